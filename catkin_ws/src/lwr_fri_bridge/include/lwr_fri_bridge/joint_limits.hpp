@@ -1,0 +1,26 @@
+/// @file
+/// The robot's joint limits as read from the one table, lwr_description/config/joint_limits.yaml.
+#pragma once
+
+#include <string>
+
+#include "lwr_fri_bridge/control_port.hpp"
+
+namespace lwr_fri_bridge {
+
+/// Limits per joint in wire order; all vectors hold seven positive finite values, except the positions.
+struct JointLimits {
+  Vector7 lower_position;  ///< rad
+  Vector7 upper_position;  ///< rad, above lower_position
+  Vector7 velocity;        ///< rad/s
+  Vector7 acceleration;    ///< rad/s^2
+  Vector7 jerk;            ///< rad/s^3
+  Vector7 torque;          ///< Nm
+};
+
+/// Reads the table. `profile` is "default" or a profile of the file such as "t1", which overrides what it names.
+/// @throws std::runtime_error naming file, line, field and what was expected if anything is missing, of the wrong
+///         length, not finite or out of order.
+JointLimits loadJointLimits(const std::string& path, const std::string& profile = "default");
+
+}  // namespace lwr_fri_bridge
