@@ -1,0 +1,271 @@
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <deque>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <ostream>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "ctrl_more/change.hpp"
+#include "ctrl_more/config_node.hpp"
+#include "ctrl_more/control_states.hpp"
+#include "ctrl_more/controller_status.hpp"
+#include "ctrl_more/cycle.hpp"
+#include "ctrl_more/feedback_controller.hpp"
+#include "ctrl_more/logger.hpp"
+#include "ctrl_more/manager.hpp"
+#include "ctrl_more/plugin_library.hpp"
+#include "ctrl_more/robot_states.hpp"
+#include "ctrl_more/status.hpp"
+
+namespace ctrl_more {
+
+class ControllerSlot;
+struct Plan;
+
+/// How a manager runs its controllers.
+struct ManagerOptions {
+  double blend_s = 0.2;    ///< time over which any change is blended in [s]; 0: at once
+  bool timed = false;      ///< measure each update() on the steady clock
+  bool lockstep = false;   ///< simulated time: overruns are not judged
+  int overruns_to_pause = 5;  ///< overruns in a row that pause a controller
+  bool check_undeclared = false;  ///< test mode: compare everything a controller did not declare
+};
+
+/// How one controller is to be loaded; what the list file says of it.
+struct ControllerEntry {
+  std::string type;           ///< registered class; "": the only one in the library
+  std::string library;        ///< `libPath` resolved; "": linked into the program
+  std::string config_file;    ///< `configFile` resolved; "": defaults
+  bool enabled = false;       ///< enabled from the start
+  double overrun_us = 0.0;    ///< longest update() [us]; 0: not judged
+  double blend_s = -1.0;      ///< own blend time [s]; < 0: the manager's
+  StopPolicy on_fault = StopPolicy::Fade;  ///< the last correction after a fault
+};
+
+/// What a list file did.
+struct LoadReport {
+  std::vector<std::string> loaded;  ///< controllers that are there now
+  std::vector<std::string> errors;  ///< one sentence each for those that are not
+  /// True if nothing was refused.
+  bool ok() const { return errors.empty(); }
+  /// All errors as one text.
+  std::string text() const;
+};
+
+/// Loads, orders, runs, pauses and guards feedback controllers (Ctrl-MORE paper, section V-B).
+///
+/// Two sides. The *cycle* calls beginCycle(), updateStage() and endCycle(): no allocation, no
+/// lock, no system call, no exception. *Services* (any other thread, serialised here by a mutex)
+/// call everything else: each change is validated against a copy, becomes one immutable plan, and
+/// is published through one atomic pointer. The cycle adopts the newest plan at its start and
+/// acknowledges its generation; what it no longer uses is freed by the service side. A refused
+/// change leaves everything as it was.
+///
+/// In the cycle each controller is guarded: on an exception, a number that is not finite, a
+/// quaternion that is not unit, or a correction beyond its declared size or rate, its writes are
+/// undone in the same cycle, its last correction is let go by policy, it is paused with the
+/// reason, and the controllers after it run. A crash of the process is not isolated.
+///
+/// Everything that starts, stops or moves a controller is blended over `blend_s`, so that
+/// corrections are continuous. With no enabled controller the references keep their bits.
+class FeedbackControllersManager : public Manager, private ControllerOwner {
+ public:
+  /// A manager without controllers.
+  /// @param robot shared robot states; must outlive the manager
+  /// @param control shared control states; must outlive the manager
+  /// @param options see ManagerOptions
+  /// @param logger null: Logger::standard()
+  FeedbackControllersManager(RobotStates& robot, ControlStates& control,
+                             const ManagerOptions& options = {}, Logger* logger = nullptr);
+  ~FeedbackControllersManager() override;
+
+  /// @name Loading (services)
+  /// @{
+
+  /// Loads a list file as printed in the paper: `loadControllers: [..]`, and for each name
+  /// `libPath` and `configFile`. Further keys per controller: `type`, `enabled`, `overrun_us`,
+  /// `on_fault` (hold, fade, zero), `blend_s`; of the file: `profiles` (name: [controllers]),
+  /// `searchPath` ([folders]), `sharedSignals` (cascade or refuse).
+  /// Controllers that cannot be loaded are reported; the others are loaded all the same. A file
+  /// that cannot be parsed loads nothing. What was loaded before keeps running.
+  /// @param file path of the list file
+  /// @param strict true: load nothing if anything is refused
+  LoadReport load(const std::string& file, bool strict = false);
+
+  /// As load(), from a parsed file or text.
+  /// @param list the tree
+  /// @param base folder that relative paths refer to
+  /// @param strict true: load nothing if anything is refused
+  LoadReport load(const ConfigNode& list, const std::string& base, bool strict = false);
+
+  /// Loads one controller under a name.
+  Status loadController(const std::string& name, const ControllerEntry& entry);
+
+  /// Takes a controller that the program made itself.
+  /// @param controller the instance
+  /// @param name its name
+  /// @param entry `library` and `type` are not used
+  Status addController(std::unique_ptr<FeedbackController> controller, const std::string& name,
+                       const ControllerEntry& entry = {});
+
+  /// Unloads a controller; refused unless it is disabled and its last correction has faded.
+  Status unload(const std::string& name);
+
+  /// Sets or replaces a profile: exactly these controllers are enabled when it is applied.
+  /// Names must be loaded.
+  Status setProfile(const std::string& profile, const std::vector<std::string>& controllers);
+  /// @}
+
+  /// @name Changing (services)
+  /// Each returns after publishing; waitAdopted(status.generation()) waits for the cycle. Unknown
+  /// names are refused with the nearest known one. Forms without a name act on all controllers,
+  /// leave safety controllers alone unless forced, and say so in the note.
+  /// @{
+  Status apply(const Change& change);       ///< several steps, all or nothing, one cycle boundary
+  Status enable();                          ///< all
+  Status disable(bool force = false);       ///< all
+  Status pause(bool force = false);         ///< all, with the reason "user"
+  Status resume();                          ///< all, the reason "user"
+  Status enable(const std::string& name);   ///< one
+  Status disable(const std::string& name, bool force = false);  ///< one
+  Status pause(const std::string& name, bool force = false);    ///< one, with the reason "user"
+  Status resume(const std::string& name, const std::string& reason = "user");
+  ///< one, one reason; "fault" clears a latched fault. The note says what still pauses it
+  Status pauseAllUsingRobotState(const std::string& signal, bool force = false);
+  ///< reason `robot signal <signal>`; key or `measuredData/key`
+  Status pauseAllUsingControlState(const std::string& signal, bool force = false);
+  ///< reason `control signal <signal>`; key or `container/key`
+  Status resumeAllUsingRobotState(const std::string& signal);    ///< withdraws that reason only
+  Status resumeAllUsingControlState(const std::string& signal);  ///< withdraws that reason only
+  Status disableAllUsingRobotState(const std::string& signal, bool force = false);
+  ///< disables them
+  Status disableAllUsingControlState(const std::string& signal, bool force = false);
+  ///< disables them
+  Status setExecutionOrder(const std::vector<std::string>& names);
+  ///< every loaded controller exactly once; on any error the old order stays
+  Status applyProfile(const std::string& profile, bool motion_switched = true);
+  ///< enables exactly these, at one cycle boundary; see Change::profile()
+  Status loadGains(const std::string& name, const std::string& file);
+  ///< hot reload: whole file checked first; changed settings are refused; gains are blended in
+  Status reloadGains(const std::string& name);  ///< loadGains() from the controller's own file
+  Status setGains(const std::string& name,
+                  const std::map<std::string, std::vector<double>>& gains);
+  ///< all or nothing, blended in
+
+  /// Waits until the cycle has adopted a plan.
+  /// @param generation from Status::generation()
+  /// @param timeout_s longest wait [s]
+  /// @return false on time-out; the plan stays published and will be adopted
+  bool waitAdopted(std::uint64_t generation, double timeout_s) const;
+  /// @}
+
+  /// @name Asking (services)
+  /// Unknown names throw std::invalid_argument with the nearest known one.
+  /// @{
+  bool isEnabled(const std::string& name) const;  ///< as requested
+  bool isPaused(const std::string& name) const;   ///< for any reason, a latched fault included
+  bool has(const std::string& name) const;        ///< true if loaded
+  std::vector<std::string> getControllersNames() const;  ///< loaded, in load order
+  std::vector<std::string> getExecutionOrder() const;    ///< loaded, in execution order
+  std::vector<std::string> getProfiles() const;          ///< names of the profiles
+  bool hasProfile(const std::string& profile) const;     ///< true if it exists
+  std::vector<std::string> getUsedRobotStates(bool enabled_only = false) const;
+  ///< union of `map/key` over loaded (or enabled) controllers, sorted
+  std::vector<std::string> getUsedControlStates(bool enabled_only = false) const;
+  ///< union of `container/key` over loaded (or enabled) controllers, sorted
+  Description describe(const std::string& name) const;  ///< declaration of one controller
+  GainValues getGains(const std::string& name) const;   ///< gains as last requested
+  ControllerStatus status(const std::string& name) const;  ///< one
+  std::vector<ControllerStatus> statusAll() const;         ///< all, in execution order
+  /// Who changed which reference by how much in the last completed run of each controller, in
+  /// execution order; controllers that are off are left out.
+  std::vector<Attribution> attribution() const;
+  void plot(const std::string& name, std::ostream& out) const;  ///< one controller
+  void plotAll(std::ostream& out) const;                        ///< all, in execution order
+  const ManagerOptions& options() const { return options_; }    ///< as constructed
+  /// @}
+
+  /// @name Manager interface (the cycle)
+  /// @{
+
+  /// `feedback`, or what setName() said.
+  const std::string& name() const override { return name_; }
+  /// Name under which a central module lists it; before the first cycle.
+  void setName(const std::string& name) { name_ = name; }
+  /// Adopts the newest plan. Freezes both stores with the first cycle.
+  void beginCycle(const Cycle& cycle) noexcept override;
+  /// Snapshots the references as `original`, then runs the controllers of the stage in order.
+  /// Both stores must be those of the constructor, or copies of them.
+  void updateStage(Stage stage, const RobotStates& robot, ControlStates& control) noexcept override;
+  /// Closes the cycle.
+  void endCycle() noexcept override;
+
+  /// A whole cycle: begin, all stages, end.
+  void update(const Cycle& cycle, const RobotStates& robot, ControlStates& control) noexcept;
+
+  /// The paper's form, for users without a clock: now is the newest stamp in `robot`, dt the
+  /// control period of `control`.
+  void update(const RobotStates& robot, ControlStates* control) noexcept;
+  /// @}
+
+ private:
+  struct Member;
+  struct Draft;
+  using Lock = std::lock_guard<std::mutex>;
+
+  // ControllerOwner
+  Status setEnabled(const std::string& name, bool enabled) override;
+  Status setPaused(const std::string& name, bool paused) override;
+  Status replaceGains(const std::string& name, const GainValues& gains) override;
+  bool enabled(const std::string& name) const override { return isEnabled(name); }
+  bool paused(const std::string& name) const override { return isPaused(name); }
+  GainValues gainsOf(const std::string& name) const override { return getGains(name); }
+
+  Status applyLocked(const Change& change);
+  Status applyStep(const Change::Step& step, Draft& draft, std::vector<std::string>& spared) const;
+  Status checkExclusive(const Draft& draft) const;
+  Status bySignal(Change::Kind kind, bool robot, const std::string& signal, bool force);
+  Status publish(const Draft& draft);
+  void collect();
+  Status take(ControllerInstance instance, const std::string& name, const ControllerEntry& entry,
+              bool publish_now);
+  Member& member(const std::string& name);
+  const Member& member(const std::string& name) const;
+  std::string unknownName(const std::string& name) const;
+  ControllerStatus statusLocked(const Member& member) const;
+
+  RobotStates& robot_;
+  ControlStates& control_;
+  ManagerOptions options_;
+  Logger* logger_;
+  LogSource log_;
+  std::string name_ = "feedback";
+
+  // service side, under mutex_
+  mutable std::mutex mutex_;
+  std::vector<std::unique_ptr<Member>> members_;  // load order
+  std::vector<std::string> order_;
+  std::map<std::string, std::vector<std::string>> profiles_;
+  bool refuse_shared_ = false;
+  std::uint32_t next_owner_ = 1;
+  std::uint64_t generation_ = 0;
+  std::deque<std::unique_ptr<const Plan>> plans_;
+
+  // shared
+  std::atomic<const Plan*> newest_{nullptr};
+  std::atomic<std::uint64_t> acknowledged_{0};
+  std::atomic<std::uint64_t> cycle_number_{0};
+
+  // cycle side
+  const Plan* plan_ = nullptr;
+  Cycle cycle_;
+  ControlStates original_;
+};
+
+}  // namespace ctrl_more

@@ -1,0 +1,171 @@
+#pragma once
+
+#include <cstdint>
+#include <ostream>
+#include <string>
+#include <unordered_map>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "ctrl_more/signal.hpp"
+#include "ctrl_more/status.hpp"
+
+namespace ctrl_more {
+
+class Logger;
+
+/// What the robot measures and what other modules estimate (Ctrl-MORE paper, section IV-A).
+///
+/// The paper's four maps are `measuredData` with `measurementTimeStamp` and `estimatedData` with
+/// `estimateTimeStamp`. Here each pair of maps is one table over one contiguous buffer: users read
+/// and write by key outside the cycle, controllers and the host by handle inside it.
+///
+/// A key has one size for its whole life. New keys are announced once on the logger; after
+/// freeze() a new key is an error. Stamps are monotonic nanoseconds; a signal that was declared
+/// but never written has the stamp kNeverWritten and reads as zeros. Values that are not finite
+/// are refused and leave the signal untouched.
+///
+/// Threads: one thread at a time. Data from other threads comes through SignalMailbox.
+class RobotStates {
+ public:
+  /// An empty store.
+  /// @param logger where new keys and wrong accesses are reported; null: Logger::standard()
+  explicit RobotStates(Logger* logger = nullptr);
+
+  /// @name Declaring keys (outside the cycle, before freeze())
+  /// @{
+
+  /// Declares a signal, or completes the unit and frame of one that exists with the same size.
+  /// @param source which map
+  /// @param key name, not empty
+  /// @param size number of doubles, > 0
+  /// @param unit SI unit or list of units
+  /// @param frame frame the numbers are expressed in
+  Status declare(RobotSource source, const std::string& key, int size, const std::string& unit = "",
+                 const std::string& frame = "");
+
+  /// Forbids new keys from now on. Called by the manager before the first cycle.
+  void freeze() { frozen_ = true; }
+
+  /// True after freeze().
+  bool frozen() const { return frozen_; }
+  /// @}
+
+  /// @name The paper's accessors, by key (outside the cycle)
+  /// Errors name the key, the expected size, the size that came and who asked.
+  /// @{
+
+  /// Writes `measuredData[key]` and its stamp; a new key is added and announced.
+  /// @param key name of the signal
+  /// @param value all of its numbers, finite
+  /// @param stamp_ns time of measurement, monotonic nanoseconds >= 0
+  /// @param who name of the writer for messages
+  Status setMeasuredData(const std::string& key, const Eigen::Ref<const Eigen::VectorXd>& value,
+                         std::int64_t stamp_ns, const char* who = "user");
+
+  /// As setMeasuredData(), in `estimatedData`.
+  Status setEstimatedData(const std::string& key, const Eigen::Ref<const Eigen::VectorXd>& value,
+                          std::int64_t stamp_ns, const char* who = "user");
+
+  /// Reads `measuredData[key]`; on failure `value` is untouched.
+  Status getMeasuredData(const std::string& key, Eigen::VectorXd& value,
+                         const char* who = "user") const;
+
+  /// Reads `measuredData[key]` with its stamp; on failure both are untouched.
+  Status getMeasuredData(const std::string& key, Eigen::VectorXd& value, std::int64_t& stamp_ns,
+                         const char* who = "user") const;
+
+  /// As getMeasuredData(), from `estimatedData`.
+  Status getEstimatedData(const std::string& key, Eigen::VectorXd& value,
+                          const char* who = "user") const;
+
+  /// As getMeasuredData(), from `estimatedData`.
+  Status getEstimatedData(const std::string& key, Eigen::VectorXd& value, std::int64_t& stamp_ns,
+                          const char* who = "user") const;
+
+  /// Writes `measurementTimeStamp[key]`; refused when `measuredData` has no such key.
+  Status setMeasurementTimeStamp(const std::string& key, std::int64_t stamp_ns,
+                                 const char* who = "user");
+
+  /// Writes `estimateTimeStamp[key]`; refused when `estimatedData` has no such key.
+  Status setEstimateTimeStamp(const std::string& key, std::int64_t stamp_ns,
+                              const char* who = "user");
+  /// @}
+
+  /// @name Access by handle (inside the cycle: no allocation, no lock)
+  /// @{
+
+  /// Handle of a key; an invalid handle if there is none (outside the cycle).
+  RobotSignal find(RobotSource source, const std::string& key) const;
+
+  /// The numbers of a signal.
+  Eigen::Map<const Eigen::VectorXd> view(RobotSignal signal) const {
+    return Eigen::Map<const Eigen::VectorXd>(data_.data() + signal.offset_, signal.size_);
+  }
+
+  /// The numbers of a signal whose size N was checked when its handle was made.
+  template <int N>
+  Eigen::Map<const Eigen::Matrix<double, N, 1>> view(RobotSignal signal) const {
+    eigen_assert(signal.size() == N);
+    return Eigen::Map<const Eigen::Matrix<double, N, 1>>(data_.data() + signal.offset_);
+  }
+
+  /// Stamp of a signal, monotonic nanoseconds, or kNeverWritten.
+  std::int64_t stamp(RobotSignal signal) const { return stamps_[signal.index_]; }
+
+  /// True if the signal was written not longer than `max_age_ns` before `now_ns`.
+  bool isFresh(RobotSignal signal, std::int64_t now_ns, std::int64_t max_age_ns) const {
+    const std::int64_t stamp = stamps_[signal.index_];
+    return stamp != kNeverWritten && now_ns - stamp <= max_age_ns;
+  }
+
+  /// Writes a signal. Returns false, and leaves it untouched, if a number is not finite.
+  /// @param signal handle from find()
+  /// @param values `signal.size()` doubles
+  /// @param stamp_ns monotonic nanoseconds >= 0
+  bool write(RobotSignal signal, const double* values, std::int64_t stamp_ns);
+  /// @}
+
+  /// Newest stamp of any signal, kNeverWritten if none was written. This is "now" for users who
+  /// run a manager without a clock.
+  std::int64_t newestStamp() const { return newest_; }
+
+  /// Table of one map, in order of declaration.
+  std::vector<SignalInfo> signals(RobotSource source) const;
+
+  /// Prints every signal of both maps with its numbers, unit and age.
+  /// @param out stream
+  /// @param now_ns time the ages refer to; kNeverWritten: newestStamp()
+  void print(std::ostream& out, std::int64_t now_ns = kNeverWritten) const;
+
+ private:
+  struct Entry {
+    SignalInfo info;
+    RobotSource source = RobotSource::Measured;
+  };
+  using Index = std::unordered_map<std::string, std::uint32_t>;
+
+  const Index& index(RobotSource source) const { return index_[static_cast<int>(source)]; }
+  Status add(RobotSource source, const std::string& key, int size, const std::string& unit,
+             const std::string& frame, const char* who);
+  Status set(RobotSource source, const std::string& key,
+             const Eigen::Ref<const Eigen::VectorXd>& value, std::int64_t stamp_ns,
+             const char* who);
+  Status get(RobotSource source, const std::string& key, Eigen::VectorXd& value,
+             std::int64_t* stamp_ns, const char* who) const;
+  Status setStamp(RobotSource source, const std::string& key, std::int64_t stamp_ns,
+                  const char* who);
+  Status refuse(const std::string& text) const;
+  std::string unknownKey(RobotSource source, const std::string& key, const char* who) const;
+
+  Logger* logger_;
+  bool frozen_ = false;
+  std::int64_t newest_ = kNeverWritten;
+  Index index_[2];
+  std::vector<Entry> entries_;
+  std::vector<double> data_;
+  std::vector<std::int64_t> stamps_;
+};
+
+}  // namespace ctrl_more

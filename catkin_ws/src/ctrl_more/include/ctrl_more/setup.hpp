@@ -1,0 +1,144 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "ctrl_more/control_states.hpp"
+#include "ctrl_more/description.hpp"
+#include "ctrl_more/gains.hpp"
+#include "ctrl_more/robot_states.hpp"
+#include "ctrl_more/signal.hpp"
+
+namespace ctrl_more {
+
+class Logger;
+
+/// Values of a controller's settings, checked against its description.
+class SettingValues {
+ public:
+  /// Every setting at its initial value.
+  explicit SettingValues(const std::vector<SettingSpec>& specs = {});
+
+  /// Sets a text setting; refuses unknown names and texts that are not among the choices.
+  Status set(const std::string& name, const std::string& text);
+
+  /// Sets a numeric setting; refuses unknown names, other sizes, ranges, numbers not finite.
+  Status set(const std::string& name, const std::vector<double>& numbers);
+
+  /// A text setting; throws std::invalid_argument if the description has none of this name.
+  const std::string& text(const std::string& name) const;
+
+  /// A numeric setting; throws std::invalid_argument if the description has none of this name.
+  const std::vector<double>& numbers(const std::string& name) const;
+
+  /// What the settings are.
+  const std::vector<SettingSpec>& specs() const { return specs_; }
+
+  /// True if all values are the same.
+  bool sameAs(const SettingValues& other) const {
+    return texts_ == other.texts_ && numbers_ == other.numbers_;
+  }
+
+  /// Name of the first setting that differs; "" if none does.
+  std::string firstDifference(const SettingValues& other) const;
+
+ private:
+  int indexOf(const std::string& name, SettingSpec::Kind kind) const;
+
+  std::vector<SettingSpec> specs_;
+  std::vector<std::string> texts_;
+  std::vector<std::vector<double>> numbers_;
+};
+
+/// One declared control signal of a controller with the key and size it got.
+struct ResolvedControlUse {
+  ControlSignalUse use;   ///< the declaration
+  std::string key;        ///< the key after settings
+  ControlSignal signal;   ///< where it is
+};
+
+/// One declared robot signal of a controller with the key and size it got.
+struct ResolvedRobotUse {
+  RobotSignalUse use;   ///< the declaration
+  std::string key;      ///< the key after settings
+  RobotSignal signal;   ///< where it is
+};
+
+/// What a controller gets in initialize(): its configuration, and handles for what its
+/// description declares. Asking for anything else throws std::invalid_argument, which refuses the
+/// controller with that sentence. Keys that do not exist yet are added with the declared size,
+/// until the stores are frozen.
+class Setup {
+ public:
+  /// Made by the manager.
+  /// @param name name of the controller, for messages
+  /// @param description its declaration
+  /// @param gains its gains
+  /// @param settings its settings
+  /// @param robot shared robot states
+  /// @param control shared control states
+  /// @param owner the controller's number
+  Setup(std::string name, const Description& description, const GainValues& gains,
+        const SettingValues& settings, RobotStates& robot, ControlStates& control,
+        std::uint32_t owner);
+
+  /// Handle of a declared robot signal.
+  /// @param role its name in the description
+  /// @param size expected size; 0: the declared one (if the description allows several: the size
+  ///        the key already has)
+  RobotSignal robot(const std::string& role, int size = 0);
+
+  /// Handle of a declared control signal, for reading.
+  /// @param role its name in the description, or `container/role` where a role appears twice
+  /// @param size as in robot()
+  ControlSignal control(const std::string& role, int size = 0);
+
+  /// Permission to modify a control signal that the description declares as modified.
+  /// @param role its name in the description, or `container/role` where a role appears twice
+  /// @param size as in robot()
+  ModifySignal modify(const std::string& role, int size = 0);
+
+  /// Handle of a declared gain.
+  Gain gain(const std::string& name) const { return gains_.find(name); }
+
+  /// Value of a declared text setting.
+  const std::string& text(const std::string& name) const { return settings_.text(name); }
+
+  /// Value of a declared numeric setting.
+  const std::vector<double>& numbers(const std::string& name) const {
+    return settings_.numbers(name);
+  }
+
+  /// Number of joints of the control states, 0 if undecided.
+  int joints() const { return control_.joints(); }
+
+  /// Control period [s]; the true one of each cycle is in Cycle::dt.
+  double period() const { return control_.controlPeriod(); }
+
+  /// Resolves everything that was declared and not asked for. Called by the manager afterwards.
+  void resolveAll();
+
+  /// All declared robot signals, in order of declaration; complete after resolveAll().
+  const std::vector<ResolvedRobotUse>& robotUses() const { return robot_uses_; }
+
+  /// All declared control signals, in order of declaration; complete after resolveAll().
+  const std::vector<ResolvedControlUse>& controlUses() const { return control_uses_; }
+
+ private:
+  void resolve(ResolvedRobotUse& entry, int size);
+  void resolve(ResolvedControlUse& entry, int size);
+  ResolvedControlUse& findControl(const std::string& role);
+  std::string keyOf(const std::string& role, const std::string& key_setting) const;
+
+  std::string name_;
+  const GainValues& gains_;
+  const SettingValues& settings_;
+  RobotStates& robot_;
+  ControlStates& control_;
+  std::uint32_t owner_;
+  std::vector<ResolvedRobotUse> robot_uses_;
+  std::vector<ResolvedControlUse> control_uses_;
+};
+
+}  // namespace ctrl_more

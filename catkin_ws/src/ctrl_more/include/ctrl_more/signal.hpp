@@ -1,0 +1,122 @@
+#pragma once
+
+#include <cstdint>
+#include <limits>
+#include <string>
+
+namespace ctrl_more {
+
+/// The two data maps of RobotStates (Ctrl-MORE paper, section IV-A).
+enum class RobotSource : std::uint8_t {
+  Measured,   ///< `measuredData`: sensors
+  Estimated,  ///< `estimatedData`: results of other modules
+};
+
+/// The containers of ControlStates (Ctrl-MORE paper, section IV-B).
+enum class ControlContainer : std::uint8_t {
+  TaskSpaceReferencePose,  ///< 7: x y z [m], quaternion x y z w
+  TaskSpaceReferenceVel,   ///< 6: linear [m/s], angular [rad/s]
+  TaskSpaceReferenceAcc,   ///< 6: linear [m/s^2], angular [rad/s^2]
+  JointSpaceReference,     ///< one per joint; keys Position, Velocity, Torque
+  OtherReference,          ///< any declared size
+  CentreOfMass,            ///< 3 each; keys com, comVelocity, comAcceleration
+  LinearMomentum,          ///< 3 [kg m/s]; key linearMomentum
+  AngularMomentum,         ///< 3 [kg m^2/s]; key angularMomentum
+  Zmp,                     ///< 3 [m]; key zmp, and named ones
+  PelvisOrientation,       ///< 4: unit quaternion x y z w; key pelvis
+};
+
+/// How corrections of a signal are combined, faded and checked.
+enum class SignalKind : std::uint8_t {
+  Vector,      ///< a correction is a sum
+  Pose,        ///< 7: position adds, orientation multiplies from the left
+  Quaternion,  ///< 4: x y z w, multiplies from the left
+};
+
+/// Name of a source as in the paper: `measuredData`, `estimatedData`.
+const char* nameOf(RobotSource source);
+
+/// Name of a container as in the paper, for example `taskSpaceReferencePose`.
+const char* nameOf(ControlContainer container);
+
+/// Kind of the signals of a container.
+SignalKind kindOf(ControlContainer container);
+
+/// Size that every signal of a container has; 0 where each key declares its own.
+int fixedSizeOf(ControlContainer container);
+
+/// Stamp of a signal that was never written. All other stamps are monotonic nanoseconds >= 0.
+constexpr std::int64_t kNeverWritten = -1;
+
+/// "No limit", for ages and corrections.
+constexpr double kUnlimited = std::numeric_limits<double>::infinity();
+
+/// What a store knows of one signal.
+struct SignalInfo {
+  std::string key;     ///< key within its map or container
+  std::string unit;    ///< SI unit or list of units, "" if the writer declared none
+  std::string frame;   ///< frame the numbers are expressed in, "" if not declared
+  std::uint32_t offset = 0;  ///< first double in the store's buffer
+  std::uint32_t size = 0;    ///< number of doubles
+  SignalKind kind = SignalKind::Vector;  ///< algebra of corrections
+};
+
+/// Handle of a signal in RobotStates, valid for every store with the same layout (copies included).
+/// Obtained from RobotStates::find() or, in a controller, from Setup.
+class RobotSignal {
+ public:
+  /// An empty handle; using it is an error.
+  RobotSignal() = default;
+  /// Number of doubles.
+  int size() const { return static_cast<int>(size_); }
+  /// False for an empty handle.
+  bool valid() const { return size_ != 0; }
+
+ private:
+  friend class RobotStates;
+  std::uint32_t offset_ = 0;
+  std::uint32_t size_ = 0;
+  std::uint32_t index_ = 0;
+};
+
+/// Handle of a signal in ControlStates, for reading (and, on a mutable store, for the host's own
+/// writing). A controller only ever sees constant stores, so for it this handle reads.
+class ControlSignal {
+ public:
+  /// An empty handle; using it is an error.
+  ControlSignal() = default;
+  /// Number of doubles.
+  int size() const { return static_cast<int>(size_); }
+  /// First double in the store's buffer.
+  int offset() const { return static_cast<int>(offset_); }
+  /// False for an empty handle.
+  bool valid() const { return size_ != 0; }
+
+ private:
+  friend class ControlStates;
+  std::uint32_t offset_ = 0;
+  std::uint32_t size_ = 0;
+  std::uint32_t index_ = 0;
+};
+
+/// Permission of one controller to modify one control signal. Only Setup issues it, only for a
+/// signal that the controller's description declares, and only its owner can use it.
+class ModifySignal {
+ public:
+  /// An empty permission; using it is a fault.
+  ModifySignal() = default;
+  /// The same signal for reading, in `original` or elsewhere.
+  ControlSignal signal() const { return signal_; }
+  /// Number of doubles.
+  int size() const { return signal_.size(); }
+  /// False for an empty permission.
+  bool valid() const { return owner_ != 0; }
+
+ private:
+  friend class Setup;
+  friend class ModifiedControlStates;
+  ControlSignal signal_;
+  std::uint32_t owner_ = 0;
+};
+
+}  // namespace ctrl_more
