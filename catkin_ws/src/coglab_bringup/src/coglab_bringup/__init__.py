@@ -1,0 +1,1 @@
+"""The tools behind ./coglab: demo, test runner, bench frame, launch, doctor."""

@@ -1,0 +1,195 @@
+"""./coglab demo: launches the simulated cell and the whole system, asks for a handover, writes what happened, stops."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+from coglab_bringup.run_directory import free_port, run_environment
+
+MASTER_LIMIT = 30.0  # s until the ROS master answers
+READY_LIMIT = 90.0  # s until the system waits in its hub
+HANDOVER_LIMIT = 60.0  # s for one handover
+HUBS = ("wait_without_object", "wait_with_object")
+MASTER = "/coglab_master"
+
+
+def commit_of(top: Path) -> str:
+    """The commit of this checkout, read from .git (git itself may not be installed); "unknown" outside a checkout."""
+    head = top / ".git" / "HEAD"
+    if not head.is_file():
+        return "unknown"
+    reference = head.read_text().strip().removeprefix("ref: ")
+    loose = top / ".git" / reference
+    if loose.is_file():
+        return loose.read_text().strip()
+    packed = top / ".git" / "packed-refs"
+    for line in packed.read_text().splitlines() if packed.is_file() else []:
+        if line.endswith(" " + reference):
+            return line.split()[0]
+    return reference
+
+
+class System:
+    """The launched system of one run; `stop()` ends every process of it."""
+
+    def __init__(self, environment: dict[str, str], port: int, arguments: list[str], log: Path) -> None:
+        self._log = log.open("w")
+        command = ["roslaunch", "-p", str(port), "coglab_bringup", "coglab.launch", *arguments]
+        self._process = subprocess.Popen(
+            command, env=environment, stdout=self._log, stderr=subprocess.STDOUT, stdin=subprocess.DEVNULL,
+            start_new_session=True,
+        )
+
+    def alive(self) -> bool:
+        """Whether roslaunch still runs."""
+        return self._process.poll() is None
+
+    def stop(self) -> None:
+        """SIGINT to roslaunch, as Ctrl-C does; harder after 20 s."""
+        for sign, patience in ((signal.SIGINT, 20.0), (signal.SIGTERM, 10.0)):
+            if not self.alive():
+                break
+            self._process.send_signal(sign)
+            try:
+                self._process.wait(patience)
+            except subprocess.TimeoutExpired:
+                continue
+        if self.alive():
+            os.killpg(self._process.pid, signal.SIGKILL)
+            self._process.wait()
+        self._log.close()
+
+
+def wait_for_master(system: System, limit: float) -> None:
+    """Waits until the ROS master of this run answers. Raises RuntimeError after `limit` seconds or if roslaunch ended."""
+    import rosgraph
+
+    deadline = time.monotonic() + limit
+    while not rosgraph.is_master_online():
+        if not system.alive():
+            raise RuntimeError("roslaunch ended before its master answered")
+        if time.monotonic() > deadline:
+            raise RuntimeError(f"the ROS master did not answer within {limit:.0f} s")
+        time.sleep(0.1)
+
+
+def ask_for(action: str, object_id: str, system: System, limit: float) -> None:
+    """Calls /coglab/start until the master machine takes the action. Raises RuntimeError with its last refusal."""
+    import rospy
+    from coglab_msgs.srv import Start
+
+    deadline = time.monotonic() + limit
+    refusal = "the service /coglab/start never appeared"
+    while time.monotonic() < deadline and system.alive():
+        try:
+            rospy.wait_for_service("/coglab/start", timeout=1.0)
+            answer = rospy.ServiceProxy("/coglab/start", Start)(action, object_id)
+        except rospy.ROSException:
+            continue
+        except rospy.ServiceException as error:
+            refusal = str(error)
+        else:
+            if answer.success:
+                return
+            refusal = answer.message
+        time.sleep(0.2)
+    raise RuntimeError(f"{action} was not taken within {limit:.0f} s: {refusal}")
+
+
+def run_handover(kind: str, object_id: str, system: System) -> tuple[dict, object, float, float]:
+    """Asks for one handover and waits for the hub after it; its result row, its record, and when it began and ended."""
+    import numpy as np
+    import rospkg
+    import rospy
+    import yaml
+
+    from coglab_bringup.trial_recorder import TrialRecorder, summarise
+
+    table = Path(rospkg.RosPack().get_path("lwr_description")) / "config" / "joint_limits.yaml"
+    limits = np.array(yaml.safe_load(table.read_text())["default"]["velocity"])
+    recorder = TrialRecorder()
+    ask_for(kind, object_id, system, READY_LIMIT)
+    start = rospy.get_time()
+
+    def ended() -> list[tuple]:
+        return [row for row in recorder.trial.transitions if row[1] == MASTER and row[2] == kind and row[4] in HUBS]
+
+    recorder.wait_for(lambda: bool(ended()) or not system.alive(), HANDOVER_LIMIT)
+    end = rospy.get_time()
+    trial = recorder.stop()
+    if ended():
+        _, _, _, outcome, _, reason = ended()[0]
+        outcome = "success" if outcome == "succeeded" else f"{outcome}: {reason}"
+    else:
+        outcome = "the system ended" if not system.alive() else f"no end within {HANDOVER_LIMIT:.0f} s"
+    return summarise(trial, kind, outcome, start, end, limits), trial, start, end
+
+
+def record_times(top: Path, seconds: float) -> None:
+    """Keeps the wall times of this demo for ./coglab bench wall."""
+    folder = top / ".coglab"
+    folder.mkdir(exist_ok=True)
+    path = folder / "times.json"
+    times = json.loads(path.read_text()) if path.is_file() else {}
+    install = float(os.environ.get("COGLAB_INSTALL_SECONDS", "0"))
+    build = float(os.environ.get("COGLAB_BUILD_SECONDS", "0"))
+    whole = {"install_s": install, "build_s": build, "run_s": round(seconds, 1), "total_s": round(install + build + seconds, 1)}
+    times["first_demo" if "first_demo" not in times else "later_demo"] = whole
+    path.write_text(json.dumps(times, indent=1) + "\n")
+
+
+def main(arguments: list[str]) -> int:
+    """Exit status 0 if every handover succeeded."""
+    top = Path(os.environ["COGLAB_TOP"])
+    parser = argparse.ArgumentParser(prog="coglab demo", description=__doc__)
+    parser.add_argument("--headless", action="store_true", help="no rviz, whatever is installed")
+    parser.add_argument("--seed", type=int, default=7, help="seed of the virtual person and of all noise")
+    parser.add_argument("--object", default="mug", help="id in the object database")
+    parser.add_argument("--out", type=Path, default=top / "out" / "demo", metavar="DIR", help="where result.json and trial.png go")
+    options = parser.parse_args(arguments)
+    began = time.monotonic()
+    out: Path = options.out.absolute()
+    out.mkdir(parents=True, exist_ok=True)
+    port = free_port()
+    environment = run_environment(port, out / "ros_home")
+    os.environ.update(environment)
+    screen = bool(os.environ.get("DISPLAY")) and not options.headless and Path("/usr/bin/rviz").exists()
+    launch = [f"seed:={options.seed}", f"rviz:={'true' if screen else 'false'}", f"log_file:={out / 'fri_ticks.csv'}"]
+    system = System(environment, port, launch, out / "roslaunch.log")
+    kinds = ["exchange_human_to_robot"]
+    result: dict = {"commit": commit_of(top), "seed": options.seed, "handovers": []}
+    try:
+        wait_for_master(system, MASTER_LIMIT)
+        import rospy
+
+        from coglab_bringup.trial_plot import draw_trial
+
+        rospy.init_node("coglab_demo", anonymous=True, disable_signals=True)
+        for kind in kinds:
+            row, trial, start, end = run_handover(kind, options.object, system)
+            result["handovers"].append(row)
+            title = f"{kind.replace('_', ' ')}, {options.object}, seed {options.seed}: {row['outcome']}"
+            draw_trial(trial, title, start, end, out / "trial.png")
+    except (RuntimeError, KeyboardInterrupt) as error:
+        reason = str(error) or "interrupted"
+        result["handovers"].append({"kind": kinds[len(result["handovers"])], "outcome": reason})
+    finally:
+        system.stop()
+    (out / "result.json").write_text(json.dumps(result, indent=1) + "\n")
+    good = sum(row["outcome"] == "success" for row in result["handovers"])
+    for row in result["handovers"]:
+        print(f"{row['kind']}: {row['outcome']}" + (f" in {row['duration_s']:.1f} s" if "duration_s" in row else ""))
+    print(f"{good} of {len(kinds)} handovers succeeded; {out}/result.json and trial.png, log: {out}/roslaunch.log", flush=True)
+    record_times(top, time.monotonic() - began)
+    return 0 if good == len(kinds) else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

@@ -1,0 +1,95 @@
+"""./coglab doctor: says in words what is missing on this machine and how to get it. Needs nothing but Python."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import socket
+import subprocess
+import sys
+from pathlib import Path
+
+
+def package_groups(top: Path) -> dict[str, list[str]]:
+    """Groups of debian-packages.txt with their packages."""
+    groups: dict[str, list[str]] = {}
+    for line in (top / "debian-packages.txt").read_text().splitlines():
+        if line and not line.startswith("#"):
+            group, names = line.split(":", 1)
+            groups.setdefault(group, []).extend(names.split())
+    return groups
+
+
+def installed(package: str) -> bool:
+    """Whether a Debian package is installed."""
+    query = ["dpkg-query", "-W", "-f=${db:Status-Status}", package]
+    return subprocess.run(query, capture_output=True, text=True, check=False).stdout == "installed"
+
+
+def release() -> dict[str, str]:
+    """Fields of /etc/os-release."""
+    lines = Path("/etc/os-release").read_text().splitlines()
+    return {key: value.strip('"') for key, _, value in (line.partition("=") for line in lines)}
+
+
+def smach_copies(top: Path) -> list[Path]:
+    """Folders outside our own that hold a package named smach, smach_msgs or smach_ros in the workspace or ROS paths."""
+    ours = top / "catkin_ws" / "src" / "executive_smach"
+    places = [top / "catkin_ws" / "src", Path("/opt/ros"), Path("/usr/share")]
+    places += [Path(p) for p in os.environ.get("ROS_PACKAGE_PATH", "").split(":") if p]
+    copies: set[Path] = set()
+    for place in places:
+        for name in ("smach", "smach_msgs", "smach_ros"):
+            patterns = (f"{name}/package.xml", f"*/{name}/package.xml", f"*/share/{name}/package.xml")
+            for pattern in patterns:
+                copies.update(found.parent for found in place.glob(pattern) if ours not in found.parents)
+    return sorted(copies)
+
+
+def findings(top: Path) -> list[tuple[bool, str]]:
+    """Each finding: whether it is fine, and a sentence (with what to do where it is not)."""
+    result: list[tuple[bool, str]] = []
+    system = release()
+    fine = system.get("VERSION_CODENAME") == "bookworm"
+    name = system.get("PRETTY_NAME", "unknown")
+    result.append((fine, f"Debian 12 (bookworm): {name}" + ("" if fine else "; use Debian 12, or a container: docker/run")))
+    for group, packages in package_groups(top).items():
+        missing = [package for package in packages if not installed(package)]
+        if missing and group == "viz":
+            result.append((True, "rviz is not installed (only needed where there is a screen): ./coglab install viz"))
+        elif missing:
+            result.append((False, f"packages to {group}: missing {' '.join(missing)}; get them: ./coglab install {group}"))
+        else:
+            result.append((True, f"packages to {group}: all {len(packages)} installed"))
+    built = (top / "catkin_ws" / "devel" / "setup.bash").exists()
+    result.append((built, "workspace: built" if built else "workspace: not built yet; do it: ./coglab build"))
+    python = shutil.which("python3")
+    if python != "/usr/bin/python3":
+        result.append((True, f"python3 in your PATH is {python}; ./coglab uses /usr/bin/python3 anyway, and so does devel/setup.bash"))
+    foreign = [v for v in ("ROS_DISTRO", "ROS_ROOT", "CMAKE_PREFIX_PATH", "ROS_PACKAGE_PATH") if "/opt/ros" in os.environ.get(v, "")]
+    if foreign:
+        result.append((False, f"a ROS from /opt/ros is in {', '.join(foreign)}; open a shell without it before sourcing devel/setup.bash"))
+    for copy in smach_copies(top):
+        result.append((False, f"a second copy of {copy.name} lies in {copy}; remove it, or build with ./coglab build --upstream-smach"))
+    try:
+        socket.getaddrinfo(socket.gethostname(), None)
+    except OSError:
+        result.append((True, f"the host name {socket.gethostname()} does not resolve; harmless, because ROS_IP=127.0.0.1 is set"))
+    if shutil.disk_usage(top).free < 2e9:
+        result.append((False, "less than 2 GB free where this folder lies; make room before building"))
+    return result
+
+
+def main(arguments: list[str]) -> int:
+    """Prints the findings; exit status 0 if all are fine."""
+    found = findings(Path(arguments[0]))
+    for fine, sentence in found:
+        print(("ok       " if fine else "MISSING  ") + sentence)
+    if all(fine for fine, _ in found):
+        print("Everything is here: ./coglab demo")
+        return 0
+    return 1
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

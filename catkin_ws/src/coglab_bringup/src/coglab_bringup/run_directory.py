@@ -1,0 +1,42 @@
+"""What makes two runs on one machine independent: an own ROS master port, ROS_HOME and log folder per run."""
+
+from __future__ import annotations
+
+import os
+import socket
+import tempfile
+from pathlib import Path
+
+
+def free_port() -> int:
+    """A TCP port on loopback that nobody holds at the moment."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
+
+
+def port_is_free(port: int) -> bool:
+    """Whether a ROS master could bind this TCP port."""
+    with socket.socket() as probe:
+        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            probe.bind(("127.0.0.1", port))
+        except OSError:
+            return False
+    return True
+
+
+def run_environment(port: int, home: Path | None = None) -> dict[str, str]:
+    """The environment of one run: `port` of its ROS master, `home` for ROS_HOME (default: a new temporary folder)."""
+    ros_home = home or Path(tempfile.mkdtemp(prefix="coglab-run-"))
+    ros_home.mkdir(parents=True, exist_ok=True)
+    environment = dict(os.environ)
+    environment.update(
+        ROS_MASTER_URI=f"http://127.0.0.1:{port}",
+        ROS_IP="127.0.0.1",
+        ROS_HOME=str(ros_home),
+        ROS_LOG_DIR=str(ros_home / "log"),
+        ROSCONSOLE_STDOUT_LINE_BUFFERED="1",
+    )
+    environment.pop("ROS_HOSTNAME", None)
+    return environment

@@ -1,0 +1,196 @@
+"""./coglab test: finds and runs every test of the workspace and counts each case once, from the JUnit files.
+
+Three kinds, found by where they lie in a package:
+  gtest    executables <package>_test_* in devel/lib/<package> (built by the target `tests`)
+  pytest   test/test_*.py (smach's own packages one level deeper alike)
+  rostest  test/*.test, one at a time, each with a ROS master of its own
+gtests and pytests of different packages run two at a time; rostests run alone, because they measure real time.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+import xml.etree.ElementTree as ElementTree
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from coglab_bringup.run_directory import free_port, run_environment
+
+TIME_LIMIT = 900.0  # s, per test program
+LONG_TIME_LIMIT = 7200.0  # s, with --long
+
+
+@dataclass
+class Program:
+    """One test program and what became of it."""
+
+    package: str
+    kind: str  # gtest, pytest, rostest
+    name: str
+    command: list[str]
+    junit: Path  # file it writes, or (rostest) folder
+    seconds: float = 0.0
+    passed: int = 0
+    failed: int = 0
+    skipped: int = 0
+    failures: list[str] = field(default_factory=list)
+
+
+def packages(sources: Path) -> dict[str, Path]:
+    """Folder of each package by name."""
+    found = {}
+    for manifest in sorted(sources.rglob("package.xml")):
+        name = ElementTree.parse(manifest).findtext("name", "").strip()
+        found[name] = manifest.parent
+    return found
+
+
+def find_programs(top: Path, results: Path, python: str, wanted: list[str]) -> list[Program]:
+    """All test programs of the wanted packages (all if none is named)."""
+    programs = []
+    library = top / "catkin_ws" / "devel" / "lib"
+    for package, folder in packages(top / "catkin_ws" / "src").items():
+        if wanted and package not in wanted:
+            continue
+        for binary in sorted((library / package).glob(f"{package}_test_*")):
+            xml = results / f"{package}.{binary.name}.xml"
+            programs.append(Program(package, "gtest", binary.name, [str(binary), f"--gtest_output=xml:{xml}"], xml))
+        for path in sorted((folder / "test").glob("test_*.py")):
+            xml = results / f"{package}.{path.stem}.xml"
+            command = [python, "-m", "pytest", "-q", "-p", "no:cacheprovider", f"--junit-xml={xml}", str(path)]
+            programs.append(Program(package, "pytest", path.name, command, xml))
+        for path in sorted((folder / "test").glob("*.test")):
+            home = results / f"{package}.{path.stem}"
+            programs.append(Program(package, "rostest", path.name, ["rostest", str(path)], home))
+    return programs
+
+
+def count_cases(program: Program, report: Path) -> None:
+    """Adds the cases of one JUnit file to the program's counts."""
+    for case in ElementTree.parse(report).getroot().iter("testcase"):
+        name = f"{case.get('classname', '')}.{case.get('name', '')}"
+        if case.find("failure") is not None or case.find("error") is not None:
+            problem = case.find("failure") if case.find("failure") is not None else case.find("error")
+            program.failed += 1
+            text = (problem.get("message") or problem.text or "").strip().splitlines()
+            program.failures.append(f"{name}: {text[0] if text else 'no message'}")
+        elif case.find("skipped") is not None or case.get("status") == "notrun":
+            program.skipped += 1
+        else:
+            program.passed += 1
+
+
+def count(program: Program, status: int | None) -> None:
+    """Reads the program's JUnit files; a program without one, or that died without a red case, counts as one failure."""
+    if program.kind == "rostest":
+        # rosunit-*.xml holds the cases; rostest-*.xml only says whether each test node left such a file
+        reports = sorted(program.junit.rglob("rosunit-*.xml"))
+        if status != 0 and not reports:
+            reports = sorted(program.junit.rglob("rostest-*.xml"))
+    else:
+        reports = [program.junit] if program.junit.exists() else []
+    for report in reports:
+        try:
+            count_cases(program, report)
+        except ElementTree.ParseError as error:
+            program.failed += 1
+            program.failures.append(f"{report.name}: not readable as JUnit XML ({error})")
+    ended = "was ended at its time limit" if status is None else f"ended with status {status}"
+    nothing_ran = program.kind == "pytest" and status == 5
+    if not program.failed and not nothing_ran and (status != 0 or not reports):
+        program.failed += 1
+        program.failures.append(f"{program.name} {ended} and reported no failed case; see its log")
+
+
+def run(program: Program, log: Path, limit: float) -> None:
+    """Runs one program in its own process group and ends the whole group at the limit."""
+    environment = dict(os.environ)
+    if program.kind == "rostest":
+        environment = run_environment(free_port(), program.junit)
+    start = time.monotonic()
+    with log.open("w") as output:
+        process = subprocess.Popen(
+            program.command, stdout=output, stderr=subprocess.STDOUT, stdin=subprocess.DEVNULL,
+            env=environment, start_new_session=True,
+        )
+        status: int | None
+        try:
+            status = process.wait(limit)
+        except subprocess.TimeoutExpired:
+            os.killpg(process.pid, signal.SIGINT)
+            try:
+                process.wait(20)
+            except subprocess.TimeoutExpired:
+                os.killpg(process.pid, signal.SIGKILL)
+                process.wait()
+            status = None
+    program.seconds = time.monotonic() - start
+    count(program, status)
+    verdict = "ok" if not program.failed else f"{program.failed} FAILED"
+    print(
+        f"  {program.package:20s} {program.kind:8s}{program.name:44s}{program.passed:6d} passed "
+        f"{program.skipped:3d} skipped {program.seconds:7.1f} s  {verdict}",
+        flush=True,
+    )
+
+
+def report(programs: list[Program], results: Path) -> int:
+    """Prints failures, the time of each package and the closing line; returns the exit status."""
+    for program in programs:
+        for failure in program.failures:
+            print(f"FAILED {program.package} {program.name}: {failure}")
+            print(f"       log: {results / 'logs' / (program.package + '.' + program.name + '.log')}")
+    by_package: dict[str, float] = {}
+    for program in programs:
+        by_package[program.package] = by_package.get(program.package, 0.0) + program.seconds
+    print("time per package: " + ", ".join(f"{name} {seconds:.0f} s" for name, seconds in sorted(by_package.items())))
+    passed = sum(program.passed for program in programs)
+    failed = sum(program.failed for program in programs)
+    skipped = sum(program.skipped for program in programs)
+    print(f"{passed} passed, {failed} failed, {skipped} skipped", flush=True)
+    return 0 if failed == 0 and passed > 0 else 1
+
+
+def main(arguments: list[str]) -> int:
+    """Runs the tests; exit status 0 only if at least one passed and none failed."""
+    parser = argparse.ArgumentParser(prog="coglab test", description=__doc__.splitlines()[0])
+    parser.add_argument("packages", nargs="*", metavar="PACKAGE", help="default: all")
+    parser.add_argument("--long", action="store_true", help="the campaigns too (hours)")
+    options = parser.parse_args(arguments)
+    top = Path(os.environ["COGLAB_TOP"])
+    known = packages(top / "catkin_ws" / "src")
+    unknown = [name for name in options.packages if name not in known]
+    if unknown:
+        print(f"[coglab] error: no package named {', '.join(unknown)}; there are: {', '.join(known)}", file=sys.stderr)
+        return 2
+    if options.long:
+        os.environ["COGLAB_LONG"] = "1"
+    limit = LONG_TIME_LIMIT if options.long else TIME_LIMIT
+    results = top / "out" / "test"
+    shutil.rmtree(results, ignore_errors=True)
+    (results / "logs").mkdir(parents=True)
+    python = os.environ.get("COGLAB_TEST_PYTHON", "/usr/bin/python3")
+    programs = find_programs(top, results, python, options.packages)
+    start = time.monotonic()
+
+    def run_one(program: Program) -> None:
+        run(program, results / "logs" / f"{program.package}.{program.name}.log", limit)
+
+    with ThreadPoolExecutor(max_workers=2) as pool:
+        list(pool.map(run_one, [program for program in programs if program.kind != "rostest"]))
+    for program in programs:
+        if program.kind == "rostest":
+            run_one(program)
+    print(f"all tests: {time.monotonic() - start:.0f} s; JUnit files and logs: {results.relative_to(top)}")
+    return report(programs, results)
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

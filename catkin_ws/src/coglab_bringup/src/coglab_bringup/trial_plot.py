@@ -1,0 +1,90 @@
+"""One picture of a trial: phases, paths, speeds, torques and fingers on one time axis."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import matplotlib
+
+matplotlib.use("Agg")
+import matplotlib.pyplot as plt  # noqa: E402  (the backend has to be chosen first)
+import numpy as np  # noqa: E402
+
+from coglab_bringup.trial_recorder import Trial  # noqa: E402
+
+# Okabe and Ito's colours: told apart by colour-blind readers too
+COLOURS = ["#0072B2", "#E69F00", "#009E73", "#D55E00", "#56B4E9", "#CC79A7", "#1B1F24"]
+JOINTS = ["A1", "A2", "E1", "A3", "A4", "A5", "A6"]
+FINGERS = ["thumb abduction", "thumb", "index", "middle", "ring+little"]
+
+
+def _column(rows: list[tuple], index: int, origin: float) -> tuple[np.ndarray, np.ndarray]:
+    """Times relative to `origin` and one column of the rows."""
+    return np.array([row[0] for row in rows]) - origin, np.array([row[index] for row in rows])
+
+
+def _speed(times: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """Speed of a path, smoothed over 50 ms."""
+    velocity = np.gradient(points, times, axis=0)
+    width = max(1, int(0.05 / max(np.median(np.diff(times)), 1e-4)))
+    kernel = np.ones(width) / width
+    return np.convolve(np.linalg.norm(velocity, axis=1), kernel, mode="same")
+
+
+def _phases(axis: plt.Axes, trial: Trial, origin: float, end: float) -> None:
+    """A bar per state of the two innermost levels that were entered."""
+    rows = [(t, path, to) for t, path, _, _, to, _ in trial.transitions]
+    lanes = sorted({path for _, path, _ in rows}, key=lambda path: (path.count("/"), path))
+    for lane, path in enumerate(lanes):
+        steps = [(t, to) for t, at, to in rows if at == path]
+        for k, (t, name) in enumerate(steps):
+            stop = steps[k + 1][0] if k + 1 < len(steps) else end
+            axis.barh(lane, stop - t, left=t - origin, height=0.8, color=COLOURS[k % 6], alpha=0.35, edgecolor="#1B1F24", lw=0.5)
+            if stop - t > 0.02 * (end - origin):
+                axis.text(t - origin + 0.02, lane, name, va="center", fontsize=6, clip_on=True)
+    axis.set_yticks(range(len(lanes)), [path.rsplit("/", 1)[-1] for path in lanes], fontsize=6)
+    axis.invert_yaxis()
+
+
+def draw_trial(trial: Trial, title: str, start: float, end: float, path: Path) -> None:
+    """Writes the picture of the trial between `start` and `end` (s of ROS time) as PNG."""
+    figure, axes = plt.subplots(5, 1, figsize=(10, 11), sharex=True, height_ratios=[1.3, 1.5, 1, 1.2, 1], layout="constrained")
+    _phases(axes[0], trial, start, end)
+    axes[0].set_title(title, fontsize=10, loc="left")
+    if len(trial.truth) > 2:
+        times, robot = _column(trial.truth, 1, start)
+        _, human = _column(trial.truth, 2, start)
+        _, force = _column(trial.truth, 4, start)
+        for k, name in enumerate("xyz"):
+            axes[1].plot(times, robot[:, k], color=COLOURS[k], label=f"robot {name}")
+            axes[1].plot(times, human[:, k], color=COLOURS[k], ls="--", label=f"person {name}")
+        axes[2].plot(times, _speed(times, robot), color=COLOURS[0], label="robot hand")
+        axes[2].plot(times, _speed(times, human), color=COLOURS[3], ls="--", label="person's hand")
+        force_axis = axes[4].twinx()
+        force_axis.plot(times, force, color=COLOURS[6], lw=0.8, label="force on the palm")
+        force_axis.set_ylabel("N", fontsize=8)
+        force_axis.legend(fontsize=6, loc="upper right")
+    axes[1].set_ylabel("hand paths, m", fontsize=8)
+    axes[2].set_ylabel("speed, m/s", fontsize=8)
+    if trial.external_torques:
+        times, torques = _column(trial.external_torques, 1, start)
+        for k, name in enumerate(JOINTS):
+            axes[3].plot(times, torques[:, k], color=COLOURS[k], lw=0.7, label=name)
+    axes[3].set_ylabel("external torque, Nm", fontsize=8)
+    if trial.fingers:
+        times, positions = _column(trial.fingers, 1, start)
+        for k, name in enumerate(FINGERS):
+            axes[4].plot(times, positions[:, k], color=COLOURS[k], lw=0.9, label=name)
+    axes[4].set_ylabel("finger position", fontsize=8)
+    axes[4].set_xlabel("time, s", fontsize=8)
+    for axis in axes:
+        for t, found, _ in trial.contacts:
+            if found:
+                axis.axvline(t - start, color="#D55E00", lw=0.8, ls=":")
+        axis.tick_params(labelsize=7)
+        axis.grid(alpha=0.25)
+        axis.set_xlim(0.0, end - start)
+        if axis.get_legend_handles_labels()[0]:
+            axis.legend(fontsize=6, ncols=4, loc="upper left")
+    figure.savefig(path, dpi=110)
+    plt.close(figure)

@@ -1,0 +1,118 @@
+"""Listens to one trial and keeps what its result and its plot need. Reads the simulated truth: it measures, it does not control."""
+
+from __future__ import annotations
+
+import threading
+from dataclasses import dataclass, field
+
+import numpy as np
+import rospy
+from coglab_msgs.msg import CellTruth, Contact, DmpFeedback, HandStatus, Transition
+from diagnostic_msgs.msg import DiagnosticArray
+from sensor_msgs.msg import JointState
+
+FORCE_THRESHOLD = 0.3  # N on the palm from which the object counts as touching (truth)
+LOST_KEYS = ("lost measurements", "lost")  # diagnostics values that count lost FRI packets
+
+
+@dataclass
+class Trial:
+    """Time series of one trial; times in s of ROS time, rows beside them."""
+
+    joints: list[tuple] = field(default_factory=list)  # (t, position[7], velocity[7])
+    external_torques: list[tuple] = field(default_factory=list)  # (t, torque[7]) in Nm
+    truth: list[tuple] = field(default_factory=list)  # (t, robot xyz, human xyz, object xyz, palm force)
+    fingers: list[tuple] = field(default_factory=list)  # (t, position[5])
+    feedback: list[tuple] = field(default_factory=list)  # (t, state, remaining distance)
+    transitions: list[tuple] = field(default_factory=list)  # (t, path, from, outcome, to, reason)
+    contacts: list[tuple] = field(default_factory=list)  # (t, contact, margin)
+    fri_lost: int = 0
+
+
+class TrialRecorder:
+    """Subscribes to the topics of a running system and fills a Trial until `stop()`."""
+
+    def __init__(self) -> None:
+        self.trial = Trial()
+        self.changed = threading.Condition()
+        self._lost_at_start: int | None = None
+        self._subscribers = [
+            rospy.Subscriber("/lwr/joint_states", JointState, self._on_joints, queue_size=400),
+            rospy.Subscriber("/lwr/external_torques", JointState, self._on_torques, queue_size=400),
+            rospy.Subscriber("/coglab_sim/truth/cell", CellTruth, self._on_truth, queue_size=400),
+            rospy.Subscriber("/ih2_hand/hand_status", HandStatus, self._on_hand, queue_size=100),
+            rospy.Subscriber("/controller_manager/dmp/feedback", DmpFeedback, self._on_feedback, queue_size=100),
+            rospy.Subscriber("/coglab/transitions", Transition, self._on_transition, queue_size=100),
+            rospy.Subscriber("/coglab/contact", Contact, self._on_contact, queue_size=100),
+            rospy.Subscriber("/diagnostics", DiagnosticArray, self._on_diagnostics, queue_size=10),
+        ]
+
+    def stop(self) -> Trial:
+        """Ends listening; the trial is complete."""
+        for subscriber in self._subscribers:
+            subscriber.unregister()
+        return self.trial
+
+    def wait_for(self, condition, limit: float) -> bool:
+        """Waits until `condition()` holds, at most `limit` seconds of the steady clock; whether it did."""
+        with self.changed:
+            return self.changed.wait_for(lambda: condition() or rospy.is_shutdown(), limit) and condition()
+
+    def _on_joints(self, message: JointState) -> None:
+        self.trial.joints.append((message.header.stamp.to_sec(), message.position, message.velocity))
+
+    def _on_torques(self, message: JointState) -> None:
+        self.trial.external_torques.append((message.header.stamp.to_sec(), message.effort))
+
+    def _on_truth(self, message: CellTruth) -> None:
+        points = [message.robot_hand.position, message.human_hand.position, message.object.position, message.palm_force]
+        robot, human, thing, force = ([p.x, p.y, p.z] for p in points)
+        self.trial.truth.append((rospy.get_time(), robot, human, thing, float(np.linalg.norm(force))))
+
+    def _on_hand(self, message: HandStatus) -> None:
+        if len(message.motors) == 5:
+            self.trial.fingers.append((message.header.stamp.to_sec(), [motor.position for motor in message.motors]))
+
+    def _on_feedback(self, message: DmpFeedback) -> None:
+        self.trial.feedback.append((rospy.get_time(), message.state, message.remaining_distance))
+
+    def _on_transition(self, message: Transition) -> None:
+        with self.changed:
+            row = (message.header.stamp.to_sec(), message.path, message.from_state, message.outcome, message.to_state)
+            self.trial.transitions.append((*row, message.reason))
+            self.changed.notify_all()
+
+    def _on_contact(self, message: Contact) -> None:
+        self.trial.contacts.append((message.header.stamp.to_sec(), message.contact, message.margin))
+
+    def _on_diagnostics(self, message: DiagnosticArray) -> None:
+        for status in message.status:
+            for value in status.values:
+                if value.key.lower() in LOST_KEYS and value.value.isdigit():
+                    lost = int(value.value)
+                    if self._lost_at_start is None:
+                        self._lost_at_start = lost
+                    self.trial.fri_lost = lost - self._lost_at_start
+
+
+def summarise(trial: Trial, kind: str, outcome: str, start: float, end: float, velocity_limits: np.ndarray) -> dict:
+    """The figures of one handover between `start` and `end` (s), for result.json.
+
+    final_error_mm: hand to the goal as received, when the arm had stopped; contact_delay_ms: from the first touch (truth)
+    to the detector's sample; peak_velocity_share: largest joint speed over its limit. None where nothing was measured.
+    """
+    contact = next((t for t, found, _ in trial.contacts if found and start <= t <= end), None)
+    until = contact or end
+    arrived = [d for t, state, d in trial.feedback if start <= t <= until and state in ("reached", "holding")]
+    touch = next((t for t, *_, force in trial.truth if start <= t <= end and force > FORCE_THRESHOLD), None)
+    speeds = np.array([velocity for t, _, velocity in trial.joints if start <= t <= end])
+    share = float(np.max(np.abs(speeds) / velocity_limits)) if speeds.size else None
+    return {
+        "kind": kind,
+        "outcome": outcome,
+        "duration_s": round(end - start, 3),
+        "final_error_mm": round(1000.0 * arrived[-1], 3) if arrived else None,
+        "contact_delay_ms": round(1000.0 * (contact - touch), 1) if contact and touch else None,
+        "fri_lost": trial.fri_lost,
+        "peak_velocity_share": round(share, 4) if share is not None else None,
+    }
