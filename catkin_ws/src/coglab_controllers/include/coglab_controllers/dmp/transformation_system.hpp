@@ -1,0 +1,51 @@
+/// @file
+/// Eq. (1), (2), (4) and (5) of one primitive on three axes, in fixed-size form for the control cycle.
+#pragma once
+
+#include "coglab_controllers/dmp/primitive.hpp"
+
+namespace coglab_controllers {
+
+/// A primitive ready to run: validated, fixed size, copied without allocation.
+class TransformationSystem {
+ public:
+  /// The system at rest: no shape (phi = 0), K = 150, duration 1 s.
+  TransformationSystem() noexcept;
+  /// @throws std::invalid_argument if the primitive is not valid.
+  explicit TransformationSystem(const Primitive& primitive);
+
+  const CanonicalSystem& canonical() const noexcept { return canonical_; }
+  double duration() const noexcept { return duration_; }    ///< s
+  double stiffness() const noexcept { return stiffness_; }  ///< K
+  double damping() const noexcept { return damping_; }      ///< D
+
+  /// Turns and scales the learnt shape from the demonstration's start-goal line to this one (ShapeMapping).
+  void mapShape(const Vector3& start, const Vector3& goal) noexcept;
+
+  /// w(s), 0 at the start and 1 at the end.
+  double goalWeight(double s) const noexcept { return goal_weight_(s); }
+  /// phi(s) of eq. (5), m relative to the start. Never divides by a vanishing sum.
+  Vector3 movingPoint(double s) const noexcept;
+  /// h(w, g, g') of eq. (4), given phi(s): the part that does not depend on the state.
+  Vector3 forcing(double w, const Vector3& phi, const Vector3& start, const Vector3& goal,
+                  const Vector3& goal_velocity, double tau) const noexcept {
+    return (1.0 - w) * stiffness_ * (phi + start) + w * stiffness_ * goal + damping_ * tau * goal_velocity;
+  }
+  /// tau * v' of eq. (4).
+  Vector3 acceleration(const Vector3& forcing, const Vector3& x, const Vector3& v) const noexcept {
+    return forcing - stiffness_ * x - damping_ * v;
+  }
+
+ private:
+  CanonicalSystem canonical_;
+  double duration_, stiffness_, damping_;
+  GoalWeight goal_weight_;
+  ShapeMapping mapping_;
+  Vector3 demonstrated_line_;
+  Matrix3 shape_map_ = Matrix3::Identity();
+  int count_;
+  Eigen::Array<double, kMaxBasis, 1> centres_, widths_;
+  Eigen::Matrix<double, 3, kMaxBasis> weights_;
+};
+
+}  // namespace coglab_controllers

@@ -1,0 +1,72 @@
+/// @file
+/// The one estimator every goal passes before eq. (1): position g and velocity g' without steps and without ramp lag.
+#pragma once
+
+#include "coglab_controllers/kinematics/types.hpp"
+
+namespace coglab_controllers {
+
+/// Third-order tracker shared by goal position and orientation: three equal poles at 1/time_constant, solved exactly.
+///
+/// It works on the difference to its input, so that the same code tracks points and, in the tangent space, rotations.
+struct ThirdOrderTracker {
+  Vector3 rate = Vector3::Zero();          ///< per second
+  Vector3 acceleration = Vector3::Zero();  ///< per second^2
+
+  /// One step towards an input that stays `error` away from the present value; returns the change of the value.
+  Vector3 advance(const Vector3& error, double dt, double time_constant) noexcept;
+};
+
+/// Parameters of both estimators.
+struct GoalEstimatorParameters {
+  double time_constant = 0.06;       ///< s; 0 switches the estimator off: g is the input, g' is zero
+  double max_innovation = 0.15;      ///< m: a goal further away pulls no harder, which bounds speed and acceleration
+  double max_angle_innovation = 0.6; ///< rad, for orientations
+};
+
+/// Estimates g and g' from goal positions as received (sample-and-hold between frames).
+///
+/// A constant-velocity tracker of third order with ramp compensation: g = p + 3 T p', so a steadily moving goal is met
+/// without lag, and g and g' have no step when the input has one. No allocation, no throw.
+class GoalEstimator {
+ public:
+  /// @throws std::invalid_argument unless time_constant is 0 or in [0.005, 2] and the others are positive.
+  explicit GoalEstimator(const GoalEstimatorParameters& parameters = {});
+
+  /// At rest at `goal` (m).
+  void reset(const Vector3& goal) noexcept;
+  /// One cycle of `dt` s with the newest goal as received (m, finite).
+  void update(double dt, const Vector3& goal) noexcept;
+
+  const Vector3& position() const noexcept { return position_; }      ///< g, m
+  const Vector3& velocity() const noexcept { return tracker_.rate; }  ///< g', m/s
+  bool enabled() const noexcept { return parameters_.time_constant > 0.0; }
+
+ private:
+  GoalEstimatorParameters parameters_;
+  ThirdOrderTracker tracker_;
+  Vector3 smooth_ = Vector3::Zero();
+  Vector3 position_ = Vector3::Zero();
+};
+
+/// The same for the target orientation of a turning object.
+class OrientationEstimator {
+ public:
+  /// @throws std::invalid_argument as GoalEstimator.
+  explicit OrientationEstimator(const GoalEstimatorParameters& parameters = {});
+
+  void reset(const Quaternion& target) noexcept;
+  /// @param target unit; q and -q mean the same.
+  void update(double dt, const Quaternion& target) noexcept;
+
+  const Quaternion& orientation() const noexcept { return orientation_; }
+  const Vector3& angularVelocity() const noexcept { return tracker_.rate; }  ///< rad/s, base frame
+
+ private:
+  GoalEstimatorParameters parameters_;
+  ThirdOrderTracker tracker_;
+  Quaternion smooth_ = Quaternion::Identity();
+  Quaternion orientation_ = Quaternion::Identity();
+};
+
+}  // namespace coglab_controllers

@@ -1,0 +1,29 @@
+/// @file
+/// Slows the clock of a motion so that the reference waits for the arm instead of running away from it.
+#pragma once
+
+namespace coglab_controllers {
+
+/// Turns a speed scale and the scaling that limits would impose into the `rate` of CartesianMotion::step and of the
+/// profile time of a point-to-point motion. The rate moves at a bounded speed, so that it never makes a step in velocity.
+class PhaseGovernor {
+ public:
+  /// @param rise, fall largest change of the rate per second.  @throws std::invalid_argument unless positive.
+  explicit PhaseGovernor(double rise = 2.0, double fall = 10.0);
+
+  /// A new motion from rest begins; one that begins in motion begins with rate 1.
+  void reset(double rate = 1.0) noexcept { rate_ = rate; }
+
+  /// One cycle.
+  /// @param speed_scale 0..1 as set by the user.
+  /// @param limit_scale 0..1: scale that the limits imposed in the last cycle (IkResult::scale times GuardResult::scale).
+  double update(double dt, double speed_scale, double limit_scale) noexcept;
+
+  double rate() const noexcept { return rate_; }
+
+ private:
+  double rise_, fall_;
+  double rate_ = 1.0;
+};
+
+}  // namespace coglab_controllers
