@@ -30,7 +30,7 @@ struct LogRecord {
   /// The message with its numbers put in.
   std::string message() const;
   /// `[WARN] attitude (attitude.cpp:41, cycle 17): message`.
-  std::string line_text() const;
+  std::string toLine() const;
 };
 
 /// Where drained records go. Called by one thread at a time, never in the cycle.

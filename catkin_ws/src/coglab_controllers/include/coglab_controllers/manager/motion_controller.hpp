@@ -1,0 +1,120 @@
+/// @file
+/// The interface of a motion controller plug-in (D4.10, section 3.1.2): exactly one is active, it writes the references.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <string>
+
+#include <yaml-cpp/yaml.h>
+
+#include "coglab_controllers/manager/fixed_text.hpp"
+#include "coglab_controllers/manager/robot_setup.hpp"
+#include "ctrl_more/control_states.hpp"
+#include "lwr_fri_bridge/control_port.hpp"
+
+namespace coglab_controllers {
+
+using lwr_fri_bridge::RobotSample;
+
+/// What the control cycle tells a motion controller, every cycle.
+struct CycleInput {
+  RobotSample robot;            ///< newest measurement; its stamps and commanded state are those of the bridge
+  double dt = 0.0;              ///< true time since the last cycle, s, > 0
+  double time_scale = 1.0;      ///< 0..1: how much of dt the reference's own time advances (speed_scale and Cartesian limits)
+  bool motion_allowed = false;  ///< target velocities are followed now
+};
+
+/// The references of one cycle and where the motion controller finds its own in them.
+/// Poses are those of the tool frame in the robot's base frame.
+struct References {
+  ctrl_more::ControlStates states;            ///< what feedback controllers modify
+  ctrl_more::ControlSignal pose;              ///< taskSpaceReferencePose: x y z (m), quaternion x y z w
+  ctrl_more::ControlSignal twist;             ///< taskSpaceReferenceVel: m/s, rad/s
+  ctrl_more::ControlSignal joint_position;    ///< jointSpaceReference Position, rad
+  ctrl_more::ControlSignal joint_velocity;    ///< jointSpaceReference Velocity, rad/s
+};
+
+/// What a motion controller does at the moment.
+enum class MotionState : std::uint8_t {
+  Idle,     ///< no motion; braking to, or at, stand-still
+  Running,  ///< a motion is executed
+  Holding,  ///< a motion waits on its last valid goal
+  Reached,  ///< the last motion came to its end
+  Aborted   ///< the last motion was given up; the reason says why
+};
+
+/// idle, running, holding, reached or aborted.
+const char* nameOf(MotionState state);
+
+/// What a plug-in may ask of the manager outside the cycle.
+class MotionHost {
+ public:
+  virtual ~MotionHost() = default;
+
+  /// Requests that end in a plan come one after another; hold this while building one.
+  virtual std::unique_lock<std::mutex> lockRequests() = 0;
+
+  /// Why a new motion of this controller is refused now, with what to do next; empty if it is welcome.
+  virtual std::string motionRefusal(const std::string& controller_id) const = 0;
+
+  /// The newest measurement that the cycle has seen; sequence 0: none yet.
+  virtual RobotSample robotSnapshot() const = 0;
+
+  /// Time of the stamps in samples and goals, ns (steady clock; simulated time in lockstep).
+  virtual std::int64_t now_ns() const = 0;
+
+  /// How to wait for the cycle (for PlanExchange::setWait); empty: by sleeping.
+  virtual std::function<void()> cycleWait() const = 0;
+
+  /// The longest that a request waits for the cycle, s.
+  virtual double planTimeout() const = 0;
+};
+
+/// What a plug-in gets when it is loaded.
+struct MotionSetup {
+  std::string id;                           ///< the controller's id, also its namespace
+  YAML::Node parameters;                    ///< its parameters (ROS: below /controller_manager/<id>); may be null
+  std::shared_ptr<const RobotSetup> robot;  ///< model, limits, workspace
+  MotionHost* host = nullptr;               ///< outlives the controller
+};
+
+/// A motion controller: computes the references, alone.
+///
+/// Non-real-time: configure() and whatever requests a plug-in offers. Real-time (control thread, between two samples): adopt(), start(),
+/// stop(), abort(), computeReference(), resolve(), state(), reason(); these must not allocate, lock, or make system calls. What
+/// they throw is caught: the motion is given up, the arm brakes, the reason is published.
+class MotionController {
+ public:
+  virtual ~MotionController() = default;
+
+  /// Reads the parameters. @throws std::runtime_error saying which parameter, what was expected and what came.
+  virtual void configure(const MotionSetup& setup) = 0;
+
+  /// Takes over requests made since the last cycle. Called every cycle while active, samples or not.
+  /// @param input in cycles without a sample `robot.sequence` is that of the last one and motion_allowed is false
+  virtual void adopt(const CycleInput& input) = 0;
+
+  /// Becomes the active controller. The arm may be moving: commanded state in `input.robot`.
+  virtual void start(const CycleInput& input) = 0;
+
+  /// Is no longer the active one: ends its motion, reports unfinished requests as not executed.
+  virtual void stop() = 0;
+
+  /// Gives up the motion (fall-back of the robot, hold, a limit). The arm brakes by itself.
+  virtual void abort(const Reason& reason) = 0;
+
+  /// Step 3: computes the reference of this cycle and writes pose and twist (Cartesian motions) or joint position and velocity.
+  virtual void computeReference(const CycleInput& input, References& references) = 0;
+
+  /// Step 5: from the references, perhaps modified by feedback controllers, to joint velocities (joint_velocity of references).
+  virtual void resolve(const CycleInput& input, References& references) = 0;
+
+  virtual MotionState state() const = 0;
+  /// Why it aborted or holds; empty otherwise.
+  virtual const Reason& reason() const = 0;
+};
+
+}  // namespace coglab_controllers

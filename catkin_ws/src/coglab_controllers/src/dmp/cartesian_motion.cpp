@@ -1,0 +1,99 @@
+#include "coglab_controllers/dmp/cartesian_motion.hpp"
+
+#include <algorithm>
+
+#include "coglab_controllers/kinematics/rotation.hpp"
+
+namespace coglab_controllers {
+namespace {
+
+// Below this the set-point is put to rest at the latched goal (m/s and m); far less than an encoder step.
+constexpr double kRestSpeed = 1e-4, kRestDistance = 1e-4;
+
+}  // namespace
+
+CartesianMotion::CartesianMotion(const GoalEstimatorParameters& estimator, const MotionEndParameters& end)
+    : goal_estimator_(estimator), orientation_estimator_(estimator), end_(end) {}
+
+void CartesianMotion::start(const CartesianMotionPlan& plan, const Pose& pose, const Vector3& velocity,
+                            const Vector3& angular_velocity, const Pose& goal) noexcept {
+  goal_estimator_.reset(goal.position);
+  orientation_estimator_.reset(goal.orientation);
+  end_.reset();
+  dmp_.start(plan.system, pose.position, velocity, goal.position, plan.ratio);
+  orientation_ = pose.orientation.normalized();
+  curve_.start(orientation_, angular_velocity, goal.orientation, dmp_.tau());
+  curve_begin_ = 0.0;
+  reference_ = {{pose.position, orientation_}, velocity, angular_velocity, plan.orientation_control};
+  goal_ = goal.position;
+  remaining_distance_ = (goal.position - pose.position).norm();
+  phase_ = Phase::Running;
+  event_ = MotionEnd::Event::None;
+  settled_ = false;
+}
+
+void CartesianMotion::switchTo(const CartesianMotionPlan& plan, const Pose& goal) noexcept {
+  if (phase_ == Phase::Idle) return;
+  dmp_.switchTo(plan.system, goal.position, plan.ratio);
+  curve_begin_ = std::min(dmp_.progress(), 0.95);
+  const Vector3 angular_velocity = reference_.angular_velocity;
+  orientation_estimator_.reset(goal.orientation);
+  curve_.start(orientation_, angular_velocity, goal.orientation, (1.0 - curve_begin_) * dmp_.tau());
+  reference_.orientation_control = plan.orientation_control;
+  end_.reset();
+  phase_ = Phase::Running;
+  settled_ = false;
+}
+
+const CartesianReference& CartesianMotion::step(double dt, const Pose& goal, double rate) noexcept {
+  event_ = MotionEnd::Event::None;
+  if (phase_ == Phase::Idle || !(dt > 0.0)) return reference_;
+  const Vector3 before = dmp_.state().position;
+  Vector3 goal_velocity = Vector3::Zero();
+  if (end_.latched()) {
+    goal_ = end_.latchedGoal();
+  } else {
+    // g and g' at the beginning of the cycle go into eq. (1); the estimator then follows to its end.
+    goal_ = goal_estimator_.position();
+    goal_velocity = goal_estimator_.velocity();
+    if (!goal_estimator_.enabled()) goal_ = goal.position;
+    goal_estimator_.update(dt, goal.position);
+    orientation_estimator_.update(dt, goal.orientation);
+    curve_.setTarget(orientation_estimator_.orientation());
+  }
+  if (!settled_) dmp_.step(dt, goal_, goal_velocity, rate);
+  const DmpState& state = dmp_.state();
+  const double curve_progress = (dmp_.progress() - curve_begin_) / (1.0 - curve_begin_);
+  const Quaternion orientation = settled_ ? orientation_ : curve_.at(curve_progress);
+
+  reference_.pose.position = before;
+  reference_.pose.orientation = orientation_;
+  reference_.velocity = settled_ ? Vector3::Zero() : Vector3((state.position - before) / dt);
+  reference_.angular_velocity = rotationBetween(orientation_, orientation) / dt;
+  orientation_ = orientation.normalized();
+  remaining_distance_ = (goal.position - state.position).norm();
+
+  event_ = end_.update(dt, state.phase, reference_.velocity.norm(), state.position, goal_, goal.position);
+  if (event_ == MotionEnd::Event::Ended) phase_ = Phase::Ended;
+  if (event_ == MotionEnd::Event::FollowsAgain) {
+    phase_ = Phase::Running;
+    settled_ = false;
+    goal_estimator_.reset(goal_);
+    orientation_estimator_.reset(orientation_);
+  }
+  if (phase_ == Phase::Ended && state.velocity.norm() < kRestSpeed &&
+      (state.position - goal_).norm() < kRestDistance && curve_progress >= 1.0) {
+    settled_ = true;
+  }
+  return reference_;
+}
+
+void CartesianMotion::stop() noexcept {
+  phase_ = Phase::Idle;
+  reference_.pose.position = dmp_.state().position;
+  reference_.pose.orientation = orientation_;
+  reference_.velocity.setZero();
+  reference_.angular_velocity.setZero();
+}
+
+}  // namespace coglab_controllers

@@ -1,0 +1,88 @@
+#include "coglab_controllers/goal/goal_estimator.hpp"
+
+#include <cmath>
+#include <stdexcept>
+#include <string>
+
+#include "coglab_controllers/kinematics/rotation.hpp"
+
+namespace coglab_controllers {
+namespace {
+
+void validate(const GoalEstimatorParameters& parameters) {
+  const double t = parameters.time_constant;
+  if (!(t == 0.0 || (t >= 0.005 && t <= 2.0))) {
+    throw std::invalid_argument("goal time constant: expected 0 (off) or 0.005 to 2 s, got " + std::to_string(t));
+  }
+  if (!(parameters.max_innovation > 0.0 && std::isfinite(parameters.max_innovation))) {
+    throw std::invalid_argument("goal max innovation: expected a positive distance in m, got " +
+                                std::to_string(parameters.max_innovation));
+  }
+  if (!(parameters.max_angle_innovation > 0.0 && parameters.max_angle_innovation <= 3.1)) {
+    throw std::invalid_argument("goal max angle innovation: expected 0 to 3.1 rad, got " +
+                                std::to_string(parameters.max_angle_innovation));
+  }
+}
+
+Vector3 clipped(const Vector3& error, double limit) {
+  const double norm = error.norm();
+  return norm > limit ? Vector3(error * (limit / norm)) : error;
+}
+
+}  // namespace
+
+Vector3 ThirdOrderTracker::advance(const Vector3& error, double dt, double time_constant) noexcept {
+  // d(t) = (c0 + c1 t + c2 t^2) exp(-t/T) is the way still to go, with d, d', d'' given at t = 0.
+  const double k = 1.0 / time_constant, decay = std::exp(-k * dt);
+  const Vector3 c0 = error;
+  const Vector3 c1 = k * c0 - rate;
+  const Vector3 c2 = 0.5 * (2.0 * k * c1 - k * k * c0 - acceleration);
+  const Vector3 polynomial = c0 + dt * (c1 + dt * c2);
+  const Vector3 slope = c1 + 2.0 * dt * c2;
+  rate = -decay * (slope - k * polynomial);
+  acceleration = -decay * (2.0 * c2 - 2.0 * k * slope + k * k * polynomial);
+  return error - decay * polynomial;
+}
+
+GoalEstimator::GoalEstimator(const GoalEstimatorParameters& parameters) : parameters_(parameters) {
+  validate(parameters);
+}
+
+void GoalEstimator::reset(const Vector3& goal) noexcept {
+  tracker_ = {};
+  smooth_ = position_ = goal;
+}
+
+void GoalEstimator::update(double dt, const Vector3& goal) noexcept {
+  if (!enabled()) {
+    smooth_ = position_ = goal;
+    return;
+  }
+  if (!(dt > 0.0)) return;
+  const Vector3 error = clipped(goal - smooth_, parameters_.max_innovation);
+  smooth_ += tracker_.advance(error, dt, parameters_.time_constant);
+  position_ = smooth_ + 3.0 * parameters_.time_constant * tracker_.rate;
+}
+
+OrientationEstimator::OrientationEstimator(const GoalEstimatorParameters& parameters) : parameters_(parameters) {
+  validate(parameters);
+}
+
+void OrientationEstimator::reset(const Quaternion& target) noexcept {
+  tracker_ = {};
+  smooth_ = orientation_ = target.normalized();
+}
+
+void OrientationEstimator::update(double dt, const Quaternion& target) noexcept {
+  const Quaternion unit = target.normalized();
+  if (parameters_.time_constant <= 0.0) {
+    smooth_ = orientation_ = unit;
+    return;
+  }
+  if (!(dt > 0.0)) return;
+  const Vector3 error = clipped(rotationBetween(smooth_, unit), parameters_.max_angle_innovation);
+  smooth_ = (expRotation(tracker_.advance(error, dt, parameters_.time_constant)) * smooth_).normalized();
+  orientation_ = (expRotation(3.0 * parameters_.time_constant * tracker_.rate) * smooth_).normalized();
+}
+
+}  // namespace coglab_controllers

@@ -1,0 +1,31 @@
+#include "coglab_controllers/kinematics/rotation.hpp"
+
+#include <cmath>
+
+namespace coglab_controllers {
+
+Quaternion expRotation(const Vector3& r) noexcept {
+  const double angle = r.norm();
+  // sin(a/2)/a by its series near zero, where the quotient loses digits
+  const double factor = angle < 1e-4 ? 0.5 - angle * angle / 48.0 : std::sin(0.5 * angle) / angle;
+  return Quaternion(std::cos(0.5 * angle), factor * r.x(), factor * r.y(), factor * r.z());
+}
+
+Vector3 logRotation(const Quaternion& q) noexcept {
+  const double sign = q.w() < 0.0 ? -1.0 : 1.0;
+  const Vector3 v = sign * q.vec();
+  const double sine = v.norm(), cosine = sign * q.w();
+  const double factor =
+      sine < 1e-4 ? 2.0 / cosine * (1.0 - sine * sine / (3.0 * cosine * cosine)) : 2.0 * std::atan2(sine, cosine) / sine;
+  return factor * v;
+}
+
+Vector3 rotationBetween(const Quaternion& from, const Quaternion& to) noexcept {
+  return logRotation(to * from.conjugate());
+}
+
+bool isUnit(const Quaternion& q) noexcept {
+  return q.coeffs().allFinite() && std::abs(q.norm() - 1.0) <= 1e-3;
+}
+
+}  // namespace coglab_controllers

@@ -1,0 +1,55 @@
+/// @file
+/// Kinematics and rigid-body terms of the arm with its hand, from the URDF, by KDL.
+#pragma once
+
+#include <string>
+
+#include <kdl/chain.hpp>
+#include <kdl/chaindynparam.hpp>
+#include <kdl/chainfksolverpos_recursive.hpp>
+#include <kdl/chainjnttojacsolver.hpp>
+
+#include "coglab_sim/geometry.hpp"
+
+namespace coglab_sim {
+
+/// Everything the cell needs at one joint configuration.
+struct ArmTerms {
+  Matrix7 mass;        ///< link side, kg m^2
+  Vector7 coriolis;    ///< C(q, dq) dq, Nm
+  Vector7 gravity;     ///< torque that holds the arm against gravity, Nm
+  Matrix67 jacobian;   ///< of the tip, world axes: rows x y z, rx ry rz
+  Pose tip;            ///< ih2_palm in the world
+};
+
+/// Rigid-body model between two links of a URDF with seven joints in between.
+///
+/// Links that hang beside the chain (fingers) count with their mass in the position zero of their joints. Links behind
+/// fixed joints are merged, so that the recursion runs over seven bodies.
+class ArmModel {
+ public:
+  /// @param urdf  path of the robot description
+  /// @throws std::runtime_error naming file and link if the chain cannot be built or has not exactly seven joints.
+  explicit ArmModel(const std::string& urdf, const std::string& base = "lwr_base_link",
+                    const std::string& tip = "ih2_palm");
+  ArmModel(const ArmModel&) = delete;
+  ArmModel& operator=(const ArmModel&) = delete;
+
+  /// Fills `terms` for joint positions (rad) and velocities (rad/s). Allocates nothing.
+  void evaluate(const Vector7& position, const Vector7& velocity, ArmTerms& terms);
+
+  /// Viscous friction of the joints as the URDF gives it (`<dynamics damping>`), Nms/rad.
+  const Vector7& damping() const { return damping_; }
+
+ private:
+  KDL::Chain chain_;
+  KDL::ChainDynParam dynamics_;
+  KDL::ChainFkSolverPos_recursive forward_;
+  KDL::ChainJntToJacSolver jacobian_solver_;
+  Vector7 damping_ = Vector7::Zero();
+  KDL::JntArray q_, dq_, coriolis_, gravity_;
+  KDL::JntSpaceInertiaMatrix mass_;
+  KDL::Jacobian jacobian_;
+};
+
+}  // namespace coglab_sim

@@ -1,0 +1,159 @@
+/// @file
+/// The robot controller (KRC) as seen through FRI: session state, statistics, checks, drives, KRL program.
+///
+/// Per FRI period: `receive()` every datagram that came, then `tick()`, which judges the answer to the last measurement and
+/// says what the servos do during the next period; after the arm has moved, `measure()` writes the next measurement.
+#pragma once
+
+#include <deque>
+#include <memory>
+#include <string>
+
+#include "coglab_sim/arm_dynamics.hpp"
+#include "coglab_sim/krc/answer_statistics.hpp"
+#include "coglab_sim/krc/krl_program.hpp"
+#include "coglab_sim/krc/parameters.hpp"
+
+namespace coglab_sim::krc {
+
+/// A line of the controller's message window.
+struct Message {
+  double time = 0.0;  ///< s since start
+  std::string text;
+};
+
+/// Datagrams that were no answer, by reason.
+struct Rejections {
+  std::uint64_t wrong_size = 0;       ///< datagram is not 376 bytes
+  std::uint64_t wrong_header = 0;     ///< id or size field
+  std::uint64_t stale = 0;            ///< reflects another counter than that of the last measurement
+  std::uint64_t repeated = 0;         ///< counter did not advance
+};
+
+/// Set-point movement of one FRI period for the joint servos.
+struct PeriodCommand {
+  Vector7 from, to;       ///< rad, interpolated linearly over the period
+  ServoCommand servo;     ///< everything but position and velocity
+  Pose frame_from, frame_to;
+};
+
+/// Measured quantities that go into a measurement.
+struct ArmSignals {
+  Vector7 position;         ///< rad
+  Vector7 torque;           ///< measured, Nm
+  Vector7 external_torque;  ///< estimated, Nm
+};
+
+class Controller : private KrlInterface {
+ public:
+  /// @throws std::invalid_argument naming parameter, value and range if one is out of range.
+  Controller(const Parameters& parameters, const ArmParameters& arm, const Vector7& position);
+
+  /// A datagram arrived `latency` s after the last measurement went out.
+  void receive(const std::uint8_t* bytes, std::size_t size, double latency);
+
+  /// Ends the waiting for an answer. `on_time`: the stand-in itself was; if not, a missing answer is bridged but not counted.
+  /// @param arm  state of the arm now
+  PeriodCommand tick(const ArmDynamics& arm, bool on_time);
+
+  /// The next measurement, with its counters.
+  lwr_fri_bridge::fri::MeasurementDatagram measure(const ArmDynamics& arm, const ArmSignals& signals);
+
+  bool brakesWanted() const { return !drives_on_; }
+  bool sends() const { return state_ != lwr_fri_bridge::fri::FriState::Off && silent_until_ <= time_; }
+
+  // What people and faults do to a controller
+  void setEnablingSwitch(bool pressed);     ///< in T1/T2; stands for the operator safety gate in Automatic
+  void setDriveError(int joint, bool on);   ///< joint 0..6; switches all drives off
+  void setSilent(double duration);          ///< sends nothing for so long, s
+  void leaveCommandMode(const std::string& reason);  ///< fall-back as after a fault
+  void acknowledge();                       ///< operator acknowledges messages; drives may be switched on again
+  void setOperatingMode(OperatingMode mode);
+
+  double time() const { return time_; }
+  lwr_fri_bridge::fri::FriState friState() const { return state_; }
+  lwr_fri_bridge::fri::Quality friQuality() const { return statistics_.quality(); }
+  lwr_fri_bridge::fri::ControlStrategy strategy() const { return strategy_; }
+  std::uint16_t power() const;
+  /// Commanded total: own interpolator plus FRI offset, rad.
+  Vector7 setPoint() const { return own_ + offset_; }
+  const AnswerStatistics& statistics() const { return statistics_; }
+  const Rejections& rejections() const { return rejections_; }
+  const std::deque<Message>& messages() const { return messages_; }  ///< newest last, at most 200
+  std::uint64_t messageCount() const { return message_count_; }
+  const Parameters& parameters() const override { return parameters_; }
+
+ private:
+  // KrlInterface
+  std::int32_t frmInt(int index) const override { return krl_in_.ints[index - 1]; }
+  float frmReal(int index) const override { return krl_in_.reals[index - 1]; }
+  bool frmBool(int index) const override { return ((krl_in_.bools >> (index - 1)) & 1) != 0; }
+  void setToInt(int index, std::int32_t value) override { krl_out_.ints[index - 1] = value; }
+  void setToReal(int index, float value) override { krl_out_.reals[index - 1] = value; }
+  void setToBool(int index, bool value) override;
+  lwr_fri_bridge::fri::FriState state() const override { return state_; }
+  lwr_fri_bridge::fri::Quality quality() const override { return statistics_.quality(); }
+  int krlStrategy() const override { return 10 * static_cast<int>(strategy_); }
+  bool setKrlStrategy(int strategy) override;
+  bool drivesReady() const override { return power() == lwr_fri_bridge::fri::kAllDrivesOn; }
+  void friOpen(double period) override;
+  lwr_fri_bridge::fri::FriState friStart(double scale) override;
+  void friStop() override;
+  void friClose() override;
+  void nudge() override;
+  void show(const std::string& message) override;
+
+  bool answerInTime() const { return answered_; }
+  /// Sentence if this command must not become active in command mode, empty if it may.
+  std::string entryFault(const lwr_fri_bridge::fri::CommandDatagram& command) const;
+  std::string cyclicFault(const lwr_fri_bridge::fri::CommandDatagram& command) const;
+  std::string valueFault(const lwr_fri_bridge::fri::CommandDatagram& command) const;
+  void follow(const lwr_fri_bridge::fri::CommandDatagram& command);
+  void extrapolate();
+  void judgeAnswer(bool on_time);
+  void updateDrives(const ArmDynamics& arm);
+  void watchTorque(const ArmDynamics& arm);
+  double speedLimit(int joint) const;
+  void holdMeasured(const ArmDynamics& arm);
+  ServoCommand servoCommand() const;
+
+  Parameters parameters_;
+  ArmParameters arm_parameters_;
+  AnswerStatistics statistics_;
+  std::unique_ptr<KrlProgram> program_;
+  double time_ = 0.0, krl_due_ = 0.0, silent_until_ = 0.0;
+
+  lwr_fri_bridge::fri::FriState state_ = lwr_fri_bridge::fri::FriState::Off;
+  lwr_fri_bridge::fri::ControlStrategy strategy_ = lwr_fri_bridge::fri::ControlStrategy::Position;
+  double start_scale_ = 1.0;
+
+  // Wire
+  std::uint16_t counter_ = 0;          // of the last measurement
+  bool measured_once_ = false;
+  std::uint16_t peer_counter_ = 0;
+  bool peer_known_ = false;
+  bool answered_ = false;
+  double answer_latency_ = 0.0;
+  lwr_fri_bridge::fri::CommandDatagram answer_{};
+  lwr_fri_bridge::fri::UserData krl_in_{}, krl_out_{};
+  Rejections rejections_;
+  int missed_in_row_ = 0;
+
+  // Set-points
+  Vector7 own_, offset_ = Vector7::Zero(), last_step_ = Vector7::Zero();
+  Pose frame_own_, frame_;             // set-point of the tip: KRC's own, and with FRI
+  lwr_fri_bridge::fri::CommandDatagram latched_{};  // impedance values in force
+  std::uint32_t flags_ = 0;            // latched on entry
+
+  // Drives
+  bool drives_on_ = false, enabled_ = true, error_latched_ = false, entry_pending_ = false;
+  double drives_on_at_ = -1.0;         // time at which a running nudge ends; < 0: none runs
+  std::uint16_t drive_error_ = 0;
+  Vector7 saturated_ = Vector7::Zero();  // s each motor has been at its limit
+  Vector7 temperature_;
+
+  std::deque<Message> messages_;
+  std::uint64_t message_count_ = 0;
+};
+
+}  // namespace coglab_sim::krc

@@ -1,0 +1,115 @@
+#include "coglab_sim/arm_model.hpp"
+
+#include <set>
+#include <stdexcept>
+
+#include <kdl/tree.hpp>
+#include <kdl_parser/kdl_parser.hpp>
+#include <urdf_model/joint.h>
+#include <urdf_model/model.h>
+#include <urdf_parser/urdf_parser.h>
+
+namespace coglab_sim {
+namespace {
+
+constexpr int kJoints = 7;
+
+/// Inertia of a side branch, seen from its parent's frame, with all its joints at zero.
+KDL::RigidBodyInertia branchInertia(const KDL::TreeElement& element) {
+  KDL::RigidBodyInertia inertia = element.segment.getInertia();
+  for (const auto& child : element.children) inertia = inertia + branchInertia(child->second);
+  return element.segment.pose(0.0) * inertia;
+}
+
+/// The chain with side branches added to their parents and bodies behind fixed joints merged into the moving ones.
+KDL::Chain condensed(const KDL::Tree& tree, const KDL::Chain& chain) {
+  std::set<std::string> on_chain;
+  for (const auto& segment : chain.segments) on_chain.insert(segment.getName());
+
+  std::vector<KDL::Segment> bodies;
+  for (const auto& segment : chain.segments) {
+    KDL::RigidBodyInertia inertia = segment.getInertia();
+    for (const auto& child : tree.getSegment(segment.getName())->second.children) {
+      if (on_chain.count(child->first) == 0) inertia = inertia + branchInertia(child->second);
+    }
+    if (segment.getJoint().getType() == KDL::Joint::None && !bodies.empty()) {
+      const KDL::Segment& carrier = bodies.back();
+      const KDL::Frame step = segment.getFrameToTip();
+      bodies.back() = KDL::Segment(segment.getName(), carrier.getJoint(), carrier.getFrameToTip() * step,
+                                   step.Inverse() * carrier.getInertia() + inertia);
+    } else {
+      bodies.emplace_back(segment.getName(), segment.getJoint(), segment.getFrameToTip(), inertia);
+    }
+  }
+  KDL::Chain result;
+  for (const auto& body : bodies) result.addSegment(body);
+  return result;
+}
+
+KDL::Chain readChain(const std::string& urdf, const std::string& base, const std::string& tip) {
+  KDL::Tree tree;
+  if (!kdl_parser::treeFromFile(urdf, tree)) {
+    throw std::runtime_error("robot description " + urdf + " cannot be read as a URDF");
+  }
+  KDL::Chain chain;
+  if (!tree.getChain(base, tip, chain)) {
+    throw std::runtime_error("robot description " + urdf + " has no chain from " + base + " to " + tip);
+  }
+  if (chain.getNrOfJoints() != kJoints) {
+    throw std::runtime_error("robot description " + urdf + ": expected 7 joints from " + base + " to " + tip +
+                             ", found " + std::to_string(chain.getNrOfJoints()));
+  }
+  return condensed(tree, chain);
+}
+
+Vector7 readDamping(const std::string& urdf, const KDL::Chain& chain) {
+  const auto model = urdf::parseURDFFile(urdf);
+  Vector7 damping = Vector7::Zero();
+  int index = 0;
+  for (const auto& segment : chain.segments) {
+    if (segment.getJoint().getType() == KDL::Joint::None) continue;
+    const auto joint = model ? model->getJoint(segment.getJoint().getName()) : nullptr;
+    if (joint && joint->dynamics) damping[index] = joint->dynamics->damping;
+    ++index;
+  }
+  return damping;
+}
+
+}  // namespace
+
+ArmModel::ArmModel(const std::string& urdf, const std::string& base, const std::string& tip)
+    : chain_(readChain(urdf, base, tip)),
+      dynamics_(chain_, KDL::Vector(0.0, 0.0, -9.81)),
+      forward_(chain_),
+      jacobian_solver_(chain_),
+      damping_(readDamping(urdf, chain_)),
+      q_(kJoints),
+      dq_(kJoints),
+      coriolis_(kJoints),
+      gravity_(kJoints),
+      mass_(kJoints),
+      jacobian_(kJoints) {}
+
+void ArmModel::evaluate(const Vector7& position, const Vector7& velocity, ArmTerms& terms) {
+  q_.data = position;
+  dq_.data = velocity;
+  dynamics_.JntToMass(q_, mass_);
+  dynamics_.JntToCoriolis(q_, dq_, coriolis_);
+  dynamics_.JntToGravity(q_, gravity_);
+  jacobian_solver_.JntToJac(q_, jacobian_);
+  KDL::Frame tip;
+  forward_.JntToCart(q_, tip);
+
+  terms.mass = mass_.data;
+  terms.coriolis = coriolis_.data;
+  terms.gravity = gravity_.data;
+  terms.jacobian = jacobian_.data;
+  terms.tip.position = Vector3d(tip.p.x(), tip.p.y(), tip.p.z());
+  Matrix3d rotation;
+  for (int row = 0; row < 3; ++row) {
+    for (int column = 0; column < 3; ++column) rotation(row, column) = tip.M(row, column);
+  }
+  terms.tip.rotation = Quaterniond(rotation);
+}
+
+}  // namespace coglab_sim

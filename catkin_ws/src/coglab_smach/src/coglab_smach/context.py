@@ -1,0 +1,51 @@
+"""What every state is given: ports, clock, configuration, journal, triggers."""
+from __future__ import annotations
+
+import threading
+from dataclasses import dataclass, field
+
+from smach.clock import Clock
+
+from .config import Config
+from .journal import Journal
+from .ports import ArmPort, ContactPort, DatabasePort, HandPort, PerceptionPort
+from .requests import Requests
+
+
+class StopSwitch:
+    """STOP as the machines see it: set by the operator, cleared only by an explicit reset."""
+
+    def __init__(self) -> None:
+        self._event = threading.Event()
+        self.reason = ""
+
+    def press(self, reason: str) -> None:
+        """Latch with a reason in words."""
+        self.reason = reason
+        self._event.set()
+
+    def reset(self) -> None:
+        """Unlatch."""
+        self._event.clear()
+        self.reason = ""
+
+    def pressed(self) -> bool:
+        """Whether STOP is latched."""
+        return self._event.is_set()
+
+
+@dataclass
+class Context:
+    """Injected into each state. ``clock`` is the engine's: steady for the robot, virtual for tests and benches; ``holding`` is the id of the object in the robot's hand, empty if it is empty."""
+
+    clock: Clock
+    arm: ArmPort
+    hand: HandPort
+    perception: PerceptionPort
+    database: DatabasePort
+    contact: ContactPort
+    config: Config
+    journal: Journal
+    requests: Requests = field(default_factory=Requests)
+    stop: StopSwitch = field(default_factory=StopSwitch)
+    holding: str = ""

@@ -1,0 +1,46 @@
+"""Goals of the DMP from database entries: pure geometry, tested without any machine.
+
+A goal travels in user data as plain types: ``{frame, offset [m], orientation [x y z w], primitive, dmp_ratio}``; offset
+and orientation are the pose of ``ih2_palm`` relative to ``frame``.
+"""
+from __future__ import annotations
+
+from typing import Any, Mapping, Optional
+
+import numpy as np
+
+from .pose import Pose, rotate
+
+
+def _goal(frame: str, palm: Pose, entry: Mapping[str, Any], role: str) -> dict[str, Any]:
+    dmp = entry["dmp"]
+    return {"frame": frame, "offset": palm.to_dict()["xyz"], "orientation": palm.to_dict()["quaternion"],
+            "primitive": dmp[role], "dmp_ratio": float(dmp.get("dmp_ratio", 1.0))}
+
+
+def palm_at_grasp(grasp: Mapping[str, Any], standoff: Optional[float] = None) -> Pose:
+    """Palm in the object frame at the grasp, drawn back by ``standoff`` m against the approach axis (default: as stored)."""
+    palm = Pose.from_dict(grasp["pose"])
+    approach = grasp.get("approach", {})
+    distance = float(approach.get("distance", 0.0)) if standoff is None else standoff
+    if distance == 0.0:
+        return palm
+    axis = np.asarray(approach.get("axis", rotate(palm.orientation, [1.0, 0.0, 0.0])), dtype=float)
+    return Pose(palm.position - distance * axis / np.linalg.norm(axis), palm.orientation)
+
+
+def grasp_goal(entry: Mapping[str, Any], grasp: Mapping[str, Any], frame: str, role: str,
+               standoff: Optional[float] = None) -> dict[str, Any]:
+    """Goal at the grasp pose relative to the object's frame. ``role`` names the primitive: receive or take."""
+    return _goal(frame, palm_at_grasp(grasp, standoff), entry, role)
+
+
+def delivery_goal(entry: Mapping[str, Any], grasp: Mapping[str, Any], delivery: Mapping[str, Any],
+                  frame: str) -> dict[str, Any]:
+    """Goal that offers the held object in its delivery pose relative to the human hand frame."""
+    return _goal(frame, Pose.from_dict(delivery["pose"]) * palm_at_grasp(grasp, 0.0), entry, "give")
+
+
+def place_goal(entry: Mapping[str, Any], grasp: Mapping[str, Any], place: Mapping[str, Any]) -> dict[str, Any]:
+    """Goal that sets the held object down at a free place (pose of the object in the place's frame)."""
+    return _goal(place["frame"], Pose.from_dict(place) * palm_at_grasp(grasp, 0.0), entry, "put")

@@ -1,0 +1,34 @@
+"""The reach shared by all actions: arm motion, hand preshape and monitor_dmp side by side."""
+from __future__ import annotations
+
+from ..context import Context
+from ..states.arm import ExecuteDmp, MonitorDmp, SwitchController, WaitStop
+from ..states.base import CoglabConcurrence, CoglabMachine, require_all
+from ..states.hand import HandPreshape
+
+KEYS = ["goal", "grasp", "object_entry", "object_id"]
+
+
+def build_arm_motion(ctx: Context, trigger: str) -> CoglabMachine:
+    """switch_to_dmp, execute_dmp (starts only), wait_stop (waits for everything)."""
+    machine = CoglabMachine(ctx, "arm_motion", ["succeeded", "failed", "preempted"], input_keys=KEYS)
+    with machine:
+        machine.add_state("switch_to_dmp", SwitchController(ctx, "dmp"), {"succeeded": "execute_dmp"})
+        machine.add_state("execute_dmp", ExecuteDmp(ctx), {"succeeded": "wait_stop"})
+        machine.add_state("wait_stop", WaitStop(ctx, trigger), {"succeeded": "succeeded"})
+    return machine
+
+
+def build_approach(ctx: Context, label: str, trigger: str, preshape: bool, monitor: bool) -> CoglabConcurrence:
+    """Concurrence of arm_motion with, if asked, hand_preshape and monitor_dmp. Outcomes succeeded, failed, preempted."""
+    essential = ["arm_motion", "hand_preshape"] if preshape else ["arm_motion"]
+    decide, conclude = require_all(essential)
+    group = CoglabConcurrence(ctx, label, ["succeeded", "failed", "preempted"], "failed", decide, conclude,
+                              input_keys=KEYS)
+    with group:
+        group.add_state("arm_motion", build_arm_motion(ctx, trigger))
+        if preshape:
+            group.add_state("hand_preshape", HandPreshape(ctx))
+        if monitor:
+            group.add_state("monitor_dmp", MonitorDmp(ctx))
+    return group

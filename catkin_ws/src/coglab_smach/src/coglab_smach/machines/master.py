@@ -1,0 +1,53 @@
+"""coglab_master (D4.10 Figure 3): initialisation, then two hubs from which every action leaves and to which it returns."""
+from __future__ import annotations
+
+from ..context import Context
+from ..states.base import CoglabMachine
+from ..states.hub import Fault, Hub, Stopped
+from .board import build_put, build_take
+from .exchange_human_to_robot import build_exchange_human_to_robot
+from .exchange_robot_to_human import build_exchange_robot_to_human
+from .init import build_init_system
+from .recovery import WhatIsHeld, build_recovery
+
+ACTIONS_EMPTY = ("exchange_human_to_robot", "take")
+ACTIONS_HOLDING = ("exchange_robot_to_human", "put")
+LABEL = "coglab_master"
+
+
+def _after_action(succeeded: str) -> dict[str, str]:
+    return {"succeeded": succeeded, "failed_empty": "wait_without_object", "failed_holding": "wait_with_object",
+            "stopped": "stopped", "fault": "fault", "preempted": "preempted"}
+
+
+def build_master(ctx: Context) -> CoglabMachine:
+    """The whole hierarchy. Its only outcome is 'preempted': a shut-down is the only way out."""
+    master = CoglabMachine(ctx, LABEL, ["preempted"])
+    master.userdata.object_id = ""
+    with master:
+        master.add_state("coglab_init_system", build_init_system(ctx),
+                         {"succeeded": "which_hub", "failed": "fault", "preempted": "preempted"})
+        # After a repair the hand may still hold the object of the action that failed.
+        master.add_state("which_hub", WhatIsHeld(ctx),
+                         {"empty": "wait_without_object", "holding": "wait_with_object", "failed": "fault",
+                          "preempted": "preempted"})
+        master.add_state("wait_without_object", Hub(ctx, ACTIONS_EMPTY, with_object=False),
+                         {action: action for action in ACTIONS_EMPTY}
+                         | {"stopped": "stopped", "failed": "fault", "preempted": "preempted"})
+        master.add_state("exchange_human_to_robot", build_exchange_human_to_robot(ctx),
+                         _after_action("wait_with_object"))
+        master.add_state("take", build_take(ctx), _after_action("wait_with_object"))
+        master.add_state("wait_with_object", Hub(ctx, ACTIONS_HOLDING, with_object=True),
+                         {action: action for action in ACTIONS_HOLDING}
+                         | {"stopped": "stopped", "failed": "fault", "preempted": "preempted"})
+        master.add_state("exchange_robot_to_human", build_exchange_robot_to_human(ctx),
+                         _after_action("wait_without_object"))
+        master.add_state("put", build_put(ctx), _after_action("wait_without_object"))
+        master.add_state("stopped", Stopped(ctx),
+                         {"succeeded": "recover", "failed": "fault", "preempted": "preempted"})
+        master.add_state("fault", Fault(ctx),
+                         {"succeeded": "coglab_init_system", "failed": "fault", "preempted": "preempted"})
+        master.add_state("recover", build_recovery(ctx),
+                         {"empty": "wait_without_object", "holding": "wait_with_object", "stopped": "stopped",
+                          "fault": "fault", "preempted": "preempted"})
+    return master

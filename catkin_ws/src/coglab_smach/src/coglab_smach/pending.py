@@ -1,0 +1,99 @@
+"""Answers that take time: every port call that may wait returns a Pending, and states wait on it with a limit."""
+from __future__ import annotations
+
+import threading
+from typing import Any, Callable, Optional
+
+
+class PortError(Exception):
+    """A port could not do what was asked: one sentence with what was expected, what came, what to do next.
+
+    ``causes`` is the chain behind the sentence, nearest first.
+    """
+
+    def __init__(self, sentence: str, causes: tuple[str, ...] = ()) -> None:
+        super().__init__(sentence)
+        self.sentence = sentence
+        self.causes = tuple(causes)
+
+
+class Pending:
+    """A value that arrives later. Polled, never blocking, so that it works in virtual time too."""
+
+    def done(self) -> bool:
+        """True when result() will not say 'not yet' any more."""
+        raise NotImplementedError
+
+    def result(self) -> Any:
+        """The value; raises PortError if the call failed."""
+        raise NotImplementedError
+
+    def cancel(self) -> None:
+        """Nobody waits any more; stop what can be stopped."""
+
+
+class Ready(Pending):
+    """A value that is already there, or an error that already happened."""
+
+    def __init__(self, value: Any = None, error: Optional[PortError] = None) -> None:
+        self._value = value
+        self._error = error
+
+    def done(self) -> bool:
+        return True
+
+    def result(self) -> Any:
+        if self._error is not None:
+            raise self._error
+        return self._value
+
+
+class Polled(Pending):
+    """A value computed from callables: ``ready()`` says when, ``value()`` gives it (may raise PortError)."""
+
+    def __init__(self, ready: Callable[[], bool], value: Callable[[], Any],
+                 cancel: Optional[Callable[[], None]] = None) -> None:
+        self._ready = ready
+        self._value = value
+        self._cancel = cancel
+
+    def done(self) -> bool:
+        return self._ready()
+
+    def result(self) -> Any:
+        return self._value()
+
+    def cancel(self) -> None:
+        if self._cancel is not None:
+            self._cancel()
+
+
+class Threaded(Pending):
+    """A blocking call run in a daemon thread of its own; abandoned, not awaited, when nobody waits any more."""
+
+    def __init__(self, call: Callable[[], Any], what: str) -> None:
+        self._value: Any = None
+        self._error: Optional[PortError] = None
+        self._event = threading.Event()
+        self._call = call
+        self._what = what
+        threading.Thread(target=self._run, name=f"call:{what}", daemon=True).start()
+
+    def _run(self) -> None:
+        try:
+            self._value = self._call()
+        except PortError as error:
+            self._error = error
+        except Exception as error:  # whatever the middleware throws becomes one sentence for the machine
+            self._error = PortError(f"{self._what} failed: {error}")
+        self._event.set()
+
+    def done(self) -> bool:
+        return self._event.is_set()
+
+    def result(self) -> Any:
+        if not self._event.is_set():
+            raise PortError(f"{self._what} has not answered yet")
+        if self._error is not None:
+            raise self._error
+        return self._value

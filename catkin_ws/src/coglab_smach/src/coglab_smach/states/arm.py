@@ -1,0 +1,206 @@
+"""States of the arm: plug-ins and primitives, LWR interface, starting a DMP, waiting for its end, point-to-point."""
+from __future__ import annotations
+
+from typing import Any, Optional
+
+from ..context import Context
+from ..ports import DmpRequest
+from .base import CoglabState, Interrupted, TimeLimit
+
+
+class LoadControllers(CoglabState):
+    """Ask the controller manager to load the DMP and the point-to-point plug-in (D4.10 Figure 4)."""
+
+    default_time_limit = 40.0
+
+    def run(self, ud: Any) -> str:
+        for controller_id, controller_type in dict(self.ctx.config.get("controllers")).items():
+            self.await_pending(self.ctx.arm.load_controller(controller_id, controller_type),
+                               f"loading plug-in '{controller_id}' of type {controller_type}")
+        return "succeeded"
+
+
+class LoadDmps(CoglabState):
+    """Load the library of primitives."""
+
+    default_time_limit = 15.0
+
+    def run(self, ud: Any) -> str:
+        filename = str(self.ctx.config.get("dmp_library"))
+        count = self.await_pending(self.ctx.arm.load_dmps(filename), f"loading primitives of {filename}")
+        self.reason = f"{count} primitives loaded from {filename}"
+        return "succeeded"
+
+
+class ConfigureLwr(CoglabState):
+    """Bring the LWR interface into command mode: control strategy, start, then wait until motion is allowed."""
+
+    default_time_limit = 45.0
+
+    def run(self, ud: Any) -> str:
+        if not self.ctx.arm.motion_allowed()[0]:
+            for command in list(self.ctx.config.get("lwr_commands", ["position", "start"])):
+                self.await_pending(self.ctx.arm.lwr_command(command), f"LWR command '{command}'")
+        try:
+            self.wait_for(lambda: self.ctx.arm.motion_allowed()[0], "command mode of the LWR")
+        except TimeLimit as limit:
+            limit.causes = (self.ctx.arm.motion_allowed()[1],)
+            raise
+        return "succeeded"
+
+
+class SwitchController(CoglabState):
+    """Make one plug-in the active one. Switching to 'ptp' is what ends a running DMP."""
+
+    default_time_limit = 5.0
+
+    def __init__(self, ctx: Context, controller_id: str) -> None:
+        super().__init__(ctx)
+        self.controller_id = controller_id
+
+    def run(self, ud: Any) -> str:
+        self.await_pending(self.ctx.arm.switch_controller(self.controller_id),
+                           f"switching to controller '{self.controller_id}'")
+        return "succeeded"
+
+
+def dmp_request(goal: dict[str, Any], primitive: Optional[str] = None, ratio: Optional[float] = None) -> DmpRequest:
+    """The request of a goal as it travels in user data."""
+    return DmpRequest(primitive or goal["primitive"], goal["frame"], list(goal["offset"]),
+                      list(goal["orientation"]) if goal.get("orientation") is not None else None,
+                      float(ratio if ratio is not None else goal.get("dmp_ratio", 1.0)))
+
+
+class ExecuteDmp(CoglabState):
+    """Temporary state: starts the motion and passes on to wait_stop; the controller manager closes the loop."""
+
+    default_time_limit = 5.0
+
+    def __init__(self, ctx: Context) -> None:
+        super().__init__(ctx, input_keys=["goal"])
+
+    def run(self, ud: Any) -> str:
+        request = dmp_request(ud.goal)
+        self.await_pending(self.ctx.arm.execute_dmp(request), f"start of primitive '{request.primitive_id}'")
+        self.ctx.journal.mark("motion_started")
+        self.reason = f"primitive '{request.primitive_id}' toward {request.goal_frame}"
+        return "succeeded"
+
+
+class WaitStop(CoglabState):
+    """Wait for the end of the reach and then, if ``trigger`` asks for it, for the contact trigger.
+
+    trigger: '' (the end of the motion is enough), 'contact' (an object is in the hand) or 'release' (the person has
+    taken the load). The detector is armed only after the motion has ended; it checks by itself that the arm stands still.
+    """
+
+    default_time_limit = 20.0
+
+    def __init__(self, ctx: Context, trigger: str) -> None:
+        super().__init__(ctx, input_keys=["object_entry"] if trigger else [])
+        self.trigger = trigger
+
+    def run(self, ud: Any) -> str:
+        self.wait_for(self._reached, "the end of the reach", float(self.ctx.config.get("reach_timeout", 8.0)))
+        self.ctx.journal.mark("motion_reached")
+        if not self.trigger:
+            return "succeeded"
+        entry = ud.object_entry
+        settings = dict(entry.get("contact", {}))
+        settings["mass"] = float(entry.get("mass", 0.0))
+        limit = float(settings.get("timeout", self.ctx.config.get(f"{self.trigger}_timeout", 6.0)))
+        self.await_pending(self.ctx.contact.arm(self.trigger, limit, settings), "arming of the contact detector", 2.0)
+        try:
+            self.wait_for(lambda: self.ctx.contact.event() is not None, self._expected(), limit)
+        finally:
+            self.ctx.contact.disarm()
+        event = self.ctx.contact.event()
+        assert event is not None
+        self.ctx.journal.mark("contact")
+        self.reason = event.message or f"{self.trigger} by {event.source}, margin {event.margin:.1f}"
+        return "succeeded"
+
+    def _expected(self) -> str:
+        return "contact of an object with the hand" if self.trigger == "contact" else "the person's taking of the load"
+
+    def _reached(self) -> bool:
+        progress = self.ctx.arm.dmp_progress()
+        if progress.state == "aborted":
+            raise TimeLimit("the reach was aborted", (progress.reason or "the controller gave no reason",))
+        allowed, why = self.ctx.arm.motion_allowed()
+        if not allowed:
+            raise TimeLimit("the arm does not follow any more", (why,))
+        return progress.state == "reached"
+
+
+class MonitorDmp(CoglabState):
+    """Beside the motion: if another reaching pattern is recognised, substitute its primitive (switch_dmp). Runs until preempted."""
+
+    default_time_limit = 60.0
+
+    def __init__(self, ctx: Context) -> None:
+        super().__init__(ctx, input_keys=["goal"])
+
+    def run(self, ud: Any) -> str:
+        if not bool(self.ctx.config.get("monitor.enabled", True)):
+            self.wait_for(lambda: False, "the end of the motion")
+        running = ud.goal["primitive"]
+        family = dict(self.ctx.config.get("monitor.primitives", {}))
+        switches = 0
+        while True:
+            try:
+                self.wait_for(lambda: self._other_pattern(family, running), "another reaching pattern")
+            except Interrupted as end:
+                if end.stop:
+                    raise
+                self.reason = f"motion over, {switches} switches"
+                return "preempted"
+            seen = self.ctx.perception.recognition()
+            target = family[seen.pattern]
+            self.await_pending(self.ctx.arm.switch_dmp(dmp_request(ud.goal, primitive=target)),
+                               f"switch to primitive '{target}'", 1.0)
+            self.ctx.journal.mark("switch_dmp")
+            self.ctx.journal.transition(self.path(), self.label, "switched", self.label,
+                                        f"pattern '{seen.pattern}' recognised with confidence {seen.confidence:.2f}: "
+                                        f"primitive '{running}' replaced by '{target}'")
+            running = target
+            switches += 1
+
+    def _other_pattern(self, family: dict[str, str], running: str) -> bool:
+        seen = self.ctx.perception.recognition()
+        return seen.decided and seen.pattern in family and family[seen.pattern] != running
+
+
+class PtpMotion(CoglabState):
+    """Point-to-point motion to a named posture of the configuration (``postures.<name>``); 'home' is coglab_home_robot."""
+
+    default_time_limit = 20.0
+
+    def __init__(self, ctx: Context, posture: str = "home") -> None:
+        super().__init__(ctx)
+        self.posture = posture
+
+    def run(self, ud: Any) -> str:
+        target = [float(v) for v in self.ctx.config.get(f"postures.{self.posture}")]
+        speed = [float(v) for v in self.ctx.config.get("ptp_velocity", [])]
+        self.await_pending(self.ctx.arm.switch_controller("ptp"), "switching to controller 'ptp'", 5.0)
+        self.await_pending(self.ctx.arm.move_ptp(target, speed), f"the motion to posture '{self.posture}'")
+        self._verify(target)
+        return "succeeded"
+
+    def _verify(self, target: list[float]) -> None:
+        """The controller says it has arrived: the measured joints must agree (they are allowed 1 s to settle)."""
+        tolerance = float(self.ctx.config.get("ptp_tolerance", 0.03))
+
+        def arrived() -> bool:
+            measured = self.ctx.arm.joint_positions()
+            return measured is None or max(abs(m - t) for m, t in zip(measured, target)) <= tolerance
+
+        self.wait_for(arrived, f"all measured joints within {tolerance} rad of posture '{self.posture}'", 1.0)
+
+
+class HomeRobot(PtpMotion):
+    """coglab_home_robot: the arm goes to its home posture."""
+
+    def __init__(self, ctx: Context) -> None:
+        super().__init__(ctx, "home")

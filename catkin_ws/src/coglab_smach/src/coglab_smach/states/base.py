@@ -1,0 +1,236 @@
+"""The state every other one derives from: time limit, preemption, STOP, reasons; and containers that record them."""
+from __future__ import annotations
+
+import traceback
+from typing import Any, Callable, Iterable, Mapping, Optional, Sequence
+
+import smach
+
+from ..config import ConfigError
+from ..context import Context
+from ..pending import Pending, PortError
+
+POLL_PERIOD = 0.01
+"""s between two looks at a condition: well below the 60 ms in which a contact has to be found."""
+
+
+class Interrupted(Exception):
+    """The wait of a state was ended from outside: by preemption (``stop=False``) or by STOP."""
+
+    def __init__(self, stop: bool, reason: str) -> None:
+        super().__init__(reason)
+        self.stop = stop
+
+
+class TimeLimit(PortError):
+    """A state's time limit ran out; the sentence says what it waited for."""
+
+
+class CoglabState(smach.State):
+    """Leaf state. Subclasses implement ``run`` and wait only through ``wait_for``, ``await_pending`` and ``pause``.
+
+    Outcomes always include failed and preempted. A PortError, a limit, STOP or a programming error ends the state with
+    'failed' and leaves its sentence in the journal, so that no error can leave a machine stuck.
+    """
+
+    default_time_limit = 10.0
+    """s; the configuration's ``time_limits.<label>`` wins."""
+
+    ignores_stop = False
+    """True for states that make things safe after STOP and must run to their end."""
+
+    def __init__(self, ctx: Context, outcomes: Iterable[str] = ("succeeded",), input_keys: Sequence[str] = (),
+                 output_keys: Sequence[str] = (), io_keys: Sequence[str] = ()) -> None:
+        every = list(dict.fromkeys([*outcomes, "failed", "preempted"]))
+        super().__init__(outcomes=every, input_keys=list(input_keys), output_keys=list(output_keys),
+                         io_keys=list(io_keys))
+        self.ctx = ctx
+        self.label = type(self).__name__
+        self.container: Optional[Any] = None
+        self.targets: Mapping[str, str] = {}
+        self.reason = ""
+        self._deadline = 0.0
+
+    def run(self, ud: Any) -> str:
+        """Do the work; returns an outcome. ``self.reason`` may hold a sentence for it."""
+        raise NotImplementedError
+
+    def path(self) -> str:
+        """Introspection path of the container this state is in."""
+        return self.container.full_path() if self.container is not None else ""
+
+    def execute(self, ud: Any) -> str:
+        self.reason = ""
+        causes: tuple[str, ...] = ()
+        self._deadline = self.ctx.clock.now() + self.time_limit()
+        try:
+            outcome = self.run(ud)
+        except Interrupted as interrupt:
+            outcome, self.reason = ("failed" if interrupt.stop else "preempted"), str(interrupt)
+        except PortError as error:
+            outcome, self.reason, causes = "failed", f"{self.label}: {error.sentence}", error.causes
+        except (ConfigError, smach.InvalidUserCodeError) as error:
+            outcome, self.reason = "failed", f"{self.label}: {error}"
+        except Exception as error:
+            last = traceback.extract_tb(error.__traceback__)[-1]
+            outcome, self.reason = "failed", f"{self.label}: {type(error).__name__}: {error} ({last.name}:{last.lineno})"
+            smach.logerr(traceback.format_exc())
+        if self.preempt_requested():
+            # Served here whatever the outcome, so that a late request cannot poison the next run.
+            self.service_preempt()
+        if outcome == "failed":
+            self.ctx.journal.failure(self.reason or f"{self.label} failed", causes)
+        self.ctx.journal.transition(self.path(), self.label, outcome, self.targets.get(outcome) or outcome,
+                                    self.reason, causes)
+        return outcome
+
+    def time_limit(self) -> float:
+        """Longest duration of this state, s."""
+        limits = self.ctx.config.get("time_limits", {})
+        return float(limits.get(self.label, self.default_time_limit))
+
+    def left(self) -> float:
+        """Time left before the limit, s."""
+        return self._deadline - self.ctx.clock.now()
+
+    def check(self) -> None:
+        """Raise Interrupted if this state was preempted or STOP is latched."""
+        if self.preempt_requested():
+            raise Interrupted(False, f"{self.label} was preempted")
+        if self.ctx.stop.pressed() and not self.ignores_stop:
+            raise Interrupted(True, f"STOP: {self.ctx.stop.reason}")
+
+    def wait_for(self, condition: Callable[[], bool], what: str, limit: Optional[float] = None) -> None:
+        """Wait until ``condition()``; TimeLimit naming ``what`` after ``limit`` s or at the end of the state's own limit."""
+        allowed = self.left() if limit is None else min(limit, self.left())
+        end = self.ctx.clock.now() + allowed
+        while True:
+            self.check()
+            if condition():
+                return
+            if self.ctx.clock.now() >= end:
+                raise TimeLimit(f"{what} within {max(0.0, allowed):.1f} s expected, it did not happen")
+            self.ctx.clock.sleep(POLL_PERIOD)
+
+    def await_pending(self, pending: Pending, what: str, limit: Optional[float] = None) -> Any:
+        """The pending call's value; cancelled if the wait ends otherwise."""
+        try:
+            self.wait_for(pending.done, what, limit)
+        except (Interrupted, TimeLimit):
+            pending.cancel()
+            raise
+        return pending.result()
+
+    def pause(self, duration: float) -> None:
+        """Wait for a duration within the state's limit, ended early by preemption or STOP."""
+        end = self.ctx.clock.now() + min(duration, max(0.0, self.left()))
+        while self.ctx.clock.now() < end:
+            self.check()
+            self.ctx.clock.sleep(min(POLL_PERIOD, end - self.ctx.clock.now()))
+
+
+class _Placed:
+    """What both containers share: label, place in the hierarchy, and the record of how they ended."""
+
+    ctx: Context
+    label: str
+    container: Optional[Any]
+    targets: Mapping[str, str]
+    is_action: bool
+
+    def place(self, ctx: Context, label: str) -> None:
+        """Set the name until the container is added to another one."""
+        self.ctx, self.label, self.container, self.targets = ctx, label, None, {}
+        self.is_action = False
+
+    def begin(self, parent_ud: Any) -> Any:
+        """Start of a run: an action opens its record in the journal. Returns user data, empty where none is given."""
+        ud = parent_ud if parent_ud is not None else smach.UserData()
+        if self.is_action:
+            self.ctx.journal.begin_action(self.label, str(ud.object_id) if "object_id" in ud else "")
+        return ud
+
+    def full_path(self) -> str:
+        """Introspection path of this container."""
+        prefix = self.container.full_path() if self.container is not None else ""
+        return f"{prefix}/{self.label}"
+
+    def adopt(self, label: str, state: Any, transitions: Mapping[str, str]) -> None:
+        """Tell a child where it is."""
+        state.label, state.container, state.targets = label, self, dict(transitions)
+
+    def record_end(self, outcome: Optional[str]) -> None:
+        """Record the container's own transition with the first failure as its reason; close the record of an action."""
+        if outcome is None:
+            return
+        reason, causes = self.ctx.journal.first_failure() if outcome != "succeeded" else ("", ())
+        if self.container is not None:
+            self.ctx.journal.transition(self.container.full_path(), self.label, outcome,
+                                        self.targets.get(outcome) or outcome, reason, causes)
+        if self.is_action:
+            self.ctx.journal.end_action(outcome)
+
+
+class CoglabMachine(_Placed, smach.StateMachine):
+    """A state machine of labelled states that records how it ended."""
+
+    def __init__(self, ctx: Context, label: str, outcomes: Sequence[str], input_keys: Sequence[str] = (),
+                 output_keys: Sequence[str] = ()) -> None:
+        smach.StateMachine.__init__(self, outcomes=list(outcomes), input_keys=list(input_keys),
+                                    output_keys=list(output_keys))
+        self.place(ctx, label)
+
+    def add_state(self, label: str, state: Any, transitions: Mapping[str, str],
+                  remapping: Optional[Mapping[str, str]] = None) -> Any:
+        """Add a state inside ``with machine:``; outcomes left out of ``transitions`` are outcomes of the machine."""
+        smach.StateMachine.add(label, state, transitions=dict(transitions), remapping=dict(remapping or {}))
+        self.adopt(label, state, transitions)
+        return state
+
+    def execute(self, parent_ud: Any = None) -> Optional[str]:
+        outcome = smach.StateMachine.execute(self, self.begin(parent_ud))
+        self.record_end(outcome)
+        return outcome
+
+
+class CoglabConcurrence(_Placed, smach.Concurrence):
+    """Children side by side. ``decide(outcomes)`` is asked after each child's end: True preempts those still running."""
+
+    def __init__(self, ctx: Context, label: str, outcomes: Sequence[str], default_outcome: str,
+                 decide: Callable[[Mapping[str, Optional[str]]], bool],
+                 conclude: Callable[[Mapping[str, str]], str], input_keys: Sequence[str] = (),
+                 output_keys: Sequence[str] = ()) -> None:
+        smach.Concurrence.__init__(self, outcomes=list(outcomes), default_outcome=default_outcome,
+                                   input_keys=list(input_keys), output_keys=list(output_keys), outcome_cb=conclude,
+                                   child_termination_cb=decide)
+        self.place(ctx, label)
+
+    def add_state(self, label: str, state: Any, remapping: Optional[Mapping[str, str]] = None) -> Any:
+        """Add a child inside ``with concurrence:``."""
+        smach.Concurrence.add(label, state, remapping=dict(remapping or {}))
+        self.adopt(label, state, {})
+        return state
+
+    def execute(self, parent_ud: Any = None) -> str:
+        outcome = smach.Concurrence.execute(self, self.begin(parent_ud))
+        self.record_end(outcome)
+        return outcome
+
+
+def require_all(essential: Sequence[str]) -> tuple[Callable[..., bool], Callable[..., str]]:
+    """Rule for a concurrence: it succeeds when all essential children have; the first failure ends the others.
+
+    Children that are not essential run until the essential ones have ended. Returns (decide, conclude).
+    """
+
+    def decide(outcomes: Mapping[str, Optional[str]]) -> bool:
+        ended = [outcomes[name] for name in essential if outcomes[name] is not None]
+        return any(outcome != "succeeded" for outcome in ended) or len(ended) == len(essential)
+
+    def conclude(outcomes: Mapping[str, str]) -> str:
+        results = [outcomes[name] for name in essential]
+        if all(result == "succeeded" for result in results):
+            return "succeeded"
+        return "failed" if "failed" in results else "preempted"
+
+    return decide, conclude

@@ -1,0 +1,74 @@
+"""States of the hand: calibration, preshape, closing on the object, opening."""
+from __future__ import annotations
+
+from typing import Any
+
+from ..context import Context
+from ..pending import PortError
+from .base import CoglabState
+
+
+class CalibrateHand(CoglabState):
+    """Calibration order to the hand; skipped, with a sentence, if it is calibrated and the configuration does not insist."""
+
+    default_time_limit = 30.0
+
+    def run(self, ud: Any) -> str:
+        state = self.ctx.hand.state()
+        if state.calibrated and not bool(self.ctx.config.get("hand.calibrate_always", False)):
+            self.reason = "the hand is calibrated already"
+            return "succeeded"
+        mode = str(self.ctx.config.get("hand.calibration", "fast"))
+        self.await_pending(self.ctx.hand.calibrate(mode), f"hand calibration '{mode}'")
+        return "succeeded"
+
+
+class HandPreshape(CoglabState):
+    """Take the preshape of the object's grasp mode."""
+
+    default_time_limit = 6.0
+
+    def __init__(self, ctx: Context) -> None:
+        super().__init__(ctx, input_keys=["grasp"])
+
+    def run(self, ud: Any) -> str:
+        hand = ud.grasp["hand"]
+        self.await_pending(self.ctx.hand.preshape(hand["mode"], hand["level"]), f"preshape '{hand['mode']}'")
+        self.ctx.journal.mark("preshaped")
+        return "succeeded"
+
+
+class HandClose(CoglabState):
+    """Close the preshaped hand on the object and make sure that something is in it."""
+
+    default_time_limit = 8.0
+
+    def __init__(self, ctx: Context) -> None:
+        super().__init__(ctx, input_keys=["object_id"])
+
+    def run(self, ud: Any) -> str:
+        self.ctx.journal.mark("closing")
+        # From here on the hand may hold: a failure in the middle must not make the recovery drop the object.
+        self.ctx.holding = ud.object_id
+        self.await_pending(self.ctx.hand.close_on_object(), "closing of the hand")
+        self.ctx.journal.mark("closed")
+        self.pause(float(self.ctx.config.get("hand.settle_after_close", 0.3)))
+        positions = self.ctx.hand.state().positions
+        empty_above = int(self.ctx.config.get("hand.empty_above", 245))
+        # Motor 0 abducts the thumb: it says nothing about an object.
+        if positions and all(p >= empty_above for p in positions[1:]):
+            self.ctx.holding = ""
+            raise PortError(f"the hand closed on nothing: flexion motors at {list(positions[1:])} of 254")
+        return "succeeded"
+
+
+class HandOpen(CoglabState):
+    """Open the hand; afterwards nothing is held."""
+
+    default_time_limit = 8.0
+
+    def run(self, ud: Any) -> str:
+        self.ctx.journal.mark("opening")
+        self.await_pending(self.ctx.hand.open(int(self.ctx.config.get("hand.open_speed", 400))), "opening of the hand")
+        self.ctx.holding = ""
+        return "succeeded"

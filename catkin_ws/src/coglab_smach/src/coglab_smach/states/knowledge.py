@@ -1,0 +1,132 @@
+"""States that turn knowledge into a goal: the object database and perception."""
+from __future__ import annotations
+
+from typing import Any
+
+from ..context import Context
+from ..goals import delivery_goal, grasp_goal, place_goal
+from ..pending import PortError
+from .base import CoglabState
+
+
+class InitVision(CoglabState):
+    """coglab_init_vision: start the perception modules."""
+
+    default_time_limit = 30.0
+
+    def run(self, ud: Any) -> str:
+        self.reason = str(self.await_pending(self.ctx.perception.init_vision(self.left()), "start of perception"))
+        return "succeeded"
+
+
+class QueryDatabase(CoglabState):
+    """Read the object's entry; its nominal grasp goes into user data for all later states."""
+
+    default_time_limit = 5.0
+
+    def __init__(self, ctx: Context) -> None:
+        super().__init__(ctx, input_keys=["object_id"], output_keys=["object_entry", "grasp", "grasp_name"])
+
+    def run(self, ud: Any) -> str:
+        entry = self.await_pending(self.ctx.database.get_object(ud.object_id), f"entry of object '{ud.object_id}'")
+        name = entry["default_grasp"]
+        ud.object_entry = entry
+        ud.grasp_name = name
+        ud.grasp = entry["grasps"][name]
+        return "succeeded"
+
+
+class LocateObject(CoglabState):
+    """Ask perception where something is; the answer goes into user data."""
+
+    default_time_limit = 8.0
+
+    def __init__(self, ctx: Context) -> None:
+        super().__init__(ctx, input_keys=["object_id"], output_keys=["located"])
+
+    def run(self, ud: Any) -> str:
+        ud.located = locate(self, ud.object_id)
+        return "succeeded"
+
+
+def locate(state: CoglabState, target: str) -> dict[str, Any]:
+    """Wait for perception to see ``target`` (object id or 'human_hand'); plain dict for user data."""
+    limit = float(state.ctx.config.get("perception.locate_timeout", 5.0))
+    found = state.await_pending(state.ctx.perception.locate_object(target, limit), f"sight of '{target}'", limit + 1.0)
+    oldest = float(state.ctx.config.get("perception.max_age", 0.5))
+    if found.age > oldest:
+        raise PortError(f"'{target}' was last seen {found.age:.2f} s ago, expected at most {oldest} s",
+                        ("the tracker has lost it; bring it into view",))
+    return {"frame": found.frame, "parent": found.parent, "xyz": list(found.xyz),
+            "quaternion": list(found.quaternion), "age": found.age}
+
+
+class SetGraspGoal(CoglabState):
+    """DMP goal from the nominal grasp: palm relative to the tracked object frame, short of it by the approach distance."""
+
+    default_time_limit = 10.0
+
+    def __init__(self, ctx: Context, role: str) -> None:
+        super().__init__(ctx, input_keys=["object_id", "object_entry", "grasp"], output_keys=["goal", "located"])
+        self.role = role
+
+    def run(self, ud: Any) -> str:
+        located = locate(self, ud.object_id)
+        ud.located = located
+        standoff = None if self.role == "receive" else 0.0
+        ud.goal = grasp_goal(ud.object_entry, ud.grasp, located["frame"], self.role, standoff)
+        return "succeeded"
+
+
+class SetDeliveryGoal(CoglabState):
+    """DMP goal from the delivery mode: where the palm must be, relative to the person's hand, to offer the object."""
+
+    default_time_limit = 10.0
+
+    def __init__(self, ctx: Context) -> None:
+        super().__init__(ctx, input_keys=["object_entry", "grasp"],
+                         output_keys=["goal", "delivery", "delivery_name", "delivery_pose"])
+
+    def run(self, ud: Any) -> str:
+        located = locate(self, str(self.ctx.config.get("perception.human_hand", "human_hand")))
+        entry = ud.object_entry
+        name = entry["default_delivery"]
+        delivery = entry["deliveries"][name]
+        ud.delivery_name = name
+        ud.delivery = delivery
+        goal = delivery_goal(entry, ud.grasp, delivery, located["frame"])
+        ud.delivery_pose = {"xyz": goal["offset"], "quaternion": goal["orientation"]}
+        ud.goal = goal
+        return "succeeded"
+
+
+class FindPlace(CoglabState):
+    """Ask perception for a free place on the board (Figure 8)."""
+
+    default_time_limit = 8.0
+
+    def __init__(self, ctx: Context) -> None:
+        super().__init__(ctx, input_keys=["object_id"], output_keys=["place"])
+
+    def run(self, ud: Any) -> str:
+        limit = float(self.ctx.config.get("perception.locate_timeout", 5.0))
+        places = self.await_pending(self.ctx.perception.free_places(ud.object_id, limit), "a free place on the board",
+                                    limit + 1.0)
+        if not places:
+            raise PortError("perception names no free place on the board; clear one")
+        best = places[0]
+        ud.place = {"frame": best.parent, "xyz": list(best.xyz), "quaternion": list(best.quaternion)}
+        return "succeeded"
+
+
+class SetPlaceGoal(CoglabState):
+    """DMP goal from a free place: the palm pose that brings the held object there."""
+
+    default_time_limit = 5.0
+
+    def __init__(self, ctx: Context) -> None:
+        super().__init__(ctx, input_keys=["object_entry", "grasp", "place"], output_keys=["goal"])
+
+    def run(self, ud: Any) -> str:
+        ud.goal = place_goal(ud.object_entry, ud.grasp, ud.place)
+        return "succeeded"

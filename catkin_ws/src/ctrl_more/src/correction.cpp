@@ -1,0 +1,81 @@
+#include "correction.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+
+#include "ctrl_more/so3.hpp"
+
+namespace ctrl_more::correction {
+namespace {
+
+using Quaternion = Eigen::Map<Eigen::Quaterniond>;
+using ConstQuaternion = Eigen::Map<const Eigen::Quaterniond>;
+
+// Doubles before the quaternion; all of them for a vector.
+int linearPart(SignalKind kind, int size) { return kind == SignalKind::Vector ? size : size - 4; }
+
+}  // namespace
+
+void setIdentity(SignalKind kind, int size, double* c) {
+  std::fill(c, c + size, 0.0);
+  if (kind != SignalKind::Vector) c[size - 1] = 1.0;
+}
+
+void difference(SignalKind kind, int size, const double* before, const double* after, double* c) {
+  const int n = linearPart(kind, size);
+  for (int i = 0; i < n; ++i) c[i] = after[i] - before[i];
+  if (kind == SignalKind::Vector) return;
+  Quaternion(c + n) =
+      (ConstQuaternion(after + n) * ConstQuaternion(before + n).conjugate()).normalized();
+}
+
+void apply(SignalKind kind, int size, const double* before, const double* c, double* out) {
+  const int n = linearPart(kind, size);
+  for (int i = 0; i < n; ++i) out[i] = before[i] + c[i];
+  if (kind == SignalKind::Vector) return;
+  const Eigen::Quaterniond q = ConstQuaternion(c + n) * ConstQuaternion(before + n);
+  Quaternion(out + n) = q.normalized();
+}
+
+void between(SignalKind kind, int size, const double* from, const double* to, double share,
+             double* out) {
+  const int n = linearPart(kind, size);
+  for (int i = 0; i < n; ++i) out[i] = from[i] + share * (to[i] - from[i]);
+  if (kind == SignalKind::Vector) return;
+  const Eigen::Quaterniond q =
+      ctrl_more::between(ConstQuaternion(from + n), ConstQuaternion(to + n), share);
+  Quaternion(out + n) = q.normalized();
+}
+
+Norms norms(SignalKind kind, int size, const double* c) {
+  const int n = linearPart(kind, size);
+  Norms result;
+  double sum = 0.0;
+  for (int i = 0; i < n; ++i) sum += c[i] * c[i];
+  result.size = std::sqrt(sum);
+  if (kind != SignalKind::Vector) {
+    const double* q = c + n;
+    const double sine = std::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2]);
+    result.angle = 2.0 * std::atan2(sine, std::abs(q[3]));
+  }
+  return result;
+}
+
+bool isFinite(int size, const double* values) {
+  // 0 * x is 0 for every finite x and NaN otherwise: no branch per number.
+  double sum = 0.0;
+  for (int i = 0; i < size; ++i) sum += 0.0 * values[i];
+  return sum == 0.0;
+}
+
+bool isUnit(SignalKind kind, int size, const double* values) {
+  if (kind == SignalKind::Vector) return true;
+  const double* q = values + size - 4;
+  const double square = q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3];
+  return std::abs(square - 1.0) <= 2e-6;
+}
+
+}  // namespace ctrl_more::correction

@@ -1,0 +1,218 @@
+#include "ctrl_more/setup.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <sstream>
+#include <stdexcept>
+
+#include "ctrl_more/config_node.hpp"
+
+namespace ctrl_more {
+namespace {
+
+std::string listOf(const std::vector<int>& sizes) {
+  std::string text;
+  for (const int size : sizes) text += (text.empty() ? "" : " or ") + std::to_string(size);
+  return text;
+}
+
+// The size a signal gets: asked for, else the one it has, else the only one declared.
+int decideSize(const std::string& what, const std::vector<int>& allowed, int asked, int existing) {
+  const auto isAllowed = [&](int size) {
+    return allowed.empty() || std::find(allowed.begin(), allowed.end(), size) != allowed.end();
+  };
+  if (asked != 0 && !isAllowed(asked)) {
+    throw std::invalid_argument(what + ": size " + std::to_string(asked) +
+                                " was asked for, but " + listOf(allowed) + " is declared");
+  }
+  const int expected = asked != 0 ? asked : (allowed.size() == 1 ? allowed[0] : 0);
+  if (existing != 0) {
+    if ((expected != 0 && existing != expected) || !isAllowed(existing)) {
+      throw std::invalid_argument(
+          what + " has size " + std::to_string(existing) + ", but the controller expects " +
+          (expected != 0 ? std::to_string(expected) : listOf(allowed)));
+    }
+    return existing;
+  }
+  if (expected == 0) {
+    throw std::invalid_argument(what + " does not exist yet and the controller accepts several " +
+                                "sizes; declare it before loading the controller");
+  }
+  return expected;
+}
+
+}  // namespace
+
+SettingValues::SettingValues(const std::vector<SettingSpec>& specs) : specs_(specs) {
+  for (const SettingSpec& spec : specs_) {
+    texts_.push_back(spec.initial_text);
+    numbers_.push_back(spec.initial);
+  }
+}
+
+int SettingValues::indexOf(const std::string& name, SettingSpec::Kind kind) const {
+  for (std::size_t i = 0; i < specs_.size(); ++i) {
+    if (specs_[i].name == name && specs_[i].kind == kind) return static_cast<int>(i);
+  }
+  return -1;
+}
+
+Status SettingValues::set(const std::string& name, const std::string& text) {
+  const int i = indexOf(name, SettingSpec::Kind::Text);
+  if (i < 0) return Status::failure("'" + name + "' is no text setting");
+  const auto& choices = specs_[i].choices;
+  if (!choices.empty() && std::find(choices.begin(), choices.end(), text) == choices.end()) {
+    return Status::failure("'" + name + "' cannot be '" + text + "'" +
+                           suggestion(text, choices));
+  }
+  if (text.empty()) return Status::failure("'" + name + "' must not be empty");
+  texts_[i] = text;
+  return {};
+}
+
+Status SettingValues::set(const std::string& name, const std::vector<double>& numbers) {
+  const int i = indexOf(name, SettingSpec::Kind::Numbers);
+  if (i < 0) return Status::failure("'" + name + "' is no numeric setting");
+  const SettingSpec& spec = specs_[i];
+  if (numbers.size() != spec.initial.size()) {
+    return Status::failure("'" + name + "' expects " + std::to_string(spec.initial.size()) +
+                           " numbers, got " + std::to_string(numbers.size()));
+  }
+  for (const double v : numbers) {
+    if (!std::isfinite(v) || v < spec.min || v > spec.max) {
+      std::ostringstream text;
+      text << "'" << name << "' expects " << spec.min << " to " << spec.max << " " << spec.unit
+           << ", got " << v;
+      return Status::failure(text.str());
+    }
+  }
+  numbers_[i] = numbers;
+  return {};
+}
+
+const std::string& SettingValues::text(const std::string& name) const {
+  const int i = indexOf(name, SettingSpec::Kind::Text);
+  if (i < 0) throw std::invalid_argument("no text setting '" + name + "' is declared");
+  return texts_[i];
+}
+
+const std::vector<double>& SettingValues::numbers(const std::string& name) const {
+  const int i = indexOf(name, SettingSpec::Kind::Numbers);
+  if (i < 0) throw std::invalid_argument("no numeric setting '" + name + "' is declared");
+  return numbers_[i];
+}
+
+std::string SettingValues::firstDifference(const SettingValues& other) const {
+  for (std::size_t i = 0; i < specs_.size(); ++i) {
+    if (texts_[i] != other.texts_[i] || numbers_[i] != other.numbers_[i]) return specs_[i].name;
+  }
+  return "";
+}
+
+Setup::Setup(std::string name, const Description& description, const GainValues& gains,
+             const SettingValues& settings, RobotStates& robot, ControlStates& control,
+             std::uint32_t owner)
+    : name_(std::move(name)),
+      gains_(gains),
+      settings_(settings),
+      robot_(robot),
+      control_(control),
+      owner_(owner) {
+  for (const RobotSignalUse& use : description.robot_signals) {
+    robot_uses_.push_back({use, keyOf(use.role, use.key_setting), {}});
+  }
+  for (const ControlSignalUse& use : description.control_signals) {
+    control_uses_.push_back({use, keyOf(use.role, use.key_setting), {}});
+  }
+}
+
+std::string Setup::keyOf(const std::string& role, const std::string& key_setting) const {
+  return key_setting.empty() ? role : settings_.text(key_setting);
+}
+
+void Setup::resolve(ResolvedRobotUse& entry, int size) {
+  const std::string what =
+      name_ + ": " + nameOf(entry.use.source) + " '" + entry.key + "'";
+  const RobotSignal existing = robot_.find(entry.use.source, entry.key);
+  const int decided = decideSize(what, entry.use.sizes, size, existing.size());
+  const Status status =
+      robot_.declare(entry.use.source, entry.key, decided, entry.use.unit, entry.use.frame);
+  if (!status) throw std::invalid_argument(name_ + ": " + status.message());
+  entry.signal = robot_.find(entry.use.source, entry.key);
+}
+
+void Setup::resolve(ResolvedControlUse& entry, int size) {
+  const std::string what = name_ + ": " + nameOf(entry.use.container) + " '" + entry.key + "'";
+  const ControlSignal existing = control_.find(entry.use.container, entry.key);
+  const int fixed = entry.use.container == ControlContainer::JointSpaceReference
+                        ? control_.joints()
+                        : fixedSizeOf(entry.use.container);
+  std::vector<int> allowed = entry.use.sizes;
+  if (allowed.empty() && fixed != 0) allowed = {fixed};
+  const int decided = decideSize(what, allowed, size, existing.size());
+  const Status status = control_.declare(entry.use.container, entry.key, decided, entry.use.unit,
+                                         entry.use.frame);
+  if (!status) throw std::invalid_argument(name_ + ": " + status.message());
+  entry.signal = control_.find(entry.use.container, entry.key);
+}
+
+RobotSignal Setup::robot(const std::string& role, int size) {
+  std::vector<std::string> known;
+  for (ResolvedRobotUse& entry : robot_uses_) {
+    known.push_back(entry.use.role);
+    if (entry.use.role != role) continue;
+    resolve(entry, size);
+    return entry.signal;
+  }
+  throw std::invalid_argument(name_ + ": the description declares no robot signal '" + role + "'" +
+                              suggestion(role, known));
+}
+
+ResolvedControlUse& Setup::findControl(const std::string& role) {
+  std::vector<std::string> known;
+  ResolvedControlUse* found = nullptr;
+  for (ResolvedControlUse& entry : control_uses_) {
+    const std::string full = std::string(nameOf(entry.use.container)) + "/" + entry.use.role;
+    known.push_back(full);
+    if (full == role) return entry;
+    if (entry.use.role != role) continue;
+    if (found) {
+      throw std::invalid_argument(name_ + ": the role '" + role +
+                                  "' is declared in two containers; write container/role");
+    }
+    found = &entry;
+  }
+  if (found) return *found;
+  throw std::invalid_argument(name_ + ": the description declares no control signal '" + role +
+                              "'" + suggestion(role, known));
+}
+
+ControlSignal Setup::control(const std::string& role, int size) {
+  ResolvedControlUse& entry = findControl(role);
+  resolve(entry, size);
+  return entry.signal;
+}
+
+ModifySignal Setup::modify(const std::string& role, int size) {
+  ResolvedControlUse& entry = findControl(role);
+  if (!entry.use.modifies) {
+    throw std::invalid_argument(name_ + ": the description declares control signal '" + role +
+                                "' as read only");
+  }
+  resolve(entry, size);
+  ModifySignal permission;
+  permission.signal_ = entry.signal;
+  permission.owner_ = owner_;
+  return permission;
+}
+
+void Setup::resolveAll() {
+  for (ResolvedRobotUse& entry : robot_uses_) {
+    if (!entry.signal.valid()) resolve(entry, 0);
+  }
+  for (ResolvedControlUse& entry : control_uses_) {
+    if (!entry.signal.valid()) resolve(entry, 0);
+  }
+}
+
+}  // namespace ctrl_more

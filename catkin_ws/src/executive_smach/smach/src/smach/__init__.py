@@ -1,0 +1,49 @@
+"""Hierarchical state machines in Python.
+
+A state has outcomes; a container of states turns the outcome of one into the start of the next; a container is itself
+a state. See the README beside this package for how to write a machine.
+
+Example::
+
+    import smach
+
+    class Hello(smach.State):
+        def __init__(self):
+            smach.State.__init__(self, outcomes=["done"])
+
+        def execute(self, ud):
+            print("hello")
+            return "done"
+
+    machine = smach.StateMachine(outcomes=["end"])
+    with machine:
+        smach.StateMachine.add("HELLO", Hello(), transitions={"done": "end"})
+    assert machine.execute() == "end"
+"""
+
+# The loggers come first: every other module looks them up here each time it logs.
+from smach.log import is_shutdown, logdebug, logerr, loginfo, logwarn, set_loggers, set_shutdown_check  # isort: skip
+
+from smach import clock
+from smach.concurrence import Concurrence
+from smach.container import Container
+from smach.exceptions import (
+    InvalidConstructionError,
+    InvalidStateError,
+    InvalidTransitionError,
+    InvalidUserCodeError,
+)
+from smach.iterator import Iterator
+from smach.sequence import Sequence
+from smach.state import CBState, State
+from smach.state_machine import StateMachine
+from smach.user_data import Remapper, UserData
+from smach.util import CBInterface, cb_interface, has_smach_interface
+from smach.virtual_clock import VirtualClock
+
+__all__ = [
+    "CBInterface", "CBState", "Concurrence", "Container", "InvalidConstructionError", "InvalidStateError",
+    "InvalidTransitionError", "InvalidUserCodeError", "Iterator", "Remapper", "Sequence", "State", "StateMachine",
+    "UserData", "VirtualClock", "cb_interface", "clock", "has_smach_interface", "is_shutdown", "logdebug", "logerr",
+    "loginfo", "logwarn", "set_loggers", "set_shutdown_check",
+]

@@ -1,0 +1,340 @@
+"""What all containers have in common: construction, user data, callbacks and the bookkeeping of a run."""
+
+from __future__ import annotations
+
+import threading
+import traceback
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from typing import Any
+
+import smach
+from smach.exceptions import InvalidConstructionError, InvalidStateError, InvalidTransitionError
+from smach.state import State
+from smach.user_data import UserData
+
+_STATE_METHODS = ("execute", "request_preempt", "preempt_requested", "recall_preempt", "get_registered_outcomes",
+                  "get_registered_input_keys", "get_registered_output_keys")
+
+
+class Container(State):
+    """A state that holds states. Base of StateMachine, Concurrence and Iterator.
+
+    `userdata` is the store its children share; it is kept between runs. On entry every registered input key is copied
+    into it from the parent, on exit every output key back.
+
+    Containers of your own override `__getitem__`, `get_children`, `get_initial_states`, `set_initial_state`,
+    `get_active_states`, `get_internal_edges`, `check_consistency` and `execute`, and run inside `self._run()`.
+
+    Example::
+
+        machine = smach.StateMachine(outcomes=["done"])
+        with machine:                               # open for construction
+            smach.StateMachine.add("A", A(), transitions={"ok": "done"})
+    """
+
+    #: Containers that are open for construction, innermost last, and the lock their thread holds meanwhile.
+    _construction_stack: list[Container] = []
+    _construction_lock = threading.RLock()
+    _construction_thread: int | None = None
+
+    def __init__(self, outcomes: Iterable[str] = (), input_keys: Iterable[str] = (),
+                 output_keys: Iterable[str] = ()) -> None:
+        super().__init__(outcomes, input_keys, output_keys)
+        self.userdata = UserData()
+        self._is_running = False
+        self._run_thread: int | None = None
+        self._preempt_lock = threading.RLock()
+        self._start_cbs: list[tuple[Callable, Sequence]] = []
+        self._transition_cbs: list[tuple[Callable, Sequence]] = []
+        self._termination_cbs: list[tuple[Callable, Sequence]] = []
+        self._end_cbs: list[tuple[Callable, Sequence]] = []
+
+    def __getstate__(self) -> dict:
+        return {key: value for key, value in self.__dict__.items() if not key.endswith("_lock")}
+
+    def __setstate__(self, state: dict) -> None:
+        self.__dict__.update(state)
+        self._preempt_lock = threading.RLock()
+
+    # What a container has to offer.
+
+    def __getitem__(self, key: str) -> State:
+        """The child with this label. Example: `machine["GRASP"]`. KeyError if there is none."""
+        raise NotImplementedError(f"{type(self).__name__} must override __getitem__(label)")
+
+    def get_children(self) -> dict[str, State]:
+        """The children by label. Example: `list(machine.get_children())`."""
+        raise NotImplementedError(f"{type(self).__name__} must override get_children()")
+
+    def get_initial_states(self) -> list[str]:
+        """Labels with which a run begins. Example: `machine.get_initial_states()`."""
+        raise NotImplementedError(f"{type(self).__name__} must override get_initial_states()")
+
+    def set_initial_state(self, initial_states: Sequence[str], userdata: UserData | None = None) -> None:
+        """Begin the next run elsewhere, with this merged into the user data. Example: `m.set_initial_state(["B"])`."""
+        raise NotImplementedError(f"{type(self).__name__} must override set_initial_state(labels, userdata)")
+
+    def get_active_states(self) -> list[str]:
+        """Labels of the children that run now. Example: `machine.get_active_states()`."""
+        raise NotImplementedError(f"{type(self).__name__} must override get_active_states()")
+
+    def get_internal_edges(self) -> list[tuple[str, str, str | None]]:
+        """Edges as (outcome, from label, to label or None). Example: `machine.get_internal_edges()`."""
+        raise NotImplementedError(f"{type(self).__name__} must override get_internal_edges()")
+
+    def check_consistency(self) -> None:
+        """Raise InvalidStateError or InvalidTransitionError if the container cannot run.
+
+        Example: `machine.check_consistency()`.
+        """
+        raise NotImplementedError(f"{type(self).__name__} must override check_consistency()")
+
+    def is_running(self) -> bool:
+        """Whether `execute` is going on. Example: `while machine.is_running(): ...`."""
+        return self._is_running
+
+    # Construction.
+
+    def open(self) -> None:
+        """Begin to add children; pair with `close`. Prefer `with container:`. Example: `machine.open()`."""
+        Container._construction_lock.acquire()
+        Container._construction_thread = threading.get_ident()
+        Container._construction_stack.append(self)
+
+    def close(self) -> None:
+        """End construction and log what is inconsistent. Example: `machine.close()`.
+
+        Raises InvalidStateError if another container was opened later and is still open.
+        """
+        if not self.is_opened():
+            raise InvalidStateError(f"close() of {self._name()}: it is not the innermost open container "
+                                    f"({_stack_text()}); close that one first")
+        self._pop()
+        try:
+            self.check_consistency()
+        except (InvalidStateError, InvalidTransitionError) as error:
+            smach.logerr(f"{self._name()} is inconsistent and will not run as it is: {error}")
+
+    def is_opened(self) -> bool:
+        """Whether this is the innermost container open for construction. Example: `machine.is_opened()`."""
+        stack = Container._construction_stack
+        return bool(stack) and stack[-1] is self
+
+    def assert_opened(self, msg: str = "") -> None:
+        """Raise InvalidConstructionError unless the container is open. Example: `machine.assert_opened()`."""
+        if not self.is_opened():
+            raise InvalidConstructionError(
+                f"{msg or 'the container must be open for construction'}: {self._name()} is not the innermost open "
+                f"container ({_stack_text()}); use it inside 'with container:'")
+
+    def __enter__(self) -> Container:
+        self.open()
+        return self
+
+    def __exit__(self, kind: type | None, error: BaseException | None, trace: Any) -> bool:
+        if error is None:
+            self.close()
+            return False
+        if not isinstance(error, (InvalidStateError, InvalidTransitionError)):  # these were logged when made
+            text = "".join(traceback.format_exception(kind, error, trace))
+            smach.logerr(f"construction of {self._name()} failed: {text}")
+        # Whatever happened inside, nobody else may find the construction lock taken.
+        if any(container is self for container in Container._construction_stack):
+            while not self.is_opened():
+                Container._construction_stack[-1]._pop()
+            self._pop()
+        return False
+
+    @contextmanager
+    def opened(self, **_kwargs: Any) -> Iterator[Container]:
+        """`with machine.opened() as m:` is `with machine:`; keyword arguments are accepted and have no effect."""
+        with self:
+            yield self
+
+    def _pop(self) -> None:
+        Container._construction_stack.pop()
+        if not Container._construction_stack:
+            Container._construction_thread = None
+        Container._construction_lock.release()
+
+    @classmethod
+    def _currently_opened(cls) -> Any:
+        """The innermost container that this thread has open, which must be of this class."""
+        stack = Container._construction_stack
+        if not stack or Container._construction_thread != threading.get_ident():
+            raise InvalidStateError(f"{cls.__name__}.add and the like need an open container; "
+                                    f"call them inside 'with container:'")
+        if not isinstance(stack[-1], cls):
+            raise InvalidStateError(f"expected an open {cls.__name__}, but the innermost open container is a "
+                                    f"{type(stack[-1]).__name__}; use the add method of its class")
+        return stack[-1]
+
+    def _check_new_child(self, label: str, state: State, taken: Iterable[str]) -> None:
+        if not isinstance(label, str):
+            raise InvalidStateError(f"a label must be a string, got {label!r}")
+        missing = [name for name in _STATE_METHODS if not callable(getattr(state, name, None))]
+        if missing:
+            raise InvalidStateError(f"state {label!r}: expected a smach.State, got {type(state).__name__} {state!r} "
+                                    f"without {', '.join(missing)}")
+        try:
+            state.get_registered_outcomes(), state.get_registered_input_keys(), state.get_registered_output_keys()
+        except AttributeError as error:
+            raise InvalidStateError(f"state {label!r} ({type(state).__name__}) is not initialised: {error}; "
+                                    f"call smach.State.__init__(self, outcomes=[...]) in its __init__") from error
+        if label in taken:
+            raise InvalidStateError(f"label {label!r} is already taken in this {type(self).__name__}; labels: "
+                                    f"{', '.join(taken)}")
+
+    def _name(self) -> str:
+        return f"{type(self).__name__} with outcomes {list(self.get_registered_outcomes())}"
+
+    # Callbacks.
+
+    def register_start_cb(self, start_cb: Callable, cb_args: Sequence = ()) -> None:
+        """Call `start_cb(userdata, initial_states, *cb_args)` at the start of each run.
+
+        Example: `machine.register_start_cb(lambda ud, labels: print(labels))`.
+        """
+        self._start_cbs.append(_callback("start_cb", start_cb, cb_args))
+
+    def register_transition_cb(self, transition_cb: Callable, cb_args: Sequence = ()) -> None:
+        """Call `transition_cb(userdata, active_states, *cb_args)` at each transition between children.
+
+        Example: `machine.register_transition_cb(lambda ud, labels: print(labels))`.
+        """
+        self._transition_cbs.append(_callback("transition_cb", transition_cb, cb_args))
+
+    def register_termination_cb(self, termination_cb: Callable, cb_args: Sequence = ()) -> None:
+        """Call `termination_cb(userdata, terminal_states, outcome, *cb_args)` when a run ends with an outcome.
+
+        Example: `machine.register_termination_cb(lambda ud, labels, outcome: print(outcome))`.
+        """
+        self._termination_cbs.append(_callback("termination_cb", termination_cb, cb_args))
+
+    def register_end_cb(self, end_cb: Callable, cb_args: Sequence = ()) -> None:
+        """Call `end_cb(userdata, outcome, *cb_args)` when a run is over in whatever way, the container being idle.
+
+        `outcome` is None if the run ended with an error or at shutdown.
+        Example: `machine.register_end_cb(lambda ud, outcome: print(machine.get_active_states()))`.
+        """
+        self._end_cbs.append(_callback("end_cb", end_cb, cb_args))
+
+    def unregister_cb(self, cb: Callable) -> None:
+        """Never call `cb` again, however it was registered. Example: `machine.unregister_cb(my_start_cb)`."""
+        for name in ("_start_cbs", "_transition_cbs", "_termination_cbs", "_end_cbs"):
+            setattr(self, name, [entry for entry in getattr(self, name) if entry[0] != cb])
+
+    def call_start_cbs(self) -> None:
+        """Call the start callbacks. Example: `self.call_start_cbs()` in an `execute` of your own."""
+        self._call("start", self._start_cbs, self.get_initial_states)
+
+    def call_transition_cbs(self) -> None:
+        """Call the transition callbacks. Example: `self.call_transition_cbs()`."""
+        self._call("transition", self._transition_cbs, self.get_active_states)
+
+    def call_termination_cbs(self, terminal_states: Any, outcome: str | None) -> None:
+        """Call the termination callbacks. Example: `self.call_termination_cbs([label], outcome)`."""
+        self._call("termination", self._termination_cbs, lambda: terminal_states, outcome)
+
+    def _call(self, what: str, callbacks: list[tuple[Callable, Sequence]], states: Callable[[], Any],
+              *more: Any) -> None:
+        for cb, args in callbacks:
+            try:
+                cb(self.userdata, states(), *more, *args)
+            except Exception:
+                smach.logerr(f"{what} callback {_cb_name(cb)} of {self._name()} raised; the run goes on:\n"
+                             f"{traceback.format_exc()}")
+
+    # A run.
+
+    @contextmanager
+    def _run(self) -> Iterator[dict[str, Any]]:
+        """Surrounds one run: flags, and the end callbacks with `result["outcome"]`."""
+        result: dict[str, Any] = {"outcome": None}
+        with self._preempt_lock:
+            if self._is_running:
+                raise InvalidStateError(f"{self._name()} is already running; one container object can be executed "
+                                        f"once at a time: make a second one")
+            self._drop_spent_preempt()
+            self._is_running = True
+            self._run_thread = threading.get_ident()
+        try:
+            yield result
+        finally:
+            with self._preempt_lock:
+                self._is_running = False
+                self._run_thread = None
+                self._spend_preempt()
+            for cb, args in self._end_cbs:
+                try:
+                    cb(self.userdata, result["outcome"], *args)
+                except Exception:
+                    smach.logerr(f"end callback {_cb_name(cb)} of {self._name()} raised:\n{traceback.format_exc()}")
+
+    def request_preempt(self) -> None:
+        """Ask the container, and with it the children that run, to end early. Example: `machine.request_preempt()`.
+
+        Before a run the request waits for its first children. Thread-safe.
+        """
+        with self._preempt_lock:
+            super().request_preempt()
+            if self._is_running:
+                self._forward_preempt()
+
+    def _forward_preempt(self) -> None:
+        """Tell the running children. The preempt lock is held."""
+
+    @staticmethod
+    def _tell(label: str, state: State) -> bool:
+        """Pass the request to a child; whether the child has taken it."""
+        try:
+            state.request_preempt()
+        except Exception:
+            smach.logerr(f"request_preempt of state {label!r} raised; the request is kept for the next state:\n"
+                         f"{traceback.format_exc()}")
+            return False
+        return True
+
+    @staticmethod
+    def _take_back(label: str, state: State) -> bool:
+        """At the end of a child's run, lower its flag; whether it was up, that is, the request was ignored."""
+        try:
+            if not state.preempt_requested():
+                return False
+            state.recall_preempt()
+        except Exception:
+            smach.logerr(f"preemption methods of state {label!r} raised:\n{traceback.format_exc()}")
+        return True
+
+    def _copy_input_keys(self, parent_ud: Any, keys: Iterable[str]) -> None:
+        """Copy `keys` from the parent's user data, of which there may be none."""
+        if parent_ud is not None:
+            _copy(parent_ud, self.userdata, keys, f"input of {self._name()}")
+
+    def _copy_output_keys(self, parent_ud: Any, keys: Iterable[str]) -> None:
+        """Copy `keys` to the parent's user data, of which there may be none."""
+        if parent_ud is not None:
+            _copy(self.userdata, parent_ud, keys, f"output of {self._name()}")
+
+
+def _copy(source: Any, target: Any, keys: Iterable[str], what: str) -> None:
+    for key in keys:
+        if key in source:
+            target[key] = source[key]
+        else:
+            smach.logwarn(f"{what}: user data key {key!r} is not there; present: {', '.join(source.keys()) or 'none'}")
+
+
+def _callback(what: str, cb: Callable, cb_args: Sequence) -> tuple[Callable, Sequence]:
+    if not callable(cb):
+        raise TypeError(f"{what}: expected a callable, got {type(cb).__name__}")
+    return cb, tuple(cb_args)
+
+
+def _cb_name(cb: Callable) -> str:
+    return getattr(cb, "__qualname__", None) or repr(cb)
+
+
+def _stack_text() -> str:
+    return "open: " + (" > ".join(type(c).__name__ for c in Container._construction_stack) or "none")

@@ -1,0 +1,77 @@
+"""Where the engine's messages go, and how it learns that the process is shutting down.
+
+The engine never keeps a reference to a logger: it looks the functions up as attributes of the package
+(`smach.logerr(...)`) each time, so that `set_loggers` takes effect at once and everywhere.
+
+Example::
+
+    import logging, smach
+    log = logging.getLogger("machine")
+    smach.set_loggers(log.info, log.warning, log.debug, log.error)
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+
+Logger = Callable[[str], object]
+
+
+def _write(level: str, message: object, stream: object) -> None:
+    print(f"[ {level} ] : {message}", file=stream)  # type: ignore[arg-type]
+
+
+def loginfo(message: object) -> None:
+    """Print what goes on, to stdout. Example: `smach.loginfo("started")`."""
+    _write("INFO", message, sys.stdout)
+
+
+def logwarn(message: object) -> None:
+    """Print something doubtful, to stderr. Example: `smach.logwarn("key 'x' is missing")`."""
+    _write("WARN", message, sys.stderr)
+
+
+def logdebug(message: object) -> None:
+    """Print a detail, to stdout. Example: `smach.logdebug("released the children")`."""
+    _write("DEBUG", message, sys.stdout)
+
+
+def logerr(message: object) -> None:
+    """Print a fault, to stderr. Example: `smach.logerr("state 'A' raised")`."""
+    _write("ERROR", message, sys.stderr)
+
+
+def is_shutdown() -> bool:
+    """Whether the process is shutting down. Without ROS never; see `set_shutdown_check`."""
+    return False
+
+
+def set_loggers(info: Logger, warn: Logger, debug: Logger, error: Logger) -> None:
+    """Send the engine's messages elsewhere; mind the order of the four.
+
+    Example: `set_loggers(rospy.loginfo, rospy.logwarn, rospy.logdebug, rospy.logerr)`.
+    Raises TypeError if one of them cannot be called (then nothing has changed).
+    """
+    functions = {"loginfo": info, "logwarn": warn, "logdebug": debug, "logerr": error}
+    for name, function in functions.items():
+        if not callable(function):
+            raise TypeError(f"set_loggers: {name} must be callable, got {type(function).__name__}")
+    _rebind(functions)
+
+
+def set_shutdown_check(check: Callable[[], bool]) -> None:
+    """Replace `smach.is_shutdown`; machines ask it between states and while they wait.
+
+    Example: `set_shutdown_check(rospy.is_shutdown)`. Raises TypeError if `check` cannot be called.
+    """
+    if not callable(check):
+        raise TypeError(f"set_shutdown_check: expected a callable, got {type(check).__name__}")
+    _rebind({"is_shutdown": check})
+
+
+def _rebind(functions: dict[str, Callable]) -> None:
+    package = sys.modules[__package__]
+    for module in (package, sys.modules[__name__]):
+        for name, function in functions.items():
+            setattr(module, name, function)

@@ -1,0 +1,298 @@
+"""The hand's functions, D4.10 Table 2, on top of the serial line. Needs pyserial, no ROS."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from numbers import Integral
+from typing import Any
+
+from ih2_hand import frames, grasps
+from ih2_hand.clock import Clock
+from ih2_hand.errors import (HandCalibratingError, HandCalibrationError, HandConnectionLost,
+                             HandPortError, NoForceSensorError, NoGraspModeError)
+from ih2_hand.line import (ANALOGUE_SLACK, POSITION_SLACK, STATUS_SLACK, HandLine, LineCounters,
+                           TraceHook, status_request)
+from ih2_hand.status import decode_status
+from ih2_hand.transport import SerialTransport, Transport
+from ih2_hand.wire_choices import WIRE
+
+_MOTORS = tuple(range(WIRE.motors))
+_STATUS = tuple(status_request(motor) for motor in _MOTORS)
+_POSITION = tuple(bytes((frames.GET_POSITION, motor)) for motor in _MOTORS)
+_CURRENT = tuple(bytes((frames.GET_CURRENT, motor)) for motor in _MOTORS)
+_FORCE = tuple(bytes((motor,)) for motor in _MOTORS)
+
+CALIBRATIONS = {
+    "fast": (frames.FAST_CALIBRATION, "calibration_fast_limit_s"),
+    "complete": (frames.FIRST_CALIBRATION, "calibration_complete_limit_s"),
+}
+
+MILLIAMPERE_PER_COUNT = (0.81, 1.1, 1.1, 1.1, 1.1)
+"""Motor current, by motor (EH1 guide 2.2.2)."""
+
+
+class HandSerialDriver:
+    """One IH2 Azzurra hand on one serial port.
+
+    Motors ("fingers" in Table 2): 0 thumb abduction, 1 thumb flexion, 2 index, 3 middle, 4 ring and
+    little. Positions 0 (open) .. 254 (closed). Every argument out of range is a ValueError before
+    any byte is sent. Every read has a time limit; see `line` for what follows a bad answer.
+    Commands are not acknowledged by the hand: poll the status to follow them. May be called from
+    several threads.
+    """
+
+    def __init__(self, serial_port: str | None = None, *, dialect: str | None = None,
+                 preshapes: Mapping[str, Sequence[int]] | None = None,
+                 send_preshape: bool = WIRE.send_preshape, transport: Transport | None = None,
+                 clock: Clock | None = None, trace: TraceHook | None = None):
+        """Open the port, bring the line in step, and ask the hand for one status.
+
+        `serial_port` is a device, a pty or `socket://host:port`; None takes the one serial device
+        there is. `dialect` is `legacy` or `v17` (W1). `preshapes` replaces grasps.yaml.
+        `send_preshape` False keeps set_grasp_mode from moving the fingers (W21). `transport`
+        replaces the port altogether. Opening stops the fingers (W10) but moves nothing.
+        Raises HandPortError when the port cannot be opened or no hand answers on it.
+        """
+        self.dialect = dialect if dialect is not None else WIRE.dialect
+        if self.dialect not in ("legacy", "v17"):
+            raise ValueError(f"dialect must be legacy or v17; got {dialect!r}")
+        self.preshapes = {mode: tuple(_positions(list(positions))) for mode, positions in
+                          (preshapes or grasps.load_preshapes()).items()}
+        self.send_preshape = send_preshape
+        self._grasp: bytes | None = None
+        self._grasp_mode: tuple[str, str] | None = None
+        self._calibrating = False
+        self.line = HandLine(transport or SerialTransport(serial_port), clock, trace=trace)
+        self.port = self.line.port
+        try:
+            self.line.resynchronise("port opened")
+            if not self.line.answers(_STATUS[0], 1) and not self.line.answers(_STATUS[0], 1):
+                raise HandPortError(
+                    f"no hand answers on {self.port}: check that it is powered, that this is its "
+                    "port, and that it is not calibrating")
+        except (HandPortError, HandConnectionLost):
+            self.line.close()
+            raise
+        self.line.counters = LineCounters()
+
+    # -- connection ------------------------------------------------------------------------------
+
+    def close(self) -> None:
+        """Close the port. The fingers keep what they do; call stop_all first to stop them."""
+        self.line.close()
+
+    def __enter__(self) -> HandSerialDriver:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    @property
+    def counters(self) -> LineCounters:
+        """Requests, resynchronisations and failures since the port was opened."""
+        return self.line.counters
+
+    @property
+    def last_byte(self) -> int | None:
+        """Last byte received, None if none was."""
+        return self.line.transport.last_byte
+
+    @property
+    def calibrating(self) -> bool:
+        """Whether a calibration started here runs."""
+        return self._calibrating
+
+    @property
+    def grasp_mode(self) -> tuple[str, str] | None:
+        """Mode and force level of the last set_grasp_mode."""
+        return self._grasp_mode
+
+    def _check_free(self) -> None:
+        if self._calibrating:
+            raise HandCalibratingError(f"the hand on {self.port} calibrates and discards every "
+                                       "request; wait until `calibrating` is False")
+
+    def _command(self, frame: bytes, busy_s: float = 0.0) -> None:
+        self._check_free()
+        self.line.send(frame, busy_s)
+
+    # -- calibration and stop --------------------------------------------------------------------
+
+    def calibration(self, data: str) -> None:
+        """Calibrate `fast` or `complete` and wait for the end; the hand opens.
+
+        Other requests raise HandCalibratingError meanwhile, except stop_all, whose byte the hand
+        discards like every other (W11). Raises HandCalibrationError when the hand does not answer
+        again in time (W12), or ends in another state than fully open (W13).
+        """
+        if data not in CALIBRATIONS:
+            raise ValueError(f"calibration must be fast or complete; got {data!r}")
+        code, limit_name = CALIBRATIONS[data]
+        limit = getattr(WIRE, limit_name)
+        with self.line.lock:
+            self._command(bytes((code,)))
+            self._calibrating = True
+        try:
+            self._await_calibration(data, limit)
+        finally:
+            self._calibrating = False
+
+    def _await_calibration(self, data: str, limit: float) -> None:
+        clock, poll = self.line.clock, _STATUS[WIRE.calibration_poll_motor]
+        deadline = clock.monotonic() + limit
+        answered = 0
+        while answered < 2:
+            if clock.monotonic() > deadline:
+                raise HandCalibrationError(
+                    f"the hand on {self.port} did not answer within {limit:.0f} s after the {data} "
+                    "calibration began; cycle its power and look for a blocked finger")
+            clock.sleep(WIRE.calibration_poll_s)
+            answered = answered + 1 if self.line.answers(poll, 1) else 0
+        wrong = [motor for motor in _MOTORS
+                 if self.line.value(_STATUS[motor], 1, STATUS_SLACK) & 0xFE
+                 != WIRE.status_after_calibration & 0xFE]
+        if wrong:
+            raise HandCalibrationError(
+                f"the {data} calibration on {self.port} left motor(s) "
+                f"{', '.join(map(str, wrong))} not fully open: free the fingers and repeat it")
+
+    def stop_all(self) -> None:
+        """Stop every motor where it is. Waits for no running request, only for a running frame."""
+        self.line.send(bytes((frames.STOP_ALL,)))
+
+    # -- single motors ---------------------------------------------------------------------------
+
+    def move_motor(self, motor: int, speed: int, is_close_direction: bool) -> None:
+        """Drive a motor at `speed` 0..511 until its end sensor or a resistance stops it."""
+        _motor(motor)
+        _whole("speed", speed, WIRE.speed_max)
+        if not isinstance(is_close_direction, (bool, int)) or is_close_direction not in (0, 1):
+            raise ValueError("is_close_direction must be True (close) or False (open); got "
+                             f"{is_close_direction!r}")
+        self._command(frames.move_motor(motor, speed, bool(is_close_direction)))
+
+    def set_finger_position(self, motor: int, position: int) -> None:
+        """Move a motor to `position` 0..254."""
+        _motor(motor)
+        _whole("position", position, WIRE.position_max)
+        self._command(frames.set_finger_position(motor, position))
+
+    def set_finger_force(self, motor: int, force: int) -> None:
+        """Pull a finger's tendon with `force` 0..254 (W5); motor 0 has no sensor (W6)."""
+        _sensed(motor)
+        _whole("force", force, 254)
+        self._command(frames.set_finger_tension(motor, force * WIRE.force_scale))
+
+    def set_finger_current(self, motor: int, current: int) -> None:
+        """Close a motor with `current` 0..1023 counts (beyond Table 2)."""
+        _motor(motor)
+        _whole("current", current, 1023)
+        self._command(frames.set_finger_current(motor, current))
+
+    def get_finger_position(self, finger: int) -> int:
+        """Position 0..254; valid after a calibration."""
+        return min(self.get_raw_position(finger), WIRE.position_max)
+
+    def get_raw_position(self, finger: int) -> int:
+        """Position byte 0..255 as the hand sends it (beyond Table 2)."""
+        _motor(finger)
+        self._check_free()
+        return self.line.value(_POSITION[finger], 1, POSITION_SLACK)
+
+    def get_finger_force(self, finger: int) -> int:
+        """Tendon tension 0..254 (W5); NoForceSensorError for motor 0."""
+        _sensed(finger)
+        self._check_free()
+        tension = self.line.value(_FORCE[finger], 2, ANALOGUE_SLACK)
+        return min(tension // WIRE.force_scale, 254)
+
+    def get_motor_current(self, motor: int) -> int:
+        """Motor current in counts 0..1023; times MILLIAMPERE_PER_COUNT it is mA."""
+        _motor(motor)
+        self._check_free()
+        return self.line.value(_CURRENT[motor], 2, ANALOGUE_SLACK)
+
+    def get_finger_status(self, finger: int) -> dict[str, Any]:
+        """Status of one motor, see `status.decode_status`."""
+        _motor(finger)
+        self._check_free()
+        return decode_status(finger, self.line.value(_STATUS[finger], 1, STATUS_SLACK))
+
+    # -- whole hand ------------------------------------------------------------------------------
+
+    def get_all_finger_status(self) -> list[dict[str, Any]]:
+        """Status of the five motors, one request each (the hand has no bulk read)."""
+        return [self.get_finger_status(motor) for motor in _MOTORS]
+
+    def read_motors(self) -> list[dict[str, Any]]:
+        """Status, `position`, `force` (-1 where there is no sensor) and `current` of all motors."""
+        readings = []
+        for motor in _MOTORS:
+            reading = self.get_finger_status(motor)
+            reading["position"] = self.get_finger_position(motor)
+            reading["force"] = (-1 if motor == WIRE.unsensed_motor
+                                else self.get_finger_force(motor))
+            reading["current"] = self.get_motor_current(motor)
+            readings.append(reading)
+        return readings
+
+    def set_hand_posture(self, pos: Sequence[int]) -> None:
+        """Move the five motors to positions 0..254; spaced as the hand needs it."""
+        self._command(frames.set_hand_posture(_positions(pos)), WIRE.posture_spacing_s)
+
+    def open_all(self) -> None:
+        """Open the flexion motors 1..4 at the hand's own speed (beyond Table 2)."""
+        self._command(bytes((frames.OPEN_ALL,)), WIRE.posture_spacing_s)
+
+    def set_grasp_mode(self, mode: str, force_level: str, is_current: bool = True) -> None:
+        """Pre-shape the hand for a grasp and remember the grasp for grasp_mode_close (W21).
+
+        `is_current` True limits the grip by motor current, False by tendon tension; the v17
+        dialect has no such choice (W23). ValueError lists modes or levels that exist.
+        """
+        grasps.check_grasp(mode, force_level, self.dialect)
+        if not isinstance(is_current, bool):
+            raise ValueError(f"is_current must be True or False; got {is_current!r}")
+        if self.send_preshape:
+            self.set_hand_posture(self.preshapes[mode])
+        else:
+            self._check_free()
+        self._grasp = frames.grasp(self.dialect, mode, force_level, is_current)
+        self._grasp_mode = (mode, force_level)
+
+    def grasp_mode_close(self) -> None:
+        """Close to the grasp of the last set_grasp_mode; NoGraspModeError if there was none."""
+        if self._grasp is None:
+            raise NoGraspModeError("no grasp mode is set: call set_grasp_mode first")
+        self._command(self._grasp, WIRE.posture_spacing_s)
+
+
+handSerialDriver = HandSerialDriver  # noqa: N816  the name in Table 2
+
+
+def _whole(name: str, value: int, largest: int) -> None:
+    if isinstance(value, bool) or not isinstance(value, Integral) or not 0 <= value <= largest:
+        raise ValueError(f"{name} must be a whole number 0..{largest}; got {value!r}")
+
+
+def _motor(motor: int) -> None:
+    _whole("motor", motor, WIRE.motors - 1)
+
+
+def _sensed(motor: int) -> None:
+    _motor(motor)
+    if motor == WIRE.unsensed_motor:
+        raise NoForceSensorError(f"motor {motor} (thumb abduction) has no tension sensor: force "
+                                 f"exists for motors 1..{WIRE.motors - 1} only")
+
+
+def _positions(pos: Sequence[int]) -> list[int]:
+    try:
+        positions = list(pos)
+    except TypeError:
+        positions = []
+    if isinstance(pos, (str, bytes)) or len(positions) != WIRE.motors:
+        raise ValueError(f"pos must be {WIRE.motors} positions 0..{WIRE.position_max}; got {pos!r}")
+    for motor, position in enumerate(positions):
+        _whole(f"position of motor {motor}", position, WIRE.position_max)
+    return positions

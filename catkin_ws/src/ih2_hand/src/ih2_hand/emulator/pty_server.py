@@ -1,0 +1,169 @@
+"""The emulated hand behind a pseudo-terminal that can be unplugged and plugged in again."""
+
+from __future__ import annotations
+
+import os
+import pty
+import select
+import threading
+import time
+import tty
+from collections.abc import Callable
+from pathlib import Path
+
+from ih2_hand.emulator.faults import Faults
+from ih2_hand.emulator.hand import EmulatedHand
+
+IDLE_S = 1.0
+"""Longest sleep of the serving loop."""
+
+
+class PtyServer:
+    """Serves one EmulatedHand on a pty; `serve` blocks, the rest may be called from any thread.
+
+    `link` is a symlink kept on the pty's path; `on_port` is told the path whenever it changes
+    (empty while unplugged); `trace` gets (direction, bytes, time) as the hand sees them.
+    """
+
+    def __init__(self, hand: EmulatedHand, faults: Faults | None = None,
+                 link: str | None = None,
+                 on_port: Callable[[str], None] = lambda _path: None,
+                 trace: Callable[[str, bytes, float], None] | None = None):
+        self.hand = hand
+        self.faults = faults or Faults(hand)
+        self.faults.on_unplug, self.faults.on_replug = self.unplug, self.replug
+        self.lock = threading.RLock()
+        """Held while the hand is touched."""
+        self.path = ""
+        self._link = Path(link) if link else None
+        self._on_port = on_port
+        self._trace = trace
+        self._master = self._slave = -1
+        self._late: list[tuple[float, bytes]] = []
+        self._replug_at: float | None = None
+        self._running = True
+        self._wake_read, self._wake_write = os.pipe()
+        os.set_blocking(self._wake_read, False)
+        self.replug()
+
+    # -- plug ------------------------------------------------------------------------------------
+
+    def replug(self) -> None:
+        """Open a pty, raw and without echo; nothing happens when it is open."""
+        with self.lock:
+            self._replug_at = None
+            if self._master >= 0:
+                return
+            self._master, self._slave = pty.openpty()
+            # The slave stays open here too: without a reader the master would report an error.
+            tty.setraw(self._slave)
+            os.set_blocking(self._master, False)
+            self.path = os.ttyname(self._slave)
+            if self._link:
+                fresh = self._link.with_name(self._link.name + f".{os.getpid()}")
+                fresh.symlink_to(self.path)
+                fresh.replace(self._link)
+        self._on_port(self.path)
+        self._wake()
+
+    def unplug(self, seconds: float | None = None) -> None:
+        """Close the pty: readers see the device vanish. Plugs in again after `seconds`."""
+        with self.lock:
+            if self._master < 0:
+                return
+            os.close(self._master)
+            os.close(self._slave)
+            self._master = self._slave = -1
+            self.path = ""
+            self._late.clear()
+            self.hand.parser.clear()
+            if self._link:
+                self._link.unlink(missing_ok=True)
+            if seconds is not None:
+                self._replug_at = time.monotonic() + seconds
+        self._on_port("")
+        self._wake()
+
+    # -- serving ---------------------------------------------------------------------------------
+
+    def serve(self) -> None:
+        """Answer until `shutdown`."""
+        while self._running:
+            with self.lock:
+                master = self._master
+            poll = select.poll()
+            poll.register(self._wake_read, select.POLLIN)
+            if master >= 0:
+                poll.register(master, select.POLLIN)
+            self._serve_port(poll, master)
+
+    def _serve_port(self, poll: select.poll, master: int) -> None:
+        """Serve while the same pty is open."""
+        while self._running and self._master == master:
+            events = poll.poll(self._wait_s() * 1000.0)
+            with self.lock:
+                for descriptor, _ in events:
+                    if descriptor == self._wake_read:
+                        _drain(self._wake_read)
+                    elif self._master == master:
+                        self._receive(os.read(master, 4096))
+                if self._master >= 0:
+                    self._send_due()
+                replug = self._replug_at is not None and time.monotonic() >= self._replug_at
+            if replug:
+                self.replug()
+
+    def _wait_s(self) -> float:
+        due = [moment for moment, _ in self._late[:1]]
+        if self._replug_at is not None:
+            due.append(self._replug_at)
+        return max(0.0, min([IDLE_S, *(moment - time.monotonic() for moment in due)]))
+
+    def _receive(self, data: bytes) -> None:
+        data = self.faults.incoming(data)
+        if self._trace:
+            self._trace(">", data, time.time())
+        for _, answer in self.hand.receive(data):
+            answer = self.faults.outgoing(answer)
+            if answer and self.faults.delay_s:
+                self._late.append((time.monotonic() + self.faults.delay_s, answer))
+            elif answer:
+                self._send(answer)
+
+    def _send_due(self) -> None:
+        while self._late and self._late[0][0] <= time.monotonic():
+            self._send(self._late.pop(0)[1])
+        stray = self.faults.take_stray() if self.faults.stray else b""
+        if stray:
+            self._send(stray)
+
+    def _send(self, answer: bytes) -> None:
+        try:
+            os.write(self._master, answer)
+        except BlockingIOError:
+            return  # nobody reads and the line's buffer is full: a wire would lose the bytes too
+        if self._trace:
+            self._trace("<", answer, time.time())
+
+    def fault(self, command: str) -> str:
+        """Carry out a fault command; what was done."""
+        with self.lock:
+            done = self.faults.command(command)
+        self._wake()
+        return done
+
+    def _wake(self) -> None:
+        os.write(self._wake_write, b"x")
+
+    def shutdown(self) -> None:
+        """End `serve` and take the port away."""
+        self._running = False
+        self.unplug()
+        self._wake()
+
+
+def _drain(descriptor: int) -> None:
+    try:
+        os.read(descriptor, 4096)
+    except BlockingIOError:
+        pass

@@ -1,0 +1,234 @@
+"""Requests and answers on a line without checksums: time limits, resynchronisation, confirmation.
+
+The protocol has neither lengths nor checksums, so three rules stand in for them:
+
+* more bytes than asked for, or bytes nobody asked for, make the answer worthless: the input is
+  flushed (a counted resynchronisation) and the request repeated;
+* an answer that does not come makes the hand's own parser suspect: it is filled with StopALL (W10,
+  counted, and it does stop the fingers), then the request is repeated once, then HandTimeoutError;
+* a value that differs from the one read last is confirmed: it counts when two readings agree. At
+  rest this costs nothing. Values that move under the readings settle by their median while they
+  stay within what a finger can do in that time; otherwise HandInconsistentError.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+from ih2_hand import frames
+from ih2_hand.clock import Clock, SteadyClock
+from ih2_hand.errors import HandConnectionLost, HandInconsistentError, HandTimeoutError
+from ih2_hand.transport import Transport, format_byte
+from ih2_hand.wire_choices import WIRE
+
+TraceHook = Callable[[str, bytes], None]
+"""Called with ">" (to the hand) or "<" (from the hand) and the bytes."""
+
+READINGS = 5
+"""Readings taken of one value before it counts as contradictory."""
+
+QUIET_S = 0.002
+"""After a flush the line must stay silent this long (20 byte times)."""
+
+
+@dataclass(frozen=True)
+class Slack:
+    """How far readings of one value may lie apart: `counts` + `rate` (counts/s) x elapsed time."""
+
+    counts: float
+    rate: float
+
+
+POSITION_SLACK = Slack(2.0, 400.0)
+"""A finger does 255 counts/s at full speed (W15); half as much again as margin."""
+
+ANALOGUE_SLACK = Slack(24.0, 5000.0)
+"""Current and tension are noisy and rise fast on contact."""
+
+STATUS_SLACK = Slack(0.0, 0.0)
+"""Flags either agree or do not."""
+
+
+@dataclass
+class LineCounters:
+    """What happened on the line since it was opened."""
+
+    requests: int = 0
+    resynchronisations: int = 0
+    """All of them: flushed input and refilled parser."""
+    fillers: int = 0
+    """Resynchronisations by StopALL: these stopped the fingers."""
+    retries: int = 0
+    failures: int = 0
+    reasons: dict[str, int] = field(default_factory=dict)
+
+
+class HandLine:
+    """Thread-safe request and answer over a transport."""
+
+    def __init__(self, transport: Transport, clock: Clock | None = None,
+                 read_timeout: float = WIRE.read_timeout_s, trace: TraceHook | None = None):
+        self.transport = transport
+        self.port = transport.port
+        self.clock: Clock = clock or SteadyClock()
+        self.read_timeout = read_timeout
+        self.trace = trace
+        self.counters = LineCounters()
+        self.lock = threading.RLock()
+        """Held during a request with its answer."""
+        self._write_lock = threading.Lock()
+        self._not_before = 0.0
+        self._known: dict[bytes, int] = {}
+        self._closed = False
+
+    # -- sending ---------------------------------------------------------------------------------
+
+    def send(self, frame: bytes, busy_s: float = 0.0) -> None:
+        """Send a frame; nothing follows it for `busy_s` (s), the time the hand needs for it.
+
+        Frames are never interleaved. Raises HandConnectionLost.
+        """
+        with self._write_lock:
+            if self._closed:
+                raise HandConnectionLost(f"the hand's port {self.port} was closed; open it again")
+            if self._not_before:
+                wait = self._not_before - self.clock.monotonic()
+                if wait > 0.0:
+                    self.clock.sleep(wait)
+                self._not_before = 0.0
+            self.transport.write(frame)
+            if busy_s:
+                self._not_before = self.clock.monotonic() + busy_s
+            if self.trace:
+                self.trace(">", frame)
+
+    def _receive(self, count: int, timeout: float) -> bytes:
+        data = self.transport.read(count, timeout)
+        if self.trace and data:
+            self.trace("<", data)
+        return data
+
+    def close(self) -> None:
+        """Close the port; later requests raise HandConnectionLost."""
+        with self._write_lock:
+            self._closed = True
+        self.transport.close()
+
+    # -- one request -----------------------------------------------------------------------------
+
+    def request(self, frame: bytes, length: int) -> bytes:
+        """Answer of exactly `length` bytes, after at most one resynchronisation and one retry."""
+        with self.lock:
+            if self.transport.pending():
+                self._flush("bytes nobody asked for")
+            data = self._attempt(frame, length)
+            if data is not None:
+                return data
+            self.counters.retries += 1
+            data = self._attempt(frame, length)
+            if data is not None:
+                return data
+            self.counters.failures += 1
+            last = format_byte(self.transport.last_byte)
+            raise HandTimeoutError(
+                f"the hand on {self.port} gave no complete answer to `{frame.hex(' ')}` "
+                f"({length} byte(s) within {self.read_timeout * 1000:.0f} ms, twice); last byte "
+                f"received {last}; check power, cable and that no calibration runs")
+
+    def _attempt(self, frame: bytes, length: int) -> bytes | None:
+        self.counters.requests += 1
+        self.send(frame)
+        data = self._receive(length, self.read_timeout)
+        if len(data) == length:
+            return data
+        if len(data) > length:
+            self._flush("answer too long")
+        else:
+            self.resynchronise("answer missing" if not data else "answer too short")
+        return None
+
+    # -- resynchronisation -----------------------------------------------------------------------
+
+    def resynchronise(self, reason: str) -> None:
+        """Complete whatever the hand waits for with StopALL (W10), then flush the input."""
+        with self.lock:
+            self.counters.fillers += 1
+            self.send(WIRE.resync_filler)
+            self.clock.sleep(WIRE.resync_wait_s)
+            self._flush(reason)
+
+    def _flush(self, reason: str) -> None:
+        counters = self.counters
+        counters.resynchronisations += 1
+        counters.reasons[reason] = counters.reasons.get(reason, 0) + 1
+        self._known.clear()
+        for _ in range(50):
+            self.transport.flush_input()
+            self.clock.sleep(QUIET_S)
+            if not self.transport.pending():
+                return
+
+    def answers(self, frame: bytes, length: int) -> bool:
+        """Whether one request is answered with exactly `length` bytes; no retry, input flushed.
+
+        For polls of a hand that discards requests while it calibrates (W11).
+        """
+        with self.lock:
+            self.transport.flush_input()
+            self.send(frame)
+            got = len(self._receive(length, self.read_timeout))
+            self._known.clear()
+            return got == length
+
+    # -- values ----------------------------------------------------------------------------------
+
+    def value(self, frame: bytes, length: int, slack: Slack) -> int:
+        """Confirmed value of a reading: 8 bits of a one-byte answer, 10 bits of a two-byte one."""
+        with self.lock:
+            first = self._number(frame, length)
+            if first is not None and first == self._known.get(frame):
+                return first
+            value = self._confirm(frame, length, slack, first)
+            self._known[frame] = value
+            return value
+
+    def _number(self, frame: bytes, length: int) -> int | None:
+        data = self.request(frame, length)
+        if length == 1:
+            return data[0]
+        if data[0] > 3:
+            return None  # ten bits were promised: this is not the answer to the question
+        return data[0] << 8 | data[1]
+
+    def _confirm(self, frame: bytes, length: int, slack: Slack, first: int | None) -> int:
+        start = self.clock.monotonic()
+        for last_round in (False, True):
+            readings = [] if first is None else [first]
+            for _ in range(READINGS - 1):
+                resynchronisations = self.counters.resynchronisations
+                number = self._number(frame, length)
+                if self.counters.resynchronisations != resynchronisations:
+                    readings.clear()  # what was read across a slip may belong to another question
+                if number is None:
+                    continue
+                if number in readings:
+                    return number
+                readings.append(number)
+            span = slack.counts + slack.rate * (self.clock.monotonic() - start)
+            if len(readings) > 2 and max(readings) - min(readings) <= span:
+                return sorted(readings)[len(readings) // 2]
+            if not last_round:
+                self._flush("readings contradict each other")
+                first = None
+        self.counters.failures += 1
+        raise HandInconsistentError(
+            f"readings of `{frame.hex(' ')}` on {self.port} contradict each other "
+            f"({', '.join(str(number) for number in readings) or 'no valid one'}): the line is "
+            "disturbed; check cable, ground and supply")
+
+
+def status_request(motor: int) -> bytes:
+    """GetFingerStatus."""
+    return bytes((frames.GET_STATUS, motor))

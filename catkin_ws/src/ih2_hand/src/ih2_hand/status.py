@@ -1,0 +1,44 @@
+"""The STATUS byte of one motor (EH1 guide 2.4.3)."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from ih2_hand.wire_choices import WIRE
+
+MODES = ("stop", "speed", "position", "tension", "current", "unassigned", "current_position",
+         "bus_error")
+"""Control mode by code (bits 7..5)."""
+
+REACHED, OPEN_END, CLOSED_END, OVER_CURRENT = 0x10, 0x08, 0x04, 0x02
+
+
+def decode_status(motor: int, raw: int) -> dict[str, Any]:
+    """Status of `motor` from its STATUS byte.
+
+    Keys: motor, raw, mode (text), mode_code, target_reached, fully_open, fully_closed,
+    over_current, moving, com_error. With `com_error` the five flags are None (W27).
+    """
+    code = raw >> 5
+    com_error = code == WIRE.com_error_mode
+
+    def flag(bit: int) -> bool | None:
+        return None if com_error else bool(raw & bit)
+
+    return {
+        "motor": motor, "raw": raw, "mode": MODES[code], "mode_code": code,
+        "target_reached": flag(REACHED), "fully_open": flag(OPEN_END),
+        "fully_closed": flag(CLOSED_END), "over_current": flag(OVER_CURRENT),
+        "moving": flag(WIRE.moving_bit), "com_error": com_error,
+    }
+
+
+def describe_status(raw: int) -> str:
+    """One STATUS byte in words, for traces."""
+    status = decode_status(0, raw)
+    words = [status["mode"]]
+    if not status["com_error"]:
+        words += [name.replace("_", " ") for name in
+                  ("target_reached", "fully_open", "fully_closed", "over_current", "moving")
+                  if status[name]]
+    return ", ".join(words)

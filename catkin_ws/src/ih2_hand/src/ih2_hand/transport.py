@@ -1,0 +1,194 @@
+"""The line to the hand: a serial device, a pty, or a `socket://host:port` URL.
+
+A transport has `port` (text for messages), `last_byte` (last byte received or None),
+`write(data)`, `read(count, timeout)` -> all bytes there (at least `count` unless the time ran out;
+more means stray bytes), `pending()`, `flush_input()` and `close()`.
+"""
+
+from __future__ import annotations
+
+import errno
+import os
+import select
+import time
+from typing import Any, Protocol
+
+import serial
+from serial.tools import list_ports
+
+from ih2_hand.errors import HandConnectionLost, HandPortError
+from ih2_hand.wire_choices import WIRE
+
+WRITE_TIMEOUT_S = 0.5
+"""Longest wait for the line to take a frame."""
+
+
+class Transport(Protocol):
+    """What the driver needs of a line."""
+
+    port: str
+    last_byte: int | None
+
+    def write(self, data: bytes) -> None:
+        """Send a frame in one go, or raise HandConnectionLost."""
+
+    def read(self, count: int, timeout: float) -> bytes:
+        """At least `count` bytes, fewer when `timeout` (s) ran out; HandConnectionLost if gone."""
+
+    def pending(self) -> bool:
+        """Whether bytes wait to be read."""
+
+    def flush_input(self) -> None:
+        """Forget the bytes that wait."""
+
+    def close(self) -> None:
+        """Let go of the line; harmless when already closed."""
+
+
+class SerialTransport:
+    """A device, a pty or a URL, opened through pyserial.
+
+    Devices are read by poll and read on pyserial's descriptor: that costs a third of
+    `serial.read` and shows bytes beyond the expected ones. URLs use pyserial's own reader.
+    """
+
+    def __init__(self, port: str | None):
+        self.port = port if port is not None else find_port()
+        self.last_byte: int | None = None
+        self._serial = _open(self.port)
+        self._fd: int | None = None
+        if isinstance(self._serial, serial.Serial) and "://" not in self.port:
+            self._fd = self._serial.fileno()
+            self._poll = select.poll()
+            self._poll.register(self._fd, select.POLLIN)
+
+    def write(self, data: bytes) -> None:
+        try:
+            if self._fd is None:
+                self._serial.write(data)
+                return
+            sent = os.write(self._fd, data)
+            while sent < len(data):
+                sent += self._write_rest(data[sent:])
+        except BlockingIOError:
+            self._write_rest(data)
+        except (OSError, serial.SerialException, TypeError) as error:
+            raise self._lost(error) from error
+
+    def _write_rest(self, data: bytes) -> int:
+        _, ready, _ = select.select([], [self._fd], [], WRITE_TIMEOUT_S)
+        if not ready:
+            raise HandConnectionLost(f"{self.port} took no byte for {WRITE_TIMEOUT_S} s: the other "
+                                     "end is stuck; unplug and replug the hand's cable")
+        return os.write(self._fd, data)
+
+    def read(self, count: int, timeout: float) -> bytes:
+        try:
+            data = self._read_url(count, timeout) if self._fd is None \
+                else self._read_device(count, timeout)
+        except (OSError, serial.SerialException, TypeError) as error:
+            raise self._lost(error) from error
+        if data:
+            self.last_byte = data[-1]
+        return data
+
+    def _read_device(self, count: int, timeout: float) -> bytes:
+        if not self._poll.poll(timeout * 1000.0):
+            return b""
+        data = os.read(self._fd, 256)
+        if len(data) >= count:
+            return data
+        if not data:
+            raise OSError(errno.EIO, "end of file")
+        end = time.monotonic() + timeout
+        while len(data) < count:
+            left = end - time.monotonic()
+            if left <= 0 or not self._poll.poll(left * 1000.0):
+                break
+            more = os.read(self._fd, 256)
+            if not more:
+                raise OSError(errno.EIO, "end of file")
+            data += more
+        return data
+
+    def _read_url(self, count: int, timeout: float) -> bytes:
+        self._serial.timeout = timeout
+        data = self._serial.read(count)
+        if len(data) == count and self._serial.in_waiting:
+            self._serial.timeout = 0
+            data += self._serial.read(256)
+        return data
+
+    def pending(self) -> bool:
+        try:
+            if self._fd is None:
+                return bool(self._serial.in_waiting)
+            return bool(self._poll.poll(0))
+        except (OSError, serial.SerialException, TypeError) as error:
+            raise self._lost(error) from error
+
+    def flush_input(self) -> None:
+        deadline = time.monotonic() + WRITE_TIMEOUT_S
+        while self.pending() and time.monotonic() < deadline:
+            self.read(1, 0.0)
+
+    def close(self) -> None:
+        try:
+            self._serial.close()
+        except (OSError, serial.SerialException):
+            pass  # a pulled device cannot be closed in order; nothing is left to do
+
+    def _lost(self, error: Exception) -> HandConnectionLost:
+        return HandConnectionLost(f"the hand's port {self.port} is gone ({error}); "
+                                  f"last byte received {format_byte(self.last_byte)}; "
+                                  "check the cable")
+
+
+def format_byte(value: int | None) -> str:
+    """A byte for messages."""
+    return "none" if value is None else f"0x{value:02x}"
+
+
+def serial_ports() -> list[str]:
+    """Serial devices of this machine that have a driver behind them."""
+    return sorted(info.device for info in list_ports.comports() if info.hwid != "n/a")
+
+
+def find_port() -> str:
+    """The one serial device; HandPortError names what exists if there is not exactly one."""
+    ports = serial_ports()
+    if len(ports) == 1:
+        return ports[0]
+    if not ports:
+        raise HandPortError("no serial device found: plug in the hand's USB adapter, or name the "
+                            "port (a device, a pty or socket://host:port)")
+    raise HandPortError(f"several serial devices found ({', '.join(ports)}): name the hand's one")
+
+
+def _open(port: str) -> Any:
+    try:
+        if "://" in port:
+            return serial.serial_for_url(port, baudrate=WIRE.baud, timeout=WIRE.read_timeout_s,
+                                         write_timeout=WRITE_TIMEOUT_S)
+        return serial.Serial(port, baudrate=WIRE.baud, timeout=WIRE.read_timeout_s,
+                             write_timeout=WRITE_TIMEOUT_S, exclusive=True)
+    except ValueError as error:
+        raise HandPortError(f"{port!r} is not a port: give a device, a pty or socket://host:port "
+                            f"({error})") from error
+    except (OSError, serial.SerialException) as error:
+        raise HandPortError(_why_not(port, error)) from error
+
+
+def _why_not(port: str, error: Exception) -> str:
+    code = getattr(error, "errno", None)
+    if "://" in port:
+        return f"{port} does not answer ({error}): start the other end or correct the address"
+    if code == errno.ENOENT or not os.path.exists(port):
+        there = ", ".join(serial_ports()) or "none"
+        return f"no such port {port} (serial devices here: {there}): plug it in or correct the name"
+    if code in (errno.EACCES, errno.EPERM):
+        return (f"no permission for {port}: add the user to the group that owns it "
+                "(`sudo adduser $USER dialout`) and log in again")
+    if code in (errno.EAGAIN, errno.EBUSY) or "exclusively lock" in str(error):
+        return f"port {port} is busy: end the other program that has it open (`fuser {port}`)"
+    return f"port {port} cannot be opened ({error}): check that it is the hand's serial device"
