@@ -155,11 +155,15 @@ class PtyServer:
     def _wake(self) -> None:
         os.write(self._wake_write, b"x")
 
+    def request_shutdown(self) -> None:
+        """Make `serve` return; safe in a signal handler."""
+        self._running = False
+        self._wake()
+
     def shutdown(self) -> None:
         """End `serve` and take the port away."""
-        self._running = False
+        self.request_shutdown()
         self.unplug()
-        self._wake()
 
 
 def _drain(descriptor: int) -> None:

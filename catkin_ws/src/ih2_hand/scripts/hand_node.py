@@ -1,0 +1,23 @@
+#!/usr/bin/python3
+"""The hand node (D4.10 Table 3); see ih2_hand.ros.hand_node."""
+
+import sys
+
+import rospy
+
+from ih2_hand.ros.hand_node import HandNode
+
+
+def main() -> int:
+    rospy.init_node("ih2_hand")
+    try:
+        node = HandNode()
+    except (ValueError, OSError) as error:
+        rospy.logfatal("hand node: %s", error)
+        return 1
+    node.run()
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

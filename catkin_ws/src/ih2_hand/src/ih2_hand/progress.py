@@ -1,0 +1,321 @@
+"""Whether a hand movement is done, read from the status of the motors alone (D4.10 section 2.2).
+
+The hand acknowledges nothing: a task sends its command once, then judges every poll of the five
+motors. Motor readings are objects with the fields of coglab_msgs/MotorStatus. No ROS here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any, Protocol
+
+from ih2_hand.driver import HandSerialDriver
+from ih2_hand.wire_choices import WIRE
+
+FLEXION = (1, 2, 3, 4)
+"""Motors that bend fingers; motor 0 swings the thumb sideways."""
+
+POSITION_TOLERANCE = 12
+"""A reached preshape may read this many counts beside its target."""
+
+START_GRACE_S = 0.5
+"""A motor that still shows its old status this long after the command has not taken it."""
+
+STALL_S = 0.4
+"""A driven motor that reads the same position this long is stalled."""
+
+BLOCKED_S = 1.0
+"""A position move that stands this long before its target is blocked."""
+
+LONGEST_S = 60.0
+"""No goal may last longer, whatever its speed."""
+
+MOTOR_NAMES = ("thumb abduction", "thumb", "index", "middle", "ring and little")
+
+
+class MotorReading(Protocol):
+    """The fields of coglab_msgs/MotorStatus that decide."""
+
+    motor: int
+    mode: str
+    target_reached: bool
+    fully_open: bool
+    fully_closed: bool
+    over_current: bool
+    com_error: bool
+    position: int
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What one poll says: `done`, and then whether `ok` and what the fingers `holding` (None:
+    nothing learnt about the grip); `text` for feedback and result; `stop` asks for StopALL."""
+
+    text: str
+    done: bool = False
+    ok: bool = False
+    holding: bool | None = None
+    stop: bool = False
+
+
+class StallWatch:
+    """Since when each motor stands at its position."""
+
+    def __init__(self) -> None:
+        self._since: dict[int, tuple[int, float]] = {}
+
+    def update(self, motors: Sequence[MotorReading], elapsed: float) -> None:
+        """Take a poll made `elapsed` s after the command."""
+        for motor in motors:
+            known = self._since.get(motor.motor)
+            if known is None or known[0] != motor.position:
+                self._since[motor.motor] = (motor.position, elapsed)
+
+    def standing(self, motor: int, elapsed: float) -> float:
+        """Seconds that the motor has not moved."""
+        return elapsed - self._since[motor][1]
+
+
+def _names(motors: Sequence[int]) -> str:
+    return ", ".join(MOTOR_NAMES[motor] for motor in motors)
+
+
+@dataclass
+class Task:
+    """One goal: `begin` commands the hand, `judge` reads a poll, `limit` (s) bounds it."""
+
+    name: str = "task"
+    limit: float = 10.0
+    _stall: StallWatch = field(default_factory=StallWatch)
+
+    def begin(self, driver: HandSerialDriver) -> None:
+        """Send the command; called again when a resynchronisation has stopped the fingers."""
+        raise NotImplementedError
+
+    def judge(self, motors: Sequence[MotorReading], elapsed: float) -> Verdict:
+        """Verdict on a poll that began `elapsed` s after the command."""
+        bus = [motor.motor for motor in motors if motor.com_error]
+        if bus:
+            return Verdict(f"internal bus error of {_names(bus)}: cycle the hand's power", done=True,
+                           stop=True)
+        self._stall.update(motors, elapsed)
+        return self._judge(motors, elapsed)
+
+    def _judge(self, motors: Sequence[MotorReading], elapsed: float) -> Verdict:
+        raise NotImplementedError
+
+
+def _speed_limit_s(speed: int) -> float:
+    stroke = WIRE.full_stroke_s * WIRE.speed_max / speed
+    return min(LONGEST_S, 3.0 + 2.0 * stroke)
+
+
+def check_speed(speed: int) -> None:
+    """ValueError unless 1..511: the wire takes 0 too, but nothing would ever move."""
+    if not 0 <= speed <= WIRE.speed_max:
+        raise ValueError(f"speed must be 0..{WIRE.speed_max}; got {speed}")
+    if speed == 0:
+        raise ValueError(f"speed 0 moves nothing; give 1..{WIRE.speed_max}")
+
+
+class SpeedTask(Task):
+    """Common to open and close: MoveMotor at the goal's speed until end sensor or resistance."""
+
+    close = False
+    motors: tuple[int, ...] = ()
+
+    def __init__(self, name: str, speed: int):
+        check_speed(speed)
+        super().__init__(name, _speed_limit_s(speed))
+        self.speed = speed
+        # At low speed a count takes 2/speed seconds: four of them must pass to call it a stall.
+        self.stall_s = max(STALL_S, 8.0 / speed)
+
+    def begin(self, driver: HandSerialDriver) -> None:
+        for motor in self.motors:
+            driver.move_motor(motor, self.speed, self.close)
+
+    def _judge(self, motors: Sequence[MotorReading], elapsed: float) -> Verdict:
+        at_end, met, moving, lost = [], [], [], []
+        for motor in motors:
+            number = motor.motor
+            if number not in self.motors:
+                continue
+            if motor.fully_closed if self.close else motor.fully_open:
+                at_end.append(number)
+            elif motor.over_current:
+                met.append(number)
+            elif motor.mode == "speed":
+                stalled = self._stall.standing(number, elapsed) >= self.stall_s
+                (met if stalled else moving).append(number)
+            elif elapsed < START_GRACE_S:
+                moving.append(number)
+            else:
+                lost.append(number)
+        if moving:
+            return Verdict(f"{_names(moving)} moving")
+        if lost:
+            return Verdict(f"{_names(lost)} stopped on the way without a reason on the status",
+                           done=True, stop=True)
+        return self._ended(at_end, met)
+
+    def _ended(self, at_end: list[int], met: list[int]) -> Verdict:
+        raise NotImplementedError
+
+
+class OpenTask(SpeedTask):
+    """hand_open: all five motors to their open ends."""
+
+    close = False
+    motors = (0, *FLEXION)
+
+    def __init__(self, speed: int):
+        super().__init__("hand_open", speed)
+
+    def _ended(self, at_end: list[int], met: list[int]) -> Verdict:
+        if met:
+            return Verdict(f"{_names(met)} blocked before the open end: free the fingers",
+                           done=True, stop=True)
+        return Verdict("open", done=True, ok=True, holding=False)
+
+
+class CloseTask(SpeedTask):
+    """hand_close: the fingers (motors 1..4) to their closed ends or onto an object."""
+
+    close = True
+    motors = FLEXION
+
+    def __init__(self, speed: int):
+        super().__init__("hand_close", speed)
+
+    def _ended(self, at_end: list[int], met: list[int]) -> Verdict:
+        if met:
+            return Verdict(f"closed on an object: {_names(met)} met it", done=True, ok=True,
+                           holding=True, stop=True)
+        return Verdict("closed without meeting an object", done=True, ok=True, holding=False)
+
+
+class PreshapeTask(Task):
+    """hand_preshape: every motor at the mode's preshape, in position mode with bit 4 set."""
+
+    def __init__(self, mode: str, level: str, is_current: bool, limit: float):
+        super().__init__("hand_preshape", limit)
+        self.mode, self.level, self.is_current = mode, level, is_current
+        self.targets: tuple[int, ...] = ()
+
+    def begin(self, driver: HandSerialDriver) -> None:
+        self.targets = tuple(driver.preshapes[self.mode])
+        driver.set_grasp_mode(self.mode, self.level, self.is_current)
+        if not driver.send_preshape:
+            driver.set_hand_posture(self.targets)
+
+    def _judge(self, motors: Sequence[MotorReading], elapsed: float) -> Verdict:
+        waiting, ignored = [], []
+        for motor in motors:
+            number, target = motor.motor, self.targets[motor.motor]
+            if motor.mode == "position":
+                near = abs(motor.position - target) <= POSITION_TOLERANCE
+                if motor.target_reached and near:
+                    continue
+                if self._stall.standing(number, elapsed) >= BLOCKED_S:
+                    return Verdict(f"{MOTOR_NAMES[number]} stands at {motor.position} of {target}: "
+                                   "something is in the way", done=True, stop=True)
+                waiting.append(number)
+            elif motor.over_current:
+                return Verdict(f"{MOTOR_NAMES[number]} stopped by over-current at "
+                               f"{motor.position} of {target}", done=True, stop=True)
+            elif elapsed < START_GRACE_S:
+                waiting.append(number)
+            else:
+                ignored.append(number)
+        if ignored:
+            return Verdict("the hand did not take the preshape: it is probably not calibrated; "
+                           "publish `fast` on hand_calibration", done=True, stop=True)
+        if waiting:
+            return Verdict(f"{_names(waiting)} moving")
+        return Verdict(f"preshape {self.mode} reached", done=True, ok=True)
+
+
+class GraspTask(Task):
+    """hand_preshape_close: the closing motors of the mode up to force, object or closed end."""
+
+    def __init__(self, closing: Sequence[int], limit: float):
+        super().__init__("hand_preshape_close", limit)
+        self.closing = tuple(closing)
+        self._started = False
+
+    def begin(self, driver: HandSerialDriver) -> None:
+        self._started = False
+        driver.grasp_mode_close()
+
+    def _judge(self, motors: Sequence[MotorReading], elapsed: float) -> Verdict:
+        closing = [motor for motor in motors if motor.motor in self.closing]
+        in_grasp = ("current_position", "current", "tension")
+        if any(motor.mode in in_grasp for motor in closing):
+            self._started = True
+        if not self._started:
+            return self._not_started(closing, elapsed)
+        met, moving = [], []
+        for motor in closing:
+            number = motor.motor
+            if motor.fully_closed:
+                continue
+            stalled = self._stall.standing(number, elapsed) >= BLOCKED_S
+            if motor.target_reached and motor.mode != "position" or motor.over_current:
+                met.append(number)
+            elif motor.mode in in_grasp or motor.mode == "position":
+                (met if stalled else moving).append(number)
+            else:
+                return Verdict(f"{MOTOR_NAMES[number]} stopped at {motor.position} before it met "
+                               "anything: the grasp was interrupted", done=True, stop=True)
+        if moving:
+            return Verdict(f"{_names(moving)} closing")
+        if met:
+            return Verdict(f"holding: {_names(met)} met the object", done=True, ok=True,
+                           holding=True)
+        return Verdict("closed without meeting an object", done=True, ok=True, holding=False)
+
+    def _not_started(self, closing: Sequence[MotorReading], elapsed: float) -> Verdict:
+        # The hand takes the preshape first, so a motor may move in position mode for a while.
+        if all(self._stall.standing(motor.motor, elapsed) >= BLOCKED_S for motor in closing):
+            if all(motor.fully_closed for motor in closing):
+                return Verdict("closed without meeting an object", done=True, ok=True,
+                               holding=False)
+            return Verdict("the hand did not begin to close: it is probably not calibrated; publish "
+                           "`fast` on hand_calibration", done=True, stop=True)
+        return Verdict("taking the preshape")
+
+
+def shown_empty(motors: Sequence[Any]) -> bool:
+    """Whether a poll proves that the hand holds nothing: every finger at its open end."""
+    flexion = [motor for motor in motors if motor.motor in FLEXION]
+    return bool(flexion) and all(motor.fully_open and not motor.com_error for motor in flexion)
+
+
+def shown_holding(motors: Sequence[Any]) -> bool:
+    """Whether a poll proves a grip: a finger at its closing force before its closed end."""
+    return any(motor.motor in FLEXION and motor.target_reached and not motor.fully_closed
+               and motor.mode in ("current_position", "tension", "current") for motor in motors)
+
+
+def refuse_calibration(words: Sequence[str], *, calibrated: bool, holding: bool,
+                       busy: str | None) -> str | None:
+    """Reason to refuse a calibration request (`fast` or `complete`, then maybe `force`), or None.
+
+    `busy` names what runs now. A second calibration, or one while the hand holds something (or may
+    hold something), opens the fingers and therefore needs ` force`.
+    """
+    if not words or words[0] not in ("fast", "complete") or list(words[1:]) not in ([], ["force"]):
+        return (f"calibration must be fast, complete, fast force or complete force; got "
+                f"{' '.join(words)!r}")
+    if busy:
+        return f"{busy}: calibrate when it has ended"
+    if len(words) == 2:
+        return None
+    if holding:
+        return (f"the hand may hold an object and calibration opens it: open it first (hand_open), "
+                f"or send `{words[0]} force`")
+    if calibrated:
+        return f"the hand is calibrated already: send `{words[0]} force` to repeat it"
+    return None

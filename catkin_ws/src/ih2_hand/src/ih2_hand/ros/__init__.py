@@ -1,0 +1,1 @@
+"""The ROS side of the hand: thin nodes over the driver and the emulator."""

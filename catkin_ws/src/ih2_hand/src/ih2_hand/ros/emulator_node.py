@@ -1,0 +1,56 @@
+"""The emulated hand as a ROS node: meets the simulated object, tells its fingers and its port."""
+
+from __future__ import annotations
+
+import rospy
+from coglab_msgs.msg import FingerContact, FingerPositions
+from std_msgs.msg import String
+
+from ih2_hand.emulator.pty_server import PtyServer
+
+PUBLISH_HZ = 50.0
+
+
+class EmulatorNode:
+    """Topics `finger_contact` (in), `finger_positions` (out, 50 Hz), `hand_fault` (in: commands of
+    `emulator.faults`); parameter `hand_port` holds the pty's path. All names are relative."""
+
+    def __init__(self, server: PtyServer):
+        self._server = server
+        self._positions = rospy.Publisher("finger_positions", FingerPositions, queue_size=5)
+        rospy.Subscriber("finger_contact", FingerContact, self._on_contact, queue_size=5)
+        rospy.Subscriber("hand_fault", String, self._on_fault, queue_size=5)
+        self._timer = rospy.Timer(rospy.Duration(1.0 / PUBLISH_HZ), self._publish)
+
+    @staticmethod
+    def announce(path: str) -> None:
+        """Set (or, while unplugged, remove) the parameter with the pty's path."""
+        if path:
+            rospy.set_param("hand_port", path)
+        elif rospy.has_param("hand_port"):
+            rospy.delete_param("hand_port")
+
+    def _on_contact(self, contact: FingerContact) -> None:
+        try:
+            with self._server.lock:
+                self._server.hand.advance()
+                self._server.hand.set_contacts(contact.contact_position, contact.stiffness)
+        except ValueError as error:
+            rospy.logwarn_throttle(1.0, "finger_contact refused: %s", error)
+
+    def _on_fault(self, command: String) -> None:
+        try:
+            rospy.loginfo("hand emulator: %s", self._server.fault(command.data))
+        except ValueError as error:
+            rospy.logwarn("%s", error)
+
+    def _publish(self, _: rospy.timer.TimerEvent) -> None:
+        message = FingerPositions()
+        message.header.stamp = rospy.Time.now()
+        with self._server.lock:
+            hand = self._server.hand
+            hand.advance()
+            message.position = [min(254, round(motor.position)) for motor in hand.motors]
+            message.current = [min(1023, int(motor.current)) for motor in hand.motors]
+            message.effort = [motor.effort for motor in hand.motors]
+        self._positions.publish(message)

@@ -1,0 +1,268 @@
+"""The four hand actions on one mailbox: at most one goal moves the fingers.
+
+Four SimpleActionServers would each run their own goal, could move the fingers against each other,
+and lose a cancel that arrives between two goals. Here every goal, cancel, stop, calibration request
+and hand_status lands in one queue and one thread works it off, so their order is fixed; goal
+handles are touched by that thread alone.
+"""
+
+from __future__ import annotations
+
+import queue
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import actionlib
+import rospy
+from coglab_msgs.msg import (HandCloseAction, HandCloseFeedback, HandCloseResult, HandOpenAction,
+                             HandOpenFeedback, HandOpenResult, HandPreshapeAction,
+                             HandPreshapeCloseAction, HandPreshapeCloseFeedback,
+                             HandPreshapeCloseResult, HandPreshapeFeedback, HandPreshapeResult,
+                             HandStatus)
+
+from ih2_hand.errors import HandError
+from ih2_hand.progress import Task, Verdict
+
+SETTLE_S = 0.02
+"""Polls begun earlier than this after a command may still show the status before it."""
+
+SILENCE_S = 1.5
+"""Without a hand_status for this long a goal is aborted."""
+
+RESENDS = 2
+"""Times a command is repeated after a resynchronisation stopped the fingers."""
+
+SPECS: dict[str, tuple[Any, Any, Any]] = {
+    "hand_open": (HandOpenAction, HandOpenResult, HandOpenFeedback),
+    "hand_close": (HandCloseAction, HandCloseResult, HandCloseFeedback),
+    "hand_preshape": (HandPreshapeAction, HandPreshapeResult, HandPreshapeFeedback),
+    "hand_preshape_close": (HandPreshapeCloseAction, HandPreshapeCloseResult,
+                            HandPreshapeCloseFeedback),
+}
+"""Action, result and feedback type by action name."""
+
+
+@dataclass(frozen=True)
+class Item:
+    """One entry of the mailbox: `kind` goal, cancel, stop, status, call or quit."""
+
+    kind: str
+    name: str = ""
+    content: Any = None
+
+
+@dataclass
+class Running:
+    """The goal that moves the fingers now."""
+
+    name: str
+    handle: Any
+    task: Task
+    begun: float
+    begun_stamp: rospy.Time
+    fillers: int
+    resends: int = 0
+    last_status: float = 0.0
+
+
+class GoalQueue:
+    """Runs goals one after another; `owner` is the hand node (driver, preshape and events)."""
+
+    def __init__(self, owner: Any):
+        self._owner = owner
+        self._mailbox: queue.Queue[Item] = queue.Queue()
+        self._running: Running | None = None
+        self._status: rospy.Subscriber | None = None
+        self._servers = {}
+        for name, (action, _, _) in SPECS.items():
+            self._servers[name] = actionlib.ActionServer(
+                rospy.resolve_name("~" + name), action,
+                lambda handle, name=name: self._mailbox.put(Item("goal", name, handle)),
+                lambda handle, name=name: self._mailbox.put(Item("cancel", name, handle)),
+                auto_start=False)
+        self._thread = threading.Thread(target=self._work, name="goals", daemon=True)
+
+    def start(self) -> None:
+        """Offer the actions."""
+        self._thread.start()
+        for server in self._servers.values():
+            server.start()
+
+    def shutdown(self) -> None:
+        """Abort what runs and end the thread, bounded."""
+        self._mailbox.put(Item("quit"))
+        self._thread.join(1.0)
+
+    @property
+    def active(self) -> str | None:
+        """Name of the action that runs."""
+        running = self._running
+        return running.name if running else None
+
+    def stop(self, reason: str) -> None:
+        """Abort the running goal; the fingers are stopped."""
+        self._mailbox.put(Item("stop", reason))
+
+    def call(self, function: Callable[[], None]) -> None:
+        """Run a function between goals' steps, in the goals' thread."""
+        self._mailbox.put(Item("call", content=function))
+
+    # -- the thread ------------------------------------------------------------------------------
+
+    def _work(self) -> None:
+        while not rospy.is_shutdown():
+            try:
+                item = self._mailbox.get(timeout=0.1)
+            except queue.Empty:
+                item = Item("tick")
+            try:
+                if item.kind == "quit":
+                    self._end_running("the node ends")
+                    return
+                self._handle(item)
+            except HandError as error:
+                self._fail(f"{error}")
+            except Exception as error:  # a goal must end whatever happens
+                rospy.logerr("hand action: unexpected %s: %s", type(error).__name__, error)
+                self._fail(f"internal error: {error}")
+
+    def _handle(self, item: Item) -> None:
+        running = self._running
+        if item.kind == "goal":
+            if running:
+                self._cancel("replaced by a new goal; fingers stopped")
+            self._accept(item.name, item.content)
+        elif item.kind == "cancel":
+            if running and item.content == running.handle:
+                self._cancel("preempted; fingers stopped")
+        elif item.kind == "stop":
+            self._end_running(item.name)
+        elif item.kind == "call":
+            item.content()
+        elif running:
+            if item.kind == "status":
+                self._step(running, item.content)
+            if self._running is running:
+                self._watch_time(running)
+
+    def _end_running(self, reason: str) -> None:
+        if self._running:
+            self._stop_fingers()
+            self._fail(reason)
+
+    def _accept(self, name: str, handle: Any) -> None:
+        handle.set_accepted()
+        try:
+            task = self._owner.make_task(name, handle.get_goal())
+        except (ValueError, HandError) as error:
+            self._finish_handle(name, handle, Verdict(str(error), done=True))
+            return
+        if handle.get_goal_status().status == actionlib.GoalStatus.PREEMPTING:
+            handle.set_canceled(_result(name, False, "cancelled before it began"))
+            return
+        self._status = rospy.Subscriber(rospy.resolve_name("~hand_status"), HandStatus,
+                                        self._on_status, queue_size=2, tcp_nodelay=True)
+        driver = self._owner.driver
+        now = time.monotonic()
+        self._running = Running(name, handle, task, now, rospy.Time.now(),
+                                driver.counters.fillers if driver else 0, last_status=now)
+        self._begin(self._running)
+
+    def _on_status(self, status: HandStatus) -> None:
+        self._mailbox.put(Item("status", content=status))
+
+    def _begin(self, running: Running) -> None:
+        running.task.begin(self._owner.connected_driver())
+        running.fillers = self._owner.connected_driver().counters.fillers
+        running.begun_stamp = rospy.Time.now()
+        if not running.resends:
+            running.begun = time.monotonic()
+
+    def _step(self, running: Running, status: HandStatus) -> None:
+        running.last_status = time.monotonic()
+        if not status.connected:
+            self._fail(status.message)
+            return
+        if self._owner.connected_driver().counters.fillers != running.fillers:
+            self._resend(running)
+            return
+        age = (status.header.stamp - running.begun_stamp).to_sec()
+        if not status.motors or age < SETTLE_S:
+            return
+        verdict = running.task.judge(status.motors, time.monotonic() - running.begun)
+        _, _, feedback = SPECS[running.name]
+        running.handle.publish_feedback(feedback(
+            status=verdict.text, positions=[motor.position for motor in status.motors]))
+        if verdict.done:
+            if verdict.stop:
+                self._stop_fingers()
+            self._owner.task_ended(running.task, verdict)
+            self._finish(verdict)
+
+    def _resend(self, running: Running) -> None:
+        """A resynchronisation has sent StopALL: the fingers stand; go on with the goal."""
+        if running.resends >= RESENDS:
+            self._stop_fingers()
+            self._fail(f"the line to {self._owner.port} had to be resynchronised "
+                       f"{RESENDS + 1} times during the goal: check the cable")
+            return
+        running.resends += 1
+        self._begin(running)
+
+    def _watch_time(self, running: Running) -> None:
+        now = time.monotonic()
+        if now - running.last_status > SILENCE_S:
+            self._stop_fingers()
+            self._fail(f"no hand_status for {SILENCE_S} s from {self._owner.port}")
+        elif now - running.begun > running.task.limit:
+            self._stop_fingers()
+            self._fail(f"not done within {running.task.limit:.0f} s; fingers stopped")
+
+    # -- ends ------------------------------------------------------------------------------------
+
+    def _stop_fingers(self) -> None:
+        try:
+            driver = self._owner.driver
+            if driver:
+                driver.stop_all()
+        except HandError as error:
+            rospy.logwarn("fingers could not be stopped: %s", error)
+
+    def _cancel(self, reason: str) -> None:
+        running = self._running
+        self._stop_fingers()
+        self._leave()
+        self._owner.task_ended(running.task, Verdict(reason, done=True))
+        running.handle.set_canceled(_result(running.name, False, reason), reason)
+
+    def _fail(self, reason: str) -> None:
+        if self._running:
+            self._owner.task_ended(self._running.task, Verdict(reason, done=True))
+            self._finish(Verdict(reason, done=True))
+
+    def _finish(self, verdict: Verdict) -> None:
+        running = self._running
+        # The subscriber goes before the result: who waits for it may send the next goal at once.
+        self._leave()
+        self._finish_handle(running.name, running.handle, verdict)
+
+    def _leave(self) -> None:
+        self._running = None
+        if self._status:
+            status, self._status = self._status, None
+            threading.Thread(target=status.unregister, daemon=True).start()
+
+    def _finish_handle(self, name: str, handle: Any, verdict: Verdict) -> None:
+        result = _result(name, verdict.ok, verdict.text)
+        if verdict.ok:
+            handle.set_succeeded(result, verdict.text)
+        else:
+            rospy.logwarn("%s: %s", name, verdict.text)
+            handle.set_aborted(result, verdict.text)
+
+
+def _result(name: str, is_ok: bool, message: str) -> Any:
+    return SPECS[name][1](isOk=is_ok, message=message)

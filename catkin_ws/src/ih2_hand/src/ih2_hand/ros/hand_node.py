@@ -1,0 +1,279 @@
+"""The hand node, D4.10 Table 3: polls the hand, publishes it, and offers its actions."""
+
+from __future__ import annotations
+
+import threading
+import time
+from typing import Any
+
+import rospy
+from coglab_msgs.msg import HandStatus
+from sensor_msgs.msg import JointState
+from std_msgs.msg import String
+from std_srvs.srv import Trigger, TriggerResponse
+
+from ih2_hand import grasps
+from ih2_hand.driver import HandSerialDriver
+from ih2_hand.errors import (HandCalibratingError, HandConnectionLost, HandError,
+                             HandInconsistentError, HandPortError, HandTimeoutError)
+from ih2_hand.progress import (CloseTask, GraspTask, OpenTask, PreshapeTask, Task, Verdict,
+                               refuse_calibration, shown_empty, shown_holding)
+from ih2_hand.ros.diagnostics import Diagnostics
+from ih2_hand.ros.goals import GoalQueue
+from ih2_hand.ros.messages import joint_state, motor_status
+from ih2_hand.ros.tracing import TracePublisher
+from ih2_hand.transport import format_byte
+
+RECONNECT_S = 0.5
+"""Pause between attempts to open the port."""
+
+CONTRADICTIONS = 3
+"""Polls in a row with contradicting readings before the connection counts as lost."""
+
+STOP_CHECKS = 5
+"""Rounds in which the stop service looks whether the motors stand."""
+
+
+class HandNode:
+    """Owns the driver; one thread polls, one works the goals off, one calibrates when asked.
+
+    Parameters (private): `serial_port` (device, pty, socket:// URL, `param:NAME` to read it from
+    another parameter, empty for the one serial device there is), `rate` (Hz, 30), `dialect`
+    (legacy), `use_tension` (false: grip by motor current), `goal_time_limit` (s, 10),
+    `grasps_file` (empty: the package's grasps.yaml).
+    """
+
+    def __init__(self) -> None:
+        self._port_setting = str(rospy.get_param("~serial_port", "") or "")
+        self.rate = float(rospy.get_param("~rate", 30.0))
+        if not 1.0 <= self.rate <= 200.0:
+            raise ValueError(f"~rate must be 1..200 Hz; got {self.rate}")
+        self._dialect = str(rospy.get_param("~dialect", "legacy"))
+        self._is_current = not bool(rospy.get_param("~use_tension", False))
+        self._limit = float(rospy.get_param("~goal_time_limit", 10.0))
+        self._preshapes = grasps.load_preshapes(rospy.get_param("~grasps_file", "") or None)
+        self.driver: HandSerialDriver | None = None
+        self.port = self._port_setting or "(the only serial device)"
+        self.calibrated = False
+        self.calibrating = False
+        self.holding = True
+        self.message = "not connected yet"
+        self._preshape: tuple[str, str] | None = None
+        self._contradictions = 0
+        self._lost_lock = threading.Lock()
+        self._ended = threading.Event()
+        self._publisher = rospy.Publisher("~hand_status", HandStatus, queue_size=5,
+                                          tcp_nodelay=True)
+        self._joints = rospy.Publisher("~joint_states", JointState, queue_size=5)
+        self._diagnostics = Diagnostics(self)
+        self._trace = TracePublisher()
+        self.goals = GoalQueue(self)
+        rospy.Service("~stop", Trigger, self._on_stop)
+        rospy.Subscriber("~hand_calibration", String, self._on_calibration, queue_size=5)
+        self._thread = threading.Thread(target=self._poll, name="poll", daemon=True)
+
+    def run(self) -> None:
+        """Work until the node is shut down. The fingers keep what they do then."""
+        self._thread.start()
+        self.goals.start()
+        rospy.spin()
+        self.goals.shutdown()
+        self._ended.set()
+        self._thread.join(2.0)
+        if self.driver:
+            self.driver.close()
+
+    # -- connection ------------------------------------------------------------------------------
+
+    def connected_driver(self) -> HandSerialDriver:
+        """The driver, or HandConnectionLost with the reason in words."""
+        driver = self.driver
+        if driver is None:
+            raise HandConnectionLost(f"the hand is not connected: {self.message}")
+        return driver
+
+    def event(self, text: str, warn: bool = False) -> None:
+        """Something happened: into the log, hand_status and diagnostics."""
+        self.message = text
+        (rospy.logwarn if warn else rospy.loginfo)("hand: %s", text)
+        self._diagnostics.publish()
+
+    def _connect(self) -> None:
+        try:
+            self.port = self._resolve_port()
+            driver = HandSerialDriver(None if self.port == "" else self.port, dialect=self._dialect,
+                                      preshapes=self._preshapes, trace=self._trace.hook)
+        except HandError as error:
+            text = str(error)
+            if text != self.message:
+                self.event(text, warn=True)
+            return
+        self.port = driver.port
+        self.calibrated, self.holding, self._preshape = False, True, None
+        self._contradictions = 0
+        self.driver = driver
+        self.event(f"connected on {self.port}; the grip counts as holding until shown empty")
+
+    def _resolve_port(self) -> str:
+        if not self._port_setting.startswith("param:"):
+            return self._port_setting
+        name = self._port_setting[len("param:"):]
+        port = rospy.get_param(name, "")
+        if not port:
+            raise HandPortError(f"parameter {rospy.resolve_name(name)} is not set: start what "
+                                "publishes the hand's port there")
+        return str(port)
+
+    def lost(self, error: HandError) -> None:
+        """The connection is lost: close it and say so at once; polling reopens it."""
+        with self._lost_lock:
+            driver, self.driver = self.driver, None
+        if driver is None:
+            return
+        last = format_byte(driver.last_byte)
+        driver.close()
+        self.calibrated, self.holding, self._preshape = False, True, None
+        self.event(f"connection to {driver.port} lost (last byte {last}): {error}", warn=True)
+        self._publish([], rospy.Time.now())
+
+    # -- polling ---------------------------------------------------------------------------------
+
+    def _poll(self) -> None:
+        period = 1.0 / self.rate
+        next_time = next_connect = time.monotonic()
+        while not self._ended.is_set() and not rospy.is_shutdown():
+            now = time.monotonic()
+            if self.driver is None and now >= next_connect:
+                self._connect()
+                next_connect = time.monotonic() + RECONNECT_S
+            self._poll_once()
+            self._diagnostics.tick()
+            # A late round moves the grid: there is no use in catching up on polls.
+            next_time = max(next_time + period, time.monotonic())
+            self._ended.wait(next_time - time.monotonic())
+
+    def _poll_once(self) -> None:
+        driver, stamp = self.driver, rospy.Time.now()
+        readings: list[dict[str, Any]] = []
+        if driver is not None and not self.calibrating:
+            try:
+                readings = driver.read_motors()
+                self._contradictions = 0
+            except HandCalibratingError:
+                pass
+            except HandInconsistentError as error:
+                self._contradictions += 1
+                rospy.logwarn_throttle(1.0, "hand: %s", error)
+                if self._contradictions >= CONTRADICTIONS:
+                    self.lost(error)
+                return
+            except (HandTimeoutError, HandConnectionLost) as error:
+                if not self.calibrating:
+                    self.lost(error)
+                return
+        self._publish(readings, stamp)
+
+    def _publish(self, readings: list[dict[str, Any]], stamp: rospy.Time) -> None:
+        status = HandStatus(motors=[motor_status(reading) for reading in readings])
+        if readings:
+            if self.holding and shown_empty(status.motors):
+                self.holding = False
+                self.event("the hand is open: it holds nothing")
+            elif not self.holding and shown_holding(status.motors):
+                self.holding = True
+            self._joints.publish(joint_state(readings, stamp))
+        status.header.stamp = stamp
+        status.calibrated, status.calibrating = self.calibrated, self.calibrating
+        status.connected, status.holding = self.driver is not None, self.holding
+        status.message = self.message
+        self._publisher.publish(status)
+
+    # -- goals -----------------------------------------------------------------------------------
+
+    def make_task(self, name: str, goal: Any) -> Task:
+        """Task for an accepted goal; ValueError or HandError with the reason to refuse it."""
+        driver = self.connected_driver()
+        if self.calibrating:
+            raise HandCalibratingError("the hand calibrates; send the goal again afterwards")
+        if name == "hand_open":
+            task: Task = OpenTask(goal.speed)
+        elif name == "hand_close":
+            task = CloseTask(goal.speed)
+        elif name == "hand_preshape":
+            grasps.check_grasp(goal.mode, goal.level, driver.dialect)
+            task = PreshapeTask(goal.mode, goal.level, self._is_current, self._limit)
+        else:
+            if self._preshape is None:
+                raise ValueError("the hand is not preshaped: call hand_preshape first (a hand_open, "
+                                 "hand_close, calibration or reconnection undoes it)")
+            task = GraspTask(grasps.CLOSING_MOTORS[self._preshape[0]], self._limit)
+        if name != "hand_preshape_close":
+            self._preshape = None
+        return task
+
+    def task_ended(self, task: Task, verdict: Verdict) -> None:
+        """Remember what a finished task tells about preshape and grip."""
+        if isinstance(task, PreshapeTask) and verdict.ok:
+            self._preshape = (task.mode, task.level)
+        if verdict.holding is not None:
+            self.holding = verdict.holding
+        elif isinstance(task, (CloseTask, GraspTask)) and not verdict.ok:
+            self.holding = True  # broken off on the way: something may be between the fingers
+        self.message = f"{task.name}: {verdict.text}"
+
+    # -- calibration and stop --------------------------------------------------------------------
+
+    def _on_calibration(self, request: String) -> None:
+        self.goals.call(lambda: self._calibrate(request.data.split()))
+
+    def _calibrate(self, words: list[str]) -> None:
+        """Start a calibration, or say why not; runs in the goals' thread, so no goal can begin."""
+        busy = "a calibration runs" if self.calibrating else None
+        if self.goals.active:
+            busy = f"{self.goals.active} runs"
+        reason = refuse_calibration(words, calibrated=self.calibrated, holding=self.holding,
+                                    busy=busy)
+        if reason is None and self.driver is None:
+            reason = f"the hand is not connected: {self.message}"
+        if reason:
+            self.event(f"calibration refused: {reason}", warn=True)
+            return
+        self.calibrating, self.calibrated, self._preshape = True, False, None
+        self.event(f"calibration {words[0]} started")
+        threading.Thread(target=self._run_calibration, args=(self.driver, words[0]),
+                         name="calibration", daemon=True).start()
+
+    def _run_calibration(self, driver: HandSerialDriver, kind: str) -> None:
+        try:
+            driver.calibration(kind)
+        except (HandConnectionLost, HandTimeoutError) as error:
+            self.calibrating = False
+            self.lost(error)
+        except HandError as error:
+            self.calibrating = False
+            self.event(f"calibration {kind} failed: {error}", warn=True)
+        else:
+            self.calibrated, self.calibrating = True, False
+            self.event(f"calibration {kind} ended")
+
+    def _on_stop(self, _: Any) -> TriggerResponse:
+        """Stop every motor; true only when the motors say that they stand."""
+        self.goals.stop("stopped by the stop service")
+        driver = self.driver
+        if driver is None:
+            return TriggerResponse(False, f"not connected, nothing sent: {self.message}")
+        try:
+            driver.stop_all()
+            if self.calibrating:
+                return TriggerResponse(False, "StopALL sent, but the hand discards everything "
+                                              "while it calibrates; cut its power if it must stop")
+            for attempt in range(STOP_CHECKS):
+                if all(status["mode"] == "stop" for status in driver.get_all_finger_status()):
+                    return TriggerResponse(True, "every motor stands")
+                if attempt:  # a frame may have been cut: complete it, which stops as well
+                    driver.line.resynchronise("stop not taken")
+                driver.stop_all()
+        except HandError as error:
+            return TriggerResponse(False, f"StopALL sent, not confirmed: {error}")
+        return TriggerResponse(False, "StopALL sent, but a motor still reports a driven mode: "
+                                      "cut the hand's power")
