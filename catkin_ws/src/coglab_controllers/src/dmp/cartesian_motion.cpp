@@ -36,7 +36,8 @@ void CartesianMotion::switchTo(const CartesianMotionPlan& plan, const Pose& goal
   if (phase_ == Phase::Idle) return;
   dmp_.switchTo(plan.system, goal.position, plan.ratio);
   curve_begin_ = std::min(dmp_.progress(), 0.95);
-  const Vector3 angular_velocity = reference_.angular_velocity;
+  // The curve runs on the clock of the DMP, which may be slowed.
+  const Vector3 angular_velocity = reference_.angular_velocity / std::max(rate_, 0.1);
   orientation_estimator_.reset(goal.orientation);
   curve_.start(orientation_, angular_velocity, goal.orientation, (1.0 - curve_begin_) * dmp_.tau());
   reference_.orientation_control = plan.orientation_control;
@@ -48,6 +49,7 @@ void CartesianMotion::switchTo(const CartesianMotionPlan& plan, const Pose& goal
 const CartesianReference& CartesianMotion::step(double dt, const Pose& goal, double rate) noexcept {
   event_ = MotionEnd::Event::None;
   if (phase_ == Phase::Idle || !(dt > 0.0)) return reference_;
+  rate_ = rate;
   const Vector3 before = dmp_.state().position;
   Vector3 goal_velocity = Vector3::Zero();
   if (end_.latched()) {

@@ -71,6 +71,7 @@ class CartesianMotion {
   Quaternion orientation_ = Quaternion::Identity();  // set-point at the end of the last step
   double curve_begin_ = 0.0;                         // progress of the DMP at which the curve began
   double remaining_distance_ = 0.0;
+  double rate_ = 1.0;                                // of the last step
   bool settled_ = false;                             // the set-point has come to rest at the latched goal
 };
 

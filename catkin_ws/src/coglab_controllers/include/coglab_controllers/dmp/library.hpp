@@ -45,7 +45,7 @@ class Library {
   int load(const std::string& path);
   /// The same from text; `name` stands for the file in messages.
   int parse(const std::string& text, const std::string& name);
-  /// Writes all primitives as weights, numbers with 17 digits, so that reading gives the same bits. The file appears
+  /// Writes all primitives as weights, numbers so that reading gives the same bits. The file appears
   /// whole or not at all.  @throws LibraryError if it cannot be written.
   void save(const std::string& path) const;
   /// The text that `save` writes.

@@ -8,7 +8,7 @@ namespace coglab_controllers {
 
 /// Thresholds of MotionEnd.
 struct MotionEndParameters {
-  double phase = 0.02;          ///< the phase must be below this,
+  double phase = 0.012;         ///< the phase must be below this (0.01 is reached with the duration over),
   double speed = 0.005;         ///< m/s, and the set-point slower than this,
   double distance = 0.002;      ///< m, and closer to the goal than this
   double follow_distance = 0.030;  ///< m: a goal that leaves this ball around the latched one …

@@ -1,0 +1,42 @@
+# The cores of this package (no ROS nodes): library coglab_controllers_core, the Python module and the tests of both.
+# CMakeLists.txt includes this file after find_package(catkin ...), catkin_python_setup() and catkin_package().
+
+find_package(Eigen3 REQUIRED NO_MODULE)
+find_package(orocos_kdl REQUIRED)
+find_package(kdl_parser REQUIRED)
+find_library(COGLAB_TINYXML2_LIBRARY tinyxml2 REQUIRED)
+find_package(pybind11 REQUIRED)
+
+add_library(coglab_controllers_core
+  src/dmp/canonical_system.cpp
+  src/dmp/cartesian_motion.cpp
+  src/dmp/dmp.cpp
+  src/dmp/learning.cpp
+  src/dmp/library.cpp
+  src/dmp/library_xml.cpp
+  src/dmp/motion_end.cpp
+  src/dmp/orientation_curve.cpp
+  src/dmp/primitive.cpp
+  src/dmp/transformation_system.cpp
+  src/goal/goal_estimator.cpp
+  src/ik/second_task.cpp
+  src/ik/two_task_ik.cpp
+  src/kinematics/chain.cpp
+  src/kinematics/rotation.cpp
+  src/limits/guard.cpp
+  src/limits/phase_governor.cpp
+  src/limits/workspace.cpp
+  src/ptp/ptp_trajectory.cpp)
+target_include_directories(coglab_controllers_core PUBLIC ${CMAKE_CURRENT_SOURCE_DIR}/include)
+target_include_directories(coglab_controllers_core SYSTEM PUBLIC ${orocos_kdl_INCLUDE_DIRS} ${kdl_parser_INCLUDE_DIRS})
+target_link_libraries(coglab_controllers_core
+  PUBLIC Eigen3::Eigen ${orocos_kdl_LIBRARIES}
+  PRIVATE ${kdl_parser_LIBRARIES} ${COGLAB_TINYXML2_LIBRARY})
+target_compile_features(coglab_controllers_core PUBLIC cxx_std_17)
+target_compile_options(coglab_controllers_core PRIVATE -Wall -Wextra)
+set_target_properties(coglab_controllers_core PROPERTIES POSITION_INDEPENDENT_CODE ON)
+
+install(TARGETS coglab_controllers_core
+  ARCHIVE DESTINATION ${CATKIN_PACKAGE_LIB_DESTINATION}
+  LIBRARY DESTINATION ${CATKIN_PACKAGE_LIB_DESTINATION}
+  RUNTIME DESTINATION ${CATKIN_GLOBAL_BIN_DESTINATION})

@@ -1,0 +1,221 @@
+#include "coglab_controllers/dmp/learning.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+#include <Eigen/QR>
+
+#include "coglab_controllers/dmp/dmp.hpp"
+
+namespace coglab_controllers {
+namespace {
+
+constexpr int kGridSteps = 600;       // integration steps per duration
+constexpr double kHoldShare = 0.3;    // how long after its end a motion must stay at the goal, in durations
+constexpr double kHoldWeight = 0.3;   // weight of that, against the motion itself
+constexpr double kRestSpeed = 0.1;    // a demonstration that ends slower than this share of its mean speed ends at rest
+
+// One demonstration, prepared: time from its start, the goal is its last point.
+struct Example {
+  Eigen::VectorXd times;
+  Eigen::Matrix3Xd positions;
+  double duration;
+  double scale;  // length of the path, m
+  bool ends_at_rest;
+};
+
+// Response of the linear system to everything it is linear in, column by column:
+// the basis functions, the goal (times w), the start (times 1 - w and as initial position), the start velocity.
+class Responses {
+ public:
+  Responses(const Primitive& primitive, double duration)
+      : primitive_(primitive), step_(duration / kGridSteps), count_(primitive.basisCount()) {
+    const int columns = count_ + 3;
+    const int steps = static_cast<int>(std::ceil((1.0 + kHoldShare) * kGridSteps)) + 1;
+    positions_.resize(steps + 1, columns);
+    velocities_.resize(steps + 1, columns);
+    Eigen::RowVectorXd x = Eigen::RowVectorXd::Zero(columns), v = x;
+    x[count_ + 1] = 1.0;
+    v[count_ + 2] = duration;  // v = tau * x', for x' = 1 m/s
+    positions_.row(0) = x;
+    velocities_.row(0) = v / duration;
+    const double b = 1.0 / kGridSteps, a = 0.5 * b;
+    Eigen::RowVectorXd f0 = inputs(0.0);
+    for (int i = 0; i < steps; ++i) {
+      const Eigen::RowVectorXd f1 = inputs((i + 0.5) * b), f2 = inputs((i + 1) * b);
+      const Eigen::RowVectorXd kx1 = v, kv1 = slope(f0, x, v);
+      const Eigen::RowVectorXd kx2 = v + a * kv1, kv2 = slope(f1, x + a * kx1, kx2);
+      const Eigen::RowVectorXd kx3 = v + a * kv2, kv3 = slope(f1, x + a * kx2, kx3);
+      const Eigen::RowVectorXd kx4 = v + b * kv3, kv4 = slope(f2, x + b * kx3, kx4);
+      x += b / 6.0 * (kx1 + 2.0 * kx2 + 2.0 * kx3 + kx4);
+      v += b / 6.0 * (kv1 + 2.0 * kv2 + 2.0 * kv3 + kv4);
+      positions_.row(i + 1) = x;
+      velocities_.row(i + 1) = v / duration;
+      f0 = f2;
+    }
+  }
+
+  // Responses at a time, by cubic interpolation on the grid.
+  Eigen::RowVectorXd at(double t) const {
+    const int last = static_cast<int>(positions_.rows()) - 2;
+    const int i = std::clamp(static_cast<int>(t / step_), 0, last);
+    const double u = t / step_ - i, r = 1.0 - u;
+    return (1.0 + 2.0 * u) * r * r * positions_.row(i) + u * u * (3.0 - 2.0 * u) * positions_.row(i + 1) +
+           step_ * u * r * (r * velocities_.row(i) - u * velocities_.row(i + 1));
+  }
+
+ private:
+  Eigen::RowVectorXd inputs(double time) const {  // time in durations
+    const double s = std::exp(-primitive_.alpha * time), w = primitive_.goal_weight(s);
+    Eigen::RowVectorXd result = Eigen::RowVectorXd::Zero(count_ + 3);
+    const Eigen::ArrayXd exponent = -primitive_.widths.array() * (s - primitive_.centres.array()).square();
+    const Eigen::ArrayXd psi = (exponent - exponent.maxCoeff()).exp();
+    result.head(count_) = ((1.0 - w) * primitive_.stiffness / psi.sum() * psi).matrix().transpose();
+    result[count_] = w * primitive_.stiffness;
+    result[count_ + 1] = (1.0 - w) * primitive_.stiffness;
+    return result;
+  }
+  Eigen::RowVectorXd slope(const Eigen::RowVectorXd& f, const Eigen::RowVectorXd& x,
+                           const Eigen::RowVectorXd& v) const {
+    return f - primitive_.stiffness * x - primitive_.damping * v;
+  }
+
+  const Primitive& primitive_;
+  double step_;
+  int count_;
+  Eigen::MatrixXd positions_, velocities_;
+};
+
+Example prepare(const Trajectory& trajectory) {
+  Example example;
+  const Eigen::Index count = trajectory.positions.cols();
+  example.times = Eigen::Map<const Eigen::VectorXd>(trajectory.times.data(), count).array() - trajectory.times[0];
+  example.positions = trajectory.positions;
+  example.duration = example.times[count - 1];
+  example.scale = 0.0;
+  for (Eigen::Index i = 1; i < count; ++i) {
+    example.scale += (example.positions.col(i) - example.positions.col(i - 1)).norm();
+  }
+  if (example.scale < 1e-4) {
+    throw std::invalid_argument("expected a path of at least 0.1 mm, got one of " + std::to_string(example.scale) + " m");
+  }
+  const Eigen::Index tail = std::max<Eigen::Index>(1, count / 50);
+  const Vector3 last = example.positions.col(count - 1) - example.positions.col(count - 1 - tail);
+  const double end_speed = last.norm() / (example.times[count - 1] - example.times[count - 1 - tail]);
+  example.ends_at_rest = end_speed < kRestSpeed * example.scale / example.duration;
+  return example;
+}
+
+// Turned, scaled and shifted so that start and goal are those of the reference.
+void alignTo(const Example& reference, Example& example) {
+  const auto line = [](const Example& e) -> Vector3 { return e.positions.rightCols<1>() - e.positions.leftCols<1>(); };
+  const Vector3 from = line(example), to = line(reference);
+  if (from.norm() < 1e-3 || to.norm() < 1e-3) return;
+  const double scale = to.norm() / from.norm();
+  const Matrix3 map = scale * Quaternion::FromTwoVectors(from, to).toRotationMatrix();
+  const Vector3 start = example.positions.col(0), reference_start = reference.positions.col(0);
+  example.positions = (map * (example.positions.colwise() - start)).colwise() + reference_start;
+  example.scale *= scale;
+}
+
+}  // namespace
+
+Primitive learn(const std::string& id, const std::vector<Trajectory>& demonstrations,
+                const LearningOptions& options) {
+  if (demonstrations.empty()) throw std::invalid_argument("expected at least one demonstration, got none");
+  if (options.basis_count < 2 || options.basis_count > kMaxBasis) {
+    throw std::invalid_argument("basis_count: expected 2 to " + std::to_string(kMaxBasis) + ", got " +
+                                std::to_string(options.basis_count));
+  }
+  if (!(options.regularisation >= 0.0 && options.regularisation <= 1.0)) {
+    throw std::invalid_argument("regularisation: expected 0 to 1, got " + std::to_string(options.regularisation));
+  }
+  std::vector<Example> examples;
+  for (std::size_t i = 0; i < demonstrations.size(); ++i) {
+    try {
+      validate(demonstrations[i]);
+      examples.push_back(prepare(demonstrations[i]));
+    } catch (const std::invalid_argument& error) {
+      throw std::invalid_argument("demonstration " + std::to_string(i + 1) + ": " + error.what());
+    }
+    if (options.mapping == ShapeMapping::Similarity) alignTo(examples.front(), examples.back());
+  }
+
+  Primitive primitive;
+  primitive.id = id;
+  primitive.alpha = CanonicalSystem(options.alpha).alpha();
+  primitive.stiffness = options.stiffness;
+  primitive.damping = 2.0 * std::sqrt(options.stiffness);
+  primitive.goal_weight = options.goal_weight;
+  primitive.mapping = options.mapping;
+  primitive.duration = 0.0;
+  placeBasis(options.basis_count, primitive.alpha, primitive.centres, primitive.widths);
+  const double share = 1.0 / static_cast<double>(examples.size());
+  for (const Example& example : examples) {
+    primitive.duration += share * example.duration;
+    primitive.start += share * example.positions.leftCols<1>();
+    primitive.goal += share * example.positions.rightCols<1>();
+  }
+  primitive.weights = Eigen::Matrix3Xd::Zero(3, options.basis_count);
+  validate(primitive);
+
+  // Unknowns: the weights, and the start velocity of each demonstration.
+  const Eigen::Index n = options.basis_count, unknowns = n + static_cast<Eigen::Index>(examples.size());
+  Eigen::Index rows = unknowns;
+  for (const Example& example : examples) {
+    rows += example.times.size();
+    if (example.ends_at_rest) rows += kGridSteps / 10;
+  }
+  Eigen::MatrixXd a = Eigen::MatrixXd::Zero(rows, unknowns);
+  Eigen::MatrixX3d b = Eigen::MatrixX3d::Zero(rows, 3);
+  Eigen::Index row = 0;
+  for (std::size_t k = 0; k < examples.size(); ++k) {
+    const Example& example = examples[k];
+    const Responses responses(primitive, example.duration);
+    const Eigen::RowVector3d start = example.positions.leftCols<1>().transpose();
+    const Eigen::RowVector3d goal = example.positions.rightCols<1>().transpose();
+    const auto add = [&](double t, const Eigen::RowVector3d& position, double weight) {
+      const Eigen::RowVectorXd response = responses.at(t);
+      a.row(row).head(n) = weight * response.head(n);
+      a(row, n + static_cast<Eigen::Index>(k)) = weight * response[n + 2];
+      b.row(row) = weight * (position - response[n] * goal - response[n + 1] * start);
+      ++row;
+    };
+    const double weight = 1.0 / (example.scale * std::sqrt(static_cast<double>(example.times.size())));
+    for (Eigen::Index i = 0; i < example.times.size(); ++i) {
+      add(example.times[i], example.positions.col(i).transpose(), weight);
+    }
+    if (!example.ends_at_rest) continue;
+    const int holds = kGridSteps / 10;
+    const double hold_weight = kHoldWeight / (example.scale * std::sqrt(static_cast<double>(holds)));
+    for (int i = 1; i <= holds; ++i) add(example.duration * (1.0 + kHoldShare * i / holds), goal, hold_weight);
+  }
+  const double ridge = std::sqrt(options.regularisation * a.leftCols(n).squaredNorm() / static_cast<double>(n));
+  for (Eigen::Index i = 0; i < n; ++i) a(row + i, i) = ridge;
+  const Eigen::MatrixX3d solution = a.colPivHouseholderQr().solve(b);
+  primitive.weights = solution.topRows(n).transpose();
+  primitive.start_velocity = solution.bottomRows(unknowns - n).colwise().mean().transpose();
+  validate(primitive);
+  return primitive;
+}
+
+Eigen::Matrix3Xd reproduce(const Primitive& primitive, const std::vector<double>& times, double dt) {
+  Dmp dmp;
+  dmp.start(TransformationSystem(primitive), primitive.start, primitive.start_velocity, primitive.goal, 1.0);
+  Eigen::Matrix3Xd result(3, static_cast<Eigen::Index>(times.size()));
+  const double begin = times.empty() ? 0.0 : times.front();
+  double now = 0.0;
+  for (std::size_t i = 0; i < times.size(); ++i) {
+    const double until = times[i] - begin;
+    while (until - now > 1e-12) {
+      const double step = std::min(dt, until - now);
+      dmp.step(step, primitive.goal);
+      now += step;
+    }
+    result.col(static_cast<Eigen::Index>(i)) = dmp.state().position;
+  }
+  return result;
+}
+
+}  // namespace coglab_controllers
