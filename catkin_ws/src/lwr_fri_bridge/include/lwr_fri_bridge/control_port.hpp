@@ -25,7 +25,8 @@ enum class MotionBlock : std::uint8_t {
   NoPower,       ///< not all drives are powered
   NotStarted,    ///< no `start` since the last stop or fall-back
   Held,          ///< `hold` is latched until `reset`
-  Stopping       ///< `stop` was asked for; braking or waiting for monitor mode
+  Stopping,      ///< `stop` was asked for; braking or waiting for monitor mode
+  Leashed        ///< the set-point ran ahead of the arm; it returns, and the motion must be asked for anew
 };
 
 /// Words for a MotionBlock, for messages to the user.
@@ -45,7 +46,8 @@ struct RobotSample {
   Vector7 commanded_velocity = Vector7::Zero();      ///< state of the interpolator, rad/s
   Vector7 commanded_acceleration = Vector7::Zero();  ///< state of the interpolator, rad/s^2
   MotionBlock block = MotionBlock::Disconnected;     ///< None: target velocities are followed
-  std::uint32_t motion_epoch = 0;  ///< grows whenever a running motion must be aborted (fall-back, hold, stop)
+  std::int8_t blocking_joint = -1;                   ///< Leashed: index of the joint that ran ahead, else -1
+  std::uint32_t motion_epoch = 0;  ///< grows whenever motion is blocked or allowed again: abort what is running
 };
 
 /// A target velocity of the control thread.

@@ -1,0 +1,188 @@
+/// @file
+/// The bridge: composes FRI session, Interpolator, VelocityFilter, Supervisor and Configurator (D4.10 Figure 1) into the answer to
+/// one datagram. It owns no socket and no thread, so the FRI thread, lockstep tests and a simulation in virtual time drive
+/// the same code.
+#pragma once
+
+#include <array>
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
+#include <map>
+#include <mutex>
+#include <string>
+
+#include "lwr_fri_bridge/braking.hpp"
+#include "lwr_fri_bridge/bridge_config.hpp"
+#include "lwr_fri_bridge/cartesian_set_point.hpp"
+#include "lwr_fri_bridge/fri/session.hpp"
+#include "lwr_fri_bridge/set_point_leash.hpp"
+#include "lwr_fri_bridge/spsc_queue.hpp"
+#include "lwr_fri_bridge/supervisor.hpp"
+#include "lwr_fri_bridge/velocity_filter.hpp"
+
+namespace lwr_fri_bridge {
+
+/// Whose target velocities are followed.
+enum class VelocitySource : std::uint8_t {
+  ControlThread,  ///< ControlPort, in one process
+  Topic           ///< sendTopicVelocity(), from target_joint_states
+};
+
+/// What is counted besides the session, all since the bridge started.
+struct BridgeCounters {
+  std::uint64_t commands_invalid = 0;    ///< velocities that were not finite
+  std::uint64_t commands_old_epoch = 0;  ///< computed before motion was allowed
+  std::uint64_t command_timeouts = 0;    ///< commands stopped while a joint was moving
+  std::uint64_t resumed_after_gap = 0;   ///< went on from the controller's set-point after a loss
+  std::uint64_t position_bounds = 0;     ///< ticks in which braking distance bounded a joint
+  std::uint64_t leash_trips = 0;
+  std::uint64_t requests_dropped = 0;    ///< events that found the request queue full
+};
+
+/// Everything there is to show, copied at the end of each tick.
+struct Snapshot {
+  RobotSample sample;
+  fri::SessionCounters session;
+  BridgeCounters counters;
+  SupervisorState supervisor = SupervisorState::Disconnected;
+  bool hold_latched = false;
+  bool request_busy = false;
+  std::uint32_t fall_backs = 0;
+  fri::FriState state = fri::FriState::Off;
+  fri::Quality quality = fri::Quality::Unacceptable;
+  fri::ControlStrategy control = fri::ControlStrategy::Other;  ///< as the controller reports it
+  ControlMode mode;  ///< for the next start
+  std::uint16_t power = 0, drive_error = 0, drive_warning = 0;
+  float answer_rate = 0, latency = 0, jitter = 0, miss_rate = 0, safety_scale = 0, timestamp = 0;  ///< of the controller
+  std::uint32_t miss_counter = 0;
+  std::array<float, 7> temperature{};  ///< degree Celsius
+  unsigned bounded_joints = 0;         ///< joints bounded by braking distance in this tick, bit i for joint i
+};
+
+/// The part of a Snapshot whose changes are worth telling (topic `state`).
+struct StateView {
+  SupervisorState supervisor = SupervisorState::Disconnected;
+  MotionBlock block = MotionBlock::Disconnected;
+  bool hold_latched = false;
+  std::int8_t blocking_joint = -1;
+  fri::FriState state = fri::FriState::Off;
+  fri::Quality quality = fri::Quality::Unacceptable;
+  fri::ControlStrategy control = fri::ControlStrategy::Other;
+  std::uint16_t power = 0, drive_error = 0, drive_warning = 0;
+  double cycle_time = 0.0;  ///< s
+
+  bool operator==(const StateView& other) const;
+};
+
+class Bridge {
+ public:
+  /// @throws std::invalid_argument if a parameter is out of range.
+  explicit Bridge(const BridgeConfig& config);
+
+  // --- FRI thread (or lockstep). Real-time safe: no allocation, lock, syscall or exception.
+
+  /// One FRI tick: judges the datagram of `size` bytes received at `now_ns` (steady or simulated clock) and fills `answer`.
+  /// Returns false if the datagram deserves none (see fri::Verdict); it is counted.
+  bool answer(const std::uint8_t* datagram, std::size_t size, std::int64_t now_ns, fri::CommandDatagram& answer);
+
+  /// To be called when no datagram came for some time: time limits go on, silence becomes `disconnected`.
+  void idle(std::int64_t now_ns);
+
+  /// Whether datagrams have come within the receive time limit, as of the last answer() or idle().
+  bool connected() const { return connected_; }
+
+  // --- control thread
+
+  /// Mailboxes of the one control thread.
+  ControlPort& port() { return port_; }
+
+  // --- other threads
+
+  /// Accepts an event (see events.hpp) and returns a ticket for its outcome. Callable from any thread but the FRI thread.
+  /// @throws std::invalid_argument if the event is unknown or its parameters are not valid.
+  std::uint32_t submit(const std::string& event);
+  /// Outcome of a ticket, Pending until it ends. An outcome is kept until it has been fetched, at most 64 of them.
+  Outcome outcome(std::uint32_t ticket);
+  /// Submits and waits (steady clock, bounded by the request's own time limits plus 2 s); not for lockstep.
+  Outcome command(const std::string& event);
+
+  /// A target velocity from target_joint_states. One thread. Followed if the source is Topic.
+  void sendTopicVelocity(const VelocityCommand& command) { topic_.write(command); }
+  void setVelocitySource(VelocitySource source) { source_.store(source, std::memory_order_relaxed); }
+  VelocitySource velocitySource() const { return source_.load(std::memory_order_relaxed); }
+
+  /// Newest snapshot. Any thread but the FRI thread.
+  Snapshot snapshot();
+  /// Next change of the state that was not fetched yet. One thread.
+  bool nextStateChange(StateView& view) { return changes_.pop(view); }
+
+  const BridgeConfig& config() const { return config_; }
+
+ private:
+  struct Request {
+    std::uint32_t ticket = 0;
+    Event event;
+  };
+  struct Sent {
+    std::uint16_t counter = 0;
+    bool valid = false;
+    Vector7 velocity = Vector7::Zero();
+  };
+
+  void serveRequests(const Configurator::Observation& seen);
+  void serve(const Request& request, const Configurator::Observation& seen);
+  void finish(const Request& request, OutcomeCode code);
+  void runSupervision(const Configurator::Observation& seen, bool fresh_session);
+  void move(const fri::Reception& reception, fri::CommandDatagram& answer);
+  void mirror(fri::CommandDatagram& answer);
+  void follow(const fri::Reception& reception, fri::CommandDatagram& answer);
+  Vector7 targetVelocity();
+  double leashLength() const;
+  void fillMode(fri::CommandDatagram& answer) const;
+  void publish();
+
+  const BridgeConfig config_;
+  ControlPort port_;
+  TripleBuffer<VelocityCommand> topic_;
+  std::atomic<VelocitySource> source_{VelocitySource::ControlThread};
+
+  // FRI thread
+  fri::Session session_;
+  fri::MeasurementDatagram measurement_{};
+  VelocityFilter velocity_filter_;
+  Interpolator interpolator_;
+  BrakingGuard braking_;
+  SetPointLeash leash_;
+  CartesianSetPoint cartesian_;
+  Supervisor supervisor_;
+  Configurator configurator_;
+  ControlMode wanted_mode_;  // for the next start
+  ControlMode active_mode_;  // latched on leaving monitor mode
+  RobotSample sample_;
+  BridgeCounters counters_;
+  VelocityCommand valid_command_;
+  std::array<Sent, 64> sent_{};
+  std::int64_t last_receive_ns_ = 0;
+  std::int64_t stop_began_ns_ = 0;
+  std::uint32_t stop_ticket_ = 0;
+  unsigned bounded_joints_ = 0;
+  bool connected_ = false;
+  bool following_ = false;  // the last answer came from the interpolator
+  bool monitor_asked_ = false;
+  bool command_expired_ = false;
+  StateView last_view_;
+
+  // to and from the FRI thread
+  SpscQueue<Request, 16> requests_;
+  SpscQueue<Outcome, 64> outcomes_;
+  SpscQueue<StateView, 128> changes_;
+  TripleBuffer<Snapshot> snapshots_;
+
+  // other threads
+  std::mutex mutex_;
+  std::uint32_t next_ticket_ = 1;
+  std::map<std::uint32_t, Outcome> ended_;
+};
+
+}  // namespace lwr_fri_bridge

@@ -1,0 +1,398 @@
+#include "lwr_fri_bridge/bridge.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <thread>
+
+namespace lwr_fri_bridge {
+namespace {
+
+constexpr double kBrakeTimeLimit = 3.0;  // s for the arm to come to rest before monitor mode is requested anyway
+constexpr double kWaitBeyondLimits = 2.0;  // s that command() waits beyond the limits of the request itself
+constexpr std::size_t kKeptOutcomes = 64;
+
+bool allFinite(const Vector7& v) { return v.allFinite(); }
+
+double seconds(std::int64_t from_ns, std::int64_t to_ns) { return 1e-9 * static_cast<double>(to_ns - from_ns); }
+
+}  // namespace
+
+bool StateView::operator==(const StateView& o) const {
+  return supervisor == o.supervisor && block == o.block && hold_latched == o.hold_latched &&
+         blocking_joint == o.blocking_joint && state == o.state && quality == o.quality && control == o.control &&
+         power == o.power && drive_error == o.drive_error && drive_warning == o.drive_warning &&
+         cycle_time == o.cycle_time;
+}
+
+Bridge::Bridge(const BridgeConfig& config)
+    : config_((config.check(), config)),
+      session_(config.lenient_headers),
+      velocity_filter_(config.velocity_filter_time),
+      interpolator_(config.limits),
+      braking_(config.limits, config.position_margin),
+      configurator_(config.krl_convention, config.tool_number, config.requests),
+      wanted_mode_(config.mode),
+      active_mode_(config.mode) {
+  publish();
+}
+
+// --- FRI thread ------------------------------------------------------------------------------------------------------------
+
+bool Bridge::answer(const std::uint8_t* datagram, std::size_t size, std::int64_t now_ns,
+                    fri::CommandDatagram& answer) {
+  const fri::Reception reception = session_.receive(datagram, size, measurement_);
+  if (reception.verdict != fri::Verdict::Accepted) return false;
+
+  const bool first_contact = !connected_;
+  connected_ = true;
+  last_receive_ns_ = now_ns;
+  const double dt = fri::cycleTimeOf(measurement_);
+  if (reception.fresh_session) {
+    velocity_filter_.reset();
+    following_ = false;
+  }
+
+  sample_.stamp_ns = now_ns;
+  sample_.cycle_time = dt;
+  sample_.position = fri::jointsFromWire(measurement_.measured_position);
+  sample_.velocity = velocity_filter_.update(sample_.position, reception.cycles, dt);
+  sample_.torque = fri::jointsFromWire(measurement_.measured_torque);
+  sample_.external_torque = fri::jointsFromWire(measurement_.external_torque);
+  sample_.tool_wrench = fri::wrenchFromWire(measurement_.external_wrench);
+  ++sample_.sequence;
+
+  const bool monitor = measurement_.state == static_cast<std::uint16_t>(fri::FriState::Monitor);
+  if (first_contact && !monitor) {
+    // Somebody else brought the controller into command mode: its flags may not change now, so speak its strategy.
+    active_mode_ = wanted_mode_;
+    active_mode_.strategy = static_cast<fri::ControlStrategy>(measurement_.control);
+  }
+
+  const Configurator::Observation seen{true, &measurement_, now_ns};
+  serveRequests(seen);
+  runSupervision(seen, reception.fresh_session);
+  if (monitor) active_mode_ = wanted_mode_;
+
+  answer = fri::CommandDatagram{};
+  move(reception, answer);
+  fillMode(answer);
+  configurator_.write(answer.krl);
+  answer.header = session_.nextHeader();
+  sent_[answer.header.counter % sent_.size()] = {answer.header.counter, true, interpolator_.velocity()};
+  publish();
+  return true;
+}
+
+void Bridge::idle(std::int64_t now_ns) {
+  const double limit = std::max(config_.receive_timeout, 5.0 * sample_.cycle_time);
+  if (connected_ && seconds(last_receive_ns_, now_ns) > limit) {
+    connected_ = false;
+    following_ = false;
+    session_.forget();
+    leash_.reset();
+    for (Sent& sent : sent_) sent.valid = false;
+  }
+  const Configurator::Observation seen{connected_, sample_.sequence > 0 ? &measurement_ : nullptr, now_ns};
+  serveRequests(seen);
+  runSupervision(seen, false);
+  publish();
+}
+
+void Bridge::finish(const Request& request, OutcomeCode code) {
+  Outcome outcome;
+  outcome.ticket = request.ticket;
+  outcome.kind = request.event.kind;
+  outcome.code = code;
+  outcome.wanted = request.event.kind == EventKind::Mode ? request.event.mode.strategy : wanted_mode_.strategy;
+  outcome.reported = static_cast<fri::ControlStrategy>(measurement_.control);
+  outcome.state = static_cast<fri::FriState>(measurement_.state);
+  outcome.quality = static_cast<fri::Quality>(measurement_.quality);
+  outcome.convention = config_.krl_convention;
+  outcomes_.push(outcome);
+}
+
+void Bridge::serveRequests(const Configurator::Observation& seen) {
+  Request request;
+  while (requests_.pop(request)) serve(request, seen);
+}
+
+void Bridge::serve(const Request& request, const Configurator::Observation& seen) {
+  const bool monitor =
+      connected_ && measurement_.state == static_cast<std::uint16_t>(fri::FriState::Monitor);
+  switch (request.event.kind) {
+    case EventKind::Hold:
+      supervisor_.hold();
+      configurator_.abandon(OutcomeCode::Interrupted, seen);
+      return finish(request, OutcomeCode::Done);
+    case EventKind::Reset:
+      if (!supervisor_.held()) return finish(request, OutcomeCode::AlreadyThere);
+      supervisor_.reset();
+      return finish(request, OutcomeCode::Done);
+    case EventKind::Mode:
+      if (supervisor_.held()) return finish(request, OutcomeCode::Held);
+      if (connected_ && !monitor) return finish(request, OutcomeCode::InCommandMode);
+      if (supervisor_.starting()) return finish(request, OutcomeCode::InCommandMode);
+      wanted_mode_ = request.event.mode;
+      return finish(request, OutcomeCode::Done);
+    case EventKind::Start:
+      if (!connected_) return finish(request, OutcomeCode::Disconnected);
+      if (supervisor_.held()) return finish(request, OutcomeCode::Held);
+      if (supervisor_.stopping() || supervisor_.starting()) return finish(request, OutcomeCode::Interrupted);
+      if (supervisor_.state() == SupervisorState::Command) return finish(request, OutcomeCode::AlreadyThere);
+      supervisor_.startBegins();
+      configurator_.start(request.ticket, monitor ? wanted_mode_.strategy : active_mode_.strategy, seen);
+      return;
+    case EventKind::Stop:
+      if (supervisor_.stopping()) return finish(request, OutcomeCode::AlreadyThere);
+      if (!connected_) return finish(request, OutcomeCode::Disconnected);
+      if (monitor && !supervisor_.starting()) {
+        supervisor_.stopEnds();
+        return finish(request, OutcomeCode::AlreadyThere);
+      }
+      configurator_.abandon(OutcomeCode::Interrupted, seen);
+      supervisor_.stopBegins();
+      stop_ticket_ = request.ticket;
+      stop_began_ns_ = seen.now_ns;
+      monitor_asked_ = false;
+      return;
+  }
+}
+
+void Bridge::runSupervision(const Configurator::Observation& seen, bool fresh_session) {
+  Outcome ended;
+  if (configurator_.update(seen, ended)) {
+    outcomes_.push(ended);
+    if (ended.kind == EventKind::Start && supervisor_.starting()) supervisor_.startEnds(ended.success());
+    if (ended.kind == EventKind::Stop) supervisor_.stopEnds();
+  }
+
+  SupervisorInput input;
+  input.connected = connected_;
+  input.fresh_session = fresh_session;
+  input.command_mode = measurement_.state == static_cast<std::uint16_t>(fri::FriState::Command);
+  input.full_power = measurement_.power == fri::kAllDrivesOn;
+  input.stands_still = interpolator_.standsStill();
+  input.leashed = leash_.joint() >= 0;
+  const std::uint32_t fall_backs = supervisor_.fallBacks();
+  supervisor_.update(input);
+  if (supervisor_.fallBacks() != fall_backs) configurator_.fellBack();
+
+  // The first half of a stop is the supervisor's (brake), the second the configurator's (monitor mode).
+  const bool brake_too_long = seconds(stop_began_ns_, seen.now_ns) > kBrakeTimeLimit;
+  if (supervisor_.stopping() && !monitor_asked_ && (supervisor_.readyForMonitor() || brake_too_long)) {
+    monitor_asked_ = true;
+    configurator_.stop(stop_ticket_, seen);
+  }
+}
+
+void Bridge::move(const fri::Reception& reception, fri::CommandDatagram& answer) {
+  bounded_joints_ = 0;
+  const bool command_mode = measurement_.state == static_cast<std::uint16_t>(fri::FriState::Command);
+  if (command_mode && measurement_.power == fri::kAllDrivesOn) {
+    follow(reception, answer);
+  } else {
+    mirror(answer);
+  }
+  sample_.commanded_position = interpolator_.position();
+  sample_.commanded_velocity = interpolator_.velocity();
+  sample_.commanded_acceleration = interpolator_.acceleration();
+}
+
+void Bridge::mirror(fri::CommandDatagram& answer) {
+  fri::setPointOf(measurement_, answer.joint_position);
+  fri::cartesianSetPointOf(measurement_, answer.cartesian_frame);
+  interpolator_.reset(fri::jointsFromWire(answer.joint_position));
+  leash_.reset();
+  following_ = false;
+  command_expired_ = false;
+}
+
+void Bridge::follow(const fri::Reception& reception, fri::CommandDatagram& answer) {
+  float reported_joints[fri::kJoints], reported_frame[fri::kFrameValues];
+  fri::setPointOf(measurement_, reported_joints);
+  fri::cartesianSetPointOf(measurement_, reported_frame);
+  const bool cartesian = active_mode_.strategy == fri::ControlStrategy::CartesianImpedance;
+
+  if (!following_) {
+    interpolator_.reset(fri::jointsFromWire(reported_joints));
+    cartesian_.anchor(interpolator_.position(), reported_frame);
+    following_ = true;
+  } else if (reception.cycles > 1 || !reception.answer_arrived) {
+    // The controller went on by itself: take over where it is, at the speed of the answer it saw last. Its joint
+    // set-point means nothing in Cartesian impedance mode; there the frame is what it went on with.
+    const Sent& last_seen = sent_[reception.reflected % sent_.size()];
+    const bool known = last_seen.valid && last_seen.counter == reception.reflected;
+    const Vector7 velocity = known ? last_seen.velocity : interpolator_.velocity();
+    const Vector7 position = cartesian ? interpolator_.position() : fri::jointsFromWire(reported_joints);
+    interpolator_.resume(position, velocity, Vector7::Zero());
+    cartesian_.anchor(interpolator_.position(), reported_frame);
+    ++counters_.resumed_after_gap;
+  }
+
+  const Vector7 wanted = targetVelocity();
+  Vector7 target = wanted;
+  const double excess = (target.cwiseAbs().array() / config_.limits.velocity.array()).maxCoeff();
+  if (excess > 1.0) target /= excess;  // the whole vector, so that the direction of the motion is kept
+
+  const bool was_leashed = leash_.joint() >= 0;
+  leash_.update(interpolator_, sample_.position, wanted, leashLength(), config_.limits, target);
+  if (!was_leashed && leash_.joint() >= 0) ++counters_.leash_trips;
+
+  bounded_joints_ = braking_.bound(interpolator_, sample_.cycle_time, target);
+  if (bounded_joints_ != 0) ++counters_.position_bounds;
+  interpolator_.step(target, sample_.cycle_time);
+  fri::jointsToWire(interpolator_.position(), answer.joint_position);
+  if (cartesian) {
+    cartesian_.frame(interpolator_.position(), answer.cartesian_frame);
+  } else {
+    std::copy(std::begin(reported_frame), std::end(reported_frame), answer.cartesian_frame);
+  }
+}
+
+Vector7 Bridge::targetVelocity() {
+  const bool from_topic = source_.load(std::memory_order_relaxed) == VelocitySource::Topic;
+  VelocityCommand command;
+  const bool fresh = from_topic ? topic_.read(command) : port_.takeVelocity(command);
+  if (fresh && command.stamp_ns != 0) {
+    if (!allFinite(command.velocity)) {
+      ++counters_.commands_invalid;
+    } else if (command.motion_epoch != supervisor_.epoch()) {
+      ++counters_.commands_old_epoch;
+    } else {
+      valid_command_ = command;
+    }
+  }
+
+  const double age = seconds(valid_command_.stamp_ns, sample_.stamp_ns);
+  const double limit = from_topic ? config_.topic_timeout : config_.command_timeout;
+  const bool current = valid_command_.stamp_ns != 0 && valid_command_.motion_epoch == supervisor_.epoch();
+  const bool expired = current && (age > limit || age < -limit);
+  if (expired && !command_expired_ && !valid_command_.velocity.isZero()) ++counters_.command_timeouts;
+  command_expired_ = expired;
+  // While leashed the wish is still looked at, to see when the outward motion is not asked for any more.
+  const bool allowed = supervisor_.block() == MotionBlock::None || supervisor_.block() == MotionBlock::Leashed;
+  return current && !expired && allowed ? valid_command_.velocity : Vector7::Zero();
+}
+
+double Bridge::leashLength() const {
+  return active_mode_.strategy == fri::ControlStrategy::Position ? config_.leash_position : config_.leash_impedance;
+}
+
+void Bridge::fillMode(fri::CommandDatagram& answer) const {
+  // Added torques and forces stay 0: nothing here commands them, and a leap there makes the controller drop its contactors.
+  answer.flags = fri::flagsFor(active_mode_.strategy);
+  fri::jointsToWire(active_mode_.joint_stiffness, answer.joint_stiffness);
+  fri::jointsToWire(active_mode_.joint_damping, answer.joint_damping);
+  fri::wrenchToWire(active_mode_.cartesian_stiffness, answer.cartesian_stiffness);
+  fri::wrenchToWire(active_mode_.cartesian_damping, answer.cartesian_damping);
+}
+
+void Bridge::publish() {
+  sample_.block = supervisor_.block();
+  sample_.motion_epoch = supervisor_.epoch();
+  sample_.blocking_joint = static_cast<std::int8_t>(leash_.joint());
+  port_.publishSample(sample_);
+
+  Snapshot snapshot;
+  snapshot.sample = sample_;
+  snapshot.session = session_.counters();
+  snapshot.counters = counters_;
+  snapshot.supervisor = supervisor_.state();
+  snapshot.hold_latched = supervisor_.held();
+  snapshot.request_busy = configurator_.busy();
+  snapshot.fall_backs = supervisor_.fallBacks();
+  snapshot.state = connected_ ? static_cast<fri::FriState>(measurement_.state) : fri::FriState::Off;
+  snapshot.quality = connected_ ? static_cast<fri::Quality>(measurement_.quality) : fri::Quality::Unacceptable;
+  snapshot.control = static_cast<fri::ControlStrategy>(measurement_.control);
+  snapshot.mode = wanted_mode_;
+  snapshot.power = measurement_.power;
+  snapshot.drive_error = measurement_.drive_error;
+  snapshot.drive_warning = measurement_.drive_warning;
+  snapshot.answer_rate = measurement_.answer_rate;
+  snapshot.latency = measurement_.latency;
+  snapshot.jitter = measurement_.jitter;
+  snapshot.miss_rate = measurement_.miss_rate;
+  snapshot.miss_counter = measurement_.miss_counter;
+  snapshot.safety_scale = measurement_.safety_scale;
+  snapshot.timestamp = measurement_.timestamp;
+  std::copy(std::begin(measurement_.temperature), std::end(measurement_.temperature), snapshot.temperature.begin());
+  snapshot.bounded_joints = bounded_joints_;
+  snapshots_.write(snapshot);
+
+  StateView view;
+  view.supervisor = snapshot.supervisor;
+  view.block = sample_.block;
+  view.hold_latched = snapshot.hold_latched;
+  view.blocking_joint = sample_.blocking_joint;
+  view.state = snapshot.state;
+  view.quality = snapshot.quality;
+  view.control = snapshot.control;
+  view.power = snapshot.power;
+  view.drive_error = snapshot.drive_error;
+  view.drive_warning = snapshot.drive_warning;
+  view.cycle_time = sample_.cycle_time;
+  if (!(view == last_view_) && changes_.push(view)) last_view_ = view;
+}
+
+// --- other threads -----------------------------------------------------------------------------------------------------------
+
+std::uint32_t Bridge::submit(const std::string& text) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  Snapshot newest;
+  snapshots_.read(newest);
+  Request request;
+  request.event = parseEvent(text, newest.mode);
+  request.ticket = next_ticket_++;
+  if (!requests_.push(request)) {
+    Outcome dropped;
+    dropped.ticket = request.ticket;
+    dropped.kind = request.event.kind;
+    dropped.code = OutcomeCode::NotServed;
+    ended_[request.ticket] = dropped;
+  }
+  return request.ticket;
+}
+
+Outcome Bridge::outcome(std::uint32_t ticket) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  Outcome ended;
+  while (outcomes_.pop(ended)) ended_[ended.ticket] = ended;
+  while (ended_.size() > kKeptOutcomes) ended_.erase(ended_.begin());
+  const auto found = ended_.find(ticket);
+  if (found == ended_.end()) {
+    Outcome pending;
+    pending.ticket = ticket;
+    return pending;
+  }
+  ended = found->second;
+  ended_.erase(found);
+  return ended;
+}
+
+Outcome Bridge::command(const std::string& event) {
+  using Clock = std::chrono::steady_clock;
+  const auto began = Clock::now();
+  const std::uint32_t ticket = submit(event);
+  const double limit = std::max(config_.requests.start_timeout, kBrakeTimeLimit + config_.requests.stop_timeout) +
+                       kWaitBeyondLimits;
+  for (;;) {
+    Outcome ended = outcome(ticket);
+    if (ended.code != OutcomeCode::Pending) return ended;
+    const double waited = std::chrono::duration<double>(Clock::now() - began).count();
+    if (waited > limit) {
+      ended.code = OutcomeCode::NotServed;
+      ended.waited = waited;
+      return ended;
+    }
+    std::this_thread::sleep_for(std::chrono::milliseconds(2));
+  }
+}
+
+Snapshot Bridge::snapshot() {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  Snapshot newest;
+  snapshots_.read(newest);
+  return newest;
+}
+
+}  // namespace lwr_fri_bridge

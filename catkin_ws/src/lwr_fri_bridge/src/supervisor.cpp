@@ -1,0 +1,98 @@
+#include "lwr_fri_bridge/supervisor.hpp"
+
+namespace lwr_fri_bridge {
+
+const char* describe(MotionBlock block) {
+  switch (block) {
+    case MotionBlock::None: return "";
+    case MotionBlock::Disconnected: return "no datagrams from the robot controller";
+    case MotionBlock::Monitor: return "the robot controller is in monitor mode; send start";
+    case MotionBlock::NoPower: return "not all drives have power; check enabling switch and emergency stop, then send start";
+    case MotionBlock::NotStarted: return "command mode without an explicit start; send start";
+    case MotionBlock::Held: return "hold is latched; send reset";
+    case MotionBlock::Stopping: return "stop was asked for";
+    case MotionBlock::Leashed: return "the set-point ran ahead of the arm, something blocks it; ask for the motion anew";
+  }
+  return "?";
+}
+
+const char* nameOf(SupervisorState state) {
+  switch (state) {
+    case SupervisorState::Disconnected: return "disconnected";
+    case SupervisorState::Monitor: return "monitor";
+    case SupervisorState::Starting: return "starting";
+    case SupervisorState::Command: return "command";
+    case SupervisorState::Holding: return "holding";
+    case SupervisorState::Stopping: return "stopping";
+    case SupervisorState::Stopped: return "stopped";
+  }
+  return "?";
+}
+
+void Supervisor::startBegins() {
+  starting_ = true;
+  fell_back_ = false;
+}
+
+void Supervisor::startEnds(bool reached) {
+  starting_ = false;
+  started_ = reached;
+}
+
+void Supervisor::stopBegins() {
+  stopping_ = true;
+  at_rest_ = false;
+  starting_ = false;
+}
+
+void Supervisor::stopEnds() {
+  stopping_ = false;
+  started_ = false;
+  fell_back_ = false;
+}
+
+MotionBlock Supervisor::judge(const SupervisorInput& input) const {
+  if (!input.connected) return MotionBlock::Disconnected;
+  if (stopping_) return MotionBlock::Stopping;
+  if (held_) return MotionBlock::Held;
+  if (!input.command_mode) return MotionBlock::Monitor;
+  if (!input.full_power) return MotionBlock::NoPower;
+  if (!started_) return MotionBlock::NotStarted;
+  if (input.leashed) return MotionBlock::Leashed;
+  return MotionBlock::None;
+}
+
+void Supervisor::update(const SupervisorInput& input) {
+  const bool commanding = input.connected && input.command_mode && input.full_power && !input.fresh_session;
+  if (started_ && !commanding) {
+    started_ = false;
+    if (!stopping_) {
+      fell_back_ = true;
+      ++fall_backs_;
+    }
+  }
+  at_rest_ = input.stands_still || !commanding;
+
+  const MotionBlock block = judge(input);
+  // Every change of the permission starts a new epoch: commands computed before it do not count any more.
+  if ((block == MotionBlock::None) != (block_ == MotionBlock::None)) ++epoch_;
+  block_ = block;
+
+  if (!input.connected) {
+    state_ = SupervisorState::Disconnected;
+  } else if (stopping_) {
+    state_ = SupervisorState::Stopping;
+  } else if (starting_) {
+    state_ = SupervisorState::Starting;
+  } else if (held_) {
+    state_ = SupervisorState::Holding;
+  } else if (started_) {
+    state_ = SupervisorState::Command;
+  } else if (fell_back_ || input.command_mode) {
+    state_ = SupervisorState::Stopped;
+  } else {
+    state_ = SupervisorState::Monitor;
+  }
+}
+
+}  // namespace lwr_fri_bridge
