@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <stdexcept>
 
 namespace ctrl_more {
@@ -63,14 +64,17 @@ void ControllerSlot::configure(const GainValues& gains, const SettingValues& set
                         kindOf(use.use.container), l, use.use.on_pause, limited, rated});
     total += use.signal.size();
   }
-  for (auto* buffer : {&before_, &after_, &from_, &raw_, &scratch_}) buffer->assign(total, 0.0);
-  for (const Written& w : written_) {
-    for (auto* buffer : {&from_, &raw_, &scratch_}) {
+  for (auto* buffer : {&record_[0].before, &record_[0].after, &record_[1].before,
+                       &record_[1].after, &from_, &raw_, &now_, &step_}) {
+    buffer->assign(total, 0.0);
+    // Equal and unit, so that the correction before the first run is the identity.
+    for (const Written& w : written_) {
       correction::setIdentity(w.kind, w.size, buffer->data() + w.local);
     }
-    // Equal and unit, so that the difference before the first run is the identity.
-    correction::setIdentity(w.kind, w.size, before_.data() + w.local);
-    correction::setIdentity(w.kind, w.size, after_.data() + w.local);
+  }
+  declared_.assign(control.dataSize(), false);
+  for (const Written& w : written_) {
+    for (int i = 0; i < w.size; ++i) declared_[w.offset + i] = true;
   }
   gains_from_ = gains;
   gains_to_ = gains;
@@ -106,7 +110,8 @@ void ControllerSlot::adopt(const PlanEntry& entry) noexcept {
     stop(!enabled_ ? Why::Disabled : Why::Paused);
   } else if (running && (moved || reset_pending_)) {
     captureCorrection();
-  } else if (!running && !enabled_ && activity_ != Activity::Off) {
+    raw_valid_ = false;
+  } else if (!running && !enabled_ && activity_ != Activity::Off && why_ != Why::Disabled) {
     captureCorrection();  // a held correction is let go once the controller is disabled
     why_ = Why::Disabled;
     setActivity(Activity::Stopping);
@@ -117,8 +122,8 @@ void ControllerSlot::adopt(const PlanEntry& entry) noexcept {
 
 void ControllerSlot::captureCorrection() noexcept {
   for (const Written& w : written_) {
-    correction::difference(w.kind, w.size, before_.data() + w.local, after_.data() + w.local,
-                           from_.data() + w.local);
+    correction::difference(w.kind, w.size, record_[last_].before.data() + w.local,
+                           record_[last_].after.data() + w.local, from_.data() + w.local);
   }
   blend_ = 0.0;
 }
@@ -177,32 +182,43 @@ void ControllerSlot::run(const Cycle& cycle, const RobotStates& robot,
   }
 }
 
-void ControllerSlot::saveBefore(const ControlStates& control) noexcept {
+void ControllerSlot::openRecord(const ControlStates& control) noexcept {
   const double* data = control.data();
+  double* before = record_[1 - last_].before.data();
   for (const Written& w : written_) {
-    std::copy(data + w.offset, data + w.offset + w.size, before_.data() + w.local);
+    std::copy(data + w.offset, data + w.offset + w.size, before + w.local);
   }
 }
 
-void ControllerSlot::saveAfter(const ControlStates& control) noexcept {
+void ControllerSlot::closeRecord(const Cycle& cycle, const ControlStates& control) noexcept {
+  last_ = 1 - last_;
   const double* data = control.data();
+  const double* before = record_[last_].before.data();
+  double* after = record_[last_].after.data();
+  correction_->begin();
+  correction_->put(0, static_cast<double>(cycle.number));
+  std::size_t next = 1;
   for (const Written& w : written_) {
-    std::copy(data + w.offset, data + w.offset + w.size, after_.data() + w.local);
+    std::copy(data + w.offset, data + w.offset + w.size, after + w.local);
+    for (int i = 0; i < w.size; ++i) {
+      correction_->put(next++, before[w.local + i]);
+      correction_->put(next++, after[w.local + i]);
+    }
   }
+  correction_->end();
 }
 
 void ControllerSlot::restore(ControlStates& control) noexcept {
   double* data = control.data();
+  const double* before = record_[1 - last_].before.data();
   for (const Written& w : written_) {
-    std::copy(before_.data() + w.local, before_.data() + w.local + w.size, data + w.offset);
+    std::copy(before + w.local, before + w.local + w.size, data + w.offset);
   }
 }
 
 void ControllerSlot::runGuarded(const Cycle& cycle, const RobotStates& robot,
                                 const ControlStates& original, ControlStates& control) noexcept {
-  // The correction of the last good cycle is still in before_/after_ when this one fails.
-  std::swap(before_, scratch_);
-  saveBefore(control);
+  openRecord(control);
   FaultKind kind = FaultKind::None;
   const char* text = nullptr;
   char copied[96];
@@ -227,8 +243,9 @@ void ControllerSlot::runGuarded(const Cycle& cycle, const RobotStates& robot,
   } catch (const std::exception& e) {
     kind = FaultKind::Exception;
     // The text dies with the exception.
+    const char* what = e.what();
     std::size_t i = 0;
-    for (const char* c = e.what(); c[i] != '\0' && i + 1 < sizeof copied; ++i) copied[i] = c[i];
+    for (; what[i] != '\0' && i + 1 < sizeof copied; ++i) copied[i] = what[i];
     copied[i] = '\0';
     text = copied;
   } catch (...) {
@@ -237,8 +254,7 @@ void ControllerSlot::runGuarded(const Cycle& cycle, const RobotStates& robot,
   }
   if (kind != FaultKind::None) {
     restore(control);
-    std::swap(before_, scratch_);
-    latch(cycle, kind, text ? text : nameOf(kind));
+    latch(cycle, kind, text);
     runStopped(cycle, control);
     return;
   }
@@ -246,30 +262,27 @@ void ControllerSlot::runGuarded(const Cycle& cycle, const RobotStates& robot,
     advanceBlend(cycle.dt);
     if (blend_ < 1.0) blendIn(control);
   }
-  // scratch_ keeps the reference of the cycle before, for judgeTime().
-  saveAfter(control);
-  publishCorrection(cycle);
+  closeRecord(cycle, control);
 }
 
 FaultKind ControllerSlot::judge(const Cycle& cycle, const ControlStates& control) noexcept {
   const double* data = control.data();
+  const double* before = record_[1 - last_].before.data();
   bool rated = false;
   for (const Written& w : written_) {
     const double* value = data + w.offset;
     if (!correction::isFinite(w.size, value)) return FaultKind::NotFinite;
     if (!correction::isUnit(w.kind, w.size, value)) return FaultKind::NotUnit;
     if (!w.limited) continue;
-    double c[64];
-    double* now = w.size <= 64 ? c : after_.data() + w.local;
-    correction::difference(w.kind, w.size, before_.data() + w.local, value, now);
+    double* now = now_.data() + w.local;
+    correction::difference(w.kind, w.size, before + w.local, value, now);
     const correction::Norms n = correction::norms(w.kind, w.size, now);
     if (n.size > w.limit.size || n.angle > w.limit.angle) return FaultKind::CorrectionSize;
     if (!w.rated) continue;
     rated = true;
     double* last = raw_.data() + w.local;
     if (raw_valid_) {
-      double change[64];
-      double* step = w.size <= 64 ? change : from_.data() + w.local;
+      double* step = step_.data() + w.local;
       correction::difference(w.kind, w.size, last, now, step);
       const correction::Norms r = correction::norms(w.kind, w.size, step);
       if (r.size > w.limit.rate * cycle.dt || r.angle > w.limit.angle_rate * cycle.dt) {
@@ -284,12 +297,12 @@ FaultKind ControllerSlot::judge(const Cycle& cycle, const ControlStates& control
 
 void ControllerSlot::blendIn(ControlStates& control) noexcept {
   double* data = control.data();
+  const double* before = record_[1 - last_].before.data();
   for (const Written& w : written_) {
-    double* after = after_.data() + w.local;  // free until saveAfter()
-    const double* before = before_.data() + w.local;
-    correction::difference(w.kind, w.size, before, data + w.offset, after);
-    correction::between(w.kind, w.size, from_.data() + w.local, after, blend_, after);
-    correction::apply(w.kind, w.size, before, after, data + w.offset);
+    double* c = now_.data() + w.local;
+    correction::difference(w.kind, w.size, before + w.local, data + w.offset, c);
+    correction::between(w.kind, w.size, from_.data() + w.local, c, blend_, c);
+    correction::apply(w.kind, w.size, before + w.local, c, data + w.offset);
   }
 }
 
@@ -309,9 +322,9 @@ StopPolicy ControllerSlot::policyOf(const Written& written) const {
 void ControllerSlot::runStopped(const Cycle& cycle, ControlStates& control) noexcept {
   if (activity_ == Activity::Off) return;
   advanceBlend(cycle.dt);
+  openRecord(control);
   bool holding = false;
   double* data = control.data();
-  saveBefore(control);
   for (const Written& w : written_) {
     const StopPolicy policy = policyOf(w);
     if (policy == StopPolicy::Zero || (policy == StopPolicy::Fade && blend_ >= 1.0)) continue;
@@ -319,16 +332,21 @@ void ControllerSlot::runStopped(const Cycle& cycle, ControlStates& control) noex
     if (policy == StopPolicy::Hold) {
       holding = true;
     } else {
-      double* identity = after_.data() + w.local;
-      correction::setIdentity(w.kind, w.size, identity);
-      correction::between(w.kind, w.size, c, identity, blend_, identity);
-      c = identity;
+      double* fading = now_.data() + w.local;
+      correction::setIdentity(w.kind, w.size, fading);
+      correction::between(w.kind, w.size, c, fading, blend_, fading);
+      c = fading;
     }
-    correction::apply(w.kind, w.size, before_.data() + w.local, c, data + w.offset);
+    correction::apply(w.kind, w.size, data + w.offset, c, data + w.offset);
   }
-  saveAfter(control);
-  publishCorrection(cycle);
+  closeRecord(cycle, control);
   if (blend_ >= 1.0 && !holding && activity_ == Activity::Stopping) setActivity(Activity::Off);
+}
+
+void ControllerSlot::undo(ControlStates& control) noexcept {
+  last_ = 1 - last_;  // the run just recorded becomes the open record again
+  restore(control);
+  raw_valid_ = false;
 }
 
 void ControllerSlot::judgeTime(const Cycle& cycle, std::int64_t duration_ns,
@@ -341,18 +359,89 @@ void ControllerSlot::judgeTime(const Cycle& cycle, std::int64_t duration_ns,
   }
   overruns_.fetch_add(1, std::memory_order_relaxed);
   // What it wrote came too late: undone, and the correction of the cycle before is used again.
-  restore(control);
+  undo(control);
   double* data = control.data();
-  const std::vector<double>& last = raw_output_;
   for (const Written& w : written_) {
-    correction::apply(w.kind, w.size, before_.data() + w.local, last.data() + w.local,
-                      data + w.offset);
+    double* held = now_.data() + w.local;
+    correction::difference(w.kind, w.size, record_[last_].before.data() + w.local,
+                           record_[last_].after.data() + w.local, held);
+    correction::apply(w.kind, w.size, data + w.offset, held, data + w.offset);
   }
-  saveAfter(control);
-  publishCorrection(cycle);
-  raw_valid_ = false;
+  closeRecord(cycle, control);
   if (++overruns_in_row_ >= overruns_to_pause_) {
     latch(cycle, FaultKind::Overrun, "update() was too slow in too many cycles in a row");
+  }
+}
+
+void ControllerSlot::checkUndeclared(const Cycle& cycle, const double* before,
+                                     ControlStates& control) noexcept {
+  double* data = control.data();
+  bool changed = false;
+  for (int i = 0; i < control.dataSize(); ++i) {
+    const bool declared = i < static_cast<int>(declared_.size()) && declared_[i];
+    if (declared || std::memcmp(data + i, before + i, sizeof(double)) == 0) continue;
+    data[i] = before[i];
+    changed = true;
+  }
+  if (!changed || activity_ != Activity::Running) return;
+  undo(control);
+  latch(cycle, FaultKind::Undeclared, "it changed a reference that its description does not name");
+  runStopped(cycle, control);
+}
+
+void ControllerSlot::latch(const Cycle& cycle, FaultKind kind, const char* text) noexcept {
+  fault_ = kind;
+  wanted_ = false;
+  fault_text_.set(text ? text : nameOf(kind));
+  fault_cycle_.store(cycle.number, std::memory_order_relaxed);
+  faults_.fetch_add(1, std::memory_order_relaxed);
+  shared_fault_.store(kind, std::memory_order_release);
+  stop(Why::Fault);
+  CTRL_MORE_LOG(controller_->log_, Error, nameOf(kind));
+  if (text) CTRL_MORE_LOG(controller_->log_, Error, text);
+}
+
+void ControllerSlot::fillStatus(ControllerStatus& status) const {
+  status.name = name();
+  status.stage = stage_;
+  status.activity = activity();
+  status.fault = fault();
+  if (status.fault != FaultKind::None) {
+    status.fault_text = std::string(nameOf(status.fault)) + ": " + fault_text_.get();
+    status.fault_cycle = fault_cycle_.load(std::memory_order_relaxed);
+  }
+  status.faults = faults_.load(std::memory_order_relaxed);
+  status.overruns = overruns_.load(std::memory_order_relaxed);
+  status.last_us = 1e-3 * static_cast<double>(last_ns_.load(std::memory_order_relaxed));
+  const int waiting = waiting_.load(std::memory_order_relaxed);
+  if (status.activity == Activity::Waiting && waiting >= 0) {
+    const ResolvedRobotUse& use = robotUses()[waiting];
+    status.waiting_for = std::string(nameOf(use.use.source)) + "/" + use.key;
+  }
+}
+
+void ControllerSlot::attribution(const ControlStates& names,
+                                 std::vector<Attribution>& list) const {
+  if (activity() == Activity::Off) return;
+  std::vector<double> numbers;
+  if (!correction_->read(numbers)) return;
+  std::size_t next = 1;
+  std::vector<double> change;
+  for (const Written& w : written_) {
+    Attribution entry;
+    entry.controller = name();
+    entry.signal = names.nameOfSignal(w.signal);
+    entry.cycle = static_cast<std::uint64_t>(numbers[0]);
+    for (int i = 0; i < w.size; ++i) {
+      entry.before.push_back(numbers[next++]);
+      entry.after.push_back(numbers[next++]);
+    }
+    change.resize(w.size);
+    correction::difference(w.kind, w.size, entry.before.data(), entry.after.data(), change.data());
+    const correction::Norms n = correction::norms(w.kind, w.size, change.data());
+    entry.size = n.size;
+    entry.angle = n.angle;
+    list.push_back(entry);
   }
 }
 

@@ -56,7 +56,7 @@ class ControllerSlot {
            ControlStates& control) noexcept;
   /// Judges the duration of the run just made; undoes it if it was an overrun.
   void judgeTime(const Cycle& cycle, std::int64_t duration_ns, ControlStates& control) noexcept;
-  /// Test mode: true if something it did not declare differs from `before`, which is restored.
+  /// Test mode: if something it did not declare differs from `before`, restores it and faults.
   void checkUndeclared(const Cycle& cycle, const double* before, ControlStates& control) noexcept;
   bool ran() const { return ran_; }
   /// @}
@@ -99,12 +99,12 @@ class ControllerSlot {
   FaultKind judge(const Cycle& cycle, const ControlStates& control) noexcept;
   void blendIn(ControlStates& control) noexcept;
   void runStopped(const Cycle& cycle, ControlStates& control) noexcept;
-  void saveBefore(const ControlStates& control) noexcept;
-  void saveAfter(const ControlStates& control) noexcept;
+  void openRecord(const ControlStates& control) noexcept;
+  void closeRecord(const Cycle& cycle, const ControlStates& control) noexcept;
   void restore(ControlStates& control) noexcept;
+  void undo(ControlStates& control) noexcept;
   void latch(const Cycle& cycle, FaultKind kind, const char* text) noexcept;
   void setActivity(Activity activity) noexcept;
-  void publishCorrection(const Cycle& cycle) noexcept;
   StopPolicy policyOf(const Written& written) const;
 
   ControllerInstance instance_;
@@ -119,6 +119,7 @@ class ControllerSlot {
   StopPolicy on_fault_;
   std::vector<Written> written_;
   std::vector<Needed> needed_;
+  std::vector<bool> declared_;  // doubles of the control buffer it may change
 
   // cycle side
   bool wanted_ = false;  // enabled, not paused, no fault
@@ -138,10 +139,15 @@ class ControllerSlot {
   bool raw_valid_ = false;
   bool ran_ = false;
   int overruns_in_row_ = 0;
-  std::vector<double> before_, after_;  // references around the last run
-  std::vector<double> from_;            // correction that the blend starts from
-  std::vector<double> raw_;             // correction of the last run before blending
-  std::vector<double> scratch_;
+  struct Record {
+    std::vector<double> before, after;  // references around one run
+  };
+  Record record_[2];           // the last complete one, and the one being made
+  int last_ = 0;               // index of the last complete one
+  std::vector<double> from_;   // correction that the blend starts from
+  std::vector<double> raw_;    // correction of the last run before blending
+  std::vector<double> now_;    // room for one correction
+  std::vector<double> step_;   // room for another
   GainValues gains_from_, gains_to_;
 
   // shared

@@ -8,9 +8,9 @@
 namespace coglab_controllers {
 namespace {
 
-// Longest sub-step of the integration, as a share of the fastest time constant of the linear part: the error of one
-// motion is then below a micrometre for any cycle time.
-constexpr double kStepShare = 0.08;
+// Longest sub-step of the integration, as a share of the fastest time constant of the linear part and of the distance
+// in time of two basis functions: the error of a whole motion is then some micrometres at most, whatever the cycle time.
+constexpr double kPoleShare = 0.1, kBasisShare = 0.5;
 
 }  // namespace
 
@@ -38,8 +38,9 @@ const DmpState& Dmp::step(double dt, const Vector3& goal, const Vector3& goal_ve
   if (!(total > 0.0)) return state_;
   // Seen from a slowed clock the goal moves faster; a clock that nearly stands does not run after it.
   const Vector3 goal_rate = goal_velocity / std::max(rate, 0.1);
-  const double fastest = tau_ / std::max(std::sqrt(system_.stiffness()), system_.damping());
-  const int count = std::clamp(static_cast<int>(std::ceil(total / (kStepShare * fastest) - 1e-9)), 1, 10000);
+  const double pole = tau_ / std::max(std::sqrt(system_.stiffness()), 0.5 * system_.damping());
+  const double longest = std::min(kPoleShare * pole, kBasisShare * tau_ / system_.basisCount());
+  const int count = std::clamp(static_cast<int>(std::ceil(total / longest - 1e-9)), 1, 10000);
   const double h = total / count;
   Vector3 x = state_.position, v = tau_ * state_.velocity;
   const CanonicalSystem& canonical = system_.canonical();

@@ -7,7 +7,6 @@
 #include <memory>
 #include <mutex>
 #include <ostream>
-#include <set>
 #include <string>
 #include <vector>
 
@@ -163,6 +162,12 @@ class FeedbackControllersManager : public Manager, private ControllerOwner {
   /// @param timeout_s longest wait [s]
   /// @return false on time-out; the plan stays published and will be adopted
   bool waitAdopted(std::uint64_t generation, double timeout_s) const;
+
+  /// Takes back the newest plan if the cycle has not adopted it; everything is then as before it.
+  /// Only the newest plan of apply() and its short forms can be withdrawn, not a load.
+  /// @param generation from Status::generation()
+  /// @return failure if the plan is adopted already, or is not the newest one
+  Status withdraw(std::uint64_t generation);
   /// @}
 
   /// @name Asking (services)
@@ -198,7 +203,10 @@ class FeedbackControllersManager : public Manager, private ControllerOwner {
   const std::string& name() const override { return name_; }
   /// Name under which a central module lists it; before the first cycle.
   void setName(const std::string& name) { name_ = name; }
-  /// Adopts the newest plan. Freezes both stores with the first cycle.
+  /// Fixes the layout of both stores and allocates what the cycle needs. Call it before the first
+  /// cycle of a real-time thread (outside of it); otherwise the first cycle does it, once.
+  void freeze();
+  /// Adopts the newest plan.
   void beginCycle(const Cycle& cycle) noexcept override;
   /// Snapshots the references as `original`, then runs the controllers of the stage in order.
   /// Both stores must be those of the constructor, or copies of them.
@@ -229,16 +237,23 @@ class FeedbackControllersManager : public Manager, private ControllerOwner {
 
   Status applyLocked(const Change& change);
   Status applyStep(const Change::Step& step, Draft& draft, std::vector<std::string>& spared) const;
+  Status applyToMember(const Change::Step& step, const Member& member, std::size_t index,
+                       Draft& draft, std::vector<std::string>& spared) const;
   Status checkExclusive(const Draft& draft) const;
   Status bySignal(Change::Kind kind, bool robot, const std::string& signal, bool force);
+  Draft draftOf() const;
   Status publish(const Draft& draft);
   void collect();
-  Status take(ControllerInstance instance, const std::string& name, const ControllerEntry& entry,
-              bool publish_now);
-  Member& member(const std::string& name);
+  Status take(ControllerInstance instance, const std::string& name, const ControllerEntry& entry);
+  Status loadLocked(const std::string& name, const ControllerEntry& entry);
+  Status setProfileLocked(const std::string& profile, const std::vector<std::string>& controllers);
+  Status unloadLocked(const std::string& name);
+  int indexOf(const std::string& name) const;
   const Member& member(const std::string& name) const;
+  std::vector<std::string> namesLocked() const;
   std::string unknownName(const std::string& name) const;
   ControllerStatus statusLocked(const Member& member) const;
+  void runStage(Stage stage, const RobotStates& robot, ControlStates& control) noexcept;
 
   RobotStates& robot_;
   ControlStates& control_;
@@ -255,10 +270,11 @@ class FeedbackControllersManager : public Manager, private ControllerOwner {
   bool refuse_shared_ = false;
   std::uint32_t next_owner_ = 1;
   std::uint64_t generation_ = 0;
-  std::deque<std::unique_ptr<const Plan>> plans_;
+  std::deque<std::unique_ptr<const Plan>> plans_;  // what the cycle has or may still have
+  std::unique_ptr<Draft> before_last_;             // what withdraw() returns to
 
   // shared
-  std::atomic<const Plan*> newest_{nullptr};
+  std::atomic<const Plan*> offered_{nullptr};  // taken by the cycle with one exchange
   std::atomic<std::uint64_t> acknowledged_{0};
   std::atomic<std::uint64_t> cycle_number_{0};
 
@@ -266,6 +282,7 @@ class FeedbackControllersManager : public Manager, private ControllerOwner {
   const Plan* plan_ = nullptr;
   Cycle cycle_;
   ControlStates original_;
+  ControlStates compared_;  // of the test mode
 };
 
 }  // namespace ctrl_more

@@ -225,8 +225,8 @@ class HandLine:
         self.counters.failures += 1
         raise HandInconsistentError(
             f"readings of `{frame.hex(' ')}` on {self.port} contradict each other "
-            f"({', '.join(str(number) for number in readings) or 'no valid one'}): the line is "
-            "disturbed; check cable, ground and supply")
+            f"({', '.join(str(number) for number in readings) or 'no valid one'}; last byte received "
+            f"{format_byte(self.transport.last_byte)}): the line is disturbed; check cable, ground and supply")
 
 
 def status_request(motor: int) -> bytes:

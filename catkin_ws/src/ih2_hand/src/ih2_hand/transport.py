@@ -78,8 +78,9 @@ class SerialTransport:
     def _write_rest(self, data: bytes) -> int:
         _, ready, _ = select.select([], [self._fd], [], WRITE_TIMEOUT_S)
         if not ready:
-            raise HandConnectionLost(f"{self.port} took no byte for {WRITE_TIMEOUT_S} s: the other "
-                                     "end is stuck; unplug and replug the hand's cable")
+            raise HandConnectionLost(f"{self.port} took no byte for {WRITE_TIMEOUT_S} s (last byte "
+                                     f"received {format_byte(self.last_byte)}): the other end is "
+                                     "stuck; unplug and replug the hand's cable")
         return os.write(self._fd, data)
 
     def read(self, count: int, timeout: float) -> bytes:

@@ -18,6 +18,7 @@ class TransformationSystem {
   double duration() const noexcept { return duration_; }    ///< s
   double stiffness() const noexcept { return stiffness_; }  ///< K
   double damping() const noexcept { return damping_; }      ///< D
+  int basisCount() const noexcept { return count_; }        ///< N, rounded up to whole packets of four
 
   /// Turns and scales the learnt shape from the demonstration's start-goal line to this one (ShapeMapping).
   void mapShape(const Vector3& start, const Vector3& goal) noexcept;

@@ -6,11 +6,11 @@
 #include <cstdint>
 #include <memory>
 
+#include "coglab_controllers/limits/guard.hpp"
+#include "coglab_controllers/limits/phase_governor.hpp"
 #include "coglab_controllers/manager/feedback_stage.hpp"
 #include "coglab_controllers/manager/motion_controller.hpp"
-#include "coglab_controllers/manager/motion_guard.hpp"
 #include "coglab_controllers/manager/plan_exchange.hpp"
-#include "coglab_controllers/manager/time_scale.hpp"
 #include "lwr_fri_bridge/control_port.hpp"
 
 namespace coglab_controllers {
@@ -21,7 +21,6 @@ using lwr_fri_bridge::VelocityCommand;
 struct CycleSettings {
   double cycle_time = 0.005;     ///< intended period, s
   double sample_timeout = 0.1;   ///< a joint state older than this gives zero velocity, s
-  double blocked_time = 0.5;     ///< a joint at its stop that blocks a motion this long aborts it, s
   double overrun_time = 0.004;   ///< a motion controller slower than this overruns, s; 0: not judged (lockstep)
   int overruns_to_fault = 5;     ///< overruns in a row that fault it
 };
@@ -97,21 +96,21 @@ class ControlCycle {
   const CycleSettings& settings() const { return settings_; }
 
  private:
-  void adopt(std::int64_t now_ns) noexcept;
+  void adopt() noexcept;
   bool usable(const RobotSample& sample, double dt) noexcept;
   void compute(JointVector& velocity) noexcept;
   void watchRobot() noexcept;
-  void watchBlocked(double dt) noexcept;
+  void abortMotion(const Reason& reason) noexcept;
   void fault(const Reason& reason) noexcept;
-  void publish() noexcept;
+  void publish(std::int64_t begin_ns) noexcept;
   template <typename Call>
   bool guarded(const char* what, Call&& call) noexcept;
 
   std::shared_ptr<const RobotSetup> robot_;
   FeedbackStage& feedback_;
   CycleSettings settings_;
-  MotionGuard guard_;
-  TimeScale time_scale_;
+  Guard guard_;
+  PhaseGovernor governor_;
 
   PlanExchange<CyclePlan> plans_;
   std::atomic<double> speed_scale_{1.0};
@@ -120,15 +119,14 @@ class ControlCycle {
 
   // control thread only
   MotionController* motion_ = nullptr;
+  Name id_;
   CycleInput input_;
-  ChainState chain_;
   CycleReport report_;
   bool fault_ = false;
   Reason fault_reason_;
   Reason input_reason_;
-  std::uint32_t epoch_ = 0;
-  bool epoch_known_ = false;
-  double blocked_for_ = 0.0;
+  double limit_scale_ = 1.0;
+  std::uint64_t numbers_ = 0;  // of cycles with a joint state
   int overruns_in_row_ = 0;
   lwr_fri_bridge::TripleBuffer<CycleReport> reports_;
 };

@@ -7,10 +7,12 @@
 #include <memory>
 #include <mutex>
 #include <string>
+#include <utility>
 
 #include <yaml-cpp/yaml.h>
 
 #include "coglab_controllers/manager/fixed_text.hpp"
+#include "coglab_controllers/manager/plan_exchange.hpp"
 #include "coglab_controllers/manager/robot_setup.hpp"
 #include "ctrl_more/control_states.hpp"
 #include "lwr_fri_bridge/control_port.hpp"
@@ -19,11 +21,20 @@ namespace coglab_controllers {
 
 using lwr_fri_bridge::RobotSample;
 
+/// Outcome of a request: a sentence for the user if it was refused, perhaps a note if not.
+struct Answer {
+  bool success = true;
+  std::string message;
+
+  static Answer refusal(std::string why) { return {false, std::move(why)}; }
+};
+
 /// What the control cycle tells a motion controller, every cycle.
 struct CycleInput {
-  RobotSample robot;            ///< newest measurement; its stamps and commanded state are those of the bridge
+  RobotSample robot;            ///< newest measurement; stamps and commanded state are the bridge's
+  ChainState chain;             ///< kinematics at the measured joints
   double dt = 0.0;              ///< true time since the last cycle, s, > 0
-  double time_scale = 1.0;      ///< 0..1: how much of dt the reference's own time advances (speed_scale and Cartesian limits)
+  double time_scale = 1.0;      ///< 0..1: how fast the reference's own time runs (speed_scale, limits)
   bool motion_allowed = false;  ///< target velocities are followed now
 };
 
@@ -71,6 +82,9 @@ class MotionHost {
 
   /// The longest that a request waits for the cycle, s.
   virtual double planTimeout() const = 0;
+
+  /// Sentence for a plan that the cycle did not adopt in time.
+  virtual std::string notAdopted(PlanOutcome outcome) const = 0;
 };
 
 /// What a plug-in gets when it is loaded.
@@ -111,6 +125,9 @@ class MotionController {
 
   /// Step 5: from the references, perhaps modified by feedback controllers, to joint velocities (joint_velocity of references).
   virtual void resolve(const CycleInput& input, References& references) = 0;
+
+  /// 0..1: how much its own limits (those of the inverse kinematics) shrank the last velocity; slows the time scale.
+  virtual double limitScale() const { return 1.0; }
 
   virtual MotionState state() const = 0;
   /// Why it aborted or holds; empty otherwise.

@@ -11,6 +11,7 @@
 
 #include "coglab_sim/arm_dynamics.hpp"
 #include "coglab_sim/krc/answer_statistics.hpp"
+#include "coglab_sim/krc/command_checks.hpp"
 #include "coglab_sim/krc/krl_program.hpp"
 #include "coglab_sim/krc/parameters.hpp"
 
@@ -48,6 +49,8 @@ class Controller : private KrlInterface {
  public:
   /// @throws std::invalid_argument naming parameter, value and range if one is out of range.
   Controller(const Parameters& parameters, const ArmParameters& arm, const Vector7& position);
+  Controller(const Controller&) = delete;
+  Controller& operator=(const Controller&) = delete;
 
   /// A datagram arrived `latency` s after the last measurement went out.
   void receive(const std::uint8_t* bytes, std::size_t size, double latency);
@@ -103,17 +106,12 @@ class Controller : private KrlInterface {
   void nudge() override;
   void show(const std::string& message) override;
 
-  bool answerInTime() const { return answered_; }
-  /// Sentence if this command must not become active in command mode, empty if it may.
-  std::string entryFault(const lwr_fri_bridge::fri::CommandDatagram& command) const;
-  std::string cyclicFault(const lwr_fri_bridge::fri::CommandDatagram& command) const;
-  std::string valueFault(const lwr_fri_bridge::fri::CommandDatagram& command) const;
+  CheckContext checkContext() const;
   void follow(const lwr_fri_bridge::fri::CommandDatagram& command);
   void extrapolate();
-  void judgeAnswer(bool on_time);
+  void judgeAnswer(const ArmDynamics& arm, bool on_time);
   void updateDrives(const ArmDynamics& arm);
   void watchTorque(const ArmDynamics& arm);
-  double speedLimit(int joint) const;
   void holdMeasured(const ArmDynamics& arm);
   ServoCommand servoCommand() const;
 

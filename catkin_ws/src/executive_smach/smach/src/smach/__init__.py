@@ -1,7 +1,7 @@
 """Hierarchical state machines in Python.
 
-A state has outcomes; a container of states turns the outcome of one into the start of the next; a container is itself
-a state. See the README beside this package for how to write a machine.
+A state has outcomes; a container of states turns the outcome of one into the start of the next; a
+container is itself a state. See the README beside this package for how to write a machine.
 
 Example::
 
@@ -22,7 +22,15 @@ Example::
 """
 
 # The loggers come first: every other module looks them up here each time it logs.
-from smach.log import is_shutdown, logdebug, logerr, loginfo, logwarn, set_loggers, set_shutdown_check  # isort: skip
+from smach.log import (
+    is_shutdown,
+    logdebug,
+    logerr,
+    loginfo,
+    logwarn,
+    set_loggers,
+    set_shutdown_check,
+)  # isort: skip
 
 from smach import clock
 from smach.concurrence import Concurrence
@@ -42,8 +50,29 @@ from smach.util import CBInterface, cb_interface, has_smach_interface
 from smach.virtual_clock import VirtualClock
 
 __all__ = [
-    "CBInterface", "CBState", "Concurrence", "Container", "InvalidConstructionError", "InvalidStateError",
-    "InvalidTransitionError", "InvalidUserCodeError", "Iterator", "Remapper", "Sequence", "State", "StateMachine",
-    "UserData", "VirtualClock", "cb_interface", "clock", "has_smach_interface", "is_shutdown", "logdebug", "logerr",
-    "loginfo", "logwarn", "set_loggers", "set_shutdown_check",
+    "CBInterface",
+    "CBState",
+    "Concurrence",
+    "Container",
+    "InvalidConstructionError",
+    "InvalidStateError",
+    "InvalidTransitionError",
+    "InvalidUserCodeError",
+    "Iterator",
+    "Remapper",
+    "Sequence",
+    "State",
+    "StateMachine",
+    "UserData",
+    "VirtualClock",
+    "cb_interface",
+    "clock",
+    "has_smach_interface",
+    "is_shutdown",
+    "logdebug",
+    "logerr",
+    "loginfo",
+    "logwarn",
+    "set_loggers",
+    "set_shutdown_check",
 ]

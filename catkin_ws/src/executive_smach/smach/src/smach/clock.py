@@ -1,7 +1,8 @@
-"""The clock machines run by: the steady wall clock, or a virtual one in which waiting costs no time.
+"""The clock machines run by: the steady wall clock, or a virtual one in which waiting costs no
+time.
 
-States that wait or measure time ask this module instead of `time` and `threading`, and then run unchanged in real
-and in virtual time::
+States that wait or measure time ask this module instead of `time` and `threading`, and then run
+unchanged in real and in virtual time::
 
     class Pause(smach.State):
         def execute(self, ud):
@@ -64,16 +65,27 @@ class Clock(ABC):
         """A new event to wait for, unset. Example: `done = clock.event()`."""
 
     @abstractmethod
-    def start_thread(self, target: Callable[[], object], name: str, daemon: bool = False) -> threading.Thread:
-        """Start a thread that belongs to this clock. Example: `clock.start_thread(work, "worker").join()`."""
+    def start_thread(
+        self, target: Callable[[], object], name: str, daemon: bool = False
+    ) -> threading.Thread:
+        """Start a thread that belongs to this clock.
+
+        Example: `clock.start_thread(work, "worker").join()`.
+        """
 
     @contextmanager
     def attached(self) -> Iterator[Clock]:
-        """The calling thread belongs to this clock inside the block. Example: `with clock.attached(): ...`."""
+        """The calling thread belongs to this clock inside the block.
+
+        Example: `with clock.attached(): ...`.
+        """
         yield self
 
     def wait(self, event: Event, timeout: float | None = None) -> bool:
-        """Wait for an event of this clock. Example: `clock.wait(done, 5.0)` is False after 5 s in vain."""
+        """Wait for an event of this clock.
+
+        Example: `clock.wait(done, 5.0)` is False after 5 s in vain.
+        """
         return event.wait(timeout)
 
 
@@ -97,7 +109,9 @@ class SteadyClock(Clock):
         """A `threading.Event`. Example: `clock.event().wait(0.1)`."""
         return threading.Event()
 
-    def start_thread(self, target: Callable[[], object], name: str, daemon: bool = False) -> threading.Thread:
+    def start_thread(
+        self, target: Callable[[], object], name: str, daemon: bool = False
+    ) -> threading.Thread:
         """An ordinary thread, started. Example: `clock.start_thread(work, "worker")`."""
         thread = threading.Thread(target=in_current_context(target), name=name, daemon=daemon)
         thread.start()
@@ -123,7 +137,8 @@ def current() -> Clock:
 
 
 def set_clock(clock: Clock) -> None:
-    """Make `clock` the default of the whole process. Example: `smach.clock.set_clock(SteadyClock())`.
+    """Make `clock` the default of the whole process. Example:
+    `smach.clock.set_clock(SteadyClock())`.
 
     Raises TypeError if it is no Clock.
     """

@@ -20,12 +20,13 @@ Outcomes = dict[str, Any]
 class Concurrence(Container):
     """States that are started together; the container ends when all of them have ended.
 
-    `outcome_map` {outcome: {label: child's outcome}}: of the entries that hold in full the one with most conditions
-    gives the outcome. `outcome_cb({label: outcome})` comes first if it returns a string. Else `default_outcome`.
-    `child_termination_cb({label: outcome or None})` is called after each child's end; if it returns something true,
-    the children that still run are preempted.
+    `outcome_map` {outcome: {label: child's outcome}}: of the entries that hold in full the one with
+    most conditions gives the outcome. `outcome_cb({label: outcome})` comes first if it returns a
+    string. Else `default_outcome`. `child_termination_cb({label: outcome or None})` is called after
+    each child's end; if it returns something true, the children that still run are preempted.
 
-    A preempted concurrence whose children have all served the request has the outcome 'preempted': register it.
+    A preempted concurrence whose children have all served the request has the outcome 'preempted':
+    register it.
 
     Example::
 
@@ -37,25 +38,42 @@ class Concurrence(Container):
             smach.Concurrence.add("WATCH", Watch())
     """
 
-    def __init__(self, outcomes: Iterable[str], default_outcome: str, input_keys: Iterable[str] = (),
-                 output_keys: Iterable[str] = (), outcome_map: Mapping[str, Mapping[str, str]] | None = None,
-                 outcome_cb: Callable[[Outcomes], str | None] | None = None,
-                 child_termination_cb: Callable[[Outcomes], Any] | None = None) -> None:
+    def __init__(
+        self,
+        outcomes: Iterable[str],
+        default_outcome: str,
+        input_keys: Iterable[str] = (),
+        output_keys: Iterable[str] = (),
+        outcome_map: Mapping[str, Mapping[str, str]] | None = None,
+        outcome_cb: Callable[[Outcomes], str | None] | None = None,
+        child_termination_cb: Callable[[Outcomes], Any] | None = None,
+    ) -> None:
         super().__init__(outcomes, input_keys, output_keys)
         if not isinstance(default_outcome, str) or default_outcome not in self._outcomes:
-            raise InvalidStateError(f"Concurrence: default_outcome {default_outcome!r} is not among its outcomes "
-                                    f"{list(self._outcomes)}")
+            raise InvalidStateError(
+                f"Concurrence: default_outcome {default_outcome!r} is not among its outcomes "
+                f"{list(self._outcomes)}"
+            )
         for outcome in outcome_map or {}:
             if outcome not in self._outcomes:
-                raise InvalidStateError(f"Concurrence: outcome_map has {outcome!r}, which is not among its outcomes "
-                                        f"{list(self._outcomes)}")
-        for what, cb in (("outcome_cb", outcome_cb), ("child_termination_cb", child_termination_cb)):
+                raise InvalidStateError(
+                    f"Concurrence: outcome_map has {outcome!r}, which is not among its outcomes "
+                    f"{list(self._outcomes)}"
+                )
+        for what, cb in (
+            ("outcome_cb", outcome_cb),
+            ("child_termination_cb", child_termination_cb),
+        ):
             if cb and not callable(cb):
-                raise InvalidStateError(f"Concurrence: {what} must be callable, got {type(cb).__name__}")
+                raise InvalidStateError(
+                    f"Concurrence: {what} must be callable, got {type(cb).__name__}"
+                )
         self._states: dict[str, State] = {}
         self._remappings: dict[str, dict[str, str]] = {}
         self._default_outcome = default_outcome
-        self._outcome_map = {outcome: dict(conditions) for outcome, conditions in (outcome_map or {}).items()}
+        self._outcome_map = {
+            outcome: dict(conditions) for outcome, conditions in (outcome_map or {}).items()
+        }
         self._outcome_cb = outcome_cb
         self._child_termination_cb = child_termination_cb
         self._callback_lock = threading.Lock()
@@ -75,9 +93,11 @@ class Concurrence(Container):
 
     @staticmethod
     def add(label: str, state: State, remapping: Mapping[str, str] | None = None) -> State:
-        """Add a child to the concurrence that is open, and return it; `remapping` {its key: the container's key}.
+        """Add a child to the concurrence that is open, and return it; `remapping` {its key: the
+        container's key}.
 
-        Raises InvalidStateError for a label that is taken. Example: `Concurrence.add("WATCH", Watch())`.
+        Raises InvalidStateError for a label that is taken. Example: `Concurrence.add("WATCH",
+        Watch())`.
         """
         concurrence = Concurrence._currently_opened()
         concurrence._check_new_child(label, state, concurrence._states)
@@ -91,8 +111,9 @@ class Concurrence(Container):
         try:
             return self._states[key]
         except KeyError:
-            raise KeyError(f"no state {key!r} in this concurrence; labels: "
-                           f"{', '.join(self._states) or 'none'}") from None
+            raise KeyError(
+                f"no state {key!r} in this concurrence; labels: {', '.join(self._states) or 'none'}"
+            ) from None
 
     def get_children(self) -> dict[str, State]:
         """The children by label, in the order they were added. Example: `both.get_children()`."""
@@ -102,53 +123,79 @@ class Concurrence(Container):
         """All labels. Example: `both.get_initial_states()`."""
         return list(self._states)
 
-    def set_initial_state(self, initial_states: Sequence[str], userdata: UserData | None = None) -> None:
-        """Merge `userdata`; every run begins with all children, so labels have no effect beyond a warning.
+    def set_initial_state(
+        self, initial_states: Sequence[str], userdata: UserData | None = None
+    ) -> None:
+        """Merge `userdata`; every run begins with all children, so labels have no effect beyond a
+        warning.
 
         Example: `both.set_initial_state([], userdata)`.
         """
         if len(initial_states) > 0 and set(initial_states) != set(self._states):
-            smach.logwarn(f"a concurrence begins with all its children {list(self._states)}, not only with "
-                          f"{list(initial_states)}")
+            smach.logwarn(
+                f"a concurrence begins with all its children {list(self._states)}, not only with "
+                f"{list(initial_states)}"
+            )
         if userdata is not None:
             self.userdata.update(userdata)
 
     def get_active_states(self) -> list[str]:
-        """Labels of the children that have not ended; [] when idle. Example: `both.get_active_states()`."""
+        """Labels of the children that have not ended; [] when idle.
+
+        Example: `both.get_active_states()`.
+        """
         with self._preempt_lock:
             return list(self._live)
 
     def get_internal_edges(self) -> list[tuple[str, str, str | None]]:
-        """(child's outcome, label, container's outcome) from the outcome map. Example: `both.get_internal_edges()`."""
-        return [(child_outcome, label, outcome) for outcome, conditions in self._outcome_map.items()
-                for label, child_outcome in conditions.items()]
+        """(child's outcome, label, container's outcome) from the outcome map.
+
+        Example: `both.get_internal_edges()`.
+        """
+        return [
+            (child_outcome, label, outcome)
+            for outcome, conditions in self._outcome_map.items()
+            for label, child_outcome in conditions.items()
+        ]
 
     def check_consistency(self) -> None:
-        """Raise InvalidTransitionError if the outcome map names labels or child outcomes that do not exist.
+        """Raise InvalidTransitionError if the outcome map names labels or child outcomes that do
+        not exist.
 
         Example: `both.check_consistency()`.
         """
         faults = []
         for child_outcome, label, outcome in self.get_internal_edges():
             if label not in self._states:
-                faults.append(f"{outcome!r} depends on {label!r}, which is not among its labels {list(self._states)}")
+                faults.append(
+                    f"{outcome!r} depends on {label!r}, which is not among its labels "
+                    f"{list(self._states)}"
+                )
             elif child_outcome not in self._states[label].get_registered_outcomes():
-                faults.append(f"{outcome!r} depends on outcome {child_outcome!r} of {label!r}, which has only "
-                              f"{list(self._states[label].get_registered_outcomes())}")
+                faults.append(
+                    f"{outcome!r} depends on outcome {child_outcome!r} of {label!r}, which has "
+                    "only "
+                    f"{list(self._states[label].get_registered_outcomes())}"
+                )
         if faults:
-            raise InvalidTransitionError(f"outcome_map of the concurrence is wrong: {'; '.join(faults)}")
+            raise InvalidTransitionError(
+                f"outcome_map of the concurrence is wrong: {'; '.join(faults)}"
+            )
 
     # Running.
 
     def execute(self, parent_ud: Any = None) -> str:
         """Run all children to their ends and return the outcome.
 
-        Raises InvalidStateError without children, or if a child raises or returns no outcome of its own (after the
-        others were preempted and have ended); InvalidUserCodeError if a callback raises; InvalidTransitionError if the
-        outcome map is wrong. Example: `outcome = both.execute()`.
+        Raises InvalidStateError without children, or if a child raises or returns no outcome of its
+        own (after the others were preempted and have ended); InvalidUserCodeError if a callback
+        raises; InvalidTransitionError if the outcome map is wrong. Example: `outcome =
+        both.execute()`.
         """
         if not self._states:
-            raise InvalidStateError("concurrence not executed: it has no children; add at least one")
+            raise InvalidStateError(
+                "concurrence not executed: it has no children; add at least one"
+            )
         self.check_consistency()
         with self._run() as result:
             try:
@@ -183,13 +230,22 @@ class Concurrence(Container):
         threads = []
         for label in self._states:
             try:
-                threads.append(clock.start_thread(lambda label=label: self._run_child(label, released, all_ended),
-                                                  name=f"concurrent_split:{label}"))
+                threads.append(
+                    clock.start_thread(
+                        lambda label=label: self._run_child(label, released, all_ended),
+                        name=f"concurrent_split:{label}",
+                    )
+                )
             except RuntimeError as error:  # the system gives no more threads
                 with self._preempt_lock:
                     self._abandoned = True
-                    self._errors.append(_error(InvalidStateError, f"thread of concurrent state '{label}' did not "
-                                                                  f"start: {error}", error))
+                    self._errors.append(
+                        _error(
+                            InvalidStateError,
+                            f"thread of concurrent state '{label}' did not start: {error}",
+                            error,
+                        )
+                    )
                 break
         self._pending = len(threads)
         if not threads:
@@ -225,7 +281,10 @@ class Concurrence(Container):
                 self._child_outcomes[label] = outcome
                 if self._take_back(label, state) and label in self._told:
                     self._ignored.add(label)
-                    smach.logwarn(f"concurrent state '{label}' was asked to end early and has not served the request")
+                    smach.logwarn(
+                        f"concurrent state '{label}' was asked to end early and has not served the "
+                        "request"
+                    )
             self.call_transition_cbs()
             if error is None and self._child_termination_cb and not self._abandoned:
                 stop, error = self._ask_termination_cb(label)
@@ -244,19 +303,33 @@ class Concurrence(Container):
 
     def _execute_child(self, label: str, state: State) -> tuple[Any, Exception | None]:
         """The child's outcome, or the error with which the container has to end."""
-        ud = Remapper(self.userdata, state.get_registered_input_keys(), state.get_registered_output_keys(),
-                      self._remappings[label])
+        ud = Remapper(
+            self.userdata,
+            state.get_registered_input_keys(),
+            state.get_registered_output_keys(),
+            self._remappings[label],
+        )
         kind = type(state).__name__
         try:
             outcome = state.execute(ud)
         except BaseException as error:
             traceback.print_exc()
-            return None, _error(InvalidStateError, f"concurrent state '{label}' ({kind}) raised "
-                                f"{type(error).__name__}: {error}\n{traceback.format_exc()}", error)
+            return None, _error(
+                InvalidStateError,
+                f"concurrent state '{label}' ({kind}) raised "
+                f"{type(error).__name__}: {error}\n{traceback.format_exc()}",
+                error,
+            )
         registered = state.get_registered_outcomes()
+        if outcome is None and smach.is_shutdown():
+            return None, None  # an inner container that stopped for the same reason
         if outcome not in registered:
-            return None, _error(InvalidStateError, f"concurrent state '{label}' ({kind}) returned {outcome!r}, which is "
-                                f"not among its outcomes {list(registered)}; does every path of its execute() return?")
+            return None, _error(
+                InvalidStateError,
+                f"concurrent state '{label}' ({kind}) returned {outcome!r}, which is "
+                f"not among its outcomes {list(registered)}; does every path of its execute() "
+                "return?",
+            )
         return outcome, None
 
     def _ask_termination_cb(self, label: str) -> tuple[bool, Exception | None]:
@@ -264,8 +337,12 @@ class Concurrence(Container):
             with self._callback_lock:
                 return bool(self._child_termination_cb(self._child_outcomes)), None  # type: ignore[misc]
         except Exception as error:
-            return True, _error(InvalidUserCodeError, f"child_termination_cb raised after the end of '{label}': "
-                                f"{type(error).__name__}: {error}\n{traceback.format_exc()}", error)
+            return True, _error(
+                InvalidUserCodeError,
+                f"child_termination_cb raised after the end of '{label}': "
+                f"{type(error).__name__}: {error}\n{traceback.format_exc()}",
+                error,
+            )
 
     def _choose_outcome(self) -> str:
         with self._preempt_lock:
@@ -276,15 +353,22 @@ class Concurrence(Container):
             try:
                 outcome = self._outcome_cb(dict(self._child_outcomes))
             except Exception as error:
-                raise InvalidUserCodeError(f"outcome_cb of the concurrence raised {type(error).__name__}: {error}\n"
-                                           f"{traceback.format_exc()}") from error
+                raise InvalidUserCodeError(
+                    f"outcome_cb of the concurrence raised {type(error).__name__}: {error}\n"
+                    f"{traceback.format_exc()}"
+                ) from error
             if isinstance(outcome, str) and outcome:
                 return outcome
             if outcome:
-                smach.logerr(f"outcome_cb of the concurrence returned {outcome!r}; expected one of "
-                             f"{list(self._outcomes)} or None; ignored")
-        satisfied = [(len(conditions), outcome) for outcome, conditions in self._outcome_map.items()
-                     if all(self._child_outcomes[label] == wanted for label, wanted in conditions.items())]
+                smach.logerr(
+                    f"outcome_cb of the concurrence returned {outcome!r}; expected one of "
+                    f"{list(self._outcomes)} or None; ignored"
+                )
+        satisfied = [
+            (len(conditions), outcome)
+            for outcome, conditions in self._outcome_map.items()
+            if all(self._child_outcomes[label] == wanted for label, wanted in conditions.items())
+        ]
         if satisfied:
             return max(satisfied, key=lambda entry: entry[0])[1]  # the first declared, among equals
         return self._default_outcome
@@ -303,7 +387,9 @@ class Concurrence(Container):
                 self._tell(label, self._states[label])
 
 
-def _error(kind: type[smach.exceptions.SmachError], message: str, cause: BaseException | None = None) -> Exception:
+def _error(
+    kind: type[smach.exceptions.SmachError], message: str, cause: BaseException | None = None
+) -> Exception:
     error = kind(message)
     error.__cause__ = cause
     return error

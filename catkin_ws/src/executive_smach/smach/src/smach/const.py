@@ -28,9 +28,14 @@ def unwrap(value: Any) -> Any:
 def is_wrapped_kind(value: Any) -> bool:
     """Whether reading `value` through an input-only key gives a `Const`: objects with a `__dict__`.
 
-    Classes are left alone: `isinstance(x, wrapped_class)` could not work. Example: `is_wrapped_kind(3)` is False.
+    Classes are left alone: `isinstance(x, wrapped_class)` could not work. Example:
+    `is_wrapped_kind(3)` is False.
     """
-    return not isinstance(value, type) and not issubclass(type(value), Const) and hasattr(value, "__dict__")
+    return (
+        not isinstance(value, type)
+        and not issubclass(type(value), Const)
+        and hasattr(value, "__dict__")
+    )
 
 
 def const(value: Any) -> Any:
@@ -48,11 +53,14 @@ def const(value: Any) -> Any:
 
 
 class Const:
-    """Read-only view of `obj`: calls, comparison, text and `isinstance` act as on the object; assignment and `del`
-    raise TypeError. Attributes and items read through it are read-only in turn; what a call returns is the caller's.
+    """Read-only view of `obj`: calls, comparison, text and `isinstance` act as on the object;
+    assignment and `del`
+    raise TypeError. Attributes and items read through it are read-only in turn; what a call returns
+    is the caller's.
 
-    A method that changes its own object does change it: the view forbids assignment, it cannot see into methods.
-    `copy.copy` and `copy.deepcopy` give a free copy of the object. Example: see `const`.
+    A method that changes its own object does change it: the view forbids assignment, it cannot see
+    into methods. `copy.copy` and `copy.deepcopy` give a free copy of the object. Example: see
+    `const`.
     """
 
     __slots__ = ("_const_obj", "__weakref__")
@@ -138,9 +146,13 @@ def _getitem(self: Const, key: Any) -> Any:
 
 
 def _view_class(kind: type) -> type:
-    """A Const class with just the special methods that `kind` has, so that e.g. `callable(view)` is right."""
+    """A Const class with just the special methods that `kind` has, so that e.g. `callable(view)` is
+    right.
+    """
     members: dict[str, Any] = {"__slots__": (), "__doc__": Const.__doc__}
-    members.update({name: _forwarder(name) for name in _FORWARDED if getattr(kind, name, None) is not None})
+    members.update(
+        {name: _forwarder(name) for name in _FORWARDED if getattr(kind, name, None) is not None}
+    )
     members.update({name: _refuser(name) for name in _REFUSED if hasattr(kind, name)})
     if hasattr(kind, "__getitem__"):
         members["__getitem__"] = _getitem

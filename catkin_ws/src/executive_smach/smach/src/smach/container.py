@@ -13,8 +13,15 @@ from smach.exceptions import InvalidConstructionError, InvalidStateError, Invali
 from smach.state import State
 from smach.user_data import UserData
 
-_STATE_METHODS = ("execute", "request_preempt", "preempt_requested", "recall_preempt", "get_registered_outcomes",
-                  "get_registered_input_keys", "get_registered_output_keys")
+_STATE_METHODS = (
+    "execute",
+    "request_preempt",
+    "preempt_requested",
+    "recall_preempt",
+    "get_registered_outcomes",
+    "get_registered_input_keys",
+    "get_registered_output_keys",
+)
 
 
 class Container(State):
@@ -38,8 +45,12 @@ class Container(State):
     _construction_lock = threading.RLock()
     _construction_thread: int | None = None
 
-    def __init__(self, outcomes: Iterable[str] = (), input_keys: Iterable[str] = (),
-                 output_keys: Iterable[str] = ()) -> None:
+    def __init__(
+        self,
+        outcomes: Iterable[str] = (),
+        input_keys: Iterable[str] = (),
+        output_keys: Iterable[str] = (),
+    ) -> None:
         super().__init__(outcomes, input_keys, output_keys)
         self.userdata = UserData()
         self._is_running = False
@@ -71,9 +82,13 @@ class Container(State):
         """Labels with which a run begins. Example: `machine.get_initial_states()`."""
         raise NotImplementedError(f"{type(self).__name__} must override get_initial_states()")
 
-    def set_initial_state(self, initial_states: Sequence[str], userdata: UserData | None = None) -> None:
+    def set_initial_state(
+        self, initial_states: Sequence[str], userdata: UserData | None = None
+    ) -> None:
         """Begin the next run elsewhere, with this merged into the user data. Example: `m.set_initial_state(["B"])`."""
-        raise NotImplementedError(f"{type(self).__name__} must override set_initial_state(labels, userdata)")
+        raise NotImplementedError(
+            f"{type(self).__name__} must override set_initial_state(labels, userdata)"
+        )
 
     def get_active_states(self) -> list[str]:
         """Labels of the children that run now. Example: `machine.get_active_states()`."""
@@ -108,8 +123,10 @@ class Container(State):
         Raises InvalidStateError if another container was opened later and is still open.
         """
         if not self.is_opened():
-            raise InvalidStateError(f"close() of {self._name()}: it is not the innermost open container "
-                                    f"({_stack_text()}); close that one first")
+            raise InvalidStateError(
+                f"close() of {self._name()}: it is not the innermost open container "
+                f"({_stack_text()}); close that one first"
+            )
         self._pop()
         try:
             self.check_consistency()
@@ -126,7 +143,8 @@ class Container(State):
         if not self.is_opened():
             raise InvalidConstructionError(
                 f"{msg or 'the container must be open for construction'}: {self._name()} is not the innermost open "
-                f"container ({_stack_text()}); use it inside 'with container:'")
+                f"container ({_stack_text()}); use it inside 'with container:'"
+            )
 
     def __enter__(self) -> Container:
         self.open()
@@ -136,7 +154,9 @@ class Container(State):
         if error is None:
             self.close()
             return False
-        if not isinstance(error, (InvalidStateError, InvalidTransitionError)):  # these were logged when made
+        if not isinstance(
+            error, (InvalidStateError, InvalidTransitionError)
+        ):  # these were logged when made
             text = "".join(traceback.format_exception(kind, error, trace))
             smach.logerr(f"construction of {self._name()} failed: {text}")
         # Whatever happened inside, nobody else may find the construction lock taken.
@@ -163,11 +183,15 @@ class Container(State):
         """The innermost container that this thread has open, which must be of this class."""
         stack = Container._construction_stack
         if not stack or Container._construction_thread != threading.get_ident():
-            raise InvalidStateError(f"{cls.__name__}.add and the like need an open container; "
-                                    f"call them inside 'with container:'")
+            raise InvalidStateError(
+                f"{cls.__name__}.add and the like need an open container; "
+                f"call them inside 'with container:'"
+            )
         if not isinstance(stack[-1], cls):
-            raise InvalidStateError(f"expected an open {cls.__name__}, but the innermost open container is a "
-                                    f"{type(stack[-1]).__name__}; use the add method of its class")
+            raise InvalidStateError(
+                f"expected an open {cls.__name__}, but the innermost open container is a "
+                f"{type(stack[-1]).__name__}; use the add method of its class"
+            )
         return stack[-1]
 
     def _check_new_child(self, label: str, state: State, taken: Iterable[str]) -> None:
@@ -175,16 +199,26 @@ class Container(State):
             raise InvalidStateError(f"a label must be a string, got {label!r}")
         missing = [name for name in _STATE_METHODS if not callable(getattr(state, name, None))]
         if missing:
-            raise InvalidStateError(f"state {label!r}: expected a smach.State, got {type(state).__name__} {state!r} "
-                                    f"without {', '.join(missing)}")
+            raise InvalidStateError(
+                f"state {label!r}: expected a smach.State, got {type(state).__name__} {state!r} "
+                f"without {', '.join(missing)}"
+            )
         try:
-            state.get_registered_outcomes(), state.get_registered_input_keys(), state.get_registered_output_keys()
+            (
+                state.get_registered_outcomes(),
+                state.get_registered_input_keys(),
+                state.get_registered_output_keys(),
+            )
         except AttributeError as error:
-            raise InvalidStateError(f"state {label!r} ({type(state).__name__}) is not initialised: {error}; "
-                                    f"call smach.State.__init__(self, outcomes=[...]) in its __init__") from error
+            raise InvalidStateError(
+                f"state {label!r} ({type(state).__name__}) is not initialised: {error}; "
+                f"call smach.State.__init__(self, outcomes=[...]) in its __init__"
+            ) from error
         if label in taken:
-            raise InvalidStateError(f"label {label!r} is already taken in this {type(self).__name__}; labels: "
-                                    f"{', '.join(taken)}")
+            raise InvalidStateError(
+                f"label {label!r} is already taken in this {type(self).__name__}; labels: "
+                f"{', '.join(taken)}"
+            )
 
     def _name(self) -> str:
         return f"{type(self).__name__} with outcomes {list(self.get_registered_outcomes())}"
@@ -237,14 +271,21 @@ class Container(State):
         """Call the termination callbacks. Example: `self.call_termination_cbs([label], outcome)`."""
         self._call("termination", self._termination_cbs, lambda: terminal_states, outcome)
 
-    def _call(self, what: str, callbacks: list[tuple[Callable, Sequence]], states: Callable[[], Any],
-              *more: Any) -> None:
+    def _call(
+        self,
+        what: str,
+        callbacks: list[tuple[Callable, Sequence]],
+        states: Callable[[], Any],
+        *more: Any,
+    ) -> None:
         for cb, args in callbacks:
             try:
                 cb(self.userdata, states(), *more, *args)
             except Exception:
-                smach.logerr(f"{what} callback {_cb_name(cb)} of {self._name()} raised; the run goes on:\n"
-                             f"{traceback.format_exc()}")
+                smach.logerr(
+                    f"{what} callback {_cb_name(cb)} of {self._name()} raised; the run goes on:\n"
+                    f"{traceback.format_exc()}"
+                )
 
     # A run.
 
@@ -254,8 +295,10 @@ class Container(State):
         result: dict[str, Any] = {"outcome": None}
         with self._preempt_lock:
             if self._is_running:
-                raise InvalidStateError(f"{self._name()} is already running; one container object can be executed "
-                                        f"once at a time: make a second one")
+                raise InvalidStateError(
+                    f"{self._name()} is already running; one container object can be executed "
+                    f"once at a time: make a second one"
+                )
             self._drop_spent_preempt()
             self._is_running = True
             self._run_thread = threading.get_ident()
@@ -270,7 +313,9 @@ class Container(State):
                 try:
                     cb(self.userdata, result["outcome"], *args)
                 except Exception:
-                    smach.logerr(f"end callback {_cb_name(cb)} of {self._name()} raised:\n{traceback.format_exc()}")
+                    smach.logerr(
+                        f"end callback {_cb_name(cb)} of {self._name()} raised:\n{traceback.format_exc()}"
+                    )
 
     def request_preempt(self) -> None:
         """Ask the container, and with it the children that run, to end early. Example: `machine.request_preempt()`.
@@ -291,8 +336,10 @@ class Container(State):
         try:
             state.request_preempt()
         except Exception:
-            smach.logerr(f"request_preempt of state {label!r} raised; the request is kept for the next state:\n"
-                         f"{traceback.format_exc()}")
+            smach.logerr(
+                f"request_preempt of state {label!r} raised; the request is kept for the next state:\n"
+                f"{traceback.format_exc()}"
+            )
             return False
         return True
 
@@ -323,7 +370,9 @@ def _copy(source: Any, target: Any, keys: Iterable[str], what: str) -> None:
         if key in source:
             target[key] = source[key]
         else:
-            smach.logwarn(f"{what}: user data key {key!r} is not there; present: {', '.join(source.keys()) or 'none'}")
+            smach.logwarn(
+                f"{what}: user data key {key!r} is not there; present: {', '.join(source.keys()) or 'none'}"
+            )
 
 
 def _callback(what: str, cb: Callable, cb_args: Sequence) -> tuple[Callable, Sequence]:
@@ -337,4 +386,6 @@ def _cb_name(cb: Callable) -> str:
 
 
 def _stack_text() -> str:
-    return "open: " + (" > ".join(type(c).__name__ for c in Container._construction_stack) or "none")
+    return "open: " + (
+        " > ".join(type(c).__name__ for c in Container._construction_stack) or "none"
+    )

@@ -28,9 +28,15 @@ class Iterator(Container):
                                                final_outcome_map={"bad": "failed"})
     """
 
-    def __init__(self, outcomes: Iterable[str], input_keys: Iterable[str], output_keys: Iterable[str],
-                 it: Iterable | Callable[[], Iterable] = (), it_label: str = "it_data",
-                 exhausted_outcome: str = "exhausted") -> None:
+    def __init__(
+        self,
+        outcomes: Iterable[str],
+        input_keys: Iterable[str],
+        output_keys: Iterable[str],
+        it: Iterable | Callable[[], Iterable] = (),
+        it_label: str = "it_data",
+        exhausted_outcome: str = "exhausted",
+    ) -> None:
         super().__init__((*names("outcomes", outcomes), exhausted_outcome), input_keys, output_keys)
         self._items = it
         self._items_label = it_label
@@ -45,9 +51,13 @@ class Iterator(Container):
     # Construction.
 
     @staticmethod
-    def set_contained_state(label: str, state: State, loop_outcomes: Iterable[str] = (),
-                            break_outcomes: Iterable[str] = (),
-                            final_outcome_map: Mapping[str, str] | None = None) -> State:
+    def set_contained_state(
+        label: str,
+        state: State,
+        loop_outcomes: Iterable[str] = (),
+        break_outcomes: Iterable[str] = (),
+        final_outcome_map: Mapping[str, str] | None = None,
+    ) -> State:
         """Set the state to run in the iterator that is open, and return it.
 
         With `break_outcomes` all others go on with the next item; else `loop_outcomes` do and all others end the
@@ -55,9 +65,14 @@ class Iterator(Container):
         state into the iterator's. Example: see the class.
         """
         iterator = Iterator._currently_opened()
-        iterator._check_new_child(label, state, [iterator._label] if iterator._label is not None else [])
+        iterator._check_new_child(
+            label, state, [iterator._label] if iterator._label is not None else []
+        )
         outcomes = state.get_registered_outcomes()
-        breaks, loops = names("break_outcomes", break_outcomes), names("loop_outcomes", loop_outcomes)
+        breaks, loops = (
+            names("break_outcomes", break_outcomes),
+            names("loop_outcomes", loop_outcomes),
+        )
         if breaks:
             loops = tuple(outcome for outcome in outcomes if outcome not in breaks)
         else:
@@ -82,16 +97,24 @@ class Iterator(Container):
 
     def get_children(self) -> dict[str, State]:
         """The contained state under its label. Example: `each.get_children()`."""
-        return {self._label: self._state} if self._label is not None and self._state is not None else {}
+        return (
+            {self._label: self._state}
+            if self._label is not None and self._state is not None
+            else {}
+        )
 
     def get_initial_states(self) -> list[str]:
         """The label of the contained state, as a list. Example: `each.get_initial_states()`."""
         return list(self.get_children())
 
-    def set_initial_state(self, initial_states: Sequence[str], userdata: UserData | None = None) -> None:
+    def set_initial_state(
+        self, initial_states: Sequence[str], userdata: UserData | None = None
+    ) -> None:
         """Merge `userdata`; there is only one state to begin with. Example: `each.set_initial_state([], ud)`."""
         if any(label != self._label for label in initial_states):
-            smach.logwarn(f"an iterator begins with its only state {self._label!r}, not with {list(initial_states)}")
+            smach.logwarn(
+                f"an iterator begins with its only state {self._label!r}, not with {list(initial_states)}"
+            )
         if userdata is not None:
             self.userdata.update(userdata)
 
@@ -103,8 +126,10 @@ class Iterator(Container):
         """Loop outcomes lead back to the state, the others out of the iterator. Example: see the name."""
         if self._label is None:
             return []
-        return [(outcome, self._label, self._label) for outcome in self._loop_outcomes] + \
-               [(outcome, self._label, self._final_outcome_map.get(outcome)) for outcome in self._break_outcomes]
+        return [(outcome, self._label, self._label) for outcome in self._loop_outcomes] + [
+            (outcome, self._label, self._final_outcome_map.get(outcome))
+            for outcome in self._break_outcomes
+        ]
 
     def check_consistency(self) -> None:
         """Raise InvalidStateError without a contained state, InvalidTransitionError for outcomes that do not exist.
@@ -112,20 +137,28 @@ class Iterator(Container):
         Example: `each.check_consistency()`.
         """
         if self._state is None:
-            raise InvalidStateError("iterator has no contained state; call Iterator.set_contained_state inside 'with'")
+            raise InvalidStateError(
+                "iterator has no contained state; call Iterator.set_contained_state inside 'with'"
+            )
         known = self._state.get_registered_outcomes()
-        unknown = [outcome for outcome in (*self._loop_outcomes, *self._break_outcomes, *self._final_outcome_map)
-                   if outcome not in known]
-        wrong = [outcome for outcome in self._final_outcome_map.values() if outcome not in self._outcomes]
+        unknown = [
+            outcome
+            for outcome in (*self._loop_outcomes, *self._break_outcomes, *self._final_outcome_map)
+            if outcome not in known
+        ]
+        wrong = [
+            outcome for outcome in self._final_outcome_map.values() if outcome not in self._outcomes
+        ]
         if unknown or wrong:
             raise InvalidTransitionError(
                 f"iterator over {self._label!r}: {unknown} are not among the state's outcomes {list(known)}, and "
-                f"{wrong} of final_outcome_map not among the iterator's {list(self._outcomes)}")
+                f"{wrong} of final_outcome_map not among the iterator's {list(self._outcomes)}"
+            )
 
     # Running.
 
-    def execute(self, parent_ud: Any = None) -> str:
-        """Run the state for each item; return the mapped last outcome, or the exhausted outcome.
+    def execute(self, parent_ud: Any = None) -> str | None:
+        """Run the state for each item; return the mapped last outcome, or the exhausted outcome; None at shutdown.
 
         Raises InvalidStateError without a contained state, InvalidUserCodeError if the state or the function that
         gives the items raises, InvalidTransitionError for an outcome the state has not registered.
@@ -137,28 +170,36 @@ class Iterator(Container):
             result["outcome"] = self._execute(parent_ud)
             return result["outcome"]
 
-    def _execute(self, parent_ud: Any) -> str:
+    def _execute(self, parent_ud: Any) -> str | None:
         self._copy_input_keys(parent_ud, self._input_keys)
         self.call_start_cbs()
         smach.loginfo(f"Iterator starting over '{self._items_label}' with state '{self._label}'")
         items = self._begin()
         result = self._exhausted_outcome
-        while not smach.is_shutdown():
+        while True:
+            if smach.is_shutdown():
+                return None
             try:
                 item = next(items)
             except StopIteration:
                 break
             except Exception:
-                smach.logerr(f"the items of the iterator over '{self._label}' ended with an error, taken as exhausted:"
-                             f"\n{traceback.format_exc()}")
+                smach.logerr(
+                    f"the items of the iterator over '{self._label}' ended with an error, taken as exhausted:"
+                    f"\n{traceback.format_exc()}"
+                )
                 break
             self.userdata[self._items_label] = item
             outcome, asked = self._execute_state()
+            if outcome is None:
+                return None
             if asked or outcome in self._break_outcomes:
                 result = self._final_outcome_map.get(outcome, outcome)
                 if asked and result not in self._outcomes:
                     # A loop outcome, cut short by a request: no outcome of ours, so say what happened.
-                    result = "preempted" if "preempted" in self._outcomes else self._exhausted_outcome
+                    result = (
+                        "preempted" if "preempted" in self._outcomes else self._exhausted_outcome
+                    )
                 break
             self.call_transition_cbs()
         self._copy_output_keys(parent_ud, self._output_keys)
@@ -170,10 +211,12 @@ class Iterator(Container):
         try:
             return iter(self._items() if callable(self._items) else self._items)
         except Exception as error:
-            raise InvalidUserCodeError(f"the items of the iterator over '{self._label}' could not be had: "
-                                       f"{type(error).__name__}: {error}\n{traceback.format_exc()}") from error
+            raise InvalidUserCodeError(
+                f"the items of the iterator over '{self._label}' could not be had: "
+                f"{type(error).__name__}: {error}\n{traceback.format_exc()}"
+            ) from error
 
-    def _execute_state(self) -> tuple[str, bool]:
+    def _execute_state(self) -> tuple[str | None, bool]:
         """Outcome of the state for the current item, and whether the iterator was asked to end."""
         label, state = str(self._label), self._state
         assert state is not None
@@ -187,17 +230,23 @@ class Iterator(Container):
             smach.logerr(f"... in state '{label}' ({type(state).__name__}) of an iterator")
             raise
         except Exception as error:
-            raise InvalidUserCodeError(f"state '{label}' ({type(state).__name__}) of an iterator raised "
-                                       f"{type(error).__name__}: {error}\n{traceback.format_exc()}") from error
+            raise InvalidUserCodeError(
+                f"state '{label}' ({type(state).__name__}) of an iterator raised "
+                f"{type(error).__name__}: {error}\n{traceback.format_exc()}"
+            ) from error
         finally:
             with self._preempt_lock:
                 self._executing = False
                 self._take_back(label, state)
                 asked = self._preempt_requested
                 self._preempt_requested = False
+        if outcome is None and smach.is_shutdown():
+            return None, asked  # an inner container that stopped for the same reason
         if outcome not in state.get_registered_outcomes():
-            raise InvalidTransitionError(f"state '{label}' ({type(state).__name__}) of an iterator returned {outcome!r}, "
-                                         f"which is not among its outcomes {list(state.get_registered_outcomes())}")
+            raise InvalidTransitionError(
+                f"state '{label}' ({type(state).__name__}) of an iterator returned {outcome!r}, "
+                f"which is not among its outcomes {list(state.get_registered_outcomes())}"
+            )
         return outcome, asked
 
     def _forward_preempt(self) -> None:

@@ -22,15 +22,24 @@ class Sequence(StateMachine):
             smach.Sequence.add("MOVE", Move(), transitions={"blocked": "aborted"})
     """
 
-    def __init__(self, outcomes: Iterable[str], connector_outcome: str, input_keys: Iterable[str] = (),
-                 output_keys: Iterable[str] = ()) -> None:
+    def __init__(
+        self,
+        outcomes: Iterable[str],
+        connector_outcome: str,
+        input_keys: Iterable[str] = (),
+        output_keys: Iterable[str] = (),
+    ) -> None:
         super().__init__(outcomes, input_keys, output_keys)
         self._connector_outcome = connector_outcome
         self._last_label: str | None = None
 
     @staticmethod
-    def add(label: str, state: State, transitions: Mapping[str, str | None] | None = None,
-            remapping: Mapping[str, str] | None = None) -> State:
+    def add(
+        label: str,
+        state: State,
+        transitions: Mapping[str, str | None] | None = None,
+        remapping: Mapping[str, str] | None = None,
+    ) -> State:
         """Add a state behind the last one of the sequence that is open, and return it.
 
         Errors as with StateMachine.add. Example: `Sequence.add("MOVE", Move())`.
@@ -39,8 +48,10 @@ class Sequence(StateMachine):
         previous = sequence._last_label
         sequence._add(label, state, transitions, remapping)
         if sequence._connector_outcome not in state.get_registered_outcomes():
-            smach.logerr(f"state {label!r} lacks the sequence's connector outcome {sequence._connector_outcome!r} (it "
-                         f"has {list(state.get_registered_outcomes())}): what follows it is reached only by transitions")
+            smach.logerr(
+                f"state {label!r} lacks the sequence's connector outcome {sequence._connector_outcome!r} (it "
+                f"has {list(state.get_registered_outcomes())}): what follows it is reached only by transitions"
+            )
         if previous is not None:
             edges = sequence._transitions[previous]
             if sequence._connector_outcome in edges and edges[sequence._connector_outcome] is None:

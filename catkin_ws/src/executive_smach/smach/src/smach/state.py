@@ -30,8 +30,13 @@ class State:
     _preempt_flag = False
     _preempt_spent = False
 
-    def __init__(self, outcomes: Iterable[str] = (), input_keys: Iterable[str] = (),
-                 output_keys: Iterable[str] = (), io_keys: Iterable[str] = ()) -> None:
+    def __init__(
+        self,
+        outcomes: Iterable[str] = (),
+        input_keys: Iterable[str] = (),
+        output_keys: Iterable[str] = (),
+        io_keys: Iterable[str] = (),
+    ) -> None:
         self._outcomes = OrderedSet(names("outcomes", outcomes))
         io_keys = names("io_keys", io_keys)
         self._input_keys = OrderedSet((*names("input_keys", input_keys), *io_keys))
@@ -127,9 +132,16 @@ class CBState(State):
         StateMachine.add("SHOW", CBState(show))
     """
 
-    def __init__(self, cb: Callable[..., str], cb_args: Sequence = (), cb_kwargs: Mapping[str, Any] | None = None,
-                 outcomes: Iterable[str] = (), input_keys: Iterable[str] = (), output_keys: Iterable[str] = (),
-                 io_keys: Iterable[str] = ()) -> None:
+    def __init__(
+        self,
+        cb: Callable[..., str],
+        cb_args: Sequence = (),
+        cb_kwargs: Mapping[str, Any] | None = None,
+        outcomes: Iterable[str] = (),
+        input_keys: Iterable[str] = (),
+        output_keys: Iterable[str] = (),
+        io_keys: Iterable[str] = (),
+    ) -> None:
         super().__init__(outcomes, input_keys, output_keys, io_keys)
         if not callable(cb):
             raise TypeError(f"CBState: expected a callable, got {type(cb).__name__}")

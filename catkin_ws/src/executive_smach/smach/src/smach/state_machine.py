@@ -28,8 +28,12 @@ class StateMachine(Container):
         outcome = machine.execute()
     """
 
-    def __init__(self, outcomes: Iterable[str], input_keys: Iterable[str] = (),
-                 output_keys: Iterable[str] = ()) -> None:
+    def __init__(
+        self,
+        outcomes: Iterable[str],
+        input_keys: Iterable[str] = (),
+        output_keys: Iterable[str] = (),
+    ) -> None:
         super().__init__(outcomes, input_keys, output_keys)
         self._states: dict[str, State] = {}
         self._transitions: dict[str, dict[str, str | None]] = {}
@@ -45,8 +49,13 @@ class StateMachine(Container):
     # Construction.
 
     @staticmethod
-    def add(label: str, state: State, transitions: Mapping[str, str | None] | None = None,
-            remapping: Mapping[str, str] | None = None, constants: Mapping[str, Any] | None = None) -> State:
+    def add(
+        label: str,
+        state: State,
+        transitions: Mapping[str, str | None] | None = None,
+        remapping: Mapping[str, str] | None = None,
+        constants: Mapping[str, Any] | None = None,
+    ) -> State:
         """Add a state to the machine that is open, and return it.
 
         `transitions` {outcome: label, machine outcome or None}; `remapping` {the state's key: the machine's key};
@@ -55,12 +64,19 @@ class StateMachine(Container):
 
         Example: `StateMachine.add("A", A(), transitions={"ok": "B"}, remapping={"x": "count"})`.
         """
-        return StateMachine._currently_opened()._add(label, state, transitions, remapping, constants)
+        return StateMachine._currently_opened()._add(
+            label, state, transitions, remapping, constants
+        )
 
     @staticmethod
-    def add_auto(label: str, state: State, connector_outcomes: Iterable[str],
-                 transitions: Mapping[str, str | None] | None = None, remapping: Mapping[str, str] | None = None,
-                 constants: Mapping[str, Any] | None = None) -> State:
+    def add_auto(
+        label: str,
+        state: State,
+        connector_outcomes: Iterable[str],
+        transitions: Mapping[str, str | None] | None = None,
+        remapping: Mapping[str, str] | None = None,
+        constants: Mapping[str, Any] | None = None,
+    ) -> State:
         """As `add`; each connector outcome leads to whatever is added next.
 
         Raises InvalidStateError for a connector outcome that the state lacks.
@@ -72,25 +88,39 @@ class StateMachine(Container):
         outcomes = state.get_registered_outcomes()
         for outcome in connector_outcomes:
             if outcome not in outcomes:
-                raise InvalidStateError(f"state {label!r}: connector outcome {outcome!r} is not among its outcomes "
-                                        f"{list(outcomes)}")
+                raise InvalidStateError(
+                    f"state {label!r}: connector outcome {outcome!r} is not among its outcomes "
+                    f"{list(outcomes)}"
+                )
         machine._add(label, state, transitions, remapping, constants)
         machine._connector_label, machine._connector_outcomes = label, connector_outcomes
         return state
 
-    def _add(self, label: str, state: State, transitions: Mapping[str, str | None] | None = None,
-             remapping: Mapping[str, str] | None = None, constants: Mapping[str, Any] | None = None) -> State:
+    def _add(
+        self,
+        label: str,
+        state: State,
+        transitions: Mapping[str, str | None] | None = None,
+        remapping: Mapping[str, str] | None = None,
+        constants: Mapping[str, Any] | None = None,
+    ) -> State:
         self._check_new_child(label, state, self._states)
         outcomes = state.get_registered_outcomes()
         for outcome, target in (transitions or {}).items():
             if outcome not in outcomes:
-                raise InvalidTransitionError(f"state {label!r}: transition from {outcome!r}, which is not among its "
-                                             f"outcomes {list(outcomes)}")
+                raise InvalidTransitionError(
+                    f"state {label!r}: transition from {outcome!r}, which is not among its "
+                    f"outcomes {list(outcomes)}"
+                )
             if target is not None and not isinstance(target, str):
-                raise InvalidTransitionError(f"state {label!r}: transition from {outcome!r} to {target!r}; expected a "
-                                             f"label, an outcome of the machine, or None")
+                raise InvalidTransitionError(
+                    f"state {label!r}: transition from {outcome!r} to {target!r}; expected a "
+                    f"label, an outcome of the machine, or None"
+                )
         if self._connector_label is not None:
-            self._transitions[self._connector_label].update(dict.fromkeys(self._connector_outcomes, label))
+            self._transitions[self._connector_label].update(
+                dict.fromkeys(self._connector_outcomes, label)
+            )
             self._connector_label = None
         self._states[label] = state
         self._transitions[label] = {**dict.fromkeys(outcomes), **(transitions or {})}
@@ -106,7 +136,9 @@ class StateMachine(Container):
         try:
             return self._states[key]
         except KeyError:
-            raise KeyError(f"no state {key!r} in this machine; labels: {', '.join(self._states) or 'none'}") from None
+            raise KeyError(
+                f"no state {key!r} in this machine; labels: {', '.join(self._states) or 'none'}"
+            ) from None
 
     def get_children(self) -> dict[str, State]:
         """The states by label, in the order they were added. Example: `machine.get_children()`."""
@@ -116,14 +148,18 @@ class StateMachine(Container):
         """The label with which a run begins, as a list. Example: `machine.get_initial_states()`."""
         return [str(self._initial_state_label)]
 
-    def set_initial_state(self, initial_states: Sequence[str], userdata: UserData | None = None) -> None:
+    def set_initial_state(
+        self, initial_states: Sequence[str], userdata: UserData | None = None
+    ) -> None:
         """Begin with the first label given ([]: leave it), and merge `userdata`.
 
         Example: `machine.set_initial_state(["GRASP"])`. Labels are checked by `check_consistency`.
         """
         smach.logdebug(f"initial state set to {list(initial_states)}")
         if len(initial_states) > 1:
-            smach.logwarn(f"a state machine begins with one state; of {list(initial_states)} the first is taken")
+            smach.logwarn(
+                f"a state machine begins with one state; of {list(initial_states)} the first is taken"
+            )
         if len(initial_states) > 0:
             self._initial_state_label = initial_states[0]
         if userdata is not None:
@@ -135,8 +171,11 @@ class StateMachine(Container):
 
     def get_internal_edges(self) -> list[tuple[str, str, str | None]]:
         """(outcome, from, to) of every transition, None where it falls through. Example: see the name."""
-        return [(outcome, label, target) for label, transitions in self._transitions.items()
-                for outcome, target in transitions.items()]
+        return [
+            (outcome, label, target)
+            for label, transitions in self._transitions.items()
+            for outcome, target in transitions.items()
+        ]
 
     def check_consistency(self) -> None:
         """Raise InvalidTransitionError if there is nothing to begin with or a transition leads nowhere.
@@ -147,17 +186,25 @@ class StateMachine(Container):
         if not self._states:
             faults.append("there are no states in it")
         elif self._initial_state_label not in self._states:
-            faults.append(f"the initial state {self._initial_state_label!r} is not among its labels")
+            faults.append(
+                f"the initial state {self._initial_state_label!r} is not among its labels"
+            )
         for outcome, label, target in self.get_internal_edges():
             if target is None and outcome not in self._outcomes:
-                faults.append(f"outcome {outcome!r} of state {label!r} has no transition and is no outcome of the "
-                              f"machine")
+                faults.append(
+                    f"outcome {outcome!r} of state {label!r} has no transition and is no outcome of the "
+                    f"machine"
+                )
             elif target is not None and target not in self._states and target not in self._outcomes:
-                faults.append(f"outcome {outcome!r} of state {label!r} leads to {target!r}, which is neither a label "
-                              f"nor an outcome of the machine")
+                faults.append(
+                    f"outcome {outcome!r} of state {label!r} leads to {target!r}, which is neither a label "
+                    f"nor an outcome of the machine"
+                )
         if faults:
-            raise InvalidTransitionError(f"state machine cannot run: {'; '.join(faults)}. Labels: "
-                                         f"{list(self._states)}, outcomes: {list(self._outcomes)}")
+            raise InvalidTransitionError(
+                f"state machine cannot run: {'; '.join(faults)}. Labels: "
+                f"{list(self._states)}, outcomes: {list(self._outcomes)}"
+            )
 
     # Running.
 
@@ -182,10 +229,14 @@ class StateMachine(Container):
     def _execute(self, parent_ud: Any) -> str | None:
         label = self._current_label = str(self._initial_state_label)
         self._copy_input_keys(parent_ud, self._input_keys)
-        smach.loginfo(f"State machine starting in initial state '{label}' with user data {self.userdata.keys()}")
+        smach.loginfo(
+            f"State machine starting in initial state '{label}' with user data {self.userdata.keys()}"
+        )
         self.call_start_cbs()
         while not smach.is_shutdown():
             outcome = self._execute_state(label)
+            if outcome is None and smach.is_shutdown():
+                break  # an inner container that stopped for the same reason
             target = self._target(label, outcome)
             if target not in self._states:
                 smach.loginfo(f"State machine terminating '{label}':'{outcome}':'{target}'")
@@ -201,8 +252,12 @@ class StateMachine(Container):
         state = self._states[label]
         for key, value in self._constants[label].items():
             self.userdata[key] = value
-        ud = Remapper(self.userdata, state.get_registered_input_keys(), state.get_registered_output_keys(),
-                      self._remappings[label])
+        ud = Remapper(
+            self.userdata,
+            state.get_registered_input_keys(),
+            state.get_registered_output_keys(),
+            self._remappings[label],
+        )
         with self._preempt_lock:
             self._current_state = state
             self._current_told = self._preempt_requested and self._tell(label, state)
@@ -212,13 +267,17 @@ class StateMachine(Container):
             smach.logerr(f"... in state '{label}' ({type(state).__name__})")
             raise
         except Exception as error:
-            raise InvalidUserCodeError(f"state '{label}' ({type(state).__name__}) raised "
-                                       f"{type(error).__name__}: {error}\n{traceback.format_exc()}") from error
+            raise InvalidUserCodeError(
+                f"state '{label}' ({type(state).__name__}) raised "
+                f"{type(error).__name__}: {error}\n{traceback.format_exc()}"
+            ) from error
         finally:
             with self._preempt_lock:
                 self._current_state = None
                 if not self._take_back(label, state) and self._current_told:
-                    self._preempt_requested = False  # served below, so not for the next state nor for the parent
+                    self._preempt_requested = (
+                        False  # served below, so not for the next state nor for the parent
+                    )
                 self._current_told = False
 
     def _target(self, label: str, outcome: Any) -> str:
@@ -227,14 +286,20 @@ class StateMachine(Container):
             if outcome in transitions:
                 target = transitions[outcome]
                 return outcome if target is None else target
-            if outcome in self._states[label].get_registered_outcomes() and outcome in self._outcomes:
+            if (
+                outcome in self._states[label].get_registered_outcomes()
+                and outcome in self._outcomes
+            ):
                 return outcome  # registered after the state was added
         except TypeError:
             pass  # not even hashable
         raise InvalidTransitionError(
             f"state '{label}' ({type(self._states[label]).__name__}) returned {outcome!r}, which is not among its "
-            f"outcomes {list(self._states[label].get_registered_outcomes())}; does every path of its execute() return?")
+            f"outcomes {list(self._states[label].get_registered_outcomes())}; does every path of its execute() return?"
+        )
 
     def _forward_preempt(self) -> None:
-        if self._current_state is not None and self._tell(str(self._current_label), self._current_state):
+        if self._current_state is not None and self._tell(
+            str(self._current_label), self._current_state
+        ):
             self._current_told = True

@@ -128,8 +128,13 @@ class Remapper:
         view.y = view.x + 1       # ud.y = ud.count + 1
     """
 
-    def __init__(self, ud: UserData | Remapper, input_keys: Iterable[str] = (), output_keys: Iterable[str] = (),
-                 remapping: Mapping[str, str] | None = None) -> None:
+    def __init__(
+        self,
+        ud: UserData | Remapper,
+        input_keys: Iterable[str] = (),
+        output_keys: Iterable[str] = (),
+        remapping: Mapping[str, str] | None = None,
+    ) -> None:
         self._ud = ud
         self._input_keys = frozenset(input_keys)
         self._output_keys = frozenset(output_keys)
@@ -143,15 +148,18 @@ class Remapper:
             declared = ", ".join(sorted(map(repr, self._input_keys))) or "none"
             raise InvalidUserCodeError(
                 f"reading user data key {key!r}, which is not among this state's input keys ({declared}); "
-                f"add it to input_keys or io_keys")
+                f"add it to input_keys or io_keys"
+            )
         value = self._ud[self._remap(key)]
         return value if key in self._output_keys else const(value)
 
     def __setitem__(self, key: str, value: Any) -> None:
         if key not in self._output_keys:
             declared = ", ".join(sorted(map(repr, self._output_keys))) or "none"
-            smach.logerr(f"writing user data key {key!r} ignored: it is not among this state's output keys "
-                         f"({declared}); add it to output_keys or io_keys")
+            smach.logerr(
+                f"writing user data key {key!r} ignored: it is not among this state's output keys "
+                f"({declared}); add it to output_keys or io_keys"
+            )
             return
         self._ud[self._remap(key)] = value
 

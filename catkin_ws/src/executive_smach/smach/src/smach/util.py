@@ -18,8 +18,14 @@ class CBInterface:
         check.get_registered_output_keys()      # ('n',)
     """
 
-    def __init__(self, cb: Callable[..., Any], outcomes: Iterable[str] = (), input_keys: Iterable[str] = (),
-                 output_keys: Iterable[str] = (), io_keys: Iterable[str] = ()) -> None:
+    def __init__(
+        self,
+        cb: Callable[..., Any],
+        outcomes: Iterable[str] = (),
+        input_keys: Iterable[str] = (),
+        output_keys: Iterable[str] = (),
+        io_keys: Iterable[str] = (),
+    ) -> None:
         if not callable(cb):
             raise TypeError(f"CBInterface: expected a callable, got {type(cb).__name__}")
         self._cb = cb
@@ -36,7 +42,9 @@ class CBInterface:
         """A decorated method is bound like any other method."""
         if instance is None or not hasattr(self._cb, "__get__"):
             return self
-        return CBInterface(self._cb.__get__(instance, owner), self._outcomes, self._input_keys, self._output_keys)
+        return CBInterface(
+            self._cb.__get__(instance, owner), self._outcomes, self._input_keys, self._output_keys
+        )
 
     def get_registered_outcomes(self) -> tuple[str, ...]:
         """The declared outcomes. Example: `check.get_registered_outcomes()`."""
@@ -62,8 +70,13 @@ class cb_interface:  # noqa: N801  (used as a decorator)
             return "done"
     """
 
-    def __init__(self, outcomes: Iterable[str] | None = None, input_keys: Iterable[str] | None = None,
-                 output_keys: Iterable[str] | None = None, io_keys: Iterable[str] | None = None) -> None:
+    def __init__(
+        self,
+        outcomes: Iterable[str] | None = None,
+        input_keys: Iterable[str] | None = None,
+        output_keys: Iterable[str] | None = None,
+        io_keys: Iterable[str] | None = None,
+    ) -> None:
         self._interface = (outcomes or (), input_keys or (), output_keys or (), io_keys or ())
 
     def __call__(self, cb: Callable[..., Any]) -> CBInterface:
@@ -75,4 +88,6 @@ def has_smach_interface(obj: Any) -> bool:
 
     Example: `has_smach_interface(smach.State())` is True.
     """
-    return all(hasattr(obj, f"get_registered_{what}") for what in ("outcomes", "input_keys", "output_keys"))
+    return all(
+        hasattr(obj, f"get_registered_{what}") for what in ("outcomes", "input_keys", "output_keys")
+    )

@@ -109,7 +109,9 @@ class VirtualClock(Clock):
         """A new event. Example: `done = clock.event()`."""
         return VirtualEvent(self)
 
-    def start_thread(self, target: Callable[[], object], name: str, daemon: bool = False) -> threading.Thread:
+    def start_thread(
+        self, target: Callable[[], object], name: str, daemon: bool = False
+    ) -> threading.Thread:
         """Start a member thread; its turn comes before time goes on. Example: `clock.start_thread(f, "f").join()`."""
         body = in_current_context(target)
 
@@ -232,4 +234,5 @@ class VirtualClock(Clock):
             raise ClockStalled(
                 f"virtual time has stood still at {self._now:.6f} s for {self._stall_limit:g} s of wall time: {running} "
                 f"is running, {waiting} wait; a running thread must wait through the clock, and an event that "
-                f"is waited for without a time limit must be set by somebody")
+                f"is waited for without a time limit must be set by somebody"
+            )

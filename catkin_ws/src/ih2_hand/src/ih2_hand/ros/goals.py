@@ -63,7 +63,7 @@ class Running:
     task: Task
     begun: float
     begun_stamp: rospy.Time
-    fillers: int
+    fillers: int = 0
     resends: int = 0
     last_status: float = 0.0
 
@@ -165,18 +165,17 @@ class GoalQueue:
             return
         self._status = rospy.Subscriber(rospy.resolve_name("~hand_status"), HandStatus,
                                         self._on_status, queue_size=2, tcp_nodelay=True)
-        driver = self._owner.driver
         now = time.monotonic()
-        self._running = Running(name, handle, task, now, rospy.Time.now(),
-                                driver.counters.fillers if driver else 0, last_status=now)
+        self._running = Running(name, handle, task, now, rospy.Time.now(), last_status=now)
         self._begin(self._running)
 
     def _on_status(self, status: HandStatus) -> None:
         self._mailbox.put(Item("status", content=status))
 
     def _begin(self, running: Running) -> None:
-        running.task.begin(self._owner.connected_driver())
-        running.fillers = self._owner.connected_driver().counters.fillers
+        driver = self._owner.connected_driver()
+        running.fillers = driver.counters.fillers  # before: a stop during the command counts too
+        running.task.begin(driver)
         running.begun_stamp = rospy.Time.now()
         if not running.resends:
             running.begun = time.monotonic()

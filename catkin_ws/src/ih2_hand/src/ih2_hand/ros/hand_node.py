@@ -22,7 +22,6 @@ from ih2_hand.ros.diagnostics import Diagnostics
 from ih2_hand.ros.goals import GoalQueue
 from ih2_hand.ros.messages import joint_state, motor_status
 from ih2_hand.ros.tracing import TracePublisher
-from ih2_hand.transport import format_byte
 
 RECONNECT_S = 0.5
 """Pause between attempts to open the port."""
@@ -130,10 +129,9 @@ class HandNode:
             driver, self.driver = self.driver, None
         if driver is None:
             return
-        last = format_byte(driver.last_byte)
         driver.close()
         self.calibrated, self.holding, self._preshape = False, True, None
-        self.event(f"connection to {driver.port} lost (last byte {last}): {error}", warn=True)
+        self.event(f"connection lost: {error}", warn=True)
         self._publish([], rospy.Time.now())
 
     # -- polling ---------------------------------------------------------------------------------

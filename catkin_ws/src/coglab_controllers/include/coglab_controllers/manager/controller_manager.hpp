@@ -1,0 +1,119 @@
+/// @file
+/// The controller manager without ROS (D4.10, Table 6): loads, lists, switches, and runs the control cycle.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <vector>
+
+#include "coglab_controllers/manager/control_cycle.hpp"
+#include "coglab_controllers/manager/plugin_registry.hpp"
+
+namespace coglab_controllers {
+
+/// What a controller manager is made of. Everything but the robot has defaults.
+struct ManagerSettings {
+  std::shared_ptr<const RobotSetup> robot;
+  CycleSettings cycle;
+  /// Parameters of the plug-ins by their id, and those of the manager itself (see ControllerManager).
+  YAML::Node parameters;
+  /// Type name to library, for example coglab/DmpController: libcoglab_dmp_controller.so.
+  std::map<std::string, std::string> types;
+  std::vector<std::string> plugin_paths;   ///< folders of libraries that are given without a path
+  std::string feedback_file;               ///< list file of Ctrl-MORE; empty: no feedback controllers
+  double plan_timeout = 2.0;               ///< the longest that a request waits for the cycle, s
+  bool lockstep = false;                   ///< requests are adopted by the caller's own thread, nothing is timed
+  std::function<std::int64_t()> clock;     ///< time of the samples' stamps, ns; empty: the steady clock
+  ctrl_more::Logger* logger = nullptr;     ///< of feedback controllers; null: Logger::standard()
+};
+
+/// Reads the manager's own parameters: `cycle_time` (0.005 s), `sample_timeout`, `overrun_time` (s), `plan_timeout` (s),
+/// `speed_scale`, `types` (block: type -> library; the two of this package are known), `plugin_paths`, `feedback_file`, and those of
+/// makeRobotSetup(). @throws std::runtime_error naming the parameter
+ManagerSettings readManagerSettings(const YAML::Node& parameters, const std::string& urdf,
+                                    const lwr_fri_bridge::JointLimits& table, bool lockstep);
+
+/// One motion controller that is loaded.
+struct LoadedMotion {
+  std::string id, type;
+  std::shared_ptr<MotionLibrary> library;  ///< null for types linked into the program
+  std::unique_ptr<MotionController> controller;
+};
+
+/// Loads controllers and decides which one is active. Services call it from any thread; requests come one after another.
+/// The control thread uses cycle() alone.
+class ControllerManager : public MotionHost {
+ public:
+  explicit ControllerManager(ManagerSettings settings);
+  ~ControllerManager() override;
+  ControllerManager(const ControllerManager&) = delete;
+  ControllerManager& operator=(const ControllerManager&) = delete;
+
+  /// @name Requests of Table 6
+  /// @{
+
+  /// Loads a controller of a type under an id: a motion controller, or a feedback controller if the type is one of Ctrl-MORE's.
+  Answer load(const std::string& id, const std::string& type);
+  /// Ids and types of all loaded controllers, in load order; feedback controllers after motion controllers.
+  void list(std::vector<std::string>& ids, std::vector<std::string>& types) const;
+  /// Makes a motion controller the active one, and applies the feedback profile of its name. The one that is active already goes
+  /// on undisturbed, unless it is at fault: then it starts afresh.
+  Answer switchTo(const std::string& id, std::string& type);
+  /// Id and type of the active one; empty if there is none.
+  void active(std::string& id, std::string& type) const;
+  /// 0 (stand still) to 1.
+  Answer setSpeedScale(double scale);
+  /// @}
+
+  /// A loaded motion controller; null if the id is unknown. Valid as long as the manager.
+  MotionController* motion(const std::string& id);
+  /// Its type; empty if unknown.
+  std::string typeOf(const std::string& id) const;
+
+  ctrl_more::FeedbackControllersManager& feedback() { return feedback_.manager(); }
+  /// What the feedback list file could not load, one sentence each.
+  const std::vector<std::string>& feedbackErrors() const { return feedback_errors_; }
+  ControlCycle& cycle() { return cycle_; }
+  const ManagerSettings& settings() const { return settings_; }
+  /// The newest report of the cycle; any thread.
+  CycleReport report() const;
+  /// Name of the feedback profile applied last.
+  std::string profile() const;
+
+  // MotionHost
+  std::unique_lock<std::mutex> lockRequests() override {
+    return std::unique_lock<std::mutex>(requests_);
+  }
+  std::string motionRefusal(const std::string& controller_id) const override;
+  RobotSample robotSnapshot() const override { return report().robot; }
+  std::int64_t now_ns() const override;
+  std::function<void()> cycleWait() const override;
+  double planTimeout() const override { return settings_.plan_timeout; }
+
+  /// Sentence for a plan that the cycle did not adopt; names the controller whose code the cycle is in.
+  std::string notAdopted(PlanOutcome outcome) const override;
+
+ private:
+  Answer loadMotion(const std::string& id, const std::string& type);
+  Answer loadFeedback(const std::string& id, const std::string& type);
+  bool known(const std::string& id) const;
+  std::string loadedMotions() const;
+
+  ManagerSettings settings_;
+  FeedbackStage feedback_;
+  ControlCycle cycle_;
+  std::vector<std::string> feedback_errors_;
+
+  mutable std::mutex requests_;   // requests one after another
+  mutable std::mutex table_;      // the members below, for short
+  std::vector<std::unique_ptr<LoadedMotion>> motions_;
+  std::string active_id_, active_type_, profile_;
+  mutable std::mutex report_mutex_;
+  mutable CycleReport report_;
+};
+
+}  // namespace coglab_controllers

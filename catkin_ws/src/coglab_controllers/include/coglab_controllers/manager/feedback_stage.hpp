@@ -1,0 +1,53 @@
+/// @file
+/// Where Ctrl-MORE's feedback controllers meet the control cycle: the shared stores of the arm and their signals.
+#pragma once
+
+#include <cstdint>
+
+#include "coglab_controllers/manager/motion_controller.hpp"
+#include "ctrl_more/feedback_controllers_manager.hpp"
+#include "ctrl_more/robot_states.hpp"
+
+namespace coglab_controllers {
+
+/// The stores that all controllers of the arm share, and the feedback manager over them.
+///
+/// Signals. measuredData: `jointPosition` (rad), `jointVelocity` (rad/s), `jointTorque` (Nm), `externalTorque` (Nm), 7 each in wire
+/// order; `FT_tool` (N, Nm, tool frame, 6). estimatedData: `toolPose` (m, quaternion; base frame, 7), from the measured joints.
+/// References: taskSpaceReferencePose and taskSpaceReferenceVel `tool`; jointSpaceReference `Position` and `Velocity`.
+class FeedbackStage {
+ public:
+  /// @param period intended cycle time, s
+  /// @param lockstep simulated time: overruns of feedback controllers are not judged
+  /// @param logger where feedback controllers log; null: Logger::standard()
+  FeedbackStage(double period, bool lockstep, ctrl_more::Logger* logger = nullptr);
+
+  ctrl_more::FeedbackControllersManager& manager() { return manager_; }
+  const ctrl_more::FeedbackControllersManager& manager() const { return manager_; }
+  References& references() { return references_; }
+  const ctrl_more::RobotStates& robot() const { return robot_; }
+
+  /// @name In the cycle: no allocation, no lock
+  /// @{
+
+  /// Adopts the newest plan of the feedback manager; called once per cycle, idle ones included.
+  void begin(std::int64_t now_ns, double dt) noexcept;
+  /// Step 2: measurement to robot states. False if a number is not finite (then nothing was written).
+  bool fill(const CycleInput& input) noexcept;
+  /// Steps 4 and 6.
+  void run(ctrl_more::Stage stage) noexcept {
+    manager_.updateStage(stage, robot_, references_.states);
+  }
+  /// Closes the cycle.
+  void end() noexcept { manager_.endCycle(); }
+  /// @}
+
+ private:
+  ctrl_more::RobotStates robot_;
+  References references_;
+  ctrl_more::RobotSignal position_, velocity_, torque_, external_, wrench_, pose_;
+  ctrl_more::FeedbackControllersManager manager_;
+  std::uint64_t number_ = 0;
+};
+
+}  // namespace coglab_controllers

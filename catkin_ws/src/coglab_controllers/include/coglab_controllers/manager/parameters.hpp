@@ -1,0 +1,43 @@
+/// @file
+/// Checked reading of parameters, which come from ROS or from a YAML file alike.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include <yaml-cpp/yaml.h>
+
+#include "coglab_controllers/kinematics/types.hpp"
+
+namespace coglab_controllers {
+
+/// One block of parameters. Every read names its default and its range; what does not fit is refused with
+/// std::runtime_error: "parameter <block>/<name>: expected …, got …". Not for the control cycle.
+class Parameters {
+ public:
+  /// @param node a map, or nothing at all.  @param block what to call it in messages
+  Parameters(const YAML::Node& node, std::string block);
+
+  bool has(const std::string& name) const;
+  double number(const std::string& name, double fallback, double least, double most) const;
+  int whole(const std::string& name, int fallback, int least, int most) const;
+  bool flag(const std::string& name, bool fallback) const;
+  std::string text(const std::string& name, const std::string& fallback) const;
+  /// A text that must be one of `allowed`.
+  std::string choice(const std::string& name, const std::string& fallback,
+                     const std::vector<std::string>& allowed) const;
+  std::vector<std::string> texts(const std::string& name) const;
+  /// Exactly `size` finite numbers.
+  Eigen::VectorXd numbers(const std::string& name, const Eigen::VectorXd& fallback) const;
+  /// A block inside this one; empty if there is none.
+  Parameters block(const std::string& name) const;
+  const YAML::Node& node() const { return node_; }
+
+ private:
+  [[noreturn]] void refuse(const std::string& name, const std::string& expected) const;
+
+  YAML::Node node_;
+  std::string block_;
+};
+
+}  // namespace coglab_controllers

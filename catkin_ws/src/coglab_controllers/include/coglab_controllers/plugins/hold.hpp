@@ -1,0 +1,74 @@
+/// @file
+/// What a motion controller does between motions: brake, then stand exactly still, open to feedback controllers.
+#pragma once
+
+#include "coglab_controllers/manager/motion_controller.hpp"
+
+namespace coglab_controllers {
+
+/// Fades a difference away, so that a motion that begins somewhere else than measured begins without a step.
+///
+/// References begin at the commanded state, and loops close on the measured one. At the start of a motion the difference of
+/// the two counts as no error; it becomes one within about `blend` seconds.
+class StartBlend {
+ public:
+  /// @param blend time constant, s
+  void setTime(double blend) { blend_ = blend; }
+  void begin(const Vector3& position, const Vector3& rotation, const JointVector& joints) noexcept {
+    position_ = position;
+    rotation_ = rotation;
+    joints_ = joints;
+  }
+  void advance(double dt) noexcept;
+  const Vector3& position() const noexcept { return position_; }  ///< m
+  const Vector3& rotation() const noexcept { return rotation_; }  ///< rad, rotation vector
+  const JointVector& joints() const noexcept { return joints_; }  ///< rad
+
+ private:
+  double blend_ = 0.15;
+  Vector3 position_ = Vector3::Zero(), rotation_ = Vector3::Zero();
+  JointVector joints_ = JointVector::Zero();
+};
+
+/// Zero velocity, so that the arm brakes within its limits; once it stands, the commanded posture is remembered as the reference. If
+/// feedback controllers leave the reference alone, the velocity is exactly zero; if they move it, the hand follows.
+/// No allocation, no throw.
+class Hold {
+ public:
+  /// Another hold begins: the arm may still be moving.
+  void begin() noexcept { latched_ = false; }
+
+  /// Writes pose, zero twist, joint position and zero joint velocity.
+  void computeReference(const CycleInput& input, const Chain& chain, References& references) noexcept;
+
+  /// @param solve makes joint velocities from a chain state, joints and a Cartesian reference: (const ChainState&, const
+  ///        JointVector&, const CartesianReference&) -> JointVector
+  template <typename Solve>
+  void resolve(const CycleInput& input, References& references, Solve&& solve) noexcept {
+    if (!moved(references)) return;  // joint velocity stays zero
+    CartesianReference reference;
+    const auto pose = references.states.view<7>(references.pose);
+    reference.pose.position = pose.head<3>();
+    reference.pose.orientation = Quaternion(pose[6], pose[3], pose[4], pose[5]);
+    const auto twist = references.states.view<6>(references.twist);
+    reference.velocity = twist.head<3>();
+    reference.angular_velocity = twist.tail<3>();
+    references.states.view<kMaxJoints>(references.joint_velocity) =
+        solve(commanded_, input.robot.commanded_position, reference);
+  }
+
+ private:
+  bool moved(const References& references) const noexcept;
+
+  bool latched_ = false;
+  ChainState commanded_;  // kinematics at the commanded joints
+  Eigen::Matrix<double, 7, 1> pose_ = Eigen::Matrix<double, 7, 1>::Zero();
+  JointVector joints_ = JointVector::Zero();
+};
+
+/// Pose of a reference as the stores keep it.
+inline void writePose(References& references, const Pose& pose) noexcept {
+  references.states.view<7>(references.pose) << pose.position, pose.orientation.coeffs();
+}
+
+}  // namespace coglab_controllers

@@ -1,0 +1,259 @@
+#include "coglab_controllers/manager/control_cycle.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <exception>
+#include <utility>
+
+namespace coglab_controllers {
+
+namespace {
+
+std::int64_t steadyNow() {
+  return std::chrono::duration_cast<std::chrono::nanoseconds>(
+             std::chrono::steady_clock::now().time_since_epoch())
+      .count();
+}
+
+bool finite(const RobotSample& sample) {
+  return sample.position.allFinite() && sample.velocity.allFinite() && sample.torque.allFinite() &&
+         sample.external_torque.allFinite() && sample.tool_wrench.allFinite() &&
+         sample.commanded_position.allFinite() && sample.commanded_velocity.allFinite();
+}
+
+}  // namespace
+
+const char* nameOf(MotionState state) {
+  switch (state) {
+    case MotionState::Idle: return "idle";
+    case MotionState::Running: return "running";
+    case MotionState::Holding: return "holding";
+    case MotionState::Reached: return "reached";
+    case MotionState::Aborted: return "aborted";
+  }
+  return "unknown";
+}
+
+const char* nameOf(ManagerState state) {
+  switch (state) {
+    case ManagerState::Idle: return "idle";
+    case ManagerState::Running: return "running";
+    case ManagerState::Holding: return "holding";
+    case ManagerState::Fault: return "fault";
+  }
+  return "unknown";
+}
+
+ControlCycle::ControlCycle(std::shared_ptr<const RobotSetup> robot, FeedbackStage& feedback,
+                           const CycleSettings& settings)
+    : robot_(std::move(robot)),
+      feedback_(feedback),
+      settings_(settings),
+      guard_(robot_->guard, robot_->chain) {
+  input_.dt = settings_.cycle_time;
+}
+
+/// Runs a plug-in's code; what it throws ends here. Catching costs nothing until something is thrown.
+template <typename Call>
+bool ControlCycle::guarded(const char* what, Call&& call) noexcept {
+  in_plugin_.store(true, std::memory_order_relaxed);
+  bool fine = true;
+  try {
+    call();
+  } catch (const std::exception& error) {
+    fine = false;
+    fault(Reason("controller '") << id_.c_str() << "' threw in " << what << ": " << error.what());
+  } catch (...) {
+    fine = false;
+    fault(Reason("controller '") << id_.c_str() << "' threw in " << what);
+  }
+  in_plugin_.store(false, std::memory_order_relaxed);
+  return fine;
+}
+
+void ControlCycle::fault(const Reason& reason) noexcept {
+  if (fault_) return;
+  fault_ = true;
+  fault_reason_ = reason;
+  ++report_.faults;
+  // Its state may be anything now; it is told to give up, and what it does then no longer counts.
+  guarded("abort", [this] { motion_->abort(fault_reason_); });
+}
+
+void ControlCycle::abortMotion(const Reason& reason) noexcept {
+  if (motion_ != nullptr && !fault_) {
+    guarded("abort", [this, &reason] { motion_->abort(reason); });
+  }
+}
+
+void ControlCycle::adopt() noexcept {
+  if (const CyclePlan* plan = plans_.take()) {
+    if (motion_ != nullptr) guarded("stop", [this] { motion_->stop(); });
+    motion_ = plan->motion;
+    id_ = plan->id;
+    fault_ = false;
+    fault_reason_.clear();
+    overruns_in_row_ = 0;
+    guard_.reset();
+    if (motion_ != nullptr) guarded("start", [this] { motion_->start(input_); });
+    plans_.acknowledge();
+  }
+  if (motion_ != nullptr && !fault_) guarded("adopt", [this] { motion_->adopt(input_); });
+}
+
+bool ControlCycle::usable(const RobotSample& sample, double dt) noexcept {
+  input_reason_.clear();
+  if (!finite(sample)) {
+    input_reason_ = Reason("the joint state holds a number that is not finite");
+  } else if (!(dt > 0.0)) {
+    input_reason_ = Reason("the joint state is not newer than the last one");
+  } else if (dt > settings_.sample_timeout) {
+    input_reason_ = Reason("no joint state for ") << dt << " s";
+  }
+  return input_reason_.empty();
+}
+
+void ControlCycle::watchRobot() noexcept {
+  const RobotSample& sample = input_.robot;
+  const bool aborted = numbers_ > 0 && sample.motion_epoch != report_.robot.motion_epoch;
+  if (!aborted && input_.motion_allowed) return;
+  if (motion_ == nullptr || fault_) return;
+  const MotionState state = motion_->state();
+  const bool moving = state == MotionState::Running || state == MotionState::Holding;
+  if (moving || (aborted && state == MotionState::Reached)) {
+    abortMotion(Reason("the robot stopped the motion: ")
+                << (input_.motion_allowed ? "it left command mode for a moment"
+                                          : lwr_fri_bridge::describe(sample.block)));
+  }
+}
+
+void ControlCycle::compute(JointVector& velocity) noexcept {
+  References& references = feedback_.references();
+  references.states.view<kMaxJoints>(references.joint_velocity).setZero();
+  if (motion_ == nullptr || fault_) return;
+  const std::int64_t begin = settings_.overrun_time > 0.0 ? steadyNow() : 0;
+  if (!guarded("computeReference", [&] { motion_->computeReference(input_, references); })) return;
+  feedback_.run(ctrl_more::Stage::Task);
+  if (!guarded("resolve", [&] { motion_->resolve(input_, references); })) return;
+  if (settings_.overrun_time > 0.0) {
+    const double taken = 1e-9 * static_cast<double>(steadyNow() - begin);
+    overruns_in_row_ = taken > settings_.overrun_time ? overruns_in_row_ + 1 : 0;
+    if (overruns_in_row_ > 0) ++report_.overruns;
+    if (overruns_in_row_ >= settings_.overruns_to_fault) {
+      fault(Reason("controller '") << id_.c_str() << "' was too slow " << overruns_in_row_ * 1.0
+                                   << " times in a row: " << taken * 1e3 << " ms, allowed "
+                                   << settings_.overrun_time * 1e3 << " ms");
+      return;
+    }
+  }
+  if (!references.states.view<kMaxJoints>(references.joint_velocity).allFinite()) {
+    fault(Reason("controller '") << id_.c_str() << "' gave a velocity that is not finite");
+    return;
+  }
+  feedback_.run(ctrl_more::Stage::Joint);
+  velocity = references.states.view<kMaxJoints>(references.joint_velocity);
+}
+
+void ControlCycle::run(const RobotSample& sample, double dt, VelocityCommand& out) noexcept {
+  heartbeat_.fetch_add(1, std::memory_order_relaxed);
+  const std::int64_t begin = settings_.overrun_time > 0.0 ? steadyNow() : 0;
+  const bool fine = usable(sample, dt);
+  if (fine) {
+    input_.robot = sample;
+    input_.dt = dt;
+    robot_->chain.evaluate(sample.position, input_.chain);
+  }
+  input_.motion_allowed = fine && sample.block == lwr_fri_bridge::MotionBlock::None;
+  input_.time_scale = governor_.update(fine ? dt : settings_.cycle_time, speedScale(), limit_scale_);
+  feedback_.begin(sample.stamp_ns, input_.dt);
+  JointVector velocity = JointVector::Zero();
+  limit_scale_ = 1.0;
+  report_.guard = GuardResult();
+  if (fine) {
+    feedback_.fill(input_);
+    watchRobot();
+  }
+  adopt();
+  if (fine) {
+    compute(velocity);
+    guard_.limit(input_.chain, sample.position, velocity, dt, report_.guard);
+    const MotionState state =
+        motion_ != nullptr && !fault_ ? motion_->state() : MotionState::Idle;
+    if (state == MotionState::Running || state == MotionState::Holding) {
+      limit_scale_ = std::clamp(motion_->limitScale() * report_.guard.scale, 0.0, 1.0);
+      if (report_.guard.blocked_joint >= 0) {
+        abortMotion(Reason("joint ")
+                    << robot_->chain.jointNames()[report_.guard.blocked_joint].c_str()
+                    << " is at its stop and blocks the motion");
+      }
+    }
+    ++numbers_;
+  } else {
+    ++report_.stale;
+  }
+  feedback_.end();
+  out.velocity = fine ? report_.guard.velocity : JointVector::Zero();
+  out.stamp_ns = sample.stamp_ns;
+  out.motion_epoch = sample.motion_epoch;
+  report_.velocity = out.velocity;
+  ++report_.samples;
+  publish(begin);
+}
+
+void ControlCycle::idle(std::int64_t now_ns) noexcept {
+  heartbeat_.fetch_add(1, std::memory_order_relaxed);
+  const std::int64_t begin = settings_.overrun_time > 0.0 ? steadyNow() : 0;
+  input_.motion_allowed = false;
+  input_.time_scale = governor_.rate();
+  feedback_.begin(now_ns, settings_.cycle_time);
+  const double silent = 1e-9 * static_cast<double>(now_ns - input_.robot.stamp_ns);
+  if (numbers_ > 0 && silent > settings_.sample_timeout) {
+    input_reason_ = Reason("no joint state for more than ") << settings_.sample_timeout << " s";
+    const MotionState state =
+        motion_ != nullptr && !fault_ ? motion_->state() : MotionState::Idle;
+    if (state == MotionState::Running || state == MotionState::Holding) abortMotion(input_reason_);
+  }
+  adopt();
+  feedback_.end();
+  report_.velocity.setZero();
+  publish(begin);
+}
+
+void ControlCycle::publish(std::int64_t begin_ns) noexcept {
+  ++report_.cycles;
+  report_.generation = plans_.generation();
+  report_.active = id_;
+  report_.fault = fault_;
+  report_.motion = motion_ != nullptr && !fault_ ? motion_->state() : MotionState::Idle;
+  report_.time_scale = input_.time_scale;
+  report_.speed_scale = speedScale();
+  report_.robot = input_.robot;
+  report_.dt = input_.dt;
+  report_.state = ManagerState::Idle;
+  if (fault_) {
+    report_.state = ManagerState::Fault;
+  } else if (report_.motion == MotionState::Running) {
+    report_.state = ManagerState::Running;
+  } else if (report_.motion == MotionState::Holding) {
+    report_.state = ManagerState::Holding;
+  }
+  report_.reason.clear();
+  if (fault_) {
+    report_.reason = fault_reason_;
+  } else if (!input_reason_.empty()) {
+    report_.reason = input_reason_;
+  } else if (motion_ != nullptr && !motion_->reason().empty()) {
+    report_.reason = motion_->reason();
+  } else if (numbers_ == 0) {
+    report_.reason = Reason("no joint state from the robot yet");
+  } else if (!input_.motion_allowed) {
+    report_.reason = Reason(lwr_fri_bridge::describe(input_.robot.block));
+  }
+  if (begin_ns != 0) {
+    report_.duration = 1e-9 * static_cast<double>(steadyNow() - begin_ns);
+    report_.longest = std::max(report_.longest, report_.duration);
+  }
+  reports_.write(report_);
+}
+
+}  // namespace coglab_controllers

@@ -1,0 +1,310 @@
+#include "coglab_controllers/manager/controller_manager.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <stdexcept>
+#include <utility>
+
+namespace coglab_controllers {
+
+namespace {
+
+std::string joined(const std::vector<std::string>& words) {
+  std::string text;
+  for (const std::string& word : words) text += (text.empty() ? "" : ", ") + word;
+  return text.empty() ? "none" : text;
+}
+
+bool validId(const std::string& id) {
+  if (id.empty() || id.size() > 48) return false;
+  if (std::isalpha(static_cast<unsigned char>(id[0])) == 0) return false;
+  return std::all_of(id.begin(), id.end(), [](unsigned char letter) {
+    return std::isalnum(letter) != 0 || letter == '_';
+  });
+}
+
+}  // namespace
+
+ManagerSettings readManagerSettings(const YAML::Node& node, const std::string& urdf,
+                                    const lwr_fri_bridge::JointLimits& table, bool lockstep) {
+  const Parameters parameters(node, "controller_manager");
+  ManagerSettings settings;
+  settings.parameters = node;
+  settings.lockstep = lockstep;
+  settings.robot = makeRobotSetup(urdf, table, parameters);
+  CycleSettings& cycle = settings.cycle;
+  cycle.cycle_time = parameters.number("cycle_time", cycle.cycle_time, 0.0005, 0.1);
+  cycle.sample_timeout = parameters.number("sample_timeout", cycle.sample_timeout, 0.005, 5.0);
+  cycle.overrun_time =
+      lockstep ? 0.0 : parameters.number("overrun_time", cycle.cycle_time, 0.0, 10.0);
+  settings.plan_timeout = parameters.number("plan_timeout", settings.plan_timeout, 0.05, 30.0);
+  settings.types = {{"coglab/DmpController", "libcoglab_dmp_controller.so"},
+                    {"coglab/PtpController", "libcoglab_ptp_controller.so"}};
+  const Parameters types = parameters.block("types");
+  if (types.node().IsDefined() && types.node().IsMap()) {
+    for (const auto& entry : types.node()) {
+      const std::string package = entry.first.as<std::string>();
+      if (entry.second.IsScalar()) {
+        settings.types[package] = entry.second.as<std::string>();
+      } else {  // a slash in a ROS parameter's name makes a block of it
+        for (const auto& inner : entry.second) {
+          settings.types[package + "/" + inner.first.as<std::string>()] =
+              inner.second.as<std::string>();
+        }
+      }
+    }
+  }
+  settings.plugin_paths = parameters.texts("plugin_paths");
+  settings.feedback_file = parameters.text("feedback_file", "");
+  return settings;
+}
+
+ControllerManager::ControllerManager(ManagerSettings settings)
+    : settings_(std::move(settings)),
+      feedback_(settings_.cycle.cycle_time, settings_.lockstep, settings_.logger),
+      cycle_(settings_.robot, feedback_, settings_.cycle) {
+  if (std::function<void()> wait = cycleWait()) cycle_.plans().setWait(wait);
+  const Parameters parameters(settings_.parameters, "controller_manager");
+  cycle_.setSpeedScale(parameters.number("speed_scale", 1.0, 0.0, 1.0));
+  if (!settings_.feedback_file.empty()) {
+    feedback_errors_ = feedback_.manager().load(settings_.feedback_file).errors;
+  }
+}
+
+ControllerManager::~ControllerManager() = default;
+
+std::int64_t ControllerManager::now_ns() const {
+  if (settings_.clock) return settings_.clock();
+  return std::chrono::duration_cast<std::chrono::nanoseconds>(
+             std::chrono::steady_clock::now().time_since_epoch())
+      .count();
+}
+
+std::function<void()> ControllerManager::cycleWait() const {
+  if (!settings_.lockstep) return {};
+  // Nobody else runs the cycle: the caller's thread adopts, between two cycles.
+  ControllerManager* const self = const_cast<ControllerManager*>(this);
+  return [self] { self->cycle_.idle(self->now_ns()); };
+}
+
+bool ControllerManager::known(const std::string& id) const {
+  return std::any_of(motions_.begin(), motions_.end(),
+                     [&id](const auto& motion) { return motion->id == id; });
+}
+
+std::string ControllerManager::loadedMotions() const {
+  std::vector<std::string> ids;
+  for (const auto& motion : motions_) ids.push_back(motion->id);
+  return joined(ids);
+}
+
+Answer ControllerManager::load(const std::string& id, const std::string& type) {
+  const std::lock_guard<std::mutex> requests(requests_);
+  if (!validId(id)) {
+    return Answer::refusal("controller_id '" + id +
+                           "': expected up to 48 letters, digits and '_', beginning with a letter");
+  }
+  {
+    const std::lock_guard<std::mutex> lock(table_);
+    if (known(id) || feedback_.manager().has(id)) {
+      return Answer::refusal("controller_id '" + id +
+                             "' is in use; choose another id, or go on with the loaded one");
+    }
+  }
+  const bool motion = settings_.types.count(type) != 0 || MotionTypes::instance().find(type);
+  return motion ? loadMotion(id, type) : loadFeedback(id, type);
+}
+
+Answer ControllerManager::loadMotion(const std::string& id, const std::string& type) {
+  try {
+    auto loaded = std::make_unique<LoadedMotion>();
+    loaded->id = id;
+    loaded->type = type;
+    const auto place = settings_.types.find(type);
+    if (place != settings_.types.end()) {
+      loaded->library = MotionLibrary::open(findLibrary(place->second, settings_.plugin_paths));
+    }
+    const MotionMaker* maker = MotionTypes::instance().find(type);
+    if (maker == nullptr) {
+      return Answer::refusal("library '" + loaded->library->path() + "' has no type '" + type +
+                             "'; it has: " + joined(loaded->library->types()));
+    }
+    loaded->controller.reset(maker->controller());
+    MotionSetup setup;
+    setup.id = id;
+    setup.parameters = Parameters(settings_.parameters, "controller_manager").block(id).node();
+    setup.robot = settings_.robot;
+    setup.host = this;
+    loaded->controller->configure(setup);
+    const std::lock_guard<std::mutex> lock(table_);
+    motions_.push_back(std::move(loaded));
+    return {};
+  } catch (const std::exception& error) {
+    return Answer::refusal("controller '" + id + "' of type '" + type +
+                           "' was not loaded: " + error.what());
+  } catch (...) {
+    return Answer::refusal("controller '" + id + "' of type '" + type +
+                           "' was not loaded: its code threw something that is no std::exception");
+  }
+}
+
+Answer ControllerManager::loadFeedback(const std::string& id, const std::string& type) {
+  std::vector<std::string> types;
+  for (const auto& entry : settings_.types) types.push_back(entry.first);
+  try {
+    ctrl_more::ControllerEntry entry;
+    entry.type = type;
+    entry.library = ctrl_more::SearchPath("", settings_.plugin_paths).findLibraryOf(type);
+    const ctrl_more::Status status = feedback_.manager().loadController(id, entry);
+    if (!status.ok()) return Answer::refusal(status.message());
+    return {};
+  } catch (const std::exception& error) {
+    return Answer::refusal("controller_type '" + type + "' is unknown; motion controllers: " +
+                           joined(types) + "; as a feedback controller: " + error.what());
+  }
+}
+
+void ControllerManager::list(std::vector<std::string>& ids, std::vector<std::string>& types) const {
+  ids.clear();
+  types.clear();
+  {
+    const std::lock_guard<std::mutex> lock(table_);
+    for (const auto& motion : motions_) {
+      ids.push_back(motion->id);
+      types.push_back(motion->type);
+    }
+  }
+  const ctrl_more::FeedbackControllersManager& feedback = feedback_.manager();
+  for (const std::string& name : feedback.getControllersNames()) {
+    ids.push_back(name);
+    types.push_back(feedback.status(name).type);
+  }
+}
+
+Answer ControllerManager::switchTo(const std::string& id, std::string& type) {
+  const std::lock_guard<std::mutex> requests(requests_);
+  auto plan = std::make_unique<CyclePlan>();
+  {
+    const std::lock_guard<std::mutex> lock(table_);
+    const auto found = std::find_if(motions_.begin(), motions_.end(),
+                                    [&id](const auto& motion) { return motion->id == id; });
+    if (found == motions_.end()) {
+      if (feedback_.manager().has(id)) {
+        return Answer::refusal("'" + id + "' is a feedback controller: use feedback/enable; motion "
+                               "controllers: " + loadedMotions());
+      }
+      return Answer::refusal("controller_id '" + id + "' is not loaded; loaded: " +
+                             loadedMotions() + "; use load_controller first");
+    }
+    type = (*found)->type;
+    if (id == active_id_ && !report().fault) return {true, "'" + id + "' is active already"};
+    plan->motion = (*found)->controller.get();
+    plan->id << id.c_str();
+  }
+  ctrl_more::FeedbackControllersManager& feedback = feedback_.manager();
+  std::string note;
+  if (feedback.hasProfile(id)) {
+    const ctrl_more::Status status = feedback.applyProfile(id, true);
+    if (!status.ok()) return Answer::refusal(status.message());
+  } else if (!feedback.getControllersNames().empty()) {
+    ctrl_more::Change change;
+    feedback.apply(change.motionSwitched());
+    note = "no feedback profile of this name: feedback controllers stay as they are";
+  }
+  const PlanOutcome outcome = cycle_.plans().offer(std::move(plan), settings_.plan_timeout);
+  if (outcome == PlanOutcome::Withdrawn) return Answer::refusal(notAdopted(outcome));
+  if (outcome == PlanOutcome::Taken) note = notAdopted(outcome);
+  const std::lock_guard<std::mutex> lock(table_);
+  active_id_ = id;
+  active_type_ = type;
+  if (feedback.hasProfile(id)) profile_ = id;
+  return {true, note};
+}
+
+void ControllerManager::active(std::string& id, std::string& type) const {
+  const std::lock_guard<std::mutex> lock(table_);
+  id = active_id_;
+  type = active_type_;
+}
+
+Answer ControllerManager::setSpeedScale(double scale) {
+  if (!std::isfinite(scale) || scale < 0.0 || scale > 1.0) {
+    return Answer::refusal("speed_scale " + std::to_string(scale) +
+                           ": expected 0 (stand still) to 1 (as planned)");
+  }
+  cycle_.setSpeedScale(scale);
+  return {};
+}
+
+MotionController* ControllerManager::motion(const std::string& id) {
+  const std::lock_guard<std::mutex> lock(table_);
+  for (const auto& motion : motions_) {
+    if (motion->id == id) return motion->controller.get();
+  }
+  return nullptr;
+}
+
+std::string ControllerManager::typeOf(const std::string& id) const {
+  const std::lock_guard<std::mutex> lock(table_);
+  for (const auto& motion : motions_) {
+    if (motion->id == id) return motion->type;
+  }
+  return "";
+}
+
+CycleReport ControllerManager::report() const {
+  const std::lock_guard<std::mutex> lock(report_mutex_);
+  const_cast<ControlCycle&>(cycle_).readReport(report_);
+  return report_;
+}
+
+std::string ControllerManager::profile() const {
+  const std::lock_guard<std::mutex> lock(table_);
+  return profile_;
+}
+
+std::string ControllerManager::motionRefusal(const std::string& controller_id) const {
+  std::string id, type;
+  active(id, type);
+  if (id != controller_id) {
+    return "controller '" + controller_id + "' is not active; active is " +
+           (id.empty() ? "none" : "'" + id + "'") + "; call switch_controller with '" +
+           controller_id + "' first";
+  }
+  const CycleReport now = report();
+  if (now.fault) {
+    return "controller '" + controller_id + "' is at fault: " + now.reason.str() +
+           "; call switch_controller with '" + controller_id + "' to start it afresh";
+  }
+  if (now.samples == 0) {
+    return "no joint state from the robot yet; start the robot's interface first";
+  }
+  const double age = 1e-9 * static_cast<double>(now_ns() - now.robot.stamp_ns);
+  if (age > settings_.cycle.sample_timeout) {
+    return "the newest joint state is " + std::to_string(age) + " s old; allowed: " +
+           std::to_string(settings_.cycle.sample_timeout) + " s";
+  }
+  if (now.robot.block != lwr_fri_bridge::MotionBlock::None) {
+    return std::string("the robot follows no motion now: ") +
+           lwr_fri_bridge::describe(now.robot.block) +
+           "; see lwr/state, then use lwr/command (reset, start)";
+  }
+  return "";
+}
+
+std::string ControllerManager::notAdopted(PlanOutcome outcome) const {
+  std::string id, type;
+  active(id, type);
+  const std::string who = cycle_.inPlugin()
+                              ? "controller '" + id + "' has not returned from its code"
+                              : "the control cycle does not run";
+  const std::string limit = std::to_string(settings_.plan_timeout) + " s";
+  if (outcome == PlanOutcome::Taken) {
+    return "the control cycle took the request but did not confirm it within " + limit + ": " + who;
+  }
+  return "the control cycle did not take the request within " + limit + ": " + who +
+         "; the request was withdrawn and has no effect";
+}
+
+}  // namespace coglab_controllers

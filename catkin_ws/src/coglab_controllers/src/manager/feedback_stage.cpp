@@ -1,0 +1,83 @@
+#include "coglab_controllers/manager/feedback_stage.hpp"
+
+#include <stdexcept>
+#include <string>
+
+namespace coglab_controllers {
+
+namespace {
+
+ctrl_more::RobotSignal declare(ctrl_more::RobotStates& store, ctrl_more::RobotSource source,
+                               const std::string& key, int size, const std::string& unit,
+                               const std::string& frame) {
+  const ctrl_more::Status status = store.declare(source, key, size, unit, frame);
+  if (!status.ok()) throw std::logic_error(status.message());
+  return store.find(source, key);
+}
+
+ctrl_more::ControlSignal declare(ctrl_more::ControlStates& store,
+                                 ctrl_more::ControlContainer container, const std::string& key,
+                                 int size, const std::string& unit, const std::string& frame) {
+  const ctrl_more::Status status = store.declare(container, key, size, unit, frame);
+  if (!status.ok()) throw std::logic_error(status.message());
+  return store.find(container, key);
+}
+
+ctrl_more::ManagerOptions options(bool lockstep) {
+  ctrl_more::ManagerOptions options;
+  options.timed = !lockstep;
+  options.lockstep = lockstep;
+  return options;
+}
+
+References makeReferences(double period, ctrl_more::Logger* logger) {
+  using ctrl_more::ControlContainer;
+  References references;
+  references.states = ctrl_more::ControlStates(kMaxJoints, period, logger);
+  ctrl_more::ControlStates& states = references.states;
+  references.pose = declare(states, ControlContainer::TaskSpaceReferencePose, "tool", 7,
+                            "m, quaternion x y z w", "base");
+  references.twist =
+      declare(states, ControlContainer::TaskSpaceReferenceVel, "tool", 6, "m/s, rad/s", "base");
+  references.joint_position = declare(states, ControlContainer::JointSpaceReference, "Position",
+                                      kMaxJoints, "rad", "joints in wire order");
+  references.joint_velocity = declare(states, ControlContainer::JointSpaceReference, "Velocity",
+                                      kMaxJoints, "rad/s", "joints in wire order");
+  references.states.view<7>(references.pose) << 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0;
+  return references;
+}
+
+}  // namespace
+
+FeedbackStage::FeedbackStage(double period, bool lockstep, ctrl_more::Logger* logger)
+    : robot_(logger),
+      references_(makeReferences(period, logger)),
+      manager_(robot_, references_.states, options(lockstep), logger) {
+  using ctrl_more::RobotSource;
+  const std::string wire = "joints in wire order";
+  position_ = declare(robot_, RobotSource::Measured, "jointPosition", kMaxJoints, "rad", wire);
+  velocity_ = declare(robot_, RobotSource::Measured, "jointVelocity", kMaxJoints, "rad/s", wire);
+  torque_ = declare(robot_, RobotSource::Measured, "jointTorque", kMaxJoints, "Nm", wire);
+  external_ = declare(robot_, RobotSource::Measured, "externalTorque", kMaxJoints, "Nm", wire);
+  wrench_ = declare(robot_, RobotSource::Measured, "FT_tool", 6, "N, Nm", "tool");
+  pose_ = declare(robot_, RobotSource::Estimated, "toolPose", 7, "m, quaternion x y z w", "base");
+}
+
+void FeedbackStage::begin(std::int64_t now_ns, double dt) noexcept {
+  manager_.beginCycle(ctrl_more::Cycle{now_ns, dt, ++number_});
+}
+
+bool FeedbackStage::fill(const CycleInput& input) noexcept {
+  const RobotSample& sample = input.robot;
+  const std::int64_t stamp = sample.stamp_ns;
+  Eigen::Matrix<double, 7, 1> pose;
+  pose << input.chain.tool.position, input.chain.tool.orientation.coeffs();
+  return robot_.write(position_, sample.position.data(), stamp) &&
+         robot_.write(velocity_, sample.velocity.data(), stamp) &&
+         robot_.write(torque_, sample.torque.data(), stamp) &&
+         robot_.write(external_, sample.external_torque.data(), stamp) &&
+         robot_.write(wrench_, sample.tool_wrench.data(), stamp) &&
+         robot_.write(pose_, pose.data(), stamp);
+}
+
+}  // namespace coglab_controllers

@@ -1,0 +1,54 @@
+#include "coglab_controllers/manager/robot_setup.hpp"
+
+#include <stdexcept>
+
+namespace coglab_controllers {
+
+std::shared_ptr<const RobotSetup> makeRobotSetup(const std::string& urdf,
+                                                 const lwr_fri_bridge::JointLimits& table,
+                                                 const Parameters& parameters) {
+  lwr_fri_bridge::JointLimits limits = table;
+  limits.upper_position = parameters.numbers("upper_joint_pos_limit", table.upper_position);
+  limits.lower_position = parameters.numbers("lower_joint_pos_limit", table.lower_position);
+  limits.velocity = parameters.numbers("joint_vel_limit", table.velocity);
+  for (int joint = 0; joint < kMaxJoints; ++joint) {
+    const bool wider = limits.upper_position[joint] > table.upper_position[joint] ||
+                       limits.lower_position[joint] < table.lower_position[joint] ||
+                       limits.velocity[joint] > table.velocity[joint];
+    if (wider || limits.lower_position[joint] >= limits.upper_position[joint] ||
+        limits.velocity[joint] <= 0.0) {
+      throw std::runtime_error(
+          "parameters upper_joint_pos_limit, lower_joint_pos_limit, joint_vel_limit: joint " +
+          std::to_string(joint + 1) +
+          " is not inside the robot's own limits (lwr_description/config/joint_limits.yaml); "
+          "they may only be narrowed");
+    }
+  }
+
+  GuardParameters guard;
+  guard.lower_position = limits.lower_position;
+  guard.upper_position = limits.upper_position;
+  guard.velocity = limits.velocity;
+  guard.acceleration = limits.acceleration;
+  guard.jerk = limits.jerk;
+  guard.position_margin = parameters.number("position_margin", guard.position_margin, 0.0, 0.5);
+  guard.hand_speed = parameters.number("hand_speed_limit", guard.hand_speed, 0.0, 5.0);
+  guard.elbow_speed = parameters.number("elbow_speed_limit", guard.elbow_speed, 0.0, 5.0);
+  guard.block_time = parameters.number("blocked_time", guard.block_time, 0.05, 10.0);
+  const Parameters space = parameters.block("workspace");
+  guard.workspace.box_min = space.numbers("box_min", guard.workspace.box_min);
+  guard.workspace.box_max = space.numbers("box_max", guard.workspace.box_max);
+  guard.workspace.base_centre = space.numbers("base_centre", guard.workspace.base_centre);
+  guard.workspace.base_radius = space.number("base_radius", guard.workspace.base_radius, 0.0, 5.0);
+  guard.workspace.max_stretch = space.number("max_stretch", guard.workspace.max_stretch, 0.1, 1.0);
+  guard.workspace_deceleration =
+      space.number("deceleration", guard.workspace_deceleration, 0.05, 20.0);
+
+  const Chain chain(urdf, parameters.text("base_link", "lwr_base_link"),
+                    parameters.text("tool_link", "ih2_palm"));
+  const Guard check(guard, chain);  // throws here, outside the cycle
+  return std::make_shared<const RobotSetup>(
+      RobotSetup{chain, limits, guard, Workspace(guard.workspace, chain.reach())});
+}
+
+}  // namespace coglab_controllers

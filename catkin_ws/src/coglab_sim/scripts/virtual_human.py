@@ -1,0 +1,130 @@
+#!/usr/bin/python3
+"""The node /coglab_sim/virtual_human: a seeded person who gives and takes.
+
+Subscribes truth/cell (what a person sees and feels), human_command (std_msgs/String: give <id>, receive <id>, rest) and
+/coglab/transitions (reacts by itself unless ~react is false). Publishes human_hand (coglab_msgs/HumanHand, 100 Hz) and
+human_state (std_msgs/String). Names are relative to the node's namespace.
+Parameters (private): seed, behaviour, participant (mapping, overrides), holds_object, react, rest, handover_object,
+object_in_hand (three numbers each, m), object_mass.
+"""
+import sys
+import threading
+import time
+
+import numpy as np
+import rospy
+from coglab_msgs.msg import CellTruth, HumanHand, Transition
+from coglab_sim.participant import Participant
+from coglab_sim.rigid import Frame
+from coglab_sim.virtual_human import Scene, VirtualHuman, WorldView
+from geometry_msgs.msg import Point, Quaternion, Vector3
+from std_msgs.msg import String
+
+GIVE, RECEIVE = "exchange_human_to_robot", "exchange_robot_to_human"
+
+
+def frame_of(pose) -> Frame:
+    """geometry_msgs/Pose as a Frame."""
+    p, q = pose.position, pose.orientation
+    return Frame(np.array([p.x, p.y, p.z]), np.array([q.x, q.y, q.z, q.w]))
+
+
+class VirtualHumanNode:
+    """Thin node over VirtualHuman."""
+
+    def __init__(self) -> None:
+        fields = dict(rospy.get_param("~participant", {}))
+        fields.setdefault("seed", int(rospy.get_param("~seed", rospy.get_param("/coglab_sim/seed", 7))))
+        fields.setdefault("behaviour", rospy.get_param("~behaviour", "normal"))
+        scene = Scene()
+        for name in ("rest", "handover_object", "object_in_hand"):
+            if rospy.has_param(f"~{name}"):
+                setattr(scene, name, np.array(rospy.get_param(f"~{name}"), dtype=float))
+        scene.object_mass = float(rospy.get_param("~object_mass", scene.object_mass))
+        self.human = VirtualHuman(Participant.from_mapping(fields), scene, rospy.get_param("~holds_object", True))
+        self.lock = threading.Lock()
+        self.view = WorldView()
+        self.palm_history: list[tuple[float, np.ndarray]] = []
+        self.hand = rospy.Publisher("human_hand", HumanHand, queue_size=1, tcp_nodelay=True)
+        self.state = rospy.Publisher("human_state", String, queue_size=10, latch=True)
+        self.last_phase = ""
+        rospy.Subscriber("truth/cell", CellTruth, self.on_truth, queue_size=1, tcp_nodelay=True)
+        rospy.Subscriber("human_command", String, self.on_command, queue_size=10)
+        if rospy.get_param("~react", True):
+            rospy.Subscriber("/coglab/transitions", Transition, self.on_transition, queue_size=100)
+
+    def on_truth(self, message: CellTruth) -> None:
+        """What the person sees and feels now; the robot's speed is judged over 0.1 s."""
+        now = time.monotonic()
+        robot = frame_of(message.robot_hand)
+        force = message.palm_force
+        with self.lock:
+            self.palm_history.append((now, robot.position))
+            while self.palm_history[0][0] < now - 0.1:
+                self.palm_history.pop(0)
+            then, place = self.palm_history[0]
+            speed = float(np.linalg.norm(robot.position - place)) / (now - then) if now - then > 0.03 else 1.0
+            self.view = WorldView(robot, speed, frame_of(message.object),
+                                  float(np.linalg.norm([force.x, force.y, force.z])), message.robot_load_share,
+                                  message.human_load_share, message.held_by)
+
+    def on_command(self, message: String) -> None:
+        """What the person is asked to do."""
+        try:
+            with self.lock:
+                self.human.command(message.data)
+        except ValueError as error:
+            rospy.logwarn("virtual human: %s", error)
+
+    def on_transition(self, message: Transition) -> None:
+        """The person sees what the robot is about to do."""
+        if message.path != "/coglab_master":
+            return
+        with self.lock:
+            if message.to_state == GIVE:
+                self.human.command("give")
+            elif message.to_state == RECEIVE:
+                self.human.command("receive")
+            elif message.from_state in (GIVE, RECEIVE) and message.outcome != "succeeded":
+                self.human.command("rest")
+
+    def run(self) -> None:
+        """100 Hz on the steady clock."""
+        period = 0.01
+        due = time.monotonic()
+        while not rospy.is_shutdown():
+            with self.lock:
+                sample = self.human.step(time.monotonic(), self.view)
+            self.publish(sample)
+            due = max(due + period, time.monotonic() - period)
+            time.sleep(max(0.0, due - time.monotonic()))
+
+    def publish(self, sample) -> None:
+        """Hand for the cell, phase for whoever watches."""
+        message = HumanHand(grip=sample.grip, grip_force=sample.grip_force)
+        message.header.stamp = rospy.Time.now()
+        message.header.frame_id = "world"
+        message.pose.position = Point(*sample.frame.position)
+        message.pose.orientation = Quaternion(*sample.frame.orientation)
+        message.velocity.linear = Vector3(*sample.velocity)
+        self.hand.publish(message)
+        if sample.phase != self.last_phase:
+            self.last_phase = sample.phase
+            self.state.publish(String(sample.phase))
+            rospy.loginfo("virtual human: %s", sample.phase)
+
+
+def main() -> int:
+    """Entry point."""
+    rospy.init_node("virtual_human")
+    try:
+        node = VirtualHumanNode()
+    except (ValueError, TypeError) as error:
+        rospy.logfatal("virtual human: %s", error)
+        return 1
+    node.run()
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,109 @@
+#!/usr/bin/python3
+"""The node /contact_detector: external joint torques -> /coglab/contact, armed by ~arm (coglab_msgs/ArmContact).
+
+Subscribes /lwr/external_torques (effort, Nm) and /lwr/joint_states. Parameters (private): the fields of
+coglab_smach.contact_detector.DetectorSettings; robot_description is read for the Jacobian.
+Publishes ~margin (std_msgs/Float64) at 20 Hz while watching.
+"""
+import dataclasses
+import sys
+import threading
+
+import rospy
+from coglab_msgs.msg import Contact
+from coglab_msgs.srv import ArmContact, ArmContactResponse
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Float64
+
+from coglab_smach.contact_detector import ContactDetector, DetectorSettings
+from coglab_smach.kinematics import SerialArm
+
+
+class ContactDetectorNode:
+    """Thin node over ContactDetector."""
+
+    def __init__(self, urdf: str) -> None:
+        settings = DetectorSettings()
+        for field in dataclasses.fields(settings):
+            if rospy.has_param(f"~{field.name}"):
+                setattr(settings, field.name, rospy.get_param(f"~{field.name}"))
+        self.arm_model = SerialArm(urdf)
+        self.detector = ContactDetector(settings, self.arm_model.position_jacobian)
+        self.lock = threading.Lock()
+        self.position = None
+        self.velocity = None
+        self.last_sample = None
+        self.publisher = rospy.Publisher("/coglab/contact", Contact, queue_size=10)
+        self.margin = rospy.Publisher("~margin", Float64, queue_size=1)
+        rospy.Subscriber("/lwr/joint_states", JointState, self.on_joints, queue_size=1, tcp_nodelay=True)
+        rospy.Subscriber("/lwr/external_torques", JointState, self.on_torques, queue_size=20, tcp_nodelay=True)
+        rospy.Service("~arm", ArmContact, self.on_arm)
+        rospy.Timer(rospy.Duration(0.05), self.on_timer)
+
+    def on_joints(self, message: JointState) -> None:
+        """Positions and velocities in wire order; velocities are differentiated where the message has none."""
+        index = {name: i for i, name in enumerate(message.name)}
+        if any(name not in index for name in self.arm_model.names):
+            return
+        order = [index[name] for name in self.arm_model.names]
+        position = [message.position[i] for i in order]
+        stamp = message.header.stamp.to_sec()
+        if len(message.velocity) == len(message.name):
+            velocity = [message.velocity[i] for i in order]
+        elif self.position is not None and stamp > self.joint_stamp:
+            velocity = [(a - b) / (stamp - self.joint_stamp) for a, b in zip(position, self.position)]
+        else:
+            velocity = None
+        self.position, self.velocity, self.joint_stamp = position, velocity, stamp
+
+    def on_torques(self, message: JointState) -> None:
+        """Each torque sample goes through the detector; an event is published at once."""
+        if len(message.effort) != 7 or self.position is None or self.velocity is None:
+            return
+        with self.lock:
+            self.last_sample = message.header.stamp.to_sec()
+            event = self.detector.feed(self.last_sample, message.effort, self.position, self.velocity)
+        if event is None:
+            return
+        out = Contact(source=event.source, contact=event.contact, margin=event.margin, message=event.message)
+        out.header.stamp = message.header.stamp
+        self.publisher.publish(out)
+        rospy.loginfo("contact detector: %s", event.message)
+
+    def on_arm(self, request):
+        """Arm or disarm."""
+        with self.lock:
+            if request.mode == "off":
+                self.detector.disarm()
+                return ArmContactResponse(True, "off")
+            now = self.last_sample
+            if now is None or abs(rospy.Time.now().to_sec() - now) > 1.0:
+                return ArmContactResponse(False, "no torques on /lwr/external_torques for 1 s; is the robot connected?")
+            try:
+                self.detector.arm(request.mode, now, request.timeout, request.k, request.joints, request.mass,
+                                  request.load_share)
+            except ValueError as error:
+                return ArmContactResponse(False, str(error))
+        return ArmContactResponse(True, f"watching for {request.mode} for {request.timeout:.1f} s once the arm is still")
+
+    def on_timer(self, _event) -> None:
+        """Live margin."""
+        with self.lock:
+            if self.detector.state() == "watching":
+                self.margin.publish(Float64(self.detector.margin))
+
+
+def main() -> int:
+    """Entry point."""
+    rospy.init_node("contact_detector")
+    urdf = rospy.get_param("robot_description", None) or rospy.get_param("/robot_description", None)
+    if urdf is None:
+        rospy.logfatal("contact_detector: parameter robot_description is missing; load lwr_description's URDF")
+        return 1
+    ContactDetectorNode(urdf)
+    rospy.spin()
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

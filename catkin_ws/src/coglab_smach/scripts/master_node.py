@@ -1,0 +1,126 @@
+#!/usr/bin/python3
+"""The node /coglab: runs coglab_master on ROS ports, takes triggers, publishes transitions and introspection.
+
+Services: start (coglab_msgs/Start), stop (std_srvs/Trigger), why (std_srvs/Trigger).
+Topics: transitions (coglab_msgs/Transition), results (std_msgs/String, one JSON object per action, latched).
+Parameters (private): config_file, dmp_library (path of the primitives), auto_trigger, result_file (JSON lines),
+config_overrides (mapping of dotted names), introspection (default true).
+"""
+import json
+import sys
+import threading
+
+import rospy
+import smach
+import smach_ros
+from coglab_msgs.msg import Transition
+from coglab_msgs.srv import Start, StartResponse
+from std_msgs.msg import String
+from std_srvs.srv import Trigger, TriggerResponse
+
+from coglab_smach.config import Config, ConfigError
+from coglab_smach.context import Context
+from coglab_smach.journal import ActionRecord, Journal, TransitionRecord
+from coglab_smach.machines import build_master
+from coglab_smach.ros_hand import RosHand
+from coglab_smach.ros_ports import RosArm, RosContact, RosDatabase, RosPerception
+
+
+class MasterNode:
+    """Ties the machines to ROS; holds no logic of its own."""
+
+    def __init__(self) -> None:
+        overrides = dict(rospy.get_param("~config_overrides", {}))
+        for name in ("dmp_library", "auto_trigger"):
+            if rospy.has_param(f"~{name}"):
+                overrides[name] = rospy.get_param(f"~{name}")
+        config = Config.load(rospy.get_param("~config_file"), overrides, rospy.logwarn)
+        clock = smach.clock.SteadyClock()
+        self.journal = Journal(clock.now)
+        self.transitions = rospy.Publisher("/coglab/transitions", Transition, queue_size=200)
+        self.results = rospy.Publisher("/coglab/results", String, queue_size=20, latch=True)
+        self.result_file = rospy.get_param("~result_file", "")
+        self.journal.listen(self.on_transition)
+        self.journal.listen_results(self.on_result)
+        self.ctx = Context(clock=clock, arm=RosArm(), hand=RosHand(), perception=RosPerception(),
+                           database=RosDatabase(), contact=RosContact(), config=config, journal=self.journal)
+        self.master = build_master(self.ctx)
+        self.server = None
+        if rospy.get_param("~introspection", True):
+            self.server = smach_ros.IntrospectionServer("coglab", self.master, "/coglab_master")
+            self.server.start()
+        rospy.Service("/coglab/start", Start, self.on_start)
+        rospy.Service("/coglab/stop", Trigger, self.on_stop)
+        rospy.Service("/coglab/why", Trigger, self.on_why)
+
+    def on_start(self, request):
+        """A trigger for the hub that is open now."""
+        accepted, message = self.ctx.requests.submit(request.action, request.object_id)
+        rospy.loginfo("start %s %s: %s", request.action, request.object_id, message)
+        return StartResponse(accepted, message)
+
+    def on_stop(self, _request):
+        """STOP: the arm brakes and latches, the machine ends the action; the hand keeps what it holds."""
+        self.ctx.stop.press("the operator pressed STOP")
+        pending = self.ctx.arm.hold("the operator pressed STOP")
+        end = self.ctx.clock.now() + 2.0
+        while not pending.done() and self.ctx.clock.now() < end:
+            self.ctx.clock.sleep(0.005)
+        try:
+            if not pending.done():
+                return TriggerResponse(False, "STOP is latched in the machine, but the LWR interface did not answer "
+                                              "within 2 s: use the emergency stop of the robot")
+            return TriggerResponse(True, f"STOP: {pending.result()}")
+        except Exception as error:
+            return TriggerResponse(False, f"STOP is latched in the machine, but: {error}")
+
+    def on_why(self, _request):
+        """'Why did it stop?' in one sentence."""
+        return TriggerResponse(True, self.journal.why())
+
+    def on_transition(self, record: TransitionRecord) -> None:
+        """Topic and log."""
+        message = Transition(path=record.path, from_state=record.from_state, outcome=record.outcome,
+                             to_state=record.to_state, reason=record.reason, causes=list(record.causes))
+        message.header.stamp = rospy.Time.now()
+        self.transitions.publish(message)
+        (rospy.logwarn if record.outcome in ("failed", "fault", "stopped") else rospy.loginfo)(record.sentence())
+
+    def on_result(self, record: ActionRecord) -> None:
+        """Topic and result file, one JSON object per action."""
+        line = json.dumps(record.to_dict())
+        self.results.publish(String(line))
+        if self.result_file:
+            try:
+                with open(self.result_file, "a", encoding="utf-8") as stream:
+                    stream.write(line + "\n")
+            except OSError as error:
+                rospy.logerr("result file %s cannot be written: %s", self.result_file, error)
+
+    def run(self) -> None:
+        """Execute the machine until shut-down."""
+        thread = threading.Thread(target=self.master.execute, name="coglab_master", daemon=True)
+        thread.start()
+        rospy.on_shutdown(self.master.request_preempt)
+        rate = 0.2
+        while not rospy.is_shutdown() and thread.is_alive():
+            thread.join(rate)
+        thread.join(3.0)
+        if self.server is not None:
+            self.server.stop()
+
+
+def main() -> int:
+    """Entry point; exit status 1 where the configuration cannot be used."""
+    rospy.init_node("coglab")
+    try:
+        node = MasterNode()
+    except (ConfigError, KeyError) as error:
+        rospy.logfatal("coglab cannot start: %s", error)
+        return 1
+    node.run()
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,123 @@
+"""HandPort over the four actions, the calibration topic and the status of /ih2_hand."""
+from __future__ import annotations
+
+import threading
+import time
+from typing import Any
+
+import actionlib
+import rospy
+from actionlib_msgs.msg import GoalStatus
+from coglab_msgs.msg import (HandCloseAction, HandOpenAction, HandOpenGoal, HandPreshapeAction, HandPreshapeCloseAction,
+                             HandPreshapeCloseGoal, HandPreshapeGoal, HandStatus)
+from std_msgs.msg import String
+
+from .pending import Pending, PortError, Polled
+from .ports import HandState
+from .ros_ports import Newest
+
+SERVER_WAIT = 10.0
+"""s to wait for an action server to appear."""
+
+
+class ActionCall(Pending):
+    """One goal sent to an action server; the result's ``isOk`` decides, ``message`` is the reason."""
+
+    def __init__(self, client: actionlib.SimpleActionClient, name: str, goal: Any) -> None:
+        self._client, self._name = client, name
+        self._done = threading.Event()
+        self._error: PortError | None = None
+        self._result: Any = None
+        self._sent = False
+        threading.Thread(target=self._send, args=(goal,), name=f"action:{name}", daemon=True).start()
+
+    def _send(self, goal: Any) -> None:
+        if not self._client.wait_for_server(rospy.Duration(SERVER_WAIT)):
+            self._fail(f"action {self._name} has no server after {SERVER_WAIT:.0f} s; is the hand node running?")
+            return
+        self._sent = True
+        self._client.send_goal(goal, done_cb=self._on_done)
+
+    def _fail(self, sentence: str, causes: tuple[str, ...] = ()) -> None:
+        self._error = PortError(sentence, causes)
+        self._done.set()
+
+    def _on_done(self, status: int, result: Any) -> None:
+        self._result = result
+        message = getattr(result, "message", "") or self._client.get_goal_status_text()
+        if status != GoalStatus.SUCCEEDED or (result is not None and not result.isOk):
+            self._fail(f"action {self._name} ended {GoalStatus.to_string(status)}", (message,) if message else ())
+            return
+        self._done.set()
+
+    def done(self) -> bool:
+        return self._done.is_set()
+
+    def result(self) -> Any:
+        if self._error is not None:
+            raise self._error
+        return self._result
+
+    def cancel(self) -> None:
+        if self._sent and not self._done.is_set():
+            self._client.cancel_goal()
+
+
+class RosHand:
+    """HandPort over ROS."""
+
+    def __init__(self, namespace: str = "/ih2_hand") -> None:
+        self._ns = namespace
+        self._clients = {name: actionlib.SimpleActionClient(f"{namespace}/{name}", kind) for name, kind in
+                         (("hand_open", HandOpenAction), ("hand_close", HandCloseAction),
+                          ("hand_preshape", HandPreshapeAction), ("hand_preshape_close", HandPreshapeCloseAction))}
+        self._status = Newest(f"{namespace}/hand_status", HandStatus)
+        self._calibration = rospy.Publisher(f"{namespace}/hand_calibration", String, queue_size=1)
+
+    def _call(self, name: str, goal: Any) -> Pending:
+        return ActionCall(self._clients[name], f"{self._ns}/{name}", goal)
+
+    def preshape(self, mode: str, level: str) -> Pending:
+        return self._call("hand_preshape", HandPreshapeGoal(mode=mode, level=level))
+
+    def close_on_object(self) -> Pending:
+        return self._call("hand_preshape_close", HandPreshapeCloseGoal())
+
+    def open(self, speed: int) -> Pending:
+        return self._call("hand_open", HandOpenGoal(speed=speed))
+
+    def calibrate(self, mode: str) -> Pending:
+        """Publish the order once the hand listens, then follow hand_status: started, ended, or refused in words."""
+        begun = {"sent": 0.0, "seen": False, "message": ""}
+
+        def done() -> bool:
+            state = self.state()
+            if not begun["sent"]:
+                if state.connected and self._calibration.get_num_connections() > 0:
+                    begun["message"] = state.message
+                    self._calibration.publish(String(mode))
+                    begun["sent"] = time.monotonic()
+                return False
+            if state.calibrating:
+                begun["seen"] = True
+                return False
+            if begun["seen"] or (state.calibrated and time.monotonic() - begun["sent"] > 0.5):
+                return True
+            if time.monotonic() - begun["sent"] > 3.0:
+                raise PortError(f"the hand does not calibrate after the order '{mode}'",
+                                (state.message or "hand_status says nothing about it",))
+            return False
+
+        def value() -> None:
+            state = self.state()
+            if not state.calibrated:
+                raise PortError("the hand's calibration ended without success", (state.message,))
+
+        return Polled(done, value)
+
+    def state(self) -> HandState:
+        message = self._status.message
+        if message is None or self._status.age() > 1.0:
+            return HandState(message=f"{self._ns}/hand_status is silent")
+        return HandState(message.connected, message.calibrated, message.calibrating, message.holding, message.message,
+                         tuple(motor.position for motor in message.motors))

@@ -1,0 +1,173 @@
+#include "ctrl_more/feedback_controllers_manager.hpp"
+
+#include <time.h>
+
+#include <chrono>
+#include <thread>
+
+#include "manager_members.hpp"
+
+namespace ctrl_more {
+namespace {
+
+// clock_gettime needs no system call on Linux: the kernel maps the clock into the process.
+std::int64_t steadyNow() {
+  timespec now;
+  clock_gettime(CLOCK_MONOTONIC, &now);
+  return static_cast<std::int64_t>(now.tv_sec) * 1000000000 + now.tv_nsec;
+}
+
+}  // namespace
+
+FeedbackControllersManager::FeedbackControllersManager(RobotStates& robot, ControlStates& control,
+                                                       const ManagerOptions& options,
+                                                       Logger* logger)
+    : robot_(robot),
+      control_(control),
+      options_(options),
+      logger_(logger ? logger : &Logger::standard()),
+      log_(logger_, "FeedbackControllersManager", &cycle_number_),
+      original_(0, control.controlPeriod(), logger_),
+      compared_(0, control.controlPeriod(), logger_) {}
+
+FeedbackControllersManager::~FeedbackControllersManager() {
+  offered_.store(nullptr);
+  for (auto& member : members_) member->slot->setOwner(nullptr);
+}
+
+FeedbackControllersManager::Draft FeedbackControllersManager::draftOf() const {
+  Draft draft;
+  for (const auto& member : members_) draft.states.push_back(member->state);
+  draft.order = order_;
+  return draft;
+}
+
+// Makes the draft the truth, and offers it to the cycle as a plan.
+Status FeedbackControllersManager::publish(const Draft& draft) {
+  auto plan = std::make_unique<Plan>();
+  plan->generation = ++generation_;
+  for (std::size_t i = 0; i < members_.size(); ++i) members_[i]->state = draft.states[i];
+  order_ = draft.order;
+  for (const std::string& name : order_) {
+    const Member& m = *members_[indexOf(name)];
+    plan->entries.push_back({m.slot, m.state.enabled, !m.state.reasons.empty(),
+                             m.state.fault_clears, m.state.resets, m.state.reorders,
+                             m.state.gains_revision, m.state.gains});
+    plan->stages[static_cast<int>(m.slot->stage())].push_back(m.slot.get());
+  }
+  const Plan* offer = plan.get();
+  plans_.push_back(std::move(plan));
+  const Plan* untaken = offered_.exchange(offer, std::memory_order_acq_rel);
+  if (untaken) {
+    // The cycle never saw it, and never will.
+    for (auto it = plans_.begin(); it != plans_.end(); ++it) {
+      if (it->get() != untaken) continue;
+      plans_.erase(it);
+      break;
+    }
+  }
+  collect();
+  return Status::published(generation_);
+}
+
+// Frees the plans that the cycle has left behind.
+void FeedbackControllersManager::collect() {
+  const std::uint64_t in_use = acknowledged_.load(std::memory_order_acquire);
+  while (!plans_.empty() && plans_.front()->generation < in_use) plans_.pop_front();
+}
+
+bool FeedbackControllersManager::waitAdopted(std::uint64_t generation, double timeout_s) const {
+  const auto deadline =
+      std::chrono::steady_clock::now() + std::chrono::duration<double>(timeout_s);
+  while (acknowledged_.load(std::memory_order_acquire) < generation) {
+    if (std::chrono::steady_clock::now() >= deadline) return false;
+    std::this_thread::sleep_for(std::chrono::microseconds(200));
+  }
+  return true;
+}
+
+Status FeedbackControllersManager::withdraw(std::uint64_t generation) {
+  const Lock lock(mutex_);
+  if (generation != generation_ || !before_last_ ||
+      before_last_->states.size() != members_.size()) {
+    return Status::failure("plan " + std::to_string(generation) +
+                           " cannot be withdrawn: the newest one is " +
+                           std::to_string(generation_));
+  }
+  const Plan* offer = plans_.empty() ? nullptr : plans_.back().get();
+  if (!offer || !offered_.compare_exchange_strong(offer, nullptr, std::memory_order_acq_rel)) {
+    return Status::failure("plan " + std::to_string(generation) + " is adopted already");
+  }
+  plans_.pop_back();
+  const std::unique_ptr<Draft> back = std::move(before_last_);
+  return publish(*back);
+}
+
+void FeedbackControllersManager::freeze() {
+  if (robot_.frozen() && control_.frozen() && original_.dataSize() == control_.dataSize()) return;
+  robot_.freeze();
+  control_.freeze();
+  original_ = control_;
+  if (options_.check_undeclared) compared_ = control_;
+}
+
+void FeedbackControllersManager::beginCycle(const Cycle& cycle) noexcept {
+  cycle_ = cycle;
+  cycle_number_.store(cycle.number, std::memory_order_relaxed);
+  if (original_.dataSize() != control_.dataSize() || !control_.frozen()) freeze();
+  if (offered_.load(std::memory_order_relaxed) == nullptr) return;
+  const Plan* plan = offered_.exchange(nullptr, std::memory_order_acq_rel);
+  if (!plan) return;
+  plan_ = plan;
+  for (const PlanEntry& entry : plan->entries) entry.slot->adopt(entry);
+  acknowledged_.store(plan->generation, std::memory_order_release);
+}
+
+void FeedbackControllersManager::updateStage(Stage stage, const RobotStates& robot,
+                                             ControlStates& control) noexcept {
+  if (!plan_ || plan_->stages[static_cast<int>(stage)].empty()) return;
+  if (control.dataSize() != original_.dataSize()) {
+    CTRL_MORE_LOG(log_, Error, "control states of {} numbers were given, {} expected: nothing run",
+                  control.dataSize(), original_.dataSize());
+    return;
+  }
+  original_.copyValuesFrom(control);
+  runStage(stage, robot, control);
+}
+
+void FeedbackControllersManager::runStage(Stage stage, const RobotStates& robot,
+                                          ControlStates& control) noexcept {
+  const bool timed = options_.timed;
+  std::int64_t before = timed ? steadyNow() : 0;
+  for (ControllerSlot* slot : plan_->stages[static_cast<int>(stage)]) {
+    if (slot->idle()) continue;
+    if (options_.check_undeclared) compared_.copyValuesFrom(control);
+    slot->run(cycle_, robot, original_, control);
+    if (options_.check_undeclared && slot->ran()) {
+      slot->checkUndeclared(cycle_, compared_.data(), control);
+    }
+    if (timed) {
+      const std::int64_t after = steadyNow();
+      slot->judgeTime(cycle_, after - before, control);
+      before = after;
+    }
+  }
+}
+
+void FeedbackControllersManager::endCycle() noexcept {}
+
+void FeedbackControllersManager::update(const Cycle& cycle, const RobotStates& robot,
+                                        ControlStates& control) noexcept {
+  beginCycle(cycle);
+  updateStage(Stage::Task, robot, control);
+  updateStage(Stage::Joint, robot, control);
+  endCycle();
+}
+
+void FeedbackControllersManager::update(const RobotStates& robot,
+                                        ControlStates* control) noexcept {
+  if (!control) return;
+  update({robot.newestStamp(), control->controlPeriod(), cycle_.number + 1}, robot, *control);
+}
+
+}  // namespace ctrl_more

@@ -1,0 +1,165 @@
+"""100 000 corrupted byte streams: no wrong value passes as right, and the driver never sticks.
+
+A stream is a handful of calls during which one to three bytes, in either direction, are lost,
+doubled, flipped or preceded by a stray byte. The truth is read from the emulated motors directly.
+"""
+
+from __future__ import annotations
+
+import os
+import random
+
+import pytest
+from ih2_hand.clock import VirtualClock
+from ih2_hand.driver import HandSerialDriver
+from ih2_hand.emulator.hand import EmulatedHand
+from ih2_hand.emulator.virtual_link import VirtualLink
+from ih2_hand.errors import HandError
+from ih2_hand.line import LineCounters
+
+STREAMS = 1_000_000 if os.environ.get("COGLAB_LONG") else 100_000
+PARTS = 4
+CALLS = 4
+WIRE_S = 0.0005
+
+
+class Corrupter:
+    """Corrupts bytes at planned places of the two directions."""
+
+    KINDS = ("lost", "doubled", "flipped", "inserted")
+
+    def __init__(self, rng: random.Random, clock: VirtualClock):
+        self.rng, self.clock = rng, clock
+        self.plan: dict[int, str] = {}
+        self.passed = 0
+        self.done = 0
+
+    def arm(self, events: int) -> None:
+        self.passed = 0
+        self.plan = {self.rng.randrange(18): self.rng.choice(self.KINDS) for _ in range(events)}
+
+    def to_hand(self, data: bytes) -> bytes:
+        self.clock.sleep(WIRE_S)
+        return self.tamper(data)
+
+    def tamper(self, data: bytes) -> bytes:
+        if not self.plan:
+            return data
+        out = bytearray()
+        for byte in data:
+            kind = self.plan.pop(self.passed, None)
+            self.passed += 1
+            self.done += kind is not None
+            if kind == "lost":
+                continue
+            if kind == "flipped":
+                byte ^= 1 << self.rng.randrange(8)
+            elif kind == "doubled":
+                out.append(byte)
+            elif kind == "inserted":
+                out.append(self.rng.randrange(256))
+            out.append(byte)
+        return bytes(out)
+
+
+def truth(hand: EmulatedHand, call: str, motor: int) -> int:
+    hand.advance()
+    model = hand.motors[motor]
+    return {"get_raw_position": lambda: model.position_byte,
+            "get_finger_force": lambda: min(254, model.tension // 4),
+            "get_motor_current": lambda: min(1023, int(model.current)),
+            "get_finger_status": lambda: model.status_byte}[call]()
+
+
+READS = ("get_raw_position", "get_finger_force", "get_motor_current", "get_finger_status")
+
+
+class Campaign:
+    """One driver, one hand, many streams."""
+
+    def __init__(self, seed: int):
+        self.rng = random.Random(seed)
+        self.clock = VirtualClock()
+        self.hand = EmulatedHand(self.clock, greeting=True)
+        self.corrupter = Corrupter(self.rng, self.clock)
+        self.link = VirtualLink(self.hand, self.clock, to_hand=self.corrupter.to_hand,
+                                to_host=self.corrupter.tamper)
+        self.driver = HandSerialDriver(transport=self.link, clock=self.clock)
+        self.wrong: list[tuple] = []
+        self.wrong_but_counted = self.refused = self.read = 0
+
+    def new_scene(self) -> None:
+        """Another posture, object and driver state."""
+        rng = self.rng
+        self.hand.calibrated = True
+        self.hand.set_contacts([rng.choice((255, rng.randrange(40, 250))) for _ in range(5)],
+                               [rng.uniform(5, 60) for _ in range(5)])
+        self.driver.close()
+        self.link.plugged = True
+        self.driver = HandSerialDriver(transport=self.link, clock=self.clock)
+        self.driver.set_hand_posture([rng.randrange(255) for _ in range(5)])
+        if rng.random() < 0.5:
+            self.driver.move_motor(rng.randrange(5), rng.randrange(40, 512), rng.random() < 0.5)
+        self.clock.sleep(rng.choice((0.0, 0.2, 2.0)))
+
+    def check_read(self, call: str, motor: int) -> None:
+        counters: LineCounters = self.driver.counters
+        resyncs, before = counters.resynchronisations, truth(self.hand, call, motor)
+        try:
+            value = getattr(self.driver, call)(motor)
+        except HandError:
+            self.refused += 1
+            return
+        if call == "get_finger_status":
+            value = value["raw"]
+        self.read += 1
+        after = truth(self.hand, call, motor)
+        if call == "get_finger_status":
+            right = value in (before, after)
+        else:
+            right = min(before, after) - 1 <= value <= max(before, after) + 1
+        if right:
+            return
+        if counters.resynchronisations > resyncs:
+            self.wrong_but_counted += 1
+        else:
+            self.wrong.append((call, motor, before, value, after))
+
+    def stream(self, events: int) -> None:
+        self.corrupter.arm(events)
+        for _ in range(CALLS):
+            motor = self.rng.randrange(1, 5)
+            if self.rng.random() < 0.1:
+                try:
+                    self.driver.set_finger_position(motor, self.rng.randrange(255))
+                except HandError:
+                    self.refused += 1
+            else:
+                self.check_read(self.rng.choice(READS), motor)
+        self.corrupter.plan = {}
+        self.check_not_stuck()
+
+    def check_not_stuck(self) -> None:
+        """On a clean line the next call answers, at the latest when a calibration that a flipped
+        byte may have started is over."""
+        for _ in range(2):
+            try:
+                self.driver.get_finger_status(2)
+                return
+            except HandError:
+                self.clock.sleep(11.0)
+        assert self.driver.get_finger_status(2)["raw"] == truth(self.hand, "get_finger_status", 2)
+
+
+@pytest.mark.parametrize("part", range(PARTS))
+def test_corrupted_streams(part):
+    campaign = Campaign(seed=1000 + part)
+    for number in range(STREAMS // PARTS):
+        if number % 50 == 0:
+            campaign.new_scene()
+        campaign.stream(events=campaign.rng.choice((1, 1, 1, 2, 3)))
+    print(f"{campaign.corrupter.done} corruptions, {campaign.read} values, {campaign.refused} "
+          f"refused, {campaign.wrong_but_counted} wrong with a resynchronisation counted, "
+          f"{len(campaign.wrong)} wrong")
+    assert campaign.corrupter.done > STREAMS // PARTS
+    assert campaign.wrong == []

@@ -1,0 +1,284 @@
+"""The emulated hand against raw bytes: framing, status walks, calibration, contact, faults."""
+
+from __future__ import annotations
+
+import pytest
+from ih2_hand import frames
+from ih2_hand.clock import VirtualClock
+from ih2_hand.emulator.hand import EmulatedHand
+from ih2_hand.emulator.parser import FrameParser
+
+
+class Raw:
+    """A hand spoken to in hex."""
+
+    def __init__(self, **options):
+        self.clock = VirtualClock()
+        self.hand = EmulatedHand(self.clock, **({"greeting": True} | options))
+
+    def ask(self, text: str) -> str:
+        answers = self.hand.receive(bytes.fromhex(text))
+        return b"".join(answer for _, answer in answers).hex(" ").upper()
+
+    def status(self, motor: int) -> str:
+        return self.ask(f"4B 0{motor}")
+
+    def walk(self, motor: int, seconds: float, step: float = 0.01) -> list[str]:
+        """Different STATUS bytes in the order they appear."""
+        seen: list[str] = []
+        for _ in range(round(seconds / step)):
+            status = self.status(motor)
+            if not seen or seen[-1] != status:
+                seen.append(status)
+            self.clock.sleep(step)
+        return seen
+
+
+@pytest.fixture
+def raw() -> Raw:
+    return Raw()
+
+
+# Lengths typed from the last paragraph of section 8 of the protocol facts.
+LENGTHS = ({first: 1 for first in range(0x40)} | {0x41: 1, 0x42: 1, 0x46: 1, 0x4C: 1}
+           | {0x45: 2, 0x49: 2, 0x4B: 2, 0x44: 3, 0x4A: 3}
+           | {first: 7 for first in (0x48, 0x58, 0x59, 0x5A, 0x5B, 0x6A, 0x6B)}
+           | {0x5C: 6, 0x5D: 6, 0x5E: 6, 0x6C: 10, 0x6D: 10, 0x6E: 10}
+           | {first: 1 for first in range(0x50, 0x58)} | {first: 1 for first in range(0x60, 0x6A)}
+           | {0x70: 1, 0x71: 1, 0x6F: 4} | {first: 2 for first in range(0x80, 0x100)})
+UNASSIGNED = [0x40, 0x43, 0x47, 0x4D, 0x4E, 0x4F, *range(0x72, 0x80)]
+
+
+@pytest.mark.parametrize("first", [first for first in range(256) if first != 0x5F])
+def test_frame_lengths(first):
+    assert frames.frame_length(bytes((first,))) == LENGTHS.get(first, 1)
+    assert frames.is_known(first) == (first not in UNASSIGNED)
+
+
+@pytest.mark.parametrize(("command", "data"), [
+    (0x70, 0), (0x71, 0), (0x72, 2), (0x73, 2), (0x74, 2), (0x76, 0), (0x77, 0), (0x21, 2),
+    (0x31, 2), (0x22, 0), (0x23, 0), (0x24, 4), (0x25, 0), (0x41, 2), (0x42, 0), (0x43, 0),
+    (0x44, 4), (0x45, 0), (0x61, 2), (0x62, 0), (0x63, 0), (0x64, 4), (0x65, 0), (0x66, 2)])
+def test_low_level_lengths(command, data):
+    assert frames.frame_length(bytes((0x5F, 1, command))) == 4 + data
+    parser = FrameParser()
+    frame = bytes((0x5F, 1, command)) + bytes(data) + b"\x01"
+    assert [parser.feed(byte) for byte in frame] == [None] * (len(frame) - 1) + [frame]
+
+
+def test_bytes_one_at_a_time_and_many_at_once(raw):
+    assert [raw.ask(byte) for byte in ("44", "02", "64")] == ["", "", ""]
+    raw.clock.sleep(1.0)
+    assert raw.ask("45 02 4B 02 49 02 02") == "64 50 00 00 00 00"
+
+
+def test_incomplete_frame_waits_for_ever(raw):
+    assert raw.ask("45") == ""
+    raw.clock.sleep(3600.0)
+    assert raw.ask("02") == "00"
+
+
+def test_wrong_closing_byte_drops_the_frame(raw):
+    raw.ask("48 64 64 64 64 64 49")
+    assert raw.hand.parser.counters.bad_closing == 1
+    raw.clock.sleep(1.0)
+    assert raw.ask("45 02") == "00"
+    raw.ask("5F 01 61 00 64 02")
+    assert raw.hand.parser.counters.bad_closing == 2
+
+
+@pytest.mark.parametrize("byte", [f"{value:02X}" for value in UNASSIGNED])
+def test_unknown_first_byte_is_dropped_alone(raw, byte):
+    assert raw.ask(f"{byte} 4B 00") == "08"
+    assert raw.hand.parser.counters.unknown == 1
+
+
+def test_upper_nibble_and_force_bits_do_not_care(raw):
+    assert raw.ask("45 F2") == "00"
+    assert raw.ask("31") == raw.ask("01") == "00 00"
+
+
+def test_motor_above_four_is_consumed_silently(raw):
+    assert raw.ask("45 07 4B 09 C5") == ""
+    assert raw.hand.counters.wrong_motor == 2
+    assert raw.ask("FF 4B 00") == "08"
+
+
+def test_force_of_motor_0():
+    assert Raw().ask("00") == "00 00"
+    assert Raw(strict_force=True).ask("00 4B 00") == "08"
+
+
+def test_newer_grasp_byte_in_strict_legacy_runs_its_arguments():
+    strict = Raw(dialect="legacy")
+    assert strict.ask("6F 04 C8 14") == "00 00"  # 04 reads a force, C8 14 drives motor 2
+    assert strict.status(2) == "29"
+    assert Raw(dialect="both").ask("6F 04 C8 14") == ""
+
+
+def test_one_byte_grasp_in_strict_v17_is_unknown():
+    strict = Raw(dialect="v17")
+    strict.ask("61")
+    assert strict.hand.parser.counters.unknown == 1
+
+
+def test_position_move_walk(raw):
+    raw.ask("44 02 80")
+    assert raw.walk(2, 1.0) == ["49", "41", "51", "50"]
+    assert raw.ask("45 02") == "80"
+
+
+def test_speed_move_walk(raw):
+    raw.ask("C9 FF")
+    assert raw.walk(2, 1.2) == ["29", "21", "04"]
+    raw.ask("89 FF")
+    assert raw.walk(2, 1.2)[-2:] == ["21", "08"]
+
+
+def test_speed_is_linear(raw):
+    raw.ask("C9 00")
+    raw.clock.sleep(1.0)
+    assert abs(int(raw.ask("45 02"), 16) - 255 * 256 / 511) <= 1
+    raw.ask("C8 00")
+    assert raw.status(2) == "00"
+
+
+def test_tension_without_contact_walk(raw):
+    raw.ask("4A 02 64")
+    assert raw.walk(2, 1.2) == ["69", "61", "64"]
+
+
+def test_tension_on_contact(raw):
+    raw.hand.set_contacts([255, 255, 100, 255, 255], [20] * 5)
+    raw.ask("4A 02 64")
+    assert raw.walk(2, 1.2)[-1] == "70"
+    assert 95 <= int(raw.ask("02").replace(" ", ""), 16) <= 100
+
+
+def test_grasp_walk_on_an_object(raw):
+    raw.hand.set_contacts([255, 100, 100, 100, 100], [20] * 5)
+    raw.ask("61")
+    assert raw.walk(2, 2.5, step=0.001)[-4:] == ["C1", "D1", "D0", "10"]
+    assert raw.ask("45 02") == "70"  # 240 counts of current at 20 counts per count beyond 100
+    assert raw.status(0) == "50", "the thumb's abduction only takes the preshape"
+
+
+def test_grasp_without_object_ends_fully_closed(raw):
+    raw.ask("61")
+    assert raw.walk(2, 3.0)[-1] == "04"
+
+
+def test_force_levels_are_ordered():
+    depths = []
+    for code in ("60", "61", "62"):
+        raw = Raw()
+        raw.hand.set_contacts([255, 100, 100, 100, 100], [20] * 5)
+        raw.ask(code)
+        raw.clock.sleep(3.0)
+        depths.append(int(raw.ask("45 02"), 16))
+    assert depths == sorted(set(depths))
+
+
+def test_stop_keeps_the_grip(raw):
+    raw.hand.set_contacts([255, 255, 100, 255, 255], [20] * 5)
+    raw.ask("C9 80")
+    raw.clock.sleep(2.0)
+    raw.ask("41")
+    before = raw.hand.motors[2].effort
+    assert raw.status(2) == "00"
+    raw.clock.sleep(1.0)
+    raw.hand.advance()
+    assert raw.hand.motors[2].effort == before > 0.0
+
+
+def test_over_current_switches_the_motor_off(raw):
+    raw.hand.set_contacts([255, 255, 100, 255, 255], [50] * 5)
+    raw.ask("C9 FF")
+    walk = raw.walk(2, 3.0)
+    assert walk[-1] == "02"
+    assert raw.ask("49 02") == "00 00"
+
+
+def test_open_all_leaves_the_abduction(raw):
+    raw.ask("48 64 64 64 64 64 48")
+    raw.clock.sleep(1.0)
+    raw.ask("4C")
+    raw.clock.sleep(1.5)
+    assert [raw.ask(f"45 0{motor}") for motor in range(5)] == ["64", "00", "00", "00", "00"]
+
+
+@pytest.mark.parametrize(("code", "seconds"), [("46", 2.0), ("42", 10.0)])
+def test_calibration_discards_everything(code, seconds):
+    raw = Raw(greeting=False, positions=[200] * 5)
+    raw.ask(code)
+    raw.clock.sleep(seconds - 0.01)
+    assert raw.ask("4B 02 41") == ""
+    assert raw.hand.counters.discarded == 3
+    raw.clock.sleep(0.02)
+    assert [raw.status(motor) for motor in range(5)] == ["08"] * 5
+    assert [raw.ask(f"45 0{motor}") for motor in range(5)] == ["00"] * 5
+    assert raw.hand.calibrated
+
+
+def test_uncalibrated_hand_ignores_positions_but_answers():
+    raw = Raw(greeting=False)
+    raw.ask("44 02 80 48 64 64 64 64 64 48 61")
+    raw.clock.sleep(1.0)
+    assert raw.ask("45 02 4B 02") == "00 08"
+    assert raw.hand.counters.ignored_uncalibrated == 3
+    raw.ask("C9 FF")
+    assert raw.status(2) == "29"
+
+
+def test_spacing_of_postures():
+    raw = Raw(enforce_spacing=True)
+    raw.ask("48 00 00 00 00 00 48 44 02 80")
+    assert raw.hand.counters.too_fast == 1
+    raw.clock.sleep(0.0031)
+    raw.ask("44 02 80")
+    assert raw.hand.counters.too_fast == 1
+
+
+def test_low_level_reads_and_stores(raw):
+    assert raw.ask("5F 01 70 01") == "08"
+    raw.ask("5F 01 24 01 02 03 04 01")
+    assert raw.ask("5F 01 25 01") == "01 02 03 04"
+    assert len(raw.ask("5F 02 22 02").split()) == 3
+    raw.ask("5F 02 61 00 64 02")
+    assert raw.status(2)[0] == "8"
+    raw.ask("5F 02 71 02")
+    assert raw.status(2)[0] == "0"
+
+
+def test_stored_preshape_is_used(raw):
+    raw.ask("58 0A 14 1E 28 32 58 61")
+    raw.clock.sleep(0.15)
+    raw.hand.advance()
+    assert [motor.target for motor in raw.hand.motors] == [10, 20, 30, 40, 50]
+
+
+def test_short_and_wrap_faults(raw):
+    for motor in raw.hand.motors:
+        motor.short_by = 3
+    raw.ask("44 02 80")
+    raw.clock.sleep(1.0)
+    assert raw.ask("4B 02 45 02") == "50 7D"
+    for motor in raw.hand.motors:
+        motor.short_by, motor.wrap = 0, True
+    raw.ask("44 02 FF")
+    raw.clock.sleep(1.0)
+    assert raw.ask("45 02") == "00"
+
+
+def test_stuck_motor_trips(raw):
+    raw.hand.motors[2].stuck = True
+    raw.ask("C9 FF")
+    assert raw.walk(2, 2.0)[-1] == "0A"
+
+
+@pytest.mark.parametrize(("positions", "stiffness"), [
+    ([0] * 4, [1] * 5), ([0] * 5, [1] * 4), ([-1] + [0] * 4, [1] * 5), ([256] * 5, [1] * 5),
+    ([0] * 5, [-1.0] * 5), ([0] * 5, [float("nan")] * 5)])
+def test_bad_contacts_are_refused(raw, positions, stiffness):
+    with pytest.raises(ValueError):
+        raw.hand.set_contacts(positions, stiffness)
