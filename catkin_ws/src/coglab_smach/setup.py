@@ -4,4 +4,5 @@ from setuptools import setup
 
 setup(**generate_distutils_setup(
     packages=["coglab_smach", "coglab_smach.states", "coglab_smach.machines"],
-    package_dir={"": "src"}))
+    package_dir={"": "src"},
+    package_data={"coglab_smach": ["object_schema.json"]}))

@@ -194,3 +194,37 @@ class ObjectDatabase:
         self.get(object_id)
         with self._lock:
             return self._texts[object_id]
+
+
+_EXAMPLE = """\
+# {id}: edit every value, then check it.
+schema: 1
+id: {id}
+name: New object
+mass: 0.30                       # kg
+size: [0.06, 0.06, 0.12]         # m, box around the object
+shape: {{type: cylinder, radius: 0.03, height: 0.12}}
+friction: 0.5
+fragile: false
+frame: object_{id}
+default_grasp: side
+grasps:
+  side:
+    hand: {{mode: cylindrical, level: medium}}
+    pose: {{xyz: [0.0, -0.03, 0.0], quaternion: [0.5, 0.5, 0.5, 0.5]}}   # ih2_palm in the object frame at contact
+    approach: {{axis: [0.0, 1.0, 0.0], distance: 0.025}}                 # the reach ends this far before it
+default_delivery: offer
+deliveries:
+  offer:
+    pose: {{xyz: [-0.10, 0.0, 0.0], rpy_deg: [0, 0, 0]}}                 # object in the human hand frame
+    release: {{rule: load_share, threshold: 0.6, timeout: 8.0}}
+dmp: {{receive: reach_mid, give: give_mid, take: reach_mid, put: reach_mid, dmp_ratio: 1.0}}
+contact: {{k: 6.0, timeout: 6.0}}
+"""
+
+
+def new_object_text(object_id: str) -> str:
+    """A valid entry to start from; ObjectError if the id cannot be one."""
+    text = _EXAMPLE.format(id=object_id)
+    parse_object(text, f"{object_id}.yaml")
+    return text

@@ -1,0 +1,96 @@
+#!/usr/bin/python3
+"""Objects on the command line: list them, check them (schema, consistency, reachability), start a new one.
+
+Usage: object_tool.py [--folder DIR] list | check [ID ...] | new ID. Exit status: 0 well, 1 a check failed, 2 usage.
+"""
+import argparse
+import sys
+from pathlib import Path
+
+from coglab_smach.object_database import ObjectDatabase, ObjectError, new_object_text, parse_object
+from coglab_smach.reachability import reachability_report
+
+
+def default_folder() -> Path:
+    """The objects of the source tree or of the installed share folder, whichever this script belongs to."""
+    here = Path(__file__).resolve()
+    beside = here.parent.parent / "objects"
+    if beside.is_dir():
+        return beside
+    import rospkg
+    return Path(rospkg.RosPack().get_path("coglab_smach")) / "objects"
+
+
+def cmd_list(database: ObjectDatabase) -> int:
+    """One line per object."""
+    for object_id in database.ids():
+        entry = database.get(object_id)
+        print(f"{object_id:12} {entry['mass']:5.2f} kg  grasps: {', '.join(entry['grasps'])}  {entry['name']}")
+    for problem in database.problems:
+        print(problem, file=sys.stderr)
+    print("next: object_tool.py check")
+    return 1 if database.problems else 0
+
+
+def cmd_check(folder: Path, ids: list[str]) -> int:
+    """Schema, consistency and reachability of each object."""
+    failed = 0
+    files = [folder / f"{i}.yaml" for i in ids] or sorted(folder.glob("*.yaml"))
+    for path in files:
+        try:
+            entry = parse_object(path.read_text(encoding="utf-8"), path.name)
+        except OSError as error:
+            print(f"{path}: cannot be read ({error.strerror})")
+            failed += 1
+            continue
+        except ObjectError as error:
+            print(error)
+            failed += 1
+            continue
+        print(f"{path.name}: schema and references ok")
+        for line, ok in reachability_report(entry):
+            print(f"  {line}")
+            failed += 0 if ok else 1
+    print("next: object_tool.py list" if not failed else f"{failed} problems")
+    return 1 if failed else 0
+
+
+def cmd_new(folder: Path, object_id: str) -> int:
+    """Write a commented example to start from; never overwrites."""
+    path = folder / f"{object_id}.yaml"
+    if path.exists():
+        print(f"{path} exists already; edit it or choose another id", file=sys.stderr)
+        return 1
+    try:
+        text = new_object_text(object_id)
+    except ObjectError as error:
+        print(error, file=sys.stderr)
+        return 2
+    path.write_text(text, encoding="utf-8")
+    print(f"wrote {path}; edit it, then: object_tool.py check {object_id}")
+    return 0
+
+
+def main() -> int:
+    """Entry point."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--folder", type=Path, default=None, help="folder of the object files")
+    verbs = parser.add_subparsers(dest="verb", required=True)
+    verbs.add_parser("list")
+    check = verbs.add_parser("check")
+    check.add_argument("ids", nargs="*")
+    new = verbs.add_parser("new")
+    new.add_argument("id")
+    arguments = parser.parse_args()
+    folder = arguments.folder or default_folder()
+    if arguments.verb == "check":
+        return cmd_check(folder, arguments.ids)
+    if arguments.verb == "new":
+        return cmd_new(folder, arguments.id)
+    database = ObjectDatabase(str(folder))
+    database.reload()
+    return cmd_list(database)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,85 @@
+"""Can the arm bring the palm to an object's grasp and delivery poses in the handover region?
+
+A damped least-squares descent from the home posture, with joint limits, to grid points of the region: what the motion
+itself will do. Coarse on purpose; it finds the grasp that asks the wrist for the impossible.
+"""
+from __future__ import annotations
+
+from functools import lru_cache
+from pathlib import Path
+from typing import Any, Mapping, Optional, Sequence
+
+import numpy as np
+
+from .goals import palm_at_grasp
+from .kinematics import SerialArm
+from .pose import Pose, conjugate, multiply
+
+HOME = (-1.4349, -0.6086, 1.4986, 1.7048, 0.1857, 0.2152, 0.782)
+JOINT_LIMIT = np.radians([170, 120, 170, 120, 170, 120, 170])
+POSITION_TOLERANCE = 0.003
+ANGLE_TOLERANCE = np.radians(3.0)
+REGION = ((0.72, 0.78, 0.82), (-0.12, 0.0, 0.12), (0.33, 0.43, 0.50))
+"""m, base frame: object positions at a handover."""
+
+
+@lru_cache(maxsize=1)
+def default_arm() -> SerialArm:
+    """The arm of lwr_description, found beside this package or through rospack."""
+    here = Path(__file__).resolve()
+    for parent in here.parents:
+        candidate = parent / "lwr_description" / "urdf" / "lwr_ih2.urdf"
+        if candidate.is_file():
+            return SerialArm(candidate.read_text(encoding="utf-8"))
+    import rospkg
+    path = Path(rospkg.RosPack().get_path("lwr_description")) / "urdf" / "lwr_ih2.urdf"
+    return SerialArm(path.read_text(encoding="utf-8"))
+
+
+def solve(arm: SerialArm, target: Pose, start: Sequence[float] = HOME, steps: int = 120) -> Optional[np.ndarray]:
+    """Joint positions (rad) that bring the tip to ``target`` within 3 mm and 3 deg, or None."""
+    q = np.array(start, dtype=float)
+    for _ in range(steps):
+        pose = arm.forward(q)
+        error = np.concatenate([target.position - pose.position, _rotation_error(target, pose)])
+        if np.linalg.norm(error[:3]) < POSITION_TOLERANCE and np.linalg.norm(error[3:]) < ANGLE_TOLERANCE:
+            return q
+        error[:3] *= min(1.0, 0.08 / max(1e-9, float(np.linalg.norm(error[:3]))))
+        error[3:] *= min(1.0, 0.3 / max(1e-9, float(np.linalg.norm(error[3:]))))
+        j = arm.jacobian(q)
+        dq = j.T @ np.linalg.solve(j @ j.T + 1e-4 * np.eye(6), error)
+        q = np.clip(q + dq, -0.98 * JOINT_LIMIT, 0.98 * JOINT_LIMIT)
+    return None
+
+
+def _rotation_error(target: Pose, pose: Pose) -> np.ndarray:
+    q = multiply(target.orientation, conjugate(pose.orientation))
+    q = q if q[3] >= 0 else -q
+    return 2.0 * q[:3]
+
+
+def share_reached(palm_in_object: Pose, arm: Optional[SerialArm] = None,
+                  yaws_deg: Sequence[float] = (-20.0, 0.0, 20.0)) -> tuple[int, int]:
+    """How many object poses of the handover region (27 places, turned about z) the palm can be brought to: (n, of m)."""
+    arm = arm or default_arm()
+    reached = total = 0
+    for x in REGION[0]:
+        for y in REGION[1]:
+            for z in REGION[2]:
+                for yaw in yaws_deg:
+                    half = np.radians(yaw) / 2
+                    at = Pose(np.array([x, y, z]), np.array([0.0, 0.0, np.sin(half), np.cos(half)]))
+                    total += 1
+                    reached += solve(arm, at * palm_in_object) is not None
+    return reached, total
+
+
+def reachability_report(entry: Mapping[str, Any], needed: float = 0.7) -> list[tuple[str, bool]]:
+    """One sentence per grasp and whether it is good enough."""
+    report = []
+    for name, grasp in entry["grasps"].items():
+        reached, total = share_reached(palm_at_grasp(grasp), yaws_deg=(0.0,))
+        ok = reached >= needed * total
+        report.append((f"grasp '{name}': {reached} of {total} places of the handover region reached"
+                       f"{'' if ok else f' (at least {needed:.0%} expected: turn or move the grasp pose)'}", ok))
+    return report
