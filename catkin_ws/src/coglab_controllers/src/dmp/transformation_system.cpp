@@ -32,7 +32,7 @@ TransformationSystem::TransformationSystem(const Primitive& primitive) : Transfo
   const int count = primitive.basisCount();
   centres_.head(count) = primitive.centres;
   widths_.head(count) = primitive.widths;
-  weights_.leftCols(count) = primitive.weights;
+  weights_.topRows(count) = primitive.weights.transpose();
   // Whole packets of four: the spare ones are so far away that their share is zero.
   count_ = (count + 3) / 4 * 4;
   for (int i = count; i < count_; ++i) {
@@ -60,7 +60,8 @@ Vector3 TransformationSystem::movingPoint(double s) const noexcept {
   active = -widths_.head(count_) * (s - centres_.head(count_)).square();
   // Relative to the nearest basis function, so that far from all of them the sum is still at least one.
   active = (active - active.maxCoeff()).exp();
-  return shape_map_ * (weights_.leftCols(count_) * active.matrix()) / active.sum();
+  const auto along = [&](int axis) { return (weights_.col(axis).head(count_) * active).sum(); };
+  return shape_map_ * Vector3(along(0), along(1), along(2)) / active.sum();
 }
 
 }  // namespace coglab_controllers

@@ -25,21 +25,30 @@ bool finite(const RobotSample& sample) {
 
 const char* nameOf(MotionState state) {
   switch (state) {
-    case MotionState::Idle: return "idle";
-    case MotionState::Running: return "running";
-    case MotionState::Holding: return "holding";
-    case MotionState::Reached: return "reached";
-    case MotionState::Aborted: return "aborted";
+    case MotionState::Idle:
+      return "idle";
+    case MotionState::Running:
+      return "running";
+    case MotionState::Holding:
+      return "holding";
+    case MotionState::Reached:
+      return "reached";
+    case MotionState::Aborted:
+      return "aborted";
   }
   return "unknown";
 }
 
 const char* nameOf(ManagerState state) {
   switch (state) {
-    case ManagerState::Idle: return "idle";
-    case ManagerState::Running: return "running";
-    case ManagerState::Holding: return "holding";
-    case ManagerState::Fault: return "fault";
+    case ManagerState::Idle:
+      return "idle";
+    case ManagerState::Running:
+      return "running";
+    case ManagerState::Holding:
+      return "holding";
+    case ManagerState::Fault:
+      return "fault";
   }
   return "unknown";
 }
@@ -53,7 +62,8 @@ ControlCycle::ControlCycle(std::shared_ptr<const RobotSetup> robot, FeedbackStag
   input_.dt = settings_.cycle_time;
 }
 
-/// Runs a plug-in's code; what it throws ends here. Catching costs nothing until something is thrown.
+/// Runs a plug-in's code; what it throws ends here. Catching costs nothing until something is
+/// thrown.
 template <typename Call>
 bool ControlCycle::guarded(const char* what, Call&& call) noexcept {
   in_plugin_.store(true, std::memory_order_relaxed);
@@ -164,7 +174,8 @@ void ControlCycle::run(const RobotSample& sample, double dt, VelocityCommand& ou
     robot_->chain.evaluate(sample.position, input_.chain);
   }
   input_.motion_allowed = fine && sample.block == lwr_fri_bridge::MotionBlock::None;
-  input_.time_scale = governor_.update(fine ? dt : settings_.cycle_time, speedScale(), limit_scale_);
+  input_.time_scale =
+      governor_.update(fine ? dt : settings_.cycle_time, speedScale(), limit_scale_);
   feedback_.begin(sample.stamp_ns, input_.dt);
   JointVector velocity = JointVector::Zero();
   limit_scale_ = 1.0;
@@ -177,8 +188,7 @@ void ControlCycle::run(const RobotSample& sample, double dt, VelocityCommand& ou
   if (fine) {
     compute(velocity);
     guard_.limit(input_.chain, sample.position, velocity, dt, report_.guard);
-    const MotionState state =
-        motion_ != nullptr && !fault_ ? motion_->state() : MotionState::Idle;
+    const MotionState state = motion_ != nullptr && !fault_ ? motion_->state() : MotionState::Idle;
     if (state == MotionState::Running || state == MotionState::Holding) {
       limit_scale_ = std::clamp(motion_->limitScale() * report_.guard.scale, 0.0, 1.0);
       if (report_.guard.blocked_joint >= 0) {
@@ -209,8 +219,7 @@ void ControlCycle::idle(std::int64_t now_ns) noexcept {
   const double silent = 1e-9 * static_cast<double>(now_ns - input_.robot.stamp_ns);
   if (numbers_ > 0 && silent > settings_.sample_timeout) {
     input_reason_ = Reason("no joint state for more than ") << settings_.sample_timeout << " s";
-    const MotionState state =
-        motion_ != nullptr && !fault_ ? motion_->state() : MotionState::Idle;
+    const MotionState state = motion_ != nullptr && !fault_ ? motion_->state() : MotionState::Idle;
     if (state == MotionState::Running || state == MotionState::Holding) abortMotion(input_reason_);
   }
   adopt();

@@ -191,8 +191,10 @@ Answer ControllerManager::switchTo(const std::string& id, std::string& type) {
                                     [&id](const auto& motion) { return motion->id == id; });
     if (found == motions_.end()) {
       if (feedback_.manager().has(id)) {
-        return Answer::refusal("'" + id + "' is a feedback controller: use feedback/enable; motion "
-                               "controllers: " + loadedMotions());
+        return Answer::refusal("'" + id +
+                               "' is a feedback controller: use feedback/enable; motion "
+                               "controllers: " +
+                               loadedMotions());
       }
       return Answer::refusal("controller_id '" + id + "' is not loaded; loaded: " +
                              loadedMotions() + "; use load_controller first");
@@ -282,8 +284,8 @@ std::string ControllerManager::motionRefusal(const std::string& controller_id) c
   }
   const double age = 1e-9 * static_cast<double>(now_ns() - now.robot.stamp_ns);
   if (age > settings_.cycle.sample_timeout) {
-    return "the newest joint state is " + std::to_string(age) + " s old; allowed: " +
-           std::to_string(settings_.cycle.sample_timeout) + " s";
+    return "the newest joint state is " + std::to_string(age) +
+           " s old; allowed: " + std::to_string(settings_.cycle.sample_timeout) + " s";
   }
   if (now.robot.block != lwr_fri_bridge::MotionBlock::None) {
     return std::string("the robot follows no motion now: ") +

@@ -22,8 +22,8 @@ bool Parameters::has(const std::string& name) const {
 void Parameters::refuse(const std::string& name, const std::string& expected) const {
   std::ostringstream got;
   got << YAML::Node(node_[name]);
-  throw std::runtime_error("parameter " + block_ + "/" + name + ": expected " + expected + ", got " +
-                           got.str());
+  throw std::runtime_error("parameter " + block_ + "/" + name + ": expected " + expected +
+                           ", got " + got.str());
 }
 
 double Parameters::number(const std::string& name, double fallback, double least,

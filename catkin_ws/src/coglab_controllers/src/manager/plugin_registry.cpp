@@ -82,7 +82,8 @@ std::shared_ptr<MotionLibrary> MotionLibrary::open(const std::string& path) {
   const std::string key = std::filesystem::weakly_canonical(path).string();
   if (std::shared_ptr<MotionLibrary> open = openLibraries()[key].lock()) return open;
   if (!std::filesystem::exists(key)) {
-    throw std::runtime_error("library '" + path + "' does not exist; expected a shared object with motion "
+    throw std::runtime_error("library '" + path +
+                             "' does not exist; expected a shared object with motion "
                              "controllers; check the path, and that its package is built");
   }
   MotionTypes& types = MotionTypes::instance();
@@ -93,21 +94,24 @@ std::shared_ptr<MotionLibrary> MotionLibrary::open(const std::string& path) {
   try {
     library->handle_ = std::make_unique<Handle>(key);
   } catch (const std::exception& error) {
-    throw std::runtime_error("library '" + path + "' cannot be loaded: " + error.what() +
-                             "; expected a shared object built as a MODULE against coglab_controllers");
+    throw std::runtime_error(
+        "library '" + path + "' cannot be loaded: " + error.what() +
+        "; expected a shared object built as a MODULE against coglab_controllers");
   }
   const std::vector<std::string> refused = types.takeRefused();
   if (!refused.empty()) {
     library->handle_.reset();  // takes its other registrations with it
-    throw std::runtime_error("library '" + path + "' registers type '" + joined(refused) +
-                             "', which another library has registered already; rename one of the two types");
+    throw std::runtime_error(
+        "library '" + path + "' registers type '" + joined(refused) +
+        "', which another library has registered already; rename one of the two types");
   }
   for (const std::string& name : types.names()) {
     if (!std::binary_search(before.begin(), before.end(), name)) library->types_.push_back(name);
   }
   if (library->types_.empty()) {
     library->handle_.reset();
-    throw std::runtime_error("library '" + path + "' registers no motion controller; expected at least one "
+    throw std::runtime_error("library '" + path +
+                             "' registers no motion controller; expected at least one "
                              "COGLAB_REGISTER_MOTION_CONTROLLER in its sources");
   }
   openLibraries()[key] = library;
@@ -129,8 +133,9 @@ std::string findLibrary(const std::string& name, const std::vector<std::string>&
     const fs::path candidate = fs::path(place) / name;
     if (!place.empty() && fs::exists(candidate)) return candidate.string();
   }
-  throw std::runtime_error("library '" + name + "' was not found in: " + joined(places) +
-                           "; build its package, or give an absolute path or the parameter plugin_paths");
+  throw std::runtime_error(
+      "library '" + name + "' was not found in: " + joined(places) +
+      "; build its package, or give an absolute path or the parameter plugin_paths");
 }
 
 }  // namespace coglab_controllers

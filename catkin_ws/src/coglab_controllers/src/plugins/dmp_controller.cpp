@@ -12,9 +12,10 @@ namespace coglab_controllers {
 
 namespace {
 
-constexpr double kRestError = 3e-4;   // m: after the end the loop is opened once the hand is this close,
-constexpr double kRestAngle = 3e-3;   // rad, and turned this close,
-constexpr double kRestTime = 0.5;     // s, or after this time
+constexpr double kRestError =
+    3e-4;  // m: after the end the loop is opened once the hand is this close,
+constexpr double kRestAngle = 3e-3;  // rad, and turned this close,
+constexpr double kRestTime = 0.5;    // s, or after this time
 
 Pose inverse(const Pose& pose) {
   const Quaternion back = pose.orientation.conjugate();
@@ -50,8 +51,7 @@ void DmpController::configure(const MotionSetup& setup) {
   ik.rot_clik_gain = parameters.number("rot_clik_gain", ik.rot_clik_gain, 0.0, 200.0);
   ik.singularity_threshold =
       parameters.number("singularity_threshold", ik.singularity_threshold, 0.0, 1.0);
-  ik.rotation_first_scaling =
-      parameters.flag("rotation_first_scaling", ik.rotation_first_scaling);
+  ik.rotation_first_scaling = parameters.flag("rotation_first_scaling", ik.rotation_first_scaling);
   ik.velocity_limit = setup.robot->limits.velocity;
   ik_ = std::make_unique<TwoTaskIk>(ik);
 
@@ -82,7 +82,8 @@ void DmpController::configure(const MotionSetup& setup) {
   }
 }
 
-// ---- the control thread -----------------------------------------------------------------------------------------
+// ---- the control thread
+// -----------------------------------------------------------------------------------------
 
 void DmpController::start(const CycleInput& input) {
   loop_->motion.stop();
@@ -149,7 +150,8 @@ void DmpController::begin(const CycleInput& input, const Plan& plan) {
     return;
   }
 
-  // Where the motion begins: on the set-point of the motion it replaces, else on the commanded state.
+  // Where the motion begins: on the set-point of the motion it replaces, else on the commanded
+  // state.
   ChainState commanded;
   setup_.robot->chain.evaluate(input.robot.commanded_position, commanded);
   Pose pose = loop.dmp_from_base * commanded.tool;
@@ -193,8 +195,8 @@ Pose DmpController::handGoal(const GoalObservation& goal, const HandGoal& hand) 
   if (!hand.in_goal_frame) return {goal.position + hand.offset, hand.orientation};
   Pose pose;
   pose.position = goal.position + goal.orientation * hand.offset;
-  pose.orientation = hand.keep_orientation ? hand.orientation
-                                           : (goal.orientation * hand.orientation).normalized();
+  pose.orientation =
+      hand.keep_orientation ? hand.orientation : (goal.orientation * hand.orientation).normalized();
   return pose;
 }
 

@@ -21,8 +21,8 @@ GoalGate::State GoalGate::update(std::int64_t now_ns, const GoalObservation& new
       goal_ = newest;
       agreeing_ = 0;
     } else {
-      const bool agrees = agreeing_ > 0 && (newest.position - candidate_.position).norm() <=
-                                               parameters_.agreement;
+      const bool agrees =
+          agreeing_ > 0 && (newest.position - candidate_.position).norm() <= parameters_.agreement;
       agreeing_ = agrees ? agreeing_ + 1 : 1;
       candidate_ = newest;
       if (agreeing_ >= parameters_.frames_to_accept) {

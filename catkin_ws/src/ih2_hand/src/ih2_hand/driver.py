@@ -12,7 +12,7 @@ from ih2_hand.errors import (HandCalibratingError, HandCalibrationError, HandCon
                              HandPortError, NoForceSensorError, NoGraspModeError)
 from ih2_hand.line import (ANALOGUE_SLACK, POSITION_SLACK, STATUS_SLACK, HandLine, LineCounters,
                            TraceHook, status_request)
-from ih2_hand.status import decode_status
+from ih2_hand.status import at_rest, decode_status
 from ih2_hand.transport import SerialTransport, Transport
 from ih2_hand.wire_choices import WIRE
 
@@ -62,6 +62,7 @@ class HandSerialDriver:
         self._grasp: bytes | None = None
         self._grasp_mode: tuple[str, str] | None = None
         self._calibrating = False
+        self._resting: set[int] = set()
         self.line = HandLine(transport or SerialTransport(serial_port), clock, trace=trace)
         self.port = self.line.port
         try:
@@ -114,7 +115,12 @@ class HandSerialDriver:
 
     def _command(self, frame: bytes, busy_s: float = 0.0) -> None:
         self._check_free()
+        self._something_changes()
         self.line.send(frame, busy_s)
+
+    def _something_changes(self) -> None:
+        self._resting.clear()
+        self.line.resting = False
 
     # -- calibration and stop --------------------------------------------------------------------
 
@@ -158,6 +164,7 @@ class HandSerialDriver:
 
     def stop_all(self) -> None:
         """Stop every motor where it is. Waits for no running request, only for a running frame."""
+        self._something_changes()
         self.line.send(bytes((frames.STOP_ALL,)))
 
     # -- single motors ---------------------------------------------------------------------------
@@ -216,7 +223,13 @@ class HandSerialDriver:
         """Status of one motor, see `status.decode_status`."""
         _motor(finger)
         self._check_free()
-        return decode_status(finger, self.line.value(_STATUS[finger], 1, STATUS_SLACK))
+        raw = self.line.value(_STATUS[finger], 1, STATUS_SLACK)
+        if not at_rest(raw):
+            self._something_changes()
+        elif not self.line.resting:
+            self._resting.add(finger)
+            self.line.resting = len(self._resting) == WIRE.motors
+        return decode_status(finger, raw)
 
     # -- whole hand ------------------------------------------------------------------------------
 

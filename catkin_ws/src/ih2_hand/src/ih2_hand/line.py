@@ -6,8 +6,9 @@ The protocol has neither lengths nor checksums, so three rules stand in for them
   flushed (a counted resynchronisation) and the request repeated;
 * an answer that does not come makes the hand's own parser suspect: it is filled with StopALL (W10,
   counted, and it does stop the fingers), then the request is repeated once, then HandTimeoutError;
-* a value that differs from the one read last is confirmed: it counts when two readings agree. At
-  rest this costs nothing. Values that move under the readings settle by their median while they
+* a value counts when two readings agree, so that one corrupted byte cannot make a wrong one. While
+  the hand is known to rest (`resting`), the value confirmed before is the second reading and the
+  confirmation costs nothing. Values that move under the readings settle by their median while they
   stay within what a finger can do in that time; otherwise HandInconsistentError.
 """
 
@@ -81,6 +82,7 @@ class HandLine:
         self._write_lock = threading.Lock()
         self._not_before = 0.0
         self._known: dict[bytes, int] = {}
+        self._resting = False
         self._closed = False
 
     # -- sending ---------------------------------------------------------------------------------
@@ -184,11 +186,22 @@ class HandLine:
 
     # -- values ----------------------------------------------------------------------------------
 
+    @property
+    def resting(self) -> bool:
+        """Whether nothing in the hand changes by itself, so that known values keep their worth."""
+        return self._resting
+
+    @resting.setter
+    def resting(self, resting: bool) -> None:
+        if resting and not self._resting:
+            self._known.clear()  # read while things moved
+        self._resting = resting
+
     def value(self, frame: bytes, length: int, slack: Slack) -> int:
         """Confirmed value of a reading: 8 bits of a one-byte answer, 10 bits of a two-byte one."""
         with self.lock:
             first = self._number(frame, length)
-            if first is not None and first == self._known.get(frame):
+            if self._resting and first is not None and first == self._known.get(frame):
                 return first
             value = self._confirm(frame, length, slack, first)
             self._known[frame] = value

@@ -33,6 +33,13 @@ def decode_status(motor: int, raw: int) -> dict[str, Any]:
     }
 
 
+def at_rest(raw: int) -> bool:
+    """Whether a motor with this STATUS byte changes nothing by itself: off, or at its position."""
+    mode = MODES[raw >> 5]
+    return mode == "stop" or (mode == "position" and bool(raw & REACHED)
+                              and not raw & WIRE.moving_bit)
+
+
 def describe_status(raw: int) -> str:
     """One STATUS byte in words, for traces."""
     status = decode_status(0, raw)

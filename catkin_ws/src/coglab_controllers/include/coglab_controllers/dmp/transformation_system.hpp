@@ -46,7 +46,7 @@ class TransformationSystem {
   Matrix3 shape_map_ = Matrix3::Identity();
   int count_;
   Eigen::Array<double, kMaxBasis, 1> centres_, widths_;
-  Eigen::Matrix<double, 3, kMaxBasis> weights_;
+  Eigen::Array<double, kMaxBasis, 3> weights_;  // one column per axis, so that each is contiguous
 };
 
 }  // namespace coglab_controllers

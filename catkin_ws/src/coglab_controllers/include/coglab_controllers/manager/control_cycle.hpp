@@ -1,5 +1,6 @@
 /// @file
-/// One control cycle, steps 1 to 8 of the design: adopt, read, reference, task feedback, resolve, joint feedback, guard.
+/// One control cycle, steps 1 to 8 of the design: adopt, read, reference, task feedback, resolve,
+/// joint feedback, guard.
 #pragma once
 
 #include <atomic>
@@ -19,16 +20,18 @@ using lwr_fri_bridge::VelocityCommand;
 
 /// How the cycle runs.
 struct CycleSettings {
-  double cycle_time = 0.005;     ///< intended period, s
-  double sample_timeout = 0.1;   ///< a joint state older than this gives zero velocity, s
-  double overrun_time = 0.004;   ///< a motion controller slower than this overruns, s; 0: not judged (lockstep)
-  int overruns_to_fault = 5;     ///< overruns in a row that fault it
+  double cycle_time = 0.005;    ///< intended period, s
+  double sample_timeout = 0.1;  ///< a joint state older than this gives zero velocity, s
+  double overrun_time =
+      0.004;  ///< a motion controller slower than this overruns, s; 0: not judged (lockstep)
+  int overruns_to_fault = 5;  ///< overruns in a row that fault it
 };
 
 /// What the cycle runs: the unit of adoption.
 struct CyclePlan {
-  MotionController* motion = nullptr;  ///< the active motion controller, kept alive by the manager; null: none
-  Name id;                             ///< its id
+  MotionController* motion =
+      nullptr;  ///< the active motion controller, kept alive by the manager; null: none
+  Name id;      ///< its id
 };
 
 /// What the manager as a whole does.
@@ -39,29 +42,29 @@ const char* nameOf(ManagerState state);
 
 /// What the cycle tells the outside world, once per cycle.
 struct CycleReport {
-  std::uint64_t cycles = 0;        ///< cycles so far, idle ones included
-  std::uint64_t samples = 0;       ///< cycles with a new joint state
-  std::uint64_t generation = 0;    ///< plan in effect
-  Name active;                     ///< id of the active motion controller
+  std::uint64_t cycles = 0;      ///< cycles so far, idle ones included
+  std::uint64_t samples = 0;     ///< cycles with a new joint state
+  std::uint64_t generation = 0;  ///< plan in effect
+  Name active;                   ///< id of the active motion controller
   ManagerState state = ManagerState::Idle;
   MotionState motion = MotionState::Idle;
-  Reason reason;                   ///< why it holds, aborted or is at fault; empty while all is well
-  bool fault = false;              ///< the active controller is at fault until switched to again
-  double time_scale = 1.0;         ///< what the references run at
-  double speed_scale = 1.0;        ///< as requested
-  RobotSample robot;               ///< the joint state used
+  Reason reason;             ///< why it holds, aborted or is at fault; empty while all is well
+  bool fault = false;        ///< the active controller is at fault until switched to again
+  double time_scale = 1.0;   ///< what the references run at
+  double speed_scale = 1.0;  ///< as requested
+  RobotSample robot;         ///< the joint state used
   JointVector velocity = JointVector::Zero();  ///< as sent, rad/s
-  GuardResult guard;               ///< what step 7 did
-  double dt = 0.0;                 ///< of the last cycle with a joint state, s
-  double duration = 0.0;           ///< of the last cycle, s; 0 in lockstep
-  double longest = 0.0;            ///< longest cycle so far, s
-  std::uint64_t overruns = 0;      ///< of motion controllers
-  std::uint64_t faults = 0;        ///< exceptions, NaN, overruns in a row
-  std::uint64_t stale = 0;         ///< cycles whose joint state was not usable
+  GuardResult guard;                           ///< what step 7 did
+  double dt = 0.0;                             ///< of the last cycle with a joint state, s
+  double duration = 0.0;                       ///< of the last cycle, s; 0 in lockstep
+  double longest = 0.0;                        ///< longest cycle so far, s
+  std::uint64_t overruns = 0;                  ///< of motion controllers
+  std::uint64_t faults = 0;                    ///< exceptions, NaN, overruns in a row
+  std::uint64_t stale = 0;                     ///< cycles whose joint state was not usable
 };
 
-/// The control cycle without threads and without ROS. One thread at a time calls run() and idle(): no allocation, no
-/// lock, no system call, no exception leaves.
+/// The control cycle without threads and without ROS. One thread at a time calls run() and idle():
+/// no allocation, no lock, no system call, no exception leaves.
 class ControlCycle {
  public:
   /// @param robot model, limits, workspace; shared with the controllers
@@ -72,7 +75,8 @@ class ControlCycle {
   /// A cycle with a new joint state.
   /// @param sample measurement and commanded state
   /// @param dt true time since the last one, s, > 0
-  /// @param out velocity to send, stamped with the sample's stamp and epoch; zero when nothing may move
+  /// @param out velocity to send, stamped with the sample's stamp and epoch; zero when nothing may
+  /// move
   void run(const RobotSample& sample, double dt, VelocityCommand& out) noexcept;
 
   /// A cycle without one: plans are adopted, nothing is computed and nothing sent.

@@ -1,5 +1,6 @@
 /// @file
-/// The controller manager without ROS (D4.10, Table 6): loads, lists, switches, and runs the control cycle.
+/// The controller manager without ROS (D4.10, Table 6): loads, lists, switches, and runs the
+/// control cycle.
 #pragma once
 
 #include <cstdint>
@@ -19,21 +20,24 @@ namespace coglab_controllers {
 struct ManagerSettings {
   std::shared_ptr<const RobotSetup> robot;
   CycleSettings cycle;
-  /// Parameters of the plug-ins by their id, and those of the manager itself (see ControllerManager).
+  /// Parameters of the plug-ins by their id, and those of the manager itself (see
+  /// ControllerManager).
   YAML::Node parameters;
   /// Type name to library, for example coglab/DmpController: libcoglab_dmp_controller.so.
   std::map<std::string, std::string> types;
-  std::vector<std::string> plugin_paths;   ///< folders of libraries that are given without a path
-  std::string feedback_file;               ///< list file of Ctrl-MORE; empty: no feedback controllers
-  double plan_timeout = 2.0;               ///< the longest that a request waits for the cycle, s
-  bool lockstep = false;                   ///< requests are adopted by the caller's own thread, nothing is timed
-  std::function<std::int64_t()> clock;     ///< time of the samples' stamps, ns; empty: the steady clock
-  ctrl_more::Logger* logger = nullptr;     ///< of feedback controllers; null: Logger::standard()
+  std::vector<std::string> plugin_paths;  ///< folders of libraries that are given without a path
+  std::string feedback_file;  ///< list file of Ctrl-MORE; empty: no feedback controllers
+  double plan_timeout = 2.0;  ///< the longest that a request waits for the cycle, s
+  bool lockstep = false;      ///< requests are adopted by the caller's own thread, nothing is timed
+  std::function<std::int64_t()>
+      clock;  ///< time of the samples' stamps, ns; empty: the steady clock
+  ctrl_more::Logger* logger = nullptr;  ///< of feedback controllers; null: Logger::standard()
 };
 
-/// Reads the manager's own parameters: `cycle_time` (0.005 s), `sample_timeout`, `overrun_time` (s), `plan_timeout` (s),
-/// `speed_scale`, `types` (block: type -> library; the two of this package are known), `plugin_paths`, `feedback_file`, and those of
-/// makeRobotSetup(). @throws std::runtime_error naming the parameter
+/// Reads the manager's own parameters: `cycle_time` (0.005 s), `sample_timeout`, `overrun_time`
+/// (s), `plan_timeout` (s), `speed_scale`, `types` (block: type -> library; the two of this package
+/// are known), `plugin_paths`, `feedback_file`, and those of makeRobotSetup(). @throws
+/// std::runtime_error naming the parameter
 ManagerSettings readManagerSettings(const YAML::Node& parameters, const std::string& urdf,
                                     const lwr_fri_bridge::JointLimits& table, bool lockstep);
 
@@ -44,8 +48,8 @@ struct LoadedMotion {
   std::unique_ptr<MotionController> controller;
 };
 
-/// Loads controllers and decides which one is active. Services call it from any thread; requests come one after another.
-/// The control thread uses cycle() alone.
+/// Loads controllers and decides which one is active. Services call it from any thread; requests
+/// come one after another. The control thread uses cycle() alone.
 class ControllerManager : public MotionHost {
  public:
   explicit ControllerManager(ManagerSettings settings);
@@ -56,12 +60,14 @@ class ControllerManager : public MotionHost {
   /// @name Requests of Table 6
   /// @{
 
-  /// Loads a controller of a type under an id: a motion controller, or a feedback controller if the type is one of Ctrl-MORE's.
+  /// Loads a controller of a type under an id: a motion controller, or a feedback controller if the
+  /// type is one of Ctrl-MORE's.
   Answer load(const std::string& id, const std::string& type);
-  /// Ids and types of all loaded controllers, in load order; feedback controllers after motion controllers.
+  /// Ids and types of all loaded controllers, in load order; feedback controllers after motion
+  /// controllers.
   void list(std::vector<std::string>& ids, std::vector<std::string>& types) const;
-  /// Makes a motion controller the active one, and applies the feedback profile of its name. The one that is active already goes
-  /// on undisturbed, unless it is at fault: then it starts afresh.
+  /// Makes a motion controller the active one, and applies the feedback profile of its name. The
+  /// one that is active already goes on undisturbed, unless it is at fault: then it starts afresh.
   Answer switchTo(const std::string& id, std::string& type);
   /// Id and type of the active one; empty if there is none.
   void active(std::string& id, std::string& type) const;
@@ -94,7 +100,8 @@ class ControllerManager : public MotionHost {
   std::function<void()> cycleWait() const override;
   double planTimeout() const override { return settings_.plan_timeout; }
 
-  /// Sentence for a plan that the cycle did not adopt; names the controller whose code the cycle is in.
+  /// Sentence for a plan that the cycle did not adopt; names the controller whose code the cycle is
+  /// in.
   std::string notAdopted(PlanOutcome outcome) const override;
 
  private:
@@ -108,8 +115,8 @@ class ControllerManager : public MotionHost {
   ControlCycle cycle_;
   std::vector<std::string> feedback_errors_;
 
-  mutable std::mutex requests_;   // requests one after another
-  mutable std::mutex table_;      // the members below, for short
+  mutable std::mutex requests_;  // requests one after another
+  mutable std::mutex table_;     // the members below, for short
   std::vector<std::unique_ptr<LoadedMotion>> motions_;
   std::string active_id_, active_type_, profile_;
   mutable std::mutex report_mutex_;

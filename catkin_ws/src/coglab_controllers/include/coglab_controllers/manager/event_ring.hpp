@@ -10,7 +10,8 @@
 namespace coglab_controllers {
 
 /// Bounded queue with one writer and one reader thread, both wait-free, no allocation.
-/// A full queue refuses the newest entry and counts it, so that the cycle never waits for a publisher.
+/// A full queue refuses the newest entry and counts it, so that the cycle never waits for a
+/// publisher.
 /// @tparam Size number of entries, a power of two
 template <typename T, std::size_t Size>
 class EventRing {

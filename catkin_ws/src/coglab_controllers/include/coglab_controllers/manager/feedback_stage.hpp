@@ -1,5 +1,6 @@
 /// @file
-/// Where Ctrl-MORE's feedback controllers meet the control cycle: the shared stores of the arm and their signals.
+/// Where Ctrl-MORE's feedback controllers meet the control cycle: the shared stores of the arm and
+/// their signals.
 #pragma once
 
 #include <cstdint>
@@ -12,9 +13,11 @@ namespace coglab_controllers {
 
 /// The stores that all controllers of the arm share, and the feedback manager over them.
 ///
-/// Signals. measuredData: `jointPosition` (rad), `jointVelocity` (rad/s), `jointTorque` (Nm), `externalTorque` (Nm), 7 each in wire
-/// order; `FT_tool` (N, Nm, tool frame, 6). estimatedData: `toolPose` (m, quaternion; base frame, 7), from the measured joints.
-/// References: taskSpaceReferencePose and taskSpaceReferenceVel `tool`; jointSpaceReference `Position` and `Velocity`.
+/// Signals. measuredData: `jointPosition` (rad), `jointVelocity` (rad/s), `jointTorque` (Nm),
+/// `externalTorque` (Nm), 7 each in wire order; `FT_tool` (N, Nm, tool frame, 6). estimatedData:
+/// `toolPose` (m, quaternion; base frame, 7), from the measured joints. References:
+/// taskSpaceReferencePose and taskSpaceReferenceVel `tool`; jointSpaceReference `Position` and
+/// `Velocity`.
 class FeedbackStage {
  public:
   /// @param period intended cycle time, s
@@ -32,7 +35,8 @@ class FeedbackStage {
 
   /// Adopts the newest plan of the feedback manager; called once per cycle, idle ones included.
   void begin(std::int64_t now_ns, double dt) noexcept;
-  /// Step 2: measurement to robot states. False if a number is not finite (then nothing was written).
+  /// Step 2: measurement to robot states. False if a number is not finite (then nothing was
+  /// written).
   bool fill(const CycleInput& input) noexcept;
   /// Steps 4 and 6.
   void run(ctrl_more::Stage stage) noexcept {

@@ -1,5 +1,6 @@
 /// @file
-/// The interface of a motion controller plug-in (D4.10, section 3.1.2): exactly one is active, it writes the references.
+/// The interface of a motion controller plug-in (D4.10, section 3.1.2): exactly one is active, it
+/// writes the references.
 #pragma once
 
 #include <cstdint>
@@ -31,21 +32,21 @@ struct Answer {
 
 /// What the control cycle tells a motion controller, every cycle.
 struct CycleInput {
-  RobotSample robot;            ///< newest measurement; stamps and commanded state are the bridge's
-  ChainState chain;             ///< kinematics at the measured joints
-  double dt = 0.0;              ///< true time since the last cycle, s, > 0
-  double time_scale = 1.0;      ///< 0..1: how fast the reference's own time runs (speed_scale, limits)
+  RobotSample robot;        ///< newest measurement; stamps and commanded state are the bridge's
+  ChainState chain;         ///< kinematics at the measured joints
+  double dt = 0.0;          ///< true time since the last cycle, s, > 0
+  double time_scale = 1.0;  ///< 0..1: how fast the reference's own time runs (speed_scale, limits)
   bool motion_allowed = false;  ///< target velocities are followed now
 };
 
 /// The references of one cycle and where the motion controller finds its own in them.
 /// Poses are those of the tool frame in the robot's base frame.
 struct References {
-  ctrl_more::ControlStates states;            ///< what feedback controllers modify
-  ctrl_more::ControlSignal pose;              ///< taskSpaceReferencePose: x y z (m), quaternion x y z w
-  ctrl_more::ControlSignal twist;             ///< taskSpaceReferenceVel: m/s, rad/s
-  ctrl_more::ControlSignal joint_position;    ///< jointSpaceReference Position, rad
-  ctrl_more::ControlSignal joint_velocity;    ///< jointSpaceReference Velocity, rad/s
+  ctrl_more::ControlStates states;  ///< what feedback controllers modify
+  ctrl_more::ControlSignal pose;    ///< taskSpaceReferencePose: x y z (m), quaternion x y z w
+  ctrl_more::ControlSignal twist;   ///< taskSpaceReferenceVel: m/s, rad/s
+  ctrl_more::ControlSignal joint_position;  ///< jointSpaceReference Position, rad
+  ctrl_more::ControlSignal joint_velocity;  ///< jointSpaceReference Velocity, rad/s
 };
 
 /// What a motion controller does at the moment.
@@ -68,7 +69,8 @@ class MotionHost {
   /// Requests that end in a plan come one after another; hold this while building one.
   virtual std::unique_lock<std::mutex> lockRequests() = 0;
 
-  /// Why a new motion of this controller is refused now, with what to do next; empty if it is welcome.
+  /// Why a new motion of this controller is refused now, with what to do next; empty if it is
+  /// welcome.
   virtual std::string motionRefusal(const std::string& controller_id) const = 0;
 
   /// The newest measurement that the cycle has seen; sequence 0: none yet.
@@ -89,26 +91,30 @@ class MotionHost {
 
 /// What a plug-in gets when it is loaded.
 struct MotionSetup {
-  std::string id;                           ///< the controller's id, also its namespace
-  YAML::Node parameters;                    ///< its parameters (ROS: below /controller_manager/<id>); may be null
+  std::string id;         ///< the controller's id, also its namespace
+  YAML::Node parameters;  ///< its parameters (ROS: below /controller_manager/<id>); may be null
   std::shared_ptr<const RobotSetup> robot;  ///< model, limits, workspace
   MotionHost* host = nullptr;               ///< outlives the controller
 };
 
 /// A motion controller: computes the references, alone.
 ///
-/// Non-real-time: configure() and whatever requests a plug-in offers. Real-time (control thread, between two samples): adopt(), start(),
-/// stop(), abort(), computeReference(), resolve(), state(), reason(); these must not allocate, lock, or make system calls. What
-/// they throw is caught: the motion is given up, the arm brakes, the reason is published.
+/// Non-real-time: configure() and whatever requests a plug-in offers. Real-time (control thread,
+/// between two samples): adopt(), start(), stop(), abort(), computeReference(), resolve(), state(),
+/// reason(); these must not allocate, lock, or make system calls. What they throw is caught: the
+/// motion is given up, the arm brakes, the reason is published.
 class MotionController {
  public:
   virtual ~MotionController() = default;
 
-  /// Reads the parameters. @throws std::runtime_error saying which parameter, what was expected and what came.
+  /// Reads the parameters. @throws std::runtime_error saying which parameter, what was expected and
+  /// what came.
   virtual void configure(const MotionSetup& setup) = 0;
 
-  /// Takes over requests made since the last cycle. Called every cycle while active, samples or not.
-  /// @param input in cycles without a sample `robot.sequence` is that of the last one and motion_allowed is false
+  /// Takes over requests made since the last cycle. Called every cycle while active, samples or
+  /// not.
+  /// @param input in cycles without a sample `robot.sequence` is that of the last one and
+  /// motion_allowed is false
   virtual void adopt(const CycleInput& input) = 0;
 
   /// Becomes the active controller. The arm may be moving: commanded state in `input.robot`.
@@ -120,13 +126,16 @@ class MotionController {
   /// Gives up the motion (fall-back of the robot, hold, a limit). The arm brakes by itself.
   virtual void abort(const Reason& reason) = 0;
 
-  /// Step 3: computes the reference of this cycle and writes pose and twist (Cartesian motions) or joint position and velocity.
+  /// Step 3: computes the reference of this cycle and writes pose and twist (Cartesian motions) or
+  /// joint position and velocity.
   virtual void computeReference(const CycleInput& input, References& references) = 0;
 
-  /// Step 5: from the references, perhaps modified by feedback controllers, to joint velocities (joint_velocity of references).
+  /// Step 5: from the references, perhaps modified by feedback controllers, to joint velocities
+  /// (joint_velocity of references).
   virtual void resolve(const CycleInput& input, References& references) = 0;
 
-  /// 0..1: how much its own limits (those of the inverse kinematics) shrank the last velocity; slows the time scale.
+  /// 0..1: how much its own limits (those of the inverse kinematics) shrank the last velocity;
+  /// slows the time scale.
   virtual double limitScale() const { return 1.0; }
 
   virtual MotionState state() const = 0;

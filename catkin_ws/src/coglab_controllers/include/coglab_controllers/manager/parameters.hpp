@@ -11,8 +11,9 @@
 
 namespace coglab_controllers {
 
-/// One block of parameters. Every read names its default and its range; what does not fit is refused with
-/// std::runtime_error: "parameter <block>/<name>: expected …, got …". Not for the control cycle.
+/// One block of parameters. Every read names its default and its range; what does not fit is
+/// refused with std::runtime_error: "parameter <block>/<name>: expected …, got …". Not for the
+/// control cycle.
 class Parameters {
  public:
   /// @param node a map, or nothing at all.  @param block what to call it in messages

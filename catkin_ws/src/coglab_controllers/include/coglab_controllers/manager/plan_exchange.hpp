@@ -23,16 +23,18 @@ enum class PlanOutcome : std::uint8_t {
 
 /// Hands plans from the threads that build them to the one control thread.
 ///
-/// Builders (services) come one after another. Each offers a plan by one atomic pointer; the cycle takes it at its
-/// start, acknowledges its number, and never looks at the one before again; the builder then frees the old one. So
-/// the cycle neither locks nor frees, and what it reads is never changed under it (design, section 2, step 1).
+/// Builders (services) come one after another. Each offers a plan by one atomic pointer; the cycle
+/// takes it at its start, acknowledges its number, and never looks at the one before again; the
+/// builder then frees the old one. So the cycle neither locks nor frees, and what it reads is never
+/// changed under it (design, section 2, step 1).
 ///
-/// @tparam Plan what is handed over; the cycle may write fields of it that the builder reads after Adopted
+/// @tparam Plan what is handed over; the cycle may write fields of it that the builder reads after
+/// Adopted
 template <typename Plan>
 class PlanExchange {
  public:
-  /// Called again and again while a builder waits. Default: sleep 0.2 ms. Where nobody else runs the cycle
-  /// (lockstep, tests), set it to a function that adopts.
+  /// Called again and again while a builder waits. Default: sleep 0.2 ms. Where nobody else runs
+  /// the cycle (lockstep, tests), set it to a function that adopts.
   using Wait = std::function<void()>;
 
   PlanExchange() = default;
@@ -45,7 +47,8 @@ class PlanExchange {
     wait_ = std::move(wait);
   }
 
-  /// Offers a plan and waits for its acknowledgement, at most `timeout_s` seconds on the steady clock.
+  /// Offers a plan and waits for its acknowledgement, at most `timeout_s` seconds on the steady
+  /// clock.
   /// @param read called with the plan as the cycle left it, if the outcome is Adopted
   template <typename Read>
   PlanOutcome offer(std::unique_ptr<Plan> plan, double timeout_s, Read&& read) {
@@ -80,8 +83,8 @@ class PlanExchange {
     return offer(std::move(plan), timeout_s, [](const Plan&) {});
   }
 
-  /// Control thread: takes the newest plan if there is one, else returns null. The plan stays valid until the one
-  /// after it is adopted. Call acknowledge() when the one before is no longer used.
+  /// Control thread: takes the newest plan if there is one, else returns null. The plan stays valid
+  /// until the one after it is adopted. Call acknowledge() when the one before is no longer used.
   Plan* take() {
     Offer* const offer = offered_.exchange(nullptr, std::memory_order_acq_rel);
     if (offer == nullptr) return nullptr;

@@ -1,5 +1,6 @@
 /// @file
-/// Which motion controller types exist in this process, and how they get into it from shared objects.
+/// Which motion controller types exist in this process, and how they get into it from shared
+/// objects.
 #pragma once
 
 #include <map>
@@ -19,8 +20,9 @@ struct MotionMaker {
   MotionControllerRos* (*ros)() = nullptr;      ///< its ROS side; null: it has none
 };
 
-/// The types that libraries have registered. Unlike class_loader's own map, in which a second registration of a name
-/// silently replaces the first, it refuses one and remembers that, so that the library can be refused as a whole.
+/// The types that libraries have registered. Unlike class_loader's own map, in which a second
+/// registration of a name silently replaces the first, it refuses one and remembers that, so that
+/// the library can be refused as a whole.
 ///
 /// Threads: used under the loader's lock, or while static objects are made.
 class MotionTypes {
@@ -58,12 +60,15 @@ class MotionRegistration {
   MotionMaker maker_;
 };
 
-/// A shared object with motion controllers, loaded by class_loader; stays loaded while anything holds it.
+/// A shared object with motion controllers, loaded by class_loader; stays loaded while anything
+/// holds it.
 class MotionLibrary {
  public:
   /// Loads a library, or returns it if it is loaded already.
-  /// @throws std::runtime_error with a sentence: the file is missing or not loadable, registers no type, or registers a
-  ///         type that is known already (then it is unloaded again and what was there stays as it was)
+  /// @throws std::runtime_error with a sentence: the file is missing or not loadable, registers no
+  /// type, or registers a
+  ///         type that is known already (then it is unloaded again and what was there stays as it
+  ///         was)
   static std::shared_ptr<MotionLibrary> open(const std::string& path);
 
   ~MotionLibrary();
@@ -82,24 +87,25 @@ class MotionLibrary {
   std::unique_ptr<Handle> handle_;
 };
 
-/// Finds a library by its name: absolute paths as they are, else in `folders`, in the folder of this library, and in
-/// `lib` of every entry of CMAKE_PREFIX_PATH. @throws std::runtime_error listing the places.
+/// Finds a library by its name: absolute paths as they are, else in `folders`, in the folder of
+/// this library, and in `lib` of every entry of CMAKE_PREFIX_PATH. @throws std::runtime_error
+/// listing the places.
 std::string findLibrary(const std::string& name, const std::vector<std::string>& folders);
 
 }  // namespace coglab_controllers
 
 /// Registers a motion controller from one of its library's source files, outside of any namespace:
 /// `COGLAB_REGISTER_MOTION_CONTROLLER("my_lab/Wiggle", my_lab::Wiggle)`.
-#define COGLAB_REGISTER_MOTION_CONTROLLER(type, Class)                                            \
-  namespace {                                                                                     \
-  const ::coglab_controllers::MotionRegistration coglab_motion_registration(                      \
+#define COGLAB_REGISTER_MOTION_CONTROLLER(type, Class)                                           \
+  namespace {                                                                                    \
+  const ::coglab_controllers::MotionRegistration coglab_motion_registration(                     \
       type, {[]() -> ::coglab_controllers::MotionController* { return new Class(); }, nullptr}); \
   }
 
 /// The same for a controller with a ROS side.
-#define COGLAB_REGISTER_MOTION_CONTROLLER_WITH_ROS(type, Class, RosClass)                       \
-  namespace {                                                                                   \
-  const ::coglab_controllers::MotionRegistration coglab_motion_registration(                    \
-      type, {[]() -> ::coglab_controllers::MotionController* { return new Class(); },           \
-             []() -> ::coglab_controllers::MotionControllerRos* { return new RosClass(); }});   \
+#define COGLAB_REGISTER_MOTION_CONTROLLER_WITH_ROS(type, Class, RosClass)                     \
+  namespace {                                                                                 \
+  const ::coglab_controllers::MotionRegistration coglab_motion_registration(                  \
+      type, {[]() -> ::coglab_controllers::MotionController* { return new Class(); },         \
+             []() -> ::coglab_controllers::MotionControllerRos* { return new RosClass(); }}); \
   }

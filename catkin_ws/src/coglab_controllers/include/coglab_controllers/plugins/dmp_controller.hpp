@@ -1,5 +1,6 @@
 /// @file
-/// The cognitive controller plug-in (D4.10, section 3.1, Table 4): DMP towards a goal that may move, two-task IK.
+/// The cognitive controller plug-in (D4.10, section 3.1, Table 4): DMP towards a goal that may
+/// move, two-task IK.
 #pragma once
 
 #include <atomic>
@@ -30,8 +31,9 @@ struct DmpRequest {
   double dmp_ratio = 1.0;
   Vector3 goal_offset = Vector3::Zero();  ///< m, in the goal frame (tf) or dmp_frame_name (topic)
   bool orientation_control = false;
-  Eigen::Vector4d target_orientation = Eigen::Vector4d::Zero();  ///< x y z w; all zero: keep the current one
-  std::string goal_frame;                 ///< tf2 frame of the goal; empty: goal_frame_name
+  Eigen::Vector4d target_orientation =
+      Eigen::Vector4d::Zero();  ///< x y z w; all zero: keep the current one
+  std::string goal_frame;       ///< tf2 frame of the goal; empty: goal_frame_name
 };
 
 /// Progress of the motion, for dmp/feedback.
@@ -59,17 +61,19 @@ struct IkDebugRecord {
 struct HandGoal {
   Vector3 offset = Vector3::Zero();
   Quaternion orientation = Quaternion::Identity();
-  bool in_goal_frame = true;       ///< offset and orientation turn with the goal frame
-  bool keep_orientation = true;    ///< the hand keeps the orientation it has
+  bool in_goal_frame = true;     ///< offset and orientation turn with the goal frame
+  bool keep_orientation = true;  ///< the hand keeps the orientation it has
 };
 
 /// The plug-in. Requests come from any thread; the cycle sees them as plans.
 ///
-/// Parameters: Table 4's `pos_clik_gain`, `rot_clik_gain` (1/s), `robot_base_frame_name`, `dmp_frame_name`, `enable_ik_debug`; and
-/// `goal_source` (tf or topic), `goal_frame_name`, `goal_timeout` (s, topic; 0: never old), `goal_max_age` (s), `goal_max_jump` (m),
-/// `goal_lost_time` (s), `goal_finish_distance` (m), `goal_reach_margin` (m), `goal_time_constant` (s), `max_initial_distance` (m),
-/// `end_phase`, `end_speed` (m/s), `end_distance`, `follow_distance` (m), `follow_time` (s), `singularity_threshold`,
-/// `rotation_first_scaling`, `hold_blend` (s), `dmp_file` (a library to load at once).
+/// Parameters: Table 4's `pos_clik_gain`, `rot_clik_gain` (1/s), `robot_base_frame_name`,
+/// `dmp_frame_name`, `enable_ik_debug`; and `goal_source` (tf or topic), `goal_frame_name`,
+/// `goal_timeout` (s, topic; 0: never old), `goal_max_age` (s), `goal_max_jump` (m),
+/// `goal_lost_time` (s), `goal_finish_distance` (m), `goal_reach_margin` (m), `goal_time_constant`
+/// (s), `max_initial_distance` (m), `end_phase`, `end_speed` (m/s), `end_distance`,
+/// `follow_distance` (m), `follow_time` (s), `singularity_threshold`, `rotation_first_scaling`,
+/// `hold_blend` (s), `dmp_file` (a library to load at once).
 class DmpController : public MotionController {
  public:
   DmpController();
@@ -82,7 +86,8 @@ class DmpController : public MotionController {
   Answer switchDmp(const DmpRequest& request);
   /// dmp_goal. `frame` must be dmp_frame_name. @param stamp_ns 0: now
   Answer setGoal(const std::string& frame, const Vector3& goal, std::int64_t stamp_ns);
-  /// Asks the goal source for the goal frame of the motion; call it often (the ROS side: 200 Hz; lockstep: every tick).
+  /// Asks the goal source for the goal frame of the motion; call it often (the ROS side: 200 Hz;
+  /// lockstep: every tick).
   void pollGoal();
   /// Who knows frames. Must outlive the controller, or be taken away with null.
   void setGoalSource(GoalSource* source);
@@ -119,7 +124,9 @@ class DmpController : public MotionController {
 
   Answer request(const DmpRequest& request, bool execute);
   std::string checkRequest(const DmpRequest& request, bool execute, Plan& plan) const;
+  std::string findFrames(Plan& plan);
   std::string findGoal(const std::string& frame, Plan& plan);
+  std::string outsideWorkspace(const Plan& plan) const;
   Answer offer(std::unique_ptr<Plan> plan);
   Pose handGoal(const GoalObservation& goal, const HandGoal& hand) const;
   Pose inWorkspace(const Pose& hand_in_dmp, bool& projected) const;

@@ -8,15 +8,15 @@ namespace coglab_controllers {
 
 /// One execute_dmp or switch_dmp, checked and complete.
 struct DmpController::Plan {
-  bool execute = true;         ///< false: switch_dmp
+  bool execute = true;  ///< false: switch_dmp
   Name primitive;
   CartesianMotionPlan motion;
   HandGoal hand;
-  GoalObservation goal;        ///< the goal as it was when the request came
-  Pose base_from_dmp;          ///< dmp_frame_name in robot_base_frame_name
-  bool given = false;          ///< initial_state GIVEN
+  GoalObservation goal;  ///< the goal as it was when the request came
+  Pose base_from_dmp;    ///< dmp_frame_name in robot_base_frame_name
+  bool given = false;    ///< initial_state GIVEN
   Vector3 initial_position = Vector3::Zero(), initial_velocity = Vector3::Zero();
-  Reason refusal;              ///< written by the cycle: why it did not begin; empty: it did
+  Reason refusal;  ///< written by the cycle: why it did not begin; empty: it did
 };
 
 /// State of the running motion; the control thread's own.

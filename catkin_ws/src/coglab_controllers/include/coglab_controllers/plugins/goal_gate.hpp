@@ -8,31 +8,33 @@
 
 namespace coglab_controllers {
 
-/// A goal frame as received: from tf2 its pose, from dmp_goal its position with the identity as orientation.
+/// A goal frame as received: from tf2 its pose, from dmp_goal its position with the identity as
+/// orientation.
 struct GoalObservation {
   Vector3 position = Vector3::Zero();               ///< m, in dmp_frame_name
   Quaternion orientation = Quaternion::Identity();  ///< of the goal frame, in dmp_frame_name
-  std::int64_t stamp_ns = 0;  ///< time of capture, clock of the samples
+  std::int64_t stamp_ns = 0;                        ///< time of capture, clock of the samples
   std::uint64_t request = 0;  ///< which request asked for this frame; set by the plug-in
 };
 
 /// Limits of GoalGate.
 struct GoalGateParameters {
-  double max_age = 0.2;      ///< s: an older frame holds the last goal; 0: a goal stays valid until replaced
+  double max_age =
+      0.2;  ///< s: an older frame holds the last goal; 0: a goal stays valid until replaced
   double max_jump = 0.15;    ///< m from one frame to the next; a larger one holds the last goal …
   int frames_to_accept = 3;  ///< … until this many frames in a row agree within `agreement`
   double agreement = 0.05;   ///< m
-  double lost_time = 1.0;    ///< s without a believable frame after which the goal is lost; 0: never
+  double lost_time = 1.0;  ///< s without a believable frame after which the goal is lost; 0: never
 };
 
 /// Holds the last believable goal. No allocation, no throw.
 class GoalGate {
  public:
   enum class State : std::uint8_t {
-    Fresh,  ///< the newest frame is followed
-    Old,    ///< no frame young enough: the last goal is held
-    Jumped, ///< the newest frames are too far away: the last goal is held
-    Lost    ///< held for longer than lost_time
+    Fresh,   ///< the newest frame is followed
+    Old,     ///< no frame young enough: the last goal is held
+    Jumped,  ///< the newest frames are too far away: the last goal is held
+    Lost     ///< held for longer than lost_time
   };
 
   explicit GoalGate(const GoalGateParameters& parameters = {}) : parameters_(parameters) {}
@@ -46,7 +48,7 @@ class GoalGate {
   State update(std::int64_t now_ns, const GoalObservation& newest) noexcept;
 
   const GoalObservation& goal() const noexcept { return goal_; }  ///< the one to follow
-  double age() const noexcept { return age_; }    ///< s, of the newest frame
+  double age() const noexcept { return age_; }                    ///< s, of the newest frame
   double jump() const noexcept { return jump_; }  ///< m, of the newest frame against the goal held
   State state() const noexcept { return state_; }
   const GoalGateParameters& parameters() const noexcept { return parameters_; }

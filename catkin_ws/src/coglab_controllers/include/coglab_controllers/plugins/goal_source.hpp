@@ -13,8 +13,8 @@ class GoalSource {
  public:
   virtual ~GoalSource() = default;
 
-  /// Newest pose of `frame` in `reference`, with its time of capture in the clock of the samples; a transform that never
-  /// changes counts as captured now.
+  /// Newest pose of `frame` in `reference`, with its time of capture in the clock of the samples; a
+  /// transform that never changes counts as captured now.
   /// @param why set on failure: which frame is missing, or what is wrong with the transform
   virtual bool lookup(const std::string& reference, const std::string& frame,
                       GoalObservation& observation, std::string& why) = 0;

@@ -1,15 +1,18 @@
 /// @file
-/// What a motion controller does between motions: brake, then stand exactly still, open to feedback controllers.
+/// What a motion controller does between motions: brake, then stand exactly still, open to feedback
+/// controllers.
 #pragma once
 
 #include "coglab_controllers/manager/motion_controller.hpp"
 
 namespace coglab_controllers {
 
-/// Fades a difference away, so that a motion that begins somewhere else than measured begins without a step.
+/// Fades a difference away, so that a motion that begins somewhere else than measured begins
+/// without a step.
 ///
-/// References begin at the commanded state, and loops close on the measured one. At the start of a motion the difference of
-/// the two counts as no error; it becomes one within about `blend` seconds.
+/// References begin at the commanded state, and loops close on the measured one. At the start of a
+/// motion the difference of the two counts as no error; it becomes one within about `blend`
+/// seconds.
 class StartBlend {
  public:
   /// @param blend time constant, s
@@ -30,18 +33,20 @@ class StartBlend {
   JointVector joints_ = JointVector::Zero();
 };
 
-/// Zero velocity, so that the arm brakes within its limits; once it stands, the commanded posture is remembered as the reference. If
-/// feedback controllers leave the reference alone, the velocity is exactly zero; if they move it, the hand follows.
-/// No allocation, no throw.
+/// Zero velocity, so that the arm brakes within its limits; once it stands, the commanded posture
+/// is remembered as the reference. If feedback controllers leave the reference alone, the velocity
+/// is exactly zero; if they move it, the hand follows. No allocation, no throw.
 class Hold {
  public:
   /// Another hold begins: the arm may still be moving.
   void begin() noexcept { latched_ = false; }
 
   /// Writes pose, zero twist, joint position and zero joint velocity.
-  void computeReference(const CycleInput& input, const Chain& chain, References& references) noexcept;
+  void computeReference(const CycleInput& input, const Chain& chain,
+                        References& references) noexcept;
 
-  /// @param solve makes joint velocities from a chain state, joints and a Cartesian reference: (const ChainState&, const
+  /// @param solve makes joint velocities from a chain state, joints and a Cartesian reference:
+  /// (const ChainState&, const
   ///        JointVector&, const CartesianReference&) -> JointVector
   template <typename Solve>
   void resolve(const CycleInput& input, References& references, Solve&& solve) noexcept {

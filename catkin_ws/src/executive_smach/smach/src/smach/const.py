@@ -8,11 +8,12 @@ from typing import Any
 
 # Special methods Python looks up on the type, never on the instance: each needs its own forwarder.
 _FORWARDED = """
-__call__ __len__ __iter__ __next__ __reversed__ __contains__ __bool__ __int__ __float__ __complex__ __index__
-__round__ __trunc__ __floor__ __ceil__ __abs__ __neg__ __pos__ __invert__ __bytes__ __fspath__ __array__
-__add__ __radd__ __sub__ __rsub__ __mul__ __rmul__ __matmul__ __rmatmul__ __truediv__ __rtruediv__ __floordiv__
-__rfloordiv__ __mod__ __rmod__ __divmod__ __rdivmod__ __pow__ __rpow__ __lshift__ __rlshift__ __rshift__
-__rrshift__ __and__ __rand__ __or__ __ror__ __xor__ __rxor__ __lt__ __le__ __gt__ __ge__ __enter__ __exit__
+__call__ __len__ __iter__ __next__ __reversed__ __contains__ __bool__ __int__ __float__
+__complex__ __index__ __round__ __trunc__ __floor__ __ceil__ __abs__ __neg__ __pos__ __invert__
+__bytes__ __fspath__ __array__ __add__ __radd__ __sub__ __rsub__ __mul__ __rmul__ __matmul__
+__rmatmul__ __truediv__ __rtruediv__ __floordiv__ __rfloordiv__ __mod__ __rmod__ __divmod__
+__rdivmod__ __pow__ __rpow__ __lshift__ __rlshift__ __rshift__ __rrshift__ __and__ __rand__ __or__
+__ror__ __xor__ __rxor__ __lt__ __le__ __gt__ __ge__ __enter__ __exit__
 """.split()
 _REFUSED = "__setitem__ __delitem__ __set__ __delete__".split()
 
@@ -120,7 +121,10 @@ class Const:
 
 def _refusal(view: Const, what: str) -> str:
     kind = type(_target(view, "_const_obj")).__name__
-    return f"{what}: this {kind} came through an input-only key; declare the key among io_keys to change it"
+    return (
+        f"{what}: this {kind} came through an input-only key; "
+        f"declare the key among io_keys to change it"
+    )
 
 
 def _forwarder(name: str) -> Any:

@@ -1,4 +1,6 @@
-"""What all containers have in common: construction, user data, callbacks and the bookkeeping of a run."""
+"""What all containers have in common: construction, user data, callbacks and the bookkeeping of a
+run.
+"""
 
 from __future__ import annotations
 
@@ -27,11 +29,12 @@ _STATE_METHODS = (
 class Container(State):
     """A state that holds states. Base of StateMachine, Concurrence and Iterator.
 
-    `userdata` is the store its children share; it is kept between runs. On entry every registered input key is copied
-    into it from the parent, on exit every output key back.
+    `userdata` is the store its children share; it is kept between runs. On entry every registered
+    input key is copied into it from the parent, on exit every output key back.
 
-    Containers of your own override `__getitem__`, `get_children`, `get_initial_states`, `set_initial_state`,
-    `get_active_states`, `get_internal_edges`, `check_consistency` and `execute`, and run inside `self._run()`.
+    Containers of your own override `__getitem__`, `get_children`, `get_initial_states`,
+    `set_initial_state`, `get_active_states`, `get_internal_edges`, `check_consistency` and
+    `execute`, and run inside `self._run()`.
 
     Example::
 
@@ -40,7 +43,7 @@ class Container(State):
             smach.StateMachine.add("A", A(), transitions={"ok": "done"})
     """
 
-    #: Containers that are open for construction, innermost last, and the lock their thread holds meanwhile.
+    #: Containers open for construction, innermost last, and the lock their thread holds meanwhile.
     _construction_stack: list[Container] = []
     _construction_lock = threading.RLock()
     _construction_thread: int | None = None
@@ -85,7 +88,10 @@ class Container(State):
     def set_initial_state(
         self, initial_states: Sequence[str], userdata: UserData | None = None
     ) -> None:
-        """Begin the next run elsewhere, with this merged into the user data. Example: `m.set_initial_state(["B"])`."""
+        """Begin the next run elsewhere, with this merged into the user data.
+
+        Example: `m.set_initial_state(["B"])`.
+        """
         raise NotImplementedError(
             f"{type(self).__name__} must override set_initial_state(labels, userdata)"
         )
@@ -95,7 +101,10 @@ class Container(State):
         raise NotImplementedError(f"{type(self).__name__} must override get_active_states()")
 
     def get_internal_edges(self) -> list[tuple[str, str, str | None]]:
-        """Edges as (outcome, from label, to label or None). Example: `machine.get_internal_edges()`."""
+        """Edges as (outcome, from label, to label or None).
+
+        Example: `machine.get_internal_edges()`.
+        """
         raise NotImplementedError(f"{type(self).__name__} must override get_internal_edges()")
 
     def check_consistency(self) -> None:
@@ -112,7 +121,10 @@ class Container(State):
     # Construction.
 
     def open(self) -> None:
-        """Begin to add children; pair with `close`. Prefer `with container:`. Example: `machine.open()`."""
+        """Begin to add children; pair with `close`. Prefer `with container:`.
+
+        Example: `machine.open()`.
+        """
         Container._construction_lock.acquire()
         Container._construction_thread = threading.get_ident()
         Container._construction_stack.append(self)
@@ -134,15 +146,22 @@ class Container(State):
             smach.logerr(f"{self._name()} is inconsistent and will not run as it is: {error}")
 
     def is_opened(self) -> bool:
-        """Whether this is the innermost container open for construction. Example: `machine.is_opened()`."""
+        """Whether this is the innermost container open for construction.
+
+        Example: `machine.is_opened()`.
+        """
         stack = Container._construction_stack
         return bool(stack) and stack[-1] is self
 
     def assert_opened(self, msg: str = "") -> None:
-        """Raise InvalidConstructionError unless the container is open. Example: `machine.assert_opened()`."""
+        """Raise InvalidConstructionError unless the container is open.
+
+        Example: `machine.assert_opened()`.
+        """
         if not self.is_opened():
             raise InvalidConstructionError(
-                f"{msg or 'the container must be open for construction'}: {self._name()} is not the innermost open "
+                f"{msg or 'the container must be open for construction'}: {self._name()} is not "
+                "the innermost open "
                 f"container ({_stack_text()}); use it inside 'with container:'"
             )
 
@@ -168,7 +187,9 @@ class Container(State):
 
     @contextmanager
     def opened(self, **_kwargs: Any) -> Iterator[Container]:
-        """`with machine.opened() as m:` is `with machine:`; keyword arguments are accepted and have no effect."""
+        """`with machine.opened() as m:` is `with machine:`; keyword arguments are accepted and have
+        no effect.
+        """
         with self:
             yield self
 
@@ -233,21 +254,24 @@ class Container(State):
         self._start_cbs.append(_callback("start_cb", start_cb, cb_args))
 
     def register_transition_cb(self, transition_cb: Callable, cb_args: Sequence = ()) -> None:
-        """Call `transition_cb(userdata, active_states, *cb_args)` at each transition between children.
+        """Call `transition_cb(userdata, active_states, *cb_args)` at each transition between
+        children.
 
         Example: `machine.register_transition_cb(lambda ud, labels: print(labels))`.
         """
         self._transition_cbs.append(_callback("transition_cb", transition_cb, cb_args))
 
     def register_termination_cb(self, termination_cb: Callable, cb_args: Sequence = ()) -> None:
-        """Call `termination_cb(userdata, terminal_states, outcome, *cb_args)` when a run ends with an outcome.
+        """Call `termination_cb(userdata, terminal_states, outcome, *cb_args)` when a run ends with
+        an outcome.
 
         Example: `machine.register_termination_cb(lambda ud, labels, outcome: print(outcome))`.
         """
         self._termination_cbs.append(_callback("termination_cb", termination_cb, cb_args))
 
     def register_end_cb(self, end_cb: Callable, cb_args: Sequence = ()) -> None:
-        """Call `end_cb(userdata, outcome, *cb_args)` when a run is over in whatever way, the container being idle.
+        """Call `end_cb(userdata, outcome, *cb_args)` when a run is over in whatever way, the
+        container being idle.
 
         `outcome` is None if the run ended with an error or at shutdown.
         Example: `machine.register_end_cb(lambda ud, outcome: print(machine.get_active_states()))`.
@@ -255,12 +279,18 @@ class Container(State):
         self._end_cbs.append(_callback("end_cb", end_cb, cb_args))
 
     def unregister_cb(self, cb: Callable) -> None:
-        """Never call `cb` again, however it was registered. Example: `machine.unregister_cb(my_start_cb)`."""
+        """Never call `cb` again, however it was registered.
+
+        Example: `machine.unregister_cb(my_start_cb)`.
+        """
         for name in ("_start_cbs", "_transition_cbs", "_termination_cbs", "_end_cbs"):
             setattr(self, name, [entry for entry in getattr(self, name) if entry[0] != cb])
 
     def call_start_cbs(self) -> None:
-        """Call the start callbacks. Example: `self.call_start_cbs()` in an `execute` of your own."""
+        """Call the start callbacks.
+
+        Example: `self.call_start_cbs()` in an `execute` of your own.
+        """
         self._call("start", self._start_cbs, self.get_initial_states)
 
     def call_transition_cbs(self) -> None:
@@ -268,7 +298,10 @@ class Container(State):
         self._call("transition", self._transition_cbs, self.get_active_states)
 
     def call_termination_cbs(self, terminal_states: Any, outcome: str | None) -> None:
-        """Call the termination callbacks. Example: `self.call_termination_cbs([label], outcome)`."""
+        """Call the termination callbacks.
+
+        Example: `self.call_termination_cbs([label], outcome)`.
+        """
         self._call("termination", self._termination_cbs, lambda: terminal_states, outcome)
 
     def _call(
@@ -314,11 +347,13 @@ class Container(State):
                     cb(self.userdata, result["outcome"], *args)
                 except Exception:
                     smach.logerr(
-                        f"end callback {_cb_name(cb)} of {self._name()} raised:\n{traceback.format_exc()}"
+                        f"end callback {_cb_name(cb)} of {self._name()} "
+                        f"raised:\n{traceback.format_exc()}"
                     )
 
     def request_preempt(self) -> None:
-        """Ask the container, and with it the children that run, to end early. Example: `machine.request_preempt()`.
+        """Ask the container, and with it the children that run, to end early. Example:
+        `machine.request_preempt()`.
 
         Before a run the request waits for its first children. Thread-safe.
         """
@@ -337,7 +372,8 @@ class Container(State):
             state.request_preempt()
         except Exception:
             smach.logerr(
-                f"request_preempt of state {label!r} raised; the request is kept for the next state:\n"
+                f"request_preempt of state {label!r} raised; the request is kept for the next "
+                "state:\n"
                 f"{traceback.format_exc()}"
             )
             return False
@@ -345,7 +381,9 @@ class Container(State):
 
     @staticmethod
     def _take_back(label: str, state: State) -> bool:
-        """At the end of a child's run, lower its flag; whether it was up, that is, the request was ignored."""
+        """At the end of a child's run, lower its flag; whether it was up, that is, the request was
+        ignored.
+        """
         try:
             if not state.preempt_requested():
                 return False
@@ -371,7 +409,8 @@ def _copy(source: Any, target: Any, keys: Iterable[str], what: str) -> None:
             target[key] = source[key]
         else:
             smach.logwarn(
-                f"{what}: user data key {key!r} is not there; present: {', '.join(source.keys()) or 'none'}"
+                f"{what}: user data key {key!r} is not there; present: "
+                f"{', '.join(source.keys()) or 'none'}"
             )
 
 

@@ -1,4 +1,6 @@
-"""The errors of the engine. Each is written to `smach.logerr` when it is made, so none passes unseen."""
+"""The errors of the engine. Each is written to `smach.logerr` when it is made, so none passes
+unseen.
+"""
 
 from __future__ import annotations
 
@@ -23,7 +25,8 @@ class SmachError(Exception):
 
 
 class InvalidStateError(SmachError):
-    """A state or container is missing, doubled, of the wrong kind, or in no condition to do what is asked.
+    """A state or container is missing, doubled, of the wrong kind, or in no condition to do what is
+    asked.
 
     Example: adding a second state under the label of the first raises it.
     """

@@ -17,12 +17,13 @@ from smach.user_data import UserData
 class Iterator(Container):
     """Runs the contained state for each item of `it`, an iterable or a function that returns one.
 
-    The item is in the user data under `it_label`. The state gets the iterator's own user data, without key checks.
+    The item is in the user data under `it_label`. The state gets the iterator's own user data,
+    without key checks.
 
     Example::
 
-        each = smach.Iterator(outcomes=["done", "failed"], input_keys=[], output_keys=[], it=lambda: range(3),
-                              it_label="index", exhausted_outcome="done")
+        each = smach.Iterator(outcomes=["done", "failed"], input_keys=[], output_keys=[],
+                              it=lambda: range(3), it_label="index", exhausted_outcome="done")
         with each:
             smach.Iterator.set_contained_state("TRY", Try(), loop_outcomes=["ok"],
                                                final_outcome_map={"bad": "failed"})
@@ -60,9 +61,9 @@ class Iterator(Container):
     ) -> State:
         """Set the state to run in the iterator that is open, and return it.
 
-        With `break_outcomes` all others go on with the next item; else `loop_outcomes` do and all others end the
-        iteration; with neither it ends after the first item. `final_outcome_map` translates the last outcome of the
-        state into the iterator's. Example: see the class.
+        With `break_outcomes` all others go on with the next item; else `loop_outcomes` do and all
+        others end the iteration; with neither it ends after the first item. `final_outcome_map`
+        translates the last outcome of the state into the iterator's. Example: see the class.
         """
         iterator = Iterator._currently_opened()
         iterator._check_new_child(
@@ -84,7 +85,10 @@ class Iterator(Container):
 
     @staticmethod
     def set_iteritems(it: Iterable | Callable[[], Iterable], it_label: str = "it_data") -> None:
-        """Set the items of the iterator that is open. Example: `Iterator.set_iteritems([1, 2, 3], "number")`."""
+        """Set the items of the iterator that is open.
+
+        Example: `Iterator.set_iteritems([1, 2, 3], "number")`.
+        """
         iterator = Iterator._currently_opened()
         iterator._items, iterator._items_label = it, it_label
 
@@ -110,10 +114,14 @@ class Iterator(Container):
     def set_initial_state(
         self, initial_states: Sequence[str], userdata: UserData | None = None
     ) -> None:
-        """Merge `userdata`; there is only one state to begin with. Example: `each.set_initial_state([], ud)`."""
+        """Merge `userdata`; there is only one state to begin with.
+
+        Example: `each.set_initial_state([], ud)`.
+        """
         if any(label != self._label for label in initial_states):
             smach.logwarn(
-                f"an iterator begins with its only state {self._label!r}, not with {list(initial_states)}"
+                f"an iterator begins with its only state {self._label!r}, not with "
+                f"{list(initial_states)}"
             )
         if userdata is not None:
             self.userdata.update(userdata)
@@ -123,7 +131,10 @@ class Iterator(Container):
         return self.get_initial_states() if self._is_running else []
 
     def get_internal_edges(self) -> list[tuple[str, str, str | None]]:
-        """Loop outcomes lead back to the state, the others out of the iterator. Example: see the name."""
+        """Loop outcomes lead back to the state, the others out of the iterator.
+
+        Example: see the name.
+        """
         if self._label is None:
             return []
         return [(outcome, self._label, self._label) for outcome in self._loop_outcomes] + [
@@ -132,7 +143,8 @@ class Iterator(Container):
         ]
 
     def check_consistency(self) -> None:
-        """Raise InvalidStateError without a contained state, InvalidTransitionError for outcomes that do not exist.
+        """Raise InvalidStateError without a contained state, InvalidTransitionError for outcomes
+        that do not exist.
 
         Example: `each.check_consistency()`.
         """
@@ -151,18 +163,20 @@ class Iterator(Container):
         ]
         if unknown or wrong:
             raise InvalidTransitionError(
-                f"iterator over {self._label!r}: {unknown} are not among the state's outcomes {list(known)}, and "
+                f"iterator over {self._label!r}: {unknown} are not among the state's outcomes "
+                f"{list(known)}, and "
                 f"{wrong} of final_outcome_map not among the iterator's {list(self._outcomes)}"
             )
 
     # Running.
 
     def execute(self, parent_ud: Any = None) -> str | None:
-        """Run the state for each item; return the mapped last outcome, or the exhausted outcome; None at shutdown.
+        """Run the state for each item; return the mapped last outcome, or the exhausted outcome;
+        None at shutdown.
 
-        Raises InvalidStateError without a contained state, InvalidUserCodeError if the state or the function that
-        gives the items raises, InvalidTransitionError for an outcome the state has not registered.
-        Example: `outcome = each.execute()`.
+        Raises InvalidStateError without a contained state, InvalidUserCodeError if the state or the
+        function that gives the items raises, InvalidTransitionError for an outcome the state has
+        not registered. Example: `outcome = each.execute()`.
         """
         if self._state is None:
             raise InvalidStateError("iterator not executed: it has no contained state")
@@ -185,7 +199,8 @@ class Iterator(Container):
                 break
             except Exception:
                 smach.logerr(
-                    f"the items of the iterator over '{self._label}' ended with an error, taken as exhausted:"
+                    f"the items of the iterator over '{self._label}' ended with an error, taken as "
+                    "exhausted:"
                     f"\n{traceback.format_exc()}"
                 )
                 break
@@ -196,7 +211,8 @@ class Iterator(Container):
             if asked or outcome in self._break_outcomes:
                 result = self._final_outcome_map.get(outcome, outcome)
                 if asked and result not in self._outcomes:
-                    # A loop outcome, cut short by a request: no outcome of ours, so say what happened.
+                    # A loop outcome, cut short by a request: no outcome of ours, so say what
+                    # happened.
                     result = (
                         "preempted" if "preempted" in self._outcomes else self._exhausted_outcome
                     )

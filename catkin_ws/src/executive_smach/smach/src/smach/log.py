@@ -1,7 +1,7 @@
 """Where the engine's messages go, and how it learns that the process is shutting down.
 
-The engine never keeps a reference to a logger: it looks the functions up as attributes of the package
-(`smach.logerr(...)`) each time, so that `set_loggers` takes effect at once and everywhere.
+The engine never keeps a reference to a logger: it looks the functions up as attributes of the
+package (`smach.logerr(...)`) each time, so that `set_loggers` takes effect at once and everywhere.
 
 Example::
 

@@ -6,7 +6,8 @@ from collections.abc import Hashable, Iterable, Iterator, MutableSet
 
 
 class OrderedSet(MutableSet):
-    """Outcomes and keys in the order of their declaration, so that pictures and messages stay stable.
+    """Outcomes and keys in the order of their declaration, so that pictures and messages stay
+    stable.
 
     Behaves like `set` (operators, `update`, `union`), iterates in order of first insertion.
 

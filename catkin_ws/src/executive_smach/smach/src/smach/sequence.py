@@ -10,7 +10,8 @@ from smach.state_machine import StateMachine
 
 
 class Sequence(StateMachine):
-    """Each state's connector outcome leads to the next state, unless it has a transition of its own.
+    """Each state's connector outcome leads to the next state, unless it has a transition of its
+    own.
 
     The connector outcome of the last one is an outcome of the sequence.
 
@@ -49,8 +50,10 @@ class Sequence(StateMachine):
         sequence._add(label, state, transitions, remapping)
         if sequence._connector_outcome not in state.get_registered_outcomes():
             smach.logerr(
-                f"state {label!r} lacks the sequence's connector outcome {sequence._connector_outcome!r} (it "
-                f"has {list(state.get_registered_outcomes())}): what follows it is reached only by transitions"
+                f"state {label!r} lacks the sequence's connector outcome "
+                f"{sequence._connector_outcome!r} (it "
+                f"has {list(state.get_registered_outcomes())}): what follows it is reached only by "
+                "transitions"
             )
         if previous is not None:
             edges = sequence._transitions[previous]

@@ -12,8 +12,9 @@ from smach.util import has_smach_interface
 class State:
     """Base of all states. Declare outcomes and keys, override `execute`.
 
-    Nothing interrupts a running `execute`: a state that takes long polls `preempt_requested()`, and if asked calls
-    `service_preempt()` and returns. A request it does not serve is passed on by its container to the next state.
+    Nothing interrupts a running `execute`: a state that takes long polls `preempt_requested()`, and
+    if asked calls `service_preempt()` and returns. A request it does not serve is passed on by its
+    container to the next state.
 
     Example::
 
@@ -80,9 +81,9 @@ class State:
         """The keys that may be written, in order. Example: `state.get_registered_output_keys()`."""
         return tuple(self._output_keys)
 
-    # Preemption. `_preempt_requested` is the flag under the name that user code touches. A flag that is still up when
-    # its run ends is "spent": it shows that the run ignored a request, and the next run drops it. A new request, also
-    # by assignment, makes it fresh again.
+    # Preemption. `_preempt_requested` is the flag under the name that user code touches. A flag
+    # that is still up when its run ends is "spent": it shows that the run ignored a request, and
+    # the next run drops it. A new request, also by assignment, makes it fresh again.
 
     @property
     def _preempt_requested(self) -> bool:
@@ -94,11 +95,17 @@ class State:
         self._preempt_flag = bool(value)
 
     def request_preempt(self) -> None:
-        """Ask the state to end early. May come from any thread. Example: `machine.request_preempt()`."""
+        """Ask the state to end early. May come from any thread.
+
+        Example: `machine.request_preempt()`.
+        """
         self._preempt_requested = True
 
     def service_preempt(self) -> None:
-        """Say that the request has been served. Example: `self.service_preempt(); return "preempted"`."""
+        """Say that the request has been served.
+
+        Example: `self.service_preempt(); return "preempted"`.
+        """
         self._preempt_requested = False
 
     def recall_preempt(self) -> None:
@@ -106,7 +113,10 @@ class State:
         self._preempt_requested = False
 
     def preempt_requested(self) -> bool:
-        """Whether the state has been asked to end early. Example: `if self.preempt_requested(): ...`."""
+        """Whether the state has been asked to end early.
+
+        Example: `if self.preempt_requested(): ...`.
+        """
         return self._preempt_requested
 
     def _drop_spent_preempt(self) -> None:
@@ -154,5 +164,8 @@ class CBState(State):
             self.register_output_keys(cb.get_registered_output_keys())
 
     def execute(self, ud: Any) -> str:
-        """Call the function. Example: `CBState(lambda ud: "done", outcomes=["done"]).execute(ud)`."""
+        """Call the function.
+
+        Example: `CBState(lambda ud: "done", outcomes=["done"]).execute(ud)`.
+        """
         return self._cb(ud, *self._cb_args, **self._cb_kwargs)

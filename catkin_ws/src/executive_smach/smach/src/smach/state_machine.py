@@ -16,8 +16,9 @@ from smach.user_data import Remapper, UserData
 class StateMachine(Container):
     """States and the transitions between them.
 
-    A transition leads to the label of a sibling, or to an outcome of the machine; None, or no entry, means that the
-    state's outcome is the machine's outcome. The first state added is the initial one.
+    A transition leads to the label of a sibling, or to an outcome of the machine; None, or no
+    entry, means that the state's outcome is the machine's outcome. The first state added is the
+    initial one.
 
     Example::
 
@@ -58,9 +59,10 @@ class StateMachine(Container):
     ) -> State:
         """Add a state to the machine that is open, and return it.
 
-        `transitions` {outcome: label, machine outcome or None}; `remapping` {the state's key: the machine's key};
-        `constants` {the machine's key: value}, written each time before the state runs.
-        Raises InvalidTransitionError for an outcome the state lacks, InvalidStateError for a label that is taken.
+        `transitions` {outcome: label, machine outcome or None}; `remapping` {the state's key: the
+        machine's key}; `constants` {the machine's key: value}, written each time before the state
+        runs. Raises InvalidTransitionError for an outcome the state lacks, InvalidStateError for a
+        label that is taken.
 
         Example: `StateMachine.add("A", A(), transitions={"ok": "B"}, remapping={"x": "count"})`.
         """
@@ -158,7 +160,8 @@ class StateMachine(Container):
         smach.logdebug(f"initial state set to {list(initial_states)}")
         if len(initial_states) > 1:
             smach.logwarn(
-                f"a state machine begins with one state; of {list(initial_states)} the first is taken"
+                f"a state machine begins with one state; of {list(initial_states)} the first is "
+                "taken"
             )
         if len(initial_states) > 0:
             self._initial_state_label = initial_states[0]
@@ -166,11 +169,17 @@ class StateMachine(Container):
             self.userdata.update(userdata)
 
     def get_active_states(self) -> list[str]:
-        """`[label]` of the state that runs, `['None']` when idle. Example: `machine.get_active_states()`."""
+        """`[label]` of the state that runs, `['None']` when idle.
+
+        Example: `machine.get_active_states()`.
+        """
         return [str(self._current_label)]
 
     def get_internal_edges(self) -> list[tuple[str, str, str | None]]:
-        """(outcome, from, to) of every transition, None where it falls through. Example: see the name."""
+        """(outcome, from, to) of every transition, None where it falls through.
+
+        Example: see the name.
+        """
         return [
             (outcome, label, target)
             for label, transitions in self._transitions.items()
@@ -178,7 +187,8 @@ class StateMachine(Container):
         ]
 
     def check_consistency(self) -> None:
-        """Raise InvalidTransitionError if there is nothing to begin with or a transition leads nowhere.
+        """Raise InvalidTransitionError if there is nothing to begin with or a transition leads
+        nowhere.
 
         Example: `machine.check_consistency()`. All faults found are in the message.
         """
@@ -192,12 +202,14 @@ class StateMachine(Container):
         for outcome, label, target in self.get_internal_edges():
             if target is None and outcome not in self._outcomes:
                 faults.append(
-                    f"outcome {outcome!r} of state {label!r} has no transition and is no outcome of the "
+                    f"outcome {outcome!r} of state {label!r} has no transition and is no outcome "
+                    "of the "
                     f"machine"
                 )
             elif target is not None and target not in self._states and target not in self._outcomes:
                 faults.append(
-                    f"outcome {outcome!r} of state {label!r} leads to {target!r}, which is neither a label "
+                    f"outcome {outcome!r} of state {label!r} leads to {target!r}, which is neither "
+                    "a label "
                     f"nor an outcome of the machine"
                 )
         if faults:
@@ -211,8 +223,8 @@ class StateMachine(Container):
     def execute(self, parent_ud: Any = None) -> str | None:
         """Run from the initial state until an outcome; None if inconsistent or at shutdown.
 
-        Raises InvalidUserCodeError if a state raises, InvalidTransitionError if it returns an outcome that it has not
-        registered. Example: `outcome = machine.execute()`.
+        Raises InvalidUserCodeError if a state raises, InvalidTransitionError if it returns an
+        outcome that it has not registered. Example: `outcome = machine.execute()`.
         """
         try:
             self.check_consistency()
@@ -230,7 +242,8 @@ class StateMachine(Container):
         label = self._current_label = str(self._initial_state_label)
         self._copy_input_keys(parent_ud, self._input_keys)
         smach.loginfo(
-            f"State machine starting in initial state '{label}' with user data {self.userdata.keys()}"
+            f"State machine starting in initial state '{label}' with user data "
+            f"{self.userdata.keys()}"
         )
         self.call_start_cbs()
         while not smach.is_shutdown():
@@ -294,8 +307,10 @@ class StateMachine(Container):
         except TypeError:
             pass  # not even hashable
         raise InvalidTransitionError(
-            f"state '{label}' ({type(self._states[label]).__name__}) returned {outcome!r}, which is not among its "
-            f"outcomes {list(self._states[label].get_registered_outcomes())}; does every path of its execute() return?"
+            f"state '{label}' ({type(self._states[label]).__name__}) returned {outcome!r}, which "
+            "is not among its "
+            f"outcomes {list(self._states[label].get_registered_outcomes())}; does every path of "
+            "its execute() return?"
         )
 
     def _forward_preempt(self) -> None:

@@ -1,4 +1,4 @@
-"""The data that states share: a store per container, and the restricted view of it each state gets."""
+"""The data states share: a store per container, and the restricted view of it each state gets."""
 
 from __future__ import annotations
 
@@ -16,7 +16,8 @@ __all__ = ["Const", "Remapper", "UserData", "locked"]
 
 
 class MissingKeyError(KeyError, AttributeError):
-    """A key that is not in the user data. Both kinds of error, so that `hasattr(ud, "x")` is simply False.
+    """A key that is not in the user data. Both kinds of error, so that `hasattr(ud, "x")` is simply
+    False.
 
     Example: `UserData().x` raises it, and `except KeyError` catches it.
     """
@@ -26,7 +27,8 @@ class MissingKeyError(KeyError, AttributeError):
 
 
 class UserData:
-    """Named values, as attributes or as items; names with a leading underscore are plain attributes.
+    """Named values, as attributes or as items; names with a leading underscore are plain
+    attributes.
 
     Each single access is atomic; for several at once use `locked`.
 
@@ -82,8 +84,8 @@ class UserData:
     def extract(self, keys: Iterable[str], remapping: Mapping[str, str]) -> UserData:
         """A new store with shallow copies of the values `keys` under their local names.
 
-        `keys` are names of this store, `remapping` is {local name: name here}. KeyError if one is absent.
-        Example: `ud.extract(["a"], {"x": "a"}).x` is a copy of `ud.a`.
+        `keys` are names of this store, `remapping` is {local name: name here}. KeyError if one is
+        absent. Example: `ud.extract(["a"], {"x": "a"}).x` is a copy of `ud.a`.
         """
         local_names: dict[str, list[str]] = {}
         for local, outer in remapping.items():
@@ -95,7 +97,8 @@ class UserData:
         return result
 
     def merge(self, ud: UserData, keys: Iterable[str], remapping: Mapping[str, str]) -> None:
-        """The way back: copy the values `keys` (local names) of `ud` into this store, renamed by `remapping`.
+        """The way back: copy the values `keys` (local names) of `ud` into this store, renamed by
+        `remapping`.
 
         Example: `ud.merge(local, ["x"], {"x": "a"})` sets `ud.a` to a copy of `local.x`.
         """
@@ -118,9 +121,9 @@ class UserData:
 class Remapper:
     """What a state sees of its container's user data: its own names, its declared keys only.
 
-    `remapping` is {the state's name: the container's name}. Reading a key outside of `input_keys` raises
-    InvalidUserCodeError; writing one outside of `output_keys` is logged and ignored; an object read through a key
-    that is not also an output key is read-only (`Const`).
+    `remapping` is {the state's name: the container's name}. Reading a key outside of `input_keys`
+    raises InvalidUserCodeError; writing one outside of `output_keys` is logged and ignored; an
+    object read through a key that is not also an output key is read-only (`Const`).
 
     Example::
 
@@ -147,7 +150,8 @@ class Remapper:
         if key not in self._input_keys:
             declared = ", ".join(sorted(map(repr, self._input_keys))) or "none"
             raise InvalidUserCodeError(
-                f"reading user data key {key!r}, which is not among this state's input keys ({declared}); "
+                f"reading user data key {key!r}, which is not among this state's input keys "
+                f"({declared}); "
                 f"add it to input_keys or io_keys"
             )
         value = self._ud[self._remap(key)]
@@ -182,7 +186,10 @@ class Remapper:
         return [key for key in sorted(self._input_keys) if key in self]
 
     def update(self, ud: UserData | Mapping[str, Any]) -> None:
-        """Write every value of `ud` through to the container's store, unchecked. Example: `ud.update(other)`."""
+        """Write every value of `ud` through to the container's store, unchecked.
+
+        Example: `ud.update(other)`.
+        """
         self._ud.update(ud)
 
     def __repr__(self) -> str:
@@ -193,7 +200,8 @@ class Remapper:
 def locked(ud: UserData | Remapper) -> Iterator[UserData | Remapper]:
     """Several accesses as one: nobody else writes to this user data meanwhile.
 
-    Keep it short, and do not wait inside. Concurrent children share one store, so this also serves among them.
+    Keep it short, and do not wait inside. Concurrent children share one store, so this also serves
+    among them.
 
     Example::
 

@@ -1,8 +1,10 @@
-"""A clock in which time passes only while everybody waits, so that hours of a machine's life take milliseconds.
+"""A clock in which time passes only while everybody waits, so that hours of a machine's life take
+milliseconds.
 
-The threads that belong to the clock take turns: one runs until it waits, then the next that is ready, and only when
-none is ready does the time jump to the nearest deadline. Runs are therefore the same each time. Threads that do not
-belong to the clock may set events and sleep on it too, but when they do so is up to the operating system.
+The threads that belong to the clock take turns: one runs until it waits, then the next that is
+ready, and only when none is ready does the time jump to the nearest deadline. Runs are therefore
+the same each time. Threads that do not belong to the clock may set events and sleep on it too, but
+when they do so is up to the operating system.
 """
 
 from __future__ import annotations
@@ -19,14 +21,17 @@ from smach.clock import Clock, in_current_context
 
 
 class ClockStalled(RuntimeError):
-    """Virtual time cannot go on: all wait without a deadline, or one thread has stopped taking part.
+    """Virtual time cannot go on: all wait without a deadline, or one thread has stopped taking
+    part.
 
     Example: two states that wait for each other's event end with it instead of hanging.
     """
 
 
 class _Parked:
-    """One waiting thread: its turn (`go`), and whether it was woken by an event (`fired`) or by the time."""
+    """One waiting thread: its turn (`go`), and whether it was woken by an event (`fired`) or by the
+    time.
+    """
 
     __slots__ = ("fired", "go", "released", "thread")
 
@@ -38,7 +43,10 @@ class _Parked:
 
 
 class VirtualEvent:
-    """An event of a VirtualClock; use it like `threading.Event`. Example: `done = clock.event()`."""
+    """An event of a VirtualClock; use it like `threading.Event`.
+
+    Example: `done = clock.event()`.
+    """
 
     def __init__(self, clock: VirtualClock) -> None:
         self._clock = clock
@@ -64,7 +72,10 @@ class VirtualEvent:
             self._flag = False
 
     def wait(self, timeout: float | None = None) -> bool:
-        """Wait at most `timeout` seconds of virtual time; whether the event is set. Example: `done.wait(5.0)`."""
+        """Wait at most `timeout` seconds of virtual time; whether the event is set.
+
+        Example: `done.wait(5.0)`.
+        """
         if self._flag:
             return True
         if timeout is not None and timeout <= 0.0:
@@ -75,8 +86,8 @@ class VirtualEvent:
 class VirtualClock(Clock):
     """Time that jumps from deadline to deadline.
 
-    `start`: the first time (s). `stall_limit`: after so many seconds of wall time without any progress those who wait
-    get ClockStalled.
+    `start`: the first time (s). `stall_limit`: after so many seconds of wall time without any
+    progress those who wait get ClockStalled.
 
     Example::
 
@@ -112,7 +123,10 @@ class VirtualClock(Clock):
     def start_thread(
         self, target: Callable[[], object], name: str, daemon: bool = False
     ) -> threading.Thread:
-        """Start a member thread; its turn comes before time goes on. Example: `clock.start_thread(f, "f").join()`."""
+        """Start a member thread; its turn comes before time goes on.
+
+        Example: `clock.start_thread(f, "f").join()`.
+        """
         body = in_current_context(target)
 
         def run() -> None:
@@ -125,7 +139,8 @@ class VirtualClock(Clock):
         thread = threading.Thread(target=run, name=name, daemon=daemon)
         turn = _Parked(thread)
         with self._lock:
-            # Queued by the caller, so that the order is that of the calls and not of the operating system.
+            # Queued by the caller, so that the order is that of the calls and not of the operating
+            # system.
             self._members[thread] += 1
             self._parked[turn] = None
             self._release(turn, fired=False)
@@ -144,7 +159,10 @@ class VirtualClock(Clock):
 
     @contextmanager
     def attached(self) -> Iterator[VirtualClock]:
-        """The calling thread is a member inside the block: time waits for it. Example: `with clock.attached(): ...`."""
+        """The calling thread is a member inside the block: time waits for it.
+
+        Example: `with clock.attached(): ...`.
+        """
         me = threading.current_thread()
         turn = _Parked(me)
         with self._lock:
@@ -202,7 +220,9 @@ class VirtualClock(Clock):
             self._ready.append(parked)
 
     def _dispatch(self) -> None:
-        """Give the turn to the next ready thread, moving time on if there is none. The lock is held."""
+        """Give the turn to the next ready thread, moving time on if there is none. The lock is
+        held.
+        """
         while self._holder is None:
             while not self._ready:
                 if not self._timed:
@@ -232,7 +252,9 @@ class VirtualClock(Clock):
                 if self._holder is None and parked.thread in self._members:
                     self._holder = parked.thread
             raise ClockStalled(
-                f"virtual time has stood still at {self._now:.6f} s for {self._stall_limit:g} s of wall time: {running} "
-                f"is running, {waiting} wait; a running thread must wait through the clock, and an event that "
+                f"virtual time has stood still at {self._now:.6f} s for {self._stall_limit:g} s of "
+                f"wall time: {running} "
+                f"is running, {waiting} wait; a running thread must wait through the clock, and an "
+                "event that "
                 f"is waited for without a time limit must be set by somebody"
             )

@@ -1,0 +1,62 @@
+"""Asks a running system for one handover, as any user can, and waits for its end. Used by the demo and the whole-system tests."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import rospkg
+import rospy
+import yaml
+from coglab_msgs.srv import Start
+
+from coglab_bringup.trial_recorder import Trial, TrialRecorder, summarise
+
+READY_LIMIT = 90.0  # s until the system waits in its hub
+HANDOVER_LIMIT = 60.0  # s for one handover
+HUBS = ("wait_without_object", "wait_with_object")
+MASTER = "/coglab_master"
+
+
+def ask_for(action: str, object_id: str, alive: Callable[[], bool], limit: float) -> None:
+    """Calls /coglab/start until the master machine takes the action. Raises RuntimeError with its last refusal."""
+    deadline = time.monotonic() + limit
+    refusal = "the service /coglab/start never appeared"
+    while time.monotonic() < deadline and alive():
+        try:
+            rospy.wait_for_service("/coglab/start", timeout=1.0)
+            answer = rospy.ServiceProxy("/coglab/start", Start)(action, object_id)
+        except rospy.ROSException:
+            continue
+        except rospy.ServiceException as error:
+            refusal = str(error)
+        else:
+            if answer.success:
+                return
+            refusal = answer.message
+        time.sleep(0.2)
+    raise RuntimeError(f"{action} was not taken within {limit:.0f} s: {refusal}")
+
+
+def run_handover(kind: str, object_id: str, alive: Callable[[], bool]) -> tuple[dict, Trial, float, float]:
+    """Asks for one handover and waits for the hub after it; its result row, its record, and when it began and ended."""
+    table = Path(rospkg.RosPack().get_path("lwr_description")) / "config" / "joint_limits.yaml"
+    limits = np.array(yaml.safe_load(table.read_text())["default"]["velocity"])
+    recorder = TrialRecorder()
+    ask_for(kind, object_id, alive, READY_LIMIT)
+    start = rospy.get_time()
+
+    def ended() -> list[tuple]:
+        return [row for row in recorder.trial.transitions if row[1] == MASTER and row[2] == kind and row[4] in HUBS]
+
+    recorder.wait_for(lambda: bool(ended()) or not alive(), HANDOVER_LIMIT)
+    end = rospy.get_time()
+    trial = recorder.stop()
+    if ended():
+        _, _, _, outcome, _, reason = ended()[0]
+        outcome = "success" if outcome == "succeeded" else f"{outcome}: {reason}"
+    else:
+        outcome = "the system ended" if not alive() else f"no end within {HANDOVER_LIMIT:.0f} s"
+    return summarise(trial, kind, outcome, start, end, limits), trial, start, end
