@@ -1,0 +1,328 @@
+"""Ports without ROS: a kinematic cell in which the machines run in virtual time, for tests and quick trials.
+
+The arm moves its palm with minimum-jerk timing, the hand takes fixed times, the partner follows a small script. Faults
+are attributes that a test sets at any time. Physics belongs to coglab_sim; here only order, timing and outcomes matter.
+"""
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any, Callable, Optional, Sequence
+
+import numpy as np
+from smach.clock import Clock
+
+from .object_database import ObjectDatabase, ObjectError
+from .pending import Pending, Polled, PortError, Ready
+from .ports import ContactEvent, DmpProgress, DmpRequest, HandState, Located, Recognition
+from .pose import Pose
+
+HOME_PALM = Pose(np.array([0.58, -0.15, 0.58]), np.array([0.5, 0.5, 0.5, 0.5]))
+
+
+@dataclass
+class Faults:
+    """What is broken. Sets of names are compared with the port method that is called."""
+
+    dead: set[str] = field(default_factory=set)
+    """ports that never answer: arm, hand, perception, database, contact"""
+    refuse: dict[str, str] = field(default_factory=dict)
+    """port method -> sentence with which it refuses"""
+    not_seen: set[str] = field(default_factory=set)
+    """objects perception does not see"""
+    abort_dmp_after: float = 0.0
+    """s into the motion at which it aborts (0: never)"""
+    abort_reason: str = "goal lost for 1.0 s"
+    arm_disabled: str = ""
+    """reason why motion is not allowed"""
+    empty_grasp: bool = False
+    """the hand closes on nothing"""
+
+
+@dataclass
+class Partner:
+    """The person's script: seconds from the end of the robot's reach to the touch, and to the taking; None: never."""
+
+    touch_after: Optional[float] = 0.8
+    take_after: Optional[float] = 1.0
+    pattern: str = "unknown"
+    pattern_at: float = 0.0
+    """s into the motion at which the pattern is decided"""
+
+
+class SimulatedCell:
+    """State shared by the simulated ports, advanced by looking at the clock: no thread of its own."""
+
+    def __init__(self, clock: Clock, reach_time: float = 1.3, ptp_time: float = 1.0) -> None:
+        self.clock = clock
+        self.faults = Faults()
+        self.partner = Partner()
+        self.reach_time = reach_time
+        self.ptp_time = ptp_time
+        self.calls: list[tuple[float, str]] = []
+        self.active = ""
+        self.loaded: dict[str, str] = {}
+        self.primitives = {"reach_mid", "reach_high", "give_mid"}
+        self.enabled = False
+        self.held = False
+        self.joints = tuple([0.3] * 7)
+        self.reached_at: Optional[float] = None
+        self.motion_started: Optional[float] = None
+        self.hand_positions = (0, 0, 0, 0, 0)
+        self.preshaped = False
+        self.objects: dict[str, Pose] = {"mug": Pose(np.array([0.78, 0.03, 0.43])),
+                                         "human_hand": Pose(np.array([0.86, 0.03, 0.43]))}
+
+    def note(self, what: str) -> None:
+        """Remember a call with its time."""
+        self.calls.append((self.clock.now(), what))
+
+    def called(self, prefix: str = "") -> list[str]:
+        """Names of the calls so far that begin with ``prefix``."""
+        return [what for _, what in self.calls if what.startswith(prefix)]
+
+    def answer(self, port: str, method: str, after: float, value: Callable[[], Any]) -> Pending:
+        """A pending answer that respects the faults."""
+        self.note(method)
+        if port in self.faults.dead:
+            return Polled(lambda: False, lambda: None)
+        if method in self.faults.refuse:
+            return Ready(error=PortError(self.faults.refuse[method]))
+        due = self.clock.now() + after
+        cancelled = [False]
+
+        def ready() -> bool:
+            return self.clock.now() >= due and port not in self.faults.dead
+
+        def cancel() -> None:
+            cancelled[0] = True
+            self.note(f"cancel {method}")
+
+        return Polled(ready, value, cancel)
+
+
+class SimulatedArm:
+    """ArmPort of the kinematic cell."""
+
+    def __init__(self, cell: SimulatedCell) -> None:
+        self.cell = cell
+        self._request: Optional[DmpRequest] = None
+
+    def load_controller(self, controller_id: str, controller_type: str) -> Pending:
+        return self.cell.answer("arm", "load_controller", 0.1,
+                                lambda: self.cell.loaded.__setitem__(controller_id, controller_type))
+
+    def load_dmps(self, filename: str) -> Pending:
+        return self.cell.answer("arm", "load_dmps", 0.1, lambda: len(self.cell.primitives))
+
+    def lwr_command(self, event: str) -> Pending:
+        def apply() -> str:
+            if event == "start" and not self.cell.held:
+                self.cell.enabled = True
+            if event == "hold":
+                self.cell.held, self.cell.motion_started = True, None
+            if event == "reset":
+                self.cell.held = False
+            return event
+
+        return self.cell.answer("arm", f"lwr {event}", 0.05, apply)
+
+    def motion_allowed(self) -> tuple[bool, str]:
+        if "arm" in self.cell.faults.dead:
+            return False, "/lwr/state is silent"
+        if self.cell.faults.arm_disabled:
+            return False, self.cell.faults.arm_disabled
+        if self.cell.held:
+            return False, "hold is latched; reset first"
+        return self.cell.enabled, "" if self.cell.enabled else "command mode was not asked for"
+
+    def switch_controller(self, controller_id: str) -> Pending:
+        def apply() -> str:
+            if controller_id not in self.cell.loaded:
+                raise PortError(f"controller '{controller_id}' is not loaded")
+            self.cell.active = controller_id
+            self.cell.motion_started = None
+            return self.cell.loaded[controller_id]
+
+        return self.cell.answer("arm", f"switch {controller_id}", 0.02, apply)
+
+    def execute_dmp(self, request: DmpRequest) -> Pending:
+        def apply() -> None:
+            self._check(request)
+            self._request = request
+            self.cell.motion_started, self.cell.reached_at = self.cell.clock.now(), None
+
+        return self.cell.answer("arm", "execute_dmp", 0.02, apply)
+
+    def _check(self, request: DmpRequest) -> None:
+        if self.cell.active != "dmp":
+            raise PortError(f"execute_dmp refused: '{self.cell.active}' is the active controller")
+        if request.primitive_id not in self.cell.primitives:
+            raise PortError(f"primitive '{request.primitive_id}' does not exist; loaded: "
+                            f"{', '.join(sorted(self.cell.primitives))}")
+
+    def switch_dmp(self, request: DmpRequest) -> Pending:
+        def apply() -> None:
+            self._check(request)
+            self._request = request
+
+        return self.cell.answer("arm", f"switch_dmp {request.primitive_id}", 0.02, apply)
+
+    def dmp_progress(self) -> DmpProgress:
+        cell = self.cell
+        if cell.motion_started is None or self._request is None:
+            return DmpProgress("idle")
+        t = cell.clock.now() - cell.motion_started
+        if cell.faults.abort_dmp_after and t >= cell.faults.abort_dmp_after:
+            return DmpProgress("aborted", cell.faults.abort_reason, self._request.primitive_id)
+        if t >= cell.reach_time * self._request.dmp_ratio:
+            cell.reached_at = cell.reached_at or cell.clock.now()
+            return DmpProgress("reached", "", self._request.primitive_id)
+        return DmpProgress("running", "", self._request.primitive_id, 1.0 - t / cell.reach_time)
+
+    def move_ptp(self, position: Sequence[float], max_velocity: Sequence[float]) -> Pending:
+        cell = self.cell
+        if cell.active != "ptp":
+            return Ready(error=PortError(f"add_ptp refused: '{cell.active}' is the active controller"))
+
+        def arrive() -> None:
+            if not self.motion_allowed()[0]:
+                raise PortError("the arm does not follow any more", (self.motion_allowed()[1],))
+            cell.joints = tuple(position)
+
+        return cell.answer("arm", "move_ptp", cell.ptp_time, arrive)
+
+    def joint_positions(self) -> Optional[tuple[float, ...]]:
+        return None if "arm" in self.cell.faults.dead else self.cell.joints
+
+    def hold(self, reason: str) -> Pending:
+        self.cell.held, self.cell.motion_started = True, None
+        return self.cell.answer("arm", "hold", 0.0, lambda: "held")
+
+
+class SimulatedHand:
+    """HandPort of the kinematic cell; the hand is calibrated from the first calibration on."""
+
+    def __init__(self, cell: SimulatedCell) -> None:
+        self.cell = cell
+        self._calibrated = False
+
+    def calibrate(self, mode: str) -> Pending:
+        return self.cell.answer("hand", f"calibrate {mode}", 2.0, lambda: setattr(self, "_calibrated", True))
+
+    def preshape(self, mode: str, level: str) -> Pending:
+        def apply() -> None:
+            self.cell.preshaped, self.cell.hand_positions = True, (200, 40, 40, 40, 40)
+
+        return self.cell.answer("hand", f"preshape {mode}", 0.8, apply)
+
+    def close_on_object(self) -> Pending:
+        def apply() -> None:
+            if not self.cell.preshaped:
+                raise PortError("hand_preshape_close without a preshape")
+            self.cell.hand_positions = (200, 254, 254, 254, 254) if self.cell.faults.empty_grasp else (200, 150, 160, 155, 170)
+
+        return self.cell.answer("hand", "close", 1.0, apply)
+
+    def open(self, speed: int) -> Pending:
+        def apply() -> None:
+            self.cell.preshaped, self.cell.hand_positions = False, (0, 0, 0, 0, 0)
+
+        return self.cell.answer("hand", "open", 0.8, apply)
+
+    def state(self) -> HandState:
+        if "hand" in self.cell.faults.dead:
+            return HandState(message="hand_status is silent")
+        return HandState(True, self._calibrated, False, False, "", self.cell.hand_positions)
+
+
+class SimulatedPerception:
+    """PerceptionPort of the kinematic cell."""
+
+    def __init__(self, cell: SimulatedCell) -> None:
+        self.cell = cell
+        self.places = [Pose(np.array([0.0, 0.0, 0.05]))]
+
+    def init_vision(self, time_limit: float) -> Pending:
+        return self.cell.answer("perception", "init_vision", 0.5, lambda: "ready")
+
+    def locate_object(self, object_id: str, time_limit: float) -> Pending:
+        unseen = object_id in self.cell.faults.not_seen or object_id not in self.cell.objects
+
+        def value() -> Located:
+            if unseen:
+                raise PortError(f"'{object_id}' was not seen within {time_limit:.1f} s")
+            return _located(self.cell.objects[object_id], object_id)
+
+        return self.cell.answer("perception", f"locate {object_id}", time_limit if unseen else 0.05, value)
+
+    def free_places(self, object_id: str, time_limit: float) -> Pending:
+        return self.cell.answer("perception", "free_places", 0.1,
+                                lambda: [_located(place, "", parent="board") for place in self.places])
+
+    def recognition(self) -> Recognition:
+        cell, partner = self.cell, self.cell.partner
+        if cell.motion_started is None or cell.clock.now() - cell.motion_started < partner.pattern_at:
+            return Recognition()
+        return Recognition(partner.pattern, 0.95, partner.pattern != "unknown")
+
+
+def _located(pose: Pose, object_id: str, parent: str = "world") -> Located:
+    frame = object_id if object_id in ("", "human_hand") else f"object_{object_id}"
+    d = pose.to_dict()
+    return Located(frame, parent, tuple(d["xyz"]), tuple(d["quaternion"]), 0.05)
+
+
+class SimulatedDatabase:
+    """DatabasePort over the real object files."""
+
+    def __init__(self, cell: SimulatedCell, database: ObjectDatabase) -> None:
+        self.cell = cell
+        self.database = database
+
+    def get_object(self, object_id: str) -> Pending:
+        def value() -> dict[str, Any]:
+            try:
+                return self.database.get(object_id)
+            except ObjectError as error:
+                raise PortError(str(error)) from None
+
+        return self.cell.answer("database", f"get {object_id}", 0.02, value)
+
+
+class SimulatedContact:
+    """ContactPort of the kinematic cell: the partner's script decides."""
+
+    def __init__(self, cell: SimulatedCell) -> None:
+        self.cell = cell
+        self._mode = ""
+        self._due: Optional[float] = None
+        self.armed_while_moving = False
+
+    def arm(self, mode: str, time_limit: float, settings: dict[str, Any]) -> Pending:
+        cell = self.cell
+        after = cell.partner.touch_after if mode == "contact" else cell.partner.take_after
+        self._mode, self._due = mode, None if after is None else cell.clock.now() + after
+        if cell.motion_started is not None and cell.reached_at is None:
+            self.armed_while_moving = True
+        return cell.answer("contact", f"arm {mode}", 0.01, lambda: None)
+
+    def disarm(self) -> None:
+        if self._mode:
+            self.cell.note("disarm")
+            self._mode = ""
+
+    def event(self) -> Optional[ContactEvent]:
+        if self._due is None or self.cell.clock.now() < self._due or "contact" in self.cell.faults.dead:
+            return None
+        return ContactEvent(self._mode != "release", "simulated", 2.0, f"{self._mode or 'event'} by the partner's script")
+
+
+def simulated_context(clock: Clock, database: ObjectDatabase, config: Any) -> tuple[Any, SimulatedCell]:
+    """A complete context on simulated ports, and the cell behind them."""
+    from .context import Context
+    from .journal import Journal
+    cell = SimulatedCell(clock)
+    ctx = Context(clock=clock, arm=SimulatedArm(cell), hand=SimulatedHand(cell), perception=SimulatedPerception(cell),
+                  database=SimulatedDatabase(cell, database), contact=SimulatedContact(cell), config=config,
+                  journal=Journal(clock.now))
+    return ctx, cell

@@ -1,0 +1,75 @@
+"""Fixtures of the machine tests: the master in virtual time on simulated ports, walked by a script."""
+import threading
+from pathlib import Path
+
+import pytest
+import smach
+from smach.virtual_clock import VirtualClock
+
+from coglab_smach.config import Config
+from coglab_smach.machines import build_master
+from coglab_smach.object_database import ObjectDatabase
+from coglab_smach.simulated_ports import simulated_context
+
+SHARE = Path(__file__).resolve().parent.parent
+
+
+class Trial:
+    """The master on simulated ports. ``run(script)`` executes script(trial) beside the machine, in virtual time."""
+
+    def __init__(self, **overrides):
+        self.clock = VirtualClock()
+        self.database = ObjectDatabase(str(SHARE / "objects"))
+        assert self.database.reload() == []
+        config = Config.load(str(SHARE / "config" / "machines.yaml"),
+                             {"auto_trigger": True, "dmp_library": "library.xml", **overrides})
+        self.ctx, self.cell = simulated_context(self.clock, self.database, config)
+        self.master = build_master(self.ctx)
+        self.error = None
+
+    def run(self, script, limit=600.0):
+        """Walk the machine until the script ends; whatever the script raises is raised here."""
+        with smach.clock.using(self.clock):
+            def scripted():
+                try:
+                    script(self)
+                except BaseException as error:
+                    self.error = error
+                finally:
+                    self.master.request_preempt()
+
+            self.clock.start_thread(scripted, "script")
+            outcome = self.master.execute()
+        if self.error is not None:
+            raise self.error
+        assert outcome == "preempted"
+        return self
+
+    def wait_hub(self, label, limit=120.0):
+        """Wait until a hub (or stopped, fault) is open."""
+        end = self.clock.now() + limit
+        while self.ctx.requests.hub() != label:
+            assert self.clock.now() < end, (
+                f"{label} not reached in {limit} s; hub '{self.ctx.requests.hub()}', why: {self.ctx.journal.why()}\n"
+                + "\n".join(t.sentence() for t in self.ctx.journal.transitions[-15:]))
+            self.clock.sleep(0.05)
+
+    def start(self, action, object_id="mug"):
+        """Trigger an action; it must be accepted."""
+        ok, message = self.ctx.requests.submit(action, object_id)
+        assert ok, message
+        self.clock.sleep(0.1)
+
+    def labels(self, path_end):
+        """Labels of the states that ended in the container whose path ends so, in order."""
+        return [t.from_state for t in self.ctx.journal.transitions if t.path.endswith(path_end)]
+
+    def result(self):
+        """The newest finished action."""
+        return self.ctx.journal.results[-1]
+
+
+@pytest.fixture
+def trial():
+    """A fresh master."""
+    return Trial()

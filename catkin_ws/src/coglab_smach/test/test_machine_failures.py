@@ -1,0 +1,250 @@
+"""Whatever breaks, the machine ends in a hub, in 'stopped' or in 'fault', with a sentence; never stuck, never by opening the hand."""
+import pytest
+from conftest import Trial
+
+
+def failed_exchange(prepare, hub="wait_without_object", action="exchange_human_to_robot", object_id="mug", **overrides):
+    """Run one exchange that is made to fail; returns the trial."""
+    trial = Trial(**overrides)
+
+    def script(t):
+        t.wait_hub("wait_without_object")
+        prepare(t)
+        t.start(action, object_id)
+        t.wait_hub(hub)
+
+    return trial.run(script)
+
+
+def assert_recovered_empty(trial, sentence):
+    result = trial.result()
+    assert result.outcome == "failed_empty"
+    assert sentence in result.reason + " ".join(result.causes), result.reason
+    calls = trial.cell.called()
+    assert "open" in calls and calls[-1] != "execute_dmp"
+    assert trial.ctx.holding == ""
+    assert trial.cell.active == "ptp"
+    home = trial.ctx.config.get("postures.home")
+    assert list(trial.cell.joints) == home
+
+
+def test_object_that_is_not_in_the_database():
+    trial = failed_exchange(lambda t: None, object_id="elephant")
+    assert_recovered_empty(trial, "object 'elephant' is not in the database; it has: ")
+
+
+def test_object_that_is_not_seen():
+    trial = failed_exchange(lambda t: t.cell.faults.not_seen.add("mug"))
+    assert_recovered_empty(trial, "'mug' was not seen within 5.0 s")
+
+
+def test_no_person_means_no_contact_within_the_limit():
+    trial = failed_exchange(lambda t: setattr(t.cell.partner, "touch_after", None))
+    assert_recovered_empty(trial, "contact of an object with the hand within 6.0 s expected")
+
+
+def test_goal_lost_half_way():
+    trial = failed_exchange(lambda t: setattr(t.cell.faults, "abort_dmp_after", 0.6))
+    assert_recovered_empty(trial, "goal lost for 1.0 s")
+    assert trial.ctx.journal.why() == ("wait_stop: the reach was aborted, because goal lost for 1.0 s")
+
+
+def test_primitive_that_does_not_exist():
+    trial = failed_exchange(lambda t: t.cell.primitives.discard("reach_mid"))
+    assert_recovered_empty(trial, "primitive 'reach_mid' does not exist; loaded: give_mid, reach_high")
+
+
+def test_contact_detector_dead():
+    trial = failed_exchange(lambda t: t.cell.faults.dead.add("contact"))
+    assert_recovered_empty(trial, "arming of the contact detector within 2.0 s expected")
+
+
+def test_database_dead_during_a_trial():
+    trial = failed_exchange(lambda t: t.cell.faults.dead.add("database"))
+    assert_recovered_empty(trial, "entry of object 'mug' within 5.0 s expected")
+
+
+def test_hand_closed_on_nothing():
+    trial = failed_exchange(lambda t: setattr(t.cell.faults, "empty_grasp", True))
+    assert_recovered_empty(trial, "the hand closed on nothing")
+
+
+def test_failed_preshape_ends_the_arm_motion_too():
+    trial = failed_exchange(lambda t: t.cell.faults.refuse.__setitem__("preshape cylindrical", "motor 2 is stuck"))
+    assert_recovered_empty(trial, "motor 2 is stuck")
+    assert not trial.cell.called("close")
+
+
+def test_dead_hand_arm_still_goes_home():
+    trial = failed_exchange(lambda t: t.cell.faults.dead.add("hand"))
+    result = trial.result()
+    assert result.outcome == "failed_empty" and "preshape 'cylindrical'" in result.reason
+    assert list(trial.cell.joints) == trial.ctx.config.get("postures.home")
+
+
+def test_dead_arm_node_ends_in_fault_and_can_be_initialised_again():
+    trial = Trial()
+
+    def script(t):
+        t.wait_hub("wait_without_object")
+        t.start("exchange_human_to_robot")
+        t.clock.sleep(1.0)
+        t.cell.faults.dead.add("arm")
+        t.wait_hub("fault")
+        assert "/lwr/state is silent" in t.ctx.journal.why()
+        t.cell.faults.dead.clear()
+        t.start("initialise")
+        t.wait_hub("wait_without_object")
+
+    trial.run(script)
+
+
+def test_failed_start_up_ends_in_fault_with_the_reason():
+    trial = Trial()
+    trial.cell.faults.refuse["load_dmps"] = "library.xml:3: <weights> has 14 numbers, expected 15"
+
+    def script(t):
+        t.wait_hub("fault")
+        assert "library.xml:3" in t.ctx.journal.why()
+        del t.cell.faults.refuse["load_dmps"]
+        t.start("initialise")
+        t.wait_hub("wait_without_object")
+
+    trial.run(script)
+
+
+def test_failure_while_holding_ends_with_the_object_in_the_hand():
+    trial = Trial()
+
+    def script(t):
+        t.wait_hub("wait_without_object")
+        t.start("exchange_human_to_robot")
+        t.wait_hub("wait_with_object")
+        t.cell.partner.take_after = None
+        t.cell.calls.clear()
+        t.start("exchange_robot_to_human")
+        t.wait_hub("wait_with_object")
+
+    trial.run(script)
+    assert trial.result().outcome == "failed_holding"
+    assert "the person's taking of the load" in trial.result().reason
+    assert "open" not in trial.cell.called() and trial.ctx.holding == "mug"
+
+
+@pytest.mark.parametrize("moment", [0.2, 0.9, 1.8, 2.5, 3.4, 4.5])
+def test_stop_holds_never_opens_the_hand_and_needs_a_reset(moment):
+    trial = Trial()
+
+    def script(t):
+        t.wait_hub("wait_without_object")
+        t.cell.calls.clear()
+        t.start("exchange_human_to_robot")
+        t.clock.sleep(moment)
+        t.ctx.stop.press("the operator pressed STOP")
+        t.ctx.arm.hold("STOP")
+        t.wait_hub("stopped", limit=1.0)
+        assert "open" not in t.cell.called()
+        held = t.ctx.holding
+        before = len(t.cell.called())
+        t.clock.sleep(3.0)
+        assert len(t.cell.called()) == before, "something moved after STOP"
+        t.start("reset", "")
+        t.wait_hub("wait_with_object" if held else "wait_without_object")
+
+    trial.run(script)
+    assert "STOP" in trial.ctx.journal.results[-1].reason
+
+
+def test_stop_in_a_hub_is_stopped_too():
+    trial = Trial()
+
+    def script(t):
+        t.wait_hub("wait_without_object")
+        t.ctx.stop.press("the operator pressed STOP")
+        t.wait_hub("stopped")
+        t.start("reset", "")
+        t.wait_hub("wait_without_object")
+
+    trial.run(script)
+
+
+def test_trigger_in_the_wrong_hub_is_refused_with_a_sentence(trial):
+    def script(t):
+        t.wait_hub("wait_without_object")
+        ok, message = t.ctx.requests.submit("exchange_robot_to_human", "mug")
+        assert not ok and message == ("'exchange_robot_to_human' refused: wait_without_object takes "
+                                      "exchange_human_to_robot, take")
+        t.start("exchange_human_to_robot")
+        ok, message = t.ctx.requests.submit("take", "mug")
+        assert not ok and "not in a hub now" in message
+
+    trial.run(script)
+
+
+def test_another_object_named_in_wait_with_object_means_the_one_held(trial):
+    def script(t):
+        t.wait_hub("wait_without_object")
+        t.start("exchange_human_to_robot")
+        t.wait_hub("wait_with_object")
+        t.start("put", "bottle")
+        t.wait_hub("wait_without_object")
+
+    trial.run(script)
+    assert any("the hand holds 'mug'" in t.reason for t in trial.ctx.journal.transitions)
+
+
+def test_no_free_place_keeps_the_object():
+    trial = Trial()
+
+    def script(t):
+        t.wait_hub("wait_without_object")
+        t.start("exchange_human_to_robot")
+        t.wait_hub("wait_with_object")
+        t.ctx.perception.places = []
+        t.start("put")
+        t.wait_hub("wait_with_object")
+
+    trial.run(script)
+    assert trial.result().outcome == "failed_holding" and "no free place" in trial.result().reason
+
+
+def test_a_programming_error_in_a_state_is_a_failure_not_a_stuck_machine():
+    trial = failed_exchange(lambda t: setattr(t.ctx.database, "get_object", None))
+    assert_recovered_empty(trial, "TypeError")
+
+
+def test_recognition_leaves_the_hub_where_configured():
+    trial = Trial(**{"recognition_trigger.enabled": True,
+                     "recognition_trigger.actions": {"offer": "exchange_human_to_robot"}})
+
+    def script(t):
+        t.wait_hub("wait_without_object")
+        t.cell.motion_started = t.clock.now()
+        t.cell.partner.pattern = "offer"
+        t.wait_hub("wait_with_object")
+
+    trial.run(script)
+    assert any("recognition of 'offer'" in t.reason for t in trial.ctx.journal.transitions)
+
+
+def test_every_transition_of_a_failure_carries_its_sentence():
+    trial = failed_exchange(lambda t: t.cell.faults.not_seen.add("mug"))
+    records = [t for t in trial.ctx.journal.transitions if t.outcome in ("failed", "failed_empty")]
+    assert records and all("was not seen" in t.reason for t in records)
+
+
+def test_configuration_is_read_again_while_running(tmp_path):
+    from coglab_smach.config import Config
+    path = tmp_path / "c.yaml"
+    path.write_text("a: {b: 1}\n")
+    warnings = []
+    config = Config.load(str(path), warn=warnings.append)
+    assert config.get("a.b") == 1
+    path.write_text("a: {b: 22}\n")
+    import os
+    os.utime(path, ns=(1, 1))
+    assert config.get("a.b") == 22
+    path.write_text("a: [\n")
+    os.utime(path, ns=(2, 2))
+    assert config.get("a.b") == 22
+    assert len(warnings) == 1 and "stay in force" in warnings[0]

@@ -1,0 +1,169 @@
+"""The machines walk in D4.10's order (section 3.2, Figures 3 to 8): asserted from the journal, not from the code."""
+from conftest import Trial
+
+
+def receive(t):
+    t.wait_hub("wait_without_object")
+    t.start("exchange_human_to_robot")
+    t.wait_hub("wait_with_object")
+
+
+def test_init_loads_configures_and_only_then_calibrates_and_homes(trial):
+    trial.run(lambda t: t.wait_hub("wait_without_object"))
+    assert trial.labels("/coglab_init_robot") == ["load_controllers", "load_dmps", "configure_lwr", "wait_trigger",
+                                                  "calibrate_and_home"]
+    assert set(trial.labels("/coglab_init_system")) == {"coglab_init_vision", "coglab_init_robot"}
+    assert trial.cell.called("load_controller") == ["load_controller"] * 2
+    assert trial.cell.loaded == {"dmp": "coglab/DmpController", "ptp": "coglab/PtpController"}
+
+
+def test_vision_and_robot_are_initialised_in_parallel(trial):
+    trial.run(lambda t: t.wait_hub("wait_without_object"))
+    times = {what: when for when, what in trial.cell.calls}
+    assert times["init_vision"] == times["load_controller"] - 0.1 or times["init_vision"] <= 0.02
+
+
+def test_calibration_and_home_run_concurrently(trial):
+    trial.run(lambda t: t.wait_hub("wait_without_object"))
+    times = {what: when for when, what in trial.cell.calls}
+    assert abs(times["calibrate fast"] - times["move_ptp"]) < 0.1
+
+
+def test_init_waits_for_the_trigger_before_anything_moves():
+    trial = Trial(auto_trigger=False)
+
+    def script(t):
+        t.wait_hub("wait_trigger")
+        t.clock.sleep(5.0)
+        assert not t.cell.called("move_ptp") and not t.cell.called("calibrate")
+        t.start("initialise")
+        t.wait_hub("wait_without_object")
+
+    trial.run(script)
+    assert trial.cell.called("move_ptp")
+
+
+def test_human_to_robot_order(trial):
+    trial.run(receive)
+    assert trial.labels("/exchange_human_to_robot") == [
+        "query_database", "set_dmp_goal", "approach", "switch_to_ptp", "hand_close", "coglab_home_robot"]
+    assert trial.labels("/approach/arm_motion") == ["switch_to_dmp", "execute_dmp", "wait_stop"]
+    order = trial.cell.called()
+    for earlier, later in (("get mug", "locate mug"), ("locate mug", "switch dmp"), ("switch dmp", "execute_dmp"),
+                           ("execute_dmp", "arm contact"), ("arm contact", "close")):
+        assert order.index(earlier) < order.index(later)
+    # The switch to point-to-point, which ends the DMP, comes between contact and closing.
+    assert "switch ptp" in order[order.index("arm contact"):order.index("close")]
+    assert order.index("close") < len(order) - 1 - order[::-1].index("move_ptp")
+    assert trial.ctx.holding == "mug"
+    assert trial.result().outcome == "succeeded"
+
+
+def test_preshape_runs_while_the_arm_moves(trial):
+    trial.run(receive)
+    marks = trial.result().marks
+    assert marks["motion_started"] < marks["preshaped"] < marks["motion_reached"]
+    starts = {what: when for when, what in trial.cell.calls}
+    assert abs(starts["preshape cylindrical"] - starts["switch dmp"]) <= 0.02
+
+
+def test_execute_dmp_only_starts(trial):
+    trial.run(receive)
+    times = {(t.path.rsplit("/", 1)[-1], t.from_state): t.stamp for t in trial.ctx.journal.transitions}
+    assert times[("arm_motion", "execute_dmp")] - times[("arm_motion", "switch_to_dmp")] < 0.1
+    assert times[("arm_motion", "wait_stop")] - times[("arm_motion", "execute_dmp")] > 1.0
+
+
+def test_contact_is_armed_only_after_the_motion_has_ended(trial):
+    trial.run(receive)
+    assert not trial.ctx.contact.armed_while_moving
+    marks = trial.result().marks
+    assert marks["motion_reached"] <= marks["contact"]
+
+
+def test_monitor_switches_the_primitive_once():
+    trial = Trial(**{"monitor.primitives": {"mid": "reach_mid", "high": "reach_high"}})
+    trial.cell.partner.pattern, trial.cell.partner.pattern_at = "high", 0.4
+    trial.run(receive)
+    assert trial.cell.called("switch_dmp") == ["switch_dmp reach_high"]
+    assert any(t.outcome == "switched" for t in trial.ctx.journal.transitions)
+
+
+def test_monitor_keeps_the_primitive_that_fits():
+    trial = Trial(**{"monitor.primitives": {"mid": "reach_mid", "high": "reach_high"}})
+    trial.cell.partner.pattern = "mid"
+    trial.run(receive)
+    assert trial.cell.called("switch_dmp") == []
+
+
+def test_robot_to_human_order_without_a_new_query(trial):
+    def script(t):
+        receive(t)
+        t.cell.calls.clear()
+        t.start("exchange_robot_to_human")
+        t.wait_hub("wait_without_object")
+
+    trial.run(script)
+    assert trial.labels("/exchange_robot_to_human") == ["set_dmp_goal", "approach", "switch_to_ptp", "hand_open",
+                                                        "coglab_home_robot"]
+    assert not trial.cell.called("get")
+    order = trial.cell.called()
+    assert order.index("arm release") < order.index("open")
+    assert "switch ptp" in order[order.index("arm release"):order.index("open")]
+    assert trial.ctx.holding == ""
+
+
+def test_object_delivery_mode_and_pose_travel_as_user_data(trial):
+    def script(t):
+        receive(t)
+        t.start("exchange_robot_to_human")
+        t.wait_hub("wait_without_object")
+
+    trial.run(script)
+    master = trial.master.userdata
+    assert master.object_id == "mug" and master.grasp_name == "side" and master.object_entry["mass"] == 0.31
+    give = trial.master.get_children()["exchange_robot_to_human"].userdata
+    assert give.delivery_name == "handle_first"
+    assert give.delivery_pose["xyz"] == give.goal["offset"] and give.goal["frame"] == "human_hand"
+
+
+def test_take_order_with_preshape_before(trial):
+    def script(t):
+        t.wait_hub("wait_without_object")
+        t.start("take")
+        t.wait_hub("wait_with_object")
+
+    trial.run(script)
+    assert trial.labels("/take") == ["query_database", "approach_board", "set_dmp_goal", "hand_preshape",
+                                     "precise_motion", "switch_to_ptp", "hand_close", "leave_board",
+                                     "coglab_home_robot"]
+    assert set(trial.labels("/approach_board")) == {"locate_object", "move_to_board"}
+    goal = trial.master.get_children()["take"].userdata.goal
+    assert goal["frame"] == "object_mug" and goal["offset"] == [0.0, -0.04, 0.0]
+
+
+def test_take_with_preshape_during_the_precise_motion():
+    trial = Trial(**{"take.preshape": "during"})
+
+    def script(t):
+        t.wait_hub("wait_without_object")
+        t.start("take")
+        t.wait_hub("wait_with_object")
+
+    trial.run(script)
+    assert "hand_preshape" not in trial.labels("/take")
+    assert "hand_preshape" in trial.labels("/take/precise_motion")
+
+
+def test_put_asks_for_free_places_while_moving(trial):
+    def script(t):
+        receive(t)
+        t.start("put")
+        t.wait_hub("wait_without_object")
+
+    trial.run(script)
+    assert trial.labels("/put") == ["approach_board", "set_dmp_goal", "precise_motion", "switch_to_ptp", "hand_open",
+                                    "leave_board", "coglab_home_robot"]
+    times = {what: when for when, what in trial.cell.calls}
+    assert "free_places" in times
+    assert trial.master.get_children()["put"].userdata.goal["frame"] == "board"
