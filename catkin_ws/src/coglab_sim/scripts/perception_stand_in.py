@@ -4,7 +4,7 @@
 Subscribes truth/cell (relative name) and broadcasts the tf frames of frames.yaml: human_hand, object_<id>, board.
 Serves /perception/init_vision, /perception/locate_object, /perception/free_places.
 Parameters (private): settings (mapping, see PerceptionSettings), perfect, seed, frames (mapping of names), board
-(xyz, slots: name -> [x, y, z] in the board frame).
+(xyz m, yaw_deg, slots: name -> [x, y, z] in the board frame).
 """
 import sys
 import threading
@@ -17,7 +17,7 @@ from coglab_msgs.msg import CellTruth
 from coglab_msgs.srv import (FreePlaces, FreePlacesResponse, InitVision, InitVisionResponse, LocateObject,
                              LocateObjectResponse)
 from coglab_sim.perception_stand_in import Board, PerceptionSettings, Sight, Tracker
-from coglab_sim.rigid import Frame
+from coglab_sim.rigid import Frame, quat_from_rotvec
 from geometry_msgs.msg import Point, PoseStamped, Quaternion, TransformStamped, Vector3
 
 OLDEST = 0.5
@@ -43,9 +43,10 @@ class PerceptionNode:
         self.board_frame = names.get("board", "board")
         self.object_pattern = names.get("object", "object_{id}")
         self.world = names.get("world", "world")
-        board = dict(rospy.get_param("~board", {"xyz": [0.70, -0.30, 0.30], "slots": {"A1": [0.0, 0.0, 0.05],
-                                                                                       "A2": [0.0, 0.15, 0.05]}}))
-        self.board = Board(Frame(np.array(board["xyz"], dtype=float)),
+        board = dict(rospy.get_param("~board", {"xyz": [0.45, -0.55, -0.05], "yaw_deg": -90.0,
+                                                "slots": {"A1": [0.0, 0.0, 0.0]}}))
+        turn = quat_from_rotvec([0.0, 0.0, np.radians(float(board.get("yaw_deg", 0.0)))])
+        self.board = Board(Frame(np.array(board["xyz"], dtype=float), turn),
                            {name: np.array(place, dtype=float) for name, place in board["slots"].items()})
         self.lock = threading.Condition()
         self.trackers: dict[str, Tracker] = {}

@@ -139,7 +139,7 @@ def test_take_order_with_preshape_before(trial):
                                      "coglab_home_robot"]
     assert set(trial.labels("/approach_board")) == {"locate_object", "move_to_board"}
     goal = trial.master.get_children()["take"].userdata.goal
-    assert goal["frame"] == "object_mug" and goal["offset"] == [0.0, -0.04, 0.0]
+    assert goal["frame"] == "object_mug" and goal["offset"] == [0.0, -0.04, 0.05]
 
 
 def test_take_with_preshape_during_the_precise_motion():

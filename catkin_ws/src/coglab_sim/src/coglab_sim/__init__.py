@@ -1,1 +1,1 @@
-"""Python side of the simulated cell: the virtual human and the perception stand-in. No ROS client library in here."""
+"""The simulated cell of CogLab: what answers behind the wires when no robot is there."""

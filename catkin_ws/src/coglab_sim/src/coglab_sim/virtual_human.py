@@ -21,11 +21,11 @@ class Scene:
     """Where things are. The hand frame is world-aligned; a held object sits at ``object_in_hand`` in it."""
 
     rest: np.ndarray = field(default_factory=lambda: np.array([1.30, 0.20, 0.15]))
-    handover_object: np.ndarray = field(default_factory=lambda: np.array([0.78, 0.03, 0.43]))
+    handover_object: np.ndarray = field(default_factory=lambda: np.array([0.78, 0.03, 0.39]))
     """nominal position of the object at a handover"""
-    region_low: np.ndarray = field(default_factory=lambda: np.array([0.72, -0.12, 0.33]))
-    region_high: np.ndarray = field(default_factory=lambda: np.array([0.81, 0.16, 0.50]))
-    object_in_hand: np.ndarray = field(default_factory=lambda: np.array([-0.08, 0.0, 0.0]))
+    region_low: np.ndarray = field(default_factory=lambda: np.array([0.72, -0.12, 0.29]))
+    region_high: np.ndarray = field(default_factory=lambda: np.array([0.81, 0.16, 0.46]))
+    object_in_hand: np.ndarray = field(default_factory=lambda: np.array([-0.08, 0.0, -0.05]))
     object_mass: float = 0.31
     other_side: float = -0.16
     """m, lateral shift of the handover point by a person who changes side"""

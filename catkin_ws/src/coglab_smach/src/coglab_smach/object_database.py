@@ -211,12 +211,12 @@ default_grasp: side
 grasps:
   side:
     hand: {{mode: cylindrical, level: medium}}
-    pose: {{xyz: [0.0, -0.03, 0.0], quaternion: [0.5, 0.5, 0.5, 0.5]}}   # ih2_palm in the object frame at contact
+    pose: {{xyz: [0.0, -0.03, 0.06], quaternion: [0.5, 0.5, 0.5, 0.5]}}   # ih2_palm in the object frame at contact
     approach: {{axis: [0.0, 1.0, 0.0], distance: 0.025}}                 # the reach ends this far before it
 default_delivery: offer
 deliveries:
   offer:
-    pose: {{xyz: [-0.10, 0.0, 0.0], rpy_deg: [0, 0, 0]}}                 # object in the human hand frame
+    pose: {{xyz: [-0.10, 0.0, -0.06], rpy_deg: [0, 0, 0]}}               # object in the human hand frame
     release: {{rule: load_share, threshold: 0.6, timeout: 8.0}}
 dmp: {{receive: reach_mid, give: give_mid, take: reach_mid, put: reach_mid, dmp_ratio: 1.0}}
 contact: {{k: 6.0, timeout: 6.0}}

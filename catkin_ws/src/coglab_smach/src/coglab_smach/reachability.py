@@ -19,7 +19,7 @@ HOME = (-1.4349, -0.6086, 1.4986, 1.7048, 0.1857, 0.2152, 0.782)
 JOINT_LIMIT = np.radians([170, 120, 170, 120, 170, 120, 170])
 POSITION_TOLERANCE = 0.003
 ANGLE_TOLERANCE = np.radians(3.0)
-REGION = ((0.72, 0.78, 0.82), (-0.12, 0.0, 0.12), (0.33, 0.43, 0.50))
+REGION = ((0.72, 0.78, 0.82), (-0.12, 0.0, 0.12), (0.28, 0.38, 0.45))
 """m, base frame: object positions at a handover."""
 
 

@@ -88,19 +88,22 @@ class RosHand:
 
     def calibrate(self, mode: str) -> Pending:
         """Publish the order once the hand listens, then follow hand_status: started, ended, or refused in words."""
-        begun = {"sent": 0.0, "seen": False, "message": ""}
+        begun = {"sent": 0.0, "seen": False, "asked": time.monotonic()}
 
         def done() -> bool:
             state = self.state()
             if not begun["sent"]:
-                if state.connected and self._calibration.get_num_connections() > 0:
-                    begun["message"] = state.message
+                # After a start the hand counts as holding until a poll has shown it empty: give it 2 s for that.
+                settled = not state.holding or time.monotonic() - begun["asked"] > 2.0
+                if state.connected and settled and self._calibration.get_num_connections() > 0:
                     self._calibration.publish(String(mode))
                     begun["sent"] = time.monotonic()
                 return False
             if state.calibrating:
                 begun["seen"] = True
                 return False
+            if "refused" in state.message and time.monotonic() - begun["sent"] > 0.2:
+                raise PortError(f"the hand does not calibrate after the order '{mode}'", (state.message,))
             if begun["seen"] or (state.calibrated and time.monotonic() - begun["sent"] > 0.5):
                 return True
             if time.monotonic() - begun["sent"] > 3.0:

@@ -232,7 +232,8 @@ class SimulatedHand:
     def state(self) -> HandState:
         if "hand" in self.cell.faults.dead:
             return HandState(message="hand_status is silent")
-        return HandState(True, self._calibrated, False, False, "", self.cell.hand_positions)
+        closed = self.cell.hand_positions[2] > 100 and not self.cell.faults.empty_grasp
+        return HandState(True, self._calibrated, False, closed, "", self.cell.hand_positions)
 
 
 class SimulatedPerception:

@@ -53,12 +53,11 @@ class HandClose(CoglabState):
         self.await_pending(self.ctx.hand.close_on_object(), "closing of the hand")
         self.ctx.journal.mark("closed")
         self.pause(float(self.ctx.config.get("hand.settle_after_close", 0.3)))
-        positions = self.ctx.hand.state().positions
-        empty_above = int(self.ctx.config.get("hand.empty_above", 245))
-        # Motor 0 abducts the thumb: it says nothing about an object.
-        if positions and all(p >= empty_above for p in positions[1:]):
+        state = self.ctx.hand.state()
+        if state.connected and not state.holding:
             self.ctx.holding = ""
-            raise PortError(f"the hand closed on nothing: flexion motors at {list(positions[1:])} of 254")
+            raise PortError(f"the hand closed on nothing: motors at {list(state.positions)} of 254",
+                            (state.message,) if state.message else ())
         return "succeeded"
 
 
