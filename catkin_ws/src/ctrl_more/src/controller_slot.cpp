@@ -45,6 +45,8 @@ void ControllerSlot::configure(const GainValues& gains, const SettingValues& set
   stage_ = description.stage;
   c.gains_ = gains;
   c.log_ = LogSource(logger, c.name_, cycle);
+  const std::string complaint = c.judgeGains(gains);
+  if (!complaint.empty()) throw std::invalid_argument(complaint);
   Setup setup(c.name_, description, gains, settings, robot, control, owner_);
   c.initialize(setup);
   setup.resolveAll();

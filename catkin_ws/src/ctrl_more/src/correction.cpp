@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
@@ -17,6 +18,14 @@ using ConstQuaternion = Eigen::Map<const Eigen::Quaterniond>;
 // Doubles before the quaternion; all of them for a vector.
 int linearPart(SignalKind kind, int size) { return kind == SignalKind::Vector ? size : size - 4; }
 
+bool isIdentity(SignalKind kind, int size, const double* c) {
+  const int n = kind == SignalKind::Vector ? size : size - 1;
+  for (int i = 0; i < n; ++i) {
+    if (c[i] != 0.0) return false;
+  }
+  return kind == SignalKind::Vector || c[size - 1] == 1.0;
+}
+
 }  // namespace
 
 void setIdentity(SignalKind kind, int size, double* c) {
@@ -27,12 +36,22 @@ void setIdentity(SignalKind kind, int size, double* c) {
 void difference(SignalKind kind, int size, const double* before, const double* after, double* c) {
   const int n = linearPart(kind, size);
   for (int i = 0; i < n; ++i) c[i] = after[i] - before[i];
+  if (kind != SignalKind::Vector &&
+      std::memcmp(before + n, after + n, 4 * sizeof(double)) == 0) {
+    setIdentity(kind, 4, c + n);
+    return;
+  }
   if (kind == SignalKind::Vector) return;
   Quaternion(c + n) =
       (ConstQuaternion(after + n) * ConstQuaternion(before + n).conjugate()).normalized();
 }
 
 void apply(SignalKind kind, int size, const double* before, const double* c, double* out) {
+  if (isIdentity(kind, size, c)) {
+    // No correction keeps every bit: signs of zeros, and quaternions that are unit only nearly.
+    if (out != before) std::copy(before, before + size, out);
+    return;
+  }
   const int n = linearPart(kind, size);
   for (int i = 0; i < n; ++i) out[i] = before[i] + c[i];
   if (kind == SignalKind::Vector) return;

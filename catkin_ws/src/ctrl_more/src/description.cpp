@@ -16,6 +16,8 @@ RobotSignalUse& RobotSignalUse::keyFrom(const std::string& setting) {
 }
 RobotSignalUse& RobotSignalUse::maxAge(double seconds) { max_age_s = seconds; return *this; }
 
+RobotSignalUse& RobotSignalUse::ifAsked() { if_asked = true; return *this; }
+
 ControlSignalUse& ControlSignalUse::size(int n) { sizes.push_back(n); return *this; }
 ControlSignalUse& ControlSignalUse::in(const std::string& units) { unit = units; return *this; }
 ControlSignalUse& ControlSignalUse::frameOf(const std::string& name) {
@@ -36,6 +38,8 @@ ControlSignalUse& ControlSignalUse::whenPaused(StopPolicy policy) {
   on_pause = policy;
   return *this;
 }
+
+ControlSignalUse& ControlSignalUse::ifAsked() { if_asked = true; return *this; }
 
 GainSpec& GainSpec::vector(int n, double value) {
   size = n;
@@ -59,6 +63,7 @@ SettingSpec& SettingSpec::range(double smallest, double largest) {
   max = largest;
   return *this;
 }
+SettingSpec& SettingSpec::anySize() { any_size = true; return *this; }
 SettingSpec& SettingSpec::in(const std::string& units) { unit = units; return *this; }
 SettingSpec& SettingSpec::about(const std::string& words) { text = words; return *this; }
 

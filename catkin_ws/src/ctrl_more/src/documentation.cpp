@@ -51,8 +51,10 @@ std::string limitText(const CorrectionLimit& limit) {
   return text.empty() ? "none" : text;
 }
 
-std::string keyText(const std::string& role, const std::string& setting) {
-  return setting.empty() ? "`" + role + "`" : "`" + role + "` (key: setting `" + setting + "`)";
+std::string keyText(const std::string& role, const std::string& setting, bool if_asked) {
+  std::string text = "`" + role + "`";
+  if (!setting.empty()) text += " (key: setting `" + setting + "`)";
+  return if_asked ? text + ", depends on settings" : text;
 }
 
 }  // namespace
@@ -111,7 +113,7 @@ std::string documentationPage(const Description& d) {
     out << "| signal | map | size | unit | frame | largest age | meaning |\n"
         << "| --- | --- | --- | --- | --- | --- | --- |\n";
     for (const RobotSignalUse& s : d.robot_signals) {
-      out << "| " << keyText(s.role, s.key_setting) << " | " << nameOf(s.source) << " | "
+      out << "| " << keyText(s.role, s.key_setting, s.if_asked) << " | " << nameOf(s.source) << " | "
           << sizesText(s.sizes, 0) << " | " << s.unit << " | " << s.frame << " | "
           << ageText(s.max_age_s) << " | " << s.text << " |\n";
     }
@@ -122,7 +124,7 @@ std::string documentationPage(const Description& d) {
       << "| --- | --- | --- | --- | --- | --- | --- | --- | --- |\n";
   for (const ControlSignalUse& s : d.control_signals) {
     const char* by_kind = kindOf(s.container) == SignalKind::Vector ? "fade" : "hold";
-    out << "| " << keyText(s.role, s.key_setting) << " | " << nameOf(s.container) << " | "
+    out << "| " << keyText(s.role, s.key_setting, s.if_asked) << " | " << nameOf(s.container) << " | "
         << (s.container == ControlContainer::JointSpaceReference && s.sizes.empty()
                 ? "joints"
                 : sizesText(s.sizes, fixedSizeOf(s.container)))

@@ -152,6 +152,8 @@ Status FeedbackControllersManager::applyToMember(const Change::Step& step, const
         const Status status = checked.set(gain.first, gain.second);
         if (!status) return Status::failure("'" + member.name + "': " + status.message());
       }
+      const std::string complaint = member.slot->controller().judgeGains(checked);
+      if (!complaint.empty()) return Status::failure("'" + member.name + "': " + complaint);
       state.gains = std::make_shared<const GainValues>(checked);
       ++state.gains_revision;
       break;

@@ -74,7 +74,7 @@ Status SettingValues::set(const std::string& name, const std::vector<double>& nu
   const int i = indexOf(name, SettingSpec::Kind::Numbers);
   if (i < 0) return Status::failure("'" + name + "' is no numeric setting");
   const SettingSpec& spec = specs_[i];
-  if (numbers.size() != spec.initial.size()) {
+  if (numbers.empty() || (!spec.any_size && numbers.size() != spec.initial.size())) {
     return Status::failure("'" + name + "' expects " + std::to_string(spec.initial.size()) +
                            " numbers, got " + std::to_string(numbers.size()));
   }
@@ -207,12 +207,16 @@ ModifySignal Setup::modify(const std::string& role, int size) {
 }
 
 void Setup::resolveAll() {
-  for (ResolvedRobotUse& entry : robot_uses_) {
-    if (!entry.signal.valid()) resolve(entry, 0);
-  }
-  for (ResolvedControlUse& entry : control_uses_) {
-    if (!entry.signal.valid()) resolve(entry, 0);
-  }
+  const auto resolve_or_drop = [this](auto& uses) {
+    for (auto& entry : uses) {
+      if (!entry.signal.valid() && !entry.use.if_asked) resolve(entry, 0);
+    }
+    uses.erase(std::remove_if(uses.begin(), uses.end(),
+                              [](const auto& entry) { return !entry.signal.valid(); }),
+               uses.end());
+  };
+  resolve_or_drop(robot_uses_);
+  resolve_or_drop(control_uses_);
 }
 
 }  // namespace ctrl_more

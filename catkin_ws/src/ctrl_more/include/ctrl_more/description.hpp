@@ -36,6 +36,7 @@ struct RobotSignalUse {
   std::string frame;        ///< required
   std::string text;         ///< what it is, layout included; required
   double max_age_s = kUnlimited;  ///< older data stop the controller until fresh ones come
+  bool if_asked = false;  ///< used only if initialize() asks for it, by its settings
 
   RobotSignalUse& size(int n);                     ///< allows one more size
   RobotSignalUse& in(const std::string& units);    ///< sets the unit
@@ -43,6 +44,7 @@ struct RobotSignalUse {
   RobotSignalUse& about(const std::string& words);   ///< sets the text
   RobotSignalUse& keyFrom(const std::string& setting);  ///< names the text setting with the key
   RobotSignalUse& maxAge(double seconds);            ///< sets the largest age [s]
+  RobotSignalUse& ifAsked();                         ///< makes the use depend on settings
 };
 
 /// Bounds on what a controller may do to one signal; beyond them its writes are undone.
@@ -66,6 +68,7 @@ struct ControlSignalUse {
   bool exclusive = false;   ///< no other enabled controller may modify the signal
   CorrectionLimit limit;    ///< bounds on the correction
   StopPolicy on_pause = StopPolicy::ByKind;  ///< the correction while paused
+  bool if_asked = false;  ///< used only if initialize() asks for it, by its settings
 
   ControlSignalUse& size(int n);                       ///< allows one more size
   ControlSignalUse& in(const std::string& units);      ///< sets the unit
@@ -75,6 +78,7 @@ struct ControlSignalUse {
   ControlSignalUse& alone();                              ///< makes the use exclusive
   ControlSignalUse& bounded(const CorrectionLimit& limits);  ///< sets the bounds
   ControlSignalUse& whenPaused(StopPolicy policy);           ///< sets on_pause
+  ControlSignalUse& ifAsked();  ///< makes the use depend on settings
 };
 
 /// One gain: a number or a vector that may change while the controller runs.
@@ -105,11 +109,13 @@ struct SettingSpec {
   std::string initial_text;          ///< text if the file does not give one
   std::vector<std::string> choices;  ///< allowed texts; empty: any
   std::vector<double> initial;       ///< numbers if the file does not give any
+  bool any_size = false;             ///< the file may give another count of numbers
   double min = -kUnlimited;          ///< smallest number allowed
   double max = kUnlimited;           ///< largest number allowed
 
   SettingSpec& oneOf(const std::vector<std::string>& texts);  ///< sets the allowed texts
   SettingSpec& range(double smallest, double largest);        ///< sets min and max
+  SettingSpec& anySize();                                     ///< allows any count of numbers
   SettingSpec& in(const std::string& units);                  ///< sets the unit
   SettingSpec& about(const std::string& words);               ///< sets the text
 };

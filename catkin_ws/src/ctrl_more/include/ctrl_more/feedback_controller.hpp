@@ -84,6 +84,14 @@ class FeedbackController {
   /// Called in the cycle after gain values changed, before the next update().
   virtual void gainsChanged() {}
 
+  /// Judges gains together (each alone is judged by its range), outside the cycle, before they are
+  /// accepted.
+  /// @return "" if they fit, else one sentence
+  virtual std::string judgeGains(const GainValues& gains) const {
+    static_cast<void>(gains);
+    return "";
+  }
+
   /// Values worth watching, with their names; used for state publishers. Called outside the cycle
   /// on a controller that is not running, and by tests.
   virtual std::vector<std::pair<std::string, double>> state() const { return {}; }

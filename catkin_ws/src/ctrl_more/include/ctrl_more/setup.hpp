@@ -116,7 +116,8 @@ class Setup {
   /// Control period [s]; the true one of each cycle is in Cycle::dt.
   double period() const { return control_.controlPeriod(); }
 
-  /// Resolves everything that was declared and not asked for. Called by the manager afterwards.
+  /// Resolves everything that was declared and not asked for, and drops what is declared to be
+  /// used only if asked for and was not. Called by the manager afterwards.
   void resolveAll();
 
   /// All declared robot signals, in order of declaration; complete after resolveAll().

@@ -1,0 +1,182 @@
+#include <algorithm>
+#include <cmath>
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+
+#include "ctrl_more/prototypes.hpp"
+#include "ctrl_more/so3.hpp"
+#include "second_order.hpp"
+
+namespace ctrl_more {
+
+/// Lets an end-effector yield to the hand that pushes or pulls it, around whatever motion runs.
+/// See doc/controllers/EeAdmittance.md.
+class EeAdmittance : public FeedbackController {
+ public:
+  Description describe() const override;
+  void initialize(Setup& setup) override;
+  void update(const Cycle& cycle, const RobotStates& robot, const ControlStates& original,
+              ModifiedControlStates& modified) override;
+  void reset() override {
+    offset_.setZero();
+    velocity_.setZero();
+  }
+  std::vector<std::pair<std::string, double>> state() const override {
+    return {{"offset_x", offset_[0]}, {"offset_y", offset_[1]}, {"offset_z", offset_[2]}};
+  }
+
+ private:
+  using Vector6 = Eigen::Matrix<double, 6, 1>;
+  bool in_tool_frame_ = false;
+  bool rotates_ = false;
+  RobotSignal wrench_;
+  ModifySignal pose_, twist_;
+  Gain mass_, damping_, stiffness_, inertia_, rotary_damping_, rotary_stiffness_;
+  Gain force_dead_band_, torque_dead_band_, max_offset_, max_angle_, max_velocity_;
+  SecondOrder axis_[6];
+  Vector6 offset_ = Vector6::Zero();    // [m], [rad]
+  Vector6 velocity_ = Vector6::Zero();  // [m/s], [rad/s]
+};
+
+namespace {
+
+// Without a step at its edge, and exactly zero inside.
+Eigen::Vector3d withoutDeadBand(const Eigen::Vector3d& value, double dead_band) {
+  const double size = value.norm();
+  if (size <= dead_band) return Eigen::Vector3d::Zero();
+  return (1.0 - dead_band / size) * value;
+}
+
+// Bounds an offset as a ball, and lets its velocity not point out of it.
+template <typename Offset, typename Velocity>
+void bound(Offset offset, Velocity velocity, double limit) {
+  const double size = offset.norm();
+  if (size <= limit) return;
+  const Eigen::Vector3d direction = offset / size;
+  offset = limit * direction;
+  const double outward = velocity.dot(direction);
+  if (outward > 0.0) velocity -= outward * direction;
+}
+
+}  // namespace
+
+Description EeAdmittance::describe() const {
+  Description d;
+  d.type = "EeAdmittance";
+  d.summary = "Lets the end-effector yield to external force like a mass on a damper and a spring.";
+  d.use =
+      "Write the external wrench at the end-effector (without its own weight and that of the "
+      "object) into `measuredData` under the key of the setting `wrench`, and pose and velocity "
+      "references under the key of the setting `ee`. Runs between the motion controller and the "
+      "inverse kinematics, and shifts pose and velocity together, so that a controller which "
+      "closes its loop on the pose follows.";
+  d.when =
+      "While a person may touch the arm: guiding, waiting, approaching. Switch it off before "
+      "contact detection by force is armed: a yielding hand hides the contact it should feel. "
+      "With stiffness 0 the hand stays where it is led.";
+  d.limitations =
+      "A stiff contact with little virtual mass can oscillate: raise `mass` and `damping`. It is "
+      "no safety function. Rotation yields only with `axes: all`.";
+  d.law =
+      "M \\ddot x + D \\dot x + K x = \\mathrm{deadband}(F_{ext}),\\quad p' = p + x,\\ "
+      "\\dot p' = \\dot p + \\dot x";
+  d.source = "Mass-spring-damper admittance, discretised exactly for a force held over a cycle.";
+  d.information =
+      "Below the dead band, from rest, the references keep their bits. Offset and velocity are "
+      "bounded as balls; at the bound the outward velocity is taken away.";
+  d.publishes = "`offset_x`, `offset_y`, `offset_z`: yielded distance [m].";
+  d.measured("wrench").keyFrom("wrench").size(6).in("N, Nm").frameOf("setting `wrench_frame`")
+      .maxAge(0.1).about("external force and torque on the end-effector");
+  d.modifies(ControlContainer::TaskSpaceReferencePose, "ee").keyFrom("ee").in("m, 1").frameOf(
+      "base").bounded({0.5, 5.0, 1.6, 30.0}).about("the yielded offset is added");
+  d.modifies(ControlContainer::TaskSpaceReferenceVel, "ee").keyFrom("ee").in("m/s, rad/s").frameOf(
+      "base").bounded({5.0, kUnlimited, kUnlimited, kUnlimited}).about(
+      "the velocity of the offset is added");
+  d.gain("mass", 0).vector(3, 4.0).range(0.1, 100.0).in("kg").about("virtual mass, x y z");
+  d.gain("damping", 0).vector(3, 60.0).range(0.0, 1e4).in("N s/m").about("virtual damper, x y z");
+  d.gain("stiffness", 0).vector(3, 200.0).range(0.0, 1e5).in("N/m").about(
+      "virtual spring, x y z; 0: stays where it is led");
+  d.gain("inertia", 0).vector(3, 0.2).range(0.001, 10.0).in("kg m^2").about(
+      "virtual inertia about x y z (axes: all)");
+  d.gain("rotary_damping", 0).vector(3, 3.0).range(0.0, 1e3).in("Nm s/rad").about(
+      "virtual damper about x y z (axes: all)");
+  d.gain("rotary_stiffness", 0).vector(3, 10.0).range(0.0, 1e4).in("Nm/rad").about(
+      "virtual spring about x y z (axes: all)");
+  d.gain("force_dead_band", 3.0).range(0.0, 100.0).in("N").about("forces below it count as zero");
+  d.gain("torque_dead_band", 0.5).range(0.0, 50.0).in("Nm").about(
+      "torques below it count as zero");
+  d.gain("max_offset", 0.15).range(0.0, 0.4).in("m").about("largest distance from the reference");
+  d.gain("max_angle", 0.5).range(0.0, 1.5).in("rad").about("largest turn from the reference");
+  d.gain("max_velocity", 0.25).range(0.0, 2.0).in("m/s").about("largest yielding speed");
+  d.setting("wrench", "wrench").about("key of the wrench in `measuredData`");
+  d.setting("ee", "ee").about("key of pose and velocity references");
+  d.setting("wrench_frame", "base").oneOf({"base", "tool"}).about(
+      "frame the wrench is expressed in");
+  d.setting("axes", "translation").oneOf({"translation", "all"}).about(
+      "whether orientation yields too");
+  return d;
+}
+
+void EeAdmittance::initialize(Setup& setup) {
+  in_tool_frame_ = setup.text("wrench_frame") == "tool";
+  rotates_ = setup.text("axes") == "all";
+  wrench_ = setup.robot("wrench");
+  pose_ = setup.modify("taskSpaceReferencePose/ee");
+  twist_ = setup.modify("taskSpaceReferenceVel/ee");
+  mass_ = setup.gain("mass");
+  damping_ = setup.gain("damping");
+  stiffness_ = setup.gain("stiffness");
+  inertia_ = setup.gain("inertia");
+  rotary_damping_ = setup.gain("rotary_damping");
+  rotary_stiffness_ = setup.gain("rotary_stiffness");
+  force_dead_band_ = setup.gain("force_dead_band");
+  torque_dead_band_ = setup.gain("torque_dead_band");
+  max_offset_ = setup.gain("max_offset");
+  max_angle_ = setup.gain("max_angle");
+  max_velocity_ = setup.gain("max_velocity");
+}
+
+void EeAdmittance::update(const Cycle& cycle, const RobotStates& robot,
+                          const ControlStates& original, ModifiedControlStates& modified) {
+  const auto wrench = robot.view<6>(wrench_);
+  Eigen::Vector3d force = withoutDeadBand(wrench.head<3>(), scalar(force_dead_band_));
+  Eigen::Vector3d torque = withoutDeadBand(wrench.tail<3>(), scalar(torque_dead_band_));
+  if (in_tool_frame_) {
+    const Eigen::Quaterniond tool(original.view<7>(pose_.signal()).tail<4>().data());
+    force = tool * force;
+    torque = tool * torque;
+  }
+  for (int i = 0; i < 3; ++i) {
+    axis_[i].prepare(gain(mass_)[i], gain(damping_)[i], gain(stiffness_)[i], cycle.dt);
+    axis_[i].step(force[i], offset_[i], velocity_[i]);
+  }
+  const double speed = velocity_.head<3>().norm();
+  const double max_velocity = scalar(max_velocity_);
+  if (speed > max_velocity) {
+    // The offset may not run ahead of the velocity that is sent with it.
+    offset_.head<3>() -= cycle.dt * (1.0 - max_velocity / speed) * velocity_.head<3>();
+    velocity_.head<3>() *= max_velocity / speed;
+  }
+  bound(offset_.head<3>(), velocity_.head<3>(), scalar(max_offset_));
+  if (rotates_) {
+    for (int i = 0; i < 3; ++i) {
+      axis_[3 + i].prepare(gain(inertia_)[i], gain(rotary_damping_)[i],
+                           gain(rotary_stiffness_)[i], cycle.dt);
+      axis_[3 + i].step(torque[i], offset_[3 + i], velocity_[3 + i]);
+    }
+    bound(offset_.tail<3>(), velocity_.tail<3>(), scalar(max_angle_));
+  }
+  if (offset_.isZero(0.0) && velocity_.isZero(0.0)) return;  // every bit stays
+  auto pose = modified.at<7>(pose_);
+  pose.head<3>() += offset_.head<3>();
+  if (rotates_) {
+    const Eigen::Quaterniond before(pose.tail<4>().data());
+    pose.tail<4>() = (expOf(offset_.tail<3>()) * before).normalized().coeffs();
+  }
+  modified.at<6>(twist_) += velocity_;
+}
+
+}  // namespace ctrl_more
+
+CTRL_MORE_REGISTER_CONTROLLER(ctrl_more::EeAdmittance, "EeAdmittance")

@@ -1,0 +1,115 @@
+#include <algorithm>
+#include <cmath>
+
+#include <Eigen/Core>
+
+#include "ctrl_more/prototypes.hpp"
+
+namespace ctrl_more {
+
+/// Slows joints that approach the ends of their range. See doc/controllers/JointLimits.md.
+class JointLimits : public FeedbackController {
+ public:
+  Description describe() const override;
+  void initialize(Setup& setup) override;
+  void update(const Cycle& cycle, const RobotStates& robot, const ControlStates& original,
+              ModifiedControlStates& modified) override;
+  std::string judgeGains(const GainValues& gains) const override;
+
+ private:
+  RobotSignal position_;
+  ModifySignal velocity_;
+  Gain influence_, safety_, xi_;
+  std::vector<double> lower_, upper_;  // [rad]
+};
+
+Description JointLimits::describe() const {
+  constexpr double kDegree = 3.14159265358979323846 / 180.0;
+  const double wide = 170.0 * kDegree, narrow = 120.0 * kDegree;
+  Description d;
+  d.type = "JointLimits";
+  d.summary = "Bounds the speed of each joint toward the end of its range.";
+  d.use =
+      "Write measured joint positions into `measuredData` under the key of the setting "
+      "`joint_position`; the velocity reference of the same joints is bounded after inverse "
+      "kinematics. The settings `lower` and `upper` give the range of each joint.";
+  d.when = "Always, with every motion controller whose output is a joint velocity.";
+  d.limitations =
+      "Bounds each joint alone, so near an end the direction of the motion changes. It never "
+      "drives a joint back by itself. The host's own guard stays the last word on limits.";
+  d.law =
+      "\\rho < \\rho_i:\\quad \\dot q_{toward} \\le \\xi \\, \\max(0, \\rho - \\rho_s) / (\\rho_i - "
+      "\\rho_s)";
+  d.source = "Velocity damper near obstacles and limits.";
+  d.information =
+      "Pushed with constant speed, a joint approaches its safety distance by the factor "
+      "1 - xi T / (influence - safety) per cycle and never crosses it while that is >= 0.";
+  d.stage = Stage::Joint;
+  d.safety = true;
+  d.on_switch = SwitchPolicy::Hold;
+  d.measured("joint_position").keyFrom("joint_position").in("rad").frameOf("joint").maxAge(0.1)
+      .about("measured positions, one per joint");
+  d.modifies(ControlContainer::JointSpaceReference, "Velocity").in("rad/s").frameOf("joint")
+      .bounded({100.0, kUnlimited, kUnlimited, kUnlimited}).whenPaused(StopPolicy::Zero)
+      .about("velocity reference, one per joint");
+  d.gain("influence", 0.20).range(0.001, 1.0).in("rad").about(
+      "distance to an end below which the speed is bounded");
+  d.gain("safety", 0.03).range(0.0, 0.5).in("rad").about("distance that is kept");
+  d.gain("xi", 1.0).range(0.001, 10.0).in("rad/s").about("bound at the influence distance");
+  d.setting("joint_position", "joint_position").about(
+      "key of the joint positions in `measuredData`");
+  d.setting("lower", std::vector<double>{-wide, -narrow, -wide, -narrow, -wide, -narrow, -wide})
+      .range(-1000.0, 1000.0).in("rad").anySize().about("lower end of each joint");
+  d.setting("upper", std::vector<double>{wide, narrow, wide, narrow, wide, narrow, wide})
+      .range(-1000.0, 1000.0).in("rad").anySize().about("upper end of each joint");
+  return d;
+}
+
+std::string JointLimits::judgeGains(const GainValues& gains) const {
+  const double influence = gains.scalar(gains.find("influence"));
+  const double safety = gains.scalar(gains.find("safety"));
+  if (influence > safety) return "";
+  return "influence (" + std::to_string(influence) + " rad) must be larger than safety (" +
+         std::to_string(safety) + " rad)";
+}
+
+void JointLimits::initialize(Setup& setup) {
+  lower_ = setup.numbers("lower");
+  upper_ = setup.numbers("upper");
+  const int joints = static_cast<int>(lower_.size());
+  if (lower_.size() != upper_.size()) {
+    throw std::invalid_argument("settings 'lower' and 'upper' must have the same count, got " +
+                                std::to_string(lower_.size()) + " and " +
+                                std::to_string(upper_.size()));
+  }
+  for (int i = 0; i < joints; ++i) {
+    if (!(lower_[i] < upper_[i])) {
+      throw std::invalid_argument("joint " + std::to_string(i) + ": lower must be below upper");
+    }
+  }
+  position_ = setup.robot("joint_position", joints);
+  velocity_ = setup.modify("Velocity", joints);
+  influence_ = setup.gain("influence");
+  safety_ = setup.gain("safety");
+  xi_ = setup.gain("xi");
+}
+
+void JointLimits::update(const Cycle&, const RobotStates& robot, const ControlStates&,
+                         ModifiedControlStates& modified) {
+  const auto q = robot.view(position_);
+  auto qd = modified[velocity_];
+  const double influence = scalar(influence_), safety = scalar(safety_), xi = scalar(xi_);
+  const auto bound = [&](double distance) {
+    return xi * std::max(0.0, distance - safety) / (influence - safety);
+  };
+  for (int i = 0; i < static_cast<int>(lower_.size()); ++i) {
+    const double above = upper_[i] - q[i];
+    const double below = q[i] - lower_[i];
+    if (above < influence && qd[i] > bound(above)) qd[i] = bound(above);
+    if (below < influence && qd[i] < -bound(below)) qd[i] = -bound(below);
+  }
+}
+
+}  // namespace ctrl_more
+
+CTRL_MORE_REGISTER_CONTROLLER(ctrl_more::JointLimits, "JointLimits")
