@@ -33,6 +33,7 @@ Bridge::Bridge(const BridgeConfig& config)
       configurator_(config.krl_convention, config.tool_number, config.requests),
       wanted_mode_(config.mode),
       active_mode_(config.mode) {
+  changes_.push(last_view_);
   publish();
 }
 

@@ -1,0 +1,113 @@
+/// @file
+/// The bridge on ROS (D4.10 Table 1): topics, service, diagnostics and parameters of the namespace `/lwr`. Used by lwr_node and, in one
+/// process with the controller manager, by robot_node.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <vector>
+
+#include <semaphore.h>
+
+#include <coglab_msgs/LwrCommand.h>
+#include <geometry_msgs/WrenchStamped.h>
+#include <ros/callback_queue.h>
+#include <ros/ros.h>
+#include <ros/spinner.h>
+#include <sensor_msgs/JointState.h>
+#include <std_msgs/String.h>
+
+#include "lwr_fri_bridge/bridge.hpp"
+#include "lwr_fri_bridge/fri_thread.hpp"
+
+namespace lwr_fri_bridge {
+
+class BridgeDiagnostics;
+
+/// Reads the parameters of the bridge from the namespace of `nh` (README: table of parameters).
+/// @throws std::exception naming parameter, value and range, or file, line and field of the limits table.
+BridgeConfig readBridgeConfig(const ros::NodeHandle& nh);
+FriThreadOptions readFriThreadOptions(const ros::NodeHandle& nh);
+
+/// Publishes joint_states, external_torques, tool_wrench (all at joint_states_rate or the FRI rate, the lower one) and state
+/// (latched, on change); subscribes target_joint_states and ros_events; serves command. Has its own callback
+/// queue and threads, so a long start does not delay a hold.
+class BridgeRos {
+ public:
+  struct Options {
+    /// true: a control thread of this process feeds port(); target_joint_states is then accepted only while no
+    /// controller is active (setControllerActive). false: target_joint_states is the only source.
+    bool one_process = false;
+    /// Called in the FRI thread after each answer (true) and on idle ticks without datagrams (false): wakes the control
+    /// thread. Must be real-time safe.
+    std::function<void(bool answered)> after_answer;
+  };
+
+  /// Reads the parameters under `nh` (normally ros::NodeHandle("lwr")). @throws std::exception as readBridgeConfig().
+  BridgeRos(const ros::NodeHandle& nh, Options options);
+  ~BridgeRos();
+  BridgeRos(const BridgeRos&) = delete;
+  BridgeRos& operator=(const BridgeRos&) = delete;
+
+  /// Binds the socket, sets the parameter fri_port_bound, starts all threads. @throws std::runtime_error if it cannot bind.
+  void start();
+
+  /// Brakes, requests monitor mode, keeps answering until it comes or its time limit is over, then ends all threads. To be called on
+  /// SIGINT, SIGTERM and at the end of main; works without a roscore. Safe to call twice.
+  void shutdown();
+
+  Bridge& bridge() { return bridge_; }
+  ControlPort& port() { return bridge_.port(); }
+  int boundPort() const { return fri_thread_.port(); }
+
+  /// One process only: whether the control thread's velocities count (true) or those of target_joint_states (false).
+  void setControllerActive(bool active);
+
+  /// Messages on target_joint_states that were refused: not valid / a controller is active / motion is not allowed.
+  struct Refused {
+    std::uint64_t invalid = 0, controller_active = 0, not_allowed = 0;
+  };
+  Refused refused() const;
+
+ private:
+  friend class BridgeDiagnostics;
+
+  void onTarget(const ros::MessageEvent<const sensor_msgs::JointState>& event);
+  void onEvent(const std_msgs::String& message);
+  bool onCommand(coglab_msgs::LwrCommand::Request& request, coglab_msgs::LwrCommand::Response& response);
+  void publishLoop();
+  void publishSample(const Snapshot& snapshot);
+  void publishState(const StateView& view);
+  void reportOutcomes();
+
+  ros::NodeHandle nh_;
+  const Options options_;
+  ros::CallbackQueue queue_;
+  Bridge bridge_;
+  FriThread fri_thread_;
+  std::unique_ptr<ros::AsyncSpinner> spinner_;
+  std::unique_ptr<BridgeDiagnostics> diagnostics_;
+  ros::Publisher joint_states_, external_torques_, tool_wrench_, state_;
+  ros::Subscriber target_, events_;
+  ros::ServiceServer command_;
+  ros::Timer diagnostics_timer_;
+  BoundedThread publisher_;
+  sem_t new_sample_;
+  std::int64_t publish_period_ns_ = 5'000'000;
+  std::int64_t last_post_ns_ = 0;  // FRI thread
+  std::int64_t started_ns_ = 0;
+  std::uint64_t published_sequence_ = 0;
+  std::atomic<bool> stopping_{false};
+  std::atomic<bool> controller_active_{false};
+  bool started_ = false;
+  std::atomic<std::uint64_t> refused_invalid_{0}, refused_active_{0}, refused_blocked_{0};
+  std::mutex tickets_mutex_;
+  std::vector<std::uint32_t> tickets_;  // of ros_events, whose outcomes go to the log
+  sensor_msgs::JointState joint_message_, torque_message_;
+  geometry_msgs::WrenchStamped wrench_message_;
+};
+
+}  // namespace lwr_fri_bridge

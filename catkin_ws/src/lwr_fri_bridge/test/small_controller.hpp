@@ -1,0 +1,135 @@
+/// @file
+/// A robot controller just large enough for the tests of this package: keeps the set-point, extrapolates single losses, runs our own
+/// KRL convention. Independent of coglab_sim, which tests the bridge as a whole.
+#pragma once
+
+#include <cmath>
+#include <cstring>
+#include <string>
+
+#include "lwr_fri_bridge/bridge.hpp"
+
+namespace lwr_fri_bridge::test {
+
+inline BridgeConfig defaultConfig(const std::string& profile = "default") {
+  BridgeConfig config;
+  config.limits = loadJointLimits(LIMITS_FILE, profile);
+  return config;
+}
+
+class SmallController {
+ public:
+  explicit SmallController(double period) : period_(period) {
+    own_ << 0.1, 0.5, -0.2, 1.0, 0.3, -0.4, 0.6;
+    measured_ = own_;
+  }
+
+  /// The datagram of this cycle. `time()` is its time stamp.
+  fri::MeasurementDatagram measure() {
+    fri::MeasurementDatagram m{};
+    m.header = fri::measurementHeader(++counter_, last_answer_);
+    m.state = static_cast<std::uint16_t>(state);
+    m.quality = static_cast<std::uint16_t>(quality);
+    m.control = static_cast<std::uint16_t>(control);
+    m.power = power;
+    m.measurement_period = m.command_period = static_cast<float>(period_);
+    fri::jointsToWire(measured_, m.measured_position);
+    fri::jointsToWire(own_, m.commanded_position);
+    fri::jointsToWire(offset_, m.commanded_position_offset);
+    for (int i = 0; i < 3; ++i) m.commanded_frame[5 * i] = m.commanded_frame_offset[5 * i] = 1.0F;
+    m.commanded_frame[3] = 0.6F;
+    m.krl.ints[15] = fri::kCoglabProgramMark;
+    m.krl.ints[0] = finished_;
+    m.krl.ints[1] = finished_ != 0 ? 1 : 0;
+    now_ns_ += static_cast<std::int64_t>(std::llround(period_ * 1e9));
+    return m;
+  }
+
+  /// Takes the answer, or extrapolates if there is none.
+  void take(const fri::CommandDatagram* answer) {
+    Vector7 next = setPoint();
+    if (answer != nullptr) {
+      last_answer_ = answer->header.counter;
+      next = fri::jointsFromWire(answer->joint_position);
+      runProgram(answer->krl);
+    } else {
+      next += last_step_;
+    }
+    if (state == fri::FriState::Command && power == fri::kAllDrivesOn) {
+      last_step_ = next - setPoint();
+      offset_ = next - own_;
+      if (!blocked) measured_ = setPoint();
+    } else {
+      last_step_.setZero();
+    }
+  }
+
+  /// One whole cycle in lockstep; `lose_measurement` / `lose_answer` drop one of the datagrams.
+  bool cycle(Bridge& bridge, bool lose_measurement = false, bool lose_answer = false) {
+    const fri::MeasurementDatagram m = measure();
+    fri::CommandDatagram answer{};
+    std::uint8_t bytes[fri::kMeasurementSize];
+    fri::encode(m, bytes);
+    bool answered = false;
+    if (!lose_measurement) {
+      answered = bridge.answer(bytes, sizeof bytes, now_ns_, answer);
+      if (answered) this->answer = answer;
+    }
+    take(answered && !lose_answer ? &answer : nullptr);
+    return answered;
+  }
+
+  Vector7 setPoint() const { return own_ + offset_; }
+  std::int64_t now() const { return now_ns_; }
+  double period() const { return period_; }
+  void moveOwn(const Vector7& own) { own_ = own; }
+  void setMeasured(const Vector7& measured) { measured_ = measured; }
+  const Vector7& measured() const { return measured_; }
+  void setCounter(std::uint16_t counter) { counter_ = counter; }
+
+  fri::FriState state = fri::FriState::Monitor;
+  fri::Quality quality = fri::Quality::Perfect;
+  fri::ControlStrategy control = fri::ControlStrategy::Position;
+  std::uint16_t power = fri::kAllDrivesOn;
+  bool obeys = true;    ///< whether the KRL program runs
+  bool blocked = false;  ///< something holds the arm
+  fri::CommandDatagram answer{};
+
+ private:
+  void runProgram(const fri::UserData& krl) {
+    if (!obeys || krl.ints[2] == finished_ || krl.ints[2] == 0) return;
+    finished_ = krl.ints[2];
+    if (krl.ints[0] == 1) {
+      control = static_cast<fri::ControlStrategy>(krl.ints[1] / 10);
+      state = fri::FriState::Command;
+    } else if (krl.ints[0] == 2) {
+      state = fri::FriState::Monitor;
+    }
+  }
+
+  double period_;
+  Vector7 own_, offset_ = Vector7::Zero(), measured_, last_step_ = Vector7::Zero();
+  std::uint16_t counter_ = 100, last_answer_ = 0;
+  std::int32_t finished_ = 0;
+  std::int64_t now_ns_ = 1'000'000'000;
+};
+
+/// Submits `event` and runs cycles until it ends (at most `limit` s of simulated time).
+inline Outcome runEvent(Bridge& bridge, SmallController& robot, const std::string& event, double limit = 20.0) {
+  const std::uint32_t ticket = bridge.submit(event);
+  for (int i = 0; i < static_cast<int>(limit / robot.period()); ++i) {
+    robot.cycle(bridge);
+    const Outcome outcome = bridge.outcome(ticket);
+    if (outcome.code != OutcomeCode::Pending) return outcome;
+  }
+  return Outcome{};
+}
+
+/// Sends a target velocity as the control thread does.
+inline void drive(Bridge& bridge, const SmallController& robot, const Vector7& velocity) {
+  RobotSample sample;
+  bridge.port().newestSample(sample);
+  bridge.port().sendVelocity({velocity, robot.now(), sample.motion_epoch});
+}
+
+}  // namespace lwr_fri_bridge::test

@@ -1,0 +1,410 @@
+/// The bridge in lockstep with a small controller: what Table 1, the supervisor and "failure has a meaning" promise.
+#include <gtest/gtest.h>
+
+#include <random>
+
+#include "small_controller.hpp"
+
+namespace lwr_fri_bridge {
+namespace {
+
+using test::defaultConfig;
+using test::drive;
+using test::runEvent;
+using test::SmallController;
+
+struct Cell {
+  explicit Cell(double period = 0.005, const BridgeConfig& config = defaultConfig()) : bridge(config), robot(period) {}
+  void run(int cycles) {
+    for (int i = 0; i < cycles; ++i) robot.cycle(bridge);
+  }
+  void runDriven(int cycles, const Vector7& velocity) {
+    for (int i = 0; i < cycles; ++i) {
+      drive(bridge, robot, velocity);
+      robot.cycle(bridge);
+    }
+  }
+  void start() {
+    run(3);
+    const Outcome outcome = runEvent(bridge, robot, "start");
+    ASSERT_TRUE(outcome.success()) << describe(outcome);
+    run(1);
+  }
+  Bridge bridge;
+  SmallController robot;
+};
+
+void expectMirror(const Cell& cell, const Vector7& set_point) {
+  for (int i = 0; i < 7; ++i) EXPECT_FLOAT_EQ(cell.robot.answer.joint_position[i], static_cast<float>(set_point[i]));
+}
+
+TEST(Bridge, mirrorsTheSetPointInMonitorModeAndWithoutPower) {
+  Cell cell;
+  cell.run(5);
+  expectMirror(cell, cell.robot.setPoint());
+  // The commanded position counts, not the measured one.
+  cell.robot.setMeasured(cell.robot.setPoint() + Vector7::Constant(0.01));
+  cell.run(1);
+  expectMirror(cell, cell.robot.setPoint());
+
+  cell.start();
+  cell.robot.power = 0x3F;
+  cell.runDriven(20, Vector7::Constant(0.3));
+  expectMirror(cell, cell.robot.setPoint());
+  EXPECT_EQ(cell.bridge.snapshot().supervisor, SupervisorState::Stopped);
+}
+
+TEST(Bridge, answersWithHeaderAndFlags) {
+  Cell cell;
+  cell.robot.setCounter(65534);
+  cell.run(1);
+  EXPECT_EQ(cell.robot.answer.header.reflected, 65535);
+  EXPECT_EQ(cell.robot.answer.header.size, 376);
+  EXPECT_EQ(cell.robot.answer.header.id, 0x1005);
+  const std::uint16_t first = cell.robot.answer.header.counter;
+  cell.run(1);
+  EXPECT_EQ(cell.robot.answer.header.reflected, 0);
+  EXPECT_EQ(cell.robot.answer.header.counter, static_cast<std::uint16_t>(first + 1));
+  EXPECT_EQ(cell.robot.answer.flags, 0x0001U);
+  EXPECT_TRUE(runEvent(cell.bridge, cell.robot, "joint_impedance stiffness 500 damping 0.5").success());
+  cell.run(1);
+  EXPECT_EQ(cell.robot.answer.flags, 0x0035U);
+  EXPECT_FLOAT_EQ(cell.robot.answer.joint_stiffness[3], 500.0F);
+  EXPECT_TRUE(runEvent(cell.bridge, cell.robot, "cartesian_impedance stiffness 1 2 3 4 5 6").success());
+  cell.run(1);
+  EXPECT_EQ(cell.robot.answer.flags, 0x3500U);
+  const float wire[6] = {1, 2, 3, 6, 5, 4};
+  for (int i = 0; i < 6; ++i) EXPECT_FLOAT_EQ(cell.robot.answer.cartesian_stiffness[i], wire[i]);
+  for (int i = 0; i < 7; ++i) EXPECT_EQ(cell.robot.answer.joint_torque[i], 0.0F);
+}
+
+TEST(Bridge, followsVelocitiesAfterStartOnly) {
+  Cell cell;
+  cell.run(3);
+  cell.robot.state = fri::FriState::Command;  // nobody asked
+  const Vector7 before = cell.robot.setPoint();
+  cell.runDriven(100, Vector7::Constant(0.2));
+  EXPECT_TRUE(cell.robot.setPoint().isApprox(before, 1e-6));
+  EXPECT_EQ(cell.bridge.snapshot().supervisor, SupervisorState::Stopped);
+  EXPECT_EQ(cell.bridge.snapshot().sample.block, MotionBlock::NotStarted);
+
+  const Outcome outcome = runEvent(cell.bridge, cell.robot, "start");
+  ASSERT_TRUE(outcome.success()) << describe(outcome);
+  cell.run(2);
+  cell.runDriven(200, Vector7::Constant(0.2));
+  EXPECT_NEAR(cell.robot.setPoint()[0] - before[0], 0.2, 0.01);
+  EXPECT_EQ(cell.bridge.snapshot().supervisor, SupervisorState::Command);
+}
+
+TEST(Bridge, strategyChangesInMonitorModeOnly) {
+  Cell cell;
+  cell.start();
+  const Outcome refused = runEvent(cell.bridge, cell.robot, "joint_impedance");
+  EXPECT_EQ(refused.code, OutcomeCode::InCommandMode);
+  cell.run(1);
+  EXPECT_EQ(cell.robot.answer.flags, 0x0001U);
+  EXPECT_TRUE(runEvent(cell.bridge, cell.robot, "stop").success());
+  EXPECT_TRUE(runEvent(cell.bridge, cell.robot, "joint_impedance").success());
+  cell.start();
+  EXPECT_EQ(cell.robot.control, fri::ControlStrategy::JointImpedance);
+  EXPECT_EQ(cell.robot.answer.flags, 0x0035U);
+}
+
+TEST(Bridge, everyStrategyFollows) {
+  for (const char* mode : {"position", "joint_impedance", "cartesian_impedance"}) {
+    Cell cell;
+    cell.run(2);
+    ASSERT_TRUE(runEvent(cell.bridge, cell.robot, mode).success());
+    cell.start();
+    const float x = cell.robot.answer.cartesian_frame[3], y = cell.robot.answer.cartesian_frame[7];
+    Vector7 velocity = Vector7::Zero();
+    velocity[0] = 0.3;
+    cell.runDriven(100, velocity);
+    EXPECT_GT(cell.bridge.snapshot().sample.commanded_position[0], 0.1 + 0.1) << mode;
+    if (std::string(mode) == "cartesian_impedance") {
+      // Joint 1 turns about the vertical: the frame turns with it.
+      const double angle = cell.bridge.snapshot().sample.commanded_position[0] - 0.1;
+      EXPECT_NEAR(cell.robot.answer.cartesian_frame[3], x * std::cos(angle) - y * std::sin(angle), 1e-3);
+      EXPECT_NEAR(cell.robot.answer.cartesian_frame[7], x * std::sin(angle) + y * std::cos(angle), 1e-3);
+    }
+  }
+}
+
+TEST(Bridge, holdBrakesLatchesAndNeedsReset) {
+  Cell cell;
+  cell.start();
+  Vector7 velocity = Vector7::Constant(0.5);
+  cell.runDriven(60, velocity);
+  EXPECT_NEAR(cell.bridge.snapshot().sample.commanded_velocity[0], 0.5, 1e-9);
+  const std::uint32_t ticket = cell.bridge.submit("hold");
+  cell.runDriven(60, velocity);
+  EXPECT_TRUE(cell.bridge.outcome(ticket).success());
+  EXPECT_TRUE(cell.bridge.snapshot().sample.commanded_velocity.isZero());
+  EXPECT_EQ(cell.bridge.snapshot().supervisor, SupervisorState::Holding);
+  EXPECT_EQ(runEvent(cell.bridge, cell.robot, "start").code, OutcomeCode::Held);
+  const Vector7 held = cell.robot.setPoint();
+  cell.runDriven(50, velocity);
+  EXPECT_TRUE(cell.robot.setPoint().isApprox(held, 1e-7));
+  EXPECT_TRUE(runEvent(cell.bridge, cell.robot, "reset").success());
+  cell.run(2);
+  cell.runDriven(60, velocity);
+  EXPECT_NEAR(cell.bridge.snapshot().sample.commanded_velocity[0], 0.5, 1e-9);
+}
+
+TEST(Bridge, commandsBeforeThePermissionDoNotCount) {
+  Cell cell;
+  cell.run(3);
+  RobotSample sample;
+  cell.bridge.port().newestSample(sample);
+  cell.start();
+  cell.bridge.port().sendVelocity({Vector7::Constant(0.5), cell.robot.now(), sample.motion_epoch});
+  cell.run(5);
+  EXPECT_TRUE(cell.bridge.snapshot().sample.commanded_velocity.isZero());
+  EXPECT_GE(cell.bridge.snapshot().counters.commands_old_epoch, 1U);
+}
+
+TEST(Bridge, stopBrakesThenAsksForMonitorMode) {
+  Cell cell;
+  cell.start();
+  const Vector7 velocity = Vector7::Constant(1.0);
+  cell.runDriven(100, velocity);
+  const std::uint32_t ticket = cell.bridge.submit("stop");
+  bool asked_while_moving = false;
+  double largest_change = 0.0;
+  Vector7 last = cell.bridge.snapshot().sample.commanded_velocity;
+  for (int i = 0; i < 200; ++i) {
+    drive(cell.bridge, cell.robot, velocity);
+    cell.robot.cycle(cell.bridge);
+    const Vector7 now = cell.bridge.snapshot().sample.commanded_velocity;
+    if (cell.robot.answer.krl.ints[0] == 2 && !now.isZero()) asked_while_moving = true;
+    largest_change = std::max(largest_change, (now - last).cwiseAbs().maxCoeff());
+    last = now;
+  }
+  EXPECT_FALSE(asked_while_moving);
+  EXPECT_LE(largest_change, 10.0 * 0.005 * (1 + 1e-9));
+  EXPECT_TRUE(cell.bridge.outcome(ticket).success());
+  EXPECT_EQ(cell.robot.state, fri::FriState::Monitor);
+  EXPECT_EQ(cell.bridge.snapshot().supervisor, SupervisorState::Monitor);
+}
+
+TEST(Bridge, requestsEndWithinTheirTimeLimits) {
+  Cell cell;
+  cell.robot.obeys = false;
+  cell.run(3);
+  const Outcome outcome = runEvent(cell.bridge, cell.robot, "start");
+  EXPECT_EQ(outcome.code, OutcomeCode::NotEntered);
+  EXPECT_NEAR(outcome.waited, 10.0, 0.1);
+  EXPECT_NE(describe(outcome).find("pendant"), std::string::npos);
+
+  cell.robot.obeys = true;
+  cell.robot.quality = fri::Quality::Bad;
+  EXPECT_EQ(runEvent(cell.bridge, cell.robot, "start").code, OutcomeCode::PoorQuality);
+  cell.robot.quality = fri::Quality::Perfect;
+  cell.start();
+  cell.robot.obeys = false;
+  const Outcome stop = runEvent(cell.bridge, cell.robot, "stop");
+  EXPECT_EQ(stop.code, OutcomeCode::NotLeft);
+  EXPECT_NEAR(stop.waited, 2.0, 0.1);
+}
+
+TEST(Bridge, startWithTheWrongStrategyIsNotAccepted) {
+  Cell cell;
+  cell.run(3);
+  const std::uint32_t ticket = cell.bridge.submit("start");
+  cell.robot.obeys = false;
+  cell.run(2);
+  cell.robot.state = fri::FriState::Command;
+  cell.robot.control = fri::ControlStrategy::JointImpedance;
+  cell.run(2);
+  EXPECT_EQ(cell.bridge.outcome(ticket).code, OutcomeCode::WrongStrategy);
+  EXPECT_EQ(cell.robot.answer.krl.ints[0], 2);
+  EXPECT_NE(cell.bridge.snapshot().supervisor, SupervisorState::Command);
+}
+
+TEST(Bridge, holdInterruptsAStart) {
+  Cell cell;
+  cell.robot.obeys = false;
+  cell.run(3);
+  const std::uint32_t start = cell.bridge.submit("start");
+  cell.run(10);
+  EXPECT_EQ(cell.bridge.snapshot().supervisor, SupervisorState::Starting);
+  cell.bridge.submit("hold");
+  cell.run(1);
+  EXPECT_EQ(cell.bridge.outcome(start).code, OutcomeCode::Interrupted);
+  EXPECT_EQ(cell.bridge.snapshot().supervisor, SupervisorState::Holding);
+  cell.run(1);
+  EXPECT_EQ(cell.robot.answer.krl.ints[0], 2);
+}
+
+TEST(Bridge, fallBackLatchesUntilAnExplicitStart) {
+  Cell cell;
+  cell.start();
+  cell.runDriven(60, Vector7::Constant(0.4));
+  const std::uint32_t epoch = cell.bridge.snapshot().sample.motion_epoch;
+  cell.robot.state = fri::FriState::Monitor;
+  cell.run(3);
+  expectMirror(cell, cell.robot.setPoint());
+  EXPECT_EQ(cell.bridge.snapshot().supervisor, SupervisorState::Stopped);
+  EXPECT_NE(cell.bridge.snapshot().sample.motion_epoch, epoch);
+  EXPECT_EQ(cell.bridge.snapshot().fall_backs, 1U);
+  cell.robot.state = fri::FriState::Command;
+  const Vector7 before = cell.robot.setPoint();
+  cell.runDriven(50, Vector7::Constant(0.4));
+  EXPECT_TRUE(cell.robot.setPoint().isApprox(before, 1e-6));
+  EXPECT_TRUE(runEvent(cell.bridge, cell.robot, "start").success());
+  cell.run(1);
+  cell.runDriven(50, Vector7::Constant(0.4));
+  EXPECT_GT(cell.robot.setPoint()[0], before[0] + 0.05);
+}
+
+TEST(Bridge, brakesWhenCommandsStopAndResumes) {
+  Cell cell;
+  cell.start();
+  cell.runDriven(60, Vector7::Constant(0.4));
+  cell.run(40);
+  EXPECT_TRUE(cell.bridge.snapshot().sample.commanded_velocity.isZero());
+  EXPECT_EQ(cell.bridge.snapshot().counters.command_timeouts, 1U);
+  EXPECT_EQ(cell.bridge.snapshot().supervisor, SupervisorState::Command);
+  cell.runDriven(60, Vector7::Constant(0.4));
+  EXPECT_NEAR(cell.bridge.snapshot().sample.commanded_velocity[0], 0.4, 1e-9);
+}
+
+TEST(Bridge, keepsTheLastValidCommandWhenOneIsNotFinite) {
+  Cell cell;
+  cell.start();
+  cell.runDriven(60, Vector7::Constant(0.4));
+  Vector7 broken = Vector7::Constant(0.4);
+  broken[5] = std::nan("");
+  cell.runDriven(3, broken);
+  EXPECT_NEAR(cell.bridge.snapshot().sample.commanded_velocity[5], 0.4, 1e-9);
+  EXPECT_EQ(cell.bridge.snapshot().counters.commands_invalid, 3U);
+  cell.runDriven(60, broken);
+  EXPECT_TRUE(cell.bridge.snapshot().sample.commanded_velocity.isZero());
+}
+
+TEST(Bridge, scalesTheWholeVectorToTheSpeedLimit) {
+  Cell cell;
+  cell.start();
+  Vector7 velocity = Vector7::Constant(1.0);
+  velocity[2] = 4.0;
+  cell.runDriven(100, velocity);
+  const Vector7 v = cell.bridge.snapshot().sample.commanded_velocity;
+  const double limit = cell.bridge.config().limits.velocity[2];
+  EXPECT_NEAR(v[2], limit, 1e-9);
+  EXPECT_NEAR(v[5], limit / 4.0, 1e-9);
+}
+
+/// Single losses: the set-point goes on without a leap and within speed and acceleration limits, as the controller sees it.
+TEST(Bridge, ridesThroughLossesWithoutALeap) {
+  for (const double period : {0.001, 0.005, 0.010}) {
+    Cell cell(period);
+    cell.start();
+    std::mt19937 random(7);
+    std::uniform_real_distribution<double> part(0.0, 1.0);
+    const JointLimits& limits = cell.bridge.config().limits;
+    Vector7 last = cell.robot.setPoint(), last_velocity = Vector7::Zero(), velocity = Vector7::Zero();
+    int losses = 0;
+    for (int i = 0; i < static_cast<int>(8.0 / period); ++i) {
+      if (i % static_cast<int>(0.4 / period) == 0) velocity = Vector7::Constant(0.6 * (i % 2 == 0 ? 1 : -1) * part(random));
+      drive(cell.bridge, cell.robot, velocity);
+      const double dice = part(random);
+      cell.robot.cycle(cell.bridge, dice < 0.05, dice > 0.95);
+      losses += dice < 0.05 || dice > 0.95 ? 1 : 0;
+      const Vector7 v = (cell.robot.setPoint() - last) / period;
+      for (int j = 0; j < 7; ++j) {
+        const double noise = 6e-7 / period;  // float32 on the wire, twice
+        ASSERT_LE(std::abs(v[j]), limits.velocity[j] + noise);
+        ASSERT_LE(std::abs(v[j] - last_velocity[j]), limits.acceleration[j] * period + 2.0 * noise) << i << " " << j;
+      }
+      last = cell.robot.setPoint();
+      last_velocity = v;
+    }
+    const Snapshot s = cell.bridge.snapshot();
+    EXPECT_EQ(s.supervisor, SupervisorState::Command);
+    EXPECT_GT(losses, 50);
+    EXPECT_GT(s.session.lost_measurements, 0U);
+    EXPECT_GT(s.session.lost_answers, 0U);
+    EXPECT_GT(s.counters.resumed_after_gap, 0U);
+  }
+}
+
+TEST(Bridge, noPositionLimitIsCrossedWhateverIsAsked) {
+  for (const double period : {0.001, 0.005, 0.020}) {
+    Cell cell(period);
+    cell.start();
+    std::mt19937 random(3);
+    std::uniform_real_distribution<double> speed(-3.0, 3.0);
+    Vector7 velocity = Vector7::Zero();
+    Vector7 reached = Vector7::Zero();
+    for (int i = 0; i < static_cast<int>(30.0 / period); ++i) {
+      if (i % static_cast<int>(1.5 / period) == 0) {
+        for (int j = 0; j < 7; ++j) velocity[j] = speed(random);
+      }
+      drive(cell.bridge, cell.robot, velocity);
+      cell.robot.cycle(cell.bridge);
+      const Vector7 q = cell.robot.setPoint();
+      reached = reached.cwiseMax(q.cwiseAbs());
+      for (int j = 0; j < 7; ++j) {
+        ASSERT_LE(q[j], cell.bridge.config().limits.upper_position[j]);
+        ASSERT_GE(q[j], cell.bridge.config().limits.lower_position[j]);
+      }
+    }
+    for (int j = 0; j < 7; ++j) {  // the range is not given away either
+      EXPECT_GT(reached[j], cell.bridge.config().limits.upper_position[j] - 0.03) << j;
+    }
+    EXPECT_GT(cell.bridge.snapshot().counters.position_bounds, 0U);
+  }
+}
+
+TEST(Bridge, silenceIsDisconnectionAndEndsRequests) {
+  Cell cell;
+  cell.start();
+  cell.runDriven(20, Vector7::Constant(0.2));
+  const std::uint32_t ticket = cell.bridge.submit("stop");
+  std::int64_t now = cell.robot.now();
+  for (int i = 0; i < 200; ++i) cell.bridge.idle(now += 10'000'000);
+  EXPECT_EQ(cell.bridge.snapshot().supervisor, SupervisorState::Disconnected);
+  const Outcome stop = cell.bridge.outcome(ticket);
+  EXPECT_EQ(stop.code, OutcomeCode::LostConnection);
+  EXPECT_LE(stop.waited, 1.1);
+  EXPECT_EQ(cell.bridge.snapshot().sample.block, MotionBlock::Disconnected);
+}
+
+TEST(Bridge, aNewBridgeStartsNothing) {
+  Cell cell;
+  cell.start();
+  cell.runDriven(50, Vector7::Constant(0.2));
+  // The process died and was started again while the controller is still in command mode.
+  Bridge other(defaultConfig());
+  for (int i = 0; i < 50; ++i) {
+    RobotSample sample;
+    other.port().newestSample(sample);
+    other.port().sendVelocity({Vector7::Constant(0.5), cell.robot.now(), sample.motion_epoch});
+    cell.robot.cycle(other);
+  }
+  EXPECT_TRUE(other.snapshot().sample.commanded_velocity.isZero());
+  EXPECT_EQ(other.snapshot().supervisor, SupervisorState::Stopped);
+}
+
+TEST(Bridge, refusesParametersOutOfRangeByName) {
+  BridgeConfig config = defaultConfig();
+  config.leash_position = 3.0;
+  try {
+    Bridge bridge(config);
+    FAIL() << "accepted";
+  } catch (const std::invalid_argument& error) {
+    const std::string text = error.what();
+    EXPECT_NE(text.find("set_point_leash_position = 3"), std::string::npos) << text;
+    EXPECT_NE(text.find("0.005..0.5"), std::string::npos) << text;
+  }
+}
+
+TEST(Bridge, t1ProfileBoundsSpeed) {
+  Cell cell(0.005, defaultConfig("t1"));
+  cell.start();
+  cell.runDriven(400, Vector7::Constant(1.0));
+  EXPECT_NEAR(cell.bridge.snapshot().sample.commanded_velocity.maxCoeff(), 0.24, 1e-9);
+}
+
+}  // namespace
+}  // namespace lwr_fri_bridge
