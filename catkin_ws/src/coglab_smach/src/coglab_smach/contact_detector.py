@@ -76,6 +76,7 @@ class _Armed:
     load_share: float
     baseline: Optional[np.ndarray] = None
     watched: list[int] = field(default_factory=list)
+    threshold: Optional[np.ndarray] = None
     over: int = 0
     gone_since: Optional[float] = None
 
@@ -203,10 +204,12 @@ class ContactDetector:
             armed.baseline = self._filtered.copy()
             armed.watched = armed.joints or sensitive_joints(self._jacobian(position), self.settings.user_direction,
                                                              self.settings.sensitivity_share)
+            armed.threshold = armed.k * self.sigma()[armed.watched]
             return self._check_offset(armed)
         if armed.mode == "release":
             return self._watch_release(stamp, armed, position)
-        self.margin = float(np.max(np.abs(difference)[armed.watched] / (armed.k * self.sigma()[armed.watched])))
+        assert armed.threshold is not None
+        self.margin = float(np.max(np.abs(difference[armed.watched]) / armed.threshold))
         armed.over = armed.over + 1 if self.margin > 1.0 else 0
         if armed.over < self.settings.confirm:
             return None
