@@ -36,7 +36,34 @@ target_compile_features(coglab_controllers_core PUBLIC cxx_std_17)
 target_compile_options(coglab_controllers_core PRIVATE -Wall -Wextra)
 set_target_properties(coglab_controllers_core PROPERTIES POSITION_INDEPENDENT_CODE ON)
 
+# Python module coglab_controllers._core, beside the Python files of src/coglab_controllers.
+pybind11_add_module(coglab_controllers_python
+  src/python/module.cpp
+  src/python/bind_arm.cpp
+  src/python/bind_dmp.cpp
+  src/python/bind_limits.cpp
+  src/python/bind_motion.cpp)
+target_link_libraries(coglab_controllers_python PRIVATE coglab_controllers_core lwr_fri_bridge)
+set_target_properties(coglab_controllers_python PROPERTIES
+  OUTPUT_NAME _core
+  LIBRARY_OUTPUT_DIRECTORY ${CATKIN_DEVEL_PREFIX}/${CATKIN_PACKAGE_PYTHON_DESTINATION})
+
 install(TARGETS coglab_controllers_core
   ARCHIVE DESTINATION ${CATKIN_PACKAGE_LIB_DESTINATION}
   LIBRARY DESTINATION ${CATKIN_PACKAGE_LIB_DESTINATION}
   RUNTIME DESTINATION ${CATKIN_GLOBAL_BIN_DESTINATION})
+install(TARGETS coglab_controllers_python LIBRARY DESTINATION ${CATKIN_PACKAGE_PYTHON_DESTINATION})
+install(FILES src/coglab_controllers/_core.pyi src/coglab_controllers/py.typed
+  DESTINATION ${CATKIN_PACKAGE_PYTHON_DESTINATION})
+install(FILES config/primitives.xml DESTINATION ${CATKIN_PACKAGE_SHARE_DESTINATION}/config)
+
+if(CATKIN_ENABLE_TESTING)
+  foreach(thing dmp learning library motion kinematics ik ptp limits)
+    catkin_add_gtest(coglab_controllers_test_${thing} test/test_${thing}.cpp)
+    if(TARGET coglab_controllers_test_${thing})
+      target_link_libraries(coglab_controllers_test_${thing} coglab_controllers_core)
+      target_compile_definitions(coglab_controllers_test_${thing} PRIVATE
+        COGLAB_PACKAGE_DIR="${CMAKE_CURRENT_SOURCE_DIR}")
+    endif()
+  endforeach()
+endif()

@@ -107,16 +107,14 @@ Example prepare(const Trajectory& trajectory) {
   return example;
 }
 
-// Turned, scaled and shifted so that start and goal are those of the reference.
-void alignTo(const Example& reference, Example& example) {
+// Mapped and shifted so that start and goal are those of the reference.
+void alignTo(const Example& reference, ShapeMapping mapping, Example& example) {
   const auto line = [](const Example& e) -> Vector3 { return e.positions.rightCols<1>() - e.positions.leftCols<1>(); };
-  const Vector3 from = line(example), to = line(reference);
-  if (from.norm() < 1e-3 || to.norm() < 1e-3) return;
-  const double scale = to.norm() / from.norm();
-  const Matrix3 map = scale * Quaternion::FromTwoVectors(from, to).toRotationMatrix();
+  if (line(example).norm() < 1e-3 || line(reference).norm() < 1e-3) return;
+  const Matrix3 map = shapeMap(mapping, line(example), line(reference));
   const Vector3 start = example.positions.col(0), reference_start = reference.positions.col(0);
-  example.positions = (map * (example.positions.colwise() - start)).colwise() + reference_start;
-  example.scale *= scale;
+  example.scale *= line(reference).norm() / line(example).norm();
+  example.positions = ((map * (example.positions.colwise() - start)).colwise() + reference_start).eval();
 }
 
 }  // namespace
@@ -139,7 +137,7 @@ Primitive learn(const std::string& id, const std::vector<Trajectory>& demonstrat
     } catch (const std::invalid_argument& error) {
       throw std::invalid_argument("demonstration " + std::to_string(i + 1) + ": " + error.what());
     }
-    if (options.mapping == ShapeMapping::Similarity) alignTo(examples.front(), examples.back());
+    if (options.mapping != ShapeMapping::None && i > 0) alignTo(examples.front(), options.mapping, examples.back());
   }
 
   Primitive primitive;

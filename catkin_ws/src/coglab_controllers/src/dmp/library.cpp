@@ -35,10 +35,11 @@ GoalWeight readGoalWeight(const Element& element) {
 }
 
 ShapeMapping readMapping(const Element& element) {
-  const std::string mapping = element.text("mapping");
-  if (mapping == "none") return ShapeMapping::None;
-  if (mapping == "similarity") return ShapeMapping::Similarity;
-  element.fail("mapping: expected none or similarity, got '" + mapping + "'");
+  try {
+    return toShapeMapping(element.text("mapping"));
+  } catch (const std::invalid_argument& error) {
+    element.fail(error.what());
+  }
 }
 
 Trajectory readTrajectory(const std::string& file, const tinyxml2::XMLElement& xml) {
@@ -194,7 +195,7 @@ void print(tinyxml2::XMLPrinter& printer, const Primitive& primitive) {
   }
   printer.CloseElement();
   printer.OpenElement("shape");
-  attribute("mapping", primitive.mapping == ShapeMapping::Similarity ? "similarity" : "none");
+  attribute("mapping", describe(primitive.mapping));
   printer.CloseElement();
   printer.OpenElement("start");
   attribute("position", exact(primitive.start));

@@ -24,6 +24,9 @@ void requirePoint(const std::string& field, const Vector3& point) {
   for (int axis = 0; axis < 3; ++axis) requireRange(field + "." + "xyz"[axis], point[axis], -100.0, 100.0);
 }
 
+// Lines shorter than this (m) have no direction.
+constexpr double kShortestLine = 1e-3;
+
 double logistic(double x) { return 1.0 / (1.0 + std::exp(x)); }
 
 }  // namespace
@@ -32,6 +35,41 @@ double GoalWeight::operator()(double s) const noexcept {
   if (kind == Kind::Linear) return 1.0 - s;
   const double at_start = logistic(steepness * (1.0 - centre)), at_end = logistic(-steepness * centre);
   return (logistic(steepness * (s - centre)) - at_start) / (at_end - at_start);
+}
+
+Matrix3 shapeMap(ShapeMapping mapping, const Vector3& demonstrated, const Vector3& line) noexcept {
+  const double from = demonstrated.norm(), to = line.norm();
+  if (mapping == ShapeMapping::None || from < kShortestLine) return Matrix3::Identity();
+  if (to < 1e-9) return Matrix3::Zero();
+  const double scale = to / from;
+  const Vector3 level_from(demonstrated.x(), demonstrated.y(), 0.0), level_to(line.x(), line.y(), 0.0);
+  const double flat_from = level_from.norm(), flat_to = level_to.norm();
+  if (mapping == ShapeMapping::Similarity || flat_from < kShortestLine || flat_to < kShortestLine) {
+    return scale * Quaternion::FromTwoVectors(demonstrated, line).toRotationMatrix();
+  }
+  // Level part turned about the vertical; heights scaled, and tilted along the way so that the end fits.
+  const Vector3 ahead_from = level_from / flat_from, ahead_to = level_to / flat_to;
+  const Vector3 up = Vector3::UnitZ();
+  return flat_to / flat_from *
+             (ahead_to * ahead_from.transpose() + up.cross(ahead_to) * up.cross(ahead_from).transpose()) +
+         scale * up * up.transpose() +
+         (line.z() - scale * demonstrated.z()) / flat_from * up * ahead_from.transpose();
+}
+
+const char* describe(ShapeMapping mapping) noexcept {
+  switch (mapping) {
+    case ShapeMapping::None: return "none";
+    case ShapeMapping::Similarity: return "similarity";
+    case ShapeMapping::Upright: return "upright";
+  }
+  return "unknown";
+}
+
+ShapeMapping toShapeMapping(const std::string& word) {
+  for (const ShapeMapping mapping : {ShapeMapping::None, ShapeMapping::Similarity, ShapeMapping::Upright}) {
+    if (word == describe(mapping)) return mapping;
+  }
+  throw std::invalid_argument("mapping: expected none, similarity or upright, got '" + word.substr(0, 60) + "'");
 }
 
 void validate(const Primitive& primitive) {

@@ -3,8 +3,10 @@
 namespace coglab_controllers {
 namespace {
 
-// A demonstration whose ends are closer than this (m) has no direction that could be mapped.
-constexpr double kShortestLine = 1e-3;
+// Basis functions are summed up in packets of this size.
+constexpr int kPacket = 4;
+// Exponent below which a basis function is less than the rounding of the sum.
+constexpr double kNegligible = -40.0;
 
 }  // namespace
 
@@ -14,7 +16,7 @@ TransformationSystem::TransformationSystem() noexcept
       damping_(2.0 * std::sqrt(150.0)),
       mapping_(ShapeMapping::None),
       demonstrated_line_(Vector3::Zero()),
-      count_(4) {
+      count_(kPacket) {
   centres_.setConstant(0.5);
   widths_.setConstant(1.0);
   weights_.setZero();
@@ -33,8 +35,8 @@ TransformationSystem::TransformationSystem(const Primitive& primitive) : Transfo
   centres_.head(count) = primitive.centres;
   widths_.head(count) = primitive.widths;
   weights_.topRows(count) = primitive.weights.transpose();
-  // Whole packets of four: the spare ones are so far away that their share is zero.
-  count_ = (count + 3) / 4 * 4;
+  // Whole packets: the spare ones are so far away that their share is zero.
+  count_ = (count + kPacket - 1) / kPacket * kPacket;
   for (int i = count; i < count_; ++i) {
     centres_[i] = 100.0;
     widths_[i] = 1e15;
@@ -42,26 +44,26 @@ TransformationSystem::TransformationSystem(const Primitive& primitive) : Transfo
 }
 
 void TransformationSystem::mapShape(const Vector3& start, const Vector3& goal) noexcept {
-  shape_map_.setIdentity();
-  const Vector3 line = goal - start;
-  const double demonstrated = demonstrated_line_.norm(), length = line.norm();
-  if (mapping_ == ShapeMapping::None || demonstrated < kShortestLine) return;
-  if (length < 1e-9) {
-    shape_map_.setZero();
-    return;
-  }
-  shape_map_ =
-      length / demonstrated * Quaternion::FromTwoVectors(demonstrated_line_, line).toRotationMatrix();
+  shape_map_ = shapeMap(mapping_, demonstrated_line_, goal - start);
 }
 
 Vector3 TransformationSystem::movingPoint(double s) const noexcept {
-  Eigen::Array<double, kMaxBasis, 1> psi;
-  auto active = psi.head(count_);
-  active = -widths_.head(count_) * (s - centres_.head(count_)).square();
+  using Packet = Eigen::Array<double, kPacket, 1>;
+  Eigen::Array<double, kMaxBasis, 1> exponent;
+  exponent.head(count_) = -widths_.head(count_) * (s - centres_.head(count_)).square();
   // Relative to the nearest basis function, so that far from all of them the sum is still at least one.
-  active = (active - active.maxCoeff()).exp();
-  const auto along = [&](int axis) { return (weights_.col(axis).head(count_) * active).sum(); };
-  return shape_map_ * Vector3(along(0), along(1), along(2)) / active.sum();
+  const double nearest = exponent.head(count_).maxCoeff();
+  Packet x = Packet::Zero(), y = Packet::Zero(), z = Packet::Zero(), sum = Packet::Zero();
+  for (int i = 0; i < count_; i += kPacket) {
+    const Packet relative = exponent.segment<kPacket>(i) - nearest;
+    if (relative.maxCoeff() < kNegligible) continue;
+    const Packet psi = relative.exp();
+    sum += psi;
+    x += psi * weights_.col(0).segment<kPacket>(i);
+    y += psi * weights_.col(1).segment<kPacket>(i);
+    z += psi * weights_.col(2).segment<kPacket>(i);
+  }
+  return shape_map_ * (Vector3(x.sum(), y.sum(), z.sum()) / sum.sum());
 }
 
 }  // namespace coglab_controllers

@@ -30,9 +30,19 @@ struct GoalWeight {
 
 /// What becomes of the learnt shape when start and goal differ from those of the demonstration.
 enum class ShapeMapping {
-  None,       ///< eq. (5) as learnt, whatever the goal
-  Similarity  ///< turned and scaled (smallest rotation) as the line from start to goal is against the demonstration's
+  None,        ///< eq. (5) as learnt, whatever the goal
+  Similarity,  ///< turned (smallest rotation) and scaled as the line from start to goal is against the demonstration's
+  Upright      ///< turned about the vertical and scaled; what the demonstration lifts stays lifted
 };
+
+/// The linear map of a shape from the demonstration's line (start to goal, m) to the present one: it takes `demonstrated`
+/// to `line` (unless one is shorter than a millimetre). Eq. (1)-(5) are invariant under it.
+Matrix3 shapeMap(ShapeMapping mapping, const Vector3& demonstrated, const Vector3& line) noexcept;
+
+/// The words of library files: none, similarity, upright.
+const char* describe(ShapeMapping mapping) noexcept;
+/// @throws std::invalid_argument listing the words.
+ShapeMapping toShapeMapping(const std::string& word);
 
 /// One demonstrated path: equal numbers of times and positions, at least 5, times strictly increasing.
 struct Trajectory {
