@@ -50,8 +50,8 @@ def test_goal_lost_half_way():
 
 
 def test_primitive_that_does_not_exist():
-    trial = failed_exchange(lambda t: t.cell.primitives.discard("reach_mid"))
-    assert_recovered_empty(trial, "primitive 'reach_mid' does not exist; loaded: give_mid, reach_high")
+    trial = failed_exchange(lambda t: t.cell.primitives.discard("reach_human"))
+    assert_recovered_empty(trial, "primitive 'reach_human' does not exist; loaded: give_human, put_board, reach_high, take_board")
 
 
 def test_contact_detector_dead():

@@ -218,7 +218,7 @@ deliveries:
   offer:
     pose: {{xyz: [-0.10, 0.0, -0.06], rpy_deg: [0, 0, 0]}}               # object in the human hand frame
     release: {{rule: load_share, threshold: 0.6, timeout: 8.0}}
-dmp: {{receive: reach_mid, give: give_mid, take: reach_mid, put: reach_mid, dmp_ratio: 1.0}}
+dmp: {{receive: reach_human, give: give_human, take: take_board, put: put_board, dmp_ratio: 1.0}}
 contact: {{k: 6.0, timeout: 6.0}}
 """
 

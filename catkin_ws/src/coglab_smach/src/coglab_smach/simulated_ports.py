@@ -61,7 +61,7 @@ class SimulatedCell:
         self.calls: list[tuple[float, str]] = []
         self.active = ""
         self.loaded: dict[str, str] = {}
-        self.primitives = {"reach_mid", "reach_high", "give_mid"}
+        self.primitives = {"reach_human", "reach_high", "give_human", "take_board", "put_board"}
         self.enabled = False
         self.held = False
         self.joints = tuple([0.3] * 7)

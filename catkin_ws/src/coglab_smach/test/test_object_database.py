@@ -1,0 +1,130 @@
+"""The object database: the sample objects are good, bad files are refused with file, line and field, the old entry stays."""
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from coglab_smach.goals import delivery_goal, grasp_goal, palm_at_grasp, place_goal
+from coglab_smach.object_database import ObjectDatabase, ObjectError, new_object_text, parse_object
+from coglab_smach.pose import Pose
+from coglab_smach.reachability import reachability_report, share_reached
+
+SHARE = Path(__file__).resolve().parent.parent
+MUG = (SHARE / "objects" / "mug.yaml").read_text()
+OBJECTS = ["ball", "bottle", "mug", "screwdriver", "tea_box"]
+
+
+def test_five_sample_objects_without_a_problem():
+    database = ObjectDatabase(str(SHARE / "objects"))
+    assert database.reload() == []
+    assert database.ids() == OBJECTS
+
+
+@pytest.mark.parametrize("object_id", OBJECTS)
+def test_sample_grasps_are_reachable(object_id):
+    entry = parse_object((SHARE / "objects" / f"{object_id}.yaml").read_text(), object_id)
+    for line, ok in reachability_report(entry):
+        assert ok, line
+
+
+def test_an_unreachable_grasp_is_found():
+    text = MUG.replace("quaternion: [0.5, 0.5, 0.5, 0.5]", "quaternion: [0.5, 0.5, -0.5, -0.5]")
+    reached, total = share_reached(palm_at_grasp(parse_object(text, "mug.yaml")["grasps"]["side"]), yaws_deg=(0.0,))
+    assert reached < 0.3 * total
+
+
+@pytest.mark.parametrize("change, sentence", [
+    (("mass: 0.31", "mass: -1"), "mug.yaml:5: mass: -1 is less than or equal to the minimum of 0"),
+    (("mass: 0.31", "mass: heavy"), "mug.yaml:5: mass: 'heavy' is not of type 'number'"),
+    (("mass: 0.31\n", ""), "mug.yaml:2: top level: 'mass' is a required property"),
+    (("friction: 0.6", "friction: 0.6\nfrction: 0.6"), "'frction' was unexpected"),
+    (("mode: cylindrical", "mode: claw"), "grasps.side.hand.mode: 'claw' is not one of"),
+    (("default_grasp: side", "default_grasp: top"), "default_grasp: 'top' is none of grasps: side"),
+    (("[0.5, 0.5, 0.5, 0.5]", "[0, 0, 0, 0]"), "a quaternion of zeros has no direction"),
+    (("[0.5, 0.5, 0.5, 0.5]", "[.nan, 0, 0, 1]"), "four finite numbers"),
+    (("xyz: [0.0, -0.04, 0.05]", "xyz: [0.0, -40.0, 0.05]"), "more than 1 m away; lengths are in m"),
+    (("axis: [0.0, 1.0, 0.0]", "axis: [0.0, 0.0, 0.0]"), "a direction must not be zero"),
+    (("id: mug", "id: Mug Cup"), "id: 'Mug Cup' does not match"),
+    (("mass: 0.31", "mass: 0.31\nmass: 0.4"), "field 'mass' appears twice"),
+    (("mass: 0.31", "mass: [0.31"), "not YAML"),
+    (("mass: 0.31", "mass: &m 0.31\nnotes: *m"), "aliases"),
+])
+def test_bad_files_name_place_and_field(change, sentence):
+    with pytest.raises(ObjectError) as error:
+        parse_object(MUG.replace(*change), "mug.yaml")
+    assert sentence in str(error.value)
+    assert str(error.value).startswith("mug.yaml:")
+
+
+def test_empty_oversize_and_python_tags_are_refused():
+    for text in ("", "x" * 200_000, "!!python/object/apply:os.system ['true']"):
+        with pytest.raises(ObjectError):
+            parse_object(text, "x.yaml")
+
+
+def test_hot_reload_keeps_the_old_entry_of_a_bad_file(tmp_path):
+    path = tmp_path / "mug.yaml"
+    path.write_text(MUG)
+    database = ObjectDatabase(str(tmp_path))
+    assert database.reload() == []
+    path.write_text(MUG.replace("mass: 0.31", "mass: -3"))
+    os.utime(path, ns=(5, 5))
+    assert database.changed()
+    problems = database.reload(only_changed=True)
+    assert len(problems) == 1 and "the old entry stays" in problems[0]
+    assert database.get("mug")["mass"] == 0.31
+    path.write_text(MUG.replace("mass: 0.31", "mass: 0.44"))
+    os.utime(path, ns=(6, 6))
+    assert database.reload(only_changed=True) == []
+    assert database.get("mug")["mass"] == 0.44 and not database.changed()
+    path.unlink()
+    database.reload()
+    assert database.ids() == []
+
+
+def test_an_id_must_be_its_files_name(tmp_path):
+    (tmp_path / "cup.yaml").write_text(MUG)
+    problems = ObjectDatabase(str(tmp_path)).reload()
+    assert problems == ["cup.yaml:1: id: 'mug' must be the file's name, 'cup'"]
+
+
+def test_missing_object_names_those_that_exist():
+    database = ObjectDatabase(str(SHARE / "objects"))
+    database.reload()
+    with pytest.raises(ObjectError, match="it has: ball, bottle, mug, screwdriver, tea_box"):
+        database.get("elephant")
+
+
+def test_goals_are_the_palm_relative_to_the_goal_frame():
+    mug = parse_object(MUG, "mug.yaml")
+    grasp = mug["grasps"]["side"]
+    receive = grasp_goal(mug, grasp, "object_mug", "receive")
+    assert receive["frame"] == "object_mug" and receive["primitive"] == "reach_human"
+    assert receive["offset"] == pytest.approx([0.0, -0.065, 0.05])
+    assert grasp_goal(mug, grasp, "object_mug", "take", 0.0)["offset"] == pytest.approx([0.0, -0.04, 0.05])
+    give = delivery_goal(mug, grasp, mug["deliveries"]["handle_first"], "human_hand")
+    # Palm in the hand frame, then the object from the palm, must give the delivery pose back.
+    palm = Pose.from_dict({"xyz": give["offset"], "quaternion": give["orientation"]})
+    held = palm * palm_at_grasp(grasp, 0.0).inverse()
+    assert held.position == pytest.approx([-0.10, 0.0, -0.05])
+    put = place_goal(mug, grasp, {"frame": "board", "xyz": [0.1, 0.2, 0.0]})
+    assert put["frame"] == "board" and put["offset"] == pytest.approx([0.1, 0.16, 0.05])
+
+
+def test_new_object_is_valid_and_ids_are_checked(tmp_path):
+    assert parse_object(new_object_text("spoon"), "spoon.yaml")["id"] == "spoon"
+    with pytest.raises(ObjectError):
+        new_object_text("Bad Id")
+
+
+def test_command_line(tmp_path):
+    tool = [sys.executable, str(SHARE / "scripts" / "object_tool.py"), "--folder", str(tmp_path)]
+    run = lambda *a: subprocess.run([*tool, *a], capture_output=True, text=True, timeout=60)  # noqa: E731
+    assert run("new", "spoon").returncode == 0
+    assert run("new", "spoon").returncode == 1
+    assert "spoon" in run("list").stdout
+    good = run("check", "spoon")
+    assert good.returncode == 0 and "places of the handover region reached" in good.stdout
+    (tmp_path / "bad.yaml").write_text("id: bad\n")
+    assert run("check").returncode == 1
