@@ -1,0 +1,77 @@
+"""The tracker stand-in: latency, noise, dropouts and swaps as configured, and nothing of it when perfect."""
+import numpy as np
+import pytest
+from coglab_sim.perception_stand_in import Board, PerceptionSettings, Tracker
+from coglab_sim.rigid import Frame
+
+
+def watch(settings, seconds=20.0, truth=lambda t: Frame(np.array([0.8, 0.0, 0.4])), seed=3, robot=None):
+    tracker = Tracker("object_mug", settings, seed)
+    sights = []
+    for k in range(int(seconds * 200)):
+        t = k * 0.005
+        for sight in tracker.step(t, truth(t), robot):
+            sights.append((t, sight))
+    return sights
+
+
+def test_perfect_perception_is_the_truth_at_the_same_rate():
+    moving = lambda t: Frame(np.array([0.8 + 0.1 * t, 0.0, 0.4]))  # noqa: E731
+    sights = watch(PerceptionSettings(perfect=True), truth=moving)
+    assert len(sights) == pytest.approx(20 * 30, rel=0.15)
+    for t, sight in sights:
+        assert sight.captured == t
+        assert sight.frame.position == pytest.approx(moving(t).position)
+
+
+def test_stamp_is_the_capture_time_and_latency_is_as_configured():
+    sights = watch(PerceptionSettings())
+    delays = np.array([t - s.captured for t, s in sights])
+    assert delays.mean() == pytest.approx(0.060, abs=0.01) and delays.min() >= 0.0
+    assert all(b[1].captured > a[1].captured for a, b in zip(sights, sights[1:]))
+
+
+def test_noise_per_axis_and_its_correlation():
+    settings = PerceptionSettings(position_noise=(0.004, 0.001, 0.008), dropout_start=0.0, latency_sigma=0.0)
+    points = np.array([s.frame.position for _, s in watch(settings, 200.0)])
+    assert points.std(axis=0) == pytest.approx([0.004, 0.001, 0.008], rel=0.25)
+    x = points[:, 0] - points[:, 0].mean()
+    assert float(x[1:] @ x[:-1] / (x @ x)) == pytest.approx(np.exp(-1 / 30 / 0.1), abs=0.1)
+
+
+def test_dropouts_come_in_bursts():
+    sights = watch(PerceptionSettings(dropout_start=0.05, dropout_end=0.2), 60.0)
+    gaps = np.diff([s.captured for _, s in sights])
+    assert gaps.max() > 0.15 and len(sights) < 0.95 * 60 * 30
+
+
+def test_identity_swaps_jump_and_come_back():
+    settings = PerceptionSettings(swap_probability=0.01, position_noise=(0, 0, 0), dropout_start=0.0)
+    offsets = np.array([np.linalg.norm(s.frame.position - [0.8, 0, 0.4]) for _, s in watch(settings, 60.0)])
+    assert offsets.max() == pytest.approx(0.08) and np.median(offsets) == pytest.approx(0.0, abs=1e-9)
+
+
+def test_occlusion_by_the_robots_hand():
+    settings = PerceptionSettings(occlusion_distance=0.10, dropout_start=0.0)
+    far = watch(settings, robot=Frame(np.array([0.5, 0, 0.4])))
+    near = watch(settings, robot=Frame(np.array([0.75, 0, 0.4])))
+    assert len(near) < 0.65 * len(far)
+
+
+def test_same_seed_same_sights():
+    a, b = watch(PerceptionSettings(), 5.0, seed=9), watch(PerceptionSettings(), 5.0, seed=9)
+    assert [t for t, _ in a] == [t for t, _ in b]
+    assert all(np.array_equal(x.frame.position, y.frame.position) for (_, x), (_, y) in zip(a, b))
+
+
+def test_settings_are_checked():
+    with pytest.raises(ValueError, match="unknown fields latncy"):
+        PerceptionSettings.from_mapping({"latncy": 0.1})
+    with pytest.raises(ValueError, match="rate must be positive"):
+        PerceptionSettings(rate=0.0)
+
+
+def test_free_places_are_those_without_an_object():
+    board = Board(Frame(np.array([0.5, -0.5, 0.0])), {"A1": np.zeros(3), "A2": np.array([0.2, 0.0, 0.0])})
+    assert board.free([]) == ["A1", "A2"]
+    assert board.free([np.array([0.52, -0.5, 0.0])]) == ["A2"]

@@ -1,0 +1,43 @@
+"""The shape of a human reach: minimum jerk in closed form, decoupled, conic."""
+import numpy as np
+import pytest
+from coglab_sim.reach import Reach, duration_for, min_jerk
+
+
+def test_min_jerk_closed_form():
+    x = np.linspace(0, 1, 201)
+    s = np.array([min_jerk(v)[0] for v in x])
+    assert s[0] == 0 and s[-1] == 1 and np.all(np.diff(s) >= 0)
+    assert max(min_jerk(v)[1] for v in x) == pytest.approx(1.875)
+
+
+def test_half_a_metre_in_1_2_seconds_peaks_at_0_78():
+    reach = Reach(np.zeros(3), np.array([0.5, 0, 0]), 0.0, 1.2)
+    assert max(np.linalg.norm(reach.at(t)[1]) for t in np.arange(0, 1.2, 0.002)) == pytest.approx(0.781, abs=0.002)
+
+
+@pytest.mark.parametrize("bow", [0.0, 0.05])
+def test_velocity_is_the_derivative_of_position(bow):
+    reach = Reach(np.array([1.3, 0.2, 0.1]), np.array([0.8, 0, 0.4]), 2.0, 1.1, bow=bow)
+    h = 1e-6
+    for t in np.linspace(2.01, 3.05, 60):
+        numeric = (reach.at(t + h)[0] - reach.at(t - h)[0]) / (2 * h)
+        assert numeric == pytest.approx(reach.at(t)[1], abs=1e-5)
+
+
+def test_the_vertical_part_is_quicker_and_both_arrive():
+    reach = Reach(np.zeros(3), np.array([0.4, 0.0, 0.3]), 0.0, 1.0)
+    position, _ = reach.at(0.8)
+    assert position[2] / 0.3 > position[0] / 0.4
+    assert reach.at(1.0)[0] == pytest.approx([0.4, 0, 0.3]) and reach.over(1.0)
+
+
+def test_a_conic_reach_bows_but_ends_where_it_should():
+    reach = Reach(np.zeros(3), np.array([0.4, 0.0, 0.0]), 0.0, 1.0, bow=0.05)
+    assert max(reach.at(t)[0][2] for t in np.linspace(0, 1, 101)) == pytest.approx(0.05, abs=1e-3)
+    assert reach.at(1.0)[0] == pytest.approx([0.4, 0, 0], abs=1e-12)
+
+
+def test_duration_grows_with_the_power_of_the_distance():
+    assert duration_for(0.45, 1.1) == pytest.approx(1.1)
+    assert duration_for(0.9, 1.1) == pytest.approx(1.1 * 2**0.3)

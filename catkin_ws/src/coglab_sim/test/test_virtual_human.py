@@ -1,0 +1,178 @@
+"""The virtual human against a robot's hand that is simply there: phases, timing, and what each misbehaviour does."""
+import numpy as np
+import pytest
+from coglab_sim.participant import BEHAVIOURS, Participant, population
+from coglab_sim.rigid import Frame
+from coglab_sim.virtual_human import Scene, VirtualHuman, WorldView
+
+DT = 0.01
+PALM_TURN = np.array([0.5, 0.5, 0.5, 0.5])
+
+
+class Stage:
+    """Object and robot hand around a virtual human, with the simplest contact there is."""
+
+    def __init__(self, behaviour="normal", seed=1, robot_comes=True, closes=True):
+        self.scene = Scene()
+        self.human = VirtualHuman(Participant.draw(seed, behaviour), self.scene)
+        self.t = 0.0
+        self.palm = np.array([0.58, -0.15, 0.58])
+        self.robot_comes, self.closes = robot_comes, closes
+        self.touched_at = None
+        self.closed = False
+        self.phases = ["idle"]
+        self.samples = []
+
+    def step(self):
+        self.t += DT
+        sample = self.samples[-1] if self.samples else None
+        hand = sample.frame.position if sample else self.scene.rest
+        held = sample.grip > 0.3 if sample else True
+        if held or self.touched_at is None:
+            self.object = hand + self.scene.object_in_hand
+        speed = 0.0
+        if self.robot_comes and self.human.phase == "waiting" and self.t - self.waiting_since > 0.3:
+            goal = self.object + np.array([0.0, -0.065, 0.05])
+            step = np.clip(goal - self.palm, -0.01, 0.01)
+            if np.linalg.norm(goal - self.palm) > 0.012:
+                self.palm = self.palm + step
+                speed = np.linalg.norm(step) / DT
+        gap = (self.object[1] - 0.04) - self.palm[1]
+        force = max(0.0, -gap) * 600.0
+        if force > 0.3 and self.touched_at is None:
+            self.touched_at = self.t
+        self.closed = self.closes and self.touched_at is not None and self.t - self.touched_at > 1.0
+        view = WorldView(Frame(self.palm, PALM_TURN), speed, Frame(self.object), force, 0.0, 1.0,
+                         "both" if self.closed else "human")
+        sample = self.human.step(self.t, view)
+        self.samples.append(sample)
+        if sample.phase != self.phases[-1]:
+            self.phases.append(sample.phase)
+            if sample.phase == "waiting":
+                self.waiting_since = self.t
+        return sample
+
+    def run(self, seconds):
+        for _ in range(int(seconds / DT)):
+            self.step()
+        return self
+
+
+def give(**kw):
+    stage = Stage(**kw)
+    stage.run(0.5)
+    stage.human.command("give mug")
+    return stage.run(25.0)
+
+
+def test_a_normal_giver_goes_through_all_phases():
+    stage = give()
+    assert stage.phases == ["idle", "reacting", "reaching", "waiting", "placing", "holding", "releasing",
+                            "retreating", "idle"]
+    assert stage.samples[-1].grip == 0.0
+    assert stage.samples[-1].frame.position == pytest.approx(stage.scene.rest, abs=0.01)
+
+
+def test_the_object_is_placed_gently():
+    for seed in range(10):
+        stage = give(seed=seed)
+        speeds = [np.linalg.norm(s.velocity) for s in stage.samples if s.phase == "placing"]
+        assert speeds and 0.05 <= max(speeds) <= 0.2
+
+
+def test_the_grip_is_released_only_after_the_robot_has_closed():
+    stage = give()
+    first_release = next(i for i, s in enumerate(stage.samples) if s.grip < 1.0) * DT
+    assert first_release > stage.touched_at + 1.0
+
+
+def test_the_same_seed_gives_the_same_hand():
+    a, b = give(seed=5), give(seed=5)
+    assert all(np.array_equal(x.frame.position, y.frame.position) for x, y in zip(a.samples, b.samples))
+    c = give(seed=6)
+    assert any(not np.array_equal(x.frame.position, y.frame.position) for x, y in zip(a.samples, c.samples))
+
+
+def test_reach_time_and_reaction_are_human():
+    reactions, reaches = [], []
+    for seed in range(40):
+        stage = Stage(seed=seed, robot_comes=False)
+        stage.human.command("give mug")
+        stage.run(4.0)
+        phases = [s.phase for s in stage.samples]
+        reactions.append(phases.count("reacting") * DT)
+        reaches.append(phases.count("reaching") * DT)
+    assert 0.25 < np.median(reactions) < 0.5
+    assert 0.9 < np.median(reaches) < 1.5
+
+
+def test_nobody_waits_for_ever_for_a_robot_that_does_not_come():
+    stage = give(robot_comes=False)
+    assert stage.phases[-2:] == ["retreating", "idle"] and stage.samples[-1].grip == 1.0
+
+
+def test_absent_does_nothing():
+    assert give(behaviour="absent").phases == ["idle"]
+
+
+def test_slow_takes_about_twice_as_long():
+    def reaching(b):
+        return sum(s.phase == "reaching" for s in give(behaviour=b, seed=3).samples)
+    assert reaching("slow") > 1.6 * reaching("normal")
+
+
+def test_hesitant_stops_on_the_way():
+    assert "hesitating" in give(behaviour="hesitant").phases
+
+
+def test_early_release_lets_go_before_the_robot_has_closed():
+    stage = give(behaviour="early_release")
+    first_release = next(i for i, s in enumerate(stage.samples) if s.grip < 1.0) * DT
+    assert first_release < stage.touched_at + 0.5
+
+
+def test_never_release_keeps_the_object():
+    stage = give(behaviour="never_release")
+    assert min(s.grip for s in stage.samples) == 1.0 and stage.phases[-1] == "idle"
+
+
+def test_pull_back_takes_the_object_away_again():
+    stage = give(behaviour="pull_back")
+    assert stage.phases[-2:] == ["retreating", "idle"] and stage.samples[-1].grip == 1.0
+
+
+def test_change_side_ends_elsewhere():
+    a, b = give(seed=2), give(seed=2, behaviour="change_side")
+    at = lambda s: next(x.frame.position for x in s.samples if x.phase == "waiting")  # noqa: E731
+    assert at(b)[1] < at(a)[1] - 0.1
+
+
+def test_tug_pulls_before_letting_go():
+    stage = give(behaviour="tug")
+    x = [s.frame.position[0] for s in stage.samples if s.phase == "holding"]
+    assert max(x) - min(x) > 0.015 and stage.samples[-1].grip == 0.0
+
+
+def test_rest_calls_the_hand_back():
+    stage = Stage(robot_comes=False)
+    stage.human.command("give mug")
+    stage.run(2.0)
+    stage.human.command("rest")
+    stage.run(3.0)
+    assert stage.phases[-2:] == ["retreating", "idle"]
+
+
+def test_population_is_reproducible_and_varied():
+    people = population(20, 7)
+    assert people == population(20, 7)
+    assert len({p.reach_time for p in people}) == 20
+
+
+def test_commands_and_files_are_checked():
+    with pytest.raises(ValueError, match="give, receive or rest"):
+        Stage().human.command("juggle")
+    with pytest.raises(ValueError, match="unknown fields"):
+        Participant.from_mapping({"seed": 1, "hat": "green"})
+    with pytest.raises(ValueError, match="is none of"):
+        Participant(behaviour="angry")
+    assert set(BEHAVIOURS) >= {"normal", "tug"}
