@@ -7,8 +7,9 @@ namespace {
 
 // A counter that runs this far ahead is not a gap any more: 1 s of silence at 1 kHz is a lost connection.
 constexpr int kLargestGap = 1000;
-// So many successive counters prove that the controller's counter began anew.
+// Successive counters prove that the controller's counter began anew; fewer, or for a shorter time, may be a replay.
 constexpr int kProofOfRestart = 3;
+constexpr double kProofTime = 0.1;  // s
 // No joint of the arm is faster (KRC limit of A4, 250 deg/s), so no set-point is either; with half as much again.
 constexpr float kFastestSetPoint = 6.6F;     // rad/s
 constexpr float kSetPointAllowance = 0.02F;  // rad
@@ -72,7 +73,7 @@ void cartesianSetPointOf(const MeasurementDatagram& m, float (&frame)[kFrameValu
   }
 }
 
-bool Session::settingLeaps(const MeasurementDatagram& candidate, std::uint32_t cycles) const {
+bool Session::setPointLeaps(const MeasurementDatagram& candidate, std::uint32_t cycles) const {
   float now[kJoints];
   setPointOf(candidate, now);
   const float allowed =
@@ -88,7 +89,7 @@ Verdict Session::checkOrder(const MeasurementDatagram& candidate, Reception& rec
   if (lenient_ && counter == 0 && candidate.header.reflected == 0) {
     reception.cycles = 1;
     reception.answer_arrived = true;
-    return settingLeaps(candidate, 1) ? Verdict::Implausible : Verdict::Accepted;
+    return setPointLeaps(candidate, 1) ? Verdict::Implausible : Verdict::Accepted;
   }
   const auto difference = static_cast<std::int16_t>(static_cast<std::uint16_t>(counter - received_));
   if (difference == 0) return Verdict::Duplicate;
@@ -96,7 +97,7 @@ Verdict Session::checkOrder(const MeasurementDatagram& candidate, Reception& rec
   reception.cycles = static_cast<std::uint32_t>(difference);
   reception.reflected = candidate.header.reflected;
   reception.answer_arrived = answered_ && candidate.header.reflected == sent_;
-  return settingLeaps(candidate, reception.cycles) ? Verdict::Implausible : Verdict::Accepted;
+  return setPointLeaps(candidate, reception.cycles) ? Verdict::Implausible : Verdict::Accepted;
 }
 
 Reception Session::receive(const std::uint8_t* bytes, std::size_t size, MeasurementDatagram& measurement) {
@@ -136,7 +137,7 @@ Reception Session::receive(const std::uint8_t* bytes, std::size_t size, Measurem
     const bool successive = static_cast<std::uint16_t>(suspect_ + 1) == header.counter;
     suspects_in_a_row_ = successive && suspects_in_a_row_ > 0 ? suspects_in_a_row_ + 1 : 1;
     suspect_ = header.counter;
-    if (suspects_in_a_row_ < kProofOfRestart) {
+    if (suspects_in_a_row_ < kProofOfRestart || suspects_in_a_row_ * cycleTimeOf(candidate) < kProofTime) {
       ++(reception.verdict == Verdict::Implausible ? counters_.implausible : counters_.out_of_order);
       return reception;
     }

@@ -65,7 +65,7 @@ class Session {
 
  private:
   Verdict checkOrder(const MeasurementDatagram& candidate, Reception& reception);
-  bool settingLeaps(const MeasurementDatagram& candidate, std::uint32_t cycles) const;
+  bool setPointLeaps(const MeasurementDatagram& candidate, std::uint32_t cycles) const;
 
   bool lenient_;
   bool connected_ = false;
