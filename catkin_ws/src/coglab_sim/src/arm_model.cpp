@@ -5,9 +5,7 @@
 
 #include <kdl/tree.hpp>
 #include <kdl_parser/kdl_parser.hpp>
-#include <urdf_model/joint.h>
-#include <urdf_model/model.h>
-#include <urdf_parser/urdf_parser.h>
+#include <tinyxml2.h>
 
 namespace coglab_sim {
 namespace {
@@ -62,14 +60,21 @@ KDL::Chain readChain(const std::string& urdf, const std::string& base, const std
   return condensed(tree, chain);
 }
 
+/// `<dynamics damping>` of the chain's joints; KDL's tree does not keep it.
 Vector7 readDamping(const std::string& urdf, const KDL::Chain& chain) {
-  const auto model = urdf::parseURDFFile(urdf);
+  tinyxml2::XMLDocument document;
+  document.LoadFile(urdf.c_str());
+  const tinyxml2::XMLElement* robot = document.FirstChildElement("robot");
   Vector7 damping = Vector7::Zero();
   int index = 0;
   for (const auto& segment : chain.segments) {
     if (segment.getJoint().getType() == KDL::Joint::None) continue;
-    const auto joint = model ? model->getJoint(segment.getJoint().getName()) : nullptr;
-    if (joint && joint->dynamics) damping[index] = joint->dynamics->damping;
+    const tinyxml2::XMLElement* joint = robot != nullptr ? robot->FirstChildElement("joint") : nullptr;
+    while (joint != nullptr && !joint->Attribute("name", segment.getJoint().getName().c_str())) {
+      joint = joint->NextSiblingElement("joint");
+    }
+    const tinyxml2::XMLElement* dynamics = joint != nullptr ? joint->FirstChildElement("dynamics") : nullptr;
+    if (dynamics != nullptr) damping[index] = dynamics->DoubleAttribute("damping");
     ++index;
   }
   return damping;

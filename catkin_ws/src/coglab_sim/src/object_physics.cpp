@@ -9,6 +9,7 @@ namespace {
 
 constexpr double kGravity = 9.81;
 constexpr double kShareTime = 0.02;   // s over which load shares are averaged
+constexpr double kSafeGrip = 1.5;     // friction over weight at which a hand that was given the object holds it
 constexpr double kGripBegins = 0.05, kGripEnds = 0.02;
 
 // Palm and straight fingers as points in ih2_palm, from the shapes in the URDF; a point is a ball of this radius.
@@ -200,7 +201,8 @@ Wrench ObjectPhysics::step(const Pose& palm, const Twist& palm_twist, const Huma
       return {};
     }
     pin(in_robot ? palm : human.hand, in_robot ? palm_twist : human.twist);
-    pinned_ = in_robot ? fingerForce(fingers) <= 0.0 : human.grip <= kGripBegins;
+    const double normal_force = in_robot ? fingerForce(fingers) : 2.0 * human.grip * human.grip_force;
+    pinned_ = object_.friction * normal_force < kSafeGrip * object_.mass * kGravity;
     if (pinned_) return {};
   }
 

@@ -34,7 +34,7 @@ struct ContactParameters {
   GripCoupling::Figures human;     ///< 600 N/m, within the 300-800 N/m of the literature
   GripCoupling::Figures robot{1500.0, 5.0, 0.7, 0.03};
   double human_reach = 0.06;       ///< m between hand frame and the object's surface at which a grip finds it
-  double robot_reach = 0.045;      ///< m between the grasp centre and the object's surface
+  double robot_reach = 0.015;      ///< m between the grasp centre and the object's surface
   Vector3d grasp_center = Vector3d(0.035, 0.0, 0.02);  ///< in ih2_palm: where closing fingers meet
   double newton_per_count = 0.5;   ///< N of finger force per position count beyond contact
   double finger_force_max = 15.0;  ///< N per finger

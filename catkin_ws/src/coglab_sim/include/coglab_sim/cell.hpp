@@ -1,0 +1,95 @@
+/// @file
+/// The simulated cell: robot controller, arm, object and hands behind the FRI wire.
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include "coglab_sim/cell_config.hpp"
+#include "coglab_sim/krc/controller.hpp"
+
+namespace coglab_sim {
+
+using MeasurementBytes = std::array<std::uint8_t, lwr_fri_bridge::fri::kMeasurementSize>;
+
+/// What really happens in the cell. Nothing in control may read it.
+struct CellTruth {
+  double time = 0.0;      ///< s, simulated
+  Pose object, human_hand, robot_hand;
+  Twist object_twist;
+  Vector3d palm_force = Vector3d::Zero();  ///< N, on the robot hand
+  double robot_load_share = 0.0, human_load_share = 0.0;
+  std::string held_by;
+  bool dropped = false;
+  Vector7 position, velocity, set_point;   ///< of the arm
+  Vector7 external_torque;                 ///< without any error, Nm
+};
+
+/// One FRI period at a time; no clock, no thread, no socket of its own. The same configuration and inputs give the same bytes.
+class Cell {
+ public:
+  /// @throws std::invalid_argument or std::runtime_error with what is wrong in the configuration.
+  explicit Cell(const CellConfig& config);
+
+  /// Lockstep: takes the answer to the last measurement (none: null and 0), advances one period and returns the next
+  /// measurement. Look at `sent()`: the controller does not send while FRI is closed or its packet got lost.
+  const MeasurementBytes& step(const std::uint8_t* answer, std::size_t size);
+
+  /// The same in two parts for a real clock: hand over datagrams as they come, `latency` s after the measurement...
+  void receive(const std::uint8_t* bytes, std::size_t size, double latency);
+  /// ...and advance when the period is over. `on_time` false: the caller was late, a missing answer is not the PC's fault.
+  const MeasurementBytes& advance(bool on_time = true);
+
+  bool sent() const { return sent_; }
+  const MeasurementBytes& measurement() const { return bytes_; }
+
+  // Inputs, valid until changed
+  void setHuman(const HumanInput& human);
+  void setFingers(const FingerInput& fingers) { fingers_ = fingers; }
+  void setPush(const Wrench& push) { push_ = push; }  ///< on the palm about its origin, besides the object
+  void place(Placement placement, const Pose& pose) { object_.place(placement, pose); }
+  /// Exchanges the object; it is then to be placed. @throws std::invalid_argument
+  void setObject(const ObjectParameters& object);
+
+  // Faults
+  void setBlock(bool on) { arm_.setBlock(on); }
+  /// Share of lost packets, 0..1, to and from the PC.
+  void setLoss(double to_pc, double from_pc);
+  /// Loses the next packets, both ways.
+  void loseNext(int packets) { lose_next_ = packets; }
+  krc::Controller& controller() { return controller_; }
+  const krc::Controller& controller() const { return controller_; }
+
+  double period() const { return config_.krc.period; }
+  CellTruth truth() const;
+  FingerContactState fingerContact() const { return object_.fingerContact(arm_.terms().tip); }
+  const ArmDynamics& arm() const { return arm_; }
+  const ObjectPhysics& object() const { return object_; }
+  const CellConfig& config() const { return config_; }
+
+ private:
+  bool lost(double share);
+  void moveHuman(double dt);
+
+  CellConfig config_;
+  ArmDynamics arm_;
+  krc::Controller controller_;
+  TorqueSensor torque_sensor_;
+  ObjectPhysics object_;
+  Random loss_;
+  HumanInput human_;
+  bool human_present_ = false;
+  double human_age_ = 0.0;  // s since its last message
+  FingerInput fingers_{};
+  Wrench push_;
+  double loss_to_pc_ = 0.0, loss_from_pc_ = 0.0;
+  int lose_next_ = 0;
+  bool losing_ = false;
+  bool sent_ = false;
+  MeasurementBytes bytes_{};
+};
+
+/// @throws std::invalid_argument for anything but human_hand, robot_hand, world.
+Placement placementOf(const std::string& name);
+
+}  // namespace coglab_sim

@@ -1,0 +1,95 @@
+/// @file
+/// The cell on a clock: one thread that paces the FRI periods and speaks UDP. No ROS here.
+#pragma once
+
+#include <atomic>
+#include <functional>
+#include <future>
+#include <mutex>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "coglab_sim/cell.hpp"
+#include "coglab_sim/fri_socket.hpp"
+
+namespace coglab_sim {
+
+/// One FRI period for the log.
+struct TickRecord {
+  double time = 0.0;  ///< s, simulated, at the end of the period
+  int state = 0, quality = 0, power = 0, control = 0;
+  bool answered = false;   ///< the last measurement got its answer in time
+  Vector7 commanded, measured;  ///< rad
+};
+
+/// What the thread leaves for others to look at.
+struct CellSnapshot {
+  CellTruth truth;
+  FingerContactState finger_contact;
+  std::uint64_t tick = 0;           ///< number of periods so far
+  std::uint64_t late_ticks = 0;     ///< periods that the thread itself began too late
+  std::uint64_t answers = 0;        ///< datagrams received so far
+};
+
+/// Runs a Cell in real time times a factor.
+class RealTimeCell {
+ public:
+  /// @param factor  simulated over real time, 0.01 .. 100
+  /// @throws what Cell and FriSocket throw, std::invalid_argument for the factor
+  RealTimeCell(const CellConfig& config, const std::string& host, std::uint16_t port, double factor);
+  ~RealTimeCell();
+  RealTimeCell(const RealTimeCell&) = delete;
+  RealTimeCell& operator=(const RealTimeCell&) = delete;
+
+  void start();
+  void stop();
+  /// Where the PC listens from now on.
+  void setPort(std::uint16_t port) { port_ = port; }
+
+  // From any thread
+  void setHuman(const HumanInput& human);
+  void setFingers(const FingerInput& fingers);
+  void setPush(const Wrench& push);
+  /// Runs `action` between two periods. @throws what it throws, std::runtime_error if the thread does not get to it in 1 s.
+  void apply(std::function<void(Cell&)> action);
+  /// Runs `action` after so many simulated seconds.
+  void applyLater(double delay, std::function<void(Cell&)> action);
+
+  CellSnapshot snapshot() const;
+  std::vector<TickRecord> takeRecords();         ///< since the last call
+  std::vector<krc::Message> takeMessages();      ///< of the controller, since the last call
+  /// The thread ended by itself with this error; empty while it runs.
+  std::string failure() const;
+
+ private:
+  struct Delayed {
+    double time;
+    std::function<void(Cell&)> action;
+  };
+  void run();
+  void applyInputs();
+  void leaveResults(bool answered);
+
+  Cell cell_;
+  FriSocket socket_;
+  double factor_;
+  std::atomic<std::uint16_t> port_;
+  std::atomic<bool> running_{false};
+  std::thread thread_;
+
+  mutable std::mutex mutex_;  // guards everything below
+  bool new_human_ = false;
+  HumanInput human_;
+  FingerInput fingers_{};
+  Wrench push_;
+  std::vector<std::packaged_task<void(Cell&)>> actions_;
+  std::vector<Delayed> delayed_;
+  CellSnapshot snapshot_;
+  std::vector<TickRecord> records_;
+  std::vector<krc::Message> messages_;
+  std::string failure_;
+  std::uint64_t messages_seen_ = 0;
+};
+
+}  // namespace coglab_sim

@@ -1,0 +1,61 @@
+#include "cell_faults.hpp"
+
+#include <cmath>
+#include <functional>
+#include <stdexcept>
+
+namespace coglab_sim {
+namespace {
+
+using Action = std::function<void(Cell&)>;
+
+/// What to do, and what undoes it (empty if it passes by itself).
+struct Fault {
+  Action make, undo;
+};
+
+Fault faultOf(const std::string& kind, double value) {
+  if (!std::isfinite(value)) throw std::invalid_argument("value must be a finite number");
+  const bool on = value != 0.0;
+  if (kind == "block") return {[on](Cell& cell) { cell.setBlock(on); }, [on](Cell& cell) { cell.setBlock(!on); }};
+  if (kind == "packet_loss") {
+    return {[value](Cell& cell) { cell.setLoss(value, value); }, [](Cell& cell) { cell.setLoss(0.0, 0.0); }};
+  }
+  if (kind == "lose_packets") {
+    if (value < 0.0 || value > 1e6) throw std::invalid_argument("lose_packets: value must lie in 0 .. 1e6");
+    return {[value](Cell& cell) { cell.loseNext(static_cast<int>(value)); }, {}};
+  }
+  if (kind == "silence") {
+    if (value < 0.0) throw std::invalid_argument("silence: value must be a duration in s");
+    return {[value](Cell& cell) { cell.controller().setSilent(value); }, {}};
+  }
+  if (kind == "drive_error") {
+    const int joint = static_cast<int>(value);
+    return {[joint](Cell& cell) { cell.controller().setDriveError(joint, true); },
+            [joint](Cell& cell) {
+              cell.controller().setDriveError(joint, false);
+              cell.controller().acknowledge();
+            }};
+  }
+  if (kind == "enabling_switch") {
+    return {[on](Cell& cell) { cell.controller().setEnablingSwitch(on); },
+            [on](Cell& cell) { cell.controller().setEnablingSwitch(!on); }};
+  }
+  if (kind == "leave_command_mode") {
+    return {[](Cell& cell) { cell.controller().leaveCommandMode("fault injected"); }, {}};
+  }
+  if (kind == "acknowledge") return {[](Cell& cell) { cell.controller().acknowledge(); }, {}};
+  throw std::invalid_argument("unknown fault '" + kind +
+                              "'; known: block, packet_loss, lose_packets, silence, drive_error, enabling_switch, "
+                              "leave_command_mode, acknowledge");
+}
+
+}  // namespace
+
+void injectFault(RealTimeCell& cell, const std::string& kind, double value, double duration) {
+  Fault fault = faultOf(kind, value);
+  cell.apply(std::move(fault.make));
+  if (duration > 0.0 && fault.undo) cell.applyLater(duration, std::move(fault.undo));
+}
+
+}  // namespace coglab_sim

@@ -1,0 +1,239 @@
+/// The node /coglab_sim/cell: the simulated cell in real time, behind UDP and topics.
+///
+/// Subscribes (relative names) human_hand, finger_positions, ~push (geometry_msgs/Wrench on the palm, world axes). Publishes
+/// truth/cell, finger_contact, ~messages (the controller's message window), /clock if ~publish_clock. Serves ~fault, ~place_object.
+/// Parameters: every row of the cell's table under the private namespace; ~speed, ~fri_host, ~fri_port (0: wait for
+/// ~port_parameter), ~port_wait, ~log_file, ~truth_rate, ~publish_clock; fri_period and seed of the parent namespace.
+#include <fstream>
+#include <memory>
+
+#include <coglab_msgs/CellTruth.h>
+#include <coglab_msgs/FingerContact.h>
+#include <coglab_msgs/FingerPositions.h>
+#include <coglab_msgs/HumanHand.h>
+#include <coglab_msgs/InjectFault.h>
+#include <coglab_msgs/PlaceObject.h>
+#include <geometry_msgs/Wrench.h>
+#include <ros/ros.h>
+#include <rosgraph_msgs/Clock.h>
+#include <std_msgs/String.h>
+
+#include "cell_faults.hpp"
+#include "cell_messages.hpp"
+#include "cell_parameters.hpp"
+#include "coglab_sim/real_time_cell.hpp"
+
+namespace coglab_sim {
+namespace {
+
+/// Waits until the bridge has published its port. @throws std::runtime_error after `limit` s or at shutdown.
+std::uint16_t waitForPort(const std::string& parameter, double limit) {
+  const ros::WallTime end = ros::WallTime::now() + ros::WallDuration(limit);
+  ROS_INFO("waiting up to %.0f s for the bridge's port in parameter %s", limit, parameter.c_str());
+  while (ros::ok() && ros::WallTime::now() < end) {
+    int port = 0;
+    if (ros::param::get(parameter, port) && port > 0 && port < 65536) return static_cast<std::uint16_t>(port);
+    ros::WallDuration(0.1).sleep();
+  }
+  throw std::runtime_error("no bridge published its UDP port in parameter " + parameter + " within " +
+                           std::to_string(limit) + " s; start the bridge or set ~fri_port");
+}
+
+class CellNode {
+ public:
+  CellNode() : private_("~"), config_(readCellConfig(private_)) {
+    int port = private_.param("fri_port", 0);
+    port_parameter_ = private_.param<std::string>("port_parameter", "/lwr/fri_port_bound");
+    follow_port_ = port == 0;
+    if (follow_port_) port = waitForPort(port_parameter_, private_.param("port_wait", 60.0));
+    const auto host = private_.param<std::string>("fri_host", "127.0.0.1");
+    const double speed = private_.param("speed", 1.0);
+    cell_ = std::make_unique<RealTimeCell>(config_, host, static_cast<std::uint16_t>(port), speed);
+    openLog(private_.param<std::string>("log_file", ""));
+
+    truth_ = node_.advertise<coglab_msgs::CellTruth>("truth/cell", 1);
+    contact_ = node_.advertise<coglab_msgs::FingerContact>("finger_contact", 1, true);
+    messages_ = private_.advertise<std_msgs::String>("messages", 50, true);
+    if (private_.param("publish_clock", false)) clock_ = node_.advertise<rosgraph_msgs::Clock>("/clock", 1);
+    const auto hints = ros::TransportHints().tcpNoDelay();
+    human_ = node_.subscribe<coglab_msgs::HumanHand>(
+        "human_hand", 1, [this](const coglab_msgs::HumanHand::ConstPtr& m) { onHuman(*m); }, nullptr, hints);
+    fingers_ = node_.subscribe<coglab_msgs::FingerPositions>(
+        "finger_positions", 1, [this](const coglab_msgs::FingerPositions::ConstPtr& m) { onFingers(*m); }, nullptr, hints);
+    push_ = private_.subscribe<geometry_msgs::Wrench>("push", 1, [this](const geometry_msgs::Wrench::ConstPtr& m) {
+      cell_->setPush({vectorOf(m->force), vectorOf(m->torque)});
+    });
+    fault_ = private_.advertiseService("fault", &CellNode::onFault, this);
+    place_ = private_.advertiseService("place_object", &CellNode::onPlace, this);
+
+    const double rate = private_.param("truth_rate", 200.0);
+    if (!(rate >= 1.0 && rate <= 1000.0)) throw std::invalid_argument("truth_rate must lie in 1 .. 1000 Hz");
+    publish_timer_ = node_.createWallTimer(ros::WallDuration(1.0 / rate), [this](const ros::WallTimerEvent&) { publish(); });
+    log_timer_ = node_.createWallTimer(ros::WallDuration(0.1), [this](const ros::WallTimerEvent&) { writeLog(); });
+    port_timer_ = node_.createWallTimer(ros::WallDuration(1.0), [this](const ros::WallTimerEvent&) { checkPort(); });
+    ROS_INFO("robot controller stand-in: FRI toward %s:%d every %.1f ms, KRL program %s, %.3g times real time",
+             host.c_str(), port, 1e3 * config_.krc.period, krc::nameOf(config_.krc.convention).c_str(), speed);
+    cell_->start();
+  }
+
+  ~CellNode() {
+    cell_->stop();
+    writeLog();
+  }
+
+ private:
+  void openLog(const std::string& path) {
+    if (path.empty()) return;
+    log_.open(path);
+    if (!log_) throw std::runtime_error("log_file " + path + " cannot be written");
+    log_ << "time,state,quality,power,control,answered";
+    const char* joints[] = {"a1", "a2", "e1", "a3", "a4", "a5", "a6"};
+    for (const char* kind : {"commanded_lwr_", "measured_lwr_"}) {
+      for (const char* joint : joints) log_ << ',' << kind << joint;
+    }
+    log_ << '\n';
+    log_.precision(9);
+  }
+
+  void writeLog() {
+    for (const TickRecord& record : cell_->takeRecords()) {
+      if (!log_.is_open()) continue;
+      log_ << record.time << ',' << record.state << ',' << record.quality << ',' << record.power << ',' << record.control
+           << ',' << record.answered;
+      for (const Vector7* joints : {&record.commanded, &record.measured}) {
+        for (int i = 0; i < 7; ++i) log_ << ',' << (*joints)[i];
+      }
+      log_ << '\n';
+    }
+    if (log_.is_open()) log_.flush();
+  }
+
+  void onHuman(const coglab_msgs::HumanHand& message) {
+    HumanInput human;
+    if (!poseOf(message.pose, human.hand) || !(message.grip >= 0.0 && message.grip <= 1.0) ||
+        !(message.grip_force >= 0.0 && message.grip_force <= 1000.0)) {
+      ROS_WARN_THROTTLE(1.0, "human_hand ignored: expected a finite pose, grip 0..1 and grip_force 0..1000 N");
+      return;
+    }
+    human.twist = {vectorOf(message.velocity.linear), vectorOf(message.velocity.angular)};
+    human.grip = message.grip;
+    human.grip_force = message.grip_force;
+    cell_->setHuman(human);
+  }
+
+  void onFingers(const coglab_msgs::FingerPositions& message) {
+    if (message.position.size() != 5) {
+      ROS_WARN_THROTTLE(1.0, "finger_positions ignored: expected 5 positions, got %zu", message.position.size());
+      return;
+    }
+    FingerInput fingers{};
+    std::copy(message.position.begin(), message.position.end(), fingers.begin());
+    cell_->setFingers(fingers);
+  }
+
+  bool onFault(coglab_msgs::InjectFault::Request& request, coglab_msgs::InjectFault::Response& response) {
+    try {
+      injectFault(*cell_, request.kind, request.value, request.duration);
+      response.success = true;
+      response.message = request.kind + " done";
+      ROS_INFO("fault %s, value %g, duration %g s", request.kind.c_str(), request.value, request.duration);
+    } catch (const std::exception& error) {
+      response.message = error.what();
+    }
+    return true;
+  }
+
+  bool onPlace(coglab_msgs::PlaceObject::Request& request, coglab_msgs::PlaceObject::Response& response) {
+    try {
+      const Placement where = placementOf(request.where);
+      Pose pose;
+      if (!poseOf(request.pose, pose)) throw std::invalid_argument("pose needs finite numbers and a quaternion of length 1");
+      ObjectParameters object = config_.object;
+      const bool exchange = !request.object_id.empty() && request.object_id != config_.object.id;
+      if (exchange) object = readObject(private_, request.object_id);
+      cell_->apply([&](Cell& cell) {
+        if (exchange) cell.setObject(object);
+        cell.place(where, pose);
+      });
+      config_.object = object;
+      response.success = true;
+      response.message = object.id + " placed: " + request.where;
+    } catch (const std::exception& error) {
+      response.message = error.what();
+    }
+    return true;
+  }
+
+  void publish() {
+    const CellSnapshot snapshot = cell_->snapshot();
+    if (const std::string failure = cell_->failure(); !failure.empty()) {
+      ROS_FATAL("the simulated cell stopped: %s", failure.c_str());
+      ros::requestShutdown();
+      return;
+    }
+    if (snapshot.tick == 0) return;
+    if (clock_) {
+      rosgraph_msgs::Clock clock;
+      clock.clock.fromSec(snapshot.truth.time);
+      clock_.publish(clock);
+    }
+    const ros::Time now = ros::Time::now();
+    truth_.publish(truthMessage(snapshot.truth, config_.object.id, now));
+
+    coglab_msgs::FingerContact contact = contactMessage(snapshot.finger_contact, now);
+    const bool changed = contact.contact_position != last_contact_.contact_position;
+    const ros::WallTime wall = ros::WallTime::now();
+    if (changed || wall - contact_published_ >= ros::WallDuration(0.05)) {
+      contact_.publish(contact);
+      contact_published_ = wall;
+      last_contact_ = std::move(contact);
+    }
+    for (const krc::Message& message : cell_->takeMessages()) {
+      ROS_WARN("KRC %.3f s: %s", message.time, message.text.c_str());
+      std_msgs::String text;
+      text.data = message.text;
+      messages_.publish(text);
+    }
+  }
+
+  /// A bridge that was started again listens elsewhere.
+  void checkPort() {
+    const CellSnapshot snapshot = cell_->snapshot();
+    const bool silent = snapshot.answers == answers_seen_;
+    answers_seen_ = snapshot.answers;
+    int port = 0;
+    if (follow_port_ && silent && ros::param::get(port_parameter_, port) && port > 0 && port < 65536) {
+      cell_->setPort(static_cast<std::uint16_t>(port));
+    }
+    if (silent && snapshot.tick > 0) ROS_WARN_THROTTLE(10.0, "no FRI answer for 1 s; is the bridge running?");
+  }
+
+  ros::NodeHandle node_, private_;
+  CellConfig config_;
+  std::unique_ptr<RealTimeCell> cell_;
+  std::string port_parameter_;
+  bool follow_port_ = false;
+  std::uint64_t answers_seen_ = 0;
+  std::ofstream log_;
+  ros::Publisher truth_, contact_, messages_, clock_;
+  ros::Subscriber human_, fingers_, push_;
+  ros::ServiceServer fault_, place_;
+  ros::WallTimer publish_timer_, log_timer_, port_timer_;
+  ros::WallTime contact_published_;
+  coglab_msgs::FingerContact last_contact_;
+};
+
+}  // namespace
+}  // namespace coglab_sim
+
+int main(int argc, char** argv) {
+  ros::init(argc, argv, "cell");
+  try {
+    const coglab_sim::CellNode node;
+    ros::spin();
+  } catch (const std::exception& error) {
+    ROS_FATAL("%s", error.what());
+    return 1;
+  }
+  return 0;
+}

@@ -1,0 +1,189 @@
+/// Python module coglab_sim._cell: the simulated cell without ROS, one FRI period per call.
+#include <pybind11/eigen.h>
+#include <pybind11/pybind11.h>
+#include <pybind11/stl.h>
+
+#include "coglab_sim/cell.hpp"
+
+namespace py = pybind11;
+using namespace coglab_sim;
+
+namespace {
+
+py::dict poseDict(const Pose& pose) {
+  py::dict result;
+  result["position"] = pose.position;
+  result["rotation"] = Eigen::Vector4d(pose.rotation.coeffs());  // x y z w
+  return result;
+}
+
+Pose makePose(const Vector3d& position, const Eigen::Vector4d& rotation) {
+  return {position, Quaterniond(rotation[3], rotation[0], rotation[1], rotation[2]).normalized()};
+}
+
+CellConfig configFrom(const std::string& urdf, const py::dict& parameters) {
+  CellConfig config;
+  config.urdf = urdf;
+  for (const auto& [key, value] : parameters) {
+    setCellParameter(config, py::cast<std::string>(key), py::cast<ParameterValue>(value));
+  }
+  return config;
+}
+
+/// Lockstep in Python terms: bytes in, bytes out; None where nothing is sent.
+class PyCell {
+ public:
+  PyCell(const std::string& urdf, const py::dict& parameters) : cell_(configFrom(urdf, parameters)) {}
+
+  py::object step(const py::object& answer) {
+    if (answer.is_none()) {
+      cell_.step(nullptr, 0);
+    } else {
+      const std::string bytes = py::cast<py::bytes>(answer);
+      cell_.step(reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size());
+    }
+    if (!cell_.sent()) return py::none();
+    const MeasurementBytes& out = cell_.measurement();
+    return py::bytes(reinterpret_cast<const char*>(out.data()), out.size());
+  }
+
+  py::dict truth() const {
+    const CellTruth t = cell_.truth();
+    py::dict result;
+    result["time"] = t.time;
+    result["object"] = poseDict(t.object);
+    result["object_velocity"] = t.object_twist.linear;
+    result["object_spin"] = t.object_twist.angular;
+    result["human_hand"] = poseDict(t.human_hand);
+    result["robot_hand"] = poseDict(t.robot_hand);
+    result["palm_force"] = t.palm_force;
+    result["robot_load_share"] = t.robot_load_share;
+    result["human_load_share"] = t.human_load_share;
+    result["held_by"] = t.held_by;
+    result["dropped"] = t.dropped;
+    result["position"] = t.position;
+    result["velocity"] = t.velocity;
+    result["set_point"] = t.set_point;
+    result["external_torque"] = t.external_torque;
+    return result;
+  }
+
+  Cell& cell() { return cell_; }
+  const Cell& cell() const { return cell_; }
+
+ private:
+  Cell cell_;
+};
+
+}  // namespace
+
+PYBIND11_MODULE(_cell, m) {
+  m.doc() = "The simulated cell: robot controller, arm, object and hands behind the FRI wire. SI units, quaternions x y z w.";
+
+  py::class_<PyCell>(m, "Cell", "One FRI period per step(); the same seed and inputs give the same bytes.")
+      .def(py::init<const std::string&, const py::dict&>(), py::arg("urdf"), py::arg("parameters") = py::dict(),
+           "urdf: path of the robot description; parameters: names and values as in parameter_table().")
+      .def("step", &PyCell::step, py::arg("answer") = py::none(),
+           "Takes the 376 bytes that answer the last measurement (None: no answer), advances one FRI period and returns "
+           "the next measurement, 916 bytes, or None if nothing is sent.")
+      .def("truth", &PyCell::truth, "What really happens in the cell; nothing in control may read it.")
+      .def_property_readonly("period", [](const PyCell& c) { return c.cell().period(); })
+      .def_property_readonly("time", [](const PyCell& c) { return c.cell().controller().time(); })
+      .def_property_readonly("set_point", [](const PyCell& c) { return c.cell().controller().setPoint(); })
+      .def_property_readonly("position", [](const PyCell& c) { return Vector7(c.cell().arm().position()); })
+      .def_property_readonly("velocity", [](const PyCell& c) { return Vector7(c.cell().arm().velocity()); })
+      .def_property_readonly("fri_state", [](const PyCell& c) { return static_cast<int>(c.cell().controller().friState()); })
+      .def_property_readonly("quality", [](const PyCell& c) { return static_cast<int>(c.cell().controller().friQuality()); })
+      .def_property_readonly("messages",
+                             [](const PyCell& c) {
+                               py::list list;
+                               for (const auto& message : c.cell().controller().messages()) {
+                                 list.append(py::make_tuple(message.time, message.text));
+                               }
+                               return list;
+                             },
+                             "The controller's message window: (time, text), newest last.")
+      .def_property_readonly("rejections",
+                             [](const PyCell& c) {
+                               const auto& r = c.cell().controller().rejections();
+                               py::dict d;
+                               d["wrong_size"] = r.wrong_size;
+                               d["wrong_header"] = r.wrong_header;
+                               d["stale"] = r.stale;
+                               d["repeated"] = r.repeated;
+                               return d;
+                             })
+      .def("receive",
+           [](PyCell& c, const py::bytes& data, double latency) {
+             const std::string bytes = data;
+             c.cell().receive(reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size(), latency);
+           },
+           py::arg("data"), py::arg("latency") = 0.0, "Hands over one datagram before the next step().")
+      .def("set_human",
+           [](PyCell& c, const Vector3d& position, const Eigen::Vector4d& rotation, const Vector3d& velocity,
+              const Vector3d& spin, double grip, double grip_force) {
+             c.cell().setHuman({makePose(position, rotation), {velocity, spin}, grip, grip_force});
+           },
+           py::arg("position"), py::arg("rotation") = Eigen::Vector4d(0, 0, 0, 1),
+           py::arg("velocity") = Vector3d(Vector3d::Zero()), py::arg("spin") = Vector3d(Vector3d::Zero()),
+           py::arg("grip") = 0.0, py::arg("grip_force") = 20.0, "The person's hand in the world; grip 0..1, force N.")
+      .def("set_fingers", [](PyCell& c, const FingerInput& fingers) { c.cell().setFingers(fingers); },
+           "Positions of the five motors, 0..254.")
+      .def("finger_contact",
+           [](const PyCell& c) {
+             const auto state = c.cell().fingerContact();
+             return py::make_tuple(state.position, state.stiffness);
+           },
+           "(positions, stiffness) where the five motors meet the object; 255: free.")
+      .def("set_push",
+           [](PyCell& c, const Vector3d& force, const Vector3d& torque) { c.cell().setPush({force, torque}); },
+           py::arg("force"), py::arg("torque") = Vector3d(Vector3d::Zero()), "Wrench on the palm, world axes, N and Nm.")
+      .def("place",
+           [](PyCell& c, const std::string& where, const Vector3d& position, const Eigen::Vector4d& rotation) {
+             c.cell().place(placementOf(where), makePose(position, rotation));
+           },
+           py::arg("where"), py::arg("position") = Vector3d(Vector3d::Zero()),
+           py::arg("rotation") = Eigen::Vector4d(0, 0, 0, 1), "human_hand, robot_hand or world; pose in that frame.")
+      .def("block", [](PyCell& c, bool on) { c.cell().setBlock(on); }, "Holds the arm where it is, or lets go.")
+      .def("set_loss", [](PyCell& c, double to_pc, double from_pc) { c.cell().setLoss(to_pc, from_pc); },
+           py::arg("to_pc"), py::arg("from_pc"))
+      .def("lose_next", [](PyCell& c, int packets) { c.cell().loseNext(packets); }, "Loses the next packets both ways.")
+      .def("enabling_switch", [](PyCell& c, bool pressed) { c.cell().controller().setEnablingSwitch(pressed); })
+      .def("drive_error", [](PyCell& c, int joint, bool on) { c.cell().controller().setDriveError(joint, on); },
+           py::arg("joint"), py::arg("on") = true)
+      .def("silence", [](PyCell& c, double duration) { c.cell().controller().setSilent(duration); },
+           "The controller sends nothing for so long, s.")
+      .def("leave_command_mode", [](PyCell& c, const std::string& why) { c.cell().controller().leaveCommandMode(why); })
+      .def("acknowledge", [](PyCell& c) { c.cell().controller().acknowledge(); });
+
+  m.def("parameter_table", [] {
+    const CellConfig defaults;
+    py::list rows;
+    for (const auto& parameter : cellParameters()) {
+      py::dict row;
+      row["name"] = parameter.name;
+      row["unit"] = parameter.unit;
+      row["source"] = parameter.source;
+      row["description"] = parameter.description;
+      row["default"] = parameter.get(defaults);
+      rows.append(row);
+    }
+    return rows;
+  }, "Every parameter of the cell: name, unit, source (published, ours, set-up), description, default.");
+
+  m.def("arm_terms",
+        [](const std::string& urdf, const Vector7& position, const Vector7& velocity) {
+          ArmModel model(urdf);
+          ArmTerms terms;
+          model.evaluate(position, velocity, terms);
+          py::dict result;
+          result["mass"] = Matrix7(terms.mass);
+          result["coriolis"] = Vector7(terms.coriolis);
+          result["gravity"] = Vector7(terms.gravity);
+          result["jacobian"] = Matrix67(terms.jacobian);
+          result["tip"] = poseDict(terms.tip);
+          return result;
+        },
+        py::arg("urdf"), py::arg("position"), py::arg("velocity"),
+        "Mass matrix, velocity and gravity torques, Jacobian (x y z rx ry rz, world axes) and pose of ih2_palm.");
+}

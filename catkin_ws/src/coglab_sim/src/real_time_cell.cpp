@@ -1,0 +1,182 @@
+#include "coglab_sim/real_time_cell.hpp"
+
+#include <algorithm>
+#include <stdexcept>
+#include <utility>
+
+namespace coglab_sim {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+// A measurement that left later than this share of a period leaves the PC too little time to be blamed.
+constexpr double kLateShare = 0.2;
+// Periods behind schedule after which the schedule starts anew instead of catching up.
+constexpr int kGiveUp = 5;
+constexpr std::size_t kMaxRecords = 100000;  // if nobody takes them
+
+}  // namespace
+
+RealTimeCell::RealTimeCell(const CellConfig& config, const std::string& host, std::uint16_t port, double factor)
+    : cell_(config), socket_(host), factor_(factor), port_(port) {
+  if (!(factor >= 0.01 && factor <= 100.0)) {
+    throw std::invalid_argument("speed factor is " + std::to_string(factor) + ", expected 0.01 .. 100");
+  }
+}
+
+RealTimeCell::~RealTimeCell() { stop(); }
+
+void RealTimeCell::start() {
+  if (running_.exchange(true)) return;
+  thread_ = std::thread([this] {
+    try {
+      run();
+    } catch (const std::exception& error) {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      failure_ = error.what();
+    }
+  });
+}
+
+void RealTimeCell::stop() {
+  running_ = false;
+  if (thread_.joinable()) thread_.join();
+}
+
+void RealTimeCell::run() {
+  const auto period = std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(cell_.period() / factor_));
+  auto deadline = Clock::now();
+  auto sent_at = deadline;
+  bool sent_late = false;
+  std::array<std::uint8_t, 2048> buffer{};
+  while (running_) {
+    bool answered = false;
+    const auto listenUntil = [&](Clock::time_point until) {
+      for (;;) {
+        const long size = socket_.receive(buffer.data(), buffer.size(), until);
+        if (size < 0) return;
+        const double latency = std::chrono::duration<double>(Clock::now() - sent_at).count() * factor_;
+        cell_.receive(buffer.data(), static_cast<std::size_t>(size), latency);
+        answered = true;
+      }
+    };
+    listenUntil(deadline);
+    const auto now = Clock::now();
+    const bool late = now - deadline > std::chrono::duration_cast<Clock::duration>(period * kLateShare);
+
+    applyInputs();
+    cell_.advance(!sent_late);
+    sent_at = Clock::now();
+    if (cell_.sent()) socket_.send(cell_.measurement().data(), cell_.measurement().size(), port_);
+    sent_late = late;
+    leaveResults(answered);
+    if (late) {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      ++snapshot_.late_ticks;
+    }
+    deadline += period;
+    if (now - deadline > kGiveUp * period) deadline = now + period;
+  }
+}
+
+void RealTimeCell::applyInputs() {
+  std::vector<std::packaged_task<void(Cell&)>> actions;
+  std::vector<Delayed> due;
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (new_human_) cell_.setHuman(human_);
+    new_human_ = false;
+    cell_.setFingers(fingers_);
+    cell_.setPush(push_);
+    actions.swap(actions_);
+    const double time = cell_.controller().time();
+    const auto later =
+        std::stable_partition(delayed_.begin(), delayed_.end(), [&](const Delayed& d) { return d.time > time; });
+    std::move(later, delayed_.end(), std::back_inserter(due));
+    delayed_.erase(later, delayed_.end());
+  }
+  for (auto& action : actions) action(cell_);
+  for (auto& entry : due) entry.action(cell_);
+}
+
+void RealTimeCell::leaveResults(bool answered) {
+  const auto& controller = cell_.controller();
+  TickRecord record;
+  record.time = controller.time();
+  record.state = static_cast<int>(controller.friState());
+  record.quality = static_cast<int>(controller.friQuality());
+  record.power = controller.power();
+  record.control = static_cast<int>(controller.strategy());
+  record.answered = answered;
+  record.commanded = controller.setPoint();
+  record.measured = cell_.arm().position();
+  const CellTruth truth = cell_.truth();
+  const FingerContactState contact = cell_.fingerContact();
+
+  const std::lock_guard<std::mutex> lock(mutex_);
+  snapshot_.truth = truth;
+  snapshot_.finger_contact = contact;
+  ++snapshot_.tick;
+  if (answered) ++snapshot_.answers;
+  if (records_.size() < kMaxRecords) records_.push_back(record);
+  const std::uint64_t fresh = std::min<std::uint64_t>(controller.messageCount() - messages_seen_, controller.messages().size());
+  messages_.insert(messages_.end(), controller.messages().end() - static_cast<std::ptrdiff_t>(fresh),
+                   controller.messages().end());
+  messages_seen_ = controller.messageCount();
+}
+
+void RealTimeCell::setHuman(const HumanInput& human) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  human_ = human;
+  new_human_ = true;
+}
+
+void RealTimeCell::setFingers(const FingerInput& fingers) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  fingers_ = fingers;
+}
+
+void RealTimeCell::setPush(const Wrench& push) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  push_ = push;
+}
+
+void RealTimeCell::apply(std::function<void(Cell&)> action) {
+  std::packaged_task<void(Cell&)> task(std::move(action));
+  std::future<void> done = task.get_future();
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    actions_.push_back(std::move(task));
+  }
+  if (done.wait_for(std::chrono::seconds(1)) != std::future_status::ready) {
+    throw std::runtime_error("the simulated cell did not react within 1 s");
+  }
+  done.get();
+}
+
+void RealTimeCell::applyLater(double delay, std::function<void(Cell&)> action) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  delayed_.push_back({snapshot_.truth.time + delay, std::move(action)});
+}
+
+CellSnapshot RealTimeCell::snapshot() const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  return snapshot_;
+}
+
+std::vector<TickRecord> RealTimeCell::takeRecords() {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  return std::exchange(records_, {});
+}
+
+std::vector<krc::Message> RealTimeCell::takeMessages() {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  return std::exchange(messages_, {});
+}
+
+std::string RealTimeCell::failure() const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  return failure_;
+}
+
+}  // namespace coglab_sim
