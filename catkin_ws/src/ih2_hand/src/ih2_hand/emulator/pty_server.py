@@ -39,6 +39,7 @@ class PtyServer:
         self._on_port = on_port
         self._trace = trace
         self._master = self._slave = -1
+        self._plugs = 0
         self._late: list[tuple[float, bytes]] = []
         self._replug_at: float | None = None
         self._running = True
@@ -55,6 +56,7 @@ class PtyServer:
             if self._master >= 0:
                 return
             self._master, self._slave = pty.openpty()
+            self._plugs += 1
             # The slave stays open here too: without a reader the master would report an error.
             tty.setraw(self._slave)
             os.set_blocking(self._master, False)
@@ -90,23 +92,23 @@ class PtyServer:
         """Answer until `shutdown`."""
         while self._running:
             with self.lock:
-                master = self._master
+                master, plug = self._master, self._plugs
             poll = select.poll()
             poll.register(self._wake_read, select.POLLIN)
             if master >= 0:
                 poll.register(master, select.POLLIN)
-            self._serve_port(poll, master)
+            self._serve_port(poll, master, plug)
 
-    def _serve_port(self, poll: select.poll, master: int) -> None:
-        """Serve while the same pty is open."""
-        while self._running and self._master == master:
+    def _serve_port(self, poll: select.poll, master: int, plug: int) -> None:
+        """Serve while the same pty is open. Its number alone does not tell: numbers return."""
+        while self._running and self._master == master and self._plugs == plug:
             events = poll.poll(self._wait_s() * 1000.0)
             with self.lock:
                 for descriptor, _ in events:
                     if descriptor == self._wake_read:
-                        _drain(self._wake_read)
-                    elif self._master == master:
-                        self._receive(os.read(master, 4096))
+                        _read(self._wake_read)
+                    elif self._master == master and self._plugs == plug:
+                        self._receive(_read(master))
                 if self._master >= 0:
                     self._send_due()
                 replug = self._replug_at is not None and time.monotonic() >= self._replug_at
@@ -121,7 +123,7 @@ class PtyServer:
 
     def _receive(self, data: bytes) -> None:
         data = self.faults.incoming(data)
-        if self._trace:
+        if self._trace and data:
             self._trace(">", data, time.time())
         for _, answer in self.hand.receive(data):
             answer = self.faults.outgoing(answer)
@@ -166,8 +168,9 @@ class PtyServer:
         self.unplug()
 
 
-def _drain(descriptor: int) -> None:
+def _read(descriptor: int) -> bytes:
+    """What is there; nothing when an event was for a descriptor since closed and reused."""
     try:
-        os.read(descriptor, 4096)
+        return os.read(descriptor, 4096)
     except BlockingIOError:
-        pass
+        return b""

@@ -1,0 +1,262 @@
+"""The driver on a real pty and a socket: opening, silence, slowness, a pulled cable, threads."""
+
+from __future__ import annotations
+
+import os
+import pty
+import socket
+import subprocess
+import sys
+import textwrap
+import threading
+import time
+import tty
+
+import pytest
+from ih2_hand import transport
+from ih2_hand.driver import HandSerialDriver
+from ih2_hand.emulator.faults import Faults
+from ih2_hand.emulator.hand import EmulatedHand
+from ih2_hand.emulator.pty_server import PtyServer
+from ih2_hand.errors import (HandCalibratingError, HandConnectionLost, HandPortError,
+                             HandTimeoutError)
+
+
+@pytest.fixture
+def server(tmp_path):
+    hand = EmulatedHand(calibration_scale=0.2, greeting=True)
+    server = PtyServer(hand, Faults(hand), link=str(tmp_path / "hand"))
+    thread = threading.Thread(target=server.serve, daemon=True)
+    thread.start()
+    yield server
+    server.shutdown()
+    thread.join(5.0)
+    assert not thread.is_alive()
+
+
+@pytest.fixture
+def driver(server):
+    with HandSerialDriver(server.path) as driver:
+        yield driver
+
+
+def test_reads_and_moves_over_a_pty(server, driver):
+    driver.set_hand_posture([10, 20, 30, 40, 50])
+    time.sleep(0.4)
+    assert [driver.get_finger_position(motor) for motor in range(5)] == [10, 20, 30, 40, 50]
+    assert driver.counters.resynchronisations == 0
+
+
+def test_link_follows_the_pty(server, tmp_path):
+    assert os.path.realpath(tmp_path / "hand") == server.path
+    with HandSerialDriver(str(tmp_path / "hand")) as driver:
+        assert driver.get_finger_status(0)["fully_open"]
+    server.fault("unplug")
+    assert not (tmp_path / "hand").exists()
+    server.fault("replug")
+    with HandSerialDriver(str(tmp_path / "hand")) as driver:
+        assert driver.get_finger_status(0)["fully_open"]
+
+
+def test_control_characters_are_ordinary_data(server, driver):
+    for position in (0x03, 0x0A, 0x0D, 0x11, 0x13):
+        driver.set_finger_position(2, position)
+        time.sleep(0.15)
+        assert driver.get_finger_position(2) == position
+
+
+def test_slow_answers_within_the_limit(server, driver):
+    server.fault("slow 20")
+    assert driver.get_finger_status(1)["mode"] == "stop"
+    assert driver.counters.resynchronisations == 0
+
+
+def test_answers_slower_than_the_limit_end_in_one_exception(server, driver):
+    server.fault("slow 200")
+    with pytest.raises(HandTimeoutError, match="last byte received 0x08"):
+        driver.get_finger_status(1)
+    assert driver.counters.retries == 1
+    server.fault("clear")
+    time.sleep(0.3)
+    assert driver.get_finger_status(1)["mode"] == "stop"
+    assert driver.get_finger_position(1) == 0
+
+
+def test_lost_byte_is_asked_for_again(server, driver):
+    server.fault("lose 1")
+    assert driver.get_motor_current(1) == 0
+    assert driver.counters.resynchronisations == 1
+
+
+def test_lost_command_byte_does_not_stall_the_line(server, driver):
+    server.fault("lose_in 1")
+    driver.set_hand_posture([9] * 5)
+    assert driver.get_finger_status(1)["mode"] in ("stop", "position")
+    assert driver.counters.resynchronisations >= 1
+
+
+def test_garbage_is_flushed_and_counted(server, driver):
+    server.fault("garbage 30")
+    time.sleep(0.1)
+    assert driver.get_finger_position(3) == 0
+    assert driver.counters.reasons == {"bytes nobody asked for": 1}
+
+
+def test_silence(server, driver):
+    server.fault("mute")
+    started = time.monotonic()
+    with pytest.raises(HandTimeoutError, match=f"hand on {server.path} gave no complete answer"):
+        driver.get_finger_position(1)
+    assert driver.counters.fillers == 2
+    assert time.monotonic() - started >= 0.1
+
+
+def test_unplugged_cable_names_port_and_last_byte(server, driver):
+    driver.get_finger_status(0)
+    path = server.path
+    server.fault("unplug")
+    with pytest.raises(HandConnectionLost, match=f"{path} is gone.*last byte received 0x08"):
+        driver.get_finger_status(0)
+    with pytest.raises(HandConnectionLost):
+        driver.stop_all()
+
+
+def test_calibration_over_the_pty(server, driver):
+    driver.set_hand_posture([100] * 5)
+    time.sleep(0.5)
+    outcome = []
+    thread = threading.Thread(target=lambda: outcome.append(driver.calibration("fast")))
+    thread.start()
+    time.sleep(0.15)
+    assert driver.calibrating
+    with pytest.raises(HandCalibratingError, match="discards every"):
+        driver.get_finger_position(1)
+    driver.stop_all()
+    thread.join(10.0)
+    assert outcome == [None]
+    assert driver.get_finger_position(1) == 0
+
+
+def test_calibration_broken_by_the_cable(server, driver):
+    errors = []
+
+    def calibrate():
+        try:
+            driver.calibration("complete")
+        except HandConnectionLost as error:
+            errors.append(error)
+
+    thread = threading.Thread(target=calibrate)
+    thread.start()
+    time.sleep(0.2)
+    server.fault("unplug")
+    thread.join(5.0)
+    assert len(errors) == 1
+    assert not driver.calibrating
+
+
+def test_many_threads_share_one_driver(server, driver):
+    driver.set_hand_posture([10, 20, 30, 40, 50])
+    time.sleep(0.4)
+    wrong: list[tuple[int, int]] = []
+
+    def read(motor: int) -> None:
+        for _ in range(60):
+            value = driver.get_finger_position(motor)
+            if value != (motor + 1) * 10:
+                wrong.append((motor, value))
+
+    threads = [threading.Thread(target=read, args=(motor,)) for motor in range(5)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join(30.0)
+    assert wrong == []
+    assert driver.counters.resynchronisations == 0
+
+
+def test_socket_url():
+    hand = EmulatedHand(greeting=True)
+    listener = socket.create_server(("127.0.0.1", 0))
+
+    def serve() -> None:
+        connection, _ = listener.accept()
+        with connection:
+            while data := connection.recv(4096):
+                for _, answer in hand.receive(data):
+                    connection.sendall(answer)
+
+    threading.Thread(target=serve, daemon=True).start()
+    url = f"socket://127.0.0.1:{listener.getsockname()[1]}"
+    with HandSerialDriver(url) as driver:
+        assert driver.port == url
+        driver.set_finger_position(2, 20)
+        time.sleep(0.3)
+        assert driver.get_finger_position(2) == 20
+        assert driver.get_motor_current(2) == 0
+    listener.close()
+    with pytest.raises(HandPortError, match="does not answer"):
+        HandSerialDriver(url)
+
+
+# -- ports that cannot be opened -------------------------------------------------------------------
+
+
+def test_no_such_port():
+    with pytest.raises(HandPortError, match="no such port /dev/ttyNONE .*correct the name"):
+        HandSerialDriver("/dev/ttyNONE")
+
+
+def test_busy_port(server, driver):
+    with pytest.raises(HandPortError, match=f"port {server.path} is busy: end the other program"):
+        HandSerialDriver(server.path)
+
+
+def test_no_permission(server):
+    os.chmod(server.path, 0o600)
+    script = textwrap.dedent(f"""
+        import os, sys
+        from ih2_hand.driver import HandSerialDriver
+        from ih2_hand.errors import HandPortError
+        os.setgroups([]); os.setgid(65534); os.setuid(65534)
+        try:
+            HandSerialDriver({server.path!r})
+        except HandPortError as error:
+            print(error)
+    """)
+    if os.geteuid() != 0:
+        pytest.skip("needs root to become a user without permission")
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, timeout=30,
+                          check=False)
+    assert "no permission for" in done.stdout, done.stderr
+    assert "dialout" in done.stdout
+
+
+def test_no_hand_on_the_port():
+    master, slave = pty.openpty()
+    tty.setraw(slave)
+    try:
+        with pytest.raises(HandPortError, match="no hand answers on .*powered"):
+            HandSerialDriver(os.ttyname(slave))
+    finally:
+        os.close(master)
+        os.close(slave)
+
+
+def test_not_a_url():
+    with pytest.raises(HandPortError, match="is not a port"):
+        HandSerialDriver("nonsense://x")
+
+
+@pytest.mark.parametrize(("ports", "words"), [
+    ([], "no serial device found"), (["/dev/ttyUSB0", "/dev/ttyUSB1"], "/dev/ttyUSB0, /dev/ttyUSB1")])
+def test_the_only_port(monkeypatch, ports, words):
+    monkeypatch.setattr(transport, "serial_ports", lambda: ports)
+    with pytest.raises(HandPortError, match=words):
+        HandSerialDriver()
+
+
+def test_the_only_port_is_taken(monkeypatch, server):
+    monkeypatch.setattr(transport, "serial_ports", lambda: [server.path])
+    with HandSerialDriver(None) as driver:
+        assert driver.port == server.path
