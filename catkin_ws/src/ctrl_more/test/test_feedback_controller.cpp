@@ -1,0 +1,162 @@
+#include <fstream>
+#include <sstream>
+
+#include "ctrl_more/documentation.hpp"
+#include "test_support.hpp"
+
+namespace ctrl_more {
+namespace {
+
+TEST(FeedbackControllerTest, documentationMethodsWithoutAManager) {
+  TestController c;
+  c.description.information = "more";
+  c.description.gain("kp", 2.0).in("1").about("gain");
+  EXPECT_TRUE(c.setName("mine"));
+  EXPECT_EQ(c.getName(), "mine");
+  EXPECT_FALSE(c.setName(""));
+  EXPECT_TRUE(c.addUsedControlState("pelvis"));
+  EXPECT_TRUE(c.addUsedControlState("taskSpaceReferencePose/ee"));
+  EXPECT_TRUE(c.addUsedRobotState("imu"));
+  EXPECT_TRUE(c.addUsedRobotState("estimatedData/zmp"));
+  EXPECT_FALSE(c.addUsedRobotState(""));
+  const Status status = c.addUsedControlState("pelvs");
+  EXPECT_TRUE(contains(status.message(), "did you mean 'pelvis'")) << status.message();
+  EXPECT_TRUE(c.isUsingRobotState("imu"));
+  EXPECT_TRUE(c.isUsingRobotState("estimatedData/zmp"));
+  EXPECT_FALSE(c.isUsingRobotState("measuredData/zmp"));
+  EXPECT_TRUE(c.isUsingControlState("ee"));
+  EXPECT_TRUE(c.isUsingControlState("pelvisOrientation/pelvis"));
+  EXPECT_FALSE(c.isUsingControlState("com"));
+  EXPECT_EQ(c.getUsedControlState().size(), 2u);
+  EXPECT_EQ(c.getUsedControlStates().size(), 2u);
+  EXPECT_EQ(c.getUsedRobotStates().size(), 2u);
+  EXPECT_EQ(c.getGains().at("kp"), std::vector<double>{2.0});
+  EXPECT_EQ(c.getInformation(), "more");
+}
+
+TEST(FeedbackControllerTest, controlMethodsWithoutAManager) {
+  TestController c;
+  c.description.gain("kp", 2.0).range(0, 10).in("1").about("gain");
+  EXPECT_FALSE(c.isEnabled());
+  EXPECT_FALSE(c.isPaused());
+  c.enable();
+  c.pause();
+  EXPECT_TRUE(c.isEnabled());
+  EXPECT_TRUE(c.isPaused());
+  c.resume();
+  c.disable();
+  EXPECT_FALSE(c.isEnabled());
+  EXPECT_FALSE(c.isPaused());
+  EXPECT_TRUE(c.setGains({{"kp", {3.0}}}));
+  EXPECT_FALSE(c.setGains({{"kp", {11.0}}}));
+  EXPECT_FALSE(c.setGains({{"kq", {1.0}}}));
+  EXPECT_EQ(c.getGains().at("kp"), std::vector<double>{3.0});
+  EXPECT_FALSE(c.loadGains("/nowhere/gains.yaml"));
+}
+
+TEST(FeedbackControllerTest, controlMethodsGoToTheManager) {
+  Rig rig;
+  TestController* c = rig.add(adder("pose", "ee", 0.1), "a", false);
+  c->enable();
+  EXPECT_TRUE(rig.manager->isEnabled("a"));
+  c->pause();
+  EXPECT_TRUE(rig.manager->isPaused("a"));
+  EXPECT_TRUE(c->isPaused());
+  c->resume();
+  EXPECT_FALSE(c->isPaused());
+  c->disable();
+  EXPECT_FALSE(rig.manager->isEnabled("a"));
+  EXPECT_FALSE(c->setName("b")) << "names come from the manager";
+  EXPECT_FALSE(c->addUsedRobotState("imu")) << "too late";
+  EXPECT_FALSE(c->addUsedControlState("zmp")) << "too late";
+}
+
+TEST(FeedbackControllerTest, declarationSurvivesLoading) {
+  Rig rig;
+  auto controller = adder("pose", "ee", 0.1);
+  controller->description.measured("imu").size(9).in("rad").frameOf("imu").about("imu");
+  controller->addUsedControlState("zmp");
+  TestController* c = rig.add(std::move(controller), "a");
+  ASSERT_EQ(c->getUsedControlStates().size(), 2u);
+  EXPECT_EQ(c->getUsedControlStates()[0].signal.size(), 7);
+  ASSERT_EQ(c->getUsedRobotStates().size(), 1u);
+  EXPECT_EQ(c->getUsedRobotStates()[0].signal.size(), 9);
+  EXPECT_EQ(rig.manager->getUsedControlStates(),
+            (std::vector<std::string>{"taskSpaceReferencePose/ee", "zmp/zmp"}));
+  EXPECT_EQ(rig.manager->getUsedRobotStates(), std::vector<std::string>{"measuredData/imu"});
+  rig.manager->disable("a");
+  EXPECT_TRUE(rig.manager->getUsedControlStates(true).empty());
+}
+
+TEST(FeedbackControllerTest, askingForWhatIsNotDeclaredIsRefused) {
+  Rig rig;
+  for (int what = 0; what < 5; ++what) {
+    auto c = adder("pose", "ee", 0.1);
+    c->description.reads(ControlContainer::Zmp, "zmp").in("m").frameOf("w").about("read only");
+    c->on_initialize = [what](TestController&, Setup& setup) {
+      if (what == 0) setup.modify("pelvis");
+      if (what == 1) setup.modify("zmp");
+      if (what == 2) setup.robot("imu");
+      if (what == 3) setup.gain("kp");
+      if (what == 4) setup.modify("ee", 6);
+    };
+    const Status status = rig.manager->addController(std::move(c), "c" + std::to_string(what));
+    EXPECT_FALSE(status) << what;
+    EXPECT_FALSE(status.message().empty());
+  }
+  EXPECT_TRUE(rig.manager->getControllersNames().empty());
+}
+
+TEST(FeedbackControllerTest, wrongDescriptionsAreRefused) {
+  Rig rig;
+  const auto refused = [&](const std::function<void(Description&)>& spoil) {
+    auto c = adder("pose", "ee", 0.1);
+    spoil(c->description);
+    return !rig.manager->addController(std::move(c), "c");
+  };
+  EXPECT_TRUE(refused([](Description& d) { d.type = ""; }));
+  EXPECT_TRUE(refused([](Description& d) { d.gain("k", 1); d.gain("k", 1); }));
+  EXPECT_TRUE(refused([](Description& d) { d.gain("k", 1).range(2, 3); }));
+  EXPECT_TRUE(refused([](Description& d) { d.stage = Stage::Joint; }));
+  EXPECT_TRUE(refused([](Description& d) { d.measured("imu").keyFrom("nothing"); }));
+  EXPECT_TRUE(refused([](Description& d) { d.measured("imu").maxAge(0.0); }));
+}
+
+TEST(FeedbackControllerTest, plotShowsEverything) {
+  Rig rig;
+  auto c = adder("pose", "ee", 0.1);
+  c->description.measured("imu").size(9).in("rad").frameOf("imu_link").maxAge(0.05);
+  c->description.gain("kp", 0).vector(2, 1.5).range(0, 10).in("1").about("gain");
+  c->description.information = "written for a test";
+  rig.add(std::move(c), "a");
+  rig.manager->pause("a");
+  std::ostringstream out;
+  rig.manager->plot("a", out);
+  EXPECT_EQ(out.str(),
+            "a (TestController, task stage)\n"
+            "  adds to a reference\n"
+            "  enabled: yes, paused: yes, safety: no\n"
+            "  robot states:\n"
+            "    measuredData/imu [9] (rad) in imu_link, age 50 ms\n"
+            "  control states:\n"
+            "    taskSpaceReferencePose/ee [7] (m) in base, modified\n"
+            "  gains:\n"
+            "    kp = [1.5, 1.5] 1 (0 to 10)\n"
+            "  written for a test\n");
+  std::ostringstream all;
+  rig.manager->plotAll(all);
+  EXPECT_EQ(all.str(), out.str());
+}
+
+TEST(FeedbackControllerTest, emptyFieldsAreFound) {
+  Description d;
+  d.type = "X";
+  d.measured("imu");
+  d.gain("kp", 1);
+  d.setting("mode", "a");
+  const auto empty = d.emptyFields();
+  EXPECT_EQ(empty.size(), 6u + 3u + 2u + 1u);
+}
+
+}  // namespace
+}  // namespace ctrl_more
