@@ -1,0 +1,73 @@
+#!/usr/bin/python3
+"""A whole handover from person to robot through the plain launch file: outcome, error, limits at every FRI tick, bytes of the hand."""
+
+import sys
+import unittest
+from pathlib import Path
+
+import numpy as np
+import rospkg
+import rospy
+import rostest
+import yaml
+
+from coglab_bringup.handover import run_handover
+
+CMD = 2  # FRI state in which the arm follows our commands
+FLOAT32 = 5e-4  # rad/s, what rounding to float32 on the wire adds to a velocity (at 10 ms)
+
+
+class Handover(unittest.TestCase):
+    """One handover for all cases: it runs once, in setUpClass."""
+
+    @classmethod
+    def setUpClass(cls):
+        rospy.init_node("handover_test")
+        cls.log = rospy.get_param("/handover_test/log")
+        cls.row, cls.trial, cls.start, cls.end = run_handover("exchange_human_to_robot", "mug", lambda: True)
+
+    def test_outcome(self):
+        self.assertEqual(self.row["outcome"], "success", self.trial.transitions[-8:])
+
+    def test_final_error(self):
+        self.assertIsNotNone(self.row["final_error_mm"], "the DMP never reported an arrival")
+        self.assertLessEqual(self.row["final_error_mm"], 5.0)
+
+    def test_contact_was_found_after_the_touch(self):
+        self.assertIsNotNone(self.row["contact_delay_ms"], "no contact, or no touch in the truth")
+        self.assertGreaterEqual(self.row["contact_delay_ms"], -20.0)
+
+    def test_every_joint_inside_its_limits_at_every_tick(self):
+        rospy.sleep(0.5)  # the cell writes its log ten times a second
+        with Path(f"{self.log}_fri_ticks.csv").open() as ticks:
+            names = ticks.readline().strip().split(",")
+            rows = np.array([[float(v) for v in line.split(",")] for line in ticks if line.count(",") == len(names) - 1])
+        table = Path(rospkg.RosPack().get_path("lwr_description")) / "config" / "joint_limits.yaml"
+        limits = {name: np.array(values) for name, values in yaml.safe_load(table.read_text())["default"].items()}
+        commanding = rows[rows[:, names.index("state")] == CMD]
+        self.assertGreater(len(commanding), 300, "the arm was hardly ever in command mode")
+        for kind in ("commanded", "measured"):
+            first = names.index(f"{kind}_lwr_a1")
+            joints = commanding[:, first : first + 7]
+            self.assertTrue(np.all(joints >= limits["lower_position"]) and np.all(joints <= limits["upper_position"]), kind)
+        first = names.index("commanded_lwr_a1")
+        time = commanding[:, names.index("time")]
+        steps = np.diff(commanding[:, first : first + 7], axis=0) / np.diff(time)[:, None]
+        consecutive = np.diff(time) < 0.015
+        share = np.max(np.abs(steps[consecutive]) / (limits["velocity"] + FLOAT32))
+        self.assertLessEqual(share, 1.0)
+        self.assertGreater(share, 0.05, "the arm did not move")
+
+    def test_the_hand_really_closed(self):
+        trace = Path(f"{self.log}_hand_trace.txt").read_text()
+        for word in ("Calibration", "SetHandPosture", "grasp "):
+            self.assertIn(word, trace)
+        times = np.array([t for t, _ in self.trial.fingers])
+        positions = np.array([p for _, p in self.trial.fingers])
+        closed = positions[times > self.end - 0.5].mean(axis=0)
+        preshaped = positions.min(axis=0)
+        self.assertGreater(np.max(closed - preshaped), 20)
+
+
+if __name__ == "__main__":
+    rostest.rosrun("coglab_bringup", "handover", Handover, sys.argv)
