@@ -149,15 +149,20 @@ def _getitem(self: Const, key: Any) -> Any:
     return const(_target(self, "_const_obj")[unwrap(key)])
 
 
+def _has(kind: type, name: str) -> bool:
+    """Whether instances have the special method; `getattr(kind, name)` would also find the
+    metaclass's.
+    """
+    return any(vars(base).get(name) is not None for base in kind.__mro__)
+
+
 def _view_class(kind: type) -> type:
-    """A Const class with just the special methods that `kind` has, so that e.g. `callable(view)` is
+    """A Const class with just the special methods `kind` has, so that e.g. `callable(view)` is
     right.
     """
     members: dict[str, Any] = {"__slots__": (), "__doc__": Const.__doc__}
-    members.update(
-        {name: _forwarder(name) for name in _FORWARDED if getattr(kind, name, None) is not None}
-    )
-    members.update({name: _refuser(name) for name in _REFUSED if hasattr(kind, name)})
-    if hasattr(kind, "__getitem__"):
+    members.update({name: _forwarder(name) for name in _FORWARDED if _has(kind, name)})
+    members.update({name: _refuser(name) for name in _REFUSED if _has(kind, name)})
+    if _has(kind, "__getitem__"):
         members["__getitem__"] = _getitem
     return type("Const", (Const,), members)

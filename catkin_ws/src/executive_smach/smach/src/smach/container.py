@@ -218,6 +218,10 @@ class Container(State):
     def _check_new_child(self, label: str, state: State, taken: Iterable[str]) -> None:
         if not isinstance(label, str):
             raise InvalidStateError(f"a label must be a string, got {label!r}")
+        if isinstance(state, type):
+            raise InvalidStateError(
+                f"state {label!r}: expected an instance, got the class {state.__name__}; call it"
+            )
         missing = [name for name in _STATE_METHODS if not callable(getattr(state, name, None))]
         if missing:
             raise InvalidStateError(

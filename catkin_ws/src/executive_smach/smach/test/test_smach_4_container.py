@@ -1,0 +1,265 @@
+"""Section 4 of the specification: construction, user data and callbacks of all containers."""
+
+import threading
+
+import pytest
+import smach
+from machine_parts import Calls, Raises, Says, in_thread, machine
+
+
+def test_s4_abstract_methods():
+    container = smach.Container(["a"])
+    for call in (
+        lambda: container["x"],
+        container.get_children,
+        container.get_initial_states,
+        lambda: container.set_initial_state([]),
+        container.get_active_states,
+        container.get_internal_edges,
+        container.check_consistency,
+    ):
+        with pytest.raises(NotImplementedError):
+            call()
+
+
+def test_s4_getitem_and_unknown_label():
+    state = Says("done")
+    sm = machine(state)
+    assert sm["S0"] is state
+    both = smach.Concurrence(["a"], "a")
+    each = smach.Iterator(["a"], [], [])
+    for container in (sm, both, each):
+        with pytest.raises(KeyError, match="nothing"):
+            container["nothing"]
+
+
+def test_s4_user_data_is_kept_between_runs():
+    sm = machine(Calls(lambda ud: setattr(ud, "n", (ud.n if "n" in ud else 0) + 1), io_keys=["n"]))
+    sm.execute(), sm.execute()
+    assert sm.userdata.n == 2
+
+
+def test_s4_keys_are_copied_in_and_out():
+    sm = machine(
+        Calls(lambda ud: setattr(ud, "o", ud.i + 1), input_keys=["i"], output_keys=["o"]),
+        input_keys=["i"],
+        output_keys=["o"],
+    )
+    ud = smach.UserData()
+    ud.i, ud.unrelated = 1, 5
+    assert sm.execute(ud) == "done"
+    assert ud.o == 2 and sm.userdata._data == {"i": 1, "o": 2}
+
+
+def test_s4_a_missing_key_is_one_warning(log):
+    sm = machine(Says("done"), input_keys=["i"], output_keys=["o"])
+    assert sm.execute(smach.UserData()) == "done"
+    assert len(log.warn) == 2 and "'i'" in log.warn[0] and "'o'" in log.warn[1] and log.error == []
+
+
+def test_s4_output_keys_are_not_copied_after_an_error():
+    def run(ud):
+        ud.o = 1
+        raise ValueError("no")
+
+    sm = machine(Calls(run, output_keys=["o"]), output_keys=["o"])
+    ud = smach.UserData()
+    with pytest.raises(smach.InvalidUserCodeError):
+        sm.execute(ud)
+    assert "o" not in ud
+
+
+def test_s4_callbacks_get_the_containers_own_user_data_and_arguments():
+    calls = []
+    sm = machine(Says("done"), Says("done"))
+    sm.register_start_cb(lambda ud, states, x: calls.append(("start", ud, states, x)), [1])
+    sm.register_transition_cb(
+        lambda ud, states, x: calls.append(("transition", ud, states, x)), [2]
+    )
+    sm.register_termination_cb(
+        lambda ud, states, o, x: calls.append(("end", ud, states, o, x)), cb_args=[3]
+    )
+    sm.execute()
+    assert calls == [
+        ("start", sm.userdata, ["S0"], 1),
+        ("transition", sm.userdata, ["S1"], 2),
+        ("end", sm.userdata, ["S1"], "done", 3),
+    ]
+
+
+def test_s4_a_callback_that_raises_is_logged_and_the_others_still_run_better(log):
+    calls = []
+
+    def bad(*args):
+        raise RuntimeError("broken callback")
+
+    sm = machine(Says("done"), Says("done"))
+    for register in (sm.register_start_cb, sm.register_transition_cb, sm.register_termination_cb):
+        register(bad)
+        register(lambda *args: calls.append(1))
+    assert sm.execute() == "done"
+    assert len(calls) == 3 and log.text("error").count("broken callback") >= 3
+
+
+def test_s4_end_callback_comes_in_every_case_with_the_container_idle_better():
+    for state, outcome in ((Says("done"), "done"), (Raises(ValueError()), None)):
+        sm = machine(state)
+        seen = []
+        sm.register_end_cb(
+            lambda ud, o, sm=sm, seen=seen: seen.append(
+                (o, sm.get_active_states(), sm.is_running())
+            )
+        )
+        try:
+            sm.execute()
+        except smach.InvalidUserCodeError:
+            pass
+        assert seen == [(outcome, ["None"], False)]
+
+
+def test_s4_unregister_callback():
+    calls = []
+
+    def cb(*args):
+        calls.append(args)
+
+    sm = machine(Says("done"))
+    sm.register_start_cb(cb), sm.register_end_cb(cb), sm.unregister_cb(cb)
+    sm.execute()
+    assert calls == []
+    with pytest.raises(TypeError):
+        sm.register_start_cb("no function")
+
+
+def test_s4_open_close_and_stack():
+    a, b = smach.StateMachine(["done"]), smach.StateMachine(["done"])
+    a.open()
+    assert a.is_opened() and smach.Container._construction_stack[-1] is a
+    b.open()
+    assert b.is_opened() and not a.is_opened()
+    with pytest.raises(smach.InvalidStateError):
+        a.close()
+    b.close(), a.close()
+    assert not smach.Container._construction_stack
+    with pytest.raises(smach.InvalidStateError):
+        a.close()
+
+
+def test_s4_assert_opened():
+    sm = smach.StateMachine(["done"])
+    with pytest.raises(smach.InvalidConstructionError, match="my words"):
+        sm.assert_opened("my words")
+    with sm:
+        sm.assert_opened("my words")
+        smach.StateMachine.add("A", Says("done"))
+
+
+def test_s4_close_logs_inconsistency_and_does_not_raise(log):
+    with smach.StateMachine(["other"]):
+        smach.StateMachine.add("A", Says("done"))
+    assert "'done'" in log.text("error")
+
+
+def test_s4_opened_again_and_in_itself():
+    sm = smach.StateMachine(["done"])
+    with sm:
+        with sm:
+            smach.StateMachine.add("A", Says("done"), {"done": "B"})
+        smach.StateMachine.add("B", Says("done"))
+    with sm:
+        smach.StateMachine.add("C", Says("done"))
+    assert list(sm.get_children()) == ["A", "B", "C"]
+
+
+def test_s4_with_gives_the_container_better_and_opened_too():
+    sm = smach.StateMachine(["done"])
+    with sm as x:
+        smach.StateMachine.add("A", Says("done"))
+    with sm.opened() as y:
+        assert y.is_opened()
+    assert x is sm and y is sm
+
+
+def test_s4_a_with_block_that_raises_is_closed_better(log):
+    sm, inner = smach.StateMachine(["done"]), smach.StateMachine(["done"])
+    with pytest.raises(ValueError):
+        with sm:
+            inner.open()
+            raise ValueError("construction went wrong")
+    assert not smach.Container._construction_stack
+    assert "construction went wrong" in log.text("error")
+    other = in_thread(lambda: machine(Says("done")).execute())
+    other.join(5)
+    assert other.result == "done"
+
+
+def test_s4_errors_already_logged_are_not_logged_again(log):
+    with pytest.raises(smach.InvalidStateError):
+        with smach.StateMachine(["done"]):
+            smach.StateMachine.add("A", Says("done"))
+            smach.StateMachine.add("A", Says("done"))
+    assert len(log.error) == 1
+
+
+def test_s4_add_needs_an_open_container_of_its_kind():
+    for add in (
+        lambda: smach.StateMachine.add("A", Says("done")),
+        lambda: smach.Concurrence.add("A", Says("done")),
+        lambda: smach.Sequence.add("A", Says("done")),
+        lambda: smach.Iterator.set_contained_state("A", Says("done")),
+    ):
+        with pytest.raises(smach.InvalidStateError):
+            add()
+    with pytest.raises(smach.InvalidStateError):
+        with smach.Concurrence(["a"], "a"):
+            smach.StateMachine.add("A", Says("done"))
+    with pytest.raises(smach.InvalidStateError):
+        with smach.StateMachine(["done"]):
+            smach.Sequence.add("A", Says("done"))
+    with smach.Sequence(["done"], "done") as sequence:
+        smach.StateMachine.add("A", Says("done"))
+    assert sequence.execute() == "done"
+
+
+def test_s4_another_thread_cannot_add_to_an_open_container_better():
+    with smach.StateMachine(["done"]) as sm:
+        smach.StateMachine.add("A", Says("done"))
+        other = in_thread(lambda: smach.StateMachine.add("B", Says("done")))
+        other.join(5)
+    assert isinstance(other.error, smach.InvalidStateError) and list(sm.get_children()) == ["A"]
+
+
+def test_s4_construction_in_many_threads():
+    results = []
+    threads = [
+        threading.Thread(
+            target=lambda: results.append(machine(Says("done"), Says("done")).execute())
+        )
+        for _ in range(20)
+    ]
+    [t.start() for t in threads], [t.join(20) for t in threads]
+    assert results == ["done"] * 20
+
+
+def test_s4_what_is_no_state_is_refused_with_words():
+    with smach.StateMachine(["done"]):
+        for wrong in (None, "state", lambda ud: "done", Says):
+            with pytest.raises(smach.InvalidStateError, match="'A'"):
+                smach.StateMachine.add("A", wrong)
+        with pytest.raises(smach.InvalidStateError):
+            smach.StateMachine.add(3, Says("done"))
+
+        class Forgot(smach.State):
+            def __init__(self):
+                pass
+
+        with pytest.raises(smach.InvalidStateError, match="__init__"):
+            smach.StateMachine.add("A", Forgot())
+        smach.StateMachine.add("A", Says("done"))
+
+
+def test_s4_running_twice_at_once_is_refused_better():
+    sm = machine(Calls(lambda ud: sm.execute()))
+    with pytest.raises(smach.InvalidUserCodeError):
+        sm.execute()
+    assert not sm.is_running()

@@ -1,0 +1,236 @@
+"""Section 5 of the specification: StateMachine, without preemption."""
+
+import pickle
+
+import pytest
+import smach
+from machine_parts import Calls, Raises, Says, machine
+
+
+def test_s5_first_added_is_initial_and_set_initial_state_wins():
+    sm = machine(Says("done"), Says("done"))
+    assert sm.get_initial_states() == ["S0"]
+    other = smach.StateMachine(["done"])
+    other.set_initial_state(["B"])
+    with other:
+        smach.StateMachine.add("A", Says("done"))
+        smach.StateMachine.add("B", Says("done"))
+    assert other.get_initial_states() == ["B"] and other.execute() == "done"
+    assert other["A"].runs == 0
+
+
+def test_s5_add_returns_the_state():
+    state = Says("done")
+    with smach.StateMachine(["done"]):
+        assert smach.StateMachine.add("A", state) is state
+
+
+def test_s5_add_refuses_unknown_outcomes_and_taken_labels():
+    with smach.StateMachine(["done"]) as sm:
+        with pytest.raises(smach.InvalidTransitionError, match="nothing"):
+            smach.StateMachine.add("A", Says("done"), {"nothing": "A"})
+        assert sm.get_children() == {}
+        smach.StateMachine.add("A", Says("done"))
+        with pytest.raises(smach.InvalidStateError, match="'A'"):
+            smach.StateMachine.add("A", Says("done"))
+        with pytest.raises(smach.InvalidTransitionError):
+            smach.StateMachine.add("B", Says("done"), {"done": 3})
+
+
+def test_s5_two_adds_may_share_one_dict_which_stays_as_it_is_better():
+    shared = {"done": "end"}
+    with smach.StateMachine(["end", "x", "y"]) as sm:
+        smach.StateMachine.add("A", Says("done", "x"), shared)
+        smach.StateMachine.add("B", Says("done", "y"), shared)
+    assert shared == {"done": "end"}
+    assert sm.get_internal_edges() == [
+        ("done", "A", "end"),
+        ("x", "A", None),
+        ("done", "B", "end"),
+        ("y", "B", None),
+    ]
+
+
+def test_s5_outcomes_left_out_fall_through():
+    assert machine(Says("done")).execute() == "done"
+    assert machine(Says("done"), transitions={0: {"done": None}}).execute() == "done"
+
+
+def test_s5_a_name_that_is_label_and_outcome_is_the_label():
+    with smach.StateMachine(["B", "done"]) as sm:
+        smach.StateMachine.add("A", Says("ok"), {"ok": "B"})
+        smach.StateMachine.add("B", Says("done"))
+    assert sm.execute() == "done"
+
+
+@pytest.mark.parametrize(
+    "build",
+    [
+        lambda: machine(),
+        lambda: machine(Says("done"), transitions={0: {"done": "nowhere"}}),
+        lambda: machine(Says("other")),
+    ],
+)
+def test_s5_inconsistent_machines_are_logged_and_return_none(build, log):
+    sm = build()
+    with pytest.raises(smach.InvalidTransitionError):
+        sm.check_consistency()
+    assert sm.execute() is None and not sm.is_running()
+    assert "inconsistent" in log.text("error")
+
+
+def test_s5_unknown_initial_state_is_inconsistent():
+    sm = machine(Says("done"))
+    sm.set_initial_state(["nowhere"])
+    with pytest.raises(smach.InvalidTransitionError, match="nowhere"):
+        sm.check_consistency()
+    assert sm.execute() is None
+
+
+def test_s5_add_auto_connects_whatever_comes_next():
+    with smach.StateMachine(["end"]) as sm:
+        smach.StateMachine.add_auto("A", Says("a", "x"), ["a", "x"], {"x": "end"})
+        smach.StateMachine.add("B", Says("b"), {"b": "C"})
+        smach.StateMachine.add_auto("C", Says("c"), connector_outcomes=["c"])
+        smach.StateMachine.add_auto("D", Says("end"), connector_outcomes=[])
+    edges = sm.get_internal_edges()
+    assert ("a", "A", "B") in edges and ("x", "A", "B") in edges and ("c", "C", "D") in edges
+    assert sm.execute() == "end"
+
+
+def test_s5_add_auto_refuses_unknown_connectors():
+    with smach.StateMachine(["done"]) as sm:
+        with pytest.raises(smach.InvalidStateError, match="nothing"):
+            smach.StateMachine.add_auto("A", Says("done"), ["nothing"])
+        assert sm.get_children() == {}
+
+
+def test_s5_constants_are_written_each_time():
+    seen = []
+    with smach.StateMachine(["done"]) as sm:
+        state = Calls(lambda ud: seen.append(ud.c) or setattr(ud, "c", 0), io_keys=["c"])
+        smach.StateMachine.add("A", state, remapping={"c": "k"}, constants={"k": 7})
+    sm.execute(), sm.execute()
+    assert seen == [7, 7]
+
+
+def test_s5_execute_with_and_without_parent():
+    sm = machine(Says("done"))
+    assert sm.execute() == sm.execute(None) == sm.execute(smach.UserData()) == "done"
+    assert sm.execute(parent_ud=smach.UserData()) == "done"
+
+
+def test_s5_shutdown_between_states_returns_none():
+    second = Says("done")
+    sm = machine(Calls(lambda ud: smach.set_shutdown_check(lambda: True)), second)
+    assert sm.execute() is None and second.runs == 0 and not sm.is_running()
+
+
+def test_s5_shutdown_inside_nested_machines_is_no_error_better(log):
+    outer = machine(machine(Calls(lambda ud: smach.set_shutdown_check(lambda: True)), Says("done")))
+    assert outer.execute() is None and log.error == []
+
+
+def test_s5_is_running_only_inside():
+    seen = []
+    sm = machine(Calls(lambda ud: seen.append(sm.is_running())))
+    sm.execute()
+    assert seen == [True] and not sm.is_running()
+    broken = machine(Raises(ValueError()))
+    with pytest.raises(smach.InvalidUserCodeError):
+        broken.execute()
+    assert not broken.is_running() and broken.get_active_states() == ["None"]
+
+
+def test_s5_a_state_that_raises():
+    with pytest.raises(smach.InvalidUserCodeError) as caught:
+        machine(Raises(ValueError("deep reason"))).execute()
+    text = str(caught.value)
+    assert "S0" in text and "Raises" in text and "deep reason" in text and "Traceback" in text
+    assert isinstance(caught.value.__cause__, ValueError)
+
+
+def test_s5_nesting_does_not_wrap_again():
+    inner = Raises(ValueError("reason"))
+    with pytest.raises(smach.InvalidUserCodeError) as caught:
+        machine(machine(machine(inner))).execute()
+    assert isinstance(caught.value.__cause__, ValueError)
+
+
+@pytest.mark.parametrize("outcome", [None, "unknown", 3, ["done"], {}])
+def test_s5_an_unregistered_outcome(outcome):
+    with pytest.raises(smach.InvalidTransitionError, match="S0"):
+        machine(Says(outcome, registered=["done"])).execute()
+    with pytest.raises(smach.InvalidUserCodeError):
+        machine(machine(Says(outcome, registered=["done"]))).execute()
+
+
+def test_s5_an_outcome_registered_after_add_falls_through():
+    state = Says("late", registered=["done"])
+    sm = machine(state, outcomes=["done", "late"])
+    state.register_outcomes(["late"])
+    assert sm.execute() == "late"
+
+
+def test_s5_order_of_callbacks_and_output_keys():
+    events = []
+    parent = smach.UserData()
+    sm = machine(
+        Calls(lambda ud: events.append("run")),
+        Calls(lambda ud: setattr(ud, "o", 1), output_keys=["o"]),
+        output_keys=["o"],
+    )
+    sm.register_start_cb(lambda ud, labels: events.append(("start", labels)))
+    sm.register_transition_cb(lambda ud, labels: events.append(("to", labels)))
+    sm.register_termination_cb(
+        lambda ud, labels, o: events.append(("end", labels, o, "o" in parent))
+    )
+    sm.execute(parent)
+    assert events == [("start", ["S0"]), "run", ("to", ["S1"]), ("end", ["S1"], "done", False)]
+    assert parent.o == 1
+
+
+def test_s5_active_and_initial_states():
+    seen = []
+    sm = machine(Calls(lambda ud: seen.append(sm.get_active_states())))
+    assert sm.get_active_states() == ["None"] and sm.get_initial_states() == ["S0"]
+    sm.execute()
+    assert seen == [["S0"]] and sm.get_active_states() == ["None"]
+
+
+def test_s5_set_initial_state(log):
+    sm = machine(Says("done"), Says("done"))
+    ud = smach.UserData()
+    ud.x = 4
+    sm.set_initial_state(["S1", "S0"], ud)
+    assert sm.get_initial_states() == ["S1"] and sm.userdata.x == 4 and len(log.warn) == 1
+    sm.set_initial_state([], smach.UserData())
+    assert sm.get_initial_states() == ["S1"]
+    sm.execute()
+    assert sm["S0"].runs == 0
+
+
+def test_s5_pickles():
+    sm = machine(Says("done"), machine(Says("done")))
+    sm.userdata.x = 1
+    clone = pickle.loads(pickle.dumps(sm))
+    assert clone.execute() == "done" and clone.userdata.x == 1
+
+
+def test_s5_user_data_nesting_and_remapping():
+    inner = smach.StateMachine(["done"], input_keys=["a"], output_keys=["b"])
+    with inner:
+        state = Calls(lambda ud: setattr(ud, "y", ud.x * 2), input_keys=["x"], output_keys=["y"])
+        smach.StateMachine.add("DOUBLE", state, remapping={"x": "a", "y": "b"})
+    outer = smach.StateMachine(["done"])
+    outer.userdata.first = 21
+    with outer:
+        smach.StateMachine.add("INNER", inner, remapping={"a": "first", "b": "second"})
+    assert outer.execute() == "done" and outer.userdata.second == 42
+
+
+def test_s5_two_runs_of_a_nested_machine_start_anew():
+    leaf = Says("done")
+    inner = machine(leaf)
+    outer = machine(inner, Says("again", "done"), transitions={1: {"again": "S0"}})
+    assert outer.execute() == "done" and leaf.runs == 2

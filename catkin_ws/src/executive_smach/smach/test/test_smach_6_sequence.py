@@ -1,0 +1,63 @@
+"""Section 6 of the specification: Sequence."""
+
+import smach
+from machine_parts import Says
+
+
+def sequence(*items, outcomes=("done", "failed")):
+    result = smach.Sequence(outcomes=outcomes, connector_outcome="done")
+    with result:
+        for label, state, transitions in items:
+            smach.Sequence.add(label, state, transitions=transitions)
+    return result
+
+
+def test_s6_is_a_state_machine():
+    assert issubclass(smach.Sequence, smach.StateMachine)
+
+
+def test_s6_connects_in_order_and_the_last_falls_through():
+    seq = sequence(("A", Says("done"), None), ("B", Says("done"), None), ("C", Says("done"), None))
+    assert seq.get_internal_edges() == [("done", "A", "B"), ("done", "B", "C"), ("done", "C", None)]
+    assert seq.execute() == "done" and [seq[k].runs for k in "ABC"] == [1, 1, 1]
+
+
+def test_s6_an_explicit_target_stays_and_none_does_not():
+    seq = sequence(
+        ("A", Says("done"), {"done": "C"}),
+        ("B", Says("done"), {"done": None}),
+        ("C", Says("done"), None),
+    )
+    assert ("done", "A", "C") in seq.get_internal_edges() and (
+        "done",
+        "B",
+        "C",
+    ) in seq.get_internal_edges()
+    assert seq.execute() == "done" and seq["B"].runs == 0
+
+
+def test_s6_other_outcomes_leave_the_sequence():
+    seq = sequence(
+        ("A", Says("failed", registered=["done", "failed"]), None), ("B", Says("done"), None)
+    )
+    assert seq.execute() == "failed" and seq["B"].runs == 0
+
+
+def test_s6_a_state_without_the_connector_is_logged_only(log):
+    seq = sequence(("A", Says("other"), {"other": "B"}), ("B", Says("done"), None))
+    assert "connector" in log.text("error") and seq.execute() == "done"
+
+
+def test_s6_user_data_and_remapping():
+    seq = smach.Sequence(["done"], "done", input_keys=["a"], output_keys=["b"])
+    with seq:
+        state = smach.CBState(
+            lambda ud: setattr(ud, "y", ud.x) or "done",
+            outcomes=["done"],
+            input_keys=["x"],
+            output_keys=["y"],
+        )
+        assert smach.Sequence.add("A", state, remapping={"x": "a", "y": "b"}) is state
+    ud = smach.UserData()
+    ud.a = 3
+    assert seq.execute(ud) == "done" and ud.b == 3

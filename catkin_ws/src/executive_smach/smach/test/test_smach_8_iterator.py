@@ -1,0 +1,211 @@
+"""Section 8 of the specification: Iterator."""
+
+import pickle
+
+import pytest
+import smach
+from machine_parts import Calls, Ignores, Raises, Says, Serves, in_thread, machine
+
+
+def iterator(
+    state, it=(), outcomes=("done", "failed"), label="it_data", exhausted="exhausted", **contained
+):
+    result = smach.Iterator(list(outcomes), [], [], it, label, exhausted)
+    with result:
+        smach.Iterator.set_contained_state("CHILD", state, **contained)
+    return result
+
+
+def test_s8_exhausted_outcome_is_added_and_the_callers_list_untouched_better():
+    outcomes = ["done"]
+    each = smach.Iterator(outcomes, [], [])
+    assert outcomes == ["done"] and each.get_registered_outcomes() == ("done", "exhausted")
+
+
+def test_s8_items_iterable_or_function_evaluated_each_time():
+    got = []
+    state = Calls(lambda ud: got.append(ud.x))
+    assert iterator(state, [1, 2], label="x", loop_outcomes=["done"]).execute() == "exhausted"
+    each = iterator(state, lambda: iter([3, 4]), label="x", loop_outcomes=["done"])
+    each.execute(), each.execute()
+    assert got == [1, 2, 3, 4, 3, 4]
+
+
+def test_s8_set_iteritems():
+    got = []
+    each = smach.Iterator(["done"], [], [], exhausted_outcome="done")
+    with each:
+        smach.Iterator.set_iteritems(range(3), "n")
+        state = Calls(lambda ud: got.append(ud.n))
+        assert smach.Iterator.set_contained_state("C", state, loop_outcomes=["done"]) is state
+    assert each.execute() == "done" and got == [0, 1, 2]
+    assert each.get_registered_outcomes() == ("done",)
+
+
+def test_s8_break_outcomes_given_all_others_loop():
+    state = Says("a", "b", "stop", registered=["a", "b", "stop"])
+    each = iterator(state, range(10), outcomes=["stop"], break_outcomes=["stop"])
+    assert each.execute() == "stop" and state.runs == 3
+
+
+def test_s8_loop_outcomes_given_all_others_break():
+    state = Says("go", "go", "stop", registered=["go", "stop", "x"])
+    each = iterator(state, range(10), outcomes=["stop"], loop_outcomes=["go"])
+    assert each.execute() == "stop" and state.runs == 3
+
+
+def test_s8_neither_given_breaks_after_the_first_item():
+    state = Says("done")
+    assert iterator(state, range(10)).execute() == "done" and state.runs == 1
+
+
+def test_s8_final_outcome_map():
+    state = Says("bad", registered=["ok", "bad"])
+    each = iterator(state, range(3), loop_outcomes=["ok"], final_outcome_map={"bad": "failed"})
+    assert each.execute() == "failed"
+
+
+def test_s8_the_child_gets_the_containers_user_data_itself():
+    got = []
+    each = iterator(Calls(lambda ud: got.append(ud)), [1], loop_outcomes=["done"])
+    each.execute()
+    assert got == [each.userdata]
+
+
+def test_s8_transition_callbacks_after_looping_items_only():
+    seen = []
+    each = iterator(
+        Says("go", "go", "stop", registered=["go", "stop"]),
+        range(9),
+        ["stop"],
+        break_outcomes=["stop"],
+    )
+    each.register_transition_cb(lambda ud, labels: seen.append(labels))
+    each.execute()
+    assert seen == [["CHILD"]] * 2
+
+
+def test_s8_preempted_by_a_served_request():
+    state = Serves(patience=20)
+    each = iterator(state, range(5), ["preempted"], loop_outcomes=["done"])
+    run = in_thread(each.execute)
+    assert state.started.wait(5)
+    each.request_preempt()
+    run.join(10)
+    assert run.result == "preempted" and state.runs == 1 and not each.preempt_requested()
+
+
+def test_s8_an_ignored_request_ends_the_iteration_and_is_cleared():
+    state = Ignores("done")
+    each = iterator(state, range(5), loop_outcomes=["done"])
+    state.machine = each
+    assert each.execute() == "done" and state.runs == 1
+    assert not each.preempt_requested() and not state.preempt_requested()
+
+
+@pytest.mark.parametrize("outcomes, wanted", [(["preempted"], "preempted"), (["x"], "exhausted")])
+def test_s8_a_loop_outcome_cut_short_is_no_foreign_outcome_better(outcomes, wanted):
+    state = Ignores("go")
+    each = iterator(state, range(5), outcomes, loop_outcomes=["go"])
+    state.machine = each
+    assert each.execute() == wanted
+
+
+def test_s8_a_request_before_the_start_reaches_the_child_better():
+    state = Serves()
+    each = iterator(state, range(5), ["preempted"], loop_outcomes=["done"])
+    each.request_preempt()
+    assert each.execute() == "preempted" and state.seen == [True]
+    assert each.execute() == "exhausted" and state.runs == 6
+
+
+def test_s8_an_error_of_the_items_counts_as_exhausted(log):
+    def items():
+        yield 1
+        raise ValueError("no more")
+
+    state = Says("done")
+    assert iterator(state, items, loop_outcomes=["done"]).execute() == "exhausted"
+    assert state.runs == 1 and "no more" in log.text("error")
+
+
+def test_s8_a_child_that_raises():
+    each = iterator(Raises(ValueError("reason")), [1], loop_outcomes=["done"])
+    with pytest.raises(smach.InvalidUserCodeError, match="reason"):
+        each.execute()
+    assert not each.is_running() and each.get_active_states() == []
+
+
+def test_s8_a_child_with_an_unknown_outcome():
+    with pytest.raises(smach.InvalidTransitionError):
+        iterator(Says(None, registered=["done"]), [1]).execute()
+
+
+def test_s8_items_that_cannot_be_had():
+    with pytest.raises(smach.InvalidUserCodeError):
+        iterator(Says("done"), lambda: 1 / 0).execute()
+    with pytest.raises(smach.InvalidUserCodeError):
+        iterator(Says("done"), 3).execute()
+
+
+def test_s8_termination_callback_gets_the_label_after_the_output_keys():
+    seen, parent = [], smach.UserData()
+    each = smach.Iterator(["done"], [], ["o"], [1], exhausted_outcome="done")
+    with each:
+        state = Calls(lambda ud: setattr(ud, "o", 5))
+        smach.Iterator.set_contained_state("C", state, loop_outcomes=["done"])
+    each.register_termination_cb(
+        lambda ud, states, outcome: seen.append((states, outcome, parent.o))
+    )
+    assert each.execute(parent) == "done" and seen == [("C", "done", 5)]
+
+
+def test_s8_execute_with_none_and_without_argument():
+    each = iterator(Says("done"), [1])
+    assert each.execute(None) == each.execute() == each.execute(smach.UserData()) == "done"
+
+
+def test_s8_edges_and_states():
+    seen = []
+    state = Calls(
+        lambda ud: seen.append((each.get_active_states(), each.is_running())) or "go",
+        ["go", "a", "b"],
+    )
+    each = iterator(state, [1], ["a", "z"], loop_outcomes=["go"], final_outcome_map={"b": "z"})
+    assert each.get_internal_edges() == [
+        ("go", "CHILD", "CHILD"),
+        ("a", "CHILD", None),
+        ("b", "CHILD", "z"),
+    ]
+    assert each.get_active_states() == [] and each.get_initial_states() == ["CHILD"]
+    each.execute()
+    assert seen == [(["CHILD"], True)] and each.get_active_states() == [] and not each.is_running()
+
+
+def test_s8_without_contained_state():
+    each = smach.Iterator(["done"], [], [])
+    with pytest.raises(smach.InvalidStateError):
+        each.execute()
+    with pytest.raises(smach.InvalidStateError):
+        each.check_consistency()
+    assert each.get_children() == {} and each.get_internal_edges() == []
+
+
+def test_s8_in_a_machine_and_pickled():
+    each = iterator(
+        Says("done"), [1, 2], outcomes=["done"], exhausted="done", loop_outcomes=["done"]
+    )
+    assert machine(pickle.loads(pickle.dumps(each))).execute() == "done"
+
+
+def test_s8_shutdown_ends_the_iteration_better():
+    state = Calls(lambda ud: smach.set_shutdown_check(lambda: True))
+    assert iterator(state, range(5), loop_outcomes=["done"]).execute() is None
+
+
+def test_s8_set_initial_state_takes_user_data():
+    each = iterator(Says("done"), [1])
+    ud = smach.UserData()
+    ud.x = 2
+    each.set_initial_state([], ud)
+    assert each.userdata.x == 2
