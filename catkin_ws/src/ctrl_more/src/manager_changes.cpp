@@ -217,8 +217,8 @@ Status FeedbackControllersManager::bySignal(Change::Kind kind, bool robot,
 }
 
 Status FeedbackControllersManager::enable() { return enable(""); }
-Status FeedbackControllersManager::disable(bool force) { return disable("", force); }
-Status FeedbackControllersManager::pause(bool force) { return pause("", force); }
+Status FeedbackControllersManager::disable() { return disable(""); }
+Status FeedbackControllersManager::pause() { return pause(""); }
 Status FeedbackControllersManager::resume() { return resume(""); }
 
 Status FeedbackControllersManager::enable(const std::string& name) {

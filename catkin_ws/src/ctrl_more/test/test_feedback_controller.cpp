@@ -93,7 +93,7 @@ TEST(FeedbackControllerTest, askingForWhatIsNotDeclaredIsRefused) {
   for (int what = 0; what < 5; ++what) {
     auto c = adder("pose", "ee", 0.1);
     c->description.reads(ControlContainer::Zmp, "zmp").in("m").frameOf("w").about("read only");
-    c->on_initialize = [what](TestController&, Setup& setup) {
+    c->on_initialize = [what](TestController&, ctrl_more::Setup& setup) {
       if (what == 0) setup.modify("pelvis");
       if (what == 1) setup.modify("zmp");
       if (what == 2) setup.robot("imu");

@@ -161,7 +161,7 @@ TEST(ManagerTest, refusedControllerLeavesNoKeyBehind) {
   Rig rig;
   auto c = adder("pose", "ee", 0.1);
   c->description.measured("leftover").size(3);
-  c->on_initialize = [](TestController&, Setup& setup) {
+  c->on_initialize = [](TestController&, ctrl_more::Setup& setup) {
     setup.robot("leftover");
     throw std::runtime_error("no");
   };
@@ -236,6 +236,7 @@ TEST_F(BySignal, safetyControllersMustBeForced) {
   EXPECT_FALSE(rig.manager->disable("limits"));
   EXPECT_TRUE(contains(rig.manager->disable().message(), "limits"));
   EXPECT_TRUE(rig.manager->isEnabled("limits"));
+  EXPECT_FALSE(rig.manager->isEnabled("force"));
   EXPECT_TRUE(rig.manager->disable("limits", true));
   EXPECT_FALSE(rig.manager->isEnabled("limits"));
 }
@@ -337,7 +338,7 @@ struct WithGain : ::testing::Test {
     auto made = adder("vel", "ee", 0.0);
     made->description.gain("kp", 1.0).range(0, 10).in("1").about("what is added");
     made->description.setting("mode", "fast").oneOf({"fast", "slow"}).about("a mode");
-    made->on_initialize = [](TestController& self, Setup& setup) {
+    made->on_initialize = [](TestController& self, ctrl_more::Setup& setup) {
       self.out = setup.modify("ee");
       self.gain_handle = setup.gain("kp");
     };

@@ -123,13 +123,13 @@ class FeedbackControllersManager : public Manager, private ControllerOwner {
 
   /// @name Changing (services)
   /// Each returns after publishing; waitAdopted(status.generation()) waits for the cycle. Unknown
-  /// names are refused with the nearest known one. Forms without a name act on all controllers,
-  /// leave safety controllers alone unless forced, and say so in the note.
+  /// names are refused with the nearest known one. Forms without a name, and the name "", act on
+  /// all controllers, leave safety controllers alone unless forced, and say so in the note.
   /// @{
   Status apply(const Change& change);       ///< several steps, all or nothing, one cycle boundary
   Status enable();                          ///< all
-  Status disable(bool force = false);       ///< all
-  Status pause(bool force = false);         ///< all, with the reason "user"
+  Status disable();                         ///< all
+  Status pause();                           ///< all, with the reason "user"
   Status resume();                          ///< all, the reason "user"
   Status enable(const std::string& name);   ///< one
   Status disable(const std::string& name, bool force = false);  ///< one
