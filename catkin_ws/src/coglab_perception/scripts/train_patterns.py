@@ -1,0 +1,52 @@
+#!/usr/bin/python3
+"""Train reaching patterns from recorded motion.
+
+Usage: train_patterns.py -o patterns.json NAME=FILE.csv[,FILE.csv...] ...
+Each CSV holds one reach: a header line, then t,x,y,z[,...] in s and m (robot base frame), with at least 0.4 s of rest
+before the reach. Exit status: 0 well, 1 the recordings cannot be used, 2 usage.
+"""
+import argparse
+import sys
+
+import numpy as np
+
+from coglab_perception.recogniser import RecogniserSettings, save_patterns, train_patterns
+
+
+def read(path: str) -> tuple[np.ndarray, np.ndarray]:
+    """(stamps, positions) of one recording."""
+    try:
+        data = np.loadtxt(path, delimiter=",", skiprows=1, usecols=(0, 1, 2, 3), ndmin=2)
+    except (OSError, ValueError) as error:
+        raise ValueError(f"{path}: expected a header and lines t,x,y,z: {error}") from None
+    if len(data) < 10 or not np.all(np.isfinite(data)) or np.any(np.diff(data[:, 0]) <= 0):
+        raise ValueError(f"{path}: expected at least 10 finite lines with increasing time")
+    return data[:, 0], data[:, 1:4]
+
+
+def main() -> int:
+    """Entry point."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("-o", "--output", required=True)
+    parser.add_argument("patterns", nargs="+", metavar="NAME=FILE.csv,...")
+    arguments = parser.parse_args()
+    try:
+        recordings = {}
+        for item in arguments.patterns:
+            name, _, files = item.partition("=")
+            if not name or not files:
+                parser.error(f"expected NAME=FILE.csv,..., got '{item}'")
+            recordings[name] = [read(f) for f in files.split(",")]
+        patterns = train_patterns(recordings)
+    except ValueError as error:
+        print(error, file=sys.stderr)
+        return 1
+    save_patterns(arguments.output, patterns, RecogniserSettings(), "train_patterns.py")
+    for p in patterns:
+        print(f"{p.name}: {len(recordings[p.name])} recordings, floor {p.floor:.1f} per frame")
+    print(f"wrote {arguments.output}; next: set ~patterns of motion_recogniser_node.py to it")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,235 @@
+"""Which reaching pattern is the partner performing? Recognition from the hand's position, frame by frame.
+
+Features: displacement from the place where the hand rested (m) and velocity over a short window (m/s). The posterior over
+the patterns comes from the models' forward filters; 'unknown' where even the best one explains the motion badly. A decision
+needs a confident posterior for several frames, and is kept until another pattern has been as confident for as long.
+"""
+from __future__ import annotations
+
+import json
+import math
+from collections import deque
+from dataclasses import asdict, dataclass, field, fields
+from pathlib import Path
+from typing import Any, Mapping, Optional, Sequence
+
+import numpy as np
+
+from .hmm import HmmFilter, LeftRightHmm
+
+UNKNOWN = "unknown"
+FILE_VERSION = 1
+
+
+@dataclass(frozen=True)
+class RecogniserSettings:
+    """Of the recogniser. Times in s, lengths in m."""
+
+    confident: float = 0.9
+    """posterior that counts as confident"""
+    frames: int = 5
+    """confident frames in a row for a decision"""
+    onset_distance: float = 0.03
+    """the reach has begun when the hand is this far from its rest"""
+    rest_speed: float = 0.08
+    rest_time: float = 0.3
+    """slower than rest_speed for so long: the hand rests, and the next motion is a new one"""
+    velocity_window: float = 0.10
+    """s, over which velocity is taken"""
+    max_gap: float = 0.4
+    """s without a frame: what was seen before does not count any more"""
+    temperature: float = 3.0
+    """frames of a tracker are correlated: the log-likelihood is divided by this before it becomes a probability"""
+
+
+@dataclass
+class Pattern:
+    """One reaching pattern: its model, and the log-likelihood per frame below which a motion is not this pattern."""
+
+    name: str
+    model: LeftRightHmm
+    floor: float
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """What the recogniser says now: best pattern (or unknown), its probability, whether it is decided, share seen."""
+
+    pattern: str = UNKNOWN
+    confidence: float = 0.0
+    decided: bool = False
+    progress: float = 0.0
+    probabilities: dict[str, float] = field(default_factory=dict)
+
+
+class FeatureStream:
+    """Positions to features; finds rest and onset by itself."""
+
+    def __init__(self, settings: RecogniserSettings) -> None:
+        self.settings = settings
+        self._history: deque[tuple[float, np.ndarray]] = deque()
+        self._rest: Optional[np.ndarray] = None
+        self._recent: deque[tuple[float, np.ndarray]] = deque()
+        self.moving = False
+        self.started = False
+
+    def update(self, stamp: float, position: Sequence[float]) -> Optional[np.ndarray]:
+        """One frame; returns (6,) features while a reach is under way, else None. ``started`` is True on its first frame."""
+        s = self.settings
+        p = np.asarray(position, dtype=float)
+        self.started = False
+        if self._history and stamp - self._history[-1][0] > s.max_gap:
+            self._history.clear()
+            self._recent.clear()
+            self.moving = False
+        if self._history and stamp <= self._history[-1][0]:
+            return None
+        self._history.append((stamp, p))
+        while len(self._history) > 2 and self._history[1][0] <= stamp - s.velocity_window:
+            self._history.popleft()
+        t0, p0 = self._history[0]
+        velocity = (p - p0) / (stamp - t0) if stamp > t0 else np.zeros(3)
+        self._follow_rest(stamp, p)
+        if self._rest is None:
+            return None
+        if not self.moving:
+            if np.linalg.norm(p - self._rest) <= s.onset_distance:
+                return None
+            self.moving = self.started = True
+        return np.concatenate([p - self._rest, velocity])
+
+    def _follow_rest(self, stamp: float, p: np.ndarray) -> None:
+        """The hand rests where the two halves of the last ``rest_time`` agree: noise averages out, motion does not."""
+        s = self.settings
+        self._recent.append((stamp, p))
+        while self._recent[-1][0] - self._recent[0][0] > s.rest_time:
+            self._recent.popleft()
+        if len(self._recent) < 6 or stamp - self._recent[0][0] < 0.8 * s.rest_time:
+            return
+        half = len(self._recent) // 2
+        places = [place for _, place in self._recent]
+        way = np.mean(places[half:], axis=0) - np.mean(places[:half], axis=0)
+        if np.linalg.norm(way) > s.rest_speed * s.rest_time / 2:
+            return
+        if self.moving or self._rest is None:
+            self._rest = np.mean(places, axis=0)
+        # During the first frames of a reach the hand is still slow: follow only what is not yet a displacement.
+        self._rest = self._rest + 0.1 * (p - self._rest)
+        self.moving = False
+
+
+class Recogniser:
+    """Feed it stamped hand positions (m, robot base frame); it keeps an Estimate."""
+
+    def __init__(self, patterns: Sequence[Pattern], settings: RecogniserSettings = RecogniserSettings()) -> None:
+        if not patterns:
+            raise ValueError("a recogniser needs at least one pattern")
+        self.patterns = list(patterns)
+        self.settings = settings
+        self.stream = FeatureStream(settings)
+        self.estimate = Estimate()
+        self._filters: list[HmmFilter] = []
+        self._streak: tuple[str, int] = (UNKNOWN, 0)
+        self._decision = UNKNOWN
+
+    def update(self, stamp: float, position: Sequence[float]) -> Estimate:
+        """One frame of the partner's hand."""
+        if not np.all(np.isfinite(position)):
+            return self.estimate
+        features = self.stream.update(stamp, position)
+        if features is None:
+            return self.estimate
+        if self.stream.started:
+            self._filters = [HmmFilter(p.model) for p in self.patterns]
+            self._streak, self._decision = (UNKNOWN, 0), UNKNOWN
+        for f in self._filters:
+            f.update(features)
+        self.estimate = self._judge()
+        return self.estimate
+
+    def _judge(self) -> Estimate:
+        scores = np.array([f.log_likelihood for f in self._filters])
+        floors = np.array([p.floor * f.frames for p, f in zip(self.patterns, self._filters)])
+        # 'unknown' competes with the likelihood that the worst genuine reach of the best pattern would have had.
+        best = int(np.argmax(scores))
+        scores = np.append(scores, floors[best]) / self.settings.temperature
+        weights = np.exp(scores - scores.max())
+        weights /= weights.sum()
+        names = [p.name for p in self.patterns] + [UNKNOWN]
+        winner = int(np.argmax(weights))
+        name, confidence = names[winner], float(weights[winner])
+        if confidence >= self.settings.confident:
+            self._streak = (name, self._streak[1] + 1 if self._streak[0] == name else 1)
+        else:
+            self._streak = (UNKNOWN, 0)
+        if self._streak[1] >= self.settings.frames and self._streak[0] != UNKNOWN:
+            self._decision = self._streak[0]
+        decided = self._decision != UNKNOWN
+        shown = self._decision if decided else name
+        probabilities = dict(zip(names, (float(w) for w in weights)))
+        return Estimate(shown, probabilities[shown], decided, self._filters[best].progress(), probabilities)
+
+
+def train_patterns(demonstrations: Mapping[str, Sequence[tuple[np.ndarray, np.ndarray]]],
+                   settings: RecogniserSettings = RecogniserSettings(), states: int = 5) -> list[Pattern]:
+    """One pattern per name from demonstrations [(stamps (T,), positions (T, 3)), ...].
+
+    The floor is the mean less five standard deviations of the log-likelihood per frame over the demonstrations.
+    """
+    patterns = []
+    for name, recordings in demonstrations.items():
+        sequences = [f for stamps, positions in recordings if len(f := reach_features(stamps, positions, settings)) > states]
+        if len(sequences) < 2:
+            raise ValueError(f"pattern '{name}': {len(sequences)} usable demonstrations; at least 2 are needed, each with "
+                             f"a rest before the reach and more than {states} frames of motion")
+        model = LeftRightHmm.train(sequences, states)
+        per_frame = np.array([model.log_likelihood(s) / len(s) for s in sequences])
+        patterns.append(Pattern(name, model, float(per_frame.mean() - 5.0 * per_frame.std() - 1.0)))
+    return patterns
+
+
+def reach_features(stamps: np.ndarray, positions: np.ndarray, settings: RecogniserSettings) -> np.ndarray:
+    """Features of the first reach in a recording, (T, 6); empty if there is none."""
+    stream = FeatureStream(settings)
+    frames: list[np.ndarray] = []
+    for t, p in zip(stamps, positions):
+        f = stream.update(float(t), p)
+        if f is not None:
+            frames.append(f)
+        elif frames:
+            break
+    return np.array(frames).reshape(-1, 6)
+
+
+def save_patterns(path: str, patterns: Sequence[Pattern], settings: RecogniserSettings, source: str) -> None:
+    """Write a pattern file (JSON)."""
+    data = {"version": FILE_VERSION, "source": source, "settings": asdict(settings),
+            "patterns": [{"name": p.name, "floor": p.floor, **p.model.to_dict()} for p in patterns]}
+    Path(path).write_text(json.dumps(data, indent=1) + "\n", encoding="utf-8")
+
+
+def load_patterns(path: str) -> tuple[list[Pattern], RecogniserSettings]:
+    """Read a pattern file; ValueError names file and field."""
+    try:
+        data: Any = json.loads(Path(path).read_text(encoding="utf-8"))
+    except OSError as error:
+        raise ValueError(f"{path}: cannot be read ({error.strerror})") from error
+    except json.JSONDecodeError as error:
+        raise ValueError(f"{path}:{error.lineno}: not JSON: {error.msg}") from error
+    if not isinstance(data, dict) or data.get("version") != FILE_VERSION:
+        raise ValueError(f"{path}: expected a pattern file of version {FILE_VERSION}")
+    known = {f.name for f in fields(RecogniserSettings)}
+    settings = RecogniserSettings(**{k: v for k, v in data.get("settings", {}).items() if k in known})
+    patterns = []
+    for i, entry in enumerate(data.get("patterns", [])):
+        try:
+            model = LeftRightHmm.from_dict(entry)
+            floor = float(entry["floor"])
+            if model.mean.shape[1] != 6 or not math.isfinite(floor):
+                raise ValueError(f"features have {model.mean.shape[1]} numbers, expected 6, floor finite")
+            patterns.append(Pattern(str(entry["name"]), model, floor))
+        except (KeyError, TypeError, ValueError) as error:
+            raise ValueError(f"{path}: patterns[{i}]: {error}") from error
+    if not patterns:
+        raise ValueError(f"{path}: no patterns in it")
+    return patterns, settings

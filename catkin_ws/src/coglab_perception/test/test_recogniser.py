@@ -1,0 +1,180 @@
+"""Recognition of reaching patterns: the filter against brute force and hmmlearn, earliness, unknown motions, hysteresis."""
+import itertools
+import json
+
+import numpy as np
+import pytest
+from coglab_perception.hmm import HmmFilter, LeftRightHmm
+from coglab_perception.recogniser import (UNKNOWN, Recogniser, RecogniserSettings, load_patterns, save_patterns,
+                                          train_patterns)
+from synthetic_reaches import ENDS, demonstrations, reach
+
+
+@pytest.fixture(scope="module")
+def patterns():
+    return train_patterns(demonstrations(20, seed=1))
+
+
+def small_model(rng, n=3, d=2):
+    return LeftRightHmm(np.append(rng.uniform(0.3, 0.9, n - 1), 1.0), rng.normal(size=(n, d)), rng.uniform(0.2, 1, (n, d)))
+
+
+def test_the_filter_equals_the_sum_over_all_paths():
+    rng = np.random.default_rng(0)
+    for _ in range(20):
+        model = small_model(rng)
+        x = rng.normal(size=(6, 2))
+        a, log_b = model.transition(), model.log_emission(x)
+        total = 0.0
+        for path in itertools.product(range(3), repeat=6):
+            if path[0] != 0:
+                continue
+            p = np.exp(log_b[0, 0])
+            for t in range(1, 6):
+                p *= a[path[t - 1], path[t]] * np.exp(log_b[t, path[t]])
+            total += p
+        assert model.log_likelihood(x) == pytest.approx(np.log(total), abs=1e-9)
+
+
+def test_training_raises_the_likelihood_and_finds_the_means():
+    rng = np.random.default_rng(1)
+    truth = LeftRightHmm([0.8, 0.8, 1.0], [[0.0], [3.0], [6.0]], [[0.2], [0.2], [0.2]])
+    data = []
+    for _ in range(40):
+        state, frames = 0, []
+        for _ in range(25):
+            frames.append(truth.mean[state] + np.sqrt(truth.variance[state]) * rng.normal(size=1))
+            if state < 2 and rng.random() > truth.stay[state]:
+                state += 1
+        data.append(np.array(frames))
+    model = LeftRightHmm.train(data, 3)
+    assert model.mean[:, 0] == pytest.approx([0, 3, 6], abs=0.15)
+    assert model.stay[:2] == pytest.approx([0.8, 0.8], abs=0.06)
+
+
+def test_filter_and_training_agree_with_hmmlearn():
+    hmmlearn = pytest.importorskip("hmmlearn.hmm", reason="the oracle hmmlearn is not installed")
+    rng = np.random.default_rng(2)
+    model = small_model(rng, 4, 3)
+    peer = hmmlearn.GaussianHMM(4, covariance_type="diag", init_params="", params="")
+    peer.n_features = 3
+    peer.startprob_ = np.array([1.0, 0, 0, 0])
+    peer.transmat_ = model.transition()
+    peer.means_, peer.covars_ = model.mean, model.variance
+    for _ in range(10):
+        x = rng.normal(size=(30, 3))
+        assert model.log_likelihood(x) == pytest.approx(peer.score(x), rel=1e-9)
+
+
+def test_one_frame_costs_the_same_whatever_came_before():
+    rng = np.random.default_rng(3)
+    f = HmmFilter(small_model(rng))
+    for _ in range(5000):
+        f.update(rng.normal(size=2))
+    assert np.isfinite(f.log_likelihood) and f.frames == 5000 and 0.0 <= f.progress() <= 1.0
+
+
+def outcome_at(patterns, name, rng, share):
+    recogniser = Recogniser(patterns)
+    stamps, positions, onset, duration = reach(name, rng)
+    switches, last = 0, UNKNOWN
+    at_share = None
+    for t, p in zip(stamps, positions):
+        estimate = recogniser.update(t, p)
+        if at_share is None and t >= onset + share * duration:
+            at_share = estimate
+        if estimate.decided and estimate.pattern != last:
+            switches += estimate.pattern != name
+            last = estimate.pattern
+    return at_share, switches
+
+
+def test_right_after_forty_per_cent_of_the_reach_and_hardly_ever_wrong(patterns):
+    rng = np.random.default_rng(77)
+    right = wrong = total = 0
+    for name in ENDS:
+        for _ in range(60):
+            estimate, switches = outcome_at(patterns, name, rng, 0.4)
+            right += estimate.pattern == name
+            wrong += switches > 0
+            total += 1
+    assert right / total >= 0.95, f"{right} of {total} right after 40 %"
+    assert wrong / total <= 0.01, f"{wrong} of {total} with a wrong decision"
+
+
+def test_more_of_the_reach_is_never_worse(patterns):
+    shares = []
+    for share in (0.2, 0.4, 0.7):
+        rng = np.random.default_rng(5)
+        shares.append(np.mean([outcome_at(patterns, name, rng, share)[0].pattern == name for name in ENDS for _ in range(15)]))
+    assert shares[0] <= shares[1] + 0.05 and shares[1] <= shares[2] + 0.05
+
+
+def test_a_motion_that_is_no_reach_is_unknown(patterns):
+    rng = np.random.default_rng(6)
+    decided = 0
+    for _ in range(40):
+        recogniser = Recogniser(patterns)
+        away = np.array([1.30, 0.20, 0.15]) + rng.normal(0, 0.02, 3)
+        direction = np.array([0.5, rng.uniform(-0.2, 0.2), -0.2])
+        for k in range(60):
+            t = k / 30
+            s = min(1.0, max(0.0, (t - 0.6) / 0.9))
+            recogniser.update(t, away + direction * s**3 * (10 - 15 * s + 6 * s * s) + rng.normal(0, 0.004, 3))
+        decided += recogniser.estimate.decided
+    assert decided == 0
+
+
+def test_nothing_is_decided_while_the_hand_rests(patterns):
+    rng = np.random.default_rng(8)
+    recogniser = Recogniser(patterns)
+    for k in range(600):
+        assert not recogniser.update(k / 30, np.array([1.3, 0.2, 0.15]) + rng.normal(0, 0.004, 3)).decided
+
+
+def test_a_decision_needs_several_confident_frames(patterns):
+    rng = np.random.default_rng(9)
+    recogniser = Recogniser(patterns, RecogniserSettings(frames=5))
+    streak = 0
+    stamps, positions, _, _ = reach("high", rng)
+    for t, p in zip(stamps, positions):
+        estimate = recogniser.update(t, p)
+        best = max(estimate.probabilities.values(), default=0.0)
+        streak = streak + 1 if best >= 0.9 else 0
+        if estimate.decided:
+            assert streak >= 5
+            break
+    assert recogniser.estimate.decided
+
+
+def test_gaps_and_old_frames_do_no_harm(patterns):
+    rng = np.random.default_rng(10)
+    recogniser = Recogniser(patterns)
+    stamps, positions, _, _ = reach("left", rng)
+    for i, (t, p) in enumerate(zip(stamps, positions)):
+        if i % 3 != 1:
+            recogniser.update(t, p)
+        recogniser.update(t - 1.0, p + 1.0)
+        recogniser.update(t + 0.001, [np.nan, 0, 0])
+    assert recogniser.estimate.pattern == "left"
+
+
+def test_pattern_files_round_trip_and_are_checked(patterns, tmp_path):
+    path = tmp_path / "p.json"
+    save_patterns(str(path), patterns, RecogniserSettings(), "test")
+    again, settings = load_patterns(str(path))
+    assert [p.name for p in again] == list(ENDS) and settings == RecogniserSettings()
+    assert np.array_equal(again[0].model.mean, patterns[0].model.mean)
+    for broken, sentence in (("{", "not JSON"), ('{"version": 2}', "version 1"), ('{"version": 1}', "no patterns")):
+        path.write_text(broken)
+        with pytest.raises(ValueError, match=sentence):
+            load_patterns(str(path))
+    data = {"version": 1, "patterns": [{"name": "x", "floor": 0.0, "stay": [1.0], "mean": [[0.0]], "variance": [[-1.0]]}]}
+    path.write_text(json.dumps(data))
+    with pytest.raises(ValueError, match=r"patterns\[0\]"):
+        load_patterns(str(path))
+
+
+def test_too_little_to_train_on_is_said():
+    with pytest.raises(ValueError, match="at least 2 are needed"):
+        train_patterns({"one": demonstrations(1, 3)["high"]})
