@@ -67,3 +67,56 @@ class Client:
     def request(self, kind: int, strategy: int = 10) -> None:
         """Our own KRL program: 1 start, 2 stop."""
         self.ints[0], self.ints[1], self.ints[2] = kind, strategy, self.ints[2] + 1
+
+
+class Session:
+    """A cell and a client in lockstep."""
+
+    def __init__(self, urdf: str, client: Client | None = None, **parameters) -> None:
+        from coglab_sim import _cell
+        self.cell = _cell.Cell(urdf, {key.replace('__', '/'): value for key, value in parameters.items()})
+        self.client = client or Client()
+        self.measurement = None
+        self.sent = 0
+
+    def tick(self, position=None, answer: bool = True, **overrides) -> dict | None:
+        """One FRI period; None if the controller sent nothing."""
+        data = None
+        if answer and self.measurement is not None:
+            data = self.client.answer(self.measurement, position, **overrides)
+        out = self.cell.step(data)
+        self.sent += out is not None
+        self.measurement = out
+        return parse(out) if out is not None else None
+
+    def run(self, seconds: float, **kwargs) -> dict | None:
+        """So many simulated seconds."""
+        fields = None
+        for _ in range(max(1, round(seconds / self.cell.period))):
+            fields = self.tick(**kwargs)
+        return fields
+
+    def monitor(self) -> dict:
+        """Until the quality is perfect and the drives are on."""
+        fields = self.run(max(2.0, 110 * self.cell.period))
+        assert (fields['state'], fields['quality'], fields['power']) == (MONITOR, 3, 0x7F), self.cell.messages
+        return fields
+
+    def command(self, strategy: int = 10) -> dict:
+        """Into command mode by our own KRL program."""
+        self.monitor()
+        self.client.flags = {10: JOINT_POSITION, 20: CARTESIAN_IMPEDANCE, 30: JOINT_IMPEDANCE}[strategy]
+        self.client.request(1, strategy)
+        fields = self.run(1.0)
+        assert fields['state'] == COMMAND, self.cell.messages
+        assert fields['control'] == strategy // 10
+        return fields
+
+    def texts(self) -> list[str]:
+        """The controller's message window."""
+        return [text for _, text in self.cell.messages]
+
+
+def set_point(fields: dict) -> list[float]:
+    """Commanded total of a measurement."""
+    return [a + b for a, b in zip(fields['commanded'], fields['offset'])]
