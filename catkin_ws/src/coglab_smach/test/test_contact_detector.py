@@ -2,12 +2,9 @@
 import numpy as np
 import pytest
 from coglab_smach.contact_detector import ContactDetector, DetectorSettings, sensitive_joints
-from coglab_smach.reachability import default_arm, solve
+from coglab_smach.contact_trials import DT, STILL, ContactTrial, found_within, push
 from coglab_smach.pose import Pose
-from coglab_smach.torque_signal import TorqueSignal
-
-DT = 0.005
-STILL = np.zeros(7)
+from coglab_smach.reachability import default_arm, solve
 
 
 @pytest.fixture(scope="module")
@@ -17,64 +14,18 @@ def posture():
     return q, default_arm().position_jacobian(q)
 
 
-class Run:
-    """A detector fed with a synthetic arm at one posture."""
-
-    def __init__(self, posture, seed, sigma=0.05, **settings):
-        self.q, self.jacobian = posture
-        self.detector = ContactDetector(DetectorSettings(**settings), lambda q: self.jacobian)
-        self.signal = TorqueSignal(seed, sigma)
-        self.t = 0.0
-
-    def feed(self, duration, force=lambda t: (0, 0, 0), velocity=lambda t: STILL):
-        """Feed samples; returns (event, time since the start of this call) or (None, duration)."""
-        start = self.t
-        for _ in range(int(round(duration / DT))):
-            self.t += DT
-            v = velocity(self.t - start)
-            tau = self.signal.sample(DT, self.jacobian, force(self.t - start), v)
-            event = self.detector.feed(self.t, tau, self.q, v)
-            if event is not None:
-                return event, self.t - start
-        return None, duration
-
-    def rest_and_arm(self, mode="contact", timeout=30.0, **kw):
-        self.feed(1.5)
-        self.detector.arm(mode, self.t, timeout, **kw)
-        event, _ = self.feed(0.2)
-        return event
-
-
-def push(direction, newton, rise=0.06):
-    d = np.asarray(direction, dtype=float)
-    return lambda t: d * newton * min(1.0, t / rise)
-
-
-def rate(posture, direction, newton, sigma=0.05, n=60):
-    found, delays = 0, []
-    for seed in range(n):
-        run = Run(posture, seed, sigma)
-        assert run.rest_and_arm() is None
-        event, delay = run.feed(0.2, push(direction, newton))
-        if event is not None and delay <= 0.06 + 1e-9:
-            found += 1
-        if event is not None:
-            delays.append(delay)
-    return found / n, float(np.median(delays)) if delays else np.inf
-
-
 def test_lateral_three_newton_found_within_sixty_milliseconds(posture):
-    share, median = rate(posture, (0, 1, 0), 3.0)
+    share, median = found_within(posture, (0, 1, 0), 3.0)
     assert share >= 0.95, f"{share:.0%} within 60 ms, median {median * 1000:.0f} ms"
 
 
 def test_weight_of_an_object_is_found_too(posture):
-    assert rate(posture, (0, 0, -1), 3.0)[0] >= 0.95
+    assert found_within(posture, (0, 0, -1), 3.0)[0] >= 0.95
 
 
 def test_forces_along_the_person_robot_line_are_felt_worst(posture):
-    lateral = rate(posture, (0, 1, 0), 2.0, n=30)[0]
-    along = rate(posture, (-1, 0, 0), 2.0, n=30)[0]
+    lateral = found_within(posture, (0, 1, 0), 2.0, trials=30)[0]
+    along = found_within(posture, (-1, 0, 0), 2.0, trials=30)[0]
     assert lateral > along + 0.2
 
 
@@ -87,7 +38,7 @@ def test_joints_are_chosen_by_the_jacobian(posture):
 
 def test_no_false_alarm_in_two_hundred_still_runs(posture):
     for seed in range(200):
-        run = Run(posture, 1000 + seed)
+        run = ContactTrial(posture, 1000 + seed)
         assert run.rest_and_arm() is None
         event, when = run.feed(1.0)
         assert event is None, f"seed {seed}: {event} after {when:.2f} s"
@@ -95,7 +46,7 @@ def test_no_false_alarm_in_two_hundred_still_runs(posture):
 
 def test_never_watches_while_the_arm_moves(posture):
     for seed in range(20):
-        run = Run(posture, seed)
+        run = ContactTrial(posture, seed)
         run.feed(1.0)
         run.detector.arm("contact", run.t, 30.0)
         for k in range(400):
@@ -105,7 +56,7 @@ def test_never_watches_while_the_arm_moves(posture):
 
 
 def test_watches_only_after_settling(posture):
-    run = Run(posture, 3)
+    run = ContactTrial(posture, 3)
     run.feed(1.0)
     run.feed(0.5, velocity=lambda t: np.full(7, 0.3))
     run.detector.arm("contact", run.t, 10.0)
@@ -116,7 +67,7 @@ def test_watches_only_after_settling(posture):
 
 
 def test_arming_ends_by_itself(posture):
-    run = Run(posture, 4)
+    run = ContactTrial(posture, 4)
     run.feed(1.0)
     run.detector.arm("contact", run.t, 0.5)
     assert run.feed(0.6)[0] is None
@@ -125,7 +76,7 @@ def test_arming_ends_by_itself(posture):
 
 
 def test_a_person_who_was_early_is_found_by_the_offset(posture):
-    run = Run(posture, 5)
+    run = ContactTrial(posture, 5)
     run.feed(1.5)
     moving = np.full(7, 0.3)
     pressing = push((0, 1, 0), 5.0, rise=1e-6)
@@ -137,7 +88,7 @@ def test_a_person_who_was_early_is_found_by_the_offset(posture):
 
 
 def test_only_one_event_per_arming(posture):
-    run = Run(posture, 6)
+    run = ContactTrial(posture, 6)
     run.rest_and_arm()
     assert run.feed(0.3, push((0, 1, 0), 5.0))[0] is not None
     assert run.feed(0.3, push((0, -1, 0), 9.0))[0] is None
@@ -148,7 +99,7 @@ def test_release_is_found_when_the_load_leaves(posture, mass):
     weight = mass * 9.81
     held = lambda t: (0, 0, -weight)  # noqa: E731
     for seed in range(20):
-        run = Run(posture, seed)
+        run = ContactTrial(posture, seed)
         run.feed(1.5, held)
         run.detector.arm("release", run.t, 10.0, mass=mass, load_share=0.6)
         assert run.feed(1.0, held)[0] is None, "released while the robot carried it all"
@@ -167,7 +118,7 @@ def test_requests_that_make_no_sense_are_refused():
 
 
 def test_nan_and_old_stamps_are_ignored(posture):
-    run = Run(posture, 8)
+    run = ContactTrial(posture, 8)
     run.rest_and_arm()
     assert run.detector.feed(run.t + 0.005, [np.nan] * 7, run.q, STILL) is None
     assert run.detector.feed(run.t - 1.0, np.full(7, 50.0), run.q, STILL) is None
