@@ -1,0 +1,590 @@
+#!/usr/bin/python3
+"""Section 9 of the specification: the states on actions, services and topics, and a machine as an
+action server.
+"""
+
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+import unittest
+
+import actionlib
+import rospy
+import smach
+import smach_ros
+from actionlib.msg import TestAction, TestFeedback, TestGoal, TestResult
+from actionlib_msgs.msg import GoalStatus
+from std_msgs.msg import Bool, Empty
+from std_srvs.srv import SetBool, SetBoolRequest, SetBoolResponse, Trigger
+
+sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
+from reference_server import (  # noqa: E402
+    ABORT,
+    DEAF,
+    SUCCEED,
+    SUCCEED_WHEN_CANCELLED,
+    UNTIL_CANCELLED,
+    ReferenceServer,
+)
+
+HERE = os.path.dirname(os.path.abspath(__file__))
+LIMIT = 20.0
+
+
+def in_thread(function, *args):
+    """Runs it; .result after .join()."""
+    thread = threading.Thread(
+        target=lambda: setattr(thread, "result", function(*args)), daemon=True
+    )
+    thread.result = "did not end"
+    thread.start()
+    return thread
+
+
+def wait_for(condition, limit=LIMIT):
+    end = time.monotonic() + limit
+    while time.monotonic() < end and not condition():
+        time.sleep(0.01)
+    return condition()
+
+
+def action_state(goal, name="reference", **kwargs):
+    return smach_ros.SimpleActionState(name, TestAction, goal=TestGoal(goal=goal), **kwargs)
+
+
+class TestSection9Action(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.server = ReferenceServer("reference")
+
+    def setUp(self):
+        self.server.goals.clear()
+        self.ud = smach.UserData()
+
+    def test_s9_outcomes_and_constants(self):
+        state = action_state(SUCCEED, outcomes=["extra"])
+        self.assertEqual(
+            state.get_registered_outcomes(), ("succeeded", "aborted", "preempted", "extra")
+        )
+        names = ("WAITING_FOR_SERVER", "INACTIVE", "ACTIVE", "PREEMPTING", "COMPLETED")
+        self.assertEqual([getattr(state, name) for name in names], [0, 1, 2, 3, 4])
+
+    def test_s9_succeeded_and_aborted(self):
+        self.assertEqual(action_state(SUCCEED).execute(self.ud), "succeeded")
+        self.assertEqual(action_state(ABORT).execute(self.ud), "aborted")
+
+    def test_s9_goal_key_slots_and_callback_in_this_order(self):
+        self.ud.whole, self.ud.goal = TestGoal(goal=ABORT), SUCCEED
+        make = smach_ros.SimpleActionState
+        state = make("reference", TestAction, goal=TestGoal(goal=DEAF), goal_key="whole")
+        self.assertEqual(state.get_registered_input_keys(), ("whole",))
+        self.assertEqual(state.execute(self.ud), "aborted")
+        state = make("reference", TestAction, goal_key="whole", goal_slots=["goal"])
+        self.assertEqual(state.execute(self.ud), "succeeded")
+        self.assertEqual(self.ud.whole.goal, ABORT)
+
+        def goal_cb(ud, goal, more, twice=1):
+            return TestGoal(goal=goal.goal + more * twice)
+
+        state = make(
+            "reference",
+            TestAction,
+            goal_slots=["goal"],
+            goal_cb=goal_cb,
+            goal_cb_args=[1],
+            goal_cb_kwargs={"twice": 1},
+        )
+        self.assertEqual(state.execute(self.ud), "aborted")
+        self.assertEqual(self.server.goals, [ABORT, SUCCEED, ABORT])
+
+    def test_s9_goal_cb_in_place_and_raising(self):
+        def in_place(ud, goal):
+            goal.goal = SUCCEED
+
+        default = TestGoal(goal=ABORT)
+        state = smach_ros.SimpleActionState("reference", TestAction, goal=default, goal_cb=in_place)
+        self.assertEqual(state.execute(self.ud), "succeeded")
+        self.assertEqual(default.goal, ABORT, "the default goal is not shared")
+        state = smach_ros.SimpleActionState("reference", TestAction, goal_cb=lambda ud, goal: 1 / 0)
+        self.assertEqual(state.execute(self.ud), "aborted")
+        state = smach_ros.SimpleActionState("reference", TestAction, goal_slots=["goal"])
+        self.assertEqual(state.execute(self.ud), "aborted", "a missing key")
+        state = smach_ros.SimpleActionState(
+            "reference", TestAction, goal_cb=lambda ud, goal: "text"
+        )
+        self.assertEqual(state.execute(self.ud), "aborted", "no goal")
+
+    def test_s9_result_key_slots_and_callback(self):
+        got = []
+
+        @smach.cb_interface(outcomes=["special"], output_keys=["own"])
+        def result_cb(ud, status, result):
+            got.append((status, result.result))
+            ud.own = 1
+            return "special"
+
+        state = action_state(
+            SUCCEED, result_key="whole", result_slots=["result"], result_cb=result_cb
+        )
+        self.assertEqual(set(state.get_registered_output_keys()), {"own", "whole", "result"})
+        self.assertEqual(state.execute(self.ud), "special")
+        self.assertEqual(got, [(GoalStatus.SUCCEEDED, 101)])
+        self.assertEqual((self.ud.own, self.ud.whole.result, self.ud.result), (1, 101, 101))
+
+    def test_s9_result_cb_unregistered_raising_and_with_arguments(self):
+        self.assertEqual(
+            action_state(SUCCEED, result_cb=lambda *a: "nothing").execute(self.ud), "aborted"
+        )
+        self.assertEqual(
+            action_state(SUCCEED, result_cb=lambda *a: 1 / 0).execute(self.ud), "aborted"
+        )
+        got = []
+        state = action_state(
+            SUCCEED,
+            result_cb=lambda ud, s, r, x, y=0: got.append((x, y)),
+            result_cb_args=[1],
+            result_cb_kwargs={"y": 2},
+        )
+        self.assertEqual(state.execute(self.ud), "succeeded")
+        self.assertEqual(got, [(1, 2)])
+
+    def test_s9_bad_construction(self):
+        for wrong in (
+            {"goal": lambda: 1},
+            {"goal_slots": ["nothing"]},
+            {"result_slots": ["nothing"]},
+            {"goal_cb": 3},
+            {"result_cb": "text"},
+        ):
+            with self.assertRaises(smach.InvalidStateError):
+                smach_ros.SimpleActionState("reference", TestAction, **wrong)
+
+    def test_s9_preempted_cancels_the_goal(self):
+        state = action_state(UNTIL_CANCELLED)
+        run = in_thread(state.execute, self.ud)
+        self.assertTrue(wait_for(lambda: self.server.goals == [UNTIL_CANCELLED]))
+        state.request_preempt()
+        run.join(LIMIT)
+        self.assertEqual(run.result, "preempted")
+        self.assertFalse(state.preempt_requested())
+
+    def test_s9_preempted_before_the_start_sends_nothing(self):
+        state = action_state(SUCCEED)
+        state.request_preempt()
+        self.assertEqual(state.execute(self.ud), "preempted")
+        self.assertEqual(self.server.goals, [])
+        self.assertEqual(state.execute(self.ud), "succeeded")
+
+    def test_s15_cancelled_but_succeeded_does_not_poison_the_next_run_better(self):
+        state = action_state(SUCCEED_WHEN_CANCELLED)
+        run = in_thread(state.execute, self.ud)
+        self.assertTrue(wait_for(lambda: self.server.goals))
+        state.request_preempt()
+        run.join(LIMIT)
+        self.assertEqual(run.result, "succeeded")
+        state._goal = TestGoal(goal=SUCCEED)
+        self.assertEqual(state.execute(self.ud), "succeeded")
+
+    def test_s15_cancelled_but_succeeded_the_machine_carries_the_request_on(self):
+        machine = smach.StateMachine(["done", "preempted", "aborted"])
+        with machine:
+            smach.StateMachine.add(
+                "ACT", action_state(SUCCEED_WHEN_CANCELLED), {"succeeded": "NEXT"}
+            )
+            smach.StateMachine.add("NEXT", action_state(UNTIL_CANCELLED), {"succeeded": "done"})
+        run = in_thread(machine.execute)
+        self.assertTrue(wait_for(lambda: self.server.goals))
+        machine.request_preempt()
+        run.join(LIMIT)
+        self.assertEqual(run.result, "preempted")
+        self.assertEqual(self.server.goals, [SUCCEED_WHEN_CANCELLED])
+
+    def test_s9_exec_timeout_cancels_and_aborts(self):
+        before = self.server.cancelled
+        state = action_state(UNTIL_CANCELLED, exec_timeout=rospy.Duration(0.3))
+        self.assertEqual(state.execute(self.ud), "aborted")
+        self.assertEqual(self.server.cancelled, before + 1)
+        self.assertFalse(state.preempt_requested())
+
+    def test_s9_preempt_timeout_gives_up_better(self):
+        for how in ("exec_timeout", "request"):
+            state = action_state(
+                DEAF, preempt_timeout=0.3, exec_timeout=0.2 if how == "exec_timeout" else None
+            )
+            run = in_thread(state.execute, self.ud)
+            self.assertTrue(wait_for(lambda: self.server.goals))
+            if how == "request":
+                state.request_preempt()
+            run.join(LIMIT)
+            self.assertEqual(run.result, "aborted")
+            self.server.release.set()
+            self.assertEqual(action_state(SUCCEED).execute(self.ud), "succeeded")
+            self.server.release.clear()
+            self.server.goals.clear()
+
+    def test_s9_no_server(self):
+        state = action_state(SUCCEED, name="nobody", server_wait_timeout=rospy.Duration(0.3))
+        self.assertEqual(state.execute(self.ud), "aborted")
+
+    def test_s9_waiting_for_the_server_is_preemptible(self):
+        state = action_state(SUCCEED, name="nobody")
+        run = in_thread(state.execute, self.ud)
+        time.sleep(0.1)
+        state.request_preempt()
+        run.join(LIMIT)
+        self.assertEqual(run.result, "preempted")
+
+    def test_s15_the_server_dies_better(self):
+        process = subprocess.Popen(
+            [sys.executable, os.path.join(HERE, "reference_server.py"), "mortal"]
+        )
+        try:
+            state = action_state(UNTIL_CANCELLED, name="mortal")
+            run = in_thread(state.execute, self.ud)
+            self.assertTrue(wait_for(lambda: state.status == state.ACTIVE))
+            time.sleep(0.5)
+            process.send_signal(signal.SIGKILL)
+            run.join(LIMIT)
+            self.assertEqual(run.result, "aborted")
+        finally:
+            process.kill()
+            process.wait()
+
+
+class TestSection9Service(unittest.TestCase):
+    def setUp(self):
+        self.ud = smach.UserData()
+        self.asked = []
+        self.service = rospy.Service("set", SetBool, self._serve)
+
+    def tearDown(self):
+        self.service.shutdown()
+        rospy.sleep(0.05)
+
+    def _serve(self, request):
+        self.asked.append(request.data)
+        return SetBoolResponse(success=request.data, message="text") if request.data else None
+
+    def test_s9_request_in_its_three_ways(self):
+        self.ud.whole, self.ud.data = SetBoolRequest(data=False), True
+        make = smach_ros.ServiceState
+        state = make("set", SetBool, request=SetBoolRequest(data=True))
+        self.assertEqual(state.get_registered_outcomes(), ("succeeded", "aborted", "preempted"))
+        self.assertEqual(state.execute(self.ud), "succeeded")
+        state = make("set", SetBool, request_key="whole", request_slots=["data"])
+        self.assertEqual(set(state.get_registered_input_keys()), {"whole", "data"})
+        self.assertEqual(state.execute(self.ud), "succeeded")
+        state = make(
+            "set",
+            SetBool,
+            request_cb=lambda ud, r, x, y=0: SetBoolRequest(data=bool(x and y)),
+            request_cb_args=[1],
+            request_cb_kwargs={"y": 1},
+        )
+        self.assertEqual(state.execute(self.ud), "succeeded")
+        self.assertEqual(self.asked, [True] * 3)
+
+    def test_s9_aborted_by_service_key_or_callback(self):
+        make = smach_ros.ServiceState
+        self.assertEqual(make("set", SetBool).execute(self.ud), "aborted", "the service fails")
+        self.assertEqual(make("set", SetBool, request_key="absent").execute(self.ud), "aborted")
+        self.assertEqual(
+            make("set", SetBool, request_cb=lambda ud, r: 1 / 0).execute(self.ud), "aborted"
+        )
+
+    def test_s9_response(self):
+        @smach.cb_interface(outcomes=["special"], output_keys=["own"])
+        def response_cb(ud, response):
+            ud.own = response.message
+            return "special"
+
+        true = SetBoolRequest(data=True)
+        state = smach_ros.ServiceState(
+            "set",
+            SetBool,
+            true,
+            response_cb=response_cb,
+            response_key="whole",
+            response_slots=["success"],
+        )
+        self.assertEqual(set(state.get_registered_output_keys()), {"own", "whole", "success"})
+        self.assertEqual(state.execute(self.ud), "special")
+        self.assertEqual(
+            (self.ud.own, self.ud.whole.message, self.ud.success), ("text", "text", True)
+        )
+        for bad in (lambda ud, r: "nothing", lambda ud, r: 1 / 0):
+            self.assertEqual(
+                smach_ros.ServiceState("set", SetBool, true, response_cb=bad).execute(self.ud),
+                "aborted",
+            )
+
+    def test_s9_service_bad_construction(self):
+        for wrong in (
+            {"request_slots": ["x"]},
+            {"response_slots": ["x"]},
+            {"request_cb": 1},
+            {"response_cb": 1},
+        ):
+            with self.assertRaises(smach.InvalidStateError):
+                smach_ros.ServiceState("set", SetBool, **wrong)
+
+    def test_s9_preempted_before_and_while_waiting_for_the_service(self):
+        state = smach_ros.ServiceState("nobody", Trigger)
+        state.request_preempt()
+        self.assertEqual(state.execute(self.ud), "preempted")
+        run = in_thread(state.execute, self.ud)
+        time.sleep(0.2)
+        state.request_preempt()
+        run.join(LIMIT)
+        self.assertEqual(run.result, "preempted")
+
+
+class TestSection9Topic(unittest.TestCase):
+    def setUp(self):
+        self.ud = smach.UserData()
+        self.pub = rospy.Publisher("flag", Bool, queue_size=10)
+        self.sending = True
+        self.value = True
+        self.thread = in_thread(self._send)
+
+    def tearDown(self):
+        self.sending = False
+        self.thread.join(LIMIT)
+
+    def _send(self):
+        while self.sending:
+            self.pub.publish(self.value)
+            time.sleep(0.02)
+
+    def test_s9_monitor_valid_after_max_checks(self):
+        count = []
+        state = smach_ros.MonitorState(
+            "flag", Bool, lambda ud, msg: count.append(1) or msg.data, max_checks=3
+        )
+        self.assertEqual(state.get_registered_outcomes(), ("valid", "invalid", "preempted"))
+        self.assertEqual(state.execute(self.ud), "valid")
+        self.assertEqual(len(count), 3)
+        self.assertEqual(state.execute(self.ud), "valid", "again")
+
+    def test_s9_monitor_invalid_by_false_and_by_an_error(self):
+        state = smach_ros.MonitorState("flag", Bool, lambda ud, msg: msg.data)
+        run = in_thread(state.execute, self.ud)
+        time.sleep(0.3)
+        self.assertTrue(run.is_alive(), "-1: only false ends it")
+        self.value = False
+        run.join(LIMIT)
+        self.assertEqual(run.result, "invalid")
+        self.assertEqual(
+            smach_ros.MonitorState("flag", Bool, lambda ud, msg: 1 / 0).execute(self.ud), "invalid"
+        )
+
+    def test_s9_monitor_user_data(self):
+        def cond(ud, msg):
+            ud.n = ud.n + 1
+            return ud.n < 3
+
+        self.ud.n = 0
+        state = smach_ros.MonitorState("flag", Bool, cond, input_keys=["n"], output_keys=["n"])
+        self.assertEqual(state.execute(self.ud), "invalid")
+        self.assertEqual(self.ud.n, 3)
+
+    def test_s15_a_monitor_without_messages_is_woken_by_a_request(self):
+        state = smach_ros.MonitorState("silence", Empty, lambda ud, msg: True)
+        run = in_thread(state.execute, self.ud)
+        time.sleep(0.1)
+        asked = time.monotonic()
+        state.request_preempt()
+        run.join(LIMIT)
+        self.assertEqual(run.result, "preempted")
+        self.assertLess(time.monotonic() - asked, LIMIT)
+        self.assertFalse(state.preempt_requested())
+
+    def test_s9_monitor_in_a_concurrence_is_preempted(self):
+        both = smach.Concurrence(["done", "preempted"], "done", child_termination_cb=lambda o: True)
+        with both:
+            smach.Concurrence.add(
+                "M", smach_ros.MonitorState("silence", Empty, lambda ud, msg: True)
+            )
+            smach.Concurrence.add("S", smach.CBState(lambda ud: "ok", outcomes=["ok"]))
+        self.assertEqual([both.execute() for _ in range(5)], ["done"] * 5)
+
+
+class TestSection9Condition(unittest.TestCase):
+    def run_state(self, cond, **kwargs):
+        return smach_ros.ConditionState(cond, poll_rate=rospy.Duration(0.01), **kwargs).execute(
+            smach.UserData()
+        )
+
+    def test_s9_condition_true(self):
+        self.assertEqual(self.run_state(lambda ud: True), "true")
+        state = smach_ros.ConditionState(lambda ud: True)
+        self.assertEqual(state.get_registered_outcomes(), ("true", "false", "preempted"))
+
+    def test_s9_condition_max_checks_allows_one_more(self):
+        for checks, calls in ((1, 2), (3, 4)):
+            count = []
+            self.assertEqual(
+                self.run_state(lambda ud, c=count: c.append(1), max_checks=checks), "false"
+            )
+            self.assertEqual(len(count), calls)
+
+    def test_s9_condition_unlimited_with_timeout(self):
+        count = []
+        outcome = self.run_state(
+            lambda ud: count.append(1), max_checks=-1, timeout=rospy.Duration(0.3)
+        )
+        self.assertEqual(outcome, "false")
+        self.assertGreater(len(count), 3)
+
+    def test_s9_condition_preempted(self):
+        state = smach_ros.ConditionState(
+            lambda ud: False, max_checks=-1, poll_rate=rospy.Duration(60)
+        )
+        run = in_thread(state.execute, smach.UserData())
+        time.sleep(0.1)
+        state.request_preempt()
+        run.join(LIMIT)
+        self.assertEqual(run.result, "preempted")
+        self.assertFalse(state.preempt_requested())
+
+    def test_s9_condition_that_raises(self):
+        with self.assertRaises(smach.InvalidUserCodeError):
+            self.run_state(lambda ud: 1 / 0)
+
+    def test_s9_condition_user_data(self):
+        ud = smach.UserData()
+        ud.n = 5
+        state = smach_ros.ConditionState(lambda ud: ud.n == 5, input_keys=["n"])
+        self.assertEqual(state.execute(ud), "true")
+
+
+class Work(smach.State):
+    """What the wrapped machine does, by the number in the goal."""
+
+    def __init__(self):
+        super().__init__(
+            ["succeeded", "aborted", "preempted", "other"], ["action_goal"], ["action_result"]
+        )
+        self.seen = []
+
+    def execute(self, ud):
+        goal = ud.action_goal.goal
+        self.seen.append((goal, self.preempt_requested()))
+        ud.action_result = TestResult(result=goal + 1000)
+        while goal == UNTIL_CANCELLED and not self.preempt_requested() and not rospy.is_shutdown():
+            time.sleep(0.005)
+        if self.preempt_requested():
+            self.service_preempt()
+            return "preempted"
+        if goal == 99:
+            raise ValueError("broken state")
+        return {SUCCEED: "succeeded", ABORT: "aborted"}.get(goal, "other")
+
+
+class TestSection9Wrapper(unittest.TestCase):
+    count = 0
+
+    def serve(self, machine, **kwargs):
+        type(self).count += 1
+        name = f"wrapped_{self.count}"
+        wrapper = smach_ros.ActionServerWrapper(
+            name, TestAction, machine, ["succeeded"], ["aborted"], ["preempted"], **kwargs
+        )
+        wrapper.run_server()
+        client = actionlib.SimpleActionClient(name, TestAction)
+        self.assertTrue(client.wait_for_server(rospy.Duration(LIMIT)))
+        return client
+
+    def machine(self, state=None):
+        machine = smach.StateMachine(
+            ["succeeded", "aborted", "preempted", "other"], ["action_goal"], ["action_result"]
+        )
+        with machine:
+            smach.StateMachine.add("WORK", state or Work())
+        return machine
+
+    def send(self, client, goal, **kwargs):
+        client.send_goal(TestGoal(goal=goal), **kwargs)
+        self.assertTrue(client.wait_for_result(rospy.Duration(LIMIT)))
+        return client.get_state(), client.get_result().result if client.get_result() else None
+
+    def test_s9_wrapper_outcomes(self):
+        client = self.serve(self.machine())
+        self.assertEqual(self.send(client, SUCCEED), (GoalStatus.SUCCEEDED, 1000 + SUCCEED))
+        self.assertEqual(self.send(client, ABORT), (GoalStatus.ABORTED, 1000 + ABORT))
+        self.assertEqual(self.send(client, 50), (GoalStatus.ABORTED, 1050), "in none of the lists")
+        self.assertEqual(self.send(client, 99)[0], GoalStatus.ABORTED, "an error")
+        self.assertEqual(
+            self.send(client, SUCCEED)[0], GoalStatus.SUCCEEDED, "works after an error"
+        )
+
+    def test_s9_wrapper_cancel_and_s15_nothing_left_over(self):
+        state = Work()
+        client = self.serve(self.machine(state))
+        for _ in range(5):
+            client.send_goal(TestGoal(goal=UNTIL_CANCELLED))
+            before = len(state.seen)
+            self.assertTrue(
+                wait_for(lambda before=before: len(state.seen) > before or rospy.is_shutdown())
+            )
+            client.cancel_goal()
+            self.assertTrue(client.wait_for_result(rospy.Duration(LIMIT)))
+            self.assertEqual(client.get_state(), GoalStatus.PREEMPTED)
+            self.assertEqual(self.send(client, SUCCEED)[0], GoalStatus.SUCCEEDED)
+        self.assertFalse(any(asked for goal, asked in state.seen if goal == SUCCEED))
+
+    def test_s9_wrapper_a_new_goal_preempts_the_old(self):
+        state = Work()
+        client = self.serve(self.machine(state))
+        client.send_goal(TestGoal(goal=UNTIL_CANCELLED))
+        self.assertTrue(wait_for(lambda: state.seen))
+        self.assertEqual(self.send(client, SUCCEED)[0], GoalStatus.SUCCEEDED)
+
+    def test_s9_wrapper_slots_and_feedback(self):
+        machine = smach.StateMachine(["succeeded", "aborted", "preempted"], ["n"], ["m", "result"])
+
+        @smach.cb_interface(outcomes=["ok"], input_keys=["n"], output_keys=["action_feedback", "m"])
+        def first(ud):
+            ud.action_feedback = TestFeedback(feedback=ud.n + 1)
+            ud.m = ud.n * 2
+            return "ok"
+
+        with machine:
+            smach.StateMachine.add("A", smach.CBState(first), {"ok": "B"})
+            smach.StateMachine.add(
+                "B", smach.CBState(lambda ud: "succeeded", outcomes=["succeeded"])
+            )
+        client = self.serve(machine, goal_slots_map={"goal": "n"}, result_slots_map={"result": "m"})
+        got = []
+        state = self.send(client, 21, feedback_cb=lambda feedback: got.append(feedback.feedback))
+        self.assertEqual(state, (GoalStatus.SUCCEEDED, 42))
+        self.assertTrue(wait_for(lambda: got == [22]))
+
+    def test_s9_wrapper_expand_and_pack(self):
+        machine = smach.StateMachine(["succeeded", "aborted", "preempted"], ["goal"], ["result"])
+
+        @smach.cb_interface(outcomes=["succeeded"], input_keys=["goal"], output_keys=["result"])
+        def work(ud):
+            ud.result = ud.goal + 5
+            return "succeeded"
+
+        with machine:
+            smach.StateMachine.add("A", smach.CBState(work))
+        client = self.serve(machine, expand_goal_slots=True, pack_result_slots=True)
+        self.assertEqual(self.send(client, 1), (GoalStatus.SUCCEEDED, 6))
+
+    def test_s9_wrapper_bad_slots(self):
+        with self.assertRaises(smach.InvalidStateError):
+            smach_ros.ActionServerWrapper(
+                "x", TestAction, self.machine(), goal_slots_map={"nothing": "n"}
+            )
+
+
+if __name__ == "__main__":
+    import rostest
+
+    rospy.init_node("states_rostest")
+    rostest.rosrun("smach_ros", "states", __name__)
