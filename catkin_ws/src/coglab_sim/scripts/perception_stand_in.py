@@ -43,7 +43,7 @@ class PerceptionNode:
         self.board_frame = names.get("board", "board")
         self.object_pattern = names.get("object", "object_{id}")
         self.world = names.get("world", "world")
-        board = dict(rospy.get_param("~board", {"xyz": [0.45, -0.55, -0.05], "yaw_deg": -90.0,
+        board = dict(rospy.get_param("~board", {"xyz": [0.45, -0.55, 0.05], "yaw_deg": -90.0,
                                                 "slots": {"A1": [0.0, 0.0, 0.0]}}))
         turn = quat_from_rotvec([0.0, 0.0, np.radians(float(board.get("yaw_deg", 0.0)))])
         self.board = Board(Frame(np.array(board["xyz"], dtype=float), turn),
