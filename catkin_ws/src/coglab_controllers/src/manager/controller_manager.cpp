@@ -62,7 +62,7 @@ ManagerSettings readManagerSettings(const YAML::Node& node, const std::string& u
 
 ControllerManager::ControllerManager(ManagerSettings settings)
     : settings_(std::move(settings)),
-      feedback_(settings_.cycle.cycle_time, settings_.lockstep, settings_.logger),
+      feedback_(*settings_.robot, settings_.cycle.cycle_time, settings_.lockstep, settings_.logger),
       cycle_(settings_.robot, feedback_, settings_.cycle) {
   if (std::function<void()> wait = cycleWait()) cycle_.plans().setWait(wait);
   const Parameters parameters(settings_.parameters, "controller_manager");

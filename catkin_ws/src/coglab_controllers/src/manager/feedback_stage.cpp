@@ -35,10 +35,10 @@ References makeReferences(double period, ctrl_more::Logger* logger) {
   References references;
   references.states = ctrl_more::ControlStates(kMaxJoints, period, logger);
   ctrl_more::ControlStates& states = references.states;
-  references.pose = declare(states, ControlContainer::TaskSpaceReferencePose, "tool", 7,
+  references.pose = declare(states, ControlContainer::TaskSpaceReferencePose, "ee", 7,
                             "m, quaternion x y z w", "base");
   references.twist =
-      declare(states, ControlContainer::TaskSpaceReferenceVel, "tool", 6, "m/s, rad/s", "base");
+      declare(states, ControlContainer::TaskSpaceReferenceVel, "ee", 6, "m/s, rad/s", "base");
   references.joint_position = declare(states, ControlContainer::JointSpaceReference, "Position",
                                       kMaxJoints, "rad", "joints in wire order");
   references.joint_velocity = declare(states, ControlContainer::JointSpaceReference, "Velocity",
@@ -49,18 +49,20 @@ References makeReferences(double period, ctrl_more::Logger* logger) {
 
 }  // namespace
 
-FeedbackStage::FeedbackStage(double period, bool lockstep, ctrl_more::Logger* logger)
-    : robot_(logger),
+FeedbackStage::FeedbackStage(const RobotSetup& setup, double period, bool lockstep,
+                             ctrl_more::Logger* logger)
+    : tool_from_wrench_(setup.tool_from_wrench),
+      robot_(logger),
       references_(makeReferences(period, logger)),
       manager_(robot_, references_.states, options(lockstep), logger) {
   using ctrl_more::RobotSource;
   const std::string wire = "joints in wire order";
-  position_ = declare(robot_, RobotSource::Measured, "jointPosition", kMaxJoints, "rad", wire);
-  velocity_ = declare(robot_, RobotSource::Measured, "jointVelocity", kMaxJoints, "rad/s", wire);
-  torque_ = declare(robot_, RobotSource::Measured, "jointTorque", kMaxJoints, "Nm", wire);
-  external_ = declare(robot_, RobotSource::Measured, "externalTorque", kMaxJoints, "Nm", wire);
-  wrench_ = declare(robot_, RobotSource::Measured, "FT_tool", 6, "N, Nm", "tool");
-  pose_ = declare(robot_, RobotSource::Estimated, "toolPose", 7, "m, quaternion x y z w", "base");
+  position_ = declare(robot_, RobotSource::Measured, "joint_position", kMaxJoints, "rad", wire);
+  velocity_ = declare(robot_, RobotSource::Measured, "joint_velocity", kMaxJoints, "rad/s", wire);
+  torque_ = declare(robot_, RobotSource::Measured, "joint_torque", kMaxJoints, "Nm", wire);
+  external_ = declare(robot_, RobotSource::Measured, "external_torque", kMaxJoints, "Nm", wire);
+  wrench_ = declare(robot_, RobotSource::Measured, "wrench", 6, "N, Nm", "base");
+  pose_ = declare(robot_, RobotSource::Estimated, "ee", 7, "m, quaternion x y z w", "base");
 }
 
 void FeedbackStage::begin(std::int64_t now_ns, double dt) noexcept {
@@ -70,14 +72,17 @@ void FeedbackStage::begin(std::int64_t now_ns, double dt) noexcept {
 bool FeedbackStage::fill(const CycleInput& input) noexcept {
   const RobotSample& sample = input.robot;
   const std::int64_t stamp = sample.stamp_ns;
+  const Quaternion turn = input.chain.tool.orientation * tool_from_wrench_;
+  lwr_fri_bridge::Vector6 wrench;
+  wrench << turn * Vector3(sample.tool_wrench.head<3>()),
+      turn * Vector3(sample.tool_wrench.tail<3>());
   Eigen::Matrix<double, 7, 1> pose;
   pose << input.chain.tool.position, input.chain.tool.orientation.coeffs();
   return robot_.write(position_, sample.position.data(), stamp) &&
          robot_.write(velocity_, sample.velocity.data(), stamp) &&
          robot_.write(torque_, sample.torque.data(), stamp) &&
          robot_.write(external_, sample.external_torque.data(), stamp) &&
-         robot_.write(wrench_, sample.tool_wrench.data(), stamp) &&
-         robot_.write(pose_, pose.data(), stamp);
+         robot_.write(wrench_, wrench.data(), stamp) && robot_.write(pose_, pose.data(), stamp);
 }
 
 }  // namespace coglab_controllers

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cstdlib>
 #include <filesystem>
+#include <iterator>
 #include <mutex>
 #include <sstream>
 #include <stdexcept>
@@ -23,6 +24,13 @@ std::mutex& loaderMutex() {
 std::map<std::string, std::weak_ptr<MotionLibrary>>& openLibraries() {
   static std::map<std::string, std::weak_ptr<MotionLibrary>> libraries;
   return libraries;
+}
+
+/// What libraries registered when they were first loaded. The dynamic linker may keep one mapped
+/// after it was unloaded; loaded again, it then registers nothing anew.
+std::map<std::string, std::vector<std::string>>& registeredOnce() {
+  static std::map<std::string, std::vector<std::string>> types;
+  return types;
 }
 
 std::string joined(const std::vector<std::string>& words) {
@@ -98,22 +106,33 @@ std::shared_ptr<MotionLibrary> MotionLibrary::open(const std::string& path) {
         "library '" + path + "' cannot be loaded: " + error.what() +
         "; expected a shared object built as a MODULE against coglab_controllers");
   }
-  const std::vector<std::string> refused = types.takeRefused();
+  const std::vector<std::string> known = types.names();
+  std::vector<std::string> refused = types.takeRefused();
+  std::vector<std::string> added;
+  std::set_difference(known.begin(), known.end(), before.begin(), before.end(),
+                      std::back_inserter(added));
+  std::vector<std::string>& once = registeredOnce()[key];
+  if (added.empty() && refused.empty()) {
+    for (const std::string& type : once) {
+      (std::binary_search(known.begin(), known.end(), type) ? added : refused).push_back(type);
+    }
+  } else {
+    once = added;
+    once.insert(once.end(), refused.begin(), refused.end());
+  }
   if (!refused.empty()) {
     library->handle_.reset();  // takes its other registrations with it
-    throw std::runtime_error(
-        "library '" + path + "' registers type '" + joined(refused) +
-        "', which another library has registered already; rename one of the two types");
+    throw std::runtime_error("library '" + path + "' registers type '" + joined(refused) +
+                             "', which another library has registered already; rename one of the "
+                             "two types");
   }
-  for (const std::string& name : types.names()) {
-    if (!std::binary_search(before.begin(), before.end(), name)) library->types_.push_back(name);
-  }
-  if (library->types_.empty()) {
+  if (added.empty()) {
     library->handle_.reset();
     throw std::runtime_error("library '" + path +
                              "' registers no motion controller; expected at least one "
                              "COGLAB_REGISTER_MOTION_CONTROLLER in its sources");
   }
+  library->types_ = added;
   openLibraries()[key] = library;
   return library;
 }

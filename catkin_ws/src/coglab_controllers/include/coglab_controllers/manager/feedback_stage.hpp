@@ -13,17 +13,19 @@ namespace coglab_controllers {
 
 /// The stores that all controllers of the arm share, and the feedback manager over them.
 ///
-/// Signals. measuredData: `jointPosition` (rad), `jointVelocity` (rad/s), `jointTorque` (Nm),
-/// `externalTorque` (Nm), 7 each in wire order; `FT_tool` (N, Nm, tool frame, 6). estimatedData:
-/// `toolPose` (m, quaternion; base frame, 7), from the measured joints. References:
-/// taskSpaceReferencePose and taskSpaceReferenceVel `tool`; jointSpaceReference `Position` and
-/// `Velocity`.
+/// Signals. measuredData: `joint_position` (rad), `joint_velocity` (rad/s), `joint_torque`,
+/// `external_torque` (Nm), 7 each in wire order; `wrench` (N, Nm at the tool, in the base frame,
+/// 6). estimatedData: `ee` (m, quaternion; base frame, 7), the tool's pose by the measured joints.
+/// References: taskSpaceReferencePose and taskSpaceReferenceVel `ee`; jointSpaceReference
+/// `Position` and `Velocity`.
 class FeedbackStage {
  public:
+  /// @param setup orientation of the measured wrench
   /// @param period intended cycle time, s
   /// @param lockstep simulated time: overruns of feedback controllers are not judged
   /// @param logger where feedback controllers log; null: Logger::standard()
-  FeedbackStage(double period, bool lockstep, ctrl_more::Logger* logger = nullptr);
+  FeedbackStage(const RobotSetup& setup, double period, bool lockstep,
+                ctrl_more::Logger* logger = nullptr);
 
   ctrl_more::FeedbackControllersManager& manager() { return manager_; }
   const ctrl_more::FeedbackControllersManager& manager() const { return manager_; }
@@ -47,6 +49,7 @@ class FeedbackStage {
   /// @}
 
  private:
+  Quaternion tool_from_wrench_;
   ctrl_more::RobotStates robot_;
   References references_;
   ctrl_more::RobotSignal position_, velocity_, torque_, external_, wrench_, pose_;

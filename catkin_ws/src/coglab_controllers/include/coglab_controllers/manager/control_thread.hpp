@@ -1,0 +1,68 @@
+/// @file
+/// The thread that runs the control cycle, woken by the arriving measurements (design, section 2).
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <functional>
+#include <string>
+
+#include <semaphore.h>
+
+#include "coglab_controllers/manager/control_cycle.hpp"
+#include "lwr_fri_bridge/real_time.hpp"
+
+namespace coglab_controllers {
+
+/// How the thread runs.
+struct ControlThreadOptions {
+  int priority = 70;          ///< SCHED_FIFO, below the FRI thread; 0: leave the scheduling alone
+  double idle_period = 0.02;  ///< s: without measurements an idle cycle runs this often
+  std::size_t stack_bytes = 1024 * 1024;
+  /// Called in this thread after each cycle that made a command, for a robot behind a topic. Not
+  /// real-time.
+  std::function<void(const VelocityCommand&)> after_cycle;
+};
+
+/// Reads the newest sample of a ControlPort, runs the cycle, writes the velocity back.
+///
+/// The period is the smallest whole number of measurement periods that is not shorter than
+/// cycle_time. Without measurements idle cycles run, so that controllers load before the robot is
+/// there.
+class ControlThread {
+ public:
+  ControlThread(ControlCycle& cycle, lwr_fri_bridge::ControlPort& port,
+                ControlThreadOptions options = {});
+  ~ControlThread();
+  ControlThread(const ControlThread&) = delete;
+  ControlThread& operator=(const ControlThread&) = delete;
+
+  void start();
+  /// Ends the thread; waits for the cycle that runs.
+  void stop();
+
+  /// From the thread that writes samples, after each: wakes the cycle when its period has come.
+  /// Wait-free.
+  void wake(bool answered) noexcept;
+
+  /// Warning about scheduling once known; empty if all is well.
+  std::string warning() const;
+
+ private:
+  void run();
+  void once(bool woken);
+
+  ControlCycle& cycle_;
+  lwr_fri_bridge::ControlPort& port_;
+  ControlThreadOptions options_;
+  sem_t semaphore_;
+  lwr_fri_bridge::BoundedThread thread_;
+  std::atomic<bool> stopping_{false};
+  std::atomic<int> periods_{1};      // measurement periods per cycle
+  int since_wake_ = 0;               // writer's thread
+  std::uint64_t last_sequence_ = 0;  // control thread
+  std::string warning_;              // written before scheduled_
+  std::atomic<bool> scheduled_{false};
+};
+
+}  // namespace coglab_controllers

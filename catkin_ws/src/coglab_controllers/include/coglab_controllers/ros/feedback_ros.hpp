@@ -1,0 +1,68 @@
+/// @file
+/// Ctrl-MORE's feedback controllers on ROS: services below controller_manager/feedback, and their
+/// log.
+#pragma once
+
+#include <memory>
+#include <mutex>
+#include <string>
+#include <vector>
+
+#include <ros/node_handle.h>
+
+#include "coglab_controllers/manager/controller_manager.hpp"
+#include "coglab_msgs/DescribeController.h"
+#include "coglab_msgs/FeedbackBySignal.h"
+#include "coglab_msgs/FeedbackSelect.h"
+#include "coglab_msgs/FeedbackStatus.h"
+#include "coglab_msgs/ReloadGains.h"
+#include "coglab_msgs/SetExecutionOrder.h"
+#include "ctrl_more/logger.hpp"
+
+namespace coglab_controllers {
+
+/// Hands records of Ctrl-MORE's logger to rosconsole, with controller, place and cycle.
+class RosLogSink : public ctrl_more::LogSink {
+ public:
+  void write(const ctrl_more::LogRecord& record) override;
+};
+
+/// enable, disable, pause, resume, set_execution_order, pause_by_signal, resume_by_signal,
+/// disable_by_signal, reload_gains, describe, and the latched topic status. Every service answers
+/// after the cycle has adopted the change.
+class FeedbackRos {
+ public:
+  FeedbackRos(const ros::NodeHandle& node, ControllerManager& manager);
+  ~FeedbackRos();
+
+  /// Publishes status if it changed; publisher thread.
+  void publishStatus();
+
+ private:
+  using Select = coglab_msgs::FeedbackSelect;
+  using BySignal = coglab_msgs::FeedbackBySignal;
+  enum class What { Enable, Disable, Pause, Resume };
+
+  template <What what>
+  bool onSelect(Select::Request& request, Select::Response& response);
+  template <What what>
+  bool onSignal(BySignal::Request& request, BySignal::Response& response);
+  bool onOrder(coglab_msgs::SetExecutionOrder::Request& request,
+               coglab_msgs::SetExecutionOrder::Response& response);
+  bool onReload(coglab_msgs::ReloadGains::Request& request,
+                coglab_msgs::ReloadGains::Response& response);
+  bool onDescribe(coglab_msgs::DescribeController::Request& request,
+                  coglab_msgs::DescribeController::Response& response);
+  template <typename Response>
+  bool finish(const ctrl_more::Status& status, Response& response);
+
+  ros::NodeHandle node_;
+  ControllerManager& manager_;
+  ctrl_more::FeedbackControllersManager& feedback_;
+  ros::Publisher status_;
+  std::vector<ros::ServiceServer> services_;
+  coglab_msgs::FeedbackStatus last_;
+  bool published_ = false;
+};
+
+}  // namespace coglab_controllers

@@ -1,0 +1,52 @@
+/// @file
+/// The robot behind topics (split:=true): joint_states in, target_joint_states out, as D4.10's
+/// Tables 1 and 6 have it.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+
+#include <coglab_msgs/LwrState.h>
+#include <geometry_msgs/WrenchStamped.h>
+#include <ros/ros.h>
+#include <sensor_msgs/JointState.h>
+
+#include "lwr_fri_bridge/control_port.hpp"
+
+namespace coglab_controllers {
+
+/// Makes a ControlPort of the topics of a robot interface in another process.
+///
+/// Measured values come from `joint_states`, `external_torques` and `tool_wrench`, the permission
+/// to move from `state`. What is commanded cannot be seen from here: position counts as commanded
+/// where it is measured, velocity where it was sent. Callbacks run in one thread; that thread is
+/// the port's writer.
+class RobotTopics {
+ public:
+  /// @param node namespace of the robot interface (…/lwr)
+  /// @param sample_written called after each joint state: wakes the control thread
+  RobotTopics(const ros::NodeHandle& node, std::function<void()> sample_written);
+
+  lwr_fri_bridge::ControlPort& port() { return port_; }
+
+  /// Publishes a velocity and remembers it as commanded. Control thread.
+  void send(const lwr_fri_bridge::VelocityCommand& command);
+
+ private:
+  void onJoints(const sensor_msgs::JointState& joints);
+  void onState(const coglab_msgs::LwrState& state);
+  void onTorques(const sensor_msgs::JointState& torques);
+  void onWrench(const geometry_msgs::WrenchStamped& wrench);
+
+  ros::NodeHandle node_;
+  std::function<void()> sample_written_;
+  lwr_fri_bridge::ControlPort port_;
+  lwr_fri_bridge::RobotSample sample_;
+  lwr_fri_bridge::TripleBuffer<lwr_fri_bridge::Vector7> sent_;  // control thread to callbacks
+  ros::Subscriber joints_, state_, torques_, wrench_;
+  ros::Publisher target_;
+  sensor_msgs::JointState target_message_;  // control thread
+  std::int64_t last_stamp_ns_ = 0;
+};
+
+}  // namespace coglab_controllers

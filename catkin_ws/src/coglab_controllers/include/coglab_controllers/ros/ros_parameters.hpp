@@ -1,0 +1,23 @@
+/// @file
+/// ROS parameters as the YAML trees that the cores read.
+#pragma once
+
+#include <string>
+
+#include <ros/node_handle.h>
+
+#include "coglab_controllers/manager/controller_manager.hpp"
+
+namespace coglab_controllers {
+
+/// Everything below a namespace; an empty map if there is nothing.
+YAML::Node readParameters(const ros::NodeHandle& node);
+
+/// Settings of the controller manager from the parameters below `node`: those of
+/// readManagerSettings(), and `joint_limits_file`, `joint_limits_profile`, `urdf_file` (else the
+/// parameter robot_description, else lwr_description's own file). Relative names in `feedback_file`
+/// refer to this package's config folder.
+/// @throws std::runtime_error naming the parameter
+ManagerSettings readManagerSettings(const ros::NodeHandle& node);
+
+}  // namespace coglab_controllers

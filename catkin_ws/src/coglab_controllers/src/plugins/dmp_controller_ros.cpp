@@ -1,0 +1,199 @@
+// ROS side of the DMP plug-in: services and topics of D4.10 Table 4, and the registration of both
+// halves.
+#include <memory>
+#include <string>
+
+#include <ros/ros.h>
+
+#include "coglab_controllers/manager/plugin_registry.hpp"
+#include "coglab_controllers/plugins/dmp_controller.hpp"
+#include "coglab_controllers/ros/motion_controller_ros.hpp"
+#include "coglab_controllers/ros/tf_goal_source.hpp"
+#include "coglab_msgs/DmpFeedback.h"
+#include "coglab_msgs/DmpGoal.h"
+#include "coglab_msgs/ExecuteDmp.h"
+#include "coglab_msgs/IkDebug.h"
+#include "coglab_msgs/LoadDmps.h"
+#include "coglab_msgs/SwitchDmp.h"
+
+namespace coglab_controllers {
+
+namespace {
+
+template <typename Point>
+Vector3 toVector(const Point& point) {
+  return Vector3(point.x, point.y, point.z);
+}
+
+template <typename Point>
+void write(const Vector3& v, Point& point) {
+  point.x = v.x();
+  point.y = v.y();
+  point.z = v.z();
+}
+
+void write(const Pose& pose, geometry_msgs::Pose& message) {
+  write(pose.position, message.position);
+  message.orientation.x = pose.orientation.x();
+  message.orientation.y = pose.orientation.y();
+  message.orientation.z = pose.orientation.z();
+  message.orientation.w = pose.orientation.w();
+}
+
+/// What execute_dmp and switch_dmp have in common.
+template <typename Request>
+DmpRequest readRequest(const Request& request) {
+  DmpRequest result;
+  result.primitive_id = request.primitive_id;
+  result.dmp_ratio = request.dmp_ratio;
+  result.goal_offset = toVector(request.goal_offset);
+  result.orientation_control = request.orientation_control;
+  const auto& q = request.target_orientation;
+  result.target_orientation = Eigen::Vector4d(q.x, q.y, q.z, q.w);
+  return result;
+}
+
+}  // namespace
+
+class DmpControllerRos : public MotionControllerRos {
+ public:
+  ~DmpControllerRos() override {
+    for (ros::ServiceServer& service : services_) service.shutdown();
+    goal_.shutdown();
+    if (controller_ != nullptr) controller_->setGoalSource(nullptr);
+  }
+
+  void attach(MotionController& controller, const ros::NodeHandle& node,
+              const RosContext& context) override {
+    controller_ = &dynamic_cast<DmpController&>(controller);
+    node_ = node;
+    source_ = std::make_unique<TfGoalSource>(*context.tf);
+    controller_->setGoalSource(source_.get());
+    feedback_ = node_.advertise<coglab_msgs::DmpFeedback>("feedback", 10, true);
+    debug_ = node_.advertise<coglab_msgs::IkDebug>("ik_debug", 200);
+    goal_ = node_.subscribe("dmp_goal", 1, &DmpControllerRos::onGoal, this);
+    services_[0] = node_.advertiseService("load_dmps", &DmpControllerRos::onLoad, this);
+    services_[1] = node_.advertiseService("execute_dmp", &DmpControllerRos::onExecute, this);
+    services_[2] = node_.advertiseService("switch_dmp", &DmpControllerRos::onSwitch, this);
+  }
+
+  void spinOnce() override {
+    controller_->pollGoal();
+    publishDebug();
+    publishFeedback();
+    if (++calls_ % 200 == 0) {  // once a second: the parameter may be changed while running
+      bool debug = controller_->ikDebug();
+      if (node_.getParam("enable_ik_debug", debug)) controller_->setIkDebug(debug);
+    }
+  }
+
+ private:
+  using LoadDmps = coglab_msgs::LoadDmps;
+  using ExecuteDmp = coglab_msgs::ExecuteDmp;
+  using SwitchDmp = coglab_msgs::SwitchDmp;
+
+  bool onLoad(LoadDmps::Request& request, LoadDmps::Response& response) {
+    int loaded = 0;
+    const Answer answer = controller_->loadDmps(request.filename, loaded);
+    response.num_loaded = static_cast<std::int16_t>(loaded);
+    response.success = answer.success;
+    response.message = answer.message;
+    if (!answer.success) ROS_WARN("load_dmps refused: %s", answer.message.c_str());
+    return true;
+  }
+
+  bool onExecute(ExecuteDmp::Request& request, ExecuteDmp::Response& response) {
+    DmpRequest asked = readRequest(request);
+    asked.initial_state = request.initial_state;
+    asked.initial_position = toVector(request.initial_position);
+    asked.initial_velocity = toVector(request.initial_velocity);
+    asked.goal_frame = request.goal_frame;
+    return reply("execute_dmp", controller_->execute(asked), response);
+  }
+
+  bool onSwitch(SwitchDmp::Request& request, SwitchDmp::Response& response) {
+    return reply("switch_dmp", controller_->switchDmp(readRequest(request)), response);
+  }
+
+  template <typename Response>
+  bool reply(const char* service, const Answer& answer, Response& response) {
+    response.success = answer.success;
+    response.message = answer.message;
+    if (!answer.success) ROS_WARN("%s refused: %s", service, answer.message.c_str());
+    return true;
+  }
+
+  void onGoal(const coglab_msgs::DmpGoal& goal) {
+    const Answer answer = controller_->setGoal(goal.header.frame_id, toVector(goal.goal),
+                                               toSteady(goal.header.stamp));
+    if (!answer.success) ROS_WARN_THROTTLE(1.0, "%s", answer.message.c_str());
+  }
+
+  void publishDebug() {
+    IkDebugRecord record;
+    while (controller_->readIkDebug(record)) {
+      coglab_msgs::IkDebug message;
+      message.header.stamp = toRos(record.stamp_ns);
+      message.header.frame_id = controller_->baseFrame();
+      message.phase = record.phase;
+      write(record.goal, message.goal);
+      write(record.set_point, message.set_point);
+      write(record.velocity, message.set_point_velocity.linear);
+      write(record.angular_velocity, message.set_point_velocity.angular);
+      write(record.measured, message.measured);
+      write(record.ik.position_error, message.position_error);
+      write(record.ik.rotation_error, message.rotation_error);
+      const auto copy = [](const JointVector& v) {
+        return std::vector<double>(v.data(), v.data() + v.size());
+      };
+      message.joint_velocity_position = copy(record.ik.position_velocity);
+      message.joint_velocity_rotation = copy(record.ik.rotation_velocity);
+      message.smallest_singular_value_position = record.ik.smallest_singular_value_position;
+      message.smallest_singular_value_rotation = record.ik.smallest_singular_value_rotation;
+      message.rotation_rejected = record.ik.rotation_rejected;
+      debug_.publish(message);
+    }
+  }
+
+  void publishFeedback() {
+    const MotionState before = progress_.state;
+    const Reason reason = progress_.reason;
+    if (!controller_->readProgress(progress_)) return;
+    const bool changed = progress_.state != before || (progress_.reason.empty() != reason.empty());
+    const bool moving =
+        progress_.state == MotionState::Running || progress_.state == MotionState::Holding;
+    // 50 Hz while it moves, 5 Hz otherwise, and every change at once.
+    if (!changed && calls_ - last_feedback_ < (moving ? 4u : 40u)) return;
+    last_feedback_ = calls_;
+    coglab_msgs::DmpFeedback message;
+    message.header.stamp = toRos(progress_.stamp_ns);
+    message.header.frame_id = controller_->dmpFrame();
+    message.primitive_id = progress_.primitive.str();
+    message.state = nameOf(progress_.state);
+    message.reason = progress_.reason.str();
+    message.phase = progress_.phase;
+    message.remaining_distance = progress_.remaining_distance;
+    message.remaining_time = progress_.remaining_time;
+    feedback_.publish(message);
+    if (changed && progress_.state == MotionState::Aborted) {
+      ROS_WARN("DMP motion '%s' aborted: %s", message.primitive_id.c_str(), message.reason.c_str());
+    } else if (changed && !message.reason.empty()) {
+      ROS_INFO("DMP motion '%s': %s", message.primitive_id.c_str(), message.reason.c_str());
+    }
+  }
+
+  DmpController* controller_ = nullptr;
+  ros::NodeHandle node_;
+  std::unique_ptr<TfGoalSource> source_;
+  ros::Publisher feedback_, debug_;
+  ros::Subscriber goal_;
+  ros::ServiceServer services_[3];
+  DmpProgress progress_;
+  std::uint64_t calls_ = 0, last_feedback_ = 0;
+};
+
+}  // namespace coglab_controllers
+
+COGLAB_REGISTER_MOTION_CONTROLLER_WITH_ROS("coglab/DmpController",
+                                           coglab_controllers::DmpController,
+                                           coglab_controllers::DmpControllerRos)

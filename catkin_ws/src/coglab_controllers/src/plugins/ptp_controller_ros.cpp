@@ -1,0 +1,58 @@
+// ROS side of the point-to-point plug-in: D4.10 Table 5, and the registration of both halves.
+#include <ros/ros.h>
+
+#include "coglab_controllers/manager/plugin_registry.hpp"
+#include "coglab_controllers/plugins/ptp_controller.hpp"
+#include "coglab_controllers/ros/motion_controller_ros.hpp"
+#include "coglab_msgs/AddPtp.h"
+#include "coglab_msgs/FinishedPtp.h"
+
+namespace coglab_controllers {
+
+class PtpControllerRos : public MotionControllerRos {
+ public:
+  ~PtpControllerRos() override { service_.shutdown(); }
+
+  void attach(MotionController& controller, const ros::NodeHandle& node,
+              const RosContext&) override {
+    controller_ = &dynamic_cast<PtpController&>(controller);
+    node_ = node;
+    finished_ = node_.advertise<coglab_msgs::FinishedPtp>("finished_ptp", 50);
+    service_ = node_.advertiseService("add_ptp", &PtpControllerRos::onAdd, this);
+  }
+
+  void spinOnce() override {
+    PtpEnd end;
+    while (controller_->readEnd(end)) {
+      if (end.executed) {
+        coglab_msgs::FinishedPtp message;
+        message.ptp_id = end.ptp_id;
+        finished_.publish(message);
+      } else {
+        ROS_WARN("ptp_id %d was not executed", end.ptp_id);
+      }
+    }
+  }
+
+ private:
+  bool onAdd(coglab_msgs::AddPtp::Request& request, coglab_msgs::AddPtp::Response& response) {
+    const PtpAnswer answer = controller_->add({request.position, request.max_vel, request.max_acc});
+    response.status = answer.status;
+    response.ptp_id = answer.ptp_id;
+    response.success = answer.status != PtpAnswer::kRejected;
+    response.message = answer.message;
+    if (!response.success) ROS_WARN("add_ptp rejected: %s", answer.message.c_str());
+    return true;
+  }
+
+  PtpController* controller_ = nullptr;
+  ros::NodeHandle node_;
+  ros::Publisher finished_;
+  ros::ServiceServer service_;
+};
+
+}  // namespace coglab_controllers
+
+COGLAB_REGISTER_MOTION_CONTROLLER_WITH_ROS("coglab/PtpController",
+                                           coglab_controllers::PtpController,
+                                           coglab_controllers::PtpControllerRos)

@@ -1,0 +1,60 @@
+// The controller manager as a node of its own (split:=true), over joint_states and
+// target_joint_states.
+#include <atomic>
+#include <chrono>
+#include <csignal>
+#include <cstdio>
+#include <exception>
+#include <thread>
+
+#include <ros/callback_queue.h>
+#include <ros/ros.h>
+
+#include "coglab_controllers/ros/manager_ros.hpp"
+#include "coglab_controllers/ros/robot_topics.hpp"
+
+namespace {
+volatile std::sig_atomic_t asked_to_end = 0;
+void onSignal(int) { asked_to_end = 1; }
+}  // namespace
+
+int main(int argc, char** argv) {
+  ros::init(argc, argv, "controller_manager", ros::init_options::NoSigintHandler);
+  std::signal(SIGINT, onSignal);
+  std::signal(SIGTERM, onSignal);
+  try {
+    ros::NodeHandle robot(ros::param::param<std::string>("~lwr_namespace", "lwr"));
+    ros::CallbackQueue queue;  // one thread: the writer of the port
+    robot.setCallbackQueue(&queue);
+    std::atomic<coglab_controllers::ControlThread*> control{nullptr};
+    coglab_controllers::RobotTopics topics(robot, [&control] {
+      if (auto* thread = control.load(std::memory_order_acquire)) thread->wake(true);
+    });
+    std::atomic<coglab_controllers::ManagerRos*> ready{nullptr};
+    coglab_controllers::ManagerRos::Options options;
+    options.publish_target = false;
+    options.thread.after_cycle = [&](const lwr_fri_bridge::VelocityCommand& command) {
+      // Without an active controller others may use the topic.
+      const auto* manager = ready.load(std::memory_order_acquire);
+      if (manager != nullptr && manager->controllerActive()) topics.send(command);
+    };
+    coglab_controllers::ManagerRos manager(ros::NodeHandle("controller_manager"), topics.port(),
+                                           options);
+    ready.store(&manager, std::memory_order_release);
+    control.store(&manager.controlThread(), std::memory_order_release);
+    ros::AsyncSpinner spinner(1, &queue);
+    spinner.start();
+    manager.start();
+    while (ros::ok() && asked_to_end == 0) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    }
+    spinner.stop();
+    manager.shutdown();
+    ros::shutdown();
+  } catch (const std::exception& error) {
+    ROS_FATAL("%s", error.what());
+    std::fprintf(stderr, "controller_manager_node: %s\n", error.what());
+    return 1;
+  }
+  return 0;
+}

@@ -1,0 +1,273 @@
+#include "coglab_controllers/ros/manager_ros.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <exception>
+#include <utility>
+
+#include "coglab_controllers/ros/ros_parameters.hpp"
+#include "coglab_msgs/ControllerStatus.h"
+
+namespace coglab_controllers {
+
+namespace {
+constexpr auto kPublishPeriod = std::chrono::milliseconds(5);
+constexpr double kStallTime = 0.25;  // s without a cycle that count as a stall
+}  // namespace
+
+ManagerRos::ManagerRos(const ros::NodeHandle& node, lwr_fri_bridge::ControlPort& port,
+                       Options options)
+    : node_(node),
+      options_(std::move(options)),
+      log_sink_(std::make_shared<RosLogSink>()),
+      logger_(std::make_unique<ctrl_more::Logger>()) {
+  node_.setCallbackQueue(&queue_);
+  logger_->addSink(log_sink_);
+  logger_->startDraining();
+  ManagerSettings settings = readManagerSettings(node_);
+  settings.logger = logger_.get();
+  options_.thread.priority = node_.param("priority", options_.thread.priority);
+  manager_ = std::make_unique<ControllerManager>(std::move(settings));
+  for (const std::string& error : manager_->feedbackErrors()) {
+    ROS_ERROR("feedback controllers: %s", error.c_str());
+  }
+  thread_ = std::make_unique<ControlThread>(manager_->cycle(), port, options_.thread);
+  tf_ = std::make_unique<tf2_ros::Buffer>(ros::Duration(10.0));
+  target_message_.name = manager_->settings().robot->chain.jointNames();
+  target_message_.velocity.resize(target_message_.name.size());
+}
+
+ManagerRos::~ManagerRos() { shutdown(); }
+
+void ManagerRos::start() {
+  thread_->start();
+  tf_listener_ = std::make_unique<tf2_ros::TransformListener>(*tf_);
+  status_ = node_.advertise<coglab_msgs::ControllerStatus>("status", 10, true);
+  services_.push_back(node_.advertiseService("load_controller", &ManagerRos::onLoad, this));
+  services_.push_back(node_.advertiseService("list_controllers", &ManagerRos::onList, this));
+  services_.push_back(node_.advertiseService("switch_controller", &ManagerRos::onSwitch, this));
+  services_.push_back(node_.advertiseService("get_active_controller", &ManagerRos::onActive, this));
+  services_.push_back(node_.advertiseService("speed_scale", &ManagerRos::onSpeed, this));
+  speed_ = node_.subscribe("speed_scale", 1, &ManagerRos::onSpeedTopic, this);
+  feedback_ = std::make_unique<FeedbackRos>(ros::NodeHandle(node_, "feedback"), *manager_);
+  diagnostics_ = std::make_unique<diagnostic_updater::Updater>(node_);
+  diagnostics_->setHardwareID("none");
+  diagnostics_->add("control cycle", this, &ManagerRos::diagnose);
+  loadFromParameters();
+  spinner_ = std::make_unique<ros::AsyncSpinner>(4, &queue_);
+  spinner_->start();
+  publisher_ = std::thread([this] { publishLoop(); });
+}
+
+void ManagerRos::shutdown() {
+  if (stopping_.exchange(true)) return;
+  if (publisher_.joinable()) publisher_.join();
+  for (ros::ServiceServer& service : services_) service.shutdown();
+  speed_.shutdown();
+  feedback_.reset();
+  if (spinner_) spinner_->stop();
+  {
+    const std::lock_guard<std::mutex> lock(sides_mutex_);
+    sides_.clear();
+  }
+  thread_->stop();
+}
+
+void ManagerRos::loadFromParameters() {
+  const Parameters parameters(manager_->settings().parameters, "controller_manager");
+  const Parameters list = parameters.block("load");
+  if (list.node().IsDefined() && list.node().IsMap()) {
+    for (const auto& entry : list.node()) {
+      const std::string id = entry.first.as<std::string>();
+      const Answer answer = load(id, entry.second.as<std::string>());
+      if (!answer.success) ROS_ERROR("%s", answer.message.c_str());
+    }
+  }
+  const std::string active = parameters.text("active", "");
+  if (active.empty()) return;
+  std::string type;
+  const Answer answer = switchTo(active, type);
+  if (!answer.success) ROS_ERROR("%s", answer.message.c_str());
+}
+
+Answer ManagerRos::load(const std::string& id, const std::string& type) {
+  const Answer answer = manager_->load(id, type);
+  if (!answer.success) return answer;
+  MotionController* controller = manager_->motion(id);
+  const MotionMaker* maker = MotionTypes::instance().find(type);
+  if (controller == nullptr || maker == nullptr || maker->ros == nullptr) return answer;
+  std::unique_ptr<MotionControllerRos> side(maker->ros());
+  RosContext context;
+  context.tf = tf_.get();
+  side->attach(*controller, ros::NodeHandle(node_, id), context);
+  const std::lock_guard<std::mutex> lock(sides_mutex_);
+  sides_.push_back(std::move(side));
+  return answer;
+}
+
+Answer ManagerRos::switchTo(const std::string& id, std::string& type) {
+  const Answer answer = manager_->switchTo(id, type);
+  if (answer.success) {
+    active_.store(true, std::memory_order_relaxed);
+    if (options_.controller_active) options_.controller_active(true);
+  }
+  return answer;
+}
+
+bool ManagerRos::onLoad(coglab_msgs::LoadController::Request& request,
+                        coglab_msgs::LoadController::Response& response) {
+  Answer answer;
+  try {
+    answer = load(request.controller_id, request.controller_type);
+  } catch (const std::exception& error) {
+    answer = Answer::refusal("the ROS side of '" + request.controller_id + "': " + error.what());
+  }
+  response.success = answer.success;
+  response.message = answer.message;
+  manager_->list(response.controller_ids, response.controller_types);
+  if (!answer.success) ROS_WARN("load_controller refused: %s", answer.message.c_str());
+  return true;
+}
+
+bool ManagerRos::onList(coglab_msgs::ListControllers::Request&,
+                        coglab_msgs::ListControllers::Response& response) {
+  manager_->list(response.controller_ids, response.controller_types);
+  return true;
+}
+
+bool ManagerRos::onSwitch(coglab_msgs::SwitchController::Request& request,
+                          coglab_msgs::SwitchController::Response& response) {
+  const Answer answer = switchTo(request.controller_id, response.controller_type);
+  response.success = answer.success;
+  response.message = answer.message;
+  if (!answer.success) ROS_WARN("switch_controller refused: %s", answer.message.c_str());
+  return true;
+}
+
+bool ManagerRos::onActive(coglab_msgs::GetActiveController::Request&,
+                          coglab_msgs::GetActiveController::Response& response) {
+  manager_->active(response.controller_id, response.controller_type);
+  return true;
+}
+
+bool ManagerRos::onSpeed(coglab_msgs::SetSpeedScale::Request& request,
+                         coglab_msgs::SetSpeedScale::Response& response) {
+  const Answer answer = manager_->setSpeedScale(request.speed_scale);
+  response.success = answer.success;
+  response.message = answer.message;
+  return true;
+}
+
+void ManagerRos::onSpeedTopic(const std_msgs::Float64& message) {
+  const Answer answer = manager_->setSpeedScale(message.data);
+  if (!answer.success) ROS_WARN_THROTTLE(1.0, "%s", answer.message.c_str());
+}
+
+void ManagerRos::publishLoop() {
+  heartbeat_ns_ = steadyNow();
+  auto next = std::chrono::steady_clock::now();
+  for (std::uint64_t round = 0; !stopping_; ++round) {
+    {
+      const std::lock_guard<std::mutex> lock(sides_mutex_);
+      for (const auto& side : sides_) side->spinOnce();
+    }
+    const CycleReport report = manager_->report();
+    watch(report);
+    publishTarget(report);
+    if (round % 4 == 0) publishStatus(report);
+    if (round % 40 == 0) feedback_->publishStatus();
+    if (round % 40 == 20) diagnostics_->update();
+    next = std::max(next + kPublishPeriod, std::chrono::steady_clock::now() - kPublishPeriod);
+    std::this_thread::sleep_until(next);
+  }
+}
+
+void ManagerRos::watch(const CycleReport&) {
+  const std::uint64_t heartbeat = manager_->cycle().heartbeat();
+  const std::int64_t now = steadyNow();
+  if (heartbeat != heartbeat_) {
+    heartbeat_ = heartbeat;
+    heartbeat_ns_ = now;
+    stalled_.clear();
+    return;
+  }
+  const double silent = 1e-9 * static_cast<double>(now - heartbeat_ns_);
+  if (silent < kStallTime || !stalled_.empty()) return;
+  std::string id, type;
+  manager_->active(id, type);
+  stalled_ = manager_->cycle().inPlugin()
+                 ? "controller '" + id + "' has stalled in its code: the arm was braked and holds"
+                 : "the control thread does not run: the arm was braked and holds";
+  ROS_ERROR("%s", stalled_.c_str());
+}
+
+void ManagerRos::publishTarget(const CycleReport& report) {
+  if (!options_.publish_target || report.samples == published_samples_) return;
+  published_samples_ = report.samples;
+  if (report.active.empty()) return;
+  target_message_.header.stamp = toRos(report.robot.stamp_ns);
+  for (std::size_t joint = 0; joint < target_message_.velocity.size(); ++joint) {
+    target_message_.velocity[joint] = report.velocity[static_cast<int>(joint)];
+  }
+  options_.target.publish(target_message_);
+}
+
+void ManagerRos::publishStatus(const CycleReport& report) {
+  coglab_msgs::ControllerStatus message;
+  manager_->active(message.active_controller, message.active_type);
+  message.state = stalled_.empty() ? nameOf(report.state) : "fault";
+  message.reason = stalled_.empty() ? report.reason.str() : stalled_;
+  message.plan_generation = report.generation;
+  message.speed_scale = report.speed_scale;
+  const coglab_msgs::ControllerStatus& last = status_shown_;
+  // Numbers in a reason change all the time; a new sentence does not come more often than twice a
+  // second.
+  const bool same_reason = message.reason.empty() == last.reason.empty() &&
+                           message.reason.substr(0, 24) == last.reason.substr(0, 24);
+  const bool same = message.active_controller == last.active_controller &&
+                    message.state == last.state && same_reason &&
+                    message.plan_generation == last.plan_generation &&
+                    message.speed_scale == last.speed_scale;
+  if (shown_once_ && same) return;
+  if (report.fault && !shown_.fault) ROS_ERROR("%s", report.reason.c_str());
+  shown_ = report;
+  shown_once_ = true;
+  message.header.stamp = ros::Time::now();
+  status_shown_ = message;
+  status_.publish(message);
+}
+
+void ManagerRos::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) {
+  using diagnostic_msgs::DiagnosticStatus;
+  const CycleReport report = manager_->report();
+  const std::string warning = thread_->warning();
+  if (!stalled_.empty()) {
+    status.summary(DiagnosticStatus::ERROR, stalled_);
+  } else if (report.fault) {
+    status.summary(DiagnosticStatus::ERROR, report.reason.str());
+  } else if (!report.reason.empty()) {
+    status.summary(DiagnosticStatus::WARN, report.reason.str());
+  } else if (!warning.empty()) {
+    status.summary(DiagnosticStatus::WARN, warning);
+  } else {
+    status.summary(DiagnosticStatus::OK, nameOf(report.state));
+  }
+  status.add("active controller", report.active.str());
+  status.add("state", nameOf(report.state));
+  status.add("cycles", report.cycles);
+  status.add("cycles with a joint state", report.samples);
+  status.add("cycles with an unusable joint state", report.stale);
+  status.add("cycle time (s)", report.dt);
+  status.add("duration of the last cycle (us)", 1e6 * report.duration);
+  status.add("longest cycle (us)", 1e6 * report.longest);
+  status.add("overruns", report.overruns);
+  status.add("faults", report.faults);
+  status.add("plan", report.generation);
+  status.add("speed scale", report.speed_scale);
+  status.add("time scale", report.time_scale);
+  status.add("guard", describe(report.guard.reason));
+  status.add("guard scale", report.guard.scale);
+  status.add("real-time scheduling", warning.empty() ? "granted or not asked for" : warning);
+}
+
+}  // namespace coglab_controllers

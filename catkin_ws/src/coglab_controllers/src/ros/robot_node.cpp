@@ -1,0 +1,60 @@
+// /robot: the arm's interface and the controller manager in one process, coupled in memory (D4.10:
+// "in a single ROS component on top of the robot HAL component, to avoid delays inherent to the IPC
+// mechanisms").
+#include <atomic>
+#include <chrono>
+#include <csignal>
+#include <cstdio>
+#include <exception>
+#include <memory>
+#include <thread>
+
+#include <ros/ros.h>
+#include <sensor_msgs/JointState.h>
+
+#include "coglab_controllers/ros/manager_ros.hpp"
+#include "lwr_fri_bridge/bridge_ros.hpp"
+
+namespace {
+volatile std::sig_atomic_t asked_to_end = 0;
+void onSignal(int) { asked_to_end = 1; }
+}  // namespace
+
+int main(int argc, char** argv) {
+  ros::init(argc, argv, "robot", ros::init_options::NoSigintHandler);
+  std::signal(SIGINT, onSignal);
+  std::signal(SIGTERM, onSignal);
+  try {
+    ros::NodeHandle root;
+    ros::NodeHandle lwr("lwr");
+    // The FRI thread starts after this pointer is set and ends before it goes.
+    std::atomic<coglab_controllers::ControlThread*> control{nullptr};
+    lwr_fri_bridge::BridgeRos::Options bridge_options;
+    bridge_options.one_process = true;
+    bridge_options.after_answer = [&control](bool answered) {
+      if (auto* thread = control.load(std::memory_order_acquire)) thread->wake(answered);
+    };
+    lwr_fri_bridge::BridgeRos bridge(lwr, bridge_options);
+
+    coglab_controllers::ManagerRos::Options options;
+    options.target = lwr.advertise<sensor_msgs::JointState>("target_joint_states", 10);
+    options.controller_active = [&bridge](bool active) { bridge.setControllerActive(active); };
+    coglab_controllers::ManagerRos manager(ros::NodeHandle("controller_manager"), bridge.port(),
+                                           options);
+    control.store(&manager.controlThread(), std::memory_order_release);
+    manager.start();
+    bridge.start();
+    while (ros::ok() && asked_to_end == 0) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    }
+    bridge.shutdown();  // brakes and leaves command mode while the control thread still answers
+    control.store(nullptr, std::memory_order_release);
+    manager.shutdown();
+    ros::shutdown();
+  } catch (const std::exception& error) {
+    ROS_FATAL("%s", error.what());
+    std::fprintf(stderr, "robot_node: %s\n", error.what());
+    return 1;
+  }
+  return 0;
+}

@@ -1,0 +1,354 @@
+// The DMP plug-in in virtual time: D4.10 Table 4, goals that move, jump and vanish, bad requests.
+#include "virtual_robot.hpp"
+
+namespace coglab_controllers {
+namespace {
+
+const Vector3 kGoal(0.80, 0.0, 0.45);
+
+TEST(DmpController, ReachesTheGoalFrameAndRestsExactlyStill) {
+  VirtualRobot robot;
+  robot.loadBoth();
+  robot.see("human_hand", kGoal);
+  ASSERT_TRUE(VirtualRobot::ok(robot.dmp().execute(robot.reach())));
+  double t = 0.0;
+  for (; t < 5.0 && robot.state() != MotionState::Reached; t += robot.period) {
+    robot.see("human_hand", kGoal);
+    robot.tick();
+    for (int joint = 0; joint < kMaxJoints; ++joint) {
+      ASSERT_LE(std::abs(robot.command.velocity[joint]), robot.limits.velocity[joint] + 1e-12);
+    }
+  }
+  EXPECT_EQ(robot.state(), MotionState::Reached) << robot.reason();
+  for (int i = 0; i < 200; ++i) {
+    robot.see("human_hand", kGoal);
+    robot.tick();
+  }
+  EXPECT_LT((robot.hand().position - kGoal).norm(), 1e-3);
+  EXPECT_EQ(robot.command.velocity, JointVector::Zero().eval());
+}
+
+TEST(DmpController, OffsetIsAppliedOnceAndTurnsWithTheGoalFrame) {
+  VirtualRobot robot;
+  robot.loadBoth();
+  const Quaternion turned(Eigen::AngleAxisd(M_PI / 2, Vector3::UnitZ()));
+  DmpRequest request = robot.reach();
+  request.goal_offset = Vector3(0.05, 0.0, 0.02);
+  request.orientation_control = true;
+  const Quaternion wanted = turned.conjugate() * robot.hand().orientation;
+  request.target_orientation = wanted.coeffs();
+  robot.see("human_hand", kGoal, turned);
+  ASSERT_TRUE(VirtualRobot::ok(robot.dmp().execute(request)));
+  for (int i = 0; i < 800; ++i) {
+    robot.see("human_hand", kGoal, turned);
+    robot.tick();
+  }
+  EXPECT_EQ(robot.state(), MotionState::Reached) << robot.reason();
+  EXPECT_LT((robot.hand().position - (kGoal + Vector3(0.0, 0.05, 0.02))).norm(), 2e-3);
+  EXPECT_LT(robot.hand().orientation.angularDistance(turned * wanted), 0.01);
+}
+
+TEST(DmpController, TopicAndTfGiveTheSameMotion) {
+  const std::string topic = "dmp: {goal_source: topic}";
+  VirtualRobot a, b(topic);
+  a.loadBoth();
+  b.loadBoth();
+  Vector3 goal = kGoal;
+  a.see("human_hand", goal);
+  ASSERT_TRUE(VirtualRobot::ok(b.dmp().setGoal("lwr_base_link", goal, 0)));
+  ASSERT_TRUE(VirtualRobot::ok(a.dmp().execute(a.reach())));
+  DmpRequest request = b.reach();
+  request.goal_frame.clear();
+  ASSERT_TRUE(VirtualRobot::ok(b.dmp().execute(request)));
+  for (int i = 0; i < 500; ++i) {
+    a.tick();
+    b.tick();
+    goal.y() += 0.0002;
+    a.see("human_hand", goal);
+    ASSERT_TRUE(VirtualRobot::ok(b.dmp().setGoal("lwr_base_link", goal, b.now_ns)));
+    ASSERT_EQ(a.command.velocity, b.command.velocity) << "cycle " << i;
+  }
+}
+
+TEST(DmpController, SwitchKeepsPositionAndVelocity) {
+  VirtualRobot robot;
+  robot.loadBoth();
+  robot.see("human_hand", kGoal);
+  ASSERT_TRUE(VirtualRobot::ok(robot.dmp().execute(robot.reach())));
+  for (int i = 0; i < 60; ++i) {
+    robot.see("human_hand", kGoal);
+    robot.tick();
+  }
+  const Vector3 before = robot.handVelocity();
+  ASSERT_GT(before.norm(), 0.03);
+  DmpRequest request = robot.reach("give_human");
+  request.dmp_ratio = 2.0;
+  ASSERT_TRUE(VirtualRobot::ok(robot.dmp().switchDmp(request)));
+  robot.see("human_hand", kGoal);
+  robot.tick();
+  EXPECT_LT((robot.handVelocity() - before).norm(), 0.05);
+  EXPECT_EQ(robot.state(), MotionState::Running);
+}
+
+TEST(DmpController, SecondExecuteDoesNotStepInVelocity) {
+  VirtualRobot robot;
+  robot.loadBoth();
+  robot.see("human_hand", kGoal);
+  ASSERT_TRUE(VirtualRobot::ok(robot.dmp().execute(robot.reach())));
+  double worst = 0.0, worst_at_request = 0.0;
+  for (int i = 0; i < 300; ++i) {
+    robot.see("human_hand", kGoal);
+    const JointVector before = robot.command.velocity;
+    if (i == 80) {
+      ASSERT_TRUE(VirtualRobot::ok(robot.dmp().execute(robot.reach())));
+    }
+    robot.tick();
+    const double step = (robot.command.velocity - before).norm();
+    if (i == 80) {
+      worst_at_request = step;
+    } else if (i > 2) {
+      worst = std::max(worst, step);
+    }
+  }
+  EXPECT_LT(worst_at_request, 3.0 * worst + 1e-3);
+}
+
+TEST(DmpController, FollowsAgainOnlyWhenTheGoalLeavesItsBall) {
+  VirtualRobot robot;
+  robot.loadBoth();
+  robot.see("human_hand", kGoal);
+  ASSERT_TRUE(VirtualRobot::ok(robot.dmp().execute(robot.reach())));
+  for (int i = 0; i < 800; ++i) {
+    robot.see("human_hand", kGoal);
+    robot.tick();
+  }
+  ASSERT_EQ(robot.state(), MotionState::Reached);
+  for (int i = 0; i < 200; ++i) {  // 20 mm away, and noise: nothing moves
+    robot.see("human_hand", kGoal + Vector3(0.0, 0.02 + 0.004 * std::sin(i), 0.0));
+    robot.tick();
+    ASSERT_EQ(robot.command.velocity, JointVector::Zero().eval());
+  }
+  const Vector3 moved = kGoal + Vector3(0.0, 0.08, 0.0);
+  bool ran = false;
+  for (int i = 0; i < 1000; ++i) {
+    robot.see("human_hand", moved);
+    robot.tick();
+    ran = ran || robot.state() == MotionState::Running;
+  }
+  EXPECT_TRUE(ran);
+  EXPECT_EQ(robot.state(), MotionState::Reached);
+  EXPECT_LT((robot.hand().position - moved).norm(), 2e-3);
+}
+
+TEST(DmpController, OldGoalIsHeldAndALostOneAborts) {
+  VirtualRobot robot;
+  robot.loadBoth();
+  robot.see("human_hand", kGoal);
+  DmpRequest request = robot.reach();
+  request.dmp_ratio = 4.0;
+  ASSERT_TRUE(VirtualRobot::ok(robot.dmp().execute(request)));
+  for (int i = 0; i < 60; ++i) robot.tick();  // 0.3 s without a frame
+  EXPECT_EQ(robot.state(), MotionState::Holding);
+  EXPECT_NE(robot.reason().find("old"), std::string::npos) << robot.reason();
+  robot.see("human_hand", kGoal);
+  robot.tick();
+  EXPECT_EQ(robot.state(), MotionState::Running);
+  for (int i = 0; i < 210; ++i) robot.tick();
+  EXPECT_EQ(robot.state(), MotionState::Aborted);
+  EXPECT_NE(robot.reason().find("lost"), std::string::npos) << robot.reason();
+}
+
+TEST(DmpController, LostGoalNearTheEndIsFinished) {
+  VirtualRobot robot;
+  robot.loadBoth();
+  const Vector3 near = robot.hand().position + Vector3(0.06, 0.0, 0.0);
+  robot.see("human_hand", near);
+  ASSERT_TRUE(VirtualRobot::ok(robot.dmp().execute(robot.reach())));
+  for (int i = 0; i < 1000; ++i) robot.tick();
+  EXPECT_EQ(robot.state(), MotionState::Reached) << robot.reason();
+  EXPECT_LT((robot.hand().position - near).norm(), 2e-3);
+}
+
+TEST(DmpController, JumpIsBelievedAfterThreeFrames) {
+  VirtualRobot robot;
+  robot.loadBoth();
+  robot.see("human_hand", kGoal);
+  ASSERT_TRUE(VirtualRobot::ok(robot.dmp().execute(robot.reach())));
+  robot.tick();
+  const Vector3 far = kGoal + Vector3(0.0, -0.2, 0.0);
+  for (int frame = 0; frame < 2; ++frame) {
+    robot.see("human_hand", far);
+    robot.tick();
+    EXPECT_EQ(robot.state(), MotionState::Holding);
+    EXPECT_NE(robot.reason().find("jumped"), std::string::npos);
+  }
+  robot.see("human_hand", far);
+  robot.tick();
+  EXPECT_EQ(robot.state(), MotionState::Running);
+  robot.see("human_hand", kGoal);  // one wild frame, then the old place again
+  robot.tick();
+  robot.see("human_hand", far);
+  robot.tick();
+  EXPECT_EQ(robot.state(), MotionState::Running);
+}
+
+TEST(DmpController, RefusesBadRequestsAndKeepsMoving) {
+  VirtualRobot robot;
+  robot.loadBoth();
+  robot.see("human_hand", kGoal);
+  ASSERT_TRUE(VirtualRobot::ok(robot.dmp().execute(robot.reach())));
+  VirtualRobot twin;  // the same motion, undisturbed
+  twin.loadBoth();
+  twin.see("human_hand", kGoal);
+  ASSERT_TRUE(VirtualRobot::ok(twin.dmp().execute(twin.reach())));
+  DmpController& dmp = robot.dmp();
+  const auto with = [&](auto change) {
+    DmpRequest request = robot.reach();
+    change(request);
+    return request;
+  };
+  int loaded = 7;
+  const std::vector<std::function<void()>> requests = {
+      [&] {
+        EXPECT_TRUE(refused(dmp.execute(with([](auto& r) { r.primitive_id = "wave"; })),
+                            {"wave", "reach_human"}));
+      },
+      [&] {
+        for (const double ratio : {0.0, -1.0, std::nan("")}) {
+          EXPECT_TRUE(refused(dmp.execute(with([&](auto& r) { r.dmp_ratio = ratio; })), {"ratio"}));
+        }
+      },
+      [&] {
+        EXPECT_TRUE(refused(dmp.execute(with([](auto& r) {
+          r.orientation_control = true;
+          r.target_orientation << 0, 0, 0, 2;
+        })),
+                            {"target_orientation", "unit"}));
+      },
+      [&] {
+        EXPECT_TRUE(refused(dmp.execute(with([](auto& r) { r.initial_state = 7; })),
+                            {"initial_state", "CURRENT=0", "GIVEN=1"}));
+      },
+      [&] {
+        EXPECT_TRUE(refused(dmp.execute(with([](auto& r) {
+          r.initial_state = DmpRequest::kGiven;
+          r.initial_position = Vector3(0.3, 0.3, 0.3);
+        })),
+                            {"initial_position"}));
+      },
+      [&] {
+        EXPECT_TRUE(
+            refused(dmp.execute(with([](auto& r) { r.goal_offset = Vector3(std::nan(""), 0, 0); })),
+                    {"goal_offset"}));
+      },
+      [&] {
+        EXPECT_TRUE(refused(dmp.execute(with([](auto& r) { r.goal_frame = "cup"; })), {"cup"}));
+      },
+      [&] {
+        robot.see("far", Vector3(3.0, 0.0, 0.5));
+        EXPECT_TRUE(refused(dmp.execute(with([](auto& r) { r.goal_frame = "far"; })),
+                            {"workspace", "box"}));
+      },
+      [&] {
+        robot.see("nan", Vector3(std::nan(""), 0.0, 0.5));
+        EXPECT_TRUE(refused(dmp.execute(with([](auto& r) { r.goal_frame = "nan"; })), {"finite"}));
+      },
+      [&] { EXPECT_TRUE(refused(dmp.loadDmps("/nowhere.xml", loaded), {"/nowhere.xml"})); },
+      [&] { EXPECT_TRUE(refused(dmp.setGoal("lwr_base_link", kGoal, 0), {"goal_source"})); },
+      [&] {
+        PtpAnswer answer = robot.ptp().add({std::vector<double>(7, 0.0), {}, {}});
+        EXPECT_EQ(answer.status, PtpAnswer::kRejected);
+        EXPECT_NE(answer.message.find("active is 'dmp'"), std::string::npos) << answer.message;
+      },
+      [&] {
+        std::string type;
+        EXPECT_TRUE(refused(robot.manager->switchTo("nobody", type), {"nobody", "dmp", "ptp"}));
+      },
+  };
+  for (const auto& request : requests) {
+    request();
+    robot.see("human_hand", kGoal);
+    twin.see("human_hand", kGoal);
+    robot.tick();
+    twin.tick();
+    ASSERT_EQ(robot.command.velocity, twin.command.velocity);
+  }
+  EXPECT_EQ(loaded, 0);
+  EXPECT_EQ(robot.state(), MotionState::Running);
+}
+
+TEST(DmpController, TopicGoalInAnotherFrameOrNotFiniteIsRefused) {
+  VirtualRobot robot("dmp: {goal_source: topic}");
+  robot.loadBoth();
+  DmpRequest request = robot.reach();
+  EXPECT_TRUE(refused(robot.dmp().execute(request), {"dmp_goal"}));
+  EXPECT_TRUE(refused(robot.dmp().setGoal("world", kGoal, 0), {"world", "lwr_base_link"}));
+  EXPECT_TRUE(
+      refused(robot.dmp().setGoal("lwr_base_link", Vector3(0, std::nan(""), 0), 0), {"finite"}));
+  ASSERT_TRUE(VirtualRobot::ok(robot.dmp().setGoal("lwr_base_link", Vector3(0, 0, 5), 0)));
+  EXPECT_TRUE(refused(robot.dmp().execute(request), {"workspace"}));
+}
+
+TEST(DmpController, SpeedScaleSlowsTheWholeMotion) {
+  VirtualRobot slow, fast;
+  slow.loadBoth();
+  fast.loadBoth();
+  ASSERT_TRUE(slow.manager->setSpeedScale(0.5).success);
+  EXPECT_TRUE(refused(slow.manager->setSpeedScale(1.5), {"0", "1"}));
+  const auto run = [](VirtualRobot& robot) {
+    for (int i = 0; i < 200; ++i) robot.tick();  // the scale settles
+    robot.see("human_hand", kGoal);
+    EXPECT_TRUE(VirtualRobot::ok(robot.dmp().execute(robot.reach())));
+    int cycles = 0;
+    for (; cycles < 3000 && robot.state() != MotionState::Reached; ++cycles) {
+      robot.see("human_hand", kGoal);
+      robot.tick();
+    }
+    return cycles;
+  };
+  const int quick = run(fast);
+  EXPECT_NEAR(run(slow), 2 * quick, 0.15 * quick);
+}
+
+TEST(DmpController, HandSpeedStaysBelowItsLimit) {
+  VirtualRobot robot("{hand_speed_limit: 0.25, elbow_speed_limit: 0.25}");
+  robot.loadBoth();
+  robot.see("human_hand", kGoal);
+  DmpRequest request = robot.reach();
+  request.dmp_ratio = 0.5;
+  ASSERT_TRUE(VirtualRobot::ok(robot.dmp().execute(request)));
+  double fastest = 0.0;
+  for (int i = 0; i < 1500; ++i) {
+    robot.see("human_hand", kGoal);
+    robot.tick();
+    fastest = std::max(fastest, robot.handVelocity().norm());
+  }
+  EXPECT_LT(fastest, 0.2525);
+  EXPECT_GT(fastest, 0.15);
+  EXPECT_EQ(robot.state(), MotionState::Reached) << robot.reason();
+}
+
+TEST(DmpController, RobotThatStopsAbortsTheMotionAndRefusesNewOnes) {
+  VirtualRobot robot;
+  robot.loadBoth();
+  robot.see("human_hand", kGoal);
+  ASSERT_TRUE(VirtualRobot::ok(robot.dmp().execute(robot.reach())));
+  for (int i = 0; i < 40; ++i) robot.tick();
+  robot.sample.block = lwr_fri_bridge::MotionBlock::Held;
+  ++robot.sample.motion_epoch;
+  robot.tick();
+  EXPECT_EQ(robot.state(), MotionState::Aborted);
+  robot.see("human_hand", kGoal);
+  EXPECT_TRUE(refused(robot.dmp().execute(robot.reach()), {"reset"}));
+  robot.sample.block = lwr_fri_bridge::MotionBlock::None;
+  for (int i = 0; i < 10; ++i) {
+    robot.tick();
+    EXPECT_EQ(robot.command.velocity, JointVector::Zero().eval());
+  }
+  EXPECT_EQ(robot.state(), MotionState::Aborted);  // nothing goes on by itself
+  robot.see("human_hand", kGoal);
+  EXPECT_TRUE(VirtualRobot::ok(robot.dmp().execute(robot.reach())));
+}
+
+}  // namespace
+}  // namespace coglab_controllers

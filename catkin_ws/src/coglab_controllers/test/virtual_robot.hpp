@@ -1,0 +1,155 @@
+// A controller manager in virtual time with an ideal velocity robot: what the tests of the manager
+// share.
+#pragma once
+
+#include <cstdint>
+#include <fstream>
+#include <map>
+#include <memory>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "coglab_controllers/manager/controller_manager.hpp"
+#include "coglab_controllers/plugins/dmp_controller.hpp"
+#include "coglab_controllers/plugins/ptp_controller.hpp"
+
+namespace coglab_controllers {
+
+/// Frames as a table.
+class FrameTable : public GoalSource {
+ public:
+  bool lookup(const std::string&, const std::string& frame, GoalObservation& observation,
+              std::string& why) override {
+    const auto found = frames.find(frame);
+    if (found == frames.end()) {
+      why = "no such frame";
+      return false;
+    }
+    observation = found->second;
+    return true;
+  }
+  std::map<std::string, GoalObservation> frames;
+};
+
+inline std::string readText(const std::string& path) {
+  std::ifstream file(path);
+  std::ostringstream text;
+  text << file.rdbuf();
+  return text.str();
+}
+
+/// Manager, robot and clock. The robot follows velocities as `follow` says; by default at once and
+/// exactly.
+class VirtualRobot {
+ public:
+  explicit VirtualRobot(const std::string& parameters = "", double period = 0.005)
+      : period(period) {
+    limits =
+        lwr_fri_bridge::loadJointLimits(std::string(DESCRIPTION_DIR) + "/config/joint_limits.yaml");
+    ManagerSettings settings = readManagerSettings(
+        YAML::Load(parameters), readText(std::string(DESCRIPTION_DIR) + "/urdf/lwr_ih2.urdf"),
+        limits, true);
+    settings.clock = [this] { return now_ns; };
+    settings.plan_timeout = 0.3;
+    settings.logger = &logger;
+    manager = std::make_unique<ControllerManager>(std::move(settings));
+    sample.position << -1.4349, -0.6086, 1.4986, 1.7048, 0.1857, 0.2152, 0.782;
+    sample.commanded_position = sample.position;
+    sample.block = lwr_fri_bridge::MotionBlock::None;
+    sample.cycle_time = period;
+    tick();
+  }
+
+  /// Both plug-ins, the library of the package, and `active`.
+  void loadBoth(const std::string& active = "dmp") {
+    ASSERT_TRUE(ok(manager->load("dmp", "coglab/DmpController")));
+    ASSERT_TRUE(ok(manager->load("ptp", "coglab/PtpController")));
+    dmp().setGoalSource(&frames);
+    int loaded = 0;
+    ASSERT_TRUE(ok(dmp().loadDmps(std::string(PACKAGE_DIR) + "/config/primitives.xml", loaded)));
+    ASSERT_GT(loaded, 0);
+    switchTo(active);
+  }
+
+  void switchTo(const std::string& id) {
+    std::string type;
+    ASSERT_TRUE(ok(manager->switchTo(id, type)));
+  }
+
+  static ::testing::AssertionResult ok(const Answer& answer) {
+    return answer.success ? ::testing::AssertionSuccess()
+                          : ::testing::AssertionFailure() << answer.message;
+  }
+
+  DmpController& dmp() { return dynamic_cast<DmpController&>(*manager->motion("dmp")); }
+  PtpController& ptp() { return dynamic_cast<PtpController&>(*manager->motion("ptp")); }
+
+  /// A goal frame seen now.
+  void see(const std::string& frame, const Vector3& position,
+           const Quaternion& orientation = Quaternion::Identity()) {
+    GoalObservation observation;
+    observation.position = position;
+    observation.orientation = orientation;
+    observation.stamp_ns = now_ns;
+    frames.frames[frame] = observation;
+  }
+
+  /// One measurement and one cycle; the robot then follows for one period.
+  const VelocityCommand& tick() {
+    now_ns += static_cast<std::int64_t>(period * 1e9);
+    ++sample.sequence;
+    sample.stamp_ns = now_ns;
+    if (MotionController* motion = manager->motion("dmp")) {
+      static_cast<DmpController*>(motion)->pollGoal();
+    }
+    manager->cycle().run(sample, period, command);
+    if (sample.block != lwr_fri_bridge::MotionBlock::None) command.velocity.setZero();
+    sample.commanded_acceleration = (command.velocity - sample.commanded_velocity) / period;
+    sample.position += period * command.velocity;
+    sample.velocity = command.velocity;
+    sample.commanded_velocity = command.velocity;
+    sample.commanded_position = sample.position;
+    return command;
+  }
+
+  Pose hand() const { return manager->settings().robot->chain.evaluate(sample.position).tool; }
+  Vector3 handVelocity() const {
+    const ChainState state = manager->settings().robot->chain.evaluate(sample.position);
+    return (state.jacobian * sample.velocity).head<3>();
+  }
+  MotionState state() const { return manager->report().motion; }
+  std::string reason() const { return manager->report().reason.str(); }
+
+  DmpRequest reach(const std::string& primitive = "reach_human") const {
+    DmpRequest request;
+    request.primitive_id = primitive;
+    request.goal_frame = "human_hand";
+    return request;
+  }
+
+  double period;
+  std::int64_t now_ns = 1'000'000'000;
+  lwr_fri_bridge::JointLimits limits;
+  FrameTable frames;
+  ctrl_more::Logger logger;  // without sinks
+  std::unique_ptr<ControllerManager> manager;
+  RobotSample sample;
+  VelocityCommand command;
+};
+
+/// A refusal whose sentence has all these words.
+inline ::testing::AssertionResult refused(const Answer& answer,
+                                          const std::vector<std::string>& words) {
+  if (answer.success) return ::testing::AssertionFailure() << "was not refused";
+  for (const std::string& word : words) {
+    if (answer.message.find(word) == std::string::npos) {
+      return ::testing::AssertionFailure() << "'" << answer.message << "' lacks '" << word << "'";
+    }
+  }
+  return ::testing::AssertionSuccess();
+}
+
+}  // namespace coglab_controllers
