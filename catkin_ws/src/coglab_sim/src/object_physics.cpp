@@ -204,6 +204,11 @@ Wrench ObjectPhysics::step(const Pose& palm, const Twist& palm_twist, const Huma
     const double normal_force = in_robot ? fingerForce(fingers) : 2.0 * human.grip * human.grip_force;
     pinned_ = object_.friction * normal_force < kSafeGrip * object_.mass * kGravity;
     if (pinned_) return {};
+    if (in_robot) {
+      robot_grip_.engage(palm, center_);
+    } else {
+      human_grip_.engage(human.hand, center_);
+    }
   }
 
   // Who holds

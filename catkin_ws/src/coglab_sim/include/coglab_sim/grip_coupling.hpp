@@ -15,7 +15,7 @@ class GripCoupling {
  public:
   struct Figures {
     double stiffness = 600.0;          ///< N/m at full closure
-    double rotation_stiffness = 2.0;   ///< Nm/rad at full closure
+    double rotation_stiffness = 8.0;   ///< Nm/rad at full closure
     double damping_ratio = 0.7;        ///< against mass and inertia of the object
     double lever = 0.03;               ///< m; a friction force F resists torques up to F * lever
   };
