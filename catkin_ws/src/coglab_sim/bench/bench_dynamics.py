@@ -1,0 +1,64 @@
+#!/usr/bin/python3
+"""Time of a complete step of the simulated cell, and how far its dynamics are from MuJoCo's. Prints JSON rows only."""
+import json
+import os
+import statistics
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+
+PACKAGE = Path(__file__).resolve().parents[1]
+URDF = PACKAGE.parent / 'lwr_description' / 'urdf' / 'lwr_ih2.urdf'
+BLOCKS, STEPS = 40, 2000
+
+
+def binary() -> str:
+    """The timing program in the devel or install space on CMAKE_PREFIX_PATH."""
+    for prefix in os.environ.get('CMAKE_PREFIX_PATH', '').split(':'):
+        path = Path(prefix) / 'lib' / 'coglab_sim' / 'coglab_sim_bench_cell'
+        if path.is_file():
+            return str(path)
+    sys.exit('coglab_sim_bench_cell not found: build the package and source its setup.bash first')
+
+
+def equality() -> float | None:
+    """Largest relative difference to MuJoCo over 1000 random states; None without the oracle."""
+    try:
+        import mujoco  # noqa: F401
+    except ImportError:
+        return None
+    sys.path.insert(0, str(PACKAGE / 'test'))
+    from test_dynamics_oracle import Oracle
+    from coglab_sim import _cell
+    oracle, random, worst = Oracle(), np.random.default_rng(1), 0.0
+    for _ in range(1000):
+        position, velocity = random.uniform(-2.0, 2.0, 7), random.uniform(-2.0, 2.0, 7)
+        theirs, ours = oracle.terms(position, velocity), _cell.arm_terms(str(URDF), position, velocity)
+        for name in ('mass', 'gravity', 'coriolis', 'jacobian'):
+            scale = max(1.0, np.abs(theirs[name]).max())
+            worst = max(worst, np.abs(ours[name] - theirs[name]).max() / scale)
+    return float(worst)
+
+
+def main() -> None:
+    output = subprocess.run([binary(), str(URDF), str(BLOCKS), str(STEPS)], check=True, capture_output=True, text=True,
+                            timeout=300).stdout
+    cell, terms = zip(*((float(a), float(b)) for a, b in (line.split() for line in output.splitlines())))
+    step = statistics.median(cell) * 1e-3
+    rows = [{'bench': 'dynamics', 'figure': 'complete step of the cell, 1 ms period, median', 'value': round(step, 2),
+             'unit': 'us', 'goal': '<= 30', 'peer': 'KDL terms alone', 'peer_value': round(statistics.median(terms) * 1e-3, 2),
+             'ok': step <= 30.0}]
+    difference = equality()
+    if difference is None:
+        print('no row for the comparison with MuJoCo: mujoco-core is not installed', file=sys.stderr)
+    else:
+        rows.append({'bench': 'dynamics', 'figure': 'M, C, g, J against MuJoCo, 1000 random states, largest difference',
+                     'value': difference, 'unit': 'relative', 'goal': '<= 1e-9', 'peer': None, 'peer_value': None,
+                     'ok': difference <= 1e-9})
+    print(json.dumps(rows, indent=1))
+
+
+if __name__ == '__main__':
+    main()
