@@ -164,10 +164,11 @@ def _to_plain(value: Any, depth: int, nodes: list[int]) -> Any:
             return str.__str__(value[:MAX_STRING])
         if isinstance(value, bytes) and len(value) <= MAX_STRING:
             return bytes(value)
-        if not isinstance(value, (list, tuple, dict)) or depth >= MAX_DEPTH // 2:
+        if not isinstance(value, (list, tuple, dict)):
             return _repr(value)
-        if nodes[0] + len(value) > MAX_NODES // 4:
-            return _repr(value)
+        if depth >= MAX_DEPTH // 2 or nodes[0] + len(value) > MAX_NODES // 4:
+            # Not its repr, which may be longer than any memory: parts can be shared many times.
+            return f"<{type(value).__name__} of {len(value)} items, too large or too deep to show>"
         if isinstance(value, dict):
             return {
                 _to_key(key, depth, nodes): _to_plain(item, depth + 1, nodes)
@@ -193,7 +194,7 @@ def _repr(value: Any) -> str:
         text = repr(value)
         return text if len(text) <= MAX_REPR else text[: MAX_REPR - 3] + "..."
     except Exception as error:
-        return f"<{type(value).__name__} whose repr raised {type(error).__name__}>"
+        return f"<{value.__class__.__name__} whose repr raised {type(error).__name__}>"
 
 
 def _has_bytes(value: Any) -> bool:
