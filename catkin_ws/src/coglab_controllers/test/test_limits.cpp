@@ -4,6 +4,7 @@
 #include "coglab_controllers/limits/guard.hpp"
 #include "coglab_controllers/limits/phase_governor.hpp"
 #include "core_support.hpp"
+#include "lwr_fri_bridge/interpolator.hpp"
 
 using namespace coglab_controllers;
 using namespace coglab_controllers::test;
@@ -52,8 +53,8 @@ TEST(Guard, ScalesTheWholeVectorAndKeepsEveryLimit) {
     ASSERT_LE(Chain::originVelocity(state, robot().elbowJoint(), result.velocity).norm(),
               p.elbow_speed + 1e-9);
     for (int i = 0; i < kMaxJoints; ++i) {
-      if (q[i] >= p.upper_position[i]) ASSERT_LE(result.velocity[i], 0.0);
-      if (q[i] <= p.lower_position[i]) ASSERT_GE(result.velocity[i], 0.0);
+      ASSERT_TRUE(q[i] < p.upper_position[i] || result.velocity[i] <= 0.0);
+      ASSERT_TRUE(q[i] > p.lower_position[i] || result.velocity[i] >= 0.0);
     }
     ASSERT_EQ(result.reason == GuardReason::None, result.scale == 1.0);
     limited += result.scale < 1.0;
@@ -69,27 +70,27 @@ TEST(Guard, AJointNeverReachesItsStopAtFullSpeed) {
   p.workspace = everywhere();
   p.hand_speed = p.elbow_speed = 0.0;
   Guard guard(p, robot());
-  for (int k = 0; k < 200; ++k) {
-    JointVector q = random.posture(0.3), velocity = JointVector::Zero(),
-                acceleration = JointVector::Zero();
-    const JointVector request = random.joints(3.0);
+  lwr_fri_bridge::JointLimits limits;
+  limits.lower_position = p.lower_position;
+  limits.upper_position = p.upper_position;
+  limits.velocity = p.velocity;
+  limits.acceleration = p.acceleration;
+  limits.jerk = p.jerk;
+  limits.torque.setOnes();
+  for (int k = 0; k < 500; ++k) {
+    lwr_fri_bridge::Interpolator interpolator(limits);
+    interpolator.reset(random.posture(0.3));
+    JointVector request = random.joints(3.0), last = JointVector::Zero();
     for (int i = 0; i < 800; ++i) {
+      if (i % 100 == 99 && k % 2 == 0) request = random.joints(3.0);
+      const JointVector q = interpolator.position();
       GuardResult result;
       guard.limit(robot().evaluate(q), q, request, kCycle, result);
-      for (int step = 0; step < 5; ++step) {
-        const double h = kCycle / 5;
-        for (int j = 0; j < kMaxJoints; ++j) {
-          // Bang-bang jerk towards the commanded speed, ending with no acceleration.
-          const double left = result.velocity[j] - velocity[j] -
-                              acceleration[j] * std::abs(acceleration[j]) / 1000.0;
-          const double wanted = std::clamp(left / h, -p.acceleration[j], p.acceleration[j]);
-          acceleration[j] += std::clamp(wanted - acceleration[j], -p.jerk[j] * h, p.jerk[j] * h);
-          velocity[j] += h * acceleration[j];
-          q[j] += h * velocity[j];
-        }
-      }
-      ASSERT_LE((q - p.upper_position).maxCoeff(), 0.0) << k;
-      ASSERT_LE((p.lower_position - q).maxCoeff(), 0.0) << k;
+      // One cycle late, as from another thread.
+      interpolator.step(last, kCycle);
+      last = result.velocity;
+      ASSERT_LE((interpolator.position() - p.upper_position).maxCoeff(), 0.0) << k;
+      ASSERT_LE((p.lower_position - interpolator.position()).maxCoeff(), 0.0) << k;
     }
   }
 }
@@ -206,7 +207,7 @@ TEST(Workspace, ProjectsGoalsToTheNearestAllowedPoint) {
     const Vector3 point = random.point(2.5);
     const Vector3 projected = workspace.project(point);
     ASSERT_TRUE(workspace.contains(projected)) << projected.transpose();
-    if (workspace.contains(point)) ASSERT_EQ(point, projected);
+    ASSERT_TRUE(!workspace.contains(point) || point == projected);
   }
   EXPECT_EQ(workspace.violated(Vector3(0, 0, -1)), WorkspaceBorder::BoxMin);
   EXPECT_EQ(workspace.violated(Vector3(0, 2, 1)), WorkspaceBorder::BoxMax);

@@ -1,0 +1,303 @@
+// Goal estimator, orientation curve, end of motion and the whole Cartesian motion.
+#include <gtest/gtest.h>
+
+#include "coglab_controllers/dmp/cartesian_motion.hpp"
+#include "core_support.hpp"
+
+using namespace coglab_controllers;
+using namespace coglab_controllers::test;
+
+namespace {
+
+constexpr double kCycle = 0.005;
+
+CartesianMotionPlan reachPlan(double duration = 1.0, double length = 0.51) {
+  LearningOptions options;
+  options.mapping = ShapeMapping::Similarity;
+  const Primitive p = learn("reach", {minimumJerkReach(Vector3::Zero(), Vector3(length, 0, 0), duration)}, options);
+  return {TransformationSystem(p), 1.0, true};
+}
+
+Pose at(const Vector3& position, const Quaternion& orientation = Quaternion::Identity()) {
+  return {position, orientation};
+}
+
+}  // namespace
+
+TEST(GoalEstimator, MeetsASteadyRampWithoutLag) {
+  GoalEstimator estimator;
+  Vector3 goal = Vector3::Zero();
+  const Vector3 speed(0.1, -0.2, 0.05);
+  estimator.reset(goal);
+  for (int i = 0; i < 400; ++i) {
+    goal += kCycle * speed;
+    estimator.update(kCycle, goal);
+  }
+  // The input is held over the cycle, so what can be met is its value within that cycle.
+  EXPECT_LT((estimator.position() - goal).norm(), kCycle * speed.norm());
+  EXPECT_LT((estimator.velocity() - speed).norm(), 1e-6);
+}
+
+TEST(GoalEstimator, HasNoStepWhenTheGoalHasOne) {
+  GoalEstimator estimator;
+  estimator.reset(Vector3::Zero());
+  Vector3 last_position = Vector3::Zero(), last_velocity = Vector3::Zero();
+  for (int i = 0; i < 200; ++i) {
+    estimator.update(0.001, Vector3(0.1, 0, 0));
+    EXPECT_LT((estimator.position() - last_position).norm(), 0.1 * 0.001 / 0.06);
+    EXPECT_LT((estimator.velocity() - last_velocity).norm(), 0.25 * 0.1 * 0.001 / (0.06 * 0.06));
+    last_position = estimator.position();
+    last_velocity = estimator.velocity();
+  }
+}
+
+TEST(GoalEstimator, IsExactForAnyCycleTime) {
+  Random random(1);
+  for (int k = 0; k < 2000; ++k) {
+    GoalEstimator one, many;
+    const Vector3 start = random.point(0.02), goal = random.point(0.02);
+    one.reset(start);
+    many.reset(start);
+    const double dt = random.uniform(0.001, 0.2);
+    one.update(dt, goal);
+    for (int i = 0; i < 20; ++i) many.update(dt / 20, goal);
+    EXPECT_LT((one.position() - many.position()).norm(), 1e-12);
+    EXPECT_LT((one.velocity() - many.velocity()).norm(), 1e-11);
+  }
+}
+
+TEST(GoalEstimator, AFarGoalPullsNoHarder) {
+  GoalEstimator estimator;
+  estimator.reset(Vector3::Zero());
+  double fastest = 0.0;
+  for (int i = 0; i < 2000; ++i) {
+    estimator.update(kCycle, Vector3(2.0, 0, 0));
+    fastest = std::max(fastest, estimator.velocity().norm());
+  }
+  EXPECT_LT(fastest, 0.15 / (2.0 * 0.06));
+  EXPECT_LT((estimator.position() - Vector3(2.0, 0, 0)).norm(), 1e-6);
+}
+
+TEST(GoalEstimator, OffIsThePlainInput) {
+  GoalEstimatorParameters parameters;
+  parameters.time_constant = 0.0;
+  GoalEstimator estimator(parameters);
+  estimator.reset(Vector3::Zero());
+  estimator.update(kCycle, Vector3(1, 2, 3));
+  EXPECT_EQ(estimator.position(), Vector3(1, 2, 3));
+  EXPECT_TRUE(estimator.velocity().isZero(0.0));
+  parameters.time_constant = -1.0;
+  EXPECT_THROW(GoalEstimator{parameters}, std::invalid_argument);
+}
+
+TEST(OrientationEstimator, FollowsATurningObject) {
+  OrientationEstimator estimator;
+  const Vector3 rate(0.3, 0.2, -0.4);
+  Quaternion target = Quaternion::Identity();
+  estimator.reset(target);
+  for (int i = 0; i < 1000; ++i) {
+    target = expRotation(kCycle * rate) * target;
+    // Both signs of a quaternion mean the same orientation.
+    if (i % 2) target.coeffs() *= -1.0;
+    estimator.update(kCycle, target);
+  }
+  EXPECT_LT(estimator.orientation().angularDistance(target), 0.02);
+  EXPECT_LT((estimator.angularVelocity() - rate).norm(), 0.02);
+}
+
+TEST(OrientationCurve, StartsAndEndsAsGiven) {
+  Random random(2);
+  for (int k = 0; k < 20000; ++k) {
+    const Quaternion start = random.rotation(), target = random.rotation();
+    const Vector3 velocity = random.point(1.0);
+    const double duration = random.uniform(0.3, 3.0);
+    OrientationCurve curve;
+    curve.start(start, velocity, target, duration);
+    ASSERT_LT(curve.at(0.0).angularDistance(start), 1e-7);
+    ASSERT_LT(curve.at(1.0).angularDistance(target), 1e-7);
+    const double h = 1e-6;
+    ASSERT_LT((rotationBetween(curve.at(0.0), curve.at(h)) / (h * duration) - velocity).norm(), 1e-3);
+    ASSERT_LT(rotationBetween(curve.at(1.0 - h), curve.at(1.0)).norm() / h, 1e-3);
+  }
+}
+
+TEST(OrientationCurve, ATurnFromRestFollowsTheMinimumJerkProfile) {
+  OrientationCurve curve;
+  const Vector3 turn(0.3, 1.0, -0.5);
+  curve.start(Quaternion::Identity(), Vector3::Zero(), expRotation(turn), 1.0);
+  for (double u = 0.0; u <= 1.0; u += 0.01) {
+    EXPECT_LT(curve.at(u).angularDistance(expRotation(minimumJerk(u) * turn)), 1e-7);
+  }
+}
+
+TEST(OrientationCurve, ATargetThatPassesHalfATurnMakesNoJump) {
+  OrientationCurve curve;
+  curve.start(Quaternion::Identity(), Vector3::Zero(), expRotation(Vector3(0, 0, 3.0)), 1.0);
+  Quaternion last = curve.at(0.6);
+  for (double angle = 3.0; angle < 4.0; angle += 0.01) {
+    curve.setTarget(expRotation(Vector3(0, 0, angle)));
+    EXPECT_LT(curve.at(0.6).angularDistance(last), 0.011);
+    last = curve.at(0.6);
+  }
+}
+
+TEST(MotionEnd, LatchesAndFollowsAgainOutsideTheBall) {
+  using Event = MotionEnd::Event;
+  MotionEnd end;
+  const Vector3 goal(0.5, 0, 0), near = goal + Vector3(0, 0.029, 0), far = goal + Vector3(0, 0.031, 0);
+  EXPECT_EQ(end.update(kCycle, 0.5, 0.0, goal, goal, goal), Event::None);
+  EXPECT_EQ(end.update(kCycle, 0.001, 0.1, goal, goal, goal), Event::None);
+  EXPECT_EQ(end.update(kCycle, 0.001, 0.001, goal + Vector3(0.01, 0, 0), goal, goal), Event::None);
+  EXPECT_EQ(end.update(kCycle, 0.001, 0.001, goal, goal, goal), Event::Ended);
+  for (int i = 0; i < 1000; ++i) EXPECT_EQ(end.update(kCycle, 0, 0, goal, goal, near), Event::None);
+  for (int i = 0; i < 39; ++i) EXPECT_EQ(end.update(kCycle, 0, 0, goal, goal, far), Event::None);
+  EXPECT_EQ(end.update(kCycle, 0, 0, goal, goal, near), Event::None);
+  int cycles = 1;
+  while (end.update(kCycle, 0, 0, goal, goal, far) != Event::FollowsAgain) ASSERT_LT(++cycles, 100);
+  EXPECT_NEAR(cycles * kCycle, 0.2, 0.006);
+  EXPECT_FALSE(end.latched());
+}
+
+TEST(CartesianMotion, WithTheEstimatorOffItIsThePlainDmp) {
+  GoalEstimatorParameters off;
+  off.time_constant = 0.0;
+  CartesianMotion motion(off);
+  const CartesianMotionPlan plan = reachPlan();
+  Random random(3);
+  for (int k = 0; k < 50; ++k) {
+    const Vector3 start = random.point(0.3), goal = start + random.point(0.5);
+    motion.start(plan, at(start), Vector3::Zero(), Vector3::Zero(), at(goal));
+    Dmp dmp;
+    dmp.start(plan.system, start, Vector3::Zero(), goal, 1.0);
+    for (int i = 0; i < 150; ++i) {
+      motion.step(kCycle, at(goal));
+      dmp.step(kCycle, goal);
+      ASSERT_LT((motion.dmp().state().position - dmp.state().position).norm(), 1e-12);
+    }
+  }
+}
+
+TEST(CartesianMotion, AGoalStepMakesNoAccelerationStep) {
+  CartesianMotion motion;
+  const Vector3 goal(0.51, 0, 0), moved(0.51, 0.1, 0);
+  motion.start(reachPlan(), at(Vector3::Zero()), Vector3::Zero(), Vector3::Zero(), at(goal));
+  Vector3 last = Vector3::Zero();
+  double worst = 0.0, settled = 0.0;
+  for (int i = 0; i < 400; ++i) {
+    motion.step(kCycle, at(i * kCycle < 0.3 - 1e-9 ? goal : moved));
+    if (i > 0) worst = std::max(worst, (motion.dmp().state().acceleration - last).norm());
+    last = motion.dmp().state().acceleration;
+    if ((motion.dmp().state().position - moved).norm() > 0.01) settled = (i + 2) * kCycle;
+  }
+  EXPECT_LT(worst, 1.0);
+  EXPECT_LE(settled, 0.95);
+}
+
+TEST(CartesianMotion, FollowsAMovingGoal) {
+  CartesianMotion motion;
+  const Vector3 speed(0.0, 0.1, 0.0);
+  motion.start(reachPlan(), at(Vector3::Zero()), Vector3::Zero(), Vector3::Zero(), at(Vector3(0.51, 0, 0)));
+  for (int i = 0; i < 400; ++i) {
+    const Vector3 goal = Vector3(0.51, 0, 0) + i * kCycle * speed;
+    motion.step(kCycle, at(goal));
+    const double lag = (motion.dmp().state().position - goal).norm();
+    ASSERT_TRUE(i * kCycle < 1.0 || lag < 0.002) << lag;
+  }
+}
+
+TEST(CartesianMotion, ANoisyGoalDoesNotMoveAnArmThatHasArrived) {
+  Random random(4);
+  CartesianMotion motion;
+  const Vector3 goal(0.51, 0, 0);
+  motion.start(reachPlan(), at(Vector3::Zero()), Vector3::Zero(), Vector3::Zero(), at(goal));
+  Pose seen = at(goal);
+  double ended = 1e9;
+  for (int i = 0; i < 1200; ++i) {
+    if (i % 7 == 0) seen.position = goal + Vector3(random.normal(0.004), random.normal(0.004), random.normal(0.004));
+    const CartesianReference& reference = motion.step(kCycle, seen);
+    if (motion.event() == MotionEnd::Event::Ended) ended = i * kCycle;
+    EXPECT_NE(motion.event(), MotionEnd::Event::FollowsAgain);
+    ASSERT_TRUE(i * kCycle < ended + 1.0 || reference.velocity.norm() == 0.0) << i;
+  }
+  EXPECT_LT(ended, 3.0);
+}
+
+TEST(CartesianMotion, FollowsAGoalThatLeavesAfterTheEnd) {
+  CartesianMotion motion;
+  const Vector3 goal(0.51, 0, 0), moved(0.51, 0.05, 0);
+  motion.start(reachPlan(), at(Vector3::Zero()), Vector3::Zero(), Vector3::Zero(), at(goal));
+  for (int i = 0; i < 600; ++i) motion.step(kCycle, at(goal));
+  EXPECT_EQ(motion.phase(), CartesianMotion::Phase::Ended);
+  bool again = false;
+  Vector3 last = motion.dmp().state().velocity;
+  for (int i = 0; i < 600; ++i) {
+    motion.step(kCycle, at(moved));
+    again = again || motion.event() == MotionEnd::Event::FollowsAgain;
+    ASSERT_LT((motion.dmp().state().velocity - last).norm(), 0.03) << i;
+    last = motion.dmp().state().velocity;
+  }
+  EXPECT_TRUE(again);
+  EXPECT_EQ(motion.phase(), CartesianMotion::Phase::Ended);
+  EXPECT_LT((motion.dmp().state().position - moved).norm(), 0.002);
+}
+
+TEST(CartesianMotion, SwitchingKeepsPoseAndVelocity) {
+  Random random(5);
+  const CartesianMotionPlan fast = reachPlan(0.8, 0.4), slow = reachPlan(1.6, 0.4);
+  for (int k = 0; k < 200; ++k) {
+    CartesianMotion motion;
+    const Pose goal = at(random.point(0.5), random.rotation());
+    motion.start(fast, at(Vector3::Zero()), Vector3::Zero(), Vector3::Zero(), goal);
+    for (int i = random.integer(10, 150); i > 0; --i) motion.step(kCycle, goal);
+    const DmpState before = motion.dmp().state();
+    const Vector3 turning = motion.reference().angular_velocity;
+    motion.switchTo(slow, goal);
+    EXPECT_LT((motion.dmp().state().position - before.position).norm(), 1e-9);
+    EXPECT_LT((motion.dmp().state().velocity - before.velocity).norm(), 1e-9);
+    EXPECT_EQ(motion.dmp().state().phase, before.phase);
+    const CartesianReference next = motion.step(kCycle, goal);
+    EXPECT_LT((next.angular_velocity - turning).norm(), 0.5);
+    EXPECT_LT((next.velocity - before.velocity).norm(), 0.15);
+  }
+}
+
+TEST(CartesianMotion, EndsInTheTargetOrientationAndFollowsATurningObject) {
+  Random random(6);
+  const CartesianMotionPlan plan = reachPlan();
+  for (int k = 0; k < 100; ++k) {
+    CartesianMotion motion;
+    const Quaternion start = random.rotation();
+    Pose goal = at(random.point(0.5), random.rotation());
+    motion.start(plan, at(Vector3::Zero(), start), Vector3::Zero(), Vector3::Zero(), goal);
+    const Vector3 turning = random.point(0.5);
+    double bend = 0.0;
+    Vector3 last = Vector3::Zero();
+    Quaternion pose = start;
+    for (int i = 0; i < 600; ++i) {
+      if (i < 150) goal.orientation = expRotation(kCycle * turning) * goal.orientation;
+      const CartesianReference& reference = motion.step(kCycle, goal);
+      ASSERT_LT(pose.angularDistance(reference.pose.orientation), 1e-6);
+      pose = expRotation(kCycle * reference.angular_velocity) * pose;
+      bend = std::max(bend, (reference.angular_velocity - last).norm());
+      last = reference.angular_velocity;
+    }
+    EXPECT_LT(pose.angularDistance(goal.orientation), 1e-3);
+    EXPECT_LT(bend, 0.4);
+  }
+}
+
+TEST(CartesianMotion, ItsVelocitiesLeadToItsPoses) {
+  Random random(7);
+  CartesianMotion motion;
+  const CartesianMotionPlan plan = reachPlan();
+  Pose goal = at(Vector3(0.4, 0.2, 0.1), random.rotation());
+  motion.start(plan, at(Vector3::Zero()), Vector3(0.1, 0, 0), Vector3(0, 0.2, 0), goal);
+  Vector3 position = Vector3::Zero();
+  for (int i = 0; i < 800; ++i) {
+    if (i % 50 == 0) goal.position += random.point(0.03);
+    if (i == 120) motion.switchTo(plan, goal);
+    const CartesianReference& reference = motion.step(kCycle, goal, i < 200 ? 1.0 : 0.4);
+    ASSERT_LT((reference.pose.position - position).norm(), 1e-9);
+    position += kCycle * reference.velocity;
+  }
+}
