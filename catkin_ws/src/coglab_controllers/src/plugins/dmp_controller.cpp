@@ -96,7 +96,7 @@ void DmpController::start(const CycleInput& input) {
 
 void DmpController::stop() {
   loop_->motion.stop();
-  if (following()) {
+  if (state_ == MotionState::Running || state_ == MotionState::Holding) {
     state_ = MotionState::Aborted;
     reason_ = Reason("ended by a switch to another controller");
   } else if (state_ == MotionState::Reached) {

@@ -44,6 +44,22 @@ std::string readFile(const std::string& path) {
   return text.str();
 }
 
+/// `package://name/path` as a path; other names below this package's config folder.
+std::string resolve(const std::string& name) {
+  const std::string scheme = "package://";
+  if (name.rfind(scheme, 0) == 0) {
+    const std::size_t slash = name.find('/', scheme.size());
+    const std::string package = name.substr(scheme.size(), slash - scheme.size());
+    const std::string path = ros::package::getPath(package);
+    if (path.empty() || slash == std::string::npos) {
+      throw std::runtime_error("'" + name + "': package '" + package + "' was not found");
+    }
+    return path + name.substr(slash);
+  }
+  if (name.empty() || std::filesystem::path(name).is_absolute()) return name;
+  return ros::package::getPath("coglab_controllers") + "/config/" + name;
+}
+
 std::string robotModel(const ros::NodeHandle& node, const Parameters& parameters) {
   const std::string file = parameters.text("urdf_file", "");
   if (!file.empty()) return readFile(file);
@@ -72,11 +88,7 @@ ManagerSettings readManagerSettings(const ros::NodeHandle& node) {
       tree, robotModel(node, parameters),
       lwr_fri_bridge::loadJointLimits(table, parameters.text("joint_limits_profile", "default")),
       false);
-  if (!settings.feedback_file.empty() &&
-      !std::filesystem::path(settings.feedback_file).is_absolute()) {
-    settings.feedback_file =
-        ros::package::getPath("coglab_controllers") + "/config/" + settings.feedback_file;
-  }
+  settings.feedback_file = resolve(settings.feedback_file);
   return settings;
 }
 

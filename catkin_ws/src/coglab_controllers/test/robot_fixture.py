@@ -1,0 +1,141 @@
+"""What the rostests of this package share: the robot's services, a tf2 goal, and bounded waits."""
+from __future__ import annotations
+
+import threading
+import time
+from typing import Callable
+
+import rospy
+import tf2_ros
+from geometry_msgs.msg import TransformStamped
+from sensor_msgs.msg import JointState
+
+from coglab_msgs.msg import ControllerStatus, DmpFeedback, FinishedPtp, LwrState
+from coglab_msgs.srv import (
+    AddPtp, AddPtpRequest, ExecuteDmp, ExecuteDmpRequest, GetActiveController, ListControllers, LoadController,
+    LoadDmps, LwrCommand, SetSpeedScale, SwitchController, SwitchDmp)
+
+HOME = [-1.4349, -0.6086, 1.4986, 1.7048, 0.1857, 0.2152, 0.782]
+JOINTS = ["lwr_a1", "lwr_a2", "lwr_e1", "lwr_a3", "lwr_a4", "lwr_a5", "lwr_a6"]
+SERVICES = {
+    "load_controller": LoadController, "list_controllers": ListControllers,
+    "switch_controller": SwitchController, "get_active_controller": GetActiveController,
+    "speed_scale": SetSpeedScale}
+DMP_SERVICES = {"load_dmps": LoadDmps, "execute_dmp": ExecuteDmp, "switch_dmp": SwitchDmp}
+
+
+def wait_until(condition: Callable[[], bool], seconds: float, what: str) -> None:
+    """Polls a condition on the steady clock; fails with what was waited for."""
+    end = time.monotonic() + seconds
+    while not condition():
+        if time.monotonic() > end:
+            raise AssertionError(f"not within {seconds} s: {what}")
+        time.sleep(0.01)
+
+
+class Robot:
+    """The robot as its users see it."""
+
+    def __init__(self) -> None:
+        self.joints: JointState | None = None
+        self.state: LwrState | None = None
+        self.status: ControllerStatus | None = None
+        self.feedback: DmpFeedback | None = None
+        self.feedbacks: list[DmpFeedback] = []
+        self.finished: list[int] = []
+        rospy.Subscriber("lwr/joint_states", JointState, self._on_joints)
+        rospy.Subscriber("lwr/state", LwrState, lambda m: setattr(self, "state", m))
+        rospy.Subscriber("controller_manager/status", ControllerStatus,
+                         lambda m: setattr(self, "status", m))
+        rospy.Subscriber("controller_manager/dmp/feedback", DmpFeedback, self._on_feedback)
+        rospy.Subscriber("controller_manager/ptp/finished_ptp", FinishedPtp,
+                         lambda m: self.finished.append(m.ptp_id))
+        self._goal: tuple[float, float, float] | None = None
+        self._quaternion = (0.0, 0.0, 0.0, 1.0)
+        self._broadcaster = tf2_ros.TransformBroadcaster()
+        threading.Thread(target=self._broadcast, daemon=True).start()
+
+    def _on_joints(self, message: JointState) -> None:
+        self.joints = message
+
+    def _on_feedback(self, message: DmpFeedback) -> None:
+        self.feedback = message
+        self.feedbacks.append(message)
+
+    def _broadcast(self) -> None:
+        while not rospy.is_shutdown():
+            if self._goal is not None:
+                message = TransformStamped()
+                message.header.stamp = rospy.Time.now()
+                message.header.frame_id = "lwr_base_link"
+                message.child_frame_id = "human_hand"
+                t, q = message.transform.translation, message.transform.rotation
+                t.x, t.y, t.z = self._goal
+                q.x, q.y, q.z, q.w = self._quaternion
+                self._broadcaster.sendTransform(message)
+            time.sleep(1.0 / 30.0)
+
+    def see_hand(self, position: tuple[float, float, float] | None) -> None:
+        """Where perception sees the human hand from now on; None: not at all."""
+        self._goal = position
+
+    @staticmethod
+    def call(name: str, kind: type, *args: object, seconds: float = 20.0) -> object:
+        """Calls a service below the root; waits for it."""
+        rospy.wait_for_service(name, seconds)
+        return rospy.ServiceProxy(name, kind)(*args)
+
+    def manager(self, name: str, *args: object) -> object:
+        """A service of the controller manager."""
+        return self.call("controller_manager/" + name, SERVICES[name], *args)
+
+    def dmp(self, name: str, *args: object) -> object:
+        """A service of the DMP plug-in."""
+        return self.call("controller_manager/dmp/" + name, DMP_SERVICES[name], *args)
+
+    def add_ptp(self, position: list[float], velocity: list[float] | None = None) -> object:
+        """Adds a point-to-point motion."""
+        return self.call("controller_manager/ptp/add_ptp", AddPtp, position, velocity or [], [])
+
+    def start(self) -> None:
+        """Brings the arm into command mode."""
+        wait_until(lambda: self.state is not None and self.state.supervisor != "disconnected", 20.0,
+                   "datagrams of the robot controller")
+        if self.state.motion_allowed:
+            return
+        answer = self.call("lwr/command", LwrCommand, "start")
+        assert answer.success, answer.message
+        wait_until(lambda: self.state.motion_allowed, 10.0, "motion allowed")
+
+    def load(self) -> None:
+        """Loads both plug-ins unless they are there."""
+        loaded = self.manager("list_controllers").controller_ids
+        for name, kind in (("dmp", "coglab/DmpController"), ("ptp", "coglab/PtpController")):
+            if name not in loaded:
+                answer = self.manager("load_controller", name, kind)
+                assert answer.success, answer.message
+
+    def switch(self, name: str) -> object:
+        """Makes a controller the active one."""
+        answer = self.manager("switch_controller", name)
+        assert answer.success, answer.message
+        return answer
+
+    def go(self, position: list[float], seconds: float = 30.0) -> None:
+        """Moves to a posture with the point-to-point plug-in and waits for its end."""
+        self.switch("ptp")
+        answer = self.add_ptp(position)
+        assert answer.status == AddPtpRequest.STARTED, answer.message
+        wait_until(lambda: answer.ptp_id in self.finished, seconds, "finished_ptp")
+
+    def execute(self, primitive: str = "reach_human", **fields: object) -> object:
+        """Calls execute_dmp."""
+        request = ExecuteDmpRequest(primitive_id=primitive, dmp_ratio=1.0, goal_frame="human_hand")
+        for key, value in fields.items():
+            setattr(request, key, value)
+        return self.dmp("execute_dmp", request)
+
+    def arm(self) -> list[float]:
+        """Measured joints in wire order."""
+        by_name = dict(zip(self.joints.name, self.joints.position))
+        return [by_name[name] for name in JOINTS]

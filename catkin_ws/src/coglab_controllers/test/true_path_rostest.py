@@ -1,0 +1,83 @@
+#!/usr/bin/python3
+"""The true path through /robot and the simulated cell: load, point-to-point, reach to a tf2 frame, switch, refuse."""
+from __future__ import annotations
+
+import os
+import sys
+import unittest
+
+import rospkg
+import rospy
+import rostest
+
+sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
+from coglab_msgs.srv import AddPtpRequest  # noqa: E402
+from robot_fixture import HOME, Robot, wait_until  # noqa: E402
+
+GOAL = (0.80, 0.0, 0.45)
+
+
+class TruePath(unittest.TestCase):
+    """One robot for all tests; they run in the order of their names."""
+
+    @classmethod
+    def setUpClass(cls) -> None:
+        cls.robot = Robot()
+        cls.robot.load()
+        path = rospkg.RosPack().get_path("coglab_controllers") + "/config/primitives.xml"
+        answer = cls.robot.dmp("load_dmps", path)
+        assert answer.success and answer.num_loaded >= 4, answer.message
+        cls.robot.start()
+        cls.robot.go(HOME)
+
+    def test_1_list_and_active(self) -> None:
+        listed = self.robot.manager("list_controllers")
+        self.assertEqual(listed.controller_ids[:2], ["dmp", "ptp"])
+        self.assertEqual(listed.controller_types[:2], ["coglab/DmpController", "coglab/PtpController"])
+        active = self.robot.manager("get_active_controller")
+        self.assertEqual((active.controller_id, active.controller_type), ("ptp", "coglab/PtpController"))
+
+    def test_2_reaches_the_hand_and_follows_it(self) -> None:
+        robot = self.robot
+        answer = robot.switch("dmp")
+        self.assertEqual(answer.controller_type, "coglab/DmpController")
+        robot.see_hand(GOAL)
+        wait_until(lambda: robot.execute().success, 5.0, "execute_dmp")
+        wait_until(lambda: robot.feedback.state == "running", 5.0, "running")
+        wait_until(lambda: robot.feedback.state == "reached", 10.0, "reached")
+        wait_until(lambda: robot.feedback.remaining_distance < 0.002, 5.0, "2 mm from the goal")
+        phases = [m.phase for m in robot.feedbacks if m.state == "running"]
+        self.assertTrue(all(a >= b for a, b in zip(phases[-20:], phases[-19:])))
+
+    def test_3_switch_in_motion_ends_it_and_refuses_dmp(self) -> None:
+        robot = self.robot
+        robot.go(HOME)
+        robot.switch("dmp")
+        self.assertTrue(robot.execute().success)
+        wait_until(lambda: robot.feedback.state == "running" and robot.feedback.phase < 0.6, 5.0,
+                   "in mid-motion")
+        refused = robot.add_ptp(HOME)
+        self.assertEqual(refused.status, AddPtpRequest.REJECTED)
+        self.assertIn("active is 'dmp'", refused.message)
+        robot.go(HOME)
+        refused = robot.execute()
+        self.assertFalse(refused.success)
+        self.assertIn("active is 'ptp'", refused.message)
+
+    def test_4_lost_goal_aborts(self) -> None:
+        robot = self.robot
+        robot.switch("dmp")
+        robot.see_hand(GOAL)
+        rospy.sleep(0.3)
+        answer = robot.execute(dmp_ratio=6.0)
+        self.assertTrue(answer.success, answer.message)
+        rospy.sleep(0.5)
+        robot.see_hand(None)
+        wait_until(lambda: robot.feedback.state == "aborted", 5.0, "aborted")
+        self.assertIn("lost", robot.feedback.reason)
+        wait_until(lambda: max(abs(v) for v in robot.joints.velocity) < 0.01, 3.0, "standing still")
+
+
+if __name__ == "__main__":
+    rospy.init_node("true_path")
+    rostest.rosrun("coglab_controllers", "true_path", TruePath)
