@@ -36,6 +36,8 @@ class Participant:
     """height of a conic reach's arc; 0: straight"""
     place_speed: float = 0.10
     """m/s at which the object is brought into the robot's palm"""
+    look_time: float = 1.0
+    """for which the robot's hand must have stood still before the person trusts that it waits"""
     press: float = 0.006
     """how far past first touch the hand goes on: with the grip's stiffness this makes the press force"""
     release_share: float = 0.3

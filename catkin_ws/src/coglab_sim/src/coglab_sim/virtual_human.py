@@ -57,7 +57,7 @@ class HandSample:
 
 NEAR = 0.16
 """m between palm and object below which the person takes the robot's hand as arrived."""
-STILL = 0.02
+STILL = 0.012
 """m/s below which the robot's hand looks still."""
 
 
@@ -201,7 +201,7 @@ class VirtualHuman:
         elif self._still_since is None:
             self._still_since = t
         # A person looks a moment before trusting that the robot has stopped; it also lets the detector settle.
-        if self._still_since is not None and t - self._still_since > 0.6:
+        if self._still_since is not None and t - self._still_since > self.participant.look_time:
             self._go("placing" if self._task == "give" else "grasping", t)
         elif t - self._since > self.participant.patience:
             self._retreat(t)
