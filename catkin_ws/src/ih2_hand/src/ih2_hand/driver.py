@@ -11,7 +11,7 @@ from ih2_hand.clock import Clock
 from ih2_hand.errors import (HandCalibratingError, HandCalibrationError, HandConnectionLost,
                              HandPortError, NoForceSensorError, NoGraspModeError)
 from ih2_hand.line import (ANALOGUE_SLACK, POSITION_SLACK, STATUS_SLACK, HandLine, LineCounters,
-                           TraceHook, status_request)
+                           Slack, TraceHook, status_request)
 from ih2_hand.status import at_rest, decode_status
 from ih2_hand.transport import SerialTransport, Transport
 from ih2_hand.wire_choices import WIRE
@@ -113,6 +113,11 @@ class HandSerialDriver:
             raise HandCalibratingError(f"the hand on {self.port} calibrates and discards every "
                                        "request; wait until `calibrating` is False")
 
+    def _value(self, frame: bytes, length: int, slack: Slack) -> int:
+        if self._calibrating:
+            self._check_free()
+        return self.line.value(frame, length, slack)
+
     def _command(self, frame: bytes, busy_s: float = 0.0) -> None:
         self._check_free()
         self._something_changes()
@@ -203,27 +208,23 @@ class HandSerialDriver:
     def get_raw_position(self, finger: int) -> int:
         """Position byte 0..255 as the hand sends it (beyond Table 2)."""
         _motor(finger)
-        self._check_free()
-        return self.line.value(_POSITION[finger], 1, POSITION_SLACK)
+        return self._value(_POSITION[finger], 1, POSITION_SLACK)
 
     def get_finger_force(self, finger: int) -> int:
         """Tendon tension 0..254 (W5); NoForceSensorError for motor 0."""
         _sensed(finger)
-        self._check_free()
-        tension = self.line.value(_FORCE[finger], 2, ANALOGUE_SLACK)
+        tension = self._value(_FORCE[finger], 2, ANALOGUE_SLACK)
         return min(tension // WIRE.force_scale, 254)
 
     def get_motor_current(self, motor: int) -> int:
         """Motor current in counts 0..1023; times MILLIAMPERE_PER_COUNT it is mA."""
         _motor(motor)
-        self._check_free()
-        return self.line.value(_CURRENT[motor], 2, ANALOGUE_SLACK)
+        return self._value(_CURRENT[motor], 2, ANALOGUE_SLACK)
 
     def get_finger_status(self, finger: int) -> dict[str, Any]:
         """Status of one motor, see `status.decode_status`."""
         _motor(finger)
-        self._check_free()
-        raw = self.line.value(_STATUS[finger], 1, STATUS_SLACK)
+        raw = self._value(_STATUS[finger], 1, STATUS_SLACK)
         if not at_rest(raw):
             self._something_changes()
         elif not self.line.resting:
@@ -289,7 +290,8 @@ def _whole(name: str, value: int, largest: int) -> None:
 
 
 def _motor(motor: int) -> None:
-    _whole("motor", motor, WIRE.motors - 1)
+    if type(motor) is not int or motor not in _MOTORS:
+        _whole("motor", motor, WIRE.motors - 1)
 
 
 def _sensed(motor: int) -> None:

@@ -96,21 +96,13 @@ class HandLine:
             if self._closed:
                 raise HandConnectionLost(f"the hand's port {self.port} was closed; open it again")
             if self._not_before:
-                wait = self._not_before - self.clock.monotonic()
-                if wait > 0.0:
-                    self.clock.sleep(wait)
+                self.clock.sleep(max(0.0, self._not_before - self.clock.monotonic()))
                 self._not_before = 0.0
             self.transport.write(frame)
             if busy_s:
                 self._not_before = self.clock.monotonic() + busy_s
             if self.trace:
                 self.trace(">", frame)
-
-    def _receive(self, count: int, timeout: float) -> bytes:
-        data = self.transport.read(count, timeout)
-        if self.trace and data:
-            self.trace("<", data)
-        return data
 
     def close(self) -> None:
         """Close the port; later requests raise HandConnectionLost."""
@@ -125,31 +117,25 @@ class HandLine:
         with self.lock:
             if self.transport.pending():
                 self._flush("bytes nobody asked for")
-            data = self._attempt(frame, length)
-            if data is not None:
-                return data
-            self.counters.retries += 1
-            data = self._attempt(frame, length)
-            if data is not None:
-                return data
+            for attempt in (1, 2):
+                self.counters.requests += 1
+                self.send(frame)
+                data = self.transport.read(length, self.read_timeout)
+                if self.trace and data:
+                    self.trace("<", data)
+                if len(data) == length:
+                    return data
+                if len(data) > length:
+                    self._flush("answer too long")
+                else:
+                    self.resynchronise("answer too short" if data else "answer missing")
+                self.counters.retries += attempt == 1
             self.counters.failures += 1
             last = format_byte(self.transport.last_byte)
             raise HandTimeoutError(
                 f"the hand on {self.port} gave no complete answer to `{frame.hex(' ')}` "
                 f"({length} byte(s) within {self.read_timeout * 1000:.0f} ms, twice); last byte "
                 f"received {last}; check power, cable and that no calibration runs")
-
-    def _attempt(self, frame: bytes, length: int) -> bytes | None:
-        self.counters.requests += 1
-        self.send(frame)
-        data = self._receive(length, self.read_timeout)
-        if len(data) == length:
-            return data
-        if len(data) > length:
-            self._flush("answer too long")
-        else:
-            self.resynchronise("answer missing" if not data else "answer too short")
-        return None
 
     # -- resynchronisation -----------------------------------------------------------------------
 
@@ -180,9 +166,11 @@ class HandLine:
         with self.lock:
             self.transport.flush_input()
             self.send(frame)
-            got = len(self._receive(length, self.read_timeout))
+            data = self.transport.read(length, self.read_timeout)
+            if self.trace and data:
+                self.trace("<", data)
             self._known.clear()
-            return got == length
+            return len(data) == length
 
     # -- values ----------------------------------------------------------------------------------
 
@@ -211,9 +199,8 @@ class HandLine:
         data = self.request(frame, length)
         if length == 1:
             return data[0]
-        if data[0] > 3:
-            return None  # ten bits were promised: this is not the answer to the question
-        return data[0] << 8 | data[1]
+        # Ten bits were promised: more cannot be the answer to the question.
+        return data[0] << 8 | data[1] if data[0] < 4 else None
 
     def _confirm(self, frame: bytes, length: int, slack: Slack, first: int | None) -> int:
         start = self.clock.monotonic()

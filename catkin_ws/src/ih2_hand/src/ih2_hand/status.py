@@ -13,12 +13,7 @@ MODES = ("stop", "speed", "position", "tension", "current", "unassigned", "curre
 REACHED, OPEN_END, CLOSED_END, OVER_CURRENT = 0x10, 0x08, 0x04, 0x02
 
 
-def decode_status(motor: int, raw: int) -> dict[str, Any]:
-    """Status of `motor` from its STATUS byte.
-
-    Keys: motor, raw, mode (text), mode_code, target_reached, fully_open, fully_closed,
-    over_current, moving, com_error. With `com_error` the five flags are None (W27).
-    """
+def _decode(raw: int) -> dict[str, Any]:
     code = raw >> 5
     com_error = code == WIRE.com_error_mode
 
@@ -26,11 +21,25 @@ def decode_status(motor: int, raw: int) -> dict[str, Any]:
         return None if com_error else bool(raw & bit)
 
     return {
-        "motor": motor, "raw": raw, "mode": MODES[code], "mode_code": code,
+        "motor": 0, "raw": raw, "mode": MODES[code], "mode_code": code,
         "target_reached": flag(REACHED), "fully_open": flag(OPEN_END),
         "fully_closed": flag(CLOSED_END), "over_current": flag(OVER_CURRENT),
         "moving": flag(WIRE.moving_bit), "com_error": com_error,
     }
+
+
+_DECODED = tuple(_decode(raw) for raw in range(256))
+
+
+def decode_status(motor: int, raw: int) -> dict[str, Any]:
+    """Status of `motor` from its STATUS byte.
+
+    Keys: motor, raw, mode (text), mode_code, target_reached, fully_open, fully_closed,
+    over_current, moving, com_error. With `com_error` the five flags are None (W27).
+    """
+    status = _DECODED[raw].copy()
+    status["motor"] = motor
+    return status
 
 
 def at_rest(raw: int) -> bool:

@@ -85,31 +85,31 @@ class SerialTransport:
 
     def read(self, count: int, timeout: float) -> bytes:
         try:
-            data = self._read_url(count, timeout) if self._fd is None \
-                else self._read_device(count, timeout)
+            if self._fd is None:
+                data = self._read_url(count, timeout)
+            elif self._poll.poll(timeout * 1000.0):
+                data = os.read(self._fd, 256)
+                if len(data) < count:
+                    data = self._read_rest(data, count, timeout)
+            else:
+                return b""
         except (OSError, serial.SerialException, TypeError) as error:
             raise self._lost(error) from error
         if data:
             self.last_byte = data[-1]
         return data
 
-    def _read_device(self, count: int, timeout: float) -> bytes:
-        if not self._poll.poll(timeout * 1000.0):
-            return b""
-        data = os.read(self._fd, 256)
-        if len(data) >= count:
-            return data
-        if not data:
-            raise OSError(errno.EIO, "end of file")
+    def _read_rest(self, data: bytes, count: int, timeout: float) -> bytes:
         end = time.monotonic() + timeout
-        while len(data) < count:
+        more = data
+        while more and len(data) < count:
             left = end - time.monotonic()
             if left <= 0 or not self._poll.poll(left * 1000.0):
-                break
+                return data
             more = os.read(self._fd, 256)
-            if not more:
-                raise OSError(errno.EIO, "end of file")
             data += more
+        if not more:
+            raise OSError(errno.EIO, "end of file")
         return data
 
     def _read_url(self, count: int, timeout: float) -> bytes:
