@@ -1,0 +1,365 @@
+#!/usr/bin/python3
+"""Figures of the state machine engine and of its introspection, as a JSON list on stdout.
+
+Starts a master of its own on a free port of 127.0.0.1 and ends it. Takes about three minutes.
+`--quick` shortens all phases, for a look; its figures are not the ones to show.
+"""
+
+from __future__ import annotations
+
+import collections
+import contextlib
+import io
+import json
+import os
+import random
+import socket
+import statistics
+import subprocess
+import sys
+import threading
+import time
+
+import smach
+
+QUICK = "--quick" in sys.argv
+RUN_SECONDS = 6.0 if QUICK else 60.0
+IDLE_SECONDS = 6.0 if QUICK else 30.0
+PREEMPTS = 300 if QUICK else 10_000
+CONTAINERS = 50
+LIMIT = 30.0  # s, of every wait
+
+
+# Machines.
+
+
+class Tick(smach.State):
+    """Takes `seconds`; ends early if asked; ends the second time with 'twice'."""
+
+    def __init__(self, seconds: float) -> None:
+        super().__init__(["once", "twice", "preempted"])
+        self.seconds, self.count = seconds, 0
+
+    def execute(self, ud: object) -> str:
+        time.sleep(self.seconds)
+        if self.preempt_requested():
+            self.service_preempt()
+            return "preempted"
+        self.count += 1
+        return "once" if self.count % 2 else "twice"
+
+
+def nested(depth: int, seconds: float) -> smach.StateMachine:
+    """`depth` machines, each in the one before; every one runs its child twice before it ends."""
+    machine = smach.StateMachine(["done", "preempted"])
+    with machine:
+        if depth > 1:
+            smach.StateMachine.add("CHILD", nested(depth - 1, seconds), {"done": "TICK"})
+        smach.StateMachine.add(
+            "TICK", Tick(seconds), {"once": "CHILD" if depth > 1 else "TICK", "twice": "done"}
+        )
+    return machine
+
+
+def all_containers(container: smach.Container, path: str):
+    yield path, container
+    for label, child in container.get_children().items():
+        if isinstance(child, smach.Container):
+            yield from all_containers(child, f"{path}/{label}")
+
+
+class Hop(smach.State):
+    """One look at the flag, then on."""
+
+    def __init__(self) -> None:
+        super().__init__(["on", "preempted"])
+
+    def execute(self, ud: object) -> str:
+        time.sleep(0.0002)
+        if self.preempt_requested():
+            self.service_preempt()
+            return "preempted"
+        return "on"
+
+
+def endless(depth: int) -> smach.StateMachine:
+    """Concurrences in machines in concurrences, which end by a request only."""
+    machine = smach.StateMachine(["preempted"])
+    with machine:
+        smach.StateMachine.add("A", Hop(), {"on": "B"})
+        if depth == 0:
+            smach.StateMachine.add("B", Hop(), {"on": "A"})
+        else:
+            both = smach.Concurrence(["again", "preempted"], "again")
+            with both:
+                smach.Concurrence.add("LEFT", endless(depth - 1))
+                smach.Concurrence.add("RIGHT", endless(0))
+            smach.StateMachine.add("B", both, {"again": "A"})
+    return machine
+
+
+def flags_up(state: smach.State) -> int:
+    count = int(state.preempt_requested())
+    if isinstance(state, smach.Container):
+        count += sum(map(flags_up, state.get_children().values()))
+    return count
+
+
+# Figures without ROS.
+
+
+def transition_cost() -> tuple[float, float]:
+    """Median microseconds of a transition, and of a bare loop over the same states in the same
+    blocks.
+    """
+    count = 1000
+    states = [smach.CBState(lambda ud: "next", outcomes=["next"]) for _ in range(count)]
+    machine = smach.StateMachine(["end"])
+    with machine:
+        for i, state in enumerate(states):
+            target = f"S{i + 1}" if i + 1 < count else "end"
+            smach.StateMachine.add(f"S{i}", state, {"next": target})
+    ours, bare = [], []
+    ud = smach.UserData()
+    for _ in range(30):
+        begun = time.perf_counter()
+        with contextlib.redirect_stdout(io.StringIO()):  # the default loggers format and print
+            machine.execute()
+        middle = time.perf_counter()
+        for state in states:
+            state.execute(ud)
+        ours.append((middle - begun) / count * 1e6)
+        bare.append((time.perf_counter() - middle) / count * 1e6)
+    return statistics.median(ours), statistics.median(bare)
+
+
+def preempt_campaign() -> tuple[int, int]:
+    """How many of the preempts at random moments were lost, and how many flags were left over."""
+    smach.set_loggers(*[lambda message: None] * 4)
+    seed = random.Random(7)
+    machine = endless(2)
+    lost = left = 0
+    for _ in range(PREEMPTS):
+        outcome: list[str | None] = []
+        thread = threading.Thread(target=lambda outcome=outcome: outcome.append(machine.execute()))
+        moment = seed.random() * 0.004
+        if moment < 0.0004:
+            machine.request_preempt()  # before the run
+            thread.start()
+        else:
+            thread.start()
+            time.sleep(moment)
+            machine.request_preempt()
+        thread.join(5.0)
+        if thread.is_alive() or outcome != ["preempted"]:
+            lost += 1
+            while thread.is_alive():
+                machine.request_preempt()
+                thread.join(0.1)
+        left += flags_up(machine)
+    return lost, left
+
+
+# Figures of introspection: a node with the machine, and this process as the viewer.
+
+
+def tasks() -> int:
+    return len(os.listdir("/proc/self/task"))
+
+
+def node_main() -> None:
+    """The process under test; prints one JSON line with what it has sent."""
+    import rospy
+    import smach_ros
+
+    rospy.init_node("bench_smach_node")
+    smach.set_loggers(*[lambda message: None] * 4)
+    machine = nested(CONTAINERS, 0.02)
+    sent: collections.Counter[str] = collections.Counter()
+    rounds = 0
+    time.sleep(1.0)
+    threads_before = tasks()
+    server = smach_ros.IntrospectionServer("/bench", machine, "/SM_ROOT")
+    for path, container in all_containers(machine, "/SM_ROOT"):
+
+        def count(*_args: object, path: str = path) -> None:
+            sent[path] += 1
+
+        container.register_start_cb(count)
+        container.register_transition_cb(count)
+        container.register_termination_cb(count)
+        container.register_end_cb(count)
+    publish = server._publish_heartbeats
+
+    def counted() -> None:
+        nonlocal rounds
+        if connected():
+            rounds += 1
+        publish()
+
+    def connected() -> bool:
+        topics = (server._status_pub, server._structure_pub)
+        return all(topic.get_num_connections() > 0 for topic in topics)
+
+    server._publish_heartbeats = counted
+    server.start()
+    limit = time.monotonic() + LIMIT
+    while not connected() and time.monotonic() < limit:
+        time.sleep(0.01)
+    time.sleep(3.0)
+    cpu, begun = time.process_time(), time.monotonic()
+    time.sleep(IDLE_SECONDS)
+    idle = (time.process_time() - cpu) / (time.monotonic() - begun) * 100.0
+    extra = tasks() - threads_before
+    runner = threading.Thread(target=machine.execute)
+    runner.start()
+    time.sleep(RUN_SECONDS)
+    machine.request_preempt()
+    runner.join(LIMIT)
+    server.stop()
+    report = {"sent": sent, "rounds": rounds, "idle": idle, "extra": extra}
+    print("REPORT " + json.dumps(report), flush=True)
+
+
+def free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return probe.getsockname()[1]
+
+
+def introspection_figures() -> dict[str, float]:
+    port = free_port()
+    os.environ.update(ROS_MASTER_URI=f"http://127.0.0.1:{port}", ROS_IP="127.0.0.1")
+    os.environ.pop("ROS_HOSTNAME", None)
+    quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+    master = subprocess.Popen(["rosmaster", "--core", "-p", str(port)], **quiet)
+    try:
+        limit = time.monotonic() + LIMIT
+        while time.monotonic() < limit:
+            with contextlib.suppress(OSError), socket.create_connection(("127.0.0.1", port), 1.0):
+                break
+            time.sleep(0.1)
+        return watch()
+    finally:
+        master.terminate()
+        master.wait(LIMIT)
+
+
+def watch() -> dict[str, float]:
+    import rospy
+    from smach_msgs.msg import SmachContainerStatus, SmachContainerStructure
+
+    rospy.init_node("bench_smach_viewer", disable_signals=True)
+    beats: collections.Counter[str] = collections.Counter()
+    structures: collections.Counter[str] = collections.Counter()
+    moves: collections.Counter[str] = collections.Counter()
+
+    def on_status(message: SmachContainerStatus) -> None:
+        if message.info == "HEARTBEAT":
+            beats[message.path] += 1
+        elif message.info != "Initial state":
+            moves[message.path] += 1
+
+    rospy.Subscriber("/bench/smach/container_status", SmachContainerStatus, on_status)
+    rospy.Subscriber(
+        "/bench/smach/container_structure",
+        SmachContainerStructure,
+        lambda message: structures.update([message.path]),
+    )
+    command = [sys.executable, os.path.abspath(__file__), "--node", *(["--quick"] if QUICK else [])]
+    node = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+    try:
+        output, _ = node.communicate(timeout=RUN_SECONDS + IDLE_SECONDS + 4 * LIMIT)
+    finally:
+        node.kill()
+        node.wait()
+    report = json.loads(
+        next(line for line in output.splitlines() if line.startswith("REPORT "))[7:]
+    )
+    time.sleep(1.0)
+    rospy.signal_shutdown("done")
+    beats_sent = 2 * CONTAINERS * report["rounds"]
+    beats_got = sum(
+        min(c, report["rounds"]) for counter in (beats, structures) for c in counter.values()
+    )
+    moves_got = sum(min(moves[path], count) for path, count in report["sent"].items())
+    return {
+        "beats": 100.0 * beats_got / beats_sent,
+        "moves": 100.0 * moves_got / sum(report["sent"].values()),
+        "moves_sent": sum(report["sent"].values()),
+        "beats_sent": beats_sent,
+        "idle": report["idle"],
+        "extra": report["extra"],
+    }
+
+
+def main() -> None:
+    if "--node" in sys.argv:
+        node_main()
+        return
+    transition, bare = transition_cost()
+    lost, left = preempt_campaign()
+    wire = introspection_figures()
+
+    def row(
+        figure: str, value: float, unit: str, goal: str, ok: bool, peer=None, peer_value=None
+    ) -> dict:
+        return {
+            "bench": "smach",
+            "figure": figure,
+            "value": round(value, 3),
+            "unit": unit,
+            "goal": goal,
+            "peer": peer,
+            "peer_value": peer_value and round(peer_value, 3),
+            "ok": ok,
+        }
+
+    where = f"{CONTAINERS} nested containers, {RUN_SECONDS:.0f} s"
+    rows = [
+        row(
+            f"heartbeats and structures that arrive, of {wire['beats_sent']:.0f}; {where}",
+            wire["beats"],
+            "%",
+            ">= 100",
+            wire["beats"] >= 100.0,
+        ),
+        row(
+            f"statuses at start, transition and end that arrive, of {wire['moves_sent']:.0f}; "
+            f"{where}",
+            wire["moves"],
+            "%",
+            ">= 100",
+            wire["moves"] >= 100.0,
+        ),
+        row(
+            "processor time of an idle machine with one viewer",
+            wire["idle"],
+            "% of a core",
+            "<= 2",
+            wire["idle"] <= 2.0,
+        ),
+        row("extra threads with one viewer", wire["extra"], "threads", "<= 4", wire["extra"] <= 4),
+        row(
+            "a transition",
+            transition,
+            "us",
+            "<= 50",
+            transition <= 50.0,
+            "bare loop over the same states",
+            bare,
+        ),
+        row(
+            f"preempts lost, of {PREEMPTS} at random moments of nested concurrent machines",
+            lost,
+            "preempts",
+            "<= 0",
+            lost == 0,
+        ),
+        row(f"preempt flags left over after {PREEMPTS} preempts", left, "flags", "<= 0", left == 0),
+    ]
+    print(json.dumps(rows, indent=1))
+
+
+if __name__ == "__main__":
+    main()

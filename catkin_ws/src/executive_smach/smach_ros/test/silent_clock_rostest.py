@@ -1,0 +1,61 @@
+#!/usr/bin/python3
+"""Time limits and heartbeats while simulated time stands still."""
+
+import time
+import unittest
+
+import rospy
+import smach
+import smach_ros
+from actionlib.msg import TestAction, TestGoal
+from rosgraph_msgs.msg import Clock
+from smach_msgs.msg import SmachContainerStatus
+from smach_ros.introspection import STATUS_TOPIC
+
+
+class TestSilentClock(unittest.TestCase):
+    def test_s9_time_limits_run_on(self):
+        self.assertFalse(rospy.rostime.is_wallclock())
+        state = smach_ros.SimpleActionState(
+            "nobody", TestAction, goal=TestGoal(), server_wait_timeout=0.5
+        )
+        self.assertEqual(state.execute(smach.UserData()), "aborted")
+        state = smach_ros.ConditionState(
+            lambda ud: False, timeout=rospy.Duration(0.5), max_checks=-1
+        )
+        self.assertEqual(state.execute(smach.UserData()), "false")
+
+    def test_s11_heartbeats_go_on(self):
+        machine = smach.StateMachine(["done"])
+        with machine:
+            smach.StateMachine.add("A", smach.CBState(lambda ud: "done", outcomes=["done"]))
+        got = []
+        sub = rospy.Subscriber("/silent" + STATUS_TOPIC, SmachContainerStatus, got.append)
+        server = smach_ros.IntrospectionServer("/silent", machine, "/SM_ROOT")
+        server.start()
+        end = time.monotonic() + 20
+        while sum(m.info == "HEARTBEAT" for m in got) < 2 and time.monotonic() < end:
+            time.sleep(0.05)
+        server.stop()
+        sub.unregister()
+        self.assertGreaterEqual(sum(m.info == "HEARTBEAT" for m in got), 2)
+
+    def test_limits_count_ros_time_while_it_moves(self):
+        pub = rospy.Publisher("/clock", Clock, queue_size=10)
+        end = time.monotonic() + 10
+        while pub.get_num_connections() == 0 and time.monotonic() < end:
+            time.sleep(0.01)
+        limit = smach_ros.util.TimeLimit(rospy.Duration(100))
+        for second in range(1, 121):  # 120 s of ROS time in 1.2 s
+            pub.publish(rospy.Time(second))
+            time.sleep(0.01)
+            if limit.expired():
+                break
+        self.assertTrue(95 <= second <= 120, f"expired after {second} s")
+
+
+if __name__ == "__main__":
+    import rostest
+
+    rospy.init_node("silent_clock_rostest")
+    rostest.rosrun("smach_ros", "silent_clock", __name__)
