@@ -63,6 +63,7 @@ class Running:
     task: Task
     begun: float
     begun_stamp: rospy.Time
+    driver: Any = None
     fillers: int = 0
     resends: int = 0
     last_status: float = 0.0
@@ -135,9 +136,12 @@ class GoalQueue:
             if running:
                 self._cancel("replaced by a new goal; fingers stopped")
             self._accept(item.name, item.content)
+            if not self._running:
+                self._unsubscribe()
         elif item.kind == "cancel":
             if running and item.content == running.handle:
                 self._cancel("preempted; fingers stopped")
+                self._unsubscribe()
         elif item.kind == "stop":
             self._end_running(item.name)
         elif item.kind == "call":
@@ -163,8 +167,9 @@ class GoalQueue:
         if handle.get_goal_status().status == actionlib.GoalStatus.PREEMPTING:
             handle.set_canceled(_result(name, False, "cancelled before it began"))
             return
-        self._status = rospy.Subscriber(rospy.resolve_name("~hand_status"), HandStatus,
-                                        self._on_status, queue_size=2, tcp_nodelay=True)
+        if self._status is None:  # else the replaced goal's subscription goes on
+            self._status = rospy.Subscriber(rospy.resolve_name("~hand_status"), HandStatus,
+                                            self._on_status, queue_size=2, tcp_nodelay=True)
         now = time.monotonic()
         self._running = Running(name, handle, task, now, rospy.Time.now(), last_status=now)
         self._begin(self._running)
@@ -174,6 +179,7 @@ class GoalQueue:
 
     def _begin(self, running: Running) -> None:
         driver = self._owner.connected_driver()
+        running.driver = driver
         running.fillers = driver.counters.fillers  # before: a stop during the command counts too
         running.task.begin(driver)
         running.begun_stamp = rospy.Time.now()
@@ -185,7 +191,10 @@ class GoalQueue:
         if not status.connected:
             self._fail(status.message)
             return
-        if self._owner.connected_driver().counters.fillers != running.fillers:
+        if self._owner.driver is not running.driver:
+            self._fail(f"the connection to {self._owner.port} was lost during the goal")
+            return
+        if running.driver.counters.fillers != running.fillers:
             self._resend(running)
             return
         age = (status.header.stamp - running.begun_stamp).to_sec()
@@ -233,7 +242,7 @@ class GoalQueue:
     def _cancel(self, reason: str) -> None:
         running = self._running
         self._stop_fingers()
-        self._leave()
+        self._running = None
         self._owner.task_ended(running.task, Verdict(reason, done=True))
         running.handle.set_canceled(_result(running.name, False, reason), reason)
 
@@ -244,12 +253,12 @@ class GoalQueue:
 
     def _finish(self, verdict: Verdict) -> None:
         running = self._running
-        # The subscriber goes before the result: who waits for it may send the next goal at once.
-        self._leave()
+        self._running = None
+        self._unsubscribe()
         self._finish_handle(running.name, running.handle, verdict)
 
-    def _leave(self) -> None:
-        self._running = None
+    def _unsubscribe(self) -> None:
+        """Leave hand_status; in a thread, as it asks the master and the result need not wait."""
         if self._status:
             status, self._status = self._status, None
             threading.Thread(target=status.unregister, daemon=True).start()

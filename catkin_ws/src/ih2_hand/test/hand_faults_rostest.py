@@ -1,0 +1,134 @@
+#!/usr/bin/python3
+"""What goes wrong between node and hand: pulled cables, silence, noise, a blocked motor."""
+
+from __future__ import annotations
+
+import sys
+import time
+import unittest
+
+import rospy
+import rostest
+from actionlib import GoalStatus
+from ih2_hand.ros.client import HandClient
+
+GOALS = {"hand_open": (60,), "hand_close": (60,), "hand_preshape": ("cylindrical", "low"),
+         "hand_preshape_close": ()}
+ABORT_LIMIT_S = 2.0
+
+
+class HandFaults(unittest.TestCase):
+    """Each test begins with an open hand and an untroubled line."""
+
+    @classmethod
+    def setUpClass(cls) -> None:
+        cls.hand = HandClient()
+        cls.hand.wait_ready()
+
+    def setUp(self) -> None:
+        self.hand.fault("clear")
+        self.hand.wait(lambda: self.hand.status.connected, "hand connected")
+        self.hand.touch([255] * 5)
+        self.assertTrue(self.hand.run("hand_open", 511).isOk)
+
+    def begin(self, name: str) -> None:
+        """Have the action of that name on its way."""
+        if name == "hand_open":
+            self.assertTrue(self.hand.run("hand_close", 511).isOk)
+        if name == "hand_preshape_close":
+            self.assertTrue(self.hand.run("hand_preshape", "cylindrical", "low").isOk)
+        self.hand.send(name, *GOALS[name])
+        self.hand.wait(lambda: self.hand.feedback, "feedback")
+
+    def check_broken(self, fault: str) -> None:
+        for name in GOALS:
+            self.hand.fault("clear")
+            self.hand.wait(lambda: self.hand.status.connected, "reconnection")
+            self.begin(name)
+            port = rospy.get_param("coglab_sim/hand_port")
+            self.hand.fault(fault)
+            pulled = time.monotonic()
+            result = self.hand.result(name)
+            took = time.monotonic() - pulled
+            self.assertFalse(result.isOk, name)
+            self.assertEqual(self.hand.clients[name].get_state(), GoalStatus.ABORTED, name)
+            self.assertIn(port, result.message)
+            self.assertRegex(result.message, r"last byte received (0x\w\w|none)")
+            self.assertLess(took, ABORT_LIMIT_S, name)
+            self.hand.wait(lambda: not self.hand.status.connected, "report of the loss")
+            self.assertEqual(list(self.hand.status.motors), [])
+
+    def test_cable_pulled_during_each_action(self) -> None:
+        self.check_broken("unplug")
+
+    def test_silence_during_each_action(self) -> None:
+        self.check_broken("mute")
+
+    def test_reconnection_counts_as_holding_and_moves_nothing(self) -> None:
+        self.assertTrue(self.hand.run("hand_preshape", "lateral", "high").isOk)
+        before = list(self.hand.fingers.position)
+        self.hand.fault("unplug 1")
+        self.hand.wait(lambda: not self.hand.status.connected, "loss")
+        self.hand.wait(lambda: self.hand.status.connected, "reconnection")
+        status = self.hand.fresh_status()
+        self.assertTrue(status.holding)
+        self.assertFalse(status.calibrated)
+        time.sleep(0.5)
+        self.assertEqual(list(self.hand.fingers.position), before)
+        result = self.hand.run("hand_preshape_close")
+        self.assertIn("hand_preshape first", result.message)
+        self.hand.calibrate("fast")
+        self.hand.wait(lambda: "may hold" in self.hand.status.message, "refusal")
+        self.assertTrue(self.hand.run("hand_open", 511).isOk)
+        self.assertFalse(self.hand.fresh_status().holding)
+
+    def test_goal_without_connection(self) -> None:
+        self.hand.fault("unplug")
+        self.hand.wait(lambda: not self.hand.status.connected, "loss")
+        result = self.hand.run("hand_open", 100)
+        self.assertFalse(result.isOk)
+        self.assertIn("not connected", result.message)
+        self.assertFalse(self.hand.stop_service().success)
+
+    def test_cable_pulled_during_calibration(self) -> None:
+        self.hand.calibrate("complete force")
+        self.hand.wait(lambda: self.hand.status.calibrating, "calibration")
+        self.hand.fault("unplug 0.5")
+        self.hand.wait(lambda: not self.hand.status.connected, "loss")
+        self.hand.wait(lambda: self.hand.status.connected, "reconnection")
+        self.assertFalse(self.hand.status.calibrated)
+
+    def test_lost_bytes_do_not_end_a_goal(self) -> None:
+        for name in ("hand_close", "hand_open"):
+            self.hand.send(name, 200)
+            for fault in ("lose 1", "garbage 3", "lose_in 1"):
+                time.sleep(0.15)
+                self.hand.fault(fault)
+            result = self.hand.result(name)
+            self.assertTrue(result.isOk, result.message)
+
+    def test_slow_hand(self) -> None:
+        self.hand.fault("slow 10")
+        self.assertTrue(self.hand.run("hand_close", 511).isOk)
+
+    def test_stuck_motor(self) -> None:
+        self.assertTrue(self.hand.run("hand_close", 511).isOk)
+        self.hand.fault("stuck 3")
+        result = self.hand.run("hand_open", 511)
+        self.assertFalse(result.isOk)
+        self.assertIn("middle", result.message)
+
+    def test_moves_that_end_short(self) -> None:
+        self.hand.fault("short 4")
+        result = self.hand.run("hand_preshape", "tridigit", "low")
+        self.assertTrue(result.isOk, result.message)
+
+    def test_bad_fault_and_bad_contact_do_no_harm(self) -> None:
+        self.hand.fault("explode")
+        self.hand.touch([1, 2])
+        self.assertTrue(self.hand.run("hand_close", 511).isOk)
+
+
+if __name__ == "__main__":
+    rospy.init_node("hand_faults_rostest")
+    rostest.rosrun("ih2_hand", "hand_faults", HandFaults, sys.argv)

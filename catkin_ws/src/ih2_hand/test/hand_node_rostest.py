@@ -1,0 +1,203 @@
+#!/usr/bin/python3
+"""Table 3 of D4.10 against the running node: actions, calibration, status, joints, stop."""
+
+from __future__ import annotations
+
+import sys
+import time
+import unittest
+
+import rospy
+import rostest
+from actionlib import GoalStatus
+from diagnostic_msgs.msg import DiagnosticArray
+from ih2_hand.ros.client import HandClient
+from std_msgs.msg import String
+
+OBJECT = [255, 100, 120, 120, 130]
+FREE = [255] * 5
+
+
+class HandNode(unittest.TestCase):
+    """Runs in alphabetical order on one hand."""
+
+    @classmethod
+    def setUpClass(cls) -> None:
+        cls.hand = HandClient()
+        cls.diagnostics = []
+        rospy.Subscriber("/diagnostics", DiagnosticArray,
+                         lambda array: cls.diagnostics.extend(array.status))
+        cls.trace = []
+        rospy.Subscriber("ih2_hand/trace", String, lambda line: cls.trace.append(line.data))
+        cls.hand.wait_ready()
+
+    def state(self, name: str) -> int:
+        return self.hand.clients[name].get_state()
+
+    def test_a_node_does_nothing_by_itself(self) -> None:
+        status = self.hand.fresh_status()
+        self.assertFalse(status.calibrated)
+        self.assertEqual([motor.motor for motor in status.motors], [0, 1, 2, 3, 4])
+        self.assertEqual([motor.force for motor in status.motors], [-1, 0, 0, 0, 0])
+        self.hand.wait(lambda: len(self.trace) > 200, "trace lines")
+        meanings = {line.split(maxsplit=2)[2].split("  ", 1)[-1].strip() for line in self.trace
+                    if " > " in line}
+        self.assertTrue(all("Get" in meaning for meaning in meanings), meanings)
+
+    def test_b_preshape_before_calibration_is_honest(self) -> None:
+        result = self.hand.run("hand_preshape", "cylindrical", "medium")
+        self.assertFalse(result.isOk)
+        self.assertIn("not calibrated", result.message)
+        self.assertEqual(self.state("hand_preshape"), GoalStatus.ABORTED)
+
+    def test_c_calibration(self) -> None:
+        self.hand.calibrate("slow")
+        self.hand.wait(lambda: "must be fast" in self.hand.status.message, "refusal")
+        count = len(self.hand.statuses)
+        self.hand.calibrate_and_wait("fast")
+        seen = self.hand.statuses[count:]
+        self.assertTrue(any("fast started" in status.message for status in seen))
+        self.assertTrue(all(not status.motors for status in seen if status.calibrating))
+        self.assertTrue(self.hand.status.calibrated)
+        self.assertFalse(self.hand.fresh_status().holding)
+        self.hand.calibrate("fast")
+        self.hand.wait(lambda: "refused" in self.hand.status.message, "refusal")
+        self.assertIn("calibrated already", self.hand.status.message)
+        self.hand.calibrate_and_wait("fast force")
+        self.assertTrue(self.hand.status.calibrated)
+        for word in ("must be fast", "started", "calibrated already", "ended"):
+            self.assertTrue(any(word in status.message for status in self.diagnostics), word)
+
+    def test_d_preshape_close_without_preshape(self) -> None:
+        result = self.hand.run("hand_preshape_close")
+        self.assertFalse(result.isOk)
+        self.assertIn("hand_preshape first", result.message)
+
+    def test_e_refusals_list_what_exists(self) -> None:
+        result = self.hand.run("hand_preshape", "power", "low")
+        self.assertIn("cylindrical, lateral, tridigit, bidigit, tridigit2, bidigit2",
+                      result.message)
+        result = self.hand.run("hand_preshape", "lateral", "low")
+        self.assertIn("lateral has force level high", result.message)
+        for speed in (-1, 0, 512):
+            self.assertFalse(self.hand.run("hand_open", speed).isOk)
+            self.assertFalse(self.hand.run("hand_close", speed).isOk)
+
+    def test_f_grasp_an_object(self) -> None:
+        self.hand.touch(OBJECT)
+        result = self.hand.run("hand_preshape", "cylindrical", "medium")
+        self.assertTrue(result.isOk, result.message)
+        self.assertEqual(self.state("hand_preshape"), GoalStatus.SUCCEEDED)
+        positions = [motor.position for motor in self.hand.fresh_status().motors]
+        for position, target in zip(positions, (245, 5, 30, 50, 50)):
+            self.assertLessEqual(abs(position - target), 4)
+        result = self.hand.run("hand_preshape_close")
+        self.assertTrue(result.isOk, result.message)
+        self.assertIn("holding", result.message)
+        self.assertTrue(self.hand.feedback)
+        self.assertEqual(len(self.hand.feedback[-1].positions), 5)
+        self.assertTrue(self.hand.fresh_status().holding)
+        self.assertTrue(any("grasp cylindrical medium by current" in line for line in self.trace))
+        self.assertGreater(min(self.hand.fingers.effort[1:]), 100.0)
+
+    def test_g_calibration_would_drop_the_object(self) -> None:
+        self.hand.calibrate("fast")
+        self.hand.wait(lambda: "may hold an object" in self.hand.status.message, "refusal")
+        self.assertFalse(self.hand.status.calibrating)
+
+    def test_h_open(self) -> None:
+        result = self.hand.run("hand_open", 400)
+        self.assertTrue(result.isOk, result.message)
+        status = self.hand.fresh_status()
+        self.assertTrue(all(motor.fully_open for motor in status.motors))
+        self.assertFalse(status.holding)
+        self.hand.wait(lambda: max(self.hand.joints.position) == 0.0, "open joints")
+
+    def test_i_close_on_object_and_on_nothing(self) -> None:
+        self.hand.touch(OBJECT)
+        result = self.hand.run("hand_close", 300)
+        self.assertTrue(result.isOk and "on an object" in result.message, result.message)
+        self.assertTrue(self.hand.fresh_status().holding)
+        self.assertTrue(self.hand.run("hand_open", 511).isOk)
+        self.hand.touch(FREE)
+        result = self.hand.run("hand_close", 511)
+        self.assertTrue(result.isOk and "without meeting" in result.message, result.message)
+        self.assertFalse(self.hand.fresh_status().holding)
+        self.hand.wait(lambda: self.hand.joints.position[2] == 1.5, "closed joints")
+        self.assertEqual(list(self.hand.joints.name), [
+            "ih2_thumb_abduction", "ih2_thumb_flexion", "ih2_index_flexion", "ih2_middle_flexion",
+            "ih2_ring_little_flexion"])
+
+    def test_j_speed_is_what_the_goal_says(self) -> None:
+        durations = {}
+        for speed in (511, 255):
+            self.assertTrue(self.hand.run("hand_open", 511).isOk)
+            started = time.monotonic()
+            self.assertTrue(self.hand.run("hand_close", speed).isOk)
+            durations[speed] = time.monotonic() - started
+        self.assertGreater(durations[255], 1.5 * durations[511] - 0.2)
+
+    def test_k_preemption_stops_the_fingers(self) -> None:
+        self.assertTrue(self.hand.run("hand_open", 511).isOk)
+        self.hand.send("hand_close", 60)
+        self.hand.wait(lambda: self.hand.feedback, "feedback")
+        self.hand.clients["hand_close"].cancel_goal()
+        result = self.hand.result("hand_close")
+        self.assertEqual(self.state("hand_close"), GoalStatus.PREEMPTED)
+        self.assertFalse(result.isOk)
+        status = self.hand.fresh_status()
+        self.assertTrue(all(motor.mode == "stop" for motor in status.motors))
+
+    def test_l_a_new_goal_replaces_the_old_one(self) -> None:
+        old = self.hand.send("hand_close", 60)
+        self.hand.wait(lambda: self.hand.feedback, "feedback")
+        result = self.hand.run("hand_open", 511)
+        self.assertTrue(result.isOk, result.message)
+        self.hand.wait(lambda: old.get_state() == GoalStatus.PREEMPTED, "preempted old goal")
+        self.assertIn("replaced", old.get_result().message)
+        for speed in range(100, 200, 5):  # the same action, goal upon goal
+            self.hand.send("hand_close", speed)
+        result = self.hand.run("hand_close", 511)
+        self.assertTrue(result.isOk, result.message)
+
+    def test_m_stop_service(self) -> None:
+        self.assertTrue(self.hand.run("hand_open", 511).isOk)
+        self.hand.send("hand_close", 60)
+        self.hand.wait(lambda: self.hand.feedback, "feedback")
+        answer = self.hand.stop_service()
+        self.assertTrue(answer.success, answer.message)
+        result = self.hand.result("hand_close")
+        self.assertFalse(result.isOk)
+        self.assertIn("stop service", result.message)
+        status = self.hand.fresh_status()
+        self.assertTrue(all(motor.mode == "stop" for motor in status.motors))
+        self.assertTrue(self.hand.stop_service().success)
+
+    def test_n_other_grasps(self) -> None:
+        for mode, level in (("lateral", "high"), ("tridigit", "high"), ("bidigit", "low")):
+            result = self.hand.run("hand_preshape", mode, level)
+            self.assertTrue(result.isOk, f"{mode}: {result.message}")
+            result = self.hand.run("hand_preshape_close")
+            self.assertTrue(result.isOk, f"{mode}: {result.message}")
+
+    def test_o_no_goal_during_calibration(self) -> None:
+        self.assertTrue(self.hand.run("hand_open", 511).isOk)
+        self.hand.calibrate("complete force")
+        self.hand.wait(lambda: self.hand.status.calibrating, "calibration")
+        result = self.hand.run("hand_open", 511)
+        self.assertIn("calibrates", result.message)
+        self.assertFalse(self.hand.stop_service().success)
+        self.hand.wait(lambda: self.hand.status.calibrated, "end of the calibration")
+
+    def test_p_status_rate(self) -> None:
+        self.hand.fresh_status()
+        count, started = len(self.hand.statuses), time.monotonic()
+        time.sleep(2.0)
+        rate = (len(self.hand.statuses) - count) / (time.monotonic() - started)
+        self.assertGreater(rate, 15.0)
+        self.assertLess(rate, 33.0)
+
+
+if __name__ == "__main__":
+    rospy.init_node("hand_node_rostest")
+    rostest.rosrun("ih2_hand", "hand_node", HandNode, sys.argv)
