@@ -1,0 +1,2 @@
+// A library without a controller.
+extern "C" int answer() { return 42; }

@@ -1,0 +1,103 @@
+#include <random>
+
+#include "controller_rig.hpp"
+#include "second_order.hpp"
+
+namespace ctrl_more {
+namespace {
+
+TEST(SecondOrderTest, criticalDampingIsExactAtTheSamples) {
+  const double m = 2.0, k = 50.0, f = 3.0, wn = std::sqrt(k / m), dt = 0.005;
+  SecondOrder axis;
+  axis.prepare(m, 2 * std::sqrt(k * m), k, dt);
+  double x = 0, v = 0;
+  for (int i = 1; i <= 2000; ++i) {
+    axis.step(f, x, v);
+    const double t = i * dt;
+    ASSERT_NEAR(x, f / k * (1 - (1 + wn * t) * std::exp(-wn * t)), 1e-13);
+    ASSERT_NEAR(v, f / m * t * std::exp(-wn * t), 1e-12);
+  }
+}
+
+TEST(SecondOrderTest, allDampingsAgreeWithSmallSteps) {
+  std::mt19937 random(11);
+  std::uniform_real_distribution<double> u(0.0, 1.0);
+  for (int n = 0; n < 300; ++n) {
+    const double m = 0.2 + 5 * u(random), d = n % 7 == 0 ? 0.0 : 100 * u(random);
+    const double k = n % 5 == 0 ? 0.0 : 1000 * u(random), f = u(random) - 0.5;
+    SecondOrder coarse, fine;
+    coarse.prepare(m, d, k, 0.01);
+    fine.prepare(m, d, k, 0.01 / 64);
+    double x = 0.1, v = -0.2, y = 0.1, w = -0.2;
+    for (int i = 0; i < 50; ++i) {
+      coarse.step(f, x, v);
+      for (int j = 0; j < 64; ++j) fine.step(f, y, w);
+      ASSERT_NEAR(x, y, 1e-11);
+      ASSERT_NEAR(v, w, 1e-10);
+    }
+  }
+}
+
+TEST(SecondOrderTest, passive) {
+  // Stored energy never exceeds initial energy plus work of the force.
+  std::mt19937 random(13);
+  std::normal_distribution<double> normal;
+  SecondOrder axis;
+  const double m = 3, d = 5, k = 40;
+  axis.prepare(m, d, k, 0.005);
+  double x = 0.02, v = 0.1, budget = 0.5 * m * v * v + 0.5 * k * x * x;
+  for (int i = 0; i < 20000; ++i) {
+    const double f = 5 * normal(random), before = x;
+    axis.step(f, x, v);
+    budget += f * (x - before);  // exact for a force held over the step
+    ASSERT_LE(0.5 * m * v * v + 0.5 * k * x * x, budget + 1e-12);
+  }
+}
+
+struct CompliantTest : ::testing::Test {
+  ControllerRig rig;
+  void push(double zmp_x, int cycles) {
+    for (int i = 0; i < cycles; ++i) {
+      rig.robot.setEstimatedData("zmp", vectorOf({zmp_x, 0, 0}), rig.cycle.now_ns);
+      rig.setReferences();
+      rig.cycleOnce();
+    }
+  }
+};
+
+TEST_F(CompliantTest, stepFromTheZmpSettlesAtForceOverStiffness) {
+  ASSERT_TRUE(rig.load("compliant_stabiliser",
+                       "mass: 20\ndamping: 400\nstiffness: 2000\nmax_offset: 0.3\n"
+                       "total_mass: 40\nheight: 0.8\n"));
+  const double force = 40 * 9.80665 * 0.02 / 0.8, wn = 10.0;
+  for (int i = 1; i <= 400; ++i) {
+    push(0.02, 1);
+    const double t = 0.005 * i;
+    ASSERT_NEAR(rig.control.getCoM().x(), force / 2000 * (1 - (1 + wn * t) * std::exp(-wn * t)),
+                1e-13);
+    ASSERT_NEAR(rig.control.getCoMVelocity().x(), force / 20 * t * std::exp(-wn * t), 1e-12);
+    ASSERT_EQ(rig.control.getCoM().y(), 0.0);
+  }
+  EXPECT_EQ(rig.manager->status("c").faults, 0u);
+}
+
+TEST_F(CompliantTest, offsetIsBounded) {
+  ASSERT_TRUE(rig.load("compliant_stabiliser", "max_offset: 0.05\n"));
+  push(0.5, 1000);
+  EXPECT_EQ(rig.control.getCoM().x(), 0.05);
+  EXPECT_EQ(rig.control.getCoMVelocity().x(), 0.0);
+}
+
+TEST_F(CompliantTest, measuredForceInstead) {
+  ASSERT_TRUE(rig.load("compliant_stabiliser", "force_source: force\nmax_offset: 0.3\n"));
+  for (int i = 0; i < 3000; ++i) {
+    rig.robot.setMeasuredData("contactForce", vectorOf({0, 30, 300}), rig.cycle.now_ns);
+    rig.setReferences();
+    rig.cycleOnce();
+  }
+  EXPECT_NEAR(rig.control.getCoM().y(), 30.0 / 1000.0, 1e-9);
+  EXPECT_EQ(rig.manager->getUsedRobotStates(), std::vector<std::string>{"measuredData/contactForce"});
+}
+
+}  // namespace
+}  // namespace ctrl_more

@@ -1,0 +1,89 @@
+#include "test_support.hpp"
+
+namespace ctrl_more {
+namespace {
+
+std::string messageOf(const std::function<void()>& action) {
+  try {
+    action();
+  } catch (const ConfigError& e) {
+    return e.what();
+  }
+  return "";
+}
+
+TEST(ConfigTest, readsScalarsListsAndMapsWithTheirLines) {
+  const ConfigNode root = ConfigNode::fromText("a: 1.5\nb: [1, 2]\nc:\n  d: true\n", "f.yaml");
+  EXPECT_EQ(root.find("a")->number("a"), 1.5);
+  EXPECT_EQ(root.find("b")->numbers("b"), (std::vector<double>{1, 2}));
+  EXPECT_TRUE(root.find("c")->find("d")->boolean("d"));
+  EXPECT_EQ(root.find("c")->find("d")->place(), "f.yaml:4");
+  EXPECT_EQ(root.find("e"), nullptr);
+  EXPECT_EQ(root.keys(), (std::vector<std::string>{"a", "b", "c"}));
+}
+
+TEST(ConfigTest, errorsNameFileLineAndField) {
+  const ConfigNode root = ConfigNode::fromText("a: x\nb: {c: 1}\nn: .nan\nh: 1e999\n", "f.yaml");
+  EXPECT_EQ(messageOf([&] { root.find("a")->number("gain 'a'"); }),
+            "f.yaml:1: gain 'a' expects a number, got 'x'");
+  EXPECT_FALSE(messageOf([&] { root.find("b")->number("b"); }).empty());
+  EXPECT_FALSE(messageOf([&] { root.find("b")->text("b"); }).empty());
+  EXPECT_FALSE(messageOf([&] { root.find("b")->texts("b"); }).empty());
+  EXPECT_FALSE(messageOf([&] { root.find("n")->number("n"); }).empty());
+  EXPECT_FALSE(messageOf([&] { root.find("h")->number("h"); }).empty());
+  EXPECT_FALSE(messageOf([&] { root.find("a")->boolean("a"); }).empty());
+  EXPECT_EQ(messageOf([&] { root.requireKeys("it", {"aa", "b", "n", "h"}); }),
+            "f.yaml:1: it has an unknown key 'a'; did you mean 'aa'?");
+}
+
+TEST(ConfigTest, hostileFilesAreRefused) {
+  std::string deep;
+  for (int i = 0; i < 100; ++i) deep += "[";
+  EXPECT_FALSE(messageOf([&] { ConfigNode::fromText(deep, "f"); }).empty());
+  std::string closed = deep;
+  for (int i = 0; i < 100; ++i) closed += "]";
+  EXPECT_TRUE(contains(messageOf([&] { ConfigNode::fromText(closed, "f"); }), "nested"));
+  std::string bomb = "a0: &a0 [x, x, x, x, x, x, x, x, x, x]\n";
+  for (int i = 1; i < 10; ++i) {
+    const std::string last = "*a" + std::to_string(i - 1);
+    bomb += "a" + std::to_string(i) + ": &a" + std::to_string(i) + " [";
+    for (int k = 0; k < 10; ++k) bomb += (k ? ", " : "") + last;
+    bomb += "]\n";
+  }
+  EXPECT_TRUE(contains(messageOf([&] { ConfigNode::fromText(bomb, "f"); }), "20000 nodes"));
+  EXPECT_TRUE(contains(messageOf([&] { ConfigNode::fromText("a: &a [*a]\n", "f"); }), "f:"));
+  EXPECT_TRUE(contains(messageOf([&] { ConfigNode::fromText("a: 1\na: 2\n", "f"); }), "twice"));
+  EXPECT_TRUE(contains(messageOf([&] { ConfigNode::fromText("? [1]\n: 2\n", "f"); }), "key"));
+  EXPECT_TRUE(contains(
+      messageOf([&] { ConfigNode::fromText(std::string(2000000, ' '), "f"); }), "1 MB"));
+  EXPECT_TRUE(contains(messageOf([] { ConfigNode::fromFile("/nowhere.yaml"); }), "/nowhere.yaml"));
+  EXPECT_TRUE(contains(messageOf([&] { ConfigNode::fromText("a: [1\nb: 2", "f"); }), "f:"));
+}
+
+TEST(ConfigTest, nearestNames) {
+  const std::vector<std::string> known = {"Compliant", "ZmpIP", "AttitudeMPCController"};
+  EXPECT_EQ(nearestName("Attitude", known), "AttitudeMPCController");
+  EXPECT_EQ(nearestName("zmpip", known), "ZmpIP");
+  EXPECT_EQ(nearestName("Compliantt", known), "Compliant");
+  EXPECT_EQ(nearestName("Xyz", known), "");
+  EXPECT_EQ(suggestion("Xyz", known), "; known: Compliant, ZmpIP, AttitudeMPCController");
+  EXPECT_EQ(suggestion("Xyz", {}), "; there is none");
+}
+
+TEST(ConfigTest, gainsAreCheckedOneByOne) {
+  Description d;
+  d.gain("kp", 0).vector(3, 1.0).range(0, 2).in("1").about("x");
+  GainValues gains(d.gains);
+  EXPECT_TRUE(gains.set("kp", {0.5}));
+  EXPECT_EQ(gains.all().at("kp"), (std::vector<double>{0.5, 0.5, 0.5}));
+  EXPECT_TRUE(gains.set("kp", {0, 1, 2}));
+  EXPECT_FALSE(gains.set("kp", {0, 1}));
+  EXPECT_FALSE(gains.set("kp", {}));
+  EXPECT_FALSE(gains.set("kp", {0, 1, 2.1}));
+  EXPECT_FALSE(gains.set("kp", {std::nan("")}));
+  EXPECT_EQ(gains.all().at("kp"), (std::vector<double>{0, 1, 2}));
+  EXPECT_THROW(gains.find("kq"), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace ctrl_more

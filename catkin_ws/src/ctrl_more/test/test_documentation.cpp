@@ -1,0 +1,61 @@
+#include <fstream>
+#include <sstream>
+
+#include "ctrl_more/documentation.hpp"
+#include "ctrl_more/prototypes.hpp"
+#include "test_support.hpp"
+
+namespace ctrl_more {
+namespace {
+
+std::string contentOf(const std::string& path) {
+  std::ifstream stream(path);
+  std::stringstream text;
+  text << stream.rdbuf();
+  return text.str();
+}
+
+class Documentation : public ::testing::TestWithParam<const char*> {
+ protected:
+  Description description() const {
+    const std::string file =
+        std::string(CTRL_MORE_PLUGIN_DIR) + "/libctrl_more_" + GetParam() + ".so";
+    return makeController(file, "").controller->describe();
+  }
+};
+
+TEST_P(Documentation, noFieldIsEmpty) {
+  const auto empty = description().emptyFields();
+  EXPECT_TRUE(empty.empty()) << empty.front();
+  const auto faults = description().faults();
+  EXPECT_TRUE(faults.empty()) << faults.front();
+}
+
+TEST_P(Documentation, committedPageIsTheGeneratedOne) {
+  const Description d = description();
+  EXPECT_EQ(contentOf(std::string(CTRL_MORE_SOURCE_DIR) + "/doc/controllers/" + d.type + ".md"),
+            documentationPage(d))
+      << "run: rosrun ctrl_more ctrl_more_describe page LIBRARY > doc/controllers/" << d.type
+      << ".md";
+}
+
+TEST_P(Documentation, shippedConfigurationHasEveryKeyAtItsInitialValue) {
+  EXPECT_EQ(contentOf(std::string(CTRL_MORE_SOURCE_DIR) + "/config/" + GetParam() + ".yaml"),
+            configurationTemplate(description()));
+}
+
+TEST_P(Documentation, pageShowsEverySignalAndGain) {
+  const Description d = description();
+  const std::string page = documentationPage(d);
+  for (const GainSpec& s : d.gains) EXPECT_TRUE(contains(page, "`" + s.name + "`"));
+  for (const SettingSpec& s : d.settings) EXPECT_TRUE(contains(page, "`" + s.name + "`"));
+  for (const RobotSignalUse& s : d.robot_signals) EXPECT_TRUE(contains(page, s.text));
+  for (const ControlSignalUse& s : d.control_signals) EXPECT_TRUE(contains(page, s.text));
+}
+
+INSTANTIATE_TEST_SUITE_P(Shipped, Documentation,
+                         ::testing::Values("attitude", "compliant_stabiliser", "zmp_dcm",
+                                           "ee_admittance", "joint_limits"));
+
+}  // namespace
+}  // namespace ctrl_more

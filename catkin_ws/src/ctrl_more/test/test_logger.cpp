@@ -1,0 +1,115 @@
+#include <cstdio>
+#include <fstream>
+#include <sstream>
+#include <thread>
+
+#include "test_support.hpp"
+
+namespace ctrl_more {
+namespace {
+
+TEST(LoggerTest, recordsCarrySourcePlaceCycleAndNumbers) {
+  Logger logger;
+  auto sink = std::make_shared<ListSink>();
+  logger.addSink(sink);
+  std::atomic<std::uint64_t> cycle{17};
+  const LogSource source(&logger, "attitude", &cycle);
+  CTRL_MORE_LOG(source, Warning, "force {} N above {} N", 12.5, 10);
+  EXPECT_TRUE(sink->lines.empty()) << "nothing is written before it is drained";
+  EXPECT_EQ(logger.drain(), 1u);
+  ASSERT_EQ(sink->lines.size(), 1u);
+  EXPECT_TRUE(contains(sink->lines[0], "[WARN] attitude (test_logger.cpp:"));
+  EXPECT_TRUE(contains(sink->lines[0], ", cycle 17): force 12.5 N above 10 N"));
+}
+
+TEST(LoggerTest, levels) {
+  Logger logger;
+  auto sink = std::make_shared<ListSink>();
+  logger.addSink(sink);
+  logger.log(LogLevel::Debug, "a", "hidden");
+  logger.log(LogLevel::Info, "a", "shown");
+  logger.setLevel(LogLevel::Error);
+  logger.log(LogLevel::Warning, "a", "hidden too");
+  logger.log(LogLevel::Error, "a", "shown too");
+  logger.drain();
+  EXPECT_EQ(sink->lines.size(), 2u);
+}
+
+TEST(LoggerTest, longTextsAreCutNotOverrun) {
+  Logger logger;
+  auto sink = std::make_shared<ListSink>();
+  logger.addSink(sink);
+  logger.log(LogLevel::Info, std::string(500, 's'), std::string(5000, 't'), "f", 1);
+  logger.drain();
+  ASSERT_EQ(sink->lines.size(), 1u);
+  EXPECT_LT(sink->lines[0].size(), 400u);
+}
+
+TEST(LoggerTest, fullRingDropsAndCounts) {
+  Logger logger(8);
+  for (int i = 0; i < 20; ++i) logger.log(LogLevel::Info, "a", "x");
+  EXPECT_EQ(logger.dropped(), 12u);
+  EXPECT_EQ(logger.drain(), 8u);
+  logger.log(LogLevel::Info, "a", "x");
+  EXPECT_EQ(logger.drain(), 1u);
+}
+
+TEST(LoggerTest, fileSinkWritesTheFileThatWasNamed) {
+  const std::string path = ::testing::TempDir() + "/ctrl_more_test.log";
+  std::remove(path.c_str());
+  {
+    Logger logger;
+    logger.addSink(std::make_shared<FileLogSink>(path));
+    logger.log(LogLevel::Error, "a", "kept");
+  }
+  std::ifstream stream(path);
+  std::string line;
+  std::getline(stream, line);
+  EXPECT_EQ(line, "[ERROR] a: kept");
+  EXPECT_THROW(FileLogSink("/nowhere/x.log"), std::runtime_error);
+}
+
+TEST(LoggerTest, streamSink) {
+  std::ostringstream out;
+  Logger logger;
+  logger.addSink(std::make_shared<StreamLogSink>(out));
+  logger.log(LogLevel::Info, "a", "b");
+  logger.drain();
+  EXPECT_EQ(out.str(), "[INFO] a: b\n");
+}
+
+TEST(LoggerTest, manyProducersLoseNothing) {
+  Logger logger(1 << 15);
+  auto sink = std::make_shared<ListSink>();
+  logger.addSink(sink);
+  logger.startDraining(1);
+  std::vector<std::thread> producers;
+  for (int p = 0; p < 4; ++p) {
+    producers.emplace_back([&logger, p] {
+      for (int i = 0; i < 5000; ++i) {
+        logger.log(LogLevel::Info, "p" + std::to_string(p), std::to_string(i));
+      }
+    });
+  }
+  for (auto& producer : producers) producer.join();
+  logger.drain();
+  ASSERT_EQ(sink->lines.size() + logger.dropped(), 20000u);
+  // In the order of each producer.
+  std::map<std::string, int> last;
+  for (const std::string& line : sink->lines) {
+    const std::string who = line.substr(7, 2);
+    const int number = std::stoi(line.substr(11));
+    if (last.count(who)) EXPECT_GT(number, last[who]);
+    last[who] = number;
+  }
+}
+
+TEST(LoggerTest, throttle) {
+  LogThrottle throttle(1000);
+  EXPECT_TRUE(throttle.pass(0));
+  EXPECT_FALSE(throttle.pass(999));
+  EXPECT_TRUE(throttle.pass(1000));
+}
+
+}  // namespace
+}  // namespace ctrl_more

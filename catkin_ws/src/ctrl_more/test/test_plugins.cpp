@@ -1,0 +1,212 @@
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+
+#include "ctrl_more/prototypes.hpp"
+#include "test_support.hpp"
+
+namespace fs = std::filesystem;
+
+namespace ctrl_more {
+namespace {
+
+const std::string kPlugins = CTRL_MORE_TEST_PLUGIN_DIR;
+const std::string kController = CTRL_MORE_PLUGIN_DIR;
+
+std::string library(const std::string& name) { return kPlugins + "/lib" + name + ".so"; }
+
+struct Plugins : ::testing::Test {
+  Rig rig{0.0, false, false};
+  LoadReport load(const std::string& yaml, bool strict = false) {
+    return rig.manager->load(ConfigNode::fromText(yaml, "list.yaml"), kPlugins, strict);
+  }
+  void expectRefused(const std::string& yaml, const std::vector<std::string>& parts) {
+    const LoadReport report = load(yaml);
+    ASSERT_FALSE(report.ok()) << yaml;
+    for (const std::string& part : parts) {
+      EXPECT_TRUE(contains(report.text(), part)) << part << " not in: " << report.text();
+    }
+  }
+};
+
+TEST_F(Plugins, loadsRunsAndUnloads) {
+  ASSERT_TRUE(load("loadControllers: [Good]\nGood: {libPath: libgood.so, enabled: true}\n").ok());
+  EXPECT_NE(prototypes().find("Good"), nullptr);
+  rig.step();
+  EXPECT_EQ(rig.control.getZMP()[0], 1.0);
+  rig.manager->disable("Good");
+  rig.step();
+  ASSERT_TRUE(rig.manager->unload("Good"));
+  rig.step(2);
+  // The plan that still held the instance is freed with the next change.
+  rig.manager->enable();
+  EXPECT_EQ(prototypes().find("Good"), nullptr) << "the library is closed";
+  ASSERT_TRUE(load("loadControllers: [Good]\nGood: {libPath: libgood.so}\n").ok()) << "again";
+}
+
+TEST_F(Plugins, papersOwnMakerAndNames) {
+  rig.robot.declare(RobotSource::Measured, "imu", 9, "rad, rad/s, m/s^2", "imu");
+  ASSERT_TRUE(load("loadControllers: [MyController]\nMyController: {libPath: libpaper_maker.so, "
+                   "enabled: true}\n")
+                  .ok());
+  const auto used = rig.manager->getUsedControlStates();
+  EXPECT_EQ(used, (std::vector<std::string>{"centreOfMass/com", "zmp/zmp"}));
+}
+
+TEST_F(Plugins, addedRobotStateWithoutSizeMustExist) {
+  // "imu" has no declared size: the host has to declare it, or the load is refused in words.
+  const LoadReport report =
+      load("loadControllers: [MyController]\nMyController: {libPath: libpaper_maker.so}\n");
+  EXPECT_FALSE(report.ok());
+  EXPECT_TRUE(contains(report.text(), "declare it before loading")) << report.text();
+}
+
+TEST_F(Plugins, papersExampleFileIsRefusedWithLineAndSuggestion) {
+  const std::string paper =
+      "loadControllers: [Attitude , ZmpIP]\n"
+      "Compliant:\n"
+      "  libPath: /LIBPATH/locomotion/libfbkCtrlCompliant.so\n"
+      "  configFile: /PROJECTPATH/configs/compliant.yaml\n"
+      "ZmpIP:\n"
+      "  libPath: /LIBPATH/locomotion/libfbkCtrlZmpIP.so\n"
+      "  configFile: /PROJECTPATH/configs/zmpip.yaml\n"
+      "AttitudeMPCController:\n"
+      "  libPath: /LIBPATH/locomotion/libfbkCtrlAttitude.so\n"
+      "  configFile: /PROJECTPATH/configs/Attitude.yaml\n";
+  ASSERT_TRUE(load("loadControllers: [Good]\nGood: {libPath: libgood.so, enabled: true}\n").ok());
+  const LoadReport report = load(paper);
+  ASSERT_EQ(report.errors.size(), 2u);
+  EXPECT_TRUE(contains(report.errors[0], "list.yaml:1:")) << report.errors[0];
+  EXPECT_TRUE(contains(report.errors[0], "did you mean 'AttitudeMPCController'"));
+  EXPECT_TRUE(contains(report.errors[1], "zmpip.yaml")) << report.errors[1];
+  rig.step();
+  EXPECT_EQ(rig.control.getZMP()[0], 1.0) << "what was loaded keeps running";
+}
+
+TEST_F(Plugins, papersKeysWorkAsPrintedWithRealFiles) {
+  const std::string yaml = "loadControllers: [Attitude]\nAttitude:\n  libPath: " + kController +
+                           "/libctrl_more_attitude.so\n  configFile: " CTRL_MORE_SOURCE_DIR
+                           "/config/attitude.yaml\n";
+  const LoadReport report = load(yaml);
+  EXPECT_TRUE(report.ok()) << report.text();
+  EXPECT_EQ(report.loaded, std::vector<std::string>{"Attitude"});
+}
+
+TEST_F(Plugins, badLibrariesAreRefusedInWords) {
+  expectRefused("loadControllers: [A]\nA: {libPath: libmissing.so}\n",
+                {"list.yaml:2", "libPath", "libmissing.so", "tried"});
+  expectRefused("loadControllers: [A]\nA: {libPath: libnone.so}\n", {"registers no controller"});
+  expectRefused("loadControllers: [A]\nA: {libPath: libtwo.so}\n",
+                {"more than one controller", "First, Second", "type"});
+  expectRefused("loadControllers: [A]\nA: {libPath: libunresolved.so}\n", {"cannot be loaded"});
+  expectRefused("loadControllers: [A]\nA: {libPath: libthrowing.so}\n", {"no such camera"});
+  expectRefused("loadControllers: [A]\nA: {libPath: libwrong_type.so}\n",
+                {"'Registered'", "'Described'"});
+  expectRefused("loadControllers: [A]\nA: {libPath: libgood.so, type: God}\n",
+                {"no controller of type 'God'", "did you mean 'Good'"});
+  EXPECT_TRUE(prototypes().types().empty()) << "nothing stays behind";
+  EXPECT_TRUE(load("loadControllers: [A]\nA: {libPath: libtwo.so, type: Second}\n").ok());
+}
+
+TEST_F(Plugins, knownTypeNameIsRefusedAndTheFirstOneStays) {
+  ASSERT_TRUE(load("loadControllers: [Good]\nGood: {libPath: libgood.so, enabled: true}\n").ok());
+  expectRefused("loadControllers: [B]\nB: {libPath: libagain.so}\n", {"registered already", "Good"});
+  rig.step();
+  EXPECT_EQ(rig.control.getZMP()[0], 1.0);
+  EXPECT_NE(prototypes().find("Good"), nullptr);
+}
+
+TEST_F(Plugins, twoInstancesOfOneLibrary) {
+  ASSERT_TRUE(load("loadControllers: [left, right]\nleft: {libPath: libgood.so, enabled: true}\n"
+                   "right: {libPath: libgood.so, enabled: true}\n")
+                  .ok());
+  rig.step();
+  EXPECT_EQ(rig.control.getZMP()[0], 2.0);
+}
+
+TEST_F(Plugins, oneBadControllerDoesNotKeepOthersOut) {
+  const std::string yaml =
+      "loadControllers: [Bad, Good]\nBad: {libPath: libnone.so}\nGood: {libPath: libgood.so}\n";
+  const LoadReport strict = load(yaml, true);
+  EXPECT_FALSE(strict.ok());
+  EXPECT_TRUE(strict.loaded.empty());
+  EXPECT_TRUE(rig.manager->getControllersNames().empty());
+  const LoadReport lenient = load(yaml);
+  EXPECT_EQ(lenient.loaded, std::vector<std::string>{"Good"});
+  EXPECT_EQ(lenient.errors.size(), 1u);
+}
+
+TEST_F(Plugins, wrongFilesAreRefusedWithTheirLine) {
+  expectRefused("loadControllers: [Good]\nGood:\n  libPath: libgood.so\n  confgFile: x\n",
+                {"list.yaml:4", "confgFile", "did you mean 'configFile'"});
+  expectRefused("loadControllers: [Good]\nGood: {libPath: libgood.so, enabled: yess}\n",
+                {"true or false"});
+  expectRefused("loadControllers: [Good]\nGood: {libPath: libgood.so, on_fault: holdd}\n",
+                {"did you mean 'hold'"});
+  expectRefused("loadControllers: [Good]\nGood: {libPath: libgood.so, overrun_us: -1}\n",
+                {"negative"});
+  expectRefused("loadControllers: Good\n", {"list"});
+  expectRefused("LoadControllers: [Good]\n", {"loadControllers"});
+  expectRefused("[1, 2]\n", {"map"});
+  expectRefused("loadControllers: []\nsharedSignals: maybe\n", {"sharedSignals"});
+  expectRefused("loadControllers: []\nprofles: 3\n", {"did you mean 'profiles'"});
+  expectRefused("loadControllers: []\nprofiles: {dmp: [nobody]}\n", {"nobody"});
+  EXPECT_FALSE(rig.manager->load("/nowhere/list.yaml").ok());
+}
+
+TEST_F(Plugins, sharedSignalsCanBeRefused) {
+  expectRefused("loadControllers: [left, right]\nsharedSignals: refuse\n"
+                "left: {libPath: libgood.so, enabled: true}\n"
+                "right: {libPath: libgood.so, enabled: true}\n",
+                {"both modify zmp/zmp", "sharedSignals is refuse"});
+  EXPECT_TRUE(rig.manager->has("left"));
+  EXPECT_FALSE(rig.manager->has("right"));
+}
+
+TEST_F(Plugins, librariesAreFoundWithoutAbsolutePaths) {
+  const fs::path folder = fs::path(::testing::TempDir()) / "ctrl_more_search";
+  fs::create_directories(folder / "share_root/my_pkg");
+  fs::copy_file(library("good"), folder / "share_root/my_pkg/libgood_there.so",
+                fs::copy_options::overwrite_existing);
+  // package://
+  setenv("ROS_PACKAGE_PATH", (folder / "share_root").c_str(), 1);
+  EXPECT_TRUE(load("loadControllers: [a]\na: {libPath: 'package://my_pkg/libgood_there.so'}\n").ok());
+  rig.manager->unload("a");
+  // searchPath of the file, relative to it
+  const LoadReport relative = rig.manager->load(
+      ConfigNode::fromText("loadControllers: [a]\nsearchPath: [share_root/my_pkg]\n"
+                           "a: {libPath: libgood_there.so}\n", "x.yaml"),
+      folder.string());
+  EXPECT_TRUE(relative.ok()) << relative.text();
+  rig.manager->unload("a");
+  // environment
+  setenv("CTRL_MORE_PATH", (folder / "share_root/my_pkg").c_str(), 1);
+  EXPECT_TRUE(load("loadControllers: [a]\na: {libPath: libgood_there.so}\n").ok());
+  unsetenv("CTRL_MORE_PATH");
+  unsetenv("ROS_PACKAGE_PATH");
+  // by type alone: the library is named after it
+  setenv("CTRL_MORE_PATH", kController.c_str(), 1);
+  const LoadReport by_type = load("loadControllers: [JointLimits]\nJointLimits: {}\n");
+  EXPECT_TRUE(by_type.ok()) << by_type.text();
+  unsetenv("CTRL_MORE_PATH");
+  EXPECT_FALSE(load("loadControllers: [Nowhere]\nNowhere: {}\n").ok());
+}
+
+TEST_F(Plugins, shippedListAndProfilesLoad) {
+  setenv("CTRL_MORE_PATH", kController.c_str(), 1);
+  const LoadReport report = rig.manager->load(CTRL_MORE_SOURCE_DIR "/config/feedback.yaml", true);
+  unsetenv("CTRL_MORE_PATH");
+  ASSERT_TRUE(report.ok()) << report.text();
+  EXPECT_FALSE(rig.manager->isEnabled("ee_admittance")) << "ships loaded and disabled";
+  EXPECT_TRUE(rig.manager->isEnabled("joint_limits"));
+  EXPECT_EQ(rig.manager->getProfiles(), (std::vector<std::string>{"dmp", "dmp_compliant", "ptp"}));
+  rig.manager->applyProfile("dmp_compliant");
+  EXPECT_TRUE(rig.manager->isEnabled("ee_admittance"));
+  rig.manager->applyProfile("dmp");
+  EXPECT_FALSE(rig.manager->isEnabled("ee_admittance"));
+  EXPECT_TRUE(rig.manager->isEnabled("joint_limits"));
+  EXPECT_TRUE(rig.manager->reloadGains("ee_admittance"));
+}
+
+}  // namespace
+}  // namespace ctrl_more

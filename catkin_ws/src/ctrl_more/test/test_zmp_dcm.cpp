@@ -1,0 +1,93 @@
+#include "controller_rig.hpp"
+
+namespace ctrl_more {
+namespace {
+
+constexpr double kDt = 0.005;
+
+// Linear inverted pendulum with the ZMP held over a cycle, in its divergent component:
+// xi_{k+1} = p + (xi_k - p) exp(w T).
+double dcmAfter(double k, double height, double e0, int cycles, ControllerRig& rig) {
+  const double w = std::sqrt(9.80665 / height);
+  EXPECT_TRUE(rig.load("zmp_dcm", "mode: dcm\nk: " + std::to_string(k) + "\nheight: " +
+                                      std::to_string(height) + "\nsupport_box: 1\n"));
+  double xi = e0;
+  for (int i = 0; i < cycles; ++i) {
+    // Position zero: all of the divergent component is in the velocity.
+    rig.robot.setEstimatedData("com", vectorOf({0, 0, 0, xi * w, 0, 0}), rig.cycle.now_ns);
+    rig.setReferences();
+    rig.cycleOnce(kDt);
+    const double p = rig.control.getZMP().x();
+    xi = p + (xi - p) * std::exp(w * kDt);
+  }
+  return xi;
+}
+
+TEST(ZmpDcmTest, errorDecaysAsTheClosedFormSays) {
+  ControllerRig rig;
+  const double k = 20, height = 0.8, w = std::sqrt(9.80665 / height);
+  const int n = 100;
+  const double expected = 0.01 * std::pow(1 - (std::exp(w * kDt) - 1) * k / w, n);
+  EXPECT_NEAR(dcmAfter(k, height, 0.01, n, rig), expected, 1e-13);
+}
+
+TEST(ZmpDcmTest, stableExactlyBelowTheBound) {
+  const double height = 0.8, w = std::sqrt(9.80665 / height);
+  const double bound = 2 * w / (std::exp(w * kDt) - 1);
+  EXPECT_NEAR(bound, 396.0, 1.0);
+  ControllerRig below, above;
+  EXPECT_LT(std::abs(dcmAfter(0.99 * bound, height, 1e-6, 200, below)), 1e-6);
+  EXPECT_GT(std::abs(dcmAfter(1.01 * bound, height, 1e-6, 200, above)), 1e-6);
+}
+
+TEST(ZmpDcmTest, staysInTheSupportBox) {
+  ControllerRig rig;
+  ASSERT_TRUE(rig.load("zmp_dcm", "k: 10\nsupport_box: [0.05, 0.12, 0.03, 0.04]\n"));
+  for (const double side : {1.0, -1.0}) {
+    rig.robot.setEstimatedData("com", vectorOf({side, side, 0, 0, 0, 0}), rig.cycle.now_ns);
+    rig.setReferences();
+    rig.cycleOnce();
+    EXPECT_EQ(rig.control.getZMP().x(), side > 0 ? 0.12 : -0.05);
+    EXPECT_EQ(rig.control.getZMP().y(), side > 0 ? 0.04 : -0.03);
+  }
+}
+
+TEST(ZmpDcmTest, zmpIpFollowsItsClosedForm) {
+  ControllerRig rig;
+  const double kc = 6.0, ki = 3.5, disturbance = 0.01;
+  ASSERT_TRUE(rig.load("zmp_dcm", "mode: zmp_ip\nkc: 6\nki: 3.5\nmax_offset: 0.3\n"));
+  double com = 0.0;
+  for (int i = 1; i <= 600; ++i) {
+    // Quasi-static: the ZMP stands under the centre of mass, plus a constant disturbance.
+    rig.robot.setEstimatedData("zmp", vectorOf({com + disturbance, 0, 0}), rig.cycle.now_ns);
+    rig.setReferences();
+    rig.cycleOnce(kDt);
+    com = rig.control.getCoM().x();
+    const double exact =
+        -disturbance / (1 + kc) * (1 - std::pow(1 - ki * kDt * (1 + kc), i));
+    ASSERT_NEAR(com, exact, 1e-14);
+  }
+  EXPECT_NEAR(com, -disturbance / 7, 1e-9);
+  EXPECT_NEAR(rig.control.getZMP().x(), -kc * com, 1e-9);
+}
+
+TEST(ZmpDcmTest, zmpIpIsNotAlwaysAtItsLimitAndStaysFinite) {
+  for (const double d : {0.0, 0.01, -0.01}) {
+    ControllerRig rig;
+    ASSERT_TRUE(rig.load("zmp_dcm", "mode: zmp_ip\n"));
+    for (int i = 0; i < 5; ++i) {
+      rig.robot.setEstimatedData("zmp", vectorOf({d, 0, 0}), rig.cycle.now_ns);
+      rig.setReferences();
+      rig.cycleOnce(kDt);
+      ASSERT_TRUE(rig.control.getCoM().allFinite());
+    }
+    if (d == 0.0) EXPECT_EQ(rig.control.getCoM().x(), 0.0);
+    if (d != 0.0) {
+      EXPECT_LT(rig.control.getCoM().x() * d, 0.0);
+      EXPECT_LT(std::abs(rig.control.getCoM().x()), 0.05);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace ctrl_more
