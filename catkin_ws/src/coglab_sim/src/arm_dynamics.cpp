@@ -73,7 +73,10 @@ ArmDynamics::Law ArmDynamics::servoLaw(const ServoCommand& command, double dt) c
 
       Vector6 error;
       error << command.frame.position - terms_.tip.position, rotationBetween(terms_.tip.rotation, command.frame.rotation);
-      const Vector6 force = command.frame_stiffness.cwiseProduct(error) + command.force;
+      Vector6 wanted;
+      wanted << command.frame_velocity.linear, command.frame_velocity.angular;
+      const Vector6 force =
+          command.frame_stiffness.cwiseProduct(error) + damping.cwiseProduct(wanted) + command.force;
       law.constant = jacobian.transpose() * force;
       law.damping = jacobian.transpose() * (damping + dt * command.frame_stiffness).asDiagonal() * jacobian;
 

@@ -66,6 +66,8 @@ const MeasurementBytes& Cell::advance(bool on_time) {
   const double dt = period / steps;
   ServoCommand servo = command.servo;
   servo.velocity = (command.to - command.from) / period;
+  servo.frame_velocity.linear = (command.frame_to.position - command.frame_from.position) / period;
+  servo.frame_velocity.angular = rotationBetween(command.frame_from.rotation, command.frame_to.rotation) / period;
   for (int i = 1; i <= steps; ++i) {
     const double share = static_cast<double>(i) / steps;
     servo.position = command.from + share * (command.to - command.from);

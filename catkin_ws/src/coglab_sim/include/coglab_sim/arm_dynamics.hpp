@@ -37,6 +37,7 @@ struct ServoCommand {
   Vector7 stiffness = Vector7::Zero();     ///< Nm/rad (joint impedance)
   Vector7 damping = Vector7::Zero();       ///< normalised, 1 is critical
   Pose frame;                              ///< set-point of the tip in the world (Cartesian impedance)
+  Twist frame_velocity;                    ///< of that set-point
   Vector6 force = Vector6::Zero();         ///< added at the tip, world axes, N and Nm
   Vector6 frame_stiffness = Vector6::Zero();  ///< x y z (N/m) rx ry rz (Nm/rad), world axes
   Vector6 frame_damping = Vector6::Zero();    ///< normalised
