@@ -41,6 +41,13 @@ Bridge::Bridge(const BridgeConfig& config)
 
 bool Bridge::answer(const std::uint8_t* datagram, std::size_t size, std::int64_t now_ns,
                     fri::CommandDatagram& answer) {
+  if (!compute(datagram, size, now_ns, answer)) return false;
+  publish();
+  return true;
+}
+
+bool Bridge::compute(const std::uint8_t* datagram, std::size_t size, std::int64_t now_ns,
+                     fri::CommandDatagram& answer) {
   const fri::Reception reception = session_.receive(datagram, size, measurement_);
   if (reception.verdict != fri::Verdict::Accepted) return false;
 
@@ -80,7 +87,6 @@ bool Bridge::answer(const std::uint8_t* datagram, std::size_t size, std::int64_t
   configurator_.write(answer.krl);
   answer.header = session_.nextHeader();
   sent_[answer.header.counter % sent_.size()] = {answer.header.counter, true, interpolator_.velocity()};
-  publish();
   return true;
 }
 

@@ -51,9 +51,8 @@ std::int64_t steadyNow() {
 
 struct FriThread::Batch {
   std::uint8_t bytes[kBatch][kBuffer];
+  ssize_t size[kBatch];
   sockaddr_in from[kBatch];
-  iovec vectors[kBatch];
-  mmsghdr messages[kBatch];
 };
 
 FriThread::FriThread(Bridge& bridge, FriThreadOptions options) : bridge_(bridge), options_(std::move(options)) {}
@@ -105,18 +104,26 @@ void FriThread::run() {
 
   Batch batch;
   std::memset(&batch, 0, sizeof batch);
-  std::int64_t last_tick = steadyNow();
+  const auto receive = [&](int slot, int flags) {
+    socklen_t length = sizeof batch.from[slot];
+    batch.size[slot] = recvfrom(socket_, batch.bytes[slot], kBuffer, flags,
+                                reinterpret_cast<sockaddr*>(&batch.from[slot]), &length);
+    return batch.size[slot] >= 0;
+  };
+  std::int64_t last_tick = steadyNow(), last_receive = last_tick;
   while (!stopping_.load(std::memory_order_relaxed)) {
-    for (int i = 0; i < kBatch; ++i) {
-      batch.vectors[i] = {batch.bytes[i], kBuffer};
-      msghdr& header = batch.messages[i].msg_hdr;
-      header.msg_name = &batch.from[i];
-      header.msg_namelen = sizeof batch.from[i];
-      header.msg_iov = &batch.vectors[i];
-      header.msg_iovlen = 1;
-    }
-    const int received = recvmmsg(socket_, batch.messages, kBatch, MSG_WAITFORONE, nullptr);
+    int received = receive(0, 0) ? 1 : 0;
+    const int error = received > 0 ? 0 : errno;
     const std::int64_t now = steadyNow();
+    if (received > 0) {
+      // Only a datagram that comes off the beat may have others behind it; on the beat there is nothing to look for.
+      const auto interval = static_cast<double>(now - last_receive);
+      const double cycle_ns = 1e9 * bridge_.cycleTime();
+      last_receive = now;
+      if (interval < 0.5 * cycle_ns || interval > 1.5 * cycle_ns) {
+        while (received < kBatch && receive(received, MSG_DONTWAIT)) ++received;
+      }
+    }
     const std::uint64_t before = answers_.load(std::memory_order_relaxed);
     if (received > 0) serve(batch, received, now);
     if (answers_.load(std::memory_order_relaxed) != before) {
@@ -127,7 +134,7 @@ void FriThread::run() {
       if (!bridge_.connected()) peer_.store(0, std::memory_order_relaxed);
       if (options_.after_answer) options_.after_answer(false);
     }
-    if (received < 0 && errno != EAGAIN && errno != EWOULDBLOCK && errno != EINTR) {
+    if (error != 0 && error != EAGAIN && error != EWOULDBLOCK && error != EINTR) {
       // Such as an unreachable port reported back by the network: nothing to do but not to spin.
       timespec pause{0, 1'000'000};
       nanosleep(&pause, nullptr);
@@ -150,9 +157,10 @@ void FriThread::serve(Batch& batch, int received, std::int64_t now_ns) {
       continue;
     }
     fri::CommandDatagram answer;
-    if (!bridge_.answer(batch.bytes[i], batch.messages[i].msg_len, now_ns, answer)) continue;
+    if (!bridge_.compute(batch.bytes[i], static_cast<std::size_t>(batch.size[i]), now_ns, answer)) continue;
     const ssize_t sent = sendto(socket_, &answer, sizeof answer, 0, reinterpret_cast<sockaddr*>(&batch.from[i]),
                                 sizeof batch.from[i]);
+    bridge_.publish();
     if (sent != static_cast<ssize_t>(sizeof answer)) send_errors_.fetch_add(1, std::memory_order_relaxed);
     answered = true;
     peer_.store(from, std::memory_order_relaxed);

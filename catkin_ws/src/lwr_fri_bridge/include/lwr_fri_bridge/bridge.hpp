@@ -86,11 +86,18 @@ class Bridge {
   /// Returns false if the datagram deserves none (see fri::Verdict); it is counted.
   bool answer(const std::uint8_t* datagram, std::size_t size, std::int64_t now_ns, fri::CommandDatagram& answer);
 
+  /// The two halves of answer(), for who wants to send in between: compute() fills the answer, publish() then shows the tick to the
+  /// other threads. publish() only after a compute() that returned true.
+  bool compute(const std::uint8_t* datagram, std::size_t size, std::int64_t now_ns, fri::CommandDatagram& answer);
+  void publish();
+
   /// To be called when no datagram came for some time: time limits go on, silence becomes `disconnected`.
   void idle(std::int64_t now_ns);
 
   /// Whether datagrams have come within the receive time limit, as of the last answer() or idle().
   bool connected() const { return connected_; }
+  /// FRI period of the newest measurement, s; 0 before the first. FRI thread only.
+  double cycleTime() const { return sample_.cycle_time; }
 
   // --- control thread
 
@@ -140,7 +147,6 @@ class Bridge {
   Vector7 targetVelocity();
   double leashLength() const;
   void fillMode(fri::CommandDatagram& answer) const;
-  void publish();
 
   const BridgeConfig config_;
   ControlPort port_;
