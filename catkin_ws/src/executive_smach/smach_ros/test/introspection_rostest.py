@@ -140,6 +140,28 @@ class TestSection11(unittest.TestCase):
         self.assertEqual(root.header.frame_id, "")
         self.assertLess(abs((rospy.Time.now() - root.header.stamp).to_sec()), LIMIT)
 
+    def test_s12_what_a_viewer_needs(self):
+        self.start()
+        self.gate.open.set()
+        self.root.execute()
+        self.assertTrue(wait_for(lambda: "END end" in self.viewer.infos("/SM_ROOT")))
+        self.assertTrue(wait_for(lambda: len({m.path for m in self.viewer.structures}) == 4))
+        children = {message.path: message.children for message in self.viewer.structures}
+        for path in children:
+            parent, label = path.rsplit("/", 1)
+            self.assertTrue(parent == "" or label in children[parent], path)
+        for message in self.viewer.structures:
+            edges = (message.internal_outcomes, message.outcomes_from, message.outcomes_to)
+            self.assertEqual(len({len(part) for part in edges}), 1)
+        for status in self.viewer.statuses:
+            self.assertIn(status.path, children)
+            self.assertLessEqual(set(status.active_states) - {"None"}, set(children[status.path]))
+            self.assertIsInstance(pickle.loads(base64.b64decode(status.local_data)), dict)
+        header = status._connection_header
+        self.assertEqual(header["type"], "smach_msgs/SmachContainerStatus")
+        self.assertEqual(header["md5sum"], "5ba2bb79ac19e3842d562a191f2a675b")
+        self.assertEqual(header.get("latching", "0"), "0")
+
     def test_s11_heartbeats_of_every_container(self):
         self.start()
         for path in ("/SM_ROOT", "/SM_ROOT/INNER", "/SM_ROOT/BOTH", "/SM_ROOT/EACH"):

@@ -70,7 +70,7 @@ def main():
     if kind.startswith("handler"):
         smach_ros.set_preempt_handler(machine)
     machine.register_start_cb(
-        lambda *args: threading.Timer(1.0, print, ["READY"], {"flush": True}).start()
+        lambda *args: threading.Timer(0.5, print, ["READY"], {"flush": True}).start()
     )
     if kind == "handler_in_main_thread":
         print("OUTCOME", machine.execute(), flush=True)

@@ -15,7 +15,7 @@ __rmatmul__ __truediv__ __rtruediv__ __floordiv__ __rfloordiv__ __mod__ __rmod__
 __rdivmod__ __pow__ __rpow__ __lshift__ __rlshift__ __rshift__ __rrshift__ __and__ __rand__ __or__
 __ror__ __xor__ __rxor__ __lt__ __le__ __gt__ __ge__ __enter__ __exit__
 """.split()
-_REFUSED = "__setitem__ __delitem__ __set__ __delete__".split()
+_REFUSED = ("__setitem__", "__delitem__")
 
 _target = object.__getattribute__
 _classes: weakref.WeakKeyDictionary[type, type] = weakref.WeakKeyDictionary()

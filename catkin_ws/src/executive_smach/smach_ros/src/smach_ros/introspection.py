@@ -102,6 +102,17 @@ class _Watched:
         return message
 
 
+class _Newcomers(rospy.SubscribeListener):
+    """Tells the server when a viewer has connected."""
+
+    def __init__(self, server: IntrospectionServer) -> None:
+        super().__init__()
+        self._server = server
+
+    def peer_subscribe(self, topic_name: str, topic_publish: Any, peer_publish: Any) -> None:
+        self._server._welcome()
+
+
 class IntrospectionServer:
     """Publishes structure and status of a machine and all containers in it, from one thread.
 
@@ -122,6 +133,7 @@ class IntrospectionServer:
         self._backlog: deque[tuple[SmachContainerStatus, dict]] = deque()
         self._dropped = 0
         self._changed = threading.Condition()
+        self._newcomer = False
         self._running = False
         self._thread: threading.Thread | None = None
         self._status_pub: rospy.Publisher | None = None
@@ -138,11 +150,12 @@ class IntrospectionServer:
         if not self._watched:
             self.construct(self._server_name, self._state, self._path)
         queue_size = max(100, 4 * len(self._watched))
+        options = {"queue_size": queue_size, "subscriber_listener": _Newcomers(self)}
         self._status_pub = rospy.Publisher(
-            self._server_name + STATUS_TOPIC, SmachContainerStatus, queue_size=queue_size
+            self._server_name + STATUS_TOPIC, SmachContainerStatus, **options
         )
         self._structure_pub = rospy.Publisher(
-            self._server_name + STRUCTURE_TOPIC, SmachContainerStructure, queue_size=queue_size
+            self._server_name + STRUCTURE_TOPIC, SmachContainerStructure, **options
         )
         self._running = True
         for watched in self._watched:
@@ -217,9 +230,10 @@ class IntrospectionServer:
         beat = time.monotonic()
         while True:
             with self._changed:
-                while self._running and not self._backlog and time.monotonic() < beat:
+                while not self._work_to_do() and time.monotonic() < beat:
                     self._changed.wait(max(0.0, beat - time.monotonic()))
-                running = self._running
+                running, newcomer = self._running, self._newcomer
+                self._newcomer = False
                 items, dropped = list(self._backlog), self._dropped
                 self._backlog.clear()
                 self._dropped = 0
@@ -235,7 +249,18 @@ class IntrospectionServer:
                     time.monotonic() > beat
                 ):  # the process was suspended: do not make up for lost beats
                     beat = time.monotonic() + HEARTBEAT
+                newcomer = True
+            if newcomer:
                 self._publish_heartbeats()
+
+    def _work_to_do(self) -> bool:
+        return bool(self._backlog) or self._newcomer or not self._running
+
+    def _welcome(self) -> None:
+        """Somebody has just subscribed: show everything at once, not at the next beat."""
+        with self._changed:
+            self._newcomer = True
+            self._changed.notify()
 
     def _publish_heartbeats(self) -> None:
         for watched in self._watched:
