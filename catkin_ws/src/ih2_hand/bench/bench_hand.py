@@ -107,7 +107,8 @@ def request_time() -> list[Row]:
             poll = select.poll()
             poll.register(bare, select.POLLIN)
             plain = serial.Serial(port, timeout=0.05)
-            contestants = ((driver_sweep, driver), (bare_sweep, bare, poll), (pyserial_sweep, plain))
+            contestants = ((driver_sweep, driver), (bare_sweep, bare, poll),
+                           (pyserial_sweep, plain))
             for contestant in contestants * 3:
                 time_of(*contestant)
             times = [[time_of(*contestant) for contestant in contestants] for _ in range(BLOCKS)]
@@ -118,7 +119,8 @@ def request_time() -> list[Row]:
     finally:
         emulator.terminate()
         emulator.wait(10)
-    ours, bare_us, pyserial_us = (statistics.median(column) for column in zip(*times))
+    ours, bare_us, pyserial_us = (statistics.median(column)
+                                  for column in zip(*times, strict=True))
     ratio = statistics.median(block[0] / block[1] for block in times)
     pyserial_ratio = statistics.median(block[0] / block[2] for block in times)
     wire_us = (3 + 3 + 4) / 3 * 10 / WIRE.baud * 1e6

@@ -63,7 +63,6 @@ def main() -> int:
     arguments, announce = sys.argv[1:], None
     if as_node:
         import rospy
-
         from ih2_hand.ros.emulator_node import EmulatorNode
         rospy.init_node("hand_emulator", disable_signals=True)
         arguments, announce = rospy.myargv(sys.argv)[1:], EmulatorNode.announce

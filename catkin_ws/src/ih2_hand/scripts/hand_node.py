@@ -4,7 +4,6 @@
 import sys
 
 import rospy
-
 from ih2_hand.ros.hand_node import HandNode
 
 

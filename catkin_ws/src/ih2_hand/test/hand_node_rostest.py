@@ -89,7 +89,7 @@ class HandNode(unittest.TestCase):
         self.assertTrue(result.isOk, result.message)
         self.assertEqual(self.state("hand_preshape"), GoalStatus.SUCCEEDED)
         positions = [motor.position for motor in self.hand.fresh_status().motors]
-        for position, target in zip(positions, (245, 5, 30, 50, 50)):
+        for position, target in zip(positions, (245, 5, 30, 50, 50), strict=True):
             self.assertLessEqual(abs(position - target), 4)
         result = self.hand.run("hand_preshape_close")
         self.assertTrue(result.isOk, result.message)

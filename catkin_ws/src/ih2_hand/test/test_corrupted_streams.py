@@ -2,8 +2,8 @@
 
 A stream is a handful of calls during which one byte, in either direction, is lost, doubled, flipped
 or preceded by a stray byte. The truth is read from the emulated motors at every request. Bursts
-that hit one value twice are beyond a protocol without checksums: two equal lies look like the truth.
-They are counted in a campaign of their own.
+that hit one value twice are beyond a protocol without checksums: two equal lies look like the
+truth. They are counted in a campaign of their own.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Driver and emulated hand together in virtual time: pacing, calibration, grasps, resynchronising."""
+"""Driver and emulated hand together in virtual time: pacing, calibration, grasps, slips."""
 
 from __future__ import annotations
 

@@ -18,8 +18,12 @@ from ih2_hand.driver import HandSerialDriver
 from ih2_hand.emulator.faults import Faults
 from ih2_hand.emulator.hand import EmulatedHand
 from ih2_hand.emulator.pty_server import PtyServer
-from ih2_hand.errors import (HandCalibratingError, HandConnectionLost, HandPortError,
-                             HandTimeoutError)
+from ih2_hand.errors import (
+    HandCalibratingError,
+    HandConnectionLost,
+    HandPortError,
+    HandTimeoutError,
+)
 
 
 @pytest.fixture
@@ -226,8 +230,8 @@ def test_no_permission(server):
     """)
     if os.geteuid() != 0:
         pytest.skip("needs root to become a user without permission")
-    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, timeout=30,
-                          check=False)
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True,
+                          timeout=30, check=False)
     assert "no permission for" in done.stdout, done.stderr
     assert "dialout" in done.stdout
 
@@ -249,7 +253,8 @@ def test_not_a_url():
 
 
 @pytest.mark.parametrize(("ports", "words"), [
-    ([], "no serial device found"), (["/dev/ttyUSB0", "/dev/ttyUSB1"], "/dev/ttyUSB0, /dev/ttyUSB1")])
+    ([], "no serial device found"),
+    (["/dev/ttyUSB0", "/dev/ttyUSB1"], "/dev/ttyUSB0, /dev/ttyUSB1")])
 def test_the_only_port(monkeypatch, ports, words):
     monkeypatch.setattr(transport, "serial_ports", lambda: ports)
     with pytest.raises(HandPortError, match=words):

@@ -5,8 +5,15 @@ from __future__ import annotations
 from types import SimpleNamespace
 
 import pytest
-from ih2_hand.progress import (CloseTask, GraspTask, OpenTask, PreshapeTask, refuse_calibration,
-                               shown_empty, shown_holding)
+from ih2_hand.progress import (
+    CloseTask,
+    GraspTask,
+    OpenTask,
+    PreshapeTask,
+    refuse_calibration,
+    shown_empty,
+    shown_holding,
+)
 from ih2_hand.status import decode_status
 
 

@@ -48,6 +48,6 @@ def test_script_explains_hex():
                           capture_output=True, text=True, timeout=30, check=True)
     assert "SetFingerPosition motor 4 to 100" in done.stdout
     assert "grasp cylindrical medium" in done.stdout
-    bad = subprocess.run([sys.executable, str(script), "--hex", "4"], capture_output=True, text=True,
-                         timeout=30, check=False)
+    bad = subprocess.run([sys.executable, str(script), "--hex", "4"], capture_output=True,
+                         text=True, timeout=30, check=False)
     assert bad.returncode == 2 and "pairs of hex digits" in bad.stderr

@@ -8,10 +8,24 @@ from typing import Any
 
 from ih2_hand import frames, grasps
 from ih2_hand.clock import Clock
-from ih2_hand.errors import (HandCalibratingError, HandCalibrationError, HandConnectionLost,
-                             HandPortError, NoForceSensorError, NoGraspModeError)
-from ih2_hand.line import (ANALOGUE_SLACK, POSITION_SLACK, STATUS_SLACK, HandLine, LineCounters,
-                           Slack, TraceHook, status_request)
+from ih2_hand.errors import (
+    HandCalibratingError,
+    HandCalibrationError,
+    HandConnectionLost,
+    HandPortError,
+    NoForceSensorError,
+    NoGraspModeError,
+)
+from ih2_hand.line import (
+    ANALOGUE_SLACK,
+    POSITION_SLACK,
+    STATUS_SLACK,
+    HandLine,
+    LineCounters,
+    Slack,
+    TraceHook,
+    status_request,
+)
 from ih2_hand.status import at_rest, decode_status
 from ih2_hand.transport import SerialTransport, Transport
 from ih2_hand.wire_choices import WIRE
@@ -281,7 +295,7 @@ class HandSerialDriver:
         self._command(self._grasp, WIRE.posture_spacing_s)
 
 
-handSerialDriver = HandSerialDriver  # noqa: N816  the name in Table 2
+handSerialDriver = HandSerialDriver
 
 
 def _whole(name: str, value: int, largest: int) -> None:

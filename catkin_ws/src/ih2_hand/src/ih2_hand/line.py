@@ -223,10 +223,11 @@ class HandLine:
                 self._flush("readings contradict each other")
                 first = None
         self.counters.failures += 1
+        seen = ", ".join(str(number) for number in readings) or "no valid one"
         raise HandInconsistentError(
-            f"readings of `{frame.hex(' ')}` on {self.port} contradict each other "
-            f"({', '.join(str(number) for number in readings) or 'no valid one'}; last byte received "
-            f"{format_byte(self.transport.last_byte)}): the line is disturbed; check cable, ground and supply")
+            f"readings of `{frame.hex(' ')}` on {self.port} contradict each other ({seen}; last "
+            f"byte received {format_byte(self.transport.last_byte)}): the line is disturbed; check "
+            "cable, ground and supply")
 
 
 def status_request(motor: int) -> bytes:

@@ -97,8 +97,8 @@ class Task:
         """Verdict on a poll that began `elapsed` s after the command."""
         bus = [motor.motor for motor in motors if motor.com_error]
         if bus:
-            return Verdict(f"internal bus error of {_names(bus)}: cycle the hand's power", done=True,
-                           stop=True)
+            return Verdict(f"internal bus error of {_names(bus)}: cycle the hand's power",
+                           done=True, stop=True)
         self._stall.update(motors, elapsed)
         return self._judge(motors, elapsed)
 
@@ -282,8 +282,8 @@ class GraspTask(Task):
             if all(motor.fully_closed for motor in closing):
                 return Verdict("closed without meeting an object", done=True, ok=True,
                                holding=False)
-            return Verdict("the hand did not begin to close: it is probably not calibrated; publish "
-                           "`fast` on hand_calibration", done=True, stop=True)
+            return Verdict("the hand did not begin to close: it is probably not calibrated; "
+                           "publish `fast` on hand_calibration", done=True, stop=True)
         return Verdict("taking the preshape")
 
 

@@ -171,13 +171,23 @@ def _open(port: str) -> Any:
         if "://" in port:
             return serial.serial_for_url(port, baudrate=WIRE.baud, timeout=WIRE.read_timeout_s,
                                          write_timeout=WRITE_TIMEOUT_S)
-        return serial.Serial(port, baudrate=WIRE.baud, timeout=WIRE.read_timeout_s,
-                             write_timeout=WRITE_TIMEOUT_S, exclusive=True)
+        device = serial.Serial(port, baudrate=WIRE.baud, timeout=WIRE.read_timeout_s,
+                               write_timeout=WRITE_TIMEOUT_S, exclusive=True)
     except ValueError as error:
         raise HandPortError(f"{port!r} is not a port: give a device, a pty or socket://host:port "
                             f"({error})") from error
     except (OSError, serial.SerialException) as error:
         raise HandPortError(_why_not(port, error)) from error
+    _shorten_latency(device)
+    return device
+
+
+def _shorten_latency(device: serial.Serial) -> None:
+    """USB adapters may hold each answer back for 16 ms; ask the kernel for 1 ms instead."""
+    try:
+        device.set_low_latency_mode(True)
+    except (AttributeError, OSError, ValueError):
+        pass  # a pty, or an adapter without that knob
 
 
 def _why_not(port: str, error: Exception) -> str:

@@ -51,7 +51,8 @@ TABLE: tuple[Choice, ...] = (
            GUIDE, "the stream slips"),
     Choice("W10", "resync_filler", b"\x41" * 13,
            "StopALL, more often than any frame is long: completes whatever the hand waits for",
-           f"the hand waits for ever for the rest of a frame ({GUIDE})", "the line stays out of step"),
+           f"the hand waits for ever for the rest of a frame ({GUIDE})",
+           "the line stays out of step"),
     Choice("W10", "resync_wait_s", 0.020, "silence after the filler before the input is flushed",
            GUESS, "stale answers survive the flush; they are caught at the next request"),
     Choice("W11", "calibration_poll_s", 0.100, "period of the 4B 02 polls that find the end",
@@ -136,7 +137,8 @@ def as_markdown() -> str:
              "| --- | --- | --- | --- | --- | --- |"]
     for row in TABLE:
         if isinstance(row.value, bytes):
-            value = row.value.hex(" ") if len(row.value) < 4 else f"{row.value[0]:02x} x {len(row.value)}"
+            short = len(row.value) < 4
+            value = row.value.hex(" ") if short else f"{row.value[0]:02x} x {len(row.value)}"
         elif isinstance(row.value, dict):
             value = f"{len(row.value)} entries"
         else:

@@ -86,7 +86,7 @@ class EmulatedHand:
         if len(positions) != WIRE.motors or len(stiffness) != WIRE.motors:
             raise ValueError(f"contact needs {WIRE.motors} positions and stiffnesses; got "
                              f"{len(positions)} and {len(stiffness)}")
-        for motor, position, stiff in zip(self.motors, positions, stiffness):
+        for motor, position, stiff in zip(self.motors, positions, stiffness, strict=True):
             if not 0 <= position <= FREE or not stiff >= 0.0:
                 raise ValueError("contact position must be 0..255 and stiffness not negative; got "
                                  f"{position} and {stiff} for motor {motor.number}")
@@ -255,7 +255,7 @@ class EmulatedHand:
 
     def _posture(self, positions: Sequence[int]) -> None:
         self._busy_until = self.clock.monotonic() + WIRE.posture_spacing_s
-        for motor, position in zip(self.motors, positions):
+        for motor, position in zip(self.motors, positions, strict=True):
             motor.go_to(position)
 
     def _grasp_v17(self, frame: bytes) -> None:

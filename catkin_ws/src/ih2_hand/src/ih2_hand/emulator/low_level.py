@@ -1,4 +1,4 @@
-"""Low-level (LLMC) frames `5F MA cmd [data] MA` of the simulated hand; a normal driver needs two."""
+"""Low-level (LLMC) frames `5F MA cmd [data] MA` of the simulated hand."""
 
 from __future__ import annotations
 

@@ -19,7 +19,7 @@ SPEED_CURRENT = 60.0
 STALL_CURRENT = 1000.0
 """Counts at standstill under full PWM; in proportion to the speed setting."""
 POSITION_STALL_CURRENT = 640.0
-"""Counts at standstill in position mode: below the trip, so that a blocked posture keeps pushing."""
+"""Counts at standstill in position mode: below the trip: a blocked posture keeps pushing."""
 TRIP_COUNTS = (504.0, 730.0, 730.0, 730.0, 730.0)
 """Over-current limit by motor: 0.41 A x 1230 for the abduction, 0.81 A x 901 for flexion."""
 TRIP_TIME_S = 1.0

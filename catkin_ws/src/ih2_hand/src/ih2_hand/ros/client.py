@@ -8,10 +8,19 @@ from typing import Any
 
 import actionlib
 import rospy
-from coglab_msgs.msg import (FingerContact, FingerPositions, HandCloseAction, HandCloseGoal,
-                             HandOpenAction, HandOpenGoal, HandPreshapeAction,
-                             HandPreshapeCloseAction, HandPreshapeCloseGoal, HandPreshapeGoal,
-                             HandStatus)
+from coglab_msgs.msg import (
+    FingerContact,
+    FingerPositions,
+    HandCloseAction,
+    HandCloseGoal,
+    HandOpenAction,
+    HandOpenGoal,
+    HandPreshapeAction,
+    HandPreshapeCloseAction,
+    HandPreshapeCloseGoal,
+    HandPreshapeGoal,
+    HandStatus,
+)
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 from std_srvs.srv import Trigger

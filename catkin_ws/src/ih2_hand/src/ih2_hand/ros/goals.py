@@ -17,11 +17,21 @@ from typing import Any
 
 import actionlib
 import rospy
-from coglab_msgs.msg import (HandCloseAction, HandCloseFeedback, HandCloseResult, HandOpenAction,
-                             HandOpenFeedback, HandOpenResult, HandPreshapeAction,
-                             HandPreshapeCloseAction, HandPreshapeCloseFeedback,
-                             HandPreshapeCloseResult, HandPreshapeFeedback, HandPreshapeResult,
-                             HandStatus)
+from coglab_msgs.msg import (
+    HandCloseAction,
+    HandCloseFeedback,
+    HandCloseResult,
+    HandOpenAction,
+    HandOpenFeedback,
+    HandOpenResult,
+    HandPreshapeAction,
+    HandPreshapeCloseAction,
+    HandPreshapeCloseFeedback,
+    HandPreshapeCloseResult,
+    HandPreshapeFeedback,
+    HandPreshapeResult,
+    HandStatus,
+)
 
 from ih2_hand.errors import HandError
 from ih2_hand.progress import Task, Verdict

@@ -14,10 +14,25 @@ from std_srvs.srv import Trigger, TriggerResponse
 
 from ih2_hand import grasps
 from ih2_hand.driver import HandSerialDriver
-from ih2_hand.errors import (HandCalibratingError, HandConnectionLost, HandError,
-                             HandInconsistentError, HandPortError, HandTimeoutError)
-from ih2_hand.progress import (CloseTask, GraspTask, OpenTask, PreshapeTask, Task, Verdict,
-                               refuse_calibration, shown_empty, shown_holding)
+from ih2_hand.errors import (
+    HandCalibratingError,
+    HandConnectionLost,
+    HandError,
+    HandInconsistentError,
+    HandPortError,
+    HandTimeoutError,
+)
+from ih2_hand.progress import (
+    CloseTask,
+    GraspTask,
+    OpenTask,
+    PreshapeTask,
+    Task,
+    Verdict,
+    refuse_calibration,
+    shown_empty,
+    shown_holding,
+)
 from ih2_hand.ros.diagnostics import Diagnostics
 from ih2_hand.ros.goals import GoalQueue
 from ih2_hand.ros.messages import joint_state, motor_status
@@ -117,7 +132,11 @@ class HandNode:
         if not self._port_setting.startswith("param:"):
             return self._port_setting
         name = self._port_setting[len("param:"):]
-        port = rospy.get_param(name, "")
+        try:
+            port = rospy.get_param(name, "")
+        except Exception as error:  # whatever the master's absence raises: try again later
+            raise HandPortError(f"parameter {name} cannot be read ({error}): is the ROS master "
+                                "there?") from error
         if not port:
             raise HandPortError(f"parameter {rospy.resolve_name(name)} is not set: start what "
                                 "publishes the hand's port there")
@@ -144,8 +163,14 @@ class HandNode:
             if self.driver is None and now >= next_connect:
                 self._connect()
                 next_connect = time.monotonic() + RECONNECT_S
-            self._poll_once()
-            self._diagnostics.tick()
+            try:
+                self._poll_once()
+                self._diagnostics.tick()
+            except Exception as error:
+                if rospy.is_shutdown():
+                    return
+                rospy.logerr("hand: unexpected %s: %s", type(error).__name__, error)
+                self.lost(HandError(f"internal error: {error}"))
             # A late round moves the grid: there is no use in catching up on polls.
             next_time = max(next_time + period, time.monotonic())
             self._ended.wait(next_time - time.monotonic())
@@ -202,8 +227,8 @@ class HandNode:
             task = PreshapeTask(goal.mode, goal.level, self._is_current, self._limit)
         else:
             if self._preshape is None:
-                raise ValueError("the hand is not preshaped: call hand_preshape first (a hand_open, "
-                                 "hand_close, calibration or reconnection undoes it)")
+                raise ValueError("the hand is not preshaped: call hand_preshape first (hand_open, "
+                                 "hand_close, calibration or reconnection undo it)")
             task = GraspTask(grasps.CLOSING_MOTORS[self._preshape[0]], self._limit)
         if name != "hand_preshape_close":
             self._preshape = None
