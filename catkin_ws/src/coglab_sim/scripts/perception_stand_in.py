@@ -101,7 +101,11 @@ class PerceptionNode:
                                          "/coglab_sim/cell running?")
 
     def on_locate(self, request):
-        """Newest sight of an object or of the person's hand, fresh enough; else why not."""
+        """Newest sight of an object, of the person's hand or of the board, fresh enough; else why not."""
+        if request.object_id == self.board_frame:
+            response = LocateObjectResponse(success=True, frame_id=self.board_frame, age=0.0)
+            response.pose = self.pose(self.world, rospy.get_time(), self.board.frame)
+            return response
         if request.object_id == self.human_frame:
             name = self.human_frame
         else:

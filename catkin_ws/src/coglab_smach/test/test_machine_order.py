@@ -1,4 +1,5 @@
 """The machines walk in D4.10's order (section 3.2, Figures 3 to 8): asserted from the journal, not from the code."""
+import pytest
 from conftest import Trial
 
 
@@ -139,7 +140,9 @@ def test_take_order_with_preshape_before(trial):
                                      "coglab_home_robot"]
     assert set(trial.labels("/approach_board")) == {"locate_object", "move_to_board"}
     goal = trial.master.get_children()["take"].userdata.goal
-    assert goal["frame"] == "object_mug" and goal["offset"] == [0.0, -0.04, 0.05]
+    # In the board frame, from detection and database: the object as seen there, the grasp, 12 mm of clearance.
+    assert goal["frame"] == "board"
+    assert goal["offset"] == pytest.approx([0.78 - 0.45, 0.03 + 0.55 - 0.04 - 0.012, 0.43 - 0.05 + 0.05])
 
 
 def test_take_with_preshape_during_the_precise_motion():

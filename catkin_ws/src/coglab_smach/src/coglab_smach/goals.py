@@ -31,7 +31,7 @@ def palm_at_grasp(grasp: Mapping[str, Any], standoff: Optional[float] = None) ->
 
 def grasp_goal(entry: Mapping[str, Any], grasp: Mapping[str, Any], frame: str, role: str,
                standoff: Optional[float] = None) -> dict[str, Any]:
-    """Goal at the grasp pose relative to the object's frame. ``role`` names the primitive: receive or take."""
+    """Goal at the grasp pose relative to the object's tracked frame. ``role`` names the primitive."""
     return _goal(frame, palm_at_grasp(grasp, standoff), entry, role)
 
 
@@ -41,6 +41,10 @@ def delivery_goal(entry: Mapping[str, Any], grasp: Mapping[str, Any], delivery: 
     return _goal(frame, Pose.from_dict(delivery["pose"]) * palm_at_grasp(grasp, 0.0), entry, "give")
 
 
-def place_goal(entry: Mapping[str, Any], grasp: Mapping[str, Any], place: Mapping[str, Any]) -> dict[str, Any]:
-    """Goal that sets the held object down at a free place (pose of the object in the place's frame)."""
-    return _goal(place["frame"], Pose.from_dict(place) * palm_at_grasp(grasp, 0.0), entry, "put")
+def place_goal(entry: Mapping[str, Any], grasp: Mapping[str, Any], place: Mapping[str, Any], role: str,
+               clearance: float = 0.0) -> dict[str, Any]:
+    """Goal on the board: the palm at the grasp of an object whose pose in the board frame is ``place``.
+
+    ``role`` take: the object is there; put: it is held and is to be set down there. ``clearance`` (m) keeps the palm off.
+    """
+    return _goal(place["frame"], Pose.from_dict(place) * palm_at_grasp(grasp, clearance), entry, role)

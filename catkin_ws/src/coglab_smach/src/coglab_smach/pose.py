@@ -115,3 +115,12 @@ class Pose:
         if rpy.shape != (3,) or not np.all(np.isfinite(rpy)):
             raise ValueError(f"rpy_deg has three finite numbers in degrees, got {data.get('rpy_deg')}")
         return Pose(xyz, from_rpy(*rpy))
+
+
+def mean_pose(poses: Sequence[Pose]) -> Pose:
+    """Average of poses that differ by noise: mean position, normalised mean quaternion (signs aligned)."""
+    if not poses:
+        raise ValueError("the mean of no poses is undefined")
+    first = poses[0].orientation
+    aligned = [p.orientation if float(np.dot(p.orientation, first)) >= 0 else -p.orientation for p in poses]
+    return Pose(np.mean([p.position for p in poses], axis=0), normalised(np.mean(aligned, axis=0)))

@@ -70,6 +70,7 @@ class SimulatedCell:
         self.hand_positions = (0, 0, 0, 0, 0)
         self.preshaped = False
         self.objects: dict[str, Pose] = {"mug": Pose(np.array([0.78, 0.03, 0.43])),
+                                         "board": Pose(np.array([0.45, -0.55, 0.05])),
                                          "human_hand": Pose(np.array([0.86, 0.03, 0.43]))}
 
     def note(self, what: str) -> None:
@@ -268,7 +269,7 @@ class SimulatedPerception:
 
 
 def _located(pose: Pose, object_id: str, parent: str = "world") -> Located:
-    frame = object_id if object_id in ("", "human_hand") else f"object_{object_id}"
+    frame = object_id if object_id in ("", "human_hand", "board") else f"object_{object_id}"
     d = pose.to_dict()
     return Located(frame, parent, tuple(d["xyz"]), tuple(d["quaternion"]), 0.05)
 

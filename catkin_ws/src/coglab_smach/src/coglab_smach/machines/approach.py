@@ -7,11 +7,13 @@ from ..states.base import CoglabConcurrence, CoglabMachine, require_all
 from ..states.hand import HandPreshape
 
 KEYS = ["goal", "grasp", "object_entry", "object_id"]
+RELEASE_KEYS = [*KEYS, "delivery"]
 
 
 def build_arm_motion(ctx: Context, trigger: str) -> CoglabMachine:
     """switch_to_dmp, execute_dmp (starts only), wait_stop (waits for everything)."""
-    machine = CoglabMachine(ctx, "arm_motion", ["succeeded", "failed", "preempted"], input_keys=KEYS)
+    machine = CoglabMachine(ctx, "arm_motion", ["succeeded", "failed", "preempted"],
+                            input_keys=RELEASE_KEYS if trigger == "release" else KEYS)
     with machine:
         machine.add_state("switch_to_dmp", SwitchController(ctx, "dmp"), {"succeeded": "execute_dmp"})
         machine.add_state("execute_dmp", ExecuteDmp(ctx), {"succeeded": "wait_stop"})
@@ -24,7 +26,7 @@ def build_approach(ctx: Context, label: str, trigger: str, preshape: bool, monit
     essential = ["arm_motion", "hand_preshape"] if preshape else ["arm_motion"]
     decide, conclude = require_all(essential)
     group = CoglabConcurrence(ctx, label, ["succeeded", "failed", "preempted"], "failed", decide, conclude,
-                              input_keys=KEYS)
+                              input_keys=RELEASE_KEYS if trigger == "release" else KEYS)
     with group:
         group.add_state("arm_motion", build_arm_motion(ctx, trigger))
         if preshape:

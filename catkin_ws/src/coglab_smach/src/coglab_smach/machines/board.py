@@ -5,7 +5,7 @@ from ..context import Context
 from ..states.arm import HomeRobot, PtpMotion, SwitchController
 from ..states.base import CoglabConcurrence, CoglabMachine, CoglabState, require_all
 from ..states.hand import HandClose, HandOpen, HandPreshape
-from ..states.knowledge import FindPlace, LocateObject, QueryDatabase, SetGraspGoal, SetPlaceGoal
+from ..states.knowledge import FindPlace, LocateOnBoard, QueryDatabase, SetPlaceGoal, SetTakeGoal
 from .approach import build_approach
 from .recovery import ACTION_OUTCOMES, RECOVERY_TRANSITIONS, build_recovery, to_recovery
 
@@ -34,9 +34,9 @@ def build_take(ctx: Context) -> CoglabMachine:
     with machine:
         machine.add_state("query_database", QueryDatabase(ctx), to_recovery(succeeded="approach_board"))
         machine.add_state("approach_board",
-                          build_look_while_moving(ctx, "approach_board", "locate_object", LocateObject(ctx), "located"),
+                          build_look_while_moving(ctx, "approach_board", "locate_object", LocateOnBoard(ctx), "located"),
                           to_recovery(succeeded="set_dmp_goal"))
-        machine.add_state("set_dmp_goal", SetGraspGoal(ctx, "take"),
+        machine.add_state("set_dmp_goal", SetTakeGoal(ctx),
                           to_recovery(succeeded="precise_motion" if during else "hand_preshape"))
         if not during:
             machine.add_state("hand_preshape", HandPreshape(ctx), to_recovery(succeeded="precise_motion"))

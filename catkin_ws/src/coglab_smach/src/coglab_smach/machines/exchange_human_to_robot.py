@@ -19,7 +19,7 @@ def build_exchange_human_to_robot(ctx: Context) -> CoglabMachine:
     machine.is_action = True
     with machine:
         machine.add_state("query_database", QueryDatabase(ctx), to_recovery(succeeded="set_dmp_goal"))
-        machine.add_state("set_dmp_goal", SetGraspGoal(ctx, "receive"), to_recovery(succeeded="approach"))
+        machine.add_state("set_dmp_goal", SetGraspGoal(ctx), to_recovery(succeeded="approach"))
         machine.add_state("approach", build_approach(ctx, "approach", "contact", preshape=True, monitor=True),
                           to_recovery(succeeded="switch_to_ptp"))
         machine.add_state("switch_to_ptp", SwitchController(ctx, "ptp"), to_recovery(succeeded="hand_close"))

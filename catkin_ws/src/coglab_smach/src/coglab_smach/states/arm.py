@@ -97,7 +97,8 @@ class WaitStop(CoglabState):
     default_time_limit = 20.0
 
     def __init__(self, ctx: Context, trigger: str) -> None:
-        super().__init__(ctx, input_keys=["object_entry"] if trigger else [])
+        keys = {"": [], "contact": ["object_entry"], "release": ["object_entry", "delivery"]}
+        super().__init__(ctx, input_keys=keys[trigger])
         self.trigger = trigger
 
     def run(self, ud: Any) -> str:
@@ -105,9 +106,7 @@ class WaitStop(CoglabState):
         self.ctx.journal.mark("motion_reached")
         if not self.trigger:
             return "succeeded"
-        entry = ud.object_entry
-        settings = dict(entry.get("contact", {}))
-        settings["mass"] = float(entry.get("mass", 0.0))
+        settings = self._settings(ud)
         limit = float(settings.get("timeout", self.ctx.config.get(f"{self.trigger}_timeout", 6.0)))
         self.await_pending(self.ctx.contact.arm(self.trigger, limit, settings), "arming of the contact detector", 2.0)
         try:
@@ -119,6 +118,18 @@ class WaitStop(CoglabState):
         self.ctx.journal.mark("contact")
         self.reason = event.message or f"{self.trigger} by {event.source}, margin {event.margin:.1f}"
         return "succeeded"
+
+    def _settings(self, ud: Any) -> dict[str, Any]:
+        """What the object's entry says about contact, or its delivery mode about release."""
+        entry = ud.object_entry
+        settings = dict(entry.get("contact", {}))
+        settings["mass"] = float(entry.get("mass", 0.0))
+        if self.trigger == "release":
+            release = ud.delivery["release"]
+            settings.pop("timeout", None)
+            settings.update({key: release[key] for key in ("timeout",) if key in release})
+            settings["load_share"] = float(release.get("threshold", 0.0))
+        return settings
 
     def _expected(self) -> str:
         return "contact of an object with the hand" if self.trigger == "contact" else "the person's taking of the load"

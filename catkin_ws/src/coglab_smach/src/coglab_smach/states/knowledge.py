@@ -6,6 +6,7 @@ from typing import Any
 from ..context import Context
 from ..goals import delivery_goal, grasp_goal, place_goal
 from ..pending import PortError
+from ..pose import Pose, mean_pose
 from .base import CoglabState
 
 
@@ -36,16 +37,28 @@ class QueryDatabase(CoglabState):
         return "succeeded"
 
 
-class LocateObject(CoglabState):
-    """Ask perception where something is; the answer goes into user data."""
+class LocateOnBoard(CoglabState):
+    """Where the object lies on the board, averaged over several sights; the pose in the board frame goes into user data.
 
-    default_time_limit = 8.0
+    The board stands still and so does the object, so the goal of the precise motion must not follow single noisy sights,
+    nor an object that the hand pushes.
+    """
+
+    default_time_limit = 12.0
 
     def __init__(self, ctx: Context) -> None:
         super().__init__(ctx, input_keys=["object_id"], output_keys=["located"])
 
     def run(self, ud: Any) -> str:
-        ud.located = locate(self, ud.object_id)
+        board = locate(self, str(self.ctx.config.get("perception.board", "board")))
+        count = int(self.ctx.config.get("take.sights", 10))
+        sights = []
+        for i in range(max(1, count)):
+            if i:
+                self.pause(0.08)
+            sights.append(Pose.from_dict(locate(self, ud.object_id)))
+        on_board = Pose.from_dict(board).inverse() * mean_pose(sights)
+        ud.located = {"frame": board["frame"], **on_board.to_dict()}
         return "succeeded"
 
 
@@ -66,15 +79,27 @@ class SetGraspGoal(CoglabState):
 
     default_time_limit = 10.0
 
-    def __init__(self, ctx: Context, role: str) -> None:
+    def __init__(self, ctx: Context) -> None:
         super().__init__(ctx, input_keys=["object_id", "object_entry", "grasp"], output_keys=["goal", "located"])
-        self.role = role
 
     def run(self, ud: Any) -> str:
         located = locate(self, ud.object_id)
         ud.located = located
-        standoff = None if self.role == "receive" else 0.0
-        ud.goal = grasp_goal(ud.object_entry, ud.grasp, located["frame"], self.role, standoff)
+        ud.goal = grasp_goal(ud.object_entry, ud.grasp, located["frame"], "receive")
+        return "succeeded"
+
+
+class SetTakeGoal(CoglabState):
+    """DMP goal in the board frame, from detection and database, with a little clearance between palm and object."""
+
+    default_time_limit = 5.0
+
+    def __init__(self, ctx: Context) -> None:
+        super().__init__(ctx, input_keys=["object_entry", "grasp", "located"], output_keys=["goal"])
+
+    def run(self, ud: Any) -> str:
+        clearance = float(self.ctx.config.get("take.clearance", 0.012))
+        ud.goal = place_goal(ud.object_entry, ud.grasp, ud.located, "take", clearance)
         return "succeeded"
 
 
@@ -128,5 +153,5 @@ class SetPlaceGoal(CoglabState):
         super().__init__(ctx, input_keys=["object_entry", "grasp", "place"], output_keys=["goal"])
 
     def run(self, ud: Any) -> str:
-        ud.goal = place_goal(ud.object_entry, ud.grasp, ud.place)
+        ud.goal = place_goal(ud.object_entry, ud.grasp, ud.place, "put")
         return "succeeded"
