@@ -1,0 +1,208 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numeric>
+
+#include "coglab_sim/cell.hpp"
+#include "coglab_sim/random.hpp"
+
+namespace fri = lwr_fri_bridge::fri;
+using namespace coglab_sim;
+
+namespace {
+
+ServoCommand limp() {
+  ServoCommand command;
+  command.strategy = fri::ControlStrategy::Other;
+  return command;
+}
+
+Vector7 posture() { return (Vector7() << 0.3, 0.6, -0.4, -1.2, 0.5, 0.8, 0.2).finished(); }
+
+}  // namespace
+
+TEST(Random, MomentsAndReproducibility) {
+  Random a(7), b(7), c(8);
+  double sum = 0.0, square = 0.0;
+  int equal = 0;
+  constexpr int kDraws = 200000;
+  for (int i = 0; i < kDraws; ++i) {
+    const double value = a.normal();
+    EXPECT_EQ(value, b.normal());
+    equal += value == c.normal() ? 1 : 0;
+    sum += value;
+    square += value * value;
+  }
+  EXPECT_EQ(equal, 0);
+  EXPECT_NEAR(sum / kDraws, 0.0, 0.01);
+  EXPECT_NEAR(square / kDraws, 1.0, 0.02);
+}
+
+TEST(Shape, DistanceIsThatToTheNearestSurfacePoint) {
+  Random random(1);
+  for (const char* kind : {"box", "cylinder", "sphere"}) {
+    const Shape shape(kind, Vector3d(0.1, 0.1, kind[0] == 's' ? 0.1 : 0.2));
+    for (int i = 0; i < 2000; ++i) {
+      const Vector3d point(0.4 * random.uniform() - 0.2, 0.4 * random.uniform() - 0.2, 0.4 * random.uniform() - 0.2);
+      Vector3d normal, again;
+      const double distance = shape.distance(point, normal);
+      EXPECT_NEAR(normal.norm(), 1.0, 1e-12);
+      // Walking back along the normal by the distance leads to the surface.
+      EXPECT_NEAR(shape.distance(point - distance * normal, again), 0.0, 1e-9) << kind;
+      // It is a distance: it changes by no more than the way walked.
+      const Vector3d step(1e-3 * random.normal(), 1e-3 * random.normal(), 1e-3 * random.normal());
+      EXPECT_LE(std::abs(shape.distance(point + step, again) - distance), step.norm() + 1e-12);
+    }
+  }
+  EXPECT_THROW(Shape("cone", Vector3d::Ones()), std::invalid_argument);
+  EXPECT_THROW(Shape("box", Vector3d(1.0, 0.0, 1.0)), std::invalid_argument);
+}
+
+TEST(ArmDynamics, ACarriedArmStaysWhereItIs) {
+  ArmDynamics arm(URDF, ArmParameters{}, posture());
+  for (int i = 0; i < 5000; ++i) arm.step(limp(), Wrench{}, 1e-3);
+  EXPECT_NEAR((arm.position() - posture()).cwiseAbs().maxCoeff(), 0.0, 1e-9);
+}
+
+TEST(ArmDynamics, WorkBecomesMotionAndHeight) {
+  // Power balance: push + motors - friction = change of kinetic + potential energy.
+  ArmParameters parameters;
+  parameters.coulomb_friction.setZero();
+  ArmDynamics arm(URDF, parameters, posture());
+  const ArmModel model(URDF);
+  Wrench push;
+  push.force = Vector3d(3.0, -5.0, 4.0);
+  double work = 0.0, lifted = 0.0;
+  constexpr double kStep = 1e-5;
+  for (int i = 0; i < 30000; ++i) {
+    const Vector7 pushed = arm.terms().jacobian.transpose() * push.stacked();
+    const Vector7 gravity = arm.terms().gravity, before = arm.position();
+    arm.step(limp(), push, kStep);
+    const Vector7 way = arm.position() - before;
+    work += (pushed + arm.motorTorque() - model.damping().cwiseProduct(arm.velocity())).dot(way);
+    lifted += 0.5 * (gravity + arm.terms().gravity).dot(way);
+  }
+  Matrix7 mass = arm.terms().mass;
+  mass.diagonal() += parameters.rotor_inertia;
+  const double kinetic = 0.5 * arm.velocity().dot(mass * arm.velocity());
+  EXPECT_GT(kinetic, 0.02);
+  EXPECT_NEAR(kinetic + lifted, work, 1e-3 * kinetic);
+}
+
+TEST(ArmDynamics, TorquesAreLimitedAndTheArmStaysFinite) {
+  ArmParameters parameters;
+  ArmDynamics arm(URDF, parameters, posture());
+  ServoCommand command;
+  command.strategy = fri::ControlStrategy::Position;
+  command.position = posture() + Vector7::Constant(1.0);
+  for (int i = 0; i < 2000; ++i) {
+    arm.step(command, Wrench{}, 1e-3);
+    ASSERT_TRUE(((arm.motorTorque().cwiseAbs() - parameters.torque_limit).array() <= 1e-9).all());
+    ASSERT_TRUE(arm.position().allFinite());
+  }
+  EXPECT_NEAR((arm.position() - command.position).cwiseAbs().maxCoeff(), 0.0, 1e-3);
+}
+
+TEST(ArmDynamics, BrakesStopFromTopSpeedAndHoldAgainstAPush) {
+  ArmParameters parameters;
+  ArmDynamics arm(URDF, parameters, posture());
+  ServoCommand command;
+  command.velocity.setConstant(1.5);
+  for (int i = 0; i < 300; ++i) {
+    command.position = posture() + command.velocity * 1e-3 * (i + 1);
+    arm.step(command, Wrench{}, 1e-3);
+  }
+  ASSERT_GT(arm.velocity().minCoeff(), 1.0);
+  arm.setBrakes(true);
+  int steps = 0;
+  while (!arm.locked() && steps < 1000) {
+    arm.step(command, Wrench{}, 1e-3);
+    ++steps;
+  }
+  EXPECT_LT(steps, 200);
+  const Vector7 held = arm.position();
+  Wrench push;
+  push.force.setConstant(50.0);
+  for (int i = 0; i < 500; ++i) arm.step(command, push, 1e-3);
+  EXPECT_EQ((arm.position() - held).norm(), 0.0);
+  const Vector7 felt = arm.terms().jacobian.transpose() * push.stacked();
+  EXPECT_NEAR((arm.externalTorque() - felt).norm(), 0.0, 1e-12);
+}
+
+TEST(ArmDynamics, JointSensorBalancesTheLinkSide) {
+  ArmParameters parameters;
+  ArmDynamics arm(URDF, parameters, posture());
+  ServoCommand command;
+  command.position = posture();
+  Wrench push;
+  push.force = Vector3d(0.0, 10.0, -3.0);
+  for (int i = 0; i < 3000; ++i) arm.step(command, push, 1e-3);
+  const Vector7 expected = arm.terms().gravity - arm.terms().jacobian.transpose() * push.stacked();
+  EXPECT_NEAR((arm.jointTorque() - expected).cwiseAbs().maxCoeff(), 0.0, 1e-6);
+}
+
+TEST(ArmDynamics, ImpedanceYieldsAsItsStiffnessSays) {
+  ArmParameters parameters;
+  ArmDynamics arm(URDF, parameters, posture());
+  ServoCommand command;
+  command.strategy = fri::ControlStrategy::CartesianImpedance;
+  command.position = posture();
+  command.frame = arm.terms().tip;
+  command.frame_stiffness << 1000.0, 1000.0, 1000.0, 100.0, 100.0, 100.0;
+  command.frame_damping.setConstant(0.7);
+  Wrench push;
+  push.force = Vector3d(0.0, 10.0, 0.0);
+  for (int i = 0; i < 8000; ++i) arm.step(command, push, 1e-3);
+  const Vector3d given_way = arm.terms().tip.position - command.frame.position;
+  EXPECT_NEAR(given_way.y(), 0.010, 2e-4);
+  EXPECT_NEAR(std::hypot(given_way.x(), given_way.z()), 0.0, 5e-4);
+
+  command.strategy = fri::ControlStrategy::JointImpedance;
+  arm.reset(posture());
+  command.stiffness.setConstant(500.0);
+  command.damping.setConstant(0.7);
+  for (int i = 0; i < 8000; ++i) arm.step(command, push, 1e-3);
+  const Vector7 felt = arm.terms().jacobian.transpose() * push.stacked();
+  EXPECT_NEAR(((arm.position() - posture()) * 500.0 - felt).cwiseAbs().maxCoeff(), 0.0, 0.02);
+}
+
+TEST(Statistics, WindowLatencyAndJitter) {
+  krc::Parameters parameters;
+  krc::AnswerStatistics statistics(parameters);
+  EXPECT_EQ(statistics.quality(), fri::Quality::Unacceptable);
+  for (int i = 0; i < 100; ++i) statistics.add(true, i % 2 == 0 ? 0.001 : 0.003);
+  EXPECT_EQ(statistics.quality(), fri::Quality::Perfect);
+  EXPECT_NEAR(statistics.latency(), 0.002, 1e-12);
+  EXPECT_NEAR(statistics.jitter(), 0.002, 1e-12);
+  for (int i = 0; i < 2; ++i) statistics.add(false, 0.0);
+  EXPECT_EQ(statistics.quality(), fri::Quality::Ok);
+  EXPECT_EQ(statistics.missCounter(), 2U);
+  for (int i = 0; i < 100; ++i) statistics.add(true, 0.0);
+  EXPECT_EQ(statistics.quality(), fri::Quality::Perfect);
+  EXPECT_EQ(statistics.missCounter(), 2U);
+}
+
+TEST(CellConfig, EveryParameterGoesInAndOut) {
+  CellConfig config;
+  for (const CellParameter& parameter : cellParameters()) {
+    SCOPED_TRACE(parameter.name);
+    EXPECT_FALSE(parameter.description.empty());
+    EXPECT_TRUE(parameter.source == "published" || parameter.source == "ours" || parameter.source == "set-up");
+    const ParameterValue value = parameter.get(config);
+    parameter.set(config, value);
+    EXPECT_TRUE(parameter.get(config) == value);
+  }
+  EXPECT_THROW(setCellParameter(config, "krc/nothing", 1.0), std::invalid_argument);
+  EXPECT_THROW(setCellParameter(config, "krc/period", std::string("fast")), std::invalid_argument);
+  EXPECT_THROW(setCellParameter(config, "home", std::vector<double>{1.0}), std::invalid_argument);
+}
+
+TEST(Cell, LateStandInDoesNotBlameThePc) {
+  CellConfig config;
+  config.urdf = URDF;
+  Cell cell(config);
+  for (int i = 0; i < 50; ++i) cell.advance(true);
+  const auto counted = cell.controller().statistics().missCounter();
+  for (int i = 0; i < 50; ++i) cell.advance(false);
+  EXPECT_EQ(cell.controller().statistics().missCounter(), counted);
+}
