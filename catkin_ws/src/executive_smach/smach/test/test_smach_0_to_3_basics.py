@@ -4,6 +4,7 @@ import copy
 import importlib
 import io
 import pickle
+import sys
 import threading
 import types
 from contextlib import redirect_stderr, redirect_stdout
@@ -269,8 +270,13 @@ def test_s3_locked_makes_transactions_better():
             with smach.user_data.locked(view):
                 view.n = view.n + 1
 
-    threads = [threading.Thread(target=count) for _ in range(4)]
-    [t.start() for t in threads], [t.join() for t in threads]
+    interval = sys.getswitchinterval()
+    sys.setswitchinterval(1e-6)  # so that threads meet
+    try:
+        threads = [threading.Thread(target=count) for _ in range(4)]
+        [t.start() for t in threads], [t.join() for t in threads]
+    finally:
+        sys.setswitchinterval(interval)
     assert ud.n == 8000
 
 

@@ -327,6 +327,15 @@ def test_s15_a_request_after_all_children_have_ended_is_carried_on():
     assert both.execute() == "done" and both.preempt_requested()
 
 
+def test_s15_a_request_when_the_last_child_has_just_ended_is_carried_on():
+    after = Serves()
+    both = concurrence(children={"A": Says("done")}, outcome_map={"done": {"A": "done"}})
+    outer = machine(both, after, outcomes=["done", "failed", "preempted"])
+    both.register_transition_cb(lambda ud, labels: labels or outer.request_preempt())
+    assert outer.execute() == "preempted"
+    assert after.seen == [True] and not both.preempt_requested()
+
+
 def test_s7_is_running_better():
     seen = []
     both = concurrence(children={"A": Calls(lambda ud: seen.append(both.is_running()))})

@@ -254,6 +254,12 @@ def test_s11_random_bytes():
     assert fired == []
 
 
+@pytest.mark.parametrize("raw", [b"\x80\x02}r\xff\xff\xff\x7f.", b"\x80\x02}p99999\n."])
+def test_s11_memo_numbers_cannot_reserve_memory(raw):
+    with pytest.raises(InvalidDataError, match="memo"):
+        decode(b64(raw))
+
+
 def test_s11_find_class_always_refuses():
     from smach_ros.plain_data import _PlainUnpickler
 
