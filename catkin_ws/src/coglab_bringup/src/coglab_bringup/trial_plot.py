@@ -23,25 +23,43 @@ def _column(rows: list[tuple], index: int, origin: float) -> tuple[np.ndarray, n
     return np.array([row[0] for row in rows]) - origin, np.array([row[index] for row in rows])
 
 
-def _speed(times: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """Speed of a path, smoothed over 50 ms."""
-    velocity = np.gradient(points, times, axis=0)
-    width = max(1, int(0.05 / max(np.median(np.diff(times)), 1e-4)))
-    kernel = np.ones(width) / width
-    return np.convolve(np.linalg.norm(velocity, axis=1), kernel, mode="same")
+def _speed(times: np.ndarray, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Speed of a path on an even 50 Hz grid, smoothed over 60 ms: times and m/s."""
+    grid = np.arange(times[0], times[-1], 0.02)
+    even = np.column_stack([np.interp(grid, times, axis) for axis in points.T])
+    speed = np.linalg.norm(np.gradient(even, 0.02, axis=0), axis=1)
+    return grid, np.convolve(speed, np.ones(3) / 3, mode="same")
 
 
-def _phases(axis: plt.Axes, trial: Trial, origin: float, end: float) -> None:
-    """A bar per state of the two innermost levels that were entered."""
-    rows = [(t, path, to) for t, path, _, _, to, _ in trial.transitions]
-    lanes = sorted({path for _, path, _ in rows}, key=lambda path: (path.count("/"), path))
+def state_intervals(trial: Trial, end: float) -> dict[str, list[tuple[float, float, str]]]:
+    """For each container: when its states began and ended, from the transitions; what is still active ends at `end`."""
+    intervals: dict[str, list[tuple[float, float, str]]] = {}
+    entered: dict[tuple[str, str], float] = {}  # (container, state) -> time
+    begun: dict[str, float] = {}  # container -> time
+    for t, path, from_state, outcome, to_state, _ in trial.transitions:
+        since = entered.pop((path, from_state), begun.get(path, trial.transitions[0][0]))
+        intervals.setdefault(path, []).append((since, t, from_state))
+        if to_state != outcome:  # a sibling, not the container's own outcome
+            entered[path, to_state] = t
+            begun[f"{path}/{to_state}"] = t
+    for (path, state), since in entered.items():
+        intervals.setdefault(path, []).append((since, end, state))
+    return intervals
+
+
+def _phases(axis: plt.Axes, trial: Trial, start: float, end: float) -> None:
+    """A lane per container, a bar per state."""
+    intervals = state_intervals(trial, end)
+    lanes = sorted(intervals, key=lambda path: (path.count("/"), path))
     for lane, path in enumerate(lanes):
-        steps = [(t, to) for t, at, to in rows if at == path]
-        for k, (t, name) in enumerate(steps):
-            stop = steps[k + 1][0] if k + 1 < len(steps) else end
-            axis.barh(lane, stop - t, left=t - origin, height=0.8, color=COLOURS[k % 6], alpha=0.35, edgecolor="#1B1F24", lw=0.5)
-            if stop - t > 0.02 * (end - origin):
-                axis.text(t - origin + 0.02, lane, name, va="center", fontsize=6, clip_on=True)
+        for k, (since, until, name) in enumerate(sorted(intervals[path])):
+            since, until = max(since, start), min(until, end)
+            if until <= since:
+                continue
+            colour = COLOURS[k % 6]
+            axis.barh(lane, until - since, left=since - start, height=0.8, color=colour, alpha=0.35, edgecolor=COLOURS[6], lw=0.5)
+            if until - since > 0.03 * (end - start):
+                axis.text(since - start + 0.02, lane, name, va="center", fontsize=6, clip_on=True)
     axis.set_yticks(range(len(lanes)), [path.rsplit("/", 1)[-1] for path in lanes], fontsize=6)
     axis.invert_yaxis()
 
@@ -58,8 +76,8 @@ def draw_trial(trial: Trial, title: str, start: float, end: float, path: Path) -
         for k, name in enumerate("xyz"):
             axes[1].plot(times, robot[:, k], color=COLOURS[k], label=f"robot {name}")
             axes[1].plot(times, human[:, k], color=COLOURS[k], ls="--", label=f"person {name}")
-        axes[2].plot(times, _speed(times, robot), color=COLOURS[0], label="robot hand")
-        axes[2].plot(times, _speed(times, human), color=COLOURS[3], ls="--", label="person's hand")
+        axes[2].plot(*_speed(times, robot), color=COLOURS[0], label="robot hand")
+        axes[2].plot(*_speed(times, human), color=COLOURS[3], ls="--", label="person's hand")
         force_axis = axes[4].twinx()
         force_axis.plot(times, force, color=COLOURS[6], lw=0.8, label="force on the palm")
         force_axis.set_ylabel("N", fontsize=8)

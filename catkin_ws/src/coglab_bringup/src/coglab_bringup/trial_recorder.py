@@ -67,7 +67,7 @@ class TrialRecorder:
     def _on_truth(self, message: CellTruth) -> None:
         points = [message.robot_hand.position, message.human_hand.position, message.object.position, message.palm_force]
         robot, human, thing, force = ([p.x, p.y, p.z] for p in points)
-        self.trial.truth.append((rospy.get_time(), robot, human, thing, float(np.linalg.norm(force))))
+        self.trial.truth.append((message.header.stamp.to_sec(), robot, human, thing, float(np.linalg.norm(force))))
 
     def _on_hand(self, message: HandStatus) -> None:
         if len(message.motors) == 5:
