@@ -75,7 +75,10 @@ const CartesianReference& CartesianMotion::step(double dt, const Pose& goal, dou
   orientation_ = orientation.normalized();
   remaining_distance_ = (goal.position - state.position).norm();
 
-  event_ = end_.update(dt, state.phase, reference_.velocity.norm(), state.position, goal_, goal.position);
+  // Seen on the clock of the motion: a motion that is slowed to a standstill has not ended.
+  const double clock = std::max(rate, 1e-3);
+  const double turning = reference_.orientation_control ? reference_.angular_velocity.norm() / clock : 0.0;
+  event_ = end_.update(dt, state.phase, reference_.velocity.norm() / clock, turning, state.position, goal_, goal.position);
   if (event_ == MotionEnd::Event::Ended) phase_ = Phase::Ended;
   if (event_ == MotionEnd::Event::FollowsAgain) {
     phase_ = Phase::Running;

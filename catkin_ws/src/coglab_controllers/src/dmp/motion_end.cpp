@@ -13,6 +13,7 @@ MotionEnd::MotionEnd(const MotionEndParameters& parameters) : parameters_(parame
   };
   require("end_phase", parameters.phase);
   require("end_speed", parameters.speed);
+  require("end_turning", parameters.turning);
   require("end_distance", parameters.distance);
   require("follow_distance", parameters.follow_distance);
   require("follow_time", parameters.follow_time);
@@ -23,11 +24,12 @@ void MotionEnd::reset() noexcept {
   away_ = 0.0;
 }
 
-MotionEnd::Event MotionEnd::update(double dt, double phase, double speed, const Vector3& position,
+MotionEnd::Event MotionEnd::update(double dt, double phase, double speed, double turning, const Vector3& position,
                                    const Vector3& goal, const Vector3& raw_goal) noexcept {
   if (!latched_) {
-    if (phase >= parameters_.phase || speed >= parameters_.speed ||
-        (position - goal).norm() >= parameters_.distance) {
+    if (phase >= parameters_.phase || speed >= parameters_.speed || turning >= parameters_.turning ||
+        (position - goal).norm() >= parameters_.distance ||
+        (goal - raw_goal).norm() >= parameters_.follow_distance) {
       return Event::None;
     }
     latched_ = true;

@@ -61,8 +61,9 @@ Guard::Guard(const GuardParameters& parameters, const Chain& chain)
 
 double Guard::speedToStop(int joint, double room) const noexcept {
   const double a = parameters_.acceleration[joint];
-  // Braking with limited jerk needs v a / (2 j) more room than v^2 / (2 a); for small speeds this is on the safe side.
-  const double lag = 0.5 * a / parameters_.jerk[joint] + parameters_.reaction_time;
+  // Braking with limited jerk needs v a / (2 j) more room than v^2 / (2 a), and an arm that still speeds up takes another
+  // a / j to turn its acceleration round; for small speeds both are on the safe side.
+  const double lag = 1.5 * a / parameters_.jerk[joint] + parameters_.reaction_time;
   return stoppingSpeed(room - parameters_.position_margin, a, lag);
 }
 

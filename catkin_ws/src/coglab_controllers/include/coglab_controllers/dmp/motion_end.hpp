@@ -9,8 +9,9 @@ namespace coglab_controllers {
 /// Thresholds of MotionEnd.
 struct MotionEndParameters {
   double phase = 0.012;         ///< the phase must be below this (0.01 is reached with the duration over),
-  double speed = 0.005;         ///< m/s, and the set-point slower than this,
-  double distance = 0.002;      ///< m, and closer to the goal than this
+  double speed = 0.02;          ///< m/s, the set-point move slower than this,
+  double turning = 0.2;         ///< rad/s, and turn slower than this,
+  double distance = 0.005;      ///< m, and be closer to the goal than this
   double follow_distance = 0.030;  ///< m: a goal that leaves this ball around the latched one …
   double follow_time = 0.2;        ///< s: … for this long is followed again
 };
@@ -26,9 +27,9 @@ class MotionEnd {
   void reset() noexcept;  ///< a new motion begins
 
   /// One cycle.
-  /// @param speed of the set-point, m/s.  @param position of the set-point, m.
+  /// @param speed, turning of the set-point, m/s and rad/s.  @param position of the set-point, m.
   /// @param goal as estimated, m.  @param raw_goal as received, m.
-  Event update(double dt, double phase, double speed, const Vector3& position, const Vector3& goal,
+  Event update(double dt, double phase, double speed, double turning, const Vector3& position, const Vector3& goal,
                const Vector3& raw_goal) noexcept;
 
   bool latched() const noexcept { return latched_; }
