@@ -138,19 +138,19 @@ void Bridge::serve(const Request& request, const Configurator::Observation& seen
     case EventKind::Mode:
       if (supervisor_.held()) return finish(request, OutcomeCode::Held);
       if (connected_ && !monitor) return finish(request, OutcomeCode::InCommandMode);
-      if (supervisor_.starting()) return finish(request, OutcomeCode::InCommandMode);
+      if (supervisor_.starting()) return finish(request, OutcomeCode::Busy);
       wanted_mode_ = request.event.mode;
       return finish(request, OutcomeCode::Done);
     case EventKind::Start:
       if (!connected_) return finish(request, OutcomeCode::Disconnected);
       if (supervisor_.held()) return finish(request, OutcomeCode::Held);
-      if (supervisor_.stopping() || supervisor_.starting()) return finish(request, OutcomeCode::Interrupted);
+      if (supervisor_.stopping() || supervisor_.starting()) return finish(request, OutcomeCode::Busy);
       if (supervisor_.state() == SupervisorState::Command) return finish(request, OutcomeCode::AlreadyThere);
       supervisor_.startBegins();
       configurator_.start(request.ticket, monitor ? wanted_mode_.strategy : active_mode_.strategy, seen);
       return;
     case EventKind::Stop:
-      if (supervisor_.stopping()) return finish(request, OutcomeCode::AlreadyThere);
+      if (supervisor_.stopping()) return finish(request, OutcomeCode::Busy);
       if (!connected_) return finish(request, OutcomeCode::Disconnected);
       if (monitor && !supervisor_.starting()) {
         supervisor_.stopEnds();

@@ -202,6 +202,7 @@ std::string describe(const Outcome& o) {
       return word + ": still in " + fri::nameOf(o.state) + " after " + seconds +
              ", MON expected; stop the KRL program on the pendant";
     case OutcomeCode::Interrupted: return word + ": interrupted by hold, stop or a fall-back";
+    case OutcomeCode::Busy: return word + " refused: a start or stop is in progress; wait for its outcome";
     case OutcomeCode::LostConnection: return word + ": the robot controller fell silent after " + seconds;
     case OutcomeCode::NotServed: return word + ": the FRI thread did not take the request within " + seconds;
   }

@@ -62,6 +62,7 @@ enum class OutcomeCode : std::uint8_t {
   WrongStrategy,    ///< command mode came with another strategy
   NotLeft,          ///< monitor mode did not come in time
   Interrupted,      ///< hold or stop came in between
+  Busy,             ///< refused: another start or stop is in progress
   LostConnection,   ///< the controller fell silent in between
   NotServed         ///< the FRI thread did not take the request
 };

@@ -1,0 +1,157 @@
+/// The FRI thread over real sockets on 127.0.0.1: peers, backlog, ports. Asserts outcomes and counters, no times.
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <functional>
+#include <stdexcept>
+#include <thread>
+
+#include <arpa/inet.h>
+#include <netinet/in.h>
+#include <sys/socket.h>
+#include <sys/time.h>
+#include <unistd.h>
+
+#include "lwr_fri_bridge/fri_thread.hpp"
+#include "small_controller.hpp"
+
+namespace lwr_fri_bridge {
+namespace {
+
+class Peer {
+ public:
+  explicit Peer(int port) : fd_(socket(AF_INET, SOCK_DGRAM, 0)) {
+    to_.sin_family = AF_INET;
+    to_.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    to_.sin_port = htons(static_cast<std::uint16_t>(port));
+    timeval timeout{};
+    timeout.tv_usec = 300'000;
+    setsockopt(fd_, SOL_SOCKET, SO_RCVTIMEO, &timeout, sizeof timeout);
+  }
+  ~Peer() { close(fd_); }
+  void send(const void* data, std::size_t size) {
+    sendto(fd_, data, size, 0, reinterpret_cast<sockaddr*>(&to_), sizeof to_);
+  }
+  void send(const fri::MeasurementDatagram& m) { send(&m, sizeof m); }
+  bool receive(fri::CommandDatagram& c) { return recv(fd_, &c, sizeof c, 0) == static_cast<ssize_t>(sizeof c); }
+
+ private:
+  int fd_;
+  sockaddr_in to_{};
+};
+
+bool eventually(const std::function<bool()>& condition) {
+  for (int i = 0; i < 500 && !condition(); ++i) std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  return condition();
+}
+
+struct Fixture : testing::Test {
+  Fixture() : bridge(test::defaultConfig()), fri(bridge, options()), robot(0.005) { fri.start(); }
+  static FriThreadOptions options() {
+    FriThreadOptions o;
+    o.port = 0;
+    o.priority = 0;
+    return o;
+  }
+  Bridge bridge;
+  FriThread fri;
+  test::SmallController robot;
+};
+
+using FriThreadTest = Fixture;
+
+TEST_F(FriThreadTest, answersToTheSourceOfTheDatagram) {
+  Peer peer(fri.port());
+  fri::CommandDatagram c{};
+  for (int i = 0; i < 10; ++i) {
+    const fri::MeasurementDatagram m = robot.measure();
+    peer.send(m);
+    ASSERT_TRUE(peer.receive(c));
+    EXPECT_EQ(c.header.reflected, m.header.counter);
+  }
+  EXPECT_TRUE(eventually([&] { return fri.statistics().answers == 10; }));  // counted after sending
+  EXPECT_NE(fri.statistics().peer.find("127.0.0.1:"), std::string::npos);
+}
+
+TEST_F(FriThreadTest, aSecondSenderIsIgnoredAndNamed) {
+  Peer peer(fri.port()), other(fri.port());
+  fri::CommandDatagram c{};
+  peer.send(robot.measure());
+  ASSERT_TRUE(peer.receive(c));
+  other.send(robot.measure());
+  EXPECT_TRUE(eventually([&] { return fri.statistics().foreign == 1; }));
+  EXPECT_FALSE(other.receive(c));
+  EXPECT_NE(fri.statistics().last_foreign.find("127.0.0.1:"), std::string::npos);
+  EXPECT_NE(fri.statistics().last_foreign, fri.statistics().peer);
+  // When the peer has fallen silent, another one may take its place.
+  EXPECT_TRUE(eventually([&] { return fri.statistics().peer.empty(); }));
+  other.send(robot.measure());
+  EXPECT_TRUE(other.receive(c));
+}
+
+TEST_F(FriThreadTest, rubbishMakesNoPeerAndIsCounted) {
+  Peer rubbish(fri.port()), peer(fri.port());
+  std::vector<std::uint8_t> bytes(60000, 0x55);
+  for (const std::size_t size : {0, 1, 375, 915, 917, 1024, 1025, 2000, 60000}) {
+    rubbish.send(bytes.data(), static_cast<std::size_t>(size));
+  }
+  rubbish.send(bytes.data(), 916);
+  EXPECT_TRUE(eventually([&] { return bridge.snapshot().session.rejected() == 10; }));
+  EXPECT_TRUE(fri.statistics().peer.empty());
+  peer.send(robot.measure());
+  fri::CommandDatagram c{};
+  EXPECT_TRUE(peer.receive(c));
+}
+
+TEST_F(FriThreadTest, silenceIsDisconnection) {
+  Peer peer(fri.port());
+  peer.send(robot.measure());
+  fri::CommandDatagram c{};
+  ASSERT_TRUE(peer.receive(c));
+  EXPECT_TRUE(eventually([&] { return bridge.snapshot().supervisor == SupervisorState::Monitor; }));
+  EXPECT_TRUE(eventually([&] { return bridge.snapshot().supervisor == SupervisorState::Disconnected; }));
+  const Outcome outcome = bridge.command("start");
+  EXPECT_EQ(outcome.code, OutcomeCode::Disconnected);
+}
+
+TEST_F(FriThreadTest, aPortInUseIsSaid) {
+  FriThreadOptions same = options();
+  same.port = fri.port();
+  Bridge other(test::defaultConfig());
+  FriThread second(other, same);
+  try {
+    second.start();
+    FAIL() << "bound twice";
+  } catch (const std::runtime_error& error) {
+    EXPECT_NE(std::string(error.what()).find(std::to_string(fri.port())), std::string::npos) << error.what();
+  }
+  same.address = "300.1.1.1";
+  FriThread third(other, same);
+  EXPECT_THROW(third.start(), std::runtime_error);
+}
+
+TEST_F(FriThreadTest, commandReachesTheThreadAndComesBack) {
+  Peer peer(fri.port());
+  std::atomic<bool> end{false};
+  std::thread controller([&] {
+    while (!end) {
+      peer.send(robot.measure());
+      fri::CommandDatagram c{};
+      robot.take(peer.receive(c) ? &c : nullptr);
+      std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    }
+  });
+  EXPECT_TRUE(eventually([&] { return bridge.snapshot().supervisor == SupervisorState::Monitor; }));
+  const Outcome start = bridge.command("start");
+  EXPECT_TRUE(start.success()) << describe(start);
+  EXPECT_TRUE(bridge.command("hold").success());
+  EXPECT_EQ(bridge.command("start").code, OutcomeCode::Held);
+  EXPECT_TRUE(bridge.command("reset").success());
+  const Outcome stop = bridge.command("stop");
+  EXPECT_TRUE(stop.success()) << describe(stop);
+  end = true;
+  controller.join();
+}
+
+}  // namespace
+}  // namespace lwr_fri_bridge
