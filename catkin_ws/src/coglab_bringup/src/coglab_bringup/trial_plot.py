@@ -47,20 +47,38 @@ def state_intervals(trial: Trial, end: float) -> dict[str, list[tuple[float, flo
     return intervals
 
 
+def rows_without_overlap(intervals: list[tuple[float, float, str]]) -> list[list[tuple[float, float, str]]]:
+    """Spreads intervals over as few rows as it takes that none overlaps another (children of a concurrence)."""
+    rows: list[list[tuple[float, float, str]]] = []
+    for interval in sorted(intervals):
+        for row in rows:
+            if row[-1][1] <= interval[0] + 1e-3:
+                row.append(interval)
+                break
+        else:
+            rows.append([interval])
+    return rows
+
+
 def _phases(axis: plt.Axes, trial: Trial, start: float, end: float) -> None:
-    """A lane per container, a bar per state."""
-    intervals = state_intervals(trial, end)
-    lanes = sorted(intervals, key=lambda path: (path.count("/"), path))
-    for lane, path in enumerate(lanes):
-        for k, (since, until, name) in enumerate(sorted(intervals[path])):
-            since, until = max(since, start), min(until, end)
-            if until <= since:
-                continue
-            colour = COLOURS[k % 6]
-            axis.barh(lane, until - since, left=since - start, height=0.8, color=colour, alpha=0.35, edgecolor=COLOURS[6], lw=0.5)
-            if until - since > 0.03 * (end - start):
-                axis.text(since - start + 0.02, lane, name, va="center", fontsize=6, clip_on=True)
-    axis.set_yticks(range(len(lanes)), [path.rsplit("/", 1)[-1] for path in lanes], fontsize=6)
+    """A lane per container that was active, a bar per state; parallel children share the lane's height."""
+    lanes = []
+    for path, intervals in sorted(state_intervals(trial, end).items(), key=lambda item: (item[0].count("/"), item[0])):
+        seen = [(max(since, start), min(until, end), name) for since, until, name in intervals]
+        seen = [interval for interval in seen if interval[1] > interval[0]]
+        if seen:
+            lanes.append((path.rsplit("/", 1)[-1], rows_without_overlap(seen)))
+    for lane, (_, rows) in enumerate(lanes):
+        height = 0.84 / len(rows)
+        for level, row in enumerate(rows):
+            centre = lane - 0.42 + (level + 0.5) * height
+            for k, (since, until, name) in enumerate(row):
+                colour = COLOURS[(k + level) % 6]
+                axis.barh(centre, until - since, left=since - start, height=height, color=colour, alpha=0.35,
+                          edgecolor=COLOURS[6], lw=0.5)  # fmt: skip
+                if until - since > 0.03 * (end - start):
+                    axis.text(since - start + 0.02, centre, name, va="center", fontsize=6, clip_on=True)
+    axis.set_yticks(range(len(lanes)), [name for name, _ in lanes], fontsize=6)
     axis.invert_yaxis()
 
 

@@ -1,0 +1,40 @@
+"""The runner that counts all other tests must not lie: red, dead, hanging and empty programs are told apart."""
+
+import sys
+
+import pytest
+
+from coglab_bringup.test_runner import Program, report, run
+
+GREEN = '<testsuites><testsuite><testcase classname="a" name="one"/><testcase name="two"><skipped/></testcase></testsuite></testsuites>'
+RED = '<testsuite><testcase name="bad"><failure message="1 is not 2"/></testcase></testsuite>'
+
+
+def program(tmp_path, script: str) -> Program:
+    xml = tmp_path / "report.xml"
+    return Program("pkg", "pytest", "test_x.py", [sys.executable, "-c", script.replace("XML", repr(str(xml)))], xml)
+
+
+@pytest.mark.parametrize(
+    "script, counts",
+    [
+        (f"open(XML, 'w').write('''{GREEN}''')", (1, 0, 1)),
+        (f"open(XML, 'w').write('''{RED}'''); raise SystemExit(1)", (0, 1, 0)),
+        (f"open(XML, 'w').write('''{GREEN}'''); raise SystemExit(1)", (1, 1, 1)),  # died after green cases
+        ("raise SystemExit(0)", (0, 1, 0)),  # says it is fine and leaves no report
+        ("import os; os.abort()", (0, 1, 0)),
+        ("open(XML, 'w').write('<testsuite><testcase')", (0, 1, 0)),
+        ("import time; time.sleep(60)", (0, 1, 0)),  # ended at the limit
+    ],
+)
+def test_counts(tmp_path, script, counts, capsys):
+    item = program(tmp_path, script)
+    run(item, tmp_path / "log", limit=5.0)
+    assert (item.passed, item.failed, item.skipped) == counts
+    status = report([item], tmp_path)
+    assert status == (0 if counts[1] == 0 else 1)
+    assert capsys.readouterr().out.splitlines()[-1] == "{} passed, {} failed, {} skipped".format(*counts)
+
+
+def test_nothing_at_all_is_not_a_success(tmp_path):
+    assert report([], tmp_path) == 1

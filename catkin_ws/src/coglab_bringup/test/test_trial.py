@@ -1,0 +1,49 @@
+"""Figures and intervals of a trial against trials small enough to know the answer."""
+
+import numpy as np
+import pytest
+
+pytest.importorskip("coglab_msgs", reason="the workspace is not built or not sourced")
+from coglab_bringup.trial_plot import rows_without_overlap, state_intervals  # noqa: E402
+from coglab_bringup.trial_recorder import Trial, summarise  # noqa: E402
+
+LIMITS = np.full(7, 2.0)
+
+
+def test_summary_of_a_known_trial():
+    trial = Trial()
+    trial.joints = [(t, [0.0] * 7, [0.0] * 6 + [t / 10]) for t in np.arange(0.0, 10.0, 0.1)]
+    trial.feedback = [(4.0, "running", 0.2), (5.0, "reached", 0.004), (5.5, "reached", 0.003), (9.0, "reached", 0.5)]
+    trial.truth = [(5.9, [0, 0, 0], [0, 0, 0], [0, 0, 0], 0.1), (6.0, [0, 0, 0], [0, 0, 0], [0, 0, 0], 2.0)]
+    trial.contacts = [(6.04, True, 3.0)]
+    row = summarise(trial, "exchange_human_to_robot", "success", 1.0, 8.0, LIMITS)
+    assert row["duration_s"] == 7.0
+    assert row["final_error_mm"] == pytest.approx(3.0)  # the last arrival before contact
+    assert row["contact_delay_ms"] == pytest.approx(40.0)
+    assert row["peak_velocity_share"] == pytest.approx(0.4)
+
+
+def test_summary_without_measurements_says_none():
+    row = summarise(Trial(), "take", "no end", 0.0, 1.0, LIMITS)
+    assert row["final_error_mm"] is None and row["contact_delay_ms"] is None and row["peak_velocity_share"] is None
+
+
+def test_state_intervals_end_where_states_end():
+    trial = Trial()
+    trial.transitions = [
+        (1.0, "/m", "idle", "go", "work", ""),
+        (2.0, "/m/work", "first", "done", "second", ""),
+        (3.0, "/m/work", "second", "finished", "finished", ""),
+        (3.0, "/m", "work", "finished", "idle", ""),
+    ]
+    intervals = state_intervals(trial, 5.0)
+    assert intervals["/m/work"] == [(1.0, 2.0, "first"), (2.0, 3.0, "second")]
+    assert intervals["/m"] == [(1.0, 1.0, "idle"), (1.0, 3.0, "work"), (3.0, 5.0, "idle")]
+
+
+def test_children_of_a_concurrence_get_rows_of_their_own():
+    rows = rows_without_overlap([(0.0, 2.0, "a"), (0.0, 1.0, "b"), (1.0, 3.0, "c")])
+    assert sorted(name for row in rows for _, _, name in row) == ["a", "b", "c"]
+    for row in rows:
+        assert all(first[1] <= second[0] + 1e-3 for first, second in zip(row, row[1:]))
+    assert len(rows) == 2
