@@ -18,30 +18,54 @@ from reference_server import ReferenceServer  # noqa: E402
 LIMIT = 30.0
 
 
+KINDS = """action_without_server action_under_way monitor condition service service_that_hangs
+    concurrence handler handler_in_main_thread""".split()
+
+
 class TestShutdown(unittest.TestCase):
-    def run_until_interrupted(self, kind):
-        command = [sys.executable, os.path.join(HERE, "shutdown_machine.py"), kind]
-        process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
-        try:
-            for line in process.stdout:
-                if "READY" in line:
-                    break
-            process.send_signal(signal.SIGINT)
-            return process.communicate(timeout=LIMIT)[0]
-        finally:
+    @classmethod
+    def setUpClass(cls):
+        """All at once: most of the time goes into starting and ending processes."""
+        cls.server = ReferenceServer("reference")
+        cls.release = threading.Event()
+
+        def hang(request):
+            cls.release.wait(2 * LIMIT)
+            return TriggerResponse()
+
+        cls.service = rospy.Service("hangs", Trigger, hang)
+        script = os.path.join(HERE, "shutdown_machine.py")
+        cls.processes = {
+            kind: subprocess.Popen(
+                [sys.executable, script, kind], stdout=subprocess.PIPE, text=True
+            )
+            for kind in KINDS
+        }
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.release.set()
+        for process in cls.processes.values():
             process.kill()
             process.wait()
+            process.stdout.close()
+        cls.service.shutdown()
 
     def check(self, kind):
-        self.assertIn("OUTCOME", self.run_until_interrupted(kind))
+        process = self.processes[kind]
+        for line in process.stdout:
+            if "READY" in line:
+                break
+        self.assertIsNone(process.poll(), "still running before the interrupt")
+        process.send_signal(signal.SIGINT)
+        self.assertIn("OUTCOME end", process.communicate(timeout=LIMIT)[0])
 
     def test_s15_action_without_server(self):
         self.check("action_without_server")
 
     def test_s15_action_under_way(self):
-        server = ReferenceServer("reference")
         self.check("action_under_way")
-        self.assertEqual(server.goals, [3])
+        self.assertEqual(self.server.goals, [3])
 
     def test_s15_monitor(self):
         self.check("monitor")
@@ -53,22 +77,16 @@ class TestShutdown(unittest.TestCase):
         self.check("service")
 
     def test_s15_service_that_hangs(self):
-        done = threading.Event()
-        service = rospy.Service(
-            "hangs", Trigger, lambda request: done.wait(60) or TriggerResponse()
-        )
         self.check("service_that_hangs")
-        done.set()
-        service.shutdown()
 
     def test_s15_concurrence(self):
         self.check("concurrence")
 
     def test_s9_set_preempt_handler(self):
-        self.assertIn("OUTCOME end", self.run_until_interrupted("handler"))
+        self.check("handler")
 
     def test_s9_set_preempt_handler_does_not_wait_for_its_own_thread_better(self):
-        self.assertIn("OUTCOME end", self.run_until_interrupted("handler_in_main_thread"))
+        self.check("handler_in_main_thread")
 
 
 if __name__ == "__main__":
