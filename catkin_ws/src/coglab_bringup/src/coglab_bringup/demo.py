@@ -11,7 +11,7 @@ import sys
 import time
 from pathlib import Path
 
-from coglab_bringup.run_directory import free_port, run_environment
+from coglab_bringup.run_directory import free_port, record_times, run_environment
 
 MASTER_LIMIT = 30.0  # s until the ROS master answers
 
@@ -76,19 +76,6 @@ def wait_for_master(system: System, limit: float) -> None:
         time.sleep(0.1)
 
 
-def record_times(top: Path, seconds: float) -> None:
-    """Keeps the wall times of this demo for ./coglab bench wall."""
-    folder = top / ".coglab"
-    folder.mkdir(exist_ok=True)
-    path = folder / "times.json"
-    times = json.loads(path.read_text()) if path.is_file() else {}
-    install = float(os.environ.get("COGLAB_INSTALL_SECONDS", "0"))
-    build = float(os.environ.get("COGLAB_BUILD_SECONDS", "0"))
-    whole = {"install_s": install, "build_s": build, "run_s": round(seconds, 1), "total_s": round(install + build + seconds, 1)}
-    times["first_demo" if "first_demo" not in times else "later_demo"] = whole
-    path.write_text(json.dumps(times, indent=1) + "\n")
-
-
 def main(arguments: list[str]) -> int:
     """Exit status 0 if every handover succeeded."""
     top = Path(os.environ["COGLAB_TOP"])
@@ -132,7 +119,7 @@ def main(arguments: list[str]) -> int:
     for row in result["handovers"]:
         print(f"{row['kind']}: {row['outcome']}" + (f" in {row['duration_s']:.1f} s" if "duration_s" in row else ""))
     print(f"{good} of {len(kinds)} handovers succeeded; {out}/result.json and trial.png, log: {out}/roslaunch.log", flush=True)
-    record_times(top, time.monotonic() - began)
+    record_times(top, "demo", time.monotonic() - began)
     return 0 if good == len(kinds) else 1
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import socket
 import tempfile
@@ -40,3 +41,20 @@ def run_environment(port: int, home: Path | None = None) -> dict[str, str]:
     )
     environment.pop("ROS_HOSTNAME", None)
     return environment
+
+
+def record_times(top: Path, command: str, seconds: float) -> None:
+    """Keeps the wall times (s) of the first and the last run of ./coglab demo or test on this machine, for ./coglab bench wall.
+
+    `seconds` is the run itself; what installing and building took before it comes from the environment.
+    """
+    folder = top / ".coglab"
+    folder.mkdir(exist_ok=True)
+    path = folder / "times.json"
+    times = json.loads(path.read_text()) if path.is_file() else {}
+    install = float(os.environ.get("COGLAB_INSTALL_SECONDS", "0"))
+    build = float(os.environ.get("COGLAB_BUILD_SECONDS", "0"))
+    row = {"install_s": install, "build_s": build, "run_s": round(seconds, 1), "total_s": round(install + build + seconds, 1)}
+    times.setdefault(f"first_{command}", row)
+    times[f"last_{command}"] = row
+    path.write_text(json.dumps(times, indent=1) + "\n")

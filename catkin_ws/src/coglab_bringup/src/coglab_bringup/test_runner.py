@@ -21,7 +21,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from coglab_bringup.run_directory import free_port, run_environment
+from coglab_bringup.run_directory import free_port, record_times, run_environment
 
 TIME_LIMIT = 900.0  # s, per test program
 LONG_TIME_LIMIT = 7200.0  # s, with --long
@@ -189,6 +189,8 @@ def main(arguments: list[str]) -> int:
         if program.kind == "rostest":
             run_one(program)
     print(f"all tests: {time.monotonic() - start:.0f} s; JUnit files and logs: {results.relative_to(top)}")
+    if not options.packages and not options.long:
+        record_times(top, "test", time.monotonic() - start)
     return report(programs, results)
 
 
