@@ -38,6 +38,13 @@ def test_object_that_is_not_seen():
     assert_recovered_empty(trial, "'mug' was not seen within 5.0 s")
 
 
+def test_nobody_offers_the_object_and_the_arm_does_not_move():
+    from coglab_smach.pose import Pose
+    trial = failed_exchange(lambda t: t.cell.objects.__setitem__("mug", Pose([1.2, 0.2, 0.1])))
+    assert_recovered_empty(trial, "'mug' was not offered within 8 s: it stayed at (1.20, 0.20, 0.10) m")
+    assert "execute_dmp" not in trial.cell.called()
+
+
 def test_no_person_means_no_contact_within_the_limit():
     trial = failed_exchange(lambda t: setattr(t.cell.partner, "touch_after", None))
     assert_recovered_empty(trial, "contact of an object with the hand within 6.0 s expected")

@@ -75,18 +75,38 @@ def locate(state: CoglabState, target: str) -> dict[str, Any]:
 
 
 class SetGraspGoal(CoglabState):
-    """DMP goal from the nominal grasp: palm relative to the tracked object frame, short of it by the approach distance."""
+    """DMP goal from the nominal grasp: palm relative to the tracked object frame, short of it by the approach distance.
 
-    default_time_limit = 10.0
+    Ends when the object is on offer, that is inside the handover region: the arm must not chase an object that still
+    rests with the person. Nobody offering it within the limit is a failure, and the arm has not moved.
+    """
+
+    default_time_limit = 20.0
 
     def __init__(self, ctx: Context) -> None:
         super().__init__(ctx, input_keys=["object_id", "object_entry", "grasp"], output_keys=["goal", "located"])
 
     def run(self, ud: Any) -> str:
+        limit = float(self.ctx.config.get("handover.offer_timeout", 8.0))
+        end = self.ctx.clock.now() + limit
         located = locate(self, ud.object_id)
+        while not self._on_offer(located["xyz"]):
+            if self.ctx.clock.now() > end:
+                place = ", ".join(f"{v:.2f}" for v in located["xyz"])
+                raise PortError(f"'{ud.object_id}' was not offered within {limit:.0f} s: it stayed at ({place}) m, outside "
+                                "the handover region", ("nobody reaches toward the robot",))
+            self.pause(0.03)
+            located = locate(self, ud.object_id)
+        self.ctx.journal.mark("offered")
         ud.located = located
         ud.goal = grasp_goal(ud.object_entry, ud.grasp, located["frame"], "receive")
         return "succeeded"
+
+
+    def _on_offer(self, xyz: list[float]) -> bool:
+        low = self.ctx.config.get("handover.region_low", [-1.0, -1.0, -1.0])
+        high = self.ctx.config.get("handover.region_high", [1.0, 1.0, 2.0])
+        return all(a <= v <= b for a, v, b in zip(low, xyz, high))
 
 
 class SetTakeGoal(CoglabState):
