@@ -1,6 +1,10 @@
 """Section 7 of the specification: Concurrence; complaints 1, 7 and 8 of section 15."""
 
+import os
 import pickle
+import signal
+import subprocess
+import sys
 import threading
 import time
 
@@ -379,6 +383,33 @@ def test_s7_shutdown_takes_the_children_along_better():
     smach.set_shutdown_check(lambda: True)
     run.join(10)
     assert not run.is_alive()
+
+
+def test_s7_ctrl_c_in_the_main_thread_takes_the_children_along_better():
+    code = """
+import smach, machine_parts
+both = smach.Concurrence(["done", "preempted"], "done")
+with both:
+    smach.Concurrence.add("A", machine_parts.Serves(patience=60))
+    smach.Concurrence.add("B", machine_parts.Serves(patience=60))
+both.register_transition_cb(lambda ud, labels: print("READY", flush=True))
+try:
+    both.execute()
+except KeyboardInterrupt:
+    print("INTERRUPTED", both.is_running(), flush=True)
+"""
+    env = {**os.environ, "PYTHONPATH": os.pathsep.join([p for p in sys.path if p])}
+    process = subprocess.Popen(
+        [sys.executable, "-c", code], stdout=subprocess.PIPE, text=True, env=env
+    )
+    try:
+        while "READY" not in process.stdout.readline():
+            pass
+        process.send_signal(signal.SIGINT)
+        assert "INTERRUPTED False" in process.communicate(timeout=30)[0]
+    finally:
+        process.kill()
+        process.wait()
 
 
 def test_s7_too_few_threads_is_an_error_and_nothing_runs(monkeypatch):

@@ -65,7 +65,9 @@ class Container(State):
         self._end_cbs: list[tuple[Callable, Sequence]] = []
 
     def __getstate__(self) -> dict:
-        return {key: value for key, value in self.__dict__.items() if not key.endswith("_lock")}
+        # Locks cannot be pickled; __setstate__ makes them anew.
+        locks = ("_preempt_lock", "_callback_lock")
+        return {key: value for key, value in self.__dict__.items() if key not in locks}
 
     def __setstate__(self, state: dict) -> None:
         self.__dict__.update(state)
