@@ -1,0 +1,89 @@
+#!/usr/bin/python3
+"""Imitation error and step time of the DMP beside PyPI movement_primitives (if it is there)."""
+
+import json
+import sys
+import time
+
+import numpy as np
+from core_bench import Row, core_times, row
+from curves import SAMPLES, curves
+
+import coglab_controllers as cc
+
+try:
+    from movement_primitives.dmp import DMP
+except ImportError:  # the peer is optional: its column is then null
+    DMP = None
+
+PEER = "movement_primitives" if DMP is not None else None
+BASIS = 20
+TIMES = np.linspace(0.0, 1.0, SAMPLES)
+
+
+def relative_rmse(path: np.ndarray, wanted: np.ndarray) -> float:
+    """RMSE in percent of the path's length."""
+    length = np.linalg.norm(np.diff(wanted, axis=0), axis=1).sum()
+    return 100.0 * float(np.sqrt(np.mean(np.sum((path - wanted) ** 2, axis=1)))) / length
+
+
+def ours(wanted: np.ndarray, dt: float) -> float:
+    """Error of our reproduction, start velocity kept."""
+    primitive = cc.learn("curve", [(TIMES, wanted)], basis_count=BASIS)
+    return relative_rmse(cc.reproduce(primitive, TIMES, dt), wanted)
+
+
+def theirs(wanted: np.ndarray) -> float:
+    """Error of the peer with as many basis functions, begun with the same velocity."""
+    dt = 1.0 / (SAMPLES - 1)
+    dmp = DMP(n_dims=3, execution_time=1.0, dt=dt, n_weights_per_dim=BASIS)
+    dmp.imitate(TIMES, wanted)
+    velocity = (wanted[1] - wanted[0]) / dt
+    dmp.configure(start_y=wanted[0], goal_y=wanted[-1], start_yd=velocity)
+    _, path = dmp.open_loop(run_t=1.0)
+    return relative_rmse(path[:SAMPLES], wanted)
+
+
+def peer_step_time() -> float:
+    """Median time of the peer's step, us."""
+    dmp = DMP(n_dims=3, execution_time=1.0, dt=0.005, n_weights_per_dim=BASIS)
+    dmp.configure(start_y=np.zeros(3), goal_y=np.ones(3))
+    position, velocity, spent = np.zeros(3), np.zeros(3), []
+    for _ in range(150):
+        begin = time.perf_counter()
+        position, velocity = dmp.step(position, velocity)
+        spent.append(time.perf_counter() - begin)
+    return 1e6 * float(np.median(spent))
+
+
+def imitation_rows() -> list[Row]:
+    """Errors over all curves and per kind."""
+    wanted = curves(44)
+    errors = np.array([ours(path, 0.001) for _, path in wanted])
+    at_cycle = np.array([ours(path, 0.005) for _, path in wanted])
+    peer = np.array([theirs(path) for _, path in wanted]) if DMP else None
+    rows = [
+        row("dmp", f"imitation RMSE, median of {len(wanted)} curves, N=20", np.median(errors), "% of path", "<= 0.10",
+            PEER, None if peer is None else np.median(peer), below_peer=True),
+        row("dmp", "imitation RMSE, 95th percentile", np.percentile(errors, 95), "% of path", "",
+            PEER, None if peer is None else np.percentile(peer, 95), below_peer=True),
+        row("dmp", "imitation RMSE, median, stepped at 200 Hz", np.median(at_cycle), "% of path", "<= 0.10"),
+    ]
+    for kind in dict.fromkeys(kind for kind, _ in wanted):
+        chosen = np.array([k == kind for k, _ in wanted])
+        rows.append(row("dmp", f"imitation RMSE, median, {kind}", np.median(errors[chosen]), "% of path", "",
+                        PEER, None if peer is None else np.median(peer[chosen])))
+    return rows
+
+
+def main() -> None:
+    """Prints the rows as JSON."""
+    rows = imitation_rows()
+    peer = peer_step_time() if DMP else None
+    rows.append(row("dmp", "step, three axes, N=20, 200 Hz", core_times()["dmp_step_20"], "us", "<= 0.5", PEER, peer))
+    json.dump(rows, sys.stdout, indent=1)
+    print()
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,165 @@
+#!/usr/bin/python3
+"""What a goal that steps, moves or trembles does to the motion, beside PyPI movement_primitives (if it is there)."""
+
+import json
+import sys
+
+import numpy as np
+from core_bench import Row, minimum_jerk, row
+
+import coglab_controllers as cc
+
+try:
+    from movement_primitives.dmp import DMP
+except ImportError:  # the peer is optional: its column is then null
+    DMP = None
+
+PEER = "movement_primitives" if DMP is not None else None
+CYCLE, DURATION = 0.005, 1.0
+GOAL = np.array([0.51, 0.0, 0.0])
+TIMES = np.linspace(0.0, DURATION, 1001)
+DEMONSTRATION = np.outer(minimum_jerk(TIMES / DURATION), GOAL)
+UPRIGHT = np.array([0.0, 0.0, 0.0, 1.0])
+PRIMITIVE = cc.learn("reach", [(TIMES, DEMONSTRATION)], mapping="similarity")
+
+
+def run(goal_at, cycles: int, estimator: float = 0.06) -> tuple[np.ndarray, np.ndarray, np.ndarray, list[str]]:
+    """Positions, commanded velocities, accelerations (cycles, 3) and events of a motion to goal_at(time)."""
+    motion = cc.CartesianMotion(estimator)
+    motion.start(PRIMITIVE, np.zeros(3), UPRIGHT, goal_at(0.0), UPRIGHT)
+    positions, velocities, accelerations, events = [], [], [], []
+    for i in range(cycles):
+        reference = motion.step(CYCLE, goal_at(i * CYCLE), UPRIGHT)
+        positions.append(motion.position)
+        velocities.append(reference.velocity)
+        accelerations.append(motion.acceleration)
+        events.append(motion.event)
+    return np.array(positions), np.array(velocities), np.array(accelerations), events
+
+
+def largest_change(accelerations: np.ndarray) -> float:
+    """Largest change of the acceleration from one cycle to the next, m/s^2."""
+    return float(np.linalg.norm(np.diff(accelerations, axis=0), axis=1).max())
+
+
+def settling(positions: np.ndarray, goal: np.ndarray) -> float:
+    """Share of the duration after which the distance stays within 10 mm."""
+    outside = np.nonzero(np.linalg.norm(positions - goal, axis=1) > 0.01)[0]
+    return float((outside[-1] + 2) * CYCLE / DURATION)
+
+
+def peer_step(moved: np.ndarray) -> tuple[float, float]:
+    """Change of acceleration and settling time of the peer for the same goal step."""
+    dmp = DMP(n_dims=3, execution_time=DURATION, dt=CYCLE, n_weights_per_dim=20)
+    dmp.imitate(TIMES, DEMONSTRATION)
+    dmp.configure(start_y=np.zeros(3), goal_y=GOAL)
+    position, velocity = np.zeros(3), np.zeros(3)
+    positions, velocities = [position], [velocity]
+    for i in range(300):
+        if i == round(0.3 * DURATION / CYCLE):
+            dmp.configure(goal_y=moved)
+        position, velocity = (np.array(a) for a in dmp.step(position, velocity))
+        positions.append(position)
+        velocities.append(velocity)
+    accelerations = np.diff(velocities, axis=0) / CYCLE
+    return largest_change(accelerations[1:]), settling(np.array(positions[1:]), moved)
+
+
+def peer_lag() -> float:
+    """Lag of the peer behind a goal that moves at 0.1 m/s, mm, as long as its motion lasts."""
+    dmp = DMP(n_dims=3, execution_time=DURATION, dt=CYCLE, n_weights_per_dim=20)
+    dmp.imitate(TIMES, DEMONSTRATION)
+    dmp.configure(start_y=np.zeros(3), goal_y=GOAL)
+    position, velocity, goal = np.zeros(3), np.zeros(3), GOAL
+    for i in range(round(DURATION / CYCLE)):
+        goal = GOAL + np.array([0.0, 0.1 * i * CYCLE, 0.0])
+        dmp.configure(goal_y=goal)
+        position, velocity = (np.array(a) for a in dmp.step(position, velocity))
+    return 1000.0 * float(np.linalg.norm(position - goal))
+
+
+def step_rows() -> list[Row]:
+    """A step of 100 mm to the side at 0.3 of the duration."""
+    moved = GOAL + np.array([0.0, 0.1, 0.0])
+
+    def goal_at(t: float) -> np.ndarray:
+        return moved if t >= 0.3 * DURATION - 1e-9 else GOAL
+
+    positions, _, accelerations, _ = run(goal_at, 400)
+    peer_change, peer_settling = peer_step(moved) if DMP else (None, None)
+    plain_positions, _, plain, _ = run(goal_at, 400, estimator=0.0)
+    return [
+        row("goal_change", "goal step of 100 mm at 0.3 T: change of acceleration per 5 ms", largest_change(accelerations),
+            "m/s^2", "< 1", PEER, peer_change, below_peer=True),
+        row("goal_change", "the same without the goal estimator", largest_change(plain), "m/s^2", ""),
+        row("goal_change", "goal step of 100 mm at 0.3 T: within 10 mm", settling(positions, moved), "T", "<= 0.95", PEER,
+            peer_settling),
+        row("goal_change", "the same without the goal estimator (settling)", settling(plain_positions, moved), "T", ""),
+    ]
+
+
+def moving_rows() -> list[Row]:
+    """A goal that moves at 0.1 m/s from the start."""
+
+    def goal_at(t: float) -> np.ndarray:
+        return GOAL + np.array([0.0, 0.1 * t, 0.0])
+
+    positions, _, _, _ = run(goal_at, 500)
+    goals = np.array([goal_at(i * CYCLE) for i in range(500)])
+    lag = 1000.0 * np.linalg.norm(positions - goals, axis=1)
+    plain, _, _, _ = run(goal_at, 500, estimator=0.0)
+    plain_lag = 1000.0 * np.linalg.norm(plain - goals, axis=1)
+    end = round(DURATION / CYCLE)
+    peer = peer_lag() if DMP else None
+    return [
+        row("goal_change", "goal moving at 0.1 m/s: lag from T on, largest", lag[end:].max(), "mm", "<= 2", PEER, peer,
+            below_peer=True),
+        row("goal_change", "the same, without goal velocity", plain_lag[end:].max(), "mm", ""),
+    ]
+
+
+def noise_rows() -> list[Row]:
+    """A still goal seen at 30 Hz with 4 mm of noise."""
+    rng = np.random.default_rng(3)
+    frames = [GOAL + rng.normal(scale=0.004, size=3) for _ in range(400)]
+    still, _, _, _ = run(lambda t: GOAL, 1200)
+    positions, velocities, _, events = run(lambda t: frames[int(t * 30.0)], 1200)
+    ended = events.index("ended") if "ended" in events else len(events) - 1
+    speed = np.linalg.norm(velocities, axis=1)
+    extra = np.linalg.norm(np.diff(positions - still, axis=0), axis=1) / CYCLE
+    return [
+        row("goal_change", "still goal, 4 mm noise at 30 Hz: speed that the noise adds during the motion, RMS",
+            1000.0 * np.sqrt(np.mean(extra[:ended] ** 2)), "mm/s", ""),
+        row("goal_change", "still goal, 4 mm noise: end of the motion", ended * CYCLE / DURATION, "T", "<= 2"),
+        row("goal_change", "still goal, 4 mm noise: largest speed from 1 s after the end on",
+            1000.0 * speed[ended + round(1.0 / CYCLE):].max(), "mm/s", "<= 0"),
+        row("goal_change", "still goal, 4 mm noise: times it was followed again", events.count("follows_again"), "1",
+            "<= 0"),
+    ]
+
+
+def switch_rows() -> list[Row]:
+    """Another primitive and another ratio in mid-motion."""
+    other = cc.learn("other", [(1.6 * TIMES, DEMONSTRATION + 0.1 * np.outer(np.sin(np.pi * minimum_jerk(TIMES)),
+                                                                             [0, 0, 1]))])
+    worst = 0.0
+    rng = np.random.default_rng(4)
+    for _ in range(500):
+        dmp = cc.Dmp(PRIMITIVE, np.zeros(3), GOAL)
+        for _ in range(rng.integers(1, 200)):
+            dmp.step(CYCLE, GOAL)
+        position, velocity, phase = dmp.position, dmp.velocity, dmp.phase
+        dmp.switch_to(other, GOAL, rng.uniform(0.5, 2.0))
+        worst = max(worst, np.abs(dmp.position - position).max(), np.abs(dmp.velocity - velocity).max(),
+                    abs(dmp.phase - phase))
+    return [row("goal_change", "switch_dmp: step in position, velocity and phase", worst, "m, m/s, 1", "<= 1e-9")]
+
+
+def main() -> None:
+    """Prints the rows as JSON."""
+    json.dump(step_rows() + moving_rows() + noise_rows() + switch_rows(), sys.stdout, indent=1)
+    print()
+
+
+if __name__ == "__main__":
+    main()
