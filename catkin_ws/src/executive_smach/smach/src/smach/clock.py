@@ -28,7 +28,10 @@ from typing import Protocol
 
 
 class Event(Protocol):
-    """What `Clock.event()` returns: the interface of `threading.Event`."""
+    """What `Clock.event()` returns: the interface of `threading.Event`.
+
+    Example: `done = clock.event(); done.wait(5.0)`.
+    """
 
     def set(self) -> None:
         """Wake all who wait."""

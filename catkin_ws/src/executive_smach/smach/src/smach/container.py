@@ -171,13 +171,12 @@ class Container(State):
         self.open()
         return self
 
-    def __exit__(self, kind: type | None, error: BaseException | None, trace: Any) -> bool:
+    def __exit__(self, kind: type | None, error: BaseException | None, trace: Any) -> None:
         if error is None:
             self.close()
-            return False
-        if not isinstance(
-            error, (InvalidStateError, InvalidTransitionError)
-        ):  # these were logged when made
+            return
+        logged_when_made = (InvalidStateError, InvalidTransitionError)
+        if not isinstance(error, logged_when_made):
             text = "".join(traceback.format_exception(kind, error, trace))
             smach.logerr(f"construction of {self._name()} failed: {text}")
         # Whatever happened inside, nobody else may find the construction lock taken.
@@ -185,12 +184,12 @@ class Container(State):
             while not self.is_opened():
                 Container._construction_stack[-1]._pop()
             self._pop()
-        return False
 
     @contextmanager
     def opened(self, **_kwargs: Any) -> Iterator[Container]:
-        """`with machine.opened() as m:` is `with machine:`; keyword arguments are accepted and have
-        no effect.
+        """The same as `with machine:`; keyword arguments are accepted and have no effect.
+
+        Example: `with machine.opened() as m: ...`.
         """
         with self:
             yield self

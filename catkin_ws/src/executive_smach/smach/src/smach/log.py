@@ -14,12 +14,13 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable
+from typing import TextIO
 
 Logger = Callable[[str], object]
 
 
-def _write(level: str, message: object, stream: object) -> None:
-    print(f"[ {level} ] : {message}", file=stream)  # type: ignore[arg-type]
+def _write(level: str, message: object, stream: TextIO) -> None:
+    print(f"[ {level} ] : {message}", file=stream)
 
 
 def loginfo(message: object) -> None:
@@ -43,7 +44,10 @@ def logerr(message: object) -> None:
 
 
 def is_shutdown() -> bool:
-    """Whether the process is shutting down. Without ROS never; see `set_shutdown_check`."""
+    """Whether the process is shutting down; without ROS never. See `set_shutdown_check`.
+
+    Example: `while not smach.is_shutdown(): ...`.
+    """
     return False
 
 
