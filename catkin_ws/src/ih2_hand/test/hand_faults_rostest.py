@@ -66,7 +66,8 @@ class HandFaults(unittest.TestCase):
 
     def test_reconnection_counts_as_holding_and_moves_nothing(self) -> None:
         self.assertTrue(self.hand.run("hand_preshape", "lateral", "high").isOk)
-        before = list(self.hand.fingers.position)
+        before = [110, 5, 160, 245, 245]
+        self.hand.wait(lambda: list(self.hand.fingers.position) == before, "fingers at rest")
         self.hand.fault("unplug 1")
         self.hand.wait(lambda: not self.hand.status.connected, "loss")
         self.hand.wait(lambda: self.hand.status.connected, "reconnection")

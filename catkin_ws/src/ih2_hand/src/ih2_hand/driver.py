@@ -58,13 +58,15 @@ class HandSerialDriver:
     def __init__(self, serial_port: str | None = None, *, dialect: str | None = None,
                  preshapes: Mapping[str, Sequence[int]] | None = None,
                  send_preshape: bool = WIRE.send_preshape, transport: Transport | None = None,
-                 clock: Clock | None = None, trace: TraceHook | None = None):
+                 clock: Clock | None = None, trace: TraceHook | None = None,
+                 read_timeout: float = WIRE.read_timeout_s):
         """Open the port, bring the line in step, and ask the hand for one status.
 
         `serial_port` is a device, a pty or `socket://host:port`; None takes the one serial device
         there is. `dialect` is `legacy` or `v17` (W1). `preshapes` replaces grasps.yaml.
         `send_preshape` False keeps set_grasp_mode from moving the fingers (W21). `transport`
-        replaces the port altogether. Opening stops the fingers (W10) but moves nothing.
+        replaces the port altogether. `read_timeout` (s) bounds each wait for an
+        answer. Opening stops the fingers (W10) but moves nothing.
         Raises HandPortError when the port cannot be opened or no hand answers on it.
         """
         self.dialect = dialect if dialect is not None else WIRE.dialect
@@ -77,7 +79,7 @@ class HandSerialDriver:
         self._grasp_mode: tuple[str, str] | None = None
         self._calibrating = False
         self._resting: set[int] = set()
-        self.line = HandLine(transport or SerialTransport(serial_port), clock, trace=trace)
+        self.line = HandLine(transport or SerialTransport(serial_port), clock, read_timeout, trace)
         self.port = self.line.port
         try:
             self.line.resynchronise("port opened")

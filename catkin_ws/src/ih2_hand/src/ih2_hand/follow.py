@@ -7,13 +7,10 @@ from types import SimpleNamespace
 from typing import Any
 
 from ih2_hand.driver import HandSerialDriver
-from ih2_hand.progress import Task, Verdict
+from ih2_hand.progress import RESENDS, Task, Verdict
 
 PERIOD_S = 1.0 / 30.0
 """Time between polls."""
-
-RESENDS = 2
-"""Times a command is repeated after a resynchronisation stopped the fingers."""
 
 
 def follow(driver: HandSerialDriver, task: Task, *, period: float = PERIOD_S,

@@ -28,6 +28,9 @@ STALL_S = 0.4
 BLOCKED_S = 1.0
 """A position move that stands this long before its target is blocked."""
 
+RESENDS = 2
+"""Times a command is repeated after a resynchronisation stopped the fingers."""
+
 LONGEST_S = 60.0
 """No goal may last longer, whatever its speed."""
 

@@ -34,16 +34,13 @@ from coglab_msgs.msg import (
 )
 
 from ih2_hand.errors import HandError
-from ih2_hand.progress import Task, Verdict
+from ih2_hand.progress import RESENDS, Task, Verdict
 
 SETTLE_S = 0.02
 """Polls begun earlier than this after a command may still show the status before it."""
 
 SILENCE_S = 1.5
 """Without a hand_status for this long a goal is aborted."""
-
-RESENDS = 2
-"""Times a command is repeated after a resynchronisation stopped the fingers."""
 
 SPECS: dict[str, tuple[Any, Any, Any]] = {
     "hand_open": (HandOpenAction, HandOpenResult, HandOpenFeedback),

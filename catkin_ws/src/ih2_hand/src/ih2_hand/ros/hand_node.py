@@ -37,6 +37,7 @@ from ih2_hand.ros.diagnostics import Diagnostics
 from ih2_hand.ros.goals import GoalQueue
 from ih2_hand.ros.messages import joint_state, motor_status
 from ih2_hand.ros.tracing import TracePublisher
+from ih2_hand.wire_choices import WIRE
 
 RECONNECT_S = 0.5
 """Pause between attempts to open the port."""
@@ -53,8 +54,8 @@ class HandNode:
 
     Parameters (private): `serial_port` (device, pty, socket:// URL, `param:NAME` to read it from
     another parameter, empty for the one serial device there is), `rate` (Hz, 30), `dialect`
-    (legacy), `use_tension` (false: grip by motor current), `goal_time_limit` (s, 10),
-    `grasps_file` (empty: the package's grasps.yaml).
+    (legacy), `read_timeout` (s, 0.05: longest wait for an answer), `use_tension` (false: grip by
+    motor current), `goal_time_limit` (s, 10), `grasps_file` (empty: the package's grasps.yaml).
     """
 
     def __init__(self) -> None:
@@ -64,6 +65,9 @@ class HandNode:
             raise ValueError(f"~rate must be 1..200 Hz; got {self.rate}")
         self._dialect = str(rospy.get_param("~dialect", "legacy"))
         self._is_current = not bool(rospy.get_param("~use_tension", False))
+        self._read_timeout = float(rospy.get_param("~read_timeout", WIRE.read_timeout_s))
+        if not 0.005 <= self._read_timeout <= 0.5:
+            raise ValueError(f"~read_timeout must be 0.005..0.5 s; got {self._read_timeout}")
         self._limit = float(rospy.get_param("~goal_time_limit", 10.0))
         self._preshapes = grasps.load_preshapes(rospy.get_param("~grasps_file", "") or None)
         self.driver: HandSerialDriver | None = None
@@ -116,7 +120,8 @@ class HandNode:
         try:
             self.port = self._resolve_port()
             driver = HandSerialDriver(None if self.port == "" else self.port, dialect=self._dialect,
-                                      preshapes=self._preshapes, trace=self._trace.hook)
+                                      preshapes=self._preshapes, trace=self._trace.hook,
+                                      read_timeout=self._read_timeout)
         except HandError as error:
             text = str(error)
             if text != self.message:
@@ -197,6 +202,9 @@ class HandNode:
         self._publish(readings, stamp)
 
     def _publish(self, readings: list[dict[str, Any]], stamp: rospy.Time) -> None:
+        calibrating = self.calibrating
+        if calibrating:
+            readings = []  # read before it began
         status = HandStatus(motors=[motor_status(reading) for reading in readings])
         if readings:
             if self.holding and shown_empty(status.motors):
@@ -206,7 +214,7 @@ class HandNode:
                 self.holding = True
             self._joints.publish(joint_state(readings, stamp))
         status.header.stamp = stamp
-        status.calibrated, status.calibrating = self.calibrated, self.calibrating
+        status.calibrated, status.calibrating = self.calibrated, calibrating
         status.connected, status.holding = self.driver is not None, self.holding
         status.message = self.message
         self._publisher.publish(status)
