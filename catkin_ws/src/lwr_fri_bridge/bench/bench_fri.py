@@ -1,10 +1,12 @@
 #!/usr/bin/python3
-"""Answer latency of the bridge against a bare echo, at 1 kHz, in command mode, control thread running.
+"""Answer latency of the bridge against a bare echo, at 1 kHz, in command mode.
 
-Blocks of 500 packets in the order echo, bridge, bridge, echo. The ratio of the medians of neighbouring blocks is judged by its median over all
-pairs, with the distribution-free 95 % interval of that median. The ratio of the 99th percentiles is shown beside the same ratio
-of echo against echo, because on a machine that is not a real-time one it says more about the machine. Prints JSON.
+A control thread is running. Blocks of 500 packets go to echo, bridge, bridge, echo. The ratio of the
+medians of neighbouring blocks is judged by its median over all pairs, with the distribution-free 95 %
+interval of that median. The ratio of the 99th percentiles is shown beside the same ratio of echo against
+echo: on a machine that is not a real-time one it says more about the machine. Prints JSON.
 """
+
 from __future__ import annotations
 
 import json
@@ -55,7 +57,9 @@ def median_interval(values: list[float]) -> tuple[float, float]:
 
 
 def measure() -> list[tuple[str, list[float]]]:
-    limits = pathlib.Path(__file__).resolve().parents[2] / "lwr_description/config/joint_limits.yaml"
+    limits = (
+        pathlib.Path(__file__).resolve().parents[2] / "lwr_description/config/joint_limits.yaml"
+    )
     binary = find_peer()
     peers = []
     try:
@@ -63,9 +67,13 @@ def measure() -> list[tuple[str, list[float]]]:
         peers.append(echo)
         bridge, bridge_port = start_peer(binary, "bridge", str(limits))
         peers.append(bridge)
-        run = subprocess.run([binary, "measure", str(echo_port), str(bridge_port), str(QUADS)],
-                             stdout=subprocess.PIPE, text=True, check=True,
-                             timeout=60 + 10 * QUADS)
+        run = subprocess.run(
+            [binary, "measure", str(echo_port), str(bridge_port), str(QUADS)],
+            stdout=subprocess.PIPE,
+            text=True,
+            check=True,
+            timeout=60 + 10 * QUADS,
+        )
     finally:
         for peer in peers:
             peer.terminate()
@@ -93,29 +101,77 @@ def main() -> None:
         echo_p99_ratios.append(p99s[first + 3] / p99s[first])
     low, high = median_interval(ratios)
     ratio = statistics.median(ratios)
-    medians_of = {kind: statistics.median(m for (k, _), m in zip(answered, medians) if k == kind)
-                  for kind in ("echo", "bridge")}
-    missed = {kind: sum(v < 0.0 for k, values in blocks if k == kind for v in values)
-              for kind in ("echo", "bridge")}
+    medians_of = {
+        kind: statistics.median(m for (k, _), m in zip(answered, medians, strict=True) if k == kind)
+        for kind in ("echo", "bridge")
+    }
+    missed = {
+        kind: sum(v < 0.0 for k, values in blocks if k == kind for v in values)
+        for kind in ("echo", "bridge")
+    }
 
-    def row(figure: str, value: float, unit: str, goal: str = "", peer: str | None = None,
-            peer_value: float | None = None, ok: bool | None = None) -> dict[str, object]:
-        return {"bench": "fri", "figure": figure, "value": round(value, 4), "unit": unit,
-                "goal": goal, "peer": peer,
-                "peer_value": None if peer_value is None else round(peer_value, 4), "ok": ok}
+    def row(
+        figure: str,
+        value: float,
+        unit: str,
+        goal: str = "",
+        peer: str | None = None,
+        peer_value: float | None = None,
+        ok: bool | None = None,
+    ) -> dict[str, object]:
+        return {
+            "bench": "fri",
+            "figure": figure,
+            "value": round(value, 4),
+            "unit": unit,
+            "goal": goal,
+            "peer": peer,
+            "peer_value": None if peer_value is None else round(peer_value, 4),
+            "ok": ok,
+        }
 
-    print(json.dumps([
-        row(f"answer latency, median of {len(ratios)} block ratios", ratio, "bridge/echo",
-            f"<= {LIMIT:.2f}, 95 % interval not above", "bare echo", 1.0, low <= LIMIT),
-        row("answer latency ratio, 95 % interval, low end", low, "bridge/echo"),
-        row("answer latency ratio, 95 % interval, high end", high, "bridge/echo"),
-        row("answer latency, median", medians_of["bridge"], "us", "", "bare echo",
-            medians_of["echo"]),
-        row("answer latency, ratio of p99", statistics.median(p99_ratios), "bridge/echo", "",
-            "echo/echo", statistics.median(echo_p99_ratios)),
-        row("answers missing within 20 ms", missed["bridge"], "packets", "", "bare echo",
-            missed["echo"]),
-    ], indent=1))
+    print(
+        json.dumps(
+            [
+                row(
+                    f"answer latency, median of {len(ratios)} block ratios",
+                    ratio,
+                    "bridge/echo",
+                    f"<= {LIMIT:.2f}, 95 % interval not above",
+                    "bare echo",
+                    1.0,
+                    low <= LIMIT,
+                ),
+                row("answer latency ratio, 95 % interval, low end", low, "bridge/echo"),
+                row("answer latency ratio, 95 % interval, high end", high, "bridge/echo"),
+                row(
+                    "answer latency, median",
+                    medians_of["bridge"],
+                    "us",
+                    "",
+                    "bare echo",
+                    medians_of["echo"],
+                ),
+                row(
+                    "answer latency, ratio of p99",
+                    statistics.median(p99_ratios),
+                    "bridge/echo",
+                    "",
+                    "echo/echo",
+                    statistics.median(echo_p99_ratios),
+                ),
+                row(
+                    "answers missing within 20 ms",
+                    missed["bridge"],
+                    "packets",
+                    "",
+                    "bare echo",
+                    missed["echo"],
+                ),
+            ],
+            indent=1,
+        )
+    )
 
 
 if __name__ == "__main__":

@@ -1,5 +1,6 @@
 #!/usr/bin/python3
-"""Time of one interpolator step (7 axes) and its distance from ruckig, if that is installed. Prints JSON."""
+"""Time of one interpolator step (7 axes) and its distance from ruckig, if installed. Prints JSON."""
+
 from __future__ import annotations
 
 import json
@@ -22,8 +23,9 @@ def step_time() -> float:
     for prefix in os.environ.get("CMAKE_PREFIX_PATH", "").split(":"):
         path = pathlib.Path(prefix) / "lib" / "lwr_fri_bridge" / BINARY
         if path.is_file():
-            out = subprocess.run([str(path), str(LIMITS)], check=True, stdout=subprocess.PIPE,
-                                 text=True, timeout=120).stdout
+            out = subprocess.run(
+                [str(path), str(LIMITS)], check=True, stdout=subprocess.PIPE, text=True, timeout=120
+            ).stdout
             return float(out.split()[0])
     sys.exit(f"{BINARY} not found: build the workspace and source its setup.bash")
 
@@ -51,19 +53,37 @@ def distance_from_ruckig() -> float | None:
             generator.calculate(parameters, trajectory)
             theirs = [entry[0] for entry in trajectory.at_time(tick)[:3]]
             ours = lwr_fri_bridge.step_axis(p, v, a, target, max_a, max_j, tick)
-            worst = max(worst, *(abs(x - y) for x, y in zip(ours, theirs)))
+            worst = max(worst, *(abs(x - y) for x, y in zip(ours, theirs, strict=True)))
     return worst
 
 
 def main() -> None:
     us = step_time()
-    rows = [{"bench": "interpolator", "figure": "step of 7 axes, median", "value": round(us, 4), "unit": "us",
-             "goal": f"<= {LIMIT_US}", "peer": None, "peer_value": None, "ok": us <= LIMIT_US}]
+    rows = [
+        {
+            "bench": "interpolator",
+            "figure": "step of 7 axes, median",
+            "value": round(us, 4),
+            "unit": "us",
+            "goal": f"<= {LIMIT_US}",
+            "peer": None,
+            "peer_value": None,
+            "ok": us <= LIMIT_US,
+        }
+    ]
     worst = distance_from_ruckig()
-    rows.append({"bench": "interpolator", "figure": "largest difference, 100 000 random states", "value": worst,
-                 "unit": "rad, rad/s, rad/s^2", "goal": f"<= {LIMIT_DIFFERENCE}",
-                 "peer": "ruckig" if worst is not None else "ruckig (not installed)", "peer_value": None,
-                 "ok": None if worst is None else worst <= LIMIT_DIFFERENCE})
+    rows.append(
+        {
+            "bench": "interpolator",
+            "figure": "largest difference, 100 000 random states",
+            "value": worst,
+            "unit": "rad, rad/s, rad/s^2",
+            "goal": f"<= {LIMIT_DIFFERENCE}",
+            "peer": "ruckig" if worst is not None else "ruckig (not installed)",
+            "peer_value": None,
+            "ok": None if worst is None else worst <= LIMIT_DIFFERENCE,
+        }
+    )
     print(json.dumps(rows, indent=1))
 
 

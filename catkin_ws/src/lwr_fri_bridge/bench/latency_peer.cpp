@@ -2,10 +2,13 @@
 /// The three processes of bench_fri.py, all over UDP on 127.0.0.1:
 ///
 ///   echo                          bare recv/send: the floor. Prints its port.
-///   bridge LIMITS_FILE            FRI thread with the whole bridge in command mode, and a control thread that is woken every 5 ms
+///   bridge LIMITS_FILE            FRI thread with the whole bridge in command mode, and a control
+///   thread that is woken every 5 ms
 ///                                 and moves the arm. Prints its port.
-///   measure ECHO BRIDGE QUADS     paced 1 kHz controller: blocks of 500 packets in the order echo bridge bridge echo, QUADS
-///                                 times. Prints per block one line: kind, then the latencies in us, -1 for a missing answer.
+///   measure ECHO BRIDGE QUADS     paced 1 kHz controller: blocks of 500 packets in the order echo
+///   bridge bridge echo, QUADS
+///                                 times. Prints per block one line: kind, then the latencies in
+///                                 us, -1 for a missing answer.
 #include <atomic>
 #include <cerrno>
 #include <cmath>
@@ -31,8 +34,8 @@ namespace {
 
 using namespace lwr_fri_bridge;
 
-constexpr int kPriority = 80;       // of echo and FRI thread alike
-constexpr int kBlock = 500;         // packets
+constexpr int kPriority = 80;                // of echo and FRI thread alike
+constexpr int kBlock = 500;                  // packets
 constexpr std::int64_t kPeriod = 1'000'000;  // ns
 
 std::atomic<bool> ended{false};
@@ -64,8 +67,10 @@ int echo() {
   char buffer[1024];
   while (!ended) {
     socklen_t length = sizeof from;
-    if (recvfrom(fd, buffer, sizeof buffer, 0, reinterpret_cast<sockaddr*>(&from), &length) <= 0) continue;
-    if (sendto(fd, buffer, fri::kCommandSize, 0, reinterpret_cast<sockaddr*>(&from), length) < 0) return 1;
+    if (recvfrom(fd, buffer, sizeof buffer, 0, reinterpret_cast<sockaddr*>(&from), &length) <= 0)
+      continue;
+    if (sendto(fd, buffer, fri::kCommandSize, 0, reinterpret_cast<sockaddr*>(&from), length) < 0)
+      return 1;
   }
   return 0;
 }
@@ -97,9 +102,11 @@ int bridge(const char* limits_file) {
       sem_wait(&due);
       bridge.port().newestSample(sample);
       const std::int64_t now = steadyNow();
-      Vector7 velocity = Vector7::Constant(0.2 * std::sin(2e-9 * static_cast<double>(now % 1'000'000'000'000)));
+      Vector7 velocity =
+          Vector7::Constant(0.2 * std::sin(2e-9 * static_cast<double>(now % 1'000'000'000'000)));
       // About the work of a control cycle: some kinematics.
-      for (int i = 0; i < 20; ++i) velocity[0] += 1e-9 * flangePose(sample.position).translation().x();
+      for (int i = 0; i < 20; ++i)
+        velocity[0] += 1e-9 * flangePose(sample.position).translation().x();
       bridge.port().sendVelocity({velocity, now, sample.motion_epoch});
     }
   });
@@ -123,12 +130,15 @@ struct Controller {
     datagram.control = 1;
     datagram.power = fri::kAllDrivesOn;
     datagram.krl.ints[15] = fri::kCoglabProgramMark;
-    for (int i = 0; i < 3; ++i) datagram.commanded_frame[5 * i] = datagram.commanded_frame_offset[5 * i] = 1.0F;
+    for (int i = 0; i < 3; ++i)
+      datagram.commanded_frame[5 * i] = datagram.commanded_frame_offset[5 * i] = 1.0F;
   }
   void take(const fri::CommandDatagram& answer) {
     datagram.header.reflected = answer.header.counter;
     if (answer.krl.ints[0] == 1) datagram.state = 2;
-    for (int i = 0; i < 7; ++i) datagram.measured_position[i] = datagram.commanded_position_offset[i] = answer.joint_position[i];
+    for (int i = 0; i < 7; ++i)
+      datagram.measured_position[i] = datagram.commanded_position_offset[i] =
+          answer.joint_position[i];
   }
 };
 
@@ -155,9 +165,11 @@ int measure(int echo_port, int bridge_port, int quads) {
       const ssize_t got = recv(fd, reply, sizeof reply, 0);
       const std::int64_t received = steadyNow();
       us[static_cast<std::size_t>(i % kBlock)] = got == static_cast<ssize_t>(fri::kCommandSize)
-                                                     ? 1e-3F * static_cast<float>(received - sent) : -1.0F;
+                                                     ? 1e-3F * static_cast<float>(received - sent)
+                                                     : -1.0F;
       fri::CommandDatagram answer;
-      if (to_bridge && fri::decode(reply, fri::kCommandSize, answer) && got > 0) controller.take(answer);
+      if (to_bridge && fri::decode(reply, fri::kCommandSize, answer) && got > 0)
+        controller.take(answer);
     }
   };
   block(false, kBlock);
@@ -185,7 +197,10 @@ int main(int argc, char** argv) {
   const std::string mode = argc > 1 ? argv[1] : "";
   if (mode == "echo") return echo();
   if (mode == "bridge" && argc == 3) return bridge(argv[2]);
-  if (mode == "measure" && argc == 5) return measure(std::atoi(argv[2]), std::atoi(argv[3]), std::atoi(argv[4]));
-  std::fprintf(stderr, "usage: %s echo | bridge LIMITS_FILE | measure ECHO_PORT BRIDGE_PORT QUADS\n", argv[0]);
+  if (mode == "measure" && argc == 5)
+    return measure(std::atoi(argv[2]), std::atoi(argv[3]), std::atoi(argv[4]));
+  std::fprintf(stderr,
+               "usage: %s echo | bridge LIMITS_FILE | measure ECHO_PORT BRIDGE_PORT QUADS\n",
+               argv[0]);
   return 2;
 }

@@ -1,6 +1,7 @@
 /// @file
-/// Times one step of the interpolator (7 axes, 1 ms, a new target in every step, as the bridge runs it). Prints the median of 200
-/// blocks of 10 000 steps, in us of processor time of the thread, so that other work on the machine does not count.
+/// Times one step of the interpolator (7 axes, 1 ms, a new target in every step, as the bridge runs
+/// it). Prints the median of 200 blocks of 10 000 steps, in us of processor time of the thread, so
+/// that other work on the machine does not count.
 #include <algorithm>
 #include <cstdint>
 #include <cstdio>

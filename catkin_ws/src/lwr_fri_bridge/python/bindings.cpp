@@ -1,6 +1,7 @@
 /// @file
-/// Python module `lwr_fri_bridge`: the bridge in lockstep, the interpolator, braking and the two datagrams as dictionaries. Arrays are numpy
-/// float64 in wire order; times in ns and s as in the headers.
+/// Python module `lwr_fri_bridge`: the bridge in lockstep, the interpolator, braking and the two
+/// datagrams as dictionaries. Arrays are numpy float64 in wire order; times in ns and s as in the
+/// headers.
 #include <pybind11/eigen.h>
 #include <pybind11/numpy.h>
 #include <pybind11/pybind11.h>
@@ -31,7 +32,8 @@ void fromList(const py::dict& fields, const char* name, T (&values)[N]) {
   std::copy(list.begin(), list.end(), values);
 }
 
-/// One visitor for both directions and both datagrams, so that dict and struct cannot disagree on a name.
+/// One visitor for both directions and both datagrams, so that dict and struct cannot disagree on a
+/// name.
 template <typename Visitor>
 void visitCommon(fri::Header& header, fri::UserData& krl, Visitor&& visit) {
   visit("counter", header.counter);
@@ -120,7 +122,8 @@ py::dict decodeToDict(const py::bytes& bytes) {
   const std::string text = bytes;
   Datagram datagram;
   if (!fri::decode(reinterpret_cast<const std::uint8_t*>(text.data()), text.size(), datagram)) {
-    throw py::value_error("expected " + std::to_string(sizeof(Datagram)) + " bytes, got " + std::to_string(text.size()));
+    throw py::value_error("expected " + std::to_string(sizeof(Datagram)) + " bytes, got " +
+                          std::to_string(text.size()));
   }
   ToDict visitor;
   visitFields(datagram, visitor);
@@ -181,7 +184,8 @@ py::dict snapshotDict(const Snapshot& s) {
   return d;
 }
 
-BridgeConfig configFrom(const std::string& limits_file, const std::string& profile, const py::dict& parameters) {
+BridgeConfig configFrom(const std::string& limits_file, const std::string& profile,
+                        const py::dict& parameters) {
   BridgeConfig config;
   config.limits = loadJointLimits(limits_file, profile);
   for (const auto& item : parameters) {
@@ -217,7 +221,9 @@ BridgeConfig configFrom(const std::string& limits_file, const std::string& profi
 }  // namespace
 
 PYBIND11_MODULE(lwr_fri_bridge, m) {
-  m.doc() = "FRI bridge of the KUKA LWR 4+: interpolator, braking, datagrams, and the bridge in lockstep.";
+  m.doc() =
+      "FRI bridge of the KUKA LWR 4+: interpolator, braking, datagrams, and the bridge in "
+      "lockstep.";
   m.attr("MEASUREMENT_SIZE") = fri::kMeasurementSize;
   m.attr("COMMAND_SIZE") = fri::kCommandSize;
   m.def("decode_measurement", &decodeToDict<fri::MeasurementDatagram>, py::arg("datagram"));
@@ -226,7 +232,9 @@ PYBIND11_MODULE(lwr_fri_bridge, m) {
   m.def("encode_command", &encodeFromDict<fri::CommandDatagram>, py::arg("fields"));
 
   py::class_<JointLimits>(m, "JointLimits")
-      .def(py::init([](const std::string& path, const std::string& profile) { return loadJointLimits(path, profile); }),
+      .def(py::init([](const std::string& path, const std::string& profile) {
+             return loadJointLimits(path, profile);
+           }),
            py::arg("path"), py::arg("profile") = "default")
       .def_readonly("lower_position", &JointLimits::lower_position)
       .def_readonly("upper_position", &JointLimits::upper_position)
@@ -237,11 +245,14 @@ PYBIND11_MODULE(lwr_fri_bridge, m) {
 
   m.def(
       "step_axis",
-      [](double p, double v, double a, double target, double max_acceleration, double max_jerk, double dt) {
-        const AxisState s = advance({p, v, a}, planVelocity(v, a, target, max_acceleration, max_jerk), dt);
+      [](double p, double v, double a, double target, double max_acceleration, double max_jerk,
+         double dt) {
+        const AxisState s =
+            advance({p, v, a}, planVelocity(v, a, target, max_acceleration, max_jerk), dt);
         return py::make_tuple(s.position, s.velocity, s.acceleration);
       },
-      "State (position, velocity, acceleration) of one axis after dt on the way to the target velocity.",
+      "State (position, velocity, acceleration) of one axis after dt on the way to the target "
+      "velocity.",
       py::arg("position"), py::arg("velocity"), py::arg("acceleration"), py::arg("target_velocity"),
       py::arg("max_acceleration"), py::arg("max_jerk"), py::arg("dt"));
   m.def(
@@ -249,20 +260,23 @@ PYBIND11_MODULE(lwr_fri_bridge, m) {
       [](double v, double a, double target, double max_acceleration, double max_jerk) {
         return planVelocity(v, a, target, max_acceleration, max_jerk).totalTime();
       },
-      py::arg("velocity"), py::arg("acceleration"), py::arg("target_velocity"), py::arg("max_acceleration"),
-      py::arg("max_jerk"));
-  m.def("braking_distance", &brakingDistance, py::arg("speed"), py::arg("max_acceleration"), py::arg("max_jerk"));
-  m.def("braking_speed", &brakingSpeed, py::arg("distance"), py::arg("max_acceleration"), py::arg("max_jerk"),
-        py::arg("delay"));
+      py::arg("velocity"), py::arg("acceleration"), py::arg("target_velocity"),
+      py::arg("max_acceleration"), py::arg("max_jerk"));
+  m.def("braking_distance", &brakingDistance, py::arg("speed"), py::arg("max_acceleration"),
+        py::arg("max_jerk"));
+  m.def("braking_speed", &brakingSpeed, py::arg("distance"), py::arg("max_acceleration"),
+        py::arg("max_jerk"), py::arg("delay"));
   m.def(
-      "flange_pose", [](const Vector7& joints) { return Eigen::Matrix4d(flangePose(joints).matrix()); },
+      "flange_pose",
+      [](const Vector7& joints) { return Eigen::Matrix4d(flangePose(joints).matrix()); },
       "4x4 pose of the flange in the base frame.", py::arg("joints"));
   m.def("known_events", &knownEvents);
 
   py::class_<Interpolator>(m, "Interpolator")
       .def(py::init<const JointLimits&>(), py::arg("limits"))
       .def("reset", &Interpolator::reset, py::arg("position"))
-      .def("resume", &Interpolator::resume, py::arg("position"), py::arg("velocity"), py::arg("acceleration"))
+      .def("resume", &Interpolator::resume, py::arg("position"), py::arg("velocity"),
+           py::arg("acceleration"))
       .def("step", &Interpolator::step, py::arg("target_velocity"), py::arg("dt"))
       .def_property_readonly("position", &Interpolator::position)
       .def_property_readonly("velocity", &Interpolator::velocity)
@@ -272,10 +286,13 @@ PYBIND11_MODULE(lwr_fri_bridge, m) {
       .def(py::init<double>(), py::arg("time_constant"))
       .def("update", &VelocityFilter::update, py::arg("position"), py::arg("cycles"), py::arg("dt"))
       .def_static("delay", &VelocityFilter::delay, py::arg("time_constant"), py::arg("dt"))
-      .def_static("noise_gain", &VelocityFilter::noiseGain, py::arg("time_constant"), py::arg("dt"));
+      .def_static("noise_gain", &VelocityFilter::noiseGain, py::arg("time_constant"),
+                  py::arg("dt"));
 
-  py::class_<Bridge>(m, "Bridge", "The bridge without socket and threads: one call of answer() is one FRI tick.")
-      .def(py::init([](const std::string& limits_file, const std::string& profile, const py::kwargs& parameters) {
+  py::class_<Bridge>(m, "Bridge",
+                     "The bridge without socket and threads: one call of answer() is one FRI tick.")
+      .def(py::init([](const std::string& limits_file, const std::string& profile,
+                       const py::kwargs& parameters) {
              return std::make_unique<Bridge>(configFrom(limits_file, profile, parameters));
            }),
            py::arg("limits_file"), py::arg("profile") = "default")
@@ -284,12 +301,14 @@ PYBIND11_MODULE(lwr_fri_bridge, m) {
           [](Bridge& bridge, const py::bytes& datagram, std::int64_t now_ns) -> py::object {
             const std::string text = datagram;
             fri::CommandDatagram command;
-            if (!bridge.answer(reinterpret_cast<const std::uint8_t*>(text.data()), text.size(), now_ns, command)) {
+            if (!bridge.answer(reinterpret_cast<const std::uint8_t*>(text.data()), text.size(),
+                               now_ns, command)) {
               return py::none();
             }
             return py::bytes(reinterpret_cast<const char*>(&command), sizeof command);
           },
-          "The answer to a measurement datagram, or None if it deserves none.", py::arg("datagram"), py::arg("now_ns"))
+          "The answer to a measurement datagram, or None if it deserves none.", py::arg("datagram"),
+          py::arg("now_ns"))
       .def("idle", &Bridge::idle, py::arg("now_ns"))
       .def(
           "send_velocity",
@@ -298,7 +317,8 @@ PYBIND11_MODULE(lwr_fri_bridge, m) {
             bridge.port().newestSample(sample);
             bridge.port().sendVelocity({velocity, now_ns, sample.motion_epoch});
           },
-          "Target velocities (rad/s) as the control thread sends them, for the epoch of the newest sample.",
+          "Target velocities (rad/s) as the control thread sends them, for the epoch of the newest "
+          "sample.",
           py::arg("velocity"), py::arg("now_ns"))
       .def("submit", &Bridge::submit, py::arg("event"))
       .def(
@@ -308,6 +328,7 @@ PYBIND11_MODULE(lwr_fri_bridge, m) {
             if (outcome.code == OutcomeCode::Pending) return py::none();
             return py::make_tuple(outcome.success(), describe(outcome));
           },
-          "(success, message) of a submitted event, or None while it is not finished.", py::arg("ticket"))
+          "(success, message) of a submitted event, or None while it is not finished.",
+          py::arg("ticket"))
       .def("snapshot", [](Bridge& bridge) { return snapshotDict(bridge.snapshot()); });
 }

@@ -7,21 +7,25 @@
 namespace lwr_fri_bridge {
 namespace {
 
-constexpr double kBrakeTimeLimit = 3.0;  // s for the arm to come to rest before monitor mode is requested anyway
-constexpr double kWaitBeyondLimits = 2.0;  // s that command() waits beyond the limits of the request itself
+constexpr double kBrakeTimeLimit =
+    3.0;  // s for the arm to come to rest before monitor mode is requested anyway
+constexpr double kWaitBeyondLimits =
+    2.0;  // s that command() waits beyond the limits of the request itself
 constexpr std::size_t kKeptOutcomes = 64;
 
 bool allFinite(const Vector7& v) { return v.allFinite(); }
 
-double seconds(std::int64_t from_ns, std::int64_t to_ns) { return 1e-9 * static_cast<double>(to_ns - from_ns); }
+double seconds(std::int64_t from_ns, std::int64_t to_ns) {
+  return 1e-9 * static_cast<double>(to_ns - from_ns);
+}
 
 }  // namespace
 
 bool StateView::operator==(const StateView& o) const {
   return supervisor == o.supervisor && block == o.block && hold_latched == o.hold_latched &&
-         blocking_joint == o.blocking_joint && state == o.state && quality == o.quality && control == o.control &&
-         power == o.power && drive_error == o.drive_error && drive_warning == o.drive_warning &&
-         cycle_time == o.cycle_time;
+         blocking_joint == o.blocking_joint && state == o.state && quality == o.quality &&
+         control == o.control && power == o.power && drive_error == o.drive_error &&
+         drive_warning == o.drive_warning && cycle_time == o.cycle_time;
 }
 
 Bridge::Bridge(const BridgeConfig& config)
@@ -37,7 +41,7 @@ Bridge::Bridge(const BridgeConfig& config)
   publish();
 }
 
-// --- FRI thread ------------------------------------------------------------------------------------------------------------
+// FRI thread
 
 bool Bridge::answer(const std::uint8_t* datagram, std::size_t size, std::int64_t now_ns,
                     fri::CommandDatagram& answer) {
@@ -71,7 +75,8 @@ bool Bridge::compute(const std::uint8_t* datagram, std::size_t size, std::int64_
 
   const bool monitor = measurement_.state == static_cast<std::uint16_t>(fri::FriState::Monitor);
   if (first_contact && !monitor) {
-    // Somebody else brought the controller into command mode: its flags may not change now, so speak its strategy.
+    // Somebody else brought the controller into command mode: its flags may not change now, so
+    // speak its strategy.
     active_mode_ = wanted_mode_;
     active_mode_.strategy = static_cast<fri::ControlStrategy>(measurement_.control);
   }
@@ -86,7 +91,8 @@ bool Bridge::compute(const std::uint8_t* datagram, std::size_t size, std::int64_
   fillMode(answer);
   configurator_.write(answer.krl);
   answer.header = session_.nextHeader();
-  sent_[answer.header.counter % sent_.size()] = {answer.header.counter, true, interpolator_.velocity()};
+  sent_[answer.header.counter % sent_.size()] = {answer.header.counter, true,
+                                                 interpolator_.velocity()};
   return true;
 }
 
@@ -99,7 +105,8 @@ void Bridge::idle(std::int64_t now_ns) {
     leash_.reset();
     for (Sent& sent : sent_) sent.valid = false;
   }
-  const Configurator::Observation seen{connected_, sample_.sequence > 0 ? &measurement_ : nullptr, now_ns};
+  const Configurator::Observation seen{connected_, sample_.sequence > 0 ? &measurement_ : nullptr,
+                                       now_ns};
   serveRequests(seen);
   runSupervision(seen, false);
   publish();
@@ -110,7 +117,8 @@ void Bridge::finish(const Request& request, OutcomeCode code) {
   outcome.ticket = request.ticket;
   outcome.kind = request.event.kind;
   outcome.code = code;
-  outcome.wanted = request.event.kind == EventKind::Mode ? request.event.mode.strategy : wanted_mode_.strategy;
+  outcome.wanted =
+      request.event.kind == EventKind::Mode ? request.event.mode.strategy : wanted_mode_.strategy;
   outcome.reported = static_cast<fri::ControlStrategy>(measurement_.control);
   outcome.state = static_cast<fri::FriState>(measurement_.state);
   outcome.quality = static_cast<fri::Quality>(measurement_.quality);
@@ -144,10 +152,13 @@ void Bridge::serve(const Request& request, const Configurator::Observation& seen
     case EventKind::Start:
       if (!connected_) return finish(request, OutcomeCode::Disconnected);
       if (supervisor_.held()) return finish(request, OutcomeCode::Held);
-      if (supervisor_.stopping() || supervisor_.starting()) return finish(request, OutcomeCode::Busy);
-      if (supervisor_.state() == SupervisorState::Command) return finish(request, OutcomeCode::AlreadyThere);
+      if (supervisor_.stopping() || supervisor_.starting())
+        return finish(request, OutcomeCode::Busy);
+      if (supervisor_.state() == SupervisorState::Command)
+        return finish(request, OutcomeCode::AlreadyThere);
       supervisor_.startBegins();
-      configurator_.start(request.ticket, monitor ? wanted_mode_.strategy : active_mode_.strategy, seen);
+      configurator_.start(request.ticket, monitor ? wanted_mode_.strategy : active_mode_.strategy,
+                          seen);
       return;
     case EventKind::Stop:
       if (supervisor_.stopping()) return finish(request, OutcomeCode::Busy);
@@ -169,7 +180,8 @@ void Bridge::runSupervision(const Configurator::Observation& seen, bool fresh_se
   Outcome ended;
   if (configurator_.update(seen, ended)) {
     outcomes_.push(ended);
-    if (ended.kind == EventKind::Start && supervisor_.starting()) supervisor_.startEnds(ended.success());
+    if (ended.kind == EventKind::Start && supervisor_.starting())
+      supervisor_.startEnds(ended.success());
     if (ended.kind == EventKind::Stop) supervisor_.stopEnds();
   }
 
@@ -184,9 +196,11 @@ void Bridge::runSupervision(const Configurator::Observation& seen, bool fresh_se
   supervisor_.update(input);
   if (supervisor_.fallBacks() != fall_backs) configurator_.fellBack();
 
-  // The first half of a stop is the supervisor's (brake), the second the configurator's (monitor mode).
+  // The first half of a stop is the supervisor's (brake), the second the configurator's (monitor
+  // mode).
   const bool brake_too_long = seconds(stop_began_ns_, seen.now_ns) > kBrakeTimeLimit;
-  if (supervisor_.stopping() && !monitor_asked_ && (supervisor_.readyForMonitor() || brake_too_long)) {
+  if (supervisor_.stopping() && !monitor_asked_ &&
+      (supervisor_.readyForMonitor() || brake_too_long)) {
     monitor_asked_ = true;
     configurator_.stop(stop_ticket_, seen);
   }
@@ -194,7 +208,8 @@ void Bridge::runSupervision(const Configurator::Observation& seen, bool fresh_se
 
 void Bridge::move(const fri::Reception& reception, fri::CommandDatagram& answer) {
   bounded_joints_ = 0;
-  const bool command_mode = measurement_.state == static_cast<std::uint16_t>(fri::FriState::Command);
+  const bool command_mode =
+      measurement_.state == static_cast<std::uint16_t>(fri::FriState::Command);
   if (command_mode && measurement_.power == fri::kAllDrivesOn) {
     follow(reception, answer);
   } else {
@@ -225,12 +240,14 @@ void Bridge::follow(const fri::Reception& reception, fri::CommandDatagram& answe
     cartesian_.anchor(interpolator_.position(), reported_frame);
     following_ = true;
   } else if (reception.cycles > 1 || !reception.answer_arrived) {
-    // The controller went on by itself: take over where it is, at the speed of the answer it saw last. Its joint
-    // set-point means nothing in Cartesian impedance mode; there the frame is what it went on with.
+    // The controller went on by itself: take over where it is, at the speed of the answer it saw
+    // last. Its joint set-point means nothing in Cartesian impedance mode; there the frame is what
+    // it went on with.
     const Sent& last_seen = sent_[reception.reflected % sent_.size()];
     const bool known = last_seen.valid && last_seen.counter == reception.reflected;
     const Vector7 velocity = known ? last_seen.velocity : interpolator_.velocity();
-    const Vector7 position = cartesian ? interpolator_.position() : fri::jointsFromWire(reported_joints);
+    const Vector7 position =
+        cartesian ? interpolator_.position() : fri::jointsFromWire(reported_joints);
     interpolator_.resume(position, velocity, Vector7::Zero());
     cartesian_.anchor(interpolator_.position(), reported_frame);
     ++counters_.resumed_after_gap;
@@ -239,7 +256,8 @@ void Bridge::follow(const fri::Reception& reception, fri::CommandDatagram& answe
   const Vector7 wanted = targetVelocity();
   Vector7 target = wanted;
   const double excess = (target.cwiseAbs().array() / config_.limits.velocity.array()).maxCoeff();
-  if (excess > 1.0) target /= excess;  // the whole vector, so that the direction of the motion is kept
+  if (excess > 1.0)
+    target /= excess;  // the whole vector, so that the direction of the motion is kept
 
   const bool was_leashed = leash_.joint() >= 0;
   leash_.update(interpolator_, sample_.position, wanted, leashLength(), config_.limits, target);
@@ -272,21 +290,27 @@ Vector7 Bridge::targetVelocity() {
 
   const double age = seconds(valid_command_.stamp_ns, sample_.stamp_ns);
   const double limit = from_topic ? config_.topic_timeout : config_.command_timeout;
-  const bool current = valid_command_.stamp_ns != 0 && valid_command_.motion_epoch == supervisor_.epoch();
+  const bool current =
+      valid_command_.stamp_ns != 0 && valid_command_.motion_epoch == supervisor_.epoch();
   const bool expired = current && (age > limit || age < -limit);
-  if (expired && !command_expired_ && !valid_command_.velocity.isZero()) ++counters_.command_timeouts;
+  if (expired && !command_expired_ && !valid_command_.velocity.isZero())
+    ++counters_.command_timeouts;
   command_expired_ = expired;
-  // While leashed the wish is still looked at, to see when the outward motion is not asked for any more.
-  const bool allowed = supervisor_.block() == MotionBlock::None || supervisor_.block() == MotionBlock::Leashed;
+  // While leashed the wish is still looked at, to see when the outward motion is not asked for any
+  // more.
+  const bool allowed =
+      supervisor_.block() == MotionBlock::None || supervisor_.block() == MotionBlock::Leashed;
   return current && !expired && allowed ? valid_command_.velocity : Vector7::Zero();
 }
 
 double Bridge::leashLength() const {
-  return active_mode_.strategy == fri::ControlStrategy::Position ? config_.leash_position : config_.leash_impedance;
+  return active_mode_.strategy == fri::ControlStrategy::Position ? config_.leash_position
+                                                                 : config_.leash_impedance;
 }
 
 void Bridge::fillMode(fri::CommandDatagram& answer) const {
-  // Added torques and forces stay 0: nothing here commands them, and a leap there makes the controller drop its contactors.
+  // Added torques and forces stay 0: nothing here commands them, and a leap there makes the
+  // controller drop its contactors.
   answer.flags = fri::flagsFor(active_mode_.strategy);
   fri::jointsToWire(active_mode_.joint_stiffness, answer.joint_stiffness);
   fri::jointsToWire(active_mode_.joint_damping, answer.joint_damping);
@@ -309,7 +333,8 @@ void Bridge::publish() {
   snapshot.request_busy = configurator_.busy();
   snapshot.fall_backs = supervisor_.fallBacks();
   snapshot.state = connected_ ? static_cast<fri::FriState>(measurement_.state) : fri::FriState::Off;
-  snapshot.quality = connected_ ? static_cast<fri::Quality>(measurement_.quality) : fri::Quality::Unacceptable;
+  snapshot.quality =
+      connected_ ? static_cast<fri::Quality>(measurement_.quality) : fri::Quality::Unacceptable;
   snapshot.control = static_cast<fri::ControlStrategy>(measurement_.control);
   snapshot.mode = wanted_mode_;
   snapshot.power = measurement_.power;
@@ -322,7 +347,8 @@ void Bridge::publish() {
   snapshot.miss_counter = measurement_.miss_counter;
   snapshot.safety_scale = measurement_.safety_scale;
   snapshot.timestamp = measurement_.timestamp;
-  std::copy(std::begin(measurement_.temperature), std::end(measurement_.temperature), snapshot.temperature.begin());
+  std::copy(std::begin(measurement_.temperature), std::end(measurement_.temperature),
+            snapshot.temperature.begin());
   snapshot.bounded_joints = bounded_joints_;
   snapshots_.write(snapshot);
 
@@ -341,7 +367,7 @@ void Bridge::publish() {
   if (!(view == last_view_) && changes_.push(view)) last_view_ = view;
 }
 
-// --- other threads -----------------------------------------------------------------------------------------------------------
+// other threads
 
 std::uint32_t Bridge::submit(const std::string& text) {
   const std::lock_guard<std::mutex> lock(mutex_);
@@ -380,8 +406,9 @@ Outcome Bridge::command(const std::string& event) {
   using Clock = std::chrono::steady_clock;
   const auto began = Clock::now();
   const std::uint32_t ticket = submit(event);
-  const double limit = std::max(config_.requests.start_timeout, kBrakeTimeLimit + config_.requests.stop_timeout) +
-                       kWaitBeyondLimits;
+  const double limit =
+      std::max(config_.requests.start_timeout, kBrakeTimeLimit + config_.requests.stop_timeout) +
+      kWaitBeyondLimits;
   for (;;) {
     Outcome ended = outcome(ticket);
     if (ended.code != OutcomeCode::Pending) return ended;

@@ -15,8 +15,8 @@ void checkParameter(const char* name, double value, double low, double high) {
 void BridgeConfig::check() const {
   checkParameter("tool_number", tool_number, 0, 16);
   checkParameter("position_margin", position_margin, 0.0, 0.5);
-  checkParameter("set_point_leash_position", leash_position, 0.005, 0.5);
-  checkParameter("set_point_leash_impedance", leash_impedance, 0.005, 0.5);
+  checkParameter("set_point_leash/position", leash_position, 0.005, 0.5);
+  checkParameter("set_point_leash/impedance", leash_impedance, 0.005, 0.5);
   checkParameter("velocity_filter_time", velocity_filter_time, 0.0, 0.2);
   checkParameter("command_timeout", command_timeout, 0.005, 1.0);
   checkParameter("topic_timeout", topic_timeout, 0.005, 1.0);
@@ -26,7 +26,8 @@ void BridgeConfig::check() const {
   checkParameter("silent_stop_timeout", requests.silent_stop_timeout, 0.1, 30.0);
   for (int i = 0; i < 7; ++i) {
     const double room = limits.upper_position[i] - limits.lower_position[i];
-    checkParameter("position_margin (twice, within the range of a joint)", 2.0 * position_margin, 0.0, room);
+    checkParameter("position_margin (twice, within the range of a joint)", 2.0 * position_margin,
+                   0.0, room);
     checkParameter("limits.velocity", limits.velocity[i], 1e-3, 10.0);
     checkParameter("limits.acceleration", limits.acceleration[i], 1e-2, 1e3);
     checkParameter("limits.jerk", limits.jerk[i], 0.1, 1e6);

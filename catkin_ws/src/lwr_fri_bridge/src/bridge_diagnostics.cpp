@@ -10,7 +10,9 @@ unsigned char levelOf(Severity severity) { return static_cast<unsigned char>(sev
 }  // namespace
 
 BridgeDiagnostics::BridgeDiagnostics(BridgeRos& owner)
-    : owner_(owner), hot_(owner.nh_.param("hot_drive", 70.0)), updater_(ros::NodeHandle(), owner.nh_, owner.nh_.getNamespace()) {
+    : owner_(owner),
+      hot_(owner.nh_.param("hot_drive", 70.0)),
+      updater_(ros::NodeHandle(), owner.nh_, owner.nh_.getNamespace()) {
   updater_.setHardwareID("KUKA LWR 4+");
   updater_.add("FRI connection", this, &BridgeDiagnostics::connection);
   updater_.add("arm", this, &BridgeDiagnostics::arm);

@@ -36,32 +36,40 @@ BridgeConfig readBridgeConfig(const ros::NodeHandle& nh) {
   if (limits_file.empty()) {
     const std::string package = ros::package::getPath("lwr_description");
     if (package.empty()) {
-      throw std::runtime_error("package lwr_description is not found; build and source the workspace or set " +
-                               nh.resolveName("limits_file"));
+      throw std::runtime_error(
+          "package lwr_description is not found; build and source the workspace or set " +
+          nh.resolveName("limits_file"));
     }
     limits_file = package + "/config/joint_limits.yaml";
   }
-  config.limits = loadJointLimits(limits_file, parameter<std::string>(nh, "limits_profile", "default", "a name"));
+  config.limits = loadJointLimits(
+      limits_file, parameter<std::string>(nh, "limits_profile", "default", "a name"));
   config.krl_convention =
       fri::krlConventionFromName(parameter<std::string>(nh, "krl_convention", "coglab", "a name"));
   config.tool_number = parameter<int>(nh, "tool_number", config.tool_number, "a whole number");
-  config.lenient_headers = parameter<bool>(nh, "lenient_headers", config.lenient_headers, "true or false");
-  const Event mode = parseEvent(parameter<std::string>(nh, "control_mode", "position", "an event"), config.mode);
+  config.lenient_headers =
+      parameter<bool>(nh, "lenient_headers", config.lenient_headers, "true or false");
+  const Event mode =
+      parseEvent(parameter<std::string>(nh, "control_mode", "position", "an event"), config.mode);
   if (mode.kind != EventKind::Mode) {
-    throw std::invalid_argument("parameter " + nh.resolveName("control_mode") +
-                                ": expected position, joint_impedance or cartesian_impedance with their parameters");
+    throw std::invalid_argument(
+        "parameter " + nh.resolveName("control_mode") +
+        ": expected position, joint_impedance or cartesian_impedance with their parameters");
   }
   config.mode = mode.mode;
   config.position_margin = numberParameter(nh, "position_margin", config.position_margin);
   config.leash_position = numberParameter(nh, "set_point_leash/position", config.leash_position);
   config.leash_impedance = numberParameter(nh, "set_point_leash/impedance", config.leash_impedance);
-  config.velocity_filter_time = numberParameter(nh, "velocity_filter_time", config.velocity_filter_time);
+  config.velocity_filter_time =
+      numberParameter(nh, "velocity_filter_time", config.velocity_filter_time);
   config.command_timeout = numberParameter(nh, "command_timeout", config.command_timeout);
   config.topic_timeout = numberParameter(nh, "topic_timeout", config.topic_timeout);
   config.receive_timeout = numberParameter(nh, "receive_timeout", config.receive_timeout);
-  config.requests.start_timeout = numberParameter(nh, "start_timeout", config.requests.start_timeout);
+  config.requests.start_timeout =
+      numberParameter(nh, "start_timeout", config.requests.start_timeout);
   config.requests.stop_timeout = numberParameter(nh, "stop_timeout", config.requests.stop_timeout);
-  config.requests.silent_stop_timeout = numberParameter(nh, "silent_stop_timeout", config.requests.silent_stop_timeout);
+  config.requests.silent_stop_timeout =
+      numberParameter(nh, "silent_stop_timeout", config.requests.silent_stop_timeout);
   config.check();
   return config;
 }
@@ -71,7 +79,8 @@ FriThreadOptions readFriThreadOptions(const ros::NodeHandle& nh) {
   options.address = parameter<std::string>(nh, "fri_address", options.address, "an IPv4 address");
   options.port = wholeParameter(nh, "fri_port", options.port, 0, 65535);
   options.priority = wholeParameter(nh, "rt_priority", options.priority, 0, 98);
-  options.stack_bytes = 1024 * static_cast<std::size_t>(wholeParameter(nh, "rt_stack_kib", 256, 128, 8192));
+  options.stack_bytes =
+      1024 * static_cast<std::size_t>(wholeParameter(nh, "rt_stack_kib", 256, 128, 8192));
   return options;
 }
 

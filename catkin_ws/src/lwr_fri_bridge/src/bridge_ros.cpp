@@ -12,7 +12,8 @@
 namespace lwr_fri_bridge {
 namespace {
 
-constexpr int kSpinnerThreads = 4;  // a start may occupy one for seconds; hold and stop must get through
+constexpr int kSpinnerThreads =
+    4;  // a start may occupy one for seconds; hold and stop must get through
 constexpr double kSilenceWarning = 5.0;  // s between warnings about silence
 
 ros::Time rosTime(std::int64_t steady_ns) {
@@ -48,7 +49,8 @@ BridgeRos::BridgeRos(const ros::NodeHandle& nh, Options options)
         };
         return thread;
       }()) {
-  // A little shorter than the period, so that an FRI period of the same length is not halved by jitter.
+  // A little shorter than the period, so that an FRI period of the same length is not halved by
+  // jitter.
   publish_period_ns_ = static_cast<std::int64_t>(0.9e9 / checkedRate(nh));
   nh_.setCallbackQueue(&queue_);
   sem_init(&new_sample_, 0, 0);
@@ -69,8 +71,10 @@ void BridgeRos::start() {
   tool_wrench_ = nh_.advertise<geometry_msgs::WrenchStamped>("tool_wrench", 10);
   state_ = nh_.advertise<coglab_msgs::LwrState>("state", 10, true);
   command_ = nh_.advertiseService("command", &BridgeRos::onCommand, this);
-  events_ = nh_.subscribe("ros_events", 10, &BridgeRos::onEvent, this, ros::TransportHints().tcpNoDelay());
-  target_ = nh_.subscribe("target_joint_states", 1, &BridgeRos::onTarget, this, ros::TransportHints().tcpNoDelay());
+  events_ = nh_.subscribe("ros_events", 10, &BridgeRos::onEvent, this,
+                          ros::TransportHints().tcpNoDelay());
+  target_ = nh_.subscribe("target_joint_states", 1, &BridgeRos::onTarget, this,
+                          ros::TransportHints().tcpNoDelay());
 
   if (nh_.param("lock_memory", true)) {
     const std::string warning = lockMemory();
@@ -85,7 +89,8 @@ void BridgeRos::start() {
            fri::nameOf(bridge_.config().krl_convention));
 
   diagnostics_ = std::make_unique<BridgeDiagnostics>(*this);
-  diagnostics_timer_ = nh_.createTimer(ros::Duration(1.0), [this](const ros::TimerEvent&) { diagnostics_->publish(); });
+  diagnostics_timer_ = nh_.createTimer(ros::Duration(1.0),
+                                       [this](const ros::TimerEvent&) { diagnostics_->publish(); });
   publisher_.start("lwr_publisher", 512 * 1024, [this] { publishLoop(); });
   spinner_ = std::make_unique<ros::AsyncSpinner>(kSpinnerThreads, &queue_);
   spinner_->start();
@@ -116,14 +121,18 @@ void BridgeRos::setControllerActive(bool active) {
   bridge_.setVelocitySource(active ? VelocitySource::ControlThread : VelocitySource::Topic);
 }
 
-BridgeRos::Refused BridgeRos::refused() const { return {refused_invalid_, refused_active_, refused_blocked_}; }
+BridgeRos::Refused BridgeRos::refused() const {
+  return {refused_invalid_, refused_active_, refused_blocked_};
+}
 
 void BridgeRos::onTarget(const ros::MessageEvent<const sensor_msgs::JointState>& event) {
   // In one process the controller manager publishes here what it sent already.
   if (options_.one_process && event.getPublisherName() == ros::this_node::getName()) return;
   if (options_.one_process && controller_active_) {
     ++refused_active_;
-    ROS_WARN_THROTTLE(5.0, "lwr: target_joint_states of %s refused: a controller of this process is active; switch it off first",
+    ROS_WARN_THROTTLE(5.0,
+                      "lwr: target_joint_states of %s refused: a controller of this process is "
+                      "active; switch it off first",
                       event.getPublisherName().c_str());
     return;
   }
@@ -142,13 +151,15 @@ void BridgeRos::onTarget(const ros::MessageEvent<const sensor_msgs::JointState>&
         joint = 0;
         while (joint < 7 && message.name[i] != kJointNames[joint]) ++joint;
         if (joint == 7) {
-          fault = "unknown joint '" + message.name[i] + "', expected lwr_a1 lwr_a2 lwr_e1 lwr_a3 lwr_a4 lwr_a5 lwr_a6";
+          fault = "unknown joint '" + message.name[i] +
+                  "', expected lwr_a1 lwr_a2 lwr_e1 lwr_a3 lwr_a4 lwr_a5 lwr_a6";
           break;
         }
       }
       command.velocity[static_cast<Eigen::Index>(joint)] = message.velocity[i];
     }
-    if (fault.empty() && !command.velocity.allFinite()) fault = "a velocity is not finite, or a joint is named twice";
+    if (fault.empty() && !command.velocity.allFinite())
+      fault = "a velocity is not finite, or a joint is named twice";
   }
   if (!fault.empty()) {
     ++refused_invalid_;
@@ -160,7 +171,8 @@ void BridgeRos::onTarget(const ros::MessageEvent<const sensor_msgs::JointState>&
     ++refused_blocked_;
     ROS_WARN_THROTTLE(5.0, "lwr: target_joint_states refused: %s",
                       reasonOf(now.sample.block, now.sample.blocking_joint).c_str());
-    // The leash lets go when the outward motion is not asked for any more, so it must hear what is asked for.
+    // The leash lets go when the outward motion is not asked for any more, so it must hear what is
+    // asked for.
     if (now.sample.block != MotionBlock::Leashed) return;
   }
   command.stamp_ns = steadyNow();
@@ -178,7 +190,8 @@ void BridgeRos::onEvent(const std_msgs::String& message) {
   }
 }
 
-bool BridgeRos::onCommand(coglab_msgs::LwrCommand::Request& request, coglab_msgs::LwrCommand::Response& response) {
+bool BridgeRos::onCommand(coglab_msgs::LwrCommand::Request& request,
+                          coglab_msgs::LwrCommand::Response& response) {
   try {
     const Outcome outcome = bridge_.command(request.event);
     response.success = outcome.success();
@@ -187,7 +200,8 @@ bool BridgeRos::onCommand(coglab_msgs::LwrCommand::Request& request, coglab_msgs
     response.success = false;
     response.message = error.what();
   }
-  if (!response.success) ROS_WARN("lwr: command '%s': %s", request.event.c_str(), response.message.c_str());
+  if (!response.success)
+    ROS_WARN("lwr: command '%s': %s", request.event.c_str(), response.message.c_str());
   return true;
 }
 
@@ -233,8 +247,8 @@ void BridgeRos::publishLoop() {
 
     const FriThreadStatistics thread = fri_thread_.statistics();
     if (thread.foreign != 0 && foreign == 0) {
-      ROS_WARN("lwr: a second sender, %s, uses the FRI port and is ignored; the peer is %s", thread.last_foreign.c_str(),
-               thread.peer.c_str());
+      ROS_WARN("lwr: a second sender, %s, uses the FRI port and is ignored; the peer is %s",
+               thread.last_foreign.c_str(), thread.peer.c_str());
     }
     foreign = thread.foreign;
     const std::int64_t since = now.sample.stamp_ns != 0 ? now.sample.stamp_ns : started_ns_;
@@ -242,7 +256,8 @@ void BridgeRos::publishLoop() {
     if (now.supervisor == SupervisorState::Disconnected && silence > kSilenceWarning &&
         1e-9 * static_cast<double>(steadyNow() - last_warning_ns) > kSilenceWarning) {
       last_warning_ns = steadyNow();
-      ROS_WARN("lwr: %s", diagnoseConnection(now, thread, fri_thread_.port(), silence).text.c_str());
+      ROS_WARN("lwr: %s",
+               diagnoseConnection(now, thread, fri_thread_.port(), silence).text.c_str());
     }
   }
 }

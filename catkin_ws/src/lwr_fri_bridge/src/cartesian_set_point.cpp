@@ -36,7 +36,8 @@ void CartesianSetPoint::anchor(const Vector7& joints, const float (&frame)[fri::
 void CartesianSetPoint::frame(const Vector7& joints, float (&frame)[fri::kFrameValues]) const {
   const Eigen::Isometry3d wanted = flangePose(joints) * relative_;
   for (int row = 0; row < 3; ++row) {
-    for (int column = 0; column < 4; ++column) frame[4 * row + column] = static_cast<float>(wanted(row, column));
+    for (int column = 0; column < 4; ++column)
+      frame[4 * row + column] = static_cast<float>(wanted(row, column));
   }
 }
 

@@ -4,8 +4,10 @@ namespace lwr_fri_bridge {
 namespace {
 
 constexpr double kProgramMarkTime = 1.0;  // s, for a KRL program to show whose it is
-constexpr double kRefusalTime = 0.5;      // s in monitor mode after the program stopped working on a start
-constexpr double kSettleTime = 0.5;       // s; KRL programs poll every 50 ms and may be just about to call friStart
+constexpr double kRefusalTime =
+    0.5;  // s in monitor mode after the program stopped working on a start
+constexpr double kSettleTime =
+    0.5;  // s; KRL programs poll every 50 ms and may be just about to call friStart
 
 }  // namespace
 
@@ -32,7 +34,8 @@ void Configurator::finish(OutcomeCode code, const Observation& seen) {
   step_ = Step::Ended;
 }
 
-void Configurator::start(std::uint32_t ticket, fri::ControlStrategy strategy, const Observation& seen) {
+void Configurator::start(std::uint32_t ticket, fri::ControlStrategy strategy,
+                         const Observation& seen) {
   outcome_ = Outcome{};
   outcome_.ticket = ticket;
   outcome_.kind = EventKind::Start;
@@ -99,11 +102,13 @@ void Configurator::stepStart(const Observation& seen) {
       setPhase(fri::KrlPhase::Stop);
       return finish(OutcomeCode::NotEntered, seen);
     } else if (convention_ == fri::KrlConvention::RcprgTum) {
-      // Its flag is all it shows: worked on the request, is done with it, and still in monitor mode means no.
+      // Its flag is all it shows: worked on the request, is done with it, and still in monitor mode
+      // means no.
       if (reply_.busy) {
         seen_busy_ = true;
         monitor_since_ns_ = seen.now_ns;
-      } else if (seen_busy_ && 1e-9 * static_cast<double>(seen.now_ns - monitor_since_ns_) > kRefusalTime) {
+      } else if (seen_busy_ &&
+                 1e-9 * static_cast<double>(seen.now_ns - monitor_since_ns_) > kRefusalTime) {
         setPhase(fri::KrlPhase::Stop);
         return finish(OutcomeCode::ProgramRefused, seen);
       }

@@ -4,7 +4,8 @@
 
 namespace lwr_fri_bridge {
 
-const char* const kJointNames[7] = {"lwr_a1", "lwr_a2", "lwr_e1", "lwr_a3", "lwr_a4", "lwr_a5", "lwr_a6"};
+const char* const kJointNames[7] = {"lwr_a1", "lwr_a2", "lwr_e1", "lwr_a3",
+                                    "lwr_a4", "lwr_a5", "lwr_a6"};
 
 namespace {
 
@@ -24,33 +25,43 @@ std::string jointsIn(unsigned bits) {
 
 }  // namespace
 
-Diagnosis diagnoseConnection(const Snapshot& s, const FriThreadStatistics& thread, int port, double silence) {
+Diagnosis diagnoseConnection(const Snapshot& s, const FriThreadStatistics& thread, int port,
+                             double silence) {
   if (s.supervisor == SupervisorState::Disconnected) {
-    std::string text = "no valid packet received on port " + std::to_string(port) + " for " + number("%.0f s", silence);
-    text += s.session.rejected() > 0
-                ? "; what comes is rejected (see the counters): is it an FRI controller of this version?"
-                : "; check cable, FRIHOST and FRISOCK (or friSetup) of the controller, and that its KRL program called friOpen";
+    std::string text = "no valid packet received on port " + std::to_string(port) + " for " +
+                       number("%.0f s", silence);
+    text += s.session.rejected() > 0 ? "; what comes is rejected (see the counters): is it an FRI "
+                                       "controller of this version?"
+                                     : "; check cable, FRIHOST and FRISOCK (or friSetup) of the "
+                                       "controller, and that its KRL program called friOpen";
     return {Severity::Error, text};
   }
   const double cycle = s.sample.cycle_time;
   if (s.quality <= fri::Quality::Bad) {
     std::string text = std::string("quality ") + fri::nameOf(s.quality) + ": ";
     if (s.miss_rate > 0.05F && s.latency > 0.5 * cycle) {
-      text += number("answers take %.2f ms", 1e3 * s.latency) + number(" of a %.0f ms cycle", 1e3 * cycle) +
-              (thread.real_time ? "; use a direct cable, a real computer instead of a virtual machine, or a longer friOpen period"
-                                : "; the FRI thread has no real-time priority, give the binary cap_sys_nice");
+      text += number("answers take %.2f ms", 1e3 * s.latency) +
+              number(" of a %.0f ms cycle", 1e3 * cycle) +
+              (thread.real_time
+                   ? "; use a direct cable, a real computer instead of a virtual machine, or a "
+                     "longer friOpen period"
+                   : "; the FRI thread has no real-time priority, give the binary cap_sys_nice");
     } else if (s.session.lost_measurements + s.session.lost_answers > 0) {
-      text += "packets are lost on the way; use a direct cable and a network card of its own, no switch and no Wi-Fi";
+      text +=
+          "packets are lost on the way; use a direct cable and a network card of its own, no "
+          "switch and no Wi-Fi";
     } else {
-      text += "it needs 100 answered packets to judge; if it stays, look at the load of this computer";
+      text +=
+          "it needs 100 answered packets to judge; if it stays, look at the load of this computer";
     }
     return {s.quality == fri::Quality::Unacceptable ? Severity::Error : Severity::Warning, text};
   }
   if (!thread.last_foreign.empty()) {
-    return {Severity::Warning, "a second sender (" + thread.last_foreign + ") uses the port and is ignored; peer is " +
-                                   thread.peer};
+    return {Severity::Warning, "a second sender (" + thread.last_foreign +
+                                   ") uses the port and is ignored; peer is " + thread.peer};
   }
-  return {Severity::Ok, std::string("quality ") + fri::nameOf(s.quality) + number(", latency %.2f ms", 1e3 * s.latency) +
+  return {Severity::Ok, std::string("quality ") + fri::nameOf(s.quality) +
+                            number(", latency %.2f ms", 1e3 * s.latency) +
                             number(", cycle %.0f ms", 1e3 * cycle)};
 }
 
@@ -60,14 +71,16 @@ Diagnosis diagnoseArm(const Snapshot& s, double hot) {
   unsigned hot_joints = 0;
   for (unsigned i = 0; i < 7; ++i) hot_joints |= s.temperature[i] > hot ? 1U << i : 0U;
   if (hot_joints != 0) return {Severity::Warning, "drives are hot: " + jointsIn(hot_joints)};
-  if (s.drive_warning != 0) return {Severity::Warning, "drive warning: " + jointsIn(s.drive_warning)};
+  if (s.drive_warning != 0)
+    return {Severity::Warning, "drive warning: " + jointsIn(s.drive_warning)};
   const std::string reason = reasonOf(s.sample.block, s.sample.blocking_joint);
   return {Severity::Ok, reason.empty() ? "motion is allowed" : reason};
 }
 
 std::string reasonOf(MotionBlock block, int joint) {
   std::string reason = describe(block);
-  if (block == MotionBlock::Leashed && joint >= 0) reason = std::string(kJointNames[joint]) + ": " + reason;
+  if (block == MotionBlock::Leashed && joint >= 0)
+    reason = std::string(kJointNames[joint]) + ": " + reason;
   return reason;
 }
 

@@ -18,11 +18,13 @@ namespace lwr_fri_bridge {
 namespace {
 
 constexpr int kBatch = 8;
-constexpr std::size_t kBuffer = 1024;  // larger than any valid datagram: what is cut off has a wrong size anyway
+constexpr std::size_t kBuffer =
+    1024;  // larger than any valid datagram: what is cut off has a wrong size anyway
 constexpr std::int64_t kIdleTick_ns = 10'000'000;
 
 std::uint64_t endpointOf(const sockaddr_in& address) {
-  return (static_cast<std::uint64_t>(ntohl(address.sin_addr.s_addr)) << 16) | ntohs(address.sin_port);
+  return (static_cast<std::uint64_t>(ntohl(address.sin_addr.s_addr)) << 16) |
+         ntohs(address.sin_port);
 }
 
 std::string nameOf(std::uint64_t endpoint) {
@@ -37,8 +39,9 @@ std::string nameOf(std::uint64_t endpoint) {
 [[noreturn]] void failSocket(int socket, const std::string& what, const FriThreadOptions& options) {
   const std::string reason = std::strerror(errno);
   if (socket >= 0) close(socket);
-  throw std::runtime_error("FRI socket: cannot " + what + " " + options.address + ":" + std::to_string(options.port) +
-                           " (" + reason + "); is another bridge running, is fri_address an address of this computer?");
+  throw std::runtime_error(
+      "FRI socket: cannot " + what + " " + options.address + ":" + std::to_string(options.port) +
+      " (" + reason + "); is another bridge running, is fri_address an address of this computer?");
 }
 
 }  // namespace
@@ -55,7 +58,8 @@ struct FriThread::Batch {
   sockaddr_in from[kBatch];
 };
 
-FriThread::FriThread(Bridge& bridge, FriThreadOptions options) : bridge_(bridge), options_(std::move(options)) {}
+FriThread::FriThread(Bridge& bridge, FriThreadOptions options)
+    : bridge_(bridge), options_(std::move(options)) {}
 
 FriThread::~FriThread() { stop(); }
 
@@ -65,19 +69,24 @@ std::string FriThread::start() {
   local.sin_family = AF_INET;
   local.sin_port = htons(static_cast<std::uint16_t>(options_.port));
   if (options_.port < 0 || options_.port > 65535) {
-    throw std::runtime_error("fri_port = " + std::to_string(options_.port) + " is outside its range 0..65535");
+    throw std::runtime_error("fri_port = " + std::to_string(options_.port) +
+                             " is outside its range 0..65535");
   }
   if (inet_pton(AF_INET, options_.address.c_str(), &local.sin_addr) != 1) {
-    throw std::runtime_error("fri_address = '" + options_.address + "' is not an IPv4 address such as 192.168.0.20");
+    throw std::runtime_error("fri_address = '" + options_.address +
+                             "' is not an IPv4 address such as 192.168.0.20");
   }
   const int fd = socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
   if (fd < 0) failSocket(fd, "open a socket for", options_);
-  if (bind(fd, reinterpret_cast<sockaddr*>(&local), sizeof local) != 0) failSocket(fd, "bind", options_);
+  if (bind(fd, reinterpret_cast<sockaddr*>(&local), sizeof local) != 0)
+    failSocket(fd, "bind", options_);
   socklen_t length = sizeof local;
-  if (getsockname(fd, reinterpret_cast<sockaddr*>(&local), &length) != 0) failSocket(fd, "query", options_);
+  if (getsockname(fd, reinterpret_cast<sockaddr*>(&local), &length) != 0)
+    failSocket(fd, "query", options_);
   timeval timeout{};
   timeout.tv_usec = kIdleTick_ns / 1000;
-  if (setsockopt(fd, SOL_SOCKET, SO_RCVTIMEO, &timeout, sizeof timeout) != 0) failSocket(fd, "configure", options_);
+  if (setsockopt(fd, SOL_SOCKET, SO_RCVTIMEO, &timeout, sizeof timeout) != 0)
+    failSocket(fd, "configure", options_);
 
   socket_ = fd;
   bound_port_ = ntohs(local.sin_port);
@@ -116,7 +125,8 @@ void FriThread::run() {
     const int error = received > 0 ? 0 : errno;
     const std::int64_t now = steadyNow();
     if (received > 0) {
-      // Only a datagram that comes off the beat may have others behind it; on the beat there is nothing to look for.
+      // Only a datagram that comes off the beat may have others behind it; on the beat there is
+      // nothing to look for.
       const auto interval = static_cast<double>(now - last_receive);
       const double cycle_ns = 1e9 * bridge_.cycleTime();
       last_receive = now;
@@ -157,11 +167,13 @@ void FriThread::serve(Batch& batch, int received, std::int64_t now_ns) {
       continue;
     }
     fri::CommandDatagram answer;
-    if (!bridge_.compute(batch.bytes[i], static_cast<std::size_t>(batch.size[i]), now_ns, answer)) continue;
-    const ssize_t sent = sendto(socket_, &answer, sizeof answer, 0, reinterpret_cast<sockaddr*>(&batch.from[i]),
-                                sizeof batch.from[i]);
+    if (!bridge_.compute(batch.bytes[i], static_cast<std::size_t>(batch.size[i]), now_ns, answer))
+      continue;
+    const ssize_t sent = sendto(socket_, &answer, sizeof answer, 0,
+                                reinterpret_cast<sockaddr*>(&batch.from[i]), sizeof batch.from[i]);
     bridge_.publish();
-    if (sent != static_cast<ssize_t>(sizeof answer)) send_errors_.fetch_add(1, std::memory_order_relaxed);
+    if (sent != static_cast<ssize_t>(sizeof answer))
+      send_errors_.fetch_add(1, std::memory_order_relaxed);
     answered = true;
     peer_.store(from, std::memory_order_relaxed);
   }
@@ -170,7 +182,8 @@ void FriThread::serve(Batch& batch, int received, std::int64_t now_ns) {
   answers_.fetch_add(1, std::memory_order_relaxed);
   const auto taken = static_cast<float>(1e-9 * static_cast<double>(steadyNow() - now_ns));
   const float mean = mean_answer_time_.load(std::memory_order_relaxed);
-  mean_answer_time_.store(mean == 0.0F ? taken : mean + 1e-3F * (taken - mean), std::memory_order_relaxed);
+  mean_answer_time_.store(mean == 0.0F ? taken : mean + 1e-3F * (taken - mean),
+                          std::memory_order_relaxed);
   if (taken > longest_answer_time_.load(std::memory_order_relaxed)) {
     longest_answer_time_.store(taken, std::memory_order_relaxed);
   }
@@ -186,7 +199,8 @@ FriThreadStatistics FriThread::statistics(bool restart_longest) {
   s.peer = nameOf(peer_);
   s.last_foreign = nameOf(last_foreign_);
   s.mean_answer_time = mean_answer_time_;
-  s.longest_answer_time = restart_longest ? longest_answer_time_.exchange(0.0F) : longest_answer_time_.load();
+  s.longest_answer_time =
+      restart_longest ? longest_answer_time_.exchange(0.0F) : longest_answer_time_.load();
   s.real_time = scheduling_ == 1;
   return s;
 }

@@ -5,8 +5,8 @@
 
 namespace lwr_fri_bridge {
 
-AxisProfile planVelocity(double velocity, double acceleration, double target_velocity, double max_acceleration,
-                         double max_jerk) {
+AxisProfile planVelocity(double velocity, double acceleration, double target_velocity,
+                         double max_acceleration, double max_jerk) {
   const double per_jerk = 1.0 / max_jerk;
   // Velocity that is reached by doing nothing but bringing the acceleration to zero.
   const double coasting = velocity + 0.5 * acceleration * std::abs(acceleration) * per_jerk;
@@ -25,7 +25,8 @@ AxisProfile planVelocity(double velocity, double acceleration, double target_vel
     profile.duration[1] = 0.0;
     profile.duration[2] = peak * per_jerk;
   } else {
-    const double sign = a > max_acceleration ? -1.0 : 1.0;  // an acceleration beyond the limit comes down first
+    const double sign =
+        a > max_acceleration ? -1.0 : 1.0;  // an acceleration beyond the limit comes down first
     profile.duration[0] = sign * (max_acceleration - a) * per_jerk;
     profile.jerk[0] *= sign;
     const double dv1 = 0.5 * sign * (max_acceleration * max_acceleration - a * a) * per_jerk;
@@ -56,7 +57,9 @@ AxisState advance(const AxisState& start, const AxisProfile& profile, double dt)
 }
 
 Interpolator::Interpolator(const JointLimits& limits)
-    : max_velocity_(limits.velocity), max_acceleration_(limits.acceleration), max_jerk_(limits.jerk) {}
+    : max_velocity_(limits.velocity),
+      max_acceleration_(limits.acceleration),
+      max_jerk_(limits.jerk) {}
 
 void Interpolator::reset(const Vector7& position) {
   position_ = position;
@@ -64,7 +67,8 @@ void Interpolator::reset(const Vector7& position) {
   acceleration_.setZero();
 }
 
-void Interpolator::resume(const Vector7& position, const Vector7& velocity, const Vector7& acceleration) {
+void Interpolator::resume(const Vector7& position, const Vector7& velocity,
+                          const Vector7& acceleration) {
   position_ = position;
   velocity_ = velocity;
   acceleration_ = acceleration;
@@ -82,6 +86,8 @@ void Interpolator::step(const Vector7& target_velocity, double dt) {
   }
 }
 
-bool Interpolator::standsStill() const { return (velocity_.array() == 0.0).all() && (acceleration_.array() == 0.0).all(); }
+bool Interpolator::standsStill() const {
+  return (velocity_.array() == 0.0).all() && (acceleration_.array() == 0.0).all();
+}
 
 }  // namespace lwr_fri_bridge

@@ -9,7 +9,8 @@
 namespace lwr_fri_bridge {
 namespace {
 
-const char* const kJointNames[7] = {"lwr_a1", "lwr_a2", "lwr_e1", "lwr_a3", "lwr_a4", "lwr_a5", "lwr_a6"};
+const char* const kJointNames[7] = {"lwr_a1", "lwr_a2", "lwr_e1", "lwr_a3",
+                                    "lwr_a4", "lwr_a5", "lwr_a6"};
 
 [[noreturn]] void fail(const std::string& path, const YAML::Mark& mark, const std::string& what) {
   const std::string line = mark.is_null() ? "" : ":" + std::to_string(mark.line + 1);
@@ -23,8 +24,9 @@ bool readVector(const std::string& path, const YAML::Node& section, const std::s
   const std::string name = section_name + "." + field;
   if (!node) return false;
   if (!node.IsSequence() || node.size() != 7) {
-    fail(path, node.Mark(), name + ": expected a list of 7 numbers, got " +
-                                (node.IsSequence() ? std::to_string(node.size()) + " entries" : "no list"));
+    fail(path, node.Mark(),
+         name + ": expected a list of 7 numbers, got " +
+             (node.IsSequence() ? std::to_string(node.size()) + " entries" : "no list"));
   }
   for (std::size_t i = 0; i < 7; ++i) {
     double number = 0.0;
@@ -34,8 +36,9 @@ bool readVector(const std::string& path, const YAML::Node& section, const std::s
       fail(path, node[i].Mark(), name + "[" + std::to_string(i) + "]: expected a number");
     }
     if (!std::isfinite(number) || (positive && number <= 0.0)) {
-      fail(path, node[i].Mark(), name + "[" + std::to_string(i) + "] = " + std::to_string(number) + ": expected a " +
-                                     (positive ? "positive " : "") + "finite number");
+      fail(path, node[i].Mark(),
+           name + "[" + std::to_string(i) + "] = " + std::to_string(number) + ": expected a " +
+               (positive ? "positive " : "") + "finite number");
     }
     value[static_cast<Eigen::Index>(i)] = number;
   }
@@ -49,11 +52,14 @@ JointLimits loadJointLimits(const std::string& path, const std::string& profile)
   try {
     root = YAML::LoadFile(path);
   } catch (const YAML::BadFile&) {
-    throw std::runtime_error("joint limits " + path + ": cannot be opened; expected lwr_description/config/joint_limits.yaml");
+    throw std::runtime_error(
+        "joint limits " + path +
+        ": cannot be opened; expected lwr_description/config/joint_limits.yaml");
   } catch (const YAML::ParserException& error) {
     fail(path, error.mark, error.msg);
   }
-  if (!root.IsMap()) fail(path, root.Mark(), "expected a map with 'joints', 'default' and profiles");
+  if (!root.IsMap())
+    fail(path, root.Mark(), "expected a map with 'joints', 'default' and profiles");
 
   const YAML::Node joints = root["joints"];
   if (!joints || !joints.IsSequence() || joints.size() != 7) {
@@ -62,7 +68,8 @@ JointLimits loadJointLimits(const std::string& path, const std::string& profile)
   for (std::size_t i = 0; i < 7; ++i) {
     const auto name = joints[i].as<std::string>("");
     if (name != kJointNames[i]) {
-      fail(path, joints[i].Mark(), "joints[" + std::to_string(i) + "] = '" + name + "': expected '" + kJointNames[i] + "'");
+      fail(path, joints[i].Mark(),
+           "joints[" + std::to_string(i) + "] = '" + name + "': expected '" + kJointNames[i] + "'");
     }
   }
 
@@ -85,17 +92,23 @@ JointLimits loadJointLimits(const std::string& path, const std::string& profile)
     if (!section || !section.IsMap()) fail(path, root.Mark(), "profile '" + name + "' is missing");
     for (const auto& entry : section) {
       bool known = false;
-      for (const Field& field : fields) known = known || entry.first.as<std::string>() == field.name;
-      if (!known) fail(path, entry.first.Mark(), name + "." + entry.first.as<std::string>() + ": unknown field");
+      for (const Field& field : fields)
+        known = known || entry.first.as<std::string>() == field.name;
+      if (!known)
+        fail(path, entry.first.Mark(),
+             name + "." + entry.first.as<std::string>() + ": unknown field");
     }
     for (const Field& field : fields) {
-      const bool found = readVector(path, section, name, field.name, field.positive, limits.*field.member);
-      if (!found && name == "default") fail(path, section.Mark(), "default." + std::string(field.name) + " is missing");
+      const bool found =
+          readVector(path, section, name, field.name, field.positive, limits.*field.member);
+      if (!found && name == "default")
+        fail(path, section.Mark(), "default." + std::string(field.name) + " is missing");
     }
   }
   for (int i = 0; i < 7; ++i) {
     if (limits.lower_position[i] >= limits.upper_position[i]) {
-      fail(path, root.Mark(), std::string(kJointNames[i]) + ": lower_position must be below upper_position");
+      fail(path, root.Mark(),
+           std::string(kJointNames[i]) + ": lower_position must be below upper_position");
     }
   }
   return limits;

@@ -1,6 +1,7 @@
 /// @file
-/// The bridge as a node of its own (split:=true): target velocities come over target_joint_states. The default is robot_node of
-/// coglab_controllers, which holds bridge and controller manager in one process.
+/// The bridge as a node of its own (split:=true): target velocities come over target_joint_states.
+/// The default is robot_node of coglab_controllers, which holds bridge and controller manager in
+/// one process.
 #include <atomic>
 #include <chrono>
 #include <csignal>

@@ -15,14 +15,15 @@ std::string enterRealTime(int priority) {
   parameters.sched_priority = priority;
   const int error = pthread_setschedparam(pthread_self(), SCHED_FIFO, &parameters);
   if (error == 0) return {};
-  return "SCHED_FIFO priority " + std::to_string(priority) + " not granted (" + std::strerror(error) +
-         "): answers may come late under load; give the binary cap_sys_nice";
+  return "SCHED_FIFO priority " + std::to_string(priority) + " not granted (" +
+         std::strerror(error) + "): answers may come late under load; give the binary cap_sys_nice";
 }
 
 std::string lockMemory() {
   if (mlockall(MCL_CURRENT | MCL_FUTURE) == 0) return {};
   return std::string("mlockall not granted (") + std::strerror(errno) +
-         "): page faults may delay answers; give the binary cap_ipc_lock or raise the memlock limit";
+         "): page faults may delay answers; give the binary cap_ipc_lock or raise the memlock "
+         "limit";
 }
 
 void* BoundedThread::entry(void* self) {
@@ -45,7 +46,8 @@ void BoundedThread::start(const char* name, std::size_t stack_bytes, std::functi
   pthread_attr_setstacksize(&attributes, stack_bytes_);
   const int error = pthread_create(&thread_, &attributes, &BoundedThread::entry, this);
   pthread_attr_destroy(&attributes);
-  if (error != 0) throw std::system_error(error, std::generic_category(), "cannot start thread " + name_);
+  if (error != 0)
+    throw std::system_error(error, std::generic_category(), "cannot start thread " + name_);
   running_ = true;
 }
 

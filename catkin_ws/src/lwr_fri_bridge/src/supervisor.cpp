@@ -4,27 +4,42 @@ namespace lwr_fri_bridge {
 
 const char* describe(MotionBlock block) {
   switch (block) {
-    case MotionBlock::None: return "";
-    case MotionBlock::Disconnected: return "no datagrams from the robot controller";
-    case MotionBlock::Monitor: return "the robot controller is in monitor mode; send start";
-    case MotionBlock::NoPower: return "not all drives have power; check enabling switch and emergency stop, then send start";
-    case MotionBlock::NotStarted: return "command mode without an explicit start; send start";
-    case MotionBlock::Held: return "hold is latched; send reset";
-    case MotionBlock::Stopping: return "stop was asked for";
-    case MotionBlock::Leashed: return "the set-point ran ahead of the arm, something blocks it; ask for the motion anew";
+    case MotionBlock::None:
+      return "";
+    case MotionBlock::Disconnected:
+      return "no datagrams from the robot controller";
+    case MotionBlock::Monitor:
+      return "the robot controller is in monitor mode; send start";
+    case MotionBlock::NoPower:
+      return "not all drives have power; check enabling switch and emergency stop, then send start";
+    case MotionBlock::NotStarted:
+      return "command mode without an explicit start; send start";
+    case MotionBlock::Held:
+      return "hold is latched; send reset";
+    case MotionBlock::Stopping:
+      return "stop was asked for";
+    case MotionBlock::Leashed:
+      return "the set-point ran ahead of the arm, something blocks it; ask for the motion anew";
   }
   return "?";
 }
 
 const char* nameOf(SupervisorState state) {
   switch (state) {
-    case SupervisorState::Disconnected: return "disconnected";
-    case SupervisorState::Monitor: return "monitor";
-    case SupervisorState::Starting: return "starting";
-    case SupervisorState::Command: return "command";
-    case SupervisorState::Holding: return "holding";
-    case SupervisorState::Stopping: return "stopping";
-    case SupervisorState::Stopped: return "stopped";
+    case SupervisorState::Disconnected:
+      return "disconnected";
+    case SupervisorState::Monitor:
+      return "monitor";
+    case SupervisorState::Starting:
+      return "starting";
+    case SupervisorState::Command:
+      return "command";
+    case SupervisorState::Holding:
+      return "holding";
+    case SupervisorState::Stopping:
+      return "stopping";
+    case SupervisorState::Stopped:
+      return "stopped";
   }
   return "?";
 }
@@ -63,7 +78,8 @@ MotionBlock Supervisor::judge(const SupervisorInput& input) const {
 }
 
 void Supervisor::update(const SupervisorInput& input) {
-  const bool commanding = input.connected && input.command_mode && input.full_power && !input.fresh_session;
+  const bool commanding =
+      input.connected && input.command_mode && input.full_power && !input.fresh_session;
   if (started_ && !commanding) {
     started_ = false;
     if (!stopping_) {
@@ -74,7 +90,8 @@ void Supervisor::update(const SupervisorInput& input) {
   at_rest_ = input.stands_still || !commanding;
 
   const MotionBlock block = judge(input);
-  // Every change of the permission starts a new epoch: commands computed before it do not count any more.
+  // Every change of the permission starts a new epoch: commands computed before it do not count any
+  // more.
   if ((block == MotionBlock::None) != (block_ == MotionBlock::None)) ++epoch_;
   block_ = block;
 

@@ -1,6 +1,7 @@
 /// @file
-/// A robot controller just large enough for the tests of this package: keeps the set-point, extrapolates single losses, runs our own
-/// KRL convention. Independent of coglab_sim, which tests the bridge as a whole.
+/// A robot controller just large enough for the tests of this package: keeps the set-point,
+/// extrapolates single losses, runs our own KRL convention. Independent of coglab_sim, which tests
+/// the bridge as a whole.
 #pragma once
 
 #include <cmath>
@@ -91,7 +92,7 @@ class SmallController {
   fri::Quality quality = fri::Quality::Perfect;
   fri::ControlStrategy control = fri::ControlStrategy::Position;
   std::uint16_t power = fri::kAllDrivesOn;
-  bool obeys = true;    ///< whether the KRL program runs
+  bool obeys = true;     ///< whether the KRL program runs
   bool blocked = false;  ///< something holds the arm
   fri::CommandDatagram answer{};
 
@@ -115,7 +116,8 @@ class SmallController {
 };
 
 /// Submits `event` and runs cycles until it ends (at most `limit` s of simulated time).
-inline Outcome runEvent(Bridge& bridge, SmallController& robot, const std::string& event, double limit = 20.0) {
+inline Outcome runEvent(Bridge& bridge, SmallController& robot, const std::string& event,
+                        double limit = 20.0) {
   const std::uint32_t ticket = bridge.submit(event);
   for (int i = 0; i < static_cast<int>(limit / robot.period()); ++i) {
     robot.cycle(bridge);

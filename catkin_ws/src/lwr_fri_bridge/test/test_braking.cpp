@@ -1,4 +1,5 @@
-/// Braking distance and the bound it puts on velocities: no position limit is crossed from any state that can be braked at all.
+/// Braking distance and the bound it puts on velocities: no position limit is crossed from any
+/// state that can be braked at all.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -61,9 +62,11 @@ TEST(Braking, noPositionLimitIsCrossedFromAnyState) {
           p[i] = limits.upper_position[i] * part(random);
           v[i] = limits.velocity[i] * part(random);
           a[i] = limits.acceleration[i] * part(random);
-          const BrakingReach reach = brakingReach(v[i], a[i], limits.acceleration[i], limits.jerk[i]);
+          const BrakingReach reach =
+              brakingReach(v[i], a[i], limits.acceleration[i], limits.jerk[i]);
           const double peak = v[i] + a[i] * std::abs(a[i]) / (2.0 * limits.jerk[i]);
-          if (std::abs(peak) <= limits.velocity[i] && p[i] + reach.highest <= limits.upper_position[i] &&
+          if (std::abs(peak) <= limits.velocity[i] &&
+              p[i] + reach.highest <= limits.upper_position[i] &&
               p[i] + reach.lowest >= limits.lower_position[i]) {
             break;
           }
@@ -80,8 +83,10 @@ TEST(Braking, noPositionLimitIsCrossedFromAnyState) {
         at_border += cut != 0 ? 1 : 0;
         interpolator.step(target, dt);
         for (int i = 0; i < 7; ++i) {
-          ASSERT_LE(interpolator.position()[i], limits.upper_position[i] + 1e-9) << i << " dt " << dt;
-          ASSERT_GE(interpolator.position()[i], limits.lower_position[i] - 1e-9) << i << " dt " << dt;
+          ASSERT_LE(interpolator.position()[i], limits.upper_position[i] + 1e-9)
+              << i << " dt " << dt;
+          ASSERT_GE(interpolator.position()[i], limits.lower_position[i] - 1e-9)
+              << i << " dt " << dt;
         }
       }
     }

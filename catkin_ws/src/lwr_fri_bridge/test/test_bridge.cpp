@@ -1,4 +1,5 @@
-/// The bridge in lockstep with a small controller: what Table 1, the supervisor and "failure has a meaning" promise.
+/// The bridge in lockstep with a small controller: what Table 1, the supervisor and "failure has a
+/// meaning" promise.
 #include <gtest/gtest.h>
 
 #include <random>
@@ -14,7 +15,8 @@ using test::runEvent;
 using test::SmallController;
 
 struct Cell {
-  explicit Cell(double period = 0.005, const BridgeConfig& config = defaultConfig()) : bridge(config), robot(period) {}
+  explicit Cell(double period = 0.005, const BridgeConfig& config = defaultConfig())
+      : bridge(config), robot(period) {}
   void run(int cycles) {
     for (int i = 0; i < cycles; ++i) robot.cycle(bridge);
   }
@@ -35,7 +37,8 @@ struct Cell {
 };
 
 void expectMirror(const Cell& cell, const Vector7& set_point) {
-  for (int i = 0; i < 7; ++i) EXPECT_FLOAT_EQ(cell.robot.answer.joint_position[i], static_cast<float>(set_point[i]));
+  for (int i = 0; i < 7; ++i)
+    EXPECT_FLOAT_EQ(cell.robot.answer.joint_position[i], static_cast<float>(set_point[i]));
 }
 
 TEST(Bridge, mirrorsTheSetPointInMonitorModeAndWithoutPower) {
@@ -66,11 +69,13 @@ TEST(Bridge, answersWithHeaderAndFlags) {
   EXPECT_EQ(cell.robot.answer.header.reflected, 0);
   EXPECT_EQ(cell.robot.answer.header.counter, static_cast<std::uint16_t>(first + 1));
   EXPECT_EQ(cell.robot.answer.flags, 0x0001U);
-  EXPECT_TRUE(runEvent(cell.bridge, cell.robot, "joint_impedance stiffness 500 damping 0.5").success());
+  EXPECT_TRUE(
+      runEvent(cell.bridge, cell.robot, "joint_impedance stiffness 500 damping 0.5").success());
   cell.run(1);
   EXPECT_EQ(cell.robot.answer.flags, 0x0035U);
   EXPECT_FLOAT_EQ(cell.robot.answer.joint_stiffness[3], 500.0F);
-  EXPECT_TRUE(runEvent(cell.bridge, cell.robot, "cartesian_impedance stiffness 1 2 3 4 5 6").success());
+  EXPECT_TRUE(
+      runEvent(cell.bridge, cell.robot, "cartesian_impedance stiffness 1 2 3 4 5 6").success());
   cell.run(1);
   EXPECT_EQ(cell.robot.answer.flags, 0x3500U);
   const float wire[6] = {1, 2, 3, 6, 5, 4};
@@ -124,8 +129,10 @@ TEST(Bridge, everyStrategyFollows) {
     if (std::string(mode) == "cartesian_impedance") {
       // Joint 1 turns about the vertical: the frame turns with it.
       const double angle = cell.bridge.snapshot().sample.commanded_position[0] - 0.1;
-      EXPECT_NEAR(cell.robot.answer.cartesian_frame[3], x * std::cos(angle) - y * std::sin(angle), 1e-3);
-      EXPECT_NEAR(cell.robot.answer.cartesian_frame[7], x * std::sin(angle) + y * std::cos(angle), 1e-3);
+      EXPECT_NEAR(cell.robot.answer.cartesian_frame[3], x * std::cos(angle) - y * std::sin(angle),
+                  1e-3);
+      EXPECT_NEAR(cell.robot.answer.cartesian_frame[7], x * std::sin(angle) + y * std::cos(angle),
+                  1e-3);
     }
   }
 }
@@ -294,7 +301,8 @@ TEST(Bridge, scalesTheWholeVectorToTheSpeedLimit) {
   EXPECT_NEAR(v[5], limit / 4.0, 1e-9);
 }
 
-/// Single losses: the set-point goes on without a leap and within speed and acceleration limits, as the controller sees it.
+/// Single losses: the set-point goes on without a leap and within speed and acceleration limits, as
+/// the controller sees it.
 TEST(Bridge, ridesThroughLossesWithoutALeap) {
   for (const double period : {0.001, 0.005, 0.010}) {
     Cell cell(period);
@@ -302,19 +310,22 @@ TEST(Bridge, ridesThroughLossesWithoutALeap) {
     std::mt19937 random(7);
     std::uniform_real_distribution<double> part(0.0, 1.0);
     const JointLimits& limits = cell.bridge.config().limits;
-    Vector7 last = cell.robot.setPoint(), last_velocity = Vector7::Zero(), velocity = Vector7::Zero();
+    Vector7 last = cell.robot.setPoint(), last_velocity = Vector7::Zero(),
+            velocity = Vector7::Zero();
     int losses = 0;
     for (int i = 0; i < static_cast<int>(8.0 / period); ++i) {
-      if (i % static_cast<int>(0.4 / period) == 0) velocity = Vector7::Constant(0.6 * (i % 2 == 0 ? 1 : -1) * part(random));
+      if (i % static_cast<int>(0.4 / period) == 0)
+        velocity = Vector7::Constant(0.6 * (i % 2 == 0 ? 1 : -1) * part(random));
       drive(cell.bridge, cell.robot, velocity);
       const double dice = part(random);
-      cell.robot.cycle(cell.bridge, dice < 0.05, dice > 0.95);
+      cell.robot.cycle(cell.bridge, dice<0.05, dice> 0.95);
       losses += dice < 0.05 || dice > 0.95 ? 1 : 0;
       const Vector7 v = (cell.robot.setPoint() - last) / period;
       for (int j = 0; j < 7; ++j) {
         const double noise = 6e-7 / period;  // float32 on the wire, twice
         ASSERT_LE(std::abs(v[j]), limits.velocity[j] + noise);
-        ASSERT_LE(std::abs(v[j] - last_velocity[j]), limits.acceleration[j] * period + 2.0 * noise) << i << " " << j;
+        ASSERT_LE(std::abs(v[j] - last_velocity[j]), limits.acceleration[j] * period + 2.0 * noise)
+            << i << " " << j;
       }
       last = cell.robot.setPoint();
       last_velocity = v;
@@ -394,7 +405,7 @@ TEST(Bridge, refusesParametersOutOfRangeByName) {
     FAIL() << "accepted";
   } catch (const std::invalid_argument& error) {
     const std::string text = error.what();
-    EXPECT_NE(text.find("set_point_leash_position = 3"), std::string::npos) << text;
+    EXPECT_NE(text.find("set_point_leash/position = 3"), std::string::npos) << text;
     EXPECT_NE(text.find("0.005..0.5"), std::string::npos) << text;
   }
 }

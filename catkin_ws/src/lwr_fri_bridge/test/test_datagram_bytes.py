@@ -1,9 +1,11 @@
 """The bytes of both datagrams, read a second time.
 
-The tables below are typed from the description of the interface (offset, format, name) and share nothing with the C++ header: every field
-gets values that occur nowhere else, and both directions are checked. A swapped pair of fields, a shifted offset, another joint order or
-wrong order of the rotations turns these tests red.
+The tables below are typed from the description of the interface (offset, format, name) and share nothing
+with the C++ header: every field gets values that occur nowhere else, and both directions are checked. A
+swapped pair of fields, a shifted offset, another joint order or wrong order of the rotations turns these
+tests red.
 """
+
 from __future__ import annotations
 
 import pathlib
@@ -11,7 +13,9 @@ import struct
 
 import pytest
 
-lwr_fri_bridge = pytest.importorskip("lwr_fri_bridge", reason="the workspace is not built or not sourced")
+lwr_fri_bridge = pytest.importorskip(
+    "lwr_fri_bridge", reason="the workspace is not built or not sourced"
+)
 
 HEADER = [
     (0, "H", "counter"),
@@ -119,10 +123,12 @@ def test_wrong_size_is_refused(kind: str) -> None:
 
 def test_golden_headers() -> None:
     command = lwr_fri_bridge.encode_command(
-        {"counter": 1, "reflected": 0x1234, "size": 376, "id": 0x1005})
+        {"counter": 1, "reflected": 0x1234, "size": 376, "id": 0x1005}
+    )
     assert command[:8] == bytes.fromhex("01 00 34 12 78 01 05 10")
     measurement = lwr_fri_bridge.encode_measurement(
-        {"counter": 2, "reflected": 1, "size": 916, "id": 0x2006})
+        {"counter": 2, "reflected": 1, "size": 916, "id": 0x2006}
+    )
     assert measurement[:8] == bytes.fromhex("02 00 01 00 94 03 06 20")
     # The controller's own self-test of the byte order of floats.
     assert struct.pack("<I", 0x40490FDB) == bytes.fromhex("DB 0F 49 40")
@@ -131,12 +137,23 @@ def test_golden_headers() -> None:
 
 
 def monitor_datagram(counter: int, **fields: object) -> bytes:
-    values: dict[str, object] = {name: [0] * int(form[:-1]) if len(form) > 1 else 0
-                                 for _, form, name in MEASUREMENT}
+    values: dict[str, object] = {
+        name: [0] * int(form[:-1]) if len(form) > 1 else 0 for _, form, name in MEASUREMENT
+    }
     identity = [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0]
-    values.update(counter=counter, size=916, id=0x2006, state=1, quality=3, control=1, power=0x7F,
-                  measurement_period=0.005, command_period=0.005, commanded_frame=identity,
-                  commanded_frame_offset=identity)
+    values.update(
+        counter=counter,
+        size=916,
+        id=0x2006,
+        state=1,
+        quality=3,
+        control=1,
+        power=0x7F,
+        measurement_period=0.005,
+        command_period=0.005,
+        commanded_frame=identity,
+        commanded_frame_offset=identity,
+    )
     values.update(fields)
     return pack(MEASUREMENT, 916, values)
 
@@ -150,10 +167,14 @@ def test_bridge_reads_joint_order_and_reversed_torques() -> None:
     """What the bridge tells the controllers: wire order of the joints, Tx Ty Tz from Tz Ty Tx."""
     bridge = lwr_fri_bridge.Bridge(str(LIMITS))
     joints = [0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7]
-    data = monitor_datagram(5, measured_position=joints, commanded_position=joints,
-                            measured_torque=[1, 2, 3, 4, 5, 6, 7],
-                            external_torque=[11, 12, 13, 14, 15, 16, 17],
-                            external_wrench=[21, 22, 23, 24, 25, 26])
+    data = monitor_datagram(
+        5,
+        measured_position=joints,
+        commanded_position=joints,
+        measured_torque=[1, 2, 3, 4, 5, 6, 7],
+        external_torque=[11, 12, 13, 14, 15, 16, 17],
+        external_wrench=[21, 22, 23, 24, 25, 26],
+    )
     assert bridge.answer(data, 10**9) is not None
     sample = bridge.snapshot()
     assert list(sample["position"]) == pytest.approx(joints, abs=1e-7)
@@ -164,10 +185,14 @@ def test_bridge_reads_joint_order_and_reversed_torques() -> None:
 
 def test_bridge_writes_stiffness_with_reversed_rotations() -> None:
     bridge = lwr_fri_bridge.Bridge(
-        str(LIMITS), control_mode="cartesian_impedance stiffness 1 2 3 4 5 6 damping .1 .2 .3 .4 .5 .6")
+        str(LIMITS),
+        control_mode="cartesian_impedance stiffness 1 2 3 4 5 6 damping .1 .2 .3 .4 .5 .6",
+    )
     answer = bridge.answer(monitor_datagram(5), 10**9)
     assert read(COMMAND, answer, "cartesian_stiffness") == (1, 2, 3, 6, 5, 4)
-    assert read(COMMAND, answer, "cartesian_damping") == pytest.approx((.1, .2, .3, .6, .5, .4))
+    assert read(COMMAND, answer, "cartesian_damping") == pytest.approx(
+        (0.1, 0.2, 0.3, 0.6, 0.5, 0.4)
+    )
     assert read(COMMAND, answer, "flags") == (0x3500,)
 
 
@@ -175,11 +200,18 @@ def test_bridge_mirrors_the_sum() -> None:
     bridge = lwr_fri_bridge.Bridge(str(LIMITS))
     own = [0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7]
     offset = [0.01, 0.02, 0.03, 0.04, 0.05, 0.06, 0.07]
-    answer = bridge.answer(monitor_datagram(65535, commanded_position=own,
-                                            commanded_position_offset=offset,
-                                            measured_position=[0.0] * 7), 10**9)
+    answer = bridge.answer(
+        monitor_datagram(
+            65535,
+            commanded_position=own,
+            commanded_position_offset=offset,
+            measured_position=[0.0] * 7,
+        ),
+        10**9,
+    )
     assert read(COMMAND, answer, "joint_position") == pytest.approx(
-        [a + b for a, b in zip(own, offset)], abs=1e-7)
+        [a + b for a, b in zip(own, offset, strict=True)], abs=1e-7
+    )
     assert read(COMMAND, answer, "reflected") == (65535,)
     assert read(COMMAND, answer, "size") == (376,)
     assert read(COMMAND, answer, "id") == (0x1005,)

@@ -1,4 +1,5 @@
-/// The FRI thread over real sockets on 127.0.0.1: peers, backlog, ports. Asserts outcomes and counters, no times.
+/// The FRI thread over real sockets on 127.0.0.1: peers, backlog, ports. Asserts outcomes and
+/// counters, no times.
 #include <gtest/gtest.h>
 
 #include <chrono>
@@ -33,7 +34,9 @@ class Peer {
     sendto(fd_, data, size, 0, reinterpret_cast<sockaddr*>(&to_), sizeof to_);
   }
   void send(const fri::MeasurementDatagram& m) { send(&m, sizeof m); }
-  bool receive(fri::CommandDatagram& c) { return recv(fd_, &c, sizeof c, 0) == static_cast<ssize_t>(sizeof c); }
+  bool receive(fri::CommandDatagram& c) {
+    return recv(fd_, &c, sizeof c, 0) == static_cast<ssize_t>(sizeof c);
+  }
 
  private:
   int fd_;
@@ -41,7 +44,8 @@ class Peer {
 };
 
 bool eventually(const std::function<bool()>& condition) {
-  for (int i = 0; i < 500 && !condition(); ++i) std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  for (int i = 0; i < 500 && !condition(); ++i)
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
   return condition();
 }
 
@@ -109,7 +113,8 @@ TEST_F(FriThreadTest, silenceIsDisconnection) {
   fri::CommandDatagram c{};
   ASSERT_TRUE(peer.receive(c));
   EXPECT_TRUE(eventually([&] { return bridge.snapshot().supervisor == SupervisorState::Monitor; }));
-  EXPECT_TRUE(eventually([&] { return bridge.snapshot().supervisor == SupervisorState::Disconnected; }));
+  EXPECT_TRUE(
+      eventually([&] { return bridge.snapshot().supervisor == SupervisorState::Disconnected; }));
   const Outcome outcome = bridge.command("start");
   EXPECT_EQ(outcome.code, OutcomeCode::Disconnected);
 }
@@ -123,7 +128,8 @@ TEST_F(FriThreadTest, aPortInUseIsSaid) {
     second.start();
     FAIL() << "bound twice";
   } catch (const std::runtime_error& error) {
-    EXPECT_NE(std::string(error.what()).find(std::to_string(fri.port())), std::string::npos) << error.what();
+    EXPECT_NE(std::string(error.what()).find(std::to_string(fri.port())), std::string::npos)
+        << error.what();
   }
   same.address = "300.1.1.1";
   FriThread third(other, same);

@@ -1,5 +1,6 @@
-/// Interpolator: limits checked by differentiating the output (each quantity by one difference of the next lower one), exact arrival,
-/// equality with fine numeric integration. Equality with ruckig is in test_interpolator_oracle.py.
+/// Interpolator: limits checked by differentiating the output (each quantity by one difference of
+/// the next lower one), exact arrival, equality with fine numeric integration. Equality with ruckig
+/// is in test_interpolator_oracle.py.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -21,9 +22,11 @@ TEST(Interpolator, limitsHoldByDifferentiation) {
       Vector7 target = Vector7::Zero();
       for (int step = 0; step < 20000; ++step) {
         if (step % 17 == 0) {
-          for (int i = 0; i < 7; ++i) target[i] = 1.5 * part(random) * limits.velocity[i];  // beyond the limit, too
+          for (int i = 0; i < 7; ++i)
+            target[i] = 1.5 * part(random) * limits.velocity[i];  // beyond the limit, too
         }
-        const Vector7 p = interpolator.position(), v = interpolator.velocity(), a = interpolator.acceleration();
+        const Vector7 p = interpolator.position(), v = interpolator.velocity(),
+                      a = interpolator.acceleration();
         interpolator.step(target, dt);
         const Vector7 dp = (interpolator.position() - p) / dt;
         const Vector7 dv = (interpolator.velocity() - v) / dt;
@@ -62,11 +65,13 @@ TEST(Interpolator, planIsConsistentAlongItself) {
     const AxisProfile whole = planVelocity(start.velocity, start.acceleration, target, A, J);
     const double t = whole.totalTime() * std::abs(part(random)), rest = 0.05;
     const AxisState middle = advance(start, whole, t);
-    const AxisState twice = advance(middle, planVelocity(middle.velocity, middle.acceleration, target, A, J), rest);
+    const AxisState twice =
+        advance(middle, planVelocity(middle.velocity, middle.acceleration, target, A, J), rest);
     const AxisState once = advance(start, whole, t + rest);
     ASSERT_NEAR(twice.position, once.position, 1e-11);
     ASSERT_NEAR(twice.velocity, once.velocity, 1e-11);
-    // Near the end of a phase the acceleration follows the square root of the rounding of the velocity.
+    // Near the end of a phase the acceleration follows the square root of the rounding of the
+    // velocity.
     ASSERT_NEAR(twice.acceleration, once.acceleration, 1e-5);
   }
 }

@@ -1,11 +1,14 @@
-"""The interpolator against ruckig (velocity interface, no synchronisation), an independent jerk-limited trajectory generator."""
+"""The interpolator against ruckig (velocity interface, no synchronisation), an independent generator."""
+
 from __future__ import annotations
 
 import random
 
 import pytest
 
-lwr_fri_bridge = pytest.importorskip("lwr_fri_bridge", reason="the workspace is not built or not sourced")
+lwr_fri_bridge = pytest.importorskip(
+    "lwr_fri_bridge", reason="the workspace is not built or not sourced"
+)
 ruckig = pytest.importorskip("ruckig", reason="oracle: pip install ruckig==0.19.4")
 
 STATES = 100_000
@@ -42,6 +45,8 @@ def test_equal_to_ruckig() -> None:
             got = lwr_fri_bridge.step_axis(p, v, a, target, max_a, max_j, tick)
             duration = lwr_fri_bridge.time_to_velocity(v, a, target, max_a, max_j)
             worst["duration"] = max(worst["duration"], abs(duration - trajectory.duration))
-            for name, ours, theirs in zip(worst, got, expected):
+            for name, ours, theirs in zip(
+                ("position", "velocity", "acceleration"), got, expected, strict=True
+            ):
                 worst[name] = max(worst[name], abs(ours - theirs))
     assert max(worst.values()) <= 1e-12, worst

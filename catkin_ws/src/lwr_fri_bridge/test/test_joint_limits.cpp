@@ -55,14 +55,23 @@ TEST(JointLimits, errorsNameFileLineAndField) {
   EXPECT_EQ(errorFor(original()), "");
   EXPECT_NE(errorFor(original(), "t3").find("profile 't3' is missing"), std::string::npos);
   const std::string short_list = errorFor(replaced(original(), "torque: [176.0, ", "torque: ["));
-  EXPECT_NE(short_list.find("default.torque: expected a list of 7 numbers, got 6"), std::string::npos) << short_list;
+  EXPECT_NE(short_list.find("default.torque: expected a list of 7 numbers, got 6"),
+            std::string::npos)
+      << short_list;
   EXPECT_NE(short_list.find("/tmp/joint_limits_"), std::string::npos);
-  EXPECT_NE(errorFor(replaced(original(), "jerk: [500.0", "jerk: [.nan")).find("default.jerk[0]"), std::string::npos);
-  EXPECT_NE(errorFor(replaced(original(), "jerk: [500.0", "jerk: [-5.0")).find("positive"), std::string::npos);
-  EXPECT_NE(errorFor(replaced(original(), "jerk: [500.0", "jerk: [fast")).find("expected a number"), std::string::npos);
-  EXPECT_NE(errorFor(replaced(original(), "lwr_a2", "lwr_a9")).find("'lwr_a9': expected 'lwr_a2'"), std::string::npos);
-  EXPECT_NE(errorFor(replaced(original(), "  torque:", "  torq:")).find("default.torq: unknown field"), std::string::npos);
-  EXPECT_NE(errorFor(replaced(original(), "lower_position: [-2.96", "lower_position: [12.96")).find("lower_position must be below"),
+  EXPECT_NE(errorFor(replaced(original(), "jerk: [500.0", "jerk: [.nan")).find("default.jerk[0]"),
+            std::string::npos);
+  EXPECT_NE(errorFor(replaced(original(), "jerk: [500.0", "jerk: [-5.0")).find("positive"),
+            std::string::npos);
+  EXPECT_NE(errorFor(replaced(original(), "jerk: [500.0", "jerk: [fast")).find("expected a number"),
+            std::string::npos);
+  EXPECT_NE(errorFor(replaced(original(), "lwr_a2", "lwr_a9")).find("'lwr_a9': expected 'lwr_a2'"),
+            std::string::npos);
+  EXPECT_NE(
+      errorFor(replaced(original(), "  torque:", "  torq:")).find("default.torq: unknown field"),
+      std::string::npos);
+  EXPECT_NE(errorFor(replaced(original(), "lower_position: [-2.96", "lower_position: [12.96"))
+                .find("lower_position must be below"),
             std::string::npos);
   EXPECT_NE(errorFor("joints: [").size(), 0U);
   EXPECT_NE(errorFor("").size(), 0U);

@@ -148,7 +148,8 @@ TEST(Session, cartesianSetPointIsCommandTimesOffset) {
   for (int i = 0; i < 12; ++i) EXPECT_FLOAT_EQ(frame[i], expected[i]) << i;
 }
 
-/// A million bad datagrams between good ones while the arm moves: no crash, all counted, no leap in the answers.
+/// A million bad datagrams between good ones while the arm moves: no crash, all counted, no leap in
+/// the answers.
 TEST(Session, aMillionBadDatagramsMakeNoLeap) {
   const double period = 0.001;
   Bridge bridge(test::defaultConfig());
@@ -157,7 +158,9 @@ TEST(Session, aMillionBadDatagramsMakeNoLeap) {
   ASSERT_TRUE(test::runEvent(bridge, robot, "start").success());
 
   std::mt19937 random(99);
-  const auto dice = [&random](int n) { return static_cast<int>(random() % static_cast<unsigned>(n)); };
+  const auto dice = [&random](int n) {
+    return static_cast<int>(random() % static_cast<unsigned>(n));
+  };
   std::deque<Bytes> past;
   constexpr int kBad = 1'000'000;
   std::uint64_t bad = 0, bad_answered = 0;
@@ -196,7 +199,9 @@ TEST(Session, aMillionBadDatagramsMakeNoLeap) {
             const Bytes& old = past[static_cast<std::size_t>(dice(static_cast<int>(past.size())))];
             std::copy(old.begin(), old.end(), buffer.begin());
             const int kind = dice(3);
-            size = kind == 0 ? old.size() : kind == 1 ? static_cast<std::size_t>(dice(916)) : 917 + static_cast<std::size_t>(dice(100));
+            size = kind == 0   ? old.size()
+                   : kind == 1 ? static_cast<std::size_t>(dice(916))
+                               : 917 + static_cast<std::size_t>(dice(100));
           }
       }
       if (bridge.answer(buffer.data(), size, robot.now() + 1000 * k, answer)) ++bad_answered;
@@ -226,7 +231,8 @@ TEST(Session, aMillionBadDatagramsMakeNoLeap) {
   EXPECT_GT(s.session.implausible, 0U);
 }
 
-/// Reordered: a datagram that was overtaken is not answered, and the command goes on without a leap.
+/// Reordered: a datagram that was overtaken is not answered, and the command goes on without a
+/// leap.
 TEST(Session, reorderedDatagramsMakeNoLeap) {
   const double period = 0.005;
   Bridge bridge(test::defaultConfig());

@@ -15,7 +15,8 @@ TEST(VelocityFilter, delayIsAsStated) {
       VelocityFilter filter(T);
       const double acceleration = 3.0;
       double t = 0.0;
-      for (int i = 0; i < 2000; ++i, t += dt) filter.update(Vector7::Constant(0.5 * acceleration * t * t), 1, dt);
+      for (int i = 0; i < 2000; ++i, t += dt)
+        filter.update(Vector7::Constant(0.5 * acceleration * t * t), 1, dt);
       t -= dt;
       const double lag = t - filter.velocity()[0] / acceleration;
       EXPECT_NEAR(lag, VelocityFilter::delay(T, dt), 1e-8) << T << " " << dt;

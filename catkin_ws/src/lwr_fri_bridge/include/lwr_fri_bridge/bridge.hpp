@@ -1,7 +1,7 @@
 /// @file
-/// The bridge: composes FRI session, Interpolator, VelocityFilter, Supervisor and Configurator (D4.10 Figure 1) into the answer to
-/// one datagram. It owns no socket and no thread, so the FRI thread, lockstep tests and a simulation in virtual time drive
-/// the same code.
+/// The bridge: composes FRI session, Interpolator, VelocityFilter, Supervisor and Configurator
+/// (D4.10 Figure 1) into the answer to one datagram. It owns no socket and no thread, so the FRI
+/// thread, lockstep tests and a simulation in virtual time drive the same code.
 #pragma once
 
 #include <array>
@@ -37,7 +37,7 @@ struct BridgeCounters {
   std::uint64_t resumed_after_gap = 0;   ///< went on from the controller's set-point after a loss
   std::uint64_t position_bounds = 0;     ///< ticks in which braking distance bounded a joint
   std::uint64_t leash_trips = 0;
-  std::uint64_t requests_dropped = 0;    ///< events that found the request queue full
+  std::uint64_t requests_dropped = 0;  ///< events that found the request queue full
 };
 
 /// Everything there is to show, copied at the end of each tick.
@@ -52,12 +52,14 @@ struct Snapshot {
   fri::FriState state = fri::FriState::Off;
   fri::Quality quality = fri::Quality::Unacceptable;
   fri::ControlStrategy control = fri::ControlStrategy::Other;  ///< as the controller reports it
-  ControlMode mode;  ///< for the next start
+  ControlMode mode;                                            ///< for the next start
   std::uint16_t power = 0, drive_error = 0, drive_warning = 0;
-  float answer_rate = 0, latency = 0, jitter = 0, miss_rate = 0, safety_scale = 0, timestamp = 0;  ///< of the controller
+  float answer_rate = 0, latency = 0, jitter = 0, miss_rate = 0, safety_scale = 0,
+        timestamp = 0;  ///< of the controller
   std::uint32_t miss_counter = 0;
   std::array<float, 7> temperature{};  ///< degree Celsius
-  unsigned bounded_joints = 0;         ///< joints bounded by braking distance in this tick, bit i for joint i
+  unsigned bounded_joints =
+      0;  ///< joints bounded by braking distance in this tick, bit i for joint i
 };
 
 /// The part of a Snapshot whose changes are worth telling (topic `state`).
@@ -82,16 +84,21 @@ class Bridge {
 
   // --- FRI thread (or lockstep). Real-time safe: no allocation, lock, syscall or exception.
 
-  /// One FRI tick: judges the datagram of `size` bytes received at `now_ns` (steady or simulated clock) and fills `answer`.
-  /// Returns false if the datagram deserves none (see fri::Verdict); it is counted.
-  bool answer(const std::uint8_t* datagram, std::size_t size, std::int64_t now_ns, fri::CommandDatagram& answer);
+  /// One FRI tick: judges the datagram of `size` bytes received at `now_ns` (steady or simulated
+  /// clock) and fills `answer`. Returns false if the datagram deserves none (see fri::Verdict); it
+  /// is counted.
+  bool answer(const std::uint8_t* datagram, std::size_t size, std::int64_t now_ns,
+              fri::CommandDatagram& answer);
 
-  /// The two halves of answer(), for who wants to send in between: compute() fills the answer, publish() then shows the tick to the
-  /// other threads. publish() only after a compute() that returned true.
-  bool compute(const std::uint8_t* datagram, std::size_t size, std::int64_t now_ns, fri::CommandDatagram& answer);
+  /// The two halves of answer(), for who wants to send in between: compute() fills the answer,
+  /// publish() then shows the tick to the other threads. publish() only after a compute() that
+  /// returned true.
+  bool compute(const std::uint8_t* datagram, std::size_t size, std::int64_t now_ns,
+               fri::CommandDatagram& answer);
   void publish();
 
-  /// To be called when no datagram came for some time: time limits go on, silence becomes `disconnected`.
+  /// To be called when no datagram came for some time: time limits go on, silence becomes
+  /// `disconnected`.
   void idle(std::int64_t now_ns);
 
   /// Whether datagrams have come within the receive time limit, as of the last answer() or idle().
@@ -106,17 +113,22 @@ class Bridge {
 
   // --- other threads
 
-  /// Accepts an event (see events.hpp) and returns a ticket for its outcome. Callable from any thread but the FRI thread.
+  /// Accepts an event (see events.hpp) and returns a ticket for its outcome. Callable from any
+  /// thread but the FRI thread.
   /// @throws std::invalid_argument if the event is unknown or its parameters are not valid.
   std::uint32_t submit(const std::string& event);
-  /// Outcome of a ticket, Pending until it ends. An outcome is kept until it has been fetched, at most 64 of them.
+  /// Outcome of a ticket, Pending until it ends. An outcome is kept until it has been fetched, at
+  /// most 64 of them.
   Outcome outcome(std::uint32_t ticket);
-  /// Submits and waits (steady clock, bounded by the request's own time limits plus 2 s); not for lockstep.
+  /// Submits and waits (steady clock, bounded by the request's own time limits plus 2 s); not for
+  /// lockstep.
   Outcome command(const std::string& event);
 
   /// A target velocity from target_joint_states. One thread. Followed if the source is Topic.
   void sendTopicVelocity(const VelocityCommand& command) { topic_.write(command); }
-  void setVelocitySource(VelocitySource source) { source_.store(source, std::memory_order_relaxed); }
+  void setVelocitySource(VelocitySource source) {
+    source_.store(source, std::memory_order_relaxed);
+  }
   VelocitySource velocitySource() const { return source_.load(std::memory_order_relaxed); }
 
   /// Newest snapshot. Any thread but the FRI thread.

@@ -1,6 +1,6 @@
 /// @file
-/// The bridge on ROS (D4.10 Table 1): topics, service, diagnostics and parameters of the namespace `/lwr`. Used by lwr_node and, in one
-/// process with the controller manager, by robot_node.
+/// The bridge on ROS (D4.10 Table 1): topics, service, diagnostics and parameters of the namespace
+/// `/lwr`. Used by lwr_node and, in one process with the controller manager, by robot_node.
 #pragma once
 
 #include <atomic>
@@ -28,45 +28,52 @@ namespace lwr_fri_bridge {
 class BridgeDiagnostics;
 
 /// Reads the parameters of the bridge from the namespace of `nh` (README: table of parameters).
-/// @throws std::exception naming parameter, value and range, or file, line and field of the limits table.
+/// @throws std::exception naming parameter, value and range, or file, line and field of the limits
+/// table.
 BridgeConfig readBridgeConfig(const ros::NodeHandle& nh);
 FriThreadOptions readFriThreadOptions(const ros::NodeHandle& nh);
 
-/// Publishes joint_states, external_torques, tool_wrench (all at joint_states_rate or the FRI rate, the lower one) and state
-/// (latched, on change); subscribes target_joint_states and ros_events; serves command. Has its own callback
-/// queue and threads, so a long start does not delay a hold.
+/// Publishes joint_states, external_torques, tool_wrench (all at joint_states_rate or the FRI rate,
+/// the lower one) and state (latched, on change); subscribes target_joint_states and ros_events;
+/// serves command. Has its own callback queue and threads, so a long start does not delay a hold.
 class BridgeRos {
  public:
   struct Options {
-    /// true: a control thread of this process feeds port(); target_joint_states is then accepted only while no
-    /// controller is active (setControllerActive). false: target_joint_states is the only source.
+    /// true: a control thread of this process feeds port(); target_joint_states is then accepted
+    /// only while no controller is active (setControllerActive). false: target_joint_states is the
+    /// only source.
     bool one_process = false;
-    /// Called in the FRI thread after each answer (true) and on idle ticks without datagrams (false): wakes the control
-    /// thread. Must be real-time safe.
+    /// Called in the FRI thread after each answer (true) and on idle ticks without datagrams
+    /// (false): wakes the control thread. Must be real-time safe.
     std::function<void(bool answered)> after_answer;
   };
 
-  /// Reads the parameters under `nh` (normally ros::NodeHandle("lwr")). @throws std::exception as readBridgeConfig().
+  /// Reads the parameters under `nh` (normally ros::NodeHandle("lwr")). @throws std::exception as
+  /// readBridgeConfig().
   BridgeRos(const ros::NodeHandle& nh, Options options);
   ~BridgeRos();
   BridgeRos(const BridgeRos&) = delete;
   BridgeRos& operator=(const BridgeRos&) = delete;
 
-  /// Binds the socket, sets the parameter fri_port_bound, starts all threads. @throws std::runtime_error if it cannot bind.
+  /// Binds the socket, sets the parameter fri_port_bound, starts all threads. @throws
+  /// std::runtime_error if it cannot bind.
   void start();
 
-  /// Brakes, requests monitor mode, keeps answering until it comes or its time limit is over, then ends all threads. To be called on
-  /// SIGINT, SIGTERM and at the end of main; works without a roscore. Safe to call twice.
+  /// Brakes, requests monitor mode, keeps answering until it comes or its time limit is over, then
+  /// ends all threads. To be called on SIGINT, SIGTERM and at the end of main; works without a
+  /// roscore. Safe to call twice.
   void shutdown();
 
   Bridge& bridge() { return bridge_; }
   ControlPort& port() { return bridge_.port(); }
   int boundPort() const { return fri_thread_.port(); }
 
-  /// One process only: whether the control thread's velocities count (true) or those of target_joint_states (false).
+  /// One process only: whether the control thread's velocities count (true) or those of
+  /// target_joint_states (false).
   void setControllerActive(bool active);
 
-  /// Messages on target_joint_states that were refused: not valid / a controller is active / motion is not allowed.
+  /// Messages on target_joint_states that were refused: not valid / a controller is active / motion
+  /// is not allowed.
   struct Refused {
     std::uint64_t invalid = 0, controller_active = 0, not_allowed = 0;
   };
@@ -77,7 +84,8 @@ class BridgeRos {
 
   void onTarget(const ros::MessageEvent<const sensor_msgs::JointState>& event);
   void onEvent(const std_msgs::String& message);
-  bool onCommand(coglab_msgs::LwrCommand::Request& request, coglab_msgs::LwrCommand::Response& response);
+  bool onCommand(coglab_msgs::LwrCommand::Request& request,
+                 coglab_msgs::LwrCommand::Response& response);
   void publishLoop();
   void publishSample(const Snapshot& snapshot);
   void publishState(const StateView& view);

@@ -8,11 +8,13 @@
 
 namespace lwr_fri_bridge {
 
-/// Pose of the flange in the base frame, m (facts: kinematics of the LWR 4+, alternating twists, all a = 0). Real-time safe.
+/// Pose of the flange in the base frame, m (facts: kinematics of the LWR 4+, alternating twists,
+/// all a = 0). Real-time safe.
 Eigen::Isometry3d flangePose(const Vector7& joints);
 
-/// In Cartesian impedance mode the controller follows a frame and not joint positions. This class moves the frame that the
-/// controller reports by what the joint set-point has moved since: F(q) = P(q) P(q0)^-1 F0 with P the pose of the flange. The tool
+/// In Cartesian impedance mode the controller follows a frame and not joint positions. This class
+/// moves the frame that the controller reports by what the joint set-point has moved since: F(q) =
+/// P(q) P(q0)^-1 F0 with P the pose of the flange. The tool
 /// ($STIFFNESS.TOOL) cancels; $STIFFNESS.BASE is taken as the robot's base. Real-time safe.
 class CartesianSetPoint {
  public:

@@ -1,9 +1,10 @@
 /// @file
-/// Configurator (D4.10 Figure 1): the requests that take long, entering and leaving command mode, each with a time limit and
-/// an outcome.
+/// Configurator (D4.10 Figure 1): the requests that take long, entering and leaving command mode,
+/// each with a time limit and an outcome.
 ///
-/// It is stepped by every FRI tick (and by the FRI thread's time-outs when the controller is silent) and never waits itself, so it
-/// runs beside the supervisor in the same thread, and in lockstep it is as reproducible as the rest.
+/// It is stepped by every FRI tick (and by the FRI thread's time-outs when the controller is
+/// silent) and never waits itself, so it runs beside the supervisor in the same thread, and in
+/// lockstep it is as reproducible as the rest.
 #pragma once
 
 #include "lwr_fri_bridge/events.hpp"
@@ -11,8 +12,9 @@
 namespace lwr_fri_bridge {
 
 struct ConfiguratorLimits {
-  double start_timeout = 10.0;       ///< s, from the request to command mode with power; KRL programs need up to some seconds
-  double stop_timeout = 2.0;         ///< s, from the request to monitor mode
+  double start_timeout = 10.0;  ///< s, from the request to command mode with power; KRL programs
+                                ///< need up to some seconds
+  double stop_timeout = 2.0;    ///< s, from the request to monitor mode
   double silent_stop_timeout = 1.0;  ///< s, the same when the controller is silent
 };
 
@@ -46,7 +48,9 @@ class Configurator {
   bool update(const Observation& seen, Outcome& outcome);
 
   /// Writes the request of the moment for the KRL program.
-  void write(fri::UserData& to_controller) const { fri::writeRequest(convention_, request_, to_controller); }
+  void write(fri::UserData& to_controller) const {
+    fri::writeRequest(convention_, request_, to_controller);
+  }
 
   bool busy() const { return step_ != Step::Idle; }
   fri::KrlConvention convention() const { return convention_; }
@@ -54,7 +58,9 @@ class Configurator {
  private:
   enum class Step : std::uint8_t { Idle, WaitQuality, WaitCommand, WaitPower, WaitMonitor, Ended };
 
-  double elapsed(const Observation& seen) const { return 1e-9 * static_cast<double>(seen.now_ns - began_ns_); }
+  double elapsed(const Observation& seen) const {
+    return 1e-9 * static_cast<double>(seen.now_ns - began_ns_);
+  }
   void finish(OutcomeCode code, const Observation& seen);
   void setPhase(fri::KrlPhase phase);
   void stepStart(const Observation& seen);

@@ -17,14 +17,17 @@ struct Diagnosis {
   std::string text;
 };
 
-/// Connection: silence, quality, latency, losses, a second sender, with a hint what to do. `port` is the bound one,
-/// `silence` (s) the time since the last datagram or since the start.
-Diagnosis diagnoseConnection(const Snapshot& snapshot, const FriThreadStatistics& thread, int port, double silence);
+/// Connection: silence, quality, latency, losses, a second sender, with a hint what to do. `port`
+/// is the bound one, `silence` (s) the time since the last datagram or since the start.
+Diagnosis diagnoseConnection(const Snapshot& snapshot, const FriThreadStatistics& thread, int port,
+                             double silence);
 
-/// Arm: drive errors and warnings (by joint), temperatures above `hot` (degree Celsius), why motion is not allowed.
+/// Arm: drive errors and warnings (by joint), temperatures above `hot` (degree Celsius), why motion
+/// is not allowed.
 Diagnosis diagnoseArm(const Snapshot& snapshot, double hot);
 
-/// Why motion is not allowed at the moment, in words, naming the joint if one is the reason; empty if it is allowed.
+/// Why motion is not allowed at the moment, in words, naming the joint if one is the reason; empty
+/// if it is allowed.
 std::string reasonOf(MotionBlock block, int joint);
 
 /// Joint names in wire order.

@@ -1,16 +1,16 @@
 /// @file
 /// The events of `ros_events` and `command` (D4.10 Table 1), and how they end.
 ///
-/// | event                                             | meaning                                                     |
-/// | ------------------------------------------------- | ----------------------------------------------------------- |
-/// | start                                             | enter command mode; target velocities are followed from then on |
-/// | hold                                              | brake and latch: every motion request is refused until reset |
-/// | reset                                             | release hold                                                |
-/// | stop                                              | brake, then go to monitor mode                              |
-/// | position                                          | control mode for the next start                             |
-/// | joint_impedance [stiffness k] [damping d]         | the same; k in Nm/rad, d normalised; one value or seven     |
-/// | cartesian_impedance [stiffness k] [damping d]     | the same; k: x y z in N/m, rotations in Nm/rad; one value   |
-/// |                                                   | for damping, two (translation, rotation), or six (x y z Rx Ry Rz) |
+/// | event                                         | meaning                                   |
+/// | --------------------------------------------- | ----------------------------------------- |
+/// | start                                         | command mode: target velocities count     |
+/// | hold                                          | brake and latch until reset               |
+/// | reset                                         | release hold                              |
+/// | stop                                          | brake, then monitor mode                  |
+/// | position                                      | control mode for the next start           |
+/// | joint_impedance [stiffness k] [damping d]     | k in Nm/rad, one value or seven; d alike  |
+/// | cartesian_impedance [stiffness k] [damping d] | k in N/m and Nm/rad: translation rotation |
+/// |                                               | or x y z Rx Ry Rz; d one, two or six      |
 ///
 /// Values are separated by blanks or commas. What is left out keeps the value it had.
 #pragma once
@@ -22,12 +22,14 @@
 
 namespace lwr_fri_bridge {
 
-/// Control mode with its parameters. The defaults are those existing clients use (1000 Nm/rad, 2000 N/m, 200 Nm/rad, 0.7).
+/// Control mode with its parameters. The defaults are those existing clients use (1000 Nm/rad, 2000
+/// N/m, 200 Nm/rad, 0.7).
 struct ControlMode {
   fri::ControlStrategy strategy = fri::ControlStrategy::Position;
   Vector7 joint_stiffness = Vector7::Constant(1000.0);  ///< Nm/rad, 0.01..2000
   Vector7 joint_damping = Vector7::Constant(0.7);       ///< normalised, 0.1..1
-  Vector6 cartesian_stiffness = (Vector6() << 2000.0, 2000.0, 2000.0, 200.0, 200.0, 200.0).finished();
+  Vector6 cartesian_stiffness =
+      (Vector6() << 2000.0, 2000.0, 2000.0, 200.0, 200.0, 200.0).finished();
   ///< x y z (N/m, 0.01..5000) Rx Ry Rz (Nm/rad, 0.01..300)
   Vector6 cartesian_damping = Vector6::Constant(0.7);  ///< normalised, 0.1..1
 };
@@ -40,7 +42,8 @@ struct Event {
 };
 
 /// Reads an event. `current` gives the values that the text leaves out.
-/// @throws std::invalid_argument: unknown event (with the list of the known ones), wrong number or range of values.
+/// @throws std::invalid_argument: unknown event (with the list of the known ones), wrong number or
+/// range of values.
 Event parseEvent(const std::string& text, const ControlMode& current);
 
 /// The known events with their parameters, for messages.
@@ -49,22 +52,22 @@ const char* knownEvents();
 enum class OutcomeCode : std::uint8_t {
   Pending,
   Done,
-  AlreadyThere,     ///< nothing to do
-  Disconnected,     ///< no datagrams from the controller
-  Held,             ///< refused: hold is latched
-  InCommandMode,    ///< refused: the control mode may change in monitor mode only
-  NotSupported,     ///< the KRL convention cannot run this strategy
-  PoorQuality,      ///< quality did not become OK in time
-  NoKrlProgram,     ///< the controller shows no sign of the program of krl_convention
-  ProgramRefused,   ///< the KRL program reported a failure
-  NotEntered,       ///< command mode did not come in time
-  NoPower,          ///< command mode came, but not all drives have power
-  WrongStrategy,    ///< command mode came with another strategy
-  NotLeft,          ///< monitor mode did not come in time
-  Interrupted,      ///< hold or stop came in between
-  Busy,             ///< refused: another start or stop is in progress
-  LostConnection,   ///< the controller fell silent in between
-  NotServed         ///< the FRI thread did not take the request
+  AlreadyThere,    ///< nothing to do
+  Disconnected,    ///< no datagrams from the controller
+  Held,            ///< refused: hold is latched
+  InCommandMode,   ///< refused: the control mode may change in monitor mode only
+  NotSupported,    ///< the KRL convention cannot run this strategy
+  PoorQuality,     ///< quality did not become OK in time
+  NoKrlProgram,    ///< the controller shows no sign of the program of krl_convention
+  ProgramRefused,  ///< the KRL program reported a failure
+  NotEntered,      ///< command mode did not come in time
+  NoPower,         ///< command mode came, but not all drives have power
+  WrongStrategy,   ///< command mode came with another strategy
+  NotLeft,         ///< monitor mode did not come in time
+  Interrupted,     ///< hold or stop came in between
+  Busy,            ///< refused: another start or stop is in progress
+  LostConnection,  ///< the controller fell silent in between
+  NotServed        ///< the FRI thread did not take the request
 };
 
 /// How a request ended, with what was seen then.

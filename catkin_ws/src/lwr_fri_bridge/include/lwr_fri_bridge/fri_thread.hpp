@@ -13,30 +13,32 @@
 namespace lwr_fri_bridge {
 
 struct FriThreadOptions {
-  std::string address = "127.0.0.1";    ///< local address to bind; that of the network card towards the cabinet, 0.0.0.0: all
-  int port = fri::kDefaultPort;         ///< local UDP port, 0: any free one
-  int priority = 80;                    ///< SCHED_FIFO, 0: leave the scheduling alone
+  std::string address = "127.0.0.1";  ///< local address to bind; that of the network card towards
+                                      ///< the cabinet, 0.0.0.0: all
+  int port = fri::kDefaultPort;       ///< local UDP port, 0: any free one
+  int priority = 80;                  ///< SCHED_FIFO, 0: leave the scheduling alone
   std::size_t stack_bytes = 256 * 1024;
-  /// Called in the FRI thread after each answer has been sent (and after each time-out without datagrams, with answered = false):
-  /// wakes the control thread. Must be real-time safe.
+  /// Called in the FRI thread after each answer has been sent (and after each time-out without
+  /// datagrams, with answered = false): wakes the control thread. Must be real-time safe.
   std::function<void(bool answered)> after_answer;
 };
 
 /// What the thread counts; readable from any thread.
 struct FriThreadStatistics {
   std::uint64_t answers = 0;
-  std::uint64_t superseded = 0;      ///< datagrams skipped because a newer one was waiting already
-  std::uint64_t foreign = 0;         ///< datagrams from a second sender, ignored
+  std::uint64_t superseded = 0;  ///< datagrams skipped because a newer one was waiting already
+  std::uint64_t foreign = 0;     ///< datagrams from a second sender, ignored
   std::uint64_t send_errors = 0;
-  std::string peer;                  ///< "address:port" of the robot controller, empty if none
-  std::string last_foreign;          ///< "address:port" of the last second sender
-  double mean_answer_time = 0.0;     ///< s, receive to sent, exponential mean over about 1000 answers
+  std::string peer;               ///< "address:port" of the robot controller, empty if none
+  std::string last_foreign;       ///< "address:port" of the last second sender
+  double mean_answer_time = 0.0;  ///< s, receive to sent, exponential mean over about 1000 answers
   double longest_answer_time = 0.0;  ///< s, since the last call of statistics(true)
   bool real_time = false;            ///< SCHED_FIFO was granted
 };
 
-/// Answers go to where the datagrams come from: the first sender of a valid datagram is the peer until it falls silent. If
-/// several datagrams wait, only the newest is answered; the controller has given up the others.
+/// Answers go to where the datagrams come from: the first sender of a valid datagram is the peer
+/// until it falls silent. If several datagrams wait, only the newest is answered; the controller
+/// has given up the others.
 class FriThread {
  public:
   FriThread(Bridge& bridge, FriThreadOptions options);
@@ -47,7 +49,8 @@ class FriThread {
   /// Binds the socket and starts the thread. Returns warnings (scheduling), empty if none.
   /// @throws std::runtime_error naming address and port if the socket cannot be bound.
   std::string start();
-  /// Ends the thread at once; braking and leaving command mode (Bridge::command("stop")) is the caller's matter.
+  /// Ends the thread at once; braking and leaving command mode (Bridge::command("stop")) is the
+  /// caller's matter.
   void stop();
 
   int port() const { return bound_port_; }  ///< the one bound

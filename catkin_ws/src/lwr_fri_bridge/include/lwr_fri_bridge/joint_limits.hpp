@@ -8,7 +8,8 @@
 
 namespace lwr_fri_bridge {
 
-/// Limits per joint in wire order; all vectors hold seven positive finite values, except the positions.
+/// Limits per joint in wire order; all vectors hold seven positive finite values, except the
+/// positions.
 struct JointLimits {
   Vector7 lower_position;  ///< rad
   Vector7 upper_position;  ///< rad, above lower_position
@@ -18,8 +19,10 @@ struct JointLimits {
   Vector7 torque;          ///< Nm
 };
 
-/// Reads the table. `profile` is "default" or a profile of the file such as "t1", which overrides what it names.
-/// @throws std::runtime_error naming file, line, field and what was expected if anything is missing, of the wrong
+/// Reads the table. `profile` is "default" or a profile of the file such as "t1", which overrides
+/// what it names.
+/// @throws std::runtime_error naming file, line, field and what was expected if anything is
+/// missing, of the wrong
 ///         length, not finite or out of order.
 JointLimits loadJointLimits(const std::string& path, const std::string& profile = "default");
 

@@ -11,14 +11,16 @@
 
 namespace lwr_fri_bridge {
 
-/// Gives the calling thread SCHED_FIFO with `priority` (1..99). Returns an empty string, or what failed and what to do.
+/// Gives the calling thread SCHED_FIFO with `priority` (1..99). Returns an empty string, or what
+/// failed and what to do.
 std::string enterRealTime(int priority);
 
-/// Locks present and future memory of the process (mlockall). Returns an empty string, or what failed and what to do.
+/// Locks present and future memory of the process (mlockall). Returns an empty string, or what
+/// failed and what to do.
 std::string lockMemory();
 
-/// A thread with a bounded stack that is touched once before it runs, so that locked memory stays small and no page fault comes
-/// later. Not copyable; the owner must join().
+/// A thread with a bounded stack that is touched once before it runs, so that locked memory stays
+/// small and no page fault comes later. Not copyable; the owner must join().
 class BoundedThread {
  public:
   BoundedThread() = default;

@@ -1,8 +1,8 @@
 /// @file
 /// Supervisor (D4.10 Figure 1): the quick state machine that says whether motion is allowed.
 ///
-/// It never waits: what takes time (entering and leaving command mode) is the Configurator's, which runs beside it, so
-/// `hold` acts in the tick in which it arrives, whatever else is going on.
+/// It never waits: what takes time (entering and leaving command mode) is the Configurator's, which
+/// runs beside it, so `hold` acts in the tick in which it arrives, whatever else is going on.
 #pragma once
 
 #include <cstdint>
@@ -54,7 +54,8 @@ class Supervisor {
   bool held() const { return held_; }
   bool starting() const { return starting_; }
   bool stopping() const { return stopping_; }
-  /// A stop was asked for and the arm has come to rest (or is not commanded any more): ask for monitor mode.
+  /// A stop was asked for and the arm has come to rest (or is not commanded any more): ask for
+  /// monitor mode.
   bool readyForMonitor() const { return stopping_ && at_rest_; }
   /// Times that command mode or power was lost while started.
   std::uint32_t fallBacks() const { return fall_backs_; }

@@ -1,10 +1,11 @@
 /// @file
 /// Velocity filter (D4.10 Figure 1): joint velocities from joint positions.
 ///
-/// Difference quotient over the cycles that really passed, then a first-order low-pass with time constant T. With
-/// k = 1 - exp(-dt/T): delay of a ramp dt/2 + dt (1-k)/k, standard deviation of the velocity per standard deviation of white
-/// noise on the positions (k/dt) sqrt(2/(2-k)). A gap of n cycles counts as n samples on the straight line between its
-/// ends, so lost packets neither make a spike nor change the time constant.
+/// Difference quotient over the cycles that really passed, then a first-order low-pass with time
+/// constant T. With k = 1 - exp(-dt/T): delay of a ramp dt/2 + dt (1-k)/k, standard deviation of
+/// the velocity per standard deviation of white noise on the positions (k/dt) sqrt(2/(2-k)). A gap
+/// of n cycles counts as n samples on the straight line between its ends, so lost packets neither
+/// make a spike nor change the time constant.
 #pragma once
 
 #include <cstdint>
@@ -22,7 +23,8 @@ class VelocityFilter {
   /// Forgets the past: the next sample gives velocity 0.
   void reset() { primed_ = false; }
 
-  /// Takes the position (rad) measured `cycles` (>= 1) FRI cycles of `dt` seconds after the previous one.
+  /// Takes the position (rad) measured `cycles` (>= 1) FRI cycles of `dt` seconds after the
+  /// previous one.
   const Vector7& update(const Vector7& position, std::uint32_t cycles, double dt);
 
   const Vector7& velocity() const { return velocity_; }

@@ -6,12 +6,15 @@
 namespace lwr_fri_bridge::fri {
 namespace {
 
-constexpr std::array<const char*, 5> kNames = {"coglab", "centro_epiaggio", "stanford", "rcprg_tum", "rtt_lwr"};
+constexpr std::array<const char*, 5> kNames = {"coglab", "centro_epiaggio", "stanford", "rcprg_tum",
+                                               "rtt_lwr"};
 
 // KRL counts from 1.
 std::int32_t& intAt(UserData& data, int krl_index) { return data.ints[krl_index - 1]; }
 std::int32_t intAt(const UserData& data, int krl_index) { return data.ints[krl_index - 1]; }
-bool boolAt(const UserData& data, int krl_index) { return ((data.bools >> (krl_index - 1)) & 1) != 0; }
+bool boolAt(const UserData& data, int krl_index) {
+  return ((data.bools >> (krl_index - 1)) & 1) != 0;
+}
 
 void setBool(UserData& data, int krl_index, bool value) {
   const auto bit = static_cast<std::uint16_t>(1U << (krl_index - 1));
@@ -24,8 +27,9 @@ bool isRequest(KrlPhase phase) { return phase == KrlPhase::Start || phase == Krl
 
 void writeRequest(KrlConvention convention, const KrlRequest& request, UserData& to) {
   const std::int32_t strategy = 10 * static_cast<std::int32_t>(request.strategy);
-  const std::int32_t start_or_stop =
-      request.phase == KrlPhase::Start ? 1 : request.phase == KrlPhase::Stop ? 2 : 0;
+  const std::int32_t start_or_stop = request.phase == KrlPhase::Start  ? 1
+                                     : request.phase == KrlPhase::Stop ? 2
+                                                                       : 0;
   const bool wants_command = request.phase == KrlPhase::Start || request.phase == KrlPhase::Running;
   switch (convention) {
     case KrlConvention::Coglab:
@@ -38,7 +42,8 @@ void writeRequest(KrlConvention convention, const KrlRequest& request, UserData&
       intAt(to, 2) = wants_command ? 1 : 0;
       break;
     case KrlConvention::Stanford:
-      // 20 also while idle: a 10 left over would restart the robot after a fall-back to monitor mode.
+      // 20 also while idle: a 10 left over would restart the robot after a fall-back to monitor
+      // mode.
       intAt(to, 15) = strategy;
       intAt(to, 16) = wants_command ? 10 : 20;
       break;
@@ -82,7 +87,9 @@ bool supports(KrlConvention convention, ControlStrategy strategy) {
   return convention != KrlConvention::RcprgTum || strategy == ControlStrategy::JointImpedance;
 }
 
-const char* nameOf(KrlConvention convention) { return kNames[static_cast<std::size_t>(convention)]; }
+const char* nameOf(KrlConvention convention) {
+  return kNames[static_cast<std::size_t>(convention)];
+}
 
 KrlConvention krlConventionFromName(const std::string& name) {
   std::string known;

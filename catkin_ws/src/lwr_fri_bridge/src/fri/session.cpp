@@ -5,15 +5,18 @@
 namespace lwr_fri_bridge::fri {
 namespace {
 
-// A counter that runs this far ahead is not a gap any more: 1 s of silence at 1 kHz is a lost connection.
+// A counter that runs this far ahead is not a gap any more: 1 s of silence at 1 kHz is a lost
+// connection.
 constexpr int kLargestGap = 1000;
-// Successive counters prove that the controller's counter began anew; fewer, or for a shorter time, may be a replay.
+// Successive counters prove that the controller's counter began anew; fewer, or for a shorter time,
+// may be a replay.
 constexpr int kProofOfRestart = 3;
 constexpr double kProofTime = 0.1;  // s
-// No joint of the arm is faster (KRC limit of A4, 250 deg/s), so no set-point is either; with half as much again.
-constexpr float kFastestSetPoint = 6.6F;     // rad/s
-constexpr float kSetPointAllowance = 0.02F;  // rad
-constexpr float kLargestAngle = 6.4F;        // rad; the arm reaches 2.97
+// No joint of the arm is faster (KRC limit of A4, 250 deg/s), so no set-point is either; with half
+// as much again.
+constexpr float kFastestSetPoint = 6.6F;                          // rad/s
+constexpr float kSetPointAllowance = 0.02F;                       // rad
+constexpr float kLargestAngle = 6.4F;                             // rad; the arm reaches 2.97
 constexpr float kShortestCycle = 0.0005F, kLongestCycle = 0.11F;  // s; FRI offers 1..100 ms
 
 template <std::size_t N>
@@ -35,7 +38,8 @@ bool validCycle(float seconds) { return seconds >= kShortestCycle && seconds <= 
 }  // namespace
 
 double cycleTimeOf(const MeasurementDatagram& m) {
-  // float32 of 0.001 is off by 5e-11: rounding to microseconds gives back what the KRL program asked for.
+  // float32 of 0.001 is off by 5e-11: rounding to microseconds gives back what the KRL program
+  // asked for.
   const float seconds = validCycle(m.command_period) ? m.command_period : m.measurement_period;
   return std::round(static_cast<double>(seconds) * 1e6) * 1e-6;
 }
@@ -48,9 +52,11 @@ bool plausible(const MeasurementDatagram& m) {
   if (m.quality > static_cast<std::uint16_t>(Quality::Perfect)) return false;
   if (m.control > static_cast<std::uint16_t>(ControlStrategy::JointImpedance)) return false;
   if (!validCycle(m.command_period) && !validCycle(m.measurement_period)) return false;
-  return allWithin(m.measured_position, kLargestAngle) && allWithin(m.commanded_position, kLargestAngle) &&
-         allWithin(m.commanded_position_offset, 2.0F * kLargestAngle) && allFinite(m.measured_torque) &&
-         allFinite(m.external_torque) && allFinite(m.external_wrench) && allFinite(m.commanded_frame) &&
+  return allWithin(m.measured_position, kLargestAngle) &&
+         allWithin(m.commanded_position, kLargestAngle) &&
+         allWithin(m.commanded_position_offset, 2.0F * kLargestAngle) &&
+         allFinite(m.measured_torque) && allFinite(m.external_torque) &&
+         allFinite(m.external_wrench) && allFinite(m.commanded_frame) &&
          allFinite(m.commanded_frame_offset);
 }
 
@@ -76,8 +82,9 @@ void cartesianSetPointOf(const MeasurementDatagram& m, float (&frame)[kFrameValu
 bool Session::setPointLeaps(const MeasurementDatagram& candidate, std::uint32_t cycles) const {
   float now[kJoints];
   setPointOf(candidate, now);
-  const float allowed =
-      kSetPointAllowance + kFastestSetPoint * static_cast<float>(cycleTimeOf(candidate)) * static_cast<float>(cycles);
+  const float allowed = kSetPointAllowance + kFastestSetPoint *
+                                                 static_cast<float>(cycleTimeOf(candidate)) *
+                                                 static_cast<float>(cycles);
   for (std::size_t i = 0; i < kJoints; ++i) {
     if (!(std::fabs(now[i] - set_point_[i]) <= allowed)) return true;
   }
@@ -91,7 +98,8 @@ Verdict Session::checkOrder(const MeasurementDatagram& candidate, Reception& rec
     reception.answer_arrived = true;
     return setPointLeaps(candidate, 1) ? Verdict::Implausible : Verdict::Accepted;
   }
-  const auto difference = static_cast<std::int16_t>(static_cast<std::uint16_t>(counter - received_));
+  const auto difference =
+      static_cast<std::int16_t>(static_cast<std::uint16_t>(counter - received_));
   if (difference == 0) return Verdict::Duplicate;
   if (difference < 0 || difference > kLargestGap) return Verdict::OutOfOrder;
   reception.cycles = static_cast<std::uint32_t>(difference);
@@ -100,7 +108,8 @@ Verdict Session::checkOrder(const MeasurementDatagram& candidate, Reception& rec
   return setPointLeaps(candidate, reception.cycles) ? Verdict::Implausible : Verdict::Accepted;
 }
 
-Reception Session::receive(const std::uint8_t* bytes, std::size_t size, MeasurementDatagram& measurement) {
+Reception Session::receive(const std::uint8_t* bytes, std::size_t size,
+                           MeasurementDatagram& measurement) {
   Reception reception;
   MeasurementDatagram candidate;
   if (!decode(bytes, size, candidate)) {
@@ -137,8 +146,10 @@ Reception Session::receive(const std::uint8_t* bytes, std::size_t size, Measurem
     const bool successive = static_cast<std::uint16_t>(suspect_ + 1) == header.counter;
     suspects_in_a_row_ = successive && suspects_in_a_row_ > 0 ? suspects_in_a_row_ + 1 : 1;
     suspect_ = header.counter;
-    if (suspects_in_a_row_ < kProofOfRestart || suspects_in_a_row_ * cycleTimeOf(candidate) < kProofTime) {
-      ++(reception.verdict == Verdict::Implausible ? counters_.implausible : counters_.out_of_order);
+    if (suspects_in_a_row_ < kProofOfRestart ||
+        suspects_in_a_row_ * cycleTimeOf(candidate) < kProofTime) {
+      ++(reception.verdict == Verdict::Implausible ? counters_.implausible
+                                                   : counters_.out_of_order);
       return reception;
     }
     ++counters_.restarts;

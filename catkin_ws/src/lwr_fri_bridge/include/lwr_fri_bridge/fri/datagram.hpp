@@ -1,11 +1,12 @@
 /// @file
 /// The two datagrams of KUKA's Fast Research Interface, and the only place that knows their layout.
 ///
-/// The robot controller (KRC) sends one measurement per cycle, the PC answers each with one command. Both are little
-/// endian with IEEE-754 float32 and natural alignment, which is the same as packed here: every offset and size is
-/// asserted at compile time. Joint arrays are in wire order A1 A2 E1 A3 A4 A5 A6. A frame is 3x4, row major
-/// (r11 r12 r13 px r21 r22 r23 py r31 r32 r33 pz), m. Cartesian vectors carry the rotations reversed: x y z Rz Ry Rx;
-/// use `wrenchFromWire()` / `wrenchToWire()` and never index the last three by hand.
+/// The robot controller (KRC) sends one measurement per cycle, the PC answers each with one
+/// command. Both are little endian with IEEE-754 float32 and natural alignment, which is the same
+/// as packed here: every offset and size is asserted at compile time. Joint arrays are in wire
+/// order A1 A2 E1 A3 A4 A5 A6. A frame is 3x4, row major (r11 r12 r13 px r21 r22 r23 py r31 r32 r33
+/// pz), m. Cartesian vectors carry the rotations reversed: x y z Rz Ry Rx; use `wrenchFromWire()` /
+/// `wrenchToWire()` and never index the last three by hand.
 #pragma once
 
 #include <cstddef>
@@ -17,7 +18,8 @@
 
 namespace lwr_fri_bridge::fri {
 
-static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__, "the datagrams are copied as they lie in memory");
+static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__,
+              "the datagrams are copied as they lie in memory");
 
 constexpr std::size_t kJoints = 7;
 constexpr std::size_t kUserValues = 16;   ///< length of the arrays exchanged with the KRL program
@@ -36,7 +38,12 @@ enum class FriState : std::uint16_t { Off = 0, Monitor = 1, Command = 2 };
 enum class Quality : std::uint16_t { Unacceptable = 0, Bad = 1, Ok = 2, Perfect = 3 };
 
 /// `control` of a measurement; KRL's `$STIFFNESS.STRATEGY` is ten times the number.
-enum class ControlStrategy : std::uint16_t { Other = 0, Position = 1, CartesianImpedance = 2, JointImpedance = 3 };
+enum class ControlStrategy : std::uint16_t {
+  Other = 0,
+  Position = 1,
+  CartesianImpedance = 2,
+  JointImpedance = 3
+};
 
 /// Bits of `flags` in a command: which of its fields count. They may change in monitor mode only.
 enum CommandFlag : std::uint32_t {
@@ -55,11 +62,14 @@ enum CommandFlag : std::uint32_t {
 /// The flags that existing clients set per strategy (Other: none).
 constexpr std::uint32_t flagsFor(ControlStrategy strategy) {
   switch (strategy) {
-    case ControlStrategy::Position: return kJointPosition;
-    case ControlStrategy::JointImpedance: return kJointPosition | kJointTorque | kJointStiffness | kJointDamping;
+    case ControlStrategy::Position:
+      return kJointPosition;
+    case ControlStrategy::JointImpedance:
+      return kJointPosition | kJointTorque | kJointStiffness | kJointDamping;
     case ControlStrategy::CartesianImpedance:
       return kCartesianPosition | kCartesianForce | kCartesianStiffness | kCartesianDamping;
-    case ControlStrategy::Other: break;
+    case ControlStrategy::Other:
+      break;
   }
   return 0;
 }
@@ -74,44 +84,44 @@ struct Header {
 
 /// Values a KRL program and the PC show each other; the same layout in both directions.
 struct UserData {
-  float reals[kUserValues];         ///< `$FRI_TO_REA[i+1]` or `$FRI_FRM_REA[i+1]`
-  std::int32_t ints[kUserValues];   ///< `$FRI_TO_INT[i+1]` or `$FRI_FRM_INT[i+1]`
-  std::uint16_t bools;              ///< bit i: `$FRI_TO_BOOL[i+1]` or `$FRI_FRM_BOOL[i+1]`
-  std::uint16_t padding;            ///< 0
+  float reals[kUserValues];        ///< `$FRI_TO_REA[i+1]` or `$FRI_FRM_REA[i+1]`
+  std::int32_t ints[kUserValues];  ///< `$FRI_TO_INT[i+1]` or `$FRI_FRM_INT[i+1]`
+  std::uint16_t bools;             ///< bit i: `$FRI_TO_BOOL[i+1]` or `$FRI_FRM_BOOL[i+1]`
+  std::uint16_t padding;           ///< 0
 };
 
 /// Robot controller -> PC.
 struct MeasurementDatagram {
   Header header;
   UserData krl;
-  float timestamp;             ///< controller's clock, s; float32 loses milliseconds after hours
-  std::uint16_t state;         ///< FriState
-  std::uint16_t quality;       ///< Quality
-  float measurement_period;    ///< desired, s
-  float command_period;        ///< desired, s
-  float safety_scale;          ///< what `friStart(x)` was given, 0..1
-  float answer_rate;           ///< mean of the last 100 packets, ideal 1
-  float latency;               ///< mean round trip, s
-  float jitter;                ///< mean, s
-  float miss_rate;             ///< mean
-  std::uint32_t miss_counter;  ///< missed answers since the connection was opened
-  std::uint16_t power;         ///< drive power, one bit per joint
-  std::uint16_t control;       ///< ControlStrategy
-  std::uint16_t drive_error;   ///< one bit per joint; leads to power off
+  float timestamp;              ///< controller's clock, s; float32 loses milliseconds after hours
+  std::uint16_t state;          ///< FriState
+  std::uint16_t quality;        ///< Quality
+  float measurement_period;     ///< desired, s
+  float command_period;         ///< desired, s
+  float safety_scale;           ///< what `friStart(x)` was given, 0..1
+  float answer_rate;            ///< mean of the last 100 packets, ideal 1
+  float latency;                ///< mean round trip, s
+  float jitter;                 ///< mean, s
+  float miss_rate;              ///< mean
+  std::uint32_t miss_counter;   ///< missed answers since the connection was opened
+  std::uint16_t power;          ///< drive power, one bit per joint
+  std::uint16_t control;        ///< ControlStrategy
+  std::uint16_t drive_error;    ///< one bit per joint; leads to power off
   std::uint16_t drive_warning;  ///< one bit per joint
-  float temperature[kJoints];  ///< of the drives, degree Celsius
-  float measured_position[kJoints];                ///< rad
-  float measured_frame[kFrameValues];              ///< m
-  float commanded_position[kJoints];               ///< KRC's own interpolator, before FRI, rad
-  float commanded_position_offset[kJoints];        ///< added by FRI, rad; the set-point is the sum of both
-  float commanded_frame[kFrameValues];             ///< before FRI, m
-  float commanded_frame_offset[kFrameValues];      ///< the frame due to FRI, m
-  float measured_torque[kJoints];                  ///< Nm
-  float external_torque[kJoints];                  ///< estimated, Nm
-  float external_wrench[kCartesian];               ///< estimated at the tool: Fx Fy Fz Tz Ty Tx, N and Nm
-  float jacobian[kCartesian * kJoints];            ///< row major, rows X Y Z RZ RY RX
-  float mass_matrix[kJoints * kJoints];            ///< row major, kg m^2
-  float gravity[kJoints];                          ///< used as joint gravity torque, Nm
+  float temperature[kJoints];   ///< of the drives, degree Celsius
+  float measured_position[kJoints];            ///< rad
+  float measured_frame[kFrameValues];          ///< m
+  float commanded_position[kJoints];           ///< KRC's own interpolator, before FRI, rad
+  float commanded_position_offset[kJoints];    ///< added by FRI; set-point = sum of both, rad
+  float commanded_frame[kFrameValues];         ///< before FRI, m
+  float commanded_frame_offset[kFrameValues];  ///< the frame due to FRI, m
+  float measured_torque[kJoints];              ///< Nm
+  float external_torque[kJoints];              ///< estimated, Nm
+  float external_wrench[kCartesian];     ///< estimated at the tool: Fx Fy Fz Tz Ty Tx, N and Nm
+  float jacobian[kCartesian * kJoints];  ///< row major, rows X Y Z RZ RY RX
+  float mass_matrix[kJoints * kJoints];  ///< row major, kg m^2
+  float gravity[kJoints];                ///< used as joint gravity torque, Nm
 };
 
 /// PC -> robot controller.
@@ -132,8 +142,8 @@ struct CommandDatagram {
 constexpr std::size_t kMeasurementSize = 916;
 constexpr std::size_t kCommandSize = 376;
 
-#define LWR_FRI_FIELD(type, field, offset, bytes)                                                   \
-  static_assert(offsetof(type, field) == (offset), #type "." #field " is at a wrong offset");      \
+#define LWR_FRI_FIELD(type, field, offset, bytes)                                             \
+  static_assert(offsetof(type, field) == (offset), #type "." #field " is at a wrong offset"); \
   static_assert(sizeof(type::field) == (bytes), #type "." #field " has a wrong size")
 
 LWR_FRI_FIELD(Header, counter, 0, 2);
@@ -175,7 +185,8 @@ LWR_FRI_FIELD(MeasurementDatagram, external_wrench, 500, 24);
 LWR_FRI_FIELD(MeasurementDatagram, jacobian, 524, 168);
 LWR_FRI_FIELD(MeasurementDatagram, mass_matrix, 692, 196);
 LWR_FRI_FIELD(MeasurementDatagram, gravity, 888, 28);
-static_assert(sizeof(MeasurementDatagram) == kMeasurementSize, "measurement datagram has a wrong size");
+static_assert(sizeof(MeasurementDatagram) == kMeasurementSize,
+              "measurement datagram has a wrong size");
 
 LWR_FRI_FIELD(CommandDatagram, header, 0, 8);
 LWR_FRI_FIELD(CommandDatagram, krl, 8, 132);
@@ -191,10 +202,11 @@ LWR_FRI_FIELD(CommandDatagram, cartesian_damping, 352, 24);
 static_assert(sizeof(CommandDatagram) == kCommandSize, "command datagram has a wrong size");
 #undef LWR_FRI_FIELD
 
-static_assert(std::is_trivially_copyable_v<MeasurementDatagram> && std::is_trivially_copyable_v<CommandDatagram>);
+static_assert(std::is_trivially_copyable_v<MeasurementDatagram> &&
+              std::is_trivially_copyable_v<CommandDatagram>);
 
-/// Copies a datagram out of `size` received bytes. Returns false and leaves `datagram` alone if the size is not exactly
-/// that of the type; the header is not looked at.
+/// Copies a datagram out of `size` received bytes. Returns false and leaves `datagram` alone if the
+/// size is not exactly that of the type; the header is not looked at.
 template <typename Datagram>
 bool decode(const std::uint8_t* bytes, std::size_t size, Datagram& datagram) {
   if (size != sizeof(Datagram)) return false;
@@ -205,7 +217,8 @@ bool decode(const std::uint8_t* bytes, std::size_t size, Datagram& datagram) {
 /// Writes sizeof(datagram) bytes as they go on the wire.
 template <typename Datagram>
 void encode(const Datagram& datagram, std::uint8_t* bytes) {
-  static_assert(std::is_same_v<Datagram, MeasurementDatagram> || std::is_same_v<Datagram, CommandDatagram>);
+  static_assert(std::is_same_v<Datagram, MeasurementDatagram> ||
+                std::is_same_v<Datagram, CommandDatagram>);
   std::memcpy(bytes, &datagram, sizeof(Datagram));
 }
 
@@ -226,7 +239,8 @@ inline Vector7 jointsFromWire(const float (&wire)[kJoints]) {
 
 /// Vector as joint array of the wire, rounded to float32.
 inline void jointsToWire(const Vector7& joints, float (&wire)[kJoints]) {
-  for (std::size_t i = 0; i < kJoints; ++i) wire[i] = static_cast<float>(joints[static_cast<Eigen::Index>(i)]);
+  for (std::size_t i = 0; i < kJoints; ++i)
+    wire[i] = static_cast<float>(joints[static_cast<Eigen::Index>(i)]);
 }
 
 /// Fx Fy Fz Tz Ty Tx of the wire as Fx Fy Fz Tx Ty Tz.
@@ -244,8 +258,8 @@ inline void wrenchToWire(const Vector6& wrench, float (&wire)[kCartesian]) {
   }
 }
 
-/// Where the controller holds the robot now: its own command plus the offset that FRI added, summed in float32 as the
-/// controller compares it.
+/// Where the controller holds the robot now: its own command plus the offset that FRI added, summed
+/// in float32 as the controller compares it.
 inline void setPointOf(const MeasurementDatagram& measurement, float (&set_point)[kJoints]) {
   for (std::size_t i = 0; i < kJoints; ++i) {
     set_point[i] = measurement.commanded_position[i] + measurement.commanded_position_offset[i];

@@ -1,21 +1,26 @@
 /// @file
 /// How a PC asks the KRL program on the robot controller to enter or leave command mode.
 ///
-/// FRI itself has no such request: the PC can only write `$FRI_FRM_INT/REA/BOOL` and read `$FRI_TO_INT/REA/BOOL`, and every lab's
-/// KRL program gives them its own meaning. This file is the table of the meanings we speak. Indices in comments are
-/// KRL's, 1-based; on the wire they are one lower. Requests are levels: they stay until the phase changes.
+/// FRI itself has no such request: the PC can only write `$FRI_FRM_INT/REA/BOOL` and read
+/// `$FRI_TO_INT/REA/BOOL`, and every lab's KRL program gives them its own meaning. This file is the
+/// table of the meanings we speak. Indices in comments are KRL's, 1-based; on the wire they are one
+/// lower. Requests are levels: they stay until the phase changes.
 ///
-/// | convention       | start (strategy s = 10, 20, 30)      | stop                    | what the program shows           |
-/// | ---------------- | ------------------------------------ | ----------------------- | -------------------------------- |
-/// | coglab           | INT[1]=1, INT[2]=s, INT[3]=number    | INT[1]=2, INT[3]=number | INT[1..3], INT[16]=4010, below   |
-/// | centro_epiaggio  | INT[2]=1, INT[1]=s                   | INT[2]=0                | INT[2]: 10 fresh, 1 on, 0 off    |
-/// | stanford         | INT[16]=10, INT[15]=s                | INT[16]=20              | INT[16]: 10 monitor, 20 started  |
-/// | rcprg_tum        | INT[1]=1, BOOL[1]=1 (s is always 30) | INT[1]=2, BOOL[1]=1     | BOOL[1]: working on it           |
-/// | rtt_lwr          | INT[1]=1, INT[2]=s, INT[3]=tool      | INT[1]=2                | INT[1]: FRI state                |
+// clang-format off
+/// | convention      | start (strategy s = 10, 20, 30)   | stop              | the program shows       |
+/// | --------------- | --------------------------------- | ----------------- | ----------------------- |
+/// | coglab          | INT[1]=1, INT[2]=s, INT[3]=number | INT[1]=2, INT[3]  | INT[1..3], INT[16]=4010 |
+/// | centro_epiaggio | INT[2]=1, INT[1]=s                | INT[2]=0          | INT[2]: 10, 1 on, 0 off |
+/// | stanford        | INT[16]=10, INT[15]=s             | INT[16]=20        | INT[16]: 10 MON, 20 CMD |
+/// | rcprg_tum       | INT[1]=1, BOOL[1] (s is 30)       | INT[1]=2, BOOL[1] | BOOL[1]: working on it  |
+/// | rtt_lwr         | INT[1]=1, INT[2]=s, INT[3]=tool   | INT[1]=2          | INT[1]: FRI state       |
+// clang-format on
 ///
-/// Our own program (krl/coglab_fri.src) acts once per request number (1..32767, wraps to 1) and answers with
+/// Our own program (krl/coglab_fri.src) acts once per request number (1..32767, wraps to 1) and
+/// answers with
 ///   TO_INT[1] number of the request finished last, TO_INT[2] its result (KrlResult),
-///   TO_INT[3] number of the request it works on (0: none), TO_INT[16] = 4010, so that the PC knows whom it talks to.
+///   TO_INT[3] number of the request it works on (0: none), TO_INT[16] = 4010, so that the PC knows
+///   whom it talks to.
 #pragma once
 
 #include <string>
@@ -51,8 +56,8 @@ constexpr std::uint16_t kMaxRequestNumber = 32767;
 struct KrlRequest {
   KrlPhase phase = KrlPhase::Idle;
   ControlStrategy strategy = ControlStrategy::Position;  ///< for Start
-  std::uint16_t number = 0;                              ///< grows with every Start and Stop; coglab only
-  std::int32_t tool = 0;                                 ///< tool number; rtt_lwr only
+  std::uint16_t number = 0;  ///< grows with every Start and Stop; coglab only
+  std::int32_t tool = 0;     ///< tool number; rtt_lwr only
 };
 
 /// What the KRL program says about a request.
@@ -63,11 +68,13 @@ struct KrlReply {
   KrlResult result = KrlResult::None;  ///< why refused (coglab only)
 };
 
-/// Writes the request into the fields the convention uses and leaves the other fields alone. Real-time safe.
+/// Writes the request into the fields the convention uses and leaves the other fields alone.
+/// Real-time safe.
 void writeRequest(KrlConvention convention, const KrlRequest& request, UserData& to_controller);
 
 /// Reads what the program says about `request`. Real-time safe.
-KrlReply readReply(KrlConvention convention, const KrlRequest& request, const UserData& from_controller);
+KrlReply readReply(KrlConvention convention, const KrlRequest& request,
+                   const UserData& from_controller);
 
 /// Whether the convention's program can run this strategy (rcprg_tum fixes joint impedance).
 bool supports(KrlConvention convention, ControlStrategy strategy);

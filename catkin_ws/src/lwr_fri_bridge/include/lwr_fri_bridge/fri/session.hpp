@@ -1,8 +1,10 @@
 /// @file
-/// The FRI session: which datagrams count, what was lost between them, and the header of the answer.
+/// The FRI session: which datagrams count, what was lost between them, and the header of the
+/// answer.
 ///
-/// Every datagram gets a verdict. Wrong size, wrong id, implausible content, doubled and out-of-order ones are counted and not
-/// answered: an answer to them would only disturb the controller's statistics. Lost ones show as gaps in the counter.
+/// Every datagram gets a verdict. Wrong size, wrong id, implausible content, doubled and
+/// out-of-order ones are counted and not answered: an answer to them would only disturb the
+/// controller's statistics. Lost ones show as gaps in the counter.
 #pragma once
 
 #include <cstddef>
@@ -16,7 +18,8 @@ enum class Verdict : std::uint8_t {
   Accepted,
   WrongSize,    ///< not 916 bytes, or the header says so
   WrongId,      ///< not a measurement of the known version
-  Implausible,  ///< a value is not finite or outside of what a controller can send, or the set-point leaps
+  Implausible,  ///< a value is not finite or outside of what a controller can send, or the
+                ///< set-point leaps
   Duplicate,    ///< same counter as the last accepted one
   OutOfOrder    ///< older than the last accepted one, or far ahead of it
 };
@@ -30,10 +33,12 @@ struct SessionCounters {
   std::uint64_t duplicate = 0;
   std::uint64_t out_of_order = 0;
   std::uint64_t lost_measurements = 0;  ///< gaps in the controller's counter
-  std::uint64_t lost_answers = 0;       ///< answers that the controller's next datagram does not reflect
-  std::uint64_t restarts = 0;           ///< the controller's counter began anew
+  std::uint64_t lost_answers = 0;  ///< answers that the controller's next datagram does not reflect
+  std::uint64_t restarts = 0;      ///< the controller's counter began anew
 
-  std::uint64_t rejected() const { return wrong_size + wrong_id + implausible + duplicate + out_of_order; }
+  std::uint64_t rejected() const {
+    return wrong_size + wrong_id + implausible + duplicate + out_of_order;
+  }
 };
 
 /// What an accepted datagram says about the connection.
@@ -48,7 +53,8 @@ struct Reception {
 /// Real-time safe, one thread.
 class Session {
  public:
-  /// `lenient`: controllers that send zeros in the header are accepted. Order, losses and reflections cannot be told then.
+  /// `lenient`: controllers that send zeros in the header are accepted. Order, losses and
+  /// reflections cannot be told then.
   explicit Session(bool lenient) : lenient_(lenient) {}
 
   /// Judges a datagram; `measurement` is filled if and only if the verdict is Accepted.
@@ -69,10 +75,10 @@ class Session {
 
   bool lenient_;
   bool connected_ = false;
-  bool answered_ = false;        // an answer was sent in this session
-  std::uint16_t received_ = 0;   // counter of the last accepted measurement
-  std::uint16_t sent_ = 0;       // counter of our last answer
-  std::uint16_t suspect_ = 0;    // counter of the last datagram out of order
+  bool answered_ = false;       // an answer was sent in this session
+  std::uint16_t received_ = 0;  // counter of the last accepted measurement
+  std::uint16_t sent_ = 0;      // counter of our last answer
+  std::uint16_t suspect_ = 0;   // counter of the last datagram out of order
   int suspects_in_a_row_ = 0;
   float set_point_[kJoints] = {};
   SessionCounters counters_;
@@ -84,8 +90,9 @@ double cycleTimeOf(const MeasurementDatagram& measurement);
 /// Whether all values that we use are finite and within what a controller can send.
 bool plausible(const MeasurementDatagram& measurement);
 
-/// The Cartesian set-point: KRC's own command moved by the frame that FRI added (commanded_frame * commanded_frame_offset). An
-/// offset whose rotation is all zeros (controllers that do not fill it) counts as none.
+/// The Cartesian set-point: KRC's own command moved by the frame that FRI added (commanded_frame *
+/// commanded_frame_offset). An offset whose rotation is all zeros (controllers that do not fill it)
+/// counts as none.
 void cartesianSetPointOf(const MeasurementDatagram& measurement, float (&frame)[kFrameValues]);
 
 }  // namespace lwr_fri_bridge::fri
