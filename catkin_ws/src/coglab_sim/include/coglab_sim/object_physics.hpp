@@ -41,7 +41,7 @@ struct ContactParameters {
   double full_grasp_force = 10.0;  ///< N, sum of the fingers at which the grasp has its full stiffness
   double current_per_count = 6.0;  ///< counts of motor current per position count beyond contact
   double floor_height = -0.75;     ///< m, world z
-  Vector3d board_center = Vector3d(0.45, -0.55, -0.05);  ///< m, middle of the board's upper side in the world
+  Vector3d board_center = Vector3d(0.45, -0.55, 0.05);   ///< m, middle of the board's upper side in the world
   Vector3d board_size = Vector3d(0.50, 0.40, 0.0);  ///< m along world x y; 0: no board
 };
 

@@ -1,0 +1,157 @@
+#!/usr/bin/python3
+"""The node /coglab_sim/cell: UDP, truth, finger contact, faults, placing, log file."""
+import csv
+import os
+import socket
+import sys
+import threading
+import time
+import unittest
+from pathlib import Path
+
+import numpy as np
+import rospy
+import rostest
+from coglab_msgs.msg import CellTruth, FingerContact, FingerPositions, HumanHand
+from coglab_msgs.srv import InjectFault, PlaceObject
+from geometry_msgs.msg import Point, Pose, Quaternion
+from std_msgs.msg import String
+
+sys.path.insert(0, str(Path(__file__).resolve().parent))
+from fri_client import COMMAND, MONITOR, Client, parse  # noqa: E402
+
+
+class Bridge(threading.Thread):
+    """Answers on a UDP port of its own and publishes it as the bridge does."""
+
+    def __init__(self) -> None:
+        super().__init__(daemon=True)
+        self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self.socket.bind(('127.0.0.1', 0))
+        self.socket.settimeout(0.2)
+        self.client = Client()
+        self.fields = None
+        self.received = 0
+        self.peers = set()
+        rospy.set_param('/lwr/fri_port_bound', self.socket.getsockname()[1])
+
+    def run(self) -> None:
+        while not rospy.is_shutdown():
+            try:
+                data, peer = self.socket.recvfrom(2048)
+            except socket.timeout:
+                continue
+            self.received += 1
+            self.peers.add(peer)
+            self.socket.sendto(self.client.answer(data), peer)
+            self.fields = parse(data)
+
+
+def wait_for(condition, limit: float = 10.0) -> bool:
+    """Polls until the condition holds or the limit (s, wall) is over."""
+    end = time.monotonic() + limit
+    while time.monotonic() < end:
+        if condition():
+            return True
+        time.sleep(0.02)
+    return False
+
+
+class CellNode(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls) -> None:
+        cls.bridge = Bridge()
+        cls.bridge.start()
+        cls.truth = []
+        cls.contact = []
+        cls.messages = []
+        rospy.Subscriber('/coglab_sim/truth/cell', CellTruth, cls.truth.append)
+        rospy.Subscriber('/coglab_sim/finger_contact', FingerContact, cls.contact.append)
+        rospy.Subscriber('/coglab_sim/cell/messages', String, lambda m: cls.messages.append(m.data))
+        cls.human = rospy.Publisher('/coglab_sim/human_hand', HumanHand, queue_size=1)
+        cls.fingers = rospy.Publisher('/coglab_sim/finger_positions', FingerPositions, queue_size=1)
+        rospy.wait_for_service('/coglab_sim/cell/fault', 20.0)
+        cls.fault = rospy.ServiceProxy('/coglab_sim/cell/fault', InjectFault)
+        cls.place = rospy.ServiceProxy('/coglab_sim/cell/place_object', PlaceObject)
+        assert wait_for(lambda: cls.bridge.fields is not None and cls.truth)
+
+    def command_mode(self) -> None:
+        self.assertTrue(wait_for(lambda: self.bridge.fields['quality'] >= 2))
+        self.bridge.client.request(1, 10)
+        self.assertTrue(wait_for(lambda: self.bridge.fields['state'] == COMMAND), self.messages)
+
+    def test_1_one_socket_and_the_period(self) -> None:
+        self.assertEqual(len(self.bridge.peers), 1)
+        self.assertAlmostEqual(self.bridge.fields['measurement_period'], 0.01)
+        before = self.bridge.received
+        time.sleep(1.0)
+        self.assertGreater(self.bridge.received - before, 70)
+
+    def test_2_command_mode_and_faults(self) -> None:
+        self.command_mode()
+        self.assertTrue(self.fault('leave_command_mode', 0.0, 0.0).success)
+        self.assertTrue(wait_for(lambda: self.bridge.fields['state'] == MONITOR))
+        self.assertTrue(wait_for(lambda: 'fault injected' in self.messages))
+        self.command_mode()
+        self.assertTrue(self.fault('enabling_switch', 0.0, 0.5).success)
+        self.assertTrue(wait_for(lambda: self.bridge.fields['power'] == 0))
+        self.assertTrue(wait_for(lambda: self.bridge.fields['power'] == 0x7F))  # undone by itself
+        refused = self.fault('earthquake', 1.0, 0.0)
+        self.assertFalse(refused.success)
+        self.assertIn('packet_loss', refused.message)
+        self.assertFalse(self.fault('packet_loss', 2.0, 0.0).success)
+        self.assertFalse(self.fault('drive_error', 9.0, 0.0).success)
+
+    def test_3_person_and_fingers(self) -> None:
+        palm = self.truth[-1].robot_hand.position
+        pose = Pose(Point(palm.x + 0.08, palm.y + 0.045, palm.z), Quaternion(0, 0, 0, 1))
+        message = HumanHand(pose=pose, grip=1.0, grip_force=20.0)
+
+        def show(until, limit=8.0):
+            def poll():
+                message.header.stamp = rospy.Time.now()
+                self.human.publish(message)
+                return until()
+            return wait_for(poll, limit)
+
+        self.assertTrue(self.place('', 'human_hand', Pose(Point(-0.08, 0, -0.05), Quaternion(0, 0, 0, 1))).success)
+        self.assertTrue(show(lambda: self.truth[-1].held_by == 'human' and self.truth[-1].human_load_share > 0.9))
+        self.assertEqual(self.truth[-1].object_id, 'mug')
+        self.assertTrue(show(lambda: any(m.contact_position[2] < 255 for m in self.contact[-3:])))
+        contact = self.contact[-1].contact_position[2]
+        self.fingers.publish(FingerPositions(position=[0] + [contact + 20] * 4, current=[0] * 5))
+        self.assertTrue(show(lambda: self.truth[-1].held_by == 'both'))
+        message.grip = 0.0
+        self.assertTrue(show(lambda: self.truth[-1].held_by == 'robot' and self.truth[-1].robot_load_share > 0.9))
+        self.assertLess(self.truth[-1].palm_force.z, -2.0)
+        self.fingers.publish(FingerPositions(position=[0] * 5, current=[0] * 5))
+        self.assertTrue(show(lambda: self.truth[-1].dropped))
+
+    def test_4_bad_requests_are_refused_with_words(self) -> None:
+        answer = self.place('', 'moon', Pose(Point(), Quaternion(0, 0, 0, 1)))
+        self.assertFalse(answer.success)
+        self.assertIn('human_hand', answer.message)
+        self.assertFalse(self.place('', 'world', Pose()).success)  # quaternion of length 0
+        self.assertIn('objects/', self.place('unknown_thing', 'world', Pose(Point(), Quaternion(0, 0, 0, 1))).message)
+        self.human.publish(HumanHand(grip=float('nan')))
+        self.fingers.publish(FingerPositions(position=[1, 2]))
+        ticks = len(self.truth)
+        self.assertTrue(wait_for(lambda: len(self.truth) > ticks + 20))
+
+    def test_5_every_period_is_in_the_log(self) -> None:
+        path = rospy.get_param('/coglab_sim/cell/log_file')
+        time.sleep(0.3)
+        with open(path) as file:
+            rows = list(csv.DictReader(file))
+        times = np.array([float(row['time']) for row in rows])
+        self.assertGreater(len(rows), 100)
+        self.assertTrue(np.allclose(np.diff(times), 0.01, atol=1e-6))
+        self.assertIn('commanded_lwr_a6', rows[0])
+        measured = np.array([float(row['measured_lwr_a1']) for row in rows])
+        self.assertTrue(np.all(np.abs(measured) <= 2.97))
+        os.unlink(path)
+
+
+if __name__ == '__main__':
+    rospy.init_node('cell_rostest')
+    rostest.rosrun('coglab_sim', 'cell', CellNode)
