@@ -15,11 +15,11 @@ PhaseGovernor::PhaseGovernor(double rise, double fall) : rise_(rise), fall_(fall
 }
 
 double PhaseGovernor::update(double dt, double speed_scale, double limit_scale) noexcept {
+  const double last = rate_;
   const double wanted = std::clamp(speed_scale, 0.0, 1.0);
-  // A limit that scaled the last cycle's velocity asks for a clock as much slower than it was.
-  const double bearable = limit_scale < 1.0 ? rate_ * std::clamp(limit_scale, 0.0, 1.0) : 1.0;
-  const double target = std::min(wanted, bearable);
-  rate_ = target > rate_ ? std::min(target, rate_ + rise_ * dt) : std::max(target, rate_ - fall_ * dt);
+  rate_ = wanted > rate_ ? std::min(wanted, rate_ + rise_ * dt) : std::max(wanted, rate_ - fall_ * dt);
+  // The arm already moves that much slower than the motion, so the clock follows at once: no step in velocity.
+  if (limit_scale < 1.0) rate_ = std::min(rate_, last * std::clamp(limit_scale, 0.0, 1.0));
   return rate_;
 }
 
