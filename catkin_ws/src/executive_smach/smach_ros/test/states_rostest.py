@@ -1,7 +1,5 @@
 #!/usr/bin/python3
-"""Section 9 of the specification: the states on actions, services and topics, and a machine as an
-action server.
-"""
+"""Section 9 of the specification: the states on actions, services and topics."""
 
 import os
 import signal
@@ -11,11 +9,10 @@ import threading
 import time
 import unittest
 
-import actionlib
 import rospy
 import smach
 import smach_ros
-from actionlib.msg import TestAction, TestFeedback, TestGoal, TestResult
+from actionlib.msg import TestAction, TestGoal
 from actionlib_msgs.msg import GoalStatus
 from std_msgs.msg import Bool, Empty
 from std_srvs.srv import SetBool, SetBoolRequest, SetBoolResponse, Trigger
@@ -459,128 +456,6 @@ class TestSection9Condition(unittest.TestCase):
         ud.n = 5
         state = smach_ros.ConditionState(lambda ud: ud.n == 5, input_keys=["n"])
         self.assertEqual(state.execute(ud), "true")
-
-
-class Work(smach.State):
-    """What the wrapped machine does, by the number in the goal."""
-
-    def __init__(self):
-        super().__init__(
-            ["succeeded", "aborted", "preempted", "other"], ["action_goal"], ["action_result"]
-        )
-        self.seen = []
-
-    def execute(self, ud):
-        goal = ud.action_goal.goal
-        self.seen.append((goal, self.preempt_requested()))
-        ud.action_result = TestResult(result=goal + 1000)
-        while goal == UNTIL_CANCELLED and not self.preempt_requested() and not rospy.is_shutdown():
-            time.sleep(0.005)
-        if self.preempt_requested():
-            self.service_preempt()
-            return "preempted"
-        if goal == 99:
-            raise ValueError("broken state")
-        return {SUCCEED: "succeeded", ABORT: "aborted"}.get(goal, "other")
-
-
-class TestSection9Wrapper(unittest.TestCase):
-    count = 0
-
-    def serve(self, machine, **kwargs):
-        type(self).count += 1
-        name = f"wrapped_{self.count}"
-        wrapper = smach_ros.ActionServerWrapper(
-            name, TestAction, machine, ["succeeded"], ["aborted"], ["preempted"], **kwargs
-        )
-        wrapper.run_server()
-        client = actionlib.SimpleActionClient(name, TestAction)
-        self.assertTrue(client.wait_for_server(rospy.Duration(LIMIT)))
-        return client
-
-    def machine(self, state=None):
-        machine = smach.StateMachine(
-            ["succeeded", "aborted", "preempted", "other"], ["action_goal"], ["action_result"]
-        )
-        with machine:
-            smach.StateMachine.add("WORK", state or Work())
-        return machine
-
-    def send(self, client, goal, **kwargs):
-        client.send_goal(TestGoal(goal=goal), **kwargs)
-        self.assertTrue(client.wait_for_result(rospy.Duration(LIMIT)))
-        return client.get_state(), client.get_result().result if client.get_result() else None
-
-    def test_s9_wrapper_outcomes(self):
-        client = self.serve(self.machine())
-        self.assertEqual(self.send(client, SUCCEED), (GoalStatus.SUCCEEDED, 1000 + SUCCEED))
-        self.assertEqual(self.send(client, ABORT), (GoalStatus.ABORTED, 1000 + ABORT))
-        self.assertEqual(self.send(client, 50), (GoalStatus.ABORTED, 1050), "in none of the lists")
-        self.assertEqual(self.send(client, 99)[0], GoalStatus.ABORTED, "an error")
-        self.assertEqual(
-            self.send(client, SUCCEED)[0], GoalStatus.SUCCEEDED, "works after an error"
-        )
-
-    def test_s9_wrapper_cancel_and_s15_nothing_left_over(self):
-        state = Work()
-        client = self.serve(self.machine(state))
-        for _ in range(5):
-            client.send_goal(TestGoal(goal=UNTIL_CANCELLED))
-            before = len(state.seen)
-            self.assertTrue(
-                wait_for(lambda before=before: len(state.seen) > before or rospy.is_shutdown())
-            )
-            client.cancel_goal()
-            self.assertTrue(client.wait_for_result(rospy.Duration(LIMIT)))
-            self.assertEqual(client.get_state(), GoalStatus.PREEMPTED)
-            self.assertEqual(self.send(client, SUCCEED)[0], GoalStatus.SUCCEEDED)
-        self.assertFalse(any(asked for goal, asked in state.seen if goal == SUCCEED))
-
-    def test_s9_wrapper_a_new_goal_preempts_the_old(self):
-        state = Work()
-        client = self.serve(self.machine(state))
-        client.send_goal(TestGoal(goal=UNTIL_CANCELLED))
-        self.assertTrue(wait_for(lambda: state.seen))
-        self.assertEqual(self.send(client, SUCCEED)[0], GoalStatus.SUCCEEDED)
-
-    def test_s9_wrapper_slots_and_feedback(self):
-        machine = smach.StateMachine(["succeeded", "aborted", "preempted"], ["n"], ["m", "result"])
-
-        @smach.cb_interface(outcomes=["ok"], input_keys=["n"], output_keys=["action_feedback", "m"])
-        def first(ud):
-            ud.action_feedback = TestFeedback(feedback=ud.n + 1)
-            ud.m = ud.n * 2
-            return "ok"
-
-        with machine:
-            smach.StateMachine.add("A", smach.CBState(first), {"ok": "B"})
-            smach.StateMachine.add(
-                "B", smach.CBState(lambda ud: "succeeded", outcomes=["succeeded"])
-            )
-        client = self.serve(machine, goal_slots_map={"goal": "n"}, result_slots_map={"result": "m"})
-        got = []
-        state = self.send(client, 21, feedback_cb=lambda feedback: got.append(feedback.feedback))
-        self.assertEqual(state, (GoalStatus.SUCCEEDED, 42))
-        self.assertTrue(wait_for(lambda: got == [22]))
-
-    def test_s9_wrapper_expand_and_pack(self):
-        machine = smach.StateMachine(["succeeded", "aborted", "preempted"], ["goal"], ["result"])
-
-        @smach.cb_interface(outcomes=["succeeded"], input_keys=["goal"], output_keys=["result"])
-        def work(ud):
-            ud.result = ud.goal + 5
-            return "succeeded"
-
-        with machine:
-            smach.StateMachine.add("A", smach.CBState(work))
-        client = self.serve(machine, expand_goal_slots=True, pack_result_slots=True)
-        self.assertEqual(self.send(client, 1), (GoalStatus.SUCCEEDED, 6))
-
-    def test_s9_wrapper_bad_slots(self):
-        with self.assertRaises(smach.InvalidStateError):
-            smach_ros.ActionServerWrapper(
-                "x", TestAction, self.machine(), goal_slots_map={"nothing": "n"}
-            )
 
 
 if __name__ == "__main__":
