@@ -38,7 +38,7 @@ def test_port_link_commands_and_trace(start, tmp_path):
                     "--contact", "255", "100", "100", "100", "100", "--stiffness", "20")
     port = process.stdout.readline().split()
     assert port[0] == "port"
-    with HandSerialDriver(str(tmp_path / "hand")) as driver:
+    with HandSerialDriver(str(tmp_path / "hand"), read_timeout=0.3) as driver:
         driver.calibration("fast")
         driver.set_finger_current(2, 100)
         time.sleep(1.0)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import threading
 import time
 from typing import Any
@@ -77,6 +78,7 @@ class HandNode:
         self.holding = True
         self.message = "not connected yet"
         self._preshape: tuple[str, str] | None = None
+        self._last_status = HandStatus()
         self._contradictions = 0
         self._lost_lock = threading.Lock()
         self._ended = threading.Event()
@@ -217,6 +219,7 @@ class HandNode:
         status.calibrated, status.calibrating = self.calibrated, calibrating
         status.connected, status.holding = self.driver is not None, self.holding
         status.message = self.message
+        self._last_status = status
         self._publisher.publish(status)
 
     # -- goals -----------------------------------------------------------------------------------
@@ -251,6 +254,10 @@ class HandNode:
         elif isinstance(task, (CloseTask, GraspTask)) and not verdict.ok:
             self.holding = True  # broken off on the way: something may be between the fingers
         self.message = f"{task.name}: {verdict.text}"
+        # The last poll once more: who acts on the result finds the grip told with it.
+        status = copy.copy(self._last_status)
+        status.holding, status.message = self.holding, self.message
+        self._publisher.publish(status)
 
     # -- calibration and stop --------------------------------------------------------------------
 
