@@ -18,7 +18,7 @@ from std_msgs.msg import Bool, Empty
 from std_srvs.srv import SetBool, SetBoolRequest, SetBoolResponse, Trigger
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
-from reference_server import (  # noqa: E402
+from reference_server import (
     ABORT,
     DEAF,
     SUCCEED,

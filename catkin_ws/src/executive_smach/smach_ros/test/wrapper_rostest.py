@@ -14,7 +14,7 @@ from actionlib.msg import TestAction, TestFeedback, TestGoal, TestResult
 from actionlib_msgs.msg import GoalStatus
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
-from reference_server import ABORT, SUCCEED, UNTIL_CANCELLED  # noqa: E402
+from reference_server import ABORT, SUCCEED, UNTIL_CANCELLED
 
 LIMIT = 20.0
 

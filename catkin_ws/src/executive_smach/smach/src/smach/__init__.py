@@ -22,16 +22,6 @@ Example::
 """
 
 # The loggers come first: every other module looks them up here each time it logs.
-from smach.log import (
-    is_shutdown,
-    logdebug,
-    logerr,
-    loginfo,
-    logwarn,
-    set_loggers,
-    set_shutdown_check,
-)  # isort: skip
-
 from smach import clock
 from smach.concurrence import Concurrence
 from smach.container import Container
@@ -42,6 +32,15 @@ from smach.exceptions import (
     InvalidUserCodeError,
 )
 from smach.iterator import Iterator
+from smach.log import (
+    is_shutdown,
+    logdebug,
+    logerr,
+    loginfo,
+    logwarn,
+    set_loggers,
+    set_shutdown_check,
+)  # isort: skip
 from smach.sequence import Sequence
 from smach.state import CBState, State
 from smach.state_machine import StateMachine

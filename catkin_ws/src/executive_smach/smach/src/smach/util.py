@@ -59,7 +59,7 @@ class CBInterface:
         return tuple(self._output_keys)
 
 
-class cb_interface:  # noqa: N801  (used as a decorator)
+class cb_interface:
     """Decorator: declares outcomes and keys of a callback.
 
     Example::

@@ -12,6 +12,8 @@ import smach
 
 from smach_ros.util import TimeLimit, callback_userdata, register_callback, seconds
 
+_POLL_RATE = rospy.Duration(0.05)
+
 
 class ConditionState(smach.State):
     """Outcomes true, false and preempted.
@@ -31,7 +33,7 @@ class ConditionState(smach.State):
         self,
         cond_cb: Callable[[Any], bool],
         input_keys: Iterable[str] = (),
-        poll_rate: Any = rospy.Duration(0.05),
+        poll_rate: Any = _POLL_RATE,
         timeout: Any = None,
         max_checks: int = 1,
     ) -> None:

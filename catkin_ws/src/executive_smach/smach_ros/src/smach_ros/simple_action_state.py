@@ -17,6 +17,7 @@ from actionlib_msgs.msg import GoalStatus
 
 from smach_ros.util import POLL, TimeLimit, callback_userdata, check_slots, register_callback
 
+_MINUTE = rospy.Duration(60.0)
 _STATUS_NAMES = {
     value: name
     for name, value in vars(GoalStatus).items()
@@ -74,8 +75,8 @@ class SimpleActionState(smach.State):
         output_keys: Iterable[str] = (),
         outcomes: Iterable[str] = (),
         exec_timeout: Any = None,
-        preempt_timeout: Any = rospy.Duration(60.0),
-        server_wait_timeout: Any = rospy.Duration(60.0),
+        preempt_timeout: Any = _MINUTE,
+        server_wait_timeout: Any = _MINUTE,
     ) -> None:
         super().__init__(["succeeded", "aborted", "preempted"], input_keys, output_keys)
         self.register_outcomes(outcomes)
