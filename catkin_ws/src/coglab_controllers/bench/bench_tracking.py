@@ -23,6 +23,7 @@ except ImportError:  # the peer is optional: its column is then null
 
 CYCLE, DURATION, REACHES, SEED = 0.005, 1.2, 300, 11
 CYCLES = round(DURATION / CYCLE)
+REST = 100  # cycles that a reach is watched after its end
 TIMES = np.linspace(0.0, DURATION, 241)
 GAIN = 20.0
 
@@ -91,16 +92,16 @@ def rotate(q: np.ndarray, v: np.ndarray) -> np.ndarray:
     return multiply(multiply(q, np.append(v, 0.0)), conjugate(q))[:3]
 
 
-# Joint velocity for posture and reference, and the share of the whole that the speed limits let pass.
-Solver = Callable[[np.ndarray, cc.CartesianReference], tuple[np.ndarray, float]]
+# Joint velocity for posture, reference and last joint velocity, and the share of the whole that the speed limits let pass.
+Solver = Callable[[np.ndarray, cc.CartesianReference, np.ndarray], tuple[np.ndarray, float]]
 
 
-def two_task(chain: cc.Chain, limits: cc.JointLimits, rotation_first: bool) -> Solver:
-    """Our IK."""
+def two_task(chain: cc.Chain, limits: cc.JointLimits, rotation_first: bool, ahead: bool = False) -> Solver:
+    """Our IK; `ahead`: with the Jacobian of the middle of the cycle."""
     ik = cc.TwoTaskIk(GAIN, GAIN, rotation_first_scaling=rotation_first, velocity_limit=limits.velocity)
 
-    def solve(q: np.ndarray, reference: cc.CartesianReference) -> tuple[np.ndarray, float]:
-        result = ik.solve(chain, q, reference)
+    def solve(q: np.ndarray, reference: cc.CartesianReference, last: np.ndarray) -> tuple[np.ndarray, float]:
+        result = ik.solve(chain, q, reference, velocity=last, dt=CYCLE if ahead else 0.0)
         return result.velocity, result.scale
 
     return solve
@@ -137,7 +138,8 @@ def kdl_solver(chain: cc.Chain, limits: cc.JointLimits, kind: str) -> Solver:
     joints, velocity = PyKDL.JntArray(7), PyKDL.JntArray(7)
 
     # The solver only refers to the chain, which must therefore live as long.
-    def solve(q: np.ndarray, reference: cc.CartesianReference, _: object = tree) -> tuple[np.ndarray, float]:
+    def solve(q: np.ndarray, reference: cc.CartesianReference, _: np.ndarray,
+              keep: object = tree) -> tuple[np.ndarray, float]:
         position, orientation = chain.fk(q)
         linear = reference.velocity + GAIN * (reference.position - position)
         angular = reference.angular_velocity + GAIN * cc.rotation_between(orientation, reference.orientation)
@@ -165,14 +167,14 @@ def run(chain: cc.Chain, limits: cc.JointLimits, reach: Reach, primitive: cc.Pri
     motion.start(primitive, reach.position, reach.orientation, reach.goal, reach.target)
     interpolator = cc.Interpolator(limits)
     interpolator.reset(reach.posture)
-    q, scale, cycles, rest = reach.posture.copy(), 1.0, 0, 0
+    q, velocity, scale, cycles, rest = reach.posture.copy(), np.zeros(7), 1.0, 0, 0
     outcome = Outcome(0.0, 0.0, 0.0, 0.0, False, 0.0)
-    while rest < 40 and cycles < 4 * CYCLES:
+    while rest < REST and cycles < 4 * CYCLES:
         rate = governor.update(CYCLE, 1.0, scale if waits else 1.0)
         reference = motion.step(CYCLE, reach.goal, reach.target, rate)
         position, _ = chain.fk(q)
         outcome.worst = max(outcome.worst, float(np.linalg.norm(position - reference.position)))
-        velocity, scale = solve(q, reference)
+        velocity, scale = solve(q, reference, velocity)
         outcome.over = max(outcome.over, float(np.max(np.abs(velocity) / limits.velocity)))
         if interpolated:
             q = interpolator.step(velocity, CYCLE)
@@ -228,11 +230,11 @@ def main() -> None:
     def all_of(solver: Solver, waits: bool, interpolated: bool = False) -> list[Outcome]:
         return [run(chain, limits, reach, primitive, solver, waits, interpolated) for reach in reaches]
 
-    ours = all_of(two_task(chain, limits, True), waits=True)
+    ours = all_of(two_task(chain, limits, True, ahead=True), waits=True)
     hurried = all_of(two_task(chain, limits, True), waits=False)
     plain = all_of(two_task(chain, limits, False), waits=False)
     wdls = all_of(kdl_solver(chain, limits, "wdls"), waits=False) if PyKDL else None
-    through = all_of(two_task(chain, limits, True), waits=True, interpolated=True)
+    through = all_of(two_task(chain, limits, True, ahead=True), waits=True, interpolated=True)
     free = [o for o in ours if not o.stopped]
     slowed = 100.0 * float(np.mean([o.duration > min(x.duration for x in free) + 0.05 for o in free]))
     ends = 1000.0 * np.array([o.last for o in through if not o.stopped])

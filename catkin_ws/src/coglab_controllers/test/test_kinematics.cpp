@@ -109,6 +109,19 @@ TEST(Chain, JacobianIsTheDerivative) {
   }
 }
 
+TEST(Chain, TheJacobianOfTheMiddleLeadsToTheEndOfTheCycle) {
+  Random random(7);
+  const double dt = 0.005;
+  for (int k = 0; k < 2000; ++k) {
+    const JointVector q = random.posture(0.0), velocity = random.joints(1.9);
+    ChainState now = robot().evaluate(q), middle;
+    robot().evaluate(q, velocity, dt, middle);
+    EXPECT_EQ(middle.tool.position, now.tool.position);
+    const Vector3 way = robot().evaluate(q + dt * velocity).tool.position - now.tool.position;
+    EXPECT_LT((way - dt * middle.jacobian.topRows<3>() * velocity).norm(), 1e-6);
+  }
+}
+
 TEST(Chain, SaysWhatIsWrongWithAUrdf) {
   const std::string urdf = robotUrdf();
   EXPECT_THROW(Chain("not xml", "a", "b"), std::invalid_argument);

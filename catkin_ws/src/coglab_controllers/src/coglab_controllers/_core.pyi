@@ -332,9 +332,16 @@ class TwoTaskIk:
         velocity_limit: ArrayLike = ...,
     ) -> None: ...
     def solve(
-        self, chain: Chain, q: ArrayLike, reference: CartesianReference, task: PostureTask | None = None
+        self,
+        chain: Chain,
+        q: ArrayLike,
+        reference: CartesianReference,
+        task: PostureTask | None = None,
+        velocity: ArrayLike = ...,
+        dt: float = 0.0,
     ) -> IkResult:
-        """Joint velocities at q (7,); `task` replaces the orientation as second task."""
+        """Joint velocities at q (7,); `task` replaces the orientation as second task. With the present joint velocity (7,)
+        and the cycle time the Jacobian is that of the middle of the cycle."""
 
 class JointLimits:
     """The robot's table of joint limits; arrays (7,), rad, rad/s, rad/s^2, rad/s^3, Nm."""

@@ -103,6 +103,14 @@ void Chain::evaluate(const JointVector& q, ChainState& state) const noexcept {
   }
 }
 
+void Chain::evaluate(const JointVector& q, const JointVector& velocity, double dt, ChainState& state) const noexcept {
+  evaluate(q, state);
+  if (!(dt > 0.0) || velocity.isZero(0.0)) return;
+  const Pose now = state.tool;
+  evaluate(q + 0.5 * dt * velocity, state);
+  state.tool = now;
+}
+
 Vector3 Chain::originVelocity(const ChainState& state, int index, const JointVector& velocity) noexcept {
   Vector3 result = Vector3::Zero();
   for (int i = 0; i < index; ++i) {

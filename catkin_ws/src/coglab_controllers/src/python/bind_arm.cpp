@@ -63,8 +63,9 @@ void bindIk(py::module_& module) {
       .def(
           "solve",
           [](const TwoTaskIk& ik, const Chain& chain, const JointVector& q, const CartesianReference& reference,
-             const PostureTask* task) {
-            const ChainState state = chain.evaluate(requireFinite(q, "q"));
+             const PostureTask* task, const JointVector& velocity, double dt) {
+            ChainState state;
+            chain.evaluate(requireFinite(q, "q"), requireFinite(velocity, "velocity"), requireStep(dt), state);
             IkResult result;
             if (task != nullptr) {
               ik.solve(state, q, reference, *task, result);
@@ -74,6 +75,7 @@ void bindIk(py::module_& module) {
             return result;
           },
           py::arg("chain"), py::arg("q"), py::arg("reference"), py::arg("task") = nullptr,
+          py::arg("velocity") = JointVector(JointVector::Zero()), py::arg("dt") = 0.0,
           "Joint velocities for a reference; `task` replaces the orientation as second task.");
 }
 

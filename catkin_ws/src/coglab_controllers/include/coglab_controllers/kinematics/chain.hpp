@@ -54,6 +54,10 @@ class Chain {
     return state;
   }
 
+  /// The same for a cycle of `dt` s in which the joints move at about `velocity` (rad/s): the pose is that at q, the rest
+  /// that in the middle of the cycle, where a Jacobian leads to the pose at its end with an error of third order in dt.
+  void evaluate(const JointVector& q, const JointVector& velocity, double dt, ChainState& state) const noexcept;
+
   /// Velocity of the origin of joint `index` (elbow, wrist), m/s, base frame.
   static Vector3 originVelocity(const ChainState& state, int index, const JointVector& velocity) noexcept;
 
