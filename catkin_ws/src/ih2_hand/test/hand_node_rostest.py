@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import random
 import sys
 import time
 import unittest
@@ -160,6 +161,20 @@ class HandNode(unittest.TestCase):
             self.hand.send("hand_close", speed)
         result = self.hand.run("hand_close", 511)
         self.assertTrue(result.isOk, result.message)
+
+    def test_l_cancels_at_any_moment(self) -> None:
+        rng = random.Random(5)
+        ends = (GoalStatus.PREEMPTED, GoalStatus.RECALLED, GoalStatus.SUCCEEDED)
+        for _ in range(25):
+            name = rng.choice(("hand_open", "hand_close"))
+            client = self.hand.send(name, 300)
+            time.sleep(rng.choice((0.0, 0.001, 0.01, 0.05)))
+            client.cancel_goal()
+            self.assertTrue(client.wait_for_result(rospy.Duration(5.0)), name)
+            self.assertIn(client.get_state(), ends, name)
+        status = self.hand.fresh_status()
+        self.assertTrue(all(motor.mode == "stop" for motor in status.motors))
+        self.assertTrue(self.hand.run("hand_open", 511).isOk)
 
     def test_m_stop_service(self) -> None:
         self.assertTrue(self.hand.run("hand_open", 511).isOk)
