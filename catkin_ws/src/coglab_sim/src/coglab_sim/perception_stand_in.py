@@ -27,7 +27,7 @@ class PerceptionSettings:
     position_noise: tuple[float, float, float] = (0.004, 0.004, 0.004)
     """standard deviation per world axis"""
     orientation_noise: float = 0.035
-    correlation_time: float = 0.10
+    correlation_time: float = 0.50
     """of the noise: an AR(1) process, as a filtering tracker gives it"""
     dropout_start: float = 0.02
     """probability per frame that a burst of dropout begins; 0 switches dropouts off"""

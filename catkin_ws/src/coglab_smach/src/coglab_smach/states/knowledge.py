@@ -74,6 +74,27 @@ def locate(state: CoglabState, target: str) -> dict[str, Any]:
             "quaternion": list(found.quaternion), "age": found.age}
 
 
+def await_offer(state: CoglabState, target: str) -> dict[str, Any]:
+    """Wait until ``target`` is inside the handover region, so that the arm does not chase a hand at rest.
+
+    PortError if nobody comes within ``handover.offer_timeout``; nothing has moved then.
+    """
+    low = [float(v) for v in state.ctx.config.get("handover.region_low", [-1.0, -1.0, -1.0])]
+    high = [float(v) for v in state.ctx.config.get("handover.region_high", [1.5, 1.0, 2.0])]
+    limit = float(state.ctx.config.get("handover.offer_timeout", 8.0))
+    end = state.ctx.clock.now() + limit
+    located = locate(state, target)
+    while not all(a <= v <= b for a, v, b in zip(low, located["xyz"], high)):
+        if state.ctx.clock.now() > end:
+            place = ", ".join(f"{v:.2f}" for v in located["xyz"])
+            raise PortError(f"'{target}' was not offered within {limit:.0f} s: it stayed at ({place}) m, outside the "
+                            "handover region", ("nobody reaches toward the robot",))
+        state.pause(0.03)
+        located = locate(state, target)
+    state.ctx.journal.mark("offered")
+    return located
+
+
 class SetGraspGoal(CoglabState):
     """DMP goal from the nominal grasp: palm relative to the tracked object frame, short of it by the approach distance.
 
@@ -87,26 +108,10 @@ class SetGraspGoal(CoglabState):
         super().__init__(ctx, input_keys=["object_id", "object_entry", "grasp"], output_keys=["goal", "located"])
 
     def run(self, ud: Any) -> str:
-        limit = float(self.ctx.config.get("handover.offer_timeout", 8.0))
-        end = self.ctx.clock.now() + limit
-        located = locate(self, ud.object_id)
-        while not self._on_offer(located["xyz"]):
-            if self.ctx.clock.now() > end:
-                place = ", ".join(f"{v:.2f}" for v in located["xyz"])
-                raise PortError(f"'{ud.object_id}' was not offered within {limit:.0f} s: it stayed at ({place}) m, outside "
-                                "the handover region", ("nobody reaches toward the robot",))
-            self.pause(0.03)
-            located = locate(self, ud.object_id)
-        self.ctx.journal.mark("offered")
+        located = await_offer(self, ud.object_id)
         ud.located = located
         ud.goal = grasp_goal(ud.object_entry, ud.grasp, located["frame"], "receive")
         return "succeeded"
-
-
-    def _on_offer(self, xyz: list[float]) -> bool:
-        low = self.ctx.config.get("handover.region_low", [-1.0, -1.0, -1.0])
-        high = self.ctx.config.get("handover.region_high", [1.0, 1.0, 2.0])
-        return all(a <= v <= b for a, v, b in zip(low, xyz, high))
 
 
 class SetTakeGoal(CoglabState):
@@ -124,16 +129,19 @@ class SetTakeGoal(CoglabState):
 
 
 class SetDeliveryGoal(CoglabState):
-    """DMP goal from the delivery mode: where the palm must be, relative to the person's hand, to offer the object."""
+    """DMP goal from the delivery mode: where the palm must be, relative to the person's hand, to offer the object.
 
-    default_time_limit = 10.0
+    Ends when the person's hand is in the handover region: until then nobody asks for the object.
+    """
+
+    default_time_limit = 20.0
 
     def __init__(self, ctx: Context) -> None:
         super().__init__(ctx, input_keys=["object_entry", "grasp"],
                          output_keys=["goal", "delivery", "delivery_name", "delivery_pose"])
 
     def run(self, ud: Any) -> str:
-        located = locate(self, str(self.ctx.config.get("perception.human_hand", "human_hand")))
+        located = await_offer(self, str(self.ctx.config.get("perception.human_hand", "human_hand")))
         entry = ud.object_entry
         name = entry["default_delivery"]
         delivery = entry["deliveries"][name]
