@@ -1,81 +1,9 @@
 /// Python module coglab_sim._cell: the simulated cell without ROS, one FRI period per call.
-#include <pybind11/eigen.h>
-#include <pybind11/pybind11.h>
-#include <pybind11/stl.h>
-
-#include "coglab_sim/cell.hpp"
+#include "py_cell.hpp"
 
 namespace py = pybind11;
 using namespace coglab_sim;
-
-namespace {
-
-py::dict poseDict(const Pose& pose) {
-  py::dict result;
-  result["position"] = pose.position;
-  result["rotation"] = Eigen::Vector4d(pose.rotation.coeffs());  // x y z w
-  return result;
-}
-
-Pose makePose(const Vector3d& position, const Eigen::Vector4d& rotation) {
-  return {position, Quaterniond(rotation[3], rotation[0], rotation[1], rotation[2]).normalized()};
-}
-
-CellConfig configFrom(const std::string& urdf, const py::dict& parameters) {
-  CellConfig config;
-  config.urdf = urdf;
-  for (const auto& [key, value] : parameters) {
-    setCellParameter(config, py::cast<std::string>(key), py::cast<ParameterValue>(value));
-  }
-  return config;
-}
-
-/// Lockstep in Python terms: bytes in, bytes out; None where nothing is sent.
-class PyCell {
- public:
-  PyCell(const std::string& urdf, const py::dict& parameters) : cell_(configFrom(urdf, parameters)) {}
-
-  py::object step(const py::object& answer) {
-    if (answer.is_none()) {
-      cell_.step(nullptr, 0);
-    } else {
-      const std::string bytes = py::cast<py::bytes>(answer);
-      cell_.step(reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size());
-    }
-    if (!cell_.sent()) return py::none();
-    const MeasurementBytes& out = cell_.measurement();
-    return py::bytes(reinterpret_cast<const char*>(out.data()), out.size());
-  }
-
-  py::dict truth() const {
-    const CellTruth t = cell_.truth();
-    py::dict result;
-    result["time"] = t.time;
-    result["object"] = poseDict(t.object);
-    result["object_velocity"] = t.object_twist.linear;
-    result["object_spin"] = t.object_twist.angular;
-    result["human_hand"] = poseDict(t.human_hand);
-    result["robot_hand"] = poseDict(t.robot_hand);
-    result["palm_force"] = t.palm_force;
-    result["robot_load_share"] = t.robot_load_share;
-    result["human_load_share"] = t.human_load_share;
-    result["held_by"] = t.held_by;
-    result["dropped"] = t.dropped;
-    result["position"] = t.position;
-    result["velocity"] = t.velocity;
-    result["set_point"] = t.set_point;
-    result["external_torque"] = t.external_torque;
-    return result;
-  }
-
-  Cell& cell() { return cell_; }
-  const Cell& cell() const { return cell_; }
-
- private:
-  Cell cell_;
-};
-
-}  // namespace
+using namespace coglab_sim::python;
 
 PYBIND11_MODULE(_cell, m) {
   m.doc() = "The simulated cell: robot controller, arm, object and hands behind the FRI wire. SI units, quaternions x y z w.";

@@ -1,0 +1,83 @@
+/// @file
+/// The whole robot in virtual time: simulated cell, FRI bridge and controller manager in one process and one thread.
+///
+/// The same libraries as on the real clock, coupled in the same order: measurement, answer, control cycle, next period. Time
+/// advances only by tick(), so that trials run as fast as the machine can and the same requests give the same bytes.
+#pragma once
+
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "coglab_controllers/manager/controller_manager.hpp"
+#include "coglab_controllers/plugins/dmp_controller.hpp"
+#include "coglab_controllers/plugins/ptp_controller.hpp"
+#include "coglab_sim/cell.hpp"
+#include "lwr_fri_bridge/bridge.hpp"
+
+namespace coglab_sim {
+
+/// Frames as a table, in place of tf2. All poses are in `world`, which is `lwr_base_link`.
+class FrameTable : public coglab_controllers::GoalSource {
+ public:
+  /// Tells where a frame was seen, at a time of the robot's clock, ns.
+  void set(const std::string& frame, const Pose& in_world, std::int64_t stamp_ns);
+  void forget(const std::string& frame) { frames_.erase(frame); }
+  bool lookup(const std::string& reference, const std::string& frame, coglab_controllers::GoalObservation& observation,
+              std::string& why) override;
+
+ private:
+  struct Seen {
+    Pose pose;
+    std::int64_t stamp_ns = 0;
+  };
+  bool find(const std::string& frame, Seen& seen) const;
+  std::map<std::string, Seen> frames_;
+};
+
+/// Settings of a VirtualRobot.
+struct VirtualRobotConfig {
+  CellConfig cell;
+  std::string limits_file;         ///< lwr_description/config/joint_limits.yaml
+  std::string manager_parameters;  ///< YAML text as below /controller_manager
+};
+
+class VirtualRobot {
+ public:
+  /// @throws what Cell, Bridge and readManagerSettings() throw.
+  explicit VirtualRobot(const VirtualRobotConfig& config);
+  ~VirtualRobot();
+
+  /// One FRI period.
+  void tick();
+  double now() const { return 1e-9 * static_cast<double>(now_ns_); }  ///< s
+  std::int64_t nowNs() const { return now_ns_; }
+
+  Cell& cell() { return cell_; }
+  lwr_fri_bridge::Bridge& bridge() { return bridge_; }
+  coglab_controllers::ControllerManager& manager() { return *manager_; }
+  FrameTable& frames() { return frames_; }
+
+  /// Loads a controller; a DMP controller gets the frame table as goal source.
+  coglab_controllers::Answer load(const std::string& id, const std::string& type);
+  /// The controller of that id. @throws std::invalid_argument if there is none of that type.
+  coglab_controllers::DmpController& dmp(const std::string& id = "dmp");
+  coglab_controllers::PtpController& ptp(const std::string& id = "ptp");
+
+ private:
+  void controlCycle(bool answered);
+
+  Cell cell_;
+  lwr_fri_bridge::Bridge bridge_;
+  std::int64_t period_ns_;
+  std::int64_t now_ns_ = 1'000'000'000;  // a stamp of 0 would mean "none"
+  bool measured_ = false;
+  int since_cycle_ = 0;
+  std::uint64_t last_sequence_ = 0;
+  FrameTable frames_;
+  std::unique_ptr<coglab_controllers::ControllerManager> manager_;
+  std::vector<coglab_controllers::DmpController*> dmps_;
+};
+
+}  // namespace coglab_sim

@@ -1,0 +1,137 @@
+#include "coglab_sim/virtual_robot.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <sstream>
+#include <stdexcept>
+
+COGLAB_REGISTER_MOTION_CONTROLLER("coglab/DmpController", coglab_controllers::DmpController)
+namespace coglab_sim {
+namespace {
+const coglab_controllers::MotionRegistration ptp_registration(
+    "coglab/PtpController",
+    {[]() -> coglab_controllers::MotionController* { return new coglab_controllers::PtpController(); }, nullptr});
+
+std::string textOf(const std::string& path) {
+  std::ifstream file(path);
+  if (!file) throw std::runtime_error("cannot read " + path);
+  std::ostringstream text;
+  text << file.rdbuf();
+  return text.str();
+}
+
+lwr_fri_bridge::BridgeConfig bridgeConfig(const VirtualRobotConfig& config) {
+  lwr_fri_bridge::BridgeConfig bridge;
+  bridge.limits = lwr_fri_bridge::loadJointLimits(config.limits_file);
+  bridge.krl_convention = lwr_fri_bridge::fri::krlConventionFromName(krc::nameOf(config.cell.krc.convention));
+  return bridge;
+}
+
+}  // namespace
+
+void FrameTable::set(const std::string& frame, const Pose& in_world, std::int64_t stamp_ns) {
+  frames_[frame] = {in_world, stamp_ns};
+}
+
+bool FrameTable::find(const std::string& frame, Seen& seen) const {
+  if (frame == "world" || frame == "lwr_base_link") {
+    seen = Seen{};
+    return true;
+  }
+  const auto found = frames_.find(frame);
+  if (found == frames_.end()) return false;
+  seen = found->second;
+  return true;
+}
+
+bool FrameTable::lookup(const std::string& reference, const std::string& frame,
+                        coglab_controllers::GoalObservation& observation, std::string& why) {
+  Seen from, to;
+  for (const auto& [name, seen] : {std::pair{&reference, &from}, std::pair{&frame, &to}}) {
+    if (find(*name, *seen)) continue;
+    why = "frame '" + *name + "' is not known";
+    return false;
+  }
+  const Pose pose = from.pose.inverse() * to.pose;
+  observation.position = pose.position;
+  observation.orientation = pose.rotation;
+  observation.stamp_ns = to.stamp_ns;
+  return true;
+}
+
+VirtualRobot::VirtualRobot(const VirtualRobotConfig& config)
+    : cell_(config.cell),
+      bridge_(bridgeConfig(config)),
+      period_ns_(static_cast<std::int64_t>(std::llround(1e9 * config.cell.krc.period))) {
+  auto settings = coglab_controllers::readManagerSettings(YAML::Load(config.manager_parameters), textOf(config.cell.urdf),
+                                                          bridge_.config().limits, true);
+  settings.clock = [this] { return now_ns_; };
+  // The controllers are linked into this library; no shared object with a ROS side is needed.
+  settings.types.erase("coglab/DmpController");
+  settings.types.erase("coglab/PtpController");
+  manager_ = std::make_unique<coglab_controllers::ControllerManager>(std::move(settings));
+}
+
+VirtualRobot::~VirtualRobot() {
+  for (auto* dmp : dmps_) dmp->setGoalSource(nullptr);
+}
+
+coglab_controllers::Answer VirtualRobot::load(const std::string& id, const std::string& type) {
+  coglab_controllers::Answer answer = manager_->load(id, type);
+  if (!answer.success) return answer;
+  if (auto* dmp = dynamic_cast<coglab_controllers::DmpController*>(manager_->motion(id))) {
+    dmp->setGoalSource(&frames_);
+    dmps_.push_back(dmp);
+  }
+  return answer;
+}
+
+coglab_controllers::DmpController& VirtualRobot::dmp(const std::string& id) {
+  if (auto* dmp = dynamic_cast<coglab_controllers::DmpController*>(manager_->motion(id))) return *dmp;
+  throw std::invalid_argument("no DMP controller is loaded under the id '" + id + "'");
+}
+
+coglab_controllers::PtpController& VirtualRobot::ptp(const std::string& id) {
+  if (auto* ptp = dynamic_cast<coglab_controllers::PtpController*>(manager_->motion(id))) return *ptp;
+  throw std::invalid_argument("no point-to-point controller is loaded under the id '" + id + "'");
+}
+
+void VirtualRobot::tick() {
+  lwr_fri_bridge::fri::CommandDatagram command;
+  std::array<std::uint8_t, lwr_fri_bridge::fri::kCommandSize> answer{};
+  bool answered = false;
+  if (measured_) {
+    const MeasurementBytes& measurement = cell_.measurement();
+    answered = bridge_.answer(measurement.data(), measurement.size(), now_ns_, command);
+    if (answered) lwr_fri_bridge::fri::encode(command, answer.data());
+  } else {
+    bridge_.idle(now_ns_);
+  }
+  controlCycle(answered);
+  cell_.step(answered ? answer.data() : nullptr, answer.size());
+  measured_ = cell_.sent();
+  now_ns_ += period_ns_;
+}
+
+void VirtualRobot::controlCycle(bool answered) {
+  for (auto* dmp : dmps_) dmp->pollGoal();
+  auto& cycle = manager_->cycle();
+  const double period = cell_.period(), wanted = cycle.settings().cycle_time;
+  const int periods = std::max(1, static_cast<int>(std::ceil(wanted / period - 1e-6)));
+  if (!answered) {
+    cycle.idle(now_ns_);
+    return;
+  }
+  if (++since_cycle_ < periods) return;
+  since_cycle_ = 0;
+  coglab_controllers::RobotSample sample;
+  bridge_.port().newestSample(sample);
+  const double dt = last_sequence_ == 0 ? wanted : static_cast<double>(sample.sequence - last_sequence_) * period;
+  last_sequence_ = sample.sequence;
+  coglab_controllers::VelocityCommand command;
+  cycle.run(sample, std::min(dt, cycle.settings().sample_timeout), command);
+  bridge_.port().sendVelocity(command);
+}
+
+}  // namespace coglab_sim
