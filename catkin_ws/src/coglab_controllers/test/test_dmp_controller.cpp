@@ -350,5 +350,105 @@ TEST(DmpController, RobotThatStopsAbortsTheMotionAndRefusesNewOnes) {
   EXPECT_TRUE(VirtualRobot::ok(robot.dmp().execute(robot.reach())));
 }
 
+TEST(DmpController, GivenStateBeginsThereWithItsVelocity) {
+  VirtualRobot robot;
+  robot.loadBoth();
+  robot.see("human_hand", kGoal);
+  DmpRequest request = robot.reach();
+  request.initial_state = DmpRequest::kGiven;
+  request.initial_position = robot.hand().position + Vector3(0.0, 0.01, 0.0);
+  request.initial_velocity = Vector3(0.1, 0.0, 0.0);
+  ASSERT_TRUE(VirtualRobot::ok(robot.dmp().execute(request)));
+  robot.tick();
+  EXPECT_LT((robot.handVelocity() - request.initial_velocity).norm(), 0.03);
+  for (int i = 0; i < 1000; ++i) {
+    robot.see("human_hand", kGoal);
+    robot.tick();
+  }
+  EXPECT_EQ(robot.state(), MotionState::Reached);
+}
+
+TEST(DmpController, GoalThatLeavesTheWorkspaceIsProjected) {
+  VirtualRobot robot("workspace: {box_max: [0.75, 1.2, 1.6]}");
+  robot.loadBoth();
+  robot.see("human_hand", kGoal);  // 50 mm outside, within goal_reach_margin
+  ASSERT_TRUE(VirtualRobot::ok(robot.dmp().execute(robot.reach())));
+  for (int i = 0; i < 1000; ++i) {
+    robot.see("human_hand", kGoal);
+    robot.tick();
+    ASSERT_LT(robot.hand().position.x(), 0.7505);
+    if (i == 100) {
+      EXPECT_NE(robot.reason().find("outside the workspace"), std::string::npos);
+    }
+  }
+  EXPECT_GT(robot.hand().position.x(), 0.74);
+}
+
+TEST(DmpController, FollowsATurningObject) {
+  VirtualRobot robot;
+  robot.loadBoth();
+  const Quaternion start = robot.hand().orientation;
+  robot.see("human_hand", kGoal);
+  DmpRequest request = robot.reach();
+  request.orientation_control = true;
+  request.target_orientation = start.coeffs();
+  ASSERT_TRUE(VirtualRobot::ok(robot.dmp().execute(request)));
+  Quaternion object = Quaternion::Identity();
+  for (int i = 0; i < 1000; ++i) {
+    const double angle = std::min(0.3, 0.3 * i * robot.period / 2.0);  // turns for two seconds
+    object = Quaternion(Eigen::AngleAxisd(angle, Vector3::UnitZ()));
+    robot.see("human_hand", kGoal, object);
+    robot.tick();
+  }
+  EXPECT_EQ(robot.state(), MotionState::Reached) << robot.reason();
+  EXPECT_LT(robot.hand().orientation.angularDistance(object * start), 0.02);
+}
+
+TEST(DmpController, IkDebugSaysWhatTheCycleDid) {
+  VirtualRobot robot("dmp: {enable_ik_debug: true}");
+  robot.loadBoth();
+  robot.see("human_hand", kGoal);
+  ASSERT_TRUE(VirtualRobot::ok(robot.dmp().execute(robot.reach())));
+  for (int i = 0; i < 100; ++i) {
+    robot.see("human_hand", kGoal);
+    robot.tick();
+  }
+  IkDebugRecord record;
+  int records = 0;
+  double phase = 1.0;
+  while (robot.dmp().readIkDebug(record)) {
+    ++records;
+    EXPECT_LE(record.phase, phase);
+    phase = record.phase;
+    EXPECT_LT(
+        (record.set_point.position - record.measured.position - record.ik.position_error).norm(),
+        5e-3);
+    EXPECT_LT(
+        (record.ik.position_velocity + record.ik.rotation_velocity - record.ik.velocity).norm(),
+        1e-9);
+  }
+  EXPECT_GE(records, 100);
+  EXPECT_LT((record.goal - kGoal).norm(), 1e-6);
+}
+
+class Rate : public ::testing::TestWithParam<double> {};
+
+TEST_P(Rate, ReachesAtAnyRate) {
+  VirtualRobot robot("{cycle_time: " + std::to_string(GetParam()) + "}", GetParam());
+  robot.loadBoth();
+  robot.see("human_hand", kGoal);
+  ASSERT_TRUE(VirtualRobot::ok(robot.dmp().execute(robot.reach())));
+  double t = 0.0;
+  for (; t < 5.0 && robot.state() != MotionState::Reached; t += robot.period) {
+    robot.see("human_hand", kGoal);
+    robot.tick();
+  }
+  EXPECT_EQ(robot.state(), MotionState::Reached) << robot.reason();
+  EXPECT_LT(t, 3.0);
+  EXPECT_LT((robot.hand().position - kGoal).norm(), 3e-3);
+}
+
+INSTANTIATE_TEST_SUITE_P(DmpController, Rate, ::testing::Values(0.001, 0.002, 0.01, 0.02));
+
 }  // namespace
 }  // namespace coglab_controllers

@@ -137,6 +137,22 @@ void ControlCycle::watchRobot() noexcept {
   }
 }
 
+void ControlCycle::watchGuard(double dt) noexcept {
+  const MotionState state = motion_ != nullptr && !fault_ ? motion_->state() : MotionState::Idle;
+  const bool moving = state == MotionState::Running || state == MotionState::Holding;
+  const GuardResult& guard = report_.guard;
+  const bool stopped = moving && guard.reason == GuardReason::WorkspaceBorder && guard.scale < 0.02;
+  at_border_ = stopped ? at_border_ + dt : 0.0;
+  if (!moving) return;
+  limit_scale_ = std::clamp(motion_->limitScale() * guard.scale, 0.0, 1.0);
+  if (guard.blocked_joint >= 0) {
+    abortMotion(Reason("joint ") << robot_->chain.jointNames()[guard.blocked_joint].c_str()
+                                 << " is at its stop and blocks the motion");
+  } else if (at_border_ > settings_.border_time && !motion_->waitsAtBorder()) {
+    abortMotion(Reason("a border of the workspace blocks the motion: ") << describe(guard.border));
+  }
+}
+
 void ControlCycle::compute(JointVector& velocity) noexcept {
   References& references = feedback_.references();
   references.states.view<kMaxJoints>(references.joint_velocity).setZero();
@@ -188,15 +204,7 @@ void ControlCycle::run(const RobotSample& sample, double dt, VelocityCommand& ou
   if (fine) {
     compute(velocity);
     guard_.limit(input_.chain, sample.position, velocity, dt, report_.guard);
-    const MotionState state = motion_ != nullptr && !fault_ ? motion_->state() : MotionState::Idle;
-    if (state == MotionState::Running || state == MotionState::Holding) {
-      limit_scale_ = std::clamp(motion_->limitScale() * report_.guard.scale, 0.0, 1.0);
-      if (report_.guard.blocked_joint >= 0) {
-        abortMotion(Reason("joint ")
-                    << robot_->chain.jointNames()[report_.guard.blocked_joint].c_str()
-                    << " is at its stop and blocks the motion");
-      }
-    }
+    watchGuard(dt);
     ++numbers_;
   } else {
     ++report_.stale;

@@ -224,6 +224,21 @@ Answer ControllerManager::switchTo(const std::string& id, std::string& type) {
   return {true, note};
 }
 
+Answer ControllerManager::applyProfile(const std::string& profile) {
+  const std::lock_guard<std::mutex> requests(requests_);
+  ctrl_more::FeedbackControllersManager& feedback = feedback_.manager();
+  const ctrl_more::Status status = feedback.applyProfile(profile, false);
+  if (!status.ok()) return Answer::refusal(status.message());
+  if (settings_.lockstep) {
+    cycle_.idle(now_ns());
+  } else if (!feedback.waitAdopted(status.generation(), settings_.plan_timeout)) {
+    return {true, "the control cycle has not taken the change yet; it will with its next cycle"};
+  }
+  const std::lock_guard<std::mutex> lock(table_);
+  profile_ = profile;
+  return {};
+}
+
 void ControllerManager::active(std::string& id, std::string& type) const {
   const std::lock_guard<std::mutex> lock(table_);
   id = active_id_;

@@ -87,6 +87,7 @@ void DmpController::configure(const MotionSetup& setup) {
 
 void DmpController::start(const CycleInput& input) {
   loop_->motion.stop();
+  loop_->pending = false;
   state_ = MotionState::Idle;
   reason_.clear();
   resting_ = true;
@@ -96,6 +97,7 @@ void DmpController::start(const CycleInput& input) {
 
 void DmpController::stop() {
   loop_->motion.stop();
+  loop_->pending = false;
   if (state_ == MotionState::Running || state_ == MotionState::Holding) {
     state_ = MotionState::Aborted;
     reason_ = Reason("ended by a switch to another controller");
@@ -109,29 +111,35 @@ void DmpController::stop() {
 void DmpController::abort(const Reason& reason) {
   if (state_ == MotionState::Idle || state_ == MotionState::Aborted) return;
   loop_->motion.stop();
+  loop_->pending = false;
   state_ = MotionState::Aborted;
   reason_ = reason;
   resting_ = true;
   hold_.begin();
 }
 
-void DmpController::adopt(const CycleInput& input) {
-  if (Plan* plan = plans_->take()) {
-    const bool under_way = following() || state_ == MotionState::Reached;
-    if (!input.motion_allowed && input.dt <= 0.0) {
-      plan->refusal = Reason("the robot follows no motion");
-    } else if (!plan->execute && !under_way) {
-      plan->refusal = Reason("no motion is running");
-    } else {
-      begin(input, *plan);
-    }
-    plans_->acknowledge();
+void DmpController::adopt(const CycleInput&) {
+  Plan* const plan = plans_->take();
+  if (plan == nullptr) return;
+  const bool under_way = following() || state_ == MotionState::Reached;
+  if (!plan->execute && !under_way) {
+    plan->refusal = Reason("no motion is running; use execute_dmp");
+  } else {
+    // It begins with the next joint state: in a cycle without one, the commanded state is that of
+    // the last.
+    if (!loop_->pending) loop_->was_following = following();
+    loop_->pending = true;
+    loop_->next = *plan;
+    state_ = MotionState::Running;
+    reason_.clear();
   }
+  plans_->acknowledge();
 }
 
 void DmpController::begin(const CycleInput& input, const Plan& plan) {
   Loop& loop = *loop_;
-  const bool was_following = following();
+  const bool was_following = loop.was_following;
+  loop.pending = false;
   loop.base_from_dmp = plan.base_from_dmp;
   loop.dmp_from_base = inverse(plan.base_from_dmp);
   loop.primitive = plan.primitive;
@@ -145,8 +153,6 @@ void DmpController::begin(const CycleInput& input, const Plan& plan) {
     bool projected = false;
     loop.motion.switchTo(plan.motion, inWorkspace(goal, projected));
     if (resting_) closeLoop(input);
-    state_ = MotionState::Running;
-    reason_.clear();
     return;
   }
 
@@ -177,8 +183,6 @@ void DmpController::begin(const CycleInput& input, const Plan& plan) {
   loop.motion.start(plan.motion, pose, velocity, angular, goal);
   loop.reference.pose = pose;
   if (!was_following || plan.given) closeLoop(input);
-  state_ = MotionState::Running;
-  reason_.clear();
 }
 
 void DmpController::closeLoop(const CycleInput& input) {
@@ -270,6 +274,7 @@ void DmpController::followEnd(const CycleInput& input) {
 
 void DmpController::computeReference(const CycleInput& input, References& references) {
   Loop& loop = *loop_;
+  if (loop.pending && input.motion_allowed) begin(input, loop.next);
   if (following() || state_ == MotionState::Reached) watchGoal(input);
   if (following() || state_ == MotionState::Reached) {
     loop.reference = loop.motion.step(input.dt, loop.goal, input.time_scale);

@@ -112,6 +112,7 @@ void PtpController::start(const CycleInput&) {
   state_ = MotionState::Idle;
   reason_.clear();
   queued_ = 0;
+  pending_ = false;
   hold_.begin();
 }
 
@@ -127,6 +128,7 @@ void PtpController::giveUp(const char* why) {
     drop(queue_[first_].id);
     first_ = (first_ + 1) % kMaxQueue;
   }
+  pending_ = false;
   if (unfinished > 0) {
     state_ = MotionState::Aborted;
     reason_ = Reason(why) << "; not executed: ptp_id " << ids.c_str();
@@ -138,11 +140,16 @@ void PtpController::stop() { giveUp("ended by a switch to another controller"); 
 
 void PtpController::abort(const Reason& reason) { giveUp(reason.c_str()); }
 
-void PtpController::adopt(const CycleInput& input) {
+void PtpController::adopt(const CycleInput&) {
   Plan* plan = plans_.take();
   if (plan == nullptr) return;
   if (state_ != MotionState::Running) {
-    begin(input, plan->motion);
+    // It begins with the next joint state: in a cycle without one, the commanded state is that of
+    // the last.
+    running_ = plan->motion;
+    pending_ = true;
+    state_ = MotionState::Running;
+    reason_.clear();
     plan->status = PtpAnswer::kStarted;
   } else if (queued_ < max_queue_) {
     queue_[(first_ + queued_++) % kMaxQueue] = plan->motion;
@@ -157,8 +164,8 @@ void PtpController::adopt(const CycleInput& input) {
 
 void PtpController::begin(const CycleInput& input, const Motion& motion) {
   const RobotSample& robot = input.robot;
-  const bool goes_on =
-      state_ == MotionState::Running;  // the next of the queue: from the last target, at rest
+  const bool goes_on = !pending_;  // the next of the queue: from the last target, at rest
+  pending_ = false;
   const JointVector from = goes_on ? trajectory_.target() : robot.commanded_position;
   const JointVector speed =
       goes_on ? JointVector(JointVector::Zero())
@@ -187,6 +194,7 @@ void PtpController::finish(const CycleInput& input) {
 }
 
 void PtpController::computeReference(const CycleInput& input, References& references) {
+  if (pending_ && input.motion_allowed) begin(input, running_);
   if (state_ == MotionState::Running && time_ >= trajectory_.duration()) {
     const double error = (trajectory_.target() - input.robot.position).lpNorm<Eigen::Infinity>();
     settling_ += input.dt;

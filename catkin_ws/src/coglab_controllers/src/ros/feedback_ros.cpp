@@ -39,6 +39,7 @@ FeedbackRos::FeedbackRos(const ros::NodeHandle& node, ControllerManager& manager
   serve("disable_by_signal", &FeedbackRos::onSignal<What::Disable>);
   serve("pause_by_signal", &FeedbackRos::onSignal<What::Pause>);
   serve("resume_by_signal", &FeedbackRos::onSignal<What::Resume>);
+  serve("apply_profile", &FeedbackRos::onProfile);
   serve("set_execution_order", &FeedbackRos::onOrder);
   serve("reload_gains", &FeedbackRos::onReload);
   serve("describe", &FeedbackRos::onDescribe);
@@ -118,6 +119,18 @@ bool FeedbackRos::onSignal(BySignal::Request& request, BySignal::Response& respo
     }
   }
   return finish(status, response);
+}
+
+bool FeedbackRos::onProfile(Select::Request& request, Select::Response& response) {
+  if (request.names.size() != 1) {
+    response.success = false;
+    response.message = "names: expected one profile, got " + std::to_string(request.names.size());
+    return true;
+  }
+  const Answer answer = manager_.applyProfile(request.names[0]);
+  response.success = answer.success;
+  response.message = answer.message;
+  return true;
 }
 
 bool FeedbackRos::onOrder(coglab_msgs::SetExecutionOrder::Request& request,

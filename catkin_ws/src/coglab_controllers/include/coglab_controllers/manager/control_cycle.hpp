@@ -24,6 +24,7 @@ struct CycleSettings {
   double sample_timeout = 0.1;  ///< a joint state older than this gives zero velocity, s
   double overrun_time =
       0.004;  ///< a motion controller slower than this overruns, s; 0: not judged (lockstep)
+  double border_time = 1.0;  ///< a border of the workspace that stops a motion this long ends it, s
   int overruns_to_fault = 5;  ///< overruns in a row that fault it
 };
 
@@ -104,6 +105,7 @@ class ControlCycle {
   bool usable(const RobotSample& sample, double dt) noexcept;
   void compute(JointVector& velocity) noexcept;
   void watchRobot() noexcept;
+  void watchGuard(double dt) noexcept;
   void abortMotion(const Reason& reason) noexcept;
   void fault(const Reason& reason) noexcept;
   void publish(std::int64_t begin_ns) noexcept;
@@ -132,6 +134,7 @@ class ControlCycle {
   double limit_scale_ = 1.0;
   std::uint64_t numbers_ = 0;  // of cycles with a joint state
   int overruns_in_row_ = 0;
+  double at_border_ = 0.0;  // s that a border of the workspace has stopped the motion
   lwr_fri_bridge::TripleBuffer<CycleReport> reports_;
 };
 

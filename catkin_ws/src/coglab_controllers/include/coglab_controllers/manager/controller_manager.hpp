@@ -71,6 +71,9 @@ class ControllerManager : public MotionHost {
   Answer switchTo(const std::string& id, std::string& type);
   /// Id and type of the active one; empty if there is none.
   void active(std::string& id, std::string& type) const;
+  /// Enables exactly the feedback controllers of a profile, for example dmp_compliant during an
+  /// approach.
+  Answer applyProfile(const std::string& profile);
   /// 0 (stand still) to 1.
   Answer setSpeedScale(double scale);
   /// @}

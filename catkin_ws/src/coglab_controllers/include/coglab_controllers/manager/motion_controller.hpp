@@ -138,6 +138,10 @@ class MotionController {
   /// slows the time scale.
   virtual double limitScale() const { return 1.0; }
 
+  /// Whether a border of the workspace that stops the arm is a reason to wait (a goal that may come
+  /// closer) and not to give up.
+  virtual bool waitsAtBorder() const { return false; }
+
   virtual MotionState state() const = 0;
   /// Why it aborted or holds; empty otherwise.
   virtual const Reason& reason() const = 0;

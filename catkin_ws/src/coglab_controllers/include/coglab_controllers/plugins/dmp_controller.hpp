@@ -115,6 +115,7 @@ class DmpController : public MotionController {
   void computeReference(const CycleInput& input, References& references) override;
   void resolve(const CycleInput& input, References& references) override;
   double limitScale() const override;
+  bool waitsAtBorder() const override { return true; }
   MotionState state() const override { return state_; }
   const Reason& reason() const override { return reason_; }
 

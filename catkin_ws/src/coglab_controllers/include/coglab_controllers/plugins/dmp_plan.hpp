@@ -38,6 +38,9 @@ struct DmpController::Loop {
     return now;
   }
 
+  Plan next;  ///< adopted, begins with the next joint state
+  bool pending = false;
+  bool was_following = false;  ///< the motion that `next` replaces still has its loop closed
   CartesianMotion motion;
   GoalGate gate;
   CartesianMotionPlan plan;

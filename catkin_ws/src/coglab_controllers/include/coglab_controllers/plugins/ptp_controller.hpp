@@ -94,6 +94,7 @@ class PtpController : public MotionController {
   std::array<Motion, kMaxQueue> queue_;
   int first_ = 0, queued_ = 0;
   Motion running_;
+  bool pending_ = false;  ///< running_ was adopted and begins with the next joint state
   PtpTrajectory trajectory_;
   PtpPoint point_;
   double time_ = 0.0, settling_ = 0.0;

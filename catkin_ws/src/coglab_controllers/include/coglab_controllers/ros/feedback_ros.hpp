@@ -28,8 +28,8 @@ class RosLogSink : public ctrl_more::LogSink {
 };
 
 /// enable, disable, pause, resume, set_execution_order, pause_by_signal, resume_by_signal,
-/// disable_by_signal, reload_gains, describe, and the latched topic status. Every service answers
-/// after the cycle has adopted the change.
+/// disable_by_signal, reload_gains, describe, apply_profile (names: one profile), and the latched
+/// topic status. Every service answers after the cycle has adopted the change.
 class FeedbackRos {
  public:
   FeedbackRos(const ros::NodeHandle& node, ControllerManager& manager);
@@ -47,6 +47,7 @@ class FeedbackRos {
   bool onSelect(Select::Request& request, Select::Response& response);
   template <What what>
   bool onSignal(BySignal::Request& request, BySignal::Response& response);
+  bool onProfile(Select::Request& request, Select::Response& response);
   bool onOrder(coglab_msgs::SetExecutionOrder::Request& request,
                coglab_msgs::SetExecutionOrder::Response& response);
   bool onReload(coglab_msgs::ReloadGains::Request& request,

@@ -15,8 +15,8 @@ YAML::Node readParameters(const ros::NodeHandle& node);
 
 /// Settings of the controller manager from the parameters below `node`: those of
 /// readManagerSettings(), and `joint_limits_file`, `joint_limits_profile`, `urdf_file` (else the
-/// parameter robot_description, else lwr_description's own file). Relative names in `feedback_file`
-/// refer to this package's config folder.
+/// parameter robot_description, else lwr_description's own file). `feedback_file` may be
+/// `package://name/path`; other relative names refer to this package's config folder.
 /// @throws std::runtime_error naming the parameter
 ManagerSettings readManagerSettings(const ros::NodeHandle& node);
 

@@ -1,0 +1,161 @@
+// The control cycle runs free while services are called: no allocation, no lock in it, ever.
+#include <dlfcn.h>
+#include <pthread.h>
+
+#include <atomic>
+#include <cstdlib>
+#include <thread>
+
+#include "virtual_robot.hpp"
+
+namespace {
+thread_local bool counting = false;
+std::atomic<std::uint64_t> allocations{0}, locks{0};
+}  // namespace
+
+extern "C" {
+void* __libc_malloc(std::size_t);
+void* __libc_calloc(std::size_t, std::size_t);
+void* __libc_realloc(void*, std::size_t);
+void __libc_free(void*);
+
+// Everything in the process allocates through these.
+void* malloc(std::size_t size) {
+  if (counting) ++allocations;
+  return __libc_malloc(size);
+}
+void* calloc(std::size_t count, std::size_t size) {
+  if (counting) ++allocations;
+  return __libc_calloc(count, size);
+}
+void* realloc(void* pointer, std::size_t size) {
+  if (counting) ++allocations;
+  return __libc_realloc(pointer, size);
+}
+void free(void* pointer) {
+  if (counting && pointer != nullptr) ++allocations;
+  __libc_free(pointer);
+}
+int pthread_mutex_lock(pthread_mutex_t* mutex) {
+  using Lock = int (*)(pthread_mutex_t*);
+  static const Lock original = reinterpret_cast<Lock>(dlsym(RTLD_NEXT, "pthread_mutex_lock"));
+  if (counting) ++locks;
+  return original(mutex);
+}
+}
+
+namespace coglab_controllers {
+namespace {
+
+TEST(Cycle, TheCounterCounts) {
+  counting = true;
+  void* volatile pointer = std::malloc(16);
+  counting = false;
+  std::free(pointer);
+  EXPECT_EQ(allocations.exchange(0), 1u);
+}
+
+TEST(Cycle, NeitherAllocatesNorLocksWhileServicesAreCalled) {
+  constexpr std::uint64_t kCycles = 100000;
+  const auto limits =
+      lwr_fri_bridge::loadJointLimits(std::string(DESCRIPTION_DIR) + "/config/joint_limits.yaml");
+  ctrl_more::Logger logger;
+  FrameTable frames;
+  ManagerSettings settings = readManagerSettings(
+      YAML::Load("dmp: {enable_ik_debug: true}"),
+      readText(std::string(DESCRIPTION_DIR) + "/urdf/lwr_ih2.urdf"), limits, false);
+  settings.logger = &logger;
+  settings.cycle.overrun_time = 10.0;  // timed, and never over on a busy machine
+  settings.plan_timeout = 5.0;
+  ControllerManager manager(std::move(settings));
+  std::atomic<bool> stop{false};
+  std::atomic<std::uint64_t> cycles{0}, moving{0};
+  ASSERT_TRUE(manager.load("limits", "JointLimits").success);
+
+  std::thread control([&] {
+    RobotSample sample;
+    sample.position << -1.4349, -0.6086, 1.4986, 1.7048, 0.1857, 0.2152, 0.782;
+    sample.commanded_position = sample.position;
+    sample.cycle_time = 0.005;
+    sample.block = lwr_fri_bridge::MotionBlock::None;
+    VelocityCommand command;
+    while (!stop) {
+      ++sample.sequence;
+      sample.stamp_ns = manager.now_ns();
+      counting = true;
+      manager.cycle().run(sample, 0.005, command);
+      counting = false;
+      if (command.velocity.norm() > 1e-3) ++moving;
+      sample.position += 0.005 * command.velocity;
+      sample.velocity = command.velocity;
+      sample.commanded_velocity = command.velocity;
+      sample.commanded_position = sample.position;
+      ++cycles;
+      if (cycles % 16 == 0) std::this_thread::yield();
+    }
+  });
+
+  ASSERT_TRUE(VirtualRobot::ok(manager.load("dmp", "coglab/DmpController")));
+  ASSERT_TRUE(VirtualRobot::ok(manager.load("ptp", "coglab/PtpController")));
+  auto& dmp = dynamic_cast<DmpController&>(*manager.motion("dmp"));
+  auto& ptp = dynamic_cast<PtpController&>(*manager.motion("ptp"));
+  dmp.setGoalSource(&frames);
+  int loaded = 0;
+  ASSERT_TRUE(
+      VirtualRobot::ok(dmp.loadDmps(std::string(PACKAGE_DIR) + "/config/primitives.xml", loaded)));
+  int requests = 0, accepted = 0;
+  const auto count = [&](bool success) {
+    ++requests;
+    if (success) ++accepted;
+  };
+  std::string type;
+  for (int round = 0; cycles < kCycles || round < 30; ++round) {
+    GoalObservation goal;
+    goal.position = Vector3(0.80, 0.02 * (round % 5), 0.45);
+    goal.stamp_ns = manager.now_ns();
+    frames.frames["human_hand"] = goal;
+    count(manager.switchTo("dmp", type).success);
+    DmpRequest request;
+    request.primitive_id = "reach_human";
+    request.goal_frame = "human_hand";
+    request.orientation_control = round % 2 == 0;
+    count(dmp.execute(request).success);
+    for (int i = 0; i < 5; ++i) {
+      frames.frames["human_hand"].stamp_ns = manager.now_ns();
+      dmp.pollGoal();
+      std::this_thread::sleep_for(std::chrono::microseconds(500));
+    }
+    request.primitive_id = "give_human";
+    count(dmp.switchDmp(request).success);
+    request.primitive_id = "unknown";
+    count(dmp.execute(request).success);
+    count(manager.setSpeedScale(0.5 + 0.5 * (round % 2)).success);
+    count(manager.feedback().enable("limits").ok());
+    count(manager.switchTo("ptp", type).success);
+    const double turn = 0.1 * (round % 3);
+    for (int i = 0; i < 3; ++i) {
+      count(ptp.add({{-1.4 + turn, -0.6, 1.5, 1.7, 0.2, 0.2, 0.8}, {}, {}}).ptp_id >= 0);
+    }
+    count(manager.feedback().disable("limits", true).ok());
+    IkDebugRecord record;
+    while (dmp.readIkDebug(record)) {
+    }
+    PtpEnd end;
+    while (ptp.readEnd(end)) {
+    }
+    manager.report();
+  }
+  stop = true;
+  control.join();
+  EXPECT_GE(cycles.load(), kCycles);
+  EXPECT_GT(moving.load(), kCycles / 100);
+  EXPECT_GT(requests, 300);
+  EXPECT_GT(accepted, requests / 2);
+  EXPECT_EQ(allocations.load(), 0u);
+  EXPECT_EQ(locks.load(), 0u);
+  RecordProperty("requests", requests);
+  RecordProperty("allocations", static_cast<int>(allocations.load()));
+}
+
+}  // namespace
+}  // namespace coglab_controllers

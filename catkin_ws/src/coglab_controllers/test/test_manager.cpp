@@ -1,0 +1,249 @@
+// The controller manager in virtual time: loading, switching, faults, limits; D4.10 Table 6.
+#include <atomic>
+#include <chrono>
+#include <thread>
+
+#include "coglab_controllers/manager/control_thread.hpp"
+#include "virtual_robot.hpp"
+
+namespace coglab_controllers {
+namespace {
+
+const Vector3 kGoal(0.80, 0.0, 0.45);
+const std::string kTypes =
+    "types: {test/Misbehaving: libcoglab_test_misbehaving.so, test/Twin: "
+    "libcoglab_test_twin.so, test/Empty: libcoglab_test_empty.so, test/Missing: libnowhere.so, "
+    "test/Other: libcoglab_test_misbehaving.so}, plugin_paths: [" PLUGIN_DIR "]";
+
+TEST(Manager, RefusesBadPluginsAndKeepsWhatIsThere) {
+  VirtualRobot robot("{" + kTypes + "}");
+  robot.loadBoth("ptp");
+  ControllerManager& manager = *robot.manager;
+  EXPECT_TRUE(VirtualRobot::ok(manager.load("odd", "test/Misbehaving")));
+  EXPECT_TRUE(refused(manager.load("a", "test/Missing"), {"libnowhere.so", "not found"}));
+  EXPECT_TRUE(refused(manager.load("a", "test/Empty"), {"no motion controller"}));
+  EXPECT_TRUE(refused(manager.load("a", "test/Twin"), {"test/Misbehaving", "registered already"}));
+  EXPECT_TRUE(refused(manager.load("a", "test/Twin"), {"registered already"}));  // and again
+  EXPECT_TRUE(refused(manager.load("a", "test/Other"), {"has no type", "test/Misbehaving"}));
+  EXPECT_TRUE(
+      refused(manager.load("a", "my_lab/Unknown"), {"my_lab/Unknown", "coglab/DmpController"}));
+  EXPECT_TRUE(refused(manager.load("dmp", "coglab/DmpController"), {"in use"}));
+  EXPECT_TRUE(refused(manager.load("", "coglab/DmpController"), {"controller_id"}));
+  EXPECT_TRUE(refused(manager.load("a/b", "coglab/DmpController"), {"controller_id"}));
+  std::vector<std::string> ids, types;
+  manager.list(ids, types);
+  EXPECT_EQ(ids, (std::vector<std::string>{"dmp", "ptp", "odd"}));
+  EXPECT_EQ(types, (std::vector<std::string>{"coglab/DmpController", "coglab/PtpController",
+                                             "test/Misbehaving"}));
+  EXPECT_TRUE(VirtualRobot::ok(manager.load("odd2", "test/Misbehaving")));  // still makes new ones
+}
+
+TEST(Manager, BadParametersRefuseThePluginWithTheirName) {
+  VirtualRobot robot("{dmp: {pos_clik_gain: fast}, ptp: {max_queue: -3}, " + kTypes +
+                     ", odd: {fault: configure}}");
+  EXPECT_TRUE(refused(robot.manager->load("dmp", "coglab/DmpController"),
+                      {"dmp/pos_clik_gain", "fast", "expected"}));
+  EXPECT_TRUE(refused(robot.manager->load("ptp", "coglab/PtpController"), {"ptp/max_queue", "-3"}));
+  EXPECT_TRUE(refused(robot.manager->load("odd", "test/Misbehaving"), {"told to fail"}));
+  EXPECT_THROW(VirtualRobot("{joint_vel_limit: [1, 2, 3]}"), std::runtime_error);
+  EXPECT_THROW(VirtualRobot("{joint_vel_limit: [9, 9, 9, 9, 9, 9, 9]}"), std::runtime_error);
+  EXPECT_THROW(VirtualRobot("{cycle_time: 0}"), std::runtime_error);
+}
+
+class Fault : public ::testing::TestWithParam<std::pair<const char*, const char*>> {};
+
+TEST_P(Fault, GivesZeroVelocityItsReasonAndALivingManager) {
+  VirtualRobot robot(std::string("{odd: {fault: ") + GetParam().first + "}, " + kTypes + "}");
+  robot.loadBoth("ptp");
+  ASSERT_TRUE(VirtualRobot::ok(robot.manager->load("odd", "test/Misbehaving")));
+  robot.switchTo("odd");
+  for (int i = 0; i < 10; ++i) {
+    robot.tick();
+    EXPECT_GT(robot.command.velocity.norm(), 0.0);
+  }
+  for (int i = 0; i < 20; ++i) {
+    robot.tick();
+    EXPECT_EQ(robot.command.velocity, JointVector::Zero().eval());
+  }
+  const CycleReport report = robot.manager->report();
+  EXPECT_TRUE(report.fault);
+  EXPECT_EQ(report.state, ManagerState::Fault);
+  EXPECT_NE(report.reason.str().find(GetParam().second), std::string::npos)
+      << report.reason.c_str();
+  EXPECT_NE(report.reason.str().find("'odd'"), std::string::npos);
+  EXPECT_NE(robot.manager->motionRefusal("odd").find("fault"), std::string::npos);
+  robot.switchTo("ptp");
+  EXPECT_EQ(robot.ptp().add({{-1.3, -0.6, 1.5, 1.7, 0.2, 0.2, 0.8}, {}, {}}).status,
+            PtpAnswer::kStarted);
+  robot.tick();
+  robot.tick();
+  EXPECT_GT(robot.command.velocity.norm(), 0.0);
+  robot.switchTo("odd");  // afresh
+  robot.tick();
+  EXPECT_GT(robot.command.velocity.norm(), 0.0);
+}
+
+INSTANTIATE_TEST_SUITE_P(Manager, Fault,
+                         ::testing::Values(std::make_pair("throw", "told to throw"),
+                                           std::make_pair("throw_int", "threw"),
+                                           std::make_pair("nan", "not finite")));
+
+TEST(Manager, StaleAndBrokenJointStatesGiveZeroVelocity) {
+  VirtualRobot robot;
+  robot.loadBoth();
+  robot.see("human_hand", kGoal);
+  ASSERT_TRUE(VirtualRobot::ok(robot.dmp().execute(robot.reach())));
+  for (int i = 0; i < 50; ++i) robot.tick();
+  ASSERT_GT(robot.command.velocity.norm(), 0.01);
+  const double good = robot.sample.position[2];
+  robot.sample.position[2] = std::nan("");
+  VelocityCommand command;
+  RobotSample sample = robot.sample;
+  ++sample.sequence;
+  robot.manager->cycle().run(sample, 0.005, command);
+  EXPECT_EQ(command.velocity, JointVector::Zero().eval());
+  EXPECT_NE(robot.reason().find("not finite"), std::string::npos);
+  robot.sample.position[2] = good;
+  robot.see("human_hand", kGoal);
+  robot.tick();
+  EXPECT_GT(robot.command.velocity.norm(), 0.01);  // one broken measurement does not end a motion
+  robot.manager->cycle().idle(robot.now_ns + 200'000'000);  // silence does
+  EXPECT_EQ(robot.state(), MotionState::Aborted);
+  EXPECT_NE(robot.reason().find("no joint state"), std::string::npos);
+}
+
+TEST(Manager, SwitchInMotionBrakesWithoutAJumpAndReportsUnfinished) {
+  VirtualRobot robot;
+  robot.loadBoth("ptp");
+  const std::vector<double> there = {-1.0, -0.5, 1.2, 1.5, 0.3, 0.3, 0.6};
+  EXPECT_EQ(robot.ptp().add({there, {}, {}}).ptp_id, 0);
+  const PtpAnswer queued = robot.ptp().add({there, {}, {}});
+  EXPECT_EQ(queued.status, PtpAnswer::kQueued);
+  for (int i = 0; i < 100; ++i) robot.tick();
+  ASSERT_GT(robot.command.velocity.norm(), 0.01);
+  robot.switchTo("dmp");
+  robot.tick();
+  EXPECT_EQ(robot.command.velocity, JointVector::Zero().eval());  // the interpolator brakes
+  PtpEnd end;
+  std::vector<int> given_up;
+  while (robot.ptp().readEnd(end)) {
+    EXPECT_FALSE(end.executed);
+    given_up.push_back(end.ptp_id);
+  }
+  EXPECT_EQ(given_up, (std::vector<int>{0, 1}));
+  std::string type;
+  EXPECT_TRUE(VirtualRobot::ok(robot.manager->switchTo("dmp", type)));  // is active: no effect
+  EXPECT_EQ(type, "coglab/DmpController");
+}
+
+TEST(Manager, MotionBeginsWithTheCommandedVelocity) {
+  VirtualRobot robot;
+  robot.loadBoth();
+  for (int i = 0; i < 5; ++i) robot.tick();
+  // The arm moves with a velocity that a Cartesian motion can have.
+  const Chain& chain = robot.manager->settings().robot->chain;
+  const ChainState state = chain.evaluate(robot.sample.position);
+  CartesianReference drift;
+  drift.pose = state.tool;
+  drift.velocity = Vector3(0.1, 0.05, 0.0);
+  IkResult ik;
+  IkParameters parameters;
+  parameters.velocity_limit = robot.limits.velocity;
+  TwoTaskIk(parameters).solve(state, robot.sample.position, drift, ik);
+  robot.sample.commanded_velocity = ik.velocity;
+  robot.sample.velocity = ik.velocity;
+  robot.sample.commanded_position += JointVector::Constant(0.002);  // the arm lags behind
+  robot.see("human_hand", kGoal);
+  DmpRequest request = robot.reach();
+  request.orientation_control = true;
+  ASSERT_TRUE(VirtualRobot::ok(robot.dmp().execute(request)));
+  robot.tick();
+  EXPECT_LT((robot.command.velocity - ik.velocity).norm(), 0.05 * ik.velocity.norm() + 0.01);
+}
+
+TEST(Manager, BlockedJointAbortsNamingIt) {
+  VirtualRobot robot("{lower_joint_pos_limit: [-2.9, -2.0, -2.9, 1.6, -2.9, -2.0, -2.9]}");
+  robot.loadBoth();
+  robot.see("human_hand", kGoal);
+  ASSERT_TRUE(VirtualRobot::ok(robot.dmp().execute(robot.reach())));
+  for (int i = 0; i < 2000 && robot.state() != MotionState::Aborted; ++i) {
+    robot.see("human_hand", kGoal);
+    robot.tick();
+    ASSERT_GT(robot.sample.position[3], 1.6);
+  }
+  EXPECT_EQ(robot.state(), MotionState::Aborted);
+  EXPECT_NE(robot.reason().find("lwr_a3"), std::string::npos) << robot.reason();
+}
+
+TEST(Manager, ControlThreadIdlesWithoutARobotAndSurvivesAStall) {
+  lwr_fri_bridge::ControlPort port;
+  const lwr_fri_bridge::JointLimits limits =
+      lwr_fri_bridge::loadJointLimits(std::string(DESCRIPTION_DIR) + "/config/joint_limits.yaml");
+  ctrl_more::Logger logger;
+  ManagerSettings settings = readManagerSettings(
+      YAML::Load("{odd: {fault: stall, after: 0}, plan_timeout: 0.3, " + kTypes + "}"),
+      readText(std::string(DESCRIPTION_DIR) + "/urdf/lwr_ih2.urdf"), limits, false);
+  settings.logger = &logger;
+  ControllerManager manager(std::move(settings));
+  ControlThreadOptions options;
+  options.priority = 0;
+  ControlThread thread(manager.cycle(), port, options);
+  thread.start();
+  std::string type;
+  EXPECT_TRUE(VirtualRobot::ok(manager.load("ptp", "coglab/PtpController")));  // no robot yet
+  EXPECT_TRUE(VirtualRobot::ok(manager.switchTo("ptp", type)));
+  EXPECT_NE(manager.motionRefusal("ptp").find("no joint state"), std::string::npos);
+  EXPECT_TRUE(VirtualRobot::ok(manager.load("odd", "test/Misbehaving")));
+
+  std::atomic<bool> stop{false};
+  std::thread robot([&] {
+    RobotSample sample;
+    sample.position << -1.4349, -0.6086, 1.4986, 1.7048, 0.1857, 0.2152, 0.782;
+    sample.commanded_position = sample.position;
+    sample.cycle_time = 0.005;
+    sample.block = lwr_fri_bridge::MotionBlock::None;
+    while (!stop) {
+      ++sample.sequence;
+      sample.stamp_ns = manager.now_ns();
+      port.publishSample(sample);
+      thread.wake(true);
+      std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    }
+  });
+  EXPECT_TRUE(VirtualRobot::ok(manager.switchTo("odd", type)));
+  std::this_thread::sleep_for(std::chrono::milliseconds(100));  // it is in its stall of 1.5 s
+  EXPECT_TRUE(refused(manager.switchTo("ptp", type), {"odd", "not returned"}));
+  EXPECT_TRUE(manager.setSpeedScale(0.5).success);
+  std::vector<std::string> ids, types;
+  manager.list(ids, types);
+  EXPECT_EQ(ids.size(), 2u);
+  bool switched = false;
+  for (int i = 0; i < 40 && !switched; ++i) switched = manager.switchTo("ptp", type).success;
+  EXPECT_TRUE(switched);
+  stop = true;
+  robot.join();
+  thread.stop();
+}
+
+TEST(Manager, EmptyFeedbackListChangesNoBit) {
+  VirtualRobot plain, staged;
+  plain.loadBoth();
+  staged.loadBoth();
+  // One controller, loaded and disabled, against none at all.
+  ASSERT_TRUE(VirtualRobot::ok(staged.manager->load("limits", "JointLimits")));
+  ASSERT_TRUE(staged.manager->feedback().disable("limits", true).ok());
+  for (VirtualRobot* robot : {&plain, &staged}) {
+    robot->see("human_hand", kGoal);
+    ASSERT_TRUE(VirtualRobot::ok(robot->dmp().execute(robot->reach())));
+  }
+  for (int i = 0; i < 600; ++i) {
+    plain.see("human_hand", kGoal);
+    staged.see("human_hand", kGoal);
+    plain.tick();
+    staged.tick();
+    ASSERT_EQ(plain.command.velocity, staged.command.velocity);
+  }
+}
+
+}  // namespace
+}  // namespace coglab_controllers

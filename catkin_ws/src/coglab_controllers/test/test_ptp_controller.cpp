@@ -1,0 +1,150 @@
+// The point-to-point plug-in in virtual time: D4.10 Table 5.
+#include "virtual_robot.hpp"
+
+namespace coglab_controllers {
+namespace {
+
+const std::vector<double> kThere = {-1.0, -0.5, 1.2, 1.5, 0.3, 0.3, 0.6};
+
+std::vector<int> executed(PtpController& ptp) {
+  std::vector<int> ids;
+  PtpEnd end;
+  while (ptp.readEnd(end)) {
+    if (end.executed) ids.push_back(end.ptp_id);
+  }
+  return ids;
+}
+
+TEST(PtpController, EndsExactlyWithinItsLimitsAndReportsOnce) {
+  VirtualRobot robot;
+  robot.loadBoth("ptp");
+  const std::vector<double> speed(7, 0.5), acceleration(7, 1.0);
+  const PtpAnswer answer = robot.ptp().add({kThere, speed, acceleration});
+  ASSERT_EQ(answer.status, PtpAnswer::kStarted) << answer.message;
+  const JointVector start = robot.sample.position;
+  const JointVector target = Eigen::Map<const JointVector>(kThere.data());
+  JointVector before = JointVector::Zero();
+  for (int i = 0; i < 2000; ++i) {
+    robot.tick();
+    for (int joint = 0; joint < kMaxJoints; ++joint) {
+      ASSERT_LE(std::abs(robot.command.velocity[joint]), 0.5 + 1e-6);
+      ASSERT_LE(std::abs(robot.command.velocity[joint] - before[joint]), 1.0 * 0.005 + 1e-3);
+    }
+    before = robot.command.velocity;
+    if (robot.state() != MotionState::Running) break;
+    // A straight line in joint space: all joints are equally far on their way.
+    const JointVector share = (robot.sample.position - start).cwiseQuotient(target - start);
+    ASSERT_LT(share.maxCoeff() - share.minCoeff(), 1e-3);
+  }
+  EXPECT_EQ(robot.state(), MotionState::Reached);
+  EXPECT_LT((robot.sample.position - target).lpNorm<Eigen::Infinity>(), 1e-6);
+  EXPECT_EQ(executed(robot.ptp()), std::vector<int>{answer.ptp_id});
+}
+
+TEST(PtpController, QueueRunsInOrderAndRefusesWhenFull) {
+  VirtualRobot robot("ptp: {max_queue: 2}");
+  robot.loadBoth("ptp");
+  std::vector<double> target = kThere;
+  std::vector<int> statuses, ids;
+  for (int i = 0; i < 5; ++i) {
+    target[0] = -1.0 + 0.05 * i;
+    const PtpAnswer answer = robot.ptp().add({target, {}, {}});
+    statuses.push_back(answer.status);
+    if (answer.status != PtpAnswer::kRejected) ids.push_back(answer.ptp_id);
+    if (i >= 3) {
+      EXPECT_NE(answer.message.find("full"), std::string::npos) << answer.message;
+      EXPECT_EQ(answer.ptp_id, -1);
+    }
+  }
+  EXPECT_EQ(statuses, (std::vector<int>{0, 1, 1, 2, 2}));
+  for (int i = 0; i < 4000; ++i) robot.tick();
+  EXPECT_EQ(executed(robot.ptp()), ids);
+  EXPECT_NEAR(robot.sample.position[0], -0.9, 1e-6);
+}
+
+TEST(PtpController, RejectsBadRequestsSayingWhy) {
+  VirtualRobot robot;
+  robot.loadBoth("ptp");
+  const auto why = [&](const PtpRequest& request, const std::string& word) {
+    const PtpAnswer answer = robot.ptp().add(request);
+    EXPECT_EQ(answer.status, PtpAnswer::kRejected);
+    EXPECT_EQ(answer.ptp_id, -1);
+    EXPECT_NE(answer.message.find(word), std::string::npos) << answer.message;
+  };
+  std::vector<double> far = kThere, nan = kThere;
+  far[1] = 2.1;
+  nan[4] = std::nan("");
+  why({{1, 2, 3}, {}, {}}, "3 numbers");
+  why({{}, {}, {}}, "0 numbers");
+  why({far, {}, {}}, "lwr_a2");
+  why({nan, {}, {}}, "lwr_a4");
+  why({kThere, {0.1, 0.1}, {}}, "max_vel");
+  why({kThere, std::vector<double>(7, 0.0), {}}, "max_vel");
+  why({kThere, std::vector<double>(7, 99.0), {}}, "max_vel");
+  why({kThere, {}, std::vector<double>(7, -1.0)}, "max_acc");
+  EXPECT_TRUE(executed(robot.ptp()).empty());
+}
+
+TEST(PtpController, SpeedScaleStretchesTheProfile) {
+  const auto cycles = [](double scale) {
+    VirtualRobot robot;
+    robot.loadBoth("ptp");
+    EXPECT_TRUE(robot.manager->setSpeedScale(scale).success);
+    for (int i = 0; i < 200; ++i) robot.tick();
+    EXPECT_EQ(robot.ptp().add({kThere, {}, {}}).status, PtpAnswer::kStarted);
+    int count = 0;
+    for (; count < 5000 && robot.state() != MotionState::Reached; ++count) robot.tick();
+    return count;
+  };
+  const int full = cycles(1.0);
+  EXPECT_NEAR(cycles(0.25), 4 * full, 0.02 * full + 8);
+}
+
+TEST(PtpController, StandsStillAtScaleZeroAndGoesOn) {
+  VirtualRobot robot;
+  robot.loadBoth("ptp");
+  ASSERT_EQ(robot.ptp().add({kThere, {}, {}}).status, PtpAnswer::kStarted);
+  for (int i = 0; i < 60; ++i) robot.tick();
+  robot.manager->setSpeedScale(0.0);
+  for (int i = 0; i < 300; ++i) robot.tick();
+  EXPECT_LT(robot.command.velocity.norm(), 1e-6);
+  EXPECT_EQ(robot.state(), MotionState::Running);
+  robot.manager->setSpeedScale(1.0);
+  for (int i = 0; i < 3000; ++i) robot.tick();
+  EXPECT_EQ(robot.state(), MotionState::Reached);
+}
+
+TEST(PtpController, RandomMotionsEndExactly) {
+  std::srand(7);
+  VirtualRobot robot;
+  robot.loadBoth("ptp");
+  int rejected = 0;
+  for (int run = 0; run < 40; ++run) {
+    std::vector<double> target(7);
+    for (int joint = 0; joint < 7; ++joint) {
+      const double random = 2.0 * std::rand() / RAND_MAX - 1.0;
+      target[joint] = random * 0.6 * robot.limits.upper_position[joint];
+    }
+    const PtpAnswer answer = robot.ptp().add({target, std::vector<double>(7, 1.5), {}});
+    if (answer.status == PtpAnswer::kRejected) {
+      ++rejected;
+      continue;
+    }
+    int i = 0;
+    robot.tick();
+    for (; i < 20000 && robot.state() == MotionState::Running; ++i) {
+      robot.tick();
+      ASSERT_TRUE(
+          (robot.command.velocity.cwiseAbs().array() <= robot.limits.velocity.array() + 1e-9)
+              .all());
+    }
+    if (robot.state() == MotionState::Aborted) continue;  // a border of the workspace on the way
+    for (int joint = 0; joint < 7; ++joint) {
+      ASSERT_NEAR(robot.sample.position[joint], target[joint], 2e-3) << robot.reason();
+    }
+  }
+  EXPECT_LT(rejected, 30);
+}
+
+}  // namespace
+}  // namespace coglab_controllers

@@ -1,0 +1,160 @@
+#!/usr/bin/python3
+"""Goals on dmp_goal from the goal helper, ik_debug, refusals, speed scale and feedback services, all over ROS."""
+from __future__ import annotations
+
+import math
+import os
+import sys
+import unittest
+
+import rospkg
+import rospy
+import rostest
+from diagnostic_msgs.msg import DiagnosticArray
+from sensor_msgs.msg import JointState
+
+from coglab_msgs.msg import DmpGoal, FeedbackStatus, IkDebug
+from coglab_msgs.srv import (
+    AddPtpRequest, DescribeController, FeedbackBySignal, FeedbackSelect, ReloadGains,
+    SetExecutionOrder)
+
+sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
+from robot_fixture import HOME, Robot, wait_until  # noqa: E402
+
+GOAL = (0.80, 0.0, 0.45)
+
+
+class TopicGoal(unittest.TestCase):
+    """One robot for all tests; they run in the order of their names."""
+
+    @classmethod
+    def setUpClass(cls) -> None:
+        cls.goals: list[DmpGoal] = []
+        cls.debug: list[IkDebug] = []
+        cls.feedback: list[FeedbackStatus] = []
+        cls.diagnostics: list[str] = []
+        cls.targets: list[JointState] = []
+        rospy.Subscriber("controller_manager/dmp/dmp_goal", DmpGoal, cls.goals.append)
+        rospy.Subscriber("controller_manager/dmp/ik_debug", IkDebug, cls.debug.append)
+        rospy.Subscriber("controller_manager/feedback/status", FeedbackStatus, cls.feedback.append)
+        rospy.Subscriber("lwr/target_joint_states", JointState, cls.targets.append)
+        rospy.Subscriber("/diagnostics", DiagnosticArray, lambda m: cls.diagnostics.extend(
+            s.name for s in m.status))
+        cls.robot = Robot()
+        cls.robot.load()
+        path = rospkg.RosPack().get_path("coglab_controllers") + "/config/primitives.xml"
+        answer = cls.robot.dmp("load_dmps", path)
+        assert answer.success, answer.message
+        cls.robot.start()
+        cls.robot.go(HOME)
+        cls.robot.switch("dmp")
+
+    def test_1_no_goal_yet(self) -> None:
+        answer = self.robot.execute(goal_frame="")
+        self.assertFalse(answer.success)
+        self.assertIn("dmp_goal", answer.message)
+
+    def test_2_helper_publishes_each_transform_once(self) -> None:
+        self.robot.see_hand(GOAL)
+        wait_until(lambda: len(self.goals) >= 20, 10.0, "20 goals of the helper")
+        stamps = [g.header.stamp for g in self.goals]
+        self.assertEqual(len(stamps), len(set(stamps)))
+        self.assertLess(20 / max(1e-3, (stamps[19] - stamps[0]).to_sec()), 45.0)  # 30 Hz, not 100
+        goal = self.goals[-1]
+        self.assertEqual(goal.header.frame_id, "lwr_base_link")
+        self.assertAlmostEqual(goal.goal.z, GOAL[2] + 0.02, places=6)
+
+    def test_3_reaches_the_goal_of_the_topic(self) -> None:
+        robot = self.robot
+        answer = robot.execute(goal_frame="")
+        self.assertTrue(answer.success, answer.message)
+        wait_until(lambda: robot.feedback.state == "reached", 10.0, "reached")
+        wait_until(lambda: robot.feedback.remaining_distance < 0.002, 5.0, "2 mm from the goal")
+        wait_until(lambda: len(self.debug) > 50, 5.0, "ik_debug")
+        record = self.debug[len(self.debug) // 2]
+        self.assertEqual(record.header.frame_id, "lwr_base_link")
+        self.assertEqual((len(record.joint_velocity_position), len(record.joint_velocity_rotation)),
+                         (7, 7))
+        self.assertGreater(record.smallest_singular_value_position, 0.0)
+        q = record.measured.orientation
+        self.assertAlmostEqual(q.x**2 + q.y**2 + q.z**2 + q.w**2, 1.0, places=6)
+        self.assertTrue(self.targets and len(self.targets[-1].velocity) == 7)
+
+    def test_4_refusals(self) -> None:
+        robot = self.robot
+        for fields, word in (
+                ({"primitive": "wave"}, "reach_human"), ({"dmp_ratio": 0.0}, "ratio"),
+                ({"dmp_ratio": math.nan}, "ratio"), ({"initial_state": 9}, "CURRENT=0")):
+            answer = robot.execute(**{"primitive": "reach_human", **fields})
+            self.assertFalse(answer.success)
+            self.assertIn(word, answer.message)
+        answer = robot.dmp("load_dmps", "/does/not/exist.xml")
+        self.assertEqual((answer.success, answer.num_loaded), (False, 0))
+        answer = robot.manager("load_controller", "dmp", "coglab/DmpController")
+        self.assertFalse(answer.success)
+        self.assertIn("in use", answer.message)
+        self.assertIn("dmp", answer.controller_ids)
+        answer = robot.manager("load_controller", "x", "coglab/Nothing")
+        self.assertIn("coglab/DmpController", answer.message)
+        answer = robot.manager("switch_controller", "nobody")
+        self.assertFalse(answer.success)
+        answer = robot.manager("speed_scale", 2.0)
+        self.assertFalse(answer.success)
+        self.assertTrue(robot.manager("speed_scale", 0.5).success)
+        wait_until(lambda: robot.status.speed_scale == 0.5, 5.0, "speed_scale in the status")
+        self.assertTrue(robot.manager("speed_scale", 1.0).success)
+        publisher = rospy.Publisher("controller_manager/dmp/dmp_goal", DmpGoal, queue_size=1)
+        wait_until(lambda: publisher.get_num_connections() > 0, 5.0, "connection")
+        robot.see_hand(None)
+        before = robot.feedback.remaining_distance
+        for frame, x in (("world", 0.3), ("lwr_base_link", math.nan)):
+            wrong = DmpGoal()
+            wrong.header.frame_id = frame
+            wrong.goal.x = x
+            publisher.publish(wrong)
+        rospy.sleep(0.5)
+        self.assertAlmostEqual(robot.feedback.remaining_distance, before, delta=0.002)
+
+    def test_5_feedback_services(self) -> None:
+        name = "controller_manager/feedback/"
+        wait_until(lambda: bool(self.feedback), 5.0, "feedback/status")
+        names = [c.name for c in self.feedback[-1].controllers]
+        self.assertEqual(sorted(names), ["ee_admittance", "joint_limits"])
+        self.assertEqual(self.feedback[-1].profile, "dmp")
+        call = self.robot.call
+        answer = call(name + "describe", DescribeController, "joint_limits")
+        self.assertTrue(answer.success and "joint_position" in answer.text)
+        self.assertFalse(call(name + "describe", DescribeController, "joint_limit").success)
+        answer = call(name + "set_execution_order", SetExecutionOrder, names[:1])
+        self.assertFalse(answer.success)
+        answer = call(name + "set_execution_order", SetExecutionOrder, names[::-1])
+        self.assertTrue(answer.success, answer.message)
+        answer = call(name + "enable", FeedbackSelect, ["ee_admittance"], "")
+        self.assertTrue(answer.success, answer.message)
+        wait_until(lambda: next(c for c in self.feedback[-1].controllers
+                                if c.name == "ee_admittance").enabled, 5.0, "enabled")
+        answer = call(name + "pause_by_signal", FeedbackBySignal, "wrench", False)
+        self.assertTrue(answer.success, answer.message)
+        self.assertEqual(list(answer.affected), ["ee_admittance"])
+        answer = call(name + "resume_by_signal", FeedbackBySignal, "wrench", False)
+        self.assertEqual(list(answer.affected), ["ee_admittance"])
+        answer = call(name + "reload_gains", ReloadGains, "ee_admittance", "")
+        self.assertTrue(answer.success, answer.message)
+        answer = call(name + "reload_gains", ReloadGains, "ee_admittance", "/no/such.yaml")
+        self.assertFalse(answer.success)
+        self.assertTrue(call(name + "disable", FeedbackSelect, ["ee_admittance"], "").success)
+        self.assertFalse(call(name + "enable", FeedbackSelect, ["nobody"], "").success)
+
+    def test_6_diagnostics_and_ptp_refusal(self) -> None:
+        wait_until(lambda: any("control cycle" in n for n in self.diagnostics), 5.0, "/diagnostics")
+        answer = self.robot.add_ptp(HOME)
+        self.assertEqual(answer.status, AddPtpRequest.REJECTED)
+        self.robot.switch("ptp")
+        answer = self.robot.add_ptp([0.0, 1.0])
+        self.assertEqual((answer.status, answer.ptp_id), (AddPtpRequest.REJECTED, -1))
+        self.assertIn("2 numbers", answer.message)
+
+
+if __name__ == "__main__":
+    rospy.init_node("topic_goal")
+    rostest.rosrun("coglab_controllers", "topic_goal", TopicGoal)
