@@ -4,11 +4,24 @@
 #include <cmath>
 #include <cstring>
 #include <stdexcept>
+#include <type_traits>
 
 namespace ctrl_more {
 namespace {
 
 const std::string kNoLibrary;
+
+// Calls `function` with the size, as a constant for the usual ones, so that its loops unroll.
+template <typename Function>
+inline void forSize(int size, Function function) {
+  switch (size) {
+    case 3: return function(std::integral_constant<int, 3>());
+    case 4: return function(std::integral_constant<int, 4>());
+    case 6: return function(std::integral_constant<int, 6>());
+    case 7: return function(std::integral_constant<int, 7>());
+    default: return function(size);
+  }
+}
 
 std::int64_t toNanoseconds(double seconds) {
   return seconds >= 9e9 ? INT64_MAX : static_cast<std::int64_t>(1e9 * seconds);
@@ -19,11 +32,10 @@ std::int64_t toNanoseconds(double seconds) {
 ControllerSlot::ControllerSlot(ControllerInstance instance, const std::string& name,
                                const ControllerEntry& entry, const ManagerOptions& options,
                                std::uint32_t owner)
-    : instance_(std::move(instance)),
-      controller_(instance_.controller.get()),
+    : controller_(instance.controller.get()),
       owner_(owner),
+      instance_(std::move(instance)),
       blend_s_(entry.blend_s >= 0.0 ? entry.blend_s : options.blend_s),
-      gain_blend_s_(blend_s_),
       overrun_ns_(toNanoseconds(1e-6 * entry.overrun_us)),
       overruns_to_pause_(options.overruns_to_pause),
       lockstep_(options.lockstep),
@@ -64,15 +76,23 @@ void ControllerSlot::configure(const GainValues& gains, const SettingValues& set
     const bool limited = rated || std::isfinite(l.size) || std::isfinite(l.angle);
     written_.push_back({use.signal, use.signal.offset(), total, use.signal.size(),
                         kindOf(use.use.container), l, use.use.on_pause, limited, rated});
+    limited_ = limited_ || limited;
     total += use.signal.size();
   }
-  for (auto* buffer : {&record_[0].before, &record_[0].after, &record_[1].before,
-                       &record_[1].after, &from_, &raw_, &now_, &step_}) {
+  for (auto* buffer : {&from_, &raw_, &now_, &step_, &before_, &after_}) {
     buffer->assign(total, 0.0);
-    // Equal and unit, so that the correction before the first run is the identity.
     for (const Written& w : written_) {
       correction::setIdentity(w.kind, w.size, buffer->data() + w.local);
     }
+  }
+  records_ = std::make_unique<SharedRecords>(1 + 2 * static_cast<std::size_t>(total));
+  for (int both = 0; both < 2; ++both) {
+    // Equal and unit, so that the correction before the first run is the identity.
+    for (int i = 0; i < total; ++i) {
+      records_->put(1 + 2 * i, before_[i]);
+      records_->put(2 + 2 * i, before_[i]);
+    }
+    records_->close();
   }
   declared_.assign(control.dataSize(), false);
   for (const Written& w : written_) {
@@ -80,7 +100,6 @@ void ControllerSlot::configure(const GainValues& gains, const SettingValues& set
   }
   gains_from_ = gains;
   gains_to_ = gains;
-  correction_ = std::make_unique<SharedSnapshot>(1 + 2 * static_cast<std::size_t>(total));
 }
 
 void ControllerSlot::adopt(const PlanEntry& entry) noexcept {
@@ -124,8 +143,12 @@ void ControllerSlot::adopt(const PlanEntry& entry) noexcept {
 
 void ControllerSlot::captureCorrection() noexcept {
   for (const Written& w : written_) {
-    correction::difference(w.kind, w.size, record_[last_].before.data() + w.local,
-                           record_[last_].after.data() + w.local, from_.data() + w.local);
+    for (int i = w.local; i < w.local + w.size; ++i) {
+      before_[i] = records_->last(1 + 2 * i);
+      after_[i] = records_->last(2 + 2 * i);
+    }
+    correction::difference(w.kind, w.size, before_.data() + w.local, after_.data() + w.local,
+                           from_.data() + w.local);
   }
   blend_ = 0.0;
 }
@@ -154,13 +177,12 @@ void ControllerSlot::advanceBlend(double dt) noexcept {
 }
 
 void ControllerSlot::advanceGains(double dt) noexcept {
-  if (gain_weight_ >= 1.0) return;
-  gain_weight_ = gain_blend_s_ > 0.0 ? std::min(1.0, gain_weight_ + dt / gain_blend_s_) : 1.0;
+  gain_weight_ = blend_s_ > 0.0 ? std::min(1.0, gain_weight_ + dt / blend_s_) : 1.0;
   controller_->gains_.blend(gains_from_, gains_to_, gain_weight_);
   gains_pending_ = true;
 }
 
-bool ControllerSlot::isFresh(const Cycle& cycle, const RobotStates& robot) noexcept {
+inline bool ControllerSlot::isFresh(const Cycle& cycle, const RobotStates& robot) noexcept {
   for (std::size_t i = 0; i < needed_.size(); ++i) {
     if (robot.isFresh(needed_[i].signal, cycle.now_ns, needed_[i].max_age_ns)) continue;
     waiting_.store(static_cast<int>(i), std::memory_order_relaxed);
@@ -173,7 +195,7 @@ void ControllerSlot::run(const Cycle& cycle, const RobotStates& robot,
                          const ControlStates& original, ControlStates& control) noexcept {
   ran_ = false;
   if (idle()) return;
-  advanceGains(cycle.dt);
+  if (gain_weight_ < 1.0) advanceGains(cycle.dt);
   if (wanted_ && isFresh(cycle, robot)) {
     if (activity_ != Activity::Running) start();
     ran_ = true;
@@ -184,43 +206,49 @@ void ControllerSlot::run(const Cycle& cycle, const RobotStates& robot,
   }
 }
 
-void ControllerSlot::openRecord(const ControlStates& control) noexcept {
-  const double* data = control.data();
-  double* before = record_[1 - last_].before.data();
+inline void ControllerSlot::openRecord(const Cycle& cycle, const double* data) noexcept {
+  records_->put(0, static_cast<double>(cycle.number));
+  std::atomic<double>* const record = records_->making();
   for (const Written& w : written_) {
-    std::copy(data + w.offset, data + w.offset + w.size, before + w.local);
+    forSize(w.size, [&](auto size) {
+      const double* value = data + w.offset;
+      std::atomic<double>* word = record + 1 + 2 * w.local;
+      for (int i = 0; i < size; ++i) word[2 * i].store(value[i], std::memory_order_release);
+    });
   }
 }
 
-void ControllerSlot::closeRecord(const Cycle& cycle, const ControlStates& control) noexcept {
-  last_ = 1 - last_;
-  const double* data = control.data();
-  const double* before = record_[last_].before.data();
-  double* after = record_[last_].after.data();
-  correction_->begin();
-  correction_->put(0, static_cast<double>(cycle.number));
-  std::size_t next = 1;
+inline FaultKind ControllerSlot::fillAfter(const double* data) noexcept {
+  std::atomic<double>* const record = records_->making();
+  FaultKind fault = FaultKind::None;
   for (const Written& w : written_) {
-    std::copy(data + w.offset, data + w.offset + w.size, after + w.local);
-    for (int i = 0; i < w.size; ++i) {
-      correction_->put(next++, before[w.local + i]);
-      correction_->put(next++, after[w.local + i]);
-    }
+    const double* value = data + w.offset;
+    std::uint64_t collected = 0;
+    forSize(w.size, [&](auto size) {
+      std::atomic<double>* word = record + 2 + 2 * w.local;
+      for (int i = 0; i < size; ++i) {
+        const double v = value[i];
+        collected |= correction::notFinite(v);
+        word[2 * i].store(v, std::memory_order_release);
+      }
+    });
+    if (collected != 0) return FaultKind::NotFinite;
+    if (!correction::isUnit(w.kind, w.size, value)) fault = FaultKind::NotUnit;
   }
-  correction_->end();
+  return fault;
 }
 
-void ControllerSlot::restore(ControlStates& control) noexcept {
-  double* data = control.data();
-  const double* before = record_[1 - last_].before.data();
+// Puts back what was found when the record being made was opened.
+void ControllerSlot::restore(double* data) noexcept {
   for (const Written& w : written_) {
-    std::copy(before + w.local, before + w.local + w.size, data + w.offset);
+    for (int i = 0; i < w.size; ++i) data[w.offset + i] = records_->made(1 + 2 * (w.local + i));
   }
 }
 
 void ControllerSlot::runGuarded(const Cycle& cycle, const RobotStates& robot,
                                 const ControlStates& original, ControlStates& control) noexcept {
-  openRecord(control);
+  double* data = control.data();
+  openRecord(cycle, data);
   FaultKind kind = FaultKind::None;
   const char* text = nullptr;
   char copied[96];
@@ -240,7 +268,8 @@ void ControllerSlot::runGuarded(const Cycle& cycle, const RobotStates& robot,
       text = controller_->failure_;
       controller_->failure_ = nullptr;
     } else {
-      kind = judge(cycle, control);
+      kind = fillAfter(data);
+      if (kind == FaultKind::None && limited_) kind = judgeLimits(cycle, data);
     }
   } catch (const std::exception& e) {
     kind = FaultKind::Exception;
@@ -255,7 +284,7 @@ void ControllerSlot::runGuarded(const Cycle& cycle, const RobotStates& robot,
     text = "it threw something that is not a std::exception";
   }
   if (kind != FaultKind::None) {
-    restore(control);
+    restore(data);
     latch(cycle, kind, text);
     runStopped(cycle, control);
     return;
@@ -263,21 +292,19 @@ void ControllerSlot::runGuarded(const Cycle& cycle, const RobotStates& robot,
   if (blend_ < 1.0) {
     advanceBlend(cycle.dt);
     if (blend_ < 1.0) blendIn(control);
+    fillAfter(data);
   }
-  closeRecord(cycle, control);
+  records_->close();
 }
 
-FaultKind ControllerSlot::judge(const Cycle& cycle, const ControlStates& control) noexcept {
-  const double* data = control.data();
-  const double* before = record_[1 - last_].before.data();
+FaultKind ControllerSlot::judgeLimits(const Cycle& cycle, const double* data) noexcept {
   bool rated = false;
   for (const Written& w : written_) {
-    const double* value = data + w.offset;
-    if (!correction::isFinite(w.size, value)) return FaultKind::NotFinite;
-    if (!correction::isUnit(w.kind, w.size, value)) return FaultKind::NotUnit;
     if (!w.limited) continue;
     double* now = now_.data() + w.local;
-    correction::difference(w.kind, w.size, before + w.local, value, now);
+    double* before = before_.data() + w.local;
+    for (int i = 0; i < w.size; ++i) before[i] = records_->made(1 + 2 * (w.local + i));
+    correction::difference(w.kind, w.size, before, data + w.offset, now);
     const correction::Norms n = correction::norms(w.kind, w.size, now);
     if (n.size > w.limit.size || n.angle > w.limit.angle) return FaultKind::CorrectionSize;
     if (!w.rated) continue;
@@ -299,12 +326,13 @@ FaultKind ControllerSlot::judge(const Cycle& cycle, const ControlStates& control
 
 void ControllerSlot::blendIn(ControlStates& control) noexcept {
   double* data = control.data();
-  const double* before = record_[1 - last_].before.data();
   for (const Written& w : written_) {
     double* c = now_.data() + w.local;
-    correction::difference(w.kind, w.size, before + w.local, data + w.offset, c);
+    double* before = before_.data() + w.local;
+    for (int i = 0; i < w.size; ++i) before[i] = records_->made(1 + 2 * (w.local + i));
+    correction::difference(w.kind, w.size, before, data + w.offset, c);
     correction::between(w.kind, w.size, from_.data() + w.local, c, blend_, c);
-    correction::apply(w.kind, w.size, before + w.local, c, data + w.offset);
+    correction::apply(w.kind, w.size, before, c, data + w.offset);
   }
 }
 
@@ -324,9 +352,9 @@ StopPolicy ControllerSlot::policyOf(const Written& written) const {
 void ControllerSlot::runStopped(const Cycle& cycle, ControlStates& control) noexcept {
   if (activity_ == Activity::Off) return;
   advanceBlend(cycle.dt);
-  openRecord(control);
   bool holding = false;
   double* data = control.data();
+  openRecord(cycle, data);
   for (const Written& w : written_) {
     const StopPolicy policy = policyOf(w);
     if (policy == StopPolicy::Zero || (policy == StopPolicy::Fade && blend_ >= 1.0)) continue;
@@ -341,14 +369,32 @@ void ControllerSlot::runStopped(const Cycle& cycle, ControlStates& control) noex
     }
     correction::apply(w.kind, w.size, data + w.offset, c, data + w.offset);
   }
-  closeRecord(cycle, control);
+  fillAfter(data);
+  records_->close();
   if (blend_ >= 1.0 && !holding && activity_ == Activity::Stopping) setActivity(Activity::Off);
 }
 
-void ControllerSlot::undo(ControlStates& control) noexcept {
-  last_ = 1 - last_;  // the run just recorded becomes the open record again
-  restore(control);
+// Takes back the run just recorded; the correction of the run before is used again, as a record of
+// its own.
+void ControllerSlot::undo(const Cycle& cycle, double* data) noexcept {
   raw_valid_ = false;
+  for (const Written& w : written_) {
+    double* before = before_.data() + w.local;
+    double* after = after_.data() + w.local;
+    double* held = now_.data() + w.local;
+    for (int i = 0; i < w.size; ++i) {
+      before[i] = records_->previous(1 + 2 * (w.local + i));
+      after[i] = records_->previous(2 + 2 * (w.local + i));
+    }
+    correction::difference(w.kind, w.size, before, after, held);
+    for (int i = 0; i < w.size; ++i) data[w.offset + i] = records_->last(1 + 2 * (w.local + i));
+  }
+  openRecord(cycle, data);
+  for (const Written& w : written_) {
+    correction::apply(w.kind, w.size, data + w.offset, now_.data() + w.local, data + w.offset);
+  }
+  fillAfter(data);
+  records_->close();
 }
 
 void ControllerSlot::judgeTime(const Cycle& cycle, std::int64_t duration_ns,
@@ -360,16 +406,8 @@ void ControllerSlot::judgeTime(const Cycle& cycle, std::int64_t duration_ns,
     return;
   }
   overruns_.fetch_add(1, std::memory_order_relaxed);
-  // What it wrote came too late: undone, and the correction of the cycle before is used again.
-  undo(control);
-  double* data = control.data();
-  for (const Written& w : written_) {
-    double* held = now_.data() + w.local;
-    correction::difference(w.kind, w.size, record_[last_].before.data() + w.local,
-                           record_[last_].after.data() + w.local, held);
-    correction::apply(w.kind, w.size, data + w.offset, held, data + w.offset);
-  }
-  closeRecord(cycle, control);
+  // What it wrote came too late.
+  undo(cycle, control.data());
   if (++overruns_in_row_ >= overruns_to_pause_) {
     latch(cycle, FaultKind::Overrun, "update() was too slow in too many cycles in a row");
   }
@@ -386,8 +424,11 @@ void ControllerSlot::checkUndeclared(const Cycle& cycle, const double* before,
     changed = true;
   }
   if (!changed || activity_ != Activity::Running) return;
-  undo(control);
+  undo(cycle, data);
   latch(cycle, FaultKind::Undeclared, "it changed a reference that its description does not name");
+  for (const Written& w : written_) {
+    for (int i = 0; i < w.size; ++i) data[w.offset + i] = records_->last(1 + 2 * (w.local + i));
+  }
   runStopped(cycle, control);
 }
 
@@ -426,7 +467,7 @@ void ControllerSlot::attribution(const ControlStates& names,
                                  std::vector<Attribution>& list) const {
   if (activity() == Activity::Off) return;
   std::vector<double> numbers;
-  if (!correction_->read(numbers)) return;
+  if (!records_->read(numbers)) return;
   std::size_t next = 1;
   std::vector<double> change;
   for (const Written& w : written_) {

@@ -11,8 +11,8 @@
 #include "ctrl_more/feedback_controller.hpp"
 #include "ctrl_more/feedback_controllers_manager.hpp"
 #include "ctrl_more/plugin_library.hpp"
-#include "ctrl_more/shared_snapshot.hpp"
 #include "plan.hpp"
+#include "shared_records.hpp"
 #include "shared_text.hpp"
 
 namespace ctrl_more {
@@ -22,7 +22,7 @@ namespace ctrl_more {
 ///
 /// configure() and the const questions are for services; adopt(), run() and judgeTime() are for
 /// the cycle and neither allocate nor lock nor throw.
-class ControllerSlot {
+class __attribute__((visibility("hidden"))) ControllerSlot {
  public:
   /// @param instance the controller and its library
   /// @param name its name
@@ -96,58 +96,56 @@ class ControllerSlot {
   bool isFresh(const Cycle& cycle, const RobotStates& robot) noexcept;
   void runGuarded(const Cycle& cycle, const RobotStates& robot, const ControlStates& original,
                   ControlStates& control) noexcept;
-  FaultKind judge(const Cycle& cycle, const ControlStates& control) noexcept;
+  FaultKind judgeLimits(const Cycle& cycle, const double* data) noexcept;
   void blendIn(ControlStates& control) noexcept;
   void runStopped(const Cycle& cycle, ControlStates& control) noexcept;
-  void openRecord(const ControlStates& control) noexcept;
-  void closeRecord(const Cycle& cycle, const ControlStates& control) noexcept;
-  void restore(ControlStates& control) noexcept;
-  void undo(ControlStates& control) noexcept;
+  void openRecord(const Cycle& cycle, const double* data) noexcept;
+  FaultKind fillAfter(const double* data) noexcept;
+  void restore(double* data) noexcept;
+  void undo(const Cycle& cycle, double* data) noexcept;
   void latch(const Cycle& cycle, FaultKind kind, const char* text) noexcept;
   void setActivity(Activity activity) noexcept;
   StopPolicy policyOf(const Written& written) const;
 
-  ControllerInstance instance_;
+  // What every cycle touches comes first, to lie together in memory.
   FeedbackController* controller_;  // of instance_, at hand
-  Stage stage_ = Stage::Task;
-  std::uint32_t owner_;
-  double blend_s_;
-  double gain_blend_s_;
-  std::int64_t overrun_ns_;
-  int overruns_to_pause_;
-  bool lockstep_;
-  StopPolicy on_fault_;
   std::vector<Written> written_;
   std::vector<Needed> needed_;
-  std::vector<bool> declared_;  // doubles of the control buffer it may change
-
-  // cycle side
-  bool wanted_ = false;  // enabled, not paused, no fault
-  bool enabled_ = false;
-  bool paused_ = false;
-  FaultKind fault_ = FaultKind::None;
-  std::uint32_t fault_clears_ = 0;
-  std::uint32_t resets_ = 0;
-  std::uint32_t reorders_ = 0;
-  std::uint32_t gains_revision_ = 0;
-  Activity activity_ = Activity::Off;
-  Why why_ = Why::Disabled;
+  std::unique_ptr<SharedRecords> records_;  // [0] cycle, then before and after of each double
   double blend_ = 1.0;
   double gain_weight_ = 1.0;
+  std::uint32_t owner_;
+  Activity activity_ = Activity::Off;
+  bool wanted_ = false;  // enabled, not paused, no fault
   bool reset_pending_ = false;
   bool gains_pending_ = true;
   bool raw_valid_ = false;
   bool ran_ = false;
+  bool limited_ = false;  // any signal has a finite limit
+  bool enabled_ = false;
+  bool paused_ = false;
+  Stage stage_ = Stage::Task;
+  FaultKind fault_ = FaultKind::None;
+  Why why_ = Why::Disabled;
+
+  ControllerInstance instance_;
+  double blend_s_;
+  std::int64_t overrun_ns_;
+  int overruns_to_pause_;
+  bool lockstep_;
+  StopPolicy on_fault_;
+  std::vector<bool> declared_;  // doubles of the control buffer it may change
+  std::uint32_t fault_clears_ = 0;
+  std::uint32_t resets_ = 0;
+  std::uint32_t reorders_ = 0;
+  std::uint32_t gains_revision_ = 0;
   int overruns_in_row_ = 0;
-  struct Record {
-    std::vector<double> before, after;  // references around one run
-  };
-  Record record_[2];           // the last complete one, and the one being made
-  int last_ = 0;               // index of the last complete one
-  std::vector<double> from_;   // correction that the blend starts from
-  std::vector<double> raw_;    // correction of the last run before blending
-  std::vector<double> now_;    // room for one correction
-  std::vector<double> step_;   // room for another
+  std::vector<double> from_;    // correction that the blend starts from
+  std::vector<double> raw_;     // correction of the last run before blending
+  std::vector<double> now_;     // room for one correction
+  std::vector<double> step_;    // room for another
+  std::vector<double> before_;  // room for references
+  std::vector<double> after_;   // room for references
   GainValues gains_from_, gains_to_;
 
   // shared
@@ -159,7 +157,6 @@ class ControllerSlot {
   std::atomic<std::int64_t> last_ns_{0};
   std::atomic<int> waiting_{-1};
   SharedText fault_text_;
-  std::unique_ptr<SharedSnapshot> correction_;
 };
 
 }  // namespace ctrl_more

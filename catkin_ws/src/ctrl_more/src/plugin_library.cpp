@@ -58,6 +58,13 @@ std::string coreFolder() {
 }  // namespace
 
 struct PluginLibrary::Handle {
+  ~Handle() {
+    loader.reset();
+    if (bound) dlclose(bound);
+  }
+  // Opened with all functions resolved: class_loader resolves late, and a function that nobody has
+  // would end the process when it is called.
+  void* bound = nullptr;
   std::unique_ptr<class_loader::ClassLoader> loader;
   std::map<std::string, FeedbackControllerMaker> makers;
 };
@@ -77,6 +84,10 @@ std::shared_ptr<PluginLibrary> PluginLibrary::open(const std::string& path) {
   std::shared_ptr<PluginLibrary> library(new PluginLibrary());
   library->path_ = file;
   library->handle_ = std::make_unique<Handle>();
+  library->handle_->bound = dlopen(file.c_str(), RTLD_NOW | RTLD_LOCAL);
+  if (!library->handle_->bound) {
+    throw std::runtime_error("library " + file + " cannot be loaded: " + dlerror());
+  }
   try {
     library->handle_->loader = std::make_unique<class_loader::ClassLoader>(file, false);
   } catch (const std::exception& e) {
@@ -107,7 +118,7 @@ PluginLibrary::~PluginLibrary() {
   if (!handle_) return;
   // Makers written as in the paper do not take themselves out.
   for (const auto& entry : handle_->makers) prototypes().erase(entry.first, entry.second);
-  handle_->loader.reset();
+  handle_.reset();
   const auto found = openLibraries().find(path_);
   if (found != openLibraries().end() && found->second.expired()) openLibraries().erase(found);
 }

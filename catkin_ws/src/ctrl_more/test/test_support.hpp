@@ -103,6 +103,7 @@ struct Rig {
     control.setTaskSpaceReferenceVel("ee", velocity);
     control.setJointSpaceReference("Velocity", joints);
     control.setCoM(Eigen::Vector3d::Zero());
+    control.setCoMVelocity(Eigen::Vector3d::Zero());
     control.setZMP(Eigen::Vector3d::Zero());
     control.setPelvisOrientation(0.0, 0.0, 0.0);
   }

@@ -162,9 +162,9 @@ class FeedbackController {
  private:
   friend class ControllerSlot;
 
+  const char* failure_ = nullptr;  // first: read each cycle
   std::string name_;
   GainValues gains_;
-  const char* failure_ = nullptr;
   LogSource log_;
   ControllerOwner* owner_ = nullptr;
   bool alone_enabled_ = false;
