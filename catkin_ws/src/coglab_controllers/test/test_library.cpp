@@ -3,8 +3,11 @@
 
 #include <sys/stat.h>
 
+#include <algorithm>
 #include <cstdio>
+#include <cstdlib>
 
+#include "coglab_controllers/dmp/dmp.hpp"
 #include "coglab_controllers/dmp/library.hpp"
 #include "core_support.hpp"
 
@@ -120,6 +123,41 @@ TEST(Library, LearnsTrajectoriesWhenRead) {
   EXPECT_NEAR(p.goal.x(), 0.5, 1e-9);
   const Eigen::Matrix3Xd path = reproduce(p, {0.0, 0.6, 1.2});
   EXPECT_NEAR(path(0, 1), 0.25, 0.002);
+}
+
+TEST(Library, GoldenFilesMeanTheSameAsInPython) {
+  const std::string folder = std::string(COGLAB_PACKAGE_DIR) + "/test/golden/";
+  Library weights, learnt;
+  EXPECT_EQ(weights.load(folder + "weights.xml"), 2);
+  EXPECT_EQ(weights.format(), readFile(folder + "weights.xml"));
+  EXPECT_EQ(learnt.load(folder + "demonstrations.xml"), 2);
+  for (const auto& [id, p] : weights.primitives()) {
+    EXPECT_LT((learnt.at(id).weights - p.weights).norm(), 1e-6) << id;
+  }
+  std::istringstream rows(readFile(folder + "motions.csv"));
+  std::string line, running;
+  std::getline(rows, line);
+  Dmp dmp;
+  int step = 0, compared = 0;
+  while (std::getline(rows, line)) {
+    std::replace(line.begin(), line.end(), ',', ' ');
+    std::istringstream fields(line);
+    std::string id;
+    int until = 0;
+    Vector3 expected;
+    fields >> id >> until >> expected[0] >> expected[1] >> expected[2];
+    const Primitive& p = weights.at(id);
+    const Vector3 goal = p.goal + Vector3(0.05, -0.1, 0.02);
+    if (id != running) {
+      dmp.start(TransformationSystem(p), p.start, Vector3::Zero(), goal, 1.3);
+      running = id;
+      step = 0;
+    }
+    for (; step < until; ++step) dmp.step(0.005, goal);
+    EXPECT_LT((dmp.state().position - expected).norm(), 1e-9) << line;
+    ++compared;
+  }
+  EXPECT_EQ(compared, 40);
 }
 
 TEST(Library, AnUnknownIdNamesThoseLoaded) {
