@@ -1,0 +1,84 @@
+#!/usr/bin/python3
+"""Makes a new feedback controller from the template: code, configuration, list file and test.
+
+    new_controller.py NAME --into DIR
+
+NAME is the type in CamelCase (for example WristDamper). DIR/wrist_damper is made with a CMake
+project that builds alone or in a catkin workspace, compiles at once, and has a passing test.
+"""
+
+from __future__ import annotations
+
+import argparse
+import re
+import sys
+from pathlib import Path
+
+PLACEHOLDERS = ("@TYPE@", "@name@")
+
+
+def snake_case(name: str) -> str:
+    """WristDamper -> wrist_damper; the same rule by which libraries are found by type."""
+    return re.sub(r"(?<=[a-z])(?=[A-Z])", "_", name).lower()
+
+
+def template_folder() -> Path:
+    """The template beside this script: in the source tree, or where it was installed."""
+    here = Path(__file__).resolve().parent
+    for folder in (
+        here.parent / "template",
+        here.parent.parent / "share" / "ctrl_more" / "template",
+    ):
+        if folder.is_dir():
+            return folder
+    raise FileNotFoundError(
+        f"the template was expected at {here.parent / 'template'}; reinstall ctrl_more"
+    )
+
+
+def make_controller(name: str, into: Path) -> Path:
+    """Writes the new controller and returns its folder; raises ValueError or FileExistsError."""
+    if not re.fullmatch(r"[A-Z][A-Za-z0-9]*[a-z][A-Za-z0-9]*", name):
+        raise ValueError(
+            f"a controller's name is CamelCase, letters and digits, like WristDamper; got '{name}'"
+        )
+    if not into.is_dir():
+        raise FileNotFoundError(f"there is no folder {into}; make it first")
+    snake = snake_case(name)
+    target = into / snake
+    if target.exists():
+        raise FileExistsError(f"{target} exists already; choose another name or remove it")
+    files = sorted(path for path in template_folder().rglob("*") if path.is_file())
+    target.mkdir()
+    for source in files:
+        relative = str(source.relative_to(template_folder()))
+        for key, value in zip(PLACEHOLDERS, (name, snake)):
+            relative = relative.replace(key, value)
+        text = source.read_text(encoding="utf-8")
+        for key, value in zip(PLACEHOLDERS, (name, snake)):
+            text = text.replace(key, value)
+        destination = target / relative.removesuffix(".in")
+        destination.parent.mkdir(parents=True, exist_ok=True)
+        destination.write_text(text, encoding="utf-8")
+    return target
+
+
+def main() -> int:
+    """Command line."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("name", help="type of the controller in CamelCase, for example WristDamper")
+    parser.add_argument("--into", type=Path, default=Path("."), help="folder to make it in")
+    arguments = parser.parse_args()
+    try:
+        target = make_controller(arguments.name, arguments.into)
+    except (ValueError, OSError) as error:
+        print(error, file=sys.stderr)
+        return 1
+    print(f"made {target}; build and test it:")
+    print(f"  cmake -S {target} -B {target}/build && cmake --build {target}/build")
+    print(f"  ctest --test-dir {target}/build --output-on-failure")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -104,8 +104,8 @@ std::string documentationPage(const Description& d) {
       << " | " << (d.safety ? "yes: refuses pause and disable unless forced" : "no") << " | "
       << (d.on_switch == SwitchPolicy::Reset ? "reset" : "state kept") << " |\n\n";
   out << "## Use\n\n" << d.use << "\n\n## When to apply it\n\n" << d.when
-      << "\n\n## Limitations\n\n" << d.limitations << "\n\n## Law\n\n$$" << d.law
-      << "$$\n\nSource: " << d.source << "\n\n";
+      << "\n\n## Limitations\n\n" << d.limitations << "\n\n## Law\n\n```math\n" << d.law
+      << "\n```\n\nSource: " << d.source << "\n\n";
   out << "## Robot signals\n\n";
   if (d.robot_signals.empty()) {
     out << "None.\n\n";

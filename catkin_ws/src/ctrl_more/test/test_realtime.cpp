@@ -130,10 +130,11 @@ TEST(Realtime, nothingForbiddenIn100000CyclesWith10000PlanChanges) {
   }
   run = false;
   cycle_thread.join();
-  std::printf("cycles %llu, plans adopted %llu, faults %llu, allocations of throws %llu\n",
-              static_cast<unsigned long long>(cycles.load()),
-              static_cast<unsigned long long>(adopted), static_cast<unsigned long long>(faults),
-              static_cast<unsigned long long>(counts.of_throw));
+  const auto number = [](std::uint64_t n) { return static_cast<unsigned long long>(n); };
+  std::printf("cycles %llu, plans adopted %llu, faults %llu, allocations %llu, locks %llu, "
+              "syscalls %llu, allocations of throws %llu\n",
+              number(cycles.load()), number(adopted), number(faults), number(counts.allocations),
+              number(counts.locks), number(counts.syscalls), number(counts.of_throw));
   EXPECT_EQ(counts.allocations, 0u);
   EXPECT_EQ(counts.locks, 0u);
   EXPECT_EQ(counts.syscalls, 0u);

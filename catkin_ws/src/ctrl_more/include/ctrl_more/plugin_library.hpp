@@ -41,7 +41,9 @@ struct ControllerInstance {
   std::shared_ptr<PluginLibrary> library;           ///< null for code linked into the program
   std::unique_ptr<FeedbackController> controller;  ///< declared after, so destroyed first
 
+  /// Holds nothing.
   ControllerInstance() = default;
+  /// Takes over both.
   ControllerInstance(ControllerInstance&&) = default;
   ControllerInstance& operator=(ControllerInstance&&) = delete;
   ~ControllerInstance() { controller.reset(); }

@@ -1,0 +1,74 @@
+"""The template compiles, is tested and documented from the first minute."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+PACKAGE = Path(__file__).resolve().parent.parent
+SCRIPT = PACKAGE / "scripts" / "new_controller.py"
+
+
+def run(*command: str | Path, **options) -> subprocess.CompletedProcess:
+    """Runs a command with a time limit and keeps what it says."""
+    return subprocess.run(
+        [str(part) for part in command], capture_output=True, text=True, timeout=300, **options
+    )
+
+
+def core_library() -> Path:
+    """The built core library in the workspace that was sourced."""
+    for prefix in os.environ.get("CMAKE_PREFIX_PATH", "").split(":"):
+        library = Path(prefix) / "lib" / "libctrl_more.so"
+        if prefix and library.is_file():
+            return library
+    pytest.skip("ctrl_more is not built: source the workspace's setup file first")
+
+
+def test_new_controller_compiles_is_tested_and_documented(tmp_path: Path) -> None:
+    library = core_library()
+    made = run(sys.executable, SCRIPT, "WristDamper", "--into", tmp_path)
+    assert made.returncode == 0, made.stderr
+    folder = tmp_path / "wrist_damper"
+    left = [p for p in folder.rglob("*") if p.is_file() and "@" in p.name + p.read_text()
+            and "example.org" not in p.read_text()]
+    assert not left, left
+    environment = dict(
+        os.environ, CTRL_MORE_LIB_DIR=str(library.parent),
+        CTRL_MORE_INCLUDE_DIR=str(PACKAGE / "include"),
+    )
+    build = folder / "build"
+    configured = run("cmake", "-S", folder, "-B", build, env=environment)
+    assert configured.returncode == 0, configured.stdout + configured.stderr
+    built = run("cmake", "--build", build, env=environment)
+    assert built.returncode == 0, built.stdout + built.stderr
+    assert "warning" not in built.stdout + built.stderr
+    tested = run("ctest", "--test-dir", build, "--output-on-failure", env=environment)
+    assert tested.returncode == 0, tested.stdout
+    describe = library.parent / "ctrl_more" / "ctrl_more_describe"
+    plugin = build / "libwrist_damper.so"
+    assert run(describe, "check", plugin).returncode == 0
+    page = run(describe, "page", plugin)
+    assert page.stdout.startswith("# WristDamper\n")
+    config = run(describe, "config", plugin)
+    assert "k: 0.5" in config.stdout
+
+
+@pytest.mark.parametrize("name", ["wristDamper", "Wrist-Damper", "", "9Lives", "../Up", "X"])
+def test_wrong_names_are_refused(tmp_path: Path, name: str) -> None:
+    result = run(sys.executable, SCRIPT, name, "--into", tmp_path)
+    assert result.returncode == 1
+    assert "CamelCase" in result.stderr
+    assert not list(tmp_path.iterdir())
+
+
+def test_existing_folder_and_missing_target_are_refused(tmp_path: Path) -> None:
+    (tmp_path / "wrist_damper").mkdir()
+    again = run(sys.executable, SCRIPT, "WristDamper", "--into", tmp_path)
+    assert again.returncode == 1 and "exists already" in again.stderr
+    missing = run(sys.executable, SCRIPT, "WristDamper", "--into", tmp_path / "nowhere")
+    assert missing.returncode == 1 and "no folder" in missing.stderr

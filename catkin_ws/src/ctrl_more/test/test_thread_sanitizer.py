@@ -1,0 +1,36 @@
+"""Services against the control cycle under ThreadSanitizer (a campaign: COGLAB_LONG=1)."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+
+PACKAGE = Path(__file__).resolve().parent.parent
+# What the stress needs of the core: all but the part that opens libraries.
+LEFT_OUT = {"plugin_library.cpp", "central_module.cpp"}
+
+
+@pytest.mark.skipif(not os.environ.get("COGLAB_LONG"), reason="campaign: set COGLAB_LONG=1")
+@pytest.mark.skipif(shutil.which("g++") is None, reason="g++ is not installed")
+def test_services_against_the_cycle(tmp_path: Path) -> None:
+    seconds = os.environ.get("CTRL_MORE_TSAN_SECONDS", "60")
+    sources = [p for p in sorted((PACKAGE / "src").glob("*.cpp")) if p.name not in LEFT_OUT]
+    sources += [PACKAGE / "test" / "thread_stress.cpp", PACKAGE / "test" / "no_libraries.cpp"]
+    program = tmp_path / "thread_stress"
+    built = subprocess.run(
+        ["g++", "-std=c++17", "-O1", "-g", "-fsanitize=thread", "-o", str(program),
+         *map(str, sources), f"-I{PACKAGE / 'include'}", f"-I{PACKAGE / 'src'}",
+         "-I/usr/include/eigen3", "-lyaml-cpp", "-lpthread", "-ldl"],
+        capture_output=True, text=True, timeout=1800,
+    )
+    assert built.returncode == 0, built.stderr[-3000:]
+    result = subprocess.run(
+        ["setarch", os.uname().machine, "-R", str(program), seconds],
+        env=dict(os.environ, TSAN_OPTIONS="halt_on_error=1 exitcode=66"),
+        capture_output=True, text=True, timeout=float(seconds) * 5 + 120,
+    )
+    assert result.returncode == 0, (result.stdout + result.stderr)[-4000:]
