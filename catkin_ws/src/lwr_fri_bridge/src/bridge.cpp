@@ -11,6 +11,7 @@ constexpr double kBrakeTimeLimit =
     3.0;  // s for the arm to come to rest before monitor mode is requested anyway
 constexpr double kWaitBeyondLimits =
     2.0;  // s that command() waits beyond the limits of the request itself
+constexpr double kCommandCycles = 2.5;  // FRI cycles that a command lives at least
 constexpr std::size_t kKeptOutcomes = 64;
 
 bool allFinite(const Vector7& v) { return v.allFinite(); }
@@ -275,7 +276,10 @@ void Bridge::follow(const fri::Reception& reception, fri::CommandDatagram& answe
 }
 
 Vector7 Bridge::targetVelocity() {
-  const bool from_topic = source_.load(std::memory_order_relaxed) == VelocitySource::Topic;
+  const VelocitySource source = source_.load(std::memory_order_relaxed);
+  const bool from_topic = source == VelocitySource::Topic;
+  if (source != last_source_) valid_command_ = VelocityCommand();  // nothing outlives its source
+  last_source_ = source;
   VelocityCommand command;
   const bool fresh = from_topic ? topic_.read(command) : port_.takeVelocity(command);
   if (fresh && command.stamp_ns != 0) {
@@ -289,12 +293,15 @@ Vector7 Bridge::targetVelocity() {
   }
 
   const double age = seconds(valid_command_.stamp_ns, sample_.stamp_ns);
-  const double limit = from_topic ? config_.topic_timeout : config_.command_timeout;
+  // With long FRI periods a command is two cycles old before its successor can be there.
+  const double limit = std::max(from_topic ? config_.topic_timeout : config_.command_timeout,
+                                kCommandCycles * sample_.cycle_time);
   const bool current =
       valid_command_.stamp_ns != 0 && valid_command_.motion_epoch == supervisor_.epoch();
   const bool expired = current && (age > limit || age < -limit);
-  if (expired && !command_expired_ && !valid_command_.velocity.isZero())
+  if (expired && !command_expired_ && !valid_command_.velocity.isZero()) {
     ++counters_.command_timeouts;
+  }
   command_expired_ = expired;
   // While leashed the wish is still looked at, to see when the outward motion is not asked for any
   // more.

@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <chrono>
 #include <cmath>
+#include <thread>
 
 #include <coglab_msgs/LwrState.h>
 
@@ -102,7 +104,12 @@ void BridgeRos::shutdown() {
   target_.shutdown();
   events_.shutdown();
   command_.shutdown();
-  const Outcome outcome = bridge_.command("stop");
+  Outcome outcome = bridge_.command("stop");
+  // Somebody else's stop may be in progress; it has time limits of its own.
+  for (int i = 0; i < 100 && outcome.code == OutcomeCode::Busy; ++i) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(100));
+    outcome = bridge_.command("stop");
+  }
   if (!outcome.success() && outcome.code != OutcomeCode::Disconnected) {
     // The log may be gone already when a node shuts down.
     std::fprintf(stderr, "lwr: shutdown: %s\n", describe(outcome).c_str());

@@ -410,6 +410,42 @@ TEST(Bridge, refusesParametersOutOfRangeByName) {
   }
 }
 
+TEST(Bridge, everyPeriodOfFriFollows) {
+  for (const double period : {0.001, 0.002, 0.005, 0.010, 0.020, 0.050, 0.100}) {
+    Cell cell(period);
+    cell.start();
+    const double before = cell.robot.setPoint()[0];
+    cell.runDriven(static_cast<int>(2.0 / period), Vector7::Constant(0.3));
+    EXPECT_NEAR(cell.robot.setPoint()[0] - before, 0.6, 0.06) << period;
+    EXPECT_EQ(cell.bridge.snapshot().counters.command_timeouts, 0U) << period;
+    EXPECT_EQ(cell.bridge.snapshot().counters.leash_trips, 0U) << period;
+  }
+}
+
+TEST(Bridge, theVelocitySourceIsSwitched) {
+  Cell cell;
+  cell.start();
+  const auto topic = [&](double speed) {
+    cell.bridge.sendTopicVelocity(
+        {Vector7::Constant(speed), cell.robot.now(), cell.bridge.snapshot().sample.motion_epoch});
+  };
+  for (int i = 0; i < 50; ++i) {
+    topic(0.3);
+    cell.run(1);
+  }
+  EXPECT_TRUE(cell.bridge.snapshot().sample.commanded_velocity.isZero());  // not the source
+  cell.bridge.setVelocitySource(VelocitySource::Topic);
+  for (int i = 0; i < 60; ++i) {
+    topic(0.3);
+    drive(cell.bridge, cell.robot, Vector7::Constant(-0.5));
+    cell.run(1);
+  }
+  EXPECT_NEAR(cell.bridge.snapshot().sample.commanded_velocity[0], 0.3, 1e-9);
+  cell.bridge.setVelocitySource(VelocitySource::ControlThread);
+  cell.run(40);  // the last command of the topic does not go on
+  EXPECT_TRUE(cell.bridge.snapshot().sample.commanded_velocity.isZero());
+}
+
 TEST(Bridge, t1ProfileBoundsSpeed) {
   Cell cell(0.005, defaultConfig("t1"));
   cell.start();

@@ -189,6 +189,7 @@ class Bridge {
   bool following_ = false;  // the last answer came from the interpolator
   bool monitor_asked_ = false;
   bool command_expired_ = false;
+  VelocitySource last_source_ = VelocitySource::ControlThread;
   StateView last_view_;
 
   // to and from the FRI thread
