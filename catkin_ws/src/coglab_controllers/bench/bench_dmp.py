@@ -64,16 +64,41 @@ def imitation_rows() -> list[Row]:
     at_cycle = np.array([ours(path, every=5) for _, path in wanted])
     peer = np.array([theirs(path) for _, path in wanted]) if DMP else None
     rows = [
-        row("dmp", f"imitation RMSE, median of {len(wanted)} curves, N=20", np.median(errors), "% of path", "<= 0.10",
-            PEER, None if peer is None else np.median(peer), below_peer=True),
-        row("dmp", "imitation RMSE, 95th percentile", np.percentile(errors, 95), "% of path", "",
-            PEER, None if peer is None else np.percentile(peer, 95), below_peer=True),
+        row(
+            "dmp",
+            f"imitation RMSE, median of {len(wanted)} curves, N=20",
+            np.median(errors),
+            "% of path",
+            "<= 0.10",
+            PEER,
+            None if peer is None else np.median(peer),
+            below_peer=True,
+        ),
+        row(
+            "dmp",
+            "imitation RMSE, 95th percentile",
+            np.percentile(errors, 95),
+            "% of path",
+            "",
+            PEER,
+            None if peer is None else np.percentile(peer, 95),
+            below_peer=True,
+        ),
         row("dmp", "imitation RMSE, median, stepped at 100 Hz", np.median(at_cycle), "% of path", "<= 0.10"),
     ]
     for kind in dict.fromkeys(kind for kind, _ in wanted):
         chosen = np.array([k == kind for k, _ in wanted])
-        rows.append(row("dmp", f"imitation RMSE, median, {kind}", np.median(errors[chosen]), "% of path", "",
-                        PEER, None if peer is None else np.median(peer[chosen])))
+        rows.append(
+            row(
+                "dmp",
+                f"imitation RMSE, median, {kind}",
+                np.median(errors[chosen]),
+                "% of path",
+                "",
+                PEER,
+                None if peer is None else np.median(peer[chosen]),
+            )
+        )
     return rows
 
 

@@ -89,11 +89,26 @@ def step_rows() -> list[Row]:
     peer_change, peer_settling = peer_step(moved) if DMP else (None, None)
     plain_positions, _, plain, _ = run(goal_at, 400, estimator=0.0)
     return [
-        row("goal_change", "goal step of 100 mm at 0.3 T: change of acceleration per 5 ms", largest_change(accelerations),
-            "m/s^2", "< 1", PEER, peer_change, below_peer=True),
+        row(
+            "goal_change",
+            "goal step of 100 mm at 0.3 T: change of acceleration per 5 ms",
+            largest_change(accelerations),
+            "m/s^2",
+            "< 1",
+            PEER,
+            peer_change,
+            below_peer=True,
+        ),
         row("goal_change", "the same without the goal estimator", largest_change(plain), "m/s^2", ""),
-        row("goal_change", "goal step of 100 mm at 0.3 T: within 10 mm", settling(positions, moved), "T", "<= 0.95", PEER,
-            peer_settling),
+        row(
+            "goal_change",
+            "goal step of 100 mm at 0.3 T: within 10 mm",
+            settling(positions, moved),
+            "T",
+            "<= 0.95",
+            PEER,
+            peer_settling,
+        ),
         row("goal_change", "the same without the goal estimator (settling)", settling(plain_positions, moved), "T", ""),
     ]
 
@@ -112,8 +127,16 @@ def moving_rows() -> list[Row]:
     end = round(DURATION / CYCLE)
     peer = peer_lag() if DMP else None
     return [
-        row("goal_change", "goal moving at 0.1 m/s: lag from T on, largest", lag[end:].max(), "mm", "<= 2", PEER, peer,
-            below_peer=True),
+        row(
+            "goal_change",
+            "goal moving at 0.1 m/s: lag from T on, largest",
+            lag[end:].max(),
+            "mm",
+            "<= 2",
+            PEER,
+            peer,
+            below_peer=True,
+        ),
         row("goal_change", "the same, without goal velocity", plain_lag[end:].max(), "mm", ""),
     ]
 
@@ -128,20 +151,36 @@ def noise_rows() -> list[Row]:
     speed = np.linalg.norm(velocities, axis=1)
     extra = np.linalg.norm(np.diff(positions - still, axis=0), axis=1) / CYCLE
     return [
-        row("goal_change", "still goal, 4 mm noise at 30 Hz: speed that the noise adds during the motion, RMS",
-            1000.0 * np.sqrt(np.mean(extra[:ended] ** 2)), "mm/s", ""),
+        row(
+            "goal_change",
+            "still goal, 4 mm noise at 30 Hz: speed that the noise adds during the motion, RMS",
+            1000.0 * np.sqrt(np.mean(extra[:ended] ** 2)),
+            "mm/s",
+            "",
+        ),
         row("goal_change", "still goal, 4 mm noise: end of the motion", ended * CYCLE / DURATION, "T", "<= 2"),
-        row("goal_change", "still goal, 4 mm noise: largest speed from 1 s after the end on",
-            1000.0 * speed[ended + round(1.0 / CYCLE):].max(), "mm/s", "<= 0"),
-        row("goal_change", "still goal, 4 mm noise: times it was followed again", events.count("follows_again"), "1",
-            "<= 0"),
+        row(
+            "goal_change",
+            "still goal, 4 mm noise: largest speed from 1 s after the end on",
+            1000.0 * speed[ended + round(1.0 / CYCLE) :].max(),
+            "mm/s",
+            "<= 0",
+        ),
+        row(
+            "goal_change",
+            "still goal, 4 mm noise: times it was followed again",
+            events.count("follows_again"),
+            "1",
+            "<= 0",
+        ),
     ]
 
 
 def switch_rows() -> list[Row]:
     """Another primitive and another ratio in mid-motion."""
-    other = cc.learn("other", [(1.6 * TIMES, DEMONSTRATION + 0.1 * np.outer(np.sin(np.pi * minimum_jerk(TIMES)),
-                                                                             [0, 0, 1]))])
+    other = cc.learn(
+        "other", [(1.6 * TIMES, DEMONSTRATION + 0.1 * np.outer(np.sin(np.pi * minimum_jerk(TIMES)), [0, 0, 1]))]
+    )
     worst = 0.0
     rng = np.random.default_rng(4)
     for _ in range(500):
@@ -150,8 +189,9 @@ def switch_rows() -> list[Row]:
             dmp.step(CYCLE, GOAL)
         position, velocity, phase = dmp.position, dmp.velocity, dmp.phase
         dmp.switch_to(other, GOAL, rng.uniform(0.5, 2.0))
-        worst = max(worst, np.abs(dmp.position - position).max(), np.abs(dmp.velocity - velocity).max(),
-                    abs(dmp.phase - phase))
+        worst = max(
+            worst, np.abs(dmp.position - position).max(), np.abs(dmp.velocity - velocity).max(), abs(dmp.phase - phase)
+        )
     return [row("goal_change", "switch_dmp: step in position, velocity and phase", worst, "m, m/s, 1", "<= 1e-9")]
 
 

@@ -1,8 +1,8 @@
 #!/usr/bin/python3
 """Tracking of random reaches at 200 Hz: the two-task IK beside plain whole-vector scaling and KDL's solvers.
 
-An ideal velocity robot follows the commands; joints stop at their limits, and reaches that touch one are reported apart.
-The same reaches are run through the bridge's interpolator as well.
+An ideal velocity robot follows the commands; joints stop at their limits, and reaches that touch one are reported
+apart. The same reaches are run through the bridge's interpolator as well.
 """
 
 import json
@@ -92,7 +92,7 @@ def rotate(q: np.ndarray, v: np.ndarray) -> np.ndarray:
     return multiply(multiply(q, np.append(v, 0.0)), conjugate(q))[:3]
 
 
-# Joint velocity for posture, reference and last joint velocity, and the share of the whole that the speed limits let pass.
+# Joint velocity for posture, reference and last joint velocity, and the share that the speed limits let pass.
 Solver = Callable[[np.ndarray, cc.CartesianReference, np.ndarray], tuple[np.ndarray, float]]
 
 
@@ -138,8 +138,9 @@ def kdl_solver(chain: cc.Chain, limits: cc.JointLimits, kind: str) -> Solver:
     joints, velocity = PyKDL.JntArray(7), PyKDL.JntArray(7)
 
     # The solver only refers to the chain, which must therefore live as long.
-    def solve(q: np.ndarray, reference: cc.CartesianReference, _: np.ndarray,
-              keep: object = tree) -> tuple[np.ndarray, float]:
+    def solve(
+        q: np.ndarray, reference: cc.CartesianReference, _: np.ndarray, keep: object = tree
+    ) -> tuple[np.ndarray, float]:
         position, orientation = chain.fk(q)
         linear = reference.velocity + GAIN * (reference.position - position)
         angular = reference.angular_velocity + GAIN * cc.rotation_between(orientation, reference.orientation)
@@ -157,11 +158,18 @@ def angle_between(p: np.ndarray, q: np.ndarray) -> float:
     return float(np.degrees(np.linalg.norm(cc.rotation_between(p, q))))
 
 
-def run(chain: cc.Chain, limits: cc.JointLimits, reach: Reach, primitive: cc.Primitive, solve: Solver,
-        waits: bool, interpolated: bool = False) -> Outcome:
+def run(
+    chain: cc.Chain,
+    limits: cc.JointLimits,
+    reach: Reach,
+    primitive: cc.Primitive,
+    solve: Solver,
+    waits: bool,
+    interpolated: bool = False,
+) -> Outcome:
     """One reach on an ideal velocity robot, or through the interpolator.
 
-    `waits`: the clock of the motion slows where limits slow the arm, as in the control cycle; else it runs on, as in D4.10.
+    `waits`: the clock of the motion slows where limits slow the arm, as in the control cycle; else it runs on.
     """
     motion, governor = cc.CartesianMotion(), cc.PhaseGovernor()
     motion.start(primitive, reach.position, reach.orientation, reach.goal, reach.target)
@@ -195,8 +203,9 @@ def run(chain: cc.Chain, limits: cc.JointLimits, reach: Reach, primitive: cc.Pri
     return outcome
 
 
-def rows_of(name: str, outcomes: list[Outcome], peer: str | None, peer_outcomes: list[Outcome] | None,
-            gated: bool) -> list[Row]:
+def rows_of(
+    name: str, outcomes: list[Outcome], peer: str | None, peer_outcomes: list[Outcome] | None, gated: bool
+) -> list[Row]:
     """Position and orientation errors over the reaches without a joint at its stop."""
 
     def figures(chosen: list[Outcome] | None) -> list[float | None]:
@@ -205,26 +214,54 @@ def rows_of(name: str, outcomes: list[Outcome], peer: str | None, peer_outcomes:
         free = [o for o in chosen if not o.stopped]
         worst = 1000.0 * np.array([o.worst for o in free])
         turned = np.array([o.turned for o in free])
-        return [float(np.percentile(worst, 95)), float(worst.max()), 100.0 * float(np.mean(turned > 3.0)),
-                float(sum(o.stopped for o in chosen))]
+        return [
+            float(np.percentile(worst, 95)),
+            float(worst.max()),
+            100.0 * float(np.mean(turned > 3.0)),
+            float(sum(o.stopped for o in chosen)),
+        ]
 
     ours, theirs = figures(outcomes), figures(peer_outcomes)
     return [
-        row("tracking", f"{name}: position error, 95th percentile", ours[0], "mm", "<= 0.3" if gated else "", peer,
-            theirs[0], below_peer=gated),
-        row("tracking", f"{name}: position error, largest", ours[1], "mm", "<= 1" if gated else "", peer, theirs[1],
-            below_peer=gated),
+        row(
+            "tracking",
+            f"{name}: position error, 95th percentile",
+            ours[0],
+            "mm",
+            "<= 0.3" if gated else "",
+            peer,
+            theirs[0],
+            below_peer=gated,
+        ),
+        row(
+            "tracking",
+            f"{name}: position error, largest",
+            ours[1],
+            "mm",
+            "<= 1" if gated else "",
+            peer,
+            theirs[1],
+            below_peer=gated,
+        ),
         row("tracking", f"{name}: reaches more than 3 deg off at the end", ours[2], "%", "", peer, theirs[2]),
-        row("tracking", f"{name}: reaches of {len(outcomes)} that touched a joint limit", ours[3], "1", "", peer,
-            theirs[3]),
+        row(
+            "tracking",
+            f"{name}: reaches of {len(outcomes)} that touched a joint limit",
+            ours[3],
+            "1",
+            "",
+            peer,
+            theirs[3],
+        ),
     ]
 
 
 def main() -> None:
     """Prints the rows as JSON."""
     chain, limits = cc.Chain(URDF.read_text()), cc.load_joint_limits(str(LIMITS))
-    primitive = cc.learn("reach", [(TIMES, np.outer(minimum_jerk(TIMES / DURATION), [0.5, 0.0, 0.0]))],
-                         mapping="similarity")
+    primitive = cc.learn(
+        "reach", [(TIMES, np.outer(minimum_jerk(TIMES / DURATION), [0.5, 0.0, 0.0]))], mapping="similarity"
+    )
     reaches = draw_reaches(chain, limits)
 
     def all_of(solver: Solver, waits: bool, interpolated: bool = False) -> list[Outcome]:
@@ -241,15 +278,27 @@ def main() -> None:
     over = max(o.over for o in ours + hurried + plain + through)
     rows = rows_of("rotation shrunk first", ours, "KDL wdls" if PyKDL else None, wdls, gated=True)
     rows += [
-        row("tracking", "rotation shrunk first: reaches slowed by more than 50 ms because translation alone met a limit",
-            slowed, "%", ""),
+        row(
+            "tracking",
+            "rotation shrunk first: reaches slowed by more than 50 ms because translation alone met a limit",
+            slowed,
+            "%",
+            "",
+        ),
         row("tracking", "rotation shrunk first: longest reach", max(o.duration for o in free), "s", ""),
     ]
-    rows += rows_of("rotation shrunk first, clock not slowed", hurried, "KDL wdls" if PyKDL else None, wdls, gated=False)
+    rows += rows_of(
+        "rotation shrunk first, clock not slowed", hurried, "KDL wdls" if PyKDL else None, wdls, gated=False
+    )
     rows += rows_of("whole vector scaled (plain D4.10)", plain, "KDL wdls" if PyKDL else None, wdls, gated=False)
     rows += [
-        row("tracking", "through the interpolator: position at the end, 95th percentile", np.percentile(ends, 95), "mm",
-            "<= 1"),
+        row(
+            "tracking",
+            "through the interpolator: position at the end, 95th percentile",
+            np.percentile(ends, 95),
+            "mm",
+            "<= 1",
+        ),
         row("tracking", "largest joint speed over its limit, all runs", over, "1", "<= 1.000000001"),
     ]
     json.dump(rows, sys.stdout, indent=1)

@@ -25,7 +25,7 @@ def row(
     peer_value: float | None = None,
     below_peer: bool = False,
 ) -> Row:
-    """One row; `goal` is empty (reported only) or "<= number" or "< number"; `below_peer` also asks to beat the peer."""
+    """One row; `goal` is "" (reported only), "<= number" or "< number"; `below_peer` also asks to beat the peer."""
     ok = True
     if goal:
         sign, number = goal.split()

@@ -1,7 +1,11 @@
-// Times the parts of a control cycle beside KDL's velocity solvers, for bench_dmp.py and bench_ik.py.
-// Prints one JSON object {name: microseconds per call}: medians over blocks that alternate between all candidates.
+// Times the parts of a control cycle beside KDL's velocity solvers, for bench_dmp.py and
+// bench_ik.py. Prints one JSON object: microseconds of processor time per call by name, medians
+// over blocks that alternate between all candidates, and the cycle's share of each KDL cycle as the
+// median of the blocks' ratios.
+#include <time.h>
+
 #include <algorithm>
-#include <chrono>
+#include <cmath>
 #include <cstdio>
 #include <fstream>
 #include <functional>
@@ -27,13 +31,26 @@ namespace {
 
 constexpr int kPostures = 256, kBlocks = 401, kCallsPerBlock = 240;
 
+// Processor time of this thread, us: what other processes do does not count.
+double now() {
+  timespec time{};
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
+  return 1e6 * static_cast<double>(time.tv_sec) + 1e-3 * static_cast<double>(time.tv_nsec);
+}
+
+double median(std::vector<double> values) {
+  std::nth_element(values.begin(), values.begin() + values.size() / 2, values.end());
+  return values[values.size() / 2];
+}
+
 struct Candidate {
   std::string name;
   std::function<double(int)> call;  // returns something that depends on the result
   std::vector<double> times;
 };
 
-// The cycle as a user of KDL writes it: pose error, twist, velocity solver, scaling of the whole vector.
+// The cycle as a user of KDL writes it: pose error, twist, velocity solver, scaling of the whole
+// vector.
 template <typename Solver>
 JointVector kdlCycle(KDL::ChainFkSolverPos_recursive& fk, Solver& solver, const JointVector& q,
                      const CartesianReference& reference, const JointVector& limit) {
@@ -43,7 +60,8 @@ JointVector kdlCycle(KDL::ChainFkSolverPos_recursive& fk, Solver& solver, const 
   fk.JntToCart(joints, now);
   const Vector3& p = reference.pose.position;
   const Quaternion& o = reference.pose.orientation;
-  const KDL::Frame wanted(KDL::Rotation::Quaternion(o.x(), o.y(), o.z(), o.w()), KDL::Vector(p.x(), p.y(), p.z()));
+  const KDL::Frame wanted(KDL::Rotation::Quaternion(o.x(), o.y(), o.z(), o.w()),
+                          KDL::Vector(p.x(), p.y(), p.z()));
   const KDL::Twist error = KDL::diff(now, wanted);
   const Vector3 &v = reference.velocity, &w = reference.angular_velocity;
   const KDL::Twist twist(KDL::Vector(v.x(), v.y(), v.z()) + 20.0 * error.vel,
@@ -113,7 +131,8 @@ int main(int argc, char** argv) {
   std::vector<Candidate> candidates = {
       {"dmp_step_20",
        [&](int i) {
-         if (i % 240 == 0) dmp.start(plan.system, Vector3::Zero(), Vector3::Zero(), goal.position, 1.0);
+         if (i % 240 == 0)
+           dmp.start(plan.system, Vector3::Zero(), Vector3::Zero(), goal.position, 1.0);
          return dmp.step(0.005, goal.position).position.x();
        },
        {}},
@@ -139,10 +158,14 @@ int main(int argc, char** argv) {
        },
        {}},
       {"kdl_pinv",
-       [&](int i) { return kdlCycle(fk, pinv, postures[i % kPostures], references[i % kPostures], limit)[0]; },
+       [&](int i) {
+         return kdlCycle(fk, pinv, postures[i % kPostures], references[i % kPostures], limit)[0];
+       },
        {}},
       {"kdl_wdls",
-       [&](int i) { return kdlCycle(fk, wdls, postures[i % kPostures], references[i % kPostures], limit)[0]; },
+       [&](int i) {
+         return kdlCycle(fk, wdls, postures[i % kPostures], references[i % kPostures], limit)[0];
+       },
        {}},
       {"cycle",
        [&](int i) {
@@ -175,18 +198,27 @@ int main(int argc, char** argv) {
   double sink = 0.0;
   for (int block = 0; block < kBlocks; ++block) {
     for (Candidate& candidate : candidates) {
-      const auto begin = std::chrono::steady_clock::now();
+      const double begin = now();
       for (int i = 0; i < kCallsPerBlock; ++i) sink += candidate.call(i);
-      const std::chrono::duration<double, std::micro> spent = std::chrono::steady_clock::now() - begin;
-      candidate.times.push_back(spent.count() / kCallsPerBlock);
+      candidate.times.push_back((now() - begin) / kCallsPerBlock);
     }
   }
   std::printf("{");
-  for (Candidate& candidate : candidates) {
-    std::nth_element(candidate.times.begin(), candidate.times.begin() + kBlocks / 2, candidate.times.end());
-    std::printf("\"%s\": %.4f, ", candidate.name.c_str(), candidate.times[kBlocks / 2]);
+  for (const Candidate& candidate : candidates) {
+    std::printf("\"%s\": %.4f, ", candidate.name.c_str(), median(candidate.times));
+  }
+  const auto times = [&](const std::string& name) -> const std::vector<double>& {
+    return std::find_if(candidates.begin(), candidates.end(),
+                        [&](const Candidate& c) { return c.name == name; })
+        ->times;
+  };
+  for (const char* peer : {"wdls", "pinv"}) {
+    std::vector<double> shares = times("cycle");
+    for (int i = 0; i < kBlocks; ++i) shares[i] /= times(std::string("cycle_kdl_") + peer)[i];
+    std::printf("\"share_of_kdl_%s\": %.4f, ", peer, median(shares));
   }
   // The sum keeps the compiler from dropping calls.
-  std::printf("\"calls\": %d, \"finite\": %s}\n", kCallsPerBlock * kBlocks, std::isfinite(sink) ? "true" : "false");
+  std::printf("\"calls\": %d, \"finite\": %s}\n", kCallsPerBlock * kBlocks,
+              std::isfinite(sink) ? "true" : "false");
   return 0;
 }

@@ -14,15 +14,16 @@ library.load(str(PRIMITIVES))
 start = np.array([0.9, 0.9, -0.4, -1.5, 0.3, 0.9, 0.2])
 position, orientation = chain.fk(start)
 goal = position + [0.1, -0.45, 0.15]
+target = chain.fk(start + [0.0, 0.0, 0.0, 0.0, 0.6, -0.5, 0.4])[1]
 
 figure, axes = pyplot.subplots(3, sharex=True, figsize=(7, 6))
 for first, label in ((True, "rotation shrunk first"), (False, "whole vector scaled")):
     ik = cc.TwoTaskIk(rotation_first_scaling=first, velocity_limit=0.6 * limits.velocity)
     motion, q, velocity = cc.CartesianMotion(), start.copy(), np.zeros(7)
-    motion.start(library["reach_human"], position, orientation, goal, cc.exp_rotation([0.0, 0.9, 0.3]))
+    motion.start(library["reach_human"], position, orientation, goal, target)
     errors, angles, shares = [], [], []
     for _ in range(360):
-        reference = motion.step(CYCLE, goal, cc.exp_rotation([0.0, 0.9, 0.3]))
+        reference = motion.step(CYCLE, goal, target)
         result = ik.solve(chain, q, reference, velocity=velocity, dt=CYCLE)
         velocity = result.velocity
         errors.append(1000.0 * np.linalg.norm(result.position_error))

@@ -9,12 +9,12 @@ import coglab_controllers as cc
 CYCLE = 0.005
 chain = cc.Chain(URDF.read_text())
 limits = cc.load_joint_limits(str(LIMITS))
-guard = cc.Guard(chain, limits, cc.WorkspaceParameters(box_max=[1.2, 0.45, 1.6]), hand_speed=0.5)
+guard = cc.Guard(chain, limits, cc.WorkspaceParameters(box_max=[1.2, 0.45, 1.6]), hand_speed=0.4)
 interpolator = cc.Interpolator(limits)
 interpolator.reset(np.array([0.0, 0.6, 0.0, -1.2, 0.0, 0.8, 0.0]))
-request = np.array([1.2, 0.0, 0.0, 0.0, 0.4, 0.3, 2.5])
+request = np.array([0.5, 0.2, 0.0, 0.3, 0.4, 0.0, 1.4])
 
-time, scales, reasons = CYCLE * np.arange(400), [], []
+time, scales, reasons = CYCLE * np.arange(600), [], []
 for _ in time:
     result = guard.limit(chain, interpolator.position, request, CYCLE)
     interpolator.step(result.velocity, CYCLE)

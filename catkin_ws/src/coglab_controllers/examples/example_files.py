@@ -7,7 +7,7 @@ import matplotlib
 import numpy as np
 
 matplotlib.use("Agg")
-from matplotlib import pyplot  # noqa: E402  (the backend has to be chosen first)
+from matplotlib import pyplot
 
 PACKAGE = Path(__file__).resolve().parent.parent
 URDF = PACKAGE.parent / "lwr_description" / "urdf" / "lwr_ih2.urdf"

@@ -34,12 +34,8 @@ def demonstrations() -> list[tuple[str, str, str, np.ndarray, np.ndarray]]:
     zero = np.zeros(SAMPLES)
     straight = np.stack([0.5 * minimum_jerk(u), zero, zero], axis=1)
     # To the board: forward first, down last, so that the hand comes from above.
-    take = np.stack(
-        [0.4 * minimum_jerk(u / 0.8), zero, 0.06 * lift(u) - 0.2 * minimum_jerk((u - 0.25) / 0.75)], axis=1
-    )
-    put = np.stack(
-        [0.4 * minimum_jerk(u / 0.75), zero, 0.10 * lift(u) - 0.2 * minimum_jerk((u - 0.3) / 0.7)], axis=1
-    )
+    take = np.stack([0.4 * minimum_jerk(u / 0.8), zero, 0.06 * lift(u) - 0.2 * minimum_jerk((u - 0.25) / 0.75)], axis=1)
+    put = np.stack([0.4 * minimum_jerk(u / 0.75), zero, 0.10 * lift(u) - 0.2 * minimum_jerk((u - 0.3) / 0.7)], axis=1)
     return [
         ("reach_human", "Straight reach to a person's hand, to take an object.", "similarity", 1.2 * u, straight),
         ("give_human", "Straight reach to a person's hand, to give an object.", "similarity", 1.2 * u, straight),

@@ -54,14 +54,16 @@ TEST(Allocation, TheCounterCounts) {
 TEST(Allocation, AWholeCycleTouchesNoHeap) {
   Random random(1);
   const Primitive one = randomPrimitive(random), two = randomPrimitive(random);
-  const CartesianMotionPlan plan{TransformationSystem(one), 1.0, true}, other{TransformationSystem(two), 1.5, true};
+  const CartesianMotionPlan plan{TransformationSystem(one), 1.0, true},
+      other{TransformationSystem(two), 1.5, true};
   CartesianMotion motion;
   const TwoTaskIk ik;
   const PostureTask posture(JointVector::Zero(), 1.0);
   Guard guard(GuardParameters{}, robot());
   PhaseGovernor governor;
   const JointVector home = random.posture(1.0);
-  const PtpTrajectory trajectory(home, random.joints(0.5), JointVector::Zero(), JointVector::Ones(), JointVector::Ones());
+  const PtpTrajectory trajectory(home, random.joints(0.5), JointVector::Zero(), JointVector::Ones(),
+                                 JointVector::Ones());
   long seen = 0;
   {
     Counted counted;

@@ -14,7 +14,8 @@ constexpr double kCycle = 0.005;
 CartesianMotionPlan reachPlan(double duration = 1.0, double length = 0.51) {
   LearningOptions options;
   options.mapping = ShapeMapping::Similarity;
-  const Primitive p = learn("reach", {minimumJerkReach(Vector3::Zero(), Vector3(length, 0, 0), duration)}, options);
+  const Primitive p =
+      learn("reach", {minimumJerkReach(Vector3::Zero(), Vector3(length, 0, 0), duration)}, options);
   return {TransformationSystem(p), 1.0, true};
 }
 
@@ -116,7 +117,8 @@ TEST(OrientationCurve, StartsAndEndsAsGiven) {
     ASSERT_LT(curve.at(0.0).angularDistance(start), 1e-7);
     ASSERT_LT(curve.at(1.0).angularDistance(target), 1e-7);
     const double h = 1e-6;
-    ASSERT_LT((rotationBetween(curve.at(0.0), curve.at(h)) / (h * duration) - velocity).norm(), 1e-3);
+    ASSERT_LT((rotationBetween(curve.at(0.0), curve.at(h)) / (h * duration) - velocity).norm(),
+              1e-3);
     ASSERT_LT(rotationBetween(curve.at(1.0 - h), curve.at(1.0)).norm() / h, 1e-3);
   }
 }
@@ -144,17 +146,21 @@ TEST(OrientationCurve, ATargetThatPassesHalfATurnMakesNoJump) {
 TEST(MotionEnd, LatchesAndFollowsAgainOutsideTheBall) {
   using Event = MotionEnd::Event;
   MotionEnd end;
-  const Vector3 goal(0.5, 0, 0), near = goal + Vector3(0, 0.029, 0), far = goal + Vector3(0, 0.031, 0);
+  const Vector3 goal(0.5, 0, 0), near = goal + Vector3(0, 0.029, 0),
+                                 far = goal + Vector3(0, 0.031, 0);
   EXPECT_EQ(end.update(kCycle, 0.5, 0.0, 0.0, goal, goal, goal), Event::None);
   EXPECT_EQ(end.update(kCycle, 0.001, 0.1, 0.0, goal, goal, goal), Event::None);
   EXPECT_EQ(end.update(kCycle, 0.001, 0.001, 0.5, goal, goal, goal), Event::None);
-  EXPECT_EQ(end.update(kCycle, 0.001, 0.001, 0.0, goal + Vector3(0.01, 0, 0), goal, goal), Event::None);
+  EXPECT_EQ(end.update(kCycle, 0.001, 0.001, 0.0, goal + Vector3(0.01, 0, 0), goal, goal),
+            Event::None);
   EXPECT_EQ(end.update(kCycle, 0.001, 0.001, 0.0, goal, goal, goal), Event::Ended);
-  for (int i = 0; i < 1000; ++i) EXPECT_EQ(end.update(kCycle, 0, 0, 0, goal, goal, near), Event::None);
+  for (int i = 0; i < 1000; ++i)
+    EXPECT_EQ(end.update(kCycle, 0, 0, 0, goal, goal, near), Event::None);
   for (int i = 0; i < 39; ++i) EXPECT_EQ(end.update(kCycle, 0, 0, 0, goal, goal, far), Event::None);
   EXPECT_EQ(end.update(kCycle, 0, 0, 0, goal, goal, near), Event::None);
   int cycles = 1;
-  while (end.update(kCycle, 0, 0, 0, goal, goal, far) != Event::FollowsAgain) ASSERT_LT(++cycles, 100);
+  while (end.update(kCycle, 0, 0, 0, goal, goal, far) != Event::FollowsAgain)
+    ASSERT_LT(++cycles, 100);
   EXPECT_NEAR(cycles * kCycle, 0.2, 0.006);
   EXPECT_FALSE(end.latched());
 }
@@ -197,7 +203,8 @@ TEST(CartesianMotion, AGoalStepMakesNoAccelerationStep) {
 TEST(CartesianMotion, FollowsAMovingGoal) {
   CartesianMotion motion;
   const Vector3 speed(0.0, 0.1, 0.0);
-  motion.start(reachPlan(), at(Vector3::Zero()), Vector3::Zero(), Vector3::Zero(), at(Vector3(0.51, 0, 0)));
+  motion.start(reachPlan(), at(Vector3::Zero()), Vector3::Zero(), Vector3::Zero(),
+               at(Vector3(0.51, 0, 0)));
   for (int i = 0; i < 400; ++i) {
     const Vector3 goal = Vector3(0.51, 0, 0) + i * kCycle * speed;
     motion.step(kCycle, at(goal));
@@ -214,7 +221,9 @@ TEST(CartesianMotion, ANoisyGoalDoesNotMoveAnArmThatHasArrived) {
   Pose seen = at(goal);
   double ended = 1e9;
   for (int i = 0; i < 1200; ++i) {
-    if (i % 7 == 0) seen.position = goal + Vector3(random.normal(0.004), random.normal(0.004), random.normal(0.004));
+    if (i % 7 == 0)
+      seen.position =
+          goal + Vector3(random.normal(0.004), random.normal(0.004), random.normal(0.004));
     const CartesianReference& reference = motion.step(kCycle, seen);
     if (motion.event() == MotionEnd::Event::Ended) ended = i * kCycle;
     EXPECT_NE(motion.event(), MotionEnd::Event::FollowsAgain);

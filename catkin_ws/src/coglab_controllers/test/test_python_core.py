@@ -214,7 +214,9 @@ def test_ik_equals_numpy(chain: cc.Chain) -> None:
         q = rng.uniform(-1.8, 1.8, 7)
         position, orientation = chain.fk(q)
         reference = cc.CartesianReference(
-            position + rng.normal(scale=0.002, size=3), orientation, rng.normal(scale=0.1, size=3),
+            position + rng.normal(scale=0.002, size=3),
+            orientation,
+            rng.normal(scale=0.1, size=3),
             rng.normal(scale=0.1, size=3),
         )
         result = ik.solve(chain, q, reference)

@@ -193,9 +193,7 @@ class CartesianMotion:
         orientation_control: bool = True,
     ) -> None:
         """Another primitive or ratio in mid-motion; phase, position and velocity are kept."""
-    def step(
-        self, dt: float, goal: ArrayLike, target: ArrayLike = ..., rate: float = 1.0
-    ) -> CartesianReference:
+    def step(self, dt: float, goal: ArrayLike, target: ArrayLike = ..., rate: float = 1.0) -> CartesianReference:
         """One cycle with the newest goal as received."""
     def stop(self) -> None:
         """Ends the motion where it is."""
@@ -340,8 +338,8 @@ class TwoTaskIk:
         velocity: ArrayLike = ...,
         dt: float = 0.0,
     ) -> IkResult:
-        """Joint velocities at q (7,); `task` replaces the orientation as second task. With the present joint velocity (7,)
-        and the cycle time the Jacobian is that of the middle of the cycle."""
+        """Joint velocities at q (7,); `task` replaces the orientation as second task. With the present joint
+        velocity (7,) and the cycle time the Jacobian is that of the middle of the cycle."""
 
 class JointLimits:
     """The robot's table of joint limits; arrays (7,), rad, rad/s, rad/s^2, rad/s^3, Nm."""

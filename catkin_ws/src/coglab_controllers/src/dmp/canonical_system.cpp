@@ -16,6 +16,8 @@ double CanonicalSystem::advance(double s, double dt, double tau) const noexcept 
   return s * std::exp(-alpha_ * dt / tau);
 }
 
-double CanonicalSystem::timeAt(double s, double tau) const noexcept { return -std::log(s) * tau / alpha_; }
+double CanonicalSystem::timeAt(double s, double tau) const noexcept {
+  return -std::log(s) * tau / alpha_;
+}
 
 }  // namespace coglab_controllers

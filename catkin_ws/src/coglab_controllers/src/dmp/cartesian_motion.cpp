@@ -7,16 +7,19 @@
 namespace coglab_controllers {
 namespace {
 
-// Below this the set-point is put to rest at the latched goal (m/s and m); far less than an encoder step.
+// Below this the set-point is put to rest at the latched goal (m/s and m); far less than an encoder
+// step.
 constexpr double kRestSpeed = 1e-4, kRestDistance = 1e-4;
 
 }  // namespace
 
-CartesianMotion::CartesianMotion(const GoalEstimatorParameters& estimator, const MotionEndParameters& end)
+CartesianMotion::CartesianMotion(const GoalEstimatorParameters& estimator,
+                                 const MotionEndParameters& end)
     : goal_estimator_(estimator), orientation_estimator_(estimator), end_(end) {}
 
-void CartesianMotion::start(const CartesianMotionPlan& plan, const Pose& pose, const Vector3& velocity,
-                            const Vector3& angular_velocity, const Pose& goal) noexcept {
+void CartesianMotion::start(const CartesianMotionPlan& plan, const Pose& pose,
+                            const Vector3& velocity, const Vector3& angular_velocity,
+                            const Pose& goal) noexcept {
   goal_estimator_.reset(goal.position);
   orientation_estimator_.reset(goal.orientation);
   end_.reset();
@@ -24,7 +27,8 @@ void CartesianMotion::start(const CartesianMotionPlan& plan, const Pose& pose, c
   orientation_ = pose.orientation.normalized();
   curve_.start(orientation_, angular_velocity, goal.orientation, dmp_.tau());
   curve_begin_ = 0.0;
-  reference_ = {{pose.position, orientation_}, velocity, angular_velocity, plan.orientation_control};
+  reference_ = {
+      {pose.position, orientation_}, velocity, angular_velocity, plan.orientation_control};
   goal_ = goal.position;
   remaining_distance_ = (goal.position - pose.position).norm();
   phase_ = Phase::Running;
@@ -55,7 +59,8 @@ const CartesianReference& CartesianMotion::step(double dt, const Pose& goal, dou
   if (end_.latched()) {
     goal_ = end_.latchedGoal();
   } else {
-    // g and g' at the beginning of the cycle go into eq. (1); the estimator then follows to its end.
+    // g and g' at the beginning of the cycle go into eq. (1); the estimator then follows to its
+    // end.
     goal_ = goal_estimator_.position();
     goal_velocity = goal_estimator_.velocity();
     if (!goal_estimator_.enabled()) goal_ = goal.position;
@@ -77,8 +82,10 @@ const CartesianReference& CartesianMotion::step(double dt, const Pose& goal, dou
 
   // Seen on the clock of the motion: a motion that is slowed to a standstill has not ended.
   const double clock = std::max(rate, 1e-3);
-  const double turning = reference_.orientation_control ? reference_.angular_velocity.norm() / clock : 0.0;
-  event_ = end_.update(dt, state.phase, reference_.velocity.norm() / clock, turning, state.position, goal_, goal.position);
+  const double turning =
+      reference_.orientation_control ? reference_.angular_velocity.norm() / clock : 0.0;
+  event_ = end_.update(dt, state.phase, reference_.velocity.norm() / clock, turning, state.position,
+                       goal_, goal.position);
   if (event_ == MotionEnd::Event::Ended) phase_ = Phase::Ended;
   if (event_ == MotionEnd::Event::FollowsAgain) {
     phase_ = Phase::Running;

@@ -8,14 +8,15 @@
 namespace coglab_controllers {
 namespace {
 
-// Longest sub-step of the integration, as a share of the fastest time constant of the linear part and of the distance
-// in time of two basis functions: the error of a whole motion is then some micrometres at most, whatever the cycle time.
+// Longest sub-step of the integration, as a share of the fastest time constant of the linear part
+// and of the distance in time of two basis functions: the error of a whole motion is then some
+// micrometres at most, whatever the cycle time.
 constexpr double kPoleShare = 0.1, kBasisShare = 0.5;
 
 }  // namespace
 
-void Dmp::start(const TransformationSystem& system, const Vector3& position, const Vector3& velocity,
-                const Vector3& goal, double ratio) noexcept {
+void Dmp::start(const TransformationSystem& system, const Vector3& position,
+                const Vector3& velocity, const Vector3& goal, double ratio) noexcept {
   system_ = system;
   tau_ = ratio * system_.duration();
   start_ = position;
@@ -33,10 +34,12 @@ void Dmp::switchTo(const TransformationSystem& system, const Vector3& goal, doub
 
 void Dmp::setRatio(double ratio) noexcept { tau_ = ratio * system_.duration(); }
 
-const DmpState& Dmp::step(double dt, const Vector3& goal, const Vector3& goal_velocity, double rate) noexcept {
+const DmpState& Dmp::step(double dt, const Vector3& goal, const Vector3& goal_velocity,
+                          double rate) noexcept {
   const double total = dt * rate;
   if (!(total > 0.0)) return state_;
-  // Seen from a slowed clock the goal moves faster; a clock that nearly stands does not run after it.
+  // Seen from a slowed clock the goal moves faster; a clock that nearly stands does not run after
+  // it.
   const Vector3 goal_rate = goal_velocity / std::max(rate, 0.1);
   const double pole = tau_ / std::max(std::sqrt(system_.stiffness()), 0.5 * system_.damping());
   const double longest = std::min(kPoleShare * pole, kBasisShare * tau_ / system_.basisCount());
@@ -81,8 +84,9 @@ double Dmp::remainingTime() const noexcept { return (1.0 - progress()) * tau_; }
 
 void requireRatio(double ratio) {
   if (ratio >= 0.05 && ratio <= 100.0) return;
-  throw std::invalid_argument("dmp_ratio: expected a number from 0.05 to 100 (1: duration of the demonstration), got " +
-                              std::to_string(ratio));
+  throw std::invalid_argument(
+      "dmp_ratio: expected a number from 0.05 to 100 (1: duration of the demonstration), got " +
+      std::to_string(ratio));
 }
 
 }  // namespace coglab_controllers

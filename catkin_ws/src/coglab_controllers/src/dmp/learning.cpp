@@ -11,10 +11,12 @@
 namespace coglab_controllers {
 namespace {
 
-constexpr int kGridSteps = 600;       // integration steps per duration
-constexpr double kHoldShare = 0.3;    // how long after its end a motion must stay at the goal, in durations
-constexpr double kHoldWeight = 0.3;   // weight of that, against the motion itself
-constexpr double kRestSpeed = 0.1;    // a demonstration that ends slower than this share of its mean speed ends at rest
+constexpr int kGridSteps = 600;  // integration steps per duration
+constexpr double kHoldShare =
+    0.3;  // how long after its end a motion must stay at the goal, in durations
+constexpr double kHoldWeight = 0.3;  // weight of that, against the motion itself
+constexpr double kRestSpeed =
+    0.1;  // a demonstration that ends slower than this share of its mean speed ends at rest
 
 // One demonstration, prepared: time from its start, the goal is its last point.
 struct Example {
@@ -26,7 +28,8 @@ struct Example {
 };
 
 // Response of the linear system to everything it is linear in, column by column:
-// the basis functions, the goal (times w), the start (times 1 - w and as initial position), the start velocity.
+// the basis functions, the goal (times w), the start (times 1 - w and as initial position), the
+// start velocity.
 class Responses {
  public:
   Responses(const Primitive& primitive, double duration)
@@ -61,7 +64,8 @@ class Responses {
     const int last = static_cast<int>(positions_.rows()) - 2;
     const int i = std::clamp(static_cast<int>(t / step_), 0, last);
     const double u = t / step_ - i, r = 1.0 - u;
-    return (1.0 + 2.0 * u) * r * r * positions_.row(i) + u * u * (3.0 - 2.0 * u) * positions_.row(i + 1) +
+    return (1.0 + 2.0 * u) * r * r * positions_.row(i) +
+           u * u * (3.0 - 2.0 * u) * positions_.row(i + 1) +
            step_ * u * r * (r * velocities_.row(i) - u * velocities_.row(i + 1));
   }
 
@@ -69,7 +73,8 @@ class Responses {
   Eigen::RowVectorXd inputs(double time) const {  // time in durations
     const double s = std::exp(-primitive_.alpha * time), w = primitive_.goal_weight(s);
     Eigen::RowVectorXd result = Eigen::RowVectorXd::Zero(count_ + 3);
-    const Eigen::ArrayXd exponent = -primitive_.widths.array() * (s - primitive_.centres.array()).square();
+    const Eigen::ArrayXd exponent =
+        -primitive_.widths.array() * (s - primitive_.centres.array()).square();
     const Eigen::ArrayXd psi = (exponent - exponent.maxCoeff()).exp();
     result.head(count_) = ((1.0 - w) * primitive_.stiffness / psi.sum() * psi).matrix().transpose();
     result[count_] = w * primitive_.stiffness;
@@ -90,7 +95,8 @@ class Responses {
 Example prepare(const Trajectory& trajectory) {
   Example example;
   const Eigen::Index count = trajectory.positions.cols();
-  example.times = Eigen::Map<const Eigen::VectorXd>(trajectory.times.data(), count).array() - trajectory.times[0];
+  example.times = Eigen::Map<const Eigen::VectorXd>(trajectory.times.data(), count).array() -
+                  trajectory.times[0];
   example.positions = trajectory.positions;
   example.duration = example.times[count - 1];
   example.scale = 0.0;
@@ -98,36 +104,43 @@ Example prepare(const Trajectory& trajectory) {
     example.scale += (example.positions.col(i) - example.positions.col(i - 1)).norm();
   }
   if (example.scale < 1e-4) {
-    throw std::invalid_argument("expected a path of at least 0.1 mm, got one of " + std::to_string(example.scale) + " m");
+    throw std::invalid_argument("expected a path of at least 0.1 mm, got one of " +
+                                std::to_string(example.scale) + " m");
   }
   const Eigen::Index tail = std::max<Eigen::Index>(1, count / 50);
   const Vector3 last = example.positions.col(count - 1) - example.positions.col(count - 1 - tail);
-  const double end_speed = last.norm() / (example.times[count - 1] - example.times[count - 1 - tail]);
+  const double end_speed =
+      last.norm() / (example.times[count - 1] - example.times[count - 1 - tail]);
   example.ends_at_rest = end_speed < kRestSpeed * example.scale / example.duration;
   return example;
 }
 
 // Mapped and shifted so that start and goal are those of the reference.
 void alignTo(const Example& reference, ShapeMapping mapping, Example& example) {
-  const auto line = [](const Example& e) -> Vector3 { return e.positions.rightCols<1>() - e.positions.leftCols<1>(); };
+  const auto line = [](const Example& e) -> Vector3 {
+    return e.positions.rightCols<1>() - e.positions.leftCols<1>();
+  };
   if (line(example).norm() < 1e-3 || line(reference).norm() < 1e-3) return;
   const Matrix3 map = shapeMap(mapping, line(example), line(reference));
   const Vector3 start = example.positions.col(0), reference_start = reference.positions.col(0);
   example.scale *= line(reference).norm() / line(example).norm();
-  example.positions = ((map * (example.positions.colwise() - start)).colwise() + reference_start).eval();
+  example.positions =
+      ((map * (example.positions.colwise() - start)).colwise() + reference_start).eval();
 }
 
 }  // namespace
 
 Primitive learn(const std::string& id, const std::vector<Trajectory>& demonstrations,
                 const LearningOptions& options) {
-  if (demonstrations.empty()) throw std::invalid_argument("expected at least one demonstration, got none");
+  if (demonstrations.empty())
+    throw std::invalid_argument("expected at least one demonstration, got none");
   if (options.basis_count < 2 || options.basis_count > kMaxBasis) {
-    throw std::invalid_argument("basis_count: expected 2 to " + std::to_string(kMaxBasis) + ", got " +
-                                std::to_string(options.basis_count));
+    throw std::invalid_argument("basis_count: expected 2 to " + std::to_string(kMaxBasis) +
+                                ", got " + std::to_string(options.basis_count));
   }
   if (!(options.regularisation >= 0.0 && options.regularisation <= 1.0)) {
-    throw std::invalid_argument("regularisation: expected 0 to 1, got " + std::to_string(options.regularisation));
+    throw std::invalid_argument("regularisation: expected 0 to 1, got " +
+                                std::to_string(options.regularisation));
   }
   std::vector<Example> examples;
   for (std::size_t i = 0; i < demonstrations.size(); ++i) {
@@ -137,7 +150,8 @@ Primitive learn(const std::string& id, const std::vector<Trajectory>& demonstrat
     } catch (const std::invalid_argument& error) {
       throw std::invalid_argument("demonstration " + std::to_string(i + 1) + ": " + error.what());
     }
-    if (options.mapping != ShapeMapping::None && i > 0) alignTo(examples.front(), options.mapping, examples.back());
+    if (options.mapping != ShapeMapping::None && i > 0)
+      alignTo(examples.front(), options.mapping, examples.back());
   }
 
   Primitive primitive;
@@ -159,7 +173,8 @@ Primitive learn(const std::string& id, const std::vector<Trajectory>& demonstrat
   validate(primitive);
 
   // Unknowns: the weights, and the start velocity of each demonstration.
-  const Eigen::Index n = options.basis_count, unknowns = n + static_cast<Eigen::Index>(examples.size());
+  const Eigen::Index n = options.basis_count,
+                     unknowns = n + static_cast<Eigen::Index>(examples.size());
   Eigen::Index rows = unknowns;
   for (const Example& example : examples) {
     rows += example.times.size();
@@ -180,16 +195,20 @@ Primitive learn(const std::string& id, const std::vector<Trajectory>& demonstrat
       b.row(row) = weight * (position - response[n] * goal - response[n + 1] * start);
       ++row;
     };
-    const double weight = 1.0 / (example.scale * std::sqrt(static_cast<double>(example.times.size())));
+    const double weight =
+        1.0 / (example.scale * std::sqrt(static_cast<double>(example.times.size())));
     for (Eigen::Index i = 0; i < example.times.size(); ++i) {
       add(example.times[i], example.positions.col(i).transpose(), weight);
     }
     if (!example.ends_at_rest) continue;
     const int holds = kGridSteps / 10;
-    const double hold_weight = kHoldWeight / (example.scale * std::sqrt(static_cast<double>(holds)));
-    for (int i = 1; i <= holds; ++i) add(example.duration * (1.0 + kHoldShare * i / holds), goal, hold_weight);
+    const double hold_weight =
+        kHoldWeight / (example.scale * std::sqrt(static_cast<double>(holds)));
+    for (int i = 1; i <= holds; ++i)
+      add(example.duration * (1.0 + kHoldShare * i / holds), goal, hold_weight);
   }
-  const double ridge = std::sqrt(options.regularisation * a.leftCols(n).squaredNorm() / static_cast<double>(n));
+  const double ridge =
+      std::sqrt(options.regularisation * a.leftCols(n).squaredNorm() / static_cast<double>(n));
   for (Eigen::Index i = 0; i < n; ++i) a(row + i, i) = ridge;
   const Eigen::MatrixX3d solution = a.colPivHouseholderQr().solve(b);
   primitive.weights = solution.topRows(n).transpose();
@@ -198,9 +217,11 @@ Primitive learn(const std::string& id, const std::vector<Trajectory>& demonstrat
   return primitive;
 }
 
-Eigen::Matrix3Xd reproduce(const Primitive& primitive, const std::vector<double>& times, double dt) {
+Eigen::Matrix3Xd reproduce(const Primitive& primitive, const std::vector<double>& times,
+                           double dt) {
   Dmp dmp;
-  dmp.start(TransformationSystem(primitive), primitive.start, primitive.start_velocity, primitive.goal, 1.0);
+  dmp.start(TransformationSystem(primitive), primitive.start, primitive.start_velocity,
+            primitive.goal, 1.0);
   Eigen::Matrix3Xd result(3, static_cast<Eigen::Index>(times.size()));
   const double begin = times.empty() ? 0.0 : times.front();
   double now = 0.0;

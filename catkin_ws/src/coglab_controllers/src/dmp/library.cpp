@@ -24,7 +24,8 @@ GoalWeight readGoalWeight(const Element& element) {
   GoalWeight weight;
   const std::string kind = element.text("kind");
   if (kind == "linear") {
-    if (element.has("centre") || element.has("steepness")) element.fail("centre and steepness need kind=\"sigmoid\"");
+    if (element.has("centre") || element.has("steepness"))
+      element.fail("centre and steepness need kind=\"sigmoid\"");
     return weight;
   }
   if (kind != "sigmoid") element.fail("kind: expected linear or sigmoid, got '" + kind + "'");
@@ -47,7 +48,8 @@ Trajectory readTrajectory(const std::string& file, const tinyxml2::XMLElement& x
   library_xml::requireElementsOnly(file, xml);
   std::vector<Vector3> positions;
   Trajectory trajectory;
-  for (const auto* child = xml.FirstChildElement(); child != nullptr; child = child->NextSiblingElement()) {
+  for (const auto* child = xml.FirstChildElement(); child != nullptr;
+       child = child->NextSiblingElement()) {
     const Element sample(file, *child, {"t", "position"});
     if (std::string(child->Name()) != "sample") sample.fail("expected <sample>");
     library_xml::requireElementsOnly(file, *child);
@@ -75,7 +77,8 @@ class PrimitiveReader {
   PrimitiveReader(const std::string& file, const tinyxml2::XMLElement& xml)
       : file_(file), element_(file, xml, {"id", "description"}) {
     library_xml::requireElementsOnly(file, xml);
-    for (const auto* child = xml.FirstChildElement(); child != nullptr; child = child->NextSiblingElement()) {
+    for (const auto* child = xml.FirstChildElement(); child != nullptr;
+         child = child->NextSiblingElement()) {
       const std::string name = child->Name();
       if (name == "basis") {
         basis_.push_back(child);
@@ -112,7 +115,8 @@ class PrimitiveReader {
   void requireNothingLeft() {
     if (once_.empty()) return;
     const auto& [name, xml] = *once_.begin();
-    library_xml::fail(file_, xml->GetLineNum(), "unexpected <" + name.substr(0, 60) + "> in <primitive>");
+    library_xml::fail(file_, xml->GetLineNum(),
+                      "unexpected <" + name.substr(0, 60) + "> in <primitive>");
   }
 
   Primitive weighted() {
@@ -130,7 +134,8 @@ class PrimitiveReader {
     primitive.goal = child("goal", {"position"}).point("position");
     if (!trajectories_.empty()) element_.fail("<trajectory> needs a <learn> beside it");
     if (basis_.size() > static_cast<std::size_t>(kMaxBasis)) {
-      element_.fail("expected at most " + std::to_string(kMaxBasis) + " <basis>, got " + std::to_string(basis_.size()));
+      element_.fail("expected at most " + std::to_string(kMaxBasis) + " <basis>, got " +
+                    std::to_string(basis_.size()));
     }
     const auto count = static_cast<Eigen::Index>(basis_.size());
     primitive.centres.resize(count);
@@ -159,7 +164,8 @@ class PrimitiveReader {
       options.goal_weight = readGoalWeight(child("goal_weight", {"kind", "centre", "steepness"}));
     }
     if (once_.count("shape") != 0) options.mapping = readMapping(child("shape", {"mapping"}));
-    if (!basis_.empty()) element_.fail("expected either <learn> with <trajectory> or <basis>, got both");
+    if (!basis_.empty())
+      element_.fail("expected either <learn> with <trajectory> or <basis>, got both");
     if (trajectories_.size() > static_cast<std::size_t>(kMaxTrajectories)) {
       element_.fail("expected at most " + std::to_string(kMaxTrajectories) + " trajectories");
     }
@@ -176,7 +182,9 @@ class PrimitiveReader {
 };
 
 void print(tinyxml2::XMLPrinter& printer, const Primitive& primitive) {
-  const auto attribute = [&](const char* name, const std::string& value) { printer.PushAttribute(name, value.c_str()); };
+  const auto attribute = [&](const char* name, const std::string& value) {
+    printer.PushAttribute(name, value.c_str());
+  };
   printer.OpenElement("primitive");
   attribute("id", primitive.id);
   if (!primitive.description.empty()) attribute("description", primitive.description);
@@ -218,11 +226,12 @@ void print(tinyxml2::XMLPrinter& printer, const Primitive& primitive) {
 
 int Library::load(const std::string& path) {
   struct stat info {};
-  if (::stat(path.c_str(), &info) != 0) throw LibraryError(path + ":0: cannot be read; expected an existing file");
+  if (::stat(path.c_str(), &info) != 0)
+    throw LibraryError(path + ":0: cannot be read; expected an existing file");
   if (!S_ISREG(info.st_mode)) throw LibraryError(path + ":0: expected a regular file");
   if (static_cast<std::size_t>(info.st_size) > kMaxFileBytes) {
-    throw LibraryError(path + ":0: expected at most " + std::to_string(kMaxFileBytes) + " bytes, got " +
-                       std::to_string(info.st_size));
+    throw LibraryError(path + ":0: expected at most " + std::to_string(kMaxFileBytes) +
+                       " bytes, got " + std::to_string(info.st_size));
   }
   std::ifstream file(path, std::ios::binary);
   std::ostringstream text;
@@ -233,21 +242,25 @@ int Library::load(const std::string& path) {
 
 int Library::parse(const std::string& text, const std::string& name) {
   if (text.size() > kMaxFileBytes) {
-    throw LibraryError(name + ":0: expected at most " + std::to_string(kMaxFileBytes) + " bytes, got " +
-                       std::to_string(text.size()));
+    throw LibraryError(name + ":0: expected at most " + std::to_string(kMaxFileBytes) +
+                       " bytes, got " + std::to_string(text.size()));
   }
-  if (text.find('\0') != std::string::npos) throw LibraryError(name + ":0: expected text, got a zero byte");
+  if (text.find('\0') != std::string::npos)
+    throw LibraryError(name + ":0: expected text, got a zero byte");
   tinyxml2::XMLDocument document;
   if (document.Parse(text.data(), text.size()) != tinyxml2::XML_SUCCESS) {
-    library_xml::fail(name, document.ErrorLineNum(), "expected XML, got " + std::string(document.ErrorName()));
+    library_xml::fail(name, document.ErrorLineNum(),
+                      "expected XML, got " + std::string(document.ErrorName()));
   }
   library_xml::requireElementsOnly(name, document);
   const tinyxml2::XMLElement* root = document.RootElement();
   if (root == nullptr || std::string(root->Name()) != "dmp_library") {
-    library_xml::fail(name, root == nullptr ? 1 : root->GetLineNum(), "expected <dmp_library> as the root element");
+    library_xml::fail(name, root == nullptr ? 1 : root->GetLineNum(),
+                      "expected <dmp_library> as the root element");
   }
   if (const auto* second = root->NextSiblingElement()) {
-    library_xml::fail(name, second->GetLineNum(), "expected one root element, got <" + std::string(second->Name()) + ">");
+    library_xml::fail(name, second->GetLineNum(),
+                      "expected one root element, got <" + std::string(second->Name()) + ">");
   }
   const Element element(name, *root, {"version"});
   if (element.integer("version", 0) != kVersion) {
@@ -256,9 +269,11 @@ int Library::parse(const std::string& text, const std::string& name) {
   }
   library_xml::requireElementsOnly(name, *root);
   std::map<std::string, Primitive> read;
-  for (const auto* child = root->FirstChildElement(); child != nullptr; child = child->NextSiblingElement()) {
+  for (const auto* child = root->FirstChildElement(); child != nullptr;
+       child = child->NextSiblingElement()) {
     if (std::string(child->Name()) != "primitive") {
-      library_xml::fail(name, child->GetLineNum(), "expected <primitive>, got <" + std::string(child->Name()) + ">");
+      library_xml::fail(name, child->GetLineNum(),
+                        "expected <primitive>, got <" + std::string(child->Name()) + ">");
     }
     Primitive primitive = PrimitiveReader(name, *child).read();
     const std::string id = primitive.id;
@@ -266,10 +281,12 @@ int Library::parse(const std::string& text, const std::string& name) {
       library_xml::fail(name, child->GetLineNum(), "primitive '" + id + "' is there twice");
     }
     if (static_cast<int>(read.size()) > kMaxPrimitives) {
-      library_xml::fail(name, child->GetLineNum(), "expected at most " + std::to_string(kMaxPrimitives) + " primitives");
+      library_xml::fail(name, child->GetLineNum(),
+                        "expected at most " + std::to_string(kMaxPrimitives) + " primitives");
     }
   }
-  if (read.empty()) library_xml::fail(name, root->GetLineNum(), "expected at least one <primitive>");
+  if (read.empty())
+    library_xml::fail(name, root->GetLineNum(), "expected at least one <primitive>");
   const int count = static_cast<int>(read.size());
   for (auto& [id, primitive] : read) primitives_.insert_or_assign(id, std::move(primitive));
   return count;
@@ -286,14 +303,16 @@ std::string Library::format() const {
 }
 
 void Library::save(const std::string& path) const {
-  if (primitives_.empty()) throw LibraryError(path + ":0: expected at least one primitive to write");
+  if (primitives_.empty())
+    throw LibraryError(path + ":0: expected at least one primitive to write");
   const std::string temporary = path + ".part" + std::to_string(::getpid());
   {
     std::ofstream file(temporary, std::ios::binary | std::ios::trunc);
     file << format();
     if (!file.flush()) {
       std::remove(temporary.c_str());
-      throw LibraryError(path + ":0: cannot be written; check that the folder exists and may be written to");
+      throw LibraryError(
+          path + ":0: cannot be written; check that the folder exists and may be written to");
     }
   }
   if (std::rename(temporary.c_str(), path.c_str()) != 0) {

@@ -22,7 +22,9 @@ bool atEnd(const char* text) {
   return *text == '\0';
 }
 
-std::string shortened(const std::string& text) { return text.size() > 60 ? text.substr(0, 57) + "..." : text; }
+std::string shortened(const std::string& text) {
+  return text.size() > 60 ? text.substr(0, 57) + "..." : text;
+}
 
 }  // namespace
 
@@ -30,21 +32,25 @@ void fail(const std::string& file, int line, const std::string& text) {
   throw LibraryError(file + ":" + std::to_string(line) + ": " + text);
 }
 
-Element::Element(const std::string& file, const tinyxml2::XMLElement& element, const std::set<std::string>& attributes)
+Element::Element(const std::string& file, const tinyxml2::XMLElement& element,
+                 const std::set<std::string>& attributes)
     : file_(file), element_(element) {
   std::set<std::string> seen;
   for (const auto* a = element.FirstAttribute(); a != nullptr; a = a->Next()) {
     if (attributes.count(a->Name()) == 0) {
       std::string known;
       for (const std::string& name : attributes) known += (known.empty() ? "" : ", ") + name;
-      fail("unknown attribute '" + shortened(a->Name()) + "', expected " + (known.empty() ? "none" : known));
+      fail("unknown attribute '" + shortened(a->Name()) + "', expected " +
+           (known.empty() ? "none" : known));
     }
-    if (!seen.insert(a->Name()).second) fail("attribute '" + std::string(a->Name()) + "' is there twice");
+    if (!seen.insert(a->Name()).second)
+      fail("attribute '" + std::string(a->Name()) + "' is there twice");
   }
 }
 
 void Element::fail(const std::string& text) const {
-  library_xml::fail(file_, element_.GetLineNum(), "<" + std::string(element_.Name()) + ">: " + text);
+  library_xml::fail(file_, element_.GetLineNum(),
+                    "<" + std::string(element_.Name()) + ">: " + text);
 }
 
 std::string Element::text(const char* name) const {
@@ -63,7 +69,9 @@ double Element::number(const char* name) const {
   return number;
 }
 
-double Element::number(const char* name, double otherwise) const { return has(name) ? number(name) : otherwise; }
+double Element::number(const char* name, double otherwise) const {
+  return has(name) ? number(name) : otherwise;
+}
 
 int Element::integer(const char* name, int otherwise) const {
   if (!has(name)) return otherwise;
@@ -78,7 +86,8 @@ Vector3 Element::point(const char* name) const {
   const std::string value = text(name);
   const char* at = value.c_str();
   Vector3 point;
-  if (!readNumber(at, point[0]) || !readNumber(at, point[1]) || !readNumber(at, point[2]) || !atEnd(at)) {
+  if (!readNumber(at, point[0]) || !readNumber(at, point[1]) || !readNumber(at, point[2]) ||
+      !atEnd(at)) {
     fail(std::string(name) + ": expected three finite numbers, got '" + shortened(value) + "'");
   }
   return point;
@@ -92,8 +101,9 @@ void requireElementsOnly(const std::string& file, const tinyxml2::XMLNode& node)
   for (const auto* child = node.FirstChild(); child != nullptr; child = child->NextSibling()) {
     if (child->ToElement() != nullptr || child->ToComment() != nullptr) continue;
     if (child->ToUnknown() != nullptr) {
-      fail(file, child->GetLineNum(), "document types and entities are refused, remove '<!" +
-                                          shortened(child->Value()) + ">'");
+      fail(
+          file, child->GetLineNum(),
+          "document types and entities are refused, remove '<!" + shortened(child->Value()) + ">'");
     }
     if (child->ToDeclaration() != nullptr && node.ToDocument() != nullptr) continue;
     fail(file, child->GetLineNum(), "expected elements, got '" + shortened(child->Value()) + "'");
@@ -106,6 +116,8 @@ std::string exact(double value) {
   return std::string(buffer, end);
 }
 
-std::string exact(const Vector3& point) { return exact(point.x()) + " " + exact(point.y()) + " " + exact(point.z()); }
+std::string exact(const Vector3& point) {
+  return exact(point.x()) + " " + exact(point.y()) + " " + exact(point.z());
+}
 
 }  // namespace coglab_controllers::library_xml

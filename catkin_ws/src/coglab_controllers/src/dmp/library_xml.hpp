@@ -1,5 +1,6 @@
 /// @file
-/// Strict reading of one XML element for library.cpp: every attribute known, present once and a finite number.
+/// Strict reading of one XML element for library.cpp: every attribute known, present once and a
+/// finite number.
 #pragma once
 
 #include <set>
@@ -18,14 +19,16 @@ namespace coglab_controllers::library_xml {
 class Element {
  public:
   /// @throws LibraryError for an attribute that is not in the list or there twice.
-  Element(const std::string& file, const tinyxml2::XMLElement& element, const std::set<std::string>& attributes);
+  Element(const std::string& file, const tinyxml2::XMLElement& element,
+          const std::set<std::string>& attributes);
 
   bool has(const char* name) const { return element_.Attribute(name) != nullptr; }
-  std::string text(const char* name) const;    ///< @throws LibraryError if missing
-  double number(const char* name) const;       ///< @throws LibraryError if missing or not one finite number
+  std::string text(const char* name) const;  ///< @throws LibraryError if missing
+  double number(
+      const char* name) const;  ///< @throws LibraryError if missing or not one finite number
   double number(const char* name, double otherwise) const;
   int integer(const char* name, int otherwise) const;
-  Vector3 point(const char* name) const;       ///< three finite numbers with blanks between
+  Vector3 point(const char* name) const;  ///< three finite numbers with blanks between
   Vector3 point(const char* name, const Vector3& otherwise) const;
   [[noreturn]] void fail(const std::string& text) const;
   const tinyxml2::XMLElement& xml() const { return element_; }

@@ -9,7 +9,8 @@ namespace coglab_controllers {
 MotionEnd::MotionEnd(const MotionEndParameters& parameters) : parameters_(parameters) {
   const auto require = [](const char* name, double value) {
     if (std::isfinite(value) && value > 0.0) return;
-    throw std::invalid_argument(std::string(name) + ": expected a positive number, got " + std::to_string(value));
+    throw std::invalid_argument(std::string(name) + ": expected a positive number, got " +
+                                std::to_string(value));
   };
   require("end_phase", parameters.phase);
   require("end_speed", parameters.speed);
@@ -24,11 +25,12 @@ void MotionEnd::reset() noexcept {
   away_ = 0.0;
 }
 
-MotionEnd::Event MotionEnd::update(double dt, double phase, double speed, double turning, const Vector3& position,
-                                   const Vector3& goal, const Vector3& raw_goal) noexcept {
+MotionEnd::Event MotionEnd::update(double dt, double phase, double speed, double turning,
+                                   const Vector3& position, const Vector3& goal,
+                                   const Vector3& raw_goal) noexcept {
   if (!latched_) {
-    if (phase >= parameters_.phase || speed >= parameters_.speed || turning >= parameters_.turning ||
-        (position - goal).norm() >= parameters_.distance ||
+    if (phase >= parameters_.phase || speed >= parameters_.speed ||
+        turning >= parameters_.turning || (position - goal).norm() >= parameters_.distance ||
         (goal - raw_goal).norm() >= parameters_.follow_distance) {
       return Event::None;
     }

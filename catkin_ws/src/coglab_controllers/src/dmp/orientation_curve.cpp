@@ -7,10 +7,11 @@
 
 namespace coglab_controllers {
 
-void OrientationCurve::start(const Quaternion& start, const Vector3& angular_velocity, const Quaternion& target,
-                             double duration) noexcept {
+void OrientationCurve::start(const Quaternion& start, const Vector3& angular_velocity,
+                             const Quaternion& target, double duration) noexcept {
   start_ = start.normalized();
-  // Equal first two segments: rotational velocity as given, no rotational acceleration at the beginning.
+  // Equal first two segments: rotational velocity as given, no rotational acceleration at the
+  // beginning.
   lead_ = start_.conjugate() * angular_velocity * (duration / 5.0);
   turn_.setZero();
   setTarget(target);
@@ -19,7 +20,8 @@ void OrientationCurve::start(const Quaternion& start, const Vector3& angular_vel
 void OrientationCurve::setTarget(const Quaternion& target) noexcept {
   const Quaternion after_lead = start_ * expRotation(2.0 * lead_);
   Vector3 turn = logRotation((after_lead.conjugate() * target.normalized()).normalized());
-  // Beyond half a turn the logarithm flips to the other way round: keep to the branch nearest to the present one.
+  // Beyond half a turn the logarithm flips to the other way round: keep to the branch nearest to
+  // the present one.
   const double angle = turn.norm();
   if (angle > 1e-9 && turn_.squaredNorm() > 0.0) {
     const Vector3 other = turn * (1.0 - 2.0 * M_PI / angle);

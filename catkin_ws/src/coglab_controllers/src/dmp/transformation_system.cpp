@@ -51,7 +51,8 @@ Vector3 TransformationSystem::movingPoint(double s) const noexcept {
   using Packet = Eigen::Array<double, kPacket, 1>;
   Eigen::Array<double, kMaxBasis, 1> exponent;
   exponent.head(count_) = -widths_.head(count_) * (s - centres_.head(count_)).square();
-  // Relative to the nearest basis function, so that far from all of them the sum is still at least one.
+  // Relative to the nearest basis function, so that far from all of them the sum is still at least
+  // one.
   const double nearest = exponent.head(count_).maxCoeff();
   Packet x = Packet::Zero(), y = Packet::Zero(), z = Packet::Zero(), sum = Packet::Zero();
   for (int i = 0; i < count_; i += kPacket) {

@@ -12,7 +12,8 @@ namespace {
 void validate(const GoalEstimatorParameters& parameters) {
   const double t = parameters.time_constant;
   if (!(t == 0.0 || (t >= 0.005 && t <= 2.0))) {
-    throw std::invalid_argument("goal time constant: expected 0 (off) or 0.005 to 2 s, got " + std::to_string(t));
+    throw std::invalid_argument("goal time constant: expected 0 (off) or 0.005 to 2 s, got " +
+                                std::to_string(t));
   }
   if (!(parameters.max_innovation > 0.0 && std::isfinite(parameters.max_innovation))) {
     throw std::invalid_argument("goal max innovation: expected a positive distance in m, got " +
@@ -64,7 +65,8 @@ void GoalEstimator::update(double dt, const Vector3& goal) noexcept {
   position_ = smooth_ + 3.0 * parameters_.time_constant * tracker_.rate;
 }
 
-OrientationEstimator::OrientationEstimator(const GoalEstimatorParameters& parameters) : parameters_(parameters) {
+OrientationEstimator::OrientationEstimator(const GoalEstimatorParameters& parameters)
+    : parameters_(parameters) {
   validate(parameters);
 }
 
@@ -81,8 +83,10 @@ void OrientationEstimator::update(double dt, const Quaternion& target) noexcept 
   }
   if (!(dt > 0.0)) return;
   const Vector3 error = clipped(rotationBetween(smooth_, unit), parameters_.max_angle_innovation);
-  smooth_ = (expRotation(tracker_.advance(error, dt, parameters_.time_constant)) * smooth_).normalized();
-  orientation_ = (expRotation(3.0 * parameters_.time_constant * tracker_.rate) * smooth_).normalized();
+  smooth_ =
+      (expRotation(tracker_.advance(error, dt, parameters_.time_constant)) * smooth_).normalized();
+  orientation_ =
+      (expRotation(3.0 * parameters_.time_constant * tracker_.rate) * smooth_).normalized();
 }
 
 }  // namespace coglab_controllers

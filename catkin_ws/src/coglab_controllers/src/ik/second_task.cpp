@@ -11,25 +11,29 @@ namespace {
 
 double requireGain(const char* name, double gain) {
   if (std::isfinite(gain) && gain >= 0.0) return gain;
-  throw std::invalid_argument(std::string(name) + ": expected a gain of at least 0 1/s, got " + std::to_string(gain));
+  throw std::invalid_argument(std::string(name) + ": expected a gain of at least 0 1/s, got " +
+                              std::to_string(gain));
 }
 
 }  // namespace
 
 OrientationTask::OrientationTask(double gain) : gain_(requireGain("rot_clik_gain", gain)) {}
 
-void OrientationTask::evaluate(const ChainState& state, const JointVector&, const CartesianReference& reference,
+void OrientationTask::evaluate(const ChainState& state, const JointVector&,
+                               const CartesianReference& reference,
                                TaskConstraint& constraint) const noexcept {
   constraint.rows = 3;
   constraint.reject_whole = true;
   constraint.jacobian.topRows<3>() = state.jacobian.bottomRows<3>();
   constraint.velocity.head<3>() =
-      reference.angular_velocity + gain_ * rotationBetween(state.tool.orientation, reference.pose.orientation);
+      reference.angular_velocity +
+      gain_ * rotationBetween(state.tool.orientation, reference.pose.orientation);
 }
 
 PostureTask::PostureTask(const JointVector& posture, double gain)
     : posture_(posture), gain_(requireGain("posture gain", gain)) {
-  if (!posture.allFinite()) throw std::invalid_argument("posture: expected seven finite joint positions");
+  if (!posture.allFinite())
+    throw std::invalid_argument("posture: expected seven finite joint positions");
 }
 
 void PostureTask::evaluate(const ChainState&, const JointVector& q, const CartesianReference&,

@@ -17,9 +17,11 @@ double worstRatio(const JointVector& velocity, const JointVector& limit) noexcep
   return (velocity.array().abs() / limit.array()).maxCoeff();
 }
 
-// Largest share a in [0, 1] of the second task with |first + a * second| inside the limits. If there is none, the
-// share at which the vector exceeds them least, so that the translation is slowed as little as possible.
-double largestShare(const JointVector& first, const JointVector& second, const JointVector& limit) noexcept {
+// Largest share a in [0, 1] of the second task with |first + a * second| inside the limits. If
+// there is none, the share at which the vector exceeds them least, so that the translation is
+// slowed as little as possible.
+double largestShare(const JointVector& first, const JointVector& second,
+                    const JointVector& limit) noexcept {
   double low = 0.0, high = 1.0;
   for (int i = 0; i < kMaxJoints; ++i) {
     if (std::abs(second[i]) < 1e-12 * limit[i]) {
@@ -36,7 +38,8 @@ double largestShare(const JointVector& first, const JointVector& second, const J
   high = 1.0;
   for (int i = 0; i < 40; ++i) {
     const double third = (high - low) / 3.0;
-    if (worstRatio(first + (low + third) * second, limit) <= worstRatio(first + (high - third) * second, limit)) {
+    if (worstRatio(first + (low + third) * second, limit) <=
+        worstRatio(first + (high - third) * second, limit)) {
       high -= third;
     } else {
       low += third;
@@ -47,8 +50,8 @@ double largestShare(const JointVector& first, const JointVector& second, const J
 
 // Joint velocity of the second task inside the null space of the first, eq. (11).
 template <int Rows>
-JointVector secondShare(const TaskConstraint& task, const JointVector& first, const Projector& null_space,
-                        double threshold, IkResult& result) noexcept {
+JointVector secondShare(const TaskConstraint& task, const JointVector& first,
+                        const Projector& null_space, double threshold, IkResult& result) noexcept {
   const auto jacobian = task.jacobian.topRows<Rows>();
   const RowSvd<Rows> svd((jacobian * null_space).eval());
   result.smallest_singular_value_rotation = svd.sigma.minCoeff();
@@ -68,25 +71,28 @@ TwoTaskIk::TwoTaskIk(const IkParameters& parameters)
     : parameters_(parameters), orientation_(parameters.rot_clik_gain) {
   const auto require = [](const char* name, double value, double low, double high) {
     if (value >= low && value <= high) return;
-    throw std::invalid_argument(std::string(name) + ": expected a number from " + std::to_string(low) + " to " +
-                                std::to_string(high) + ", got " + std::to_string(value));
+    throw std::invalid_argument(std::string(name) + ": expected a number from " +
+                                std::to_string(low) + " to " + std::to_string(high) + ", got " +
+                                std::to_string(value));
   };
   require("pos_clik_gain", parameters.pos_clik_gain, 0.0, 500.0);
   require("rot_clik_gain", parameters.rot_clik_gain, 0.0, 500.0);
   require("singularity_threshold", parameters.singularity_threshold, 1e-6, 1.0);
   require("stretch_threshold", parameters.stretch_threshold, 1e-6, 0.2);
   for (int i = 0; i < kMaxJoints; ++i) {
-    require(("velocity_limit[" + std::to_string(i) + "]").c_str(), parameters.velocity_limit[i], 1e-3, 100.0);
+    require(("velocity_limit[" + std::to_string(i) + "]").c_str(), parameters.velocity_limit[i],
+            1e-3, 100.0);
   }
 }
 
-void TwoTaskIk::solve(const ChainState& state, const JointVector& q, const CartesianReference& reference,
-                      IkResult& result) const noexcept {
+void TwoTaskIk::solve(const ChainState& state, const JointVector& q,
+                      const CartesianReference& reference, IkResult& result) const noexcept {
   solve(state, q, reference, orientation_, result);
 }
 
-void TwoTaskIk::solve(const ChainState& state, const JointVector& q, const CartesianReference& reference,
-                      const SecondTask& task, IkResult& result) const noexcept {
+void TwoTaskIk::solve(const ChainState& state, const JointVector& q,
+                      const CartesianReference& reference, const SecondTask& task,
+                      IkResult& result) const noexcept {
   result.rotation_rejected = false;
   result.smallest_singular_value_rotation = 0.0;
   result.second_task_scale = 1.0;
@@ -94,8 +100,9 @@ void TwoTaskIk::solve(const ChainState& state, const JointVector& q, const Carte
   result.position_error = reference.pose.position - state.tool.position;
   result.rotation_error = rotationBetween(state.tool.orientation, reference.pose.orientation);
 
-  const Vector3 wanted = reference.velocity + parameters_.pos_clik_gain * result.position_error;  // (6)
-  const auto position_jacobian = state.jacobian.topRows<3>();                                     // (8)
+  const Vector3 wanted =
+      reference.velocity + parameters_.pos_clik_gain * result.position_error;  // (6)
+  const auto position_jacobian = state.jacobian.topRows<3>();                  // (8)
   const RowSvd<3> svd(position_jacobian);
   result.smallest_singular_value_position = svd.sigma.minCoeff();
   const double threshold = parameters_.stretch_threshold;
@@ -114,19 +121,21 @@ void TwoTaskIk::solve(const ChainState& state, const JointVector& q, const Carte
 
   const bool orientation_only = &task == &orientation_;
   TaskConstraint constraint;
-  if (!orientation_only || reference.orientation_control) task.evaluate(state, q, reference, constraint);
+  if (!orientation_only || reference.orientation_control)
+    task.evaluate(state, q, reference, constraint);
   result.rotation_velocity.setZero();
   const double limit = parameters_.singularity_threshold;
   if (constraint.rows == 3) {
-    result.rotation_velocity = secondShare<3>(constraint, result.position_velocity, null_space, limit, result);
+    result.rotation_velocity =
+        secondShare<3>(constraint, result.position_velocity, null_space, limit, result);
   } else if (constraint.rows == kMaxJoints) {
     result.rotation_velocity =
         secondShare<kMaxJoints>(constraint, result.position_velocity, null_space, limit, result);
   }
 
   if (parameters_.rotation_first_scaling) {
-    result.second_task_scale =
-        largestShare(result.position_velocity, result.rotation_velocity, parameters_.velocity_limit);
+    result.second_task_scale = largestShare(result.position_velocity, result.rotation_velocity,
+                                            parameters_.velocity_limit);
     result.rotation_velocity *= result.second_task_scale;
   }
   result.velocity = result.position_velocity + result.rotation_velocity;  // (12)

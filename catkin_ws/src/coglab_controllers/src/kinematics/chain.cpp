@@ -30,18 +30,19 @@ Chain::Chain(const std::string& urdf, const std::string& base_link, const std::s
     : base_link_(base_link), tip_link_(tip_link) {
   KDL::Tree tree;
   if (!kdl_parser::treeFromString(urdf, tree)) {
-    throw std::invalid_argument("expected a URDF with one tree of links, got text of " + std::to_string(urdf.size()) +
+    throw std::invalid_argument("expected a URDF with one tree of links, got text of " +
+                                std::to_string(urdf.size()) +
                                 " characters that does not parse; see the messages above");
   }
   auto chain = std::make_shared<KDL::Chain>();
   if (!tree.getChain(base_link, tip_link, *chain)) {
-    throw std::invalid_argument("expected a chain from link '" + base_link + "' to link '" + tip_link +
-                                "' in the URDF, found none; check both names");
+    throw std::invalid_argument("expected a chain from link '" + base_link + "' to link '" +
+                                tip_link + "' in the URDF, found none; check both names");
   }
   const unsigned count = chain->getNrOfJoints();
   if (count != 6 && count != 7) {
-    throw std::invalid_argument("expected 6 or 7 movable joints between '" + base_link + "' and '" + tip_link +
-                                "', found " + std::to_string(count));
+    throw std::invalid_argument("expected 6 or 7 movable joints between '" + base_link + "' and '" +
+                                tip_link + "', found " + std::to_string(count));
   }
   Matrix3 rotation = Matrix3::Identity();
   Vector3 translation = Vector3::Zero();
@@ -55,8 +56,8 @@ Chain::Chain(const std::string& urdf, const std::string& base_link, const std::s
     }
     if (joint.getType() != KDL::Joint::RotAxis && joint.getType() != KDL::Joint::RotX &&
         joint.getType() != KDL::Joint::RotY && joint.getType() != KDL::Joint::RotZ) {
-      throw std::invalid_argument("expected revolute or continuous joints, joint '" + joint.getName() + "' is " +
-                                  joint.getTypeName());
+      throw std::invalid_argument("expected revolute or continuous joints, joint '" +
+                                  joint.getName() + "' is " + joint.getTypeName());
     }
     const Vector3 origin = toEigen(joint.JointOrigin());
     const Matrix3 to_axis = zTo(toEigen(joint.JointAxis()).normalized());
@@ -69,7 +70,8 @@ Chain::Chain(const std::string& urdf, const std::string& base_link, const std::s
   }
   tool_ = {rotation, translation};
   kdl_ = chain;
-  // With every joint at zero the arm of this project is stretched; for any other arm the sum of the link lengths bounds it.
+  // With every joint at zero the arm of this project is stretched; for any other arm the sum of the
+  // link lengths bounds it.
   for (int i = 2; i <= wristJoint(); ++i) reach_ += links_[i].translation.norm();
 }
 
@@ -103,7 +105,8 @@ void Chain::evaluate(const JointVector& q, ChainState& state) const noexcept {
   }
 }
 
-void Chain::evaluate(const JointVector& q, const JointVector& velocity, double dt, ChainState& state) const noexcept {
+void Chain::evaluate(const JointVector& q, const JointVector& velocity, double dt,
+                     ChainState& state) const noexcept {
   evaluate(q, state);
   if (!(dt > 0.0) || velocity.isZero(0.0)) return;
   const Pose now = state.tool;
@@ -111,10 +114,12 @@ void Chain::evaluate(const JointVector& q, const JointVector& velocity, double d
   state.tool = now;
 }
 
-Vector3 Chain::originVelocity(const ChainState& state, int index, const JointVector& velocity) noexcept {
+Vector3 Chain::originVelocity(const ChainState& state, int index,
+                              const JointVector& velocity) noexcept {
   Vector3 result = Vector3::Zero();
   for (int i = 0; i < index; ++i) {
-    result += velocity[i] * state.axes.col(i).cross(state.origins.col(index) - state.origins.col(i));
+    result +=
+        velocity[i] * state.axes.col(i).cross(state.origins.col(index) - state.origins.col(i));
   }
   return result;
 }

@@ -15,8 +15,8 @@ Vector3 logRotation(const Quaternion& q) noexcept {
   const double sign = q.w() < 0.0 ? -1.0 : 1.0;
   const Vector3 v = sign * q.vec();
   const double sine = v.norm(), cosine = sign * q.w();
-  const double factor =
-      sine < 1e-4 ? 2.0 / cosine * (1.0 - sine * sine / (3.0 * cosine * cosine)) : 2.0 * std::atan2(sine, cosine) / sine;
+  const double factor = sine < 1e-4 ? 2.0 / cosine * (1.0 - sine * sine / (3.0 * cosine * cosine))
+                                    : 2.0 * std::atan2(sine, cosine) / sine;
   return factor * v;
 }
 

@@ -21,13 +21,20 @@ double stoppingSpeed(double room, double acceleration, double lag) noexcept {
 
 const char* describe(GuardReason reason) noexcept {
   switch (reason) {
-    case GuardReason::None: return "not limited";
-    case GuardReason::JointVelocity: return "joint speed limit";
-    case GuardReason::JointPosition: return "joint position limit";
-    case GuardReason::HandSpeed: return "Cartesian speed limit of the hand";
-    case GuardReason::ElbowSpeed: return "Cartesian speed limit of the elbow";
-    case GuardReason::WorkspaceBorder: return "workspace border";
-    case GuardReason::NotFinite: return "velocity that is not a finite number";
+    case GuardReason::None:
+      return "not limited";
+    case GuardReason::JointVelocity:
+      return "joint speed limit";
+    case GuardReason::JointPosition:
+      return "joint position limit";
+    case GuardReason::HandSpeed:
+      return "Cartesian speed limit of the hand";
+    case GuardReason::ElbowSpeed:
+      return "Cartesian speed limit of the elbow";
+    case GuardReason::WorkspaceBorder:
+      return "workspace border";
+    case GuardReason::NotFinite:
+      return "velocity that is not a finite number";
   }
   return "unknown";
 }
@@ -36,16 +43,18 @@ Guard::Guard(const GuardParameters& parameters, const Chain& chain)
     : parameters_(parameters), chain_(chain), workspace_(parameters.workspace, chain.reach()) {
   const auto require = [](const std::string& name, double value, bool may_be_zero) {
     if (std::isfinite(value) && (value > 0.0 || (may_be_zero && value == 0.0))) return;
-    throw std::invalid_argument(name + ": expected a " + (may_be_zero ? "number of at least 0" : "positive number") +
+    throw std::invalid_argument(name + ": expected a " +
+                                (may_be_zero ? "number of at least 0" : "positive number") +
                                 ", got " + std::to_string(value));
   };
   const GuardParameters& p = parameters_;
   for (int i = 0; i < chain_.joints(); ++i) {
     const std::string joint = chain_.jointNames()[static_cast<std::size_t>(i)];
     if (!(p.upper_position[i] - p.lower_position[i] > 2.0 * p.position_margin)) {
-      throw std::invalid_argument("joint position limits of " + joint +
-                                  ": expected the upper one above the lower one by more than twice the margin, got " +
-                                  std::to_string(p.lower_position[i]) + " and " + std::to_string(p.upper_position[i]));
+      throw std::invalid_argument(
+          "joint position limits of " + joint +
+          ": expected the upper one above the lower one by more than twice the margin, got " +
+          std::to_string(p.lower_position[i]) + " and " + std::to_string(p.upper_position[i]));
     }
     require("joint velocity limit of " + joint, p.velocity[i], false);
     require("joint acceleration limit of " + joint, p.acceleration[i], false);
@@ -61,14 +70,15 @@ Guard::Guard(const GuardParameters& parameters, const Chain& chain)
 
 double Guard::speedToStop(int joint, double room) const noexcept {
   const double a = parameters_.acceleration[joint];
-  // Braking with limited jerk needs v a / (2 j) more room than v^2 / (2 a), and an arm that still speeds up takes another
-  // a / j to turn its acceleration round; for small speeds both are on the safe side.
+  // Braking with limited jerk needs v a / (2 j) more room than v^2 / (2 a), and an arm that still
+  // speeds up takes another a / j to turn its acceleration round; for small speeds both are on the
+  // safe side.
   const double lag = 1.5 * a / parameters_.jerk[joint] + parameters_.reaction_time;
   return stoppingSpeed(room - parameters_.position_margin, a, lag);
 }
 
-void Guard::limit(const ChainState& state, const JointVector& q, const JointVector& request, double dt,
-                  GuardResult& result) noexcept {
+void Guard::limit(const ChainState& state, const JointVector& q, const JointVector& request,
+                  double dt, GuardResult& result) noexcept {
   result = GuardResult{};
   const int joints = chain_.joints();
   if (!request.head(joints).allFinite() || !q.head(joints).allFinite()) {
@@ -77,7 +87,8 @@ void Guard::limit(const ChainState& state, const JointVector& q, const JointVect
     return;
   }
   // `allowed` of the speed `asked`; both >= 0.
-  const auto bind = [&](double asked, double allowed, GuardReason reason, int joint, WorkspaceBorder border) {
+  const auto bind = [&](double asked, double allowed, GuardReason reason, int joint,
+                        WorkspaceBorder border) {
     if (!(asked > allowed) || allowed / asked >= result.scale) return;
     result.scale = allowed / asked;
     result.reason = reason;
@@ -87,7 +98,8 @@ void Guard::limit(const ChainState& state, const JointVector& q, const JointVect
   for (int i = 0; i < joints; ++i) {
     const double speed = std::abs(request[i]);
     bind(speed, parameters_.velocity[i], GuardReason::JointVelocity, i, WorkspaceBorder::None);
-    const double room = request[i] > 0.0 ? parameters_.upper_position[i] - q[i] : q[i] - parameters_.lower_position[i];
+    const double room = request[i] > 0.0 ? parameters_.upper_position[i] - q[i]
+                                         : q[i] - parameters_.lower_position[i];
     bind(speed, speedToStop(i, room), GuardReason::JointPosition, i, WorkspaceBorder::None);
   }
   if (parameters_.hand_speed > 0.0) {
@@ -103,8 +115,8 @@ void Guard::limit(const ChainState& state, const JointVector& q, const JointVect
   for (const Workspace::Margin& margin : margins) {
     // A rate that is only rounding does not hold up a motion along the border.
     if (margin.rate > -1e-6) continue;
-    const double allowed =
-        stoppingSpeed(margin.distance, parameters_.workspace_deceleration, parameters_.reaction_time);
+    const double allowed = stoppingSpeed(margin.distance, parameters_.workspace_deceleration,
+                                         parameters_.reaction_time);
     bind(-margin.rate, allowed, GuardReason::WorkspaceBorder, -1, margin.border);
   }
   result.velocity = result.scale * request;

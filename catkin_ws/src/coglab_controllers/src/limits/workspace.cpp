@@ -9,24 +9,31 @@ namespace coglab_controllers {
 
 const char* describe(WorkspaceBorder border) noexcept {
   switch (border) {
-    case WorkspaceBorder::None: return "inside the workspace";
-    case WorkspaceBorder::BoxMin: return "lower side of the workspace box";
-    case WorkspaceBorder::BoxMax: return "upper side of the workspace box";
-    case WorkspaceBorder::BaseSphere: return "sphere around the base";
-    case WorkspaceBorder::Stretch: return "arm fully stretched";
+    case WorkspaceBorder::None:
+      return "inside the workspace";
+    case WorkspaceBorder::BoxMin:
+      return "lower side of the workspace box";
+    case WorkspaceBorder::BoxMax:
+      return "upper side of the workspace box";
+    case WorkspaceBorder::BaseSphere:
+      return "sphere around the base";
+    case WorkspaceBorder::Stretch:
+      return "arm fully stretched";
   }
   return "unknown";
 }
 
-Workspace::Workspace(const WorkspaceParameters& parameters, double reach) : parameters_(parameters) {
+Workspace::Workspace(const WorkspaceParameters& parameters, double reach)
+    : parameters_(parameters) {
   const WorkspaceParameters& p = parameters_;
   if (!p.box_min.allFinite() || !p.box_max.allFinite() || !(p.box_max - p.box_min).minCoeff() ||
       (p.box_max - p.box_min).minCoeff() <= 0.0) {
     throw std::invalid_argument("workspace box: expected box_max above box_min on each axis, in m");
   }
   if (!p.base_centre.allFinite() || !(p.base_radius >= 0.0 && p.base_radius < 10.0)) {
-    throw std::invalid_argument("workspace base sphere: expected a finite centre and a radius from 0 to 10 m, got " +
-                                std::to_string(p.base_radius));
+    throw std::invalid_argument(
+        "workspace base sphere: expected a finite centre and a radius from 0 to 10 m, got " +
+        std::to_string(p.base_radius));
   }
   if (!(p.max_stretch > 0.2 && p.max_stretch <= 1.0)) {
     throw std::invalid_argument("max_stretch: expected a share above 0.2 and up to 1, got " +
@@ -34,11 +41,13 @@ Workspace::Workspace(const WorkspaceParameters& parameters, double reach) : para
   }
   bool room = false;
   for (int corner = 0; corner < 8; ++corner) {
-    const Vector3 point(corner & 1 ? p.box_max.x() : p.box_min.x(), corner & 2 ? p.box_max.y() : p.box_min.y(),
+    const Vector3 point(corner & 1 ? p.box_max.x() : p.box_min.x(),
+                        corner & 2 ? p.box_max.y() : p.box_min.y(),
                         corner & 4 ? p.box_max.z() : p.box_min.z());
     room = room || (point - p.base_centre).norm() > p.base_radius;
   }
-  if (!room) throw std::invalid_argument("workspace: the sphere around the base leaves no room in the box");
+  if (!room)
+    throw std::invalid_argument("workspace: the sphere around the base leaves no room in the box");
   max_distance_ = p.max_stretch < 1.0 ? p.max_stretch * reach : 0.0;
 }
 
@@ -47,8 +56,10 @@ void Workspace::margins(const Chain& chain, const ChainState& state, const Joint
   const Vector3& hand = state.tool.position;
   const Vector3 hand_velocity = state.jacobian.topRows<3>() * velocity;
   for (int axis = 0; axis < 3; ++axis) {
-    margins[2 * axis] = {hand[axis] - parameters_.box_min[axis], hand_velocity[axis], WorkspaceBorder::BoxMin};
-    margins[2 * axis + 1] = {parameters_.box_max[axis] - hand[axis], -hand_velocity[axis], WorkspaceBorder::BoxMax};
+    margins[2 * axis] = {hand[axis] - parameters_.box_min[axis], hand_velocity[axis],
+                         WorkspaceBorder::BoxMin};
+    margins[2 * axis + 1] = {parameters_.box_max[axis] - hand[axis], -hand_velocity[axis],
+                             WorkspaceBorder::BoxMax};
   }
   margins[6] = margins[7] = {1e3, 0.0, WorkspaceBorder::None};
   if (parameters_.base_radius > 0.0) {
@@ -71,7 +82,8 @@ void Workspace::margins(const Chain& chain, const ChainState& state, const Joint
 WorkspaceBorder Workspace::violated(const Vector3& point) const noexcept {
   if (!((point - parameters_.box_min).minCoeff() >= 0.0)) return WorkspaceBorder::BoxMin;
   if (!((parameters_.box_max - point).minCoeff() >= 0.0)) return WorkspaceBorder::BoxMax;
-  if ((point - parameters_.base_centre).norm() < parameters_.base_radius) return WorkspaceBorder::BaseSphere;
+  if ((point - parameters_.base_centre).norm() < parameters_.base_radius)
+    return WorkspaceBorder::BaseSphere;
   return WorkspaceBorder::None;
 }
 
@@ -99,7 +111,9 @@ Vector3 Workspace::project(const Vector3& point) const noexcept {
     for (const double side : {parameters_.box_min[axis], parameters_.box_max[axis]}) {
       Vector3 candidate = result;
       const double room = std::abs(side - centre[axis]);
-      candidate[axis] = room > radius ? centre[axis] + std::copysign(radius * (1.0 + 1e-9), side - centre[axis]) : side;
+      candidate[axis] =
+          room > radius ? centre[axis] + std::copysign(radius * (1.0 + 1e-9), side - centre[axis])
+                        : side;
       const double distance = (candidate - centre).norm();
       if (distance < radius) continue;
       if (best_distance < 0.0 || (candidate - result).norm() < best_distance) {

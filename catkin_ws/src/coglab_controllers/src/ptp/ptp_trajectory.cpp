@@ -9,24 +9,28 @@
 namespace coglab_controllers {
 namespace {
 
-// Way of a ramp that goes from `velocity` to `cruise`, holds it so that all takes `duration`, and brakes to rest.
+// Way of a ramp that goes from `velocity` to `cruise`, holds it so that all takes `duration`, and
+// brakes to rest.
 double wayOf(double velocity, double cruise, double acceleration, double duration) {
-  const double up = std::abs(cruise - velocity) / acceleration, down = std::abs(cruise) / acceleration;
+  const double up = std::abs(cruise - velocity) / acceleration,
+               down = std::abs(cruise) / acceleration;
   return 0.5 * (velocity + cruise) * up + cruise * (duration - up - down) + 0.5 * cruise * down;
 }
 
 }  // namespace
 
-PtpTrajectory::PtpTrajectory(const JointVector& position, const JointVector& velocity, const JointVector& target,
-                             const JointVector& max_velocity, const JointVector& max_acceleration, int joints) {
+PtpTrajectory::PtpTrajectory(const JointVector& position, const JointVector& velocity,
+                             const JointVector& target, const JointVector& max_velocity,
+                             const JointVector& max_acceleration, int joints) {
   if (joints < 1 || joints > kMaxJoints) {
     throw std::invalid_argument("joints: expected 1 to " + std::to_string(kMaxJoints) + ", got " +
                                 std::to_string(joints));
   }
-  const auto require = [](const char* name, int joint, double value, double low, double high, const char* expected) {
+  const auto require = [](const char* name, int joint, double value, double low, double high,
+                          const char* expected) {
     if (value >= low && value <= high) return;
-    throw std::invalid_argument(std::string(name) + "[" + std::to_string(joint) + "]: expected " + expected +
-                                ", got " + std::to_string(value));
+    throw std::invalid_argument(std::string(name) + "[" + std::to_string(joint) + "]: expected " +
+                                expected + ", got " + std::to_string(value));
   };
   target_ = position;
   target_.head(joints) = target.head(joints);
@@ -60,7 +64,8 @@ PtpTrajectory::PtpTrajectory(const JointVector& position, const JointVector& vel
     }
   } else {
     for (int i = 0; i < joints; ++i) {
-      const Ramp ramp = fastest(target[i] - position[i], velocity[i], max_velocity[i], max_acceleration[i]);
+      const Ramp ramp =
+          fastest(target[i] - position[i], velocity[i], max_velocity[i], max_acceleration[i]);
       duration_ = std::max(duration_, ramp.accelerate_time + ramp.cruise_time + ramp.brake_time);
     }
     for (int i = 0; i < joints; ++i) {
@@ -97,8 +102,10 @@ PtpTrajectory::Ramp PtpTrajectory::fastest(double distance, double velocity, dou
 
 PtpTrajectory::Ramp PtpTrajectory::stretched(double distance, double velocity, double acceleration,
                                              double duration) {
-  // The way grows with the cruising speed as long as there is time to cruise, so bisection finds the one that fits.
-  double low = 0.5 * (velocity - acceleration * duration), high = 0.5 * (velocity + acceleration * duration);
+  // The way grows with the cruising speed as long as there is time to cruise, so bisection finds
+  // the one that fits.
+  double low = 0.5 * (velocity - acceleration * duration),
+         high = 0.5 * (velocity + acceleration * duration);
   for (int i = 0; i < 200 && high - low > 0.0; ++i) {
     const double middle = 0.5 * (low + high);
     if (middle == low || middle == high) break;
@@ -132,7 +139,8 @@ void PtpTrajectory::at(double t, PtpPoint& point) const noexcept {
       point.velocity[i] = ramp.velocity + up * t;
       point.acceleration[i] = up;
     } else if (t < second) {
-      point.position[i] = ramp.start + 0.5 * first * (ramp.velocity + ramp.cruise) + (t - first) * ramp.cruise;
+      point.position[i] =
+          ramp.start + 0.5 * first * (ramp.velocity + ramp.cruise) + (t - first) * ramp.cruise;
       point.velocity[i] = ramp.cruise;
     } else if (t < second + ramp.brake_time) {
       // From the end backwards, so that the motion ends exactly at the target.

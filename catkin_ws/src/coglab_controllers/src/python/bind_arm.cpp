@@ -23,7 +23,8 @@ void bindChain(py::module_& module) {
           [](const Chain& chain, const JointVector& q) {
             return chain.evaluate(requireFinite(q, "q")).jacobian;
           },
-          py::arg("q"), "Jacobian (6, 7) of the tip, translation above rotation, in the base frame.")
+          py::arg("q"),
+          "Jacobian (6, 7) of the tip, translation above rotation, in the base frame.")
       .def(
           "joint_origins",
           [](const Chain& chain, const JointVector& q) -> Eigen::Matrix<double, kMaxJoints, 3> {
@@ -45,27 +46,33 @@ void bindIk(py::module_& module) {
       .def_readonly("scale", &IkResult::scale)
       .def_readonly("rotation_rejected", &IkResult::rotation_rejected);
 
-  py::class_<PostureTask>(module, "PostureTask", "Second task that draws the joints towards a posture.")
+  py::class_<PostureTask>(module, "PostureTask",
+                          "Second task that draws the joints towards a posture.")
       .def(py::init<const JointVector&, double>(), py::arg("posture"), py::arg("gain") = 1.0);
 
   const IkParameters standard;
-  py::class_<TwoTaskIk>(module, "TwoTaskIk", "Inverse kinematics with two priorities, eq. (6)-(12).")
+  py::class_<TwoTaskIk>(module, "TwoTaskIk",
+                        "Inverse kinematics with two priorities, eq. (6)-(12).")
       .def(py::init([](double pos_clik_gain, double rot_clik_gain, double singularity_threshold,
-                       double stretch_threshold, bool rotation_first_scaling, const JointVector& velocity_limit) {
-             return TwoTaskIk({pos_clik_gain, rot_clik_gain, singularity_threshold, stretch_threshold,
-                               rotation_first_scaling, velocity_limit});
+                       double stretch_threshold, bool rotation_first_scaling,
+                       const JointVector& velocity_limit) {
+             return TwoTaskIk({pos_clik_gain, rot_clik_gain, singularity_threshold,
+                               stretch_threshold, rotation_first_scaling, velocity_limit});
            }),
-           py::arg("pos_clik_gain") = standard.pos_clik_gain, py::arg("rot_clik_gain") = standard.rot_clik_gain,
+           py::arg("pos_clik_gain") = standard.pos_clik_gain,
+           py::arg("rot_clik_gain") = standard.rot_clik_gain,
            py::arg("singularity_threshold") = standard.singularity_threshold,
            py::arg("stretch_threshold") = standard.stretch_threshold,
            py::arg("rotation_first_scaling") = standard.rotation_first_scaling,
            py::arg("velocity_limit") = standard.velocity_limit)
       .def(
           "solve",
-          [](const TwoTaskIk& ik, const Chain& chain, const JointVector& q, const CartesianReference& reference,
-             const PostureTask* task, const JointVector& velocity, double dt) {
+          [](const TwoTaskIk& ik, const Chain& chain, const JointVector& q,
+             const CartesianReference& reference, const PostureTask* task,
+             const JointVector& velocity, double dt) {
             ChainState state;
-            chain.evaluate(requireFinite(q, "q"), requireFinite(velocity, "velocity"), requireStep(dt), state);
+            chain.evaluate(requireFinite(q, "q"), requireFinite(velocity, "velocity"),
+                           requireStep(dt), state);
             IkResult result;
             if (task != nullptr) {
               ik.solve(state, q, reference, *task, result);
@@ -85,14 +92,15 @@ void bindArm(py::module_& module) {
   bindChain(module);
   bindIk(module);
   module.def(
-      "exp_rotation", [](const Vector3& r) { return toArray(expRotation(r)); }, py::arg("rotation_vector"),
-      "Quaternion (4,) of a rotation vector (3,) in rad.");
+      "exp_rotation", [](const Vector3& r) { return toArray(expRotation(r)); },
+      py::arg("rotation_vector"), "Quaternion (4,) of a rotation vector (3,) in rad.");
   module.def(
       "rotation_between",
       [](const QuaternionArray& from, const QuaternionArray& to) {
         return rotationBetween(toQuaternion(from), toQuaternion(to));
       },
-      py::arg("start"), py::arg("target"), "Rotation vector (3,) in rad, base frame, from start to target.");
+      py::arg("start"), py::arg("target"),
+      "Rotation vector (3,) in rad, base frame, from start to target.");
 }
 
 }  // namespace coglab_controllers::python

@@ -17,12 +17,15 @@ GoalWeight toGoalWeight(const std::string& kind, double centre, double steepness
   if (kind != "linear" && kind != "sigmoid") {
     throw std::invalid_argument("kind: expected 'linear' or 'sigmoid', got '" + kind + "'");
   }
-  return {kind == "linear" ? GoalWeight::Kind::Linear : GoalWeight::Kind::Sigmoid, centre, steepness};
+  return {kind == "linear" ? GoalWeight::Kind::Linear : GoalWeight::Kind::Sigmoid, centre,
+          steepness};
 }
 
 void bindPrimitive(py::module_& module) {
-  py::class_<GoalWeight>(module, "GoalWeight", "Weight w(s) of eq. (1): 0 at the start of a motion, 1 at its end.")
-      .def(py::init(&toGoalWeight), py::arg("kind") = "linear", py::arg("centre") = 0.5, py::arg("steepness") = 10.0)
+  py::class_<GoalWeight>(module, "GoalWeight",
+                         "Weight w(s) of eq. (1): 0 at the start of a motion, 1 at its end.")
+      .def(py::init(&toGoalWeight), py::arg("kind") = "linear", py::arg("centre") = 0.5,
+           py::arg("steepness") = 10.0)
       .def_property_readonly("kind",
                              [](const GoalWeight& w) {
                                return w.kind == GoalWeight::Kind::Linear ? "linear" : "sigmoid";
@@ -31,7 +34,8 @@ void bindPrimitive(py::module_& module) {
       .def_readonly("steepness", &GoalWeight::steepness)
       .def("__call__", &GoalWeight::operator(), py::arg("s"), "w(s) at phase s.");
 
-  py::class_<Primitive>(module, "Primitive", "A learnt motion primitive: everything eq. (1)-(5) need.")
+  py::class_<Primitive>(module, "Primitive",
+                        "A learnt motion primitive: everything eq. (1)-(5) need.")
       .def(py::init<>())
       .def_readwrite("id", &Primitive::id)
       .def_readwrite("description", &Primitive::description)
@@ -41,8 +45,7 @@ void bindPrimitive(py::module_& module) {
       .def_readwrite("damping", &Primitive::damping, "D of eq. (1)")
       .def_readwrite("goal_weight", &Primitive::goal_weight)
       .def_property(
-          "mapping",
-          [](const Primitive& p) { return describe(p.mapping); },
+          "mapping", [](const Primitive& p) { return describe(p.mapping); },
           [](Primitive& p, const std::string& mapping) { p.mapping = toShapeMapping(mapping); })
       .def_readwrite("start", &Primitive::start, "m, (3,)")
       .def_readwrite("goal", &Primitive::goal, "m, (3,)")
@@ -51,10 +54,14 @@ void bindPrimitive(py::module_& module) {
       .def_readwrite("widths", &Primitive::widths, "h_i, (N,)")
       .def_property(
           "weights", [](const Primitive& p) -> Points { return p.weights.transpose(); },
-          [](Primitive& p, const Points& weights) { p.weights = weights.transpose(); }, "w_i, m, (N, 3)")
-      .def("validate", [](const Primitive& p) { validate(p); }, "Raises ValueError naming the field that is wrong.")
+          [](Primitive& p, const Points& weights) { p.weights = weights.transpose(); },
+          "w_i, m, (N, 3)")
       .def(
-          "moving_point", [](const Primitive& p, double s) { return TransformationSystem(p).movingPoint(s); },
+          "validate", [](const Primitive& p) { validate(p); },
+          "Raises ValueError naming the field that is wrong.")
+      .def(
+          "moving_point",
+          [](const Primitive& p, double s) { return TransformationSystem(p).movingPoint(s); },
           py::arg("s"), "phi(s) of eq. (5), m, (3,)");
 }
 
@@ -62,8 +69,10 @@ void bindLibrary(py::module_& module) {
   py::register_exception<LibraryError>(module, "LibraryError", PyExc_ValueError);
   py::class_<Library>(module, "Library", "Primitives by id, read from and written to XML.")
       .def(py::init<>())
-      .def("load", &Library::load, py::arg("path"), "Adds all primitives of a file, or none; returns their number.")
-      .def("parse", &Library::parse, py::arg("text"), py::arg("name") = "text", "The same from text.")
+      .def("load", &Library::load, py::arg("path"),
+           "Adds all primitives of a file, or none; returns their number.")
+      .def("parse", &Library::parse, py::arg("text"), py::arg("name") = "text",
+           "The same from text.")
       .def("save", &Library::save, py::arg("path"), "Writes all primitives.")
       .def("format", &Library::format, "The text that save() writes.")
       .def("add", &Library::add, py::arg("primitive"))
@@ -78,7 +87,8 @@ void bindLibrary(py::module_& module) {
              }
              return *library.find(id);
            })
-      .def("__contains__", [](const Library& library, const std::string& id) { return library.find(id) != nullptr; })
+      .def("__contains__", [](const Library& library,
+                              const std::string& id) { return library.find(id) != nullptr; })
       .def("__len__", [](const Library& library) { return library.primitives().size(); })
       .def("ids", [](const Library& library) {
         std::vector<std::string> ids;
@@ -97,8 +107,8 @@ void bindStepping(py::module_& module) {
                        requireFinite(velocity, "velocity"), requireFinite(goal, "goal"), ratio);
              return dmp;
            }),
-           py::arg("primitive"), py::arg("position"), py::arg("goal"), py::arg("velocity") = Vector3(Vector3::Zero()),
-           py::arg("ratio") = 1.0)
+           py::arg("primitive"), py::arg("position"), py::arg("goal"),
+           py::arg("velocity") = Vector3(Vector3::Zero()), py::arg("ratio") = 1.0)
       .def(
           "switch_to",
           [](Dmp& dmp, const Primitive& primitive, const Vector3& goal, double ratio) {
@@ -118,11 +128,12 @@ void bindStepping(py::module_& module) {
           "step",
           [](Dmp& dmp, double dt, const Vector3& goal, const Vector3& goal_velocity, double rate) {
             if (!(rate >= 0.0 && rate <= 1.0)) throw std::invalid_argument("rate: expected 0 to 1");
-            dmp.step(requireStep(dt), requireFinite(goal, "goal"), requireFinite(goal_velocity, "goal_velocity"), rate);
+            dmp.step(requireStep(dt), requireFinite(goal, "goal"),
+                     requireFinite(goal_velocity, "goal_velocity"), rate);
             return dmp.state().position;
           },
-          py::arg("dt"), py::arg("goal"), py::arg("goal_velocity") = Vector3(Vector3::Zero()), py::arg("rate") = 1.0,
-          "One cycle; returns the position (m, (3,)).")
+          py::arg("dt"), py::arg("goal"), py::arg("goal_velocity") = Vector3(Vector3::Zero()),
+          py::arg("rate") = 1.0, "One cycle; returns the position (m, (3,)).")
       .def(
           "roll_out",
           [](Dmp& dmp, const Vector3& goal, double duration, double dt) {
@@ -145,7 +156,8 @@ void bindStepping(py::module_& module) {
           "Steps to a fixed goal; returns times (n,), positions (n, 3) and velocities (n, 3).")
       .def_property_readonly("position", [](const Dmp& dmp) { return dmp.state().position; })
       .def_property_readonly("velocity", [](const Dmp& dmp) { return dmp.state().velocity; })
-      .def_property_readonly("acceleration", [](const Dmp& dmp) { return dmp.state().acceleration; })
+      .def_property_readonly("acceleration",
+                             [](const Dmp& dmp) { return dmp.state().acceleration; })
       .def_property_readonly("phase", [](const Dmp& dmp) { return dmp.state().phase; })
       .def_property_readonly("progress", &Dmp::progress)
       .def_property_readonly("tau", &Dmp::tau)
@@ -161,24 +173,31 @@ void bindDmp(py::module_& module) {
   bindStepping(module);
   module.def(
       "learn",
-      [](const std::string& id, const std::vector<std::pair<Eigen::VectorXd, Points>>& demonstrations, int basis_count,
+      [](const std::string& id,
+         const std::vector<std::pair<Eigen::VectorXd, Points>>& demonstrations, int basis_count,
          double alpha, double stiffness, const GoalWeight& goal_weight, const std::string& mapping,
          double regularisation) {
         std::vector<Trajectory> trajectories;
-        for (const auto& [times, positions] : demonstrations) trajectories.push_back(toTrajectory(times, positions));
-        return learn(id, trajectories,
-                     {basis_count, alpha, stiffness, goal_weight, toShapeMapping(mapping), regularisation});
+        for (const auto& [times, positions] : demonstrations)
+          trajectories.push_back(toTrajectory(times, positions));
+        return learn(
+            id, trajectories,
+            {basis_count, alpha, stiffness, goal_weight, toShapeMapping(mapping), regularisation});
       },
-      py::arg("id"), py::arg("demonstrations"), py::arg("basis_count") = LearningOptions().basis_count,
-      py::arg("alpha") = LearningOptions().alpha, py::arg("stiffness") = LearningOptions().stiffness,
-      py::arg("goal_weight") = GoalWeight(), py::arg("mapping") = "none",
-      py::arg("regularisation") = LearningOptions().regularisation,
-      "Learns a primitive from one or several demonstrations, each (times (n,) in s, positions (n, 3) in m).");
+      py::arg("id"), py::arg("demonstrations"),
+      py::arg("basis_count") = LearningOptions().basis_count,
+      py::arg("alpha") = LearningOptions().alpha,
+      py::arg("stiffness") = LearningOptions().stiffness, py::arg("goal_weight") = GoalWeight(),
+      py::arg("mapping") = "none", py::arg("regularisation") = LearningOptions().regularisation,
+      "Learns a primitive from one or several demonstrations, each (times (n,) in s, positions (n, "
+      "3) in m).");
   module.def(
       "reproduce",
       [](const Primitive& primitive, const Eigen::VectorXd& times, double dt) -> Points {
         if (!(dt > 1e-6)) throw std::invalid_argument("dt: expected more than 1e-6 s");
-        return reproduce(primitive, std::vector<double>(times.data(), times.data() + times.size()), dt).transpose();
+        return reproduce(primitive, std::vector<double>(times.data(), times.data() + times.size()),
+                         dt)
+            .transpose();
       },
       py::arg("primitive"), py::arg("times"), py::arg("dt") = 0.001,
       "Path (n, 3) from the primitive's own start to its own goal at times (n,) in s.");

@@ -11,7 +11,8 @@ using lwr_fri_bridge::Interpolator;
 using lwr_fri_bridge::JointLimits;
 
 void bindTable(py::module_& module) {
-  py::class_<JointLimits>(module, "JointLimits", "The robot's table of joint limits; vectors (7,) in wire order.")
+  py::class_<JointLimits>(module, "JointLimits",
+                          "The robot's table of joint limits; vectors (7,) in wire order.")
       .def(py::init<>())
       .def_readwrite("lower_position", &JointLimits::lower_position)
       .def_readwrite("upper_position", &JointLimits::upper_position)
@@ -19,13 +20,15 @@ void bindTable(py::module_& module) {
       .def_readwrite("acceleration", &JointLimits::acceleration)
       .def_readwrite("jerk", &JointLimits::jerk)
       .def_readwrite("torque", &JointLimits::torque);
-  module.def("load_joint_limits", &lwr_fri_bridge::loadJointLimits, py::arg("path"), py::arg("profile") = "default",
-             "Reads lwr_description/config/joint_limits.yaml.");
+  module.def("load_joint_limits", &lwr_fri_bridge::loadJointLimits, py::arg("path"),
+             py::arg("profile") = "default", "Reads lwr_description/config/joint_limits.yaml.");
 
-  py::class_<Interpolator>(module, "Interpolator", "Jerk-limited interpolator from target velocities to positions.")
+  py::class_<Interpolator>(module, "Interpolator",
+                           "Jerk-limited interpolator from target velocities to positions.")
       .def(py::init<const JointLimits&>(), py::arg("limits"))
       .def(
-          "reset", [](Interpolator& i, const JointVector& q) { i.reset(requireFinite(q, "position")); },
+          "reset",
+          [](Interpolator& i, const JointVector& q) { i.reset(requireFinite(q, "position")); },
           py::arg("position"))
       .def(
           "step",
@@ -34,20 +37,25 @@ void bindTable(py::module_& module) {
             return i.position();
           },
           py::arg("velocity"), py::arg("dt"), "Returns the commanded position (7,) in rad.")
-      .def_property_readonly("position", [](const Interpolator& i) { return JointVector(i.position()); })
-      .def_property_readonly("velocity", [](const Interpolator& i) { return JointVector(i.velocity()); })
-      .def_property_readonly("acceleration", [](const Interpolator& i) { return JointVector(i.acceleration()); });
+      .def_property_readonly("position",
+                             [](const Interpolator& i) { return JointVector(i.position()); })
+      .def_property_readonly("velocity",
+                             [](const Interpolator& i) { return JointVector(i.velocity()); })
+      .def_property_readonly("acceleration",
+                             [](const Interpolator& i) { return JointVector(i.acceleration()); });
 }
 
 void bindWorkspace(py::module_& module) {
   const WorkspaceParameters standard;
-  py::class_<WorkspaceParameters>(module, "WorkspaceParameters", "Box, sphere around the base, stretch of the arm.")
-      .def(py::init([](const Vector3& box_min, const Vector3& box_max, const Vector3& base_centre, double base_radius,
-                       double max_stretch) {
+  py::class_<WorkspaceParameters>(module, "WorkspaceParameters",
+                                  "Box, sphere around the base, stretch of the arm.")
+      .def(py::init([](const Vector3& box_min, const Vector3& box_max, const Vector3& base_centre,
+                       double base_radius, double max_stretch) {
              return WorkspaceParameters{box_min, box_max, base_centre, base_radius, max_stretch};
            }),
            py::arg("box_min") = standard.box_min, py::arg("box_max") = standard.box_max,
-           py::arg("base_centre") = standard.base_centre, py::arg("base_radius") = standard.base_radius,
+           py::arg("base_centre") = standard.base_centre,
+           py::arg("base_radius") = standard.base_radius,
            py::arg("max_stretch") = standard.max_stretch)
       .def_readwrite("box_min", &WorkspaceParameters::box_min)
       .def_readwrite("box_max", &WorkspaceParameters::box_max)
@@ -59,7 +67,8 @@ void bindWorkspace(py::module_& module) {
       .def(py::init<const WorkspaceParameters&>(), py::arg("parameters") = standard)
       .def("contains", &Workspace::contains, py::arg("point"))
       .def(
-          "violated", [](const Workspace& w, const Vector3& point) { return describe(w.violated(point)); },
+          "violated",
+          [](const Workspace& w, const Vector3& point) { return describe(w.violated(point)); },
           py::arg("point"))
       .def("project", &Workspace::project, py::arg("point"), "The nearest allowed point.");
 }
@@ -74,9 +83,11 @@ void bindGuard(py::module_& module) {
       .def_property_readonly("reason", [](const GuardResult& r) { return describe(r.reason); })
       .def_property_readonly("border", [](const GuardResult& r) { return describe(r.border); });
 
-  py::class_<Guard>(module, "Guard", "Scales joint velocities into all limits, keeping their direction.")
-      .def(py::init([](const Chain& chain, const JointLimits& limits, const WorkspaceParameters& workspace,
-                       double hand_speed, double elbow_speed, double position_margin, double reaction_time) {
+  py::class_<Guard>(module, "Guard",
+                    "Scales joint velocities into all limits, keeping their direction.")
+      .def(py::init([](const Chain& chain, const JointLimits& limits,
+                       const WorkspaceParameters& workspace, double hand_speed, double elbow_speed,
+                       double position_margin, double reaction_time) {
              GuardParameters p;
              p.lower_position = limits.lower_position;
              p.upper_position = limits.upper_position;
@@ -91,11 +102,14 @@ void bindGuard(py::module_& module) {
              return Guard(p, chain);
            }),
            py::arg("chain"), py::arg("limits"), py::arg("workspace") = WorkspaceParameters(),
-           py::arg("hand_speed") = standard.hand_speed, py::arg("elbow_speed") = standard.elbow_speed,
-           py::arg("position_margin") = standard.position_margin, py::arg("reaction_time") = standard.reaction_time)
+           py::arg("hand_speed") = standard.hand_speed,
+           py::arg("elbow_speed") = standard.elbow_speed,
+           py::arg("position_margin") = standard.position_margin,
+           py::arg("reaction_time") = standard.reaction_time)
       .def(
           "limit",
-          [](Guard& guard, const Chain& chain, const JointVector& q, const JointVector& velocity, double dt) {
+          [](Guard& guard, const Chain& chain, const JointVector& q, const JointVector& velocity,
+             double dt) {
             GuardResult result;
             guard.limit(chain.evaluate(q), q, velocity, requireStep(dt), result);
             return result;
@@ -104,9 +118,11 @@ void bindGuard(py::module_& module) {
       .def("speed_to_stop", &Guard::speedToStop, py::arg("joint"), py::arg("room"))
       .def("reset", &Guard::reset);
 
-  py::class_<PhaseGovernor>(module, "PhaseGovernor", "Slows the clock of a motion so that the reference waits.")
+  py::class_<PhaseGovernor>(module, "PhaseGovernor",
+                            "Slows the clock of a motion so that the reference waits.")
       .def(py::init<double, double>(), py::arg("rise") = 2.0, py::arg("fall") = 10.0)
-      .def("update", &PhaseGovernor::update, py::arg("dt"), py::arg("speed_scale"), py::arg("limit_scale"))
+      .def("update", &PhaseGovernor::update, py::arg("dt"), py::arg("speed_scale"),
+           py::arg("limit_scale"))
       .def("reset", &PhaseGovernor::reset, py::arg("rate") = 1.0)
       .def_property_readonly("rate", &PhaseGovernor::rate);
 }

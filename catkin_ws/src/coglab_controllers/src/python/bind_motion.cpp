@@ -6,7 +6,8 @@ namespace coglab_controllers::python {
 namespace {
 
 double requireRate(double rate) {
-  if (!(rate >= 0.0 && rate <= 1.0)) throw std::invalid_argument("rate: expected 0 to 1, got " + std::to_string(rate));
+  if (!(rate >= 0.0 && rate <= 1.0))
+    throw std::invalid_argument("rate: expected 0 to 1, got " + std::to_string(rate));
   return rate;
 }
 
@@ -20,22 +21,30 @@ CartesianMotionPlan toPlan(const Primitive& primitive, double ratio, bool orient
 }
 
 void bindCartesianMotion(py::module_& module) {
-  py::class_<CartesianReference>(module, "CartesianReference", "What a motion asks of the inverse kinematics.")
-      .def(py::init([](const Vector3& position, const QuaternionArray& orientation, const Vector3& velocity,
-                       const Vector3& angular_velocity, bool orientation_control) {
-             return CartesianReference{toPose(position, orientation, "pose"), requireFinite(velocity, "velocity"),
-                                       requireFinite(angular_velocity, "angular_velocity"), orientation_control};
+  py::class_<CartesianReference>(module, "CartesianReference",
+                                 "What a motion asks of the inverse kinematics.")
+      .def(py::init([](const Vector3& position, const QuaternionArray& orientation,
+                       const Vector3& velocity, const Vector3& angular_velocity,
+                       bool orientation_control) {
+             return CartesianReference{
+                 toPose(position, orientation, "pose"), requireFinite(velocity, "velocity"),
+                 requireFinite(angular_velocity, "angular_velocity"), orientation_control};
            }),
-           py::arg("position"), py::arg("orientation"), py::arg("velocity") = Vector3(Vector3::Zero()),
-           py::arg("angular_velocity") = Vector3(Vector3::Zero()), py::arg("orientation_control") = true)
-      .def_property_readonly("position", [](const CartesianReference& r) { return r.pose.position; })
-      .def_property_readonly("orientation", [](const CartesianReference& r) { return toArray(r.pose.orientation); })
+           py::arg("position"), py::arg("orientation"),
+           py::arg("velocity") = Vector3(Vector3::Zero()),
+           py::arg("angular_velocity") = Vector3(Vector3::Zero()),
+           py::arg("orientation_control") = true)
+      .def_property_readonly("position",
+                             [](const CartesianReference& r) { return r.pose.position; })
+      .def_property_readonly(
+          "orientation", [](const CartesianReference& r) { return toArray(r.pose.orientation); })
       .def_readonly("velocity", &CartesianReference::velocity)
       .def_readonly("angular_velocity", &CartesianReference::angular_velocity)
       .def_readonly("orientation_control", &CartesianReference::orientation_control);
 
   const QuaternionArray none(0.0, 0.0, 0.0, 1.0);
-  py::class_<CartesianMotion>(module, "CartesianMotion", "Estimator, DMP, orientation curve and end of motion.")
+  py::class_<CartesianMotion>(module, "CartesianMotion",
+                              "Estimator, DMP, orientation curve and end of motion.")
       .def(py::init([](double goal_time_constant) {
              GoalEstimatorParameters parameters;
              parameters.time_constant = goal_time_constant;
@@ -46,25 +55,30 @@ void bindCartesianMotion(py::module_& module) {
           "start",
           [](CartesianMotion& motion, const Primitive& primitive, const Vector3& position,
              const QuaternionArray& orientation, const Vector3& goal, const QuaternionArray& target,
-             const Vector3& velocity, const Vector3& angular_velocity, double ratio, bool orientation_control) {
-            motion.start(toPlan(primitive, ratio, orientation_control), toPose(position, orientation, "pose"),
-                         requireFinite(velocity, "velocity"), requireFinite(angular_velocity, "angular_velocity"),
+             const Vector3& velocity, const Vector3& angular_velocity, double ratio,
+             bool orientation_control) {
+            motion.start(toPlan(primitive, ratio, orientation_control),
+                         toPose(position, orientation, "pose"), requireFinite(velocity, "velocity"),
+                         requireFinite(angular_velocity, "angular_velocity"),
                          toPose(goal, target, "goal"));
           },
-          py::arg("primitive"), py::arg("position"), py::arg("orientation"), py::arg("goal"), py::arg("target"),
-          py::arg("velocity") = Vector3(Vector3::Zero()), py::arg("angular_velocity") = Vector3(Vector3::Zero()),
-          py::arg("ratio") = 1.0, py::arg("orientation_control") = true)
+          py::arg("primitive"), py::arg("position"), py::arg("orientation"), py::arg("goal"),
+          py::arg("target"), py::arg("velocity") = Vector3(Vector3::Zero()),
+          py::arg("angular_velocity") = Vector3(Vector3::Zero()), py::arg("ratio") = 1.0,
+          py::arg("orientation_control") = true)
       .def(
           "switch_to",
-          [](CartesianMotion& motion, const Primitive& primitive, const Vector3& goal, const QuaternionArray& target,
-             double ratio, bool orientation_control) {
-            motion.switchTo(toPlan(primitive, ratio, orientation_control), toPose(goal, target, "goal"));
+          [](CartesianMotion& motion, const Primitive& primitive, const Vector3& goal,
+             const QuaternionArray& target, double ratio, bool orientation_control) {
+            motion.switchTo(toPlan(primitive, ratio, orientation_control),
+                            toPose(goal, target, "goal"));
           },
           py::arg("primitive"), py::arg("goal"), py::arg("target"), py::arg("ratio") = 1.0,
           py::arg("orientation_control") = true)
       .def(
           "step",
-          [](CartesianMotion& motion, double dt, const Vector3& goal, const QuaternionArray& target, double rate) {
+          [](CartesianMotion& motion, double dt, const Vector3& goal, const QuaternionArray& target,
+             double rate) {
             return motion.step(requireStep(dt), toPose(goal, target, "goal"), requireRate(rate));
           },
           py::arg("dt"), py::arg("goal"), py::arg("target") = none, py::arg("rate") = 1.0)
@@ -72,29 +86,39 @@ void bindCartesianMotion(py::module_& module) {
       .def_property_readonly("phase",
                              [](const CartesianMotion& motion) {
                                switch (motion.phase()) {
-                                 case CartesianMotion::Phase::Running: return "running";
-                                 case CartesianMotion::Phase::Ended: return "ended";
-                                 default: return "idle";
+                                 case CartesianMotion::Phase::Running:
+                                   return "running";
+                                 case CartesianMotion::Phase::Ended:
+                                   return "ended";
+                                 default:
+                                   return "idle";
                                }
                              })
       .def_property_readonly("event",
                              [](const CartesianMotion& motion) {
                                switch (motion.event()) {
-                                 case MotionEnd::Event::Ended: return "ended";
-                                 case MotionEnd::Event::FollowsAgain: return "follows_again";
-                                 default: return "";
+                                 case MotionEnd::Event::Ended:
+                                   return "ended";
+                                 case MotionEnd::Event::FollowsAgain:
+                                   return "follows_again";
+                                 default:
+                                   return "";
                                }
                              })
-      .def_property_readonly("position", [](const CartesianMotion& m) { return m.dmp().state().position; })
-      .def_property_readonly("velocity", [](const CartesianMotion& m) { return m.dmp().state().velocity; })
-      .def_property_readonly("acceleration", [](const CartesianMotion& m) { return m.dmp().state().acceleration; })
+      .def_property_readonly("position",
+                             [](const CartesianMotion& m) { return m.dmp().state().position; })
+      .def_property_readonly("velocity",
+                             [](const CartesianMotion& m) { return m.dmp().state().velocity; })
+      .def_property_readonly("acceleration",
+                             [](const CartesianMotion& m) { return m.dmp().state().acceleration; })
       .def_property_readonly("goal", [](const CartesianMotion& m) { return m.goal(); })
       .def_property_readonly("remaining_distance", &CartesianMotion::remainingDistance)
       .def_property_readonly("remaining_time", &CartesianMotion::remainingTime);
 }
 
 void bindEstimators(py::module_& module) {
-  py::class_<GoalEstimator>(module, "GoalEstimator", "Third-order tracker of a goal with ramp compensation.")
+  py::class_<GoalEstimator>(module, "GoalEstimator",
+                            "Third-order tracker of a goal with ramp compensation.")
       .def(py::init([](double time_constant, double max_innovation) {
              GoalEstimatorParameters parameters;
              parameters.time_constant = time_constant;
@@ -104,7 +128,8 @@ void bindEstimators(py::module_& module) {
            py::arg("time_constant") = GoalEstimatorParameters().time_constant,
            py::arg("max_innovation") = GoalEstimatorParameters().max_innovation)
       .def(
-          "reset", [](GoalEstimator& e, const Vector3& goal) { e.reset(requireFinite(goal, "goal")); },
+          "reset",
+          [](GoalEstimator& e, const Vector3& goal) { e.reset(requireFinite(goal, "goal")); },
           py::arg("goal"))
       .def(
           "update",
@@ -116,10 +141,12 @@ void bindEstimators(py::module_& module) {
       .def_property_readonly("position", &GoalEstimator::position)
       .def_property_readonly("velocity", &GoalEstimator::velocity);
 
-  py::class_<OrientationCurve>(module, "OrientationCurve", "Quaternion Bezier curve between two orientations.")
+  py::class_<OrientationCurve>(module, "OrientationCurve",
+                               "Quaternion Bezier curve between two orientations.")
       .def(py::init([](const QuaternionArray& start, const QuaternionArray& target, double duration,
                        const Vector3& angular_velocity) {
-             if (!(duration > 0.0)) throw std::invalid_argument("duration: expected a positive number of seconds");
+             if (!(duration > 0.0))
+               throw std::invalid_argument("duration: expected a positive number of seconds");
              OrientationCurve curve;
              curve.start(toQuaternion(start), requireFinite(angular_velocity, "angular_velocity"),
                          toQuaternion(target), duration);
@@ -128,7 +155,10 @@ void bindEstimators(py::module_& module) {
            py::arg("start"), py::arg("target"), py::arg("duration") = 1.0,
            py::arg("angular_velocity") = Vector3(Vector3::Zero()))
       .def(
-          "set_target", [](OrientationCurve& c, const QuaternionArray& target) { c.setTarget(toQuaternion(target)); },
+          "set_target",
+          [](OrientationCurve& c, const QuaternionArray& target) {
+            c.setTarget(toQuaternion(target));
+          },
           py::arg("target"))
       .def(
           "at", [](const OrientationCurve& c, double progress) { return toArray(c.at(progress)); },
@@ -136,9 +166,10 @@ void bindEstimators(py::module_& module) {
 }
 
 void bindPtp(py::module_& module) {
-  py::class_<PtpTrajectory>(module, "PtpTrajectory", "Synchronised, acceleration-limited motion to rest at a target.")
-      .def(py::init<const JointVector&, const JointVector&, const JointVector&, const JointVector&, const JointVector&,
-                    int>(),
+  py::class_<PtpTrajectory>(module, "PtpTrajectory",
+                            "Synchronised, acceleration-limited motion to rest at a target.")
+      .def(py::init<const JointVector&, const JointVector&, const JointVector&, const JointVector&,
+                    const JointVector&, int>(),
            py::arg("position"), py::arg("velocity"), py::arg("target"), py::arg("max_velocity"),
            py::arg("max_acceleration"), py::arg("joints") = kMaxJoints)
       .def_property_readonly("duration", &PtpTrajectory::duration)
@@ -150,7 +181,8 @@ void bindPtp(py::module_& module) {
             trajectory.at(t, point);
             return py::make_tuple(point.position, point.velocity, point.acceleration);
           },
-          py::arg("t"), "Position, velocity and acceleration, each (7,), t seconds after the start.");
+          py::arg("t"),
+          "Position, velocity and acceleration, each (7,), t seconds after the start.");
 }
 
 }  // namespace

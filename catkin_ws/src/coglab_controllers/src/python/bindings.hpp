@@ -1,6 +1,6 @@
 /// @file
-/// Parts of the Python module coglab_controllers._core and what they share. Documentation of the Python side, with shapes
-/// and units, is in src/coglab_controllers/_core.pyi.
+/// Parts of the Python module coglab_controllers._core and what they share. Documentation of the
+/// Python side, with shapes and units, is in src/coglab_controllers/_core.pyi.
 #pragma once
 
 #include <stdexcept>
@@ -25,20 +25,23 @@ inline QuaternionArray toArray(const Quaternion& q) { return q.coeffs(); }
 /// @throws std::invalid_argument (ValueError) unless it is a unit quaternion.
 inline Quaternion toQuaternion(const QuaternionArray& xyzw, const char* name = "quaternion") {
   const Quaternion q(xyzw);
-  if (!isUnit(q)) throw std::invalid_argument(std::string(name) + ": expected a unit quaternion x y z w");
+  if (!isUnit(q))
+    throw std::invalid_argument(std::string(name) + ": expected a unit quaternion x y z w");
   return q.normalized();
 }
 
 /// @throws std::invalid_argument (ValueError) unless all entries are finite.
 template <typename Vector>
 const Vector& requireFinite(const Vector& vector, const char* name) {
-  if (!vector.allFinite()) throw std::invalid_argument(std::string(name) + ": expected finite numbers");
+  if (!vector.allFinite())
+    throw std::invalid_argument(std::string(name) + ": expected finite numbers");
   return vector;
 }
 
 /// @throws std::invalid_argument (ValueError) unless dt is finite and not negative.
 inline double requireStep(double dt) {
-  if (!(dt >= 0.0 && dt < 1e6)) throw std::invalid_argument("dt: expected seconds, 0 or more, got " + std::to_string(dt));
+  if (!(dt >= 0.0 && dt < 1e6))
+    throw std::invalid_argument("dt: expected seconds, 0 or more, got " + std::to_string(dt));
   return dt;
 }
 

@@ -4,7 +4,8 @@
 
 namespace coglab_controllers {
 
-/// Phase that falls from 1 at the start of a motion towards 0. Solved exactly, so that the step size does not matter.
+/// Phase that falls from 1 at the start of a motion towards 0. Solved exactly, so that the step
+/// size does not matter.
 class CanonicalSystem {
  public:
   /// ln(100): the phase is 0.01 when the duration of the demonstration is over.

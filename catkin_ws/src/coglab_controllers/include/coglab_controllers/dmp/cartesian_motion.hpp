@@ -1,5 +1,6 @@
 /// @file
-/// A whole Cartesian motion: estimator, DMP, orientation curve and end of the motion in the order of the control cycle.
+/// A whole Cartesian motion: estimator, DMP, orientation curve and end of the motion in the order
+/// of the control cycle.
 #pragma once
 
 #include "coglab_controllers/dmp/dmp.hpp"
@@ -12,12 +13,12 @@ namespace coglab_controllers {
 /// What execute_dmp asks for, checked and complete; built outside the cycle, copied into it.
 struct CartesianMotionPlan {
   TransformationSystem system;
-  double ratio = 1.0;              ///< dmp_ratio
+  double ratio = 1.0;  ///< dmp_ratio
   bool orientation_control = true;
 };
 
-/// Runs a primitive towards a goal pose that may move. This is all the DMP plug-in does between its mailboxes and the IK;
-/// the Python module runs the same code. No allocation, no throw.
+/// Runs a primitive towards a goal pose that may move. This is all the DMP plug-in does between its
+/// mailboxes and the IK; the Python module runs the same code. No allocation, no throw.
 class CartesianMotion {
  public:
   enum class Phase {
@@ -27,19 +28,22 @@ class CartesianMotion {
   };
 
   /// @throws std::invalid_argument as the constructors of the estimators and MotionEnd.
-  CartesianMotion(const GoalEstimatorParameters& estimator = {}, const MotionEndParameters& end = {});
+  CartesianMotion(const GoalEstimatorParameters& estimator = {},
+                  const MotionEndParameters& end = {});
 
   /// Begins at phase 1 from the given pose and velocity (execute_dmp).
-  /// @param goal hand pose to reach, offset and target orientation already applied, goal as received now.
+  /// @param goal hand pose to reach, offset and target orientation already applied, goal as
+  /// received now.
   void start(const CartesianMotionPlan& plan, const Pose& pose, const Vector3& velocity,
              const Vector3& angular_velocity, const Pose& goal) noexcept;
 
-  /// Another primitive or ratio (switch_dmp): phase, position and velocity are kept, and the orientation curve goes
-  /// on from where it is.
+  /// Another primitive or ratio (switch_dmp): phase, position and velocity are kept, and the
+  /// orientation curve goes on from where it is.
   void switchTo(const CartesianMotionPlan& plan, const Pose& goal) noexcept;
 
   /// One cycle.
-  /// @param goal as received, sample-and-hold.  @param rate 0..1 slows the clock (speed_scale), see Dmp::step.
+  /// @param goal as received, sample-and-hold.  @param rate 0..1 slows the clock (speed_scale), see
+  /// Dmp::step.
   /// @return what the IK shall do in this cycle.
   const CartesianReference& step(double dt, const Pose& goal, double rate = 1.0) noexcept;
 
@@ -56,7 +60,9 @@ class CartesianMotion {
   /// From the set-point to the goal as received, m.
   double remainingDistance() const noexcept { return remaining_distance_; }
   /// Estimated from the phase and tau, s, at rate 1.
-  double remainingTime() const noexcept { return phase_ == Phase::Running ? dmp_.remainingTime() : 0.0; }
+  double remainingTime() const noexcept {
+    return phase_ == Phase::Running ? dmp_.remainingTime() : 0.0;
+  }
 
  private:
   GoalEstimator goal_estimator_;
@@ -71,8 +77,8 @@ class CartesianMotion {
   Quaternion orientation_ = Quaternion::Identity();  // set-point at the end of the last step
   double curve_begin_ = 0.0;                         // progress of the DMP at which the curve began
   double remaining_distance_ = 0.0;
-  double rate_ = 1.0;                                // of the last step
-  bool settled_ = false;                             // the set-point has come to rest at the latched goal
+  double rate_ = 1.0;     // of the last step
+  bool settled_ = false;  // the set-point has come to rest at the latched goal
 };
 
 }  // namespace coglab_controllers

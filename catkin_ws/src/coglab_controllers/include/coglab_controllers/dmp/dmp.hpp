@@ -14,15 +14,18 @@ struct DmpState {
   double phase = 0.0;                      ///< s, 1 at the start of the motion
 };
 
-/// Integrates a primitive with fourth-order Runge-Kutta, in sub-steps if the cycle is long. No allocation, no throw.
+/// Integrates a primitive with fourth-order Runge-Kutta, in sub-steps if the cycle is long. No
+/// allocation, no throw.
 class Dmp {
  public:
-  /// Begins a motion at phase 1. `ratio` is dmp_ratio: tau = ratio * duration; finite and positive (checked by the
-  /// caller at plan time with `requireRatio`). `goal` only serves the primitive's ShapeMapping.
+  /// Begins a motion at phase 1. `ratio` is dmp_ratio: tau = ratio * duration; finite and positive
+  /// (checked by the caller at plan time with `requireRatio`). `goal` only serves the primitive's
+  /// ShapeMapping.
   void start(const TransformationSystem& system, const Vector3& position, const Vector3& velocity,
              const Vector3& goal, double ratio) noexcept;
 
-  /// Another primitive (or the same with another ratio) in mid-motion: phase, position and velocity are kept.
+  /// Another primitive (or the same with another ratio) in mid-motion: phase, position and velocity
+  /// are kept.
   void switchTo(const TransformationSystem& system, const Vector3& goal, double ratio) noexcept;
 
   /// Another time constant; position, velocity and phase are kept.
@@ -31,10 +34,11 @@ class Dmp {
   /// One cycle.
   /// @param dt s; a step of 0 changes nothing.
   /// @param goal, goal_velocity g (m) and g' (m/s) of eq. (1), g at the beginning of the cycle.
-  /// @param rate 0..1, slows the clock: the path stays, the time along it runs `rate` times as fast (0: standstill).
+  /// @param rate 0..1, slows the clock: the path stays, the time along it runs `rate` times as fast
+  /// (0: standstill).
   ///        The velocity in state() is x' of the unslowed motion; the arm moves at rate times it.
-  const DmpState& step(double dt, const Vector3& goal, const Vector3& goal_velocity = Vector3::Zero(),
-                       double rate = 1.0) noexcept;
+  const DmpState& step(double dt, const Vector3& goal,
+                       const Vector3& goal_velocity = Vector3::Zero(), double rate = 1.0) noexcept;
 
   const DmpState& state() const noexcept { return state_; }
   const Vector3& startPosition() const noexcept { return start_; }  ///< x0, m

@@ -1,5 +1,6 @@
 /// @file
-/// Learning a primitive from demonstrations by regularised least squares. Not for the control cycle.
+/// Learning a primitive from demonstrations by regularised least squares. Not for the control
+/// cycle.
 #pragma once
 
 #include <string>
@@ -11,25 +12,29 @@ namespace coglab_controllers {
 
 /// How to learn; the defaults suit reaches of about a second.
 struct LearningOptions {
-  int basis_count = 20;                      ///< N, 2..kMaxBasis
+  int basis_count = 20;  ///< N, 2..kMaxBasis
   double alpha = CanonicalSystem::kDefaultAlpha;
-  double stiffness = 150.0;                  ///< K; D is 2 sqrt(K)
+  double stiffness = 150.0;  ///< K; D is 2 sqrt(K)
   GoalWeight goal_weight;
   ShapeMapping mapping = ShapeMapping::None;
-  double regularisation = 1e-10;             ///< ridge, relative to the mean diagonal of the normal matrix
+  double regularisation = 1e-10;  ///< ridge, relative to the mean diagonal of the normal matrix
 };
 
-/// Learns from one or several demonstrations of one motion, which may differ in duration, start and goal.
+/// Learns from one or several demonstrations of one motion, which may differ in duration, start and
+/// goal.
 ///
-/// Eq. (1) is linear in the weights, so the *position* that the system runs through is linear in them too: the
-/// weights minimise the squared distance between demonstrated and reproduced path (in units of each path's length) and
-/// never need the second derivative of a noisy recording. The start velocity of the demonstration is kept.
+/// Eq. (1) is linear in the weights, so the *position* that the system runs through is linear in
+/// them too: the weights minimise the squared distance between demonstrated and reproduced path (in
+/// units of each path's length) and never need the second derivative of a noisy recording. The
+/// start velocity of the demonstration is kept.
 /// @throws std::invalid_argument for invalid demonstrations or options, saying which and why.
 Primitive learn(const std::string& id, const std::vector<Trajectory>& demonstrations,
                 const LearningOptions& options = {});
 
-/// Runs a primitive from its own start to its own goal and samples it at the given times (s). For tests and figures.
+/// Runs a primitive from its own start to its own goal and samples it at the given times (s). For
+/// tests and figures.
 /// @param dt integration step, s.
-Eigen::Matrix3Xd reproduce(const Primitive& primitive, const std::vector<double>& times, double dt = 0.001);
+Eigen::Matrix3Xd reproduce(const Primitive& primitive, const std::vector<double>& times,
+                           double dt = 0.001);
 
 }  // namespace coglab_controllers

@@ -4,8 +4,8 @@
 ///     <dmp_library version="1">
 ///       <primitive id="reach_human" description="…">
 ///         <system duration="1.2" alpha="4.605" stiffness="150" damping="24.495"/>
-///         <goal_weight kind="linear"/>                   or kind="sigmoid" centre="0.5" steepness="10"
-///         <shape mapping="similarity"/>                  or "upright", "none"
+///         <goal_weight kind="linear"/>                   or kind="sigmoid" centre="0.5"
+///         steepness="10" <shape mapping="similarity"/>                  or "upright", "none"
 ///         <start position="0 0 0" velocity="0 0 0"/>
 ///         <goal position="0.5 0 0"/>
 ///         <basis centre="1" width="20.1" weight="0 0 0"/>   2 to kMaxBasis of them
@@ -36,17 +36,17 @@ class LibraryError : public std::runtime_error {
 /// Primitives by id.
 class Library {
  public:
-  static constexpr std::size_t kMaxFileBytes = 4u << 20;   ///< larger files are refused unread
+  static constexpr std::size_t kMaxFileBytes = 4u << 20;  ///< larger files are refused unread
   static constexpr int kMaxPrimitives = 500;
-  static constexpr int kMaxSamples = 20000;                ///< per trajectory
+  static constexpr int kMaxSamples = 20000;  ///< per trajectory
 
   /// Adds all primitives of a file, or none. An id that is already loaded is replaced.
   /// @return how many the file holds.  @throws LibraryError.
   int load(const std::string& path);
   /// The same from text; `name` stands for the file in messages.
   int parse(const std::string& text, const std::string& name);
-  /// Writes all primitives as weights, numbers so that reading gives the same bits. The file appears
-  /// whole or not at all.  @throws LibraryError if it cannot be written.
+  /// Writes all primitives as weights, numbers so that reading gives the same bits. The file
+  /// appears whole or not at all.  @throws LibraryError if it cannot be written.
   void save(const std::string& path) const;
   /// The text that `save` writes.
   std::string format() const;

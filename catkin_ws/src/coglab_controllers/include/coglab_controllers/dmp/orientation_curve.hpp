@@ -1,5 +1,6 @@
 /// @file
-/// Orientation between start and target as a quaternion Bezier curve (D4.10 section 3.1, after eq. (7)).
+/// Orientation between start and target as a quaternion Bezier curve (D4.10 section 3.1, after eq.
+/// (7)).
 #pragma once
 
 #include "coglab_controllers/kinematics/types.hpp"
@@ -8,9 +9,10 @@ namespace coglab_controllers {
 
 /// Quaternion Bezier curve of degree five in cumulative form.
 ///
-/// It begins with a given rotational velocity and no acceleration and ends at rest, so that a turn from rest follows the
-/// minimum-jerk profile. The target may be changed at any time: the curve then bends towards the new one, continuous
-/// as long as the target is, also through half a turn. No allocation, no throw.
+/// It begins with a given rotational velocity and no acceleration and ends at rest, so that a turn
+/// from rest follows the minimum-jerk profile. The target may be changed at any time: the curve
+/// then bends towards the new one, continuous as long as the target is, also through half a turn.
+/// No allocation, no throw.
 class OrientationCurve {
  public:
   /// @param start, angular_velocity at the beginning (unit; rad/s, base frame).
@@ -27,7 +29,8 @@ class OrientationCurve {
  private:
   Quaternion start_ = Quaternion::Identity();
   Vector3 lead_ = Vector3::Zero();  // rotation vector of each of the first two control segments
-  Vector3 turn_ = Vector3::Zero();  // rotation vector of the middle segment, in the frame after the first two
+  Vector3 turn_ =
+      Vector3::Zero();  // rotation vector of the middle segment, in the frame after the first two
 };
 
 }  // namespace coglab_controllers

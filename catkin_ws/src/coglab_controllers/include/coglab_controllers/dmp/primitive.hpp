@@ -1,5 +1,6 @@
 /// @file
-/// A motion primitive as it is learnt, stored in a library and chosen by its name. Not for the control cycle.
+/// A motion primitive as it is learnt, stored in a library and chosen by its name. Not for the
+/// control cycle.
 #pragma once
 
 #include <string>
@@ -12,7 +13,8 @@
 
 namespace coglab_controllers {
 
-/// Largest number of basis functions of a primitive; the control cycle holds them in fixed-size arrays.
+/// Largest number of basis functions of a primitive; the control cycle holds them in fixed-size
+/// arrays.
 constexpr int kMaxBasis = 64;
 
 /// The weight w(s) of eq. (1): 0 at the start of a motion, 1 at its end.
@@ -22,8 +24,8 @@ struct GoalWeight {
     Sigmoid  ///< logistic in s around `centre`, scaled so that w(1) = 0 and w(0) = 1
   };
   Kind kind = Kind::Linear;
-  double centre = 0.5;     ///< phase at which a sigmoid is steepest, 0..1
-  double steepness = 10.0; ///< of a sigmoid, 1..100
+  double centre = 0.5;      ///< phase at which a sigmoid is steepest, 0..1
+  double steepness = 10.0;  ///< of a sigmoid, 1..100
 
   double operator()(double s) const noexcept;
 };
@@ -31,12 +33,14 @@ struct GoalWeight {
 /// What becomes of the learnt shape when start and goal differ from those of the demonstration.
 enum class ShapeMapping {
   None,        ///< eq. (5) as learnt, whatever the goal
-  Similarity,  ///< turned (smallest rotation) and scaled as the line from start to goal is against the demonstration's
+  Similarity,  ///< turned (smallest rotation) and scaled as the line from start to goal is against
+               ///< the demonstration's
   Upright      ///< turned about the vertical and scaled; what the demonstration lifts stays lifted
 };
 
-/// The linear map of a shape from the demonstration's line (start to goal, m) to the present one: it takes `demonstrated`
-/// to `line` (unless one is shorter than a millimetre). Eq. (1)-(5) are invariant under it.
+/// The linear map of a shape from the demonstration's line (start to goal, m) to the present one:
+/// it takes `demonstrated` to `line` (unless one is shorter than a millimetre). Eq. (1)-(5) are
+/// invariant under it.
 Matrix3 shapeMap(ShapeMapping mapping, const Vector3& demonstrated, const Vector3& line) noexcept;
 
 /// The words of library files: none, similarity, upright.
@@ -44,28 +48,29 @@ const char* describe(ShapeMapping mapping) noexcept;
 /// @throws std::invalid_argument listing the words.
 ShapeMapping toShapeMapping(const std::string& word);
 
-/// One demonstrated path: equal numbers of times and positions, at least 5, times strictly increasing.
+/// One demonstrated path: equal numbers of times and positions, at least 5, times strictly
+/// increasing.
 struct Trajectory {
-  std::vector<double> times;             ///< s
-  Eigen::Matrix3Xd positions;            ///< m, one column per time
+  std::vector<double> times;   ///< s
+  Eigen::Matrix3Xd positions;  ///< m, one column per time
 };
 
 /// A learnt primitive: everything eq. (1)-(5) need. A plain value; `validate` checks it.
 struct Primitive {
-  std::string id;                        ///< 1..64 letters, digits, '_', '-', '.'
-  std::string description;               ///< free text for people, up to 500 characters
-  double duration = 1.0;                 ///< s, of the demonstration: the time constant at dmp_ratio 1
+  std::string id;           ///< 1..64 letters, digits, '_', '-', '.'
+  std::string description;  ///< free text for people, up to 500 characters
+  double duration = 1.0;    ///< s, of the demonstration: the time constant at dmp_ratio 1
   double alpha = CanonicalSystem::kDefaultAlpha;
-  double stiffness = 150.0;              ///< K, in units of 1/duration^2
-  double damping = 24.494897427831781;   ///< D, in units of 1/duration; 2 sqrt(K) is critical
+  double stiffness = 150.0;             ///< K, in units of 1/duration^2
+  double damping = 24.494897427831781;  ///< D, in units of 1/duration; 2 sqrt(K) is critical
   GoalWeight goal_weight;
   ShapeMapping mapping = ShapeMapping::None;
   Vector3 start = Vector3::Zero();           ///< m, of the demonstration
   Vector3 goal = Vector3::Zero();            ///< m, of the demonstration
   Vector3 start_velocity = Vector3::Zero();  ///< m/s, of the demonstration
-  Eigen::VectorXd centres;               ///< c_i, in phase
-  Eigen::VectorXd widths;                ///< h_i, 1/phase^2
-  Eigen::Matrix3Xd weights;              ///< w_i, m, relative to the start; one column per basis function
+  Eigen::VectorXd centres;                   ///< c_i, in phase
+  Eigen::VectorXd widths;                    ///< h_i, 1/phase^2
+  Eigen::Matrix3Xd weights;  ///< w_i, m, relative to the start; one column per basis function
 
   int basisCount() const noexcept { return static_cast<int>(centres.size()); }
 };
@@ -76,7 +81,8 @@ void validate(const Primitive& primitive);
 /// @throws std::invalid_argument naming the sample or count, what was expected and what came.
 void validate(const Trajectory& trajectory);
 
-/// Centres equally spaced in time over the duration and the widths at which neighbours meet at a fixed height.
+/// Centres equally spaced in time over the duration and the widths at which neighbours meet at a
+/// fixed height.
 void placeBasis(int count, double alpha, Eigen::VectorXd& centres, Eigen::VectorXd& widths);
 
 }  // namespace coglab_controllers

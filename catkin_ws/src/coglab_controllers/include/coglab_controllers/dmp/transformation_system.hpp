@@ -1,5 +1,6 @@
 /// @file
-/// Eq. (1), (2), (4) and (5) of one primitive on three axes, in fixed-size form for the control cycle.
+/// Eq. (1), (2), (4) and (5) of one primitive on three axes, in fixed-size form for the control
+/// cycle.
 #pragma once
 
 #include "coglab_controllers/dmp/primitive.hpp"
@@ -18,9 +19,10 @@ class TransformationSystem {
   double duration() const noexcept { return duration_; }    ///< s
   double stiffness() const noexcept { return stiffness_; }  ///< K
   double damping() const noexcept { return damping_; }      ///< D
-  int basisCount() const noexcept { return count_; }        ///< N, rounded up to whole packets of four
+  int basisCount() const noexcept { return count_; }  ///< N, rounded up to whole packets of four
 
-  /// Turns and scales the learnt shape from the demonstration's start-goal line to this one (ShapeMapping).
+  /// Turns and scales the learnt shape from the demonstration's start-goal line to this one
+  /// (ShapeMapping).
   void mapShape(const Vector3& start, const Vector3& goal) noexcept;
 
   /// w(s), 0 at the start and 1 at the end.
@@ -30,7 +32,8 @@ class TransformationSystem {
   /// h(w, g, g') of eq. (4), given phi(s): the part that does not depend on the state.
   Vector3 forcing(double w, const Vector3& phi, const Vector3& start, const Vector3& goal,
                   const Vector3& goal_velocity, double tau) const noexcept {
-    return (1.0 - w) * stiffness_ * (phi + start) + w * stiffness_ * goal + damping_ * tau * goal_velocity;
+    return (1.0 - w) * stiffness_ * (phi + start) + w * stiffness_ * goal +
+           damping_ * tau * goal_velocity;
   }
   /// tau * v' of eq. (4).
   Vector3 acceleration(const Vector3& forcing, const Vector3& x, const Vector3& v) const noexcept {

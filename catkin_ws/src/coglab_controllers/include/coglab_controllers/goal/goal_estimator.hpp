@@ -1,36 +1,43 @@
 /// @file
-/// The one estimator every goal passes before eq. (1): position g and velocity g' without steps and without ramp lag.
+/// The one estimator every goal passes before eq. (1): position g and velocity g' without steps and
+/// without ramp lag.
 #pragma once
 
 #include "coglab_controllers/kinematics/types.hpp"
 
 namespace coglab_controllers {
 
-/// Third-order tracker shared by goal position and orientation: three equal poles at 1/time_constant, solved exactly.
+/// Third-order tracker shared by goal position and orientation: three equal poles at
+/// 1/time_constant, solved exactly.
 ///
-/// It works on the difference to its input, so that the same code tracks points and, in the tangent space, rotations.
+/// It works on the difference to its input, so that the same code tracks points and, in the tangent
+/// space, rotations.
 struct ThirdOrderTracker {
   Vector3 rate = Vector3::Zero();          ///< per second
   Vector3 acceleration = Vector3::Zero();  ///< per second^2
 
-  /// One step towards an input that stays `error` away from the present value; returns the change of the value.
+  /// One step towards an input that stays `error` away from the present value; returns the change
+  /// of the value.
   Vector3 advance(const Vector3& error, double dt, double time_constant) noexcept;
 };
 
 /// Parameters of both estimators.
 struct GoalEstimatorParameters {
-  double time_constant = 0.06;       ///< s; 0 switches the estimator off: g is the input, g' is zero
-  double max_innovation = 0.15;      ///< m: a goal further away pulls no harder, which bounds speed and acceleration
-  double max_angle_innovation = 0.6; ///< rad, for orientations
+  double time_constant = 0.06;  ///< s; 0 switches the estimator off: g is the input, g' is zero
+  double max_innovation =
+      0.15;  ///< m: a goal further away pulls no harder, which bounds speed and acceleration
+  double max_angle_innovation = 0.6;  ///< rad, for orientations
 };
 
 /// Estimates g and g' from goal positions as received (sample-and-hold between frames).
 ///
-/// A constant-velocity tracker of third order with ramp compensation: g = p + 3 T p', so a steadily moving goal is met
-/// without lag, and g and g' have no step when the input has one. No allocation, no throw.
+/// A constant-velocity tracker of third order with ramp compensation: g = p + 3 T p', so a steadily
+/// moving goal is met without lag, and g and g' have no step when the input has one. No allocation,
+/// no throw.
 class GoalEstimator {
  public:
-  /// @throws std::invalid_argument unless time_constant is 0 or in [0.005, 2] and the others are positive.
+  /// @throws std::invalid_argument unless time_constant is 0 or in [0.005, 2] and the others are
+  /// positive.
   explicit GoalEstimator(const GoalEstimatorParameters& parameters = {});
 
   /// At rest at `goal` (m).

@@ -1,19 +1,21 @@
 /// @file
-/// What the arm does with the freedom that the translation leaves: one constraint among possible others (D4.10).
+/// What the arm does with the freedom that the translation leaves: one constraint among possible
+/// others (D4.10).
 #pragma once
 
 #include "coglab_controllers/kinematics/chain.hpp"
 
 namespace coglab_controllers {
 
-/// A linear constraint on the joint velocities: jacobian * qd = velocity, with `rows` rows of 7 in use.
+/// A linear constraint on the joint velocities: jacobian * qd = velocity, with `rows` rows of 7 in
+/// use.
 struct TaskConstraint {
-  int rows = 0;                           ///< 0: no constraint in this cycle; else 3 or 7
+  int rows = 0;  ///< 0: no constraint in this cycle; else 3 or 7
   Eigen::Matrix<double, kMaxJoints, kMaxJoints> jacobian =
       Eigen::Matrix<double, kMaxJoints, kMaxJoints>::Zero();
   JointVector velocity = JointVector::Zero();
-  /// true: near a singularity the task is rejected altogether, eq. (11). false: only the singular directions are, as a
-  /// task with more rows than the null space has dimensions needs.
+  /// true: near a singularity the task is rejected altogether, eq. (11). false: only the singular
+  /// directions are, as a task with more rows than the null space has dimensions needs.
   bool reject_whole = true;
 };
 
@@ -22,7 +24,8 @@ class SecondTask {
  public:
   virtual ~SecondTask() = default;
   /// @param state kinematics at q (rad).
-  virtual void evaluate(const ChainState& state, const JointVector& q, const CartesianReference& reference,
+  virtual void evaluate(const ChainState& state, const JointVector& q,
+                        const CartesianReference& reference,
                         TaskConstraint& constraint) const noexcept = 0;
 };
 

@@ -9,19 +9,21 @@
 
 namespace coglab_controllers {
 
-/// A = U * diag(sigma) * V^T of a Rows x 7 matrix, Rows <= 7; singular values in no particular order.
+/// A = U * diag(sigma) * V^T of a Rows x 7 matrix, Rows <= 7; singular values in no particular
+/// order.
 template <int Rows>
 struct RowSvd {
   using Wide = Eigen::Matrix<double, Rows, kMaxJoints>;
   using Tall = Eigen::Matrix<double, kMaxJoints, Rows>;
   using Values = Eigen::Matrix<double, Rows, 1>;
 
-  Tall scaled;                            ///< columns sigma_i * v_i
-  Eigen::Matrix<double, Rows, Rows> u;    ///< columns u_i
+  Tall scaled;                          ///< columns sigma_i * v_i
+  Eigen::Matrix<double, Rows, Rows> u;  ///< columns u_i
   Values sigma;
 
-  /// Turns pairs of rows until all are orthogonal; each turn is an exact rotation, so small singular values keep their
-  /// relative accuracy. Converges quadratically; the number of sweeps is bounded.
+  /// Turns pairs of rows until all are orthogonal; each turn is an exact rotation, so small
+  /// singular values keep their relative accuracy. Converges quadratically; the number of sweeps is
+  /// bounded.
   explicit RowSvd(const Wide& a) noexcept {
     scaled = a.transpose();
     u.setIdentity();
@@ -35,7 +37,8 @@ struct RowSvd {
           if (!(std::abs(ik) > kEps * std::sqrt(ii * kk)) || std::abs(ik) < 1e-300) continue;
           turned = true;
           const double zeta = (kk - ii) / (2.0 * ik);
-          const double t = std::copysign(1.0, zeta) / (std::abs(zeta) + std::sqrt(1.0 + zeta * zeta));
+          const double t =
+              std::copysign(1.0, zeta) / (std::abs(zeta) + std::sqrt(1.0 + zeta * zeta));
           const double c = 1.0 / std::sqrt(1.0 + t * t), s = c * t;
           const Eigen::Matrix<double, kMaxJoints, 1> column = scaled.col(i);
           scaled.col(i) = c * column - s * scaled.col(k);

@@ -8,14 +8,15 @@ namespace coglab_controllers {
 
 /// Parameters of TwoTaskIk.
 struct IkParameters {
-  double pos_clik_gain = 20.0;        ///< K_pos, 1/s, eq. (6); at most 0.5 / cycle time for a stable loop
-  double rot_clik_gain = 20.0;        ///< K_rot, 1/s, eq. (7)
-  double singularity_threshold = 0.05;  ///< the second task is rejected if its smallest singular value is below this
-  /// Singular values of J_pos below this (m) are damped. They occur only with the arm stretched, which the workspace
-  /// limits keep out; above it eq. (9) is the exact Moore-Penrose inverse.
+  double pos_clik_gain = 20.0;  ///< K_pos, 1/s, eq. (6); at most 0.5 / cycle time for a stable loop
+  double rot_clik_gain = 20.0;  ///< K_rot, 1/s, eq. (7)
+  double singularity_threshold =
+      0.05;  ///< the second task is rejected if its smallest singular value is below this
+  /// Singular values of J_pos below this (m) are damped. They occur only with the arm stretched,
+  /// which the workspace limits keep out; above it eq. (9) is the exact Moore-Penrose inverse.
   double stretch_threshold = 0.01;
-  /// true: where a speed limit binds, the second task shrinks first, so that translation keeps its priority.
-  /// false: both are scaled together.
+  /// true: where a speed limit binds, the second task shrinks first, so that translation keeps its
+  /// priority. false: both are scaled together.
   bool rotation_first_scaling = true;
   JointVector velocity_limit = JointVector::Constant(1.9);  ///< rad/s, positive
 };
@@ -24,13 +25,15 @@ struct IkParameters {
 struct IkResult {
   JointVector velocity = JointVector::Zero();           ///< qd_cmd, rad/s, within the limits
   JointVector position_velocity = JointVector::Zero();  ///< share of eq. (9) in `velocity`
-  JointVector rotation_velocity = JointVector::Zero();  ///< share of eq. (11) in `velocity`, after scaling
-  Vector3 position_error = Vector3::Zero();             ///< x_des - x_cur, m
-  Vector3 rotation_error = Vector3::Zero();             ///< diff(R_des, R_cur), rad
-  double smallest_singular_value_position = 0.0;        ///< of J_pos, m
-  double smallest_singular_value_rotation = 0.0;        ///< of J_rot * N_pos; 0 if there is no second task
+  JointVector rotation_velocity =
+      JointVector::Zero();                   ///< share of eq. (11) in `velocity`, after scaling
+  Vector3 position_error = Vector3::Zero();  ///< x_des - x_cur, m
+  Vector3 rotation_error = Vector3::Zero();  ///< diff(R_des, R_cur), rad
+  double smallest_singular_value_position = 0.0;  ///< of J_pos, m
+  double smallest_singular_value_rotation =
+      0.0;                         ///< of J_rot * N_pos; 0 if there is no second task
   double second_task_scale = 1.0;  ///< 0..1 of the second task that was left by the speed limits
-  double scale = 1.0;              ///< 0..1 of the whole vector after that; below 1 the reference is too fast
+  double scale = 1.0;  ///< 0..1 of the whole vector after that; below 1 the reference is too fast
   bool rotation_rejected = false;  ///< second task dropped near a singularity
 };
 

@@ -17,20 +17,21 @@ namespace coglab_controllers {
 
 /// Forward kinematics of one joint configuration, all in the base frame.
 struct ChainState {
-  Pose tool;                              ///< pose of the tip
-  Jacobian jacobian = Jacobian::Zero();   ///< of the tip, eq. (8)
-  Matrix37 axes = Matrix37::Zero();       ///< unit axis of each joint
-  Matrix37 origins = Matrix37::Zero();    ///< m, a point on each joint's axis
+  Pose tool;                             ///< pose of the tip
+  Jacobian jacobian = Jacobian::Zero();  ///< of the tip, eq. (8)
+  Matrix37 axes = Matrix37::Zero();      ///< unit axis of each joint
+  Matrix37 origins = Matrix37::Zero();   ///< m, a point on each joint's axis
 };
 
 /// A serial chain of 6 or 7 revolute joints from a base link to a tip link.
 ///
-/// Construction parses and may throw; everything else is free of allocation and never throws. Equal to KDL's
-/// solvers within 1e-12.
+/// Construction parses and may throw; everything else is free of allocation and never throws. Equal
+/// to KDL's solvers within 1e-12.
 class Chain {
  public:
   /// Parses a URDF (the text, not a file name).
-  /// @throws std::invalid_argument naming the link or joint if the URDF does not parse, if there is no chain between
+  /// @throws std::invalid_argument naming the link or joint if the URDF does not parse, if there is
+  /// no chain between
   ///         the links, or if it has not 6 or 7 movable joints, all revolute or continuous.
   Chain(const std::string& urdf, const std::string& base_link, const std::string& tip_link);
 
@@ -54,12 +55,15 @@ class Chain {
     return state;
   }
 
-  /// The same for a cycle of `dt` s in which the joints move at about `velocity` (rad/s): the pose is that at q, the rest
-  /// that in the middle of the cycle, where a Jacobian leads to the pose at its end with an error of third order in dt.
-  void evaluate(const JointVector& q, const JointVector& velocity, double dt, ChainState& state) const noexcept;
+  /// The same for a cycle of `dt` s in which the joints move at about `velocity` (rad/s): the pose
+  /// is that at q, the rest that in the middle of the cycle, where a Jacobian leads to the pose at
+  /// its end with an error of third order in dt.
+  void evaluate(const JointVector& q, const JointVector& velocity, double dt,
+                ChainState& state) const noexcept;
 
   /// Velocity of the origin of joint `index` (elbow, wrist), m/s, base frame.
-  static Vector3 originVelocity(const ChainState& state, int index, const JointVector& velocity) noexcept;
+  static Vector3 originVelocity(const ChainState& state, int index,
+                                const JointVector& velocity) noexcept;
 
   /// The chain as KDL read it, for comparison in tests and benches.
   const KDL::Chain& kdl() const noexcept { return *kdl_; }

@@ -12,8 +12,8 @@ Quaternion expRotation(const Vector3& r) noexcept;
 /// Rotation vector of a unit quaternion, angle in [0, pi]; q and -q give the same vector.
 Vector3 logRotation(const Quaternion& q) noexcept;
 
-/// Rotational velocity (rad/s, base frame) that brings `from` to `to` in one second: the diff of eq. (7),
-/// equal to KDL::diff(from, to).
+/// Rotational velocity (rad/s, base frame) that brings `from` to `to` in one second: the diff of
+/// eq. (7), equal to KDL::diff(from, to).
 Vector3 rotationBetween(const Quaternion& from, const Quaternion& to) noexcept;
 
 /// True if all four entries are finite and the norm is within 1e-3 of one.

@@ -1,6 +1,6 @@
 /// @file
-/// Fixed-size types that all cores of this package share. Units are SI; joint order is the wire order
-/// lwr_a1 lwr_a2 lwr_e1 lwr_a3 lwr_a4 lwr_a5 lwr_a6.
+/// Fixed-size types that all cores of this package share. Units are SI; joint order is the wire
+/// order lwr_a1 lwr_a2 lwr_e1 lwr_a3 lwr_a4 lwr_a5 lwr_a6.
 #pragma once
 
 #include <Eigen/Core>
@@ -23,15 +23,15 @@ using Jacobian = Eigen::Matrix<double, 6, kMaxJoints>;
 
 /// Pose of the end-effector in the base frame.
 struct Pose {
-  Vector3 position = Vector3::Zero();             ///< m
+  Vector3 position = Vector3::Zero();               ///< m
   Quaternion orientation = Quaternion::Identity();  ///< unit
 };
 
 /// What a Cartesian motion asks of the inverse kinematics in one cycle.
 ///
-/// The pose is the one desired *now*, at the time of the joint measurement; the velocities are the mean velocities
-/// that lead from it to the pose desired at the end of the cycle. So a robot that follows ideally has no tracking
-/// error, and eq. (6)-(7) close the loop on a true error.
+/// The pose is the one desired *now*, at the time of the joint measurement; the velocities are the
+/// mean velocities that lead from it to the pose desired at the end of the cycle. So a robot that
+/// follows ideally has no tracking error, and eq. (6)-(7) close the loop on a true error.
 struct CartesianReference {
   Pose pose;
   Vector3 velocity = Vector3::Zero();          ///< m/s

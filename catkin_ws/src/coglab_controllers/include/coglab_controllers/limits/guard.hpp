@@ -1,5 +1,6 @@
 /// @file
-/// The last line between a controller and the robot: scales the whole velocity vector, keeping its direction.
+/// The last line between a controller and the robot: scales the whole velocity vector, keeping its
+/// direction.
 #pragma once
 
 #include "coglab_controllers/limits/workspace.hpp"
@@ -11,26 +12,29 @@ struct GuardParameters {
   JointVector lower_position = JointVector::Constant(-2.0);  ///< rad
   JointVector upper_position = JointVector::Constant(2.0);   ///< rad, above lower_position
   JointVector velocity = JointVector::Constant(1.9);         ///< rad/s
-  JointVector acceleration = JointVector::Constant(10.0);    ///< rad/s^2 with which the interpolator brakes
-  JointVector jerk = JointVector::Constant(500.0);           ///< rad/s^3 with which the interpolator brakes
-  double position_margin = 0.01;       ///< rad kept free before a joint's stop
-  double hand_speed = 1.0;             ///< m/s of the tip; 0: no limit
-  double elbow_speed = 1.0;            ///< m/s of the elbow; 0: no limit
-  double workspace_deceleration = 2.0; ///< m/s^2 with which a border of the workspace is approached at most
-  double reaction_time = 0.015;        ///< s from a command until the arm brakes: cycle and interpolator
-  double block_time = 0.5;             ///< s at a standstill because of one joint's stop, then the motion shall end
+  JointVector acceleration =
+      JointVector::Constant(10.0);                  ///< rad/s^2 with which the interpolator brakes
+  JointVector jerk = JointVector::Constant(500.0);  ///< rad/s^3 with which the interpolator brakes
+  double position_margin = 0.01;                    ///< rad kept free before a joint's stop
+  double hand_speed = 1.0;                          ///< m/s of the tip; 0: no limit
+  double elbow_speed = 1.0;                         ///< m/s of the elbow; 0: no limit
+  double workspace_deceleration =
+      2.0;  ///< m/s^2 with which a border of the workspace is approached at most
+  double reaction_time = 0.015;  ///< s from a command until the arm brakes: cycle and interpolator
+  double block_time =
+      0.5;  ///< s at a standstill because of one joint's stop, then the motion shall end
   WorkspaceParameters workspace;
 };
 
 /// Why a velocity was scaled.
 enum class GuardReason {
   None,
-  JointVelocity,   ///< `joint` is at its speed limit
-  JointPosition,   ///< `joint` nears its stop
+  JointVelocity,  ///< `joint` is at its speed limit
+  JointPosition,  ///< `joint` nears its stop
   HandSpeed,
   ElbowSpeed,
-  WorkspaceBorder, ///< `border`
-  NotFinite        ///< the request was NaN or infinite: zero velocity
+  WorkspaceBorder,  ///< `border`
+  NotFinite         ///< the request was NaN or infinite: zero velocity
 };
 const char* describe(GuardReason reason) noexcept;
 
@@ -41,15 +45,17 @@ struct GuardResult {
   GuardReason reason = GuardReason::None;      ///< of the restriction that bound hardest
   int joint = -1;                              ///< for JointVelocity and JointPosition
   WorkspaceBorder border = WorkspaceBorder::None;
-  /// Joint at its stop that has held up the motion for block_time, or -1: abort the motion and name it.
+  /// Joint at its stop that has held up the motion for block_time, or -1: abort the motion and name
+  /// it.
   int blocked_joint = -1;
 };
 
-/// Limits joint velocities. Construction validates and may throw; `limit` neither allocates nor throws.
+/// Limits joint velocities. Construction validates and may throw; `limit` neither allocates nor
+/// throws.
 ///
-/// Towards a joint's stop the bound is the speed from which the interpolator can still stop in front of it, within its
-/// acceleration and jerk. A joint beyond its limits may only move back. A restriction that is already violated lets pass
-/// what leads out of it.
+/// Towards a joint's stop the bound is the speed from which the interpolator can still stop in
+/// front of it, within its acceleration and jerk. A joint beyond its limits may only move back. A
+/// restriction that is already violated lets pass what leads out of it.
 class Guard {
  public:
   /// @throws std::invalid_argument naming joint and parameter.

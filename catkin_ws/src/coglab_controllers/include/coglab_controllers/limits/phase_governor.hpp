@@ -1,15 +1,18 @@
 /// @file
-/// Slows the clock of a motion so that the reference waits for the arm instead of running away from it.
+/// Slows the clock of a motion so that the reference waits for the arm instead of running away from
+/// it.
 #pragma once
 
 namespace coglab_controllers {
 
-/// Turns a speed scale and the scaling that limits would impose into the `rate` of CartesianMotion::step and of the
-/// profile time of a point-to-point motion. The rate rises, and follows the speed scale, at a bounded speed, so that it
-/// never makes a step in velocity; where limits have slowed the arm already, it falls at once.
+/// Turns a speed scale and the scaling that limits would impose into the `rate` of
+/// CartesianMotion::step and of the profile time of a point-to-point motion. The rate rises, and
+/// follows the speed scale, at a bounded speed, so that it never makes a step in velocity; where
+/// limits have slowed the arm already, it falls at once.
 class PhaseGovernor {
  public:
-  /// @param rise, fall largest change of the rate per second.  @throws std::invalid_argument unless positive.
+  /// @param rise, fall largest change of the rate per second.  @throws std::invalid_argument unless
+  /// positive.
   explicit PhaseGovernor(double rise = 2.0, double fall = 10.0);
 
   /// A new motion from rest begins; one that begins in motion begins with rate 1.
@@ -17,7 +20,8 @@ class PhaseGovernor {
 
   /// One cycle.
   /// @param speed_scale 0..1 as set by the user.
-  /// @param limit_scale 0..1: scale that the limits imposed in the last cycle (IkResult::scale times GuardResult::scale).
+  /// @param limit_scale 0..1: scale that the limits imposed in the last cycle (IkResult::scale
+  /// times GuardResult::scale).
   double update(double dt, double speed_scale, double limit_scale) noexcept;
 
   double rate() const noexcept { return rate_; }

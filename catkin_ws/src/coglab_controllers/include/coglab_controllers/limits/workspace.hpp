@@ -1,5 +1,6 @@
 /// @file
-/// Where the hand may be: a box, a sphere around the base, and the arm never fully stretched (D4.10 section 3.1).
+/// Where the hand may be: a box, a sphere around the base, and the arm never fully stretched (D4.10
+/// section 3.1).
 #pragma once
 
 #include <array>
@@ -10,11 +11,12 @@ namespace coglab_controllers {
 
 /// Workspace restrictions, in the base frame.
 struct WorkspaceParameters {
-  Vector3 box_min = Vector3(-1.2, -1.2, 0.0);  ///< m: the hand stays inside this box,
-  Vector3 box_max = Vector3(1.2, 1.2, 1.6);    ///< m
+  Vector3 box_min = Vector3(-1.2, -1.2, 0.0);    ///< m: the hand stays inside this box,
+  Vector3 box_max = Vector3(1.2, 1.2, 1.6);      ///< m
   Vector3 base_centre = Vector3(0.0, 0.0, 0.2);  ///< m: outside this sphere around the base,
   double base_radius = 0.25;                     ///< m; 0: no sphere
-  double max_stretch = 0.98;  ///< shoulder to wrist at most this share of the chain's reach; 1: no restriction
+  double max_stretch =
+      0.98;  ///< shoulder to wrist at most this share of the chain's reach; 1: no restriction
 };
 
 /// Which restriction is meant.
@@ -33,7 +35,8 @@ class Workspace {
     WorkspaceBorder border = WorkspaceBorder::None;
   };
 
-  /// @throws std::invalid_argument naming the parameter that is not finite, or a box or sphere that leaves no room.
+  /// @throws std::invalid_argument naming the parameter that is not finite, or a box or sphere that
+  /// leaves no room.
   Workspace(const WorkspaceParameters& parameters, double reach);
   explicit Workspace(const WorkspaceParameters& parameters = {}) : Workspace(parameters, 0.0) {}
 
@@ -41,9 +44,12 @@ class Workspace {
   void margins(const Chain& chain, const ChainState& state, const JointVector& velocity,
                std::array<Margin, kBorders>& margins) const noexcept;
 
-  /// Whether the hand may be at this point; the stretch of the arm does not enter. Names the first border violated.
+  /// Whether the hand may be at this point; the stretch of the arm does not enter. Names the first
+  /// border violated.
   WorkspaceBorder violated(const Vector3& point) const noexcept;
-  bool contains(const Vector3& point) const noexcept { return violated(point) == WorkspaceBorder::None; }
+  bool contains(const Vector3& point) const noexcept {
+    return violated(point) == WorkspaceBorder::None;
+  }
 
   /// The nearest allowed point: into the box, out of the sphere. For goals outside the workspace.
   Vector3 project(const Vector3& point) const noexcept;

@@ -17,8 +17,9 @@ struct PtpPoint {
 
 /// Synchronised trapezoidal motion from any position and velocity to rest at a target.
 ///
-/// The slowest joint moves as fast as its limits allow and the others arrive at the same time. From rest the path is a
-/// straight line in joint space. Planned at construction, which may throw; `at` neither allocates nor throws.
+/// The slowest joint moves as fast as its limits allow and the others arrive at the same time. From
+/// rest the path is a straight line in joint space. Planned at construction, which may throw; `at`
+/// neither allocates nor throws.
 class PtpTrajectory {
  public:
   /// At rest at zero, duration 0.
@@ -29,12 +30,14 @@ class PtpTrajectory {
   /// @param joints how many entries to use; the others stay where they are.
   /// @throws std::invalid_argument naming joint and field that is not finite or not positive.
   PtpTrajectory(const JointVector& position, const JointVector& velocity, const JointVector& target,
-                const JointVector& max_velocity, const JointVector& max_acceleration, int joints = kMaxJoints);
+                const JointVector& max_velocity, const JointVector& max_acceleration,
+                int joints = kMaxJoints);
 
   double duration() const noexcept { return duration_; }  ///< s
   const JointVector& target() const noexcept { return target_; }
 
-  /// State `t` seconds after the start. Exactly the target, at rest, from duration() on; the start before 0.
+  /// State `t` seconds after the start. Exactly the target, at rest, from duration() on; the start
+  /// before 0.
   void at(double t, PtpPoint& point) const noexcept;
 
  private:
@@ -42,7 +45,8 @@ class PtpTrajectory {
     double start = 0, velocity = 0, cruise = 0, acceleration = 1;
     double accelerate_time = 0, cruise_time = 0, brake_time = 0;
   };
-  static Ramp fastest(double distance, double velocity, double max_velocity, double max_acceleration);
+  static Ramp fastest(double distance, double velocity, double max_velocity,
+                      double max_acceleration);
   static Ramp stretched(double distance, double velocity, double acceleration, double duration);
 
   double duration_ = 0.0;
