@@ -378,6 +378,7 @@ void Bridge::publish() {
 
 std::uint32_t Bridge::submit(const std::string& text) {
   const std::lock_guard<std::mutex> lock(mutex_);
+  collectOutcomes();
   Snapshot newest;
   snapshots_.read(newest);
   Request request;
@@ -393,18 +394,22 @@ std::uint32_t Bridge::submit(const std::string& text) {
   return request.ticket;
 }
 
-Outcome Bridge::outcome(std::uint32_t ticket) {
-  const std::lock_guard<std::mutex> lock(mutex_);
+void Bridge::collectOutcomes() {
   Outcome ended;
   while (outcomes_.pop(ended)) ended_[ended.ticket] = ended;
   while (ended_.size() > kKeptOutcomes) ended_.erase(ended_.begin());
+}
+
+Outcome Bridge::outcome(std::uint32_t ticket) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  collectOutcomes();
   const auto found = ended_.find(ticket);
   if (found == ended_.end()) {
     Outcome pending;
     pending.ticket = ticket;
     return pending;
   }
-  ended = found->second;
+  const Outcome ended = found->second;
   ended_.erase(found);
   return ended;
 }

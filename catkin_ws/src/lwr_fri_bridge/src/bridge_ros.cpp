@@ -84,7 +84,7 @@ void BridgeRos::start() {
   }
   started_ns_ = steadyNow();
   started_ = true;
-  const std::string warning = fri_thread_.start();
+  const std::string warning = fri_thread_.start(nh_.param("fri_port_bound", 0));
   if (!warning.empty()) ROS_WARN("lwr: %s", warning.c_str());
   nh_.setParam("fri_port_bound", fri_thread_.port());
   ROS_INFO("lwr: waiting for FRI datagrams on port %d, KRL convention %s", fri_thread_.port(),

@@ -63,11 +63,10 @@ FriThread::FriThread(Bridge& bridge, FriThreadOptions options)
 
 FriThread::~FriThread() { stop(); }
 
-std::string FriThread::start() {
+std::string FriThread::start(int preferred_port) {
   stop();
   sockaddr_in local{};
   local.sin_family = AF_INET;
-  local.sin_port = htons(static_cast<std::uint16_t>(options_.port));
   if (options_.port < 0 || options_.port > 65535) {
     throw std::runtime_error("fri_port = " + std::to_string(options_.port) +
                              " is outside its range 0..65535");
@@ -78,7 +77,12 @@ std::string FriThread::start() {
   }
   const int fd = socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
   if (fd < 0) failSocket(fd, "open a socket for", options_);
-  if (bind(fd, reinterpret_cast<sockaddr*>(&local), sizeof local) != 0)
+  const auto bindTo = [&](int port) {
+    local.sin_port = htons(static_cast<std::uint16_t>(port));
+    return bind(fd, reinterpret_cast<sockaddr*>(&local), sizeof local) == 0;
+  };
+  const bool preferred = options_.port == 0 && preferred_port > 0 && preferred_port <= 65535;
+  if (!(preferred && bindTo(preferred_port)) && !bindTo(options_.port))
     failSocket(fd, "bind", options_);
   socklen_t length = sizeof local;
   if (getsockname(fd, reinterpret_cast<sockaddr*>(&local), &length) != 0)

@@ -136,6 +136,19 @@ TEST_F(FriThreadTest, aPortInUseIsSaid) {
   EXPECT_THROW(third.start(), std::runtime_error);
 }
 
+TEST_F(FriThreadTest, aRestartedThreadIsFoundWhereItWas) {
+  const int port = fri.port();
+  fri.stop();
+  Bridge other(test::defaultConfig());
+  FriThread again(other, options());
+  again.start(port);
+  EXPECT_EQ(again.port(), port);
+  FriThread third(bridge, options());  // taken: any other one
+  third.start(port);
+  EXPECT_NE(third.port(), port);
+  EXPECT_GT(third.port(), 0);
+}
+
 TEST_F(FriThreadTest, commandReachesTheThreadAndComesBack) {
   Peer peer(fri.port());
   std::atomic<bool> end{false};

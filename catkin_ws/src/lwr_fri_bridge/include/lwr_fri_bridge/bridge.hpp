@@ -157,6 +157,7 @@ class Bridge {
   void mirror(fri::CommandDatagram& answer);
   void follow(const fri::Reception& reception, fri::CommandDatagram& answer);
   Vector7 targetVelocity();
+  void collectOutcomes();
   double leashLength() const;
   void fillMode(fri::CommandDatagram& answer) const;
 

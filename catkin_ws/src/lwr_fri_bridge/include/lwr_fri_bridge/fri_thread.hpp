@@ -46,9 +46,11 @@ class FriThread {
   FriThread(const FriThread&) = delete;
   FriThread& operator=(const FriThread&) = delete;
 
-  /// Binds the socket and starts the thread. Returns warnings (scheduling), empty if none.
+  /// Binds the socket and starts the thread. With options.port 0, `preferred_port` is tried first:
+  /// a node that was killed and started again is found where it was. Returns warnings (scheduling),
+  /// empty if none.
   /// @throws std::runtime_error naming address and port if the socket cannot be bound.
-  std::string start();
+  std::string start(int preferred_port = 0);
   /// Ends the thread at once; braking and leaving command mode (Bridge::command("stop")) is the
   /// caller's matter.
   void stop();
