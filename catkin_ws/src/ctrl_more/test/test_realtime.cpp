@@ -142,9 +142,10 @@ TEST(Realtime, nothingForbiddenIn100000CyclesWith10000PlanChanges) {
 }
 
 // The kernel's own word: in strict seccomp mode any system call but read, write and exit kills
-// the process.
+// the process. So does reading the clock, which strict mode forbids too: not timed, no records.
 TEST(Realtime, cyclesRunWhereSystemCallsKill) {
-  Rig rig(0.05, true, true);
+  Rig rig(0.05, false, true);
+  rig.logger.setLevel(LogLevel::Error);
   for (int i = 0; i < 10; ++i) rig.add(typical(nullptr), "c" + std::to_string(i));
   rig.robot.setMeasuredData("imu", Eigen::VectorXd::Constant(9, 0.1), 0);
   rig.step(2);
