@@ -108,9 +108,23 @@ def test_release_is_found_when_the_load_leaves(posture, mass):
         assert 0.2 <= delay <= 0.6
 
 
+def test_load_is_counted_from_before_the_contact(posture):
+    weight = 0.31 * 9.81
+    for seed in range(20):
+        trial = ContactTrial(posture, seed)
+        trial.rest_and_arm()
+        event, _ = trial.feed(0.3, push((0, -1, 0), 3.0))
+        assert event is not None
+        trial.detector.arm("load", trial.t, 5.0, mass=0.31)
+        pressing = lambda t: (0, -3.0, 0)  # noqa: E731
+        assert trial.feed(1.0, pressing)[0] is None, "a person who only presses does not carry less"
+        event, delay = trial.feed(1.0, lambda t: (0, 0, -weight * min(1.0, t / 0.3)))
+        assert event is not None and event.contact and delay < 0.5
+
+
 def test_requests_that_make_no_sense_are_refused():
     detector = ContactDetector(DetectorSettings(), lambda q: np.zeros((3, 7)))
-    for arguments in (("touch", 0.0, 1.0), ("contact", 0.0, 0.0), ("release", 0.0, 1.0)):
+    for arguments in (("touch", 0.0, 1.0), ("contact", 0.0, 0.0), ("release", 0.0, 1.0), ("load", 0.0, 1.0)):
         with pytest.raises(ValueError):
             detector.arm(*arguments)
     with pytest.raises(ValueError, match="1..7"):

@@ -76,6 +76,11 @@ def test_hand_closed_on_nothing():
     assert_recovered_empty(trial, "the hand closed on nothing")
 
 
+def test_a_person_who_does_not_let_go_gets_the_object_back():
+    trial = failed_exchange(lambda t: setattr(t.cell.partner, "let_go_after", None))
+    assert_recovered_empty(trial, "the person did not let go of 'mug' within 5 s")
+
+
 def test_failed_preshape_ends_the_arm_motion_too():
     trial = failed_exchange(lambda t: t.cell.faults.refuse.__setitem__("preshape cylindrical", "motor 2 is stuck"))
     assert_recovered_empty(trial, "motor 2 is stuck")

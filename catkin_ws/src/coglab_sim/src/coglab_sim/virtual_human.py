@@ -223,7 +223,7 @@ class VirtualHuman:
                 return
             self._go("holding", t)
             return
-        if self._felt_since is None and self._travelled > 0.09:
+        if self._felt_since is None and self._travelled > (0.2 if p.behaviour == "early_contact" else 0.09):
             # Nothing was met where the palm should be: stop and wait for the robot.
             self._go("holding", t)
             return
@@ -315,6 +315,9 @@ class VirtualHuman:
     def _retreating(self, t: float, dt: float, view: WorldView) -> None:
         assert self._reach is not None
         self._hand, self._velocity = self._reach.at(t)
+        slipped = float(np.linalg.norm(view.object.position - self._hand - self.scene.object_in_hand)) > 0.06
+        if self._grip > 0.0 and slipped:
+            self._grip = 0.0
         if self._reach.over(t):
             self._task = "rest"
             self._go("idle", t)

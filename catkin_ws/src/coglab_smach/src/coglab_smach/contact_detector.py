@@ -2,8 +2,8 @@
 
 Contact: low-passed torque, its difference over a short window (the residual bias of the estimate drops out), compared
 with a threshold learnt while the arm stood still, on the joints that feel forces in the plane perpendicular to the line
-between person and robot. Release: the vertical force that explains the change of torque since arming, compared with the
-share of the object's weight that the person has to carry.
+between person and robot. Load and release: the vertical force that explains the change of torque, compared with a share of
+the object's weight; load counts from the torque before the contact, release from the torque on arming.
 
 The detector works only while the arm stands still: it enforces that itself, whoever arms it.
 """
@@ -47,9 +47,9 @@ class DetectorSettings:
     sensitivity_share: float = 0.5
     """joints with at least this share of the most sensitive joint's lever are watched."""
     load_share: float = 0.5
-    """share of the weight whose disappearance counts as release, unless the request says otherwise."""
+    """share of the weight whose coming counts as load and whose going as release, unless the request says otherwise."""
     release_confirm: float = 0.05
-    """s the load has to be gone."""
+    """s the load has to be gone, or has to be there."""
     user_direction: tuple[float, float, float] = (1.0, 0.0, 0.0)
     """from the robot to the person, base frame."""
 
@@ -95,20 +95,23 @@ class ContactDetector:
         self._still_since: Optional[float] = None
         self._rest_torque: Optional[np.ndarray] = None
         self._rest_before_motion: Optional[np.ndarray] = None
+        self._unloaded: Optional[np.ndarray] = None
         self.margin = 0.0
 
     def arm(self, mode: str, now: float, timeout: float, k: float = 0.0, joints: Sequence[int] = (),
             mass: float = 0.0, load_share: float = 0.0) -> None:
-        """Watch for 'contact' or 'release' for ``timeout`` s, as soon as the arm stands still. ``joints`` as 1..7.
+        """Watch for 'contact', 'load' or 'release' for ``timeout`` s, as soon as the arm stands still. ``joints`` as 1..7.
 
         ValueError says what is wrong with the request.
         """
-        if mode not in ("contact", "release"):
-            raise ValueError(f"mode is contact, release or off, got '{mode}'")
+        if mode not in ("contact", "load", "release"):
+            raise ValueError(f"mode is contact, load, release or off, got '{mode}'")
         if not timeout > 0.0:
             raise ValueError(f"timeout must be a positive time in s, got {timeout}")
-        if mode == "release" and not mass > 0.0:
-            raise ValueError(f"release needs the mass of the held object in kg, got {mass}")
+        if mode != "contact" and not mass > 0.0:
+            raise ValueError(f"{mode} needs the mass of the object in kg, got {mass}")
+        if mode == "load" and self._unloaded is None:
+            raise ValueError("load is counted from the torque before the contact: arm for contact first")
         if any(not 1 <= j <= 7 for j in joints):
             raise ValueError(f"joints are numbered 1..7, got {list(joints)}")
         self._armed = _Armed(mode, now + timeout, k if k > 0.0 else self.settings.k,
@@ -205,9 +208,11 @@ class ContactDetector:
             armed.watched = armed.joints or sensitive_joints(self._jacobian(position), self.settings.user_direction,
                                                              self.settings.sensitivity_share)
             armed.threshold = armed.k * self.sigma()[armed.watched]
+            if armed.mode == "contact":
+                self._unloaded = armed.baseline
             return self._check_offset(armed)
-        if armed.mode == "release":
-            return self._watch_release(stamp, armed, position)
+        if armed.mode != "contact":
+            return self._watch_weight(stamp, armed, position)
         assert armed.threshold is not None
         self.margin = float(np.max(np.abs(difference[armed.watched]) / armed.threshold))
         armed.over = armed.over + 1 if self.margin > 1.0 else 0
@@ -225,17 +230,21 @@ class ContactDetector:
         ratio = float(np.max(offset)) / self.settings.offset_threshold
         if ratio <= 1.0:
             return None
+        self._unloaded = self._rest_before_motion
         return self._event(True, "torque_offset", ratio,
                            f"torque offset {float(np.max(offset)):.2f} Nm on arming: the object was there already")
 
-    def _watch_release(self, stamp: float, armed: _Armed, position: Sequence[float]) -> Optional[ContactEvent]:
-        assert armed.baseline is not None and self._filtered is not None
+    def _watch_weight(self, stamp: float, armed: _Armed, position: Sequence[float]) -> Optional[ContactEvent]:
+        """Has the weight come (load) or gone (release)?"""
+        reference = self._unloaded if armed.mode == "load" else armed.baseline
+        assert reference is not None and self._filtered is not None
         lever = self._jacobian(position)[2][armed.watched]
-        change = (self._filtered - armed.baseline)[armed.watched]
+        change = (self._filtered - reference)[armed.watched]
         # Least squares for one unknown: the vertical force (N, up positive) behind the change of torque.
         lifted = float(lever @ change) / float(lever @ lever)
+        force = -lifted if armed.mode == "load" else lifted
         needed = armed.load_share * armed.mass * GRAVITY
-        self.margin = lifted / needed
+        self.margin = force / needed
         if self.margin < 1.0:
             armed.gone_since = None
             return None
@@ -243,8 +252,8 @@ class ContactDetector:
             armed.gone_since = stamp
         if stamp - armed.gone_since < self.settings.release_confirm:
             return None
-        return self._event(False, "joint_torque", self.margin,
-                           f"{lifted:.1f} N of the load are gone (needed {needed:.1f} N)")
+        verb = "carried now" if armed.mode == "load" else "of the load are gone"
+        return self._event(armed.mode == "load", "joint_torque", self.margin, f"{force:.1f} N {verb} (needed {needed:.1f} N)")
 
     def _event(self, contact: bool, source: str, margin: float, message: str) -> ContactEvent:
         self._armed = None

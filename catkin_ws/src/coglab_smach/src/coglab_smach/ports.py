@@ -160,7 +160,8 @@ class ContactPort(Protocol):
     """The contact trigger. wait_stop depends on this alone, so a tactile hand can stand behind it."""
 
     def arm(self, mode: str, time_limit: float, settings: dict[str, Any]) -> Pending:
-        """Forget old events and watch for 'contact' or 'release'; value: None once accepted."""
+        """Forget old events and watch for 'contact' (an object touches the hand), 'load' (its weight is carried now) or
+        'release' (its weight is leaving); value: None once accepted."""
 
     def disarm(self) -> None:
         """Stop watching."""

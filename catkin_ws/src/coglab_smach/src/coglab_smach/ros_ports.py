@@ -249,7 +249,7 @@ class RosContact:
 
     def arm(self, mode: str, time_limit: float, settings: dict[str, Any]) -> Pending:
         self._event = None
-        self._wanted = mode == "contact"
+        self._wanted = mode != "release"
         return mapped(call(self._service, ArmContact, wait=2.0, mode=mode, timeout=time_limit,
                            k=float(settings.get("k", 0.0)), joints=list(settings.get("joints", [])),
                            mass=float(settings.get("mass", 0.0)),

@@ -40,10 +40,11 @@ class Faults:
 
 @dataclass
 class Partner:
-    """The person's script: seconds from the end of the robot's reach to the touch, and to the taking; None: never."""
+    """The person's script: seconds from arming to the touch, to the taking and to the letting go; None: never."""
 
     touch_after: Optional[float] = 0.8
     take_after: Optional[float] = 1.0
+    let_go_after: Optional[float] = 0.2
     pattern: str = "unknown"
     pattern_at: float = 0.0
     """s into the motion at which the pattern is decided"""
@@ -302,7 +303,8 @@ class SimulatedContact:
 
     def arm(self, mode: str, time_limit: float, settings: dict[str, Any]) -> Pending:
         cell = self.cell
-        after = cell.partner.touch_after if mode == "contact" else cell.partner.take_after
+        partner = cell.partner
+        after = {"contact": partner.touch_after, "load": partner.let_go_after, "release": partner.take_after}[mode]
         self._mode, self._due = mode, None if after is None else cell.clock.now() + after
         if cell.motion_started is not None and cell.reached_at is None:
             self.armed_while_moving = True

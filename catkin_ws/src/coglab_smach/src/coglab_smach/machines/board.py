@@ -43,7 +43,7 @@ def build_take(ctx: Context) -> CoglabMachine:
         machine.add_state("precise_motion", build_approach(ctx, "precise_motion", "", preshape=during, monitor=False),
                           to_recovery(succeeded="switch_to_ptp"))
         machine.add_state("switch_to_ptp", SwitchController(ctx, "ptp"), to_recovery(succeeded="hand_close"))
-        machine.add_state("hand_close", HandClose(ctx), to_recovery(succeeded="leave_board"))
+        machine.add_state("hand_close", HandClose(ctx, from_person=False), to_recovery(succeeded="leave_board"))
         machine.add_state("leave_board", PtpMotion(ctx, "board"), to_recovery(succeeded="coglab_home_robot"))
         machine.add_state("coglab_home_robot", HomeRobot(ctx), to_recovery(succeeded="succeeded"))
         machine.add_state("recover", build_recovery(ctx), RECOVERY_TRANSITIONS)

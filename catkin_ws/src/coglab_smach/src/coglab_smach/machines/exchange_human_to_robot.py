@@ -23,7 +23,7 @@ def build_exchange_human_to_robot(ctx: Context) -> CoglabMachine:
         machine.add_state("approach", build_approach(ctx, "approach", "contact", preshape=True, monitor=True),
                           to_recovery(succeeded="switch_to_ptp"))
         machine.add_state("switch_to_ptp", SwitchController(ctx, "ptp"), to_recovery(succeeded="hand_close"))
-        machine.add_state("hand_close", HandClose(ctx), to_recovery(succeeded="coglab_home_robot"))
+        machine.add_state("hand_close", HandClose(ctx, from_person=True), to_recovery(succeeded="coglab_home_robot"))
         machine.add_state("coglab_home_robot", HomeRobot(ctx), to_recovery(succeeded="succeeded"))
         machine.add_state("recover", build_recovery(ctx), RECOVERY_TRANSITIONS)
     return machine

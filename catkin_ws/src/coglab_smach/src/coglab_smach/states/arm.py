@@ -106,6 +106,9 @@ class WaitStop(CoglabState):
         self.ctx.journal.mark("motion_reached")
         if not self.trigger:
             return "succeeded"
+        if self.trigger == "release":
+            # The goal is the person's hand, and that now comes to the object: an arm that still followed it would back away.
+            self.await_pending(self.ctx.arm.switch_controller("ptp"), "end of the reach by switching to 'ptp'", 3.0)
         settings = self._settings(ud)
         limit = float(settings.get("timeout", self.ctx.config.get(f"{self.trigger}_timeout", 6.0)))
         self.await_pending(self.ctx.contact.arm(self.trigger, limit, settings), "arming of the contact detector", 2.0)

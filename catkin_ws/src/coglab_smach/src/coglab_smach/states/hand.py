@@ -5,7 +5,7 @@ from typing import Any
 
 from ..context import Context
 from ..pending import PortError
-from .base import CoglabState
+from .base import CoglabState, TimeLimit
 
 
 class CalibrateHand(CoglabState):
@@ -39,12 +39,16 @@ class HandPreshape(CoglabState):
 
 
 class HandClose(CoglabState):
-    """Close the preshaped hand on the object and make sure that something is in it."""
+    """Close the preshaped hand on the object and make sure that something is in it.
 
-    default_time_limit = 8.0
+    With ``from_person`` it also waits until the weight has come: a person who does not let go gets the object back.
+    """
 
-    def __init__(self, ctx: Context) -> None:
-        super().__init__(ctx, input_keys=["object_id"])
+    default_time_limit = 16.0
+
+    def __init__(self, ctx: Context, from_person: bool) -> None:
+        super().__init__(ctx, input_keys=["object_id", "object_entry"])
+        self.from_person = from_person
 
     def run(self, ud: Any) -> str:
         self.ctx.journal.mark("closing")
@@ -58,7 +62,26 @@ class HandClose(CoglabState):
             self.ctx.holding = ""
             raise PortError(f"the hand closed on nothing: motors at {list(state.positions)} of 254",
                             (state.message,) if state.message else ())
+        if self.from_person:
+            self._await_load(ud.object_id, float(ud.object_entry.get("mass", 0.0)))
         return "succeeded"
+
+    def _await_load(self, object_id: str, mass: float) -> None:
+        limit = float(self.ctx.config.get("hand.load_timeout", 5.0))
+        share = float(self.ctx.config.get("hand.load_share", 0.5))
+        self.await_pending(self.ctx.contact.arm("load", limit, {"mass": mass, "load_share": share}),
+                           "arming of the contact detector", 2.0)
+        try:
+            self.wait_for(lambda: self.ctx.contact.event() is not None, f"the weight of '{object_id}'", limit)
+        except TimeLimit:
+            self.ctx.holding = ""
+            raise PortError(f"the person did not let go of '{object_id}' within {limit:.0f} s",
+                            ("its weight has not come into the robot's hand",)) from None
+        finally:
+            self.ctx.contact.disarm()
+        self.ctx.journal.mark("loaded")
+        event = self.ctx.contact.event()
+        self.reason = event.message if event is not None else ""
 
 
 class HandOpen(CoglabState):
