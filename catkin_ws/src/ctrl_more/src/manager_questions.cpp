@@ -139,17 +139,13 @@ std::vector<Attribution> FeedbackControllersManager::attribution() const {
 }
 
 void FeedbackControllersManager::plot(const std::string& name, std::ostream& out) const {
-  std::shared_ptr<ControllerSlot> slot;
-  {
-    const Lock lock(mutex_);
-    slot = member(name).slot;
-  }
-  // Asks back for enabled, paused and gains, which takes the lock.
-  out << plotText(slot->controller());
+  const Lock lock(mutex_);
+  out << plotText(member(name).slot->controller());
 }
 
 void FeedbackControllersManager::plotAll(std::ostream& out) const {
-  for (const std::string& name : getExecutionOrder()) plot(name, out);
+  const Lock lock(mutex_);
+  for (const std::string& name : order_) plot(name, out);
 }
 
 }  // namespace ctrl_more

@@ -225,7 +225,7 @@ class FeedbackControllersManager : public Manager, private ControllerOwner {
  private:
   struct Member;
   struct Draft;
-  using Lock = std::lock_guard<std::mutex>;
+  using Lock = std::lock_guard<std::recursive_mutex>;
 
   // ControllerOwner
   Status setEnabled(const std::string& name, bool enabled) override;
@@ -263,7 +263,7 @@ class FeedbackControllersManager : public Manager, private ControllerOwner {
   std::string name_ = "feedback";
 
   // service side, under mutex_
-  mutable std::mutex mutex_;
+  mutable std::recursive_mutex mutex_;  // recursive: plotting asks back through ControllerOwner
   std::vector<std::unique_ptr<Member>> members_;  // load order
   std::vector<std::string> order_;
   std::map<std::string, std::vector<std::string>> profiles_;
