@@ -23,7 +23,8 @@ class BenchPlugin : public ctrl_more::FeedbackController {
   }
   void initialize(ctrl_more::Setup& setup) override { zmp_ = setup.modify("zmp"); }
   void update(const ctrl_more::Cycle&, const ctrl_more::RobotStates&,
-              const ctrl_more::ControlStates&, ctrl_more::ModifiedControlStates& modified) override {
+              const ctrl_more::ControlStates&,
+              ctrl_more::ModifiedControlStates& modified) override {
     modified[zmp_][0] += 1e-9;
   }
 

@@ -58,8 +58,8 @@ Description Attitude::describe() const {
       "yaw is followed unless the gains about the body's z axis are zero. With a plant that "
       "answers one cycle late, kp must stay below 1.";
   d.law =
-      "e = \\log(R_{ref} R_m^T),\\quad \\delta = \\mathrm{sat}_{max}(R_{ref}(K_p e_b - K_d \\omega_b"
-      " + K_i \\textstyle\\int e_b)),\\quad R' = \\exp(\\delta) R";
+      "e = \\log(R_{ref} R_m^T),\\quad \\delta = \\mathrm{sat}_{max}(R_{ref}(K_p e_b - "
+      "K_d \\omega_b + K_i \\textstyle\\int e_b)),\\quad R' = \\exp(\\delta) R";
   d.source =
       "Proportional, integral and damping feedback on SO(3); written for this project. The "
       "Ctrl-MORE paper (section VI-A) uses an attitude controller as its example without giving "

@@ -38,8 +38,8 @@ Description JointLimits::describe() const {
       "Bounds each joint alone, so near an end the direction of the motion changes. It never "
       "drives a joint back by itself. The host's own guard stays the last word on limits.";
   d.law =
-      "\\rho < \\rho_i:\\quad \\dot q_{toward} \\le \\xi \\, \\max(0, \\rho - \\rho_s) / (\\rho_i - "
-      "\\rho_s)";
+      "\\rho < \\rho_i:\\quad \\dot q_{toward} \\le \\xi \\, \\max(0, \\rho - \\rho_s) / "
+      "(\\rho_i - \\rho_s)";
   d.source = "Velocity damper near obstacles and limits.";
   d.information =
       "Pushed with constant speed, a joint approaches its safety distance by the factor "

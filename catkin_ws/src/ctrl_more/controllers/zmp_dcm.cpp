@@ -44,8 +44,8 @@ Description ZmpDcm::describe() const {
   d.use =
       "Mode `dcm`: write estimated position and velocity of the centre of mass (6) into "
       "`estimatedData` `com`, and the references com, comVelocity and zmp; the ZMP reference is "
-      "corrected. Mode `zmp_ip`: write the estimated ZMP (3) into `estimatedData` `zmp`; references "
-      "zmp and com are corrected.";
+      "corrected. Mode `zmp_ip`: write the estimated ZMP (3) into `estimatedData` `zmp`; "
+      "references zmp and com are corrected.";
   d.when =
       "Mode `dcm` where ankle torque or whole-body control can place the ZMP; mode `zmp_ip` on "
       "position-controlled robots. Not both modes on one robot at once.";

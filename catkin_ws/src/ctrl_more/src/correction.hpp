@@ -25,7 +25,9 @@ using Quaternion = Eigen::Map<Eigen::Quaterniond>;
 using ConstQuaternion = Eigen::Map<const Eigen::Quaterniond>;
 
 /// Doubles before the quaternion; all of them for a vector.
-inline int linearPart(SignalKind kind, int size) { return kind == SignalKind::Vector ? size : size - 4; }
+inline int linearPart(SignalKind kind, int size) {
+  return kind == SignalKind::Vector ? size : size - 4;
+}
 
 /// True if a correction changes nothing.
 inline bool isIdentity(SignalKind kind, int size, const double* c) {
@@ -43,7 +45,8 @@ inline void setIdentity(SignalKind kind, int size, double* c) {
 }
 
 /// The correction that leads from `before` to `after`; exactly none for equal bits.
-inline void difference(SignalKind kind, int size, const double* before, const double* after, double* c) {
+inline void difference(SignalKind kind, int size, const double* before, const double* after,
+                       double* c) {
   const int n = linearPart(kind, size);
   for (int i = 0; i < n; ++i) c[i] = after[i] - before[i];
   if (kind != SignalKind::Vector &&

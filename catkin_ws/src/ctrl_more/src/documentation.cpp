@@ -113,7 +113,8 @@ std::string documentationPage(const Description& d) {
     out << "| signal | map | size | unit | frame | largest age | meaning |\n"
         << "| --- | --- | --- | --- | --- | --- | --- |\n";
     for (const RobotSignalUse& s : d.robot_signals) {
-      out << "| " << keyText(s.role, s.key_setting, s.if_asked) << " | " << nameOf(s.source) << " | "
+      out << "| " << keyText(s.role, s.key_setting, s.if_asked) << " | " << nameOf(s.source)
+          << " | "
           << sizesText(s.sizes, 0) << " | " << s.unit << " | " << s.frame << " | "
           << ageText(s.max_age_s) << " | " << s.text << " |\n";
     }
@@ -124,7 +125,8 @@ std::string documentationPage(const Description& d) {
       << "| --- | --- | --- | --- | --- | --- | --- | --- | --- |\n";
   for (const ControlSignalUse& s : d.control_signals) {
     const char* by_kind = kindOf(s.container) == SignalKind::Vector ? "fade" : "hold";
-    out << "| " << keyText(s.role, s.key_setting, s.if_asked) << " | " << nameOf(s.container) << " | "
+    out << "| " << keyText(s.role, s.key_setting, s.if_asked) << " | " << nameOf(s.container)
+        << " | "
         << (s.container == ControlContainer::JointSpaceReference && s.sizes.empty()
                 ? "joints"
                 : sizesText(s.sizes, fixedSizeOf(s.container)))

@@ -73,8 +73,8 @@ Status FeedbackControllersManager::applyStep(const Change::Step& step, Draft& dr
       if (std::find(wanted.begin(), wanted.end(), name) == wanted.end()) missing.push_back(name);
     }
     if (!missing.empty()) {
-      return Status::failure("execution order: every loaded controller must appear once, missing: " +
-                             joined(missing) + "; to leave one out, disable it");
+      return Status::failure("execution order: every loaded controller must appear once, " +
+                             ("missing: " + joined(missing)) + "; to leave one out, disable it");
     }
     for (std::size_t place = 0; place < wanted.size(); ++place) {
       if (draft.order[place] != wanted[place]) ++draft.states[indexOf(wanted[place])].reorders;
@@ -170,7 +170,8 @@ Status FeedbackControllersManager::checkExclusive(const Draft& draft) const {
       if (!draft.states[b].enabled) continue;
       for (const ResolvedControlUse& x : members_[a]->slot->controlUses()) {
         for (const ResolvedControlUse& y : members_[b]->slot->controlUses()) {
-          if (!x.use.modifies || !y.use.modifies || x.signal.offset() != y.signal.offset()) continue;
+          if (!x.use.modifies || !y.use.modifies) continue;
+          if (x.signal.offset() != y.signal.offset()) continue;
           if (!refuse_shared_ && !x.use.exclusive && !y.use.exclusive) continue;
           return Status::failure(
               "'" + members_[a]->name + "' and '" + members_[b]->name + "' both modify " +

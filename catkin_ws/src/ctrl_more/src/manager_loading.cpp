@@ -21,7 +21,8 @@ StopPolicy readPolicy(const ConfigNode& node) {
   if (text == "hold") return StopPolicy::Hold;
   if (text == "fade") return StopPolicy::Fade;
   if (text == "zero") return StopPolicy::Zero;
-  throw node.error("on_fault cannot be '" + text + "'" + suggestion(text, {"hold", "fade", "zero"}));
+  throw node.error("on_fault cannot be '" + text + "'" +
+                   suggestion(text, {"hold", "fade", "zero"}));
 }
 
 double readPositive(const ConfigNode& node, const std::string& what) {

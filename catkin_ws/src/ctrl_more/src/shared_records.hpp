@@ -28,7 +28,9 @@ class SharedRecords {
   std::atomic<double>* making() { return open_; }
 
   /// Writes one number of the record being made (one writer only).
-  void put(std::size_t index, double value) { open_[index].store(value, std::memory_order_release); }
+  void put(std::size_t index, double value) {
+    open_[index].store(value, std::memory_order_release);
+  }
 
   /// One number of the record being made, for the writer.
   double made(std::size_t index) const { return open_[index].load(std::memory_order_relaxed); }

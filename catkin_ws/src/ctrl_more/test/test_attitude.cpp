@@ -89,7 +89,9 @@ TEST_F(AttitudeTest, turningTheWorldTurnsTheResult) {
                           "max_angle: 1\nimu_layout: quaternion_gyro_acc\n"));
   std::mt19937 random(5);
   std::normal_distribution<double> normal(0, 0.2);
-  const auto vector = [&] { return Eigen::Vector3d(normal(random), normal(random), normal(random)); };
+  const auto vector = [&] {
+    return Eigen::Vector3d(normal(random), normal(random), normal(random));
+  };
   const Eigen::Quaterniond world = expOf({1.0, -2.0, 0.5});
   for (int i = 0; i < 200; ++i) {
     const Eigen::Quaterniond body = expOf(vector()), reference = expOf(vector());

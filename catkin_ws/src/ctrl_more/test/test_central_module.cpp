@@ -37,7 +37,9 @@ const bool registered = CentralModule::registerManager(
 
 struct CentralModuleTest : ::testing::Test {
   Logger logger;
-  CentralModuleTest() { setenv("CTRL_MORE_PATH", CTRL_MORE_PLUGIN_DIR ":" CTRL_MORE_TEST_PLUGIN_DIR, 1); }
+  CentralModuleTest() {
+    setenv("CTRL_MORE_PATH", CTRL_MORE_PLUGIN_DIR ":" CTRL_MORE_TEST_PLUGIN_DIR, 1);
+  }
   ~CentralModuleTest() override { unsetenv("CTRL_MORE_PATH"); }
   std::string errorOf(const std::string& yaml) {
     try {

@@ -96,7 +96,8 @@ TEST_F(CompliantTest, measuredForceInstead) {
     rig.cycleOnce();
   }
   EXPECT_NEAR(rig.control.getCoM().y(), 30.0 / 1000.0, 1e-9);
-  EXPECT_EQ(rig.manager->getUsedRobotStates(), std::vector<std::string>{"measuredData/contactForce"});
+  EXPECT_EQ(rig.manager->getUsedRobotStates(),
+            std::vector<std::string>{"measuredData/contactForce"});
 }
 
 }  // namespace

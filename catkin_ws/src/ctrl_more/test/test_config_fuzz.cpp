@@ -48,7 +48,8 @@ TEST(ConfigFuzz, listAndGainFilesNeverBreakWhatRuns) {
   const std::string list =
       "loadControllers: [Good, running]\nGood:\n  libPath: libgood.so\n  configFile: good.yaml\n"
       "  enabled: true\n  overrun_us: 100\nprofiles:\n  dmp: [running]\nsearchPath: [a, b]\n";
-  const std::string gains = "type: TestController\nkp: [0.1, 0.2, 0.3]\nmax_angle: 0.5\nmode: fast\n";
+  const std::string gains =
+      "type: TestController\nkp: [0.1, 0.2, 0.3]\nmax_angle: 0.5\nmode: fast\n";
   const std::string file = ::testing::TempDir() + "/ctrl_more_fuzz.yaml";
   std::mt19937 random(20180521);
   long taken = 0, refused = 0;

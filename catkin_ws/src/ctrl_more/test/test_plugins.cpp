@@ -110,7 +110,8 @@ TEST_F(Plugins, badLibrariesAreRefusedInWords) {
 
 TEST_F(Plugins, knownTypeNameIsRefusedAndTheFirstOneStays) {
   ASSERT_TRUE(load("loadControllers: [Good]\nGood: {libPath: libgood.so, enabled: true}\n").ok());
-  expectRefused("loadControllers: [B]\nB: {libPath: libagain.so}\n", {"registered already", "Good"});
+  expectRefused("loadControllers: [B]\nB: {libPath: libagain.so}\n",
+                {"registered already", "Good"});
   rig.step();
   EXPECT_EQ(rig.control.getZMP()[0], 1.0);
   EXPECT_NE(prototypes().find("Good"), nullptr);
@@ -170,7 +171,8 @@ TEST_F(Plugins, librariesAreFoundWithoutAbsolutePaths) {
                 fs::copy_options::overwrite_existing);
   // package://
   setenv("ROS_PACKAGE_PATH", (folder / "share_root").c_str(), 1);
-  EXPECT_TRUE(load("loadControllers: [a]\na: {libPath: 'package://my_pkg/libgood_there.so'}\n").ok());
+  EXPECT_TRUE(
+      load("loadControllers: [a]\na: {libPath: 'package://my_pkg/libgood_there.so'}\n").ok());
   rig.manager->unload("a");
   // searchPath of the file, relative to it
   const LoadReport relative = rig.manager->load(
