@@ -11,10 +11,11 @@ import xml.etree.ElementTree as ElementTree
 from collections.abc import Callable
 from dataclasses import dataclass
 
-import numpy as np
-from core_bench import LIMITS, URDF, Row, minimum_jerk, row
-
 import coglab_controllers as cc
+import numpy as np
+
+import lockstep
+from core_bench import LIMITS, URDF, Row, minimum_jerk, row
 
 try:
     import PyKDL
@@ -23,6 +24,7 @@ except ImportError:  # the peer is optional: its column is then null
 
 CYCLE, DURATION, REACHES, SEED = 0.005, 1.2, 300, 11
 CYCLES = round(DURATION / CYCLE)
+LOCKSTEP_REACHES = 300
 REST = 100  # cycles that a reach is watched after its end
 TIMES = np.linspace(0.0, DURATION, 241)
 GAIN = 20.0
@@ -256,6 +258,40 @@ def rows_of(
     ]
 
 
+def lockstep_rows(limits: cc.JointLimits, reaches: list[Reach]) -> list[Row]:
+    """The reaches without a joint at its stop through the whole robot in virtual time; nothing if it is not built."""
+    if lockstep._virtual is None:
+        return []
+    robot = lockstep.Robot(limits)
+    outcomes = [robot.reach(r.goal, r.target) for r in reaches[:LOCKSTEP_REACHES] if robot.approach(r.posture)]
+    done = [o for o in outcomes if o is not None]
+    last = 1000.0 * np.array([o.last for o in done])
+    return [
+        row(
+            "tracking",
+            f"bridge and stand-in in lockstep, {len(done)} reaches: position at the end, 95th percentile",
+            np.percentile(last, 95),
+            "mm",
+            "<= 1",
+        ),
+        row("tracking", "bridge and stand-in in lockstep: position at the end, median", np.median(last), "mm", ""),
+        row(
+            "tracking",
+            "bridge and stand-in in lockstep: reaches refused or aborted",
+            len(outcomes) - len(done),
+            "1",
+            "",
+        ),
+        row(
+            "tracking",
+            "bridge and stand-in in lockstep: largest joint speed over its limit",
+            max(o.over for o in done),
+            "1",
+            "",
+        ),
+    ]
+
+
 def main() -> None:
     """Prints the rows as JSON."""
     chain, limits = cc.Chain(URDF.read_text()), cc.load_joint_limits(str(LIMITS))
@@ -275,6 +311,7 @@ def main() -> None:
     free = [o for o in ours if not o.stopped]
     slowed = 100.0 * float(np.mean([o.duration > min(x.duration for x in free) + 0.05 for o in free]))
     ends = 1000.0 * np.array([o.last for o in through if not o.stopped])
+    touched = [o.stopped for o in ours]
     over = max(o.over for o in ours + hurried + plain + through)
     rows = rows_of("rotation shrunk first", ours, "KDL wdls" if PyKDL else None, wdls, gated=True)
     rows += [
@@ -301,6 +338,7 @@ def main() -> None:
         ),
         row("tracking", "largest joint speed over its limit, all runs", over, "1", "<= 1.000000001"),
     ]
+    rows += lockstep_rows(limits, [r for r, stop in zip(reaches, touched, strict=True) if not stop])
     json.dump(rows, sys.stdout, indent=1)
     print()
 

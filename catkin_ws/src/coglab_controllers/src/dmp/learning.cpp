@@ -11,12 +11,14 @@
 namespace coglab_controllers {
 namespace {
 
-constexpr int kGridSteps = 600;  // integration steps per duration
-constexpr double kHoldShare =
-    0.3;  // how long after its end a motion must stay at the goal, in durations
-constexpr double kHoldWeight = 0.3;  // weight of that, against the motion itself
-constexpr double kRestSpeed =
-    0.1;  // a demonstration that ends slower than this share of its mean speed ends at rest
+// Integration steps per duration.
+constexpr int kGridSteps = 600;
+// How long after its end a motion must stay at the goal, in durations, and what that weighs against
+// the motion itself.
+constexpr double kHoldShare = 0.3, kHoldWeight = 0.3;
+// A demonstration rests at an end where it is slower than this share of its mean speed, over this
+// share of its samples: what noise there is must not be learnt as a start in motion.
+constexpr double kRestSpeed = 0.1, kRestWindow = 0.05;
 
 // One demonstration, prepared: time from its start, the goal is its last point.
 struct Example {
@@ -24,7 +26,7 @@ struct Example {
   Eigen::Matrix3Xd positions;
   double duration;
   double scale;  // length of the path, m
-  bool ends_at_rest;
+  bool starts_at_rest, ends_at_rest;
 };
 
 // Response of the linear system to everything it is linear in, column by column:
@@ -107,11 +109,15 @@ Example prepare(const Trajectory& trajectory) {
     throw std::invalid_argument("expected a path of at least 0.1 mm, got one of " +
                                 std::to_string(example.scale) + " m");
   }
-  const Eigen::Index tail = std::max<Eigen::Index>(1, count / 50);
-  const Vector3 last = example.positions.col(count - 1) - example.positions.col(count - 1 - tail);
-  const double end_speed =
-      last.norm() / (example.times[count - 1] - example.times[count - 1 - tail]);
-  example.ends_at_rest = end_speed < kRestSpeed * example.scale / example.duration;
+  const auto window = std::max<Eigen::Index>(
+      1, static_cast<Eigen::Index>(kRestWindow * static_cast<double>(count)));
+  const auto rests = [&](Eigen::Index from, Eigen::Index to) {
+    const double way = (example.positions.col(to) - example.positions.col(from)).norm();
+    const double time = example.times[to] - example.times[from];
+    return way / time < kRestSpeed * example.scale / example.duration;
+  };
+  example.starts_at_rest = rests(0, window);
+  example.ends_at_rest = rests(count - 1 - window, count - 1);
   return example;
 }
 
@@ -172,7 +178,8 @@ Primitive learn(const std::string& id, const std::vector<Trajectory>& demonstrat
   primitive.weights = Eigen::Matrix3Xd::Zero(3, options.basis_count);
   validate(primitive);
 
-  // Unknowns: the weights, and the start velocity of each demonstration.
+  // Unknowns: the weights, and the start velocity of each demonstration. A column of zeros, for one
+  // that starts at rest, gives zero.
   const Eigen::Index n = options.basis_count,
                      unknowns = n + static_cast<Eigen::Index>(examples.size());
   Eigen::Index rows = unknowns;
@@ -191,7 +198,9 @@ Primitive learn(const std::string& id, const std::vector<Trajectory>& demonstrat
     const auto add = [&](double t, const Eigen::RowVector3d& position, double weight) {
       const Eigen::RowVectorXd response = responses.at(t);
       a.row(row).head(n) = weight * response.head(n);
-      a(row, n + static_cast<Eigen::Index>(k)) = weight * response[n + 2];
+      if (!example.starts_at_rest) {
+        a(row, n + static_cast<Eigen::Index>(k)) = weight * response[n + 2];
+      }
       b.row(row) = weight * (position - response[n] * goal - response[n + 1] * start);
       ++row;
     };

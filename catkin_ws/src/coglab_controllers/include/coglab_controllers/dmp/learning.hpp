@@ -17,7 +17,7 @@ struct LearningOptions {
   double stiffness = 150.0;  ///< K; D is 2 sqrt(K)
   GoalWeight goal_weight;
   ShapeMapping mapping = ShapeMapping::None;
-  double regularisation = 1e-10;  ///< ridge, relative to the mean diagonal of the normal matrix
+  double regularisation = 1e-6;  ///< ridge, relative to the mean diagonal of the normal matrix
 };
 
 /// Learns from one or several demonstrations of one motion, which may differ in duration, start and
