@@ -68,6 +68,7 @@ void ObjectPhysics::place(Placement placement, const Pose& pose) {
   placement_ = placement;
   placed_ = pose;
   pinned_ = placement != Placement::World;
+  folded_.fill(false);
   human_grip_.release();
   robot_grip_.release();
   speed_ = Twist{};
@@ -99,20 +100,30 @@ FingerContactState ObjectPhysics::fingerContact(const Pose& palm) const {
   FingerContactState state{{255, 255, 255, 255, 255}, {0.0, 0.0, 0.0, 0.0, 0.0}};
   if (!robot_grip_.engaged() && !inGrasp(palm)) return state;
   for (std::size_t i = 1; i < 5; ++i) {
+    if (folded_[i]) continue;
     state.position[i] = finger_contact_[i];
     state.stiffness[i] = contact_.current_per_count;
   }
   return state;
 }
 
+void ObjectPhysics::watchFingers(const Pose& palm, const FingerInput& fingers) {
+  const bool there = robot_grip_.engaged() || pinned_ || inGrasp(palm);
+  for (std::size_t i = 0; i < folded_.size(); ++i) {
+    const bool closed = fingers[i] >= finger_contact_[i];
+    folded_[i] = closed && (folded_[i] || !there);
+  }
+}
+
 double ObjectPhysics::fingerForce(const FingerInput& fingers) const {
-  // A grasp needs an opposition: without the thumb, or without a finger, nothing is pressed.
+  // Fingers press against the thumb and against the palm, the thumb against the fingers only.
   const auto force = [&](std::size_t motor) {
+    if (folded_[motor]) return 0.0;
     const double counts = std::max(0, fingers[motor] - finger_contact_[motor]);
     return std::min(contact_.finger_force_max, contact_.newton_per_count * counts);
   };
   const double thumb = force(1), others = force(2) + force(3) + force(4);
-  return thumb > 0.0 || others > 0.0 ? 2.0 * std::min(std::max(thumb, 0.5 * others), others) : 0.0;
+  return 2.0 * std::min(std::max(thumb, 0.5 * others), others);
 }
 
 Vector3d ObjectPhysics::touch(const Vector3d& point, const Vector3d& normal, double depth,
@@ -176,7 +187,7 @@ Wrench ObjectPhysics::palmTouch(const Pose& palm, const Twist& palm_twist, const
   for (const Vector3d& point : kPalmPoints) at(point);
   for (const Finger& finger : kFingers) {
     const auto motor = static_cast<std::size_t>(finger.motor);
-    if (fingers[motor] >= finger_contact_[motor]) continue;  // then it grasps; see the robot's grip
+    if (fingers[motor] >= finger_contact_[motor]) continue;  // then it grasps or is folded away
     const double angle = kFlexionRange * fingers[motor] / 254.0;
     for (const double along : kAlongFinger) {
       at(finger.base + along * Vector3d(std::sin(angle), 0.0, std::cos(angle)));
@@ -193,6 +204,7 @@ void ObjectPhysics::pin(const Pose& hand, const Twist& twist) {
 
 Wrench ObjectPhysics::step(const Pose& palm, const Twist& palm_twist, const HumanInput& human, bool human_present,
                            const FingerInput& fingers, double dt) {
+  watchFingers(palm, fingers);
   if (pinned_) {
     // What is placed into a hand stays there until that hand really holds it.
     const bool in_robot = placement_ == Placement::RobotHand;

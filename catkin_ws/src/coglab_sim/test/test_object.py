@@ -117,6 +117,23 @@ def test_opening_fingers_drop_it_and_weak_ones_let_it_slip(session):
     assert s.cell.truth()['dropped']
 
 
+def test_fingers_folded_before_the_object_came_do_not_grasp(session):
+    s, hand = scene(session)
+    for _ in range(60):
+        s.cell.set_human(hand + [0.0, 0.2, 0.0], grip=1.0)
+        s.cell.set_fingers([254, 60, 80, 80, 245])  # a tripod preshape: ring and little lie in the palm
+        s.tick()
+    s.cell.place('human_hand', IN_HAND)
+    hand, _ = approach(s, hand)
+    truth = s.cell.truth()
+    assert truth['held_by'] == 'human' and truth['human_load_share'] > 0.9
+    positions, _ = s.cell.finger_contact()
+    assert positions[4] == 255 and positions[2] < 255
+    s.cell.set_fingers([254, positions[1] + 20, positions[2] + 20, positions[3] + 20, 245])
+    s.tick()
+    assert s.cell.truth()['held_by'] == 'both'
+
+
 def test_robot_hands_over_to_a_person(session):
     s = session(object__start='robot_hand', object__position=[0.04, 0.0, 0.0], object__rotation=[-0.5, -0.5, -0.5, 0.5])
     s.cell.set_fingers([0, 160, 160, 160, 160])

@@ -91,13 +91,14 @@ class ObjectPhysics {
   bool robotGrasps() const { return robot_grip_.engaged(); }
   bool humanGrasps() const { return human_grip_.engaged(); }
   bool slipping() const { return robot_grip_.slipping() || human_grip_.slipping(); }
-  /// For the hand: where the fingers meet the object if it lies in the grasp.
+  /// For the hand: where the fingers meet the object if it lies in the grasp; 255 for those that were folded before it came.
   FingerContactState fingerContact(const Pose& palm) const;
   const ObjectParameters& object() const { return object_; }
   const ContactParameters& contact() const { return contact_; }
 
  private:
   bool inGrasp(const Pose& palm) const;
+  void watchFingers(const Pose& palm, const FingerInput& fingers);
   double fingerForce(const FingerInput& fingers) const;
   /// Adds the force of one contact point; returns it.
   Vector3d touch(const Vector3d& point, const Vector3d& normal, double depth, const Vector3d& other_speed,
@@ -111,6 +112,7 @@ class ObjectPhysics {
   Shape shape_;
   Vector3d inertia_;
   std::array<int, 5> finger_contact_;
+  std::array<bool, 5> folded_{};  // was closed before the object came: it lies behind it and presses nothing
   GripCoupling human_grip_, robot_grip_;
   Pose center_;                 // of mass, in the world
   Twist speed_;

@@ -14,6 +14,7 @@
 #include "coglab_controllers/plugins/dmp_controller.hpp"
 #include "coglab_controllers/plugins/ptp_controller.hpp"
 #include "coglab_sim/cell.hpp"
+#include "ctrl_more/logger.hpp"
 #include "lwr_fri_bridge/bridge.hpp"
 
 namespace coglab_sim {
@@ -76,6 +77,7 @@ class VirtualRobot {
   int since_cycle_ = 0;
   std::uint64_t last_sequence_ = 0;
   FrameTable frames_;
+  ctrl_more::Logger logger_;  // of the feedback stage: warnings only, on standard error
   std::unique_ptr<coglab_controllers::ControllerManager> manager_;
   std::vector<coglab_controllers::DmpController*> dmps_;
 };
