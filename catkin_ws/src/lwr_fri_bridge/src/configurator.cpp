@@ -11,11 +11,15 @@ constexpr double kSettleTime =
 
 }  // namespace
 
-void Configurator::setPhase(fri::KrlPhase phase) {
+void Configurator::setPhase(fri::KrlPhase phase, const Observation& seen) {
   request_.phase = phase;
-  if (phase == fri::KrlPhase::Start || phase == fri::KrlPhase::Stop) {
+  if (phase != fri::KrlPhase::Start && phase != fri::KrlPhase::Stop) return;
+  // A program that outlived the last run of the bridge has numbers of its own.
+  const std::int32_t finished =
+      seen.measurement != nullptr ? fri::lastFinished(*seen.measurement) : 0;
+  do {
     request_.number = static_cast<std::uint16_t>(request_.number % fri::kMaxRequestNumber + 1);
-  }
+  } while (request_.number == finished);
 }
 
 void Configurator::finish(OutcomeCode code, const Observation& seen) {
@@ -58,13 +62,13 @@ void Configurator::stop(std::uint32_t ticket, const Observation& seen) {
   reply_ = fri::KrlReply{};
   began_ns_ = seen.now_ns;
   monitor_since_ns_ = seen.now_ns;
-  setPhase(fri::KrlPhase::Stop);
+  setPhase(fri::KrlPhase::Stop, seen);
   step_ = Step::WaitMonitor;
 }
 
 void Configurator::abandon(OutcomeCode code, const Observation& seen) {
   if (step_ == Step::Idle || step_ == Step::Ended || outcome_.kind != EventKind::Start) return;
-  if (request_.phase == fri::KrlPhase::Start) setPhase(fri::KrlPhase::Stop);
+  if (request_.phase == fri::KrlPhase::Start) setPhase(fri::KrlPhase::Stop, seen);
   finish(code, seen);
 }
 
@@ -82,7 +86,7 @@ void Configurator::stepStart(const Observation& seen) {
     if (command) {
       step_ = Step::WaitPower;  // somebody entered command mode before: nothing to request
     } else if (m.quality >= static_cast<std::uint16_t>(fri::Quality::Ok)) {
-      setPhase(fri::KrlPhase::Start);
+      setPhase(fri::KrlPhase::Start, seen);
       step_ = Step::WaitCommand;
     } else if (late) {
       return finish(OutcomeCode::PoorQuality, seen);
@@ -93,13 +97,13 @@ void Configurator::stepStart(const Observation& seen) {
     if (command) {
       step_ = Step::WaitPower;
     } else if (!reply_.known && waited > kProgramMarkTime) {
-      setPhase(fri::KrlPhase::Stop);
+      setPhase(fri::KrlPhase::Stop, seen);
       return finish(OutcomeCode::NoKrlProgram, seen);
     } else if (reply_.refused) {
-      setPhase(fri::KrlPhase::Stop);
+      setPhase(fri::KrlPhase::Stop, seen);
       return finish(OutcomeCode::ProgramRefused, seen);
     } else if (late) {
-      setPhase(fri::KrlPhase::Stop);
+      setPhase(fri::KrlPhase::Stop, seen);
       return finish(OutcomeCode::NotEntered, seen);
     } else if (convention_ == fri::KrlConvention::RcprgTum) {
       // Its flag is all it shows: worked on the request, is done with it, and still in monitor mode
@@ -109,26 +113,26 @@ void Configurator::stepStart(const Observation& seen) {
         monitor_since_ns_ = seen.now_ns;
       } else if (seen_busy_ &&
                  1e-9 * static_cast<double>(seen.now_ns - monitor_since_ns_) > kRefusalTime) {
-        setPhase(fri::KrlPhase::Stop);
+        setPhase(fri::KrlPhase::Stop, seen);
         return finish(OutcomeCode::ProgramRefused, seen);
       }
     }
   }
   if (step_ == Step::WaitPower) {
     if (!command) {
-      setPhase(fri::KrlPhase::Stop);
+      setPhase(fri::KrlPhase::Stop, seen);
       return finish(OutcomeCode::NotEntered, seen);
     }
     if (m.control != static_cast<std::uint16_t>(outcome_.wanted)) {
-      setPhase(fri::KrlPhase::Stop);
+      setPhase(fri::KrlPhase::Stop, seen);
       return finish(OutcomeCode::WrongStrategy, seen);
     }
     if (m.power == fri::kAllDrivesOn) {
-      setPhase(fri::KrlPhase::Running);
+      setPhase(fri::KrlPhase::Running, seen);
       return finish(OutcomeCode::Done, seen);
     }
     if (late) {
-      setPhase(fri::KrlPhase::Stop);
+      setPhase(fri::KrlPhase::Stop, seen);
       return finish(OutcomeCode::NoPower, seen);
     }
   }

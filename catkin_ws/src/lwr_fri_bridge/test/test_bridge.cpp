@@ -395,6 +395,12 @@ TEST(Bridge, aNewBridgeStartsNothing) {
   }
   EXPECT_TRUE(other.snapshot().sample.commanded_velocity.isZero());
   EXPECT_EQ(other.snapshot().supervisor, SupervisorState::Stopped);
+  // The KRL program has lived on, with the numbers of the first bridge's requests.
+  for (const char* event : {"start", "stop", "start", "stop"}) {
+    const Outcome outcome = runEvent(other, cell.robot, event);
+    EXPECT_TRUE(outcome.success()) << describe(outcome);
+  }
+  EXPECT_EQ(cell.robot.state, fri::FriState::Monitor);
 }
 
 TEST(Bridge, refusesParametersOutOfRangeByName) {

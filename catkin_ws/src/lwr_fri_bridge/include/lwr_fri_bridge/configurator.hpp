@@ -62,7 +62,7 @@ class Configurator {
     return 1e-9 * static_cast<double>(seen.now_ns - began_ns_);
   }
   void finish(OutcomeCode code, const Observation& seen);
-  void setPhase(fri::KrlPhase phase);
+  void setPhase(fri::KrlPhase phase, const Observation& seen);
   void stepStart(const Observation& seen);
   void stepStop(const Observation& seen);
 

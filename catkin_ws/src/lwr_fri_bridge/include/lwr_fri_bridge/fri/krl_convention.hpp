@@ -76,6 +76,12 @@ void writeRequest(KrlConvention convention, const KrlRequest& request, UserData&
 KrlReply readReply(KrlConvention convention, const KrlRequest& request,
                    const UserData& from_controller);
 
+/// Number of the request that our own program finished last (TO_INT[1]): a new request needs
+/// another.
+inline std::int32_t lastFinished(const MeasurementDatagram& measurement) {
+  return measurement.krl.ints[0];
+}
+
 /// Whether the convention's program can run this strategy (rcprg_tum fixes joint impedance).
 bool supports(KrlConvention convention, ControlStrategy strategy);
 
