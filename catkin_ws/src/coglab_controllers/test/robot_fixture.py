@@ -12,8 +12,8 @@ from sensor_msgs.msg import JointState
 
 from coglab_msgs.msg import ControllerStatus, DmpFeedback, FinishedPtp, LwrState
 from coglab_msgs.srv import (
-    AddPtp, AddPtpRequest, ExecuteDmp, ExecuteDmpRequest, GetActiveController, ListControllers, LoadController,
-    LoadDmps, LwrCommand, SetSpeedScale, SwitchController, SwitchDmp)
+    AddPtp, AddPtpRequest, ExecuteDmp, ExecuteDmpRequest, GetActiveController, ListControllers,
+    LoadController, LoadDmps, LwrCommand, SetSpeedScale, SwitchController, SwitchDmp)
 
 HOME = [-1.4349, -0.6086, 1.4986, 1.7048, 0.1857, 0.2152, 0.782]
 JOINTS = ["lwr_a1", "lwr_a2", "lwr_e1", "lwr_a3", "lwr_a4", "lwr_a5", "lwr_a6"]

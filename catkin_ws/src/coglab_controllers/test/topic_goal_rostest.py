@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""Goals on dmp_goal from the goal helper, ik_debug, refusals, speed scale and feedback services, all over ROS."""
+"""Over ROS: goals from the goal helper, ik_debug, refusals, speed scale, feedback services."""
 from __future__ import annotations
 
 import math

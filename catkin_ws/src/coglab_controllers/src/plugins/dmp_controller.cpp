@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <stdexcept>
 #include <utility>
 
@@ -58,7 +59,9 @@ void DmpController::configure(const MotionSetup& setup) {
   GoalGateParameters gate;
   gate.max_age = goal_from_tf_ ? parameters.number("goal_max_age", gate.max_age, 0.01, 10.0)
                                : parameters.number("goal_timeout", 0.0, 0.0, 3600.0);
-  gate.max_jump = parameters.number("goal_max_jump", gate.max_jump, 0.01, 5.0);
+  // A goal on dmp_goal is meant as it is, also when it is far from the last one.
+  gate.max_jump = goal_from_tf_ ? parameters.number("goal_max_jump", gate.max_jump, 0.01, 5.0)
+                                : std::numeric_limits<double>::infinity();
   gate.lost_time = parameters.number("goal_lost_time", gate.lost_time, 0.0, 60.0);
 
   GoalEstimatorParameters estimator;
@@ -339,7 +342,7 @@ void DmpController::report(const CycleInput& input) {
   Loop& loop = *loop_;
   loop.stamp_ns = input.robot.stamp_ns;
   progress_.write(loop.progress(state_, reason_));
-  if (!ikDebug()) return;
+  if (!ikDebug() || !following()) return;
   IkDebugRecord record;
   record.stamp_ns = input.robot.stamp_ns;
   record.phase = loop.motion.dmp().state().phase;
