@@ -1,0 +1,135 @@
+#!/usr/bin/python3
+"""Services and topics of the brain's nodes, over ROS: database, contact detector fed with synthetic torques, master."""
+import base64
+import pickle
+import sys
+import threading
+import time
+import unittest
+
+import numpy as np
+import rospy
+import rostest
+import yaml
+from coglab_msgs.msg import Contact, Transition
+from coglab_msgs.srv import ArmContact, GetObject, ListObjects, Start
+from coglab_smach.reachability import HOME, default_arm
+from coglab_smach.torque_signal import TorqueSignal
+from sensor_msgs.msg import JointState
+from smach_msgs.msg import SmachContainerStatus, SmachContainerStructure
+from std_srvs.srv import Trigger
+
+LIMIT = 30.0
+"""s, of every wait."""
+
+
+def service(name, kind):
+    rospy.wait_for_service(name, LIMIT)
+    return rospy.ServiceProxy(name, kind)
+
+
+class Torques(threading.Thread):
+    """An arm at its home posture: joint states and external torques at 200 Hz; ``force`` (N) on the hand."""
+
+    def __init__(self):
+        super().__init__(daemon=True)
+        self.joints = rospy.Publisher("/lwr/joint_states", JointState, queue_size=1)
+        self.torques = rospy.Publisher("/lwr/external_torques", JointState, queue_size=1)
+        self.force = np.zeros(3)
+        self.over = False
+
+    def run(self):
+        arm, signal = default_arm(), TorqueSignal(5)
+        jacobian = arm.position_jacobian(HOME)
+        applied = np.zeros(3)
+        while not self.over and not rospy.is_shutdown():
+            applied = applied + np.clip(self.force - applied, -0.4, 0.4)
+            stamp = rospy.Time.now()
+            state = JointState(name=list(arm.names), position=list(HOME), velocity=[0.0] * 7)
+            state.header.stamp = stamp
+            torque = JointState(name=list(arm.names), effort=list(signal.sample(0.005, jacobian, applied, np.zeros(7))))
+            torque.header.stamp = stamp
+            self.joints.publish(state)
+            self.torques.publish(torque)
+            time.sleep(0.005)
+
+
+class BrainNodes(unittest.TestCase):
+    """See the module."""
+
+    def test_1_arming_without_torques_is_refused(self):
+        answer = service("/contact_detector/arm", ArmContact)(mode="contact", timeout=1.0)
+        self.assertFalse(answer.success)
+        self.assertIn("no torques", answer.message)
+
+    def test_2_contact_is_published_once(self):
+        torques = Torques()
+        events = []
+        rospy.Subscriber("/coglab/contact", Contact, events.append)
+        torques.start()
+        try:
+            arm = service("/contact_detector/arm", ArmContact)
+            time.sleep(2.0)
+            self.assertFalse(arm(mode="juggle", timeout=1.0).success)
+            self.assertFalse(arm(mode="release", timeout=1.0).success)
+            self.assertTrue(arm(mode="contact", timeout=20.0).success)
+            time.sleep(1.5)
+            self.assertEqual(events, [], "a false alarm at rest")
+            torques.force = np.array([0.0, 8.0, 0.0])
+            end = time.monotonic() + LIMIT
+            while not events and time.monotonic() < end:
+                time.sleep(0.02)
+            time.sleep(0.5)
+            self.assertEqual(len(events), 1)
+            self.assertTrue(events[0].contact and events[0].source == "joint_torque" and events[0].margin > 1.0)
+            self.assertTrue(arm(mode="off").success)
+        finally:
+            torques.over = True
+
+    def test_3_object_database(self):
+        self.assertEqual(list(service("/object_database/list_objects", ListObjects)().object_ids),
+                         ["ball", "bottle", "mug", "screwdriver", "tea_box"])
+        mug = service("/object_database/get_object", GetObject)("mug")
+        self.assertTrue(mug.success)
+        self.assertEqual(yaml.safe_load(mug.yaml)["mass"], 0.31)
+        missing = service("/object_database/get_object", GetObject)("elephant")
+        self.assertFalse(missing.success)
+        self.assertIn("ball, bottle, mug", missing.message)
+        self.assertTrue(service("/object_database/reload", Trigger)().success)
+        self.assertEqual(rospy.get_param("/object_database/objects/mug/mass"), 0.31)
+
+    def test_4_introspection_shows_the_whole_hierarchy(self):
+        paths, states = set(), {}
+        rospy.Subscriber("/coglab/smach/container_structure", SmachContainerStructure, lambda m: paths.add(m.path))
+        rospy.Subscriber("/coglab/smach/container_status", SmachContainerStatus, lambda m: states.update({m.path: m}))
+        wanted = {"/coglab_master", "/coglab_master/exchange_human_to_robot", "/coglab_master/take/precise_motion",
+                  "/coglab_master/exchange_robot_to_human/approach/arm_motion", "/coglab_master/put",
+                  "/coglab_master/coglab_init_system/coglab_init_robot"}
+        end = time.monotonic() + LIMIT
+        while not wanted <= paths and time.monotonic() < end:
+            time.sleep(0.1)
+        self.assertLessEqual(wanted, paths)
+        while "/coglab_master" not in states and time.monotonic() < end:
+            time.sleep(0.1)
+        self.assertIn("object_id", pickle.loads(base64.b64decode(states["/coglab_master"].local_data)))
+
+    def test_5_without_a_robot_the_master_says_so_and_waits_in_fault(self):
+        transitions = []
+        rospy.Subscriber("/coglab/transitions", Transition, transitions.append)
+        start = service("/coglab/start", Start)
+        end = time.monotonic() + 60.0
+        while time.monotonic() < end:
+            answer = start("take", "mug")
+            self.assertFalse(answer.success)
+            if "fault takes initialise" in answer.message:
+                break
+            time.sleep(0.5)
+        self.assertIn("fault takes initialise", answer.message)
+        why = service("/coglab/why", Trigger)().message
+        self.assertIn("is its node running?", why)
+        self.assertTrue(start("initialise", "").success)
+
+
+if __name__ == "__main__":
+    rospy.init_node("brain_nodes_rostest")
+    rostest.rosrun("coglab_smach", "brain_nodes", BrainNodes, sys.argv)
