@@ -108,7 +108,7 @@ FingerContactState ObjectPhysics::fingerContact(const Pose& palm) const {
 }
 
 void ObjectPhysics::watchFingers(const Pose& palm, const FingerInput& fingers) {
-  const bool there = robot_grip_.engaged() || pinned_ || inGrasp(palm);
+  const bool there = pinned_ ? placement_ == Placement::RobotHand : robot_grip_.engaged() || inGrasp(palm);
   for (std::size_t i = 0; i < folded_.size(); ++i) {
     const bool closed = fingers[i] >= finger_contact_[i];
     folded_[i] = closed && (folded_[i] || !there);

@@ -70,7 +70,6 @@ VirtualRobot::VirtualRobot(const VirtualRobotConfig& config)
   // The controllers are linked into this library; no shared object with a ROS side is needed.
   settings.types.erase("coglab/DmpController");
   settings.types.erase("coglab/PtpController");
-  logger_.setLevel(ctrl_more::LogLevel::Warning);
   settings.logger = &logger_;
   manager_ = std::make_unique<coglab_controllers::ControllerManager>(std::move(settings));
 }

@@ -212,3 +212,23 @@ def test_noise_model(session):
         target[6] += 1.0 * (i + 1) * 0.001
         moving.append(s.tick(position=target)['external_torque'][1])  # a joint that does not move itself
     assert np.std(moving[200:]) / 0.05 == pytest.approx(8.0, rel=0.3)
+
+
+def test_rotations_are_reversed_on_the_wire_and_axes_are_those_of_the_base(session):
+    """Table: wrench Fx Fy Fz Tz Ty Tx, Jacobian rows X Y Z RZ RY RX; read here against the model's own terms."""
+    from coglab_sim import _cell
+    from conftest import URDF
+    s = session(torque_noise__sigma=0.0, torque_noise__bias=0.0, torque_noise__hysteresis=0.0)
+    s.monitor()
+    s.cell.set_push([1.0, 2.0, 3.0], [0.4, 0.5, 0.6])
+    fields = s.run(0.5)
+    assert np.abs(np.array(fields['wrench']) - [1.0, 2.0, 3.0, 0.6, 0.5, 0.4]).max() < 0.02
+    terms = _cell.arm_terms(URDF, fields['position'], [0.0] * 7)
+    jacobian = np.array(fields['jacobian']).reshape(6, 7)
+    assert np.abs(jacobian - terms['jacobian'][[0, 1, 2, 5, 4, 3]]).max() < 1e-6
+    assert np.abs(np.array(fields['mass']).reshape(7, 7) - terms['mass']).max() < 1e-5
+    assert np.abs(np.array(fields['gravity']) - terms['gravity']).max() < 1e-4
+    frame = np.array(fields['frame']).reshape(3, 4)
+    assert np.abs(frame[:, 3] - terms['tip']['position']).max() < 1e-6
+    assert np.abs(np.array(fields['torque']) - fields['gravity'] + jacobian[[0, 1, 2, 5, 4, 3]].T
+                  @ [1.0, 2.0, 3.0, 0.4, 0.5, 0.6]).max() < 0.01

@@ -77,7 +77,7 @@ class VirtualRobot {
   int since_cycle_ = 0;
   std::uint64_t last_sequence_ = 0;
   FrameTable frames_;
-  ctrl_more::Logger logger_;  // of the feedback stage: warnings only, on standard error
+  ctrl_more::Logger logger_;  // of the feedback stage; without a sink: the answers of requests say what matters
   std::unique_ptr<coglab_controllers::ControllerManager> manager_;
   std::vector<coglab_controllers::DmpController*> dmps_;
 };
