@@ -13,6 +13,7 @@ from pathlib import Path
 
 from coglab_bringup.run_directory import free_port, record_times, run_environment
 
+OBJECT = "mug"  # what the simulated person offers (coglab_sim/config/cell.yaml)
 MASTER_LIMIT = 30.0  # s until the ROS master answers
 
 
@@ -82,7 +83,6 @@ def main(arguments: list[str]) -> int:
     parser = argparse.ArgumentParser(prog="coglab demo", description=__doc__)
     parser.add_argument("--headless", action="store_true", help="no rviz, whatever is installed")
     parser.add_argument("--seed", type=int, default=7, help="seed of the virtual person and of all noise")
-    parser.add_argument("--object", default="mug", help="id in the object database")
     parser.add_argument("--out", type=Path, default=top / "out" / "demo", metavar="DIR", help="where result.json and trial.png go")
     options = parser.parse_args(arguments)
     began = time.monotonic()
@@ -105,9 +105,9 @@ def main(arguments: list[str]) -> int:
 
         rospy.init_node("coglab_demo", anonymous=True, disable_signals=True)
         for kind in kinds:
-            row, trial, start, end = run_handover(kind, options.object, system.alive)
+            row, trial, start, end = run_handover(kind, OBJECT, system.alive)
             result["handovers"].append(row)
-            title = f"{kind.replace('_', ' ')}, {options.object}, seed {options.seed}: {row['outcome']}"
+            title = f"{kind.replace('_', ' ')}, {OBJECT}, seed {options.seed}: {row['outcome']}"
             draw_trial(trial, title, start, end, out / "trial.png")
     except (RuntimeError, KeyboardInterrupt) as error:
         reason = str(error) or "interrupted"

@@ -12,7 +12,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 from sensor_msgs.msg import JointState
 
 FORCE_THRESHOLD = 0.3  # N on the palm from which the object counts as touching (truth)
-LOST_KEYS = ("lost measurements", "lost")  # diagnostics values that count lost FRI packets
+LOST_KEYS = ("measurements lost", "answers lost")  # diagnostics values of the bridge that count lost FRI packets
 
 
 @dataclass
@@ -26,7 +26,7 @@ class Trial:
     feedback: list[tuple] = field(default_factory=list)  # (t, state, remaining distance)
     transitions: list[tuple] = field(default_factory=list)  # (t, path, from, outcome, to, reason)
     contacts: list[tuple] = field(default_factory=list)  # (t, contact, margin)
-    fri_lost: int = 0
+    fri_lost: int | None = None  # None: the bridge's diagnostics never came
 
 
 class TrialRecorder:
@@ -86,13 +86,12 @@ class TrialRecorder:
         self.trial.contacts.append((message.header.stamp.to_sec(), message.contact, message.margin))
 
     def _on_diagnostics(self, message: DiagnosticArray) -> None:
-        for status in message.status:
-            for value in status.values:
-                if value.key.lower() in LOST_KEYS and value.value.isdigit():
-                    lost = int(value.value)
-                    if self._lost_at_start is None:
-                        self._lost_at_start = lost
-                    self.trial.fri_lost = lost - self._lost_at_start
+        counts = [int(value.value) for status in message.status for value in status.values if value.key in LOST_KEYS]
+        if not counts:
+            return
+        if self._lost_at_start is None:
+            self._lost_at_start = sum(counts)
+        self.trial.fri_lost = sum(counts) - self._lost_at_start
 
 
 def summarise(trial: Trial, kind: str, outcome: str, start: float, end: float, velocity_limits: np.ndarray) -> dict:
