@@ -54,8 +54,12 @@ TEST_F(JointLimitsTest, neverPushesBackAndNeverSpeedsUp) {
     for (int j = 0; j < 7; ++j) {
       ASSERT_GE(out[j] * qd[j], 0.0);
       ASSERT_LE(std::abs(out[j]), std::abs(qd[j]));
-      if (q[j] > 0.95) ASSERT_LE(out[j], 0.0);
-      if (q[j] < -0.95) ASSERT_GE(out[j], 0.0);
+      if (q[j] > 0.95) {
+        ASSERT_LE(out[j], 0.0);
+      }
+      if (q[j] < -0.95) {
+        ASSERT_GE(out[j], 0.0);
+      }
     }
   }
 }

@@ -81,7 +81,9 @@ TEST(ZmpDcmTest, zmpIpIsNotAlwaysAtItsLimitAndStaysFinite) {
       rig.cycleOnce(kDt);
       ASSERT_TRUE(rig.control.getCoM().allFinite());
     }
-    if (d == 0.0) EXPECT_EQ(rig.control.getCoM().x(), 0.0);
+    if (d == 0.0) {
+      EXPECT_EQ(rig.control.getCoM().x(), 0.0);
+    }
     if (d != 0.0) {
       EXPECT_LT(rig.control.getCoM().x() * d, 0.0);
       EXPECT_LT(std::abs(rig.control.getCoM().x()), 0.05);
