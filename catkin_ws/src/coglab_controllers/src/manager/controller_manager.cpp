@@ -70,6 +70,8 @@ ControllerManager::ControllerManager(ManagerSettings settings)
   if (!settings_.feedback_file.empty()) {
     feedback_errors_ = feedback_.manager().load(settings_.feedback_file).errors;
   }
+  cycle_.idle(
+      now_ns());  // the stores are frozen here, which allocates, and not in the first real cycle
 }
 
 ControllerManager::~ControllerManager() = default;
