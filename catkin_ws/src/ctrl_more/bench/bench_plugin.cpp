@@ -6,10 +6,10 @@
 #include <class_loader/register_macro.hpp>
 #endif
 
-// Not constant, so that the compiler reads it where the copies have it changed.
-extern "C" {
+// Not constant, so that the compiler reads it where the copies have it changed; hidden, so that
+// each copy reads its own.
+__attribute__((visibility("hidden")))
 char bench_plugin_type[] = "BenchPlug#000";
-}
 
 namespace {
 
