@@ -65,23 +65,28 @@ def campaign(actions, where, first_seed, **kw):
 
 
 def reach_figures(results, trials):
-    """(largest lateness against a person s, smallest SPARC, largest palm error mm, largest angle deg) of the first reach."""
-    late, smooth, error, angle = [], [], [], []
+    """Lists over the trials: arrival later than a person's s, duration s, SPARC, palm error mm, angle deg."""
+    late, ends, smooth, error, angle = [], [], [], [], []
     for result, trial in zip(results, trials):
         if "motion_reached" not in result.marks:
             continue
         begin, end = result.marks["motion_started"], result.marks["motion_reached"]
+        times = np.array([t for t, _ in trial.palm if begin <= t <= end])
         points = np.array([p for t, p in trial.palm if begin <= t <= end])
         if len(points) < 20:
             continue
+        # The arm has arrived when it stays within 10 mm of where it ends; the state's own end comes a little later.
+        far = np.flatnonzero(np.linalg.norm(points - points[-1], axis=1) > 0.010)
+        arrived = float(times[far[-1]]) if len(far) else begin
+        ends.append(end - begin)
         way = float(np.linalg.norm(points[-1] - points[0]))
         human = HUMAN_BASE * (way / 0.45) ** 0.3
-        late.append((end - begin) - human)
+        late.append((arrived - begin) - human)
         smooth.append(sparc(np.linalg.norm(np.diff(points, axis=0), axis=1) * 200.0, 200.0))
         if trial.palm_error is not None:
             error.append(trial.palm_error[0] * 1000)
             angle.append(np.degrees(trial.palm_error[1]))
-    return late, smooth, error, angle
+    return late, ends, smooth, error, angle
 
 
 def main() -> int:
@@ -108,14 +113,15 @@ def main() -> int:
     rows.append(row("virtual over processor time", speed, "x", ">= 10", speed >= 10))
     for name, kw in (("perfect perception", {"perfect": True}), ("noisy perception", {})):
         results, trials = campaign(("exchange_human_to_robot",), "human_hand", 2000, **kw)
-        late, smooth, error, angle = reach_figures(results["exchange_human_to_robot"], trials)
+        late, ends, smooth, error, angle = reach_figures(results["exchange_human_to_robot"], trials)
         perfect = bool(kw)
         rows.append(row(f"palm to goal as received at the end, p95, {name}", np.percentile(error, 95), "mm",
                         "<= 5", np.percentile(error, 95) <= 5))
         rows.append(row(f"palm angle to the newest goal, p95, {name}", np.percentile(angle, 95), "deg",
                         "<= 3" if perfect else "", not perfect or np.percentile(angle, 95) <= 3))
-        rows.append(row(f"reach later than a person's, median, {name}", np.median(late), "s",
+        rows.append(row(f"arm there later than a person would be, median, {name}", np.median(late), "s",
                         "<= 0.25" if perfect else "", not perfect or np.median(late) <= 0.25))
+        rows.append(row(f"duration of the reach until 'reached', median, {name}", np.median(ends), "s"))
         rows.append(row(f"SPARC of the reach, median, {name}", np.median(smooth), "1",
                         ">= -1.6" if perfect else "", not perfect or np.median(smooth) >= -1.6))
     print(json.dumps(rows))

@@ -74,17 +74,18 @@ def locate(state: CoglabState, target: str) -> dict[str, Any]:
             "quaternion": list(found.quaternion), "age": found.age}
 
 
-def await_offer(state: CoglabState, target: str) -> dict[str, Any]:
+def await_offer(state: CoglabState, target: str, margin: float = 0.0) -> dict[str, Any]:
     """Wait until ``target`` is inside the handover region, so that the arm does not chase a hand at rest.
 
-    PortError if nobody comes within ``handover.offer_timeout``; nothing has moved then.
+    ``margin`` (m) widens the region: a hand is behind the object it holds or asks for. PortError if nobody
+    comes within ``handover.offer_timeout``; nothing has moved then.
     """
     low = [float(v) for v in state.ctx.config.get("handover.region_low", [-1.0, -1.0, -1.0])]
     high = [float(v) for v in state.ctx.config.get("handover.region_high", [1.5, 1.0, 2.0])]
     limit = float(state.ctx.config.get("handover.offer_timeout", 8.0))
     end = state.ctx.clock.now() + limit
     located = locate(state, target)
-    while not all(a <= v <= b for a, v, b in zip(low, located["xyz"], high)):
+    while not all(a - margin <= v <= b + margin for a, v, b in zip(low, located["xyz"], high)):
         if state.ctx.clock.now() > end:
             place = ", ".join(f"{v:.2f}" for v in located["xyz"])
             raise PortError(f"'{target}' was not offered within {limit:.0f} s: it stayed at ({place}) m, outside the "
@@ -93,6 +94,11 @@ def await_offer(state: CoglabState, target: str) -> dict[str, Any]:
         located = locate(state, target)
     state.ctx.journal.mark("offered")
     return located
+
+
+def paced(ctx: Context, goal: dict[str, Any]) -> dict[str, Any]:
+    """The goal at the pace of a person: ``handover.reach_ratio`` times the object's own dmp_ratio."""
+    return {**goal, "dmp_ratio": goal["dmp_ratio"] * float(ctx.config.get("handover.reach_ratio", 1.0))}
 
 
 class SetGraspGoal(CoglabState):
@@ -110,7 +116,7 @@ class SetGraspGoal(CoglabState):
     def run(self, ud: Any) -> str:
         located = await_offer(self, ud.object_id)
         ud.located = located
-        ud.goal = grasp_goal(ud.object_entry, ud.grasp, located["frame"], "receive")
+        ud.goal = paced(self.ctx, grasp_goal(ud.object_entry, ud.grasp, located["frame"], "receive"))
         return "succeeded"
 
 
@@ -141,13 +147,14 @@ class SetDeliveryGoal(CoglabState):
                          output_keys=["goal", "delivery", "delivery_name", "delivery_pose"])
 
     def run(self, ud: Any) -> str:
-        located = await_offer(self, str(self.ctx.config.get("perception.human_hand", "human_hand")))
+        located = await_offer(self, str(self.ctx.config.get("perception.human_hand", "human_hand")),
+                              float(self.ctx.config.get("handover.hand_margin", 0.10)))
         entry = ud.object_entry
         name = entry["default_delivery"]
         delivery = entry["deliveries"][name]
         ud.delivery_name = name
         ud.delivery = delivery
-        goal = delivery_goal(entry, ud.grasp, delivery, located["frame"])
+        goal = paced(self.ctx, delivery_goal(entry, ud.grasp, delivery, located["frame"]))
         ud.delivery_pose = {"xyz": goal["offset"], "quaternion": goal["orientation"]}
         ud.goal = goal
         return "succeeded"
