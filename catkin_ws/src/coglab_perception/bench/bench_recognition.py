@@ -9,7 +9,7 @@ import numpy as np
 from coglab_perception.recogniser import UNKNOWN, Recogniser, train_patterns
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "test"))
-from synthetic_reaches import ENDS, START, demonstrations, reach  # noqa: E402
+from synthetic_reaches import ENDS, START, demonstrations, reach
 
 REACHES = 100
 """per pattern"""
@@ -18,7 +18,8 @@ REACHES = 100
 def row(figure, value, unit, goal="", ok=True, peer=None, peer_value=None):
     """One row of the bench table."""
     return {"bench": "recognition", "figure": figure, "value": round(float(value), 4), "unit": unit, "goal": goal,
-            "peer": peer, "peer_value": peer_value if peer_value is None else round(float(peer_value), 4), "ok": bool(ok)}
+            "peer": peer, "peer_value": peer_value if peer_value is None else round(float(peer_value), 4),
+            "ok": bool(ok)}
 
 
 def nearest_direction(displacement):
@@ -41,7 +42,7 @@ def main() -> int:
             recogniser = Recogniser(patterns)
             stamps, positions, onset, duration = reach(name, rng)
             pending, last, was_wrong = list(shares), UNKNOWN, False
-            for t, p in zip(stamps, positions):
+            for t, p in zip(stamps, positions, strict=False):
                 begin = time.perf_counter()
                 estimate = recogniser.update(t, p)
                 spent, frames = spent + time.perf_counter() - begin, frames + 1
@@ -58,7 +59,8 @@ def main() -> int:
             decided += last != UNKNOWN
     n = REACHES * len(ENDS)
     rows = [row(f"right after {share:.0%} of the reach", right[share] / n, "share", ">= 0.95" if share == 0.4 else "",
-                share != 0.4 or right[share] / n >= 0.95, "nearest direction", peer_right[share] / n) for share in shares]
+                share != 0.4 or right[share] / n >= 0.95, "nearest direction", peer_right[share] / n)
+            for share in shares]
     rows.append(row("reaches with a wrong decision", wrong / n, "share", "<= 0.01", wrong / n <= 0.01))
     rows.append(row("reaches decided", decided / n, "share"))
     rows.append(row("decided after, median", float(np.median(delays)), "share of the reach"))

@@ -9,7 +9,6 @@ import sys
 import rospy
 import tf2_ros
 from coglab_msgs.msg import Recognition
-
 from coglab_perception.recogniser import Recogniser, load_patterns
 
 

@@ -9,7 +9,6 @@ import argparse
 import sys
 
 import numpy as np
-
 from coglab_perception.recogniser import RecogniserSettings, save_patterns, train_patterns
 
 

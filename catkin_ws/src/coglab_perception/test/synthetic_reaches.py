@@ -12,7 +12,8 @@ def reach(name, rng, noise=0.004, rate=30.0, rest=0.6, hold=0.4):
     start = START + rng.normal(0, 0.02, 3)
     end = np.array(ENDS[name]) + rng.normal(0, 1, 3) * [0.03, 0.035, 0.03]
     duration = duration_for(float(np.linalg.norm(end - start)), 1.1) * float(np.exp(rng.normal(0, 0.15)))
-    path = Reach(start, end, rest, duration, vertical_share=float(rng.uniform(0.8, 0.95)), bow=float(rng.normal(0, 0.015)))
+    path = Reach(start, end, rest, duration, vertical_share=float(rng.uniform(0.8, 0.95)),
+                 bow=float(rng.normal(0, 0.015)))
     stamps = np.arange(0.0, rest + duration + hold, 1.0 / rate) + rng.normal(0, 0.002)
     positions = np.array([path.at(t)[0] for t in stamps]) + rng.normal(0, noise, (len(stamps), 3))
     return stamps, positions, rest, duration

@@ -1,12 +1,19 @@
-"""Recognition of reaching patterns: the filter against brute force and hmmlearn, earliness, unknown motions, hysteresis."""
+"""Recognition of reaching patterns: the filter against brute force and hmmlearn, earliness, unknown motions,
+hysteresis."""
 import itertools
 import json
 
 import numpy as np
 import pytest
 from coglab_perception.hmm import HmmFilter, LeftRightHmm
-from coglab_perception.recogniser import (UNKNOWN, Recogniser, RecogniserSettings, load_patterns, save_patterns,
-                                          train_patterns)
+from coglab_perception.recogniser import (
+    UNKNOWN,
+    Recogniser,
+    RecogniserSettings,
+    load_patterns,
+    save_patterns,
+    train_patterns,
+)
 from synthetic_reaches import ENDS, demonstrations, reach
 
 
@@ -16,7 +23,8 @@ def patterns():
 
 
 def small_model(rng, n=3, d=2):
-    return LeftRightHmm(np.append(rng.uniform(0.3, 0.9, n - 1), 1.0), rng.normal(size=(n, d)), rng.uniform(0.2, 1, (n, d)))
+    stay = np.append(rng.uniform(0.3, 0.9, n - 1), 1.0)
+    return LeftRightHmm(stay, rng.normal(size=(n, d)), rng.uniform(0.2, 1, (n, d)))
 
 
 def test_the_filter_equals_the_sum_over_all_paths():
@@ -79,7 +87,7 @@ def outcome_at(patterns, name, rng, share):
     stamps, positions, onset, duration = reach(name, rng)
     switches, last = 0, UNKNOWN
     at_share = None
-    for t, p in zip(stamps, positions):
+    for t, p in zip(stamps, positions, strict=False):
         estimate = recogniser.update(t, p)
         if at_share is None and t >= onset + share * duration:
             at_share = estimate
@@ -106,7 +114,8 @@ def test_more_of_the_reach_is_never_worse(patterns):
     shares = []
     for share in (0.2, 0.4, 0.7):
         rng = np.random.default_rng(5)
-        shares.append(np.mean([outcome_at(patterns, name, rng, share)[0].pattern == name for name in ENDS for _ in range(15)]))
+        shares.append(np.mean([outcome_at(patterns, name, rng, share)[0].pattern == name
+                               for name in ENDS for _ in range(15)]))
     assert shares[0] <= shares[1] + 0.05 and shares[1] <= shares[2] + 0.05
 
 
@@ -137,7 +146,7 @@ def test_a_decision_needs_several_confident_frames(patterns):
     recogniser = Recogniser(patterns, RecogniserSettings(frames=5))
     streak = 0
     stamps, positions, _, _ = reach("high", rng)
-    for t, p in zip(stamps, positions):
+    for t, p in zip(stamps, positions, strict=False):
         estimate = recogniser.update(t, p)
         best = max(estimate.probabilities.values(), default=0.0)
         streak = streak + 1 if best >= 0.9 else 0
@@ -151,7 +160,7 @@ def test_gaps_and_old_frames_do_no_harm(patterns):
     rng = np.random.default_rng(10)
     recogniser = Recogniser(patterns)
     stamps, positions, _, _ = reach("left", rng)
-    for i, (t, p) in enumerate(zip(stamps, positions)):
+    for i, (t, p) in enumerate(zip(stamps, positions, strict=False)):
         if i % 3 != 1:
             recogniser.update(t, p)
         recogniser.update(t - 1.0, p + 1.0)
@@ -169,7 +178,8 @@ def test_pattern_files_round_trip_and_are_checked(patterns, tmp_path):
         path.write_text(broken)
         with pytest.raises(ValueError, match=sentence):
             load_patterns(str(path))
-    data = {"version": 1, "patterns": [{"name": "x", "floor": 0.0, "stay": [1.0], "mean": [[0.0]], "variance": [[-1.0]]}]}
+    model = {"name": "x", "floor": 0.0, "stay": [1.0], "mean": [[0.0]], "variance": [[-1.0]]}
+    data = {"version": 1, "patterns": [model]}
     path.write_text(json.dumps(data))
     with pytest.raises(ValueError, match=r"patterns\[0\]"):
         load_patterns(str(path))

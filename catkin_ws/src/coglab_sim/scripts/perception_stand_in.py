@@ -14,8 +14,14 @@ import numpy as np
 import rospy
 import tf2_ros
 from coglab_msgs.msg import CellTruth
-from coglab_msgs.srv import (FreePlaces, FreePlacesResponse, InitVision, InitVisionResponse, LocateObject,
-                             LocateObjectResponse)
+from coglab_msgs.srv import (
+    FreePlaces,
+    FreePlacesResponse,
+    InitVision,
+    InitVisionResponse,
+    LocateObject,
+    LocateObjectResponse,
+)
 from coglab_sim.perception_stand_in import Board, PerceptionSettings, Sight, Tracker
 from coglab_sim.rigid import Frame, quat_from_rotvec
 from geometry_msgs.msg import Point, PoseStamped, Quaternion, TransformStamped, Vector3

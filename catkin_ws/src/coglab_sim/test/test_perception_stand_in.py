@@ -28,11 +28,12 @@ def test_stamp_is_the_capture_time_and_latency_is_as_configured():
     sights = watch(PerceptionSettings())
     delays = np.array([t - s.captured for t, s in sights])
     assert delays.mean() == pytest.approx(0.060, abs=0.01) and delays.min() >= 0.0
-    assert all(b[1].captured > a[1].captured for a, b in zip(sights, sights[1:]))
+    assert all(b[1].captured > a[1].captured for a, b in zip(sights, sights[1:], strict=False))
 
 
 def test_noise_per_axis_and_its_correlation():
-    settings = PerceptionSettings(position_noise=(0.004, 0.001, 0.008), correlation_time=0.10, dropout_start=0.0, latency_sigma=0.0)
+    settings = PerceptionSettings(position_noise=(0.004, 0.001, 0.008), correlation_time=0.10, dropout_start=0.0,
+                                  latency_sigma=0.0)
     points = np.array([s.frame.position for _, s in watch(settings, 200.0)])
     assert points.std(axis=0) == pytest.approx([0.004, 0.001, 0.008], rel=0.25)
     x = points[:, 0] - points[:, 0].mean()
@@ -61,7 +62,7 @@ def test_occlusion_by_the_robots_hand():
 def test_same_seed_same_sights():
     a, b = watch(PerceptionSettings(), 5.0, seed=9), watch(PerceptionSettings(), 5.0, seed=9)
     assert [t for t, _ in a] == [t for t, _ in b]
-    assert all(np.array_equal(x.frame.position, y.frame.position) for (_, x), (_, y) in zip(a, b))
+    assert all(np.array_equal(x.frame.position, y.frame.position) for (_, x), (_, y) in zip(a, b, strict=False))
 
 
 def test_settings_are_checked():

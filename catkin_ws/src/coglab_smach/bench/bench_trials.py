@@ -10,7 +10,7 @@ import numpy as np
 import smach
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "test"))
-from virtual_ports import VirtualTrial  # noqa: E402
+from virtual_ports import VirtualTrial
 
 TRIALS = 100 if os.environ.get("COGLAB_LONG") == "1" else 20
 HUMAN_BASE = 1.1
@@ -20,11 +20,13 @@ HUMAN_BASE = 1.1
 def row(figure, value, unit, goal="", ok=True, peer=None, peer_value=None):
     """One row of the bench table."""
     return {"bench": "trials", "figure": figure, "value": round(float(value), 4), "unit": unit, "goal": goal,
-            "peer": peer, "peer_value": peer_value if peer_value is None else round(float(peer_value), 4), "ok": bool(ok)}
+            "peer": peer, "peer_value": peer_value if peer_value is None else round(float(peer_value), 4),
+            "ok": bool(ok)}
 
 
 def sparc(speed, rate, cut=10.0, amplitude=0.05):
-    """Spectral arc length of a speed profile (Balasubramanian et al.), 10 Hz, amplitude threshold 0.05; 0 is smoothest."""
+    """Spectral arc length of a speed profile (Balasubramanian et al.), 10 Hz, amplitude threshold 0.05; 0 is
+    smoothest."""
     n = int(2 ** (np.ceil(np.log2(len(speed))) + 4))
     f = np.arange(n) * rate / n
     spectrum = np.abs(np.fft.fft(speed, n))
@@ -67,7 +69,7 @@ def campaign(actions, where, first_seed, **kw):
 def reach_figures(results, trials):
     """Lists over the trials: arrival later than a person's s, duration s, SPARC, palm error mm, angle deg."""
     late, ends, smooth, error, angle = [], [], [], [], []
-    for result, trial in zip(results, trials):
+    for result, trial in zip(results, trials, strict=False):
         if "motion_reached" not in result.marks:
             continue
         begin, end = result.marks["motion_started"], result.marks["motion_reached"]
@@ -106,7 +108,8 @@ def main() -> int:
                 if r.outcome != "succeeded":
                     print(f"{action}: {r.reason}", file=sys.stderr)
         violations = sum(t.rig.limit_violations for t in trials)
-        rows.append(row(f"ticks outside joint limits, {' and '.join(actions)}", violations, "ticks", "<= 0", violations == 0))
+        rows.append(row(f"ticks outside joint limits, {' and '.join(actions)}", violations, "ticks", "<= 0",
+                        violations == 0))
         moving = sum(t.rig.watched_while_moving for t in trials)
         rows.append(row(f"armed while moving, {' and '.join(actions)}", moving, "ticks", "<= 0", moving == 0))
     speed = virtual / (time.process_time() - started)

@@ -12,11 +12,10 @@ import threading
 import rospy
 from coglab_msgs.msg import Contact
 from coglab_msgs.srv import ArmContact, ArmContactResponse
-from sensor_msgs.msg import JointState
-from std_msgs.msg import Float64
-
 from coglab_smach.contact_detector import ContactDetector, DetectorSettings
 from coglab_smach.kinematics import SerialArm
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Float64
 
 
 class ContactDetectorNode:
@@ -51,7 +50,7 @@ class ContactDetectorNode:
         if len(message.velocity) == len(message.name):
             velocity = [message.velocity[i] for i in order]
         elif self.position is not None and stamp > self.joint_stamp:
-            velocity = [(a - b) / (stamp - self.joint_stamp) for a, b in zip(position, self.position)]
+            velocity = [(a - b) / (stamp - self.joint_stamp) for a, b in zip(position, self.position, strict=False)]
         else:
             velocity = None
         self.position, self.velocity, self.joint_stamp = position, velocity, stamp
@@ -84,7 +83,8 @@ class ContactDetectorNode:
                                   request.load_share)
             except ValueError as error:
                 return ArmContactResponse(False, str(error))
-        return ArmContactResponse(True, f"watching for {request.mode} for {request.timeout:.1f} s once the arm is still")
+        return ArmContactResponse(True, f"watching for {request.mode} for {request.timeout:.1f} s once the arm "
+                                        "is still")
 
     def on_timer(self, _event) -> None:
         """Live margin."""

@@ -15,15 +15,14 @@ import smach
 import smach_ros
 from coglab_msgs.msg import Transition
 from coglab_msgs.srv import Start, StartResponse
-from std_msgs.msg import String
-from std_srvs.srv import Trigger, TriggerResponse
-
 from coglab_smach.config import Config, ConfigError
 from coglab_smach.context import Context
 from coglab_smach.journal import ActionRecord, Journal, TransitionRecord
 from coglab_smach.machines import build_master
 from coglab_smach.ros_hand import RosHand
 from coglab_smach.ros_ports import RosArm, RosContact, RosDatabase, RosPerception
+from std_msgs.msg import String
+from std_srvs.srv import Trigger, TriggerResponse
 
 
 class MasterNode:

@@ -8,9 +8,8 @@ import sys
 
 import rospy
 from coglab_msgs.srv import GetObject, GetObjectResponse, ListObjects, ListObjectsResponse
-from std_srvs.srv import Trigger, TriggerResponse
-
 from coglab_smach.object_database import ObjectDatabase, ObjectError
+from std_srvs.srv import Trigger, TriggerResponse
 
 
 class ObjectDatabaseNode:

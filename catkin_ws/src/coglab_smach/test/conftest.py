@@ -1,15 +1,13 @@
 """Fixtures of the machine tests: the master in virtual time on simulated ports, walked by a script."""
-import threading
 from pathlib import Path
 
 import pytest
 import smach
-from smach.virtual_clock import VirtualClock
-
 from coglab_smach.config import Config
 from coglab_smach.machines import build_master
 from coglab_smach.object_database import ObjectDatabase
 from coglab_smach.simulated_ports import simulated_context
+from smach.virtual_clock import VirtualClock
 
 SHARE = Path(__file__).resolve().parent.parent
 

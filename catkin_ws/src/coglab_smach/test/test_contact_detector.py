@@ -1,4 +1,5 @@
-"""Contact and release detection on synthetic torques: sensitivity by direction, false alarms, the arm-must-stand-still gate."""
+"""Contact and release detection on synthetic torques: sensitivity by direction, false alarms, the
+arm-must-stand-still gate."""
 import numpy as np
 import pytest
 from coglab_smach.contact_detector import ContactDetector, DetectorSettings, sensitive_joints

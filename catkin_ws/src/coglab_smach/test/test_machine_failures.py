@@ -1,4 +1,5 @@
-"""Whatever breaks, the machine ends in a hub, in 'stopped' or in 'fault', with a sentence; never stuck, never by opening the hand."""
+"""Whatever breaks, the machine ends in a hub, in 'stopped' or in 'fault', with a sentence; never stuck,
+never by opening the hand."""
 import pytest
 from conftest import Trial
 
@@ -58,7 +59,8 @@ def test_goal_lost_half_way():
 
 def test_primitive_that_does_not_exist():
     trial = failed_exchange(lambda t: t.cell.primitives.discard("reach_human"))
-    assert_recovered_empty(trial, "primitive 'reach_human' does not exist; loaded: give_human, put_board, reach_high, take_board")
+    assert_recovered_empty(trial, "primitive 'reach_human' does not exist; loaded: give_human, put_board, reach_high, "
+                                  "take_board")
 
 
 def test_contact_detector_dead():

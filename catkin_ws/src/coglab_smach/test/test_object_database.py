@@ -1,4 +1,5 @@
-"""The object database: the sample objects are good, bad files are refused with file, line and field, the old entry stays."""
+"""The object database: the sample objects are good, bad files are refused with file, line and field, the old
+entry stays."""
 import os
 import subprocess
 import sys

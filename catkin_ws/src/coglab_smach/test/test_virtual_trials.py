@@ -99,7 +99,8 @@ def test_campaign(actions, where):
 
 def test_nothing_in_control_reads_the_truth():
     """Only the partner, the tracker stand-in, recorders and tests may: no file of a control package names the topic."""
-    for package in ("coglab_smach", "coglab_perception", "coglab_controllers", "ctrl_more", "lwr_fri_bridge", "ih2_hand"):
+    for package in ("coglab_smach", "coglab_perception", "coglab_controllers", "ctrl_more", "lwr_fri_bridge",
+                    "ih2_hand"):
         for folder in ("src", "scripts", "include", "launch", "config"):
             for path in (SOURCES / package / folder).rglob("*"):
                 if path.suffix in (".py", ".cpp", ".hpp", ".launch", ".yaml"):

@@ -66,7 +66,8 @@ class VirtualArm:
             if arm.active != "dmp":
                 raise PortError(f"execute_dmp refused: '{arm.active}' is active")
             if request.primitive_id not in arm.library:
-                raise PortError(f"primitive '{request.primitive_id}' does not exist; loaded: {', '.join(arm.library.ids())}")
+                raise PortError(f"primitive '{request.primitive_id}' does not exist; loaded: "
+                                f"{', '.join(arm.library.ids())}")
         except PortError as error:
             return Ready(error=error)
         self.request = request

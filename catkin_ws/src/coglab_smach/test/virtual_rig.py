@@ -1,5 +1,6 @@
 """The whole cell in one process and in virtual time: KRC stand-in and bridge byte for byte in lockstep, the controller
-cores, the hand emulator behind its driver, virtual human, tracker, contact detector. One call of step() is one FRI period.
+cores, the hand emulator behind its driver, virtual human, tracker, contact detector. One call of step() is
+one FRI period.
 """
 from pathlib import Path
 from types import SimpleNamespace
@@ -245,7 +246,8 @@ class Rig:
         palm = _frame(truth["robot_hand"])
         self.palm_history.append(palm.position)
         del self.palm_history[:-10]
-        speed = float(np.linalg.norm(palm.position - self.palm_history[0])) / 0.09 if len(self.palm_history) > 9 else 1.0
+        way = float(np.linalg.norm(palm.position - self.palm_history[0]))
+        speed = way / 0.09 if len(self.palm_history) > 9 else 1.0
         view = WorldView(palm, speed, _frame(truth["object"]), float(np.linalg.norm(truth["palm_force"])),
                          truth["robot_load_share"], truth["human_load_share"], truth["held_by"])
         hand = self.human.step(self.t, view)

@@ -5,8 +5,9 @@ model of five states needs nothing more.
 """
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -27,8 +28,10 @@ class LeftRightHmm:
         self.variance = np.atleast_2d(np.asarray(self.variance, dtype=float))
         n = len(self.stay)
         if self.mean.shape != self.variance.shape or len(self.mean) != n or n < 1:
-            raise ValueError(f"stay has {n} states, mean {self.mean.shape}, variance {self.variance.shape}: sizes differ")
-        if not (np.all(np.isfinite(self.mean)) and np.all(self.variance > 0) and np.all((self.stay >= 0) & (self.stay <= 1))):
+            raise ValueError(f"stay has {n} states, mean {self.mean.shape}, variance {self.variance.shape}: "
+                             "sizes differ")
+        if not (np.all(np.isfinite(self.mean)) and np.all(self.variance > 0)
+                and np.all((self.stay >= 0) & (self.stay <= 1))):
             raise ValueError("means must be finite, variances positive, probabilities to stay within 0..1")
 
     @property
@@ -57,7 +60,7 @@ class LeftRightHmm:
 
     @staticmethod
     def train(sequences: Sequence[np.ndarray], states: int = 5, iterations: int = 40,
-              tolerance: float = 1e-4) -> "LeftRightHmm":
+              tolerance: float = 1e-4) -> LeftRightHmm:
         """Baum-Welch over several sequences (T_i, d), started from equal shares of each sequence.
 
         ValueError if a sequence is shorter than the number of states or not finite.
@@ -66,7 +69,8 @@ class LeftRightHmm:
         for i, s in enumerate(data):
             if s.ndim != 2 or len(s) < states or not np.all(np.isfinite(s)):
                 raise ValueError(f"sequence {i} has shape {s.shape}; expected at least {states} finite frames")
-        parts = [np.concatenate([s[len(s) * k // states:len(s) * (k + 1) // states] for s in data]) for k in range(states)]
+        parts = [np.concatenate([s[len(s) * k // states:len(s) * (k + 1) // states] for s in data])
+                 for k in range(states)]
         length = np.mean([len(s) for s in data]) / states
         model = LeftRightHmm(np.full(states, 1.0 - 1.0 / max(length, 1.5)), np.array([p.mean(axis=0) for p in parts]),
                              np.array([p.var(axis=0) + VARIANCE_FLOOR for p in parts]))
@@ -78,7 +82,7 @@ class LeftRightHmm:
             last = score
         return model
 
-    def _reestimate(self, data: Sequence[np.ndarray]) -> tuple["LeftRightHmm", float]:
+    def _reestimate(self, data: Sequence[np.ndarray]) -> tuple[LeftRightHmm, float]:
         """One Baum-Welch step; returns the new model and the log-likelihood under the old one."""
         a = self.transition()
         n, d = self.mean.shape
@@ -118,7 +122,7 @@ class LeftRightHmm:
         return {"stay": self.stay.tolist(), "mean": self.mean.tolist(), "variance": self.variance.tolist()}
 
     @staticmethod
-    def from_dict(data: Mapping[str, Any]) -> "LeftRightHmm":
+    def from_dict(data: Mapping[str, Any]) -> LeftRightHmm:
         """Inverse of to_dict; ValueError says what is wrong."""
         missing = [k for k in ("stay", "mean", "variance") if k not in data]
         if missing:

@@ -1,7 +1,9 @@
 """Which reaching pattern is the partner performing? Recognition from the hand's position, frame by frame.
 
-Features: displacement from the place where the hand rested (m) and velocity over a short window (m/s). The posterior over
-the patterns comes from the models' forward filters; 'unknown' where even the best one explains the motion badly. A decision
+Features: displacement from the place where the hand rested (m) and velocity over a short window (m/s). The
+posterior over
+the patterns comes from the models' forward filters; 'unknown' where even the best one explains the motion
+badly. A decision
 needs a confident posterior for several frames, and is kept until another pattern has been as confident for as long.
 """
 from __future__ import annotations
@@ -9,9 +11,10 @@ from __future__ import annotations
 import json
 import math
 from collections import deque
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
-from typing import Any, Mapping, Optional, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -68,13 +71,14 @@ class FeatureStream:
     def __init__(self, settings: RecogniserSettings) -> None:
         self.settings = settings
         self._history: deque[tuple[float, np.ndarray]] = deque()
-        self._rest: Optional[np.ndarray] = None
+        self._rest: np.ndarray | None = None
         self._recent: deque[tuple[float, np.ndarray]] = deque()
         self.moving = False
         self.started = False
 
-    def update(self, stamp: float, position: Sequence[float]) -> Optional[np.ndarray]:
-        """One frame; returns (6,) features while a reach is under way, else None. ``started`` is True on its first frame."""
+    def update(self, stamp: float, position: Sequence[float]) -> np.ndarray | None:
+        """One frame; returns (6,) features while a reach is under way, else None. ``started`` is True on its
+        first frame."""
         s = self.settings
         p = np.asarray(position, dtype=float)
         self.started = False
@@ -149,7 +153,7 @@ class Recogniser:
 
     def _judge(self) -> Estimate:
         scores = np.array([f.log_likelihood for f in self._filters])
-        floors = np.array([p.floor * f.frames for p, f in zip(self.patterns, self._filters)])
+        floors = np.array([p.floor * f.frames for p, f in zip(self.patterns, self._filters, strict=False)])
         # 'unknown' competes with the likelihood that the worst genuine reach of the best pattern would have had.
         best = int(np.argmax(scores))
         scores = np.append(scores, floors[best]) / self.settings.temperature
@@ -166,7 +170,7 @@ class Recogniser:
             self._decision = self._streak[0]
         decided = self._decision != UNKNOWN
         shown = self._decision if decided else name
-        probabilities = dict(zip(names, (float(w) for w in weights)))
+        probabilities = dict(zip(names, (float(w) for w in weights), strict=False))
         return Estimate(shown, probabilities[shown], decided, self._filters[best].progress(), probabilities)
 
 
@@ -178,10 +182,11 @@ def train_patterns(demonstrations: Mapping[str, Sequence[tuple[np.ndarray, np.nd
     """
     patterns = []
     for name, recordings in demonstrations.items():
-        sequences = [f for stamps, positions in recordings if len(f := reach_features(stamps, positions, settings)) > states]
+        sequences = [f for stamps, positions in recordings
+                     if len(f := reach_features(stamps, positions, settings)) > states]
         if len(sequences) < 2:
-            raise ValueError(f"pattern '{name}': {len(sequences)} usable demonstrations; at least 2 are needed, each with "
-                             f"a rest before the reach and more than {states} frames of motion")
+            raise ValueError(f"pattern '{name}': {len(sequences)} usable demonstrations; at least 2 are needed, "
+                             f"each with a rest before the reach and more than {states} frames of motion")
         model = LeftRightHmm.train(sequences, states)
         per_frame = np.array([model.log_likelihood(s) / len(s) for s in sequences])
         patterns.append(Pattern(name, model, float(per_frame.mean() - 5.0 * per_frame.std() - 1.0)))
@@ -192,7 +197,7 @@ def reach_features(stamps: np.ndarray, positions: np.ndarray, settings: Recognis
     """Features of the first reach in a recording, (T, 6); empty if there is none."""
     stream = FeatureStream(settings)
     frames: list[np.ndarray] = []
-    for t, p in zip(stamps, positions):
+    for t, p in zip(stamps, positions, strict=False):
         f = stream.update(float(t), p)
         if f is not None:
             frames.append(f)

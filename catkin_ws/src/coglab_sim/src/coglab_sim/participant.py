@@ -4,8 +4,9 @@ The figures are plausible defaults from the handover literature, not validated a
 """
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields
-from typing import Any, Mapping
+from typing import Any
 
 import numpy as np
 
@@ -55,7 +56,7 @@ class Participant:
             raise ValueError(f"behaviour '{self.behaviour}' is none of {', '.join(BEHAVIOURS)}")
 
     @staticmethod
-    def draw(seed: int, behaviour: str = "normal") -> "Participant":
+    def draw(seed: int, behaviour: str = "normal") -> Participant:
         """The person with this seed."""
         rng = np.random.default_rng([seed, 17])
         return Participant(
@@ -71,12 +72,13 @@ class Participant:
             grip_force=float(rng.uniform(9, 16)))
 
     @staticmethod
-    def from_mapping(data: Mapping[str, Any]) -> "Participant":
+    def from_mapping(data: Mapping[str, Any]) -> Participant:
         """A participant file: ``seed`` draws the person, every other field overrides what was drawn."""
         known = {f.name for f in fields(Participant)}
         unknown = sorted(set(data) - known)
         if unknown:
-            raise ValueError(f"participant file: unknown fields {', '.join(unknown)}; known: {', '.join(sorted(known))}")
+            raise ValueError(f"participant file: unknown fields {', '.join(unknown)}; known: "
+                             f"{', '.join(sorted(known))}")
         drawn = asdict(Participant.draw(int(data.get("seed", 0)), str(data.get("behaviour", "normal"))))
         drawn.update({k: tuple(v) if isinstance(v, list) else v for k, v in data.items()})
         return Participant(**drawn)

@@ -1,14 +1,16 @@
 """Perception as a tracker would deliver it: between the truth of the cell and the frames that control sees.
 
-Rate and its jitter, latency (stamp = capture time, delivered later), noise that is correlated like a tracker's, bursts of
+Rate and its jitter, latency (stamp = capture time, delivered later), noise that is correlated like a
+tracker's, bursts of
 dropout (two-state Gilbert model), occlusion by the robot's hand, identity swaps. Each can be switched off; ``perfect``
 delivers the truth as it is at the same rate.
 """
 from __future__ import annotations
 
 import heapq
+from collections.abc import Mapping
 from dataclasses import dataclass, fields
-from typing import Any, Mapping, Optional
+from typing import Any
 
 import numpy as np
 
@@ -44,7 +46,7 @@ class PerceptionSettings:
             raise ValueError(f"rate must be positive and latency not negative, got {self.rate} Hz, {self.latency} s")
 
     @staticmethod
-    def from_mapping(data: Mapping[str, Any]) -> "PerceptionSettings":
+    def from_mapping(data: Mapping[str, Any]) -> PerceptionSettings:
         """Read a parameter mapping; ValueError names unknown fields."""
         known = {f.name for f in fields(PerceptionSettings)}
         unknown = sorted(set(data) - known)
@@ -73,14 +75,14 @@ class Tracker:
         self._next = 0.0
         self._lost = False
         self._noise = np.zeros(6)
-        self._noise_stamp: Optional[float] = None
+        self._noise_stamp: float | None = None
         self._swap_left = 0
         self._swap = np.zeros(3)
         self._queue: list[tuple[float, int, Sight]] = []
         self._count = 0
-        self.newest: Optional[Sight] = None
+        self.newest: Sight | None = None
 
-    def step(self, now: float, truth: Frame, robot_hand: Optional[Frame] = None) -> list[Sight]:
+    def step(self, now: float, truth: Frame, robot_hand: Frame | None = None) -> list[Sight]:
         """At time ``now`` (s): capture if it is time, deliver what has arrived."""
         if now >= self._next:
             s = self.settings
@@ -96,7 +98,7 @@ class Tracker:
                 delivered.append(sight)
         return delivered
 
-    def _capture(self, now: float, truth: Frame, robot_hand: Optional[Frame]) -> None:
+    def _capture(self, now: float, truth: Frame, robot_hand: Frame | None) -> None:
         s = self.settings
         if s.perfect:
             self._push(now, Sight(self.name, now, truth))

@@ -1,9 +1,10 @@
-"""Positions and quaternions (x y z w) for the simulated person and tracker: plain numpy, nothing more than they need."""
+"""Positions and quaternions (x y z w) for the simulated person and tracker: plain numpy, nothing more than
+they need."""
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Sequence
 
 import numpy as np
 

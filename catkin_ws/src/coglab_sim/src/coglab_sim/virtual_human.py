@@ -7,7 +7,6 @@ the scene (WorldView) as a person would: the robot's hand, the object, the force
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Optional
 
 import numpy as np
 
@@ -62,27 +61,28 @@ STILL = 0.012
 
 
 class VirtualHuman:
-    """Step it with the time and the view; it answers with its hand. Deterministic for a seed and a sequence of steps."""
+    """Step it with the time and the view; it answers with its hand. Deterministic for a seed and a sequence
+    of steps."""
 
-    def __init__(self, participant: Participant, scene: Optional[Scene] = None, holds_object: bool = True) -> None:
+    def __init__(self, participant: Participant, scene: Scene | None = None, holds_object: bool = True) -> None:
         self.participant = participant
         self.scene = scene or Scene()
         self.rng = np.random.default_rng([participant.seed, 23])
         self.phase = "idle"
         self.trial = 0
         self._task = "rest"
-        self._pending: Optional[str] = None
+        self._pending: str | None = None
         self._hand = self.scene.rest.copy()
         self._velocity = np.zeros(3)
         self._grip = 1.0 if holds_object else 0.0
         self._since = 0.0
-        self._reach: Optional[Reach] = None
+        self._reach: Reach | None = None
         self._target = self.scene.rest.copy()
-        self._still_since: Optional[float] = None
-        self._felt_since: Optional[float] = None
-        self._load_since: Optional[float] = None
+        self._still_since: float | None = None
+        self._felt_since: float | None = None
+        self._load_since: float | None = None
         self._noise_phase = self.rng.uniform(0, 2 * np.pi, size=(3, 4))
-        self._last: Optional[float] = None
+        self._last: float | None = None
         self._interrupted = False
         self._travelled = 0.0
 

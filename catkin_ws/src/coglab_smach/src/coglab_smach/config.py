@@ -3,7 +3,8 @@ from __future__ import annotations
 
 import os
 import threading
-from typing import Any, Callable, Mapping, Optional
+from collections.abc import Callable, Mapping
+from typing import Any
 
 import yaml
 
@@ -16,7 +17,7 @@ class Config:
     """Values by dotted name. A file that has become bad keeps the old values and says so once."""
 
     def __init__(self, values: Mapping[str, Any], path: str = "",
-                 warn: Optional[Callable[[str], None]] = None) -> None:
+                 warn: Callable[[str], None] | None = None) -> None:
         self._values = dict(values)
         self.path = path
         self._warn = warn or (lambda text: None)
@@ -24,8 +25,8 @@ class Config:
         self._lock = threading.Lock()
 
     @staticmethod
-    def load(path: str, overrides: Optional[Mapping[str, Any]] = None,
-             warn: Optional[Callable[[str], None]] = None) -> "Config":
+    def load(path: str, overrides: Mapping[str, Any] | None = None,
+             warn: Callable[[str], None] | None = None) -> Config:
         """Read a file; ConfigError names file and line. ``overrides`` (dotted names) win over the file for good."""
         config = Config(_read(path), path, warn)
         config._overrides = dict(overrides or {})

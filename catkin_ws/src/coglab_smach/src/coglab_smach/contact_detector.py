@@ -2,7 +2,8 @@
 
 Contact: low-passed torque, its difference over a short window (the residual bias of the estimate drops out), compared
 with a threshold learnt while the arm stood still, on the joints that feel forces in the plane perpendicular to the line
-between person and robot. Load and release: the vertical force that explains the change of torque, compared with a share of
+between person and robot. Load and release: the vertical force that explains the change of torque, compared
+with a share of
 the object's weight; load counts from the torque before the contact, release from the torque on arming.
 
 The detector works only while the arm stands still: it enforces that itself, whoever arms it.
@@ -10,8 +11,8 @@ The detector works only while the arm stands still: it enforces that itself, who
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import Callable, Optional, Sequence
 
 import numpy as np
 
@@ -71,14 +72,14 @@ class _Armed:
     mode: str
     until: float
     k: float
-    joints: Optional[list[int]]
+    joints: list[int] | None
     mass: float
     load_share: float
-    baseline: Optional[np.ndarray] = None
+    baseline: np.ndarray | None = None
     watched: list[int] = field(default_factory=list)
-    threshold: Optional[np.ndarray] = None
+    threshold: np.ndarray | None = None
     over: int = 0
-    gone_since: Optional[float] = None
+    gone_since: float | None = None
 
 
 class ContactDetector:
@@ -87,20 +88,21 @@ class ContactDetector:
     def __init__(self, settings: DetectorSettings, jacobian: Callable[[Sequence[float]], np.ndarray]) -> None:
         self.settings = settings
         self._jacobian = jacobian
-        self._armed: Optional[_Armed] = None
-        self._filtered: Optional[np.ndarray] = None
+        self._armed: _Armed | None = None
+        self._filtered: np.ndarray | None = None
         self._history: deque[tuple[float, np.ndarray]] = deque()
         self._rest_differences: deque[np.ndarray] = deque(maxlen=400)
-        self._last_stamp: Optional[float] = None
-        self._still_since: Optional[float] = None
-        self._rest_torque: Optional[np.ndarray] = None
-        self._rest_before_motion: Optional[np.ndarray] = None
-        self._unloaded: Optional[np.ndarray] = None
+        self._last_stamp: float | None = None
+        self._still_since: float | None = None
+        self._rest_torque: np.ndarray | None = None
+        self._rest_before_motion: np.ndarray | None = None
+        self._unloaded: np.ndarray | None = None
         self.margin = 0.0
 
     def arm(self, mode: str, now: float, timeout: float, k: float = 0.0, joints: Sequence[int] = (),
             mass: float = 0.0, load_share: float = 0.0) -> None:
-        """Watch for 'contact', 'load' or 'release' for ``timeout`` s, as soon as the arm stands still. ``joints`` as 1..7.
+        """Watch for 'contact', 'load' or 'release' for ``timeout`` s, as soon as the arm stands still.
+        ``joints`` as 1..7.
 
         ValueError says what is wrong with the request.
         """
@@ -134,7 +136,7 @@ class ContactDetector:
                 and self._last_stamp - self._still_since >= self.settings.settle)
 
     def feed(self, stamp: float, torque: Sequence[float], position: Sequence[float],
-             velocity: Sequence[float]) -> Optional[ContactEvent]:
+             velocity: Sequence[float]) -> ContactEvent | None:
         """One sample: torque (Nm), position (rad), velocity (rad/s), seven joints each. Samples must be finite."""
         tau = np.asarray(torque, dtype=float)
         if not (np.all(np.isfinite(tau)) and np.all(np.isfinite(velocity))):
@@ -166,7 +168,7 @@ class ContactDetector:
             self._filtered = None
             self._rest_torque = None
 
-    def _filter(self, stamp: float, tau: np.ndarray) -> Optional[np.ndarray]:
+    def _filter(self, stamp: float, tau: np.ndarray) -> np.ndarray | None:
         """Low-pass, remember, and return the difference over the window (None until the window is full)."""
         dt = stamp - self._last_stamp if self._last_stamp is not None else 0.005
         self._last_stamp = stamp
@@ -197,7 +199,7 @@ class ContactDetector:
         mad = np.median(np.abs(values - np.median(values, axis=0)), axis=0)
         return np.maximum(MAD_TO_SIGMA * mad, self.settings.floor)
 
-    def _watch(self, stamp: float, difference: np.ndarray, position: Sequence[float]) -> Optional[ContactEvent]:
+    def _watch(self, stamp: float, difference: np.ndarray, position: Sequence[float]) -> ContactEvent | None:
         armed = self._armed
         assert armed is not None and self._filtered is not None
         if len(self._rest_differences) < self.settings.learn_samples:
@@ -222,7 +224,7 @@ class ContactDetector:
                            f"torque of joints {[j + 1 for j in armed.watched]} changed by {self.margin:.1f} x its "
                            f"threshold within {self.settings.window * 1000:.0f} ms")
 
-    def _check_offset(self, armed: _Armed) -> Optional[ContactEvent]:
+    def _check_offset(self, armed: _Armed) -> ContactEvent | None:
         """Once per arming: a person who was early has left an offset against the last rest before the motion."""
         if armed.mode != "contact" or self._rest_before_motion is None or armed.baseline is None:
             return None
@@ -234,7 +236,7 @@ class ContactDetector:
         return self._event(True, "torque_offset", ratio,
                            f"torque offset {float(np.max(offset)):.2f} Nm on arming: the object was there already")
 
-    def _watch_weight(self, stamp: float, armed: _Armed, position: Sequence[float]) -> Optional[ContactEvent]:
+    def _watch_weight(self, stamp: float, armed: _Armed, position: Sequence[float]) -> ContactEvent | None:
         """Has the weight come (load) or gone (release)?"""
         reference = self._unloaded if armed.mode == "load" else armed.baseline
         assert reference is not None and self._filtered is not None
@@ -253,7 +255,8 @@ class ContactDetector:
         if stamp - armed.gone_since < self.settings.release_confirm:
             return None
         verb = "carried now" if armed.mode == "load" else "of the load are gone"
-        return self._event(armed.mode == "load", "joint_torque", self.margin, f"{force:.1f} N {verb} (needed {needed:.1f} N)")
+        return self._event(armed.mode == "load", "joint_torque", self.margin,
+                           f"{force:.1f} N {verb} (needed {needed:.1f} N)")
 
     def _event(self, contact: bool, source: str, margin: float, message: str) -> ContactEvent:
         self._armed = None

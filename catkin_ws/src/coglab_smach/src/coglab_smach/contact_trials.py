@@ -4,7 +4,8 @@ Used by the tests, by the bench and for tuning a detector before a robot is at h
 """
 from __future__ import annotations
 
-from typing import Any, Callable, Optional, Sequence
+from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -27,7 +28,7 @@ class ContactTrial:
         self.t = 0.0
 
     def feed(self, duration: float, force: Force = lambda t: (0.0, 0.0, 0.0),
-             velocity: Callable[[float], np.ndarray] = lambda t: STILL) -> tuple[Optional[ContactEvent], float]:
+             velocity: Callable[[float], np.ndarray] = lambda t: STILL) -> tuple[ContactEvent | None, float]:
         """Feed samples; (event, time since the start of this call) or (None, duration)."""
         start = self.t
         for _ in range(int(round(duration / DT))):
@@ -39,7 +40,7 @@ class ContactTrial:
                 return event, self.t - start
         return None, duration
 
-    def rest_and_arm(self, mode: str = "contact", timeout: float = 30.0, **request: Any) -> Optional[ContactEvent]:
+    def rest_and_arm(self, mode: str = "contact", timeout: float = 30.0, **request: Any) -> ContactEvent | None:
         """Learn at rest, arm, and wait until the detector watches; an event here would be a false alarm."""
         self.feed(1.5)
         self.detector.arm(mode, self.t, timeout, **request)

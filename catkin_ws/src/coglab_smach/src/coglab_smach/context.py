@@ -36,7 +36,8 @@ class StopSwitch:
 
 @dataclass
 class Context:
-    """Injected into each state. ``clock`` is the engine's: steady for the robot, virtual for tests and benches; ``holding`` is the id of the object in the robot's hand, empty if it is empty."""
+    """Injected into each state. ``clock`` is the engine's: steady for the robot, virtual for tests and
+    benches; ``holding`` is the id of the object in the robot's hand, empty if it is empty."""
 
     clock: Clock
     arm: ArmPort

@@ -5,7 +5,8 @@ and orientation are the pose of ``ih2_palm`` relative to ``frame``.
 """
 from __future__ import annotations
 
-from typing import Any, Mapping, Optional
+from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
@@ -18,8 +19,9 @@ def _goal(frame: str, palm: Pose, entry: Mapping[str, Any], role: str) -> dict[s
             "primitive": dmp[role], "dmp_ratio": float(dmp.get("dmp_ratio", 1.0))}
 
 
-def palm_at_grasp(grasp: Mapping[str, Any], standoff: Optional[float] = None) -> Pose:
-    """Palm in the object frame at the grasp, drawn back by ``standoff`` m against the approach axis (default: as stored)."""
+def palm_at_grasp(grasp: Mapping[str, Any], standoff: float | None = None) -> Pose:
+    """Palm in the object frame at the grasp, drawn back by ``standoff`` m against the approach axis
+    (default: as stored)."""
     palm = Pose.from_dict(grasp["pose"])
     approach = grasp.get("approach", {})
     distance = float(approach.get("distance", 0.0)) if standoff is None else standoff
@@ -30,7 +32,7 @@ def palm_at_grasp(grasp: Mapping[str, Any], standoff: Optional[float] = None) ->
 
 
 def grasp_goal(entry: Mapping[str, Any], grasp: Mapping[str, Any], frame: str, role: str,
-               standoff: Optional[float] = None) -> dict[str, Any]:
+               standoff: float | None = None) -> dict[str, Any]:
     """Goal at the grasp pose relative to the object's tracked frame. ``role`` names the primitive."""
     return _goal(frame, palm_at_grasp(grasp, standoff), entry, role)
 
@@ -45,6 +47,7 @@ def place_goal(entry: Mapping[str, Any], grasp: Mapping[str, Any], place: Mappin
                clearance: float = 0.0) -> dict[str, Any]:
     """Goal on the board: the palm at the grasp of an object whose pose in the board frame is ``place``.
 
-    ``role`` take: the object is there; put: it is held and is to be set down there. ``clearance`` (m) keeps the palm off.
+    ``role`` take: the object is there; put: it is held and is to be set down there. ``clearance`` (m) keeps
+    the palm off.
     """
     return _goal(place["frame"], Pose.from_dict(place) * palm_at_grasp(grasp, clearance), entry, role)

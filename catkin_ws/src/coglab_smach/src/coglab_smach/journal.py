@@ -2,8 +2,9 @@
 from __future__ import annotations
 
 import threading
+from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any, Callable, Optional
+from typing import Any
 
 
 @dataclass(frozen=True)
@@ -56,8 +57,8 @@ class Journal:
         self._result_listeners: list[Callable[[ActionRecord], None]] = []
         self.transitions: list[TransitionRecord] = []
         self.results: list[ActionRecord] = []
-        self._failure: Optional[tuple[str, tuple[str, ...]]] = None
-        self._action: Optional[ActionRecord] = None
+        self._failure: tuple[str, tuple[str, ...]] | None = None
+        self._action: ActionRecord | None = None
 
     def listen(self, on_transition: Callable[[TransitionRecord], None]) -> None:
         """Call this for each transition, in the thread that made it."""

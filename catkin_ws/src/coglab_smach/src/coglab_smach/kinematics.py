@@ -2,8 +2,8 @@
 from __future__ import annotations
 
 import xml.etree.ElementTree as ElementTree
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Sequence
 
 import numpy as np
 
@@ -36,8 +36,9 @@ class SerialArm:
             xyz = [float(v) for v in (origin.get("xyz", "0 0 0") if origin is not None else "0 0 0").split()]
             rpy = [float(v) for v in (origin.get("rpy", "0 0 0") if origin is not None else "0 0 0").split()]
             axis = joint.find("axis")
+            direction = [float(v) for v in (axis.get("xyz") if axis is not None else "1 0 0").split()]
             chain.append(_Joint(joint.get("name"), Pose(np.array(xyz), from_rpy(*rpy)),
-                                np.array([float(v) for v in (axis.get("xyz") if axis is not None else "1 0 0").split()]),
+                                np.array(direction),
                                 joint.get("type") in ("revolute", "continuous")))
             link = joint.find("parent").get("link")
         self._chain = chain[::-1]
@@ -48,7 +49,8 @@ class SerialArm:
         return self._walk(q)[0]
 
     def position_jacobian(self, q: Sequence[float]) -> np.ndarray:
-        """3 x n: velocity of the tip (m/s, base frame) per joint velocity (rad/s); its transpose maps force to torque."""
+        """3 x n: velocity of the tip (m/s, base frame) per joint velocity (rad/s); its transpose maps force
+        to torque."""
         tip, joints = self._walk(q)
         return np.array([np.cross(axis, tip.position - point) for axis, point in joints]).T
 

@@ -1,11 +1,12 @@
-"""Object database: one YAML file per object, checked against a JSON schema and against itself, reloaded without a restart."""
+"""Object database: one YAML file per object, checked against a JSON schema and against itself, reloaded
+without a restart."""
 from __future__ import annotations
 
 import json
 import os
 import threading
 from pathlib import Path
-from typing import Any, Optional
+from typing import Any
 
 import jsonschema
 import numpy as np
@@ -88,7 +89,7 @@ def parse_object(text: str, origin: str) -> dict[str, Any]:
     return entry
 
 
-_VALIDATOR: Optional[jsonschema.Draft7Validator] = None
+_VALIDATOR: jsonschema.Draft7Validator | None = None
 
 
 def _validator() -> jsonschema.Draft7Validator:
@@ -98,7 +99,7 @@ def _validator() -> jsonschema.Draft7Validator:
     return _VALIDATOR
 
 
-def _inconsistency(entry: dict[str, Any]) -> Optional[tuple[tuple[Any, ...], str]]:
+def _inconsistency(entry: dict[str, Any]) -> tuple[tuple[Any, ...], str] | None:
     """What the schema cannot see: references between fields, and geometry. None if all is well."""
     for kind, default in (("grasps", "default_grasp"), ("deliveries", "default_delivery")):
         if entry[default] not in entry[kind]:

@@ -2,7 +2,8 @@
 from __future__ import annotations
 
 import threading
-from typing import Any, Callable, Optional
+from collections.abc import Callable
+from typing import Any
 
 
 class PortError(Exception):
@@ -35,7 +36,7 @@ class Pending:
 class Ready(Pending):
     """A value that is already there, or an error that already happened."""
 
-    def __init__(self, value: Any = None, error: Optional[PortError] = None) -> None:
+    def __init__(self, value: Any = None, error: PortError | None = None) -> None:
         self._value = value
         self._error = error
 
@@ -52,7 +53,7 @@ class Polled(Pending):
     """A value computed from callables: ``ready()`` says when, ``value()`` gives it (may raise PortError)."""
 
     def __init__(self, ready: Callable[[], bool], value: Callable[[], Any],
-                 cancel: Optional[Callable[[], None]] = None) -> None:
+                 cancel: Callable[[], None] | None = None) -> None:
         self._ready = ready
         self._value = value
         self._cancel = cancel
@@ -73,7 +74,7 @@ class Threaded(Pending):
 
     def __init__(self, call: Callable[[], Any], what: str) -> None:
         self._value: Any = None
-        self._error: Optional[PortError] = None
+        self._error: PortError | None = None
         self._event = threading.Event()
         self._call = call
         self._what = what

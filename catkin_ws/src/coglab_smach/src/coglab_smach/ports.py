@@ -6,8 +6,9 @@ Units are SI; joints in wire order lwr_a1 lwr_a2 lwr_e1 lwr_a3 lwr_a4 lwr_a5 lwr
 """
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any, Optional, Protocol, Sequence
+from typing import Any, Protocol
 
 from .pending import Pending
 
@@ -19,7 +20,7 @@ class DmpRequest:
     primitive_id: str
     goal_frame: str
     goal_offset: Sequence[float]
-    target_orientation: Optional[Sequence[float]]
+    target_orientation: Sequence[float] | None
     dmp_ratio: float = 1.0
 
 
@@ -69,7 +70,8 @@ class HandState:
 
 @dataclass(frozen=True)
 class Recognition:
-    """Motion recognition of the partner: class name ('unknown' if none), its confidence 0..1 and whether it is settled."""
+    """Motion recognition of the partner: class name ('unknown' if none), its confidence 0..1 and whether it
+    is settled."""
 
     pattern: str = "unknown"
     confidence: float = 0.0
@@ -87,7 +89,8 @@ class ArmPort(Protocol):
         """Load a library of primitives; value: how many."""
 
     def lwr_command(self, event: str) -> Pending:
-        """Acknowledged command to the LWR interface (start, hold, reset, stop, position ...); value: outcome in words."""
+        """Acknowledged command to the LWR interface (start, hold, reset, stop, position ...); value: outcome
+        in words."""
 
     def motion_allowed(self) -> tuple[bool, str]:
         """Whether target velocities are followed now, and why not."""
@@ -107,7 +110,7 @@ class ArmPort(Protocol):
     def move_ptp(self, position: Sequence[float], max_velocity: Sequence[float]) -> Pending:
         """Point-to-point motion (rad, rad/s); value: None when it has been executed to its end."""
 
-    def joint_positions(self) -> Optional[tuple[float, ...]]:
+    def joint_positions(self) -> tuple[float, ...] | None:
         """Measured joints (rad), None if unknown or older than 0.5 s."""
 
     def hold(self, reason: str) -> Pending:
@@ -166,5 +169,5 @@ class ContactPort(Protocol):
     def disarm(self) -> None:
         """Stop watching."""
 
-    def event(self) -> Optional[ContactEvent]:
+    def event(self) -> ContactEvent | None:
         """The first event since arm(), None until then."""

@@ -2,8 +2,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -88,12 +89,12 @@ class Pose:
     position: np.ndarray = field(default_factory=lambda: np.zeros(3))
     orientation: np.ndarray = field(default_factory=lambda: np.array([0.0, 0.0, 0.0, 1.0]))
 
-    def __mul__(self, other: "Pose") -> "Pose":
+    def __mul__(self, other: Pose) -> Pose:
         """Pose of a frame given in this frame, expressed in this frame's parent."""
         return Pose(self.position + rotate(self.orientation, other.position),
                     multiply(self.orientation, other.orientation))
 
-    def inverse(self) -> "Pose":
+    def inverse(self) -> Pose:
         """Pose of the parent in this frame."""
         q = conjugate(self.orientation)
         return Pose(-rotate(q, self.position), q)
@@ -104,7 +105,7 @@ class Pose:
                 "quaternion": [float(v) for v in self.orientation]}
 
     @staticmethod
-    def from_dict(data: Mapping[str, Any]) -> "Pose":
+    def from_dict(data: Mapping[str, Any]) -> Pose:
         """Read ``{xyz: [m], rpy_deg: [deg]}`` or ``{xyz: [m], quaternion: [x, y, z, w]}``; ValueError if malformed."""
         xyz = np.asarray(data.get("xyz", [0.0, 0.0, 0.0]), dtype=float)
         if xyz.shape != (3,) or not np.all(np.isfinite(xyz)):

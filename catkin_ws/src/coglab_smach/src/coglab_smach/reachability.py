@@ -5,9 +5,10 @@ itself will do. Coarse on purpose; it finds the grasp that asks the wrist for th
 """
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from pathlib import Path
-from typing import Any, Mapping, Optional, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -36,7 +37,7 @@ def default_arm() -> SerialArm:
     return SerialArm(path.read_text(encoding="utf-8"))
 
 
-def solve(arm: SerialArm, target: Pose, start: Sequence[float] = HOME, steps: int = 120) -> Optional[np.ndarray]:
+def solve(arm: SerialArm, target: Pose, start: Sequence[float] = HOME, steps: int = 120) -> np.ndarray | None:
     """Joint positions (rad) that bring the tip to ``target`` within 3 mm and 3 deg, or None."""
     q = np.array(start, dtype=float)
     for _ in range(steps):
@@ -58,9 +59,10 @@ def _rotation_error(target: Pose, pose: Pose) -> np.ndarray:
     return 2.0 * q[:3]
 
 
-def share_reached(palm_in_object: Pose, arm: Optional[SerialArm] = None,
+def share_reached(palm_in_object: Pose, arm: SerialArm | None = None,
                   yaws_deg: Sequence[float] = (-20.0, 0.0, 20.0)) -> tuple[int, int]:
-    """How many object poses of the handover region (27 places, turned about z) the palm can be brought to: (n, of m)."""
+    """How many object poses of the handover region (27 places, turned about z) the palm can be brought to:
+    (n, of m)."""
     arm = arm or default_arm()
     reached = total = 0
     for x in REGION[0]:

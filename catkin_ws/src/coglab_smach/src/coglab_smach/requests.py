@@ -2,8 +2,8 @@
 from __future__ import annotations
 
 import threading
+from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Iterable, Optional
 
 
 @dataclass(frozen=True)
@@ -22,7 +22,7 @@ class Requests:
         self._lock = threading.Lock()
         self._hub = ""
         self._allowed: tuple[str, ...] = ()
-        self._request: Optional[Request] = None
+        self._request: Request | None = None
 
     def open(self, hub: str, allowed: Iterable[str]) -> None:
         """A hub starts to wait for one of these actions; a trigger left over is dropped."""
@@ -47,7 +47,7 @@ class Requests:
             self._request = Request(action, object_id, source)
             return True, f"'{action}' accepted by {self._hub}"
 
-    def take(self) -> Optional[Request]:
+    def take(self) -> Request | None:
         """The trigger, once; None while there is none."""
         with self._lock:
             request, self._request = self._request, None

@@ -8,11 +8,19 @@ from typing import Any
 import actionlib
 import rospy
 from actionlib_msgs.msg import GoalStatus
-from coglab_msgs.msg import (HandCloseAction, HandOpenAction, HandOpenGoal, HandPreshapeAction, HandPreshapeCloseAction,
-                             HandPreshapeCloseGoal, HandPreshapeGoal, HandStatus)
+from coglab_msgs.msg import (
+    HandCloseAction,
+    HandOpenAction,
+    HandOpenGoal,
+    HandPreshapeAction,
+    HandPreshapeCloseAction,
+    HandPreshapeCloseGoal,
+    HandPreshapeGoal,
+    HandStatus,
+)
 from std_msgs.msg import String
 
-from .pending import Pending, PortError, Polled
+from .pending import Pending, Polled, PortError
 from .ports import HandState
 from .ros_ports import Newest
 

@@ -7,14 +7,28 @@ from __future__ import annotations
 
 import threading
 import time
-from typing import Any, Callable, Optional, Sequence
+from collections.abc import Callable, Sequence
+from typing import Any
 
 import rospy
 import yaml
-from coglab_msgs.msg import (Contact, ControllerStatus, DmpFeedback, FinishedPtp, LwrState, Recognition as
-                             RecognitionMsg)
-from coglab_msgs.srv import (AddPtp, ArmContact, ExecuteDmp, FreePlaces, GetObject, InitVision, ListControllers,
-                             LoadController, LoadDmps, LocateObject, LwrCommand, SwitchController, SwitchDmp)
+from coglab_msgs.msg import Contact, ControllerStatus, DmpFeedback, FinishedPtp, LwrState
+from coglab_msgs.msg import Recognition as RecognitionMsg
+from coglab_msgs.srv import (
+    AddPtp,
+    ArmContact,
+    ExecuteDmp,
+    FreePlaces,
+    GetObject,
+    InitVision,
+    ListControllers,
+    LoadController,
+    LoadDmps,
+    LocateObject,
+    LwrCommand,
+    SwitchController,
+    SwitchDmp,
+)
 from geometry_msgs.msg import Point, Pose, Quaternion
 from sensor_msgs.msg import JointState
 
@@ -29,7 +43,7 @@ SERVICE_WAIT = 20.0
 class Newest:
     """The newest message of a topic with the time it came (monotonic s)."""
 
-    def __init__(self, topic: str, kind: Any, on_message: Optional[Callable[[Any], None]] = None) -> None:
+    def __init__(self, topic: str, kind: Any, on_message: Callable[[Any], None] | None = None) -> None:
         self.message: Any = None
         self.stamp = -1e9
         self._on_message = on_message
@@ -91,7 +105,7 @@ class RosArm:
     def load_controller(self, controller_id: str, controller_type: str) -> Pending:
         def run() -> None:
             loaded = _wait(call(f"{self._manager}/list_controllers", ListControllers))
-            if (controller_id, controller_type) in zip(loaded.controller_ids, loaded.controller_types):
+            if (controller_id, controller_type) in zip(loaded.controller_ids, loaded.controller_types, strict=False):
                 return
             _wait(call(f"{self._manager}/load_controller", LoadController, controller_id=controller_id,
                        controller_type=controller_type))
@@ -164,11 +178,11 @@ class RosArm:
 
         return Polled(finished, lambda: None)
 
-    def joint_positions(self) -> Optional[tuple[float, ...]]:
+    def joint_positions(self) -> tuple[float, ...] | None:
         message = self._joints.message
         if message is None or self._joints.age() > 0.5:
             return None
-        by_name = dict(zip(message.name, message.position))
+        by_name = dict(zip(message.name, message.position, strict=False))
         return tuple(by_name[name] for name in JOINTS) if all(name in by_name for name in JOINTS) else None
 
     def hold(self, reason: str) -> Pending:
@@ -215,7 +229,7 @@ class RosPerception:
         if message is None or self._recognition.age() > 0.5:
             return Recognition()
         return Recognition(message.pattern, message.confidence, message.decided,
-                           dict(zip(message.names, message.probabilities)))
+                           dict(zip(message.names, message.probabilities, strict=False)))
 
 
 def _located(frame: str, parent: str, pose: Pose, age: float) -> Located:
@@ -239,8 +253,8 @@ class RosContact:
 
     def __init__(self, topic: str = "/coglab/contact", service: str = "/contact_detector/arm") -> None:
         self._service = service
-        self._event: Optional[ContactEvent] = None
-        self._wanted: Optional[bool] = None
+        self._event: ContactEvent | None = None
+        self._wanted: bool | None = None
         self._newest = Newest(topic, Contact, self._on_contact)
 
     def _on_contact(self, message: Contact) -> None:
@@ -261,7 +275,7 @@ class RosContact:
             call(self._service, ArmContact, wait=0.5, mode="off", timeout=0.0, k=0.0, joints=[], mass=0.0,
                  load_share=0.0)
 
-    def event(self) -> Optional[ContactEvent]:
+    def event(self) -> ContactEvent | None:
         return self._event
 
 

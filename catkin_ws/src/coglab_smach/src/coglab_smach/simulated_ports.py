@@ -5,8 +5,9 @@ are attributes that a test sets at any time. Physics belongs to coglab_sim; here
 """
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Callable, Optional, Sequence
+from typing import Any
 
 import numpy as np
 from smach.clock import Clock
@@ -42,9 +43,9 @@ class Faults:
 class Partner:
     """The person's script: seconds from arming to the touch, to the taking and to the letting go; None: never."""
 
-    touch_after: Optional[float] = 0.8
-    take_after: Optional[float] = 1.0
-    let_go_after: Optional[float] = 0.2
+    touch_after: float | None = 0.8
+    take_after: float | None = 1.0
+    let_go_after: float | None = 0.2
     pattern: str = "unknown"
     pattern_at: float = 0.0
     """s into the motion at which the pattern is decided"""
@@ -66,8 +67,8 @@ class SimulatedCell:
         self.enabled = False
         self.held = False
         self.joints = tuple([0.3] * 7)
-        self.reached_at: Optional[float] = None
-        self.motion_started: Optional[float] = None
+        self.reached_at: float | None = None
+        self.motion_started: float | None = None
         self.hand_positions = (0, 0, 0, 0, 0)
         self.preshaped = False
         self.objects: dict[str, Pose] = {"mug": Pose(np.array([0.78, 0.03, 0.43])),
@@ -107,7 +108,7 @@ class SimulatedArm:
 
     def __init__(self, cell: SimulatedCell) -> None:
         self.cell = cell
-        self._request: Optional[DmpRequest] = None
+        self._request: DmpRequest | None = None
 
     def load_controller(self, controller_id: str, controller_type: str) -> Pending:
         return self.cell.answer("arm", "load_controller", 0.1,
@@ -193,7 +194,7 @@ class SimulatedArm:
 
         return cell.answer("arm", "move_ptp", cell.ptp_time, arrive)
 
-    def joint_positions(self) -> Optional[tuple[float, ...]]:
+    def joint_positions(self) -> tuple[float, ...] | None:
         return None if "arm" in self.cell.faults.dead else self.cell.joints
 
     def hold(self, reason: str) -> Pending:
@@ -221,7 +222,8 @@ class SimulatedHand:
         def apply() -> None:
             if not self.cell.preshaped:
                 raise PortError("hand_preshape_close without a preshape")
-            self.cell.hand_positions = (200, 254, 254, 254, 254) if self.cell.faults.empty_grasp else (200, 150, 160, 155, 170)
+            empty = self.cell.faults.empty_grasp
+            self.cell.hand_positions = (200, 254, 254, 254, 254) if empty else (200, 150, 160, 155, 170)
 
         return self.cell.answer("hand", "close", 1.0, apply)
 
@@ -298,7 +300,7 @@ class SimulatedContact:
     def __init__(self, cell: SimulatedCell) -> None:
         self.cell = cell
         self._mode = ""
-        self._due: Optional[float] = None
+        self._due: float | None = None
         self.armed_while_moving = False
 
     def arm(self, mode: str, time_limit: float, settings: dict[str, Any]) -> Pending:
@@ -315,10 +317,11 @@ class SimulatedContact:
             self.cell.note("disarm")
             self._mode = ""
 
-    def event(self) -> Optional[ContactEvent]:
+    def event(self) -> ContactEvent | None:
         if self._due is None or self.cell.clock.now() < self._due or "contact" in self.cell.faults.dead:
             return None
-        return ContactEvent(self._mode != "release", "simulated", 2.0, f"{self._mode or 'event'} by the partner's script")
+        return ContactEvent(self._mode != "release", "simulated", 2.0,
+                            f"{self._mode or 'event'} by the partner's script")
 
 
 def simulated_context(clock: Clock, database: ObjectDatabase, config: Any) -> tuple[Any, SimulatedCell]:

@@ -22,7 +22,8 @@ def build_arm_motion(ctx: Context, trigger: str) -> CoglabMachine:
 
 
 def build_approach(ctx: Context, label: str, trigger: str, preshape: bool, monitor: bool) -> CoglabConcurrence:
-    """Concurrence of arm_motion with, if asked, hand_preshape and monitor_dmp. Outcomes succeeded, failed, preempted."""
+    """Concurrence of arm_motion with, if asked, hand_preshape and monitor_dmp. Outcomes succeeded, failed,
+    preempted."""
     essential = ["arm_motion", "hand_preshape"] if preshape else ["arm_motion"]
     decide, conclude = require_all(essential)
     group = CoglabConcurrence(ctx, label, ["succeeded", "failed", "preempted"], "failed", decide, conclude,

@@ -34,7 +34,8 @@ def build_take(ctx: Context) -> CoglabMachine:
     with machine:
         machine.add_state("query_database", QueryDatabase(ctx), to_recovery(succeeded="approach_board"))
         machine.add_state("approach_board",
-                          build_look_while_moving(ctx, "approach_board", "locate_object", LocateOnBoard(ctx), "located"),
+                          build_look_while_moving(ctx, "approach_board", "locate_object", LocateOnBoard(ctx),
+                                                  "located"),
                           to_recovery(succeeded="set_dmp_goal"))
         machine.add_state("set_dmp_goal", SetTakeGoal(ctx),
                           to_recovery(succeeded="precise_motion" if during else "hand_preshape"))

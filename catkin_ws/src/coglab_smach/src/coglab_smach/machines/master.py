@@ -1,4 +1,5 @@
-"""coglab_master (D4.10 Figure 3): initialisation, then two hubs from which every action leaves and to which it returns."""
+"""coglab_master (D4.10 Figure 3): initialisation, then two hubs from which every action leaves and to which
+it returns."""
 from __future__ import annotations
 
 from ..context import Context

@@ -1,4 +1,5 @@
-"""Recovery: whatever failed, the arm ends at home and the hand is open or holding, unless STOP or a fault forbids motion."""
+"""Recovery: whatever failed, the arm ends at home and the hand is open or holding, unless STOP or a fault
+forbids motion."""
 from __future__ import annotations
 
 from typing import Any

@@ -1,7 +1,7 @@
 """States of the arm: plug-ins and primitives, LWR interface, starting a DMP, waiting for its end, point-to-point."""
 from __future__ import annotations
 
-from typing import Any, Optional
+from typing import Any
 
 from ..context import Context
 from ..ports import DmpRequest
@@ -64,7 +64,7 @@ class SwitchController(CoglabState):
         return "succeeded"
 
 
-def dmp_request(goal: dict[str, Any], primitive: Optional[str] = None, ratio: Optional[float] = None) -> DmpRequest:
+def dmp_request(goal: dict[str, Any], primitive: str | None = None, ratio: float | None = None) -> DmpRequest:
     """The request of a goal as it travels in user data."""
     return DmpRequest(primitive or goal["primitive"], goal["frame"], list(goal["offset"]),
                       list(goal["orientation"]) if goal.get("orientation") is not None else None,
@@ -91,7 +91,8 @@ class WaitStop(CoglabState):
     """Wait for the end of the reach and then, if ``trigger`` asks for it, for the contact trigger.
 
     trigger: '' (the end of the motion is enough), 'contact' (an object is in the hand) or 'release' (the person has
-    taken the load). The detector is armed only after the motion has ended; it checks by itself that the arm stands still.
+    taken the load). The detector is armed only after the motion has ended; it checks by itself that the arm
+    stands still.
     """
 
     default_time_limit = 20.0
@@ -107,7 +108,8 @@ class WaitStop(CoglabState):
         if not self.trigger:
             return "succeeded"
         if self.trigger == "release":
-            # The goal is the person's hand, and that now comes to the object: an arm that still followed it would back away.
+            # The goal is the person's hand, and that now comes to the object: an arm that still followed it
+            # would back away.
             self.await_pending(self.ctx.arm.switch_controller("ptp"), "end of the reach by switching to 'ptp'", 3.0)
         settings = self._settings(ud)
         limit = float(settings.get("timeout", self.ctx.config.get(f"{self.trigger}_timeout", 6.0)))
@@ -148,7 +150,8 @@ class WaitStop(CoglabState):
 
 
 class MonitorDmp(CoglabState):
-    """Beside the motion: if another reaching pattern is recognised, substitute its primitive (switch_dmp). Runs until preempted."""
+    """Beside the motion: if another reaching pattern is recognised, substitute its primitive (switch_dmp).
+    Runs until preempted."""
 
     default_time_limit = 60.0
 
@@ -163,7 +166,7 @@ class MonitorDmp(CoglabState):
         switches = 0
         while True:
             try:
-                self.wait_for(lambda: self._other_pattern(family, running), "another reaching pattern")
+                self.wait_for(lambda shown=running: self._other_pattern(family, shown), "another reaching pattern")
             except Interrupted as end:
                 if end.stop:
                     raise
@@ -186,7 +189,8 @@ class MonitorDmp(CoglabState):
 
 
 class PtpMotion(CoglabState):
-    """Point-to-point motion to a named posture of the configuration (``postures.<name>``); 'home' is coglab_home_robot."""
+    """Point-to-point motion to a named posture of the configuration (``postures.<name>``); 'home' is
+    coglab_home_robot."""
 
     default_time_limit = 20.0
 
@@ -208,7 +212,7 @@ class PtpMotion(CoglabState):
 
         def arrived() -> bool:
             measured = self.ctx.arm.joint_positions()
-            return measured is None or max(abs(m - t) for m, t in zip(measured, target)) <= tolerance
+            return measured is None or max(abs(m - t) for m, t in zip(measured, target, strict=False)) <= tolerance
 
         self.wait_for(arrived, f"all measured joints within {tolerance} rad of posture '{self.posture}'", 1.0)
 

@@ -2,7 +2,8 @@
 from __future__ import annotations
 
 import traceback
-from typing import Any, Callable, Iterable, Mapping, Optional, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Any
 
 import smach
 
@@ -46,7 +47,7 @@ class CoglabState(smach.State):
                          io_keys=list(io_keys))
         self.ctx = ctx
         self.label = type(self).__name__
-        self.container: Optional[Any] = None
+        self.container: Any | None = None
         self.targets: Mapping[str, str] = {}
         self.reason = ""
         self._deadline = 0.0
@@ -73,7 +74,8 @@ class CoglabState(smach.State):
             outcome, self.reason = "failed", f"{self.label}: {error}"
         except Exception as error:
             last = traceback.extract_tb(error.__traceback__)[-1]
-            outcome, self.reason = "failed", f"{self.label}: {type(error).__name__}: {error} ({last.name}:{last.lineno})"
+            where = f"{last.name}:{last.lineno}"
+            outcome, self.reason = "failed", f"{self.label}: {type(error).__name__}: {error} ({where})"
             smach.logerr(traceback.format_exc())
         if self.preempt_requested():
             # Served here whatever the outcome, so that a late request cannot poison the next run.
@@ -100,8 +102,9 @@ class CoglabState(smach.State):
         if self.ctx.stop.pressed() and not self.ignores_stop:
             raise Interrupted(True, f"STOP: {self.ctx.stop.reason}")
 
-    def wait_for(self, condition: Callable[[], bool], what: str, limit: Optional[float] = None) -> None:
-        """Wait until ``condition()``; TimeLimit naming ``what`` after ``limit`` s or at the end of the state's own limit."""
+    def wait_for(self, condition: Callable[[], bool], what: str, limit: float | None = None) -> None:
+        """Wait until ``condition()``; TimeLimit naming ``what`` after ``limit`` s or at the end of the
+        state's own limit."""
         allowed = self.left() if limit is None else min(limit, self.left())
         end = self.ctx.clock.now() + allowed
         while True:
@@ -112,7 +115,7 @@ class CoglabState(smach.State):
                 raise TimeLimit(f"{what} within {max(0.0, allowed):.1f} s expected, it did not happen")
             self.ctx.clock.sleep(POLL_PERIOD)
 
-    def await_pending(self, pending: Pending, what: str, limit: Optional[float] = None) -> Any:
+    def await_pending(self, pending: Pending, what: str, limit: float | None = None) -> Any:
         """The pending call's value; cancelled if the wait ends otherwise."""
         try:
             self.wait_for(pending.done, what, limit)
@@ -134,7 +137,7 @@ class _Placed:
 
     ctx: Context
     label: str
-    container: Optional[Any]
+    container: Any | None
     targets: Mapping[str, str]
     is_action: bool
 
@@ -159,7 +162,7 @@ class _Placed:
         """Tell a child where it is."""
         state.label, state.container, state.targets = label, self, dict(transitions)
 
-    def record_end(self, outcome: Optional[str]) -> None:
+    def record_end(self, outcome: str | None) -> None:
         """Record the container's own transition with the first failure as its reason; close the record of an action."""
         if outcome is None:
             return
@@ -181,23 +184,24 @@ class CoglabMachine(_Placed, smach.StateMachine):
         self.place(ctx, label)
 
     def add_state(self, label: str, state: Any, transitions: Mapping[str, str],
-                  remapping: Optional[Mapping[str, str]] = None) -> Any:
+                  remapping: Mapping[str, str] | None = None) -> Any:
         """Add a state inside ``with machine:``; outcomes left out of ``transitions`` are outcomes of the machine."""
         smach.StateMachine.add(label, state, transitions=dict(transitions), remapping=dict(remapping or {}))
         self.adopt(label, state, transitions)
         return state
 
-    def execute(self, parent_ud: Any = None) -> Optional[str]:
+    def execute(self, parent_ud: Any = None) -> str | None:
         outcome = smach.StateMachine.execute(self, self.begin(parent_ud))
         self.record_end(outcome)
         return outcome
 
 
 class CoglabConcurrence(_Placed, smach.Concurrence):
-    """Children side by side. ``decide(outcomes)`` is asked after each child's end: True preempts those still running."""
+    """Children side by side. ``decide(outcomes)`` is asked after each child's end: True preempts those still
+    running."""
 
     def __init__(self, ctx: Context, label: str, outcomes: Sequence[str], default_outcome: str,
-                 decide: Callable[[Mapping[str, Optional[str]]], bool],
+                 decide: Callable[[Mapping[str, str | None]], bool],
                  conclude: Callable[[Mapping[str, str]], str], input_keys: Sequence[str] = (),
                  output_keys: Sequence[str] = ()) -> None:
         smach.Concurrence.__init__(self, outcomes=list(outcomes), default_outcome=default_outcome,
@@ -205,7 +209,7 @@ class CoglabConcurrence(_Placed, smach.Concurrence):
                                    child_termination_cb=decide)
         self.place(ctx, label)
 
-    def add_state(self, label: str, state: Any, remapping: Optional[Mapping[str, str]] = None) -> Any:
+    def add_state(self, label: str, state: Any, remapping: Mapping[str, str] | None = None) -> Any:
         """Add a child inside ``with concurrence:``."""
         smach.Concurrence.add(label, state, remapping=dict(remapping or {}))
         self.adopt(label, state, {})
@@ -223,7 +227,7 @@ def require_all(essential: Sequence[str]) -> tuple[Callable[..., bool], Callable
     Children that are not essential run until the essential ones have ended. Returns (decide, conclude).
     """
 
-    def decide(outcomes: Mapping[str, Optional[str]]) -> bool:
+    def decide(outcomes: Mapping[str, str | None]) -> bool:
         ended = [outcomes[name] for name in essential if outcomes[name] is not None]
         return any(outcome != "succeeded" for outcome in ended) or len(ended) == len(essential)
 

@@ -9,7 +9,8 @@ from .base import CoglabState, TimeLimit
 
 
 class CalibrateHand(CoglabState):
-    """Calibration order to the hand; skipped, with a sentence, if it is calibrated and the configuration does not insist."""
+    """Calibration order to the hand; skipped, with a sentence, if it is calibrated and the configuration
+    does not insist."""
 
     default_time_limit = 30.0
 

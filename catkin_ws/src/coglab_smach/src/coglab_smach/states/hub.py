@@ -2,14 +2,16 @@
 from __future__ import annotations
 
 import math
-from typing import Any, Sequence
+from collections.abc import Sequence
+from typing import Any
 
 from ..context import Context
 from .base import CoglabState, Interrupted
 
 
 class WaitForTrigger(CoglabState):
-    """Wait for the operator's go-ahead before anything moves; with ``auto_trigger`` in the configuration it is not awaited."""
+    """Wait for the operator's go-ahead before anything moves; with ``auto_trigger`` in the configuration it
+    is not awaited."""
 
     def __init__(self, ctx: Context, action: str = "initialise") -> None:
         super().__init__(ctx)
@@ -31,7 +33,8 @@ class WaitForTrigger(CoglabState):
 
 
 class Hub(CoglabState):
-    """wait_without_object and wait_with_object: left by a trigger or, where the configuration allows it, on recognition.
+    """wait_without_object and wait_with_object: left by a trigger or, where the configuration allows it, on
+    recognition.
 
     Outcomes are the actions this hub takes, and 'stopped' when STOP is pressed while waiting.
     """
@@ -74,7 +77,8 @@ class Hub(CoglabState):
         return request.action
 
     def _watch_partner(self) -> None:
-        """A recognised motion of the partner is a trigger like the operator's, if the configuration maps it to an action."""
+        """A recognised motion of the partner is a trigger like the operator's, if the configuration maps it
+        to an action."""
         if not bool(self.ctx.config.get("recognition_trigger.enabled", False)):
             return
         seen = self.ctx.perception.recognition()
@@ -85,7 +89,8 @@ class Hub(CoglabState):
 
 
 class Stopped(CoglabState):
-    """After STOP: nothing moves until the operator asks for 'reset'. Then the arm is enabled again; the hand keeps what it holds."""
+    """After STOP: nothing moves until the operator asks for 'reset'. Then the arm is enabled again; the hand
+    keeps what it holds."""
 
     ignores_stop = True
 
@@ -106,7 +111,8 @@ class Stopped(CoglabState):
 
 
 class Fault(CoglabState):
-    """Something is broken that recovery could not mend: says why and waits for 'initialise'; nothing moves by itself."""
+    """Something is broken that recovery could not mend: says why and waits for 'initialise'; nothing moves
+    by itself."""
 
     ignores_stop = True
 

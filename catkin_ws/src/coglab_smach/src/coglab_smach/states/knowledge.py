@@ -38,9 +38,11 @@ class QueryDatabase(CoglabState):
 
 
 class LocateOnBoard(CoglabState):
-    """Where the object lies on the board, averaged over several sights; the pose in the board frame goes into user data.
+    """Where the object lies on the board, averaged over several sights; the pose in the board frame goes
+    into user data.
 
-    The board stands still and so does the object, so the goal of the precise motion must not follow single noisy sights,
+    The board stands still and so does the object, so the goal of the precise motion must not follow single
+    noisy sights,
     nor an object that the hand pushes.
     """
 
@@ -85,7 +87,7 @@ def await_offer(state: CoglabState, target: str, margin: float = 0.0) -> dict[st
     limit = float(state.ctx.config.get("handover.offer_timeout", 8.0))
     end = state.ctx.clock.now() + limit
     located = locate(state, target)
-    while not all(a - margin <= v <= b + margin for a, v, b in zip(low, located["xyz"], high)):
+    while not all(a - margin <= v <= b + margin for a, v, b in zip(low, located["xyz"], high, strict=False)):
         if state.ctx.clock.now() > end:
             place = ", ".join(f"{v:.2f}" for v in located["xyz"])
             raise PortError(f"'{target}' was not offered within {limit:.0f} s: it stayed at ({place}) m, outside the "
