@@ -3,6 +3,8 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+
 from ..context import Context
 from ..goals import delivery_goal, grasp_goal, place_goal
 from ..pending import PortError
@@ -79,21 +81,30 @@ def locate(state: CoglabState, target: str) -> dict[str, Any]:
 def await_offer(state: CoglabState, target: str, margin: float = 0.0) -> dict[str, Any]:
     """Wait until ``target`` is inside the handover region, so that the arm does not chase a hand at rest.
 
-    ``margin`` (m) widens the region: a hand is behind the object it holds or asks for. PortError if nobody
-    comes within ``handover.offer_timeout``; nothing has moved then.
+    An object that is held still a little outside counts too. ``margin`` (m) widens the region: a hand is behind the
+    object it holds or asks for. PortError if nobody comes within ``handover.offer_timeout``; nothing has moved then.
     """
-    low = [float(v) for v in state.ctx.config.get("handover.region_low", [-1.0, -1.0, -1.0])]
-    high = [float(v) for v in state.ctx.config.get("handover.region_high", [1.5, 1.0, 2.0])]
-    limit = float(state.ctx.config.get("handover.offer_timeout", 8.0))
+    config = state.ctx.config
+    low = np.array(config.get("handover.region_low", [-1.0, -1.0, -1.0]), dtype=float) - margin
+    high = np.array(config.get("handover.region_high", [1.5, 1.0, 2.0]), dtype=float) + margin
+    wider = float(config.get("handover.still_margin", 0.10))
+    limit = float(config.get("handover.offer_timeout", 8.0))
     end = state.ctx.clock.now() + limit
-    located = locate(state, target)
-    while not all(a - margin <= v <= b + margin for a, v, b in zip(low, located["xyz"], high, strict=False)):
-        if state.ctx.clock.now() > end:
-            place = ", ".join(f"{v:.2f}" for v in located["xyz"])
-            raise PortError(f"'{target}' was not offered within {limit:.0f} s: it stayed at ({place}) m, outside the "
+    seen: list[tuple[float, np.ndarray]] = []
+    while True:
+        located = locate(state, target)
+        now, place = state.ctx.clock.now(), np.array(located["xyz"])
+        seen = [(t, p) for t, p in seen if now - t <= 0.4] + [(now, place)]
+        still = now - seen[0][0] > 0.3 and float(np.linalg.norm(place - seen[0][1])) < 0.025
+        if np.all(place >= low) and np.all(place <= high):
+            break
+        if still and np.all(place >= low - wider) and np.all(place <= high + wider):
+            break
+        if now > end:
+            where = ", ".join(f"{v:.2f}" for v in place)
+            raise PortError(f"'{target}' was not offered within {limit:.0f} s: it stayed at ({where}) m, outside the "
                             "handover region", ("nobody reaches toward the robot",))
         state.pause(0.03)
-        located = locate(state, target)
     state.ctx.journal.mark("offered")
     return located
 
