@@ -72,7 +72,9 @@ void RobotTopics::onJoints(const sensor_msgs::JointState& joints) {
   last_stamp_ns_ = stamp;
   ++sample_.sequence;
   sample_.stamp_ns = stamp;
-  sent_.read(sample_.commanded_velocity);
+  lwr_fri_bridge::VelocityCommand sent;
+  sent_.read(sent);
+  sample_.commanded_velocity = sent.velocity;
   sample_.commanded_position = sample_.position;
   port_.publishSample(sample_);
   sample_written_();
@@ -97,7 +99,7 @@ void RobotTopics::onWrench(const geometry_msgs::WrenchStamped& wrench) {
 }
 
 void RobotTopics::send(const lwr_fri_bridge::VelocityCommand& command) {
-  sent_.write(command.velocity);
+  sent_.write(command);
   target_message_.header.stamp = ros::Time::now();
   for (int joint = 0; joint < 7; ++joint) {
     target_message_.velocity[static_cast<std::size_t>(joint)] = command.velocity[joint];

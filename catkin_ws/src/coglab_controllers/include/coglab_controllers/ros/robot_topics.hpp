@@ -42,7 +42,7 @@ class RobotTopics {
   std::function<void()> sample_written_;
   lwr_fri_bridge::ControlPort port_;
   lwr_fri_bridge::RobotSample sample_;
-  lwr_fri_bridge::TripleBuffer<lwr_fri_bridge::Vector7> sent_;  // control thread to callbacks
+  lwr_fri_bridge::TripleBuffer<lwr_fri_bridge::VelocityCommand> sent_;  // control thread to callbacks
   ros::Subscriber joints_, state_, torques_, wrench_;
   ros::Publisher target_;
   sensor_msgs::JointState target_message_;  // control thread
