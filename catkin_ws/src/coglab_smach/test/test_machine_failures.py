@@ -127,6 +127,19 @@ def test_failed_start_up_ends_in_fault_with_the_reason():
     trial.run(script)
 
 
+def test_a_robot_controller_that_starts_late_is_asked_again():
+    trial = Trial()
+    trial.cell.faults.refuse["lwr start"] = "no datagrams from the robot controller"
+
+    def script(t):
+        t.clock.sleep(8.0)
+        del t.cell.faults.refuse["lwr start"]
+        t.wait_hub("wait_without_object")
+
+    trial.run(script)
+    assert len(trial.cell.called("lwr start")) > 3
+
+
 def test_failure_while_holding_ends_with_the_object_in_the_hand():
     trial = Trial()
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 from typing import Any
 
 from ..context import Context
+from ..pending import PortError
 from ..ports import DmpRequest
 from .base import CoglabState, Interrupted, TimeLimit
 
@@ -38,9 +39,18 @@ class ConfigureLwr(CoglabState):
     default_time_limit = 45.0
 
     def run(self, ud: Any) -> str:
-        if not self.ctx.arm.motion_allowed()[0]:
-            for command in list(self.ctx.config.get("lwr_commands", ["position", "start"])):
-                self.await_pending(self.ctx.arm.lwr_command(command), f"LWR command '{command}'")
+        while not self.ctx.arm.motion_allowed()[0]:
+            try:
+                for command in list(self.ctx.config.get("lwr_commands", ["position", "start"])):
+                    self.await_pending(self.ctx.arm.lwr_command(command), f"LWR command '{command}'")
+                break
+            except TimeLimit:
+                raise
+            except PortError:
+                # The robot controller may still be starting: ask again while the limit allows it.
+                if self.left() < 2.0:
+                    raise
+                self.pause(1.0)
         try:
             self.wait_for(lambda: self.ctx.arm.motion_allowed()[0], "command mode of the LWR")
         except TimeLimit as limit:
