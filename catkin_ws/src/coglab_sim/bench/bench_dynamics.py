@@ -31,6 +31,7 @@ def equality() -> float | None:
         return None
     sys.path.insert(0, str(PACKAGE / 'test'))
     from test_dynamics_oracle import Oracle
+
     from coglab_sim import _cell
     oracle, random, worst = Oracle(), np.random.default_rng(1), 0.0
     for _ in range(1000):
@@ -45,11 +46,12 @@ def equality() -> float | None:
 def main() -> None:
     output = subprocess.run([binary(), str(URDF), str(BLOCKS), str(STEPS)], check=True, capture_output=True, text=True,
                             timeout=300).stdout
-    cell, terms = zip(*((float(a), float(b)) for a, b in (line.split() for line in output.splitlines())))
+    cell, terms = zip(*((float(a), float(b)) for a, b in (line.split() for line in output.splitlines())), strict=True)
     step = statistics.median(cell) * 1e-3
-    rows = [{'bench': 'dynamics', 'figure': 'complete step of the cell, 1 ms period, median', 'value': round(step, 2),
-             'unit': 'us', 'goal': '<= 30', 'peer': 'KDL terms alone', 'peer_value': round(statistics.median(terms) * 1e-3, 2),
-             'ok': step <= 30.0}]
+    rows = [{'bench': 'dynamics', 'figure': 'complete step of the cell, 1 ms period, median',
+             'value': round(step, 2),
+             'unit': 'us', 'goal': '<= 30', 'peer': 'KDL terms alone',
+             'peer_value': round(statistics.median(terms) * 1e-3, 2), 'ok': step <= 30.0}]
     difference = equality()
     if difference is None:
         print('no row for the comparison with MuJoCo: mujoco-core is not installed', file=sys.stderr)

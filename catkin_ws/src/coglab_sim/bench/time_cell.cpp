@@ -1,7 +1,9 @@
-/// Prints the time of one complete step of the cell at a 1 ms FRI period, and of the rigid-body terms alone, ns.
+/// Prints the time of one complete step of the cell at a 1 ms FRI period, and of the rigid-body
+/// terms alone, ns.
 ///
-/// usage: coglab_sim_bench_cell URDF BLOCKS STEPS; one line per block: "cell_ns terms_ns". A complete step is controller, KRL program, object in
-/// the person's grip, servo, arm, torque signals and the measurement's 916 bytes, answered by a mirrored command.
+/// usage: coglab_sim_bench_cell URDF BLOCKS STEPS; one line per block: "cell_ns terms_ns". A
+/// complete step is controller, KRL program, object in the person's grip, servo, arm, torque
+/// signals and the measurement's 916 bytes, answered by a mirrored command.
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
@@ -23,7 +25,9 @@ void answer(const MeasurementBytes& bytes, std::uint16_t& counter, fri::CommandD
 }
 
 double nanosecondsSince(std::chrono::steady_clock::time_point begin, int steps) {
-  return std::chrono::duration<double, std::nano>(std::chrono::steady_clock::now() - begin).count() / steps;
+  return std::chrono::duration<double, std::nano>(std::chrono::steady_clock::now() - begin)
+             .count() /
+         steps;
 }
 
 }  // namespace

@@ -17,12 +17,15 @@ struct Fault {
 Fault faultOf(const std::string& kind, double value) {
   if (!std::isfinite(value)) throw std::invalid_argument("value must be a finite number");
   const bool on = value != 0.0;
-  if (kind == "block") return {[on](Cell& cell) { cell.setBlock(on); }, [on](Cell& cell) { cell.setBlock(!on); }};
+  if (kind == "block")
+    return {[on](Cell& cell) { cell.setBlock(on); }, [on](Cell& cell) { cell.setBlock(!on); }};
   if (kind == "packet_loss") {
-    return {[value](Cell& cell) { cell.setLoss(value, value); }, [](Cell& cell) { cell.setLoss(0.0, 0.0); }};
+    return {[value](Cell& cell) { cell.setLoss(value, value); },
+            [](Cell& cell) { cell.setLoss(0.0, 0.0); }};
   }
   if (kind == "lose_packets") {
-    if (value < 0.0 || value > 1e6) throw std::invalid_argument("lose_packets: value must lie in 0 .. 1e6");
+    if (value < 0.0 || value > 1e6)
+      throw std::invalid_argument("lose_packets: value must lie in 0 .. 1e6");
     return {[value](Cell& cell) { cell.loseNext(static_cast<int>(value)); }, {}};
   }
   if (kind == "silence") {
@@ -45,9 +48,10 @@ Fault faultOf(const std::string& kind, double value) {
     return {[](Cell& cell) { cell.controller().leaveCommandMode("fault injected"); }, {}};
   }
   if (kind == "acknowledge") return {[](Cell& cell) { cell.controller().acknowledge(); }, {}};
-  throw std::invalid_argument("unknown fault '" + kind +
-                              "'; known: block, packet_loss, lose_packets, silence, drive_error, enabling_switch, "
-                              "leave_command_mode, acknowledge");
+  throw std::invalid_argument(
+      "unknown fault '" + kind +
+      "'; known: block, packet_loss, lose_packets, silence, drive_error, enabling_switch, "
+      "leave_command_mode, acknowledge");
 }
 
 }  // namespace

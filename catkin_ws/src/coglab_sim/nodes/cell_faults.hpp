@@ -8,7 +8,8 @@
 
 namespace coglab_sim {
 
-/// Makes a fault now and, where it is a condition, undoes it after `duration` s of simulated time (0: it stays).
+/// Makes a fault now and, where it is a condition, undoes it after `duration` s of simulated time
+/// (0: it stays).
 ///
 ///   block               1: somebody holds the arm where it is, 0: lets go
 ///   packet_loss         share 0..1 of datagrams lost, each way

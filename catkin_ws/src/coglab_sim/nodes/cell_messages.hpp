@@ -44,7 +44,8 @@ inline geometry_msgs::Pose poseMessage(const Pose& pose) {
   return message;
 }
 
-inline coglab_msgs::CellTruth truthMessage(const CellTruth& truth, const std::string& object_id, const ros::Time& stamp) {
+inline coglab_msgs::CellTruth truthMessage(const CellTruth& truth, const std::string& object_id,
+                                           const ros::Time& stamp) {
   coglab_msgs::CellTruth message;
   message.header.stamp = stamp;
   message.header.frame_id = "world";
@@ -62,7 +63,8 @@ inline coglab_msgs::CellTruth truthMessage(const CellTruth& truth, const std::st
   return message;
 }
 
-inline coglab_msgs::FingerContact contactMessage(const FingerContactState& state, const ros::Time& stamp) {
+inline coglab_msgs::FingerContact contactMessage(const FingerContactState& state,
+                                                 const ros::Time& stamp) {
   coglab_msgs::FingerContact message;
   message.header.stamp = stamp;
   message.contact_position.assign(state.position.begin(), state.position.end());

@@ -1,9 +1,11 @@
 /// The node /coglab_sim/cell: the simulated cell in real time, behind UDP and topics.
 ///
-/// Subscribes (relative names) human_hand, finger_positions, ~push (geometry_msgs/Wrench on the palm, world axes). Publishes
-/// truth/cell, finger_contact, ~messages (the controller's message window), /clock if ~publish_clock. Serves ~fault, ~place_object.
-/// Parameters: every row of the cell's table under the private namespace; ~speed, ~fri_host, ~fri_port (0: wait for
-/// ~port_parameter), ~port_wait, ~log_file, ~truth_rate, ~publish_clock; fri_period and seed of the parent namespace.
+/// Subscribes (relative names) human_hand, finger_positions, ~push (geometry_msgs/Wrench on the
+/// palm, world axes). Publishes truth/cell, finger_contact, ~messages (the controller's message
+/// window), /clock if ~publish_clock. Serves ~fault, ~place_object. Parameters: every row of the
+/// cell's table under the private namespace; ~speed, ~fri_host, ~fri_port (0: wait for
+/// ~port_parameter), ~port_wait, ~log_file, ~truth_rate, ~publish_clock; fri_period and seed of the
+/// parent namespace.
 #include <fstream>
 #include <memory>
 
@@ -26,17 +28,20 @@
 namespace coglab_sim {
 namespace {
 
-/// Waits until the bridge has published its port. @throws std::runtime_error after `limit` s or at shutdown.
+/// Waits until the bridge has published its port. @throws std::runtime_error after `limit` s or at
+/// shutdown.
 std::uint16_t waitForPort(const std::string& parameter, double limit) {
   const ros::WallTime end = ros::WallTime::now() + ros::WallDuration(limit);
   ROS_INFO("waiting up to %.0f s for the bridge's port in parameter %s", limit, parameter.c_str());
   while (ros::ok() && ros::WallTime::now() < end) {
     int port = 0;
-    if (ros::param::get(parameter, port) && port > 0 && port < 65536) return static_cast<std::uint16_t>(port);
+    if (ros::param::get(parameter, port) && port > 0 && port < 65536)
+      return static_cast<std::uint16_t>(port);
     ros::WallDuration(0.1).sleep();
   }
-  throw std::runtime_error("no bridge published its UDP port in parameter " + parameter + " within " +
-                           std::to_string(limit) + " s; start the bridge or set ~fri_port");
+  throw std::runtime_error("no bridge published its UDP port in parameter " + parameter +
+                           " within " + std::to_string(limit) +
+                           " s; start the bridge or set ~fri_port");
 }
 
 class CellNode {
@@ -54,25 +59,36 @@ class CellNode {
     truth_ = node_.advertise<coglab_msgs::CellTruth>("truth/cell", 1);
     contact_ = node_.advertise<coglab_msgs::FingerContact>("finger_contact", 1, true);
     messages_ = private_.advertise<std_msgs::String>("messages", 50, true);
-    if (private_.param("publish_clock", false)) clock_ = node_.advertise<rosgraph_msgs::Clock>("/clock", 1);
+    if (private_.param("publish_clock", false))
+      clock_ = node_.advertise<rosgraph_msgs::Clock>("/clock", 1);
     const auto hints = ros::TransportHints().tcpNoDelay();
     human_ = node_.subscribe<coglab_msgs::HumanHand>(
-        "human_hand", 1, [this](const coglab_msgs::HumanHand::ConstPtr& m) { onHuman(*m); }, nullptr, hints);
+        "human_hand", 1, [this](const coglab_msgs::HumanHand::ConstPtr& m) { onHuman(*m); },
+        nullptr, hints);
     fingers_ = node_.subscribe<coglab_msgs::FingerPositions>(
-        "finger_positions", 1, [this](const coglab_msgs::FingerPositions::ConstPtr& m) { onFingers(*m); }, nullptr, hints);
-    push_ = private_.subscribe<geometry_msgs::Wrench>("push", 1, [this](const geometry_msgs::Wrench::ConstPtr& m) {
-      cell_->setPush({vectorOf(m->force), vectorOf(m->torque)});
-    });
+        "finger_positions", 1,
+        [this](const coglab_msgs::FingerPositions::ConstPtr& m) { onFingers(*m); }, nullptr, hints);
+    push_ = private_.subscribe<geometry_msgs::Wrench>(
+        "push", 1, [this](const geometry_msgs::Wrench::ConstPtr& m) {
+          cell_->setPush({vectorOf(m->force), vectorOf(m->torque)});
+        });
     fault_ = private_.advertiseService("fault", &CellNode::onFault, this);
     place_ = private_.advertiseService("place_object", &CellNode::onPlace, this);
 
     const double rate = private_.param("truth_rate", 200.0);
-    if (!(rate >= 1.0 && rate <= 1000.0)) throw std::invalid_argument("truth_rate must lie in 1 .. 1000 Hz");
-    publish_timer_ = node_.createWallTimer(ros::WallDuration(1.0 / rate), [this](const ros::WallTimerEvent&) { publish(); });
-    log_timer_ = node_.createWallTimer(ros::WallDuration(0.1), [this](const ros::WallTimerEvent&) { writeLog(); });
-    port_timer_ = node_.createWallTimer(ros::WallDuration(1.0), [this](const ros::WallTimerEvent&) { checkPort(); });
-    ROS_INFO("robot controller stand-in: FRI toward %s:%d every %.1f ms, KRL program %s, %.3g times real time",
-             host.c_str(), port, 1e3 * config_.krc.period, krc::nameOf(config_.krc.convention).c_str(), speed);
+    if (!(rate >= 1.0 && rate <= 1000.0))
+      throw std::invalid_argument("truth_rate must lie in 1 .. 1000 Hz");
+    publish_timer_ = node_.createWallTimer(ros::WallDuration(1.0 / rate),
+                                           [this](const ros::WallTimerEvent&) { publish(); });
+    log_timer_ = node_.createWallTimer(ros::WallDuration(0.1),
+                                       [this](const ros::WallTimerEvent&) { writeLog(); });
+    port_timer_ = node_.createWallTimer(ros::WallDuration(1.0),
+                                        [this](const ros::WallTimerEvent&) { checkPort(); });
+    ROS_INFO(
+        "robot controller stand-in: FRI toward %s:%d every %.1f ms, KRL program %s, %.3g times "
+        "real time",
+        host.c_str(), port, 1e3 * config_.krc.period, krc::nameOf(config_.krc.convention).c_str(),
+        speed);
     cell_->start();
   }
 
@@ -98,8 +114,8 @@ class CellNode {
   void writeLog() {
     for (const TickRecord& record : cell_->takeRecords()) {
       if (!log_.is_open()) continue;
-      log_ << record.time << ',' << record.state << ',' << record.quality << ',' << record.power << ',' << record.control
-           << ',' << record.answered;
+      log_ << record.time << ',' << record.state << ',' << record.quality << ',' << record.power
+           << ',' << record.control << ',' << record.answered;
       for (const Vector7* joints : {&record.commanded, &record.measured}) {
         for (int i = 0; i < 7; ++i) log_ << ',' << (*joints)[i];
       }
@@ -112,7 +128,8 @@ class CellNode {
     HumanInput human;
     if (!poseOf(message.pose, human.hand) || !(message.grip >= 0.0 && message.grip <= 1.0) ||
         !(message.grip_force >= 0.0 && message.grip_force <= 1000.0)) {
-      ROS_WARN_THROTTLE(1.0, "human_hand ignored: expected a finite pose, grip 0..1 and grip_force 0..1000 N");
+      ROS_WARN_THROTTLE(
+          1.0, "human_hand ignored: expected a finite pose, grip 0..1 and grip_force 0..1000 N");
       return;
     }
     human.twist = {vectorOf(message.velocity.linear), vectorOf(message.velocity.angular)};
@@ -123,7 +140,8 @@ class CellNode {
 
   void onFingers(const coglab_msgs::FingerPositions& message) {
     if (message.position.size() != 5) {
-      ROS_WARN_THROTTLE(1.0, "finger_positions ignored: expected 5 positions, got %zu", message.position.size());
+      ROS_WARN_THROTTLE(1.0, "finger_positions ignored: expected 5 positions, got %zu",
+                        message.position.size());
       return;
     }
     FingerInput fingers{};
@@ -131,23 +149,27 @@ class CellNode {
     cell_->setFingers(fingers);
   }
 
-  bool onFault(coglab_msgs::InjectFault::Request& request, coglab_msgs::InjectFault::Response& response) {
+  bool onFault(coglab_msgs::InjectFault::Request& request,
+               coglab_msgs::InjectFault::Response& response) {
     try {
       injectFault(*cell_, request.kind, request.value, request.duration);
       response.success = true;
       response.message = request.kind + " done";
-      ROS_INFO("fault %s, value %g, duration %g s", request.kind.c_str(), request.value, request.duration);
+      ROS_INFO("fault %s, value %g, duration %g s", request.kind.c_str(), request.value,
+               request.duration);
     } catch (const std::exception& error) {
       response.message = error.what();
     }
     return true;
   }
 
-  bool onPlace(coglab_msgs::PlaceObject::Request& request, coglab_msgs::PlaceObject::Response& response) {
+  bool onPlace(coglab_msgs::PlaceObject::Request& request,
+               coglab_msgs::PlaceObject::Response& response) {
     try {
       const Placement where = placementOf(request.where);
       Pose pose;
-      if (!poseOf(request.pose, pose)) throw std::invalid_argument("pose needs finite numbers and a quaternion of length 1");
+      if (!poseOf(request.pose, pose))
+        throw std::invalid_argument("pose needs finite numbers and a quaternion of length 1");
       ObjectParameters object = config_.object;
       const bool exchange = !request.object_id.empty() && request.object_id != config_.object.id;
       if (exchange) object = readObject(private_, request.object_id);
@@ -202,10 +224,12 @@ class CellNode {
     const bool silent = snapshot.answers == answers_seen_;
     answers_seen_ = snapshot.answers;
     int port = 0;
-    if (follow_port_ && silent && ros::param::get(port_parameter_, port) && port > 0 && port < 65536) {
+    if (follow_port_ && silent && ros::param::get(port_parameter_, port) && port > 0 &&
+        port < 65536) {
       cell_->setPort(static_cast<std::uint16_t>(port));
     }
-    if (silent && snapshot.tick > 0) ROS_WARN_THROTTLE(10.0, "no FRI answer for 1 s; is the bridge running?");
+    if (silent && snapshot.tick > 0)
+      ROS_WARN_THROTTLE(10.0, "no FRI answer for 1 s; is the bridge running?");
   }
 
   ros::NodeHandle node_, private_;

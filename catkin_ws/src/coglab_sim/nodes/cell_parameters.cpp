@@ -10,10 +10,14 @@ namespace {
 
 ParameterValue valueOf(const std::string& name, XmlRpc::XmlRpcValue& value) {
   switch (value.getType()) {
-    case XmlRpc::XmlRpcValue::TypeBoolean: return static_cast<bool>(value);
-    case XmlRpc::XmlRpcValue::TypeInt: return static_cast<int>(value);
-    case XmlRpc::XmlRpcValue::TypeDouble: return static_cast<double>(value);
-    case XmlRpc::XmlRpcValue::TypeString: return static_cast<std::string>(value);
+    case XmlRpc::XmlRpcValue::TypeBoolean:
+      return static_cast<bool>(value);
+    case XmlRpc::XmlRpcValue::TypeInt:
+      return static_cast<int>(value);
+    case XmlRpc::XmlRpcValue::TypeDouble:
+      return static_cast<double>(value);
+    case XmlRpc::XmlRpcValue::TypeString:
+      return static_cast<std::string>(value);
     case XmlRpc::XmlRpcValue::TypeArray: {
       std::vector<double> list;
       for (int i = 0; i < value.size(); ++i) {
@@ -28,14 +32,18 @@ ParameterValue valueOf(const std::string& name, XmlRpc::XmlRpcValue& value) {
       }
       return list;
     }
-    default: throw std::invalid_argument("parameter " + name + " has a type that no parameter of the cell has");
+    default:
+      throw std::invalid_argument("parameter " + name +
+                                  " has a type that no parameter of the cell has");
   }
 }
 
 /// Sets `name` of the table from `key` under the node, if it is there.
-void take(CellConfig& config, const ros::NodeHandle& node, const std::string& key, const std::string& name) {
+void take(CellConfig& config, const ros::NodeHandle& node, const std::string& key,
+          const std::string& name) {
   XmlRpc::XmlRpcValue value;
-  if (node.getParam(key, value)) setCellParameter(config, name, valueOf(node.resolveName(key), value));
+  if (node.getParam(key, value))
+    setCellParameter(config, name, valueOf(node.resolveName(key), value));
 }
 
 }  // namespace
@@ -46,14 +54,16 @@ CellConfig readCellConfig(const ros::NodeHandle& node) {
   const ros::NodeHandle above;
   take(config, above, "fri_period", "krc/period");
   take(config, above, "seed", "seed");
-  for (const CellParameter& parameter : cellParameters()) take(config, node, parameter.name, parameter.name);
+  for (const CellParameter& parameter : cellParameters())
+    take(config, node, parameter.name, parameter.name);
   return config;
 }
 
 ObjectParameters readObject(const ros::NodeHandle& node, const std::string& id) {
   const std::string prefix = "objects/" + id + "/";
   if (!node.hasParam("objects/" + id)) {
-    throw std::invalid_argument("object '" + id + "' has no parameters " + node.resolveName("objects/" + id) +
+    throw std::invalid_argument("object '" + id + "' has no parameters " +
+                                node.resolveName("objects/" + id) +
                                 " (mass, shape, size, center, friction, finger_contact)");
   }
   CellConfig config;

@@ -8,12 +8,13 @@
 
 namespace coglab_sim {
 
-/// Reads every row of the table that is set under `node`, besides the robot description's path (by default that of
-/// lwr_description), and `fri_period` and `seed` of the namespace above.
+/// Reads every row of the table that is set under `node`, besides the robot description's path (by
+/// default that of lwr_description), and `fri_period` and `seed` of the namespace above.
 /// @throws std::invalid_argument naming what is unknown or does not fit.
 CellConfig readCellConfig(const ros::NodeHandle& node);
 
-/// Parameters of an object from `objects/<id>` under `node`. @throws std::invalid_argument if there are none.
+/// Parameters of an object from `objects/<id>` under `node`. @throws std::invalid_argument if there
+/// are none.
 ObjectParameters readObject(const ros::NodeHandle& node, const std::string& id);
 
 }  // namespace coglab_sim

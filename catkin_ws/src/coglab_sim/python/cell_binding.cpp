@@ -6,31 +6,46 @@ using namespace coglab_sim;
 using namespace coglab_sim::python;
 
 PYBIND11_MODULE(_cell, m) {
-  m.doc() = "The simulated cell: robot controller, arm, object and hands behind the FRI wire. SI units, quaternions x y z w.";
+  m.doc() =
+      "The simulated cell: robot controller, arm, object and hands behind the FRI wire. SI units, "
+      "quaternions x y z w.";
 
-  py::class_<PyCell>(m, "Cell", "One FRI period per step(); the same seed and inputs give the same bytes.")
-      .def(py::init<const std::string&, const py::dict&>(), py::arg("urdf"), py::arg("parameters") = py::dict(),
-           "urdf: path of the robot description; parameters: names and values as in parameter_table().")
+  py::class_<PyCell>(m, "Cell",
+                     "One FRI period per step(); the same seed and inputs give the same bytes.")
+      .def(py::init<const std::string&, const py::dict&>(), py::arg("urdf"),
+           py::arg("parameters") = py::dict(),
+           "urdf: path of the robot description; parameters: names and values as in "
+           "parameter_table().")
       .def("step", &PyCell::step, py::arg("answer") = py::none(),
-           "Takes the 376 bytes that answer the last measurement (None: no answer), advances one FRI period and returns "
+           "Takes the 376 bytes that answer the last measurement (None: no answer), advances one "
+           "FRI period and returns "
            "the next measurement, 916 bytes, or None if nothing is sent.")
-      .def("truth", &PyCell::truth, "What really happens in the cell; nothing in control may read it.")
+      .def("truth", &PyCell::truth,
+           "What really happens in the cell; nothing in control may read it.")
       .def_property_readonly("period", [](const PyCell& c) { return c.cell().period(); })
       .def_property_readonly("time", [](const PyCell& c) { return c.cell().controller().time(); })
-      .def_property_readonly("set_point", [](const PyCell& c) { return c.cell().controller().setPoint(); })
-      .def_property_readonly("position", [](const PyCell& c) { return Vector7(c.cell().arm().position()); })
-      .def_property_readonly("velocity", [](const PyCell& c) { return Vector7(c.cell().arm().velocity()); })
-      .def_property_readonly("fri_state", [](const PyCell& c) { return static_cast<int>(c.cell().controller().friState()); })
-      .def_property_readonly("quality", [](const PyCell& c) { return static_cast<int>(c.cell().controller().friQuality()); })
-      .def_property_readonly("messages",
-                             [](const PyCell& c) {
-                               py::list list;
-                               for (const auto& message : c.cell().controller().messages()) {
-                                 list.append(py::make_tuple(message.time, message.text));
-                               }
-                               return list;
-                             },
-                             "The controller's message window: (time, text), newest last.")
+      .def_property_readonly("set_point",
+                             [](const PyCell& c) { return c.cell().controller().setPoint(); })
+      .def_property_readonly("position",
+                             [](const PyCell& c) { return Vector7(c.cell().arm().position()); })
+      .def_property_readonly("velocity",
+                             [](const PyCell& c) { return Vector7(c.cell().arm().velocity()); })
+      .def_property_readonly(
+          "fri_state",
+          [](const PyCell& c) { return static_cast<int>(c.cell().controller().friState()); })
+      .def_property_readonly(
+          "quality",
+          [](const PyCell& c) { return static_cast<int>(c.cell().controller().friQuality()); })
+      .def_property_readonly(
+          "messages",
+          [](const PyCell& c) {
+            py::list list;
+            for (const auto& message : c.cell().controller().messages()) {
+              list.append(py::make_tuple(message.time, message.text));
+            }
+            return list;
+          },
+          "The controller's message window: (time, text), newest last.")
       .def_property_readonly("rejections",
                              [](const PyCell& c) {
                                const auto& r = c.cell().controller().rejections();
@@ -41,77 +56,109 @@ PYBIND11_MODULE(_cell, m) {
                                d["repeated"] = r.repeated;
                                return d;
                              })
-      .def("receive",
-           [](PyCell& c, const py::bytes& data, double latency) {
-             const std::string bytes = data;
-             c.cell().receive(reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size(), latency);
-           },
-           py::arg("data"), py::arg("latency") = 0.0, "Hands over one datagram before the next step().")
-      .def("set_human",
-           [](PyCell& c, const Vector3d& position, const Eigen::Vector4d& rotation, const Vector3d& velocity,
-              const Vector3d& spin, double grip, double grip_force) {
-             c.cell().setHuman({makePose(position, rotation), {velocity, spin}, grip, grip_force});
-           },
-           py::arg("position"), py::arg("rotation") = Eigen::Vector4d(0, 0, 0, 1),
-           py::arg("velocity") = Vector3d(Vector3d::Zero()), py::arg("spin") = Vector3d(Vector3d::Zero()),
-           py::arg("grip") = 0.0, py::arg("grip_force") = 20.0, "The person's hand in the world; grip 0..1, force N.")
-      .def("set_fingers", [](PyCell& c, const FingerInput& fingers) { c.cell().setFingers(fingers); },
-           "Positions of the five motors, 0..254.")
-      .def("finger_contact",
-           [](const PyCell& c) {
-             const auto state = c.cell().fingerContact();
-             return py::make_tuple(state.position, state.stiffness);
-           },
-           "(positions, stiffness) where the five motors meet the object; 255: free.")
-      .def("set_push",
-           [](PyCell& c, const Vector3d& force, const Vector3d& torque) { c.cell().setPush({force, torque}); },
-           py::arg("force"), py::arg("torque") = Vector3d(Vector3d::Zero()), "Wrench on the palm, world axes, N and Nm.")
-      .def("place",
-           [](PyCell& c, const std::string& where, const Vector3d& position, const Eigen::Vector4d& rotation) {
-             c.cell().place(placementOf(where), makePose(position, rotation));
-           },
-           py::arg("where"), py::arg("position") = Vector3d(Vector3d::Zero()),
-           py::arg("rotation") = Eigen::Vector4d(0, 0, 0, 1), "human_hand, robot_hand or world; pose in that frame.")
-      .def("block", [](PyCell& c, bool on) { c.cell().setBlock(on); }, "Holds the arm where it is, or lets go.")
-      .def("set_loss", [](PyCell& c, double to_pc, double from_pc) { c.cell().setLoss(to_pc, from_pc); },
-           py::arg("to_pc"), py::arg("from_pc"))
-      .def("lose_next", [](PyCell& c, int packets) { c.cell().loseNext(packets); }, "Loses the next packets both ways.")
-      .def("enabling_switch", [](PyCell& c, bool pressed) { c.cell().controller().setEnablingSwitch(pressed); })
-      .def("drive_error", [](PyCell& c, int joint, bool on) { c.cell().controller().setDriveError(joint, on); },
-           py::arg("joint"), py::arg("on") = true)
-      .def("silence", [](PyCell& c, double duration) { c.cell().controller().setSilent(duration); },
-           "The controller sends nothing for so long, s.")
-      .def("leave_command_mode", [](PyCell& c, const std::string& why) { c.cell().controller().leaveCommandMode(why); })
+      .def(
+          "receive",
+          [](PyCell& c, const py::bytes& data, double latency) {
+            const std::string bytes = data;
+            c.cell().receive(reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size(),
+                             latency);
+          },
+          py::arg("data"), py::arg("latency") = 0.0,
+          "Hands over one datagram before the next step().")
+      .def(
+          "set_human",
+          [](PyCell& c, const Vector3d& position, const Eigen::Vector4d& rotation,
+             const Vector3d& velocity, const Vector3d& spin, double grip, double grip_force) {
+            c.cell().setHuman({makePose(position, rotation), {velocity, spin}, grip, grip_force});
+          },
+          py::arg("position"), py::arg("rotation") = Eigen::Vector4d(0, 0, 0, 1),
+          py::arg("velocity") = Vector3d(Vector3d::Zero()),
+          py::arg("spin") = Vector3d(Vector3d::Zero()), py::arg("grip") = 0.0,
+          py::arg("grip_force") = 20.0, "The person's hand in the world; grip 0..1, force N.")
+      .def(
+          "set_fingers",
+          [](PyCell& c, const FingerInput& fingers) { c.cell().setFingers(fingers); },
+          "Positions of the five motors, 0..254.")
+      .def(
+          "finger_contact",
+          [](const PyCell& c) {
+            const auto state = c.cell().fingerContact();
+            return py::make_tuple(state.position, state.stiffness);
+          },
+          "(positions, stiffness) where the five motors meet the object; 255: free.")
+      .def(
+          "set_push",
+          [](PyCell& c, const Vector3d& force, const Vector3d& torque) {
+            c.cell().setPush({force, torque});
+          },
+          py::arg("force"), py::arg("torque") = Vector3d(Vector3d::Zero()),
+          "Wrench on the palm, world axes, N and Nm.")
+      .def(
+          "place",
+          [](PyCell& c, const std::string& where, const Vector3d& position,
+             const Eigen::Vector4d& rotation) {
+            c.cell().place(placementOf(where), makePose(position, rotation));
+          },
+          py::arg("where"), py::arg("position") = Vector3d(Vector3d::Zero()),
+          py::arg("rotation") = Eigen::Vector4d(0, 0, 0, 1),
+          "human_hand, robot_hand or world; pose in that frame.")
+      .def(
+          "block", [](PyCell& c, bool on) { c.cell().setBlock(on); },
+          "Holds the arm where it is, or lets go.")
+      .def(
+          "set_loss",
+          [](PyCell& c, double to_pc, double from_pc) { c.cell().setLoss(to_pc, from_pc); },
+          py::arg("to_pc"), py::arg("from_pc"))
+      .def(
+          "lose_next", [](PyCell& c, int packets) { c.cell().loseNext(packets); },
+          "Loses the next packets both ways.")
+      .def("enabling_switch",
+           [](PyCell& c, bool pressed) { c.cell().controller().setEnablingSwitch(pressed); })
+      .def(
+          "drive_error",
+          [](PyCell& c, int joint, bool on) { c.cell().controller().setDriveError(joint, on); },
+          py::arg("joint"), py::arg("on") = true)
+      .def(
+          "silence", [](PyCell& c, double duration) { c.cell().controller().setSilent(duration); },
+          "The controller sends nothing for so long, s.")
+      .def("leave_command_mode",
+           [](PyCell& c, const std::string& why) { c.cell().controller().leaveCommandMode(why); })
       .def("acknowledge", [](PyCell& c) { c.cell().controller().acknowledge(); });
 
-  m.def("parameter_table", [] {
-    const CellConfig defaults;
-    py::list rows;
-    for (const auto& parameter : cellParameters()) {
-      py::dict row;
-      row["name"] = parameter.name;
-      row["unit"] = parameter.unit;
-      row["source"] = parameter.source;
-      row["description"] = parameter.description;
-      row["default"] = parameter.get(defaults);
-      rows.append(row);
-    }
-    return rows;
-  }, "Every parameter of the cell: name, unit, source (published, ours, set-up), description, default.");
+  m.def(
+      "parameter_table",
+      [] {
+        const CellConfig defaults;
+        py::list rows;
+        for (const auto& parameter : cellParameters()) {
+          py::dict row;
+          row["name"] = parameter.name;
+          row["unit"] = parameter.unit;
+          row["source"] = parameter.source;
+          row["description"] = parameter.description;
+          row["default"] = parameter.get(defaults);
+          rows.append(row);
+        }
+        return rows;
+      },
+      "Every parameter of the cell: name, unit, source (published, ours, set-up), description, "
+      "default.");
 
-  m.def("arm_terms",
-        [](const std::string& urdf, const Vector7& position, const Vector7& velocity) {
-          ArmModel model(urdf);
-          ArmTerms terms;
-          model.evaluate(position, velocity, terms);
-          py::dict result;
-          result["mass"] = Matrix7(terms.mass);
-          result["coriolis"] = Vector7(terms.coriolis);
-          result["gravity"] = Vector7(terms.gravity);
-          result["jacobian"] = Matrix67(terms.jacobian);
-          result["tip"] = poseDict(terms.tip);
-          return result;
-        },
-        py::arg("urdf"), py::arg("position"), py::arg("velocity"),
-        "Mass matrix, velocity and gravity torques, Jacobian (x y z rx ry rz, world axes) and pose of ih2_palm.");
+  m.def(
+      "arm_terms",
+      [](const std::string& urdf, const Vector7& position, const Vector7& velocity) {
+        ArmModel model(urdf);
+        ArmTerms terms;
+        model.evaluate(position, velocity, terms);
+        py::dict result;
+        result["mass"] = Matrix7(terms.mass);
+        result["coriolis"] = Vector7(terms.coriolis);
+        result["gravity"] = Vector7(terms.gravity);
+        result["jacobian"] = Matrix67(terms.jacobian);
+        result["tip"] = poseDict(terms.tip);
+        return result;
+      },
+      py::arg("urdf"), py::arg("position"), py::arg("velocity"),
+      "Mass matrix, velocity and gravity torques, Jacobian (x y z rx ry rz, world axes) and pose "
+      "of ih2_palm.");
 }

@@ -1,4 +1,5 @@
-/// Python module coglab_sim._virtual: the whole robot (cell, bridge, controller manager) in virtual time.
+/// Python module coglab_sim._virtual: the whole robot (cell, bridge, controller manager) in virtual
+/// time.
 #include "coglab_sim/virtual_robot.hpp"
 #include "py_cell.hpp"
 
@@ -14,8 +15,9 @@ py::tuple tupleOf(const Answer& answer) { return py::make_tuple(answer.success, 
 
 Eigen::Vector4d noOrientation() { return Eigen::Vector4d::Zero(); }
 
-DmpRequest requestOf(const std::string& primitive, double ratio, const Vector3d& offset, bool orientation_control,
-                     const Eigen::Vector4d& orientation, const std::string& goal_frame) {
+DmpRequest requestOf(const std::string& primitive, double ratio, const Vector3d& offset,
+                     bool orientation_control, const Eigen::Vector4d& orientation,
+                     const std::string& goal_frame) {
   DmpRequest request;
   request.primitive_id = primitive;
   request.dmp_ratio = ratio;
@@ -48,95 +50,124 @@ py::dict reportOf(VirtualRobot& robot) {
 }  // namespace
 
 PYBIND11_MODULE(_virtual, m) {
-  m.doc() = "Cell, bridge and controller manager in one thread and in virtual time. SI units, quaternions x y z w.";
+  m.doc() =
+      "Cell, bridge and controller manager in one thread and in virtual time. SI units, "
+      "quaternions x y z w.";
   py::module_::import("coglab_sim._cell");  // knows the type of VirtualRobot.cell
 
-  py::class_<VirtualRobot>(m, "VirtualRobot",
-                           "Time advances only by tick() and advance(); requests take effect between two ticks.")
-      .def(py::init([](const std::string& urdf, const std::string& limits_file, const py::dict& cell,
-                       const std::string& manager) {
+  py::class_<VirtualRobot>(
+      m, "VirtualRobot",
+      "Time advances only by tick() and advance(); requests take effect between two ticks.")
+      .def(py::init([](const std::string& urdf, const std::string& limits_file,
+                       const py::dict& cell, const std::string& manager) {
              VirtualRobotConfig config;
              config.cell = configFrom(urdf, cell);
              config.limits_file = limits_file;
              config.manager_parameters = manager;
              return std::make_unique<VirtualRobot>(config);
            }),
-           py::arg("urdf"), py::arg("limits_file"), py::arg("cell") = py::dict(), py::arg("manager") = "",
-           "cell: parameters of the cell as in coglab_sim._cell.parameter_table(); manager: YAML as below /controller_manager.")
+           py::arg("urdf"), py::arg("limits_file"), py::arg("cell") = py::dict(),
+           py::arg("manager") = "",
+           "cell: parameters of the cell as in coglab_sim._cell.parameter_table(); manager: YAML "
+           "as below /controller_manager.")
       .def("tick", &VirtualRobot::tick, "One FRI period.")
-      .def("advance",
-           [](VirtualRobot& robot, double seconds) {
-             const auto ticks = std::llround(seconds / robot.cell().period());
-             for (long long i = 0; i < ticks; ++i) robot.tick();
-           },
-           py::arg("seconds"), "So many seconds of simulated time.")
+      .def(
+          "advance",
+          [](VirtualRobot& robot, double seconds) {
+            const auto ticks = std::llround(seconds / robot.cell().period());
+            for (long long i = 0; i < ticks; ++i) robot.tick();
+          },
+          py::arg("seconds"), "So many seconds of simulated time.")
       .def_property_readonly("now", &VirtualRobot::now, "s")
-      .def_property_readonly("cell", [](VirtualRobot& robot) { return std::make_unique<PyCell>(robot.cell()); },
-                             py::keep_alive<0, 1>(), "The coglab_sim._cell.Cell inside; do not call its step().")
+      .def_property_readonly(
+          "cell", [](VirtualRobot& robot) { return std::make_unique<PyCell>(robot.cell()); },
+          py::keep_alive<0, 1>(), "The coglab_sim._cell.Cell inside; do not call its step().")
       .def("report", &reportOf, "The control cycle's newest report.")
 
-      .def("submit", [](VirtualRobot& robot, const std::string& event) { return robot.bridge().submit(event); },
-           "An event of ros_events; returns a ticket for outcome().")
-      .def("outcome",
-           [](VirtualRobot& robot, std::uint32_t ticket) -> py::object {
-             const auto outcome = robot.bridge().outcome(ticket);
-             if (outcome.code == lwr_fri_bridge::OutcomeCode::Pending) return py::none();
-             return py::make_tuple(outcome.success(), describe(outcome));
-           },
-           py::arg("ticket"), "(success, message), or None while it is not finished.")
+      .def(
+          "submit",
+          [](VirtualRobot& robot, const std::string& event) {
+            return robot.bridge().submit(event);
+          },
+          "An event of ros_events; returns a ticket for outcome().")
+      .def(
+          "outcome",
+          [](VirtualRobot& robot, std::uint32_t ticket) -> py::object {
+            const auto outcome = robot.bridge().outcome(ticket);
+            if (outcome.code == lwr_fri_bridge::OutcomeCode::Pending) return py::none();
+            return py::make_tuple(outcome.success(), describe(outcome));
+          },
+          py::arg("ticket"), "(success, message), or None while it is not finished.")
 
-      .def("load_controller",
-           [](VirtualRobot& robot, const std::string& id, const std::string& type) { return tupleOf(robot.load(id, type)); },
-           py::arg("id"), py::arg("type"), "coglab/DmpController or coglab/PtpController; (success, message).")
-      .def("switch_controller",
-           [](VirtualRobot& robot, const std::string& id) {
-             std::string type;
-             return tupleOf(robot.manager().switchTo(id, type));
-           },
-           py::arg("id"))
-      .def("speed_scale", [](VirtualRobot& robot, double scale) { return tupleOf(robot.manager().setSpeedScale(scale)); })
+      .def(
+          "load_controller",
+          [](VirtualRobot& robot, const std::string& id, const std::string& type) {
+            return tupleOf(robot.load(id, type));
+          },
+          py::arg("id"), py::arg("type"),
+          "coglab/DmpController or coglab/PtpController; (success, message).")
+      .def(
+          "switch_controller",
+          [](VirtualRobot& robot, const std::string& id) {
+            std::string type;
+            return tupleOf(robot.manager().switchTo(id, type));
+          },
+          py::arg("id"))
+      .def("speed_scale",
+           [](VirtualRobot& robot, double scale) {
+             return tupleOf(robot.manager().setSpeedScale(scale));
+           })
 
-      .def("add_ptp",
-           [](VirtualRobot& robot, const std::vector<double>& position, const std::vector<double>& max_vel,
-              const std::vector<double>& max_acc) {
-             const auto answer = robot.ptp().add({position, max_vel, max_acc});
-             return py::make_tuple(answer.status, answer.ptp_id, answer.message);
-           },
-           py::arg("position"), py::arg("max_vel") = std::vector<double>(), py::arg("max_acc") = std::vector<double>(),
-           "(status, ptp_id, message) as Table 5 has them: STARTED 0, QUEUED 1, REJECTED 2.")
-      .def("finished_ptps",
-           [](VirtualRobot& robot) {
-             std::vector<std::pair<int, bool>> ends;
-             coglab_controllers::PtpEnd end;
-             while (robot.ptp().readEnd(end)) ends.emplace_back(end.ptp_id, end.executed);
-             return ends;
-           },
-           "[(ptp_id, executed)] of the motions that ended since the last call.")
+      .def(
+          "add_ptp",
+          [](VirtualRobot& robot, const std::vector<double>& position,
+             const std::vector<double>& max_vel, const std::vector<double>& max_acc) {
+            const auto answer = robot.ptp().add({position, max_vel, max_acc});
+            return py::make_tuple(answer.status, answer.ptp_id, answer.message);
+          },
+          py::arg("position"), py::arg("max_vel") = std::vector<double>(),
+          py::arg("max_acc") = std::vector<double>(),
+          "(status, ptp_id, message) as Table 5 has them: STARTED 0, QUEUED 1, REJECTED 2.")
+      .def(
+          "finished_ptps",
+          [](VirtualRobot& robot) {
+            std::vector<std::pair<int, bool>> ends;
+            coglab_controllers::PtpEnd end;
+            while (robot.ptp().readEnd(end)) ends.emplace_back(end.ptp_id, end.executed);
+            return ends;
+          },
+          "[(ptp_id, executed)] of the motions that ended since the last call.")
 
-      .def("load_dmps",
-           [](VirtualRobot& robot, const std::string& filename) {
-             int loaded = 0;
-             const Answer answer = robot.dmp().loadDmps(filename, loaded);
-             return py::make_tuple(answer.success, answer.message, loaded);
-           },
-           py::arg("filename"), "(success, message, number of primitives)")
-      .def("execute_dmp",
-           [](VirtualRobot& robot, const std::string& primitive, double ratio, const Vector3d& offset, bool orientation_control,
-              const Eigen::Vector4d& orientation, const std::string& goal_frame) {
-             return tupleOf(
-                 robot.dmp().execute(requestOf(primitive, ratio, offset, orientation_control, orientation, goal_frame)));
-           },
-           py::arg("primitive_id"), py::arg("dmp_ratio") = 1.0, py::arg("goal_offset") = Vector3d(Vector3d::Zero()),
-           py::arg("orientation_control") = false, py::arg("target_orientation") = noOrientation(),
-           py::arg("goal_frame") = "", "Starts from the current state; (success, message).")
-      .def("switch_dmp",
-           [](VirtualRobot& robot, const std::string& primitive, double ratio, const Vector3d& offset, bool orientation_control,
-              const Eigen::Vector4d& orientation) {
-             return tupleOf(
-                 robot.dmp().switchDmp(requestOf(primitive, ratio, offset, orientation_control, orientation, "")));
-           },
-           py::arg("primitive_id"), py::arg("dmp_ratio") = 1.0, py::arg("goal_offset") = Vector3d(Vector3d::Zero()),
-           py::arg("orientation_control") = false, py::arg("target_orientation") = noOrientation())
+      .def(
+          "load_dmps",
+          [](VirtualRobot& robot, const std::string& filename) {
+            int loaded = 0;
+            const Answer answer = robot.dmp().loadDmps(filename, loaded);
+            return py::make_tuple(answer.success, answer.message, loaded);
+          },
+          py::arg("filename"), "(success, message, number of primitives)")
+      .def(
+          "execute_dmp",
+          [](VirtualRobot& robot, const std::string& primitive, double ratio,
+             const Vector3d& offset, bool orientation_control, const Eigen::Vector4d& orientation,
+             const std::string& goal_frame) {
+            return tupleOf(robot.dmp().execute(
+                requestOf(primitive, ratio, offset, orientation_control, orientation, goal_frame)));
+          },
+          py::arg("primitive_id"), py::arg("dmp_ratio") = 1.0,
+          py::arg("goal_offset") = Vector3d(Vector3d::Zero()),
+          py::arg("orientation_control") = false, py::arg("target_orientation") = noOrientation(),
+          py::arg("goal_frame") = "", "Starts from the current state; (success, message).")
+      .def(
+          "switch_dmp",
+          [](VirtualRobot& robot, const std::string& primitive, double ratio,
+             const Vector3d& offset, bool orientation_control, const Eigen::Vector4d& orientation) {
+            return tupleOf(robot.dmp().switchDmp(
+                requestOf(primitive, ratio, offset, orientation_control, orientation, "")));
+          },
+          py::arg("primitive_id"), py::arg("dmp_ratio") = 1.0,
+          py::arg("goal_offset") = Vector3d(Vector3d::Zero()),
+          py::arg("orientation_control") = false, py::arg("target_orientation") = noOrientation())
       .def("dmp_progress",
            [](VirtualRobot& robot) {
              coglab_controllers::DmpProgress progress;
@@ -151,13 +182,15 @@ PYBIND11_MODULE(_virtual, m) {
              return result;
            })
 
-      .def("set_frame",
-           [](VirtualRobot& robot, const std::string& frame, const Vector3d& position, const Eigen::Vector4d& rotation,
-              double age) {
-             robot.frames().set(frame, makePose(position, rotation),
-                                robot.nowNs() - static_cast<std::int64_t>(std::llround(1e9 * age)));
-           },
-           py::arg("frame"), py::arg("position"), py::arg("rotation") = Eigen::Vector4d(0, 0, 0, 1), py::arg("age") = 0.0,
-           "Where perception sees a frame in the world, captured `age` s ago.")
-      .def("forget_frame", [](VirtualRobot& robot, const std::string& frame) { robot.frames().forget(frame); });
+      .def(
+          "set_frame",
+          [](VirtualRobot& robot, const std::string& frame, const Vector3d& position,
+             const Eigen::Vector4d& rotation, double age) {
+            robot.frames().set(frame, makePose(position, rotation),
+                               robot.nowNs() - static_cast<std::int64_t>(std::llround(1e9 * age)));
+          },
+          py::arg("frame"), py::arg("position"), py::arg("rotation") = Eigen::Vector4d(0, 0, 0, 1),
+          py::arg("age") = 0.0, "Where perception sees a frame in the world, captured `age` s ago.")
+      .def("forget_frame",
+           [](VirtualRobot& robot, const std::string& frame) { robot.frames().forget(frame); });
 }

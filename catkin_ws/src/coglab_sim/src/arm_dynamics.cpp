@@ -9,7 +9,8 @@ namespace coglab_sim {
 
 using lwr_fri_bridge::fri::ControlStrategy;
 
-ArmDynamics::ArmDynamics(const std::string& urdf, const ArmParameters& parameters, const Vector7& position)
+ArmDynamics::ArmDynamics(const std::string& urdf, const ArmParameters& parameters,
+                         const Vector7& position)
     : model_(urdf), parameters_(parameters), q_(position) {
   reset(position);
 }
@@ -48,7 +49,8 @@ ArmDynamics::Law ArmDynamics::servoLaw(const ServoCommand& command, double dt) c
       const double w = parameters_.servo_bandwidth;
       const Vector7 stiffness = w * w * inertia;
       const Vector7 damping = 2.0 * w * inertia;
-      law.constant = stiffness.cwiseProduct(command.position - q_) + damping.cwiseProduct(command.velocity);
+      law.constant =
+          stiffness.cwiseProduct(command.position - q_) + damping.cwiseProduct(command.velocity);
       law.damping.diagonal() = damping + dt * stiffness;
       break;
     }
@@ -69,18 +71,22 @@ ArmDynamics::Law ArmDynamics::servoLaw(const ServoCommand& command, double dt) c
       Eigen::Matrix<double, 7, 6> half = jacobian.transpose();
       factor.matrixL().solveInPlace(half);
       const Vector6 mass = half.colwise().squaredNorm().cwiseInverse().transpose();
-      const Vector6 damping = 2.0 * command.frame_damping.array() * (command.frame_stiffness.array() * mass.array()).sqrt();
+      const Vector6 damping = 2.0 * command.frame_damping.array() *
+                              (command.frame_stiffness.array() * mass.array()).sqrt();
 
       Vector6 error;
-      error << command.frame.position - terms_.tip.position, rotationBetween(terms_.tip.rotation, command.frame.rotation);
+      error << command.frame.position - terms_.tip.position,
+          rotationBetween(terms_.tip.rotation, command.frame.rotation);
       Vector6 wanted;
       wanted << command.frame_velocity.linear, command.frame_velocity.angular;
-      const Vector6 force =
-          command.frame_stiffness.cwiseProduct(error) + damping.cwiseProduct(wanted) + command.force;
+      const Vector6 force = command.frame_stiffness.cwiseProduct(error) +
+                            damping.cwiseProduct(wanted) + command.force;
       law.constant = jacobian.transpose() * force;
-      law.damping = jacobian.transpose() * (damping + dt * command.frame_stiffness).asDiagonal() * jacobian;
+      law.damping =
+          jacobian.transpose() * (damping + dt * command.frame_stiffness).asDiagonal() * jacobian;
 
-      // Posture of the redundant joint: a soft spring to the joint set-point, filtered so that the tip does not feel it.
+      // Posture of the redundant joint: a soft spring to the joint set-point, filtered so that the
+      // tip does not feel it.
       Eigen::Matrix<double, 6, 6> gram = jacobian * jacobian.transpose();
       gram.diagonal().array() += 1e-6;
       const Eigen::LLT<Eigen::Matrix<double, 6, 6>> gram_factor(gram);
@@ -93,7 +99,8 @@ ArmDynamics::Law ArmDynamics::servoLaw(const ServoCommand& command, double dt) c
     case ControlStrategy::Other:
       break;
   }
-  // The controller carries the arm's own weight and velocity forces in every strategy; it does not know of loads.
+  // The controller carries the arm's own weight and velocity forces in every strategy; it does not
+  // know of loads.
   law.constant += terms_.gravity + terms_.coriolis;
   return law;
 }
@@ -118,10 +125,11 @@ void ArmDynamics::step(const ServoCommand& command, const Wrench& palm, double d
 
   // Everything that resists velocity linearly, per joint.
   Vector7 resistance = model_.damping();
-  resistance.array() += parameters_.coulomb_friction.array() / dq_.array().abs().max(parameters_.coulomb_speed);
+  resistance.array() +=
+      parameters_.coulomb_friction.array() / dq_.array().abs().max(parameters_.coulomb_speed);
   if (brakes_) {
-    resistance.array() +=
-        parameters_.brake_torque_share * parameters_.torque_limit.array() / dq_.array().abs().max(0.02);
+    resistance.array() += parameters_.brake_torque_share * parameters_.torque_limit.array() /
+                          dq_.array().abs().max(0.02);
   }
   Vector7 block_damping = Vector7::Zero(), block_constant = Vector7::Zero();
   if (blocked_) {
@@ -141,7 +149,8 @@ void ArmDynamics::step(const ServoCommand& command, const Wrench& palm, double d
 
   const Vector7& limit = parameters_.torque_limit;
   if (((motor_torque_.array().abs() - limit.array()) > 0.0).any()) {
-    // Saturated motors give their limit, the others follow their law; one correction is enough for a 1 ms step.
+    // Saturated motors give their limit, the others follow their law; one correction is enough for
+    // a 1 ms step.
     for (int i = 0; i < 7; ++i) {
       if (std::abs(motor_torque_[i]) <= limit[i]) continue;
       law.constant[i] = std::copysign(limit[i], motor_torque_[i]);

@@ -3,9 +3,9 @@
 #include <set>
 #include <stdexcept>
 
+#include <tinyxml2.h>
 #include <kdl/tree.hpp>
 #include <kdl_parser/kdl_parser.hpp>
-#include <tinyxml2.h>
 
 namespace coglab_sim {
 namespace {
@@ -19,7 +19,8 @@ KDL::RigidBodyInertia branchInertia(const KDL::TreeElement& element) {
   return element.segment.pose(0.0) * inertia;
 }
 
-/// The chain with side branches added to their parents and bodies behind fixed joints merged into the moving ones.
+/// The chain with side branches added to their parents and bodies behind fixed joints merged into
+/// the moving ones.
 KDL::Chain condensed(const KDL::Tree& tree, const KDL::Chain& chain) {
   std::set<std::string> on_chain;
   for (const auto& segment : chain.segments) on_chain.insert(segment.getName());
@@ -33,8 +34,9 @@ KDL::Chain condensed(const KDL::Tree& tree, const KDL::Chain& chain) {
     if (segment.getJoint().getType() == KDL::Joint::None && !bodies.empty()) {
       const KDL::Segment& carrier = bodies.back();
       const KDL::Frame step = segment.getFrameToTip();
-      bodies.back() = KDL::Segment(segment.getName(), carrier.getJoint(), carrier.getFrameToTip() * step,
-                                   step.Inverse() * carrier.getInertia() + inertia);
+      bodies.back() =
+          KDL::Segment(segment.getName(), carrier.getJoint(), carrier.getFrameToTip() * step,
+                       step.Inverse() * carrier.getInertia() + inertia);
     } else {
       bodies.emplace_back(segment.getName(), segment.getJoint(), segment.getFrameToTip(), inertia);
     }
@@ -51,11 +53,12 @@ KDL::Chain readChain(const std::string& urdf, const std::string& base, const std
   }
   KDL::Chain chain;
   if (!tree.getChain(base, tip, chain)) {
-    throw std::runtime_error("robot description " + urdf + " has no chain from " + base + " to " + tip);
+    throw std::runtime_error("robot description " + urdf + " has no chain from " + base + " to " +
+                             tip);
   }
   if (chain.getNrOfJoints() != kJoints) {
-    throw std::runtime_error("robot description " + urdf + ": expected 7 joints from " + base + " to " + tip +
-                             ", found " + std::to_string(chain.getNrOfJoints()));
+    throw std::runtime_error("robot description " + urdf + ": expected 7 joints from " + base +
+                             " to " + tip + ", found " + std::to_string(chain.getNrOfJoints()));
   }
   return condensed(tree, chain);
 }
@@ -69,11 +72,13 @@ Vector7 readDamping(const std::string& urdf, const KDL::Chain& chain) {
   int index = 0;
   for (const auto& segment : chain.segments) {
     if (segment.getJoint().getType() == KDL::Joint::None) continue;
-    const tinyxml2::XMLElement* joint = robot != nullptr ? robot->FirstChildElement("joint") : nullptr;
+    const tinyxml2::XMLElement* joint =
+        robot != nullptr ? robot->FirstChildElement("joint") : nullptr;
     while (joint != nullptr && !joint->Attribute("name", segment.getJoint().getName().c_str())) {
       joint = joint->NextSiblingElement("joint");
     }
-    const tinyxml2::XMLElement* dynamics = joint != nullptr ? joint->FirstChildElement("dynamics") : nullptr;
+    const tinyxml2::XMLElement* dynamics =
+        joint != nullptr ? joint->FirstChildElement("dynamics") : nullptr;
     if (dynamics != nullptr) damping[index] = dynamics->DoubleAttribute("damping");
     ++index;
   }

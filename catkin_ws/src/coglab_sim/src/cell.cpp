@@ -13,7 +13,8 @@ Placement placementOf(const std::string& name) {
   if (name == "human_hand") return Placement::HumanHand;
   if (name == "robot_hand") return Placement::RobotHand;
   if (name == "world") return Placement::World;
-  throw std::invalid_argument("unknown placement '" + name + "'; known: human_hand, robot_hand, world");
+  throw std::invalid_argument("unknown placement '" + name +
+                              "'; known: human_hand, robot_hand, world");
 }
 
 Cell::Cell(const CellConfig& config)
@@ -67,12 +68,13 @@ const MeasurementBytes& Cell::advance(bool on_time) {
   ServoCommand servo = command.servo;
   servo.velocity = (command.to - command.from) / period;
   servo.frame_velocity.linear = (command.frame_to.position - command.frame_from.position) / period;
-  servo.frame_velocity.angular = rotationBetween(command.frame_from.rotation, command.frame_to.rotation) / period;
+  servo.frame_velocity.angular =
+      rotationBetween(command.frame_from.rotation, command.frame_to.rotation) / period;
   for (int i = 1; i <= steps; ++i) {
     const double share = static_cast<double>(i) / steps;
     servo.position = command.from + share * (command.to - command.from);
-    servo.frame.position =
-        command.frame_from.position + share * (command.frame_to.position - command.frame_from.position);
+    servo.frame.position = command.frame_from.position +
+                           share * (command.frame_to.position - command.frame_from.position);
     servo.frame.rotation = command.frame_from.rotation.slerp(share, command.frame_to.rotation);
     const Pose& palm = arm_.terms().tip;
     Wrench on_palm = object_.step(palm, arm_.palmTwist(), human_, human_present_, fingers_, dt);

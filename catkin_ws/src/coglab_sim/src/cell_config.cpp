@@ -24,7 +24,8 @@ double numberOf(const std::string& name, const ParameterValue& value) {
 template <typename Vector>
 Vector vectorOf(const std::string& name, const ParameterValue& value, std::size_t size) {
   const auto* list = std::get_if<std::vector<double>>(&value);
-  if (list == nullptr || list->size() != size) refuse(name, "a list of " + std::to_string(size) + " numbers");
+  if (list == nullptr || list->size() != size)
+    refuse(name, "a list of " + std::to_string(size) + " numbers");
   Vector result;
   for (std::size_t i = 0; i < size; ++i) {
     if (!std::isfinite((*list)[i])) refuse(name, "finite numbers");
@@ -58,7 +59,8 @@ ParameterValue read(const CellConfig& config, Access access) {
 }
 
 template <typename Access>
-void write(CellConfig& config, const std::string& name, const ParameterValue& value, Access access) {
+void write(CellConfig& config, const std::string& name, const ParameterValue& value,
+           Access access) {
   auto& field = access(config);
   using Field = std::decay_t<decltype(field)>;
   if constexpr (std::is_same_v<Field, Vector7>) {
@@ -67,7 +69,8 @@ void write(CellConfig& config, const std::string& name, const ParameterValue& va
     field = vectorOf<Vector3d>(name, value, 3);
   } else if constexpr (std::is_same_v<Field, std::array<int, 5>>) {
     const auto counts = vectorOf<Eigen::Matrix<double, 5, 1>>(name, value, 5);
-    for (std::size_t i = 0; i < 5; ++i) field[i] = static_cast<int>(counts[static_cast<Eigen::Index>(i)]);
+    for (std::size_t i = 0; i < 5; ++i)
+      field[i] = static_cast<int>(counts[static_cast<Eigen::Index>(i)]);
   } else if constexpr (std::is_same_v<Field, Quaterniond>) {
     const auto q = vectorOf<Eigen::Vector4d>(name, value, 4);
     if (std::abs(q.norm() - 1.0) > 1e-3) refuse(name, "a quaternion x y z w of length 1");
@@ -84,8 +87,13 @@ void write(CellConfig& config, const std::string& name, const ParameterValue& va
 }
 
 template <typename Access>
-CellParameter row(const char* name, const char* unit, const char* source, const char* description, Access access) {
-  return {name, unit, source, description, [access](const CellConfig& config) { return read(config, access); },
+CellParameter row(const char* name, const char* unit, const char* source, const char* description,
+                  Access access) {
+  return {name,
+          unit,
+          source,
+          description,
+          [access](const CellConfig& config) { return read(config, access); },
           [access, name](CellConfig& config, const ParameterValue& value) {
             write(config, name, value, access);
           }};
@@ -93,28 +101,40 @@ CellParameter row(const char* name, const char* unit, const char* source, const 
 
 const char* modeName(krc::OperatingMode mode) {
   switch (mode) {
-    case krc::OperatingMode::T1: return "T1";
-    case krc::OperatingMode::T2: return "T2";
-    case krc::OperatingMode::Automatic: break;
+    case krc::OperatingMode::T1:
+      return "T1";
+    case krc::OperatingMode::T2:
+      return "T2";
+    case krc::OperatingMode::Automatic:
+      break;
   }
   return "AUT";
 }
 
 CellParameter conventionRow() {
-  return {"krc/convention", "", "set-up",
-          "KRL program: coglab, centro_epiaggio, stanford, rcprg_tum, rtt_lwr, kuka_sample",
-          [](const CellConfig& config) { return ParameterValue(krc::nameOf(config.krc.convention)); },
-          [](CellConfig& config, const ParameterValue& value) {
-            config.krc.convention = krc::krlConventionOf(stringOf("krc/convention", value));
-          }};
+  return {
+      "krc/convention",
+      "",
+      "set-up",
+      "KRL program: coglab, centro_epiaggio, stanford, rcprg_tum, rtt_lwr, kuka_sample",
+      [](const CellConfig& config) { return ParameterValue(krc::nameOf(config.krc.convention)); },
+      [](CellConfig& config, const ParameterValue& value) {
+        config.krc.convention = krc::krlConventionOf(stringOf("krc/convention", value));
+      }};
 }
 
 CellParameter modeRow() {
-  return {"krc/mode", "", "set-up", "operating mode: T1, T2, AUT",
-          [](const CellConfig& config) { return ParameterValue(std::string(modeName(config.krc.mode))); },
+  return {"krc/mode",
+          "",
+          "set-up",
+          "operating mode: T1, T2, AUT",
+          [](const CellConfig& config) {
+            return ParameterValue(std::string(modeName(config.krc.mode)));
+          },
           [](CellConfig& config, const ParameterValue& value) {
             const std::string name = stringOf("krc/mode", value);
-            for (const auto mode : {krc::OperatingMode::T1, krc::OperatingMode::T2, krc::OperatingMode::Automatic}) {
+            for (const auto mode :
+                 {krc::OperatingMode::T1, krc::OperatingMode::T2, krc::OperatingMode::Automatic}) {
               if (name != modeName(mode)) continue;
               config.krc.mode = mode;
               return;
@@ -124,7 +144,8 @@ CellParameter modeRow() {
 }
 
 #define ROW(name, unit, source, description, field) \
-  row(name, unit, source, description, [](CellConfig& c) -> auto& { return c.field; })
+  row(                                              \
+      name, unit, source, description, [](CellConfig & c) -> auto& { return c.field; })
 
 std::vector<CellParameter> makeTable() {
   return {
@@ -134,73 +155,121 @@ std::vector<CellParameter> makeTable() {
       ROW("krc/period", "s", "set-up", "FRI period, 0.001 .. 0.1", krc.period),
       conventionRow(),
       modeRow(),
-      ROW("krc/quality_perfect", "1", "ours", "share of the last 100 packets answered for PERFECT", krc.quality_perfect),
+      ROW("krc/quality_perfect", "1", "ours", "share of the last 100 packets answered for PERFECT",
+          krc.quality_perfect),
       ROW("krc/quality_ok", "1", "ours", "the same for OK", krc.quality_ok),
       ROW("krc/quality_bad", "1", "ours", "the same for BAD; below: UNACCEPTABLE", krc.quality_bad),
-      ROW("krc/entry_quality", "", "ours", "lowest quality (1 BAD .. 3 PERFECT) with which friStart succeeds", krc.entry_quality),
-      ROW("krc/extrapolated_packets", "", "ours", "successive losses bridged by extrapolation", krc.extrapolated_packets),
-      ROW("krc/entry_position_tolerance", "rad", "ours", "command against set-point on entry", krc.entry_position_tolerance),
-      ROW("krc/entry_frame_tolerance", "m, rad", "ours", "the same for a Cartesian command", krc.entry_frame_tolerance),
-      ROW("krc/torque_tolerance", "Nm", "ours", "added torque on entry and per step (users report about 1)", krc.torque_tolerance),
-      ROW("krc/speed_limit", "rad/s", "published", "per joint, KRC file rsidef7.dat", krc.speed_limit),
-      ROW("krc/t1_speed_limit", "rad/s", "published", "per joint in T1, CentroEPiaggio", krc.t1_speed_limit),
-      ROW("krc/speed_margin", "1", "ours", "share by which a step may exceed limit x period", krc.speed_margin),
-      ROW("krc/position_limit", "rad", "published", "mechanical range, both directions", krc.position_limit),
-      ROW("krc/torque_limit_time", "s", "ours", "full motor torque for so long switches the drives off", krc.torque_limit_time),
+      ROW("krc/entry_quality", "", "ours",
+          "lowest quality (1 BAD .. 3 PERFECT) with which friStart succeeds", krc.entry_quality),
+      ROW("krc/extrapolated_packets", "", "ours", "successive losses bridged by extrapolation",
+          krc.extrapolated_packets),
+      ROW("krc/entry_position_tolerance", "rad", "ours", "command against set-point on entry",
+          krc.entry_position_tolerance),
+      ROW("krc/entry_frame_tolerance", "m, rad", "ours", "the same for a Cartesian command",
+          krc.entry_frame_tolerance),
+      ROW("krc/torque_tolerance", "Nm", "ours",
+          "added torque on entry and per step (users report about 1)", krc.torque_tolerance),
+      ROW("krc/speed_limit", "rad/s", "published", "per joint, KRC file rsidef7.dat",
+          krc.speed_limit),
+      ROW("krc/t1_speed_limit", "rad/s", "published", "per joint in T1, CentroEPiaggio",
+          krc.t1_speed_limit),
+      ROW("krc/speed_margin", "1", "ours", "share by which a step may exceed limit x period",
+          krc.speed_margin),
+      ROW("krc/position_limit", "rad", "published", "mechanical range, both directions",
+          krc.position_limit),
+      ROW("krc/torque_limit_time", "s", "ours",
+          "full motor torque for so long switches the drives off", krc.torque_limit_time),
       ROW("krc/joint_stiffness_max", "Nm/rad", "ours", "largest accepted", krc.joint_stiffness_max),
       ROW("krc/frame_stiffness_max", "N/m", "ours", "largest accepted", krc.frame_stiffness_max),
-      ROW("krc/rotation_stiffness_max", "Nm/rad", "ours", "largest accepted", krc.rotation_stiffness_max),
-      ROW("krc/joint_stiffness", "Nm/rad", "published", "default of $STIFFNESS as clients set it", krc.joint_stiffness),
+      ROW("krc/rotation_stiffness_max", "Nm/rad", "ours", "largest accepted",
+          krc.rotation_stiffness_max),
+      ROW("krc/joint_stiffness", "Nm/rad", "published", "default of $STIFFNESS as clients set it",
+          krc.joint_stiffness),
       ROW("krc/frame_stiffness", "N/m", "published", "the same, translations", krc.frame_stiffness),
-      ROW("krc/rotation_stiffness", "Nm/rad", "published", "the same, rotations", krc.rotation_stiffness),
+      ROW("krc/rotation_stiffness", "Nm/rad", "published", "the same, rotations",
+          krc.rotation_stiffness),
       ROW("krc/damping", "1", "published", "the same, normalised damping", krc.damping),
-      ROW("krc/krl_poll", "s", "published", "between two looks of the KRL program at the exchange arrays", krc.krl_poll),
-      ROW("krc/krl_message_wait", "s", "published", "a program waits when it shows a message", krc.krl_message_wait),
-      ROW("krc/brake_release", "s", "ours", "duration of the tiny motion that opens the brakes", krc.brake_release),
+      ROW("krc/krl_poll", "s", "published",
+          "between two looks of the KRL program at the exchange arrays", krc.krl_poll),
+      ROW("krc/krl_message_wait", "s", "published", "a program waits when it shows a message",
+          krc.krl_message_wait),
+      ROW("krc/brake_release", "s", "ours", "duration of the tiny motion that opens the brakes",
+          krc.brake_release),
       ROW("krc/power_up", "s", "ours", "from acknowledging to full drive power", krc.power_up),
-      ROW("krc/acknowledge_by_program", "", "ours", "false: messages wait for an operator", krc.acknowledge_by_program),
-      ROW("krc/ambient_temperature", "degree Celsius", "ours", "of the drives at the start", krc.ambient_temperature),
+      ROW("krc/acknowledge_by_program", "", "ours", "false: messages wait for an operator",
+          krc.acknowledge_by_program),
+      ROW("krc/ambient_temperature", "degree Celsius", "ours", "of the drives at the start",
+          krc.ambient_temperature),
       ROW("arm/torque_limit", "Nm", "published", "of the motors at the joint", arm.torque_limit),
       ROW("arm/rotor_inertia", "kg m^2", "ours", "reflected to the joint", arm.rotor_inertia),
-      ROW("arm/coulomb_friction", "Nm", "ours", "per joint; the viscous part comes from the URDF", arm.coulomb_friction),
-      ROW("arm/coulomb_speed", "rad/s", "ours", "over which Coulomb friction reverses", arm.coulomb_speed),
-      ROW("arm/servo_bandwidth", "rad/s", "ours", "of the position servo, critically damped", arm.servo_bandwidth),
-      ROW("arm/nullspace_stiffness", "Nm/rad", "ours", "of the posture in Cartesian impedance", arm.nullspace_stiffness),
-      ROW("arm/block_stiffness", "Nm/rad", "ours", "of whatever holds a blocked arm", arm.block_stiffness),
-      ROW("arm/brake_torque_share", "1", "ours", "brake torque over motor torque limit", arm.brake_torque_share),
-      ROW("arm/unknown_load", "kg", "ours", "at the palm, not in the controller's load data", arm.unknown_load),
-      ROW("torque_noise/sigma", "Nm", "ours", "0.05 good sensors, 0.15 bad ones", torque_noise.sigma),
-      ROW("torque_noise/speed_gain", "s/rad", "ours", "growth of the noise with joint speed", torque_noise.speed_gain),
-      ROW("torque_noise/correlation_time", "s", "ours", "of the AR(1) noise", torque_noise.correlation_time),
-      ROW("torque_noise/bias", "Nm", "ours", "amplitude of the posture-dependent offset", torque_noise.bias),
-      ROW("torque_noise/hysteresis", "Nm", "ours", "of the external torque estimate", torque_noise.hysteresis),
-      ROW("torque_noise/hysteresis_speed", "rad/s", "ours", "over which it reverses", torque_noise.hysteresis_speed),
+      ROW("arm/coulomb_friction", "Nm", "ours", "per joint; the viscous part comes from the URDF",
+          arm.coulomb_friction),
+      ROW("arm/coulomb_speed", "rad/s", "ours", "over which Coulomb friction reverses",
+          arm.coulomb_speed),
+      ROW("arm/servo_bandwidth", "rad/s", "ours", "of the position servo, critically damped",
+          arm.servo_bandwidth),
+      ROW("arm/nullspace_stiffness", "Nm/rad", "ours", "of the posture in Cartesian impedance",
+          arm.nullspace_stiffness),
+      ROW("arm/block_stiffness", "Nm/rad", "ours", "of whatever holds a blocked arm",
+          arm.block_stiffness),
+      ROW("arm/brake_torque_share", "1", "ours", "brake torque over motor torque limit",
+          arm.brake_torque_share),
+      ROW("arm/unknown_load", "kg", "ours", "at the palm, not in the controller's load data",
+          arm.unknown_load),
+      ROW("torque_noise/sigma", "Nm", "ours", "0.05 good sensors, 0.15 bad ones",
+          torque_noise.sigma),
+      ROW("torque_noise/speed_gain", "s/rad", "ours", "growth of the noise with joint speed",
+          torque_noise.speed_gain),
+      ROW("torque_noise/correlation_time", "s", "ours", "of the AR(1) noise",
+          torque_noise.correlation_time),
+      ROW("torque_noise/bias", "Nm", "ours", "amplitude of the posture-dependent offset",
+          torque_noise.bias),
+      ROW("torque_noise/hysteresis", "Nm", "ours", "of the external torque estimate",
+          torque_noise.hysteresis),
+      ROW("torque_noise/hysteresis_speed", "rad/s", "ours", "over which it reverses",
+          torque_noise.hysteresis_speed),
       ROW("object/id", "", "set-up", "name of the object", object.id),
       ROW("object/mass", "kg", "set-up", "0.01 .. 10", object.mass),
       ROW("object/shape", "", "set-up", "box, cylinder or sphere", object.shape),
       ROW("object/size", "m", "set-up", "along x y z of the object frame", object.size),
       ROW("object/center", "m", "set-up", "centre of mass in the object frame", object.center),
       ROW("object/friction", "1", "set-up", "against hands and planes", object.friction),
-      ROW("object/finger_contact", "counts", "set-up", "motor positions at contact; negative: from the width", object.finger_contact),
+      ROW("object/finger_contact", "counts", "set-up",
+          "motor positions at contact; negative: from the width", object.finger_contact),
       ROW("object/start", "", "set-up", "human_hand, robot_hand or world", object_start),
       ROW("object/position", "m", "set-up", "of the object in that frame", object_pose.position),
-      ROW("object/rotation", "1", "set-up", "of the object in that frame, quaternion x y z w", object_pose.rotation),
-      ROW("contact/stiffness", "N/m^1.5", "ours", "Hunt-Crossley, per contact point", contact.stiffness),
-      ROW("contact/restitution_damping", "s/m", "ours", "Hunt-Crossley", contact.restitution_damping),
-      ROW("contact/slip_speed", "m/s", "ours", "over which Coulomb friction builds up", contact.slip_speed),
-      ROW("contact/human_stiffness", "N/m", "ours", "of the person's grip, 300-800", contact.human.stiffness),
-      ROW("contact/human_rotation_stiffness", "Nm/rad", "ours", "of the person's grip", contact.human.rotation_stiffness),
-      ROW("contact/robot_stiffness", "N/m", "ours", "of the robot's grasp", contact.robot.stiffness),
-      ROW("contact/robot_rotation_stiffness", "Nm/rad", "ours", "of the robot's grasp", contact.robot.rotation_stiffness),
-      ROW("contact/human_reach", "m", "ours", "hand to surface at which the person's grip finds the object", contact.human_reach),
-      ROW("contact/robot_reach", "m", "ours", "grasp centre to surface at which the fingers find the object", contact.robot_reach),
-      ROW("contact/grasp_center", "m", "ours", "in ih2_palm, where closing fingers meet", contact.grasp_center),
-      ROW("contact/newton_per_count", "N", "ours", "finger force per position count beyond contact", contact.newton_per_count),
+      ROW("object/rotation", "1", "set-up", "of the object in that frame, quaternion x y z w",
+          object_pose.rotation),
+      ROW("contact/stiffness", "N/m^1.5", "ours", "Hunt-Crossley, per contact point",
+          contact.stiffness),
+      ROW("contact/restitution_damping", "s/m", "ours", "Hunt-Crossley",
+          contact.restitution_damping),
+      ROW("contact/slip_speed", "m/s", "ours", "over which Coulomb friction builds up",
+          contact.slip_speed),
+      ROW("contact/human_stiffness", "N/m", "ours", "of the person's grip, 300-800",
+          contact.human.stiffness),
+      ROW("contact/human_rotation_stiffness", "Nm/rad", "ours", "of the person's grip",
+          contact.human.rotation_stiffness),
+      ROW("contact/robot_stiffness", "N/m", "ours", "of the robot's grasp",
+          contact.robot.stiffness),
+      ROW("contact/robot_rotation_stiffness", "Nm/rad", "ours", "of the robot's grasp",
+          contact.robot.rotation_stiffness),
+      ROW("contact/human_reach", "m", "ours",
+          "hand to surface at which the person's grip finds the object", contact.human_reach),
+      ROW("contact/robot_reach", "m", "ours",
+          "grasp centre to surface at which the fingers find the object", contact.robot_reach),
+      ROW("contact/grasp_center", "m", "ours", "in ih2_palm, where closing fingers meet",
+          contact.grasp_center),
+      ROW("contact/newton_per_count", "N", "ours", "finger force per position count beyond contact",
+          contact.newton_per_count),
       ROW("contact/finger_force_max", "N", "ours", "per finger", contact.finger_force_max),
-      ROW("contact/full_grasp_force", "N", "ours", "sum at which the grasp has its full stiffness", contact.full_grasp_force),
-      ROW("contact/current_per_count", "counts", "ours", "of motor current per position count beyond contact", contact.current_per_count),
+      ROW("contact/full_grasp_force", "N", "ours", "sum at which the grasp has its full stiffness",
+          contact.full_grasp_force),
+      ROW("contact/current_per_count", "counts", "ours",
+          "of motor current per position count beyond contact", contact.current_per_count),
       ROW("contact/floor_height", "m", "set-up", "world z", contact.floor_height),
-      ROW("contact/board_center", "m", "set-up", "middle of the board's upper side in the world", contact.board_center),
+      ROW("contact/board_center", "m", "set-up", "middle of the board's upper side in the world",
+          contact.board_center),
       ROW("contact/board_size", "m", "set-up", "along world x y; 0: no board", contact.board_size),
   };
 }

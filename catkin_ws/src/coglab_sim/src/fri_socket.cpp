@@ -24,7 +24,8 @@ FriSocket::FriSocket(const std::string& host) {
   own.sin_family = AF_INET;
   const bool loopback = (ntohl(address_) >> 24U) == 127U;
   own.sin_addr.s_addr = htonl(loopback ? INADDR_LOOPBACK : INADDR_ANY);
-  if (descriptor_ < 0 || bind(descriptor_, reinterpret_cast<const sockaddr*>(&own), sizeof(own)) != 0) {
+  if (descriptor_ < 0 ||
+      bind(descriptor_, reinterpret_cast<const sockaddr*>(&own), sizeof(own)) != 0) {
     const std::string reason = std::strerror(errno);
     if (descriptor_ >= 0) close(descriptor_);
     throw std::runtime_error("cannot open a UDP socket for FRI toward " + host + ": " + reason);
@@ -38,21 +39,25 @@ bool FriSocket::send(const std::uint8_t* bytes, std::size_t size, std::uint16_t 
   peer.sin_family = AF_INET;
   peer.sin_addr.s_addr = address_;
   peer.sin_port = htons(port);
-  return sendto(descriptor_, bytes, size, 0, reinterpret_cast<const sockaddr*>(&peer), sizeof(peer)) ==
-         static_cast<ssize_t>(size);
+  return sendto(descriptor_, bytes, size, 0, reinterpret_cast<const sockaddr*>(&peer),
+                sizeof(peer)) == static_cast<ssize_t>(size);
 }
 
-long FriSocket::receive(std::uint8_t* bytes, std::size_t capacity, std::chrono::steady_clock::time_point deadline) {
+long FriSocket::receive(std::uint8_t* bytes, std::size_t capacity,
+                        std::chrono::steady_clock::time_point deadline) {
   for (;;) {
     sockaddr_in sender{};
     socklen_t length = sizeof(sender);
-    const ssize_t size = recvfrom(descriptor_, bytes, capacity, MSG_TRUNC, reinterpret_cast<sockaddr*>(&sender), &length);
+    const ssize_t size = recvfrom(descriptor_, bytes, capacity, MSG_TRUNC,
+                                  reinterpret_cast<sockaddr*>(&sender), &length);
     if (size >= 0) return std::min<long>(size, static_cast<long>(capacity) + 1);
-    if (errno != EAGAIN && errno != EWOULDBLOCK && errno != EINTR && errno != ECONNREFUSED) return -1;
+    if (errno != EAGAIN && errno != EWOULDBLOCK && errno != EINTR && errno != ECONNREFUSED)
+      return -1;
     const auto left = deadline - std::chrono::steady_clock::now();
     if (left <= std::chrono::nanoseconds::zero()) return -1;
     const auto nanoseconds = std::chrono::duration_cast<std::chrono::nanoseconds>(left).count();
-    const timespec timeout{static_cast<time_t>(nanoseconds / 1000000000), static_cast<long>(nanoseconds % 1000000000)};
+    const timespec timeout{static_cast<time_t>(nanoseconds / 1000000000),
+                           static_cast<long>(nanoseconds % 1000000000)};
     pollfd wait{descriptor_, POLLIN, 0};
     ppoll(&wait, 1, &timeout, nullptr);
   }

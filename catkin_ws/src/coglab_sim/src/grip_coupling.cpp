@@ -16,13 +16,15 @@ void GripCoupling::engage(const Pose& hand, const Pose& object) {
   grip_point_ = object.inverse() * hand.position;
 }
 
-Wrench GripCoupling::evaluate(const Pose& hand, const Twist& hand_twist, const Pose& object, const Twist& object_twist,
-                              double closure, double friction, double mass, double inertia) {
+Wrench GripCoupling::evaluate(const Pose& hand, const Twist& hand_twist, const Pose& object,
+                              const Twist& object_twist, double closure, double friction,
+                              double mass, double inertia) {
   Wrench wrench;
   if (!engaged_ || closure <= 0.0) return wrench;
   const double stiffness = closure * std::min(figures_.stiffness, mass * kFastest * kFastest);
   const double damping = 2.0 * figures_.damping_ratio * std::sqrt(stiffness * mass);
-  const double turning = closure * std::min(figures_.rotation_stiffness, inertia * kFastest * kFastest);
+  const double turning =
+      closure * std::min(figures_.rotation_stiffness, inertia * kFastest * kFastest);
   const double turning_damping = 2.0 * figures_.damping_ratio * std::sqrt(turning * inertia);
 
   const Vector3d arm = object.rotation * grip_point_;
@@ -55,7 +57,8 @@ Wrench GripCoupling::evaluate(const Pose& hand, const Twist& hand_twist, const P
     if (spring > torque_limit && spring > 0.0) {
       const Vector3d excess = turn * (1.0 - torque_limit / spring);
       const Eigen::AngleAxisd back(-excess.norm(), excess.normalized());
-      in_hand_.rotation = (hand.rotation.conjugate() * (Quaterniond(back) * wanted_rotation)).normalized();
+      in_hand_.rotation =
+          (hand.rotation.conjugate() * (Quaterniond(back) * wanted_rotation)).normalized();
     }
   }
   wrench.add(force, arm);

@@ -8,11 +8,13 @@ namespace coglab_sim {
 namespace {
 
 constexpr double kGravity = 9.81;
-constexpr double kShareTime = 0.02;   // s over which load shares are averaged
-constexpr double kSafeGrip = 1.5;     // friction over weight at which a hand that was given the object holds it
+constexpr double kShareTime = 0.02;  // s over which load shares are averaged
+constexpr double kSafeGrip =
+    1.5;  // friction over weight at which a hand that was given the object holds it
 constexpr double kGripBegins = 0.05, kGripEnds = 0.02;
 
-// Palm and straight fingers as points in ih2_palm, from the shapes in the URDF; a point is a ball of this radius.
+// Palm and straight fingers as points in ih2_palm, from the shapes in the URDF; a point is a ball
+// of this radius.
 constexpr double kSkin = 0.006;
 const std::array<Vector3d, 9> kPalmPoints = {
     Vector3d(-kSkin, -0.035, -0.04), Vector3d(-kSkin, 0.0, -0.04), Vector3d(-kSkin, 0.035, -0.04),
@@ -43,10 +45,12 @@ std::array<int, 5> fingerContacts(const ObjectParameters& object) {
 
 const ObjectParameters& checked(const ObjectParameters& object) {
   if (!(object.mass >= 0.01 && object.mass <= 10.0)) {
-    throw std::invalid_argument("object mass is " + std::to_string(object.mass) + " kg, expected 0.01 .. 10");
+    throw std::invalid_argument("object mass is " + std::to_string(object.mass) +
+                                " kg, expected 0.01 .. 10");
   }
   if (!(object.friction >= 0.0 && object.friction <= 2.0)) {
-    throw std::invalid_argument("object friction is " + std::to_string(object.friction) + ", expected 0 .. 2");
+    throw std::invalid_argument("object friction is " + std::to_string(object.friction) +
+                                ", expected 0 .. 2");
   }
   return object;
 }
@@ -78,12 +82,17 @@ void ObjectPhysics::place(Placement placement, const Pose& pose) {
   center_ = pose * Pose{object_.center, Quaterniond::Identity()};
 }
 
-Pose ObjectPhysics::pose() const { return center_ * Pose{-object_.center, Quaterniond::Identity()}; }
+Pose ObjectPhysics::pose() const {
+  return center_ * Pose{-object_.center, Quaterniond::Identity()};
+}
 
-Twist ObjectPhysics::twist() const { return {speed_.at(center_.rotation * -object_.center), speed_.angular}; }
+Twist ObjectPhysics::twist() const {
+  return {speed_.at(center_.rotation * -object_.center), speed_.angular};
+}
 
 std::string ObjectPhysics::heldBy() const {
-  const bool robot = robot_grip_.engaged(), human = human_grip_.engaged() || (pinned_ && placement_ == Placement::HumanHand);
+  const bool robot = robot_grip_.engaged(),
+             human = human_grip_.engaged() || (pinned_ && placement_ == Placement::HumanHand);
   if (robot && human) return "both";
   if (robot || (pinned_ && placement_ == Placement::RobotHand)) return "robot";
   if (human) return "human";
@@ -93,7 +102,8 @@ std::string ObjectPhysics::heldBy() const {
 
 bool ObjectPhysics::inGrasp(const Pose& palm) const {
   Vector3d normal;
-  return shape_.distance(center_.inverse() * (palm * contact_.grasp_center), normal) < contact_.robot_reach;
+  return shape_.distance(center_.inverse() * (palm * contact_.grasp_center), normal) <
+         contact_.robot_reach;
 }
 
 FingerContactState ObjectPhysics::fingerContact(const Pose& palm) const {
@@ -108,7 +118,8 @@ FingerContactState ObjectPhysics::fingerContact(const Pose& palm) const {
 }
 
 void ObjectPhysics::watchFingers(const Pose& palm, const FingerInput& fingers) {
-  const bool there = pinned_ ? placement_ == Placement::RobotHand : robot_grip_.engaged() || inGrasp(palm);
+  const bool there =
+      pinned_ ? placement_ == Placement::RobotHand : robot_grip_.engaged() || inGrasp(palm);
   for (std::size_t i = 0; i < folded_.size(); ++i) {
     const bool closed = fingers[i] >= finger_contact_[i];
     folded_[i] = closed && (folded_[i] || !there);
@@ -169,8 +180,8 @@ Wrench ObjectPhysics::planes() {
   return wrench;
 }
 
-Wrench ObjectPhysics::palmTouch(const Pose& palm, const Twist& palm_twist, const FingerInput& fingers,
-                                Wrench& reaction) const {
+Wrench ObjectPhysics::palmTouch(const Pose& palm, const Twist& palm_twist,
+                                const FingerInput& fingers, Wrench& reaction) const {
   Wrench wrench;
   const Pose to_object = center_.inverse() * palm;
   const auto at = [&](const Vector3d& in_palm) {
@@ -202,8 +213,8 @@ void ObjectPhysics::pin(const Pose& hand, const Twist& twist) {
   speed_ = {twist.at(center_.position - hand.position), twist.angular};
 }
 
-Wrench ObjectPhysics::step(const Pose& palm, const Twist& palm_twist, const HumanInput& human, bool human_present,
-                           const FingerInput& fingers, double dt) {
+Wrench ObjectPhysics::step(const Pose& palm, const Twist& palm_twist, const HumanInput& human,
+                           bool human_present, const FingerInput& fingers, double dt) {
   watchFingers(palm, fingers);
   if (pinned_) {
     // What is placed into a hand stays there until that hand really holds it.
@@ -213,7 +224,8 @@ Wrench ObjectPhysics::step(const Pose& palm, const Twist& palm_twist, const Huma
       return {};
     }
     pin(in_robot ? palm : human.hand, in_robot ? palm_twist : human.twist);
-    const double normal_force = in_robot ? fingerForce(fingers) : 2.0 * human.grip * human.grip_force;
+    const double normal_force =
+        in_robot ? fingerForce(fingers) : 2.0 * human.grip * human.grip_force;
     pinned_ = object_.friction * normal_force < kSafeGrip * object_.mass * kGravity;
     if (pinned_) return {};
     if (in_robot) {
@@ -239,12 +251,12 @@ Wrench ObjectPhysics::step(const Pose& palm, const Twist& palm_twist, const Huma
   }
 
   const double smallest = inertia_.minCoeff();
-  const Wrench by_human =
-      human_grip_.evaluate(human.hand, human.twist, center_, speed_, std::clamp(human.grip, 0.0, 1.0),
-                           2.0 * object_.friction * human.grip * human.grip_force, object_.mass, smallest);
-  const Wrench by_grasp =
-      robot_grip_.evaluate(palm, palm_twist, center_, speed_, std::min(1.0, finger_force / contact_.full_grasp_force),
-                           object_.friction * finger_force, object_.mass, smallest);
+  const Wrench by_human = human_grip_.evaluate(
+      human.hand, human.twist, center_, speed_, std::clamp(human.grip, 0.0, 1.0),
+      2.0 * object_.friction * human.grip * human.grip_force, object_.mass, smallest);
+  const Wrench by_grasp = robot_grip_.evaluate(
+      palm, palm_twist, center_, speed_, std::min(1.0, finger_force / contact_.full_grasp_force),
+      object_.friction * finger_force, object_.mass, smallest);
   Wrench on_palm;
   const Wrench by_palm = palmTouch(palm, palm_twist, fingers, on_palm);
   const Wrench by_plane = planes();
@@ -275,7 +287,8 @@ Wrench ObjectPhysics::step(const Pose& palm, const Twist& palm_twist, const Huma
   const Vector3d turn = dt * speed_.angular;
   const double angle = turn.norm();
   if (angle > 1e-12) {
-    center_.rotation = (Quaterniond(Eigen::AngleAxisd(angle, turn / angle)) * center_.rotation).normalized();
+    center_.rotation =
+        (Quaterniond(Eigen::AngleAxisd(angle, turn / angle)) * center_.rotation).normalized();
   }
   return on_palm;
 }

@@ -9,7 +9,8 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-// A measurement that left later than this share of a period leaves the PC too little time to be blamed.
+// A measurement that left later than this share of a period leaves the PC too little time to be
+// blamed.
 constexpr double kLateShare = 0.2;
 // Periods behind schedule after which the schedule starts anew instead of catching up.
 constexpr int kGiveUp = 5;
@@ -17,10 +18,12 @@ constexpr std::size_t kMaxRecords = 100000;  // if nobody takes them
 
 }  // namespace
 
-RealTimeCell::RealTimeCell(const CellConfig& config, const std::string& host, std::uint16_t port, double factor)
+RealTimeCell::RealTimeCell(const CellConfig& config, const std::string& host, std::uint16_t port,
+                           double factor)
     : cell_(config), socket_(host), factor_(factor), port_(port) {
   if (!(factor >= 0.01 && factor <= 100.0)) {
-    throw std::invalid_argument("speed factor is " + std::to_string(factor) + ", expected 0.01 .. 100");
+    throw std::invalid_argument("speed factor is " + std::to_string(factor) +
+                                ", expected 0.01 .. 100");
   }
 }
 
@@ -44,7 +47,8 @@ void RealTimeCell::stop() {
 }
 
 void RealTimeCell::run() {
-  const auto period = std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(cell_.period() / factor_));
+  const auto period = std::chrono::duration_cast<Clock::duration>(
+      std::chrono::duration<double>(cell_.period() / factor_));
   auto deadline = Clock::now();
   auto sent_at = deadline;
   bool sent_late = false;
@@ -55,14 +59,16 @@ void RealTimeCell::run() {
       for (;;) {
         const long size = socket_.receive(buffer.data(), buffer.size(), until);
         if (size < 0) return;
-        const double latency = std::chrono::duration<double>(Clock::now() - sent_at).count() * factor_;
+        const double latency =
+            std::chrono::duration<double>(Clock::now() - sent_at).count() * factor_;
         cell_.receive(buffer.data(), static_cast<std::size_t>(size), latency);
         answered = true;
       }
     };
     listenUntil(deadline);
     const auto now = Clock::now();
-    const bool late = now - deadline > std::chrono::duration_cast<Clock::duration>(period * kLateShare);
+    const bool late =
+        now - deadline > std::chrono::duration_cast<Clock::duration>(period * kLateShare);
 
     applyInputs();
     cell_.advance(!sent_late);
@@ -90,8 +96,8 @@ void RealTimeCell::applyInputs() {
     cell_.setPush(push_);
     actions.swap(actions_);
     const double time = cell_.controller().time();
-    const auto later =
-        std::stable_partition(delayed_.begin(), delayed_.end(), [&](const Delayed& d) { return d.time > time; });
+    const auto later = std::stable_partition(delayed_.begin(), delayed_.end(),
+                                             [&](const Delayed& d) { return d.time > time; });
     std::move(later, delayed_.end(), std::back_inserter(due));
     delayed_.erase(later, delayed_.end());
   }
@@ -119,8 +125,10 @@ void RealTimeCell::leaveResults(bool answered) {
   ++snapshot_.tick;
   if (answered) ++snapshot_.answers;
   if (records_.size() < kMaxRecords) records_.push_back(record);
-  const std::uint64_t fresh = std::min<std::uint64_t>(controller.messageCount() - messages_seen_, controller.messages().size());
-  messages_.insert(messages_.end(), controller.messages().end() - static_cast<std::ptrdiff_t>(fresh),
+  const std::uint64_t fresh = std::min<std::uint64_t>(controller.messageCount() - messages_seen_,
+                                                      controller.messages().size());
+  messages_.insert(messages_.end(),
+                   controller.messages().end() - static_cast<std::ptrdiff_t>(fresh),
                    controller.messages().end());
   messages_seen_ = controller.messageCount();
 }

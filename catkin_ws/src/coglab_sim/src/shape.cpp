@@ -17,13 +17,15 @@ constexpr int kRimPoints = 8;
 
 }  // namespace
 
-Shape::Shape(const std::string& kind, const Vector3d& size) : kind_(kindOf(kind)), half_(0.5 * size) {
+Shape::Shape(const std::string& kind, const Vector3d& size)
+    : kind_(kindOf(kind)), half_(0.5 * size) {
   if (!size.allFinite() || size.minCoeff() <= 0.0) {
     throw std::invalid_argument("size of a " + kind + " must be positive, m");
   }
   if (kind_ == Kind::Box) {
     for (int corner = 0; corner < 8; ++corner) {
-      supports_.emplace_back((corner & 1) != 0 ? half_.x() : -half_.x(), (corner & 2) != 0 ? half_.y() : -half_.y(),
+      supports_.emplace_back((corner & 1) != 0 ? half_.x() : -half_.x(),
+                             (corner & 2) != 0 ? half_.y() : -half_.y(),
                              (corner & 4) != 0 ? half_.z() : -half_.z());
     }
   } else if (kind_ == Kind::Cylinder) {
@@ -46,7 +48,8 @@ double Shape::distance(const Vector3d& point, Vector3d& normal) const {
   }
   if (kind_ == Kind::Cylinder) {
     const double r = std::hypot(point.x(), point.y());
-    const Vector3d radial = r > 1e-9 ? Vector3d(point.x() / r, point.y() / r, 0.0) : Vector3d::UnitX();
+    const Vector3d radial =
+        r > 1e-9 ? Vector3d(point.x() / r, point.y() / r, 0.0) : Vector3d::UnitX();
     const Vector3d axial(0.0, 0.0, point.z() < 0.0 ? -1.0 : 1.0);
     const double out = r - half_.x(), up = std::abs(point.z()) - half_.z();
     if (out > 0.0 && up > 0.0) {
@@ -58,7 +61,8 @@ double Shape::distance(const Vector3d& point, Vector3d& normal) const {
   }
   const Vector3d gap = point.cwiseAbs() - half_;
   const Vector3d outside = gap.cwiseMax(0.0);
-  const Vector3d sign(std::copysign(1.0, point.x()), std::copysign(1.0, point.y()), std::copysign(1.0, point.z()));
+  const Vector3d sign(std::copysign(1.0, point.x()), std::copysign(1.0, point.y()),
+                      std::copysign(1.0, point.z()));
   const double length = outside.norm();
   if (length > 0.0) {
     normal = outside.cwiseProduct(sign) / length;

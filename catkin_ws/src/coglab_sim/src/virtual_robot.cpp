@@ -10,8 +10,10 @@ COGLAB_REGISTER_MOTION_CONTROLLER("coglab/DmpController", coglab_controllers::Dm
 namespace coglab_sim {
 namespace {
 const coglab_controllers::MotionRegistration ptp_registration(
-    "coglab/PtpController",
-    {[]() -> coglab_controllers::MotionController* { return new coglab_controllers::PtpController(); }, nullptr});
+    "coglab/PtpController", {[]() -> coglab_controllers::MotionController* {
+                               return new coglab_controllers::PtpController();
+                             },
+                             nullptr});
 
 std::string textOf(const std::string& path) {
   std::ifstream file(path);
@@ -24,7 +26,8 @@ std::string textOf(const std::string& path) {
 lwr_fri_bridge::BridgeConfig bridgeConfig(const VirtualRobotConfig& config) {
   lwr_fri_bridge::BridgeConfig bridge;
   bridge.limits = lwr_fri_bridge::loadJointLimits(config.limits_file);
-  bridge.krl_convention = lwr_fri_bridge::fri::krlConventionFromName(krc::nameOf(config.cell.krc.convention));
+  bridge.krl_convention =
+      lwr_fri_bridge::fri::krlConventionFromName(krc::nameOf(config.cell.krc.convention));
   return bridge;
 }
 
@@ -64,7 +67,8 @@ VirtualRobot::VirtualRobot(const VirtualRobotConfig& config)
     : cell_(config.cell),
       bridge_(bridgeConfig(config)),
       period_ns_(static_cast<std::int64_t>(std::llround(1e9 * config.cell.krc.period))) {
-  auto settings = coglab_controllers::readManagerSettings(YAML::Load(config.manager_parameters), textOf(config.cell.urdf),
+  auto settings = coglab_controllers::readManagerSettings(YAML::Load(config.manager_parameters),
+                                                          textOf(config.cell.urdf),
                                                           bridge_.config().limits, true);
   settings.clock = [this] { return now_ns_; };
   // The controllers are linked into this library; no shared object with a ROS side is needed.
@@ -89,12 +93,14 @@ coglab_controllers::Answer VirtualRobot::load(const std::string& id, const std::
 }
 
 coglab_controllers::DmpController& VirtualRobot::dmp(const std::string& id) {
-  if (auto* dmp = dynamic_cast<coglab_controllers::DmpController*>(manager_->motion(id))) return *dmp;
+  if (auto* dmp = dynamic_cast<coglab_controllers::DmpController*>(manager_->motion(id)))
+    return *dmp;
   throw std::invalid_argument("no DMP controller is loaded under the id '" + id + "'");
 }
 
 coglab_controllers::PtpController& VirtualRobot::ptp(const std::string& id) {
-  if (auto* ptp = dynamic_cast<coglab_controllers::PtpController*>(manager_->motion(id))) return *ptp;
+  if (auto* ptp = dynamic_cast<coglab_controllers::PtpController*>(manager_->motion(id)))
+    return *ptp;
   throw std::invalid_argument("no point-to-point controller is loaded under the id '" + id + "'");
 }
 
@@ -128,7 +134,8 @@ void VirtualRobot::controlCycle(bool answered) {
   since_cycle_ = 0;
   coglab_controllers::RobotSample sample;
   bridge_.port().newestSample(sample);
-  const double dt = last_sequence_ == 0 ? wanted : static_cast<double>(sample.sequence - last_sequence_) * period;
+  const double dt =
+      last_sequence_ == 0 ? wanted : static_cast<double>(sample.sequence - last_sequence_) * period;
   last_sequence_ = sample.sequence;
   coglab_controllers::VelocityCommand command;
   cycle.run(sample, std::min(dt, cycle.settings().sample_timeout), command);

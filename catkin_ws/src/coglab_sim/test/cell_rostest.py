@@ -18,7 +18,7 @@ from geometry_msgs.msg import Point, Pose, Quaternion
 from std_msgs.msg import String
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
-from fri_client import COMMAND, MONITOR, Client, parse  # noqa: E402
+from fri_client import COMMAND, MONITOR, Client, parse
 
 
 class Bridge(threading.Thread):
@@ -39,7 +39,7 @@ class Bridge(threading.Thread):
         while not rospy.is_shutdown():
             try:
                 data, peer = self.socket.recvfrom(2048)
-            except socket.timeout:
+            except TimeoutError:
                 continue
             self.received += 1
             self.peers.add(peer)

@@ -47,7 +47,7 @@ class Client:
     def answer(self, measurement: bytes, position=None, **overrides) -> bytes:
         """The command that answers `measurement`; `position` (7 rad) instead of the mirrored set-point."""
         fields = parse(measurement)
-        set_point = [a + b for a, b in zip(fields['commanded'], fields['offset'])]
+        set_point = [a + b for a, b in zip(fields['commanded'], fields['offset'], strict=True)]
         self.counter = (self.counter + 1) & 0xFFFF
         data = bytearray(376)
         header = overrides.get('header', (self.counter, fields['header'][0], 376, 0x1005))
@@ -119,4 +119,4 @@ class Session:
 
 def set_point(fields: dict) -> list[float]:
     """Commanded total of a measurement."""
-    return [a + b for a, b in zip(fields['commanded'], fields['offset'])]
+    return [a + b for a, b in zip(fields['commanded'], fields['offset'], strict=True)]

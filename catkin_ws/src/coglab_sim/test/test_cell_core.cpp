@@ -43,7 +43,8 @@ TEST(Shape, DistanceIsThatToTheNearestSurfacePoint) {
   for (const char* kind : {"box", "cylinder", "sphere"}) {
     const Shape shape(kind, Vector3d(0.1, 0.1, kind[0] == 's' ? 0.1 : 0.2));
     for (int i = 0; i < 2000; ++i) {
-      const Vector3d point(0.4 * random.uniform() - 0.2, 0.4 * random.uniform() - 0.2, 0.4 * random.uniform() - 0.2);
+      const Vector3d point(0.4 * random.uniform() - 0.2, 0.4 * random.uniform() - 0.2,
+                           0.4 * random.uniform() - 0.2);
       Vector3d normal, again;
       const double distance = shape.distance(point, normal);
       EXPECT_NEAR(normal.norm(), 1.0, 1e-12);
@@ -187,7 +188,8 @@ TEST(CellConfig, EveryParameterGoesInAndOut) {
   for (const CellParameter& parameter : cellParameters()) {
     SCOPED_TRACE(parameter.name);
     EXPECT_FALSE(parameter.description.empty());
-    EXPECT_TRUE(parameter.source == "published" || parameter.source == "ours" || parameter.source == "set-up");
+    EXPECT_TRUE(parameter.source == "published" || parameter.source == "ours" ||
+                parameter.source == "set-up");
     const ParameterValue value = parameter.get(config);
     parameter.set(config, value);
     EXPECT_TRUE(parameter.get(config) == value);

@@ -1,4 +1,4 @@
-"""The controller stand-in's session: states, statistics, power, entry, faults. Bytes are read a second time in fri_client."""
+"""The controller stand-in's session: states, statistics, power, entry, faults. fri_client reads the bytes a second time."""
 import math
 import random
 import struct
@@ -29,7 +29,7 @@ def test_quality_is_earned_over_100_packets(session):
     changes = {level: seen.index(level) for level in (1, 2, 3)}
     assert changes == {1: 80, 2: 95, 3: 99}
     levels = []
-    for i in range(25):  # without answers it falls again through all levels
+    for _ in range(25):  # without answers it falls again through all levels
         levels.append(s.tick(answer=False)['quality'])
     assert sorted(set(levels), reverse=True) == [3, 2, 1, 0]
     fields = s.tick(answer=False)

@@ -60,9 +60,16 @@ class Trial:
                              f'{self.human.phase}, {self.robot.cell.messages[-3:]}')
 
     def request(self, event):
-        ticket = self.robot.submit(event)
-        self.until(lambda *_: (out := self.robot.outcome(ticket)) is not None and (setattr(self, 'out', out) or True), 10)
-        assert self.out[0], self.out
+        ticket, ended = self.robot.submit(event), []
+
+        def over(*_):
+            outcome = self.robot.outcome(ticket)
+            if outcome is not None:
+                ended.append(outcome)
+            return bool(ended)
+
+        self.until(over, 10)
+        assert ended[0][0], ended
 
     def start(self):
         for controller, kind in (('dmp', 'coglab/DmpController'), ('ptp', 'coglab/PtpController')):
@@ -78,7 +85,8 @@ class Trial:
         self.start()
         self.human.command('give mug')
         self.until(lambda *_: self.human.phase == 'waiting', 6)
-        good, message = self.robot.execute_dmp('reach_human', orientation_control=True, goal_frame='object_mug', **GRASP)
+        good, message = self.robot.execute_dmp('reach_human', orientation_control=True,
+                                                goal_frame='object_mug', **GRASP)
         assert good, message
         self.until(lambda report, _: report['motion'] == 'reached', 8)
         self.reached = self.robot.cell.truth()

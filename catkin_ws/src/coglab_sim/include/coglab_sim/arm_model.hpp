@@ -15,21 +15,22 @@ namespace coglab_sim {
 
 /// Everything the cell needs at one joint configuration.
 struct ArmTerms {
-  Matrix7 mass;        ///< link side, kg m^2
-  Vector7 coriolis;    ///< C(q, dq) dq, Nm
-  Vector7 gravity;     ///< torque that holds the arm against gravity, Nm
-  Matrix67 jacobian;   ///< of the tip, world axes: rows x y z, rx ry rz
-  Pose tip;            ///< ih2_palm in the world
+  Matrix7 mass;       ///< link side, kg m^2
+  Vector7 coriolis;   ///< C(q, dq) dq, Nm
+  Vector7 gravity;    ///< torque that holds the arm against gravity, Nm
+  Matrix67 jacobian;  ///< of the tip, world axes: rows x y z, rx ry rz
+  Pose tip;           ///< ih2_palm in the world
 };
 
 /// Rigid-body model between two links of a URDF with seven joints in between.
 ///
-/// Links that hang beside the chain (fingers) count with their mass in the position zero of their joints. Links behind
-/// fixed joints are merged, so that the recursion runs over seven bodies.
+/// Links that hang beside the chain (fingers) count with their mass in the position zero of their
+/// joints. Links behind fixed joints are merged, so that the recursion runs over seven bodies.
 class ArmModel {
  public:
   /// @param urdf  path of the robot description
-  /// @throws std::runtime_error naming file and link if the chain cannot be built or has not exactly seven joints.
+  /// @throws std::runtime_error naming file and link if the chain cannot be built or has not
+  /// exactly seven joints.
   explicit ArmModel(const std::string& urdf, const std::string& base = "lwr_base_link",
                     const std::string& tip = "ih2_palm");
   ArmModel(const ArmModel&) = delete;

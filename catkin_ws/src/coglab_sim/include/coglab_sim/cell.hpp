@@ -14,30 +14,34 @@ using MeasurementBytes = std::array<std::uint8_t, lwr_fri_bridge::fri::kMeasurem
 
 /// What really happens in the cell. Nothing in control may read it.
 struct CellTruth {
-  double time = 0.0;      ///< s, simulated
+  double time = 0.0;  ///< s, simulated
   Pose object, human_hand, robot_hand;
   Twist object_twist;
   Vector3d palm_force = Vector3d::Zero();  ///< N, on the robot hand
   double robot_load_share = 0.0, human_load_share = 0.0;
   std::string held_by;
   bool dropped = false;
-  Vector7 position, velocity, set_point;   ///< of the arm
-  Vector7 external_torque;                 ///< without any error, Nm
+  Vector7 position, velocity, set_point;  ///< of the arm
+  Vector7 external_torque;                ///< without any error, Nm
 };
 
-/// One FRI period at a time; no clock, no thread, no socket of its own. The same configuration and inputs give the same bytes.
+/// One FRI period at a time; no clock, no thread, no socket of its own. The same configuration and
+/// inputs give the same bytes.
 class Cell {
  public:
   /// @throws std::invalid_argument or std::runtime_error with what is wrong in the configuration.
   explicit Cell(const CellConfig& config);
 
-  /// Lockstep: takes the answer to the last measurement (none: null and 0), advances one period and returns the next
-  /// measurement. Look at `sent()`: the controller does not send while FRI is closed or its packet got lost.
+  /// Lockstep: takes the answer to the last measurement (none: null and 0), advances one period and
+  /// returns the next measurement. Look at `sent()`: the controller does not send while FRI is
+  /// closed or its packet got lost.
   const MeasurementBytes& step(const std::uint8_t* answer, std::size_t size);
 
-  /// The same in two parts for a real clock: hand over datagrams as they come, `latency` s after the measurement...
+  /// The same in two parts for a real clock: hand over datagrams as they come, `latency` s after
+  /// the measurement...
   void receive(const std::uint8_t* bytes, std::size_t size, double latency);
-  /// ...and advance when the period is over. `on_time` false: the caller was late, a missing answer is not the PC's fault.
+  /// ...and advance when the period is over. `on_time` false: the caller was late, a missing answer
+  /// is not the PC's fault.
   const MeasurementBytes& advance(bool on_time = true);
 
   bool sent() const { return sent_; }
@@ -46,7 +50,9 @@ class Cell {
   // Inputs, valid until changed
   void setHuman(const HumanInput& human);
   void setFingers(const FingerInput& fingers) { fingers_ = fingers; }
-  void setPush(const Wrench& push) { push_ = push; }  ///< on the palm about its origin, besides the object
+  void setPush(const Wrench& push) {
+    push_ = push;
+  }  ///< on the palm about its origin, besides the object
   void place(Placement placement, const Pose& pose) { object_.place(placement, pose); }
   /// Exchanges the object; it is then to be placed. @throws std::invalid_argument
   void setObject(const ObjectParameters& object);

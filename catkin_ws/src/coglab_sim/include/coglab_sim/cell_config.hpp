@@ -1,8 +1,9 @@
 /// @file
 /// Everything that can be set about the simulated cell, by name.
 ///
-/// The table behind `cellParameters()` is used by the node (ROS parameters), by the Python binding (keyword arguments) and by
-/// the documentation, so that a figure has one name and one default. Source tells `published` figures from `ours`.
+/// The table behind `cellParameters()` is used by the node (ROS parameters), by the Python binding
+/// (keyword arguments) and by the documentation, so that a figure has one name and one default.
+/// Source tells `published` figures from `ours`.
 #pragma once
 
 #include <array>
@@ -39,9 +40,9 @@ using ParameterValue = std::variant<bool, int, double, std::string, std::vector<
 
 /// One row of the table.
 struct CellParameter {
-  std::string name;         ///< such as "krc/quality_ok"
+  std::string name;  ///< such as "krc/quality_ok"
   std::string unit;
-  std::string source;       ///< "published" (fri.md names where), "ours" or "set-up"
+  std::string source;  ///< "published" (fri.md names where), "ours" or "set-up"
   std::string description;
   std::function<ParameterValue(const CellConfig&)> get;
   /// @throws std::invalid_argument with name, what was expected and what came.
@@ -51,7 +52,8 @@ struct CellParameter {
 /// All rows, in a fixed order.
 const std::vector<CellParameter>& cellParameters();
 
-/// Sets one parameter. @throws std::invalid_argument if the name is unknown or the value does not fit.
+/// Sets one parameter. @throws std::invalid_argument if the name is unknown or the value does not
+/// fit.
 void setCellParameter(CellConfig& config, const std::string& name, const ParameterValue& value);
 
 }  // namespace coglab_sim

@@ -1,5 +1,6 @@
 /// @file
-/// Vectors, poses and wrenches of the simulated cell. World axes are those of `lwr_base_link`; SI units.
+/// Vectors, poses and wrenches of the simulated cell. World axes are those of `lwr_base_link`; SI
+/// units.
 #pragma once
 
 #include <Eigen/Core>
@@ -19,7 +20,7 @@ using Eigen::Vector3d;
 
 /// Position and orientation of a frame in another one.
 struct Pose {
-  Vector3d position = Vector3d::Zero();             ///< m
+  Vector3d position = Vector3d::Zero();            ///< m
   Quaterniond rotation = Quaterniond::Identity();  ///< unit length
 
   Pose operator*(const Pose& other) const {
@@ -58,7 +59,8 @@ struct Wrench {
   }
 };
 
-/// Rotation vector (rad) that turns `from` into `to`, the short way round, in the axes both are given in.
+/// Rotation vector (rad) that turns `from` into `to`, the short way round, in the axes both are
+/// given in.
 inline Vector3d rotationBetween(const Quaterniond& from, const Quaterniond& to) {
   Quaterniond difference = to * from.conjugate();
   if (difference.w() < 0.0) difference.coeffs() = -difference.coeffs();

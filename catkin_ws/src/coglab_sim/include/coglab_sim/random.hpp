@@ -1,5 +1,6 @@
 /// @file
-/// The random numbers of the simulated cell: one small generator, so that a seed gives the same numbers on every machine.
+/// The random numbers of the simulated cell: one small generator, so that a seed gives the same
+/// numbers on every machine.
 #pragma once
 
 #include <cmath>
@@ -7,8 +8,9 @@
 
 namespace coglab_sim {
 
-/// PCG-XSH-RR 64/32 (O'Neill, "PCG: A Family of Simple Fast Space-Efficient Statistically Good Algorithms", 2014).
-/// The standard library's distributions differ between implementations, so the two that are needed are here too.
+/// PCG-XSH-RR 64/32 (O'Neill, "PCG: A Family of Simple Fast Space-Efficient Statistically Good
+/// Algorithms", 2014). The standard library's distributions differ between implementations, so the
+/// two that are needed are here too.
 class Random {
  public:
   /// Generators with the same seed and different streams are independent.
@@ -30,7 +32,8 @@ class Random {
   /// Uniform in [0, 1).
   double uniform() { return next() * (1.0 / 4294967296.0); }
 
-  /// Normal with mean 0 and variance 1 (Marsaglia's polar method; the second value of each pair is kept).
+  /// Normal with mean 0 and variance 1 (Marsaglia's polar method; the second value of each pair is
+  /// kept).
   double normal() {
     if (has_spare_) {
       has_spare_ = false;

@@ -19,7 +19,7 @@ namespace coglab_sim {
 struct TickRecord {
   double time = 0.0;  ///< s, simulated, at the end of the period
   int state = 0, quality = 0, power = 0, control = 0;
-  bool answered = false;   ///< the last measurement got its answer in time
+  bool answered = false;        ///< the last measurement got its answer in time
   Vector7 commanded, measured;  ///< rad
 };
 
@@ -27,9 +27,9 @@ struct TickRecord {
 struct CellSnapshot {
   CellTruth truth;
   FingerContactState finger_contact;
-  std::uint64_t tick = 0;           ///< number of periods so far
-  std::uint64_t late_ticks = 0;     ///< periods that the thread itself began too late
-  std::uint64_t answers = 0;        ///< datagrams received so far
+  std::uint64_t tick = 0;        ///< number of periods so far
+  std::uint64_t late_ticks = 0;  ///< periods that the thread itself began too late
+  std::uint64_t answers = 0;     ///< datagrams received so far
 };
 
 /// Runs a Cell in real time times a factor.
@@ -37,7 +37,8 @@ class RealTimeCell {
  public:
   /// @param factor  simulated over real time, 0.01 .. 100
   /// @throws what Cell and FriSocket throw, std::invalid_argument for the factor
-  RealTimeCell(const CellConfig& config, const std::string& host, std::uint16_t port, double factor);
+  RealTimeCell(const CellConfig& config, const std::string& host, std::uint16_t port,
+               double factor);
   ~RealTimeCell();
   RealTimeCell(const RealTimeCell&) = delete;
   RealTimeCell& operator=(const RealTimeCell&) = delete;
@@ -51,14 +52,15 @@ class RealTimeCell {
   void setHuman(const HumanInput& human);
   void setFingers(const FingerInput& fingers);
   void setPush(const Wrench& push);
-  /// Runs `action` between two periods. @throws what it throws, std::runtime_error if the thread does not get to it in 1 s.
+  /// Runs `action` between two periods. @throws what it throws, std::runtime_error if the thread
+  /// does not get to it in 1 s.
   void apply(std::function<void(Cell&)> action);
   /// Runs `action` after so many simulated seconds.
   void applyLater(double delay, std::function<void(Cell&)> action);
 
   CellSnapshot snapshot() const;
-  std::vector<TickRecord> takeRecords();         ///< since the last call
-  std::vector<krc::Message> takeMessages();      ///< of the controller, since the last call
+  std::vector<TickRecord> takeRecords();     ///< since the last call
+  std::vector<krc::Message> takeMessages();  ///< of the controller, since the last call
   /// The thread ended by itself with this error; empty while it runs.
   std::string failure() const;
 

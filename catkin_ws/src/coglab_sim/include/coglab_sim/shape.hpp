@@ -19,10 +19,12 @@ class Shape {
   /// @throws std::invalid_argument for an unknown kind or a size that is not positive and finite.
   Shape(const std::string& kind, const Vector3d& size);
 
-  /// Distance of a point from the surface, m, negative inside; `normal` receives the outward direction there.
+  /// Distance of a point from the surface, m, negative inside; `normal` receives the outward
+  /// direction there.
   double distance(const Vector3d& point, Vector3d& normal) const;
 
-  /// Points of the surface that can carry the solid on a plane: corners, rims, or for a sphere none (see radius()).
+  /// Points of the surface that can carry the solid on a plane: corners, rims, or for a sphere none
+  /// (see radius()).
   const std::vector<Vector3d>& supports() const { return supports_; }
   Kind kind() const { return kind_; }
   double radius() const { return half_.x(); }

@@ -2,10 +2,12 @@
 /// Joint torque signals as imperfect as D4.10 describes those of the real arm.
 ///
 ///   measured = ideal joint torque + noise
-///   external = J^T F + bias(q) + hysteresis sign(dq) + noise,   noise AR(1) with deviation sigma (1 + k |dq|)
+///   external = J^T F + bias(q) + hysteresis sign(dq) + noise,   noise AR(1) with deviation sigma
+///   (1 + k |dq|)
 ///
-/// An offset that depends on the posture stays in the estimate and the noise grows about eightfold at 1 rad/s: this is why
-/// contact has to be detected from changes, and only while the arm stands still.
+/// An offset that depends on the posture stays in the estimate and the noise grows about eightfold
+/// at 1 rad/s: this is why contact has to be detected from changes, and only while the arm stands
+/// still.
 #pragma once
 
 #include "coglab_sim/geometry.hpp"
@@ -15,11 +17,11 @@ namespace coglab_sim {
 
 /// All defaults are ours, to be replaced by a recording of a real arm at rest.
 struct TorqueNoise {
-  double sigma = 0.05;           ///< Nm; 0.05 stands for good sensors, 0.15 for bad ones
-  double speed_gain = 7.0;       ///< s/rad, k above; |dq| is the largest joint speed
+  double sigma = 0.05;             ///< Nm; 0.05 stands for good sensors, 0.15 for bad ones
+  double speed_gain = 7.0;         ///< s/rad, k above; |dq| is the largest joint speed
   double correlation_time = 0.01;  ///< s
-  double bias = 0.4;             ///< Nm, amplitude of the posture-dependent offset
-  double hysteresis = 0.1;       ///< Nm
+  double bias = 0.4;               ///< Nm, amplitude of the posture-dependent offset
+  double hysteresis = 0.1;         ///< Nm
   double hysteresis_speed = 0.02;  ///< rad/s over which it reverses
 };
 
@@ -42,7 +44,8 @@ class TorqueSensor {
  private:
   TorqueNoise noise_;
   Random random_;
-  Vector7 measured_noise_ = Vector7::Zero(), external_noise_ = Vector7::Zero(), friction_ = Vector7::Zero();
+  Vector7 measured_noise_ = Vector7::Zero(), external_noise_ = Vector7::Zero(),
+          friction_ = Vector7::Zero();
   Vector7 bias_phase_, bias_rate_;
 };
 

@@ -1,8 +1,10 @@
 /// @file
-/// The whole robot in virtual time: simulated cell, FRI bridge and controller manager in one process and one thread.
+/// The whole robot in virtual time: simulated cell, FRI bridge and controller manager in one
+/// process and one thread.
 ///
-/// The same libraries as on the real clock, coupled in the same order: measurement, answer, control cycle, next period. Time
-/// advances only by tick(), so that trials run as fast as the machine can and the same requests give the same bytes.
+/// The same libraries as on the real clock, coupled in the same order: measurement, answer, control
+/// cycle, next period. Time advances only by tick(), so that trials run as fast as the machine can
+/// and the same requests give the same bytes.
 #pragma once
 
 #include <map>
@@ -25,8 +27,8 @@ class FrameTable : public coglab_controllers::GoalSource {
   /// Tells where a frame was seen, at a time of the robot's clock, ns.
   void set(const std::string& frame, const Pose& in_world, std::int64_t stamp_ns);
   void forget(const std::string& frame) { frames_.erase(frame); }
-  bool lookup(const std::string& reference, const std::string& frame, coglab_controllers::GoalObservation& observation,
-              std::string& why) override;
+  bool lookup(const std::string& reference, const std::string& frame,
+              coglab_controllers::GoalObservation& observation, std::string& why) override;
 
  private:
   struct Seen {
@@ -77,7 +79,8 @@ class VirtualRobot {
   int since_cycle_ = 0;
   std::uint64_t last_sequence_ = 0;
   FrameTable frames_;
-  ctrl_more::Logger logger_;  // of the feedback stage; without a sink: the answers of requests say what matters
+  ctrl_more::Logger
+      logger_;  // of the feedback stage; without a sink: the answers of requests say what matters
   std::unique_ptr<coglab_controllers::ControllerManager> manager_;
   std::vector<coglab_controllers::DmpController*> dmps_;
 };

@@ -19,7 +19,8 @@ bool allFinite(const float (&values)[N]) {
 }
 
 template <std::size_t N>
-bool allWithin(const float (&values)[N], std::size_t first, std::size_t last, double low, double high) {
+bool allWithin(const float (&values)[N], std::size_t first, std::size_t last, double low,
+               double high) {
   for (std::size_t i = first; i < last; ++i) {
     if (!(values[i] >= low && values[i] <= high)) return false;
   }
@@ -51,7 +52,8 @@ std::string checkValues(const CheckContext& context, const fri::CommandDatagram&
   if ((flags & fri::kCartesianForce) != 0 && !allFinite(command.cartesian_force)) {
     return "cmd.addTcpFT not properly initialized";
   }
-  if ((flags & fri::kJointStiffness) != 0 && !allWithin(command.joint_stiffness, 0, 7, 0.0, p.joint_stiffness_max)) {
+  if ((flags & fri::kJointStiffness) != 0 &&
+      !allWithin(command.joint_stiffness, 0, 7, 0.0, p.joint_stiffness_max)) {
     return "cmd.jntStiffness out of range";
   }
   if ((flags & fri::kJointDamping) != 0 && !allWithin(command.joint_damping, 0, 7, 0.0, 1.0)) {
@@ -62,7 +64,8 @@ std::string checkValues(const CheckContext& context, const fri::CommandDatagram&
         allWithin(command.cartesian_stiffness, 3, 6, 0.0, p.rotation_stiffness_max))) {
     return "cmd.cartStiffness out of range";
   }
-  if ((flags & fri::kCartesianDamping) != 0 && !allWithin(command.cartesian_damping, 0, 6, 0.0, 1.0)) {
+  if ((flags & fri::kCartesianDamping) != 0 &&
+      !allWithin(command.cartesian_damping, 0, 6, 0.0, 1.0)) {
     return "cmd.cartDamping out of range";
   }
   return {};
@@ -77,7 +80,8 @@ bool poseFromWire(const float (&wire)[fri::kFrameValues], Pose& pose) {
     pose.position[row] = wire[4 * row + 3];
   }
   if (!rotation.allFinite() || !pose.position.allFinite()) return false;
-  if ((rotation * rotation.transpose() - Matrix3d::Identity()).cwiseAbs().maxCoeff() > 1e-3) return false;
+  if ((rotation * rotation.transpose() - Matrix3d::Identity()).cwiseAbs().maxCoeff() > 1e-3)
+    return false;
   if (rotation.determinant() < 0.0) return false;
   pose.rotation = Quaterniond(rotation).normalized();
   return true;
@@ -86,7 +90,8 @@ bool poseFromWire(const float (&wire)[fri::kFrameValues], Pose& pose) {
 void poseToWire(const Pose& pose, float (&wire)[fri::kFrameValues]) {
   const Matrix3d rotation = pose.rotation.toRotationMatrix();
   for (int row = 0; row < 3; ++row) {
-    for (int column = 0; column < 3; ++column) wire[4 * row + column] = static_cast<float>(rotation(row, column));
+    for (int column = 0; column < 3; ++column)
+      wire[4 * row + column] = static_cast<float>(rotation(row, column));
     wire[4 * row + 3] = static_cast<float>(pose.position[row]);
   }
 }
@@ -95,7 +100,8 @@ std::string checkEntry(const CheckContext& context, const fri::CommandDatagram& 
   const Parameters& p = context.parameters;
   const bool cartesian = context.strategy == fri::ControlStrategy::CartesianImpedance;
   const std::uint32_t needed = cartesian ? fri::kCartesianPosition : fri::kJointPosition;
-  const std::uint32_t allowed = fri::flagsFor(context.strategy) | (cartesian ? fri::kJointPosition : 0U);
+  const std::uint32_t allowed =
+      fri::flagsFor(context.strategy) | (cartesian ? fri::kJointPosition : 0U);
   if ((command.flags & needed) == 0 || (command.flags & ~allowed) != 0) {
     return "cmdFlags do not fit the control strategy";
   }
@@ -111,7 +117,8 @@ std::string checkEntry(const CheckContext& context, const fri::CommandDatagram& 
     Pose frame;
     poseFromWire(command.cartesian_frame, frame);
     if ((frame.position - context.frame_set_point.position).norm() > p.entry_frame_tolerance ||
-        rotationBetween(context.frame_set_point.rotation, frame.rotation).norm() > p.entry_frame_tolerance) {
+        rotationBetween(context.frame_set_point.rotation, frame.rotation).norm() >
+            p.entry_frame_tolerance) {
       return "cmd.cartPos not properly initialized";
     }
   }

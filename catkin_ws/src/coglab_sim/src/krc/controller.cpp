@@ -15,8 +15,8 @@ constexpr std::size_t kMessageWindow = 200;
 
 void requireRange(const char* name, double value, double low, double high) {
   if (value >= low && value <= high) return;
-  throw std::invalid_argument(std::string("parameter ") + name + " is " + std::to_string(value) + ", expected " +
-                              std::to_string(low) + " .. " + std::to_string(high));
+  throw std::invalid_argument(std::string("parameter ") + name + " is " + std::to_string(value) +
+                              ", expected " + std::to_string(low) + " .. " + std::to_string(high));
 }
 
 const Parameters& checked(const Parameters& p) {
@@ -33,7 +33,8 @@ const Parameters& checked(const Parameters& p) {
 
 }  // namespace
 
-Controller::Controller(const Parameters& parameters, const ArmParameters& arm, const Vector7& position)
+Controller::Controller(const Parameters& parameters, const ArmParameters& arm,
+                       const Vector7& position)
     : parameters_(checked(parameters)),
       arm_parameters_(arm),
       statistics_(parameters_),
@@ -41,7 +42,8 @@ Controller::Controller(const Parameters& parameters, const ArmParameters& arm, c
       own_(position),
       temperature_(Vector7::Constant(parameters.ambient_temperature)) {}
 
-// ---------------------------------------------------------------------------------------------------------------- wire
+// ----------------------------------------------------------------------------------------------------------------
+// wire
 
 void Controller::receive(const std::uint8_t* bytes, std::size_t size, double latency) {
   fri::CommandDatagram command;
@@ -82,7 +84,8 @@ PeriodCommand Controller::tick(const ArmDynamics& arm, bool on_time) {
   if (time_ >= krl_due_) krl_due_ = time_ + program_->poll(*this);
   answered_ = false;
 
-  // After a fall-back or a change of strategy the set-point was re-anchored: nothing to interpolate from.
+  // After a fall-back or a change of strategy the set-point was re-anchored: nothing to interpolate
+  // from.
   if (brakesWanted()) period.from = setPoint();
   period.to = setPoint();
   period.frame_to = frame_;
@@ -100,21 +103,24 @@ void Controller::judgeAnswer(const ArmDynamics& arm, bool on_time) {
     return;
   }
   if (power() != fri::kAllDrivesOn) {
-    entry_pending_ = true;  // the PC mirrors while the drives are off and enters anew when they return
+    entry_pending_ =
+        true;  // the PC mirrors while the drives are off and enters anew when they return
     missed_in_row_ = 0;
     return;
   }
   if (!answered_) {
     if (on_time) ++missed_in_row_;
     if (missed_in_row_ > parameters_.extrapolated_packets) {
-      leaveCommandMode("FRI timing: " + std::to_string(missed_in_row_) + " successive answers missing");
+      leaveCommandMode("FRI timing: " + std::to_string(missed_in_row_) +
+                       " successive answers missing");
     } else if (!entry_pending_) {
       extrapolate();
     }
     return;
   }
   missed_in_row_ = 0;
-  const std::string fault = entry_pending_ ? checkEntry(checkContext(), answer_) : checkCyclic(checkContext(), answer_);
+  const std::string fault =
+      entry_pending_ ? checkEntry(checkContext(), answer_) : checkCyclic(checkContext(), answer_);
   if (!fault.empty()) {
     leaveCommandMode(fault);
     return;
@@ -132,10 +138,13 @@ CheckContext Controller::checkContext() const {
   Vector7 speed = parameters_.speed_limit;
   if (parameters_.mode == OperatingMode::T1) speed = speed.cwiseMin(parameters_.t1_speed_limit);
   const bool torque_in_force = state_ == FriState::Command && (flags_ & fri::kJointTorque) != 0;
-  return {parameters_, strategy_,
-          setPoint(),  frame_,
+  return {parameters_,
+          strategy_,
+          setPoint(),
+          frame_,
           torque_in_force ? fri::jointsFromWire(latched_.joint_torque) : Vector7(Vector7::Zero()),
-          speed * start_scale_, flags_};
+          speed * start_scale_,
+          flags_};
 }
 
 void Controller::follow(const fri::CommandDatagram& command) {
@@ -174,7 +183,8 @@ fri::MeasurementDatagram Controller::measure(const ArmDynamics& arm, const ArmSi
   m.drive_error = drive_error_;
   m.drive_warning = 0;
   for (int i = 0; i < 7; ++i) {
-    if (temperature_[i] > 70.0) m.drive_warning = static_cast<std::uint16_t>(m.drive_warning | (1U << i));
+    if (temperature_[i] > 70.0)
+      m.drive_warning = static_cast<std::uint16_t>(m.drive_warning | (1U << i));
   }
   fri::jointsToWire(temperature_, m.temperature);
   fri::jointsToWire(signals.position, m.measured_position);
@@ -215,19 +225,24 @@ ServoCommand Controller::servoCommand() const {
   ServoCommand servo;
   servo.strategy = strategy_;
   const Parameters& p = parameters_;
-  servo.stiffness =
-      given(fri::kJointStiffness) ? fri::jointsFromWire(latched_.joint_stiffness) : Vector7::Constant(p.joint_stiffness);
-  servo.damping = given(fri::kJointDamping) ? fri::jointsFromWire(latched_.joint_damping) : Vector7::Constant(p.damping);
+  servo.stiffness = given(fri::kJointStiffness) ? fri::jointsFromWire(latched_.joint_stiffness)
+                                                : Vector7::Constant(p.joint_stiffness);
+  servo.damping = given(fri::kJointDamping) ? fri::jointsFromWire(latched_.joint_damping)
+                                            : Vector7::Constant(p.damping);
   if (given(fri::kJointTorque)) servo.torque = fri::jointsFromWire(latched_.joint_torque);
-  servo.frame_stiffness << Vector3d::Constant(p.frame_stiffness), Vector3d::Constant(p.rotation_stiffness);
-  if (given(fri::kCartesianStiffness)) servo.frame_stiffness = fri::wrenchFromWire(latched_.cartesian_stiffness);
+  servo.frame_stiffness << Vector3d::Constant(p.frame_stiffness),
+      Vector3d::Constant(p.rotation_stiffness);
+  if (given(fri::kCartesianStiffness))
+    servo.frame_stiffness = fri::wrenchFromWire(latched_.cartesian_stiffness);
   servo.frame_damping.setConstant(p.damping);
-  if (given(fri::kCartesianDamping)) servo.frame_damping = fri::wrenchFromWire(latched_.cartesian_damping);
+  if (given(fri::kCartesianDamping))
+    servo.frame_damping = fri::wrenchFromWire(latched_.cartesian_damping);
   if (given(fri::kCartesianForce)) servo.force = fri::wrenchFromWire(latched_.cartesian_force);
   return servo;
 }
 
-// -------------------------------------------------------------------------------------------------------------- drives
+// --------------------------------------------------------------------------------------------------------------
+// drives
 
 std::uint16_t Controller::power() const {
   return drives_on_ && enabled_ && drive_error_ == 0 ? fri::kAllDrivesOn : 0;
@@ -252,7 +267,8 @@ void Controller::updateDrives(const ArmDynamics& arm) {
   }
   // Warm-up of the drives: 20 K above ambient at full torque, time constant 10 min.
   const Vector7 load = arm.motorTorque().cwiseQuotient(arm_parameters_.torque_limit);
-  const Vector7 target = Vector7::Constant(parameters_.ambient_temperature) + 20.0 * load.cwiseAbs2();
+  const Vector7 target =
+      Vector7::Constant(parameters_.ambient_temperature) + 20.0 * load.cwiseAbs2();
   temperature_ += (target - temperature_) * (parameters_.period / 600.0);
 }
 
@@ -284,13 +300,15 @@ void Controller::leaveCommandMode(const std::string& reason) {
 void Controller::setEnablingSwitch(bool pressed) {
   if (pressed != enabled_) {
     const bool gate = parameters_.mode == OperatingMode::Automatic;
-    show(std::string(gate ? "operator safety " : "enabling switch ") + (pressed ? "closed" : "released"));
+    show(std::string(gate ? "operator safety " : "enabling switch ") +
+         (pressed ? "closed" : "released"));
   }
   enabled_ = pressed;
 }
 
 void Controller::setDriveError(int joint, bool on) {
-  if (joint < 0 || joint > 6) throw std::invalid_argument("joint " + std::to_string(joint) + ", expected 0 .. 6");
+  if (joint < 0 || joint > 6)
+    throw std::invalid_argument("joint " + std::to_string(joint) + ", expected 0 .. 6");
   const auto bit = static_cast<std::uint16_t>(1U << joint);
   drive_error_ = static_cast<std::uint16_t>(on ? drive_error_ | bit : drive_error_ & ~bit);
   if (on) leaveCommandMode("drive error J" + std::to_string(joint + 1));
@@ -310,7 +328,8 @@ void Controller::setOperatingMode(OperatingMode mode) {
   parameters_.mode = mode;
 }
 
-// ----------------------------------------------------------------------------------------------------------------- KRL
+// -----------------------------------------------------------------------------------------------------------------
+// KRL
 
 void Controller::setToBool(int index, bool value) {
   const auto bit = static_cast<std::uint16_t>(1U << (index - 1));
@@ -332,7 +351,8 @@ bool Controller::setKrlStrategy(int strategy) {
 
 void Controller::friOpen(double period) {
   if (period > 0.0 && std::abs(period - parameters_.period) > 1e-9) {
-    show("friOpen: period stays " + std::to_string(parameters_.period) + " s, set when the cell starts");
+    show("friOpen: period stays " + std::to_string(parameters_.period) +
+         " s, set when the cell starts");
   }
   if (state_ == FriState::Off) {
     state_ = FriState::Monitor;
@@ -347,7 +367,8 @@ FriState Controller::friStart(double scale) {
   if (power() != fri::kAllDrivesOn) {
     show("friStart: drives not ready");
   } else if (static_cast<int>(statistics_.quality()) < parameters_.entry_quality) {
-    show(std::string("friStart: quality too low, answer rate ") + std::to_string(statistics_.answerRate()));
+    show(std::string("friStart: quality too low, answer rate ") +
+         std::to_string(statistics_.answerRate()));
   } else if (!answered_) {
     show("friStart: no answer in time");
   } else if (const std::string fault = checkEntry(checkContext(), answer_); !fault.empty()) {

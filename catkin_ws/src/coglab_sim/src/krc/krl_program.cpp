@@ -35,12 +35,14 @@ class StartSequence {
       nudged_ = true;
       return Outcome::Working;
     }
-    if (krl.quality() < needed) return waited_ > kQualityLimit ? Outcome::PoorQuality : Outcome::Working;
+    if (krl.quality() < needed)
+      return waited_ > kQualityLimit ? Outcome::PoorQuality : Outcome::Working;
     return krl.friStart(1.0) == FriState::Command ? Outcome::Started : Outcome::NotEntered;
   }
 
  private:
-  static constexpr double kDriveLimit = 3.0, kQualityLimit = 12.0;  // s; 100 packets of 100 ms take 10 s
+  static constexpr double kDriveLimit = 3.0,
+                          kQualityLimit = 12.0;  // s; 100 packets of 100 ms take 10 s
   double waited_ = 0.0;
   bool nudged_ = false;
 };
@@ -80,11 +82,20 @@ class Coglab : public BasicProgram {
     const std::int32_t number = krl.frmInt(3);
     if (starting_) {
       switch (sequence_.poll(krl, Quality::Perfect, wait)) {
-        case StartSequence::Outcome::Working: return wait;
-        case StartSequence::Outcome::Started: finish(krl, 1); break;
-        case StartSequence::Outcome::NoDrives: finish(krl, -4); break;
-        case StartSequence::Outcome::PoorQuality: finish(krl, -2); break;
-        case StartSequence::Outcome::NotEntered: finish(krl, -3); break;
+        case StartSequence::Outcome::Working:
+          return wait;
+        case StartSequence::Outcome::Started:
+          finish(krl, 1);
+          break;
+        case StartSequence::Outcome::NoDrives:
+          finish(krl, -4);
+          break;
+        case StartSequence::Outcome::PoorQuality:
+          finish(krl, -2);
+          break;
+        case StartSequence::Outcome::NotEntered:
+          finish(krl, -3);
+          break;
       }
       return wait;
     }
@@ -131,7 +142,8 @@ class CentroEpiaggio : public BasicProgram {
     const bool wanted = krl.frmInt(2) == 1;
     if (!wanted) armed_ = true;
     if (starting_) {
-      const auto outcome = wanted ? sequence_.poll(krl, Quality::Perfect, wait) : StartSequence::Outcome::NotEntered;
+      const auto outcome =
+          wanted ? sequence_.poll(krl, Quality::Perfect, wait) : StartSequence::Outcome::NotEntered;
       if (outcome == StartSequence::Outcome::Working) return wait;
       starting_ = false;
       if (outcome == StartSequence::Outcome::Started) krl.setToInt(2, shown_ = 1);
@@ -155,7 +167,8 @@ class CentroEpiaggio : public BasicProgram {
   bool armed_ = false;
 };
 
-/// Stanford FRIControl.src: levels in INT[16], does not wait for a quality, starts again as long as 10 is asked.
+/// Stanford FRIControl.src: levels in INT[16], does not wait for a quality, starts again as long as
+/// 10 is asked.
 class Stanford : public BasicProgram {
  protected:
   void begin(KrlInterface& krl) override {
@@ -173,8 +186,8 @@ class Stanford : public BasicProgram {
       krl.setToInt(16, 30);
       closed_ = true;
     } else if (starting_) {
-      const auto outcome =
-          request == 10 ? sequence_.poll(krl, Quality::Unacceptable, wait) : StartSequence::Outcome::NotEntered;
+      const auto outcome = request == 10 ? sequence_.poll(krl, Quality::Unacceptable, wait)
+                                         : StartSequence::Outcome::NotEntered;
       if (outcome == StartSequence::Outcome::Working) return wait;
       starting_ = false;
       krl.setToInt(16, outcome == StartSequence::Outcome::Started ? 20 : 10);
@@ -198,7 +211,8 @@ class Stanford : public BasicProgram {
   bool closed_ = false;
 };
 
-/// RCPRG / TUM fri_start.src: a flag in BOOL[1] with a code in INT[1]; always joint impedance; wants a free arm.
+/// RCPRG / TUM fri_start.src: a flag in BOOL[1] with a code in INT[1]; always joint impedance;
+/// wants a free arm.
 class RcprgTum : public BasicProgram {
  protected:
   void begin(KrlInterface& krl) override { krl.setKrlStrategy(30); }
@@ -266,7 +280,8 @@ class RttLwr : public BasicProgram {
     for (int i = 1; i <= 6; ++i) krl.setToReal(i, 0.0F);  // the base frame is the robot's root
     if (request != 1) armed_ = true;
     if (starting_) {
-      const auto outcome = request == 1 ? sequence_.poll(krl, Quality::Ok, wait) : StartSequence::Outcome::NotEntered;
+      const auto outcome = request == 1 ? sequence_.poll(krl, Quality::Ok, wait)
+                                        : StartSequence::Outcome::NotEntered;
       if (outcome != StartSequence::Outcome::Working) starting_ = false;
     } else if (request == 1 && armed_ && krl.state() == FriState::Monitor) {
       if (isStrategy(krl.frmInt(2))) krl.setKrlStrategy(krl.frmInt(2));
@@ -287,7 +302,8 @@ class RttLwr : public BasicProgram {
   bool armed_ = false, ended_ = false;
 };
 
-/// KUKA's own sample application: the PC shows 10 in INT[1] once it is content; one run, then INT[1] = -1 ends it.
+/// KUKA's own sample application: the PC shows 10 in INT[1] once it is content; one run, then
+/// INT[1] = -1 ends it.
 class KukaSample : public BasicProgram {
  protected:
   double run(KrlInterface& krl) override {
@@ -316,12 +332,18 @@ class KukaSample : public BasicProgram {
 
 std::unique_ptr<KrlProgram> makeKrlProgram(KrlConvention convention) {
   switch (convention) {
-    case KrlConvention::Coglab: return std::make_unique<Coglab>();
-    case KrlConvention::CentroEpiaggio: return std::make_unique<CentroEpiaggio>();
-    case KrlConvention::Stanford: return std::make_unique<Stanford>();
-    case KrlConvention::RcprgTum: return std::make_unique<RcprgTum>();
-    case KrlConvention::RttLwr: return std::make_unique<RttLwr>();
-    case KrlConvention::KukaSample: return std::make_unique<KukaSample>();
+    case KrlConvention::Coglab:
+      return std::make_unique<Coglab>();
+    case KrlConvention::CentroEpiaggio:
+      return std::make_unique<CentroEpiaggio>();
+    case KrlConvention::Stanford:
+      return std::make_unique<Stanford>();
+    case KrlConvention::RcprgTum:
+      return std::make_unique<RcprgTum>();
+    case KrlConvention::RttLwr:
+      return std::make_unique<RttLwr>();
+    case KrlConvention::KukaSample:
+      return std::make_unique<KukaSample>();
   }
   throw std::invalid_argument("no such KRL convention");
 }
@@ -335,6 +357,8 @@ KrlConvention krlConventionOf(const std::string& name) {
   throw std::invalid_argument("unknown KRL convention '" + name + "'; known: " + known);
 }
 
-std::string nameOf(KrlConvention convention) { return kNames[static_cast<std::size_t>(convention)]; }
+std::string nameOf(KrlConvention convention) {
+  return kNames[static_cast<std::size_t>(convention)];
+}
 
 }  // namespace coglab_sim::krc

@@ -10,7 +10,8 @@
 
 namespace coglab_sim::krc {
 
-/// Counts answered and missed packets. Packets from before the first one count as missed, so quality has to be earned.
+/// Counts answered and missed packets. Packets from before the first one count as missed, so
+/// quality has to be earned.
 class AnswerStatistics {
  public:
   explicit AnswerStatistics(const Parameters& parameters) : parameters_(parameters) {}

@@ -13,11 +13,11 @@ namespace coglab_sim::krc {
 struct CheckContext {
   const Parameters& parameters;
   lwr_fri_bridge::fri::ControlStrategy strategy;
-  Vector7 set_point;              ///< rad, before this command
-  Pose frame_set_point;           ///< of the tip, before this command
-  Vector7 last_torque;            ///< added torque in force, Nm
-  Vector7 speed_limit;            ///< rad/s
-  std::uint32_t latched_flags;    ///< of entry; only for checkCyclic
+  Vector7 set_point;            ///< rad, before this command
+  Pose frame_set_point;         ///< of the tip, before this command
+  Vector7 last_torque;          ///< added torque in force, Nm
+  Vector7 speed_limit;          ///< rad/s
+  std::uint32_t latched_flags;  ///< of entry; only for checkCyclic
 };
 
 /// A 3x4 frame of the wire as pose; false if it is not a rotation within 1e-3 or not finite.
@@ -26,9 +26,11 @@ bool poseFromWire(const float (&wire)[lwr_fri_bridge::fri::kFrameValues], Pose& 
 void poseToWire(const Pose& pose, float (&wire)[lwr_fri_bridge::fri::kFrameValues]);
 
 /// Sentence why the command cannot start command mode; empty if it can.
-std::string checkEntry(const CheckContext& context, const lwr_fri_bridge::fri::CommandDatagram& command);
+std::string checkEntry(const CheckContext& context,
+                       const lwr_fri_bridge::fri::CommandDatagram& command);
 
 /// Sentence why the command ends command mode; empty if it is followed.
-std::string checkCyclic(const CheckContext& context, const lwr_fri_bridge::fri::CommandDatagram& command);
+std::string checkCyclic(const CheckContext& context,
+                        const lwr_fri_bridge::fri::CommandDatagram& command);
 
 }  // namespace coglab_sim::krc

@@ -1,8 +1,10 @@
 /// @file
-/// The robot controller (KRC) as seen through FRI: session state, statistics, checks, drives, KRL program.
+/// The robot controller (KRC) as seen through FRI: session state, statistics, checks, drives, KRL
+/// program.
 ///
-/// Per FRI period: `receive()` every datagram that came, then `tick()`, which judges the answer to the last measurement and
-/// says what the servos do during the next period; after the arm has moved, `measure()` writes the next measurement.
+/// Per FRI period: `receive()` every datagram that came, then `tick()`, which judges the answer to
+/// the last measurement and says what the servos do during the next period; after the arm has
+/// moved, `measure()` writes the next measurement.
 #pragma once
 
 #include <deque>
@@ -25,16 +27,16 @@ struct Message {
 
 /// Datagrams that were no answer, by reason.
 struct Rejections {
-  std::uint64_t wrong_size = 0;       ///< datagram is not 376 bytes
-  std::uint64_t wrong_header = 0;     ///< id or size field
-  std::uint64_t stale = 0;            ///< reflects another counter than that of the last measurement
-  std::uint64_t repeated = 0;         ///< counter did not advance
+  std::uint64_t wrong_size = 0;    ///< datagram is not 376 bytes
+  std::uint64_t wrong_header = 0;  ///< id or size field
+  std::uint64_t stale = 0;         ///< reflects another counter than that of the last measurement
+  std::uint64_t repeated = 0;      ///< counter did not advance
 };
 
 /// Set-point movement of one FRI period for the joint servos.
 struct PeriodCommand {
-  Vector7 from, to;       ///< rad, interpolated linearly over the period
-  ServoCommand servo;     ///< everything but position and velocity
+  Vector7 from, to;    ///< rad, interpolated linearly over the period
+  ServoCommand servo;  ///< everything but position and velocity
   Pose frame_from, frame_to;
 };
 
@@ -55,22 +57,27 @@ class Controller : private KrlInterface {
   /// A datagram arrived `latency` s after the last measurement went out.
   void receive(const std::uint8_t* bytes, std::size_t size, double latency);
 
-  /// Ends the waiting for an answer. `on_time`: the stand-in itself was; if not, a missing answer is bridged but not counted.
+  /// Ends the waiting for an answer. `on_time`: the stand-in itself was; if not, a missing answer
+  /// is bridged but not counted.
   /// @param arm  state of the arm now
   PeriodCommand tick(const ArmDynamics& arm, bool on_time);
 
   /// The next measurement, with its counters.
-  lwr_fri_bridge::fri::MeasurementDatagram measure(const ArmDynamics& arm, const ArmSignals& signals);
+  lwr_fri_bridge::fri::MeasurementDatagram measure(const ArmDynamics& arm,
+                                                   const ArmSignals& signals);
 
   bool brakesWanted() const { return !drives_on_; }
-  bool sends() const { return state_ != lwr_fri_bridge::fri::FriState::Off && silent_until_ <= time_; }
+  bool sends() const {
+    return state_ != lwr_fri_bridge::fri::FriState::Off && silent_until_ <= time_;
+  }
 
   // What people and faults do to a controller
-  void setEnablingSwitch(bool pressed);     ///< in T1/T2; stands for the operator safety gate in Automatic
-  void setDriveError(int joint, bool on);   ///< joint 0..6; switches all drives off
-  void setSilent(double duration);          ///< sends nothing for so long, s
+  void setEnablingSwitch(
+      bool pressed);  ///< in T1/T2; stands for the operator safety gate in Automatic
+  void setDriveError(int joint, bool on);            ///< joint 0..6; switches all drives off
+  void setSilent(double duration);                   ///< sends nothing for so long, s
   void leaveCommandMode(const std::string& reason);  ///< fall-back as after a fault
-  void acknowledge();                       ///< operator acknowledges messages; drives may be switched on again
+  void acknowledge();  ///< operator acknowledges messages; drives may be switched on again
   void setOperatingMode(OperatingMode mode);
 
   double time() const { return time_; }
@@ -126,7 +133,7 @@ class Controller : private KrlInterface {
   double start_scale_ = 1.0;
 
   // Wire
-  std::uint16_t counter_ = 0;          // of the last measurement
+  std::uint16_t counter_ = 0;  // of the last measurement
   bool measured_once_ = false;
   std::uint16_t peer_counter_ = 0;
   bool peer_known_ = false;
@@ -139,13 +146,13 @@ class Controller : private KrlInterface {
 
   // Set-points
   Vector7 own_, offset_ = Vector7::Zero(), last_step_ = Vector7::Zero();
-  Pose frame_own_, frame_;             // set-point of the tip: KRC's own, and with FRI
+  Pose frame_own_, frame_;                          // set-point of the tip: KRC's own, and with FRI
   lwr_fri_bridge::fri::CommandDatagram latched_{};  // impedance values in force
-  std::uint32_t flags_ = 0;            // latched on entry
+  std::uint32_t flags_ = 0;                         // latched on entry
 
   // Drives
   bool drives_on_ = false, enabled_ = true, error_latched_ = false, entry_pending_ = false;
-  double drives_on_at_ = -1.0;         // time at which a running nudge ends; < 0: none runs
+  double drives_on_at_ = -1.0;  // time at which a running nudge ends; < 0: none runs
   std::uint16_t drive_error_ = 0;
   Vector7 saturated_ = Vector7::Zero();  // s each motor has been at its limit
   Vector7 temperature_;

@@ -1,8 +1,9 @@
 /// @file
 /// The programs that run on the controller and start and stop FRI on the PC's request.
 ///
-/// KRL indices count from 1. TO = controller to PC, FRM = PC to controller. Existing PC stacks bring their own program;
-/// each convention here answers the same requests at the same array places as that stack's script.
+/// KRL indices count from 1. TO = controller to PC, FRM = PC to controller. Existing PC stacks
+/// bring their own program; each convention here answers the same requests at the same array places
+/// as that stack's script.
 #pragma once
 
 #include <memory>
@@ -27,21 +28,25 @@ class KrlInterface {
 
   virtual lwr_fri_bridge::fri::FriState state() const = 0;
   virtual lwr_fri_bridge::fri::Quality quality() const = 0;
-  virtual int krlStrategy() const = 0;            ///< `$STIFFNESS.STRATEGY`: 10, 20 or 30
-  virtual bool setKrlStrategy(int strategy) = 0;  ///< false, with a message, if unknown or not in monitor mode
-  virtual bool drivesReady() const = 0;           ///< power on all joints and brakes open
+  virtual int krlStrategy() const = 0;  ///< `$STIFFNESS.STRATEGY`: 10, 20 or 30
+  virtual bool setKrlStrategy(
+      int strategy) = 0;  ///< false, with a message, if unknown or not in monitor mode
+  virtual bool drivesReady() const = 0;  ///< power on all joints and brakes open
 
   virtual void friOpen(double period) = 0;  ///< OFF -> MON; a period <= 0 keeps the present one
-  virtual lwr_fri_bridge::fri::FriState friStart(double scale) = 0;  ///< tries MON -> CMD, returns the state then
+  virtual lwr_fri_bridge::fri::FriState friStart(
+      double scale) = 0;  ///< tries MON -> CMD, returns the state then
   virtual void friStop() = 0;
   virtual void friClose() = 0;
-  /// Acknowledges messages if the program may, and starts the tiny motion that opens the brakes; see drivesReady().
+  /// Acknowledges messages if the program may, and starts the tiny motion that opens the brakes;
+  /// see drivesReady().
   virtual void nudge() = 0;
   virtual void show(const std::string& message) = 0;
   virtual const Parameters& parameters() const = 0;
 };
 
-/// One of the programs. `poll()` runs until the program's next WAIT and returns how long that is, s.
+/// One of the programs. `poll()` runs until the program's next WAIT and returns how long that is,
+/// s.
 class KrlProgram {
  public:
   virtual ~KrlProgram() = default;

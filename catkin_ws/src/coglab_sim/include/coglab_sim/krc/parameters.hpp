@@ -1,8 +1,9 @@
 /// @file
 /// Every figure of the robot controller's behaviour that the stand-in has to choose.
 ///
-/// "published" marks what a public source states; all others are OUR CHOICE, because no public document settles them. This
-/// struct is the only table of them; docs and the node's parameters are generated from the same names.
+/// "published" marks what a public source states; all others are OUR CHOICE, because no public
+/// document settles them. This struct is the only table of them; docs and the node's parameters are
+/// generated from the same names.
 #pragma once
 
 #include "coglab_sim/geometry.hpp"
@@ -12,7 +13,8 @@ namespace coglab_sim::krc {
 /// Operating modes of a KRC that matter here.
 enum class OperatingMode { T1, T2, Automatic };
 
-/// Which KRL program runs on the controller, i.e. how PC and program talk through the exchange arrays.
+/// Which KRL program runs on the controller, i.e. how PC and program talk through the exchange
+/// arrays.
 enum class KrlConvention { Coglab, CentroEpiaggio, Stanford, RcprgTum, RttLwr, KukaSample };
 
 /// @see the file's comment. Times in s, angles in rad.
@@ -28,22 +30,28 @@ struct Parameters {
   int entry_quality = 2;  ///< lowest Quality that lets `friStart` succeed (OK)
 
   // Timing of answers.
-  int extrapolated_packets = 5;  ///< consecutive losses bridged by extrapolation in command mode; one more ends it
+  int extrapolated_packets =
+      5;  ///< consecutive losses bridged by extrapolation in command mode; one more ends it
 
   // Entry into command mode.
-  double entry_position_tolerance = 1e-4;     ///< rad per joint between command and set-point
-  double entry_frame_tolerance = 1e-3;        ///< m, and rad for the orientation
-  double torque_tolerance = 1.0;              ///< Nm; added torque on entry, and its largest step (users' reports: about 1)
+  double entry_position_tolerance = 1e-4;  ///< rad per joint between command and set-point
+  double entry_frame_tolerance = 1e-3;     ///< m, and rad for the orientation
+  double torque_tolerance =
+      1.0;  ///< Nm; added torque on entry, and its largest step (users' reports: about 1)
 
-  // Cyclic checks. Speeds are published (rsidef7.dat as quoted by TUM), 120 120 160 160 250 220 220 deg/s.
+  // Cyclic checks. Speeds are published (rsidef7.dat as quoted by TUM), 120 120 160 160 250 220 220
+  // deg/s.
   Vector7 speed_limit =
-      (Vector7() << 2.0943951, 2.0943951, 2.7925268, 2.7925268, 4.3633231, 3.8397244, 3.8397244).finished();
-  double t1_speed_limit = 0.24;    ///< rad/s in T1 (CentroEPiaggio)
-  double speed_margin = 0.05;      ///< share by which a step may exceed limit x period
+      (Vector7() << 2.0943951, 2.0943951, 2.7925268, 2.7925268, 4.3633231, 3.8397244, 3.8397244)
+          .finished();
+  double t1_speed_limit = 0.24;  ///< rad/s in T1 (CentroEPiaggio)
+  double speed_margin = 0.05;    ///< share by which a step may exceed limit x period
   /// rad, +-; mechanical range (published).
   Vector7 position_limit =
-      (Vector7() << 2.96705973, 2.0943951, 2.96705973, 2.0943951, 2.96705973, 2.0943951, 2.96705973).finished();
-  double torque_limit_time = 0.05;  ///< s that a motor may give its full torque before the drives are switched off
+      (Vector7() << 2.96705973, 2.0943951, 2.96705973, 2.0943951, 2.96705973, 2.0943951, 2.96705973)
+          .finished();
+  double torque_limit_time =
+      0.05;  ///< s that a motor may give its full torque before the drives are switched off
   double joint_stiffness_max = 5000.0;   ///< Nm/rad
   double frame_stiffness_max = 10000.0;  ///< N/m; rotations 1000 Nm/rad
   double rotation_stiffness_max = 1000.0;
@@ -55,10 +63,12 @@ struct Parameters {
   double damping = 0.7;
 
   // KRL and drives.
-  double krl_poll = 0.05;          ///< s between two looks of the KRL program at the exchange arrays (published: ~50 ms)
-  double krl_message_wait = 0.3;   ///< s a program waits when it shows a message (published: 0.3-0.5)
-  double brake_release = 0.3;      ///< s that the tiny motion takes which opens the brakes
-  double power_up = 0.5;           ///< s from acknowledging an error to full drive power
+  double krl_poll =
+      0.05;  ///< s between two looks of the KRL program at the exchange arrays (published: ~50 ms)
+  double krl_message_wait =
+      0.3;                     ///< s a program waits when it shows a message (published: 0.3-0.5)
+  double brake_release = 0.3;  ///< s that the tiny motion takes which opens the brakes
+  double power_up = 0.5;       ///< s from acknowledging an error to full drive power
   bool acknowledge_by_program = true;  ///< false: errors wait for an operator (`acknowledge()`)
   double ambient_temperature = 25.0;   ///< degree Celsius
 };
