@@ -1,4 +1,4 @@
-"""The controller stand-in's session: states, statistics, power, entry, faults. fri_client reads the bytes a second time."""
+"""The controller stand-in's session: states, statistics, power, entry, faults; fri_client reads the bytes again."""
 import math
 import random
 import struct
