@@ -107,7 +107,7 @@ TEST(Manager, StaleAndBrokenJointStatesGiveZeroVelocity) {
   robot.see("human_hand", kGoal);
   robot.tick();
   EXPECT_GT(robot.command.velocity.norm(), 0.01);  // one broken measurement does not end a motion
-  robot.manager->cycle().idle(robot.now_ns + 200'000'000);  // silence does
+  robot.manager->cycle().idle(robot.now_ns + 600'000'000);  // silence does
   EXPECT_EQ(robot.state(), MotionState::Aborted);
   EXPECT_NE(robot.reason().find("no joint state"), std::string::npos);
 }

@@ -228,7 +228,8 @@ void ControlCycle::idle(std::int64_t now_ns) noexcept {
   if (numbers_ > 0 && silent > settings_.sample_timeout) {
     input_reason_ = Reason("no joint state for more than ") << settings_.sample_timeout << " s";
     const MotionState state = motion_ != nullptr && !fault_ ? motion_->state() : MotionState::Idle;
-    if (state == MotionState::Running || state == MotionState::Holding) abortMotion(input_reason_);
+    const bool moving = state == MotionState::Running || state == MotionState::Holding;
+    if (moving && silent > settings_.silent_time) abortMotion(input_reason_);
   }
   adopt();
   feedback_.end();

@@ -22,6 +22,7 @@ using lwr_fri_bridge::VelocityCommand;
 struct CycleSettings {
   double cycle_time = 0.005;    ///< intended period, s
   double sample_timeout = 0.1;  ///< a joint state older than this gives zero velocity, s
+  double silent_time = 0.5;     ///< no joint state for this long ends a motion, s
   double overrun_time =
       0.004;  ///< a motion controller slower than this overruns, s; 0: not judged (lockstep)
   double border_time = 1.0;  ///< a border of the workspace that stops a motion this long ends it, s

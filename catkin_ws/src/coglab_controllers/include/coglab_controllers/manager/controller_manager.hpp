@@ -34,10 +34,10 @@ struct ManagerSettings {
   ctrl_more::Logger* logger = nullptr;  ///< of feedback controllers; null: Logger::standard()
 };
 
-/// Reads the manager's own parameters: `cycle_time` (0.005 s), `sample_timeout`, `overrun_time`
-/// (s), `plan_timeout` (s), `speed_scale`, `types` (block: type -> library; the two of this package
-/// are known), `plugin_paths`, `feedback_file`, and those of makeRobotSetup(). @throws
-/// std::runtime_error naming the parameter
+/// Reads the manager's own parameters: `cycle_time` (0.005 s), `sample_timeout`, `silent_time`,
+/// `overrun_time` (s), `plan_timeout` (s), `speed_scale`, `types` (block: type -> library; the two
+/// of this package are known), `plugin_paths`, `feedback_file`, and those of makeRobotSetup().
+/// @throws std::runtime_error naming the parameter
 ManagerSettings readManagerSettings(const YAML::Node& parameters, const std::string& urdf,
                                     const lwr_fri_bridge::JointLimits& table, bool lockstep);
 
