@@ -231,7 +231,7 @@ PYBIND11_MODULE(lwr_fri_bridge, m) {
   m.def("encode_measurement", &encodeFromDict<fri::MeasurementDatagram>, py::arg("fields"));
   m.def("encode_command", &encodeFromDict<fri::CommandDatagram>, py::arg("fields"));
 
-  py::class_<JointLimits>(m, "JointLimits")
+  py::class_<JointLimits>(m, "JointLimits", py::module_local())
       .def(py::init([](const std::string& path, const std::string& profile) {
              return loadJointLimits(path, profile);
            }),
@@ -272,7 +272,7 @@ PYBIND11_MODULE(lwr_fri_bridge, m) {
       "4x4 pose of the flange in the base frame.", py::arg("joints"));
   m.def("known_events", &knownEvents);
 
-  py::class_<Interpolator>(m, "Interpolator")
+  py::class_<Interpolator>(m, "Interpolator", py::module_local())
       .def(py::init<const JointLimits&>(), py::arg("limits"))
       .def("reset", &Interpolator::reset, py::arg("position"))
       .def("resume", &Interpolator::resume, py::arg("position"), py::arg("velocity"),
@@ -282,14 +282,14 @@ PYBIND11_MODULE(lwr_fri_bridge, m) {
       .def_property_readonly("velocity", &Interpolator::velocity)
       .def_property_readonly("acceleration", &Interpolator::acceleration);
 
-  py::class_<VelocityFilter>(m, "VelocityFilter")
+  py::class_<VelocityFilter>(m, "VelocityFilter", py::module_local())
       .def(py::init<double>(), py::arg("time_constant"))
       .def("update", &VelocityFilter::update, py::arg("position"), py::arg("cycles"), py::arg("dt"))
       .def_static("delay", &VelocityFilter::delay, py::arg("time_constant"), py::arg("dt"))
       .def_static("noise_gain", &VelocityFilter::noiseGain, py::arg("time_constant"),
                   py::arg("dt"));
 
-  py::class_<Bridge>(m, "Bridge",
+  py::class_<Bridge>(m, "Bridge", py::module_local(),
                      "The bridge without socket and threads: one call of answer() is one FRI tick.")
       .def(py::init([](const std::string& limits_file, const std::string& profile,
                        const py::kwargs& parameters) {
