@@ -50,7 +50,8 @@ pybind11_add_module(coglab_controllers_python
   src/python/bind_dmp.cpp
   src/python/bind_limits.cpp
   src/python/bind_motion.cpp)
-target_link_libraries(coglab_controllers_python PRIVATE coglab_controllers_core ${COGLAB_CORE_BRIDGE})
+target_link_libraries(coglab_controllers_python PRIVATE coglab_controllers_core ${COGLAB_CORE_BRIDGE}
+        gtest_main gtest)
 target_include_directories(coglab_controllers_python SYSTEM PRIVATE ${lwr_fri_bridge_INCLUDE_DIRS})
 set_target_properties(coglab_controllers_python PROPERTIES
   OUTPUT_NAME _core
@@ -69,7 +70,8 @@ if(CATKIN_ENABLE_TESTING)
   foreach(thing allocation cartesian_motion dmp ik kinematics learning library limits ptp)
     catkin_add_gtest(coglab_controllers_test_${thing} test/test_${thing}.cpp)
     if(TARGET coglab_controllers_test_${thing})
-      target_link_libraries(coglab_controllers_test_${thing} coglab_controllers_core ${COGLAB_CORE_BRIDGE})
+      target_link_libraries(coglab_controllers_test_${thing} coglab_controllers_core ${COGLAB_CORE_BRIDGE}
+        gtest_main gtest)
       target_include_directories(coglab_controllers_test_${thing} SYSTEM PRIVATE ${lwr_fri_bridge_INCLUDE_DIRS})
       target_compile_definitions(coglab_controllers_test_${thing} PRIVATE
         COGLAB_PACKAGE_DIR="${CMAKE_CURRENT_SOURCE_DIR}")
