@@ -97,7 +97,7 @@ class TrialRecorder:
 def summarise(trial: Trial, kind: str, outcome: str, start: float, end: float, velocity_limits: np.ndarray) -> dict:
     """The figures of one handover between `start` and `end` (s), for result.json.
 
-    final_error_mm: hand to the goal as received, when the arm had stopped; contact_delay_ms: from the first touch (truth)
+    final_error_mm: hand to the goal that the motion latched at its end, from goals as received; contact_delay_ms: from the first touch (truth)
     to the detector's sample; peak_velocity_share: largest joint speed over its limit. None where nothing was measured.
     """
     contact = next((t for t, found, _ in trial.contacts if found and start <= t <= end), None)

@@ -225,8 +225,12 @@ void DmpController::watchGoal(const CycleInput& input) {
       loop.gate.update(input.robot.stamp_ns, mine ? newest : loop.gate.goal());
   loop.goal = inWorkspace(handGoal(loop.gate.goal(), loop.hand), loop.projected);
   const Vector3 hand = (loop.dmp_from_base * input.chain.tool).position;
+  if (state_ == MotionState::Reached) {
+    // The motion stands at the goal it latched; newer sights differ from it by their noise.
+    loop.remaining_distance = (loop.motion.goal() - hand).norm();
+    return;
+  }
   loop.remaining_distance = (handGoal(loop.gate.goal(), loop.hand).position - hand).norm();
-  if (state_ == MotionState::Reached) return;  // the goal is latched
 
   state_ = gate == GoalGate::State::Fresh ? MotionState::Running : MotionState::Holding;
   reason_.clear();
