@@ -12,6 +12,7 @@ import rostest
 import yaml
 
 from coglab_bringup.handover import run_handover
+from coglab_bringup.trial_recorder import TrialRecorder
 
 CMD = 2  # FRI state in which the arm follows our commands
 FLOAT32 = 5e-4  # rad/s, what rounding to float32 on the wire adds to a velocity (at 10 ms)
@@ -24,7 +25,9 @@ class Handover(unittest.TestCase):
     def setUpClass(cls):
         rospy.init_node("handover_test")
         cls.log = rospy.get_param("/handover_test/log")
-        cls.row, cls.trial, cls.start, cls.end = run_handover("exchange_human_to_robot", "mug", lambda: True)
+        recorder = TrialRecorder()
+        cls.row, cls.start, cls.end = run_handover("exchange_human_to_robot", "mug", recorder)
+        cls.trial = recorder.stop()
 
     def test_outcome(self):
         self.assertEqual(self.row["outcome"], "success", self.trial.transitions[-8:])

@@ -16,7 +16,9 @@ def test_summary_of_a_known_trial():
     trial.feedback = [(4.0, "running", 0.2), (5.0, "reached", 0.004), (5.5, "reached", 0.003), (9.0, "reached", 0.5)]
     trial.truth = [(5.9, [0, 0, 0], [0, 0, 0], [0, 0, 0], 0.1), (6.0, [0, 0, 0], [0, 0, 0], [0, 0, 0], 2.0)]
     trial.contacts = [(6.04, True, 3.0)]
+    trial.fri_lost = [(0.5, 3), (1.5, 3), (7.5, 5), (9.5, 9)]  # two of them meanwhile
     row = summarise(trial, "exchange_human_to_robot", "success", 1.0, 8.0, LIMITS)
+    assert row["fri_lost"] == 2
     assert row["duration_s"] == 7.0
     assert row["final_error_mm"] == pytest.approx(3.0)  # the last arrival before contact
     assert row["contact_delay_ms"] == pytest.approx(40.0)
@@ -26,6 +28,7 @@ def test_summary_of_a_known_trial():
 def test_summary_without_measurements_says_none():
     row = summarise(Trial(), "take", "no end", 0.0, 1.0, LIMITS)
     assert row["final_error_mm"] is None and row["contact_delay_ms"] is None and row["peak_velocity_share"] is None
+    assert row["fri_lost"] is None
 
 
 def test_state_intervals_end_where_states_end():

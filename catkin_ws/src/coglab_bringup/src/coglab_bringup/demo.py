@@ -1,4 +1,4 @@
-"""./coglab demo: launches the simulated cell and the whole system, asks for a handover, writes what happened, stops."""
+"""./coglab demo: launches the simulated cell and the whole system, takes an object from the person and gives it back, writes what happened, stops."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from pathlib import Path
 from coglab_bringup.run_directory import free_port, record_times, run_environment
 
 OBJECT = "mug"  # what the simulated person offers (coglab_sim/config/cell.yaml)
+KINDS = ("exchange_human_to_robot", "exchange_robot_to_human")  # take it from the person, then give it back
 MASTER_LIMIT = 30.0  # s until the ROS master answers
 
 
@@ -94,7 +95,6 @@ def main(arguments: list[str]) -> int:
     screen = bool(os.environ.get("DISPLAY")) and not options.headless and Path("/usr/bin/rviz").exists()
     launch = [f"seed:={options.seed}", f"rviz:={'true' if screen else 'false'}", f"log_file:={out / 'fri_ticks.csv'}"]
     system = System(environment, port, launch, out / "roslaunch.log")
-    kinds = ["exchange_human_to_robot"]
     result: dict = {"commit": commit_of(top), "seed": options.seed, "handovers": []}
     try:
         wait_for_master(system, MASTER_LIMIT)
@@ -102,25 +102,31 @@ def main(arguments: list[str]) -> int:
 
         from coglab_bringup.handover import run_handover
         from coglab_bringup.trial_plot import draw_trial
+        from coglab_bringup.trial_recorder import TrialRecorder
 
         rospy.init_node("coglab_demo", anonymous=True, disable_signals=True)
-        for kind in kinds:
-            row, trial, start, end = run_handover(kind, OBJECT, system.alive)
+        recorder = TrialRecorder()
+        spans = []
+        for kind in KINDS:
+            row, start, end = run_handover(kind, OBJECT, recorder, system.alive)
             result["handovers"].append(row)
-            title = f"{kind.replace('_', ' ')}, {OBJECT}, seed {options.seed}: {row['outcome']}"
-            draw_trial(trial, title, start, end, out / "trial.png")
+            spans.append((start, end))
+            if row["outcome"] != "success":
+                break
+        title = ", then ".join(f"{row['kind'].replace('_', ' ')}: {row['outcome']}" for row in result["handovers"])
+        draw_trial(recorder.stop(), f"{OBJECT}, seed {options.seed}; {title}", spans[0][0], spans[-1][1], out / "trial.png")
     except (RuntimeError, KeyboardInterrupt) as error:
         reason = str(error) or "interrupted"
-        result["handovers"].append({"kind": kinds[len(result["handovers"])], "outcome": reason})
+        result["handovers"].append({"kind": KINDS[min(len(result["handovers"]), len(KINDS) - 1)], "outcome": reason})
     finally:
         system.stop()
     (out / "result.json").write_text(json.dumps(result, indent=1) + "\n")
     good = sum(row["outcome"] == "success" for row in result["handovers"])
     for row in result["handovers"]:
         print(f"{row['kind']}: {row['outcome']}" + (f" in {row['duration_s']:.1f} s" if "duration_s" in row else ""))
-    print(f"{good} of {len(kinds)} handovers succeeded; {out}/result.json and trial.png, log: {out}/roslaunch.log", flush=True)
+    print(f"{good} of {len(KINDS)} handovers succeeded; {out}/result.json and trial.png, log: {out}/roslaunch.log", flush=True)
     record_times(top, "demo", time.monotonic() - began)
-    return 0 if good == len(kinds) else 1
+    return 0 if good == len(KINDS) else 1
 
 
 if __name__ == "__main__":

@@ -12,7 +12,7 @@ import rospy
 import yaml
 from coglab_msgs.srv import Start
 
-from coglab_bringup.trial_recorder import Trial, TrialRecorder, summarise
+from coglab_bringup.trial_recorder import TrialRecorder, summarise
 
 READY_LIMIT = 90.0  # s until the system waits in its hub
 HANDOVER_LIMIT = 60.0  # s for one handover
@@ -40,23 +40,22 @@ def ask_for(action: str, object_id: str, alive: Callable[[], bool], limit: float
     raise RuntimeError(f"{action} was not taken within {limit:.0f} s: {refusal}")
 
 
-def run_handover(kind: str, object_id: str, alive: Callable[[], bool]) -> tuple[dict, Trial, float, float]:
-    """Asks for one handover and waits for the hub after it; its result row, its record, and when it began and ended."""
+def run_handover(kind: str, object_id: str, recorder: TrialRecorder, alive: Callable[[], bool] = lambda: True) -> tuple[dict, float, float]:
+    """Asks for one handover and waits for the hub after it, while `recorder` listens; its result row, and when it began and ended."""
     table = Path(rospkg.RosPack().get_path("lwr_description")) / "config" / "joint_limits.yaml"
     limits = np.array(yaml.safe_load(table.read_text())["default"]["velocity"])
-    recorder = TrialRecorder()
     ask_for(kind, object_id, alive, READY_LIMIT)
     start = rospy.get_time()
 
     def ended() -> list[tuple]:
-        return [row for row in recorder.trial.transitions if row[1] == MASTER and row[2] == kind and row[4] in HUBS]
+        rows = list(recorder.trial.transitions)
+        return [row for row in rows if row[0] >= start and row[1] == MASTER and row[2] == kind and row[4] in HUBS]
 
     recorder.wait_for(lambda: bool(ended()) or not alive(), HANDOVER_LIMIT)
     end = rospy.get_time()
-    trial = recorder.stop()
     if ended():
         _, _, _, outcome, _, reason = ended()[0]
         outcome = "success" if outcome == "succeeded" else f"{outcome}: {reason}"
     else:
         outcome = "the system ended" if not alive() else f"no end within {HANDOVER_LIMIT:.0f} s"
-    return summarise(trial, kind, outcome, start, end, limits), trial, start, end
+    return summarise(recorder.trial, kind, outcome, start, end, limits), start, end

@@ -26,7 +26,7 @@ class Trial:
     feedback: list[tuple] = field(default_factory=list)  # (t, state, remaining distance)
     transitions: list[tuple] = field(default_factory=list)  # (t, path, from, outcome, to, reason)
     contacts: list[tuple] = field(default_factory=list)  # (t, contact, margin)
-    fri_lost: int | None = None  # None: the bridge's diagnostics never came
+    fri_lost: list[tuple] = field(default_factory=list)  # (t, FRI packets lost so far), from the bridge's diagnostics
 
 
 class TrialRecorder:
@@ -35,7 +35,6 @@ class TrialRecorder:
     def __init__(self) -> None:
         self.trial = Trial()
         self.changed = threading.Condition()
-        self._lost_at_start: int | None = None
         self._subscribers = [
             rospy.Subscriber("/lwr/joint_states", JointState, self._on_joints, queue_size=400),
             rospy.Subscriber("/lwr/external_torques", JointState, self._on_torques, queue_size=400),
@@ -87,23 +86,23 @@ class TrialRecorder:
 
     def _on_diagnostics(self, message: DiagnosticArray) -> None:
         counts = [int(value.value) for status in message.status for value in status.values if value.key in LOST_KEYS]
-        if not counts:
-            return
-        if self._lost_at_start is None:
-            self._lost_at_start = sum(counts)
-        self.trial.fri_lost = sum(counts) - self._lost_at_start
+        if counts:
+            self.trial.fri_lost.append((message.header.stamp.to_sec(), sum(counts)))
 
 
 def summarise(trial: Trial, kind: str, outcome: str, start: float, end: float, velocity_limits: np.ndarray) -> dict:
     """The figures of one handover between `start` and `end` (s), for result.json.
 
     final_error_mm: hand to the goal that the motion latched at its end, from goals as received; contact_delay_ms: from the first touch (truth)
-    to the detector's sample; peak_velocity_share: largest joint speed over its limit. None where nothing was measured.
+    to the detector's sample; fri_lost: FRI packets lost meanwhile, as far as the bridge reported once a second; peak_velocity_share: largest
+    joint speed over its limit. None where nothing was measured (no contact is waited for where the robot gives).
     """
     contact = next((t for t, found, _ in trial.contacts if found and start <= t <= end), None)
     until = contact or end
     arrived = [d for t, state, d in trial.feedback if start <= t <= until and state in ("reached", "holding")]
     touch = next((t for t, *_, force in trial.truth if start <= t <= end and force > FORCE_THRESHOLD), None)
+    lost_before = [count for t, count in trial.fri_lost if t <= start] or [count for _, count in trial.fri_lost][:1]
+    lost_until = [count for t, count in trial.fri_lost if t <= end + 1.0]
     speeds = np.array([velocity for t, _, velocity in trial.joints if start <= t <= end])
     share = float(np.max(np.abs(speeds) / velocity_limits)) if speeds.size else None
     return {
@@ -112,6 +111,6 @@ def summarise(trial: Trial, kind: str, outcome: str, start: float, end: float, v
         "duration_s": round(end - start, 3),
         "final_error_mm": round(1000.0 * arrived[-1], 3) if arrived else None,
         "contact_delay_ms": round(1000.0 * (contact - touch), 1) if contact and touch else None,
-        "fri_lost": trial.fri_lost,
+        "fri_lost": lost_until[-1] - lost_before[-1] if lost_until and lost_before else None,
         "peak_velocity_share": round(share, 4) if share is not None else None,
     }
