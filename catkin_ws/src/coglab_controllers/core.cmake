@@ -50,8 +50,7 @@ pybind11_add_module(coglab_controllers_python
   src/python/bind_dmp.cpp
   src/python/bind_limits.cpp
   src/python/bind_motion.cpp)
-target_link_libraries(coglab_controllers_python PRIVATE coglab_controllers_core ${COGLAB_CORE_BRIDGE}
-        gtest_main gtest)
+target_link_libraries(coglab_controllers_python PRIVATE coglab_controllers_core ${COGLAB_CORE_BRIDGE})
 target_include_directories(coglab_controllers_python SYSTEM PRIVATE ${lwr_fri_bridge_INCLUDE_DIRS})
 set_target_properties(coglab_controllers_python PROPERTIES
   OUTPUT_NAME _core
