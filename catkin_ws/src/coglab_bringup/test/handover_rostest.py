@@ -6,12 +6,15 @@ import unittest
 from pathlib import Path
 
 import numpy as np
+import rosgraph
 import rospkg
 import rospy
 import rostest
+import tf2_ros
 import yaml
 
 from coglab_bringup.handover import run_handover
+from coglab_bringup.interface import FRAMES, missing_names
 from coglab_bringup.trial_recorder import TrialRecorder
 
 CMD = 2  # FRI state in which the arm follows our commands
@@ -28,6 +31,19 @@ class Handover(unittest.TestCase):
         recorder = TrialRecorder()
         cls.row, cls.start, cls.end = run_handover("exchange_human_to_robot", "mug", recorder)
         cls.trial = recorder.stop()
+
+    def test_every_name_of_the_interface(self):
+        master = rosgraph.Master("/handover_test")
+        publishers, subscribers, services = master.getSystemState()
+        nodes = {node for _, names in publishers + subscribers + services for node in names}
+        problems = missing_names(dict(master.getTopicTypes()), {name for name, _ in services}, nodes)
+        self.assertEqual(problems, [])
+
+    def test_frames_of_arm_hand_person_and_goal(self):
+        buffer = tf2_ros.Buffer()
+        self.listener = tf2_ros.TransformListener(buffer)
+        for frame in FRAMES:
+            buffer.lookup_transform("world", frame, rospy.Time(0), rospy.Duration(5.0))  # raises where there is none
 
     def test_outcome(self):
         self.assertEqual(self.row["outcome"], "success", self.trial.transitions[-8:])

@@ -4,7 +4,7 @@ import sys
 
 import pytest
 
-from coglab_bringup.test_runner import Program, report, run
+from coglab_bringup.test_runner import Program, find_programs, report, run
 
 GREEN = '<testsuites><testsuite><testcase classname="a" name="one"/><testcase name="two"><skipped/></testcase></testsuite></testsuites>'
 RED = '<testsuite><testcase name="bad"><failure message="1 is not 2"/></testcase></testsuite>'
@@ -34,6 +34,17 @@ def test_counts(tmp_path, script, counts, capsys):
     status = report([item], tmp_path)
     assert status == (0 if counts[1] == 0 else 1)
     assert capsys.readouterr().out.splitlines()[-1] == "{} passed, {} failed, {} skipped".format(*counts)
+
+
+def test_a_gtest_that_was_not_built_is_a_failure(tmp_path):
+    package = tmp_path / "catkin_ws" / "src" / "pkg"
+    (package / "test").mkdir(parents=True)
+    (package / "package.xml").write_text("<package><name>pkg</name></package>")
+    (package / "test" / "test_thing.cpp").write_text("")
+    (item,) = find_programs(tmp_path, tmp_path, sys.executable, [])
+    assert item.name == "pkg_test_thing"
+    run(item, tmp_path / "log", limit=5.0)
+    assert (item.passed, item.failed, item.skipped) == (0, 1, 0) and "not built" in item.failures[0]
 
 
 def test_nothing_at_all_is_not_a_success(tmp_path):

@@ -44,6 +44,18 @@ def test_state_intervals_end_where_states_end():
     assert intervals["/m"] == [(1.0, 1.0, "idle"), (1.0, 3.0, "work"), (3.0, 5.0, "idle")]
 
 
+def test_an_outcome_named_like_the_next_state_leads_to_it():
+    trial = Trial()
+    trial.transitions = [
+        (1.0, "/m", "hub", "give", "give", ""),
+        (2.0, "/m/give", "first", "done", "done", ""),
+        (2.0, "/m", "give", "done", "hub", ""),
+    ]
+    intervals = state_intervals(trial, 5.0)
+    assert intervals["/m/give"] == [(1.0, 2.0, "first")]
+    assert intervals["/m"][1:] == [(1.0, 2.0, "give"), (2.0, 5.0, "hub")]
+
+
 def test_children_of_a_concurrence_get_rows_of_their_own():
     rows = rows_without_overlap([(0.0, 2.0, "a"), (0.0, 1.0, "b"), (1.0, 3.0, "c")])
     assert sorted(name for row in rows for _, _, name in row) == ["a", "b", "c"]

@@ -1,7 +1,7 @@
 """./coglab test: finds and runs every test of the workspace and counts each case once, from the JUnit files.
 
 Three kinds, found by where they lie in a package:
-  gtest    executables <package>_test_* in devel/lib/<package> (built by the target `tests`)
+  gtest    test/test_THING.cpp, built by the target `tests` as <package>_test_THING in devel/lib/<package>; not built is a failure
   pytest   test/test_*.py (smach's own packages one level deeper alike)
   rostest  test/*.test, one at a time, each with a ROS master of its own
 gtests and pytests of different packages run two at a time; rostests run alone, because they measure real time.
@@ -59,7 +59,8 @@ def find_programs(top: Path, results: Path, python: str, wanted: list[str]) -> l
     for package, folder in packages(top / "catkin_ws" / "src").items():
         if wanted and package not in wanted:
             continue
-        for binary in sorted((library / package).glob(f"{package}_test_*")):
+        for source in sorted((folder / "test").glob("test_*.cpp")):
+            binary = library / package / f"{package}_{source.stem}"
             xml = results / f"{package}.{binary.name}.xml"
             programs.append(Program(package, "gtest", binary.name, [str(binary), f"--gtest_output=xml:{xml}"], xml))
         for path in sorted((folder / "test").glob("test_*.py")):
@@ -115,6 +116,11 @@ def run(program: Program, log: Path, limit: float) -> None:
     if program.kind == "rostest":
         environment = run_environment(free_port(), program.junit)
     start = time.monotonic()
+    if not Path(shutil.which(program.command[0]) or "").is_file():
+        program.failed += 1
+        program.failures.append(f"{program.command[0]} does not exist: it was not built; see .coglab/build.log")
+        print(f"  {program.package:20s} {program.kind:8s}{program.name:44s} not built  FAILED", flush=True)
+        return
     with log.open("w") as output:
         process = subprocess.Popen(
             program.command, stdout=output, stderr=subprocess.STDOUT, stdin=subprocess.DEVNULL,

@@ -36,10 +36,12 @@ def state_intervals(trial: Trial, end: float) -> dict[str, list[tuple[float, flo
     intervals: dict[str, list[tuple[float, float, str]]] = {}
     entered: dict[tuple[str, str], float] = {}  # (container, state) -> time
     begun: dict[str, float] = {}  # container -> time
+    left = {(path, from_state) for _, path, from_state, _, _, _ in trial.transitions}
     for t, path, from_state, outcome, to_state, _ in trial.transitions:
         since = entered.pop((path, from_state), begun.get(path, trial.transitions[0][0]))
         intervals.setdefault(path, []).append((since, t, from_state))
-        if to_state != outcome:  # a sibling, not the container's own outcome
+        # a sibling, not the container's own outcome: it is left later, or (still active) not named like the outcome
+        if (path, to_state) in left or to_state != outcome:
             entered[path, to_state] = t
             begun[f"{path}/{to_state}"] = t
     for (path, state), since in entered.items():
@@ -87,10 +89,11 @@ def draw_trial(trial: Trial, title: str, start: float, end: float, path: Path) -
     figure, axes = plt.subplots(5, 1, figsize=(10, 11), sharex=True, height_ratios=[1.3, 1.5, 1, 1.2, 1], layout="constrained")
     _phases(axes[0], trial, start, end)
     axes[0].set_title(title, fontsize=10, loc="left")
-    if len(trial.truth) > 2:
-        times, robot = _column(trial.truth, 1, start)
-        _, human = _column(trial.truth, 2, start)
-        _, force = _column(trial.truth, 4, start)
+    truth = [row for row in trial.truth if start <= row[0] <= end]
+    if len(truth) > 2:
+        times, robot = _column(truth, 1, start)
+        _, human = _column(truth, 2, start)
+        _, force = _column(truth, 4, start)
         for k, name in enumerate("xyz"):
             axes[1].plot(times, robot[:, k], color=COLOURS[k], label=f"robot {name}")
             axes[1].plot(times, human[:, k], color=COLOURS[k], ls="--", label=f"person {name}")
@@ -114,9 +117,8 @@ def draw_trial(trial: Trial, title: str, start: float, end: float, path: Path) -
     axes[4].set_ylabel("finger position", fontsize=8)
     axes[4].set_xlabel("time, s", fontsize=8)
     for axis in axes:
-        for t, found, _ in trial.contacts:
-            if found:
-                axis.axvline(t - start, color="#D55E00", lw=0.8, ls=":")
+        for t, found, _ in trial.contacts:  # dotted: contact or load; dashed: the load was taken over
+            axis.axvline(t - start, color="#D55E00", lw=0.8, ls=":" if found else "--")
         axis.tick_params(labelsize=7)
         axis.grid(alpha=0.25)
         axis.set_xlim(0.0, end - start)

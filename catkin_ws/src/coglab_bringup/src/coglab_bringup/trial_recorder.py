@@ -98,7 +98,7 @@ def summarise(trial: Trial, kind: str, outcome: str, start: float, end: float, v
     joint speed over its limit. None where nothing was measured (no contact is waited for where the robot gives).
     """
     contact = next((t for t, found, _ in trial.contacts if found and start <= t <= end), None)
-    until = contact or end
+    until = next((t for t, _, _ in trial.contacts if start <= t <= end), end)  # after a contact or a release the arm goes home
     arrived = [d for t, state, d in trial.feedback if start <= t <= until and state in ("reached", "holding")]
     touch = next((t for t, *_, force in trial.truth if start <= t <= end and force > FORCE_THRESHOLD), None)
     lost_before = [count for t, count in trial.fri_lost if t <= start] or [count for _, count in trial.fri_lost][:1]

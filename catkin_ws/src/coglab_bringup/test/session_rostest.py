@@ -1,0 +1,75 @@
+#!/usr/bin/python3
+"""A session of the whole system: from the person, onto the board, from the board, to the person. Then the robot's node
+is killed while the machine waits: it says so, and can go on."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+import unittest
+
+import rospy
+import rostest
+from coglab_msgs.srv import Start
+from std_srvs.srv import Trigger
+from visualization_msgs.msg import MarkerArray
+
+from coglab_bringup.handover import READY_LIMIT, ask_for, run_handover
+from coglab_bringup.trial_recorder import TrialRecorder
+
+ORDER = ("exchange_human_to_robot", "put", "take", "exchange_robot_to_human")
+
+
+class Session(unittest.TestCase):
+    """The actions run once, in setUpClass."""
+
+    @classmethod
+    def setUpClass(cls):
+        rospy.init_node("session_test")
+        cls.markers = []
+        rospy.Subscriber("/coglab_sim/truth/markers", MarkerArray, cls.markers.append, queue_size=1)
+        recorder = TrialRecorder()
+        cls.rows = {action: run_handover(action, "mug", recorder)[0] for action in ORDER}
+
+    def test_1_from_the_person(self):
+        self.assertEqual(self.rows[ORDER[0]]["outcome"], "success")
+
+    def test_2_onto_the_board(self):
+        self.assertEqual(self.rows[ORDER[1]]["outcome"], "success")
+
+    def test_3_from_the_board(self):
+        self.assertEqual(self.rows[ORDER[2]]["outcome"], "success")
+
+    def test_4_to_the_person(self):
+        self.assertEqual(self.rows[ORDER[3]]["outcome"], "success")
+
+    def test_5_rviz_gets_person_and_object(self):
+        self.assertTrue(self.markers)
+        self.assertEqual({m.ns for m in self.markers[-1].markers}, {"human_hand", "object"})
+
+    def test_6_a_killed_robot_node_shows_in_the_hub_and_is_initialised_again(self):
+        found = subprocess.run(["rosnode", "info", "/robot"], capture_output=True, text=True, timeout=20, check=True)
+        pid = int(next(line.split()[1] for line in found.stdout.splitlines() if line.startswith("Pid:")))
+        os.kill(pid, signal.SIGKILL)
+        start = rospy.ServiceProxy("/coglab/start", Start)
+        end = time.monotonic() + 30.0
+        answer = start("juggle", "")
+        while "takes initialise" not in answer.message and "takes reset" not in answer.message and time.monotonic() < end:
+            time.sleep(0.2)
+            answer = start("juggle", "")
+        why = rospy.ServiceProxy("/coglab/why", Trigger)().message
+        self.assertRegex(why, "robot is silent|arm is blocked|arm does not follow")
+        action = "initialise" if "takes initialise" in answer.message else "reset"
+        ask_for(action, "", lambda: True, READY_LIMIT)
+        end = time.monotonic() + READY_LIMIT
+        while "wait_without_object takes" not in answer.message and time.monotonic() < end:
+            time.sleep(0.5)
+            answer = start("juggle", "")
+            if "takes initialise" in answer.message:
+                start("initialise", "")
+        self.assertIn("wait_without_object takes", answer.message)
+
+
+if __name__ == "__main__":
+    rostest.rosrun("coglab_bringup", "session", Session, sys.argv)
