@@ -38,6 +38,7 @@ def run_environment(port: int, home: Path | None = None) -> dict[str, str]:
         ROS_HOME=str(ros_home),
         ROS_LOG_DIR=str(ros_home / "log"),
         ROSCONSOLE_STDOUT_LINE_BUFFERED="1",
+        PYTHONUNBUFFERED="1",  # what a node said last is in the log, also when it was killed
     )
     environment.pop("ROS_HOSTNAME", None)
     return environment
