@@ -9,10 +9,14 @@ import unittest
 import rospkg
 import rospy
 import rostest
+import tf2_ros
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 from coglab_msgs.srv import AddPtpRequest  # noqa: E402
+from diagnostic_msgs.msg import DiagnosticArray  # noqa: E402
 from robot_fixture import HOME, Robot, wait_until  # noqa: E402
+from rosgraph_msgs.msg import Log  # noqa: E402
+from sensor_msgs.msg import JointState  # noqa: E402
 
 GOAL = (0.80, 0.0, 0.45)
 
@@ -23,6 +27,8 @@ class TruePath(unittest.TestCase):
     @classmethod
     def setUpClass(cls) -> None:
         cls.robot = Robot()
+        cls.frames = tf2_ros.Buffer()
+        cls.listener = tf2_ros.TransformListener(cls.frames)
         cls.robot.load()
         path = rospkg.RosPack().get_path("coglab_controllers") + "/config/primitives.xml"
         answer = cls.robot.dmp("load_dmps", path)
@@ -46,6 +52,12 @@ class TruePath(unittest.TestCase):
         robot.see_hand(GOAL)
         wait_until(lambda: robot.execute().success, 5.0, "execute_dmp")
         wait_until(lambda: robot.feedback.state == "running", 5.0, "running")
+        wait_until(lambda: self.frames.can_transform("lwr_base_link", "dmp_goal", rospy.Time(0)), 5.0,
+                   "tf2 frame dmp_goal")
+        goal = self.frames.lookup_transform("lwr_base_link", "dmp_goal", rospy.Time(0))
+        place = goal.transform.translation
+        for value, wanted in zip((place.x, place.y, place.z), GOAL):
+            self.assertAlmostEqual(value, wanted, delta=0.01)
         wait_until(lambda: robot.feedback.state == "reached", 10.0, "reached")
         wait_until(lambda: robot.feedback.remaining_distance < 0.002, 5.0, "2 mm from the goal")
         phases = [m.phase for m in robot.feedbacks if m.state == "running"]
@@ -78,6 +90,36 @@ class TruePath(unittest.TestCase):
         wait_until(lambda: robot.feedback.state == "aborted", 5.0, "aborted")
         self.assertIn("lost", robot.feedback.reason)
         wait_until(lambda: max(abs(v) for v in robot.joints.velocity) < 0.01, 3.0, "standing still")
+
+    def test_5_foreign_target_velocities_are_refused_with_the_reason(self) -> None:
+        """Who else publishes target_joint_states while a controller is active moves nothing."""
+        robot = self.robot
+        robot.go(HOME)
+        told: list[str] = []
+        counted: dict[str, int] = {}
+
+        def diagnosed(message: DiagnosticArray) -> None:
+            for status in message.status:
+                if status.name.endswith("commands"):
+                    counted.update((v.key, int(v.value)) for v in status.values)
+
+        rospy.Subscriber("/rosout_agg", Log, lambda m: told.append(m.msg))
+        rospy.Subscriber("/diagnostics", DiagnosticArray, diagnosed)
+        foreign = rospy.Publisher("lwr/target_joint_states", JointState, queue_size=1)
+        wait_until(lambda: foreign.get_num_connections() > 0 and counted, 10.0, "connections")
+        before = robot.arm()
+        rate = rospy.Rate(100)
+        for _ in range(150):
+            foreign.publish(JointState(velocity=[0.0] * 6 + [0.4]))
+            rate.sleep()
+        for now, then in zip(robot.arm(), before, strict=True):
+            self.assertAlmostEqual(now, then, delta=0.01)
+        keys = ("refused: a controller is active", "refused: another publisher moves the arm")
+        wait_until(lambda: sum(counted.get(key, 0) for key in keys) > 100, 5.0, "refusals counted")
+        wait_until(lambda: any(f"target_joint_states of {rospy.get_name()} refused" in line
+                               for line in told), 8.0, "the reason with the publisher's name")
+        foreign.unregister()
+        robot.go(HOME)  # and the controller's own velocities still count
 
 
 if __name__ == "__main__":

@@ -1,29 +1,28 @@
 /// @file
-/// The three processes of bench_fri.py, all over UDP on 127.0.0.1:
+/// The two processes beside the robot node in bench_fri.py (coglab_controllers), over UDP on
+/// 127.0.0.1:
 ///
-///   echo                          bare recv/send: the floor. Prints its port.
-///   bridge LIMITS_FILE            FRI thread with the whole bridge in command mode, and a control
-///   thread that is woken every 5 ms
-///                                 and moves the arm. Prints its port.
-///   measure ECHO BRIDGE QUADS     paced 1 kHz controller: blocks of 500 packets in the order echo
-///   bridge bridge echo, QUADS
-///                                 times. Prints per block one line: kind, then the latencies in
-///                                 us, -1 for a missing answer.
+///   echo                       bare recv/send: the floor. Prints its port.
+///   measure ECHO BRIDGE QUADS  paced 1 kHz controller: blocks of 500 packets in the order echo
+///                              bridge bridge echo, QUADS times. Both get a packet in every
+///                              millisecond, so that the robot's control cycle runs on during the
+///                              blocks of the echo; the one whose block it is gets it first and is
+///                              measured. Prints "ready" when the bridge is in command mode and
+///                              moves; then per block one line: kind, then the latencies in us, -1
+///                              for a missing answer; at last the word moving and the share of the
+///                              bridge's answers that moved the arm.
+#include <algorithm>
 #include <atomic>
-#include <cerrno>
-#include <cmath>
 #include <csignal>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
 #include <ctime>
 #include <string>
-#include <thread>
 #include <vector>
 
 #include <arpa/inet.h>
 #include <netinet/in.h>
-#include <semaphore.h>
 #include <sys/socket.h>
 #include <sys/time.h>
 #include <unistd.h>
@@ -75,54 +74,11 @@ int echo() {
   return 0;
 }
 
-int bridge(const char* limits_file) {
-  BridgeConfig config;
-  config.limits = loadJointLimits(limits_file);
-  config.receive_timeout = 5.0;  // the other peer's blocks are no silence
-  Bridge bridge(config);
-  sem_t due;
-  sem_init(&due, 0, 0);
-  int ticks = 0;
-  FriThreadOptions options;
-  options.port = 0;
-  options.priority = kPriority;
-  options.after_answer = [&](bool) {
-    if (++ticks % 5 == 0) sem_post(&due);
-  };
-  FriThread fri(bridge, options);
-  lockMemory();
-  fri.start();
-  std::printf("%d\n", fri.port());
-  std::fflush(stdout);
-  BoundedThread control;
-  control.start("control", 256 * 1024, [&] {
-    enterRealTime(kPriority - 10);
-    RobotSample sample;
-    while (!ended) {
-      sem_wait(&due);
-      bridge.port().newestSample(sample);
-      const std::int64_t now = steadyNow();
-      Vector7 velocity =
-          Vector7::Constant(0.2 * std::sin(2e-9 * static_cast<double>(now % 1'000'000'000'000)));
-      // About the work of a control cycle: some kinematics.
-      for (int i = 0; i < 20; ++i)
-        velocity[0] += 1e-9 * flangePose(sample.position).translation().x();
-      bridge.port().sendVelocity({velocity, now, sample.motion_epoch});
-    }
-  });
-  while (!ended) {
-    if (bridge.snapshot().supervisor == SupervisorState::Monitor) bridge.command("start");
-    std::this_thread::sleep_for(std::chrono::milliseconds(20));
-  }
-  sem_post(&due);
-  control.join();
-  fri.stop();
-  return 0;
-}
-
+/// A robot controller that does what it is told, in its resting posture.
 struct Controller {
   fri::MeasurementDatagram datagram{};
   std::uint16_t counter = 0;
+  std::uint64_t answers = 0, moved = 0;
   Controller() {
     datagram.measurement_period = datagram.command_period = 0.001F;
     datagram.state = 1;
@@ -132,13 +88,26 @@ struct Controller {
     datagram.krl.ints[15] = fri::kCoglabProgramMark;
     for (int i = 0; i < 3; ++i)
       datagram.commanded_frame[5 * i] = datagram.commanded_frame_offset[5 * i] = 1.0F;
+    const float home[7] = {-1.4349F, -0.6086F, 1.4986F, 1.7048F, 0.1857F, 0.2152F, 0.782F};
+    std::copy(home, home + 7, datagram.commanded_position);
+    std::copy(home, home + 7, datagram.measured_position);
   }
   void take(const fri::CommandDatagram& answer) {
     datagram.header.reflected = answer.header.counter;
-    if (answer.krl.ints[0] == 1) datagram.state = 2;
-    for (int i = 0; i < 7; ++i)
-      datagram.measured_position[i] = datagram.commanded_position_offset[i] =
-          answer.joint_position[i];
+    if (answer.krl.ints[2] != 0 && answer.krl.ints[2] != datagram.krl.ints[0]) {
+      datagram.krl.ints[0] = answer.krl.ints[2];
+      datagram.krl.ints[1] = 1;
+      datagram.state = answer.krl.ints[0] == 1 ? 2 : 1;
+    }
+    ++answers;
+    bool moves = false;
+    for (int i = 0; i < 7; ++i) {
+      moves = moves || answer.joint_position[i] != datagram.measured_position[i];
+      datagram.measured_position[i] = answer.joint_position[i];
+      datagram.commanded_position_offset[i] =
+          answer.joint_position[i] - datagram.commanded_position[i];
+    }
+    if (moves) ++moved;
   }
 };
 
@@ -151,33 +120,50 @@ int measure(int echo_port, int bridge_port, int quads) {
   std::uint8_t reply[1024];
   std::vector<float> us(kBlock);
   std::int64_t next = steadyNow() + kPeriod;
-  const auto block = [&](bool to_bridge, int packets) {
+
+  /// Sends the packet of this millisecond to one of the two and waits for its answer; us.
+  const auto exchange = [&](bool to_bridge) {
     target.sin_port = htons(static_cast<std::uint16_t>(to_bridge ? bridge_port : echo_port));
+    fri::MeasurementDatagram& d = controller.datagram;
+    d.header = fri::measurementHeader(
+        to_bridge ? ++controller.counter : controller.counter, d.header.reflected);
+    const std::int64_t sent = steadyNow();
+    sendto(fd, &d, sizeof d, 0, reinterpret_cast<sockaddr*>(&target), sizeof target);
+    // A late answer of the other one is not mistaken for this one.
+    sockaddr_in from{};
+    ssize_t got = 0;
+    do {
+      socklen_t length = sizeof from;
+      got = recvfrom(fd, reply, sizeof reply, 0, reinterpret_cast<sockaddr*>(&from), &length);
+    } while (got > 0 && from.sin_port != target.sin_port);
+    const std::int64_t received = steadyNow();
+    if (got != static_cast<ssize_t>(fri::kCommandSize)) return -1.0F;
+    fri::CommandDatagram answer;
+    if (to_bridge && fri::decode(reply, fri::kCommandSize, answer)) controller.take(answer);
+    return 1e-3F * static_cast<float>(received - sent);
+  };
+  const auto block = [&](bool to_bridge, int packets) {
     for (int i = 0; i < packets; ++i, next += kPeriod) {
       if (steadyNow() > next) next = steadyNow() + kPeriod;  // late ourselves: not the peer's fault
       timespec wake{next / 1'000'000'000, next % 1'000'000'000};
       clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &wake, nullptr);
-      fri::MeasurementDatagram& d = controller.datagram;
-      d.header = fri::measurementHeader(++controller.counter, d.header.reflected);
-      if (!to_bridge) --controller.counter;
-      const std::int64_t sent = steadyNow();
-      sendto(fd, &d, sizeof d, 0, reinterpret_cast<sockaddr*>(&target), sizeof target);
-      const ssize_t got = recv(fd, reply, sizeof reply, 0);
-      const std::int64_t received = steadyNow();
-      us[static_cast<std::size_t>(i % kBlock)] = got == static_cast<ssize_t>(fri::kCommandSize)
-                                                     ? 1e-3F * static_cast<float>(received - sent)
-                                                     : -1.0F;
-      fri::CommandDatagram answer;
-      if (to_bridge && fri::decode(reply, fri::kCommandSize, answer) && got > 0)
-        controller.take(answer);
+      us[static_cast<std::size_t>(i % kBlock)] = exchange(to_bridge);
+      exchange(!to_bridge);
     }
   };
-  block(false, kBlock);
-  block(true, 3 * kBlock);  // until command mode
-  if (controller.datagram.state != 2) {
-    std::fprintf(stderr, "the bridge did not ask for command mode\n");
+  for (int second = 0; second < 60 && !ended; ++second) {
+    const std::uint64_t moved = controller.moved;
+    block(false, kBlock);
+    block(true, kBlock);
+    if (controller.datagram.state == 2 && controller.moved > moved + kBlock / 2) break;
+  }
+  if (controller.datagram.state != 2 || controller.moved == 0) {
+    std::fprintf(stderr, "the bridge did not move the arm within 60 s\n");
     return 1;
   }
+  std::puts("ready");
+  std::fflush(stdout);
+  controller.answers = controller.moved = 0;
   for (int quad = 0; quad < quads && !ended; ++quad) {
     for (const bool to_bridge : {false, true, true, false}) {
       block(to_bridge, kBlock);
@@ -186,6 +172,8 @@ int measure(int echo_port, int bridge_port, int quads) {
       std::fputc('\n', stdout);
     }
   }
+  std::printf("moving %.4f\n", static_cast<double>(controller.moved) /
+                                   static_cast<double>(std::max<std::uint64_t>(controller.answers, 1)));
   return 0;
 }
 
@@ -196,11 +184,9 @@ int main(int argc, char** argv) {
   std::signal(SIGTERM, onSignal);
   const std::string mode = argc > 1 ? argv[1] : "";
   if (mode == "echo") return echo();
-  if (mode == "bridge" && argc == 3) return bridge(argv[2]);
   if (mode == "measure" && argc == 5)
     return measure(std::atoi(argv[2]), std::atoi(argv[3]), std::atoi(argv[4]));
   std::fprintf(stderr,
-               "usage: %s echo | bridge LIMITS_FILE | measure ECHO_PORT BRIDGE_PORT QUADS\n",
-               argv[0]);
+               "usage: %s echo | measure ECHO_PORT BRIDGE_PORT QUADS\n", argv[0]);
   return 2;
 }

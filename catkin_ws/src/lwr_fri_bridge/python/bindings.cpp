@@ -175,6 +175,8 @@ py::dict snapshotDict(const Snapshot& s) {
   d["lost_measurements"] = s.session.lost_measurements;
   d["lost_answers"] = s.session.lost_answers;
   d["restarts"] = s.session.restarts;
+  d["new_periods"] = s.session.new_periods;
+  d["cycle_time"] = s.sample.cycle_time;
   d["commands_invalid"] = s.counters.commands_invalid;
   d["commands_old_epoch"] = s.counters.commands_old_epoch;
   d["command_timeouts"] = s.counters.command_timeouts;
@@ -197,12 +199,15 @@ BridgeConfig configFrom(const std::string& limits_file, const std::string& profi
       config.mode = parseEvent(value.cast<std::string>(), config.mode).mode;
     } else if (name == "lenient_headers") {
       config.lenient_headers = value.cast<bool>();
+    } else if (name == "wrench_in_tool_axes") {
+      config.wrench_in_tool_axes = value.cast<bool>();
     } else if (name == "tool_number") {
       config.tool_number = value.cast<int>();
     } else {
       double* const target = name == "position_margin"        ? &config.position_margin
-                             : name == "leash_position"       ? &config.leash_position
-                             : name == "leash_impedance"      ? &config.leash_impedance
+                             : name == "leash_position"       ? &config.leash.position
+                             : name == "leash_impedance"      ? &config.leash.impedance
+                             : name == "leash_load"           ? &config.leash.load
                              : name == "velocity_filter_time" ? &config.velocity_filter_time
                              : name == "command_timeout"      ? &config.command_timeout
                              : name == "topic_timeout"        ? &config.topic_timeout

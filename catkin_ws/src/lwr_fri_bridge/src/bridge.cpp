@@ -60,7 +60,7 @@ bool Bridge::compute(const std::uint8_t* datagram, std::size_t size, std::int64_
   connected_ = true;
   last_receive_ns_ = now_ns;
   const double dt = fri::cycleTimeOf(measurement_);
-  if (reception.fresh_session) {
+  if (reception.fresh_session || reception.new_period) {
     velocity_filter_.reset();
     following_ = false;
   }
@@ -71,7 +71,7 @@ bool Bridge::compute(const std::uint8_t* datagram, std::size_t size, std::int64_
   sample_.velocity = velocity_filter_.update(sample_.position, reception.cycles, dt);
   sample_.torque = fri::jointsFromWire(measurement_.measured_torque);
   sample_.external_torque = fri::jointsFromWire(measurement_.external_torque);
-  sample_.tool_wrench = fri::wrenchFromWire(measurement_.external_wrench);
+  sample_.tool_wrench = toolWrench(measurement_, config_.wrench_in_tool_axes);
   ++sample_.sequence;
 
   const bool monitor = measurement_.state == static_cast<std::uint16_t>(fri::FriState::Monitor);
@@ -261,7 +261,8 @@ void Bridge::follow(const fri::Reception& reception, fri::CommandDatagram& answe
     target /= excess;  // the whole vector, so that the direction of the motion is kept
 
   const bool was_leashed = leash_.joint() >= 0;
-  leash_.update(interpolator_, sample_.position, wanted, leashLength(), config_.limits, target);
+  leash_.update(interpolator_, sample_.position, wanted, leashOf(active_mode_, config_.leash),
+                config_.limits, target);
   if (!was_leashed && leash_.joint() >= 0) ++counters_.leash_trips;
 
   bounded_joints_ = braking_.bound(interpolator_, sample_.cycle_time, target);
@@ -308,11 +309,6 @@ Vector7 Bridge::targetVelocity() {
   const bool allowed =
       supervisor_.block() == MotionBlock::None || supervisor_.block() == MotionBlock::Leashed;
   return current && !expired && allowed ? valid_command_.velocity : Vector7::Zero();
-}
-
-double Bridge::leashLength() const {
-  return active_mode_.strategy == fri::ControlStrategy::Position ? config_.leash_position
-                                                                 : config_.leash_impedance;
 }
 
 void Bridge::fillMode(fri::CommandDatagram& answer) const {

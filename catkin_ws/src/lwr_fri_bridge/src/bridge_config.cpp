@@ -15,8 +15,9 @@ void checkParameter(const char* name, double value, double low, double high) {
 void BridgeConfig::check() const {
   checkParameter("tool_number", tool_number, 0, 16);
   checkParameter("position_margin", position_margin, 0.0, 0.5);
-  checkParameter("set_point_leash/position", leash_position, 0.005, 0.5);
-  checkParameter("set_point_leash/impedance", leash_impedance, 0.005, 0.5);
+  checkParameter("set_point_leash/position", leash.position, 0.005, 0.5);
+  checkParameter("set_point_leash/impedance", leash.impedance, 0.005, 0.5);
+  checkParameter("set_point_leash/load", leash.load, 0.0, 70.0);
   checkParameter("velocity_filter_time", velocity_filter_time, 0.0, 0.2);
   checkParameter("command_timeout", command_timeout, 0.005, 1.0);
   checkParameter("topic_timeout", topic_timeout, 0.005, 1.0);

@@ -49,6 +49,7 @@ void BridgeDiagnostics::connection(diagnostic_updater::DiagnosticStatusWrapper& 
   status.add("rejected: out of order", s.session.out_of_order);
   status.add("superseded in the queue", thread.superseded);
   status.add("restarts of the controller", s.session.restarts);
+  status.add("changes of the period", s.session.new_periods);
   status.add("datagrams of a second sender", thread.foreign);
   status.add("last second sender", thread.last_foreign);
   status.add("send errors", thread.send_errors);
@@ -74,13 +75,15 @@ void BridgeDiagnostics::arm(diagnostic_updater::DiagnosticStatusWrapper& status)
 void BridgeDiagnostics::commands(diagnostic_updater::DiagnosticStatusWrapper& status) {
   const Snapshot s = owner_.bridge_.snapshot();
   const BridgeRos::Refused refused = owner_.refused();
-  const std::uint64_t total = refused.invalid + refused.controller_active + refused.not_allowed +
+  const std::uint64_t total = refused.invalid + refused.controller_active +
+                              refused.second_publisher + refused.not_allowed +
                               s.counters.commands_invalid;
   status.summary(levelOf(total > refused_before_ ? Severity::Warning : Severity::Ok),
                  total > refused_before_ ? "target velocities were refused" : "ok");
   refused_before_ = total;
   status.add("refused: not valid", refused.invalid + s.counters.commands_invalid);
   status.add("refused: a controller is active", refused.controller_active);
+  status.add("refused: another publisher moves the arm", refused.second_publisher);
   status.add("refused: motion not allowed", refused.not_allowed);
   status.add("ignored: older than the permission", s.counters.commands_old_epoch);
   status.add("commands stopped while moving", s.counters.command_timeouts);

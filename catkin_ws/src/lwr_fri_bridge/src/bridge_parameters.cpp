@@ -58,8 +58,15 @@ BridgeConfig readBridgeConfig(const ros::NodeHandle& nh) {
   }
   config.mode = mode.mode;
   config.position_margin = numberParameter(nh, "position_margin", config.position_margin);
-  config.leash_position = numberParameter(nh, "set_point_leash/position", config.leash_position);
-  config.leash_impedance = numberParameter(nh, "set_point_leash/impedance", config.leash_impedance);
+  config.leash.position = numberParameter(nh, "set_point_leash/position", config.leash.position);
+  config.leash.impedance = numberParameter(nh, "set_point_leash/impedance", config.leash.impedance);
+  config.leash.load = numberParameter(nh, "set_point_leash/load", config.leash.load);
+  const auto axes = parameter<std::string>(nh, "wrench_axes", "base", "base or tool");
+  if (axes != "base" && axes != "tool") {
+    throw std::invalid_argument("parameter " + nh.resolveName("wrench_axes") + " = " + axes +
+                                ": expected base or tool");
+  }
+  config.wrench_in_tool_axes = axes == "tool";
   config.velocity_filter_time =
       numberParameter(nh, "velocity_filter_time", config.velocity_filter_time);
   config.command_timeout = numberParameter(nh, "command_timeout", config.command_timeout);

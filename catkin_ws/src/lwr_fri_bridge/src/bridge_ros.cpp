@@ -59,7 +59,7 @@ BridgeRos::BridgeRos(const ros::NodeHandle& nh, Options options)
   bridge_.setVelocitySource(VelocitySource::Topic);
   for (const char* name : kJointNames) joint_message_.name.emplace_back(name);
   torque_message_.name = joint_message_.name;
-  wrench_message_.header.frame_id = nh.param<std::string>("tool_frame", "lwr_flange");
+  wrench_message_.header.frame_id = nh.param<std::string>("tool_frame", "ih2_palm");
 }
 
 BridgeRos::~BridgeRos() {
@@ -129,7 +129,7 @@ void BridgeRos::setControllerActive(bool active) {
 }
 
 BridgeRos::Refused BridgeRos::refused() const {
-  return {refused_invalid_, refused_active_, refused_blocked_};
+  return {refused_invalid_, refused_active_, refused_second_, refused_blocked_};
 }
 
 void BridgeRos::onTarget(const ros::MessageEvent<const sensor_msgs::JointState>& event) {
@@ -141,6 +141,18 @@ void BridgeRos::onTarget(const ros::MessageEvent<const sensor_msgs::JointState>&
                       "lwr: target_joint_states of %s refused: a controller of this process is "
                       "active; switch it off first",
                       event.getPublisherName().c_str());
+    return;
+  }
+  // Two publishers would pull the arm to and fro: the one whose velocities are followed keeps it
+  // until it pauses.
+  const double pause = 1e-9 * static_cast<double>(steadyNow() - target_stamp_ns_);
+  if (event.getPublisherName() != target_publisher_ && target_stamp_ns_ != 0 &&
+      pause < bridge_.config().topic_timeout) {
+    ++refused_second_;
+    ROS_WARN_THROTTLE(5.0,
+                      "lwr: target_joint_states of %s refused: %s moves the arm; switch its "
+                      "controller off or end it first",
+                      event.getPublisherName().c_str(), target_publisher_.c_str());
     return;
   }
   const sensor_msgs::JointState& message = *event.getMessage();
@@ -185,6 +197,8 @@ void BridgeRos::onTarget(const ros::MessageEvent<const sensor_msgs::JointState>&
   command.stamp_ns = steadyNow();
   command.motion_epoch = now.sample.motion_epoch;
   bridge_.sendTopicVelocity(command);
+  target_publisher_ = event.getPublisherName();
+  target_stamp_ns_ = command.stamp_ns;
 }
 
 void BridgeRos::onEvent(const std_msgs::String& message) {

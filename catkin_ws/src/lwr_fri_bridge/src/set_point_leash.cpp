@@ -13,22 +13,49 @@ constexpr double kReturnDelay = 0.05;  // s, time constant of the last bit of th
 constexpr double kReturned = 1e-3;     // rad
 constexpr double kNoticeable = 0.1;    // of the leash: joints ahead by less keep their set-point
 
+constexpr double kLongest = 0.5;  // rad
+constexpr double kLever[7] = {1.0, 1.0, 0.6, 0.6, 0.2, 0.2, 0.2};  // m, joint axis to hand, stretched
+constexpr double kReach = 0.4;      // m of hand displacement per rad of joint, in a usual posture
+constexpr double kLoadLever = 0.1;  // m, from the tool's origin to the load
+
 }  // namespace
 
+Vector7 leashOf(const ControlMode& mode, const LeashLengths& lengths) {
+  Vector7 leash = Vector7::Constant(lengths.position);
+  switch (mode.strategy) {
+    case fri::ControlStrategy::JointImpedance:
+      for (int i = 0; i < 7; ++i)
+        leash[i] = std::max(lengths.impedance, lengths.load * kLever[i] / mode.joint_stiffness[i]);
+      break;
+    case fri::ControlStrategy::CartesianImpedance: {
+      const double translation = mode.cartesian_stiffness.head<3>().minCoeff();
+      const double rotation = mode.cartesian_stiffness.tail<3>().minCoeff();
+      leash.setConstant(std::max(lengths.impedance, lengths.load / (translation * kReach) +
+                                                        lengths.load * kLoadLever / rotation));
+      break;
+    }
+    case fri::ControlStrategy::Position:
+    case fri::ControlStrategy::Other:
+      break;
+  }
+  return leash.cwiseMin(kLongest);
+}
+
 bool SetPointLeash::update(const Interpolator& interpolator, const Vector7& measured,
-                           const Vector7& wanted, double leash, const JointLimits& limits,
+                           const Vector7& wanted, const Vector7& leash, const JointLimits& limits,
                            Vector7& target) {
   const Vector7 ahead = interpolator.position() - measured;
   if (joint_ < 0) {
     for (int i = 0; i < 7; ++i) {
       const bool outward =
           interpolator.velocity()[i] * ahead[i] > 0.0 || target[i] * ahead[i] > 0.0;
-      if (outward && std::abs(ahead[i]) > leash) joint_ = i;
+      if (outward && std::abs(ahead[i]) > leash[i]) joint_ = i;
     }
     if (joint_ < 0) return false;
     home_ = measured;
     for (int i = 0; i < 7; ++i) {
-      direction_[i] = std::abs(ahead[i]) > kNoticeable * leash ? std::copysign(1.0, ahead[i]) : 0.0;
+      direction_[i] =
+          std::abs(ahead[i]) > kNoticeable * leash[i] ? std::copysign(1.0, ahead[i]) : 0.0;
     }
   }
 

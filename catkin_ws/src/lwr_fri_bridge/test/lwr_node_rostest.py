@@ -17,6 +17,7 @@ from coglab_msgs.msg import LwrState
 from coglab_msgs.srv import LwrCommand
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import WrenchStamped
+from rosgraph_msgs.msg import Log
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 
@@ -38,6 +39,12 @@ def wait_for(condition, what: str, limit: float = LIMIT):
 
 def bound_port(name: str) -> int:
     return wait_for(lambda: rospy.get_param(f"{name}/fri_port_bound", 0), f"{name}/fri_port_bound")
+
+
+def node_binary() -> str:
+    return subprocess.check_output(
+        ["catkin_find", "--first-only", "--libexec", "lwr_fri_bridge", "lwr_node"], text=True
+    ).strip()
 
 
 class Twist:
@@ -101,8 +108,12 @@ class LwrNode(unittest.TestCase):
         self.assertEqual(len(joints.velocity), 7)
         torques = rospy.wait_for_message("/lwr/external_torques", JointState, LIMIT)
         self.assertEqual(list(torques.effort), [7, 6, 5, 4, 3, 2, 1])
-        wrench = rospy.wait_for_message("/lwr/tool_wrench", WrenchStamped, LIMIT).wrench
-        self.assertEqual((wrench.torque.x, wrench.torque.y, wrench.torque.z), (6, 5, 4))
+        message = rospy.wait_for_message("/lwr/tool_wrench", WrenchStamped, LIMIT)
+        self.assertEqual(message.header.frame_id, "ih2_palm")
+        # On the wire 1 2 3, torques reversed 4 5 6, in the base's axes; told in the tool's.
+        force, torque = message.wrench.force, message.wrench.torque
+        self.assertEqual((force.x, force.y, force.z), (2, -1, 3))
+        self.assertEqual((torque.x, torque.y, torque.z), (5, -6, 4))
 
     def test_unknown_event_is_rejected_with_the_list(self) -> None:
         reply = self.command("jump")
@@ -170,53 +181,156 @@ class LwrNode(unittest.TestCase):
             self.assertIn(key, found["FRI connection"])
         self.assertEqual(float(found["arm"]["temperature lwr_a6 (degC)"]), 36.0)
 
-    def test_sigint_brakes_then_asks_for_monitor_mode(self) -> None:
-        rospy.set_param("/lwr_two/fri_port", 0)
-        rospy.set_param("/lwr_two/rt_priority", 0)
-        binary = subprocess.check_output(
-            ["catkin_find", "--first-only", "--libexec", "lwr_fri_bridge", "lwr_node"], text=True
-        ).strip()
-        node = subprocess.Popen(
-            [binary, "__name:=lwr_two", "_lwr_namespace:=/lwr_two"], env=os.environ
-        )
-        robot = UdpController(bound_port("/lwr_two")).start()
-        twist = None
+    def test_a_second_sender_is_ignored_and_named(self) -> None:
+        told: list[str] = []
+        rospy.Subscriber("/rosout_agg", Log, lambda m: told.append(m.msg))
+        rospy.sleep(0.5)
+        other = UdpController(bound_port("/lwr")).start()
+        name = f"127.0.0.1:{other.source_port}"
         try:
-            rospy.wait_for_service("/lwr_two/command", LIMIT)
-            command = rospy.ServiceProxy("/lwr_two/command", LwrCommand)
-            wait_for(lambda: command("start").success, "start")
-            target = rospy.Publisher("/lwr_two/target_joint_states", JointState, queue_size=1)
-            twist = Twist(target, [0.5, 0, 0, 0, 0, 0, 0])
-            before = robot.position[0]
-            wait_for(lambda: robot.position[0] > before + 0.2, "motion")
+            wait_for(lambda: any("second sender, " + name in line for line in told), "the warning")
+            self.assertEqual(other.answered, 0)
+            values: dict[str, str] = {}
+
+            def diagnosed() -> bool:
+                for status in rospy.wait_for_message("/diagnostics", DiagnosticArray, LIMIT).status:
+                    values.update((v.key, v.value) for v in status.values)
+                return values.get("last second sender") == name
+
+            wait_for(diagnosed, "the second sender in the diagnostics")
+            self.assertEqual(values["peer"], f"127.0.0.1:{self.robot.source_port}")
+        finally:
+            other.close()
+        self.ask("start")  # the true peer goes on
+        self.ask("stop")
+
+    def test_a_second_publisher_is_refused_while_one_moves_the_arm(self) -> None:
+        binary = [sys.executable, str(pathlib.Path(__file__).resolve().parent / "foreign_target.py")]
+        told: list[str] = []
+        rospy.Subscriber("/rosout_agg", Log, lambda m: told.append(m.msg))
+        self.ask("start")
+        twist = Twist(self.target, [0.0] * 7)
+        foreign = subprocess.Popen([*binary, "__name:=foreign_target"], env=os.environ)
+        try:
+            before = self.robot.position[6]
+            wait_for(
+                lambda: any("target_joint_states of /foreign_target refused" in m for m in told),
+                "the refusal",
+            )
+            rospy.sleep(1.0)
+            self.assertEqual(self.robot.position[6], before)
+            twist.stop()  # a pause longer than topic_timeout: now the other one may
+            wait_for(lambda: self.robot.position[6] > before + 0.05, "the other one's motion")
+        finally:
+            twist.stop()
+            foreign.terminate()
+            foreign.wait(timeout=LIMIT)
+        self.ask("stop")
+
+    def second_node(self, name: str) -> tuple[subprocess.Popen, UdpController, Twist]:
+        """Another bridge with a controller of its own, moving A1 at 0.5 rad/s."""
+        rospy.set_param(f"/{name}/fri_port", 0)
+        rospy.set_param(f"/{name}/rt_priority", 0)
+        node = subprocess.Popen(
+            [node_binary(), f"__name:={name}", f"_lwr_namespace:=/{name}"], env=os.environ
+        )
+        robot = UdpController(bound_port(f"/{name}")).start()
+        rospy.wait_for_service(f"/{name}/command", LIMIT)
+        command = rospy.ServiceProxy(f"/{name}/command", LwrCommand)
+        wait_for(lambda: command("start").success, "start")
+        target = rospy.Publisher(f"/{name}/target_joint_states", JointState, queue_size=1)
+        twist = Twist(target, [0.5, 0, 0, 0, 0, 0, 0])
+        before = robot.position[0]
+        wait_for(lambda: robot.position[0] > before + 0.2, "motion")
+        return node, robot, twist
+
+    def end(self, node: subprocess.Popen, robot: UdpController, twist: Twist) -> None:
+        twist.stop()
+        if node.poll() is None:
+            node.kill()
+        node.wait(timeout=LIMIT)
+        robot.close()
+
+    def test_sigint_brakes_then_asks_for_monitor_mode(self) -> None:
+        node, robot, twist = self.second_node("lwr_two")
+        try:
             node.send_signal(signal.SIGINT)
             self.assertEqual(node.wait(timeout=LIMIT), 0)
             self.assertEqual(robot.state, 1)
             self.assertEqual(robot.requests[-1][0], 2)
             self.assertLess(robot.requests[-1][1], 1e-6)
         finally:
-            if twist:
-                twist.stop()
-            if node.poll() is None:
-                node.kill()
-            node.wait(timeout=LIMIT)
-            robot.close()
+            self.end(node, robot, twist)
 
-    def test_parameter_out_of_range_is_refused_at_start(self) -> None:
-        rospy.set_param("/lwr_three/set_point_leash/position", 7.0)
-        binary = subprocess.check_output(
-            ["catkin_find", "--first-only", "--libexec", "lwr_fri_bridge", "lwr_node"], text=True
-        ).strip()
-        run = subprocess.run(
-            [binary, "__name:=lwr_three", "_lwr_namespace:=/lwr_three"],
-            env=os.environ,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            text=True,
-            timeout=LIMIT,
+    def test_sigint_keeps_answering_for_2_s_if_monitor_mode_does_not_come(self) -> None:
+        node, robot, twist = self.second_node("lwr_four")
+        try:
+            robot.obeys = False
+            answered, began = robot.answered, time.monotonic()
+            node.send_signal(signal.SIGTERM)
+            self.assertEqual(node.wait(timeout=LIMIT), 0)
+            self.assertGreater(time.monotonic() - began, 1.9)
+            self.assertGreater(robot.answered - answered, 200)  # of 400 in 2 s
+            self.assertLess(robot.steps[-1], 1e-6)  # braked meanwhile
+        finally:
+            self.end(node, robot, twist)
+
+    def test_sigint_with_a_silent_controller_ends_after_1_s(self) -> None:
+        node, robot, twist = self.second_node("lwr_five")
+        try:
+            robot.silent = True
+            began = time.monotonic()
+            node.send_signal(signal.SIGINT)
+            self.assertEqual(node.wait(timeout=LIMIT), 0)
+            self.assertGreater(time.monotonic() - began, 0.9)  # it waited for it to come back
+        finally:
+            self.end(node, robot, twist)
+
+    def test_no_packets_is_said_with_port_and_time(self) -> None:
+        rospy.set_param("/lwr_six/fri_port", 0)
+        rospy.set_param("/lwr_six/rt_priority", 0)
+        told: list[str] = []
+        rospy.Subscriber("/rosout_agg", Log, lambda m: told.append(m.msg))
+        node = subprocess.Popen(
+            [node_binary(), "__name:=lwr_six", "_lwr_namespace:=/lwr_six"], env=os.environ
         )
-        self.assertNotEqual(run.returncode, 0)
-        self.assertIn("set_point_leash/position = 7 is outside its range 0.005..0.5", run.stdout)
+        try:
+            port = bound_port("/lwr_six")
+            wait_for(
+                lambda: any(f"no valid packet received on port {port} for" in m for m in told),
+                "the warning",
+            )
+        finally:
+            node.send_signal(signal.SIGINT)
+            self.assertEqual(node.wait(timeout=LIMIT), 0)
+
+    def test_parameters_out_of_range_are_refused_at_start(self) -> None:
+        for name, value, expected in (
+            ("set_point_leash/position", 7.0, "= 7 is outside its range 0.005..0.5"),
+            ("set_point_leash/load", -1.0, "= -1 is outside its range 0..70"),
+            ("fri_port", 70000, "= 70000 is outside its range 0..65535"),
+            ("rt_priority", 99, "= 99 is outside its range 0..98"),
+            ("rt_stack_kib", 1, "= 1 is outside its range 128..8192"),
+            ("joint_states_rate", 0.0, "= 0 is outside its range 1..1000"),
+            ("position_margin", "wide", "expected a number"),
+            ("krl_convention", "nobody", "known: coglab, centro_epiaggio, stanford"),
+            ("limits_profile", "t9", "profile 't9' is missing"),
+            ("wrench_axes", "flange", "= flange: expected base or tool"),
+            ("control_mode", "start", "expected position, joint_impedance"),
+        ):
+            space = "/lwr_three_" + name.replace("/", "_")
+            rospy.set_param(f"{space}/{name}", value)
+            run = subprocess.run(
+                [node_binary(), f"__name:={space[1:]}", f"_lwr_namespace:={space}"],
+                env=os.environ,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.STDOUT,
+                text=True,
+                timeout=LIMIT,
+            )
+            self.assertNotEqual(run.returncode, 0, name)
+            self.assertIn(expected, run.stdout)
+            self.assertIn(name.split("/")[-1] if name != "limits_profile" else "t9", run.stdout)
 
 
 if __name__ == "__main__":

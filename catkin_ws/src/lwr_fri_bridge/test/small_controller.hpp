@@ -86,6 +86,9 @@ class SmallController {
   void moveOwn(const Vector7& own) { own_ = own; }
   void setMeasured(const Vector7& measured) { measured_ = measured; }
   const Vector7& measured() const { return measured_; }
+  const Vector7& own() const { return own_; }
+  /// friOpen with another period, s.
+  void setPeriod(double period) { period_ = period; }
   void setCounter(std::uint16_t counter) { counter_ = counter; }
 
   fri::FriState state = fri::FriState::Monitor;

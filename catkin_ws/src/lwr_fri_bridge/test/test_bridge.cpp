@@ -2,7 +2,11 @@
 /// meaning" promise.
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <functional>
 #include <random>
+#include <sstream>
+#include <vector>
 
 #include "small_controller.hpp"
 
@@ -404,15 +408,175 @@ TEST(Bridge, aNewBridgeStartsNothing) {
 }
 
 TEST(Bridge, refusesParametersOutOfRangeByName) {
-  BridgeConfig config = defaultConfig();
-  config.leash_position = 3.0;
-  try {
-    Bridge bridge(config);
-    FAIL() << "accepted";
-  } catch (const std::invalid_argument& error) {
-    const std::string text = error.what();
-    EXPECT_NE(text.find("set_point_leash/position = 3"), std::string::npos) << text;
-    EXPECT_NE(text.find("0.005..0.5"), std::string::npos) << text;
+  struct Case {
+    const char* name;
+    double value;
+    const char* range;
+    std::function<void(BridgeConfig&, double)> set;
+  };
+  const std::vector<Case> cases = {
+      {"tool_number", 17, "0..16",
+       [](BridgeConfig& c, double v) { c.tool_number = static_cast<int>(v); }},
+      {"position_margin", 0.6, "0..0.5", [](BridgeConfig& c, double v) { c.position_margin = v; }},
+      {"set_point_leash/position", 3, "0.005..0.5",
+       [](BridgeConfig& c, double v) { c.leash.position = v; }},
+      {"set_point_leash/impedance", 0.001, "0.005..0.5",
+       [](BridgeConfig& c, double v) { c.leash.impedance = v; }},
+      {"set_point_leash/load", 71, "0..70", [](BridgeConfig& c, double v) { c.leash.load = v; }},
+      {"velocity_filter_time", -1, "0..0.2",
+       [](BridgeConfig& c, double v) { c.velocity_filter_time = v; }},
+      {"command_timeout", 2, "0.005..1", [](BridgeConfig& c, double v) { c.command_timeout = v; }},
+      {"topic_timeout", 2, "0.005..1", [](BridgeConfig& c, double v) { c.topic_timeout = v; }},
+      {"receive_timeout", 6, "0.05..5", [](BridgeConfig& c, double v) { c.receive_timeout = v; }},
+      {"start_timeout", 0.1, "0.5..120",
+       [](BridgeConfig& c, double v) { c.requests.start_timeout = v; }},
+      {"stop_timeout", 31, "0.1..30",
+       [](BridgeConfig& c, double v) { c.requests.stop_timeout = v; }},
+      {"silent_stop_timeout", 31, "0.1..30",
+       [](BridgeConfig& c, double v) { c.requests.silent_stop_timeout = v; }},
+      {"limits.velocity", 11, "0.001..10",
+       [](BridgeConfig& c, double v) { c.limits.velocity[3] = v; }},
+      {"limits.acceleration", 2000, "0.01..1000",
+       [](BridgeConfig& c, double v) { c.limits.acceleration[3] = v; }},
+      {"limits.jerk", 0.01, "0.1..1e+06", [](BridgeConfig& c, double v) { c.limits.jerk[3] = v; }}};
+  for (const Case& one : cases) {
+    for (const double value : {one.value, std::nan("")}) {
+      if (std::isnan(value) && std::string(one.name) == "tool_number") continue;
+      BridgeConfig config = defaultConfig();
+      one.set(config, value);
+      try {
+        Bridge bridge(config);
+        ADD_FAILURE() << one.name << " accepted";
+      } catch (const std::invalid_argument& error) {
+        std::ostringstream expected;
+        expected << one.name << " = " << value << " is outside its range " << one.range;
+        EXPECT_NE(std::string(error.what()).find(expected.str()), std::string::npos)
+            << error.what() << " instead of " << expected.str();
+      }
+    }
+  }
+}
+
+/// The next command after a gap is the set-point that the controller reports, one step on at the
+/// speed of the answer it saw last: it extrapolated, whatever was answered meanwhile.
+TEST(Bridge, goesOnFromTheReportedSetPointAfterAGap) {
+  for (const int gap : {1, 2, 5}) {
+    Cell cell(0.001);
+    cell.start();
+    const Vector7 velocity = Vector7::Constant(0.3);
+    cell.runDriven(300, velocity);
+    for (int i = 0; i < gap; ++i) {
+      drive(cell.bridge, cell.robot, velocity);
+      cell.robot.cycle(cell.bridge, i % 2 == 0, true);
+    }
+    const Vector7 reported = cell.robot.setPoint() + Vector7::Constant(0.001);
+    cell.robot.moveOwn(cell.robot.own() + Vector7::Constant(0.001));  // not where it was expected
+    drive(cell.bridge, cell.robot, velocity);
+    cell.robot.cycle(cell.bridge);
+    const Vector7 step = cell.robot.setPoint() - reported;
+    for (int j = 0; j < 7; ++j) EXPECT_NEAR(step[j], 0.3 * 0.001, 5e-7) << gap << " " << j;
+    EXPECT_GT(cell.bridge.snapshot().counters.resumed_after_gap, 0U);
+  }
+}
+
+/// friOpen with another period: the counters go on, no velocity spike, and every bound holds at the
+/// new period.
+TEST(Bridge, followsAnotherPeriodAfterFriWasOpenedAgain) {
+  Cell cell(0.001);
+  const JointLimits& limits = cell.bridge.config().limits;
+  std::uint64_t changes = 0;
+  for (const double period : {0.001, 0.005, 0.1, 0.020, 0.002}) {
+    if (period != cell.robot.period()) {
+      cell.robot.state = fri::FriState::Monitor;
+      cell.robot.setPeriod(period);
+      // Between friClose and friOpen the KRL program may have moved the arm a little.
+      cell.robot.moveOwn(cell.robot.own() + Vector7::Constant(0.01));
+      cell.robot.setMeasured(cell.robot.setPoint());
+      cell.run(1);
+      ++changes;
+      EXPECT_TRUE(cell.bridge.snapshot().sample.velocity.isZero()) << period;
+      const Vector7 answered = fri::jointsFromWire(cell.robot.answer.joint_position);
+      EXPECT_LT((answered - cell.robot.setPoint()).cwiseAbs().maxCoeff(), 2e-7) << period;
+    }
+    cell.start();
+    EXPECT_DOUBLE_EQ(cell.bridge.snapshot().sample.cycle_time, period);
+    Vector7 last = cell.robot.setPoint(), last_v = Vector7::Zero();
+    const double begin = last[0];
+    const int cycles = static_cast<int>(std::lround(1.2 / period));
+    for (int i = 0; i < cycles; ++i) {
+      drive(cell.bridge, cell.robot, Vector7::Constant(i < cycles * 3 / 4 ? 0.15 : 0.0));
+      cell.robot.cycle(cell.bridge);
+      const Vector7 v = (cell.robot.setPoint() - last) / period;
+      for (int j = 0; j < 7; ++j) {
+        const double noise = 6e-7 / period;  // float32 on the wire, twice
+        ASSERT_LE(std::abs(v[j]), limits.velocity[j] + noise) << period;
+        ASSERT_LE(std::abs(v[j] - last_v[j]), limits.acceleration[j] * period + 2.0 * noise)
+            << period;
+      }
+      last = cell.robot.setPoint();
+      last_v = v;
+    }
+    EXPECT_NEAR(last[0] - begin, 0.135, 0.03) << period;
+    EXPECT_EQ(cell.bridge.snapshot().session.new_periods, changes);
+    EXPECT_EQ(cell.bridge.snapshot().session.restarts, 0U);
+    EXPECT_TRUE(runEvent(cell.bridge, cell.robot, "stop").success());
+  }
+}
+
+/// The estimate comes in the base's axes about the tool, and is told in the tool's axes.
+TEST(Bridge, wrenchIsToldInTheToolsAxes) {
+  for (const bool filled : {true, false}) {
+    SmallController robot(0.005);
+    Vector7 posture;
+    posture << 0.4, 0.7, -0.3, -1.1, 0.6, 0.9, -0.5;
+    robot.moveOwn(posture);
+    robot.setMeasured(posture);
+    fri::MeasurementDatagram m = robot.measure();
+    // A tool turned by 90 degrees about the flange's z; without a frame: the flange itself.
+    Eigen::Matrix3d tool = flangePose(posture).linear();
+    if (filled) {
+      tool *= Eigen::AngleAxisd(M_PI / 2.0, Eigen::Vector3d::UnitZ()).toRotationMatrix();
+      for (int row = 0; row < 3; ++row) {
+        for (int column = 0; column < 3; ++column)
+          m.measured_frame[4 * row + column] = static_cast<float>(tool(row, column));
+      }
+    }
+    const Eigen::Vector3d force(3.0, -5.0, 7.0), torque(0.2, 0.4, -0.6);
+    Vector6 wrench;
+    wrench << force, torque;
+    fri::wrenchToWire(wrench, m.external_wrench);
+    EXPECT_TRUE(toolWrench(m, false).head<3>().isApprox(tool.transpose() * force, 1e-5));
+    EXPECT_TRUE(toolWrench(m, false).tail<3>().isApprox(tool.transpose() * torque, 1e-5));
+    EXPECT_TRUE(toolWrench(m, true).isApprox(wrench, 1e-6));
+  }
+}
+
+/// What a person sees on the wire: float32 positions, speed and acceleration by differences.
+TEST(Bridge, theWireKeepsTheLimitsAtEveryPeriod) {
+  for (const double period : {0.001, 0.005, 0.020, 0.100}) {
+    Cell cell(period);
+    cell.start();
+    const JointLimits& limits = cell.bridge.config().limits;
+    std::mt19937 random(21);
+    std::uniform_real_distribution<double> part(-1.5, 1.5);
+    Vector7 velocity = Vector7::Zero(), last = cell.robot.setPoint(), last_v = Vector7::Zero();
+    for (int i = 0; i < 6000; ++i) {
+      if (i % 13 == 0) {
+        for (int j = 0; j < 7; ++j) velocity[j] = part(random) * limits.velocity[j];
+      }
+      drive(cell.bridge, cell.robot, velocity);
+      cell.robot.cycle(cell.bridge);
+      const Vector7 sent = fri::jointsFromWire(cell.robot.answer.joint_position);
+      const Vector7 v = (sent - last) / period;
+      if (i > 1) {
+        ASSERT_LE((v.cwiseAbs() - limits.velocity).maxCoeff(), 5e-4) << period << " " << i;
+        ASSERT_LE(((v - last_v).cwiseAbs() / period - limits.acceleration).maxCoeff(), 1.0)
+            << period << " " << i;
+      }
+      last = sent;
+      last_v = v;
+    }
+    EXPECT_EQ(cell.bridge.snapshot().supervisor, SupervisorState::Command);
   }
 }
 

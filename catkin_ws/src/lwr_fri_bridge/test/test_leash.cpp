@@ -54,6 +54,52 @@ TEST(Leash, relaxesABlockedArmInEveryMode) {
   }
 }
 
+/// Lengths by mode and stiffness, worked out by hand from the documented rule.
+TEST(Leash, growsAsTheStiffnessFalls) {
+  const LeashLengths lengths;
+  ControlMode mode;
+  EXPECT_TRUE(leashOf(mode, lengths).isApprox(Vector7::Constant(0.05)));
+  mode.strategy = fri::ControlStrategy::JointImpedance;
+  EXPECT_TRUE(leashOf(mode, lengths).isApprox(Vector7::Constant(0.10)));  // 1000 Nm/rad
+  mode.joint_stiffness.setConstant(40.0);
+  Vector7 expected;
+  expected << 0.25, 0.25, 0.15, 0.15, 0.10, 0.10, 0.10;
+  EXPECT_TRUE(leashOf(mode, lengths).isApprox(expected));
+  mode.joint_stiffness.setConstant(0.01);
+  EXPECT_TRUE(leashOf(mode, lengths).isApprox(Vector7::Constant(0.5)));  // never longer
+  mode.strategy = fri::ControlStrategy::CartesianImpedance;
+  EXPECT_TRUE(leashOf(mode, lengths).isApprox(Vector7::Constant(0.10)));  // 2000 N/m, 200 Nm/rad
+  mode.cartesian_stiffness << 500, 500, 100, 50, 50, 20;
+  EXPECT_TRUE(leashOf(mode, lengths).isApprox(Vector7::Constant(0.25 + 0.05)));
+  mode.strategy = fri::ControlStrategy::Position;
+  EXPECT_TRUE(leashOf(mode, lengths).isApprox(Vector7::Constant(0.05)));
+}
+
+/// A soft arm sags under what it holds, friction holds it back: no block, it goes on. A stiff one
+/// that lies back as far is blocked.
+TEST(Leash, aSoftArmThatSagsIsNotBlocked) {
+  for (const bool soft : {true, false}) {
+    Bridge bridge(defaultConfig());
+    SmallController robot(0.005);
+    for (int i = 0; i < 3; ++i) robot.cycle(bridge);
+    const std::string mode = soft ? "joint_impedance stiffness 30" : "joint_impedance";
+    ASSERT_TRUE(test::runEvent(bridge, robot, mode).success());
+    ASSERT_TRUE(test::runEvent(bridge, robot, "start").success());
+    robot.blocked = true;  // the measured position is set here
+    Vector7 sag = Vector7::Zero(), velocity = Vector7::Zero();
+    sag[1] = 0.2;  // 6 Nm at 30 Nm/rad
+    velocity[1] = 0.3;
+    const double before = robot.setPoint()[1];
+    for (int i = 0; i < 300; ++i) {
+      robot.setMeasured(robot.setPoint() - sag);
+      drive(bridge, robot, velocity);
+      robot.cycle(bridge);
+    }
+    EXPECT_EQ(bridge.snapshot().counters.leash_trips, soft ? 0U : 1U);
+    EXPECT_EQ(robot.setPoint()[1] > before + 0.3, soft);
+  }
+}
+
 TEST(Leash, needsANewRequest) {
   Blocked cell("position", 0.5);
   cell.push(1000);

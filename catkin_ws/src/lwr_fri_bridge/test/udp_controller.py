@@ -9,6 +9,7 @@ import time
 import lwr_fri_bridge
 
 IDENTITY = [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0]
+TURNED = [0, -1, 0, 0.5, 1, 0, 0, 0.1, 0, 0, 1, 0.4]  # the tool's x lies along the base's y
 
 
 class UdpController:
@@ -19,6 +20,8 @@ class UdpController:
         self.own = [0.1, 0.5, -0.2, 1.0, 0.3, -0.4, 0.6]
         self.offset = [0.0] * 7
         self.state, self.control = 1, 1
+        self.obeys, self.silent = True, False
+        self.answered = 0
         self.steps: list[float] = []  # largest joint step per cycle in command mode, rad
         self.requests: list[tuple[int, float]] = []  # request, largest step of the cycle before it
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
@@ -26,6 +29,10 @@ class UdpController:
         self._finished = self._counter = self._reflected = 0
         self._running = True
         self._thread = threading.Thread(target=self._run, daemon=True)
+
+    @property
+    def source_port(self) -> int:
+        return self._socket.getsockname()[1]
 
     @property
     def position(self) -> list[float]:
@@ -43,6 +50,10 @@ class UdpController:
     def _run(self) -> None:
         due = time.monotonic()
         while self._running:
+            if self.silent:
+                time.sleep(self.period)
+                due = time.monotonic()
+                continue
             self._counter = (self._counter + 1) & 0xFFFF
             self._socket.sendto(
                 lwr_fri_bridge.encode_measurement(
@@ -62,6 +73,7 @@ class UdpController:
                         "commanded_position_offset": self.offset,
                         "commanded_frame": IDENTITY,
                         "commanded_frame_offset": IDENTITY,
+                        "measured_frame": TURNED,
                         "external_wrench": [1, 2, 3, 4, 5, 6],
                         "measured_torque": [1, 2, 3, 4, 5, 6, 7],
                         "external_torque": [7, 6, 5, 4, 3, 2, 1],
@@ -88,6 +100,7 @@ class UdpController:
             if answer["reflected"] != self._counter:
                 continue
             self._reflected = answer["counter"]
+            self.answered += 1
             step = max(
                 abs(a - b) for a, b in zip(answer["joint_position"], self.position, strict=True)
             )
@@ -97,7 +110,7 @@ class UdpController:
                     a - b for a, b in zip(answer["joint_position"], self.own, strict=True)
                 ]
             request, strategy, number = answer["krl_ints"][:3]
-            if number and number != self._finished and request in (1, 2):
+            if self.obeys and number and number != self._finished and request in (1, 2):
                 self._finished = number
                 self.requests.append((request, step))
                 self.state = 2 if request == 1 else 1

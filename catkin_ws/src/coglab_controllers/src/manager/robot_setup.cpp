@@ -46,7 +46,7 @@ std::shared_ptr<const RobotSetup> makeRobotSetup(const std::string& urdf,
 
   const Chain chain(urdf, parameters.text("base_link", "lwr_base_link"),
                     parameters.text("tool_link", "ih2_palm"));
-  const Chain to_wrench(urdf, chain.baseLink(), parameters.text("wrench_link", "lwr_flange"));
+  const Chain to_wrench(urdf, chain.baseLink(), parameters.text("wrench_link", "ih2_palm"));
   const JointVector zero = JointVector::Zero();
   const Quaternion tool_from_wrench =
       chain.evaluate(zero).tool.orientation.conjugate() * to_wrench.evaluate(zero).tool.orientation;

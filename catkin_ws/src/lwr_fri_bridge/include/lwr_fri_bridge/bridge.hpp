@@ -19,6 +19,7 @@
 #include "lwr_fri_bridge/set_point_leash.hpp"
 #include "lwr_fri_bridge/spsc_queue.hpp"
 #include "lwr_fri_bridge/supervisor.hpp"
+#include "lwr_fri_bridge/tool_wrench.hpp"
 #include "lwr_fri_bridge/velocity_filter.hpp"
 
 namespace lwr_fri_bridge {
@@ -158,7 +159,6 @@ class Bridge {
   void follow(const fri::Reception& reception, fri::CommandDatagram& answer);
   Vector7 targetVelocity();
   void collectOutcomes();
-  double leashLength() const;
   void fillMode(fri::CommandDatagram& answer) const;
 
   const BridgeConfig config_;

@@ -4,6 +4,7 @@
 
 #include "lwr_fri_bridge/configurator.hpp"
 #include "lwr_fri_bridge/joint_limits.hpp"
+#include "lwr_fri_bridge/set_point_leash.hpp"
 
 namespace lwr_fri_bridge {
 
@@ -14,9 +15,8 @@ struct BridgeConfig {
   bool lenient_headers = false;   ///< accept controllers that send zeros in the header
   ControlMode mode;               ///< control mode until an event sets another
   double position_margin = 0.01;  ///< rad kept from both ends of every joint's range, 0..0.5
-  double leash_position =
-      0.05;  ///< rad, |commanded - measured| in position mode, 0.005..0.5 (ours)
-  double leash_impedance = 0.10;        ///< rad, the same in impedance modes (ours)
+  LeashLengths leash;             ///< bound of |commanded - measured| per joint
+  bool wrench_in_tool_axes = false;  ///< the KRL program sets $STIFFNESS.TASKFRAME to #TOOL
   double velocity_filter_time = 0.008;  ///< s, time constant of the velocity filter, 0..0.2
   double command_timeout =
       0.05;                    ///< s, age at which a command of the control thread ends, 0.005..1

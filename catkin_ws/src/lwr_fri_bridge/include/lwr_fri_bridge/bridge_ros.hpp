@@ -8,6 +8,7 @@
 #include <functional>
 #include <memory>
 #include <mutex>
+#include <string>
 #include <vector>
 
 #include <semaphore.h>
@@ -72,10 +73,10 @@ class BridgeRos {
   /// target_joint_states (false).
   void setControllerActive(bool active);
 
-  /// Messages on target_joint_states that were refused: not valid / a controller is active / motion
-  /// is not allowed.
+  /// Messages on target_joint_states that were refused: not valid / a controller of this process is
+  /// active / another publisher's velocities are followed at present / motion is not allowed.
   struct Refused {
-    std::uint64_t invalid = 0, controller_active = 0, not_allowed = 0;
+    std::uint64_t invalid = 0, controller_active = 0, second_publisher = 0, not_allowed = 0;
   };
   Refused refused() const;
 
@@ -111,7 +112,10 @@ class BridgeRos {
   std::atomic<bool> stopping_{false};
   std::atomic<bool> controller_active_{false};
   bool started_ = false;
-  std::atomic<std::uint64_t> refused_invalid_{0}, refused_active_{0}, refused_blocked_{0};
+  std::atomic<std::uint64_t> refused_invalid_{0}, refused_active_{0}, refused_second_{0},
+      refused_blocked_{0};
+  std::string target_publisher_;      // whose velocities were followed last
+  std::int64_t target_stamp_ns_ = 0;  // when; both only in the callback of target_joint_states
   std::mutex tickets_mutex_;
   std::vector<std::uint32_t> tickets_;  // of ros_events, whose outcomes go to the log
   sensor_msgs::JointState joint_message_, torque_message_;

@@ -16,8 +16,8 @@ namespace lwr_fri_bridge {
 
 /// Joint-space vector in wire order: A1, A2, E1, A3, A4, A5, A6.
 using Vector7 = Eigen::Matrix<double, 7, 1>;
-/// Force (N) and torque (Nm) at the tool: Fx Fy Fz Tx Ty Tz (the wire's reversed torque order is
-/// already undone).
+/// Force (N) and torque (Nm): Fx Fy Fz Tx Ty Tz (the wire's reversed torque order is already
+/// undone).
 using Vector6 = Eigen::Matrix<double, 6, 1>;
 
 /// Why motion is not allowed at the moment; the words are in `describe()`.
@@ -46,7 +46,8 @@ struct RobotSample {
   Vector7 velocity = Vector7::Zero();                ///< from the velocity filter, rad/s
   Vector7 torque = Vector7::Zero();                  ///< measured, Nm
   Vector7 external_torque = Vector7::Zero();         ///< estimated by the robot controller, Nm
-  Vector6 tool_wrench = Vector6::Zero();             ///< estimated by the robot controller
+  Vector6 tool_wrench = Vector6::Zero();  ///< estimated by the robot controller, about the tool's
+                                          ///< origin in the tool's axes, see toolWrench()
   Vector7 commanded_position = Vector7::Zero();      ///< sent in the last answer, rad
   Vector7 commanded_velocity = Vector7::Zero();      ///< state of the interpolator, rad/s
   Vector7 commanded_acceleration = Vector7::Zero();  ///< state of the interpolator, rad/s^2

@@ -91,8 +91,16 @@ bool Session::setPointLeaps(const MeasurementDatagram& candidate, std::uint32_t 
   return false;
 }
 
+bool Session::newPeriod(const MeasurementDatagram& candidate) const {
+  return std::fabs(cycleTimeOf(candidate) - period_) > 1e-9;
+}
+
 Verdict Session::checkOrder(const MeasurementDatagram& candidate, Reception& reception) {
   const std::uint16_t counter = candidate.header.counter;
+  // friOpen sets the period, and command mode has to be left for it.
+  reception.new_period = newPeriod(candidate);
+  if (reception.new_period && candidate.state == static_cast<std::uint16_t>(FriState::Command))
+    return Verdict::Implausible;
   if (lenient_ && counter == 0 && candidate.header.reflected == 0) {
     reception.cycles = 1;
     reception.answer_arrived = true;
@@ -163,6 +171,7 @@ Reception Session::receive(const std::uint8_t* bytes, std::size_t size,
     answered_ = false;
     reception.reflected = header.reflected;
   } else {
+    if (reception.new_period) ++counters_.new_periods;
     counters_.lost_measurements += reception.cycles - 1;
     if (answered_ && !reception.answer_arrived) ++counters_.lost_answers;
   }
@@ -170,6 +179,7 @@ Reception Session::receive(const std::uint8_t* bytes, std::size_t size,
   connected_ = true;
   received_ = header.counter;
   setPointOf(candidate, set_point_);
+  period_ = cycleTimeOf(candidate);
   measurement = candidate;
   return reception;
 }

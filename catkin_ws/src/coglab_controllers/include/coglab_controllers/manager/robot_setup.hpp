@@ -22,8 +22,8 @@ struct RobotSetup {
 };
 
 /// Builds it from the robot's model, its table of limits, and the manager's parameters (D4.10 Table
-/// 6): `base_link` (lwr_base_link), `tool_link` (ih2_palm), `wrench_link` (lwr_flange),
-/// `upper_joint_pos_limit`, `lower_joint_pos_limit`, `joint_vel_limit` (rad, rad, rad/s; seven
+/// 6): `base_link` (lwr_base_link), `tool_link` (ih2_palm), `wrench_link` (ih2_palm; what the
+/// bridge's `tool_frame` says), `upper_joint_pos_limit`, `lower_joint_pos_limit`, `joint_vel_limit` (rad, rad, rad/s; seven
 /// each, wire order; default: the table), `position_margin` (rad), `hand_speed_limit`,
 /// `elbow_speed_limit` (m/s; 0: none), block `workspace`: `box_min`, `box_max`, `base_centre` (m),
 /// `base_radius` (m), `max_stretch` (share of the reach), `deceleration` (m/s^2).

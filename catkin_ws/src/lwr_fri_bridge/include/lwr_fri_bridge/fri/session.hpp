@@ -18,8 +18,8 @@ enum class Verdict : std::uint8_t {
   Accepted,
   WrongSize,    ///< not 916 bytes, or the header says so
   WrongId,      ///< not a measurement of the known version
-  Implausible,  ///< a value is not finite or outside of what a controller can send, or the
-                ///< set-point leaps
+  Implausible,  ///< a value is not finite or outside of what a controller can send, the set-point
+                ///< leaps, or the period changes in command mode
   Duplicate,    ///< same counter as the last accepted one
   OutOfOrder    ///< older than the last accepted one, or far ahead of it
 };
@@ -35,6 +35,7 @@ struct SessionCounters {
   std::uint64_t lost_measurements = 0;  ///< gaps in the controller's counter
   std::uint64_t lost_answers = 0;  ///< answers that the controller's next datagram does not reflect
   std::uint64_t restarts = 0;      ///< the controller's counter began anew
+  std::uint64_t new_periods = 0;   ///< FRI was opened again with another period
 
   std::uint64_t rejected() const {
     return wrong_size + wrong_id + implausible + duplicate + out_of_order;
@@ -46,6 +47,7 @@ struct Reception {
   Verdict verdict = Verdict::WrongSize;
   std::uint32_t cycles = 1;     ///< cycles of the controller since the last accepted datagram, >= 1
   bool fresh_session = false;   ///< first datagram, or the controller's counter began anew
+  bool new_period = false;      ///< FRI was opened again with another period
   bool answer_arrived = false;  ///< it reflects our last answer
   std::uint16_t reflected = 0;  ///< counter of our answer that the controller saw last
 };
@@ -72,6 +74,7 @@ class Session {
  private:
   Verdict checkOrder(const MeasurementDatagram& candidate, Reception& reception);
   bool setPointLeaps(const MeasurementDatagram& candidate, std::uint32_t cycles) const;
+  bool newPeriod(const MeasurementDatagram& candidate) const;
 
   bool lenient_;
   bool connected_ = false;
@@ -81,6 +84,7 @@ class Session {
   std::uint16_t suspect_ = 0;   // counter of the last datagram out of order
   int suspects_in_a_row_ = 0;
   float set_point_[kJoints] = {};
+  double period_ = 0.0;  // s, of the last accepted measurement
   SessionCounters counters_;
 };
 
