@@ -42,8 +42,22 @@ py::dict reportOf(VirtualRobot& robot) {
   result["motion_allowed"] = sample.block == lwr_fri_bridge::MotionBlock::None;
   result["blocked_by"] = std::string(lwr_fri_bridge::describe(sample.block));
   result["position"] = Vector7(sample.position);
+  result["measured_velocity"] = Vector7(sample.velocity);
+  result["commanded_position"] = Vector7(sample.commanded_position);
+  result["fri_period"] = sample.cycle_time;
   result["external_torque"] = Vector7(sample.external_torque);
   result["cycles"] = report.cycles;
+  return result;
+}
+
+py::dict debugOf(const coglab_controllers::IkDebugRecord& record) {
+  py::dict result;
+  result["time"] = 1e-9 * static_cast<double>(record.stamp_ns);
+  result["goal"] = Vector3d(record.goal);
+  result["set_point"] = py::make_tuple(Vector3d(record.set_point.position),
+                                       Eigen::Vector4d(record.set_point.orientation.coeffs()));
+  result["measured"] = py::make_tuple(Vector3d(record.measured.position),
+                                      Eigen::Vector4d(record.measured.orientation.coeffs()));
   return result;
 }
 
@@ -168,6 +182,19 @@ PYBIND11_MODULE(_virtual, m) {
           py::arg("primitive_id"), py::arg("dmp_ratio") = 1.0,
           py::arg("goal_offset") = Vector3d(Vector3d::Zero()),
           py::arg("orientation_control") = false, py::arg("target_orientation") = noOrientation())
+      .def(
+          "set_ik_debug", [](VirtualRobot& robot, bool on) { robot.dmp().setIkDebug(on); },
+          py::arg("on"), "Whether ik_debug() gets records; the DMP controller must be loaded.")
+      .def(
+          "ik_debug",
+          [](VirtualRobot& robot) {
+            py::list records;
+            coglab_controllers::IkDebugRecord record;
+            while (robot.dmp().readIkDebug(record)) records.append(debugOf(record));
+            return records;
+          },
+          "What dmp/ik_debug tells of the cycles since the last call: time s, goal m as estimated "
+          "or latched, set_point and measured (position, quaternion) of the hand in the base frame.")
       .def("dmp_progress",
            [](VirtualRobot& robot) {
              coglab_controllers::DmpProgress progress;

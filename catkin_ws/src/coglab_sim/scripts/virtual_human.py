@@ -2,9 +2,9 @@
 """The node /coglab_sim/virtual_human: a seeded person who gives and takes.
 
 Subscribes truth/cell (what a person sees and feels), human_command (std_msgs/String: give <id>, receive <id>, rest) and
-/coglab/transitions (reacts by itself unless ~react is false). Publishes human_hand (coglab_msgs/HumanHand, 100 Hz) and
-human_state (std_msgs/String). Names are relative to the node's namespace.
-Parameters (private): seed, behaviour, participant (mapping, overrides), holds_object, react, rest, handover_object,
+coglab/transitions of the namespace above this one (reacts by itself unless ~react is false). Publishes human_hand
+(coglab_msgs/HumanHand, 100 Hz) and human_state (std_msgs/String). Names are relative to the node's namespace.
+Parameters (private): transitions (topic, where it is another one), seed, behaviour, participant (mapping, overrides), holds_object, react, rest, handover_object,
 object_in_hand (three numbers each, m), object_mass.
 """
 import sys
@@ -16,7 +16,8 @@ import rospy
 from coglab_msgs.msg import CellTruth, HumanHand, Transition
 from coglab_sim.participant import Participant
 from coglab_sim.rigid import Frame
-from coglab_sim.virtual_human import Scene, VirtualHuman, WorldView
+from coglab_sim.scene import Scene, WorldView
+from coglab_sim.virtual_human import VirtualHuman
 from geometry_msgs.msg import Point, Quaternion, Vector3
 from std_msgs.msg import String
 
@@ -34,7 +35,7 @@ class VirtualHumanNode:
 
     def __init__(self) -> None:
         fields = dict(rospy.get_param("~participant", {}))
-        fields.setdefault("seed", int(rospy.get_param("~seed", rospy.get_param("/coglab_sim/seed", 7))))
+        fields.setdefault("seed", int(rospy.get_param("~seed", rospy.get_param("seed", 7))))
         fields.setdefault("behaviour", rospy.get_param("~behaviour", "normal"))
         scene = Scene()
         for name in ("rest", "handover_object", "object_in_hand"):
@@ -51,7 +52,9 @@ class VirtualHumanNode:
         rospy.Subscriber("truth/cell", CellTruth, self.on_truth, queue_size=1, tcp_nodelay=True)
         rospy.Subscriber("human_command", String, self.on_command, queue_size=10)
         if rospy.get_param("~react", True):
-            rospy.Subscriber("/coglab/transitions", Transition, self.on_transition, queue_size=100)
+            above = rospy.get_namespace().rstrip("/").rpartition("/")[0]
+            topic = rospy.get_param("~transitions", f"{above}/coglab/transitions")
+            rospy.Subscriber(topic, Transition, self.on_transition, queue_size=100)
 
     def on_truth(self, message: CellTruth) -> None:
         """What the person sees and feels now; the robot's speed is judged over 0.1 s."""

@@ -3,7 +3,8 @@ import numpy as np
 import pytest
 from coglab_sim.participant import BEHAVIOURS, Participant, population
 from coglab_sim.rigid import Frame
-from coglab_sim.virtual_human import Scene, VirtualHuman, WorldView
+from coglab_sim.scene import Scene, WorldView
+from coglab_sim.virtual_human import VirtualHuman
 
 DT = 0.01
 PALM_TURN = np.array([0.5, 0.5, 0.5, 0.5])
@@ -177,3 +178,51 @@ def test_commands_and_files_are_checked():
     with pytest.raises(ValueError, match="is none of"):
         Participant(behaviour="angry")
     assert set(BEHAVIOURS) >= {"normal", "tug"}
+
+
+def receive(offered, seed=3, seconds=6.0, appears_at=0.6):
+    """A person who is to take the object out of a robot's hand that appears ``appears_at`` s after the request."""
+    scene = Scene()
+    human = VirtualHuman(Participant.draw(seed), scene, holds_object=False)
+    far, samples, t = np.array([0.3, 0.0, 0.6]), [], 0.0
+    human.command("receive mug")
+    for _ in range(int(seconds / DT)):
+        t += DT
+        place = np.asarray(offered) if t >= appears_at else far
+        view = WorldView(Frame(place - [0.0, 0.04, -0.05], PALM_TURN), 0.0, Frame(place), 0.0, 1.0, 0.0, "robot")
+        samples.append((t, human.step(t, view)))
+    return human, scene, samples
+
+
+def test_a_nearer_robot_hand_draws_the_reach_toward_it():
+    offered = np.array([0.90, 0.10, 0.36])
+    human, scene, samples = receive(offered)
+    waiting = next(s for _, s in samples if s.phase == "waiting")
+    assert np.linalg.norm(waiting.frame.position + scene.object_in_hand - offered) < 0.02
+    _, _, plain = receive(np.array([0.3, 0.0, 0.6]))
+    own = next(s for _, s in plain if s.phase == "waiting")
+    assert np.linalg.norm(own.frame.position + scene.object_in_hand - offered) > 0.05
+
+
+def test_the_correction_comes_after_the_sensorimotor_delay_and_without_a_step():
+    _, _, corrected = receive(np.array([0.90, 0.10, 0.36]))
+    _, _, plain = receive(np.array([0.3, 0.0, 0.6]))
+    differs = next(t for (t, a), (_, b) in zip(corrected, plain, strict=True)
+                   if np.linalg.norm(a.velocity - b.velocity) > 1e-9)
+    assert 0.6 + 0.15 - 1e-9 <= differs <= 0.6 + 0.15 + 0.10 + 2 * DT
+    reaching = [s.velocity for _, s in corrected if s.phase == "reaching"]
+    assert max(np.linalg.norm(b - a) for a, b in zip(reaching, reaching[1:], strict=False)) < 0.12
+
+
+def test_a_giver_who_feels_the_object_slip_holds_on_again():
+    human = VirtualHuman(Participant.draw(4), Scene())
+    human.phase, human._task = "releasing", "give"
+    palm = np.array([0.78, -0.05, 0.45])
+    t, lowest = 0.0, 1.0
+    for _ in range(60):
+        t += DT
+        sunk = 0.0 if t < 0.10 else 0.02
+        place = palm + np.array([0.0, 0.04, -0.05 - sunk])
+        human.step(t, WorldView(Frame(palm, PALM_TURN), 0.0, Frame(place), 1.0, 0.1, 0.9, "human"))
+        lowest = min(lowest, human._grip)
+    assert human.phase == "holding" and lowest < 0.9 and human._grip == 1.0

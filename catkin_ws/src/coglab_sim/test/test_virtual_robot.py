@@ -7,7 +7,8 @@ import pytest
 from coglab_sim import _cell  # noqa: F401
 from coglab_sim.participant import Participant
 from coglab_sim.rigid import Frame
-from coglab_sim.virtual_human import Scene, VirtualHuman, WorldView
+from coglab_sim.scene import Scene, WorldView
+from coglab_sim.virtual_human import VirtualHuman
 
 virtual = pytest.importorskip('coglab_sim._virtual', reason='the robot in virtual time is not built')
 SOURCES = Path(__file__).resolve().parents[2]

@@ -1,7 +1,8 @@
 """How a hand moves from here to there: decoupled minimum jerk and a conic (elliptic) path.
 
 Minimum jerk: Flash and Hogan's fifth-order polynomial. Decoupled: the vertical part is a little quicker than the
-horizontal one. Conic: the same timing along an ellipse arc, as unconstrained handovers show.
+horizontal one. Conic: the same timing along an ellipse arc, as unconstrained handovers show. Corrections on the way are
+superposed.
 """
 from __future__ import annotations
 
@@ -48,6 +49,42 @@ class Reach:
     def over(self, t: float) -> bool:
         """Whether the reach has ended."""
         return t >= self.begin + self.duration
+
+
+class CorrectedReach:
+    """A reach whose end may be moved on the way: each correction is a minimum-jerk displacement on top of what runs
+    already (superposition, Flash and Henis 1991), so that position and velocity have no step."""
+
+    def __init__(self, reach: Reach) -> None:
+        self.parts = [reach]
+
+    @property
+    def end(self) -> np.ndarray:
+        """m, where the hand is going now"""
+        return self.parts[0].end + sum((part.end for part in self.parts[1:]), np.zeros(3))
+
+    @property
+    def duration(self) -> float:
+        """s, from the beginning to the end of the last correction"""
+        return max(part.begin + part.duration for part in self.parts) - self.parts[0].begin
+
+    @property
+    def begin(self) -> float:
+        """s"""
+        return self.parts[0].begin
+
+    def retarget(self, t: float, end: np.ndarray, duration: float) -> None:
+        """From time t on go to ``end``; the correction takes ``duration`` s."""
+        self.parts.append(Reach(np.zeros(3), end - self.end, t, duration, vertical_share=1.0))
+
+    def at(self, t: float) -> tuple[np.ndarray, np.ndarray]:
+        """Position (m) and velocity (m/s) at time t."""
+        samples = [part.at(t) for part in self.parts]
+        return sum((p for p, _ in samples), np.zeros(3)), sum((v for _, v in samples), np.zeros(3))
+
+    def over(self, t: float) -> bool:
+        """Whether the reach and all its corrections have ended."""
+        return all(part.over(t) for part in self.parts)
 
 
 def duration_for(distance: float, base: float) -> float:

@@ -1,0 +1,103 @@
+#!/usr/bin/python3
+"""The node /coglab_sim/truth_markers: shows person and object as they really are, for rviz alone.
+
+Subscribes truth/cell. Publishes truth/markers (visualization_msgs/MarkerArray, 10 Hz) and truth/tf (tf2_msgs/TFMessage:
+frames truth/human_hand, truth/object_<id>, truth/robot_hand; a topic of its own, so that no tf listener of the control
+side can look them up). Names are relative to the node's namespace. Sizes come from the cell's parameters
+cell/objects/<id> and cell/object.
+"""
+import sys
+import time
+
+import rospy
+from coglab_msgs.msg import CellTruth
+from coglab_sim.rigid import quat_rotate
+from geometry_msgs.msg import Point, Pose, TransformStamped, Vector3
+from std_msgs.msg import ColorRGBA
+from tf2_msgs.msg import TFMessage
+from visualization_msgs.msg import Marker, MarkerArray
+
+PERIOD = 0.1
+"""s between two publications"""
+KINDS = {"box": Marker.CUBE, "cylinder": Marker.CYLINDER, "sphere": Marker.SPHERE}
+ORANGE, RED, SKIN = (0.90, 0.62, 0.0, 1.0), (0.84, 0.37, 0.0, 1.0), (0.80, 0.58, 0.46, 0.9)
+HAND_SIZE = (0.16, 0.09, 0.03)
+
+
+class TruthMarkers:
+    """Redraws the newest truth ten times a second."""
+
+    def __init__(self) -> None:
+        self.markers = rospy.Publisher("truth/markers", MarkerArray, queue_size=1, latch=True)
+        self.frames = rospy.Publisher("truth/tf", TFMessage, queue_size=1)
+        self.due = 0.0
+        self.shapes: dict[str, dict] = {}
+        rospy.Subscriber("truth/cell", CellTruth, self.on_truth, queue_size=1, tcp_nodelay=True)
+
+    def on_truth(self, truth: CellTruth) -> None:
+        """Draw, if it is time."""
+        now = time.monotonic()
+        if now < self.due:
+            return
+        self.due = now + PERIOD
+        array = MarkerArray(markers=[self.hand(truth)])
+        if truth.object_id:
+            array.markers.append(self.object(truth))
+        self.markers.publish(array)
+        poses = {"human_hand": truth.human_hand, "robot_hand": truth.robot_hand}
+        if truth.object_id:
+            poses[f"object_{truth.object_id}"] = truth.object
+        self.frames.publish(TFMessage([self.transform(truth, name, pose) for name, pose in poses.items()]))
+
+    def marker(self, truth: CellTruth, name: str, kind: int, pose, size, colour) -> Marker:
+        """One marker in the frame of the truth."""
+        marker = Marker(ns=name, id=0, type=kind, action=Marker.ADD, pose=pose, scale=Vector3(*size),
+                        color=ColorRGBA(*colour))
+        marker.header.frame_id = truth.header.frame_id or "world"
+        marker.header.stamp = rospy.Time.now()
+        return marker
+
+    def hand(self, truth: CellTruth) -> Marker:
+        """The person's hand: a flat box."""
+        return self.marker(truth, "human_hand", Marker.CUBE, truth.human_hand, HAND_SIZE, SKIN)
+
+    def object(self, truth: CellTruth) -> Marker:
+        """The object in its shape; another colour once it has fallen."""
+        shape = self.shape(truth.object_id)
+        p, q = truth.object.position, truth.object.orientation
+        x, y, z = quat_rotate((q.x, q.y, q.z, q.w), shape.get("center", (0.0, 0.0, 0.0)))
+        middle = Pose(Point(p.x + x, p.y + y, p.z + z), q)
+        marker = self.marker(truth, "object", KINDS.get(shape.get("shape"), Marker.CUBE), middle,
+                             shape.get("size", (0.08, 0.08, 0.1)), RED if truth.dropped else ORANGE)
+        return marker
+
+    def shape(self, object_id: str) -> dict:
+        """Shape, size and centre of an object in the cell's parameters."""
+        if object_id not in self.shapes:
+            found = rospy.get_param(f"cell/objects/{object_id}", None) or rospy.get_param("cell/object", {})
+            self.shapes[object_id] = dict(found)
+        return self.shapes[object_id]
+
+    @staticmethod
+    def transform(truth: CellTruth, name: str, pose) -> TransformStamped:
+        """A pose of the truth as a frame truth/<name>."""
+        out = TransformStamped(child_frame_id=f"truth/{name}")
+        out.header.frame_id = truth.header.frame_id or "world"
+        out.header.stamp = rospy.Time.now()
+        p = pose.position
+        out.transform.translation, out.transform.rotation = Vector3(p.x, p.y, p.z), pose.orientation
+        return out
+
+
+
+
+def main() -> int:
+    """Entry point."""
+    rospy.init_node("truth_markers")
+    TruthMarkers()
+    rospy.spin()
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
