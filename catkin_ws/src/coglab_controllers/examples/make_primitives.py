@@ -33,11 +33,14 @@ def demonstrations() -> list[tuple[str, str, str, np.ndarray, np.ndarray]]:
     u = np.linspace(0.0, 1.0, SAMPLES)
     zero = np.zeros(SAMPLES)
     straight = np.stack([0.5 * minimum_jerk(u), zero, zero], axis=1)
+    # To a hand held high: from below, so that the person sees all of the robot's hand while it comes.
+    high = np.stack([0.5 * minimum_jerk(u), zero, -0.04 * lift(u)], axis=1)
     # To the board: forward first, down last, so that the hand comes from above.
     take = np.stack([0.4 * minimum_jerk(u / 0.8), zero, 0.06 * lift(u) - 0.2 * minimum_jerk((u - 0.25) / 0.75)], axis=1)
     put = np.stack([0.4 * minimum_jerk(u / 0.75), zero, 0.10 * lift(u) - 0.2 * minimum_jerk((u - 0.3) / 0.7)], axis=1)
     return [
         ("reach_human", "Straight reach to a person's hand, to take an object.", "similarity", 1.2 * u, straight),
+        ("reach_human_high", "Reach to an object held high: from below.", "upright", 1.2 * u, high),
         ("give_human", "Straight reach to a person's hand, to give an object.", "similarity", 1.2 * u, straight),
         ("take_board", "Over to an object on the board and down to it from above.", "upright", 2.0 * u, take),
         ("put_board", "Over to a free place on the board and down to it from above.", "upright", 2.2 * u, put),

@@ -109,7 +109,7 @@ TEST(Library, SavesAndLoadsFiles) {
 
 TEST(Library, ThePackagesPrimitivesLoad) {
   Library library;
-  EXPECT_EQ(library.load(std::string(COGLAB_PACKAGE_DIR) + "/config/primitives.xml"), 4);
+  EXPECT_EQ(library.load(std::string(COGLAB_PACKAGE_DIR) + "/config/primitives.xml"), 5);
   for (const char* id : {"reach_human", "give_human", "take_board", "put_board"})
     EXPECT_NE(library.find(id), nullptr);
   EXPECT_NEAR(library.at("reach_human").duration, 1.2, 1e-12);
