@@ -1,7 +1,7 @@
 #!/usr/bin/python3
-"""The node /contact_detector: external joint torques -> /coglab/contact, armed by ~arm (coglab_msgs/ArmContact).
+"""The node /contact_detector: external joint torques -> coglab/contact, armed by ~arm (coglab_msgs/ArmContact).
 
-Subscribes /lwr/external_torques (effort, Nm) and /lwr/joint_states. Parameters (private): the fields of
+Subscribes lwr/external_torques (effort, Nm) and lwr/joint_states; names are relative. Parameters (private): the fields of
 coglab_smach.contact_detector.DetectorSettings; robot_description is read for the Jacobian.
 Publishes ~margin (std_msgs/Float64) at 20 Hz while watching.
 """
@@ -9,11 +9,13 @@ import dataclasses
 import sys
 import threading
 
+import coglab_controllers as cc
+import numpy as np
 import rospy
 from coglab_msgs.msg import Contact
 from coglab_msgs.srv import ArmContact, ArmContactResponse
 from coglab_smach.contact_detector import ContactDetector, DetectorSettings
-from coglab_smach.kinematics import SerialArm
+from coglab_smach.ros_publish import publish
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64
 
@@ -26,25 +28,26 @@ class ContactDetectorNode:
         for field in dataclasses.fields(settings):
             if rospy.has_param(f"~{field.name}"):
                 setattr(settings, field.name, rospy.get_param(f"~{field.name}"))
-        self.arm_model = SerialArm(urdf)
-        self.detector = ContactDetector(settings, self.arm_model.position_jacobian)
+        self.arm = cc.Chain(urdf)
+        self.joints = tuple(self.arm.joint_names)
+        self.detector = ContactDetector(settings, lambda q: self.arm.jacobian(np.asarray(q, dtype=float))[:3])
         self.lock = threading.Lock()
         self.position = None
         self.velocity = None
         self.last_sample = None
-        self.publisher = rospy.Publisher("/coglab/contact", Contact, queue_size=10)
+        self.publisher = rospy.Publisher("coglab/contact", Contact, queue_size=10)
         self.margin = rospy.Publisher("~margin", Float64, queue_size=1)
-        rospy.Subscriber("/lwr/joint_states", JointState, self.on_joints, queue_size=1, tcp_nodelay=True)
-        rospy.Subscriber("/lwr/external_torques", JointState, self.on_torques, queue_size=20, tcp_nodelay=True)
+        rospy.Subscriber("lwr/joint_states", JointState, self.on_joints, queue_size=1, tcp_nodelay=True)
+        self.torques = rospy.Subscriber("lwr/external_torques", JointState, self.on_torques, queue_size=20, tcp_nodelay=True)
         rospy.Service("~arm", ArmContact, self.on_arm)
         rospy.Timer(rospy.Duration(0.05), self.on_timer)
 
     def on_joints(self, message: JointState) -> None:
         """Positions and velocities in wire order; velocities are differentiated where the message has none."""
         index = {name: i for i, name in enumerate(message.name)}
-        if any(name not in index for name in self.arm_model.names):
+        if any(name not in index for name in self.joints):
             return
-        order = [index[name] for name in self.arm_model.names]
+        order = [index[name] for name in self.joints]
         position = [message.position[i] for i in order]
         stamp = message.header.stamp.to_sec()
         if len(message.velocity) == len(message.name):
@@ -66,7 +69,7 @@ class ContactDetectorNode:
             return
         out = Contact(source=event.source, contact=event.contact, margin=event.margin, message=event.message)
         out.header.stamp = message.header.stamp
-        self.publisher.publish(out)
+        publish(self.publisher, out)
         rospy.loginfo("contact detector: %s", event.message)
 
     def on_arm(self, request):
@@ -77,7 +80,8 @@ class ContactDetectorNode:
                 return ArmContactResponse(True, "off")
             now = self.last_sample
             if now is None or abs(rospy.Time.now().to_sec() - now) > 1.0:
-                return ArmContactResponse(False, "no torques on /lwr/external_torques for 1 s; is the robot connected?")
+                return ArmContactResponse(False, f"no torques on {self.torques.resolved_name} for 1 s; is the "
+                                                 "robot connected?")
             try:
                 self.detector.arm(request.mode, now, request.timeout, request.k, request.joints, request.mass,
                                   request.load_share)
@@ -89,14 +93,16 @@ class ContactDetectorNode:
     def on_timer(self, _event) -> None:
         """Live margin."""
         with self.lock:
-            if self.detector.state() == "watching":
-                self.margin.publish(Float64(self.detector.margin))
+            watching, margin = self.detector.state() == "watching", self.detector.margin
+        if watching:
+            publish(self.margin, Float64(margin))
 
 
 def main() -> int:
     """Entry point."""
     rospy.init_node("contact_detector")
-    urdf = rospy.get_param("robot_description", None) or rospy.get_param("/robot_description", None)
+    found = rospy.search_param("robot_description")
+    urdf = rospy.get_param(found) if found else None
     if urdf is None:
         rospy.logfatal("contact_detector: parameter robot_description is missing; load lwr_description's URDF")
         return 1

@@ -1,15 +1,20 @@
 #!/usr/bin/python3
 """The node /coglab: runs coglab_master on ROS ports, takes triggers, publishes transitions and introspection.
 
-Services: start (coglab_msgs/Start), stop (std_srvs/Trigger), why (std_srvs/Trigger).
-Topics: transitions (coglab_msgs/Transition), results (std_msgs/String, one JSON object per action, latched).
-Parameters (private): config_file, dmp_library (path of the primitives), auto_trigger, result_file (JSON lines),
-config_overrides (mapping of dotted names), introspection (default true).
+Names are relative to the node's namespace.
+Services: coglab/start (coglab_msgs/Start), coglab/stop, coglab/why (std_srvs/Trigger).
+Topics: coglab/transitions (coglab_msgs/Transition), coglab/results (std_msgs/String, one JSON object per action,
+latched), coglab/holding (std_msgs/String, what the hand holds, latched).
+Parameters: perception/frames (names of human_hand and board). Private: config_file, dmp_library (path of the primitives), auto_trigger, result_file (JSON lines),
+state_file (what the hand holds, to survive a restart; default coglab_holding.json in ROS_HOME), config_overrides
+(mapping of dotted names), introspection (default true).
 """
 import json
+import os
 import sys
 import threading
 
+import rospkg
 import rospy
 import smach
 import smach_ros
@@ -17,40 +22,63 @@ from coglab_msgs.msg import Transition
 from coglab_msgs.srv import Start, StartResponse
 from coglab_smach.config import Config, ConfigError
 from coglab_smach.context import Context
+from coglab_smach.holding import HoldingMemory
 from coglab_smach.journal import ActionRecord, Journal, TransitionRecord
 from coglab_smach.machines import build_master
 from coglab_smach.ros_hand import RosHand
 from coglab_smach.ros_ports import RosArm, RosContact, RosDatabase, RosPerception
+from coglab_smach.ros_publish import publish
 from std_msgs.msg import String
 from std_srvs.srv import Trigger, TriggerResponse
+
+
+class Memory(HoldingMemory):
+    """Shows on a latched topic what it notes."""
+
+    def __init__(self, path: str, warn) -> None:
+        super().__init__(path, warn)
+        self.publisher = rospy.Publisher("coglab/holding", String, queue_size=1, latch=True)
+
+    def note(self, object_id: str) -> None:
+        super().note(object_id)
+        publish(self.publisher, String(object_id))
 
 
 class MasterNode:
     """Ties the machines to ROS; holds no logic of its own."""
 
     def __init__(self) -> None:
-        overrides = dict(rospy.get_param("~config_overrides", {}))
+        frames = rospy.get_param("perception/frames", {})
+        overrides = {f"perception.{role}": frames[role] for role in ("human_hand", "board") if role in frames}
+        overrides.update(rospy.get_param("~config_overrides", {}))
         for name in ("dmp_library", "auto_trigger"):
             if rospy.has_param(f"~{name}"):
                 overrides[name] = rospy.get_param(f"~{name}")
         config = Config.load(rospy.get_param("~config_file"), overrides, rospy.logwarn)
         clock = smach.clock.SteadyClock()
         self.journal = Journal(clock.now)
-        self.transitions = rospy.Publisher("/coglab/transitions", Transition, queue_size=200)
-        self.results = rospy.Publisher("/coglab/results", String, queue_size=20, latch=True)
+        self.transitions = rospy.Publisher("coglab/transitions", Transition, queue_size=200)
+        self.results = rospy.Publisher("coglab/results", String, queue_size=20, latch=True)
         self.result_file = rospy.get_param("~result_file", "")
         self.journal.listen(self.on_transition)
         self.journal.listen_results(self.on_result)
         self.ctx = Context(clock=clock, arm=RosArm(), hand=RosHand(), perception=RosPerception(),
-                           database=RosDatabase(), contact=RosContact(), config=config, journal=self.journal)
+                           database=RosDatabase(), contact=RosContact(), config=config, journal=self.journal,
+                           memory=Memory(self.state_file(), rospy.logwarn))
         self.master = build_master(self.ctx)
         self.server = None
         if rospy.get_param("~introspection", True):
             self.server = smach_ros.IntrospectionServer("coglab", self.master, "/coglab_master")
             self.server.start()
-        rospy.Service("/coglab/start", Start, self.on_start)
-        rospy.Service("/coglab/stop", Trigger, self.on_stop)
-        rospy.Service("/coglab/why", Trigger, self.on_why)
+        rospy.Service("coglab/start", Start, self.on_start)
+        rospy.Service("coglab/stop", Trigger, self.on_stop)
+        rospy.Service("coglab/why", Trigger, self.on_why)
+
+    @staticmethod
+    def state_file() -> str:
+        """Where the held object is noted: one file per namespace."""
+        name = "coglab_holding" + rospy.get_namespace().rstrip("/").replace("/", "_") + ".json"
+        return rospy.get_param("~state_file", "") or os.path.join(rospkg.get_ros_home(), name)
 
     def on_start(self, request):
         """A trigger for the hub that is open now."""
@@ -82,13 +110,13 @@ class MasterNode:
         message = Transition(path=record.path, from_state=record.from_state, outcome=record.outcome,
                              to_state=record.to_state, reason=record.reason, causes=list(record.causes))
         message.header.stamp = rospy.Time.now()
-        self.transitions.publish(message)
+        publish(self.transitions, message)
         (rospy.logwarn if record.outcome in ("failed", "fault", "stopped") else rospy.loginfo)(record.sentence())
 
     def on_result(self, record: ActionRecord) -> None:
         """Topic and result file, one JSON object per action."""
         line = json.dumps(record.to_dict())
-        self.results.publish(String(line))
+        publish(self.results, String(line))
         if self.result_file:
             try:
                 with open(self.result_file, "a", encoding="utf-8") as stream:

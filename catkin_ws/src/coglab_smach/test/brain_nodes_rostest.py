@@ -13,7 +13,7 @@ import rostest
 import yaml
 from coglab_msgs.msg import Contact, Transition
 from coglab_msgs.srv import ArmContact, GetObject, ListObjects, Start
-from coglab_smach.reachability import HOME, default_arm
+from coglab_smach.reachability import default_arm, home_posture, position_jacobian
 from coglab_smach.torque_signal import TorqueSignal
 from sensor_msgs.msg import JointState
 from smach_msgs.msg import SmachContainerStatus, SmachContainerStructure
@@ -40,14 +40,15 @@ class Torques(threading.Thread):
 
     def run(self):
         arm, signal = default_arm(), TorqueSignal(5)
-        jacobian = arm.position_jacobian(HOME)
+        home = home_posture()
+        jacobian = position_jacobian(arm, home)
         applied = np.zeros(3)
         while not self.over and not rospy.is_shutdown():
             applied = applied + np.clip(self.force - applied, -0.4, 0.4)
             stamp = rospy.Time.now()
-            state = JointState(name=list(arm.names), position=list(HOME), velocity=[0.0] * 7)
+            state = JointState(name=list(arm.joint_names), position=list(home), velocity=[0.0] * 7)
             state.header.stamp = stamp
-            torque = JointState(name=list(arm.names), effort=list(signal.sample(0.005, jacobian, applied, np.zeros(7))))
+            torque = JointState(name=list(arm.joint_names), effort=list(signal.sample(0.005, jacobian, applied, np.zeros(7))))
             torque.header.stamp = stamp
             self.joints.publish(state)
             self.torques.publish(torque)

@@ -5,14 +5,14 @@ import pytest
 from coglab_smach.contact_detector import ContactDetector, DetectorSettings, sensitive_joints
 from coglab_smach.contact_trials import DT, STILL, ContactTrial, found_within, push
 from coglab_smach.pose import Pose
-from coglab_smach.reachability import default_arm, solve
+from coglab_smach.reachability import default_arm, position_jacobian, solve
 
 
 @pytest.fixture(scope="module")
 def posture():
     q = solve(default_arm(), Pose(np.array([0.78, -0.02, 0.44]), np.array([0.5, 0.5, 0.5, 0.5])))
     assert q is not None
-    return q, default_arm().position_jacobian(q)
+    return q, position_jacobian(default_arm(), q)
 
 
 def test_lateral_three_newton_found_within_sixty_milliseconds(posture):

@@ -59,7 +59,7 @@ def test_goal_lost_half_way():
 
 def test_primitive_that_does_not_exist():
     trial = failed_exchange(lambda t: t.cell.primitives.discard("reach_human"))
-    assert_recovered_empty(trial, "primitive 'reach_human' does not exist; loaded: give_human, put_board, reach_high, "
+    assert_recovered_empty(trial, "primitive 'reach_human' does not exist; loaded: give_human, put_board, reach_human_high, "
                                   "take_board")
 
 
@@ -171,7 +171,7 @@ def test_stop_holds_never_opens_the_hand_and_needs_a_reset(moment):
         t.ctx.arm.hold("STOP")
         t.wait_hub("stopped", limit=1.0)
         assert "open" not in t.cell.called()
-        held = t.ctx.holding
+        held = t.ctx.hand.state().holding
         before = len(t.cell.called())
         t.clock.sleep(3.0)
         assert len(t.cell.called()) == before, "something moved after STOP"

@@ -83,15 +83,15 @@ def test_contact_is_armed_only_after_the_motion_has_ended(trial):
 
 
 def test_monitor_switches_the_primitive_once():
-    trial = Trial(**{"monitor.primitives": {"mid": "reach_human", "high": "reach_high"}})
+    trial = Trial(**{"monitor.primitives": {"mid": "reach_human", "high": "reach_human_high"}})
     trial.cell.partner.pattern, trial.cell.partner.pattern_at = "high", 0.4
     trial.run(receive)
-    assert trial.cell.called("switch_dmp") == ["switch_dmp reach_high"]
+    assert trial.cell.called("switch_dmp") == ["switch_dmp reach_human_high"]
     assert any(t.outcome == "switched" for t in trial.ctx.journal.transitions)
 
 
 def test_monitor_keeps_the_primitive_that_fits():
-    trial = Trial(**{"monitor.primitives": {"mid": "reach_human", "high": "reach_high"}})
+    trial = Trial(**{"monitor.primitives": {"mid": "reach_human", "high": "reach_human_high"}})
     trial.cell.partner.pattern = "mid"
     trial.run(receive)
     assert trial.cell.called("switch_dmp") == []

@@ -1,44 +1,52 @@
 """The ports of the machines on the virtual rig, and a whole trial: the master beside the world, in virtual time."""
+import dataclasses
 from pathlib import Path
 
 import ih2_hand.progress as progress
-import numpy as np
+
 import smach
 from coglab_smach.config import Config
 from coglab_smach.context import Context
 from coglab_smach.journal import Journal
 from coglab_smach.machines import build_master
-from coglab_smach.object_database import ObjectDatabase
+from coglab_smach.object_database import ObjectDatabase, ObjectError
 from coglab_smach.pending import Polled, PortError, Ready
 from coglab_smach.ports import DmpProgress, HandState, Located, Recognition
-from coglab_smach.simulated_ports import SimulatedDatabase
 from smach.virtual_clock import VirtualClock
-from virtual_rig import BOARD, DT, Rig
+from virtual_rig import DT, Rig, distance, frame_of, palm_goal
 
 SHARE = Path(__file__).resolve().parent.parent
 LIBRARY = str(SHARE.parent / "coglab_controllers" / "config" / "primitives.xml")
 
 
+def answered(answer, value=None):
+    """(success, message) of a controller as a Pending."""
+    return Ready(value) if answer[0] else Ready(error=PortError(answer[1]))
+
+
 class VirtualArm:
-    """ArmPort on the rig."""
+    """ArmPort on the rig: the real controller manager and bridge."""
 
     def __init__(self, rig):
-        self.rig = rig
+        self.rig, self.robot = rig, rig.robot.virtual
         self.request = None
 
     def load_controller(self, controller_id, controller_type):
-        return Ready()
+        done = answered(self.robot.load_controller(controller_id, controller_type))
+        if controller_id == "dmp":
+            self.robot.set_ik_debug(True)
+        return done
 
     def load_dmps(self, filename):
-        return Ready(self.rig.arm.library.load(filename))
+        good, message, count = self.robot.load_dmps(filename)
+        return answered((good, message), count)
 
     def lwr_command(self, event):
-        ticket = self.rig.bridge.submit(event)
-        outcome = []
+        ticket, outcome = self.robot.submit(event), []
 
         def done():
             if not outcome:
-                answer = self.rig.bridge.outcome(ticket)
+                answer = self.robot.outcome(ticket)
                 if answer is not None:
                     outcome.append(answer)
             return bool(outcome)
@@ -52,56 +60,47 @@ class VirtualArm:
         return Polled(done, value)
 
     def motion_allowed(self):
-        sample = self.rig.arm.sample
-        return (False, "no measurement yet") if sample is None else (sample["motion_allowed"], sample["reason"])
+        report = self.rig.robot.report
+        return report["motion_allowed"], report["blocked_by"]
 
     def switch_controller(self, controller_id):
-        arm = self.rig.arm
-        arm.active, arm.motion, arm.ptp = controller_id, None, None
-        return Ready(controller_id)
+        return answered(self.robot.switch_controller(controller_id))
 
     def execute_dmp(self, request):
-        arm = self.rig.arm
-        try:
-            if arm.active != "dmp":
-                raise PortError(f"execute_dmp refused: '{arm.active}' is active")
-            if request.primitive_id not in arm.library:
-                raise PortError(f"primitive '{request.primitive_id}' does not exist; loaded: "
-                                f"{', '.join(arm.library.ids())}")
-        except PortError as error:
-            return Ready(error=error)
         self.request = request
-        goal = self.rig.goal_of(request.goal_frame, request.goal_offset, np.array(request.target_orientation))
-        arm.start_dmp(request.primitive_id, goal, request.dmp_ratio)
-        return Ready()
+        self.rig.robot.debug = None
+        return answered(self.robot.execute_dmp(request.primitive_id, request.dmp_ratio, request.goal_offset, True,
+                                               request.target_orientation, request.goal_frame))
 
     def switch_dmp(self, request):
-        arm = self.rig.arm
-        arm.motion.switch_to(arm.library[request.primitive_id], *arm.last_goal, ratio=request.dmp_ratio)
-        return Ready()
+        return answered(self.robot.switch_dmp(request.primitive_id, request.dmp_ratio, request.goal_offset, True,
+                                              request.target_orientation))
 
     def dmp_progress(self):
-        arm = self.rig.arm
-        if arm.aborted:
-            return DmpProgress("aborted", arm.aborted)
-        if arm.motion is None:
-            return DmpProgress("idle")
-        return DmpProgress("reached" if arm.motion.phase == "ended" else "running", "", self.request.primitive_id, 0.0,
-                           arm.motion.remaining_distance)
+        now = self.robot.dmp_progress()
+        return DmpProgress(now["motion"], now["reason"], now["primitive"], now["phase"], now["remaining_distance"])
 
     def move_ptp(self, position, max_velocity):
-        arm = self.rig.arm
-        arm.start_ptp(np.array(position))
+        rig = self.rig
+        status, identity, message = self.robot.add_ptp(list(position), list(max_velocity))
+        if status == 2:
+            return Ready(error=PortError(f"add_ptp refused: {message}"))
+        rig.robot.finished.discard(identity)
 
         def done():
-            if not arm.sample["motion_allowed"]:
-                raise PortError("the arm does not follow any more", (arm.sample["reason"],))
-            return arm.ptp_done()
+            if identity in rig.robot.finished:
+                return True
+            if rig.robot.report["fault"]:
+                raise PortError("the point-to-point motion ended in a fault", (rig.robot.report["reason"],))
+            allowed, why = self.motion_allowed()
+            if not allowed:
+                raise PortError("the arm does not follow any more", (why,))
+            return False
 
         return Polled(done, lambda: None)
 
     def joint_positions(self):
-        return tuple(self.rig.arm.sample["position"])
+        return tuple(self.rig.robot.report["position"])
 
     def hold(self, reason):
         return self.lwr_command("hold")
@@ -115,6 +114,8 @@ class VirtualHand:
 
     def _task(self, task):
         hand = self.rig.hand
+        if hand.dead:
+            return Polled(lambda: False, lambda: None)
         try:
             hand.begin(task)
         except Exception as error:
@@ -147,14 +148,16 @@ class VirtualHand:
 
     def state(self):
         hand = self.rig.hand
+        if hand.dead:
+            return HandState(message="hand_status is silent")
         return HandState(True, hand.calibrated, False, hand.holding, hand.message, hand.positions)
 
 
 class VirtualPerception:
-    """PerceptionPort on the rig's trackers."""
+    """PerceptionPort on the rig's trackers; the recogniser, if one is given, sees the tracked hand."""
 
-    def __init__(self, rig):
-        self.rig = rig
+    def __init__(self, rig, recogniser=None):
+        self.rig, self.recogniser = rig, recogniser
 
     def init_vision(self, time_limit):
         return Ready("rig")
@@ -179,7 +182,23 @@ class VirtualPerception:
         return Ready([Located("", "board", (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0), 0.0)])
 
     def recognition(self):
-        return Recognition()
+        if self.recogniser is None:
+            return Recognition()
+        seen = self.recogniser.estimate
+        return Recognition(seen.pattern, seen.confidence, seen.decided, seen.probabilities)
+
+
+class VirtualDatabase:
+    """DatabasePort over the real object files."""
+
+    def __init__(self, database):
+        self.database = database
+
+    def get_object(self, object_id):
+        try:
+            return Ready(self.database.get(object_id))
+        except ObjectError as error:
+            return Ready(error=PortError(str(error)))
 
 
 class VirtualContact:
@@ -206,51 +225,54 @@ class VirtualContact:
 
 
 class VirtualTrial:
-    """One trial: ``actions`` one after the other, each from its hub; results in the journal."""
+    """One trial: ``actions`` one after the other, each from its hub; results in the journal.
 
-    def __init__(self, seed=1, behaviour="normal", perfect=False, object_on="human_hand", **overrides):
-        self.rig = Rig(seed, behaviour, perfect, object_on)
+    ``reaches`` gets one Reach record per DMP motion toward a person's hand or object (see reach_record.py).
+    """
+
+    def __init__(self, seed=1, behaviour="normal", perfect=False, object_on="human_hand", perception=None,
+                 recogniser=None, later_behaviour="", **overrides):
+        self.rig = Rig(seed, behaviour, perfect, object_on, perception)
         self.clock = VirtualClock()
+        self.recogniser, self.later_behaviour = recogniser, later_behaviour
+        self.last_hub = ""
         database = ObjectDatabase(str(SHARE / "objects"))
         database.reload()
         config = Config.load(str(SHARE / "config" / "machines.yaml"),
                              {"auto_trigger": True, "dmp_library": LIBRARY, **overrides})
         self.ctx = Context(clock=self.clock, arm=VirtualArm(self.rig), hand=VirtualHand(self.rig),
-                           perception=VirtualPerception(self.rig), database=None, contact=VirtualContact(self.rig),
-                           config=config, journal=Journal(self.clock.now))
-        cell = type("Calls", (), {"answer": staticmethod(lambda port, method, after, value: _immediately(value))})
-        self.ctx.database = SimulatedDatabase(cell, database)
+                           perception=VirtualPerception(self.rig, recogniser), database=VirtualDatabase(database),
+                           contact=VirtualContact(self.rig), config=config, journal=Journal(self.clock.now))
         self.ctx.journal.listen(self._on_transition)
         self.master = build_master(self.ctx)
         self.over = False
-        self.palm_error = None
         self.failure = None
+        self.reaches = []
+        self.beside = lambda trial: None
+        self._reach = None
 
     def _on_transition(self, record):
-        """The person sees what the robot is about to do; the end of a reach is measured."""
+        """The person sees what the robot is about to do; reaches are recorded."""
         if record.path == "/coglab_master":
             task = {"exchange_human_to_robot": "give", "exchange_robot_to_human": "receive"}
+            if record.to_state == "exchange_robot_to_human" and self.later_behaviour:
+                human = self.rig.human
+                human.participant = dataclasses.replace(human.participant, behaviour=self.later_behaviour)
             if record.to_state in task:
                 self.rig.human.command(task[record.to_state])
             elif record.from_state in task and record.outcome != "succeeded":
                 self.rig.human.command("rest")
-        if record.from_state == "wait_stop" and record.outcome == "succeeded" and self.palm_error is None:
-            self.palm_error = self._goal_error()
+        if record.from_state == "execute_dmp" and record.outcome == "succeeded":
+            self._reach = ReachRecord(self.rig, self.ctx.arm.request)
+        if record.from_state == "wait_stop" and self._reach is not None:
+            self.reaches.append(self._reach)
+            self._reach = None
 
-    def _goal_error(self):
-        """(m, rad) between the palm and the goal as the motion latched it."""
-        arm = self.rig.arm
-        if arm.motion is None:
-            return None
-        p, o = arm.chain.fk(arm.sample["position"])
-        d = abs(float(np.dot(o, arm.last_goal[1])))
-        return float(np.linalg.norm(p - arm.motion.goal)), 2 * float(np.arccos(min(1.0, d)))
-
-    def run(self, *actions, limit=60.0, between=None):
+    def run(self, *actions, limit=60.0):
         """Execute; returns the results of the actions as the journal holds them."""
         with smach.clock.using(self.clock):
             self.clock.start_thread(self._world, "world")
-            self.clock.start_thread(lambda: self._script(actions, limit, between), "script")
+            self.clock.start_thread(lambda: self._script(actions, limit), "script")
             self.master.execute()
             self.over = True
         if self.failure is not None:
@@ -261,12 +283,19 @@ class VirtualTrial:
         try:
             while not self.over:
                 self.rig.step()
+                if self._reach is not None:
+                    self._reach.look()
+                if self.recogniser is not None and self.rig.ticks % 6 == 0:
+                    sight = self.rig.sights.get("human_hand")
+                    if sight is not None:
+                        self.recogniser.update(sight.captured, sight.frame.position)
+                self.beside(self)
                 self.clock.sleep(DT)
         except Exception as error:
             self.failure = error
             self.master.request_preempt()
 
-    def _script(self, actions, limit, between):
+    def _script(self, actions, limit):
         try:
             for action in actions:
                 end = self.clock.now() + limit
@@ -282,17 +311,51 @@ class VirtualTrial:
                 # The person's hand comes back before the next action.
                 while self.rig.human.phase != "idle" and self.clock.now() < end:
                     self.clock.sleep(0.1)
+                end = self.clock.now() + 10.0
+                while self.ctx.requests.hub() == "" and self.clock.now() < end:
+                    self.clock.sleep(0.05)
         except Exception as error:
             self.failure = error
         finally:
+            self.last_hub = self.ctx.requests.hub()
             self.master.request_preempt()
 
 
-def _immediately(value):
-    try:
-        return Ready(value())
-    except PortError as error:
-        return Ready(error=error)
+class ReachRecord:
+    """What one DMP motion did: (time, measured palm, goal in use) per cycle, and the errors once the arm stands still.
+
+    ``to_goal``: (m, rad) from the measured palm to the goal as received, that is as the motion has estimated and latched
+    it; ``to_sight``: to the newest single sight; ``to_truth``: to where the grasp pose really is.
+    """
+
+    def __init__(self, rig, request):
+        self.rig, self.request = rig, request
+        self.begin = rig.t
+        self.path = []
+        self.reached = None
+        self.to_goal = self.to_sight = self.to_truth = None
+
+    def look(self):
+        """After each period of the rig."""
+        robot, rig = self.rig.robot, self.rig
+        for record in robot.look_at_motion():
+            self.path.append((record["time"], record["measured"][0], record["goal"]))
+        if self.reached is None and robot.progress["motion"] == "reached":
+            self.reached = rig.t
+        # Measured when the detector begins to watch: the arm stands still and nobody has touched it yet.
+        if self.to_goal is None and self.reached is not None and rig.detector.state() == "watching":
+            self._measure()
+
+    def _measure(self):
+        rig, request, debug = self.rig, self.request, self.rig.robot.debug
+        if debug is None:
+            return
+        palm = rig.robot.chain.fk(rig.robot.report["position"])
+        self.to_goal = distance(palm, (debug["goal"], debug["set_point"][1]))
+        seen, _ = rig.newest(request.goal_frame)
+        truth = rig.truth["human_hand" if request.goal_frame == "human_hand" else "object"]
+        self.to_sight = distance(palm, palm_goal(seen, request.goal_offset, request.target_orientation))
+        self.to_truth = distance(palm, palm_goal(frame_of(truth), request.goal_offset, request.target_orientation))
 
 
-__all__ = ["BOARD", "VirtualTrial"]
+__all__ = ["VirtualTrial"]

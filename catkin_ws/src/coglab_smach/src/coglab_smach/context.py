@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from smach.clock import Clock
 
 from .config import Config
+from .holding import HoldingMemory
 from .journal import Journal
 from .ports import ArmPort, ContactPort, DatabasePort, HandPort, PerceptionPort
 from .requests import Requests
@@ -37,7 +38,7 @@ class StopSwitch:
 @dataclass
 class Context:
     """Injected into each state. ``clock`` is the engine's: steady for the robot, virtual for tests and
-    benches; ``holding`` is the id of the object in the robot's hand, empty if it is empty."""
+    benches."""
 
     clock: Clock
     arm: ArmPort
@@ -49,4 +50,16 @@ class Context:
     journal: Journal
     requests: Requests = field(default_factory=Requests)
     stop: StopSwitch = field(default_factory=StopSwitch)
-    holding: str = ""
+    memory: HoldingMemory = field(default_factory=HoldingMemory)
+    _holding: str = ""
+
+    @property
+    def holding(self) -> str:
+        """Id of the object in the robot's hand, empty if the hand is empty."""
+        return self._holding
+
+    @holding.setter
+    def holding(self, object_id: str) -> None:
+        if object_id != self._holding:
+            self.memory.note(object_id)
+        self._holding = object_id

@@ -58,6 +58,7 @@ class Journal:
         self.transitions: list[TransitionRecord] = []
         self.results: list[ActionRecord] = []
         self._failure: tuple[str, tuple[str, ...]] | None = None
+        self._newest: tuple[str, tuple[str, ...]] | None = None
         self._action: ActionRecord | None = None
 
     def listen(self, on_transition: Callable[[TransitionRecord], None]) -> None:
@@ -108,7 +109,12 @@ class Journal:
         """A state failed: kept as the reason of the action if it is the first."""
         with self._lock:
             if self._failure is None:
-                self._failure = (sentence, causes)
+                self._failure = self._newest = (sentence, causes)
+
+    def settle(self) -> None:
+        """The machine waits in a hub: what fails from now on is no consequence of what failed before."""
+        with self._lock:
+            self._failure = None
 
     def first_failure(self) -> tuple[str, tuple[str, ...]]:
         """Sentence and causes of the running action's first failure; empty if all is well."""
@@ -116,13 +122,9 @@ class Journal:
             return self._failure or ("", ())
 
     def why(self) -> str:
-        """'Why did it stop?' in one sentence: the newest action that did not succeed."""
+        """'Why did it stop?' in one sentence: the newest thing that did not succeed."""
         with self._lock:
-            if self._failure is not None:
-                sentence, causes = self._failure
-            else:
-                failed = [r for r in self.results if r.outcome != "succeeded" and r.reason]
-                if not failed:
-                    return "Nothing has failed."
-                sentence, causes = failed[-1].reason, failed[-1].causes
+            if self._newest is None:
+                return "Nothing has failed."
+            sentence, causes = self._newest
         return sentence + "".join(f", because {cause}" for cause in causes)

@@ -98,6 +98,13 @@ class ArmPort(Protocol):
     def switch_controller(self, controller_id: str) -> Pending:
         """Make a plug-in the active one; ends the motion of the other. Value: its type."""
 
+    def apply_profile(self, profile: str) -> Pending:
+        """Enable exactly the feedback controllers of a named profile, at one cycle boundary; value: None."""
+
+    def profile_settled(self, profile: str) -> tuple[bool, str]:
+        """Whether this profile is in force and nothing of the one before it is left: the last correction of each
+        feedback controller that it does not enable has faded. If not, why."""
+
     def execute_dmp(self, request: DmpRequest) -> Pending:
         """Start a DMP motion; value: None once it is accepted."""
 

@@ -10,38 +10,60 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
+import coglab_controllers as cc
 import numpy as np
+import yaml
 
 from .goals import palm_at_grasp
-from .kinematics import SerialArm
 from .pose import Pose, conjugate, multiply
 
-HOME = (-1.4349, -0.6086, 1.4986, 1.7048, 0.1857, 0.2152, 0.782)
-JOINT_LIMIT = np.radians([170, 120, 170, 120, 170, 120, 170])
 POSITION_TOLERANCE = 0.003
 ANGLE_TOLERANCE = np.radians(3.0)
 REGION = ((0.72, 0.78, 0.82), (-0.12, 0.0, 0.12), (0.28, 0.38, 0.45))
 """m, base frame: object positions at a handover."""
 
 
-@lru_cache(maxsize=1)
-def default_arm() -> SerialArm:
-    """The arm of lwr_description, found beside this package or through rospack."""
-    here = Path(__file__).resolve()
-    for parent in here.parents:
-        candidate = parent / "lwr_description" / "urdf" / "lwr_ih2.urdf"
+def shared_file(package: str, *path: str) -> Path:
+    """A file of a package of this workspace, found beside this package or through rospack."""
+    for parent in Path(__file__).resolve().parents:
+        candidate = parent.joinpath(package, *path)
         if candidate.is_file():
-            return SerialArm(candidate.read_text(encoding="utf-8"))
+            return candidate
     import rospkg
-    path = Path(rospkg.RosPack().get_path("lwr_description")) / "urdf" / "lwr_ih2.urdf"
-    return SerialArm(path.read_text(encoding="utf-8"))
+    return Path(rospkg.RosPack().get_path(package)).joinpath(*path)
 
 
-def solve(arm: SerialArm, target: Pose, start: Sequence[float] = HOME, steps: int = 120) -> np.ndarray | None:
-    """Joint positions (rad) that bring the tip to ``target`` within 3 mm and 3 deg, or None."""
-    q = np.array(start, dtype=float)
+@lru_cache(maxsize=1)
+def default_arm() -> cc.Chain:
+    """The arm of lwr_description."""
+    return cc.Chain(shared_file("lwr_description", "urdf", "lwr_ih2.urdf").read_text(encoding="utf-8"))
+
+
+@lru_cache(maxsize=1)
+def joint_limits() -> cc.JointLimits:
+    """The table of lwr_description."""
+    return cc.load_joint_limits(str(shared_file("lwr_description", "config", "joint_limits.yaml")))
+
+
+@lru_cache(maxsize=1)
+def home_posture() -> np.ndarray:
+    """``postures.home`` of the machines' configuration, rad."""
+    text = shared_file("coglab_smach", "config", "machines.yaml").read_text(encoding="utf-8")
+    return np.array(yaml.safe_load(text)["postures"]["home"], dtype=float)
+
+
+def position_jacobian(arm: cc.Chain, q: Sequence[float]) -> np.ndarray:
+    """3 x 7: velocity of the palm (m/s, base frame) per joint velocity; its transpose maps force to torque."""
+    return np.asarray(arm.jacobian(np.asarray(q, dtype=float)))[:3]
+
+
+def solve(arm: cc.Chain, target: Pose, start: Sequence[float] | None = None, steps: int = 120) -> np.ndarray | None:
+    """Joint positions (rad) that bring the palm to ``target`` within 3 mm and 3 deg, or None. Begins at ``start``, by
+    default at home."""
+    q = np.array(home_posture() if start is None else start, dtype=float)
+    lower, upper = 0.98 * joint_limits().lower_position, 0.98 * joint_limits().upper_position
     for _ in range(steps):
-        pose = arm.forward(q)
+        pose = Pose(*arm.fk(q))
         error = np.concatenate([target.position - pose.position, _rotation_error(target, pose)])
         if np.linalg.norm(error[:3]) < POSITION_TOLERANCE and np.linalg.norm(error[3:]) < ANGLE_TOLERANCE:
             return q
@@ -49,7 +71,7 @@ def solve(arm: SerialArm, target: Pose, start: Sequence[float] = HOME, steps: in
         error[3:] *= min(1.0, 0.3 / max(1e-9, float(np.linalg.norm(error[3:]))))
         j = arm.jacobian(q)
         dq = j.T @ np.linalg.solve(j @ j.T + 1e-4 * np.eye(6), error)
-        q = np.clip(q + dq, -0.98 * JOINT_LIMIT, 0.98 * JOINT_LIMIT)
+        q = np.clip(q + dq, lower, upper)
     return None
 
 
@@ -59,7 +81,7 @@ def _rotation_error(target: Pose, pose: Pose) -> np.ndarray:
     return 2.0 * q[:3]
 
 
-def share_reached(palm_in_object: Pose, arm: SerialArm | None = None,
+def share_reached(palm_in_object: Pose, arm: cc.Chain | None = None,
                   yaws_deg: Sequence[float] = (-20.0, 0.0, 20.0)) -> tuple[int, int]:
     """How many object poses of the handover region (27 places, turned about z) the palm can be brought to:
     (n, of m)."""

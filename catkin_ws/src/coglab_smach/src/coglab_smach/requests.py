@@ -23,11 +23,15 @@ class Requests:
         self._hub = ""
         self._allowed: tuple[str, ...] = ()
         self._request: Request | None = None
+        self._names_object = False
 
-    def open(self, hub: str, allowed: Iterable[str]) -> None:
-        """A hub starts to wait for one of these actions; a trigger left over is dropped."""
+    def open(self, hub: str, allowed: Iterable[str], names_object: bool = False) -> None:
+        """A hub starts to wait for one of these actions; a trigger left over is dropped.
+
+        ``names_object``: nobody knows what the hand holds, so the trigger has to say it."""
         with self._lock:
             self._hub, self._allowed, self._request = hub, tuple(allowed), None
+            self._names_object = names_object
 
     def close(self) -> None:
         """The hub has left; triggers are refused until the next one opens."""
@@ -42,6 +46,9 @@ class Requests:
                                "wait_without_object or wait_with_object")
             if action not in self._allowed:
                 return False, (f"'{action}' refused: {self._hub} takes {', '.join(self._allowed)}")
+            if self._names_object and not object_id:
+                return False, (f"'{action}' refused: the hand holds an object that is not known after a restart; name "
+                               "its object_id")
             if self._request is not None:
                 return False, f"'{action}' refused: '{self._request.action}' was asked for a moment ago"
             self._request = Request(action, object_id, source)

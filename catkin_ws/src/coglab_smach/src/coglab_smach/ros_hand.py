@@ -1,4 +1,4 @@
-"""HandPort over the four actions, the calibration topic and the status of /ih2_hand."""
+"""HandPort over the four actions, the calibration topic and the status of ih2_hand."""
 from __future__ import annotations
 
 import threading
@@ -74,7 +74,7 @@ class ActionCall(Pending):
 class RosHand:
     """HandPort over ROS."""
 
-    def __init__(self, namespace: str = "/ih2_hand") -> None:
+    def __init__(self, namespace: str = "ih2_hand") -> None:
         self._ns = namespace
         self._clients = {name: actionlib.SimpleActionClient(f"{namespace}/{name}", kind) for name, kind in
                          (("hand_open", HandOpenAction), ("hand_close", HandCloseAction),

@@ -1,7 +1,7 @@
 """The ports over ROS: services, actions and topics of the robot, the hand, perception, database and contact detector.
 
 A rospy service call has no time limit of its own, so each runs in a thread and the state that waits gives it one.
-Names are relative to the node's namespace rules of design.md section 3 and can be remapped.
+All names are relative: in the node's own namespace, so that two robots fit in one graph.
 """
 from __future__ import annotations
 
@@ -11,13 +11,15 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import rospy
+import tf2_ros
 import yaml
-from coglab_msgs.msg import Contact, ControllerStatus, DmpFeedback, FinishedPtp, LwrState
+from coglab_msgs.msg import Contact, ControllerStatus, DmpFeedback, FeedbackStatus, FinishedPtp, LwrState
 from coglab_msgs.msg import Recognition as RecognitionMsg
 from coglab_msgs.srv import (
     AddPtp,
     ArmContact,
     ExecuteDmp,
+    FeedbackSelect,
     FreePlaces,
     GetObject,
     InitVision,
@@ -29,7 +31,7 @@ from coglab_msgs.srv import (
     SwitchController,
     SwitchDmp,
 )
-from geometry_msgs.msg import Point, Pose, Quaternion
+from geometry_msgs.msg import Point, Pose, Quaternion, TransformStamped, Vector3
 from sensor_msgs.msg import JointState
 
 from .pending import Pending, Polled, PortError, Ready, Threaded
@@ -85,9 +87,9 @@ def mapped(pending: Pending, value: Callable[[Any], Any]) -> Pending:
 
 
 class RosArm:
-    """ArmPort over /controller_manager and /lwr."""
+    """ArmPort over controller_manager and lwr. Shows the goal of the running motion as tf frame ``dmp_goal``."""
 
-    def __init__(self, manager: str = "/controller_manager", lwr: str = "/lwr") -> None:
+    def __init__(self, manager: str = "controller_manager", lwr: str = "lwr") -> None:
         self._manager, self._lwr = manager, lwr
         self._lock = threading.Lock()
         self._finished: set[int] = set()
@@ -96,7 +98,9 @@ class RosArm:
         self._joints = Newest(f"{lwr}/joint_states", JointState)
         self._feedback = Newest(f"{manager}/dmp/feedback", DmpFeedback)
         self._status = Newest(f"{manager}/status", ControllerStatus)
+        self._cascade = Newest(f"{manager}/feedback/status", FeedbackStatus)
         self._ptp = Newest(f"{manager}/ptp/finished_ptp", FinishedPtp, self._on_finished)
+        self._shown_goal = tf2_ros.StaticTransformBroadcaster()
 
     def _on_finished(self, message: FinishedPtp) -> None:
         with self._lock:
@@ -132,6 +136,19 @@ class RosArm:
         return mapped(call(f"{self._manager}/switch_controller", SwitchController, wait=5.0,
                            controller_id=controller_id), lambda r: r.controller_type)
 
+    def apply_profile(self, profile: str) -> Pending:
+        return mapped(call(f"{self._manager}/feedback/apply_profile", FeedbackSelect, wait=5.0, names=[profile],
+                           reason=""), lambda r: None)
+
+    def profile_settled(self, profile: str) -> tuple[bool, str]:
+        message = self._cascade.message
+        if message is None:
+            return False, f"{self._manager}/feedback/status has never been published; is the robot node running?"
+        if message.profile != profile:
+            return False, f"profile '{message.profile}' is in force"
+        busy = [f"{c.name} is {c.activity}" for c in message.controllers if not c.enabled and c.activity != "off"]
+        return not busy, ", ".join(busy)
+
     def execute_dmp(self, request: DmpRequest) -> Pending:
         self._started_at = time.monotonic()
         fields = _dmp_fields(request)
@@ -140,8 +157,18 @@ class RosArm:
 
         def accepted(response: Any) -> None:
             self._started_at = time.monotonic()
+            self._show_goal(request)
 
         return mapped(pending, accepted)
+
+    def _show_goal(self, request: DmpRequest) -> None:
+        """For whoever looks on: where the palm is to go, relative to the tracked frame. Nothing in control reads it."""
+        shown = TransformStamped()
+        shown.header.stamp = rospy.Time.now()
+        shown.header.frame_id, shown.child_frame_id = request.goal_frame, "dmp_goal"
+        shown.transform.translation = Vector3(*request.goal_offset)
+        shown.transform.rotation = Quaternion(*(request.target_orientation or (0.0, 0.0, 0.0, 1.0)))
+        self._shown_goal.sendTransform(shown)
 
     def switch_dmp(self, request: DmpRequest) -> Pending:
         return mapped(call(f"{self._manager}/dmp/switch_dmp", SwitchDmp, wait=1.0, **_dmp_fields(request)),
@@ -207,9 +234,9 @@ def _dmp_fields(request: DmpRequest) -> dict[str, Any]:
 
 
 class RosPerception:
-    """PerceptionPort over /perception and the recogniser's topic."""
+    """PerceptionPort over perception and the recogniser's topic."""
 
-    def __init__(self, namespace: str = "/perception") -> None:
+    def __init__(self, namespace: str = "perception") -> None:
         self._ns = namespace
         self._recognition = Newest(f"{namespace}/recognition", RecognitionMsg)
 
@@ -238,9 +265,9 @@ def _located(frame: str, parent: str, pose: Pose, age: float) -> Located:
 
 
 class RosDatabase:
-    """DatabasePort over /object_database."""
+    """DatabasePort over object_database."""
 
-    def __init__(self, namespace: str = "/object_database") -> None:
+    def __init__(self, namespace: str = "object_database") -> None:
         self._ns = namespace
 
     def get_object(self, object_id: str) -> Pending:
@@ -249,9 +276,9 @@ class RosDatabase:
 
 
 class RosContact:
-    """ContactPort: the topic /coglab/contact, and the service that arms whoever publishes there."""
+    """ContactPort: the topic coglab/contact, and the service that arms whoever publishes there."""
 
-    def __init__(self, topic: str = "/coglab/contact", service: str = "/contact_detector/arm") -> None:
+    def __init__(self, topic: str = "coglab/contact", service: str = "contact_detector/arm") -> None:
         self._service = service
         self._event: ContactEvent | None = None
         self._wanted: bool | None = None

@@ -5,102 +5,17 @@ are attributes that a test sets at any time. Physics belongs to coglab_sim; here
 """
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from smach.clock import Clock
 
 from .object_database import ObjectDatabase, ObjectError
-from .pending import Pending, Polled, PortError, Ready
+from .pending import Pending, PortError, Ready
 from .ports import ContactEvent, DmpProgress, DmpRequest, HandState, Located, Recognition
 from .pose import Pose
-
-HOME_PALM = Pose(np.array([0.58, -0.15, 0.58]), np.array([0.5, 0.5, 0.5, 0.5]))
-
-
-@dataclass
-class Faults:
-    """What is broken. Sets of names are compared with the port method that is called."""
-
-    dead: set[str] = field(default_factory=set)
-    """ports that never answer: arm, hand, perception, database, contact"""
-    refuse: dict[str, str] = field(default_factory=dict)
-    """port method -> sentence with which it refuses"""
-    not_seen: set[str] = field(default_factory=set)
-    """objects perception does not see"""
-    abort_dmp_after: float = 0.0
-    """s into the motion at which it aborts (0: never)"""
-    abort_reason: str = "goal lost for 1.0 s"
-    arm_disabled: str = ""
-    """reason why motion is not allowed"""
-    empty_grasp: bool = False
-    """the hand closes on nothing"""
-
-
-@dataclass
-class Partner:
-    """The person's script: seconds from arming to the touch, to the taking and to the letting go; None: never."""
-
-    touch_after: float | None = 0.8
-    take_after: float | None = 1.0
-    let_go_after: float | None = 0.2
-    pattern: str = "unknown"
-    pattern_at: float = 0.0
-    """s into the motion at which the pattern is decided"""
-
-
-class SimulatedCell:
-    """State shared by the simulated ports, advanced by looking at the clock: no thread of its own."""
-
-    def __init__(self, clock: Clock, reach_time: float = 1.3, ptp_time: float = 1.0) -> None:
-        self.clock = clock
-        self.faults = Faults()
-        self.partner = Partner()
-        self.reach_time = reach_time
-        self.ptp_time = ptp_time
-        self.calls: list[tuple[float, str]] = []
-        self.active = ""
-        self.loaded: dict[str, str] = {}
-        self.primitives = {"reach_human", "reach_high", "give_human", "take_board", "put_board"}
-        self.enabled = False
-        self.held = False
-        self.joints = tuple([0.3] * 7)
-        self.reached_at: float | None = None
-        self.motion_started: float | None = None
-        self.hand_positions = (0, 0, 0, 0, 0)
-        self.preshaped = False
-        self.objects: dict[str, Pose] = {"mug": Pose(np.array([0.78, 0.03, 0.43])),
-                                         "board": Pose(np.array([0.45, -0.55, 0.05])),
-                                         "human_hand": Pose(np.array([0.86, 0.03, 0.43]))}
-
-    def note(self, what: str) -> None:
-        """Remember a call with its time."""
-        self.calls.append((self.clock.now(), what))
-
-    def called(self, prefix: str = "") -> list[str]:
-        """Names of the calls so far that begin with ``prefix``."""
-        return [what for _, what in self.calls if what.startswith(prefix)]
-
-    def answer(self, port: str, method: str, after: float, value: Callable[[], Any]) -> Pending:
-        """A pending answer that respects the faults."""
-        self.note(method)
-        if port in self.faults.dead:
-            return Polled(lambda: False, lambda: None)
-        if method in self.faults.refuse:
-            return Ready(error=PortError(self.faults.refuse[method]))
-        due = self.clock.now() + after
-        cancelled = [False]
-
-        def ready() -> bool:
-            return self.clock.now() >= due and port not in self.faults.dead
-
-        def cancel() -> None:
-            cancelled[0] = True
-            self.note(f"cancel {method}")
-
-        return Polled(ready, value, cancel)
+from .simulated_cell import SimulatedCell
 
 
 class SimulatedArm:
@@ -144,9 +59,24 @@ class SimulatedArm:
                 raise PortError(f"controller '{controller_id}' is not loaded")
             self.cell.active = controller_id
             self.cell.motion_started = None
+            # As the controller manager does: the profile of the motion controller's name comes with it.
+            self.cell.profile, self.cell.profile_since = controller_id, self.cell.clock.now()
             return self.cell.loaded[controller_id]
 
         return self.cell.answer("arm", f"switch {controller_id}", 0.02, apply)
+
+    def apply_profile(self, profile: str) -> Pending:
+        def apply() -> None:
+            self.cell.profile, self.cell.profile_since = profile, self.cell.clock.now()
+
+        return self.cell.answer("arm", f"profile {profile}", 0.01, apply)
+
+    def profile_settled(self, profile: str) -> tuple[bool, str]:
+        cell = self.cell
+        if cell.profile != profile:
+            return False, f"profile '{cell.profile}' is in force"
+        faded = cell.clock.now() - cell.profile_since >= cell.fade_time
+        return faded, "" if faded else "ee_admittance is stopping"
 
     def execute_dmp(self, request: DmpRequest) -> Pending:
         def apply() -> None:
@@ -302,6 +232,8 @@ class SimulatedContact:
         self._mode = ""
         self._due: float | None = None
         self.armed_while_moving = False
+        self.armed_with_profile: list[str] = []
+        """profile in force at each arming, with ' fading' while another one's correction was not gone"""
 
     def arm(self, mode: str, time_limit: float, settings: dict[str, Any]) -> Pending:
         cell = self.cell
@@ -310,6 +242,8 @@ class SimulatedContact:
         self._mode, self._due = mode, None if after is None else cell.clock.now() + after
         if cell.motion_started is not None and cell.reached_at is None:
             self.armed_while_moving = True
+        fading = cell.clock.now() - cell.profile_since < cell.fade_time
+        self.armed_with_profile.append(cell.profile + (" fading" if fading else ""))
         return cell.answer("contact", f"arm {mode}", 0.01, lambda: None)
 
     def disarm(self) -> None:

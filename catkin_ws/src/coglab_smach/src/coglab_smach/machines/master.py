@@ -24,7 +24,8 @@ def _after_action(succeeded: str) -> dict[str, str]:
 def build_master(ctx: Context) -> CoglabMachine:
     """The whole hierarchy. Its only outcome is 'preempted': a shut-down is the only way out."""
     master = CoglabMachine(ctx, LABEL, ["preempted"])
-    master.userdata.object_id = ""
+    master.userdata.object_id = master.userdata.grasp_name = ""
+    master.userdata.object_entry, master.userdata.grasp = {}, {}
     with master:
         master.add_state("coglab_init_system", build_init_system(ctx),
                          {"succeeded": "which_hub", "failed": "fault", "preempted": "preempted"})

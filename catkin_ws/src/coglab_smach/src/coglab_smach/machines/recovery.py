@@ -5,13 +5,21 @@ from __future__ import annotations
 from typing import Any
 
 from ..context import Context
+from ..holding import UNKNOWN
 from ..pending import PortError
 from ..states.arm import HomeRobot
 from ..states.base import CoglabMachine, CoglabState
 
 
+def arm_is_blocked(state: CoglabState) -> str:
+    """Why the arm is there but may not move (hold, command mode lost); empty if it may, or if its node is silent."""
+    allowed, why = state.ctx.arm.motion_allowed()
+    return "" if allowed or state.ctx.arm.joint_positions() is None else why or "no reason was given"
+
+
 class EndMotion(CoglabState):
-    """First step of every recovery: end the running motion. After STOP nothing is touched at all."""
+    """First step of every recovery: end the running motion. After STOP, or while the arm is blocked, nothing is
+    touched at all: the operator decides, and the hand keeps what it holds."""
 
     default_time_limit = 5.0
 
@@ -23,6 +31,10 @@ class EndMotion(CoglabState):
             self.reason = f"STOP: {self.ctx.stop.reason}; the hand keeps what it holds"
             return "stopped"
         self.ctx.contact.disarm()
+        why = arm_is_blocked(self)
+        if why:
+            self.reason = f"the arm is blocked: {why}; the hand keeps what it holds"
+            return "stopped"
         self.await_pending(self.ctx.arm.switch_controller("ptp"), "end of the motion by switching to 'ptp'")
         return "succeeded"
 
@@ -46,13 +58,41 @@ class SecureHand(CoglabState):
 
 
 class WhatIsHeld(CoglabState):
-    """Which hub is the right one now."""
+    """Which hub is the right one now. The hand's own grip decides; memory only names the object.
+
+    After a restart the machine knows of no object though the hand may hold one: then it is the one noted on disk, or an
+    unknown one. A hand that turns out to be empty, because somebody took the object meanwhile, is believed too.
+    """
+
+    default_time_limit = 8.0
 
     def __init__(self, ctx: Context) -> None:
         super().__init__(ctx, outcomes=["empty", "holding"])
 
     def run(self, ud: Any) -> str:
+        held = self._seen_by_the_hand()
+        if held is None:
+            self.reason = (f"the hand does not tell; as noted before, "
+                           f"{f'it holds {self.ctx.holding!r}' if self.ctx.holding else 'it is empty'}")
+        elif held and not self.ctx.holding:
+            self.ctx.holding = self.ctx.memory.recall() or UNKNOWN
+            self.reason = f"the hand holds an object since before this start: {self.ctx.holding}"
+        elif not held and self.ctx.holding:
+            self.reason = f"'{self.ctx.holding}' is not in the hand any more"
+            self.ctx.holding = ""
         return "holding" if self.ctx.holding else "empty"
+
+    def _seen_by_the_hand(self) -> bool | None:
+        """Whether the hand's grip says so; None if the hand does not answer. A hand node that has just started counts
+        as holding until a poll of the motors has shown it empty: that gets ``hand.settle_after_start``."""
+        end = self.ctx.clock.now() + float(self.ctx.config.get("hand.settle_after_start", 2.0))
+        while True:
+            state = self.ctx.hand.state()
+            if not state.connected:
+                return None
+            if not state.holding or self.ctx.holding or self.ctx.clock.now() >= end:
+                return state.holding
+            self.pause(0.1)
 
 
 def build_recovery(ctx: Context) -> CoglabMachine:
@@ -71,7 +111,7 @@ def build_recovery(ctx: Context) -> CoglabMachine:
 
 
 class CheckStop(CoglabState):
-    """A step of recovery failed: because of STOP, or because something is broken?"""
+    """A step of recovery failed: because of STOP or a blocked arm, or because something is broken?"""
 
     ignores_stop = True
 
@@ -79,7 +119,7 @@ class CheckStop(CoglabState):
         super().__init__(ctx, outcomes=["stopped", "fault"])
 
     def run(self, ud: Any) -> str:
-        return "stopped" if self.ctx.stop.pressed() else "fault"
+        return "stopped" if self.ctx.stop.pressed() or arm_is_blocked(self) else "fault"
 
 
 ACTION_OUTCOMES = ["succeeded", "failed_empty", "failed_holding", "stopped", "fault", "preempted"]

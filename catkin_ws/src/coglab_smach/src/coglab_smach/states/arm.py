@@ -91,6 +91,9 @@ class ExecuteDmp(CoglabState):
 
     def run(self, ud: Any) -> str:
         request = dmp_request(ud.goal)
+        profile = str(self.ctx.config.get("approach_profile", ""))
+        if profile:
+            self.await_pending(self.ctx.arm.apply_profile(profile), f"feedback profile '{profile}'", 2.0)
         self.await_pending(self.ctx.arm.execute_dmp(request), f"start of primitive '{request.primitive_id}'")
         self.ctx.journal.mark("motion_started")
         self.reason = f"primitive '{request.primitive_id}' toward {request.goal_frame}"
@@ -117,6 +120,7 @@ class WaitStop(CoglabState):
         self.ctx.journal.mark("motion_reached")
         if not self.trigger:
             return "succeeded"
+        self._leave_approach_profile()
         if self.trigger == "release":
             # The goal is the person's hand, and that now comes to the object: an arm that still followed it
             # would back away.
@@ -133,6 +137,18 @@ class WaitStop(CoglabState):
         self.ctx.journal.mark("contact")
         self.reason = event.message or f"{self.trigger} by {event.source}, margin {event.margin:.1f}"
         return "succeeded"
+
+    def _leave_approach_profile(self) -> None:
+        """Back to the rigid profile, and wait until what the compliant one added is gone: contact is found in forces,
+        which an arm that yields to them would not show."""
+        if not str(self.ctx.config.get("approach_profile", "")):
+            return
+        self.await_pending(self.ctx.arm.apply_profile("dmp"), "feedback profile 'dmp'", 2.0)
+        try:
+            self.wait_for(lambda: self.ctx.arm.profile_settled("dmp")[0], "the end of the approach's compliance", 2.0)
+        except TimeLimit as limit:
+            limit.causes = (self.ctx.arm.profile_settled("dmp")[1],)
+            raise
 
     def _settings(self, ud: Any) -> dict[str, Any]:
         """What the object's entry says about contact, or its delivery mode about release."""
@@ -194,6 +210,9 @@ class MonitorDmp(CoglabState):
             switches += 1
 
     def _other_pattern(self, family: dict[str, str], running: str) -> bool:
+        # Once the hand has arrived there is nothing left to substitute, and the arm has to stand still.
+        if self.ctx.arm.dmp_progress().state not in ("running", "holding"):
+            return False
         seen = self.ctx.perception.recognition()
         return seen.decided and seen.pattern in family and family[seen.pattern] != running
 

@@ -10,12 +10,19 @@ from .base import CoglabState, TimeLimit
 
 class CalibrateHand(CoglabState):
     """Calibration order to the hand; skipped, with a sentence, if it is calibrated and the configuration
-    does not insist."""
+    does not insist, and always if the hand holds something: calibrating opens the fingers."""
 
     default_time_limit = 30.0
 
     def run(self, ud: Any) -> str:
         state = self.ctx.hand.state()
+        end = self.ctx.clock.now() + float(self.ctx.config.get("hand.settle_after_start", 2.0))
+        while state.connected and state.holding and self.ctx.clock.now() < end:
+            self.pause(0.1)
+            state = self.ctx.hand.state()
+        if state.connected and state.holding:
+            self.reason = "the hand holds an object: not calibrated, because that would open it"
+            return "succeeded"
         if state.calibrated and not bool(self.ctx.config.get("hand.calibrate_always", False)):
             self.reason = "the hand is calibrated already"
             return "succeeded"

@@ -6,6 +6,9 @@ from collections.abc import Sequence
 from typing import Any
 
 from ..context import Context
+from ..holding import UNKNOWN
+from ..pending import PortError
+from ..requests import Request
 from .base import CoglabState, Interrupted
 
 
@@ -36,13 +39,18 @@ class Hub(CoglabState):
     """wait_without_object and wait_with_object: left by a trigger or, where the configuration allows it, on
     recognition.
 
-    Outcomes are the actions this hub takes, and 'stopped' when STOP is pressed while waiting.
+    Outcomes are the actions this hub takes; 'stopped' when STOP is pressed or the arm is blocked while waiting (hold
+    latched at the robot, command mode lost), so that it shows and waits for the operator's reset; failed when the robot
+    node is silent.
     """
 
     def __init__(self, ctx: Context, actions: Sequence[str], with_object: bool) -> None:
-        super().__init__(ctx, outcomes=[*actions, "stopped"], io_keys=["object_id"])
+        known = ["object_entry", "grasp", "grasp_name"] if with_object else []
+        super().__init__(ctx, outcomes=[*actions, "stopped"], io_keys=["object_id", *known])
         self.actions = tuple(actions)
         self.with_object = with_object
+        self._blocked_since: float | None = None
+        self._saw_rest = False
 
     def time_limit(self) -> float:
         # A hub is the place to wait in: it has no end of its own.
@@ -51,40 +59,101 @@ class Hub(CoglabState):
     def run(self, ud: Any) -> str:
         if not self.with_object:
             self.ctx.holding = ""
-        self.ctx.requests.open(self.label, self.actions)
-        try:
-            while True:
-                try:
-                    self.check()
-                except Interrupted as interrupt:
-                    if interrupt.stop:
-                        self.reason = str(interrupt)
-                        return "stopped"
-                    raise
-                request = self.ctx.requests.take()
-                if request is not None:
-                    break
-                self._watch_partner()
-                self.ctx.clock.sleep(0.02)
-        finally:
-            self.ctx.requests.close()
-        # With an object in the hand the action is about that object, whatever else was named.
-        if not self.with_object:
-            ud.object_id = request.object_id or str(self.ctx.config.get("default_object", "mug"))
-        elif request.object_id and request.object_id != ud.object_id:
-            self.reason = f"asked for '{request.object_id}', but the hand holds '{ud.object_id}': that one is meant. "
+        elif ud.object_id != self.ctx.holding or not ud.object_entry:
+            # Held since before this start: user data knows nothing of it.
+            ud.object_id, ud.object_entry = self.ctx.holding, {}
+        self._blocked_since, self._saw_rest = None, False
+        self.ctx.journal.settle()
+        while True:
+            self._open(ud)
+            try:
+                request = self._await_request()
+            finally:
+                self.ctx.requests.close()
+            if request is None:
+                self.ctx.journal.failure(self.reason)
+                return "stopped"
+            if not self.with_object:
+                ud.object_id = request.object_id or str(self.ctx.config.get("default_object", "mug"))
+                break
+            refusal = self._learn_what_is_held(ud, request)
+            if not refusal:
+                break
+            self.ctx.journal.transition(self.path(), self.label, "refused", self.label, refusal)
         self.reason += f"{request.source} asked for {request.action} of '{ud.object_id}'"
         return request.action
 
+    def _open(self, ud: Any) -> None:
+        unknown = self.with_object and ud.object_id == UNKNOWN
+        self.ctx.requests.open(self.label, self.actions, names_object=unknown)
+
+    def _await_request(self) -> Request | None:
+        """The next trigger; None, with a reason, if the arm was stopped first."""
+        while True:
+            try:
+                self.check()
+            except Interrupted as interrupt:
+                if not interrupt.stop:
+                    raise
+                self.reason = str(interrupt)
+                return None
+            if self._blocked():
+                return None
+            request = self.ctx.requests.take()
+            if request is not None:
+                return request
+            self._watch_partner()
+            self.ctx.clock.sleep(0.02)
+
+    def _blocked(self) -> bool:
+        """Whether the arm has been blocked for longer than a hiccup; PortError if its node is silent."""
+        allowed, why = self.ctx.arm.motion_allowed()
+        now = self.ctx.clock.now()
+        if allowed:
+            self._blocked_since = None
+            return False
+        if self._blocked_since is None:
+            self._blocked_since = now
+        waited = now - self._blocked_since
+        if waited > float(self.ctx.config.get("hub.silent_time", 2.0)) and self.ctx.arm.joint_positions() is None:
+            raise PortError("the robot is silent", (why,))
+        if waited <= float(self.ctx.config.get("hub.blocked_time", 0.5)) or self.ctx.arm.joint_positions() is None:
+            return False
+        self.reason = f"the arm is blocked: {why}; ask for 'reset' when its cause is away"
+        return True
+
+    def _learn_what_is_held(self, ud: Any, request: Request) -> str:
+        """With an object in the hand the action is about that object, whatever else was named. After a restart its
+        entry is read first. Returns why the trigger cannot be followed, empty if it can."""
+        if ud.object_id == UNKNOWN:
+            self.ctx.holding = ud.object_id = request.object_id
+        elif request.object_id and request.object_id != ud.object_id:
+            self.reason = f"asked for '{request.object_id}', but the hand holds '{ud.object_id}': that one is meant. "
+        if ud.object_entry:
+            return ""
+        try:
+            entry = self.await_pending(self.ctx.database.get_object(ud.object_id), f"entry of '{ud.object_id}'", 5.0)
+        except PortError as error:
+            self.ctx.holding = ud.object_id = UNKNOWN
+            return f"'{request.action}' refused: {error.sentence}"
+        ud.object_entry = entry
+        ud.grasp_name = entry["default_grasp"]
+        ud.grasp = entry["grasps"][ud.grasp_name]
+        return ""
+
     def _watch_partner(self) -> None:
         """A recognised motion of the partner is a trigger like the operator's, if the configuration maps it
-        to an action."""
+        to an action of this hub. Only a motion that began in this hub counts."""
         if not bool(self.ctx.config.get("recognition_trigger.enabled", False)):
             return
         seen = self.ctx.perception.recognition()
-        actions = dict(self.ctx.config.get("recognition_trigger.actions", {}))
-        action = actions.get(seen.pattern)
-        if seen.decided and action in self.actions:
+        if not seen.decided:
+            self._saw_rest = True
+            return
+        wanted = dict(self.ctx.config.get("recognition_trigger.actions", {})).get(seen.pattern, [])
+        wanted = [wanted] if isinstance(wanted, str) else list(wanted)
+        action = next((name for name in wanted if name in self.actions), None)
+        if self._saw_rest and action is not None:
             self.ctx.requests.submit(action, "", f"recognition of '{seen.pattern}' ({seen.confidence:.2f})")
 
 
@@ -107,6 +176,12 @@ class Stopped(CoglabState):
             self.ctx.requests.close()
         self.await_pending(self.ctx.arm.lwr_command("reset"), "LWR command 'reset'", 5.0)
         self.ctx.stop.reset()
+        if not self.ctx.arm.motion_allowed()[0]:
+            # Command mode was lost as well: the operator's reset is the explicit start that it needs.
+            self.pause(0.3)
+            if not self.ctx.arm.motion_allowed()[0]:
+                self.await_pending(self.ctx.arm.lwr_command("start"), "LWR command 'start'", 20.0)
+            self.wait_for(lambda: self.ctx.arm.motion_allowed()[0], "command mode of the LWR", 10.0)
         return "succeeded"
 
 
@@ -128,8 +203,12 @@ class Fault(CoglabState):
                 self.ctx.clock.sleep(0.05)
         finally:
             self.ctx.requests.close()
-        if self.ctx.stop.pressed():
-            self.await_pending(self.ctx.arm.lwr_command("reset"), "LWR command 'reset'", 5.0)
+        if self.ctx.stop.pressed() or not self.ctx.arm.motion_allowed()[0]:
+            # A hold that is latched at the robot would let the new initialisation fail as well.
+            try:
+                self.await_pending(self.ctx.arm.lwr_command("reset"), "LWR command 'reset'", 5.0)
+            except PortError:
+                pass  # the robot may not be there yet; the initialisation says so if it stays away
             self.ctx.stop.reset()
         self.reason = "the operator asked for a new initialisation"
         return "succeeded"

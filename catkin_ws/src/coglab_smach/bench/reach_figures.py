@@ -1,0 +1,49 @@
+"""Figures of a recorded reach: how late it is compared with a person's, how smooth, how far off at its end."""
+from __future__ import annotations
+
+import numpy as np
+
+HUMAN_BASE = 1.1
+"""s, a person's reach over 0.45 m (coglab_sim.participant.Participant.reach_time)"""
+NEAR = 0.010
+"""m: the hand has arrived when it stays this close to the goal as received"""
+
+
+def human_time(way: float) -> float:
+    """Duration (s) of a person's reach over ``way`` m: facts of coglab_sim.reach.duration_for."""
+    return HUMAN_BASE * max(0.3, (max(way, 1e-3) / 0.45) ** 0.3)
+
+
+def sparc(speed, rate: float, cut: float = 10.0, amplitude: float = 0.05) -> float:
+    """Spectral arc length of a speed profile (Balasubramanian et al.), 10 Hz, amplitude threshold 0.05; 0 is
+    smoothest."""
+    n = int(2 ** (np.ceil(np.log2(len(speed))) + 4))
+    f = np.arange(n) * rate / n
+    spectrum = np.abs(np.fft.fft(speed, n))
+    spectrum = spectrum / spectrum.max()
+    keep = f <= cut
+    f, spectrum = f[keep], spectrum[keep]
+    above = np.flatnonzero(spectrum >= amplitude)
+    f, spectrum = f[above[0]:above[-1] + 1], spectrum[above[0]:above[-1] + 1]
+    return -float(np.sum(np.sqrt((np.diff(f) / (f[-1] - f[0])) ** 2 + np.diff(spectrum) ** 2)))
+
+
+def figures(reach) -> dict[str, float] | None:
+    """Of one ReachRecord: ``late`` (s, arrival after a person's), ``reached`` (s, until the machine is told so),
+    ``sparc``, and mm and deg to goal, newest sight and truth. None if the motion did not end."""
+    if reach.reached is None or reach.to_goal is None or len(reach.path) < 20:
+        return None
+    times = np.array([t for t, _, _ in reach.path])
+    palm = np.array([p for _, p, _ in reach.path])
+    goal = np.array([g for _, _, g in reach.path])
+    inside = times <= reach.reached
+    far = np.flatnonzero(np.linalg.norm(palm[inside] - goal[inside], axis=1) > NEAR)
+    arrived = float(times[far[-1]]) if len(far) else reach.begin
+    way = float(np.linalg.norm(palm[-1] - palm[0]))
+    speed = np.linalg.norm(np.diff(palm[inside], axis=0), axis=1) / np.diff(times[inside])
+    out = {"late": arrived - times[0] - human_time(way), "reached_late": reach.reached - times[0] - human_time(way),
+           "reached": reach.reached - reach.begin, "sparc": sparc(speed, 1.0 / float(np.median(np.diff(times))))}
+    for name in ("goal", "sight", "truth"):
+        metres, angle = getattr(reach, f"to_{name}")
+        out[f"{name}_mm"], out[f"{name}_deg"] = 1000.0 * metres, float(np.degrees(angle))
+    return out

@@ -1,0 +1,145 @@
+"""Bad input, one case per line of the table in the README: what is wrong, where the machine ends, the sentence."""
+import shutil
+
+import pytest
+from coglab_smach.object_database import ObjectDatabase
+from coglab_smach.pose import Pose
+from conftest import SHARE, Trial
+
+EXCHANGE = "exchange_human_to_robot"
+
+
+def missing_object(t):
+    t.wanted = "elephant"
+
+
+def unreachable_object(t):
+    t.cell.faults.abort_dmp_after = 0.05
+    t.cell.faults.abort_reason = "joint lwr_a3 at its stop blocks the motion for 0.5 s"
+
+
+def object_out_of_reach(t):
+    t.cell.objects["mug"] = Pose([1.4, 0.2, 0.1])
+
+
+def no_person(t):
+    t.cell.faults.not_seen.add("mug")
+
+
+def two_people(t):
+    t.cell.faults.refuse["locate mug"] = ("2 people are in view; one partner is expected: ask the others to step back")
+
+
+def goal_lost(t):
+    t.cell.faults.abort_dmp_after = 0.6
+
+
+def hand_dead(t):
+    t.cell.faults.dead.add("hand")
+
+
+def missing_primitive(t):
+    t.cell.primitives.discard("reach_human")
+
+
+CASES = {
+    missing_object: "object 'elephant' is not in the database; it has: ball, bottle, mug, screwdriver, tea_box",
+    unreachable_object: "the reach was aborted, because joint lwr_a3 at its stop blocks the motion",
+    object_out_of_reach: "'mug' was not offered within 8 s: it stayed at (1.40, 0.20, 0.10) m, outside the handover",
+    no_person: "'mug' was not seen within 5.0 s",
+    two_people: "2 people are in view; one partner is expected",
+    goal_lost: "the reach was aborted, because goal lost for 1.0 s",
+    hand_dead: "preshape 'cylindrical' within 6.0 s expected",
+    missing_primitive: "primitive 'reach_human' does not exist; loaded: ",
+}
+
+
+@pytest.mark.parametrize("prepare", CASES, ids=lambda f: f.__name__)
+def test_bad_input_ends_in_the_hub_with_its_sentence(prepare):
+    trial = Trial()
+
+    def script(t):
+        t.wait_hub("wait_without_object")
+        t.wanted = "mug"
+        prepare(t)
+        t.start(EXCHANGE, t.wanted)
+        t.wait_hub("wait_without_object")
+
+    trial.run(script)
+    assert trial.result().outcome == "failed_empty"
+    assert CASES[prepare] in trial.ctx.journal.why()
+    # The same sentence on the topic (transitions) and in the result file.
+    assert any(CASES[prepare].split(", because")[0] in r.reason for r in trial.ctx.journal.transitions
+               if r.path == "/coglab_master" and r.from_state == EXCHANGE)
+    assert CASES[prepare].split(", because")[0] in trial.result().to_dict()["reason"]
+    assert list(trial.cell.joints) == trial.ctx.config.get("postures.home")
+
+
+@pytest.mark.parametrize("moment, hub, sentence", [
+    (0.3, "wait_without_object", "hand"), (2.6, "wait_without_object", "closing of the hand")])
+def test_hand_node_dies_during_the_exchange(moment, hub, sentence):
+    trial = Trial()
+
+    def script(t):
+        t.wait_hub("wait_without_object")
+        t.start(EXCHANGE)
+        t.clock.sleep(moment)
+        t.cell.faults.dead.add("hand")
+        t.wait_hub("wait_with_object" if moment > 2 else hub)
+
+    trial.run(script)
+    assert trial.result().outcome in ("failed_empty", "failed_holding")
+    assert sentence in trial.result().reason
+    assert "open" not in [c for c in trial.cell.called() if c == "open"][1:]
+
+
+def test_arm_node_dead_ends_in_fault_with_its_sentence():
+    trial = Trial()
+
+    def script(t):
+        t.wait_hub("wait_without_object")
+        t.start(EXCHANGE)
+        t.clock.sleep(1.0)
+        t.cell.faults.dead.add("arm")
+        t.wait_hub("fault")
+
+    trial.run(script)
+    assert trial.ctx.journal.why() == "wait_stop: the arm does not follow any more, because /lwr/state is silent"
+    assert trial.result().outcome == "fault"
+
+
+def test_a_database_file_that_breaks_during_a_trial_keeps_the_old_entry(tmp_path):
+    shutil.copytree(SHARE / "objects", tmp_path / "objects")
+    trial = Trial()
+    problems = []
+
+    def script(t):
+        t.database = t.ctx.database.database = ObjectDatabase(str(tmp_path / "objects"))
+        assert t.database.reload() == []
+        t.wait_hub("wait_without_object")
+        t.start(EXCHANGE)
+        file = tmp_path / "objects" / "mug.yaml"
+        file.write_text(file.read_text().replace("mass: 0.31", "mass: heavy"))
+        problems.extend(t.database.reload())
+        t.wait_hub("wait_with_object")
+        assert t.result().outcome == "succeeded"
+        t.start("exchange_robot_to_human")
+        t.wait_hub("wait_without_object")
+
+    trial.run(script)
+    assert trial.result().outcome == "succeeded"
+    assert len(problems) == 1 and "mug.yaml" in problems[0] and "mass" in problems[0], problems
+    assert trial.database.get("mug")["mass"] == 0.31
+
+
+def test_trigger_in_the_wrong_hub():
+    trial = Trial()
+
+    def script(t):
+        t.wait_hub("wait_without_object")
+        ok, message = t.ctx.requests.submit("put", "mug")
+        assert not ok and message == "'put' refused: wait_without_object takes exchange_human_to_robot, take"
+        t.clock.sleep(1.0)
+        assert t.ctx.requests.hub() == "wait_without_object"
+
+    trial.run(script)

@@ -1,0 +1,61 @@
+"""A compliant approach: the feedback profile is on during the reach, and gone before the contact detector is armed."""
+import pytest
+from conftest import Trial
+
+ACTIONS = {"contact": "exchange_human_to_robot", "release": "exchange_robot_to_human"}
+
+
+def handover(t):
+    t.wait_hub("wait_without_object")
+    t.start(ACTIONS["contact"])
+    t.wait_hub("wait_with_object")
+    t.start(ACTIONS["release"])
+    t.wait_hub("wait_without_object")
+
+
+def test_no_profile_is_asked_for_by_default(trial):
+    trial.run(handover)
+    assert trial.cell.called("profile") == []
+
+
+def test_profile_is_on_in_the_reach_and_off_before_contact_is_armed():
+    trial = Trial(approach_profile="dmp_compliant")
+    trial.run(handover)
+    assert [r.outcome for r in trial.ctx.journal.results[-2:]] == ["succeeded", "succeeded"]
+    order = [what for what in trial.cell.called()
+             if what.startswith(("switch", "profile", "execute_dmp", "arm contact", "arm release"))]
+    reach = ["switch dmp", "profile dmp_compliant", "execute_dmp", "profile dmp"]
+    assert order[order.index("switch dmp"):][:5] == [*reach, "arm contact"]
+    again = order.index("switch dmp", order.index("arm contact"))
+    assert [what for what in order[again:] if what != "switch ptp"][:5] == [*reach, "arm release"]
+    assert not trial.ctx.contact.armed_while_moving
+    assert not [p for p in trial.ctx.contact.armed_with_profile[:1] if p != "dmp"]
+    assert all("compliant" not in p for p in trial.ctx.contact.armed_with_profile)
+
+
+def test_contact_is_not_armed_while_the_correction_fades():
+    trial = Trial(approach_profile="dmp_compliant")
+    trial.cell.fade_time = 1.5
+    trial.run(lambda t: (t.wait_hub("wait_without_object"), t.start(ACTIONS["contact"]),
+                         t.wait_hub("wait_with_object")))
+    assert trial.ctx.contact.armed_with_profile[0] == "dmp"
+
+
+@pytest.mark.parametrize("fault", ["refused", "never fades"])
+def test_a_profile_that_cannot_be_left_ends_the_reach(fault):
+    trial = Trial(approach_profile="dmp_compliant")
+    if fault == "refused":
+        trial.cell.faults.refuse["profile dmp"] = "there is no profile 'dmp'"
+    else:
+        trial.cell.fade_time = 1e9
+
+    def script(t):
+        t.wait_hub("wait_without_object")
+        t.start(ACTIONS["contact"])
+        t.clock.sleep(30.0)
+
+    trial.run(script)
+    assert "arm contact" not in trial.cell.called()
+    assert trial.result().outcome != "succeeded"
+    why = " ".join(t.reason for t in trial.ctx.journal.transitions)
+    assert ("no profile 'dmp'" if fault == "refused" else "ee_admittance is stopping") in why

@@ -1,0 +1,208 @@
+"""What happens while a hub waits: STOP and hold show and are reset by the operator; what is held survives a restart."""
+import json
+
+import pytest
+from coglab_smach.holding import HoldingMemory
+from coglab_smach.ports import Recognition
+from conftest import Trial
+
+
+def receive(t):
+    t.wait_hub("wait_without_object")
+    t.start("exchange_human_to_robot")
+    t.wait_hub("wait_with_object")
+
+
+@pytest.mark.parametrize("with_object", [False, True])
+def test_a_hold_in_a_hub_is_shown_and_needs_a_reset(with_object):
+    trial = Trial()
+
+    def script(t):
+        receive(t) if with_object else t.wait_hub("wait_without_object")
+        hub = t.ctx.requests.hub()
+        before = len(t.cell.called())
+        t.cell.held = True  # somebody sent 'hold' to the robot without asking this machine
+        t.wait_hub("stopped", limit=2.0)
+        assert t.ctx.journal.why() == ("the arm is blocked: hold is latched; reset first; ask for 'reset' when its "
+                                       "cause is away")
+        ok, message = t.ctx.requests.submit("take", "mug")
+        assert not ok and message == "'take' refused: stopped takes reset"
+        assert t.cell.called()[before:] == [], "something moved in a hub that is blocked"
+        t.start("reset", "")
+        t.wait_hub(hub)
+        if with_object:
+            assert "open" not in t.cell.called()[before:] and t.ctx.holding == "mug"
+
+    trial.run(script)
+    ended = [(r.from_state, r.outcome) for r in trial.ctx.journal.transitions if r.path == "/coglab_master"]
+    assert ("wait_with_object" if with_object else "wait_without_object", "stopped") in ended
+
+
+def test_command_mode_lost_in_a_hub_is_started_again_by_the_reset():
+    trial = Trial()
+
+    def script(t):
+        t.wait_hub("wait_without_object")
+        t.cell.enabled = False
+        t.wait_hub("stopped", limit=2.0)
+        assert "command mode was not asked for" in t.ctx.journal.why()
+        t.cell.calls.clear()
+        t.start("reset", "")
+        t.wait_hub("wait_without_object")
+        assert t.cell.called("lwr") == ["lwr reset", "lwr start"]
+
+    trial.run(script)
+
+
+def test_a_hiccup_does_not_leave_the_hub():
+    trial = Trial()
+
+    def script(t):
+        t.wait_hub("wait_without_object")
+        t.cell.held = True
+        t.clock.sleep(0.3)
+        t.cell.held = False
+        t.clock.sleep(1.0)
+        assert t.ctx.requests.hub() == "wait_without_object"
+
+    trial.run(script)
+
+
+def test_a_robot_node_that_dies_in_a_hub_ends_in_fault():
+    trial = Trial()
+
+    def script(t):
+        t.wait_hub("wait_without_object")
+        t.cell.faults.dead.add("arm")
+        t.wait_hub("fault", limit=5.0)
+        assert t.ctx.journal.why() == "wait_without_object: the robot is silent, because /lwr/state is silent"
+        t.cell.faults.dead.clear()
+        t.start("initialise")
+        t.wait_hub("wait_without_object")
+
+    trial.run(script)
+
+
+def test_a_hold_during_an_action_never_opens_the_hand():
+    trial = Trial()
+
+    def script(t):
+        receive(t)
+        t.cell.calls.clear()
+        t.start("exchange_robot_to_human")
+        t.clock.sleep(0.8)
+        t.cell.held = True
+        t.wait_hub("stopped", limit=10.0)
+        t.clock.sleep(3.0)
+        assert "open" not in t.cell.called() and t.ctx.holding == "mug"
+        t.start("reset", "")
+        t.wait_hub("wait_with_object")
+
+    trial.run(script)
+    assert trial.result().outcome == "stopped" and "hold is latched" in trial.result().reason + str(
+        trial.result().causes)
+
+
+class Restarted(Trial):
+    """A brain that starts while the hand holds an object, with what a former one noted on disk."""
+
+    def __init__(self, path, **overrides):
+        super().__init__(**overrides)
+        self.ctx.memory = HoldingMemory(str(path))
+        self.cell.hand_positions = (200, 150, 160, 155, 170)
+        self.cell.enabled = True
+
+
+@pytest.fixture
+def noted(tmp_path):
+    path = tmp_path / "home" / "holding.json"
+    HoldingMemory(str(path)).note("mug")
+    return path
+
+
+def test_a_restart_with_the_object_in_the_hand_goes_on_with_it(noted):
+    trial = Restarted(noted)
+
+    def script(t):
+        t.wait_hub("wait_with_object")
+        assert t.ctx.holding == "mug"
+        assert not t.cell.called("open") and not t.cell.called("calibrate"), "the hand was opened"
+        t.start("exchange_robot_to_human", "")
+        t.wait_hub("wait_without_object")
+
+    trial.run(script)
+    assert trial.result().outcome == "succeeded" and trial.result().object_id == "mug"
+    assert json.loads(noted.read_text()) == {"object_id": ""}
+
+
+def test_a_restart_that_remembers_nothing_asks_for_the_objects_name(tmp_path):
+    trial = Restarted(tmp_path / "none.json")
+
+    def script(t):
+        t.wait_hub("wait_with_object")
+        ok, message = t.ctx.requests.submit("put", "")
+        assert not ok and message == ("'put' refused: the hand holds an object that is not known after a restart; "
+                                      "name its object_id")
+        t.start("put", "elephant")
+        t.wait_hub("wait_with_object")
+        assert "'elephant' is not in the database" in [r for r in t.ctx.journal.transitions
+                                                       if r.outcome == "refused"][-1].reason
+        t.start("put", "mug")
+        t.wait_hub("wait_without_object")
+
+    trial.run(script)
+    assert trial.result().outcome == "succeeded" and trial.result().object_id == "mug"
+
+
+def test_a_note_about_an_object_that_is_gone_is_not_believed(noted):
+    trial = Restarted(noted)
+    trial.cell.hand_positions = (0, 0, 0, 0, 0)
+    trial.run(lambda t: t.wait_hub("wait_without_object"))
+    assert trial.ctx.holding == ""
+
+
+def test_a_broken_note_is_an_unknown_object(tmp_path):
+    path = tmp_path / "holding.json"
+    path.write_text("{")
+    warnings = []
+    assert HoldingMemory(str(path), warnings.append).recall() == ""
+    assert len(warnings) == 1 and "cannot be read" in warnings[0]
+
+
+def test_an_object_that_was_taken_away_ends_in_the_hub_without():
+    trial = Trial()
+
+    def script(t):
+        receive(t)
+        t.cell.hand_positions = (200, 254, 254, 254, 254)
+        t.cell.faults.empty_grasp = True
+        t.ctx.stop.press("the operator pressed STOP")
+        t.wait_hub("stopped")
+        t.start("reset", "")
+        t.wait_hub("wait_without_object")
+
+    trial.run(script)
+    assert any(r.reason == "'mug' is not in the hand any more" for r in trial.ctx.journal.transitions)
+
+
+def test_an_old_recognition_does_not_trigger_twice():
+    trial = Trial(**{"recognition_trigger.enabled": True, "monitor.enabled": False,
+                     "recognition_trigger.actions": {"offer": ["exchange_human_to_robot", "exchange_robot_to_human"]}})
+    seen = [Recognition()]
+    trial.ctx.perception.recognition = lambda: seen[0]
+
+    def script(t):
+        t.wait_hub("wait_without_object")
+        t.clock.sleep(0.5)
+        seen[0] = Recognition("offer", 0.95, True)
+        t.wait_hub("wait_with_object")
+        t.clock.sleep(3.0)
+        assert t.ctx.requests.hub() == "wait_with_object", "an old reach counted as a new one"
+        seen[0] = Recognition()
+        t.clock.sleep(0.5)
+        seen[0] = Recognition("offer", 0.95, True)
+        t.wait_hub("wait_without_object")
+
+    trial.run(script)
+    asked = [r.outcome for r in trial.ctx.journal.transitions if "recognition of 'offer'" in r.reason]
+    assert asked == ["exchange_human_to_robot", "exchange_robot_to_human"]
