@@ -11,12 +11,11 @@ import unittest
 
 import rospy
 import rostest
+from coglab_bringup.handover import READY_LIMIT, ask_for, run_handover
+from coglab_bringup.trial_recorder import TrialRecorder
 from coglab_msgs.srv import Start
 from std_srvs.srv import Trigger
 from visualization_msgs.msg import MarkerArray
-
-from coglab_bringup.handover import READY_LIMIT, ask_for, run_handover
-from coglab_bringup.trial_recorder import TrialRecorder
 
 ORDER = ("exchange_human_to_robot", "put", "take", "exchange_robot_to_human")
 
@@ -55,7 +54,8 @@ class Session(unittest.TestCase):
         start = rospy.ServiceProxy("/coglab/start", Start)
         end = time.monotonic() + 30.0
         answer = start("juggle", "")
-        while "takes initialise" not in answer.message and "takes reset" not in answer.message and time.monotonic() < end:
+        waits = ("takes initialise", "takes reset")
+        while not any(words in answer.message for words in waits) and time.monotonic() < end:
             time.sleep(0.2)
             answer = start("juggle", "")
         why = rospy.ServiceProxy("/coglab/why", Trigger)().message

@@ -69,7 +69,11 @@ def findings(top: Path) -> list[tuple[bool, str]]:
     foreign = [v for v in ("ROS_DISTRO", "ROS_ROOT", "CMAKE_PREFIX_PATH", "ROS_PACKAGE_PATH") if "/opt/ros" in os.environ.get(v, "")]
     if foreign:
         result.append((False, f"a ROS from /opt/ros is in {', '.join(foreign)}; open a shell without it before sourcing devel/setup.bash"))
-    for copy in smach_copies(top):
+    cache = top / "catkin_ws" / "build" / "CMakeCache.txt"
+    upstream = cache.is_file() and "=smach;smach_msgs;smach_ros" in cache.read_text()
+    if upstream:
+        result.append((True, "smach: upstream's, as built with --upstream-smach; ours again: ./coglab build"))
+    for copy in [] if upstream else smach_copies(top):
         result.append((False, f"a second copy of {copy.name} lies in {copy}; remove it, or build with ./coglab build --upstream-smach"))
     try:
         socket.getaddrinfo(socket.gethostname(), None)
