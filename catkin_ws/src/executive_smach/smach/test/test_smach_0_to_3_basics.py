@@ -241,6 +241,20 @@ def test_s3_update():
     assert a._data == {"x": 2, "y": 3}
 
 
+def test_s3_no_deletion_length_or_iteration():
+    ud = smach.UserData()
+    ud.x = 1
+    with pytest.raises(AttributeError):
+        del ud.x
+    with pytest.raises((AttributeError, TypeError)):
+        del ud["x"]
+    with pytest.raises(TypeError):
+        len(ud)
+    with pytest.raises(KeyError):
+        iter(ud).__next__()
+    assert ud._data == {"x": 1}
+
+
 def test_s3_extract_and_merge_with_remapping():
     ud = smach.UserData()
     ud.a, ud.b = [1], 2
@@ -260,7 +274,7 @@ def test_s3_pickles_and_copies():
     assert pickle.loads(pickle.dumps(ud)).a == 1 and copy.deepcopy(ud).a == 1
 
 
-def test_s3_locked_makes_transactions_better():
+def test_s3_s15_8_locked_makes_transactions_better():
     ud = smach.UserData()
     ud.n = 0
     view = smach.Remapper(ud, ["n"], ["n"], {})
@@ -372,7 +386,7 @@ def test_s3_const_reads_recursively():
     assert const.items["k"].z == 3
 
 
-def test_s3_const_refuses_assignment_and_del_better():
+def test_s3_s15_8_const_refuses_assignment_and_del_better():
     thing = Thing()
     const = view_of(thing)[0].v
     for target in (const, const.inner):

@@ -111,7 +111,7 @@ def test_s5_there_is_no_built_in_preempted_outcome():
     assert smach.StateMachine(["done"]).get_registered_outcomes() == ("done",)
 
 
-def test_s15_an_ignored_request_does_not_poison_the_next_run_better():
+def test_s15_2_an_ignored_request_does_not_poison_the_next_run_better():
     state = Ignores("done")
     sm = machine(state)
     state.machine = sm
@@ -121,7 +121,7 @@ def test_s15_an_ignored_request_does_not_poison_the_next_run_better():
     assert state.seen == [False, False] and not sm.preempt_requested()
 
 
-def test_s15_an_ignored_request_in_a_nested_machine_does_not_poison_better():
+def test_s15_2_an_ignored_request_in_a_nested_machine_does_not_poison_better():
     leaf = Ignores("done")
     inner = machine(leaf)
     outer = machine(inner)
@@ -132,7 +132,7 @@ def test_s15_an_ignored_request_in_a_nested_machine_does_not_poison_better():
     assert leaf.seen == [False] * 3
 
 
-def test_s15_a_request_after_a_run_is_for_the_next_run():
+def test_s15_1_a_request_after_a_run_is_for_the_next_run():
     state = Ignores("done")
     sm = machine(state)
     state.machine = sm
@@ -143,7 +143,7 @@ def test_s15_a_request_after_a_run_is_for_the_next_run():
     assert state.seen == [False, True]
 
 
-def test_s15_a_request_by_assignment_to_the_private_flag_counts():
+def test_s15_1_a_request_by_assignment_to_the_private_flag_counts():
     state = Serves()
     sm = machine(state)
     sm._preempt_requested = True
@@ -151,7 +151,7 @@ def test_s15_a_request_by_assignment_to_the_private_flag_counts():
     assert sm.execute() == "done"
 
 
-def test_s15_a_leaf_asked_directly_keeps_no_flag_after_its_run_better():
+def test_s15_2_a_leaf_asked_directly_keeps_no_flag_after_its_run_better():
     leaf = Says("done")
     sm = machine(leaf)
     leaf.request_preempt()
@@ -159,21 +159,21 @@ def test_s15_a_leaf_asked_directly_keeps_no_flag_after_its_run_better():
     assert leaf.seen == [True, False]
 
 
-def test_s15_a_request_between_two_states_reaches_the_second():
+def test_s15_1_a_request_between_two_states_reaches_the_second():
     first, second = Says("done"), Serves()
     sm = machine(first, second)
     sm.register_transition_cb(lambda ud, labels: sm.request_preempt())
     assert sm.execute() == "preempted" and second.seen == [True]
 
 
-def test_s15_a_request_in_the_start_callback_reaches_the_first_state():
+def test_s15_1_a_request_in_the_start_callback_reaches_the_first_state():
     first = Serves()
     sm = machine(first)
     sm.register_start_cb(lambda ud, labels: sm.request_preempt())
     assert sm.execute() == "preempted" and first.seen == [True]
 
 
-def test_s15_flags_are_down_after_an_error_and_the_next_run_is_normal():
+def test_s15_2_flags_are_down_after_an_error_and_the_next_run_is_normal():
     state = Calls(lambda ud: sm.request_preempt() or 1 / 0)
     sm = machine(state)
     try:
@@ -185,7 +185,7 @@ def test_s15_flags_are_down_after_an_error_and_the_next_run_is_normal():
     assert sm.execute() == "done" and seen == [False] and not sm.preempt_requested()
 
 
-def test_s15_recall_before_the_start():
+def test_s15_2_recall_before_the_start():
     state = Serves()
     sm = machine(state)
     sm.request_preempt(), sm.recall_preempt()

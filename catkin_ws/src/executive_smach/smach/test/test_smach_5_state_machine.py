@@ -131,7 +131,7 @@ def test_s5_shutdown_inside_nested_machines_is_no_error_better(log):
     assert outer.execute() is None and log.error == []
 
 
-def test_s5_is_running_only_inside():
+def test_s5_s15_7_is_running_only_inside():
     seen = []
     sm = machine(Calls(lambda ud: seen.append(sm.is_running())))
     sm.execute()

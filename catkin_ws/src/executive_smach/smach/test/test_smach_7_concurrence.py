@@ -42,7 +42,7 @@ def test_s7_bad_arguments(wrong):
         smach.Concurrence(**{"outcomes": ["done"], "default_outcome": "done", **wrong})
 
 
-def test_s7_no_child():
+def test_s7_s15_7_no_child():
     with pytest.raises(smach.InvalidStateError):
         smach.Concurrence(["done"], "done").execute()
 
@@ -219,7 +219,7 @@ def test_s7_default_outcome():
     assert both.execute() == "failed"
 
 
-def test_s7_a_child_that_raises_preempts_the_others_and_ends_the_container(capsys):
+def test_s7_s15_7_a_child_that_raises_preempts_the_others_and_ends_the_container(capsys):
     other = Serves(patience=20)
     both = concurrence(children={"A": Raises(ValueError("deep reason")), "B": other})
     with pytest.raises(smach.InvalidStateError, match="deep reason"):
@@ -316,7 +316,7 @@ def test_s7_a_request_before_or_during_the_start_reaches_every_child_better(mome
         assert time.monotonic() - begun < 15  # not by patience
 
 
-def test_s15_ignored_requests_do_not_poison_the_next_run_better():
+def test_s15_2_ignored_requests_do_not_poison_the_next_run_better():
     stubborn, polite = Ignores("done"), Serves()
     both = concurrence(children={"A": polite, "B": stubborn}, outcome_map=ALL_DONE)
     stubborn.machine = both
@@ -325,13 +325,13 @@ def test_s15_ignored_requests_do_not_poison_the_next_run_better():
     assert both.execute() == "done" and polite.seen[-1] is False and not both.preempt_requested()
 
 
-def test_s15_a_request_after_all_children_have_ended_is_carried_on():
+def test_s15_1_a_request_after_all_children_have_ended_is_carried_on():
     both = concurrence(children={"A": Says("done")}, outcome_map={"done": {"A": "done"}})
     both._outcome_cb = lambda outcomes: both.request_preempt()
     assert both.execute() == "done" and both.preempt_requested()
 
 
-def test_s15_a_request_when_the_last_child_has_just_ended_is_carried_on():
+def test_s15_1_a_request_when_the_last_child_has_just_ended_is_carried_on():
     after = Serves()
     both = concurrence(children={"A": Says("done")}, outcome_map={"done": {"A": "done"}})
     outer = machine(both, after, outcomes=["done", "failed", "preempted"])
@@ -340,7 +340,7 @@ def test_s15_a_request_when_the_last_child_has_just_ended_is_carried_on():
     assert after.seen == [True] and not both.preempt_requested()
 
 
-def test_s7_is_running_better():
+def test_s7_s15_7_is_running_better():
     seen = []
     both = concurrence(children={"A": Calls(lambda ud: seen.append(both.is_running()))})
     both.execute()

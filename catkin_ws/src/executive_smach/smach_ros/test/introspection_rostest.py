@@ -172,7 +172,7 @@ class TestSection11(unittest.TestCase):
             wait_for(lambda: [m.path for m in self.viewer.structures].count("/SM_ROOT") >= 2)
         )
 
-    def test_s11_user_data_and_s15_what_cannot_be_pickled(self):
+    def test_s11_user_data_and_s15_4_what_cannot_be_pickled(self):
         self.start()
         status = self.viewer.of("/SM_ROOT")[-1]
         raw = base64.b64decode(status.local_data, validate=True)
@@ -181,7 +181,7 @@ class TestSection11(unittest.TestCase):
         self.assertEqual(data["count"], 3)
         self.assertEqual(data["lock"], repr(self.root.userdata.lock))
 
-    def test_s11_a_status_at_each_transition_and_s15_at_start_and_end(self):
+    def test_s11_a_status_at_each_transition_and_s15_5_at_start_and_end(self):
         self.start()
         self.viewer.statuses.clear()
         self.gate.open.set()
@@ -196,7 +196,7 @@ class TestSection11(unittest.TestCase):
             self.assertEqual(seen[-1].active_states, idle, f"{path} looks idle at once")
         self.assertEqual(statuses[0].initial_states, ["INNER"])
 
-    def test_s15_a_container_that_ends_with_an_error_looks_idle(self):
+    def test_s15_7_a_container_that_ends_with_an_error_looks_idle(self):
         def broken(ud):
             raise ValueError("broken")
 
@@ -217,7 +217,7 @@ class TestSection11(unittest.TestCase):
         self.server.construct(self.name, self.root, "/")
         self.assertEqual([w.path for w in self.server._watched], ["/", "/INNER", "/BOTH", "/EACH"])
 
-    def test_s15_one_thread_per_server_and_nothing_left_by_stop(self):
+    def test_s15_6_one_thread_per_server_and_nothing_left_by_stop(self):
         self.viewer.close()
         time.sleep(0.2)
         before = set(threading.enumerate())
@@ -324,7 +324,7 @@ class TestSection11(unittest.TestCase):
         server.start()
         server.stop()
 
-    def test_s15_bursts_lose_nothing(self):
+    def test_s15_6_bursts_lose_nothing(self):
         machine = smach.StateMachine(["end"])
         with machine:
             for i in range(400):

@@ -60,26 +60,26 @@ class TestShutdown(unittest.TestCase):
         process.send_signal(signal.SIGINT)
         self.assertIn("OUTCOME end", process.communicate(timeout=LIMIT)[0])
 
-    def test_s15_action_without_server(self):
+    def test_s15_3_action_without_server(self):
         self.check("action_without_server")
 
-    def test_s15_action_under_way(self):
+    def test_s15_3_action_under_way(self):
         self.check("action_under_way")
         self.assertEqual(self.server.goals, [3])
 
-    def test_s15_monitor(self):
+    def test_s15_3_monitor(self):
         self.check("monitor")
 
-    def test_s15_condition(self):
+    def test_s15_3_condition(self):
         self.check("condition")
 
-    def test_s15_service_that_is_not_there(self):
+    def test_s15_3_service_that_is_not_there(self):
         self.check("service")
 
-    def test_s15_service_that_hangs(self):
+    def test_s15_3_service_that_hangs(self):
         self.check("service_that_hangs")
 
-    def test_s15_concurrence(self):
+    def test_s15_3_concurrence(self):
         self.check("concurrence")
 
     def test_s9_set_preempt_handler(self):

@@ -168,6 +168,16 @@ class TestSection9Action(unittest.TestCase):
         self.assertEqual(run.result, "preempted")
         self.assertFalse(state.preempt_requested())
 
+    def test_s9_s15_1_preempted_right_after_the_goal_was_sent(self):
+        for delay in [0.0, 0.0005, 0.002, 0.005, 0.01] * 8:
+            state = action_state(UNTIL_CANCELLED)
+            run = in_thread(state.execute, self.ud)
+            self.assertTrue(wait_for(lambda s=state: s.status == s.ACTIVE))
+            time.sleep(delay)
+            state.request_preempt()
+            run.join(LIMIT)
+            self.assertEqual(run.result, "preempted", f"{delay} s after the goal")
+
     def test_s9_preempted_before_the_start_sends_nothing(self):
         state = action_state(SUCCEED)
         state.request_preempt()
@@ -175,7 +185,7 @@ class TestSection9Action(unittest.TestCase):
         self.assertEqual(self.server.goals, [])
         self.assertEqual(state.execute(self.ud), "succeeded")
 
-    def test_s15_cancelled_but_succeeded_does_not_poison_the_next_run_better(self):
+    def test_s15_2_cancelled_but_succeeded_does_not_poison_the_next_run_better(self):
         state = action_state(SUCCEED_WHEN_CANCELLED)
         run = in_thread(state.execute, self.ud)
         self.assertTrue(wait_for(lambda: self.server.goals))
@@ -185,7 +195,7 @@ class TestSection9Action(unittest.TestCase):
         state._goal = TestGoal(goal=SUCCEED)
         self.assertEqual(state.execute(self.ud), "succeeded")
 
-    def test_s15_cancelled_but_succeeded_the_machine_carries_the_request_on(self):
+    def test_s15_2_cancelled_but_succeeded_the_machine_carries_the_request_on(self):
         machine = smach.StateMachine(["done", "preempted", "aborted"])
         with machine:
             smach.StateMachine.add(
@@ -206,7 +216,7 @@ class TestSection9Action(unittest.TestCase):
         self.assertEqual(self.server.cancelled, before + 1)
         self.assertFalse(state.preempt_requested())
 
-    def test_s9_preempt_timeout_gives_up_better(self):
+    def test_s9_s15_3_preempt_timeout_gives_up_better(self):
         for how in ("exec_timeout", "request"):
             state = action_state(
                 DEAF, preempt_timeout=0.3, exec_timeout=0.2 if how == "exec_timeout" else None
@@ -234,7 +244,7 @@ class TestSection9Action(unittest.TestCase):
         run.join(LIMIT)
         self.assertEqual(run.result, "preempted")
 
-    def test_s15_the_server_dies_better(self):
+    def test_s15_3_the_server_dies_better(self):
         process = subprocess.Popen(
             [sys.executable, os.path.join(HERE, "reference_server.py"), "mortal"]
         )
@@ -388,7 +398,7 @@ class TestSection9Topic(unittest.TestCase):
         self.assertEqual(state.execute(self.ud), "invalid")
         self.assertEqual(self.ud.n, 3)
 
-    def test_s15_a_monitor_without_messages_is_woken_by_a_request(self):
+    def test_s15_1_a_monitor_without_messages_is_woken_by_a_request(self):
         state = smach_ros.MonitorState("silence", Empty, lambda ud, msg: True)
         run = in_thread(state.execute, self.ud)
         time.sleep(0.1)

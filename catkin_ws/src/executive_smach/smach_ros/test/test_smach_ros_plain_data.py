@@ -56,7 +56,7 @@ def test_s11_plain_data_goes_there_and_back():
     assert decode(encode({"b": b"\x00\xff", "l": [b""]})) == {"b": b"\x00\xff", "l": [b""]}
 
 
-def test_s11_the_text_is_base64_of_a_protocol_2_pickle_of_a_dict():
+def test_s11_s15_5_the_text_is_base64_of_a_protocol_2_pickle_of_a_dict():
     text = encode(PLAIN)
     raw = base64.b64decode(text, validate=True)
     assert raw[:2] == b"\x80\x02" and "\n" not in text
@@ -76,7 +76,7 @@ class Colour(enum.IntEnum):
     RED = 1
 
 
-def test_s15_what_is_not_plain_shows_as_its_repr_better():
+def test_s15_4_what_is_not_plain_shows_as_its_repr_better():
     lock = threading.Lock()
     shown = decode(
         encode({"lock": lock, "f": len, "odd": Odd(), "set": {1}, "inside": [lock, {"x": lock}]})
@@ -85,7 +85,7 @@ def test_s15_what_is_not_plain_shows_as_its_repr_better():
     assert shown["f"] == repr(len) and shown["set"] == "{1}" and "Odd" in shown["odd"]
 
 
-def test_s15_subclasses_of_plain_types_become_plain():
+def test_s15_4_subclasses_of_plain_types_become_plain():
     point = collections.namedtuple("Point", "x y")(1, 2)
     shown = decode(
         encode(
@@ -101,19 +101,19 @@ def test_s15_subclasses_of_plain_types_become_plain():
     assert type(shown["p"]) is tuple and type(shown["c"]) is int
 
 
-def test_s15_numpy():
+def test_s15_4_numpy():
     numpy = pytest.importorskip("numpy")
     shown = decode(encode({"i": numpy.int32(3), "f": numpy.float32(0.5), "a": numpy.zeros(3)}))
     assert shown["i"] == 3 and shown["f"] == 0.5 and isinstance(shown["a"], str)
 
 
-def test_s15_a_read_only_view_shows_what_is_behind():
+def test_s15_4_a_read_only_view_shows_what_is_behind():
     ud = smach.UserData()
     ud.f = Odd()
     assert "Odd" in to_plain(smach.Remapper(ud, ["f"]).f)
 
 
-def test_s15_cycles_depth_and_size_end():
+def test_s15_4_cycles_depth_and_size_end():
     loop = []
     loop.append(loop)
     deep = []
@@ -139,7 +139,7 @@ def test_s15_cycles_depth_and_size_end():
     )
 
 
-def test_s15_keys_that_are_no_strings():
+def test_s15_4_keys_that_are_no_strings():
     assert decode(encode({3: 1, None: 2})) == {"3": 1, "None": 2}
     assert decode(encode({"d": {(1, 2): 3, Odd: 4}}))["d"][(1, 2)] == 3
 

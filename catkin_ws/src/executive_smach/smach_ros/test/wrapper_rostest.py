@@ -90,7 +90,7 @@ class TestSection9Wrapper(unittest.TestCase):
             self.send(client, SUCCEED)[0], GoalStatus.SUCCEEDED, "works after an error"
         )
 
-    def test_s9_wrapper_cancel_and_s15_nothing_left_over(self):
+    def test_s9_wrapper_cancel_and_s15_2_nothing_left_over(self):
         state = Work()
         client = self.serve(self.machine(state))
         for _ in range(5):

@@ -34,16 +34,19 @@ class Event(Protocol):
     """
 
     def set(self) -> None:
-        """Wake all who wait."""
+        """Wake all who wait. Example: `done.set()`."""
 
     def clear(self) -> None:
-        """From now on let others wait."""
+        """From now on let others wait. Example: `done.clear()`."""
 
     def is_set(self) -> bool:
-        """Whether the event has happened."""
+        """Whether the event has happened. Example: `if done.is_set(): ...`."""
 
     def wait(self, timeout: float | None = None) -> bool:
-        """Wait until the event is set or `timeout` seconds have passed; whether it is set."""
+        """Wait until the event is set or `timeout` seconds have passed; whether it is set.
+
+        Example: `if not done.wait(5.0): return "aborted"`.
+        """
 
 
 class Clock(ABC):

@@ -2,9 +2,10 @@
 
 Topics of a server, in the namespace of its node unless its name begins with '/':
 
-* `<server>/smach/container_structure`: the graph of every container, again every 2 s; *
-`<server>/smach/container_status`: what every container does, at start, at each transition, at the
-end, and every 2 s; * `<server>/smach/container_init`: takes commands that set initial states.
+* `<server>/smach/container_structure`: the graph of every container, again every 2 s;
+* `<server>/smach/container_status`: what every container does, at start, at each transition, at
+  the end, and every 2 s;
+* `<server>/smach/container_init`: takes commands that set initial states.
 
 The path of a container is that of its parent, a slash and its label; that of the outermost is by
 convention /SM_ROOT.

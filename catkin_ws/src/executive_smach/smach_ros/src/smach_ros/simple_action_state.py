@@ -56,6 +56,10 @@ class SimpleActionState(smach.State):
     #: How long (s) the connection to the server may be down while a goal is under way.
     LOST_AFTER = 1.0
 
+    #: How long (s) a cancel waits for the goal's acknowledgement. A client that cancels earlier
+    #: takes a status sent meanwhile, in which the goal is not listed yet, as its loss.
+    ACKNOWLEDGED_WITHIN = 1.0
+
     def __init__(
         self,
         action_name: str,
@@ -220,6 +224,7 @@ class SimpleActionState(smach.State):
         """Whether the goal has come to an end that its server has told us."""
         name = f"action '{self._action_name}'"
         exec_limit, cancel_limit = TimeLimit(self._exec_timeout), None
+        sent_at = time.monotonic()
         lost_at: float | None = None
         while handle.get_comm_state() != CommState.DONE:
             if rospy.is_shutdown():
@@ -242,8 +247,12 @@ class SimpleActionState(smach.State):
                         "given up"
                     )
                     return False
+            unacknowledged = (
+                handle.get_comm_state() == CommState.WAITING_FOR_GOAL_ACK
+                and time.monotonic() - sent_at < self.ACKNOWLEDGED_WITHIN
+            )
             if cancel_limit is None:
-                if self.preempt_requested() or exec_limit.expired():
+                if not unacknowledged and (self.preempt_requested() or exec_limit.expired()):
                     if not self.preempt_requested():
                         smach.logwarn(
                             f"{name}: not finished within {exec_limit.limit:g} s; goal cancelled"
