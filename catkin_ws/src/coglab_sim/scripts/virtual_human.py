@@ -4,8 +4,8 @@
 Subscribes truth/cell (what a person sees and feels), human_command (std_msgs/String: give <id>, receive <id>, rest) and
 coglab/transitions of the namespace above this one (reacts by itself unless ~react is false). Publishes human_hand
 (coglab_msgs/HumanHand, 100 Hz) and human_state (std_msgs/String). Names are relative to the node's namespace.
-Parameters (private): transitions (topic, where it is another one), seed, behaviour, participant (mapping, overrides), holds_object, react, rest, handover_object,
-object_in_hand (three numbers each, m), object_mass.
+Parameters (private): transitions (topic, where it is another one), seed, behaviour, participant (mapping, overrides),
+holds_object, react, rest, handover_object, object_in_hand (three numbers each, m), object_mass.
 """
 import sys
 import threading

@@ -127,7 +127,7 @@ def misbehaviour_rows():
 def main() -> int:
     """Print the rows."""
     smach.set_loggers(*[lambda *a: None] * 4)
-    rows, virtual, started = [], 0.0, time.process_time()
+    rows, started = [], time.process_time()
     exchanges = Campaign().run(EXCHANGES, range(1000, 1000 + TRIALS))
     board = Campaign().run(BOARD_ACTIONS, range(1000, 1000 + TRIALS), object_on="world")
     speed = (exchanges.virtual + board.virtual) / (time.process_time() - started)

@@ -1,8 +1,8 @@
 #!/usr/bin/python3
 """The node /contact_detector: external joint torques -> coglab/contact, armed by ~arm (coglab_msgs/ArmContact).
 
-Subscribes lwr/external_torques (effort, Nm) and lwr/joint_states; names are relative. Parameters (private): the fields of
-coglab_smach.contact_detector.DetectorSettings; robot_description is read for the Jacobian.
+Subscribes lwr/external_torques (effort, Nm) and lwr/joint_states; names are relative. Parameters (private): the fields
+of coglab_smach.contact_detector.DetectorSettings; robot_description is read for the Jacobian.
 Publishes ~margin (std_msgs/Float64) at 20 Hz while watching.
 """
 import dataclasses
@@ -38,7 +38,8 @@ class ContactDetectorNode:
         self.publisher = rospy.Publisher("coglab/contact", Contact, queue_size=10)
         self.margin = rospy.Publisher("~margin", Float64, queue_size=1)
         rospy.Subscriber("lwr/joint_states", JointState, self.on_joints, queue_size=1, tcp_nodelay=True)
-        self.torques = rospy.Subscriber("lwr/external_torques", JointState, self.on_torques, queue_size=20, tcp_nodelay=True)
+        self.torques = rospy.Subscriber("lwr/external_torques", JointState, self.on_torques, queue_size=20,
+                                        tcp_nodelay=True)
         rospy.Service("~arm", ArmContact, self.on_arm)
         rospy.Timer(rospy.Duration(0.05), self.on_timer)
 

@@ -5,9 +5,9 @@ Names are relative to the node's namespace.
 Services: coglab/start (coglab_msgs/Start), coglab/stop, coglab/why (std_srvs/Trigger).
 Topics: coglab/transitions (coglab_msgs/Transition), coglab/results (std_msgs/String, one JSON object per action,
 latched), coglab/holding (std_msgs/String, what the hand holds, latched).
-Parameters: perception/frames (names of human_hand and board). Private: config_file, dmp_library (path of the primitives), auto_trigger, result_file (JSON lines),
-state_file (what the hand holds, to survive a restart; default coglab_holding.json in ROS_HOME), config_overrides
-(mapping of dotted names), introspection (default true).
+Parameters: perception/frames (names of human_hand and board). Private: config_file, dmp_library (path of the
+primitives), auto_trigger, result_file (JSON lines), state_file (what the hand holds, to survive a restart; default
+coglab_holding.json in ROS_HOME), config_overrides (mapping of dotted names), introspection (default true).
 """
 import json
 import os
@@ -25,8 +25,9 @@ from coglab_smach.context import Context
 from coglab_smach.holding import HoldingMemory
 from coglab_smach.journal import ActionRecord, Journal, TransitionRecord
 from coglab_smach.machines import build_master
+from coglab_smach.ros_arm import RosArm
 from coglab_smach.ros_hand import RosHand
-from coglab_smach.ros_ports import RosArm, RosContact, RosDatabase, RosPerception
+from coglab_smach.ros_ports import RosContact, RosDatabase, RosPerception
 from coglab_smach.ros_publish import publish
 from std_msgs.msg import String
 from std_srvs.srv import Trigger, TriggerResponse

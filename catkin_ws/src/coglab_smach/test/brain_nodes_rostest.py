@@ -1,7 +1,11 @@
 #!/usr/bin/python3
 """Services and topics of the brain's nodes, over ROS: database, contact detector fed with synthetic torques, master."""
 import base64
+import json
+import os
 import pickle
+import signal
+import subprocess
 import sys
 import threading
 import time
@@ -17,6 +21,7 @@ from coglab_smach.reachability import default_arm, home_posture, position_jacobi
 from coglab_smach.torque_signal import TorqueSignal
 from sensor_msgs.msg import JointState
 from smach_msgs.msg import SmachContainerStatus, SmachContainerStructure
+from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
 LIMIT = 30.0
@@ -48,7 +53,8 @@ class Torques(threading.Thread):
             stamp = rospy.Time.now()
             state = JointState(name=list(arm.joint_names), position=list(home), velocity=[0.0] * 7)
             state.header.stamp = stamp
-            torque = JointState(name=list(arm.joint_names), effort=list(signal.sample(0.005, jacobian, applied, np.zeros(7))))
+            tau = signal.sample(0.005, jacobian, applied, np.zeros(7))
+            torque = JointState(name=list(arm.joint_names), effort=list(tau))
             torque.header.stamp = stamp
             self.joints.publish(state)
             self.torques.publish(torque)
@@ -128,7 +134,39 @@ class BrainNodes(unittest.TestCase):
         self.assertIn("fault takes initialise", answer.message)
         why = service("/coglab/why", Trigger)().message
         self.assertIn("is its node running?", why)
+        # The same sentence on the topics and in the result file.
+        with open(rospy.get_param("/coglab/result_file"), encoding="utf-8") as stream:
+            written = json.loads(stream.readlines()[-1])
+        self.assertEqual(written["kind"], "coglab_init_system")
+        self.assertIn("is its node running?", written["reason"])
+        shown = json.loads(rospy.wait_for_message("/coglab/results", String, LIMIT).data)
+        self.assertEqual(shown["reason"], written["reason"])
+        self.assertTrue(why.startswith(written["reason"]))
         self.assertTrue(start("initialise", "").success)
+        end = time.monotonic() + LIMIT
+        while not any("is its node running?" in t.reason for t in transitions) and time.monotonic() < end:
+            time.sleep(0.1)
+        self.assertTrue(any("is its node running?" in t.reason for t in transitions))
+
+    def test_6_a_second_one_in_its_own_namespace_ends_without_a_traceback(self):
+        config = rospy.get_param("/coglab/config_file")
+        node = subprocess.Popen(["rosrun", "coglab_smach", "master_node.py", "__ns:=two", "__name:=coglab",
+                                 f"_config_file:={config}", "_dmp_library:=none.xml"],
+                                stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, start_new_session=True)
+        try:
+            start = service("/two/coglab/start", Start)
+            self.assertFalse(start("take", "mug").success)
+            time.sleep(1.0)
+        finally:
+            os.killpg(node.pid, signal.SIGINT)
+            try:
+                words, _ = node.communicate(timeout=LIMIT)
+            except subprocess.TimeoutExpired:
+                os.killpg(node.pid, signal.SIGKILL)
+                words, _ = node.communicate()
+                self.fail(f"it does not end: {words[-2000:]}")
+        self.assertNotIn("Traceback", words)
+        self.assertNotIn("closed topic", words)
 
 
 if __name__ == "__main__":

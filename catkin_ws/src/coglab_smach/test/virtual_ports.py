@@ -3,7 +3,6 @@ import dataclasses
 from pathlib import Path
 
 import ih2_hand.progress as progress
-
 import smach
 from coglab_smach.config import Config
 from coglab_smach.context import Context
@@ -268,11 +267,12 @@ class VirtualTrial:
             self.reaches.append(self._reach)
             self._reach = None
 
-    def run(self, *actions, limit=60.0):
-        """Execute; returns the results of the actions as the journal holds them."""
+    def run(self, *actions, limit=60.0, script=None):
+        """Execute ``actions``, or ``script(trial)``; returns the results of the actions as the journal holds them."""
         with smach.clock.using(self.clock):
             self.clock.start_thread(self._world, "world")
-            self.clock.start_thread(lambda: self._script(actions, limit), "script")
+            walk = script or (lambda trial: trial.ask_for(actions, limit))
+            self.clock.start_thread(lambda: self._script(walk), "script")
             self.master.execute()
             self.over = True
         if self.failure is not None:
@@ -295,37 +295,48 @@ class VirtualTrial:
             self.failure = error
             self.master.request_preempt()
 
-    def _script(self, actions, limit):
+    def _script(self, walk):
         try:
-            for action in actions:
-                end = self.clock.now() + limit
-                while self.ctx.requests.hub() == "" and self.clock.now() < end:
-                    self.clock.sleep(0.1)
-                if not self.ctx.requests.submit(action, "mug")[0]:
-                    return  # the action before it failed, so that this hub does not take it
-                before = len(self.ctx.journal.results)
-                while len(self.ctx.journal.results) == before:
-                    if self.clock.now() > end:
-                        raise AssertionError(f"'{action}' is stuck: " + self.ctx.journal.transitions[-1].sentence())
-                    self.clock.sleep(0.05)
-                # The person's hand comes back before the next action.
-                while self.rig.human.phase != "idle" and self.clock.now() < end:
-                    self.clock.sleep(0.1)
-                end = self.clock.now() + 10.0
-                while self.ctx.requests.hub() == "" and self.clock.now() < end:
-                    self.clock.sleep(0.05)
+            walk(self)
         except Exception as error:
             self.failure = error
         finally:
             self.last_hub = self.ctx.requests.hub()
             self.master.request_preempt()
 
+    def wait_hub(self, label, limit=60.0):
+        """Wait until this hub is open."""
+        end = self.clock.now() + limit
+        while self.ctx.requests.hub() != label:
+            assert self.clock.now() < end, f"{label} not reached: {self.ctx.journal.transitions[-1].sentence()}"
+            self.clock.sleep(0.05)
+
+    def ask_for(self, actions, limit):
+        """The actions one after the other, each in its hub, until one fails."""
+        for action in actions:
+            end = self.clock.now() + limit
+            while self.ctx.requests.hub() == "" and self.clock.now() < end:
+                self.clock.sleep(0.1)
+            if not self.ctx.requests.submit(action, "mug")[0]:
+                return  # the action before it failed, so that this hub does not take it
+            before = len(self.ctx.journal.results)
+            while len(self.ctx.journal.results) == before:
+                if self.clock.now() > end:
+                    raise AssertionError(f"'{action}' is stuck: " + self.ctx.journal.transitions[-1].sentence())
+                self.clock.sleep(0.05)
+            # The person's hand comes back before the next action.
+            while self.rig.human.phase != "idle" and self.clock.now() < end:
+                self.clock.sleep(0.1)
+            end = self.clock.now() + 10.0
+            while self.ctx.requests.hub() == "" and self.clock.now() < end:
+                self.clock.sleep(0.05)
+
 
 class ReachRecord:
     """What one DMP motion did: (time, measured palm, goal in use) per cycle, and the errors once the arm stands still.
 
-    ``to_goal``: (m, rad) from the measured palm to the goal as received, that is as the motion has estimated and latched
-    it; ``to_sight``: to the newest single sight; ``to_truth``: to where the grasp pose really is.
+    ``to_goal``: (m, rad) from the measured palm to the goal as received, that is as the motion has estimated and
+    latched it; ``to_sight``: to the newest single sight; ``to_truth``: to where the grasp pose really is.
     """
 
     def __init__(self, rig, request):

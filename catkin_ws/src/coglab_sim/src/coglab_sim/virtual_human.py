@@ -78,8 +78,8 @@ class VirtualHuman(Giving, Receiving):
         if self._pending is not None:
             self._take_up(t)
         getattr(self, f"_{self.phase}")(t, dt, view)
-        return HandSample(Frame(self._hand + involuntary(self.participant, self._noise_phase, t), np.array(IDENTITY)), self._velocity.copy(), self._grip,
-                          self.participant.grip_force, self.phase)
+        shown = Frame(self._hand + involuntary(self.participant, self._noise_phase, t), np.array(IDENTITY))
+        return HandSample(shown, self._velocity.copy(), self._grip, self.participant.grip_force, self.phase)
 
     # -- what to do ---------------------------------------------------------------------------------------------
 

@@ -1,6 +1,7 @@
 """What the machines need from the rest of the system, as interfaces without ROS.
 
-Adapters: ``ros_ports`` (services, actions and topics) and ``simulated_ports`` (virtual time, for tests and benches).
+Adapters: ``ros_arm``, ``ros_hand`` and ``ros_ports`` (services, actions and topics) and ``simulated_ports`` (virtual
+time, for tests and benches).
 Methods that return a Pending may take time; the states wait on it within their limits. All others return at once.
 Units are SI; joints in wire order lwr_a1 lwr_a2 lwr_e1 lwr_a3 lwr_a4 lwr_a5 lwr_a6; quaternions x y z w.
 """

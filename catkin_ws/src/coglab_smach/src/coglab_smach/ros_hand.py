@@ -22,7 +22,7 @@ from std_msgs.msg import String
 
 from .pending import Pending, Polled, PortError
 from .ports import HandState
-from .ros_ports import Newest
+from .ros_calls import Newest
 
 SERVER_WAIT = 10.0
 """s to wait for an action server to appear."""

@@ -1,0 +1,61 @@
+"""Recognition of the partner's reach in whole trials: monitor_dmp substitutes the primitive, and a hub is left by it."""
+from pathlib import Path
+
+import numpy as np
+import pytest
+import smach
+
+try:
+    from virtual_ports import VirtualTrial
+except ImportError as error:
+    pytest.skip(f"a compiled module is not there: {error}", allow_module_level=True)
+from coglab_perception.recogniser import Recogniser, load_patterns
+
+PATTERNS = str(Path(__file__).resolve().parents[2] / "coglab_perception" / "config" / "patterns.json")
+GIVE = "exchange_human_to_robot"
+
+
+@pytest.fixture(autouse=True)
+def quiet():
+    """The engine's log helps nobody here."""
+    smach.set_loggers(*[lambda *a: None] * 4)
+
+
+def trial_of(**kw):
+    return VirtualTrial(seed=5, recogniser=Recogniser(*load_patterns(PATTERNS)), **kw)
+
+
+def test_an_object_held_high_gets_the_primitive_for_it():
+    trial = trial_of()
+    trial.rig.scene.handover_object = np.array([0.78, 0.03, 0.60])
+    trial.rig.scene.region_high = np.array([0.81, 0.16, 0.66])
+    results = trial.run(GIVE)
+    switched = [t.reason for t in trial.ctx.journal.transitions if t.outcome == "switched"]
+    assert len(switched) == 1 and "pattern 'high' recognised" in switched[0]
+    assert "primitive 'reach_human' replaced by 'reach_human_high'" in switched[0]
+    assert trial.rig.robot.progress["primitive"] == "reach_human_high"
+    assert results[0].outcome == "succeeded", results[0].reason
+    assert trial.rig.robot.limit_violations == 0 and trial.rig.watched_while_moving == 0
+
+
+def test_a_common_reach_keeps_the_primitive():
+    trial = trial_of()
+    results = trial.run(GIVE)
+    assert results[0].outcome == "succeeded", results[0].reason
+    assert not [t for t in trial.ctx.journal.transitions if t.outcome == "switched"]
+
+
+def test_a_person_who_reaches_out_starts_the_exchange():
+    trial = trial_of(**{"recognition_trigger.enabled": True})
+
+    def script(t):
+        t.wait_hub("wait_without_object")
+        t.clock.sleep(1.0)
+        t.rig.human.command("give")
+        t.wait_hub("wait_with_object")
+        t.clock.sleep(4.0)
+        assert t.ctx.requests.hub() == "wait_with_object", "the hand that went back counted as a reach"
+
+    trial.run(script=script)
+    asked = [t for t in trial.ctx.journal.transitions if t.from_state == "wait_without_object"]
+    assert asked[0].outcome == GIVE and "recognition of 'centre'" in asked[0].reason
