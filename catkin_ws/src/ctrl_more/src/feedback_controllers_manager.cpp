@@ -1,23 +1,13 @@
 #include "ctrl_more/feedback_controllers_manager.hpp"
 
-#include <time.h>
-
 #include <chrono>
 #include <thread>
+#include <utility>
 
 #include "manager_members.hpp"
+#include "steady_now.hpp"
 
 namespace ctrl_more {
-namespace {
-
-// clock_gettime needs no system call on Linux: the kernel maps the clock into the process.
-std::int64_t steadyNow() {
-  timespec now;
-  clock_gettime(CLOCK_MONOTONIC, &now);
-  return static_cast<std::int64_t>(now.tv_sec) * 1000000000 + now.tv_nsec;
-}
-
-}  // namespace
 
 FeedbackControllersManager::FeedbackControllersManager(RobotStates& robot, ControlStates& control,
                                                        const ManagerOptions& options,
@@ -28,10 +18,11 @@ FeedbackControllersManager::FeedbackControllersManager(RobotStates& robot, Contr
       logger_(logger ? logger : &Logger::standard()),
       log_(logger_, "FeedbackControllersManager", &cycle_number_),
       original_(0, control.controlPeriod(), logger_),
-      compared_(0, control.controlPeriod(), logger_) {}
+      found_(0, control.controlPeriod(), logger_) {}
 
 FeedbackControllersManager::~FeedbackControllersManager() {
   offered_.store(nullptr);
+  prepared_.store(nullptr);
   for (auto& member : members_) member->slot->setOwner(nullptr);
 }
 
@@ -43,7 +34,7 @@ FeedbackControllersManager::Draft FeedbackControllersManager::draftOf() const {
 }
 
 // Makes the draft the truth, and offers it to the cycle as a plan.
-Status FeedbackControllersManager::publish(const Draft& draft) {
+Status FeedbackControllersManager::publish(const Draft& draft, bool prepared) {
   auto plan = std::make_unique<Plan>();
   plan->generation = ++generation_;
   for (std::size_t i = 0; i < members_.size(); ++i) members_[i]->state = draft.states[i];
@@ -57,17 +48,21 @@ Status FeedbackControllersManager::publish(const Draft& draft) {
   }
   const Plan* offer = plan.get();
   plans_.push_back(std::move(plan));
-  const Plan* untaken = offered_.exchange(offer, std::memory_order_acq_rel);
-  if (untaken) {
-    // The cycle never saw it, and never will.
-    for (auto it = plans_.begin(); it != plans_.end(); ++it) {
-      if (it->get() != untaken) continue;
-      plans_.erase(it);
-      break;
-    }
-  }
+  // A plan is the whole truth, what was prepared before included.
+  forget(prepared_.exchange(prepared ? offer : nullptr, std::memory_order_acq_rel));
+  if (!prepared) forget(offered_.exchange(offer, std::memory_order_acq_rel));
   collect();
   return Status::published(generation_);
+}
+
+// Frees a plan that the cycle never saw, and never will.
+void FeedbackControllersManager::forget(const Plan* untaken) {
+  if (!untaken) return;
+  for (auto it = plans_.begin(); it != plans_.end(); ++it) {
+    if (it->get() != untaken) continue;
+    plans_.erase(it);
+    break;
+  }
 }
 
 // Frees the plans that the cycle has left behind.
@@ -94,8 +89,12 @@ Status FeedbackControllersManager::withdraw(std::uint64_t generation) {
                            " cannot be withdrawn: the newest one is " +
                            std::to_string(generation_));
   }
-  const Plan* offer = plans_.empty() ? nullptr : plans_.back().get();
-  if (!offer || !offered_.compare_exchange_strong(offer, nullptr, std::memory_order_acq_rel)) {
+  const Plan* const newest = plans_.empty() ? nullptr : plans_.back().get();
+  const auto takeBack = [newest](std::atomic<const Plan*>& place) {
+    const Plan* offer = newest;
+    return place.compare_exchange_strong(offer, nullptr, std::memory_order_acq_rel);
+  };
+  if (!newest || (!takeBack(offered_) && !takeBack(prepared_))) {
     return Status::failure("plan " + std::to_string(generation) + " is adopted already");
   }
   plans_.pop_back();
@@ -108,7 +107,7 @@ void FeedbackControllersManager::freeze() {
   robot_.freeze();
   control_.freeze();
   original_ = control_;
-  if (options_.check_undeclared) compared_ = control_;
+  found_ = control_;
 }
 
 void FeedbackControllersManager::beginCycle(const Cycle& cycle) noexcept {
@@ -116,7 +115,21 @@ void FeedbackControllersManager::beginCycle(const Cycle& cycle) noexcept {
   cycle_number_.store(cycle.number, std::memory_order_relaxed);
   if (original_.dataSize() != control_.dataSize() || !control_.frozen()) freeze();
   if (offered_.load(std::memory_order_relaxed) == nullptr) return;
-  const Plan* plan = offered_.exchange(nullptr, std::memory_order_acq_rel);
+  adopt(offered_.exchange(nullptr, std::memory_order_acq_rel));
+}
+
+void FeedbackControllersManager::adoptPrepared() noexcept {
+  if (prepared_.load(std::memory_order_relaxed) == nullptr) return;
+  const Plan* first = prepared_.exchange(nullptr, std::memory_order_acq_rel);
+  if (!first) return;
+  // An older one may have been offered since beginCycle(): it must not come afterwards.
+  const Plan* second = offered_.exchange(nullptr, std::memory_order_acq_rel);
+  if (second && second->generation < first->generation) std::swap(first, second);
+  adopt(first);
+  adopt(second);
+}
+
+void FeedbackControllersManager::adopt(const Plan* plan) noexcept {
   if (!plan) return;
   plan_ = plan;
   for (const PlanEntry& entry : plan->entries) entry.slot->adopt(entry);
@@ -132,26 +145,17 @@ void FeedbackControllersManager::updateStage(Stage stage, const RobotStates& rob
     return;
   }
   original_.copyValuesFrom(control);
+  found_.copyValuesFrom(control);
   runStage(stage, robot, control);
 }
 
 void FeedbackControllersManager::runStage(Stage stage, const RobotStates& robot,
                                           ControlStates& control) noexcept {
-  const bool timed = options_.timed;
-  std::int64_t before = timed ? steadyNow() : 0;
-  for (ControllerSlot* slot : plan_->stages[static_cast<int>(stage)]) {
-    if (slot->idle()) continue;
-    if (options_.check_undeclared) compared_.copyValuesFrom(control);
-    slot->run(cycle_, robot, original_, control);
-    if (options_.check_undeclared && slot->ran()) {
-      slot->checkUndeclared(cycle_, compared_.data(), control);
-    }
-    if (timed) {
-      const std::int64_t after = steadyNow();
-      slot->judgeTime(cycle_, after - before, control);
-      before = after;
-    }
-  }
+  StageRun run{cycle_,           robot,          original_, control,
+               control.data(),   found_.data(),  options_.timed,
+               options_.check_undeclared, 0};
+  if (run.timed) run.boundary_ns = steadyNow();
+  for (ControllerSlot* slot : plan_->stages[static_cast<int>(stage)]) slot->run(run);
 }
 
 void FeedbackControllersManager::endCycle() noexcept {}

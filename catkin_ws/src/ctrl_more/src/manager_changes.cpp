@@ -30,7 +30,12 @@ Status FeedbackControllersManager::apply(const Change& change) {
   return applyLocked(change);
 }
 
-Status FeedbackControllersManager::applyLocked(const Change& change) {
+Status FeedbackControllersManager::prepare(const Change& change) {
+  const Lock lock(mutex_);
+  return applyLocked(change, true);
+}
+
+Status FeedbackControllersManager::applyLocked(const Change& change, bool prepared) {
   Draft draft = draftOf();
   std::vector<std::string> spared;
   for (const Change::Step& step : change.steps()) {
@@ -40,7 +45,7 @@ Status FeedbackControllersManager::applyLocked(const Change& change) {
   Status status = checkExclusive(draft);
   if (!status) return status;
   before_last_ = std::make_unique<Draft>(draftOf());
-  status = publish(draft);
+  status = publish(draft, prepared);
   std::string note;
   if (!spared.empty()) {
     note = "left alone, because safety controllers must be forced: " + joined(spared);

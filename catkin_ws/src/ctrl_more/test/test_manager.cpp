@@ -135,6 +135,39 @@ TEST_F(Three, planThatWasNotAdoptedCanBeWithdrawn) {
   EXPECT_TRUE(rig.manager->isEnabled("a"));
 }
 
+TEST_F(Three, preparedPlanWaitsForItsPlaceInTheCycle) {
+  rig.step();
+  ASSERT_TRUE(rig.manager->disable("a"));
+  const Status prepared = rig.manager->prepare(Change().disable("b"));
+  ASSERT_TRUE(prepared);
+  EXPECT_EQ(runOnce(), (Names{"b", "c"})) << "the ordinary change, and no more";
+  EXPECT_EQ(runOnce(), (Names{"b", "c"}));
+  EXPECT_FALSE(rig.manager->waitAdopted(prepared.generation(), 0.0));
+  rig.manager->adoptPrepared();
+  EXPECT_TRUE(rig.manager->waitAdopted(prepared.generation(), 0.0));
+  EXPECT_EQ(runOnce(), (Names{"c"}));
+
+  // Withdrawn, it never happens; overtaken by an ordinary change, it is part of that.
+  const Status second = rig.manager->prepare(Change().enable("a"));
+  ASSERT_TRUE(rig.manager->withdraw(second.generation()));
+  rig.manager->adoptPrepared();
+  EXPECT_EQ(runOnce(), (Names{"c"}));
+  ASSERT_TRUE(rig.manager->prepare(Change().enable("a")));
+  ASSERT_TRUE(rig.manager->enable("b"));
+  EXPECT_EQ(runOnce(), (Names{"a", "b", "c"}));
+  rig.manager->adoptPrepared();
+  EXPECT_EQ(runOnce(), (Names{"a", "b", "c"}));
+}
+
+TEST_F(Three, anOlderOrdinaryPlanDoesNotOvertakeAPreparedOne) {
+  rig.step();
+  ASSERT_TRUE(rig.manager->disable("a"));
+  const Status prepared = rig.manager->prepare(Change().disable("b"));
+  rig.manager->adoptPrepared();
+  EXPECT_TRUE(rig.manager->waitAdopted(prepared.generation(), 0.0));
+  EXPECT_EQ(runOnce(), (Names{"c"}));
+}
+
 TEST_F(Three, unloadOnlyWhenDisabledAndFaded) {
   rig.step();
   EXPECT_FALSE(rig.manager->unload("b"));

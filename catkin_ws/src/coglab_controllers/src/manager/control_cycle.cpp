@@ -98,6 +98,7 @@ void ControlCycle::abortMotion(const Reason& reason) noexcept {
 
 void ControlCycle::adopt() noexcept {
   if (const CyclePlan* plan = plans_.take()) {
+    feedback_.switchProfile();
     if (motion_ != nullptr) guarded("stop", [this] { motion_->stop(); });
     motion_ = plan->motion;
     id_ = plan->id;
@@ -187,7 +188,8 @@ void ControlCycle::run(const RobotSample& sample, double dt, VelocityCommand& ou
   if (fine) {
     input_.robot = sample;
     input_.dt = dt;
-    robot_->chain.evaluate(sample.position, input_.chain);
+    // The velocity of this cycle acts until its end: the Jacobian of its middle leads there.
+    robot_->chain.evaluate(sample.position, sample.commanded_velocity, dt, input_.chain);
   }
   input_.motion_allowed = fine && sample.block == lwr_fri_bridge::MotionBlock::None;
   input_.time_scale =

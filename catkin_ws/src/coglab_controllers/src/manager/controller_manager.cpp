@@ -207,18 +207,26 @@ Answer ControllerManager::switchTo(const std::string& id, std::string& type) {
     plan->motion = (*found)->controller.get();
     plan->id << id.c_str();
   }
+  // The profile of its name is prepared here and begins in the cycle that switches.
   ctrl_more::FeedbackControllersManager& feedback = feedback_.manager();
   std::string note;
-  if (feedback.hasProfile(id)) {
-    const ctrl_more::Status status = feedback.applyProfile(id, true);
-    if (!status.ok()) return Answer::refusal(status.message());
-  } else if (!feedback.getControllersNames().empty()) {
+  ctrl_more::Status prepared;
+  const bool some_feedback = !feedback.getControllersNames().empty();
+  if (some_feedback || feedback.hasProfile(id)) {
     ctrl_more::Change change;
-    feedback.apply(change.motionSwitched());
-    note = "no feedback profile of this name: feedback controllers stay as they are";
+    if (feedback.hasProfile(id)) {
+      change.profile(id);
+    } else {
+      note = "no feedback profile of this name: feedback controllers stay as they are";
+    }
+    prepared = feedback.prepare(change.motionSwitched());
+    if (!prepared.ok()) return Answer::refusal(prepared.message());
   }
   const PlanOutcome outcome = cycle_.plans().offer(std::move(plan), settings_.plan_timeout);
-  if (outcome == PlanOutcome::Withdrawn) return Answer::refusal(notAdopted(outcome));
+  if (outcome == PlanOutcome::Withdrawn) {
+    if (prepared.generation() != 0) feedback.withdraw(prepared.generation());
+    return Answer::refusal(notAdopted(outcome));
+  }
   if (outcome == PlanOutcome::Taken) note = notAdopted(outcome);
   const std::lock_guard<std::mutex> lock(table_);
   active_id_ = id;

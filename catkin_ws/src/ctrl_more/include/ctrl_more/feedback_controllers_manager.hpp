@@ -91,17 +91,17 @@ class FeedbackControllersManager : public Manager, private ControllerOwner {
   /// `libPath` and `configFile`. Further keys per controller: `type`, `enabled`, `overrun_us`,
   /// `on_fault` (hold, fade, zero), `blend_s`; of the file: `profiles` (name: [controllers]),
   /// `searchPath` ([folders]), `sharedSignals` (cascade or refuse).
-  /// Controllers that cannot be loaded are reported; the others are loaded all the same. A file
-  /// that cannot be parsed loads nothing. What was loaded before keeps running.
+  /// All or nothing: if anything is refused, nothing of the file is loaded, and the report says
+  /// why, one sentence for each. What was loaded before keeps running.
   /// @param file path of the list file
-  /// @param strict true: load nothing if anything is refused
-  LoadReport load(const std::string& file, bool strict = false);
+  /// @param strict false: load what can be loaded, and report the rest
+  LoadReport load(const std::string& file, bool strict = true);
 
   /// As load(), from a parsed file or text.
   /// @param list the tree
   /// @param base folder that relative paths refer to
-  /// @param strict true: load nothing if anything is refused
-  LoadReport load(const ConfigNode& list, const std::string& base, bool strict = false);
+  /// @param strict false: load what can be loaded, and report the rest
+  LoadReport load(const ConfigNode& list, const std::string& base, bool strict = true);
 
   /// Loads one controller under a name.
   Status loadController(const std::string& name, const ControllerEntry& entry);
@@ -157,6 +157,11 @@ class FeedbackControllersManager : public Manager, private ControllerOwner {
                   const std::map<std::string, std::vector<double>>& gains);
   ///< all or nothing, blended in
 
+  /// As apply(), but the cycle takes the plan only where it calls adoptPrepared(): for a change
+  /// that must begin in the same cycle as something else, as a profile with its motion controller.
+  /// The next ordinary change includes what is prepared.
+  Status prepare(const Change& change);
+
   /// Waits until the cycle has adopted a plan.
   /// @param generation from Status::generation()
   /// @param timeout_s longest wait [s]
@@ -164,7 +169,7 @@ class FeedbackControllersManager : public Manager, private ControllerOwner {
   bool waitAdopted(std::uint64_t generation, double timeout_s) const;
 
   /// Takes back the newest plan if the cycle has not adopted it; everything is then as before it.
-  /// Only the newest plan of apply() and its short forms can be withdrawn, not a load.
+  /// Only the newest plan of apply(), its short forms and prepare() can be withdrawn, not a load.
   /// @param generation from Status::generation()
   /// @return failure if the plan is adopted already, or is not the newest one
   Status withdraw(std::uint64_t generation);
@@ -208,6 +213,8 @@ class FeedbackControllersManager : public Manager, private ControllerOwner {
   void freeze();
   /// Adopts the newest plan.
   void beginCycle(const Cycle& cycle) noexcept override;
+  /// Adopts what prepare() left, if anything; between beginCycle() and the first stage.
+  void adoptPrepared() noexcept;
   /// Snapshots the references as `original`, then runs the controllers of the stage in order.
   /// Both stores must be those of the constructor, or copies of them.
   void updateStage(Stage stage, const RobotStates& robot, ControlStates& control) noexcept override;
@@ -235,17 +242,20 @@ class FeedbackControllersManager : public Manager, private ControllerOwner {
   bool paused(const std::string& name) const override { return isPaused(name); }
   GainValues gainsOf(const std::string& name) const override { return getGains(name); }
 
-  Status applyLocked(const Change& change);
+  Status applyLocked(const Change& change, bool prepared = false);
   Status applyStep(const Change::Step& step, Draft& draft, std::vector<std::string>& spared) const;
   Status applyToMember(const Change::Step& step, const Member& member, std::size_t index,
                        Draft& draft, std::vector<std::string>& spared) const;
   Status checkExclusive(const Draft& draft) const;
   Status bySignal(Change::Kind kind, bool robot, const std::string& signal, bool force);
   Draft draftOf() const;
-  Status publish(const Draft& draft);
+  Status publish(const Draft& draft, bool prepared = false);
+  void forget(const Plan* untaken);
+  void adopt(const Plan* plan) noexcept;
   void collect();
-  Status take(ControllerInstance instance, const std::string& name, const ControllerEntry& entry);
-  Status loadLocked(const std::string& name, const ControllerEntry& entry);
+  Status take(ControllerInstance instance, const std::string& name, const ControllerEntry& entry,
+              bool offer = true);
+  Status loadLocked(const std::string& name, const ControllerEntry& entry, bool offer = true);
   Status setProfileLocked(const std::string& profile, const std::vector<std::string>& controllers);
   Status unloadLocked(const std::string& name);
   int indexOf(const std::string& name) const;
@@ -275,6 +285,7 @@ class FeedbackControllersManager : public Manager, private ControllerOwner {
 
   // shared
   std::atomic<const Plan*> offered_{nullptr};  // taken by the cycle with one exchange
+  std::atomic<const Plan*> prepared_{nullptr};  // as offered_, but only by adoptPrepared()
   std::atomic<std::uint64_t> acknowledged_{0};
   std::atomic<std::uint64_t> cycle_number_{0};
 
@@ -282,7 +293,7 @@ class FeedbackControllersManager : public Manager, private ControllerOwner {
   const Plan* plan_ = nullptr;
   Cycle cycle_;
   ControlStates original_;
-  ControlStates compared_;  // of the test mode
+  ControlStates found_;  // the references as the controller that runs found them
 };
 
 }  // namespace ctrl_more

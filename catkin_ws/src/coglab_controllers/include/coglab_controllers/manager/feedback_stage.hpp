@@ -37,6 +37,8 @@ class FeedbackStage {
 
   /// Adopts the newest plan of the feedback manager; called once per cycle, idle ones included.
   void begin(std::int64_t now_ns, double dt) noexcept;
+  /// The feedback profile of a motion controller begins in the cycle that switches to it.
+  void switchProfile() noexcept { manager_.adoptPrepared(); }
   /// Step 2: measurement to robot states. False if a number is not finite (then nothing was
   /// written).
   bool fill(const CycleInput& input) noexcept;
