@@ -1,4 +1,8 @@
 // Goal estimator, orientation curve, end of motion and the whole Cartesian motion.
+#include <algorithm>
+#include <utility>
+#include <vector>
+
 #include <gtest/gtest.h>
 
 #include "coglab_controllers/dmp/cartesian_motion.hpp"
@@ -163,6 +167,130 @@ TEST(MotionEnd, LatchesAndFollowsAgainOutsideTheBall) {
     ASSERT_LT(++cycles, 100);
   EXPECT_NEAR(cycles * kCycle, 0.2, 0.006);
   EXPECT_FALSE(end.latched());
+}
+
+TEST(MotionEnd, ThresholdsGrowWithTheNoiseOfTheGoal) {
+  using Event = MotionEnd::Event;
+  const Vector3 goal(0.5, 0, 0), near = goal + Vector3(0.009, 0, 0);
+  const auto ends = [&](double speed, double turning, const Vector3& at, const GoalNoise& noise) {
+    MotionEnd end;
+    return end.update(kCycle, 0.001, speed, turning, at, goal, goal, noise) == Event::Ended;
+  };
+  EXPECT_FALSE(ends(0.021, 0.0, goal, {}));
+  EXPECT_FALSE(ends(0.021, 0.0, goal, {0.0, 1.0}));
+  EXPECT_TRUE(ends(0.099, 0.0, goal, {1.0, 0.0}));
+  EXPECT_FALSE(ends(0.061, 0.0, goal, {0.5, 0.0}));
+  EXPECT_TRUE(ends(0.059, 0.0, goal, {0.5, 0.0}));
+  EXPECT_FALSE(ends(0.101, 0.0, goal, {5.0, 5.0}));
+  EXPECT_FALSE(ends(0.0, 0.5, goal, {1.0, 0.0}));
+  EXPECT_TRUE(ends(0.0, 0.5, goal, {0.0, 1.0}));
+  EXPECT_FALSE(ends(0.0, 0.0, near, {}));
+  EXPECT_TRUE(ends(0.0, 0.0, near, {1.0, 0.0}));
+}
+
+/// Frames at 30 Hz, 7 cycles apart: `goal(time)` plus noise of 4 mm per axis that wanders with a
+/// correlation time of 0.5 s, or is white with 0.
+class Sights {
+ public:
+  Sights(int seed, double noise, double correlation)
+      : random_(seed),
+        noise_(noise),
+        keep_(correlation > 0.0 ? std::exp(-7 * kCycle / correlation) : 0.0) {
+    error_ = draw();
+  }
+  template <typename Goal>
+  Vector3 at(int cycle, Goal&& goal) {
+    if (cycle % 7 == 0) {
+      error_ = keep_ * error_ + std::sqrt(1.0 - keep_ * keep_) * draw();
+      seen_ = goal(cycle * kCycle) + error_;
+    }
+    return seen_;
+  }
+
+ private:
+  Vector3 draw() {
+    return Vector3(random_.normal(noise_), random_.normal(noise_), random_.normal(noise_));
+  }
+  Random random_;
+  double noise_, keep_;
+  Vector3 error_ = Vector3::Zero(), seen_ = Vector3::Zero();
+};
+
+TEST(GoalJitter, TellsNoiseFromTheMotionOfAPerson) {
+  const auto largest = [](Sights sights, auto goal, int from, int cycles) {
+    GoalJitter jitter(0.03);
+    Vector3 last = sights.at(0, goal);
+    double share = 0.0, least = 1.0;
+    for (int i = 1; i < cycles; ++i) {
+      const Vector3 seen = sights.at(i, goal);
+      if (seen == last) {
+        jitter.wait(kCycle);
+      } else {
+        jitter.see(kCycle, seen - last);
+      }
+      last = seen;
+      if (i < from) continue;
+      share = std::max(share, jitter.share());
+      least = std::min(least, jitter.share());
+    }
+    return std::make_pair(least, share);
+  };
+  const auto reach = [](double t) {  // 0.5 m in 1 s, then at rest
+    const double u = std::min(1.0, t);
+    return Vector3(0.5 * u * u * u * (10.0 - 15.0 * u + 6.0 * u * u), 0, 0);
+  };
+  const auto still = [](double) { return Vector3(0.5, 0, 0); };
+  const auto steady = [](double t) { return Vector3(0.5, 0.1 * t, 0); };
+  const auto jump = [](double t) { return Vector3(0.5, t < 1.0 ? 0.0 : 0.1, 0); };
+  EXPECT_LT(largest(Sights(1, 0.0, 0.0), reach, 0, 400).second, 0.5);
+  EXPECT_LT(largest(Sights(1, 0.0, 0.0), reach, 220, 400).second, 0.2);  // soon after it rests
+  EXPECT_LT(largest(Sights(1, 0.0, 0.0), steady, 30, 400).second, 0.05);
+  EXPECT_LT(largest(Sights(1, 0.0, 0.0), jump, 400, 420).second, 0.1);
+  EXPECT_LT(largest(Sights(1, 0.0001, 0.0), still, 100, 400).second, 0.2);  // a motion capture's
+  EXPECT_GT(largest(Sights(2, 0.004, 0.0), still, 100, 400).first, 0.9);
+  EXPECT_GT(largest(Sights(3, 0.004, 0.5), still, 100, 400).first, 0.5);
+  EXPECT_GT(largest(Sights(3, 0.004, 0.5), steady, 100, 400).first, 0.5);
+}
+
+TEST(CartesianMotion, ANoisyGoalIsReachedNearlyAsSoonAsAStillOne) {
+  const Vector3 goal(0.51, 0, 0);
+  const auto still = [&goal](double) { return goal; };
+  const auto end_of = [&](Sights sights) {
+    CartesianMotion motion;
+    motion.start(reachPlan(), at(Vector3::Zero()), Vector3::Zero(), Vector3::Zero(),
+                 at(sights.at(0, still)));
+    for (int i = 0; i < 1000; ++i) {
+      motion.step(kCycle, at(sights.at(i, still)));
+      if (motion.event() == MotionEnd::Event::Ended) return i * kCycle;
+    }
+    return 1e9;
+  };
+  const double exact = end_of(Sights(1, 0.0, 0.0));
+  for (const double correlation : {0.0, 0.5}) {
+    std::vector<double> later;
+    for (int seed = 1; seed <= 101; ++seed) {
+      later.push_back(end_of(Sights(seed, 0.004, correlation)) - exact);
+    }
+    std::sort(later.begin(), later.end());
+    EXPECT_LT(later[50], 0.1) << correlation;
+    EXPECT_LT(later[95], 0.4) << correlation;
+  }
+}
+
+TEST(CartesianMotion, AMovingNoisyGoalIsNotTakenForReached) {
+  // 0.15 m/s is faster than any noise lets pass: such a motion goes on as long as the goal does.
+  for (int seed = 1; seed <= 20; ++seed) {
+    Sights sights(seed, 0.002, 0.5);
+    const auto goal = [](double t) { return Vector3(0.4, 0.15 * t, 0); };
+    CartesianMotion motion;
+    motion.start(reachPlan(), at(Vector3::Zero()), Vector3::Zero(), Vector3::Zero(), at(goal(0)));
+    int ended = 0;
+    for (int i = 0; i < 500; ++i) {
+      motion.step(kCycle, at(sights.at(i, goal)));
+      if (motion.event() == MotionEnd::Event::Ended) ++ended;
+    }
+    EXPECT_EQ(ended, 0) << seed;
+  }
 }
 
 TEST(CartesianMotion, WithTheEstimatorOffItIsThePlainDmp) {

@@ -22,6 +22,9 @@ void CartesianMotion::start(const CartesianMotionPlan& plan, const Pose& pose,
                             const Pose& goal) noexcept {
   goal_estimator_.reset(goal.position);
   orientation_estimator_.reset(goal.orientation);
+  jitter_.reset();
+  turning_jitter_.reset();
+  seen_ = goal;
   end_.reset();
   dmp_.start(plan.system, pose.position, velocity, goal.position, plan.ratio);
   orientation_ = pose.orientation.normalized();
@@ -50,10 +53,22 @@ void CartesianMotion::switchTo(const CartesianMotionPlan& plan, const Pose& goal
   settled_ = false;
 }
 
+void CartesianMotion::watchNoise(double dt, const Pose& goal) noexcept {
+  if (goal.position == seen_.position && goal.orientation.coeffs() == seen_.orientation.coeffs()) {
+    jitter_.wait(dt);
+    turning_jitter_.wait(dt);
+    return;
+  }
+  jitter_.see(dt, goal.position - seen_.position);
+  turning_jitter_.see(dt, rotationBetween(seen_.orientation, goal.orientation));
+  seen_ = goal;
+}
+
 const CartesianReference& CartesianMotion::step(double dt, const Pose& goal, double rate) noexcept {
   event_ = MotionEnd::Event::None;
   if (phase_ == Phase::Idle || !(dt > 0.0)) return reference_;
   rate_ = rate;
+  watchNoise(dt, goal);
   const Vector3 before = dmp_.state().position;
   Vector3 goal_velocity = Vector3::Zero();
   if (end_.latched()) {
@@ -85,7 +100,7 @@ const CartesianReference& CartesianMotion::step(double dt, const Pose& goal, dou
   const double turning =
       reference_.orientation_control ? reference_.angular_velocity.norm() / clock : 0.0;
   event_ = end_.update(dt, state.phase, reference_.velocity.norm() / clock, turning, state.position,
-                       goal_, goal.position);
+                       goal_, goal.position, noise());
   if (event_ == MotionEnd::Event::Ended) phase_ = Phase::Ended;
   if (event_ == MotionEnd::Event::FollowsAgain) {
     phase_ = Phase::Running;

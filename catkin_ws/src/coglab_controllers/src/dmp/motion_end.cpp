@@ -1,10 +1,19 @@
 #include "coglab_controllers/dmp/motion_end.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <stdexcept>
 #include <string>
 
 namespace coglab_controllers {
+
+namespace {
+
+double between(double exact, double noisy, double share) noexcept {
+  return exact + std::clamp(share, 0.0, 1.0) * (std::max(exact, noisy) - exact);
+}
+
+}  // namespace
 
 MotionEnd::MotionEnd(const MotionEndParameters& parameters) : parameters_(parameters) {
   const auto require = [](const char* name, double value) {
@@ -16,6 +25,9 @@ MotionEnd::MotionEnd(const MotionEndParameters& parameters) : parameters_(parame
   require("end_speed", parameters.speed);
   require("end_turning", parameters.turning);
   require("end_distance", parameters.distance);
+  require("noisy_end_speed", parameters.noisy_speed);
+  require("noisy_end_turning", parameters.noisy_turning);
+  require("noisy_end_distance", parameters.noisy_distance);
   require("follow_distance", parameters.follow_distance);
   require("follow_time", parameters.follow_time);
 }
@@ -27,11 +39,13 @@ void MotionEnd::reset() noexcept {
 
 MotionEnd::Event MotionEnd::update(double dt, double phase, double speed, double turning,
                                    const Vector3& position, const Vector3& goal,
-                                   const Vector3& raw_goal) noexcept {
+                                   const Vector3& raw_goal, const GoalNoise& noise) noexcept {
   if (!latched_) {
-    if (phase >= parameters_.phase || speed >= parameters_.speed ||
-        turning >= parameters_.turning || (position - goal).norm() >= parameters_.distance ||
-        (goal - raw_goal).norm() >= parameters_.follow_distance) {
+    const MotionEndParameters& p = parameters_;
+    if (phase >= p.phase || speed >= between(p.speed, p.noisy_speed, noise.position) ||
+        turning >= between(p.turning, p.noisy_turning, noise.orientation) ||
+        (position - goal).norm() >= between(p.distance, p.noisy_distance, noise.position) ||
+        (goal - raw_goal).norm() >= p.follow_distance) {
       return Event::None;
     }
     latched_ = true;

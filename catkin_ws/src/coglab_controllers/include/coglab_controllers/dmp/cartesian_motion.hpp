@@ -7,6 +7,7 @@
 #include "coglab_controllers/dmp/motion_end.hpp"
 #include "coglab_controllers/dmp/orientation_curve.hpp"
 #include "coglab_controllers/goal/goal_estimator.hpp"
+#include "coglab_controllers/goal/goal_jitter.hpp"
 
 namespace coglab_controllers {
 
@@ -57,6 +58,10 @@ class CartesianMotion {
   const CartesianReference& reference() const noexcept { return reference_; }
   /// Goal position as used in eq. (1), m: the estimate, or the latched goal after the end.
   const Vector3& goal() const noexcept { return goal_; }
+  /// Target orientation as estimated; it does not matter without orientation control.
+  const Quaternion& goalOrientation() const noexcept {
+    return orientation_estimator_.orientation();
+  }
   /// From the set-point to the goal as received, m.
   double remainingDistance() const noexcept { return remaining_distance_; }
   /// Estimated from the phase and tau, s, at rate 1.
@@ -64,7 +69,12 @@ class CartesianMotion {
     return phase_ == Phase::Running ? dmp_.remainingTime() : 0.0;
   }
 
+  /// How noisy the goal as received is at the moment.
+  GoalNoise noise() const noexcept { return {jitter_.share(), turning_jitter_.share()}; }
+
  private:
+  void watchNoise(double dt, const Pose& goal) noexcept;
+
   GoalEstimator goal_estimator_;
   OrientationEstimator orientation_estimator_;
   Dmp dmp_;
@@ -73,6 +83,8 @@ class CartesianMotion {
   CartesianReference reference_;
   Phase phase_ = Phase::Idle;
   MotionEnd::Event event_ = MotionEnd::Event::None;
+  GoalJitter jitter_{0.03}, turning_jitter_{0.3};
+  Pose seen_;  // the goal as received in the last step
   Vector3 goal_ = Vector3::Zero();
   Quaternion orientation_ = Quaternion::Identity();  // set-point at the end of the last step
   double curve_begin_ = 0.0;                         // progress of the DMP at which the curve began
