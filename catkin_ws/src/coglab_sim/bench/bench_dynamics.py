@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""Time of a complete step of the simulated cell, and how far its dynamics are from MuJoCo's. Prints JSON rows only."""
+"""The simulated cell: time of a step, dynamics against MuJoCo's, a blocked arm, lockstep. Prints JSON rows only."""
 import json
 import os
 import statistics
@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 PACKAGE = Path(__file__).resolve().parents[1]
+sys.path.insert(0, str(PACKAGE / 'test'))
 URDF = PACKAGE.parent / 'lwr_description' / 'urdf' / 'lwr_ih2.urdf'
 BLOCKS, STEPS = 40, 2000
 
@@ -29,7 +30,6 @@ def equality() -> float | None:
         import mujoco  # noqa: F401
     except ImportError:
         return None
-    sys.path.insert(0, str(PACKAGE / 'test'))
     from test_dynamics_oracle import Oracle
 
     from coglab_sim import _cell
@@ -41,6 +41,29 @@ def equality() -> float | None:
             scale = max(1.0, np.abs(theirs[name]).max())
             worst = max(worst, np.abs(ours[name] - theirs[name]).max() / scale)
     return float(worst)
+
+
+def row(figure: str, value: float, unit: str, limit: float) -> dict[str, object]:
+    """A figure without a peer; fine up to `limit`."""
+    return {'bench': 'dynamics', 'figure': figure, 'value': value, 'unit': unit, 'goal': f'<= {limit:g}', 'peer': None,
+            'peer_value': None, 'ok': value <= limit}
+
+
+def blocked_rows() -> list[dict[str, object]]:
+    """Bridge and cell: the moving arm is held for 5 s and released, in each mode; worst of two motions and three periods."""
+    from wire import BLOCKED_MODES, BLOCKED_MOTIONS, Wire, speed_after_block
+    return [row(f'{mode}: peak speed after 5 s against a block', round(max(
+        speed_after_block(Wire(krc__period=period), mode, moving)
+        for moving in BLOCKED_MOTIONS for period in (0.001, 0.005, 0.02)), 5), 'rad/s', 0.1) for mode in BLOCKED_MODES]
+
+
+def lockstep_row() -> dict[str, object]:
+    """Two runs with the same seed, byte by byte."""
+    from wire import lockstep_bytes
+    periods = 3000
+    first, second = lockstep_bytes(6, periods), lockstep_bytes(6, periods)
+    different = sum(a != b for a, b in zip(first, second, strict=True))
+    return row(f'lockstep: datagrams that differ between two runs of {periods} periods', different, 'datagrams', 0)
 
 
 def main() -> None:
@@ -59,6 +82,7 @@ def main() -> None:
         rows.append({'bench': 'dynamics', 'figure': 'M, C, g, J against MuJoCo, 1000 random states, largest difference',
                      'value': difference, 'unit': 'relative', 'goal': '<= 1e-9', 'peer': None, 'peer_value': None,
                      'ok': difference <= 1e-9})
+    rows += blocked_rows() + [lockstep_row()]
     print(json.dumps(rows, indent=1))
 
 

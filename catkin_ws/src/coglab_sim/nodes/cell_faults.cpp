@@ -7,6 +7,8 @@
 namespace coglab_sim {
 namespace {
 
+constexpr double kReopenPause = 0.5;  // s between friClose and friOpen
+
 using Action = std::function<void(Cell&)>;
 
 /// What to do, and what undoes it (empty if it passes by itself).
@@ -47,11 +49,14 @@ Fault faultOf(const std::string& kind, double value) {
   if (kind == "leave_command_mode") {
     return {[](Cell& cell) { cell.controller().leaveCommandMode("fault injected"); }, {}};
   }
+  if (kind == "reopen") {
+    return {[value](Cell& cell) { cell.controller().restartProgram(value, kReopenPause); }, {}};
+  }
   if (kind == "acknowledge") return {[](Cell& cell) { cell.controller().acknowledge(); }, {}};
   throw std::invalid_argument(
       "unknown fault '" + kind +
       "'; known: block, packet_loss, lose_packets, silence, drive_error, enabling_switch, "
-      "leave_command_mode, acknowledge");
+      "leave_command_mode, reopen, acknowledge");
 }
 
 }  // namespace

@@ -18,6 +18,7 @@ namespace coglab_sim {
 ///   drive_error         joint 0..6 reports an error; its end is acknowledged too
 ///   enabling_switch     0: released, 1: pressed (in Automatic: operator safety)
 ///   leave_command_mode  fall-back as after a fault
+///   reopen              the KRL program is started anew with an FRI period of `value` s
 ///   acknowledge         the operator acknowledges the controller's messages
 ///
 /// @throws std::invalid_argument with the known kinds, or naming value and range.

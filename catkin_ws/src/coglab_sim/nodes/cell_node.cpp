@@ -4,8 +4,8 @@
 /// palm, world axes). Publishes truth/cell, finger_contact, ~messages (the controller's message
 /// window), /clock if ~publish_clock. Serves ~fault, ~place_object. Parameters: every row of the
 /// cell's table under the private namespace; ~speed, ~fri_host, ~fri_port (0: wait for
-/// ~port_parameter), ~port_wait, ~log_file, ~truth_rate, ~publish_clock; fri_period and seed of the
-/// parent namespace.
+/// ~port_parameter, by default lwr/fri_port_bound, looked for from here upward), ~port_wait,
+/// ~log_file, ~truth_rate, ~publish_clock; fri_period and seed of the parent namespace.
 #include <fstream>
 #include <memory>
 
@@ -28,27 +28,35 @@
 namespace coglab_sim {
 namespace {
 
-/// Waits until the bridge has published its port. @throws std::runtime_error after `limit` s or at
-/// shutdown.
+/// The port that the bridge has published; 0 if none yet. A relative name is looked for in the
+/// node's namespace and upward, so that the bridge of the same robot is found whatever it is pushed
+/// into.
+std::uint16_t publishedPort(const std::string& parameter) {
+  std::string found;
+  int port = 0;
+  if (!ros::param::search(ros::this_node::getName(), parameter, found)) return 0;
+  if (!ros::param::get(found, port) || port <= 0 || port > 65535) return 0;
+  return static_cast<std::uint16_t>(port);
+}
+
+/// Waits for it. @throws std::runtime_error after `limit` s or at shutdown.
 std::uint16_t waitForPort(const std::string& parameter, double limit) {
   const ros::WallTime end = ros::WallTime::now() + ros::WallDuration(limit);
   ROS_INFO("waiting up to %.0f s for the bridge's port in parameter %s", limit, parameter.c_str());
   while (ros::ok() && ros::WallTime::now() < end) {
-    int port = 0;
-    if (ros::param::get(parameter, port) && port > 0 && port < 65536)
-      return static_cast<std::uint16_t>(port);
+    if (const std::uint16_t port = publishedPort(parameter); port != 0) return port;
     ros::WallDuration(0.1).sleep();
   }
   throw std::runtime_error("no bridge published its UDP port in parameter " + parameter +
-                           " within " + std::to_string(limit) +
-                           " s; start the bridge or set ~fri_port");
+                           ", from " + ros::this_node::getName() + " upward, within " +
+                           std::to_string(limit) + " s; start the bridge or set ~fri_port");
 }
 
 class CellNode {
  public:
   CellNode() : private_("~"), config_(readCellConfig(private_)) {
     int port = private_.param("fri_port", 0);
-    port_parameter_ = private_.param<std::string>("port_parameter", "/lwr/fri_port_bound");
+    port_parameter_ = private_.param<std::string>("port_parameter", "lwr/fri_port_bound");
     follow_port_ = port == 0;
     if (follow_port_) port = waitForPort(port_parameter_, private_.param("port_wait", 60.0));
     const auto host = private_.param<std::string>("fri_host", "127.0.0.1");
@@ -223,11 +231,8 @@ class CellNode {
     const CellSnapshot snapshot = cell_->snapshot();
     const bool silent = snapshot.answers == answers_seen_;
     answers_seen_ = snapshot.answers;
-    int port = 0;
-    if (follow_port_ && silent && ros::param::get(port_parameter_, port) && port > 0 &&
-        port < 65536) {
-      cell_->setPort(static_cast<std::uint16_t>(port));
-    }
+    const std::uint16_t port = follow_port_ && silent ? publishedPort(port_parameter_) : 0;
+    if (port != 0) cell_->setPort(port);
     if (silent && snapshot.tick > 0)
       ROS_WARN_THROTTLE(10.0, "no FRI answer for 1 s; is the bridge running?");
   }

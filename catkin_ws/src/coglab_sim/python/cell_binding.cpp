@@ -123,6 +123,13 @@ PYBIND11_MODULE(_cell, m) {
           "The controller sends nothing for so long, s.")
       .def("leave_command_mode",
            [](PyCell& c, const std::string& why) { c.cell().controller().leaveCommandMode(why); })
+      .def(
+          "restart_program",
+          [](PyCell& c, double period, double pause) {
+            c.cell().controller().restartProgram(period, pause);
+          },
+          py::arg("period"), py::arg("pause") = 0.5,
+          "The operator starts the KRL program anew, with another FRI period, s.")
       .def("acknowledge", [](PyCell& c) { c.cell().controller().acknowledge(); });
 
   m.def(

@@ -62,7 +62,7 @@ const MeasurementBytes& Cell::advance(bool on_time) {
   const krc::PeriodCommand command = controller_.tick(arm_, on_time);
   arm_.setBrakes(controller_.brakesWanted());
 
-  const double period = config_.krc.period;
+  const double period = this->period();
   const int steps = static_cast<int>(std::ceil(period / 1e-3 - 1e-9));
   const double dt = period / steps;
   ServoCommand servo = command.servo;

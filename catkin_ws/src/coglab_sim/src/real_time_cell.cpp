@@ -47,8 +47,11 @@ void RealTimeCell::stop() {
 }
 
 void RealTimeCell::run() {
-  const auto period = std::chrono::duration_cast<Clock::duration>(
-      std::chrono::duration<double>(cell_.period() / factor_));
+  const auto periodNow = [this] {
+    return std::chrono::duration_cast<Clock::duration>(
+        std::chrono::duration<double>(cell_.period() / factor_));
+  };
+  auto period = periodNow();
   auto deadline = Clock::now();
   auto sent_at = deadline;
   bool sent_late = false;
@@ -75,6 +78,7 @@ void RealTimeCell::run() {
     sent_at = Clock::now();
     if (cell_.sent()) socket_.send(cell_.measurement().data(), cell_.measurement().size(), port_);
     sent_late = late;
+    period = periodNow();  // the KRL program may have opened FRI anew
     leaveResults(answered);
     if (late) {
       const std::lock_guard<std::mutex> lock(mutex_);

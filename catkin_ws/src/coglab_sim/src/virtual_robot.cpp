@@ -65,8 +65,7 @@ bool FrameTable::lookup(const std::string& reference, const std::string& frame,
 
 VirtualRobot::VirtualRobot(const VirtualRobotConfig& config)
     : cell_(config.cell),
-      bridge_(bridgeConfig(config)),
-      period_ns_(static_cast<std::int64_t>(std::llround(1e9 * config.cell.krc.period))) {
+      bridge_(bridgeConfig(config)) {
   auto settings = coglab_controllers::readManagerSettings(YAML::Load(config.manager_parameters),
                                                           textOf(config.cell.urdf),
                                                           bridge_.config().limits, true);
@@ -118,7 +117,7 @@ void VirtualRobot::tick() {
   controlCycle(answered);
   cell_.step(answered ? answer.data() : nullptr, answer.size());
   measured_ = cell_.sent();
-  now_ns_ += period_ns_;
+  now_ns_ += static_cast<std::int64_t>(std::llround(1e9 * cell_.period()));
 }
 
 void VirtualRobot::controlCycle(bool answered) {

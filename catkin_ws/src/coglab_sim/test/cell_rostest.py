@@ -24,7 +24,7 @@ from fri_client import COMMAND, MONITOR, Client, parse
 class Bridge(threading.Thread):
     """Answers on a UDP port of its own and publishes it as the bridge does."""
 
-    def __init__(self) -> None:
+    def __init__(self, namespace: str = '') -> None:
         super().__init__(daemon=True)
         self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self.socket.bind(('127.0.0.1', 0))
@@ -33,7 +33,7 @@ class Bridge(threading.Thread):
         self.fields = None
         self.received = 0
         self.peers = set()
-        rospy.set_param('/lwr/fri_port_bound', self.socket.getsockname()[1])
+        rospy.set_param(namespace + '/lwr/fri_port_bound', self.socket.getsockname()[1])
 
     def run(self) -> None:
         while not rospy.is_shutdown():
@@ -150,6 +150,28 @@ class CellNode(unittest.TestCase):
         measured = np.array([float(row['measured_lwr_a1']) for row in rows])
         self.assertTrue(np.all(np.abs(measured) <= 2.97))
         os.unlink(path)
+
+    def test_6_friopen_with_another_period(self) -> None:
+        refused = self.fault('reopen', 0.5, 0.0)
+        self.assertFalse(refused.success)
+        self.assertIn('0.001', refused.message)
+        self.assertTrue(self.fault('reopen', 0.02, 0.0).success)
+        self.assertTrue(wait_for(lambda: abs(self.bridge.fields['command_period'] - 0.02) < 1e-6))
+        self.assertTrue(wait_for(lambda: self.bridge.fields['quality'] >= 2))
+        self.command_mode()
+        before = self.bridge.received
+        time.sleep(1.0)
+        self.assertTrue(30 < self.bridge.received - before < 70)
+
+    def test_7_two_robots_in_one_graph(self) -> None:
+        """All names are relative: the cell of another namespace finds the bridge of that namespace."""
+        second = Bridge('/second')
+        second.start()
+        self.assertTrue(wait_for(lambda: second.fields is not None, 15.0))
+        self.assertFalse(second.peers & self.bridge.peers)
+        rospy.wait_for_message('/second/coglab_sim/truth/cell', CellTruth, 10.0)
+        self.assertTrue(rospy.ServiceProxy('/second/coglab_sim/cell/fault', InjectFault)('block', 1.0, 0.0).success)
+        self.assertEqual(len(self.bridge.peers), 1)
 
 
 if __name__ == '__main__':

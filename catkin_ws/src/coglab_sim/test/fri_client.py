@@ -35,6 +35,7 @@ class Client:
     def __init__(self, flags: int = JOINT_POSITION) -> None:
         self.counter = 0
         self.flags = flags
+        self.reals = [0.0] * 16
         self.ints = [0] * 16
         self.bools = 0
         self.torque = [0.0] * 7
@@ -52,6 +53,7 @@ class Client:
         data = bytearray(376)
         header = overrides.get('header', (self.counter, fields['header'][0], 376, 0x1005))
         struct.pack_into('<4H', data, 0, *header)
+        struct.pack_into('<16f', data, 8, *self.reals)
         struct.pack_into('<16i', data, 72, *self.ints)
         struct.pack_into('<H', data, 136, self.bools)
         struct.pack_into('<I', data, 140, overrides.get('flags', self.flags))

@@ -119,6 +119,50 @@ TEST(Bridge, strategyChangesInMonitorModeOnly) {
   EXPECT_EQ(cell.robot.answer.flags, 0x0035U);
 }
 
+/// Flags of the answer stay those of the entry, whatever is asked for in command mode.
+TEST(Bridge, flagsStayInCommandModeWhateverIsAsked) {
+  for (const char* mode : {"position", "joint_impedance", "cartesian_impedance"}) {
+    Cell cell;
+    cell.run(2);
+    ASSERT_TRUE(runEvent(cell.bridge, cell.robot, mode).success());
+    cell.start();
+    const std::uint32_t flags = cell.robot.answer.flags;
+    EXPECT_EQ(flags, fri::flagsFor(cell.robot.control));
+    for (const char* event : {"position", "joint_impedance stiffness 50", "cartesian_impedance",
+                              "start", "hold", "reset", "jump"}) {
+      try {
+        cell.bridge.submit(event);
+      } catch (const std::invalid_argument&) {  // the unknown one
+      }
+      for (int i = 0; i < 20; ++i) {
+        drive(cell.bridge, cell.robot, Vector7::Constant(0.1));
+        cell.robot.cycle(cell.bridge);
+        ASSERT_EQ(cell.robot.answer.flags, flags) << mode << ", " << event;
+        ASSERT_EQ(cell.robot.state, fri::FriState::Command);
+      }
+    }
+  }
+}
+
+/// Nothing adds torques or forces, in no mode and at no time.
+TEST(Bridge, addedTorquesAndForcesStayZero) {
+  for (const char* mode : {"position", "joint_impedance", "cartesian_impedance"}) {
+    Cell cell;
+    cell.run(2);
+    ASSERT_TRUE(runEvent(cell.bridge, cell.robot, mode).success());
+    cell.start();
+    for (int i = 0; i < 300; ++i) {
+      if (i == 100) cell.bridge.submit("hold");
+      if (i == 150) cell.bridge.submit("reset");
+      if (i == 250) cell.bridge.submit("stop");
+      drive(cell.bridge, cell.robot, Vector7::Constant(0.3));
+      cell.robot.cycle(cell.bridge, i % 37 == 0, i % 41 == 0);
+      for (const float torque : cell.robot.answer.joint_torque) ASSERT_EQ(torque, 0.0F);
+      for (const float force : cell.robot.answer.cartesian_force) ASSERT_EQ(force, 0.0F);
+    }
+  }
+}
+
 TEST(Bridge, everyStrategyFollows) {
   for (const char* mode : {"position", "joint_impedance", "cartesian_impedance"}) {
     Cell cell;

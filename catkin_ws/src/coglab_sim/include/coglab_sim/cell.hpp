@@ -66,7 +66,8 @@ class Cell {
   krc::Controller& controller() { return controller_; }
   const krc::Controller& controller() const { return controller_; }
 
-  double period() const { return config_.krc.period; }
+  /// FRI period now, s; friOpen may change it.
+  double period() const { return controller_.parameters().period; }
   CellTruth truth() const;
   FingerContactState fingerContact() const { return object_.fingerContact(arm_.terms().tip); }
   const ArmDynamics& arm() const { return arm_; }

@@ -73,7 +73,6 @@ class VirtualRobot {
 
   Cell cell_;
   lwr_fri_bridge::Bridge bridge_;
-  std::int64_t period_ns_;
   std::int64_t now_ns_ = 1'000'000'000;  // a stamp of 0 would mean "none"
   bool measured_ = false;
   int since_cycle_ = 0;

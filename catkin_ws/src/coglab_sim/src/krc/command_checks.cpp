@@ -38,7 +38,7 @@ std::string checkValues(const CheckContext& context, const fri::CommandDatagram&
   if ((flags & fri::kJointPosition) != 0 && !allFinite(command.joint_position)) {
     return "cmd.jntPos not properly initialized";
   }
-  if ((flags & fri::kCartesianPosition) != 0 && !poseFromWire(command.cartesian_frame, frame)) {
+  if ((flags & fri::kCartesianPosition) != 0 && !poseFromWire(command.cartesian_frame, p.frame_orthonormality, frame)) {
     return "cmd.cartPos not properly initialized";
   }
   if ((flags & fri::kJointTorque) != 0) {
@@ -73,14 +73,15 @@ std::string checkValues(const CheckContext& context, const fri::CommandDatagram&
 
 }  // namespace
 
-bool poseFromWire(const float (&wire)[fri::kFrameValues], Pose& pose) {
+bool poseFromWire(const float (&wire)[fri::kFrameValues], double tolerance, Pose& pose) {
   Matrix3d rotation;
   for (int row = 0; row < 3; ++row) {
     for (int column = 0; column < 3; ++column) rotation(row, column) = wire[4 * row + column];
     pose.position[row] = wire[4 * row + 3];
   }
   if (!rotation.allFinite() || !pose.position.allFinite()) return false;
-  if ((rotation * rotation.transpose() - Matrix3d::Identity()).cwiseAbs().maxCoeff() > 1e-3)
+  if ((rotation * rotation.transpose() - Matrix3d::Identity()).cwiseAbs().maxCoeff() >
+      tolerance)
     return false;
   if (rotation.determinant() < 0.0) return false;
   pose.rotation = Quaterniond(rotation).normalized();
@@ -115,7 +116,7 @@ std::string checkEntry(const CheckContext& context, const fri::CommandDatagram& 
   }
   if (cartesian) {
     Pose frame;
-    poseFromWire(command.cartesian_frame, frame);
+    poseFromWire(command.cartesian_frame, p.frame_orthonormality, frame);
     if ((frame.position - context.frame_set_point.position).norm() > p.entry_frame_tolerance ||
         rotationBetween(context.frame_set_point.rotation, frame.rotation).norm() >
             p.entry_frame_tolerance) {
@@ -142,10 +143,11 @@ std::string checkCyclic(const CheckContext& context, const fri::CommandDatagram&
   }
   if ((command.flags & fri::kCartesianPosition) != 0) {
     Pose frame;
-    poseFromWire(command.cartesian_frame, frame);
-    // No public figure exists for the Cartesian step; 2 m/s and 4 rad/s are ours.
-    if ((frame.position - context.frame_set_point.position).norm() > 2.0 * p.period ||
-        rotationBetween(context.frame_set_point.rotation, frame.rotation).norm() > 4.0 * p.period) {
+    poseFromWire(command.cartesian_frame, p.frame_orthonormality, frame);
+    const double turn = rotationBetween(context.frame_set_point.rotation, frame.rotation).norm();
+    if ((frame.position - context.frame_set_point.position).norm() >
+            p.frame_speed_limit * p.period ||
+        turn > p.frame_turn_limit * p.period) {
       return "FRI speed limit TCP";
     }
   }

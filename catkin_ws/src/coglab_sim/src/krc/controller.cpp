@@ -12,6 +12,7 @@ using fri::FriState;
 namespace {
 
 constexpr std::size_t kMessageWindow = 200;
+constexpr double kShortestPeriod = 0.001, kLongestPeriod = 0.1;  // s
 
 void requireRange(const char* name, double value, double low, double high) {
   if (value >= low && value <= high) return;
@@ -20,7 +21,7 @@ void requireRange(const char* name, double value, double low, double high) {
 }
 
 const Parameters& checked(const Parameters& p) {
-  requireRange("period", p.period, 0.001, 0.1);
+  requireRange("period", p.period, kShortestPeriod, kLongestPeriod);
   requireRange("quality_perfect", p.quality_perfect, p.quality_ok, 1.0);
   requireRange("quality_ok", p.quality_ok, p.quality_bad, 1.0);
   requireRange("quality_bad", p.quality_bad, 0.0, 1.0);
@@ -28,6 +29,12 @@ const Parameters& checked(const Parameters& p) {
   requireRange("extrapolated_packets", p.extrapolated_packets, 0, 100);
   requireRange("speed_margin", p.speed_margin, 0.0, 1.0);
   requireRange("krl_poll", p.krl_poll, 0.001, 10.0);
+  requireRange("krl_drive_wait", p.krl_drive_wait, 0.0, 600.0);
+  requireRange("krl_quality_wait", p.krl_quality_wait, 0.0, 600.0);
+  requireRange("frame_speed_limit", p.frame_speed_limit, 0.0, 100.0);
+  requireRange("frame_turn_limit", p.frame_turn_limit, 0.0, 100.0);
+  requireRange("frame_orthonormality", p.frame_orthonormality, 1e-6, 0.1);
+  requireRange("drive_heating_time", p.drive_heating_time, 1.0, 1e6);
   return p;
 }
 
@@ -81,7 +88,7 @@ PeriodCommand Controller::tick(const ArmDynamics& arm, bool on_time) {
 
   const bool expected = sends() && measured_once_;
   if (expected) judgeAnswer(arm, on_time);
-  if (time_ >= krl_due_) krl_due_ = time_ + program_->poll(*this);
+  if (time_ >= krl_due_ && time_ >= opens_at_) krl_due_ = time_ + program_->poll(*this);
   answered_ = false;
 
   // After a fall-back or a change of strategy the set-point was re-anchored: nothing to interpolate
@@ -153,7 +160,8 @@ void Controller::follow(const fri::CommandDatagram& command) {
     last_step_ = next - setPoint();
     offset_ = next - own_;
   }
-  if ((command.flags & fri::kCartesianPosition) != 0) poseFromWire(command.cartesian_frame, frame_);
+  if ((command.flags & fri::kCartesianPosition) != 0)
+    poseFromWire(command.cartesian_frame, parameters_.frame_orthonormality, frame_);
   latched_ = command;
 }
 
@@ -183,7 +191,7 @@ fri::MeasurementDatagram Controller::measure(const ArmDynamics& arm, const ArmSi
   m.drive_error = drive_error_;
   m.drive_warning = 0;
   for (int i = 0; i < 7; ++i) {
-    if (temperature_[i] > 70.0)
+    if (temperature_[i] > parameters_.drive_warning)
       m.drive_warning = static_cast<std::uint16_t>(m.drive_warning | (1U << i));
   }
   fri::jointsToWire(temperature_, m.temperature);
@@ -265,11 +273,12 @@ void Controller::updateDrives(const ArmDynamics& arm) {
       show("drives not ready");
     }
   }
-  // Warm-up of the drives: 20 K above ambient at full torque, time constant 10 min.
+  // Warm-up of the drives.
   const Vector7 load = arm.motorTorque().cwiseQuotient(arm_parameters_.torque_limit);
   const Vector7 target =
-      Vector7::Constant(parameters_.ambient_temperature) + 20.0 * load.cwiseAbs2();
-  temperature_ += (target - temperature_) * (parameters_.period / 600.0);
+      Vector7::Constant(parameters_.ambient_temperature) +
+                         parameters_.drive_heating * load.cwiseAbs2();
+  temperature_ += (target - temperature_) * (parameters_.period / parameters_.drive_heating_time);
 }
 
 void Controller::watchTorque(const ArmDynamics& arm) {
@@ -321,6 +330,17 @@ void Controller::acknowledge() {
   error_latched_ = false;
 }
 
+void Controller::restartProgram(double period, double pause) {
+  requireRange("period", period, kShortestPeriod, kLongestPeriod);
+  if (!(pause >= 0.0)) throw std::invalid_argument("pause must not be negative");
+  friClose();
+  parameters_.period = period;
+  program_ = makeKrlProgram(parameters_.convention);
+  krl_out_ = {};
+  krl_in_ = {};
+  opens_at_ = time_ + pause;
+}
+
 void Controller::setOperatingMode(OperatingMode mode) {
   if (mode == parameters_.mode) return;
   // Turning the key switch stops a running program's motion.
@@ -350,15 +370,17 @@ bool Controller::setKrlStrategy(int strategy) {
 }
 
 void Controller::friOpen(double period) {
-  if (period > 0.0 && std::abs(period - parameters_.period) > 1e-9) {
-    show("friOpen: period stays " + std::to_string(parameters_.period) +
-         " s, set when the cell starts");
+  if (state_ != FriState::Off) return;
+  if (period > 0.0) {
+    if (!(period >= kShortestPeriod && period <= kLongestPeriod)) {
+      show("friOpen: period " + std::to_string(period) + " s is not in 0.001 .. 0.1");
+      return;
+    }
+    parameters_.period = period;
   }
-  if (state_ == FriState::Off) {
-    state_ = FriState::Monitor;
-    statistics_.clear();
-    measured_once_ = false;
-  }
+  state_ = FriState::Monitor;
+  statistics_.clear();
+  measured_once_ = false;
 }
 
 FriState Controller::friStart(double scale) {

@@ -30,19 +30,17 @@ class StartSequence {
     wait = krl.parameters().krl_poll;
     waited_ += wait;
     if (!krl.drivesReady()) {
-      if (waited_ > kDriveLimit) return Outcome::NoDrives;
+      if (waited_ > krl.parameters().krl_drive_wait) return Outcome::NoDrives;
       if (!nudged_) krl.nudge();
       nudged_ = true;
       return Outcome::Working;
     }
     if (krl.quality() < needed)
-      return waited_ > kQualityLimit ? Outcome::PoorQuality : Outcome::Working;
+      return waited_ > krl.parameters().krl_quality_wait ? Outcome::PoorQuality : Outcome::Working;
     return krl.friStart(1.0) == FriState::Command ? Outcome::Started : Outcome::NotEntered;
   }
 
  private:
-  static constexpr double kDriveLimit = 3.0,
-                          kQualityLimit = 12.0;  // s; 100 packets of 100 ms take 10 s
   double waited_ = 0.0;
   bool nudged_ = false;
 };

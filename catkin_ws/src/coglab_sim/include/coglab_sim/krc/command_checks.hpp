@@ -20,8 +20,9 @@ struct CheckContext {
   std::uint32_t latched_flags;  ///< of entry; only for checkCyclic
 };
 
-/// A 3x4 frame of the wire as pose; false if it is not a rotation within 1e-3 or not finite.
-bool poseFromWire(const float (&wire)[lwr_fri_bridge::fri::kFrameValues], Pose& pose);
+/// A 3x4 frame of the wire as pose; false if it is not a rotation within `tolerance` or not finite.
+bool poseFromWire(const float (&wire)[lwr_fri_bridge::fri::kFrameValues], double tolerance,
+                  Pose& pose);
 /// A pose as 3x4 frame of the wire.
 void poseToWire(const Pose& pose, float (&wire)[lwr_fri_bridge::fri::kFrameValues]);
 

@@ -79,6 +79,10 @@ class Controller : private KrlInterface {
   void leaveCommandMode(const std::string& reason);  ///< fall-back as after a fault
   void acknowledge();  ///< operator acknowledges messages; drives may be switched on again
   void setOperatingMode(OperatingMode mode);
+  /// The operator starts the KRL program anew, with another FRI period (s): FRI is closed, nothing
+  /// is sent for `pause` s, then the program opens it. @throws std::invalid_argument naming value
+  /// and range of the period.
+  void restartProgram(double period, double pause);
 
   double time() const { return time_; }
   lwr_fri_bridge::fri::FriState friState() const { return state_; }
@@ -131,6 +135,7 @@ class Controller : private KrlInterface {
   lwr_fri_bridge::fri::FriState state_ = lwr_fri_bridge::fri::FriState::Off;
   lwr_fri_bridge::fri::ControlStrategy strategy_ = lwr_fri_bridge::fri::ControlStrategy::Position;
   double start_scale_ = 1.0;
+  double opens_at_ = 0.0;  // the program is not started again before
 
   // Wire
   std::uint16_t counter_ = 0;  // of the last measurement
