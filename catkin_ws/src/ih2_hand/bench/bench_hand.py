@@ -81,6 +81,15 @@ def bare_sweep(descriptor: int, poll: select.poll) -> None:
                 count -= len(os.read(descriptor, count))
 
 
+def blocking_sweep(descriptor: int) -> None:
+    """The same requests by write and blocking read: no time limit either, so it can hang."""
+    for motor in range(WIRE.motors):
+        for code, count in ((0x45, 1), (0x4B, 1), (0x49, 2)):
+            os.write(descriptor, bytes((code, motor)))
+            while count > 0:
+                count -= len(os.read(descriptor, count))
+
+
 def pyserial_sweep(port: serial.Serial) -> None:
     """The same requests by pyserial's write and read."""
     for motor in range(WIRE.motors):
@@ -107,25 +116,30 @@ def request_time() -> list[Row]:
             poll = select.poll()
             poll.register(bare, select.POLLIN)
             plain = serial.Serial(port, timeout=0.05)
+            blocking = os.open(port, os.O_RDWR | os.O_NOCTTY)
             contestants = ((driver_sweep, driver), (bare_sweep, bare, poll),
-                           (pyserial_sweep, plain))
+                           (blocking_sweep, blocking), (pyserial_sweep, plain))
             for contestant in contestants * 3:
                 time_of(*contestant)
             times = [[time_of(*contestant) for contestant in contestants] for _ in range(BLOCKS)]
             plain.close()
             os.close(bare)
+            os.close(blocking)
             if driver.counters.resynchronisations:
                 raise RuntimeError("the line was disturbed during the measurement")
     finally:
         emulator.terminate()
         emulator.wait(10)
-    ours, bare_us, pyserial_us = (statistics.median(column)
-                                  for column in zip(*times, strict=True))
-    ratio = statistics.median(block[0] / block[1] for block in times)
-    pyserial_ratio = statistics.median(block[0] / block[2] for block in times)
+    ours, bare_us, blocking_us, pyserial_us = (statistics.median(column)
+                                               for column in zip(*times, strict=True))
+    ratio, blocking_ratio, pyserial_ratio = (
+        statistics.median(block[0] / block[peer] for block in times) for peer in (1, 2, 3))
     wire_us = (3 + 3 + 4) / 3 * 10 / WIRE.baud * 1e6
     return [row("driver time per request / bare write and read on the same pty", ratio, "ratio",
                 "<= 1.25", ratio <= 1.25, "bare write/poll/read loop (us)", bare_us),
+            row("driver time per request / write and blocking read, which has no time limit",
+                blocking_ratio, "ratio", "<= 1.25", blocking_ratio <= 1.25,
+                "write/blocking read loop (us)", blocking_us),
             row("driver time per request / pyserial write and read", pyserial_ratio, "ratio",
                 "<= 1.25", pyserial_ratio <= 1.25, "pyserial write/read loop (us)", pyserial_us),
             row("driver time per request on the pty", ours, "us", None, True,

@@ -64,7 +64,9 @@ def main() -> int:
     if as_node:
         import rospy
         from ih2_hand.ros.emulator_node import EmulatorNode
+        from ih2_hand.ros.shutdown import end_quietly
         rospy.init_node("hand_emulator", disable_signals=True)
+        end_quietly()
         arguments, announce = rospy.myargv(sys.argv)[1:], EmulatorNode.announce
     options = parse(arguments)
     try:
@@ -92,13 +94,14 @@ def main() -> int:
             return 2
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: server.request_shutdown())
-    if as_node:
-        EmulatorNode(server)
+    node = EmulatorNode(server) if as_node else None
     if options.commands:
         threading.Thread(target=read_commands, args=(server,), daemon=True).start()
-    server.serve()
+    server.serve(rospy.is_shutdown if node else lambda: False)
+    if node:
+        node.stop()
     server.shutdown()
-    if as_node:
+    if node:
         rospy.signal_shutdown("ended")
     return 0
 

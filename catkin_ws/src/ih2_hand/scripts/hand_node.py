@@ -5,10 +5,12 @@ import sys
 
 import rospy
 from ih2_hand.ros.hand_node import HandNode
+from ih2_hand.ros.shutdown import end_quietly
 
 
 def main() -> int:
     rospy.init_node("ih2_hand")
+    end_quietly()
     try:
         node = HandNode()
     except (ValueError, OSError) as error:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from ih2_hand import grasps
+from ih2_hand.driver import HandSerialDriver
 from ih2_hand.errors import NoForceSensorError
 
 BAD_MOTORS = [-1, 5, 255, 2.0, "2", None, True]
@@ -62,6 +63,19 @@ def test_force_of_the_motor_without_sensor(bench, call, arguments):
     with pytest.raises(NoForceSensorError, match="no tension sensor"):
         getattr(bench.driver, call)(*arguments)
     assert bench.sent() == ""
+
+
+@pytest.mark.parametrize("seconds", [-1.0, 0.0, 0.004, 0.6, float("nan"), float("inf")])
+def test_a_read_time_limit_out_of_range_is_refused_before_the_port_is_opened(seconds):
+    with pytest.raises(ValueError, match=r"read_timeout must be 0\.005\.\.0\.5 s"):
+        HandSerialDriver("/dev/there-is-no-such-port", read_timeout=seconds)
+
+
+@pytest.mark.parametrize("options", [{"dialect": "v18"}, {"preshapes": {"lateral": [0] * 4}},
+                                     {"preshapes": {"lateral": [0, 0, 0, 0, 255]}}])
+def test_options_out_of_range_are_refused_before_the_port_is_opened(options):
+    with pytest.raises(ValueError):
+        HandSerialDriver("/dev/there-is-no-such-port", **options)
 
 
 def test_numpy_integers_are_whole_numbers(bench):

@@ -1,9 +1,10 @@
 """100 000 corrupted byte streams: no wrong value passes as right, and the driver never sticks.
 
-A stream is a handful of calls during which one byte, in either direction, is lost, doubled, flipped
-or preceded by a stray byte. The truth is read from the emulated motors at every request. Bursts
-that hit one value twice are beyond a protocol without checksums: two equal lies look like the
-truth. They are counted in a campaign of their own.
+A stream is a handful of calls during which one or two bytes, in either direction, are lost,
+doubled, flipped or preceded by a stray byte. The truth is read from the emulated motors at every
+request. A value needs three equal readings, so one or two corruptions cannot forge one. Three that
+forge the same lie can: `test_as_many_equal_lies_as_readings_are_the_truth` shows that no driver can
+tell, whatever number of readings it takes. Worse bursts are therefore counted, not excluded.
 """
 
 from __future__ import annotations
@@ -171,11 +172,70 @@ def run(seed: int, streams: int, events: tuple[int, ...]) -> Campaign:
 
 @pytest.mark.parametrize("part", range(PARTS))
 def test_corrupted_streams(part):
-    campaign = run(1000 + part, STREAMS // PARTS, (1,))
+    campaign = run(1000 + part, STREAMS // PARTS, (1, 1, 2))
     assert campaign.corrupter.done > STREAMS // PARTS * 0.7
     assert campaign.wrong == []
 
 
-def test_bursts():
-    campaign = run(2000, STREAMS // 10, (2, 3))
-    assert len(campaign.wrong) < campaign.read / 500
+def test_bursts_of_two():
+    campaign = run(2000, STREAMS // 10, (2,))
+    assert campaign.wrong == []
+
+
+def test_worse_bursts():
+    """Beyond what can be excluded: counted. The motor's number alone is a force read, so three lost
+    or changed first bytes of GetMotorCurrent read the tension instead, three times.
+    """
+    campaign = run(3000, STREAMS // 10, (3, 4, 6))
+    assert len(campaign.wrong) * 2_000 <= campaign.read
+
+
+class Flipped:
+    """A line that flips the same bit of every byte from the hand."""
+
+    def __init__(self, bit: int):
+        self.mask = 1 << bit
+
+    def __call__(self, data: bytes) -> bytes:
+        return bytes(byte ^ self.mask for byte in data)
+
+
+def test_as_many_equal_lies_as_readings_are_the_truth():
+    """A finger at 100 behind a line that flips bit 3, and a finger at 108 behind a clean line:
+    byte for byte the same answers, so the same value. No rule on the answers can tell them apart.
+    """
+    answers, values = [], []
+    for position, tamper in ((100, Flipped(3)), (108, None)):
+        clock = VirtualClock()
+        hand = EmulatedHand(clock, greeting=True, positions=[0, position, 0, 0, 0])
+        link = VirtualLink(hand, clock)
+        driver = HandSerialDriver(transport=link, clock=clock)
+        heard = bytearray()
+        driver.line.trace = lambda way, data, heard=heard: heard.extend(data if way == "<" else b"")
+        link.to_host = tamper
+        values.append(driver.get_raw_position(1))
+        answers.append(bytes(heard))
+        assert driver.counters.resynchronisations == 0
+    assert answers[0] == answers[1]
+    assert values == [108, 108]
+
+
+class Forger:
+    """Flips one bit of the first `lies` answers to a position request."""
+
+    def __init__(self, lies: int):
+        self.lies = lies
+
+    def __call__(self, data: bytes) -> bytes:
+        self.lies -= 1
+        return bytes(byte ^ 8 for byte in data) if self.lies >= 0 else data
+
+
+@pytest.mark.parametrize("lies", [1, 2])
+def test_fewer_equal_lies_than_readings_are_found_out(lies):
+    clock = VirtualClock()
+    hand = EmulatedHand(clock, greeting=True, positions=[0, 100, 0, 0, 0])
+    link = VirtualLink(hand, clock)
+    driver = HandSerialDriver(transport=link, clock=clock)
+    link.to_host = Forger(lies)
+    assert driver.get_raw_position(1) == 100

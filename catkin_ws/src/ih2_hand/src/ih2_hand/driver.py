@@ -41,6 +41,9 @@ CALIBRATIONS = {
     "complete": (frames.FIRST_CALIBRATION, "calibration_complete_limit_s"),
 }
 
+LEAST_READ_TIMEOUT_S, LARGEST_READ_TIMEOUT_S = 0.005, 0.5
+"""Bounds of a read's time limit: longer than the hand's own delay, short enough to act upon."""
+
 MILLIAMPERE_PER_COUNT = (0.81, 1.1, 1.1, 1.1, 1.1)
 """Motor current, by motor (EH1 guide 2.2.2)."""
 
@@ -74,6 +77,9 @@ class HandSerialDriver:
             raise ValueError(f"dialect must be legacy or v17; got {dialect!r}")
         self.preshapes = {mode: tuple(_positions(list(positions))) for mode, positions in
                           (preshapes or grasps.load_preshapes()).items()}
+        if not LEAST_READ_TIMEOUT_S <= read_timeout <= LARGEST_READ_TIMEOUT_S:
+            raise ValueError(f"read_timeout must be {LEAST_READ_TIMEOUT_S}.."
+                             f"{LARGEST_READ_TIMEOUT_S} s; got {read_timeout!r}")
         self.send_preshape = send_preshape
         self._grasp: bytes | None = None
         self._grasp_mode: tuple[str, str] | None = None
@@ -199,11 +205,11 @@ class HandSerialDriver:
                              f"{is_close_direction!r}")
         self._command(frames.move_motor(motor, speed, bool(is_close_direction)))
 
-    def set_finger_position(self, motor: int, position: int) -> None:
+    def set_finger_position(self, finger: int, position: int) -> None:
         """Move a motor to `position` 0..254."""
-        _motor(motor)
+        _motor(finger)
         _whole("position", position, WIRE.position_max)
-        self._command(frames.set_finger_position(motor, position))
+        self._command(frames.set_finger_position(finger, position))
 
     def set_finger_force(self, motor: int, force: int) -> None:
         """Pull a finger's tendon with `force` 0..254 (W5); motor 0 has no sensor (W6)."""

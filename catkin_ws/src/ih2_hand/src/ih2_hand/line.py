@@ -6,10 +6,12 @@ The protocol has neither lengths nor checksums, so three rules stand in for them
   flushed (a counted resynchronisation) and the request repeated;
 * an answer that does not come makes the hand's own parser suspect: it is filled with StopALL (W10,
   counted, and it does stop the fingers), then the request is repeated once, then HandTimeoutError;
-* a value counts when two readings agree, so that one corrupted byte cannot make a wrong one. While
-  the hand is known to rest (`resting`), the value confirmed before is the second reading and the
-  confirmation costs nothing. Values that move under the readings settle by their median while they
-  stay within what a finger can do in that time; otherwise HandInconsistentError.
+* a value counts when AGREE readings agree, so that fewer corrupted bytes than that cannot make a
+  wrong one. While the hand is known to rest (`resting`), a reading that equals the value confirmed
+  before is enough and the confirmation costs nothing. Values that move under the readings settle by
+  their median while they stay within what a finger can do in that time; otherwise
+  HandInconsistentError. As many equal lies as readings look like the truth, whatever their number:
+  without a checksum no rule can tell the two apart.
 """
 
 from __future__ import annotations
@@ -27,8 +29,14 @@ from ih2_hand.wire_choices import WIRE
 TraceHook = Callable[[str, bytes], None]
 """Called with ">" (to the hand) or "<" (from the hand) and the bytes."""
 
+AGREE = 3
+"""Equal readings that confirm a value: two corrupted bytes cannot make a wrong one."""
+
 READINGS = 5
-"""Readings taken of one value before it counts as contradictory."""
+"""Readings taken of one value, without a slip between them, before their median has to do."""
+
+ATTEMPTS = 8
+"""Requests for one value, slips included, before its readings count as contradictory."""
 
 QUIET_S = 0.002
 """After a flush the line must stay silent this long (20 byte times)."""
@@ -206,19 +214,21 @@ class HandLine:
         start = self.clock.monotonic()
         for last_round in (False, True):
             readings = [] if first is None else [first]
-            for _ in range(READINGS - 1):
+            for _ in range(ATTEMPTS):
                 resynchronisations = self.counters.resynchronisations
                 number = self._number(frame, length)
                 if self.counters.resynchronisations != resynchronisations:
                     readings.clear()  # what was read across a slip may belong to another question
                 if number is None:
                     continue
-                if number in readings:
-                    return number
                 readings.append(number)
+                if readings.count(number) == AGREE:
+                    return number
+                if len(readings) == READINGS:
+                    break
             span = slack.counts + slack.rate * (self.clock.monotonic() - start)
-            if len(readings) > 2 and max(readings) - min(readings) <= span:
-                return sorted(readings)[len(readings) // 2]
+            if len(readings) == READINGS and max(readings) - min(readings) <= span:
+                return sorted(readings)[READINGS // 2]
             if not last_round:
                 self._flush("readings contradict each other")
                 first = None

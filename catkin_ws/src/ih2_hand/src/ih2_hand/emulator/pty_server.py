@@ -88,20 +88,22 @@ class PtyServer:
 
     # -- serving ---------------------------------------------------------------------------------
 
-    def serve(self) -> None:
-        """Answer until `shutdown`."""
-        while self._running:
+    def serve(self, ended: Callable[[], bool] = lambda: False) -> None:
+        """Answer until `shutdown`, or until `ended` says so: it is asked once a second."""
+        while self._running and not ended():
             with self.lock:
                 master, plug = self._master, self._plugs
             poll = select.poll()
             poll.register(self._wake_read, select.POLLIN)
             if master >= 0:
                 poll.register(master, select.POLLIN)
-            self._serve_port(poll, master, plug)
+            self._serve_port(poll, master, plug, ended)
 
-    def _serve_port(self, poll: select.poll, master: int, plug: int) -> None:
+    def _serve_port(self, poll: select.poll, master: int, plug: int,
+                    ended: Callable[[], bool]) -> None:
         """Serve while the same pty is open. Its number alone does not tell: numbers return."""
-        while self._running and self._master == master and self._plugs == plug:
+        while (self._running and self._master == master and self._plugs == plug
+               and not ended()):
             events = poll.poll(self._wait_s() * 1000.0)
             with self.lock:
                 for descriptor, _ in events:

@@ -21,14 +21,25 @@ class EmulatorNode:
         rospy.Subscriber("finger_contact", FingerContact, self._on_contact, queue_size=5)
         rospy.Subscriber("hand_fault", String, self._on_fault, queue_size=5)
         self._timer = rospy.Timer(rospy.Duration(1.0 / PUBLISH_HZ), self._publish)
+        # rospy may end without a signal (rosnode kill): the process ends with it.
+        rospy.on_shutdown(server.request_shutdown)
+
+    def stop(self) -> None:
+        """Publish no more: to be called before rospy shuts down."""
+        self._timer.shutdown()
+        self._timer.join(1.0)
 
     @staticmethod
     def announce(path: str) -> None:
         """Set (or, while unplugged, remove) the parameter with the pty's path."""
-        if path:
-            rospy.set_param("hand_port", path)
-        elif rospy.has_param("hand_port"):
-            rospy.delete_param("hand_port")
+        try:
+            if path:
+                rospy.set_param("hand_port", path)
+            elif rospy.has_param("hand_port"):
+                rospy.delete_param("hand_port")
+        except Exception as error:  # whatever the master's absence raises; the hand lives on
+            rospy.logwarn("parameter hand_port not updated, the ROS master does not answer: %s",
+                          error)
 
     def _on_contact(self, contact: FingerContact) -> None:
         try:

@@ -39,6 +39,9 @@ from ih2_hand.progress import RESENDS, Task, Verdict
 SETTLE_S = 0.02
 """Polls begun earlier than this after a command may still show the status before it."""
 
+SENDING_S = 0.1
+"""A result published at shutdown needs this long to leave the process."""
+
 SILENCE_S = 1.5
 """Without a hand_status for this long a goal is aborted."""
 
@@ -100,9 +103,12 @@ class GoalQueue:
             server.start()
 
     def shutdown(self) -> None:
-        """Abort what runs and end the thread, bounded."""
+        """Abort what runs and end the thread, bounded; the results are sent before it returns."""
+        was_running = self._running is not None
         self._mailbox.put(Item("quit"))
         self._thread.join(1.0)
+        if was_running:
+            time.sleep(SENDING_S)
 
     @property
     def active(self) -> str | None:

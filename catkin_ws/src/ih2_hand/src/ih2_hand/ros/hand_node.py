@@ -14,7 +14,7 @@ from std_msgs.msg import String
 from std_srvs.srv import Trigger, TriggerResponse
 
 from ih2_hand import grasps
-from ih2_hand.driver import HandSerialDriver
+from ih2_hand.driver import LARGEST_READ_TIMEOUT_S, LEAST_READ_TIMEOUT_S, HandSerialDriver
 from ih2_hand.errors import (
     HandCalibratingError,
     HandConnectionLost,
@@ -24,6 +24,7 @@ from ih2_hand.errors import (
     HandTimeoutError,
 )
 from ih2_hand.progress import (
+    LONGEST_S,
     CloseTask,
     GraspTask,
     OpenTask,
@@ -67,9 +68,13 @@ class HandNode:
         self._dialect = str(rospy.get_param("~dialect", "legacy"))
         self._is_current = not bool(rospy.get_param("~use_tension", False))
         self._read_timeout = float(rospy.get_param("~read_timeout", WIRE.read_timeout_s))
-        if not 0.005 <= self._read_timeout <= 0.5:
-            raise ValueError(f"~read_timeout must be 0.005..0.5 s; got {self._read_timeout}")
+        if not LEAST_READ_TIMEOUT_S <= self._read_timeout <= LARGEST_READ_TIMEOUT_S:
+            raise ValueError(f"~read_timeout must be {LEAST_READ_TIMEOUT_S}.."
+                             f"{LARGEST_READ_TIMEOUT_S} s; got {self._read_timeout}")
         self._limit = float(rospy.get_param("~goal_time_limit", 10.0))
+        if not 0.0 < self._limit <= LONGEST_S:
+            raise ValueError(f"~goal_time_limit must be above 0, at most {LONGEST_S:.0f} s; got "
+                             f"{self._limit}")
         self._preshapes = grasps.load_preshapes(rospy.get_param("~grasps_file", "") or None)
         self.driver: HandSerialDriver | None = None
         self.port = self._port_setting or "(the only serial device)"
@@ -93,11 +98,13 @@ class HandNode:
         self._thread = threading.Thread(target=self._poll, name="poll", daemon=True)
 
     def run(self) -> None:
-        """Work until the node is shut down. The fingers keep what they do then."""
+        """Work until the node is shut down: a goal under way is aborted and the fingers stopped;
+        without one they keep what they do."""
+        # Before rospy closes the topics, so that who waits for the goal learns how it ended.
+        rospy.on_shutdown(self.goals.shutdown)
         self._thread.start()
         self.goals.start()
         rospy.spin()
-        self.goals.shutdown()
         self._ended.set()
         self._thread.join(2.0)
         if self.driver:

@@ -1,0 +1,24 @@
+"""A quiet end: threads that publish when rospy has just closed their topic leave no traceback."""
+
+from __future__ import annotations
+
+import threading
+from typing import Any
+
+import rospy
+
+
+def end_quietly() -> None:
+    """From now on such a thread ends without a word, once rospy shuts down.
+
+    Also threads of libraries, which cannot be told beforehand: actionlib's status loop.
+    """
+    report = threading.excepthook
+
+    def hook(arguments: Any) -> None:
+        # rospy closes topics first and raises its flag afterwards: "requested" covers both.
+        ending = rospy.core.is_shutdown_requested() or rospy.is_shutdown()
+        if not (ending and issubclass(arguments.exc_type, rospy.ROSException)):
+            report(arguments)
+
+    threading.excepthook = hook
