@@ -168,6 +168,24 @@ def test_gaps_and_old_frames_do_no_harm(patterns):
     assert recogniser.estimate.pattern == "left"
 
 
+def test_an_estimate_outlives_its_reach_for_a_second_only(patterns):
+    rng = np.random.default_rng(11)
+    recogniser = Recogniser(patterns)
+    stamps, positions, onset, duration = reach("left", rng, hold=4.0)
+    kept = 0.0
+    for t, p in zip(stamps, positions, strict=False):
+        if recogniser.update(t, p).decided:
+            kept = t
+    over = onset + duration
+    assert over + 0.5 < kept < over + 2.5, "kept for a while, then forgotten"
+    assert recogniser.estimate.pattern == UNKNOWN and not recogniser.estimate.probabilities
+    # The way back is no reach of these patterns, the next reach is recognised like the first.
+    stamps, positions, _, _ = reach("high", rng)
+    for t, p in zip(stamps + 100.0, positions, strict=False):
+        recogniser.update(t, p)
+    assert recogniser.estimate.pattern == "high" and recogniser.estimate.decided
+
+
 def test_pattern_files_round_trip_and_are_checked(patterns, tmp_path):
     path = tmp_path / "p.json"
     save_patterns(str(path), patterns, RecogniserSettings(), "test")

@@ -1,14 +1,20 @@
 #!/usr/bin/python3
-"""The node /coglab_sim/perception: stands in for a tracker and for the perception modules.
+"""The node /perception: stands in for a tracker and for the perception modules.
 
-Subscribes truth/cell (relative name) and broadcasts the tf frames of frames.yaml: human_hand, object_<id>, board.
-Serves /perception/init_vision, /perception/locate_object, /perception/free_places.
-Parameters (private): settings (mapping, see PerceptionSettings), perfect, seed, frames (mapping of names), board
-(xyz m, yaw_deg, slots: name -> [x, y, z] in the board frame).
+Subscribes coglab_sim/truth/cell and broadcasts the tf frames of frames.yaml: human_hand,
+object_<id>, board. Serves ~init_vision, ~locate_object, ~free_places. Topic ~people
+(std_msgs/UInt8): how many people are in view from now on. Or plays recorded motion: frames in the
+recording take the place of the cell's.
+
+Parameters (private): frames (mapping of frames.yaml), settings (mapping, see PerceptionSettings),
+perfect, seed, board (xyz m, yaw_deg, slots: name -> [x, y, z] in the board frame), people (1),
+others (places of the other people's hands, m), partner_margin (m, see PartnerChoice), recording
+(mapping, see PlaybackSettings; without a file nothing is played). Names are relative.
 """
+
+from __future__ import annotations
+
 import sys
-import threading
-import time
 
 import numpy as np
 import rospy
@@ -22,12 +28,16 @@ from coglab_msgs.srv import (
     LocateObject,
     LocateObjectResponse,
 )
-from coglab_sim.perception_stand_in import Board, PerceptionSettings, Sight, Tracker
+from coglab_sim.perception_stand_in import Board, PerceptionSettings, Sight
+from coglab_sim.recorded_motion import Playback, PlaybackSettings
 from coglab_sim.rigid import Frame, quat_from_rotvec
+from coglab_sim.vision import Names, NotSeen, Vision
 from geometry_msgs.msg import Point, PoseStamped, Quaternion, TransformStamped, Vector3
+from std_msgs.msg import UInt8
 
-OLDEST = 0.5
-"""s: an older sight is no answer to locate_object."""
+PLAYBACK_HZ = 100.0
+OTHERS = [[1.05, 0.45, 0.35], [1.05, -0.45, 0.35]]
+"""m, where the other people's hands are unless ~others says otherwise."""
 
 
 def frame_of(pose) -> Frame:
@@ -36,128 +46,147 @@ def frame_of(pose) -> Frame:
     return Frame(np.array([p.x, p.y, p.z]), np.array([q.x, q.y, q.z, q.w]))
 
 
+def names_of(mapping) -> Names:
+    """Frame names from the parameter; KeyError with a sentence if one is missing."""
+    roles = ("world", "human_hand", "board", "object")
+    missing = [role for role in roles if not mapping.get(role)]
+    if missing:
+        raise KeyError(f"~frames lacks {', '.join(missing)}: load coglab_perception's "
+                       "config/frames.yaml into perception/frames")
+    return Names(*(str(mapping[role]) for role in roles))
+
+
 class PerceptionNode:
-    """Thin node over Tracker and Board."""
+    """Thin node over Vision and Playback."""
 
     def __init__(self) -> None:
+        names = names_of(dict(rospy.get_param("~frames", {})))
         settings = dict(rospy.get_param("~settings", {}))
         settings["perfect"] = bool(rospy.get_param("~perfect", settings.get("perfect", False)))
-        self.settings = PerceptionSettings.from_mapping(settings)
-        self.seed = int(rospy.get_param("~seed", rospy.get_param("/coglab_sim/seed", 7)))
-        names = dict(rospy.get_param("~frames", {}))
-        self.human_frame = names.get("human_hand", "human_hand")
-        self.board_frame = names.get("board", "board")
-        self.object_pattern = names.get("object", "object_{id}")
-        self.world = names.get("world", "world")
-        board = dict(rospy.get_param("~board", {"xyz": [0.45, -0.55, 0.05], "yaw_deg": -90.0,
-                                                "slots": {"A1": [0.0, 0.0, 0.0]}}))
+        seed = int(rospy.get_param("~seed", rospy.get_param("coglab_sim/seed", 7)))
+        board = dict(rospy.get_param("~board"))
         turn = quat_from_rotvec([0.0, 0.0, np.radians(float(board.get("yaw_deg", 0.0)))])
-        self.board = Board(Frame(np.array(board["xyz"], dtype=float), turn),
-                           {name: np.array(place, dtype=float) for name, place in board["slots"].items()})
-        self.lock = threading.Condition()
-        self.trackers: dict[str, Tracker] = {}
-        self.object_id = ""
-        self.truth_stamp = -1e9
+        self.vision = Vision(
+            names, PerceptionSettings.from_mapping(settings),
+            Board(Frame(np.array(board["xyz"], dtype=float), turn),
+                  {name: np.array(place, dtype=float) for name, place in board["slots"].items()}),
+            seed, rospy.get_time, float(rospy.get_param("~partner_margin", 0.0)))
+        self.others = [Frame(np.array(place, dtype=float))
+                       for place in rospy.get_param("~others", OTHERS)]
+        self.people = int(rospy.get_param("~people", 1))
+        self.truth: CellTruth | None = None
         self.broadcaster = tf2_ros.TransformBroadcaster()
         self.static = tf2_ros.StaticTransformBroadcaster()
-        self.static.sendTransform(self.transform(Sight(self.board_frame, rospy.get_time(), self.board.frame)))
-        rospy.Subscriber("truth/cell", CellTruth, self.on_truth, queue_size=1, tcp_nodelay=True)
-        rospy.Service("/perception/init_vision", InitVision, self.on_init)
-        rospy.Service("/perception/locate_object", LocateObject, self.on_locate)
-        rospy.Service("/perception/free_places", FreePlaces, self.on_places)
+        board_sight = Sight(names.board, rospy.get_time(), self.vision.board.frame)
+        self.static.sendTransform(self.transform(board_sight))
+        recording = {"frame": names.human_hand, **dict(rospy.get_param("~recording", {}))}
+        playback = PlaybackSettings.from_mapping(recording)
+        self.playback = Playback.open(playback, names.world) if playback.file else None
+        if self.playback:
+            rospy.loginfo("perception plays %s: %s, %.1f s", playback.file,
+                          ", ".join(self.playback.names), self.playback.recording.duration)
+            self.timer = rospy.Timer(rospy.Duration(1.0 / PLAYBACK_HZ), self.on_timer)
+        rospy.Subscriber("coglab_sim/truth/cell", CellTruth, self.on_truth, queue_size=1,
+                         tcp_nodelay=True)
+        rospy.Subscriber("~people", UInt8, self.on_people, queue_size=1)
+        rospy.Service("~init_vision", InitVision, self.on_init)
+        rospy.Service("~locate_object", LocateObject, self.on_locate)
+        rospy.Service("~free_places", FreePlaces, self.on_places)
 
-    def tracker(self, name: str) -> Tracker:
-        """The tracker of a frame, made when it is first needed."""
-        if name not in self.trackers:
-            self.trackers[name] = Tracker(name, self.settings, self.seed)
-        return self.trackers[name]
+    # -- seeing ----------------------------------------------------------------------------------
 
     def on_truth(self, message: CellTruth) -> None:
-        """Capture and deliver; the capture time is the time of this node, as a camera's would be."""
-        now = rospy.get_time()
-        robot = frame_of(message.robot_hand)
-        sights = []
-        with self.lock:
-            self.truth_stamp = time.monotonic()
-            self.object_id = message.object_id
-            sights += self.tracker(self.human_frame).step(now, frame_of(message.human_hand), robot)
-            if message.object_id:
-                name = self.object_pattern.format(id=message.object_id)
-                sights += self.tracker(name).step(now, frame_of(message.object), robot)
-            self.lock.notify_all()
-        if sights:
-            self.broadcaster.sendTransform([self.transform(s) for s in sights])
+        """The cell as it is now; the capture time is this node's, as a camera's would be."""
+        self.truth = message
+        if not self.playback:
+            self.see()
+
+    def on_timer(self, _event: rospy.timer.TimerEvent) -> None:
+        """The next frames of the recording."""
+        self.see()
+
+    def on_people(self, message: UInt8) -> None:
+        """Somebody comes into view, or leaves."""
+        self.people = message.data
+        rospy.loginfo("perception: %d people in view", message.data)
+
+    def see(self) -> None:
+        """Everything in view, through noise and latency to tf."""
+        names, truth = self.vision.names, self.truth
+        hand, robot, objects = None, None, {}
+        if truth is not None:
+            hand, robot = frame_of(truth.human_hand), frame_of(truth.robot_hand)
+            if truth.object_id:
+                objects[names.object_frame(truth.object_id)] = frame_of(truth.object)
+        if self.playback:
+            played = self.playback.frames(rospy.get_time(), robot)
+            if names.human_hand in self.playback.names:
+                hand = None
+            hand = played.pop(names.human_hand, hand)
+            objects.update(played)
+        crowd = ([hand] if hand is not None else []) + self.others
+        hands = {f"person {i + 1}": each for i, each in enumerate(crowd[:self.people])}
+        sights = self.vision.see(hands, objects, robot)
+        try:
+            if sights:
+                self.broadcaster.sendTransform([self.transform(sight) for sight in sights])
+        except rospy.ROSException:
+            if not rospy.core.is_shutdown_requested():
+                raise  # else: rospy has closed tf under a last sight
 
     def transform(self, sight: Sight) -> TransformStamped:
         """A sight as a tf message, stamped with its capture time."""
         message = TransformStamped()
         message.header.stamp = rospy.Time.from_sec(sight.captured)
-        message.header.frame_id = self.world
+        message.header.frame_id = self.vision.names.world
         message.child_frame_id = sight.name
         message.transform.translation = Vector3(*sight.frame.position)
         message.transform.rotation = Quaternion(*sight.frame.orientation)
         return message
 
+    # -- services --------------------------------------------------------------------------------
+
     def on_init(self, request):
         """Ready once the cell's world is visible."""
-        with self.lock:
-            if self.lock.wait_for(lambda: time.monotonic() - self.truth_stamp < 0.5, request.timeout):
-                return InitVisionResponse(True, "tracker stand-in sees the cell")
-        return InitVisionResponse(False, f"the cell was not visible within {request.timeout:.1f} s; is "
-                                         "/coglab_sim/cell running?")
+        try:
+            return InitVisionResponse(True, self.vision.init_vision(request.timeout))
+        except NotSeen as reason:
+            return InitVisionResponse(False, str(reason))
 
     def on_locate(self, request):
-        """Newest sight of an object, of the person's hand or of the board, fresh enough; else why not."""
-        if request.object_id == self.board_frame:
-            response = LocateObjectResponse(success=True, frame_id=self.board_frame, age=0.0)
-            response.pose = self.pose(self.world, rospy.get_time(), self.board.frame)
-            return response
-        if request.object_id == self.human_frame:
-            name = self.human_frame
-        else:
-            name = self.object_pattern.format(id=request.object_id)
-
-        def fresh():
-            tracker = self.trackers.get(name)
-            return (tracker is not None and tracker.newest is not None
-                    and rospy.get_time() - tracker.newest.captured < OLDEST)
-
-        with self.lock:
-            if not self.lock.wait_for(fresh, max(0.0, request.timeout)):
-                seen = sorted(n for n, t in self.trackers.items() if t.newest is not None)
-                return LocateObjectResponse(success=False, message=(
-                    f"'{name}' was not seen within {request.timeout:.1f} s; in view: {', '.join(seen) or 'nothing'}"))
-            sight = self.trackers[name].newest
-        response = LocateObjectResponse(success=True, frame_id=name, age=rospy.get_time() - sight.captured)
-        response.pose = self.pose(self.world, sight.captured, sight.frame)
-        return response
+        """Newest sight of an object, of the partner's hand or of the board; else why not."""
+        try:
+            frame, sight, age = self.vision.locate(request.object_id, request.timeout)
+        except NotSeen as reason:
+            return LocateObjectResponse(success=False, message=str(reason))
+        return LocateObjectResponse(
+            success=True, frame_id=frame, age=age,
+            pose=pose(self.vision.names.world, sight.captured, sight.frame))
 
     def on_places(self, request):
-        """Slots without an object on them."""
-        with self.lock:
-            objects = [t.newest.frame.position for n, t in self.trackers.items()
-                       if n != self.human_frame and t.newest is not None
-                       and n != self.object_pattern.format(id=request.object_id)]
-        names = self.board.free(objects)
-        if not names:
-            return FreePlacesResponse(False, "no place on the board is free; clear one of "
-                                             f"{', '.join(self.board.slots)}", [])
-        places = [self.pose(self.board_frame, rospy.get_time(), Frame(self.board.slots[name])) for name in names]
-        return FreePlacesResponse(True, ", ".join(names), places)
+        """Slots of the board without an object on them; else why there is none."""
+        try:
+            places = self.vision.free_places(request.object_id, request.timeout)
+        except NotSeen as reason:
+            return FreePlacesResponse(False, str(reason), [])
+        return FreePlacesResponse(
+            True, ", ".join(name for name, _ in places),
+            [pose(self.vision.names.board, rospy.get_time(), Frame(place))
+             for _, place in places])
 
-    @staticmethod
-    def pose(parent: str, stamp: float, frame: Frame) -> PoseStamped:
-        """PoseStamped of a frame."""
-        message = PoseStamped()
-        message.header.frame_id = parent
-        message.header.stamp = rospy.Time.from_sec(stamp)
-        message.pose.position = Point(*frame.position)
-        message.pose.orientation = Quaternion(*frame.orientation)
-        return message
+
+def pose(parent: str, stamp: float, frame: Frame) -> PoseStamped:
+    """PoseStamped of a frame."""
+    message = PoseStamped()
+    message.header.frame_id = parent
+    message.header.stamp = rospy.Time.from_sec(stamp)
+    message.pose.position = Point(*frame.position)
+    message.pose.orientation = Quaternion(*frame.orientation)
+    return message
 
 
 def main() -> int:
-    """Entry point."""
+    """Entry point; exit status 1 where parameters or recording cannot be used."""
     rospy.init_node("perception")
     try:
         PerceptionNode()

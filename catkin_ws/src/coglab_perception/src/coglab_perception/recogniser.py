@@ -1,10 +1,9 @@
 """Which reaching pattern is the partner performing? Recognition from the hand's position, frame by frame.
 
-Features: displacement from the place where the hand rested (m) and velocity over a short window (m/s). The
-posterior over
-the patterns comes from the models' forward filters; 'unknown' where even the best one explains the motion
-badly. A decision
-needs a confident posterior for several frames, and is kept until another pattern has been as confident for as long.
+Features: displacement from the place where the hand rested (m) and velocity over a short window (m/s). The posterior
+over the patterns comes from the models' forward filters; 'unknown' where even the best one explains the motion badly.
+A decision needs a confident posterior for several frames, and is kept until another pattern has been as confident for
+as long, or the reach has been over for a while.
 """
 from __future__ import annotations
 
@@ -41,6 +40,8 @@ class RecogniserSettings:
     """s, over which velocity is taken"""
     max_gap: float = 0.4
     """s without a frame: what was seen before does not count any more"""
+    memory: float = 1.0
+    """s for which the estimate outlives its reach: who acts on it late must not act on an old one"""
     temperature: float = 3.0
     """frames of a tracker are correlated: the log-likelihood is divided by this before it becomes a probability"""
 
@@ -135,6 +136,8 @@ class Recogniser:
         self._filters: list[HmmFilter] = []
         self._streak: tuple[str, int] = (UNKNOWN, 0)
         self._decision = UNKNOWN
+        self._over_since: float | None = None
+        self._newest = -math.inf
 
     def update(self, stamp: float, position: Sequence[float]) -> Estimate:
         """One frame of the partner's hand."""
@@ -142,7 +145,9 @@ class Recogniser:
             return self.estimate
         features = self.stream.update(stamp, position)
         if features is None:
+            self._forget(stamp)
             return self.estimate
+        self._over_since, self._newest = None, stamp
         if self.stream.started:
             self._filters = [HmmFilter(p.model) for p in self.patterns]
             self._streak, self._decision = (UNKNOWN, 0), UNKNOWN
@@ -150,6 +155,16 @@ class Recogniser:
             f.update(features)
         self.estimate = self._judge()
         return self.estimate
+
+    def _forget(self, stamp: float) -> None:
+        """The hand rests: some time after a reach nothing is known any more."""
+        if self.stream.moving or not self.estimate.probabilities:
+            return
+        self._newest = max(self._newest, stamp)
+        if self._over_since is None:
+            self._over_since = self._newest
+        elif stamp - self._over_since > self.settings.memory:
+            self.estimate = Estimate()
 
     def _judge(self) -> Estimate:
         scores = np.array([f.log_likelihood for f in self._filters])

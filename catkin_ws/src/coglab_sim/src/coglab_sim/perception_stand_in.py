@@ -1,9 +1,8 @@
 """Perception as a tracker would deliver it: between the truth of the cell and the frames that control sees.
 
-Rate and its jitter, latency (stamp = capture time, delivered later), noise that is correlated like a
-tracker's, bursts of
-dropout (two-state Gilbert model), occlusion by the robot's hand, identity swaps. Each can be switched off; ``perfect``
-delivers the truth as it is at the same rate.
+Rate and its jitter, latency (stamp = capture time, delivered later), noise that is correlated like a tracker's, bursts
+of dropout (two-state Gilbert model), occlusion by the robot's hand, identity swaps. Each can be switched off;
+``perfect`` delivers the truth as it is at the same rate.
 """
 from __future__ import annotations
 

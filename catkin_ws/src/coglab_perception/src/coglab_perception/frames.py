@@ -1,0 +1,66 @@
+"""The tf2 frames by role. Their names are in one file, config/frames.yaml, and nowhere else."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+
+class FramesError(ValueError):
+    """The frames' file or parameter cannot be used; the sentence says what is wrong with it."""
+
+
+@dataclass(frozen=True)
+class FrameNames:
+    """`object` contains {id}, which stands for the object's id in the database.
+
+    Example::
+
+        frames = FrameNames.from_mapping(rospy.get_param("perception/frames"))
+        frames.object_frame("mug")          # "object_mug"
+    """
+
+    world: str
+    human_hand: str
+    board: str
+    object: str
+
+    def object_frame(self, object_id: str) -> str:
+        """Frame of an object of the database."""
+        return self.object.replace("{id}", object_id)
+
+    @staticmethod
+    def from_mapping(data: Any, source: str = "perception/frames") -> FrameNames:
+        """From the parameter, or any mapping. FramesError names what is missing, unknown or empty."""
+        roles = [f.name for f in fields(FrameNames)]
+        if not isinstance(data, Mapping):
+            raise FramesError(f"{source}: expected a mapping with {', '.join(roles)}: load "
+                              "coglab_perception/config/frames.yaml there")
+        missing = [role for role in roles if not (isinstance(data.get(role), str) and data[role])]
+        unknown = sorted(set(map(str, data)) - set(roles))
+        if missing or unknown:
+            raise FramesError(f"{source}: missing: {', '.join(missing) or 'none'}; unknown: "
+                              f"{', '.join(unknown) or 'none'}; expected {', '.join(roles)}")
+        if "{id}" not in data["object"]:
+            raise FramesError(f"{source}: object is '{data['object']}'; it must contain {{id}}")
+        names = [data[role] for role in roles]
+        slashed = [name for name in names if name.startswith("/")]
+        if slashed or len(set(names)) < len(names):
+            raise FramesError(f"{source}: tf2 frames differ from each other and have no leading "
+                              f"slash; got {', '.join(names)}")
+        return FrameNames(**{role: data[role] for role in roles})
+
+    @staticmethod
+    def load(path: str) -> FrameNames:
+        """From a YAML file. FramesError names file and line."""
+        try:
+            data = yaml.safe_load(Path(path).read_text(encoding="utf-8"))
+        except OSError as error:
+            raise FramesError(f"{path}: cannot be read ({error.strerror})") from None
+        except yaml.YAMLError as error:
+            raise FramesError(f"{path}: not YAML: {error}") from None
+        return FrameNames.from_mapping(data, path)

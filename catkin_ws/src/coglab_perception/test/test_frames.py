@@ -1,0 +1,54 @@
+"""Frame names: one file, and every fault in it is a sentence."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+import yaml
+from coglab_perception.frames import FrameNames, FramesError
+
+SOURCES = Path(__file__).resolve().parents[2]
+FILE = SOURCES / "coglab_perception" / "config" / "frames.yaml"
+GOOD = {"world": "world", "human_hand": "hand", "board": "board", "object": "object_{id}"}
+
+
+def test_the_file():
+    frames = FrameNames.load(str(FILE))
+    assert frames == FrameNames("world", "human_hand", "board", "object_{id}")
+    assert frames.object_frame("mug") == "object_mug"
+
+
+@pytest.mark.parametrize(("change", "words"), [
+    ({"board": ""}, "missing: board"), ({"palm": "x"}, "unknown: palm"),
+    ({"object": "thing"}, "must contain {id}"), ({"board": "world"}, "differ from each other"),
+    ({"world": "/world"}, "no leading slash"), ({"world": 3}, "missing: world"),
+])
+def test_bad_frames(tmp_path, change, words):
+    path = tmp_path / "frames.yaml"
+    path.write_text(yaml.safe_dump(GOOD | change))
+    with pytest.raises(FramesError) as caught:
+        FrameNames.load(str(path))
+    assert words in str(caught.value) and str(path) in str(caught.value)
+
+
+def test_bad_files(tmp_path):
+    with pytest.raises(FramesError, match="cannot be read"):
+        FrameNames.load(str(tmp_path / "none.yaml"))
+    path = tmp_path / "frames.yaml"
+    path.write_text("world: [")
+    with pytest.raises(FramesError, match="not YAML"):
+        FrameNames.load(str(path))
+    with pytest.raises(FramesError, match=r"load coglab_perception/config/frames\.yaml there"):
+        FrameNames.from_mapping(None)
+
+
+def test_no_node_of_perception_names_a_frame_itself():
+    """Other names come from the file, so that a lab changes them there and nowhere else."""
+    names = [value for value in yaml.safe_load(FILE.read_text()).values() if value != "world"]
+    for path in [SOURCES / "coglab_perception" / "scripts" / "motion_recogniser_node.py",
+                 SOURCES / "coglab_sim" / "scripts" / "perception_stand_in.py",
+                 SOURCES / "coglab_sim" / "src" / "coglab_sim" / "vision.py"]:
+        code = path.read_text(encoding="utf-8")
+        for name in names:
+            assert f'"{name}"' not in code.replace('"human_hand", "board", "object")', ""), path

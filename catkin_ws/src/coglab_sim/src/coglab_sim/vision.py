@@ -1,0 +1,217 @@
+"""The perception contract without ROS: what is in view, whose hand is the partner's, and answers.
+
+Every answer comes within the time limit of its question and, where it is a refusal, is a sentence
+that says what was in view and what to do.
+"""
+
+from __future__ import annotations
+
+import math
+import threading
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from .perception_stand_in import Board, PerceptionSettings, Sight, Tracker
+from .rigid import Frame
+
+OLDEST = 0.5
+"""s: an older sight is no answer to locate_object, and an older world is not visible."""
+
+LONGEST_WAIT = 60.0
+"""s: longer time limits are cut to this."""
+
+IN_HAND = 0.20
+"""m: an object so near to somebody's hand is held."""
+
+
+class NotSeen(Exception):
+    """Perception cannot answer; the text is the sentence for who asked."""
+
+
+@dataclass(frozen=True)
+class Names:
+    """tf2 frames by role, as in coglab_perception/config/frames.yaml; `object` contains {id}."""
+
+    world: str
+    human_hand: str
+    board: str
+    object: str
+
+    def object_frame(self, object_id: str) -> str:
+        """Frame of an object."""
+        return self.object.replace("{id}", object_id)
+
+
+class PartnerChoice:
+    """Whose hand is the partner's when several are in view.
+
+    One hand is the partner's. Of several, the one nearer to the robot than every other by at least
+    `margin` (m) is; once chosen it stays so until another is nearer by the margin. With margin 0
+    nobody is ever chosen among several.
+    """
+
+    def __init__(self, margin: float = 0.0) -> None:
+        if not (math.isfinite(margin) and margin >= 0.0):
+            raise ValueError(f"partner_margin must be 0 or more metres, got {margin}")
+        self.margin = margin
+        self._chosen = ""
+
+    def choose(self, hands: Mapping[str, Frame], robot: Frame | None) -> str:
+        """Name of the partner's hand, empty if none can be told."""
+        if len(hands) <= 1:
+            self._chosen = next(iter(hands), "")
+            return self._chosen
+        if self.margin <= 0.0 or robot is None:
+            self._chosen = ""
+            return ""
+        far = {name: float(np.linalg.norm(hand.position - robot.position))
+               for name, hand in hands.items()}
+        nearest, second = sorted(far, key=far.__getitem__)[:2]
+        kept = self._chosen in far and far[self._chosen] - far[nearest] < self.margin
+        if not kept:
+            clear = far[second] - far[nearest] >= self.margin
+            self._chosen = nearest if clear else ""
+        return self._chosen
+
+
+class Vision:
+    """What the perception stand-in sees. Thread-safe.
+
+    `clock` gives the time of the stamps (s); `steady` that of arrivals, which runs on when the
+    other stands still.
+    """
+
+    def __init__(self, names: Names, settings: PerceptionSettings, board: Board, seed: int,
+                 clock: Callable[[], float], partner_margin: float = 0.0,
+                 steady: Callable[[], float] = time.monotonic) -> None:
+        self.names, self.settings, self.board, self.seed = names, settings, board, seed
+        self.clock, self.steady = clock, steady
+        self.choice = PartnerChoice(partner_margin)
+        self.people = 0
+        self._hands: list[np.ndarray] = []
+        self._partner = ""
+        self._changed = threading.Condition()
+        self._trackers: dict[str, Tracker] = {}
+        self._arrived: dict[str, float] = {}
+        self._visible = -math.inf
+
+    # -- seeing ----------------------------------------------------------------------------------
+
+    def see(self, hands: Mapping[str, Frame], objects: Mapping[str, Frame],
+            robot: Frame | None = None) -> list[Sight]:
+        """The world as it is now: hands of people by any name, objects by frame name.
+
+        Returns the sights that are to be broadcast: the partner's hand and the objects.
+        """
+        now = self.clock()
+        with self._changed:
+            self._visible = self.steady()
+            self.people = len(hands)
+            self._hands = [hand.position for hand in hands.values()]
+            self._partner = self.choice.choose(hands, robot)
+            sights = []
+            if self._partner:
+                sights += self._track(self.names.human_hand, now, hands[self._partner], robot)
+            for name, frame in objects.items():
+                sights += self._track(name, now, frame, robot)
+            self._changed.notify_all()
+        return sights
+
+    def _track(self, name: str, now: float, frame: Frame, robot: Frame | None) -> list[Sight]:
+        if name not in self._trackers:
+            self._trackers[name] = Tracker(name, self.settings, self.seed)
+        sights = self._trackers[name].step(now, frame, robot)
+        if sights:
+            self._arrived[name] = self.steady()
+        return sights
+
+    # -- answers ---------------------------------------------------------------------------------
+
+    def init_vision(self, timeout: float) -> str:
+        """Ready once the world is visible; a sentence. Raises NotSeen."""
+        limit = _limit(timeout)
+        with self._changed:
+            if self._changed.wait_for(self._world_is_visible, limit):
+                return "tracker stand-in sees the cell"
+        raise NotSeen(f"the cell was not visible within {limit:.1f} s; is the simulated cell, or "
+                      "the recording, running?")
+
+    def locate(self, target: str, timeout: float) -> tuple[str, Sight, float]:
+        """Newest fresh sight of an object (by id), of the partner's hand or of the board.
+
+        Returns its frame, the sight, and its age (s). Raises NotSeen.
+        """
+        if target == self.names.board:
+            return target, Sight(target, self.clock(), self.board.frame), 0.0
+        name = target if target == self.names.human_hand else self.names.object_frame(target)
+        limit = _limit(timeout)
+        with self._changed:
+            found = self._changed.wait_for(lambda: self._is_fresh(name) and not self._doubt(name),
+                                           limit)
+            if not found:
+                raise NotSeen(self._doubt(name) or self._absence(name, limit))
+            sight = self._trackers[name].newest
+            assert sight is not None
+            return name, sight, max(0.0, self.clock() - sight.captured)
+
+    def free_places(self, object_id: str, timeout: float) -> list[tuple[str, np.ndarray]]:
+        """Slots of the board without an object on them, best first. Raises NotSeen.
+
+        The object that is to be put, `object_id`, occupies no place.
+        """
+        limit = _limit(timeout)
+        own = self.names.object_frame(object_id)
+        with self._changed:
+            if not self._changed.wait_for(self._world_is_visible, limit):
+                raise NotSeen(f"the board was not visible within {limit:.1f} s; is the simulated "
+                              "cell, or the recording, running?")
+            objects = {name: tracker.newest.frame.position
+                       for name, tracker in self._trackers.items()
+                       if tracker.newest is not None and name not in (self.names.human_hand, own)}
+        free = self.board.free(list(objects.values()))
+        if not free:
+            raise NotSeen(f"no place on the board is free: {', '.join(sorted(objects))} lie near "
+                          f"{', '.join(self.board.slots)}; clear one")
+        return [(name, self.board.slots[name]) for name in free]
+
+    # -- judging ---------------------------------------------------------------------------------
+
+    def _world_is_visible(self) -> bool:
+        return self.steady() - self._visible < OLDEST
+
+    def _is_fresh(self, name: str) -> bool:
+        tracker = self._trackers.get(name)
+        if tracker is None or tracker.newest is None:
+            return False
+        # By both clocks: the stamps' clock may stand still.
+        return (self.clock() - tracker.newest.captured < OLDEST
+                and self.steady() - self._arrived[name] < OLDEST)
+
+    def _doubt(self, name: str) -> str:
+        """The sentence if somebody's hand is meant and it cannot be told whose; else empty."""
+        if self.people <= 1 or self._partner or not self._world_is_visible():
+            return ""
+        if name != self.names.human_hand and not self._is_held(name):
+            return ""
+        return (f"{self.people} people are in view; one partner is expected: ask the others to "
+                "step back")
+
+    def _is_held(self, name: str) -> bool:
+        tracker = self._trackers.get(name)
+        if tracker is None or tracker.newest is None:
+            return False
+        place = tracker.newest.frame.position
+        return any(np.linalg.norm(place - hand) < IN_HAND for hand in self._hands)
+
+    def _absence(self, name: str, limit: float) -> str:
+        seen = sorted(n for n in self._trackers if self._is_fresh(n))
+        return (f"'{name}' was not seen within {limit:.1f} s; in view: "
+                f"{', '.join(seen) or 'nothing'}; bring it into view of the tracker")
+
+
+def _limit(timeout: float) -> float:
+    """A usable time limit; what is no number is no time at all."""
+    return 0.0 if math.isnan(timeout) else min(max(timeout, 0.0), LONGEST_WAIT)

@@ -1,0 +1,209 @@
+"""Recorded motion: CSV, npz and bag say the same; placing, time, waiting, ends; bad files are named."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from coglab_sim.recorded_motion import (
+    Playback,
+    PlaybackSettings,
+    RecordingError,
+    load_recording,
+)
+from coglab_sim.rigid import Frame, quat_from_rotvec, quat_rotate
+
+STAMPS = 100.0 + np.arange(0.0, 1.01, 0.1)
+POSITIONS = np.column_stack([1.3 - 0.4 * (STAMPS - 100.0), 0.2 + 0.1 * (STAMPS - 100.0),
+                             0.15 + 0.3 * (STAMPS - 100.0)])
+TURNS = np.array([quat_from_rotvec([0.0, 0.0, 0.5 * (t - 100.0)]) for t in STAMPS])
+
+
+def write_csv(path, frames=("",)):
+    with open(path, "w", encoding="utf-8") as stream:
+        stream.write("t,x,y,z,qx,qy,qz,qw" + (",frame" if frames != ("",) else "") + "\n")
+        for t, p, q in zip(STAMPS, POSITIONS, TURNS, strict=True):
+            for name in frames:
+                numbers = ",".join(repr(float(v)) for v in (t, *p, *q))
+                stream.write(numbers + (f",{name}" if name else "") + "\n")
+    return str(path)
+
+
+def write_npz(path, prefix=""):
+    np.savez(path, **{f"{prefix}t": STAMPS, f"{prefix}position": POSITIONS,
+                      f"{prefix}orientation": TURNS})
+    return str(path)
+
+
+def write_bag(path, world="world", frames=("human_hand",)):
+    rosbag = pytest.importorskip("rosbag", reason="rosbag is not installed")
+    import rospy
+    from geometry_msgs.msg import TransformStamped
+    from tf2_msgs.msg import TFMessage
+
+    with rosbag.Bag(str(path), "w") as bag:
+        for t, p, q in zip(STAMPS, POSITIONS, TURNS, strict=True):
+            message = TFMessage()
+            for name in frames:
+                item = TransformStamped()
+                item.header.stamp, item.header.frame_id = rospy.Time.from_sec(float(t)), world
+                item.child_frame_id = name
+                place, turn = item.transform.translation, item.transform.rotation
+                place.x, place.y, place.z = p
+                turn.x, turn.y, turn.z, turn.w = q
+                message.transforms.append(item)
+            bag.write("/tf", message, rospy.Time.from_sec(float(t)))
+            if t == STAMPS[3]:
+                bag.write("/tf", message, rospy.Time.from_sec(float(t)))  # tf repeats itself
+    return str(path)
+
+
+WRITERS = {"csv": write_csv, "npz": write_npz, "bag": write_bag}
+
+
+@pytest.mark.parametrize("kind", WRITERS)
+def test_every_kind_of_file_says_the_same(tmp_path, kind):
+    recording = load_recording(WRITERS[kind](tmp_path / f"reach.{kind}"))
+    assert list(recording.tracks) == ["human_hand"]
+    assert recording.duration == pytest.approx(1.0)
+    track = recording.tracks["human_hand"]
+    assert track.stamps[0] == 0.0
+    frame = track.at(0.55)
+    assert frame.position == pytest.approx([1.08, 0.255, 0.315])
+    assert quat_rotate(frame.orientation, [1, 0, 0]) == pytest.approx(
+        [np.cos(0.275), np.sin(0.275), 0.0], abs=1e-6)
+    assert track.at(-5.0).position == pytest.approx(POSITIONS[0])
+    assert track.at(np.inf).position == pytest.approx(POSITIONS[-1])
+
+
+def test_several_frames_in_one_file(tmp_path):
+    frames = ("human_hand", "object_mug")
+    for path in (write_csv(tmp_path / "two.csv", frames),
+                 write_bag(tmp_path / "two.bag", frames=frames)):
+        assert sorted(load_recording(path).tracks) == sorted(frames)
+    assert list(load_recording(write_npz(tmp_path / "o.npz", "object_mug.")).tracks) == [
+        "object_mug"]
+
+
+def test_a_csv_without_orientation(tmp_path):
+    path = tmp_path / "p.csv"
+    path.write_text("t, x, y, z\n0,1,2,3\n1,1,2,4\n")
+    frame = load_recording(str(path), "object_mug").tracks["object_mug"].at(0.5)
+    assert frame.position == pytest.approx([1, 2, 3.5])
+    assert frame.orientation == pytest.approx([0, 0, 0, 1])
+
+
+def playback(tmp_path, **settings):
+    return Playback.open(PlaybackSettings(file=write_csv(tmp_path / "reach.csv"), **settings))
+
+
+def test_time_scale_and_the_ends(tmp_path):
+    play = playback(tmp_path, time_scale=2.0)
+    play.frames(50.0)
+    assert play.frames(51.0)["human_hand"].position == pytest.approx(POSITIONS[5])
+    assert play.frames(60.0)["human_hand"].position == pytest.approx(POSITIONS[-1])
+    vanishing = playback(tmp_path, at_end="vanish")
+    vanishing.frames(0.0)
+    assert vanishing.frames(1.0) and vanishing.frames(1.1) == {}
+    looping = playback(tmp_path, at_end="loop")
+    looping.frames(0.0)
+    assert looping.frames(1.3)["human_hand"].position == pytest.approx(POSITIONS[3])
+
+
+def test_mirror_turn_and_anchor(tmp_path):
+    mirrored = playback(tmp_path, mirror=True).frames(0.0)["human_hand"]
+    assert mirrored.position == pytest.approx(POSITIONS[0] * [1, -1, 1])
+    play = playback(tmp_path, mirror=True)
+    play.frames(0.0)
+    assert quat_rotate(play.frames(1.0)["human_hand"].orientation, [1, 0, 0]) == pytest.approx(
+        [np.cos(0.5), -np.sin(0.5), 0.0])
+    turned = playback(tmp_path, turn_deg=90.0).frames(0.0)["human_hand"]
+    assert turned.position == pytest.approx([-0.2, 1.3, 0.15])
+    anchored = playback(tmp_path, end_at=(0.8, 0.0, 0.4))
+    anchored.frames(0.0)
+    assert anchored.frames(9.0)["human_hand"].position == pytest.approx([0.8, 0.0, 0.4])
+    assert anchored.recording.tracks["human_hand"].at(9.0).position == pytest.approx(POSITIONS[-1])
+
+
+def test_rename(tmp_path):
+    assert list(playback(tmp_path, rename={"human_hand": "object_mug"}).frames(0.0)) == [
+        "object_mug"]
+
+
+def test_the_recorded_hand_waits_for_the_robot(tmp_path):
+    far, near = Frame(np.array([0.2, 0.0, 0.4])), Frame(POSITIONS[5] + [0.1, 0.0, 0.0])
+    play = playback(tmp_path, wait_at=0.5, wait_limit=3.0)
+    for k in range(20):
+        frames = play.frames(0.1 * k, far)
+    assert frames["human_hand"].position == pytest.approx(POSITIONS[5])
+    play.frames(2.0, near)
+    assert play.frames(2.1, near)["human_hand"].position == pytest.approx(POSITIONS[7])
+    patient = playback(tmp_path, wait_at=0.5, wait_limit=1.0)
+    for k in range(30):
+        frames = patient.frames(0.1 * k, far)
+    assert frames["human_hand"].position == pytest.approx(POSITIONS[-1]), "not for ever"
+
+
+CSV_FAULTS = {
+    "x,y,z\n1,2,3\n": r":1: the header must name .* missing: t",
+    "t,x,y,z\n0,1,2,here\n": r":2: expected numbers",
+    "t,x,y,z\n0,1,2\n": r":2: expected numbers",
+    "t,x,y,z\n0,1,2,3\n0,1,2,3\n": "time must increase, sample 2",
+    "t,x,y,z\n0,1,2,3\n1,nan,2,3\n": "sample 2 is not finite",
+    "t,x,y,z,qx,qy,qz,qw\n0,1,2,3,0,0,0,0.5\n": "quaternion of length 0.50",
+    "t,x,y,z\n": "no samples",
+    "": "the header must name",
+}
+
+
+@pytest.mark.parametrize("text", CSV_FAULTS)
+def test_bad_csv_files_are_named(tmp_path, text):
+    path = tmp_path / "bad.csv"
+    path.write_text(text)
+    with pytest.raises(RecordingError, match=CSV_FAULTS[text]) as caught:
+        load_recording(str(path))
+    assert str(path) in str(caught.value)
+
+
+class Bomb:
+    """Unpickling it would raise."""
+
+    def __reduce__(self):
+        return exec, ("raise SystemExit('executed')",)
+
+
+def test_bad_npz_files_are_named(tmp_path):
+    path = tmp_path / "bad.npz"
+    path.write_bytes(b"nonsense")
+    with pytest.raises(RecordingError, match="not an npz file"):
+        load_recording(str(path))
+    np.savez(path, t=np.array([Bomb()], dtype=object), position=np.zeros((1, 3)))
+    with pytest.raises(RecordingError, match="not an npz file of plain arrays"):
+        load_recording(str(path))
+    np.savez(path, t=STAMPS, position=POSITIONS[:5])
+    with pytest.raises(RecordingError, match=r"'position' of shape \(N, 3\)"):
+        load_recording(str(path))
+    np.savez(path, time=STAMPS)
+    with pytest.raises(RecordingError, match="no array 't' in it; it has time"):
+        load_recording(str(path))
+
+
+def test_bad_bags_are_named(tmp_path):
+    path = tmp_path / "bad.bag"
+    path.write_bytes(b"#ROSBAG V2.0\n but then nonsense")
+    with pytest.raises(RecordingError, match="not a readable bag"):
+        load_recording(str(path))
+    with pytest.raises(RecordingError, match="no transforms from 'world' on /tf; parents seen: map"):
+        load_recording(write_bag(tmp_path / "map.bag", world="map"))
+
+
+def test_bad_names_and_settings(tmp_path):
+    with pytest.raises(RecordingError, match=r"a \.csv, \.npz or \.bag file, got '\.txt'"):
+        load_recording("reach.txt")
+    with pytest.raises(RecordingError, match="no such file"):
+        load_recording(str(tmp_path / "none.csv"))
+    for fault, words in (({"speed": 2}, "unknown fields speed"), ({"time_scale": 0}, "time_scale"),
+                         ({"at_end": "stop"}, "hold, loop or vanish"),
+                         ({"end_at": [1, 2]}, "three finite numbers"),
+                         ({"wait_distance": 0}, "wait_distance")):
+        with pytest.raises(RecordingError, match=words):
+            PlaybackSettings.from_mapping(fault)

@@ -1,0 +1,154 @@
+"""Perception's answers: fresh, within the time limit, with a sentence; and whose hand is the partner's."""
+
+from __future__ import annotations
+
+import threading
+import time
+
+import numpy as np
+import pytest
+from coglab_sim.perception_stand_in import Board, PerceptionSettings
+from coglab_sim.rigid import Frame
+from coglab_sim.vision import Names, NotSeen, PartnerChoice, Vision
+
+NAMES = Names("world", "human_hand", "board", "object_{id}")
+SLOTS = {"A1": np.zeros(3), "A2": np.array([0.0, 0.15, 0.0])}
+ROBOT = Frame(np.array([0.5, 0.0, 0.4]))
+NEAR, BESIDE, FAR = (Frame(np.array(place)) for place in
+                     ([0.9, 0.1, 0.4], [0.9, -0.15, 0.4], [1.6, 0.5, 0.4]))
+
+
+class Scene:
+    """A perfect tracker whose clock the test sets."""
+
+    def __init__(self, margin=0.0, **settings):
+        self.now = 10.0
+        self.vision = Vision(NAMES, PerceptionSettings(**({"perfect": True} | settings)),
+                             Board(Frame(np.array([0.45, -0.55, 0.05])), SLOTS), 1,
+                             lambda: self.now, margin)
+
+    def see(self, hands=None, objects=None, robot=ROBOT):
+        self.now += 0.05
+        return self.vision.see({"one": NEAR} if hands is None else hands, objects or {}, robot)
+
+
+def test_locate_gives_frame_sight_and_age():
+    scene = Scene()
+    scene.see(objects={"object_mug": BESIDE})
+    scene.now += 0.1
+    name, sight, age = scene.vision.locate("mug", 0.1)
+    assert name == "object_mug" and sight.frame.position == pytest.approx(BESIDE.position)
+    assert age == pytest.approx(0.1)
+    assert scene.vision.locate("human_hand", 0.1)[1].frame.position == pytest.approx(NEAR.position)
+    assert scene.vision.locate("board", 0.0)[1].frame.position == pytest.approx([0.45, -0.55, 0.05])
+
+
+def test_locate_waits_for_a_sight_within_its_limit():
+    scene = Scene()
+    timer = threading.Timer(0.1, lambda: scene.see(objects={"object_mug": BESIDE}))
+    timer.start()
+    assert scene.vision.locate("mug", 10.0)[0] == "object_mug"
+    timer.join()
+
+
+@pytest.mark.parametrize("limit", [0.05, 0.0, -1.0, float("nan")])
+def test_what_is_not_seen_is_said_within_the_limit(limit):
+    scene = Scene()
+    scene.see()
+    began = time.monotonic()
+    with pytest.raises(NotSeen, match="'object_mug' was not seen within .* in view: human_hand"):
+        scene.vision.locate("mug", limit)
+    assert time.monotonic() - began < 5.0
+
+
+def test_an_old_sight_is_no_sight_by_either_clock():
+    scene = Scene()
+    scene.see(objects={"object_mug": BESIDE})
+    scene.now += 0.6
+    with pytest.raises(NotSeen, match="in view: nothing"):
+        scene.vision.locate("mug", 0.0)
+    scene = Scene()
+    scene.see(objects={"object_mug": BESIDE})  # from here the stamps' clock stands still
+    time.sleep(0.6)
+    with pytest.raises(NotSeen):
+        scene.vision.locate("mug", 0.0)
+
+
+def test_init_vision():
+    scene = Scene()
+    with pytest.raises(NotSeen, match=r"not visible within 0\.1 s; is the simulated cell"):
+        scene.vision.init_vision(0.05)
+    scene.see()
+    assert "sees" in scene.vision.init_vision(0.05)
+
+
+def test_free_places():
+    scene = Scene()
+    with pytest.raises(NotSeen, match="the board was not visible"):
+        scene.vision.free_places("mug", 0.02)
+    scene.see()
+    assert [name for name, _ in scene.vision.free_places("mug", 0.1)] == ["A1", "A2"]
+    board = scene.vision.board.frame
+    on_a1, on_a2 = Frame(board.apply(SLOTS["A1"])), Frame(board.apply(SLOTS["A2"]))
+    scene.see(objects={"object_mug": on_a1, "object_ball": on_a2})
+    assert [name for name, _ in scene.vision.free_places("mug", 0.1)] == ["A1"]
+    with pytest.raises(NotSeen, match="no place on the board is free: object_ball, object_mug lie"):
+        scene.vision.free_places("bottle", 0.1)
+
+
+# -- two people -----------------------------------------------------------------------------------
+
+
+def test_two_people_and_nobody_can_tell_whose_hand_is_meant():
+    scene = Scene()
+    held = Frame(NEAR.position + [-0.08, 0.0, -0.05])
+    scene.see(objects={"object_mug": held})
+    sights = scene.see({"one": NEAR, "two": BESIDE}, {"object_mug": held})
+    assert [sight.name for sight in sights] == ["object_mug"], "no hand is broadcast"
+    sentence = "2 people are in view; one partner is expected: ask the others to step back"
+    for target in ("human_hand", "mug"):
+        with pytest.raises(NotSeen, match=sentence):
+            scene.vision.locate(target, 0.02)
+    on_board = Frame(scene.vision.board.frame.apply(SLOTS["A1"]))
+    scene.see({"one": NEAR, "two": BESIDE}, {"object_ball": on_board})
+    assert scene.vision.locate("ball", 0.02)[0] == "object_ball", "what lies there is nobody's"
+    scene.see({"one": NEAR}, {"object_mug": held})
+    assert scene.vision.locate("mug", 0.02) and scene.vision.locate("human_hand", 0.02)
+
+
+def test_with_a_margin_the_nearer_one_is_the_partner_and_stays_so():
+    scene = Scene(margin=0.3)
+    sights = scene.see({"one": FAR, "two": NEAR})
+    assert [sight.name for sight in sights] == ["human_hand"]
+    assert scene.vision.locate("human_hand", 0.02)[1].frame.position == pytest.approx(
+        NEAR.position)
+    scene.see({"one": BESIDE, "two": NEAR})
+    assert scene.vision.locate("human_hand", 0.02)[1].frame.position == pytest.approx(
+        NEAR.position), "somebody beside the partner changes nothing"
+
+
+def test_partner_choice():
+    choice = PartnerChoice(0.3)
+    assert choice.choose({}, ROBOT) == ""
+    assert choice.choose({"a": FAR}, None) == "a"
+    assert choice.choose({"a": NEAR, "b": BESIDE}, ROBOT) == "a", "was there before"
+    fresh = PartnerChoice(0.3)
+    assert fresh.choose({"a": NEAR, "b": BESIDE}, ROBOT) == "", "two as near: not clear"
+    assert fresh.choose({"a": FAR, "b": BESIDE}, ROBOT) == "b"
+    assert fresh.choose({"a": NEAR, "b": FAR}, ROBOT) == "a", "nearer by more than the margin"
+    assert PartnerChoice(0.0).choose({"a": NEAR, "b": FAR}, ROBOT) == ""
+    for wrong in (-0.1, float("nan")):
+        with pytest.raises(ValueError, match="partner_margin"):
+            PartnerChoice(wrong)
+
+
+def test_a_bystander_who_walks_by_never_becomes_the_partner():
+    """500 ticks of a second person crossing 0.4 m behind the partner."""
+    rng = np.random.default_rng(4)
+    for _ in range(20):
+        choice = PartnerChoice(0.3)
+        assert choice.choose({"partner": NEAR}, ROBOT) == "partner"
+        back = rng.uniform(0.3, 0.8)
+        for y in np.linspace(-1.0, 1.0, 500):
+            crossing = Frame(np.array([0.9 + back, y, 0.4]))
+            assert choice.choose({"bystander": crossing, "partner": NEAR}, ROBOT) == "partner"
