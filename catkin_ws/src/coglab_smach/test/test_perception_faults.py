@@ -115,7 +115,7 @@ def test_the_partner_among_two_is_served_and_served_only(seed):
     results = trial.run("exchange_human_to_robot", "exchange_robot_to_human")
     assert [r.outcome for r in results] == ["succeeded", "succeeded"], [r.reason for r in results]
     assert trial.rig.cell.truth()["held_by"] == "human"
-    assert trial.rig.limit_violations == 0
+    assert trial.rig.robot.limit_violations == 0
 
 
 @pytest.mark.parametrize("jump", [0.08, 0.30])
@@ -126,7 +126,7 @@ def test_identity_swaps_neither_mislead_the_arm_nor_go_unsaid(jump):
     for seed in range(3):
         trial = VirtualTrial(seed=seed, perception=settings)
         result = trial.run("exchange_human_to_robot")[0]
-        assert trial.rig.limit_violations == 0
+        assert trial.rig.robot.limit_violations == 0
         assert result.outcome == "succeeded" or (result.outcome == "failed_empty" and result.reason)
         good += result.outcome == "succeeded"
     assert good >= 2
