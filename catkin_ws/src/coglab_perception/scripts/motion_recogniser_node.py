@@ -15,7 +15,7 @@ import rospy
 import tf2_ros
 from coglab_msgs.msg import Recognition
 from coglab_perception.frames import FrameNames
-from coglab_perception.recogniser import Recogniser, load_patterns
+from coglab_perception.recogniser import CLOCK_JUMP, Recogniser, load_patterns
 
 
 class RecogniserNode:
@@ -35,7 +35,7 @@ class RecogniserNode:
         self.buffer = tf2_ros.Buffer(rospy.Duration(2.0))
         self.listener = tf2_ros.TransformListener(self.buffer)
         self.publisher = rospy.Publisher("perception/recognition", Recognition, queue_size=1)
-        self.last = rospy.Time(0)
+        self.last = rospy.Time(0)  # stamp of the newest transform taken
         rospy.Timer(rospy.Duration(0.01), self.on_timer)
 
     def on_timer(self, _event: rospy.timer.TimerEvent) -> None:
@@ -44,7 +44,8 @@ class RecogniserNode:
             transform = self.buffer.lookup_transform(self.base, self.hand, rospy.Time(0))
         except tf2_ros.TransformException:
             return
-        if transform.header.stamp <= self.last:
+        late = (self.last - transform.header.stamp).to_sec()
+        if 0.0 <= late <= CLOCK_JUMP:
             return
         self.last = transform.header.stamp
         try:

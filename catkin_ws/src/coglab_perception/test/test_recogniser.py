@@ -186,6 +186,16 @@ def test_an_estimate_outlives_its_reach_for_a_second_only(patterns):
     assert recogniser.estimate.pattern == "high" and recogniser.estimate.decided
 
 
+def test_a_clock_that_was_set_back_is_a_new_beginning(patterns):
+    rng = np.random.default_rng(12)
+    recogniser = Recogniser(patterns)
+    for begin, name in ((1000.0, "left"), (10.0, "high"), (10.0 - 9.0, "centre")):
+        stamps, positions, _, _ = reach(name, rng)
+        for t, p in zip(stamps + begin, positions, strict=False):
+            recogniser.update(t, p)
+        assert recogniser.estimate.pattern == name and recogniser.estimate.decided
+
+
 def test_pattern_files_round_trip_and_are_checked(patterns, tmp_path):
     path = tmp_path / "p.json"
     save_patterns(str(path), patterns, RecogniserSettings(), "test")

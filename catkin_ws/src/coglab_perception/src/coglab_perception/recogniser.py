@@ -20,6 +20,8 @@ import numpy as np
 from .hmm import HmmFilter, LeftRightHmm
 
 UNKNOWN = "unknown"
+CLOCK_JUMP = 5.0
+"""s: a frame that is older than the newest by more is no late one; the clock was set back, as when a bag is replayed"""
 FILE_VERSION = 1
 
 
@@ -83,7 +85,8 @@ class FeatureStream:
         s = self.settings
         p = np.asarray(position, dtype=float)
         self.started = False
-        if self._history and stamp - self._history[-1][0] > s.max_gap:
+        gap = stamp - self._history[-1][0] if self._history else 0.0
+        if gap > s.max_gap or gap < -CLOCK_JUMP:
             self._history.clear()
             self._recent.clear()
             self.moving = False
@@ -160,6 +163,8 @@ class Recogniser:
         """The hand rests: some time after a reach nothing is known any more."""
         if self.stream.moving or not self.estimate.probabilities:
             return
+        if stamp < self._newest - CLOCK_JUMP:
+            self._newest, self._over_since = stamp, None
         self._newest = max(self._newest, stamp)
         if self._over_since is None:
             self._over_since = self._newest
