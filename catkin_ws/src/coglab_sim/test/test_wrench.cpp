@@ -52,7 +52,8 @@ Felt pushed(const Vector7& posture, const Vector6& push) {
   const std::string urdf((std::istreambuf_iterator<char>(file)), std::istreambuf_iterator<char>());
   const auto setup = coglab_controllers::makeRobotSetup(
       urdf, bridge_config.limits, coglab_controllers::Parameters(YAML::Node(), "test"));
-  coglab_controllers::FeedbackStage stage(*setup, 0.005, true);
+  ctrl_more::Logger silent;
+  coglab_controllers::FeedbackStage stage(*setup, 0.005, true, &silent);
   coglab_controllers::CycleInput input;
   input.robot = sample;
   setup->chain.evaluate(sample.position, input.chain);
