@@ -52,6 +52,7 @@ class HandShutdown(unittest.TestCase):
         _, errors = process.communicate(timeout=LIMIT_S)
         self.assertNotIn("Traceback", errors, errors)
         self.assertNotIn("Error", errors)
+        self.assertNotIn("unexpected", errors)
         if status is not None:
             self.assertEqual(process.returncode, status, errors)
 

@@ -35,6 +35,7 @@ from coglab_msgs.msg import (
 
 from ih2_hand.errors import HandError
 from ih2_hand.progress import RESENDS, Task, Verdict
+from ih2_hand.ros.shutdown import ending
 
 SETTLE_S = 0.02
 """Polls begun earlier than this after a command may still show the status before it."""
@@ -140,6 +141,8 @@ class GoalQueue:
             except HandError as error:
                 self._fail(f"{error}")
             except Exception as error:  # a goal must end whatever happens
+                if ending():
+                    continue  # the topics are closed; what remains is to quit
                 rospy.logerr("hand action: unexpected %s: %s", type(error).__name__, error)
                 self._fail(f"internal error: {error}")
 

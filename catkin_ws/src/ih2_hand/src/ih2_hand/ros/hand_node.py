@@ -38,6 +38,7 @@ from ih2_hand.progress import (
 from ih2_hand.ros.diagnostics import Diagnostics
 from ih2_hand.ros.goals import GoalQueue
 from ih2_hand.ros.messages import joint_state, motor_status
+from ih2_hand.ros.shutdown import ending
 from ih2_hand.ros.tracing import TracePublisher
 from ih2_hand.wire_choices import WIRE
 
@@ -181,7 +182,7 @@ class HandNode:
                 self._poll_once()
                 self._diagnostics.tick()
             except Exception as error:
-                if rospy.is_shutdown():
+                if ending():
                     return
                 rospy.logerr("hand: unexpected %s: %s", type(error).__name__, error)
                 self.lost(HandError(f"internal error: {error}"))

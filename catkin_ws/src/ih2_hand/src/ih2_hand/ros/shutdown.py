@@ -8,6 +8,11 @@ from typing import Any
 import rospy
 
 
+def ending() -> bool:
+    """Whether rospy shuts down; true before it closes the topics, unlike rospy.is_shutdown()."""
+    return rospy.core.is_shutdown_requested() or rospy.is_shutdown()
+
+
 def end_quietly() -> None:
     """From now on such a thread ends without a word, once rospy shuts down.
 
@@ -16,9 +21,7 @@ def end_quietly() -> None:
     report = threading.excepthook
 
     def hook(arguments: Any) -> None:
-        # rospy closes topics first and raises its flag afterwards: "requested" covers both.
-        ending = rospy.core.is_shutdown_requested() or rospy.is_shutdown()
-        if not (ending and issubclass(arguments.exc_type, rospy.ROSException)):
+        if not (ending() and issubclass(arguments.exc_type, rospy.ROSException)):
             report(arguments)
 
     threading.excepthook = hook
