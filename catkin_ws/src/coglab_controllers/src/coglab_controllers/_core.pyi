@@ -328,7 +328,12 @@ class TwoTaskIk:
         stretch_threshold: float = 0.01,
         rotation_first_scaling: bool = True,
         velocity_limit: ArrayLike = ...,
-    ) -> None: ...
+        acceleration_limit: ArrayLike = ...,
+        jerk_limit: ArrayLike = ...,
+    ) -> None:
+        """Limits (7,) in rad/s, rad/s^2, rad/s^3. With those of acceleration and jerk, errors are answered only by
+        speeds from which each joint can brake."""
+
     def solve(
         self,
         chain: Chain,

@@ -1,6 +1,5 @@
 #include "coglab_controllers/ik/second_task.hpp"
 
-#include <algorithm>
 #include <cmath>
 #include <stdexcept>
 #include <string>
@@ -9,9 +8,6 @@
 
 namespace coglab_controllers {
 namespace {
-
-// As for the translation, rad/s^2: errors below 2 a / K^2 (0.05 rad at K = 20) are not touched.
-constexpr double kFeedbackDeceleration = 10.0;
 
 double requireGain(const char* name, double gain) {
   if (std::isfinite(gain) && gain >= 0.0) return gain;
@@ -29,11 +25,10 @@ void OrientationTask::evaluate(const ChainState& state, const JointVector&,
   constraint.rows = 3;
   constraint.reject_whole = true;
   constraint.jacobian.topRows<3>() = state.jacobian.bottomRows<3>();
-  const Vector3 error = rotationBetween(state.tool.orientation, reference.pose.orientation);
-  const double angle = error.norm();
-  const double brakeable = std::sqrt(2.0 * kFeedbackDeceleration * angle);
-  const double gain = std::min(gain_, angle > 0.0 ? brakeable / angle : 1e3);
-  constraint.velocity.head<3>() = reference.angular_velocity + gain * error;
+  constraint.velocity.head<3>() = reference.angular_velocity;
+  constraint.error.head<3>() =
+      rotationBetween(state.tool.orientation, reference.pose.orientation);
+  constraint.gain = gain_;
 }
 
 PostureTask::PostureTask(const JointVector& posture, double gain)
@@ -47,7 +42,9 @@ void PostureTask::evaluate(const ChainState&, const JointVector& q, const Cartes
   constraint.rows = kMaxJoints;
   constraint.reject_whole = false;
   constraint.jacobian.setIdentity();
-  constraint.velocity = gain_ * (posture_ - q);
+  constraint.velocity.setZero();
+  constraint.error = posture_ - q;
+  constraint.gain = gain_;
 }
 
 }  // namespace coglab_controllers

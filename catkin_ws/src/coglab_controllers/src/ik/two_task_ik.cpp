@@ -11,10 +11,9 @@
 namespace coglab_controllers {
 namespace {
 
-// Deceleration (m/s^2) that the closed loop of eq. (6) asks for at most: a large error is not
-// answered by a speed from which an arm of limited acceleration could not stop at the goal. Errors
-// below 2 a / K^2 (10 mm at K = 20) are not touched.
-constexpr double kFeedbackDeceleration = 2.0;
+// Share of a joint's acceleration limit that the closed loop of each task may count on for braking:
+// the reference and the other task need theirs.
+constexpr double kBrakingShare = 0.5;
 
 using Projector = Eigen::Matrix<double, kMaxJoints, kMaxJoints>;
 
@@ -54,10 +53,12 @@ double largestShare(const JointVector& first, const JointVector& second,
   return 0.5 * (low + high);
 }
 
-// Joint velocity of the second task inside the null space of the first, eq. (11).
-template <int Rows>
+// Joint velocity of the second task inside the null space of the first, eq. (11). `gain` gives the
+// gain of the closed loop for the joint motion that would take the error away.
+template <int Rows, typename Gain>
 JointVector secondShare(const TaskConstraint& task, const JointVector& first,
-                        const Projector& null_space, double threshold, IkResult& result) noexcept {
+                        const Projector& null_space, double threshold, Gain&& gain,
+                        IkResult& result) noexcept {
   const auto jacobian = task.jacobian.topRows<Rows>();
   const RowSvd<Rows> svd((jacobian * null_space).eval());
   result.smallest_singular_value_rotation = svd.sigma.minCoeff();
@@ -66,9 +67,11 @@ JointVector secondShare(const TaskConstraint& task, const JointVector& first,
     return JointVector::Zero();
   }
   const auto inverse = [&](double sigma) { return sigma < threshold ? 0.0 : 1.0 / sigma; };
+  const Eigen::Matrix<double, kMaxJoints, Rows> pseudo_inverse = svd.pseudoInverse(inverse);
   const Eigen::Matrix<double, Rows, 1> residual = task.velocity.head<Rows>() - jacobian * first;
+  const JointVector way = pseudo_inverse * task.error.head<Rows>();
   // The projection once more removes what rounding has left outside the null space.
-  return null_space * (svd.pseudoInverse(inverse) * residual);
+  return null_space * (pseudo_inverse * residual + gain(way) * way);
 }
 
 }  // namespace
@@ -86,9 +89,30 @@ TwoTaskIk::TwoTaskIk(const IkParameters& parameters)
   require("singularity_threshold", parameters.singularity_threshold, 1e-6, 1.0);
   require("stretch_threshold", parameters.stretch_threshold, 1e-6, 0.2);
   for (int i = 0; i < kMaxJoints; ++i) {
-    require(("velocity_limit[" + std::to_string(i) + "]").c_str(), parameters.velocity_limit[i],
-            1e-3, 100.0);
+    const std::string index = "[" + std::to_string(i) + "]";
+    constexpr double kInfinity = std::numeric_limits<double>::infinity();
+    require(("velocity_limit" + index).c_str(), parameters.velocity_limit[i], 1e-3, 100.0);
+    require(("acceleration_limit" + index).c_str(), parameters.acceleration_limit[i], 1e-3,
+            kInfinity);
+    require(("jerk_limit" + index).c_str(), parameters.jerk_limit[i], 1e-3, kInfinity);
+    const double acceleration = parameters.acceleration_limit[i];
+    braking_[i] = kBrakingShare * acceleration;
+    // As in Guard::speedToStop(): limited jerk costs about so much time.
+    lag_[i] = parameters.reaction_time +
+              (std::isfinite(acceleration) ? 1.5 * acceleration / parameters.jerk_limit[i] : 0.0);
   }
+  require("reaction_time", parameters.reaction_time, 0.0, 1.0);
+}
+
+double TwoTaskIk::brakeableGain(const JointVector& way, double gain) const noexcept {
+  for (int i = 0; i < kMaxJoints; ++i) {
+    if (!std::isfinite(braking_[i])) continue;
+    // v^2 / (2 a) + v * lag = way, solved for v / way.
+    const double lag = lag_[i];
+    const double root = std::sqrt(lag * lag + 2.0 * std::abs(way[i]) / braking_[i]);
+    gain = std::min(gain, 2.0 / (root + lag));
+  }
+  return gain;
 }
 
 void TwoTaskIk::solve(const ChainState& state, const JointVector& q,
@@ -106,19 +130,17 @@ void TwoTaskIk::solve(const ChainState& state, const JointVector& q,
   result.position_error = reference.pose.position - state.tool.position;
   result.rotation_error = rotationBetween(state.tool.orientation, reference.pose.orientation);
 
-  const double distance = result.position_error.norm();
-  const double brakeable = std::sqrt(2.0 * kFeedbackDeceleration * distance);
-  const double gain =
-      std::min(parameters_.pos_clik_gain, distance > 0.0 ? brakeable / distance : 1e3);
-  const Vector3 wanted = reference.velocity + gain * result.position_error;  // (6)
-  const auto position_jacobian = state.jacobian.topRows<3>();                // (8)
+  const auto position_jacobian = state.jacobian.topRows<3>();  // (8)
   const RowSvd<3> svd(position_jacobian);
   result.smallest_singular_value_position = svd.sigma.minCoeff();
   const double threshold = parameters_.stretch_threshold;
   const auto damped = [&](double sigma) {
     return sigma >= threshold ? 1.0 / sigma : sigma / (threshold * threshold);
   };
-  result.position_velocity = svd.pseudoInverse(damped) * wanted;  // (9)
+  const Eigen::Matrix<double, kMaxJoints, 3> pseudo_inverse = svd.pseudoInverse(damped);
+  const JointVector way = pseudo_inverse * result.position_error;
+  const double gain = brakeableGain(way, parameters_.pos_clik_gain);
+  result.position_velocity = pseudo_inverse * reference.velocity + gain * way;  // (6), (9)
 
   // (10) from the same decomposition: J^+ J is the projection on the right singular vectors.
   Projector null_space = Projector::Identity();
@@ -134,12 +156,15 @@ void TwoTaskIk::solve(const ChainState& state, const JointVector& q,
     task.evaluate(state, q, reference, constraint);
   result.rotation_velocity.setZero();
   const double limit = parameters_.singularity_threshold;
+  const auto task_gain = [&](const JointVector& joint_way) {
+    return brakeableGain(joint_way, constraint.gain);
+  };
   if (constraint.rows == 3) {
-    result.rotation_velocity =
-        secondShare<3>(constraint, result.position_velocity, null_space, limit, result);
+    result.rotation_velocity = secondShare<3>(constraint, result.position_velocity, null_space,
+                                              limit, task_gain, result);
   } else if (constraint.rows == kMaxJoints) {
-    result.rotation_velocity =
-        secondShare<kMaxJoints>(constraint, result.position_velocity, null_space, limit, result);
+    result.rotation_velocity = secondShare<kMaxJoints>(constraint, result.position_velocity,
+                                                       null_space, limit, task_gain, result);
   }
 
   if (parameters_.rotation_first_scaling) {

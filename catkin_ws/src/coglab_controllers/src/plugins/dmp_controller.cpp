@@ -41,6 +41,7 @@ void DmpController::configure(const MotionSetup& setup) {
   base_frame_ = parameters.text("robot_base_frame_name", base);
   dmp_frame_ = parameters.text("dmp_frame_name", base_frame_);
   goal_frame_ = parameters.text("goal_frame_name", "human_hand");
+  goal_tf_frame_ = parameters.text("goal_tf_frame", "dmp_goal");
   goal_from_tf_ = parameters.choice("goal_source", "tf", {"tf", "topic"}) == "tf";
   setIkDebug(parameters.flag("enable_ik_debug", false));
   finish_distance_ = parameters.number("goal_finish_distance", 0.12, 0.0, 1.0);
@@ -54,6 +55,8 @@ void DmpController::configure(const MotionSetup& setup) {
       parameters.number("singularity_threshold", ik.singularity_threshold, 0.0, 1.0);
   ik.rotation_first_scaling = parameters.flag("rotation_first_scaling", ik.rotation_first_scaling);
   ik.velocity_limit = setup.robot->limits.velocity;
+  ik.acceleration_limit = setup.robot->limits.acceleration;
+  ik.jerk_limit = setup.robot->limits.jerk;
   ik_ = std::make_unique<TwoTaskIk>(ik);
 
   GoalGateParameters gate;
@@ -70,7 +73,11 @@ void DmpController::configure(const MotionSetup& setup) {
   MotionEndParameters end;
   end.phase = parameters.number("end_phase", end.phase, 1e-6, 0.5);
   end.speed = parameters.number("end_speed", end.speed, 1e-6, 1.0);
+  end.turning = parameters.number("end_turning", end.turning, 1e-6, 10.0);
   end.distance = parameters.number("end_distance", end.distance, 1e-6, 0.5);
+  end.noisy_speed = parameters.number("noisy_end_speed", end.noisy_speed, 1e-6, 1.0);
+  end.noisy_turning = parameters.number("noisy_end_turning", end.noisy_turning, 1e-6, 10.0);
+  end.noisy_distance = parameters.number("noisy_end_distance", end.noisy_distance, 1e-6, 0.5);
   end.follow_distance = parameters.number("follow_distance", end.follow_distance, 1e-3, 1.0);
   end.follow_time = parameters.number("follow_time", end.follow_time, 0.0, 10.0);
 
@@ -341,6 +348,8 @@ void DmpController::resolve(const CycleInput& input, References& references) {
 }
 
 double DmpController::limitScale() const { return loop_->ik.scale; }
+
+const CartesianMotion& DmpController::motion() const { return loop_->motion; }
 
 void DmpController::report(const CycleInput& input) {
   Loop& loop = *loop_;

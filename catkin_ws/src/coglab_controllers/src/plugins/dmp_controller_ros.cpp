@@ -3,7 +3,9 @@
 #include <memory>
 #include <string>
 
+#include <geometry_msgs/TransformStamped.h>
 #include <ros/ros.h>
+#include <tf2_ros/transform_broadcaster.h>
 
 #include "coglab_controllers/manager/plugin_registry.hpp"
 #include "coglab_controllers/plugins/dmp_controller.hpp"
@@ -159,6 +161,7 @@ class DmpControllerRos : public MotionControllerRos {
     const MotionState before = progress_.state;
     const Reason reason = progress_.reason;
     if (!controller_->readProgress(progress_)) return;
+    broadcastGoal();
     const bool changed = progress_.state != before || (progress_.reason.empty() != reason.empty());
     const bool moving =
         progress_.state == MotionState::Running || progress_.state == MotionState::Holding;
@@ -182,14 +185,35 @@ class DmpControllerRos : public MotionControllerRos {
     }
   }
 
+  /// The goal as a tf2 frame, 33 times a second while a motion runs: what rviz and recorders show.
+  void broadcastGoal() {
+    const bool moving =
+        progress_.state == MotionState::Running || progress_.state == MotionState::Holding;
+    const std::string& frame = controller_->goalTfFrame();
+    if (!moving || frame.empty() || progress_.stamp_ns == 0 || calls_ - last_goal_ < 6) return;
+    last_goal_ = calls_;
+    geometry_msgs::TransformStamped message;
+    message.header.stamp = toRos(progress_.stamp_ns);
+    message.header.frame_id = controller_->dmpFrame();
+    message.child_frame_id = frame;
+    geometry_msgs::Pose pose;
+    write(progress_.goal, pose);
+    message.transform.translation.x = pose.position.x;
+    message.transform.translation.y = pose.position.y;
+    message.transform.translation.z = pose.position.z;
+    message.transform.rotation = pose.orientation;
+    broadcaster_.sendTransform(message);
+  }
+
   DmpController* controller_ = nullptr;
   ros::NodeHandle node_;
+  tf2_ros::TransformBroadcaster broadcaster_;
   std::unique_ptr<TfGoalSource> source_;
   ros::Publisher feedback_, debug_;
   ros::Subscriber goal_;
   ros::ServiceServer services_[3];
   DmpProgress progress_;
-  std::uint64_t calls_ = 0, last_feedback_ = 0;
+  std::uint64_t calls_ = 0, last_feedback_ = 0, last_goal_ = 0;
 };
 
 }  // namespace coglab_controllers

@@ -50,6 +50,8 @@ void PtpController::configure(const MotionSetup& setup) {
   blend_.setTime(parameters.number("hold_blend", 0.15, 0.0, 5.0));
   IkParameters ik;
   ik.velocity_limit = setup.robot->limits.velocity;
+  ik.acceleration_limit = setup.robot->limits.acceleration;
+  ik.jerk_limit = setup.robot->limits.jerk;
   ik_ = std::make_unique<TwoTaskIk>(ik);
   if (std::function<void()> wait = setup.host->cycleWait()) plans_.setWait(wait);
 }

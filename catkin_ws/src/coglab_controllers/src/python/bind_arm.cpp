@@ -55,16 +55,29 @@ void bindIk(py::module_& module) {
                         "Inverse kinematics with two priorities, eq. (6)-(12).")
       .def(py::init([](double pos_clik_gain, double rot_clik_gain, double singularity_threshold,
                        double stretch_threshold, bool rotation_first_scaling,
-                       const JointVector& velocity_limit) {
-             return TwoTaskIk({pos_clik_gain, rot_clik_gain, singularity_threshold,
-                               stretch_threshold, rotation_first_scaling, velocity_limit});
+                       const JointVector& velocity_limit, const JointVector& acceleration_limit,
+                       const JointVector& jerk_limit) {
+             IkParameters parameters;
+             parameters.pos_clik_gain = pos_clik_gain;
+             parameters.rot_clik_gain = rot_clik_gain;
+             parameters.singularity_threshold = singularity_threshold;
+             parameters.stretch_threshold = stretch_threshold;
+             parameters.rotation_first_scaling = rotation_first_scaling;
+             parameters.velocity_limit = velocity_limit;
+             parameters.acceleration_limit = acceleration_limit;
+             parameters.jerk_limit = jerk_limit;
+             return TwoTaskIk(parameters);
            }),
            py::arg("pos_clik_gain") = standard.pos_clik_gain,
            py::arg("rot_clik_gain") = standard.rot_clik_gain,
            py::arg("singularity_threshold") = standard.singularity_threshold,
            py::arg("stretch_threshold") = standard.stretch_threshold,
            py::arg("rotation_first_scaling") = standard.rotation_first_scaling,
-           py::arg("velocity_limit") = standard.velocity_limit)
+           py::arg("velocity_limit") = standard.velocity_limit,
+           py::arg("acceleration_limit") = standard.acceleration_limit,
+           py::arg("jerk_limit") = standard.jerk_limit,
+           "With the limits of acceleration (7,) and jerk (7,) errors are answered only by speeds "
+           "from which each joint can brake.")
       .def(
           "solve",
           [](const TwoTaskIk& ik, const Chain& chain, const JointVector& q,

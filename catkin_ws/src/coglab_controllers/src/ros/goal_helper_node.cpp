@@ -19,14 +19,16 @@ namespace coglab_controllers {
 /// capture; what is old or not finite is not published.
 class GoalHelper {
  public:
-  explicit GoalHelper(const ros::NodeHandle& node) : node_(node), listener_(buffer_) {
-    const Parameters parameters(readParameters(node_), "goal_helper");
+  /// @param node of the topic's name, which is relative to it  @param own the node's parameters
+  GoalHelper(const ros::NodeHandle& node, const ros::NodeHandle& own)
+      : node_(node), listener_(buffer_) {
+    const Parameters parameters(readParameters(own), "goal_helper");
     frame_ = parameters.text("frame", "human_hand");
     dmp_frame_ = parameters.text("dmp_frame_name", "lwr_base_link");
     offset_ = parameters.numbers("offset", Eigen::VectorXd::Zero(3));
     rate_ = parameters.number("rate", 100.0, 0.1, 1000.0);
     goal_ = node_.advertise<coglab_msgs::DmpGoal>(
-        parameters.text("topic", "/controller_manager/dmp/dmp_goal"), 1);
+        parameters.text("topic", "controller_manager/dmp/dmp_goal"), 1);
   }
 
   void run() {
@@ -86,7 +88,7 @@ class GoalHelper {
 int main(int argc, char** argv) {
   ros::init(argc, argv, "goal_helper");
   try {
-    coglab_controllers::GoalHelper(ros::NodeHandle("~")).run();
+    coglab_controllers::GoalHelper(ros::NodeHandle(), ros::NodeHandle("~")).run();
   } catch (const std::exception& error) {
     ROS_FATAL("%s", error.what());
     return 1;

@@ -7,13 +7,15 @@
 
 namespace coglab_controllers {
 
-/// A linear constraint on the joint velocities: jacobian * qd = velocity, with `rows` rows of 7 in
-/// use.
+/// A linear constraint on the joint velocities: jacobian * qd = velocity + gain * error, with `rows`
+/// rows of 7 in use.
 struct TaskConstraint {
   int rows = 0;  ///< 0: no constraint in this cycle; else 3 or 7
   Eigen::Matrix<double, kMaxJoints, kMaxJoints> jacobian =
       Eigen::Matrix<double, kMaxJoints, kMaxJoints>::Zero();
   JointVector velocity = JointVector::Zero();
+  JointVector error = JointVector::Zero();  ///< what is still to go, in the same rows
+  double gain = 0.0;  ///< 1/s; TwoTaskIk takes less where the arm could not brake
   /// true: near a singularity the task is rejected altogether, eq. (11). false: only the singular
   /// directions are, as a task with more rows than the null space has dimensions needs.
   bool reject_whole = true;

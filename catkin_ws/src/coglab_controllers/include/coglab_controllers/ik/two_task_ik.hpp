@@ -2,6 +2,8 @@
 /// Inverse kinematics with two priorities, eq. (6)-(12).
 #pragma once
 
+#include <limits>
+
 #include "coglab_controllers/ik/second_task.hpp"
 
 namespace coglab_controllers {
@@ -19,6 +21,13 @@ struct IkParameters {
   /// priority. false: both are scaled together.
   bool rotation_first_scaling = true;
   JointVector velocity_limit = JointVector::Constant(1.9);  ///< rad/s, positive
+  /// What the arm can follow, rad/s^2 and rad/s^3: an error is answered only by speeds from which
+  /// each joint can brake on the way that takes the error away. Small errors see K_pos and K_rot as
+  /// they are; without limits, the default, all do.
+  JointVector acceleration_limit =
+      JointVector::Constant(std::numeric_limits<double>::infinity());
+  JointVector jerk_limit = JointVector::Constant(std::numeric_limits<double>::infinity());
+  double reaction_time = 0.015;  ///< s from a measurement until the arm follows what it led to
 };
 
 /// Result of one cycle, with everything dmp/ik_debug shows.
@@ -53,7 +62,10 @@ class TwoTaskIk {
   const IkParameters& parameters() const noexcept { return parameters_; }
 
  private:
+  double brakeableGain(const JointVector& way, double gain) const noexcept;
+
   IkParameters parameters_;
+  JointVector braking_, lag_;  // rad/s^2 and s of brakeableGain()
   OrientationTask orientation_;
 };
 

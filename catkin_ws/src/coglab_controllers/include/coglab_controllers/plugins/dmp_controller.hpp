@@ -45,6 +45,7 @@ struct DmpProgress {
   double phase = 0.0;
   double remaining_distance = 0.0;  ///< m, end-effector to goal as received
   double remaining_time = 0.0;      ///< s
+  Pose goal;  ///< of the hand in dmp_frame_name, as estimated, or as latched at the end
 };
 
 /// One cycle, for dmp/ik_debug. Poses and vectors in the robot's base frame.
@@ -71,9 +72,11 @@ struct HandGoal {
 /// `dmp_frame_name`, `enable_ik_debug`; and `goal_source` (tf or topic), `goal_frame_name`,
 /// `goal_timeout` (s, topic; 0: never old), `goal_max_age` (s), `goal_max_jump` (m),
 /// `goal_lost_time` (s), `goal_finish_distance` (m), `goal_reach_margin` (m), `goal_time_constant`
-/// (s), `max_initial_distance` (m), `end_phase`, `end_speed` (m/s), `end_distance`,
+/// (s), `max_initial_distance` (m), `end_phase`, `end_speed` (m/s), `end_turning` (rad/s),
+/// `end_distance` (m), `noisy_end_speed`, `noisy_end_turning`, `noisy_end_distance`,
 /// `follow_distance` (m), `follow_time` (s), `singularity_threshold`, `rotation_first_scaling`,
-/// `hold_blend` (s), `dmp_file` (a library to load at once).
+/// `hold_blend` (s), `dmp_file` (a library to load at once); on ROS also `goal_tf_frame` (name under
+/// which the estimated goal is broadcast; empty: it is not).
 class DmpController : public MotionController {
  public:
   DmpController();
@@ -105,6 +108,9 @@ class DmpController : public MotionController {
   const std::string& dmpFrame() const { return dmp_frame_; }
   const std::string& baseFrame() const { return base_frame_; }
   bool goalFromTf() const { return goal_from_tf_; }
+  const std::string& goalTfFrame() const { return goal_tf_frame_; }
+  /// The motion behind the references. Control thread, or lockstep between two cycles.
+  const CartesianMotion& motion() const;
 
   // MotionController
   void configure(const MotionSetup& setup) override;
@@ -144,7 +150,7 @@ class DmpController : public MotionController {
 
   // set once, by configure()
   MotionSetup setup_;
-  std::string base_frame_, dmp_frame_, goal_frame_;
+  std::string base_frame_, dmp_frame_, goal_frame_, goal_tf_frame_;
   bool goal_from_tf_ = true;
   double finish_distance_ = 0.12, reach_margin_ = 0.5, max_initial_distance_ = 0.1;
   std::unique_ptr<TwoTaskIk> ik_;

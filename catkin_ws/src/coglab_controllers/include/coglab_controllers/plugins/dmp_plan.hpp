@@ -35,6 +35,7 @@ struct DmpController::Loop {
     now.phase = motion.dmp().state().phase;
     now.remaining_distance = remaining_distance;
     now.remaining_time = motion.remainingTime();
+    now.goal = {motion.goal(), motion.goalOrientation()};
     return now;
   }
 
