@@ -93,6 +93,27 @@ def test_hand_node_dies_during_the_exchange(moment, hub, sentence):
     assert "open" not in [c for c in trial.cell.called() if c == "open"][1:]
 
 
+def test_a_goal_that_is_lost_for_a_moment_at_the_start_is_waited_for():
+    trial = Trial()
+    trial.cell.faults.refuse["execute_dmp"] = "goal frame 'object_mug' is 0.45 s old, allowed: 0.2 s (goal_max_age)"
+
+    def script(t):
+        t.wait_hub("wait_without_object")
+        t.start(EXCHANGE)
+        while not t.cell.called("execute_dmp"):
+            t.clock.sleep(0.02)
+        t.clock.sleep(0.4)
+        del t.cell.faults.refuse["execute_dmp"]
+        t.wait_hub("wait_with_object")
+        t.cell.faults.refuse["execute_dmp"] = "goal frame 'human_hand' is 3.10 s old, allowed: 0.2 s (goal_max_age)"
+        t.start("exchange_robot_to_human")
+        t.wait_hub("wait_with_object")
+
+    trial.run(script)
+    assert [r.outcome for r in trial.ctx.journal.results[1:]] == ["succeeded", "failed_holding"]
+    assert "3.10 s old" in trial.ctx.journal.why()
+
+
 def test_arm_node_dead_ends_in_fault_with_its_sentence():
     trial = Trial()
 

@@ -103,6 +103,24 @@ def test_a_hold_during_an_action_never_opens_the_hand():
         trial.result().causes)
 
 
+def test_a_hold_while_the_person_gives_does_not_move_the_hand():
+    trial = Trial()
+
+    def script(t):
+        t.wait_hub("wait_without_object")
+        t.cell.calls.clear()
+        t.start("exchange_human_to_robot")
+        t.clock.sleep(0.8)
+        t.cell.held = True
+        t.wait_hub("stopped", limit=10.0)
+        t.clock.sleep(3.0)
+        assert "open" not in t.cell.called() and "close" not in t.cell.called()
+        t.start("reset", "")
+        t.wait_hub("wait_without_object")
+
+    trial.run(script)
+
+
 class Restarted(Trial):
     """A brain that starts while the hand holds an object, with what a former one noted on disk."""
 

@@ -1,4 +1,4 @@
-"""Recognition of the partner's reach in whole trials: monitor_dmp substitutes the primitive, and a hub is left by it."""
+"""Recognition of the partner's reach in whole trials: monitor_dmp substitutes the primitive; a reach leaves a hub."""
 from pathlib import Path
 
 import numpy as np

@@ -94,10 +94,24 @@ class ExecuteDmp(CoglabState):
         profile = str(self.ctx.config.get("approach_profile", ""))
         if profile:
             self.await_pending(self.ctx.arm.apply_profile(profile), f"feedback profile '{profile}'", 2.0)
-        self.await_pending(self.ctx.arm.execute_dmp(request), f"start of primitive '{request.primitive_id}'")
+        self._start(request)
         self.ctx.journal.mark("motion_started")
         self.reason = f"primitive '{request.primitive_id}' toward {request.goal_frame}"
         return "succeeded"
+
+    def _start(self, request: DmpRequest) -> None:
+        """A tracker that has lost the goal for a moment gets as long as a running motion would give it."""
+        end = self.ctx.clock.now() + float(self.ctx.config.get("goal_lost_time", 1.0))
+        while True:
+            try:
+                self.await_pending(self.ctx.arm.execute_dmp(request), f"start of primitive '{request.primitive_id}'")
+                return
+            except TimeLimit:
+                raise
+            except PortError as error:
+                if " s old" not in error.sentence or self.ctx.clock.now() >= end:
+                    raise
+            self.pause(0.05)
 
 
 class WaitStop(CoglabState):
@@ -123,7 +137,8 @@ class WaitStop(CoglabState):
         self._leave_approach_profile()
         if self.trigger == "release":
             # The goal is the person's hand, and that now comes to the object: an arm that still followed it
-            # would back away.
+            # would back away. But first the motion has to come to rest at the goal that it has latched.
+            self._await_rest()
             self.await_pending(self.ctx.arm.switch_controller("ptp"), "end of the reach by switching to 'ptp'", 3.0)
         settings = self._settings(ud)
         limit = float(settings.get("timeout", self.ctx.config.get(f"{self.trigger}_timeout", 6.0)))
@@ -137,6 +152,16 @@ class WaitStop(CoglabState):
         self.ctx.journal.mark("contact")
         self.reason = event.message or f"{self.trigger} by {event.source}, margin {event.margin:.1f}"
         return "succeeded"
+
+    def _await_rest(self) -> None:
+        """Until no joint has moved by more than 2 mrad for 0.1 s, or 1 s is over."""
+        end = self.ctx.clock.now() + 1.0
+        still_since, place = self.ctx.clock.now(), self.ctx.arm.joint_positions()
+        while self.ctx.clock.now() < end and self.ctx.clock.now() - still_since < 0.1:
+            self.pause(0.02)
+            now = self.ctx.arm.joint_positions()
+            if now is None or place is None or max(abs(a - b) for a, b in zip(now, place, strict=True)) > 0.002:
+                still_since, place = self.ctx.clock.now(), now
 
     def _leave_approach_profile(self) -> None:
         """Back to the rigid profile, and wait until what the compliant one added is gone: contact is found in forces,
