@@ -145,6 +145,26 @@ class TestSection9Wrapper(unittest.TestCase):
         client = self.serve(machine, expand_goal_slots=True, pack_result_slots=True)
         self.assertEqual(self.send(client, 1), (GoalStatus.SUCCEEDED, 6))
 
+    def test_s9_wrapper_a_fresh_result_is_there_to_be_filled_in(self):
+        """As the machines of others do it: the result is an input and an output key."""
+
+        def fill(ud):
+            seen.append(ud.action_result.result)
+            ud.action_result.result += ud.action_goal.goal + 40
+            return "succeeded"
+
+        seen = []
+        machine = smach.StateMachine(
+            ["succeeded"], ["action_goal", "action_result"], ["action_result"]
+        )
+        with machine:
+            keys = {"input_keys": ["action_goal"], "io_keys": ["action_result"]}
+            smach.StateMachine.add("FILL", smach.CBState(fill, outcomes=["succeeded"], **keys))
+        client = self.serve(machine)
+        for goal in (1, 2):
+            self.assertEqual(self.send(client, goal), (GoalStatus.SUCCEEDED, 40 + goal))
+        self.assertEqual(seen, [0, 0], "no goal sees the result of another")
+
     def test_s9_wrapper_bad_slots(self):
         with self.assertRaises(smach.InvalidStateError):
             smach_ros.ActionServerWrapper(

@@ -19,7 +19,8 @@ class ActionServerWrapper:
     `expand_goal_slots`, or under another with `goal_slots_map` {field: key}); the container must
     have these among its input keys. The result is what it leaves in `result_key` (and
     `result_slots_map` {field: key}, and with `pack_result_slots` each field under its own name),
-    its output keys. `feedback_key` (and `feedback_slots_map` {field: key}) in its own user data is
+    its output keys; a fresh result is there from the start, for containers that have it among their
+    input keys too. `feedback_key` (and `feedback_slots_map` {field: key}) in its own user data is
     published at each transition.
 
     The outcome decides how the goal ends; what is in none of the three lists aborts it, as does an
@@ -107,6 +108,8 @@ class ActionServerWrapper:
         assert server is not None
         ud = smach.UserData()
         ud[self._goal_key] = goal
+        # A machine with the result among its input keys may fill in this one field by field.
+        ud[self._result_key] = self._result_class()
         if self._expand_goal_slots:
             for slot in goal.__slots__:
                 ud[slot] = getattr(goal, slot)
