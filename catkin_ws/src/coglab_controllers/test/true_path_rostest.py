@@ -103,7 +103,7 @@ class TruePath(unittest.TestCase):
                 if status.name.endswith("commands"):
                     counted.update((v.key, int(v.value)) for v in status.values)
 
-        rospy.Subscriber("/rosout_agg", Log, lambda m: told.append(m.msg))
+        rospy.Subscriber("/rosout", Log, lambda m: told.append(m.msg))
         rospy.Subscriber("/diagnostics", DiagnosticArray, diagnosed)
         foreign = rospy.Publisher("lwr/target_joint_states", JointState, queue_size=1)
         wait_until(lambda: foreign.get_num_connections() > 0 and counted, 10.0, "connections")

@@ -183,7 +183,7 @@ class LwrNode(unittest.TestCase):
 
     def test_a_second_sender_is_ignored_and_named(self) -> None:
         told: list[str] = []
-        rospy.Subscriber("/rosout_agg", Log, lambda m: told.append(m.msg))
+        rospy.Subscriber("/rosout", Log, lambda m: told.append(m.msg))
         rospy.sleep(0.5)
         other = UdpController(bound_port("/lwr")).start()
         name = f"127.0.0.1:{other.source_port}"
@@ -207,7 +207,7 @@ class LwrNode(unittest.TestCase):
     def test_a_second_publisher_is_refused_while_one_moves_the_arm(self) -> None:
         binary = [sys.executable, str(pathlib.Path(__file__).resolve().parent / "foreign_target.py")]
         told: list[str] = []
-        rospy.Subscriber("/rosout_agg", Log, lambda m: told.append(m.msg))
+        rospy.Subscriber("/rosout", Log, lambda m: told.append(m.msg))
         self.ask("start")
         twist = Twist(self.target, [0.0] * 7)
         foreign = subprocess.Popen([*binary, "__name:=foreign_target"], env=os.environ)
@@ -223,7 +223,7 @@ class LwrNode(unittest.TestCase):
             wait_for(lambda: self.robot.position[6] > before + 0.05, "the other one's motion")
         finally:
             twist.stop()
-            foreign.terminate()
+            foreign.kill()
             foreign.wait(timeout=LIMIT)
         self.ask("stop")
 
@@ -290,7 +290,7 @@ class LwrNode(unittest.TestCase):
         rospy.set_param("/lwr_six/fri_port", 0)
         rospy.set_param("/lwr_six/rt_priority", 0)
         told: list[str] = []
-        rospy.Subscriber("/rosout_agg", Log, lambda m: told.append(m.msg))
+        rospy.Subscriber("/rosout", Log, lambda m: told.append(m.msg))
         node = subprocess.Popen(
             [node_binary(), "__name:=lwr_six", "_lwr_namespace:=/lwr_six"], env=os.environ
         )
