@@ -34,6 +34,8 @@ BLOCKS = 401
 SWEEPS = 4
 MOVES = 25
 CPU_WINDOW_S = 12.0
+SLOW = 30
+"""Speed at which a full stroke takes longer than CPU_WINDOW_S."""
 
 Row = dict[str, object]
 
@@ -77,7 +79,7 @@ def bare_sweep(descriptor: int, poll: select.poll) -> None:
         for code, count in ((0x45, 1), (0x4B, 1), (0x49, 2)):
             os.write(descriptor, bytes((code, motor)))
             while count > 0:
-                poll.poll(50)
+                poll.poll(500)
                 count -= len(os.read(descriptor, count))
 
 
@@ -111,11 +113,12 @@ def request_time() -> list[Row]:
                                  "--greeting"], stdout=subprocess.PIPE, text=True)
     try:
         port = emulator.stdout.readline().split()[1]
-        with HandSerialDriver(port) as driver:
+        # A busy machine may hold the emulator back for longer than a hand ever takes.
+        with HandSerialDriver(port, read_timeout=0.5) as driver:
             bare = os.open(port, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
             poll = select.poll()
             poll.register(bare, select.POLLIN)
-            plain = serial.Serial(port, timeout=0.05)
+            plain = serial.Serial(port, timeout=0.5)
             blocking = os.open(port, os.O_RDWR | os.O_NOCTTY)
             contestants = ((driver_sweep, driver), (bare_sweep, bare, poll),
                            (blocking_sweep, blocking), (pyserial_sweep, plain))
@@ -196,6 +199,13 @@ def cpu_seconds(pid: int) -> float:
     return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
 
+def cpu_share(pid: int) -> float:
+    """Processor time of a process over CPU_WINDOW_S, as a share of one core."""
+    before, begun = cpu_seconds(pid), time.monotonic()
+    time.sleep(CPU_WINDOW_S)
+    return (cpu_seconds(pid) - before) / (time.monotonic() - begun)
+
+
 def node_figures() -> list[Row]:
     os.environ["ROS_MASTER_URI"] = f"http://127.0.0.1:{free_port()}"
     os.environ.setdefault("ROS_IP", "127.0.0.1")
@@ -205,7 +215,13 @@ def node_figures() -> list[Row]:
         import actionlib
         import rosgraph
         import rospy
-        from coglab_msgs.msg import HandOpenAction, HandOpenGoal, HandStatus
+        from coglab_msgs.msg import (
+            HandCloseAction,
+            HandCloseGoal,
+            HandOpenAction,
+            HandOpenGoal,
+            HandStatus,
+        )
 
         wait_for(rosgraph.is_master_online, 20.0, "the ROS master")
         hand = TimedHand(greeting=True)
@@ -227,14 +243,22 @@ def node_figures() -> list[Row]:
             raise RuntimeError("no hand_open action")
         delays = [one_move(server, hand, client, HandOpenGoal, number) for number in range(MOVES)]
         time.sleep(1.0)
-        before, begun = cpu_seconds(node.pid), time.monotonic()
-        time.sleep(CPU_WINDOW_S)
-        share = (cpu_seconds(node.pid) - before) / (time.monotonic() - begun)
+        share = cpu_share(node.pid)
+        closing = actionlib.SimpleActionClient("/ih2_hand/hand_close", HandCloseAction)
+        if not closing.wait_for_server(rospy.Duration(10.0)):
+            raise RuntimeError("no hand_close action")
+        closing.send_goal(HandCloseGoal(speed=SLOW))
+        time.sleep(1.0)
+        moving_share = cpu_share(node.pid)
+        if closing.get_state() != actionlib.GoalStatus.ACTIVE:
+            raise RuntimeError("hand_close ended during the measurement")
     median_ms, limit_ms = statistics.median(delays) * 1e3, 1e3 / RATE_HZ + 20.0
     return [row("finger stop to action result, median", median_ms, "ms",
                 f"<= {limit_ms:.1f}", median_ms <= limit_ms, "one poll period (ms)", 1e3 / RATE_HZ),
             row("hand node at 30 Hz hand_status", share * 100.0, "% of one core", "<= 5",
-                share <= 0.05)]
+                share <= 0.05),
+            row("hand node at 30 Hz hand_status while a goal moves the fingers",
+                moving_share * 100.0, "% of one core", "<= 5", moving_share <= 0.05)]
 
 
 def one_move(server: PtyServer, hand: TimedHand, client, goal_type, number: int) -> float:
