@@ -81,8 +81,9 @@ class PerceptionNode:
         self.static.sendTransform(self.transform(board_sight))
         recording = {"frame": names.human_hand, **dict(rospy.get_param("~recording", {}))}
         playback = PlaybackSettings.from_mapping(recording)
-        self.playback = Playback.open(playback, names.world) if playback.file else None
-        if self.playback:
+        self.playback = None
+        if playback.file:
+            self.playback = Playback.open(playback, names.world, names.is_tracked)
             rospy.loginfo("perception plays %s: %s, %.1f s", playback.file,
                           ", ".join(self.playback.names), self.playback.recording.duration)
             self.timer = rospy.Timer(rospy.Duration(1.0 / PLAYBACK_HZ), self.on_timer)

@@ -11,6 +11,7 @@ from coglab_sim.recorded_motion import (
     load_recording,
 )
 from coglab_sim.rigid import Frame, quat_from_rotvec, quat_rotate
+from coglab_sim.vision import Names
 
 STAMPS = 100.0 + np.arange(0.0, 1.01, 0.1)
 POSITIONS = np.column_stack([1.3 - 0.4 * (STAMPS - 100.0), 0.2 + 0.1 * (STAMPS - 100.0),
@@ -122,6 +123,18 @@ def test_mirror_turn_and_anchor(tmp_path):
     anchored.frames(0.0)
     assert anchored.frames(9.0)["human_hand"].position == pytest.approx([0.8, 0.0, 0.4])
     assert anchored.recording.tracks["human_hand"].at(9.0).position == pytest.approx(POSITIONS[-1])
+
+
+def test_of_a_bag_only_what_a_tracker_sees(tmp_path):
+    names = Names("world", "human_hand", "board", "object_{id}")
+    path = write_bag(tmp_path / "all.bag", frames=("human_hand", "object_mug", "dmp_goal", "board"))
+    play = Playback.open(PlaybackSettings(file=path), "world", names.is_tracked)
+    assert sorted(play.names) == ["human_hand", "object_mug"]
+    renamed = PlaybackSettings(file=path, rename={"dmp_goal": "object_ball"})
+    assert "object_ball" in Playback.open(renamed, "world", names.is_tracked).names
+    path = write_bag(tmp_path / "none.bag", frames=("dmp_goal", "object_"))
+    with pytest.raises(RecordingError, match=r"\(dmp_goal, object_\) is one that perception shows"):
+        Playback.open(PlaybackSettings(file=path), "world", names.is_tracked)
 
 
 def test_rename(tmp_path):

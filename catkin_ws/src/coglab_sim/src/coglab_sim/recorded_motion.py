@@ -12,7 +12,7 @@ orientations (unit quaternions x y z w). All three kinds of file say the same:
 from __future__ import annotations
 
 import csv
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any
@@ -255,9 +255,20 @@ class Playback:
         self._waited = 0.0
 
     @staticmethod
-    def open(settings: PlaybackSettings, world: str = "world") -> Playback:
-        """Load the settings' file. Raises RecordingError."""
-        return Playback(load_recording(settings.file, settings.frame, world), settings)
+    def open(settings: PlaybackSettings, world: str = "world",
+             wanted: Callable[[str], bool] = lambda name: True) -> Playback:
+        """Load the settings' file; of its frames, under their new names, those that are `wanted`.
+
+        A bag also holds frames that no tracker sees. Raises RecordingError.
+        """
+        recording = load_recording(settings.file, settings.frame, world)
+        kept = {name: track for name, track in recording.tracks.items()
+                if wanted(settings.rename.get(name, name))}
+        if not kept:
+            raise RecordingError(f"{settings.file}: none of its frames "
+                                 f"({', '.join(recording.tracks)}) is one that perception shows; "
+                                 "see rename")
+        return Playback(Recording(kept), settings)
 
     @property
     def names(self) -> Iterable[str]:

@@ -44,6 +44,13 @@ class Names:
         """Frame of an object."""
         return self.object.replace("{id}", object_id)
 
+    def is_tracked(self, frame: str) -> bool:
+        """Whether a tracker shows this frame: the partner's hand, or an object's."""
+        before, _, after = self.object.partition("{id}")
+        is_object = (frame.startswith(before) and frame.endswith(after)
+                     and len(frame) > len(before) + len(after))
+        return frame == self.human_hand or is_object
+
 
 class PartnerChoice:
     """Whose hand is the partner's when several are in view.
