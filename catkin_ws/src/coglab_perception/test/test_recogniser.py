@@ -5,7 +5,7 @@ import json
 
 import numpy as np
 import pytest
-from coglab_perception.hmm import HmmFilter, LeftRightHmm
+from coglab_perception.hmm import VARIANCE_FLOOR, HmmFilter, LeftRightHmm
 from coglab_perception.recogniser import (
     UNKNOWN,
     Recogniser,
@@ -60,18 +60,38 @@ def test_training_raises_the_likelihood_and_finds_the_means():
     assert model.stay[:2] == pytest.approx([0.8, 0.8], abs=0.06)
 
 
-def test_filter_and_training_agree_with_hmmlearn():
-    hmmlearn = pytest.importorskip("hmmlearn.hmm", reason="the oracle hmmlearn is not installed")
-    rng = np.random.default_rng(2)
-    model = small_model(rng, 4, 3)
-    peer = hmmlearn.GaussianHMM(4, covariance_type="diag", init_params="", params="")
-    peer.n_features = 3
-    peer.startprob_ = np.array([1.0, 0, 0, 0])
+def hmmlearn_twin(model, dimensions):
+    """The same model in the oracle."""
+    hmm = pytest.importorskip("hmmlearn.hmm", reason="the oracle hmmlearn is not installed")
+    peer = hmm.GaussianHMM(model.states, covariance_type="diag", init_params="", params="tmc", n_iter=1, tol=0.0,
+                           covars_prior=0.0)
+    peer.n_features = dimensions
+    peer.startprob_ = np.eye(model.states)[0]
     peer.transmat_ = model.transition()
     peer.means_, peer.covars_ = model.mean, model.variance
+    return peer
+
+
+def test_the_filter_agrees_with_hmmlearn():
+    rng = np.random.default_rng(2)
+    model = small_model(rng, 4, 3)
+    peer = hmmlearn_twin(model, 3)
     for _ in range(10):
         x = rng.normal(size=(30, 3))
         assert model.log_likelihood(x) == pytest.approx(peer.score(x), rel=1e-9)
+
+
+def test_a_step_of_training_agrees_with_hmmlearn():
+    rng = np.random.default_rng(4)
+    model = small_model(rng, 4, 3)
+    data = [rng.normal(size=(int(n), 3)) for n in rng.integers(20, 40, 8)]
+    peer = hmmlearn_twin(model, 3)
+    ours, score = model._reestimate(data)
+    assert score == pytest.approx(peer.score(np.concatenate(data), [len(x) for x in data]), rel=1e-9)
+    peer.fit(np.concatenate(data), [len(x) for x in data])
+    assert ours.mean == pytest.approx(peer.means_, rel=1e-6, abs=1e-9)
+    assert ours.variance - VARIANCE_FLOOR == pytest.approx(np.array([np.diag(c) for c in peer.covars_]), rel=1e-6)
+    assert ours.stay[:-1] == pytest.approx(np.diag(peer.transmat_)[:-1], rel=1e-6)
 
 
 def test_one_frame_costs_the_same_whatever_came_before():
