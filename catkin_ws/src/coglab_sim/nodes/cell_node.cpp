@@ -4,7 +4,7 @@
 /// palm, world axes). Publishes truth/cell, finger_contact, ~messages (the controller's message
 /// window), /clock if ~publish_clock. Serves ~fault, ~place_object. Parameters: every row of the
 /// cell's table under the private namespace; ~speed, ~fri_host, ~fri_port (0: wait for
-/// ~port_parameter, by default lwr/fri_port_bound, looked for from here upward), ~port_wait,
+/// ~port_parameter, by default lwr/fri_port_bound beside this namespace), ~port_wait,
 /// ~log_file, ~truth_rate, ~publish_clock; fri_period and seed of the parent namespace.
 #include <fstream>
 #include <memory>
@@ -28,14 +28,17 @@
 namespace coglab_sim {
 namespace {
 
-/// The port that the bridge has published; 0 if none yet. A relative name is looked for in the
-/// node's namespace and upward, so that the bridge of the same robot is found whatever it is pushed
-/// into.
+/// Full name of the parameter with the bridge's port. A relative one counts from the namespace above
+/// the cell's own: the bridge /a/lwr and the cell /a/coglab_sim/cell belong to one robot.
+std::string portParameter(const std::string& name) {
+  if (!name.empty() && name[0] == '/') return name;
+  return ros::names::append(ros::names::parentNamespace(ros::this_node::getNamespace()), name);
+}
+
+/// The port that the bridge has published; 0 if none yet.
 std::uint16_t publishedPort(const std::string& parameter) {
-  std::string found;
   int port = 0;
-  if (!ros::param::search(ros::this_node::getName(), parameter, found)) return 0;
-  if (!ros::param::get(found, port) || port <= 0 || port > 65535) return 0;
+  if (!ros::param::get(parameter, port) || port <= 0 || port > 65535) return 0;
   return static_cast<std::uint16_t>(port);
 }
 
@@ -48,15 +51,16 @@ std::uint16_t waitForPort(const std::string& parameter, double limit) {
     ros::WallDuration(0.1).sleep();
   }
   throw std::runtime_error("no bridge published its UDP port in parameter " + parameter +
-                           ", from " + ros::this_node::getName() + " upward, within " +
-                           std::to_string(limit) + " s; start the bridge or set ~fri_port");
+                           " within " + std::to_string(limit) +
+                           " s; start the bridge or set ~fri_port");
 }
 
 class CellNode {
  public:
   CellNode() : private_("~"), config_(readCellConfig(private_)) {
     int port = private_.param("fri_port", 0);
-    port_parameter_ = private_.param<std::string>("port_parameter", "lwr/fri_port_bound");
+    port_parameter_ =
+        portParameter(private_.param<std::string>("port_parameter", "lwr/fri_port_bound"));
     follow_port_ = port == 0;
     if (follow_port_) port = waitForPort(port_parameter_, private_.param("port_wait", 60.0));
     const auto host = private_.param<std::string>("fri_host", "127.0.0.1");
