@@ -5,10 +5,10 @@ RECEIVE, GIVE = "exchange_human_to_robot", "exchange_robot_to_human"
 OUTCOMES = {
     (RECEIVE, "slow"): {"succeeded"},
     (RECEIVE, "hesitant"): {"succeeded"},
-    (RECEIVE, "change_side"): {"succeeded"},
+    (RECEIVE, "change_side"): {"succeeded", "failed_empty"},
     (RECEIVE, "tug"): {"succeeded"},
     (RECEIVE, "absent"): {"failed_empty"},
-    (RECEIVE, "early_release"): {"failed_empty"},
+    (RECEIVE, "early_release"): {"failed_empty", "succeeded"},
     (RECEIVE, "never_release"): {"failed_empty"},
     (RECEIVE, "pull_back"): {"succeeded", "failed_empty"},
     (RECEIVE, "early_contact"): {"succeeded", "failed_empty"},

@@ -57,5 +57,5 @@ def test_a_profile_that_cannot_be_left_ends_the_reach(fault):
     trial.run(script)
     assert "arm contact" not in trial.cell.called()
     assert trial.result().outcome != "succeeded"
-    why = " ".join(t.reason for t in trial.ctx.journal.transitions)
+    why = trial.ctx.journal.why()
     assert ("no profile 'dmp'" if fault == "refused" else "ee_admittance is stopping") in why

@@ -121,6 +121,23 @@ def test_a_hold_while_the_person_gives_does_not_move_the_hand():
     trial.run(script)
 
 
+def test_why_names_the_block_and_not_only_what_failed_before_it():
+    trial = Trial()
+
+    def script(t):
+        t.wait_hub("wait_without_object")
+        t.cell.faults.not_seen.add("mug")
+        t.start("exchange_human_to_robot")
+        t.cell.held = True
+        t.wait_hub("stopped", limit=15.0)
+
+    trial.run(script)
+    assert trial.ctx.journal.why() == (
+        "the arm is blocked: hold is latched; reset first; the hand keeps what it holds, because set_dmp_goal: 'mug' "
+        "was not seen within 5.0 s")
+    assert trial.result().reason.startswith("the arm is blocked: hold is latched")
+
+
 class Restarted(Trial):
     """A brain that starts while the hand holds an object, with what a former one noted on disk."""
 

@@ -76,6 +76,10 @@ def test_misbehaviour_ends_in_its_documented_outcome(action, behaviour):
         assert trial.last_hub == ("wait_with_object" if held else "wait_without_object")
         if last.outcome != "succeeded":
             assert last.reason
+        if (action, behaviour) == (RECEIVE, "early_release"):
+            # Nobody else holds it: what the robot has not caught lies on the floor.
+            truth = trial.rig.cell.truth()
+            assert truth["dropped"] == (last.outcome == "failed_empty"), (truth["held_by"], last.reason)
 
 
 def test_the_same_seed_gives_the_same_trial():
