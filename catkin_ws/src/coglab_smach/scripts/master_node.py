@@ -14,6 +14,7 @@ import os
 import sys
 import threading
 
+import coglab_controllers as cc
 import rospkg
 import rospy
 import smach
@@ -25,6 +26,7 @@ from coglab_smach.context import Context
 from coglab_smach.holding import HoldingMemory
 from coglab_smach.journal import ActionRecord, Journal, TransitionRecord
 from coglab_smach.machines import build_master
+from coglab_smach.reachability import solve
 from coglab_smach.ros_arm import RosArm
 from coglab_smach.ros_hand import RosHand
 from coglab_smach.ros_ports import RosContact, RosDatabase, RosPerception
@@ -65,7 +67,7 @@ class MasterNode:
         self.journal.listen_results(self.on_result)
         self.ctx = Context(clock=clock, arm=RosArm(), hand=RosHand(), perception=RosPerception(),
                            database=RosDatabase(), contact=RosContact(), config=config, journal=self.journal,
-                           memory=Memory(self.state_file(), rospy.logwarn))
+                           memory=Memory(self.state_file(), rospy.logwarn), reachable=self.reachable())
         self.master = build_master(self.ctx)
         self.server = None
         if rospy.get_param("~introspection", True):
@@ -74,6 +76,15 @@ class MasterNode:
         rospy.Service("coglab/start", Start, self.on_start)
         rospy.Service("coglab/stop", Trigger, self.on_stop)
         rospy.Service("coglab/why", Trigger, self.on_why)
+
+    @staticmethod
+    def reachable():
+        """The check of the arm's reach on the robot's own description, where there is one."""
+        found = rospy.search_param("robot_description")
+        if not found:
+            return lambda pose: True
+        arm = cc.Chain(rospy.get_param(found))
+        return lambda pose: solve(arm, pose) is not None
 
     @staticmethod
     def state_file() -> str:

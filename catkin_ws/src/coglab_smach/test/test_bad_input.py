@@ -14,6 +14,10 @@ def missing_object(t):
 
 
 def unreachable_object(t):
+    t.ctx.reachable = lambda palm: False
+
+
+def object_behind_a_stop(t):
     t.cell.faults.abort_dmp_after = 0.05
     t.cell.faults.abort_reason = "joint lwr_a3 at its stop blocks the motion for 0.5 s"
 
@@ -44,7 +48,8 @@ def missing_primitive(t):
 
 CASES = {
     missing_object: "object 'elephant' is not in the database; it has: ball, bottle, mug, screwdriver, tea_box",
-    unreachable_object: "the reach was aborted, because joint lwr_a3 at its stop blocks the motion",
+    unreachable_object: "'mug' cannot be reached: the arm has no posture for the hand at (0.78, -0.04, 0.48) m",
+    object_behind_a_stop: "the reach was aborted, because joint lwr_a3 at its stop blocks the motion",
     object_out_of_reach: "'mug' was not offered within 8 s: it stayed at (1.40, 0.20, 0.10) m, outside the handover",
     no_person: "'mug' was not seen within 5.0 s",
     two_people: "2 people are in view; one partner is expected",

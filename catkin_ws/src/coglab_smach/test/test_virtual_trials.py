@@ -25,13 +25,13 @@ def quiet():
     smach.set_loggers(*[lambda *a: None] * 4)
 
 
-def run(*actions, **kw):
+def run(*actions, moves=True, **kw):
     trial = VirtualTrial(**kw)
     results = trial.run(*actions)
     assert trial.rig.robot.limit_violations == 0
     assert trial.rig.watched_while_moving == 0
     # "The arm has not moved" where nobody offered anything; else it has.
-    assert (trial.rig.robot.peak_share > 0.05) != (kw.get("behaviour") == "absent")
+    assert (trial.rig.robot.peak_share > 0.05) == (moves and kw.get("behaviour") != "absent")
     assert trial.last_hub in ("wait_without_object", "wait_with_object"), trial.ctx.journal.why()
     return trial, results
 
@@ -82,6 +82,19 @@ def test_misbehaviour_ends_in_its_documented_outcome(action, behaviour):
             assert truth["dropped"] == (last.outcome == "failed_empty"), (truth["held_by"], last.reason)
 
 
+def test_an_object_that_cannot_be_reached_is_refused_before_the_arm_moves():
+    trial, results = run(RECEIVE, seed=3, turned=3.14159, moves=False)
+    assert results[0].outcome == "failed_empty" and trial.last_hub == "wait_without_object"
+    assert "'mug' cannot be reached: the arm has no posture for the hand at (" in trial.ctx.journal.why()
+
+
+def test_an_object_out_of_reach_all_the_same_ends_with_what_remained():
+    trial, results = run(RECEIVE, seed=3, turned=3.14159, **{"handover.check_reach": False})
+    assert results[0].outcome == "failed_empty" and trial.last_hub == "wait_without_object"
+    assert "the end of the reach within 8.0 s expected, it did not happen, because the motion is running with 0." in (
+        trial.ctx.journal.why())
+
+
 def test_the_same_seed_gives_the_same_trial():
     def marks():
         _, results = run("exchange_human_to_robot", seed=12)
@@ -116,3 +129,9 @@ def test_nothing_in_control_reads_the_truth():
                     if path.suffix == ".py":
                         names = {n.module or "" for n in ast.walk(ast.parse(text)) if isinstance(n, ast.ImportFrom)}
                         assert not any(name.startswith("coglab_sim") for name in names), f"{path} imports coglab_sim"
+
+
+def test_the_true_frames_are_not_on_tf():
+    """They go to a topic of their own, so that no tf listener can look them up."""
+    text = (SOURCES / "coglab_sim" / "scripts" / "truth_markers.py").read_text(encoding="utf-8")
+    assert "TransformBroadcaster" not in text and 'rospy.Publisher("truth/tf"' in text

@@ -11,6 +11,7 @@ from coglab_smach.machines import build_master
 from coglab_smach.object_database import ObjectDatabase, ObjectError
 from coglab_smach.pending import Polled, PortError, Ready
 from coglab_smach.ports import DmpProgress, HandState, Located, Recognition
+from coglab_smach.reachability import default_arm, solve
 from smach.virtual_clock import VirtualClock
 from virtual_rig import DT, Rig, distance, frame_of, palm_goal
 
@@ -230,8 +231,8 @@ class VirtualTrial:
     """
 
     def __init__(self, seed=1, behaviour="normal", perfect=False, object_on="human_hand", perception=None,
-                 recogniser=None, later_behaviour="", **overrides):
-        self.rig = Rig(seed, behaviour, perfect, object_on, perception)
+                 recogniser=None, later_behaviour="", turned=0.0, **overrides):
+        self.rig = Rig(seed, behaviour, perfect, object_on, perception, turned)
         self.clock = VirtualClock()
         self.recogniser, self.later_behaviour = recogniser, later_behaviour
         self.last_hub = ""
@@ -241,7 +242,8 @@ class VirtualTrial:
                              {"auto_trigger": True, "dmp_library": LIBRARY, **overrides})
         self.ctx = Context(clock=self.clock, arm=VirtualArm(self.rig), hand=VirtualHand(self.rig),
                            perception=VirtualPerception(self.rig, recogniser), database=VirtualDatabase(database),
-                           contact=VirtualContact(self.rig), config=config, journal=Journal(self.clock.now))
+                           contact=VirtualContact(self.rig), config=config, journal=Journal(self.clock.now),
+                           reachable=lambda pose: solve(default_arm(), pose) is not None)
         self.ctx.journal.listen(self._on_transition)
         self.master = build_master(self.ctx)
         self.over = False

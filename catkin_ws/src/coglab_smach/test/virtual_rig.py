@@ -139,8 +139,9 @@ class Hand:
 class Rig:
     """Everything together. ``seed`` makes person, noise and tracker; ``behaviour`` is the person's."""
 
-    def __init__(self, seed=1, behaviour="normal", perfect=False, object_on="human_hand", perception=None):
-        where = {"object__start": object_on, "object__position": [-0.08, 0.0, -0.05]}
+    def __init__(self, seed=1, behaviour="normal", perfect=False, object_on="human_hand", perception=None, turned=0.0):
+        where = {"object__start": object_on, "object__position": [-0.08, 0.0, -0.05],
+                 "object__rotation": [float(v) for v in quat_from_rotvec([0, 0, turned])]}
         if object_on == "world":
             where["object__position"] = [float(v) for v in BOARD.apply([0.0, 0.0, 0.002])]
             where["object__rotation"] = [float(v) for v in BOARD.orientation]

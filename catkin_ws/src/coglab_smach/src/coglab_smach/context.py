@@ -2,6 +2,7 @@
 from __future__ import annotations
 
 import threading
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from smach.clock import Clock
@@ -10,6 +11,7 @@ from .config import Config
 from .holding import HoldingMemory
 from .journal import Journal
 from .ports import ArmPort, ContactPort, DatabasePort, HandPort, PerceptionPort
+from .pose import Pose
 from .requests import Requests
 
 
@@ -51,6 +53,8 @@ class Context:
     requests: Requests = field(default_factory=Requests)
     stop: StopSwitch = field(default_factory=StopSwitch)
     memory: HoldingMemory = field(default_factory=HoldingMemory)
+    reachable: Callable[[Pose], bool] = lambda pose: True
+    """whether the arm can bring the palm to a pose in the base frame"""
     _holding: str = ""
 
     @property

@@ -130,7 +130,13 @@ class WaitStop(CoglabState):
         self.trigger = trigger
 
     def run(self, ud: Any) -> str:
-        self.wait_for(self._reached, "the end of the reach", float(self.ctx.config.get("reach_timeout", 8.0)))
+        try:
+            self.wait_for(self._reached, "the end of the reach", float(self.ctx.config.get("reach_timeout", 8.0)))
+        except TimeLimit as limit:
+            progress = self.ctx.arm.dmp_progress()
+            limit.causes = limit.causes or (f"the motion is {progress.state} with {progress.remaining_distance:.2f} m "
+                                            f"to go{': ' if progress.reason else ''}{progress.reason}",)
+            raise
         self.ctx.journal.mark("motion_reached")
         if not self.trigger:
             return "succeeded"

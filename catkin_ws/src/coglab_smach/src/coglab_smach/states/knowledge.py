@@ -114,6 +114,18 @@ def paced(ctx: Context, goal: dict[str, Any]) -> dict[str, Any]:
     return {**goal, "dmp_ratio": goal["dmp_ratio"] * float(ctx.config.get("handover.reach_ratio", 1.0))}
 
 
+def require_reach(ctx: Context, what: str, seen: dict[str, Any], goal: dict[str, Any]) -> None:
+    """PortError if the arm has no posture for ``goal`` with its frame where it was seen: better said before the hand
+    runs into whoever holds the object. The frame's parent is the base frame."""
+    if not bool(ctx.config.get("handover.check_reach", True)):
+        return
+    palm = Pose.from_dict(seen) * Pose.from_dict({"xyz": goal["offset"], "quaternion": goal["orientation"]})
+    if not ctx.reachable(palm):
+        where = ", ".join(f"{v:.2f}" for v in palm.position)
+        raise PortError(f"{what} cannot be reached: the arm has no posture for the hand at ({where}) m turned like that",
+                        ("it is too far, or turned so that the grasp points away from the robot; turn or move it",))
+
+
 class SetGraspGoal(CoglabState):
     """DMP goal from the nominal grasp: palm relative to the tracked object frame, short of it by the approach distance.
 
@@ -129,7 +141,9 @@ class SetGraspGoal(CoglabState):
     def run(self, ud: Any) -> str:
         located = await_offer(self, ud.object_id)
         ud.located = located
-        ud.goal = paced(self.ctx, grasp_goal(ud.object_entry, ud.grasp, located["frame"], "receive"))
+        goal = paced(self.ctx, grasp_goal(ud.object_entry, ud.grasp, located["frame"], "receive"))
+        require_reach(self.ctx, f"'{ud.object_id}'", located, goal)
+        ud.goal = goal
         return "succeeded"
 
 
@@ -168,6 +182,7 @@ class SetDeliveryGoal(CoglabState):
         ud.delivery_name = name
         ud.delivery = delivery
         goal = paced(self.ctx, delivery_goal(entry, ud.grasp, delivery, located["frame"]))
+        require_reach(self.ctx, "the person's hand", located, goal)
         ud.delivery_pose = {"xyz": goal["offset"], "quaternion": goal["orientation"]}
         ud.goal = goal
         return "succeeded"
