@@ -122,7 +122,8 @@ def require_reach(ctx: Context, what: str, seen: dict[str, Any], goal: dict[str,
     palm = Pose.from_dict(seen) * Pose.from_dict({"xyz": goal["offset"], "quaternion": goal["orientation"]})
     if not ctx.reachable(palm):
         where = ", ".join(f"{v:.2f}" for v in palm.position)
-        raise PortError(f"{what} cannot be reached: the arm has no posture for the hand at ({where}) m turned like that",
+        raise PortError(f"{what} cannot be reached: the arm has no posture for the hand at ({where}) m turned like "
+                        "that",
                         ("it is too far, or turned so that the grasp points away from the robot; turn or move it",))
 
 
