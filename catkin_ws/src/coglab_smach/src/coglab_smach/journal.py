@@ -111,12 +111,12 @@ class Journal:
             if self._failure is None:
                 self._failure = self._newest = (sentence, causes)
 
-    def stopped(self, sentence: str) -> None:
-        """The action cannot even recover, for this reason: that is what the operator has to know. What failed before
-        becomes its cause, unless it says the same already."""
+    def stopped(self, sentence: str, block: str) -> None:
+        """The action cannot even recover: that is what the operator has to know. What failed before becomes its cause,
+        unless it names the same ``block`` already."""
         with self._lock:
             before, causes = self._failure or ("", ())
-            if sentence in before or any(cause and cause in sentence for cause in causes):
+            if block in before or any(block in cause for cause in causes):
                 return
             self._failure = self._newest = (sentence, (before, *causes) if before else ())
 

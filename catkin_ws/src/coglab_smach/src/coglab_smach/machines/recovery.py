@@ -34,7 +34,7 @@ class EndMotion(CoglabState):
         why = arm_is_blocked(self)
         if why:
             self.reason = f"the arm is blocked: {why}; the hand keeps what it holds"
-            self.ctx.journal.stopped(self.reason)
+            self.ctx.journal.stopped(self.reason, why)
             return "stopped"
         self.await_pending(self.ctx.arm.switch_controller("ptp"), "end of the motion by switching to 'ptp'")
         return "succeeded"

@@ -1,0 +1,94 @@
+"""Bad input against the real controller manager, bridge and hand driver: the sentences are theirs."""
+import pytest
+import smach
+
+try:
+    from virtual_ports import VirtualTrial
+except ImportError as error:
+    pytest.skip(f"a compiled module is not there: {error}", allow_module_level=True)
+import numpy as np
+
+RECEIVE, GIVE = "exchange_human_to_robot", "exchange_robot_to_human"
+
+
+@pytest.fixture(autouse=True)
+def quiet():
+    """The engine's log helps nobody here."""
+    smach.set_loggers(*[lambda *a: None] * 4)
+
+
+def at_home(trial):
+    home = np.array(trial.ctx.config.get("postures.home"))
+    return np.max(np.abs(np.asarray(trial.rig.robot.report["position"]) - home)) < 0.03
+
+
+def blinded(after, **overrides):
+    """Receive; perception loses the object ``after`` s into the motion."""
+    trial = VirtualTrial(seed=4, perfect=True, **overrides)
+
+    def beside(t):
+        if t._reach is not None and t.rig.t > t._reach.begin + after:
+            t.rig.blind.add("object_mug")
+
+    trial.beside = beside
+    return trial, trial.run(RECEIVE)
+
+
+def test_goal_lost_half_way():
+    trial, results = blinded(0.3, **{"handover.reach_ratio": 2.5})
+    assert results[0].outcome == "failed_empty" and trial.last_hub == "wait_without_object" and at_home(trial)
+    why = trial.ctx.journal.why()
+    assert why.startswith("wait_stop: the reach was aborted, because the goal is lost for 1") and "m to go" in why
+
+
+def test_goal_lost_for_the_rest_of_a_short_way_is_finished_on_the_held_one():
+    trial, results = blinded(0.5)
+    assert results[0].outcome == "succeeded", trial.ctx.journal.why()
+
+
+def test_primitive_that_does_not_exist():
+    trial = VirtualTrial(seed=4)
+    entry = trial.ctx.database.database.get("mug")
+    broken = {**entry, "dmp": {**entry["dmp"], "receive": "reach_the_moon"}}
+    trial.ctx.database.database.get = lambda object_id: broken
+    results = trial.run(RECEIVE)
+    assert results[0].outcome == "failed_empty" and trial.last_hub == "wait_without_object" and at_home(trial)
+    why = trial.ctx.journal.why()
+    assert why.startswith("execute_dmp: ") and "reach_the_moon" in why
+
+
+def test_hand_dead_when_the_object_comes():
+    trial = VirtualTrial(seed=4)
+
+    def beside(t):
+        t.rig.hand.dead = t.rig.hand.dead or (t._reach is not None)
+
+    trial.beside = beside
+    results = trial.run(RECEIVE)
+    assert results[0].outcome == "failed_empty" and at_home(trial)
+    assert "preshape 'cylindrical'" in results[0].reason or "closing of the hand" in results[0].reason
+
+
+def test_command_mode_lost_in_mid_reach_and_reset():
+    trial = VirtualTrial(seed=4)
+    done = []
+
+    def beside(t):
+        if t._reach is not None and t.rig.t > t._reach.begin + 0.4 and not done:
+            done.append(t.rig.t)
+            t.rig.cell.leave_command_mode("cut by the test")
+
+    def script(t):
+        t.wait_hub("wait_without_object")
+        t.ctx.requests.submit(RECEIVE, "mug")
+        t.wait_hub("stopped")
+        assert t.ctx.journal.why() == ("wait_stop: the reach was aborted, because the robot stopped the motion: the "
+                                       "robot controller is in monitor mode; send start")
+        assert t.ctx.requests.submit("reset", "")[0]
+        t.wait_hub("wait_without_object")
+
+    trial.beside = beside
+    trial.run(script=script)
+    assert done and trial.ctx.journal.results[-1].outcome == "stopped"
+    assert trial.last_hub == "wait_without_object" and at_home(trial)
+    assert trial.rig.robot.limit_violations == 0
