@@ -36,15 +36,20 @@ class ActionCall(Pending):
         self._done = threading.Event()
         self._error: PortError | None = None
         self._result: Any = None
-        self._sent = False
+        self._lock = threading.Lock()
+        self._sent = self._cancelled = False
         threading.Thread(target=self._send, args=(goal,), name=f"action:{name}", daemon=True).start()
 
     def _send(self, goal: Any) -> None:
         if not self._client.wait_for_server(rospy.Duration(SERVER_WAIT)):
             self._fail(f"action {self._name} has no server after {SERVER_WAIT:.0f} s; is the hand node running?")
             return
-        self._sent = True
-        self._client.send_goal(goal, done_cb=self._on_done)
+        with self._lock:
+            if self._cancelled:
+                self._fail(f"action {self._name} was cancelled before its goal was sent")
+                return
+            self._client.send_goal(goal, done_cb=self._on_done)
+            self._sent = True
 
     def _fail(self, sentence: str, causes: tuple[str, ...] = ()) -> None:
         self._error = PortError(sentence, causes)
@@ -67,8 +72,11 @@ class ActionCall(Pending):
         return self._result
 
     def cancel(self) -> None:
-        if self._sent and not self._done.is_set():
-            self._client.cancel_goal()
+        """End the action; a goal that is not sent yet never will be."""
+        with self._lock:
+            self._cancelled = True
+            if self._sent and not self._done.is_set():
+                self._client.cancel_goal()
 
 
 class RosHand:

@@ -1,0 +1,69 @@
+"""A hand action that is cancelled while its server is still awaited: the hand must never move afterwards."""
+
+from __future__ import annotations
+
+import threading
+import time
+from types import SimpleNamespace
+
+import pytest
+
+pytest.importorskip("actionlib", reason="actionlib is not installed")
+from actionlib_msgs.msg import GoalStatus
+from coglab_smach.pending import PortError
+from coglab_smach.ros_hand import ActionCall
+
+
+class Client:
+    """An action client whose server comes when the test says so."""
+
+    def __init__(self):
+        self.server = threading.Event()
+        self.calls = []
+
+    def wait_for_server(self, timeout):
+        return self.server.wait(10.0)
+
+    def send_goal(self, goal, done_cb):
+        self.calls.append("send")
+        self.done_cb = done_cb
+
+    def cancel_goal(self):
+        self.calls.append("cancel")
+
+    def get_goal_status_text(self):
+        return ""
+
+
+def ended(call):
+    end = time.monotonic() + 10.0
+    while not call.done() and time.monotonic() < end:
+        time.sleep(0.005)
+    return call.done()
+
+
+def test_cancelled_before_the_goal_was_sent():
+    client = Client()
+    call = ActionCall(client, "hand_open", "goal")
+    call.cancel()
+    client.server.set()
+    assert ended(call)
+    with pytest.raises(PortError, match="cancelled before its goal was sent"):
+        call.result()
+    assert client.calls == [], "the hand has heard nothing"
+
+
+def test_cancelled_afterwards():
+    client = Client()
+    client.server.set()
+    call = ActionCall(client, "hand_open", "goal")
+    while not client.calls:
+        time.sleep(0.005)
+    call.cancel()
+    assert client.calls == ["send", "cancel"]
+    client.done_cb(GoalStatus.PREEMPTED, SimpleNamespace(isOk=False, message="preempted"))
+    assert ended(call)
+    call.cancel()
+    assert client.calls == ["send", "cancel"], "an action that is over is not cancelled"
+    with pytest.raises(PortError, match="ended PREEMPTED"):
+        call.result()
