@@ -143,13 +143,15 @@ PYBIND11_MODULE(_cell, m) {
           row["unit"] = parameter.unit;
           row["source"] = parameter.source;
           row["description"] = parameter.description;
+          row["low"] = parameter.low;
+          row["high"] = parameter.high;
           row["default"] = parameter.get(defaults);
           rows.append(row);
         }
         return rows;
       },
       "Every parameter of the cell: name, unit, source (published, ours, set-up), description, "
-      "default.");
+      "low and high end of the range of numbers (equal: no number), default.");
 
   m.def(
       "arm_terms",

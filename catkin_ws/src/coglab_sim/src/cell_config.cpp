@@ -1,6 +1,8 @@
 #include "coglab_sim/cell_config.hpp"
 
 #include <cmath>
+#include <map>
+#include <sstream>
 #include <stdexcept>
 
 #include "coglab_sim/krc/krl_program.hpp"
@@ -12,23 +14,78 @@ namespace {
   throw std::invalid_argument("parameter " + name + ": expected " + expected);
 }
 
-double numberOf(const std::string& name, const ParameterValue& value) {
-  if (const auto* number = std::get_if<double>(&value)) {
-    if (std::isfinite(*number)) return *number;
-    refuse(name, "a finite number");
+struct Range {
+  double low, high;
+};
+
+/// Ranges by name, and for the others by unit: what the cell can compute with, not what is sensible.
+Range rangeOf(const std::string& name, const std::string& unit) {
+  static const std::map<std::string, Range> by_name = {
+      {"seed", {0, 2147483647}},
+      {"krc/period", {0.001, 0.1}},
+      {"krc/entry_quality", {1, 3}},
+      {"krc/extrapolated_packets", {0, 100}},
+      {"krc/entry_position_tolerance", {0, 0.1}},
+      {"krc/frame_orthonormality", {1e-6, 0.1}},
+      {"krc/position_limit", {0.1, 3.2}},
+      {"krc/krl_poll", {0.001, 10}},
+      {"krc/drive_heating_time", {1, 1e6}},
+      {"arm/torque_limit", {1, 1000}},
+      {"arm/rotor_inertia", {0.01, 100}},
+      {"arm/servo_bandwidth", {1, 500}},
+      {"arm/brake_torque_share", {0.1, 100}},
+      {"torque_noise/correlation_time", {1e-4, 10}},
+      {"object/mass", {0.01, 10}},
+      {"object/size", {1e-3, 2}},
+      {"object/friction", {0, 5}},
+      {"object/finger_contact", {-1, 254}},
+      {"object/rotation", {-1, 1}},
+      {"contact/human_reach", {0, 1}},
+      {"contact/robot_reach", {0, 1}},
+      {"contact/current_per_count", {0, 1000}},
+      {"contact/board_size", {0, 5}}};
+  static const std::map<std::string, Range> by_unit = {
+      {"rad", {-3.2, 3.2}},   {"s", {0, 600}},       {"1", {0, 1}},
+      {"m, rad", {0, 1}},     {"Nm", {0, 1000}},     {"rad/s", {1e-4, 50}},
+      {"m/s", {1e-4, 50}},    {"Nm/rad", {0, 1e7}},  {"N/m", {0, 1e7}},
+      {"kg m^2", {0, 100}},   {"kg", {0, 10}},       {"s/rad", {0, 1000}},
+      {"m", {-5, 5}},         {"s/m", {0, 1000}},    {"N/m^1.5", {0, 1e9}},
+      {"N", {0, 1000}},       {"K", {0, 200}},       {"degree Celsius", {-50, 200}}};
+  if (const auto found = by_name.find(name); found != by_name.end()) return found->second;
+  if (const auto found = by_unit.find(unit); found != by_unit.end()) return found->second;
+  return {0, 0};
+}
+
+void requireRange(const std::string& name, double value, const Range& range) {
+  if (value >= range.low && value <= range.high) return;
+  std::ostringstream text;
+  text << "parameter " << name << " = " << value << " is outside its range " << range.low << ".."
+       << range.high;
+  throw std::invalid_argument(text.str());
+}
+
+double numberOf(const std::string& name, const ParameterValue& value, const Range& range) {
+  double number = 0.0;
+  if (const auto* given = std::get_if<double>(&value)) {
+    number = *given;
+  } else if (const auto* whole = std::get_if<int>(&value)) {
+    number = *whole;
+  } else {
+    refuse(name, "a number");
   }
-  if (const auto* number = std::get_if<int>(&value)) return *number;
-  refuse(name, "a number");
+  requireRange(name, number, range);
+  return number;
 }
 
 template <typename Vector>
-Vector vectorOf(const std::string& name, const ParameterValue& value, std::size_t size) {
+Vector vectorOf(const std::string& name, const ParameterValue& value, std::size_t size,
+                const Range& range) {
   const auto* list = std::get_if<std::vector<double>>(&value);
   if (list == nullptr || list->size() != size)
     refuse(name, "a list of " + std::to_string(size) + " numbers");
   Vector result;
   for (std::size_t i = 0; i < size; ++i) {
-    if (!std::isfinite((*list)[i])) refuse(name, "finite numbers");
+    requireRange(name + "[" + std::to_string(i) + "]", (*list)[i], range);
     result[static_cast<Eigen::Index>(i)] = (*list)[i];
   }
   return result;
@@ -59,20 +116,20 @@ ParameterValue read(const CellConfig& config, Access access) {
 }
 
 template <typename Access>
-void write(CellConfig& config, const std::string& name, const ParameterValue& value,
-           Access access) {
+void write(CellConfig& config, const std::string& name, const Range& range,
+           const ParameterValue& value, Access access) {
   auto& field = access(config);
   using Field = std::decay_t<decltype(field)>;
   if constexpr (std::is_same_v<Field, Vector7>) {
-    field = vectorOf<Vector7>(name, value, 7);
+    field = vectorOf<Vector7>(name, value, 7, range);
   } else if constexpr (std::is_same_v<Field, Vector3d>) {
-    field = vectorOf<Vector3d>(name, value, 3);
+    field = vectorOf<Vector3d>(name, value, 3, range);
   } else if constexpr (std::is_same_v<Field, std::array<int, 5>>) {
-    const auto counts = vectorOf<Eigen::Matrix<double, 5, 1>>(name, value, 5);
+    const auto counts = vectorOf<Eigen::Matrix<double, 5, 1>>(name, value, 5, range);
     for (std::size_t i = 0; i < 5; ++i)
       field[i] = static_cast<int>(counts[static_cast<Eigen::Index>(i)]);
   } else if constexpr (std::is_same_v<Field, Quaterniond>) {
-    const auto q = vectorOf<Eigen::Vector4d>(name, value, 4);
+    const auto q = vectorOf<Eigen::Vector4d>(name, value, 4, range);
     if (std::abs(q.norm() - 1.0) > 1e-3) refuse(name, "a quaternion x y z w of length 1");
     field = Quaterniond(q[3], q[0], q[1], q[2]).normalized();
   } else if constexpr (std::is_same_v<Field, std::string>) {
@@ -82,20 +139,23 @@ void write(CellConfig& config, const std::string& name, const ParameterValue& va
     if (flag == nullptr) refuse(name, "true or false");
     field = *flag;
   } else {
-    field = static_cast<Field>(numberOf(name, value));
+    field = static_cast<Field>(numberOf(name, value, range));
   }
 }
 
 template <typename Access>
 CellParameter row(const char* name, const char* unit, const char* source, const char* description,
                   Access access) {
+  const Range range = rangeOf(name, unit);
   return {name,
           unit,
           source,
           description,
+          range.low,
+          range.high,
           [access](const CellConfig& config) { return read(config, access); },
-          [access, name](CellConfig& config, const ParameterValue& value) {
-            write(config, name, value, access);
+          [access, name, range](CellConfig& config, const ParameterValue& value) {
+            write(config, name, range, value, access);
           }};
 }
 
@@ -117,6 +177,8 @@ CellParameter conventionRow() {
       "",
       "set-up",
       "KRL program: coglab, centro_epiaggio, stanford, rcprg_tum, rtt_lwr, kuka_sample",
+      0.0,
+      0.0,
       [](const CellConfig& config) { return ParameterValue(krc::nameOf(config.krc.convention)); },
       [](CellConfig& config, const ParameterValue& value) {
         config.krc.convention = krc::krlConventionOf(stringOf("krc/convention", value));
@@ -128,6 +190,8 @@ CellParameter modeRow() {
           "",
           "set-up",
           "operating mode: T1, T2, AUT",
+          0.0,
+          0.0,
           [](const CellConfig& config) {
             return ParameterValue(std::string(modeName(config.krc.mode)));
           },

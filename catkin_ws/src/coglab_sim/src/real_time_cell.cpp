@@ -66,6 +66,7 @@ void RealTimeCell::run() {
             std::chrono::duration<double>(Clock::now() - sent_at).count() * factor_;
         cell_.receive(buffer.data(), static_cast<std::size_t>(size), latency);
         answered = true;
+        if (Clock::now() >= until) return;  // a flood of datagrams does not stop the clock
       }
     };
     listenUntil(deadline);

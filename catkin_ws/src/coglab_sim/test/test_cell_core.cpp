@@ -1,10 +1,17 @@
 #include <gtest/gtest.h>
 
+#include <array>
+#include <chrono>
 #include <cmath>
 #include <numeric>
 
+#include <netinet/in.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
 #include "coglab_sim/cell.hpp"
 #include "coglab_sim/random.hpp"
+#include "coglab_sim/real_time_cell.hpp"
 
 namespace fri = lwr_fri_bridge::fri;
 using namespace coglab_sim;
@@ -197,6 +204,45 @@ TEST(CellConfig, EveryParameterGoesInAndOut) {
   EXPECT_THROW(setCellParameter(config, "krc/nothing", 1.0), std::invalid_argument);
   EXPECT_THROW(setCellParameter(config, "krc/period", std::string("fast")), std::invalid_argument);
   EXPECT_THROW(setCellParameter(config, "home", std::vector<double>{1.0}), std::invalid_argument);
+}
+
+/// Real time times any factor; nobody has to answer, and a flood of datagrams stops nothing.
+TEST(RealTimeCell, TheFactorScalesTimeAndAFloodDoesNotStopIt) {
+  for (const double factor : {0.5, 4.0}) {
+    const int fd = socket(AF_INET, SOCK_DGRAM, 0);
+    sockaddr_in own{};
+    own.sin_family = AF_INET;
+    own.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    socklen_t length = sizeof own;
+    ASSERT_EQ(bind(fd, reinterpret_cast<sockaddr*>(&own), length), 0);
+    ASSERT_EQ(getsockname(fd, reinterpret_cast<sockaddr*>(&own), &length), 0);
+    CellConfig config;
+    config.urdf = URDF;
+    config.krc.period = 0.01;
+    RealTimeCell cell(config, "127.0.0.1", ntohs(own.sin_port), factor);
+    const auto begin = std::chrono::steady_clock::now();
+    cell.start();
+    std::array<char, 1024> bytes{};
+    sockaddr_in peer{};
+    length = sizeof peer;
+    ASSERT_EQ(recvfrom(fd, bytes.data(), bytes.size(), 0, reinterpret_cast<sockaddr*>(&peer), &length),
+              916);
+    double simulated = 0.0, real = 0.0;
+    while (real < 0.6) {
+      for (int i = 0; i < 50; ++i)
+        sendto(fd, bytes.data(), 376, 0, reinterpret_cast<sockaddr*>(&peer), sizeof peer);
+      simulated = cell.snapshot().truth.time;
+      real = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+    }
+    cell.stop();
+    close(fd);
+    EXPECT_TRUE(cell.failure().empty()) << cell.failure();
+    EXPECT_LT(simulated, factor * real * 1.05 + 0.02);
+    EXPECT_GT(simulated, 0.1 * factor * real);  // a busy machine may lose periods, never all
+  }
+  CellConfig config;
+  config.urdf = URDF;
+  EXPECT_THROW(RealTimeCell(config, "127.0.0.1", 1, 0.001), std::invalid_argument);
 }
 
 TEST(Cell, LateStandInDoesNotBlameThePc) {

@@ -262,6 +262,16 @@ class LwrNode(unittest.TestCase):
         finally:
             self.end(node, robot, twist)
 
+    def test_rosnode_kill_brakes_too(self) -> None:
+        node, robot, twist = self.second_node("lwr_seven")
+        try:
+            subprocess.run(["rosnode", "kill", "/lwr_seven"], env=os.environ, check=False, timeout=LIMIT)
+            self.assertEqual(node.wait(timeout=LIMIT), 0)
+            self.assertEqual((robot.state, robot.requests[-1][0]), (1, 2))
+            self.assertLess(robot.requests[-1][1], 1e-6)
+        finally:
+            self.end(node, robot, twist)
+
     def test_sigint_keeps_answering_for_2_s_if_monitor_mode_does_not_come(self) -> None:
         node, robot, twist = self.second_node("lwr_four")
         try:

@@ -12,8 +12,10 @@
 
 #include <arpa/inet.h>
 #include <netinet/in.h>
+#include <sys/resource.h>
 #include <sys/socket.h>
 #include <sys/time.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
 #include "lwr_fri_bridge/fri_thread.hpp"
@@ -188,6 +190,36 @@ TEST_F(FriThreadTest, aRestartedThreadIsFoundWhereItWas) {
   third.start(port);
   EXPECT_NE(third.port(), port);
   EXPECT_GT(third.port(), 0);
+}
+
+/// In a process without any right to priority or locked memory: 0 if it warned and answers anyway.
+int answersWithoutRights() {
+  if (geteuid() == 0 && setresuid(65534, 65534, 65534) != 0) return 10;
+  rlimit none{0, 0};
+  setrlimit(RLIMIT_RTPRIO, &none);
+  setrlimit(RLIMIT_MEMLOCK, &none);
+  if (lockMemory().find("mlockall not granted") == std::string::npos) return 11;
+  Bridge bridge(test::defaultConfig());
+  FriThreadOptions options;
+  options.port = 0;
+  options.priority = 80;
+  FriThread fri(bridge, options);
+  if (fri.start().find("SCHED_FIFO priority 80 not granted") == std::string::npos) return 12;
+  if (fri.statistics().real_time) return 13;
+  Peer peer(fri.port());
+  test::SmallController robot(0.005);
+  fri::CommandDatagram c{};
+  peer.send(robot.measure());
+  return peer.receive(c) ? 0 : 14;
+}
+
+TEST(FriThreadRights, withoutThemItWarnsAndRunsOn) {
+  const pid_t child = fork();
+  if (child == 0) _exit(answersWithoutRights());
+  int status = 0;
+  ASSERT_EQ(waitpid(child, &status, 0), child);
+  ASSERT_TRUE(WIFEXITED(status));
+  EXPECT_EQ(WEXITSTATUS(status), 0);
 }
 
 TEST_F(FriThreadTest, commandReachesTheThreadAndComesBack) {

@@ -44,8 +44,9 @@ struct CellParameter {
   std::string unit;
   std::string source;  ///< "published" (fri.md names where), "ours" or "set-up"
   std::string description;
+  double low = 0.0, high = 0.0;  ///< range of numbers, also of each one in a list; equal: no number
   std::function<ParameterValue(const CellConfig&)> get;
-  /// @throws std::invalid_argument with name, what was expected and what came.
+  /// @throws std::invalid_argument with name, value and range, or what was expected.
   std::function<void(CellConfig&, const ParameterValue&)> set;
 };
 
