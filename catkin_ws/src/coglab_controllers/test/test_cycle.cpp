@@ -1,11 +1,14 @@
-// The control cycle runs free while services are called: no allocation, no lock in it, ever.
+// The control cycle runs free while services are called: no allocation, no lock, no system call in
+// it, ever.
 #include <dlfcn.h>
 #include <pthread.h>
+#include <unistd.h>
 
 #include <atomic>
 #include <cstdlib>
 #include <thread>
 
+#include "system_calls.hpp"
 #include "virtual_robot.hpp"
 
 namespace {
@@ -55,6 +58,29 @@ TEST(Cycle, TheCounterCounts) {
   EXPECT_EQ(allocations.exchange(0), 1u);
 }
 
+TEST(Cycle, TheCounterOfSystemCallsCounts) {
+  bool enabled = false;
+  std::uint64_t in_clock = 0, in_call = 0;
+  std::thread thread([&] {
+    enabled = SystemCalls::enable();
+    if (!enabled) return;
+    const std::uint64_t before = SystemCalls::count();
+    SystemCalls::start();
+    static_cast<void>(std::chrono::steady_clock::now());
+    SystemCalls::stop();
+    in_clock = SystemCalls::count() - before;
+    SystemCalls::start();
+    static_cast<void>(::getppid());
+    SystemCalls::stop();
+    in_call = SystemCalls::count() - before - in_clock;
+  });
+  thread.join();
+  if (!enabled) GTEST_SKIP() << "this kernel has no syscall user dispatch (x86-64, Linux 5.11)";
+  if (in_clock != 0) GTEST_SKIP() << "on this machine reading the clock is a system call";
+  EXPECT_EQ(in_call, 1u);
+  EXPECT_EQ(SystemCalls::last(), SYS_getppid);
+}
+
 TEST(Cycle, NeitherAllocatesNorLocksWhileServicesAreCalled) {
   constexpr std::uint64_t kCycles = 100000;
   const auto limits =
@@ -70,6 +96,8 @@ TEST(Cycle, NeitherAllocatesNorLocksWhileServicesAreCalled) {
   ControllerManager manager(std::move(settings));
   std::atomic<bool> stop{false};
   std::atomic<std::uint64_t> cycles{0}, moving{0};
+  const std::uint64_t calls_before = SystemCalls::count();
+  std::atomic<bool> calls_counted{false};
   ASSERT_TRUE(manager.load("limits", "JointLimits").success);
 
   std::thread control([&] {
@@ -79,11 +107,14 @@ TEST(Cycle, NeitherAllocatesNorLocksWhileServicesAreCalled) {
     sample.cycle_time = 0.005;
     sample.block = lwr_fri_bridge::MotionBlock::None;
     VelocityCommand command;
+    calls_counted = SystemCalls::enable();
     while (!stop) {
       ++sample.sequence;
       sample.stamp_ns = manager.now_ns();
       counting = true;
+      SystemCalls::start();
       manager.cycle().run(sample, 0.005, command);
+      SystemCalls::stop();
       counting = false;
       if (command.velocity.norm() > 1e-3) ++moving;
       sample.position += 0.005 * command.velocity;
@@ -153,7 +184,13 @@ TEST(Cycle, NeitherAllocatesNorLocksWhileServicesAreCalled) {
   EXPECT_GT(accepted, requests / 2);
   EXPECT_EQ(allocations.load(), 0u);
   EXPECT_EQ(locks.load(), 0u);
+  const auto calls = static_cast<int>(SystemCalls::count() - calls_before);
+  if (calls_counted) {
+    EXPECT_EQ(calls, 0) << "the last one has number " << SystemCalls::last();
+  }
   RecordProperty("requests", requests);
+  RecordProperty("locks", static_cast<int>(locks.load()));
+  RecordProperty("system_calls", calls_counted ? calls : -1);
   RecordProperty("allocations", static_cast<int>(allocations.load()));
 }
 

@@ -38,6 +38,35 @@ TEST(Manager, RefusesBadPluginsAndKeepsWhatIsThere) {
   EXPECT_TRUE(VirtualRobot::ok(manager.load("odd2", "test/Misbehaving")));  // still makes new ones
 }
 
+TEST(Manager, BadPluginsAndSwitchesLeaveARunningMotionAsItIs) {
+  VirtualRobot robot("{" + kTypes + "}"), twin("{" + kTypes + "}");
+  for (VirtualRobot* one : {&robot, &twin}) {
+    one->loadBoth();
+    ASSERT_TRUE(VirtualRobot::ok(one->manager->load("odd", "test/Misbehaving")));
+    one->see("human_hand", kGoal);
+    ASSERT_TRUE(VirtualRobot::ok(one->dmp().execute(one->reach())));
+  }
+  std::string type;
+  for (int i = 0; i < 60; ++i) {
+    if (i == 20) {
+      EXPECT_TRUE(refused(robot.manager->load("a", "test/Missing"), {"not found"}));
+      EXPECT_TRUE(refused(robot.manager->load("a", "test/Empty"), {"no motion controller"}));
+      EXPECT_TRUE(refused(robot.manager->load("a", "test/Twin"), {"registered already"}));
+    }
+    if (i == 40) {
+      EXPECT_TRUE(refused(robot.manager->switchTo("nobody", type), {"nobody", "dmp, ptp, odd"}));
+      EXPECT_TRUE(refused(robot.manager->setSpeedScale(std::nan("")), {"speed_scale", "0", "1"}));
+      EXPECT_TRUE(refused(robot.manager->setSpeedScale(-0.1), {"speed_scale"}));
+    }
+    for (VirtualRobot* one : {&robot, &twin}) {
+      one->see("human_hand", kGoal);
+      one->tick();
+    }
+    ASSERT_EQ(robot.command.velocity, twin.command.velocity);
+  }
+  EXPECT_EQ(robot.state(), MotionState::Running);
+}
+
 TEST(Manager, BadParametersRefuseThePluginWithTheirName) {
   VirtualRobot robot("{dmp: {pos_clik_gain: fast}, ptp: {max_queue: -3}, " + kTypes +
                      ", odd: {fault: configure}}");
@@ -223,6 +252,148 @@ TEST(Manager, ControlThreadIdlesWithoutARobotAndSurvivesAStall) {
   stop = true;
   robot.join();
   thread.stop();
+}
+
+TEST(Manager, OverrunsInARowFaultTheControllerAndSinglesDoNot) {
+  const lwr_fri_bridge::JointLimits limits =
+      lwr_fri_bridge::loadJointLimits(std::string(DESCRIPTION_DIR) + "/config/joint_limits.yaml");
+  ctrl_more::Logger logger;
+  // `slow` spins for 20 ms in each cycle but every fifth; the sixth time it does not stop any more.
+  ManagerSettings settings = readManagerSettings(
+      YAML::Load("{odd: {fault: slow, after: 0, rest_every: 5, rests: 2}, overrun_time: 0.015, " +
+                 kTypes + "}"),
+      readText(std::string(DESCRIPTION_DIR) + "/urdf/lwr_ih2.urdf"), limits, false);
+  ASSERT_EQ(settings.cycle.overruns_to_fault, 5);
+  settings.logger = &logger;
+  std::atomic<bool> stop{false};
+  ControllerManager manager(std::move(settings));
+  std::thread services([&] {
+    std::string type;
+    EXPECT_TRUE(VirtualRobot::ok(manager.load("odd", "test/Misbehaving")));
+    EXPECT_TRUE(VirtualRobot::ok(manager.switchTo("odd", type)));
+    stop = true;
+  });
+  while (!stop) manager.cycle().idle(manager.now_ns());
+  services.join();
+  RobotSample sample;
+  sample.position << -1.4349, -0.6086, 1.4986, 1.7048, 0.1857, 0.2152, 0.782;
+  sample.commanded_position = sample.position;
+  sample.block = lwr_fri_bridge::MotionBlock::None;
+  VelocityCommand command;
+  const auto run = [&] {
+    ++sample.sequence;
+    sample.stamp_ns = manager.now_ns();
+    manager.cycle().run(sample, 0.005, command);
+    return manager.report();
+  };
+  // Four slow cycles and a quick one, twice. Where the machine itself delays the quick one, the row
+  // is longer: then there is nothing to be seen.
+  std::uint64_t overruns = 0;
+  for (int i = 1; i <= 10; ++i) {
+    const CycleReport report = run();
+    if (i % 5 == 0 && report.overruns != overruns) {
+      GTEST_SKIP() << "the machine delayed a cycle";
+    }
+    overruns = report.overruns;
+    EXPECT_EQ(overruns, static_cast<std::uint64_t>(i - i / 5));
+    EXPECT_FALSE(report.fault) << report.reason.c_str();
+    EXPECT_GT(command.velocity.norm(), 0.0);
+  }
+  for (int i = 1; i <= 5; ++i) {
+    EXPECT_FALSE(manager.report().fault);
+    run();
+  }
+  const CycleReport report = manager.report();
+  EXPECT_TRUE(report.fault);
+  EXPECT_EQ(report.overruns, 13u);
+  EXPECT_NE(report.reason.str().find("too slow 5 times in a row"), std::string::npos)
+      << report.reason.c_str();
+  EXPECT_EQ(command.velocity, JointVector::Zero().eval());
+}
+
+/// Notes in which cycles it runs.
+class Probe : public ctrl_more::FeedbackController {
+ public:
+  explicit Probe(bool& ran) : ran_(ran) {}
+  ctrl_more::Description describe() const override {
+    ctrl_more::Description description;
+    description.type = "Probe";
+    description.summary = "notes in which cycles it runs";
+    description.modifies(ctrl_more::ControlContainer::TaskSpaceReferencePose, "ee")
+        .in("m, quaternion x y z w")
+        .frameOf("base")
+        .about("left as it is");
+    return description;
+  }
+  void initialize(ctrl_more::Setup&) override {}
+  void update(const ctrl_more::Cycle&, const ctrl_more::RobotStates&,
+              const ctrl_more::ControlStates&, ctrl_more::ModifiedControlStates&) override {
+    ran_ = true;
+  }
+
+ private:
+  bool& ran_;
+};
+
+TEST(Manager, MotionAndItsFeedbackProfileBeginInTheSameCycle) {
+  const lwr_fri_bridge::JointLimits limits =
+      lwr_fri_bridge::loadJointLimits(std::string(DESCRIPTION_DIR) + "/config/joint_limits.yaml");
+  ctrl_more::Logger logger;
+  ManagerSettings settings = readManagerSettings(
+      YAML::Load("{" + kTypes + "}"),
+      readText(std::string(DESCRIPTION_DIR) + "/urdf/lwr_ih2.urdf"), limits, false);
+  settings.logger = &logger;
+  settings.cycle.overrun_time = 0.0;
+  ControllerManager manager(std::move(settings));
+  bool ran = false;
+  ctrl_more::ControllerEntry entry;
+  entry.blend_s = 0.0;
+  ASSERT_TRUE(manager.feedback().addController(std::make_unique<Probe>(ran), "probe", entry).ok());
+  ASSERT_TRUE(manager.feedback().setProfile("dmp", {"probe"}).ok());
+  ASSERT_TRUE(manager.feedback().setProfile("ptp", {}).ok());
+  std::atomic<bool> stop{false};
+  std::atomic<int> with{0}, without{0}, apart{0};
+  std::thread control([&] {
+    RobotSample sample;
+    sample.position << -1.4349, -0.6086, 1.4986, 1.7048, 0.1857, 0.2152, 0.782;
+    sample.commanded_position = sample.position;
+    VelocityCommand command;
+    while (!stop) {
+      ++sample.sequence;
+      sample.stamp_ns = manager.now_ns();
+      ran = false;
+      manager.cycle().run(sample, 0.005, command);
+      const bool dmp = std::string(manager.report().active.c_str()) == "dmp";
+      ++(ran ? with : without);
+      if (ran != dmp) ++apart;
+    }
+  });
+  EXPECT_TRUE(VirtualRobot::ok(manager.load("dmp", "coglab/DmpController")));
+  EXPECT_TRUE(VirtualRobot::ok(manager.load("ptp", "coglab/PtpController")));
+  std::string type;
+  for (int i = 0; i < 300; ++i) {
+    ASSERT_TRUE(VirtualRobot::ok(manager.switchTo(i % 2 == 0 ? "dmp" : "ptp", type)));
+  }
+  EXPECT_EQ(manager.profile(), "ptp");
+  stop = true;
+  control.join();
+  EXPECT_GT(with.load(), 100);
+  EXPECT_GT(without.load(), 100);
+  EXPECT_EQ(apart.load(), 0);
+}
+
+TEST(Manager, ARefusedSwitchLeavesTheFeedbackProfile) {
+  VirtualRobot robot;
+  robot.loadBoth("ptp");
+  bool ran = false;
+  ctrl_more::FeedbackControllersManager& feedback = robot.manager->feedback();
+  ASSERT_TRUE(feedback.addController(std::make_unique<Probe>(ran), "probe").ok());
+  ASSERT_TRUE(feedback.setProfile("dmp", {"probe"}).ok());
+  std::string type;
+  EXPECT_TRUE(refused(robot.manager->switchTo("nobody", type), {"nobody"}));
+  EXPECT_FALSE(feedback.isEnabled("probe"));
+  ASSERT_TRUE(VirtualRobot::ok(robot.manager->switchTo("dmp", type)));
+  EXPECT_TRUE(feedback.isEnabled("probe"));
 }
 
 TEST(Manager, EmptyFeedbackListChangesNoBit) {

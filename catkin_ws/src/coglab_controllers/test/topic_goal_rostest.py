@@ -12,6 +12,7 @@ import rospy
 import rostest
 from diagnostic_msgs.msg import DiagnosticArray
 from sensor_msgs.msg import JointState
+from std_msgs.msg import Float64
 
 from coglab_msgs.msg import DmpGoal, FeedbackStatus, IkDebug
 from coglab_msgs.srv import (
@@ -32,14 +33,14 @@ class TopicGoal(unittest.TestCase):
         cls.goals: list[DmpGoal] = []
         cls.debug: list[IkDebug] = []
         cls.feedback: list[FeedbackStatus] = []
-        cls.diagnostics: list[str] = []
+        cls.diagnostics: dict[str, dict[str, str]] = {}
         cls.targets: list[JointState] = []
         rospy.Subscriber("controller_manager/dmp/dmp_goal", DmpGoal, cls.goals.append)
         rospy.Subscriber("controller_manager/dmp/ik_debug", IkDebug, cls.debug.append)
         rospy.Subscriber("controller_manager/feedback/status", FeedbackStatus, cls.feedback.append)
         rospy.Subscriber("lwr/target_joint_states", JointState, cls.targets.append)
-        rospy.Subscriber("/diagnostics", DiagnosticArray, lambda m: cls.diagnostics.extend(
-            s.name for s in m.status))
+        rospy.Subscriber("/diagnostics", DiagnosticArray, lambda m: cls.diagnostics.update(
+            {s.name: {v.key: v.value for v in s.values} for s in m.status}))
         cls.robot = Robot()
         cls.robot.load()
         path = rospkg.RosPack().get_path("coglab_controllers") + "/config/primitives.xml"
@@ -98,11 +99,10 @@ class TopicGoal(unittest.TestCase):
         self.assertIn("coglab/DmpController", answer.message)
         answer = robot.manager("switch_controller", "nobody")
         self.assertFalse(answer.success)
-        answer = robot.manager("speed_scale", 2.0)
-        self.assertFalse(answer.success)
-        self.assertTrue(robot.manager("speed_scale", 0.5).success)
-        wait_until(lambda: robot.status.speed_scale == 0.5, 5.0, "speed_scale in the status")
-        self.assertTrue(robot.manager("speed_scale", 1.0).success)
+        for scale in (2.0, -0.1, math.nan):
+            answer = robot.manager("speed_scale", scale)
+            self.assertFalse(answer.success)
+            self.assertIn("0 (stand still) to 1", answer.message)
         publisher = rospy.Publisher("controller_manager/dmp/dmp_goal", DmpGoal, queue_size=1)
         wait_until(lambda: publisher.get_num_connections() > 0, 5.0, "connection")
         robot.see_hand(None)
@@ -145,14 +145,44 @@ class TopicGoal(unittest.TestCase):
         self.assertTrue(call(name + "disable", FeedbackSelect, ["ee_admittance"], "").success)
         self.assertFalse(call(name + "enable", FeedbackSelect, ["nobody"], "").success)
 
+    def cycle_statistics(self) -> dict[str, str]:
+        """Values of the control cycle on /diagnostics, by name; empty before the first."""
+        return next((v for n, v in self.diagnostics.items() if "control cycle" in n), {})
+
     def test_6_diagnostics_and_ptp_refusal(self) -> None:
-        wait_until(lambda: any("control cycle" in n for n in self.diagnostics), 5.0, "/diagnostics")
+        wait_until(lambda: bool(self.cycle_statistics()), 5.0, "/diagnostics")
+        values = self.cycle_statistics()
+        self.assertEqual(values["active controller"], "dmp")
+        self.assertEqual(values["faults"], "0")
+        cycles = int(values["cycles with a joint state"])
+        self.assertGreater(cycles, 100)
+        last, longest = (float(values[f"{name} cycle (us)"]) for name in ("duration of the last", "longest"))
+        self.assertTrue(0.0 < last <= longest)
+        self.assertAlmostEqual(float(values["cycle time (s)"]), 0.01, delta=0.005)
+        self.assertGreaterEqual(int(values["overruns"]), 0)
+        wait_until(lambda: int(self.cycle_statistics()["cycles with a joint state"]) > cycles + 20, 5.0,
+                   "newer statistics")
         answer = self.robot.add_ptp(HOME)
         self.assertEqual(answer.status, AddPtpRequest.REJECTED)
         self.robot.switch("ptp")
         answer = self.robot.add_ptp([0.0, 1.0])
         self.assertEqual((answer.status, answer.ptp_id), (AddPtpRequest.REJECTED, -1))
         self.assertIn("2 numbers", answer.message)
+
+    def test_7_speed_scale_by_service_and_by_topic(self) -> None:
+        robot = self.robot
+        publisher = rospy.Publisher("controller_manager/speed_scale", Float64, queue_size=1)
+        wait_until(lambda: publisher.get_num_connections() > 0, 5.0, "connection")
+        self.assertTrue(robot.manager("speed_scale", 0.5).success)
+        wait_until(lambda: robot.status.speed_scale == 0.5, 5.0, "0.5 by the service")
+        publisher.publish(0.25)
+        wait_until(lambda: robot.status.speed_scale == 0.25, 5.0, "0.25 by the topic")
+        wait_until(lambda: float(self.cycle_statistics()["time scale"]) == 0.25, 5.0, "the clock of the references")
+        publisher.publish(7.0)
+        rospy.sleep(0.5)
+        self.assertEqual(robot.status.speed_scale, 0.25)  # refused
+        publisher.publish(1.0)
+        wait_until(lambda: robot.status.speed_scale == 1.0, 5.0, "1 by the topic")
 
 
 if __name__ == "__main__":

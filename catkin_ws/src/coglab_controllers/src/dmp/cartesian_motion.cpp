@@ -79,8 +79,8 @@ const CartesianReference& CartesianMotion::step(double dt, const Pose& goal, dou
     goal_ = goal_estimator_.position();
     goal_velocity = goal_estimator_.velocity();
     if (!goal_estimator_.enabled()) goal_ = goal.position;
-    goal_estimator_.update(dt, goal.position);
-    orientation_estimator_.update(dt, goal.orientation);
+    goal_estimator_.update(dt, goal.position, jitter_.share());
+    orientation_estimator_.update(dt, goal.orientation, turning_jitter_.share());
     curve_.setTarget(orientation_estimator_.orientation());
   }
   if (!settled_) dmp_.step(dt, goal_, goal_velocity, rate);

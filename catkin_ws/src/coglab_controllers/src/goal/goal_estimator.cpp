@@ -1,5 +1,6 @@
 #include "coglab_controllers/goal/goal_estimator.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <stdexcept>
 #include <string>
@@ -15,6 +16,11 @@ void validate(const GoalEstimatorParameters& parameters) {
     throw std::invalid_argument("goal time constant: expected 0 (off) or 0.005 to 2 s, got " +
                                 std::to_string(t));
   }
+  const double noisy = parameters.noisy_time_constant;
+  if (!(noisy >= 0.005 && noisy <= 2.0)) {
+    throw std::invalid_argument("noisy goal time constant: expected 0.005 to 2 s, got " +
+                                std::to_string(noisy));
+  }
   if (!(parameters.max_innovation > 0.0 && std::isfinite(parameters.max_innovation))) {
     throw std::invalid_argument("goal max innovation: expected a positive distance in m, got " +
                                 std::to_string(parameters.max_innovation));
@@ -23,6 +29,17 @@ void validate(const GoalEstimatorParameters& parameters) {
     throw std::invalid_argument("goal max angle innovation: expected 0 to 3.1 rad, got " +
                                 std::to_string(parameters.max_angle_innovation));
   }
+}
+
+// The time constant goes from one value to the other within about this time, s: g = p + 3 T p' must
+// not step.
+constexpr double kChange = 0.3;
+
+double nextTimeConstant(const GoalEstimatorParameters& parameters, double present, double noise,
+                        double dt) {
+  const double more = std::max(0.0, parameters.noisy_time_constant - parameters.time_constant);
+  const double wanted = parameters.time_constant + std::clamp(noise, 0.0, 1.0) * more;
+  return wanted + (present - wanted) * std::exp(-dt / kChange);
 }
 
 Vector3 clipped(const Vector3& error, double limit) {
@@ -45,37 +62,41 @@ Vector3 ThirdOrderTracker::advance(const Vector3& error, double dt, double time_
   return error - decay * polynomial;
 }
 
-GoalEstimator::GoalEstimator(const GoalEstimatorParameters& parameters) : parameters_(parameters) {
+GoalEstimator::GoalEstimator(const GoalEstimatorParameters& parameters)
+    : parameters_(parameters), time_constant_(parameters.time_constant) {
   validate(parameters);
 }
 
 void GoalEstimator::reset(const Vector3& goal) noexcept {
   tracker_ = {};
+  time_constant_ = parameters_.time_constant;
   smooth_ = position_ = goal;
 }
 
-void GoalEstimator::update(double dt, const Vector3& goal) noexcept {
+void GoalEstimator::update(double dt, const Vector3& goal, double noise) noexcept {
   if (!enabled()) {
     smooth_ = position_ = goal;
     return;
   }
   if (!(dt > 0.0)) return;
   const Vector3 error = clipped(goal - smooth_, parameters_.max_innovation);
-  smooth_ += tracker_.advance(error, dt, parameters_.time_constant);
-  position_ = smooth_ + 3.0 * parameters_.time_constant * tracker_.rate;
+  time_constant_ = nextTimeConstant(parameters_, time_constant_, noise, dt);
+  smooth_ += tracker_.advance(error, dt, time_constant_);
+  position_ = smooth_ + 3.0 * time_constant_ * tracker_.rate;
 }
 
 OrientationEstimator::OrientationEstimator(const GoalEstimatorParameters& parameters)
-    : parameters_(parameters) {
+    : parameters_(parameters), time_constant_(parameters.time_constant) {
   validate(parameters);
 }
 
 void OrientationEstimator::reset(const Quaternion& target) noexcept {
   tracker_ = {};
+  time_constant_ = parameters_.time_constant;
   smooth_ = orientation_ = target.normalized();
 }
 
-void OrientationEstimator::update(double dt, const Quaternion& target) noexcept {
+void OrientationEstimator::update(double dt, const Quaternion& target, double noise) noexcept {
   const Quaternion unit = target.normalized();
   if (parameters_.time_constant <= 0.0) {
     smooth_ = orientation_ = unit;
@@ -83,10 +104,9 @@ void OrientationEstimator::update(double dt, const Quaternion& target) noexcept 
   }
   if (!(dt > 0.0)) return;
   const Vector3 error = clipped(rotationBetween(smooth_, unit), parameters_.max_angle_innovation);
-  smooth_ =
-      (expRotation(tracker_.advance(error, dt, parameters_.time_constant)) * smooth_).normalized();
-  orientation_ =
-      (expRotation(3.0 * parameters_.time_constant * tracker_.rate) * smooth_).normalized();
+  time_constant_ = nextTimeConstant(parameters_, time_constant_, noise, dt);
+  smooth_ = (expRotation(tracker_.advance(error, dt, time_constant_)) * smooth_).normalized();
+  orientation_ = (expRotation(3.0 * time_constant_ * tracker_.rate) * smooth_).normalized();
 }
 
 }  // namespace coglab_controllers

@@ -16,7 +16,9 @@ namespace {
 constexpr double kRestError =
     3e-4;  // m: after the end the loop is opened once the hand is this close,
 constexpr double kRestAngle = 3e-3;  // rad, and turned this close,
-constexpr double kRestTime = 0.5;    // s, or after this time
+constexpr double kRestTime = 0.5;    // s, or after this time, slowly:
+constexpr double kFadeTime = 0.3;    // s. A hand that still turns then would leave its place if each
+                                     // joint braked by itself.
 
 Pose inverse(const Pose& pose) {
   const Quaternion back = pose.orientation.conjugate();
@@ -70,6 +72,8 @@ void DmpController::configure(const MotionSetup& setup) {
   GoalEstimatorParameters estimator;
   estimator.time_constant =
       parameters.number("goal_time_constant", estimator.time_constant, 0.0, 2.0);
+  estimator.noisy_time_constant =
+      parameters.number("noisy_goal_time_constant", estimator.noisy_time_constant, 0.005, 2.0);
   MotionEndParameters end;
   end.phase = parameters.number("end_phase", end.phase, 1e-6, 0.5);
   end.speed = parameters.number("end_speed", end.speed, 1e-6, 1.0);
@@ -339,7 +343,9 @@ void DmpController::resolve(const CycleInput& input, References& references) {
     const bool there = loop.ik.position_error.norm() < kRestError &&
                        loop.ik.rotation_error.norm() < kRestAngle &&
                        loop.reference.velocity.norm() < 1e-6;
-    if (there || since_end_ > kRestTime) {
+    const double left = 1.0 - (since_end_ - kRestTime) / kFadeTime;
+    references.states.view<kMaxJoints>(references.joint_velocity) *= std::clamp(left, 0.0, 1.0);
+    if (there || left <= 0.0) {
       resting_ = true;
       hold_.begin();
     }

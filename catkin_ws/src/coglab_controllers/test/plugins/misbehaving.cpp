@@ -13,13 +13,15 @@ namespace {
 using namespace coglab_controllers;
 
 /// Moves slowly, and does what its parameter `fault` says after `after` cycles: throw, throw_int,
-/// nan, slow or stall.
+/// nan, slow or stall. `slow` is quick again in every `rest_every`-th cycle, `rests` times.
 class Misbehaving : public MotionController {
  public:
   void configure(const MotionSetup& setup) override {
     const Parameters parameters(setup.parameters, setup.id);
     fault_ = parameters.text("fault", "none");
     after_ = parameters.whole("after", 10, 0, 1000000);
+    rest_every_ = parameters.whole("rest_every", 0, 0, 1000000);
+    rests_ = parameters.whole("rests", 0, 0, 1000000);
     if (fault_ == "configure") throw std::runtime_error("configure was told to fail");
   }
   void adopt(const CycleInput&) override {}
@@ -36,7 +38,7 @@ class Misbehaving : public MotionController {
     if (++cycles_ <= after_) return;
     if (fault_ == "throw") throw std::runtime_error("told to throw");
     if (fault_ == "throw_int") throw 7;
-    if (fault_ == "slow") wait(0.02);
+    if (fault_ == "slow" && !resting()) wait(0.02);
     if (fault_ == "stall") wait(1.5);
   }
   void resolve(const CycleInput&, References& references) override {
@@ -48,6 +50,12 @@ class Misbehaving : public MotionController {
   const Reason& reason() const override { return reason_; }
 
  private:
+  bool resting() {
+    if (rest_every_ == 0 || cycles_ % rest_every_ != 0 || rests_ == 0) return false;
+    --rests_;
+    return true;
+  }
+
   static void wait(double seconds) {
     const auto end = std::chrono::steady_clock::now() + std::chrono::duration<double>(seconds);
     while (std::chrono::steady_clock::now() < end) {
@@ -55,7 +63,7 @@ class Misbehaving : public MotionController {
   }
 
   std::string fault_;
-  int after_ = 0, cycles_ = 0;
+  int after_ = 0, cycles_ = 0, rest_every_ = 0, rests_ = 0;
   MotionState state_ = MotionState::Idle;
   Reason reason_;
 };

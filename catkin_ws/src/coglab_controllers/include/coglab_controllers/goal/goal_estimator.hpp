@@ -24,6 +24,8 @@ struct ThirdOrderTracker {
 /// Parameters of both estimators.
 struct GoalEstimatorParameters {
   double time_constant = 0.06;  ///< s; 0 switches the estimator off: g is the input, g' is zero
+  /// s; what it grows to when the goal trembles, see GoalJitter; not below time_constant
+  double noisy_time_constant = 0.10;
   double max_innovation =
       0.15;  ///< m: a goal further away pulls no harder, which bounds speed and acceleration
   double max_angle_innovation = 0.6;  ///< rad, for orientations
@@ -42,8 +44,8 @@ class GoalEstimator {
 
   /// At rest at `goal` (m).
   void reset(const Vector3& goal) noexcept;
-  /// One cycle of `dt` s with the newest goal as received (m, finite).
-  void update(double dt, const Vector3& goal) noexcept;
+  /// One cycle of `dt` s with the newest goal as received (m, finite).  @param noise of it, 0..1.
+  void update(double dt, const Vector3& goal, double noise = 0.0) noexcept;
 
   const Vector3& position() const noexcept { return position_; }      ///< g, m
   const Vector3& velocity() const noexcept { return tracker_.rate; }  ///< g', m/s
@@ -52,6 +54,7 @@ class GoalEstimator {
  private:
   GoalEstimatorParameters parameters_;
   ThirdOrderTracker tracker_;
+  double time_constant_ = 0.0;  // s, at present
   Vector3 smooth_ = Vector3::Zero();
   Vector3 position_ = Vector3::Zero();
 };
@@ -63,8 +66,8 @@ class OrientationEstimator {
   explicit OrientationEstimator(const GoalEstimatorParameters& parameters = {});
 
   void reset(const Quaternion& target) noexcept;
-  /// @param target unit; q and -q mean the same.
-  void update(double dt, const Quaternion& target) noexcept;
+  /// @param target unit; q and -q mean the same.  @param noise of it, 0..1.
+  void update(double dt, const Quaternion& target, double noise = 0.0) noexcept;
 
   const Quaternion& orientation() const noexcept { return orientation_; }
   const Vector3& angularVelocity() const noexcept { return tracker_.rate; }  ///< rad/s, base frame
@@ -72,6 +75,7 @@ class OrientationEstimator {
  private:
   GoalEstimatorParameters parameters_;
   ThirdOrderTracker tracker_;
+  double time_constant_ = 0.0;  // s, at present
   Quaternion smooth_ = Quaternion::Identity();
   Quaternion orientation_ = Quaternion::Identity();
 };

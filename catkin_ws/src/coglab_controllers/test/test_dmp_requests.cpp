@@ -1,0 +1,155 @@
+// Requests of the DMP plug-in that are refused: why, and that the running motion does not notice.
+#include "virtual_robot.hpp"
+
+namespace coglab_controllers {
+namespace {
+
+const Vector3 kGoal(0.80, 0.0, 0.45);
+
+TEST(DmpRequests, RefusesBadRequestsAndKeepsMoving) {
+  VirtualRobot robot;
+  robot.loadBoth();
+  robot.see("human_hand", kGoal);
+  ASSERT_TRUE(VirtualRobot::ok(robot.dmp().execute(robot.reach())));
+  VirtualRobot twin;  // the same motion, undisturbed
+  twin.loadBoth();
+  twin.see("human_hand", kGoal);
+  ASSERT_TRUE(VirtualRobot::ok(twin.dmp().execute(twin.reach())));
+  DmpController& dmp = robot.dmp();
+  const auto with = [&](auto change) {
+    DmpRequest request = robot.reach();
+    change(request);
+    return request;
+  };
+  int loaded = 7;
+  const std::vector<std::function<void()>> requests = {
+      [&] {
+        EXPECT_TRUE(refused(dmp.execute(with([](auto& r) { r.primitive_id = "wave"; })),
+                            {"wave", "reach_human"}));
+      },
+      [&] {
+        for (const double ratio : {0.0, -1.0, std::nan("")}) {
+          EXPECT_TRUE(refused(dmp.execute(with([&](auto& r) { r.dmp_ratio = ratio; })), {"ratio"}));
+        }
+      },
+      [&] {
+        EXPECT_TRUE(refused(dmp.execute(with([](auto& r) {
+          r.orientation_control = true;
+          r.target_orientation << 0, 0, 0, 2;
+        })),
+                            {"target_orientation", "unit"}));
+      },
+      [&] {
+        EXPECT_TRUE(refused(dmp.execute(with([](auto& r) { r.initial_state = 7; })),
+                            {"initial_state", "CURRENT=0", "GIVEN=1"}));
+      },
+      [&] {
+        EXPECT_TRUE(refused(dmp.execute(with([](auto& r) {
+          r.initial_state = DmpRequest::kGiven;
+          r.initial_position = Vector3(0.3, 0.3, 0.3);
+        })),
+                            {"initial_position"}));
+      },
+      [&] {
+        EXPECT_TRUE(
+            refused(dmp.execute(with([](auto& r) { r.goal_offset = Vector3(std::nan(""), 0, 0); })),
+                    {"goal_offset"}));
+      },
+      [&] {
+        EXPECT_TRUE(refused(dmp.execute(with([](auto& r) { r.goal_frame = "cup"; })), {"cup"}));
+      },
+      [&] {
+        robot.see("far", Vector3(3.0, 0.0, 0.5));
+        EXPECT_TRUE(refused(dmp.execute(with([](auto& r) { r.goal_frame = "far"; })),
+                            {"workspace", "box"}));
+      },
+      [&] {
+        robot.see("nan", Vector3(std::nan(""), 0.0, 0.5));
+        EXPECT_TRUE(refused(dmp.execute(with([](auto& r) { r.goal_frame = "nan"; })), {"finite"}));
+      },
+      [&] { EXPECT_TRUE(refused(dmp.loadDmps("/nowhere.xml", loaded), {"/nowhere.xml"})); },
+      [&] { EXPECT_TRUE(refused(dmp.setGoal("lwr_base_link", kGoal, 0), {"goal_source"})); },
+      [&] {
+        PtpAnswer answer = robot.ptp().add({std::vector<double>(7, 0.0), {}, {}});
+        EXPECT_EQ(answer.status, PtpAnswer::kRejected);
+        EXPECT_NE(answer.message.find("active is 'dmp'"), std::string::npos) << answer.message;
+      },
+      [&] {
+        std::string type;
+        EXPECT_TRUE(refused(robot.manager->switchTo("nobody", type), {"nobody", "dmp", "ptp"}));
+      },
+  };
+  for (const auto& request : requests) {
+    request();
+    robot.see("human_hand", kGoal);
+    twin.see("human_hand", kGoal);
+    robot.tick();
+    twin.tick();
+    ASSERT_EQ(robot.command.velocity, twin.command.velocity);
+  }
+  EXPECT_EQ(loaded, 0);
+  EXPECT_EQ(robot.state(), MotionState::Running);
+}
+
+TEST(DmpRequests, TopicGoalInAnotherFrameOrNotFiniteIsRefused) {
+  VirtualRobot robot("dmp: {goal_source: topic}");
+  robot.loadBoth();
+  DmpRequest request = robot.reach();
+  EXPECT_TRUE(refused(robot.dmp().execute(request), {"dmp_goal"}));
+  EXPECT_TRUE(refused(robot.dmp().setGoal("world", kGoal, 0), {"world", "lwr_base_link"}));
+  EXPECT_TRUE(
+      refused(robot.dmp().setGoal("lwr_base_link", Vector3(0, std::nan(""), 0), 0), {"finite"}));
+  ASSERT_TRUE(VirtualRobot::ok(robot.dmp().setGoal("lwr_base_link", Vector3(0, 0, 5), 0)));
+  EXPECT_TRUE(refused(robot.dmp().execute(request), {"workspace"}));
+}
+
+TEST(DmpRequests, RequestsToAnInactiveControllerNameTheActiveOne) {
+  VirtualRobot robot;
+  robot.loadBoth("ptp");
+  robot.see("human_hand", kGoal);
+  const std::vector<std::string> words = {"'dmp' is not active", "'ptp'", "switch_controller"};
+  EXPECT_TRUE(refused(robot.dmp().execute(robot.reach()), words));
+  EXPECT_TRUE(refused(robot.dmp().switchDmp(robot.reach()), words));
+  robot.switchTo("dmp");
+  const PtpAnswer answer = robot.ptp().add({std::vector<double>(7, 0.0), {}, {}});
+  EXPECT_EQ(answer.status, PtpAnswer::kRejected);
+  EXPECT_NE(answer.message.find("'ptp' is not active; active is 'dmp'"), std::string::npos)
+      << answer.message;
+  EXPECT_TRUE(refused(robot.dmp().switchDmp(robot.reach()), {"no motion", "execute_dmp"}));
+}
+
+TEST(DmpRequests, BadSwitchesLeaveTheRunningMotionAsItIs) {
+  VirtualRobot robot, twin;
+  for (VirtualRobot* one : {&robot, &twin}) {
+    one->loadBoth();
+    one->see("human_hand", kGoal);
+    ASSERT_TRUE(VirtualRobot::ok(one->dmp().execute(one->reach())));
+  }
+  const auto refuse = [&robot](auto change, const std::vector<std::string>& words) {
+    DmpRequest request = robot.reach();
+    change(request);
+    EXPECT_TRUE(refused(robot.dmp().switchDmp(request), words));
+  };
+  for (int i = 0; i < 100; ++i) {
+    if (i == 50) {
+      refuse([](auto& r) { r.primitive_id = "wave"; }, {"wave", "reach_human"});
+      refuse([](auto& r) { r.dmp_ratio = 0.0; }, {"ratio", "0.05", "100"});
+      refuse([](auto& r) { r.dmp_ratio = -2.0; }, {"ratio"});
+      refuse([](auto& r) { r.goal_offset.x() = std::nan(""); }, {"goal_offset", "finite"});
+      refuse(
+          [](auto& r) {
+            r.orientation_control = true;
+            r.target_orientation << 0.5, 0, 0, 0.5;
+          },
+          {"target_orientation", "unit"});
+    }
+    for (VirtualRobot* one : {&robot, &twin}) {
+      one->see("human_hand", kGoal);
+      one->tick();
+    }
+    ASSERT_EQ(robot.command.velocity, twin.command.velocity);
+  }
+}
+
+}  // namespace
+}  // namespace coglab_controllers
