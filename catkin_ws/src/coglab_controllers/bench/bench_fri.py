@@ -3,9 +3,9 @@
 
 The node is /robot as launched by default: FRI thread and controller manager in one process, a point-to-point motion
 running to and fro. Blocks of 500 packets go to echo, bridge, bridge, echo; both are served in every millisecond, the
-one whose block it is first. The ratio of the medians of neighbouring blocks is judged by its median over all pairs, with
-the distribution-free 95 % interval of that median. The ratio of the 99th percentiles is shown beside the same ratio of
-echo against echo: on a machine that is not a real-time one it says more about the machine. Prints JSON.
+one whose block it is first. The ratio of the medians of neighbouring blocks is judged by its median over all pairs,
+with the distribution-free 95 % interval of that median. The ratio of the 99th percentiles is shown beside the same
+ratio of echo against echo: on a machine that is not a real-time one it says more about the machine. Prints JSON.
 """
 from __future__ import annotations
 
@@ -254,7 +254,13 @@ def main() -> None:
                     "bare echo",
                     missed["echo"],
                 ),
-                row("answers that moved the arm: the controller's motion runs", moving, "share", ">= 0.8", ok=moving >= 0.8),
+                row(
+                    "answers that moved the arm: the controller's motion runs",
+                    moving,
+                    "share",
+                    ">= 0.8",
+                    ok=moving >= 0.8,
+                ),
             ],
             indent=1,
         )

@@ -45,12 +45,12 @@ def equality() -> float | None:
 
 def row(figure: str, value: float, unit: str, limit: float) -> dict[str, object]:
     """A figure without a peer; fine up to `limit`."""
-    return {'bench': 'dynamics', 'figure': figure, 'value': value, 'unit': unit, 'goal': f'<= {limit:g}', 'peer': None,
-            'peer_value': None, 'ok': value <= limit}
+    return {'bench': 'dynamics', 'figure': figure, 'value': value, 'unit': unit, 'goal': f'<= {limit:g}',
+            'peer': None, 'peer_value': None, 'ok': value <= limit}
 
 
 def blocked_rows() -> list[dict[str, object]]:
-    """Bridge and cell: the moving arm is held for 5 s and released, in each mode; worst of two motions and three periods."""
+    """Bridge and cell: the moving arm is held for 5 s and released; worst of two motions and three periods."""
     from wire import BLOCKED_MODES, BLOCKED_MOTIONS, Wire, speed_after_block
     return [row(f'{mode}: peak speed after 5 s against a block', round(max(
         speed_after_block(Wire(krc__period=period), mode, moving)

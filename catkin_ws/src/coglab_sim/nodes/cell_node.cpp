@@ -28,8 +28,8 @@
 namespace coglab_sim {
 namespace {
 
-/// Full name of the parameter with the bridge's port. A relative one counts from the namespace above
-/// the cell's own: the bridge /a/lwr and the cell /a/coglab_sim/cell belong to one robot.
+/// Full name of the parameter with the bridge's port. A relative one counts from the namespace
+/// above the cell's own: the bridge /a/lwr and the cell /a/coglab_sim/cell belong to one robot.
 std::string portParameter(const std::string& name) {
   if (!name.empty() && name[0] == '/') return name;
   return ros::names::append(ros::names::parentNamespace(ros::this_node::getNamespace()), name);

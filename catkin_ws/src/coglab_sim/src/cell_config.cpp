@@ -18,7 +18,8 @@ struct Range {
   double low, high;
 };
 
-/// Ranges by name, and for the others by unit: what the cell can compute with, not what is sensible.
+/// Ranges by name, and for the others by unit: what the cell can compute with, not what is
+/// sensible.
 Range rangeOf(const std::string& name, const std::string& unit) {
   static const std::map<std::string, Range> by_name = {
       {"seed", {0, 2147483647}},
@@ -45,12 +46,12 @@ Range rangeOf(const std::string& name, const std::string& unit) {
       {"contact/current_per_count", {0, 1000}},
       {"contact/board_size", {0, 5}}};
   static const std::map<std::string, Range> by_unit = {
-      {"rad", {-3.2, 3.2}},   {"s", {0, 600}},       {"1", {0, 1}},
-      {"m, rad", {0, 1}},     {"Nm", {0, 1000}},     {"rad/s", {1e-4, 50}},
-      {"m/s", {1e-4, 50}},    {"Nm/rad", {0, 1e7}},  {"N/m", {0, 1e7}},
-      {"kg m^2", {0, 100}},   {"kg", {0, 10}},       {"s/rad", {0, 1000}},
-      {"m", {-5, 5}},         {"s/m", {0, 1000}},    {"N/m^1.5", {0, 1e9}},
-      {"N", {0, 1000}},       {"K", {0, 200}},       {"degree Celsius", {-50, 200}}};
+      {"rad", {-3.2, 3.2}}, {"s", {0, 600}},      {"1", {0, 1}},
+      {"m, rad", {0, 1}},   {"Nm", {0, 1000}},    {"rad/s", {1e-4, 50}},
+      {"m/s", {1e-4, 50}},  {"Nm/rad", {0, 1e7}}, {"N/m", {0, 1e7}},
+      {"kg m^2", {0, 100}}, {"kg", {0, 10}},      {"s/rad", {0, 1000}},
+      {"m", {-5, 5}},       {"s/m", {0, 1000}},   {"N/m^1.5", {0, 1e9}},
+      {"N", {0, 1000}},     {"K", {0, 200}},      {"degree Celsius", {-50, 200}}};
   if (const auto found = by_name.find(name); found != by_name.end()) return found->second;
   if (const auto found = by_unit.find(unit); found != by_unit.end()) return found->second;
   return {0, 0};

@@ -64,8 +64,7 @@ bool FrameTable::lookup(const std::string& reference, const std::string& frame,
 }
 
 VirtualRobot::VirtualRobot(const VirtualRobotConfig& config)
-    : cell_(config.cell),
-      bridge_(bridgeConfig(config)) {
+    : cell_(config.cell), bridge_(bridgeConfig(config)) {
   auto settings = coglab_controllers::readManagerSettings(YAML::Load(config.manager_parameters),
                                                           textOf(config.cell.urdf),
                                                           bridge_.config().limits, true);

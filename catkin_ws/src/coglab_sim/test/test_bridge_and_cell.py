@@ -157,7 +157,8 @@ def rubbish(random, good: bytes, old: list[bytes]) -> bytes:
     data = bytearray(good)
     if kind == 4:  # true length and header, but for a measurement that is gone; the rest at random
         data[8:] = random.bytes(368)
-        struct.pack_into('<H', data, 2, (struct.unpack_from('<H', good, 2)[0] - int(random.integers(1, 60000))) & 0xFFFF)
+        reflected = struct.unpack_from('<H', good, 2)[0] - int(random.integers(1, 60000))
+        struct.pack_into('<H', data, 2, reflected & 0xFFFF)
     else:
         struct.pack_into('<H', data, int(random.choice([4, 6])), int(random.integers(0x1100, 0xFFFF)))
         data[0:2] = random.bytes(2)
@@ -283,7 +284,7 @@ def test_t1_profile_is_slow_enough_for_t1():
 @pytest.mark.parametrize('mode', ['joint_impedance stiffness 25', 'cartesian_impedance stiffness 60 10'])
 @pytest.mark.parametrize('leash_load', [10.0, 0.0])
 def test_a_soft_arm_with_a_load_moves_on(mode, leash_load):
-    """0.8 kg that the load data do not know, in a soft impedance: its sag is no block. Without the allowance it was one."""
+    """0.8 kg that the load data do not know, in a soft impedance: its sag is no block; without the allowance it was."""
     wire = Wire({'leash_load': leash_load}, arm__unknown_load=0.8)
     wire.start(mode)
     wire.run(1.0)

@@ -225,8 +225,9 @@ TEST(RealTimeCell, TheFactorScalesTimeAndAFloodDoesNotStopIt) {
     std::array<char, 1024> bytes{};
     sockaddr_in peer{};
     length = sizeof peer;
-    ASSERT_EQ(recvfrom(fd, bytes.data(), bytes.size(), 0, reinterpret_cast<sockaddr*>(&peer), &length),
-              916);
+    ASSERT_EQ(
+        recvfrom(fd, bytes.data(), bytes.size(), 0, reinterpret_cast<sockaddr*>(&peer), &length),
+        916);
     double simulated = 0.0, real = 0.0;
     while (real < 0.6) {
       for (int i = 0; i < 50; ++i)

@@ -1,5 +1,6 @@
-/// One convention for the estimated wrench from end to end: on the wire in the base's axes about the
-/// palm, on `tool_wrench` in the palm's own axes, for feedback controllers in the base's axes again.
+/// One convention for the estimated wrench from end to end: on the wire in the base's axes about
+/// the palm, on `tool_wrench` in the palm's own axes, for feedback controllers in the base's axes
+/// again.
 #include <gtest/gtest.h>
 
 #include <array>

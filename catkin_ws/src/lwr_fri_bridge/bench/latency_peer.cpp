@@ -125,8 +125,8 @@ int measure(int echo_port, int bridge_port, int quads) {
   const auto exchange = [&](bool to_bridge) {
     target.sin_port = htons(static_cast<std::uint16_t>(to_bridge ? bridge_port : echo_port));
     fri::MeasurementDatagram& d = controller.datagram;
-    d.header = fri::measurementHeader(
-        to_bridge ? ++controller.counter : controller.counter, d.header.reflected);
+    d.header = fri::measurementHeader(to_bridge ? ++controller.counter : controller.counter,
+                                      d.header.reflected);
     const std::int64_t sent = steadyNow();
     sendto(fd, &d, sizeof d, 0, reinterpret_cast<sockaddr*>(&target), sizeof target);
     // A late answer of the other one is not mistaken for this one.
@@ -172,8 +172,9 @@ int measure(int echo_port, int bridge_port, int quads) {
       std::fputc('\n', stdout);
     }
   }
-  std::printf("moving %.4f\n", static_cast<double>(controller.moved) /
-                                   static_cast<double>(std::max<std::uint64_t>(controller.answers, 1)));
+  std::printf("moving %.4f\n",
+              static_cast<double>(controller.moved) /
+                  static_cast<double>(std::max<std::uint64_t>(controller.answers, 1)));
   return 0;
 }
 
@@ -186,7 +187,6 @@ int main(int argc, char** argv) {
   if (mode == "echo") return echo();
   if (mode == "measure" && argc == 5)
     return measure(std::atoi(argv[2]), std::atoi(argv[3]), std::atoi(argv[4]));
-  std::fprintf(stderr,
-               "usage: %s echo | measure ECHO_PORT BRIDGE_PORT QUADS\n", argv[0]);
+  std::fprintf(stderr, "usage: %s echo | measure ECHO_PORT BRIDGE_PORT QUADS\n", argv[0]);
   return 2;
 }

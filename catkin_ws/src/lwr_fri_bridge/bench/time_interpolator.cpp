@@ -2,8 +2,8 @@
 /// The figures of bench_interpolator.py, one line each:
 ///
 ///   time LIMITS_FILE      median of 200 blocks of 10 000 steps (7 axes, 1 ms, a new target every 5
-///                         steps, as with a 200 Hz controller at 1 kHz), us of processor time of the
-///                         thread, so that other work on the machine does not count
+///                         steps, as with a 200 Hz controller at 1 kHz), us of processor time of
+///                         the thread, so that other work on the machine does not count
 ///   limits LIMITS_FILE    largest share by which speed, acceleration and jerk exceed their limits
 ///                         (negative: they stay below), each by one difference of the next lower
 ///                         quantity, at 1, 5, 20, 100 ms; then by how much speed (rad/s) and
@@ -64,10 +64,12 @@ void excess(const Vector7& value, const Vector7& limit, double& worst) {
 }
 
 void printLimits(const JointLimits& limits) {
-  double speed = -1.0, acceleration = -1.0, jerk = -1.0, wire_speed = -10.0, wire_acceleration = -10.0;
+  double speed = -1.0, acceleration = -1.0, jerk = -1.0, wire_speed = -10.0,
+         wire_acceleration = -10.0;
   for (const double dt : {0.001, 0.005, 0.020, 0.100}) {
     Interpolator interpolator(limits);
-    const BrakingGuard guard(limits, 0.01);  // keeps positions where float32 has its true resolution
+    const BrakingGuard guard(limits,
+                             0.01);  // keeps positions where float32 has its true resolution
     interpolator.reset(Vector7::Zero());
     Vector7 target = Vector7::Zero(), wire = Vector7::Zero(), wire_v = Vector7::Zero();
     for (int step = 0; step < 100'000; ++step) {
@@ -86,22 +88,26 @@ void printLimits(const JointLimits& limits) {
       const Vector7 sent_v = (sent - wire) / dt;
       const Vector7 sent_a = (sent_v - wire_v) / dt;
       wire_speed = std::max(wire_speed, (sent_v.cwiseAbs() - limits.velocity).maxCoeff());
-      wire_acceleration = std::max(wire_acceleration, (sent_a.cwiseAbs() - limits.acceleration).maxCoeff());
+      wire_acceleration =
+          std::max(wire_acceleration, (sent_a.cwiseAbs() - limits.acceleration).maxCoeff());
       wire = sent;
       wire_v = sent_v;
     }
   }
-  std::printf("%.3e %.3e %.3e %.3e %.3e\n", speed, acceleration, jerk, wire_speed, wire_acceleration);
+  std::printf("%.3e %.3e %.3e %.3e %.3e\n", speed, acceleration, jerk, wire_speed,
+              wire_acceleration);
 }
 
-/// A random state of a joint from which braking at once stays inside: others are lost for any guard.
+/// A random state of a joint from which braking at once stays inside: others are lost for any
+/// guard.
 AxisState randomState(const JointLimits& limits, int i) {
   for (;;) {
     const AxisState s{limits.upper_position[i] * part(), limits.velocity[i] * part(),
                       limits.acceleration[i] * part()};
     const BrakingReach reach =
         brakingReach(s.velocity, s.acceleration, limits.acceleration[i], limits.jerk[i]);
-    const double peak = s.velocity + s.acceleration * std::abs(s.acceleration) / (2.0 * limits.jerk[i]);
+    const double peak =
+        s.velocity + s.acceleration * std::abs(s.acceleration) / (2.0 * limits.jerk[i]);
     if (std::abs(peak) <= limits.velocity[i] &&
         s.position + reach.highest <= limits.upper_position[i] &&
         s.position + reach.lowest >= limits.lower_position[i]) {

@@ -14,7 +14,8 @@ constexpr double kReturned = 1e-3;     // rad
 constexpr double kNoticeable = 0.1;    // of the leash: joints ahead by less keep their set-point
 
 constexpr double kLongest = 0.5;  // rad
-constexpr double kLever[7] = {1.0, 1.0, 0.6, 0.6, 0.2, 0.2, 0.2};  // m, joint axis to hand, stretched
+constexpr double kLever[7] = {1.0, 1.0, 0.6, 0.6,
+                              0.2, 0.2, 0.2};  // m, joint axis to hand, stretched
 constexpr double kReach = 0.4;      // m of hand displacement per rad of joint, in a usual posture
 constexpr double kLoadLever = 0.1;  // m, from the tool's origin to the load
 

@@ -136,8 +136,8 @@ TEST_F(FriThreadTest, stopsAtOnceWithoutDatagrams) {
   stopper.join();
 }
 
-/// 20 000 bad datagrams from elsewhere while the peer is served: every one of the peer's is answered
-/// with what belongs to it.
+/// 20 000 bad datagrams from elsewhere while the peer is served: every one of the peer's is
+/// answered with what belongs to it.
 TEST_F(FriThreadTest, floodOfRubbishDisturbsNoAnswer) {
   Peer rubbish(fri.port()), peer(fri.port());
   fri::CommandDatagram c{};

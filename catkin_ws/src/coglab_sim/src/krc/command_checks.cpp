@@ -38,7 +38,8 @@ std::string checkValues(const CheckContext& context, const fri::CommandDatagram&
   if ((flags & fri::kJointPosition) != 0 && !allFinite(command.joint_position)) {
     return "cmd.jntPos not properly initialized";
   }
-  if ((flags & fri::kCartesianPosition) != 0 && !poseFromWire(command.cartesian_frame, p.frame_orthonormality, frame)) {
+  if ((flags & fri::kCartesianPosition) != 0 &&
+      !poseFromWire(command.cartesian_frame, p.frame_orthonormality, frame)) {
     return "cmd.cartPos not properly initialized";
   }
   if ((flags & fri::kJointTorque) != 0) {
@@ -80,8 +81,7 @@ bool poseFromWire(const float (&wire)[fri::kFrameValues], double tolerance, Pose
     pose.position[row] = wire[4 * row + 3];
   }
   if (!rotation.allFinite() || !pose.position.allFinite()) return false;
-  if ((rotation * rotation.transpose() - Matrix3d::Identity()).cwiseAbs().maxCoeff() >
-      tolerance)
+  if ((rotation * rotation.transpose() - Matrix3d::Identity()).cwiseAbs().maxCoeff() > tolerance)
     return false;
   if (rotation.determinant() < 0.0) return false;
   pose.rotation = Quaterniond(rotation).normalized();

@@ -275,8 +275,7 @@ void Controller::updateDrives(const ArmDynamics& arm) {
   }
   // Warm-up of the drives.
   const Vector7 load = arm.motorTorque().cwiseQuotient(arm_parameters_.torque_limit);
-  const Vector7 target =
-      Vector7::Constant(parameters_.ambient_temperature) +
+  const Vector7 target = Vector7::Constant(parameters_.ambient_temperature) +
                          parameters_.drive_heating * load.cwiseAbs2();
   temperature_ += (target - temperature_) * (parameters_.period / parameters_.drive_heating_time);
 }

@@ -11,12 +11,12 @@ namespace lwr_fri_bridge {
 struct BridgeConfig {
   JointLimits limits;  ///< from loadJointLimits()
   fri::KrlConvention krl_convention = fri::KrlConvention::Coglab;
-  int tool_number = 1;            ///< told to the KRL program of rtt_lwr
-  bool lenient_headers = false;   ///< accept controllers that send zeros in the header
-  ControlMode mode;               ///< control mode until an event sets another
-  double position_margin = 0.01;  ///< rad kept from both ends of every joint's range, 0..0.5
-  LeashLengths leash;             ///< bound of |commanded - measured| per joint
-  bool wrench_in_tool_axes = false;  ///< the KRL program sets $STIFFNESS.TASKFRAME to #TOOL
+  int tool_number = 1;                  ///< told to the KRL program of rtt_lwr
+  bool lenient_headers = false;         ///< accept controllers that send zeros in the header
+  ControlMode mode;                     ///< control mode until an event sets another
+  double position_margin = 0.01;        ///< rad kept from both ends of every joint's range, 0..0.5
+  LeashLengths leash;                   ///< bound of |commanded - measured| per joint
+  bool wrench_in_tool_axes = false;     ///< the KRL program sets $STIFFNESS.TASKFRAME to #TOOL
   double velocity_filter_time = 0.008;  ///< s, time constant of the velocity filter, 0..0.2
   double command_timeout =
       0.05;                    ///< s, age at which a command of the control thread ends, 0.005..1

@@ -42,10 +42,10 @@ struct RobotSample {
       0;  ///< number of measurements accepted since the bridge started; 0: none yet
   std::int64_t stamp_ns = 0;  ///< time of receipt, steady clock (lockstep: simulated time), ns
   double cycle_time = 0.0;    ///< FRI period, s
-  Vector7 position = Vector7::Zero();                ///< measured, rad
-  Vector7 velocity = Vector7::Zero();                ///< from the velocity filter, rad/s
-  Vector7 torque = Vector7::Zero();                  ///< measured, Nm
-  Vector7 external_torque = Vector7::Zero();         ///< estimated by the robot controller, Nm
+  Vector7 position = Vector7::Zero();         ///< measured, rad
+  Vector7 velocity = Vector7::Zero();         ///< from the velocity filter, rad/s
+  Vector7 torque = Vector7::Zero();           ///< measured, Nm
+  Vector7 external_torque = Vector7::Zero();  ///< estimated by the robot controller, Nm
   Vector6 tool_wrench = Vector6::Zero();  ///< estimated by the robot controller, about the tool's
                                           ///< origin in the tool's axes, see toolWrench()
   Vector7 commanded_position = Vector7::Zero();      ///< sent in the last answer, rad

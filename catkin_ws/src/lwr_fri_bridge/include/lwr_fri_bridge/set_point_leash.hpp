@@ -35,8 +35,8 @@ class SetPointLeash {
   void reset() { joint_ = -1; }
 
   /// Judges one tick and, while tripped, overwrites `target` (rad/s) with the velocities of the
-  /// return. `wanted`: velocities asked for by the user of the bridge, before any bound. `leash` per
-  /// joint in rad. Returns whether the leash is tripped.
+  /// return. `wanted`: velocities asked for by the user of the bridge, before any bound. `leash`
+  /// per joint in rad. Returns whether the leash is tripped.
   bool update(const Interpolator& interpolator, const Vector7& measured, const Vector7& wanted,
               const Vector7& leash, const JointLimits& limits, Vector7& target);
 

@@ -44,10 +44,10 @@ struct Parameters {
   Vector7 speed_limit =
       (Vector7() << 2.0943951, 2.0943951, 2.7925268, 2.7925268, 4.3633231, 3.8397244, 3.8397244)
           .finished();
-  double t1_speed_limit = 0.24;  ///< rad/s in T1 (CentroEPiaggio)
-  double speed_margin = 0.05;    ///< share by which a step may exceed limit x period
-  double frame_speed_limit = 2.0;  ///< m/s of a commanded frame
-  double frame_turn_limit = 4.0;   ///< rad/s of a commanded frame
+  double t1_speed_limit = 0.24;        ///< rad/s in T1 (CentroEPiaggio)
+  double speed_margin = 0.05;          ///< share by which a step may exceed limit x period
+  double frame_speed_limit = 2.0;      ///< m/s of a commanded frame
+  double frame_turn_limit = 4.0;       ///< rad/s of a commanded frame
   double frame_orthonormality = 1e-3;  ///< by which a commanded rotation matrix may fail to be one
   /// rad, +-; mechanical range (published).
   Vector7 position_limit =
@@ -69,11 +69,11 @@ struct Parameters {
   double krl_poll =
       0.05;  ///< s between two looks of the KRL program at the exchange arrays (published: ~50 ms)
   double krl_message_wait =
-      0.3;                     ///< s a program waits when it shows a message (published: 0.3-0.5)
-  double krl_drive_wait = 3.0;    ///< s a program waits for drives and brakes before it gives up
-  double krl_quality_wait = 12.0; ///< s it waits for the quality; 100 packets of 100 ms take 10 s
-  double brake_release = 0.3;  ///< s that the tiny motion takes which opens the brakes
-  double power_up = 0.5;       ///< s from acknowledging an error to full drive power
+      0.3;                      ///< s a program waits when it shows a message (published: 0.3-0.5)
+  double krl_drive_wait = 3.0;  ///< s a program waits for drives and brakes before it gives up
+  double krl_quality_wait = 12.0;  ///< s it waits for the quality; 100 packets of 100 ms take 10 s
+  double brake_release = 0.3;      ///< s that the tiny motion takes which opens the brakes
+  double power_up = 0.5;           ///< s from acknowledging an error to full drive power
   bool acknowledge_by_program = true;  ///< false: errors wait for an operator (`acknowledge()`)
   double ambient_temperature = 25.0;   ///< degree Celsius
   double drive_heating = 20.0;         ///< K above that at full torque, in the end
