@@ -1,6 +1,7 @@
 """States that turn knowledge into a goal: the object database and perception."""
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -78,8 +79,9 @@ def locate(state: CoglabState, target: str) -> dict[str, Any]:
             "quaternion": list(found.quaternion), "age": found.age}
 
 
-def await_offer(state: CoglabState, target: str, margin: float = 0.0) -> dict[str, Any]:
-    """Wait until ``target`` is inside the handover region, so that the arm does not chase a hand at rest.
+def await_offer(state: CoglabState, target: str, goal: Mapping[str, Any], margin: float = 0.0) -> dict[str, Any]:
+    """Wait until ``target`` is inside the handover region, so that the arm does not chase a hand at rest, and until the
+    arm has a posture for ``goal``, which is relative to its frame, so that the hand does not run into whoever offers.
 
     An object that is held still a little outside counts too. ``margin`` (m) widens the region: a hand is behind the
     object it holds or asks for. PortError if nobody comes within ``handover.offer_timeout``; nothing has moved then.
@@ -96,10 +98,12 @@ def await_offer(state: CoglabState, target: str, margin: float = 0.0) -> dict[st
         now, place = state.ctx.clock.now(), np.array(located["xyz"])
         seen = [(t, p) for t, p in seen if now - t <= 0.4] + [(now, place)]
         still = now - seen[0][0] > 0.3 and float(np.linalg.norm(place - seen[0][1])) < 0.025
-        if np.all(place >= low) and np.all(place <= high):
+        offered = bool(np.all(place >= low) and np.all(place <= high)) or (
+            still and bool(np.all(place >= low - wider) and np.all(place <= high + wider)))
+        if offered and reachable(state.ctx, located, goal):
             break
-        if still and np.all(place >= low - wider) and np.all(place <= high + wider):
-            break
+        if now > end and offered:
+            raise PortError(*out_of_reach(target, located, goal))
         if now > end:
             where = ", ".join(f"{v:.2f}" for v in place)
             raise PortError(f"'{target}' was not offered within {limit:.0f} s: it stayed at ({where}) m, outside the "
@@ -109,22 +113,26 @@ def await_offer(state: CoglabState, target: str, margin: float = 0.0) -> dict[st
     return located
 
 
+def palm_of(seen: Mapping[str, Any], goal: Mapping[str, Any]) -> Pose:
+    """Where the palm is to be, with the goal's frame where it was seen (its parent is the base frame)."""
+    return Pose.from_dict(seen) * Pose.from_dict({"xyz": goal["offset"], "quaternion": goal["orientation"]})
+
+
+def reachable(ctx: Context, seen: Mapping[str, Any], goal: Mapping[str, Any]) -> bool:
+    """Whether the arm has a posture for the goal; not asked with ``handover.check_reach`` false."""
+    return not bool(ctx.config.get("handover.check_reach", True)) or ctx.reachable(palm_of(seen, goal))
+
+
+def out_of_reach(target: str, seen: Mapping[str, Any], goal: Mapping[str, Any]) -> tuple[str, tuple[str, ...]]:
+    """Sentence and cause of an offer that cannot be taken."""
+    where = ", ".join(f"{v:.2f}" for v in palm_of(seen, goal).position)
+    return (f"'{target}' cannot be reached: the arm has no posture for the hand at ({where}) m turned like that",
+            ("it is too far, or turned so that the grasp points away from the robot; turn or move it",))
+
+
 def paced(ctx: Context, goal: dict[str, Any]) -> dict[str, Any]:
     """The goal at the pace of a person: ``handover.reach_ratio`` times the object's own dmp_ratio."""
     return {**goal, "dmp_ratio": goal["dmp_ratio"] * float(ctx.config.get("handover.reach_ratio", 1.0))}
-
-
-def require_reach(ctx: Context, what: str, seen: dict[str, Any], goal: dict[str, Any]) -> None:
-    """PortError if the arm has no posture for ``goal`` with its frame where it was seen: better said before the hand
-    runs into whoever holds the object. The frame's parent is the base frame."""
-    if not bool(ctx.config.get("handover.check_reach", True)):
-        return
-    palm = Pose.from_dict(seen) * Pose.from_dict({"xyz": goal["offset"], "quaternion": goal["orientation"]})
-    if not ctx.reachable(palm):
-        where = ", ".join(f"{v:.2f}" for v in palm.position)
-        raise PortError(f"{what} cannot be reached: the arm has no posture for the hand at ({where}) m turned like "
-                        "that",
-                        ("it is too far, or turned so that the grasp points away from the robot; turn or move it",))
 
 
 class SetGraspGoal(CoglabState):
@@ -140,11 +148,10 @@ class SetGraspGoal(CoglabState):
         super().__init__(ctx, input_keys=["object_id", "object_entry", "grasp"], output_keys=["goal", "located"])
 
     def run(self, ud: Any) -> str:
-        located = await_offer(self, ud.object_id)
+        goal = paced(self.ctx, grasp_goal(ud.object_entry, ud.grasp, "", "receive"))
+        located = await_offer(self, ud.object_id, goal)
         ud.located = located
-        goal = paced(self.ctx, grasp_goal(ud.object_entry, ud.grasp, located["frame"], "receive"))
-        require_reach(self.ctx, f"'{ud.object_id}'", located, goal)
-        ud.goal = goal
+        ud.goal = {**goal, "frame": located["frame"]}
         return "succeeded"
 
 
@@ -175,15 +182,15 @@ class SetDeliveryGoal(CoglabState):
                          output_keys=["goal", "delivery", "delivery_name", "delivery_pose"])
 
     def run(self, ud: Any) -> str:
-        located = await_offer(self, str(self.ctx.config.get("perception.human_hand", "human_hand")),
-                              float(self.ctx.config.get("handover.hand_margin", 0.10)))
         entry = ud.object_entry
         name = entry["default_delivery"]
         delivery = entry["deliveries"][name]
         ud.delivery_name = name
         ud.delivery = delivery
-        goal = paced(self.ctx, delivery_goal(entry, ud.grasp, delivery, located["frame"]))
-        require_reach(self.ctx, "the person's hand", located, goal)
+        goal = paced(self.ctx, delivery_goal(entry, ud.grasp, delivery, ""))
+        located = await_offer(self, str(self.ctx.config.get("perception.human_hand", "human_hand")), goal,
+                              float(self.ctx.config.get("handover.hand_margin", 0.10)))
+        goal["frame"] = located["frame"]
         ud.delivery_pose = {"xyz": goal["offset"], "quaternion": goal["orientation"]}
         ud.goal = goal
         return "succeeded"
