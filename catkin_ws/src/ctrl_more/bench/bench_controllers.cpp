@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
+#include <cstdlib>
 #include <limits>
 #include <memory>
 #include <vector>
@@ -73,8 +74,10 @@ double nanoseconds(const std::function<void()>& block, int cycles, int controlle
 
 }  // namespace
 
-int main() {
-  constexpr int kControllers = 100, kCycles = 400, kBlocks = 150;
+// Argument: number of blocks.
+int main(int argc, char** argv) {
+  constexpr int kControllers = 100, kCycles = 400;
+  const int blocks = argc > 1 ? std::atoi(argv[1]) : 150;
   Logger logger;
   RobotStates robot(&logger);
   ControlStates control(0, 0.005, &logger);
@@ -101,7 +104,7 @@ int main() {
   Cycle cycle{0, 0.005, 0};
 
   double floor_ns = std::numeric_limits<double>::max(), guarded_ns = floor_ns, timed_ns = floor_ns;
-  for (int block = 0; block < kBlocks; ++block) {
+  for (int block = 0; block < blocks; ++block) {
     floor_ns = std::min(floor_ns, nanoseconds([&] {
       for (int i = 0; i < kCycles; ++i) {
         ++cycle.number;

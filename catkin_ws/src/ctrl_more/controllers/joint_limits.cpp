@@ -24,8 +24,8 @@ class JointLimits : public FeedbackController {
 };
 
 Description JointLimits::describe() const {
-  constexpr double kDegree = 3.14159265358979323846 / 180.0;
-  const double wide = 170.0 * kDegree, narrow = 120.0 * kDegree;
+  // 170 and 120 degrees, as the robot's own table has them.
+  const double wide = 2.967059728390360, narrow = 2.094395102393195;
   Description d;
   d.type = "JointLimits";
   d.summary = "Bounds the speed of each joint toward the end of its range.";

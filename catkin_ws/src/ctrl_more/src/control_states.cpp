@@ -305,6 +305,12 @@ ControlSignal ControlStates::find(ControlContainer container, const std::string&
   return signal;
 }
 
+std::vector<int> ControlStates::offsets() const {
+  std::vector<int> list;
+  for (const Entry& entry : entries_) list.push_back(static_cast<int>(entry.info.offset));
+  return list;
+}
+
 void ControlStates::copyValuesFrom(const ControlStates& other) {
   if (data_.size() == other.data_.size()) {
     std::memcpy(data_.data(), other.data_.data(), data_.size() * sizeof(double));

@@ -12,17 +12,37 @@
 #include "ctrl_more/feedback_controllers_manager.hpp"
 #include "ctrl_more/plugin_library.hpp"
 #include "plan.hpp"
-#include "shared_records.hpp"
 #include "shared_text.hpp"
 
 namespace ctrl_more {
 
+/// What the controllers of one stage share while they run one after another.
+struct StageRun {
+  const Cycle& cycle;
+  const RobotStates& robot;
+  const ControlStates& original;  ///< references before the stage
+  ControlStates& control;
+  double* data;          ///< of `control`
+  const double** found;  ///< for the first double of each signal: where it is as the controller
+                         ///< that runs found it
+  double* compared;      ///< test mode: all of `data` as it found it; else null
+  bool timed;
+  unsigned buffer;       ///< the cycle's buffer of records, see RecordExchange
+  double cycle_number;
+  std::int64_t boundary_ns;  ///< steady clock between the last controller and this one
+};
+
 /// One loaded controller in the control cycle: runs it under guard, blends its corrections, and
 /// tells the other threads what happened.
 ///
-/// configure() and the const questions are for services; adopt(), run() and judgeTime() are for
-/// the cycle and neither allocate nor lock nor throw.
-class __attribute__((visibility("hidden"))) ControllerSlot {
+/// A controller runs on the references themselves. What it declared is judged, then either taken
+/// back, or committed: recorded, before and after, for attribution and for the next fade. What one
+/// left is what the next one found, so its record is also where the next one's changes are taken
+/// back from (StageRun::found), and nothing is copied twice.
+///
+/// configure() and the const questions are for services; adopt() and run() are for the cycle and
+/// neither allocate nor lock nor throw.
+class __attribute__((visibility("hidden"), aligned(64))) ControllerSlot {
  public:
   /// @param instance the controller and its library
   /// @param name its name
@@ -51,14 +71,8 @@ class __attribute__((visibility("hidden"))) ControllerSlot {
   /// @name The cycle
   /// @{
   void adopt(const PlanEntry& entry) noexcept;
-  bool idle() const { return activity_ == Activity::Off && !wanted_; }
-  void run(const Cycle& cycle, const RobotStates& robot, const ControlStates& original,
-           ControlStates& control) noexcept;
-  /// Judges the duration of the run just made; undoes it if it was an overrun.
-  void judgeTime(const Cycle& cycle, std::int64_t duration_ns, ControlStates& control) noexcept;
-  /// Test mode: if something it did not declare differs from `before`, restores it and faults.
-  void checkUndeclared(const Cycle& cycle, const double* before, ControlStates& control) noexcept;
-  bool ran() const { return ran_; }
+  /// One cycle of each of these controllers that has anything to do, in order.
+  static void runAll(const std::vector<ControllerSlot*>& slots, StageRun& run) noexcept;
   /// @}
 
   /// @name Other threads
@@ -66,7 +80,11 @@ class __attribute__((visibility("hidden"))) ControllerSlot {
   Activity activity() const { return shared_activity_.load(std::memory_order_acquire); }
   FaultKind fault() const { return shared_fault_.load(std::memory_order_acquire); }
   void fillStatus(ControllerStatus& status) const;
-  void attribution(const ControlStates& names, std::vector<Attribution>& list) const;
+  /// Adds what it changed in the newest complete cycle.
+  /// @param buffer the reader's buffer of records, from RecordExchange::acquire()
+  /// @param cycle number of that cycle; a record of another one is left out
+  void attribution(const ControlStates& names, unsigned buffer, std::uint64_t cycle,
+                   std::vector<Attribution>& list) const;
   /// @}
 
  private:
@@ -81,52 +99,91 @@ class __attribute__((visibility("hidden"))) ControllerSlot {
     bool limited;  // any finite limit
     bool rated;    // a finite rate limit
   };
+  // The same, as far as every cycle needs it.
+  struct Checked {
+    std::uint32_t offset;
+    std::uint16_t size;
+    SignalKind kind;
+  };
+  struct alignas(64) Line {
+    double numbers[8] = {};
+  };
   struct Needed {
-    RobotSignal signal;
+    RobotSignal signal{};
     std::int64_t max_age_ns;
   };
 
   enum class Why : std::uint8_t { Paused, Fault, Disabled, Stale };
 
+  const Checked* checked() const {
+    return checked_count_ == 1 ? &checked_ : all_checked_.data();
+  }
+  const Needed* needed() const { return needed_count_ == 1 ? &needed_ : all_needed_.data(); }
+  const double* lastRecord() const { return records_ + last_ * record_size_; }
+  bool idle() const { return activity_ == Activity::Off && !wanted_; }
   void start() noexcept;
   void stop(Why why) noexcept;
   void captureCorrection() noexcept;
   void advanceBlend(double dt) noexcept;
   void advanceGains(double dt) noexcept;
-  bool isFresh(const Cycle& cycle, const RobotStates& robot) noexcept;
-  void runGuarded(const Cycle& cycle, const RobotStates& robot, const ControlStates& original,
-                  ControlStates& control) noexcept;
-  FaultKind judgeLimits(const Cycle& cycle, const double* data) noexcept;
-  void blendIn(ControlStates& control) noexcept;
-  void runStopped(const Cycle& cycle, ControlStates& control) noexcept;
-  void openRecord(const Cycle& cycle, const double* data) noexcept;
-  FaultKind fillAfter(const double* data) noexcept;
-  void restore(double* data) noexcept;
-  void undo(const Cycle& cycle, double* data) noexcept;
+  static void fetchAhead(ControllerSlot* const* here, const ControllerSlot* const* end,
+                         const StageRun& run) noexcept;
+  bool isFresh(const StageRun& run) const noexcept;
+  bool prepare(StageRun& run) noexcept;
+  void noteWaiting(const StageRun& run) noexcept;
+  void catchUp();
+  void settle(StageRun& run) noexcept;
+  static bool isGood(const Checked& c, const double* data) noexcept;
+  static bool isGoodToo(const Checked& c, const double* value) noexcept;
+  bool hasGoodNumbers(const double* data) const noexcept;
+  FaultKind judgeMore(StageRun& run) noexcept;
+  FaultKind judgeNumbers(const double* data) const noexcept;
+  FaultKind judgeLimits(const StageRun& run) noexcept;
+  bool restoreUndeclared(const StageRun& run) noexcept;
+  bool isLate(StageRun& run) noexcept;
+  void overrun(StageRun& run) noexcept;
+  void takeFault(StageRun& run, FaultKind kind, const char* text) noexcept;
+  void takeFailure(StageRun& run) noexcept;
+  void blendIn(const StageRun& run) noexcept;
+  void runStopped(StageRun& run) noexcept;
+  void commit(const StageRun& run) noexcept;
+  static void commitSignal(const Checked& c, const StageRun& run, double* record,
+                           std::size_t total) noexcept;
+  void restore(const StageRun& run) const noexcept;
+  void lastCorrection(double* correction) noexcept;
   void latch(const Cycle& cycle, FaultKind kind, const char* text) noexcept;
   void setActivity(Activity activity) noexcept;
   StopPolicy policyOf(const Written& written) const;
 
-  // What every cycle touches comes first, to lie together in memory.
+  // The first cache line is all of the slot that a controller needs which runs undisturbed and
+  // reads and modifies one signal; with more signals the lists are elsewhere.
   FeedbackController* controller_;  // of instance_, at hand
-  std::vector<Written> written_;
-  std::vector<Needed> needed_;
-  std::unique_ptr<SharedRecords> records_;  // [0] cycle, then before and after of each double
-  double blend_ = 1.0;
-  double gain_weight_ = 1.0;
   std::uint32_t owner_;
+  bool steady_ = false;   // it runs, and nothing is being blended, reset or replaced
+  bool limited_ = false;  // any signal has a finite limit
+  std::uint8_t checked_count_ = 0;
+  std::uint8_t needed_count_ = 0;
+  // Two records, one for each buffer: a number for the cycle, the doubles that it modifies as it
+  // found them, and as it left them.
+  double* records_ = nullptr;
+  std::uint16_t total_ = 0;        // doubles that it modifies
+  std::uint16_t record_size_ = 0;  // doubles from one record to the other
+  std::uint32_t last_ = 0;         // buffer of the newer record
+  Checked checked_{};
+  Needed needed_{};
+
   Activity activity_ = Activity::Off;
   bool wanted_ = false;  // enabled, not paused, no fault
   bool reset_pending_ = false;
   bool gains_pending_ = true;
   bool raw_valid_ = false;
-  bool ran_ = false;
-  bool limited_ = false;  // any signal has a finite limit
   bool enabled_ = false;
   bool paused_ = false;
   Stage stage_ = Stage::Task;
   FaultKind fault_ = FaultKind::None;
   Why why_ = Why::Disabled;
+  double blend_ = 1.0;
+  double gain_weight_ = 1.0;
 
   ControllerInstance instance_;
   double blend_s_;
@@ -134,6 +191,10 @@ class __attribute__((visibility("hidden"))) ControllerSlot {
   int overruns_to_pause_;
   bool lockstep_;
   StopPolicy on_fault_;
+  std::vector<Written> written_;
+  std::vector<Checked> all_checked_;
+  std::vector<Needed> all_needed_;
+  std::unique_ptr<Line[]> lines_;  // where the records are
   std::vector<bool> declared_;  // doubles of the control buffer it may change
   std::uint32_t fault_clears_ = 0;
   std::uint32_t resets_ = 0;
@@ -144,8 +205,6 @@ class __attribute__((visibility("hidden"))) ControllerSlot {
   std::vector<double> raw_;     // correction of the last run before blending
   std::vector<double> now_;     // room for one correction
   std::vector<double> step_;    // room for another
-  std::vector<double> before_;  // room for references
-  std::vector<double> after_;   // room for references
   GainValues gains_from_, gains_to_;
 
   // shared

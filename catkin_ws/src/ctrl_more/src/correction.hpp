@@ -114,12 +114,18 @@ inline bool isFinite(int size, const double* values) {
   return collected == 0;
 }
 
+/// How far the square of a quaternion's norm may be from one: 1e-6 of the norm.
+constexpr double kUnitTolerance = 2e-6;
+
+/// Square of a quaternion's norm, less one.
+inline double squareOff(const double* q) {
+  return (q[0] * q[0] + q[1] * q[1]) + (q[2] * q[2] + q[3] * q[3]) - 1.0;
+}
+
 /// True if the quaternion in the signal, if it has one, is unit within 1e-6.
 inline bool isUnit(SignalKind kind, int size, const double* values) {
-  if (kind == SignalKind::Vector) return true;
-  const double* q = values + size - 4;
-  const double square = (q[0] * q[0] + q[1] * q[1]) + (q[2] * q[2] + q[3] * q[3]);
-  return std::abs(square - 1.0) <= 2e-6;
+  return kind == SignalKind::Vector ||
+         std::abs(squareOff(values + size - 4)) <= kUnitTolerance;
 }
 
 }  // namespace ctrl_more::correction

@@ -1,5 +1,6 @@
 #include "ctrl_more/documentation.hpp"
 
+#include <charconv>
 #include <cmath>
 #include <sstream>
 
@@ -14,10 +15,17 @@ std::string numberText(double value) {
   return out.str();
 }
 
-std::string listText(const std::vector<double>& values) {
-  if (values.size() == 1) return numberText(values[0]);
+// As few digits as give back the same number.
+std::string exactText(double value) {
+  char text[32];
+  const auto end = std::to_chars(text, text + sizeof text, value);
+  return std::string(text, end.ptr);
+}
+
+std::string listText(const std::vector<double>& values, std::string (*one)(double) = numberText) {
+  if (values.size() == 1) return one(values[0]);
   std::string text = "[";
-  for (std::size_t i = 0; i < values.size(); ++i) text += (i ? ", " : "") + numberText(values[i]);
+  for (std::size_t i = 0; i < values.size(); ++i) text += (i ? ", " : "") + one(values[i]);
   return text + "]";
 }
 
@@ -175,13 +183,13 @@ std::string configurationTemplate(const Description& d) {
   out << "type: " << d.type << "\n";
   if (!d.gains.empty()) out << "\n# Gains: read again by loadGains() while the controller runs.\n";
   for (const GainSpec& s : d.gains) {
-    out << s.name << ": " << listText(s.initial) << "  # [" << s.unit << "] "
+    out << s.name << ": " << listText(s.initial, exactText) << "  # [" << s.unit << "] "
         << rangeText(s.min, s.max) << "; " << s.text << "\n";
   }
   if (!d.settings.empty()) out << "\n# Settings: fixed when the controller is loaded.\n";
   for (const SettingSpec& s : d.settings) {
     const bool text = s.kind == SettingSpec::Kind::Text;
-    out << s.name << ": " << (text ? s.initial_text : listText(s.initial)) << "  # "
+    out << s.name << ": " << (text ? s.initial_text : listText(s.initial, exactText)) << "  # "
         << (text ? "" : "[" + s.unit + "] ") << s.text << "\n";
   }
   return out.str();

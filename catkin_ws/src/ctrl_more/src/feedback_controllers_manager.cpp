@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "manager_members.hpp"
+#include "record_exchange.hpp"
 #include "steady_now.hpp"
 
 namespace ctrl_more {
@@ -17,8 +18,8 @@ FeedbackControllersManager::FeedbackControllersManager(RobotStates& robot, Contr
       options_(options),
       logger_(logger ? logger : &Logger::standard()),
       log_(logger_, "FeedbackControllersManager", &cycle_number_),
-      original_(0, control.controlPeriod(), logger_),
-      found_(0, control.controlPeriod(), logger_) {}
+      records_(std::make_unique<RecordExchange>()),
+      original_(0, control.controlPeriod(), logger_) {}
 
 FeedbackControllersManager::~FeedbackControllersManager() {
   offered_.store(nullptr);
@@ -107,11 +108,14 @@ void FeedbackControllersManager::freeze() {
   robot_.freeze();
   control_.freeze();
   original_ = control_;
-  found_ = control_;
+  signals_ = control_.offsets();
+  found_.assign(control_.dataSize(), nullptr);
+  compared_.assign(control_.dataSize(), 0.0);
 }
 
 void FeedbackControllersManager::beginCycle(const Cycle& cycle) noexcept {
   cycle_ = cycle;
+  buffer_ = records_->begin();
   cycle_number_.store(cycle.number, std::memory_order_relaxed);
   if (original_.dataSize() != control_.dataSize() || !control_.frozen()) freeze();
   if (offered_.load(std::memory_order_relaxed) == nullptr) return;
@@ -145,20 +149,33 @@ void FeedbackControllersManager::updateStage(Stage stage, const RobotStates& rob
     return;
   }
   original_.copyValuesFrom(control);
-  found_.copyValuesFrom(control);
+  for (const int offset : signals_) found_[offset] = original_.data() + offset;
   runStage(stage, robot, control);
 }
 
 void FeedbackControllersManager::runStage(Stage stage, const RobotStates& robot,
                                           ControlStates& control) noexcept {
-  StageRun run{cycle_,           robot,          original_, control,
-               control.data(),   found_.data(),  options_.timed,
-               options_.check_undeclared, 0};
+  StageRun run{cycle_,
+               robot,
+               original_,
+               control,
+               control.data(),
+               found_.data(),
+               options_.check_undeclared ? compared_.data() : nullptr,
+               options_.timed,
+               buffer_,
+               static_cast<double>(cycle_.number),
+               0};
+  recorded_ = true;
   if (run.timed) run.boundary_ns = steadyNow();
-  for (ControllerSlot* slot : plan_->stages[static_cast<int>(stage)]) slot->run(run);
+  ControllerSlot::runAll(plan_->stages[static_cast<int>(stage)], run);
 }
 
-void FeedbackControllersManager::endCycle() noexcept {}
+void FeedbackControllersManager::endCycle() noexcept {
+  if (recorded_) recorded_cycle_[buffer_] = cycle_.number;
+  records_->end(recorded_);
+  recorded_ = false;
+}
 
 void FeedbackControllersManager::update(const Cycle& cycle, const RobotStates& robot,
                                         ControlStates& control) noexcept {

@@ -97,8 +97,13 @@ LoadReport FeedbackControllersManager::load(const ConfigNode& list, const std::s
     report.errors.push_back(text);
     logger_->log(LogLevel::Error, name_, text);
   };
+  // The cycle is offered the whole list at once, or nothing of it.
   const bool refuse_shared_before = refuse_shared_;
   const auto profiles_before = profiles_;
+  const auto order_before = order_;
+  const std::size_t members_before = members_.size();
+  std::optional<std::pair<RobotStates, ControlStates>> stores_before;
+  if (!robot_.frozen()) stores_before.emplace(robot_, control_);
   try {
     if (list.kind() != ConfigNode::Kind::Map) throw list.error("a list file must be a map");
     const ConfigNode* names = list.find("loadControllers");
@@ -138,7 +143,7 @@ LoadReport FeedbackControllersManager::load(const ConfigNode& list, const std::s
                            ":'" + suggestion(name, blocks));
         }
         const ControllerEntry entry = readEntry(name, *block, files);
-        const Status status = loadLocked(name, entry);
+        const Status status = loadLocked(name, entry, false);
         if (!status) throw block->error(status.message());
         report.loaded.push_back(name);
       } catch (const std::exception& e) {
@@ -157,16 +162,20 @@ LoadReport FeedbackControllersManager::load(const ConfigNode& list, const std::s
     refuse(e.what());
   }
   if (strict && !report.errors.empty()) {
-    for (const std::string& name : report.loaded) {
-      // Not yet enabled by anyone else: the lock has been held since it was loaded.
-      Draft draft = draftOf();
-      draft.states[indexOf(name)].enabled = false;
-      publish(draft);
-      unloadLocked(name);
+    for (std::size_t i = members_before; i < members_.size(); ++i) {
+      members_[i]->slot->setOwner(nullptr);
     }
-    report.loaded.clear();
+    members_.erase(members_.begin() + static_cast<std::ptrdiff_t>(members_before), members_.end());
+    order_ = order_before;
     profiles_ = profiles_before;
     refuse_shared_ = refuse_shared_before;
+    if (stores_before) {
+      robot_ = stores_before->first;
+      control_ = stores_before->second;
+    }
+    report.loaded.clear();
+  } else if (members_.size() > members_before) {
+    publish(draftOf());
   }
   return report;
 }
@@ -177,13 +186,14 @@ Status FeedbackControllersManager::loadController(const std::string& name,
   return loadLocked(name, entry);
 }
 
+// Without `offer` the cycle is not told: the caller publishes.
 Status FeedbackControllersManager::loadLocked(const std::string& name,
-                                              const ControllerEntry& entry) {
+                                              const ControllerEntry& entry, bool offer) {
   try {
     if (indexOf(name) >= 0) {
       return Status::failure("a controller named '" + name + "' is loaded already");
     }
-    return take(makeController(entry.library, entry.type), name, entry);
+    return take(makeController(entry.library, entry.type), name, entry, offer);
   } catch (const std::exception& e) {
     return Status::failure("controller '" + name + "': " + e.what());
   }
@@ -200,7 +210,7 @@ Status FeedbackControllersManager::addController(std::unique_ptr<FeedbackControl
 }
 
 Status FeedbackControllersManager::take(ControllerInstance instance, const std::string& name,
-                                        const ControllerEntry& entry) {
+                                        const ControllerEntry& entry, bool offer) {
   if (name.empty()) return Status::failure("a controller needs a name that is not empty");
   if (indexOf(name) >= 0) {
     return Status::failure("a controller named '" + name + "' is loaded already");
@@ -243,7 +253,9 @@ Status FeedbackControllersManager::take(ControllerInstance instance, const std::
     }
     ++next_owner_;
     before_last_.reset();
-    return publish(draft);
+    if (offer) return publish(draft);
+    order_ = draft.order;
+    return {};
   } catch (const std::exception& e) {
     undo();
     return Status::failure("controller '" + name + "': " + e.what());

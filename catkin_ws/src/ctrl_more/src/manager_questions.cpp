@@ -7,6 +7,7 @@
 #include "ctrl_more/config_node.hpp"
 #include "ctrl_more/documentation.hpp"
 #include "manager_members.hpp"
+#include "record_exchange.hpp"
 
 namespace ctrl_more {
 
@@ -133,8 +134,12 @@ std::vector<ControllerStatus> FeedbackControllersManager::statusAll() const {
 
 std::vector<Attribution> FeedbackControllersManager::attribution() const {
   const Lock lock(mutex_);
+  const unsigned buffer = records_->acquire();
+  const std::uint64_t cycle = recorded_cycle_[buffer];
   std::vector<Attribution> list;
-  for (const std::string& name : order_) member(name).slot->attribution(control_, list);
+  for (const std::string& name : order_) {
+    member(name).slot->attribution(control_, buffer, cycle, list);
+  }
   return list;
 }
 

@@ -101,8 +101,7 @@ std::shared_ptr<PluginLibrary> PluginLibrary::open(const std::string& path) {
   }
   const std::vector<std::string> refused = known.takeRefused();
   if (!refused.empty()) {
-    throw std::runtime_error("library " + file + " registers '" + joined(refused) +
-                             "', which is registered already; give its controller another name");
+    throw std::runtime_error("library " + file + " " + joined(refused));
   }
   if (library->types_.empty()) {
     throw std::runtime_error("library " + file +
@@ -211,14 +210,14 @@ std::string SearchPath::findLibraryOf(const std::string& type) const {
   }
   std::error_code no_error;
   for (const std::string& name : {"lib" + type + ".so", "libfbkCtrl" + type + ".so",
-                                  "libctrl_more_" + snake + ".so"}) {
+                                  "lib" + snake + ".so", "libctrl_more_" + snake + ".so"}) {
     for (const std::string& file : candidates(name)) {
       if (fs::is_regular_file(file, no_error)) return file;
     }
   }
   throw std::runtime_error("no libPath is given and no library of type '" + type +
-                           "' was found (lib" + type + ".so, libfbkCtrl" + type +
-                           ".so, libctrl_more_" + snake +
+                           "' was found (lib" + type + ".so, libfbkCtrl" + type + ".so, lib" +
+                           snake + ".so, libctrl_more_" + snake +
                            ".so); give libPath, searchPath or CTRL_MORE_PATH");
 }
 

@@ -3,10 +3,21 @@
 namespace ctrl_more {
 
 bool FeedbackControllerPrototypes::insert(
-    const std::pair<const std::string, FeedbackControllerMaker>& entry) {
-  const bool inserted = entry.second != nullptr && makers_.insert(entry).second;
-  if (!inserted) refused_.push_back(entry.first);
-  return inserted;
+    const std::pair<const std::string, FeedbackControllerMaker>& entry, const Abi& abi) {
+  const std::string what = "registers '" + entry.first + "'";
+  if (!(abi == thisAbi())) {
+    refused_.push_back(what + " compiled for another ctrl_more (" + abi.text() +
+                       "; this program has " + thisAbi().text() +
+                       "): build it again with the headers and the compiler of this program");
+    return false;
+  }
+  if (entry.second == nullptr) {
+    refused_.push_back(what + " without a maker");
+    return false;
+  }
+  if (makers_.insert(entry).second) return true;
+  refused_.push_back(what + ", which is registered already; give its controller another name");
+  return false;
 }
 
 void FeedbackControllerPrototypes::erase(const std::string& type, FeedbackControllerMaker maker) {
@@ -26,9 +37,9 @@ std::vector<std::string> FeedbackControllerPrototypes::types() const {
 }
 
 std::vector<std::string> FeedbackControllerPrototypes::takeRefused() {
-  std::vector<std::string> names;
-  names.swap(refused_);
-  return names;
+  std::vector<std::string> refused;
+  refused.swap(refused_);
+  return refused;
 }
 
 FeedbackControllerPrototypes& prototypes() {

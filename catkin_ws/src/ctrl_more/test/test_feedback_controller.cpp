@@ -88,6 +88,32 @@ TEST(FeedbackControllerTest, declarationSurvivesLoading) {
   EXPECT_TRUE(rig.manager->getUsedControlStates(true).empty());
 }
 
+TEST(FeedbackControllerTest, initializeIsCalledOnceAndMayRefuse) {
+  Rig rig;
+  int calls = 0;
+  auto c = adder("pose", "ee", 0.1);
+  c->on_initialize = [&calls](TestController& self, ctrl_more::Setup& setup) {
+    ++calls;
+    self.out = setup.modify("ee");
+  };
+  EXPECT_EQ(calls, 0) << "not by a constructor";
+  rig.add(std::move(c), "a");
+  rig.step(3);
+  rig.manager->disable("a");
+  rig.step();
+  rig.manager->enable("a");
+  rig.step();
+  EXPECT_EQ(calls, 1);
+  auto refusing = adder("pose", "ee", 0.1);
+  refusing->on_initialize = [](TestController&, ctrl_more::Setup&) {
+    throw std::runtime_error("no such camera");
+  };
+  const Status status = rig.manager->addController(std::move(refusing), "b");
+  EXPECT_FALSE(status);
+  EXPECT_TRUE(contains(status.message(), "no such camera")) << status.message();
+  EXPECT_FALSE(rig.manager->has("b"));
+}
+
 TEST(FeedbackControllerTest, askingForWhatIsNotDeclaredIsRefused) {
   Rig rig;
   for (int what = 0; what < 5; ++what) {

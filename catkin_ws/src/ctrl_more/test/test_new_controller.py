@@ -20,42 +20,49 @@ def run(*command: str | Path, **options) -> subprocess.CompletedProcess:
     )
 
 
-def core_library() -> Path:
-    """The built core library in the workspace that was sourced."""
+def need_workspace() -> None:
+    """Skips unless a workspace with ctrl_more is sourced."""
     for prefix in os.environ.get("CMAKE_PREFIX_PATH", "").split(":"):
-        library = Path(prefix) / "lib" / "libctrl_more.so"
-        if prefix and library.is_file():
-            return library
+        if prefix and (Path(prefix) / "lib" / "libctrl_more.so").is_file():
+            return
     pytest.skip("ctrl_more is not built: source the workspace's setup file first")
 
 
 def test_new_controller_compiles_is_tested_and_documented(tmp_path: Path) -> None:
-    library = core_library()
+    need_workspace()
     made = run(sys.executable, SCRIPT, "WristDamper", "--into", tmp_path)
     assert made.returncode == 0, made.stderr
     folder = tmp_path / "wrist_damper"
     left = [p for p in folder.rglob("*") if p.is_file() and "@" in p.name + p.read_text()
             and "example.org" not in p.read_text()]
     assert not left, left
-    environment = dict(
-        os.environ, CTRL_MORE_LIB_DIR=str(library.parent),
-        CTRL_MORE_INCLUDE_DIR=str(PACKAGE / "include"),
-    )
     build = folder / "build"
-    configured = run("cmake", "-S", folder, "-B", build, env=environment)
+    configured = run("cmake", "-S", folder, "-B", build)
     assert configured.returncode == 0, configured.stdout + configured.stderr
-    built = run("cmake", "--build", build, env=environment)
+    built = run("cmake", "--build", build)
     assert built.returncode == 0, built.stdout + built.stderr
     assert "warning" not in built.stdout + built.stderr
-    tested = run("ctest", "--test-dir", build, "--output-on-failure", env=environment)
+    tested = run("ctest", "--test-dir", build, "--output-on-failure")
     assert tested.returncode == 0, tested.stdout
-    describe = library.parent / "ctrl_more" / "ctrl_more_describe"
+    assert "wrist_damper_test_controller" in tested.stdout
+    # In the PATH of a sourced workspace.
     plugin = build / "libwrist_damper.so"
-    assert run(describe, "check", plugin).returncode == 0
-    page = run(describe, "page", plugin)
+    assert run("ctrl_more_describe", "check", plugin).returncode == 0
+    page = run("ctrl_more_describe", "page", plugin)
     assert page.stdout.startswith("# WristDamper\n")
-    config = run(describe, "config", plugin)
+    assert all(f"## {part}" in page.stdout for part in ("Use", "When to apply it", "Limitations",
+                                                        "Robot signals", "Control signals"))
+    config = run("ctrl_more_describe", "config", plugin)
     assert "k: 0.5" in config.stdout
+    # Outside of the folder it was made in: found by its name in CTRL_MORE_PATH.
+    elsewhere = tmp_path / "list.yaml"
+    elsewhere.write_text("loadControllers: [mine]\nmine: {type: WristDamper}\n")
+    checked = run("ctrl_more_describe", "list", elsewhere,
+                  env=dict(os.environ, CTRL_MORE_PATH=str(build)))
+    assert checked.returncode == 0, checked.stderr
+    assert "mine (WristDamper" in checked.stdout
+    lost = run("ctrl_more_describe", "list", elsewhere)
+    assert lost.returncode == 1 and "no library of type 'WristDamper'" in lost.stderr
 
 
 @pytest.mark.parametrize("name", ["wristDamper", "Wrist-Damper", "", "9Lives", "../Up", "X"])

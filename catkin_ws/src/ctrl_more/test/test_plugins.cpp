@@ -17,7 +17,7 @@ std::string library(const std::string& name) { return kPlugins + "/lib" + name +
 
 struct Plugins : ::testing::Test {
   Rig rig{0.0, false, false};
-  LoadReport load(const std::string& yaml, bool strict = false) {
+  LoadReport load(const std::string& yaml, bool strict = true) {
     return rig.manager->load(ConfigNode::fromText(yaml, "list.yaml"), kPlugins, strict);
   }
   void expectRefused(const std::string& yaml, const std::vector<std::string>& parts) {
@@ -102,6 +102,9 @@ TEST_F(Plugins, badLibrariesAreRefusedInWords) {
   expectRefused("loadControllers: [A]\nA: {libPath: libthrowing.so}\n", {"no such camera"});
   expectRefused("loadControllers: [A]\nA: {libPath: libwrong_type.so}\n",
                 {"'Registered'", "'Described'"});
+  expectRefused("loadControllers: [A]\nA: {libPath: libother_abi.so}\n",
+                {"'OtherAbi' compiled for another ctrl_more", "interface 2", "interface 1",
+                 "build it again"});
   expectRefused("loadControllers: [A]\nA: {libPath: libgood.so, type: God}\n",
                 {"no controller of type 'God'", "did you mean 'Good'"});
   EXPECT_TRUE(prototypes().types().empty()) << "nothing stays behind";
@@ -125,16 +128,38 @@ TEST_F(Plugins, twoInstancesOfOneLibrary) {
   EXPECT_EQ(rig.control.getZMP()[0], 2.0);
 }
 
-TEST_F(Plugins, oneBadControllerDoesNotKeepOthersOut) {
+TEST_F(Plugins, allOrNothingUnlessTheRestIsAskedFor) {
   const std::string yaml =
       "loadControllers: [Bad, Good]\nBad: {libPath: libnone.so}\nGood: {libPath: libgood.so}\n";
-  const LoadReport strict = load(yaml, true);
+  const LoadReport strict = load(yaml);
   EXPECT_FALSE(strict.ok());
   EXPECT_TRUE(strict.loaded.empty());
   EXPECT_TRUE(rig.manager->getControllersNames().empty());
-  const LoadReport lenient = load(yaml);
+  const LoadReport lenient = load(yaml, false);
   EXPECT_EQ(lenient.loaded, std::vector<std::string>{"Good"});
   EXPECT_EQ(lenient.errors.size(), 1u);
+}
+
+TEST_F(Plugins, refusedListIsNeverSeenByARunningCycle) {
+  rig.step();  // frozen
+  const LoadReport report = load(
+      "loadControllers: [Good, Bad]\nGood: {libPath: libgood.so, enabled: true}\n"
+      "Bad: {libPath: libnone.so}\nprofiles: {mine: [Good]}\n");
+  EXPECT_EQ(report.errors.size(), 1u);
+  EXPECT_TRUE(report.loaded.empty());
+  EXPECT_EQ(prototypes().find("Good"), nullptr) << "its library is closed";
+  EXPECT_FALSE(rig.manager->hasProfile("mine"));
+  rig.step(2);
+  EXPECT_EQ(rig.control.getZMP()[0], 0.0);
+  ASSERT_TRUE(load("loadControllers: [Good]\nGood: {libPath: libgood.so, enabled: true}\n").ok());
+  rig.step();
+  EXPECT_EQ(rig.control.getZMP()[0], 1.0);
+}
+
+TEST_F(Plugins, refusedListLeavesNoKeyBehind) {
+  load("loadControllers: [Limits, Bad]\nLimits: {type: JointLimits, libPath: " + kController +
+       "/libctrl_more_joint_limits.so}\nBad: {libPath: libnone.so}\n");
+  EXPECT_FALSE(rig.robot.find(RobotSource::Measured, "joint_position").valid());
 }
 
 TEST_F(Plugins, wrongFilesAreRefusedWithTheirLine) {
@@ -156,10 +181,12 @@ TEST_F(Plugins, wrongFilesAreRefusedWithTheirLine) {
 }
 
 TEST_F(Plugins, sharedSignalsCanBeRefused) {
-  expectRefused("loadControllers: [left, right]\nsharedSignals: refuse\n"
-                "left: {libPath: libgood.so, enabled: true}\n"
-                "right: {libPath: libgood.so, enabled: true}\n",
-                {"both modify zmp/zmp", "sharedSignals is refuse"});
+  const std::string yaml =
+      "loadControllers: [left, right]\nsharedSignals: refuse\n"
+      "left: {libPath: libgood.so, enabled: true}\nright: {libPath: libgood.so, enabled: true}\n";
+  expectRefused(yaml, {"both modify zmp/zmp", "sharedSignals is refuse"});
+  EXPECT_FALSE(rig.manager->has("left"));
+  EXPECT_FALSE(load(yaml, false).ok());
   EXPECT_TRUE(rig.manager->has("left"));
   EXPECT_FALSE(rig.manager->has("right"));
 }

@@ -95,12 +95,13 @@ TEST(Realtime, nothingForbiddenIn100000CyclesWith10000PlanChanges) {
   });
 
   std::mt19937 random(1);
-  std::uint64_t adopted = 0, faults = 0;
+  std::uint64_t adopted = 0, reorders = 0, reloads = 0, faults = 0;
   int changes = 0;
   while (cycles.load() < 100000 || adopted < 10000) {
     const std::string& name = names[random() % names.size()];
     Status status;
-    switch (random() % 8) {
+    const int kind = static_cast<int>(random() % 8);
+    switch (kind) {
       case 0: status = rig.manager->disable(name); break;
       case 1: status = rig.manager->enable(); break;
       case 2: status = rig.manager->pause(name); break;
@@ -116,7 +117,11 @@ TEST(Realtime, nothingForbiddenIn100000CyclesWith10000PlanChanges) {
       case 7: status = rig.manager->resumeAllUsingRobotState("imu"); break;
     }
     ASSERT_TRUE(status) << status.message();
-    if (rig.manager->waitAdopted(status.generation(), 1.0)) ++adopted;
+    if (rig.manager->waitAdopted(status.generation(), 1.0)) {
+      ++adopted;
+      reorders += kind == 4;
+      reloads += kind == 5;
+    }
     if (++changes % 500 == 0) {
       throw_now = true;
       rig.manager->enable("c50");
@@ -131,13 +136,18 @@ TEST(Realtime, nothingForbiddenIn100000CyclesWith10000PlanChanges) {
   run = false;
   cycle_thread.join();
   const auto number = [](std::uint64_t n) { return static_cast<unsigned long long>(n); };
-  std::printf("cycles %llu, plans adopted %llu, faults %llu, allocations %llu, locks %llu, "
-              "syscalls %llu, allocations of throws %llu\n",
-              number(cycles.load()), number(adopted), number(faults), number(counts.allocations),
-              number(counts.locks), number(counts.syscalls), number(counts.of_throw));
+  std::printf("cycles %llu, plans adopted %llu, reorders %llu, reloads %llu, faults %llu, "
+              "allocations %llu, locks %llu, syscalls %llu, allocations of throws %llu\n",
+              number(cycles.load()), number(adopted), number(reorders), number(reloads),
+              number(faults), number(counts.allocations), number(counts.locks),
+              number(counts.syscalls), number(counts.of_throw));
   EXPECT_EQ(counts.allocations, 0u);
   EXPECT_EQ(counts.locks, 0u);
   EXPECT_EQ(counts.syscalls, 0u);
+  EXPECT_GE(cycles.load(), 100000u);
+  EXPECT_GE(adopted, 10000u);
+  EXPECT_GE(reorders, 100u);
+  EXPECT_GE(reloads, 100u);
   EXPECT_GE(faults, 1u) << "a fault was among them";
 }
 

@@ -26,7 +26,7 @@ function(ctrl_more_add_test name)
 endfunction()
 
 # Libraries that a manager must cope with.
-foreach(plugin good none two again paper_maker unresolved throwing wrong_type)
+foreach(plugin good none two again paper_maker unresolved throwing wrong_type other_abi)
   add_library(ctrl_more_test_plugin_${plugin} SHARED EXCLUDE_FROM_ALL test/plugins/${plugin}.cpp)
   target_link_libraries(ctrl_more_test_plugin_${plugin} PRIVATE ctrl_more)
   set_target_properties(ctrl_more_test_plugin_${plugin} PROPERTIES
@@ -35,23 +35,20 @@ foreach(plugin good none two again paper_maker unresolved throwing wrong_type)
   list(APPEND CTRL_MORE_TEST_PLUGINS ctrl_more_test_plugin_${plugin})
 endforeach()
 
-ctrl_more_add_test(states test/test_robot_states.cpp test/test_control_states.cpp)
-ctrl_more_add_test(manager test/test_feedback_controller.cpp test/test_manager.cpp)
-ctrl_more_add_test(isolation test/test_isolation.cpp test/test_blending.cpp)
-ctrl_more_add_test(plugins test/test_plugins.cpp test/test_documentation.cpp)
-ctrl_more_add_test(config test/test_config.cpp test/test_config_fuzz.cpp)
-ctrl_more_add_test(logger test/test_logger.cpp)
-ctrl_more_add_test(central_module test/test_central_module.cpp)
-ctrl_more_add_test(controllers
-  test/test_attitude.cpp test/test_compliant_stabiliser.cpp test/test_zmp_dcm.cpp
-  test/test_ee_admittance.cpp test/test_joint_limits.cpp test/test_three_robots.cpp)
+# One program per file, named after it: the test runner looks for them.
+foreach(name robot_states control_states feedback_controller manager isolation blending plugins
+    documentation config config_fuzz logger central_module attitude compliant_stabiliser zmp_dcm
+    ee_admittance joint_limits three_robots)
+  ctrl_more_add_test(${name} test/test_${name}.cpp)
+endforeach()
 ctrl_more_add_test(realtime test/test_realtime.cpp test/forbidden_calls.cpp)
-foreach(name plugins config central_module)
+foreach(name plugins config_fuzz central_module)
   if(TARGET ctrl_more_test_${name})
     add_dependencies(ctrl_more_test_${name} ${CTRL_MORE_TEST_PLUGINS})
   endif()
 endforeach()
-foreach(name plugins config central_module controllers realtime)
+foreach(name plugins documentation central_module attitude compliant_stabiliser zmp_dcm ee_admittance
+    joint_limits three_robots realtime)
   if(TARGET ctrl_more_test_${name})
     add_dependencies(ctrl_more_test_${name} ${CTRL_MORE_PLUGINS})
   endif()

@@ -171,6 +171,7 @@ void FeedbackRos::publishStatus() {
     entry.stage = ctrl_more::nameOf(controller.stage);
     entry.enabled = controller.enabled;
     entry.paused = controller.paused;
+    entry.activity = ctrl_more::nameOf(controller.activity);
     entry.pause_reasons = controller.reasons;
     entry.fault = controller.fault_text;
     entry.faults = controller.faults;

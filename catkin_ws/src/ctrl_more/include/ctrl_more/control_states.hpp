@@ -153,6 +153,9 @@ class ControlStates {
   /// Number of doubles in the buffer.
   int dataSize() const { return static_cast<int>(data_.size()); }
 
+  /// First double of each signal, ascending.
+  std::vector<int> offsets() const;
+
   /// Copies all numbers of a store with the same layout. No allocation.
   void copyValuesFrom(const ControlStates& other);
   /// @}

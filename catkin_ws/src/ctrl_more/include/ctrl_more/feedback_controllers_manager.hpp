@@ -25,6 +25,7 @@
 namespace ctrl_more {
 
 class ControllerSlot;
+class RecordExchange;
 struct Plan;
 
 /// How a manager runs its controllers.
@@ -193,8 +194,9 @@ class FeedbackControllersManager : public Manager, private ControllerOwner {
   GainValues getGains(const std::string& name) const;   ///< gains as last requested
   ControllerStatus status(const std::string& name) const;  ///< one
   std::vector<ControllerStatus> statusAll() const;         ///< all, in execution order
-  /// Who changed which reference by how much in the last completed run of each controller, in
-  /// execution order; controllers that are off are left out.
+  /// Who changed which reference by how much in the last complete cycle, in execution order;
+  /// controllers that are off are left out. Waits for the end of the cycle that is running, 50 ms
+  /// at most.
   std::vector<Attribution> attribution() const;
   void plot(const std::string& name, std::ostream& out) const;  ///< one controller
   void plotAll(std::ostream& out) const;                        ///< all, in execution order
@@ -288,12 +290,18 @@ class FeedbackControllersManager : public Manager, private ControllerOwner {
   std::atomic<const Plan*> prepared_{nullptr};  // as offered_, but only by adoptPrepared()
   std::atomic<std::uint64_t> acknowledged_{0};
   std::atomic<std::uint64_t> cycle_number_{0};
+  std::unique_ptr<RecordExchange> records_;
+  std::uint64_t recorded_cycle_[2] = {0, 0};  // of each buffer; belongs to who has the buffer
 
   // cycle side
+  unsigned buffer_ = 0;    // of records, in this cycle
+  bool recorded_ = false;  // anything in this cycle
   const Plan* plan_ = nullptr;
   Cycle cycle_;
   ControlStates original_;
-  ControlStates found_;  // the references as the controller that runs found them
+  std::vector<int> signals_;          // first double of each signal in the control buffer
+  std::vector<const double*> found_;  // for these: where it is as the next controller finds it
+  std::vector<double> compared_;      // of the test mode
 };
 
 }  // namespace ctrl_more

@@ -71,7 +71,8 @@ class SearchPath {
   std::string find(const std::string& name) const;
 
   /// The library of a type when the list file gives no `libPath`: `lib<Type>.so`,
-  /// `libfbkCtrl<Type>.so` or `libctrl_more_<type_in_snake_case>.so`; throws std::runtime_error.
+  /// `libfbkCtrl<Type>.so`, `lib<type_in_snake_case>.so` or `libctrl_more_<type_in_snake_case>.so`;
+  /// throws std::runtime_error.
   std::string findLibraryOf(const std::string& type) const;
 
  private:

@@ -5,6 +5,7 @@
 #include <utility>
 #include <vector>
 
+#include "ctrl_more/abi.hpp"
 #include "ctrl_more/feedback_controller.hpp"
 
 namespace ctrl_more {
@@ -21,8 +22,12 @@ class FeedbackControllerPrototypes {
  public:
   /// Registers a maker under a type name, as the paper's listing does:
   /// `feedbackControllerPrototypes.insert({"MyController", feedbackExampleMaker});`
-  /// @return false, and a note in refused(), if the name is known already
-  bool insert(const std::pair<const std::string, FeedbackControllerMaker>& entry);
+  /// @param entry type name and maker
+  /// @param abi what the caller was compiled with; leave it out
+  /// @return false, and a note for the loader, if the name is known already or the ABI is another
+  ///         one
+  bool insert(const std::pair<const std::string, FeedbackControllerMaker>& entry,
+              const Abi& abi = thisAbi());
 
   /// Removes a type name, if its maker is this one.
   void erase(const std::string& type, FeedbackControllerMaker maker);
@@ -33,7 +38,7 @@ class FeedbackControllerPrototypes {
   /// All known type names, sorted.
   std::vector<std::string> types() const;
 
-  /// Names that were refused since the last call; the list is emptied.
+  /// What was refused since the last call, one clause each; the list is emptied.
   std::vector<std::string> takeRefused();
 
  private:
@@ -53,9 +58,10 @@ FeedbackControllerPrototypes& prototypes();
 class PrototypeRegistration {
  public:
   /// Inserts.
-  PrototypeRegistration(const char* type, FeedbackControllerMaker maker)
+  PrototypeRegistration(const char* type, FeedbackControllerMaker maker,
+                        const Abi& abi = thisAbi())
       : type_(type), maker_(maker) {
-    prototypes().insert({type_, maker_});
+    prototypes().insert({type_, maker_}, abi);
   }
   /// Erases.
   ~PrototypeRegistration() { prototypes().erase(type_, maker_); }
