@@ -21,11 +21,12 @@ START_LIMIT, REACH_LIMIT, WATCHED = 10.0, 6.0, 1.5  # s of simulated time
 @dataclass
 class LockstepReach:
     """Distance of the hand from its goal when it stands (m), time until it stood (s), largest joint speed over its
-    limit."""
+    limit: of the set-point that the bridge sends, and of the arm behind its servos."""
 
     last: float
     duration: float
     over: float
+    arm_over: float
 
 
 def wait(robot, condition, limit: float) -> None:
@@ -70,14 +71,18 @@ def reach(posture: np.ndarray, goal: np.ndarray, target: np.ndarray, limit: np.n
     )
     if not answer[0]:
         return answer[1]
-    begin, over, reached, stood = robot.now, 0.0, None, None
+    begin, over, arm_over, reached, stood = robot.now, 0.0, 0.0, None, None
+    before = robot.report()["commanded_position"]
     while reached is None or robot.now - reached < WATCHED:
         robot.set_frame("goal", goal, target)
         for _ in range(round(FRAME_PERIOD / PERIOD)):
             robot.tick()
             speed = float(np.max(np.abs(robot.cell.velocity) / limit))
-            over = max(over, speed)
-        report = robot.report()
+            arm_over = max(arm_over, speed)
+            report = robot.report()
+            set_point = report["commanded_position"]
+            over = max(over, float(np.max(np.abs(set_point - before) / (PERIOD * limit))))
+            before = set_point
         if report["motion"] == "aborted":
             return report["reason"]
         if report["motion"] == "reached" and reached is None:
@@ -86,4 +91,4 @@ def reach(posture: np.ndarray, goal: np.ndarray, target: np.ndarray, limit: np.n
             return report["reason"] or "the motion waits at a border of the workspace"
         stood = (stood or robot.now) if speed < 1e-3 else None
     hand = robot.cell.truth()["robot_hand"]["position"]
-    return LockstepReach(float(np.linalg.norm(hand - goal)), (stood or robot.now) - begin, over)
+    return LockstepReach(float(np.linalg.norm(hand - goal)), (stood or robot.now) - begin, over, arm_over)

@@ -163,7 +163,7 @@ def test_golden_files_mean_the_same_as_in_cpp() -> None:
 def test_the_packages_primitives_reach_their_goals() -> None:
     library = cc.Library()
     assert library.load(str(PACKAGE / "config" / "primitives.xml")) == 5
-    assert library.ids() == ["give_human", "put_board", "reach_human", "take_board"]
+    assert library.ids() == ["give_human", "put_board", "reach_human", "reach_human_high", "take_board"]
     rng = np.random.default_rng(2)
     for name in library.ids():
         for _ in range(20):
