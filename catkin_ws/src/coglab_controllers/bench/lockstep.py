@@ -44,10 +44,13 @@ def must(answer: tuple) -> None:
         raise RuntimeError(answer[1])
 
 
-def ready(posture: np.ndarray):
-    """The whole robot in virtual time, standing in a posture in command mode, with the DMP plug-in active."""
+def ready(posture: np.ndarray, manager: str = ""):
+    """The whole robot in virtual time, standing in a posture in command mode, with the DMP plug-in active.
+
+    `manager`: YAML text of the controller manager's parameters.
+    """
     cell = {"krc/period": PERIOD, "seed": 1, "home": [float(q) for q in posture]}
-    robot = _virtual.VirtualRobot(str(URDF), str(LIMITS), cell)
+    robot = _virtual.VirtualRobot(str(URDF), str(LIMITS), cell, manager)
     must(robot.load_controller("dmp", "coglab/DmpController"))
     must(robot.load_dmps(str(PRIMITIVES)))
     wait(robot, lambda: robot.cell.quality == 3, START_LIMIT)

@@ -103,8 +103,14 @@ class Robot:
                    "datagrams of the robot controller")
         if self.state.motion_allowed:
             return
-        answer = self.call("lwr/command", LwrCommand, "start")
-        assert answer.success, answer.message
+        answers: list[str] = []
+
+        def started() -> bool:  # on a busy machine datagrams may pause for a moment
+            answer = self.call("lwr/command", LwrCommand, "start")
+            answers.append(answer.message)
+            return answer.success
+
+        wait_until(started, 20.0, f"start: {answers[-1:]}")
         wait_until(lambda: self.state.motion_allowed, 10.0, "motion allowed")
 
     def load(self) -> None:

@@ -11,6 +11,14 @@ namespace {
 // Below this share of the request the motion counts as held up.
 constexpr double kBlockedScale = 0.01;
 
+// Kept back of a Cartesian speed limit, m/s, at most this share: joints that follow their target
+// velocities with different lags, and the arm behind its servos, add so much for a moment.
+constexpr double kSpeedMargin = 0.035, kLargestMargin = 0.15;
+
+double bound(double speed_limit) noexcept {
+  return speed_limit - std::min(kSpeedMargin, kLargestMargin * speed_limit);
+}
+
 // Speed v with which one can still stop within `room`: v^2 / (2 a) + v * lag = room.
 double stoppingSpeed(double room, double acceleration, double lag) noexcept {
   if (room <= 0.0) return 0.0;
@@ -104,11 +112,11 @@ void Guard::limit(const ChainState& state, const JointVector& q, const JointVect
   }
   if (parameters_.hand_speed > 0.0) {
     const double speed = (state.jacobian.topRows<3>() * request).norm();
-    bind(speed, parameters_.hand_speed, GuardReason::HandSpeed, -1, WorkspaceBorder::None);
+    bind(speed, bound(parameters_.hand_speed), GuardReason::HandSpeed, -1, WorkspaceBorder::None);
   }
   if (parameters_.elbow_speed > 0.0) {
     const double speed = Chain::originVelocity(state, chain_.elbowJoint(), request).norm();
-    bind(speed, parameters_.elbow_speed, GuardReason::ElbowSpeed, -1, WorkspaceBorder::None);
+    bind(speed, bound(parameters_.elbow_speed), GuardReason::ElbowSpeed, -1, WorkspaceBorder::None);
   }
   std::array<Workspace::Margin, Workspace::kBorders> margins;
   workspace_.margins(chain_, state, request, margins);

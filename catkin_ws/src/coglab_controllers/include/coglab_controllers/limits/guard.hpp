@@ -16,7 +16,8 @@ struct GuardParameters {
       JointVector::Constant(10.0);                  ///< rad/s^2 with which the interpolator brakes
   JointVector jerk = JointVector::Constant(500.0);  ///< rad/s^3 with which the interpolator brakes
   double position_margin = 0.01;                    ///< rad kept free before a joint's stop
-  double hand_speed = 1.0;                          ///< m/s of the tip; 0: no limit
+  double hand_speed = 1.0;                          ///< m/s of the tip, what the arm behind its
+                                                    ///< servos adds included; 0: no limit
   double elbow_speed = 1.0;                         ///< m/s of the elbow; 0: no limit
   double workspace_deceleration =
       2.0;  ///< m/s^2 with which a border of the workspace is approached at most

@@ -1,0 +1,63 @@
+"""Cartesian speed limits as the arm keeps them: the whole robot in virtual time, speeds of the simulated arm itself."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+cc = pytest.importorskip("coglab_controllers", reason="coglab_controllers is not built or the environment not sourced")
+pytest.importorskip("coglab_sim._virtual", reason="coglab_sim is not built")
+
+PACKAGE = Path(__file__).resolve().parent.parent
+sys.path.insert(0, str(PACKAGE / "bench"))
+import lockstep  # noqa: E402  (the bench's way to get a robot ready)
+
+HOME = np.array([-1.4349, -0.6086, 1.4986, 1.7048, 0.1857, 0.2152, 0.782])
+LIMIT, ELBOW = 0.25, 3
+
+
+@pytest.fixture(scope="module")
+def chain() -> cc.Chain:
+    return cc.Chain(lockstep.URDF.read_text())
+
+
+def fastest(robot, chain: cc.Chain, seconds: float) -> tuple[float, float]:
+    """Largest speeds of hand and elbow of the simulated arm, m/s."""
+    hand, elbow = 0.0, 0.0
+    for _ in range(round(seconds / lockstep.PERIOD)):
+        robot.set_frame("goal", [0.80, 0.0, 0.45])
+        robot.tick()
+        truth = robot.cell.truth()
+        q, velocity = np.asarray(truth["position"]), np.asarray(truth["velocity"])
+        hand = max(hand, float(np.linalg.norm(chain.jacobian(q)[:3] @ velocity)))
+        ahead = chain.joint_origins(q + 1e-6 * velocity)[ELBOW] - chain.joint_origins(q)[ELBOW]
+        elbow = max(elbow, float(np.linalg.norm(ahead)) / 1e-6)
+    return hand, elbow
+
+
+@pytest.mark.parametrize("ratio", [0.4, 0.7, 1.0])
+def test_a_reach_keeps_the_limits_of_the_real_arm(chain: cc.Chain, ratio: float) -> None:
+    robot = lockstep.ready(HOME, f"{{hand_speed_limit: {LIMIT}, elbow_speed_limit: {LIMIT}}}")
+    robot.set_frame("goal", [0.80, 0.0, 0.45])
+    answer = robot.execute_dmp("reach_human", dmp_ratio=ratio, goal_frame="goal")
+    assert answer[0], answer[1]
+    hand, elbow = fastest(robot, chain, 4.0)
+    assert max(hand, elbow) <= LIMIT
+    assert hand > 0.75 * LIMIT, "the limit was reached, or this shows nothing"
+    assert robot.report()["motion"] == "reached"
+
+
+def test_a_point_to_point_motion_keeps_them_too(chain: cc.Chain) -> None:
+    robot = lockstep.ready(HOME, f"{{hand_speed_limit: {LIMIT}, elbow_speed_limit: {LIMIT}}}")
+    lockstep.must(robot.load_controller("ptp", "coglab/PtpController"))
+    lockstep.must(robot.switch_controller("ptp"))
+    target = HOME + np.array([0.8, 0.0, 0.0, 0.2, 0.0, 0.0, 0.0])
+    status, _, message = robot.add_ptp(list(target), [1.5] * 7)
+    assert status == 0, message
+    hand, elbow = fastest(robot, chain, 6.0)
+    assert max(hand, elbow) <= LIMIT
+    assert hand > 0.75 * LIMIT
+    assert np.abs(robot.report()["position"] - target).max() < 3e-3
