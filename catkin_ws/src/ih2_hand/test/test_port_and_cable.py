@@ -34,14 +34,14 @@ def server(tmp_path):
     thread.start()
     yield server
     server.shutdown()
-    thread.join(5.0)
+    thread.join(15.0)
     assert not thread.is_alive()
 
 
 @pytest.fixture
 def driver(server):
     # A busy machine may hold the emulator's thread back for longer than a hand ever takes.
-    with HandSerialDriver(server.path, read_timeout=0.3) as driver:
+    with HandSerialDriver(server.path, read_timeout=0.5) as driver:
         yield driver
 
 
@@ -77,12 +77,12 @@ def test_slow_answers_within_the_limit(server, driver):
 
 
 def test_answers_slower_than_the_limit_end_in_one_exception(server, driver):
-    server.fault("slow 800")
+    server.fault("slow 1300")
     with pytest.raises(HandTimeoutError, match="last byte received 0x08"):
         driver.get_finger_status(1)
     assert driver.counters.retries == 1
     server.fault("clear")
-    time.sleep(1.0)
+    time.sleep(1.5)
     assert driver.get_finger_status(1)["mode"] == "stop"
     assert driver.get_finger_position(1) == 0
 
@@ -113,7 +113,7 @@ def test_silence(server, driver):
     with pytest.raises(HandTimeoutError, match=f"hand on {server.path} gave no complete answer"):
         driver.get_finger_position(1)
     assert driver.counters.fillers == 2
-    assert time.monotonic() - started >= 0.6
+    assert time.monotonic() - started >= 1.0
 
 
 def test_unplugged_cable_names_port_and_last_byte(server, driver):
