@@ -231,6 +231,7 @@ class LwrNode(unittest.TestCase):
         """Another bridge with a controller of its own, moving A1 at 0.5 rad/s."""
         rospy.set_param(f"/{name}/fri_port", 0)
         rospy.set_param(f"/{name}/rt_priority", 0)
+        rospy.set_param(f"/{name}/receive_timeout", 2.0)  # of a controller played in Python
         node = subprocess.Popen(
             [node_binary(), f"__name:={name}", f"_lwr_namespace:=/{name}"], env=os.environ
         )
