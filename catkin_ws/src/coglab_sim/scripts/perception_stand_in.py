@@ -28,10 +28,11 @@ from coglab_msgs.srv import (
     LocateObject,
     LocateObjectResponse,
 )
+from coglab_perception.frames import FrameNames
 from coglab_sim.perception_stand_in import Board, PerceptionSettings, Sight
 from coglab_sim.recorded_motion import Playback, PlaybackSettings
 from coglab_sim.rigid import Frame, quat_from_rotvec
-from coglab_sim.vision import Names, NotSeen, Vision
+from coglab_sim.vision import NotSeen, Vision
 from geometry_msgs.msg import Point, PoseStamped, Quaternion, TransformStamped, Vector3
 from std_msgs.msg import UInt8
 
@@ -46,21 +47,12 @@ def frame_of(pose) -> Frame:
     return Frame(np.array([p.x, p.y, p.z]), np.array([q.x, q.y, q.z, q.w]))
 
 
-def names_of(mapping) -> Names:
-    """Frame names from the parameter; KeyError with a sentence if one is missing."""
-    roles = ("world", "human_hand", "board", "object")
-    missing = [role for role in roles if not mapping.get(role)]
-    if missing:
-        raise KeyError(f"~frames lacks {', '.join(missing)}: load coglab_perception's "
-                       "config/frames.yaml into perception/frames")
-    return Names(*(str(mapping[role]) for role in roles))
-
-
 class PerceptionNode:
     """Thin node over Vision and Playback."""
 
     def __init__(self) -> None:
-        names = names_of(dict(rospy.get_param("~frames", {})))
+        names = FrameNames.from_mapping(rospy.get_param("~frames", None),
+                                        rospy.resolve_name("~frames"))
         settings = dict(rospy.get_param("~settings", {}))
         settings["perfect"] = bool(rospy.get_param("~perfect", settings.get("perfect", False)))
         seed = int(rospy.get_param("~seed", rospy.get_param("coglab_sim/seed", 7)))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from coglab_perception.frames import FrameNames
 from coglab_sim.recorded_motion import (
     Playback,
     PlaybackSettings,
@@ -11,7 +12,6 @@ from coglab_sim.recorded_motion import (
     load_recording,
 )
 from coglab_sim.rigid import Frame, quat_from_rotvec, quat_rotate
-from coglab_sim.vision import Names
 
 STAMPS = 100.0 + np.arange(0.0, 1.01, 0.1)
 POSITIONS = np.column_stack([1.3 - 0.4 * (STAMPS - 100.0), 0.2 + 0.1 * (STAMPS - 100.0),
@@ -126,7 +126,7 @@ def test_mirror_turn_and_anchor(tmp_path):
 
 
 def test_of_a_bag_only_what_a_tracker_sees(tmp_path):
-    names = Names("world", "human_hand", "board", "object_{id}")
+    names = FrameNames("world", "human_hand", "board", "object_{id}")
     path = write_bag(tmp_path / "all.bag", frames=("human_hand", "object_mug", "dmp_goal", "board"))
     play = Playback.open(PlaybackSettings(file=path), "world", names.is_tracked)
     assert sorted(play.names) == ["human_hand", "object_mug"]

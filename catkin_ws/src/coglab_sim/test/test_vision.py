@@ -7,11 +7,12 @@ import time
 
 import numpy as np
 import pytest
+from coglab_perception.frames import FrameNames
 from coglab_sim.perception_stand_in import Board, PerceptionSettings
 from coglab_sim.rigid import Frame
-from coglab_sim.vision import Names, NotSeen, PartnerChoice, Vision
+from coglab_sim.vision import NotSeen, PartnerChoice, Vision
 
-NAMES = Names("world", "human_hand", "board", "object_{id}")
+NAMES = FrameNames("world", "human_hand", "board", "object_{id}")
 SLOTS = {"A1": np.zeros(3), "A2": np.array([0.0, 0.15, 0.0])}
 ROBOT = Frame(np.array([0.5, 0.0, 0.4]))
 NEAR, BESIDE, FAR = (Frame(np.array(place)) for place in

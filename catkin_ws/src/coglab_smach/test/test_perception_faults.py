@@ -11,13 +11,14 @@ try:
     from virtual_rig import BOARD
 except ImportError as error:
     pytest.skip(f"a compiled module is not there: {error}", allow_module_level=True)
+from coglab_perception.frames import FrameNames
 from coglab_sim.perception_stand_in import Board, PerceptionSettings
 from coglab_sim.rigid import Frame
-from coglab_sim.vision import Names, NotSeen, Vision
+from coglab_sim.vision import NotSeen, Vision
 from coglab_smach.pending import Polled, PortError, Ready
 from coglab_smach.ports import Located
 
-NAMES = Names("world", "human_hand", "board", "object_{id}")
+NAMES = FrameNames("world", "human_hand", "board", "object_{id}")
 BESIDE, BEHIND = np.array([1.05, 0.45, 0.35]), np.array([1.75, 0.6, 0.35])
 SENTENCE = "2 people are in view; one partner is expected: ask the others to step back"
 

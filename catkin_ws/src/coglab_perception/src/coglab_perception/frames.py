@@ -33,6 +33,13 @@ class FrameNames:
         """Frame of an object of the database."""
         return self.object.replace("{id}", object_id)
 
+    def is_tracked(self, frame: str) -> bool:
+        """Whether a tracker shows this frame: the partner's hand, or an object's."""
+        before, _, after = self.object.partition("{id}")
+        is_object = (frame.startswith(before) and frame.endswith(after)
+                     and len(frame) > len(before) + len(after))
+        return frame == self.human_hand or is_object
+
     @staticmethod
     def from_mapping(data: Any, source: str = "perception/frames") -> FrameNames:
         """From the parameter, or any mapping. FramesError names what is missing, unknown or empty."""

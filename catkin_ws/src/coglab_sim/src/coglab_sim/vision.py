@@ -10,9 +10,9 @@ import math
 import threading
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 
 import numpy as np
+from coglab_perception.frames import FrameNames
 
 from .perception_stand_in import Board, PerceptionSettings, Sight, Tracker
 from .rigid import Frame
@@ -29,27 +29,6 @@ IN_HAND = 0.20
 
 class NotSeen(Exception):
     """Perception cannot answer; the text is the sentence for who asked."""
-
-
-@dataclass(frozen=True)
-class Names:
-    """tf2 frames by role, as in coglab_perception/config/frames.yaml; `object` contains {id}."""
-
-    world: str
-    human_hand: str
-    board: str
-    object: str
-
-    def object_frame(self, object_id: str) -> str:
-        """Frame of an object."""
-        return self.object.replace("{id}", object_id)
-
-    def is_tracked(self, frame: str) -> bool:
-        """Whether a tracker shows this frame: the partner's hand, or an object's."""
-        before, _, after = self.object.partition("{id}")
-        is_object = (frame.startswith(before) and frame.endswith(after)
-                     and len(frame) > len(before) + len(after))
-        return frame == self.human_hand or is_object
 
 
 class PartnerChoice:
@@ -91,7 +70,7 @@ class Vision:
     other stands still.
     """
 
-    def __init__(self, names: Names, settings: PerceptionSettings, board: Board, seed: int,
+    def __init__(self, names: FrameNames, settings: PerceptionSettings, board: Board, seed: int,
                  clock: Callable[[], float], partner_margin: float = 0.0,
                  steady: Callable[[], float] = time.monotonic) -> None:
         self.names, self.settings, self.board, self.seed = names, settings, board, seed
