@@ -45,7 +45,7 @@ SERVICES: dict[str, list[str]] = {
     "/coglab": ["start", "stop"],
     "/perception": ["init_vision", "locate_object", "free_places"],
 }  # fmt: skip
-NODES = ["/robot", "/ih2_hand", "/coglab", "/object_database", "/contact_detector", "/robot_state_publisher", "/joint_state_publisher"]
+NODES = ["/robot", "/perception", "/motion_recogniser", "/ih2_hand", "/coglab", "/object_database", "/contact_detector", "/robot_state_publisher", "/joint_state_publisher"]
 FRAMES = ["world", "lwr_base_link", "lwr_flange", "ih2_palm", "human_hand", "object_mug", "board"]
 
 
