@@ -254,6 +254,31 @@ def test_friopen_with_another_period(convention):
         assert wire.cell.fri_state == 1, wire.cell.messages
 
 
+@pytest.mark.parametrize('pause', [0.0, 0.1, 0.6])
+@pytest.mark.parametrize('convention', ['coglab', 'centro_epiaggio', 'stanford', 'rtt_lwr'])
+def test_friopen_in_the_middle_of_a_motion(convention, pause):
+    """The operator starts the KRL program anew while the arm moves: it stands, mirrored, until an explicit start."""
+    wire = Wire({'krl_convention': convention}, krc__period=0.002, krc__convention=convention)
+    wire.start()
+    wire.velocity = np.array([0.4, 0, 0, 0, 0, 0.4, 0])
+    wire.run(0.5)
+    wire.cell.restart_program(0.010, pause)
+    stood = wire.cell.set_point.copy()
+    for _ in range(300):
+        wire.tick()
+        assert np.abs(wire.cell.set_point - stood).max() < 1e-6
+    fields = parse(wire.measurement)
+    assert (fields['state'], fields['command_period']) == (1, pytest.approx(0.010))
+    assert np.abs(wire.commands[-1] - set_point(fields)).max() < 1e-6  # mirrored
+    snapshot = wire.bridge.snapshot()
+    assert snapshot['fall_backs'] == 1 and not snapshot['motion_allowed']
+    assert wire.request('start')[0], wire.cell.messages
+    before = wire.cell.set_point.copy()
+    wire.run(1.0)
+    assert wire.cell.set_point[0] - before[0] == pytest.approx(0.4, abs=0.05)
+    assert wire.cell.messages == []
+
+
 def test_the_program_of_rcprg_opens_fri_again_on_request():
     """FRM_INT[1] = 3 with the period in ms in FRM_INT[2], as its own PC stack asks."""
     s = Session(URDF, krc__period=0.002, krc__convention='rcprg_tum')

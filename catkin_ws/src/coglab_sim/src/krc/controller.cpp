@@ -336,7 +336,6 @@ void Controller::restartProgram(double period, double pause) {
   parameters_.period = period;
   program_ = makeKrlProgram(parameters_.convention);
   krl_out_ = {};
-  krl_in_ = {};
   opens_at_ = time_ + pause;
 }
 

@@ -73,7 +73,11 @@ class BasicProgram : public KrlProgram {
 /// Our own program (lwr_fri_bridge/krl): numbered requests, numbered results.
 class Coglab : public BasicProgram {
  protected:
-  void begin(KrlInterface& krl) override { krl.setToInt(16, 4010); }
+  void begin(KrlInterface& krl) override {
+    done_ = krl.frmInt(3);  // what an earlier run left behind is not a request
+    krl.setToInt(1, done_);
+    krl.setToInt(16, 4010);
+  }
 
   double run(KrlInterface& krl) override {
     double wait = krl.parameters().krl_poll;
