@@ -138,6 +138,23 @@ def test_why_names_the_block_and_not_only_what_failed_before_it():
     assert trial.result().reason.startswith("the arm is blocked: hold is latched")
 
 
+def test_a_robot_node_that_came_back_empty_ends_in_fault_with_that_reason():
+    trial = Trial()
+
+    def script(t):
+        t.wait_hub("wait_without_object")
+        t.cell.enabled = False
+        t.wait_hub("stopped", limit=2.0)
+        t.cell.loaded.clear()  # killed and started again: nothing is loaded any more
+        t.start("reset", "")
+        t.wait_hub("fault")
+        assert t.ctx.journal.why() == "end_motion: controller 'ptp' is not loaded"
+        t.start("initialise")
+        t.wait_hub("wait_without_object")
+
+    trial.run(script)
+
+
 class Restarted(Trial):
     """A brain that starts while the hand holds an object, with what a former one noted on disk."""
 

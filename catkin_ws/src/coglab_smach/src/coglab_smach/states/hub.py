@@ -174,6 +174,8 @@ class Stopped(CoglabState):
                 self.ctx.clock.sleep(0.05)
         finally:
             self.ctx.requests.close()
+        # What fails from now on is no consequence of what was stopped.
+        self.ctx.journal.settle()
         self.await_pending(self.ctx.arm.lwr_command("reset"), "LWR command 'reset'", 5.0)
         self.ctx.stop.reset()
         if not self.ctx.arm.motion_allowed()[0]:
