@@ -126,6 +126,8 @@ class __attribute__((visibility("hidden"), aligned(64))) ControllerSlot {
   void captureCorrection() noexcept;
   void advanceBlend(double dt) noexcept;
   void advanceGains(double dt) noexcept;
+  template <bool kTimed, bool kTest>
+  static void runEach(const std::vector<ControllerSlot*>& slots, StageRun& run) noexcept;
   static void fetchAhead(ControllerSlot* const* here, const ControllerSlot* const* end,
                          const StageRun& run) noexcept;
   bool isFresh(const StageRun& run) const noexcept;

@@ -31,6 +31,7 @@ __attribute__((noinline)) void recordAny(std::size_t size, const double* found, 
     case 3: return recordSignal<3>(found, left, record, total);
     case 4: return recordSignal<4>(found, left, record, total);
     case 6: return recordSignal<6>(found, left, record, total);
+    case 7: return recordSignal<7>(found, left, record, total);
     default: break;
   }
   std::memcpy(record, found, size * sizeof(double));
@@ -90,14 +91,26 @@ CTRL_MORE_OFTEN void ControllerSlot::fetchAhead(ControllerSlot* const* here,
 }
 
 void ControllerSlot::runAll(const std::vector<ControllerSlot*>& slots, StageRun& run) noexcept {
+  if (run.compared) {
+    runEach<true, true>(slots, run);
+  } else if (run.timed) {
+    runEach<true, false>(slots, run);
+  } else {
+    runEach<false, false>(slots, run);
+  }
+}
+
+template <bool kTimed, bool kTest>
+void ControllerSlot::runEach(const std::vector<ControllerSlot*>& slots, StageRun& run) noexcept {
   const ControllerSlot* const* const end = slots.data() + slots.size();
   for (ControllerSlot* const& slot : slots) {
     ControllerSlot& s = *slot;
     fetchAhead(&slot, end, run);
-    if (!(s.steady_ && s.isFresh(run)) && !s.prepare(run)) continue;
-    if (run.compared) std::memcpy(run.compared, run.data, run.control.dataSize() * sizeof(double));
+    const bool steady = s.steady_ && s.isFresh(run);
+    if (!steady && !s.prepare(run)) continue;
+    if (kTest) std::memcpy(run.compared, run.data, run.control.dataSize() * sizeof(double));
     try {
-      if (!s.steady_) s.catchUp();
+      if (!steady) s.catchUp();
       ModifiedControlStates modified(run.control, s.owner_);
       s.controller_->update(run.cycle, run.robot, run.original, modified);
     } catch (const std::exception& e) {
@@ -112,7 +125,7 @@ void ControllerSlot::runAll(const std::vector<ControllerSlot*>& slots, StageRun&
       s.takeFailure(run);
       continue;
     }
-    if (!s.hasGoodNumbers(run.data) || s.limited_ || run.compared) {
+    if (!s.hasGoodNumbers(run.data) || s.limited_ || kTest) {
       const FaultKind kind = s.judgeMore(run);
       if (kind != FaultKind::None) {
         s.takeFault(run, kind,
@@ -122,11 +135,11 @@ void ControllerSlot::runAll(const std::vector<ControllerSlot*>& slots, StageRun&
         continue;
       }
     }
-    if (run.timed && s.isLate(run)) {
+    if (kTimed && (!kTest || run.timed) && s.isLate(run)) {
       s.overrun(run);
       continue;
     }
-    if (!s.steady_) s.settle(run);
+    if (!steady) s.settle(run);
     s.commit(run);
   }
 }

@@ -137,6 +137,116 @@ TEST_F(Isolation, angleTooLarge) {
   expectFault(FaultKind::CorrectionSize, "larger");
 }
 
+struct Signal {
+  ControlContainer container;
+  const char* key;
+  int size;
+  bool quaternion;
+};
+
+const Signal kSignals[] = {
+    {ControlContainer::TaskSpaceReferencePose, "ee", 7, true},
+    {ControlContainer::PelvisOrientation, "pelvis", 4, true},
+    {ControlContainer::CentreOfMass, "com", 3, false},
+    {ControlContainer::TaskSpaceReferenceVel, "ee", 6, false},
+    {ControlContainer::JointSpaceReference, "Velocity", 7, false},
+    {ControlContainer::OtherReference, "samples", 11, false}};
+
+// What a controller that spoils one number is faulted for.
+FaultKind spoil(const Signal& signal, int index, double value, bool first_is_good = false) {
+  Rig rig;
+  rig.control.declare(ControlContainer::OtherReference, "samples", 11, "1", "none");
+  auto c = std::make_unique<TestController>();
+  if (signal.container == ControlContainer::JointSpaceReference) {
+    c->description.stage = Stage::Joint;
+  }
+  ModifySignal good;
+  if (first_is_good) {
+    c->description.modifies(ControlContainer::JointSpaceReference, "Velocity").in("rad/s")
+        .frameOf("joint").about("untouched");
+  }
+  c->description.modifies(signal.container, signal.key).size(signal.size).in("1").frameOf("w")
+      .about("spoilt");
+  const std::string role = std::string(nameOf(signal.container)) + "/" + signal.key;
+  c->on_initialize = [&](TestController& self, Setup& setup) {
+    if (first_is_good) good = setup.modify("jointSpaceReference/Velocity");
+    self.out = setup.modify(role);
+  };
+  c->on_update = [&](TestController& self, const Cycle&, const RobotStates&, const ControlStates&,
+                     ModifiedControlStates& m) { m[self.out][index] = value; };
+  rig.add(std::move(c), "c");
+  rig.step();
+  return rig.manager->status("c").fault;
+}
+
+TEST(IsolationTest, everyNumberOfEveryKindOfSignalIsJudged) {
+  for (const Signal& signal : kSignals) {
+    for (int i = 0; i < signal.size; ++i) {
+      for (const double bad : {std::nan(""), std::numeric_limits<double>::infinity(),
+                               -std::numeric_limits<double>::infinity()}) {
+        EXPECT_EQ(spoil(signal, i, bad), FaultKind::NotFinite) << signal.key << ' ' << i;
+      }
+    }
+    if (signal.quaternion) {
+      EXPECT_EQ(spoil(signal, signal.size - 1, 0.999), FaultKind::NotUnit) << signal.key;
+      EXPECT_EQ(spoil(signal, signal.size - 1, 1.0 + 1e-7), FaultKind::None) << signal.key;
+    } else {
+      // Large numbers are finite, whatever their sum is.
+      EXPECT_EQ(spoil(signal, 0, 1.7e308), FaultKind::None) << signal.key;
+    }
+  }
+  // The second signal of a controller too.
+  const Signal second = {ControlContainer::JointSpaceReference, "Position", 7, false};
+  EXPECT_EQ(spoil(second, 6, std::nan(""), true), FaultKind::NotFinite);
+  EXPECT_EQ(spoil(second, 6, 0.5, true), FaultKind::None);
+}
+
+TEST(IsolationTest, sumBeyondTheRangeOfNumbersIsNoFault) {
+  Rig rig;
+  auto c = adder("com", "com", 0.0);
+  c->on_update = [](TestController& self, const Cycle&, const RobotStates&, const ControlStates&,
+                    ModifiedControlStates& m) { m[self.out].setConstant(1.7e308); };
+  rig.add(std::move(c), "c");
+  rig.step();
+  EXPECT_EQ(rig.manager->status("c").fault, FaultKind::None);
+  EXPECT_EQ(rig.control.getCoM()[1], 1.7e308);
+}
+
+TEST(IsolationTest, secondSignalIsUndoneRecordedAndFadesLikeTheFirst) {
+  Rig rig(0.1);
+  bool wrong = false;
+  auto c = adder("pose", "ee", 0.0);
+  c->description.modifies(ControlContainer::TaskSpaceReferenceVel, "ee").in("m/s").frameOf("base")
+      .about("pushed");
+  ModifySignal velocity;
+  c->on_initialize = [&](TestController& self, ctrl_more::Setup& setup) {
+    self.out = setup.modify("taskSpaceReferencePose/ee");
+    velocity = setup.modify("taskSpaceReferenceVel/ee");
+  };
+  c->on_update = [&](TestController& self, const Cycle&, const RobotStates&, const ControlStates&,
+                     ModifiedControlStates& m) {
+    m[self.out][0] += 1.0;
+    m[velocity][5] += 2.0;
+    if (wrong) m[velocity][0] = std::nan("");
+  };
+  rig.add(std::move(c), "c");
+  rig.step(40);
+  ASSERT_EQ(rig.twist()[5], 2.0);
+  const std::vector<Attribution> list = rig.manager->attribution();
+  ASSERT_EQ(list.size(), 2u);
+  EXPECT_EQ(list[1].signal, "taskSpaceReferenceVel/ee");
+  EXPECT_EQ(list[1].before[5], 0.0);
+  EXPECT_EQ(list[1].after[5], 2.0);
+  EXPECT_EQ(list[0].size, 1.0);
+  wrong = true;
+  for (int i = 1; i <= 20; ++i) {
+    rig.step();
+    EXPECT_NEAR(rig.pose()[0], 1.0 - i / 20.0, 1e-12);
+    EXPECT_NEAR(rig.twist()[5], 2.0 - i / 10.0, 1e-12);
+    EXPECT_EQ(rig.twist()[0], 0.0);
+  }
+}
+
 TEST(IsolationTest, faultInResetOrGainsChangedIsCaughtToo) {
   class Throwing : public TestController {
    public:
@@ -286,6 +396,29 @@ TEST(IsolationTest, attributionNamesWhoChangedWhatByHowMuch) {
   EXPECT_EQ(list[1].size, 0.25);
   EXPECT_EQ(list[2].controller, "turn");
   EXPECT_NEAR(list[2].angle, 0.3, 1e-12);
+}
+
+TEST(IsolationTest, attributionIsOfTheLastCycleHoweverOftenItIsAsked) {
+  Rig rig;
+  double amount = 0.0;
+  auto c = adder("pose", "ee", 0.0);
+  c->on_update = [&](TestController& self, const Cycle&, const RobotStates&, const ControlStates&,
+                     ModifiedControlStates& m) { m[self.out][0] += amount; };
+  rig.add(std::move(c), "c");
+  for (int i = 1; i <= 7; ++i) {
+    amount = i;
+    rig.step(i % 3 + 1);
+    for (int asked = 0; asked < i % 4; ++asked) {
+      const std::vector<Attribution> list = rig.manager->attribution();
+      ASSERT_EQ(list.size(), 1u);
+      EXPECT_EQ(list[0].cycle, rig.cycle.number);
+      EXPECT_EQ(list[0].size, i);
+    }
+  }
+  rig.manager->beginCycle({0, 0.005, 1000});  // a cycle is running: what is complete is given
+  const std::vector<Attribution> meanwhile = rig.manager->attribution();
+  ASSERT_EQ(meanwhile.size(), 1u);
+  EXPECT_EQ(meanwhile[0].cycle, rig.cycle.number);
 }
 
 TEST(IsolationTest, staleOrMissingInputsStopAndFreshOnesStart) {
