@@ -44,7 +44,8 @@ class RecordExchange {
         if (word_.compare_exchange_weak(seen, changed, std::memory_order_acq_rel)) break;
         continue;
       }
-      word_.fetch_or(kWanted, std::memory_order_relaxed);
+      // Gives back what was read before.
+      word_.fetch_or(kWanted, std::memory_order_release);
       if (std::chrono::steady_clock::now() > deadline) break;
       std::this_thread::sleep_for(std::chrono::microseconds(20));
       seen = word_.load(std::memory_order_acquire);
