@@ -8,6 +8,7 @@
 /// ~log_file, ~truth_rate, ~publish_clock; fri_period and seed of the parent namespace.
 #include <fstream>
 #include <memory>
+#include <sstream>
 
 #include <coglab_msgs/CellTruth.h>
 #include <coglab_msgs/FingerContact.h>
@@ -42,6 +43,20 @@ std::uint16_t publishedPort(const std::string& parameter) {
   return static_cast<std::uint16_t>(port);
 }
 
+/// A private parameter within its range. @throws std::invalid_argument naming parameter, value and
+/// range.
+template <typename T>
+T within(const ros::NodeHandle& node, const char* name, T otherwise, double low, double high) {
+  T value = otherwise;
+  if (node.hasParam(name) && !node.getParam(name, value))
+    throw std::invalid_argument("parameter " + node.resolveName(name) + ": expected a number");
+  if (value >= low && value <= high) return value;
+  std::ostringstream text;
+  text << "parameter " << node.resolveName(name) << " = " << value << " is outside its range "
+       << low << ".." << high;
+  throw std::invalid_argument(text.str());
+}
+
 /// Waits for it. @throws std::runtime_error after `limit` s or at shutdown.
 std::uint16_t waitForPort(const std::string& parameter, double limit) {
   const ros::WallTime end = ros::WallTime::now() + ros::WallDuration(limit);
@@ -58,13 +73,15 @@ std::uint16_t waitForPort(const std::string& parameter, double limit) {
 class CellNode {
  public:
   CellNode() : private_("~"), config_(readCellConfig(private_)) {
-    int port = private_.param("fri_port", 0);
+    int port = within(private_, "fri_port", 0, 0, 65535);
+    const double speed = within(private_, "speed", 1.0, 0.01, 100.0);
+    const double rate = within(private_, "truth_rate", 200.0, 1.0, 1000.0);
     port_parameter_ =
         portParameter(private_.param<std::string>("port_parameter", "lwr/fri_port_bound"));
     follow_port_ = port == 0;
-    if (follow_port_) port = waitForPort(port_parameter_, private_.param("port_wait", 60.0));
+    if (follow_port_)
+      port = waitForPort(port_parameter_, within(private_, "port_wait", 60.0, 0.0, 3600.0));
     const auto host = private_.param<std::string>("fri_host", "127.0.0.1");
-    const double speed = private_.param("speed", 1.0);
     cell_ = std::make_unique<RealTimeCell>(config_, host, static_cast<std::uint16_t>(port), speed);
     openLog(private_.param<std::string>("log_file", ""));
 
@@ -87,9 +104,6 @@ class CellNode {
     fault_ = private_.advertiseService("fault", &CellNode::onFault, this);
     place_ = private_.advertiseService("place_object", &CellNode::onPlace, this);
 
-    const double rate = private_.param("truth_rate", 200.0);
-    if (!(rate >= 1.0 && rate <= 1000.0))
-      throw std::invalid_argument("truth_rate must lie in 1 .. 1000 Hz");
     publish_timer_ = node_.createWallTimer(ros::WallDuration(1.0 / rate),
                                            [this](const ros::WallTimerEvent&) { publish(); });
     log_timer_ = node_.createWallTimer(ros::WallDuration(0.1),
@@ -261,6 +275,7 @@ class CellNode {
 
 int main(int argc, char** argv) {
   ros::init(argc, argv, "cell");
+  const ros::NodeHandle keep;  // the last handle that goes would take the log along
   try {
     const coglab_sim::CellNode node;
     ros::spin();

@@ -3,6 +3,7 @@
 import csv
 import os
 import socket
+import subprocess
 import sys
 import threading
 import time
@@ -162,6 +163,23 @@ class CellNode(unittest.TestCase):
         before = self.bridge.received
         time.sleep(1.0)
         self.assertTrue(30 < self.bridge.received - before < 70)
+
+    def test_8_parameters_out_of_range_are_refused_at_start(self) -> None:
+        binary = subprocess.check_output(['catkin_find', '--first-only', '--libexec', 'coglab_sim', 'cell_node'],
+                                         text=True).strip()
+        for name, value, expected in (('fri_port', 70000, '= 70000 is outside its range 0..65535'),
+                                      ('speed', 1000.0, '= 1000 is outside its range 0.01..100'),
+                                      ('truth_rate', 0.1, '= 0.1 is outside its range 1..1000'),
+                                      ('krc/period', 0.5, 'krc/period = 0.5 is outside its range 0.001..0.1'),
+                                      ('arm/unknown_load', -1.0, 'arm/unknown_load = -1 is outside its range 0..10'),
+                                      ('krc/convention', 'nobody', 'known: coglab, centro_epiaggio, stanford')):
+            node = f'bad_{name.replace("/", "_")}'
+            rospy.set_param(f'/{node}/fri_port', 49999)
+            rospy.set_param(f'/{node}/{name}', value)
+            run = subprocess.run([binary, f'__name:={node}'], stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
+                                 text=True, timeout=20)
+            self.assertNotEqual(run.returncode, 0, name)
+            self.assertIn(expected, run.stdout)
 
     def test_7_two_robots_in_one_graph(self) -> None:
         """All names are relative: the cell of another namespace finds the bridge of that namespace."""

@@ -5,13 +5,19 @@
 namespace lwr_fri_bridge {
 namespace {
 
+double checkedTemperature(const ros::NodeHandle& nh) {
+  const double hot = nh.param("hot_drive", 70.0);
+  checkParameter("hot_drive", hot, 0.0, 200.0);
+  return hot;
+}
+
 unsigned char levelOf(Severity severity) { return static_cast<unsigned char>(severity); }
 
 }  // namespace
 
 BridgeDiagnostics::BridgeDiagnostics(BridgeRos& owner)
     : owner_(owner),
-      hot_(owner.nh_.param("hot_drive", 70.0)),
+      hot_(checkedTemperature(owner.nh_)),
       updater_(ros::NodeHandle(), owner.nh_, owner.nh_.getNamespace()) {
   updater_.setHardwareID("KUKA LWR 4+");
   updater_.add("FRI connection", this, &BridgeDiagnostics::connection);

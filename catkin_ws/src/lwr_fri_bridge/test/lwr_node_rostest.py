@@ -322,6 +322,7 @@ class LwrNode(unittest.TestCase):
             ("fri_port", 70000, "= 70000 is outside its range 0..65535"),
             ("rt_priority", 99, "= 99 is outside its range 0..98"),
             ("rt_stack_kib", 1, "= 1 is outside its range 128..8192"),
+            ("hot_drive", -300.0, "= -300 is outside its range 0..200"),
             ("joint_states_rate", 0.0, "= 0 is outside its range 1..1000"),
             ("position_margin", "wide", "expected a number"),
             ("krl_convention", "nobody", "known: coglab, centro_epiaggio, stanford"),
