@@ -16,7 +16,7 @@ import smach
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "test"))
 from misbehaviours import OUTCOMES
 from reach_figures import figures
-from virtual_ports import VirtualTrial
+from virtual_trial import VirtualTrial
 
 LONG = os.environ.get("COGLAB_LONG") == "1"
 TRIALS = 100 if LONG else 12

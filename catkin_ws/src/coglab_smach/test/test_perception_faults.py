@@ -7,8 +7,8 @@ import pytest
 import smach
 
 try:
-    from virtual_ports import VirtualTrial
     from virtual_rig import BOARD
+    from virtual_trial import VirtualTrial
 except ImportError as error:
     pytest.skip(f"a compiled module is not there: {error}", allow_module_level=True)
 from coglab_perception.frames import FrameNames

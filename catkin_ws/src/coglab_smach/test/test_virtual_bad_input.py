@@ -3,7 +3,7 @@ import pytest
 import smach
 
 try:
-    from virtual_ports import VirtualTrial
+    from virtual_trial import VirtualTrial
 except ImportError as error:
     pytest.skip(f"a compiled module is not there: {error}", allow_module_level=True)
 import numpy as np

@@ -1,0 +1,164 @@
+"""A whole trial in virtual time: the master beside the world, and what its reaches did."""
+import dataclasses
+from pathlib import Path
+
+import smach
+from coglab_smach.config import Config
+from coglab_smach.context import Context
+from coglab_smach.journal import Journal
+from coglab_smach.machines import build_master
+from coglab_smach.object_database import ObjectDatabase
+from coglab_smach.reachability import default_arm, solve
+from smach.virtual_clock import VirtualClock
+from virtual_ports import VirtualArm, VirtualContact, VirtualDatabase, VirtualHand, VirtualPerception
+from virtual_rig import DT, Rig, distance, frame_of, palm_goal
+
+SHARE = Path(__file__).resolve().parent.parent
+LIBRARY = str(SHARE.parent / "coglab_controllers" / "config" / "primitives.xml")
+
+
+class VirtualTrial:
+    """One trial: ``actions`` one after the other, each from its hub; results in the journal.
+
+    ``reaches`` gets one ReachRecord per DMP motion.
+    """
+
+    def __init__(self, seed=1, behaviour="normal", perfect=False, object_on="human_hand", perception=None,
+                 recogniser=None, later_behaviour="", turned=0.0, **overrides):
+        self.rig = Rig(seed, behaviour, perfect, object_on, perception, turned)
+        self.clock = VirtualClock()
+        self.recogniser, self.later_behaviour = recogniser, later_behaviour
+        self.last_hub = ""
+        database = ObjectDatabase(str(SHARE / "objects"))
+        database.reload()
+        config = Config.load(str(SHARE / "config" / "machines.yaml"),
+                             {"auto_trigger": True, "dmp_library": LIBRARY, **overrides})
+        self.ctx = Context(clock=self.clock, arm=VirtualArm(self.rig), hand=VirtualHand(self.rig),
+                           perception=VirtualPerception(self.rig, recogniser), database=VirtualDatabase(database),
+                           contact=VirtualContact(self.rig), config=config, journal=Journal(self.clock.now),
+                           reachable=lambda pose: solve(default_arm(), pose) is not None)
+        self.ctx.journal.listen(self._on_transition)
+        self.master = build_master(self.ctx)
+        self.over = False
+        self.failure = None
+        self.reaches = []
+        self.beside = lambda trial: None
+        self._reach = None
+
+    def _on_transition(self, record):
+        """The person sees what the robot is about to do; reaches are recorded."""
+        if record.path == "/coglab_master":
+            task = {"exchange_human_to_robot": "give", "exchange_robot_to_human": "receive"}
+            if record.to_state == "exchange_robot_to_human" and self.later_behaviour:
+                human = self.rig.human
+                human.participant = dataclasses.replace(human.participant, behaviour=self.later_behaviour)
+            if record.to_state in task:
+                self.rig.human.command(task[record.to_state])
+            elif record.from_state in task and record.outcome != "succeeded":
+                self.rig.human.command("rest")
+        if record.from_state == "execute_dmp" and record.outcome == "succeeded":
+            self._reach = ReachRecord(self.rig, self.ctx.arm.request)
+        if record.from_state == "wait_stop" and self._reach is not None:
+            self.reaches.append(self._reach)
+            self._reach = None
+
+    def run(self, *actions, limit=60.0, script=None):
+        """Execute ``actions``, or ``script(trial)``; returns the results of the actions as the journal holds them."""
+        with smach.clock.using(self.clock):
+            self.clock.start_thread(self._world, "world")
+            walk = script or (lambda trial: trial.ask_for(actions, limit))
+            self.clock.start_thread(lambda: self._script(walk), "script")
+            self.master.execute()
+            self.over = True
+        if self.failure is not None:
+            raise self.failure
+        return [r for r in self.ctx.journal.results if r.kind != "coglab_init_system"]
+
+    def _world(self):
+        try:
+            while not self.over:
+                self.rig.step()
+                if self._reach is not None:
+                    self._reach.look()
+                if self.recogniser is not None and self.rig.ticks % 6 == 0:
+                    sight = self.rig.sights.get("human_hand")
+                    if sight is not None:
+                        self.recogniser.update(sight.captured, sight.frame.position)
+                self.beside(self)
+                self.clock.sleep(DT)
+        except Exception as error:
+            self.failure = error
+            self.master.request_preempt()
+
+    def _script(self, walk):
+        try:
+            walk(self)
+        except Exception as error:
+            self.failure = error
+        finally:
+            self.last_hub = self.ctx.requests.hub()
+            self.master.request_preempt()
+
+    def wait_hub(self, label, limit=60.0):
+        """Wait until this hub is open."""
+        end = self.clock.now() + limit
+        while self.ctx.requests.hub() != label:
+            assert self.clock.now() < end, f"{label} not reached: {self.ctx.journal.transitions[-1].sentence()}"
+            self.clock.sleep(0.05)
+
+    def ask_for(self, actions, limit):
+        """The actions one after the other, each in its hub, until one fails."""
+        for action in actions:
+            end = self.clock.now() + limit
+            while self.ctx.requests.hub() == "" and self.clock.now() < end:
+                self.clock.sleep(0.1)
+            if not self.ctx.requests.submit(action, "mug")[0]:
+                return  # the action before it failed, so that this hub does not take it
+            before = len(self.ctx.journal.results)
+            while len(self.ctx.journal.results) == before:
+                if self.clock.now() > end:
+                    raise AssertionError(f"'{action}' is stuck: " + self.ctx.journal.transitions[-1].sentence())
+                self.clock.sleep(0.05)
+            # The person's hand comes back before the next action.
+            while self.rig.human.phase != "idle" and self.clock.now() < end:
+                self.clock.sleep(0.1)
+            end = self.clock.now() + 10.0
+            while self.ctx.requests.hub() == "" and self.clock.now() < end:
+                self.clock.sleep(0.05)
+
+
+class ReachRecord:
+    """What one DMP motion did: (time, measured palm, goal in use) per cycle, and the errors once the arm stands still.
+
+    ``to_goal``: (m, rad) from the measured palm to the goal as received, that is as the motion has estimated and
+    latched it; ``to_sight``: to the newest single sight; ``to_truth``: to where the grasp pose really is.
+    """
+
+    def __init__(self, rig, request):
+        self.rig, self.request = rig, request
+        self.begin = rig.t
+        self.path = []
+        self.reached = None
+        self.to_goal = self.to_sight = self.to_truth = None
+
+    def look(self):
+        """After each period of the rig."""
+        robot, rig = self.rig.robot, self.rig
+        for record in robot.look_at_motion():
+            self.path.append((record["time"], record["measured"][0], record["goal"]))
+        if self.reached is None and robot.progress["motion"] == "reached":
+            self.reached = rig.t
+        # Measured when the detector begins to watch: the arm stands still and nobody has touched it yet.
+        if self.to_goal is None and self.reached is not None and rig.detector.state() == "watching":
+            self._measure()
+
+    def _measure(self):
+        rig, request, debug = self.rig, self.request, self.rig.robot.debug
+        if debug is None:
+            return
+        palm = rig.robot.chain.fk(rig.robot.report["position"])
+        self.to_goal = distance(palm, (debug["goal"], debug["set_point"][1]))
+        seen, _ = rig.newest(request.goal_frame)
+        truth = rig.truth["human_hand" if request.goal_frame == "human_hand" else "object"]
+        self.to_sight = distance(palm, palm_goal(seen, request.goal_offset, request.target_orientation))
+        self.to_truth = distance(palm, palm_goal(frame_of(truth), request.goal_offset, request.target_orientation))
