@@ -39,8 +39,8 @@ class Robot:
     def __init__(self) -> None:
         self.joints: JointState | None = None
         self.state: LwrState | None = None
-        self.status: ControllerStatus | None = None
-        self.feedback: DmpFeedback | None = None
+        self.status = ControllerStatus()
+        self.feedback = DmpFeedback()
         self.feedbacks: list[DmpFeedback] = []
         self.finished: list[int] = []
         rospy.Subscriber("lwr/joint_states", JointState, self._on_joints)

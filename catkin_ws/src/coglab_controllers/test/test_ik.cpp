@@ -227,6 +227,42 @@ TEST(TwoTaskIk, AnArmOfSixJointsKeepsTheSeventhStill) {
   }
 }
 
+TEST(TwoTaskIk, AnswersErrorsOnlyWithSpeedsTheJointsCanBrakeFrom) {
+  Random random(8);
+  IkParameters parameters = unlimited();
+  parameters.acceleration_limit.setConstant(10.0);
+  parameters.jerk_limit.setConstant(500.0);
+  const TwoTaskIk braking(parameters), plain(unlimited());
+  double least = 1.0;
+  for (int k = 0; k < 20000; ++k) {
+    const JointVector q = random.posture(0.1);
+    const ChainState state = robot().evaluate(q);
+    CartesianReference reference;
+    const double size = k % 2 == 0 ? 1.0 : 0.001;
+    reference.pose.position = state.tool.position + random.point(0.1 * size);
+    reference.pose.orientation = expRotation(random.point(0.5 * size)) * state.tool.orientation;
+    IkResult slow, fast;
+    braking.solve(state, q, reference, slow);
+    plain.solve(state, q, reference, fast);
+    if (fast.scale < 1.0 || fast.second_task_scale < 1.0) continue;
+    // Half the deceleration for the translation's part; the way is what K_pos would take away.
+    const JointVector way = fast.position_velocity / 20.0;
+    for (int i = 0; i < kMaxJoints; ++i) {
+      const double v = slow.position_velocity[i];
+      ASSERT_LE(v * v, 2.0 * 5.0 * std::abs(way[i]) * (1.0 + 1e-9) + 1e-12);
+    }
+    if (fast.position_velocity.norm() < 1e-9) continue;
+    const double share = slow.position_velocity.norm() / fast.position_velocity.norm();
+    least = std::min(least, share);
+    ASSERT_LT((slow.position_velocity - share * fast.position_velocity).norm(),
+              1e-9 * (1.0 + fast.position_velocity.norm()));  // the direction is kept
+    if (way.lpNorm<Eigen::Infinity>() < 0.002) {
+      ASSERT_NEAR(share, 1.0, 1e-9);  // small errors see the gain of eq. (6)
+    }
+  }
+  EXPECT_LT(least, 0.5);
+}
+
 TEST(TwoTaskIk, RefusesBadParameters) {
   IkParameters parameters;
   parameters.pos_clik_gain = std::nan("");

@@ -39,7 +39,7 @@ double nextTimeConstant(const GoalEstimatorParameters& parameters, double presen
                         double dt) {
   const double more = std::max(0.0, parameters.noisy_time_constant - parameters.time_constant);
   const double wanted = parameters.time_constant + std::clamp(noise, 0.0, 1.0) * more;
-  return wanted + (present - wanted) * std::exp(-dt / kChange);
+  return present == wanted ? present : wanted + (present - wanted) * std::exp(-dt / kChange);
 }
 
 Vector3 clipped(const Vector3& error, double limit) {

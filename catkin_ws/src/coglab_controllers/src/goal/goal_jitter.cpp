@@ -19,7 +19,9 @@ void GoalJitter::reset() noexcept {
   power_ = 0.0;
 }
 
-void GoalJitter::wait(double dt) noexcept { power_ *= std::exp(-dt / kMemory); }
+void GoalJitter::wait(double dt) noexcept {
+  if (power_ > 0.0) power_ *= std::exp(-dt / kMemory);
+}
 
 void GoalJitter::see(double dt, const Vector3& step) noexcept {
   wait(dt);

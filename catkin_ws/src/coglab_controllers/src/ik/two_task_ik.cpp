@@ -98,21 +98,19 @@ TwoTaskIk::TwoTaskIk(const IkParameters& parameters)
     const double acceleration = parameters.acceleration_limit[i];
     braking_[i] = kBrakingShare * acceleration;
     // As in Guard::speedToStop(): limited jerk costs about so much time.
-    lag_[i] = parameters.reaction_time +
-              (std::isfinite(acceleration) ? 1.5 * acceleration / parameters.jerk_limit[i] : 0.0);
+    lag_[i] = std::isfinite(acceleration)
+                  ? parameters.reaction_time + 1.5 * acceleration / parameters.jerk_limit[i]
+                  : 0.0;
   }
   require("reaction_time", parameters.reaction_time, 0.0, 1.0);
 }
 
 double TwoTaskIk::brakeableGain(const JointVector& way, double gain) const noexcept {
-  for (int i = 0; i < kMaxJoints; ++i) {
-    if (!std::isfinite(braking_[i])) continue;
-    // v^2 / (2 a) + v * lag = way, solved for v / way.
-    const double lag = lag_[i];
-    const double root = std::sqrt(lag * lag + 2.0 * std::abs(way[i]) / braking_[i]);
-    gain = std::min(gain, 2.0 / (root + lag));
-  }
-  return gain;
+  // v^2 / (2 a) + v * lag = way, solved for v / way = 2 / (root + lag); the slowest joint counts.
+  const auto lag = lag_.array();
+  const auto root = (lag.square() + 2.0 * way.array().abs() / braking_.array()).sqrt();
+  const double slowest = (root + lag).maxCoeff();
+  return slowest > 0.0 ? std::min(gain, 2.0 / slowest) : gain;
 }
 
 void TwoTaskIk::solve(const ChainState& state, const JointVector& q,
