@@ -154,7 +154,7 @@ const Signal kSignals[] = {
 
 // What a controller that spoils one number is faulted for.
 FaultKind spoil(const Signal& signal, int index, double value, bool first_is_good = false) {
-  Rig rig;
+  Rig rig(0.0, false, false);  // as on a robot: not in the test mode
   rig.control.declare(ControlContainer::OtherReference, "samples", 11, "1", "none");
   auto c = std::make_unique<TestController>();
   if (signal.container == ControlContainer::JointSpaceReference) {
@@ -202,7 +202,7 @@ TEST(IsolationTest, everyNumberOfEveryKindOfSignalIsJudged) {
 }
 
 TEST(IsolationTest, sumBeyondTheRangeOfNumbersIsNoFault) {
-  Rig rig;
+  Rig rig(0.0, false, false);
   auto c = adder("com", "com", 0.0);
   c->on_update = [](TestController& self, const Cycle&, const RobotStates&, const ControlStates&,
                     ModifiedControlStates& m) { m[self.out].setConstant(1.7e308); };
@@ -213,7 +213,7 @@ TEST(IsolationTest, sumBeyondTheRangeOfNumbersIsNoFault) {
 }
 
 TEST(IsolationTest, secondSignalIsUndoneRecordedAndFadesLikeTheFirst) {
-  Rig rig(0.1);
+  Rig rig(0.1, true, false);
   bool wrong = false;
   auto c = adder("pose", "ee", 0.0);
   c->description.modifies(ControlContainer::TaskSpaceReferenceVel, "ee").in("m/s").frameOf("base")
