@@ -3,17 +3,27 @@ from __future__ import annotations
 
 import threading
 import time
-from typing import Callable
+from collections.abc import Callable
 
 import rospy
 import tf2_ros
-from geometry_msgs.msg import TransformStamped
-from sensor_msgs.msg import JointState
-
 from coglab_msgs.msg import ControllerStatus, DmpFeedback, FinishedPtp, LwrState
 from coglab_msgs.srv import (
-    AddPtp, AddPtpRequest, ExecuteDmp, ExecuteDmpRequest, GetActiveController, ListControllers,
-    LoadController, LoadDmps, LwrCommand, SetSpeedScale, SwitchController, SwitchDmp)
+    AddPtp,
+    AddPtpRequest,
+    ExecuteDmp,
+    ExecuteDmpRequest,
+    GetActiveController,
+    ListControllers,
+    LoadController,
+    LoadDmps,
+    LwrCommand,
+    SetSpeedScale,
+    SwitchController,
+    SwitchDmp,
+)
+from geometry_msgs.msg import TransformStamped
+from sensor_msgs.msg import JointState
 
 HOME = [-1.4349, -0.6086, 1.4986, 1.7048, 0.1857, 0.2152, 0.782]
 JOINTS = ["lwr_a1", "lwr_a2", "lwr_e1", "lwr_a3", "lwr_a4", "lwr_a5", "lwr_a6"]
@@ -143,5 +153,5 @@ class Robot:
 
     def arm(self) -> list[float]:
         """Measured joints in wire order."""
-        by_name = dict(zip(self.joints.name, self.joints.position))
+        by_name = dict(zip(self.joints.name, self.joints.position, strict=False))
         return [by_name[name] for name in JOINTS]

@@ -14,7 +14,7 @@ import rostest
 from sensor_msgs.msg import JointState
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
-from robot_fixture import HOME, JOINTS, Robot, wait_until  # noqa: E402
+from robot_fixture import HOME, JOINTS, Robot, wait_until
 
 GOAL = (0.80, 0.0, 0.45)
 LIMIT = 0.25
@@ -41,7 +41,7 @@ class RobotReal(unittest.TestCase):
 
     @classmethod
     def note(cls, message: JointState) -> None:
-        by_name = dict(zip(message.name, message.position))
+        by_name = dict(zip(message.name, message.position, strict=False))
         cls.path.append((message.header.stamp.to_sec(), np.array([by_name[n] for n in JOINTS])))
 
     def fastest(self) -> tuple[float, float]:

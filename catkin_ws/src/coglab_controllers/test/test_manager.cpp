@@ -340,8 +340,8 @@ TEST(Manager, MotionAndItsFeedbackProfileBeginInTheSameCycle) {
       lwr_fri_bridge::loadJointLimits(std::string(DESCRIPTION_DIR) + "/config/joint_limits.yaml");
   ctrl_more::Logger logger;
   ManagerSettings settings = readManagerSettings(
-      YAML::Load("{" + kTypes + "}"),
-      readText(std::string(DESCRIPTION_DIR) + "/urdf/lwr_ih2.urdf"), limits, false);
+      YAML::Load("{" + kTypes + "}"), readText(std::string(DESCRIPTION_DIR) + "/urdf/lwr_ih2.urdf"),
+      limits, false);
   settings.logger = &logger;
   settings.cycle.overrun_time = 0.0;
   ControllerManager manager(std::move(settings));

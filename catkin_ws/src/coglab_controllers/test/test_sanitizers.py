@@ -11,7 +11,9 @@ import pytest
 
 PACKAGE = Path(__file__).resolve().parent.parent
 SOURCES = PACKAGE.parent
-LIBRARIES = ["-lorocos-kdl", "-lkdl_parser", "-ltinyxml2", "-lyaml-cpp", "-lclass_loader", "-lpthread", "-ldl"]
+LIBRARIES = ["-lorocos-kdl", "-lkdl_parser", "-ltinyxml2", "-lyaml-cpp", "-lpthread", "-ldl"]
+# Debian keeps class_loader and what it includes in folders of their own.
+FOLDERS = ["eigen3", "class_loader", "rcpputils", "rcutils", "ament_index_cpp"]
 
 
 def sources() -> list[Path]:
@@ -31,14 +33,16 @@ def test_requests_against_the_control_thread(sanitizer: str, tmp_path: Path) -> 
     program = tmp_path / "thread_stress"
     objects = []
     includes = [f"-I{SOURCES / name / 'include'}" for name in ("coglab_controllers", "ctrl_more", "lwr_fri_bridge")]
-    includes += [f"-I{SOURCES / 'ctrl_more' / 'src'}", "-isystem/usr/include/eigen3"]
+    includes += [f"-I{SOURCES / 'ctrl_more' / 'src'}", *(f"-isystem/usr/include/{folder}" for folder in FOLDERS)]
+    loaders = sorted(map(str, Path("/usr/lib").glob("*/libclass_loader.so*")))
+    assert loaders, "libclass-loader-dev is not installed"
     flags = ["-std=c++17", "-O1", "-g1", f"-fsanitize={sanitizer}", "-fno-omit-frame-pointer"]
     for source in [*sources(), PACKAGE / "test" / "thread_stress.cpp"]:
         objects.append(tmp_path / f"{len(objects)}_{source.stem}.o")
         built = subprocess.run(["g++", *flags, "-c", str(source), "-o", str(objects[-1]), *includes],
                                capture_output=True, text=True, timeout=600)
         assert built.returncode == 0, built.stderr[-3000:]
-    built = subprocess.run(["g++", *flags, "-o", str(program), *map(str, objects), *LIBRARIES],
+    built = subprocess.run(["g++", *flags, "-o", str(program), *map(str, objects), loaders[-1], *LIBRARIES],
                            capture_output=True, text=True, timeout=600)
     assert built.returncode == 0, built.stderr[-3000:]
     result = subprocess.run(

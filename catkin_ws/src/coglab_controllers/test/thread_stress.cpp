@@ -100,6 +100,7 @@ int main(int argc, char** argv) {
   lwr_fri_bridge::ControlPort port;
   ControlThreadOptions options;
   options.priority = 0;
+  options.stack_bytes = 16 * 1024 * 1024;  // the sanitizers take part of it
   ControlThread control(manager.cycle(), port, options);
   control.start();
   std::atomic<bool> stop{false};

@@ -10,17 +10,21 @@ import unittest
 import rospkg
 import rospy
 import rostest
+from coglab_msgs.msg import DmpGoal, FeedbackStatus, IkDebug
+from coglab_msgs.srv import (
+    AddPtpRequest,
+    DescribeController,
+    FeedbackBySignal,
+    FeedbackSelect,
+    ReloadGains,
+    SetExecutionOrder,
+)
 from diagnostic_msgs.msg import DiagnosticArray
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64
 
-from coglab_msgs.msg import DmpGoal, FeedbackStatus, IkDebug
-from coglab_msgs.srv import (
-    AddPtpRequest, DescribeController, FeedbackBySignal, FeedbackSelect, ReloadGains,
-    SetExecutionOrder)
-
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
-from robot_fixture import HOME, Robot, wait_until  # noqa: E402
+from robot_fixture import HOME, Robot, wait_until
 
 GOAL = (0.80, 0.0, 0.45)
 

@@ -12,11 +12,11 @@ import rostest
 import tf2_ros
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
-from coglab_msgs.srv import AddPtpRequest  # noqa: E402
-from diagnostic_msgs.msg import DiagnosticArray  # noqa: E402
-from robot_fixture import HOME, Robot, wait_until  # noqa: E402
-from rosgraph_msgs.msg import Log  # noqa: E402
-from sensor_msgs.msg import JointState  # noqa: E402
+from coglab_msgs.srv import AddPtpRequest
+from diagnostic_msgs.msg import DiagnosticArray
+from robot_fixture import HOME, Robot, wait_until
+from rosgraph_msgs.msg import Log
+from sensor_msgs.msg import JointState
 
 GOAL = (0.80, 0.0, 0.45)
 
@@ -56,12 +56,12 @@ class TruePath(unittest.TestCase):
                    "tf2 frame dmp_goal")
         goal = self.frames.lookup_transform("lwr_base_link", "dmp_goal", rospy.Time(0))
         place = goal.transform.translation
-        for value, wanted in zip((place.x, place.y, place.z), GOAL):
+        for value, wanted in zip((place.x, place.y, place.z), GOAL, strict=False):
             self.assertAlmostEqual(value, wanted, delta=0.01)
         wait_until(lambda: robot.feedback.state == "reached", 10.0, "reached")
         wait_until(lambda: robot.feedback.remaining_distance < 0.002, 5.0, "2 mm from the goal")
         phases = [m.phase for m in robot.feedbacks if m.state == "running"]
-        self.assertTrue(all(a >= b for a, b in zip(phases[-20:], phases[-19:])))
+        self.assertTrue(all(a >= b for a, b in zip(phases[-20:], phases[-19:], strict=False)))
 
     def test_3_switch_in_motion_ends_it_and_refuses_dmp(self) -> None:
         robot = self.robot

@@ -158,8 +158,8 @@ void TwoTaskIk::solve(const ChainState& state, const JointVector& q,
     return brakeableGain(joint_way, constraint.gain);
   };
   if (constraint.rows == 3) {
-    result.rotation_velocity = secondShare<3>(constraint, result.position_velocity, null_space,
-                                              limit, task_gain, result);
+    result.rotation_velocity =
+        secondShare<3>(constraint, result.position_velocity, null_space, limit, task_gain, result);
   } else if (constraint.rows == kMaxJoints) {
     result.rotation_velocity = secondShare<kMaxJoints>(constraint, result.position_velocity,
                                                        null_space, limit, task_gain, result);

@@ -167,9 +167,10 @@ void ControlCycle::compute(JointVector& velocity) noexcept {
     overruns_in_row_ = taken > settings_.overrun_time ? overruns_in_row_ + 1 : 0;
     if (overruns_in_row_ > 0) ++report_.overruns;
     if (overruns_in_row_ >= settings_.overruns_to_fault) {
-      fault(Reason("controller '") << id_.c_str() << "' was too slow " << static_cast<std::uint64_t>(overruns_in_row_)
-                                   << " times in a row: " << taken * 1e3 << " ms, allowed "
-                                   << settings_.overrun_time * 1e3 << " ms");
+      fault(Reason("controller '")
+            << id_.c_str() << "' was too slow " << static_cast<std::uint64_t>(overruns_in_row_)
+            << " times in a row: " << taken * 1e3 << " ms, allowed " << settings_.overrun_time * 1e3
+            << " ms");
       return;
     }
   }

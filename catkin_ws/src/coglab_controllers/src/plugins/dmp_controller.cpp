@@ -17,8 +17,8 @@ constexpr double kRestError =
     3e-4;  // m: after the end the loop is opened once the hand is this close,
 constexpr double kRestAngle = 3e-3;  // rad, and turned this close,
 constexpr double kRestTime = 0.5;    // s, or after this time, slowly:
-constexpr double kFadeTime = 0.3;    // s. A hand that still turns then would leave its place if each
-                                     // joint braked by itself.
+constexpr double kFadeTime = 0.3;  // s. A hand that still turns then would leave its place if each
+                                   // joint braked by itself.
 
 Pose inverse(const Pose& pose) {
   const Quaternion back = pose.orientation.conjugate();
