@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""Wall times a newcomer meets: the first demo, a later one (run here), the whole test run (as recorded by the last one)."""
+"""Wall times a newcomer meets: the first demo and the whole test run as recorded, a later demo as run here."""
 
 from __future__ import annotations
 
@@ -14,7 +14,9 @@ from pathlib import Path
 def row(figure: str, value: float | None, limit: float) -> dict:
     """A row whose goal is an upper limit in s; a figure that was never recorded is not ok."""
     fine = value is not None and value <= limit
-    return dict(bench="wall", figure=figure, value=value, unit="s", goal=f"<= {limit:.0f}", peer=None, peer_value=None, ok=fine)
+    return dict(
+        bench="wall", figure=figure, value=value, unit="s", goal=f"<= {limit:.0f}", peer=None, peer_value=None, ok=fine
+    )
 
 
 def main() -> None:

@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""A handover with the feedback profile `dmp_compliant`: when the end-effector admittance ran, and that it was off before contact was armed."""
+"""A handover with the feedback profile `dmp_compliant`: the end-effector admittance runs during the reach alone."""
 
 import sys
 import unittest
@@ -38,7 +38,9 @@ class CompliantHandover(unittest.TestCase):
         running = [t for t, profile, activity in self.activity if activity == "running" and profile == "dmp_compliant"]
         self.assertTrue(running, self.activity)
         contact = next(t for t, found, _ in self.trial.contacts if found and t >= self.start)
-        off = [t for t, profile, activity in self.activity if t > running[-1] and activity == "off" and profile == "dmp"]
+        off = [
+            t for t, profile, activity in self.activity if t > running[-1] and activity == "off" and profile == "dmp"
+        ]
         self.assertTrue(off, self.activity)
         self.assertLess(running[-1], off[0])
         self.assertLess(off[0], contact, "the admittance was still at work when contact was found")

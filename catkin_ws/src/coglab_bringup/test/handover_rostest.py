@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""A whole handover from person to robot through the plain launch file: outcome, error, limits at every FRI tick, bytes of the hand."""
+"""A whole handover through the plain launch file: names, outcome, error, limits at every tick, bytes of the hand."""
 
 import sys
 import unittest
@@ -12,7 +12,6 @@ import rospy
 import rostest
 import tf2_ros
 import yaml
-
 from coglab_bringup.handover import run_handover
 from coglab_bringup.interface import FRAMES, missing_names
 from coglab_bringup.trial_recorder import TrialRecorder
@@ -60,7 +59,9 @@ class Handover(unittest.TestCase):
         rospy.sleep(0.5)  # the cell writes its log ten times a second
         with Path(f"{self.log}_fri_ticks.csv").open() as ticks:
             names = ticks.readline().strip().split(",")
-            rows = np.array([[float(v) for v in line.split(",")] for line in ticks if line.count(",") == len(names) - 1])
+            rows = np.array(
+                [[float(v) for v in line.split(",")] for line in ticks if line.count(",") == len(names) - 1]
+            )
         table = Path(rospkg.RosPack().get_path("lwr_description")) / "config" / "joint_limits.yaml"
         limits = {name: np.array(values) for name, values in yaml.safe_load(table.read_text())["default"].items()}
         commanding = rows[rows[:, names.index("state")] == CMD]
@@ -68,7 +69,9 @@ class Handover(unittest.TestCase):
         for kind in ("commanded", "measured"):
             first = names.index(f"{kind}_lwr_a1")
             joints = commanding[:, first : first + 7]
-            self.assertTrue(np.all(joints >= limits["lower_position"]) and np.all(joints <= limits["upper_position"]), kind)
+            self.assertTrue(
+                np.all(joints >= limits["lower_position"]) and np.all(joints <= limits["upper_position"]), kind
+            )
         first = names.index("commanded_lwr_a1")
         time = commanding[:, names.index("time")]
         steps = np.diff(commanding[:, first : first + 7], axis=0) / np.diff(time)[:, None]

@@ -26,7 +26,9 @@ def run(*command: object, **environment: str) -> subprocess.CompletedProcess:
 def needs(*command: str) -> pytest.MarkDecorator:
     """Skips where this command, which prepares the fault, does not run (no root, or a container that forbids it)."""
     works = shutil.which(command[0]) and subprocess.run(command, capture_output=True, check=False).returncode == 0
-    return pytest.mark.skipif(not works, reason=f"`{' '.join(command)}` does not run here: not root, or a restricted container")
+    return pytest.mark.skipif(
+        not works, reason=f"`{' '.join(command)}` does not run here: not root, or a restricted container"
+    )
 
 
 @pytest.fixture

@@ -3,10 +3,12 @@
 import sys
 
 import pytest
-
 from coglab_bringup.test_runner import Program, find_programs, report, run
 
-GREEN = '<testsuites><testsuite><testcase classname="a" name="one"/><testcase name="two"><skipped/></testcase></testsuite></testsuites>'
+GREEN = (
+    '<testsuites><testsuite><testcase classname="a" name="one"/>'
+    '<testcase name="two"><skipped/></testcase></testsuite></testsuites>'
+)
 RED = '<testsuite><testcase name="bad"><failure message="1 is not 2"/></testcase></testsuite>'
 
 

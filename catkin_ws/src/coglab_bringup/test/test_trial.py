@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 pytest.importorskip("coglab_msgs", reason="the workspace is not built or not sourced")
-from coglab_bringup.trial_plot import rows_without_overlap, state_intervals  # noqa: E402
-from coglab_bringup.trial_recorder import Trial, summarise  # noqa: E402
+from coglab_bringup.trial_plot import rows_without_overlap, state_intervals
+from coglab_bringup.trial_recorder import Trial, summarise
 
 LIMITS = np.full(7, 2.0)
 
@@ -60,5 +60,5 @@ def test_children_of_a_concurrence_get_rows_of_their_own():
     rows = rows_without_overlap([(0.0, 2.0, "a"), (0.0, 1.0, "b"), (1.0, 3.0, "c")])
     assert sorted(name for row in rows for _, _, name in row) == ["a", "b", "c"]
     for row in rows:
-        assert all(first[1] <= second[0] + 1e-3 for first, second in zip(row, row[1:]))
+        assert all(first[1] <= second[0] + 1e-3 for first, second in zip(row, row[1:], strict=False))
     assert len(rows) == 2

@@ -5,11 +5,10 @@ import json
 import sys
 import time
 
+import coglab_controllers as cc
 import numpy as np
 from core_bench import Row, core_times, row
 from curves import SAMPLES, curves
-
-import coglab_controllers as cc
 
 try:
     from movement_primitives.dmp import DMP

@@ -4,10 +4,9 @@
 import json
 import sys
 
+import coglab_controllers as cc
 import numpy as np
 from core_bench import Row, minimum_jerk, row
-
-import coglab_controllers as cc
 
 try:
     from movement_primitives.dmp import DMP

@@ -12,9 +12,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import coglab_controllers as cc
-import numpy as np
-
 import lockstep
+import numpy as np
 from core_bench import LIMITS, URDF, Row, minimum_jerk, row
 
 try:

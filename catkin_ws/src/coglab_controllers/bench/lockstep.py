@@ -6,7 +6,6 @@ Needs the robot in virtual time of coglab_sim; without it the bench reports the 
 from dataclasses import dataclass
 
 import numpy as np
-
 from core_bench import LIMITS, PRIMITIVES, URDF
 
 try:

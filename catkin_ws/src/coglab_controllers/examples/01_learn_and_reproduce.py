@@ -4,10 +4,9 @@
 import tempfile
 from pathlib import Path
 
+import coglab_controllers as cc
 import numpy as np
 from example_files import minimum_jerk, pyplot, save_plot
-
-import coglab_controllers as cc
 
 # A demonstration: times in s and positions in m, one row each. Here a reach that is lifted on its way.
 times = np.linspace(0.0, 1.2, 241)

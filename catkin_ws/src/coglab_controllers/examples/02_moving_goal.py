@@ -1,10 +1,9 @@
 #!/usr/bin/python3
 """A goal that steps aside, then drifts, then trembles: what the estimator makes of it."""
 
+import coglab_controllers as cc
 import numpy as np
 from example_files import PRIMITIVES, pyplot, save_plot
-
-import coglab_controllers as cc
 
 CYCLE = 0.005
 UPRIGHT = [0.0, 0.0, 0.0, 1.0]

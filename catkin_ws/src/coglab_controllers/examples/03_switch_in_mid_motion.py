@@ -1,10 +1,9 @@
 #!/usr/bin/python3
 """Replace the running primitive, or its speed, without a step in position or velocity (switch_dmp)."""
 
+import coglab_controllers as cc
 import numpy as np
 from example_files import PRIMITIVES, pyplot, save_plot
-
-import coglab_controllers as cc
 
 CYCLE, GOAL = 0.005, np.array([0.4, 0.0, -0.2])
 library = cc.Library()

@@ -1,10 +1,9 @@
 #!/usr/bin/python3
 """Follow a Cartesian motion with the arm: translation first, orientation in what freedom is left."""
 
+import coglab_controllers as cc
 import numpy as np
 from example_files import LIMITS, PRIMITIVES, URDF, pyplot, save_plot
-
-import coglab_controllers as cc
 
 CYCLE = 0.005
 chain = cc.Chain(URDF.read_text())

@@ -1,10 +1,9 @@
 #!/usr/bin/python3
 """A point-to-point motion that begins while the arm still moves, through the bridge's interpolator."""
 
+import coglab_controllers as cc
 import numpy as np
 from example_files import LIMITS, pyplot, save_plot
-
-import coglab_controllers as cc
 
 CYCLE, KP = 0.005, 10.0
 limits = cc.load_joint_limits(str(LIMITS))

@@ -1,10 +1,9 @@
 #!/usr/bin/python3
 """Drive the arm against its limits: the guard slows the whole vector and names the reason."""
 
+import coglab_controllers as cc
 import numpy as np
 from example_files import LIMITS, URDF, pyplot, save_plot
-
-import coglab_controllers as cc
 
 CYCLE = 0.005
 chain = cc.Chain(URDF.read_text())

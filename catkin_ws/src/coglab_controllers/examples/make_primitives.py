@@ -9,9 +9,8 @@ trapezoidal one (Huber et al. 2008).
 
 import sys
 
-import numpy as np
-
 import coglab_controllers as cc
+import numpy as np
 
 SAMPLES = 241
 

@@ -30,9 +30,8 @@ def equality() -> float | None:
         import mujoco  # noqa: F401
     except ImportError:
         return None
-    from test_dynamics_oracle import Oracle
-
     from coglab_sim import _cell
+    from test_dynamics_oracle import Oracle
     oracle, random, worst = Oracle(), np.random.default_rng(1), 0.0
     for _ in range(1000):
         position, velocity = random.uniform(-2.0, 2.0, 7), random.uniform(-2.0, 2.0, 7)

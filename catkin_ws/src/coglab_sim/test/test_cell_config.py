@@ -3,9 +3,8 @@ from pathlib import Path
 
 import pytest
 import yaml
-from conftest import URDF
-
 from coglab_sim import _cell
+from conftest import URDF
 
 PACKAGE = Path(__file__).resolve().parents[1]
 CONFIG = yaml.safe_load((PACKAGE / 'config' / 'cell.yaml').read_text())

@@ -4,7 +4,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
 from coglab_sim import _cell
 
 URDF = Path(__file__).resolve().parents[2] / 'lwr_description' / 'urdf' / 'lwr_ih2.urdf'

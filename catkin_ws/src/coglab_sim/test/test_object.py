@@ -216,9 +216,8 @@ def test_noise_model(session):
 
 def test_rotations_are_reversed_on_the_wire_and_axes_are_those_of_the_base(session):
     """Table: wrench Fx Fy Fz Tz Ty Tx, Jacobian rows X Y Z RZ RY RX; read here against the model's own terms."""
-    from conftest import URDF
-
     from coglab_sim import _cell
+    from conftest import URDF
     s = session(torque_noise__sigma=0.0, torque_noise__bias=0.0, torque_noise__hysteresis=0.0)
     s.monitor()
     s.cell.set_push([1.0, 2.0, 3.0], [0.4, 0.5, 0.6])

@@ -3,7 +3,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
 from coglab_sim import _cell  # noqa: F401
 from coglab_sim.participant import Participant
 from coglab_sim.rigid import Frame

@@ -52,10 +52,10 @@ def make_controller(name: str, into: Path) -> Path:
     target.mkdir()
     for source in files:
         relative = str(source.relative_to(template_folder()))
-        for key, value in zip(PLACEHOLDERS, (name, snake)):
+        for key, value in zip(PLACEHOLDERS, (name, snake), strict=False):
             relative = relative.replace(key, value)
         text = source.read_text(encoding="utf-8")
-        for key, value in zip(PLACEHOLDERS, (name, snake)):
+        for key, value in zip(PLACEHOLDERS, (name, snake), strict=False):
             text = text.replace(key, value)
         destination = target / relative.removesuffix(".in")
         destination.parent.mkdir(parents=True, exist_ok=True)

@@ -46,7 +46,8 @@ def test_urdf_repeats_the_table(robot, table, index):
 
 
 def test_table_holds_the_smallest_published_velocities(table):
-    published = [[120, 120, 160, 160, 250, 220, 220], [110, 110, 128, 128, 204, 184, 184], [112.5] * 4 + [180, 112.5, 112.5],
+    published = [[120, 120, 160, 160, 250, 220, 220],
+                 [110, 110, 128, 128, 204, 184, 184], [112.5] * 4 + [180, 112.5, 112.5],
                  [110, 110, 130, 130, 130, 180, 180]]  # fmt: skip
     smallest = np.radians(np.min(published, axis=0))
     np.testing.assert_allclose(table["default"]["velocity"], smallest, atol=1e-9)
@@ -54,7 +55,7 @@ def test_table_holds_the_smallest_published_velocities(table):
 
 def test_t1_is_slower_everywhere(table):
     for name, values in table["t1"].items():
-        assert all(slow < fast for slow, fast in zip(values, table["default"][name]))
+        assert all(slow < fast for slow, fast in zip(values, table["default"][name], strict=False))
 
 
 @pytest.mark.parametrize("index", range(7))

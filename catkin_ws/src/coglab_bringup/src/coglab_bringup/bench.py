@@ -25,7 +25,7 @@ def find_benches(sources: Path) -> dict[str, Path]:
 
 def failed_row(name: str, reason: str) -> dict:
     """The row of a bench that gave no figures."""
-    return dict(zip(COLUMNS, (name, f"did not run: {reason}", None, "", "runs", None, None, False)))
+    return dict(zip(COLUMNS, (name, f"did not run: {reason}", None, "", "runs", None, None, False), strict=False))
 
 
 def run_bench(name: str, path: Path, python: str, limit: float = TIME_LIMIT) -> list[dict]:
@@ -60,7 +60,7 @@ def print_table(rows: list[dict]) -> None:
     cells = [[as_text(row[column]) for column in COLUMNS] for row in rows]
     widths = [max(len(column), *(len(line[i]) for line in cells)) for i, column in enumerate(COLUMNS)]
     for line in [list(COLUMNS), *cells]:
-        print("  ".join(cell.ljust(width) for cell, width in zip(line, widths)).rstrip(), flush=True)
+        print("  ".join(cell.ljust(width) for cell, width in zip(line, widths, strict=False)).rstrip(), flush=True)
 
 
 def main(arguments: list[str]) -> int:

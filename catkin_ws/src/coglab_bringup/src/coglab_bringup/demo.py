@@ -1,4 +1,4 @@
-"""./coglab demo: launches the simulated cell and the whole system, takes an object from the person and gives it back, writes what happened, stops."""
+"""./coglab demo: launches everything, takes an object from the person, gives it back, writes what happened, stops."""
 
 from __future__ import annotations
 
@@ -41,7 +41,11 @@ class System:
         self._log = log.open("w")
         command = ["roslaunch", "-p", str(port), "coglab_bringup", "coglab.launch", *arguments]
         self._process = subprocess.Popen(
-            command, env=environment, stdout=self._log, stderr=subprocess.STDOUT, stdin=subprocess.DEVNULL,
+            command,
+            env=environment,
+            stdout=self._log,
+            stderr=subprocess.STDOUT,
+            stdin=subprocess.DEVNULL,
             start_new_session=True,
         )
 
@@ -66,7 +70,7 @@ class System:
 
 
 def wait_for_master(system: System, limit: float) -> None:
-    """Waits until the ROS master of this run answers. Raises RuntimeError after `limit` seconds or if roslaunch ended."""
+    """Waits until the ROS master of this run answers. RuntimeError after `limit` seconds or if roslaunch ended."""
     import rosgraph
 
     deadline = time.monotonic() + limit
@@ -84,7 +88,9 @@ def main(arguments: list[str]) -> int:
     parser = argparse.ArgumentParser(prog="coglab demo", description=__doc__)
     parser.add_argument("--headless", action="store_true", help="no rviz, whatever is installed")
     parser.add_argument("--seed", type=int, default=7, help="seed of the virtual person and of all noise")
-    parser.add_argument("--out", type=Path, default=top / "out" / "demo", metavar="DIR", help="where result.json and trial.png go")
+    parser.add_argument(
+        "--out", type=Path, default=top / "out" / "demo", metavar="DIR", help="where result.json and trial.png go"
+    )
     options = parser.parse_args(arguments)
     began = time.monotonic()
     out: Path = options.out.absolute()
@@ -114,7 +120,9 @@ def main(arguments: list[str]) -> int:
             if row["outcome"] != "success":
                 break
         title = ", then ".join(f"{row['kind'].replace('_', ' ')}: {row['outcome']}" for row in result["handovers"])
-        draw_trial(recorder.stop(), f"{OBJECT}, seed {options.seed}; {title}", spans[0][0], spans[-1][1], out / "trial.png")
+        draw_trial(
+            recorder.stop(), f"{OBJECT}, seed {options.seed}; {title}", spans[0][0], spans[-1][1], out / "trial.png"
+        )
     except (RuntimeError, KeyboardInterrupt) as error:
         reason = str(error) or "interrupted"
         result["handovers"].append({"kind": KINDS[min(len(result["handovers"]), len(KINDS) - 1)], "outcome": reason})
@@ -124,7 +132,10 @@ def main(arguments: list[str]) -> int:
     good = sum(row["outcome"] == "success" for row in result["handovers"])
     for row in result["handovers"]:
         print(f"{row['kind']}: {row['outcome']}" + (f" in {row['duration_s']:.1f} s" if "duration_s" in row else ""))
-    print(f"{good} of {len(KINDS)} handovers succeeded; {out}/result.json and trial.png, log: {out}/roslaunch.log", flush=True)
+    print(
+        f"{good} of {len(KINDS)} handovers succeeded; {out}/result.json and trial.png, log: {out}/roslaunch.log",
+        flush=True,
+    )
     record_times(top, "demo", time.monotonic() - began)
     return 0 if good == len(KINDS) else 1
 

@@ -33,7 +33,7 @@ def release() -> dict[str, str]:
 
 
 def smach_copies(top: Path) -> list[Path]:
-    """Folders outside our own that hold a package named smach, smach_msgs or smach_ros in the workspace or ROS paths."""
+    """Folders outside our own, in the workspace or ROS paths, that hold a package smach, smach_msgs or smach_ros."""
     ours = top / "catkin_ws" / "src" / "executive_smach"
     places = [top / "catkin_ws" / "src", Path("/opt/ros"), Path("/usr/share")]
     places += [Path(p) for p in os.environ.get("ROS_PACKAGE_PATH", "").split(":") if p]
@@ -52,33 +52,58 @@ def findings(top: Path) -> list[tuple[bool, str]]:
     system = release()
     fine = system.get("VERSION_CODENAME") == "bookworm"
     name = system.get("PRETTY_NAME", "unknown")
-    result.append((fine, f"Debian 12 (bookworm): {name}" + ("" if fine else "; use Debian 12, or a container: docker/run")))
+    result.append(
+        (fine, f"Debian 12 (bookworm): {name}" + ("" if fine else "; use Debian 12, or a container: docker/run"))
+    )
     for group, packages in package_groups(top).items():
         missing = [package for package in packages if not installed(package)]
         if missing and group == "viz":
             result.append((True, "rviz is not installed (only needed where there is a screen): ./coglab install viz"))
         elif missing:
-            result.append((False, f"packages to {group}: missing {' '.join(missing)}; get them: ./coglab install {group}"))
+            result.append(
+                (False, f"packages to {group}: missing {' '.join(missing)}; get them: ./coglab install {group}")
+            )
         else:
             result.append((True, f"packages to {group}: all {len(packages)} installed"))
     built = (top / "catkin_ws" / "devel" / "setup.bash").exists()
     result.append((built, "workspace: built" if built else "workspace: not built yet; do it: ./coglab build"))
     python = shutil.which("python3")
     if python != "/usr/bin/python3":
-        result.append((True, f"python3 in your PATH is {python}; ./coglab uses /usr/bin/python3 anyway, and so does devel/setup.bash"))
-    foreign = [v for v in ("ROS_DISTRO", "ROS_ROOT", "CMAKE_PREFIX_PATH", "ROS_PACKAGE_PATH") if "/opt/ros" in os.environ.get(v, "")]
+        result.append(
+            (
+                True,
+                f"python3 in your PATH is {python}; ./coglab uses /usr/bin/python3 anyway, as does devel/setup.bash",
+            )
+        )
+    foreign = [
+        v
+        for v in ("ROS_DISTRO", "ROS_ROOT", "CMAKE_PREFIX_PATH", "ROS_PACKAGE_PATH")
+        if "/opt/ros" in os.environ.get(v, "")
+    ]
     if foreign:
-        result.append((False, f"a ROS from /opt/ros is in {', '.join(foreign)}; open a shell without it before sourcing devel/setup.bash"))
+        result.append(
+            (
+                False,
+                f"a ROS from /opt/ros is in {', '.join(foreign)}; open a shell without it and source devel/setup.bash",
+            )
+        )
     cache = top / "catkin_ws" / "build" / "CMakeCache.txt"
     upstream = cache.is_file() and "=smach;smach_msgs;smach_ros" in cache.read_text()
     if upstream:
         result.append((True, "smach: upstream's, as built with --upstream-smach; ours again: ./coglab build"))
     for copy in [] if upstream else smach_copies(top):
-        result.append((False, f"a second copy of {copy.name} lies in {copy}; remove it, or build with ./coglab build --upstream-smach"))
+        result.append(
+            (
+                False,
+                f"a second copy of {copy.name} lies in {copy}; remove it, or use it: ./coglab build --upstream-smach",
+            )
+        )
     try:
         socket.getaddrinfo(socket.gethostname(), None)
     except OSError:
-        result.append((True, f"the host name {socket.gethostname()} does not resolve; harmless, because ROS_IP=127.0.0.1 is set"))
+        result.append(
+            (True, f"the host name {socket.gethostname()} does not resolve; harmless, because ROS_IP=127.0.0.1 is set")
+        )
     if shutil.disk_usage(top).free < 2e9:
         result.append((False, "less than 2 GB free where this folder lies; make room before building"))
     return result

@@ -1,4 +1,4 @@
-"""Asks a running system for one handover, as any user can, and waits for its end. Used by the demo and the whole-system tests."""
+"""Asks a running system for one handover, as any user can, and waits for its end. For the demo and the tests."""
 
 from __future__ import annotations
 
@@ -40,8 +40,13 @@ def ask_for(action: str, object_id: str, alive: Callable[[], bool], limit: float
     raise RuntimeError(f"{action} was not taken within {limit:.0f} s: {refusal}")
 
 
-def run_handover(kind: str, object_id: str, recorder: TrialRecorder, alive: Callable[[], bool] = lambda: True) -> tuple[dict, float, float]:
-    """Asks for one handover and waits for the hub after it, while `recorder` listens; its result row, and when it began and ended."""
+def run_handover(
+    kind: str, object_id: str, recorder: TrialRecorder, alive: Callable[[], bool] = lambda: True
+) -> tuple[dict, float, float]:
+    """Asks for one handover and waits for the hub after it, while `recorder` listens.
+
+    Returns its result row and when it began and ended (s of ROS time).
+    """
     table = Path(rospkg.RosPack().get_path("lwr_description")) / "config" / "joint_limits.yaml"
     limits = np.array(yaml.safe_load(table.read_text())["default"]["velocity"])
     ask_for(kind, object_id, alive, READY_LIMIT)

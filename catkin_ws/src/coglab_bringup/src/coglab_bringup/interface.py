@@ -33,7 +33,11 @@ TOPICS: dict[str, dict[str, str]] = {
         "smach/container_status": "smach_msgs/SmachContainerStatus",
         "smach/container_init": "smach_msgs/SmachContainerInitialStatusCmd",
     },
-    "/": {"joint_states": "sensor_msgs/JointState", "tf": "tf2_msgs/TFMessage", "diagnostics": "diagnostic_msgs/DiagnosticArray"},
+    "/": {
+        "joint_states": "sensor_msgs/JointState",
+        "tf": "tf2_msgs/TFMessage",
+        "diagnostics": "diagnostic_msgs/DiagnosticArray",
+    },
 }
 SERVICES: dict[str, list[str]] = {
     "/lwr": ["command"],
@@ -45,7 +49,17 @@ SERVICES: dict[str, list[str]] = {
     "/coglab": ["start", "stop"],
     "/perception": ["init_vision", "locate_object", "free_places"],
 }  # fmt: skip
-NODES = ["/robot", "/perception", "/motion_recogniser", "/ih2_hand", "/coglab", "/object_database", "/contact_detector", "/robot_state_publisher", "/joint_state_publisher"]
+NODES = [
+    "/robot",
+    "/perception",
+    "/motion_recogniser",
+    "/ih2_hand",
+    "/coglab",
+    "/object_database",
+    "/contact_detector",
+    "/robot_state_publisher",
+    "/joint_state_publisher",
+]
 FRAMES = ["world", "lwr_base_link", "lwr_flange", "ih2_palm", "human_hand", "object_mug", "board"]
 
 
@@ -55,7 +69,7 @@ def joined(namespace: str, name: str) -> str:
 
 
 def missing_names(topics: dict[str, str], services: set[str], nodes: set[str]) -> list[str]:
-    """What is missing, or has another type, in a graph: `topics` with their types, `services` and `nodes`, all by full name."""
+    """What is missing, or has another type, in a graph: `topics` with types, `services` and `nodes`, by full name."""
     problems = []
     for namespace, names in TOPICS.items():
         for name, kind in names.items():

@@ -21,7 +21,7 @@ def main(arguments: list[str]) -> int:
         del arguments[at : at + 2]
         if not port_is_free(port):
             print(
-                f"[coglab] error: port {port} is in use by another program; leave out -p for a free one, or name another",
+                f"[coglab] error: port {port} is in use by another program; leave out -p for a free one",
                 file=sys.stderr,
             )
             return 1

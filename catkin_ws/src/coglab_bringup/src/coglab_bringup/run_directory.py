@@ -45,7 +45,7 @@ def run_environment(port: int, home: Path | None = None) -> dict[str, str]:
 
 
 def record_times(top: Path, command: str, seconds: float) -> None:
-    """Keeps the wall times (s) of the first and the last run of ./coglab demo or test on this machine, for ./coglab bench wall.
+    """Keeps wall times (s) of the first and the last ./coglab demo or test on this machine, for ./coglab bench wall.
 
     `seconds` is the run itself; what installing and building took before it comes from the environment.
     """
@@ -55,7 +55,12 @@ def record_times(top: Path, command: str, seconds: float) -> None:
     times = json.loads(path.read_text()) if path.is_file() else {}
     install = float(os.environ.get("COGLAB_INSTALL_SECONDS", "0"))
     build = float(os.environ.get("COGLAB_BUILD_SECONDS", "0"))
-    row = {"install_s": install, "build_s": build, "run_s": round(seconds, 1), "total_s": round(install + build + seconds, 1)}
+    row = {
+        "install_s": install,
+        "build_s": build,
+        "run_s": round(seconds, 1),
+        "total_s": round(install + build + seconds, 1),
+    }
     times.setdefault(f"first_{command}", row)
     times[f"last_{command}"] = row
     path.write_text(json.dumps(times, indent=1) + "\n")

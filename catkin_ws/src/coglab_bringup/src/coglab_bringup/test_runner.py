@@ -1,7 +1,8 @@
 """./coglab test: finds and runs every test of the workspace and counts each case once, from the JUnit files.
 
 Three kinds, found by where they lie in a package:
-  gtest    test/test_THING.cpp, built by the target `tests` as <package>_test_THING in devel/lib/<package>; not built is a failure
+  gtest    test/test_THING.cpp, built by the target `tests` as devel/lib/<package>/<package>_test_THING;
+           not built is a failure
   pytest   test/test_*.py (smach's own packages one level deeper alike)
   rostest  test/*.test, one at a time, each with a ROS master of its own
 gtests and pytests of different packages run two at a time; rostests run alone, because they measure real time.
@@ -89,7 +90,7 @@ def count_cases(program: Program, report: Path) -> None:
 
 
 def count(program: Program, status: int | None) -> None:
-    """Reads the program's JUnit files; a program without one, or that died without a red case, counts as one failure."""
+    """Reads the program's JUnit files; one without such a file, or that died without a red case, is one failure."""
     if program.kind == "rostest":
         # rosunit-*.xml holds the cases; rostest-*.xml only says whether each test node left such a file
         reports = sorted(program.junit.rglob("rosunit-*.xml"))
@@ -123,8 +124,12 @@ def run(program: Program, log: Path, limit: float) -> None:
         return
     with log.open("w") as output:
         process = subprocess.Popen(
-            program.command, stdout=output, stderr=subprocess.STDOUT, stdin=subprocess.DEVNULL,
-            env=environment, start_new_session=True,
+            program.command,
+            stdout=output,
+            stderr=subprocess.STDOUT,
+            stdin=subprocess.DEVNULL,
+            env=environment,
+            start_new_session=True,
         )
         status: int | None
         try:

@@ -7,10 +7,10 @@ from pathlib import Path
 import matplotlib
 
 matplotlib.use("Agg")
-import matplotlib.pyplot as plt  # noqa: E402  (the backend has to be chosen first)
-import numpy as np  # noqa: E402
+import matplotlib.pyplot as plt
+import numpy as np
 
-from coglab_bringup.trial_recorder import Trial  # noqa: E402
+from coglab_bringup.trial_recorder import Trial
 
 # Okabe and Ito's colours: told apart by colour-blind readers too
 COLOURS = ["#0072B2", "#E69F00", "#009E73", "#D55E00", "#56B4E9", "#CC79A7", "#1B1F24"]
@@ -86,7 +86,9 @@ def _phases(axis: plt.Axes, trial: Trial, start: float, end: float) -> None:
 
 def draw_trial(trial: Trial, title: str, start: float, end: float, path: Path) -> None:
     """Writes the picture of the trial between `start` and `end` (s of ROS time) as PNG."""
-    figure, axes = plt.subplots(5, 1, figsize=(10, 11), sharex=True, height_ratios=[1.3, 1.5, 1, 1.2, 1], layout="constrained")
+    figure, axes = plt.subplots(
+        5, 1, figsize=(10, 11), sharex=True, height_ratios=[1.3, 1.5, 1, 1.2, 1], layout="constrained"
+    )
     _phases(axes[0], trial, start, end)
     axes[0].set_title(title, fontsize=10, loc="left")
     truth = [row for row in trial.truth if start <= row[0] <= end]

@@ -1,4 +1,7 @@
-"""Listens to one trial and keeps what its result and its plot need. Reads the simulated truth: it measures, it does not control."""
+"""Listens to one trial and keeps what its result and its plot need.
+
+Reads the simulated truth: it measures, it does not control.
+"""
 
 from __future__ import annotations
 
@@ -93,12 +96,15 @@ class TrialRecorder:
 def summarise(trial: Trial, kind: str, outcome: str, start: float, end: float, velocity_limits: np.ndarray) -> dict:
     """The figures of one handover between `start` and `end` (s), for result.json.
 
-    final_error_mm: hand to the goal that the motion latched at its end, from goals as received; contact_delay_ms: from the first touch (truth)
-    to the detector's sample; fri_lost: FRI packets lost meanwhile, as far as the bridge reported once a second; peak_velocity_share: largest
-    joint speed over its limit. None where nothing was measured (no contact is waited for where the robot gives).
+    final_error_mm: hand to the goal that the motion latched at its end, from goals as received; contact_delay_ms: from
+    the first touch (truth) to the detector's sample; fri_lost: FRI packets lost meanwhile, as the bridge reports
+    once a second; peak_velocity_share: largest joint speed over its limit. None where nothing was measured (no contact is
+    waited for where the robot gives).
     """
     contact = next((t for t, found, _ in trial.contacts if found and start <= t <= end), None)
-    until = next((t for t, _, _ in trial.contacts if start <= t <= end), end)  # after a contact or a release the arm goes home
+    until = next(
+        (t for t, _, _ in trial.contacts if start <= t <= end), end
+    )  # after a contact or a release the arm goes home
     arrived = [d for t, state, d in trial.feedback if start <= t <= until and state in ("reached", "holding")]
     touch = next((t for t, *_, force in trial.truth if start <= t <= end and force > FORCE_THRESHOLD), None)
     lost_before = [count for t, count in trial.fri_lost if t <= start] or [count for _, count in trial.fri_lost][:1]
