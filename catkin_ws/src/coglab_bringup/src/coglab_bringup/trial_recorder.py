@@ -98,8 +98,8 @@ def summarise(trial: Trial, kind: str, outcome: str, start: float, end: float, v
 
     final_error_mm: hand to the goal that the motion latched at its end, from goals as received; contact_delay_ms: from
     the first touch (truth) to the detector's sample; fri_lost: FRI packets lost meanwhile, as the bridge reports
-    once a second; peak_velocity_share: largest joint speed over its limit. None where nothing was measured (no contact is
-    waited for where the robot gives).
+    once a second; peak_velocity_share: largest joint speed over its limit. None where nothing was measured (no contact
+    is waited for where the robot gives).
     """
     contact = next((t for t, found, _ in trial.contacts if found and start <= t <= end), None)
     until = next(
