@@ -27,8 +27,10 @@ def main() -> None:
         later = round(time.monotonic() - start, 1)
     recorded = top / ".coglab" / "times.json"
     times = json.loads(recorded.read_text()) if recorded.is_file() else {}
+    setup = times.get("setup", {"install_s": 0.0, "build_s": 0.0})
+    first = setup["install_s"] + setup["build_s"] + later
     rows = [
-        row("first demo on this machine: packages, build, run", times.get("first_demo", {}).get("total_s"), 600),
+        row("demo with the longest installation and build recorded in this checkout", round(first, 1), 600),
         row("demo again", later, 60),
         row("./coglab test, as last run", times.get("last_test", {}).get("total_s"), 900),
     ]

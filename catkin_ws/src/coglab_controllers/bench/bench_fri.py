@@ -200,10 +200,10 @@ def main() -> None:
         figure: str,
         value: float,
         unit: str,
-        goal: str = "",
+        goal: str = "reported",
         peer: str | None = None,
         peer_value: float | None = None,
-        ok: bool | None = None,
+        ok: bool = True,
     ) -> dict[str, object]:
         return {
             "bench": "fri",

@@ -63,4 +63,6 @@ def record_times(top: Path, command: str, seconds: float) -> None:
     }
     times.setdefault(f"first_{command}", row)
     times[f"last_{command}"] = row
+    longest = times.setdefault("setup", {"install_s": 0.0, "build_s": 0.0})  # whichever command had to do it
+    longest.update(install_s=max(install, longest["install_s"]), build_s=max(build, longest["build_s"]))
     path.write_text(json.dumps(times, indent=1) + "\n")
