@@ -44,6 +44,16 @@ def test_state_intervals_end_where_states_end():
     assert intervals["/m"] == [(1.0, 1.0, "idle"), (1.0, 3.0, "work"), (3.0, 5.0, "idle")]
 
 
+def test_a_child_of_a_concurrence_begins_with_it():
+    trial = Trial()
+    trial.transitions = [
+        (1.0, "/m", "idle", "go", "both", ""),
+        (2.5, "/m/both/left", "first", "done", "done", ""),
+        (3.0, "/m", "both", "done", "idle", ""),
+    ]
+    assert state_intervals(trial, 5.0)["/m/both/left"] == [(1.0, 2.5, "first")]
+
+
 def test_an_outcome_named_like_the_next_state_leads_to_it():
     trial = Trial()
     trial.transitions = [

@@ -38,7 +38,10 @@ def state_intervals(trial: Trial, end: float) -> dict[str, list[tuple[float, flo
     begun: dict[str, float] = {}  # container -> time
     left = {(path, from_state) for _, path, from_state, _, _, _ in trial.transitions}
     for t, path, from_state, outcome, to_state, _ in trial.transitions:
-        since = entered.pop((path, from_state), begun.get(path, trial.transitions[0][0]))
+        above = path  # a child of a concurrence begins with it, and no transition leads to it
+        while above and above not in begun:
+            above = above.rpartition("/")[0]
+        since = entered.pop((path, from_state), begun.get(above, trial.transitions[0][0]))
         intervals.setdefault(path, []).append((since, t, from_state))
         # a sibling, not the container's own outcome: it is left later, or (still active) not named like the outcome
         if (path, to_state) in left or to_state != outcome:
