@@ -97,6 +97,28 @@ def test_monitor_keeps_the_primitive_that_fits():
     assert trial.cell.called("switch_dmp") == []
 
 
+def test_monitor_waits_until_it_is_sure():
+    trial = Trial(**{"monitor.primitives": {"mid": "reach_human", "high": "reach_human_high"},
+                     "monitor.confidence": 0.9999})
+    trial.cell.partner.pattern, trial.cell.partner.pattern_at = "high", 0.4
+    trial.run(receive)
+    assert trial.cell.called("switch_dmp") == []
+
+
+def test_monitor_leaves_the_primitive_of_giving_alone():
+    trial = Trial(**{"monitor.primitives": {"mid": "reach_human", "high": "reach_human_high"}})
+
+    def script(t):
+        receive(t)
+        t.cell.calls.clear()
+        t.cell.partner.pattern, t.cell.partner.pattern_at = "high", 0.4
+        t.start("exchange_robot_to_human")
+        t.wait_hub("wait_without_object")
+
+    trial.run(script)
+    assert trial.cell.called("execute_dmp") and trial.cell.called("switch_dmp") == []
+
+
 def test_robot_to_human_order_without_a_new_query(trial):
     def script(t):
         receive(t)

@@ -208,7 +208,9 @@ class WaitStop(CoglabState):
 
 class MonitorDmp(CoglabState):
     """Beside the motion: if another reaching pattern is recognised, substitute its primitive (switch_dmp).
-    Runs until preempted."""
+
+    Only among the primitives of ``monitor.primitives``: a motion that runs with another one (giving, the board) is left
+    alone. A pattern counts from ``monitor.confidence`` on. Runs until preempted."""
 
     default_time_limit = 60.0
 
@@ -220,6 +222,8 @@ class MonitorDmp(CoglabState):
             self.wait_for(lambda: False, "the end of the motion")
         running = ud.goal["primitive"]
         family = dict(self.ctx.config.get("monitor.primitives", {}))
+        if running not in family.values():
+            family = {}
         switches = 0
         while True:
             try:
@@ -245,7 +249,8 @@ class MonitorDmp(CoglabState):
         if self.ctx.arm.dmp_progress().state not in ("running", "holding"):
             return False
         seen = self.ctx.perception.recognition()
-        return seen.decided and seen.pattern in family and family[seen.pattern] != running
+        sure = seen.decided and seen.confidence >= float(self.ctx.config.get("monitor.confidence", 0.9))
+        return sure and seen.pattern in family and family[seen.pattern] != running
 
 
 class PtpMotion(CoglabState):
