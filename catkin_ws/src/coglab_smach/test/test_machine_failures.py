@@ -185,15 +185,20 @@ def test_stop_holds_never_opens_the_hand_and_needs_a_reset(moment):
 
 def test_stop_in_a_hub_is_stopped_too():
     trial = Trial()
+    moved = []  # what the machine asked of arm and hand while it was stopped
 
     def script(t):
         t.wait_hub("wait_without_object")
+        t.cell.calls.clear()
         t.ctx.stop.press("the operator pressed STOP")
         t.wait_hub("stopped")
+        moved.extend(t.cell.called("move") + t.cell.called("open") + t.cell.called("execute"))
         t.start("reset", "")
         t.wait_hub("wait_without_object")
 
     trial.run(script)
+    assert not moved
+    assert not trial.ctx.stop.pressed()
 
 
 def test_trigger_in_the_wrong_hub_is_refused_with_a_sentence(trial):

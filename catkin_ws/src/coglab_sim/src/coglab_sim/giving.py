@@ -3,34 +3,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from .participant import Participant
-from .scene import Scene, WorldView
+from .phases import Phases
+from .scene import WorldView
 
 SLIP = 0.010
 """m: an object that has sunk this much in the robot's hand while the grip opens is slipping."""
 
 
-class Giving:
-    """Phases of VirtualHuman; its attributes are made there."""
-
-    participant: Participant
-    scene: Scene
-    phase: str
-    _task: str
-    _since: float
-    _hand: np.ndarray
-    _velocity: np.ndarray
-    _grip: float
-    _load_since: float | None
-    _felt_since: float | None
-    _travelled: float
-    _height_in_palm: float
-
-    def _go(self, phase: str, t: float) -> None:
-        raise NotImplementedError
-
-    def _retreat(self, t: float) -> None:
-        raise NotImplementedError
+class Giving(Phases):
+    """Phases of VirtualHuman."""
 
     def _placing(self, t: float, dt: float, view: WorldView) -> None:
         """Bring the object into the palm, against the palm's outward axis, until it is felt; then press a little."""

@@ -3,31 +3,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from .participant import Participant
-from .scene import Scene, WorldView
+from .phases import Phases
+from .scene import WorldView
 
 
-class Receiving:
-    """Phases of VirtualHuman; its attributes are made there."""
-
-    participant: Participant
-    scene: Scene
-    phase: str
-    _task: str
-    _since: float
-    _hand: np.ndarray
-    _velocity: np.ndarray
-    _grip: float
-    _load_since: float | None
-    _felt_since: float | None
-    _travelled: float
-    _height_in_palm: float
-
-    def _go(self, phase: str, t: float) -> None:
-        raise NotImplementedError
-
-    def _retreat(self, t: float) -> None:
-        raise NotImplementedError
+class Receiving(Phases):
+    """Phases of VirtualHuman."""
 
     def _grasping(self, t: float, dt: float, view: WorldView) -> None:
         """Receiving: close the last way to the object, grip it, then lift until the robot lets go."""

@@ -77,7 +77,7 @@ def test_s13_defaults():
 def test_s0_submodules():
     for name in """util introspection simple_action_state service_state monitor_state
             condition_state action_server_wrapper""".split():
-        importlib.import_module(f"smach_ros.{name}")
+        assert importlib.import_module(f"smach_ros.{name}").__doc__
 
 
 def test_s0_importing_smach_ros_redirects_log_and_shutdown_check():
