@@ -4,7 +4,7 @@
 Names are relative to the node's namespace.
 Services: coglab/start (coglab_msgs/Start), coglab/stop, coglab/why (std_srvs/Trigger).
 Topics: coglab/transitions (coglab_msgs/Transition), coglab/results (std_msgs/String, one JSON object per action,
-latched), coglab/holding (std_msgs/String, what the hand holds, latched).
+latched), coglab/holding (std_msgs/String, what the hand holds, latched), coglab/state (coglab_msgs/MasterState, latched).
 Parameters: perception/frames (names of human_hand and board). Private: config_file, dmp_library (path of the
 primitives), auto_trigger, result_file (JSON lines), state_file (what the hand holds, to survive a restart; default
 coglab_holding.json in ROS_HOME), config_overrides (mapping of dotted names), introspection (default true).
@@ -19,14 +19,17 @@ import rospkg
 import rospy
 import smach
 import smach_ros
+from coglab_msgs.msg import MasterState as MasterStateMsg
 from coglab_msgs.msg import Transition
 from coglab_msgs.srv import Start, StartResponse
 from coglab_smach.config import Config, ConfigError
 from coglab_smach.context import Context
 from coglab_smach.holding import HoldingMemory
-from coglab_smach.journal import ActionRecord, Journal, TransitionRecord
+from coglab_smach.journal import NOTHING_FAILED, ActionRecord, Journal, TransitionRecord
 from coglab_smach.machines import build_master
+from coglab_smach.master_state import MasterState, StateWatch
 from coglab_smach.reachability import solve
+from coglab_smach.requests import ask_for, command
 from coglab_smach.ros_arm import RosArm
 from coglab_smach.ros_hand import RosHand
 from coglab_smach.ros_ports import RosContact, RosDatabase, RosPerception
@@ -69,6 +72,8 @@ class MasterNode:
                            database=RosDatabase(), contact=RosContact(), config=config, journal=self.journal,
                            memory=Memory(self.state_file(), rospy.logwarn), reachable=self.reachable())
         self.master = build_master(self.ctx)
+        self.states = rospy.Publisher("coglab/state", MasterStateMsg, queue_size=20, latch=True)
+        self.watch = StateWatch(self.ctx, self.on_state)
         self.server = None
         if rospy.get_param("~introspection", True):
             self.server = smach_ros.IntrospectionServer("coglab", self.master, "/coglab_master")
@@ -94,9 +99,9 @@ class MasterNode:
 
     def on_start(self, request):
         """A trigger for the hub that is open now."""
-        accepted, message = self.ctx.requests.submit(request.action, request.object_id)
-        rospy.loginfo("start %s %s: %s", request.action, request.object_id, message)
-        return StartResponse(accepted, message)
+        answer = ask_for(self.ctx, request.action, request.object_id)
+        rospy.loginfo("start %s %s: %s", request.action, request.object_id, answer.message)
+        return StartResponse(answer.ok, answer.code, answer.message)
 
     def on_stop(self, _request):
         """STOP: the arm brakes and latches, the machine ends the action; the hand keeps what it holds."""
@@ -109,18 +114,26 @@ class MasterNode:
             if not pending.done():
                 return TriggerResponse(False, "STOP is latched in the machine, but the LWR interface did not answer "
                                               "within 2 s: use the emergency stop of the robot")
-            return TriggerResponse(True, f"STOP: {pending.result()}")
+            return TriggerResponse(True, f"STOP: {pending.result()}; to go on {command('reset')}")
         except Exception as error:
             return TriggerResponse(False, f"STOP is latched in the machine, but: {error}")
 
     def on_why(self, _request):
         """'Why did it stop?' in one sentence."""
-        return TriggerResponse(True, self.journal.why())
+        return TriggerResponse(True, self.watch.now().why or NOTHING_FAILED)
+
+    def on_state(self, state: MasterState) -> None:
+        """Latched topic."""
+        message = MasterStateMsg(state=state.state, in_hub=state.in_hub, actions=list(state.actions),
+                                 object_id=state.object_id, why=state.why, reason_code=state.reason_code)
+        message.header.stamp = rospy.Time.now()
+        publish(self.states, message)
 
     def on_transition(self, record: TransitionRecord) -> None:
         """Topic and log."""
         message = Transition(path=record.path, from_state=record.from_state, outcome=record.outcome,
-                             to_state=record.to_state, reason=record.reason, causes=list(record.causes))
+                             to_state=record.to_state, reason_code=record.code, reason=record.reason,
+                             causes=list(record.causes))
         message.header.stamp = rospy.Time.now()
         publish(self.transitions, message)
         (rospy.logwarn if record.outcome in ("failed", "fault", "stopped") else rospy.loginfo)(record.sentence())

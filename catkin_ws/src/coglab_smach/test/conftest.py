@@ -54,7 +54,7 @@ class Trial:
 
     def start(self, action, object_id="mug"):
         """Trigger an action; it must be accepted."""
-        ok, message = self.ctx.requests.submit(action, object_id)
+        ok, message, _ = self.ctx.requests.submit(action, object_id)
         assert ok, message
         self.clock.sleep(0.1)
 

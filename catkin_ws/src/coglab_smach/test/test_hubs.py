@@ -21,12 +21,12 @@ def test_a_hold_in_a_hub_is_shown_and_needs_a_reset(with_object):
         receive(t) if with_object else t.wait_hub("wait_without_object")
         hub = t.ctx.requests.hub()
         before = len(t.cell.called())
-        t.cell.held = True  # somebody sent 'hold' to the robot without asking this machine
+        t.cell.arm.held = True  # somebody sent 'hold' to the robot without asking this machine
         t.wait_hub("stopped", limit=2.0)
-        assert t.ctx.journal.why() == ("the arm is blocked: hold is latched; reset first; ask for 'reset' when its "
-                                       "cause is away")
-        ok, message = t.ctx.requests.submit("take", "mug")
-        assert not ok and message == "'take' refused: stopped takes reset"
+        assert t.ctx.journal.why() == ("the arm is blocked: hold is latched; reset first; when its cause is away, "
+                                       "type: ./coglab start reset")
+        ok, message, _ = t.ctx.requests.submit("take", "mug")
+        assert not ok and message == "'take' refused: stopped takes reset; type: ./coglab start reset"
         assert t.cell.called()[before:] == [], "something moved in a hub that is blocked"
         t.start("reset", "")
         t.wait_hub(hub)
@@ -43,7 +43,7 @@ def test_command_mode_lost_in_a_hub_is_started_again_by_the_reset():
 
     def script(t):
         t.wait_hub("wait_without_object")
-        t.cell.enabled = False
+        t.cell.arm.enabled = False
         t.wait_hub("stopped", limit=2.0)
         assert "command mode was not asked for" in t.ctx.journal.why()
         t.cell.calls.clear()
@@ -59,9 +59,9 @@ def test_a_hiccup_does_not_leave_the_hub():
 
     def script(t):
         t.wait_hub("wait_without_object")
-        t.cell.held = True
+        t.cell.arm.held = True
         t.clock.sleep(0.3)
-        t.cell.held = False
+        t.cell.arm.held = False
         t.clock.sleep(1.0)
         assert t.ctx.requests.hub() == "wait_without_object"
 
@@ -91,7 +91,7 @@ def test_a_hold_during_an_action_never_opens_the_hand():
         t.cell.calls.clear()
         t.start("exchange_robot_to_human")
         t.clock.sleep(0.8)
-        t.cell.held = True
+        t.cell.arm.held = True
         t.wait_hub("stopped", limit=10.0)
         t.clock.sleep(3.0)
         assert "open" not in t.cell.called() and t.ctx.holding == "mug"
@@ -111,7 +111,7 @@ def test_a_hold_while_the_person_gives_does_not_move_the_hand():
         t.cell.calls.clear()
         t.start("exchange_human_to_robot")
         t.clock.sleep(0.8)
-        t.cell.held = True
+        t.cell.arm.held = True
         t.wait_hub("stopped", limit=10.0)
         t.clock.sleep(3.0)
         assert "open" not in t.cell.called() and "close" not in t.cell.called()
@@ -128,12 +128,13 @@ def test_why_names_the_block_and_not_only_what_failed_before_it():
         t.wait_hub("wait_without_object")
         t.cell.faults.not_seen.add("mug")
         t.start("exchange_human_to_robot")
-        t.cell.held = True
+        t.cell.arm.held = True
         t.wait_hub("stopped", limit=15.0)
 
     trial.run(script)
     assert trial.ctx.journal.why() == (
-        "the arm is blocked: hold is latched; reset first; the hand keeps what it holds, because set_dmp_goal: 'mug' "
+        "the arm is blocked: hold is latched; reset first; the hand keeps what it holds; when its cause is "
+        "away, type: ./coglab start reset, because set_dmp_goal: 'mug' "
         "was not seen within 5.0 s")
     assert trial.result().reason.startswith("the arm is blocked: hold is latched")
 
@@ -143,7 +144,7 @@ def test_a_robot_node_that_came_back_empty_ends_in_fault_with_that_reason():
 
     def script(t):
         t.wait_hub("wait_without_object")
-        t.cell.enabled = False
+        t.cell.arm.enabled = False
         t.wait_hub("stopped", limit=2.0)
         t.cell.loaded.clear()  # killed and started again: nothing is loaded any more
         t.start("reset", "")
@@ -162,7 +163,7 @@ class Restarted(Trial):
         super().__init__(**overrides)
         self.ctx.memory = HoldingMemory(str(path))
         self.cell.hand_positions = (200, 150, 160, 155, 170)
-        self.cell.enabled = True
+        self.cell.arm.enabled = self.cell.calibrated = True
 
 
 @pytest.fixture
@@ -192,9 +193,9 @@ def test_a_restart_that_remembers_nothing_asks_for_the_objects_name(tmp_path):
 
     def script(t):
         t.wait_hub("wait_with_object")
-        ok, message = t.ctx.requests.submit("put", "")
+        ok, message, _ = t.ctx.requests.submit("put", "")
         assert not ok and message == ("'put' refused: the hand holds an object that is not known after a restart; "
-                                      "name its object_id")
+                                      "name its object_id, type: ./coglab start put OBJECT")
         t.start("put", "elephant")
         t.wait_hub("wait_with_object")
         assert "'elephant' is not in the database" in [r for r in t.ctx.journal.transitions

@@ -24,7 +24,7 @@ def assert_recovered_empty(trial, sentence):
     calls = trial.cell.called()
     assert "open" in calls and calls[-1] != "execute_dmp"
     assert trial.ctx.holding == ""
-    assert trial.cell.active == "ptp"
+    assert trial.cell.arm.active == "ptp"
     home = trial.ctx.config.get("postures.home")
     assert list(trial.cell.joints) == home
 
@@ -204,11 +204,12 @@ def test_stop_in_a_hub_is_stopped_too():
 def test_trigger_in_the_wrong_hub_is_refused_with_a_sentence(trial):
     def script(t):
         t.wait_hub("wait_without_object")
-        ok, message = t.ctx.requests.submit("exchange_robot_to_human", "mug")
+        ok, message, _ = t.ctx.requests.submit("exchange_robot_to_human", "mug")
         assert not ok and message == ("'exchange_robot_to_human' refused: wait_without_object takes "
-                                      "exchange_human_to_robot, take")
+                                      "exchange_human_to_robot, take; type: ./coglab start exchange_human_to_robot or "
+                                      "./coglab start take")
         t.start("exchange_human_to_robot")
-        ok, message = t.ctx.requests.submit("take", "mug")
+        ok, message, _ = t.ctx.requests.submit("take", "mug")
         assert not ok and "not in a hub now" in message
 
     trial.run(script)
@@ -252,7 +253,7 @@ def test_recognition_leaves_the_hub_where_configured():
 
     def script(t):
         t.wait_hub("wait_without_object")
-        t.cell.motion_started = t.clock.now()
+        t.cell.arm.motion_started = t.clock.now()
         t.cell.partner.pattern = "offer"
         t.wait_hub("wait_with_object")
 

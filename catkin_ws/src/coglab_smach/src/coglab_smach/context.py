@@ -50,12 +50,18 @@ class Context:
     contact: ContactPort
     config: Config
     journal: Journal
-    requests: Requests = field(default_factory=Requests)
+    requests: Requests = None  # type: ignore[assignment]  # made below, so that its changes are told
     stop: StopSwitch = field(default_factory=StopSwitch)
     memory: HoldingMemory = field(default_factory=HoldingMemory)
     reachable: Callable[[Pose], bool] = lambda pose: True
     """whether the arm can bring the palm to a pose in the base frame"""
+    shared: bool = False
+    """the person may hold the object that is in the robot's fingers: from the closing on an object that is offered until
+    its weight is felt, and from the person's taking of the load until the hand is open"""
     _holding: str = ""
+
+    def __post_init__(self) -> None:
+        self.requests = self.requests or Requests(self.journal.changed)
 
     @property
     def holding(self) -> str:
@@ -67,3 +73,4 @@ class Context:
         if object_id != self._holding:
             self.memory.note(object_id)
         self._holding = object_id
+        self.journal.changed()

@@ -7,6 +7,9 @@ from dataclasses import dataclass, field
 from typing import Any
 
 
+NOTHING_FAILED = "Nothing has failed since the last success or reset."
+
+
 @dataclass(frozen=True)
 class TransitionRecord:
     """One transition of one container; ``to_state`` is a sibling label or an outcome of the container."""
@@ -18,12 +21,26 @@ class TransitionRecord:
     to_state: str
     reason: str
     causes: tuple[str, ...] = ()
+    code: int = 0
+    """coglab_msgs/ReasonCode of the reason"""
 
     def sentence(self) -> str:
         """The transition in one line."""
         chain = "".join(f" <- {cause}" for cause in self.causes)
         reason = f": {self.reason}" if self.reason else ""
         return f"{self.path}/{self.from_state} -[{self.outcome}]-> {self.to_state}{reason}{chain}"
+
+
+@dataclass(frozen=True)
+class Failure:
+    """Something that did not succeed: sentence, the causes behind it (nearest first), its ReasonCode."""
+
+    sentence: str = ""
+    causes: tuple[str, ...] = ()
+    code: int = 0
+
+    def __str__(self) -> str:
+        return self.sentence + "".join(f", because {cause}" for cause in self.causes)
 
 
 @dataclass
@@ -37,12 +54,13 @@ class ActionRecord:
     outcome: str = ""
     reason: str = ""
     causes: tuple[str, ...] = ()
+    code: int = 0
     marks: dict[str, float] = field(default_factory=dict)
 
     def to_dict(self) -> dict[str, Any]:
         """Plain types for a result file."""
         return {"kind": self.kind, "object_id": self.object_id, "outcome": self.outcome, "reason": self.reason,
-                "causes": list(self.causes), "started": self.started, "ended": self.ended,
+                "reason_code": self.code, "causes": list(self.causes), "started": self.started, "ended": self.ended,
                 "duration_s": self.ended - self.started, "marks": dict(self.marks)}
 
 
@@ -57,9 +75,11 @@ class Journal:
         self._result_listeners: list[Callable[[ActionRecord], None]] = []
         self.transitions: list[TransitionRecord] = []
         self.results: list[ActionRecord] = []
-        self._failure: tuple[str, tuple[str, ...]] | None = None
-        self._newest: tuple[str, tuple[str, ...]] | None = None
+        self._failure: Failure | None = None
+        self._newest = Failure()
         self._action: ActionRecord | None = None
+        self._active: list[str] = []
+        self._change_listeners: list[Callable[[], None]] = []
 
     def listen(self, on_transition: Callable[[TransitionRecord], None]) -> None:
         """Call this for each transition, in the thread that made it."""
@@ -69,10 +89,35 @@ class Journal:
         """Call this at the end of each action."""
         self._result_listeners.append(on_result)
 
+    def listen_changes(self, on_change: Callable[[], None]) -> None:
+        """Call this whenever another state is active, or something else is to be told as the newest failure."""
+        self._change_listeners.append(on_change)
+
+    def changed(self) -> None:
+        """Tell whoever listens for changes."""
+        for listener in self._change_listeners:
+            listener()
+
+    def entered(self, path: str) -> None:
+        """A leaf state begins; side by side with others in a concurrence."""
+        with self._lock:
+            self._active.append(path)
+        self.changed()
+
+    def left(self, path: str) -> None:
+        """A leaf state has ended."""
+        with self._lock:
+            self._active.remove(path)
+
+    def active(self) -> str:
+        """Path of the active leaf state, of several the one that began last; empty if none is."""
+        with self._lock:
+            return self._active[-1] if self._active else ""
+
     def transition(self, path: str, from_state: str, outcome: str, to_state: str, reason: str,
-                   causes: tuple[str, ...] = ()) -> None:
+                   causes: tuple[str, ...] = (), code: int = 0) -> None:
         """Record one transition."""
-        record = TransitionRecord(self._now(), path, from_state, outcome, to_state, reason, causes)
+        record = TransitionRecord(self._now(), path, from_state, outcome, to_state, reason, causes, code)
         with self._lock:
             self.transitions.append(record)
             del self.transitions[:-self._keep]
@@ -86,18 +131,23 @@ class Journal:
             self._action = ActionRecord(kind, object_id, self._now())
 
     def end_action(self, outcome: str) -> None:
-        """The action has ended; its reason is its first failure."""
+        """The action has ended; its reason is its first failure. A success has none, and explains away what failed
+        before it."""
         with self._lock:
             action, self._action = self._action, None
             if action is None:
                 return
             action.ended = self._now()
             action.outcome = outcome
-            if self._failure is not None:
-                action.reason, action.causes = self._failure
+            if outcome == "succeeded":
+                self._failure, self._newest = None, Failure()
+            elif self._failure is not None:
+                first = self._failure
+                action.reason, action.causes, action.code = first.sentence, first.causes, first.code
             self.results.append(action)
         for listener in self._result_listeners:
             listener(action)
+        self.changed()
 
     def mark(self, name: str) -> None:
         """Note the time of an event of the running action (first one of that name counts)."""
@@ -105,35 +155,41 @@ class Journal:
             if self._action is not None:
                 self._action.marks.setdefault(name, self._now())
 
-    def failure(self, sentence: str, causes: tuple[str, ...] = ()) -> None:
+    def failure(self, sentence: str, causes: tuple[str, ...] = (), code: int = 0) -> None:
         """A state failed: kept as the reason of the action if it is the first."""
         with self._lock:
             if self._failure is None:
-                self._failure = self._newest = (sentence, causes)
+                self._failure = self._newest = Failure(sentence, causes, code)
 
-    def stopped(self, sentence: str, block: str) -> None:
+    def stopped(self, sentence: str, block: str, code: int = 0) -> None:
         """The action cannot even recover: that is what the operator has to know. What failed before becomes its cause,
         unless it names the same ``block`` already."""
         with self._lock:
-            before, causes = self._failure or ("", ())
-            if block in before or any(block in cause for cause in causes):
+            before = self._failure or Failure()
+            if block in before.sentence or any(block in cause for cause in before.causes):
                 return
-            self._failure = self._newest = (sentence, (before, *causes) if before else ())
+            causes = (before.sentence, *before.causes) if before.sentence else ()
+            self._failure = self._newest = Failure(sentence, causes, code)
 
-    def settle(self) -> None:
-        """The machine waits in a hub: what fails from now on is no consequence of what failed before."""
+    def settle(self, forget: bool = False) -> None:
+        """The machine waits in a hub: what fails from now on is no consequence of what failed before. ``forget``: the
+        operator has answered it, so it is not told any more either."""
         with self._lock:
             self._failure = None
+            if forget:
+                self._newest = Failure()
+        self.changed()
 
-    def first_failure(self) -> tuple[str, tuple[str, ...]]:
-        """Sentence and causes of the running action's first failure; empty if all is well."""
+    def first_failure(self) -> Failure:
+        """The running action's first failure; empty if all is well."""
         with self._lock:
-            return self._failure or ("", ())
+            return self._failure or Failure()
+
+    def newest_failure(self) -> Failure:
+        """The newest thing that did not succeed; empty after a reset or a successful action."""
+        with self._lock:
+            return self._newest
 
     def why(self) -> str:
-        """'Why did it stop?' in one sentence: the newest thing that did not succeed."""
-        with self._lock:
-            if self._newest is None:
-                return "Nothing has failed."
-            sentence, causes = self._newest
-        return sentence + "".join(f", because {cause}" for cause in causes)
+        """'Why did it stop?' in one sentence."""
+        return str(self.newest_failure()) or NOTHING_FAILED

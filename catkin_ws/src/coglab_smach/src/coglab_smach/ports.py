@@ -9,9 +9,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
+from .motion_time import MotionLimits
 from .pending import Pending
+
+
+class Verdict(NamedTuple):
+    """Yes or no, and if not, why: in words and as a number of coglab_msgs/ReasonCode."""
+
+    ok: bool
+    why: str = ""
+    code: int = 0
 
 
 @dataclass(frozen=True)
@@ -27,13 +36,15 @@ class DmpRequest:
 
 @dataclass(frozen=True)
 class DmpProgress:
-    """How the running DMP motion stands: state is idle, running, reached, holding or aborted."""
+    """How the running DMP motion stands: state is idle, running, reached, holding or aborted; ``code`` (ReasonCode) is
+    that of the reason. Nothing has been heard of a motion yet while ``primitive_id`` is empty."""
 
     state: str = "idle"
     reason: str = ""
     primitive_id: str = ""
     phase: float = 0.0
     remaining_distance: float = 0.0
+    code: int = 0
 
 
 @dataclass(frozen=True)
@@ -67,6 +78,8 @@ class HandState:
     holding: bool = False
     message: str = ""
     positions: tuple[int, ...] = ()
+    event: int = 0
+    """ReasonCode of the message"""
 
 
 @dataclass(frozen=True)
@@ -93,8 +106,23 @@ class ArmPort(Protocol):
         """Acknowledged command to the LWR interface (start, hold, reset, stop, position ...); value: outcome
         in words."""
 
-    def motion_allowed(self) -> tuple[bool, str]:
+    def motion_allowed(self) -> Verdict:
         """Whether target velocities are followed now, and why not."""
+
+    def standing(self) -> Verdict:
+        """Whether the set-point of the arm stands (velocity and acceleration zero), and why not, or why that is not
+        known."""
+
+    def cancel_motion(self, reason: str) -> Pending:
+        """End every motion that runs or waits; the arm brakes within its limits. Value: None, once the set-point stands.
+        With nothing to end it succeeds too. This request alone is never withdrawn: giving up waiting for it leaves it
+        in force."""
+
+    def motion_limits(self) -> MotionLimits:
+        """What bounds the arm's speed; the reduced limits where a reduced profile is in force."""
+
+    def speed_scale(self) -> float:
+        """Share of its planned speed at which the reference runs now, 0..1."""
 
     def switch_controller(self, controller_id: str) -> Pending:
         """Make a plug-in the active one; ends the motion of the other. Value: its type."""
@@ -102,12 +130,13 @@ class ArmPort(Protocol):
     def apply_profile(self, profile: str) -> Pending:
         """Enable exactly the feedback controllers of a named profile, at one cycle boundary; value: None."""
 
-    def profile_settled(self, profile: str) -> tuple[bool, str]:
+    def profile_settled(self, profile: str) -> Verdict:
         """Whether this profile is in force and nothing of the one before it is left: the last correction of each
         feedback controller that it does not enable has faded. If not, why."""
 
     def execute_dmp(self, request: DmpRequest) -> Pending:
-        """Start a DMP motion; value: None once it is accepted."""
+        """Start a DMP motion; value: None once it is accepted. The motion goes on until it is cancelled, replaced by
+        another one or ended by a switch: also when nobody waits. cancel() ends it."""
 
     def switch_dmp(self, request: DmpRequest) -> Pending:
         """Substitute the running primitive; phase, position and velocity are kept. Value: None."""
@@ -116,7 +145,8 @@ class ArmPort(Protocol):
         """The newest progress since the last accepted execute_dmp."""
 
     def move_ptp(self, position: Sequence[float], max_velocity: Sequence[float]) -> Pending:
-        """Point-to-point motion (rad, rad/s); value: None when it has been executed to its end."""
+        """Point-to-point motion (rad, rad/s); value: None when it has been executed to its end. PortError with the
+        reason where it ended before. The motion goes on when nobody waits; cancel() ends it."""
 
     def joint_positions(self) -> tuple[float, ...] | None:
         """Measured joints (rad), None if unknown or older than 0.5 s."""
@@ -165,6 +195,9 @@ class DatabasePort(Protocol):
 
     def get_object(self, object_id: str) -> Pending:
         """One entry; value: dict valid against the object schema."""
+
+    def list_objects(self) -> Pending:
+        """Ids of all objects; value: list of str."""
 
 
 class ContactPort(Protocol):

@@ -8,9 +8,18 @@ from typing import Any
 
 import rospy
 import tf2_ros
-from coglab_msgs.msg import ControllerStatus, DmpFeedback, FeedbackStatus, FinishedPtp, LwrState
+from coglab_msgs.msg import (
+    ControllerStatus,
+    DmpFeedback,
+    FeedbackStatus,
+    FinishedPtp,
+    LwrState,
+    ReasonCode,
+    UnfinishedPtp,
+)
 from coglab_msgs.srv import (
     AddPtp,
+    CancelMotion,
     ExecuteDmp,
     FeedbackSelect,
     ListControllers,
@@ -23,20 +32,24 @@ from coglab_msgs.srv import (
 from geometry_msgs.msg import Point, Quaternion, TransformStamped, Vector3
 from sensor_msgs.msg import JointState
 
-from .pending import Pending, Polled, PortError, Threaded
-from .ports import DmpProgress, DmpRequest
-from .ros_calls import Newest, call, mapped, wait_for
+from .motion_time import MotionLimits
+from .pending import Pending, Permit, Polled, PortError, Threaded
+from .ports import DmpProgress, DmpRequest, Verdict
+from .ros_calls import Newest, call, call_now, mapped
+from .manager_limits import read_limits
 
 JOINTS = ("lwr_a1", "lwr_a2", "lwr_e1", "lwr_a3", "lwr_a4", "lwr_a5", "lwr_a6")
 
 
 class RosArm:
-    """ArmPort over controller_manager and lwr. Shows the goal of the running motion as tf frame ``dmp_goal``."""
+    """ArmPort over controller_manager and lwr; it drives the plug-ins loaded under the ids dmp and ptp. Shows the goal of the running motion as tf frame ``dmp_goal``."""
 
     def __init__(self, manager: str = "controller_manager", lwr: str = "lwr") -> None:
         self._manager, self._lwr = manager, lwr
         self._lock = threading.Lock()
-        self._finished: set[int] = set()
+        self._ended: dict[int, PortError | None] = {}
+        self._addressed = ""
+        self._limits = read_limits({})
         self._started_at = 0.0
         self._lwr_state = Newest(f"{lwr}/state", LwrState)
         self._joints = Newest(f"{lwr}/joint_states", JointState)
@@ -44,19 +57,27 @@ class RosArm:
         self._status = Newest(f"{manager}/status", ControllerStatus)
         self._cascade = Newest(f"{manager}/feedback/status", FeedbackStatus)
         self._ptp = Newest(f"{manager}/ptp/finished_ptp", FinishedPtp, self._on_finished)
+        self._unfinished = Newest(f"{manager}/ptp/unfinished_ptp", UnfinishedPtp, self._on_unfinished)
         self._shown_goal = tf2_ros.StaticTransformBroadcaster()
 
     def _on_finished(self, message: FinishedPtp) -> None:
         with self._lock:
-            self._finished.add(message.ptp_id)
+            self._ended[message.ptp_id] = None
+
+    def _on_unfinished(self, message: UnfinishedPtp) -> None:
+        with self._lock:
+            self._ended[message.ptp_id] = PortError("the point-to-point motion ended before its target",
+                                                    (message.reason,), message.reason_code)
 
     def load_controller(self, controller_id: str, controller_type: str) -> Pending:
-        def run() -> None:
-            loaded = wait_for(call(f"{self._manager}/list_controllers", ListControllers))
+        def run(permit: Permit) -> None:
+            # Read here because the parameter server may hang, and a state must not.
+            self._limits = read_limits(rospy.get_param(self._manager, {}))
+            loaded = call_now(f"{self._manager}/list_controllers", ListControllers, permit)
             if (controller_id, controller_type) in zip(loaded.controller_ids, loaded.controller_types, strict=False):
                 return
-            wait_for(call(f"{self._manager}/load_controller", LoadController, controller_id=controller_id,
-                       controller_type=controller_type))
+            call_now(f"{self._manager}/load_controller", LoadController, permit, controller_id=controller_id,
+                     controller_type=controller_type)
 
         return Threaded(run, f"loading of plug-in '{controller_id}'")
 
@@ -66,17 +87,53 @@ class RosArm:
     def lwr_command(self, event: str) -> Pending:
         return mapped(call(f"{self._lwr}/command", LwrCommand, event=event), lambda r: r.message)
 
-    def motion_allowed(self) -> tuple[bool, str]:
+    def motion_allowed(self) -> Verdict:
         state = self._lwr_state.message
         if state is None:
-            return False, f"{self._lwr}/state has never been published; is the robot node running?"
+            return Verdict(False, f"{self._lwr}/state has never been published; is the robot node running?",
+                           ReasonCode.NODE_SILENT)
         if self._joints.age() > 1.0:
-            return False, f"{self._lwr}/joint_states is silent for {min(self._joints.age(), 999):.1f} s"
+            return self._silent()
         if state.motion_allowed:
-            return True, ""
-        return False, state.reason or f"the LWR interface is in state '{state.supervisor}'"
+            return Verdict(True)
+        return Verdict(False, state.reason or f"the LWR interface is in state '{state.supervisor}'", state.reason_code)
+
+    def _silent(self) -> Verdict:
+        return Verdict(False, f"{self._lwr}/joint_states is silent for {min(self._joints.age(), 999):.1f} s",
+                       ReasonCode.NODE_SILENT)
+
+    def standing(self) -> Verdict:
+        status = self._status.message
+        if status is None or self._joints.age() > 1.0:
+            return self._silent()
+        return Verdict(status.standing, "" if status.standing else f"the arm is {status.state}")
+
+    def cancel_motion(self, reason: str) -> Pending:
+        status = self._status.message
+        running = {self._addressed, status.active_controller if status is not None else ""} & {"dmp", "ptp"}
+        # Permits of their own, which nobody withdraws.
+        calls = [Threaded(lambda _, name=name: self._cancel(name, reason), f"cancelling of '{name}'")
+                 for name in sorted(running)]
+        if not calls:
+            return Polled(lambda: self.standing().ok, lambda: None)
+        return Polled(lambda: all(c.done() for c in calls), lambda: [c.result() for c in calls][0])
+
+    def _cancel(self, controller_id: str, reason: str) -> None:
+        try:
+            call_now(f"{self._manager}/{controller_id}/cancel", CancelMotion, Permit(), wait=1.0, time_limit=0.0,
+                     reason=reason[:200])
+        except PortError as error:
+            if error.code not in (ReasonCode.NOTHING_RUNS, ReasonCode.NOT_ACTIVE):
+                raise
+
+    def motion_limits(self) -> MotionLimits:
+        return self._limits
+
+    def speed_scale(self) -> float:
+        return self._status.message.speed_scale if self._status.message is not None else 1.0
 
     def switch_controller(self, controller_id: str) -> Pending:
+        self._addressed = controller_id
         return mapped(call(f"{self._manager}/switch_controller", SwitchController, wait=5.0,
                            controller_id=controller_id), lambda r: r.controller_type)
 
@@ -84,14 +141,15 @@ class RosArm:
         return mapped(call(f"{self._manager}/feedback/apply_profile", FeedbackSelect, wait=5.0, names=[profile],
                            reason=""), lambda r: None)
 
-    def profile_settled(self, profile: str) -> tuple[bool, str]:
+    def profile_settled(self, profile: str) -> Verdict:
         message = self._cascade.message
         if message is None:
-            return False, f"{self._manager}/feedback/status has never been published; is the robot node running?"
+            return Verdict(False, f"{self._manager}/feedback/status has never been published; is the robot node running?",
+                           ReasonCode.NODE_SILENT)
         if message.profile != profile:
-            return False, f"profile '{message.profile}' is in force"
+            return Verdict(False, f"profile '{message.profile}' is in force")
         busy = [f"{c.name} is {c.activity}" for c in message.controllers if not c.enabled and c.activity != "off"]
-        return not busy, ", ".join(busy)
+        return Verdict(not busy, ", ".join(busy))
 
     def execute_dmp(self, request: DmpRequest) -> Pending:
         self._started_at = time.monotonic()
@@ -103,7 +161,16 @@ class RosArm:
             self._started_at = time.monotonic()
             self._show_goal(request)
 
-        return mapped(pending, accepted)
+        return self._ends_motion(mapped(pending, accepted))
+
+    def _ends_motion(self, pending: Pending) -> Pending:
+        """The handle of a motion: cancelled, the request is withdrawn if it was not sent, and the motion is ended."""
+
+        def cancel() -> None:
+            pending.cancel()
+            self.cancel_motion("its owner has given up waiting")
+
+        return Polled(pending.done, pending.result, cancel)
 
     def _show_goal(self, request: DmpRequest) -> None:
         """For whoever looks on: where the palm is to go, relative to the tracked frame. Nothing in control reads it."""
@@ -123,31 +190,45 @@ class RosArm:
         if message is None or self._feedback.stamp < self._started_at:
             return DmpProgress("running" if self._started_at else "idle")
         return DmpProgress(message.state, message.reason, message.primitive_id, message.phase,
-                           message.remaining_distance)
+                           message.remaining_distance, message.reason_code)
 
     def move_ptp(self, position: Sequence[float], max_velocity: Sequence[float]) -> Pending:
         with self._lock:
-            self._finished.clear()
+            self._ended.clear()
         added = call(f"{self._manager}/ptp/add_ptp", AddPtp, wait=5.0, position=list(position),
                      max_vel=list(max_velocity), max_acc=[])
+        ended: list[PortError | None] = []
 
         def finished() -> bool:
-            if not added.done():
-                return False
-            response = added.result()
-            with self._lock:
-                if response.ptp_id in self._finished:
-                    return True
-            status = self._status.message
-            if status is not None and status.state == "fault":
-                raise PortError("the point-to-point motion ended in a fault of the controller manager",
-                                (status.reason,))
-            allowed, why = self.motion_allowed()
-            if not allowed:
-                raise PortError("the arm does not follow any more", (why,))
-            return False
+            if not ended and added.done():
+                end = self._end_of_ptp(added)
+                if end is not None:
+                    ended.append(end[0])
+            return bool(ended)
 
-        return Polled(finished, lambda: None)
+        def value() -> None:
+            if ended[0] is not None:
+                raise ended[0]
+
+        return self._ends_motion(Polled(finished, value, added.cancel))
+
+    def _end_of_ptp(self, added: Pending) -> tuple[PortError | None] | None:
+        """How the motion has ended, as a tuple with the error, if any; None while it runs."""
+        try:
+            identity = added.result().ptp_id
+        except PortError as error:
+            return (error,)
+        with self._lock:
+            if identity in self._ended:
+                return (self._ended.pop(identity),)
+        status = self._status.message
+        if status is not None and status.state == "fault":
+            return (PortError("the point-to-point motion ended in a fault of the controller manager", (status.reason,),
+                              status.reason_code),)
+        allowed = self.motion_allowed()
+        if not allowed.ok:
+            return (PortError("the arm does not follow any more", (allowed.why,), allowed.code),)
+        return None
 
     def joint_positions(self) -> tuple[float, ...] | None:
         message = self._joints.message
@@ -157,7 +238,8 @@ class RosArm:
         return tuple(by_name[name] for name in JOINTS) if all(name in by_name for name in JOINTS) else None
 
     def hold(self, reason: str) -> Pending:
-        return self.lwr_command("hold")
+        run = Threaded(lambda _: call_now(f"{self._lwr}/command", LwrCommand, Permit(), wait=1.0, event="hold"), "hold")
+        return mapped(run, lambda r: r.message)
 
 
 def _dmp_fields(request: DmpRequest) -> dict[str, Any]:

@@ -17,6 +17,7 @@ from coglab_msgs.msg import (
     HandPreshapeCloseGoal,
     HandPreshapeGoal,
     HandStatus,
+    ReasonCode,
 )
 from std_msgs.msg import String
 
@@ -42,24 +43,26 @@ class ActionCall(Pending):
 
     def _send(self, goal: Any) -> None:
         if not self._client.wait_for_server(rospy.Duration(SERVER_WAIT)):
-            self._fail(f"action {self._name} has no server after {SERVER_WAIT:.0f} s; is the hand node running?")
+            self._fail(f"action {self._name} has no server after {SERVER_WAIT:.0f} s; is the hand node running?",
+                       code=ReasonCode.NODE_SILENT)
             return
         with self._lock:
             if self._cancelled:
-                self._fail(f"action {self._name} was cancelled before its goal was sent")
+                self._fail(f"action {self._name} was cancelled before its goal was sent", code=ReasonCode.CANCELLED)
                 return
             self._client.send_goal(goal, done_cb=self._on_done)
             self._sent = True
 
-    def _fail(self, sentence: str, causes: tuple[str, ...] = ()) -> None:
-        self._error = PortError(sentence, causes)
+    def _fail(self, sentence: str, causes: tuple[str, ...] = (), code: int = 0) -> None:
+        self._error = PortError(sentence, causes, code)
         self._done.set()
 
     def _on_done(self, status: int, result: Any) -> None:
         self._result = result
         message = getattr(result, "message", "") or self._client.get_goal_status_text()
         if status != GoalStatus.SUCCEEDED or (result is not None and not result.isOk):
-            self._fail(f"action {self._name} ended {GoalStatus.to_string(status)}", (message,) if message else ())
+            self._fail(f"action {self._name} ended {GoalStatus.to_string(status)}", (message,) if message else (),
+                       getattr(result, "reason_code", ReasonCode.NONE))
             return
         self._done.set()
 
@@ -103,11 +106,17 @@ class RosHand:
         return self._call("hand_open", HandOpenGoal(speed=speed))
 
     def calibrate(self, mode: str) -> Pending:
-        """Publish the order once the hand listens, then follow hand_status: started, ended, or refused in words."""
-        begun = {"sent": 0.0, "seen": False, "asked": time.monotonic()}
+        """Publish the order once the hand listens, then follow hand_status: started, ended, or refused."""
+        begun = {"sent": 0.0, "seen": False, "asked": time.monotonic(), "error": None}
+
+        def fail(why: str, code: int) -> bool:
+            begun["error"] = PortError(f"the hand does not calibrate after the order '{mode}'", (why,), code)
+            return True
 
         def done() -> bool:
             state = self.state()
+            if begun["error"] is not None:
+                return True
             if not begun["sent"]:
                 # After a start the hand counts as holding until a poll has shown it empty: give it 2 s for that.
                 settled = not state.holding or time.monotonic() - begun["asked"] > 2.0
@@ -115,28 +124,28 @@ class RosHand:
                     self._calibration.publish(String(mode))
                     begun["sent"] = time.monotonic()
                 return False
+            since = time.monotonic() - begun["sent"]
             if state.calibrating:
                 begun["seen"] = True
                 return False
-            if "refused" in state.message and time.monotonic() - begun["sent"] > 0.2:
-                raise PortError(f"the hand does not calibrate after the order '{mode}'", (state.message,))
-            if begun["seen"] or (state.calibrated and time.monotonic() - begun["sent"] > 0.5):
+            if state.event == ReasonCode.HAND_REFUSED and since > 0.2:
+                return fail(state.message, state.event)
+            if begun["seen"] or (state.calibrated and since > 0.5):
                 return True
-            if time.monotonic() - begun["sent"] > 3.0:
-                raise PortError(f"the hand does not calibrate after the order '{mode}'",
-                                (state.message or "hand_status says nothing about it",))
-            return False
+            return since > 3.0 and fail(state.message or "hand_status says nothing about it", ReasonCode.NODE_SILENT)
 
         def value() -> None:
+            if begun["error"] is not None:
+                raise begun["error"]
             state = self.state()
             if not state.calibrated:
-                raise PortError("the hand's calibration ended without success", (state.message,))
+                raise PortError("the hand's calibration ended without success", (state.message,), state.event)
 
         return Polled(done, value)
 
     def state(self) -> HandState:
         message = self._status.message
         if message is None or self._status.age() > 1.0:
-            return HandState(message=f"{self._ns}/hand_status is silent")
+            return HandState(message=f"{self._ns}/hand_status is silent", event=ReasonCode.NODE_SILENT)
         return HandState(message.connected, message.calibrated, message.calibrating, message.holding, message.message,
-                         tuple(motor.position for motor in message.motors))
+                         tuple(motor.position for motor in message.motors), message.event_code)

@@ -9,7 +9,7 @@ from typing import Any
 import yaml
 from coglab_msgs.msg import Contact
 from coglab_msgs.msg import Recognition as RecognitionMsg
-from coglab_msgs.srv import ArmContact, FreePlaces, GetObject, InitVision, LocateObject
+from coglab_msgs.srv import ArmContact, FreePlaces, GetObject, InitVision, ListObjects, LocateObject
 from geometry_msgs.msg import Pose
 
 from .pending import Pending
@@ -57,6 +57,9 @@ class RosDatabase:
     def get_object(self, object_id: str) -> Pending:
         pending = call(f"{self._ns}/get_object", GetObject, wait=5.0, object_id=object_id)
         return mapped(pending, lambda r: yaml.safe_load(r.yaml))
+
+    def list_objects(self) -> Pending:
+        return mapped(call(f"{self._ns}/list_objects", ListObjects, wait=1.0), lambda r: list(r.object_ids))
 
 
 class RosContact:

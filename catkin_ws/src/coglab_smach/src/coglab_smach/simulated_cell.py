@@ -1,15 +1,22 @@
-"""The kinematic cell behind the simulated ports: state, faults and the partner's script."""
+"""The kinematic cell behind the simulated ports: state, faults and the partner's script.
+
+A request acts when its time has come, whether or not anybody waits for it, as over ROS: only what could not be sent yet,
+because the node behind the port is frozen, can be given up.
+"""
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+from coglab_msgs.msg import ReasonCode
 from smach.clock import Clock
 
-from .pending import Pending, Polled, PortError, Ready
+from .pending import Pending, PortError
 from .pose import Pose
+from .simulated_arm_model import ArmModel
 
 
 @dataclass
@@ -17,9 +24,10 @@ class Faults:
     """What is broken. Sets of names are compared with the port method that is called."""
 
     dead: set[str] = field(default_factory=set)
-    """ports that never answer: arm, hand, perception, database, contact"""
-    refuse: dict[str, str] = field(default_factory=dict)
-    """port method -> sentence with which it refuses"""
+    """ports whose node is frozen: arm, hand, perception, database, contact. What is asked of it acts when it comes back,
+    unless it was given up."""
+    refuse: dict[str, str | PortError] = field(default_factory=dict)
+    """port method -> sentence, or error with its code, with which it refuses"""
     not_seen: set[str] = field(default_factory=set)
     """objects perception does not see"""
     abort_dmp_after: float = 0.0
@@ -43,32 +51,70 @@ class Partner:
     """s into the motion at which the pattern is decided"""
 
 
+class _Call(Pending):
+    """One request on its way."""
+
+    def __init__(self, cell: SimulatedCell, port: str, method: str, after: float, apply: Callable[[], Any]) -> None:
+        self.cell, self.port, self.method, self.after, self.apply = cell, port, method, after, apply
+        self.due: float | None = None
+        """when it acts; None while it is not sent"""
+        self.over = self.given_up = False
+        self.value: Any = None
+        self.error: PortError | None = None
+
+    def done(self) -> bool:
+        self.cell.advance()
+        return self.over
+
+    def result(self) -> Any:
+        if self.error is not None:
+            raise self.error
+        return self.value
+
+    def cancel(self) -> None:
+        self.given_up = True
+        self.cell.note(f"cancel {self.method}")
+
+    def look(self, now: float) -> None:
+        """Send it if its node is there, let it act if its time has come."""
+        if self.port in self.cell.faults.dead:
+            return
+        if self.due is None and self.given_up:
+            self.over = True
+            self.error = PortError("the request was given up before it was sent", code=ReasonCode.CANCELLED)
+            return
+        if self.due is None:
+            self.due = now + self.after
+        if now >= self.due:
+            self.over = True
+            try:
+                self.value = self.apply()
+            except PortError as error:
+                self.error = error
+
+
 class SimulatedCell:
     """State shared by the simulated ports, advanced by looking at the clock: no thread of its own."""
 
-    def __init__(self, clock: Clock, reach_time: float = 1.3, ptp_time: float = 1.0) -> None:
+    def __init__(self, clock: Clock, reach_time: float = 1.3) -> None:
         self.clock = clock
         self.faults = Faults()
         self.partner = Partner()
+        self.arm = ArmModel(clock, self.faults)
         self.reach_time = reach_time
-        self.ptp_time = ptp_time
         self.calls: list[tuple[float, str]] = []
-        self.active = ""
         self.profile = ""
         self.profile_since = 0.0
         self.fade_time = 0.2
         self.loaded: dict[str, str] = {}
         self.primitives = {"reach_human", "reach_human_high", "give_human", "take_board", "put_board"}
-        self.enabled = False
-        self.held = False
-        self.joints = tuple([0.3] * 7)
-        self.reached_at: float | None = None
-        self.motion_started: float | None = None
         self.hand_positions = (0, 0, 0, 0, 0)
-        self.preshaped = False
+        self.calibrated = self.preshaped = False
         self.objects: dict[str, Pose] = {"mug": Pose(np.array([0.78, 0.03, 0.43])),
                                          "board": Pose(np.array([0.45, -0.55, 0.05])),
                                          "human_hand": Pose(np.array([0.86, 0.03, 0.43]))}
+        self._lock = threading.RLock()
+        self._under_way: list[_Call] = []
 
     def note(self, what: str) -> None:
         """Remember a call with its time."""
@@ -78,21 +124,33 @@ class SimulatedCell:
         """Names of the calls so far that begin with ``prefix``."""
         return [what for _, what in self.calls if what.startswith(prefix)]
 
-    def answer(self, port: str, method: str, after: float, value: Callable[[], Any]) -> Pending:
-        """A pending answer that respects the faults."""
+    def answer(self, port: str, method: str, after: float, apply: Callable[[], Any]) -> Pending:
+        """A request that reaches its node, acts ``after`` s later and is answered then; it respects the faults."""
         self.note(method)
-        if port in self.faults.dead:
-            return Polled(lambda: False, lambda: None)
-        if method in self.faults.refuse:
-            return Ready(error=PortError(self.faults.refuse[method]))
-        due = self.clock.now() + after
-        cancelled = [False]
 
-        def ready() -> bool:
-            return self.clock.now() >= due and port not in self.faults.dead
+        def act() -> Any:
+            refusal = self.faults.refuse.get(method)
+            if refusal is not None:
+                raise refusal if isinstance(refusal, PortError) else PortError(refusal)
+            return apply()
 
-        def cancel() -> None:
-            cancelled[0] = True
-            self.note(f"cancel {method}")
+        call = _Call(self, port, method, after, act)
+        with self._lock:
+            self._under_way.append(call)
+        self.advance()
+        return call
 
-        return Polled(ready, value, cancel)
+    def advance(self) -> None:
+        """Let everything act whose time has come."""
+        with self._lock:
+            now = self.clock.now()
+            for call in list(self._under_way):
+                call.look(now)
+            self._under_way = [call for call in self._under_way if not call.over]
+            self.arm.follow()
+
+    @property
+    def joints(self) -> tuple[float, ...]:
+        """Where the arm is, rad."""
+        self.advance()
+        return self.arm.position()

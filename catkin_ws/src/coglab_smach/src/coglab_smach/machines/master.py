@@ -49,7 +49,7 @@ def build_master(ctx: Context) -> CoglabMachine:
                          {"succeeded": "recover", "failed": "fault", "preempted": "preempted"})
         master.add_state("fault", Fault(ctx),
                          {"succeeded": "coglab_init_system", "failed": "fault", "preempted": "preempted"})
-        master.add_state("recover", build_recovery(ctx),
+        master.add_state("recover", build_recovery(ctx, operator=True),
                          {"empty": "wait_without_object", "holding": "wait_with_object", "stopped": "stopped",
                           "fault": "fault", "preempted": "preempted"})
     return master

@@ -4,58 +4,89 @@ from __future__ import annotations
 
 from typing import Any
 
+from coglab_msgs.msg import ReasonCode
+
 from ..context import Context
 from ..holding import UNKNOWN
 from ..pending import PortError
+from ..ports import Verdict
+from ..requests import command
 from ..states.arm import HomeRobot
 from ..states.base import CoglabMachine, CoglabState
+from ..states.motion import end_motion
 
 
-def arm_is_blocked(state: CoglabState) -> str:
-    """Why the arm is there but may not move (hold, command mode lost); empty if it may, or if its node is silent."""
-    allowed, why = state.ctx.arm.motion_allowed()
-    return "" if allowed or state.ctx.arm.joint_positions() is None else why or "no reason was given"
+def arm_is_blocked(state: CoglabState) -> Verdict:
+    """Whether the arm is there but may not move (hold, command mode lost), and why; not if its node is silent."""
+    allowed = state.ctx.arm.motion_allowed()
+    if allowed.ok or state.ctx.arm.joint_positions() is None:
+        return Verdict(False)
+    return Verdict(True, allowed.why or "no reason was given", allowed.code)
 
 
 class EndMotion(CoglabState):
-    """First step of every recovery: end the running motion. After STOP, or while the arm is blocked, nothing is
-    touched at all: the operator decides, and the hand keeps what it holds."""
+    """First step of every recovery: the running motion is ended and the arm stands. After STOP, or while the arm is
+    blocked, nothing is touched at all: the operator decides, and the hand keeps what it holds."""
 
-    default_time_limit = 5.0
+    default_time_limit = 12.0
 
     def __init__(self, ctx: Context) -> None:
         super().__init__(ctx, outcomes=["succeeded", "stopped"])
 
     def run(self, ud: Any) -> str:
         if self.ctx.stop.pressed():
-            self.reason = f"STOP: {self.ctx.stop.reason}; the hand keeps what it holds"
+            self.reason = f"STOP: {self.ctx.stop.reason}; the hand keeps what it holds; to go on {command('reset')}"
             return "stopped"
         self.ctx.contact.disarm()
-        why = arm_is_blocked(self)
-        if why:
-            self.reason = f"the arm is blocked: {why}; the hand keeps what it holds"
-            self.ctx.journal.stopped(self.reason, why)
+        trouble = "" if arm_is_blocked(self).ok else end_motion(self.ctx, "recovery after a failure")
+        blocked = arm_is_blocked(self)
+        if blocked.ok:
+            self.reason = (f"the arm is blocked: {blocked.why}; the hand keeps what it holds; when its cause is away, "
+                           f"{command('reset')}")
+            self.ctx.journal.stopped(self.reason, blocked.why, blocked.code)
             return "stopped"
-        self.await_pending(self.ctx.arm.switch_controller("ptp"), "end of the motion by switching to 'ptp'")
+        if trouble:
+            raise PortError("the arm does not stand, so nothing else is done", (trouble,), ReasonCode.BUSY)
+        self.await_pending(self.ctx.arm.switch_controller("ptp"), "switching to 'ptp'")
         return "succeeded"
 
 
 class SecureHand(CoglabState):
-    """Decide what the hand does during recovery: keep holding if it closed on an object, else open."""
+    """Decide what the hand does during recovery: keep holding if it closed on an object, else open.
+
+    The arm goes nowhere with an object that the person may hold too: outcome stopped, until the operator has looked and
+    asks for 'reset' (``operator``: this is the recovery after that).
+    """
 
     default_time_limit = 10.0
 
+    def __init__(self, ctx: Context, operator: bool = False) -> None:
+        super().__init__(ctx, outcomes=["succeeded", "stopped"])
+        self.operator = operator
+
     def run(self, ud: Any) -> str:
-        if self.ctx.holding:
+        if self.ctx.holding and (self.operator or not self.ctx.shared):
+            self.ctx.shared = False
             self.reason = f"the hand keeps '{self.ctx.holding}'"
             return "succeeded"
+        if self.ctx.holding:
+            return self._stay(f"the person may still hold '{self.ctx.holding}', which is in the robot's fingers")
         try:
             self.await_pending(self.ctx.hand.open(int(self.ctx.config.get("hand.open_speed", 400))),
-                               "opening of the empty hand")
+                               "opening of the empty hand", 8.0)
         except PortError as error:
+            if self.ctx.shared:
+                return self._stay(f"the hand could not be opened, and the person may hold what is in it "
+                                  f"({error.sentence})")
             # A dead hand must not keep the arm from going home; what it may hold is unknown, so it is not forced.
             self.reason = f"the hand could not be opened: {error.sentence}"
+        self.ctx.shared = False
         return "succeeded"
+
+    def _stay(self, why: str) -> str:
+        self.reason = f"the arm stays where it is: {why}; free the object, then {command('reset')}"
+        self.ctx.journal.stopped(self.reason, self.reason, ReasonCode.NOT_RELEASED)
+        return "stopped"
 
 
 class WhatIsHeld(CoglabState):
@@ -96,13 +127,15 @@ class WhatIsHeld(CoglabState):
             self.pause(0.1)
 
 
-def build_recovery(ctx: Context) -> CoglabMachine:
-    """Outcomes: empty, holding (arm at home), stopped (STOP is latched), fault (arm or controller does not obey)."""
+def build_recovery(ctx: Context, operator: bool = False) -> CoglabMachine:
+    """Outcomes: empty, holding (arm at home), stopped (STOP is latched, the arm is blocked, or a person may hold what is
+    in the hand), fault (arm or controller does not obey). ``operator``: the recovery that a 'reset' begins."""
     machine = CoglabMachine(ctx, "recover", ["empty", "holding", "stopped", "fault", "preempted"])
     failed = {"failed": "check_stop", "preempted": "preempted"}
     with machine:
         machine.add_state("end_motion", EndMotion(ctx), {"succeeded": "secure_hand", "stopped": "stopped", **failed})
-        machine.add_state("secure_hand", SecureHand(ctx), {"succeeded": "coglab_home_robot", **failed})
+        machine.add_state("secure_hand", SecureHand(ctx, operator),
+                          {"succeeded": "coglab_home_robot", "stopped": "stopped", **failed})
         machine.add_state("coglab_home_robot", HomeRobot(ctx), {"succeeded": "what_is_held", **failed})
         machine.add_state("what_is_held", WhatIsHeld(ctx),
                           {"empty": "empty", "holding": "holding", "failed": "fault", "preempted": "preempted"})
@@ -120,7 +153,7 @@ class CheckStop(CoglabState):
         super().__init__(ctx, outcomes=["stopped", "fault"])
 
     def run(self, ud: Any) -> str:
-        return "stopped" if self.ctx.stop.pressed() or arm_is_blocked(self) else "fault"
+        return "stopped" if self.ctx.stop.pressed() or arm_is_blocked(self).ok else "fault"
 
 
 ACTION_OUTCOMES = ["succeeded", "failed_empty", "failed_holding", "stopped", "fault", "preempted"]

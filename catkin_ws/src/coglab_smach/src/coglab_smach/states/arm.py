@@ -3,7 +3,10 @@ from __future__ import annotations
 
 from typing import Any
 
+from coglab_msgs.msg import ReasonCode
+
 from ..context import Context
+from ..motion_time import ptp_time, reach_time
 from ..pending import PortError
 from ..ports import DmpRequest
 from .base import CoglabState, Interrupted, TimeLimit
@@ -54,7 +57,8 @@ class ConfigureLwr(CoglabState):
         try:
             self.wait_for(lambda: self.ctx.arm.motion_allowed()[0], "command mode of the LWR")
         except TimeLimit as limit:
-            limit.causes = (self.ctx.arm.motion_allowed()[1],)
+            blocked = self.ctx.arm.motion_allowed()
+            limit.causes, limit.code = (blocked.why,), blocked.code
             raise
         return "succeeded"
 
@@ -63,6 +67,7 @@ class SwitchController(CoglabState):
     """Make one plug-in the active one. Switching to 'ptp' is what ends a running DMP."""
 
     default_time_limit = 5.0
+    owns_motion = True
 
     def __init__(self, ctx: Context, controller_id: str) -> None:
         super().__init__(ctx)
@@ -85,6 +90,7 @@ class ExecuteDmp(CoglabState):
     """Temporary state: starts the motion and passes on to wait_stop; the controller manager closes the loop."""
 
     default_time_limit = 5.0
+    owns_motion = True
 
     def __init__(self, ctx: Context) -> None:
         super().__init__(ctx, input_keys=["goal"])
@@ -109,7 +115,7 @@ class ExecuteDmp(CoglabState):
             except TimeLimit:
                 raise
             except PortError as error:
-                if " s old" not in error.sentence or self.ctx.clock.now() >= end:
+                if error.code != ReasonCode.GOAL_STALE or self.ctx.clock.now() >= end:
                     raise
             self.pause(0.05)
 
@@ -119,10 +125,11 @@ class WaitStop(CoglabState):
 
     trigger: '' (the end of the motion is enough), 'contact' (an object is in the hand) or 'release' (the person has
     taken the load). The detector is armed only after the motion has ended; it checks by itself that the arm
-    stands still.
+    stands still. The reach may take ``reach_timeout`` beyond what the arm's limits ask for over its distance.
     """
 
     default_time_limit = 20.0
+    owns_motion = True
 
     def __init__(self, ctx: Context, trigger: str) -> None:
         keys = {"": [], "contact": ["object_entry"], "release": ["object_entry", "delivery"]}
@@ -130,13 +137,7 @@ class WaitStop(CoglabState):
         self.trigger = trigger
 
     def run(self, ud: Any) -> str:
-        try:
-            self.wait_for(self._reached, "the end of the reach", float(self.ctx.config.get("reach_timeout", 8.0)))
-        except TimeLimit as limit:
-            progress = self.ctx.arm.dmp_progress()
-            limit.causes = limit.causes or (f"the motion is {progress.state} with {progress.remaining_distance:.2f} m "
-                                            f"to go{': ' if progress.reason else ''}{progress.reason}",)
-            raise
+        self._await_reach()
         self.ctx.journal.mark("motion_reached")
         if not self.trigger:
             return "succeeded"
@@ -148,16 +149,37 @@ class WaitStop(CoglabState):
             self.await_pending(self.ctx.arm.switch_controller("ptp"), "end of the reach by switching to 'ptp'", 3.0)
         settings = self._settings(ud)
         limit = float(settings.get("timeout", self.ctx.config.get(f"{self.trigger}_timeout", 6.0)))
+        self.allow(limit + 5.0)
         self.await_pending(self.ctx.contact.arm(self.trigger, limit, settings), "arming of the contact detector", 2.0)
         try:
             self.wait_for(lambda: self.ctx.contact.event() is not None, self._expected(), limit)
+        except TimeLimit as error:
+            error.code = ReasonCode.NO_CONTACT if self.trigger == "contact" else ReasonCode.NOT_RELEASED
+            raise
         finally:
             self.ctx.contact.disarm()
         event = self.ctx.contact.event()
         assert event is not None
+        # From now on the person holds the object as well: until the hand is open the arm must not go away with it.
+        self.ctx.shared = self.trigger == "release"
         self.ctx.journal.mark("contact")
         self.reason = event.message or f"{self.trigger} by {event.source}, margin {event.margin:.1f}"
         return "succeeded"
+
+    def _await_reach(self) -> None:
+        """How far it is, the motion itself knows: it tells in its first feedback."""
+        arm = self.ctx.arm
+        try:
+            self.wait_for(lambda: self._reached() or arm.dmp_progress().primitive_id != "", "news of the reach", 2.0)
+            limit = (float(self.ctx.config.get("reach_timeout", 6.0))
+                     + reach_time(arm.motion_limits(), arm.dmp_progress().remaining_distance))
+            self.allow(limit + 10.0)
+            self.wait_for(self._reached, "the end of the reach", limit, arm.speed_scale)
+        except TimeLimit as error:
+            progress = arm.dmp_progress()
+            error.causes = error.causes or (f"the motion is {progress.state} with {progress.remaining_distance:.2f} m "
+                                            f"to go{': ' if progress.reason else ''}{progress.reason}",)
+            raise
 
     def _await_rest(self) -> None:
         """Until no joint has moved by more than 2 mrad for 0.1 s, or 1 s is over."""
@@ -176,9 +198,9 @@ class WaitStop(CoglabState):
             return
         self.await_pending(self.ctx.arm.apply_profile("dmp"), "feedback profile 'dmp'", 2.0)
         try:
-            self.wait_for(lambda: self.ctx.arm.profile_settled("dmp")[0], "the end of the approach's compliance", 2.0)
+            self.wait_for(lambda: self.ctx.arm.profile_settled("dmp").ok, "the end of the approach's compliance", 2.0)
         except TimeLimit as limit:
-            limit.causes = (self.ctx.arm.profile_settled("dmp")[1],)
+            limit.causes = (self.ctx.arm.profile_settled("dmp").why,)
             raise
 
     def _settings(self, ud: Any) -> dict[str, Any]:
@@ -199,10 +221,11 @@ class WaitStop(CoglabState):
     def _reached(self) -> bool:
         progress = self.ctx.arm.dmp_progress()
         if progress.state == "aborted":
-            raise TimeLimit("the reach was aborted", (progress.reason or "the controller gave no reason",))
-        allowed, why = self.ctx.arm.motion_allowed()
-        if not allowed:
-            raise TimeLimit("the arm does not follow any more", (why,))
+            raise TimeLimit("the reach was aborted", (progress.reason or "the controller gave no reason",),
+                            progress.code)
+        blocked = self.ctx.arm.motion_allowed()
+        if not blocked.ok:
+            raise TimeLimit("the arm does not follow any more", (blocked.why,), blocked.code)
         return progress.state == "reached"
 
 
@@ -210,9 +233,10 @@ class MonitorDmp(CoglabState):
     """Beside the motion: if another reaching pattern is recognised, substitute its primitive (switch_dmp).
 
     Only among the primitives of ``monitor.primitives``: a motion that runs with another one (giving, the board) is left
-    alone. A pattern counts from ``monitor.confidence`` on. Runs until preempted."""
+    alone. A pattern counts from ``monitor.confidence`` on. Runs until preempted; where it fails, the reach goes on."""
 
-    default_time_limit = 60.0
+    default_time_limit = 600.0
+    essential = False
 
     def __init__(self, ctx: Context) -> None:
         super().__init__(ctx, input_keys=["goal"])
@@ -255,9 +279,10 @@ class MonitorDmp(CoglabState):
 
 class PtpMotion(CoglabState):
     """Point-to-point motion to a named posture of the configuration (``postures.<name>``); 'home' is
-    coglab_home_robot."""
+    coglab_home_robot. It may take ``ptp_timeout`` beyond half as long again as its limits and its way ask for."""
 
     default_time_limit = 20.0
+    owns_motion = True
 
     def __init__(self, ctx: Context, posture: str = "home") -> None:
         super().__init__(ctx)
@@ -266,8 +291,14 @@ class PtpMotion(CoglabState):
     def run(self, ud: Any) -> str:
         target = [float(v) for v in self.ctx.config.get(f"postures.{self.posture}")]
         speed = [float(v) for v in self.ctx.config.get("ptp_velocity", [])]
-        self.await_pending(self.ctx.arm.switch_controller("ptp"), "switching to controller 'ptp'", 5.0)
-        self.await_pending(self.ctx.arm.move_ptp(target, speed), f"the motion to posture '{self.posture}'")
+        arm = self.ctx.arm
+        self.await_pending(arm.switch_controller("ptp"), "switching to controller 'ptp'", 5.0)
+        here = arm.joint_positions()
+        if here is not None:
+            self.allow(float(self.ctx.config.get("ptp_timeout", 5.0))
+                       + 1.5 * ptp_time(arm.motion_limits(), here, target, speed))
+        self.await_pending(arm.move_ptp(target, speed), f"the motion to posture '{self.posture}'",
+                           pace=arm.speed_scale)
         self._verify(target)
         return "succeeded"
 
@@ -279,6 +310,7 @@ class PtpMotion(CoglabState):
             measured = self.ctx.arm.joint_positions()
             return measured is None or max(abs(m - t) for m, t in zip(measured, target, strict=False)) <= tolerance
 
+        self.allow(1.5)
         self.wait_for(arrived, f"all measured joints within {tolerance} rad of posture '{self.posture}'", 1.0)
 
 

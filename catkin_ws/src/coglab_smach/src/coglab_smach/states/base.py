@@ -7,9 +7,14 @@ from typing import Any
 
 import smach
 
+from coglab_msgs.msg import ReasonCode
+
 from ..config import ConfigError
 from ..context import Context
+from ..journal import Failure
 from ..pending import Pending, PortError
+from ..requests import command
+from .motion import end_motion
 
 POLL_PERIOD = 0.01
 """s between two looks at a condition: well below the 60 ms in which a contact has to be found."""
@@ -26,6 +31,9 @@ class Interrupted(Exception):
 class TimeLimit(PortError):
     """A state's time limit ran out; the sentence says what it waited for."""
 
+    def __init__(self, sentence: str, causes: tuple[str, ...] = (), code: int = ReasonCode.TIME_LIMIT) -> None:
+        super().__init__(sentence, causes, code)
+
 
 class CoglabState(smach.State):
     """Leaf state. Subclasses implement ``run`` and wait only through ``wait_for``, ``await_pending`` and ``pause``.
@@ -39,6 +47,12 @@ class CoglabState(smach.State):
 
     ignores_stop = False
     """True for states that make things safe after STOP and must run to their end."""
+
+    owns_motion = False
+    """True for states that start a motion of the arm or wait for one: it has ended when they end without success."""
+
+    essential = True
+    """False where a failure of this state is no failure of its action: it is recorded as a transition alone."""
 
     def __init__(self, ctx: Context, outcomes: Iterable[str] = ("succeeded",), input_keys: Sequence[str] = (),
                  output_keys: Sequence[str] = (), io_keys: Sequence[str] = ()) -> None:
@@ -61,35 +75,58 @@ class CoglabState(smach.State):
         return self.container.full_path() if self.container is not None else ""
 
     def execute(self, ud: Any) -> str:
-        self.reason = ""
-        causes: tuple[str, ...] = ()
-        self._deadline = self.ctx.clock.now() + self.time_limit()
+        self.reason, self._deadline = "", self.ctx.clock.now() + self.time_limit()
+        self.ctx.journal.entered(f"{self.path()}/{self.label}")
         try:
+            outcome, failure = self._run(ud)
+            if outcome != "failed" and self.preempt_requested():
+                # Asked for after the last look: the work is done, but nothing may follow it.
+                outcome, failure = "preempted", Failure(f"{self.label} was preempted", (), ReasonCode.PREEMPTED)
+            if outcome == "preempted":
+                # Served here alone. A request that a failure has overtaken stays up, and the container passes it on.
+                self.service_preempt()
+            if self.owns_motion and outcome in ("failed", "preempted"):
+                trouble = end_motion(self.ctx, failure.sentence)
+                if trouble:
+                    failure = Failure(f"{failure.sentence}; {trouble}", failure.causes, failure.code)
+            if outcome == "failed" and self.essential:
+                self.ctx.journal.failure(failure.sentence, failure.causes, failure.code)
+            self.ctx.journal.transition(self.path(), self.label, outcome, self.targets.get(outcome) or outcome,
+                                        failure.sentence, failure.causes, failure.code)
+        finally:
+            self.ctx.journal.left(f"{self.path()}/{self.label}")
+        return outcome
+
+    def _run(self, ud: Any) -> tuple[str, Failure]:
+        """Outcome of ``run`` and the sentence for it: whatever it raises becomes one."""
+        try:
+            self.check()
             outcome = self.run(ud)
+            return outcome, Failure(self.reason or (f"{self.label} failed" if outcome == "failed" else ""))
         except Interrupted as interrupt:
-            outcome, self.reason = ("failed" if interrupt.stop else "preempted"), str(interrupt)
+            code = ReasonCode.STOP_LATCHED if interrupt.stop else ReasonCode.PREEMPTED
+            return ("failed" if interrupt.stop else "preempted"), Failure(str(interrupt), (), code)
         except PortError as error:
-            outcome, self.reason, causes = "failed", f"{self.label}: {error.sentence}", error.causes
+            return "failed", Failure(f"{self.label}: {error.sentence}", error.causes, error.code)
         except (ConfigError, smach.InvalidUserCodeError) as error:
-            outcome, self.reason = "failed", f"{self.label}: {error}"
+            return "failed", Failure(f"{self.label}: {error}", (), ReasonCode.BAD_FILE)
         except Exception as error:
             last = traceback.extract_tb(error.__traceback__)[-1]
-            where = f"{last.name}:{last.lineno}"
-            outcome, self.reason = "failed", f"{self.label}: {type(error).__name__}: {error} ({where})"
             smach.logerr(traceback.format_exc())
-        if self.preempt_requested():
-            # Served here whatever the outcome, so that a late request cannot poison the next run.
-            self.service_preempt()
-        if outcome == "failed":
-            self.ctx.journal.failure(self.reason or f"{self.label} failed", causes)
-        self.ctx.journal.transition(self.path(), self.label, outcome, self.targets.get(outcome) or outcome,
-                                    self.reason, causes)
-        return outcome
+            return "failed", Failure(f"{self.label}: {type(error).__name__}: {error} ({last.name}:{last.lineno})", (),
+                                     ReasonCode.UNEXPECTED)
 
     def time_limit(self) -> float:
         """Longest duration of this state, s."""
-        limits = self.ctx.config.get("time_limits", {})
-        return float(limits.get(self.label, self.default_time_limit))
+        return float(self._configured_limits().get(self.label, self.default_time_limit))
+
+    def allow(self, duration: float) -> None:
+        """From now on this state may take ``duration`` s, unless the configuration gives it a limit of its own."""
+        if self.label not in self._configured_limits():
+            self._deadline = self.ctx.clock.now() + duration
+
+    def _configured_limits(self) -> dict[str, Any]:
+        return dict(self.ctx.config.get("time_limits", {}))
 
     def left(self) -> float:
         """Time left before the limit, s."""
@@ -100,25 +137,36 @@ class CoglabState(smach.State):
         if self.preempt_requested():
             raise Interrupted(False, f"{self.label} was preempted")
         if self.ctx.stop.pressed() and not self.ignores_stop:
-            raise Interrupted(True, f"STOP: {self.ctx.stop.reason}")
+            raise Interrupted(True, f"STOP: {self.ctx.stop.reason}; to go on {command('reset')}")
 
-    def wait_for(self, condition: Callable[[], bool], what: str, limit: float | None = None) -> None:
+    def wait_for(self, condition: Callable[[], bool], what: str, limit: float | None = None,
+                 pace: Callable[[], float] | None = None) -> None:
         """Wait until ``condition()``; TimeLimit naming ``what`` after ``limit`` s or at the end of the
-        state's own limit."""
+        state's own limit.
+
+        With ``pace`` (0..1, such as the speed scale) the limit counts in the time of a motion: it is used up so much
+        slower, down to a tenth, and the state's own limit is put off likewise.
+        """
         allowed = self.left() if limit is None else min(limit, self.left())
-        end = self.ctx.clock.now() + allowed
+        left, before = allowed, self.ctx.clock.now()
         while True:
             self.check()
             if condition():
                 return
-            if self.ctx.clock.now() >= end:
+            now = self.ctx.clock.now()
+            used = (now - before) * (min(1.0, max(0.1, pace())) if pace is not None else 1.0)
+            left -= used
+            self._deadline += now - before - used
+            before = now
+            if left <= 0.0:
                 raise TimeLimit(f"{what} within {max(0.0, allowed):.1f} s expected, it did not happen")
             self.ctx.clock.sleep(POLL_PERIOD)
 
-    def await_pending(self, pending: Pending, what: str, limit: float | None = None) -> Any:
+    def await_pending(self, pending: Pending, what: str, limit: float | None = None,
+                      pace: Callable[[], float] | None = None) -> Any:
         """The pending call's value; cancelled if the wait ends otherwise."""
         try:
-            self.wait_for(pending.done, what, limit)
+            self.wait_for(pending.done, what, limit, pace)
         except (Interrupted, TimeLimit):
             pending.cancel()
             raise
@@ -140,6 +188,8 @@ class _Placed:
     container: Any | None
     targets: Mapping[str, str]
     is_action: bool
+    owns_motion = False
+    """True where children start a motion that outlives them: it has ended when this one ends without success."""
 
     def place(self, ctx: Context, label: str) -> None:
         """Set the name until the container is added to another one."""
@@ -166,10 +216,13 @@ class _Placed:
         """Record the container's own transition with the first failure as its reason; close the record of an action."""
         if outcome is None:
             return
-        reason, causes = self.ctx.journal.first_failure() if outcome != "succeeded" else ("", ())
+        if self.owns_motion and outcome != "succeeded":
+            end_motion(self.ctx, f"{self.label} ended as {outcome}")
+        failure = self.ctx.journal.first_failure() if outcome != "succeeded" else Failure()
         if self.container is not None:
             self.ctx.journal.transition(self.container.full_path(), self.label, outcome,
-                                        self.targets.get(outcome) or outcome, reason, causes)
+                                        self.targets.get(outcome) or outcome, failure.sentence, failure.causes,
+                                        failure.code)
         if self.is_action:
             self.ctx.journal.end_action(outcome)
 

@@ -3,6 +3,8 @@ from __future__ import annotations
 
 from typing import Any
 
+from coglab_msgs.msg import ReasonCode
+
 from ..context import Context
 from ..pending import PortError
 from .base import CoglabState, TimeLimit
@@ -61,15 +63,15 @@ class HandClose(CoglabState):
     def run(self, ud: Any) -> str:
         self.ctx.journal.mark("closing")
         # From here on the hand may hold: a failure in the middle must not make the recovery drop the object.
-        self.ctx.holding = ud.object_id
+        self.ctx.holding, self.ctx.shared = ud.object_id, self.from_person
         self.await_pending(self.ctx.hand.close_on_object(), "closing of the hand")
         self.ctx.journal.mark("closed")
         self.pause(float(self.ctx.config.get("hand.settle_after_close", 0.3)))
         state = self.ctx.hand.state()
         if state.connected and not state.holding:
-            self.ctx.holding = ""
+            self.ctx.holding, self.ctx.shared = "", False
             raise PortError(f"the hand closed on nothing: motors at {list(state.positions)} of 254",
-                            (state.message,) if state.message else ())
+                            (state.message,) if state.message else (), ReasonCode.OBJECT_NOT_SEEN)
         if self.from_person:
             self._await_load(ud.object_id, float(ud.object_entry.get("mass", 0.0)))
         return "succeeded"
@@ -84,9 +86,10 @@ class HandClose(CoglabState):
         except TimeLimit:
             self.ctx.holding = ""
             raise PortError(f"the person did not let go of '{object_id}' within {limit:.0f} s",
-                            ("its weight has not come into the robot's hand",)) from None
+                            ("its weight has not come into the robot's hand",), ReasonCode.NOT_RELEASED) from None
         finally:
             self.ctx.contact.disarm()
+        self.ctx.shared = False
         self.ctx.journal.mark("loaded")
         event = self.ctx.contact.event()
         self.reason = event.message if event is not None else ""
@@ -100,5 +103,5 @@ class HandOpen(CoglabState):
     def run(self, ud: Any) -> str:
         self.ctx.journal.mark("opening")
         self.await_pending(self.ctx.hand.open(int(self.ctx.config.get("hand.open_speed", 400))), "opening of the hand")
-        self.ctx.holding = ""
+        self.ctx.holding, self.ctx.shared = "", False
         return "succeeded"

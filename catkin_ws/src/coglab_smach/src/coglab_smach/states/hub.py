@@ -5,10 +5,12 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
+from coglab_msgs.msg import ReasonCode
+
 from ..context import Context
 from ..holding import UNKNOWN
 from ..pending import PortError
-from ..requests import Request
+from ..requests import Request, command
 from .base import CoglabState, Interrupted
 
 
@@ -29,7 +31,8 @@ class WaitForTrigger(CoglabState):
             return "succeeded"
         self.ctx.requests.open(self.label, [self.action])
         try:
-            self.wait_for(lambda: self.ctx.requests.take() is not None, f"trigger '{self.action}' on /coglab/start")
+            self.wait_for(lambda: self.ctx.requests.take() is not None,
+                          f"trigger '{self.action}' ({command(self.action)})")
         finally:
             self.ctx.requests.close()
         return "succeeded"
@@ -51,6 +54,7 @@ class Hub(CoglabState):
         self.with_object = with_object
         self._blocked_since: float | None = None
         self._saw_rest = False
+        self._code = 0
 
     def time_limit(self) -> float:
         # A hub is the place to wait in: it has no end of its own.
@@ -71,7 +75,7 @@ class Hub(CoglabState):
             finally:
                 self.ctx.requests.close()
             if request is None:
-                self.ctx.journal.failure(self.reason)
+                self.ctx.journal.failure(self.reason, (), self._code)
                 return "stopped"
             if not self.with_object:
                 ud.object_id = request.object_id or str(self.ctx.config.get("default_object", "mug"))
@@ -79,13 +83,15 @@ class Hub(CoglabState):
             refusal = self._learn_what_is_held(ud, request)
             if not refusal:
                 break
-            self.ctx.journal.transition(self.path(), self.label, "refused", self.label, refusal)
+            self.ctx.journal.transition(self.path(), self.label, "refused", self.label, refusal, (),
+                                        ReasonCode.OBJECT_UNKNOWN)
         self.reason += f"{request.source} asked for {request.action} of '{ud.object_id}'"
         return request.action
 
     def _open(self, ud: Any) -> None:
         unknown = self.with_object and ud.object_id == UNKNOWN
-        self.ctx.requests.open(self.label, self.actions, names_object=unknown)
+        default = "" if self.with_object else str(self.ctx.config.get("default_object", "mug"))
+        self.ctx.requests.open(self.label, self.actions, unknown, default)
 
     def _await_request(self) -> Request | None:
         """The next trigger; None, with a reason, if the arm was stopped first."""
@@ -95,7 +101,7 @@ class Hub(CoglabState):
             except Interrupted as interrupt:
                 if not interrupt.stop:
                     raise
-                self.reason = str(interrupt)
+                self.reason, self._code = str(interrupt), ReasonCode.STOP_LATCHED
                 return None
             if self._blocked():
                 return None
@@ -107,19 +113,21 @@ class Hub(CoglabState):
 
     def _blocked(self) -> bool:
         """Whether the arm has been blocked for longer than a hiccup; PortError if its node is silent."""
-        allowed, why = self.ctx.arm.motion_allowed()
+        allowed = self.ctx.arm.motion_allowed()
         now = self.ctx.clock.now()
-        if allowed:
+        if allowed.ok:
             self._blocked_since = None
             return False
         if self._blocked_since is None:
             self._blocked_since = now
         waited = now - self._blocked_since
-        if waited > float(self.ctx.config.get("hub.silent_time", 2.0)) and self.ctx.arm.joint_positions() is None:
-            raise PortError("the robot is silent", (why,))
-        if waited <= float(self.ctx.config.get("hub.blocked_time", 0.5)) or self.ctx.arm.joint_positions() is None:
+        silent = self.ctx.arm.joint_positions() is None
+        if waited > float(self.ctx.config.get("hub.silent_time", 2.0)) and silent:
+            raise PortError("the robot is silent", (allowed.why,), ReasonCode.NODE_SILENT)
+        if waited <= float(self.ctx.config.get("hub.blocked_time", 0.5)) or silent:
             return False
-        self.reason = f"the arm is blocked: {why}; ask for 'reset' when its cause is away"
+        self._code = allowed.code
+        self.reason = f"the arm is blocked: {allowed.why}; when its cause is away, {command('reset')}"
         return True
 
     def _learn_what_is_held(self, ud: Any, request: Request) -> str:
@@ -159,7 +167,8 @@ class Hub(CoglabState):
 
 class Stopped(CoglabState):
     """After STOP: nothing moves until the operator asks for 'reset'. Then the arm is enabled again; the hand
-    keeps what it holds."""
+    keeps what it holds. A 'reset' that somebody has sent to the robot itself is not enough: the arm would go home
+    without having been asked to."""
 
     ignores_stop = True
 
@@ -167,23 +176,17 @@ class Stopped(CoglabState):
         return math.inf
 
     def run(self, ud: Any) -> str:
-        self.ctx.requests.open(self.label, ["reset"])
-        try:
-            while self.ctx.requests.take() is None:
-                self.check()
-                self.ctx.clock.sleep(0.05)
-        finally:
-            self.ctx.requests.close()
-        # What fails from now on is no consequence of what was stopped.
-        self.ctx.journal.settle()
+        await_operator(self, "reset")
+        # The operator has answered: it is not told any more, and what fails from now on is no consequence of it.
+        self.ctx.journal.settle(forget=True)
         self.await_pending(self.ctx.arm.lwr_command("reset"), "LWR command 'reset'", 5.0)
         self.ctx.stop.reset()
-        if not self.ctx.arm.motion_allowed()[0]:
+        if not self.ctx.arm.motion_allowed().ok:
             # Command mode was lost as well: the operator's reset is the explicit start that it needs.
             self.pause(0.3)
-            if not self.ctx.arm.motion_allowed()[0]:
+            if not self.ctx.arm.motion_allowed().ok:
                 self.await_pending(self.ctx.arm.lwr_command("start"), "LWR command 'start'", 20.0)
-            self.wait_for(lambda: self.ctx.arm.motion_allowed()[0], "command mode of the LWR", 10.0)
+            self.wait_for(lambda: self.ctx.arm.motion_allowed().ok, "command mode of the LWR", 10.0)
         return "succeeded"
 
 
@@ -198,14 +201,9 @@ class Fault(CoglabState):
 
     def run(self, ud: Any) -> str:
         self.reason = self.ctx.journal.why()
-        self.ctx.requests.open(self.label, ["initialise"])
-        try:
-            while self.ctx.requests.take() is None:
-                self.check()
-                self.ctx.clock.sleep(0.05)
-        finally:
-            self.ctx.requests.close()
-        if self.ctx.stop.pressed() or not self.ctx.arm.motion_allowed()[0]:
+        await_operator(self, "initialise")
+        self.ctx.journal.settle(forget=True)
+        if self.ctx.stop.pressed() or not self.ctx.arm.motion_allowed().ok:
             # A hold that is latched at the robot would let the new initialisation fail as well.
             try:
                 self.await_pending(self.ctx.arm.lwr_command("reset"), "LWR command 'reset'", 5.0)
@@ -214,3 +212,14 @@ class Fault(CoglabState):
             self.ctx.stop.reset()
         self.reason = "the operator asked for a new initialisation"
         return "succeeded"
+
+
+def await_operator(state: CoglabState, action: str) -> None:
+    """Wait, for ever, until the operator asks for this one action."""
+    state.ctx.requests.open(state.label, [action])
+    try:
+        while state.ctx.requests.take() is None:
+            state.check()
+            state.ctx.clock.sleep(0.05)
+    finally:
+        state.ctx.requests.close()

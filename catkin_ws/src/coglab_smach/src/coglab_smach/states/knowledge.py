@@ -1,10 +1,12 @@
 """States that turn knowledge into a goal: the object database and perception."""
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
+from coglab_msgs.msg import ReasonCode
 
 from ..context import Context
 from ..goals import delivery_goal, grasp_goal, place_goal
@@ -32,7 +34,8 @@ class QueryDatabase(CoglabState):
         super().__init__(ctx, input_keys=["object_id"], output_keys=["object_entry", "grasp", "grasp_name"])
 
     def run(self, ud: Any) -> str:
-        entry = self.await_pending(self.ctx.database.get_object(ud.object_id), f"entry of object '{ud.object_id}'")
+        with refused_as(ReasonCode.OBJECT_UNKNOWN):
+            entry = self.await_pending(self.ctx.database.get_object(ud.object_id), f"entry of object '{ud.object_id}'")
         name = entry["default_grasp"]
         ud.object_entry = entry
         ud.grasp_name = name
@@ -67,14 +70,26 @@ class LocateOnBoard(CoglabState):
         return "succeeded"
 
 
+@contextmanager
+def refused_as(code: int) -> Iterator[None]:
+    """A refusal inside means this ReasonCode, where the port has none of its own."""
+    try:
+        yield
+    except PortError as error:
+        error.code = error.code or code
+        raise
+
+
 def locate(state: CoglabState, target: str) -> dict[str, Any]:
     """Wait for perception to see ``target`` (object id or 'human_hand'); plain dict for user data."""
     limit = float(state.ctx.config.get("perception.locate_timeout", 5.0))
-    found = state.await_pending(state.ctx.perception.locate_object(target, limit), f"sight of '{target}'", limit + 1.0)
+    with refused_as(ReasonCode.OBJECT_NOT_SEEN):
+        found = state.await_pending(state.ctx.perception.locate_object(target, limit), f"sight of '{target}'",
+                                    limit + 1.0)
     oldest = float(state.ctx.config.get("perception.max_age", 0.5))
     if found.age > oldest:
         raise PortError(f"'{target}' was last seen {found.age:.2f} s ago, expected at most {oldest} s",
-                        ("the tracker has lost it; bring it into view",))
+                        ("the tracker has lost it; bring it into view",), ReasonCode.OBJECT_NOT_SEEN)
     return {"frame": found.frame, "parent": found.parent, "xyz": list(found.xyz),
             "quaternion": list(found.quaternion), "age": found.age}
 
@@ -103,11 +118,11 @@ def await_offer(state: CoglabState, target: str, goal: Mapping[str, Any], margin
         if offered and reachable(state.ctx, located, goal):
             break
         if now > end and offered:
-            raise PortError(*out_of_reach(target, located, goal))
+            raise PortError(*out_of_reach(target, located, goal), ReasonCode.GOAL_UNREACHABLE)
         if now > end:
             where = ", ".join(f"{v:.2f}" for v in place)
             raise PortError(f"'{target}' was not offered within {limit:.0f} s: it stayed at ({where}) m, outside the "
-                            "handover region", ("nobody reaches toward the robot",))
+                            "handover region", ("nobody reaches toward the robot",), ReasonCode.OBJECT_NOT_SEEN)
         state.pause(0.03)
     state.ctx.journal.mark("offered")
     return located
@@ -209,7 +224,7 @@ class FindPlace(CoglabState):
         places = self.await_pending(self.ctx.perception.free_places(ud.object_id, limit), "a free place on the board",
                                     limit + 1.0)
         if not places:
-            raise PortError("perception names no free place on the board; clear one")
+            raise PortError("perception names no free place on the board; clear one", code=ReasonCode.NO_FREE_PLACE)
         best = places[0]
         ud.place = {"frame": best.parent, "xyz": list(best.xyz), "quaternion": list(best.quaternion)}
         return "succeeded"
