@@ -138,3 +138,15 @@ def test_nan_and_old_stamps_are_ignored(posture):
     assert run.detector.feed(run.t + 0.005, [np.nan] * 7, run.q, STILL) is None
     assert run.detector.feed(run.t - 1.0, np.full(7, 50.0), run.q, STILL) is None
     assert run.feed(0.2, push((0, 1, 0), 5.0))[0] is not None
+
+
+@pytest.mark.parametrize("step", [-3600.0, -0.4, 30.0])
+def test_hears_again_after_the_clock_was_set(posture, step):
+    """Armed, then the clock steps: the arming keeps the time that it had left, and a touch is still found in time."""
+    run = ContactTrial(posture, 21)
+    assert run.rest_and_arm() is None
+    run.t += step
+    assert run.feed(0.6)[0] is None
+    assert run.detector.state() == "watching"
+    event, delay = run.feed(0.3, push((0, 1, 0), 5.0))
+    assert event is not None and delay < 0.06

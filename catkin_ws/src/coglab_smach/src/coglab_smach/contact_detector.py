@@ -21,6 +21,8 @@ from .ports import ContactEvent
 GRAVITY = 9.81
 MAD_TO_SIGMA = 1.4826
 """Standard deviation of normal noise per median absolute deviation."""
+LONGEST_STEP = 1.0
+"""s between two samples that follow each other"""
 
 
 @dataclass
@@ -93,6 +95,8 @@ class ContactDetector:
         self._history: deque[tuple[float, np.ndarray]] = deque()
         self._rest_differences: deque[np.ndarray] = deque(maxlen=400)
         self._last_stamp: float | None = None
+        self._odd_stamp: float | None = None
+        """of the last sample that did not follow the one before it"""
         self._still_since: float | None = None
         self._rest_torque: np.ndarray | None = None
         self._rest_before_motion: np.ndarray | None = None
@@ -141,7 +145,7 @@ class ContactDetector:
         tau = np.asarray(torque, dtype=float)
         if not (np.all(np.isfinite(tau)) and np.all(np.isfinite(velocity))):
             return None
-        if self._last_stamp is not None and stamp <= self._last_stamp:
+        if not self._in_time(stamp):
             return None
         self._follow_motion(stamp, velocity)
         difference = self._filter(stamp, tau)
@@ -155,6 +159,22 @@ class ContactDetector:
             self._learn(difference)
             return None
         return self._watch(stamp, difference, position)
+
+    def _in_time(self, stamp: float) -> bool:
+        """Whether a sample follows the one before it. A single one that does not is ignored; two that follow each other
+        mean that the clock was set, or that no samples came for long: an arming keeps the time that it had left, and the
+        arm counts as still only once it was seen so again."""
+        last, odd, self._odd_stamp = self._last_stamp, self._odd_stamp, None
+        if last is None or 0.0 < stamp - last <= LONGEST_STEP:
+            return True
+        if odd is None or not 0.0 < stamp - odd <= LONGEST_STEP:
+            self._odd_stamp = stamp
+            return False
+        if self._armed is not None:
+            self._armed.until += stamp - last
+            self._armed.gone_since = None
+        self._last_stamp = self._still_since = None
+        return True
 
     def _follow_motion(self, stamp: float, velocity: Sequence[float]) -> None:
         moving = float(np.max(np.abs(velocity))) > self.settings.still_speed

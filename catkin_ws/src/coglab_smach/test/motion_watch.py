@@ -1,0 +1,51 @@
+"""Nothing moves after a failure: what tests and bench mean by it.
+
+From the moment at which the next state begins after a state that has ended failed or preempted, until somebody asks for
+a motion or the trial is over, the true speed of every joint stays below STILL.
+"""
+import numpy as np
+
+STILL = 0.02
+"""rad/s: what the contact detector calls standing still"""
+
+
+class MotionWatch:
+    """Looks at the arm's true velocity. ``velocity()`` gives it (rad/s, seven joints); ``look()`` is called in every
+    step of the world, by the clock's own time."""
+
+    def __init__(self, ctx, velocity):
+        self._velocity = velocity
+        self._failed = self._watching = False
+        self.failures = 0
+        """states that have ended failed or preempted"""
+        self.moved = []
+        """(state that had begun, rad/s) where the arm moved all the same"""
+        self._journal = ctx.journal
+        ctx.journal.listen(self._on_transition)
+        ctx.journal.listen_changes(self._on_change)
+        for name in ("move_ptp", "execute_dmp", "switch_dmp"):
+            setattr(ctx.arm, name, self._asked(getattr(ctx.arm, name)))
+
+    def _asked(self, call):
+        def ask(*arguments):
+            self._watching = self._failed = False
+            return call(*arguments)
+        return ask
+
+    def _on_transition(self, record):
+        if record.outcome in ("failed", "preempted") and record.from_state != "monitor_dmp":
+            self.failures += 1
+            self._failed = True
+
+    def _on_change(self):
+        # A state has begun, and it is not the one that failed.
+        if self._failed and self._journal.active():
+            self._watching = True
+            self.look()
+
+    def look(self):
+        """Note it if the arm moves although it must not."""
+        if self._watching:
+            speed = float(np.max(np.abs(self._velocity())))
+            if speed > STILL:
+                self.moved.append((self._journal.active(), speed))

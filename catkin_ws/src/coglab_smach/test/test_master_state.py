@@ -1,0 +1,129 @@
+"""coglab/state and coglab/why follow what happens; a start that cannot work is refused at once, by name."""
+import json
+
+from coglab_msgs.msg import MasterState as Message
+from coglab_msgs.msg import ReasonCode
+from coglab_smach.master_state import MasterState, StateWatch
+from coglab_smach.requests import ask_for
+from conftest import Trial
+
+RECEIVE, GIVE = "exchange_human_to_robot", "exchange_robot_to_human"
+
+
+class Watched(Trial):
+    """A trial with all that was published."""
+
+    def __init__(self, **overrides):
+        super().__init__(**overrides)
+        self.shown = []
+        self.watch = StateWatch(self.ctx, self.shown.append)
+
+    def ask(self, action, object_id=""):
+        return ask_for(self.ctx, action, object_id)
+
+
+def test_the_fields_are_those_of_the_message():
+    assert set(MasterState.__dataclass_fields__) == set(Message.__slots__) - {"header"}
+
+
+def test_why_is_told_until_the_operator_has_answered():
+    trial = Watched()
+
+    def script(t):
+        t.wait_hub("wait_without_object")
+        assert t.shown[-1].why == "" and t.shown[-1].actions == (RECEIVE, "take")
+        t.cell.arm.held = True
+        t.wait_hub("stopped")
+        stopped = t.shown[-1]
+        assert stopped.state == "/coglab_master/stopped" and stopped.in_hub and stopped.actions == ("reset",)
+        assert stopped.reason_code == ReasonCode.HELD and stopped.why.endswith("type: ./coglab start reset")
+        # Somebody lifts the hold at the robot itself: the machine still waits, and the same recipe goes on.
+        t.cell.arm.held = False
+        t.clock.sleep(1.0)
+        assert t.ctx.requests.hub() == "stopped"
+        refused = t.ask("initialise")
+        assert not refused.ok and refused.code == ReasonCode.WRONG_STATE
+        assert refused.message.endswith("type: ./coglab start reset")
+        assert t.ask("reset").ok
+        t.wait_hub("wait_without_object")
+        assert t.shown[-1].why == "" and t.shown[-1].reason_code == 0
+        for action, hub in ((RECEIVE, "wait_with_object"), (GIVE, "wait_without_object")):
+            assert t.ask(action, "mug").ok
+            t.wait_hub(hub)
+        assert t.watch.now().why == ""
+
+    trial.run(script)
+    assert all(a != b for a, b in zip(trial.shown, trial.shown[1:], strict=False))
+    held = [s for s in trial.shown if s.object_id == "mug"]
+    assert held and any(s.state.endswith("/approach/arm_motion/wait_stop") for s in trial.shown)
+
+
+def test_a_failure_is_told_until_the_next_success():
+    trial = Watched()
+
+    def script(t):
+        t.wait_hub("wait_without_object")
+        t.cell.faults.not_seen.add("mug")
+        t.ask(RECEIVE, "mug")
+        t.clock.sleep(0.5)
+        t.wait_hub("wait_without_object")
+        assert "was not seen" in t.shown[-1].why and t.shown[-1].reason_code == ReasonCode.OBJECT_NOT_SEEN
+        t.cell.faults.not_seen.clear()
+        assert t.ask(RECEIVE, "mug").ok
+        t.wait_hub("wait_with_object")
+        assert t.shown[-1].why == ""
+
+    trial.run(script)
+    failed = trial.ctx.journal.results[1]
+    assert failed.to_dict()["reason_code"] == ReasonCode.OBJECT_NOT_SEEN and json.dumps(failed.to_dict())
+    codes = {r.code for r in trial.ctx.journal.transitions if r.outcome in ("failed", "failed_empty")}
+    assert codes == {ReasonCode.OBJECT_NOT_SEEN}
+
+
+def test_fault_says_how_to_go_on():
+    trial = Watched()
+    trial.cell.faults.refuse["load_dmps"] = "library.xml:3: <weights> has 14 numbers, expected 15"
+
+    def script(t):
+        t.wait_hub("fault")
+        assert t.shown[-1].why.endswith("expected 15; to go on type: ./coglab start initialise")
+        t.cell.faults.refuse.clear()
+        assert t.ask("initialise").ok
+        t.wait_hub("wait_without_object")
+        assert t.shown[-1].why == ""
+
+    trial.run(script)
+
+
+def test_an_object_that_does_not_exist_is_refused_by_name():
+    trial = Watched()
+
+    def script(t):
+        t.wait_hub("wait_without_object")
+        refused = t.ask(RECEIVE, "elephant")
+        assert not refused.ok and refused.code == ReasonCode.OBJECT_UNKNOWN
+        assert refused.message == (
+            f"'{RECEIVE}' refused: object 'elephant' is not in the database; it has: ball, bottle, mug, screwdriver, "
+            f"tea_box; type: ./coglab start {RECEIVE} ball")
+        t.clock.sleep(1.0)
+        assert t.ctx.requests.hub() == "wait_without_object" and "execute_dmp" not in t.cell.called()
+        t.ctx.config.set("default_object", "gnu")
+        t.cell.arm.held = True  # the hub is opened again with the new default
+        t.wait_hub("stopped")
+        assert t.ask("reset").ok
+        t.wait_hub("wait_without_object")
+        assert "'gnu' is not in the database" in t.ask("take").message
+
+    trial.run(script)
+
+
+def test_a_silent_database_is_named():
+    trial = Watched()
+
+    def script(t):
+        t.wait_hub("wait_without_object")
+        t.cell.faults.dead.add("database")
+        refused = t.ask(RECEIVE, "mug")
+        assert not refused.ok and refused.code == ReasonCode.NODE_SILENT and "database has not answered" in refused.message
+
+    trial.run(script)

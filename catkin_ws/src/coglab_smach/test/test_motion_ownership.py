@@ -1,0 +1,215 @@
+"""Who starts a motion ends it: whatever fails, runs out of time or is preempted, the arm stands before the next state
+begins, and recovery goes nowhere with an object that a person may hold."""
+import coglab_smach.simulated_arm_model as model
+import pytest
+from coglab_msgs.msg import ReasonCode
+from coglab_smach.manager_limits import read_limits
+from coglab_smach.motion_time import ptp_time, reach_time
+from coglab_smach.pending import PortError
+from conftest import Trial
+from motion_watch import MotionWatch
+
+RECEIVE, GIVE = "exchange_human_to_robot", "exchange_robot_to_human"
+
+
+def watched(script, prepare=lambda t: None, **overrides):
+    """Run a script with a watch on the arm; returns the trial."""
+    trial = Trial(**overrides)
+    prepare(trial)
+    watch = MotionWatch(trial.ctx, lambda: trial.cell.arm.velocity())
+    over = []
+
+    def look():
+        while not over:
+            watch.look()
+            trial.clock.sleep(0.005)
+
+    def scripted(t):
+        t.clock.start_thread(look, "watch")
+        try:
+            script(t)
+        finally:
+            over.append(True)
+
+    trial.run(scripted)
+    assert watch.failures > 0 and watch.moved == []
+    return trial
+
+
+def test_a_motion_beyond_its_time_limit_is_ended_before_recovery_begins(monkeypatch):
+    def script(t):
+        t.wait_hub("wait_without_object")
+        monkeypatch.setattr(model, "ptp_time", lambda *a: 10.0 * ptp_time(*a))
+        t.start("take")
+        t.wait_hub("fault", 200.0)  # recovery cannot go home in its time either
+        assert t.cell.arm.standing()
+
+    trial = watched(script)
+    assert "the motion to posture 'board' within" in trial.result().reason
+    assert trial.result().code == ReasonCode.TIME_LIMIT
+    assert len(trial.cell.called("cancel")) >= 2
+
+
+@pytest.mark.parametrize("action, moment", [("take", 0.3), ("take", 1.2), (RECEIVE, 0.3), (RECEIVE, 0.7)])
+def test_a_shut_down_leaves_no_motion_behind(action, moment):
+    def script(t):
+        t.wait_hub("wait_without_object")
+        t.start(action)
+        t.clock.sleep(moment)
+        assert not t.cell.arm.standing()
+        t.master.request_preempt()
+        t.clock.sleep(0.3)
+        assert t.cell.arm.standing()
+
+    watched(script)
+
+
+def test_a_sibling_that_fails_ends_the_reach_of_the_other():
+    def script(t):
+        t.wait_hub("wait_without_object")
+        t.cell.faults.refuse["preshape cylindrical"] = PortError("motor 2 is stuck", code=ReasonCode.HAND_STALLED)
+        t.start(RECEIVE)
+        t.wait_hub("wait_without_object")
+
+    trial = watched(script)
+    assert trial.result().code == ReasonCode.HAND_STALLED
+    assert trial.cell.called("cancel")
+
+
+def test_where_cancelling_fails_the_arm_is_held():
+    def script(t):
+        t.wait_hub("wait_without_object")
+        t.cell.faults.refuse["cancel"] = "no such service"
+        t.cell.faults.abort_dmp_after = 0.0
+        t.cell.partner.touch_after = None
+        t.cell.faults.refuse["preshape cylindrical"] = "motor 2 is stuck"
+        t.start(RECEIVE)
+        t.wait_hub("stopped")
+        assert t.cell.arm.held and t.cell.arm.standing()
+        t.cell.faults.refuse.clear()
+        t.start("reset", "")
+        t.wait_hub("wait_without_object")
+
+    watched(script)
+
+
+def test_preempted_after_the_last_look_nothing_follows():
+    """The request comes while the state returns its success: the next state would have started the arm."""
+    trial = Trial()
+
+    def script(t):
+        t.wait_hub("wait_without_object")
+        switch = t.master.get_children()[RECEIVE].get_children()["approach"].get_children()["arm_motion"].get_children()[
+            "switch_to_dmp"]
+        work = switch.run
+
+        def run(ud):
+            outcome = work(ud)
+            t.master.request_preempt()
+            return outcome
+
+        switch.run = run
+        t.start(RECEIVE)
+        t.clock.sleep(3.0)
+
+    trial.run(script)
+    assert trial.cell.called("execute_dmp") == []
+    ended = {r.from_state: r.outcome for r in trial.ctx.journal.transitions}
+    assert ended["switch_to_dmp"] == "preempted"
+
+
+def test_a_limit_follows_the_limits_of_speed_and_the_speed_scale():
+    t1 = read_limits({"joint_limits_profile": "t1"})
+
+    def prepare(t):
+        t.cell.arm.limits = t1
+        t.cell.arm.speed_scale = 0.5
+
+    trial = Trial()
+    prepare(trial)
+
+    def script(t):
+        t.wait_hub("wait_without_object", 300.0)
+        for action, hub in (("take", "wait_with_object"), ("put", "wait_without_object"),
+                            (RECEIVE, "wait_with_object"), (GIVE, "wait_without_object")):
+            t.start(action)
+            t.wait_hub(hub, 400.0)
+            assert t.result().outcome == "succeeded", t.ctx.journal.why()
+
+    trial.run(script)
+
+
+def test_times_are_those_of_the_limits():
+    full, t1 = read_limits({}), read_limits({"joint_limits_profile": "t1"})
+    slow_hand = read_limits({"hand_speed_limit": 0.1})
+    home, board = (Trial().ctx.config.get(f"postures.{name}") for name in ("home", "board"))
+    # 1.4454 rad of lwr_a6 at 0.3 x 0.24 rad/s, and 0.072 rad/s over 0.2 x 0.8 rad/s^2 more.
+    assert ptp_time(t1, home, board) == pytest.approx(1.4454 / 0.072 + 0.072 / 0.16, abs=1e-3)
+    assert ptp_time(full, home, board) < 3.0 < ptp_time(slow_hand, home, board)
+    assert reach_time(full, 0.5) < 3.0 < 15.0 < reach_time(t1, 0.5)
+
+
+@pytest.mark.parametrize("hub_after", ["stopped"])
+def test_a_person_who_holds_on_and_a_hand_that_does_not_open(hub_after):
+    """The arm must not go away with the person's object."""
+    def script(t):
+        t.wait_hub("wait_without_object")
+        t.cell.partner.let_go_after = None
+        t.cell.faults.refuse["open"] = PortError("motors 2, 3 are stuck", code=ReasonCode.HAND_STALLED)
+        t.start(RECEIVE)
+        t.wait_hub(hub_after)
+        place, moved = t.cell.joints, t.cell.called("move")
+        t.clock.sleep(5.0)
+        assert t.cell.joints == place and t.cell.called("move") == moved
+        why = t.ctx.journal.why()
+        assert why.startswith("the arm stays where it is: the hand could not be opened") and "did not let go" in why
+        assert "type: ./coglab start reset" in why
+        t.start("reset", "")
+        t.wait_hub("stopped")  # as stuck as before: it still stays
+        assert t.cell.joints == place
+        t.cell.faults.refuse.clear()
+        t.clock.sleep(0.5)
+        t.start("reset", "")
+        t.wait_hub("wait_without_object")
+
+    trial = watched(script)
+    assert trial.result().code == ReasonCode.NOT_RELEASED
+
+
+def test_a_person_who_has_taken_the_load_and_a_hand_that_does_not_open():
+    def script(t):
+        t.wait_hub("wait_without_object")
+        t.start(RECEIVE)
+        t.wait_hub("wait_with_object")
+        t.cell.faults.refuse["open"] = "motors 2, 3 are stuck"
+        t.start(GIVE)
+        t.wait_hub("stopped")
+        place = t.cell.joints
+        t.clock.sleep(3.0)
+        assert t.cell.joints == place and "the person may still hold 'mug'" in t.ctx.journal.why()
+        # The operator has looked: the object is the robot's after all.
+        t.start("reset", "")
+        t.wait_hub("wait_with_object")
+
+    watched(script)
+
+
+def test_a_failed_monitor_is_no_reason_of_a_success():
+    trial = Trial()
+
+    def broken():
+        raise RuntimeError("no estimate")
+
+    trial.ctx.perception.recognition = broken
+
+    def script(t):
+        t.wait_hub("wait_without_object")
+        t.start(RECEIVE)
+        t.wait_hub("wait_with_object")
+
+    trial.run(script)
+    result = trial.result()
+    assert (result.outcome, result.reason, result.code) == ("succeeded", "", 0)
+    assert any(r.from_state == "monitor_dmp" and r.outcome == "failed" and "no estimate" in r.reason
+               for r in trial.ctx.journal.transitions)
+    assert trial.ctx.journal.newest_failure().sentence == ""

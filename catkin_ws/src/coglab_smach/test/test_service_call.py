@@ -1,0 +1,82 @@
+"""A service call that is given up before it was sent never acts, however late its server comes or thaws."""
+from __future__ import annotations
+
+import threading
+import time
+from types import SimpleNamespace
+
+import pytest
+
+rospy = pytest.importorskip("rospy", reason="rospy is not installed")
+from coglab_msgs.msg import ReasonCode
+from coglab_msgs.srv import LwrCommand
+from coglab_smach import ros_calls
+from coglab_smach.pending import PortError
+
+
+class Server:
+    """Stands for the master and a server: ``there`` is when it is registered, ``thawed`` when it takes connections."""
+
+    def __init__(self, monkeypatch):
+        self.there, self.thawed = threading.Event(), threading.Event()
+        self.heard = []
+        self.answer = SimpleNamespace(success=True, message="done", reason_code=0)
+        monkeypatch.setattr(ros_calls.rospy, "resolve_name", lambda name: "/" + name)
+        monkeypatch.setattr(ros_calls.rospy, "wait_for_service", self.wait_for_service)
+        monkeypatch.setattr(ros_calls.rospy, "ServiceProxy", lambda name, kind: self.call)
+
+    def wait_for_service(self, name, timeout):
+        if not self.there.wait(timeout):
+            raise rospy.ROSException("timeout")
+
+    def call(self, request):
+        assert self.thawed.wait(10.0)
+        buff = __import__("io").BytesIO()
+        request.serialize(buff)  # as rospy does once the connection stands
+        self.heard.append(request.event)
+        return self.answer
+
+
+def ended(call):
+    end = time.monotonic() + 5.0
+    while not call.done() and time.monotonic() < end:
+        time.sleep(0.005)
+    return call.done()
+
+
+@pytest.mark.parametrize("late", ["there", "thawed"])
+def test_given_up_before_it_was_sent(monkeypatch, late):
+    server = Server(monkeypatch)
+    if late == "thawed":
+        server.there.set()
+    call = ros_calls.call("lwr/command", LwrCommand, event="reset")
+    time.sleep(0.05)
+    call.cancel()
+    server.there.set()
+    server.thawed.set()
+    assert ended(call)
+    with pytest.raises(PortError) as raised:
+        call.result()
+    assert raised.value.code == ReasonCode.CANCELLED
+    assert server.heard == []
+
+
+def test_a_refusal_brings_its_code(monkeypatch):
+    server = Server(monkeypatch)
+    server.there.set()
+    server.thawed.set()
+    server.answer = SimpleNamespace(success=False, message="hold is latched", reason_code=ReasonCode.HELD)
+    call = ros_calls.call("lwr/command", LwrCommand, event="start")
+    assert ended(call) and server.heard == ["start"]
+    with pytest.raises(PortError, match="/lwr/command refused: hold is latched") as raised:
+        call.result()
+    assert raised.value.code == ReasonCode.HELD
+
+
+def test_a_server_that_never_comes(monkeypatch):
+    Server(monkeypatch)
+    call = ros_calls.call("lwr/command", LwrCommand, wait=0.1, event="start")
+    assert ended(call)
+    with pytest.raises(PortError, match="is not there after 0 s; is its node running") as raised:
+        call.result()
+    assert raised.value.code == ReasonCode.NODE_SILENT
