@@ -1,7 +1,7 @@
 """Nothing moves after a failure: what tests and bench mean by it.
 
-From the moment at which the next state begins after a state that has ended failed or preempted, until somebody asks for
-a motion or the trial is over, the true speed of every joint stays below STILL.
+From the moment at which the next state begins after a state that has ended failed or preempted (or at which the machine
+has ended), until somebody asks for a motion or the trial is over, the true speed of every joint stays below STILL.
 """
 import numpy as np
 
@@ -33,13 +33,16 @@ class MotionWatch:
         return ask
 
     def _on_transition(self, record):
+        if self._failed and record.outcome == "preempted" and record.path.count("/") == 1:
+            self._watching = True  # the machine is at its end: no state follows
+            self.look()
         if record.outcome in ("failed", "preempted") and record.from_state != "monitor_dmp":
             self.failures += 1
             self._failed = True
 
     def _on_change(self):
-        # A state has begun, and it is not the one that failed.
-        if self._failed and self._journal.active():
+        # A state has begun, and nothing beside it is left of what failed.
+        if self._failed and len(self._journal.active()) == 1:
             self._watching = True
             self.look()
 
@@ -48,4 +51,4 @@ class MotionWatch:
         if self._watching:
             speed = float(np.max(np.abs(self._velocity())))
             if speed > STILL:
-                self.moved.append((self._journal.active(), speed))
+                self.moved.append((", ".join(self._journal.active()), speed))

@@ -1,32 +1,37 @@
 """The ports of the machines on the virtual rig."""
 
 import ih2_hand.progress as progress
+from coglab_msgs.msg import ReasonCode
 from coglab_smach.object_database import ObjectError
 from coglab_smach.pending import Polled, PortError, Ready
-from coglab_smach.ports import DmpProgress, HandState, Located, Recognition
+from coglab_smach.ports import DmpProgress, HandState, Located, Recognition, Verdict
 
 
-def answered(answer, value=None):
+def answered(good, message, code=0, value=None):
     """(success, message) of a controller as a Pending."""
-    return Ready(value) if answer[0] else Ready(error=PortError(answer[1]))
+    return Ready(value) if good else Ready(error=PortError(message, code=code))
 
 
 class VirtualArm:
-    """ArmPort on the rig: the real controller manager and bridge."""
+    """ArmPort on the rig: the real controller manager and bridge. Requests act at once; motions go on until they end,
+    whoever waits."""
 
     def __init__(self, rig):
         self.rig, self.robot = rig, rig.robot.virtual
         self.request = None
 
+    def _answered(self, answer, value=None):
+        return answered(*answer[:2], self.robot.reason_code, value)
+
     def load_controller(self, controller_id, controller_type):
-        done = answered(self.robot.load_controller(controller_id, controller_type))
+        done = self._answered(self.robot.load_controller(controller_id, controller_type))
         if controller_id == "dmp":
             self.robot.set_ik_debug(True)
         return done
 
     def load_dmps(self, filename):
-        good, message, count = self.robot.load_dmps(filename)
-        return answered((good, message), count)
+        answer = self.robot.load_dmps(filename)
+        return self._answered(answer, answer[2])
 
     def lwr_command(self, event):
         ticket, outcome = self.robot.submit(event), []
@@ -48,43 +53,82 @@ class VirtualArm:
 
     def motion_allowed(self):
         report = self.rig.robot.report
-        return report["motion_allowed"], report["blocked_by"]
+        return Verdict(report["motion_allowed"], report["blocked_by"])
+
+    def standing(self):
+        standing = self.rig.robot.report["standing"]
+        return Verdict(standing, "" if standing else "the set-point moves")
+
+    def cancel_motion(self, reason):
+        begun, answers = self.rig.t, {}
+        orders = {name: self.robot.ask_cancel(name, reason) for name in ("dmp", "ptp")}
+
+        def done():
+            waited = self.rig.t - begun
+            for name, order in orders.items():
+                answer = self.robot.cancel_outcome(order, waited if waited > 2.0 else 0.0)
+                if name not in answers and answer is not None:
+                    answers[name] = answer
+            return len(answers) == len(orders)
+
+        def value():
+            for answer in answers.values():
+                if not answer["success"] and answer["reason_code"] != ReasonCode.NOT_ACTIVE:
+                    raise PortError(answer["message"], code=answer["reason_code"])
+
+        return Polled(done, value)
+
+    def motion_limits(self):
+        return self.rig.robot.motion_limits
+
+    def speed_scale(self):
+        return self.rig.speed_scale
 
     def switch_controller(self, controller_id):
-        return answered(self.robot.switch_controller(controller_id))
+        return self._answered(self.robot.switch_controller(controller_id))
 
     def execute_dmp(self, request):
         self.request = request
         self.rig.robot.debug = None
-        return answered(self.robot.execute_dmp(request.primitive_id, request.dmp_ratio, request.goal_offset, True,
-                                               request.target_orientation, request.goal_frame))
+        return self._answered(self.robot.execute_dmp(request.primitive_id, request.dmp_ratio, request.goal_offset, True,
+                                                     request.target_orientation, request.goal_frame))
 
     def switch_dmp(self, request):
-        return answered(self.robot.switch_dmp(request.primitive_id, request.dmp_ratio, request.goal_offset, True,
-                                              request.target_orientation))
+        return self._answered(self.robot.switch_dmp(request.primitive_id, request.dmp_ratio, request.goal_offset, True,
+                                                    request.target_orientation))
 
     def dmp_progress(self):
         now = self.robot.dmp_progress()
-        return DmpProgress(now["motion"], now["reason"], now["primitive"], now["phase"], now["remaining_distance"])
+        return DmpProgress(now["motion"], now["reason"], now["primitive"], now["phase"], now["remaining_distance"],
+                           now["reason_code"])
 
     def move_ptp(self, position, max_velocity):
-        rig = self.rig
         status, identity, message = self.robot.add_ptp(list(position), list(max_velocity))
         if status == 2:
-            return Ready(error=PortError(f"add_ptp refused: {message}"))
-        rig.robot.finished.discard(identity)
+            return Ready(error=PortError(f"add_ptp refused: {message}", code=self.robot.reason_code))
+        ended = []
 
         def done():
-            if identity in rig.robot.finished:
-                return True
-            if rig.robot.report["fault"]:
-                raise PortError("the point-to-point motion ended in a fault", (rig.robot.report["reason"],))
-            allowed, why = self.motion_allowed()
-            if not allowed:
-                raise PortError("the arm does not follow any more", (why,))
-            return False
+            if not ended:
+                ended.extend(self._end_of_ptp(identity))
+            return bool(ended)
 
-        return Polled(done, lambda: None)
+        def value():
+            if ended[0] is not None:
+                raise ended[0]
+
+        return Polled(done, value, lambda: self.cancel_motion("its owner has given up waiting"))
+
+    def _end_of_ptp(self, identity):
+        robot = self.rig.robot
+        end, allowed = robot.ended.get(identity), self.motion_allowed()
+        if end is not None and end["executed"]:
+            return [None]
+        if end is not None:
+            return [PortError("the point-to-point motion ended before its target", (end["reason"],), end["reason_code"])]
+        if robot.report["fault"]:
+            return [PortError("the point-to-point motion ended in a fault", (robot.report["reason"],))]
+        return [] if allowed.ok else [PortError("the arm does not follow any more", (allowed.why,))]
 
     def joint_positions(self):
         return tuple(self.rig.robot.report["position"])
@@ -186,6 +230,9 @@ class VirtualDatabase:
             return Ready(self.database.get(object_id))
         except ObjectError as error:
             return Ready(error=PortError(str(error)))
+
+    def list_objects(self):
+        return Ready(self.database.ids())
 
 
 class VirtualContact:

@@ -16,6 +16,7 @@ from coglab_sim.rigid import Frame, quat_from_rotvec, quat_multiply
 from coglab_sim.scene import Scene, WorldView
 from coglab_sim.virtual_human import VirtualHuman
 from coglab_smach.contact_detector import ContactDetector, DetectorSettings
+from coglab_smach.manager_limits import read_limits
 from ih2_hand.clock import VirtualClock as HandClock
 from ih2_hand.driver import HandSerialDriver
 from ih2_hand.emulator.hand import EmulatedHand
@@ -43,16 +44,17 @@ def manager_parameters() -> str:
 class Robot:
     """VirtualRobot with what the detector and the figures need of each period."""
 
-    def __init__(self, seed, **cell):
+    def __init__(self, seed, limits=LIMITS, **cell):
         parameters = {"seed": int(seed), "krc/period": DT, "contact/board_center": [0.45, -0.55, 0.05],
                       **{name.replace("__", "/"): value for name, value in cell.items()}}
-        self.virtual = VirtualRobot(str(URDF), LIMITS, parameters, manager_parameters())
+        self.virtual = VirtualRobot(str(URDF), limits, parameters, manager_parameters())
         self.cell = self.virtual.cell
-        self.limits = cc.load_joint_limits(LIMITS)
+        self.limits = cc.load_joint_limits(limits)
+        self.motion_limits = read_limits({**yaml.safe_load(manager_parameters()), "joint_limits_file": limits})
         self.chain = cc.Chain(URDF.read_text())
         self.report = self.virtual.report()
         self.progress = {"motion": "idle", "reason": "", "primitive": "", "phase": 0.0, "remaining_distance": 0.0}
-        self.finished: set[int] = set()
+        self.ended: dict[int, dict] = {}
         self.peak_share = 0.0
         self.limit_violations = 0
         self.debug = None
@@ -64,7 +66,7 @@ class Robot:
         self.report = report = self.virtual.report()
         if report["fri_period"] <= 0.0:
             return
-        self.finished.update(identity for identity, _ in self.virtual.finished_ptps())
+        self.ended.update((end["ptp_id"], end) for end in self.virtual.ptp_ends())
         q, commanded = np.asarray(report["position"]), np.asarray(report["commanded_position"])
         outside = any(np.any(v < self.limits.lower_position) or np.any(v > self.limits.upper_position)
                       for v in (q, commanded))
@@ -139,13 +141,14 @@ class Hand:
 class Rig:
     """Everything together. ``seed`` makes person, noise and tracker; ``behaviour`` is the person's."""
 
-    def __init__(self, seed=1, behaviour="normal", perfect=False, object_on="human_hand", perception=None, turned=0.0):
+    def __init__(self, seed=1, behaviour="normal", perfect=False, object_on="human_hand", perception=None, turned=0.0,
+                 limits=LIMITS):
         where = {"object__start": object_on, "object__position": [-0.08, 0.0, -0.05],
                  "object__rotation": [float(v) for v in quat_from_rotvec([0, 0, turned])]}
         if object_on == "world":
             where["object__position"] = [float(v) for v in BOARD.apply([0.0, 0.0, 0.002])]
             where["object__rotation"] = [float(v) for v in BOARD.orientation]
-        self.robot = Robot(seed, **where)
+        self.robot = Robot(seed, limits, **where)
         self.cell = self.robot.cell
         self.hand = Hand()
         self.scene = Scene()
@@ -154,6 +157,7 @@ class Rig:
         self.trackers = {name: Tracker(name, settings, seed) for name in ("object_mug", "human_hand")}
         self.detector = ContactDetector(DetectorSettings(), lambda q: self.robot.chain.jacobian(q)[:3])
         self.event = None
+        self.speed_scale = 1.0
         self.t = self.robot.virtual.now
         self.ticks = 0
         self.truth = self.cell.truth()

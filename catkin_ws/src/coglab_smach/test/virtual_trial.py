@@ -11,7 +11,7 @@ from coglab_smach.object_database import ObjectDatabase
 from coglab_smach.reachability import default_arm, solve
 from smach.virtual_clock import VirtualClock
 from virtual_ports import VirtualArm, VirtualContact, VirtualDatabase, VirtualHand, VirtualPerception
-from virtual_rig import DT, Rig, distance, frame_of, palm_goal
+from virtual_rig import DT, LIMITS, Rig, distance, frame_of, palm_goal
 
 SHARE = Path(__file__).resolve().parent.parent
 LIBRARY = str(SHARE.parent / "coglab_controllers" / "config" / "primitives.xml")
@@ -24,8 +24,8 @@ class VirtualTrial:
     """
 
     def __init__(self, seed=1, behaviour="normal", perfect=False, object_on="human_hand", perception=None,
-                 recogniser=None, later_behaviour="", turned=0.0, **overrides):
-        self.rig = Rig(seed, behaviour, perfect, object_on, perception, turned)
+                 recogniser=None, later_behaviour="", turned=0.0, limits=LIMITS, **overrides):
+        self.rig = Rig(seed, behaviour, perfect, object_on, perception, turned, limits)
         self.clock = VirtualClock()
         self.recogniser, self.later_behaviour = recogniser, later_behaviour
         self.last_hub = ""

@@ -109,10 +109,10 @@ class Journal:
         with self._lock:
             self._active.remove(path)
 
-    def active(self) -> str:
-        """Path of the active leaf state, of several the one that began last; empty if none is."""
+    def active(self) -> tuple[str, ...]:
+        """Paths of the active leaf states, in the order in which they began."""
         with self._lock:
-            return self._active[-1] if self._active else ""
+            return tuple(self._active)
 
     def transition(self, path: str, from_state: str, outcome: str, to_state: str, reason: str,
                    causes: tuple[str, ...] = (), code: int = 0) -> None:

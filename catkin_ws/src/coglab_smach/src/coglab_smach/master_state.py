@@ -46,4 +46,5 @@ class StateWatch:
         why = str(failure)
         if hub in ("stopped", "fault") and COMMAND not in why:
             why = f"{why or f'the machine is in {hub}'}; to go on {command(*ctx.requests.allowed())}"
-        return MasterState(ctx.journal.active(), bool(hub), ctx.requests.allowed(), ctx.holding, why, failure.code)
+        active = ctx.journal.active()  # of several side by side the one that began last
+        return MasterState(active[-1] if active else "", bool(hub), ctx.requests.allowed(), ctx.holding, why, failure.code)

@@ -1,0 +1,97 @@
+#!/usr/bin/python3
+"""The contracts of the ports on the real adapters. The suites of different nodes run side by side, to be quick."""
+import os
+import signal
+import sys
+import threading
+import time
+import traceback
+import unittest
+import xmlrpc.client
+from pathlib import Path
+
+import rosgraph
+import rospkg
+import rospy
+import rostest
+from coglab_smach.ros_arm import RosArm
+from coglab_smach.ros_hand import RosHand
+from coglab_smach.ros_ports import RosContact, RosDatabase, RosPerception
+
+sys.path.insert(0, str(Path(__file__).resolve().parent))
+from port_contracts import SUITES, Place
+
+LIMIT = 90.0
+"""s, of the whole"""
+NODES = {"arm": "/robot", "hand": "/ih2_hand", "perception": "/perception", "database": "/object_database",
+         "contact": "/contact_detector"}
+PORTS = {"arm": RosArm, "hand": RosHand, "perception": RosPerception, "database": RosDatabase, "contact": RosContact}
+
+
+def pid_of(node):
+    """Process id of a node."""
+    api = rosgraph.Master("/port_contracts").lookupNode(node)
+    return xmlrpc.client.ServerProxy(api).getPid("/port_contracts")[2]
+
+
+def place_of(name, arm_may_freeze):
+    """The real port; the arm's node is frozen only when nobody else needs it."""
+    pid = pid_of(NODES[name])
+
+    def freeze():
+        if name == "arm":
+            assert arm_may_freeze.wait(LIMIT)
+        os.kill(pid, signal.SIGSTOP)
+
+    library = rospkg.RosPack().get_path("coglab_controllers") + "/config/primitives.xml"
+    return Place(PORTS[name](), time.monotonic, time.sleep, freeze, lambda: os.kill(pid, signal.SIGCONT), library)
+
+
+class PortContracts(unittest.TestCase):
+    """One test per port."""
+
+    @classmethod
+    def setUpClass(cls):
+        cls.failures = {name: [] for name in SUITES}
+        cls.ran = dict.fromkeys(SUITES, 0)
+        cls.arm_may_freeze = threading.Event()
+        waits = ("/lwr/command", "/controller_manager/list_controllers", "/perception/locate_object",
+                 "/object_database/get_object", "/contact_detector/arm")
+        for service in waits:
+            rospy.wait_for_service(service, 30.0)
+        cls.threads = {name: threading.Thread(target=cls.run_suite, args=(name,), daemon=True) for name in SUITES}
+        for thread in cls.threads.values():
+            thread.start()
+
+    @classmethod
+    def run_suite(cls, name):
+        try:
+            contract = SUITES[name](place_of(name, cls.arm_may_freeze))
+            for test in [t for t in vars(SUITES[name]) if t.startswith("test_")]:
+                cls.ran[name] += 1
+                begun = time.monotonic()
+                try:
+                    contract.begin()
+                    getattr(contract, test)()
+                except Exception:
+                    cls.failures[name].append(f"{test}:\n{traceback.format_exc()}")
+                print(f"{name}: {test}: {time.monotonic() - begun:.1f} s", flush=True)
+        except Exception:
+            cls.failures[name].append(traceback.format_exc())
+        finally:
+            if name == "contact":
+                cls.arm_may_freeze.set()
+
+    def judge(self, name):
+        self.threads[name].join(LIMIT)
+        self.assertFalse(self.threads[name].is_alive(), f"the suite of the {name} hangs")
+        self.assertGreater(self.ran[name], 2)
+        self.assertEqual(self.failures[name], [], "\n".join(self.failures[name]))
+
+
+for port in SUITES:
+    setattr(PortContracts, f"test_{port}", lambda self, port=port: self.judge(port))
+
+if __name__ == "__main__":
+    rospy.init_node("port_contracts")
+    rostest.rosrun("coglab_smach", "port_contracts", PortContracts, sys.argv)
