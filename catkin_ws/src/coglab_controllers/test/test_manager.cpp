@@ -100,7 +100,9 @@ TEST_P(Fault, GivesZeroVelocityItsReasonAndALivingManager) {
   EXPECT_NE(report.reason.str().find(GetParam().second), std::string::npos)
       << report.reason.c_str();
   EXPECT_NE(report.reason.str().find("'odd'"), std::string::npos);
-  EXPECT_NE(robot.manager->motionRefusal("odd").find("fault"), std::string::npos);
+  const Answer welcome = robot.manager->motionWelcome("odd", report);
+  EXPECT_TRUE(refused(welcome, {"fault"}));
+  EXPECT_EQ(welcome.code, ReasonCode::ControllerFault);
   robot.switchTo("ptp");
   EXPECT_EQ(robot.ptp().add({{-1.3, -0.6, 1.5, 1.7, 0.2, 0.2, 0.8}, {}, {}}).status,
             PtpAnswer::kStarted);
@@ -221,7 +223,9 @@ TEST(Manager, ControlThreadIdlesWithoutARobotAndSurvivesAStall) {
   std::string type;
   EXPECT_TRUE(VirtualRobot::ok(manager.load("ptp", "coglab/PtpController")));  // no robot yet
   EXPECT_TRUE(VirtualRobot::ok(manager.switchTo("ptp", type)));
-  EXPECT_NE(manager.motionRefusal("ptp").find("no joint state"), std::string::npos);
+  const Answer blind = manager.motionWelcome("ptp", manager.report());
+  EXPECT_TRUE(refused(blind, {"no joint state"}));
+  EXPECT_EQ(blind.code, ReasonCode::StaleJointState);
   EXPECT_TRUE(VirtualRobot::ok(manager.load("odd", "test/Misbehaving")));
 
   std::atomic<bool> stop{false};

@@ -1,4 +1,8 @@
 // The point-to-point plug-in in virtual time: D4.10 Table 5.
+#include <atomic>
+#include <chrono>
+#include <thread>
+
 #include "virtual_robot.hpp"
 
 namespace coglab_controllers {
@@ -112,6 +116,49 @@ TEST(PtpController, StandsStillAtScaleZeroAndGoesOn) {
   robot.manager->setSpeedScale(1.0);
   for (int i = 0; i < 3000; ++i) robot.tick();
   EXPECT_EQ(robot.state(), MotionState::Reached);
+}
+
+/// A request in a thread of its own, while this one runs the cycle.
+template <typename Request>
+void during(VirtualRobot& robot, Request&& request) {
+  std::atomic<bool> done{false};
+  std::thread thread([&] {
+    request();
+    done = true;
+  });
+  while (!done) {
+    robot.tick();
+    std::this_thread::sleep_for(std::chrono::microseconds(100));
+  }
+  thread.join();
+}
+
+TEST(PtpController, AMotionThatRacesAHoldIsNeitherReportedAsExecutedNorMadeAfterReset) {
+  using lwr_fri_bridge::MotionBlock;
+  for (const bool split : {false, true}) {
+    VirtualRobot robot("", 0.005, false);
+    during(robot, [&] { robot.loadBoth("ptp"); });
+    PtpAnswer first, second;
+    during(robot, [&] { first = robot.ptp().add({kThere, {}, {}}); });
+    for (int i = 0; i < 2000 && robot.state() != MotionState::Reached; ++i) robot.tick();
+    ASSERT_EQ(executed(robot.ptp()), std::vector<int>{first.ptp_id});
+    // The request is checked while the arm may move, and taken over by the first cycle that sees
+    // the hold.
+    std::thread request([&] { second = robot.ptp().add({{0, 0, 0, 1, 0, 0, 0}, {}, {}}); });
+    std::this_thread::sleep_for(std::chrono::milliseconds(50));
+    robot.sample.block = MotionBlock::Held;
+    ++robot.sample.motion_epoch;
+    robot.tick();
+    request.join();
+    const JointVector stood = robot.sample.position;
+    if (!split) ++robot.sample.motion_epoch;  // a robot behind topics counts the hold alone
+    robot.sample.block = MotionBlock::None;
+    for (int i = 0; i < 200; ++i) robot.tick();
+    EXPECT_EQ(second.status, PtpAnswer::kRejected);
+    EXPECT_TRUE(second.code == ReasonCode::TooLate || second.code == ReasonCode::Held);
+    EXPECT_TRUE(executed(robot.ptp()).empty());
+    EXPECT_EQ(robot.sample.position, stood);
+  }
 }
 
 TEST(PtpController, RandomMotionsEndExactly) {

@@ -138,7 +138,7 @@ int main(int argc, char** argv) {
     std::mt19937 random(seed);
     std::string type;
     for (int round = 0; !stop; ++round) {
-      switch (random() % 9) {
+      switch (random() % 10) {
         case 0:
           note(manager.switchTo(random() % 2 == 0 ? "dmp" : "ptp", type).success);
           break;
@@ -175,6 +175,9 @@ int main(int argc, char** argv) {
                    .ok());
           break;
         }
+        case 8:
+          manager.cancel(random() % 2 == 0 ? "dmp" : "ptp", 0.2, "stress");
+          break;
         default: {
           int count = 0;
           note(dmp.loadDmps(package + "/config/primitives.xml", count).success);
@@ -199,7 +202,7 @@ int main(int argc, char** argv) {
       while (ptp.readEnd(end)) {
       }
       manager.report();
-      manager.motionRefusal("dmp");
+      manager.motionWelcome("dmp", manager.report());
       std::this_thread::sleep_for(std::chrono::milliseconds(2));
     }
   });

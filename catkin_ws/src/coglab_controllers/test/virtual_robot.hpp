@@ -15,6 +15,7 @@
 #include "coglab_controllers/manager/controller_manager.hpp"
 #include "coglab_controllers/plugins/dmp_controller.hpp"
 #include "coglab_controllers/plugins/ptp_controller.hpp"
+#include "lwr_fri_bridge/interpolator.hpp"
 
 namespace coglab_controllers {
 
@@ -45,13 +46,16 @@ inline std::string readText(const std::string& path) {
 /// exactly.
 class VirtualRobot {
  public:
-  explicit VirtualRobot(const std::string& parameters = "", double period = 0.005)
+  /// @param lockstep false: requests wait until another thread calls tick()
+  explicit VirtualRobot(const std::string& parameters = "", double period = 0.005,
+                        bool lockstep = true)
       : period(period) {
     limits =
         lwr_fri_bridge::loadJointLimits(std::string(DESCRIPTION_DIR) + "/config/joint_limits.yaml");
     ManagerSettings settings = readManagerSettings(
         YAML::Load(parameters), readText(std::string(DESCRIPTION_DIR) + "/urdf/lwr_ih2.urdf"),
-        limits, true);
+        limits, lockstep);
+    settings.cycle.overrun_time = 0.0;
     settings.clock = [this] { return now_ns; };
     settings.plan_timeout = 0.3;
     settings.logger = &logger;
@@ -61,6 +65,12 @@ class VirtualRobot {
     sample.block = lwr_fri_bridge::MotionBlock::None;
     sample.cycle_time = period;
     tick();
+  }
+
+  /// From now on the arm follows within its acceleration and jerk limits, as the bridge has it.
+  void followWithinLimits() {
+    interpolator = std::make_unique<lwr_fri_bridge::Interpolator>(limits);
+    interpolator->reset(sample.position);
   }
 
   /// Both plug-ins, the library of the package, and `active`.
@@ -107,6 +117,14 @@ class VirtualRobot {
     }
     manager->cycle().run(sample, period, command);
     if (sample.block != lwr_fri_bridge::MotionBlock::None) command.velocity.setZero();
+    if (interpolator) {
+      interpolator->step(command.velocity, period);
+      sample.position = interpolator->position();
+      sample.velocity = sample.commanded_velocity = interpolator->velocity();
+      sample.commanded_acceleration = interpolator->acceleration();
+      sample.commanded_position = sample.position;
+      return command;
+    }
     sample.commanded_acceleration = (command.velocity - sample.commanded_velocity) / period;
     sample.position += period * command.velocity;
     sample.velocity = command.velocity;
@@ -136,6 +154,7 @@ class VirtualRobot {
   FrameTable frames;
   ctrl_more::Logger logger;  // without sinks
   std::unique_ptr<ControllerManager> manager;
+  std::unique_ptr<lwr_fri_bridge::Interpolator> interpolator;  // null: velocities count at once
   RobotSample sample;
   VelocityCommand command;
 };

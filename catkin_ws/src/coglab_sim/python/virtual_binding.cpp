@@ -11,7 +11,40 @@ using coglab_controllers::DmpRequest;
 
 namespace {
 
-py::tuple tupleOf(const Answer& answer) { return py::make_tuple(answer.success, answer.message); }
+/// The robot with the code of the newest answer, which the tuples do not carry.
+class Robot : public VirtualRobot {
+ public:
+  using VirtualRobot::VirtualRobot;
+  std::uint16_t reason_code = 0;
+
+  py::tuple tell(const Answer& answer) {
+    reason_code = answer.number();
+    return py::make_tuple(answer.success, answer.message);
+  }
+};
+
+py::dict dictOf(const coglab_controllers::CancelAnswer& answer) {
+  py::dict result;
+  result["success"] = answer.success;
+  result["was_running"] = answer.was_running;
+  result["reason_code"] = answer.number();
+  result["message"] = answer.message;
+  return result;
+}
+
+py::list endsOf(coglab_controllers::PtpController& ptp) {
+  py::list ends;
+  coglab_controllers::PtpEnd end;
+  while (ptp.readEnd(end)) {
+    py::dict entry;
+    entry["ptp_id"] = end.ptp_id;
+    entry["executed"] = end.executed;
+    entry["reason_code"] = end.reason.number();
+    entry["reason"] = end.reason.str();
+    ends.append(entry);
+  }
+  return ends;
+}
 
 Eigen::Vector4d noOrientation() { return Eigen::Vector4d::Zero(); }
 
@@ -28,7 +61,7 @@ DmpRequest requestOf(const std::string& primitive, double ratio, const Vector3d&
   return request;
 }
 
-py::dict reportOf(VirtualRobot& robot) {
+py::dict reportOf(Robot& robot) {
   const auto report = robot.manager().report();
   const auto& sample = report.robot;
   py::dict result;
@@ -36,6 +69,8 @@ py::dict reportOf(VirtualRobot& robot) {
   result["state"] = std::string(nameOf(report.state));
   result["motion"] = std::string(nameOf(report.motion));
   result["reason"] = std::string(report.reason.c_str());
+  result["reason_code"] = report.reason.number();
+  result["standing"] = report.standing;
   result["fault"] = report.fault;
   result["time_scale"] = report.time_scale;
   result["velocity"] = Vector7(report.velocity);
@@ -44,6 +79,8 @@ py::dict reportOf(VirtualRobot& robot) {
   result["position"] = Vector7(sample.position);
   result["measured_velocity"] = Vector7(sample.velocity);
   result["commanded_position"] = Vector7(sample.commanded_position);
+  result["commanded_velocity"] = Vector7(sample.commanded_velocity);
+  result["commanded_acceleration"] = Vector7(sample.commanded_acceleration);
   result["fri_period"] = sample.cycle_time;
   result["external_torque"] = Vector7(sample.external_torque);
   result["cycles"] = report.cycles;
@@ -69,7 +106,9 @@ PYBIND11_MODULE(_virtual, m) {
       "quaternions x y z w.";
   py::module_::import("coglab_sim._cell");  // knows the type of VirtualRobot.cell
 
-  py::class_<VirtualRobot>(
+  py::class_<coglab_controllers::CancelOrder>(m, "CancelOrder", "A cancel on its way.");
+
+  py::class_<Robot>(
       m, "VirtualRobot",
       "Time advances only by tick() and advance(); requests take effect between two ticks.")
       .def(py::init([](const std::string& urdf, const std::string& limits_file,
@@ -78,35 +117,35 @@ PYBIND11_MODULE(_virtual, m) {
              config.cell = configFrom(urdf, cell);
              config.limits_file = limits_file;
              config.manager_parameters = manager;
-             return std::make_unique<VirtualRobot>(config);
+             return std::make_unique<Robot>(config);
            }),
            py::arg("urdf"), py::arg("limits_file"), py::arg("cell") = py::dict(),
            py::arg("manager") = "",
            "cell: parameters of the cell as in coglab_sim._cell.parameter_table(); manager: YAML "
            "as below /controller_manager.")
-      .def("tick", &VirtualRobot::tick, "One FRI period.")
+      .def("tick", &Robot::tick, "One FRI period.")
       .def(
           "advance",
-          [](VirtualRobot& robot, double seconds) {
+          [](Robot& robot, double seconds) {
             const auto ticks = std::llround(seconds / robot.cell().period());
             for (long long i = 0; i < ticks; ++i) robot.tick();
           },
           py::arg("seconds"), "So many seconds of simulated time.")
-      .def_property_readonly("now", &VirtualRobot::now, "s")
+      .def_property_readonly("now", &Robot::now, "s")
       .def_property_readonly(
-          "cell", [](VirtualRobot& robot) { return std::make_unique<PyCell>(robot.cell()); },
+          "cell", [](Robot& robot) { return std::make_unique<PyCell>(robot.cell()); },
           py::keep_alive<0, 1>(), "The coglab_sim._cell.Cell inside; do not call its step().")
       .def("report", &reportOf, "The control cycle's newest report.")
 
       .def(
           "submit",
-          [](VirtualRobot& robot, const std::string& event) {
+          [](Robot& robot, const std::string& event) {
             return robot.bridge().submit(event);
           },
           "An event of ros_events; returns a ticket for outcome().")
       .def(
           "outcome",
-          [](VirtualRobot& robot, std::uint32_t ticket) -> py::object {
+          [](Robot& robot, std::uint32_t ticket) -> py::object {
             const auto outcome = robot.bridge().outcome(ticket);
             if (outcome.code == lwr_fri_bridge::OutcomeCode::Pending) return py::none();
             return py::make_tuple(outcome.success(), describe(outcome));
@@ -115,28 +154,53 @@ PYBIND11_MODULE(_virtual, m) {
 
       .def(
           "load_controller",
-          [](VirtualRobot& robot, const std::string& id, const std::string& type) {
-            return tupleOf(robot.load(id, type));
+          [](Robot& robot, const std::string& id, const std::string& type) {
+            return robot.tell(robot.load(id, type));
           },
           py::arg("id"), py::arg("type"),
           "coglab/DmpController or coglab/PtpController; (success, message).")
       .def(
           "switch_controller",
-          [](VirtualRobot& robot, const std::string& id) {
+          [](Robot& robot, const std::string& id) {
             std::string type;
-            return tupleOf(robot.manager().switchTo(id, type));
+            return robot.tell(robot.manager().switchTo(id, type));
           },
           py::arg("id"))
       .def("speed_scale",
-           [](VirtualRobot& robot, double scale) {
-             return tupleOf(robot.manager().setSpeedScale(scale));
+           [](Robot& robot, double scale) {
+             return robot.tell(robot.manager().setSpeedScale(scale));
            })
+
+      .def_readonly("reason_code", &Robot::reason_code,
+                    "ReasonCode of the newest answer of load_controller, switch_controller, "
+                    "speed_scale, add_ptp, load_dmps, execute_dmp or switch_dmp.")
+      .def(
+          "ask_cancel",
+          [](Robot& robot, const std::string& id, const std::string& why) {
+            return robot.manager().askCancel(id, why);
+          },
+          py::arg("id"), py::arg("why") = "",
+          "Ends the motion of a controller and what waits behind it with the next tick; returns "
+          "the order for cancel_outcome().")
+      .def(
+          "cancel_outcome",
+          [](Robot& robot, const coglab_controllers::CancelOrder& order,
+             double waited) -> py::object {
+            coglab_controllers::CancelAnswer answer;
+            if (robot.manager().cancelEnded(order, answer)) return dictOf(answer);
+            if (waited <= 0.0) return py::none();
+            return dictOf(robot.manager().cancelUnfinished(order, waited));
+          },
+          py::arg("order"), py::arg("waited") = 0.0,
+          "{success, was_running, reason_code, message} once the arm stands, else None; with "
+          "`waited` > 0 (s) the refusal for an arm that does not stand after so long.")
 
       .def(
           "add_ptp",
-          [](VirtualRobot& robot, const std::vector<double>& position,
+          [](Robot& robot, const std::vector<double>& position,
              const std::vector<double>& max_vel, const std::vector<double>& max_acc) {
             const auto answer = robot.ptp().add({position, max_vel, max_acc});
+            robot.reason_code = static_cast<std::uint16_t>(answer.code);
             return py::make_tuple(answer.status, answer.ptp_id, answer.message);
           },
           py::arg("position"), py::arg("max_vel") = std::vector<double>(),
@@ -144,7 +208,7 @@ PYBIND11_MODULE(_virtual, m) {
           "(status, ptp_id, message) as Table 5 has them: STARTED 0, QUEUED 1, REJECTED 2.")
       .def(
           "finished_ptps",
-          [](VirtualRobot& robot) {
+          [](Robot& robot) {
             std::vector<std::pair<int, bool>> ends;
             coglab_controllers::PtpEnd end;
             while (robot.ptp().readEnd(end)) ends.emplace_back(end.ptp_id, end.executed);
@@ -153,19 +217,25 @@ PYBIND11_MODULE(_virtual, m) {
           "[(ptp_id, executed)] of the motions that ended since the last call.")
 
       .def(
+          "ptp_ends", [](Robot& robot) { return endsOf(robot.ptp()); },
+          "[{ptp_id, executed, reason_code, reason}] of the same motions, instead of "
+          "finished_ptps().")
+
+      .def(
           "load_dmps",
-          [](VirtualRobot& robot, const std::string& filename) {
+          [](Robot& robot, const std::string& filename) {
             int loaded = 0;
             const Answer answer = robot.dmp().loadDmps(filename, loaded);
+            robot.reason_code = answer.number();
             return py::make_tuple(answer.success, answer.message, loaded);
           },
           py::arg("filename"), "(success, message, number of primitives)")
       .def(
           "execute_dmp",
-          [](VirtualRobot& robot, const std::string& primitive, double ratio,
+          [](Robot& robot, const std::string& primitive, double ratio,
              const Vector3d& offset, bool orientation_control, const Eigen::Vector4d& orientation,
              const std::string& goal_frame) {
-            return tupleOf(robot.dmp().execute(
+            return robot.tell(robot.dmp().execute(
                 requestOf(primitive, ratio, offset, orientation_control, orientation, goal_frame)));
           },
           py::arg("primitive_id"), py::arg("dmp_ratio") = 1.0,
@@ -174,20 +244,20 @@ PYBIND11_MODULE(_virtual, m) {
           py::arg("goal_frame") = "", "Starts from the current state; (success, message).")
       .def(
           "switch_dmp",
-          [](VirtualRobot& robot, const std::string& primitive, double ratio,
+          [](Robot& robot, const std::string& primitive, double ratio,
              const Vector3d& offset, bool orientation_control, const Eigen::Vector4d& orientation) {
-            return tupleOf(robot.dmp().switchDmp(
+            return robot.tell(robot.dmp().switchDmp(
                 requestOf(primitive, ratio, offset, orientation_control, orientation, "")));
           },
           py::arg("primitive_id"), py::arg("dmp_ratio") = 1.0,
           py::arg("goal_offset") = Vector3d(Vector3d::Zero()),
           py::arg("orientation_control") = false, py::arg("target_orientation") = noOrientation())
       .def(
-          "set_ik_debug", [](VirtualRobot& robot, bool on) { robot.dmp().setIkDebug(on); },
+          "set_ik_debug", [](Robot& robot, bool on) { robot.dmp().setIkDebug(on); },
           py::arg("on"), "Whether ik_debug() gets records; the DMP controller must be loaded.")
       .def(
           "ik_debug",
-          [](VirtualRobot& robot) {
+          [](Robot& robot) {
             py::list records;
             coglab_controllers::IkDebugRecord record;
             while (robot.dmp().readIkDebug(record)) records.append(debugOf(record));
@@ -196,13 +266,14 @@ PYBIND11_MODULE(_virtual, m) {
           "What dmp/ik_debug tells of the cycles since the last call: time s, goal m as estimated "
           "or latched, set_point and measured (position, quaternion) of the hand in the base frame.")
       .def("dmp_progress",
-           [](VirtualRobot& robot) {
+           [](Robot& robot) {
              coglab_controllers::DmpProgress progress;
              robot.dmp().readProgress(progress);
              py::dict result;
              result["primitive"] = std::string(progress.primitive.c_str());
              result["motion"] = std::string(nameOf(progress.state));
              result["reason"] = std::string(progress.reason.c_str());
+             result["reason_code"] = progress.reason.number();
              result["phase"] = progress.phase;
              result["remaining_distance"] = progress.remaining_distance;
              result["remaining_time"] = progress.remaining_time;
@@ -211,7 +282,7 @@ PYBIND11_MODULE(_virtual, m) {
 
       .def(
           "set_frame",
-          [](VirtualRobot& robot, const std::string& frame, const Vector3d& position,
+          [](Robot& robot, const std::string& frame, const Vector3d& position,
              const Eigen::Vector4d& rotation, double age) {
             robot.frames().set(frame, makePose(position, rotation),
                                robot.nowNs() - static_cast<std::int64_t>(std::llround(1e9 * age)));
@@ -219,5 +290,5 @@ PYBIND11_MODULE(_virtual, m) {
           py::arg("frame"), py::arg("position"), py::arg("rotation") = Eigen::Vector4d(0, 0, 0, 1),
           py::arg("age") = 0.0, "Where perception sees a frame in the world, captured `age` s ago.")
       .def("forget_frame",
-           [](VirtualRobot& robot, const std::string& frame) { robot.frames().forget(frame); });
+           [](Robot& robot, const std::string& frame) { robot.frames().forget(frame); });
 }

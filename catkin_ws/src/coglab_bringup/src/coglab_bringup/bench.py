@@ -1,7 +1,8 @@
 """./coglab bench: runs the benches of all packages and prints every figure beside its goal and its peer.
 
 A bench is an executable `bench/bench_<name>.py` in a package; it prints a JSON list of rows
-{bench, figure, value, unit, goal, peer, peer_value, ok} and nothing else on standard output.
+{bench, figure, value, unit, goal, peer, peer_value, ok} and nothing else on standard output. Packages that have one of
+the same name share the bench: each gives its rows.
 """
 
 from __future__ import annotations
@@ -18,9 +19,12 @@ TIME_LIMIT = 1800.0  # s, per bench
 LONG_TIME_LIMIT = 7200.0  # s, with --long
 
 
-def find_benches(sources: Path) -> dict[str, Path]:
-    """Benches by name, from the packages below `sources`."""
-    return {path.stem.removeprefix("bench_"): path for path in sorted(sources.rglob("bench/bench_*.py"))}
+def find_benches(sources: Path) -> dict[str, list[Path]]:
+    """The files of each bench by its name, from the packages below `sources`."""
+    benches: dict[str, list[Path]] = {}
+    for path in sorted(sources.rglob("bench/bench_*.py")):
+        benches.setdefault(path.stem.removeprefix("bench_"), []).append(path)
+    return benches
 
 
 def failed_row(name: str, reason: str) -> dict:
@@ -82,7 +86,8 @@ def main(arguments: list[str]) -> int:
     rows: list[dict] = []
     for name in options.names or benches:
         print(f"[coglab] bench {name} ...", file=sys.stderr, flush=True)
-        rows += run_bench(name, benches[name], python, limit)
+        for path in benches[name]:
+            rows += run_bench(name, path, python, limit)
     print_table(rows)
     if options.json:
         options.json.write_text(json.dumps(rows, indent=1) + "\n")

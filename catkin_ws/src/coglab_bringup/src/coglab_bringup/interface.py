@@ -43,7 +43,8 @@ SERVICES: dict[str, list[str]] = {
     "/lwr": ["command"],
     "/controller_manager": [
         "load_controller", "list_controllers", "switch_controller", "get_active_controller", "speed_scale",
-        "dmp/load_dmps", "dmp/execute_dmp", "dmp/switch_dmp", "ptp/add_ptp",
+        "dmp/load_dmps", "dmp/execute_dmp", "dmp/switch_dmp", "dmp/cancel", "ptp/add_ptp",
+        "ptp/cancel",
     ],
     "/ih2_hand": ["stop"],
     "/coglab": ["start", "stop"],

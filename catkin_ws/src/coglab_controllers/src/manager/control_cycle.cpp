@@ -15,6 +15,10 @@ std::int64_t steadyNow() {
       .count();
 }
 
+bool moving(MotionState state) {
+  return state == MotionState::Running || state == MotionState::Holding;
+}
+
 bool finite(const RobotSample& sample) {
   return sample.position.allFinite() && sample.velocity.allFinite() && sample.torque.allFinite() &&
          sample.external_torque.allFinite() && sample.tool_wrench.allFinite() &&
@@ -22,6 +26,17 @@ bool finite(const RobotSample& sample) {
 }
 
 }  // namespace
+
+Reason voidReason(const RequestStamp& stamp, const CycleInput& input) noexcept {
+  if (stamp.cancels != input.cancels) {
+    return Reason(ReasonCode::Cancelled, "cancelled before the motion began");
+  }
+  if (stamp.motion_epoch != input.robot.motion_epoch) {
+    return Reason(ReasonCode::TooLate,
+                  "the robot stopped following motions after this one was asked for; ask anew");
+  }
+  return Reason();
+}
 
 const char* nameOf(MotionState state) {
   switch (state) {
@@ -72,10 +87,12 @@ bool ControlCycle::guarded(const char* what, Call&& call) noexcept {
     call();
   } catch (const std::exception& error) {
     fine = false;
-    fault(Reason("controller '") << id_.c_str() << "' threw in " << what << ": " << error.what());
+    fault(Reason(ReasonCode::ControllerFault, "controller '")
+          << id_.c_str() << "' threw in " << what << ": " << error.what());
   } catch (...) {
     fine = false;
-    fault(Reason("controller '") << id_.c_str() << "' threw in " << what);
+    fault(Reason(ReasonCode::ControllerFault, "controller '")
+          << id_.c_str() << "' threw in " << what);
   }
   in_plugin_.store(false, std::memory_order_relaxed);
   return fine;
@@ -101,25 +118,47 @@ void ControlCycle::adopt() noexcept {
     feedback_.switchProfile();
     if (motion_ != nullptr) guarded("stop", [this] { motion_->stop(); });
     motion_ = plan->motion;
+    cancel_ = plan->cancel;
     id_ = plan->id;
     fault_ = false;
     fault_reason_.clear();
     overruns_in_row_ = 0;
     guard_.reset();
+    // Cancels of the time when it was not the active one have nothing to end.
+    Reason old;
+    if (cancel_ != nullptr && cancel_->take(old)) cancel_->confirm(false);
     if (motion_ != nullptr) guarded("start", [this] { motion_->start(input_); });
     plans_.acknowledge();
   }
+  takeCancel();
   if (motion_ != nullptr && !fault_) guarded("adopt", [this] { motion_->adopt(input_); });
+}
+
+void ControlCycle::takeCancel() noexcept {
+  if (cancel_ == nullptr) return;
+  Reason reason;
+  if (cancel_->take(reason)) {
+    const bool given_up = motionState() == MotionState::Aborted;
+    abortMotion(reason);
+    cancel_->confirm(!given_up && motionState() == MotionState::Aborted);
+  }
+  input_.cancels = cancel_->taken();
+}
+
+MotionState ControlCycle::motionState() const noexcept {
+  return motion_ != nullptr && !fault_ ? motion_->state() : MotionState::Idle;
 }
 
 bool ControlCycle::usable(const RobotSample& sample, double dt) noexcept {
   input_reason_.clear();
   if (!finite(sample)) {
-    input_reason_ = Reason("the joint state holds a number that is not finite");
+    input_reason_ = Reason(ReasonCode::StaleJointState,
+                           "the joint state holds a number that is not finite");
   } else if (!(dt > 0.0)) {
-    input_reason_ = Reason("the joint state is not newer than the last one");
+    input_reason_ = Reason(ReasonCode::StaleJointState,
+                           "the joint state is not newer than the last one");
   } else if (dt > settings_.sample_timeout) {
-    input_reason_ = Reason("no joint state for ") << dt << " s";
+    input_reason_ = Reason(ReasonCode::StaleJointState, "no joint state for ") << dt << " s";
   }
   return input_reason_.empty();
 }
@@ -128,29 +167,29 @@ void ControlCycle::watchRobot() noexcept {
   const RobotSample& sample = input_.robot;
   const bool aborted = numbers_ > 0 && sample.motion_epoch != report_.robot.motion_epoch;
   if (!aborted && input_.motion_allowed) return;
-  if (motion_ == nullptr || fault_) return;
-  const MotionState state = motion_->state();
-  const bool moving = state == MotionState::Running || state == MotionState::Holding;
-  if (moving || (aborted && state == MotionState::Reached)) {
-    abortMotion(Reason("the robot stopped the motion: ")
-                << (input_.motion_allowed ? "it left command mode for a moment"
-                                          : lwr_fri_bridge::describe(sample.block)));
-  }
+  const MotionState state = motionState();
+  if (!moving(state) && !(aborted && state == MotionState::Reached)) return;
+  const bool again = input_.motion_allowed;
+  abortMotion(Reason(again ? ReasonCode::NotInCommandMode : codeOf(sample.block),
+                     "the robot stopped the motion: ")
+              << (again ? "it left command mode for a moment"
+                        : lwr_fri_bridge::describe(sample.block)));
 }
 
 void ControlCycle::watchGuard(double dt) noexcept {
-  const MotionState state = motion_ != nullptr && !fault_ ? motion_->state() : MotionState::Idle;
-  const bool moving = state == MotionState::Running || state == MotionState::Holding;
+  const bool under_way = moving(motionState());
   const GuardResult& guard = report_.guard;
-  const bool stopped = moving && guard.reason == GuardReason::WorkspaceBorder && guard.scale < 0.02;
+  const bool stopped = under_way && guard.reason == GuardReason::WorkspaceBorder && guard.scale < 0.02;
   at_border_ = stopped ? at_border_ + dt : 0.0;
-  if (!moving) return;
+  if (!under_way) return;
   limit_scale_ = std::clamp(motion_->limitScale() * guard.scale, 0.0, 1.0);
   if (guard.blocked_joint >= 0) {
-    abortMotion(Reason("joint ") << robot_->chain.jointNames()[guard.blocked_joint].c_str()
-                                 << " is at its stop and blocks the motion");
+    abortMotion(Reason(ReasonCode::JointBlocked, "joint ")
+                << robot_->chain.jointNames()[guard.blocked_joint].c_str()
+                << " is at its stop and blocks the motion");
   } else if (at_border_ > settings_.border_time && !motion_->waitsAtBorder()) {
-    abortMotion(Reason("a border of the workspace blocks the motion: ") << describe(guard.border));
+    abortMotion(Reason(ReasonCode::WorkspaceBorder, "a border of the workspace blocks the motion: ")
+                << describe(guard.border));
   }
 }
 
@@ -167,7 +206,7 @@ void ControlCycle::compute(JointVector& velocity) noexcept {
     overruns_in_row_ = taken > settings_.overrun_time ? overruns_in_row_ + 1 : 0;
     if (overruns_in_row_ > 0) ++report_.overruns;
     if (overruns_in_row_ >= settings_.overruns_to_fault) {
-      fault(Reason("controller '")
+      fault(Reason(ReasonCode::ControllerFault, "controller '")
             << id_.c_str() << "' was too slow " << static_cast<std::uint64_t>(overruns_in_row_)
             << " times in a row: " << taken * 1e3 << " ms, allowed " << settings_.overrun_time * 1e3
             << " ms");
@@ -175,7 +214,8 @@ void ControlCycle::compute(JointVector& velocity) noexcept {
     }
   }
   if (!references.states.view<kMaxJoints>(references.joint_velocity).allFinite()) {
-    fault(Reason("controller '") << id_.c_str() << "' gave a velocity that is not finite");
+    fault(Reason(ReasonCode::ControllerFault, "controller '")
+          << id_.c_str() << "' gave a velocity that is not finite");
     return;
   }
   feedback_.run(ctrl_more::Stage::Joint);
@@ -217,8 +257,17 @@ void ControlCycle::run(const RobotSample& sample, double dt, VelocityCommand& ou
   out.stamp_ns = sample.stamp_ns;
   out.motion_epoch = sample.motion_epoch;
   report_.velocity = out.velocity;
+  report_.standing = fine && stands(sample, out.velocity);
   ++report_.samples;
   publish(begin);
+}
+
+bool ControlCycle::stands(const RobotSample& sample, const JointVector& velocity) noexcept {
+  // What the last cycle asked for may not have reached the set-point yet.
+  const bool before = asked_still_;
+  asked_still_ = velocity.isZero(0.0);
+  return before && asked_still_ && sample.commanded_velocity.isZero(0.0) &&
+         sample.commanded_acceleration.isZero(0.0);
 }
 
 void ControlCycle::idle(std::int64_t now_ns) noexcept {
@@ -229,10 +278,10 @@ void ControlCycle::idle(std::int64_t now_ns) noexcept {
   feedback_.begin(now_ns, settings_.cycle_time);
   const double silent = 1e-9 * static_cast<double>(now_ns - input_.robot.stamp_ns);
   if (numbers_ > 0 && silent > settings_.sample_timeout) {
-    input_reason_ = Reason("no joint state for more than ") << settings_.sample_timeout << " s";
-    const MotionState state = motion_ != nullptr && !fault_ ? motion_->state() : MotionState::Idle;
-    const bool moving = state == MotionState::Running || state == MotionState::Holding;
-    if (moving && silent > settings_.silent_time) abortMotion(input_reason_);
+    input_reason_ = Reason(ReasonCode::StaleJointState, "no joint state for more than ")
+                    << settings_.sample_timeout << " s";
+    report_.standing = false;
+    if (moving(motionState()) && silent > settings_.silent_time) abortMotion(input_reason_);
   }
   adopt();
   feedback_.end();
@@ -245,7 +294,7 @@ void ControlCycle::publish(std::int64_t begin_ns) noexcept {
   report_.generation = plans_.generation();
   report_.active = id_;
   report_.fault = fault_;
-  report_.motion = motion_ != nullptr && !fault_ ? motion_->state() : MotionState::Idle;
+  report_.motion = motionState();
   report_.time_scale = input_.time_scale;
   report_.speed_scale = speedScale();
   report_.robot = input_.robot;
@@ -266,9 +315,9 @@ void ControlCycle::publish(std::int64_t begin_ns) noexcept {
   } else if (motion_ != nullptr && !motion_->reason().empty()) {
     report_.reason = motion_->reason();
   } else if (numbers_ == 0) {
-    report_.reason = Reason("no joint state from the robot yet");
-  } else if (!input_.motion_allowed) {
-    report_.reason = Reason(lwr_fri_bridge::describe(input_.robot.block));
+    report_.reason = Reason(ReasonCode::StaleJointState, "no joint state from the robot yet");
+  } else if (input_.robot.block != lwr_fri_bridge::MotionBlock::None) {
+    report_.reason = Reason(codeOf(input_.robot.block), describe(input_.robot.block));
   }
   if (begin_ns != 0) {
     report_.duration = 1e-9 * static_cast<double>(steadyNow() - begin_ns);

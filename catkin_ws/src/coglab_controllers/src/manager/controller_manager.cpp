@@ -91,9 +91,11 @@ std::function<void()> ControllerManager::cycleWait() const {
   return [self] { self->cycle_.idle(self->now_ns()); };
 }
 
-bool ControllerManager::known(const std::string& id) const {
-  return std::any_of(motions_.begin(), motions_.end(),
-                     [&id](const auto& motion) { return motion->id == id; });
+LoadedMotion* ControllerManager::find(const std::string& id) const {
+  for (const auto& motion : motions_) {
+    if (motion->id == id) return motion.get();
+  }
+  return nullptr;
 }
 
 std::string ControllerManager::loadedMotions() const {
@@ -105,13 +107,15 @@ std::string ControllerManager::loadedMotions() const {
 Answer ControllerManager::load(const std::string& id, const std::string& type) {
   const std::lock_guard<std::mutex> requests(requests_);
   if (!validId(id)) {
-    return Answer::refusal("controller_id '" + id +
+    return Answer::refusal(ReasonCode::InvalidArgument,
+                           "controller_id '" + id +
                            "': expected up to 48 letters, digits and '_', beginning with a letter");
   }
   {
     const std::lock_guard<std::mutex> lock(table_);
-    if (known(id) || feedback_.manager().has(id)) {
-      return Answer::refusal("controller_id '" + id +
+    if (find(id) != nullptr || feedback_.manager().has(id)) {
+      return Answer::refusal(ReasonCode::InvalidArgument,
+                             "controller_id '" + id +
                              "' is in use; choose another id, or go on with the loaded one");
     }
   }
@@ -130,7 +134,8 @@ Answer ControllerManager::loadMotion(const std::string& id, const std::string& t
     }
     const MotionMaker* maker = MotionTypes::instance().find(type);
     if (maker == nullptr) {
-      return Answer::refusal("library '" + loaded->library->path() + "' has no type '" + type +
+      return Answer::refusal(ReasonCode::UnknownName,
+                             "library '" + loaded->library->path() + "' has no type '" + type +
                              "'; it has: " + joined(loaded->library->types()));
     }
     loaded->controller.reset(maker->controller());
@@ -144,10 +149,12 @@ Answer ControllerManager::loadMotion(const std::string& id, const std::string& t
     motions_.push_back(std::move(loaded));
     return {};
   } catch (const std::exception& error) {
-    return Answer::refusal("controller '" + id + "' of type '" + type +
+    return Answer::refusal(ReasonCode::InvalidArgument,
+                           "controller '" + id + "' of type '" + type +
                            "' was not loaded: " + error.what());
   } catch (...) {
-    return Answer::refusal("controller '" + id + "' of type '" + type +
+    return Answer::refusal(ReasonCode::ControllerFault,
+                           "controller '" + id + "' of type '" + type +
                            "' was not loaded: its code threw something that is no std::exception");
   }
 }
@@ -160,10 +167,11 @@ Answer ControllerManager::loadFeedback(const std::string& id, const std::string&
     entry.type = type;
     entry.library = ctrl_more::SearchPath("", settings_.plugin_paths).findLibraryOf(type);
     const ctrl_more::Status status = feedback_.manager().loadController(id, entry);
-    if (!status.ok()) return Answer::refusal(status.message());
+    if (!status.ok()) return Answer::refusal(ReasonCode::InvalidArgument, status.message());
     return {};
   } catch (const std::exception& error) {
-    return Answer::refusal("controller_type '" + type + "' is unknown; motion controllers: " +
+    return Answer::refusal(ReasonCode::UnknownName,
+                           "controller_type '" + type + "' is unknown; motion controllers: " +
                            joined(types) + "; as a feedback controller: " + error.what());
   }
 }
@@ -190,21 +198,23 @@ Answer ControllerManager::switchTo(const std::string& id, std::string& type) {
   auto plan = std::make_unique<CyclePlan>();
   {
     const std::lock_guard<std::mutex> lock(table_);
-    const auto found = std::find_if(motions_.begin(), motions_.end(),
-                                    [&id](const auto& motion) { return motion->id == id; });
-    if (found == motions_.end()) {
+    LoadedMotion* const found = find(id);
+    if (found == nullptr) {
       if (feedback_.manager().has(id)) {
-        return Answer::refusal("'" + id +
+        return Answer::refusal(ReasonCode::UnknownName,
+                               "'" + id +
                                "' is a feedback controller: use feedback/enable; motion "
                                "controllers: " +
                                loadedMotions());
       }
-      return Answer::refusal("controller_id '" + id + "' is not loaded; loaded: " +
+      return Answer::refusal(ReasonCode::UnknownName,
+                             "controller_id '" + id + "' is not loaded; loaded: " +
                              loadedMotions() + "; use load_controller first");
     }
-    type = (*found)->type;
+    type = found->type;
     if (id == active_id_ && !report().fault) return {true, "'" + id + "' is active already"};
-    plan->motion = (*found)->controller.get();
+    plan->motion = found->controller.get();
+    plan->cancel = &found->cancel;
     plan->id << id.c_str();
   }
   // The profile of its name is prepared here and begins in the cycle that switches.
@@ -220,12 +230,12 @@ Answer ControllerManager::switchTo(const std::string& id, std::string& type) {
       note = "no feedback profile of this name: feedback controllers stay as they are";
     }
     prepared = feedback.prepare(change.motionSwitched());
-    if (!prepared.ok()) return Answer::refusal(prepared.message());
+    if (!prepared.ok()) return Answer::refusal(ReasonCode::InvalidArgument, prepared.message());
   }
   const PlanOutcome outcome = cycle_.plans().offer(std::move(plan), settings_.plan_timeout);
   if (outcome == PlanOutcome::Withdrawn) {
     if (prepared.generation() != 0) feedback.withdraw(prepared.generation());
-    return Answer::refusal(notAdopted(outcome));
+    return Answer::refusal(ReasonCode::NotAdopted, notAdopted(outcome));
   }
   if (outcome == PlanOutcome::Taken) note = notAdopted(outcome);
   const std::lock_guard<std::mutex> lock(table_);
@@ -239,7 +249,7 @@ Answer ControllerManager::applyProfile(const std::string& profile) {
   const std::lock_guard<std::mutex> requests(requests_);
   ctrl_more::FeedbackControllersManager& feedback = feedback_.manager();
   const ctrl_more::Status status = feedback.applyProfile(profile, false);
-  if (!status.ok()) return Answer::refusal(status.message());
+  if (!status.ok()) return Answer::refusal(ReasonCode::UnknownName, status.message());
   if (settings_.lockstep) {
     cycle_.idle(now_ns());
   } else if (!feedback.waitAdopted(status.generation(), settings_.plan_timeout)) {
@@ -258,7 +268,8 @@ void ControllerManager::active(std::string& id, std::string& type) const {
 
 Answer ControllerManager::setSpeedScale(double scale) {
   if (!std::isfinite(scale) || scale < 0.0 || scale > 1.0) {
-    return Answer::refusal("speed_scale " + std::to_string(scale) +
+    return Answer::refusal(ReasonCode::OutOfRange,
+                           "speed_scale " + std::to_string(scale) +
                            ": expected 0 (stand still) to 1 (as planned)");
   }
   cycle_.setSpeedScale(scale);
@@ -267,18 +278,14 @@ Answer ControllerManager::setSpeedScale(double scale) {
 
 MotionController* ControllerManager::motion(const std::string& id) {
   const std::lock_guard<std::mutex> lock(table_);
-  for (const auto& motion : motions_) {
-    if (motion->id == id) return motion->controller.get();
-  }
-  return nullptr;
+  const LoadedMotion* const found = find(id);
+  return found != nullptr ? found->controller.get() : nullptr;
 }
 
 std::string ControllerManager::typeOf(const std::string& id) const {
   const std::lock_guard<std::mutex> lock(table_);
-  for (const auto& motion : motions_) {
-    if (motion->id == id) return motion->type;
-  }
-  return "";
+  const LoadedMotion* const found = find(id);
+  return found != nullptr ? found->type : "";
 }
 
 CycleReport ControllerManager::report() const {
@@ -290,35 +297,6 @@ CycleReport ControllerManager::report() const {
 std::string ControllerManager::profile() const {
   const std::lock_guard<std::mutex> lock(table_);
   return profile_;
-}
-
-std::string ControllerManager::motionRefusal(const std::string& controller_id) const {
-  std::string id, type;
-  active(id, type);
-  if (id != controller_id) {
-    return "controller '" + controller_id + "' is not active; active is " +
-           (id.empty() ? "none" : "'" + id + "'") + "; call switch_controller with '" +
-           controller_id + "' first";
-  }
-  const CycleReport now = report();
-  if (now.fault) {
-    return "controller '" + controller_id + "' is at fault: " + now.reason.str() +
-           "; call switch_controller with '" + controller_id + "' to start it afresh";
-  }
-  if (now.samples == 0) {
-    return "no joint state from the robot yet; start the robot's interface first";
-  }
-  const double age = 1e-9 * static_cast<double>(now_ns() - now.robot.stamp_ns);
-  if (age > settings_.cycle.sample_timeout) {
-    return "the newest joint state is " + std::to_string(age) +
-           " s old; allowed: " + std::to_string(settings_.cycle.sample_timeout) + " s";
-  }
-  if (now.robot.block != lwr_fri_bridge::MotionBlock::None) {
-    return std::string("the robot follows no motion now: ") +
-           lwr_fri_bridge::describe(now.robot.block) +
-           "; see lwr/state, then use lwr/command (reset, start)";
-  }
-  return "";
 }
 
 std::string ControllerManager::notAdopted(PlanOutcome outcome) const {

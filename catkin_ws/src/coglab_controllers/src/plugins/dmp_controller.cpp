@@ -114,7 +114,7 @@ void DmpController::stop() {
   loop_->pending = false;
   if (state_ == MotionState::Running || state_ == MotionState::Holding) {
     state_ = MotionState::Aborted;
-    reason_ = Reason("ended by a switch to another controller");
+    reason_ = Reason(ReasonCode::Switched, "ended by a switch to another controller");
   } else if (state_ == MotionState::Reached) {
     state_ = MotionState::Idle;
   }
@@ -132,13 +132,15 @@ void DmpController::abort(const Reason& reason) {
   hold_.begin();
 }
 
-void DmpController::adopt(const CycleInput&) {
+void DmpController::adopt(const CycleInput& input) {
   Plan* const plan = plans_->take();
   if (plan == nullptr) return;
   const bool under_way = following() || state_ == MotionState::Reached;
-  if (!plan->execute && !under_way) {
-    plan->refusal = Reason("no motion is running; use execute_dmp");
-  } else {
+  plan->refusal = voidReason(plan->stamp, input);
+  if (plan->refusal.empty() && !plan->execute && !under_way) {
+    plan->refusal = Reason(ReasonCode::NothingRuns, "no motion is running; use execute_dmp");
+  }
+  if (plan->refusal.empty()) {
     // It begins with the next joint state: in a cycle without one, the commanded state is that of
     // the last.
     if (!loop_->pending) loop_->was_following = following();
@@ -248,24 +250,25 @@ void DmpController::watchGoal(const CycleInput& input) {
   switch (gate) {
     case GoalGate::State::Fresh:
       if (loop.projected) {
-        reason_ = Reason("the goal is outside the workspace (")
+        reason_ = Reason(ReasonCode::GoalOutsideWorkspace, "the goal is outside the workspace (")
                   << describe(setup_.robot->workspace.violated(
                          (loop.base_from_dmp * handGoal(loop.gate.goal(), loop.hand)).position))
                   << "): the motion goes to the border";
       }
       break;
     case GoalGate::State::Old:
-      reason_ = Reason("the newest goal is ") << loop.gate.age() << " s old: the last one is held";
+      reason_ = Reason(ReasonCode::GoalStale, "the newest goal is ")
+                << loop.gate.age() << " s old: the last one is held";
       break;
     case GoalGate::State::Jumped:
-      reason_ = Reason("the goal jumped by ")
+      reason_ = Reason(ReasonCode::GoalJumped, "the goal jumped by ")
                 << loop.gate.jump() << " m: the last one is held until frames agree";
       break;
     case GoalGate::State::Lost:
       if (loop.remaining_distance < finish_distance_) {
-        reason_ = Reason("the goal is lost: finishing on the held one");
+        reason_ = Reason(ReasonCode::GoalStale, "the goal is lost: finishing on the held one");
       } else {
-        abort(Reason("the goal is lost for ")
+        abort(Reason(ReasonCode::GoalLost, "the goal is lost for ")
               << loop.gate.age() << " s with " << loop.remaining_distance
               << " m to go; check what publishes the goal frame");
       }

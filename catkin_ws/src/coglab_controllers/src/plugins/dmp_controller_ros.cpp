@@ -120,6 +120,7 @@ class DmpControllerRos : public MotionControllerRos {
   template <typename Response>
   bool reply(const char* service, const Answer& answer, Response& response) {
     response.success = answer.success;
+    response.reason_code = answer.number();
     response.message = answer.message;
     if (!answer.success) ROS_WARN("%s refused: %s", service, answer.message.c_str());
     return true;
@@ -159,10 +160,10 @@ class DmpControllerRos : public MotionControllerRos {
 
   void publishFeedback() {
     const MotionState before = progress_.state;
-    const Reason reason = progress_.reason;
+    const ReasonCode code = progress_.reason.code();
     if (!controller_->readProgress(progress_)) return;
     broadcastGoal();
-    const bool changed = progress_.state != before || (progress_.reason.empty() != reason.empty());
+    const bool changed = progress_.state != before || progress_.reason.code() != code;
     const bool moving =
         progress_.state == MotionState::Running || progress_.state == MotionState::Holding;
     // 50 Hz while it moves, 5 Hz otherwise, and every change at once.
@@ -173,6 +174,7 @@ class DmpControllerRos : public MotionControllerRos {
     message.header.frame_id = controller_->dmpFrame();
     message.primitive_id = progress_.primitive.str();
     message.state = nameOf(progress_.state);
+    message.reason_code = progress_.reason.number();
     message.reason = progress_.reason.str();
     message.phase = progress_.phase;
     message.remaining_distance = progress_.remaining_distance;

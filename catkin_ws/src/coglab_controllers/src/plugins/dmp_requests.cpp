@@ -17,24 +17,27 @@ std::string text(const Vector3& v) {
   return out.str();
 }
 
-/// What is wrong with a target orientation; empty: nothing. Sets whether the hand keeps the one it
-/// has.
-std::string readOrientation(const DmpRequest& request, HandGoal& hand) {
+Answer invalid(std::string why) {
+  return Answer::refusal(ReasonCode::InvalidArgument, std::move(why));
+}
+
+/// Refuses a target orientation that is none. Sets whether the hand keeps the one it has.
+Answer readOrientation(const DmpRequest& request, HandGoal& hand) {
   const Eigen::Vector4d& q = request.target_orientation;
   hand.keep_orientation = true;
-  if (!request.orientation_control) return "";
-  if (!q.allFinite()) return "target_orientation holds a number that is not finite";
-  if (q.isZero(0.0)) return "";
+  if (!request.orientation_control) return {};
+  if (!q.allFinite()) return invalid("target_orientation holds a number that is not finite");
+  if (q.isZero(0.0)) return {};
   const Quaternion orientation(q[3], q[0], q[1], q[2]);
   if (!isUnit(orientation)) {
     std::ostringstream out;
     out << "target_orientation has norm " << q.norm()
         << "; expected a unit quaternion x y z w, or all zero to keep the present orientation";
-    return out.str();
+    return invalid(out.str());
   }
   hand.orientation = orientation.normalized();
   hand.keep_orientation = false;
-  return "";
+  return {};
 }
 
 }  // namespace
@@ -51,7 +54,7 @@ Answer DmpController::loadDmps(const std::string& filename, int& loaded) {
     loaded = library_.load(filename);
     return {};
   } catch (const std::exception& error) {
-    return Answer::refusal(error.what());
+    return Answer::refusal(ReasonCode::BadFile, error.what());
   }
 }
 
@@ -59,99 +62,110 @@ Answer DmpController::execute(const DmpRequest& request) { return this->request(
 
 Answer DmpController::switchDmp(const DmpRequest& request) { return this->request(request, false); }
 
-std::string DmpController::checkRequest(const DmpRequest& request, bool execute, Plan& plan) const {
-  {
+Answer DmpController::checkRequest(const DmpRequest& request, bool execute, Plan& plan) const {
+  try {
     const std::lock_guard<std::mutex> lock(library_mutex_);
     plan.motion.system = TransformationSystem(library_.at(request.primitive_id));
+  } catch (const std::exception& error) {
+    return Answer::refusal(ReasonCode::UnknownName, error.what());
   }
   plan.primitive << request.primitive_id.c_str();
-  requireRatio(request.dmp_ratio);
+  try {
+    requireRatio(request.dmp_ratio);
+  } catch (const std::exception& error) {
+    return Answer::refusal(ReasonCode::OutOfRange, error.what());
+  }
   plan.motion.ratio = request.dmp_ratio;
   plan.motion.orientation_control = request.orientation_control;
-  if (!request.goal_offset.allFinite()) return "goal_offset holds a number that is not finite";
+  if (!request.goal_offset.allFinite()) {
+    return invalid("goal_offset holds a number that is not finite");
+  }
   plan.hand.offset = request.goal_offset;
   plan.hand.in_goal_frame = goal_from_tf_;
-  const std::string orientation = readOrientation(request, plan.hand);
-  if (!orientation.empty() || !execute) return orientation;
+  const Answer orientation = readOrientation(request, plan.hand);
+  if (!orientation.success || !execute) return orientation;
 
   if (request.initial_state != DmpRequest::kCurrent &&
       request.initial_state != DmpRequest::kGiven) {
-    return "initial_state " + std::to_string(request.initial_state) +
-           " is unknown; expected CURRENT=0 or GIVEN=1";
+    return invalid("initial_state " + std::to_string(request.initial_state) +
+                   " is unknown; expected CURRENT=0 or GIVEN=1");
   }
   plan.given = request.initial_state == DmpRequest::kGiven;
   if (plan.given) {
     if (!request.initial_position.allFinite() || !request.initial_velocity.allFinite()) {
-      return "initial_position or initial_velocity holds a number that is not finite";
+      return invalid("initial_position or initial_velocity holds a number that is not finite");
     }
     plan.initial_position = request.initial_position;
     plan.initial_velocity = request.initial_velocity;
   }
-  return "";
+  return {};
 }
 
-std::string DmpController::findFrames(Plan& plan) {
-  if (dmp_frame_ == base_frame_) return "";
+Answer DmpController::findFrames(Plan& plan) {
+  if (dmp_frame_ == base_frame_) return {};
   const std::lock_guard<std::mutex> lock(goal_mutex_);
   GoalObservation transform;
   std::string why = "nothing provides frames";
   if (source_ == nullptr || !source_->lookup(base_frame_, dmp_frame_, transform, why)) {
-    return "frame '" + dmp_frame_ + "' (dmp_frame_name) is not known in '" + base_frame_ +
-           "': " + why;
+    return Answer::refusal(ReasonCode::UnknownName, "frame '" + dmp_frame_ +
+                                                        "' (dmp_frame_name) is not known in '" +
+                                                        base_frame_ + "': " + why);
   }
   plan.base_from_dmp = {transform.position, transform.orientation};
-  return "";
+  return {};
 }
 
-std::string DmpController::findGoal(const std::string& frame, Plan& plan) {
+Answer DmpController::findGoal(const std::string& frame, Plan& plan) {
   const std::lock_guard<std::mutex> lock(goal_mutex_);
   std::string why;
   if (!goal_from_tf_) {
     if (!topic_goal_known_) {
-      return "no goal has come on dmp_goal yet (goal_source is topic); publish one in frame '" +
-             dmp_frame_ + "' first";
+      return Answer::refusal(
+          ReasonCode::GoalMissing,
+          "no goal has come on dmp_goal yet (goal_source is topic); publish one in frame '" +
+              dmp_frame_ + "' first");
     }
     plan.goal = pushed_;
-    return "";
+    return {};
   }
-  if (source_ == nullptr) return "nothing provides frames (goal_source is tf)";
+  if (source_ == nullptr) {
+    return Answer::refusal(ReasonCode::GoalMissing, "nothing provides frames (goal_source is tf)");
+  }
   GoalObservation goal;
   if (!source_->lookup(dmp_frame_, frame, goal, why)) {
-    return "goal frame '" + frame + "' is not known in '" + dmp_frame_ + "': " + why;
+    return Answer::refusal(
+        ReasonCode::UnknownName,
+        "goal frame '" + frame + "' is not known in '" + dmp_frame_ + "': " + why);
   }
   if (!goal.position.allFinite() || !isUnit(goal.orientation)) {
-    return "goal frame '" + frame + "' has a pose that is not finite";
+    return invalid("goal frame '" + frame + "' has a pose that is not finite");
   }
   const double age = 1e-9 * static_cast<double>(setup_.host->now_ns() - goal.stamp_ns);
   const double max_age = loop_->gate.parameters().max_age;
   if (age > max_age) {
-    return "goal frame '" + frame + "' is " + std::to_string(age) +
-           " s old, allowed: " + std::to_string(max_age) +
-           " s (goal_max_age); check what publishes it";
+    return Answer::refusal(ReasonCode::GoalStale,
+                           "goal frame '" + frame + "' is " + std::to_string(age) +
+                               " s old, allowed: " + std::to_string(max_age) +
+                               " s (goal_max_age); check what publishes it");
   }
   goal.request = request_number_ + 1;  // in effect once the plan is
   plan.goal = goal;
-  return "";
+  return {};
 }
 
 Answer DmpController::request(const DmpRequest& request, bool execute) {
-  const std::unique_lock<std::mutex> lock = setup_.host->lockRequests();
-  const std::string refusal = setup_.host->motionRefusal(setup_.id);
-  if (!refusal.empty()) return Answer::refusal(refusal);
+  const MotionRequest begun = setup_.host->beginRequest(setup_.id);
+  if (!begun.welcome.success) return begun.welcome;
   auto plan = std::make_unique<Plan>();
+  plan->stamp = begun.stamp;
   plan->execute = execute;
-  try {
-    const std::string wrong = checkRequest(request, execute, *plan);
-    if (!wrong.empty()) return Answer::refusal(wrong);
-  } catch (const std::exception& error) {
-    return Answer::refusal(error.what());
-  }
   std::string note;
   const std::string frame = request.goal_frame.empty() ? goal_frame_ : request.goal_frame;
-  std::string wrong = findFrames(*plan);
-  if (wrong.empty() && execute) wrong = findGoal(frame, *plan);
-  if (wrong.empty() && execute) wrong = outsideWorkspace(*plan);
-  if (!wrong.empty()) return Answer::refusal(wrong);
+  Answer checked = checkRequest(request, execute, *plan);
+  if (checked.success) checked = findFrames(*plan);
+  if (checked.success && execute) checked = findGoal(frame, *plan);
+  if (checked.success && execute) checked = outsideWorkspace(*plan);
+  if (!checked.success) return checked;
   if (execute && !goal_from_tf_ && !request.goal_frame.empty()) {
     note = "goal_frame '" + request.goal_frame + "' is not used: goal_source is topic";
   }
@@ -168,7 +182,7 @@ Answer DmpController::request(const DmpRequest& request, bool execute) {
   return answer;
 }
 
-std::string DmpController::outsideWorkspace(const Plan& plan) const {
+Answer DmpController::outsideWorkspace(const Plan& plan) const {
   const Workspace& workspace = setup_.robot->workspace;
   const Pose& to_base = plan.base_from_dmp;
   const Vector3 in_dmp = handGoal(plan.goal, plan.hand).position;
@@ -176,10 +190,12 @@ std::string DmpController::outsideWorkspace(const Plan& plan) const {
   const double outside = (workspace.project(goal) - goal).norm();
   const double margin = goal_from_tf_ ? reach_margin_ : 0.0;
   if (outside > margin + 1e-9) {
-    return "the hand's goal " + text(goal) + " is " + std::to_string(outside) +
-           " m outside the workspace (" + describe(workspace.violated(goal)) + "); box from " +
-           text(workspace.parameters().box_min) + " to " + text(workspace.parameters().box_max) +
-           ", " + std::to_string(workspace.parameters().base_radius) + " m from the base";
+    return Answer::refusal(
+        ReasonCode::GoalOutsideWorkspace,
+        "the hand's goal " + text(goal) + " is " + std::to_string(outside) +
+            " m outside the workspace (" + describe(workspace.violated(goal)) + "); box from " +
+            text(workspace.parameters().box_min) + " to " + text(workspace.parameters().box_max) +
+            ", " + std::to_string(workspace.parameters().base_radius) + " m from the base");
   }
   if (plan.given) {
     const Vector3 start = to_base.position + to_base.orientation * plan.initial_position;
@@ -187,25 +203,31 @@ std::string DmpController::outsideWorkspace(const Plan& plan) const {
     const Vector3 hand = setup_.robot->chain.evaluate(robot.commanded_position).tool.position;
     const double distance = (start - hand).norm();
     if (distance > max_initial_distance_) {
-      return "initial_position is " + std::to_string(distance) + " m from the hand at " +
-             text(hand) + "; allowed: " + std::to_string(max_initial_distance_) +
-             " m (max_initial_distance); use initial_state CURRENT";
+      return Answer::refusal(
+          ReasonCode::OutOfRange,
+          "initial_position is " + std::to_string(distance) + " m from the hand at " + text(hand) +
+              "; allowed: " + std::to_string(max_initial_distance_) +
+              " m (max_initial_distance); use initial_state CURRENT");
     }
     if (plan.initial_velocity.norm() > 2.0) {
-      return "initial_velocity is " + std::to_string(plan.initial_velocity.norm()) +
-             " m/s; expected at most 2 m/s";
+      return Answer::refusal(ReasonCode::OutOfRange,
+                             "initial_velocity is " +
+                                 std::to_string(plan.initial_velocity.norm()) +
+                                 " m/s; expected at most 2 m/s");
     }
   }
-  return "";
+  return {};
 }
 
 Answer DmpController::offer(std::unique_ptr<Plan> plan) {
   Answer answer;
   const PlanOutcome outcome =
       plans_->offer(std::move(plan), setup_.host->planTimeout(), [&answer](const Plan& adopted) {
-        if (!adopted.refusal.empty()) answer = Answer::refusal(adopted.refusal.str());
+        if (!adopted.refusal.empty()) answer = Answer::refusal(adopted.refusal);
       });
-  if (outcome == PlanOutcome::Withdrawn) return Answer::refusal(setup_.host->notAdopted(outcome));
+  if (outcome == PlanOutcome::Withdrawn) {
+    return Answer::refusal(ReasonCode::NotAdopted, setup_.host->notAdopted(outcome));
+  }
   if (outcome == PlanOutcome::Taken) answer.message = setup_.host->notAdopted(outcome);
   return answer;
 }
@@ -213,21 +235,24 @@ Answer DmpController::offer(std::unique_ptr<Plan> plan) {
 Answer DmpController::setGoal(const std::string& frame, const Vector3& goal,
                               std::int64_t stamp_ns) {
   if (goal_from_tf_) {
-    return Answer::refusal("dmp_goal is not listened to: goal_source is tf; set it to topic");
+    return Answer::refusal(ReasonCode::NotSupported,
+                           "dmp_goal is not listened to: goal_source is tf; set it to topic");
   }
   if (frame != dmp_frame_) {
-    return Answer::refusal("dmp_goal in frame '" + frame + "' refused: expected '" + dmp_frame_ +
+    return Answer::refusal(ReasonCode::UnknownName,
+                           "dmp_goal in frame '" + frame + "' refused: expected '" + dmp_frame_ +
                            "' (dmp_frame_name); the goal helper transforms goals");
   }
   if (!goal.allFinite()) {
-    return Answer::refusal("dmp_goal refused: it holds a number that is not finite");
+    return invalid("dmp_goal refused: it holds a number that is not finite");
   }
   const std::lock_guard<std::mutex> lock(goal_mutex_);
   GoalObservation observation;
   observation.position = goal;
   observation.stamp_ns = stamp_ns != 0 ? stamp_ns : setup_.host->now_ns();
   if (topic_goal_known_ && observation.stamp_ns <= pushed_.stamp_ns) {
-    return Answer::refusal("dmp_goal refused: its stamp is not newer than that of the last one");
+    return Answer::refusal(ReasonCode::TooLate,
+                           "dmp_goal refused: its stamp is not newer than that of the last one");
   }
   topic_goal_known_ = true;
   pushed_ = observation;

@@ -10,26 +10,27 @@ namespace coglab_controllers {
 
 namespace {
 
-/// Reads seven numbers within limits; what is wrong with them, else empty.
-std::string readJoints(const std::vector<double>& values, const char* field,
-                       const std::vector<std::string>& names, const JointVector& least,
-                       const JointVector& most, const char* unit, JointVector& out) {
+/// Reads seven numbers within limits; refused if something is wrong with them.
+Answer readJoints(const std::vector<double>& values, const char* field,
+                  const std::vector<std::string>& names, const JointVector& least,
+                  const JointVector& most, const char* unit, JointVector& out) {
   std::ostringstream why;
   if (values.size() != static_cast<std::size_t>(kMaxJoints)) {
     why << field << " has " << values.size() << " numbers; expected " << kMaxJoints
         << ", in wire order lwr_a1 lwr_a2 lwr_e1 lwr_a3 lwr_a4 lwr_a5 lwr_a6";
-    return why.str();
+    return Answer::refusal(ReasonCode::InvalidArgument, why.str());
   }
   for (int joint = 0; joint < kMaxJoints; ++joint) {
     const double value = values[joint];
     if (!std::isfinite(value) || value < least[joint] || value > most[joint]) {
       why << field << " of " << names[joint] << " is " << value << " " << unit << "; expected "
           << least[joint] << " to " << most[joint];
-      return why.str();
+      return Answer::refusal(
+          std::isfinite(value) ? ReasonCode::OutOfRange : ReasonCode::InvalidArgument, why.str());
     }
     out[joint] = value;
   }
-  return "";
+  return {};
 }
 
 }  // namespace
@@ -56,48 +57,56 @@ void PtpController::configure(const MotionSetup& setup) {
   if (std::function<void()> wait = setup.host->cycleWait()) plans_.setWait(wait);
 }
 
-PtpAnswer PtpController::add(const PtpRequest& request) {
-  PtpAnswer answer;
-  const std::unique_lock<std::mutex> lock = setup_.host->lockRequests();
-  answer.message = setup_.host->motionRefusal(setup_.id);
-  if (!answer.message.empty()) return answer;
-
+Answer PtpController::readMotion(const PtpRequest& request, Motion& motion) const {
   const lwr_fri_bridge::JointLimits& limits = setup_.robot->limits;
   const std::vector<std::string>& names = setup_.robot->chain.jointNames();
   const JointVector margin = JointVector::Constant(setup_.robot->guard.position_margin);
   const JointVector least = JointVector::Constant(1e-4);
-  auto plan = std::make_unique<Plan>();
-  Motion& motion = plan->motion;
   motion.velocity = default_speed_ * limits.velocity;
   motion.acceleration = default_acceleration_ * limits.acceleration;
-  answer.message = readJoints(request.position, "position", names, limits.lower_position + margin,
-                              limits.upper_position - margin, "rad", motion.target);
-  if (answer.message.empty() && !request.max_vel.empty()) {
-    answer.message = readJoints(request.max_vel, "max_vel", names, least, limits.velocity, "rad/s",
-                                motion.velocity);
+  Answer answer = readJoints(request.position, "position", names, limits.lower_position + margin,
+                             limits.upper_position - margin, "rad", motion.target);
+  if (answer.success && !request.max_vel.empty()) {
+    answer = readJoints(request.max_vel, "max_vel", names, least, limits.velocity, "rad/s",
+                        motion.velocity);
   }
-  if (answer.message.empty() && !request.max_acc.empty()) {
-    answer.message = readJoints(request.max_acc, "max_acc", names, least, limits.acceleration,
-                                "rad/s^2", motion.acceleration);
+  if (answer.success && !request.max_acc.empty()) {
+    answer = readJoints(request.max_acc, "max_acc", names, least, limits.acceleration, "rad/s^2",
+                        motion.acceleration);
   }
-  if (!answer.message.empty()) return answer;
+  if (!answer.success) return answer;
   const WorkspaceBorder border =
       setup_.robot->workspace.violated(setup_.robot->chain.evaluate(motion.target).tool.position);
-  if (border != WorkspaceBorder::None) {
-    answer.message =
-        std::string("position puts the hand outside the workspace: ") + describe(border);
-    return answer;
-  }
+  if (border == WorkspaceBorder::None) return {};
+  return Answer::refusal(
+      ReasonCode::GoalOutsideWorkspace,
+      std::string("position puts the hand outside the workspace: ") + describe(border));
+}
 
-  motion.id = next_id_;
+PtpAnswer PtpController::add(const PtpRequest& request) {
+  PtpAnswer answer;
+  const auto rejected = [&answer](const Answer& why) {
+    answer.code = why.code;
+    answer.message = why.message;
+    return answer;
+  };
+  const MotionRequest begun = setup_.host->beginRequest(setup_.id);
+  if (!begun.welcome.success) return rejected(begun.welcome);
+  auto plan = std::make_unique<Plan>();
+  plan->stamp = begun.stamp;
+  const Answer read = readMotion(request, plan->motion);
+  if (!read.success) return rejected(read);
+
+  plan->motion.id = next_id_;
   const PlanOutcome outcome =
       plans_.offer(std::move(plan), setup_.host->planTimeout(), [&answer](const Plan& adopted) {
         answer.status = adopted.status;
+        answer.code = adopted.refusal.code();
         answer.message = adopted.refusal.str();
       });
   if (outcome == PlanOutcome::Withdrawn) {
-    answer.message = setup_.host->notAdopted(outcome);
-    return answer;
+    return rejected(
+        Answer::refusal(ReasonCode::NotAdopted, setup_.host->notAdopted(outcome)));
   }
   if (outcome == PlanOutcome::Taken) {
     answer.status = PtpAnswer::kQueued;
@@ -118,12 +127,12 @@ void PtpController::start(const CycleInput&) {
   hold_.begin();
 }
 
-void PtpController::giveUp(const char* why) {
+void PtpController::giveUp(const Reason& why) {
   int unfinished = 0;
-  Reason ids;
+  Reason told = why;
   const auto drop = [&](int id) {
-    ends_.push({id, false});
-    ids << (unfinished++ == 0 ? "" : ", ") << static_cast<std::uint64_t>(id);
+    ends_.push({id, false, why});
+    told << (unfinished++ == 0 ? "; not executed: ptp_id " : ", ") << static_cast<std::uint64_t>(id);
   };
   if (state_ == MotionState::Running) drop(running_.id);
   for (; queued_ > 0; --queued_) {
@@ -133,19 +142,24 @@ void PtpController::giveUp(const char* why) {
   pending_ = false;
   if (unfinished > 0) {
     state_ = MotionState::Aborted;
-    reason_ = Reason(why) << "; not executed: ptp_id " << ids.c_str();
+    reason_ = told;
   }
   hold_.begin();
 }
 
-void PtpController::stop() { giveUp("ended by a switch to another controller"); }
+void PtpController::stop() {
+  giveUp(Reason(ReasonCode::Switched, "ended by a switch to another controller"));
+}
 
-void PtpController::abort(const Reason& reason) { giveUp(reason.c_str()); }
+void PtpController::abort(const Reason& reason) { giveUp(reason); }
 
-void PtpController::adopt(const CycleInput&) {
+void PtpController::adopt(const CycleInput& input) {
   Plan* plan = plans_.take();
   if (plan == nullptr) return;
-  if (state_ != MotionState::Running) {
+  plan->refusal = voidReason(plan->stamp, input);
+  if (!plan->refusal.empty()) {
+    plan->status = PtpAnswer::kRejected;
+  } else if (state_ != MotionState::Running) {
     // It begins with the next joint state: in a cycle without one, the commanded state is that of
     // the last.
     running_ = plan->motion;
@@ -157,7 +171,7 @@ void PtpController::adopt(const CycleInput&) {
     queue_[(first_ + queued_++) % kMaxQueue] = plan->motion;
     plan->status = PtpAnswer::kQueued;
   } else {
-    plan->refusal = Reason("the queue is full: ")
+    plan->refusal = Reason(ReasonCode::QueueFull, "the queue is full: ")
                     << static_cast<std::uint64_t>(queued_) << " motions wait (max_queue "
                     << static_cast<std::uint64_t>(max_queue_) << "); wait for finished_ptp";
   }
@@ -197,16 +211,17 @@ void PtpController::finish(const CycleInput& input) {
 
 void PtpController::computeReference(const CycleInput& input, References& references) {
   if (pending_ && input.motion_allowed) begin(input, running_);
-  if (state_ == MotionState::Running && time_ >= trajectory_.duration()) {
+  if (state_ == MotionState::Running && !pending_ && time_ >= trajectory_.duration()) {
     const double error = (trajectory_.target() - input.robot.position).lpNorm<Eigen::Infinity>();
     settling_ += input.dt;
     if (error <= tolerance_) {
       finish(input);
     } else if (settling_ > settle_time_) {
-      giveUp("the arm does not reach the target: is it blocked?");
+      giveUp(Reason(ReasonCode::TargetNotReached,
+                    "the arm does not reach the target: is it blocked?"));
     }
   }
-  if (state_ != MotionState::Running) {
+  if (state_ != MotionState::Running || pending_) {
     hold_.computeReference(input, setup_.robot->chain, references);
     return;
   }
@@ -225,7 +240,7 @@ void PtpController::computeReference(const CycleInput& input, References& refere
 }
 
 void PtpController::resolve(const CycleInput& input, References& references) {
-  if (state_ != MotionState::Running) {
+  if (state_ != MotionState::Running || pending_) {
     hold_.resolve(input, references,
                   [&](const ChainState& state, const JointVector& q, const CartesianReference& to) {
                     ik_->solve(state, q, to, ik_result_);

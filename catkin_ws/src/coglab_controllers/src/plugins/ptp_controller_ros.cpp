@@ -6,6 +6,7 @@
 #include "coglab_controllers/ros/motion_controller_ros.hpp"
 #include "coglab_msgs/AddPtp.h"
 #include "coglab_msgs/FinishedPtp.h"
+#include "coglab_msgs/UnfinishedPtp.h"
 
 namespace coglab_controllers {
 
@@ -18,6 +19,7 @@ class PtpControllerRos : public MotionControllerRos {
     controller_ = &dynamic_cast<PtpController&>(controller);
     node_ = node;
     finished_ = node_.advertise<coglab_msgs::FinishedPtp>("finished_ptp", 50);
+    unfinished_ = node_.advertise<coglab_msgs::UnfinishedPtp>("unfinished_ptp", 100);
     service_ = node_.advertiseService("add_ptp", &PtpControllerRos::onAdd, this);
   }
 
@@ -29,7 +31,12 @@ class PtpControllerRos : public MotionControllerRos {
         message.ptp_id = end.ptp_id;
         finished_.publish(message);
       } else {
-        ROS_WARN("ptp_id %d was not executed", end.ptp_id);
+        coglab_msgs::UnfinishedPtp message;
+        message.ptp_id = end.ptp_id;
+        message.reason_code = end.reason.number();
+        message.reason = end.reason.str();
+        unfinished_.publish(message);
+        ROS_WARN("ptp_id %d was not executed: %s", end.ptp_id, end.reason.c_str());
       }
     }
   }
@@ -40,6 +47,7 @@ class PtpControllerRos : public MotionControllerRos {
     response.status = answer.status;
     response.ptp_id = answer.ptp_id;
     response.success = answer.status != PtpAnswer::kRejected;
+    response.reason_code = static_cast<std::uint16_t>(answer.code);
     response.message = answer.message;
     if (!response.success) ROS_WARN("add_ptp rejected: %s", answer.message.c_str());
     return true;
@@ -47,7 +55,7 @@ class PtpControllerRos : public MotionControllerRos {
 
   PtpController* controller_ = nullptr;
   ros::NodeHandle node_;
-  ros::Publisher finished_;
+  ros::Publisher finished_, unfinished_;
   ros::ServiceServer service_;
 };
 

@@ -13,6 +13,7 @@ namespace coglab_controllers {
 namespace {
 constexpr auto kPublishPeriod = std::chrono::milliseconds(5);
 constexpr double kStallTime = 0.25;  // s without a cycle that count as a stall
+constexpr double kWordsPeriod = 0.5;  // s between two status messages that differ in words alone
 }  // namespace
 
 ManagerRos::ManagerRos(const ros::NodeHandle& node, lwr_fri_bridge::ControlPort& port,
@@ -50,6 +51,7 @@ void ManagerRos::start() {
   services_.push_back(node_.advertiseService("speed_scale", &ManagerRos::onSpeed, this));
   speed_ = node_.subscribe("speed_scale", 1, &ManagerRos::onSpeedTopic, this);
   feedback_ = std::make_unique<FeedbackRos>(ros::NodeHandle(node_, "feedback"), *manager_);
+  cancel_ = std::make_unique<CancelRos>(node_, *manager_);
   diagnostics_ = std::make_unique<diagnostic_updater::Updater>(node_);
   diagnostics_->setHardwareID("none");
   diagnostics_->add("control cycle", this, &ManagerRos::diagnose);
@@ -65,6 +67,7 @@ void ManagerRos::shutdown() {
   for (ros::ServiceServer& service : services_) service.shutdown();
   speed_.shutdown();
   feedback_.reset();
+  cancel_.reset();
   if (spinner_) spinner_->stop();
   {
     const std::lock_guard<std::mutex> lock(sides_mutex_);
@@ -94,6 +97,7 @@ Answer ManagerRos::load(const std::string& id, const std::string& type) {
   const Answer answer = manager_->load(id, type);
   if (!answer.success) return answer;
   MotionController* controller = manager_->motion(id);
+  if (controller != nullptr) cancel_->serve(id);
   const MotionMaker* maker = MotionTypes::instance().find(type);
   if (controller == nullptr || maker == nullptr || maker->ros == nullptr) return answer;
   std::unique_ptr<MotionControllerRos> side(maker->ros());
@@ -120,9 +124,11 @@ bool ManagerRos::onLoad(coglab_msgs::LoadController::Request& request,
   try {
     answer = load(request.controller_id, request.controller_type);
   } catch (const std::exception& error) {
-    answer = Answer::refusal("the ROS side of '" + request.controller_id + "': " + error.what());
+    answer = Answer::refusal(ReasonCode::ControllerFault,
+                             "the ROS side of '" + request.controller_id + "': " + error.what());
   }
   response.success = answer.success;
+  response.reason_code = answer.number();
   response.message = answer.message;
   manager_->list(response.controller_ids, response.controller_types);
   if (!answer.success) ROS_WARN("load_controller refused: %s", answer.message.c_str());
@@ -139,6 +145,7 @@ bool ManagerRos::onSwitch(coglab_msgs::SwitchController::Request& request,
                           coglab_msgs::SwitchController::Response& response) {
   const Answer answer = switchTo(request.controller_id, response.controller_type);
   response.success = answer.success;
+  response.reason_code = answer.number();
   response.message = answer.message;
   if (!answer.success) ROS_WARN("switch_controller refused: %s", answer.message.c_str());
   return true;
@@ -215,20 +222,26 @@ void ManagerRos::publishTarget(const CycleReport& report) {
 void ManagerRos::publishStatus(const CycleReport& report) {
   coglab_msgs::ControllerStatus message;
   manager_->active(message.active_controller, message.active_type);
+  const Reason reason = stalled_.empty() ? report.reason
+                                         : Reason(ReasonCode::CycleStalled, stalled_.c_str());
   message.state = stalled_.empty() ? nameOf(report.state) : "fault";
-  message.reason = stalled_.empty() ? report.reason.str() : stalled_;
+  message.standing = stalled_.empty() && report.standing;
+  message.reason_code = reason.number();
+  message.reason = reason.str();
   message.plan_generation = report.generation;
   message.speed_scale = report.speed_scale;
   const coglab_msgs::ControllerStatus& last = status_shown_;
-  // Numbers in a reason change all the time; a new sentence does not come more often than twice a
-  // second.
-  const bool same_reason = message.reason.empty() == last.reason.empty() &&
-                           message.reason.substr(0, 24) == last.reason.substr(0, 24);
   const bool same = message.active_controller == last.active_controller &&
-                    message.state == last.state && same_reason &&
+                    message.state == last.state && message.standing == last.standing &&
+                    message.reason_code == last.reason_code &&
                     message.plan_generation == last.plan_generation &&
                     message.speed_scale == last.speed_scale;
-  if (shown_once_ && same) return;
+  // Numbers in a sentence change all the time.
+  const std::int64_t now = steadyNow();
+  const bool words = message.reason != last.reason &&
+                     1e-9 * static_cast<double>(now - status_shown_ns_) >= kWordsPeriod;
+  if (shown_once_ && same && !words) return;
+  status_shown_ns_ = now;
   if (report.fault && !shown_.fault) ROS_ERROR("%s", report.reason.c_str());
   shown_ = report;
   shown_once_ = true;

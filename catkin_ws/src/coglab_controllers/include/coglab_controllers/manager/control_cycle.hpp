@@ -33,7 +33,8 @@ struct CycleSettings {
 struct CyclePlan {
   MotionController* motion =
       nullptr;  ///< the active motion controller, kept alive by the manager; null: none
-  Name id;      ///< its id
+  MotionCancel* cancel = nullptr;  ///< its cancels; null only without a motion controller
+  Name id;                         ///< its id
 };
 
 /// What the manager as a whole does.
@@ -52,6 +53,9 @@ struct CycleReport {
   MotionState motion = MotionState::Idle;
   Reason reason;             ///< why it holds, aborted or is at fault; empty while all is well
   bool fault = false;        ///< the active controller is at fault until switched to again
+  /// The set-point of the arm stands: no velocity, no acceleration, and none was asked for by this
+  /// cycle and the one before. False without a usable joint state.
+  bool standing = false;
   double time_scale = 1.0;   ///< what the references run at
   double speed_scale = 1.0;  ///< as requested
   RobotSample robot;         ///< the joint state used
@@ -103,6 +107,9 @@ class ControlCycle {
 
  private:
   void adopt() noexcept;
+  void takeCancel() noexcept;
+  bool stands(const RobotSample& sample, const JointVector& velocity) noexcept;
+  MotionState motionState() const noexcept;
   bool usable(const RobotSample& sample, double dt) noexcept;
   void compute(JointVector& velocity) noexcept;
   void watchRobot() noexcept;
@@ -126,6 +133,7 @@ class ControlCycle {
 
   // control thread only
   MotionController* motion_ = nullptr;
+  MotionCancel* cancel_ = nullptr;
   Name id_;
   CycleInput input_;
   CycleReport report_;
@@ -134,6 +142,7 @@ class ControlCycle {
   Reason input_reason_;
   double limit_scale_ = 1.0;
   std::uint64_t numbers_ = 0;  // of cycles with a joint state
+  bool asked_still_ = false;   // the last cycle with a joint state asked for no velocity
   int overruns_in_row_ = 0;
   double at_border_ = 0.0;  // s that a border of the workspace has stopped the motion
   lwr_fri_bridge::TripleBuffer<CycleReport> reports_;

@@ -3,6 +3,7 @@
 /// control cycle.
 #pragma once
 
+#include <atomic>
 #include <cstdint>
 #include <functional>
 #include <map>
@@ -46,6 +47,7 @@ struct LoadedMotion {
   std::string id, type;
   std::shared_ptr<MotionLibrary> library;  ///< null for types linked into the program
   std::unique_ptr<MotionController> controller;
+  MotionCancel cancel;
 };
 
 /// Loads controllers and decides which one is active. Services call it from any thread; requests
@@ -78,6 +80,23 @@ class ControllerManager : public MotionHost {
   Answer setSpeedScale(double scale);
   /// @}
 
+  /// @name Cancel: ends the running motion of a controller and all that waits behind it
+  /// @{
+
+  /// Ends it and waits until the arm stands. Never waits for other requests. Not in lockstep.
+  /// @param time_limit the longest wait, s, at most 10; 0 or less: 2
+  /// @param why who ends the motion and why, for the log; may be empty
+  CancelAnswer cancel(const std::string& id, double time_limit, const std::string& why);
+  /// The same without waiting: the next cycle ends the motion, and requests made before are void.
+  CancelOrder askCancel(const std::string& id, const std::string& why);
+  /// Whether a cancel has come to its end: the arm stands, or there is nothing to end.
+  bool cancelEnded(const CancelOrder& order, CancelAnswer& answer) const;
+  /// The answer to one that has not.
+  CancelAnswer cancelUnfinished(const CancelOrder& order, double waited) const;
+  /// Ends every wait of cancel() now: the program ends.
+  void endWaits() { ending_.store(true, std::memory_order_relaxed); }
+  /// @}
+
   /// A loaded motion controller; null if the id is unknown. Valid as long as the manager.
   MotionController* motion(const std::string& id);
   /// Its type; empty if unknown.
@@ -93,11 +112,13 @@ class ControllerManager : public MotionHost {
   /// Name of the feedback profile applied last.
   std::string profile() const;
 
+  /// Requests that end in a plan come one after another; hold this while building one.
+  std::unique_lock<std::mutex> lockRequests() { return std::unique_lock<std::mutex>(requests_); }
+  /// Whether a new motion of this controller is welcome by this report; else what to do next.
+  Answer motionWelcome(const std::string& controller_id, const CycleReport& now) const;
+
   // MotionHost
-  std::unique_lock<std::mutex> lockRequests() override {
-    return std::unique_lock<std::mutex>(requests_);
-  }
-  std::string motionRefusal(const std::string& controller_id) const override;
+  MotionRequest beginRequest(const std::string& controller_id) override;
   RobotSample robotSnapshot() const override { return report().robot; }
   std::int64_t now_ns() const override;
   std::function<void()> cycleWait() const override;
@@ -110,7 +131,7 @@ class ControllerManager : public MotionHost {
  private:
   Answer loadMotion(const std::string& id, const std::string& type);
   Answer loadFeedback(const std::string& id, const std::string& type);
-  bool known(const std::string& id) const;
+  LoadedMotion* find(const std::string& id) const;  // under table_
   std::string loadedMotions() const;
 
   ManagerSettings settings_;
@@ -118,6 +139,7 @@ class ControllerManager : public MotionHost {
   ControlCycle cycle_;
   std::vector<std::string> feedback_errors_;
 
+  std::atomic<bool> ending_{false};
   mutable std::mutex requests_;  // requests one after another
   mutable std::mutex table_;     // the members below, for short
   std::vector<std::unique_ptr<LoadedMotion>> motions_;

@@ -75,8 +75,6 @@ class FixedText {
   std::array<char, N> text_;
 };
 
-/// Reasons and other sentences of the control cycle.
-using Reason = FixedText<200>;
 /// Ids of primitives and controllers.
 using Name = FixedText<64>;
 

@@ -12,8 +12,9 @@
 
 #include <yaml-cpp/yaml.h>
 
-#include "coglab_controllers/manager/fixed_text.hpp"
+#include "coglab_controllers/manager/motion_cancel.hpp"
 #include "coglab_controllers/manager/plan_exchange.hpp"
+#include "coglab_controllers/manager/reason.hpp"
 #include "coglab_controllers/manager/robot_setup.hpp"
 #include "ctrl_more/control_states.hpp"
 #include "lwr_fri_bridge/control_port.hpp"
@@ -22,14 +23,6 @@ namespace coglab_controllers {
 
 using lwr_fri_bridge::RobotSample;
 
-/// Outcome of a request: a sentence for the user if it was refused, perhaps a note if not.
-struct Answer {
-  bool success = true;
-  std::string message;
-
-  static Answer refusal(std::string why) { return {false, std::move(why)}; }
-};
-
 /// What the control cycle tells a motion controller, every cycle.
 struct CycleInput {
   RobotSample robot;        ///< newest measurement; stamps and commanded state are the bridge's
@@ -37,7 +30,12 @@ struct CycleInput {
   double dt = 0.0;          ///< true time since the last cycle, s, > 0
   double time_scale = 1.0;  ///< 0..1: how fast the reference's own time runs (speed_scale, limits)
   bool motion_allowed = false;  ///< target velocities are followed now
+  std::uint64_t cancels = 0;    ///< newest cancel of the active controller
 };
+
+/// Why a request is void in the cycle that takes it over: a cancel came after it, or the robot
+/// stopped following motions. Empty: it may begin.
+Reason voidReason(const RequestStamp& stamp, const CycleInput& input) noexcept;
 
 /// The references of one cycle and where the motion controller finds its own in them.
 /// Poses are those of the tool frame in the robot's base frame.
@@ -61,17 +59,20 @@ enum class MotionState : std::uint8_t {
 /// idle, running, holding, reached or aborted.
 const char* nameOf(MotionState state);
 
+/// A request for a motion, see MotionHost::beginRequest().
+struct MotionRequest {
+  std::unique_lock<std::mutex> lock;  ///< hold it while the plan is built and offered
+  RequestStamp stamp;                 ///< for the plan; the cycle judges it with voidReason()
+  Answer welcome;                     ///< refused if no motion of this controller may begin now
+};
+
 /// What a plug-in may ask of the manager outside the cycle.
 class MotionHost {
  public:
   virtual ~MotionHost() = default;
 
-  /// Requests that end in a plan come one after another; hold this while building one.
-  virtual std::unique_lock<std::mutex> lockRequests() = 0;
-
-  /// Why a new motion of this controller is refused now, with what to do next; empty if it is
-  /// welcome.
-  virtual std::string motionRefusal(const std::string& controller_id) const = 0;
+  /// Begins a request for a motion. Requests that end in a plan come one after another.
+  virtual MotionRequest beginRequest(const std::string& controller_id) = 0;
 
   /// The newest measurement that the cycle has seen; sequence 0: none yet.
   virtual RobotSample robotSnapshot() const = 0;
@@ -123,7 +124,8 @@ class MotionController {
   /// Is no longer the active one: ends its motion, reports unfinished requests as not executed.
   virtual void stop() = 0;
 
-  /// Gives up the motion (fall-back of the robot, hold, a limit). The arm brakes by itself.
+  /// Gives up the motion and what waits behind it (fall-back of the robot, hold, a limit, a
+  /// cancel). The arm brakes by itself.
   virtual void abort(const Reason& reason) = 0;
 
   /// Step 3: computes the reference of this cycle and writes pose and twist (Cartesian motions) or

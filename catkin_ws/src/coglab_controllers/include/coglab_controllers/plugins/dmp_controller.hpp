@@ -131,10 +131,10 @@ class DmpController : public MotionController {
   struct Loop;
 
   Answer request(const DmpRequest& request, bool execute);
-  std::string checkRequest(const DmpRequest& request, bool execute, Plan& plan) const;
-  std::string findFrames(Plan& plan);
-  std::string findGoal(const std::string& frame, Plan& plan);
-  std::string outsideWorkspace(const Plan& plan) const;
+  Answer checkRequest(const DmpRequest& request, bool execute, Plan& plan) const;
+  Answer findFrames(Plan& plan);
+  Answer findGoal(const std::string& frame, Plan& plan);
+  Answer outsideWorkspace(const Plan& plan) const;
   Answer offer(std::unique_ptr<Plan> plan);
   Pose handGoal(const GoalObservation& goal, const HandGoal& hand) const;
   Pose inWorkspace(const Pose& hand_in_dmp, bool& projected) const;

@@ -8,6 +8,7 @@ namespace coglab_controllers {
 
 /// One execute_dmp or switch_dmp, checked and complete.
 struct DmpController::Plan {
+  RequestStamp stamp;
   bool execute = true;  ///< false: switch_dmp
   Name primitive;
   CartesianMotionPlan motion;

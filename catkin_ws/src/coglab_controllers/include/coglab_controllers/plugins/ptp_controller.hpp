@@ -30,6 +30,7 @@ struct PtpAnswer {
 
   int status = kRejected;
   int ptp_id = -1;
+  ReasonCode code = ReasonCode::None;
   std::string message;  ///< why it was rejected
 };
 
@@ -37,6 +38,7 @@ struct PtpAnswer {
 struct PtpEnd {
   int ptp_id = -1;
   bool executed = false;  ///< false: given up; never reported on finished_ptp
+  Reason reason;          ///< why it was given up
 };
 
 /// The plug-in. Parameters: Table 5's `Kp` (1/s) and `max_queue`; and `default_speed`,
@@ -70,6 +72,7 @@ class PtpController : public MotionController {
     JointVector acceleration = JointVector::Zero();
   };
   struct Plan {
+    RequestStamp stamp;
     Motion motion;
     int status = PtpAnswer::kRejected;  ///< written by the cycle
     Reason refusal;                     ///< written by the cycle
@@ -77,7 +80,8 @@ class PtpController : public MotionController {
 
   void begin(const CycleInput& input, const Motion& motion);
   void finish(const CycleInput& input);
-  void giveUp(const char* why);
+  void giveUp(const Reason& why);
+  Answer readMotion(const PtpRequest& request, Motion& motion) const;
 
   MotionSetup setup_;
   double gain_ = 5.0, tolerance_ = 0.002, settle_time_ = 2.0;

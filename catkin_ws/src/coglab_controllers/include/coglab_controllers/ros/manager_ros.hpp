@@ -21,6 +21,7 @@
 
 #include "coglab_controllers/manager/control_thread.hpp"
 #include "coglab_controllers/manager/controller_manager.hpp"
+#include "coglab_controllers/ros/cancel_ros.hpp"
 #include "coglab_controllers/ros/feedback_ros.hpp"
 #include "coglab_controllers/ros/motion_controller_ros.hpp"
 #include "coglab_msgs/ControllerStatus.h"
@@ -95,6 +96,7 @@ class ManagerRos {
   std::unique_ptr<tf2_ros::Buffer> tf_;
   std::unique_ptr<tf2_ros::TransformListener> tf_listener_;
   std::unique_ptr<FeedbackRos> feedback_;
+  std::unique_ptr<CancelRos> cancel_;
   std::mutex sides_mutex_;
   std::vector<std::unique_ptr<MotionControllerRos>> sides_;
   std::vector<ros::ServiceServer> services_;
@@ -110,6 +112,7 @@ class ManagerRos {
   CycleReport shown_;
   coglab_msgs::ControllerStatus status_shown_;
   bool shown_once_ = false;
+  std::int64_t status_shown_ns_ = 0;
   std::string stalled_;
   std::uint64_t heartbeat_ = 0;
   std::int64_t heartbeat_ns_ = 0;

@@ -1,0 +1,88 @@
+/// @file
+/// How a motion is ended from outside the control cycle, and how requests made before that are told
+/// from those made after it.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <mutex>
+#include <string>
+
+#include "coglab_controllers/manager/reason.hpp"
+
+namespace coglab_controllers {
+
+/// The cancels of one motion controller, numbered from 1. Services ask, the cycle takes and
+/// confirms; the cycle never waits.
+class MotionCancel {
+ public:
+  /// Number of the newest cancel; 0: none yet. Any thread.
+  std::uint64_t newest() const { return newest_.load(std::memory_order_acquire); }
+
+  /// Asks the cycle to end what runs. @return number of this cancel
+  std::uint64_t ask(const Reason& reason) {
+    const std::lock_guard<std::mutex> lock(asking_);
+    const std::uint64_t number = newest() + 1;
+    orders_.write({number, reason});
+    newest_.store(number, std::memory_order_release);
+    return number;
+  }
+
+  /// Whether the cycle has served this cancel, or one after it. Any thread.
+  bool served(std::uint64_t number) const { return served_.load(std::memory_order_acquire) >= number; }
+  /// Whether this cancel, or one served together with it, ended a motion. Any thread, once served.
+  bool endedMotion(std::uint64_t number) const {
+    return ended_.load(std::memory_order_acquire) >= number;
+  }
+
+  /// @name Control thread
+  /// @{
+
+  /// The newest cancel if it has not been taken yet. @param reason why the motion ends
+  bool take(Reason& reason) {
+    Order order;
+    if (!orders_.read(order)) return false;
+    taken_ = order.number;
+    reason = order.reason;
+    return true;
+  }
+  /// Number of the cancel taken last: requests made before it come too late.
+  std::uint64_t taken() const { return taken_; }
+  void confirm(bool ended_motion) {
+    if (ended_motion) ended_.store(taken_, std::memory_order_release);
+    served_.store(taken_, std::memory_order_release);
+  }
+  /// @}
+
+ private:
+  struct Order {
+    std::uint64_t number = 0;
+    Reason reason;
+  };
+
+  std::mutex asking_;
+  lwr_fri_bridge::TripleBuffer<Order> orders_;
+  std::atomic<std::uint64_t> newest_{0}, served_{0}, ended_{0};
+  std::uint64_t taken_ = 0;  // control thread
+};
+
+/// When a request was made: what happened since then may make it void.
+struct RequestStamp {
+  std::uint64_t cancels = 0;       ///< newest cancel of its controller at that time
+  std::uint32_t motion_epoch = 0;  ///< of the joint state that allowed it
+};
+
+/// A cancel on its way, see ControllerManager::askCancel().
+struct CancelOrder {
+  MotionCancel* cancel = nullptr;  ///< null: no such controller
+  std::string id;
+  std::uint64_t number = 0;
+  std::uint64_t cycles = 0;  ///< count of the report when it was asked for
+};
+
+/// Answer to a cancel; success: the set-point of the arm stands.
+struct CancelAnswer : Answer {
+  bool was_running = false;  ///< there was a motion to end
+};
+
+}  // namespace coglab_controllers

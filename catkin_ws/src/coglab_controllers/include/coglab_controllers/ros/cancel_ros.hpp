@@ -1,0 +1,40 @@
+/// @file
+/// The services that end motions.
+#pragma once
+
+#include <mutex>
+#include <string>
+#include <vector>
+
+#include <ros/callback_queue.h>
+#include <ros/node_handle.h>
+#include <ros/spinner.h>
+
+#include "coglab_controllers/manager/controller_manager.hpp"
+#include "coglab_msgs/CancelMotion.h"
+
+namespace coglab_controllers {
+
+/// `<id>/cancel` of every loaded motion controller. They have threads of their own, so that no
+/// request that waits for the cycle or for a library keeps a cancel waiting.
+class CancelRos {
+ public:
+  /// @param node namespace of the manager  @param manager outlives this object
+  CancelRos(const ros::NodeHandle& node, ControllerManager& manager);
+  ~CancelRos();
+  CancelRos(const CancelRos&) = delete;
+  CancelRos& operator=(const CancelRos&) = delete;
+
+  /// Advertises the service of a motion controller. Any thread.
+  void serve(const std::string& id);
+
+ private:
+  ros::NodeHandle node_;
+  ControllerManager& manager_;
+  ros::CallbackQueue queue_;
+  std::mutex services_mutex_;
+  std::vector<ros::ServiceServer> services_;
+  ros::AsyncSpinner spinner_;
+};
+
+}  // namespace coglab_controllers
