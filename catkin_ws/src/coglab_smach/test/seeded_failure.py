@@ -31,7 +31,8 @@ class SeededFailure:
         smach.set_loggers(*[lambda *a: None] * 4)
         self.trial = VirtualTrial(seed=3000 + seed, object_on="world" if board else "human_hand")
         self.happened = ""
-        self._due = self._next = None
+        self._due = None
+        self._recovery = self._waited = False
         self.watch = MotionWatch(self.trial.ctx, lambda: self.trial.rig.cell.truth()["velocity"])
         self.trial.beside = self._beside
 
@@ -73,19 +74,20 @@ class SeededFailure:
         self.watch.look()
 
     def _strike(self, state):
-        """Called in every look of every state."""
-        now = self.trial.clock.now()
-        if self._due is None or now < self._due or state.label == "monitor_dmp":
+        """Called in every look of every state: the moment has come, and this is the machine that was drawn."""
+        now, path = self.trial.clock.now(), f"{state.path()}/"
+        if self._due is None or now < self._due or state.label == "monitor_dmp" or f"/{self.action}/" not in path:
             return
-        if self.machine == "recover" and self._next is None:
-            # What fails first makes the machine recover; the failure that counts comes in there.
-            if "/recover" not in state.path():
-                self._due, self._next = now, "recover"
+        recovers = "/recover/" in path
+        if self.machine == "recover" and not self._recovery:
+            if not recovers:  # what fails first makes the machine recover; the failure that counts comes in there
+                self._recovery = True
                 raise PortError("first failure of the bench")
-        if self._next == "recover":
-            if "/recover" not in state.path():
-                return
-            self._due, self._next = now + self.later, "now"
+            return
+        if self.machine == "recover" and self._recovery and not self._waited:
+            self._waited, self._due = True, now + self.later
+            return
+        if recovers != (self.machine == "recover"):
             return
         self._due, self.happened = float("inf"), f"{self.kind} in {state.path()}/{state.label}"
         if self.kind == "preemption":

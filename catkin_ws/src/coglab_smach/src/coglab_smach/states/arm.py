@@ -10,6 +10,7 @@ from ..motion_time import ptp_time, reach_time
 from ..pending import PortError
 from ..ports import DmpRequest
 from .base import CoglabState, Interrupted, TimeLimit
+from .motion import await_rest
 
 
 class LoadControllers(CoglabState):
@@ -145,7 +146,7 @@ class WaitStop(CoglabState):
         if self.trigger == "release":
             # The goal is the person's hand, and that now comes to the object: an arm that still followed it
             # would back away. But first the motion has to come to rest at the goal that it has latched.
-            self._await_rest()
+            await_rest(self.ctx, self.check)
             self.await_pending(self.ctx.arm.switch_controller("ptp"), "end of the reach by switching to 'ptp'", 3.0)
         settings = self._settings(ud)
         limit = float(settings.get("timeout", self.ctx.config.get(f"{self.trigger}_timeout", 6.0)))
@@ -180,16 +181,6 @@ class WaitStop(CoglabState):
             error.causes = error.causes or (f"the motion is {progress.state} with {progress.remaining_distance:.2f} m "
                                             f"to go{': ' if progress.reason else ''}{progress.reason}",)
             raise
-
-    def _await_rest(self) -> None:
-        """Until no joint has moved by more than 2 mrad for 0.1 s, or 1 s is over."""
-        end = self.ctx.clock.now() + 1.0
-        still_since, place = self.ctx.clock.now(), self.ctx.arm.joint_positions()
-        while self.ctx.clock.now() < end and self.ctx.clock.now() - still_since < 0.1:
-            self.pause(0.02)
-            now = self.ctx.arm.joint_positions()
-            if now is None or place is None or max(abs(a - b) for a, b in zip(now, place, strict=True)) > 0.002:
-                still_since, place = self.ctx.clock.now(), now
 
     def _leave_approach_profile(self) -> None:
         """Back to the rigid profile, and wait until what the compliant one added is gone: contact is found in forces,

@@ -1,6 +1,8 @@
 """The end of a motion: whoever started one ends it before anything else begins."""
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from ..context import Context
 from ..pending import Pending, PortError
 
@@ -11,7 +13,8 @@ SILENCE = 0.5
 
 
 def end_motion(ctx: Context, reason: str) -> str:
-    """End every motion of the arm and wait until its set-point stands; returns why it does not, empty if it does.
+    """End every motion of the arm and wait until its set-point stands, and the arm with it; returns why it does not,
+    empty if it does.
 
     Deaf to preemption and STOP, because this is how both are obeyed; each wait takes ``motion.end_timeout`` s at most.
     Where cancelling fails although the robot is there, the last means is ``hold``: the arm brakes and latches, and the
@@ -19,11 +22,26 @@ def end_motion(ctx: Context, reason: str) -> str:
     """
     trouble = _await(ctx, ctx.arm.cancel_motion(reason))
     if not trouble:
+        await_rest(ctx)
         return ""
     if ctx.arm.joint_positions() is None:
         return f"the motion could not be ended: {trouble}"
     held = _await(ctx, ctx.arm.hold(f"cancelling failed: {trouble}"))
+    await_rest(ctx)
     return f"the motion could not be cancelled ({trouble}), so the arm was held{f': {held}' if held else ''}"
+
+
+def await_rest(ctx: Context, look: Callable[[], None] = lambda: None) -> None:
+    """Until no joint has moved by more than 1 mrad for 0.2 s, or 1.5 s are over: the arm sways a little after its
+    set-point has come to rest. ``look`` is called all the while."""
+    end = ctx.clock.now() + 1.5
+    still_since, place = ctx.clock.now(), ctx.arm.joint_positions()
+    while ctx.clock.now() < end and ctx.clock.now() - still_since < 0.2:
+        look()
+        ctx.clock.sleep(POLL_PERIOD)
+        now = ctx.arm.joint_positions()
+        if now is None or place is None or max(abs(a - b) for a, b in zip(now, place, strict=True)) > 0.001:
+            still_since, place = ctx.clock.now(), now
 
 
 def _await(ctx: Context, pending: Pending) -> str:
