@@ -14,7 +14,6 @@ def build_arm_motion(ctx: Context, trigger: str) -> CoglabMachine:
     """switch_to_dmp, execute_dmp (starts only), wait_stop (waits for everything)."""
     machine = CoglabMachine(ctx, "arm_motion", ["succeeded", "failed", "preempted"],
                             input_keys=RELEASE_KEYS if trigger == "release" else KEYS)
-    machine.owns_motion = True
     with machine:
         machine.add_state("switch_to_dmp", SwitchController(ctx, "dmp"), {"succeeded": "execute_dmp"})
         machine.add_state("execute_dmp", ExecuteDmp(ctx), {"succeeded": "wait_stop"})

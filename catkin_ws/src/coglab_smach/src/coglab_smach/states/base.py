@@ -188,8 +188,6 @@ class _Placed:
     container: Any | None
     targets: Mapping[str, str]
     is_action: bool
-    owns_motion = False
-    """True where children start a motion that outlives them: it has ended when this one ends without success."""
 
     def place(self, ctx: Context, label: str) -> None:
         """Set the name until the container is added to another one."""
@@ -216,8 +214,6 @@ class _Placed:
         """Record the container's own transition with the first failure as its reason; close the record of an action."""
         if outcome is None:
             return
-        if self.owns_motion and outcome != "succeeded":
-            end_motion(self.ctx, f"{self.label} ended as {outcome}")
         failure = self.ctx.journal.first_failure() if outcome != "succeeded" else Failure()
         if self.container is not None:
             self.ctx.journal.transition(self.container.full_path(), self.label, outcome,
