@@ -72,6 +72,7 @@ class MasterNode:
                            database=RosDatabase(), contact=RosContact(), config=config, journal=self.journal,
                            memory=Memory(self.state_file(), rospy.logwarn), reachable=self.reachable())
         self.master = build_master(self.ctx)
+        self.thread = threading.Thread(target=self.master.execute, name="coglab_master", daemon=True)
         self.states = rospy.Publisher("coglab/state", MasterStateMsg, queue_size=20, latch=True)
         self.watch = StateWatch(self.ctx, self.on_state)
         self.server = None
@@ -151,15 +152,19 @@ class MasterNode:
 
     def run(self) -> None:
         """Execute the machine until shut-down."""
-        thread = threading.Thread(target=self.master.execute, name="coglab_master", daemon=True)
-        thread.start()
-        rospy.on_shutdown(self.master.request_preempt)
-        rate = 0.2
-        while not rospy.is_shutdown() and thread.is_alive():
-            thread.join(rate)
-        thread.join(3.0)
+        self.thread.start()
+        # Called before rospy shuts anything: the machine still reaches the arm, to end what it has set in motion.
+        rospy.on_shutdown(self.end)
+        while not rospy.is_shutdown() and self.thread.is_alive():
+            self.thread.join(0.2)
+        self.thread.join(1.0)
         if self.server is not None:
             self.server.stop()
+
+    def end(self) -> None:
+        """Preempt the machine and wait for its end."""
+        self.master.request_preempt()
+        self.thread.join(4.0)
 
 
 def main() -> int:

@@ -124,6 +124,10 @@ class Threaded(Pending):
     def done(self) -> bool:
         return self._event.is_set()
 
+    def failed(self) -> bool:
+        """Whether it has ended with an error."""
+        return self._event.is_set() and self._error is not None
+
     def result(self) -> Any:
         if not self._event.is_set():
             raise PortError(f"{self._what} has not answered yet", code=ReasonCode.TIME_LIMIT)

@@ -96,7 +96,8 @@ class RosArm:
             return self._silent()
         if state.motion_allowed:
             return Verdict(True)
-        return Verdict(False, state.reason or f"the LWR interface is in state '{state.supervisor}'", state.reason_code)
+        return Verdict(False, state.reason or f"the LWR interface is in state '{state.supervisor}'",
+                       state.reason_code or (ReasonCode.HELD if state.hold_latched else ReasonCode.NONE))
 
     def _silent(self) -> Verdict:
         return Verdict(False, f"{self._lwr}/joint_states is silent for {min(self._joints.age(), 999):.1f} s",
@@ -104,7 +105,10 @@ class RosArm:
 
     def standing(self) -> Verdict:
         status = self._status.message
-        if status is None or self._joints.age() > 1.0:
+        if status is None:
+            return Verdict(False, f"{self._manager}/status has never been published; is the robot node running?",
+                           ReasonCode.NODE_SILENT)
+        if self._joints.age() > 1.0:
             return self._silent()
         return Verdict(status.standing, "" if status.standing else f"the arm is {status.state}")
 
@@ -116,7 +120,13 @@ class RosArm:
                  for name in sorted(running)]
         if not calls:
             return Polled(lambda: self.standing().ok, lambda: None)
-        return Polled(lambda: all(c.done() for c in calls), lambda: [c.result() for c in calls][0])
+
+        def failed() -> bool:
+            return any(c.failed() for c in calls)
+
+        # The answer may be here before the status that says so.
+        return Polled(lambda: failed() or (all(c.done() for c in calls) and self.standing().ok),
+                      lambda: [c.result() for c in calls][0])
 
     def _cancel(self, controller_id: str, reason: str) -> None:
         try:

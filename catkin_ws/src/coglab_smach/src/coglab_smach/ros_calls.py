@@ -76,6 +76,9 @@ def _await_service(full: str, wait: float, permit: Permit) -> None:
             rospy.wait_for_service(full, timeout=max(0.05, min(0.5, end - time.monotonic())))
             return
         except rospy.ROSException:
+            if rospy.is_shutdown():
+                raise PortError(f"service {full} was not called: this node shuts down",
+                                code=ReasonCode.PREEMPTED) from None
             if time.monotonic() >= end:
                 raise PortError(f"service {full} is not there after {wait:.0f} s; is its node running?",
                                 code=ReasonCode.NODE_SILENT) from None

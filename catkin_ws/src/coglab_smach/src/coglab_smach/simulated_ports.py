@@ -190,7 +190,7 @@ class SimulatedHand:
         order, cancelled = self._order, []
 
         def apply() -> None:
-            if not self.cell.calibrated:
+            if not self.cell.calibrated and name != "open":
                 raise PortError(f"{name} refused: the hand is not calibrated", code=ReasonCode.HAND_NOT_CALIBRATED)
             if cancelled or order != self._order:
                 raise PortError(f"{name} ended PREEMPTED", code=ReasonCode.CANCELLED)
