@@ -6,8 +6,8 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from smach.clock import Clock
 
+from .clock import Clock
 from .pending import Pending, Polled, PortError, Ready
 from .pose import Pose
 

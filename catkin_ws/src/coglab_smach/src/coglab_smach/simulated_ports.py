@@ -9,8 +9,8 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from smach.clock import Clock
 
+from .clock import Clock
 from .object_database import ObjectDatabase, ObjectError
 from .pending import Pending, PortError, Ready
 from .ports import ContactEvent, DmpProgress, DmpRequest, HandState, Located, Recognition

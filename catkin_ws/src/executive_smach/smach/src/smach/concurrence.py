@@ -8,13 +8,15 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 import smach
-from smach.clock import Event, current
 from smach.container import Container
 from smach.exceptions import InvalidStateError, InvalidTransitionError, InvalidUserCodeError
 from smach.state import State
 from smach.user_data import Remapper, UserData
 
 Outcomes = dict[str, Any]
+
+#: s between two looks at `smach.is_shutdown()` while children run.
+SHUTDOWN_POLL = 0.2
 
 
 class Concurrence(Container):
@@ -222,20 +224,19 @@ class Concurrence(Container):
         return outcome
 
     def _run_children(self) -> None:
-        clock = current()
-        released, all_ended = clock.event(), clock.event()
+        released, all_ended = threading.Event(), threading.Event()
         with self._preempt_lock:
             if self._preempt_requested:  # asked before the start: each child sees it when it begins
                 self._forward_preempt()
         threads = []
         for label in self._states:
+            thread = threading.Thread(
+                target=self._run_child,
+                args=(label, released, all_ended),
+                name=f"concurrent_split:{label}",
+            )
             try:
-                threads.append(
-                    clock.start_thread(
-                        lambda label=label: self._run_child(label, released, all_ended),
-                        name=f"concurrent_split:{label}",
-                    )
-                )
+                thread.start()
             except RuntimeError as error:  # the system gives no more threads
                 with self._preempt_lock:
                     self._abandoned = True
@@ -247,28 +248,29 @@ class Concurrence(Container):
                         )
                     )
                 break
+            threads.append(thread)
         self._pending = len(threads)
         if not threads:
             all_ended.set()
         released.set()
         try:
-            self._await_children(all_ended, clock.shutdown_poll)
+            self._await_children(all_ended)
         except BaseException:  # Ctrl-C in the main thread: take the children along
             self._preempt_children()
-            self._await_children(all_ended, clock.shutdown_poll)
+            self._await_children(all_ended)
             raise
         finally:
             for thread in threads:
                 thread.join()
 
-    def _await_children(self, all_ended: Event, poll: float | None) -> None:
+    def _await_children(self, all_ended: threading.Event) -> None:
         told = False
-        while not all_ended.wait(poll):
+        while not all_ended.wait(SHUTDOWN_POLL):
             if not told and smach.is_shutdown():
                 told = True
                 self._preempt_children()
 
-    def _run_child(self, label: str, released: Event, all_ended: Event) -> None:
+    def _run_child(self, label: str, released: threading.Event, all_ended: threading.Event) -> None:
         state = self._states[label]
         outcome, error, stop = None, None, False
         released.wait()
