@@ -5,7 +5,6 @@ import threading
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-
 from .clock import Clock
 from .config import Config
 from .holding import HoldingMemory

@@ -288,8 +288,8 @@ class VirtualClock(Clock):
                 if self._holder is None and parked.thread in self._members:
                     self._holder = parked.thread
             raise ClockStalled(
-                f"virtual time has stood still at {self._now:.6f} s for {self._stall_limit:g} s of wall time: {running} "
-                f"is running, {waiting} wait; a running thread must wait through the clock, and an event that is "
+                f"virtual time has stood still at {self._now:.6f} s for {self._stall_limit:g} s of wall time: "
+                f"{running} is running, {waiting} wait; a running thread must wait through the clock, and an event that is "
                 "waited for without a time limit must be set by somebody")
 
 
@@ -302,13 +302,13 @@ class _Threading:
     def __getattr__(self, name: str) -> Any:
         return getattr(threading, name)
 
-    def Thread(self, *args: Any, **kw: Any) -> VirtualThread:  # noqa: N802
+    def Thread(self, *args: Any, **kw: Any) -> VirtualThread:
         return VirtualThread(self._clock, *args, **kw)
 
-    def Event(self) -> VirtualEvent:  # noqa: N802
+    def Event(self) -> VirtualEvent:
         return self._clock.event()
 
-    def Condition(self, lock: Any = None) -> VirtualCondition:  # noqa: N802
+    def Condition(self, lock: Any = None) -> VirtualCondition:
         return VirtualCondition(self._clock, lock)
 
 

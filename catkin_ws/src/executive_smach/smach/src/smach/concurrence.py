@@ -27,7 +27,7 @@ class Concurrence(Container):
     string. Else `default_outcome`. `child_termination_cb({label: outcome or None})` is called after
     each child's end; if it returns something true, the children that still run are preempted.
 
-    A preempted concurrence whose children have all served the request has the outcome 'preempted':
+    A preempted concurrence has the outcome 'preempted' unless a child has ignored the request:
     register it.
 
     Example::
@@ -82,7 +82,7 @@ class Concurrence(Container):
         self._child_outcomes: Outcomes = {}
         self._live: dict[str, None] = {}  # children of this run that have not ended
         self._told: set[str] = set()  # those that were passed a request to the container
-        self._ignored: set[str] = set()  # those of them that ended without serving it
+        self._ignored: set[str] = set()  # those that did not take it or ended without serving it
         self._errors: list[Exception] = []
         self._pending = 0  # threads that have not ended
         self._abandoned = False  # the threads could not all be started: let no child begin
@@ -348,7 +348,8 @@ class Concurrence(Container):
 
     def _choose_outcome(self) -> str:
         with self._preempt_lock:
-            if self._preempt_requested and self._told and not self._ignored:
+            # Also where it came after the last child's end: nobody is left who could ignore it.
+            if self._preempt_requested and not self._ignored:
                 self._preempt_requested = False
                 return "preempted"
         if self._outcome_cb:
@@ -379,8 +380,7 @@ class Concurrence(Container):
 
     def _forward_preempt(self) -> None:
         for label in self._live:
-            if self._tell(label, self._states[label]):
-                self._told.add(label)
+            (self._told if self._tell(label, self._states[label]) else self._ignored).add(label)
 
     def _preempt_children(self) -> None:
         """Ask the children that run to end, without the container itself having been asked."""
