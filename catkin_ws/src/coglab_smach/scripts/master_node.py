@@ -17,11 +17,11 @@ import threading
 import coglab_controllers as cc
 import rospkg
 import rospy
-import smach
 import smach_ros
 from coglab_msgs.msg import MasterState as MasterStateMsg
 from coglab_msgs.msg import Transition
 from coglab_msgs.srv import Start, StartResponse
+from coglab_smach.clock import SteadyClock
 from coglab_smach.config import Config, ConfigError
 from coglab_smach.context import Context
 from coglab_smach.holding import HoldingMemory
@@ -61,7 +61,7 @@ class MasterNode:
             if rospy.has_param(f"~{name}"):
                 overrides[name] = rospy.get_param(f"~{name}")
         config = Config.load(rospy.get_param("~config_file"), overrides, rospy.logwarn)
-        clock = smach.clock.SteadyClock()
+        clock = SteadyClock()
         self.journal = Journal(clock.now)
         self.transitions = rospy.Publisher("coglab/transitions", Transition, queue_size=200)
         self.results = rospy.Publisher("coglab/results", String, queue_size=20, latch=True)

@@ -2,12 +2,11 @@
 from pathlib import Path
 
 import pytest
-import smach
 from coglab_smach.config import Config
 from coglab_smach.machines import build_master
 from coglab_smach.object_database import ObjectDatabase
 from coglab_smach.simulated_ports import simulated_context
-from smach.virtual_clock import VirtualClock
+from coglab_smach.virtual_clock import VirtualClock, using
 
 SHARE = Path(__file__).resolve().parent.parent
 
@@ -22,12 +21,13 @@ class Trial:
         config = Config.load(str(SHARE / "config" / "machines.yaml"),
                              {"auto_trigger": True, "dmp_library": "library.xml", **overrides})
         self.ctx, self.cell = simulated_context(self.clock, self.database, config)
-        self.master = build_master(self.ctx)
+        with using(self.clock):
+            self.master = build_master(self.ctx)
         self.error = None
 
     def run(self, script, limit=600.0):
         """Walk the machine until the script ends; whatever the script raises is raised here."""
-        with smach.clock.using(self.clock):
+        with using(self.clock):
             def scripted():
                 try:
                     script(self)

@@ -2,14 +2,13 @@
 import dataclasses
 from pathlib import Path
 
-import smach
 from coglab_smach.config import Config
 from coglab_smach.context import Context
 from coglab_smach.journal import Journal
 from coglab_smach.machines import build_master
 from coglab_smach.object_database import ObjectDatabase
 from coglab_smach.reachability import default_arm, solve
-from smach.virtual_clock import VirtualClock
+from coglab_smach.virtual_clock import VirtualClock, using
 from virtual_ports import VirtualArm, VirtualContact, VirtualDatabase, VirtualHand, VirtualPerception
 from virtual_rig import DT, LIMITS, Rig, distance, frame_of, palm_goal
 
@@ -38,7 +37,8 @@ class VirtualTrial:
                            contact=VirtualContact(self.rig), config=config, journal=Journal(self.clock.now),
                            reachable=lambda pose: solve(default_arm(), pose) is not None)
         self.ctx.journal.listen(self._on_transition)
-        self.master = build_master(self.ctx)
+        with using(self.clock):
+            self.master = build_master(self.ctx)
         self.over = False
         self.failure = None
         self.reaches = []
@@ -64,7 +64,7 @@ class VirtualTrial:
 
     def run(self, *actions, limit=60.0, script=None):
         """Execute ``actions``, or ``script(trial)``; returns the results of the actions as the journal holds them."""
-        with smach.clock.using(self.clock):
+        with using(self.clock):
             self.clock.start_thread(self._world, "world")
             walk = script or (lambda trial: trial.ask_for(actions, limit))
             self.clock.start_thread(lambda: self._script(walk), "script")

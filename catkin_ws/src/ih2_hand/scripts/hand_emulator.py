@@ -21,7 +21,8 @@ def parse(arguments: list[str]) -> argparse.Namespace:
     parser.add_argument("--link", help="symlink to keep on the pty's path")
     parser.add_argument("--dialect", choices=("both", "legacy", "v17"), default="both")
     parser.add_argument("--calibration-scale", type=float, default=1.0,
-                        help="factor on the calibration times; 0 ends them at once")
+                        help="factor on the calibration times; 0 ends them at once, above 1.2 "
+                             "the fast one outlasts the 2.0 s that published drivers wait")
     parser.add_argument("--greeting", action="store_true", help="start calibrated")
     parser.add_argument("--strict-force", action="store_true",
                         help="leave a force read of motor 0 unanswered")

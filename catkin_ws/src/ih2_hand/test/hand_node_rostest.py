@@ -11,7 +11,8 @@ import unittest
 import rospy
 import rostest
 from actionlib import GoalStatus
-from actionlib_msgs.msg import GoalStatusArray
+from actionlib_msgs.msg import GoalID, GoalStatusArray
+from coglab_msgs.msg import HandStatus, MotorStatus, ReasonCode
 from diagnostic_msgs.msg import DiagnosticArray
 from ih2_hand.ros.client import HandClient
 from std_msgs.msg import String
@@ -51,6 +52,7 @@ class HandNode(unittest.TestCase):
         result = self.hand.run("hand_preshape", "cylindrical", "medium")
         self.assertFalse(result.isOk)
         self.assertIn("not calibrated", result.message)
+        self.assertEqual(result.reason_code, ReasonCode.HAND_NOT_CALIBRATED)
         self.assertEqual(self.state("hand_preshape"), GoalStatus.ABORTED)
 
     def test_c_calibration(self) -> None:
@@ -59,12 +61,14 @@ class HandNode(unittest.TestCase):
         count = len(self.hand.statuses)
         self.hand.calibrate_and_wait("fast")
         seen = self.hand.statuses[count:]
+        told = [status.event_code for status in seen]
+        self.assertLess(told.index(ReasonCode.HAND_STARTED), told.index(ReasonCode.HAND_ENDED))
         self.assertTrue(any("fast started" in status.message for status in seen))
         self.assertTrue(all(not status.motors for status in seen if status.calibrating))
         self.assertTrue(self.hand.status.calibrated)
         self.assertFalse(self.hand.fresh_status().holding)
         self.hand.calibrate("fast")
-        self.hand.wait(lambda: "refused" in self.hand.status.message, "refusal")
+        self.hand.wait(lambda: self.hand.status.event_code == ReasonCode.HAND_REFUSED, "refusal")
         self.assertIn("calibrated already", self.hand.status.message)
         self.hand.calibrate_and_wait("fast force")
         self.assertTrue(self.hand.status.calibrated)
@@ -75,6 +79,7 @@ class HandNode(unittest.TestCase):
         result = self.hand.run("hand_preshape_close")
         self.assertFalse(result.isOk)
         self.assertIn("hand_preshape first", result.message)
+        self.assertEqual(result.reason_code, ReasonCode.HAND_REFUSED)
 
     def test_e_refusals_list_what_exists(self) -> None:
         result = self.hand.run("hand_preshape", "power", "low")
@@ -147,7 +152,7 @@ class HandNode(unittest.TestCase):
         self.hand.clients["hand_close"].cancel_goal()
         result = self.hand.result("hand_close")
         self.assertEqual(self.state("hand_close"), GoalStatus.PREEMPTED)
-        self.assertFalse(result.isOk)
+        self.assertEqual((result.isOk, result.reason_code), (False, ReasonCode.CANCELLED))
         status = self.hand.fresh_status()
         self.assertTrue(all(motor.mode == "stop" for motor in status.motors))
 
@@ -158,6 +163,7 @@ class HandNode(unittest.TestCase):
         self.assertTrue(result.isOk, result.message)
         self.hand.wait(lambda: old.get_state() == GoalStatus.PREEMPTED, "preempted old goal")
         self.assertIn("replaced", old.get_result().message)
+        self.assertEqual(old.get_result().reason_code, ReasonCode.SUPERSEDED)
         for speed in range(100, 200, 5):  # the same action, goal upon goal
             self.hand.send("hand_close", speed)
         result = self.hand.run("hand_close", 511)
@@ -200,6 +206,7 @@ class HandNode(unittest.TestCase):
         result = self.hand.result("hand_close")
         self.assertFalse(result.isOk)
         self.assertIn("stop service", result.message)
+        self.assertEqual(result.reason_code, ReasonCode.STOPPING)
         status = self.hand.fresh_status()
         self.assertTrue(all(motor.mode == "stop" for motor in status.motors))
         self.assertTrue(self.hand.stop_service().success)
@@ -217,8 +224,42 @@ class HandNode(unittest.TestCase):
         self.hand.wait(lambda: self.hand.status.calibrating, "calibration")
         result = self.hand.run("hand_open", 511)
         self.assertIn("calibrates", result.message)
+        self.assertEqual(result.reason_code, ReasonCode.HAND_CALIBRATING)
         self.assertFalse(self.hand.stop_service().success)
         self.hand.wait(lambda: self.hand.status.calibrated, "end of the calibration")
+
+    def test_p_extreme_input_ends_nothing(self) -> None:
+        for words in ("", " ", "fast" * 250_000, "fast force force", "\0", "\u00e9", "fast;force"):
+            self.hand.calibrate(words)
+        for _ in range(300):
+            self.hand.calibrate("slow")
+        self.hand.wait(lambda: self.hand.status.event_code == ReasonCode.HAND_REFUSED, "refusal")
+        self.assertLess(max(len(status.message) for status in self.hand.statuses), 400)
+        for name, speed in (("hand_open", 2**31 - 1), ("hand_close", -2**31)):
+            result = self.hand.run(name, speed)
+            self.assertEqual((result.isOk, result.reason_code), (False, ReasonCode.OUT_OF_RANGE))
+        for mode, level in (("", ""), ("x" * 1_000_000, "low"), ("lateral", "y" * 1_000_000)):
+            result = self.hand.run("hand_preshape", mode, level)
+            self.assertEqual((result.isOk, result.reason_code), (False, ReasonCode.UNKNOWN_NAME))
+            self.assertLess(len(result.message), 400)
+        self.assertTrue(self.hand.fresh_status().connected)
+
+    def test_p_neither_stamps_nor_foreign_statuses_reach_a_goal(self) -> None:
+        cancel = rospy.Publisher("ih2_hand/hand_close/cancel", GoalID, queue_size=1)
+        foreign = rospy.Publisher("ih2_hand/hand_status", HandStatus, queue_size=10)
+        self.hand.wait(cancel.get_num_connections, "cancel topic")
+        cancel.publish(GoalID(stamp=rospy.Time(4294967295), id="nobody's"))
+        nonsense = HandStatus(motors=[MotorStatus(motor=99, position=-2**31)] * 1000)
+        nonsense.header.stamp = rospy.Time(4294967295)
+        time.sleep(0.2)
+        self.hand.send("hand_close", 300)
+        client = self.hand.clients["hand_close"]
+        while not client.wait_for_result(rospy.Duration(0.02)):
+            foreign.publish(nonsense)
+        self.assertTrue(client.get_result().isOk, client.get_result().message)
+        for topic in (cancel, foreign):
+            topic.unregister()
+        self.hand.run("hand_open", 511)
 
     def test_p_status_rate(self) -> None:
         self.hand.fresh_status()

@@ -19,10 +19,10 @@ def test_postures_are_spaced(make_bench):
 def test_calibration_polls_until_the_hand_answers(make_bench):
     bench = make_bench(greeting=False, positions=[90] * 5)
     bench.driver.calibration("fast")
-    assert 2.0 <= bench.clock.now < 2.6
+    assert 1.5 <= bench.clock.now < 2.1
     assert bench.hand.calibrated
     bench.driver.calibration("complete")
-    assert 12.0 <= bench.clock.now < 13.2
+    assert 11.5 <= bench.clock.now < 12.7
 
 
 def test_calibration_that_never_ends(make_bench):

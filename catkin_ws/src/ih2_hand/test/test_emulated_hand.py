@@ -5,8 +5,10 @@ from __future__ import annotations
 import pytest
 from ih2_hand import frames
 from ih2_hand.clock import VirtualClock
+from ih2_hand.emulator.faults import Faults
 from ih2_hand.emulator.hand import EmulatedHand
 from ih2_hand.emulator.parser import FrameParser
+from ih2_hand.wire_choices import WIRE
 
 
 class Raw:
@@ -207,7 +209,7 @@ def test_open_all_leaves_the_abduction(raw):
     assert [raw.ask(f"45 0{motor}") for motor in range(5)] == ["64", "00", "00", "00", "00"]
 
 
-@pytest.mark.parametrize(("code", "seconds"), [("46", 2.0), ("42", 10.0)])
+@pytest.mark.parametrize(("code", "seconds"), [("46", 1.5), ("42", 10.0)])
 def test_calibration_discards_everything(code, seconds):
     raw = Raw(greeting=False, positions=[200] * 5)
     raw.ask(code)
@@ -282,3 +284,53 @@ def test_stuck_motor_trips(raw):
 def test_bad_contacts_are_refused(raw, positions, stiffness):
     with pytest.raises(ValueError):
         raw.hand.set_contacts(positions, stiffness)
+
+
+@pytest.mark.parametrize("late_s", [0.0, 0.05, 0.15, 0.3])
+@pytest.mark.parametrize("then", ["48 0A 14 1E 28 32 48", "44 02 1E", "4B 00"])
+def test_a_client_that_waits_two_seconds_for_the_calibration_is_heard(late_s, then):
+    """As published drivers do. A busy machine may bring it the order late; the client waits from
+    when it has written."""
+    raw = Raw(greeting=False)
+    raw.clock.sleep(late_s)
+    raw.ask("46")
+    raw.clock.sleep(2.0 - late_s)
+    assert raw.ask(then) == ("08" if then.startswith("4B") else "")
+    assert raw.hand.counters.discarded == 0
+    raw.clock.sleep(2.0)
+    raw.hand.advance()
+    if not then.startswith("4B"):
+        assert raw.hand.motors[2].position == pytest.approx(30.0, abs=WIRE.reached_counts)
+
+
+def test_a_relaxed_hand_gives_way(raw):
+    raw.hand.set_contacts([255, 100, 100, 100, 100], [25.0] * 5)
+    raw.ask("61")
+    raw.walk(2, 3.0)
+    assert all(motor.effort > 200.0 for motor in raw.hand.motors[1:])
+    raw.ask("6F 00 50 14")
+    raw.clock.sleep(0.3)
+    raw.hand.advance()
+    assert all(motor.effort < 1.0 for motor in raw.hand.motors[1:])
+    raw.clock.sleep(3.0)
+    raw.hand.advance()
+    assert [motor.position for motor in raw.hand.motors[1:]] == [0.0] * 4
+    assert [raw.status(motor) for motor in range(1, 5)] == ["08"] * 4
+
+
+@pytest.mark.parametrize("positions, stiffness", [
+    ([100] * 5, [float("inf")] * 5), ([100] * 5, [float("nan")] * 5), ([100] * 5, [-1.0] * 5),
+    ([100] * 5, [1e300] * 5), ([float("nan")] * 5, [1.0] * 5), ([-1] * 5, [1.0] * 5),
+    ([256] * 5, [1.0] * 5), ([], []), ([100] * 1000, [1.0] * 1000)])
+def test_no_contact_can_break_the_hand(raw, positions, stiffness):
+    with pytest.raises(ValueError, match="contact"):
+        raw.hand.set_contacts(positions, stiffness)
+    raw.ask("61")
+    assert len(raw.walk(2, 2.0)) > 1
+
+
+@pytest.mark.parametrize("command", ["", " ", "unplug nan", "unplug -1", "unplug inf", "lose -1",
+                                     "garbage 99999999999999999999", "stuck x", "x" * 100_000])
+def test_no_fault_command_can_break_the_hand(raw, command):
+    with pytest.raises(ValueError, match="no such fault"):
+        Faults(raw.hand).command(command)

@@ -5,6 +5,8 @@ from __future__ import annotations
 from types import SimpleNamespace
 
 import pytest
+from ih2_hand.errors import RefusedError
+from ih2_hand.grasps import check_grasp
 from ih2_hand.progress import (
     CloseTask,
     GraspTask,
@@ -14,6 +16,7 @@ from ih2_hand.progress import (
     shown_empty,
     shown_holding,
 )
+from ih2_hand.reasons import Reason
 from ih2_hand.status import decode_status
 
 
@@ -40,6 +43,7 @@ def test_open_blocked_by_something():
     task.judge(poll("08 08 20 08 08", [0, 0, 90, 0, 0]), 0.1)
     verdict = task.judge(poll("08 08 20 08 08", [0, 0, 90, 0, 0]), 0.6)
     assert verdict.done and not verdict.ok and "index" in verdict.text and verdict.stop
+    assert verdict.reason is Reason.HAND_STALLED
 
 
 @pytest.mark.parametrize("raw", ["02", "20"])
@@ -187,3 +191,33 @@ FREE = {"calibrated": False, "holding": False, "busy": None}
 def test_calibration_rules(words, state, reason):
     answer = refuse_calibration(words.split(), **(FREE | state))
     assert answer is None if reason is None else reason in answer
+
+
+@pytest.mark.parametrize("task, raw, reason", [
+    (OpenTask(511), "e8", Reason.DRIVE_ERROR),
+    (CloseTask(511), "00", Reason.HAND_STALLED),
+    (GraspTask((1, 2, 3, 4), 10.0), "00", Reason.HAND_NOT_CALIBRATED)])
+def test_a_failure_says_to_programs_what_it_is(task, raw, reason):
+    task.judge(poll(" ".join([raw] * 5), [9] * 5), 0.0)
+    verdict = task.judge(poll(" ".join([raw] * 5), [9] * 5), 2.0)
+    assert verdict.done and not verdict.ok and verdict.reason is reason, verdict
+
+
+@pytest.mark.parametrize("call, reason", [
+    (lambda: OpenTask(512), Reason.OUT_OF_RANGE), (lambda: OpenTask(0), Reason.OUT_OF_RANGE),
+    (lambda: OpenTask(-2**31), Reason.OUT_OF_RANGE),
+    (lambda: check_grasp("power", "low", "legacy"), Reason.UNKNOWN_NAME),
+    (lambda: check_grasp("lateral", "", "legacy"), Reason.UNKNOWN_NAME),
+    (lambda: check_grasp("lateral", "low", "legacy"), Reason.NOT_SUPPORTED)])
+def test_a_refusal_says_to_programs_what_it_is(call, reason):
+    with pytest.raises(RefusedError) as refusal:
+        call()
+    assert refusal.value.reason is reason
+
+
+def test_a_message_repeats_no_more_than_the_beginning_of_a_foreign_text():
+    with pytest.raises(RefusedError) as refusal:
+        check_grasp("x" * 1_000_000, "low", "legacy")
+    assert len(str(refusal.value)) < 200
+    said = refuse_calibration(["x" * 1_000_000], calibrated=False, holding=False, busy=None)
+    assert len(said) < 200

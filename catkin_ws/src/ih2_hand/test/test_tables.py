@@ -6,6 +6,7 @@ import inspect
 
 import pytest
 from ih2_hand.driver import HandSerialDriver, handSerialDriver
+from ih2_hand.reasons import Reason
 
 TABLE_2 = {
     "calibration": "data",
@@ -69,10 +70,16 @@ def test_table_3_actions(name):
         return dict(zip(kind.__slots__, kind._slot_types, strict=True))
 
     assert fields("Goal") == goal
-    assert fields("Result") == {"isOk": "bool", "message": "string"}
+    assert fields("Result") == {"isOk": "bool", "reason_code": "uint16", "message": "string"}
     assert fields("Feedback") == {"status": "string", "positions": "int32[]"}
 
 
 def test_table_3_has_no_other_action():
     goals = pytest.importorskip("ih2_hand.ros.goals")
     assert sorted(goals.SPECS) == sorted(TABLE_3)
+
+
+def test_reasons_have_the_numbers_of_the_message():
+    codes = pytest.importorskip("coglab_msgs.msg", reason="coglab_msgs is not built").ReasonCode
+    for reason in Reason:
+        assert getattr(codes, reason.name) == reason

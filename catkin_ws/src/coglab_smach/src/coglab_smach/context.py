@@ -5,8 +5,7 @@ import threading
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from smach.clock import Clock
-
+from .clock import Clock
 from .config import Config
 from .holding import HoldingMemory
 from .journal import Journal
@@ -39,8 +38,7 @@ class StopSwitch:
 
 @dataclass
 class Context:
-    """Injected into each state. ``clock`` is the engine's: steady for the robot, virtual for tests and
-    benches."""
+    """Injected into each state. ``clock`` is steady for the robot, virtual for tests and benches."""
 
     clock: Clock
     arm: ArmPort

@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 from coglab_msgs.msg import ReasonCode
-from smach.clock import Clock
 
+from .clock import Clock
 from .manager_limits import read_limits
 from .motion_time import MotionLimits, ptp_time
 from .pending import PortError

@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 from coglab_msgs.msg import ReasonCode
-from smach.clock import Clock
 
+from .clock import Clock
 from .pending import Pending, PortError
 from .pose import Pose
 from .simulated_arm_model import ArmModel

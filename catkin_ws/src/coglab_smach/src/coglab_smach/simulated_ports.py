@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 from coglab_msgs.msg import ReasonCode
-from smach.clock import Clock
 
+from .clock import Clock
 from .motion_time import MotionLimits
 from .object_database import ObjectDatabase, ObjectError
 from .pending import Pending, Polled, PortError, Ready

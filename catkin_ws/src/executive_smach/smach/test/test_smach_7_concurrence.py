@@ -331,13 +331,40 @@ def test_s15_1_a_request_after_all_children_have_ended_is_carried_on():
     assert both.execute() == "done" and both.preempt_requested()
 
 
-def test_s15_1_a_request_when_the_last_child_has_just_ended_is_carried_on():
+@pytest.mark.parametrize("moment", ["transition_cb", "child_termination_cb"])
+@pytest.mark.parametrize("whom", ["concurrence", "machine around"])
+def test_s7_a_request_when_the_last_child_has_just_ended_gives_preempted(moment, whom):
     after = Serves()
-    both = concurrence(children={"A": Says("done")}, outcome_map={"done": {"A": "done"}})
+
+    def ask():
+        (both if whom == "concurrence" else outer).request_preempt()
+        return True
+
+    both = concurrence(
+        children={"A": Says("done"), "B": Says("done")},
+        outcome_map=ALL_DONE,
+        child_termination_cb=lambda outcomes: (
+            moment == "child_termination_cb" and all(outcomes.values()) and ask()
+        ),
+    )
     outer = machine(both, after, outcomes=["done", "failed", "preempted"])
-    both.register_transition_cb(lambda ud, labels: labels or outer.request_preempt())
+    if moment == "transition_cb":
+        both.register_transition_cb(lambda ud, labels: labels or ask())
     assert outer.execute() == "preempted"
-    assert after.seen == [True] and not both.preempt_requested()
+    assert after.seen == [] and not both.preempt_requested() and not outer.preempt_requested()
+
+
+def test_s15_1_a_request_that_a_child_did_not_take_is_carried_on(log):
+    class Deaf(Says):
+        def request_preempt(self):
+            raise OSError("deaf")
+
+    after = Serves()
+    both = concurrence(children={"A": Deaf("done")}, outcome_map={"done": {"A": "done"}})
+    outer = machine(both, after, outcomes=["done", "failed", "preempted"])
+    both.register_start_cb(lambda ud, labels: outer.request_preempt())
+    assert outer.execute() == "preempted" and after.seen == [True]
+    assert "deaf" in log.text("error")
 
 
 def test_s7_s15_7_is_running_better():

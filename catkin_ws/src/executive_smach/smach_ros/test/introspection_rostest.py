@@ -11,6 +11,7 @@ import unittest
 import rospy
 import smach
 import smach_ros
+import smach_ros.introspection
 from smach_msgs.msg import (
     SmachContainerInitialStatusCmd,
     SmachContainerStatus,
@@ -35,12 +36,18 @@ class Viewer:
 
     def __init__(self, server):
         self.statuses, self.structures = [], []
+        self.first_beat = None
         self._subs = [
-            rospy.Subscriber(server + STATUS_TOPIC, SmachContainerStatus, self.statuses.append),
+            rospy.Subscriber(server + STATUS_TOPIC, SmachContainerStatus, self.on_status),
             rospy.Subscriber(
                 server + STRUCTURE_TOPIC, SmachContainerStructure, self.structures.append
             ),
         ]
+
+    def on_status(self, message):
+        if message.info == "HEARTBEAT" and self.first_beat is None:
+            self.first_beat = time.monotonic()
+        self.statuses.append(message)
 
     def of(self, path):
         return [status for status in self.statuses if status.path == path]
@@ -100,6 +107,7 @@ class TestSection11(unittest.TestCase):
     count = 0
 
     def setUp(self):
+        smach_ros.introspection.WELCOME_DELAY = 0.1  # most tests need not wait as long as a viewer
         type(self).count += 1
         self.name = f"/server_{self.count}"
         self.root, self.gate = build()
@@ -171,6 +179,29 @@ class TestSection11(unittest.TestCase):
         self.assertTrue(
             wait_for(lambda: [m.path for m in self.viewer.structures].count("/SM_ROOT") >= 2)
         )
+
+    def test_s12_a_new_viewer_gets_no_beat_until_its_window_exists(self):
+        smach_ros.introspection.WELCOME_DELAY = 1.5
+        before = time.monotonic()  # it connects after this
+        self.server.start()
+        self.assertTrue(wait_for(lambda: self.viewer.first_beat is not None))
+        self.assertGreaterEqual(self.viewer.first_beat - before, 1.5)
+        self.assertTrue(wait_for(lambda: len({m.path for m in self.viewer.structures}) == 4))
+
+    def test_s11_a_proxy_shows_one_container_alone(self):
+        proxy = smach_ros.introspection.ContainerProxy(
+            self.name, self.root, "/SM_ROOT", update_rate=rospy.Duration(0.5)
+        )
+        proxy.start()
+        try:
+            self.assertTrue(wait_for(lambda: len(self.viewer.structures) >= 2))
+            self.gate.open.set()
+            self.root.execute()
+            self.assertTrue(wait_for(lambda: "END end" in self.viewer.infos("/SM_ROOT")))
+        finally:
+            proxy.stop()
+        self.assertEqual({m.path for m in self.viewer.structures + self.viewer.statuses}, {"/SM_ROOT"})
+        self.assertEqual((self.root._start_cbs, self.root._transition_cbs), ([], []))
 
     def test_s11_user_data_and_s15_4_what_cannot_be_pickled(self):
         self.start()

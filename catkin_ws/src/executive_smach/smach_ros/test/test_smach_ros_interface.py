@@ -8,6 +8,7 @@ import sys
 import pytest
 import smach
 import smach_ros
+from smach_ros.introspection import WELCOME_DELAY, ContainerProxy, _Beat
 
 SIGNATURES = {
     smach.State: "outcomes input_keys output_keys io_keys",
@@ -42,6 +43,7 @@ SIGNATURES = {
     "aborted_outcomes preempted_outcomes goal_key feedback_key result_key goal_slots_map "
     "feedback_slots_map result_slots_map expand_goal_slots pack_result_slots",
     smach_ros.IntrospectionServer: "server_name state path",
+    ContainerProxy: "server_name container path update_rate",
     smach_ros.IntrospectionClient.set_initial_state: "self server path initial_states "
     "initial_userdata timeout",
     smach_ros.set_preempt_handler: "container",
@@ -101,3 +103,33 @@ def test_s0_manifest_loads_and_version_is_2_5():
     roslib.load_manifest("smach_ros")
     for name in ("smach", "smach_msgs", "smach_ros"):
         assert rospkg.RosPack().get_manifest(name).version.startswith("2.5.")
+
+
+def test_s12_the_beat_spares_a_viewer_that_has_just_connected():
+    beat = _Beat(100.0, 2.0)
+    beat.done(100.0)
+    assert beat.due == 102.0
+    beat.newcomer(101.9)  # its window does not exist at 102.0 s
+    assert beat.due == 101.9 + WELCOME_DELAY
+    beat.done(beat.due)
+    assert beat.due == pytest.approx(101.9 + WELCOME_DELAY + 2.0)
+    beat.newcomer(beat.last + 0.1)  # nor does it wait for the whole period
+    assert beat.due == pytest.approx(beat.last + 0.1 + WELCOME_DELAY)
+
+
+def test_s12_a_stream_of_new_viewers_does_not_hold_up_the_beat():
+    beat, now, beats = _Beat(0.0, 2.0), 0.0, []
+    beat.done(now)
+    while now < 35.0:
+        now += 0.5
+        if now >= beat.due:
+            beat.done(now)
+            beats.append(now)
+        beat.newcomer(now)
+    assert len(beats) >= 8
+
+
+def test_s11_beats_that_were_missed_are_not_made_up_for():
+    beat = _Beat(0.0, 2.0)
+    beat.done(1000.0)
+    assert beat.due == 1002.0

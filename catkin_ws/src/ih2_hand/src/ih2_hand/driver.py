@@ -11,7 +11,6 @@ from ih2_hand.clock import Clock
 from ih2_hand.errors import (
     HandCalibratingError,
     HandCalibrationError,
-    HandConnectionLost,
     HandPortError,
     NoForceSensorError,
     NoGraspModeError,
@@ -26,6 +25,7 @@ from ih2_hand.line import (
     TraceHook,
     status_request,
 )
+from ih2_hand.reasons import Reason
 from ih2_hand.status import at_rest, decode_status
 from ih2_hand.transport import SerialTransport, Transport
 from ih2_hand.wire_choices import WIRE
@@ -40,6 +40,9 @@ CALIBRATIONS = {
     "fast": (frames.FAST_CALIBRATION, "calibration_fast_limit_s"),
     "complete": (frames.FIRST_CALIBRATION, "calibration_complete_limit_s"),
 }
+
+DIALECTS = ("legacy", "v17")
+"""Grasp commands that firmwares know (W1)."""
 
 LEAST_READ_TIMEOUT_S, LARGEST_READ_TIMEOUT_S = 0.005, 0.5
 """Bounds of a read's time limit: longer than the hand's own delay, short enough to act upon."""
@@ -73,8 +76,8 @@ class HandSerialDriver:
         Raises HandPortError when the port cannot be opened or no hand answers on it.
         """
         self.dialect = dialect if dialect is not None else WIRE.dialect
-        if self.dialect not in ("legacy", "v17"):
-            raise ValueError(f"dialect must be legacy or v17; got {dialect!r}")
+        if self.dialect not in DIALECTS:
+            raise ValueError(f"dialect must be {' or '.join(DIALECTS)}; got {dialect!r}")
         self.preshapes = {mode: tuple(_positions(list(positions))) for mode, positions in
                           (preshapes or grasps.load_preshapes()).items()}
         if not LEAST_READ_TIMEOUT_S <= read_timeout <= LARGEST_READ_TIMEOUT_S:
@@ -93,7 +96,7 @@ class HandSerialDriver:
                 raise HandPortError(
                     f"no hand answers on {self.port}: check that it is powered, that this is its "
                     "port, and that it is not calibrating")
-        except (HandPortError, HandConnectionLost):
+        except BaseException:
             self.line.close()
             raise
         self.line.counters = LineCounters()
@@ -178,7 +181,8 @@ class HandSerialDriver:
             if clock.monotonic() > deadline:
                 raise HandCalibrationError(
                     f"the hand on {self.port} did not answer within {limit:.0f} s after the {data} "
-                    "calibration began; cycle its power and look for a blocked finger")
+                    "calibration began; cycle its power and look for a blocked finger",
+                    Reason.TIME_LIMIT)
             clock.sleep(WIRE.calibration_poll_s)
             answered = answered + 1 if self.line.answers(poll, 1) else 0
         wrong = [motor for motor in _MOTORS
@@ -187,7 +191,8 @@ class HandSerialDriver:
         if wrong:
             raise HandCalibrationError(
                 f"the {data} calibration on {self.port} left motor(s) "
-                f"{', '.join(map(str, wrong))} not fully open: free the fingers and repeat it")
+                f"{', '.join(map(str, wrong))} not fully open: free the fingers and repeat it",
+                Reason.HAND_STALLED)
 
     def stop_all(self) -> None:
         """Stop every motor where it is. Waits for no running request, only for a running frame."""

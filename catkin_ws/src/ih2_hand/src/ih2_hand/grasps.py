@@ -5,7 +5,18 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
+from ih2_hand.errors import RefusedError
+from ih2_hand.reasons import Reason
 from ih2_hand.wire_choices import WIRE
+
+LONGEST_QUOTE = 40
+"""Characters of a foreign text that a message repeats."""
+
+
+def quoted(text: str) -> str:
+    """A text from outside for a message, however long it is."""
+    return repr(text if len(text) <= LONGEST_QUOTE else text[:LONGEST_QUOTE] + "...")
+
 
 MODES = ("cylindrical", "lateral", "tridigit", "bidigit", "tridigit2", "bidigit2")
 """Grasp modes."""
@@ -19,9 +30,10 @@ CLOSING_MOTORS = {"cylindrical": (1, 2, 3, 4), "lateral": (1,), "tridigit": (1, 
 
 
 def check_mode(mode: str) -> str:
-    """`mode` if it exists, else ValueError that lists the modes."""
+    """`mode` if it exists, else RefusedError, a ValueError, that lists the modes."""
     if mode not in MODES:
-        raise ValueError(f"grasp mode must be one of {', '.join(MODES)}; got {mode!r}")
+        raise RefusedError(f"grasp mode must be one of {', '.join(MODES)}; got {quoted(mode)}",
+                           Reason.UNKNOWN_NAME)
     return mode
 
 
@@ -33,12 +45,13 @@ def levels_of(mode: str, dialect: str) -> tuple[str, ...]:
 
 
 def check_grasp(mode: str, level: str, dialect: str) -> None:
-    """ValueError unless the dialect has this mode at this force level; it lists what exists."""
+    """RefusedError unless the dialect has this mode at this force level; it lists what exists."""
     check_mode(mode)
     existing = levels_of(mode, dialect)
     if level not in existing:
-        raise ValueError(f"grasp mode {mode} has force level {', '.join(existing)} in the "
-                         f"{dialect} dialect; got {level!r}")
+        raise RefusedError(f"grasp mode {mode} has force level {', '.join(existing)} in the "
+                           f"{dialect} dialect; got {quoted(level)}",
+                           Reason.NOT_SUPPORTED if level in LEVELS else Reason.UNKNOWN_NAME)
 
 
 def grasps_file() -> Path:

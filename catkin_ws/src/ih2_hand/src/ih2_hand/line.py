@@ -113,10 +113,15 @@ class HandLine:
                 self.trace(">", frame)
 
     def close(self) -> None:
-        """Close the port; later requests raise HandConnectionLost."""
+        """Close the port; later requests raise HandConnectionLost.
+
+        A request under way ends first, within its read's time limit: its descriptor must not be
+        closed under it, as the number may belong to another file at once.
+        """
         with self._write_lock:
             self._closed = True
-        self.transport.close()
+        with self.lock:
+            self.transport.close()
 
     # -- one request -----------------------------------------------------------------------------
 

@@ -11,6 +11,9 @@ from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 from ih2_hand.driver import HandSerialDriver
+from ih2_hand.errors import RefusedError
+from ih2_hand.grasps import quoted
+from ih2_hand.reasons import Reason
 from ih2_hand.wire_choices import WIRE
 
 FLEXION = (1, 2, 3, 4)
@@ -53,13 +56,19 @@ class MotorReading(Protocol):
 @dataclass(frozen=True)
 class Verdict:
     """What one poll says: `done`, and then whether `ok` and what the fingers `holding` (None:
-    nothing learnt about the grip); `text` for feedback and result; `stop` asks for StopALL."""
+    nothing learnt about the grip); `text` for feedback and result, `reason` what it means to a
+    program where it is not ok; `stop` asks for StopALL."""
 
     text: str
     done: bool = False
     ok: bool = False
     holding: bool | None = None
     stop: bool = False
+    reason: Reason = Reason.NONE
+
+
+def _failed(text: str, reason: Reason) -> Verdict:
+    return Verdict(text, done=True, stop=True, reason=reason)
 
 
 class StallWatch:
@@ -100,8 +109,8 @@ class Task:
         """Verdict on a poll that began `elapsed` s after the command."""
         bus = [motor.motor for motor in motors if motor.com_error]
         if bus:
-            return Verdict(f"internal bus error of {_names(bus)}: cycle the hand's power",
-                           done=True, stop=True)
+            return _failed(f"internal bus error of {_names(bus)}: cycle the hand's power",
+                           Reason.DRIVE_ERROR)
         self._stall.update(motors, elapsed)
         return self._judge(motors, elapsed)
 
@@ -115,11 +124,11 @@ def _speed_limit_s(speed: int) -> float:
 
 
 def check_speed(speed: int) -> None:
-    """ValueError unless 1..511: the wire takes 0 too, but nothing would ever move."""
+    """RefusedError unless 1..511: the wire takes 0 too, but nothing would ever move."""
     if not 0 <= speed <= WIRE.speed_max:
-        raise ValueError(f"speed must be 0..{WIRE.speed_max}; got {speed}")
+        raise RefusedError(f"speed must be 0..{WIRE.speed_max}; got {speed}", Reason.OUT_OF_RANGE)
     if speed == 0:
-        raise ValueError(f"speed 0 moves nothing; give 1..{WIRE.speed_max}")
+        raise RefusedError(f"speed 0 moves nothing; give 1..{WIRE.speed_max}", Reason.OUT_OF_RANGE)
 
 
 class SpeedTask(Task):
@@ -159,8 +168,8 @@ class SpeedTask(Task):
         if moving:
             return Verdict(f"{_names(moving)} moving")
         if lost:
-            return Verdict(f"{_names(lost)} stopped on the way without a reason on the status",
-                           done=True, stop=True)
+            return _failed(f"{_names(lost)} stopped on the way without a reason on the status",
+                           Reason.HAND_STALLED)
         return self._ended(at_end, met)
 
     def _ended(self, at_end: list[int], met: list[int]) -> Verdict:
@@ -178,8 +187,8 @@ class OpenTask(SpeedTask):
 
     def _ended(self, at_end: list[int], met: list[int]) -> Verdict:
         if met:
-            return Verdict(f"{_names(met)} blocked before the open end: free the fingers",
-                           done=True, stop=True)
+            return _failed(f"{_names(met)} blocked before the open end: free the fingers",
+                           Reason.HAND_STALLED)
         return Verdict("open", done=True, ok=True, holding=False)
 
 
@@ -222,19 +231,19 @@ class PreshapeTask(Task):
                 if motor.target_reached and near:
                     continue
                 if self._stall.standing(number, elapsed) >= BLOCKED_S:
-                    return Verdict(f"{MOTOR_NAMES[number]} stands at {motor.position} of {target}: "
-                                   "something is in the way", done=True, stop=True)
+                    return _failed(f"{MOTOR_NAMES[number]} stands at {motor.position} of {target}: "
+                                   "something is in the way", Reason.HAND_STALLED)
                 waiting.append(number)
             elif motor.over_current:
-                return Verdict(f"{MOTOR_NAMES[number]} stopped by over-current at "
-                               f"{motor.position} of {target}", done=True, stop=True)
+                return _failed(f"{MOTOR_NAMES[number]} stopped by over-current at "
+                               f"{motor.position} of {target}", Reason.HAND_STALLED)
             elif elapsed < START_GRACE_S:
                 waiting.append(number)
             else:
                 ignored.append(number)
         if ignored:
-            return Verdict("the hand did not take the preshape: it is probably not calibrated; "
-                           "publish `fast` on hand_calibration", done=True, stop=True)
+            return _failed("the hand did not take the preshape: it is probably not calibrated; "
+                           "publish `fast` on hand_calibration", Reason.HAND_NOT_CALIBRATED)
         if waiting:
             return Verdict(f"{_names(waiting)} moving")
         return Verdict(f"preshape {self.mode} reached", done=True, ok=True)
@@ -270,8 +279,8 @@ class GraspTask(Task):
             elif motor.mode in in_grasp or motor.mode == "position":
                 (met if stalled else moving).append(number)
             else:
-                return Verdict(f"{MOTOR_NAMES[number]} stopped at {motor.position} before it met "
-                               "anything: the grasp was interrupted", done=True, stop=True)
+                return _failed(f"{MOTOR_NAMES[number]} stopped at {motor.position} before it met "
+                               "anything: the grasp was interrupted", Reason.HAND_STALLED)
         if moving:
             return Verdict(f"{_names(moving)} closing")
         if met:
@@ -285,8 +294,8 @@ class GraspTask(Task):
             if all(motor.fully_closed for motor in closing):
                 return Verdict("closed without meeting an object", done=True, ok=True,
                                holding=False)
-            return Verdict("the hand did not begin to close: it is probably not calibrated; "
-                           "publish `fast` on hand_calibration", done=True, stop=True)
+            return _failed("the hand did not begin to close: it is probably not calibrated; "
+                           "publish `fast` on hand_calibration", Reason.HAND_NOT_CALIBRATED)
         return Verdict("taking the preshape")
 
 
@@ -311,7 +320,7 @@ def refuse_calibration(words: Sequence[str], *, calibrated: bool, holding: bool,
     """
     if not words or words[0] not in ("fast", "complete") or list(words[1:]) not in ([], ["force"]):
         return (f"calibration must be fast, complete, fast force or complete force; got "
-                f"{' '.join(words)!r}")
+                f"{quoted(' '.join(words))}")
     if busy:
         return f"{busy}: calibrate when it has ended"
     if len(words) == 2:

@@ -10,6 +10,7 @@ from __future__ import annotations
 import errno
 import os
 import select
+import termios
 import time
 from typing import Any, Protocol
 
@@ -21,6 +22,11 @@ from ih2_hand.wire_choices import WIRE
 
 WRITE_TIMEOUT_S = 0.5
 """Longest wait for the line to take a frame."""
+
+
+PORT_ERRORS = (OSError, serial.SerialException, termios.error, TypeError, ValueError)
+"""What pyserial and the kernel raise when a port goes away at a bad moment; termios.error is no
+OSError, TypeError and ValueError come from a descriptor that has gone."""
 
 
 class Transport(Protocol):
@@ -67,21 +73,22 @@ class SerialTransport:
             if self._fd is None:
                 self._serial.write(data)
                 return
-            sent = os.write(self._fd, data)
-            while sent < len(data):
-                sent += self._write_rest(data[sent:])
-        except BlockingIOError:
-            self._write_rest(data)
-        except (OSError, serial.SerialException, TypeError) as error:
+            while data:
+                data = data[self._write_some(data):]
+        except PORT_ERRORS as error:
             raise self._lost(error) from error
 
-    def _write_rest(self, data: bytes) -> int:
-        _, ready, _ = select.select([], [self._fd], [], WRITE_TIMEOUT_S)
+    def _write_some(self, data: bytes) -> int:
+        """Number of bytes that the line took, maybe after a wait."""
+        try:
+            return os.write(self._fd, data)
+        except BlockingIOError:
+            _, ready, _ = select.select([], [self._fd], [], WRITE_TIMEOUT_S)
         if not ready:
             raise HandConnectionLost(f"{self.port} took no byte for {WRITE_TIMEOUT_S} s (last byte "
                                      f"received {format_byte(self.last_byte)}): the other end is "
                                      "stuck; unplug and replug the hand's cable")
-        return os.write(self._fd, data)
+        return 0
 
     def read(self, count: int, timeout: float) -> bytes:
         try:
@@ -93,7 +100,7 @@ class SerialTransport:
                     data = self._read_rest(data, count, timeout)
             else:
                 return b""
-        except (OSError, serial.SerialException, TypeError) as error:
+        except PORT_ERRORS as error:
             raise self._lost(error) from error
         if data:
             self.last_byte = data[-1]
@@ -125,7 +132,7 @@ class SerialTransport:
             if self._fd is None:
                 return bool(self._serial.in_waiting)
             return bool(self._poll.poll(0))
-        except (OSError, serial.SerialException, TypeError) as error:
+        except PORT_ERRORS as error:
             raise self._lost(error) from error
 
     def flush_input(self) -> None:
@@ -136,7 +143,7 @@ class SerialTransport:
     def close(self) -> None:
         try:
             self._serial.close()
-        except (OSError, serial.SerialException):
+        except PORT_ERRORS:
             pass  # a pulled device cannot be closed in order; nothing is left to do
 
     def _lost(self, error: Exception) -> HandConnectionLost:
@@ -176,7 +183,7 @@ def _open(port: str) -> Any:
     except ValueError as error:
         raise HandPortError(f"{port!r} is not a port: give a device, a pty or socket://host:port "
                             f"({error})") from error
-    except (OSError, serial.SerialException) as error:
+    except PORT_ERRORS as error:
         raise HandPortError(_why_not(port, error)) from error
     _shorten_latency(device)
     return device
@@ -186,7 +193,7 @@ def _shorten_latency(device: serial.Serial) -> None:
     """USB adapters may hold each answer back for 16 ms; ask the kernel for 1 ms instead."""
     try:
         device.set_low_latency_mode(True)
-    except (AttributeError, OSError, ValueError):
+    except (AttributeError, *PORT_ERRORS):
         pass  # a pty, or an adapter without that knob
 
 

@@ -18,7 +18,7 @@ GUESS = "guess"
 
 @dataclass(frozen=True)
 class Choice:
-    """One row: `id` W1..W29, `name` of the value, the value, the point, its basis, the risk."""
+    """One row: `id` W1..W30, `name` of the value, the value, the point, its basis, the risk."""
 
     id: str
     name: str
@@ -59,8 +59,8 @@ TABLE: tuple[Choice, ...] = (
            DRIVERS, "the end is noticed later"),
     Choice("W11", "calibration_poll_motor", 2, "motor polled to find the end of a calibration",
            DRIVERS, "none"),
-    Choice("W12", "calibration_fast_s", 2.0, "duration of the fast calibration in the emulator",
-           DRIVERS, "only simulated times"),
+    Choice("W12", "calibration_fast_s", 1.5, "duration of the fast calibration in the emulator",
+           f"{DRIVERS} wait 2.0 s and then send: it ends before", "only simulated times"),
     Choice("W12", "calibration_complete_s", 10.0, "duration of the complete calibration, emulator",
            GUESS, "only simulated times"),
     Choice("W12", "calibration_fast_limit_s", 10.0, "longest wait for the fast calibration",
@@ -119,6 +119,10 @@ TABLE: tuple[Choice, ...] = (
     Choice("W29", "grip_held_after_stop", True,
            "after StopALL the fingers keep their place and with it the grip (no back-driving)",
            GUESS, "a stop, or a resynchronisation, lets the object go"),
+    Choice("W30", "relax_speed", 255,
+           "grasp type 0 of the 6F frame, relax: the flexion motors unwind at this speed until the "
+           "fingers are open (emulator)", f"named in newer {DRIVERS}; {GUESS}",
+           "only simulated times"),
     Choice("-", "baud", 115200, "8 data bits, no parity, 1 stop bit, no flow control",
            f"{GUIDE}; {DRIVERS}", "nothing is understood"),
     Choice("-", "posture_spacing_s", 0.003, "the hand needs this long to execute a posture",

@@ -22,7 +22,6 @@ Example::
 """
 
 # The loggers come first: every other module looks them up here each time it logs.
-from smach import clock
 from smach.concurrence import Concurrence
 from smach.container import Container
 from smach.exceptions import (
@@ -46,7 +45,6 @@ from smach.state import CBState, State
 from smach.state_machine import StateMachine
 from smach.user_data import Remapper, UserData
 from smach.util import CBInterface, cb_interface, has_smach_interface
-from smach.virtual_clock import VirtualClock
 
 __all__ = [
     "CBInterface",
@@ -63,9 +61,7 @@ __all__ = [
     "State",
     "StateMachine",
     "UserData",
-    "VirtualClock",
     "cb_interface",
-    "clock",
     "has_smach_interface",
     "is_shutdown",
     "logdebug",

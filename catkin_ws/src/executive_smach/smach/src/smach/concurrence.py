@@ -8,13 +8,15 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 import smach
-from smach.clock import Event, current
 from smach.container import Container
 from smach.exceptions import InvalidStateError, InvalidTransitionError, InvalidUserCodeError
 from smach.state import State
 from smach.user_data import Remapper, UserData
 
 Outcomes = dict[str, Any]
+
+#: s between two looks at `smach.is_shutdown()` while children run.
+SHUTDOWN_POLL = 0.2
 
 
 class Concurrence(Container):
@@ -25,7 +27,7 @@ class Concurrence(Container):
     string. Else `default_outcome`. `child_termination_cb({label: outcome or None})` is called after
     each child's end; if it returns something true, the children that still run are preempted.
 
-    A preempted concurrence whose children have all served the request has the outcome 'preempted':
+    A preempted concurrence has the outcome 'preempted' unless a child has ignored the request:
     register it.
 
     Example::
@@ -80,7 +82,7 @@ class Concurrence(Container):
         self._child_outcomes: Outcomes = {}
         self._live: dict[str, None] = {}  # children of this run that have not ended
         self._told: set[str] = set()  # those that were passed a request to the container
-        self._ignored: set[str] = set()  # those of them that ended without serving it
+        self._ignored: set[str] = set()  # those that did not take it or ended without serving it
         self._errors: list[Exception] = []
         self._pending = 0  # threads that have not ended
         self._abandoned = False  # the threads could not all be started: let no child begin
@@ -222,20 +224,19 @@ class Concurrence(Container):
         return outcome
 
     def _run_children(self) -> None:
-        clock = current()
-        released, all_ended = clock.event(), clock.event()
+        released, all_ended = threading.Event(), threading.Event()
         with self._preempt_lock:
             if self._preempt_requested:  # asked before the start: each child sees it when it begins
                 self._forward_preempt()
         threads = []
         for label in self._states:
+            thread = threading.Thread(
+                target=self._run_child,
+                args=(label, released, all_ended),
+                name=f"concurrent_split:{label}",
+            )
             try:
-                threads.append(
-                    clock.start_thread(
-                        lambda label=label: self._run_child(label, released, all_ended),
-                        name=f"concurrent_split:{label}",
-                    )
-                )
+                thread.start()
             except RuntimeError as error:  # the system gives no more threads
                 with self._preempt_lock:
                     self._abandoned = True
@@ -247,28 +248,29 @@ class Concurrence(Container):
                         )
                     )
                 break
+            threads.append(thread)
         self._pending = len(threads)
         if not threads:
             all_ended.set()
         released.set()
         try:
-            self._await_children(all_ended, clock.shutdown_poll)
+            self._await_children(all_ended)
         except BaseException:  # Ctrl-C in the main thread: take the children along
             self._preempt_children()
-            self._await_children(all_ended, clock.shutdown_poll)
+            self._await_children(all_ended)
             raise
         finally:
             for thread in threads:
                 thread.join()
 
-    def _await_children(self, all_ended: Event, poll: float | None) -> None:
+    def _await_children(self, all_ended: threading.Event) -> None:
         told = False
-        while not all_ended.wait(poll):
+        while not all_ended.wait(SHUTDOWN_POLL):
             if not told and smach.is_shutdown():
                 told = True
                 self._preempt_children()
 
-    def _run_child(self, label: str, released: Event, all_ended: Event) -> None:
+    def _run_child(self, label: str, released: threading.Event, all_ended: threading.Event) -> None:
         state = self._states[label]
         outcome, error, stop = None, None, False
         released.wait()
@@ -346,7 +348,8 @@ class Concurrence(Container):
 
     def _choose_outcome(self) -> str:
         with self._preempt_lock:
-            if self._preempt_requested and self._told and not self._ignored:
+            # Also where it came after the last child's end: nobody is left who could ignore it.
+            if self._preempt_requested and not self._ignored:
                 self._preempt_requested = False
                 return "preempted"
         if self._outcome_cb:
@@ -377,8 +380,7 @@ class Concurrence(Container):
 
     def _forward_preempt(self) -> None:
         for label in self._live:
-            if self._tell(label, self._states[label]):
-                self._told.add(label)
+            (self._told if self._tell(label, self._states[label]) else self._ignored).add(label)
 
     def _preempt_children(self) -> None:
         """Ask the children that run to end, without the container itself having been asked."""

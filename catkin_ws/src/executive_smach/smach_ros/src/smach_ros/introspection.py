@@ -28,22 +28,29 @@ from smach_msgs.msg import (
     SmachContainerStructure,
 )
 
-from smach_ros.plain_data import InvalidDataError, decode, encode, to_plain
+from smach_ros.introspection_client import (
+    INIT_TOPIC,
+    STATUS_TOPIC,
+    STRUCTURE_TOPIC,
+    IntrospectionClient,
+    drain,
+)
+from smach_ros.plain_data import InvalidDataError, decode, encode
 
 __all__ = [
     "INIT_TOPIC",
     "STATUS_TOPIC",
     "STRUCTURE_TOPIC",
+    "ContainerProxy",
     "IntrospectionClient",
     "IntrospectionServer",
 ]
 
-STATUS_TOPIC = "/smach/container_status"
-STRUCTURE_TOPIC = "/smach/container_structure"
-INIT_TOPIC = "/smach/container_init"
-
 #: Seconds of wall time between two heartbeats: visible also while simulated time stands still.
 HEARTBEAT = 2.0
+#: Seconds for which heartbeats spare a new viewer: one that subscribes before its window exists
+#: loses what comes meanwhile, and some then show nothing for good.
+WELCOME_DELAY = 1.5
 #: Statuses that may wait for the publishing thread; beyond it the oldest is dropped and counted.
 BACKLOG = 20_000
 
@@ -103,6 +110,26 @@ class _Watched:
         return message
 
 
+class _Beat:
+    """When the next heartbeat is due, in seconds of wall time."""
+
+    def __init__(self, now: float, period: float) -> None:
+        self.period, self.last, self.due = period, now, now
+
+    def done(self, now: float) -> None:
+        """A heartbeat has been sent. Beats that were missed, the process being suspended, are not
+        made up for.
+        """
+        self.last = now
+        self.due += self.period
+        if self.due < now:
+            self.due = now + self.period
+
+    def newcomer(self, now: float) -> None:
+        """A viewer has connected; a stream of new ones cannot hold the beat up for the others."""
+        self.due = min(now + WELCOME_DELAY, self.last + self.period + WELCOME_DELAY)
+
+
 class _Newcomers(rospy.SubscribeListener):
     """Tells the server when a viewer has connected."""
 
@@ -134,7 +161,7 @@ class IntrospectionServer:
         self._backlog: deque[tuple[SmachContainerStatus, dict]] = deque()
         self._dropped = 0
         self._changed = threading.Condition()
-        self._newcomer = False
+        self._beat = _Beat(time.monotonic(), HEARTBEAT)
         self._running = False
         self._thread: threading.Thread | None = None
         self._status_pub: rospy.Publisher | None = None
@@ -186,7 +213,7 @@ class IntrospectionServer:
             self._thread.join(5.0)
         for topic in (self._init_sub, self._status_pub, self._structure_pub):
             if topic is not None:
-                _drain(topic)
+                drain(topic)
                 topic.unregister()
         self._init_sub = self._status_pub = self._structure_pub = self._thread = None
 
@@ -195,20 +222,25 @@ class IntrospectionServer:
 
         Example: `server.construct("executive", machine, "/SM_ROOT")`.
         """
+        if not self._watch(state, path):
+            return
+        for label, child in state.get_children().items():
+            if isinstance(child, smach.Container):
+                self.construct(server_name, child, path.rstrip("/") + "/" + label)
+
+    def _watch(self, state: smach.State, path: str) -> bool:
         if not isinstance(state, smach.Container):
             smach.logwarn(
                 f"introspection of {path!r}: expected a container, got {type(state).__name__}; not "
                 "shown"
             )
-            return
+            return False
         watched = _Watched(self, path, state)
         self._watched = [*self._watched, watched]
         if self._running:
             watched.attach()
             self._enqueue(watched.snapshot("Initial state"))
-        for label, child in state.get_children().items():
-            if isinstance(child, smach.Container):
-                self.construct(server_name, child, path.rstrip("/") + "/" + label)
+        return True
 
     def clear(self) -> None:
         """Watch nothing any more.
@@ -228,39 +260,30 @@ class IntrospectionServer:
             self._changed.notify()
 
     def _work(self) -> None:
-        beat = time.monotonic()
         while True:
             with self._changed:
-                while not self._work_to_do() and time.monotonic() < beat:
-                    self._changed.wait(max(0.0, beat - time.monotonic()))
-                running, newcomer = self._running, self._newcomer
-                self._newcomer = False
+                while self._running and not self._backlog and time.monotonic() < self._beat.due:
+                    self._changed.wait(max(0.0, self._beat.due - time.monotonic()))
+                running = self._running
                 items, dropped = list(self._backlog), self._dropped
                 self._backlog.clear()
                 self._dropped = 0
+                beat = time.monotonic() >= self._beat.due
+                if beat:
+                    self._beat.done(time.monotonic())
             if dropped:
                 smach.logwarn(f"introspection is behind the machine: {dropped} statuses dropped")
             for message, data in items:
                 self._publish_status(message, data)
             if not running or rospy.is_shutdown():
                 return
-            if time.monotonic() >= beat:
-                beat += HEARTBEAT
-                if (
-                    time.monotonic() > beat
-                ):  # the process was suspended: do not make up for lost beats
-                    beat = time.monotonic() + HEARTBEAT
-                newcomer = True
-            if newcomer:
+            if beat:
                 self._publish_heartbeats()
 
-    def _work_to_do(self) -> bool:
-        return bool(self._backlog) or self._newcomer or not self._running
-
     def _welcome(self) -> None:
-        """Somebody has just subscribed: show everything at once, not at the next beat."""
+        """Somebody has just subscribed: show everything when they are ready for it."""
         with self._changed:
-            self._newcomer = True
+            self._beat.newcomer(time.monotonic())
             self._changed.notify()
 
     def _publish_heartbeats(self) -> None:
@@ -314,106 +337,33 @@ class IntrospectionServer:
                 smach.logerr(f"command for {msg.path} failed:\n{traceback.format_exc()}")
 
 
-def _drain(topic: Any) -> None:
-    """Let a publisher's connections send what they hold, for at most half a second."""
-    limit = time.monotonic() + 0.5
-    waiting = True
-    while waiting and time.monotonic() < limit:
-        links = getattr(topic.impl, "connections", None) or []
-        waiting = any(getattr(link, "_queue", None) for link in links)
-        time.sleep(0.01)
-
-
-class IntrospectionClient:
-    """Finds introspection servers, and sets initial states of their containers.
+class ContainerProxy:
+    """Shows one container, without the containers in it. `update_rate` (rospy.Duration): time
+    between two heartbeats.
 
     Example::
 
-        client = IntrospectionClient()
-        for server in client.get_servers():
-            client.set_initial_state(server, "/SM_ROOT", ["GRASP"], timeout=rospy.Duration(5))
+        proxy = ContainerProxy("executive", machine, "/SM_ROOT")
+        proxy.start()
+        machine.execute()
+        proxy.stop()
     """
 
-    def get_servers(self) -> list[str]:
-        """Absolute names of all servers on this master.
-
-        Example: `IntrospectionClient().get_servers()`.
-        """
-        return sorted(
-            topic[: -len(STATUS_TOPIC)]
-            for topic, kind in rospy.get_published_topics()
-            if kind == SmachContainerStatus._type and topic.endswith(STATUS_TOPIC)
-        )
-
-    def set_initial_state(
+    def __init__(
         self,
-        server: str,
+        server_name: str,
+        container: smach.Container,
         path: str,
-        initial_states: Sequence[str],
-        initial_userdata: smach.UserData | None = None,
-        timeout: Any = None,
-    ) -> bool:
-        """Ask the container at `path` to begin with these states and this user data.
+        update_rate: rospy.Duration = rospy.Duration(HEARTBEAT),  # noqa: B008  as elsewhere
+    ) -> None:
+        self._server = IntrospectionServer(server_name, container, path)
+        self._server._beat.period = update_rate.to_sec()
+        self._server._watch(container, path)
 
-        With a `timeout` (rospy.Duration or seconds) the command is repeated every 0.3 s until a
-        status of the container shows it: True; else False. Without one it is sent once a server is
-        connected, for which 2 s are allowed: True if it was sent. Example: see the class.
-        """
-        data = initial_userdata._data if initial_userdata is not None else {}
-        wanted = to_plain(dict(data))
-        command = SmachContainerInitialStatusCmd(
-            path=path, initial_states=list(initial_states), local_data=encode(data)
-        )
-        shown = threading.Event()
+    def start(self) -> None:
+        """Begin to publish. Example: `proxy.start()`."""
+        self._server.start()
 
-        def on_status(msg: SmachContainerStatus) -> None:
-            if (
-                msg.path == path
-                and list(msg.initial_states) == list(initial_states)
-                and _shows(msg.local_data, wanted)
-            ):
-                shown.set()
-
-        publisher = rospy.Publisher(
-            server + INIT_TOPIC, SmachContainerInitialStatusCmd, queue_size=1
-        )
-        subscriber = rospy.Subscriber(server + STATUS_TOPIC, SmachContainerStatus, on_status)
-        try:
-            if timeout is None:
-                return self._send_once(publisher, command)
-            wait = float(timeout.to_sec()) if hasattr(timeout, "to_sec") else float(timeout)
-            deadline = time.monotonic() + wait
-            while time.monotonic() < deadline and not rospy.is_shutdown():
-                # Only a status after a command counts: the container may have begun there anyway,
-                # with other data.
-                if publisher.get_num_connections() > 0:
-                    publisher.publish(command)
-                if shown.wait(min(0.3, max(0.0, deadline - time.monotonic()))):
-                    return True
-            return shown.is_set()
-        finally:
-            _drain(publisher)
-            publisher.unregister()
-            subscriber.unregister()
-
-    @staticmethod
-    def _send_once(publisher: rospy.Publisher, command: SmachContainerInitialStatusCmd) -> bool:
-        limit = time.monotonic() + 2.0
-        while publisher.get_num_connections() == 0:
-            if time.monotonic() > limit or rospy.is_shutdown():
-                smach.logerr(
-                    f"nobody takes commands on {publisher.name}; is the introspection server "
-                    "running?"
-                )
-                return False
-            time.sleep(0.02)
-        publisher.publish(command)
-        return True
-
-
-def _shows(local_data: str, wanted: dict) -> bool:
-    try:
-        data = decode(local_data)
-    except InvalidDataError:
-        return not wanted
-    return all(key in data and data[key] == value for key, value in wanted.items())
+    def stop(self) -> None:
+        """End it, with nothing left behind. Example: `proxy.stop()`."""
+        self._server.stop()

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from ih2_hand.emulator.hand import EmulatedHand
+from ih2_hand.grasps import quoted
 from ih2_hand.wire_choices import WIRE
 
 HELP = """\
@@ -49,7 +50,7 @@ class Faults:
         try:
             return self._run(words[0], words[1:])
         except (IndexError, KeyError, ValueError) as error:
-            raise ValueError(f"no such fault {text!r}; there are:\n{HELP}") from error
+            raise ValueError(f"no such fault {quoted(text)}; there are:\n{HELP}") from error
 
     def _run(self, name: str, arguments: list[str]) -> str:
         if name in ("lose", "lose_in", "double"):
@@ -79,7 +80,7 @@ class Faults:
                 motor.wrap = True
             return "a full close reads 0"
         if name == "unplug":
-            self.on_unplug(float(arguments[0]) if arguments else None)
+            self.on_unplug(_seconds(arguments[0]) if arguments else None)
             return "unplugged"
         if name == "replug":
             self.on_replug()
@@ -117,6 +118,13 @@ class Faults:
         """Garbage to send now."""
         stray, self.stray = self.stray, b""
         return b"" if self.mute else stray
+
+
+def _seconds(text: str) -> float:
+    value = float(text)
+    if not 0.0 <= value <= 3600.0:
+        raise ValueError(text)
+    return value
 
 
 def _count(text: str, largest: int) -> int:

@@ -12,6 +12,9 @@ from ih2_hand.emulator.motor import FREE, Contact, Motor
 from ih2_hand.emulator.parser import FrameParser
 from ih2_hand.wire_choices import WIRE
 
+STIFFEST = 1e6
+"""Counts of current for each count pressed into an object: beyond it, one count is too much."""
+
 STEP_S = 0.002
 """Longest integration step."""
 
@@ -43,7 +46,8 @@ class HandCounters:
 class EmulatedHand:
     """Five motors, one parser, one clock. Not thread-safe: the caller serialises.
 
-    `calibration_scale` multiplies the calibration times (0 ends them at once), `greeting` starts
+    `calibration_scale` multiplies the calibration times of W12 (0 ends them at once; above 1.2 the
+    fast one outlasts the 2.0 s that published drivers wait), `greeting` starts
     calibrated as the EH1 does, `dialect` is `both`, `legacy` or `v17` (strict), `strict_force`
     leaves a force read of motor 0 unanswered (W6), `enforce_spacing` loses commands that come
     before a posture is executed (for virtual time: a pty does not tell when bytes arrived).
@@ -87,9 +91,9 @@ class EmulatedHand:
             raise ValueError(f"contact needs {WIRE.motors} positions and stiffnesses; got "
                              f"{len(positions)} and {len(stiffness)}")
         for motor, position, stiff in zip(self.motors, positions, stiffness, strict=True):
-            if not 0 <= position <= FREE or not stiff >= 0.0:
-                raise ValueError("contact position must be 0..255 and stiffness not negative; got "
-                                 f"{position} and {stiff} for motor {motor.number}")
+            if not 0 <= position <= FREE or not 0.0 <= stiff <= STIFFEST:
+                raise ValueError(f"contact position must be 0..255 and stiffness 0..{STIFFEST:g}; "
+                                 f"got {position} and {stiff} for motor {motor.number}")
             motor.contact = Contact(float(position), float(stiff))
 
     # -- time ------------------------------------------------------------------------------------
@@ -262,8 +266,9 @@ class EmulatedHand:
         kind, strength = frame[1], frame[2]
         modes = {code: mode for mode, code in WIRE.v17_types.items()}
         if kind == 0:
-            for motor in self.motors:
-                motor.stop()
+            self.motors[WIRE.unsensed_motor].stop()
+            for number in WIRE.open_all_motors:
+                self.motors[number].drive(WIRE.relax_speed, close=False)
         elif kind in modes:
             self._grasp(modes[kind], "current", strength * V17_CURRENT_PER_GF)
         else:

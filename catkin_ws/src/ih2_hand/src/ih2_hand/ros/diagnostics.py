@@ -8,6 +8,8 @@ from typing import Any
 import rospy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 
+from ih2_hand.reasons import BROKEN, NEUTRAL
+
 PERIOD_S = 1.0
 
 
@@ -29,9 +31,9 @@ class Diagnostics:
         self._next = time.monotonic() + PERIOD_S
         node, driver = self._node, self._node.driver
         level = DiagnosticStatus.OK
-        if driver is None or "failed" in node.message:
+        if driver is None or node.event_code in BROKEN:
             level = DiagnosticStatus.ERROR
-        elif not node.calibrated or "refused" in node.message:
+        elif not node.calibrated or node.event_code not in NEUTRAL:
             level = DiagnosticStatus.WARN
         values = {"port": node.port, "connected": driver is not None,
                   "calibrated": node.calibrated, "calibrating": node.calibrating,

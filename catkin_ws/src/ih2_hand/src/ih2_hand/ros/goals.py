@@ -17,6 +17,7 @@ from typing import Any
 
 import actionlib
 import rospy
+from actionlib_msgs.msg import GoalID
 from coglab_msgs.msg import (
     HandCloseAction,
     HandCloseFeedback,
@@ -35,10 +36,14 @@ from coglab_msgs.msg import (
 
 from ih2_hand.errors import HandError
 from ih2_hand.progress import RESENDS, Task, Verdict
+from ih2_hand.reasons import Reason, reason_of
 from ih2_hand.ros.shutdown import ending
 
 SETTLE_S = 0.02
 """Polls begun earlier than this after a command may still show the status before it."""
+
+BACKLOG = 50
+"""Requests that may wait besides goals."""
 
 SENDING_S = 0.1
 """A result published at shutdown needs this long to leave the process."""
@@ -58,7 +63,8 @@ SPECS: dict[str, tuple[Any, Any, Any]] = {
 
 @dataclass(frozen=True)
 class Item:
-    """One entry of the mailbox: `kind` goal, cancel, stop, status, call or quit."""
+    """One entry of the mailbox: `kind` goal, cancel, stop, status, call or quit; `name` is the
+    action's, or why to stop."""
 
     kind: str
     name: str = ""
@@ -80,6 +86,18 @@ class Running:
     last_status: float = 0.0
 
 
+class HandActionServer(actionlib.ActionServer):
+    """An action server that no cancel can close for the future.
+
+    actionlib refuses every goal that is older than the newest stamp of a cancel request: one
+    request with a stamp of the year 2106 and no goal is ever taken again.
+    """
+
+    def internal_cancel_callback(self, goal_id: GoalID) -> None:
+        goal_id.stamp = min(goal_id.stamp, rospy.Time.now())
+        super().internal_cancel_callback(goal_id)
+
+
 class GoalQueue:
     """Runs goals one after another; `owner` is the hand node (driver, preshape and events)."""
 
@@ -90,7 +108,7 @@ class GoalQueue:
         self._status: rospy.Subscriber | None = None
         self._servers = {}
         for name, (action, _, _) in SPECS.items():
-            self._servers[name] = actionlib.ActionServer(
+            self._servers[name] = HandActionServer(
                 rospy.resolve_name("~" + name), action,
                 lambda handle, name=name: self._mailbox.put(Item("goal", name, handle)),
                 lambda handle, name=name: self._mailbox.put(Item("cancel", name, handle)),
@@ -122,8 +140,11 @@ class GoalQueue:
         self._mailbox.put(Item("stop", reason))
 
     def call(self, function: Callable[[], None]) -> None:
-        """Run a function between goals' steps, in the goals' thread."""
-        self._mailbox.put(Item("call", content=function))
+        """Run a function between goals' steps, in the goals' thread; dropped if too many wait."""
+        if self._mailbox.qsize() < BACKLOG:
+            self._mailbox.put(Item("call", content=function))
+        else:
+            rospy.logwarn_throttle(1.0, "hand: %d requests wait; further ones are dropped", BACKLOG)
 
     # -- the thread ------------------------------------------------------------------------------
 
@@ -135,31 +156,31 @@ class GoalQueue:
                 item = Item("tick")
             try:
                 if item.kind == "quit":
-                    self._end_running("the node ends")
+                    self._end_running("the node ends", Reason.CANCELLED)
                     return
                 self._handle(item)
             except HandError as error:
-                self._fail(f"{error}")
+                self._fail(f"{error}", error.reason)
             except Exception as error:  # a goal must end whatever happens
                 if ending():
                     continue  # the topics are closed; what remains is to quit
                 rospy.logerr("hand action: unexpected %s: %s", type(error).__name__, error)
-                self._fail(f"internal error: {error}")
+                self._fail(f"internal error: {error}", Reason.UNEXPECTED)
 
     def _handle(self, item: Item) -> None:
         running = self._running
         if item.kind == "goal":
             if running:
-                self._cancel("replaced by a new goal; fingers stopped")
+                self._cancel("replaced by a new goal; fingers stopped", Reason.SUPERSEDED)
             self._accept(item.name, item.content)
             if not self._running:
                 self._unsubscribe()
         elif item.kind == "cancel":
             if running and item.content == running.handle:
-                self._cancel("preempted; fingers stopped")
+                self._cancel("preempted; fingers stopped", Reason.CANCELLED)
                 self._unsubscribe()
         elif item.kind == "stop":
-            self._end_running(item.name)
+            self._end_running(item.name, Reason.STOPPING)
         elif item.kind == "call":
             item.content()
         elif running:
@@ -168,20 +189,22 @@ class GoalQueue:
             if self._running is running:
                 self._watch_time(running)
 
-    def _end_running(self, reason: str) -> None:
+    def _end_running(self, text: str, reason: Reason) -> None:
         if self._running:
             self._stop_fingers()
-            self._fail(reason)
+            self._fail(text, reason)
 
     def _accept(self, name: str, handle: Any) -> None:
         handle.set_accepted()
         try:
             task = self._owner.make_task(name, handle.get_goal())
         except (ValueError, HandError) as error:
-            self._finish_handle(name, handle, Verdict(str(error), done=True))
+            self._finish_handle(name, handle,
+                                Verdict(str(error), done=True, reason=reason_of(error)))
             return
         if handle.get_goal_status().status == actionlib.GoalStatus.PREEMPTING:
-            handle.set_canceled(_result(name, False, "cancelled before it began"))
+            cancelled = Verdict("cancelled before it began", reason=Reason.CANCELLED)
+            handle.set_canceled(_result(name, cancelled))
             return
         if self._status is None:  # else the replaced goal's subscription goes on
             self._status = rospy.Subscriber(rospy.resolve_name("~hand_status"), HandStatus,
@@ -191,7 +214,9 @@ class GoalQueue:
         self._begin(self._running)
 
     def _on_status(self, status: HandStatus) -> None:
-        self._mailbox.put(Item("status", content=status))
+        # Only what this node has read from the hand: anybody can publish on a topic.
+        if status._connection_header.get("callerid") == rospy.get_name():
+            self._mailbox.put(Item("status", content=status))
 
     def _begin(self, running: Running) -> None:
         driver = self._owner.connected_driver()
@@ -205,10 +230,11 @@ class GoalQueue:
     def _step(self, running: Running, status: HandStatus) -> None:
         running.last_status = time.monotonic()
         if not status.connected:
-            self._fail(status.message)
+            self._fail(status.message, Reason.HAND_LINK_LOST)
             return
         if self._owner.driver is not running.driver:
-            self._fail(f"the connection to {self._owner.port} was lost during the goal")
+            self._fail(f"the connection to {self._owner.port} was lost during the goal",
+                       Reason.HAND_LINK_LOST)
             return
         if running.driver.counters.fillers != running.fillers:
             self._resend(running)
@@ -231,7 +257,8 @@ class GoalQueue:
         if running.resends >= RESENDS:
             self._stop_fingers()
             self._fail(f"the line to {self._owner.port} had to be resynchronised "
-                       f"{RESENDS + 1} times during the goal: check the cable")
+                       f"{RESENDS + 1} times during the goal: check the cable",
+                       Reason.HAND_LINK_LOST)
             return
         running.resends += 1
         self._begin(running)
@@ -240,10 +267,12 @@ class GoalQueue:
         now = time.monotonic()
         if now - running.last_status > SILENCE_S:
             self._stop_fingers()
-            self._fail(f"no hand_status for {SILENCE_S} s from {self._owner.port}")
+            self._fail(f"no hand_status for {SILENCE_S} s from {self._owner.port}",
+                       Reason.HAND_LINK_LOST)
         elif now - running.begun > running.task.limit:
             self._stop_fingers()
-            self._fail(f"not done within {running.task.limit:.0f} s; fingers stopped")
+            self._fail(f"not done within {running.task.limit:.0f} s; fingers stopped",
+                       Reason.TIME_LIMIT)
 
     # -- ends ------------------------------------------------------------------------------------
 
@@ -255,17 +284,18 @@ class GoalQueue:
         except HandError as error:
             rospy.logwarn("fingers could not be stopped: %s", error)
 
-    def _cancel(self, reason: str) -> None:
-        running = self._running
+    def _cancel(self, text: str, reason: Reason) -> None:
+        running, verdict = self._running, Verdict(text, done=True, reason=reason)
         self._stop_fingers()
         self._running = None
-        self._owner.task_ended(running.task, Verdict(reason, done=True))
-        running.handle.set_canceled(_result(running.name, False, reason), reason)
+        self._owner.task_ended(running.task, verdict)
+        running.handle.set_canceled(_result(running.name, verdict), text)
 
-    def _fail(self, reason: str) -> None:
+    def _fail(self, text: str, reason: Reason) -> None:
         if self._running:
-            self._owner.task_ended(self._running.task, Verdict(reason, done=True))
-            self._finish(Verdict(reason, done=True))
+            verdict = Verdict(text, done=True, reason=reason)
+            self._owner.task_ended(self._running.task, verdict)
+            self._finish(verdict)
 
     def _finish(self, verdict: Verdict) -> None:
         running = self._running
@@ -280,7 +310,7 @@ class GoalQueue:
             threading.Thread(target=status.unregister, daemon=True).start()
 
     def _finish_handle(self, name: str, handle: Any, verdict: Verdict) -> None:
-        result = _result(name, verdict.ok, verdict.text)
+        result = _result(name, verdict)
         if verdict.ok:
             handle.set_succeeded(result, verdict.text)
         else:
@@ -288,5 +318,5 @@ class GoalQueue:
             handle.set_aborted(result, verdict.text)
 
 
-def _result(name: str, is_ok: bool, message: str) -> Any:
-    return SPECS[name][1](isOk=is_ok, message=message)
+def _result(name: str, verdict: Verdict) -> Any:
+    return SPECS[name][1](isOk=verdict.ok, reason_code=int(verdict.reason), message=verdict.text)

@@ -14,7 +14,12 @@ from std_msgs.msg import String
 from std_srvs.srv import Trigger, TriggerResponse
 
 from ih2_hand import grasps
-from ih2_hand.driver import LARGEST_READ_TIMEOUT_S, LEAST_READ_TIMEOUT_S, HandSerialDriver
+from ih2_hand.driver import (
+    DIALECTS,
+    LARGEST_READ_TIMEOUT_S,
+    LEAST_READ_TIMEOUT_S,
+    HandSerialDriver,
+)
 from ih2_hand.errors import (
     HandCalibratingError,
     HandConnectionLost,
@@ -22,6 +27,7 @@ from ih2_hand.errors import (
     HandInconsistentError,
     HandPortError,
     HandTimeoutError,
+    RefusedError,
 )
 from ih2_hand.progress import (
     LONGEST_S,
@@ -35,6 +41,7 @@ from ih2_hand.progress import (
     shown_empty,
     shown_holding,
 )
+from ih2_hand.reasons import NEUTRAL, Reason, reason_of
 from ih2_hand.ros.diagnostics import Diagnostics
 from ih2_hand.ros.goals import GoalQueue
 from ih2_hand.ros.messages import joint_state, motor_status
@@ -67,6 +74,8 @@ class HandNode:
         if not 1.0 <= self.rate <= 200.0:
             raise ValueError(f"~rate must be 1..200 Hz; got {self.rate}")
         self._dialect = str(rospy.get_param("~dialect", "legacy"))
+        if self._dialect not in DIALECTS:
+            raise ValueError(f"~dialect must be {' or '.join(DIALECTS)}; got {self._dialect!r}")
         self._is_current = not bool(rospy.get_param("~use_tension", False))
         self._read_timeout = float(rospy.get_param("~read_timeout", WIRE.read_timeout_s))
         if not LEAST_READ_TIMEOUT_S <= self._read_timeout <= LARGEST_READ_TIMEOUT_S:
@@ -82,7 +91,7 @@ class HandNode:
         self.calibrated = False
         self.calibrating = False
         self.holding = True
-        self.message = "not connected yet"
+        self._event = (Reason.HAND_LINK_LOST, "not connected yet")
         self._preshape: tuple[str, str] | None = None
         self._last_status = HandStatus()
         self._contradictions = 0
@@ -120,23 +129,43 @@ class HandNode:
             raise HandConnectionLost(f"the hand is not connected: {self.message}")
         return driver
 
-    def event(self, text: str, warn: bool = False) -> None:
-        """Something happened: into the log, hand_status and diagnostics."""
-        self.message = text
-        (rospy.logwarn if warn else rospy.loginfo)("hand: %s", text)
+    @property
+    def event_code(self) -> Reason:
+        """What the last event means to a program."""
+        return self._event[0]
+
+    @property
+    def message(self) -> str:
+        """The last event in words."""
+        return self._event[1]
+
+    def event(self, text: str, reason: Reason = Reason.NONE) -> None:
+        """Something happened: into the log, hand_status (at once, so that no event is lost to the
+        one after it) and diagnostics."""
+        self._event = (reason, text)
+        (rospy.loginfo if reason in NEUTRAL else rospy.logwarn)("hand: %s", text)
+        self._tell_again()
         self._diagnostics.publish()
+
+    def _tell_again(self) -> None:
+        """The last poll once more, with what was learnt since."""
+        self._fill_and_send(copy.copy(self._last_status))
 
     def _connect(self) -> None:
         try:
-            self.port = self._resolve_port()
-            driver = HandSerialDriver(None if self.port == "" else self.port, dialect=self._dialect,
-                                      preshapes=self._preshapes, trace=self._trace.hook,
-                                      read_timeout=self._read_timeout)
-        except HandError as error:
-            text = str(error)
+            self._open()
+        except Exception as error:  # whatever a port can raise: it is tried again
+            text = str(error) if isinstance(error, HandError) else (
+                f"the hand's port {self.port} cannot be opened ({type(error).__name__}: {error}): "
+                "check that it is the hand's serial device")
             if text != self.message:
-                self.event(text, warn=True)
-            return
+                self.event(text, Reason.HAND_LINK_LOST)
+
+    def _open(self) -> None:
+        self.port = self._resolve_port()
+        driver = HandSerialDriver(None if self.port == "" else self.port, dialect=self._dialect,
+                                  preshapes=self._preshapes, trace=self._trace.hook,
+                                  read_timeout=self._read_timeout)
         self.port = driver.port
         self.calibrated, self.holding, self._preshape = False, True, None
         self._contradictions = 0
@@ -157,16 +186,16 @@ class HandNode:
                                 "publishes the hand's port there")
         return str(port)
 
-    def lost(self, error: HandError) -> None:
-        """The connection is lost: close it and say so at once; polling reopens it."""
+    def lost(self, error: Exception, driver: HandSerialDriver | None = None) -> None:
+        """The connection is lost: close it and say so at once; polling reopens it. Nothing happens
+        if it is another one than `driver`'s by now."""
         with self._lost_lock:
+            if self.driver is None or driver not in (None, self.driver):
+                return
             driver, self.driver = self.driver, None
-        if driver is None:
-            return
         driver.close()
         self.calibrated, self.holding, self._preshape = False, True, None
-        self.event(f"connection lost: {error}", warn=True)
-        self._publish([], rospy.Time.now())
+        self.event(f"connection lost: {error}", Reason.HAND_LINK_LOST)
 
     # -- polling ---------------------------------------------------------------------------------
 
@@ -175,10 +204,10 @@ class HandNode:
         next_time = next_connect = time.monotonic()
         while not self._ended.is_set() and not rospy.is_shutdown():
             now = time.monotonic()
-            if self.driver is None and now >= next_connect:
-                self._connect()
-                next_connect = time.monotonic() + RECONNECT_S
             try:
+                if self.driver is None and now >= next_connect:
+                    self._connect()
+                    next_connect = time.monotonic() + RECONNECT_S
                 self._poll_once()
                 self._diagnostics.tick()
             except Exception as error:
@@ -203,20 +232,17 @@ class HandNode:
                 self._contradictions += 1
                 rospy.logwarn_throttle(1.0, "hand: %s", error)
                 if self._contradictions >= CONTRADICTIONS:
-                    self.lost(error)
+                    self.lost(error, driver)
                 return
             except (HandTimeoutError, HandConnectionLost) as error:
                 if not self.calibrating:
-                    self.lost(error)
+                    self.lost(error, driver)
                 return
         self._publish(readings, stamp)
 
     def _publish(self, readings: list[dict[str, Any]], stamp: rospy.Time) -> None:
-        calibrating = self.calibrating
-        if calibrating:
-            readings = []  # read before it began
         status = HandStatus(motors=[motor_status(reading) for reading in readings])
-        if readings:
+        if readings and not self.calibrating:
             if self.holding and shown_empty(status.motors):
                 self.holding = False
                 self.event("the hand is open: it holds nothing")
@@ -224,16 +250,23 @@ class HandNode:
                 self.holding = True
             self._joints.publish(joint_state(readings, stamp))
         status.header.stamp = stamp
-        status.calibrated, status.calibrating = self.calibrated, calibrating
-        status.connected, status.holding = self.driver is not None, self.holding
-        status.message = self.message
         self._last_status = status
+        self._fill_and_send(status)
+
+    def _fill_and_send(self, status: HandStatus) -> None:
+        # What ends a calibration sets this flag last: who reads False finds the outcome told.
+        status.calibrating = self.calibrating
+        status.calibrated, status.holding = self.calibrated, self.holding
+        status.connected = self.driver is not None
+        if status.calibrating or not status.connected:
+            status.motors = []  # read before it began
+        status.event_code, status.message = self._event
         self._publisher.publish(status)
 
     # -- goals -----------------------------------------------------------------------------------
 
     def make_task(self, name: str, goal: Any) -> Task:
-        """Task for an accepted goal; ValueError or HandError with the reason to refuse it."""
+        """Task for an accepted goal; RefusedError or HandError with the reason to refuse it."""
         driver = self.connected_driver()
         if self.calibrating:
             raise HandCalibratingError("the hand calibrates; send the goal again afterwards")
@@ -246,8 +279,9 @@ class HandNode:
             task = PreshapeTask(goal.mode, goal.level, self._is_current, self._limit)
         else:
             if self._preshape is None:
-                raise ValueError("the hand is not preshaped: call hand_preshape first (hand_open, "
-                                 "hand_close, calibration or reconnection undo it)")
+                raise RefusedError("the hand is not preshaped: call hand_preshape first (hand_open, "
+                                   "hand_close, calibration or reconnection undo it)",
+                                   Reason.HAND_REFUSED)
             task = GraspTask(grasps.CLOSING_MOTORS[self._preshape[0]], self._limit)
         if name != "hand_preshape_close":
             self._preshape = None
@@ -261,11 +295,8 @@ class HandNode:
             self.holding = verdict.holding
         elif isinstance(task, (CloseTask, GraspTask)) and not verdict.ok:
             self.holding = True  # broken off on the way: something may be between the fingers
-        self.message = f"{task.name}: {verdict.text}"
-        # The last poll once more: who acts on the result finds the grip told with it.
-        status = copy.copy(self._last_status)
-        status.holding, status.message = self.holding, self.message
-        self._publisher.publish(status)
+        self._event = (verdict.reason, f"{task.name}: {verdict.text}")
+        self._tell_again()  # who acts on the result finds the grip told with it
 
     # -- calibration and stop --------------------------------------------------------------------
 
@@ -279,28 +310,33 @@ class HandNode:
             busy = f"{self.goals.active} runs"
         reason = refuse_calibration(words, calibrated=self.calibrated, holding=self.holding,
                                     busy=busy)
-        if reason is None and self.driver is None:
+        driver = self.driver
+        if reason is None and driver is None:
             reason = f"the hand is not connected: {self.message}"
         if reason:
-            self.event(f"calibration refused: {reason}", warn=True)
+            self.event(f"calibration refused: {reason}", Reason.HAND_REFUSED)
             return
         self.calibrating, self.calibrated, self._preshape = True, False, None
-        self.event(f"calibration {words[0]} started")
-        threading.Thread(target=self._run_calibration, args=(self.driver, words[0]),
+        self.event(f"calibration {words[0]} started", Reason.HAND_STARTED)
+        threading.Thread(target=self._run_calibration, args=(driver, words[0]),
                          name="calibration", daemon=True).start()
 
     def _run_calibration(self, driver: HandSerialDriver, kind: str) -> None:
+        failure: Exception | None = None
         try:
             driver.calibration(kind)
-        except (HandConnectionLost, HandTimeoutError) as error:
-            self.calibrating = False
-            self.lost(error)
-        except HandError as error:
-            self.calibrating = False
-            self.event(f"calibration {kind} failed: {error}", warn=True)
+        except Exception as error:  # whatever it is: the hand must not count as calibrating for ever
+            failure = error
+        if failure is None and self.driver is driver:
+            self.calibrated = True
+            self._event = (Reason.HAND_ENDED, f"calibration {kind} ended")
         else:
-            self.calibrated, self.calibrating = True, False
-            self.event(f"calibration {kind} ended")
+            failure = failure or HandConnectionLost("the connection was lost meanwhile")
+            self._event = (reason_of(failure), f"calibration {kind} failed: {failure}")
+        self.calibrating = False
+        self.event(self.message, self.event_code)
+        if isinstance(failure, (HandConnectionLost, HandTimeoutError)):
+            self.lost(failure, driver)
 
     def _on_stop(self, _: Any) -> TriggerResponse:
         """Stop every motor; true only when the motors say that they stand."""

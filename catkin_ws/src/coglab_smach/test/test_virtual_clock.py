@@ -1,72 +1,56 @@
-"""The clock that can be replaced: machines in virtual time."""
-
+"""The clock in which waiting costs no time, and machines that run by it."""
 import threading
 
 import pytest
 import smach
-from machine_parts import in_thread
-from smach.clock import SteadyClock, using
-from smach.virtual_clock import ClockStalled, VirtualClock
+from coglab_smach.clock import SteadyClock
+from coglab_smach.virtual_clock import ClockStalled, VirtualClock, VirtualCondition, using
 
 
 class Waits(smach.State):
     """Waits in steps of 0.1 s, and ends early if asked."""
 
-    def __init__(self, seconds):
-        super().__init__(["done", "preempted"])
-        self.seconds = seconds
+    def __init__(self, clock, seconds):
+        smach.State.__init__(self, ["done", "preempted"])
+        self.clock, self.seconds = clock, seconds
 
     def execute(self, ud):
-        end = smach.clock.now() + self.seconds
-        while smach.clock.now() < end - 1e-9:
+        end = self.clock.now() + self.seconds
+        while self.clock.now() < end - 1e-9:
             if self.preempt_requested():
                 self.service_preempt()
                 return "preempted"
-            smach.clock.sleep(0.1)
+            self.clock.sleep(0.1)
         return "done"
 
 
-def both(*seconds):
-    result = smach.Concurrence(["done", "preempted"], "done")
+def both(clock, *seconds):
+    everywhere = {f"C{i}": "done" for i in range(len(seconds))}
+    result = smach.Concurrence(["done", "preempted"], "preempted", outcome_map={"done": everywhere})
     with result:
         for i, s in enumerate(seconds):
-            smach.Concurrence.add(f"C{i}", Waits(s))
+            smach.Concurrence.add(f"C{i}", Waits(clock, s))
     return result
 
 
-def test_default_is_the_steady_clock():
-    assert isinstance(smach.clock.current(), SteadyClock)
-    before = smach.clock.now()
-    smach.clock.sleep(0.01)
-    assert smach.clock.now() >= before + 0.009
-    event = smach.clock.current().event()
-    assert smach.clock.wait(event, 0.01) is False
-    event.set()
-    assert smach.clock.wait(event) is True
-
-
-def test_set_clock():
-    before = smach.clock.current()
-    clock = VirtualClock(start=5.0)
-    try:
-        smach.clock.set_clock(clock)
-        assert smach.clock.now() == 5.0
-        with pytest.raises(TypeError):
-            smach.clock.set_clock(3)
-    finally:
-        smach.clock.set_clock(before)
+def test_the_steady_clock():
+    clock = SteadyClock()
+    before = clock.now()
+    clock.sleep(0.01)
+    clock.sleep(-1.0)
+    assert clock.now() >= before + 0.009
 
 
 def test_an_hour_of_concurrent_machines_costs_nothing():
     with using(VirtualClock()) as clock:
-        assert both(10.0, 3600.0, 0.0).execute() == "done"
+        assert both(clock, 10.0, 3600.0, 0.0).execute() == "done"
         assert clock.now() == pytest.approx(3600.0, abs=0.11)  # steps of 0.1 s, summed up
-    assert isinstance(smach.clock.current(), SteadyClock)
+    assert smach.concurrence.threading is threading
 
 
 def test_a_request_at_a_moment_of_virtual_time():
-    machine = both(10.0, 50.0)
     with using(VirtualClock()) as clock:
+        machine = both(clock, 10.0, 50.0)
         asker = clock.start_thread(lambda: (clock.sleep(20.05), machine.request_preempt()), "asker")
         assert machine.execute() == "preempted"
         assert clock.now() == pytest.approx(20.1, abs=1e-6)
@@ -84,10 +68,7 @@ def test_runs_are_the_same_each_time():
                 order.append((name, round(clock.now(), 9)))
 
         with clock.attached():
-            threads = [
-                clock.start_thread(lambda n=n: work(n, 0.1 * (n % 3 + 1)), f"w{n}")
-                for n in range(6)
-            ]
+            threads = [clock.start_thread(lambda n=n: work(n, 0.1 * (n % 3 + 1)), f"w{n}") for n in range(6)]
             clock.sleep(20.0)
             order.append("end")
         [t.join(10) for t in threads]
@@ -108,18 +89,44 @@ def test_events_wake_at_once_and_time_out():
         assert not event.is_set()
 
 
+def test_a_condition_wakes_those_it_is_told_to_and_times_out():
+    with using(VirtualClock()) as clock:
+        condition, woken = VirtualCondition(clock), []
+
+        def wait(name):
+            with condition:
+                woken.append((name, condition.wait(30.0), clock.now()))
+
+        def notify():
+            clock.sleep(1.0)
+            with condition:
+                condition.notify()
+            clock.sleep(1.0)
+            with condition:
+                condition.notify_all()
+
+        for name in "abc":
+            clock.start_thread(lambda n=name: wait(n), name)
+        clock.start_thread(notify, "notify")
+        clock.sleep(5.0)
+        assert woken == [("a", True, 1.0), ("b", True, 2.0), ("c", True, 2.0)]
+        with condition:
+            assert condition.wait(4.0) is False and clock.now() == 9.0
+
+
 def test_an_outside_thread_can_set_an_event():
     clock = VirtualClock()
-    event = clock.event()
+    event, seen = clock.event(), []
 
     def wait():
         with clock.attached():
-            return event.wait()
+            seen.append(event.wait())
 
-    waiter = in_thread(wait)
+    waiter = threading.Thread(target=wait)
+    waiter.start()
     event.set()
     waiter.join(5)
-    assert waiter.result is True
+    assert seen == [True]
 
 
 def test_deadlock_is_an_error_and_no_hang():
@@ -152,15 +159,12 @@ def test_a_member_that_raises_gives_its_turn_away():
         assert clock.now() == 1.0
 
 
-def test_children_inherit_the_clock_and_siblings_do_not():
-    seen = []
-    concurrent = smach.Concurrence(["done"], "done")
-    with concurrent:
-        state = smach.CBState(
-            lambda ud: seen.append(smach.clock.current()) or "done", outcomes=["done"]
-        )
-        smach.Concurrence.add("A", state)
-    with using(VirtualClock()) as clock:
-        concurrent.execute()
-    concurrent.execute()
-    assert seen[0] is clock and isinstance(seen[1], SteadyClock)
+def test_a_thread_that_does_not_start_leaves_no_member(monkeypatch):
+    clock = VirtualClock(stall_limit=0.2)
+    with monkeypatch.context() as patch:
+        patch.setattr(threading.Thread, "start", lambda self: (_ for _ in ()).throw(RuntimeError("no more threads")))
+        with pytest.raises(RuntimeError):
+            clock.start_thread(lambda: None, "never")
+    with clock.attached():
+        clock.sleep(1.0)
+    assert clock.now() == 1.0

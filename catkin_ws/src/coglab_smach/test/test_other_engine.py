@@ -1,0 +1,68 @@
+"""The brain needs nothing of smach and smach_ros but what the ROS distributions' packages have too."""
+import ast
+import importlib.metadata
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from other_engine import MODULES, ROS_NAMES
+
+PACKAGE = Path(__file__).resolve().parent.parent
+ALLOWED = {f"{module}.{name}" for module, names in MODULES.items() for name in names.split()}
+ALLOWED |= {f"smach_ros.{name}" for name in ROS_NAMES.split()} | set(MODULES) | {"smach_ros"}
+
+
+def dotted(node):
+    """'smach.concurrence.threading' of such an expression, '' of another one."""
+    if isinstance(node, ast.Name):
+        return node.id
+    before = dotted(node.value) if isinstance(node, ast.Attribute) else ""
+    return f"{before}.{node.attr}" if before else ""
+
+
+def names_used(path):
+    """Names of the engine in a file: what it imports and what it takes from the modules."""
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
+            yield from (f"{node.module}.{alias.name}" for alias in node.names)
+        elif isinstance(node, ast.Attribute):
+            yield dotted(node)
+
+
+def test_only_names_that_every_engine_has():
+    for folder in ("src", "scripts", "bench"):
+        for path in sorted((PACKAGE / folder).rglob("*.py")):
+            used = {name for name in names_used(path) if name.split(".")[0] in ("smach", "smach_ros")}
+            # One level below a class or function (StateMachine.add) is judged by running it.
+            used = {name for name in used if name.rpartition(".")[0] not in ALLOWED - set(MODULES)}
+            assert used - {"smach.concurrence.threading"} <= ALLOWED, path
+
+
+def handover_on(engine):
+    """The report of other_engine.py, in a process of its own."""
+    ended = subprocess.run([sys.executable, str(PACKAGE / "test" / "other_engine.py"), engine], cwd=PACKAGE / "test",
+                           capture_output=True, text=True, timeout=120, check=False)
+    if "No module named 'coglab_" in ended.stderr:
+        pytest.skip("a compiled module is not there")
+    assert ended.returncode == 0, ended.stderr[-3000:]
+    report = json.loads(ended.stdout.splitlines()[-1])
+    assert [outcome for _, outcome, _ in report["outcomes"]] == ["succeeded", "succeeded"], report
+    assert report["held_by"] == "human" and not report["dropped"] and report["limit_violations"] == 0
+    assert report["last_hub"] == "wait_without_object" and report["pickled"] > 20
+    return report
+
+
+def test_a_handover_with_every_other_name_of_our_engine_hidden():
+    assert handover_on("names")["engine"] == "names"
+
+
+def test_a_handover_on_the_engine_of_the_ros_distributions():
+    try:
+        found = importlib.metadata.distribution("standalone-smach").locate_file("")
+    except importlib.metadata.PackageNotFoundError:
+        pytest.skip("standalone-smach, a copy of that engine, is not installed (test-oracles.txt)")
+    assert Path(handover_on(str(found))["engine"]).is_relative_to(found)

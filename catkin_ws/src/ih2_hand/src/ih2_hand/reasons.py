@@ -1,0 +1,43 @@
+"""What the hand's sentences mean, for programs."""
+
+from __future__ import annotations
+
+from enum import IntEnum
+
+
+class Reason(IntEnum):
+    """Those numbers of coglab_msgs/ReasonCode that the hand gives; without ROS, so that the driver
+    needs none."""
+
+    NONE = 0
+    INVALID_ARGUMENT = 100
+    OUT_OF_RANGE = 101
+    UNKNOWN_NAME = 102
+    NOT_SUPPORTED = 110
+    STOPPING = 205
+    DRIVE_ERROR = 208
+    CANCELLED = 400
+    SUPERSEDED = 402
+    TIME_LIMIT = 408
+    HAND_LINK_LOST = 500
+    HAND_NOT_CALIBRATED = 501
+    HAND_CALIBRATING = 502
+    HAND_STALLED = 504
+    HAND_REFUSED = 505
+    HAND_STARTED = 506
+    HAND_ENDED = 507
+    UNEXPECTED = 699
+
+
+NEUTRAL = (Reason.NONE, Reason.HAND_STARTED, Reason.HAND_ENDED)
+"""What is no failure."""
+
+BROKEN = (Reason.DRIVE_ERROR, Reason.TIME_LIMIT, Reason.HAND_LINK_LOST, Reason.HAND_STALLED,
+          Reason.UNEXPECTED)
+"""Failures of hand or line, other than of a request."""
+
+
+def reason_of(error: Exception) -> Reason:
+    """The reason that an error of this package carries."""
+    unknown = Reason.INVALID_ARGUMENT if isinstance(error, ValueError) else Reason.UNEXPECTED
+    return getattr(error, "reason", unknown)

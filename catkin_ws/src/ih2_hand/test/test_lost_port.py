@@ -1,0 +1,160 @@
+"""A port that goes away, or takes bytes slowly, at the worst moment; and the node's side of it."""
+
+from __future__ import annotations
+
+import os
+import socket
+import termios
+import threading
+import time
+
+import pytest
+import serial
+from ih2_hand import transport
+from ih2_hand.driver import HandSerialDriver
+from ih2_hand.errors import HandConnectionLost, HandPortError
+from ih2_hand.line import HandLine
+from ih2_hand.reasons import Reason
+from ih2_hand.transport import SerialTransport
+
+
+def raise_termios(*_, **__):
+    raise termios.error(5, "Input/output error")
+
+
+def test_a_port_that_fails_in_termios_while_it_is_opened_cannot_be_opened(monkeypatch):
+    monkeypatch.setattr(serial, "Serial", raise_termios)
+    with pytest.raises(HandPortError, match="cannot be opened"):
+        SerialTransport("/dev/null")
+
+
+def test_a_driver_that_cannot_begin_lets_go_of_the_port(monkeypatch):
+    link = Recorder()
+    monkeypatch.setattr(HandLine, "resynchronise", raise_termios)
+    with pytest.raises(termios.error):
+        HandSerialDriver(transport=link)
+    assert link.closed
+
+
+class Recorder:
+    """A transport whose reads last until `go` is set."""
+
+    port, last_byte = "recorder", None
+
+    def __init__(self):
+        self.reading, self.go = threading.Event(), threading.Event()
+        self.closed = self.closed_while_reading = False
+
+    def write(self, data):
+        pass
+
+    def read(self, count, timeout):
+        self.reading.set()
+        self.go.wait(5.0)
+        self.closed_while_reading = self.closed
+        return b"\x08"
+
+    def pending(self):
+        return False
+
+    def flush_input(self):
+        pass
+
+    def close(self):
+        self.closed = True
+
+
+def test_closing_waits_for_the_read_under_way():
+    link = Recorder()
+    line = HandLine(link)
+    reader = threading.Thread(target=line.answers, args=(b"\x4b\x00", 1))
+    reader.start()
+    assert link.reading.wait(5.0)
+    closer = threading.Thread(target=line.close)
+    closer.start()
+    with pytest.raises(HandConnectionLost):  # from now on, though the port is not closed yet
+        while closer.is_alive():
+            line.send(b"\x41")
+            time.sleep(0.001)
+    link.go.set()
+    for thread in (reader, closer):
+        thread.join(5.0)
+    assert link.closed and not link.closed_while_reading
+
+
+@pytest.mark.parametrize("piece", [1, 3])
+def test_a_line_that_takes_few_bytes_at_a_time_loses_none(monkeypatch, piece):
+    near, far = socket.socketpair()
+    line = SerialTransport.__new__(SerialTransport)
+    line.port, line.last_byte, line._fd = "slow", None, near.fileno()
+    write, calls = os.write, []
+
+    def slow(descriptor, data):
+        calls.append(data)
+        if len(calls) % 2:
+            raise BlockingIOError
+        return write(descriptor, data[:piece])
+
+    monkeypatch.setattr(transport.os, "write", slow)
+    frame = bytes.fromhex("48 00 1E FE C8 64 48")
+    line.write(frame)
+    monkeypatch.undo()
+    assert far.recv(64) == frame
+    near.close()
+    far.close()
+
+
+@pytest.fixture
+def node():
+    """A hand node without its topics: what it would tell is kept in `told`."""
+    hand_node = pytest.importorskip("ih2_hand.ros.hand_node", reason="rospy or messages missing")
+    node = hand_node.HandNode.__new__(hand_node.HandNode)
+    node.told = []
+    node.port, node.driver, node.calibrated, node.calibrating = "port", None, False, False
+    node._event = (Reason.NONE, "")
+    node._lost_lock = threading.Lock()
+
+    def event(text, reason=Reason.NONE):
+        node._event = (reason, text)
+        node.told.append((reason, node.calibrated, node.calibrating))
+
+    node.event = event
+    return node
+
+
+def test_whatever_a_port_raises_the_node_tries_again(node):
+    node._open = raise_termios
+    node._connect()
+    node._connect()
+    assert node.told == [(Reason.HAND_LINK_LOST, False, False)] and "termios" not in node.message
+
+
+class Calibrates:
+    """A driver whose calibration ends as it is told."""
+
+    def __init__(self, error=None):
+        self.error = error
+
+    def calibration(self, kind):
+        if self.error:
+            raise self.error
+
+    def close(self):
+        pass
+
+
+@pytest.mark.parametrize("error, reason", [
+    (None, Reason.HAND_ENDED), (HandConnectionLost("gone"), Reason.HAND_LINK_LOST),
+    (AttributeError("'NoneType' object"), Reason.UNEXPECTED)])
+def test_a_calibration_ends_however_it_ends(node, error, reason):
+    node.driver, node.calibrating = Calibrates(error), True
+    node._run_calibration(node.driver, "fast")
+    assert not node.calibrating and node.calibrated == (error is None)
+    assert node.told[0][0] is reason
+
+
+def test_a_calibration_of_a_lost_hand_says_nothing_of_the_new_one(node):
+    node.driver, node.calibrating = Calibrates(), True
+    node._run_calibration(Calibrates(), "fast")
+    assert not node.calibrated and not node.calibrating and node.driver is not None
+    assert node.told[0][0] is Reason.HAND_LINK_LOST
