@@ -15,7 +15,7 @@ import numpy as np
 import rospy
 import rostest
 import yaml
-from coglab_msgs.msg import Contact, Transition
+from coglab_msgs.msg import Contact, MasterState, ReasonCode, Transition
 from coglab_msgs.srv import ArmContact, GetObject, ListObjects, Start
 from coglab_smach.reachability import default_arm, home_posture, position_jacobian
 from coglab_smach.torque_signal import TorqueSignal
@@ -142,11 +142,18 @@ class BrainNodes(unittest.TestCase):
         shown = json.loads(rospy.wait_for_message("/coglab/results", String, LIMIT).data)
         self.assertEqual(shown["reason"], written["reason"])
         self.assertTrue(why.startswith(written["reason"]))
+        self.assertEqual(written["reason_code"], ReasonCode.NODE_SILENT)
+        state = rospy.wait_for_message("/coglab/state", MasterState, LIMIT)
+        self.assertEqual((state.state, state.in_hub, state.actions), ("/coglab_master/fault", True, ["initialise"]))
+        self.assertEqual((state.why, state.reason_code), (why, ReasonCode.NODE_SILENT))
+        self.assertTrue(why.endswith("type: ./coglab start initialise") and answer.message.endswith("start initialise"))
+        self.assertEqual(answer.reason_code, ReasonCode.WRONG_STATE)
         self.assertTrue(start("initialise", "").success)
         end = time.monotonic() + LIMIT
         while not any("is its node running?" in t.reason for t in transitions) and time.monotonic() < end:
             time.sleep(0.1)
-        self.assertTrue(any("is its node running?" in t.reason for t in transitions))
+        self.assertTrue(any("is its node running?" in t.reason and t.reason_code == ReasonCode.NODE_SILENT
+                            for t in transitions))
 
     def test_6_a_second_one_in_its_own_namespace_ends_without_a_traceback(self):
         config = rospy.get_param("/coglab/config_file")

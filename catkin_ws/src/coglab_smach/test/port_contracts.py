@@ -215,15 +215,16 @@ class HandContract(Contract):
     def test_a_newcomer_can_open_but_not_grasp(self):
         self.until(lambda: self.port.state().connected, 15.0, "the hand")
         if not self.port.state().calibrated:
-            self.refused(self.port.preshape("cylindrical", "medium"))
+            self.refused(self.port.preshape("cylindrical", "medium"), ReasonCode.HAND_NOT_CALIBRATED)
             self.settle(self.port.open(511), 8.0)
         self.calibrated()
         assert not self.port.state().holding
 
     def test_refusals(self):
         self.calibrated()
-        self.refused(self.port.preshape("fist", "medium"))
-        self.refused(self.port.open(9999))
+        self.refused(self.port.preshape("fist", "medium"), ReasonCode.INVALID_ARGUMENT)
+        for speed in (9999, 0, -1):
+            self.refused(self.port.open(speed), ReasonCode.OUT_OF_RANGE)
         self.settle(self.port.open(511), 8.0)
         self.refused(self.port.close_on_object())
 

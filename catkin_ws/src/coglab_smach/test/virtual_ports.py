@@ -150,7 +150,7 @@ class VirtualHand:
         try:
             hand.begin(task)
         except Exception as error:
-            return Ready(error=PortError(str(error)))
+            return Ready(error=PortError(str(error), code=getattr(error, "reason", 0)))
 
         def value():
             if not hand.verdict.ok:

@@ -168,7 +168,7 @@ class HandPort(Protocol):
         """Close the preshaped hand; value: None when it has closed or stalled on an object."""
 
     def open(self, speed: int) -> Pending:
-        """Open at a wire speed 0..511; value: None."""
+        """Open at a wire speed 1..511; value: None."""
 
     def state(self) -> HandState:
         """The newest status; connected=False if the node is silent for more than 1 s."""

@@ -219,8 +219,8 @@ class SimulatedHand:
         return self._move("close", 1.0, positions, True)
 
     def open(self, speed: int) -> Pending:
-        if not 0 <= speed <= 511:
-            return Ready(error=PortError(f"open refused: speed is {speed}, expected 0..511",
+        if not 1 <= speed <= 511:
+            return Ready(error=PortError(f"open refused: speed is {speed}, expected 1..511",
                                          code=ReasonCode.OUT_OF_RANGE))
         return self._move("open", 0.8, lambda: (0, 0, 0, 0, 0), False)
 
