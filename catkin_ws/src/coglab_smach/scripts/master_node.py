@@ -4,7 +4,8 @@
 Names are relative to the node's namespace.
 Services: coglab/start (coglab_msgs/Start), coglab/stop, coglab/why (std_srvs/Trigger).
 Topics: coglab/transitions (coglab_msgs/Transition), coglab/results (std_msgs/String, one JSON object per action,
-latched), coglab/holding (std_msgs/String, what the hand holds, latched), coglab/state (coglab_msgs/MasterState, latched).
+latched), coglab/holding (std_msgs/String, what the hand holds, latched), coglab/state (coglab_msgs/MasterState,
+latched).
 Parameters: perception/frames (names of human_hand and board). Private: config_file, dmp_library (path of the
 primitives), auto_trigger, result_file (JSON lines), state_file (what the hand holds, to survive a restart; default
 coglab_holding.json in ROS_HOME), config_overrides (mapping of dotted names), introspection (default true).

@@ -137,8 +137,8 @@ def test_arm_node_dead_ends_in_fault_with_its_sentence():
         t.wait_hub("fault")
 
     trial.run(script)
-    assert trial.ctx.journal.why() == ("wait_stop: the arm does not follow any more; the motion could not be ended: the "
-                                       "robot is silent, because /lwr/state is silent")
+    assert trial.ctx.journal.why() == ("wait_stop: the arm does not follow any more; the motion could not be ended: "
+                                       "the robot is silent, because /lwr/state is silent")
     assert trial.result().outcome == "fault"
 
 

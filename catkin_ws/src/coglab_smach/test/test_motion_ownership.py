@@ -99,8 +99,9 @@ def test_preempted_after_the_last_look_nothing_follows():
 
     def script(t):
         t.wait_hub("wait_without_object")
-        switch = t.master.get_children()[RECEIVE].get_children()["approach"].get_children()["arm_motion"].get_children()[
-            "switch_to_dmp"]
+        switch = t.master
+        for label in (RECEIVE, "approach", "arm_motion", "switch_to_dmp"):
+            switch = switch.get_children()[label]
         work = switch.run
 
         def run(ud):

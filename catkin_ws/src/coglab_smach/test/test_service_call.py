@@ -7,7 +7,10 @@ from types import SimpleNamespace
 
 import pytest
 
-rospy = pytest.importorskip("rospy", reason="rospy is not installed")
+pytest.importorskip("rospy", reason="rospy is not installed")
+import io
+
+import rospy
 from coglab_msgs.msg import ReasonCode
 from coglab_msgs.srv import LwrCommand
 from coglab_smach import ros_calls
@@ -31,7 +34,7 @@ class Server:
 
     def call(self, request):
         assert self.thawed.wait(10.0)
-        buff = __import__("io").BytesIO()
+        buff = io.BytesIO()
         request.serialize(buff)  # as rospy does once the connection stands
         self.heard.append(request.event)
         return self.answer

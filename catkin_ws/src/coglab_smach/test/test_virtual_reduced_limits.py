@@ -1,5 +1,5 @@
-"""With the reduced limits of the operating mode T1, on the real controllers, what takes long is waited for. The way to the
-board and back by default; COGLAB_LONG=1: all four actions. (test_motion_ownership: all four on the simulated arm.)"""
+"""With the reduced limits of the operating mode T1, on the real controllers, what takes long is waited for. The way to
+the board and back by default; COGLAB_LONG=1: all four actions. (test_motion_ownership: all four on the simulated arm.)"""
 import os
 
 import pytest
@@ -24,7 +24,8 @@ def test_actions_succeed_within_t1(tmp_path, actions, where):
     reduced.write_text(yaml.safe_dump({**table, "default": {**table["default"], **table["t1"]}}))
     trial = VirtualTrial(seed=3, object_on=where, limits=str(reduced))
     results = trial.run(*actions, limit=200.0)
-    assert [(r.kind, r.outcome) for r in results] == [(action, "succeeded") for action in actions], trial.ctx.journal.why()
+    wanted = [(action, "succeeded") for action in actions]
+    assert [(r.kind, r.outcome) for r in results] == wanted, trial.ctx.journal.why()
     assert trial.rig.robot.limit_violations == 0
     # Fixed limits for the full speed would not have been enough: the way to the board alone takes 20 s.
     assert max(r.ended - r.started for r in results) > 40.0

@@ -125,7 +125,8 @@ class VirtualArm:
         if end is not None and end["executed"]:
             return [None]
         if end is not None:
-            return [PortError("the point-to-point motion ended before its target", (end["reason"],), end["reason_code"])]
+            return [PortError("the point-to-point motion ended before its target", (end["reason"],),
+                              end["reason_code"])]
         if robot.report["fault"]:
             return [PortError("the point-to-point motion ended in a fault", (robot.report["reason"],))]
         return [] if allowed.ok else [PortError("the arm does not follow any more", (allowed.why,))]

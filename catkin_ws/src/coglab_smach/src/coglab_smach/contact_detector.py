@@ -162,8 +162,8 @@ class ContactDetector:
 
     def _in_time(self, stamp: float) -> bool:
         """Whether a sample follows the one before it. A single one that does not is ignored; two that follow each other
-        mean that the clock was set, or that no samples came for long: an arming keeps the time that it had left, and the
-        arm counts as still only once it was seen so again."""
+        mean that the clock was set, or that no samples came for long: an arming keeps the time that it had left, and
+        the arm counts as still only once it was seen so again."""
         last, odd, self._odd_stamp = self._last_stamp, self._odd_stamp, None
         if last is None or 0.0 < stamp - last <= LONGEST_STEP:
             return True

@@ -54,8 +54,8 @@ class Context:
     reachable: Callable[[Pose], bool] = lambda pose: True
     """whether the arm can bring the palm to a pose in the base frame"""
     shared: bool = False
-    """the person may hold the object that is in the robot's fingers: from the closing on an object that is offered until
-    its weight is felt, and from the person's taking of the load until the hand is open"""
+    """the person may hold the object that is in the robot's fingers: from the closing on an object that is offered
+    until its weight is felt, and from the person's taking of the load until the hand is open"""
     _holding: str = ""
 
     def __post_init__(self) -> None:

@@ -6,7 +6,6 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
-
 NOTHING_FAILED = "Nothing has failed since the last success or reset."
 
 

@@ -47,4 +47,5 @@ class StateWatch:
         if hub in ("stopped", "fault") and COMMAND not in why:
             why = f"{why or f'the machine is in {hub}'}; to go on {command(*ctx.requests.allowed())}"
         active = ctx.journal.active()  # of several side by side the one that began last
-        return MasterState(active[-1] if active else "", bool(hub), ctx.requests.allowed(), ctx.holding, why, failure.code)
+        return MasterState(active[-1] if active else "", bool(hub), ctx.requests.allowed(), ctx.holding, why,
+                           failure.code)

@@ -85,8 +85,8 @@ class Requests:
             return Answer(False, f"'{action}' refused: {self._hub} takes {', '.join(self._allowed)}; "
                                  f"{command(*self._allowed)}", ReasonCode.WRONG_STATE)
         if self._names_object and not object_id:
-            return Answer(False, f"'{action}' refused: the hand holds an object that is not known after a restart; name "
-                                 f"its object_id, {command(action)} OBJECT", ReasonCode.OBJECT_UNKNOWN)
+            return Answer(False, f"'{action}' refused: the hand holds an object that is not known after a restart; "
+                                 f"name its object_id, {command(action)} OBJECT", ReasonCode.OBJECT_UNKNOWN)
         if self._request is not None:
             return Answer(False, f"'{action}' refused: '{self._request.action}' was asked for a moment ago",
                           ReasonCode.BUSY)

@@ -32,17 +32,18 @@ from coglab_msgs.srv import (
 from geometry_msgs.msg import Point, Quaternion, TransformStamped, Vector3
 from sensor_msgs.msg import JointState
 
+from .manager_limits import read_limits
 from .motion_time import MotionLimits
 from .pending import Pending, Permit, Polled, PortError, Threaded
 from .ports import DmpProgress, DmpRequest, Verdict
 from .ros_calls import Newest, call, call_now, mapped
-from .manager_limits import read_limits
 
 JOINTS = ("lwr_a1", "lwr_a2", "lwr_e1", "lwr_a3", "lwr_a4", "lwr_a5", "lwr_a6")
 
 
 class RosArm:
-    """ArmPort over controller_manager and lwr; it drives the plug-ins loaded under the ids dmp and ptp. Shows the goal of the running motion as tf frame ``dmp_goal``."""
+    """ArmPort over controller_manager and lwr; it drives the plug-ins loaded under the ids dmp and ptp. Shows the goal
+    of the running motion as tf frame ``dmp_goal``."""
 
     def __init__(self, manager: str = "controller_manager", lwr: str = "lwr") -> None:
         self._manager, self._lwr = manager, lwr
@@ -154,8 +155,8 @@ class RosArm:
     def profile_settled(self, profile: str) -> Verdict:
         message = self._cascade.message
         if message is None:
-            return Verdict(False, f"{self._manager}/feedback/status has never been published; is the robot node running?",
-                           ReasonCode.NODE_SILENT)
+            return Verdict(False, f"{self._manager}/feedback/status has never been published; is the robot node "
+                                  "running?", ReasonCode.NODE_SILENT)
         if message.profile != profile:
             return Verdict(False, f"profile '{message.profile}' is in force")
         busy = [f"{c.name} is {c.activity}" for c in message.controllers if not c.enabled and c.activity != "off"]

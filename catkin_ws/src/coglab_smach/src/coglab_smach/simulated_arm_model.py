@@ -1,7 +1,7 @@
 """The arm of the kinematic cell: seven joints, their motions, and the controllers that drive them.
 
-A motion goes on until its end, whoever waits for it; it ends before only by cancelling, a switch, a hold, an abort or the
-loss of command mode, and then the arm brakes.
+A motion goes on until its end, whoever waits for it; it ends before only by cancelling, a switch, a hold, an abort or
+the loss of command mode, and then the arm brakes.
 """
 from __future__ import annotations
 

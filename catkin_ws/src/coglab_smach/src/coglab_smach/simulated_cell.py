@@ -1,7 +1,7 @@
 """The kinematic cell behind the simulated ports: state, faults and the partner's script.
 
-A request acts when its time has come, whether or not anybody waits for it, as over ROS: only what could not be sent yet,
-because the node behind the port is frozen, can be given up.
+A request acts when its time has come, whether or not anybody waits for it, as over ROS: only what could not be sent
+yet, because the node behind the port is frozen, can be given up.
 """
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ class Faults:
     """What is broken. Sets of names are compared with the port method that is called."""
 
     dead: set[str] = field(default_factory=set)
-    """ports whose node is frozen: arm, hand, perception, database, contact. What is asked of it acts when it comes back,
-    unless it was given up."""
+    """ports whose node is frozen: arm, hand, perception, database, contact. What is asked of it acts when it comes
+    back, unless it was given up."""
     refuse: dict[str, str | PortError] = field(default_factory=dict)
     """port method -> sentence, or error with its code, with which it refuses"""
     not_seen: set[str] = field(default_factory=set)

@@ -1,7 +1,7 @@
 """Ports without ROS: a kinematic cell in which the machines run in virtual time, for tests and quick trials.
 
-The arm is a model that moves and brakes (simulated_arm_model), the hand takes fixed times, the partner follows a script. Faults
-are attributes that a test sets at any time. Physics belongs to coglab_sim; here only order, timing and outcomes matter.
+The arm is a model that moves and brakes (simulated_arm_model), the hand takes fixed times, the partner follows a script.
+Faults are attributes that a test sets at any time. Physics belongs to coglab_sim; here only order, timing and outcomes matter.
 """
 from __future__ import annotations
 
@@ -18,7 +18,6 @@ from .pending import Pending, Polled, PortError, Ready
 from .ports import ContactEvent, DmpProgress, DmpRequest, HandState, Located, Recognition, Verdict
 from .pose import Pose
 from .simulated_cell import SimulatedCell
-
 
 MODES = ("cylindrical", "lateral", "tridigit", "bidigit", "tridigit2", "bidigit2")
 """preshapes of the hand"""
@@ -168,8 +167,8 @@ class SimulatedArm:
 
 
 class SimulatedHand:
-    """HandPort of the kinematic cell; the hand is calibrated from the first calibration on. One order at a time: a newer
-    one ends the older."""
+    """HandPort of the kinematic cell; the hand is calibrated from the first calibration on. One order at a time: a
+    newer one ends the older."""
 
     def __init__(self, cell: SimulatedCell) -> None:
         self.cell = cell
@@ -316,7 +315,8 @@ class SimulatedContact:
             if mode != "contact" and not float(settings.get("mass", 0.0)) > 0.0:
                 raise PortError(f"arm refused: {mode} needs the mass of the object in kg")
             if mode == "load" and not self._touched:
-                raise PortError("arm refused: load is counted from the torque before the contact: arm for contact first")
+                raise PortError("arm refused: load is counted from the torque before the contact: arm for "
+                                "contact first")
             after = {"contact": partner.touch_after, "load": partner.let_go_after, "release": partner.take_after}[mode]
             now = cell.clock.now()
             self._touched = self._touched or mode == "contact"
@@ -338,7 +338,8 @@ class SimulatedContact:
         now = self.cell.clock.now()
         happens = self._due is not None and self._due <= min(now, self._until)
         if self._event is None and self._mode and happens and "contact" not in self.cell.faults.dead:
-            self._event = ContactEvent(self._mode != "release", "simulated", 2.0, f"{self._mode} by the partner's script")
+            self._event = ContactEvent(self._mode != "release", "simulated", 2.0,
+                                       f"{self._mode} by the partner's script")
         return self._event
 
 

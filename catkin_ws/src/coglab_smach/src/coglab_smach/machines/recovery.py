@@ -128,8 +128,8 @@ class WhatIsHeld(CoglabState):
 
 
 def build_recovery(ctx: Context, operator: bool = False) -> CoglabMachine:
-    """Outcomes: empty, holding (arm at home), stopped (STOP is latched, the arm is blocked, or a person may hold what is
-    in the hand), fault (arm or controller does not obey). ``operator``: the recovery that a 'reset' begins."""
+    """Outcomes: empty, holding (arm at home), stopped (STOP is latched, the arm is blocked, or a person may hold
+    what is in the hand), fault (arm or controller does not obey). ``operator``: the recovery that a 'reset' begins."""
     machine = CoglabMachine(ctx, "recover", ["empty", "holding", "stopped", "fault", "preempted"])
     failed = {"failed": "check_stop", "preempted": "preempted"}
     with machine:

@@ -6,7 +6,6 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 import smach
-
 from coglab_msgs.msg import ReasonCode
 
 from ..config import ConfigError
