@@ -1,6 +1,6 @@
 """What every port promises, checked on the real adapter (port_contracts_rostest.py, on a running system) and on its
-double (test_port_contracts.py): what it takes, what it refuses, how it runs out of time, what cancel does, and what happens
-while its node is frozen. A double that is kinder than the real port fails here.
+double (test_port_contracts.py): what it takes, what it refuses, how it runs out of time, what cancel does, and what
+happens while its node is frozen. A double that is kinder than the real port fails here.
 
 A suite gets a Place: the port, the clock that it lives on, and how its node is frozen and thawed.
 """

@@ -115,8 +115,8 @@ class ArmPort(Protocol):
 
     def cancel_motion(self, reason: str) -> Pending:
         """End every motion that runs or waits; the arm brakes within its limits. Value: None, once the set-point
-        stands. With nothing to end it succeeds too. This request alone is never withdrawn: giving up waiting for it leaves it
-        in force."""
+        stands. With nothing to end it succeeds too. This request alone is never withdrawn: giving up waiting for it
+        leaves it in force."""
 
     def motion_limits(self) -> MotionLimits:
         """What bounds the arm's speed; the reduced limits where a reduced profile is in force."""

@@ -1,7 +1,8 @@
 """Ports without ROS: a kinematic cell in which the machines run in virtual time, for tests and quick trials.
 
-The arm is a model that moves and brakes (simulated_arm_model), the hand takes fixed times, the partner follows a script.
-Faults are attributes that a test sets at any time. Physics belongs to coglab_sim; here only order, timing and outcomes matter.
+The arm is a model that moves and brakes (simulated_arm_model), the hand takes fixed times, the partner follows a
+script. Faults are attributes that a test sets at any time. Physics belongs to coglab_sim; here only order, timing and
+outcomes matter.
 """
 from __future__ import annotations
 
