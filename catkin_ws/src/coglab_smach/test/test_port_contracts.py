@@ -45,3 +45,28 @@ def test_double(name, test):
     contract = SUITES[name](double_of(name))
     contract.begin()
     getattr(contract, test)()
+
+
+RIG_LACKS = ("test_given_up_while_its_node_is_frozen_it_never_acts", "test_a_hold_ends_the_motion_and_latches")
+"""there is no node to freeze, and the report tells in words alone what blocks"""
+
+
+def test_the_arm_of_whole_trials():
+    """The arm of the trials in virtual time, which has the real controllers behind it."""
+    try:
+        from virtual_ports import VirtualArm
+        from virtual_rig import DT, Rig
+        from virtual_trial import LIBRARY
+    except ImportError as error:
+        pytest.skip(f"a compiled module is not there: {error}")
+    rig = Rig(1)
+
+    def sleep(duration):
+        for _ in range(max(1, round(duration / DT))):
+            rig.step()
+
+    sleep(1.0)
+    suite = SUITES["arm"](Place(VirtualArm(rig), lambda: rig.t, sleep, None, None, LIBRARY))
+    for test in [name for name in vars(SUITES["arm"]) if name.startswith("test_") and name not in RIG_LACKS]:
+        suite.begin()
+        getattr(suite, test)()

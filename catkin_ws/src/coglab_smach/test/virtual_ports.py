@@ -24,7 +24,12 @@ class VirtualArm:
         return answered(*answer[:2], self.robot.reason_code, value)
 
     def load_controller(self, controller_id, controller_type):
-        done = self._answered(self.robot.load_controller(controller_id, controller_type))
+        if self.rig.robot.loaded.get(controller_id) == controller_type:
+            return Ready()
+        answer = self.robot.load_controller(controller_id, controller_type)
+        done = self._answered(answer)
+        if answer[0]:
+            self.rig.robot.loaded[controller_id] = controller_type
         if controller_id == "dmp":
             self.robot.set_ik_debug(True)
         return done
@@ -34,7 +39,10 @@ class VirtualArm:
         return self._answered(answer, answer[2])
 
     def lwr_command(self, event):
-        ticket, outcome = self.robot.submit(event), []
+        try:
+            ticket, outcome = self.robot.submit(event), []
+        except ValueError as error:
+            return Ready(error=PortError(str(error), code=ReasonCode.UNKNOWN_NAME))
 
         def done():
             if not outcome:
@@ -85,17 +93,24 @@ class VirtualArm:
         return self.rig.speed_scale
 
     def switch_controller(self, controller_id):
-        return self._answered(self.robot.switch_controller(controller_id))
+        return self._answered(self.robot.switch_controller(controller_id), self.rig.robot.loaded.get(controller_id))
 
     def execute_dmp(self, request):
         self.request = request
         self.rig.robot.debug = None
-        return self._answered(self.robot.execute_dmp(request.primitive_id, request.dmp_ratio, request.goal_offset, True,
-                                                     request.target_orientation, request.goal_frame))
+        return self._ends_motion(self._answered(self.robot.execute_dmp(*self._fields(request), request.goal_frame)))
 
     def switch_dmp(self, request):
-        return self._answered(self.robot.switch_dmp(request.primitive_id, request.dmp_ratio, request.goal_offset, True,
-                                                    request.target_orientation))
+        return self._answered(self.robot.switch_dmp(*self._fields(request)))
+
+    @staticmethod
+    def _fields(request):
+        turned = request.target_orientation is not None
+        return (request.primitive_id, request.dmp_ratio, list(request.goal_offset), turned,
+                list(request.target_orientation) if turned else [0.0, 0.0, 0.0, 0.0])
+
+    def _ends_motion(self, pending):
+        return Polled(pending.done, pending.result, lambda: self.cancel_motion("its owner has given up waiting"))
 
     def dmp_progress(self):
         now = self.robot.dmp_progress()
@@ -117,7 +132,7 @@ class VirtualArm:
             if ended[0] is not None:
                 raise ended[0]
 
-        return Polled(done, value, lambda: self.cancel_motion("its owner has given up waiting"))
+        return self._ends_motion(Polled(done, value))
 
     def _end_of_ptp(self, identity):
         robot = self.rig.robot

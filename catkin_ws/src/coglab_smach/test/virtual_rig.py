@@ -55,6 +55,7 @@ class Robot:
         self.report = self.virtual.report()
         self.progress = {"motion": "idle", "reason": "", "primitive": "", "phase": 0.0, "remaining_distance": 0.0}
         self.ended: dict[int, dict] = {}
+        self.loaded: dict[str, str] = {}
         self.peak_share = 0.0
         self.limit_violations = 0
         self.debug = None
@@ -66,7 +67,8 @@ class Robot:
         self.report = report = self.virtual.report()
         if report["fri_period"] <= 0.0:
             return
-        self.ended.update((end["ptp_id"], end) for end in self.virtual.ptp_ends())
+        if "ptp" in self.loaded:
+            self.ended.update((end["ptp_id"], end) for end in self.virtual.ptp_ends())
         q, commanded = np.asarray(report["position"]), np.asarray(report["commanded_position"])
         outside = any(np.any(v < self.limits.lower_position) or np.any(v > self.limits.upper_position)
                       for v in (q, commanded))
