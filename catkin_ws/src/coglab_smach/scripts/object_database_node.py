@@ -2,7 +2,7 @@
 """The node /object_database: serves the object files of a folder and reads them again when they change.
 
 Services (private): get_object, list_objects, reload (std_srvs/Trigger: problems in words).
-Parameter (private): folder. Mirrors the good entries read-only to ~objects/<id>.
+Parameters: ~folder; ih2_hand/dialect (legacy), that of the hand. Mirrors the good entries read-only to ~objects/<id>.
 """
 import sys
 
@@ -11,39 +11,64 @@ from coglab_msgs.srv import GetObject, GetObjectResponse, ListObjects, ListObjec
 from coglab_smach.object_database import ObjectDatabase, ObjectError
 from std_srvs.srv import Trigger, TriggerResponse
 
+MIRROR = "~objects"
+
 
 class ObjectDatabaseNode:
     """Thin node over ObjectDatabase."""
 
     def __init__(self) -> None:
-        self.database = ObjectDatabase(rospy.get_param("~folder"))
+        self.database = ObjectDatabase(str(rospy.get_param("~folder")),
+                                       str(rospy.get_param("ih2_hand/dialect", "legacy")))
+        self.reported: list[str] = []
+        self.mirrored: dict[str, str] | None = None  # text by id; None: what an earlier run has left is not removed yet
+        self.behind = False  # the mirror could not be brought up to the database
         self.reload(only_changed=False)
         rospy.Service("~get_object", GetObject, self.on_get)
         rospy.Service("~list_objects", ListObjects, lambda _request: ListObjectsResponse(self.database.ids()))
         rospy.Service("~reload", Trigger, self.on_reload)
         rospy.Timer(rospy.Duration(1.0), self.on_timer)
-        self.reported: list[str] = []
 
     def reload(self, only_changed: bool) -> list[str]:
-        """Read, warn about each problem, mirror to the parameter server."""
+        """Read, warn about each problem that is new, mirror to the parameter server."""
         problems = self.database.reload(only_changed)
-        for problem in problems:
-            rospy.logwarn("object database: %s", problem)
-        for object_id in self.database.ids():
-            rospy.set_param(f"~objects/{object_id}", self.database.get(object_id))
-        return problems
-
-    def on_timer(self, _event) -> None:
-        """Hot reload; a file that stays bad is reported once."""
-        if not self.database.changed():
-            return
-        problems = self.database.reload(only_changed=True)
         for problem in problems:
             if problem not in self.reported:
                 rospy.logwarn("object database: %s", problem)
-        self.reported = problems
-        for object_id in self.database.ids():
-            rospy.set_param(f"~objects/{object_id}", self.database.get(object_id))
+        self.reported = list(problems)
+        self.mirror()
+        return problems
+
+    def mirror(self) -> None:
+        """Bring ~objects up to the database; what the master does not take is tried again each second."""
+        try:
+            if self.mirrored is None:
+                if rospy.has_param(MIRROR):
+                    rospy.delete_param(MIRROR)
+                self.mirrored = {}
+            wanted = {object_id: self.database.text(object_id) for object_id in self.database.ids()}
+            for gone in set(self.mirrored) - set(wanted):
+                rospy.delete_param(f"{MIRROR}/{gone}")
+                del self.mirrored[gone]
+            for object_id, text in wanted.items():
+                if self.mirrored.get(object_id) != text:
+                    rospy.set_param(f"{MIRROR}/{object_id}", self.database.get(object_id))
+                    self.mirrored[object_id] = text
+            self.behind = False
+        except Exception as error:  # the master is away, or will not have a value: the services go on
+            if not self.behind:
+                rospy.logwarn("object database: %s is not up to date: %s", rospy.resolve_name(MIRROR), error)
+            self.behind = True
+
+    def on_timer(self, _event) -> None:
+        """Hot reload. Nothing may end the timer."""
+        try:
+            if self.database.changed():
+                self.reload(only_changed=True)
+            elif self.behind:
+                self.mirror()
+        except Exception as error:
+            rospy.logerr_throttle(10.0, f"object database: not read again ({type(error).__name__}: {error})")
 
     def on_get(self, request):
         """One entry as YAML text."""

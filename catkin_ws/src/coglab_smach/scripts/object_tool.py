@@ -1,13 +1,14 @@
 #!/usr/bin/python3
 """Objects on the command line: list them, check them (schema, consistency, reachability), start a new one.
 
-Usage: object_tool.py [--folder DIR] list | check [ID ...] | new ID. Exit status: 0 well, 1 a check failed, 2 usage.
+Usage: ./coglab object [--folder DIR] [--dialect D] list | check [ID ...] | new ID. Exit status: 0 well, 1 a check
+failed, 2 usage.
 """
 import argparse
 import sys
 from pathlib import Path
 
-from coglab_smach.object_database import ObjectDatabase, ObjectError, new_object_text, parse_object
+from coglab_smach.object_database import ObjectDatabase, ObjectError, new_object_text, read_object
 from coglab_smach.reachability import reachability_report
 
 
@@ -28,21 +29,17 @@ def cmd_list(database: ObjectDatabase) -> int:
         print(f"{object_id:12} {entry['mass']:5.2f} kg  grasps: {', '.join(entry['grasps'])}  {entry['name']}")
     for problem in database.problems:
         print(problem, file=sys.stderr)
-    print("next: object_tool.py check")
+    print("next: ./coglab object check")
     return 1 if database.problems else 0
 
 
-def cmd_check(folder: Path, ids: list[str]) -> int:
+def cmd_check(folder: Path, ids: list[str], dialect: str) -> int:
     """Schema, consistency and reachability of each object."""
     failed = 0
     files = [folder / f"{i}.yaml" for i in ids] or sorted(folder.glob("*.yaml"))
     for path in files:
         try:
-            entry = parse_object(path.read_text(encoding="utf-8"), path.name)
-        except OSError as error:
-            print(f"{path}: cannot be read ({error.strerror})")
-            failed += 1
-            continue
+            entry, _ = read_object(path, dialect)
         except ObjectError as error:
             print(error)
             failed += 1
@@ -51,7 +48,7 @@ def cmd_check(folder: Path, ids: list[str]) -> int:
         for line, ok in reachability_report(entry):
             print(f"  {line}")
             failed += 0 if ok else 1
-    print("next: object_tool.py list" if not failed else f"{failed} problems")
+    print(f"{len(files)} objects are well" if not failed else f"{failed} problems")
     return 1 if failed else 0
 
 
@@ -67,7 +64,7 @@ def cmd_new(folder: Path, object_id: str) -> int:
         print(error, file=sys.stderr)
         return 2
     path.write_text(text, encoding="utf-8")
-    print(f"wrote {path}; edit it, then: object_tool.py check {object_id}")
+    print(f"wrote {path}; edit it, then: ./coglab object check {object_id}")
     return 0
 
 
@@ -75,6 +72,8 @@ def main() -> int:
     """Entry point."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--folder", type=Path, default=None, help="folder of the object files")
+    parser.add_argument("--dialect", choices=("legacy", "v17"), default="legacy",
+                        help="of the hand: decides which grasps there are")
     verbs = parser.add_subparsers(dest="verb", required=True)
     verbs.add_parser("list")
     check = verbs.add_parser("check")
@@ -84,10 +83,10 @@ def main() -> int:
     arguments = parser.parse_args()
     folder = arguments.folder or default_folder()
     if arguments.verb == "check":
-        return cmd_check(folder, arguments.ids)
+        return cmd_check(folder, arguments.ids, arguments.dialect)
     if arguments.verb == "new":
         return cmd_new(folder, arguments.id)
-    database = ObjectDatabase(str(folder))
+    database = ObjectDatabase(str(folder), arguments.dialect)
     database.reload()
     return cmd_list(database)
 

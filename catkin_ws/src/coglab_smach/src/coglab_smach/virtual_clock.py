@@ -289,8 +289,8 @@ class VirtualClock(Clock):
                     self._holder = parked.thread
             raise ClockStalled(
                 f"virtual time has stood still at {self._now:.6f} s for {self._stall_limit:g} s of wall time: "
-                f"{running} is running, {waiting} wait; a running thread must wait through the clock, and an event that is "
-                "waited for without a time limit must be set by somebody")
+                f"{running} is running, {waiting} wait; a running thread must wait through the clock, and an event "
+                "that is waited for without a time limit must be set by somebody")
 
 
 class _Threading:

@@ -105,12 +105,13 @@ class GoalQueue:
         self._owner = owner
         self._mailbox: queue.Queue[Item] = queue.Queue()
         self._running: Running | None = None
+        self._newest: Any = None  # the goal that came last
         self._status: rospy.Subscriber | None = None
         self._servers = {}
         for name, (action, _, _) in SPECS.items():
             self._servers[name] = HandActionServer(
                 rospy.resolve_name("~" + name), action,
-                lambda handle, name=name: self._mailbox.put(Item("goal", name, handle)),
+                lambda handle, name=name: self._on_goal(name, handle),
                 lambda handle, name=name: self._mailbox.put(Item("cancel", name, handle)),
                 auto_start=False)
         self._thread = threading.Thread(target=self._work, name="goals", daemon=True)
@@ -146,6 +147,10 @@ class GoalQueue:
         else:
             rospy.logwarn_throttle(1.0, "hand: %d requests wait; further ones are dropped", BACKLOG)
 
+    def _on_goal(self, name: str, handle: Any) -> None:
+        self._newest = handle
+        self._mailbox.put(Item("goal", name, handle))
+
     # -- the thread ------------------------------------------------------------------------------
 
     def _work(self) -> None:
@@ -172,7 +177,12 @@ class GoalQueue:
         if item.kind == "goal":
             if running:
                 self._cancel("replaced by a new goal; fingers stopped", Reason.SUPERSEDED)
-            self._accept(item.name, item.content)
+            if item.content is self._newest:
+                self._accept(item.name, item.content)
+            else:  # a flood of goals must not keep the hand busy with those that are replaced already
+                item.content.set_accepted()
+                replaced = Verdict("replaced by a new goal before it began", reason=Reason.SUPERSEDED)
+                item.content.set_canceled(_result(item.name, replaced), replaced.text)
             if not self._running:
                 self._unsubscribe()
         elif item.kind == "cancel":
