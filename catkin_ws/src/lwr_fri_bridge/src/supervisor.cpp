@@ -20,6 +20,13 @@ const char* describe(MotionBlock block) {
       return "stop was asked for";
     case MotionBlock::Leashed:
       return "the set-point ran ahead of the arm, something blocks it; ask for the motion anew";
+    case MotionBlock::PoorQuality:
+      return "the robot controller judged the connection unacceptable: answers were missing or "
+             "late; look at answer rate and latency on /diagnostics, relieve this computer or its "
+             "network, then send start";
+    case MotionBlock::DriveError:
+      return "a drive reported an error; read its message on the pendant, remove the cause, "
+             "acknowledge it there, then send start";
   }
   return "?";
 }

@@ -29,8 +29,10 @@ enum class MotionBlock : std::uint8_t {
   NotStarted,    ///< no `start` since the last stop or fall-back
   Held,          ///< `hold` is latched until `reset`
   Stopping,      ///< `stop` was asked for; braking or waiting for monitor mode
-  Leashed  ///< the set-point ran ahead of the arm; it returns, and the motion must be asked for
-           ///< anew
+  Leashed,  ///< the set-point ran ahead of the arm; it returns, and the motion must be asked for
+            ///< anew
+  PoorQuality,  ///< the controller judged the connection unacceptable; stopped until `start`
+  DriveError    ///< a drive reported an error, with or without power; stopped until `start`
 };
 
 /// Words for a MotionBlock, for messages to the user.
