@@ -6,8 +6,6 @@ import time
 from collections.abc import Sequence
 from typing import Any
 
-import rospy
-import tf2_ros
 from coglab_msgs.msg import ControllerStatus, DmpFeedback, FeedbackStatus, FinishedPtp, LwrState
 from coglab_msgs.srv import (
     AddPtp,
@@ -20,7 +18,7 @@ from coglab_msgs.srv import (
     SwitchController,
     SwitchDmp,
 )
-from geometry_msgs.msg import Point, Quaternion, TransformStamped, Vector3
+from geometry_msgs.msg import Point, Quaternion
 from sensor_msgs.msg import JointState
 
 from .pending import Pending, Polled, PortError, Threaded
@@ -31,7 +29,7 @@ JOINTS = ("lwr_a1", "lwr_a2", "lwr_e1", "lwr_a3", "lwr_a4", "lwr_a5", "lwr_a6")
 
 
 class RosArm:
-    """ArmPort over controller_manager and lwr. Shows the goal of the running motion as tf frame ``dmp_goal``."""
+    """ArmPort over controller_manager and lwr."""
 
     def __init__(self, manager: str = "controller_manager", lwr: str = "lwr") -> None:
         self._manager, self._lwr = manager, lwr
@@ -44,7 +42,6 @@ class RosArm:
         self._status = Newest(f"{manager}/status", ControllerStatus)
         self._cascade = Newest(f"{manager}/feedback/status", FeedbackStatus)
         self._ptp = Newest(f"{manager}/ptp/finished_ptp", FinishedPtp, self._on_finished)
-        self._shown_goal = tf2_ros.StaticTransformBroadcaster()
 
     def _on_finished(self, message: FinishedPtp) -> None:
         with self._lock:
@@ -101,18 +98,8 @@ class RosArm:
 
         def accepted(response: Any) -> None:
             self._started_at = time.monotonic()
-            self._show_goal(request)
 
         return mapped(pending, accepted)
-
-    def _show_goal(self, request: DmpRequest) -> None:
-        """For whoever looks on: where the palm is to go, relative to the tracked frame. Nothing in control reads it."""
-        shown = TransformStamped()
-        shown.header.stamp = rospy.Time.now()
-        shown.header.frame_id, shown.child_frame_id = request.goal_frame, "dmp_goal"
-        shown.transform.translation = Vector3(*request.goal_offset)
-        shown.transform.rotation = Quaternion(*(request.target_orientation or (0.0, 0.0, 0.0, 1.0)))
-        self._shown_goal.sendTransform(shown)
 
     def switch_dmp(self, request: DmpRequest) -> Pending:
         return mapped(call(f"{self._manager}/dmp/switch_dmp", SwitchDmp, wait=1.0, **_dmp_fields(request)),
