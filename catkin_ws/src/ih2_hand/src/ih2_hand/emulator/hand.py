@@ -12,6 +12,9 @@ from ih2_hand.emulator.motor import FREE, Contact, Motor
 from ih2_hand.emulator.parser import FrameParser
 from ih2_hand.wire_choices import WIRE
 
+STIFFEST = 1e6
+"""Counts of current per count of position, of what a finger meets: no object is stiffer."""
+
 STEP_S = 0.002
 """Longest integration step."""
 
@@ -87,8 +90,8 @@ class EmulatedHand:
             raise ValueError(f"contact needs {WIRE.motors} positions and stiffnesses; got "
                              f"{len(positions)} and {len(stiffness)}")
         for motor, position, stiff in zip(self.motors, positions, stiffness, strict=True):
-            if not 0 <= position <= FREE or not stiff >= 0.0:
-                raise ValueError("contact position must be 0..255 and stiffness not negative; got "
+            if not 0 <= position <= FREE or not 0.0 <= stiff <= STIFFEST:
+                raise ValueError(f"contact position must be 0..255 and stiffness 0..{STIFFEST:g}; got "
                                  f"{position} and {stiff} for motor {motor.number}")
             motor.contact = Contact(float(position), float(stiff))
 
