@@ -15,6 +15,7 @@ import yaml
 from coglab_bringup.handover import run_handover
 from coglab_bringup.interface import FRAMES, missing_names
 from coglab_bringup.trial_recorder import TrialRecorder
+from tf2_msgs.msg import TFMessage
 
 CMD = 2  # FRI state in which the arm follows our commands
 FLOAT32 = 5e-4  # rad/s, what rounding to float32 on the wire adds to a velocity (at 10 ms)
@@ -27,9 +28,19 @@ class Handover(unittest.TestCase):
     def setUpClass(cls):
         rospy.init_node("handover_test")
         cls.log = rospy.get_param("/handover_test/log")
+        cls.goal_owners = set()
+        cls.frames = tf2_ros.Buffer()
+        cls.listener = tf2_ros.TransformListener(cls.frames)
+        for topic in ("/tf", "/tf_static"):
+            rospy.Subscriber(topic, TFMessage, cls.on_tf, queue_size=100)
         recorder = TrialRecorder()
         cls.row, cls.start, cls.end = run_handover("exchange_human_to_robot", "mug", recorder)
         cls.trial = recorder.stop()
+
+    @classmethod
+    def on_tf(cls, message):
+        if any(transform.child_frame_id == "dmp_goal" for transform in message.transforms):
+            cls.goal_owners.add(message._connection_header["callerid"])
 
     def test_every_name_of_the_interface(self):
         master = rosgraph.Master("/handover_test")
@@ -39,10 +50,9 @@ class Handover(unittest.TestCase):
         self.assertEqual(problems, [])
 
     def test_frames_of_arm_hand_person_and_goal(self):
-        buffer = tf2_ros.Buffer()
-        self.listener = tf2_ros.TransformListener(buffer)
         for frame in FRAMES:
-            buffer.lookup_transform("world", frame, rospy.Time(0), rospy.Duration(5.0))  # raises where there is none
+            self.frames.lookup_transform("world", frame, rospy.Time(0), rospy.Duration(5.0))  # raises if there is none
+        self.assertEqual(self.goal_owners, {"/robot"})
 
     def test_outcome(self):
         self.assertEqual(self.row["outcome"], "success", self.trial.transitions[-8:])

@@ -89,7 +89,7 @@ class Frames : public GoalSource {
   bool lookup(const std::string&, const std::string&, GoalObservation& goal,
               std::string&) override {
     goal.position = position;
-    goal.stamp_ns = now_ns;
+    goal.stamp_ns = goal.frame_ns = now_ns;
     return true;
   }
   Vector3 position{0.80, 0.0, 0.45};

@@ -1,9 +1,14 @@
 """What the rostests of this package share: the robot's services, a tf2 goal, and bounded waits."""
 from __future__ import annotations
 
+import os
+import signal
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from xmlrpc.client import ServerProxy
 
 import rospy
 import tf2_ros
@@ -43,6 +48,41 @@ def wait_until(condition: Callable[[], bool], seconds: float, what: str) -> None
         if time.monotonic() > end:
             raise AssertionError(f"not within {seconds} s: {what}")
         time.sleep(0.01)
+
+
+def robot_processes() -> list[int]:
+    """Process ids of the nodes that the arm hangs on: one, or two with split:=true."""
+    master = rospy.get_master()
+    nodes = {node for _, who in master.getSystemState()[2][2] for node in who}
+    own = sorted(nodes & {"/robot", "/lwr", "/controller_manager"})
+    return [ServerProxy(master.lookupNode(node)[2]).getPid(rospy.get_name())[2] for node in own]
+
+
+def runs(pid: int) -> bool:
+    """Whether a process has not ended; one that only waits to be reaped has."""
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except OSError:
+        return False
+
+
+def end_within(pids: list[int], seconds: float) -> None:
+    """Asks processes to end, as roslaunch does, and waits until they have."""
+    for pid in pids:
+        os.kill(pid, signal.SIGINT)
+    wait_until(lambda: not any(runs(pid) for pid in pids), seconds, f"end of {pids} after SIGINT")
+
+
+@contextmanager
+def frozen_master() -> Iterator[None]:
+    """The ROS master of this test takes calls and does not answer."""
+    pid = rospy.get_master().getPid()[2]
+    assert b"rosmaster" in Path(f"/proc/{pid}/cmdline").read_bytes()
+    os.kill(pid, signal.SIGSTOP)
+    try:
+        yield
+    finally:
+        os.kill(pid, signal.SIGCONT)
 
 
 class Robot:

@@ -143,7 +143,7 @@ TEST(Cycle, NeitherAllocatesNorLocksWhileServicesAreCalled) {
   for (int round = 0; cycles < kCycles || round < 30; ++round) {
     GoalObservation goal;
     goal.position = Vector3(0.80, 0.02 * (round % 5), 0.45);
-    goal.stamp_ns = manager.now_ns();
+    goal.stamp_ns = goal.frame_ns = manager.now_ns();
     frames.frames["human_hand"] = goal;
     count(manager.switchTo("dmp", type).success);
     DmpRequest request;
@@ -152,7 +152,8 @@ TEST(Cycle, NeitherAllocatesNorLocksWhileServicesAreCalled) {
     request.orientation_control = round % 2 == 0;
     count(dmp.execute(request).success);
     for (int i = 0; i < 5; ++i) {
-      frames.frames["human_hand"].stamp_ns = manager.now_ns();
+      GoalObservation& seen = frames.frames["human_hand"];
+      seen.stamp_ns = seen.frame_ns = manager.now_ns();
       dmp.pollGoal();
       std::this_thread::sleep_for(std::chrono::microseconds(500));
     }

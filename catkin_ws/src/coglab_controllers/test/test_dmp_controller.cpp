@@ -49,8 +49,7 @@ TEST(DmpController, OffsetIsAppliedOnceAndTurnsWithTheGoalFrame) {
 }
 
 TEST(DmpController, TopicAndTfGiveTheSameMotion) {
-  const std::string topic = "dmp: {goal_source: topic}";
-  VirtualRobot a, b(topic);
+  VirtualRobot a, b;
   a.loadBoth();
   b.loadBoth();
   Vector3 goal = kGoal;
@@ -325,7 +324,7 @@ TEST(DmpController, RobotThatStopsAbortsTheMotionAndRefusesNewOnes) {
 }
 
 TEST(DmpController, TopicGoalMayBeReplacedByAFarOne) {
-  VirtualRobot robot("dmp: {goal_source: topic}");
+  VirtualRobot robot;
   robot.loadBoth();
   ASSERT_TRUE(VirtualRobot::ok(robot.dmp().setGoal("lwr_base_link", kGoal, 0)));
   DmpRequest request = robot.reach();

@@ -68,7 +68,11 @@ TEST(DmpRequests, RefusesBadRequestsAndKeepsMoving) {
         EXPECT_TRUE(refused(dmp.execute(with([](auto& r) { r.goal_frame = "nan"; })), {"finite"}));
       },
       [&] { EXPECT_TRUE(refused(dmp.loadDmps("/nowhere.xml", loaded), {"/nowhere.xml"})); },
-      [&] { EXPECT_TRUE(refused(dmp.setGoal("lwr_base_link", kGoal, 0), {"goal_source"})); },
+      [&] {  // the motion belongs to a frame: kept for one that belongs to dmp_goal
+        const Answer answer = dmp.setGoal("lwr_base_link", Vector3(0.5, 0.2, 0.5), 0);
+        EXPECT_TRUE(VirtualRobot::ok(answer));
+        EXPECT_NE(answer.message.find("goal_frame 'human_hand'"), std::string::npos);
+      },
       [&] {
         PtpAnswer answer = robot.ptp().add({std::vector<double>(7, 0.0), {}, {}});
         EXPECT_EQ(answer.status, PtpAnswer::kRejected);
@@ -92,10 +96,11 @@ TEST(DmpRequests, RefusesBadRequestsAndKeepsMoving) {
 }
 
 TEST(DmpRequests, TopicGoalInAnotherFrameOrNotFiniteIsRefused) {
-  VirtualRobot robot("dmp: {goal_source: topic}");
+  VirtualRobot robot;
   robot.loadBoth();
   DmpRequest request = robot.reach();
-  EXPECT_TRUE(refused(robot.dmp().execute(request), {"dmp_goal"}));
+  request.goal_frame.clear();
+  EXPECT_TRUE(refused(robot.dmp().execute(request), {"dmp_goal", "goal_frame"}));
   EXPECT_TRUE(refused(robot.dmp().setGoal("world", kGoal, 0), {"world", "lwr_base_link"}));
   EXPECT_TRUE(
       refused(robot.dmp().setGoal("lwr_base_link", Vector3(0, std::nan(""), 0), 0), {"finite"}));

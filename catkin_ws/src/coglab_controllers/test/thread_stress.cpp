@@ -37,7 +37,7 @@ class WanderingGoal : public GoalSource {
       why = "no such frame";
       return false;
     }
-    goal.stamp_ns = manager_->now_ns();
+    goal.stamp_ns = goal.frame_ns = manager_->now_ns();
     goal.position = Vector3(0.8, 0.05 * std::sin(1e-9 * static_cast<double>(goal.stamp_ns)), 0.45);
     return true;
   }

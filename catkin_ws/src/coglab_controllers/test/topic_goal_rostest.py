@@ -24,9 +24,10 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
-from robot_fixture import HOME, Robot, wait_until
+from robot_fixture import HOME, Robot, end_within, frozen_master, robot_processes, wait_until
 
 GOAL = (0.80, 0.0, 0.45)
+ASIDE = (0.65, -0.15, 0.60)
 
 
 class TopicGoal(unittest.TestCase):
@@ -187,6 +188,34 @@ class TopicGoal(unittest.TestCase):
         self.assertEqual(robot.status.speed_scale, 0.25)  # refused
         publisher.publish(1.0)
         wait_until(lambda: robot.status.speed_scale == 1.0, 5.0, "1 by the topic")
+
+    def test_8_stamps_of_any_kind_end_nothing_and_are_no_goal_from_the_future(self) -> None:
+        robot = self.robot
+        robot.see_hand(None)
+        robot.switch("dmp")
+        publisher = rospy.Publisher("controller_manager/dmp/dmp_goal", DmpGoal, queue_size=100)
+        wait_until(lambda: publisher.get_num_connections() > 0, 5.0, "connection")
+        for secs in (2**32 - 1, 2**31, 2**31 - 1, int(rospy.get_time()) + 10, 1):
+            for nsecs in (2**32 - 1, 10**9, 0):
+                wrong = DmpGoal()
+                wrong.header.frame_id = "lwr_base_link"
+                wrong.header.stamp.secs, wrong.header.stamp.nsecs = secs, nsecs
+                wrong.goal.x, wrong.goal.z = 0.5, 0.6
+                publisher.publish(wrong)
+        rospy.sleep(0.3)
+        robot.see_hand(ASIDE)
+        wait_until(lambda: robot.execute(goal_frame="", dmp_ratio=2.0).success, 5.0, "execute_dmp")
+        wait_until(lambda: robot.feedback.state == "running", 5.0, "running")
+        self.assertGreater(robot.feedback.remaining_distance, 0.2)
+
+    def test_9_a_frozen_master_ends_no_reach_and_keeps_no_node_from_ending(self) -> None:
+        robot, pids = self.robot, robot_processes()
+        self.assertTrue(pids)
+        with frozen_master():
+            wait_until(lambda: robot.feedback.state not in ("running", "holding"), 20.0, "the end of the motion")
+            self.assertEqual((robot.feedback.state, robot.feedback.reason), ("reached", ""))
+            self.assertLess(robot.feedback.remaining_distance, 0.02)
+            end_within(pids, 3.0)
 
 
 if __name__ == "__main__":

@@ -15,7 +15,7 @@ sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 from coglab_msgs.msg import ReasonCode
 from coglab_msgs.srv import AddPtpRequest
 from diagnostic_msgs.msg import DiagnosticArray
-from robot_fixture import HOME, Robot, wait_until
+from robot_fixture import HOME, Robot, end_within, robot_processes, wait_until
 from rosgraph_msgs.msg import Log
 from sensor_msgs.msg import JointState
 
@@ -151,6 +151,11 @@ class TruePath(unittest.TestCase):
                                for line in told), 8.0, "the reason with the publisher's name")
         foreign.unregister()
         robot.go(HOME)  # and the controller's own velocities still count
+
+    def test_6_it_ends_when_it_is_asked_to(self) -> None:
+        pids = robot_processes()
+        self.assertTrue(pids)
+        end_within(pids, 3.0)
 
 
 if __name__ == "__main__":

@@ -110,7 +110,7 @@ class VirtualRobot {
     GoalObservation observation;
     observation.position = position;
     observation.orientation = orientation;
-    observation.stamp_ns = now_ns;
+    observation.stamp_ns = observation.frame_ns = now_ns;
     frames.frames[frame] = observation;
   }
 

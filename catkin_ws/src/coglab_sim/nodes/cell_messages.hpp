@@ -14,12 +14,22 @@ Vector3d vectorOf(const Message& m) {
   return {m.x, m.y, m.z};
 }
 
-/// False if a number is not finite or the quaternion is not of length 1 within 1 %.
+/// Whether a vector is finite and not longer than `most`: what is beyond it would end the physics.
+inline bool isWithin(const Vector3d& vector, double most) {
+  return vector.allFinite() && vector.cwiseAbs().maxCoeff() <= most;
+}
+
+constexpr double kFarthest = 100.0;  // m, of anything in the cell
+
+/// False if a number is not finite or farther than kFarthest, or the quaternion is not of length 1
+/// within 1 %.
 inline bool poseOf(const geometry_msgs::Pose& message, Pose& pose) {
   const auto& q = message.orientation;
   pose.position = vectorOf(message.position);
   pose.rotation = Quaterniond(q.w, q.x, q.y, q.z);
-  if (!pose.position.allFinite() || !(std::abs(pose.rotation.norm() - 1.0) < 0.01)) return false;
+  if (!isWithin(pose.position, kFarthest) || !(std::abs(pose.rotation.norm() - 1.0) < 0.01)) {
+    return false;
+  }
   pose.rotation.normalize();
   return true;
 }

@@ -98,9 +98,7 @@ class CellNode {
         "finger_positions", 1,
         [this](const coglab_msgs::FingerPositions::ConstPtr& m) { onFingers(*m); }, nullptr, hints);
     push_ = private_.subscribe<geometry_msgs::Wrench>(
-        "push", 1, [this](const geometry_msgs::Wrench::ConstPtr& m) {
-          cell_->setPush({vectorOf(m->force), vectorOf(m->torque)});
-        });
+        "push", 1, [this](const geometry_msgs::Wrench::ConstPtr& m) { onPush(*m); });
     fault_ = private_.advertiseService("fault", &CellNode::onFault, this);
     place_ = private_.advertiseService("place_object", &CellNode::onPlace, this);
 
@@ -150,15 +148,26 @@ class CellNode {
     if (log_.is_open()) log_.flush();
   }
 
-  void onHuman(const coglab_msgs::HumanHand& message) {
-    HumanInput human;
-    if (!poseOf(message.pose, human.hand) || !(message.grip >= 0.0 && message.grip <= 1.0) ||
-        !(message.grip_force >= 0.0 && message.grip_force <= 1000.0)) {
-      ROS_WARN_THROTTLE(
-          1.0, "human_hand ignored: expected a finite pose, grip 0..1 and grip_force 0..1000 N");
+  void onPush(const geometry_msgs::Wrench& message) {
+    const Vector3d force = vectorOf(message.force), torque = vectorOf(message.torque);
+    if (!isWithin(force, 1000.0) || !isWithin(torque, 1000.0)) {
+      ROS_WARN_THROTTLE(1.0, "push ignored: expected at most 1000 N and 1000 Nm");
       return;
     }
+    cell_->setPush({force, torque});
+  }
+
+  void onHuman(const coglab_msgs::HumanHand& message) {
+    HumanInput human;
     human.twist = {vectorOf(message.velocity.linear), vectorOf(message.velocity.angular)};
+    if (!poseOf(message.pose, human.hand) || !(message.grip >= 0.0 && message.grip <= 1.0) ||
+        !(message.grip_force >= 0.0 && message.grip_force <= 1000.0) ||
+        !isWithin(human.twist.linear, 100.0) || !isWithin(human.twist.angular, 100.0)) {
+      ROS_WARN_THROTTLE(1.0,
+                        "human_hand ignored: expected a pose within 100 m, at most 100 m/s and "
+                        "100 rad/s, grip 0..1 and grip_force 0..1000 N");
+      return;
+    }
     human.grip = message.grip;
     human.grip_force = message.grip_force;
     cell_->setHuman(human);
@@ -168,6 +177,11 @@ class CellNode {
     if (message.position.size() != 5) {
       ROS_WARN_THROTTLE(1.0, "finger_positions ignored: expected 5 positions, got %zu",
                         message.position.size());
+      return;
+    }
+    for (const auto position : message.position) {
+      if (position >= 0 && position <= 255) continue;
+      ROS_WARN_THROTTLE(1.0, "finger_positions ignored: expected 0..255, got %d", position);
       return;
     }
     FingerInput fingers{};

@@ -21,6 +21,7 @@ from coglab_sim.virtual_human import VirtualHuman
 from geometry_msgs.msg import Point, Quaternion, Vector3
 from std_msgs.msg import String
 
+LARGEST = 1e4  # m, N: no number of a cell is larger
 GIVE, RECEIVE = "exchange_human_to_robot", "exchange_robot_to_human"
 
 
@@ -59,15 +60,21 @@ class VirtualHumanNode:
     def on_truth(self, message: CellTruth) -> None:
         """What the person sees and feels now; the robot's speed is judged over 0.1 s."""
         now = time.monotonic()
-        robot = frame_of(message.robot_hand)
+        robot, held = frame_of(message.robot_hand), frame_of(message.object)
         force = message.palm_force
+        numbers = [*robot.position, *robot.orientation, *held.position, *held.orientation, force.x, force.y, force.z,
+                   message.robot_load_share, message.human_load_share]
+        if not np.all(np.abs(numbers) < LARGEST):  # not finite either
+            rospy.logwarn_throttle(5.0, "virtual human: truth/cell ignored: a number is not finite, or beyond "
+                                        f"{LARGEST:g}")
+            return
         with self.lock:
             self.palm_history.append((now, robot.position))
             while self.palm_history[0][0] < now - 0.1:
                 self.palm_history.pop(0)
             then, place = self.palm_history[0]
             speed = float(np.linalg.norm(robot.position - place)) / (now - then) if now - then > 0.03 else 1.0
-            self.view = WorldView(robot, speed, frame_of(message.object),
+            self.view = WorldView(robot, speed, held,
                                   float(np.linalg.norm([force.x, force.y, force.z])), message.robot_load_share,
                                   message.human_load_share, message.held_by)
 

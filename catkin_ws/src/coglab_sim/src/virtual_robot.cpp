@@ -60,7 +60,7 @@ bool FrameTable::lookup(const std::string& reference, const std::string& frame,
   const Pose pose = from.pose.inverse() * to.pose;
   observation.position = pose.position;
   observation.orientation = pose.rotation;
-  observation.stamp_ns = to.stamp_ns;
+  observation.stamp_ns = observation.frame_ns = to.stamp_ns;
   return true;
 }
 

@@ -101,9 +101,9 @@ void BridgeRos::start() {
 void BridgeRos::shutdown() {
   if (!started_) return;
   started_ = false;
-  target_.shutdown();
-  events_.shutdown();
-  command_.shutdown();
+  // No request is taken from now on. The topics stay registered: unregistering waits for the ROS
+  // master, which may not answer, and the arm comes first.
+  closing_ = true;
   Outcome outcome = bridge_.command("stop");
   // Somebody else's stop may be in progress; it has time limits of its own.
   for (int i = 0; i < 100 && outcome.code == OutcomeCode::Busy; ++i) {
@@ -120,6 +120,12 @@ void BridgeRos::shutdown() {
   sem_post(&new_sample_);
   publisher_.join();
   fri_thread_.stop();
+}
+
+void BridgeRos::unregister() {
+  target_.shutdown();
+  events_.shutdown();
+  command_.shutdown();
   if (ros::ok()) nh_.deleteParam("fri_port_bound");
 }
 
@@ -133,6 +139,7 @@ BridgeRos::Refused BridgeRos::refused() const {
 }
 
 void BridgeRos::onTarget(const ros::MessageEvent<const sensor_msgs::JointState>& event) {
+  if (closing_) return;
   // In one process the controller manager publishes here what it sent already.
   if (options_.one_process && event.getPublisherName() == ros::this_node::getName()) return;
   if (options_.one_process && controller_active_) {
@@ -202,6 +209,7 @@ void BridgeRos::onTarget(const ros::MessageEvent<const sensor_msgs::JointState>&
 }
 
 void BridgeRos::onEvent(const std_msgs::String& message) {
+  if (closing_) return;
   try {
     const std::uint32_t ticket = bridge_.submit(message.data);
     const std::lock_guard<std::mutex> lock(tickets_mutex_);
@@ -213,6 +221,10 @@ void BridgeRos::onEvent(const std_msgs::String& message) {
 
 bool BridgeRos::onCommand(coglab_msgs::LwrCommand::Request& request,
                           coglab_msgs::LwrCommand::Response& response) {
+  if (closing_) {
+    response.message = "this node is ending: the arm stops and takes no command";
+    return true;
+  }
   try {
     const Outcome outcome = bridge_.command(request.event);
     response.success = outcome.success();

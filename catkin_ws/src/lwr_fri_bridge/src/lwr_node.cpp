@@ -10,6 +10,7 @@
 #include <ros/ros.h>
 
 #include "lwr_fri_bridge/bridge_ros.hpp"
+#include "lwr_fri_bridge/exit_limit.hpp"
 
 namespace {
 
@@ -32,6 +33,9 @@ int main(int argc, char** argv) {
     spinner.start();
     while (!interrupted && ros::ok()) std::this_thread::sleep_for(std::chrono::milliseconds(20));
     bridge.shutdown();
+    lwr_fri_bridge::endProcessWithin(std::chrono::seconds(1));
+    bridge.unregister();
+    ros::shutdown();
   } catch (const std::exception& error) {
     ROS_FATAL("lwr: %s", error.what());
     ros::shutdown();

@@ -42,9 +42,7 @@ void DmpController::configure(const MotionSetup& setup) {
   const std::string base = setup.robot->chain.baseLink();
   base_frame_ = parameters.text("robot_base_frame_name", base);
   dmp_frame_ = parameters.text("dmp_frame_name", base_frame_);
-  goal_frame_ = parameters.text("goal_frame_name", "human_hand");
   goal_tf_frame_ = parameters.text("goal_tf_frame", "dmp_goal");
-  goal_from_tf_ = parameters.choice("goal_source", "tf", {"tf", "topic"}) == "tf";
   setIkDebug(parameters.flag("enable_ik_debug", false));
   finish_distance_ = parameters.number("goal_finish_distance", 0.12, 0.0, 1.0);
   reach_margin_ = parameters.number("goal_reach_margin", 0.5, 0.0, 5.0);
@@ -64,13 +62,14 @@ void DmpController::configure(const MotionSetup& setup) {
   ik.jerk_limit = setup.robot->limits.jerk;
   ik_ = std::make_unique<TwoTaskIk>(ik);
 
-  GoalGateParameters gate;
-  gate.max_age = goal_from_tf_ ? parameters.number("goal_max_age", gate.max_age, 0.01, 10.0)
-                               : parameters.number("goal_timeout", 0.0, 0.0, 3600.0);
-  // A goal on dmp_goal is meant as it is, also when it is far from the last one.
-  gate.max_jump = goal_from_tf_ ? parameters.number("goal_max_jump", gate.max_jump, 0.01, 5.0)
-                                : std::numeric_limits<double>::infinity();
+  GoalGateParameters& gate = frame_gate_;
+  gate.max_age = parameters.number("goal_max_age", gate.max_age, 0.01, 10.0);
+  gate.max_jump = parameters.number("goal_max_jump", gate.max_jump, 0.01, 5.0);
   gate.lost_time = parameters.number("goal_lost_time", gate.lost_time, 0.0, 60.0);
+  // A goal on dmp_goal is meant as it is, also when it is far from the last one.
+  topic_gate_ = gate;
+  topic_gate_.max_age = parameters.number("goal_timeout", 0.0, 0.0, 3600.0);
+  topic_gate_.max_jump = std::numeric_limits<double>::infinity();
 
   GoalEstimatorParameters estimator;
   estimator.time_constant =
@@ -91,7 +90,7 @@ void DmpController::configure(const MotionSetup& setup) {
   arrive_distance_ = parameters.number("arrive_distance", arrive_distance_, 1e-4, 0.5);
   settle_time_ = parameters.number("settle_time", settle_time_, 0.0, 60.0);
 
-  loop_ = std::make_unique<Loop>(estimator, end, gate);
+  loop_ = std::make_unique<Loop>(estimator, end);
   loop_->blend.setTime(parameters.number("hold_blend", 0.15, 0.0, 5.0));
   if (std::function<void()> wait = setup.host->cycleWait()) plans_->setWait(wait);
   const std::string file = parameters.text("dmp_file", "");
@@ -167,11 +166,12 @@ void DmpController::begin(const CycleInput& input, const Plan& plan) {
   loop.dmp_from_base = inverse(plan.base_from_dmp);
   loop.primitive = plan.primitive;
   loop.plan = plan.motion;
-  const Quaternion kept = loop.hand.orientation;
+  const HandGoal before = loop.hand;
   loop.hand = plan.hand;
 
   if (!plan.execute) {
-    if (plan.hand.keep_orientation) loop.hand.orientation = kept;
+    loop.hand.in_goal_frame = before.in_goal_frame;
+    if (plan.hand.keep_orientation) loop.hand.orientation = before.orientation;
     const Pose goal = handGoal(loop.gate.goal(), loop.hand);
     bool projected = false;
     loop.motion.switchTo(plan.motion, inWorkspace(goal, projected));
@@ -200,6 +200,7 @@ void DmpController::begin(const CycleInput& input, const Plan& plan) {
   }
   if (loop.hand.keep_orientation) loop.hand.orientation = pose.orientation;
   loop.request = plan.goal.request;
+  loop.gate = GoalGate(plan.hand.in_goal_frame ? frame_gate_ : topic_gate_);
   loop.gate.reset(plan.goal);
   bool projected = false;
   const Pose goal = inWorkspace(handGoal(plan.goal, loop.hand), projected);
@@ -240,7 +241,7 @@ void DmpController::watchGoal(const CycleInput& input) {
   Loop& loop = *loop_;
   GoalObservation newest;
   goals_.read(newest);
-  const bool mine = newest.request == loop.request || newest.request == 0;
+  const bool mine = newest.request == loop.request;
   const GoalGate::State gate =
       loop.gate.update(input.robot.stamp_ns, mine ? newest : loop.gate.goal());
   loop.goal = inWorkspace(handGoal(loop.gate.goal(), loop.hand), loop.projected);
@@ -252,6 +253,7 @@ void DmpController::watchGoal(const CycleInput& input) {
   }
   loop.remaining_distance = (handGoal(loop.gate.goal(), loop.hand).position - hand).norm();
 
+  const double ahead = ahead_.load(std::memory_order_relaxed);
   state_ = gate == GoalGate::State::Fresh ? MotionState::Running : MotionState::Holding;
   reason_.clear();
   switch (gate) {
@@ -266,6 +268,9 @@ void DmpController::watchGoal(const CycleInput& input) {
     case GoalGate::State::Old:
       reason_ = Reason(ReasonCode::GoalStale, "the newest goal is ")
                 << loop.gate.age() << " s old: the last one is held";
+      if (ahead > 0.0) {
+        reason_ << "; newer ones are refused: stamped " << ahead << " s ahead of the clock";
+      }
       break;
     case GoalGate::State::Jumped:
       reason_ = Reason(ReasonCode::GoalJumped, "the goal jumped by ")
@@ -277,7 +282,9 @@ void DmpController::watchGoal(const CycleInput& input) {
       } else {
         abort(Reason(ReasonCode::GoalLost, "the goal is lost for ")
               << loop.gate.age() << " s with " << loop.remaining_distance
-              << " m to go; check what publishes the goal frame");
+              << " m to go; "
+              << (ahead > 0.0 ? "newer ones are stamped ahead of the clock: synchronise the clocks"
+                              : "check what publishes it"));
       }
       break;
   }

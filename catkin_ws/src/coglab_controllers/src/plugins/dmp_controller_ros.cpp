@@ -69,7 +69,7 @@ class DmpControllerRos : public MotionControllerRos {
               const RosContext& context) override {
     controller_ = &dynamic_cast<DmpController&>(controller);
     node_ = node;
-    source_ = std::make_unique<TfGoalSource>(*context.tf);
+    source_ = std::make_unique<TfGoalSource>(*context.tf, *context.listener);
     controller_->setGoalSource(source_.get());
     feedback_ = node_.advertise<coglab_msgs::DmpFeedback>("feedback", 10, true);
     debug_ = node_.advertise<coglab_msgs::IkDebug>("ik_debug", 200);
@@ -77,15 +77,19 @@ class DmpControllerRos : public MotionControllerRos {
     services_[0] = node_.advertiseService("load_dmps", &DmpControllerRos::onLoad, this);
     services_[1] = node_.advertiseService("execute_dmp", &DmpControllerRos::onExecute, this);
     services_[2] = node_.advertiseService("switch_dmp", &DmpControllerRos::onSwitch, this);
+    bool debug = false;  // the first reading asks the master; all others must not
+    node_.getParamCached("enable_ik_debug", debug);
   }
 
+  void pollGoal() override { controller_->pollGoal(); }
+
   void spinOnce() override {
-    controller_->pollGoal();
     publishDebug();
     publishFeedback();
-    if (++calls_ % 200 == 0) {  // once a second: the parameter may be changed while running
+    // Once a second: the parameter may be changed while running. The master tells of a change.
+    if (++calls_ % 200 == 0) {
       bool debug = controller_->ikDebug();
-      if (node_.getParam("enable_ik_debug", debug)) controller_->setIkDebug(debug);
+      if (node_.getParamCached("enable_ik_debug", debug)) controller_->setIkDebug(debug);
     }
   }
 
@@ -127,9 +131,16 @@ class DmpControllerRos : public MotionControllerRos {
   }
 
   void onGoal(const coglab_msgs::DmpGoal& goal) {
+    const ros::Time stamp = goal.header.stamp.isZero() ? ros::Time::now() : goal.header.stamp;
     const Answer answer = controller_->setGoal(goal.header.frame_id, toVector(goal.goal),
-                                               toSteady(goal.header.stamp));
-    if (!answer.success) ROS_WARN_THROTTLE(1.0, "%s", answer.message.c_str());
+                                               toSteady(stamp), nanoseconds(stamp));
+    if (answer.success) {
+      if (!answer.message.empty()) ROS_INFO_THROTTLE(10.0, "%s", answer.message.c_str());
+      return;
+    }
+    ++goals_refused_;
+    ROS_WARN_THROTTLE(1.0, "%s; %llu refused so far", answer.message.c_str(),
+                      static_cast<unsigned long long>(goals_refused_));
   }
 
   void publishDebug() {
@@ -216,6 +227,7 @@ class DmpControllerRos : public MotionControllerRos {
   ros::ServiceServer services_[3];
   DmpProgress progress_;
   std::uint64_t calls_ = 0, last_feedback_ = 0, last_goal_ = 0;
+  std::uint64_t goals_refused_ = 0;  // dmp_goal
 };
 
 }  // namespace coglab_controllers

@@ -40,6 +40,13 @@ Answer readOrientation(const DmpRequest& request, HandGoal& hand) {
   return {};
 }
 
+/// What to add to a sentence about a goal whose newest frame was refused.
+std::string aheadNote(double ahead) {
+  if (ahead <= 0.0) return "";
+  return "; its newest frame is stamped " + std::to_string(ahead) +
+         " s ahead of this computer's clock and was refused: synchronise the clocks";
+}
+
 }  // namespace
 
 void DmpController::setGoalSource(GoalSource* source) {
@@ -81,7 +88,7 @@ Answer DmpController::checkRequest(const DmpRequest& request, bool execute, Plan
     return invalid("goal_offset holds a number that is not finite");
   }
   plan.hand.offset = request.goal_offset;
-  plan.hand.in_goal_frame = goal_from_tf_;
+  plan.hand.in_goal_frame = !request.goal_frame.empty();
   const Answer orientation = readOrientation(request, plan.hand);
   if (!orientation.success || !execute) return orientation;
 
@@ -117,40 +124,59 @@ Answer DmpController::findFrames(Plan& plan) {
 
 Answer DmpController::findGoal(const std::string& frame, Plan& plan) {
   const std::lock_guard<std::mutex> lock(goal_mutex_);
+  if (frame.empty()) return findTopicGoal(plan);
   std::string why;
-  if (!goal_from_tf_) {
-    if (!topic_goal_known_) {
-      return Answer::refusal(
-          ReasonCode::GoalMissing,
-          "no goal has come on dmp_goal yet (goal_source is topic); publish one in frame '" +
-              dmp_frame_ + "' first");
-    }
-    plan.goal = pushed_;
-    return {};
-  }
   if (source_ == nullptr) {
-    return Answer::refusal(ReasonCode::GoalMissing, "nothing provides frames (goal_source is tf)");
+    return Answer::refusal(ReasonCode::GoalMissing, "nothing provides frames");
   }
   GoalObservation goal;
-  if (!source_->lookup(dmp_frame_, frame, goal, why)) {
-    return Answer::refusal(
-        ReasonCode::UnknownName,
-        "goal frame '" + frame + "' is not known in '" + dmp_frame_ + "': " + why);
+  const bool known = source_->lookup(dmp_frame_, frame, goal, why);
+  const double ahead = source_->ahead(frame);
+  if (!known) {
+    return Answer::refusal(ahead > 0.0 ? ReasonCode::GoalFromFuture : ReasonCode::UnknownName,
+                           "goal frame '" + frame + "' is not known in '" + dmp_frame_ +
+                               "': " + why + aheadNote(ahead));
   }
   if (!goal.position.allFinite() || !isUnit(goal.orientation)) {
     return invalid("goal frame '" + frame + "' has a pose that is not finite");
   }
   const double age = 1e-9 * static_cast<double>(setup_.host->now_ns() - goal.stamp_ns);
-  const double max_age = loop_->gate.parameters().max_age;
-  if (age > max_age) {
+  if (age > frame_gate_.max_age) {
     return Answer::refusal(ReasonCode::GoalStale,
                            "goal frame '" + frame + "' is " + std::to_string(age) +
-                               " s old, allowed: " + std::to_string(max_age) +
-                               " s (goal_max_age); check what publishes it");
+                               " s old, allowed: " + std::to_string(frame_gate_.max_age) +
+                               " s (goal_max_age); check what publishes it" + aheadNote(ahead));
+  }
+  if (age < -1e-9 * static_cast<double>(kClockTolerance_ns)) {
+    return Answer::refusal(ReasonCode::GoalFromFuture,
+                           "goal frame '" + frame + "' is not followed" + aheadNote(-age));
   }
   goal.request = request_number_ + 1;  // in effect once the plan is
   plan.goal = goal;
   return {};
+}
+
+Answer DmpController::findTopicGoal(Plan& plan) {
+  if (!topic_goal_known_) {
+    return Answer::refusal(
+        ReasonCode::GoalMissing,
+        "no goal has come on dmp_goal yet; name the tf2 frame to follow in goal_frame, or "
+        "publish a goal in frame '" +
+            dmp_frame_ + "' first (goal_helper.launch does)");
+  }
+  plan.goal = topic_goal_;
+  plan.goal.request = request_number_ + 1;
+  return {};
+}
+
+void DmpController::followFrom(const std::string& frame, const GoalObservation& first) {
+  const std::lock_guard<std::mutex> lock(goal_mutex_);
+  request_number_ = first.request;
+  frame_of_motion_ = frame;
+  pushed_ = frame.empty() ? topic_goal_ : first;  // a dmp_goal may have come meanwhile
+  pushed_.request = request_number_;
+  ahead_ = 0.0;
+  goals_.write(pushed_);
 }
 
 Answer DmpController::request(const DmpRequest& request, bool execute) {
@@ -159,26 +185,14 @@ Answer DmpController::request(const DmpRequest& request, bool execute) {
   auto plan = std::make_unique<Plan>();
   plan->stamp = begun.stamp;
   plan->execute = execute;
-  std::string note;
-  const std::string frame = request.goal_frame.empty() ? goal_frame_ : request.goal_frame;
   Answer checked = checkRequest(request, execute, *plan);
   if (checked.success) checked = findFrames(*plan);
-  if (checked.success && execute) checked = findGoal(frame, *plan);
+  if (checked.success && execute) checked = findGoal(request.goal_frame, *plan);
   if (checked.success && execute) checked = outsideWorkspace(*plan);
   if (!checked.success) return checked;
-  if (execute && !goal_from_tf_ && !request.goal_frame.empty()) {
-    note = "goal_frame '" + request.goal_frame + "' is not used: goal_source is topic";
-  }
   const GoalObservation goal = plan->goal;
   Answer answer = offer(std::move(plan));
-  if (answer.success && execute && goal_from_tf_) {
-    const std::lock_guard<std::mutex> goal_lock(goal_mutex_);
-    request_number_ = goal.request;
-    frame_of_motion_ = frame;
-    pushed_ = goal;
-    goals_.write(goal);
-  }
-  if (answer.success && answer.message.empty()) answer.message = note;
+  if (answer.success && execute) followFrom(request.goal_frame, goal);
   return answer;
 }
 
@@ -188,7 +202,7 @@ Answer DmpController::outsideWorkspace(const Plan& plan) const {
   const Vector3 in_dmp = handGoal(plan.goal, plan.hand).position;
   const Vector3 goal = to_base.position + to_base.orientation * in_dmp;
   const double outside = (workspace.project(goal) - goal).norm();
-  const double margin = goal_from_tf_ ? reach_margin_ : 0.0;
+  const double margin = plan.hand.in_goal_frame ? reach_margin_ : 0.0;
   if (outside > margin + 1e-9) {
     return Answer::refusal(
         ReasonCode::GoalOutsideWorkspace,
@@ -233,11 +247,7 @@ Answer DmpController::offer(std::unique_ptr<Plan> plan) {
 }
 
 Answer DmpController::setGoal(const std::string& frame, const Vector3& goal,
-                              std::int64_t stamp_ns) {
-  if (goal_from_tf_) {
-    return Answer::refusal(ReasonCode::NotSupported,
-                           "dmp_goal is not listened to: goal_source is tf; set it to topic");
-  }
+                              std::int64_t stamp_ns, std::int64_t frame_ns) {
   if (frame != dmp_frame_) {
     return Answer::refusal(ReasonCode::UnknownName,
                            "dmp_goal in frame '" + frame + "' refused: expected '" + dmp_frame_ +
@@ -247,27 +257,50 @@ Answer DmpController::setGoal(const std::string& frame, const Vector3& goal,
     return invalid("dmp_goal refused: it holds a number that is not finite");
   }
   const std::lock_guard<std::mutex> lock(goal_mutex_);
+  const bool followed = frame_of_motion_.empty();
+  const std::int64_t now = setup_.host->now_ns();
   GoalObservation observation;
   observation.position = goal;
-  observation.stamp_ns = stamp_ns != 0 ? stamp_ns : setup_.host->now_ns();
-  if (topic_goal_known_ && observation.stamp_ns <= pushed_.stamp_ns) {
+  observation.stamp_ns = stamp_ns != 0 ? stamp_ns : now;
+  observation.frame_ns = frame_ns != 0 ? frame_ns : observation.stamp_ns;
+  observation.request = request_number_;
+  if (observation.stamp_ns - now > kClockTolerance_ns) {
+    const double ahead = 1e-9 * static_cast<double>(observation.stamp_ns - now);
+    if (followed) ahead_ = ahead;
+    return Answer::refusal(ReasonCode::GoalFromFuture, "dmp_goal refused" + aheadNote(ahead));
+  }
+  if (topic_goal_known_ && observation.frame_ns <= topic_goal_.frame_ns) {
     return Answer::refusal(ReasonCode::TooLate,
                            "dmp_goal refused: its stamp is not newer than that of the last one");
   }
   topic_goal_known_ = true;
-  pushed_ = observation;
-  goals_.write(observation);
-  return {};
+  topic_goal_ = observation;
+  Answer answer;
+  if (followed) {
+    ahead_ = 0.0;
+    goals_.write(observation);
+  } else {
+    answer.message = "dmp_goal is kept for later: the last execute_dmp named the goal_frame '" +
+                     frame_of_motion_ + "'; with an empty one a motion follows dmp_goal";
+  }
+  return answer;
 }
 
 void DmpController::pollGoal() {
   const std::lock_guard<std::mutex> lock(goal_mutex_);
-  if (!goal_from_tf_ || source_ == nullptr || frame_of_motion_.empty()) return;
+  if (source_ == nullptr || frame_of_motion_.empty()) return;
   GoalObservation goal;
   std::string why;
+  ahead_ = source_->ahead(frame_of_motion_);
   if (!source_->lookup(dmp_frame_, frame_of_motion_, goal, why)) return;
   if (!goal.position.allFinite() || !isUnit(goal.orientation)) return;
-  if (goal.stamp_ns <= pushed_.stamp_ns) return;
+  const std::int64_t ahead = goal.stamp_ns - setup_.host->now_ns();
+  if (ahead > kClockTolerance_ns) {
+    ahead_ = 1e-9 * static_cast<double>(ahead);
+    return;
+  }
+  // Told apart by their own stamps: what those map to differs from one poll to the next.
+  if (goal.frame_ns != 0 && goal.frame_ns <= pushed_.frame_ns) return;
   goal.request = request_number_;
   pushed_ = goal;
   goals_.write(goal);

@@ -5,17 +5,23 @@ namespace coglab_controllers {
 void GoalGate::reset(const GoalObservation& first) noexcept {
   goal_ = first;
   candidate_ = first;
+  last_ = first;
   agreeing_ = 0;
-  last_stamp_ns_ = first.stamp_ns;
   believed_ns_ = first.stamp_ns;
   age_ = 0.0;
   jump_ = 0.0;
   state_ = State::Fresh;
 }
 
+bool GoalGate::isNew(const GoalObservation& newest) const noexcept {
+  if (newest.frame_ns != 0) return newest.frame_ns > last_.frame_ns;
+  return newest.position != last_.position ||
+         newest.orientation.coeffs() != last_.orientation.coeffs();
+}
+
 GoalGate::State GoalGate::update(std::int64_t now_ns, const GoalObservation& newest) noexcept {
-  if (newest.stamp_ns > last_stamp_ns_) {  // each frame is judged once
-    last_stamp_ns_ = newest.stamp_ns;
+  if (isNew(newest)) {
+    last_ = newest;
     jump_ = (newest.position - goal_.position).norm();
     if (jump_ <= parameters_.max_jump) {
       goal_ = newest;
@@ -31,8 +37,9 @@ GoalGate::State GoalGate::update(std::int64_t now_ns, const GoalObservation& new
       }
     }
   }
-  age_ = 1e-9 * static_cast<double>(now_ns - last_stamp_ns_);
-  if (agreeing_ == 0) believed_ns_ = last_stamp_ns_;
+  if (newest.frame_ns == 0) last_.stamp_ns = newest.stamp_ns;
+  age_ = 1e-9 * static_cast<double>(now_ns - last_.stamp_ns);
+  if (agreeing_ == 0) believed_ns_ = last_.stamp_ns;
   const double held = 1e-9 * static_cast<double>(now_ns - believed_ns_);
   if (parameters_.max_age <= 0.0) {
     state_ = agreeing_ > 0 ? State::Jumped : State::Fresh;

@@ -13,6 +13,7 @@
 #include "coglab_controllers/ros/manager_ros.hpp"
 #include "coglab_controllers/ros/robot_topics.hpp"
 #include "coglab_controllers/ros/ros_parameters.hpp"
+#include "lwr_fri_bridge/exit_limit.hpp"
 
 namespace {
 volatile std::sig_atomic_t asked_to_end = 0;
@@ -51,6 +52,7 @@ int main(int argc, char** argv) {
       std::this_thread::sleep_for(std::chrono::milliseconds(20));
     }
     spinner.stop();
+    lwr_fri_bridge::endProcessWithin(std::chrono::seconds(1));
     manager.shutdown();
     ros::shutdown();
   } catch (const std::exception& error) {

@@ -1,12 +1,10 @@
 // The tf2 helper of D4.10: any frame, with an offset, to dmp_goal in dmp_frame_name.
-#include <chrono>
-#include <cmath>
+#include <cstdint>
 #include <exception>
 #include <string>
 
 #include <ros/ros.h>
-#include <tf2_ros/buffer.h>
-#include <tf2_ros/transform_listener.h>
+#include <tf2/buffer_core.h>
 
 #include "coglab_controllers/kinematics/rotation.hpp"
 #include "coglab_controllers/ros/ros_parameters.hpp"
@@ -16,7 +14,8 @@
 namespace coglab_controllers {
 
 /// Publishes the position of a frame whenever a new transform has come, stamped with its time of
-/// capture; what is old or not finite is not published.
+/// capture. What is old, from the future, not finite, or far from the frames before it is not
+/// published: the DMP plug-in takes a goal on dmp_goal as it is.
 class GoalHelper {
  public:
   /// @param node of the topic's name, which is relative to it  @param own the node's parameters
@@ -29,6 +28,7 @@ class GoalHelper {
     rate_ = parameters.number("rate", 100.0, 0.1, 1000.0);
     goal_ = node_.advertise<coglab_msgs::DmpGoal>(
         parameters.text("topic", "controller_manager/dmp/dmp_goal"), 1);
+    listener_.start();
   }
 
   void run() {
@@ -42,45 +42,55 @@ class GoalHelper {
 
  private:
   void publish() {
-    geometry_msgs::TransformStamped transform;
-    try {
-      transform = buffer_.lookupTransform(dmp_frame_, frame_, ros::Time(0));
-    } catch (const tf2::TransformException& error) {
+    GoalObservation seen;
+    std::string why;
+    if (!source_.lookup(dmp_frame_, frame_, seen, why)) {
       ROS_WARN_THROTTLE(5.0, "no goal: frame '%s' is not known in '%s': %s", frame_.c_str(),
-                        dmp_frame_.c_str(), error.what());
+                        dmp_frame_.c_str(), why.c_str());
       return;
     }
-    const ros::Time stamp = transform.header.stamp;
-    // A static frame has no stamp; it is published once, and then counts as captured on arrival.
-    if (published_ && stamp == last_) return;
-    const auto& t = transform.transform.translation;
-    const auto& q = transform.transform.rotation;
-    const Quaternion turn(q.w, q.x, q.y, q.z);
-    const Vector3 goal = Vector3(t.x, t.y, t.z) + turn * offset_;
-    if (!goal.allFinite() || !isUnit(turn)) {
+    if (!seen.position.allFinite() || !isUnit(seen.orientation)) {
       ROS_WARN_THROTTLE(5.0, "no goal: the transform of '%s' is not finite", frame_.c_str());
       return;
     }
-    last_ = stamp;
-    published_ = true;
+    const std::int64_t now = steadyNow();
+    if (sent_ns_ == 0) gate_.reset(seen);
+    const GoalGate::State state = gate_.update(now, seen);
+    if (state != GoalGate::State::Fresh) {
+      ROS_WARN_THROTTLE(5.0,
+                        "no goal: the newest transform of '%s' is %.3f s old and %.3f m away from "
+                        "the last goal",
+                        frame_.c_str(), gate_.age(), gate_.jump());
+      return;
+    }
+    // A static frame has no stamp: it is told again and again, as captured now.
+    const GoalObservation& goal = gate_.goal();
+    const bool told = sent_ns_ != 0 && goal.frame_ns == sent_frame_ns_;
+    if (told && (goal.frame_ns != 0 || now - sent_ns_ < kStaticPeriod_ns)) return;
+    sent_ns_ = now;
+    sent_frame_ns_ = goal.frame_ns;
+    const Vector3 position = goal.position + goal.orientation * offset_;
     coglab_msgs::DmpGoal message;
-    message.header.stamp = stamp;
+    message.header.stamp.fromNSec(static_cast<std::uint64_t>(goal.frame_ns));
     message.header.frame_id = dmp_frame_;
-    message.goal.x = goal.x();
-    message.goal.y = goal.y();
-    message.goal.z = goal.z();
+    message.goal.x = position.x();
+    message.goal.y = position.y();
+    message.goal.z = position.z();
     goal_.publish(message);
   }
 
+  static constexpr std::int64_t kStaticPeriod_ns = 1'000'000'000;
+
   ros::NodeHandle node_;
-  tf2_ros::Buffer buffer_;
-  tf2_ros::TransformListener listener_;
+  tf2::BufferCore buffer_;
+  TfListener listener_;
+  TfGoalSource source_{buffer_, listener_};
+  GoalGate gate_;
   ros::Publisher goal_;
   std::string frame_, dmp_frame_;
   Vector3 offset_ = Vector3::Zero();
   double rate_ = 100.0;
-  ros::Time last_;
-  bool published_ = false;
+  std::int64_t sent_ns_ = 0, sent_frame_ns_ = 0;
 };
 
 }  // namespace coglab_controllers

@@ -14,6 +14,18 @@ namespace {
 constexpr auto kPublishPeriod = std::chrono::milliseconds(5);
 constexpr double kStallTime = 0.25;  // s without a cycle that count as a stall
 constexpr double kWordsPeriod = 0.5;  // s between two status messages that differ in words alone
+
+/// An exception here would end the process that moves the arm.
+template <typename Function>
+void guarded(const char* what, const Function& function) {
+  try {
+    function();
+  } catch (const std::exception& error) {
+    ROS_ERROR_THROTTLE(1.0, "%s: %s", what, error.what());
+  } catch (...) {
+    ROS_ERROR_THROTTLE(1.0, "%s: an exception that is no std::exception", what);
+  }
+}
 }  // namespace
 
 ManagerRos::ManagerRos(const ros::NodeHandle& node, lwr_fri_bridge::ControlPort& port,
@@ -34,6 +46,7 @@ ManagerRos::ManagerRos(const ros::NodeHandle& node, lwr_fri_bridge::ControlPort&
   }
   thread_ = std::make_unique<ControlThread>(manager_->cycle(), port, options_.thread);
   tf_ = std::make_unique<tf2_ros::Buffer>(ros::Duration(10.0));
+  tf_listener_ = std::make_unique<TfListener>(*tf_);
   target_message_.name = manager_->settings().robot->chain.jointNames();
   target_message_.velocity.resize(target_message_.name.size());
 }
@@ -42,7 +55,7 @@ ManagerRos::~ManagerRos() { shutdown(); }
 
 void ManagerRos::start() {
   thread_->start();
-  tf_listener_ = std::make_unique<tf2_ros::TransformListener>(*tf_);
+  tf_listener_->start();
   status_ = node_.advertise<coglab_msgs::ControllerStatus>("status", 10, true);
   services_.push_back(node_.advertiseService("load_controller", &ManagerRos::onLoad, this));
   services_.push_back(node_.advertiseService("list_controllers", &ManagerRos::onList, this));
@@ -58,22 +71,25 @@ void ManagerRos::start() {
   loadFromParameters();
   spinner_ = std::make_unique<ros::AsyncSpinner>(4, &queue_);
   spinner_->start();
+  goals_ = std::thread([this] { goalLoop(); });
   publisher_ = std::thread([this] { publishLoop(); });
 }
 
 void ManagerRos::shutdown() {
   if (stopping_.exchange(true)) return;
+  if (goals_.joinable()) goals_.join();
   if (publisher_.joinable()) publisher_.join();
+  queue_.disable();
+  if (spinner_) spinner_->stop();
+  thread_->stop();
+  // What follows asks the ROS master, which may not answer: every thread of ours has ended.
+  tf_listener_->stop();
   for (ros::ServiceServer& service : services_) service.shutdown();
   speed_.shutdown();
   feedback_.reset();
   cancel_.reset();
-  if (spinner_) spinner_->stop();
-  {
-    const std::lock_guard<std::mutex> lock(sides_mutex_);
-    sides_.clear();
-  }
-  thread_->stop();
+  const std::lock_guard<std::mutex> lock(sides_mutex_);
+  sides_.clear();
 }
 
 void ManagerRos::loadFromParameters() {
@@ -96,9 +112,10 @@ void ManagerRos::loadFromParameters() {
 Answer ManagerRos::load(const std::string& id, const std::string& type) {
   const auto attach = [this, &id](MotionController& controller, const MotionMaker& maker) {
     if (maker.ros == nullptr) return;
-    std::unique_ptr<MotionControllerRos> side(maker.ros());
+    std::shared_ptr<MotionControllerRos> side(maker.ros());
     RosContext context;
     context.tf = tf_.get();
+    context.listener = tf_listener_.get();
     side->attach(controller, ros::NodeHandle(node_, id), context);
     const std::lock_guard<std::mutex> lock(sides_mutex_);
     sides_.push_back(std::move(side));
@@ -163,20 +180,39 @@ void ManagerRos::onSpeedTopic(const std_msgs::Float64& message) {
   if (!answer.success) ROS_WARN_THROTTLE(1.0, "%s", answer.message.c_str());
 }
 
+std::vector<std::shared_ptr<MotionControllerRos>> ManagerRos::sides() {
+  const std::lock_guard<std::mutex> lock(sides_mutex_);
+  return sides_;
+}
+
+// A thread of its own: what hinders publication (a full pipe behind the log, a plug-in's own ROS
+// side) must not take the goal from a motion.
+void ManagerRos::goalLoop() {
+  auto next = std::chrono::steady_clock::now();
+  while (!stopping_) {
+    for (const auto& side : sides()) {
+      guarded("following of goals", [&side] { side->pollGoal(); });
+    }
+    next = std::max(next + kPublishPeriod, std::chrono::steady_clock::now() - kPublishPeriod);
+    std::this_thread::sleep_until(next);
+  }
+}
+
 void ManagerRos::publishLoop() {
   heartbeat_ns_ = steadyNow();
   auto next = std::chrono::steady_clock::now();
   for (std::uint64_t round = 0; !stopping_; ++round) {
-    {
-      const std::lock_guard<std::mutex> lock(sides_mutex_);
-      for (const auto& side : sides_) side->spinOnce();
+    for (const auto& side : sides()) {
+      guarded("publication of a controller", [&side] { side->spinOnce(); });
     }
-    const CycleReport report = manager_->report();
-    watch(report);
-    publishTarget(report);
-    if (round % 4 == 0) publishStatus(report);
-    if (round % 40 == 0) feedback_->publishStatus();
-    if (round % 40 == 20) diagnostics_->update();
+    guarded("publication", [this, round] {
+      const CycleReport report = manager_->report();
+      watch(report);
+      publishTarget(report);
+      if (round % 4 == 0) publishStatus(report);
+      if (round % 40 == 0) feedback_->publishStatus();
+      if (round % 40 == 20) diagnostics_->update();
+    });
     next = std::max(next + kPublishPeriod, std::chrono::steady_clock::now() - kPublishPeriod);
     std::this_thread::sleep_until(next);
   }
@@ -271,6 +307,7 @@ void ManagerRos::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) {
   status.add("plan", report.generation);
   status.add("speed scale", report.speed_scale);
   status.add("time scale", report.time_scale);
+  status.add("transforms refused", tf_listener_->refused());
   status.add("guard", describe(report.guard.reason));
   status.add("guard scale", report.guard.scale);
   status.add("real-time scheduling", warning.empty() ? "granted or not asked for" : warning);

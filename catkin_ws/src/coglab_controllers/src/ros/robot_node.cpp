@@ -14,6 +14,7 @@
 
 #include "coglab_controllers/ros/manager_ros.hpp"
 #include "lwr_fri_bridge/bridge_ros.hpp"
+#include "lwr_fri_bridge/exit_limit.hpp"
 
 namespace {
 volatile std::sig_atomic_t asked_to_end = 0;
@@ -49,6 +50,8 @@ int main(int argc, char** argv) {
     }
     bridge.shutdown();  // brakes and leaves command mode while the control thread still answers
     control.store(nullptr, std::memory_order_release);
+    lwr_fri_bridge::endProcessWithin(std::chrono::seconds(1));
+    bridge.unregister();
     manager.shutdown();
     ros::shutdown();
   } catch (const std::exception& error) {

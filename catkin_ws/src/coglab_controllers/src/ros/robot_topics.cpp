@@ -6,7 +6,8 @@
 #include <utility>
 #include <vector>
 
-#include "coglab_controllers/ros/motion_controller_ros.hpp"
+#include "coglab_controllers/plugins/goal_source.hpp"
+#include "coglab_controllers/ros/ros_clocks.hpp"
 
 namespace coglab_controllers {
 
@@ -56,10 +57,13 @@ RobotTopics::RobotTopics(const ros::NodeHandle& node, const lwr_fri_bridge::Join
 
 void RobotTopics::onJoints(const sensor_msgs::JointState& joints) {
   const std::int64_t stamp = toSteady(joints.header.stamp);
-  if (stamp <= last_stamp_ns_ || !inWireOrder(joints.name, joints.position, sample_.position)) {
-    ROS_WARN_THROTTLE(
-        1.0, "joint_states refused: expected a new stamp, and finite positions of %zu arm joints",
-        kJoints.size());
+  // One from the future would be newer than all that come after it.
+  if (stamp <= last_stamp_ns_ || stamp - steadyNow() > kClockTolerance_ns ||
+      !inWireOrder(joints.name, joints.position, sample_.position)) {
+    ROS_WARN_THROTTLE(1.0,
+                      "joint_states refused: expected a new stamp not ahead of the clock, and finite "
+                      "positions of %zu arm joints",
+                      kJoints.size());
     return;
   }
   if (!inWireOrder(joints.name, joints.velocity, sample_.velocity)) sample_.velocity.setZero();

@@ -1,9 +1,8 @@
 #include "coglab_controllers/ros/tf_goal_source.hpp"
 
-#include <geometry_msgs/TransformStamped.h>
-#include <tf2/exceptions.h>
+#include <exception>
 
-#include "coglab_controllers/ros/motion_controller_ros.hpp"
+#include <geometry_msgs/TransformStamped.h>
 
 namespace coglab_controllers {
 
@@ -12,7 +11,7 @@ bool TfGoalSource::lookup(const std::string& reference, const std::string& frame
   geometry_msgs::TransformStamped transform;
   try {
     transform = buffer_.lookupTransform(reference, frame, ros::Time(0));
-  } catch (const tf2::TransformException& error) {
+  } catch (const std::exception& error) {  // tf2 throws more than its own exceptions
     why = error.what();
     return false;
   }
@@ -20,9 +19,9 @@ bool TfGoalSource::lookup(const std::string& reference, const std::string& frame
   const auto& q = transform.transform.rotation;
   observation.position = Vector3(t.x, t.y, t.z);
   observation.orientation = Quaternion(q.w, q.x, q.y, q.z);
-  // Static transforms have no stamp: they are as good as captured now.
+  observation.frame_ns = nanoseconds(transform.header.stamp);
   observation.stamp_ns =
-      transform.header.stamp.isZero() ? steadyNow() : toSteady(transform.header.stamp);
+      observation.frame_ns == 0 ? steady_() : toSteady(transform.header.stamp, steady_());
   return true;
 }
 

@@ -64,6 +64,8 @@ class BridgeRos {
   /// ends all threads. To be called on SIGINT, SIGTERM and at the end of main; works without a
   /// roscore. Safe to call twice.
   void shutdown();
+  /// After shutdown(): tells the ROS master, and waits for it; see endProcessWithin().
+  void unregister();
 
   Bridge& bridge() { return bridge_; }
   ControlPort& port() { return bridge_.port(); }
@@ -110,6 +112,7 @@ class BridgeRos {
   std::int64_t started_ns_ = 0;
   std::uint64_t published_sequence_ = 0;
   std::atomic<bool> stopping_{false};
+  std::atomic<bool> closing_{false};  // the node ends: nothing is asked of the arm any more
   std::atomic<bool> controller_active_{false};
   bool started_ = false;
   std::atomic<std::uint64_t> refused_invalid_{0}, refused_active_{0}, refused_second_{0},

@@ -29,11 +29,11 @@ struct DmpRequest {
   Vector3 initial_position = Vector3::Zero();  ///< m, in dmp_frame_name; only with kGiven
   Vector3 initial_velocity = Vector3::Zero();  ///< m/s
   double dmp_ratio = 1.0;
-  Vector3 goal_offset = Vector3::Zero();  ///< m, in the goal frame (tf) or dmp_frame_name (topic)
+  Vector3 goal_offset = Vector3::Zero();  ///< m, in the goal frame, or dmp_frame_name (dmp_goal)
   bool orientation_control = false;
   Eigen::Vector4d target_orientation =
       Eigen::Vector4d::Zero();  ///< x y z w; all zero: keep the current one
-  std::string goal_frame;       ///< tf2 frame of the goal; empty: goal_frame_name
+  std::string goal_frame;  ///< tf2 frame that the motion follows; empty: what comes on dmp_goal
 };
 
 /// Progress of the motion, for dmp/feedback.
@@ -62,15 +62,19 @@ struct IkDebugRecord {
 struct HandGoal {
   Vector3 offset = Vector3::Zero();
   Quaternion orientation = Quaternion::Identity();
-  bool in_goal_frame = true;     ///< offset and orientation turn with the goal frame
+  /// The goal is a frame, with which offset and orientation turn; false: it comes on dmp_goal.
+  bool in_goal_frame = true;
   bool keep_orientation = true;  ///< the hand keeps the orientation it has
 };
 
 /// The plug-in. Requests come from any thread; the cycle sees them as plans.
 ///
+/// Each motion has one owner of its goal, which its request names: the tf2 frame `goal_frame`, or,
+/// with an empty one as in D4.10, whoever publishes dmp_goal.
+///
 /// Parameters: Table 4's `pos_clik_gain`, `rot_clik_gain` (1/s), `robot_base_frame_name`,
-/// `dmp_frame_name`, `enable_ik_debug`; and `goal_source` (tf or topic), `goal_frame_name`,
-/// `goal_timeout` (s, topic; 0: never old), `goal_max_age` (s), `goal_max_jump` (m),
+/// `dmp_frame_name`, `enable_ik_debug`; and
+/// `goal_timeout` (s, dmp_goal; 0: never old), `goal_max_age` (s), `goal_max_jump` (m),
 /// `goal_lost_time` (s), `goal_finish_distance` (m), `goal_reach_margin` (m), `goal_time_constant`,
 /// `noisy_goal_time_constant` (s), `max_initial_distance` (m), `end_phase`, `end_speed` (m/s),
 /// `end_turning` (rad/s), `end_distance` (m), `noisy_end_speed`, `noisy_end_turning`,
@@ -89,8 +93,10 @@ class DmpController : public MotionController {
   Answer loadDmps(const std::string& filename, int& loaded);
   Answer execute(const DmpRequest& request);
   Answer switchDmp(const DmpRequest& request);
-  /// dmp_goal. `frame` must be dmp_frame_name. @param stamp_ns 0: now
-  Answer setGoal(const std::string& frame, const Vector3& goal, std::int64_t stamp_ns);
+  /// dmp_goal. `frame` must be dmp_frame_name. @param stamp_ns on the clock of the samples, 0: now
+  /// @param frame_ns the stamp as received, 0: as stamp_ns. Not newer than the last one: refused
+  Answer setGoal(const std::string& frame, const Vector3& goal, std::int64_t stamp_ns,
+                 std::int64_t frame_ns = 0);
   /// Asks the goal source for the goal frame of the motion; call it often (the ROS side: 200 Hz;
   /// lockstep: every tick).
   void pollGoal();
@@ -109,7 +115,6 @@ class DmpController : public MotionController {
   const std::string& id() const { return setup_.id; }
   const std::string& dmpFrame() const { return dmp_frame_; }
   const std::string& baseFrame() const { return base_frame_; }
-  bool goalFromTf() const { return goal_from_tf_; }
   const std::string& goalTfFrame() const { return goal_tf_frame_; }
   /// The motion behind the references. Control thread, or lockstep between two cycles.
   const CartesianMotion& motion() const;
@@ -135,6 +140,8 @@ class DmpController : public MotionController {
   Answer checkRequest(const DmpRequest& request, bool execute, Plan& plan) const;
   Answer findFrames(Plan& plan);
   Answer findGoal(const std::string& frame, Plan& plan);
+  Answer findTopicGoal(Plan& plan);
+  void followFrom(const std::string& frame, const GoalObservation& first);
   Answer outsideWorkspace(const Plan& plan) const;
   Answer offer(std::unique_ptr<Plan> plan);
   Pose handGoal(const GoalObservation& goal, const HandGoal& hand) const;
@@ -153,8 +160,8 @@ class DmpController : public MotionController {
 
   // set once, by configure()
   MotionSetup setup_;
-  std::string base_frame_, dmp_frame_, goal_frame_, goal_tf_frame_;
-  bool goal_from_tf_ = true;
+  std::string base_frame_, dmp_frame_, goal_tf_frame_;
+  GoalGateParameters frame_gate_, topic_gate_;
   double arrive_distance_ = 0.01, settle_time_ = 2.0;
   double finish_distance_ = 0.12, reach_margin_ = 0.5, max_initial_distance_ = 0.1;
   std::unique_ptr<TwoTaskIk> ik_;
@@ -166,10 +173,12 @@ class DmpController : public MotionController {
   std::unique_ptr<PlanExchange<Plan>> plans_;
   std::mutex goal_mutex_;
   GoalSource* source_ = nullptr;
-  std::string frame_of_motion_;
+  std::string frame_of_motion_;  // empty: dmp_goal
   std::uint64_t request_number_ = 0;
-  GoalObservation pushed_;
+  GoalObservation pushed_;      // newest sight of that frame
+  GoalObservation topic_goal_;  // newest dmp_goal
   bool topic_goal_known_ = false;
+  std::atomic<double> ahead_{0.0};  // s, of the newest goal if it was refused for that
   lwr_fri_bridge::TripleBuffer<GoalObservation> goals_;
 
   // control thread

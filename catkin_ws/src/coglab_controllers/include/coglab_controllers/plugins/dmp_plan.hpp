@@ -23,9 +23,8 @@ struct DmpController::Plan {
 /// State of the running motion; the control thread's own.
 struct DmpController::Loop {
   Loop() = default;
-  Loop(const GoalEstimatorParameters& estimator, const MotionEndParameters& end,
-       const GoalGateParameters& goal_gate)
-      : motion(estimator, end), gate(goal_gate) {}
+  Loop(const GoalEstimatorParameters& estimator, const MotionEndParameters& end)
+      : motion(estimator, end) {}
 
   DmpProgress progress(MotionState state, const Reason& reason) const {
     DmpProgress now;

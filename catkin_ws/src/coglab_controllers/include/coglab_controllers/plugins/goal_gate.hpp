@@ -13,7 +13,12 @@ namespace coglab_controllers {
 struct GoalObservation {
   Vector3 position = Vector3::Zero();               ///< m, in dmp_frame_name
   Quaternion orientation = Quaternion::Identity();  ///< of the goal frame, in dmp_frame_name
-  std::int64_t stamp_ns = 0;                        ///< time of capture, clock of the samples
+  /// Time of capture, clock of the samples. It says how old the frame is, not which one: mapped
+  /// from another clock twice, one frame has two of them.
+  std::int64_t stamp_ns = 0;
+  /// Which frame it is: its stamp as received, ns; later ones are larger. 0: it has none and is
+  /// valid as long as it is shown (a static transform).
+  std::int64_t frame_ns = 0;
   std::uint64_t request = 0;  ///< which request asked for this frame; set by the plug-in
 };
 
@@ -44,7 +49,8 @@ class GoalGate {
 
   /// One cycle.
   /// @param now_ns clock of the samples
-  /// @param newest the newest frame received, again and again while no newer one comes
+  /// @param newest the newest frame received, again and again while no newer one comes; each is
+  /// judged once
   State update(std::int64_t now_ns, const GoalObservation& newest) noexcept;
 
   const GoalObservation& goal() const noexcept { return goal_; }  ///< the one to follow
@@ -54,11 +60,13 @@ class GoalGate {
   const GoalGateParameters& parameters() const noexcept { return parameters_; }
 
  private:
+  bool isNew(const GoalObservation& newest) const noexcept;
+
   GoalGateParameters parameters_;
   GoalObservation goal_;
   GoalObservation candidate_;
+  GoalObservation last_;  // the newest frame judged
   int agreeing_ = 0;
-  std::int64_t last_stamp_ns_ = 0;
   std::int64_t believed_ns_ = 0;
   double age_ = 0.0;
   double jump_ = 0.0;

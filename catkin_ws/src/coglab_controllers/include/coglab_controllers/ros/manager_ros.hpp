@@ -17,7 +17,6 @@
 #include <sensor_msgs/JointState.h>
 #include <std_msgs/Float64.h>
 #include <tf2_ros/buffer.h>
-#include <tf2_ros/transform_listener.h>
 
 #include "coglab_controllers/manager/control_thread.hpp"
 #include "coglab_controllers/manager/controller_manager.hpp"
@@ -80,6 +79,8 @@ class ManagerRos {
   Answer load(const std::string& id, const std::string& type);
   Answer switchTo(const std::string& id, std::string& type);
   void loadFromParameters();
+  std::vector<std::shared_ptr<MotionControllerRos>> sides();
+  void goalLoop();
   void publishLoop();
   void publishTarget(const CycleReport& report);
   void publishStatus(const CycleReport& report);
@@ -94,17 +95,17 @@ class ManagerRos {
   std::unique_ptr<ControllerManager> manager_;
   std::unique_ptr<ControlThread> thread_;
   std::unique_ptr<tf2_ros::Buffer> tf_;
-  std::unique_ptr<tf2_ros::TransformListener> tf_listener_;
+  std::unique_ptr<TfListener> tf_listener_;
   std::unique_ptr<FeedbackRos> feedback_;
   std::unique_ptr<CancelRos> cancel_;
   std::mutex sides_mutex_;
-  std::vector<std::unique_ptr<MotionControllerRos>> sides_;
+  std::vector<std::shared_ptr<MotionControllerRos>> sides_;
   std::vector<ros::ServiceServer> services_;
   ros::Publisher status_;
   ros::Subscriber speed_;
   std::unique_ptr<ros::AsyncSpinner> spinner_;
   std::unique_ptr<diagnostic_updater::Updater> diagnostics_;
-  std::thread publisher_;
+  std::thread goals_, publisher_;
   std::atomic<bool> stopping_{false};
   std::atomic<bool> active_{false};
 

@@ -1,0 +1,53 @@
+#!/usr/bin/python3
+"""Figure `fuzz`: the whole system under 1e5 random messages on every topic and service of every node of ours.
+
+The generator (coglab_bringup/ros_fuzz.py says what it sends) makes each message malformed by design: at least one value
+that its definition excludes. Messages without any field that could be so (`Trigger`, integers alone) are valid by
+nature and counted apart. Ended: a node whose process is another one, or does not answer, afterwards. Silent: a topic on
+which a node of ours spoke within 1 s before, and within 1.5 s afterwards did not. Moved: the farthest that a joint of
+the arm, in command mode, came from where it was.
+"""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+from coglab_bringup.run_directory import free_port, run_environment
+
+TEST = Path(__file__).resolve().parent.parent / "test" / "fuzz.test"
+
+
+def main() -> int:
+    """Runs the campaign and prints the rows."""
+    with tempfile.TemporaryDirectory() as folder:
+        report = Path(folder) / "report.json"
+        environment = run_environment(free_port(), Path(folder))
+        environment.update(COGLAB_LONG="1", COGLAB_FUZZ_REPORT=str(report))
+        subprocess.run(["rostest", "--time-limit", "1500", str(TEST)], env=environment, stdout=sys.stderr, timeout=1700,
+                       check=False)
+        if not report.is_file():
+            sys.exit(f"{TEST.name} left no report; see its output above")
+        found = json.loads(report.read_text())
+    sent, what = found["sent"], f"{found['topics']} topics and {found['services']} services of {found['nodes']} nodes"
+    rows = [(f"nodes that ended: {', '.join(found['ended']) or 'none'}", len(found["ended"]), "1", 0),
+            (f"topics that fell silent: {', '.join(found['silent']) or 'none'}", len(found["silent"]), "1", 0),
+            ("requests without an answer within 20 s", found["answers"].get("no answer", 0), "1", 0),
+            ("the arm moved by", 1000.0 * found["moved"], "mrad", 10.0)]
+    told = [(f"malformed messages sent, to {what}", sent.get("malformed", 0)),
+            ("messages sent that are valid by nature", sent.get("valid by nature", 0)),
+            (f"malformed requests answered with success: {json.dumps(found['accepted'])}",
+             sum(found["accepted"].values()))]
+    table = [dict(bench="fuzz", figure=figure, value=value, unit=unit, goal=f"<= {most:g}", peer=None, peer_value=None,
+                  ok=value <= most) for figure, value, unit, most in rows]
+    table += [dict(bench="fuzz", figure=figure, value=value, unit="1", goal="reported", peer=None, peer_value=None,
+                   ok=True) for figure, value in told]
+    print(json.dumps(table, indent=1))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,87 @@
+#!/usr/bin/python3
+"""Nothing that arrives by ROS ends a node or moves the arm: a sample of the campaign of ./coglab bench fuzz."""
+
+import json
+import os
+import sys
+import time
+import unittest
+from pathlib import Path
+
+import rospy
+import rostest
+from coglab_bringup.ros_fuzz import Fuzz, settle
+from coglab_msgs.srv import LoadController, LwrCommand, SwitchController
+from sensor_msgs.msg import JointState
+
+LONG = os.environ.get("COGLAB_LONG") == "1"
+PER_TOPIC, PER_SERVICE = (1500, 700) if LONG else (8, 6)
+READY_LIMIT = 60.0  # s
+
+
+class Still:
+    """How far the arm's joints are from where they were, by the word of the robot's own node."""
+
+    def __init__(self) -> None:
+        self.first: tuple | None = None
+        self.farthest = 0.0  # rad
+        rospy.Subscriber("/lwr/joint_states", JointState, self.on_joints, queue_size=50)
+
+    def on_joints(self, message: JointState) -> None:
+        if message._connection_header.get("callerid") != "/robot":
+            return
+        self.first = self.first or message.position
+        self.farthest = max(self.farthest, *(abs(a - b) for a, b in zip(message.position, self.first, strict=True)))
+
+
+class FuzzTest(unittest.TestCase):
+    """One campaign, in setUpClass."""
+
+    @classmethod
+    def setUpClass(cls):
+        rospy.init_node("fuzz")
+        settle(READY_LIMIT)
+        for service, kind, arguments in (
+                ("/controller_manager/load_controller", LoadController, ("dmp", "coglab/DmpController")),
+                ("/controller_manager/load_controller", LoadController, ("ptp", "coglab/PtpController")),
+                ("/lwr/command", LwrCommand, ("start",)),
+                ("/controller_manager/switch_controller", SwitchController, ("ptp",))):
+            end = time.monotonic() + 20.0
+            while not (answer := rospy.ServiceProxy(service, kind)(*arguments)).success:
+                assert time.monotonic() < end, answer.message
+                time.sleep(0.2)
+        cls.fuzz = Fuzz(seed=1)
+        cls.arm = Still()
+        cls.before = cls.fuzz.talking(1.0)
+        cls.report = cls.fuzz.run(PER_TOPIC, PER_SERVICE, limit=20.0)
+        cls.after = cls.fuzz.talking(1.5)
+        report = {"nodes": len(cls.fuzz.nodes), "topics": len(cls.fuzz.topics), "services": len(cls.fuzz.services),
+                  "sent": cls.report.sent, "answers": cls.report.answers, "accepted": cls.report.accepted,
+                  "ended": cls.report.ended, "silent": sorted(cls.before - cls.after), "moved": cls.arm.farthest}
+        print(json.dumps(report), flush=True)
+        if "COGLAB_FUZZ_REPORT" in os.environ:
+            Path(os.environ["COGLAB_FUZZ_REPORT"]).write_text(json.dumps(report))
+
+    def test_1_everything_is_there(self):
+        for node in ("/robot", "/ih2_hand", "/coglab", "/object_database", "/contact_detector", "/perception",
+                     "/motion_recogniser", "/coglab_sim/cell"):
+            self.assertIn(node, self.fuzz.nodes)
+        self.assertTrue({"/tf", "/tf_static", "/lwr/target_joint_states"} <= set(self.fuzz.topics))
+        self.assertGreaterEqual(sum(self.report.sent.values()), 200)
+
+    def test_2_no_node_ended(self):
+        self.assertEqual(self.report.ended, [])
+
+    def test_3_whoever_spoke_still_speaks(self):
+        self.assertEqual(self.before - self.after, set())
+
+    def test_4_every_service_answered(self):
+        self.assertEqual(self.report.answers["no answer"], 0)
+
+    def test_5_the_arm_stood(self):
+        self.assertIsNotNone(self.arm.first)
+        self.assertLess(self.arm.farthest, 0.01)
+
+
+if __name__ == "__main__":
+    rostest.rosrun("coglab_bringup", "fuzz", FuzzTest, sys.argv)

@@ -1,0 +1,60 @@
+/// @file
+/// Transforms from /tf and /tf_static into a tf2 buffer, less those that would spoil it.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <string>
+
+#include <ros/callback_queue.h>
+#include <ros/ros.h>
+#include <ros/spinner.h>
+#include <tf2/buffer_core.h>
+#include <tf2_msgs/TFMessage.h>
+
+namespace coglab_controllers {
+
+/// Listens in a thread of its own, in place of tf2_ros::TransformListener.
+///
+/// A buffer keeps a transform from the future as its newest for as long as it is ahead, mixes it
+/// into those before it, and one that is further ahead than the buffer is long locks out all that
+/// come after. So a stamp more than kClockTolerance_ns ahead of this computer's clock, and numbers
+/// that are not finite, are refused, counted and logged with the frame and its publisher.
+class TfListener {
+ public:
+  /// @param buffer outlives the listener
+  explicit TfListener(tf2::BufferCore& buffer) : buffer_(buffer) {}
+  ~TfListener() { stop(); }
+
+  void start();
+  void stop();  ///< calls the ROS master once per topic
+  /// One message, as from a topic. Any thread; throws nothing.
+  /// @param publisher name of the node it comes from
+  void receive(const tf2_msgs::TFMessage& message, const std::string& publisher, bool is_static);
+
+  /// Transforms refused so far.
+  std::uint64_t refused() const { return refused_.load(std::memory_order_relaxed); }
+  /// How far the newest transform of this child frame was ahead of the clock, s, if it was refused
+  /// for that; else 0.
+  double ahead(const std::string& frame) const;
+
+ private:
+  using Event = ros::MessageEvent<const tf2_msgs::TFMessage>;
+  bool acceptable(const geometry_msgs::TransformStamped& transform, const std::string& publisher,
+                  bool is_static);
+  void clearAfterAStepBack();
+
+  tf2::BufferCore& buffer_;
+  std::atomic<std::uint64_t> refused_{0};
+  mutable std::mutex mutex_;
+  std::map<std::string, double> ahead_;  ///< s, by child frame; frames that were refused last
+  std::int64_t last_now_ns_ = 0;
+  ros::CallbackQueue queue_;
+  ros::Subscriber dynamic_, static_;
+  std::unique_ptr<ros::AsyncSpinner> spinner_;
+};
+
+}  // namespace coglab_controllers

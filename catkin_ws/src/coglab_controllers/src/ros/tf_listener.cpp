@@ -1,0 +1,119 @@
+#include "coglab_controllers/ros/tf_listener.hpp"
+
+#include <cmath>
+#include <exception>
+
+#include "coglab_controllers/plugins/goal_source.hpp"
+#include "coglab_controllers/ros/ros_clocks.hpp"
+
+namespace coglab_controllers {
+
+namespace {
+
+constexpr std::size_t kNamesKept = 256;  // of refused frames: names are anybody's
+
+bool isFinite(const geometry_msgs::Transform& transform) {
+  const auto& t = transform.translation;
+  const auto& q = transform.rotation;
+  for (const double value : {t.x, t.y, t.z, q.x, q.y, q.z, q.w}) {
+    if (!std::isfinite(value)) return false;
+  }
+  return true;
+}
+
+/// tf2 takes frame names with and without a leading slash for the same.
+std::string bare(const std::string& frame) {
+  return !frame.empty() && frame[0] == '/' ? frame.substr(1) : frame;
+}
+
+}  // namespace
+
+void TfListener::start() {
+  ros::NodeHandle node;
+  node.setCallbackQueue(&queue_);
+  dynamic_ = node.subscribe<tf2_msgs::TFMessage>(
+      "/tf", 100, boost::function<void(const Event&)>([this](const Event& event) {
+        receive(*event.getConstMessage(), event.getPublisherName(), false);
+      }));
+  static_ = node.subscribe<tf2_msgs::TFMessage>(
+      "/tf_static", 100, boost::function<void(const Event&)>([this](const Event& event) {
+        receive(*event.getConstMessage(), event.getPublisherName(), true);
+      }));
+  spinner_ = std::make_unique<ros::AsyncSpinner>(1, &queue_);
+  spinner_->start();
+}
+
+void TfListener::stop() {
+  if (spinner_) spinner_->stop();
+  spinner_.reset();
+  dynamic_.shutdown();
+  static_.shutdown();
+}
+
+void TfListener::receive(const tf2_msgs::TFMessage& message, const std::string& publisher,
+                         bool is_static) {
+  clearAfterAStepBack();
+  for (const geometry_msgs::TransformStamped& transform : message.transforms) {
+    if (!acceptable(transform, publisher, is_static)) {
+      refused_.fetch_add(1, std::memory_order_relaxed);
+      continue;
+    }
+    try {
+      buffer_.setTransform(transform, publisher, is_static);
+    } catch (const std::exception& error) {
+      refused_.fetch_add(1, std::memory_order_relaxed);
+      ROS_WARN_THROTTLE(5.0, "tf of %s refused: %s", publisher.c_str(), error.what());
+    }
+  }
+}
+
+bool TfListener::acceptable(const geometry_msgs::TransformStamped& transform,
+                            const std::string& publisher, bool is_static) {
+  const std::string& frame = transform.child_frame_id;
+  if (!isFinite(transform.transform)) {
+    ROS_WARN_THROTTLE(5.0, "tf of '%.100s' from %s refused: it holds a number that is not finite",
+                      frame.c_str(), publisher.c_str());
+    return false;
+  }
+  if (is_static) return true;  // valid at any time: nobody reads its stamp
+  const std::int64_t ahead =
+      nanoseconds(transform.header.stamp) - nanoseconds(ros::Time::now());
+  const bool future = ahead > kClockTolerance_ns;
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (!future) {
+      ahead_.erase(bare(frame));
+    } else if (ahead_.size() < kNamesKept || ahead_.count(bare(frame)) != 0) {
+      ahead_[bare(frame)] = 1e-9 * static_cast<double>(ahead);
+    }
+  }
+  if (future) {
+    ROS_WARN_THROTTLE(5.0,
+                      "tf of '%.100s' from %s refused: stamped %.3f s ahead of this computer's "
+                      "clock (allowed: %.3f s); synchronise the clocks. %llu refused so far",
+                      frame.c_str(), publisher.c_str(), 1e-9 * static_cast<double>(ahead),
+                      1e-9 * static_cast<double>(kClockTolerance_ns),
+                      static_cast<unsigned long long>(refused() + 1));
+  }
+  return !future;
+}
+
+double TfListener::ahead(const std::string& frame) const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  const auto found = ahead_.find(bare(frame));
+  return found == ahead_.end() ? 0.0 : found->second;
+}
+
+void TfListener::clearAfterAStepBack() {
+  // Everything in the buffer is from the future now.
+  const std::int64_t now = nanoseconds(ros::Time::now());
+  const std::lock_guard<std::mutex> lock(mutex_);
+  if (now < last_now_ns_ - kClockTolerance_ns) {
+    ROS_WARN("this computer's clock went back by %.3f s: transforms are forgotten",
+             1e-9 * static_cast<double>(last_now_ns_ - now));
+    buffer_.clear();
+  }
+  last_now_ns_ = now;
+}
+
+}  // namespace coglab_controllers
