@@ -58,8 +58,8 @@ class EmulatedHand:
                  strict_force: bool = False, enforce_spacing: bool = False,
                  positions: Sequence[int] = (0,) * WIRE.motors,
                  preshapes: Mapping[str, Sequence[int]] | None = None):
-        if calibration_scale < 0.0:
-            raise ValueError(f"calibration_scale must not be negative; got {calibration_scale}")
+        if not 0.0 <= calibration_scale <= 1000.0:
+            raise ValueError(f"calibration_scale must be 0..1000; got {calibration_scale}")
         self.clock = clock or SteadyClock()
         self.parser = FrameParser(dialect)
         self.motors = [Motor(number, float(positions[number])) for number in range(WIRE.motors)]
