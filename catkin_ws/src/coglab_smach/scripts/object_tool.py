@@ -48,7 +48,7 @@ def cmd_check(folder: Path, ids: list[str], dialect: str) -> int:
         for line, ok in reachability_report(entry):
             print(f"  {line}")
             failed += 0 if ok else 1
-    print(f"{len(files)} objects are well" if not failed else f"{failed} problems")
+    print("all fine" if not failed else f"{failed} problems; edit the files, then again: ./coglab object check")
     return 1 if failed else 0
 
 

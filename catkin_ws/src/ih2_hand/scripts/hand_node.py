@@ -13,7 +13,7 @@ def main() -> int:
     end_quietly()
     try:
         node = HandNode()
-    except (ValueError, OSError) as error:
+    except (TypeError, ValueError, OSError) as error:
         rospy.logfatal("hand node: %s", error)
         return 1
     node.run()

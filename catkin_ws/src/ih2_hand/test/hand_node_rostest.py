@@ -252,7 +252,7 @@ class HandNode(unittest.TestCase):
         nonsense = HandStatus(motors=[MotorStatus(motor=99, position=-2**31)] * 1000)
         nonsense.header.stamp = rospy.Time(4294967295)
         time.sleep(0.2)
-        self.hand.send("hand_close", 300)
+        self.hand.send("hand_close", 511)
         client = self.hand.clients["hand_close"]
         while not client.wait_for_result(rospy.Duration(0.02)):
             foreign.publish(nonsense)

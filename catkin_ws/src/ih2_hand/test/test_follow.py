@@ -9,6 +9,7 @@ import pytest
 from ih2_hand.follow import follow
 from ih2_hand.grasps import CLOSING_MOTORS
 from ih2_hand.progress import CloseTask, GraspTask, OpenTask, PreshapeTask
+from ih2_hand.reasons import Reason
 
 
 def grasp(bench, mode: str, level: str, is_current: bool = True):
@@ -56,6 +57,7 @@ def test_close_on_an_object_at_any_speed(bench, speed):
 def test_too_slow_ends_in_time(bench):
     verdict = follow(bench.driver, CloseTask(1), period=0.5)
     assert not verdict.ok and "not done within 60 s" in verdict.text
+    assert verdict.reason is Reason.TIME_LIMIT
     assert all(motor.mode == "stop" for motor in bench.hand.motors)
 
 
@@ -64,6 +66,7 @@ def test_breaking_off_stops_the_fingers(bench):
     verdict = follow(bench.driver, CloseTask(100),
                      on_poll=lambda verdict, motors: polls.append(motors) or len(polls) > 10)
     assert "broken off" in verdict.text and len(polls) == 11
+    assert verdict.reason is Reason.CANCELLED
     bench.hand.advance()
     assert all(motor.mode == "stop" for motor in bench.hand.motors)
 
@@ -89,6 +92,7 @@ def test_a_line_that_slips_again_and_again_is_reported(bench):
 
     verdict = follow(bench.driver, CloseTask(100), on_poll=lose)
     assert not verdict.ok and "resynchronised 3 times" in verdict.text
+    assert verdict.reason is Reason.HAND_LINK_LOST
 
 
 def test_core_needs_pyserial_alone():

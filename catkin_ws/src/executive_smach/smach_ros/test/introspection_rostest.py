@@ -107,7 +107,7 @@ class TestSection11(unittest.TestCase):
     count = 0
 
     def setUp(self):
-        smach_ros.introspection.WELCOME_DELAY = 0.1  # most tests need not wait as long as a viewer
+        smach_ros.introspection.WELCOME_DELAY = 0.02  # most tests need not wait as long as a viewer
         type(self).count += 1
         self.name = f"/server_{self.count}"
         self.root, self.gate = build()

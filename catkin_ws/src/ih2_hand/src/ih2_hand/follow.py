@@ -8,6 +8,7 @@ from typing import Any
 
 from ih2_hand.driver import HandSerialDriver
 from ih2_hand.progress import RESENDS, Task, Verdict
+from ih2_hand.reasons import Reason
 
 PERIOD_S = 1.0 / 30.0
 """Time between polls."""
@@ -30,14 +31,16 @@ def follow(driver: HandSerialDriver, task: Task, *, period: float = PERIOD_S,
         asked = clock.monotonic()
         if asked - begun > task.limit:
             driver.stop_all()
-            return Verdict(f"not done within {task.limit:.0f} s; fingers stopped", done=True)
+            return Verdict(f"not done within {task.limit:.0f} s; fingers stopped", done=True,
+                           reason=Reason.TIME_LIMIT)
         motors = [SimpleNamespace(**reading) for reading in driver.read_motors()]
         if driver.counters.fillers != fillers:
             resends += 1
             if resends > RESENDS:
                 driver.stop_all()
                 return Verdict(f"the line to {driver.port} had to be resynchronised {resends} "
-                               "times during the movement: check the cable", done=True)
+                               "times during the movement: check the cable", done=True,
+                               reason=Reason.HAND_LINK_LOST)
             fillers = driver.counters.fillers
             task.begin(driver)
             continue
@@ -48,4 +51,4 @@ def follow(driver: HandSerialDriver, task: Task, *, period: float = PERIOD_S,
         if verdict.done:
             return verdict
         if broken_off:
-            return Verdict("broken off; fingers stopped", done=True)
+            return Verdict("broken off; fingers stopped", done=True, reason=Reason.CANCELLED)

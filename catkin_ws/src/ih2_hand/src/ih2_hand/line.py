@@ -168,7 +168,7 @@ class HandLine:
         for _ in range(50):
             self.transport.flush_input()
             self.clock.sleep(QUIET_S)
-            if not self.transport.pending():
+            if self._closed or not self.transport.pending():  # who closes need not wait for quiet
                 return
 
     def answers(self, frame: bytes, length: int) -> bool:

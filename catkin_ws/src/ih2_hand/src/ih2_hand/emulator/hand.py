@@ -13,7 +13,7 @@ from ih2_hand.emulator.parser import FrameParser
 from ih2_hand.wire_choices import WIRE
 
 STIFFEST = 1e6
-"""Counts of current for each count pressed into an object: beyond it, one count is too much."""
+"""Counts of current per count of position, of what a finger meets: no object is stiffer."""
 
 STEP_S = 0.002
 """Longest integration step."""
@@ -58,8 +58,8 @@ class EmulatedHand:
                  strict_force: bool = False, enforce_spacing: bool = False,
                  positions: Sequence[int] = (0,) * WIRE.motors,
                  preshapes: Mapping[str, Sequence[int]] | None = None):
-        if calibration_scale < 0.0:
-            raise ValueError(f"calibration_scale must not be negative; got {calibration_scale}")
+        if not 0.0 <= calibration_scale <= 1000.0:
+            raise ValueError(f"calibration_scale must be 0..1000; got {calibration_scale}")
         self.clock = clock or SteadyClock()
         self.parser = FrameParser(dialect)
         self.motors = [Motor(number, float(positions[number])) for number in range(WIRE.motors)]
@@ -92,8 +92,8 @@ class EmulatedHand:
                              f"{len(positions)} and {len(stiffness)}")
         for motor, position, stiff in zip(self.motors, positions, stiffness, strict=True):
             if not 0 <= position <= FREE or not 0.0 <= stiff <= STIFFEST:
-                raise ValueError(f"contact position must be 0..255 and stiffness 0..{STIFFEST:g}; "
-                                 f"got {position} and {stiff} for motor {motor.number}")
+                raise ValueError(f"contact position must be 0..255 and stiffness 0..{STIFFEST:g}; got "
+                                 f"{position} and {stiff} for motor {motor.number}")
             motor.contact = Contact(float(position), float(stiff))
 
     # -- time ------------------------------------------------------------------------------------
