@@ -28,27 +28,29 @@ def braking_time(report: dict, limits: lwr_fri_bridge.JointLimits) -> float:
     return max(lwr_fri_bridge.time_to_velocity(v, a, 0.0, most, jerk) for v, a, most, jerk in state)
 
 
-def begin(robot: object, controller: str, speed: float, random: np.random.Generator) -> None:
-    """Starts a motion of a controller from wherever the arm stands."""
+def begin(robot: object, controller: str, speed: float, goal: np.ndarray, random: np.random.Generator) -> None:
+    """Starts a motion of a controller from wherever the arm stands; `goal` (3,) m of the DMP."""
     must(robot.switch_controller(controller))
     if controller == "ptp":
-        limits = np.array(lwr_fri_bridge.JointLimits(str(LIMITS)).velocity)
-        target = HOME + random.uniform(-0.6, 0.6, 7)
-        status, _, message = robot.add_ptp(list(target), list(speed * limits), [])
+        limits = lwr_fri_bridge.JointLimits(str(LIMITS))
+        most = 0.9 * np.asarray(limits.upper_position)
+        target = np.clip(HOME + random.uniform(-0.6, 0.6, 7), -most, most)
+        status, _, message = robot.add_ptp(list(target), list(speed * np.asarray(limits.velocity)), [])
         must((status == 0, message))
     else:
-        robot.set_frame("goal", GOAL + random.uniform(-0.15, 0.15, 3))
+        robot.set_frame("goal", goal)
         must(robot.execute_dmp("reach_human", dmp_ratio=1.0 / speed, goal_frame="goal"))
 
 
 def cancelled(robot: object, controller: str, speed: float, seed: int,
               limits: lwr_fri_bridge.JointLimits) -> tuple[float, float]:
-    """Cycles beyond the braking time until the answer came, and speed (rad/s) at the cancel; waits for the arm to move."""
+    """Cycles beyond the braking time until the answer came, and the fastest joint (rad/s) at the cancel."""
     random = np.random.default_rng([seed, int(100 * speed), controller == "ptp"])
-    begin(robot, controller, speed, random)
+    goal = GOAL + random.uniform(-0.15, 0.15, 3)
+    begin(robot, controller, speed, goal, random)
     for _ in range(int(random.integers(40, 200))):
         if controller == "dmp":
-            robot.set_frame("goal", GOAL)
+            robot.set_frame("goal", goal)
         robot.tick()
     report = robot.report()
     best, fastest = braking_time(report, limits), float(np.max(np.abs(report["commanded_velocity"])))

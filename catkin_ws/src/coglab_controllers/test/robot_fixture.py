@@ -7,10 +7,12 @@ from collections.abc import Callable
 
 import rospy
 import tf2_ros
-from coglab_msgs.msg import ControllerStatus, DmpFeedback, FinishedPtp, LwrState
+from coglab_msgs.msg import ControllerStatus, DmpFeedback, FinishedPtp, LwrState, UnfinishedPtp
 from coglab_msgs.srv import (
     AddPtp,
     AddPtpRequest,
+    CancelMotion,
+    CancelMotionResponse,
     ExecuteDmp,
     ExecuteDmpRequest,
     GetActiveController,
@@ -53,6 +55,7 @@ class Robot:
         self.feedback = DmpFeedback()
         self.feedbacks: list[DmpFeedback] = []
         self.finished: list[int] = []
+        self.unfinished: dict[int, UnfinishedPtp] = {}
         rospy.Subscriber("lwr/joint_states", JointState, self._on_joints)
         rospy.Subscriber("lwr/state", LwrState, lambda m: setattr(self, "state", m))
         rospy.Subscriber("controller_manager/status", ControllerStatus,
@@ -60,6 +63,8 @@ class Robot:
         rospy.Subscriber("controller_manager/dmp/feedback", DmpFeedback, self._on_feedback)
         rospy.Subscriber("controller_manager/ptp/finished_ptp", FinishedPtp,
                          lambda m: self.finished.append(m.ptp_id))
+        rospy.Subscriber("controller_manager/ptp/unfinished_ptp", UnfinishedPtp,
+                         lambda m: self.unfinished.update({m.ptp_id: m}))
         self._goal: tuple[float, float, float] | None = None
         self._quaternion = (0.0, 0.0, 0.0, 1.0)
         self._broadcaster = tf2_ros.TransformBroadcaster()
@@ -106,6 +111,10 @@ class Robot:
     def add_ptp(self, position: list[float], velocity: list[float] | None = None) -> object:
         """Adds a point-to-point motion."""
         return self.call("controller_manager/ptp/add_ptp", AddPtp, position, velocity or [], [])
+
+    def cancel(self, controller: str, reason: str = "") -> CancelMotionResponse:
+        """Ends the motion of a controller; answers when the arm stands."""
+        return self.call(f"controller_manager/{controller}/cancel", CancelMotion, 0.0, reason)
 
     def start(self) -> None:
         """Brings the arm into command mode."""

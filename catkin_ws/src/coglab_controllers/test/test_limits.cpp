@@ -47,7 +47,11 @@ TEST(Guard, ScalesTheWholeVectorAndKeepsEveryLimit) {
     guard.limit(state, q, request, kCycle, result);
     ASSERT_GE(result.scale, 0.0);
     ASSERT_LE(result.scale, 1.0);
-    ASSERT_LT((result.velocity - result.scale * request).norm(), 1e-12);
+    // The direction is kept, but for joints at their stop that asked for next to nothing.
+    const double next_to_nothing =
+        std::max(1e-3 * request.lpNorm<Eigen::Infinity>(), 1e-5) * result.scale;
+    ASSERT_LE((result.velocity - result.scale * request).lpNorm<Eigen::Infinity>(),
+              next_to_nothing + 1e-12);
     ASSERT_LE((result.velocity.array().abs() / p.velocity.array()).maxCoeff(), 1.0 + 1e-12);
     ASSERT_LE((state.jacobian.topRows<3>() * result.velocity).norm(), p.hand_speed + 1e-9);
     ASSERT_LE(Chain::originVelocity(state, robot().elbowJoint(), result.velocity).norm(),
@@ -116,6 +120,28 @@ TEST(Guard, NamesTheJointThatBlocksTheMotion) {
   guard.limit(robot().evaluate(q), q, request, kCycle, result);
   EXPECT_EQ(result.blocked_joint, -1);
   EXPECT_EQ(result.scale, 1.0);
+}
+
+TEST(Guard, AJointAtItsStopThatAsksForNextToNothingDoesNotStopTheArm) {
+  GuardParameters p = armLimits();
+  p.workspace = everywhere();
+  Guard guard(p, robot());
+  JointVector q = JointVector::Zero(), request = JointVector::Zero();
+  q[3] = p.upper_position[3];  // beyond its margin, as after limits were narrowed
+  request[0] = 0.3;
+  for (const double outward : {1e-12, 1e-9, 1e-6, 2e-4}) {
+    request[3] = outward;
+    GuardResult result;
+    for (int i = 0; i < 300; ++i) guard.limit(robot().evaluate(q), q, request, kCycle, result);
+    EXPECT_EQ(result.scale, 1.0) << outward;
+    EXPECT_EQ(result.velocity[0], 0.3) << outward;
+    EXPECT_EQ(result.velocity[3], 0.0) << outward;
+    EXPECT_EQ(result.blocked_joint, -1);
+  }
+  request[3] = 0.01;  // this is a share of the motion
+  GuardResult result;
+  guard.limit(robot().evaluate(q), q, request, kCycle, result);
+  EXPECT_EQ(result.scale, 0.0);
 }
 
 TEST(Guard, AnswersNanWithStandstill) {

@@ -10,11 +10,6 @@ namespace coglab_controllers {
 namespace {
 
 const Vector3 kGoal(0.80, 0.0, 0.45);
-const std::string kTypes =
-    "types: {test/Misbehaving: libcoglab_test_misbehaving.so, test/Twin: "
-    "libcoglab_test_twin.so, test/Empty: libcoglab_test_empty.so, test/Missing: libnowhere.so, "
-    "test/Other: libcoglab_test_misbehaving.so}, plugin_paths: [" PLUGIN_DIR "]";
-
 TEST(Manager, RefusesBadPluginsAndKeepsWhatIsThere) {
   VirtualRobot robot("{" + kTypes + "}");
   robot.loadBoth("ptp");
@@ -78,46 +73,6 @@ TEST(Manager, BadParametersRefuseThePluginWithTheirName) {
   EXPECT_THROW(VirtualRobot("{joint_vel_limit: [9, 9, 9, 9, 9, 9, 9]}"), std::runtime_error);
   EXPECT_THROW(VirtualRobot("{cycle_time: 0}"), std::runtime_error);
 }
-
-class Fault : public ::testing::TestWithParam<std::pair<const char*, const char*>> {};
-
-TEST_P(Fault, GivesZeroVelocityItsReasonAndALivingManager) {
-  VirtualRobot robot(std::string("{odd: {fault: ") + GetParam().first + "}, " + kTypes + "}");
-  robot.loadBoth("ptp");
-  ASSERT_TRUE(VirtualRobot::ok(robot.manager->load("odd", "test/Misbehaving")));
-  robot.switchTo("odd");
-  for (int i = 0; i < 10; ++i) {
-    robot.tick();
-    EXPECT_GT(robot.command.velocity.norm(), 0.0);
-  }
-  for (int i = 0; i < 20; ++i) {
-    robot.tick();
-    EXPECT_EQ(robot.command.velocity, JointVector::Zero().eval());
-  }
-  const CycleReport report = robot.manager->report();
-  EXPECT_TRUE(report.fault);
-  EXPECT_EQ(report.state, ManagerState::Fault);
-  EXPECT_NE(report.reason.str().find(GetParam().second), std::string::npos)
-      << report.reason.c_str();
-  EXPECT_NE(report.reason.str().find("'odd'"), std::string::npos);
-  const Answer welcome = robot.manager->motionWelcome("odd", report);
-  EXPECT_TRUE(refused(welcome, {"fault"}));
-  EXPECT_EQ(welcome.code, ReasonCode::ControllerFault);
-  robot.switchTo("ptp");
-  EXPECT_EQ(robot.ptp().add({{-1.3, -0.6, 1.5, 1.7, 0.2, 0.2, 0.8}, {}, {}}).status,
-            PtpAnswer::kStarted);
-  robot.tick();
-  robot.tick();
-  EXPECT_GT(robot.command.velocity.norm(), 0.0);
-  robot.switchTo("odd");  // afresh
-  robot.tick();
-  EXPECT_GT(robot.command.velocity.norm(), 0.0);
-}
-
-INSTANTIATE_TEST_SUITE_P(Manager, Fault,
-                         ::testing::Values(std::make_pair("throw", "told to throw"),
-                                           std::make_pair("throw_int", "threw"),
-                                           std::make_pair("nan", "not finite")));
 
 TEST(Manager, StaleAndBrokenJointStatesGiveZeroVelocity) {
   VirtualRobot robot;
@@ -256,63 +211,6 @@ TEST(Manager, ControlThreadIdlesWithoutARobotAndSurvivesAStall) {
   stop = true;
   robot.join();
   thread.stop();
-}
-
-TEST(Manager, OverrunsInARowFaultTheControllerAndSinglesDoNot) {
-  const lwr_fri_bridge::JointLimits limits =
-      lwr_fri_bridge::loadJointLimits(std::string(DESCRIPTION_DIR) + "/config/joint_limits.yaml");
-  ctrl_more::Logger logger;
-  // `slow` spins for 20 ms in each cycle but every fifth; the sixth time it does not stop any more.
-  ManagerSettings settings = readManagerSettings(
-      YAML::Load("{odd: {fault: slow, after: 0, rest_every: 5, rests: 2}, overrun_time: 0.015, " +
-                 kTypes + "}"),
-      readText(std::string(DESCRIPTION_DIR) + "/urdf/lwr_ih2.urdf"), limits, false);
-  ASSERT_EQ(settings.cycle.overruns_to_fault, 5);
-  settings.logger = &logger;
-  std::atomic<bool> stop{false};
-  ControllerManager manager(std::move(settings));
-  std::thread services([&] {
-    std::string type;
-    EXPECT_TRUE(VirtualRobot::ok(manager.load("odd", "test/Misbehaving")));
-    EXPECT_TRUE(VirtualRobot::ok(manager.switchTo("odd", type)));
-    stop = true;
-  });
-  while (!stop) manager.cycle().idle(manager.now_ns());
-  services.join();
-  RobotSample sample;
-  sample.position << -1.4349, -0.6086, 1.4986, 1.7048, 0.1857, 0.2152, 0.782;
-  sample.commanded_position = sample.position;
-  sample.block = lwr_fri_bridge::MotionBlock::None;
-  VelocityCommand command;
-  const auto run = [&] {
-    ++sample.sequence;
-    sample.stamp_ns = manager.now_ns();
-    manager.cycle().run(sample, 0.005, command);
-    return manager.report();
-  };
-  // Four slow cycles and a quick one, twice. Where the machine itself delays the quick one, the row
-  // is longer: then there is nothing to be seen.
-  std::uint64_t overruns = 0;
-  for (int i = 1; i <= 10; ++i) {
-    const CycleReport report = run();
-    if (i % 5 == 0 && report.overruns != overruns) {
-      GTEST_SKIP() << "the machine delayed a cycle";
-    }
-    overruns = report.overruns;
-    EXPECT_EQ(overruns, static_cast<std::uint64_t>(i - i / 5));
-    EXPECT_FALSE(report.fault) << report.reason.c_str();
-    EXPECT_GT(command.velocity.norm(), 0.0);
-  }
-  for (int i = 1; i <= 5; ++i) {
-    EXPECT_FALSE(manager.report().fault);
-    run();
-  }
-  const CycleReport report = manager.report();
-  EXPECT_TRUE(report.fault);
-  EXPECT_EQ(report.overruns, 13u);
-  EXPECT_NE(report.reason.str().find("too slow 5 times in a row"), std::string::npos)
-      << report.reason.c_str();
-  EXPECT_EQ(command.velocity, JointVector::Zero().eval());
 }
 
 /// Notes in which cycles it runs.

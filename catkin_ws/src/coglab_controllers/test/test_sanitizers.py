@@ -25,30 +25,44 @@ def sources() -> list[Path]:
     return own + sorted((SOURCES / "ctrl_more" / "src").glob("*.cpp")) + bridge
 
 
+def compiled(command: list[str]) -> None:
+    """Runs the compiler; fails with what it said."""
+    built = subprocess.run(command, capture_output=True, text=True, timeout=600)
+    assert built.returncode == 0, built.stderr[-3000:]
+
+
+def run(command: list[str], limit: float) -> None:
+    """Runs an instrumented program; fails with what the sanitizer found."""
+    result = subprocess.run(
+        ["setarch", os.uname().machine, "-R", *command],
+        env=dict(os.environ, TSAN_OPTIONS="halt_on_error=1 exitcode=66", UBSAN_OPTIONS="halt_on_error=1",
+                 ASAN_OPTIONS="detect_leaks=1"),
+        capture_output=True, text=True, timeout=limit,
+    )
+    assert result.returncode == 0, (result.stdout + result.stderr)[-4000:]
+
+
 @pytest.mark.skipif(not os.environ.get("COGLAB_LONG"), reason="campaign: set COGLAB_LONG=1")
 @pytest.mark.skipif(shutil.which("g++") is None, reason="g++ is not installed")
 @pytest.mark.parametrize("sanitizer", ["thread", "address,undefined"])
-def test_requests_against_the_control_thread(sanitizer: str, tmp_path: Path) -> None:
+def test_requests_against_the_control_thread_and_exceptions_of_plugins(sanitizer: str, tmp_path: Path) -> None:
     seconds = os.environ.get("COGLAB_SANITIZER_SECONDS", "60")
-    program = tmp_path / "thread_stress"
     objects = []
     includes = [f"-I{SOURCES / name / 'include'}" for name in ("coglab_controllers", "ctrl_more", "lwr_fri_bridge")]
     includes += [f"-I{SOURCES / 'ctrl_more' / 'src'}", *(f"-isystem/usr/include/{folder}" for folder in FOLDERS)]
     loaders = sorted(map(str, Path("/usr/lib").glob("*/libclass_loader.so*")))
     assert loaders, "libclass-loader-dev is not installed"
     flags = ["-std=c++17", "-O1", "-g1", f"-fsanitize={sanitizer}", "-fno-omit-frame-pointer"]
-    for source in [*sources(), PACKAGE / "test" / "thread_stress.cpp"]:
+    for source in sources():
         objects.append(tmp_path / f"{len(objects)}_{source.stem}.o")
-        built = subprocess.run(["g++", *flags, "-c", str(source), "-o", str(objects[-1]), *includes],
-                               capture_output=True, text=True, timeout=600)
-        assert built.returncode == 0, built.stderr[-3000:]
-    built = subprocess.run(["g++", *flags, "-o", str(program), *map(str, objects), loaders[-1], *LIBRARIES],
-                           capture_output=True, text=True, timeout=600)
-    assert built.returncode == 0, built.stderr[-3000:]
-    result = subprocess.run(
-        ["setarch", os.uname().machine, "-R", str(program), seconds, str(PACKAGE), str(SOURCES / "lwr_description")],
-        env=dict(os.environ, TSAN_OPTIONS="halt_on_error=1 exitcode=66", UBSAN_OPTIONS="halt_on_error=1",
-                 ASAN_OPTIONS="detect_leaks=1"),
-        capture_output=True, text=True, timeout=float(seconds) * 5 + 120,
-    )
-    assert result.returncode == 0, (result.stdout + result.stderr)[-4000:]
+        compiled(["g++", *flags, "-c", str(source), "-o", str(objects[-1]), *includes])
+    for program in ("thread_stress", "plugin_exceptions"):
+        compiled(["g++", *flags, "-rdynamic", str(PACKAGE / "test" / f"{program}.cpp"), "-o", str(tmp_path / program),
+                  *map(str, objects), *includes, loaders[-1], *LIBRARIES])
+    # Without unique symbols the library is really unmapped when it is unloaded.
+    plugin = tmp_path / "libown_exception.so"
+    compiled(["g++", *flags, "-fPIC", "-shared", "-fno-gnu-unique", str(PACKAGE / "test/plugins/own_exception.cpp"),
+              "-o", str(plugin), *includes])
+    description = str(SOURCES / "lwr_description")
+    run([str(tmp_path / "plugin_exceptions"), str(plugin), description], 120.0)
+    run([str(tmp_path / "thread_stress"), seconds, str(PACKAGE), description], float(seconds) * 5 + 120)

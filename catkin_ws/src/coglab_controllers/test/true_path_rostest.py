@@ -12,6 +12,7 @@ import rostest
 import tf2_ros
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
+from coglab_msgs.msg import ReasonCode
 from coglab_msgs.srv import AddPtpRequest
 from diagnostic_msgs.msg import DiagnosticArray
 from robot_fixture import HOME, Robot, wait_until
@@ -72,6 +73,7 @@ class TruePath(unittest.TestCase):
                    "in mid-motion")
         refused = robot.add_ptp(HOME)
         self.assertEqual(refused.status, AddPtpRequest.REJECTED)
+        self.assertEqual(refused.reason_code, ReasonCode.NOT_ACTIVE)
         self.assertIn("active is 'dmp'", refused.message)
         robot.go(HOME)
         refused = robot.execute()
@@ -88,10 +90,39 @@ class TruePath(unittest.TestCase):
         rospy.sleep(0.5)
         robot.see_hand(None)
         wait_until(lambda: robot.feedback.state == "aborted", 5.0, "aborted")
+        self.assertEqual(robot.feedback.reason_code, ReasonCode.GOAL_LOST)
         self.assertIn("lost", robot.feedback.reason)
         wait_until(lambda: max(abs(v) for v in robot.joints.velocity) < 0.01, 3.0, "standing still")
 
-    def test_5_foreign_target_velocities_are_refused_with_the_reason(self) -> None:
+    def test_5_cancel_ends_a_motion_and_its_queue_and_answers_when_the_arm_stands(self) -> None:
+        robot = self.robot
+        robot.switch("ptp")
+        wait_until(lambda: robot.status.standing, 5.0, "standing")
+        there = [q + 0.6 for q in HOME]
+        ids = [robot.add_ptp(there).ptp_id, robot.add_ptp(HOME).ptp_id]
+        wait_until(lambda: max(abs(v) for v in robot.joints.velocity) > 0.1, 5.0, "in motion")
+        self.assertFalse(robot.status.standing)
+        answer = robot.cancel("ptp", "a test gives up")
+        self.assertTrue(answer.success, answer.message)
+        self.assertTrue(answer.was_running)
+        self.assertEqual(answer.reason_code, ReasonCode.NONE)
+        before = robot.arm()
+        wait_until(lambda: all(i in robot.unfinished for i in ids), 5.0, "unfinished_ptp")
+        for i in ids:
+            self.assertEqual(robot.unfinished[i].reason_code, ReasonCode.CANCELLED)
+            self.assertNotIn(i, robot.finished)
+        wait_until(lambda: robot.status.standing and robot.status.reason_code == ReasonCode.CANCELLED, 5.0,
+                   "status after the cancel")
+        self.assertIn("a test gives up", robot.status.reason)
+        # The simulated arm follows its set-point with a delay; after that nothing moves any more.
+        rospy.sleep(0.3)
+        for now, then in zip(robot.arm(), before, strict=True):
+            self.assertAlmostEqual(now, then, delta=0.03)
+        again = robot.cancel("dmp")
+        self.assertTrue(again.success, again.message)
+        self.assertFalse(again.was_running)
+
+    def test_6_foreign_target_velocities_are_refused_with_the_reason(self) -> None:
         """Who else publishes target_joint_states while a controller is active moves nothing."""
         robot = self.robot
         robot.go(HOME)

@@ -19,6 +19,13 @@
 
 namespace coglab_controllers {
 
+/// Parameters that name the plug-ins of these tests.
+inline const std::string kTypes =
+    "types: {test/Misbehaving: libcoglab_test_misbehaving.so, test/Twin: "
+    "libcoglab_test_twin.so, test/Empty: libcoglab_test_empty.so, test/Missing: libnowhere.so, "
+    "test/Other: libcoglab_test_misbehaving.so, test/Throwing: libcoglab_test_own_exception.so}, "
+    "plugin_paths: [" PLUGIN_DIR "]";
+
 /// Frames as a table.
 class FrameTable : public GoalSource {
  public:

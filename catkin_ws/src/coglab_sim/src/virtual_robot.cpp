@@ -26,6 +26,7 @@ std::string textOf(const std::string& path) {
 lwr_fri_bridge::BridgeConfig bridgeConfig(const VirtualRobotConfig& config) {
   lwr_fri_bridge::BridgeConfig bridge;
   bridge.limits = lwr_fri_bridge::loadJointLimits(config.limits_file);
+  bridge.position_margin = bridge.limits.position_margin;
   bridge.krl_convention =
       lwr_fri_bridge::fri::krlConventionFromName(krc::nameOf(config.cell.krc.convention));
   return bridge;

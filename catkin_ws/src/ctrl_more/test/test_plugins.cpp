@@ -227,13 +227,12 @@ TEST_F(Plugins, shippedListAndProfilesLoad) {
   unsetenv("CTRL_MORE_PATH");
   ASSERT_TRUE(report.ok()) << report.text();
   EXPECT_FALSE(rig.manager->isEnabled("ee_admittance")) << "ships loaded and disabled";
-  EXPECT_TRUE(rig.manager->isEnabled("joint_limits"));
+  EXPECT_FALSE(rig.manager->isEnabled("joint_limits")) << "the arm has a guard of its own";
   EXPECT_EQ(rig.manager->getProfiles(), (std::vector<std::string>{"dmp", "dmp_compliant", "ptp"}));
   rig.manager->applyProfile("dmp_compliant");
   EXPECT_TRUE(rig.manager->isEnabled("ee_admittance"));
   rig.manager->applyProfile("dmp");
   EXPECT_FALSE(rig.manager->isEnabled("ee_admittance"));
-  EXPECT_TRUE(rig.manager->isEnabled("joint_limits"));
   EXPECT_TRUE(rig.manager->reloadGains("ee_admittance"));
 }
 

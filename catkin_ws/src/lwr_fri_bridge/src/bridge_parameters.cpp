@@ -57,7 +57,7 @@ BridgeConfig readBridgeConfig(const ros::NodeHandle& nh) {
         ": expected position, joint_impedance or cartesian_impedance with their parameters");
   }
   config.mode = mode.mode;
-  config.position_margin = numberParameter(nh, "position_margin", config.position_margin);
+  config.position_margin = numberParameter(nh, "position_margin", config.limits.position_margin);
   config.leash.position = numberParameter(nh, "set_point_leash/position", config.leash.position);
   config.leash.impedance = numberParameter(nh, "set_point_leash/impedance", config.leash.impedance);
   config.leash.load = numberParameter(nh, "set_point_leash/load", config.leash.load);

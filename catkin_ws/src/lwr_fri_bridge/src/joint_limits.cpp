@@ -105,6 +105,12 @@ JointLimits loadJointLimits(const std::string& path, const std::string& profile)
         fail(path, section.Mark(), "default." + std::string(field.name) + " is missing");
     }
   }
+  const YAML::Node margin = root["position_margin"];
+  limits.position_margin = margin && margin.IsScalar() ? margin.as<double>(-1.0) : -1.0;
+  if (!(limits.position_margin >= 0.0 && limits.position_margin <= 0.5)) {
+    fail(path, margin ? margin.Mark() : root.Mark(),
+         "position_margin: expected a number from 0 to 0.5 (rad)");
+  }
   for (int i = 0; i < 7; ++i) {
     if (limits.lower_position[i] >= limits.upper_position[i]) {
       fail(path, root.Mark(),

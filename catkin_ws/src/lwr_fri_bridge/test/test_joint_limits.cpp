@@ -73,6 +73,11 @@ TEST(JointLimits, errorsNameFileLineAndField) {
   EXPECT_NE(errorFor(replaced(original(), "lower_position: [-2.96", "lower_position: [12.96"))
                 .find("lower_position must be below"),
             std::string::npos);
+  EXPECT_NE(errorFor(replaced(original(), "position_margin: 0.01", "position_margin: wide"))
+                .find("position_margin: expected a number from 0 to 0.5"),
+            std::string::npos);
+  EXPECT_NE(errorFor(replaced(original(), "position_margin: 0.01\n", "")).find("position_margin"),
+            std::string::npos);
   EXPECT_NE(errorFor("joints: [").size(), 0U);
   EXPECT_NE(errorFor("").size(), 0U);
   EXPECT_THROW(loadJointLimits("/nonexistent.yaml"), std::runtime_error);

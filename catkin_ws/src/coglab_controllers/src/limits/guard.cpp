@@ -11,6 +11,11 @@ namespace {
 // Below this share of the request the motion counts as held up.
 constexpr double kBlockedScale = 0.01;
 
+// A joint at its stop whose outward speed is below this share of the fastest joint's, or below this
+// speed (rad/s), is stopped alone: it must not stop the arm, and turns the motion by no more than
+// the share.
+constexpr double kNegligibleShare = 1e-3, kNegligibleSpeed = 1e-5;
+
 // Kept back of a Cartesian speed limit, m/s, at most this share: joints that follow their target
 // velocities with different lags, and the arm behind its servos, add so much for a moment.
 constexpr double kSpeedMargin = 0.035, kLargestMargin = 0.15;
@@ -85,15 +90,18 @@ double Guard::speedToStop(int joint, double room) const noexcept {
   return stoppingSpeed(room - parameters_.position_margin, a, lag);
 }
 
-void Guard::limit(const ChainState& state, const JointVector& q, const JointVector& request,
+void Guard::limit(const ChainState& state, const JointVector& q, const JointVector& asked_for,
                   double dt, GuardResult& result) noexcept {
   result = GuardResult{};
   const int joints = chain_.joints();
-  if (!request.head(joints).allFinite() || !q.head(joints).allFinite()) {
+  if (!asked_for.head(joints).allFinite() || !q.head(joints).allFinite()) {
     result.scale = 0.0;
     result.reason = GuardReason::NotFinite;
     return;
   }
+  const double negligible = std::max(
+      kNegligibleShare * asked_for.head(joints).lpNorm<Eigen::Infinity>(), kNegligibleSpeed);
+  JointVector request = asked_for;
   // `allowed` of the speed `asked`; both >= 0.
   const auto bind = [&](double asked, double allowed, GuardReason reason, int joint,
                         WorkspaceBorder border) {
@@ -108,7 +116,12 @@ void Guard::limit(const ChainState& state, const JointVector& q, const JointVect
     bind(speed, parameters_.velocity[i], GuardReason::JointVelocity, i, WorkspaceBorder::None);
     const double room = request[i] > 0.0 ? parameters_.upper_position[i] - q[i]
                                          : q[i] - parameters_.lower_position[i];
-    bind(speed, speedToStop(i, room), GuardReason::JointPosition, i, WorkspaceBorder::None);
+    const double allowed = speedToStop(i, room);
+    if (speed > allowed && speed <= negligible) {
+      request[i] = std::copysign(allowed, request[i]);
+    } else {
+      bind(speed, allowed, GuardReason::JointPosition, i, WorkspaceBorder::None);
+    }
   }
   if (parameters_.hand_speed > 0.0) {
     const double speed = (state.jacobian.topRows<3>() * request).norm();

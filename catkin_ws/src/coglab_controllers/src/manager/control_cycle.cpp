@@ -19,6 +19,13 @@ bool moving(MotionState state) {
   return state == MotionState::Running || state == MotionState::Holding;
 }
 
+/// The arm follows its set-point with a delay; of the two, the one further on its way counts.
+JointVector furthest(const RobotSample& sample, const JointVector& velocity) {
+  return (velocity.array() > 0.0)
+      .select(sample.position.cwiseMax(sample.commanded_position),
+              sample.position.cwiseMin(sample.commanded_position));
+}
+
 bool finite(const RobotSample& sample) {
   return sample.position.allFinite() && sample.velocity.allFinite() && sample.torque.allFinite() &&
          sample.external_torque.allFinite() && sample.tool_wrench.allFinite() &&
@@ -179,7 +186,8 @@ void ControlCycle::watchRobot() noexcept {
 void ControlCycle::watchGuard(double dt) noexcept {
   const bool under_way = moving(motionState());
   const GuardResult& guard = report_.guard;
-  const bool stopped = under_way && guard.reason == GuardReason::WorkspaceBorder && guard.scale < 0.02;
+  const bool stopped =
+      under_way && guard.reason == GuardReason::WorkspaceBorder && guard.scale < 0.02;
   at_border_ = stopped ? at_border_ + dt : 0.0;
   if (!under_way) return;
   limit_scale_ = std::clamp(motion_->limitScale() * guard.scale, 0.0, 1.0);
@@ -193,26 +201,35 @@ void ControlCycle::watchGuard(double dt) noexcept {
   }
 }
 
+bool ControlCycle::tooSlow(double taken) noexcept {
+  overruns_in_row_ = taken > settings_.overrun_time ? overruns_in_row_ + 1 : 0;
+  if (overruns_in_row_ > 0) ++report_.overruns;
+  if (overruns_in_row_ < settings_.overruns_to_fault) return false;
+  fault(Reason(ReasonCode::ControllerFault, "controller '")
+        << id_.c_str() << "' was too slow " << static_cast<std::uint64_t>(overruns_in_row_)
+        << " times in a row: " << taken * 1e3 << " ms, allowed " << settings_.overrun_time * 1e3
+        << " ms");
+  return true;
+}
+
 void ControlCycle::compute(JointVector& velocity) noexcept {
   References& references = feedback_.references();
   references.states.view<kMaxJoints>(references.joint_velocity).setZero();
   if (motion_ == nullptr || fault_) return;
-  const std::int64_t begin = settings_.overrun_time > 0.0 ? steadyNow() : 0;
-  if (!guarded("computeReference", [&] { motion_->computeReference(input_, references); })) return;
+  // Only the time of the motion controller itself is charged to it; feedback controllers between
+  // its two parts have their own limits.
+  const bool timed = settings_.overrun_time > 0.0;
+  std::int64_t taken_ns = 0;
+  const auto charged = [&](const char* what, auto&& call) {
+    const std::int64_t begin = timed ? steadyNow() : 0;
+    const bool fine = guarded(what, call);
+    if (timed) taken_ns += steadyNow() - begin;
+    return fine;
+  };
+  if (!charged("computeReference", [&] { motion_->computeReference(input_, references); })) return;
   feedback_.run(ctrl_more::Stage::Task);
-  if (!guarded("resolve", [&] { motion_->resolve(input_, references); })) return;
-  if (settings_.overrun_time > 0.0) {
-    const double taken = 1e-9 * static_cast<double>(steadyNow() - begin);
-    overruns_in_row_ = taken > settings_.overrun_time ? overruns_in_row_ + 1 : 0;
-    if (overruns_in_row_ > 0) ++report_.overruns;
-    if (overruns_in_row_ >= settings_.overruns_to_fault) {
-      fault(Reason(ReasonCode::ControllerFault, "controller '")
-            << id_.c_str() << "' was too slow " << static_cast<std::uint64_t>(overruns_in_row_)
-            << " times in a row: " << taken * 1e3 << " ms, allowed " << settings_.overrun_time * 1e3
-            << " ms");
-      return;
-    }
-  }
+  if (!charged("resolve", [&] { motion_->resolve(input_, references); })) return;
+  if (timed && tooSlow(1e-9 * static_cast<double>(taken_ns))) return;
   if (!references.states.view<kMaxJoints>(references.joint_velocity).allFinite()) {
     fault(Reason(ReasonCode::ControllerFault, "controller '")
           << id_.c_str() << "' gave a velocity that is not finite");
@@ -246,7 +263,7 @@ void ControlCycle::run(const RobotSample& sample, double dt, VelocityCommand& ou
   adopt();
   if (fine) {
     compute(velocity);
-    guard_.limit(input_.chain, sample.position, velocity, dt, report_.guard);
+    guard_.limit(input_.chain, furthest(sample, velocity), velocity, dt, report_.guard);
     watchGuard(dt);
     ++numbers_;
   } else {

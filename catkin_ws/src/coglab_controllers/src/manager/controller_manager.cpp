@@ -104,58 +104,70 @@ std::string ControllerManager::loadedMotions() const {
   return joined(ids);
 }
 
-Answer ControllerManager::load(const std::string& id, const std::string& type) {
-  const std::lock_guard<std::mutex> requests(requests_);
+Answer ControllerManager::load(const std::string& id, const std::string& type,
+                               const Attach& attach) {
+  std::unique_lock<std::mutex> requests(requests_);
   if (!validId(id)) {
     return Answer::refusal(ReasonCode::InvalidArgument,
                            "controller_id '" + id +
-                           "': expected up to 48 letters, digits and '_', beginning with a letter");
+                               "': expected up to 48 letters, digits and '_', beginning with a "
+                               "letter");
   }
   {
     const std::lock_guard<std::mutex> lock(table_);
-    if (find(id) != nullptr || feedback_.manager().has(id)) {
+    if (find(id) != nullptr || loading_.count(id) != 0 || feedback_.manager().has(id)) {
       return Answer::refusal(ReasonCode::InvalidArgument,
                              "controller_id '" + id +
-                             "' is in use; choose another id, or go on with the loaded one");
+                                 "' is in use; choose another id, or go on with the loaded one");
     }
+    loading_.insert(id);
   }
   const bool motion = settings_.types.count(type) != 0 || MotionTypes::instance().find(type);
-  return motion ? loadMotion(id, type) : loadFeedback(id, type);
+  const Answer answer =
+      motion ? loadMotion(id, type, attach, requests) : loadFeedback(id, type);
+  const std::lock_guard<std::mutex> lock(table_);
+  loading_.erase(id);
+  return answer;
 }
 
-Answer ControllerManager::loadMotion(const std::string& id, const std::string& type) {
+Answer ControllerManager::loadMotion(const std::string& id, const std::string& type,
+                                     const Attach& attach, std::unique_lock<std::mutex>& requests) {
+  const std::string what = "controller '" + id + "' of type '" + type + "' was not loaded: ";
+  // Outlives what is thrown below: the type of an exception may live in the library.
+  auto loaded = std::make_unique<LoadedMotion>();
   try {
-    auto loaded = std::make_unique<LoadedMotion>();
     loaded->id = id;
     loaded->type = type;
     const auto place = settings_.types.find(type);
     if (place != settings_.types.end()) {
       loaded->library = MotionLibrary::open(findLibrary(place->second, settings_.plugin_paths));
     }
-    const MotionMaker* maker = MotionTypes::instance().find(type);
-    if (maker == nullptr) {
-      return Answer::refusal(ReasonCode::UnknownName,
-                             "library '" + loaded->library->path() + "' has no type '" + type +
-                             "'; it has: " + joined(loaded->library->types()));
+    const std::optional<MotionMaker> maker = MotionTypes::instance().find(type);
+    if (!maker) {
+      return Answer::refusal(
+          ReasonCode::UnknownName,
+          what + (loaded->library ? "library '" + loaded->library->path() + "' has no type '" +
+                                        type + "'; it has: " + joined(loaded->library->types())
+                                  : "its library has gone"));
     }
     loaded->controller.reset(maker->controller());
     MotionSetup setup;
     setup.id = id;
+    setup.cycle_time = settings_.cycle.cycle_time;
     setup.parameters = Parameters(settings_.parameters, "controller_manager").block(id).node();
     setup.robot = settings_.robot;
     setup.host = this;
     loaded->controller->configure(setup);
+    requests.unlock();  // what is attached may wait for others, such as the ROS master
+    if (attach) attach(*loaded->controller, *maker);
     const std::lock_guard<std::mutex> lock(table_);
     motions_.push_back(std::move(loaded));
     return {};
   } catch (const std::exception& error) {
-    return Answer::refusal(ReasonCode::InvalidArgument,
-                           "controller '" + id + "' of type '" + type +
-                           "' was not loaded: " + error.what());
+    return Answer::refusal(ReasonCode::InvalidArgument, what + error.what());
   } catch (...) {
     return Answer::refusal(ReasonCode::ControllerFault,
-                           "controller '" + id + "' of type '" + type +
-                           "' was not loaded: its code threw something that is no std::exception");
+                           what + "its code threw something that is no std::exception");
   }
 }
 

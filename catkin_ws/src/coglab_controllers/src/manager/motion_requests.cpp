@@ -35,9 +35,8 @@ Answer ControllerManager::motionWelcome(const std::string& controller_id,
   const double age = 1e-9 * static_cast<double>(now_ns() - now.robot.stamp_ns);
   if (age > settings_.cycle.sample_timeout) {
     return Answer::refusal(ReasonCode::StaleJointState,
-                           "the newest joint state is " + std::to_string(age) +
-                               " s old; allowed: " + std::to_string(settings_.cycle.sample_timeout) +
-                               " s");
+                           "the newest joint state is " + std::to_string(age) + " s old; allowed: " +
+                               std::to_string(settings_.cycle.sample_timeout) + " s");
   }
   if (now.robot.block != lwr_fri_bridge::MotionBlock::None) {
     return Answer::refusal(codeOf(now.robot.block),

@@ -53,28 +53,34 @@ MotionTypes& MotionTypes::instance() {
 }
 
 bool MotionTypes::insert(const std::string& type, const MotionMaker& maker) {
+  const std::lock_guard<std::mutex> lock(mutex_);
   if (makers_.emplace(type, maker).second) return true;
   refused_.push_back(type);
   return false;
 }
 
 void MotionTypes::erase(const std::string& type, const MotionMaker& maker) {
+  const std::lock_guard<std::mutex> lock(mutex_);
   const auto found = makers_.find(type);
   if (found != makers_.end() && found->second.controller == maker.controller) makers_.erase(found);
 }
 
-const MotionMaker* MotionTypes::find(const std::string& type) const {
+std::optional<MotionMaker> MotionTypes::find(const std::string& type) const {
+  const std::lock_guard<std::mutex> lock(mutex_);
   const auto found = makers_.find(type);
-  return found == makers_.end() ? nullptr : &found->second;
+  if (found == makers_.end()) return std::nullopt;
+  return found->second;
 }
 
 std::vector<std::string> MotionTypes::names() const {
+  const std::lock_guard<std::mutex> lock(mutex_);
   std::vector<std::string> names;
   for (const auto& entry : makers_) names.push_back(entry.first);
   return names;
 }
 
 std::vector<std::string> MotionTypes::takeRefused() {
+  const std::lock_guard<std::mutex> lock(mutex_);
   std::vector<std::string> refused;
   refused.swap(refused_);
   return refused;

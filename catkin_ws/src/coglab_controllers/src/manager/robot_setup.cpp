@@ -31,7 +31,8 @@ std::shared_ptr<const RobotSetup> makeRobotSetup(const std::string& urdf,
   guard.velocity = limits.velocity;
   guard.acceleration = limits.acceleration;
   guard.jerk = limits.jerk;
-  guard.position_margin = parameters.number("position_margin", guard.position_margin, 0.0, 0.5);
+  guard.position_margin =
+      parameters.number("position_margin", table.position_margin, table.position_margin, 0.5);
   guard.hand_speed = parameters.number("hand_speed_limit", guard.hand_speed, 0.0, 5.0);
   guard.elbow_speed = parameters.number("elbow_speed_limit", guard.elbow_speed, 0.0, 5.0);
   guard.block_time = parameters.number("blocked_time", guard.block_time, 0.05, 10.0);

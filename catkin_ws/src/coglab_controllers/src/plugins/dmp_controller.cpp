@@ -51,8 +51,11 @@ void DmpController::configure(const MotionSetup& setup) {
   max_initial_distance_ = parameters.number("max_initial_distance", 0.1, 0.0, 1.0);
 
   IkParameters ik;
-  ik.pos_clik_gain = parameters.number("pos_clik_gain", ik.pos_clik_gain, 0.0, 200.0);
-  ik.rot_clik_gain = parameters.number("rot_clik_gain", ik.rot_clik_gain, 0.0, 200.0);
+  const double most = std::min(200.0, largestGain(setup.cycle_time));
+  ik.pos_clik_gain =
+      parameters.number("pos_clik_gain", std::min(ik.pos_clik_gain, most), 0.0, most);
+  ik.rot_clik_gain =
+      parameters.number("rot_clik_gain", std::min(ik.rot_clik_gain, most), 0.0, most);
   ik.singularity_threshold =
       parameters.number("singularity_threshold", ik.singularity_threshold, 0.0, 1.0);
   ik.rotation_first_scaling = parameters.flag("rotation_first_scaling", ik.rotation_first_scaling);
@@ -84,6 +87,9 @@ void DmpController::configure(const MotionSetup& setup) {
   end.noisy_distance = parameters.number("noisy_end_distance", end.noisy_distance, 1e-6, 0.5);
   end.follow_distance = parameters.number("follow_distance", end.follow_distance, 1e-3, 1.0);
   end.follow_time = parameters.number("follow_time", end.follow_time, 0.0, 10.0);
+
+  arrive_distance_ = parameters.number("arrive_distance", arrive_distance_, 1e-4, 0.5);
+  settle_time_ = parameters.number("settle_time", settle_time_, 0.0, 60.0);
 
   loop_ = std::make_unique<Loop>(estimator, end, gate);
   loop_->blend.setTime(parameters.number("hold_blend", 0.15, 0.0, 5.0));
@@ -156,6 +162,7 @@ void DmpController::begin(const CycleInput& input, const Plan& plan) {
   Loop& loop = *loop_;
   const bool was_following = loop.was_following;
   loop.pending = false;
+  loop.ended = false;
   loop.base_from_dmp = plan.base_from_dmp;
   loop.dmp_from_base = inverse(plan.base_from_dmp);
   loop.primitive = plan.primitive;
@@ -238,7 +245,7 @@ void DmpController::watchGoal(const CycleInput& input) {
       loop.gate.update(input.robot.stamp_ns, mine ? newest : loop.gate.goal());
   loop.goal = inWorkspace(handGoal(loop.gate.goal(), loop.hand), loop.projected);
   const Vector3 hand = (loop.dmp_from_base * input.chain.tool).position;
-  if (state_ == MotionState::Reached) {
+  if (state_ == MotionState::Reached || loop.ended) {
     // The motion stands at the goal it latched; newer sights differ from it by their noise.
     loop.remaining_distance = (loop.motion.goal() - hand).norm();
     return;
@@ -280,17 +287,36 @@ void DmpController::followEnd(const CycleInput& input) {
   Loop& loop = *loop_;
   switch (loop.motion.event()) {
     case MotionEnd::Event::Ended:
-      state_ = MotionState::Reached;
+      state_ = MotionState::Running;
       reason_.clear();
-      since_end_ = 0.0;
+      loop.ended = true;
+      loop.settling = 0.0;
       break;
     case MotionEnd::Event::FollowsAgain:
       state_ = MotionState::Running;
+      loop.ended = false;
       if (resting_) closeLoop(input);
       break;
     case MotionEnd::Event::None:
       break;
   }
+  if (loop.ended && state_ == MotionState::Running) arrive(input.dt);
+}
+
+/// The set-point is at the goal; the motion has reached it when the hand, as measured, is too.
+void DmpController::arrive(double dt) {
+  Loop& loop = *loop_;
+  const double away = loop.ik.position_error.norm();
+  if (away <= arrive_distance_) {
+    state_ = MotionState::Reached;
+    reason_.clear();
+    since_end_ = 0.0;
+    return;
+  }
+  loop.settling += dt;
+  if (loop.settling <= settle_time_) return;
+  abort(Reason(ReasonCode::TargetNotReached, "the hand does not come to the goal: ")
+        << away << " m are left; is the arm blocked?");
 }
 
 void DmpController::computeReference(const CycleInput& input, References& references) {
@@ -365,16 +391,7 @@ void DmpController::report(const CycleInput& input) {
   loop.stamp_ns = input.robot.stamp_ns;
   progress_.write(loop.progress(state_, reason_));
   if (!ikDebug() || !following()) return;
-  IkDebugRecord record;
-  record.stamp_ns = input.robot.stamp_ns;
-  record.phase = loop.motion.dmp().state().phase;
-  record.goal = (loop.base_from_dmp * Pose{loop.motion.goal(), Quaternion::Identity()}).position;
-  record.set_point = loop.in_base.pose;
-  record.velocity = loop.in_base.velocity;
-  record.angular_velocity = loop.in_base.angular_velocity;
-  record.measured = input.chain.tool;
-  record.ik = loop.ik;
-  debug_.push(record);
+  debug_.push(loop.debug(input.chain.tool));
 }
 
 }  // namespace coglab_controllers

@@ -41,7 +41,8 @@ void PtpController::configure(const MotionSetup& setup) {
     throw std::runtime_error("the chain has not seven joints; point-to-point motions need all");
   }
   const Parameters parameters(setup.parameters, setup.id);
-  gain_ = parameters.number("Kp", gain_, 0.0, 100.0);
+  const double most = std::min(100.0, largestGain(setup.cycle_time));
+  gain_ = parameters.number("Kp", std::min(gain_, most), 0.0, most);
   max_queue_ = parameters.whole("max_queue", max_queue_, 0, kMaxQueue);
   tolerance_ = parameters.number("tolerance", tolerance_, 1e-5, 0.1);
   settle_time_ = parameters.number("settle_time", settle_time_, 0.0, 60.0);
@@ -60,7 +61,10 @@ void PtpController::configure(const MotionSetup& setup) {
 Answer PtpController::readMotion(const PtpRequest& request, Motion& motion) const {
   const lwr_fri_bridge::JointLimits& limits = setup_.robot->limits;
   const std::vector<std::string>& names = setup_.robot->chain.jointNames();
-  const JointVector margin = JointVector::Constant(setup_.robot->guard.position_margin);
+  // The guard lets nothing beyond its margin; a target on that border would be reached only where no
+  // noise of measurement crosses it.
+  const JointVector margin =
+      JointVector::Constant(setup_.robot->guard.position_margin + tolerance_);
   const JointVector least = JointVector::Constant(1e-4);
   motion.velocity = default_speed_ * limits.velocity;
   motion.acceleration = default_acceleration_ * limits.acceleration;
@@ -132,7 +136,8 @@ void PtpController::giveUp(const Reason& why) {
   Reason told = why;
   const auto drop = [&](int id) {
     ends_.push({id, false, why});
-    told << (unfinished++ == 0 ? "; not executed: ptp_id " : ", ") << static_cast<std::uint64_t>(id);
+    told << (unfinished++ == 0 ? "; not executed: ptp_id " : ", ")
+         << static_cast<std::uint64_t>(id);
   };
   if (state_ == MotionState::Running) drop(running_.id);
   for (; queued_ > 0; --queued_) {

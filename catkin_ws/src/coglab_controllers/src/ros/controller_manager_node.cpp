@@ -12,6 +12,7 @@
 
 #include "coglab_controllers/ros/manager_ros.hpp"
 #include "coglab_controllers/ros/robot_topics.hpp"
+#include "coglab_controllers/ros/ros_parameters.hpp"
 
 namespace {
 volatile std::sig_atomic_t asked_to_end = 0;
@@ -27,9 +28,11 @@ int main(int argc, char** argv) {
     ros::CallbackQueue queue;  // one thread: the writer of the port
     robot.setCallbackQueue(&queue);
     std::atomic<coglab_controllers::ControlThread*> control{nullptr};
-    coglab_controllers::RobotTopics topics(robot, [&control] {
-      if (auto* thread = control.load(std::memory_order_acquire)) thread->wake(true);
-    });
+    const ros::NodeHandle manager_node("controller_manager");
+    coglab_controllers::RobotTopics topics(
+        robot, coglab_controllers::readJointLimits(manager_node), [&control] {
+          if (auto* thread = control.load(std::memory_order_acquire)) thread->wake(true);
+        });
     std::atomic<coglab_controllers::ManagerRos*> ready{nullptr};
     coglab_controllers::ManagerRos::Options options;
     options.publish_target = false;
@@ -38,8 +41,7 @@ int main(int argc, char** argv) {
       const auto* manager = ready.load(std::memory_order_acquire);
       if (manager != nullptr && manager->controllerActive()) topics.send(command);
     };
-    coglab_controllers::ManagerRos manager(ros::NodeHandle("controller_manager"), topics.port(),
-                                           options);
+    coglab_controllers::ManagerRos manager(manager_node, topics.port(), options);
     ready.store(&manager, std::memory_order_release);
     control.store(&manager.controlThread(), std::memory_order_release);
     ros::AsyncSpinner spinner(1, &queue);

@@ -94,18 +94,17 @@ void ManagerRos::loadFromParameters() {
 }
 
 Answer ManagerRos::load(const std::string& id, const std::string& type) {
-  const Answer answer = manager_->load(id, type);
-  if (!answer.success) return answer;
-  MotionController* controller = manager_->motion(id);
-  if (controller != nullptr) cancel_->serve(id);
-  const MotionMaker* maker = MotionTypes::instance().find(type);
-  if (controller == nullptr || maker == nullptr || maker->ros == nullptr) return answer;
-  std::unique_ptr<MotionControllerRos> side(maker->ros());
-  RosContext context;
-  context.tf = tf_.get();
-  side->attach(*controller, ros::NodeHandle(node_, id), context);
-  const std::lock_guard<std::mutex> lock(sides_mutex_);
-  sides_.push_back(std::move(side));
+  const auto attach = [this, &id](MotionController& controller, const MotionMaker& maker) {
+    if (maker.ros == nullptr) return;
+    std::unique_ptr<MotionControllerRos> side(maker.ros());
+    RosContext context;
+    context.tf = tf_.get();
+    side->attach(controller, ros::NodeHandle(node_, id), context);
+    const std::lock_guard<std::mutex> lock(sides_mutex_);
+    sides_.push_back(std::move(side));
+  };
+  const Answer answer = manager_->load(id, type, attach);
+  if (answer.success && manager_->motion(id) != nullptr) cancel_->serve(id);
   return answer;
 }
 
@@ -120,13 +119,7 @@ Answer ManagerRos::switchTo(const std::string& id, std::string& type) {
 
 bool ManagerRos::onLoad(coglab_msgs::LoadController::Request& request,
                         coglab_msgs::LoadController::Response& response) {
-  Answer answer;
-  try {
-    answer = load(request.controller_id, request.controller_type);
-  } catch (const std::exception& error) {
-    answer = Answer::refusal(ReasonCode::ControllerFault,
-                             "the ROS side of '" + request.controller_id + "': " + error.what());
-  }
+  const Answer answer = load(request.controller_id, request.controller_type);
   response.success = answer.success;
   response.reason_code = answer.number();
   response.message = answer.message;

@@ -41,8 +41,9 @@ MotionBlock blockOf(const coglab_msgs::LwrState& state) {
 
 }  // namespace
 
-RobotTopics::RobotTopics(const ros::NodeHandle& node, std::function<void()> sample_written)
-    : node_(node), sample_written_(std::move(sample_written)) {
+RobotTopics::RobotTopics(const ros::NodeHandle& node, const lwr_fri_bridge::JointLimits& limits,
+                         std::function<void()> sample_written)
+    : node_(node), sample_written_(std::move(sample_written)), set_point_(limits) {
   target_ = node_.advertise<sensor_msgs::JointState>("target_joint_states", 5);
   target_message_.name = kJoints;
   target_message_.velocity.resize(kJoints.size());
@@ -74,7 +75,10 @@ void RobotTopics::onJoints(const sensor_msgs::JointState& joints) {
   sample_.stamp_ns = stamp;
   lwr_fri_bridge::VelocityCommand sent;
   sent_.read(sent);
-  sample_.commanded_velocity = sent.velocity;
+  const bool follows = sample_.block == MotionBlock::None;
+  set_point_.step(follows ? sent.velocity : Vector7(Vector7::Zero()), std::min(passed, 0.1));
+  sample_.commanded_velocity = set_point_.velocity();
+  sample_.commanded_acceleration = set_point_.acceleration();
   sample_.commanded_position = sample_.position;
   port_.publishSample(sample_);
   sample_written_();

@@ -79,15 +79,19 @@ YAML::Node readParameters(const ros::NodeHandle& node) {
                                                             : YAML::Node(YAML::NodeType::Map);
 }
 
+lwr_fri_bridge::JointLimits readJointLimits(const ros::NodeHandle& node) {
+  const Parameters parameters(readParameters(node), "controller_manager");
+  const std::string table = parameters.text(
+      "joint_limits_file", ros::package::getPath("lwr_description") + "/config/joint_limits.yaml");
+  return lwr_fri_bridge::loadJointLimits(table,
+                                         parameters.text("joint_limits_profile", "default"));
+}
+
 ManagerSettings readManagerSettings(const ros::NodeHandle& node) {
   const YAML::Node tree = readParameters(node);
   const Parameters parameters(tree, "controller_manager");
-  const std::string table = parameters.text(
-      "joint_limits_file", ros::package::getPath("lwr_description") + "/config/joint_limits.yaml");
-  ManagerSettings settings = readManagerSettings(
-      tree, robotModel(node, parameters),
-      lwr_fri_bridge::loadJointLimits(table, parameters.text("joint_limits_profile", "default")),
-      false);
+  ManagerSettings settings =
+      readManagerSettings(tree, robotModel(node, parameters), readJointLimits(node), false);
   settings.feedback_file = resolve(settings.feedback_file);
   return settings;
 }

@@ -17,6 +17,7 @@ struct JointLimits {
   Vector7 acceleration;    ///< rad/s^2
   Vector7 jerk;            ///< rad/s^3
   Vector7 torque;          ///< Nm
+  double position_margin = 0.01;  ///< rad kept free before both ends of every range, by everybody
 };
 
 /// Reads the table. `profile` is "default" or a profile of the file such as "t1", which overrides

@@ -41,7 +41,8 @@ const char* describe(GuardReason reason) noexcept;
 
 /// Result of one cycle.
 struct GuardResult {
-  JointVector velocity = JointVector::Zero();  ///< rad/s: `scale` times the request
+  /// rad/s: `scale` times the request, but for a joint at its stop that asked for next to nothing
+  JointVector velocity = JointVector::Zero();
   double scale = 1.0;                          ///< 0..1
   GuardReason reason = GuardReason::None;      ///< of the restriction that bound hardest
   int joint = -1;                              ///< for JointVelocity and JointPosition
@@ -55,14 +56,16 @@ struct GuardResult {
 /// throws.
 ///
 /// Towards a joint's stop the bound is the speed from which the interpolator can still stop in
-/// front of it, within its acceleration and jerk. A joint beyond its limits may only move back. A
-/// restriction that is already violated lets pass what leads out of it.
+/// front of it, within its acceleration and jerk. A joint beyond its limits may only move back; if
+/// it asks for next to nothing outward (1e-3 of the fastest joint's speed, or 1e-5 rad/s), it alone
+/// is stopped. A restriction that is already violated lets pass what leads out of it.
 class Guard {
  public:
   /// @throws std::invalid_argument naming joint and parameter.
   Guard(const GuardParameters& parameters, const Chain& chain);
 
-  /// @param state kinematics at q (rad), from the chain given at construction.
+  /// @param state kinematics at the measured joints, from the chain given at construction.
+  /// @param q rad; where measured and commanded joints differ, the ones further on their way.
   /// @param request rad/s.  @param dt s since the last call, for blocked_joint.
   void limit(const ChainState& state, const JointVector& q, const JointVector& request, double dt,
              GuardResult& result) noexcept;

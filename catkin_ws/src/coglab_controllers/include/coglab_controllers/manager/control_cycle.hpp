@@ -111,6 +111,7 @@ class ControlCycle {
   bool stands(const RobotSample& sample, const JointVector& velocity) noexcept;
   MotionState motionState() const noexcept;
   bool usable(const RobotSample& sample, double dt) noexcept;
+  bool tooSlow(double taken) noexcept;
   void compute(JointVector& velocity) noexcept;
   void watchRobot() noexcept;
   void watchGuard(double dt) noexcept;

@@ -9,6 +9,7 @@
 #include <map>
 #include <memory>
 #include <mutex>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -62,9 +63,13 @@ class ControllerManager : public MotionHost {
   /// @name Requests of Table 6
   /// @{
 
+  /// What a controller gets from the user of the manager before anybody can use it, such as its
+  /// services. Throws if it cannot have that: then the controller is not loaded.
+  using Attach = std::function<void(MotionController&, const MotionMaker&)>;
+
   /// Loads a controller of a type under an id: a motion controller, or a feedback controller if the
-  /// type is one of Ctrl-MORE's.
-  Answer load(const std::string& id, const std::string& type);
+  /// type is one of Ctrl-MORE's. All or nothing, whatever the plug-in throws.
+  Answer load(const std::string& id, const std::string& type, const Attach& attach = {});
   /// Ids and types of all loaded controllers, in load order; feedback controllers after motion
   /// controllers.
   void list(std::vector<std::string>& ids, std::vector<std::string>& types) const;
@@ -129,7 +134,8 @@ class ControllerManager : public MotionHost {
   std::string notAdopted(PlanOutcome outcome) const override;
 
  private:
-  Answer loadMotion(const std::string& id, const std::string& type);
+  Answer loadMotion(const std::string& id, const std::string& type, const Attach& attach,
+                    std::unique_lock<std::mutex>& requests);
   Answer loadFeedback(const std::string& id, const std::string& type);
   LoadedMotion* find(const std::string& id) const;  // under table_
   std::string loadedMotions() const;
@@ -143,6 +149,7 @@ class ControllerManager : public MotionHost {
   mutable std::mutex requests_;  // requests one after another
   mutable std::mutex table_;     // the members below, for short
   std::vector<std::unique_ptr<LoadedMotion>> motions_;
+  std::set<std::string> loading_;  // ids that are on their way into motions_
   std::string active_id_, active_type_, profile_;
   mutable std::mutex report_mutex_;
   mutable CycleReport report_;

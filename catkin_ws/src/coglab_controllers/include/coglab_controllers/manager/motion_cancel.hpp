@@ -29,7 +29,9 @@ class MotionCancel {
   }
 
   /// Whether the cycle has served this cancel, or one after it. Any thread.
-  bool served(std::uint64_t number) const { return served_.load(std::memory_order_acquire) >= number; }
+  bool served(std::uint64_t number) const {
+    return served_.load(std::memory_order_acquire) >= number;
+  }
   /// Whether this cancel, or one served together with it, ended a motion. Any thread, once served.
   bool endedMotion(std::uint64_t number) const {
     return ended_.load(std::memory_order_acquire) >= number;

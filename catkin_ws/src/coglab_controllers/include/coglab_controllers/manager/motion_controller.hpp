@@ -93,10 +93,15 @@ class MotionHost {
 /// What a plug-in gets when it is loaded.
 struct MotionSetup {
   std::string id;         ///< the controller's id, also its namespace
+  double cycle_time = 0.005;  ///< intended period of the cycle, s
   YAML::Node parameters;  ///< its parameters (ROS: below /controller_manager/<id>); may be null
   std::shared_ptr<const RobotSetup> robot;  ///< model, limits, workspace
   MotionHost* host = nullptr;               ///< outlives the controller
 };
+
+/// Largest gain (1/s) of a position loop that is closed once per cycle (s) and stays well damped
+/// with the delay of the robot's interface.
+inline double largestGain(double cycle_time) { return 0.5 / cycle_time; }
 
 /// A motion controller: computes the references, alone.
 ///

@@ -5,6 +5,8 @@
 
 #include <map>
 #include <memory>
+#include <mutex>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -24,7 +26,7 @@ struct MotionMaker {
 /// registration of a name silently replaces the first, it refuses one and remembers that, so that
 /// the library can be refused as a whole.
 ///
-/// Threads: used under the loader's lock, or while static objects are made.
+/// Any thread.
 class MotionTypes {
  public:
   static MotionTypes& instance();
@@ -33,14 +35,15 @@ class MotionTypes {
   bool insert(const std::string& type, const MotionMaker& maker);
   /// Removes a type if it is this maker's.
   void erase(const std::string& type, const MotionMaker& maker);
-  /// Maker of a type, null if unknown.
-  const MotionMaker* find(const std::string& type) const;
+  /// Maker of a type, if it is known.
+  std::optional<MotionMaker> find(const std::string& type) const;
   /// Known type names, sorted.
   std::vector<std::string> names() const;
   /// Names refused since the last call.
   std::vector<std::string> takeRefused();
 
  private:
+  mutable std::mutex mutex_;
   std::map<std::string, MotionMaker> makers_;
   std::vector<std::string> refused_;
 };

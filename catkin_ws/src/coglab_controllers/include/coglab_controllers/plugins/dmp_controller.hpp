@@ -74,7 +74,8 @@ struct HandGoal {
 /// `goal_lost_time` (s), `goal_finish_distance` (m), `goal_reach_margin` (m), `goal_time_constant`,
 /// `noisy_goal_time_constant` (s), `max_initial_distance` (m), `end_phase`, `end_speed` (m/s),
 /// `end_turning` (rad/s), `end_distance` (m), `noisy_end_speed`, `noisy_end_turning`,
-/// `noisy_end_distance`, `follow_distance` (m), `follow_time` (s), `singularity_threshold`,
+/// `noisy_end_distance`, `follow_distance` (m), `follow_time` (s), `arrive_distance` (m), `settle_time` (s),
+/// `singularity_threshold`,
 /// `rotation_first_scaling`,
 /// `hold_blend` (s), `dmp_file` (a library to load at once); on ROS also `goal_tf_frame` (name under
 /// which the estimated goal is broadcast; empty: it is not).
@@ -142,6 +143,7 @@ class DmpController : public MotionController {
   void begin(const CycleInput& input, const Plan& plan);
   void watchGoal(const CycleInput& input);
   void followEnd(const CycleInput& input);
+  void arrive(double dt);
   void closeLoop(const CycleInput& input);
   bool following() const {
     return state_ == MotionState::Running || state_ == MotionState::Holding ||
@@ -153,6 +155,7 @@ class DmpController : public MotionController {
   MotionSetup setup_;
   std::string base_frame_, dmp_frame_, goal_frame_, goal_tf_frame_;
   bool goal_from_tf_ = true;
+  double arrive_distance_ = 0.01, settle_time_ = 2.0;
   double finish_distance_ = 0.12, reach_margin_ = 0.5, max_initial_distance_ = 0.1;
   std::unique_ptr<TwoTaskIk> ik_;
   std::atomic<bool> ik_debug_{false};

@@ -40,6 +40,19 @@ struct DmpController::Loop {
     return now;
   }
 
+  IkDebugRecord debug(const Pose& measured) const {
+    IkDebugRecord now;
+    now.stamp_ns = stamp_ns;
+    now.phase = motion.dmp().state().phase;
+    now.goal = base_from_dmp.position + base_from_dmp.orientation * motion.goal();
+    now.set_point = in_base.pose;
+    now.velocity = in_base.velocity;
+    now.angular_velocity = in_base.angular_velocity;
+    now.measured = measured;
+    now.ik = ik;
+    return now;
+  }
+
   Plan next;  ///< adopted, begins with the next joint state
   bool pending = false;
   bool was_following = false;  ///< the motion that `next` replaces still has its loop closed
@@ -58,6 +71,8 @@ struct DmpController::Loop {
   std::int64_t stamp_ns = 0;
   double remaining_distance = 0.0;
   bool projected = false;
+  bool ended = false;      ///< the set-point has arrived
+  double settling = 0.0;   ///< s since then that the hand has not
 };
 
 }  // namespace coglab_controllers

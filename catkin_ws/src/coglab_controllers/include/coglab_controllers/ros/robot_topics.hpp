@@ -12,6 +12,7 @@
 #include <sensor_msgs/JointState.h>
 
 #include "lwr_fri_bridge/control_port.hpp"
+#include "lwr_fri_bridge/interpolator.hpp"
 
 namespace coglab_controllers {
 
@@ -19,13 +20,15 @@ namespace coglab_controllers {
 ///
 /// Measured values come from `joint_states`, `external_torques` and `tool_wrench`, the permission
 /// to move from `state`. What is commanded cannot be seen from here: position counts as commanded
-/// where it is measured, velocity where it was sent. Callbacks run in one thread; that thread is
-/// the port's writer.
+/// where it is measured; velocity and acceleration are what the interface's interpolator makes of
+/// the velocities that were sent. Callbacks run in one thread; that thread is the port's writer.
 class RobotTopics {
  public:
   /// @param node namespace of the robot interface (…/lwr)
+  /// @param limits with which the robot interface brakes and accelerates
   /// @param sample_written called after each joint state: wakes the control thread
-  RobotTopics(const ros::NodeHandle& node, std::function<void()> sample_written);
+  RobotTopics(const ros::NodeHandle& node, const lwr_fri_bridge::JointLimits& limits,
+              std::function<void()> sample_written);
 
   lwr_fri_bridge::ControlPort& port() { return port_; }
 
@@ -42,6 +45,7 @@ class RobotTopics {
   std::function<void()> sample_written_;
   lwr_fri_bridge::ControlPort port_;
   lwr_fri_bridge::RobotSample sample_;
+  lwr_fri_bridge::Interpolator set_point_;
   lwr_fri_bridge::TripleBuffer<lwr_fri_bridge::VelocityCommand> sent_;  // control thread to callbacks
   ros::Subscriber joints_, state_, torques_, wrench_;
   ros::Publisher target_;

@@ -1,0 +1,207 @@
+// Plug-ins that throw, give no numbers or take too long: told, and nobody else suffers.
+#include <atomic>
+#include <chrono>
+#include <thread>
+
+#include "virtual_robot.hpp"
+
+namespace coglab_controllers {
+namespace {
+
+TEST(Faults, AnExceptionOfAClassThatOnlyThePluginHasIsToldAndLeavesNothing) {
+  VirtualRobot robot("{" + kTypes + "}");
+  for (int round = 0; round < 3; ++round) {
+    const Answer answer = robot.manager->load("odd", "test/Throwing");
+    EXPECT_TRUE(refused(answer, {"'odd'", "test/Throwing", "an error of its own"}));
+    EXPECT_EQ(answer.code, ReasonCode::InvalidArgument);
+  }
+  std::vector<std::string> ids, types;
+  robot.manager->list(ids, types);
+  EXPECT_TRUE(ids.empty());
+}
+
+TEST(Faults, WhatCannotBeAttachedIsNotLoadedAndItsIdStaysFree) {
+  VirtualRobot robot;
+  int attached = 0;
+  const auto attach = [&](MotionController&, const MotionMaker&) {
+    EXPECT_TRUE(refused(robot.manager->load("ptp", "coglab/PtpController"), {"in use"}));
+    if (++attached == 1) throw std::runtime_error("no service for this one");
+  };
+  std::string type;
+  EXPECT_TRUE(refused(robot.manager->load("ptp", "coglab/PtpController", attach), {"no service"}));
+  EXPECT_TRUE(refused(robot.manager->switchTo("ptp", type), {"not loaded"}));
+  EXPECT_TRUE(VirtualRobot::ok(robot.manager->load("ptp", "coglab/PtpController", attach)));
+  EXPECT_TRUE(VirtualRobot::ok(robot.manager->switchTo("ptp", type)));
+  EXPECT_EQ(attached, 2);
+}
+
+TEST(Faults, GainsThatTheCycleCannotCloseALoopWithAreRefused) {
+  const std::string slow = ", cycle_time: 0.01}";
+  VirtualRobot standard("{dmp: {pos_clik_gain: 110}, ptp: {Kp: 110}}");
+  VirtualRobot slower("{dmp: {rot_clik_gain: 60}, ptp: {Kp: 60}" + slow);
+  const std::string dmp = "coglab/DmpController", ptp = "coglab/PtpController";
+  EXPECT_TRUE(refused(standard.manager->load("dmp", dmp), {"dmp/pos_clik_gain", "110", "to 100"}));
+  EXPECT_TRUE(refused(standard.manager->load("ptp", ptp), {"ptp/Kp", "110", "to 100"}));
+  EXPECT_TRUE(refused(slower.manager->load("dmp", dmp), {"dmp/rot_clik_gain", "60", "to 50"}));
+  EXPECT_TRUE(refused(slower.manager->load("ptp", ptp), {"ptp/Kp", "60", "to 50"}));
+  EXPECT_TRUE(VirtualRobot::ok(standard.manager->load("fine", ptp)));
+}
+
+class Fault : public ::testing::TestWithParam<std::pair<const char*, const char*>> {};
+
+TEST_P(Fault, GivesZeroVelocityItsReasonAndALivingManager) {
+  VirtualRobot robot(std::string("{odd: {fault: ") + GetParam().first + "}, " + kTypes + "}");
+  robot.loadBoth("ptp");
+  ASSERT_TRUE(VirtualRobot::ok(robot.manager->load("odd", "test/Misbehaving")));
+  robot.switchTo("odd");
+  for (int i = 0; i < 10; ++i) {
+    robot.tick();
+    EXPECT_GT(robot.command.velocity.norm(), 0.0);
+  }
+  for (int i = 0; i < 20; ++i) {
+    robot.tick();
+    EXPECT_EQ(robot.command.velocity, JointVector::Zero().eval());
+  }
+  const CycleReport report = robot.manager->report();
+  EXPECT_TRUE(report.fault);
+  EXPECT_EQ(report.state, ManagerState::Fault);
+  EXPECT_NE(report.reason.str().find(GetParam().second), std::string::npos)
+      << report.reason.c_str();
+  EXPECT_NE(report.reason.str().find("'odd'"), std::string::npos);
+  const Answer welcome = robot.manager->motionWelcome("odd", report);
+  EXPECT_TRUE(refused(welcome, {"fault"}));
+  EXPECT_EQ(welcome.code, ReasonCode::ControllerFault);
+  robot.switchTo("ptp");
+  EXPECT_EQ(robot.ptp().add({{-1.3, -0.6, 1.5, 1.7, 0.2, 0.2, 0.8}, {}, {}}).status,
+            PtpAnswer::kStarted);
+  robot.tick();
+  robot.tick();
+  EXPECT_GT(robot.command.velocity.norm(), 0.0);
+  robot.switchTo("odd");  // afresh
+  robot.tick();
+  EXPECT_GT(robot.command.velocity.norm(), 0.0);
+}
+
+INSTANTIATE_TEST_SUITE_P(Faults, Fault,
+                         ::testing::Values(std::make_pair("throw", "told to throw"),
+                                           std::make_pair("throw_int", "threw"),
+                                           std::make_pair("nan", "not finite")));
+
+TEST(Faults, OverrunsInARowFaultTheControllerAndSinglesDoNot) {
+  const lwr_fri_bridge::JointLimits limits =
+      lwr_fri_bridge::loadJointLimits(std::string(DESCRIPTION_DIR) + "/config/joint_limits.yaml");
+  ctrl_more::Logger logger;
+  // `slow` spins for 20 ms in each cycle but every fifth; the sixth time it does not stop any more.
+  ManagerSettings settings = readManagerSettings(
+      YAML::Load("{odd: {fault: slow, after: 0, rest_every: 5, rests: 2}, overrun_time: 0.015, " +
+                 kTypes + "}"),
+      readText(std::string(DESCRIPTION_DIR) + "/urdf/lwr_ih2.urdf"), limits, false);
+  ASSERT_EQ(settings.cycle.overruns_to_fault, 5);
+  settings.logger = &logger;
+  std::atomic<bool> stop{false};
+  ControllerManager manager(std::move(settings));
+  std::thread services([&] {
+    std::string type;
+    EXPECT_TRUE(VirtualRobot::ok(manager.load("odd", "test/Misbehaving")));
+    EXPECT_TRUE(VirtualRobot::ok(manager.switchTo("odd", type)));
+    stop = true;
+  });
+  while (!stop) manager.cycle().idle(manager.now_ns());
+  services.join();
+  RobotSample sample;
+  sample.position << -1.4349, -0.6086, 1.4986, 1.7048, 0.1857, 0.2152, 0.782;
+  sample.commanded_position = sample.position;
+  sample.block = lwr_fri_bridge::MotionBlock::None;
+  VelocityCommand command;
+  const auto run = [&] {
+    ++sample.sequence;
+    sample.stamp_ns = manager.now_ns();
+    manager.cycle().run(sample, 0.005, command);
+    return manager.report();
+  };
+  // Four slow cycles and a quick one, twice. Where the machine itself delays the quick one, the row
+  // is longer: then there is nothing to be seen.
+  std::uint64_t overruns = 0;
+  for (int i = 1; i <= 10; ++i) {
+    const CycleReport report = run();
+    if (i % 5 == 0 && report.overruns != overruns) {
+      GTEST_SKIP() << "the machine delayed a cycle";
+    }
+    overruns = report.overruns;
+    EXPECT_EQ(overruns, static_cast<std::uint64_t>(i - i / 5));
+    EXPECT_FALSE(report.fault) << report.reason.c_str();
+    EXPECT_GT(command.velocity.norm(), 0.0);
+  }
+  for (int i = 1; i <= 5; ++i) {
+    EXPECT_FALSE(manager.report().fault);
+    run();
+  }
+  const CycleReport report = manager.report();
+  EXPECT_TRUE(report.fault);
+  EXPECT_EQ(report.overruns, 13u);
+  EXPECT_NE(report.reason.str().find("too slow 5 times in a row"), std::string::npos)
+      << report.reason.c_str();
+  EXPECT_EQ(command.velocity, JointVector::Zero().eval());
+}
+
+/// Takes 20 ms.
+class Slow : public ctrl_more::FeedbackController {
+ public:
+  ctrl_more::Description describe() const override {
+    ctrl_more::Description description;
+    description.type = "Slow";
+    description.modifies(ctrl_more::ControlContainer::TaskSpaceReferencePose, "ee")
+        .in("m, quaternion x y z w")
+        .frameOf("base")
+        .about("left as it is");
+    return description;
+  }
+  void initialize(ctrl_more::Setup&) override {}
+  void update(const ctrl_more::Cycle&, const ctrl_more::RobotStates&,
+              const ctrl_more::ControlStates&, ctrl_more::ModifiedControlStates&) override {
+    const auto end = std::chrono::steady_clock::now() + std::chrono::milliseconds(20);
+    while (std::chrono::steady_clock::now() < end) {
+    }
+  }
+};
+
+TEST(Faults, TheTimeOfASlowFeedbackControllerIsNotChargedToTheMotionController) {
+  const lwr_fri_bridge::JointLimits limits =
+      lwr_fri_bridge::loadJointLimits(std::string(DESCRIPTION_DIR) + "/config/joint_limits.yaml");
+  ctrl_more::Logger logger;
+  ManagerSettings settings = readManagerSettings(
+      YAML::Load("{odd: {fault: none}, overrun_time: 0.015, " + kTypes + "}"),
+      readText(std::string(DESCRIPTION_DIR) + "/urdf/lwr_ih2.urdf"), limits, false);
+  settings.logger = &logger;
+  ControllerManager manager(std::move(settings));
+  ctrl_more::ControllerEntry entry;
+  entry.blend_s = 0.0;
+  ASSERT_TRUE(manager.feedback().addController(std::make_unique<Slow>(), "slow", entry).ok());
+  ASSERT_TRUE(manager.feedback().setProfile("odd", {"slow"}).ok());
+  std::atomic<bool> stop{false};
+  std::thread services([&] {
+    std::string type;
+    EXPECT_TRUE(VirtualRobot::ok(manager.load("odd", "test/Misbehaving")));
+    EXPECT_TRUE(VirtualRobot::ok(manager.switchTo("odd", type)));
+    stop = true;
+  });
+  while (!stop) manager.cycle().idle(manager.now_ns());
+  services.join();
+  RobotSample sample;
+  sample.position << -1.4349, -0.6086, 1.4986, 1.7048, 0.1857, 0.2152, 0.782;
+  sample.commanded_position = sample.position;
+  sample.block = lwr_fri_bridge::MotionBlock::None;
+  VelocityCommand command;
+  for (int i = 0; i < 12; ++i) {
+    ++sample.sequence;
+    sample.stamp_ns = manager.now_ns();
+    manager.cycle().run(sample, 0.005, command);
+  }
+  const CycleReport report = manager.report();
+  EXPECT_FALSE(report.fault) << report.reason.c_str();
+  EXPECT_LE(report.overruns, 2u);  // a busy machine may delay the motion controller itself
+  EXPECT_GT(command.velocity.norm(), 0.0);
+}
+
+}  // namespace
+}  // namespace coglab_controllers
