@@ -222,7 +222,7 @@ class HandContract(Contract):
 
     def test_refusals(self):
         self.calibrated()
-        self.refused(self.port.preshape("fist", "medium"), ReasonCode.INVALID_ARGUMENT)
+        self.refused(self.port.preshape("fist", "medium"), ReasonCode.UNKNOWN_NAME)
         for speed in (9999, 0, -1):
             self.refused(self.port.open(speed), ReasonCode.OUT_OF_RANGE)
         self.settle(self.port.open(511), 8.0)

@@ -207,7 +207,7 @@ class SimulatedHand:
     def preshape(self, mode: str, level: str) -> Pending:
         if mode not in MODES:
             return Ready(error=PortError(f"preshape refused: no mode '{mode}'; there are: {', '.join(MODES)}",
-                                         code=ReasonCode.INVALID_ARGUMENT))
+                                         code=ReasonCode.UNKNOWN_NAME))
         return self._move(f"preshape {mode}", 0.8, lambda: (200, 40, 40, 40, 40), True)
 
     def close_on_object(self) -> Pending:
