@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 import os
+import signal
 import sys
 import unittest
+import xmlrpc.client
 
+import rosgraph
+import rosnode
 import rospkg
 import rospy
 import rostest
@@ -13,7 +17,7 @@ import tf2_ros
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 from coglab_msgs.msg import ReasonCode
-from coglab_msgs.srv import AddPtpRequest
+from coglab_msgs.srv import AddPtpRequest, LwrCommand
 from diagnostic_msgs.msg import DiagnosticArray
 from robot_fixture import HOME, Robot, end_within, robot_processes, wait_until
 from rosgraph_msgs.msg import Log
@@ -141,7 +145,9 @@ class TruePath(unittest.TestCase):
         before = robot.arm()
         rate = rospy.Rate(100)
         for _ in range(150):
-            foreign.publish(JointState(velocity=[0.0] * 6 + [0.4]))
+            message = JointState(velocity=[0.0] * 6 + [0.4])
+            message.header.stamp = rospy.Time.now()
+            foreign.publish(message)
             rate.sleep()
         for now, then in zip(robot.arm(), before, strict=True):
             self.assertAlmostEqual(now, then, delta=0.01)
@@ -152,12 +158,41 @@ class TruePath(unittest.TestCase):
         foreign.unregister()
         robot.go(HOME)  # and the controller's own velocities still count
 
-    def test_6_it_ends_when_it_is_asked_to(self) -> None:
+    def test_8_it_ends_when_it_is_asked_to(self) -> None:
         pids = robot_processes()
         self.assertTrue(pids)
         end_within(pids, 3.0)
 
 
+class SplitPath(TruePath):
+    """The same with two nodes, and what only two can suffer."""
+
+    def test_7_a_frozen_manager_moves_nothing_after_hold_and_reset(self) -> None:
+        """In mid-motion the manager freezes; hold and reset pass without it; then it goes on with what it has."""
+        robot = self.robot
+        robot.go(HOME)
+        target = [angle + 0.8 if joint == 6 else angle for joint, angle in enumerate(HOME)]
+        self.assertEqual(robot.add_ptp(target).status, AddPtpRequest.STARTED)
+        wait_until(lambda: robot.joints.velocity[6] > 0.2, 10.0, "in mid-motion")
+        manager = rosnode.get_api_uri(rosgraph.Master("/split_path"), "/controller_manager")
+        process = xmlrpc.client.ServerProxy(manager).getPid("/split_path")[2]
+        os.kill(process, signal.SIGSTOP)
+        try:
+            for event in ("hold", "reset"):
+                answer = robot.call("lwr/command", LwrCommand, event)
+                self.assertTrue(answer.success, answer.message)
+            wait_until(lambda: robot.state.motion_allowed, 5.0, "motion allowed again")
+            wait_until(lambda: max(abs(v) for v in robot.joints.velocity) < 0.01, 5.0, "standing still")
+            stood = robot.arm()
+        finally:
+            os.kill(process, signal.SIGCONT)
+        rospy.sleep(0.6)
+        for now, then in zip(robot.arm(), stood, strict=True):
+            self.assertAlmostEqual(now, then, delta=0.003)
+        robot.go(HOME)  # a motion that is asked for after the reset counts
+
+
 if __name__ == "__main__":
     rospy.init_node("true_path")
-    rostest.rosrun("coglab_controllers", "true_path", TruePath)
+    split = rospy.get_param("~split", False)
+    rostest.rosrun("coglab_controllers", "true_path", SplitPath if split else TruePath)

@@ -5,7 +5,8 @@
 /// window), /clock if ~publish_clock. Serves ~fault, ~place_object. Parameters: every row of the
 /// cell's table under the private namespace; ~speed, ~fri_host, ~fri_port (0: wait for
 /// ~port_parameter, by default lwr/fri_port_bound beside this namespace), ~port_wait,
-/// ~log_file, ~truth_rate, ~publish_clock; fri_period and seed of the parent namespace.
+/// ~fri_source_port (0: any free one), ~log_file, ~truth_rate, ~publish_clock; fri_period and seed
+/// of the parent namespace.
 #include <fstream>
 #include <memory>
 #include <sstream>
@@ -82,7 +83,9 @@ class CellNode {
     if (follow_port_)
       port = waitForPort(port_parameter_, within(private_, "port_wait", 60.0, 0.0, 3600.0));
     const auto host = private_.param<std::string>("fri_host", "127.0.0.1");
-    cell_ = std::make_unique<RealTimeCell>(config_, host, static_cast<std::uint16_t>(port), speed);
+    const int source_port = within(private_, "fri_source_port", 0, 0, 65535);
+    cell_ = std::make_unique<RealTimeCell>(config_, host, static_cast<std::uint16_t>(port), speed,
+                                           static_cast<std::uint16_t>(source_port));
     openLog(private_.param<std::string>("log_file", ""));
 
     truth_ = node_.advertise<coglab_msgs::CellTruth>("truth/cell", 1);
@@ -213,7 +216,7 @@ class CellNode {
       ObjectParameters object = config_.object;
       const bool exchange = !request.object_id.empty() && request.object_id != config_.object.id;
       if (exchange) object = readObject(private_, request.object_id);
-      cell_->apply([&](Cell& cell) {
+      cell_->apply([exchange, object, where, pose](Cell& cell) {
         if (exchange) cell.setObject(object);
         cell.place(where, pose);
       });

@@ -13,7 +13,7 @@
 
 namespace coglab_sim {
 
-FriSocket::FriSocket(const std::string& host) {
+FriSocket::FriSocket(const std::string& host, std::uint16_t source_port) {
   in_addr peer{};
   if (inet_pton(AF_INET, host.c_str(), &peer) != 1) {
     throw std::runtime_error("FRI host '" + host + "' is not an IPv4 address such as 127.0.0.1");
@@ -22,13 +22,16 @@ FriSocket::FriSocket(const std::string& host) {
   descriptor_ = socket(AF_INET, SOCK_DGRAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
   sockaddr_in own{};
   own.sin_family = AF_INET;
+  own.sin_port = htons(source_port);
   const bool loopback = (ntohl(address_) >> 24U) == 127U;
   own.sin_addr.s_addr = htonl(loopback ? INADDR_LOOPBACK : INADDR_ANY);
   if (descriptor_ < 0 ||
       bind(descriptor_, reinterpret_cast<const sockaddr*>(&own), sizeof(own)) != 0) {
     const std::string reason = std::strerror(errno);
     if (descriptor_ >= 0) close(descriptor_);
-    throw std::runtime_error("cannot open a UDP socket for FRI toward " + host + ": " + reason);
+    const std::string from = source_port == 0 ? "" : " from port " + std::to_string(source_port);
+    throw std::runtime_error("cannot open a UDP socket for FRI toward " + host + from + ": " +
+                             reason);
   }
 }
 

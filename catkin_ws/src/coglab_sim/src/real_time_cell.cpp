@@ -19,8 +19,8 @@ constexpr std::size_t kMaxRecords = 100000;  // if nobody takes them
 }  // namespace
 
 RealTimeCell::RealTimeCell(const CellConfig& config, const std::string& host, std::uint16_t port,
-                           double factor)
-    : cell_(config), socket_(host), factor_(factor), port_(port) {
+                           double factor, std::uint16_t source_port)
+    : cell_(config), socket_(host, source_port), factor_(factor), port_(port) {
   if (!(factor >= 0.01 && factor <= 100.0)) {
     throw std::invalid_argument("speed factor is " + std::to_string(factor) +
                                 ", expected 0.01 .. 100");
@@ -91,7 +91,7 @@ void RealTimeCell::run() {
 }
 
 void RealTimeCell::applyInputs() {
-  std::vector<std::packaged_task<void(Cell&)>> actions;
+  std::vector<std::shared_ptr<Action>> actions;
   std::vector<Delayed> due;
   {
     const std::lock_guard<std::mutex> lock(mutex_);
@@ -106,7 +106,9 @@ void RealTimeCell::applyInputs() {
     std::move(later, delayed_.end(), std::back_inserter(due));
     delayed_.erase(later, delayed_.end());
   }
-  for (auto& action : actions) action(cell_);
+  for (const auto& action : actions) {
+    if (!action->taken.exchange(true)) action->task(cell_);
+  }
   for (auto& entry : due) entry.action(cell_);
 }
 
@@ -154,15 +156,25 @@ void RealTimeCell::setPush(const Wrench& push) {
   push_ = push;
 }
 
-void RealTimeCell::apply(std::function<void(Cell&)> action) {
-  std::packaged_task<void(Cell&)> task(std::move(action));
-  std::future<void> done = task.get_future();
+void RealTimeCell::apply(std::function<void(Cell&)> action, double limit) {
+  const auto asked = std::make_shared<Action>();
+  asked->task = std::packaged_task<void(Cell&)>(std::move(action));
+  std::future<void> done = asked->task.get_future();
   {
     const std::lock_guard<std::mutex> lock(mutex_);
-    actions_.push_back(std::move(task));
+    actions_.push_back(asked);
   }
-  if (done.wait_for(std::chrono::seconds(1)) != std::future_status::ready) {
-    throw std::runtime_error("the simulated cell did not react within 1 s");
+  const auto wait = std::chrono::duration<double>(limit);
+  if (done.wait_for(wait) != std::future_status::ready) {
+    // Withdrawn, so that it does not act later on; unless the thread has just begun with it.
+    if (!asked->taken.exchange(true)) {
+      throw std::runtime_error("the simulated cell did not react within " + std::to_string(limit) +
+                               " s; nothing was changed");
+    }
+    if (done.wait_for(wait) != std::future_status::ready) {
+      throw std::runtime_error("the simulated cell did not finish within " +
+                               std::to_string(2.0 * limit) + " s; it may still change");
+    }
   }
   done.get();
 }

@@ -52,6 +52,7 @@ class Conventions(unittest.TestCase):
         message = JointState(velocity=[speed] + [0.0] * 6)
 
         def moved() -> bool:
+            message.header.stamp = rospy.Time.now()
             arm.target.publish(message)
             return arm.position[0] > before[0] + 0.15
 

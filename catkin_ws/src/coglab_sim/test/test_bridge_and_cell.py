@@ -4,6 +4,7 @@ import struct
 
 import numpy as np
 import pytest
+import yaml
 from fri_client import Session, parse, set_point
 
 bridge_module = pytest.importorskip('lwr_fri_bridge', reason='the bridge is not built')
@@ -13,7 +14,7 @@ LONG = os.environ.get('COGLAB_LONG') == '1'
 
 
 @pytest.mark.parametrize('convention, mode', [
-    (convention, mode) for convention in ('coglab', 'centro_epiaggio', 'stanford', 'rcprg_tum', 'rtt_lwr')
+    (convention, mode) for convention in ('coglab', 'centro_epiaggio', 'stanford', 'rcprg_tum', 'rtt_lwr', 'openkc')
     for mode in MODES if convention != 'rcprg_tum' or mode == 'joint_impedance'])  # that program fixes the strategy
 def test_every_convention_reaches_every_strategy_it_knows(convention, mode):
     wire = Wire({'krl_convention': convention}, krc__convention=convention)
@@ -123,6 +124,28 @@ def test_no_position_limit_is_crossed_at_top_speed():
             assert abs(wire.cell.set_point[joint]) <= limits.upper_position[joint]
         assert wire.cell.fri_state == 2, wire.cell.messages
         assert abs(wire.cell.set_point[joint]) > limits.upper_position[joint] - 0.05
+
+
+@pytest.mark.parametrize('period', [0.001, 0.01])
+def test_the_measured_arm_keeps_the_speed_limits_of_the_table(period):
+    """To full speed and back, every joint: the servos pass what they are told, not what the table says."""
+    with open(LIMITS) as table:
+        limit = np.array(yaml.safe_load(table)['default']['velocity'])
+    measured, true, sent = np.zeros(7), np.zeros(7), np.zeros(7)
+    wire = Wire(krc__period=period, home=[0.0, 0.3, 0.0, 0.9, 0.0, 0.3, 0.0])
+    wire.start()
+    for joint in range(7):
+        for sign in (-1.0, 1.0):
+            wire.velocity = np.zeros(7)
+            wire.velocity[joint] = sign * 2.0 * limit[joint]
+            for _ in range(round(0.45 / period)):
+                wire.tick()
+                snapshot = wire.bridge.snapshot()
+                measured = np.maximum(measured, np.abs(snapshot['velocity']) / limit)
+                sent = np.maximum(sent, np.abs(snapshot['commanded_velocity']) / limit)
+                true = np.maximum(true, np.abs(wire.cell.velocity) / limit)
+    assert true.max() <= 1.0 and measured.max() <= 1.0, (true, measured)
+    assert measured.min() > 0.95 and sent.max() < 1.0  # and the limits are used
 
 
 def test_no_answer_ever_trips_a_limit_of_the_controller():

@@ -1,9 +1,13 @@
 #include <gtest/gtest.h>
 
 #include <array>
+#include <atomic>
 #include <chrono>
 #include <cmath>
+#include <memory>
 #include <numeric>
+#include <thread>
+#include <utility>
 
 #include <netinet/in.h>
 #include <sys/socket.h>
@@ -254,4 +258,70 @@ TEST(Cell, LateStandInDoesNotBlameThePc) {
   const auto counted = cell.controller().statistics().missCounter();
   for (int i = 0; i < 50; ++i) cell.advance(false);
   EXPECT_EQ(cell.controller().statistics().missCounter(), counted);
+}
+
+/// A request that was given up never acts, and leaves nothing behind that uses what is gone.
+TEST(RealTimeCell, ARequestThatTimedOutIsWithdrawn) {
+  CellConfig config;
+  config.urdf = URDF;
+  RealTimeCell cell(config, "127.0.0.1", 9, 1.0);
+  std::atomic<int> done{0};
+  cell.start();
+  cell.apply([&](Cell&) { ++done; });
+  cell.applyLater(0.0, [](Cell&) { std::this_thread::sleep_for(std::chrono::milliseconds(300)); });
+  const auto ask = [&] {
+    const auto object = std::make_unique<std::vector<int>>(1000, 1);  // gone after the call
+    const std::vector<int>& used = *object;
+    cell.apply([&](Cell&) { done += used[999]; }, 0.02);
+  };
+  bool refused = false;
+  for (int i = 0; i < 50 && !refused; ++i) {
+    try {
+      done = 0;
+      ask();
+    } catch (const std::runtime_error& error) {
+      refused = true;
+      EXPECT_NE(std::string(error.what()).find("nothing was changed"), std::string::npos)
+          << error.what();
+    }
+  }
+  EXPECT_TRUE(refused);
+  cell.apply([&](Cell&) {}, 5.0);  // the thread goes on
+  cell.stop();
+  EXPECT_EQ(done, 0);
+}
+
+/// Clients with a hard-wired port of the controller can be used.
+TEST(RealTimeCell, SendsFromTheSourcePortAsked) {
+  const int fd = socket(AF_INET, SOCK_DGRAM, 0), free_port = socket(AF_INET, SOCK_DGRAM, 0);
+  sockaddr_in own{}, source{};
+  own.sin_family = source.sin_family = AF_INET;
+  own.sin_addr.s_addr = source.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  socklen_t length = sizeof own;
+  for (auto [socket, address] : {std::pair{fd, &own}, std::pair{free_port, &source}}) {
+    ASSERT_EQ(bind(socket, reinterpret_cast<sockaddr*>(address), length), 0);
+    ASSERT_EQ(getsockname(socket, reinterpret_cast<sockaddr*>(address), &length), 0);
+  }
+  CellConfig config;
+  config.urdf = URDF;
+  const std::uint16_t port = ntohs(source.sin_port);
+  try {
+    RealTimeCell(config, "127.0.0.1", ntohs(own.sin_port), 1.0, port);
+    FAIL() << "bound twice";
+  } catch (const std::runtime_error& error) {
+    EXPECT_NE(std::string(error.what()).find(std::to_string(port)), std::string::npos);
+  }
+  close(free_port);
+  RealTimeCell cell(config, "127.0.0.1", ntohs(own.sin_port), 1.0, port);
+  cell.start();
+  std::array<char, 1024> bytes{};
+  sockaddr_in peer{};
+  const timeval limit{5, 0};
+  setsockopt(fd, SOL_SOCKET, SO_RCVTIMEO, &limit, sizeof limit);
+  EXPECT_EQ(
+      recvfrom(fd, bytes.data(), bytes.size(), 0, reinterpret_cast<sockaddr*>(&peer), &length),
+      916);
+  EXPECT_EQ(ntohs(peer.sin_port), port);
+  cell.stop();
+  close(fd);
 }

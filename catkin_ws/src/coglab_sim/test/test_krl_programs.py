@@ -82,7 +82,81 @@ def test_stanford(session):
     s.run(0.5)
     assert ints(s)[15] == 10 and s.cell.fri_state == MONITOR
     s.client.ints[15] = 30  # equals TO_INT[15]: close and end
-    assert s.run(0.5) is None
+    fields = s.run(0.5)
+    assert s.cell.fri_state == 0
+    assert fields['state'] == MONITOR and fields['ints'][15] == 30  # told after the close, and OFF never
+    assert s.run(1.5) is None
+
+
+def test_a_client_that_waits_for_each_datagram_hears_the_end(session):
+    """A common client: receive, answer, look whether the program has closed. It hangs where no datagram comes."""
+    s = session(krc__convention='stanford')
+    s.monitor()
+    s.client.ints[14], s.client.ints[15] = 10, 20
+    measurement, asked = s.measurement, False
+    for _ in range(400):
+        assert measurement is not None, 'the client hangs in its receive'
+        fields = parse(measurement)
+        if fields['ints'][15] == 30:
+            break
+        if not asked:
+            s.client.ints[15], asked = fields['ints'][14], True
+        measurement = s.cell.step(s.client.answer(measurement))
+    assert fields['ints'][15] == 30
+
+
+def test_how_long_it_sends_after_the_close_is_a_parameter(session):
+    for linger in (0.0, 0.3):
+        s = session(krc__convention='rtt_lwr', krc__close_linger=linger)
+        s.monitor()
+        s.client.ints[0] = 3
+        while s.cell.fri_state != 0:
+            s.tick()
+        sent = 0
+        while s.tick() is not None:
+            sent += 1
+        assert sent * s.cell.period == pytest.approx(linger, abs=2 * s.cell.period)
+
+
+def openkc(s, command):
+    """One command as OpenKC's client gives it: flag and code until it is acknowledged, then the flag back."""
+    s.client.ints[15], s.client.bools = command, 1
+    for _ in range(400):
+        s.tick()
+        if to_bool(s, 1):
+            break
+    told = ints(s)[13:16]
+    s.client.ints[15], s.client.bools = 0, 0
+    for _ in range(100):
+        s.tick()
+        if not to_bool(s, 1):
+            return told
+    raise AssertionError('the flag stays')
+
+
+def test_openkc(session):
+    s = session(krc__convention='openkc')
+    s.monitor()
+    s.client.flags = JOINT_IMPEDANCE
+    assert openkc(s, 7) == (1, 7, 105) and parse(s.measurement)['control'] == 3
+    s.client.ints[8:15], s.client.reals[9:16] = [300] * 7, [0.5] * 7
+    assert openkc(s, 5) == (2, 5, 103)
+    assert openkc(s, 1) == (3, 1, 100) and s.cell.fri_state == COMMAND
+    s.run(0.3)
+    assert openkc(s, 2) == (4, 2, 101) and s.cell.fri_state == MONITOR
+    assert openkc(s, 9) == (5, 9, 107) and parse(s.measurement)['control'] == 1
+    assert openkc(s, 6) == (6, 6, 104) and parse(s.measurement)['control'] == 2
+    assert openkc(s, 3) == (0, 3, 111)  # the count begins anew
+    s.client.ints[1] = 30
+    openkc(s, 30)
+    assert parse(s.measurement)['control'] == 3
+    s.client.ints[15], s.client.bools = 10, 1
+    s.run(0.3)
+    assert not to_bool(s, 1) and any('command 10' in text for text in s.texts())  # said, and not acknowledged
+    s.client.ints[15], s.client.bools = 0, 0
+    s.run(0.2)
+    s.client.ints[15], s.client.bools = 99, 1
+    s.run(0.3)
     assert s.cell.fri_state == 0
 
 
@@ -136,7 +210,8 @@ def test_kuka_sample(session):
     assert ints(s)[0] == -1
 
 
-@pytest.mark.parametrize('convention', ['coglab', 'centro_epiaggio', 'stanford', 'rcprg_tum', 'rtt_lwr', 'kuka_sample'])
+@pytest.mark.parametrize('convention', ['coglab', 'centro_epiaggio', 'stanford', 'rcprg_tum', 'rtt_lwr', 'openkc',
+                                        'kuka_sample'])
 def test_nothing_starts_unasked(session, convention):
     s = session(krc__convention=convention)
     s.run(5.0)

@@ -166,6 +166,7 @@ py::dict snapshotDict(const Snapshot& s) {
   d["quality"] = fri::nameOf(s.quality);
   d["control_mode"] = fri::nameOf(s.control);
   d["fall_backs"] = s.fall_backs;
+  d["loss"] = describe(s.loss);
   d["accepted"] = s.session.accepted;
   d["wrong_size"] = s.session.wrong_size;
   d["wrong_id"] = s.session.wrong_id;
@@ -183,6 +184,7 @@ py::dict snapshotDict(const Snapshot& s) {
   d["resumed_after_gap"] = s.counters.resumed_after_gap;
   d["position_bounds"] = s.counters.position_bounds;
   d["leash_trips"] = s.counters.leash_trips;
+  d["requests_dropped"] = s.counters.requests_dropped;
   return d;
 }
 

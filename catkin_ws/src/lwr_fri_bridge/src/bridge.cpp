@@ -24,7 +24,8 @@ double seconds(std::int64_t from_ns, std::int64_t to_ns) {
 
 bool StateView::operator==(const StateView& o) const {
   return supervisor == o.supervisor && block == o.block && hold_latched == o.hold_latched &&
-         blocking_joint == o.blocking_joint && state == o.state && quality == o.quality &&
+         blocking_joint == o.blocking_joint && motion_epoch == o.motion_epoch && loss == o.loss &&
+         state == o.state && quality == o.quality &&
          control == o.control && power == o.power && drive_error == o.drive_error &&
          drive_warning == o.drive_warning && cycle_time == o.cycle_time;
 }
@@ -73,6 +74,10 @@ bool Bridge::compute(const std::uint8_t* datagram, std::size_t size, std::int64_
   sample_.external_torque = fri::jointsFromWire(measurement_.external_torque);
   sample_.tool_wrench = toolWrench(measurement_, config_.wrench_in_tool_axes);
   ++sample_.sequence;
+  const bool unseen = !reception.fresh_session && !reception.answer_arrived;
+  watch_.tick(dt * reception.cycles, reception.cycles - 1 + (unseen ? 1 : 0),
+              sample_.velocity.cwiseAbs().maxCoeff(),
+              sample_.commanded_velocity.cwiseAbs().maxCoeff());
 
   const bool monitor = measurement_.state == static_cast<std::uint16_t>(fri::FriState::Monitor);
   if (first_contact && !monitor) {
@@ -193,9 +198,16 @@ void Bridge::runSupervision(const Configurator::Observation& seen, bool fresh_se
   input.full_power = measurement_.power == fri::kAllDrivesOn;
   input.stands_still = interpolator_.standsStill();
   input.leashed = leash_.joint() >= 0;
-  const std::uint32_t fall_backs = supervisor_.fallBacks();
+  const std::uint32_t fall_backs = supervisor_.fallBacks(), epoch = supervisor_.epoch();
   supervisor_.update(input);
-  if (supervisor_.fallBacks() != fall_backs) configurator_.fellBack();
+  if (supervisor_.epoch() != epoch) permission_since_ns_ = seen.now_ns;
+  if (supervisor_.fallBacks() != fall_backs) {
+    configurator_.fellBack();
+    loss_ = watch_.judge({connected_, fresh_session, input.command_mode,
+                          seconds(last_receive_ns_, seen.now_ns), sample_.cycle_time,
+                          measurement_.timestamp, sample_.position});
+  }
+  if (supervisor_.state() == SupervisorState::Command) loss_ = CommandModeLoss{};
 
   // The first half of a stop is the supervisor's (brake), the second the configurator's (monitor
   // mode).
@@ -329,12 +341,14 @@ void Bridge::publish() {
 
   Snapshot snapshot;
   snapshot.sample = sample_;
+  snapshot.permission_since_ns = permission_since_ns_;
   snapshot.session = session_.counters();
   snapshot.counters = counters_;
   snapshot.supervisor = supervisor_.state();
   snapshot.hold_latched = supervisor_.held();
   snapshot.request_busy = configurator_.busy();
   snapshot.fall_backs = supervisor_.fallBacks();
+  snapshot.loss = loss_;
   snapshot.state = connected_ ? static_cast<fri::FriState>(measurement_.state) : fri::FriState::Off;
   snapshot.quality =
       connected_ ? static_cast<fri::Quality>(measurement_.quality) : fri::Quality::Unacceptable;
@@ -360,6 +374,8 @@ void Bridge::publish() {
   view.block = sample_.block;
   view.hold_latched = snapshot.hold_latched;
   view.blocking_joint = sample_.blocking_joint;
+  view.motion_epoch = sample_.motion_epoch;
+  view.loss = loss_;
   view.state = snapshot.state;
   view.quality = snapshot.quality;
   view.control = snapshot.control;
@@ -381,6 +397,7 @@ std::uint32_t Bridge::submit(const std::string& text) {
   request.event = parseEvent(text, newest.mode);
   request.ticket = next_ticket_++;
   if (!requests_.push(request)) {
+    ++requests_dropped_;
     Outcome dropped;
     dropped.ticket = request.ticket;
     dropped.kind = request.event.kind;
@@ -434,6 +451,7 @@ Snapshot Bridge::snapshot() {
   const std::lock_guard<std::mutex> lock(mutex_);
   Snapshot newest;
   snapshots_.read(newest);
+  newest.counters.requests_dropped = requests_dropped_;
   return newest;
 }
 

@@ -1,6 +1,7 @@
 #include "bridge_diagnostics.hpp"
 
 #include "lwr_fri_bridge/diagnosis.hpp"
+#include "target_topic.hpp"
 
 namespace lwr_fri_bridge {
 namespace {
@@ -34,6 +35,7 @@ void BridgeDiagnostics::connection(diagnostic_updater::DiagnosticStatusWrapper& 
   status.summary(levelOf(d.severity), d.text);
   status.add("port", owner_.fri_thread_.port());
   status.add("peer", thread.peer);
+  status.add("controller_address", owner_.fri_thread_.controllerAddress());
   status.add("FRI state", fri::nameOf(s.state));
   status.add("quality", fri::nameOf(s.quality));
   status.add("cycle time (s)", s.sample.cycle_time);
@@ -80,14 +82,14 @@ void BridgeDiagnostics::arm(diagnostic_updater::DiagnosticStatusWrapper& status)
 
 void BridgeDiagnostics::commands(diagnostic_updater::DiagnosticStatusWrapper& status) {
   const Snapshot s = owner_.bridge_.snapshot();
-  const BridgeRos::Refused refused = owner_.refused();
-  const std::uint64_t total = refused.invalid + refused.controller_active +
-                              refused.second_publisher + refused.not_allowed +
-                              s.counters.commands_invalid;
+  const TargetTopic::Refused refused = owner_.target_->refused();
+  const std::uint64_t total = refused.total() + s.counters.commands_invalid;
   status.summary(levelOf(total > refused_before_ ? Severity::Warning : Severity::Ok),
                  total > refused_before_ ? "target velocities were refused" : "ok");
   refused_before_ = total;
   status.add("refused: not valid", refused.invalid + s.counters.commands_invalid);
+  status.add("refused: stamp missing, too old or from the future", refused.stamp);
+  status.add("refused: made before motion was allowed", refused.old_permission);
   status.add("refused: a controller is active", refused.controller_active);
   status.add("refused: another publisher moves the arm", refused.second_publisher);
   status.add("refused: motion not allowed", refused.not_allowed);
@@ -96,6 +98,7 @@ void BridgeDiagnostics::commands(diagnostic_updater::DiagnosticStatusWrapper& st
   status.add("resumed after a gap", s.counters.resumed_after_gap);
   status.add("ticks bounded by braking distance", s.counters.position_bounds);
   status.add("leash trips", s.counters.leash_trips);
+  status.add("events dropped, too many at once", s.counters.requests_dropped);
 }
 
 }  // namespace lwr_fri_bridge

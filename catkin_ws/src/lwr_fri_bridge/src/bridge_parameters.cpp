@@ -85,6 +85,9 @@ FriThreadOptions readFriThreadOptions(const ros::NodeHandle& nh) {
   FriThreadOptions options;
   options.address = parameter<std::string>(nh, "fri_address", options.address, "an IPv4 address");
   options.port = wholeParameter(nh, "fri_port", options.port, 0, 65535);
+  options.controller_address =
+      parameter<std::string>(nh, "controller_address", options.controller_address,
+                             "an IPv4 address or nothing");
   options.priority = wholeParameter(nh, "rt_priority", options.priority, 0, 98);
   options.stack_bytes =
       1024 * static_cast<std::size_t>(wholeParameter(nh, "rt_stack_kib", 256, 128, 8192));

@@ -7,9 +7,13 @@
 #include <thread>
 
 #include <coglab_msgs/LwrState.h>
+#include <coglab_msgs/ReasonCode.h>
 
 #include "bridge_diagnostics.hpp"
 #include "lwr_fri_bridge/diagnosis.hpp"
+#include "lwr_fri_bridge/reason_codes.hpp"
+#include "lwr_fri_bridge/ros_time.hpp"
+#include "target_topic.hpp"
 
 namespace lwr_fri_bridge {
 namespace {
@@ -17,12 +21,6 @@ namespace {
 constexpr int kSpinnerThreads =
     4;  // a start may occupy one for seconds; hold and stop must get through
 constexpr double kSilenceWarning = 5.0;  // s between warnings about silence
-
-ros::Time rosTime(std::int64_t steady_ns) {
-  const double age = 1e-9 * static_cast<double>(steadyNow() - steady_ns);
-  const ros::Time now = ros::Time::now();
-  return age > 0.0 && now.toSec() > age ? now - ros::Duration(age) : now;
-}
 
 void copyJoints(const Vector7& joints, std::vector<double>& values) {
   values.assign(joints.data(), joints.data() + joints.size());
@@ -57,8 +55,10 @@ BridgeRos::BridgeRos(const ros::NodeHandle& nh, Options options)
   nh_.setCallbackQueue(&queue_);
   sem_init(&new_sample_, 0, 0);
   bridge_.setVelocitySource(VelocitySource::Topic);
+  target_ = std::make_unique<TargetTopic>(bridge_, options_.one_process);
   for (const char* name : kJointNames) joint_message_.name.emplace_back(name);
   torque_message_.name = joint_message_.name;
+  restarts_quietly_ = nh.param("quiet_restart", true);
   wrench_message_.header.frame_id = nh.param<std::string>("tool_frame", "ih2_palm");
 }
 
@@ -68,6 +68,26 @@ BridgeRos::~BridgeRos() {
 }
 
 void BridgeRos::start() {
+  try {
+    startThreads();
+  } catch (...) {
+    endThreads();  // nothing may run on behind the caller's back, who frees what it uses
+    throw;
+  }
+  started_ = true;
+}
+
+void BridgeRos::startThreads() {
+  stopping_ = false;
+  started_ns_ = steadyNow();
+  // The port first: what takes long comes after the likeliest thing to fail.
+  const std::string warning = fri_thread_.start(nh_.param("fri_port_bound", 0));
+  if (!warning.empty()) ROS_WARN("lwr: %s", warning.c_str());
+  diagnostics_ = std::make_unique<BridgeDiagnostics>(*this);
+  if (nh_.param("lock_memory", true)) {
+    const std::string refused = lockMemory();
+    if (!refused.empty()) ROS_WARN("lwr: %s", refused.c_str());
+  }
   joint_states_ = nh_.advertise<sensor_msgs::JointState>("joint_states", 10);
   external_torques_ = nh_.advertise<sensor_msgs::JointState>("external_torques", 10);
   tool_wrench_ = nh_.advertise<geometry_msgs::WrenchStamped>("tool_wrench", 10);
@@ -75,27 +95,25 @@ void BridgeRos::start() {
   command_ = nh_.advertiseService("command", &BridgeRos::onCommand, this);
   events_ = nh_.subscribe("ros_events", 10, &BridgeRos::onEvent, this,
                           ros::TransportHints().tcpNoDelay());
-  target_ = nh_.subscribe("target_joint_states", 1, &BridgeRos::onTarget, this,
-                          ros::TransportHints().tcpNoDelay());
-
-  if (nh_.param("lock_memory", true)) {
-    const std::string warning = lockMemory();
-    if (!warning.empty()) ROS_WARN("lwr: %s", warning.c_str());
-  }
-  started_ns_ = steadyNow();
-  started_ = true;
-  const std::string warning = fri_thread_.start(nh_.param("fri_port_bound", 0));
-  if (!warning.empty()) ROS_WARN("lwr: %s", warning.c_str());
+  target_->start(nh_);
   nh_.setParam("fri_port_bound", fri_thread_.port());
   ROS_INFO("lwr: waiting for FRI datagrams on port %d, KRL convention %s", fri_thread_.port(),
            fri::nameOf(bridge_.config().krl_convention));
 
-  diagnostics_ = std::make_unique<BridgeDiagnostics>(*this);
   diagnostics_timer_ = nh_.createTimer(ros::Duration(1.0),
                                        [this](const ros::TimerEvent&) { diagnostics_->publish(); });
   publisher_.start("lwr_publisher", 512 * 1024, [this] { publishLoop(); });
   spinner_ = std::make_unique<ros::AsyncSpinner>(kSpinnerThreads, &queue_);
   spinner_->start();
+}
+
+void BridgeRos::endThreads() {
+  stopping_ = true;
+  diagnostics_timer_.stop();
+  if (spinner_) spinner_->stop();
+  sem_post(&new_sample_);
+  publisher_.join();
+  fri_thread_.stop();
 }
 
 void BridgeRos::shutdown() {
@@ -104,6 +122,7 @@ void BridgeRos::shutdown() {
   // No request is taken from now on. The topics stay registered: unregistering waits for the ROS
   // master, which may not answer, and the arm comes first.
   closing_ = true;
+  target_->close();
   Outcome outcome = bridge_.command("stop");
   // Somebody else's stop may be in progress; it has time limits of its own.
   for (int i = 0; i < 100 && outcome.code == OutcomeCode::Busy; ++i) {
@@ -114,98 +133,23 @@ void BridgeRos::shutdown() {
     // The log may be gone already when a node shuts down.
     std::fprintf(stderr, "lwr: shutdown: %s\n", describe(outcome).c_str());
   }
-  stopping_ = true;
-  diagnostics_timer_.stop();
-  if (spinner_) spinner_->stop();
-  sem_post(&new_sample_);
-  publisher_.join();
-  fri_thread_.stop();
+  endThreads();
 }
 
 void BridgeRos::unregister() {
-  target_.shutdown();
+  target_->stop();
   events_.shutdown();
   command_.shutdown();
   if (ros::ok()) nh_.deleteParam("fri_port_bound");
 }
 
+int BridgeRos::priorityBelow() {
+  return fri_thread_.statistics().real_time ? fri_thread_.priority() - 1 : 0;
+}
+
 void BridgeRos::setControllerActive(bool active) {
-  controller_active_ = active;
+  target_->setControllerActive(active);
   bridge_.setVelocitySource(active ? VelocitySource::ControlThread : VelocitySource::Topic);
-}
-
-BridgeRos::Refused BridgeRos::refused() const {
-  return {refused_invalid_, refused_active_, refused_second_, refused_blocked_};
-}
-
-void BridgeRos::onTarget(const ros::MessageEvent<const sensor_msgs::JointState>& event) {
-  if (closing_) return;
-  // In one process the controller manager publishes here what it sent already.
-  if (options_.one_process && event.getPublisherName() == ros::this_node::getName()) return;
-  if (options_.one_process && controller_active_) {
-    ++refused_active_;
-    ROS_WARN_THROTTLE(5.0,
-                      "lwr: target_joint_states of %s refused: a controller of this process is "
-                      "active; switch it off first",
-                      event.getPublisherName().c_str());
-    return;
-  }
-  // Two publishers would pull the arm to and fro: the one whose velocities are followed keeps it
-  // until it pauses.
-  const double pause = 1e-9 * static_cast<double>(steadyNow() - target_stamp_ns_);
-  if (event.getPublisherName() != target_publisher_ && target_stamp_ns_ != 0 &&
-      pause < bridge_.config().topic_timeout) {
-    ++refused_second_;
-    ROS_WARN_THROTTLE(5.0,
-                      "lwr: target_joint_states of %s refused: %s moves the arm; switch its "
-                      "controller off or end it first",
-                      event.getPublisherName().c_str(), target_publisher_.c_str());
-    return;
-  }
-  const sensor_msgs::JointState& message = *event.getMessage();
-  std::string fault;
-  VelocityCommand command;
-  if (message.velocity.size() != 7) {
-    fault = "expected 7 velocities, got " + std::to_string(message.velocity.size());
-  } else if (!message.name.empty() && message.name.size() != 7) {
-    fault = "expected 7 names or none, got " + std::to_string(message.name.size());
-  } else {
-    command.velocity.setConstant(NAN);
-    for (std::size_t i = 0; i < 7; ++i) {
-      std::size_t joint = i;
-      if (!message.name.empty()) {
-        joint = 0;
-        while (joint < 7 && message.name[i] != kJointNames[joint]) ++joint;
-        if (joint == 7) {
-          fault = "unknown joint '" + message.name[i] +
-                  "', expected lwr_a1 lwr_a2 lwr_e1 lwr_a3 lwr_a4 lwr_a5 lwr_a6";
-          break;
-        }
-      }
-      command.velocity[static_cast<Eigen::Index>(joint)] = message.velocity[i];
-    }
-    if (fault.empty() && !command.velocity.allFinite())
-      fault = "a velocity is not finite, or a joint is named twice";
-  }
-  if (!fault.empty()) {
-    ++refused_invalid_;
-    ROS_WARN_THROTTLE(5.0, "lwr: target_joint_states refused: %s", fault.c_str());
-    return;
-  }
-  const Snapshot now = bridge_.snapshot();
-  if (now.sample.block != MotionBlock::None) {
-    ++refused_blocked_;
-    ROS_WARN_THROTTLE(5.0, "lwr: target_joint_states refused: %s",
-                      reasonOf(now.sample.block, now.sample.blocking_joint).c_str());
-    // The leash lets go when the outward motion is not asked for any more, so it must hear what is
-    // asked for.
-    if (now.sample.block != MotionBlock::Leashed) return;
-  }
-  command.stamp_ns = steadyNow();
-  command.motion_epoch = now.sample.motion_epoch;
-  bridge_.sendTopicVelocity(command);
-  target_publisher_ = event.getPublisherName();
-  target_stamp_ns_ = command.stamp_ns;
 }
 
 void BridgeRos::onEvent(const std_msgs::String& message) {
@@ -228,9 +172,11 @@ bool BridgeRos::onCommand(coglab_msgs::LwrCommand::Request& request,
   try {
     const Outcome outcome = bridge_.command(request.event);
     response.success = outcome.success();
+    response.reason_code = reasonCode(outcome.code);
     response.message = describe(outcome);
   } catch (const std::invalid_argument& error) {
     response.success = false;
+    response.reason_code = coglab_msgs::ReasonCode::INVALID_ARGUMENT;
     response.message = error.what();
   }
   if (!response.success)
@@ -276,6 +222,7 @@ void BridgeRos::publishLoop() {
       published_sequence_ = now.sample.sequence;
       publishSample(now);
     }
+    restartQuietly(now);
     reportOutcomes();
 
     const FriThreadStatistics thread = fri_thread_.statistics();
@@ -293,6 +240,24 @@ void BridgeRos::publishLoop() {
                diagnoseConnection(now, thread, fri_thread_.port(), silence).text.c_str());
     }
   }
+}
+
+/// Goes on after a loss of command mode that this computer caused, if the arm has not moved since.
+void BridgeRos::restartQuietly(const Snapshot& now) {
+  if (!restarts_quietly_) return;
+  QuietRestart::View view;
+  view.loss = now.loss;
+  view.stopped = now.supervisor == SupervisorState::Stopped;
+  view.held = now.hold_latched;
+  view.may_command = now.quality >= fri::Quality::Ok && now.drive_error == 0;
+  view.timestamp = now.timestamp;
+  view.position = now.sample.position;
+  view.velocity = now.sample.velocity;
+  if (!quiet_restart_.due(view, steadyNow())) return;
+  ROS_WARN("lwr: %s; the arm was at rest and has not moved since: started again",
+           describe(now.loss).c_str());
+  const std::lock_guard<std::mutex> lock(tickets_mutex_);
+  tickets_.push_back(bridge_.submit("start"));
 }
 
 void BridgeRos::publishSample(const Snapshot& snapshot) {
@@ -330,7 +295,11 @@ void BridgeRos::publishState(const StateView& view) {
   message.drive_warning = view.drive_warning;
   message.motion_allowed = view.block == MotionBlock::None;
   message.hold_latched = view.hold_latched;
-  message.reason = reasonOf(view.block, view.blocking_joint);
+  message.reason_code = reasonCode(view.block, view.loss);
+  message.reason = reasonOf(view.block, view.blocking_joint, view.loss);
+  const std::string event = wayOut(view.block);
+  if (!event.empty()) message.reason += ": rosservice call " + command_.getService() + " " + event;
+  message.motion_epoch = view.motion_epoch;
   message.cycle_time = view.cycle_time;
   state_.publish(message);
 }

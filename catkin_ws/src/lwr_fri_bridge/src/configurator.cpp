@@ -13,6 +13,8 @@ constexpr double kSettleTime =
 
 void Configurator::setPhase(fri::KrlPhase phase, const Observation& seen) {
   request_.phase = phase;
+  request_.acknowledged = 0;
+  request_.asserted = false;
   if (phase != fri::KrlPhase::Start && phase != fri::KrlPhase::Stop) return;
   // A program that outlived the last run of the bridge has numbers of its own.
   const std::int32_t finished =
@@ -155,6 +157,8 @@ void Configurator::stepStop(const Observation& seen) {
 }
 
 bool Configurator::update(const Observation& seen, Outcome& outcome) {
+  if (seen.connected && seen.measurement != nullptr)
+    fri::stepRequest(convention_, request_, seen.measurement->krl);
   if (step_ == Step::WaitMonitor) {
     stepStop(seen);
   } else if (step_ != Step::Idle && step_ != Step::Ended) {

@@ -58,9 +58,11 @@ Diagnosis diagnoseConnection(const Snapshot& s, const FriThreadStatistics& threa
   }
   if (!thread.last_foreign.empty()) {
     return {Severity::Warning, "a second sender (" + thread.last_foreign +
-                                   ") uses the port and is ignored; peer is " + thread.peer};
+                                   ") uses the port and is ignored; the peer is " + thread.peer +
+                                   ": if that is not the robot controller, set controller_address"};
   }
   return {Severity::Ok, std::string("quality ") + fri::nameOf(s.quality) +
+                            " from " + thread.peer +
                             number(", latency %.2f ms", 1e3 * s.latency) +
                             number(", cycle %.0f ms", 1e3 * cycle)};
 }
@@ -73,15 +75,30 @@ Diagnosis diagnoseArm(const Snapshot& s, double hot) {
   if (hot_joints != 0) return {Severity::Warning, "drives are hot: " + jointsIn(hot_joints)};
   if (s.drive_warning != 0)
     return {Severity::Warning, "drive warning: " + jointsIn(s.drive_warning)};
-  const std::string reason = reasonOf(s.sample.block, s.sample.blocking_joint);
+  const std::string reason = reasonOf(s.sample.block, s.sample.blocking_joint, s.loss);
   return {Severity::Ok, reason.empty() ? "motion is allowed" : reason};
 }
 
-std::string reasonOf(MotionBlock block, int joint) {
+std::string reasonOf(MotionBlock block, int joint, const CommandModeLoss& loss) {
   std::string reason = describe(block);
   if (block == MotionBlock::Leashed && joint >= 0)
     reason = std::string(kJointNames[joint]) + ": " + reason;
+  const bool lost = block == MotionBlock::Disconnected || std::string(wayOut(block)) == "start";
+  if (lost && loss.cause != LossCause::None) reason = describe(loss) + "; now: " + reason;
   return reason;
+}
+
+const char* wayOut(MotionBlock block) {
+  switch (block) {
+    case MotionBlock::Monitor:
+    case MotionBlock::NoPower:
+    case MotionBlock::NotStarted:
+      return "start";
+    case MotionBlock::Held:
+      return "reset";
+    default:
+      return "";
+  }
 }
 
 }  // namespace lwr_fri_bridge

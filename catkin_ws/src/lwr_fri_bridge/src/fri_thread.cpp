@@ -75,6 +75,15 @@ std::string FriThread::start(int preferred_port) {
     throw std::runtime_error("fri_address = '" + options_.address +
                              "' is not an IPv4 address such as 192.168.0.20");
   }
+  in_addr controller{};
+  if (!options_.controller_address.empty() &&
+      inet_pton(AF_INET, options_.controller_address.c_str(), &controller) != 1) {
+    throw std::runtime_error("controller_address = '" + options_.controller_address +
+                             "' is not an IPv4 address such as 192.168.0.20, nor empty (the first "
+                             "that sends valid measurements)");
+  }
+  controller_ = ntohl(controller.s_addr);
+  local_ = ntohl(local.sin_addr.s_addr);
   const int fd = socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
   if (fd < 0) failSocket(fd, "open a socket for", options_);
   const auto bindTo = [&](int port) {
@@ -111,33 +120,45 @@ void FriThread::stop() {
   socket_ = -1;
 }
 
+/// Waits for datagrams, at most one idle tick. Returns their number; with 0, errno says why.
+int FriThread::receive(Batch& batch) {
+  const auto take = [&](int slot, int flags) {
+    socklen_t length = sizeof batch.from[slot];
+    batch.size[slot] = recvfrom(socket_, batch.bytes[slot], kBuffer, flags,
+                                reinterpret_cast<sockaddr*>(&batch.from[slot]), &length);
+    return batch.size[slot] >= 0;
+  };
+  const std::int64_t began = steadyNow();
+  int received = take(0, 0) ? 1 : 0;
+  const std::int64_t now = steadyNow();
+  if (received == 0 && now - began > 2 * kIdleTick_ns) {
+    // This thread was not run when its time was over. What has come meanwhile is no silence.
+    bridge_.noteLate(1e-9 * static_cast<double>(now - began - kIdleTick_ns));
+    received = take(0, MSG_DONTWAIT) ? 1 : 0;
+  }
+  if (received == 0) return 0;
+  // Only a datagram that comes off the beat may have others behind it; on the beat there is nothing
+  // to look for.
+  const auto interval = static_cast<double>(now - last_receive_ns_);
+  const double cycle_ns = 1e9 * bridge_.cycleTime();
+  last_receive_ns_ = now;
+  if (interval < 0.5 * cycle_ns || interval > 1.5 * cycle_ns) {
+    while (received < kBatch && take(received, MSG_DONTWAIT)) ++received;
+  }
+  return received;
+}
+
 void FriThread::run() {
   if (options_.priority > 0) scheduling_warning_ = enterRealTime(options_.priority);
   scheduling_ = options_.priority <= 0 ? 3 : scheduling_warning_.empty() ? 1 : 2;
 
   Batch batch;
   std::memset(&batch, 0, sizeof batch);
-  const auto receive = [&](int slot, int flags) {
-    socklen_t length = sizeof batch.from[slot];
-    batch.size[slot] = recvfrom(socket_, batch.bytes[slot], kBuffer, flags,
-                                reinterpret_cast<sockaddr*>(&batch.from[slot]), &length);
-    return batch.size[slot] >= 0;
-  };
-  std::int64_t last_tick = steadyNow(), last_receive = last_tick;
+  std::int64_t last_tick = last_receive_ns_ = steadyNow();
   while (!stopping_.load(std::memory_order_relaxed)) {
-    int received = receive(0, 0) ? 1 : 0;
+    const int received = receive(batch);
     const int error = received > 0 ? 0 : errno;
     const std::int64_t now = steadyNow();
-    if (received > 0) {
-      // Only a datagram that comes off the beat may have others behind it; on the beat there is
-      // nothing to look for.
-      const auto interval = static_cast<double>(now - last_receive);
-      const double cycle_ns = 1e9 * bridge_.cycleTime();
-      last_receive = now;
-      if (interval < 0.5 * cycle_ns || interval > 1.5 * cycle_ns) {
-        while (received < kBatch && receive(received, MSG_DONTWAIT)) ++received;
-      }
-    }
     const std::uint64_t before = answers_.load(std::memory_order_relaxed);
     if (received > 0) serve(batch, received, now);
     if (answers_.load(std::memory_order_relaxed) != before) {
@@ -156,12 +177,21 @@ void FriThread::run() {
   }
 }
 
+/// Whether datagrams from there may be the controller's.
+bool FriThread::isController(std::uint64_t endpoint) const {
+  const std::uint64_t peer = peer_.load(std::memory_order_relaxed);
+  if (peer != 0) return endpoint == peer;
+  return controller_ == 0 || (endpoint >> 16) == controller_;
+}
+
 void FriThread::serve(Batch& batch, int received, std::int64_t now_ns) {
   bool answered = false;
+  int waiting = -1;  // of the controller's, besides the newest
+  for (int i = 0; i < received; ++i) waiting += isController(endpointOf(batch.from[i])) ? 1 : 0;
+  if (waiting > 0) bridge_.noteLate(waiting * bridge_.cycleTime());
   for (int i = received - 1; i >= 0; --i) {
     const std::uint64_t from = endpointOf(batch.from[i]);
-    const std::uint64_t peer = peer_.load(std::memory_order_relaxed);
-    if (peer != 0 && from != peer) {
+    if (!isController(from)) {
       foreign_.fetch_add(1, std::memory_order_relaxed);
       last_foreign_.store(from, std::memory_order_relaxed);
       continue;
@@ -180,6 +210,7 @@ void FriThread::serve(Batch& batch, int received, std::int64_t now_ns) {
       send_errors_.fetch_add(1, std::memory_order_relaxed);
     answered = true;
     peer_.store(from, std::memory_order_relaxed);
+    bridge_.setControllerHere((from >> 40) == 127 || (from >> 16) == local_);
   }
   if (!answered) return;
 

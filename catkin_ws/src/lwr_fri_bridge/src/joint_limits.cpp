@@ -45,6 +45,20 @@ bool readVector(const std::string& path, const YAML::Node& section, const std::s
   return true;
 }
 
+/// Share by which the servos pass the speed that they are told; 0 if the table does not say.
+double servoOvershoot(const std::string& path, const YAML::Node& root) {
+  const YAML::Node node = root["servo_overshoot"];
+  if (!node) return 0.0;
+  double share = -1.0;
+  try {
+    share = node.as<double>();
+  } catch (const YAML::Exception&) {
+  }
+  if (!(share >= 0.0 && share <= 0.5))
+    fail(path, node.Mark(), "servo_overshoot: expected a number in 0..0.5");
+  return share;
+}
+
 }  // namespace
 
 JointLimits loadJointLimits(const std::string& path, const std::string& profile) {
@@ -117,6 +131,7 @@ JointLimits loadJointLimits(const std::string& path, const std::string& profile)
            std::string(kJointNames[i]) + ": lower_position must be below upper_position");
     }
   }
+  limits.velocity /= 1.0 + servoOvershoot(path, root);
   return limits;
 }
 

@@ -9,5 +9,7 @@ if __name__ == "__main__":
     target = rospy.Publisher("/lwr/target_joint_states", JointState, queue_size=1)
     rate = rospy.Rate(50)
     while not rospy.is_shutdown():
-        target.publish(JointState(velocity=[0.0] * 6 + [0.2]))
+        message = JointState(velocity=[0.0] * 6 + [0.2])
+        message.header.stamp = rospy.Time.now()
+        target.publish(message)
         rate.sleep()

@@ -13,7 +13,7 @@ import unittest
 
 import rospy
 import rostest
-from coglab_msgs.msg import LwrState
+from coglab_msgs.msg import LwrState, ReasonCode
 from coglab_msgs.srv import LwrCommand
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import WrenchStamped
@@ -22,41 +22,8 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent))
+from lwr_node_support import LIMIT, Twist, bound_port, node_binary, refusals, target_message, wait_for
 from udp_controller import UdpController
-
-LIMIT = 20.0  # s, for everything that is waited for
-
-
-def wait_for(condition, what: str, limit: float = LIMIT):
-    end = time.monotonic() + limit
-    while time.monotonic() < end:
-        value = condition()
-        if value:
-            return value
-        time.sleep(0.02)
-    raise AssertionError(f"not within {limit} s: {what}")
-
-
-def bound_port(name: str) -> int:
-    return wait_for(lambda: rospy.get_param(f"{name}/fri_port_bound", 0), f"{name}/fri_port_bound")
-
-
-def node_binary() -> str:
-    return subprocess.check_output(
-        ["catkin_find", "--first-only", "--libexec", "lwr_fri_bridge", "lwr_node"], text=True
-    ).strip()
-
-
-class Twist:
-    """Publishes a target velocity at 50 Hz until stopped."""
-
-    def __init__(self, publisher: rospy.Publisher, velocity: list[float]) -> None:
-        self.message = JointState(velocity=velocity)
-        self.publisher = publisher
-        self.timer = rospy.Timer(rospy.Duration(0.02), lambda _: publisher.publish(self.message))
-
-    def stop(self) -> None:
-        self.timer.shutdown()
 
 
 class LwrNode(unittest.TestCase):
@@ -119,6 +86,7 @@ class LwrNode(unittest.TestCase):
         reply = self.command("jump")
         self.assertFalse(reply.success)
         self.assertIn("known events: start, hold, reset, stop, position", reply.message)
+        self.assertEqual(reply.reason_code, ReasonCode.INVALID_ARGUMENT)
 
     def test_start_move_hold_reset_stop(self) -> None:
         self.assertIn("POSITION", self.ask("start"))
@@ -131,12 +99,14 @@ class LwrNode(unittest.TestCase):
             self.events.publish("hold")
             state = self.wait_state("holding")
             self.assertTrue(state.hold_latched)
-            self.assertIn("reset", state.reason)
+            self.assertTrue(state.reason.endswith("rosservice call /lwr/command reset"), state.reason)
+            self.assertEqual(state.reason_code, ReasonCode.HELD)
             time.sleep(0.5)
             held = self.robot.position[0]
             time.sleep(0.5)
             self.assertEqual(self.robot.position[0], held)
-            self.assertFalse(self.command("start").success)
+            refused = self.command("start")
+            self.assertEqual((refused.success, refused.reason_code), (False, ReasonCode.HELD))
             self.ask("reset")
             wait_for(lambda: self.robot.position[0] > held + 0.05, "motion after reset")
         finally:
@@ -153,15 +123,56 @@ class LwrNode(unittest.TestCase):
         self.ask("start")
         before = list(self.robot.position)
         for message in (
-            JointState(velocity=[0.2] * 6),
-            JointState(velocity=[float("nan")] * 7),
-            JointState(name=["lwr_a1"] * 7, velocity=[0.2] * 7),
-            JointState(name=["a", "b", "c", "d", "e", "f", "g"], velocity=[0.2] * 7),
+            target_message([0.2] * 6),
+            target_message([float("nan")] * 7),
+            target_message([0.2] * 7, name=["lwr_a1"] * 7),
+            target_message([0.2] * 7, name=["a", "b", "c", "d", "e", "f", "g"]),
         ):
             for _ in range(10):
                 self.target.publish(message)
                 time.sleep(0.01)
         self.assertEqual(self.robot.position, before)
+
+    def test_extreme_stamps_are_refused_counted_and_said(self) -> None:
+        told: list[str] = []
+        rospy.Subscriber("/rosout", Log, lambda m: told.append(m.msg))
+        self.ask("start")
+        before, refused = list(self.robot.position), refusals("stamp")
+        now = rospy.Time.now()
+        near = rospy.Duration(3)
+        for stamp in (rospy.Time(0), rospy.Time(1), rospy.Time(4294967295, 999999999), now + near, now - near):
+            for _ in range(4):
+                message = JointState(velocity=[0.2] * 7)
+                message.header.stamp = stamp
+                self.target.publish(message)
+                time.sleep(0.02)
+        wait_for(lambda: refusals("stamp") > refused, "the refusals in the diagnostics")
+        wait_for(lambda: any("header.stamp" in line for line in told), "the reason in the log")
+        self.assertEqual(self.robot.position, before)
+        self.ask("stop")
+
+    def test_what_was_made_before_a_hold_moves_nothing_after_reset(self) -> None:
+        self.ask("start")
+        state = self.wait_state("command")
+        wait_for(lambda: self.states[-1].motion_allowed, "permission")
+        epoch = str(self.states[-1].motion_epoch)
+        late = target_message([0.5] + [0.0] * 6, epoch=epoch)  # on its way while the arm is held
+        unmarked = target_message([0.5] + [0.0] * 6)
+        self.ask("hold")
+        self.ask("reset")
+        state = wait_for(lambda: self.states[-1].motion_allowed and self.states[-1], "permission after reset")
+        self.assertNotEqual(str(state.motion_epoch), epoch)
+        before = list(self.robot.position)
+        # A sender that has not heard of the hold: fresh stamps, the epoch from before.
+        unaware = [target_message([0.5] + [0.0] * 6, epoch=epoch) for _ in range(3)]
+        for message in (late, unmarked, *unaware):
+            self.target.publish(message)
+            time.sleep(0.02)
+        time.sleep(0.2)
+        self.assertEqual(self.robot.position, before)
+        self.target.publish(target_message([0.5] + [0.0] * 6, epoch=str(state.motion_epoch)))
+        wait_for(lambda: self.robot.position[0] > before[0], "motion made after the reset")
+        self.ask("stop")
 
     def test_modes_change_in_monitor_mode_only(self) -> None:
         self.ask("joint_impedance stiffness 500 damping 0.7")
@@ -314,6 +325,51 @@ class LwrNode(unittest.TestCase):
         finally:
             node.send_signal(signal.SIGINT)
             self.assertEqual(node.wait(timeout=LIMIT), 0)
+
+    def test_a_busy_port_is_said_at_once(self) -> None:
+        port = bound_port("/lwr")
+        rospy.set_param("/lwr_eight/fri_port", port)
+        known = subprocess.Popen(
+            [node_binary(), "__name:=lwr_eight", "_lwr_namespace:=/lwr_eight"],
+            env=os.environ, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
+        )
+        # Beside a node that fails for a parameter: what a start and an end cost on this machine now.
+        rospy.set_param("/lwr_nine/fri_port", 70000)
+        began = time.monotonic()
+        self.assertNotEqual(subprocess.run(
+            [node_binary(), "__name:=lwr_nine", "_lwr_namespace:=/lwr_nine"], env=os.environ,
+            stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, timeout=LIMIT).returncode, 0)
+        parameter = time.monotonic() - began
+        told, _ = known.communicate(timeout=LIMIT)
+        busy = time.monotonic() - began
+        self.assertNotEqual(known.returncode, 0)
+        first = next(line for line in told.splitlines() if line.strip())
+        self.assertIn(f":{port} (Address already in use)", first)
+        self.assertLess(busy, parameter + 5.0)  # no time limit of a request is waited for
+
+    def test_a_stall_of_this_computer_is_named_and_ends_by_itself_at_rest(self) -> None:
+        node, robot, twist = self.second_node("lwr_ten")
+        states: list[LwrState] = []
+        subscriber = rospy.Subscriber("/lwr_ten/state", LwrState, states.append)
+        try:
+            twist.stop()
+            wait_for(lambda: robot.steps and max(robot.steps[-200:]) == 0.0, "standing still")
+            wait_for(lambda: states, "a state")
+            epoch = states[-1].motion_epoch
+            robot.silent = True  # its receive_timeout is 2 s here
+            lost = wait_for(lambda: next((s for s in states if s.supervisor == "disconnected"), None), "the loss")
+            self.assertIn("was not run for", lost.reason)
+            robot.silent = False
+            wait_for(lambda: states[-1].motion_allowed, "motion allowed again, unasked")
+            stopped = next(s for s in states if s.supervisor == "stopped")
+            self.assertEqual(stopped.reason_code, ReasonCode.COMPUTER_LATE)
+            self.assertTrue(stopped.reason.endswith("rosservice call /lwr_ten/command start"), stopped.reason)
+            self.assertGreater(states[-1].motion_epoch, epoch)
+            self.assertEqual(states[-1].reason_code, ReasonCode.NONE)
+            self.assertEqual(max(robot.steps[-50:]), 0.0)
+        finally:
+            subscriber.unregister()
+            self.end(node, robot, twist)
 
     def test_parameters_out_of_range_are_refused_at_start(self) -> None:
         for name, value, expected in (

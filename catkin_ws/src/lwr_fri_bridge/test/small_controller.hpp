@@ -29,6 +29,7 @@ class SmallController {
   fri::MeasurementDatagram measure() {
     fri::MeasurementDatagram m{};
     m.header = fri::measurementHeader(++counter_, last_answer_);
+    m.timestamp = static_cast<float>(clock_offset + 1e-9 * static_cast<double>(now_ns_));
     m.state = static_cast<std::uint16_t>(state);
     m.quality = static_cast<std::uint16_t>(quality);
     m.control = static_cast<std::uint16_t>(control);
@@ -83,6 +84,8 @@ class SmallController {
   Vector7 setPoint() const { return own_ + offset_; }
   std::int64_t now() const { return now_ns_; }
   double period() const { return period_; }
+  /// It is not run for so many seconds.
+  void wait(double seconds) { now_ns_ += static_cast<std::int64_t>(std::llround(seconds * 1e9)); }
   void moveOwn(const Vector7& own) { own_ = own; }
   void setMeasured(const Vector7& measured) { measured_ = measured; }
   const Vector7& measured() const { return measured_; }
@@ -95,6 +98,7 @@ class SmallController {
   fri::Quality quality = fri::Quality::Perfect;
   fri::ControlStrategy control = fri::ControlStrategy::Position;
   std::uint16_t power = fri::kAllDrivesOn;
+  double clock_offset = 0.0;  ///< s, of its time stamps
   bool obeys = true;     ///< whether the KRL program runs
   bool blocked = false;  ///< something holds the arm
   fri::CommandDatagram answer{};

@@ -221,7 +221,8 @@ TEST(Bridge, t1ProfileBoundsSpeed) {
   Cell cell(0.005, defaultConfig("t1"));
   cell.start();
   cell.runDriven(400, Vector7::Constant(1.0));
-  EXPECT_NEAR(cell.bridge.snapshot().sample.commanded_velocity.maxCoeff(), 0.24, 1e-9);
+  // The measured arm keeps 0.24: commanded is less by what the servos pass it.
+  EXPECT_NEAR(cell.bridge.snapshot().sample.commanded_velocity.maxCoeff(), 0.24 / 1.04, 1e-9);
 }
 
 }  // namespace

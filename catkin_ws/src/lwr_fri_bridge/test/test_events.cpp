@@ -191,5 +191,13 @@ TEST(Diagnosis, givesAHintWhenQualityIsPoor) {
   EXPECT_NE(diagnoseArm(s, 70.0).text.find("lwr_a4"), std::string::npos);
 }
 
+TEST(Events, aFullQueueIsCountedAndSaid) {
+  Bridge bridge(test::defaultConfig());
+  std::uint32_t last = 0;
+  for (int i = 0; i < 20; ++i) last = bridge.submit("hold");  // nobody serves them
+  EXPECT_EQ(bridge.snapshot().counters.requests_dropped, 5U);
+  EXPECT_EQ(bridge.outcome(last).code, OutcomeCode::NotServed);
+}
+
 }  // namespace
 }  // namespace lwr_fri_bridge

@@ -2,6 +2,7 @@
 /// counters, no times.
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <chrono>
 #include <cstdlib>
 #include <functional>
@@ -26,8 +27,12 @@ namespace {
 
 class Peer {
  public:
-  explicit Peer(int port) : fd_(socket(AF_INET, SOCK_DGRAM, 0)) {
-    to_.sin_family = AF_INET;
+  explicit Peer(int port, std::uint32_t address = INADDR_LOOPBACK)
+      : fd_(socket(AF_INET, SOCK_DGRAM, 0)) {
+    sockaddr_in own{};
+    own.sin_family = to_.sin_family = AF_INET;
+    own.sin_addr.s_addr = htonl(address);
+    bind(fd_, reinterpret_cast<sockaddr*>(&own), sizeof own);
     to_.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
     to_.sin_port = htons(static_cast<std::uint16_t>(port));
     timeval timeout{};
@@ -96,6 +101,66 @@ TEST_F(FriThreadTest, aSecondSenderIsIgnoredAndNamed) {
   EXPECT_TRUE(eventually([&] { return fri.statistics().peer.empty(); }));
   other.send(robot.measure());
   EXPECT_TRUE(other.receive(c));
+}
+
+/// Datagrams that waited because the thread was not run make it late, not the controller silent.
+TEST(FriThreadLate, aLateThreadIsKnownAsTheCauseOfALoss) {
+  Bridge bridge(test::defaultConfig());
+  std::atomic<bool> sleeps{false};
+  FriThreadOptions options = Fixture::options();
+  options.after_answer = [&](bool answered) {
+    if (answered && sleeps.exchange(false))
+      std::this_thread::sleep_for(std::chrono::milliseconds(50));
+  };
+  FriThread fri(bridge, options);
+  fri.start();
+  Peer peer(fri.port());
+  test::SmallController robot(0.005);
+  fri::CommandDatagram c{};
+  const auto exchange = [&] {
+    peer.send(robot.measure());
+    const bool answered = peer.receive(c);
+    robot.take(answered ? &c : nullptr);
+    return answered;
+  };
+  const std::uint32_t ticket = bridge.submit("start");
+  Outcome start;
+  for (int i = 0; i < 200 && start.code == OutcomeCode::Pending; ++i) {
+    ASSERT_TRUE(exchange());
+    start = bridge.outcome(ticket);
+  }
+  ASSERT_TRUE(start.success()) << describe(start);
+  ASSERT_TRUE(exchange());
+  sleeps = true;
+  ASSERT_TRUE(exchange());
+  for (int i = 0; i < 7; ++i) peer.send(robot.measure());
+  robot.state = fri::FriState::Monitor;
+  EXPECT_TRUE(exchange());
+  EXPECT_TRUE(eventually([&] { return bridge.snapshot().fall_backs == 1; }));
+  EXPECT_EQ(bridge.snapshot().loss.cause, LossCause::ComputerLate);
+}
+
+TEST(FriThreadPeer, onlyTheControllersAddressIsAnswered) {
+  Bridge bridge(test::defaultConfig());
+  FriThreadOptions options = Fixture::options();
+  options.controller_address = "127.0.0.2";
+  FriThread fri(bridge, options);
+  fri.start();
+  Peer other(fri.port()), controller(fri.port(), 0x7F000002);
+  test::SmallController robot(0.005);
+  fri::CommandDatagram c{};
+  other.send(robot.measure());  // first and valid, and still not the controller
+  EXPECT_TRUE(eventually([&] { return fri.statistics().foreign == 1; }));
+  controller.send(robot.measure());
+  EXPECT_TRUE(controller.receive(c));
+  EXPECT_TRUE(eventually([&] { return fri.statistics().peer.substr(0, 10) == "127.0.0.2:"; }));
+  EXPECT_EQ(bridge.snapshot().session.accepted, 1U);
+  EXPECT_TRUE(eventually([&] { return fri.statistics().peer.empty(); }));
+  other.send(robot.measure());  // not after a silence either
+  EXPECT_TRUE(eventually([&] { return fri.statistics().foreign == 2; }));
+  options.controller_address = "cabinet";
+  FriThread named(bridge, options);
+  EXPECT_THROW(named.start(), std::runtime_error);
 }
 
 TEST_F(FriThreadTest, rubbishMakesNoPeerAndIsCounted) {

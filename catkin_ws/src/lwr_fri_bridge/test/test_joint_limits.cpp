@@ -47,8 +47,19 @@ TEST(JointLimits, readsTheTableAndItsProfiles) {
   EXPECT_NEAR(full.lower_position[1], -2.0943951, 1e-6);
   EXPECT_DOUBLE_EQ(full.torque[6], 38.0);
   const JointLimits t1 = loadJointLimits(LIMITS_FILE, "t1");
-  EXPECT_DOUBLE_EQ(t1.velocity[0], 0.24);
+  // What is commanded leaves the servos room to pass it.
+  EXPECT_DOUBLE_EQ(t1.velocity[0], 0.24 / 1.04);
+  EXPECT_DOUBLE_EQ(full.velocity[0], 1.919862177193763 / 1.04);
   EXPECT_EQ(t1.upper_position, full.upper_position);
+}
+
+TEST(JointLimits, aTableWithoutServoOvershootIsCommandedInFull) {
+  EXPECT_EQ(errorFor(replaced(original(), "servo_overshoot: 0.04", "")), "");
+  for (const char* bad : {"-0.1", "0.6", "much", ".nan", "[0.04]"}) {
+    const std::string error =
+        errorFor(replaced(original(), "overshoot: 0.04", std::string("overshoot: ") + bad));
+    EXPECT_NE(error.find("servo_overshoot: expected a number in 0..0.5"), std::string::npos) << bad;
+  }
 }
 
 TEST(JointLimits, errorsNameFileLineAndField) {

@@ -28,6 +28,7 @@ class UdpController:
         self._socket.bind(("127.0.0.1", 0))
         self._finished = self._counter = self._reflected = 0
         self._running = True
+        self._began = time.monotonic()
         self._thread = threading.Thread(target=self._run, daemon=True)
 
     @property
@@ -62,6 +63,7 @@ class UdpController:
                         "reflected": self._reflected,
                         "size": 916,
                         "id": 0x2006,
+                        "timestamp": time.monotonic() - self._began,
                         "state": self.state,
                         "quality": 3,
                         "control": self.control,

@@ -1,5 +1,6 @@
 // The controller manager as a node of its own (split:=true), over joint_states and
 // target_joint_states.
+#include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <csignal>
@@ -37,6 +38,8 @@ int main(int argc, char** argv) {
     std::atomic<coglab_controllers::ManagerRos*> ready{nullptr};
     coglab_controllers::ManagerRos::Options options;
     options.publish_target = false;
+    // Both may run on one computer, and the answers to the robot come first.
+    options.highest_priority = std::max(0, robot.param("rt_priority", 80) - 1);
     options.thread.after_cycle = [&](const lwr_fri_bridge::VelocityCommand& command) {
       // Without an active controller others may use the topic.
       const auto* manager = ready.load(std::memory_order_acquire);

@@ -40,6 +40,12 @@ ManagerRos::ManagerRos(const ros::NodeHandle& node, lwr_fri_bridge::ControlPort&
   ManagerSettings settings = readManagerSettings(node_);
   settings.logger = logger_.get();
   options_.thread.priority = node_.param("priority", options_.thread.priority);
+  if (options_.thread.priority > options_.highest_priority) {
+    ROS_WARN("controller_manager: priority %d is kept to %d, below that of the FRI thread "
+             "(lwr/rt_priority)",
+             options_.thread.priority, options_.highest_priority);
+    options_.thread.priority = options_.highest_priority;
+  }
   manager_ = std::make_unique<ControllerManager>(std::move(settings));
   for (const std::string& error : manager_->feedbackErrors()) {
     ROS_ERROR("feedback controllers: %s", error.c_str());

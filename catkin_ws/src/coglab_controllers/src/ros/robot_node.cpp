@@ -28,7 +28,6 @@ int main(int argc, char** argv) {
   try {
     ros::NodeHandle root;
     ros::NodeHandle lwr("lwr");
-    // The FRI thread starts after this pointer is set and ends before it goes.
     std::atomic<coglab_controllers::ControlThread*> control{nullptr};
     lwr_fri_bridge::BridgeRos::Options bridge_options;
     bridge_options.one_process = true;
@@ -36,20 +35,23 @@ int main(int argc, char** argv) {
       if (auto* thread = control.load(std::memory_order_acquire)) thread->wake(answered);
     };
     lwr_fri_bridge::BridgeRos bridge(lwr, bridge_options);
+    bridge.start();
 
     coglab_controllers::ManagerRos::Options options;
     options.target = lwr.advertise<sensor_msgs::JointState>("target_joint_states", 10);
     options.controller_active = [&bridge](bool active) { bridge.setControllerActive(active); };
+    options.highest_priority = bridge.priorityBelow();
     coglab_controllers::ManagerRos manager(ros::NodeHandle("controller_manager"), bridge.port(),
                                            options);
+    // However this scope ends: the bridge brakes and leaves command mode while the control thread
+    // still runs, and the FRI thread, which wakes the control thread, ends before the manager goes.
+    const std::shared_ptr<void> ends_first(nullptr, [&bridge](void*) { bridge.shutdown(); });
     control.store(&manager.controlThread(), std::memory_order_release);
     manager.start();
-    bridge.start();
     while (ros::ok() && asked_to_end == 0) {
       std::this_thread::sleep_for(std::chrono::milliseconds(20));
     }
-    bridge.shutdown();  // brakes and leaves command mode while the control thread still answers
-    control.store(nullptr, std::memory_order_release);
+    bridge.shutdown();
     lwr_fri_bridge::endProcessWithin(std::chrono::seconds(1));
     bridge.unregister();
     manager.shutdown();

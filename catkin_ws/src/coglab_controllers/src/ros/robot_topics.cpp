@@ -6,8 +6,9 @@
 #include <utility>
 #include <vector>
 
-#include "coglab_controllers/plugins/goal_source.hpp"
-#include "coglab_controllers/ros/ros_clocks.hpp"
+#include "lwr_fri_bridge/reason_codes.hpp"
+#include "lwr_fri_bridge/ros_time.hpp"
+#include "lwr_fri_bridge/target_command.hpp"
 
 namespace coglab_controllers {
 
@@ -31,15 +32,6 @@ bool inWireOrder(const std::vector<std::string>& names, const std::vector<double
   return true;
 }
 
-MotionBlock blockOf(const coglab_msgs::LwrState& state) {
-  if (state.motion_allowed) return MotionBlock::None;
-  if (state.hold_latched) return MotionBlock::Held;
-  if (state.supervisor == "disconnected") return MotionBlock::Disconnected;
-  if (state.supervisor == "monitor") return MotionBlock::Monitor;
-  if (state.supervisor == "stopping") return MotionBlock::Stopping;
-  return MotionBlock::NotStarted;
-}
-
 }  // namespace
 
 RobotTopics::RobotTopics(const ros::NodeHandle& node, const lwr_fri_bridge::JointLimits& limits,
@@ -56,14 +48,16 @@ RobotTopics::RobotTopics(const ros::NodeHandle& node, const lwr_fri_bridge::Join
 }
 
 void RobotTopics::onJoints(const sensor_msgs::JointState& joints) {
-  const std::int64_t stamp = toSteady(joints.header.stamp);
-  // One from the future would be newer than all that come after it.
-  if (stamp <= last_stamp_ns_ || stamp - steadyNow() > kClockTolerance_ns ||
+  const std::int64_t stamp = lwr_fri_bridge::steadyTime(joints.header.stamp);
+  const std::int64_t ahead = -lwr_fri_bridge::ageOf(joints.header.stamp);
+  // One stamp from the future would make all that follow look old.
+  if (stamp <= last_stamp_ns_ || ahead > lwr_fri_bridge::kFutureAllowance_ns ||
       !inWireOrder(joints.name, joints.position, sample_.position)) {
-    ROS_WARN_THROTTLE(1.0,
-                      "joint_states refused: expected a new stamp not ahead of the clock, and finite "
-                      "positions of %zu arm joints",
-                      kJoints.size());
+    ROS_WARN_THROTTLE(
+        1.0,
+        "joint_states refused: expected a stamp newer than the last one and not ahead of the "
+        "clock, and finite positions of %zu arm joints",
+        kJoints.size());
     return;
   }
   if (!inWireOrder(joints.name, joints.velocity, sample_.velocity)) sample_.velocity.setZero();
@@ -89,9 +83,9 @@ void RobotTopics::onJoints(const sensor_msgs::JointState& joints) {
 }
 
 void RobotTopics::onState(const coglab_msgs::LwrState& state) {
-  const MotionBlock block = blockOf(state);
-  if (sample_.block == MotionBlock::None && block != MotionBlock::None) ++sample_.motion_epoch;
-  sample_.block = block;
+  sample_.block = state.motion_allowed ? MotionBlock::None
+                                       : lwr_fri_bridge::motionBlockOf(state.reason_code);
+  sample_.motion_epoch = state.motion_epoch;
 }
 
 void RobotTopics::onTorques(const sensor_msgs::JointState& torques) {
@@ -108,7 +102,10 @@ void RobotTopics::onWrench(const geometry_msgs::WrenchStamped& wrench) {
 
 void RobotTopics::send(const lwr_fri_bridge::VelocityCommand& command) {
   sent_.write(command);
-  target_message_.header.stamp = ros::Time::now();
+  // Age and permission of the joint state that the velocity was computed from: a message that was
+  // late, or made before a hold, is known by them.
+  target_message_.header.stamp = lwr_fri_bridge::rosTime(command.stamp_ns);
+  target_message_.header.frame_id = std::to_string(command.motion_epoch);
   for (int joint = 0; joint < 7; ++joint) {
     target_message_.velocity[static_cast<std::size_t>(joint)] = command.velocity[joint];
   }

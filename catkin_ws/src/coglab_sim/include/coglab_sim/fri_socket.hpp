@@ -10,10 +10,10 @@ namespace coglab_sim {
 
 class FriSocket {
  public:
-  /// Opens a socket on a free port; peers are reached at `host` (an IPv4 address), for 127.x.x.x on
-  /// the loopback interface only.
-  /// @throws std::runtime_error naming the address and the system's reason.
-  explicit FriSocket(const std::string& host);
+  /// Opens a socket on `source_port` (0: any free one); peers are reached at `host` (an IPv4
+  /// address), for 127.x.x.x on the loopback interface only.
+  /// @throws std::runtime_error naming address, port and the system's reason.
+  explicit FriSocket(const std::string& host, std::uint16_t source_port = 0);
   ~FriSocket();
   FriSocket(const FriSocket&) = delete;
   FriSocket& operator=(const FriSocket&) = delete;

@@ -5,6 +5,7 @@
 #include <atomic>
 #include <functional>
 #include <future>
+#include <memory>
 #include <mutex>
 #include <string>
 #include <thread>
@@ -36,9 +37,10 @@ struct CellSnapshot {
 class RealTimeCell {
  public:
   /// @param factor  simulated over real time, 0.01 .. 100
+  /// @param source_port  from which the controller sends, 0: any free one
   /// @throws what Cell and FriSocket throw, std::invalid_argument for the factor
   RealTimeCell(const CellConfig& config, const std::string& host, std::uint16_t port,
-               double factor);
+               double factor, std::uint16_t source_port = 0);
   ~RealTimeCell();
   RealTimeCell(const RealTimeCell&) = delete;
   RealTimeCell& operator=(const RealTimeCell&) = delete;
@@ -52,9 +54,11 @@ class RealTimeCell {
   void setHuman(const HumanInput& human);
   void setFingers(const FingerInput& fingers);
   void setPush(const Wrench& push);
-  /// Runs `action` between two periods. @throws what it throws, std::runtime_error if the thread
-  /// does not get to it in 1 s.
-  void apply(std::function<void(Cell&)> action);
+  /// Runs `action` between two periods. It has to own what it uses: when the thread has begun with
+  /// it but does not end it in time, it may outlive the call. @throws what it throws,
+  /// std::runtime_error if the thread does not get to it within `limit` s; then it is withdrawn and
+  /// never runs.
+  void apply(std::function<void(Cell&)> action, double limit = 1.0);
   /// Runs `action` after so many simulated seconds.
   void applyLater(double delay, std::function<void(Cell&)> action);
 
@@ -65,6 +69,10 @@ class RealTimeCell {
   std::string failure() const;
 
  private:
+  struct Action {
+    std::packaged_task<void(Cell&)> task;
+    std::atomic<bool> taken{false};  // by the thread, or back by who asked
+  };
   struct Delayed {
     double time;
     std::function<void(Cell&)> action;
@@ -85,7 +93,7 @@ class RealTimeCell {
   HumanInput human_;
   FingerInput fingers_{};
   Wrench push_;
-  std::vector<std::packaged_task<void(Cell&)>> actions_;
+  std::vector<std::shared_ptr<Action>> actions_;
   std::vector<Delayed> delayed_;
   CellSnapshot snapshot_;
   std::vector<TickRecord> records_;

@@ -11,9 +11,6 @@ using fri::FriState;
 
 namespace {
 
-constexpr std::size_t kMessageWindow = 200;
-constexpr double kShortestPeriod = 0.001, kLongestPeriod = 0.1;  // s
-
 void requireRange(const char* name, double value, double low, double high) {
   if (value >= low && value <= high) return;
   throw std::invalid_argument(std::string("parameter ") + name + " is " + std::to_string(value) +
@@ -34,6 +31,7 @@ const Parameters& checked(const Parameters& p) {
   requireRange("frame_speed_limit", p.frame_speed_limit, 0.0, 100.0);
   requireRange("frame_turn_limit", p.frame_turn_limit, 0.0, 100.0);
   requireRange("frame_orthonormality", p.frame_orthonormality, 1e-6, 0.1);
+  requireRange("close_linger", p.close_linger, 0.0, 600.0);
   requireRange("drive_heating_time", p.drive_heating_time, 1.0, 1e6);
   return p;
 }
@@ -46,8 +44,14 @@ Controller::Controller(const Parameters& parameters, const ArmParameters& arm,
       arm_parameters_(arm),
       statistics_(parameters_),
       program_(makeKrlProgram(parameters.convention)),
+      joint_stiffness_(Vector7::Constant(parameters.joint_stiffness)),
+      joint_damping_(Vector7::Constant(parameters.damping)),
+      frame_damping_(Vector6::Constant(parameters.damping)),
       own_(position),
-      temperature_(Vector7::Constant(parameters.ambient_temperature)) {}
+      temperature_(Vector7::Constant(parameters.ambient_temperature)) {
+  frame_stiffness_ << Vector3d::Constant(parameters.frame_stiffness),
+      Vector3d::Constant(parameters.rotation_stiffness);
+}
 
 // ----------------------------------------------------------------------------------------------------------------
 // wire
@@ -177,7 +181,8 @@ fri::MeasurementDatagram Controller::measure(const ArmDynamics& arm, const ArmSi
   measured_once_ = true;
   m.krl = krl_out_;
   m.timestamp = static_cast<float>(time_);
-  m.state = static_cast<std::uint16_t>(state_);
+  // Measurements that follow friClose still say monitor mode: OFF is never on the wire.
+  m.state = static_cast<std::uint16_t>(state_ == FriState::Command ? state_ : FriState::Monitor);
   m.quality = static_cast<std::uint16_t>(statistics_.quality());
   m.measurement_period = m.command_period = static_cast<float>(parameters_.period);
   m.safety_scale = static_cast<float>(start_scale_);
@@ -232,17 +237,15 @@ ServoCommand Controller::servoCommand() const {
   const auto given = [&](std::uint32_t flag) { return active && (flags_ & flag) != 0; };
   ServoCommand servo;
   servo.strategy = strategy_;
-  const Parameters& p = parameters_;
   servo.stiffness = given(fri::kJointStiffness) ? fri::jointsFromWire(latched_.joint_stiffness)
-                                                : Vector7::Constant(p.joint_stiffness);
-  servo.damping = given(fri::kJointDamping) ? fri::jointsFromWire(latched_.joint_damping)
-                                            : Vector7::Constant(p.damping);
+                                                : joint_stiffness_;
+  servo.damping =
+      given(fri::kJointDamping) ? fri::jointsFromWire(latched_.joint_damping) : joint_damping_;
   if (given(fri::kJointTorque)) servo.torque = fri::jointsFromWire(latched_.joint_torque);
-  servo.frame_stiffness << Vector3d::Constant(p.frame_stiffness),
-      Vector3d::Constant(p.rotation_stiffness);
+  servo.frame_stiffness = frame_stiffness_;
   if (given(fri::kCartesianStiffness))
     servo.frame_stiffness = fri::wrenchFromWire(latched_.cartesian_stiffness);
-  servo.frame_damping.setConstant(p.damping);
+  servo.frame_damping = frame_damping_;
   if (given(fri::kCartesianDamping))
     servo.frame_damping = fri::wrenchFromWire(latched_.cartesian_damping);
   if (given(fri::kCartesianForce)) servo.force = fri::wrenchFromWire(latched_.cartesian_force);
@@ -333,6 +336,7 @@ void Controller::restartProgram(double period, double pause) {
   requireRange("period", period, kShortestPeriod, kLongestPeriod);
   if (!(pause >= 0.0)) throw std::invalid_argument("pause must not be negative");
   friClose();
+  lingers_until_ = time_;  // the program was cancelled and did not run to its end
   parameters_.period = period;
   program_ = makeKrlProgram(parameters_.convention);
   krl_out_ = {};
@@ -344,92 +348,6 @@ void Controller::setOperatingMode(OperatingMode mode) {
   // Turning the key switch stops a running program's motion.
   if (state_ == FriState::Command) leaveCommandMode("operating mode changed");
   parameters_.mode = mode;
-}
-
-// -----------------------------------------------------------------------------------------------------------------
-// KRL
-
-void Controller::setToBool(int index, bool value) {
-  const auto bit = static_cast<std::uint16_t>(1U << (index - 1));
-  krl_out_.bools = static_cast<std::uint16_t>(value ? krl_out_.bools | bit : krl_out_.bools & ~bit);
-}
-
-bool Controller::setKrlStrategy(int strategy) {
-  if (strategy != 10 && strategy != 20 && strategy != 30) {
-    show("$STIFFNESS.STRATEGY " + std::to_string(strategy) + " unknown, expected 10, 20 or 30");
-    return false;
-  }
-  if (state_ == FriState::Command) {
-    show("$STIFFNESS.STRATEGY cannot change in command mode");
-    return false;
-  }
-  strategy_ = static_cast<ControlStrategy>(strategy / 10);
-  return true;
-}
-
-void Controller::friOpen(double period) {
-  if (state_ != FriState::Off) return;
-  if (period > 0.0) {
-    if (!(period >= kShortestPeriod && period <= kLongestPeriod)) {
-      show("friOpen: period " + std::to_string(period) + " s is not in 0.001 .. 0.1");
-      return;
-    }
-    parameters_.period = period;
-  }
-  state_ = FriState::Monitor;
-  statistics_.clear();
-  measured_once_ = false;
-}
-
-FriState Controller::friStart(double scale) {
-  if (state_ != FriState::Monitor) return state_;
-  start_scale_ = std::fmin(std::fmax(scale, 0.0), 1.0);
-  if (power() != fri::kAllDrivesOn) {
-    show("friStart: drives not ready");
-  } else if (static_cast<int>(statistics_.quality()) < parameters_.entry_quality) {
-    show(std::string("friStart: quality too low, answer rate ") +
-         std::to_string(statistics_.answerRate()));
-  } else if (!answered_) {
-    show("friStart: no answer in time");
-  } else if (const std::string fault = checkEntry(checkContext(), answer_); !fault.empty()) {
-    leaveCommandMode(fault);
-  } else {
-    state_ = FriState::Command;
-    flags_ = answer_.flags;
-    missed_in_row_ = 0;
-    entry_pending_ = false;
-    follow(answer_);
-    last_step_.setZero();
-  }
-  return state_;
-}
-
-void Controller::friStop() {
-  if (state_ == FriState::Command) state_ = FriState::Monitor;
-  last_step_.setZero();
-}
-
-void Controller::friClose() {
-  friStop();
-  state_ = FriState::Off;
-}
-
-void Controller::nudge() {
-  if (error_latched_) {
-    if (!parameters_.acknowledge_by_program) {
-      show("acknowledgement required");
-      return;
-    }
-    acknowledge();
-  }
-  if (drives_on_ || drives_on_at_ >= 0.0) return;
-  drives_on_at_ = time_ + parameters_.power_up + parameters_.brake_release;
-}
-
-void Controller::show(const std::string& message) {
-  messages_.push_back({time_, message});
-  if (messages_.size() > kMessageWindow) messages_.pop_front();
-  ++message_count_;
 }
 
 }  // namespace coglab_sim::krc

@@ -15,6 +15,7 @@
 #include "lwr_fri_bridge/braking.hpp"
 #include "lwr_fri_bridge/bridge_config.hpp"
 #include "lwr_fri_bridge/cartesian_set_point.hpp"
+#include "lwr_fri_bridge/command_mode_loss.hpp"
 #include "lwr_fri_bridge/fri/session.hpp"
 #include "lwr_fri_bridge/set_point_leash.hpp"
 #include "lwr_fri_bridge/spsc_queue.hpp"
@@ -44,12 +45,14 @@ struct BridgeCounters {
 /// Everything there is to show, copied at the end of each tick.
 struct Snapshot {
   RobotSample sample;
+  std::int64_t permission_since_ns = 0;  ///< when sample.motion_epoch began
   fri::SessionCounters session;
   BridgeCounters counters;
   SupervisorState supervisor = SupervisorState::Disconnected;
   bool hold_latched = false;
   bool request_busy = false;
   std::uint32_t fall_backs = 0;
+  CommandModeLoss loss;  ///< of command mode since the last start
   fri::FriState state = fri::FriState::Off;
   fri::Quality quality = fri::Quality::Unacceptable;
   fri::ControlStrategy control = fri::ControlStrategy::Other;  ///< as the controller reports it
@@ -69,6 +72,8 @@ struct StateView {
   MotionBlock block = MotionBlock::Disconnected;
   bool hold_latched = false;
   std::int8_t blocking_joint = -1;
+  std::uint32_t motion_epoch = 0;  ///< as in RobotSample
+  CommandModeLoss loss;            ///< of command mode since the last start
   fri::FriState state = fri::FriState::Off;
   fri::Quality quality = fri::Quality::Unacceptable;
   fri::ControlStrategy control = fri::ControlStrategy::Other;
@@ -101,6 +106,11 @@ class Bridge {
   /// To be called when no datagram came for some time: time limits go on, silence becomes
   /// `disconnected`.
   void idle(std::int64_t now_ns);
+
+  /// The FRI thread came `seconds` too late to the datagram that it takes next, or to its time-out.
+  void noteLate(double seconds) { watch_.late(seconds); }
+  /// Whether the controller runs on this computer: then its silence is this computer's doing.
+  void setControllerHere(bool here) { watch_.setControllerHere(here); }
 
   /// Whether datagrams have come within the receive time limit, as of the last answer() or idle().
   bool connected() const { return connected_; }
@@ -179,11 +189,14 @@ class Bridge {
   ControlMode wanted_mode_;  // for the next start
   ControlMode active_mode_;  // latched on leaving monitor mode
   RobotSample sample_;
+  CommandModeWatch watch_;
+  CommandModeLoss loss_;
   BridgeCounters counters_;
   VelocityCommand valid_command_;
   std::array<Sent, 64> sent_{};
   std::int64_t last_receive_ns_ = 0;
   std::int64_t stop_began_ns_ = 0;
+  std::int64_t permission_since_ns_ = 0;
   std::uint32_t stop_ticket_ = 0;
   unsigned bounded_joints_ = 0;
   bool connected_ = false;
@@ -202,6 +215,7 @@ class Bridge {
   // other threads
   std::mutex mutex_;
   std::uint32_t next_ticket_ = 1;
+  std::uint64_t requests_dropped_ = 0;
   std::map<std::uint32_t, Outcome> ended_;
 };
 

@@ -27,6 +27,7 @@
 namespace lwr_fri_bridge {
 
 class BridgeDiagnostics;
+class TargetTopic;
 
 /// Reads the parameters of the bridge from the namespace of `nh` (README: table of parameters).
 /// @throws std::exception naming parameter, value and range, or file, line and field of the limits
@@ -56,8 +57,9 @@ class BridgeRos {
   BridgeRos(const BridgeRos&) = delete;
   BridgeRos& operator=(const BridgeRos&) = delete;
 
-  /// Binds the socket, sets the parameter fri_port_bound, starts all threads. @throws
-  /// std::runtime_error if it cannot bind.
+  /// Binds the socket, sets the parameter fri_port_bound, starts all threads. All or nothing: when
+  /// it throws, no thread runs and after_answer is called no more. @throws std::runtime_error if it
+  /// cannot bind, std::exception naming a parameter that is out of range.
   void start();
 
   /// Brakes, requests monitor mode, keeps answering until it comes or its time limit is over, then
@@ -70,27 +72,25 @@ class BridgeRos {
   Bridge& bridge() { return bridge_; }
   ControlPort& port() { return bridge_.port(); }
   int boundPort() const { return fri_thread_.port(); }
+  /// Highest SCHED_FIFO priority of threads that must not delay the FRI thread, after start(); 0:
+  /// none, because it has none itself.
+  int priorityBelow();
 
   /// One process only: whether the control thread's velocities count (true) or those of
   /// target_joint_states (false).
   void setControllerActive(bool active);
 
-  /// Messages on target_joint_states that were refused: not valid / a controller of this process is
-  /// active / another publisher's velocities are followed at present / motion is not allowed.
-  struct Refused {
-    std::uint64_t invalid = 0, controller_active = 0, second_publisher = 0, not_allowed = 0;
-  };
-  Refused refused() const;
-
  private:
   friend class BridgeDiagnostics;
 
-  void onTarget(const ros::MessageEvent<const sensor_msgs::JointState>& event);
+  void startThreads();
+  void endThreads();
   void onEvent(const std_msgs::String& message);
   bool onCommand(coglab_msgs::LwrCommand::Request& request,
                  coglab_msgs::LwrCommand::Response& response);
   void publishLoop();
   void publishSample(const Snapshot& snapshot);
+  void restartQuietly(const Snapshot& now);
   void publishState(const StateView& view);
   void reportOutcomes();
 
@@ -102,7 +102,8 @@ class BridgeRos {
   std::unique_ptr<ros::AsyncSpinner> spinner_;
   std::unique_ptr<BridgeDiagnostics> diagnostics_;
   ros::Publisher joint_states_, external_torques_, tool_wrench_, state_;
-  ros::Subscriber target_, events_;
+  std::unique_ptr<TargetTopic> target_;
+  ros::Subscriber events_;
   ros::ServiceServer command_;
   ros::Timer diagnostics_timer_;
   BoundedThread publisher_;
@@ -113,12 +114,9 @@ class BridgeRos {
   std::uint64_t published_sequence_ = 0;
   std::atomic<bool> stopping_{false};
   std::atomic<bool> closing_{false};  // the node ends: nothing is asked of the arm any more
-  std::atomic<bool> controller_active_{false};
   bool started_ = false;
-  std::atomic<std::uint64_t> refused_invalid_{0}, refused_active_{0}, refused_second_{0},
-      refused_blocked_{0};
-  std::string target_publisher_;      // whose velocities were followed last
-  std::int64_t target_stamp_ns_ = 0;  // when; both only in the callback of target_joint_states
+  bool restarts_quietly_ = true;
+  QuietRestart quiet_restart_;  // publisher thread
   std::mutex tickets_mutex_;
   std::vector<std::uint32_t> tickets_;  // of ros_events, whose outcomes go to the log
   sensor_msgs::JointState joint_message_, torque_message_;

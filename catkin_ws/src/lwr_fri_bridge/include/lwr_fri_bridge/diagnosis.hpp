@@ -26,9 +26,12 @@ Diagnosis diagnoseConnection(const Snapshot& snapshot, const FriThreadStatistics
 /// is not allowed.
 Diagnosis diagnoseArm(const Snapshot& snapshot, double hot);
 
-/// Why motion is not allowed at the moment, in words, naming the joint if one is the reason; empty
-/// if it is allowed.
-std::string reasonOf(MotionBlock block, int joint);
+/// Why motion is not allowed at the moment, in words, naming the joint if one is the reason, and
+/// how command mode was lost if it was; empty if motion is allowed.
+std::string reasonOf(MotionBlock block, int joint, const CommandModeLoss& loss = {});
+
+/// The event that takes the reason away, such as "start"; empty if none does.
+const char* wayOut(MotionBlock block);
 
 /// Joint names in wire order.
 extern const char* const kJointNames[7];

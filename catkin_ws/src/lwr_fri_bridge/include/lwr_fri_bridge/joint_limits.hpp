@@ -13,7 +13,7 @@ namespace lwr_fri_bridge {
 struct JointLimits {
   Vector7 lower_position;  ///< rad
   Vector7 upper_position;  ///< rad, above lower_position
-  Vector7 velocity;        ///< rad/s
+  Vector7 velocity;        ///< rad/s, largest to command: the table's over 1 + servo_overshoot
   Vector7 acceleration;    ///< rad/s^2
   Vector7 jerk;            ///< rad/s^3
   Vector7 torque;          ///< Nm

@@ -19,8 +19,9 @@ std::string enterRealTime(int priority);
 /// failed and what to do.
 std::string lockMemory();
 
-/// A thread with a bounded stack that is touched once before it runs, so that locked memory stays
-/// small and no page fault comes later. Not copyable; the owner must join().
+/// A thread with a bounded stack, the half of which that it uses first is touched once before it
+/// runs, so that locked memory stays small and no page fault comes later. Not copyable; the owner
+/// must join().
 class BoundedThread {
  public:
   BoundedThread() = default;

@@ -6,8 +6,8 @@
 namespace lwr_fri_bridge::fri {
 namespace {
 
-constexpr std::array<const char*, 5> kNames = {"coglab", "centro_epiaggio", "stanford", "rcprg_tum",
-                                               "rtt_lwr"};
+constexpr std::array<const char*, 6> kNames = {"coglab",    "centro_epiaggio", "stanford",
+                                               "rcprg_tum", "rtt_lwr",         "openkc"};
 
 // KRL counts from 1.
 std::int32_t& intAt(UserData& data, int krl_index) { return data.ints[krl_index - 1]; }
@@ -23,7 +23,38 @@ void setBool(UserData& data, int krl_index, bool value) {
 
 bool isRequest(KrlPhase phase) { return phase == KrlPhase::Start || phase == KrlPhase::Stop; }
 
+/// The command of openkc that is next in this phase; 0: none is left.
+std::int32_t openKcCommand(const KrlRequest& request) {
+  constexpr std::int32_t kStart = 1, kStop = 2, kCartesian = 6, kJoint = 7, kPosition = 9;
+  if (request.phase == KrlPhase::Stop) return request.acknowledged == 0 ? kStop : 0;
+  if (request.phase != KrlPhase::Start) return 0;
+  if (request.acknowledged == 1) return kStart;
+  if (request.acknowledged > 1) return 0;
+  switch (request.strategy) {
+    case ControlStrategy::CartesianImpedance:
+      return kCartesian;
+    case ControlStrategy::JointImpedance:
+      return kJoint;
+    default:
+      return kPosition;
+  }
+}
+
 }  // namespace
+
+void stepRequest(KrlConvention convention, KrlRequest& request, const UserData& from) {
+  if (convention != KrlConvention::OpenKc) return;
+  const std::int32_t command = openKcCommand(request);
+  const bool answers = boolAt(from, 1);
+  if (request.asserted && answers && command != 0 && intAt(from, 15) == command) {
+    ++request.acknowledged;
+    request.asserted = false;
+  } else if (command == 0) {
+    request.asserted = false;
+  } else if (!answers) {
+    request.asserted = true;
+  }
+}
 
 void writeRequest(KrlConvention convention, const KrlRequest& request, UserData& to) {
   const std::int32_t strategy = 10 * static_cast<std::int32_t>(request.strategy);
@@ -57,6 +88,10 @@ void writeRequest(KrlConvention convention, const KrlRequest& request, UserData&
       intAt(to, 2) = strategy;
       intAt(to, 3) = request.tool;
       break;
+    case KrlConvention::OpenKc:
+      setBool(to, 1, request.asserted);
+      intAt(to, 16) = request.asserted ? openKcCommand(request) : 0;
+      break;
   }
 }
 
@@ -77,6 +112,7 @@ KrlReply readReply(KrlConvention convention, const KrlRequest& request, const Us
     case KrlConvention::CentroEpiaggio:
     case KrlConvention::Stanford:
     case KrlConvention::RttLwr:
+    case KrlConvention::OpenKc:
       break;  // they show the mode they are in and nothing about a request
   }
   return reply;

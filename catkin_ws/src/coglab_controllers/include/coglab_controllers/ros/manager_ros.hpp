@@ -42,6 +42,7 @@ class ManagerRos {
     bool publish_target = true;
     ros::Publisher target;  ///< lwr/target_joint_states
     ControlThreadOptions thread;
+    int highest_priority = 99;  ///< the control thread's is kept to it: below the FRI thread's
     /// Told when a controller becomes the active one (true) for the first time.
     std::function<void(bool)> controller_active;
   };

@@ -68,7 +68,8 @@ class Controller : private KrlInterface {
 
   bool brakesWanted() const { return !drives_on_; }
   bool sends() const {
-    return state_ != lwr_fri_bridge::fri::FriState::Off && silent_until_ <= time_;
+    const bool open = state_ != lwr_fri_bridge::fri::FriState::Off || time_ < lingers_until_;
+    return open && silent_until_ <= time_;
   }
 
   // What people and faults do to a controller
@@ -115,6 +116,8 @@ class Controller : private KrlInterface {
   void friStop() override;
   void friClose() override;
   void nudge() override;
+  void setJointImpedance(const Vector7& stiffness, const Vector7& damping) override;
+  void setCartesianImpedance(const Vector6& stiffness, const Vector6& damping) override;
   void show(const std::string& message) override;
 
   CheckContext checkContext() const;
@@ -131,10 +134,14 @@ class Controller : private KrlInterface {
   AnswerStatistics statistics_;
   std::unique_ptr<KrlProgram> program_;
   double time_ = 0.0, krl_due_ = 0.0, silent_until_ = 0.0;
+  double lingers_until_ = 0.0;  // measurements go on after friClose
 
   lwr_fri_bridge::fri::FriState state_ = lwr_fri_bridge::fri::FriState::Off;
   lwr_fri_bridge::fri::ControlStrategy strategy_ = lwr_fri_bridge::fri::ControlStrategy::Position;
   double start_scale_ = 1.0;
+  // $STIFFNESS: what counts where the PC gives no value.
+  Vector7 joint_stiffness_, joint_damping_;
+  Vector6 frame_stiffness_, frame_damping_;
   double opens_at_ = 0.0;  // the program is not started again before
 
   // Wire

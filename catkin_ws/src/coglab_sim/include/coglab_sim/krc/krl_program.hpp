@@ -31,6 +31,9 @@ class KrlInterface {
   virtual int krlStrategy() const = 0;  ///< `$STIFFNESS.STRATEGY`: 10, 20 or 30
   virtual bool setKrlStrategy(
       int strategy) = 0;  ///< false, with a message, if unknown or not in monitor mode
+  /// Defaults of $STIFFNESS, for values that the PC does not give: Nm/rad, N/m; damping normalised.
+  virtual void setJointImpedance(const Vector7& stiffness, const Vector7& damping) = 0;
+  virtual void setCartesianImpedance(const Vector6& stiffness, const Vector6& damping) = 0;
   virtual bool drivesReady() const = 0;  ///< power on all joints and brakes open
 
   virtual void friOpen(double period) = 0;  ///< OFF -> MON; a period <= 0 keeps the present one
@@ -58,7 +61,7 @@ std::unique_ptr<KrlProgram> makeKrlProgram(KrlConvention convention);
 
 /// @throws std::invalid_argument naming the known conventions.
 KrlConvention krlConventionOf(const std::string& name);
-/// coglab, centro_epiaggio, stanford, rcprg_tum, rtt_lwr, kuka_sample
+/// coglab, centro_epiaggio, stanford, rcprg_tum, rtt_lwr, openkc, kuka_sample
 std::string nameOf(KrlConvention convention);
 
 }  // namespace coglab_sim::krc

@@ -15,7 +15,9 @@ enum class OperatingMode { T1, T2, Automatic };
 
 /// Which KRL program runs on the controller, i.e. how PC and program talk through the exchange
 /// arrays.
-enum class KrlConvention { Coglab, CentroEpiaggio, Stanford, RcprgTum, RttLwr, KukaSample };
+enum class KrlConvention { Coglab, CentroEpiaggio, Stanford, RcprgTum, RttLwr, OpenKc, KukaSample };
+
+constexpr double kShortestPeriod = 0.001, kLongestPeriod = 0.1;  ///< s, of FRI (published)
 
 /// @see the file's comment. Times in s, angles in rad.
 struct Parameters {
@@ -74,6 +76,7 @@ struct Parameters {
   double krl_quality_wait = 12.0;  ///< s it waits for the quality; 100 packets of 100 ms take 10 s
   double brake_release = 0.3;      ///< s that the tiny motion takes which opens the brakes
   double power_up = 0.5;           ///< s from acknowledging an error to full drive power
+  double close_linger = 1.5;  ///< s that measurements go on after friClose; clients wait for them
   bool acknowledge_by_program = true;  ///< false: errors wait for an operator (`acknowledge()`)
   double ambient_temperature = 25.0;   ///< degree Celsius
   double drive_heating = 20.0;         ///< K above that at full torque, in the end

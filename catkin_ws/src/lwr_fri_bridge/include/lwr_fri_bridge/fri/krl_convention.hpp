@@ -14,7 +14,13 @@
 /// | stanford        | INT[16]=10, INT[15]=s             | INT[16]=20        | INT[16]: 10 MON, 20 CMD |
 /// | rcprg_tum       | INT[1]=1, BOOL[1] (s is 30)       | INT[1]=2, BOOL[1] | BOOL[1]: working on it  |
 /// | rtt_lwr         | INT[1]=1, INT[2]=s, INT[3]=tool   | INT[1]=2          | INT[1]: FRI state       |
+/// | openkc          | INT[16]=9, 6 or 7; then INT[16]=1 | INT[16]=2         | INT[15], BOOL[1]        |
 // clang-format on
+///
+/// openkc takes one command after the other, each with BOOL[1]: it is over when the program shows
+/// the command in TO_INT[15] and sets TO_BOOL[1] (TO_INT[14] counts them); the PC then takes BOOL[1]
+/// back and waits for the program to do so too. Commands: 9 position, 6 Cartesian, 7 joint
+/// impedance, 1 friStart, 2 friStop. Source: public clients and emulators of that program.
 ///
 /// Our own program (krl/coglab_fri.src) acts once per request number (1..32767, wraps to 1) and
 /// answers with
@@ -29,7 +35,14 @@
 
 namespace lwr_fri_bridge::fri {
 
-enum class KrlConvention : std::uint8_t { Coglab, CentroEpiaggio, Stanford, RcprgTum, RttLwr };
+enum class KrlConvention : std::uint8_t {
+  Coglab,
+  CentroEpiaggio,
+  Stanford,
+  RcprgTum,
+  RttLwr,
+  OpenKc
+};
 
 /// What the PC wants from the KRL program at the moment.
 enum class KrlPhase : std::uint8_t {
@@ -58,6 +71,8 @@ struct KrlRequest {
   ControlStrategy strategy = ControlStrategy::Position;  ///< for Start
   std::uint16_t number = 0;  ///< grows with every Start and Stop; coglab only
   std::int32_t tool = 0;     ///< tool number; rtt_lwr only
+  std::uint8_t acknowledged = 0;  ///< commands of this phase that are over; openkc only
+  bool asserted = false;          ///< the next one is asked for; openkc only
 };
 
 /// What the KRL program says about a request.
@@ -72,6 +87,10 @@ struct KrlReply {
 /// Real-time safe.
 void writeRequest(KrlConvention convention, const KrlRequest& request, UserData& to_controller);
 
+/// Once per measurement: goes on to the next command of a phase that takes several, when the
+/// program has acknowledged the one before. Only openkc needs it. Real-time safe.
+void stepRequest(KrlConvention convention, KrlRequest& request, const UserData& from_controller);
+
 /// Reads what the program says about `request`. Real-time safe.
 KrlReply readReply(KrlConvention convention, const KrlRequest& request,
                    const UserData& from_controller);
@@ -85,7 +104,7 @@ inline std::int32_t lastFinished(const MeasurementDatagram& measurement) {
 /// Whether the convention's program can run this strategy (rcprg_tum fixes joint impedance).
 bool supports(KrlConvention convention, ControlStrategy strategy);
 
-/// "coglab", "centro_epiaggio", "stanford", "rcprg_tum", "rtt_lwr".
+/// "coglab", "centro_epiaggio", "stanford", "rcprg_tum", "rtt_lwr", "openkc".
 const char* nameOf(KrlConvention convention);
 
 /// Inverse of nameOf(). @throws std::invalid_argument listing the known names.

@@ -1,0 +1,63 @@
+"""What the node's rostest is made of: bounded waits, ports, and publishers of target velocities."""
+
+from __future__ import annotations
+
+import subprocess
+import time
+
+import rospy
+from diagnostic_msgs.msg import DiagnosticArray
+from sensor_msgs.msg import JointState
+
+LIMIT = 20.0  # s, for everything that is waited for
+
+
+def wait_for(condition, what: str, limit: float = LIMIT):
+    end = time.monotonic() + limit
+    while time.monotonic() < end:
+        value = condition()
+        if value:
+            return value
+        time.sleep(0.02)
+    raise AssertionError(f"not within {limit} s: {what}")
+
+
+def bound_port(name: str) -> int:
+    return wait_for(lambda: rospy.get_param(f"{name}/fri_port_bound", 0), f"{name}/fri_port_bound")
+
+
+def node_binary() -> str:
+    return subprocess.check_output(
+        ["catkin_find", "--first-only", "--libexec", "lwr_fri_bridge", "lwr_node"], text=True
+    ).strip()
+
+
+def target_message(velocity: list[float], age: float = 0.0, epoch: str = "", **fields) -> JointState:
+    """Target velocities made `age` s ago, in the motion_epoch if one is given."""
+    message = JointState(velocity=velocity, **fields)
+    message.header.stamp = rospy.Time.now() - rospy.Duration(age)
+    message.header.frame_id = epoch
+    return message
+
+
+def refusals(reason: str) -> int:
+    """How often target velocities of /lwr were refused so far for that reason, as /diagnostics counts them."""
+
+    def commands():
+        message = rospy.wait_for_message("/diagnostics", DiagnosticArray, LIMIT)
+        return next((s for s in message.status if s.name.endswith("lwr: commands")), None)
+
+    values = wait_for(commands, "diagnostics of the commands").values
+    return next(int(v.value) for v in values if v.key.startswith(f"refused: {reason}"))
+
+
+class Twist:
+    """Publishes a target velocity at 50 Hz, made when it is sent, until stopped."""
+
+    def __init__(self, publisher: rospy.Publisher, velocity: list[float]) -> None:
+        self.timer = rospy.Timer(
+            rospy.Duration(0.02), lambda _: publisher.publish(target_message(velocity))
+        )
+
+    def stop(self) -> None:
+        self.timer.shutdown()
