@@ -69,8 +69,11 @@ CTRL_MORE_RARE bool ControllerSlot::prepare(StageRun& run) noexcept {
     if (activity_ != Activity::Running) start();
     return true;
   }
-  if (wanted_) noteWaiting(run);
-  if (activity_ == Activity::Running || activity_ == Activity::Off) stop(Why::Stale);
+  if (wanted_) {
+    noteWaiting(run);
+    // What was held during a pause or a fault is let go as well.
+    if (activity_ != Activity::Waiting) stop(Why::Stale);
+  }
   runStopped(run);
   return false;
 }
@@ -113,6 +116,9 @@ void ControllerSlot::runEach(const std::vector<ControllerSlot*>& slots, StageRun
       if (!steady) s.catchUp();
       ModifiedControlStates modified(run.control, s.owner_);
       s.controller_->update(run.cycle, run.robot, run.original, modified);
+      if (s.special_ & kStates) {
+        s.controller_->state(Numbers<>(s.state_.data(), static_cast<int>(s.state_.size())));
+      }
     } catch (const std::exception& e) {
       // The text dies with the exception: it is used before that.
       s.takeFault(run, FaultKind::Exception, e.what());
@@ -125,7 +131,7 @@ void ControllerSlot::runEach(const std::vector<ControllerSlot*>& slots, StageRun
       s.takeFailure(run);
       continue;
     }
-    if (!s.hasGoodNumbers(run.data) || s.limited_ || kTest) {
+    if (!s.hasGoodNumbers(run.data) || (s.special_ & kLimited) || kTest) {
       const FaultKind kind = s.judgeMore(run);
       if (kind != FaultKind::None) {
         s.takeFault(run, kind,
@@ -209,7 +215,7 @@ FaultKind ControllerSlot::judgeNumbers(const double* data) const noexcept {
 
 FaultKind ControllerSlot::judgeMore(StageRun& run) noexcept {
   FaultKind kind = judgeNumbers(run.data);
-  if (kind == FaultKind::None && limited_) kind = judgeLimits(run);
+  if (kind == FaultKind::None && (special_ & kLimited)) kind = judgeLimits(run);
   if (kind == FaultKind::None && run.compared && restoreUndeclared(run)) {
     kind = FaultKind::Undeclared;
   }
@@ -220,6 +226,7 @@ FaultKind ControllerSlot::judgeMore(StageRun& run) noexcept {
 CTRL_MORE_OFTEN void ControllerSlot::commit(const StageRun& run) noexcept {
   double* record = records_ + (run.buffer ? record_size_ : 0);
   if (last_ != run.buffer) last_ = run.buffer;
+  if (special_ & kStates) std::copy(state_.begin(), state_.end(), record + 1 + 2 * total_);
   *record++ = run.cycle_number;
   if (checked_count_ == 1) {
     commitSignal(checked_, run, record, total_);
