@@ -28,7 +28,7 @@ def cmd_list(database: ObjectDatabase) -> int:
         print(f"{object_id:12} {entry['mass']:5.2f} kg  grasps: {', '.join(entry['grasps'])}  {entry['name']}")
     for problem in database.problems:
         print(problem, file=sys.stderr)
-    print("next: object_tool.py check")
+    print("next: ./coglab object check")
     return 1 if database.problems else 0
 
 
@@ -51,7 +51,7 @@ def cmd_check(folder: Path, ids: list[str]) -> int:
         for line, ok in reachability_report(entry):
             print(f"  {line}")
             failed += 0 if ok else 1
-    print("next: object_tool.py list" if not failed else f"{failed} problems")
+    print("all fine" if not failed else f"{failed} problems; edit the files, then again: ./coglab object check")
     return 1 if failed else 0
 
 
@@ -67,7 +67,7 @@ def cmd_new(folder: Path, object_id: str) -> int:
         print(error, file=sys.stderr)
         return 2
     path.write_text(text, encoding="utf-8")
-    print(f"wrote {path}; edit it, then: object_tool.py check {object_id}")
+    print(f"wrote {path}; edit it, then: ./coglab object check {object_id}")
     return 0
 
 
