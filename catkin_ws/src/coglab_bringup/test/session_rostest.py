@@ -15,7 +15,7 @@ from coglab_bringup.handover import READY_LIMIT, ask_for, run_handover
 from coglab_bringup.trial_recorder import TrialRecorder
 from coglab_msgs.srv import Start
 from std_srvs.srv import Trigger
-from visualization_msgs.msg import MarkerArray
+from visualization_msgs.msg import Marker, MarkerArray
 
 ORDER = ("exchange_human_to_robot", "put", "take", "exchange_robot_to_human")
 
@@ -27,7 +27,9 @@ class Session(unittest.TestCase):
     def setUpClass(cls):
         rospy.init_node("session_test")
         cls.markers = []
+        cls.scenes = []
         rospy.Subscriber("/coglab_sim/truth/markers", MarkerArray, cls.markers.append, queue_size=1)
+        rospy.Subscriber("/coglab/scene", MarkerArray, cls.scenes.append, queue_size=10)
         recorder = TrialRecorder()
         cls.outcomes = dict.fromkeys(ORDER, "not reached: an action before it failed")
         for action in ORDER:
@@ -47,9 +49,15 @@ class Session(unittest.TestCase):
     def test_4_to_the_person(self):
         self.assertEqual(self.outcomes[ORDER[3]], "success")
 
-    def test_5_rviz_gets_person_and_object(self):
+    def test_5_rviz_gets_person_object_cell_goal_path_and_state(self):
         self.assertTrue(self.markers)
-        self.assertEqual({m.ns for m in self.markers[-1].markers}, {"human_hand", "object"})
+        person = {"human_hand", "forearm", "upper_arm", "trunk", "legs", "head"}
+        self.assertEqual({m.ns for m in self.markers[-1].markers}, person | {"object"})
+        drawn = {m.ns for array in self.scenes for m in array.markers if m.action == Marker.ADD}
+        self.assertEqual(drawn, {"pedestal", "board", "goal", "path", "state"})
+        ends = [m.points[-1] for array in self.scenes for m in array.markers if m.ns == "path" and m.points]
+        goals = [m.pose.position for array in self.scenes for m in array.markers if m.ns == "goal" and m.color.a > 0]
+        self.assertLess(abs(ends[-1].x - goals[-1].x), 0.02, "the path does not lead to the goal")
 
     def test_6_a_killed_robot_node_shows_in_the_hub_and_is_initialised_again(self):
         found = subprocess.run(["rosnode", "info", "/robot"], capture_output=True, text=True, timeout=20, check=True)

@@ -18,9 +18,15 @@ def run(*command: object, **environment: str) -> subprocess.CompletedProcess:
     """Runs a command in this environment with some variables changed; output and errors as one text in `stdout`."""
     words = [str(word) for word in command]
     return subprocess.run(
-        words, env={**os.environ, **environment}, text=True, timeout=120, check=False,
-        stdout=subprocess.PIPE, stderr=subprocess.STDOUT, stdin=subprocess.DEVNULL,
-    )  # fmt: skip
+        words,
+        env={**os.environ, **environment},
+        text=True,
+        timeout=120,
+        check=False,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        stdin=subprocess.DEVNULL,
+    )
 
 
 def needs(*command: str) -> pytest.MarkDecorator:
@@ -40,6 +46,21 @@ def checkout():
     (folder / "debian-packages.txt").write_text(f"run: {ABSENT}\nbuild: {ABSENT}\n")
     yield folder
     shutil.rmtree(folder)
+
+
+@pytest.fixture
+def workspace(checkout):
+    """A checkout of which every package is installed, with coglab_bringup alone in its workspace."""
+    (checkout / "debian-packages.txt").write_text("run: bash\nbuild: bash\n")
+    sources = checkout / "catkin_ws" / "src"
+    sources.mkdir(parents=True)
+    shutil.copytree(
+        TOP / "catkin_ws" / "src" / "coglab_bringup",
+        sources / "coglab_bringup",
+        ignore=shutil.ignore_patterns("test", "__pycache__", "launch"),
+    )
+    (sources / "coglab_bringup" / "launch").mkdir()
+    return checkout
 
 
 def lines_of(text: str) -> list[str]:
@@ -122,11 +143,72 @@ def test_occupied_port():
         holder.bind(("127.0.0.1", 0))
         holder.listen()
         port = holder.getsockname()[1]
-        ended = run(sys.executable, "-m", "coglab_bringup.launch", "-p", port)
+        ended = run(sys.executable, "-m", "coglab_bringup.launch", "-p", port, COGLAB_TOP=str(TOP))
     assert ended.returncode == 1
     assert f"port {port} is in use by another program; leave out -p for a free one" in ended.stdout
 
 
-def test_a_port_that_is_no_number():
-    ended = run(sys.executable, "-m", "coglab_bringup.launch", "-p", "high")
-    assert ended.returncode == 2 and "-p expects a port number" in ended.stdout
+def test_a_build_that_fails_without_the_word_error(workspace):
+    folder = workspace / "catkin_ws" / "build"
+    folder.mkdir()
+    (folder / ".built_by").write_text("catkin build")  # catkin_make refuses it, in words of its own
+    ended = run(workspace / "coglab", "build")
+    assert ended.returncode == 1
+    assert "previously built by 'catkin build'" in ended.stdout
+    assert "the build failed; whole log:" in ended.stdout.splitlines()[-1]
+
+
+def test_nothing_is_built_when_no_source_is_newer():
+    log = TOP / ".coglab" / "build.log"
+    if not (TOP / ".coglab" / "built.all").is_file():
+        pytest.skip("this workspace was not built by ./coglab")
+    before = log.stat().st_mtime_ns
+    ended = run(TOP / "coglab", "shell", "true")
+    assert ended.returncode == 0 and "building" not in ended.stdout and log.stat().st_mtime_ns == before
+
+
+@pytest.mark.skipif(not os.environ.get("COGLAB_LONG"), reason="builds a workspace: ./coglab test --long")
+def test_a_newer_source_is_built_and_data_is_not(workspace):
+    package = workspace / "catkin_ws" / "src" / "coglab_bringup"
+    coglab = workspace / "coglab"
+    assert "building" in run(coglab, "shell", "true").stdout
+    assert "building" not in run(coglab, "shell", "true").stdout
+    (package / "launch" / "new.launch").write_text("<launch/>")
+    (package / "src" / "coglab_bringup" / "demo.py").write_text("changed = True\n")
+    assert "building" not in run(coglab, "shell", "true").stdout
+    for change in (
+        lambda: (package / "src" / "new.cpp").touch(),
+        lambda: os.utime(package / "CMakeLists.txt", (1, 1)),
+        lambda: (package / "src" / "new.cpp").unlink(),
+    ):
+        change()
+        assert "building" in run(coglab, "shell", "true").stdout
+        assert "building" not in run(coglab, "shell", "true").stdout
+    assert "building" in run(coglab, "build").stdout  # who asks for it by name gets it
+
+
+def test_the_template_of_a_controller_is_named_as_the_runner_expects(tmp_path):
+    from coglab_bringup.test_runner import find_programs
+
+    package = TOP / "catkin_ws" / "src" / "ctrl_more"
+    target = tmp_path / "catkin_ws" / "src"
+    target.mkdir(parents=True)
+    (tmp_path / "coglab").touch()
+    made = run(sys.executable, package / "scripts" / "new_controller.py", "WristDamper", "--into", target)
+    assert made.returncode == 0 and "./coglab build && ./coglab test wrist_damper" in made.stdout
+    (program,) = find_programs(tmp_path, tmp_path, sys.executable, ["wrist_damper"])
+    cmake = (target / "wrist_damper" / "CMakeLists.txt").read_text()
+    assert f"set(test_target {program.name})" in cmake and "test/test_controller.cpp" in cmake
+
+
+def test_a_run_finds_its_home_again_and_shares_it_with_nobody(tmp_path):
+    from coglab_bringup.run_directory import lasting_home
+
+    first, lock = lasting_home(tmp_path)
+    second, other = lasting_home(tmp_path)
+    assert first != second
+    os.close(lock)
+    again, lock = lasting_home(tmp_path)
+    assert again == first  # with what the hand holds, and without waiting for the other run
+    os.close(lock)
+    os.close(other)

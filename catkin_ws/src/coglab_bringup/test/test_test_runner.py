@@ -11,6 +11,8 @@ GREEN = (
 )
 RED = '<testsuite><testcase name="bad"><failure message="1 is not 2"/></testcase></testsuite>'
 
+SKIPPED = '<testsuite><testcase name="module"><skipped/></testcase></testsuite>'
+
 
 def program(tmp_path, script: str) -> Program:
     xml = tmp_path / "report.xml"
@@ -27,14 +29,20 @@ def program(tmp_path, script: str) -> Program:
         ("import os; os.abort()", (0, 1, 0)),
         ("open(XML, 'w').write('<testsuite><testcase')", (0, 1, 0)),
         ("import time; time.sleep(60)", (0, 1, 0)),  # ended at the limit
+        ("open(XML, 'w').write('<testsuites></testsuites>')", (0, 1, 0)),  # runs, and holds no case
+        ("open(XML, 'w').write('<testsuite/>'); raise SystemExit(5)", (0, 1, 0)),  # a pytest file without a case
+        (
+            f"open(XML, 'w').write('{SKIPPED}'); raise SystemExit(5)",
+            (0, 0, 1),
+        ),  # a whole module skipped, with its reason
     ],
 )
 def test_counts(tmp_path, script, counts, capsys):
     item = program(tmp_path, script)
-    run(item, tmp_path / "log", limit=5.0)
-    assert (item.passed, item.failed, item.skipped) == counts
+    run(item, tmp_path / "log", limit=1.0 if "sleep" in script else 60.0)
+    assert (item.passed, item.failed, item.skipped) == counts, item.failures
     status = report([item], tmp_path)
-    assert status == (0 if counts[1] == 0 else 1)
+    assert status == (0 if counts[1] == 0 and counts[0] > 0 else 1)
     assert capsys.readouterr().out.splitlines()[-1] == "{} passed, {} failed, {} skipped".format(*counts)
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 pytest.importorskip("coglab_msgs", reason="the workspace is not built or not sourced")
-from coglab_bringup.trial_plot import rows_without_overlap, state_intervals
+from coglab_bringup.trial_plot import colours_of, draw_trial, lanes_of, rows_without_overlap, state_intervals
 from coglab_bringup.trial_recorder import Trial, summarise
 
 LIMITS = np.full(7, 2.0)
@@ -72,3 +72,52 @@ def test_children_of_a_concurrence_get_rows_of_their_own():
     for row in rows:
         assert all(first[1] <= second[0] + 1e-3 for first, second in zip(row, row[1:], strict=False))
     assert len(rows) == 2
+
+
+def two_approaches() -> Trial:
+    """Two actions, each with an approach of two parallel children."""
+    trial = Trial()
+    for action, since in (("take", 0.0), ("give", 10.0)):
+        inner = f"/m/{action}/approach"
+        trial.transitions += [
+            (since, "/m", "hub", action, action, ""),
+            (since + 1.0, f"/m/{action}", "wait", "go", "approach", ""),
+            (since + 4.0, f"{inner}", "arm", "done", "done", ""),
+            (since + 5.0, f"/m/{action}", "approach", "done", "done", ""),
+            (since + 6.0, "/m", action, "done", "hub", ""),
+        ]
+    times = np.arange(0.0, 18.0, 0.02)
+    trial.truth = [(t, [t / 20, 0, 0], [1 - t / 40, 0, 0], [0, 0, 0], 2.0 * (t > 4)) for t in times]
+    trial.external_torques = [(t, list(np.sin(t + np.arange(7)))) for t in times]
+    trial.fingers = [(t, [10 * k + t for k in range(5)]) for t in times]
+    trial.contacts = [(4.0, True, 2.0), (14.0, False, 1.0)]
+    return trial
+
+
+def test_containers_of_one_name_share_a_lane_and_a_state_has_one_colour():
+    lanes = lanes_of(two_approaches(), 0.0, 18.0)
+    assert [name for name, _ in lanes].count("approach") == 1
+    colours = colours_of([name for _, rows in lanes for row in rows for _, _, name in row])
+    assert len(set(colours.values())) == len(colours)
+
+
+def test_the_picture_is_written_with_labels_in_their_bars_and_legends_beside_the_curves(tmp_path, monkeypatch):
+    import coglab_bringup.trial_plot as trial_plot
+
+    kept = []
+    monkeypatch.setattr(trial_plot.plt, "close", kept.append)
+    draw_trial(two_approaches(), "title", 0.0, 18.0, tmp_path / "trial.png")
+    assert (tmp_path / "trial.png").stat().st_size > 10000 and (tmp_path / "trial.pdf").read_bytes()[:4] == b"%PDF"
+    figure = kept[-1]
+    renderer = figure.canvas.get_renderer()
+    bars = [bar.get_window_extent(renderer) for bar in figure.axes[0].patches]
+    for label in figure.axes[0].texts:
+        box = label.get_window_extent(renderer)
+        assert any(bar.x0 <= box.x0 and box.x1 <= bar.x1 for bar in bars), label.get_text()
+    for axis in figure.axes:
+        if axis.get_legend():
+            assert axis.get_legend().get_window_extent(renderer).x0 >= axis.get_window_extent(renderer).x1 - 1
+        assert axis is figure.axes[0] or axis.get_ylabel()
+    explained = [text.get_text() for text in figure.axes[0].get_legend().get_texts()]
+    assert explained == ["contact or load felt", "load taken over"]
+    trial_plot.plt.figure(figure).clear()

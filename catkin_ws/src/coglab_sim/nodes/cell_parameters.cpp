@@ -56,6 +56,10 @@ CellConfig readCellConfig(const ros::NodeHandle& node) {
   take(config, above, "seed", "seed");
   for (const CellParameter& parameter : cellParameters())
     take(config, node, parameter.name, parameter.name);
+  if (const std::string id = node.param<std::string>("start_object", ""); !id.empty()) {
+    config.object = readObject(node, id);
+    config.object_pose.position[2] = -config.object.center[2];  // held at the height of its middle
+  }
   return config;
 }
 

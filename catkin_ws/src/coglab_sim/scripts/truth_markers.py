@@ -9,10 +9,11 @@ cell/objects/<id> and cell/object.
 import sys
 import time
 
+import numpy as np
 import rospy
 from coglab_msgs.msg import CellTruth
 from coglab_sim.rigid import quat_rotate
-from geometry_msgs.msg import Point, Pose, TransformStamped, Vector3
+from geometry_msgs.msg import Point, Pose, Quaternion, TransformStamped, Vector3
 from std_msgs.msg import ColorRGBA
 from tf2_msgs.msg import TFMessage
 from visualization_msgs.msg import Marker, MarkerArray
@@ -22,6 +23,13 @@ PERIOD = 0.1
 KINDS = {"box": Marker.CUBE, "cylinder": Marker.CYLINDER, "sphere": Marker.SPHERE}
 ORANGE, RED, SKIN = (0.90, 0.62, 0.0, 1.0), (0.84, 0.37, 0.0, 1.0), (0.80, 0.58, 0.46, 0.9)
 HAND_SIZE = (0.16, 0.09, 0.03)
+CLOTH, DARK = (0.35, 0.45, 0.60, 1.0), (0.25, 0.27, 0.30, 1.0)
+FLOOR = -0.75
+"""m, of the cell"""
+SHOULDER = np.array([1.42, 0.20, 0.50])
+"""m in the world: where the person stands; the shoulder comes forward where the hand is out of reach"""
+UPPER_ARM, FOREARM = 0.33, 0.36
+"""m; the forearm up to the palm"""
 
 
 class TruthMarkers:
@@ -40,7 +48,7 @@ class TruthMarkers:
         if now < self.due:
             return
         self.due = now + PERIOD
-        array = MarkerArray(markers=[self.hand(truth)])
+        array = MarkerArray(markers=[self.hand(truth), *self.person(truth)])
         if truth.object_id:
             array.markers.append(self.object(truth))
         self.markers.publish(array)
@@ -60,6 +68,28 @@ class TruthMarkers:
     def hand(self, truth: CellTruth) -> Marker:
         """The person's hand: a flat box."""
         return self.marker(truth, "human_hand", Marker.CUBE, truth.human_hand, HAND_SIZE, SKIN)
+
+    def person(self, truth: CellTruth) -> list[Marker]:
+        """Arm, trunk and head of the person whose hand this is."""
+        p = truth.human_hand.position
+        hand = np.array([p.x, p.y, p.z])
+        shoulder, elbow = arm_of(hand)
+        trunk, head = shoulder + [0.06, -0.20, -0.28], shoulder + [0.04, -0.20, 0.24]
+        return [self.limb(truth, "forearm", hand, elbow, 0.075, SKIN),
+                self.limb(truth, "upper_arm", elbow, shoulder, 0.095, CLOTH),
+                self.marker(truth, "trunk", Marker.SPHERE, at(trunk), (0.26, 0.44, 0.68), CLOTH),
+                self.limb(truth, "legs", trunk - [0.0, 0.0, 0.2], np.array([*trunk[:2], FLOOR]), 0.26, DARK),
+                self.marker(truth, "head", Marker.SPHERE, at(head), (0.19, 0.17, 0.24), SKIN)]
+
+    def limb(self, truth: CellTruth, name: str, end: np.ndarray, begin: np.ndarray, width: float, colour) -> Marker:
+        """A cylinder from one joint to the next."""
+        along = end - begin
+        length = float(np.linalg.norm(along))
+        marker = self.marker(truth, name, Marker.CYLINDER, at((begin + end) / 2), (width, width, length), colour)
+        x, y, z = along / max(length, 1e-9)
+        w = np.sqrt(max((1.0 + z) / 2.0, 0.0))  # half-angle form of the turn from z to `along`
+        marker.pose.orientation = Quaternion(-y / (2 * w), x / (2 * w), 0.0, w) if w > 1e-6 else Quaternion(1, 0, 0, 0)
+        return marker
 
     def object(self, truth: CellTruth) -> Marker:
         """The object in its shape; another colour once it has fallen."""
@@ -89,6 +119,22 @@ class TruthMarkers:
         return out
 
 
+def at(point: np.ndarray) -> Pose:
+    """A pose that is not turned."""
+    return Pose(Point(*point), Quaternion(w=1.0))
+
+
+def arm_of(hand: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Shoulder and elbow (m, world) of an arm whose palm is at `hand`; the elbow hangs down."""
+    away = SHOULDER - hand
+    distance = float(np.linalg.norm(away))
+    reach = min(distance, 0.98 * (UPPER_ARM + FOREARM))
+    axis = away / distance if distance > 1e-6 else np.array([1.0, 0.0, 0.0])
+    shoulder = hand + reach * axis
+    along = (reach**2 + FOREARM**2 - UPPER_ARM**2) / (2.0 * max(reach, 1e-6))  # law of cosines
+    aside = np.sqrt(max(FOREARM**2 - along**2, 0.0))
+    down = np.array([0.0, 0.0, -1.0]) + axis[2] * axis
+    return shoulder, hand + along * axis + aside * down / max(float(np.linalg.norm(down)), 1e-6)
 
 
 def main() -> int:

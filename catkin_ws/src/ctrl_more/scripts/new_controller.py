@@ -63,6 +63,17 @@ def make_controller(name: str, into: Path) -> Path:
     return target
 
 
+def next_steps(target: Path) -> list[str]:
+    """Commands that build and test the new controller: those of the workspace it lies in, else plain CMake."""
+    workspace = target.resolve().parent.parent
+    if target.resolve().parent.name == "src" and (workspace.parent / "coglab").is_file():
+        return [f"./coglab build && ./coglab test {target.name}"]
+    return [
+        f"cmake -S {target} -B {target}/build && cmake --build {target}/build",
+        f"ctest --test-dir {target}/build --output-on-failure",
+    ]
+
+
 def main() -> int:
     """Command line."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
@@ -75,8 +86,8 @@ def main() -> int:
         print(error, file=sys.stderr)
         return 1
     print(f"made {target}; build and test it:")
-    print(f"  cmake -S {target} -B {target}/build && cmake --build {target}/build")
-    print(f"  ctest --test-dir {target}/build --output-on-failure")
+    for line in next_steps(target):
+        print(f"  {line}")
     return 0
 
 

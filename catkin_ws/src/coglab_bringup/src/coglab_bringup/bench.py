@@ -1,30 +1,26 @@
 """./coglab bench: runs the benches of all packages and prints every figure beside its goal and its peer.
 
 A bench is an executable `bench/bench_<name>.py` in a package; it prints a JSON list of rows
-{bench, figure, value, unit, goal, peer, peer_value, ok} and nothing else on standard output. Packages that have one of
-the same name share the bench: each gives its rows.
+{bench, figure, value, unit, goal, peer, peer_value, ok} and nothing else on standard output, and ends with status 0,
+also where a figure misses its goal. Another status is a failure of its own, whatever rows were printed. Packages that
+have one of the same name share the bench: each gives its rows.
 """
 
 from __future__ import annotations
 
-import argparse
 import json
 import os
-import subprocess
 import sys
+import tempfile
 from pathlib import Path
+
+from coglab_bringup import process_tree
+from coglab_bringup.arguments import bench_options, find_benches
+from coglab_bringup.usage import Refused
 
 COLUMNS = ("bench", "figure", "value", "unit", "goal", "peer", "peer_value", "ok")
 TIME_LIMIT = 1800.0  # s, per bench
 LONG_TIME_LIMIT = 7200.0  # s, with --long
-
-
-def find_benches(sources: Path) -> dict[str, list[Path]]:
-    """The files of each bench by its name, from the packages below `sources`."""
-    benches: dict[str, list[Path]] = {}
-    for path in sorted(sources.rglob("bench/bench_*.py")):
-        benches.setdefault(path.stem.removeprefix("bench_"), []).append(path)
-    return benches
 
 
 def failed_row(name: str, reason: str) -> dict:
@@ -33,19 +29,20 @@ def failed_row(name: str, reason: str) -> dict:
 
 
 def run_bench(name: str, path: Path, python: str, limit: float = TIME_LIMIT) -> list[dict]:
-    """The rows of one bench, whatever its exit status; a bench that gives none gives one row that says how."""
-    try:
-        done = subprocess.run([python, str(path)], capture_output=True, text=True, timeout=limit, check=False)
-    except subprocess.TimeoutExpired:
+    """The rows of one bench, and one more that says how it failed; nothing that it started outlives it."""
+    with tempfile.TemporaryFile("w+") as output, tempfile.TemporaryFile("w+") as errors:
+        status = process_tree.run([python, str(path)], limit, stdout=output, stderr=errors)
+        output.seek(0)
+        errors.seek(0)
+        text, last = output.read(), (errors.read().strip().splitlines() or ["no message"])[-1]
+    if status is None:
         return [failed_row(name, f"no end within {limit:.0f} s")]
+    failed = [failed_row(name, f"exit status {status}: {last}")] if status != 0 else []
     try:
-        rows = json.loads(done.stdout)
-        return [{column: row[column] for column in COLUMNS} for row in rows]
+        rows = [{column: row[column] for column in COLUMNS} for row in json.loads(text)] + failed
+        return rows or [failed_row(name, "no row on standard output")]
     except (json.JSONDecodeError, KeyError, TypeError) as error:
-        if done.returncode != 0:
-            last = (done.stderr.strip().splitlines() or ["no message"])[-1]
-            return [failed_row(name, f"exit status {done.returncode}: {last}")]
-        return [failed_row(name, f"no list of rows on standard output ({error})")]
+        return failed or [failed_row(name, f"no list of rows on standard output ({error})")]
 
 
 def as_text(value: object) -> str:
@@ -69,19 +66,16 @@ def print_table(rows: list[dict]) -> None:
 
 def main(arguments: list[str]) -> int:
     """Exit status 0 if every row is ok, 1 if one is not, 2 for an unknown name."""
-    parser = argparse.ArgumentParser(prog="coglab bench", description=__doc__.splitlines()[0])
-    parser.add_argument("names", nargs="*", metavar="NAME", help="default: all")
-    parser.add_argument("--json", type=Path, metavar="FILE", help="write the rows as a JSON list")
-    parser.add_argument("--long", action="store_true", help="the campaigns too (hours)")
-    options = parser.parse_args(arguments)
+    sources = Path(os.environ["COGLAB_TOP"]) / "catkin_ws" / "src"
+    try:
+        options = bench_options(sources.parents[1], arguments)
+    except Refused as error:
+        print(f"[coglab] error: {error}", file=sys.stderr)
+        return 2
     if options.long:
         os.environ["COGLAB_LONG"] = "1"
     limit = LONG_TIME_LIMIT if options.long else TIME_LIMIT
-    benches = find_benches(Path(os.environ["COGLAB_TOP"]) / "catkin_ws" / "src")
-    unknown = [name for name in options.names if name not in benches]
-    if unknown:
-        print(f"[coglab] error: no bench named {', '.join(unknown)}; there are: {', '.join(benches)}", file=sys.stderr)
-        return 2
+    benches = find_benches(sources)
     python = os.environ.get("COGLAB_TEST_PYTHON", "/usr/bin/python3")
     rows: list[dict] = []
     for name in options.names or benches:

@@ -20,10 +20,11 @@ def package_groups(top: Path) -> dict[str, list[str]]:
     return groups
 
 
-def installed(package: str) -> bool:
-    """Whether a Debian package is installed."""
-    query = ["dpkg-query", "-W", "-f=${db:Status-Status}", package]
-    return subprocess.run(query, capture_output=True, text=True, check=False).stdout == "installed"
+def installed(packages: list[str]) -> set[str]:
+    """Those of these Debian packages that are installed."""
+    query = ["dpkg-query", "-W", "-f=${db:Status-Status} ${Package}\n", *packages]
+    found = subprocess.run(query, capture_output=True, text=True, check=False).stdout  # unknown names are left out
+    return {line.split()[1] for line in found.splitlines() if line.startswith("installed ")}
 
 
 def release() -> dict[str, str]:
@@ -56,7 +57,8 @@ def findings(top: Path) -> list[tuple[bool, str]]:
         (fine, f"Debian 12 (bookworm): {name}" + ("" if fine else "; use Debian 12, or a container: docker/run"))
     )
     for group, packages in package_groups(top).items():
-        missing = [package for package in packages if not installed(package)]
+        there = installed(packages)
+        missing = [package for package in packages if package not in there]
         if missing and group == "viz":
             result.append((True, "rviz is not installed (only needed where there is a screen): ./coglab install viz"))
         elif missing:

@@ -29,6 +29,7 @@ TOPICS: dict[str, dict[str, str]] = {
     "/coglab": {
         "contact": "coglab_msgs/Contact",
         "transitions": "coglab_msgs/Transition",
+        "scene": "visualization_msgs/MarkerArray",
         "smach/container_structure": "smach_msgs/SmachContainerStructure",
         "smach/container_status": "smach_msgs/SmachContainerStatus",
         "smach/container_init": "smach_msgs/SmachContainerInitialStatusCmd",
@@ -60,6 +61,7 @@ NODES = [
     "/contact_detector",
     "/robot_state_publisher",
     "/joint_state_publisher",
+    "/scene_markers",
 ]
 FRAMES = ["world", "lwr_base_link", "lwr_flange", "ih2_palm", "human_hand", "object_mug", "board"]
 

@@ -4,31 +4,35 @@ from __future__ import annotations
 
 import os
 import sys
+from pathlib import Path
 
-from coglab_bringup.run_directory import free_port, port_is_free, run_environment
+from coglab_bringup.launch_arguments import judge_launch, split_port
+from coglab_bringup.run_directory import free_port, lasting_home, port_is_free, record_run, run_environment
+from coglab_bringup.usage import Refused
 
 
 def main(arguments: list[str]) -> int:
     """Replaces this process by roslaunch; `-p PORT` picks the master port, all else goes to roslaunch."""
-    port = 0
-    if "-p" in arguments:
-        at = arguments.index("-p")
-        try:
-            port = int(arguments[at + 1])
-        except (IndexError, ValueError):
-            print("[coglab] error: -p expects a port number, such as -p 11411", file=sys.stderr)
-            return 2
-        del arguments[at : at + 2]
-        if not port_is_free(port):
-            print(
-                f"[coglab] error: port {port} is in use by another program; leave out -p for a free one",
-                file=sys.stderr,
-            )
-            return 1
+    top = Path(os.environ["COGLAB_TOP"])
+    try:
+        judge_launch(top, arguments)
+        port, words = split_port(arguments)
+    except Refused as error:
+        print(f"[coglab] error: {error}", file=sys.stderr)
+        return 2
+    if port and not port_is_free(port):
+        print(f"[coglab] error: port {port} is in use by another program; leave out -p for a free one", file=sys.stderr)
+        return 1
     port = port or free_port()
-    environment = run_environment(port)
-    print(f"[coglab] in another terminal: export ROS_MASTER_URI={environment['ROS_MASTER_URI']}", flush=True)
-    command = ["roslaunch", "-p", str(port), "coglab_bringup", "coglab.launch", *arguments]
+    home, _lock = lasting_home(top)  # not a new one: it holds which object the hand holds
+    environment = run_environment(port, home)
+    record_run(top, port, "launch")
+    print(
+        "[coglab] in another terminal: ./coglab status, ./coglab start; for ROS tools: ./coglab shell, and in it",
+        flush=True,
+    )
+    print(f"[coglab]   export ROS_MASTER_URI={environment['ROS_MASTER_URI']}", flush=True)
+    command = ["roslaunch", "-p", str(port), "coglab_bringup", "coglab.launch", *words]
     os.execvpe(command[0], command, environment)
     return 1
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import fcntl
 import json
 import os
 import socket
@@ -42,6 +43,60 @@ def run_environment(port: int, home: Path | None = None) -> dict[str, str]:
     )
     environment.pop("ROS_HOSTNAME", None)
     return environment
+
+
+def lasting_home(top: Path) -> tuple[Path, int]:
+    """A ROS_HOME that the next run finds again, with what the hand holds (coglab_holding.json), and its lock.
+
+    The first of .coglab/home_1, home_2, ... that no other run has. It is taken until the file descriptor is closed,
+    which is inheritable: so it belongs to the program that replaces this one.
+    """
+    number = 1
+    while True:
+        home = top / ".coglab" / f"home_{number}"
+        home.mkdir(parents=True, exist_ok=True)
+        lock = os.open(home / "lock", os.O_RDWR | os.O_CREAT, 0o600)
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError:
+            os.close(lock)
+            number += 1
+        else:
+            os.set_inheritable(lock, True)
+            return home, lock
+
+
+def _start_time(process: int) -> str:
+    """When a process began, in ticks since boot, which tells it from a later one of its id; empty if it ended."""
+    try:
+        fields = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()
+    except OSError:
+        return ""
+    return fields[19] if fields[0] != "Z" else ""
+
+
+def record_run(top: Path, port: int, command: str) -> None:
+    """Notes that this process, or what replaces it, runs a system whose ROS master listens on `port`."""
+    folder = top / ".coglab" / "runs"
+    folder.mkdir(parents=True, exist_ok=True)
+    row = {"command": command, "pid": os.getpid(), "start_time": _start_time(os.getpid())}
+    (folder / f"{port}.json").write_text(json.dumps(row) + "\n")
+
+
+def running_systems(top: Path) -> dict[int, str]:
+    """Command (launch, demo) by port of the ROS master, of the systems that run; forgets those that have ended."""
+    found = {}
+    for path in sorted((top / ".coglab" / "runs").glob("*.json")):
+        try:
+            row = json.loads(path.read_text())
+            alive = _start_time(int(row["pid"])) == row["start_time"] != ""
+        except (OSError, ValueError, KeyError, TypeError):
+            alive = False
+        if alive:
+            found[int(path.stem)] = row["command"]
+        else:
+            path.unlink(missing_ok=True)
+    return found
 
 
 def record_times(top: Path, command: str, seconds: float) -> None:

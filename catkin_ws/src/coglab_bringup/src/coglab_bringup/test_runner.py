@@ -5,15 +5,14 @@ Three kinds, found by where they lie in a package:
            not built is a failure
   pytest   test/test_*.py (smach's own packages one level deeper alike)
   rostest  test/*.test, one at a time, each with a ROS master of its own
+A program without a single case is a failure, too: a test file that tests nothing hides what it was written for.
 gtests and pytests of different packages run two at a time; rostests run alone, because they measure real time.
 """
 
 from __future__ import annotations
 
-import argparse
 import os
 import shutil
-import signal
 import subprocess
 import sys
 import time
@@ -22,7 +21,10 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from coglab_bringup import process_tree
+from coglab_bringup.arguments import package_folders, test_options
 from coglab_bringup.run_directory import free_port, record_times, run_environment
+from coglab_bringup.usage import Refused
 
 TIME_LIMIT = 900.0  # s, per test program
 LONG_TIME_LIMIT = 7200.0  # s, with --long
@@ -44,20 +46,11 @@ class Program:
     failures: list[str] = field(default_factory=list)
 
 
-def packages(sources: Path) -> dict[str, Path]:
-    """Folder of each package by name."""
-    found = {}
-    for manifest in sorted(sources.rglob("package.xml")):
-        name = ElementTree.parse(manifest).findtext("name", "").strip()
-        found[name] = manifest.parent
-    return found
-
-
 def find_programs(top: Path, results: Path, python: str, wanted: list[str]) -> list[Program]:
     """All test programs of the wanted packages (all if none is named)."""
     programs = []
     library = top / "catkin_ws" / "devel" / "lib"
-    for package, folder in packages(top / "catkin_ws" / "src").items():
+    for package, folder in package_folders(top / "catkin_ws" / "src").items():
         if wanted and package not in wanted:
             continue
         for source in sorted((folder / "test").glob("test_*.cpp")):
@@ -105,14 +98,19 @@ def count(program: Program, status: int | None) -> None:
             program.failed += 1
             program.failures.append(f"{report.name}: not readable as JUnit XML ({error})")
     ended = "was ended at its time limit" if status is None else f"ended with status {status}"
-    nothing_ran = program.kind == "pytest" and status == 5
-    if not program.failed and not nothing_ran and (status != 0 or not reports):
+    all_skipped = program.kind == "pytest" and status == 5 and program.skipped
+    if program.failed or all_skipped:
+        return
+    if status != 0 or not reports:
         program.failed += 1
         program.failures.append(f"{program.name} {ended} and reported no failed case; see its log")
+    elif not program.passed and not program.skipped:
+        program.failed += 1
+        program.failures.append(f"{program.name} holds no case; write one, or remove the file")
 
 
 def run(program: Program, log: Path, limit: float) -> None:
-    """Runs one program in its own process group and ends the whole group at the limit."""
+    """Runs one program, and ends it at the limit; nothing that it started outlives it."""
     environment = dict(os.environ)
     if program.kind == "rostest":
         environment = run_environment(free_port(), program.junit)
@@ -123,25 +121,9 @@ def run(program: Program, log: Path, limit: float) -> None:
         print(f"  {program.package:20s} {program.kind:8s}{program.name:44s} not built  FAILED", flush=True)
         return
     with log.open("w") as output:
-        process = subprocess.Popen(
-            program.command,
-            stdout=output,
-            stderr=subprocess.STDOUT,
-            stdin=subprocess.DEVNULL,
-            env=environment,
-            start_new_session=True,
+        status = process_tree.run(
+            program.command, limit, stdout=output, stderr=subprocess.STDOUT, stdin=subprocess.DEVNULL, env=environment
         )
-        status: int | None
-        try:
-            status = process.wait(limit)
-        except subprocess.TimeoutExpired:
-            os.killpg(process.pid, signal.SIGINT)
-            try:
-                process.wait(20)
-            except subprocess.TimeoutExpired:
-                os.killpg(process.pid, signal.SIGKILL)
-                process.wait()
-            status = None
     program.seconds = time.monotonic() - start
     count(program, status)
     verdict = "ok" if not program.failed else f"{program.failed} FAILED"
@@ -171,20 +153,16 @@ def report(programs: list[Program], results: Path) -> int:
 
 def main(arguments: list[str]) -> int:
     """Runs the tests; exit status 0 only if at least one passed and none failed."""
-    parser = argparse.ArgumentParser(prog="coglab test", description=__doc__.splitlines()[0])
-    parser.add_argument("packages", nargs="*", metavar="PACKAGE", help="default: all")
-    parser.add_argument("--long", action="store_true", help="the campaigns too (hours)")
-    options = parser.parse_args(arguments)
     top = Path(os.environ["COGLAB_TOP"])
-    known = packages(top / "catkin_ws" / "src")
-    unknown = [name for name in options.packages if name not in known]
-    if unknown:
-        print(f"[coglab] error: no package named {', '.join(unknown)}; there are: {', '.join(known)}", file=sys.stderr)
+    try:
+        options = test_options(top, arguments)
+    except Refused as error:
+        print(f"[coglab] error: {error}", file=sys.stderr)
         return 2
     if options.long:
         os.environ["COGLAB_LONG"] = "1"
     limit = LONG_TIME_LIMIT if options.long else TIME_LIMIT
-    results = top / "out" / "test"
+    results: Path = options.out
     shutil.rmtree(results, ignore_errors=True)
     (results / "logs").mkdir(parents=True)
     python = os.environ.get("COGLAB_TEST_PYTHON", "/usr/bin/python3")
@@ -199,7 +177,7 @@ def main(arguments: list[str]) -> int:
     for program in programs:
         if program.kind == "rostest":
             run_one(program)
-    print(f"all tests: {time.monotonic() - start:.0f} s; JUnit files and logs: {results.relative_to(top)}")
+    print(f"all tests: {time.monotonic() - start:.0f} s; JUnit files and logs: {os.path.relpath(results)}")
     if not options.packages and not options.long:
         record_times(top, "test", time.monotonic() - start)
     return report(programs, results)

@@ -14,8 +14,20 @@ from coglab_bringup.trial_recorder import Trial
 
 # Okabe and Ito's colours: told apart by colour-blind readers too
 COLOURS = ["#0072B2", "#E69F00", "#009E73", "#D55E00", "#56B4E9", "#CC79A7", "#1B1F24"]
+CONTACT = COLOURS[3]
 JOINTS = ["A1", "A2", "E1", "A3", "A4", "A5", "A6"]
 FINGERS = ["thumb abduction", "thumb", "index", "middle", "ring+little"]
+TEXT = 7  # pt, smallest text of the picture, which is made for the width of a page (7.2 inch)
+STYLE = {
+    "font.size": 8,
+    "axes.labelsize": 8,
+    "legend.fontsize": TEXT,
+    "xtick.labelsize": TEXT,
+    "ytick.labelsize": TEXT,
+    "lines.linewidth": 1.0,
+    "legend.frameon": False,
+    "pdf.fonttype": 42,
+}
 
 
 def _column(rows: list[tuple], index: int, origin: float) -> tuple[np.ndarray, np.ndarray]:
@@ -65,69 +77,146 @@ def rows_without_overlap(intervals: list[tuple[float, float, str]]) -> list[list
     return rows
 
 
-def _phases(axis: plt.Axes, trial: Trial, start: float, end: float) -> None:
-    """A lane per container that was active, a bar per state; parallel children share the lane's height."""
-    lanes = []
-    for path, intervals in sorted(state_intervals(trial, end).items(), key=lambda item: (item[0].count("/"), item[0])):
+def lanes_of(trial: Trial, start: float, end: float) -> list[tuple[str, list[list[tuple[float, float, str]]]]]:
+    """The rows of the phases, from the outermost container inwards: label and intervals between `start` and `end`.
+
+    Containers of one name at one depth, such as the approach of each action, share a lane.
+    """
+    lanes: dict[tuple[int, str], list[tuple[float, float, str]]] = {}
+    for path, intervals in state_intervals(trial, end).items():
         seen = [(max(since, start), min(until, end), name) for since, until, name in intervals]
         seen = [interval for interval in seen if interval[1] > interval[0]]
         if seen:
-            lanes.append((path.rsplit("/", 1)[-1], rows_without_overlap(seen)))
+            lanes.setdefault((path.count("/"), path.rsplit("/", 1)[-1]), []).extend(seen)
+    order = sorted(lanes, key=lambda lane: (lane[0], min(lanes[lane])))
+    return [(name, rows_without_overlap(lanes[depth, name])) for depth, name in order]
+
+
+def colours_of(names: list[str]) -> dict[str, tuple]:
+    """One colour for each name, wherever it appears."""
+    palette = plt.get_cmap("tab20").colors
+    return {name: palette[k % len(palette)] for k, name in enumerate(dict.fromkeys(names))}
+
+
+def _phases(axis: plt.Axes, trial: Trial, start: float, end: float) -> None:
+    """A lane per container that was active, a bar per state; parallel children share the lane's height. A name is
+    written where it fits into its bar."""
+    lanes = lanes_of(trial, start, end)
+    colours = colours_of([name for _, rows in lanes for row in rows for _, _, name in row])
+    axis.set_xlim(0.0, end - start)
+    axis.set_ylim(len(lanes) - 0.5, -0.5)
+    axis.figure.canvas.draw()  # the width of the bars in the picture has to be known
+    renderer = axis.figure.canvas.get_renderer()
     for lane, (_, rows) in enumerate(lanes):
         height = 0.84 / len(rows)
         for level, row in enumerate(rows):
             centre = lane - 0.42 + (level + 0.5) * height
-            for k, (since, until, name) in enumerate(row):
-                colour = COLOURS[(k + level) % 6]
-                axis.barh(centre, until - since, left=since - start, height=height, color=colour, alpha=0.35,
-                          edgecolor=COLOURS[6], lw=0.5)  # fmt: skip
-                if until - since > 0.03 * (end - start):
-                    axis.text(since - start + 0.02, centre, name, va="center", fontsize=6, clip_on=True)
-    axis.set_yticks(range(len(lanes)), [name for name, _ in lanes], fontsize=6)
-    axis.invert_yaxis()
+            for since, until, name in row:
+                (bar,) = axis.barh(
+                    centre,
+                    until - since,
+                    left=since - start,
+                    height=height,
+                    color=colours[name],
+                    alpha=0.6,
+                    edgecolor=COLOURS[6],
+                    lw=0.4,
+                )
+                label = axis.text(
+                    (since + until) / 2 - start,
+                    centre,
+                    name.replace("_", " "),
+                    ha="center",
+                    va="center",
+                    fontsize=TEXT,
+                    clip_on=True,
+                )
+                space, needed = bar.get_window_extent(renderer), label.get_window_extent(renderer)
+                if needed.width > space.width - 2 or needed.height > space.height + 2:
+                    label.remove()
+    axis.set_yticks(range(len(lanes)), [name.replace("_", " ") for name, _ in lanes])
+    axis.tick_params(axis="y", length=0)
+
+
+def _hands(path_axis: plt.Axes, speed_axis: plt.Axes, truth: list[tuple], start: float) -> None:
+    """Paths and speeds of the robot's and the person's hand, as they really were."""
+    times, robot = _column(truth, 1, start)
+    _, human = _column(truth, 2, start)
+    for k, name in enumerate("xyz"):
+        path_axis.plot(times, robot[:, k], color=COLOURS[k], label=f"robot {name}")
+        path_axis.plot(times, human[:, k], color=COLOURS[k], ls="--", label=f"person {name}")
+    speed_axis.plot(*_speed(times, robot), color=COLOURS[0], label="robot's hand")
+    speed_axis.plot(*_speed(times, human), color=COLOURS[3], ls="--", label="person's hand")
+
+
+def _torques(axis: plt.Axes, rows: list[tuple], start: float) -> None:
+    """External torques, a trace per joint above the next one, all on one scale that the bar at the right shows."""
+    times, torques = _column(rows, 1, start)
+    step = float(np.max(np.ptp(torques, axis=0))) or 1.0
+    for k in range(len(JOINTS)):
+        axis.axhline(-k * step, color="0.85", lw=0.5)
+        axis.plot(times, torques[:, k] - k * step, color=COLOURS[k], lw=0.7)
+    axis.set_yticks([-k * step for k in range(len(JOINTS))], JOINTS)
+    size = float(f"{step:.0g}")
+    x = 1.02 * axis.get_xlim()[1]
+    axis.plot([x, x], [-3 * step - size / 2, -3 * step + size / 2], color=COLOURS[6], lw=2, clip_on=False)
+    axis.text(x * 1.008, -3 * step, f"{size:g} Nm", va="center", fontsize=TEXT, clip_on=False)
+
+
+def _fingers(axis: plt.Axes, rows: list[tuple], start: float) -> None:
+    """Positions of the five motors."""
+    times, positions = _column(rows, 1, start)
+    for k, name in enumerate(FINGERS):
+        axis.plot(times, positions[:, k], color=COLOURS[k], label=name)
+
+
+def _contact_lines(axes: list[plt.Axes], contacts: list[tuple], start: float) -> None:
+    """Vertical lines where the detector reported, explained beside the phases."""
+    kinds = {True: ("contact or load felt", ":"), False: ("load taken over", "--")}
+    for axis in axes:
+        for t, found, _ in contacts:
+            axis.axvline(t - start, color=CONTACT, lw=0.9, ls=kinds[bool(found)][1])
+    shown = [kinds[found] for found in (True, False) if any(bool(c[1]) is found for c in contacts)]
+    handles = [plt.Line2D([], [], color=CONTACT, lw=0.9, ls=style, label=label) for label, style in shown]
+    if handles:
+        axes[0].legend(handles=handles, loc="upper left", bbox_to_anchor=(1.0, 1.0))
 
 
 def draw_trial(trial: Trial, title: str, start: float, end: float, path: Path) -> None:
-    """Writes the picture of the trial between `start` and `end` (s of ROS time) as PNG."""
-    figure, axes = plt.subplots(
-        5, 1, figsize=(10, 11), sharex=True, height_ratios=[1.3, 1.5, 1, 1.2, 1], layout="constrained"
-    )
-    _phases(axes[0], trial, start, end)
-    axes[0].set_title(title, fontsize=10, loc="left")
-    truth = [row for row in trial.truth if start <= row[0] <= end]
-    if len(truth) > 2:
-        times, robot = _column(truth, 1, start)
-        _, human = _column(truth, 2, start)
-        _, force = _column(truth, 4, start)
-        for k, name in enumerate("xyz"):
-            axes[1].plot(times, robot[:, k], color=COLOURS[k], label=f"robot {name}")
-            axes[1].plot(times, human[:, k], color=COLOURS[k], ls="--", label=f"person {name}")
-        axes[2].plot(*_speed(times, robot), color=COLOURS[0], label="robot hand")
-        axes[2].plot(*_speed(times, human), color=COLOURS[3], ls="--", label="person's hand")
-        force_axis = axes[4].twinx()
-        force_axis.plot(times, force, color=COLOURS[6], lw=0.8, label="force on the palm")
-        force_axis.set_ylabel("N", fontsize=8)
-        force_axis.legend(fontsize=6, loc="upper right")
-    axes[1].set_ylabel("hand paths, m", fontsize=8)
-    axes[2].set_ylabel("speed, m/s", fontsize=8)
-    if trial.external_torques:
-        times, torques = _column(trial.external_torques, 1, start)
-        for k, name in enumerate(JOINTS):
-            axes[3].plot(times, torques[:, k], color=COLOURS[k], lw=0.7, label=name)
-    axes[3].set_ylabel("external torque, Nm", fontsize=8)
-    if trial.fingers:
-        times, positions = _column(trial.fingers, 1, start)
-        for k, name in enumerate(FINGERS):
-            axes[4].plot(times, positions[:, k], color=COLOURS[k], lw=0.9, label=name)
-    axes[4].set_ylabel("finger position", fontsize=8)
-    axes[4].set_xlabel("time, s", fontsize=8)
-    for axis in axes:
-        for t, found, _ in trial.contacts:  # dotted: contact or load; dashed: the load was taken over
-            axis.axvline(t - start, color="#D55E00", lw=0.8, ls=":" if found else "--")
-        axis.tick_params(labelsize=7)
-        axis.grid(alpha=0.25)
-        axis.set_xlim(0.0, end - start)
-        if axis.get_legend_handles_labels()[0]:
-            axis.legend(fontsize=6, ncols=4, loc="upper left")
-    figure.savefig(path, dpi=110)
-    plt.close(figure)
+    """Writes the picture of the trial between `start` and `end` (s of ROS time): `path` as PNG, beside it a PDF."""
+    with plt.rc_context(STYLE):
+        figure, axes = plt.subplots(
+            6, 1, figsize=(7.2, 9.0), sharex=True, height_ratios=[2.2, 1.6, 0.9, 1.7, 1.0, 0.7], layout="constrained"
+        )
+        labels = (
+            "",
+            "position, m",
+            "speed, m/s",
+            "external torque",
+            "finger position\n(0..254)",
+            "force on\nthe palm, N",
+        )
+        for axis, label in zip(axes, labels, strict=True):
+            axis.set_ylabel(label)
+            axis.grid(alpha=0.25, lw=0.5)
+            axis.set_xlim(0.0, end - start)
+        axes[0].set_title(title, fontsize=8, loc="left")
+        truth = [row for row in trial.truth if start <= row[0] <= end]
+        if len(truth) > 2:
+            _hands(axes[1], axes[2], truth, start)
+            axes[5].plot(*_column(truth, 4, start), color=COLOURS[6], lw=0.8)
+        torques = [row for row in trial.external_torques if start <= row[0] <= end]
+        if torques:
+            _torques(axes[3], torques, start)
+        fingers = [row for row in trial.fingers if start <= row[0] <= end]
+        if fingers:
+            _fingers(axes[4], fingers, start)
+        for axis in axes[1:]:
+            if axis.get_legend_handles_labels()[0]:
+                axis.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
+        axes[-1].set_xlabel("time, s")
+        _contact_lines(list(axes), [row for row in trial.contacts if start <= row[0] <= end], start)
+        _phases(axes[0], trial, start, end)
+        figure.savefig(path, dpi=160)
+        figure.savefig(path.with_suffix(".pdf"))
+        plt.close(figure)

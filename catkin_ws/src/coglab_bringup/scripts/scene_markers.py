@@ -1,0 +1,99 @@
+#!/usr/bin/python3
+"""The node /scene_markers: what rviz needs besides robot and person to show what is going on.
+
+Publishes coglab/scene (visualization_msgs/MarkerArray, latched, 5 Hz): pedestal, board (frame `board`), while a motion
+runs its goal (frame `dmp_goal`) and the path of the primitive from where it began to that goal, and a line of text from
+coglab/state. Subscribes controller_manager/dmp/feedback and coglab/state. Nothing in control reads any of it.
+Parameters: coglab/dmp_library (XML file of the primitives), ~board_size (m along x, y of the frame `board`).
+Where a primitive was loaded from another file later, its path is not drawn.
+"""
+
+import sys
+import threading
+
+import coglab_controllers as cc
+import numpy as np
+import rospy
+import tf2_ros
+from coglab_bringup import scene
+from coglab_msgs.msg import DmpFeedback, MasterState
+from visualization_msgs.msg import MarkerArray
+
+PERIOD = 0.2  # s
+RUNNING = ("running", "holding")
+
+
+class SceneMarkers:
+    """Redraws five times a second from the newest frames and messages."""
+
+    def __init__(self) -> None:
+        self.library = cc.Library()
+        self.library.load(rospy.get_param("coglab/dmp_library"))
+        self.board_size = tuple(rospy.get_param("~board_size", [0.40, 0.50]))
+        self.lock = threading.Lock()
+        self.words = ""
+        self.primitive, self.start = "", None  # of the motion that runs; start: m in the base, (3,)
+        self.frames = tf2_ros.Buffer()
+        self.listener = tf2_ros.TransformListener(self.frames)
+        self.publisher = rospy.Publisher("coglab/scene", MarkerArray, queue_size=1, latch=True)
+        rospy.Subscriber("controller_manager/dmp/feedback", DmpFeedback, self.on_feedback, queue_size=10)
+        rospy.Subscriber("coglab/state", MasterState, self.on_state, queue_size=1)
+
+    def on_state(self, message: MasterState) -> None:
+        """Text."""
+        self.words = scene.words_of(message.state, message.object_id, message.why)
+
+    def on_feedback(self, message: DmpFeedback) -> None:
+        """Where a motion begins, from its first feedback."""
+        with self.lock:
+            if message.state not in RUNNING:
+                self.primitive, self.start = "", None
+            elif self.primitive != message.primitive_id or self.start is None:
+                self.primitive, self.start = message.primitive_id, self.place("ih2_palm")
+
+    def place(self, frame: str) -> np.ndarray | None:
+        """Newest position of a frame in the robot's base, m (3,); None if it is not known."""
+        try:
+            t = self.frames.lookup_transform(scene.BASE, frame, rospy.Time(0)).transform.translation
+        except tf2_ros.TransformException:
+            return None
+        return np.array([t.x, t.y, t.z])
+
+    def motion(self) -> list:
+        """Goal and path of the motion under way, or their removal."""
+        with self.lock:
+            primitive, start = self.primitive, self.start
+        target = self.place("dmp_goal")
+        if not primitive or start is None or target is None:
+            return [scene.gone("goal"), scene.gone("path")]
+        if primitive not in self.library.ids():
+            return [scene.goal(target), scene.gone("path")]
+        chosen = self.library[primitive]
+        _, points, _ = cc.Dmp(chosen, position=start, goal=target).roll_out(target, 1.5 * chosen.duration, 0.02)
+        return [scene.goal(target), scene.path(np.asarray(points))]
+
+    def run(self) -> None:
+        """Publishes until shut-down."""
+        while not rospy.is_shutdown():
+            markers = [scene.pedestal(), *self.motion()]
+            board = self.place("board")
+            if board is not None:
+                markers += scene.board(self.board_size, board[2])
+            if self.words:
+                markers.append(scene.text(self.words))
+            self.publisher.publish(MarkerArray(markers))
+            rospy.sleep(PERIOD)
+
+
+def main() -> int:
+    """Entry point."""
+    rospy.init_node("scene_markers")
+    try:
+        SceneMarkers().run()
+    except rospy.ROSInterruptException:
+        pass
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,201 @@
+"""What the commands of ./coglab take: judged before anything is installed or built, with Python's own library alone.
+
+    python3 -m coglab_bringup.arguments TOP COMMAND [ARG ...]
+
+Exit status 0: fine; 2: refused, in one sentence that says what there is; 10: help was asked for and printed.
+The tools themselves parse with the same functions.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import re
+import shutil
+import sys
+from collections.abc import Iterable
+from pathlib import Path
+
+from coglab_bringup.launch_arguments import judge_launch
+from coglab_bringup.usage import Parser, Refused, master_port, seed, writable_file, writable_folder
+
+HELP_GIVEN = 10
+BUILD_OPTIONS = ("--upstream-smach",)
+BUILD_TARGETS = ("tests",)
+
+
+def demo_parser(top: Path) -> Parser:
+    """./coglab demo"""
+    parser = Parser(prog="coglab demo", description="Takes an object from the simulated person and gives it back.")
+    parser.add_argument("--headless", action="store_true", help="no rviz, whatever is installed")
+    parser.add_argument("--seed", type=seed, default=7, help="seed of the virtual person and of all noise")
+    parser.add_argument(
+        "--out",
+        type=writable_folder,
+        default=top / "out" / "demo",
+        metavar="DIR",
+        help="where result.json and trial.png go",
+    )
+    return parser
+
+
+def package_folders(sources: Path) -> dict[str, Path]:
+    """Folder of each package of the workspace by name."""
+    found = {}
+    for manifest in sorted(sources.rglob("package.xml")):
+        name = re.search(r"<name>\s*([\w-]+)\s*</name>", manifest.read_text(encoding="utf-8"))
+        if name:
+            found[name.group(1)] = manifest.parent
+    return found
+
+
+def find_benches(sources: Path) -> dict[str, list[Path]]:
+    """The files of each bench by its name, from the packages below `sources`."""
+    benches: dict[str, list[Path]] = {}
+    for path in sorted(sources.rglob("bench/bench_*.py")):
+        benches.setdefault(path.stem.removeprefix("bench_"), []).append(path)
+    return benches
+
+
+def _named(names: list[str], known: Iterable[str], what: str) -> None:
+    unknown = [name for name in names if name not in known]
+    if unknown:
+        raise Refused(f"no {what} named {', '.join(unknown)}; there are: {', '.join(known)}")
+
+
+def test_options(top: Path, words: list[str]) -> argparse.Namespace:
+    """./coglab test"""
+    parser = Parser(prog="coglab test", description="Runs every test; the last line counts them.")
+    parser.add_argument("packages", nargs="*", metavar="PACKAGE", help="default: all")
+    parser.add_argument("--long", action="store_true", help="the campaigns too (hours)")
+    parser.add_argument(
+        "--out",
+        type=writable_folder,
+        default=top / "out" / "test",
+        metavar="DIR",
+        help="where JUnit files and logs go; what was there is removed (default: out/test)",
+    )
+    options = parser.parse_args(words)
+    out: Path = options.out
+    if out.is_dir() and any(out.iterdir()) and not (out / "logs").is_dir():
+        raise Refused(f"--out {out} holds other files, and would be emptied; name a new folder")
+    _named(options.packages, package_folders(top / "catkin_ws" / "src"), "package")
+    return options
+
+
+def bench_options(top: Path, words: list[str]) -> argparse.Namespace:
+    """./coglab bench"""
+    parser = Parser(prog="coglab bench", description="Every figure beside its goal and a peer.")
+    parser.add_argument("names", nargs="*", metavar="NAME", help="default: all")
+    parser.add_argument("--json", type=writable_file, metavar="FILE", help="write the rows as a JSON list")
+    parser.add_argument("--long", action="store_true", help="the campaigns too (hours)")
+    options = parser.parse_args(words)
+    _named(options.names, find_benches(top / "catkin_ws" / "src"), "bench")
+    return options
+
+
+def ask_parser(command: str) -> Parser:
+    """./coglab start, status, hold, stop, reset: what is said to a system that runs."""
+    about = {
+        "start": "Waits for the hub, then starts an action; by default takes from the person, or gives back.",
+        "status": "State, object and why, of the system that runs.",
+        "hold": "Brakes and latches; ./coglab start reset goes on.",
+        "stop": "STOP: brakes, latches and ends the action; ./coglab start reset goes on.",
+    }[command]
+    parser = Parser(prog=f"coglab {command}", description=about)
+    if command == "start":
+        parser.add_argument(
+            "action",
+            nargs="?",
+            default="",
+            metavar="ACTION",
+            help="exchange_human_to_robot, exchange_robot_to_human, take, put, initialise, reset",
+        )
+        parser.add_argument("object_id", nargs="?", default="", metavar="OBJECT", help="of the object database")
+        parser.add_argument("--wait", type=float, default=90.0, metavar="S", help="for the hub, at most (default 90)")
+    parser.add_argument(
+        "-p", type=master_port, default=0, dest="port", metavar="PORT", help="of the ROS master, if several systems run"
+    )
+    return parser
+
+
+def _judge_install(top: Path, words: list[str]) -> None:
+    lines = (top / "debian-packages.txt").read_text(encoding="utf-8").splitlines()
+    groups = list(dict.fromkeys(line.split(":")[0] for line in lines if line and not line.startswith("#")))
+    unknown = [word for word in words if word not in groups]
+    if unknown:
+        raise Refused(f"no group named {', '.join(unknown)}; there are: {', '.join(groups)}")
+
+
+def _judge_build(_top: Path, words: list[str]) -> None:
+    unknown = [word for word in words if word not in BUILD_OPTIONS + BUILD_TARGETS]
+    if unknown:
+        raise Refused(f"build takes {', '.join(BUILD_OPTIONS + BUILD_TARGETS)}, not {', '.join(unknown)}")
+
+
+def _judge_shell(top: Path, words: list[str]) -> None:
+    path = os.pathsep.join((os.environ["PATH"], str(top / "catkin_ws" / "devel" / "bin")))
+    if words and (top / "catkin_ws" / "devel" / "setup.bash").exists() and not shutil.which(words[0], path=path):
+        raise Refused(
+            f"no command named '{words[0]}' in the PATH of this workspace; to build a new one: ./coglab build"
+        )
+
+
+def _judge_tool(command: str, verbs: dict[str, int], words: list[str]) -> None:
+    """`verbs`: what may come first, and how many more words it needs at least."""
+    if words[:1] == ["--folder"]:  # of object_tool.py, which may come first
+        words = words[2:]
+    if not words or words[0] not in verbs:
+        what = f"got '{words[0]}'" if words else "got nothing"
+        raise Refused(f"{command} expects one of: {', '.join(verbs)}; {what}")
+    if len(words) - 1 < verbs[words[0]]:
+        raise Refused(f"{command} {words[0]} expects a NAME")
+
+
+def _judge_nothing(command: str, words: list[str]) -> None:
+    if words:
+        raise Refused(f"{command} takes no arguments, got '{' '.join(words)}'")
+
+
+TOOLS = {"hand": {"trace": 0}, "controller": {"new": 1}, "object": {"new": 1, "check": 0, "list": 0}}
+
+
+def judge(top: Path, command: str, words: list[str]) -> None:
+    """Raises Refused for arguments that the command cannot use."""
+    if command == "demo":
+        demo_parser(top).parse_args(words)
+    elif command == "test":
+        test_options(top, words)
+    elif command == "bench":
+        bench_options(top, words)
+    elif command in ("start", "status", "hold", "stop"):
+        ask_parser(command).parse_args(words)
+    elif command == "launch":
+        judge_launch(top, words)
+    elif command == "shell":
+        _judge_shell(top, words)
+    elif command == "install":
+        _judge_install(top, words)
+    elif command == "build":
+        _judge_build(top, words)
+    elif command in TOOLS:
+        _judge_tool(command, TOOLS[command], words)
+    else:
+        _judge_nothing(command, words)
+
+
+def main(words: list[str]) -> int:
+    """See the head of this file."""
+    top, command, rest = Path(words[0]), words[1], words[2:]
+    try:
+        judge(top, command, rest)
+    except SystemExit:  # argparse printed its help
+        return HELP_GIVEN
+    except Refused as error:
+        print(f"[coglab] error: {error}", file=sys.stderr)
+        return 2
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

@@ -1,0 +1,154 @@
+"""The arguments of coglab.launch, judged by name and value: roslaunch ignores a name that it does not know, and a node
+that cannot use its value would be started again and again."""
+
+from __future__ import annotations
+
+import ast
+import re
+from collections.abc import Callable
+from pathlib import Path
+from xml.etree import ElementTree
+
+from coglab_bringup.usage import Refused, master_port, seed, writable_file
+
+ROSLAUNCH_OPTIONS = ("--screen", "--log", "-v", "--dump-params", "--nodes", "--files", "--ros-args", "--wait")
+BEHAVIOURS = "coglab_sim/src/coglab_sim/participant.py"
+CELL = "coglab_sim/config/cell.yaml"
+LIMITS = "lwr_description/config/joint_limits.yaml"
+CONVENTIONS = "lwr_fri_bridge/src/fri/krl_convention.cpp"
+HELP = """usage: ./coglab launch [-p PORT] [ARGUMENT:=VALUE ...] [OPTION of roslaunch ...]
+
+Starts coglab.launch on a free port of its own for the ROS master, or on PORT. Arguments, with what they are by default:
+"""
+
+
+def launch_arguments(sources: Path) -> dict[str, tuple[str, str]]:
+    """Default and meaning of each argument of coglab.launch, by name."""
+    tree = ElementTree.parse(sources / "coglab_bringup" / "launch" / "coglab.launch")
+    found = [arg.attrib for arg in tree.getroot().findall("arg") if "default" in arg.attrib]
+    return {arg["name"]: (arg["default"], arg.get("doc", "")) for arg in found}
+
+
+def _behaviours(sources: Path) -> list[str]:
+    for node in ast.parse((sources / BEHAVIOURS).read_text(encoding="utf-8")).body:
+        if isinstance(node, ast.Assign) and getattr(node.targets[0], "id", "") == "BEHAVIOURS":
+            return list(ast.literal_eval(node.value))
+    raise Refused(f"{BEHAVIOURS} holds no BEHAVIOURS")
+
+
+def cell_objects(sources: Path) -> list[str]:
+    """Objects that the simulated cell knows: the keys below `objects` of its configuration."""
+    block = re.search(r"^objects:\n((?:[ ]+.*\n|#.*\n)+)", (sources / CELL).read_text(encoding="utf-8"), re.MULTILINE)
+    return re.findall(r"^[ ]{2}(\w+):", block.group(1), re.MULTILINE) if block else []
+
+
+def _profiles(sources: Path) -> list[str]:
+    names = re.findall(r"^(\w+):\s*$", (sources / LIMITS).read_text(encoding="utf-8"), re.MULTILINE)
+    return names
+
+
+def _conventions(sources: Path) -> list[str]:
+    listed = re.search(r"kNames = \{(.*?)\}", (sources / CONVENTIONS).read_text(encoding="utf-8"), re.DOTALL)
+    return re.findall(r'"(\w+)"', listed.group(1)) if listed else []
+
+
+def _one_of(words: list[str], value: str) -> None:
+    if value not in words:
+        raise ValueError(f"there is no '{value}'; there are: {', '.join(words)}")
+
+
+def _number(low: float, high: float, value: str) -> None:
+    try:
+        inside = low <= float(value) <= high
+    except ValueError:
+        inside = False
+    if not inside:
+        raise ValueError(f"expected a number from {low:g} to {high:g}, got '{value}'")
+
+
+def _file(value: str) -> None:
+    if value and not Path(value).is_file():
+        raise ValueError(f"there is no file {value}")
+
+
+def _required_file(value: str) -> None:
+    if not Path(value).is_file():
+        raise ValueError(f"there is no file {value or '(empty name)'}")
+
+
+def _folder(value: str) -> None:
+    if not Path(value).is_dir():
+        raise ValueError(f"there is no folder {value or '(empty name)'}")
+
+
+def _address(value: str) -> None:
+    parts = value.split(".")
+    if len(parts) != 4 or not all(part.isdigit() and int(part) < 256 for part in parts):
+        raise ValueError(f"expected an address of this computer, such as 127.0.0.1, got '{value}'")
+
+
+def _whole(low: int, high: int, value: str) -> None:
+    if not value.isdigit() or not low <= int(value) <= high:
+        raise ValueError(f"expected a whole number from {low} to {high}, got '{value}'")
+
+
+def _rules(sources: Path) -> dict[str, Callable[[str], object]]:
+    """What each argument takes; a name that is missing here takes any text."""
+    boolean = ["true", "false"]
+    rules: dict[str, Callable[[str], object]] = {
+        "seed": seed,
+        "fri_period": lambda value: _number(0.001, 0.1, value),
+        "fri_address": _address,
+        "fri_port": lambda value: _whole(0, 65535, value),
+        "people": lambda value: _whole(1, 9, value),
+        "krl_convention": lambda value: _one_of(_conventions(sources), value),
+        "limits_profile": lambda value: _one_of(_profiles(sources), value),
+        "behaviour": lambda value: _one_of(_behaviours(sources), value),
+        "object": lambda value: value and _one_of(cell_objects(sources), value),
+        "objects": _folder,
+        "recording": _file,
+    }
+    for name in ("sim", "split", "rviz", "perfect_perception", "auto_trigger", "recogniser"):
+        rules[name] = lambda value: _one_of(boolean, value.lower())
+    for name in ("controllers", "dmp_library", "machines", "patterns"):
+        rules[name] = _required_file
+    for name in ("result_file", "log_file", "hand_trace"):
+        rules[name] = lambda value: value and writable_file(value)
+    return rules
+
+
+def split_port(words: list[str]) -> tuple[int, list[str]]:
+    """The port after `-p` (0: none) and the other words. Refused if it is none."""
+    if "-p" not in words:
+        return 0, words
+    at = words.index("-p")
+    try:
+        return master_port((words[at + 1 : at + 2] or [""])[0]), words[:at] + words[at + 2 :]
+    except Exception as error:
+        raise Refused(f"-p: {error}") from error
+
+
+def judge_launch(top: Path, words: list[str]) -> None:
+    """Refused for an argument or value that the launch file cannot use; prints the arguments for --help and exits."""
+    sources = top / "catkin_ws" / "src"
+    known = launch_arguments(sources)
+    if "-h" in words or "--help" in words:
+        rows = [f"  {name + ':=' + default:45} {meaning}" for name, (default, meaning) in known.items()]
+        print(HELP + "\n".join(rows))
+        raise SystemExit(0)
+    rules = _rules(sources)
+    for word in split_port(words)[1]:
+        name, equals, value = word.partition(":=")
+        if not equals:
+            if word not in ROSLAUNCH_OPTIONS:
+                options = ", ".join(ROSLAUNCH_OPTIONS)
+                raise Refused(f"launch expects ARGUMENT:=VALUE, -p PORT or one of {options}; got '{word}'")
+        elif name not in known:
+            raise Refused(f"coglab.launch has no argument '{name}'; there are: {', '.join(known)}")
+        elif "$(" not in value and name in rules:  # substitutions are roslaunch's to resolve
+            try:
+                rules[name](value)
+            except Refused:
+                raise
+            except Exception as error:  # the kinds of values tell by ValueError and by argparse's own error
+                raise Refused(f"{word}: {error}") from error

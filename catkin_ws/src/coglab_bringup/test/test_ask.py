@@ -1,0 +1,140 @@
+"""./coglab start, status and hold against a brain that publishes its latched state, on a master of its own."""
+
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip("coglab_msgs", reason="the workspace is not built or not sourced")
+from coglab_bringup.ask import brain_of
+from coglab_bringup.run_directory import free_port, record_run, running_systems
+
+TOP = Path(__file__).resolve().parents[4]
+HUB = "/coglab_master/wait_without_object"
+TAKES = ["exchange_human_to_robot", "take"]
+
+
+class BrainDouble:
+    """Serves /coglab/start as the brain does: what the hub takes while it is in a hub, else nothing."""
+
+    def __init__(self) -> None:
+        import rospy
+        from coglab_msgs.msg import MasterState
+        from coglab_msgs.srv import LwrCommand, LwrCommandResponse, Start, StartResponse
+
+        rospy.init_node("coglab", disable_rosout=True, disable_signals=True)
+        self.started = []
+        self._publisher = rospy.Publisher("/coglab/state", MasterState, queue_size=1, latch=True)
+        self._state = MasterState
+
+        def on_start(request):
+            accepted = self.now.in_hub and request.action in self.now.actions
+            if accepted:
+                self.started.append((request.action, request.object_id))
+                self.say("/coglab_master/exchange_human_to_robot", [])
+            words = "accepted" if accepted else f"refused: the hub takes {', '.join(self.now.actions)}"
+            return StartResponse(success=accepted, message=f"'{request.action}' {words}")
+
+        def on_command(request):
+            self.say("/coglab_master/stopped", ["reset"], "hold was asked for")
+            return LwrCommandResponse(success=True, message=f"{request.event} done")
+
+        rospy.Service("/coglab/start", Start, on_start)
+        rospy.Service("/lwr/command", LwrCommand, on_command)
+        rospy.set_param("/coglab_sim/cell/object/id", "mug")
+        self.say("/coglab_master/initialise/home", [])
+
+    def say(self, state: str, actions: list, why: str = "", object_id: str = "") -> None:
+        """Publishes the state; a hub is where actions are taken."""
+        self.now = self._state(state=state, actions=actions, in_hub=bool(actions), why=why, object_id=object_id)
+        self._publisher.publish(self.now)
+
+
+@pytest.fixture(scope="module")
+def brain():
+    port = free_port()
+    os.environ["ROS_MASTER_URI"] = f"http://127.0.0.1:{port}"
+    master = subprocess.Popen(["rosmaster", "--core", "-p", str(port)], stdout=subprocess.DEVNULL)
+    import rosgraph
+
+    end = time.monotonic() + 30.0
+    while not rosgraph.is_master_online() and time.monotonic() < end:
+        time.sleep(0.05)
+    double = BrainDouble()
+    assert brain_of(os.environ["ROS_MASTER_URI"])
+    yield double
+    master.terminate()
+    master.wait(10)
+
+
+def begin(*words: str) -> subprocess.Popen:
+    """./coglab WORDS with the master of this test named, output and errors as one text."""
+    port = os.environ["ROS_MASTER_URI"].rsplit(":", 1)[1]
+    environment = {**os.environ, "COGLAB_TOP": str(TOP)}
+    return subprocess.Popen(
+        [sys.executable, "-m", "coglab_bringup.ask", *words, "-p", port],
+        env=environment,
+        text=True,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+    )
+
+
+def ask(*words: str) -> tuple[int, str]:
+    """Exit status and output of ./coglab WORDS."""
+    process = begin(*words)
+    output, _ = process.communicate(timeout=60)
+    return process.returncode, output
+
+
+def test_start_waits_for_the_hub_and_takes_what_the_person_offers(brain):
+    process = begin("start")
+    line = process.stdout.readline()
+    assert "waiting for the hub" in line and "now: home" in line
+    brain.say(HUB, TAKES)
+    output, _ = process.communicate(timeout=60)
+    assert process.returncode == 0, output
+    assert brain.started == [("exchange_human_to_robot", "mug")]
+    brain.started.clear()
+
+
+def test_start_in_no_hub_ends(brain):
+    brain.say("/coglab_master/take/reach", [])
+    status, output = ask("start", "--wait", "0.5")
+    assert status == 1 and "no hub within" in output and "/coglab_master/take/reach" in output
+
+
+def test_hold_status_and_the_way_back(brain):
+    brain.say("/coglab_master/wait_with_object", ["exchange_robot_to_human", "put"], object_id="mug")
+    status, output = ask("status")
+    assert status == 0 and "wait_with_object (takes exchange_robot_to_human, put)" in output and "object: mug" in output
+    status, output = ask("hold")
+    assert status == 0 and "hold done; on again: ./coglab start reset" in output
+    status, output = ask("status")
+    assert "hold was asked for" in output and "next:   ./coglab start reset" in output
+    status, output = ask("start")
+    assert status == 1 and "stopped takes reset; name one" in output and "hold was" in output
+    status, output = ask("start", "reset")
+    assert status == 0 and brain.started == [("reset", "")], output
+
+
+def test_no_system_and_several(tmp_path, monkeypatch):
+    from coglab_bringup.ask import find_master
+    from coglab_bringup.usage import Refused
+
+    monkeypatch.setattr("coglab_bringup.ask.DEFAULT_MASTER", "http://127.0.0.1:9")
+    with pytest.raises(Refused, match="no system runs; start one: ./coglab launch"):
+        find_master(tmp_path, 0, "")
+    record_run(tmp_path, 4001, "launch")
+    assert find_master(tmp_path, 0, "http://localhost:11999") == "http://127.0.0.1:4001"
+    record_run(tmp_path, 4002, "demo")
+    with pytest.raises(Refused, match=r"-p 4001 \(launch\), -p 4002 \(demo\)"):
+        find_master(tmp_path, 0, "")
+    assert find_master(tmp_path, 0, "http://127.0.0.1:4002") == "http://127.0.0.1:4002"
+    # one that has ended is forgotten, also where another program has its process id now
+    runs = tmp_path / ".coglab" / "runs"
+    (runs / "4002.json").write_text(f'{{"command": "demo", "pid": {os.getpid()}, "start_time": "1"}}')
+    assert running_systems(tmp_path) == {4001: "launch"} and not (runs / "4002.json").exists()

@@ -1,0 +1,102 @@
+"""Nothing of a command outlives it: not what forks twice, has a session of its own and ignores every polite signal."""
+
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from tree_of_processes import Marked, wait_until
+
+TOP = Path(__file__).resolve().parents[4]
+TREE = Path(__file__).resolve().parents[1] / "src" / "coglab_bringup" / "process_tree.py"
+GONE_LIMIT = 20.0  # s; how fast it goes on an idle machine is for the campaign (test_process_campaign.py)
+
+# A node of roslaunch as bad as one can be: daemon by double fork, own session, deaf to all but SIGKILL.
+STUBBORN = """
+import os, signal, sys, time
+for sign in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+    signal.signal(sign, signal.SIG_IGN)
+if os.fork() == 0:
+    os.setsid()
+    if os.fork() == 0:
+        os.setsid()
+        time.sleep(300)
+    os._exit(0)
+os.wait()
+print("ready", flush=True)
+{end}
+"""
+STAYS = STUBBORN.format(end="time.sleep(300)")
+ENDS = STUBBORN.format(end="sys.exit(3)")
+ENTRY_POINTS = {
+    "module": [sys.executable, "-I", str(TREE), sys.executable, "-c"],
+    "coglab": [str(TOP / "coglab"), "shell", "/usr/bin/python3", "-c"],
+}
+
+
+def start(script: str, entry: str = "module") -> tuple[Marked, subprocess.Popen]:
+    """Starts the script and waits until its tree stands."""
+    marked = Marked()
+    process = subprocess.Popen(
+        [*ENTRY_POINTS[entry], script],
+        env=marked.environment(),
+        text=True,
+        stdout=subprocess.PIPE,
+        stdin=subprocess.DEVNULL,
+    )
+    assert process.stdout.readline() == "ready\n"
+    return marked, process
+
+
+def keeper_of(front: int) -> int:
+    """The only child of the front."""
+    return int(Path(f"/proc/{front}/task/{front}/children").read_text().split()[0])
+
+
+def test_signals_to_the_command_and_sigkill_of_each_of_the_two_above_it():
+    bystander = subprocess.Popen(["sleep", "300"])  # of the same parent and the same process group
+    runs = {}
+    for how in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP, signal.SIGKILL, "keeper"):
+        marked, process = runs[how] = start(STAYS)
+        assert len(marked.alive()) == 4  # two of ours, the command, its daemon
+        if how == "keeper":
+            os.kill(keeper_of(process.pid), signal.SIGKILL)
+        else:
+            process.send_signal(how)
+    for how, (marked, process) in runs.items():
+        assert wait_until(lambda m=marked: not m.alive(), GONE_LIMIT), (how, marked.alive())
+        assert process.wait(5) != 0
+    assert bystander.poll() is None
+    bystander.kill()
+    bystander.wait()
+
+
+def test_the_entry_point_killed():
+    marked, process = start(STAYS, "coglab")
+    process.kill()
+    process.wait(5)
+    assert wait_until(lambda: not marked.alive(), GONE_LIMIT), marked.alive()
+
+
+def test_a_command_that_leaves_a_daemon_and_ends():
+    marked, process = start(ENDS)
+    assert process.wait(GONE_LIMIT) == 3
+    assert not marked.alive()
+
+
+def test_a_polite_command_says_its_last_word_and_keeps_its_status():
+    script = "import signal, sys, time\ntry:\n    print('ready', flush=True); time.sleep(300)\n"
+    script += "except KeyboardInterrupt:\n    print('bye', flush=True); sys.exit(9)\n"
+    marked, process = start(script)
+    process.send_signal(signal.SIGINT)
+    assert process.wait(GONE_LIMIT) == 9 and process.stdout.read() == "bye\n"
+    assert not marked.alive()
+
+
+@pytest.mark.parametrize(
+    "command, status", [(["sh", "-c", "exit 7"], 7), (["/no/such/file"], 127), (["sh", "-c", "kill -9 $$"], 137)]
+)
+def test_the_status_of_the_command(command, status):
+    assert subprocess.run([*ENTRY_POINTS["module"][:3], *command], check=False).returncode == status

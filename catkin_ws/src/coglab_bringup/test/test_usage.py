@@ -1,0 +1,115 @@
+"""An argument that cannot be used: one sentence with what there is, before anything is installed or built."""
+
+import os
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+from coglab_bringup.arguments import judge
+from coglab_bringup.launch_arguments import judge_launch, launch_arguments
+from coglab_bringup.usage import Refused
+
+TOP = Path(__file__).resolve().parents[4]
+ABSENT = "coglab-test-no-such-package"
+
+REFUSED = {
+    "demo --seed -1": "expected a whole number from 0 to 2147483647, got '-1'",
+    "demo --seed 1.5": "expected a whole number",
+    "demo --out /proc/x": "/proc/x cannot be written",
+    "demo --bogus": "unrecognized arguments: --bogus",
+    "test nosuch": "no package named nosuch; there are: coglab_bringup, coglab_controllers",
+    "test --out /usr": "--out /usr holds other files",
+    "bench nosuch": "no bench named nosuch; there are: wall, ",
+    "bench --json /no/such/folder/x": "expected a file in a folder that exists, got /no/such/folder/x",
+    "launch bogus:=1": "coglab.launch has no argument 'bogus'; there are: sim, split",
+    "launch bogus": "launch expects ARGUMENT:=VALUE",
+    "launch object:=xyz": "there is no 'xyz'; there are: ball, bottle, mug, screwdriver, tea_box",
+    "launch behaviour:=silly": "there is no 'silly'; there are: normal, slow",
+    "launch recording:=/nope.bag": "there is no file /nope.bag",
+    "launch objects:=/nope": "there is no folder /nope",
+    "launch machines:=/nope": "there is no file /nope",
+    "launch fri_period:=1": "expected a number from 0.001 to 0.1, got '1'",
+    "launch fri_period:=nan": "expected a number from 0.001 to 0.1, got 'nan'",
+    "launch people:=0": "expected a whole number from 1 to 9",
+    "launch krl_convention:=x": "there are: coglab, centro_epiaggio, stanford, rcprg_tum, rtt_lwr",
+    "launch limits_profile:=x": "there are: default, t1",
+    "launch sim:=maybe": "there are: true, false",
+    "launch seed:=-1": "expected a whole number",
+    "launch log_file:=/no/such/x": "expected a file in a folder that exists",
+    "launch -p high": "expected a port number, such as 11411, got 'high'",
+    "launch -p": "expected a port number",
+    "install vizz": "no group named vizz; there are: run, build, test, viz",
+    "build nosuch": "build takes --upstream-smach, tests, not nosuch",
+    "docs foo": "docs takes no arguments, got 'foo'",
+    "doctor foo": "doctor takes no arguments, got 'foo'",
+    "shell nosuchcmd": "no command named 'nosuchcmd'",
+    "hand": "hand expects one of: trace; got nothing",
+    "controller new": "controller new expects a NAME",
+    "object paint": "object expects one of: new, check, list; got 'paint'",
+    "status now": "unrecognized arguments: now",
+    "start take mug cup": "unrecognized arguments: cup",
+    "start -p x": "expected a port number, such as 11411, got 'x'",
+}
+
+
+@pytest.fixture(scope="module")
+def bare(tmp_path_factory):
+    """The sources with a package list of which nothing is installed: to install or to build would be seen."""
+    top = tmp_path_factory.mktemp("bare")
+    shutil.copy(TOP / "coglab", top)
+    (top / "debian-packages.txt").write_text(f"run: {ABSENT}\nbuild: {ABSENT}\ntest: {ABSENT}\nviz: {ABSENT}\n")
+    (top / "catkin_ws" / "devel").mkdir(parents=True)
+    (top / "catkin_ws" / "src").symlink_to(TOP / "catkin_ws" / "src")
+    (top / "catkin_ws" / "devel" / "setup.bash").write_text("exit 99\n")
+    return top
+
+
+def run(top: Path, words: str) -> subprocess.CompletedProcess:
+    return subprocess.run(
+        [top / "coglab", *words.split()],
+        text=True,
+        timeout=60,
+        check=False,
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        env={**os.environ, "ROS_PACKAGE_PATH": ""},
+    )
+
+
+@pytest.mark.parametrize("words", REFUSED)
+def test_refused_by_name_with_what_there_is(words):
+    command, *rest = words.split()
+    with pytest.raises(Refused) as refusal:
+        judge(TOP, command, rest)
+    assert REFUSED[words] in str(refusal.value) and "\n" not in str(refusal.value)
+
+
+@pytest.mark.parametrize(
+    "words", ["demo --out /proc/x", "launch bogus:=1", "install vizz", "shell nosuchcmd", "start -p x"]
+)
+def test_refused_before_anything_is_done(bare, words):
+    ended = run(bare, words)
+    assert ended.returncode == 2, ended.stdout
+    (line,) = ended.stdout.splitlines()
+    assert line.startswith("[coglab] error: ") and REFUSED[words] in line
+    assert not (bare / ".coglab").exists() and not (bare / "out").exists()
+
+
+@pytest.mark.parametrize("words, part", [("demo --help", "--seed SEED"), ("launch --help", "fri_period:=0.005")])
+def test_help_does_nothing_else(bare, words, part):
+    ended = run(bare, words)
+    assert ended.returncode == 0 and part in ended.stdout
+    assert not (bare / ".coglab").exists()
+
+
+def test_every_value_that_the_launch_files_offer_is_taken():
+    """The lists that arguments are judged by are read from the places that define them."""
+    sources = TOP / "catkin_ws" / "src"
+    defaults = launch_arguments(sources)
+    judge_launch(TOP, [f"{name}:={value}" for name, (value, _) in defaults.items()])
+    for convention in defaults["krl_convention"][1].partition(": ")[2].split(", "):
+        judge_launch(TOP, [f"krl_convention:={convention}"])
+    for entry in (sources / "coglab_smach" / "objects").glob("*.yaml"):
+        judge_launch(TOP, [f"object:={entry.stem}"])
