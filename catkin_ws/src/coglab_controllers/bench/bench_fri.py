@@ -6,6 +6,8 @@ running to and fro. Blocks of 500 packets go to echo, bridge, bridge, echo; both
 one whose block it is first. The ratio of the medians of neighbouring blocks is judged by its median over all pairs,
 with the distribution-free 95 % interval of that median. The ratio of the 99th percentiles is shown beside the same
 ratio of echo against echo: on a machine that is not a real-time one it says more about the machine. Prints JSON.
+
+First, in lockstep and without ROS, limits and braking while datagrams are lost (docs/limits_under_loss.md).
 """
 from __future__ import annotations
 
@@ -24,18 +26,25 @@ from pathlib import Path
 QUADS = int(os.environ.get("COGLAB_BENCH_QUADS", "20"))
 LIMIT = 1.10
 PEER = "lwr_fri_bridge_latency_peer"
+LOSSES = "lwr_fri_bridge_loss_campaign"
+SEEDS = 1000 if os.environ.get("COGLAB_LONG") else 100  # 1000 take about 25 min
+# s by FRI period: A2 from the middle of its range to 0.05 rad before its limit, measured at commit 5828bb3, which did
+# not reckon with losses.
+MOTION_TIMES = {0.001: 1.270, 0.002: 1.274, 0.005: 1.285, 0.02: 1.360}
+MOTION_LIMIT = 1.1
+STOP_LIMIT = 1.5
 HOME = [-1.4349, -0.6086, 1.4986, 1.7048, 0.1857, 0.2152, 0.782]  # where the measuring peer stands
 AWAY = [value + 0.25 for value in HOME]
 PATIENCE = 60.0  # s, for each step of the start
 
 
-def find_peer() -> str:
-    """Path of the helper binary in the sourced workspace."""
+def find_binary(name: str) -> str:
+    """Path of a helper binary in the sourced workspace."""
     for prefix in os.environ.get("CMAKE_PREFIX_PATH", "").split(":"):
-        path = Path(prefix) / "lib" / "lwr_fri_bridge" / PEER
+        path = Path(prefix) / "lib" / "lwr_fri_bridge" / name
         if path.is_file():
             return str(path)
-    sys.exit(f"{PEER} not found: build the workspace and source its setup.bash")
+    sys.exit(f"{name} not found: build the workspace and source its setup.bash")
 
 
 def end(process: subprocess.Popen, limit: float = 20.0) -> None:
@@ -138,7 +147,7 @@ def measure() -> tuple[list[tuple[str, list[float]]], float]:
     """Blocks (kind, latencies in us, -1 missing), and the share of answers that moved the arm."""
     master = random.randint(20000, 40000)
     os.environ["ROS_MASTER_URI"] = f"http://127.0.0.1:{master}"
-    binary = find_peer()
+    binary = find_binary(PEER)
     launch = Path(__file__).resolve().parent / "fri.launch"
     processes = [subprocess.Popen(["roslaunch", "-p", str(master), str(launch)], stdout=sys.stderr)]
     motion = Motion()
@@ -175,7 +184,58 @@ def measure() -> tuple[list[tuple[str, list[float]]], float]:
     return blocks, moving
 
 
+def row(
+    figure: str,
+    value: float,
+    unit: str,
+    goal: str = "reported",
+    peer: str | None = None,
+    peer_value: float | None = None,
+    ok: bool = True,
+) -> dict[str, object]:
+    """A row as `./coglab bench` prints it."""
+    return {
+        "bench": "fri",
+        "figure": figure,
+        "value": round(value, 4),
+        "unit": unit,
+        "goal": goal,
+        "peer": peer,
+        "peer_value": None if peer_value is None else round(peer_value, 4),
+        "ok": ok,
+    }
+
+
+def loss_rows() -> list[dict[str, object]]:
+    """Limits, times and braking while datagrams are lost: one figure per period."""
+    run = subprocess.run([find_binary(LOSSES), str(SEEDS)], stdout=subprocess.PIPE, text=True, check=True, timeout=6000)
+    lines = [line.split() for line in run.stdout.splitlines()]
+    rows = []
+    for period in MOTION_TIMES:
+        approaches = [list(map(float, v[1:])) for v in lines if v[0] == "approach" and float(v[1]) == period]
+        beyond, failed = max(v[2] for v in approaches), sum(v[5] + v[6] for v in approaches)
+        above = max(max(v[3], v[4]) for v in approaches)
+        at = f"at {1e3 * period:g} ms"
+        rows.append(row(f"set-point beyond its bound {at}, {SEEDS} seeds x 0, 1, 5, 10 % loss x single, bursts x both "
+                        "kinds of controller", beyond, "mrad", "0", ok=beyond == 0.0 and failed == 0))
+        rows.append(row(f"speed or acceleration beyond its limit {at}, the same runs", above, "rad/s, rad/s^2",
+                        "<= 1e-6", ok=above <= 1e-6))
+    for period, before in MOTION_TIMES.items():
+        time_now = next(float(v[2]) for v in lines if v[0] == "motion" and float(v[1]) == period)
+        rows.append(row(f"full-speed motion of A2 to 0.05 rad before its limit at {1e3 * period:g} ms", time_now, "s",
+                        f"<= {MOTION_LIMIT:g} x before", "commit 5828bb3", before,
+                        time_now <= MOTION_LIMIT * before))
+    for _, period, bursts, _, mean, worst in (v for v in lines if v[0] == "stop"):
+        kind = "bursts of 1..5" if bursts == "1" else "single"
+        what = f"angle of stopping at 10 % loss ({kind}) over that without, {1e3 * float(period):g} ms"
+        rows.append(row(f"{what}, mean of {SEEDS}", float(mean), "ratio", f"<= {STOP_LIMIT:g}",
+                        ok=float(mean) <= STOP_LIMIT))
+        rows.append(row(f"{what}, largest", float(worst), "ratio"))
+    return rows
+
+
 def main() -> None:
+    losses = loss_rows()
     blocks, moving = measure()
     answered = [(kind, [v for v in values if v >= 0.0]) for kind, values in blocks]
     medians = [statistics.median(values) for _, values in answered]
@@ -196,29 +256,10 @@ def main() -> None:
         for kind in ("echo", "bridge")
     }
 
-    def row(
-        figure: str,
-        value: float,
-        unit: str,
-        goal: str = "reported",
-        peer: str | None = None,
-        peer_value: float | None = None,
-        ok: bool = True,
-    ) -> dict[str, object]:
-        return {
-            "bench": "fri",
-            "figure": figure,
-            "value": round(value, 4),
-            "unit": unit,
-            "goal": goal,
-            "peer": peer,
-            "peer_value": None if peer_value is None else round(peer_value, 4),
-            "ok": ok,
-        }
-
     print(
         json.dumps(
             [
+                *losses,
                 row(
                     f"answer latency, median of {len(ratios)} block ratios",
                     ratio,

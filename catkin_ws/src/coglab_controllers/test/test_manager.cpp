@@ -192,6 +192,7 @@ TEST(Manager, ControlThreadIdlesWithoutARobotAndSurvivesAStall) {
     sample.block = lwr_fri_bridge::MotionBlock::None;
     while (!stop) {
       ++sample.sequence;
+      sample.controller_ns += 5'000'000;
       sample.stamp_ns = manager.now_ns();
       port.publishSample(sample);
       thread.wake(true);

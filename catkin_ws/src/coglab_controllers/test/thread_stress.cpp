@@ -116,6 +116,7 @@ int main(int argc, char** argv) {
       sample.commanded_position = sample.position;
       sample.commanded_velocity = sample.velocity = command.velocity;
       ++sample.sequence;
+      sample.controller_ns += 5'000'000;
       sample.stamp_ns = manager.now_ns();
       port.publishSample(sample);
       control.wake(true);

@@ -133,9 +133,10 @@ void VirtualRobot::controlCycle(bool answered) {
   since_cycle_ = 0;
   coglab_controllers::RobotSample sample;
   bridge_.port().newestSample(sample);
-  const double dt =
-      last_sequence_ == 0 ? wanted : static_cast<double>(sample.sequence - last_sequence_) * period;
-  last_sequence_ = sample.sequence;
+  const double dt = last_controller_ns_ == 0
+                        ? wanted
+                        : 1e-9 * static_cast<double>(sample.controller_ns - last_controller_ns_);
+  last_controller_ns_ = sample.controller_ns;
   coglab_controllers::VelocityCommand command;
   cycle.run(sample, std::min(dt, cycle.settings().sample_timeout), command);
   bridge_.port().sendVelocity(command);

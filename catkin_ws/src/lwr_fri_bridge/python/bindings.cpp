@@ -143,6 +143,7 @@ py::dict sampleDict(const RobotSample& s) {
   py::dict d;
   d["sequence"] = s.sequence;
   d["stamp_ns"] = s.stamp_ns;
+  d["controller_ns"] = s.controller_ns;
   d["cycle_time"] = s.cycle_time;
   d["position"] = s.position;
   d["velocity"] = s.velocity;

@@ -4,12 +4,20 @@
 #include <cmath>
 
 namespace lwr_fri_bridge {
+namespace {
+
+// A step on the wire is off by up to 0.24e-6 rad (float32 at 3 rad, both ends), and 20 lost cycles
+// repeat it. rad
+constexpr double kWireRounding = 5e-6;
+
+}  // namespace
 
 BrakingReach brakingReach(double velocity, double acceleration, double max_acceleration,
                           double max_jerk) {
   const AxisProfile stop = planVelocity(velocity, acceleration, 0.0, max_acceleration, max_jerk);
   BrakingReach reach;
   reach.end = advance({0.0, velocity, acceleration}, stop, stop.totalTime()).position;
+  reach.time = stop.totalTime();
   reach.lowest = std::min(0.0, reach.end);
   reach.highest = std::max(0.0, reach.end);
   // The velocity changes its sign at most once, in the first phase, where the acceleration still
@@ -55,46 +63,72 @@ double brakingSpeed(double distance, double max_acceleration, double max_jerk, d
   return root * root;
 }
 
+double lossReserve(double speed, double time, double dt, double max_acceleration, double max_jerk,
+                   bool proven) {
+  using B = LossBudget;
+  if (!(speed > 0.0)) return 0.0;
+  // Up to kInARow cycles before each answer that brakes, and after the last one, whose step still
+  // has a length.
+  const double cycles = std::min(B::kPerWindow, B::kInARow * (time / dt + 2.0));
+  double way = cycles * dt * speed;
+  // Losses of later windows come at the speed that is left then. While the acceleration turns round
+  // (2 A/J) nothing is gained, at the end the speed lies above the straight line (A/J / 2).
+  const double late = 2.5 * max_acceleration / max_jerk;
+  const double spacing = (B::kWindow - B::kPerWindow) * dt;
+  for (double begin = spacing; begin < time; begin += spacing) {
+    const double left = std::min(speed, speed - max_acceleration * (begin - late));
+    if (left <= 0.0) break;
+    way += B::kPerWindow * dt * left;
+  }
+  if (!proven) return way;
+  return std::min(way, std::max(B::kTrusted * dt, B::kTrustedTime) * speed);
+}
+
 BrakingGuard::BrakingGuard(const JointLimits& limits, double margin)
-    : lower_(limits.lower_position.array() + margin),
-      upper_(limits.upper_position.array() - margin),
+    : lower_(limits.lower_position.array() + (margin + kWireRounding)),
+      upper_(limits.upper_position.array() - (margin + kWireRounding)),
       max_velocity_(limits.velocity),
       max_acceleration_(limits.acceleration),
       max_jerk_(limits.jerk) {}
 
-bool BrakingGuard::admissible(int joint, const AxisState& state, double target, double dt,
-                              double low, double high) const {
+/// What one step towards `target` and a stop after it may reach, losses included.
+BrakingGuard::Range BrakingGuard::reach(int joint, const AxisState& state, double target, double dt,
+                                        bool proven) const {
   const double a = max_acceleration_[joint], j = max_jerk_[joint];
-  const AxisProfile profile = planVelocity(state.velocity, state.acceleration, target, a, j);
-  const AxisState next = advance(state, profile, dt);
-  const BrakingReach reach = brakingReach(next.velocity, next.acceleration, a, j);
-  const double delay = next.velocity * dt;  // one cycle that passes before braking can begin
-  return next.position + reach.highest + std::max(0.0, delay) <= high &&
-         next.position + reach.lowest + std::min(0.0, delay) >= low;
+  const AxisState next =
+      advance(state, planVelocity(state.velocity, state.acceleration, target, a, j), dt);
+  const BrakingReach stop = brakingReach(next.velocity, next.acceleration, a, j);
+  // A lost cycle repeats the last step, so its speed counts as well as those to come; the latter
+  // peak where the present acceleration has been brought to zero.
+  const double step = (next.position - state.position) / dt;
+  const double coasting =
+      next.velocity + 0.5 * next.acceleration * std::abs(next.acceleration) / j;
+  const double up = std::max({0.0, step, next.velocity, coasting});
+  const double down = std::max({0.0, -step, -next.velocity, -coasting});
+  return {next.position + stop.lowest - lossReserve(down, stop.time, dt, a, j, proven),
+          next.position + stop.highest + lossReserve(up, stop.time, dt, a, j, proven)};
 }
 
-unsigned BrakingGuard::bound(const Interpolator& interpolator, double dt,
+unsigned BrakingGuard::bound(const Interpolator& interpolator, double dt, bool proven,
                              Vector7& target_velocity) const {
+  constexpr double tiny = 1e-12;
   unsigned cut = 0;
   for (int i = 0; i < 7; ++i) {
     const AxisState state = interpolator.axis(i);
     const double target = std::clamp(target_velocity[i], -max_velocity_[i], max_velocity_[i]);
     target_velocity[i] = target;
-    if (admissible(i, state, target, dt, lower_[i], upper_[i])) continue;
+    const auto within = [&](double part, double low, double high) {
+      const Range range = reach(i, state, part * target, dt, proven);
+      return range.low >= low && range.high <= high;
+    };
+    if (within(1.0, lower_[i], upper_[i])) continue;
 
     // What braking at once would reach is unavoidable; a joint outside its range must still be
     // allowed to come back.
-    const double a = max_acceleration_[i], j = max_jerk_[i];
-    const AxisState braked =
-        advance(state, planVelocity(state.velocity, state.acceleration, 0.0, a, j), dt);
-    const BrakingReach reach = brakingReach(braked.velocity, braked.acceleration, a, j);
-    const double delay = braked.velocity * dt;
-    const double tiny = 1e-12;
-    const double high =
-        std::max(upper_[i], braked.position + reach.highest + std::max(0.0, delay) + tiny);
-    const double low =
-        std::min(lower_[i], braked.position + reach.lowest + std::min(0.0, delay) - tiny);
-    if (admissible(i, state, target, dt, low, high) && (low < lower_[i] ? target >= 0.0 : true) &&
+    const Range braked = reach(i, state, 0.0, dt, proven);
+    const double high = std::max(upper_[i], braked.high + tiny);
+    const double low = std::min(lower_[i], braked.low - tiny);
+    if (within(1.0, low, high) && (low < lower_[i] ? target >= 0.0 : true) &&
         (high > upper_[i] ? target <= 0.0 : true)) {
       continue;
     }
@@ -103,7 +137,7 @@ unsigned BrakingGuard::bound(const Interpolator& interpolator, double dt,
     double good = 0.0, bad = 1.0;
     for (int step = 0; step < 30; ++step) {
       const double middle = 0.5 * (good + bad);
-      (admissible(i, state, middle * target, dt, low, high) ? good : bad) = middle;
+      (within(middle, low, high) ? good : bad) = middle;
     }
     target_velocity[i] = good * target;
     cut |= 1U << i;

@@ -1,18 +1,13 @@
 #include "lwr_fri_bridge/bridge.hpp"
 
 #include <algorithm>
-#include <chrono>
-#include <thread>
+#include <cmath>
+#include <iterator>
 
 namespace lwr_fri_bridge {
 namespace {
 
-constexpr double kBrakeTimeLimit =
-    3.0;  // s for the arm to come to rest before monitor mode is requested anyway
-constexpr double kWaitBeyondLimits =
-    2.0;  // s that command() waits beyond the limits of the request itself
 constexpr double kCommandCycles = 2.5;  // FRI cycles that a command lives at least
-constexpr std::size_t kKeptOutcomes = 64;
 
 bool allFinite(const Vector7& v) { return v.allFinite(); }
 
@@ -61,13 +56,17 @@ bool Bridge::compute(const std::uint8_t* datagram, std::size_t size, std::int64_
   connected_ = true;
   last_receive_ns_ = now_ns;
   const double dt = fri::cycleTimeOf(measurement_);
-  if (reception.fresh_session || reception.new_period) {
-    velocity_filter_.reset();
-    following_ = false;
+  if (reception.fresh_session || reception.new_period) velocity_filter_.reset();
+  if (first_contact || reception.new_period) following_ = false;
+  if (reception.fresh_session || reception.gap()) {
+    cycles_without_loss_ = 0;
+  } else if (cycles_without_loss_ < LossBudget::kProvenCycles) {
+    ++cycles_without_loss_;
   }
 
   sample_.stamp_ns = now_ns;
   sample_.cycle_time = dt;
+  sample_.controller_ns += static_cast<std::int64_t>(std::llround(1e9 * dt * reception.cycles));
   sample_.position = fri::jointsFromWire(measurement_.measured_position);
   sample_.velocity = velocity_filter_.update(sample_.position, reception.cycles, dt);
   sample_.torque = fri::jointsFromWire(measurement_.measured_torque);
@@ -93,12 +92,11 @@ bool Bridge::compute(const std::uint8_t* datagram, std::size_t size, std::int64_
   if (monitor) active_mode_ = wanted_mode_;
 
   answer = fri::CommandDatagram{};
+  // Before the answer is made, so that it is known when the answer is lost.
+  answer.header = session_.nextHeader();
   move(reception, answer);
   fillMode(answer);
   configurator_.write(answer.krl);
-  answer.header = session_.nextHeader();
-  sent_[answer.header.counter % sent_.size()] = {answer.header.counter, true,
-                                                 interpolator_.velocity()};
   return true;
 }
 
@@ -109,7 +107,6 @@ void Bridge::idle(std::int64_t now_ns) {
     following_ = false;
     session_.forget();
     leash_.reset();
-    for (Sent& sent : sent_) sent.valid = false;
   }
   const Configurator::Observation seen{connected_, sample_.sequence > 0 ? &measurement_ : nullptr,
                                        now_ns};
@@ -195,7 +192,10 @@ void Bridge::runSupervision(const Configurator::Observation& seen, bool fresh_se
   input.connected = connected_;
   input.fresh_session = fresh_session;
   input.command_mode = measurement_.state == static_cast<std::uint16_t>(fri::FriState::Command);
-  input.full_power = measurement_.power == fri::kAllDrivesOn;
+  input.full_power = fri::allDrivesOn(measurement_.power);
+  input.quality_unacceptable =
+      measurement_.quality == static_cast<std::uint16_t>(fri::Quality::Unacceptable);
+  input.drive_error = (measurement_.drive_error & fri::kAllDrivesOn) != 0;
   input.stands_still = interpolator_.standsStill();
   input.leashed = leash_.joint() >= 0;
   const std::uint32_t fall_backs = supervisor_.fallBacks(), epoch = supervisor_.epoch();
@@ -203,9 +203,13 @@ void Bridge::runSupervision(const Configurator::Observation& seen, bool fresh_se
   if (supervisor_.epoch() != epoch) permission_since_ns_ = seen.now_ns;
   if (supervisor_.fallBacks() != fall_backs) {
     configurator_.fellBack();
-    loss_ = watch_.judge({connected_, fresh_session, input.command_mode,
-                          seconds(last_receive_ns_, seen.now_ns), sample_.cycle_time,
-                          measurement_.timestamp, sample_.position});
+    // Poor quality and errors of a drive leave command mode in force, and have sentences of their own.
+    const bool still_there = input.command_mode && input.full_power && !fresh_session;
+    loss_ = still_there && connected_
+                ? CommandModeLoss{}
+                : watch_.judge({connected_, fresh_session, input.command_mode,
+                                seconds(last_receive_ns_, seen.now_ns), sample_.cycle_time,
+                                measurement_.timestamp, sample_.position});
   }
   if (supervisor_.state() == SupervisorState::Command) loss_ = CommandModeLoss{};
 
@@ -223,7 +227,7 @@ void Bridge::move(const fri::Reception& reception, fri::CommandDatagram& answer)
   bounded_joints_ = 0;
   const bool command_mode =
       measurement_.state == static_cast<std::uint16_t>(fri::FriState::Command);
-  if (command_mode && measurement_.power == fri::kAllDrivesOn) {
+  if (command_mode && fri::allDrivesOn(measurement_.power)) {
     follow(reception, answer);
   } else {
     mirror(answer);
@@ -240,32 +244,45 @@ void Bridge::mirror(fri::CommandDatagram& answer) {
   leash_.reset();
   following_ = false;
   command_expired_ = false;
+  session_.sent(fri::SentSetPoint());
+}
+
+/// The interpolator begins or goes on where the controller's set-point is, with the velocity and
+/// the acceleration that it has there.
+void Bridge::takeOver(const fri::Reception& reception) {
+  if (following_ && !reception.fresh_session && !reception.gap()) return;
+  float frame[fri::kFrameValues];
+  fri::cartesianSetPointOf(measurement_, frame);
+  fri::SetPointHistory& history = session_.history();
+  fri::SetPointState state;
+  if (following_) {
+    state = history.afterGap(measurement_, reception.fresh_session);
+    ++counters_.resumed_after_gap;
+  } else {
+    float joints[fri::kJoints];
+    fri::setPointOf(measurement_, joints);
+    state.position = fri::jointsFromWire(joints);
+  }
+  if (!following_ || reception.fresh_session) history.beginWith(measurement_, state);
+  interpolator_.resume(state.position, state.velocity, state.acceleration);
+  cartesian_.anchor(state.position, frame);
+  following_ = true;
+}
+
+void Bridge::noteSent(const Vector7& from, const fri::CommandDatagram& answer) {
+  fri::SentSetPoint sent;
+  sent.followed = true;
+  sent.from = from;
+  sent.position = interpolator_.position();
+  sent.velocity = interpolator_.velocity();
+  sent.acceleration = interpolator_.acceleration();
+  std::copy(std::begin(answer.cartesian_frame), std::end(answer.cartesian_frame), sent.frame);
+  session_.sent(sent);
 }
 
 void Bridge::follow(const fri::Reception& reception, fri::CommandDatagram& answer) {
-  float reported_joints[fri::kJoints], reported_frame[fri::kFrameValues];
-  fri::setPointOf(measurement_, reported_joints);
-  fri::cartesianSetPointOf(measurement_, reported_frame);
-  const bool cartesian = active_mode_.strategy == fri::ControlStrategy::CartesianImpedance;
-
-  if (!following_) {
-    interpolator_.reset(fri::jointsFromWire(reported_joints));
-    cartesian_.anchor(interpolator_.position(), reported_frame);
-    following_ = true;
-  } else if (reception.cycles > 1 || !reception.answer_arrived) {
-    // The controller went on by itself: take over where it is, at the speed of the answer it saw
-    // last. Its joint set-point means nothing in Cartesian impedance mode; there the frame is what
-    // it went on with.
-    const Sent& last_seen = sent_[reception.reflected % sent_.size()];
-    const bool known = last_seen.valid && last_seen.counter == reception.reflected;
-    const Vector7 velocity = known ? last_seen.velocity : interpolator_.velocity();
-    const Vector7 position =
-        cartesian ? interpolator_.position() : fri::jointsFromWire(reported_joints);
-    interpolator_.resume(position, velocity, Vector7::Zero());
-    cartesian_.anchor(interpolator_.position(), reported_frame);
-    ++counters_.resumed_after_gap;
-  }
-
+  takeOver(reception);
+  const Vector7 from = interpolator_.position();
   const Vector7 wanted = targetVelocity();
   Vector7 target = wanted;
   const double excess = (target.cwiseAbs().array() / config_.limits.velocity.array()).maxCoeff();
@@ -277,15 +294,17 @@ void Bridge::follow(const fri::Reception& reception, fri::CommandDatagram& answe
                 config_.limits, target);
   if (!was_leashed && leash_.joint() >= 0) ++counters_.leash_trips;
 
-  bounded_joints_ = braking_.bound(interpolator_, sample_.cycle_time, target);
+  const bool proven = cycles_without_loss_ >= LossBudget::kProvenCycles;
+  bounded_joints_ = braking_.bound(interpolator_, sample_.cycle_time, proven, target);
   if (bounded_joints_ != 0) ++counters_.position_bounds;
   interpolator_.step(target, sample_.cycle_time);
   fri::jointsToWire(interpolator_.position(), answer.joint_position);
-  if (cartesian) {
+  if (active_mode_.strategy == fri::ControlStrategy::CartesianImpedance) {
     cartesian_.frame(interpolator_.position(), answer.cartesian_frame);
   } else {
-    std::copy(std::begin(reported_frame), std::end(reported_frame), answer.cartesian_frame);
+    fri::cartesianSetPointOf(measurement_, answer.cartesian_frame);
   }
+  noteSent(from, answer);
 }
 
 Vector7 Bridge::targetVelocity() {
@@ -384,75 +403,6 @@ void Bridge::publish() {
   view.drive_warning = snapshot.drive_warning;
   view.cycle_time = sample_.cycle_time;
   if (!(view == last_view_) && changes_.push(view)) last_view_ = view;
-}
-
-// other threads
-
-std::uint32_t Bridge::submit(const std::string& text) {
-  const std::lock_guard<std::mutex> lock(mutex_);
-  collectOutcomes();
-  Snapshot newest;
-  snapshots_.read(newest);
-  Request request;
-  request.event = parseEvent(text, newest.mode);
-  request.ticket = next_ticket_++;
-  if (!requests_.push(request)) {
-    ++requests_dropped_;
-    Outcome dropped;
-    dropped.ticket = request.ticket;
-    dropped.kind = request.event.kind;
-    dropped.code = OutcomeCode::NotServed;
-    ended_[request.ticket] = dropped;
-  }
-  return request.ticket;
-}
-
-void Bridge::collectOutcomes() {
-  Outcome ended;
-  while (outcomes_.pop(ended)) ended_[ended.ticket] = ended;
-  while (ended_.size() > kKeptOutcomes) ended_.erase(ended_.begin());
-}
-
-Outcome Bridge::outcome(std::uint32_t ticket) {
-  const std::lock_guard<std::mutex> lock(mutex_);
-  collectOutcomes();
-  const auto found = ended_.find(ticket);
-  if (found == ended_.end()) {
-    Outcome pending;
-    pending.ticket = ticket;
-    return pending;
-  }
-  const Outcome ended = found->second;
-  ended_.erase(found);
-  return ended;
-}
-
-Outcome Bridge::command(const std::string& event) {
-  using Clock = std::chrono::steady_clock;
-  const auto began = Clock::now();
-  const std::uint32_t ticket = submit(event);
-  const double limit =
-      std::max(config_.requests.start_timeout, kBrakeTimeLimit + config_.requests.stop_timeout) +
-      kWaitBeyondLimits;
-  for (;;) {
-    Outcome ended = outcome(ticket);
-    if (ended.code != OutcomeCode::Pending) return ended;
-    const double waited = std::chrono::duration<double>(Clock::now() - began).count();
-    if (waited > limit) {
-      ended.code = OutcomeCode::NotServed;
-      ended.waited = waited;
-      return ended;
-    }
-    std::this_thread::sleep_for(std::chrono::milliseconds(2));
-  }
-}
-
-Snapshot Bridge::snapshot() {
-  const std::lock_guard<std::mutex> lock(mutex_);
-  Snapshot newest;
-  snapshots_.read(newest);
-  newest.counters.requests_dropped = requests_dropped_;
-  return newest;
 }
 
 }  // namespace lwr_fri_bridge

@@ -129,7 +129,7 @@ void Configurator::stepStart(const Observation& seen) {
       setPhase(fri::KrlPhase::Stop, seen);
       return finish(OutcomeCode::WrongStrategy, seen);
     }
-    if (m.power == fri::kAllDrivesOn) {
+    if (fri::allDrivesOn(m.power)) {
       setPhase(fri::KrlPhase::Running, seen);
       return finish(OutcomeCode::Done, seen);
     }

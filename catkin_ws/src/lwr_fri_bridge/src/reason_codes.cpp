@@ -22,6 +22,8 @@ constexpr Row<MotionBlock> kBlocks[] = {
     {MotionBlock::Held, Code::HELD},
     {MotionBlock::Stopping, Code::STOPPING},
     {MotionBlock::Leashed, Code::LEASHED},
+    {MotionBlock::PoorQuality, Code::POOR_QUALITY},
+    {MotionBlock::DriveError, Code::DRIVE_ERROR},
 };
 
 constexpr Row<OutcomeCode> kOutcomes[] = {

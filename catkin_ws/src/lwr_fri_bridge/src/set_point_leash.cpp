@@ -45,15 +45,23 @@ Vector7 leashOf(const ControlMode& mode, const LeashLengths& lengths) {
 bool SetPointLeash::update(const Interpolator& interpolator, const Vector7& measured,
                            const Vector7& wanted, const Vector7& leash, const JointLimits& limits,
                            Vector7& target) {
-  const Vector7 ahead = interpolator.position() - measured;
+  const Vector7 before = measured_once_ ? measured_ : measured;
+  measured_ = measured;
+  measured_once_ = true;
   if (joint_ < 0) {
+    // Of two measurements the one nearer to the set-point counts.
+    const Vector7 position = interpolator.position();
+    const auto newer_counts =
+        (position - measured).array().abs() < (position - before).array().abs();
+    const Vector7 arm = newer_counts.select(measured, before);
+    const Vector7 ahead = position - arm;
     for (int i = 0; i < 7; ++i) {
       const bool outward =
           interpolator.velocity()[i] * ahead[i] > 0.0 || target[i] * ahead[i] > 0.0;
       if (outward && std::abs(ahead[i]) > leash[i]) joint_ = i;
     }
     if (joint_ < 0) return false;
-    home_ = measured;
+    home_ = arm;
     for (int i = 0; i < 7; ++i) {
       direction_[i] =
           std::abs(ahead[i]) > kNoticeable * leash[i] ? std::copysign(1.0, ahead[i]) : 0.0;

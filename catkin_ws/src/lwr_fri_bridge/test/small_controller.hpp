@@ -1,11 +1,13 @@
 /// @file
-/// A robot controller just large enough for the tests of this package: keeps the set-point,
-/// extrapolates single losses, runs our own KRL convention. Independent of coglab_sim, which tests
-/// the bridge as a whole.
+/// A robot controller just large enough for the tests of this package: keeps the set-point, goes on
+/// with the last step or stands where an answer is lost, runs our own KRL convention. Independent
+/// of coglab_sim, which tests the bridge as a whole.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <iterator>
 #include <string>
 
 #include "lwr_fri_bridge/bridge.hpp"
@@ -38,8 +40,8 @@ class SmallController {
     fri::jointsToWire(measured_, m.measured_position);
     fri::jointsToWire(own_, m.commanded_position);
     fri::jointsToWire(offset_, m.commanded_position_offset);
-    for (int i = 0; i < 3; ++i) m.commanded_frame[5 * i] = m.commanded_frame_offset[5 * i] = 1.0F;
-    m.commanded_frame[3] = 0.6F;
+    std::copy(std::begin(frame_), std::end(frame_), m.commanded_frame);
+    for (int i = 0; i < 3; ++i) m.commanded_frame_offset[5 * i] = 1.0F;
     m.krl.ints[15] = fri::kCoglabProgramMark;
     m.krl.ints[0] = finished_;
     m.krl.ints[1] = finished_ != 0 ? 1 : 0;
@@ -47,19 +49,21 @@ class SmallController {
     return m;
   }
 
-  /// Takes the answer, or extrapolates if there is none.
+  /// Takes the answer; if there is none, goes on with the last step or stands.
   void take(const fri::CommandDatagram* answer) {
     Vector7 next = setPoint();
     if (answer != nullptr) {
       last_answer_ = answer->header.counter;
       next = fri::jointsFromWire(answer->joint_position);
       runProgram(answer->krl);
-    } else {
+    } else if (extrapolates) {
       next += last_step_;
     }
-    if (state == fri::FriState::Command && power == fri::kAllDrivesOn) {
+    if (state == fri::FriState::Command && fri::allDrivesOn(power)) {
       last_step_ = next - setPoint();
       offset_ = next - own_;
+      if (answer != nullptr && control == fri::ControlStrategy::CartesianImpedance)
+        std::copy(std::begin(answer->cartesian_frame), std::end(answer->cartesian_frame), frame_);
       if (!blocked) measured_ = setPoint();
     } else {
       last_step_.setZero();
@@ -101,6 +105,7 @@ class SmallController {
   double clock_offset = 0.0;  ///< s, of its time stamps
   bool obeys = true;     ///< whether the KRL program runs
   bool blocked = false;  ///< something holds the arm
+  bool extrapolates = true;  ///< goes on with the last step where an answer is lost; else it stands
   fri::CommandDatagram answer{};
 
  private:
@@ -117,6 +122,7 @@ class SmallController {
 
   double period_;
   Vector7 own_, offset_ = Vector7::Zero(), measured_, last_step_ = Vector7::Zero();
+  float frame_[fri::kFrameValues] = {1, 0, 0, 0.6F, 0, 1, 0, 0, 0, 0, 1, 0};
   std::uint16_t counter_ = 100, last_answer_ = 0;
   std::int32_t finished_ = 0;
   std::int64_t now_ns_ = 1'000'000'000;

@@ -79,7 +79,7 @@ TEST(Braking, noPositionLimitIsCrossedFromAnyState) {
       for (int i = 0; i < 7; ++i) wish[i] = part(random) > 0.0 ? 10.0 : -10.0;
       for (int step = 0; step < static_cast<int>(4.5 / dt) && step < 900; ++step) {
         Vector7 target = wish;
-        const unsigned cut = guard.bound(interpolator, dt, target);
+        const unsigned cut = guard.bound(interpolator, dt, false, target);
         at_border += cut != 0 ? 1 : 0;
         interpolator.step(target, dt);
         for (int i = 0; i < 7; ++i) {
@@ -102,7 +102,7 @@ TEST(Braking, standsAtTheBorderAndComesBack) {
   interpolator.reset(limits.upper_position - Vector7::Constant(0.5));
   for (int step = 0; step < 3000; ++step) {
     Vector7 target = limits.velocity;
-    guard.bound(interpolator, 0.002, target);
+    guard.bound(interpolator, 0.002, false, target);
     interpolator.step(target, 0.002);
   }
   for (int i = 0; i < 7; ++i) {
@@ -111,7 +111,7 @@ TEST(Braking, standsAtTheBorderAndComesBack) {
   }
   for (int step = 0; step < 500; ++step) {
     Vector7 target = Vector7::Constant(-0.3);
-    EXPECT_EQ(guard.bound(interpolator, 0.002, target), 0U);
+    EXPECT_EQ(guard.bound(interpolator, 0.002, false, target), 0U);
     interpolator.step(target, 0.002);
   }
   EXPECT_LT(interpolator.position()[0], guard.upper()[0] - 0.2);
@@ -125,13 +125,13 @@ TEST(Braking, aJointOutsideMayOnlyComeBack) {
   interpolator.reset(outside);
   for (int step = 0; step < 200; ++step) {
     Vector7 target = Vector7::Constant(0.5);
-    guard.bound(interpolator, 0.005, target);
+    guard.bound(interpolator, 0.005, false, target);
     interpolator.step(target, 0.005);
     ASSERT_LE(interpolator.position()[0], outside[0] + 1e-9);
   }
   for (int step = 0; step < 200; ++step) {
     Vector7 target = Vector7::Constant(-0.5);
-    guard.bound(interpolator, 0.005, target);
+    guard.bound(interpolator, 0.005, false, target);
     interpolator.step(target, 0.005);
   }
   EXPECT_LT(interpolator.position()[0], outside[0] - 0.3);
@@ -149,7 +149,7 @@ TEST(Braking, theWayToTheBorderIsSmooth) {
     Vector7 target = Vector7::Zero();
     target[0] = 5.0;
     const double before = interpolator.acceleration()[0];
-    guard.bound(interpolator, 0.001, target);
+    guard.bound(interpolator, 0.001, false, target);
     interpolator.step(target, 0.001);
     const double change = interpolator.acceleration()[0] - before;
     if (std::abs(change) > 0.05 && change * last_change < 0.0) ++turns;

@@ -88,9 +88,12 @@ void ControlThread::once(bool woken) {
   const double period = sample.cycle_time > 0.0 ? sample.cycle_time : target;
   periods_.store(std::max(1, static_cast<int>(std::ceil(target / period - 1e-6))),
                  std::memory_order_relaxed);
-  // The first one, and one after a silence, counts as one cycle.
-  const double dt = last_sequence_ == 0 ? target : static_cast<double>(passed) * period;
+  // By the controller's counter, because the arm moves on while measurements are lost. The first
+  // one counts as one cycle.
+  const double passed_time = 1e-9 * static_cast<double>(sample.controller_ns - last_controller_ns_);
+  const double dt = last_sequence_ == 0 ? target : passed_time;
   last_sequence_ = sample.sequence;
+  last_controller_ns_ = sample.controller_ns;
   VelocityCommand command;
   cycle_.run(sample, std::min(dt, cycle_.settings().sample_timeout), command);
   port_.sendVelocity(command);

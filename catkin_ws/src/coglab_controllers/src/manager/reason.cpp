@@ -21,6 +21,10 @@ ReasonCode codeOf(lwr_fri_bridge::MotionBlock block) noexcept {
       return ReasonCode::Stopping;
     case MotionBlock::Leashed:
       return ReasonCode::Leashed;
+    case MotionBlock::PoorQuality:
+      return ReasonCode::PoorQuality;
+    case MotionBlock::DriveError:
+      return ReasonCode::DriveError;
   }
   return ReasonCode::NotStarted;
 }

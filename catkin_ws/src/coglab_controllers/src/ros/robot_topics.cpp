@@ -71,6 +71,7 @@ void RobotTopics::onJoints(const sensor_msgs::JointState& joints) {
   last_stamp_ns_ = stamp;
   ++sample_.sequence;
   sample_.stamp_ns = stamp;
+  sample_.controller_ns = stamp;  // the topic carries no counter
   lwr_fri_bridge::VelocityCommand sent;
   sent_.read(sent);
   const bool follows = sample_.block == MotionBlock::None;

@@ -76,7 +76,7 @@ class VirtualRobot {
   std::int64_t now_ns_ = 1'000'000'000;  // a stamp of 0 would mean "none"
   bool measured_ = false;
   int since_cycle_ = 0;
-  std::uint64_t last_sequence_ = 0;
+  std::int64_t last_controller_ns_ = 0;  // of the sample of the last control cycle
   FrameTable frames_;
   ctrl_more::Logger
       logger_;  // of the feedback stage; without a sink: the answers of requests say what matters

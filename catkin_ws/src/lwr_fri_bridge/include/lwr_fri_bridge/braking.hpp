@@ -3,6 +3,8 @@
 /// stopped before its position limits, within its acceleration and jerk limits.
 #pragma once
 
+#include <cstdint>
+
 #include "lwr_fri_bridge/interpolator.hpp"
 
 namespace lwr_fri_bridge {
@@ -13,6 +15,7 @@ struct BrakingReach {
   double lowest = 0.0;   ///< rad, <= 0
   double highest = 0.0;  ///< rad, >= 0
   double end = 0.0;      ///< rad, where it comes to rest
+  double time = 0.0;     ///< s until then
 };
 
 /// Reach of the time-optimal stop from (velocity, acceleration). Real-time safe.
@@ -29,24 +32,49 @@ double brakingDistance(double speed, double max_acceleration, double max_jerk);
 /// tick ahead with the exact state (BrakingGuard).
 double brakingSpeed(double distance, double max_acceleration, double max_jerk, double delay);
 
+/// The cycles without our answer that the bridge reckons with while it brakes: as many as a
+/// controller rides through before it ends command mode (coglab_sim's figures; KUKA publishes
+/// none). docs/limits_under_loss.md says why the limits hold.
+struct LossBudget {
+  static constexpr double kInARow = 5.0;
+  static constexpr double kPerWindow = 20.0;  ///< of any kWindow cycles: quality UNACCEPTABLE
+  static constexpr double kWindow = 100.0;
+  /// A connection that has lost nothing for so many cycles is trusted to lose no more than
+  /// max(kTrusted cycles, kTrustedTime) during one stop. Matters for periods above 5 ms only, where
+  /// the full budget would cost much time near a limit.
+  static constexpr std::uint32_t kProvenCycles = 1000;
+  static constexpr double kTrusted = 6.0;
+  static constexpr double kTrustedTime = 0.1;  ///< s
+};
+
+/// Way (rad) that an axis may make in lost cycles of `dt` (s) while it stops within `time` (s),
+/// going on with at most `speed` (rad/s, >= 0) in each of them: an upper bound over all losses
+/// within the budget. `proven`: the connection is trusted, see LossBudget. Real-time safe.
+double lossReserve(double speed, double time, double dt, double max_acceleration, double max_jerk,
+                   bool proven);
+
 /// Bounds target velocities so that the interpolator's next step leaves every joint able to stop
-/// inside its position limits even if one more cycle passes at constant speed. A joint that is
-/// already outside may only stand or come back.
+/// inside its position limits whatever is lost within the LossBudget. A joint that is already
+/// outside may only stand or come back.
 class BrakingGuard {
  public:
   /// `margin` (rad) is kept from both ends of every range; it must leave room between them.
+  /// Another 5e-6 rad are kept for the rounding of the wire.
   BrakingGuard(const JointLimits& limits, double margin);
 
   /// Cuts `target_velocity` (rad/s) in place and returns the joints that were cut, bit i for joint
-  /// i. Real-time safe.
-  unsigned bound(const Interpolator& interpolator, double dt, Vector7& target_velocity) const;
+  /// i. `proven`: see LossBudget. Real-time safe.
+  unsigned bound(const Interpolator& interpolator, double dt, bool proven,
+                 Vector7& target_velocity) const;
 
   const Vector7& lower() const { return lower_; }
   const Vector7& upper() const { return upper_; }
 
  private:
-  bool admissible(int joint, const AxisState& state, double target, double dt, double low,
-                  double high) const;
+  struct Range {
+    double low, high;  // rad
+  };
+  Range reach(int joint, const AxisState& state, double target, double dt, bool proven) const;
 
   Vector7 lower_, upper_, max_velocity_, max_acceleration_, max_jerk_;
 };

@@ -36,7 +36,7 @@ struct BridgeCounters {
   std::uint64_t commands_invalid = 0;    ///< velocities that were not finite
   std::uint64_t commands_old_epoch = 0;  ///< computed before motion was allowed
   std::uint64_t command_timeouts = 0;    ///< commands stopped while a joint was moving
-  std::uint64_t resumed_after_gap = 0;   ///< went on from the controller's set-point after a loss
+  std::uint64_t resumed_after_gap = 0;   ///< took over the controller's set-point after a loss
   std::uint64_t position_bounds = 0;     ///< ticks in which braking distance bounded a joint
   std::uint64_t leash_trips = 0;
   std::uint64_t requests_dropped = 0;  ///< events that found the request queue full
@@ -150,23 +150,22 @@ class Bridge {
   const BridgeConfig& config() const { return config_; }
 
  private:
+  /// s for the arm to come to rest before monitor mode is requested anyway
+  static constexpr double kBrakeTimeLimit = 3.0;
+
   struct Request {
     std::uint32_t ticket = 0;
     Event event;
   };
-  struct Sent {
-    std::uint16_t counter = 0;
-    bool valid = false;
-    Vector7 velocity = Vector7::Zero();
-  };
-
   void serveRequests(const Configurator::Observation& seen);
   void serve(const Request& request, const Configurator::Observation& seen);
   void finish(const Request& request, OutcomeCode code);
   void runSupervision(const Configurator::Observation& seen, bool fresh_session);
   void move(const fri::Reception& reception, fri::CommandDatagram& answer);
   void mirror(fri::CommandDatagram& answer);
+  void takeOver(const fri::Reception& reception);
   void follow(const fri::Reception& reception, fri::CommandDatagram& answer);
+  void noteSent(const Vector7& from, const fri::CommandDatagram& answer);
   Vector7 targetVelocity();
   void collectOutcomes();
   void fillMode(fri::CommandDatagram& answer) const;
@@ -193,12 +192,12 @@ class Bridge {
   CommandModeLoss loss_;
   BridgeCounters counters_;
   VelocityCommand valid_command_;
-  std::array<Sent, 64> sent_{};
   std::int64_t last_receive_ns_ = 0;
   std::int64_t stop_began_ns_ = 0;
   std::int64_t permission_since_ns_ = 0;
   std::uint32_t stop_ticket_ = 0;
   unsigned bounded_joints_ = 0;
+  std::uint32_t cycles_without_loss_ = 0;
   bool connected_ = false;
   bool following_ = false;  // the last answer came from the interpolator
   bool monitor_asked_ = false;

@@ -44,6 +44,9 @@ struct RobotSample {
       0;  ///< number of measurements accepted since the bridge started; 0: none yet
   std::int64_t stamp_ns = 0;  ///< time of receipt, steady clock (lockstep: simulated time), ns
   double cycle_time = 0.0;    ///< FRI period, s
+  std::int64_t controller_ns =
+      0;  ///< time by the controller's counter since the bridge started, lost cycles included, ns;
+          ///< differences are the true dt (silence that ended the session counts one cycle)
   Vector7 position = Vector7::Zero();         ///< measured, rad
   Vector7 velocity = Vector7::Zero();         ///< from the velocity filter, rad/s
   Vector7 torque = Vector7::Zero();           ///< measured, Nm

@@ -24,7 +24,8 @@ struct LeashLengths {
 /// 0.5 rad. Real-time safe.
 Vector7 leashOf(const ControlMode& mode, const LeashLengths& lengths);
 
-/// The leash trips when the set-point of a joint moves away from the arm beyond the leash. From
+/// The leash trips when the set-point of a joint moves away from the arm beyond the leash, as two
+/// measurements in a row show it: a single false one moves nothing. From
 /// then on all joints stop, and those whose set-point is noticeably ahead return to where the arm
 /// was when it tripped: that point is fixed, so an arm that sags or is pushed does not drag the
 /// set-point along. It lets go when the set-points are back and the outward motion is not asked for
@@ -32,7 +33,10 @@ Vector7 leashOf(const ControlMode& mode, const LeashLengths& lengths);
 class SetPointLeash {
  public:
   /// Forgets a trip (monitor mode, no power: the set-point is the controller's).
-  void reset() { joint_ = -1; }
+  void reset() {
+    joint_ = -1;
+    measured_once_ = false;
+  }
 
   /// Judges one tick and, while tripped, overwrites `target` (rad/s) with the velocities of the
   /// return. `wanted`: velocities asked for by the user of the bridge, before any bound. `leash`
@@ -45,7 +49,9 @@ class SetPointLeash {
 
  private:
   int joint_ = -1;
-  Vector7 home_ = Vector7::Zero();  // measured positions at the trip
+  bool measured_once_ = false;
+  Vector7 measured_ = Vector7::Zero();  // of the tick before
+  Vector7 home_ = Vector7::Zero();  // measured positions at the trip, the nearer of two
   Vector7 direction_ =
       Vector7::Zero();  // sign of commanded - measured of the joints that must return, else 0
 };

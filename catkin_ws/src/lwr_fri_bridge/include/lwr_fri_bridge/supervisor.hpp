@@ -18,7 +18,8 @@ enum class SupervisorState : std::uint8_t {
   Command,       ///< started; target velocities are followed
   Holding,       ///< hold is latched
   Stopping,      ///< braking, or waiting for monitor mode
-  Stopped        ///< fell back, lost power, or command mode came unasked; needs `start`
+  Stopped        ///< fell back, lost power, poor quality, drive error, or command mode came
+                 ///< unasked; needs `start`
 };
 
 /// "disconnected", "monitor", ... as in LwrState.
@@ -30,6 +31,8 @@ struct SupervisorInput {
   bool fresh_session = false;  ///< the controller's counter began anew
   bool command_mode = false;
   bool full_power = false;
+  bool quality_unacceptable = false;
+  bool drive_error = false;
   bool stands_still = false;  ///< the interpolator stands
   bool leashed = false;       ///< SetPointLeash is tripped
 };
@@ -38,7 +41,8 @@ struct SupervisorInput {
 class Supervisor {
  public:
   // Events, from the user or the configurator.
-  void hold() { held_ = true; }
+  /// Brakes, at least until the arm stands, even if `reset` comes at once.
+  void hold() { held_ = braking_ = true; }
   void reset() { held_ = false; }
   void startBegins();
   void startEnds(bool reached);
@@ -57,13 +61,14 @@ class Supervisor {
   /// A stop was asked for and the arm has come to rest (or is not commanded any more): ask for
   /// monitor mode.
   bool readyForMonitor() const { return stopping_ && at_rest_; }
-  /// Times that command mode or power was lost while started.
+  /// Times that command mode, power, quality or a drive was lost while started.
   std::uint32_t fallBacks() const { return fall_backs_; }
 
  private:
   MotionBlock judge(const SupervisorInput& input) const;
 
   bool held_ = false;
+  bool braking_ = false;  // for a hold, until the arm stands
   bool started_ = false;
   bool starting_ = false;
   bool stopping_ = false;
@@ -72,6 +77,7 @@ class Supervisor {
   std::uint32_t fall_backs_ = 0;
   std::uint32_t epoch_ = 0;
   MotionBlock block_ = MotionBlock::Disconnected;
+  MotionBlock stopped_by_ = MotionBlock::NotStarted;  // why it needs a start
   SupervisorState state_ = SupervisorState::Disconnected;
 };
 

@@ -1,6 +1,8 @@
 #include "lwr_fri_bridge/fri/session.hpp"
 
+#include <algorithm>
 #include <cmath>
+#include <iterator>
 
 namespace lwr_fri_bridge::fri {
 namespace {
@@ -12,10 +14,11 @@ constexpr int kLargestGap = 1000;
 // may be a replay.
 constexpr int kProofOfRestart = 3;
 constexpr double kProofTime = 0.1;  // s
-// No joint of the arm is faster (KRC limit of A4, 250 deg/s), so no set-point is either; with half
-// as much again.
-constexpr float kFastestSetPoint = 6.6F;                          // rad/s
-constexpr float kSetPointAllowance = 0.02F;                       // rad
+// No joint is faster than the KRC's limits (rsidef7.dat: 120 120 160 160 250 220 220 deg/s), so
+// neither its set-point nor the arm is; with half as much again. rad/s
+constexpr float kFastest[kJoints] = {3.15F, 3.15F, 4.2F, 4.2F, 6.6F, 5.8F, 5.8F};
+constexpr float kSetPointAllowance = 0.02F;   // rad
+constexpr float kMeasuredAllowance = 0.005F;  // rad, noise and rounding
 constexpr float kLargestAngle = 6.4F;                             // rad; the arm reaches 2.97
 constexpr float kShortestCycle = 0.0005F, kLongestCycle = 0.11F;  // s; FRI offers 1..100 ms
 
@@ -60,35 +63,18 @@ bool plausible(const MeasurementDatagram& m) {
          allFinite(m.commanded_frame_offset);
 }
 
-void cartesianSetPointOf(const MeasurementDatagram& m, float (&frame)[kFrameValues]) {
-  const float* c = m.commanded_frame;
-  const float* o = m.commanded_frame_offset;
-  float rotation = 0.0F;
-  for (int row = 0; row < 3; ++row) {
-    for (int column = 0; column < 3; ++column) rotation += std::fabs(o[4 * row + column]);
-  }
-  for (int row = 0; row < 3; ++row) {
-    for (int column = 0; column < 4; ++column) {
-      float value = c[4 * row + column];
-      if (rotation > 0.0F) {
-        value = column == 3 ? c[4 * row + 3] : 0.0F;
-        for (int k = 0; k < 3; ++k) value += c[4 * row + k] * o[4 * k + column];
-      }
-      frame[4 * row + column] = value;
-    }
-  }
-}
-
-bool Session::setPointLeaps(const MeasurementDatagram& candidate, std::uint32_t cycles) const {
-  float now[kJoints];
-  setPointOf(candidate, now);
-  const float allowed = kSetPointAllowance + kFastestSetPoint *
-                                                 static_cast<float>(cycleTimeOf(candidate)) *
-                                                 static_cast<float>(cycles);
+bool Session::leaps(const MeasurementDatagram& candidate, std::uint32_t cycles) const {
+  float set_point[kJoints];
+  setPointOf(candidate, set_point);
+  const float time = static_cast<float>(cycleTimeOf(candidate)) * static_cast<float>(cycles);
+  bool leap = false;
   for (std::size_t i = 0; i < kJoints; ++i) {
-    if (!(std::fabs(now[i] - set_point_[i]) <= allowed)) return true;
+    const float reach = kFastest[i] * time;
+    leap = leap || !(std::fabs(set_point[i] - set_point_[i]) <= kSetPointAllowance + reach) ||
+           !(std::fabs(candidate.measured_position[i] - measured_[i]) <=
+             kMeasuredAllowance + reach);
   }
-  return false;
+  return leap;
 }
 
 bool Session::newPeriod(const MeasurementDatagram& candidate) const {
@@ -104,16 +90,16 @@ Verdict Session::checkOrder(const MeasurementDatagram& candidate, Reception& rec
   if (lenient_ && counter == 0 && candidate.header.reflected == 0) {
     reception.cycles = 1;
     reception.answer_arrived = true;
-    return setPointLeaps(candidate, 1) ? Verdict::Implausible : Verdict::Accepted;
+    return leaps(candidate, 1) ? Verdict::Implausible : Verdict::Accepted;
   }
   const auto difference =
       static_cast<std::int16_t>(static_cast<std::uint16_t>(counter - received_));
   if (difference == 0) return Verdict::Duplicate;
   if (difference < 0 || difference > kLargestGap) return Verdict::OutOfOrder;
   reception.cycles = static_cast<std::uint32_t>(difference);
-  reception.reflected = candidate.header.reflected;
   reception.answer_arrived = answered_ && candidate.header.reflected == sent_;
-  return setPointLeaps(candidate, reception.cycles) ? Verdict::Implausible : Verdict::Accepted;
+  return leaps(candidate, reception.cycles) || !history_.explains(candidate) ? Verdict::Implausible
+                                                                             : Verdict::Accepted;
 }
 
 Reception Session::receive(const std::uint8_t* bytes, std::size_t size,
@@ -169,7 +155,6 @@ Reception Session::receive(const std::uint8_t* bytes, std::size_t size,
   suspects_in_a_row_ = 0;
   if (reception.fresh_session) {
     answered_ = false;
-    reception.reflected = header.reflected;
   } else {
     if (reception.new_period) ++counters_.new_periods;
     counters_.lost_measurements += reception.cycles - 1;
@@ -179,6 +164,8 @@ Reception Session::receive(const std::uint8_t* bytes, std::size_t size,
   connected_ = true;
   received_ = header.counter;
   setPointOf(candidate, set_point_);
+  std::copy(std::begin(candidate.measured_position), std::end(candidate.measured_position),
+            measured_);
   period_ = cycleTimeOf(candidate);
   measurement = candidate;
   return reception;
@@ -190,7 +177,15 @@ Header Session::nextHeader() {
   return commandHeader(sent_, received_);
 }
 
+void Session::sent(SentSetPoint set_point) {
+  set_point.counter = sent_;
+  set_point.measurement = received_;
+  set_point.valid = true;
+  history_.record(set_point);
+}
+
 void Session::forget() {
+  history_.forget();
   connected_ = false;
   answered_ = false;
   suspects_in_a_row_ = 0;

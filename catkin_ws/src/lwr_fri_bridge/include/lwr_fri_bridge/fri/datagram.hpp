@@ -29,6 +29,8 @@ constexpr std::size_t kCartesian = 6;     ///< x y z Rz Ry Rx
 constexpr std::uint16_t kMeasurementId = 0x2006;
 constexpr std::uint16_t kCommandId = 0x1005;
 constexpr std::uint16_t kAllDrivesOn = 0x7F;  ///< `power` with one bit per joint
+/// Whether all seven drives have power; some controllers set higher bits too.
+constexpr bool allDrivesOn(std::uint16_t power) { return (power & kAllDrivesOn) == kAllDrivesOn; }
 constexpr std::uint16_t kDefaultPort = 49938;
 
 /// `state` of a measurement.
@@ -105,7 +107,7 @@ struct MeasurementDatagram {
   float jitter;                 ///< mean, s
   float miss_rate;              ///< mean
   std::uint32_t miss_counter;   ///< missed answers since the connection was opened
-  std::uint16_t power;          ///< drive power, one bit per joint
+  std::uint16_t power;          ///< drive power, one bit per joint in the lowest seven
   std::uint16_t control;        ///< ControlStrategy
   std::uint16_t drive_error;    ///< one bit per joint; leads to power off
   std::uint16_t drive_warning;  ///< one bit per joint
@@ -265,6 +267,11 @@ inline void setPointOf(const MeasurementDatagram& measurement, float (&set_point
     set_point[i] = measurement.commanded_position[i] + measurement.commanded_position_offset[i];
   }
 }
+
+/// The Cartesian set-point: KRC's own command moved by the frame that FRI added (commanded_frame *
+/// commanded_frame_offset). An offset whose rotation is all zeros (controllers that do not fill it)
+/// counts as none.
+void cartesianSetPointOf(const MeasurementDatagram& measurement, float (&frame)[kFrameValues]);
 
 /// Words as the controller's own displays use them; "?" for numbers outside the enumeration.
 const char* nameOf(FriState state);

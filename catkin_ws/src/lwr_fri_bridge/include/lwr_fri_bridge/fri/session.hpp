@@ -10,7 +10,7 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "lwr_fri_bridge/fri/datagram.hpp"
+#include "lwr_fri_bridge/fri/set_point_history.hpp"
 
 namespace lwr_fri_bridge::fri {
 
@@ -19,7 +19,8 @@ enum class Verdict : std::uint8_t {
   WrongSize,    ///< not 916 bytes, or the header says so
   WrongId,      ///< not a measurement of the known version
   Implausible,  ///< a value is not finite or outside of what a controller can send, the set-point
-                ///< leaps, or the period changes in command mode
+                ///< does not follow from what was sent, the arm cannot have got where it was
+                ///< measured, or the period changes in command mode
   Duplicate,    ///< same counter as the last accepted one
   OutOfOrder    ///< older than the last accepted one, or far ahead of it
 };
@@ -49,7 +50,9 @@ struct Reception {
   bool fresh_session = false;   ///< first datagram, or the controller's counter began anew
   bool new_period = false;      ///< FRI was opened again with another period
   bool answer_arrived = false;  ///< it reflects our last answer
-  std::uint16_t reflected = 0;  ///< counter of our answer that the controller saw last
+
+  /// Whether the controller had to do without one of our answers, or we without a measurement.
+  bool gap() const { return cycles > 1 || !answer_arrived; }
 };
 
 /// Real-time safe, one thread.
@@ -65,6 +68,11 @@ class Session {
   /// Header for the answer to the datagram accepted last; counts up.
   Header nextHeader();
 
+  /// Notes what the answer with that header told the controller; fills in the counters.
+  void sent(SentSetPoint set_point);
+  /// What was sent; it outlives a restart of the controller's counter.
+  SetPointHistory& history() { return history_; }
+
   /// After silence: the next datagram starts a fresh session, whatever its counter.
   void forget();
 
@@ -73,7 +81,7 @@ class Session {
 
  private:
   Verdict checkOrder(const MeasurementDatagram& candidate, Reception& reception);
-  bool setPointLeaps(const MeasurementDatagram& candidate, std::uint32_t cycles) const;
+  bool leaps(const MeasurementDatagram& candidate, std::uint32_t cycles) const;
   bool newPeriod(const MeasurementDatagram& candidate) const;
 
   bool lenient_;
@@ -83,7 +91,9 @@ class Session {
   std::uint16_t sent_ = 0;      // counter of our last answer
   std::uint16_t suspect_ = 0;   // counter of the last datagram out of order
   int suspects_in_a_row_ = 0;
-  float set_point_[kJoints] = {};
+  float set_point_[kJoints] = {};  // of the last accepted measurement
+  float measured_[kJoints] = {};
+  SetPointHistory history_;
   double period_ = 0.0;  // s, of the last accepted measurement
   SessionCounters counters_;
 };
@@ -93,10 +103,5 @@ double cycleTimeOf(const MeasurementDatagram& measurement);
 
 /// Whether all values that we use are finite and within what a controller can send.
 bool plausible(const MeasurementDatagram& measurement);
-
-/// The Cartesian set-point: KRC's own command moved by the frame that FRI added (commanded_frame *
-/// commanded_frame_offset). An offset whose rotation is all zeros (controllers that do not fill it)
-/// counts as none.
-void cartesianSetPointOf(const MeasurementDatagram& measurement, float (&frame)[kFrameValues]);
 
 }  // namespace lwr_fri_bridge::fri
