@@ -227,8 +227,13 @@ void BridgeRos::publishLoop() {
 
     const FriThreadStatistics thread = fri_thread_.statistics();
     if (thread.foreign != 0 && foreign == 0) {
-      ROS_WARN("lwr: a second sender, %s, uses the FRI port and is ignored; the peer is %s",
-               thread.last_foreign.c_str(), thread.peer.c_str());
+      const std::string& address = fri_thread_.controllerAddress();
+      const std::string peer =
+          address.empty() ? "the peer is " + thread.peer +
+                                "; if that is not the robot controller, set controller_address"
+                          : "controller_address is " + address;
+      ROS_WARN("lwr: a second sender, %s, uses the FRI port and is ignored; %s",
+               thread.last_foreign.c_str(), peer.c_str());
     }
     foreign = thread.foreign;
     const std::int64_t since = now.sample.stamp_ns != 0 ? now.sample.stamp_ns : started_ns_;

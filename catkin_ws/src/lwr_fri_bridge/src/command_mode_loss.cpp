@@ -71,9 +71,10 @@ CommandModeLoss CommandModeWatch::judge(const Facts& facts) const {
   const bool late = late_ > kLateCycles * facts.cycle_time;
   if (!facts.connected) {
     loss.seconds = facts.silence;
-    loss.cause = late               ? LossCause::ComputerLate
-                 : controller_here_ ? LossCause::ControllerStalled
-                                    : LossCause::ControllerSilent;
+    // A thread that slept through most of the silence cannot tell it from its own.
+    loss.cause = late && late_ > 0.5 * facts.silence ? LossCause::ComputerLate
+                 : controller_here_                  ? LossCause::ControllerStalled
+                                                     : LossCause::ControllerSilent;
   } else if (facts.fresh_session) {
     loss.cause = LossCause::BeganAnew;
   } else if (facts.command_mode) {

@@ -61,7 +61,8 @@ std::uint16_t reasonCode(MotionBlock block) { return codeOf(kBlocks, block); }
 
 std::uint16_t reasonCode(MotionBlock block, const CommandModeLoss& loss) {
   const bool lost = block == MotionBlock::Monitor || block == MotionBlock::NotStarted;
-  return lost && loss.byComputer() ? Code::COMPUTER_LATE : reasonCode(block);
+  if (lost && loss.byComputer()) return Code::COMPUTER_LATE;
+  return reasonCode(block);
 }
 
 std::uint16_t reasonCode(OutcomeCode code) { return codeOf(kOutcomes, code); }

@@ -353,12 +353,12 @@ class LwrNode(unittest.TestCase):
         subscriber = rospy.Subscriber("/lwr_ten/state", LwrState, states.append)
         try:
             twist.stop()
-            wait_for(lambda: robot.steps and max(robot.steps[-200:]) == 0.0, "standing still")
+            wait_for(lambda: robot.steps and max(robot.steps[-200:]) < 1e-6, "standing still")
             wait_for(lambda: states, "a state")
             epoch = states[-1].motion_epoch
             robot.silent = True  # its receive_timeout is 2 s here
             lost = wait_for(lambda: next((s for s in states if s.supervisor == "disconnected"), None), "the loss")
-            self.assertIn("was not run for", lost.reason)
+            self.assertIn("this computer", lost.reason)
             robot.silent = False
             wait_for(lambda: states[-1].motion_allowed, "motion allowed again, unasked")
             stopped = next(s for s in states if s.supervisor == "stopped")
@@ -366,7 +366,7 @@ class LwrNode(unittest.TestCase):
             self.assertTrue(stopped.reason.endswith("rosservice call /lwr_ten/command start"), stopped.reason)
             self.assertGreater(states[-1].motion_epoch, epoch)
             self.assertEqual(states[-1].reason_code, ReasonCode.NONE)
-            self.assertEqual(max(robot.steps[-50:]), 0.0)
+            self.assertLess(max(robot.steps[-50:]), 1e-6)
         finally:
             subscriber.unregister()
             self.end(node, robot, twist)
