@@ -61,6 +61,7 @@ class GoalPath : public ::testing::Test {
 
   void begin() {
     see(kGoal);
+    tick();
     ASSERT_TRUE(VirtualRobot::ok(robot_.dmp().execute(robot_.reach())));
     for (int frame = 0; frame < 5; ++frame) {
       see(kGoal);
@@ -114,6 +115,7 @@ TEST_F(GoalPath, ThreeFramesThatAgreeAreFollowed) {
     see(kOutlier);
     tick(20);
   }
+  tick(100);
   EXPECT_EQ(robot_.state(), MotionState::Running);
   EXPECT_GT(astray(), 0.2);
 }
@@ -160,7 +162,7 @@ TEST_F(GoalPath, AnyStampAndAnyNumberIsRefusedOrKeptOutWithoutAnException) {
   const std::uint32_t words[] = {0,          1,          999'999'999, 1'000'000'000,
                                  0x7FFFFFFF, 0x80000000, 0xFFFFFFFF};
   std::uniform_int_distribution<std::size_t> pick(0, std::size(words) - 1);
-  const std::string names[] = {"", "/", "human_hand", "lwr_base_link", std::string(70000, 'x')};
+  const std::string names[] = {"", "/", "human_hand", "other/", std::string(70000, 'x')};
   for (int i = 0; i < 3000; ++i) {
     geometry_msgs::TransformStamped seen;
     seen.header.stamp.sec = words[pick(random)];
@@ -191,7 +193,7 @@ TEST_F(GoalPath, AGoalOnTheTopicFromTheFutureIsRefused) {
   DmpController& dmp = robot_.dmp();
   DmpRequest request = robot_.reach();
   request.goal_frame.clear();
-  robot_.now_ns = steadyNow();
+  tick();
   const auto stamp = [](double ahead) { return steadyNow() + std::llround(1e9 * ahead); };
   ASSERT_TRUE(VirtualRobot::ok(dmp.setGoal("lwr_base_link", kGoal, stamp(0.0), 1000)));
   EXPECT_TRUE(refused(dmp.setGoal("lwr_base_link", kOutlier, stamp(10.0), 2000), {"s ahead"}));
