@@ -14,7 +14,7 @@ from geometry_msgs.msg import Pose
 
 from .pending import Pending
 from .ports import ContactEvent, Located, Recognition
-from .ros_calls import Newest, call, mapped
+from .ros_calls import SERVICE_WAIT, Newest, call, mapped
 
 
 class RosPerception:
@@ -25,7 +25,9 @@ class RosPerception:
         self._recognition = Newest(f"{namespace}/recognition", RecognitionMsg)
 
     def init_vision(self, time_limit: float) -> Pending:
-        return mapped(call(f"{self._ns}/init_vision", InitVision, timeout=time_limit), lambda r: r.message)
+        # A service that is not there is said before the limit of whoever waits runs out.
+        wait = max(0.5, min(SERVICE_WAIT, time_limit - 1.0))
+        return mapped(call(f"{self._ns}/init_vision", InitVision, wait, timeout=time_limit), lambda r: r.message)
 
     def locate_object(self, object_id: str, time_limit: float) -> Pending:
         pending = call(f"{self._ns}/locate_object", LocateObject, wait=2.0, object_id=object_id, timeout=time_limit)

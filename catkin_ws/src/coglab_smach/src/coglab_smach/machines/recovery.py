@@ -29,6 +29,7 @@ class EndMotion(CoglabState):
     blocked, nothing is touched at all: the operator decides, and the hand keeps what it holds."""
 
     default_time_limit = 12.0
+    ignores_stop = True
 
     def __init__(self, ctx: Context) -> None:
         super().__init__(ctx, outcomes=["succeeded", "stopped"])

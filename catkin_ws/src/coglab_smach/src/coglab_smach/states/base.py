@@ -78,7 +78,7 @@ class CoglabState(smach.State):
         self.ctx.journal.entered(f"{self.path()}/{self.label}")
         try:
             outcome, failure = self._run(ud)
-            if outcome != "failed" and self.preempt_requested():
+            if outcome not in ("failed", "preempted") and self.preempt_requested():
                 # Asked for after the last look: the work is done, but nothing may follow it.
                 outcome, failure = "preempted", Failure(f"{self.label} was preempted", (), ReasonCode.PREEMPTED)
             if outcome == "preempted":
