@@ -1,8 +1,8 @@
 #!/usr/bin/python3
 """The node /scene_markers: what rviz needs besides robot and person to show what is going on.
 
-Publishes coglab/scene (visualization_msgs/MarkerArray, latched, 5 Hz): pedestal, board (frame `board`), while a motion
-runs its goal (frame `dmp_goal`) and the path of the primitive from where it began to that goal, and a line of text from
+Publishes coglab/scene (visualization_msgs/MarkerArray, latched, 5 Hz): pedestal, board (frame `board`), during a motion
+its goal (frame `dmp_goal`) and the path of the primitive from where it began to that goal, and a line of text from
 coglab/state. Subscribes controller_manager/dmp/feedback and coglab/state. Nothing in control reads any of it.
 Parameters: coglab/dmp_library (XML file of the primitives), ~board_size (m along x, y of the frame `board`).
 Where a primitive was loaded from another file later, its path is not drawn.
@@ -10,6 +10,7 @@ Where a primitive was loaded from another file later, its path is not drawn.
 
 import sys
 import threading
+import time
 
 import coglab_controllers as cc
 import numpy as np
@@ -20,7 +21,8 @@ from coglab_msgs.msg import DmpFeedback, MasterState
 from visualization_msgs.msg import MarkerArray
 
 PERIOD = 0.2  # s
-RUNNING = ("running", "holding")
+SHOWN = ("running", "holding", "reached")  # states of a motion whose goal and path are drawn
+SILENCE = 1.0  # s without feedback after which the controller is taken to be idle
 
 
 class SceneMarkers:
@@ -33,6 +35,7 @@ class SceneMarkers:
         self.lock = threading.Lock()
         self.words = ""
         self.primitive, self.start = "", None  # of the motion that runs; start: m in the base, (3,)
+        self.heard = 0.0
         self.frames = tf2_ros.Buffer()
         self.listener = tf2_ros.TransformListener(self.frames)
         self.publisher = rospy.Publisher("coglab/scene", MarkerArray, queue_size=1, latch=True)
@@ -46,7 +49,8 @@ class SceneMarkers:
     def on_feedback(self, message: DmpFeedback) -> None:
         """Where a motion begins, from its first feedback."""
         with self.lock:
-            if message.state not in RUNNING:
+            self.heard = time.monotonic()
+            if message.state not in SHOWN:
                 self.primitive, self.start = "", None
             elif self.primitive != message.primitive_id or self.start is None:
                 self.primitive, self.start = message.primitive_id, self.place("ih2_palm")
@@ -62,7 +66,8 @@ class SceneMarkers:
     def motion(self) -> list:
         """Goal and path of the motion under way, or their removal."""
         with self.lock:
-            primitive, start = self.primitive, self.start
+            fresh = time.monotonic() - self.heard < SILENCE
+            primitive, start = (self.primitive, self.start) if fresh else ("", None)
         target = self.place("dmp_goal")
         if not primitive or start is None or target is None:
             return [scene.gone("goal"), scene.gone("path")]

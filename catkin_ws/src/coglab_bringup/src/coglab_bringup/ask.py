@@ -201,11 +201,13 @@ def main(arguments: list[str]) -> int:
     except Refused as error:
         print(f"[coglab] error: {error}", file=sys.stderr)
         return 1
-    finally:
-        sys.stdout.flush()
 
 
 if __name__ == "__main__":
-    code = main(sys.argv[1:])
+    try:
+        code = main(sys.argv[1:])
+        sys.stdout.flush()
+    except BrokenPipeError:  # whoever reads has seen enough
+        code = 0
     sys.stderr.flush()
     os._exit(code)  # at once: rospy's threads would take their time

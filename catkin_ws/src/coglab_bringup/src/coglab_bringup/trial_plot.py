@@ -9,6 +9,7 @@ import matplotlib
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
+from matplotlib.transforms import Bbox
 
 from coglab_bringup.trial_recorder import Trial
 
@@ -98,6 +99,17 @@ def colours_of(names: list[str]) -> dict[str, tuple]:
     return {name: palette[k % len(palette)] for k, name in enumerate(dict.fromkeys(names))}
 
 
+def _label(axis: plt.Axes, x: float, y: float, name: str, space: Bbox) -> None:
+    """Writes a name into its bar, in one line or a word a line; not at all where neither fits."""
+    renderer = axis.figure.canvas.get_renderer()
+    for words in (name, name.replace(" ", "\n")):
+        label = axis.text(x, y, words, ha="center", va="center", fontsize=TEXT, linespacing=0.9, clip_on=True)
+        needed = label.get_window_extent(renderer)
+        if needed.width <= space.width - 2 and needed.height <= space.height + 2:
+            return
+        label.remove()
+
+
 def _phases(axis: plt.Axes, trial: Trial, start: float, end: float) -> None:
     """A lane per container that was active, a bar per state; parallel children share the lane's height. A name is
     written where it fits into its bar."""
@@ -122,18 +134,9 @@ def _phases(axis: plt.Axes, trial: Trial, start: float, end: float) -> None:
                     edgecolor=COLOURS[6],
                     lw=0.4,
                 )
-                label = axis.text(
-                    (since + until) / 2 - start,
-                    centre,
-                    name.replace("_", " "),
-                    ha="center",
-                    va="center",
-                    fontsize=TEXT,
-                    clip_on=True,
+                _label(
+                    axis, (since + until) / 2 - start, centre, name.replace("_", " "), bar.get_window_extent(renderer)
                 )
-                space, needed = bar.get_window_extent(renderer), label.get_window_extent(renderer)
-                if needed.width > space.width - 2 or needed.height > space.height + 2:
-                    label.remove()
     axis.set_yticks(range(len(lanes)), [name.replace("_", " ") for name, _ in lanes])
     axis.tick_params(axis="y", length=0)
 
@@ -152,7 +155,8 @@ def _hands(path_axis: plt.Axes, speed_axis: plt.Axes, truth: list[tuple], start:
 def _torques(axis: plt.Axes, rows: list[tuple], start: float) -> None:
     """External torques, a trace per joint above the next one, all on one scale that the bar at the right shows."""
     times, torques = _column(rows, 1, start)
-    step = float(np.max(np.ptp(torques, axis=0))) or 1.0
+    low, high = np.percentile(torques, [0.5, 99.5], axis=0)  # one shock must not flatten all the rest
+    step = 1.2 * float(np.max(high - low)) or 1.0
     for k in range(len(JOINTS)):
         axis.axhline(-k * step, color="0.85", lw=0.5)
         axis.plot(times, torques[:, k] - k * step, color=COLOURS[k], lw=0.7)
