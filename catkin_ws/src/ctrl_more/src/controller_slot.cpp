@@ -194,6 +194,36 @@ void ControllerSlot::advanceGains(double dt) noexcept {
   gains_pending_ = true;
 }
 
+// What only some controllers need after update(): a closer look at what it left, and its state.
+// False if that was a fault, which is dealt with then.
+bool ControllerSlot::passes(StageRun& run) noexcept {
+  const FaultKind kind = judgeMore(run);
+  if (kind != FaultKind::None) {
+    takeFault(run, kind,
+              kind == FaultKind::Undeclared
+                  ? "it changed a reference that its description does not name"
+                  : nullptr);
+    return false;
+  }
+  if ((special_ & kStates) == 0) return true;
+  try {
+    controller_->state(Numbers<>(state_.data(), static_cast<int>(state_.size())));
+  } catch (const std::exception& e) {
+    takeFault(run, FaultKind::Exception, e.what());
+    return false;
+  } catch (...) {
+    takeFault(run, FaultKind::Exception, "state() threw something that is not a std::exception");
+    return false;
+  }
+  recordState(run);
+  return true;
+}
+
+void ControllerSlot::recordState(const StageRun& run) noexcept {
+  std::copy(state_.begin(), state_.end(),
+            records_ + run.buffer * record_size_ + 1 + 2 * total_);
+}
+
 void ControllerSlot::latch(const Cycle& cycle, FaultKind kind, const char* text) noexcept {
   fault_ = kind;
   wanted_ = false;

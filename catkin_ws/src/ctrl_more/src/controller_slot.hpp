@@ -152,6 +152,8 @@ class __attribute__((visibility("hidden"), aligned(64))) ControllerSlot {
   void takeFailure(StageRun& run) noexcept;
   void blendIn(const StageRun& run) noexcept;
   void runStopped(StageRun& run) noexcept;
+  bool passes(StageRun& run) noexcept;
+  void recordState(const StageRun& run) noexcept;
   void commit(const StageRun& run) noexcept;
   static void commitSignal(const Checked& c, const StageRun& run, double* record,
                            std::size_t total) noexcept;

@@ -116,9 +116,6 @@ void ControllerSlot::runEach(const std::vector<ControllerSlot*>& slots, StageRun
       if (!steady) s.catchUp();
       ModifiedControlStates modified(run.control, s.owner_);
       s.controller_->update(run.cycle, run.robot, run.original, modified);
-      if (s.special_ & kStates) {
-        s.controller_->state(Numbers<>(s.state_.data(), static_cast<int>(s.state_.size())));
-      }
     } catch (const std::exception& e) {
       // The text dies with the exception: it is used before that.
       s.takeFault(run, FaultKind::Exception, e.what());
@@ -131,16 +128,7 @@ void ControllerSlot::runEach(const std::vector<ControllerSlot*>& slots, StageRun
       s.takeFailure(run);
       continue;
     }
-    if (!s.hasGoodNumbers(run.data) || (s.special_ & kLimited) || kTest) {
-      const FaultKind kind = s.judgeMore(run);
-      if (kind != FaultKind::None) {
-        s.takeFault(run, kind,
-                    kind == FaultKind::Undeclared
-                        ? "it changed a reference that its description does not name"
-                        : nullptr);
-        continue;
-      }
-    }
+    if ((!s.hasGoodNumbers(run.data) || s.special_ != 0 || kTest) && !s.passes(run)) continue;
     if (kTimed && (!kTest || run.timed) && s.isLate(run)) {
       s.overrun(run);
       continue;
@@ -226,7 +214,6 @@ FaultKind ControllerSlot::judgeMore(StageRun& run) noexcept {
 CTRL_MORE_OFTEN void ControllerSlot::commit(const StageRun& run) noexcept {
   double* record = records_ + (run.buffer ? record_size_ : 0);
   if (last_ != run.buffer) last_ = run.buffer;
-  if (special_ & kStates) std::copy(state_.begin(), state_.end(), record + 1 + 2 * total_);
   *record++ = run.cycle_number;
   if (checked_count_ == 1) {
     commitSignal(checked_, run, record, total_);
@@ -353,6 +340,7 @@ void ControllerSlot::runStopped(StageRun& run) noexcept {
     correction::apply(w.kind, w.size, run.data + w.offset, c, run.data + w.offset);
   }
   commit(run);
+  recordState(run);
   if (blend_ >= 1.0 && !holding && activity_ == Activity::Stopping) setActivity(Activity::Off);
   // What this took is not the next controller's.
   if (run.timed) run.boundary_ns = steadyNow();
