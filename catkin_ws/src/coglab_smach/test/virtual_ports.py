@@ -69,7 +69,7 @@ class VirtualArm:
 
     def cancel_motion(self, reason):
         begun, answers = self.rig.t, {}
-        orders = {name: self.robot.ask_cancel(name, reason) for name in ("dmp", "ptp")}
+        orders = {name: self.robot.ask_cancel(name, reason) for name in self.rig.robot.loaded}
 
         def done():
             waited = self.rig.t - begun
