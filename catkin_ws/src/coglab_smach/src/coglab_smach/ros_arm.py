@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from typing import Any
 
 import rospy
-import tf2_ros
 from coglab_msgs.msg import (
     ControllerStatus,
     DmpFeedback,
@@ -29,7 +28,7 @@ from coglab_msgs.srv import (
     SwitchController,
     SwitchDmp,
 )
-from geometry_msgs.msg import Point, Quaternion, TransformStamped, Vector3
+from geometry_msgs.msg import Point, Quaternion
 from sensor_msgs.msg import JointState
 
 from .manager_limits import read_limits
@@ -42,8 +41,7 @@ JOINTS = ("lwr_a1", "lwr_a2", "lwr_e1", "lwr_a3", "lwr_a4", "lwr_a5", "lwr_a6")
 
 
 class RosArm:
-    """ArmPort over controller_manager and lwr; it drives the plug-ins loaded under the ids dmp and ptp. Shows the goal
-    of the running motion as tf frame ``dmp_goal``."""
+    """ArmPort over controller_manager and lwr; it drives the plug-ins loaded under the ids dmp and ptp."""
 
     def __init__(self, manager: str = "controller_manager", lwr: str = "lwr") -> None:
         self._manager, self._lwr = manager, lwr
@@ -59,7 +57,6 @@ class RosArm:
         self._cascade = Newest(f"{manager}/feedback/status", FeedbackStatus)
         self._ptp = Newest(f"{manager}/ptp/finished_ptp", FinishedPtp, self._on_finished)
         self._unfinished = Newest(f"{manager}/ptp/unfinished_ptp", UnfinishedPtp, self._on_unfinished)
-        self._shown_goal = tf2_ros.StaticTransformBroadcaster()
 
     def _on_finished(self, message: FinishedPtp) -> None:
         with self._lock:
@@ -174,7 +171,6 @@ class RosArm:
 
         def accepted(response: Any) -> None:
             self._started_at = time.monotonic()
-            self._show_goal(request)
 
         return self._ends_motion(mapped(pending, accepted))
 
@@ -186,15 +182,6 @@ class RosArm:
             self.cancel_motion("its owner has given up waiting")
 
         return Polled(pending.done, pending.result, cancel)
-
-    def _show_goal(self, request: DmpRequest) -> None:
-        """For whoever looks on: where the palm is to go, relative to the tracked frame. Nothing in control reads it."""
-        shown = TransformStamped()
-        shown.header.stamp = rospy.Time.now()
-        shown.header.frame_id, shown.child_frame_id = request.goal_frame, "dmp_goal"
-        shown.transform.translation = Vector3(*request.goal_offset)
-        shown.transform.rotation = Quaternion(*(request.target_orientation or (0.0, 0.0, 0.0, 1.0)))
-        self._shown_goal.sendTransform(shown)
 
     def switch_dmp(self, request: DmpRequest) -> Pending:
         return mapped(call(f"{self._manager}/dmp/switch_dmp", SwitchDmp, wait=1.0, **_dmp_fields(request)),
