@@ -67,9 +67,17 @@ class Contract:
 
 
 class ArmContract(Contract):
-    """ArmPort."""
+    """ArmPort. The robot node has just started."""
+
+    loaded = False
 
     def begin(self):
+        if not self.loaded:
+            # A node that has just started has nothing to cancel.
+            self.until(lambda: self.port.standing().ok, 10.0, "the arm at rest")
+            self.refused(self.port.switch_controller("ptp"), ReasonCode.UNKNOWN_NAME)
+            self.settle(self.port.cancel_motion("the contract"), 4.0)
+            self.loaded = True
         for name, kind in CONTROLLERS.items():
             self.settle(self.port.load_controller(name, kind), 20.0)
         if self.port.motion_allowed().ok:

@@ -69,7 +69,7 @@ class VirtualArm:
 
     def cancel_motion(self, reason):
         begun, answers = self.rig.t, {}
-        orders = {name: self.robot.ask_cancel(name, reason) for name in ("dmp", "ptp")}
+        orders = {name: self.robot.ask_cancel(name, reason) for name in self.rig.robot.loaded}
 
         def done():
             waited = self.rig.t - begun
@@ -168,11 +168,22 @@ class VirtualHand:
         except Exception as error:
             return Ready(error=PortError(str(error), code=getattr(error, "reason", 0)))
 
+        cancelled = []
+
         def value():
+            if cancelled:
+                raise PortError(f"{task.name} was cancelled", code=ReasonCode.CANCELLED)
             if not hand.verdict.ok:
                 raise PortError(f"{task.name} ended without success", (hand.verdict.text,))
 
-        return Polled(lambda: hand.verdict is not None, value)
+        def cancel():
+            # As the hand's node does: the motors stop where they are.
+            if hand.task is task:
+                cancelled.append(True)
+                hand.task = None
+                hand.driver.stop_all()
+
+        return Polled(lambda: bool(cancelled) or hand.verdict is not None, value, cancel)
 
     def calibrate(self, mode):
         hand = self.rig.hand

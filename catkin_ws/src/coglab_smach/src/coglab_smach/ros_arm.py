@@ -131,7 +131,11 @@ class RosArm:
             call_now(f"{self._manager}/{controller_id}/cancel", CancelMotion, Permit(), wait=1.0, time_limit=0.0,
                      reason=reason[:200])
         except PortError as error:
-            if error.code not in (ReasonCode.NOTHING_RUNS, ReasonCode.NOT_ACTIVE):
+            status = self._status.message
+            # A robot node that has started anew has nothing loaded: no service, and nothing that moves.
+            elsewhere = status is not None and status.active_controller != controller_id
+            gone = error.code == ReasonCode.NODE_SILENT and elsewhere
+            if not gone and error.code not in (ReasonCode.NOTHING_RUNS, ReasonCode.NOT_ACTIVE):
                 raise
 
     def motion_limits(self) -> MotionLimits:
