@@ -27,24 +27,45 @@ def main() -> int:
         report = Path(folder) / "report.json"
         environment = run_environment(free_port(), Path(folder))
         environment.update(COGLAB_LONG="1", COGLAB_FUZZ_REPORT=str(report))
-        subprocess.run(["rostest", "--time-limit", "1500", str(TEST)], env=environment, stdout=sys.stderr, timeout=1700,
-                       check=False)
+        subprocess.run(
+            ["rostest", "--time-limit", "1500", str(TEST)],
+            env=environment,
+            stdout=sys.stderr,
+            timeout=1700,
+            check=False,
+        )
         if not report.is_file():
             sys.exit(f"{TEST.name} left no report; see its output above")
         found = json.loads(report.read_text())
     sent, what = found["sent"], f"{found['topics']} topics and {found['services']} services of {found['nodes']} nodes"
-    rows = [(f"nodes that ended: {', '.join(found['ended']) or 'none'}", len(found["ended"]), "1", 0),
-            (f"topics that fell silent: {', '.join(found['silent']) or 'none'}", len(found["silent"]), "1", 0),
-            ("requests without an answer within 20 s", found["answers"].get("no answer", 0), "1", 0),
-            ("the arm moved by", 1000.0 * found["moved"], "mrad", 10.0)]
-    told = [(f"malformed messages sent, to {what}", sent.get("malformed", 0)),
-            ("messages sent that are valid by nature", sent.get("valid by nature", 0)),
-            (f"malformed requests answered with success: {json.dumps(found['accepted'])}",
-             sum(found["accepted"].values()))]
-    table = [dict(bench="fuzz", figure=figure, value=value, unit=unit, goal=f"<= {most:g}", peer=None, peer_value=None,
-                  ok=value <= most) for figure, value, unit, most in rows]
-    table += [dict(bench="fuzz", figure=figure, value=value, unit="1", goal="reported", peer=None, peer_value=None,
-                   ok=True) for figure, value in told]
+    rows = [
+        (f"nodes that ended: {', '.join(found['ended']) or 'none'}", len(found["ended"]), "1", 0),
+        (f"topics that fell silent: {', '.join(found['silent']) or 'none'}", len(found["silent"]), "1", 0),
+        ("requests without an answer within 20 s", found["answers"].get("no answer", 0), "1", 0),
+        ("the arm moved by", 1000.0 * found["moved"], "mrad", 10.0),
+    ]
+    told = [
+        (f"malformed messages sent, to {what}", sent.get("malformed", 0)),
+        ("messages sent that are valid by nature", sent.get("valid by nature", 0)),
+        (f"malformed requests answered with success: {json.dumps(found['accepted'])}", sum(found["accepted"].values())),
+    ]
+    table = [
+        dict(
+            bench="fuzz",
+            figure=figure,
+            value=value,
+            unit=unit,
+            goal=f"<= {most:g}",
+            peer=None,
+            peer_value=None,
+            ok=value <= most,
+        )
+        for figure, value, unit, most in rows
+    ]
+    table += [
+        dict(bench="fuzz", figure=figure, value=value, unit="1", goal="reported", peer=None, peer_value=None, ok=True)
+        for figure, value in told
+    ]
     print(json.dumps(table, indent=1))
     return 0
 

@@ -42,10 +42,11 @@ class FuzzTest(unittest.TestCase):
         rospy.init_node("fuzz")
         settle(READY_LIMIT)
         for service, kind, arguments in (
-                ("/controller_manager/load_controller", LoadController, ("dmp", "coglab/DmpController")),
-                ("/controller_manager/load_controller", LoadController, ("ptp", "coglab/PtpController")),
-                ("/lwr/command", LwrCommand, ("start",)),
-                ("/controller_manager/switch_controller", SwitchController, ("ptp",))):
+            ("/controller_manager/load_controller", LoadController, ("dmp", "coglab/DmpController")),
+            ("/controller_manager/load_controller", LoadController, ("ptp", "coglab/PtpController")),
+            ("/lwr/command", LwrCommand, ("start",)),
+            ("/controller_manager/switch_controller", SwitchController, ("ptp",)),
+        ):
             end = time.monotonic() + 20.0
             while not (answer := rospy.ServiceProxy(service, kind)(*arguments)).success:
                 if "in use" in answer.message:  # the brain was faster
@@ -57,16 +58,32 @@ class FuzzTest(unittest.TestCase):
         cls.before = cls.fuzz.talking(1.0)
         cls.report = cls.fuzz.run(PER_TOPIC, PER_SERVICE, limit=20.0)
         cls.after = cls.fuzz.talking(1.5)
-        report = {"nodes": len(cls.fuzz.nodes), "topics": len(cls.fuzz.topics), "services": len(cls.fuzz.services),
-                  "sent": cls.report.sent, "answers": cls.report.answers, "accepted": cls.report.accepted,
-                  "ended": cls.report.ended, "silent": sorted(cls.before - cls.after), "moved": cls.arm.farthest}
+        report = {
+            "nodes": len(cls.fuzz.nodes),
+            "topics": len(cls.fuzz.topics),
+            "services": len(cls.fuzz.services),
+            "sent": cls.report.sent,
+            "answers": cls.report.answers,
+            "accepted": cls.report.accepted,
+            "ended": cls.report.ended,
+            "silent": sorted(cls.before - cls.after),
+            "moved": cls.arm.farthest,
+        }
         print(json.dumps(report), flush=True)
         if "COGLAB_FUZZ_REPORT" in os.environ:
             Path(os.environ["COGLAB_FUZZ_REPORT"]).write_text(json.dumps(report))
 
     def test_1_everything_is_there(self):
-        for node in ("/robot", "/ih2_hand", "/coglab", "/object_database", "/contact_detector", "/perception",
-                     "/motion_recogniser", "/coglab_sim/cell"):
+        for node in (
+            "/robot",
+            "/ih2_hand",
+            "/coglab",
+            "/object_database",
+            "/contact_detector",
+            "/perception",
+            "/motion_recogniser",
+            "/coglab_sim/cell",
+        ):
             self.assertIn(node, self.fuzz.nodes)
         self.assertTrue({"/tf", "/tf_static", "/lwr/target_joint_states"} <= set(self.fuzz.topics))
         self.assertGreaterEqual(sum(self.report.sent.values()), 200)

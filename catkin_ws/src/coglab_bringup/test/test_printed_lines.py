@@ -123,9 +123,12 @@ def test_launch_files_resolve(command, folder):
     assert load_config_default([(str(file), arguments)], None, verbose=False).nodes
 
 
-def test_the_printed_feedback_list_is_one_that_ctrl_more_reads():
+def test_the_printed_feedback_list_is_whole():
+    """ctrl_more itself reads it in test_printed_lines_long.py, once the controller that it names is built."""
     text = printed_block("docs/how_to.md", "Your own feedback controller", "yaml")
     import yaml
 
     listed = yaml.safe_load(text)
-    assert listed["loadControllers"] == ["wrist_damper", "joint_limits"] and set(listed["profiles"]) == {"dmp", "ptp"}
+    loaded = listed["loadControllers"]
+    assert "wrist_damper" in loaded and all("type" in listed[name] for name in loaded)
+    assert all(name in loaded for profile in listed["profiles"].values() for name in profile)

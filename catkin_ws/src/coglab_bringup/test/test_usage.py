@@ -20,7 +20,7 @@ REFUSED = {
     "demo --bogus": "unrecognized arguments: --bogus",
     "test nosuch": "no package named nosuch; there are: coglab_bringup, coglab_controllers",
     "test --out /usr": "--out /usr holds other files",
-    "bench nosuch": "no bench named nosuch; there are: wall, ",
+    "bench nosuch": "no bench named nosuch; there are: ",
     "bench --json /no/such/folder/x": "expected a file in a folder that exists, got /no/such/folder/x",
     "launch bogus:=1": "coglab.launch has no argument 'bogus'; there are: sim, split",
     "launch bogus": "launch expects ARGUMENT:=VALUE",

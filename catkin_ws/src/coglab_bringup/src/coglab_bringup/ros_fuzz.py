@@ -30,10 +30,40 @@ LEFT_OUT = ("/coglab/stop",)
 EXCLUDED = (math.nan, math.inf, -math.inf, 1e308, -1e308)
 FLOATS = (*EXCLUDED, 5e-324, 0.0, -0.0, -1.0, 1e9, -1e9)
 WORDS = (0, 1, 999_999_999, 1_000_000_000, 2**31 - 1, 2**31, 2**32 - 1)
-ODD = (" ", "\0", "a\0b", "../../../../etc/passwd", "/dev/zero", "%s%n%x", "☃" * 50, "{[}:", "/", "//x", "~x", "-1",
-       "nan", "\N{RIGHT-TO-LEFT OVERRIDE}x", "\x1b[2J", "x" * 65536)
-KNOWN = ("", "mug", "human_hand", "object_mug", "board", "world", "lwr_base_link", "dmp", "ptp", "reach_human",
-         "joint_limits", "lwr_a1", "lwr_a2", "/coglab_master")
+ODD = (
+    " ",
+    "\0",
+    "a\0b",
+    "../../../../etc/passwd",
+    "/dev/zero",
+    "%s%n%x",
+    "☃" * 50,
+    "{[}:",
+    "/",
+    "//x",
+    "~x",
+    "-1",
+    "nan",
+    "\N{RIGHT-TO-LEFT OVERRIDE}x",
+    "\x1b[2J",
+    "x" * 65536,
+)
+KNOWN = (
+    "",
+    "mug",
+    "human_hand",
+    "object_mug",
+    "board",
+    "world",
+    "lwr_base_link",
+    "dmp",
+    "ptp",
+    "reach_human",
+    "joint_limits",
+    "lwr_a1",
+    "lwr_a2",
+    "/coglab_master",
+)
 INTEGER = re.compile(r"(u?)int(8|16|32|64)$")
 BOUND = re.compile(r"(.*)\[(\d*)\]$")
 
@@ -50,8 +80,10 @@ class Generator:
         leaves: list[tuple[Any, Any, str]] = []  # who holds it, attribute or index, type
         stamp_only = self.random.random() < 0.3 and has_time(kind) and not has_float_array(kind)
         self._fill(message, leaves, stamp_only)
-        floats, strings, times = ([leaf for leaf in leaves if leaf[2] in names] for names in (
-            ("float32", "float64"), ("string",), ("time", "duration")))
+        floats, strings, times = (
+            [leaf for leaf in leaves if leaf[2] in names]
+            for names in (("float32", "float64"), ("string",), ("time", "duration"))
+        )
         if stamp_only and times:
             holder, name, _ = self.random.choice(times)
             put(holder, name, self._odd_time(kind=genpy.Time))
@@ -204,8 +236,10 @@ class Fuzz:
 
     def run(self, per_topic: int, per_service: int, limit: float) -> Report:
         """Sends so many messages to each; `limit` s for each answer of a service."""
-        threads = [threading.Thread(target=self._call, args=(name, kind, per_service, limit), daemon=True)
-                   for name, kind in self.services.items()]
+        threads = [
+            threading.Thread(target=self._call, args=(name, kind, per_service, limit), daemon=True)
+            for name, kind in self.services.items()
+        ]
         for thread in threads:
             thread.start()
         self._publish(per_topic)
@@ -262,9 +296,16 @@ def settle(limit: float) -> None:
 
     Raises RuntimeError naming what is missing.
     """
-    wanted = {"/lwr/command", "/coglab/start", "/object_database/get_object", "/perception/locate_object",
-              "/contact_detector/arm", "/coglab_sim/cell/fault", "/controller_manager/load_controller",
-              "/ih2_hand/stop"}
+    wanted = {
+        "/lwr/command",
+        "/coglab/start",
+        "/object_database/get_object",
+        "/perception/locate_object",
+        "/contact_detector/arm",
+        "/coglab_sim/cell/fault",
+        "/controller_manager/load_controller",
+        "/ih2_hand/stop",
+    }
     master, end, since, known = rosgraph.Master(rospy.get_name()), time.monotonic() + limit, time.monotonic(), None
     while time.monotonic() < end:
         state = master.getSystemState()
