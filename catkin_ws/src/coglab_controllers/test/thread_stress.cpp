@@ -58,14 +58,14 @@ class Shift : public ctrl_more::FeedbackController {
         .about("shifted by a millimetre");
     return d;
   }
-  void initialize(ctrl_more::Setup& setup) override { pose_ = setup.modify("ee"); }
+  void initialize(ctrl_more::Setup& setup) override { pose_ = setup.modify<ctrl_more::Pose>("ee"); }
   void update(const ctrl_more::Cycle&, const ctrl_more::RobotStates&,
               const ctrl_more::ControlStates&, ctrl_more::ModifiedControlStates& pose) override {
     pose[pose_][0] += 0.001;
   }
 
  private:
-  ctrl_more::ModifySignal pose_;
+  ctrl_more::Modify<ctrl_more::Pose> pose_;
 };
 
 }  // namespace

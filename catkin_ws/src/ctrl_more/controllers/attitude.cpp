@@ -18,10 +18,7 @@ class Attitude : public FeedbackController {
   void update(const Cycle& cycle, const RobotStates& robot, const ControlStates& original,
               ModifiedControlStates& modified) override;
   void reset() override { integral_.setZero(); }
-  std::vector<std::pair<std::string, double>> state() const override {
-    return {{"integral_x", integral_.x()}, {"integral_y", integral_.y()},
-            {"integral_z", integral_.z()}};
-  }
+  void state(Numbers<> values) const override { values.head<3>() = integral_; }
 
  private:
   struct Imu {
@@ -33,10 +30,11 @@ class Attitude : public FeedbackController {
   enum class Layout { RollPitchYaw, QuaternionGyro, QuaternionAcc, QuaternionWxyzAcc };
   Layout layout_ = Layout::RollPitchYaw;
   Eigen::Quaterniond mount_ = Eigen::Quaterniond::Identity();  // body to IMU
-  RobotSignal imu_;
-  ModifySignal target_;
+  Read<> imu_;
+  Modify<> target_;
   int first_ = 0;  // of the quaternion in the target
   Gain kp_, ki_, kd_, max_angle_, dead_band_;
+  LogThrottle said_{1'000'000'000};
   Eigen::Vector3d integral_ = Eigen::Vector3d::Zero();  // Ki times the integral of e [rad]
 };
 
@@ -68,7 +66,6 @@ Description Attitude::describe() const {
       "Gains act about the axes of the reference body (index b), so the result does not depend on "
       "the world frame. The integral holds K_i times the error, so a new gain changes nothing at "
       "once; it stands still while the output is saturated and would grow.";
-  d.publishes = "`integral_x`, `integral_y`, `integral_z`: integral part about body axes [rad].";
   d.stage = Stage::Task;
   d.measured("imu").keyFrom("imu").size(9).size(10).in("rad or 1, rad/s, m/s^2").frameOf(
       "orientation: world; rates: IMU").maxAge(0.05).about(
@@ -84,6 +81,9 @@ Description Attitude::describe() const {
   d.gain("kd", 0).vector(3, 0.02).range(0.0, 2.0).in("s").about("damping of the measured rate");
   d.gain("max_angle", 0.3).range(0.0, 1.0).in("rad").about("largest correction");
   d.gain("dead_band", 0.0).range(0.0, 0.2).in("rad").about("errors below it count as zero");
+  for (const char* name : {"integral_x", "integral_y", "integral_z"}) {
+    d.state(name).in("rad").about("integral part about this axis of the body");
+  }
   d.setting("imu", "imu").about("key of the IMU in `measuredData`");
   d.setting("imu_layout", "rpy_gyro_acc")
       .oneOf({"rpy_gyro_acc", "quaternion_gyro_acc", "quaternion_acc_gyro",
@@ -103,7 +103,7 @@ void Attitude::initialize(Setup& setup) {
             : layout == "quaternion_gyro_acc" ? Layout::QuaternionGyro
             : layout == "quaternion_acc_gyro" ? Layout::QuaternionAcc
                                               : Layout::QuaternionWxyzAcc;
-  imu_ = setup.robot("imu", layout_ == Layout::RollPitchYaw ? 9 : 10);
+  imu_ = setup.read("imu", layout_ == Layout::RollPitchYaw ? 9 : 10);
   const std::vector<double>& m = setup.numbers("mount");
   mount_ = Eigen::Quaterniond(m[3], m[0], m[1], m[2]);
   if (std::abs(mount_.norm() - 1.0) > 1e-3) {
@@ -154,7 +154,7 @@ void Attitude::update(const Cycle& cycle, const RobotStates& robot, const Contro
   }
   const Eigen::Quaterniond body = imu.orientation.normalized() * mount_.conjugate();
   const Eigen::Quaterniond reference(
-      original.view(target_.signal()).segment<4>(first_).data());
+      original.view(target_).segment<4>(first_).data());
   const Eigen::Vector3d rate_world = imu.orientation.normalized() * imu.rate;
 
   // Error and rate about the axes of the reference body.
@@ -171,6 +171,10 @@ void Attitude::update(const Cycle& cycle, const RobotStates& robot, const Contro
   const double angle = correction.norm();
   if (angle > max_angle) {
     correction *= max_angle / angle;
+    if (said_.pass(cycle.now_ns)) {
+      CTRL_MORE_LOG(log(), Warning, "correction of {} rad is held at max_angle, {} rad", angle,
+                    max_angle);
+    }
     // While saturated the integral may shrink, but not grow.
     if (grown.norm() < integral_.norm()) integral_ = grown;
   } else {

@@ -21,22 +21,27 @@ class EeAdmittance : public FeedbackController {
   void reset() override {
     offset_.setZero();
     velocity_.setZero();
+    force_.setZero();
   }
-  std::vector<std::pair<std::string, double>> state() const override {
-    return {{"offset_x", offset_[0]}, {"offset_y", offset_[1]}, {"offset_z", offset_[2]}};
+  void state(Numbers<> values) const override {
+    values.head<6>() = offset_;
+    values.tail<3>() = force_;
   }
 
  private:
   using Vector6 = Eigen::Matrix<double, 6, 1>;
   bool in_tool_frame_ = false;
   bool rotates_ = false;
-  RobotSignal wrench_;
-  ModifySignal pose_, twist_;
+  Read<Wrench> wrench_;
+  Modify<Pose> pose_;
+  Modify<Twist> twist_;
   Gain mass_, damping_, stiffness_, inertia_, rotary_damping_, rotary_stiffness_;
   Gain force_dead_band_, torque_dead_band_, max_offset_, max_angle_, max_velocity_;
   SecondOrder axis_[6];
   Vector6 offset_ = Vector6::Zero();    // [m], [rad]
   Vector6 velocity_ = Vector6::Zero();  // [m/s], [rad/s]
+  Eigen::Vector3d force_ = Eigen::Vector3d::Zero();  // that moves it, base frame [N]
+  LogThrottle said_{1'000'000'000};
 };
 
 namespace {
@@ -85,7 +90,6 @@ Description EeAdmittance::describe() const {
   d.information =
       "Below the dead band, from rest, the references keep their bits. Offset and velocity are "
       "bounded as balls; at the bound the outward velocity is taken away.";
-  d.publishes = "`offset_x`, `offset_y`, `offset_z`: yielded distance [m].";
   d.measured("wrench").keyFrom("wrench").size(6).in("N, Nm").frameOf("setting `wrench_frame`")
       .maxAge(0.1).about("external force and torque on the end-effector");
   d.modifies(ControlContainer::TaskSpaceReferencePose, "ee").keyFrom("ee").in("m, 1").frameOf(
@@ -109,6 +113,15 @@ Description EeAdmittance::describe() const {
   d.gain("max_offset", 0.15).range(0.0, 0.4).in("m").about("largest distance from the reference");
   d.gain("max_angle", 0.5).range(0.0, 1.5).in("rad").about("largest turn from the reference");
   d.gain("max_velocity", 0.25).range(0.0, 2.0).in("m/s").about("largest yielding speed");
+  for (const char* name : {"offset_x", "offset_y", "offset_z"}) {
+    d.state(name).in("m").about("yielded distance");
+  }
+  for (const char* name : {"turn_x", "turn_y", "turn_z"}) {
+    d.state(name).in("rad").about("yielded rotation vector (axes: all)");
+  }
+  for (const char* name : {"force_x", "force_y", "force_z"}) {
+    d.state(name).in("N").about("force that moves it, without its dead band, base frame");
+  }
   d.setting("wrench", "wrench").about("key of the wrench in `measuredData`");
   d.setting("ee", "ee").about("key of pose and velocity references");
   d.setting("wrench_frame", "base").oneOf({"base", "tool"}).about(
@@ -121,9 +134,9 @@ Description EeAdmittance::describe() const {
 void EeAdmittance::initialize(Setup& setup) {
   in_tool_frame_ = setup.text("wrench_frame") == "tool";
   rotates_ = setup.text("axes") == "all";
-  wrench_ = setup.robot("wrench");
-  pose_ = setup.modify("taskSpaceReferencePose/ee");
-  twist_ = setup.modify("taskSpaceReferenceVel/ee");
+  wrench_ = setup.read<Wrench>("wrench");
+  pose_ = setup.modify<Pose>("taskSpaceReferencePose/ee");
+  twist_ = setup.modify<Twist>("taskSpaceReferenceVel/ee");
   mass_ = setup.gain("mass");
   damping_ = setup.gain("damping");
   stiffness_ = setup.gain("stiffness");
@@ -138,15 +151,18 @@ void EeAdmittance::initialize(Setup& setup) {
 }
 
 void EeAdmittance::update(const Cycle& cycle, const RobotStates& robot,
-                          const ControlStates& original, ModifiedControlStates& modified) {
-  const auto wrench = robot.view<6>(wrench_);
+                          const ControlStates&, ModifiedControlStates& modified) {
+  const auto wrench = robot.view(wrench_);
   Eigen::Vector3d force = withoutDeadBand(wrench.head<3>(), scalar(force_dead_band_));
   Eigen::Vector3d torque = withoutDeadBand(wrench.tail<3>(), scalar(torque_dead_band_));
   if (in_tool_frame_) {
-    const Eigen::Quaterniond tool(original.view<7>(pose_.signal()).tail<4>().data());
+    // The sensor has turned with the tool: the reference, and as far as this controller yielded.
+    const Eigen::Quaterniond reference(modified.view(pose_).tail<4>().data());
+    const Eigen::Quaterniond tool = expOf(offset_.tail<3>()) * reference;
     force = tool * force;
     torque = tool * torque;
   }
+  force_ = force;
   for (int i = 0; i < 3; ++i) {
     axis_[i].prepare(gain(mass_)[i], gain(damping_)[i], gain(stiffness_)[i], cycle.dt);
     axis_[i].step(force[i], offset_[i], velocity_[i]);
@@ -158,7 +174,12 @@ void EeAdmittance::update(const Cycle& cycle, const RobotStates& robot,
     offset_.head<3>() -= cycle.dt * (1.0 - max_velocity / speed) * velocity_.head<3>();
     velocity_.head<3>() *= max_velocity / speed;
   }
-  bound(offset_.head<3>(), velocity_.head<3>(), scalar(max_offset_));
+  const double max_offset = scalar(max_offset_);
+  if (offset_.head<3>().norm() > max_offset && said_.pass(cycle.now_ns)) {
+    CTRL_MORE_LOG(log(), Warning, "a force of {} N holds it at max_offset, {} m", force.norm(),
+                  max_offset);
+  }
+  bound(offset_.head<3>(), velocity_.head<3>(), max_offset);
   if (rotates_) {
     for (int i = 0; i < 3; ++i) {
       axis_[3 + i].prepare(gain(inertia_)[i], gain(rotary_damping_)[i],
@@ -168,13 +189,13 @@ void EeAdmittance::update(const Cycle& cycle, const RobotStates& robot,
     bound(offset_.tail<3>(), velocity_.tail<3>(), scalar(max_angle_));
   }
   if (offset_.isZero(0.0) && velocity_.isZero(0.0)) return;  // every bit stays
-  auto pose = modified.at<7>(pose_);
+  auto pose = modified[pose_];
   pose.head<3>() += offset_.head<3>();
   if (rotates_) {
     const Eigen::Quaterniond before(pose.tail<4>().data());
     pose.tail<4>() = (expOf(offset_.tail<3>()) * before).normalized().coeffs();
   }
-  modified.at<6>(twist_) += velocity_;
+  modified[twist_] += velocity_;
 }
 
 }  // namespace ctrl_more

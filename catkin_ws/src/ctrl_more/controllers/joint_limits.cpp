@@ -15,12 +15,19 @@ class JointLimits : public FeedbackController {
   void update(const Cycle& cycle, const RobotStates& robot, const ControlStates& original,
               ModifiedControlStates& modified) override;
   std::string judgeGains(const GainValues& gains) const override;
+  void state(Numbers<> values) const override {
+    values[0] = slowed_;
+    values[1] = nearest_;
+  }
 
  private:
-  RobotSignal position_;
-  ModifySignal velocity_;
+  Read<> position_;
+  Modify<> velocity_;
   Gain influence_, safety_, xi_;
   std::vector<double> lower_, upper_;  // [rad]
+  int slowed_ = 0;          // joints in this cycle
+  double nearest_ = 0.0;    // distance of any joint to an end of its range [rad]
+  LogThrottle said_{1'000'000'000};
 };
 
 Description JointLimits::describe() const {
@@ -56,6 +63,8 @@ Description JointLimits::describe() const {
       "distance to an end below which the speed is bounded");
   d.gain("safety", 0.03).range(0.0, 0.5).in("rad").about("distance that is kept");
   d.gain("xi", 1.0).range(0.001, 10.0).in("rad/s").about("bound at the influence distance");
+  d.state("slowed").in("1").about("number of joints whose speed is bounded now");
+  d.state("nearest").in("rad").about("smallest distance of a joint to an end of its range");
   d.setting("joint_position", "joint_position").about(
       "key of the joint positions in `measuredData`");
   d.setting("lower", std::vector<double>{-wide, -narrow, -wide, -narrow, -wide, -narrow, -wide})
@@ -87,14 +96,14 @@ void JointLimits::initialize(Setup& setup) {
       throw std::invalid_argument("joint " + std::to_string(i) + ": lower must be below upper");
     }
   }
-  position_ = setup.robot("joint_position", joints);
+  position_ = setup.read("joint_position", joints);
   velocity_ = setup.modify("Velocity", joints);
   influence_ = setup.gain("influence");
   safety_ = setup.gain("safety");
   xi_ = setup.gain("xi");
 }
 
-void JointLimits::update(const Cycle&, const RobotStates& robot, const ControlStates&,
+void JointLimits::update(const Cycle& cycle, const RobotStates& robot, const ControlStates&,
                          ModifiedControlStates& modified) {
   const auto q = robot.view(position_);
   auto qd = modified[velocity_];
@@ -102,11 +111,24 @@ void JointLimits::update(const Cycle&, const RobotStates& robot, const ControlSt
   const auto bound = [&](double distance) {
     return xi * std::max(0.0, distance - safety) / (influence - safety);
   };
+  slowed_ = 0;
+  nearest_ = kUnlimited;
+  int last = 0;
   for (int i = 0; i < static_cast<int>(lower_.size()); ++i) {
     const double above = upper_[i] - q[i];
     const double below = q[i] - lower_[i];
-    if (above < influence && qd[i] > bound(above)) qd[i] = bound(above);
-    if (below < influence && qd[i] < -bound(below)) qd[i] = -bound(below);
+    nearest_ = std::min({nearest_, above, below});
+    const bool up = above < influence && qd[i] > bound(above);
+    const bool down = below < influence && qd[i] < -bound(below);
+    if (up) qd[i] = bound(above);
+    if (down) qd[i] = -bound(below);
+    if (!up && !down) continue;
+    ++slowed_;
+    last = i;
+  }
+  if (slowed_ != 0 && said_.pass(cycle.now_ns)) {
+    CTRL_MORE_LOG(log(), Info, "joint {} is slowed, at {} rad in a range of {} to {} rad", last,
+                  q[last], lower_[last], upper_[last]);
   }
 }
 

@@ -15,26 +15,35 @@ class ZmpDcm : public FeedbackController {
   void initialize(Setup& setup) override;
   void update(const Cycle& cycle, const RobotStates& robot, const ControlStates& original,
               ModifiedControlStates& modified) override;
-  void reset() override { offset_.setZero(); }
+  void reset() override {
+    offset_.setZero();
+    shift_.setZero();
+    apart_.setZero();
+  }
   std::string judgeGains(const GainValues& gains) const override;
-  std::vector<std::pair<std::string, double>> state() const override {
-    return {{"offset_x", offset_.x()}, {"offset_y", offset_.y()}};
+  void state(Numbers<> values) const override {
+    values.head<2>() = offset_;
+    values.tail<2>() = shift_;
   }
 
  private:
-  void followDcm(const RobotStates& robot, const ControlStates& original,
+  void followDcm(const Cycle& cycle, const RobotStates& robot, const ControlStates& original,
                  ModifiedControlStates& modified);
-  void followZmp(double dt, const RobotStates& robot, const ControlStates& original,
+  void followZmp(const Cycle& cycle, const RobotStates& robot, const ControlStates& original,
                  ModifiedControlStates& modified);
 
   static constexpr double kGravity = 9.80665;  // [m/s^2]
   bool dcm_ = true;
   double omega_ = 0.0;  // sqrt(g / h) [1/s]
-  RobotSignal com_, zmp_;
-  ControlSignal com_reference_, com_velocity_reference_, zmp_reference_;
-  ModifySignal zmp_out_, com_out_;
-  Gain k_, support_, kc_, ki_, max_offset_;
+  Read<6> com_;
+  Read<3> zmp_;
+  Reference<3> com_velocity_reference_;
+  Modify<3> zmp_out_, com_out_;
+  Gain k_, support_, kc_, ki_, max_offset_, zmp_filter_;
   Eigen::Vector2d offset_ = Eigen::Vector2d::Zero();  // of the centre of mass, zmp_ip mode [m]
+  Eigen::Vector2d shift_ = Eigen::Vector2d::Zero();   // of the ZMP reference [m]
+  Eigen::Vector2d apart_ = Eigen::Vector2d::Zero();   // measured ZMP from its reference [m]
+  LogThrottle said_{1'000'000'000};
 };
 
 Description ZmpDcm::describe() const {
@@ -51,15 +60,16 @@ Description ZmpDcm::describe() const {
       "position-controlled robots. Not both modes on one robot at once.";
   d.limitations =
       "Horizontal directions, constant height. In mode `dcm` with a held ZMP the loop is stable "
-      "only for 0 < k < 2 w / (exp(w T) - 1). In mode `zmp_ip` for ki T (1 + kc) < 2.";
+      "only for 0 < k < 2 w / (exp(w T) - 1). In mode `zmp_ip` for ki T (1 + kc) < 2, and with a "
+      "`zmp_filter` longer than 1 / (w sqrt(kc)): the measured ZMP also holds what accelerating the "
+      "centre of mass takes, and unfiltered that drives the offset the wrong way.";
   d.law =
       "\\omega = \\sqrt{g/h},\\ \\xi = c + \\dot c/\\omega,\\ p' = p + (1 + k/\\omega)(\\xi - "
       "\\xi_{ref}) \\text{ in the support box};\\quad \\text{zmp\\_ip: } \\Delta p = -k_c x,\\ "
-      "\\dot x = -k_i (p_{meas} - p_{ref} - \\Delta p),\\ c' = c + x";
+      "\\dot x = -k_i (e - \\Delta p),\\ \\tau \\dot e + e = p_{meas} - p_{ref},\\ c' = c + x";
   d.source =
       "Feedback of the divergent component of motion of the linear inverted pendulum; two coupled "
       "loops of ZMP and centre of mass for mode zmp_ip.";
-  d.publishes = "`offset_x`, `offset_y`: offset of the centre of mass in mode zmp_ip [m].";
   d.estimated("com").size(6).in("m, m/s").frameOf("world").maxAge(0.05).ifAsked().about(
       "position and velocity of the centre of mass (mode dcm)");
   d.estimated("zmp").size(3).in("m").frameOf("world").maxAge(0.05).ifAsked().about(
@@ -80,6 +90,14 @@ Description ZmpDcm::describe() const {
   d.gain("ki", 0).vector(2, 3.5).range(0.0, 50.0).in("1/s").about(
       "integral action of the ZMP error, x and y (mode zmp_ip)");
   d.gain("max_offset", 0.05).range(0.0, 0.3).in("m").about("bound of both corrections (zmp_ip)");
+  d.gain("zmp_filter", 0.4).range(0.0, 5.0).in("s").about(
+      "time constant tau of the measured ZMP (zmp_ip)");
+  for (const char* name : {"offset_x", "offset_y"}) {
+    d.state(name).in("m").about("offset of the centre of mass (mode zmp_ip)");
+  }
+  for (const char* name : {"shift_x", "shift_y"}) {
+    d.state(name).in("m").about("correction of the ZMP reference");
+  }
   d.setting("mode", "dcm").oneOf({"dcm", "zmp_ip"}).about("which law");
   d.setting("height", std::vector<double>{0.8}).range(0.05, 5.0).in("m").about(
       "height of the centre of mass above the ground");
@@ -95,57 +113,63 @@ void ZmpDcm::initialize(Setup& setup) {
   dcm_ = setup.text("mode") == "dcm";
   omega_ = std::sqrt(kGravity / setup.numbers("height")[0]);
   if (dcm_) {
-    com_ = setup.robot("com");
+    com_ = setup.read<6>("com");
   } else {
-    zmp_ = setup.robot("zmp");
+    zmp_ = setup.read<3>("zmp");
   }
-  com_velocity_reference_ = setup.control("comVelocity");
-  zmp_out_ = setup.modify("zmp");
-  com_out_ = setup.modify("com");
-  zmp_reference_ = zmp_out_.signal();
-  com_reference_ = com_out_.signal();
+  com_velocity_reference_ = setup.reference<3>("comVelocity");
+  zmp_out_ = setup.modify<3>("zmp");
+  com_out_ = setup.modify<3>("com");
   k_ = setup.gain("k");
   support_ = setup.gain("support_box");
   kc_ = setup.gain("kc");
   ki_ = setup.gain("ki");
   max_offset_ = setup.gain("max_offset");
+  zmp_filter_ = setup.gain("zmp_filter");
 }
 
 void ZmpDcm::update(const Cycle& cycle, const RobotStates& robot, const ControlStates& original,
                     ModifiedControlStates& modified) {
   if (dcm_) {
-    followDcm(robot, original, modified);
+    followDcm(cycle, robot, original, modified);
   } else {
-    followZmp(cycle.dt, robot, original, modified);
+    followZmp(cycle, robot, original, modified);
   }
 }
 
-void ZmpDcm::followDcm(const RobotStates& robot, const ControlStates& original,
-                       ModifiedControlStates& modified) {
-  const auto com = robot.view<6>(com_);
+void ZmpDcm::followDcm(const Cycle& cycle, const RobotStates& robot,
+                       const ControlStates& original, ModifiedControlStates& modified) {
+  const auto com = robot.view(com_);
   const Eigen::Vector2d dcm = com.head<2>() + com.segment<2>(3) / omega_;
   const Eigen::Vector2d reference =
-      original.view<3>(com_reference_).head<2>() +
-      original.view<3>(com_velocity_reference_).head<2>() / omega_;
+      original.view(com_out_).head<2>() +
+      original.view(com_velocity_reference_).head<2>() / omega_;
   const Eigen::Vector2d wanted = (1.0 + scalar(k_) / omega_) * (dcm - reference);
   const auto box = gain(support_);
-  auto zmp = modified.at<3>(zmp_out_);
-  zmp[0] += std::clamp(wanted[0], -box[0], box[1]);
-  zmp[1] += std::clamp(wanted[1], -box[2], box[3]);
+  shift_ << std::clamp(wanted[0], -box[0], box[1]), std::clamp(wanted[1], -box[2], box[3]);
+  modified[zmp_out_].head<2>() += shift_;
+  if (shift_ != wanted && said_.pass(cycle.now_ns)) {
+    CTRL_MORE_LOG(log(), Warning, "ZMP is at the edge of the support box: {} {} m are wanted",
+                  wanted[0], wanted[1]);
+  }
 }
 
-void ZmpDcm::followZmp(double dt, const RobotStates& robot, const ControlStates& original,
-                       ModifiedControlStates& modified) {
+void ZmpDcm::followZmp(const Cycle& cycle, const RobotStates& robot,
+                       const ControlStates& original, ModifiedControlStates& modified) {
   const double limit = scalar(max_offset_);
-  auto zmp = modified.at<3>(zmp_out_);
-  auto com = modified.at<3>(com_out_);
+  const double share = -std::expm1(-cycle.dt / scalar(zmp_filter_));
+  apart_ += share * ((robot.view(zmp_) - original.view(zmp_out_)).head<2>() - apart_);
+  auto zmp = modified[zmp_out_];
+  auto com = modified[com_out_];
   for (int i = 0; i < 2; ++i) {
-    const double shift = std::clamp(-gain(kc_)[i] * offset_[i], -limit, limit);
-    const double error =
-        robot.view<3>(zmp_)[i] - original.view<3>(zmp_reference_)[i] - shift;
-    offset_[i] = std::clamp(offset_[i] - dt * gain(ki_)[i] * error, -limit, limit);
-    zmp[i] += shift;
+    shift_[i] = std::clamp(-gain(kc_)[i] * offset_[i], -limit, limit);
+    const double wanted = offset_[i] - cycle.dt * gain(ki_)[i] * (apart_[i] - shift_[i]);
+    offset_[i] = std::clamp(wanted, -limit, limit);
+    zmp[i] += shift_[i];
     com[i] += offset_[i];
+    if (offset_[i] != wanted && said_.pass(cycle.now_ns)) {
+      CTRL_MORE_LOG(log(), Warning, "offset of axis {} is held at max_offset, {} m", i, limit);
+    }
   }
 }
 

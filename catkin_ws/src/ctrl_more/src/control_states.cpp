@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <stdexcept>
 
 #include "ctrl_more/config_node.hpp"
 #include "ctrl_more/logger.hpp"
@@ -149,7 +150,7 @@ Status ControlStates::get(ControlContainer container, const std::string& key,
 }
 
 Eigen::Vector3d ControlStates::get3(ControlContainer container, const char* key) const {
-  return view<3>(find(container, key));
+  return view(find<3>(container, key));
 }
 
 Status ControlStates::setTaskSpaceReferencePose(const std::string& key,
@@ -291,8 +292,8 @@ Eigen::Vector3d ControlStates::getAngularMomentum() const {
 Eigen::Vector3d ControlStates::getZMP() const { return get3(ControlContainer::Zmp, "zmp"); }
 
 Eigen::Matrix3d ControlStates::getPelvisOrientation() const {
-  const ControlSignal pelvis = find(ControlContainer::PelvisOrientation, "pelvis");
-  return Eigen::Quaterniond(view<4>(pelvis)).normalized().toRotationMatrix();
+  const Reference<4> pelvis = find<4>(ControlContainer::PelvisOrientation, "pelvis");
+  return Eigen::Quaterniond(view(pelvis)).normalized().toRotationMatrix();
 }
 
 ControlSignal ControlStates::find(ControlContainer container, const std::string& key) const {
@@ -302,6 +303,18 @@ ControlSignal ControlStates::find(ControlContainer container, const std::string&
   signal.offset_ = entries_[found->second].info.offset;
   signal.size_ = entries_[found->second].info.size;
   signal.index_ = found->second;
+  return signal;
+}
+
+ControlSignal ControlStates::findSized(ControlContainer container, const std::string& key,
+                                       int size) const {
+  const ControlSignal signal = find(container, key);
+  if (!signal.valid()) throw std::invalid_argument(unknownKey(container, key, "find"));
+  if (size != AnySize && signal.size() != size) {
+    throw std::invalid_argument("find: " + fullName(container, key) + " has size " +
+                                std::to_string(signal.size()) + ", asked for " +
+                                std::to_string(size));
+  }
   return signal;
 }
 

@@ -11,6 +11,7 @@ const std::string kNoLibrary;
 constexpr double kNoCycle = -1.0;
 constexpr int kMostSignals = 200;
 constexpr int kMostDoubles = 30000;
+constexpr std::size_t kMostStates = 1000;
 
 std::int64_t toNanoseconds(double seconds) {
   return seconds >= 9e9 ? INT64_MAX : static_cast<std::int64_t>(1e9 * seconds);
@@ -68,7 +69,7 @@ void ControllerSlot::configure(const GainValues& gains, const SettingValues& set
     all_checked_.push_back({static_cast<std::uint32_t>(use.signal.offset()),
                             static_cast<std::uint16_t>(use.signal.size()),
                             kindOf(use.use.container)});
-    limited_ = limited_ || limited;
+    if (limited) special_ |= kLimited;
     total += use.signal.size();
   }
   for (auto* buffer : {&from_, &raw_, &now_, &step_}) {
@@ -87,7 +88,12 @@ void ControllerSlot::configure(const GainValues& gains, const SettingValues& set
   if (needed_count_ == 1) needed_ = all_needed_[0];
   if (checked_count_ == 1) checked_ = all_checked_[0];
   total_ = static_cast<std::uint16_t>(total);
-  const int lines = (1 + 2 * total + 7) / 8;
+  if (description.states.size() > kMostStates) {
+    throw std::invalid_argument("it declares more states than " + std::to_string(kMostStates));
+  }
+  state_.assign(description.states.size(), 0.0);
+  if (!state_.empty()) special_ |= kStates;
+  const int lines = (1 + 2 * total + static_cast<int>(state_.size()) + 7) / 8;
   record_size_ = static_cast<std::uint16_t>(8 * lines);
   lines_ = std::make_unique<Line[]>(2 * lines);
   records_ = lines_[0].numbers;
@@ -188,6 +194,36 @@ void ControllerSlot::advanceGains(double dt) noexcept {
   gains_pending_ = true;
 }
 
+// What only some controllers need after update(): a closer look at what it left, and its state.
+// False if that was a fault, which is dealt with then.
+bool ControllerSlot::passes(StageRun& run) noexcept {
+  const FaultKind kind = judgeMore(run);
+  if (kind != FaultKind::None) {
+    takeFault(run, kind,
+              kind == FaultKind::Undeclared
+                  ? "it changed a reference that its description does not name"
+                  : nullptr);
+    return false;
+  }
+  if ((special_ & kStates) == 0) return true;
+  try {
+    controller_->state(Numbers<>(state_.data(), static_cast<int>(state_.size())));
+  } catch (const std::exception& e) {
+    takeFault(run, FaultKind::Exception, e.what());
+    return false;
+  } catch (...) {
+    takeFault(run, FaultKind::Exception, "state() threw something that is not a std::exception");
+    return false;
+  }
+  recordState(run);
+  return true;
+}
+
+void ControllerSlot::recordState(const StageRun& run) noexcept {
+  std::copy(state_.begin(), state_.end(),
+            records_ + run.buffer * record_size_ + 1 + 2 * total_);
+}
+
 void ControllerSlot::latch(const Cycle& cycle, FaultKind kind, const char* text) noexcept {
   fault_ = kind;
   wanted_ = false;
@@ -219,10 +255,10 @@ void ControllerSlot::fillStatus(ControllerStatus& status) const {
   }
 }
 
-void ControllerSlot::attribution(const ControlStates& names, unsigned buffer, std::uint64_t cycle,
-                                 std::vector<Attribution>& list) const {
+void ControllerSlot::addRecord(const ControlStates& names, unsigned buffer,
+                               CycleRecord& of_cycle) const {
   const double* record = records_ + buffer * record_size_;
-  if (activity() == Activity::Off || record[0] != static_cast<double>(cycle)) return;
+  if (activity() == Activity::Off || record[0] != static_cast<double>(of_cycle.cycle)) return;
   std::vector<double> change;
   for (const Written& w : written_) {
     const double* before = record + 1 + w.local;
@@ -230,7 +266,7 @@ void ControllerSlot::attribution(const ControlStates& names, unsigned buffer, st
     Attribution entry;
     entry.controller = name();
     entry.signal = names.nameOfSignal(w.signal);
-    entry.cycle = cycle;
+    entry.cycle = of_cycle.cycle;
     entry.before.assign(before, before + w.size);
     entry.after.assign(after, after + w.size);
     change.resize(w.size);
@@ -238,8 +274,11 @@ void ControllerSlot::attribution(const ControlStates& names, unsigned buffer, st
     const correction::Norms n = correction::norms(w.kind, w.size, change.data());
     entry.size = n.size;
     entry.angle = n.angle;
-    list.push_back(entry);
+    of_cycle.changes.push_back(entry);
   }
+  if (state_.empty()) return;
+  const double* const state = record + 1 + 2 * total_;
+  of_cycle.states.push_back({name(), {state, state + state_.size()}});
 }
 
 }  // namespace ctrl_more

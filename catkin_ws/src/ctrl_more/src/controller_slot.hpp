@@ -80,11 +80,13 @@ class __attribute__((visibility("hidden"), aligned(64))) ControllerSlot {
   Activity activity() const { return shared_activity_.load(std::memory_order_acquire); }
   FaultKind fault() const { return shared_fault_.load(std::memory_order_acquire); }
   void fillStatus(ControllerStatus& status) const;
-  /// Adds what it changed in the newest complete cycle.
+  /// Adds what it changed, and its state, in the newest complete cycle.
+  /// @param names for the names of signals
   /// @param buffer the reader's buffer of records, from RecordExchange::acquire()
-  /// @param cycle number of that cycle; a record of another one is left out
-  void attribution(const ControlStates& names, unsigned buffer, std::uint64_t cycle,
-                   std::vector<Attribution>& list) const;
+  /// @param record of the cycle with its number; what is of another one is left out
+  void addRecord(const ControlStates& names, unsigned buffer, CycleRecord& record) const;
+  /// True if the duration of its update() is judged.
+  bool isTimed() const { return overrun_ns_ > 0 && !lockstep_; }
   /// @}
 
  private:
@@ -114,6 +116,8 @@ class __attribute__((visibility("hidden"), aligned(64))) ControllerSlot {
   };
 
   enum class Why : std::uint8_t { Paused, Fault, Disabled, Stale };
+  static constexpr std::uint8_t kLimited = 1;  // any signal has a finite limit
+  static constexpr std::uint8_t kStates = 2;   // it declares states
 
   const Checked* checked() const {
     return checked_count_ == 1 ? &checked_ : all_checked_.data();
@@ -148,6 +152,8 @@ class __attribute__((visibility("hidden"), aligned(64))) ControllerSlot {
   void takeFailure(StageRun& run) noexcept;
   void blendIn(const StageRun& run) noexcept;
   void runStopped(StageRun& run) noexcept;
+  bool passes(StageRun& run) noexcept;
+  void recordState(const StageRun& run) noexcept;
   void commit(const StageRun& run) noexcept;
   static void commitSignal(const Checked& c, const StageRun& run, double* record,
                            std::size_t total) noexcept;
@@ -162,11 +168,11 @@ class __attribute__((visibility("hidden"), aligned(64))) ControllerSlot {
   FeedbackController* controller_;  // of instance_, at hand
   std::uint32_t owner_;
   bool steady_ = false;   // it runs, and nothing is being blended, reset or replaced
-  bool limited_ = false;  // any signal has a finite limit
+  std::uint8_t special_ = 0;  // kLimited, kStates
   std::uint8_t checked_count_ = 0;
   std::uint8_t needed_count_ = 0;
   // Two records, one for each buffer: a number for the cycle, the doubles that it modifies as it
-  // found them, and as it left them.
+  // found them, and as it left them, and its state.
   double* records_ = nullptr;
   std::uint16_t total_ = 0;        // doubles that it modifies
   std::uint16_t record_size_ = 0;  // doubles from one record to the other
@@ -203,6 +209,7 @@ class __attribute__((visibility("hidden"), aligned(64))) ControllerSlot {
   std::uint32_t reorders_ = 0;
   std::uint32_t gains_revision_ = 0;
   int overruns_in_row_ = 0;
+  std::vector<double> state_;  // what state() wrote last
   std::vector<double> from_;    // correction that the blend starts from
   std::vector<double> raw_;     // correction of the last run before blending
   std::vector<double> now_;     // room for one correction

@@ -69,8 +69,11 @@ CTRL_MORE_RARE bool ControllerSlot::prepare(StageRun& run) noexcept {
     if (activity_ != Activity::Running) start();
     return true;
   }
-  if (wanted_) noteWaiting(run);
-  if (activity_ == Activity::Running || activity_ == Activity::Off) stop(Why::Stale);
+  if (wanted_) {
+    noteWaiting(run);
+    // What was held during a pause or a fault is let go as well.
+    if (activity_ != Activity::Waiting) stop(Why::Stale);
+  }
   runStopped(run);
   return false;
 }
@@ -125,16 +128,7 @@ void ControllerSlot::runEach(const std::vector<ControllerSlot*>& slots, StageRun
       s.takeFailure(run);
       continue;
     }
-    if (!s.hasGoodNumbers(run.data) || s.limited_ || kTest) {
-      const FaultKind kind = s.judgeMore(run);
-      if (kind != FaultKind::None) {
-        s.takeFault(run, kind,
-                    kind == FaultKind::Undeclared
-                        ? "it changed a reference that its description does not name"
-                        : nullptr);
-        continue;
-      }
-    }
+    if ((!s.hasGoodNumbers(run.data) || s.special_ != 0 || kTest) && !s.passes(run)) continue;
     if (kTimed && (!kTest || run.timed) && s.isLate(run)) {
       s.overrun(run);
       continue;
@@ -209,7 +203,7 @@ FaultKind ControllerSlot::judgeNumbers(const double* data) const noexcept {
 
 FaultKind ControllerSlot::judgeMore(StageRun& run) noexcept {
   FaultKind kind = judgeNumbers(run.data);
-  if (kind == FaultKind::None && limited_) kind = judgeLimits(run);
+  if (kind == FaultKind::None && (special_ & kLimited)) kind = judgeLimits(run);
   if (kind == FaultKind::None && run.compared && restoreUndeclared(run)) {
     kind = FaultKind::Undeclared;
   }
@@ -346,6 +340,7 @@ void ControllerSlot::runStopped(StageRun& run) noexcept {
     correction::apply(w.kind, w.size, run.data + w.offset, c, run.data + w.offset);
   }
   commit(run);
+  recordState(run);
   if (blend_ >= 1.0 && !holding && activity_ == Activity::Stopping) setActivity(Activity::Off);
   // What this took is not the next controller's.
   if (run.timed) run.boundary_ns = steadyNow();

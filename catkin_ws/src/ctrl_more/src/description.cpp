@@ -119,6 +119,14 @@ SettingSpec& Description::setting(const std::string& name, const std::vector<dou
   return settings.back();
 }
 
+StateSpec& StateSpec::in(const std::string& units) { return unit = units, *this; }
+StateSpec& StateSpec::about(const std::string& words) { return text = words, *this; }
+
+StateSpec& Description::state(const std::string& name) {
+  states.push_back({name, "", ""});
+  return states.back();
+}
+
 std::vector<std::string> Description::faults() const {
   std::vector<std::string> found;
   if (type.empty()) found.push_back("the description has no type");
@@ -144,6 +152,7 @@ std::vector<std::string> Description::faults() const {
     });
   };
   for (const SettingSpec& spec : settings) unique(spec.name, "configuration key");
+  for (const StateSpec& spec : states) unique(spec.name, "state");
   for (const RobotSignalUse& use : robot_signals) {
     unique(std::string(nameOf(use.source)) + "/" + use.role, "signal");
     if (!use.key_setting.empty() && !isTextSetting(use.key_setting)) {
@@ -197,6 +206,10 @@ std::vector<std::string> Description::emptyFields() const {
   for (const SettingSpec& s : settings) {
     if (s.kind == SettingSpec::Kind::Numbers) need(s.unit, "unit of setting '" + s.name + "'");
     need(s.text, "text of setting '" + s.name + "'");
+  }
+  for (const StateSpec& s : states) {
+    need(s.unit, "unit of state '" + s.name + "'");
+    need(s.text, "text of state '" + s.name + "'");
   }
   return found;
 }

@@ -172,7 +172,15 @@ std::string documentationPage(const Description& d) {
           << " |\n";
     }
   }
-  if (!d.publishes.empty()) out << "\n## State\n\n" << d.publishes << '\n';
+  out << "\n## State (shown while it runs)\n\n";
+  if (d.states.empty()) {
+    out << "None.\n";
+  } else {
+    out << "| state | unit | meaning |\n| --- | --- | --- |\n";
+    for (const StateSpec& s : d.states) {
+      out << "| `" << s.name << "` | " << s.unit << " | " << s.text << " |\n";
+    }
+  }
   if (!d.information.empty()) out << "\n## More\n\n" << d.information << '\n';
   return out.str();
 }

@@ -34,21 +34,38 @@ FeedbackControllersManager::Draft FeedbackControllersManager::draftOf() const {
   return draft;
 }
 
-// Makes the draft the truth, and offers it to the cycle as a plan.
-Status FeedbackControllersManager::publish(const Draft& draft, bool prepared) {
+// The plan of a draft that has as many states as there are members.
+std::unique_ptr<Plan> FeedbackControllersManager::planOf(const Draft& draft) const {
   auto plan = std::make_unique<Plan>();
-  plan->generation = ++generation_;
-  for (std::size_t i = 0; i < members_.size(); ++i) members_[i]->state = draft.states[i];
-  order_ = draft.order;
-  for (const std::string& name : order_) {
-    const Member& m = *members_[indexOf(name)];
-    plan->entries.push_back({m.slot, m.state.enabled, !m.state.reasons.empty(),
-                             m.state.fault_clears, m.state.resets, m.state.reorders,
-                             m.state.gains_revision, m.state.gains});
-    plan->stages[static_cast<int>(m.slot->stage())].push_back(m.slot.get());
+  plan->generation = generation_ + 1;
+  for (const std::string& name : draft.order) {
+    const int i = indexOf(name);
+    const std::shared_ptr<ControllerSlot>& slot = members_[i]->slot;
+    const MemberState& state = draft.states[i];
+    plan->entries.push_back({slot, state.enabled, !state.reasons.empty(), state.fault_clears,
+                             state.resets, state.reorders, state.gains_revision, state.gains});
+    plan->stages[static_cast<int>(slot->stage())].push_back(slot.get());
+    plan->timed = plan->timed || slot->isTimed();
   }
-  const Plan* offer = plan.get();
-  plans_.push_back(std::move(plan));
+  return plan;
+}
+
+// Makes the draft the truth, and offers it to the cycle as a plan. If memory runs out, nothing has
+// changed.
+Status FeedbackControllersManager::publish(Draft draft, bool prepared) {
+  plans_.push_back(planOf(draft));
+  return commit(std::move(draft), prepared);
+}
+
+// The part of publish() that cannot fail; the plan is the last of plans_.
+Status FeedbackControllersManager::commit(Draft draft, bool prepared) noexcept {
+  const Plan* const offer = plans_.back().get();
+  generation_ = offer->generation;
+  for (std::size_t i = 0; i < members_.size(); ++i) {
+    members_[i]->state = std::move(draft.states[i]);
+  }
+  order_ = std::move(draft.order);
+  before_last_.reset();
   // A plan is the whole truth, what was prepared before included.
   forget(prepared_.exchange(prepared ? offer : nullptr, std::memory_order_acq_rel));
   if (!prepared) forget(offered_.exchange(offer, std::memory_order_acq_rel));
@@ -90,34 +107,38 @@ Status FeedbackControllersManager::withdraw(std::uint64_t generation) {
                            " cannot be withdrawn: the newest one is " +
                            std::to_string(generation_));
   }
-  const Plan* const newest = plans_.empty() ? nullptr : plans_.back().get();
+  plans_.push_back(planOf(*before_last_));
+  const Plan* const newest = plans_.size() < 2 ? nullptr : plans_[plans_.size() - 2].get();
   const auto takeBack = [newest](std::atomic<const Plan*>& place) {
     const Plan* offer = newest;
     return place.compare_exchange_strong(offer, nullptr, std::memory_order_acq_rel);
   };
   if (!newest || (!takeBack(offered_) && !takeBack(prepared_))) {
+    plans_.pop_back();
     return Status::failure("plan " + std::to_string(generation) + " is adopted already");
   }
-  plans_.pop_back();
+  forget(newest);
   const std::unique_ptr<Draft> back = std::move(before_last_);
-  return publish(*back);
+  return commit(std::move(*back), false);
 }
 
 void FeedbackControllersManager::freeze() {
-  if (robot_.frozen() && control_.frozen() && original_.dataSize() == control_.dataSize()) return;
+  if (laid_out_ && original_.dataSize() == control_.dataSize()) return;
   robot_.freeze();
   control_.freeze();
   original_ = control_;
   signals_ = control_.offsets();
   found_.assign(control_.dataSize(), nullptr);
   compared_.assign(control_.dataSize(), 0.0);
+  laid_out_ = true;
 }
 
 void FeedbackControllersManager::beginCycle(const Cycle& cycle) noexcept {
   cycle_ = cycle;
   buffer_ = records_->begin();
   cycle_number_.store(cycle.number, std::memory_order_relaxed);
-  if (original_.dataSize() != control_.dataSize() || !control_.frozen()) freeze();
+  // The stores may have been fixed by another manager, or by the host.
+  if (!laid_out_ || original_.dataSize() != control_.dataSize()) freeze();
   if (offered_.load(std::memory_order_relaxed) == nullptr) return;
   adopt(offered_.exchange(nullptr, std::memory_order_acq_rel));
 }
@@ -162,7 +183,7 @@ void FeedbackControllersManager::runStage(Stage stage, const RobotStates& robot,
                control.data(),
                found_.data(),
                options_.check_undeclared ? compared_.data() : nullptr,
-               options_.timed,
+               options_.timed || plan_->timed,
                buffer_,
                static_cast<double>(cycle_.number),
                0};

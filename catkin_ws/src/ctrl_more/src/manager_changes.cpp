@@ -1,6 +1,8 @@
 // Changes of a FeedbackControllersManager: each is tried on a draft, then published as a plan.
 #include <algorithm>
+#include <set>
 #include <stdexcept>
+#include <utility>
 
 #include "controller_config.hpp"
 #include "ctrl_more/config_node.hpp"
@@ -15,12 +17,32 @@ std::string joined(const std::vector<std::string>& names) {
   return text;
 }
 
-bool usesRobot(const ControllerSlot& slot, const std::string& signal) {
-  return slot.controller().isUsingRobotState(signal);
+// The signals of a controller that a key, or a map and a key, means: each as map/key.
+std::vector<std::string> meant(const ControllerSlot& slot, bool robot, const std::string& signal) {
+  std::vector<std::string> found;
+  const auto add = [&](const std::string& map, const std::string& key) {
+    const std::string full = map + "/" + key;
+    if (signal == key || signal == full) found.push_back(full);
+  };
+  if (robot) {
+    for (const ResolvedRobotUse& use : slot.robotUses()) add(nameOf(use.use.source), use.key);
+  } else {
+    for (const ResolvedControlUse& use : slot.controlUses()) {
+      add(nameOf(use.use.container), use.key);
+    }
+  }
+  return found;
 }
 
-bool usesControl(const ControllerSlot& slot, const std::string& signal) {
-  return slot.controller().isUsingControlState(signal);
+// What a controller has against gains; what it throws counts.
+std::string complaintOf(const FeedbackController& controller, const GainValues& gains) {
+  try {
+    return controller.judgeGains(gains);
+  } catch (const std::exception& e) {
+    return std::string("judgeGains() threw: ") + e.what();
+  } catch (...) {
+    return "judgeGains() threw something that is not a std::exception";
+  }
 }
 
 }  // namespace
@@ -35,7 +57,9 @@ Status FeedbackControllersManager::prepare(const Change& change) {
   return applyLocked(change, true);
 }
 
-Status FeedbackControllersManager::applyLocked(const Change& change, bool prepared) {
+// Everything that can fail comes before the publication: what fails has changed nothing.
+Status FeedbackControllersManager::applyLocked(const Change& change, bool prepared,
+                                               std::string note) {
   Draft draft = draftOf();
   std::vector<std::string> spared;
   for (const Change::Step& step : change.steps()) {
@@ -44,20 +68,26 @@ Status FeedbackControllersManager::applyLocked(const Change& change, bool prepar
   }
   Status status = checkExclusive(draft);
   if (!status) return status;
-  before_last_ = std::make_unique<Draft>(draftOf());
-  status = publish(draft, prepared);
-  std::string note;
   if (!spared.empty()) {
     note = "left alone, because safety controllers must be forced: " + joined(spared);
   }
+  std::set<std::string> resumed;
   for (const Change::Step& step : change.steps()) {
     if (step.kind != Change::Kind::Resume || step.name.empty()) continue;
-    const ControllerStatus now = statusLocked(*members_[indexOf(step.name)]);
-    std::vector<std::string> left = now.reasons;
-    if (step.reason == "fault" && now.fault != FaultKind::None) left.pop_back();
+    if (!resumed.insert(step.name).second) continue;
+    const int i = indexOf(step.name);
+    const MemberState& state = draft.states[i];
+    std::vector<std::string> left(state.reasons.begin(), state.reasons.end());
+    const ControllerStatus now = statusLocked(*members_[i]);
+    if (now.fault != FaultKind::None && state.fault_clears == members_[i]->state.fault_clears) {
+      left.push_back("fault: " + now.fault_text);
+    }
     if (!left.empty()) note += step.name + " is still paused: " + joined(left);
   }
-  status.note(note);
+  auto before = std::make_unique<Draft>(draftOf());
+  status = publish(std::move(draft), prepared);
+  before_last_ = std::move(before);
+  status.note(std::move(note));
   return status;
 }
 
@@ -157,7 +187,7 @@ Status FeedbackControllersManager::applyToMember(const Change::Step& step, const
         const Status status = checked.set(gain.first, gain.second);
         if (!status) return Status::failure("'" + member.name + "': " + status.message());
       }
-      const std::string complaint = member.slot->controller().judgeGains(checked);
+      const std::string complaint = complaintOf(member.slot->controller(), checked);
       if (!complaint.empty()) return Status::failure("'" + member.name + "': " + complaint);
       state.gains = std::make_shared<const GainValues>(checked);
       ++state.gains_revision;
@@ -195,31 +225,31 @@ Status FeedbackControllersManager::bySignal(Change::Kind kind, bool robot,
   const Lock lock(mutex_);
   Change change;
   std::vector<std::string> spared;
-  const std::string reason = (robot ? "robot signal " : "control signal ") + signal;
+  const std::string what = robot ? "robot signal " : "control signal ";
   bool used = false;
   for (const auto& member : members_) {
-    const ControllerSlot& slot = *member->slot;
-    if (!(robot ? usesRobot(slot, signal) : usesControl(slot, signal))) continue;
+    const std::vector<std::string> signals = meant(*member->slot, robot, signal);
+    if (signals.empty()) continue;
     used = true;
-    if (kind == Change::Kind::Resume) {
-      change.resume(member->name, reason);
-    } else if (member->description.safety && !force) {
+    if (kind != Change::Kind::Resume && member->description.safety && !force) {
       spared.push_back(member->name);
-    } else if (kind == Change::Kind::Pause) {
-      change.pause(member->name, reason, force);
-    } else {
+    } else if (kind == Change::Kind::Disable) {
       change.disable(member->name, force);
+    } else {
+      for (const std::string& full : signals) {
+        if (kind == Change::Kind::Pause) change.pause(member->name, what + full, force);
+        if (kind == Change::Kind::Resume) change.resume(member->name, what + full);
+      }
     }
   }
   if (!used) {
-    return Status::failure("no loaded controller uses " + reason + "; see getUsed" +
+    return Status::failure("no loaded controller uses " + what + signal + "; see getUsed" +
                            (robot ? "Robot" : "Control") + "States()");
   }
-  Status status = applyLocked(change);
-  if (status && !spared.empty()) {
-    status.note("left alone, because safety controllers must be forced: " + joined(spared));
-  }
-  return status;
+  return applyLocked(change, false,
+                     spared.empty() ? ""
+                                    : "left alone, because safety controllers must be forced: " +
+                                          joined(spared));
 }
 
 Status FeedbackControllersManager::enable() { return enable(""); }

@@ -1,6 +1,7 @@
 // Loading and unloading of a FeedbackControllersManager.
 #include <algorithm>
 #include <filesystem>
+#include <map>
 #include <optional>
 #include <stdexcept>
 #include <utility>
@@ -69,6 +70,20 @@ ControllerEntry readEntry(const std::string& name, const ConfigNode& block,
   return entry;
 }
 
+// The names of a list file that are blocks of controllers.
+std::vector<std::string> blocksOf(const ConfigNode& list) {
+  std::vector<std::string> blocks;
+  for (const auto& entry : list.entries()) {
+    if (std::find(kFileKeys.begin(), kFileKeys.end(), entry.first) != kFileKeys.end()) continue;
+    if (entry.second.kind() != ConfigNode::Kind::Map) {
+      throw entry.second.error("'" + entry.first + "' is neither a block of a controller nor a " +
+                               "known key" + suggestion(entry.first, kFileKeys));
+    }
+    blocks.push_back(entry.first);
+  }
+  return blocks;
+}
+
 }  // namespace
 
 std::string LoadReport::text() const {
@@ -89,95 +104,112 @@ LoadReport FeedbackControllersManager::load(const std::string& file, bool strict
   }
 }
 
+// Puts everything that loading changes back at its end, unless it is kept. A controller that is
+// refused half-way must not leave keys behind in the stores; once they are frozen it cannot, and
+// the cycle may be using them.
+class FeedbackControllersManager::Undo {
+ public:
+  explicit Undo(FeedbackControllersManager& manager)
+      : manager_(manager),
+        members_(manager.members_.size()),
+        order_(manager.order_),
+        profiles_(manager.profiles_),
+        refuse_shared_(manager.refuse_shared_) {
+    if (!manager_.robot_.frozen()) robot_.emplace(manager_.robot_);
+    if (!manager_.control_.frozen()) control_.emplace(manager_.control_);
+  }
+  ~Undo() {
+    if (kept_) return;
+    auto& members = manager_.members_;
+    for (std::size_t i = members_; i < members.size(); ++i) members[i]->slot->setOwner(nullptr);
+    members.erase(members.begin() + static_cast<std::ptrdiff_t>(members_), members.end());
+    manager_.order_.swap(order_);
+    manager_.profiles_.swap(profiles_);
+    manager_.refuse_shared_ = refuse_shared_;
+    if (robot_) manager_.robot_ = std::move(*robot_);
+    if (control_) manager_.control_ = std::move(*control_);
+  }
+  Undo(const Undo&) = delete;
+  Undo& operator=(const Undo&) = delete;
+  void keep() { kept_ = true; }
+
+ private:
+  FeedbackControllersManager& manager_;
+  std::size_t members_;
+  std::vector<std::string> order_;
+  std::map<std::string, std::vector<std::string>> profiles_;
+  bool refuse_shared_;
+  std::optional<RobotStates> robot_;
+  std::optional<ControlStates> control_;
+  bool kept_ = false;
+};
+
+// The cycle is offered the whole list at once, or nothing of it.
 LoadReport FeedbackControllersManager::load(const ConfigNode& list, const std::string& base,
                                             bool strict) {
   const Lock lock(mutex_);
   LoadReport report;
-  const auto refuse = [&](const std::string& text) {
-    report.errors.push_back(text);
-    logger_->log(LogLevel::Error, name_, text);
-  };
-  // The cycle is offered the whole list at once, or nothing of it.
-  const bool refuse_shared_before = refuse_shared_;
-  const auto profiles_before = profiles_;
-  const auto order_before = order_;
-  const std::size_t members_before = members_.size();
-  std::optional<std::pair<RobotStates, ControlStates>> stores_before;
-  if (!robot_.frozen()) stores_before.emplace(robot_, control_);
+  Undo undo(*this);
   try {
-    if (list.kind() != ConfigNode::Kind::Map) throw list.error("a list file must be a map");
-    const ConfigNode* names = list.find("loadControllers");
-    if (!names) throw list.error("a list file needs loadControllers: [names]");
-    std::vector<std::string> folders;
-    if (const ConfigNode* node = list.find("searchPath")) folders = node->texts("searchPath");
-    if (const ConfigNode* node = list.find("sharedSignals")) {
-      const std::string policy = node->text("sharedSignals");
-      if (policy != "cascade" && policy != "refuse") {
-        throw node->error("sharedSignals cannot be '" + policy + "'" +
-                          suggestion(policy, {"cascade", "refuse"}));
-      }
-      refuse_shared_ = policy == "refuse";
-    }
-    const SearchPath files(base, folders);
-    std::vector<std::string> blocks;
-    for (const auto& entry : list.entries()) {
-      const bool reserved =
-          std::find(kFileKeys.begin(), kFileKeys.end(), entry.first) != kFileKeys.end();
-      if (reserved) continue;
-      if (entry.second.kind() != ConfigNode::Kind::Map) {
-        std::vector<std::string> known = kFileKeys;
-        throw entry.second.error("'" + entry.first + "' is neither a block of a controller nor a " +
-                                 "known key" + suggestion(entry.first, known));
-      }
-      blocks.push_back(entry.first);
-    }
-    if (names->kind() != ConfigNode::Kind::List) {
-      throw names->error("loadControllers expects a list of names");
-    }
-    for (const ConfigNode& item : names->items()) {
-      try {
-        const std::string name = item.text("a name in loadControllers");
-        const ConfigNode* block = list.find(name);
-        if (!block || std::find(blocks.begin(), blocks.end(), name) == blocks.end()) {
-          throw item.error("loadControllers lists '" + name + "', but there is no block '" + name +
-                           ":'" + suggestion(name, blocks));
-        }
-        const ControllerEntry entry = readEntry(name, *block, files);
-        const Status status = loadLocked(name, entry, false);
-        if (!status) throw block->error(status.message());
-        report.loaded.push_back(name);
-      } catch (const std::exception& e) {
-        refuse(e.what());
-      }
-    }
-    if (const ConfigNode* node = list.find("profiles")) {
-      if (node->kind() != ConfigNode::Kind::Map) throw node->error("profiles expects a map");
-      for (const auto& entry : node->entries()) {
-        const Status status = setProfileLocked(
-            entry.first, entry.second.texts("profile '" + entry.first + "'"));
-        if (!status) refuse(entry.second.place() + ": " + status.message());
-      }
-    }
+    readList(list, base, report);
   } catch (const std::exception& e) {
-    refuse(e.what());
+    report.errors.push_back(e.what());
   }
+  for (const std::string& error : report.errors) logger_->log(LogLevel::Error, name_, error);
   if (strict && !report.errors.empty()) {
-    for (std::size_t i = members_before; i < members_.size(); ++i) {
-      members_[i]->slot->setOwner(nullptr);
-    }
-    members_.erase(members_.begin() + static_cast<std::ptrdiff_t>(members_before), members_.end());
-    order_ = order_before;
-    profiles_ = profiles_before;
-    refuse_shared_ = refuse_shared_before;
-    if (stores_before) {
-      robot_ = stores_before->first;
-      control_ = stores_before->second;
-    }
     report.loaded.clear();
-  } else if (members_.size() > members_before) {
-    publish(draftOf());
+    return report;
   }
+  if (!report.loaded.empty()) publish(draftOf());
+  undo.keep();
   return report;
+}
+
+// Adds what a list names, without telling the cycle. What cannot be loaded is reported.
+void FeedbackControllersManager::readList(const ConfigNode& list, const std::string& base,
+                                          LoadReport& report) {
+  if (list.kind() != ConfigNode::Kind::Map) throw list.error("a list file must be a map");
+  const ConfigNode* names = list.find("loadControllers");
+  if (!names) throw list.error("a list file needs loadControllers: [names]");
+  std::vector<std::string> folders;
+  if (const ConfigNode* node = list.find("searchPath")) folders = node->texts("searchPath");
+  if (const ConfigNode* node = list.find("sharedSignals")) {
+    const std::string policy = node->text("sharedSignals");
+    if (policy != "cascade" && policy != "refuse") {
+      throw node->error("sharedSignals cannot be '" + policy + "'" +
+                        suggestion(policy, {"cascade", "refuse"}));
+    }
+    refuse_shared_ = policy == "refuse";
+  }
+  const SearchPath files(base, folders);
+  const std::vector<std::string> blocks = blocksOf(list);
+  if (names->kind() != ConfigNode::Kind::List) {
+    throw names->error("loadControllers expects a list of names");
+  }
+  for (const ConfigNode& item : names->items()) {
+    try {
+      const std::string name = item.text("a name in loadControllers");
+      const ConfigNode* block = list.find(name);
+      if (!block || std::find(blocks.begin(), blocks.end(), name) == blocks.end()) {
+        throw item.error("loadControllers lists '" + name + "', but there is no block '" + name +
+                         ":'" + suggestion(name, blocks));
+      }
+      const ControllerEntry entry = readEntry(name, *block, files);
+      const Status status = loadLocked(name, entry, false);
+      if (!status) throw block->error(status.message());
+      report.loaded.push_back(name);
+    } catch (const std::exception& e) {
+      report.errors.push_back(e.what());
+    }
+  }
+  if (const ConfigNode* node = list.find("profiles")) {
+    if (node->kind() != ConfigNode::Kind::Map) throw node->error("profiles expects a map");
+    for (const auto& entry : node->entries()) {
+      const Status status =
+          setProfileLocked(entry.first, entry.second.texts("profile '" + entry.first + "'"));
+      if (!status) report.errors.push_back(entry.second.place() + ": " + status.message());
+    }
+  }
 }
 
 Status FeedbackControllersManager::loadController(const std::string& name,
@@ -189,6 +221,8 @@ Status FeedbackControllersManager::loadController(const std::string& name,
 // Without `offer` the cycle is not told: the caller publishes.
 Status FeedbackControllersManager::loadLocked(const std::string& name,
                                               const ControllerEntry& entry, bool offer) {
+  // A library that only an outdated plan holds is closed, so that a new build of it is loaded.
+  collect();
   try {
     if (indexOf(name) >= 0) {
       return Status::failure("a controller named '" + name + "' is loaded already");
@@ -215,15 +249,9 @@ Status FeedbackControllersManager::take(ControllerInstance instance, const std::
   if (indexOf(name) >= 0) {
     return Status::failure("a controller named '" + name + "' is loaded already");
   }
-  // A controller that is refused half-way must not leave keys behind in the stores. Once they are
-  // frozen it cannot, and the cycle may be using them.
-  std::optional<std::pair<RobotStates, ControlStates>> before;
-  if (!robot_.frozen()) before.emplace(robot_, control_);
-  const auto undo = [&] {
-    if (!before) return;
-    robot_ = before->first;
-    control_ = before->second;
-  };
+  // Until the end of this function: what initialize() throws may live in the library.
+  const std::shared_ptr<PluginLibrary> library = instance.library;
+  Undo undo(*this);
   try {
     auto member = std::make_unique<Member>();
     member->name = name;
@@ -240,27 +268,23 @@ Status FeedbackControllersManager::take(ControllerInstance instance, const std::
     member->state.enabled = entry.enabled;
     member->slot->configure(config.gains, config.settings, robot_, control_, logger_,
                             &cycle_number_);
-    member->slot->setOwner(this);
     members_.push_back(std::move(member));
     Draft draft = draftOf();
     draft.order.push_back(name);
-    const Status status = checkExclusive(draft);
-    if (!status) {
-      members_.back()->slot->setOwner(nullptr);
-      members_.pop_back();
-      undo();
-      return Status::failure("controller '" + name + "': " + status.message());
+    Status status = checkExclusive(draft);
+    if (!status) return Status::failure("controller '" + name + "': " + status.message());
+    if (offer) {
+      status = publish(std::move(draft));
+    } else {
+      order_ = std::move(draft.order);
     }
+    members_.back()->slot->setOwner(this);
     ++next_owner_;
-    before_last_.reset();
-    if (offer) return publish(draft);
-    order_ = draft.order;
-    return {};
+    undo.keep();
+    return status;
   } catch (const std::exception& e) {
-    undo();
     return Status::failure("controller '" + name + "': " + e.what());
   } catch (...) {
-    undo();
     return Status::failure("controller '" + name +
                            "': initialize() threw something that is not a std::exception");
   }
@@ -287,13 +311,19 @@ Status FeedbackControllersManager::unloadLocked(const std::string& name) {
                              "'; change the profile first");
     }
   }
-  m.slot->setOwner(nullptr);
   Draft draft = draftOf();
   draft.states.erase(draft.states.begin() + i);
   draft.order.erase(std::find(draft.order.begin(), draft.order.end(), name));
+  std::unique_ptr<Member> out = std::move(members_[i]);
   members_.erase(members_.begin() + i);
-  before_last_.reset();
-  return publish(draft);
+  try {
+    const Status status = publish(std::move(draft));
+    out->slot->setOwner(nullptr);
+    return status;
+  } catch (...) {
+    members_.insert(members_.begin() + i, std::move(out));  // its room is still there
+    throw;
+  }
 }
 
 Status FeedbackControllersManager::setProfile(const std::string& profile,
@@ -313,7 +343,8 @@ Status FeedbackControllersManager::setProfileLocked(const std::string& profile,
       return Status::failure("profile '" + profile + "': '" + name + "' appears twice");
     }
   }
-  profiles_[profile] = controllers;
+  std::vector<std::string> list = controllers;
+  profiles_[profile] = std::move(list);
   return {};
 }
 

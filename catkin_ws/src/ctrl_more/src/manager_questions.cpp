@@ -132,15 +132,13 @@ std::vector<ControllerStatus> FeedbackControllersManager::statusAll() const {
   return list;
 }
 
-std::vector<Attribution> FeedbackControllersManager::attribution() const {
+CycleRecord FeedbackControllersManager::lastCycle() const {
   const Lock lock(mutex_);
   const unsigned buffer = records_->acquire();
-  const std::uint64_t cycle = recorded_cycle_[buffer];
-  std::vector<Attribution> list;
-  for (const std::string& name : order_) {
-    member(name).slot->attribution(control_, buffer, cycle, list);
-  }
-  return list;
+  CycleRecord record;
+  record.cycle = recorded_cycle_[buffer];
+  for (const std::string& name : order_) member(name).slot->addRecord(control_, buffer, record);
+  return record;
 }
 
 void FeedbackControllersManager::plot(const std::string& name, std::ostream& out) const {

@@ -28,6 +28,7 @@ struct PlanEntry {
 /// Everything a manager is to do, immutable; see FeedbackControllersManager.
 struct Plan {
   std::uint64_t generation = 0;
+  bool timed = false;  ///< some controller's duration is judged
   std::vector<PlanEntry> entries;                               ///< execution order
   std::array<std::vector<ControllerSlot*>, kStages> stages{};  ///< the same, per stage
 };

@@ -2,9 +2,11 @@
 #include "ctrl_more/plugin_library.hpp"
 
 #include <dlfcn.h>
+#include <sys/stat.h>
 
 #include <algorithm>
 #include <cctype>
+#include <cstdint>
 #include <cstdlib>
 #include <filesystem>
 #include <map>
@@ -28,9 +30,44 @@ std::recursive_mutex& loaderMutex() {
   return mutex;
 }
 
-std::map<std::string, std::weak_ptr<PluginLibrary>>& openLibraries() {
-  static std::map<std::string, std::weak_ptr<PluginLibrary>> libraries;
+// What tells a file from a later build under the same name.
+struct Build {
+  dev_t device = 0;
+  ino_t inode = 0;
+  off_t size = 0;
+  std::int64_t changed_ns = 0;
+
+  bool operator==(const Build& other) const {
+    return device == other.device && inode == other.inode && size == other.size &&
+           changed_ns == other.changed_ns;
+  }
+};
+
+Build buildOf(const std::string& file) {
+  struct stat info {};
+  if (stat(file.c_str(), &info) != 0) return {};
+  return {info.st_dev, info.st_ino, info.st_size,
+          info.st_mtim.tv_sec * 1'000'000'000LL + info.st_mtim.tv_nsec};
+}
+
+// A library that is in memory. The dynamic linker may keep one there after it was closed (unique
+// symbols, thread-local objects, -z nodelete): its static objects do not run again, so its makers
+// are remembered here.
+struct InMemory {
+  std::weak_ptr<PluginLibrary> open;
+  Build build;
+  std::map<std::string, FeedbackControllerMaker> makers;
+};
+
+std::map<std::string, InMemory>& librariesInMemory() {
+  static std::map<std::string, InMemory> libraries;
   return libraries;
+}
+
+bool isMapped(const std::string& file) {
+  void* const still = dlopen(file.c_str(), RTLD_LAZY | RTLD_NOLOAD);
+  if (still) dlclose(still);
+  return still != nullptr;
 }
 
 std::string joined(const std::vector<std::string>& names) {
@@ -66,7 +103,6 @@ struct PluginLibrary::Handle {
   // would end the process when it is called.
   void* bound = nullptr;
   std::unique_ptr<class_loader::ClassLoader> loader;
-  std::map<std::string, FeedbackControllerMaker> makers;
 };
 
 std::shared_ptr<PluginLibrary> PluginLibrary::open(const std::string& path) {
@@ -76,7 +112,13 @@ std::shared_ptr<PluginLibrary> PluginLibrary::open(const std::string& path) {
     throw std::runtime_error("there is no library " + path);
   }
   const std::string file = fs::canonical(path, no_error).string();
-  if (const auto open_already = openLibraries()[file].lock()) return open_already;
+  const Build build = buildOf(file);
+  InMemory& memory = librariesInMemory()[file];
+  if (const auto open_already = memory.open.lock()) {
+    if (memory.build == build) return open_already;
+    throw std::runtime_error("library " + file + " was built again, and controllers of the old " +
+                             "build are loaded; unload each of them first");
+  }
 
   FeedbackControllerPrototypes& known = prototypes();
   const std::vector<std::string> before = known.types();
@@ -96,8 +138,20 @@ std::shared_ptr<PluginLibrary> PluginLibrary::open(const std::string& path) {
   const std::vector<std::string> after = known.types();
   std::set_difference(after.begin(), after.end(), before.begin(), before.end(),
                       std::back_inserter(library->types_));
-  for (const std::string& type : library->types_) {
-    library->handle_->makers[type] = known.find(type);
+  if (library->types_.empty() && !memory.makers.empty()) {
+    if (!(memory.build == build)) {
+      throw std::runtime_error(
+          "library " + file + " was built again, but the dynamic linker keeps the old build in " +
+          "memory; start the program again, or build the library so that it can be closed " +
+          "(-fno-gnu-unique, no thread_local objects with destructors, no -z nodelete)");
+    }
+    for (const auto& entry : memory.makers) {
+      if (known.insert(entry)) library->types_.push_back(entry.first);
+    }
+  } else {
+    memory.makers.clear();
+    for (const std::string& type : library->types_) memory.makers[type] = known.find(type);
+    memory.build = build;
   }
   const std::vector<std::string> refused = known.takeRefused();
   if (!refused.empty()) {
@@ -108,18 +162,22 @@ std::shared_ptr<PluginLibrary> PluginLibrary::open(const std::string& path) {
                              " registers no controller; its source needs " +
                              "CTRL_MORE_REGISTER_CONTROLLER");
   }
-  openLibraries()[file] = library;
+  memory.open = library;
   return library;
 }
 
 PluginLibrary::~PluginLibrary() {
   const std::lock_guard<std::recursive_mutex> lock(loaderMutex());
   if (!handle_) return;
-  // Makers written as in the paper do not take themselves out.
-  for (const auto& entry : handle_->makers) prototypes().erase(entry.first, entry.second);
+  const auto memory = librariesInMemory().find(path_);
+  // Makers written as in the paper do not take themselves out, nor do those of a library that
+  // stays in memory.
+  for (const std::string& type : types_) {
+    const auto maker = memory->second.makers.find(type);
+    if (maker != memory->second.makers.end()) prototypes().erase(type, maker->second);
+  }
   handle_.reset();
-  const auto found = openLibraries().find(path_);
-  if (found != openLibraries().end() && found->second.expired()) openLibraries().erase(found);
+  if (!isMapped(path_)) librariesInMemory().erase(memory);
 }
 
 ControllerInstance makeController(const std::string& library_path, const std::string& type) {
@@ -141,11 +199,20 @@ ControllerInstance makeController(const std::string& library_path, const std::st
                              " has no controller of type '" + wanted + "'" +
                              suggestion(wanted, known));
   }
-  instance.controller.reset(prototypes().find(wanted)());
+  // What the library throws lives in it, and may not leave this function.
+  std::string described;
+  const std::string threw = "the controller of type '" + wanted + "' threw while it was made: ";
+  try {
+    instance.controller.reset(prototypes().find(wanted)());
+    if (instance.controller) described = instance.controller->describe().type;
+  } catch (const std::exception& e) {
+    throw std::runtime_error(threw + e.what());
+  } catch (...) {
+    throw std::runtime_error(threw + "something that is not a std::exception");
+  }
   if (!instance.controller) {
     throw std::runtime_error("the maker of controller type '" + wanted + "' returned nothing");
   }
-  const std::string described = instance.controller->describe().type;
   if (described != wanted) {
     throw std::runtime_error("the controller registered as '" + wanted +
                              "' describes itself as '" + described + "'; make them the same");

@@ -156,7 +156,7 @@ void Setup::resolve(ResolvedControlUse& entry, int size) {
   entry.signal = control_.find(entry.use.container, entry.key);
 }
 
-RobotSignal Setup::robot(const std::string& role, int size) {
+RobotSignal Setup::robotSignal(const std::string& role, int size) {
   std::vector<std::string> known;
   for (ResolvedRobotUse& entry : robot_uses_) {
     known.push_back(entry.use.role);
@@ -187,23 +187,14 @@ ResolvedControlUse& Setup::findControl(const std::string& role) {
                               "'" + suggestion(role, known));
 }
 
-ControlSignal Setup::control(const std::string& role, int size) {
+ControlSignal Setup::controlSignal(const std::string& role, int size, bool to_modify) {
   ResolvedControlUse& entry = findControl(role);
-  resolve(entry, size);
-  return entry.signal;
-}
-
-ModifySignal Setup::modify(const std::string& role, int size) {
-  ResolvedControlUse& entry = findControl(role);
-  if (!entry.use.modifies) {
+  if (to_modify && !entry.use.modifies) {
     throw std::invalid_argument(name_ + ": the description declares control signal '" + role +
                                 "' as read only");
   }
   resolve(entry, size);
-  ModifySignal permission;
-  permission.signal_ = entry.signal;
-  permission.owner_ = owner_;
-  return permission;
+  return entry.signal;
 }
 
 void Setup::resolveAll() {

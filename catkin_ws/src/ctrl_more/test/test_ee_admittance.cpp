@@ -110,6 +110,20 @@ TEST_F(AdmittanceTest, toolFrameAndRotation) {
   EXPECT_LT((turned - Eigen::Vector3d(0, 0.1, 0)).norm(), 1e-9);
 }
 
+TEST_F(AdmittanceTest, wrenchOfTheToolTurnsWithWhatHasYielded) {
+  ASSERT_TRUE(rig.load("ee_admittance",
+                       "wrench_frame: tool\naxes: all\nforce_dead_band: 0\ntorque_dead_band: 0\n"
+                       "stiffness: 100\nrotary_stiffness: 4\nmax_velocity: 2\n"));
+  for (int i = 0; i < 4000; ++i) {
+    rig.robot.setMeasuredData("wrench", vectorOf({5, 0, 0, 0, 0, 1.6}), rig.cycle.now_ns);
+    rig.setReferences();
+    rig.cycleOnce();
+  }
+  // Turned by 0.4 rad about z, so is the sensor, and with it the force it feels along its x.
+  EXPECT_NEAR(rig.pose()[0], 0.05 * std::cos(0.4), 1e-9);
+  EXPECT_NEAR(rig.pose()[1] - 0.2, 0.05 * std::sin(0.4), 1e-9);
+}
+
 // The profile of a handover: compliant while approaching, off before contact is armed.
 TEST(Handover, compliantInTheApproachAndGoneBeforeContactIsArmed) {
   setenv("CTRL_MORE_PATH", CTRL_MORE_PLUGIN_DIR, 1);

@@ -122,7 +122,7 @@ TEST(FeedbackControllerTest, askingForWhatIsNotDeclaredIsRefused) {
     c->on_initialize = [what](TestController&, ctrl_more::Setup& setup) {
       if (what == 0) setup.modify("pelvis");
       if (what == 1) setup.modify("zmp");
-      if (what == 2) setup.robot("imu");
+      if (what == 2) setup.read("imu");
       if (what == 3) setup.gain("kp");
       if (what == 4) setup.modify("ee", 6);
     };
@@ -182,6 +182,96 @@ TEST(FeedbackControllerTest, emptyFieldsAreFound) {
   d.setting("mode", "a");
   const auto empty = d.emptyFields();
   EXPECT_EQ(empty.size(), 6u + 3u + 2u + 1u);
+}
+
+template <int N>
+std::string refusalOf(const std::string& role, bool reads) {
+  Rig rig;
+  rig.robot.declare(RobotSource::Measured, "imu", 9);
+  auto c = std::make_unique<TestController>();
+  c->description.measured("imu").in("rad").frameOf("imu").about("any size");
+  c->description.reads(ControlContainer::CentreOfMass, "com").in("m").frameOf("w").about("read");
+  c->description.modifies(ControlContainer::Zmp, "zmp").in("m").frameOf("w").about("moved");
+  c->on_initialize = [&](TestController&, Setup& setup) {
+    if (role == "imu") setup.read<N>(role);
+    else if (reads) setup.reference<N>(role);
+    else setup.modify<N>(role);
+  };
+  return rig.manager->addController(std::move(c), "c").message();
+}
+
+TEST(Handles, sizesAreComparedWhenTheyAreFetched) {
+  EXPECT_TRUE(contains(refusalOf<7>("zmp", false), "size 7")) << refusalOf<7>("zmp", false);
+  EXPECT_TRUE(contains(refusalOf<2>("com", true), "size 2"));
+  EXPECT_TRUE(contains(refusalOf<10>("imu", true), "expects 10"));
+  EXPECT_EQ(refusalOf<3>("zmp", false), "");
+  EXPECT_EQ(refusalOf<3>("com", true), "");
+  EXPECT_EQ(refusalOf<9>("imu", true), "");
+  EXPECT_TRUE(contains(refusalOf<3>("com", false), "read only"));
+}
+
+TEST(Handles, nothingBesideASignalIsWritten) {
+  using Way = std::function<void(Numbers<> any, Numbers<3> three)>;
+  const std::vector<Way> ways = {
+      [](Numbers<> any, Numbers<3>) { any[3] = 9.0; },
+      [](Numbers<>, Numbers<3> three) { three[3] = 9.0; },
+      [](Numbers<>, Numbers<3> three) { three[-1] = 9.0; },
+      [](Numbers<> any, Numbers<3>) { any(7) = 9.0; },
+      [](Numbers<> any, Numbers<3>) { any.head<4>().setConstant(9.0); },
+      [](Numbers<> any, Numbers<3>) { any.tail(4).setConstant(9.0); },
+      [](Numbers<> any, Numbers<3>) { any.segment<2>(2).setConstant(9.0); },
+      [](Numbers<>, Numbers<3> three) { three.segment(1, 3).setConstant(9.0); },
+  };
+  for (std::size_t i = 0; i < ways.size(); ++i) {
+    Rig rig(0.0, false, false);
+    auto c = std::make_unique<TestController>();
+    c->description.modifies(ControlContainer::Zmp, "zmp").in("m").frameOf("w").about("moved");
+    Modify<3> three;
+    c->on_initialize = [&three](TestController& self, ctrl_more::Setup& setup) {
+      self.out = setup.modify("zmp");
+      three = setup.modify<3>("zmp");
+    };
+    c->on_update = [&](TestController& self, const Cycle&, const RobotStates&,
+                       const ControlStates&, ModifiedControlStates& modified) {
+      ways[i](modified[self.out], modified[three]);
+    };
+    rig.add(std::move(c), "c");
+    rig.setReferences();
+    const std::vector<double> before(rig.control.data(),
+                                     rig.control.data() + rig.control.dataSize());
+    rig.step();
+    EXPECT_TRUE(contains(rig.manager->status("c").fault_text, "beside")) << i;
+    EXPECT_EQ(before, std::vector<double>(rig.control.data(),
+                                          rig.control.data() + rig.control.dataSize()));
+  }
+}
+
+TEST(Handles, emptyOnesAreFaults) {
+  Rig rig(0.0, false, false);
+  auto c = adder("com", "com", 1.0);
+  int way = 0;
+  c->on_update = [&way](TestController&, const Cycle&, const RobotStates& robot,
+                        const ControlStates& original, ModifiedControlStates& modified) {
+    if (way == 0) static_cast<void>(robot.view(Read<3>()));
+    if (way == 1) static_cast<void>(original.view(Reference<7>()));
+    if (way == 2) static_cast<void>(original.view(Modify<>()));
+    if (way == 3) modified[Modify<6>()][5] = 1.0;
+  };
+  rig.add(std::move(c), "c");
+  for (; way < 4; ++way) {
+    rig.step();
+    EXPECT_EQ(rig.manager->status("c").fault, FaultKind::Exception) << way;
+    rig.manager->resume("c", "fault");
+  }
+}
+
+TEST(Handles, hostsLookUpWithASizeToo) {
+  Rig rig;
+  EXPECT_EQ(rig.control.find<Pose>(ControlContainer::TaskSpaceReferencePose, "ee").size(), 7);
+  EXPECT_THROW(rig.control.find<6>(ControlContainer::TaskSpaceReferencePose, "ee"),
+               std::invalid_argument);
+  EXPECT_THROW(rig.control.find<7>(ControlContainer::TaskSpaceReferencePose, "e"),
+               std::invalid_argument);
 }
 
 }  // namespace

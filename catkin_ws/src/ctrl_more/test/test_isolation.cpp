@@ -98,7 +98,7 @@ TEST_F(Isolation, wrongSize) {
 }
 
 TEST_F(Isolation, emptyPermission) {
-  build([](TestController&, ModifiedControlStates& m) { m[ModifySignal()][0] = 1.0; });
+  build([](TestController&, ModifiedControlStates& m) { m[Modify<>()][0] = 1.0; });
   expectFault(FaultKind::Exception, "permission");
 }
 
@@ -160,7 +160,7 @@ FaultKind spoil(const Signal& signal, int index, double value, bool first_is_goo
   if (signal.container == ControlContainer::JointSpaceReference) {
     c->description.stage = Stage::Joint;
   }
-  ModifySignal good;
+  Modify<> good;
   if (first_is_good) {
     c->description.modifies(ControlContainer::JointSpaceReference, "Velocity").in("rad/s")
         .frameOf("joint").about("untouched");
@@ -218,7 +218,7 @@ TEST(IsolationTest, secondSignalIsUndoneRecordedAndFadesLikeTheFirst) {
   auto c = adder("pose", "ee", 0.0);
   c->description.modifies(ControlContainer::TaskSpaceReferenceVel, "ee").in("m/s").frameOf("base")
       .about("pushed");
-  ModifySignal velocity;
+  Modify<> velocity;
   c->on_initialize = [&](TestController& self, ctrl_more::Setup& setup) {
     self.out = setup.modify("taskSpaceReferencePose/ee");
     velocity = setup.modify("taskSpaceReferenceVel/ee");
@@ -450,6 +450,63 @@ TEST(IsolationTest, staleOrMissingInputsStopAndFreshOnesStart) {
     rig.step();
   }
   EXPECT_EQ(rig.pose()[0], 1.0);
+}
+
+// A sensor that is lost during a pause must not leave the correction on when the pause ends.
+TEST(IsolationTest, correctionOfAPauseFadesWhenItResumesWithoutItsSensor) {
+  for (const bool fault : {false, true}) {
+    Rig rig(0.1, false, false);
+    bool wrong = false;
+    auto c = adder("pose", "ee", 1.0);
+    c->description.measured("wrench").size(1).in("N").frameOf("w").maxAge(0.02).about("needed");
+    const auto add = c->on_update;
+    c->on_update = [&wrong, add](TestController& self, const Cycle& cycle, const RobotStates& robot,
+                                 const ControlStates& original, ModifiedControlStates& modified) {
+      if (wrong) throw std::runtime_error("wrong");
+      add(self, cycle, robot, original, modified);
+    };
+    ControllerEntry entry;
+    entry.on_fault = StopPolicy::Hold;
+    rig.add(std::move(c), "c", true, entry);
+    const auto run = [&](int cycles, bool sensor) {
+      for (int i = 0; i < cycles; ++i) {
+        if (sensor) rig.robot.setMeasuredData("wrench", vectorOf({1.0}), rig.cycle.now_ns);
+        rig.step();
+      }
+    };
+    run(60, true);
+    ASSERT_EQ(rig.pose()[0], 1.0);
+    wrong = fault;
+    if (!fault) rig.manager->pause("c");
+    run(60, true);
+    EXPECT_EQ(rig.pose()[0], 1.0) << "held";
+    run(20, false);
+    wrong = false;
+    rig.manager->resume("c", fault ? "fault" : "user");
+    run(5, false);
+    EXPECT_EQ(rig.manager->status("c").activity, Activity::Waiting);
+    EXPECT_EQ(rig.manager->status("c").waiting_for, "measuredData/wrench");
+    EXPECT_GT(rig.pose()[0], 0.0);
+    run(60, false);
+    EXPECT_EQ(rig.pose()[0], 0.0) << "let go";
+    run(60, true);
+    EXPECT_EQ(rig.pose()[0], 1.0) << "and back";
+  }
+}
+
+TEST(IsolationTest, overrunsAreJudgedWhereAControllerAsksForIt) {
+  Rig rig(0.0, false, false);  // the manager itself measures nothing
+  auto c = adder("pose", "ee", 1.0);
+  c->on_update = [](TestController&, const Cycle&, const RobotStates&, const ControlStates&,
+                    ModifiedControlStates&) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(2));
+  };
+  ControllerEntry entry;
+  entry.overrun_us = 1000.0;
+  rig.add(std::move(c), "slow", true, entry);
+  rig.step(6);
+  EXPECT_EQ(rig.manager->status("slow").fault, FaultKind::Overrun);
+  EXPECT_EQ(rig.manager->status("slow").overruns, 5u);
 }
 
 }  // namespace

@@ -195,7 +195,7 @@ TEST(ManagerTest, refusedControllerLeavesNoKeyBehind) {
   auto c = adder("pose", "ee", 0.1);
   c->description.measured("leftover").size(3);
   c->on_initialize = [](TestController&, ctrl_more::Setup& setup) {
-    setup.robot("leftover");
+    setup.read("leftover");
     throw std::runtime_error("no");
   };
   EXPECT_FALSE(rig.manager->addController(std::move(c), "a"));
@@ -250,7 +250,9 @@ TEST_F(BySignal, reasonsDoNotCancelEachOther) {
   rig.manager->resumeAllUsingRobotState("wrench");
   EXPECT_TRUE(rig.manager->isPaused("force"));
   const Status status = rig.manager->resume("force");
-  EXPECT_TRUE(contains(status.message(), "still paused: control signal ee")) << status.message();
+  EXPECT_TRUE(contains(status.message(),
+                       "still paused: control signal taskSpaceReferencePose/ee"))
+      << status.message();
   EXPECT_TRUE(rig.manager->isPaused("force"));
   rig.manager->resumeAllUsingControlState("ee");
   EXPECT_FALSE(rig.manager->isPaused("force"));
@@ -333,7 +335,7 @@ TEST(ManagerTest, originalIsTheStateBeforeTheCascade) {
     c->on_update = [&](TestController& self, const Cycle&, const RobotStates&,
                        const ControlStates& original, ModifiedControlStates& modified) {
       originals.push_back(original.view(self.out.signal())[0]);
-      found.push_back(modified.view(self.out.signal())[0]);
+      found.push_back(modified.view(self.out)[0]);
       modified[self.out][0] += 1.0;
     };
     return c;
@@ -438,6 +440,105 @@ TEST(ManagerTest, emptyListKeepsEveryBit) {
     rig.manager->update(rig.cycle, rig.robot, rig.control);
     EXPECT_EQ(0, std::memcmp(before.data(), rig.control.data(), before.size() * sizeof(double)));
   }
+}
+
+TEST(ManagerTest, secondManagerOverFrozenStoresRunsAtOnce) {
+  for (const bool keys : {false, true}) {
+    Logger logger;
+    RobotStates robot(&logger);
+    ControlStates control(0, 0.005, &logger);
+    if (keys) control.declare(ControlContainer::Zmp, "other", 3);
+    ManagerOptions options;
+    options.blend_s = 0.0;
+    FeedbackControllersManager first(robot, control, options, &logger);
+    FeedbackControllersManager second(robot, control, options, &logger);
+    ControllerEntry entry;
+    entry.enabled = true;
+    ASSERT_TRUE(first.addController(adder("com", "com", 1.0), "a", entry));
+    first.update({0, 0.005, 1}, robot, control);
+    ASSERT_TRUE(second.addController(adder("com", "com", 2.0), "b", entry));
+    second.update({0, 0.005, 1}, robot, control);
+    EXPECT_EQ(control.getCoM().x(), 3.0);
+    EXPECT_EQ(second.attribution().size(), 1u);
+  }
+}
+
+TEST(ManagerTest, storesThatTheHostFrozeAreGoodToo) {
+  Logger logger;
+  RobotStates robot(&logger);
+  ControlStates control(0, 0.005, &logger);
+  control.freeze();
+  FeedbackControllersManager manager(robot, control, {}, &logger);
+  ControllerEntry entry;
+  entry.enabled = true;
+  entry.blend_s = 0.0;
+  ASSERT_TRUE(manager.addController(adder("com", "com", 1.0), "a", entry));
+  manager.update({0, 0.005, 1}, robot, control);
+  EXPECT_EQ(control.getCoM().x(), 1.0);
+  EXPECT_TRUE(robot.frozen()) << "both stores are fixed before the first cycle";
+}
+
+TEST_F(BySignal, keyAndFullNameAreTheSameReason) {
+  for (const std::string robot : {"wrench", "measuredData/wrench"}) {
+    for (const std::string back : {"wrench", "measuredData/wrench"}) {
+      ASSERT_TRUE(rig.manager->pauseAllUsingRobotState(robot));
+      EXPECT_EQ(rig.manager->status("force").reasons,
+                Names{"robot signal measuredData/wrench"});
+      ASSERT_TRUE(rig.manager->resumeAllUsingRobotState(back));
+      EXPECT_FALSE(rig.manager->isPaused("force")) << robot << " " << back;
+    }
+  }
+  for (const std::string back : {"ee", "taskSpaceReferencePose/ee"}) {
+    ASSERT_TRUE(rig.manager->pauseAllUsingControlState("ee"));
+    ASSERT_TRUE(rig.manager->resumeAllUsingControlState(back));
+    for (const auto& status : rig.manager->statusAll()) EXPECT_FALSE(status.paused) << status.name;
+  }
+}
+
+TEST(ManagerTest, statesAreThoseOfTheCycle) {
+  class Shows : public TestController {
+   public:
+    void state(Numbers<> values) const override {
+      values[0] = updates;
+      values[1] = -updates;
+      if (wrong) values[2] = 1.0;
+    }
+    bool wrong = false;
+  };
+  Rig rig;
+  auto c = std::make_unique<Shows>();
+  Shows* const shows = c.get();
+  c->description.modifies(ControlContainer::Zmp, "zmp").in("m").frameOf("w").about("moved");
+  c->description.state("count").in("1").about("updates");
+  c->description.state("minus").in("1").about("the same, negative");
+  c->on_initialize = [](TestController& self, ctrl_more::Setup& setup) {
+    self.out = setup.modify("zmp");
+  };
+  c->on_update = [](TestController& self, const Cycle&, const RobotStates&, const ControlStates&,
+                    ModifiedControlStates& modified) { modified[self.out][0] = self.updates; };
+  ControllerEntry entry;
+  entry.on_fault = StopPolicy::Hold;
+  rig.add(std::move(c), "shows", true, entry);
+  rig.add(adder("com", "com", 1.0), "silent", false);
+  for (int i = 1; i <= 5; ++i) {
+    rig.step();
+    const CycleRecord record = rig.manager->lastCycle();
+    EXPECT_EQ(record.cycle, rig.cycle.number);
+    ASSERT_EQ(record.states.size(), 1u);
+    EXPECT_EQ(record.states[0].controller, "shows");
+    EXPECT_EQ(record.states[0].values, (std::vector<double>{1.0 * i, -1.0 * i}));
+    ASSERT_EQ(record.changes.size(), 1u);
+    EXPECT_EQ(record.changes[0].after[0], i);
+  }
+  // Writing beside the numbers is a fault; what was written last is shown while it stands.
+  shows->wrong = true;
+  rig.step();
+  EXPECT_TRUE(contains(rig.manager->status("shows").fault_text, "beside"));
+  rig.step(3);
+  const CycleRecord record = rig.manager->lastCycle();
+  ASSERT_EQ(record.states.size(), 1u);
+  EXPECT_EQ(record.states[0].values[0], 6.0);
+  EXPECT_EQ(record.changes[0].after[0], 5.0) << "the last good one is held";
 }
 
 }  // namespace

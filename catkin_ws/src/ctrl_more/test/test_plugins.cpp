@@ -103,12 +103,51 @@ TEST_F(Plugins, badLibrariesAreRefusedInWords) {
   expectRefused("loadControllers: [A]\nA: {libPath: libwrong_type.so}\n",
                 {"'Registered'", "'Described'"});
   expectRefused("loadControllers: [A]\nA: {libPath: libother_abi.so}\n",
-                {"'OtherAbi' compiled for another ctrl_more", "interface 2", "interface 1",
+                {"'OtherAbi' compiled for another ctrl_more", "interface 3", "interface 2",
                  "build it again"});
   expectRefused("loadControllers: [A]\nA: {libPath: libgood.so, type: God}\n",
                 {"no controller of type 'God'", "did you mean 'Good'"});
   EXPECT_TRUE(prototypes().types().empty()) << "nothing stays behind";
   EXPECT_TRUE(load("loadControllers: [A]\nA: {libPath: libtwo.so, type: Second}\n").ok());
+}
+
+// What a library throws lives in it, and must be dealt with before it is closed.
+TEST_F(Plugins, whateverALibraryThrowsRefusesTheWholeListInWords) {
+  const std::string own = "an error of its own", strange = "not a std::exception";
+  for (const auto& thrown : std::vector<std::pair<std::string, std::string>>{
+           {"InMaker", own}, {"InDescribe", own}, {"InInitialize", own},
+           {"NumberInMaker", strange}, {"ThingInMaker", strange},
+           {"ThingInInitialize", strange}}) {
+    for (const bool strict : {true, false}) {
+      SCOPED_TRACE(thrown.first);
+      const LoadReport report =
+          load("loadControllers: [first, odd]\nfirst: {libPath: libgood.so, enabled: true}\n"
+               "odd: {libPath: libstrangers.so, type: " + thrown.first + "}\n", strict);
+      ASSERT_EQ(report.errors.size(), 1u);
+      EXPECT_TRUE(contains(report.errors[0], thrown.second)) << report.errors[0];
+      EXPECT_TRUE(contains(report.errors[0], "odd")) << report.errors[0];
+      EXPECT_EQ(rig.manager->getControllersNames().size(), strict ? 0u : 1u);
+      EXPECT_EQ(rig.manager->getExecutionOrder().size(), strict ? 0u : 1u);
+      EXPECT_EQ(prototypes().find(thrown.first), nullptr) << "its library is closed";
+      rig.step(2);
+      EXPECT_EQ(rig.control.getZMP()[0], strict ? 0.0 : 1.0);
+      if (strict) continue;
+      rig.manager->disable("first");
+      rig.step(2);
+      EXPECT_TRUE(rig.manager->unload("first"));
+    }
+  }
+}
+
+TEST_F(Plugins, whatALibraryThrowsWhileLoadedIsAFaultOrARefusal) {
+  ASSERT_TRUE(load("loadControllers: [update, judge]\n"
+                   "update: {libPath: libstrangers.so, type: InUpdate, enabled: true}\n"
+                   "judge: {libPath: libstrangers.so, type: InJudge}\n").ok());
+  rig.step();
+  EXPECT_TRUE(contains(rig.manager->status("update").fault_text, "an error of its own"));
+  const Status status = rig.manager->setGains("judge", {{"k", {3.0}}});
+  EXPECT_TRUE(contains(status.message(), "an error of its own")) << status.message();
+  EXPECT_EQ(rig.manager->getGains("judge").all()["k"][0], 1.0);
 }
 
 TEST_F(Plugins, knownTypeNameIsRefusedAndTheFirstOneStays) {
@@ -235,6 +274,77 @@ TEST_F(Plugins, shippedListAndProfilesLoad) {
   EXPECT_FALSE(rig.manager->isEnabled("ee_admittance"));
   EXPECT_TRUE(rig.manager->isEnabled("joint_limits"));
   EXPECT_TRUE(rig.manager->reloadGains("ee_admittance"));
+}
+
+// A folder with a library that is built twice.
+struct TwoBuilds : Plugins {
+  fs::path folder = fs::path(::testing::TempDir()) / "ctrl_more_builds";
+  TwoBuilds() {
+    fs::remove_all(folder);
+    fs::create_directories(folder);
+  }
+  void build(const std::string& name) {
+    // As a linker does it: another file of the same name.
+    fs::copy_file(library(name), folder / "new");
+    fs::rename(folder / "new", folder / "libit.so");
+  }
+  LoadReport loadIt(const std::string& controller = "it") {
+    return rig.manager->load(
+        ConfigNode::fromText("loadControllers: [" + controller + "]\n" + controller +
+                             ": {libPath: libit.so, enabled: true}\n", "list.yaml"),
+        folder.string());
+  }
+  double runOnce() {
+    rig.step();
+    return rig.control.getZMP()[0];
+  }
+  void unloadIt() {
+    ASSERT_TRUE(rig.manager->disable("it"));
+    rig.step(2);
+    ASSERT_TRUE(rig.manager->unload("it"));
+    rig.step(2);
+  }
+};
+
+TEST_F(TwoBuilds, newCodeRunsAfterUnloadingRebuildingAndLoading) {
+  build("good");
+  ASSERT_TRUE(loadIt().ok());
+  EXPECT_EQ(runOnce(), 1.0);
+  unloadIt();
+  build("rebuilt");
+  const LoadReport again = loadIt();
+  ASSERT_TRUE(again.ok()) << again.text();
+  EXPECT_EQ(runOnce(), 10.0);
+}
+
+TEST_F(TwoBuilds, oldCodeIsNeverLoadedUnderTheNameOfTheNew) {
+  build("good");
+  ASSERT_TRUE(loadIt().ok());
+  build("rebuilt");
+  const LoadReport second = loadIt("another");
+  EXPECT_TRUE(contains(second.text(), "built again")) << second.text();
+  EXPECT_TRUE(contains(second.text(), "unload")) << second.text();
+  EXPECT_EQ(runOnce(), 1.0);
+  unloadIt();
+  EXPECT_TRUE(loadIt().ok());
+  EXPECT_EQ(runOnce(), 10.0);
+}
+
+// What static objects of a library cannot do twice, the loader has to remember.
+TEST_F(TwoBuilds, libraryThatStaysInMemoryIsLoadedAgain) {
+  build("resident");
+  for (int i = 0; i < 3; ++i) {
+    const LoadReport report = loadIt();
+    ASSERT_TRUE(report.ok()) << report.text();
+    EXPECT_EQ(runOnce(), 1.0);
+    unloadIt();
+  }
+  rig.manager->enable();  // frees the plan that still held the instance
+  EXPECT_EQ(prototypes().find("Good"), nullptr) << "not offered while it is not loaded";
+  build("rebuilt");
+  const LoadReport report = loadIt();
+  EXPECT_TRUE(contains(report.text(), "keeps the old build in memory")) << report.text();
+  EXPECT_TRUE(contains(report.text(), "start the program again"));
 }
 
 }  // namespace

@@ -43,13 +43,13 @@ std::unique_ptr<TestController> typical(std::atomic<bool>* throw_now) {
   c->description.modifies(ControlContainer::TaskSpaceReferenceVel, "ee");
   c->description.gain("kp", 0.01).range(0, 1).in("1").about("x");
   c->on_initialize = [](TestController& self, ctrl_more::Setup& setup) {
-    self.in = setup.robot("imu");
+    self.in = setup.read("imu");
     self.out = setup.modify("taskSpaceReferencePose/ee");
     self.gain_handle = setup.gain("kp");
   };
   c->on_update = [throw_now](TestController& self, const Cycle& cycle, const RobotStates& robot,
                              const ControlStates&, ModifiedControlStates& modified) {
-    modified.at<7>(self.out)[0] += self.scalar(self.gain_handle) * robot.view<9>(self.in)[3];
+    modified[self.out][0] += self.scalar(self.gain_handle) * robot.view(self.in)[3];
     if (cycle.number % 1000 == 0) CTRL_MORE_LOG(self.log(), Info, "cycle {}", cycle.number);
     if (throw_now && throw_now->exchange(false)) throw std::runtime_error("on purpose");
   };

@@ -150,5 +150,25 @@ TEST_F(RobotStatesTest, mailboxDeliversTheNewestCompleteLetter) {
   EXPECT_FALSE(mailbox.deliver(robot));
 }
 
+TEST_F(RobotStatesTest, stampsOfAnotherClockAreNotFresh) {
+  robot.declare(RobotSource::Measured, "imu", 1);
+  const RobotSignal imu = robot.find(RobotSource::Measured, "imu");
+  const std::int64_t now = 1'000'000'000'000, ms = 1'000'000;
+  const auto fresh = [&](std::int64_t stamp, std::int64_t max_age) {
+    const double value = 1.0;
+    robot.write(imu, &value, stamp);
+    return robot.isFresh(imu, now, max_age);
+  };
+  for (const std::int64_t age : {10 * ms, std::int64_t{INT64_MAX}}) {
+    EXPECT_TRUE(fresh(now, age));
+    EXPECT_TRUE(fresh(now + 50 * ms, age)) << "the clock was read a little later";
+    EXPECT_FALSE(fresh(now + 50 * ms + 1, age));
+    EXPECT_FALSE(fresh(INT64_MAX, age));
+    EXPECT_TRUE(fresh(now - 10 * ms, age));
+    EXPECT_EQ(fresh(now - 10 * ms - 1, age), age == INT64_MAX);
+    EXPECT_EQ(fresh(0, age), age == INT64_MAX);
+  }
+}
+
 }  // namespace
 }  // namespace ctrl_more

@@ -23,8 +23,8 @@ class TestController : public FeedbackController {
       on_update;
   int updates = 0;
   int resets = 0;
-  ModifySignal out;
-  RobotSignal in;
+  Modify<> out;
+  Read<> in;
   Gain gain_handle;
 
   TestController() {

@@ -1,4 +1,5 @@
 #include "controller_rig.hpp"
+#include "pendulum.hpp"
 
 namespace ctrl_more {
 namespace {
@@ -55,7 +56,7 @@ TEST(ZmpDcmTest, staysInTheSupportBox) {
 TEST(ZmpDcmTest, zmpIpFollowsItsClosedForm) {
   ControllerRig rig;
   const double kc = 6.0, ki = 3.5, disturbance = 0.01;
-  ASSERT_TRUE(rig.load("zmp_dcm", "mode: zmp_ip\nkc: 6\nki: 3.5\nmax_offset: 0.3\n"));
+  ASSERT_TRUE(rig.load("zmp_dcm", "mode: zmp_ip\nkc: 6\nki: 3.5\nmax_offset: 0.3\nzmp_filter: 0\n"));
   double com = 0.0;
   for (int i = 1; i <= 600; ++i) {
     // Quasi-static: the ZMP stands under the centre of mass, plus a constant disturbance.
@@ -69,6 +70,29 @@ TEST(ZmpDcmTest, zmpIpFollowsItsClosedForm) {
   }
   EXPECT_NEAR(com, -disturbance / 7, 1e-9);
   EXPECT_NEAR(rig.control.getZMP().x(), -kc * com, 1e-9);
+}
+
+TEST(ZmpDcmTest, zmpIpSettlesOnAPendulumThatFollowsLate) {
+  for (const double mass : {20.0, 100.0}) {
+    for (const double lag : {0.0, 0.02, 0.1}) {
+      for (const int delay : {1, 3}) {
+        ControllerRig rig;
+        ASSERT_TRUE(rig.load("zmp_dcm", "mode: zmp_ip\n"));
+        Pendulum plant{mass, 0.8, lag, delay};
+        const double push = 0.01 * mass * 9.80665 / 0.8;  // moves the ZMP by 10 mm
+        for (int i = 0; i < 3000; ++i) {
+          const double zmp = plant.zmp(i < 2000 ? push : 0.0, kDt);
+          rig.robot.setEstimatedData("zmp", vectorOf({zmp, 0, 0}), rig.cycle.now_ns);
+          rig.setReferences();
+          rig.cycleOnce(kDt);
+          plant.references.push_back(rig.control.getCoM().x());
+          ASSERT_LT(std::abs(rig.control.getCoM().x()), 0.03);
+          if (i == 1999) EXPECT_NEAR(rig.control.getCoM().x(), -0.01 / 2, 1e-4) << lag << delay;
+        }
+        EXPECT_NEAR(rig.control.getCoM().x(), 0.0, 1e-4);
+      }
+    }
+  }
 }
 
 TEST(ZmpDcmTest, zmpIpIsNotAlwaysAtItsLimitAndStaysFinite) {

@@ -26,8 +26,13 @@ function(ctrl_more_add_test name)
 endfunction()
 
 # Libraries that a manager must cope with.
-foreach(plugin good none two again paper_maker unresolved throwing wrong_type other_abi)
-  add_library(ctrl_more_test_plugin_${plugin} SHARED EXCLUDE_FROM_ALL test/plugins/${plugin}.cpp)
+foreach(plugin good none two again paper_maker unresolved throwing wrong_type other_abi
+    strangers rebuilt resident)
+  set(source ${plugin})
+  if(plugin STREQUAL resident)
+    set(source good)
+  endif()
+  add_library(ctrl_more_test_plugin_${plugin} SHARED EXCLUDE_FROM_ALL test/plugins/${source}.cpp)
   target_link_libraries(ctrl_more_test_plugin_${plugin} PRIVATE ctrl_more)
   set_target_properties(ctrl_more_test_plugin_${plugin} PROPERTIES
     OUTPUT_NAME ${plugin}
@@ -35,14 +40,17 @@ foreach(plugin good none two again paper_maker unresolved throwing wrong_type ot
   list(APPEND CTRL_MORE_TEST_PLUGINS ctrl_more_test_plugin_${plugin})
 endforeach()
 
+# One that the dynamic linker never closes.
+target_link_options(ctrl_more_test_plugin_resident PRIVATE -Wl,-z,nodelete)
+
 # One program per file, named after it: the test runner looks for them.
-foreach(name robot_states control_states feedback_controller manager isolation blending plugins
-    documentation config config_fuzz logger central_module attitude compliant_stabiliser zmp_dcm
+foreach(name robot_states control_states feedback_controller manager all_or_nothing isolation
+    blending plugins documentation config config_fuzz logger central_module attitude compliant_stabiliser zmp_dcm
     ee_admittance joint_limits three_robots)
   ctrl_more_add_test(${name} test/test_${name}.cpp)
 endforeach()
 ctrl_more_add_test(realtime test/test_realtime.cpp test/forbidden_calls.cpp)
-foreach(name plugins config_fuzz central_module)
+foreach(name plugins all_or_nothing config_fuzz central_module)
   if(TARGET ctrl_more_test_${name})
     add_dependencies(ctrl_more_test_${name} ${CTRL_MORE_TEST_PLUGINS})
   endif()

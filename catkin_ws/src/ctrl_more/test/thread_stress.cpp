@@ -30,21 +30,21 @@ class Pusher : public FeedbackController {
     return d;
   }
   void initialize(Setup& setup) override {
-    wrench_ = setup.robot("wrench");
-    pose_ = setup.modify("ee");
+    wrench_ = setup.read<Wrench>("wrench");
+    pose_ = setup.modify<Pose>("ee");
     k_ = setup.gain("k");
   }
   void update(const Cycle& cycle, const RobotStates& robot, const ControlStates&,
               ModifiedControlStates& modified) override {
-    modified.at<7>(pose_).head<3>() += scalar(k_) * robot.view<6>(wrench_).head<3>();
+    modified[pose_].head<3>() += scalar(k_) * robot.view(wrench_).head<3>();
     if (cycle.number % 997 == 0) fail("now and then");
     if (cycle.number % 1499 == 0) throw std::runtime_error("and this");
     if (cycle.number % 100 == 0) CTRL_MORE_LOG(log(), Info, "cycle {}", cycle.number);
   }
 
  private:
-  RobotSignal wrench_;
-  ModifySignal pose_;
+  Read<Wrench> wrench_;
+  Modify<Pose> pose_;
   Gain k_;
 };
 

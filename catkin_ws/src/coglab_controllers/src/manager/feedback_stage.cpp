@@ -15,12 +15,13 @@ ctrl_more::RobotSignal declare(ctrl_more::RobotStates& store, ctrl_more::RobotSo
   return store.find(source, key);
 }
 
-ctrl_more::ControlSignal declare(ctrl_more::ControlStates& store,
-                                 ctrl_more::ControlContainer container, const std::string& key,
-                                 int size, const std::string& unit, const std::string& frame) {
+template <int size>
+ctrl_more::Reference<size> declare(ctrl_more::ControlStates& store,
+                                   ctrl_more::ControlContainer container, const std::string& key,
+                                   const std::string& unit, const std::string& frame) {
   const ctrl_more::Status status = store.declare(container, key, size, unit, frame);
   if (!status.ok()) throw std::logic_error(status.message());
-  return store.find(container, key);
+  return store.find<size>(container, key);
 }
 
 ctrl_more::ManagerOptions options(bool lockstep) {
@@ -35,15 +36,15 @@ References makeReferences(double period, ctrl_more::Logger* logger) {
   References references;
   references.states = ctrl_more::ControlStates(kMaxJoints, period, logger);
   ctrl_more::ControlStates& states = references.states;
-  references.pose = declare(states, ControlContainer::TaskSpaceReferencePose, "ee", 7,
-                            "m, quaternion x y z w", "base");
-  references.twist =
-      declare(states, ControlContainer::TaskSpaceReferenceVel, "ee", 6, "m/s, rad/s", "base");
-  references.joint_position = declare(states, ControlContainer::JointSpaceReference, "Position",
-                                      kMaxJoints, "rad", "joints in wire order");
-  references.joint_velocity = declare(states, ControlContainer::JointSpaceReference, "Velocity",
-                                      kMaxJoints, "rad/s", "joints in wire order");
-  references.states.view<7>(references.pose) << 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0;
+  references.pose = declare<ctrl_more::Pose>(states, ControlContainer::TaskSpaceReferencePose, "ee",
+                                             "m, quaternion x y z w", "base");
+  references.twist = declare<ctrl_more::Twist>(states, ControlContainer::TaskSpaceReferenceVel,
+                                               "ee", "m/s, rad/s", "base");
+  references.joint_position = declare<kMaxJoints>(states, ControlContainer::JointSpaceReference,
+                                                  "Position", "rad", "joints in wire order");
+  references.joint_velocity = declare<kMaxJoints>(states, ControlContainer::JointSpaceReference,
+                                                  "Velocity", "rad/s", "joints in wire order");
+  references.states.view(references.pose) << 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0;
   return references;
 }
 

@@ -20,13 +20,20 @@ struct Abi {
   std::size_t controller;      ///< size of FeedbackController [bytes]
   std::size_t robot_states;    ///< size of RobotStates [bytes]
   std::size_t control_states;  ///< size of ControlStates [bytes]
+  std::size_t modified;        ///< size of ModifiedControlStates [bytes]
+  std::size_t description;     ///< size of Description [bytes]
+  std::size_t parts;           ///< sizes of its parts together [bytes]
+  std::size_t setup;           ///< size of Setup [bytes]
+  std::size_t cycle;           ///< size of Cycle [bytes]
 
   /// True if every number is the same.
   bool operator==(const Abi& other) const {
     return interface == other.interface && compiler_abi == other.compiler_abi &&
            eigen == other.eigen && eigen_align == other.eigen_align &&
            controller == other.controller && robot_states == other.robot_states &&
-           control_states == other.control_states;
+           control_states == other.control_states && modified == other.modified &&
+           description == other.description && parts == other.parts && setup == other.setup &&
+           cycle == other.cycle;
   }
 
   /// All numbers, for messages.
@@ -34,19 +41,27 @@ struct Abi {
     return "interface " + std::to_string(interface) + ", compiler ABI " +
            std::to_string(compiler_abi) + ", Eigen " + std::to_string(eigen) + " aligned to " +
            std::to_string(eigen_align) + ", sizes " + std::to_string(controller) + " " +
-           std::to_string(robot_states) + " " + std::to_string(control_states);
+           std::to_string(robot_states) + " " + std::to_string(control_states) + " " +
+           std::to_string(modified) + " " + std::to_string(description) + " " +
+           std::to_string(parts) + " " + std::to_string(setup) + " " + std::to_string(cycle);
   }
 };
 
 /// The numbers of the file that is being compiled. Static, so that a library keeps its own.
 static inline constexpr Abi thisAbi() {
-  return {1,
+  return {2,
           __GXX_ABI_VERSION,
           10000 * EIGEN_WORLD_VERSION + 100 * EIGEN_MAJOR_VERSION + EIGEN_MINOR_VERSION,
           EIGEN_MAX_ALIGN_BYTES,
           sizeof(FeedbackController),
           sizeof(RobotStates),
-          sizeof(ControlStates)};
+          sizeof(ControlStates),
+          sizeof(ModifiedControlStates),
+          sizeof(Description),
+          sizeof(RobotSignalUse) + sizeof(ControlSignalUse) + sizeof(GainSpec) +
+              sizeof(SettingSpec) + sizeof(StateSpec),
+          sizeof(Setup),
+          sizeof(Cycle)};
 }
 
 }  // namespace ctrl_more

@@ -9,6 +9,7 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 
+#include "ctrl_more/handles.hpp"
 #include "ctrl_more/signal.hpp"
 #include "ctrl_more/status.hpp"
 
@@ -121,6 +122,13 @@ class ControlStates {
   /// Handle of a key; an invalid handle if there is none (outside the cycle).
   ControlSignal find(ControlContainer container, const std::string& key) const;
 
+  /// Handle of a key that has N numbers (outside the cycle).
+  /// @throws std::invalid_argument if there is no such key, or it has another size
+  template <int N>
+  Reference<N> find(ControlContainer container, const std::string& key) const {
+    return Reference<N>(findSized(container, key, N));
+  }
+
   /// The numbers of a signal.
   Eigen::Map<const Eigen::VectorXd> view(ControlSignal signal) const {
     return Eigen::Map<const Eigen::VectorXd>(data_.data() + signal.offset_, signal.size_);
@@ -132,18 +140,27 @@ class ControlStates {
     return Eigen::Map<Eigen::VectorXd>(data_.data() + signal.offset_, signal.size_);
   }
 
-  /// The numbers of a signal whose size N was checked when its handle was made.
+  /// The numbers of a signal whose size was checked when its handle was made.
+  /// @throws EmptyHandle
   template <int N>
-  Eigen::Map<const Eigen::Matrix<double, N, 1>> view(ControlSignal signal) const {
-    eigen_assert(signal.size() == N);
-    return Eigen::Map<const Eigen::Matrix<double, N, 1>>(data_.data() + signal.offset_);
+  Eigen::Map<const Eigen::Matrix<double, N, 1>> view(const Reference<N>& handle) const {
+    return constant<N>(handle.signal_);
   }
 
-  /// As view<N>() const, writable, for the host.
+  /// As above; for whoever has the permission to modify the signal.
+  /// @throws EmptyHandle
   template <int N>
-  Eigen::Map<Eigen::Matrix<double, N, 1>> view(ControlSignal signal) {
-    eigen_assert(signal.size() == N);
-    return Eigen::Map<Eigen::Matrix<double, N, 1>>(data_.data() + signal.offset_);
+  Eigen::Map<const Eigen::Matrix<double, N, 1>> view(const Modify<N>& handle) const {
+    return constant<N>(handle.signal_);
+  }
+
+  /// As above, writable, for the host and its motion controllers.
+  /// @throws EmptyHandle
+  template <int N>
+  Eigen::Map<Eigen::Matrix<double, N, 1>> view(const Reference<N>& handle) {
+    if (!handle.valid()) throw EmptyHandle("a control signal is used that was never looked up");
+    return Eigen::Map<Eigen::Matrix<double, N, 1>>(data_.data() + handle.signal_.offset_,
+                                                   handle.size());
   }
 
   /// The whole buffer; offsets as in ControlSignal::offset().
@@ -192,6 +209,13 @@ class ControlStates {
              const Eigen::Ref<const Eigen::VectorXd>& value, const char* who);
   Status get(ControlContainer container, const std::string& key, Eigen::VectorXd& value,
              const char* who) const;
+  template <int N>
+  Eigen::Map<const Eigen::Matrix<double, N, 1>> constant(ControlSignal signal) const {
+    if (!signal.valid()) throw EmptyHandle("a control signal is read that was never fetched");
+    return Eigen::Map<const Eigen::Matrix<double, N, 1>>(data_.data() + signal.offset_,
+                                                         signal.size());
+  }
+  ControlSignal findSized(ControlContainer container, const std::string& key, int size) const;
   Eigen::Vector3d get3(ControlContainer container, const char* key) const;
   Status refuse(const std::string& text) const;
   std::string unknownKey(ControlContainer container, const std::string& key,

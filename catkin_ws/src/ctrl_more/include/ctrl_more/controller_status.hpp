@@ -66,4 +66,17 @@ struct Attribution {
   double angle = 0.0;  ///< angle of the change of an orientation [rad]
 };
 
+/// Numbers of a controller's inside in one cycle.
+struct ControllerState {
+  std::string controller;      ///< instance
+  std::vector<double> values;  ///< in the order of Description::states
+};
+
+/// What the controllers did in one cycle; those that were off are left out.
+struct CycleRecord {
+  std::uint64_t cycle = 0;               ///< its number
+  std::vector<Attribution> changes;      ///< who changed what, in execution order
+  std::vector<ControllerState> states;   ///< of those that declare any, in execution order
+};
+
 }  // namespace ctrl_more

@@ -120,6 +120,16 @@ struct SettingSpec {
   SettingSpec& about(const std::string& words);               ///< sets the text
 };
 
+/// One number of a controller's inside that is worth watching, see FeedbackController::state().
+struct StateSpec {
+  std::string name;  ///< unique within the controller
+  std::string unit;  ///< SI; "1" for a pure number; required
+  std::string text;  ///< what it is; required
+
+  StateSpec& in(const std::string& units);     ///< sets the unit
+  StateSpec& about(const std::string& words);  ///< sets the text
+};
+
 /// The one declaration of a controller. The run-time checks, the schema of its configuration file,
 /// plot(), its generated page and the template of its configuration all come from here.
 struct Description {
@@ -131,7 +141,6 @@ struct Description {
   std::string law;          ///< the control law, in LaTeX
   std::string source;       ///< where the law comes from
   std::string information;  ///< anything else the developer wants to say; may be empty
-  std::string publishes;    ///< what its state publisher shows (values of state()); may be empty
   Stage stage = Stage::Task;  ///< where in the cycle it runs
   bool safety = false;  ///< true: refuses pause and disable unless they are forced
   SwitchPolicy on_switch = SwitchPolicy::Reset;  ///< when the motion controller changes
@@ -139,6 +148,7 @@ struct Description {
   std::vector<ControlSignalUse> control_signals;  ///< what it reads and modifies
   std::vector<GainSpec> gains;                    ///< changeable while running
   std::vector<SettingSpec> settings;              ///< fixed at load
+  std::vector<StateSpec> states;                  ///< what state() writes, in this order
 
   /// Adds a signal of `measuredData`.
   RobotSignalUse& measured(const std::string& role);
@@ -154,6 +164,9 @@ struct Description {
   SettingSpec& setting(const std::string& name, const std::string& initial);
   /// Adds a setting of as many numbers as `initial` has.
   SettingSpec& setting(const std::string& name, const std::vector<double>& initial);
+
+  /// Adds a number that state() writes.
+  StateSpec& state(const std::string& name);
 
   /// What a manager needs to run the controller safely: names unique, sizes and ranges sensible,
   /// stage and modified containers in agreement. Empty if all is well, else one sentence each.

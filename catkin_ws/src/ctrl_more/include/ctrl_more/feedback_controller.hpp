@@ -12,6 +12,7 @@
 #include "ctrl_more/cycle.hpp"
 #include "ctrl_more/description.hpp"
 #include "ctrl_more/gains.hpp"
+#include "ctrl_more/handles.hpp"
 #include "ctrl_more/logger.hpp"
 #include "ctrl_more/modified_control_states.hpp"
 #include "ctrl_more/robot_states.hpp"
@@ -47,7 +48,7 @@ class ControllerOwner {
 /// it into a library of its own. Everything of Table I of the Ctrl-MORE paper is here; what only
 /// documents or administrates is implemented once, from the description.
 ///
-/// Threads: update(), reset() and gainsChanged() run in the control cycle: no allocation, no lock,
+/// Threads: update(), state(), reset() and gainsChanged() run in the control cycle: no allocation, no lock,
 /// no system call. Everything else runs outside of it.
 class FeedbackController {
  public:
@@ -92,9 +93,10 @@ class FeedbackController {
     return "";
   }
 
-  /// Values worth watching, with their names; used for state publishers. Called outside the cycle
-  /// on a controller that is not running, and by tests.
-  virtual std::vector<std::pair<std::string, double>> state() const { return {}; }
+  /// Writes the numbers that the description declares with Description::state(), in that order.
+  /// Called in the cycle after each update(), if any is declared; the manager shows them.
+  /// @param values as many as are declared
+  virtual void state(Numbers<> values) const { static_cast<void>(values); }
   /// @}
 
   /// @name Documentation methods (Table I)

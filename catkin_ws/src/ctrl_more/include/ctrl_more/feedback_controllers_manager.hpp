@@ -31,7 +31,8 @@ struct Plan;
 /// How a manager runs its controllers.
 struct ManagerOptions {
   double blend_s = 0.2;    ///< time over which any change is blended in [s]; 0: at once
-  bool timed = false;      ///< measure each update() on the steady clock
+  bool timed = false;      ///< measure each update() on the steady clock, as is done anyway while
+                           ///< any controller has an `overrun_us` to be judged
   bool lockstep = false;   ///< simulated time: overruns are not judged
   int overruns_to_pause = 5;  ///< overruns in a row that pause a controller
   bool check_undeclared = false;  ///< test mode: compare everything a controller did not declare
@@ -138,9 +139,9 @@ class FeedbackControllersManager : public Manager, private ControllerOwner {
   Status resume(const std::string& name, const std::string& reason = "user");
   ///< one, one reason; "fault" clears a latched fault. The note says what still pauses it
   Status pauseAllUsingRobotState(const std::string& signal, bool force = false);
-  ///< reason `robot signal <signal>`; key or `measuredData/key`
+  ///< key or `measuredData/key`; the reason is `robot signal measuredData/key` in both cases
   Status pauseAllUsingControlState(const std::string& signal, bool force = false);
-  ///< reason `control signal <signal>`; key or `container/key`
+  ///< key or `container/key`; the reason is `control signal container/key` in both cases
   Status resumeAllUsingRobotState(const std::string& signal);    ///< withdraws that reason only
   Status resumeAllUsingControlState(const std::string& signal);  ///< withdraws that reason only
   Status disableAllUsingRobotState(const std::string& signal, bool force = false);
@@ -197,7 +198,8 @@ class FeedbackControllersManager : public Manager, private ControllerOwner {
   /// Who changed which reference by how much in the last complete cycle, in execution order;
   /// controllers that are off are left out. Waits for the end of the cycle that is running, 50 ms
   /// at most.
-  std::vector<Attribution> attribution() const;
+  std::vector<Attribution> attribution() const { return lastCycle().changes; }
+  CycleRecord lastCycle() const;  ///< the same with the states of the controllers
   void plot(const std::string& name, std::ostream& out) const;  ///< one controller
   void plotAll(std::ostream& out) const;                        ///< all, in execution order
   const ManagerOptions& options() const { return options_; }    ///< as constructed
@@ -234,6 +236,7 @@ class FeedbackControllersManager : public Manager, private ControllerOwner {
  private:
   struct Member;
   struct Draft;
+  class Undo;
   using Lock = std::lock_guard<std::recursive_mutex>;
 
   // ControllerOwner
@@ -244,19 +247,22 @@ class FeedbackControllersManager : public Manager, private ControllerOwner {
   bool paused(const std::string& name) const override { return isPaused(name); }
   GainValues gainsOf(const std::string& name) const override { return getGains(name); }
 
-  Status applyLocked(const Change& change, bool prepared = false);
+  Status applyLocked(const Change& change, bool prepared = false, std::string note = "");
   Status applyStep(const Change::Step& step, Draft& draft, std::vector<std::string>& spared) const;
   Status applyToMember(const Change::Step& step, const Member& member, std::size_t index,
                        Draft& draft, std::vector<std::string>& spared) const;
   Status checkExclusive(const Draft& draft) const;
   Status bySignal(Change::Kind kind, bool robot, const std::string& signal, bool force);
   Draft draftOf() const;
-  Status publish(const Draft& draft, bool prepared = false);
+  std::unique_ptr<Plan> planOf(const Draft& draft) const;
+  Status publish(Draft draft, bool prepared = false);
+  Status commit(Draft draft, bool prepared) noexcept;
   void forget(const Plan* untaken);
   void adopt(const Plan* plan) noexcept;
   void collect();
   Status take(ControllerInstance instance, const std::string& name, const ControllerEntry& entry,
               bool offer = true);
+  void readList(const ConfigNode& list, const std::string& base, LoadReport& report);
   Status loadLocked(const std::string& name, const ControllerEntry& entry, bool offer = true);
   Status setProfileLocked(const std::string& profile, const std::vector<std::string>& controllers);
   Status unloadLocked(const std::string& name);
@@ -296,6 +302,7 @@ class FeedbackControllersManager : public Manager, private ControllerOwner {
   // cycle side
   unsigned buffer_ = 0;    // of records, in this cycle
   bool recorded_ = false;  // anything in this cycle
+  bool laid_out_ = false;  // freeze() was here
   const Plan* plan_ = nullptr;
   Cycle cycle_;
   ControlStates original_;

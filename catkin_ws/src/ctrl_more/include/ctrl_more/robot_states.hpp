@@ -8,6 +8,7 @@
 
 #include <Eigen/Core>
 
+#include "ctrl_more/handles.hpp"
 #include "ctrl_more/signal.hpp"
 #include "ctrl_more/status.hpp"
 
@@ -104,20 +105,35 @@ class RobotStates {
     return Eigen::Map<const Eigen::VectorXd>(data_.data() + signal.offset_, signal.size_);
   }
 
-  /// The numbers of a signal whose size N was checked when its handle was made.
+  /// The numbers of a signal whose size was checked when its handle was made.
+  /// @throws EmptyHandle
   template <int N>
-  Eigen::Map<const Eigen::Matrix<double, N, 1>> view(RobotSignal signal) const {
-    eigen_assert(signal.size() == N);
-    return Eigen::Map<const Eigen::Matrix<double, N, 1>>(data_.data() + signal.offset_);
+  Eigen::Map<const Eigen::Matrix<double, N, 1>> view(const Read<N>& handle) const {
+    if (!handle.valid()) throw EmptyHandle("a robot signal is read that initialize() did not fetch");
+    return Eigen::Map<const Eigen::Matrix<double, N, 1>>(data_.data() + handle.signal_.offset_,
+                                                         handle.size());
+  }
+
+  /// Stamp of a signal, monotonic nanoseconds, or kNeverWritten.
+  template <int N>
+  std::int64_t stamp(const Read<N>& handle) const {
+    return stamps_[handle.signal_.index_];
   }
 
   /// Stamp of a signal, monotonic nanoseconds, or kNeverWritten.
   std::int64_t stamp(RobotSignal signal) const { return stamps_[signal.index_]; }
 
-  /// True if the signal was written not longer than `max_age_ns` before `now_ns`.
+  /// How far ahead of now a stamp may be [ns]: sensors and the cycle do not read the clock at the
+  /// same moment. What is further ahead comes from another clock, and is not fresh.
+  static constexpr std::int64_t kMostAhead = 50'000'000;
+
+  /// True if the signal was written not longer than `max_age_ns` before `now_ns`, and not more than
+  /// kMostAhead after it.
   bool isFresh(RobotSignal signal, std::int64_t now_ns, std::int64_t max_age_ns) const {
     const std::int64_t stamp = stamps_[signal.index_];
-    return stamp != kNeverWritten && now_ns - stamp <= max_age_ns;
+    // Too far ahead becomes a number larger than any age.
+    const auto age = static_cast<std::uint64_t>(now_ns - stamp + kMostAhead);
+    return stamp != kNeverWritten && age <= static_cast<std::uint64_t>(max_age_ns) + kMostAhead;
   }
 
   /// Writes a signal. Returns false, and leaves it untouched, if a number is not finite.

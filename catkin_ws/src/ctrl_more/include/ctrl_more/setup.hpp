@@ -7,6 +7,7 @@
 #include "ctrl_more/control_states.hpp"
 #include "ctrl_more/description.hpp"
 #include "ctrl_more/gains.hpp"
+#include "ctrl_more/handles.hpp"
 #include "ctrl_more/robot_states.hpp"
 #include "ctrl_more/signal.hpp"
 
@@ -66,8 +67,8 @@ struct ResolvedRobotUse {
 };
 
 /// What a controller gets in initialize(): its configuration, and handles for what its
-/// description declares. Asking for anything else throws std::invalid_argument, which refuses the
-/// controller with that sentence. Keys that do not exist yet are added with the declared size,
+/// description declares. Asking for anything else, or for another size, throws
+/// std::invalid_argument, which refuses the controller with that sentence. Keys that do not exist yet are added with the declared size,
 /// until the stores are frozen.
 class Setup {
  public:
@@ -83,21 +84,30 @@ class Setup {
         const SettingValues& settings, RobotStates& robot, ControlStates& control,
         std::uint32_t owner);
 
-  /// Handle of a declared robot signal.
+  /// Handle of a declared robot signal of N numbers.
   /// @param role its name in the description
-  /// @param size expected size; 0: the declared one (if the description allows several: the size
-  ///        the key already has)
-  RobotSignal robot(const std::string& role, int size = 0);
+  /// @param size of Read<AnySize>: expected size; 0: the declared one (if the description allows
+  ///        several: the size the key already has)
+  template <int N = AnySize>
+  Read<N> read(const std::string& role, int size = 0) {
+    return Read<N>(robotSignal(role, N == AnySize ? size : N));
+  }
 
-  /// Handle of a declared control signal, for reading.
+  /// Handle of a declared control signal of N numbers, for reading.
   /// @param role its name in the description, or `container/role` where a role appears twice
-  /// @param size as in robot()
-  ControlSignal control(const std::string& role, int size = 0);
+  /// @param size as in read()
+  template <int N = AnySize>
+  Reference<N> reference(const std::string& role, int size = 0) {
+    return Reference<N>(controlSignal(role, N == AnySize ? size : N, false));
+  }
 
-  /// Permission to modify a control signal that the description declares as modified.
+  /// Permission to modify a control signal of N numbers that the description declares as modified.
   /// @param role its name in the description, or `container/role` where a role appears twice
-  /// @param size as in robot()
-  ModifySignal modify(const std::string& role, int size = 0);
+  /// @param size as in read()
+  template <int N = AnySize>
+  Modify<N> modify(const std::string& role, int size = 0) {
+    return Modify<N>(controlSignal(role, N == AnySize ? size : N, true), owner_);
+  }
 
   /// Handle of a declared gain.
   Gain gain(const std::string& name) const { return gains_.find(name); }
@@ -127,6 +137,8 @@ class Setup {
   const std::vector<ResolvedControlUse>& controlUses() const { return control_uses_; }
 
  private:
+  RobotSignal robotSignal(const std::string& role, int size);
+  ControlSignal controlSignal(const std::string& role, int size, bool to_modify);
   void resolve(ResolvedRobotUse& entry, int size);
   void resolve(ResolvedControlUse& entry, int size);
   ResolvedControlUse& findControl(const std::string& role);

@@ -61,11 +61,11 @@ struct SignalInfo {
   SignalKind kind = SignalKind::Vector;  ///< algebra of corrections
 };
 
-/// Handle of a signal in RobotStates, valid for every store with the same layout (copies included).
-/// Obtained from RobotStates::find() or, in a controller, from Setup.
+/// Handle of a signal in RobotStates, valid for every store with the same layout (copies included),
+/// for the host: RobotStates::find(). Controllers use Read<N>.
 class RobotSignal {
  public:
-  /// An empty handle; using it is an error.
+  /// An empty handle: no numbers.
   RobotSignal() = default;
   /// Number of doubles.
   int size() const { return static_cast<int>(size_); }
@@ -79,11 +79,11 @@ class RobotSignal {
   std::uint32_t index_ = 0;
 };
 
-/// Handle of a signal in ControlStates, for reading (and, on a mutable store, for the host's own
-/// writing). A controller only ever sees constant stores, so for it this handle reads.
+/// Handle of a signal in ControlStates, for the host: ControlStates::find(). Controllers use
+/// Reference<N> and Modify<N>.
 class ControlSignal {
  public:
-  /// An empty handle; using it is an error.
+  /// An empty handle: no numbers.
   ControlSignal() = default;
   /// Number of doubles.
   int size() const { return static_cast<int>(size_); }
@@ -97,26 +97,6 @@ class ControlSignal {
   std::uint32_t offset_ = 0;
   std::uint32_t size_ = 0;
   std::uint32_t index_ = 0;
-};
-
-/// Permission of one controller to modify one control signal. Only Setup issues it, only for a
-/// signal that the controller's description declares, and only its owner can use it.
-class ModifySignal {
- public:
-  /// An empty permission; using it is a fault.
-  ModifySignal() = default;
-  /// The same signal for reading, in `original` or elsewhere.
-  ControlSignal signal() const { return signal_; }
-  /// Number of doubles.
-  int size() const { return signal_.size(); }
-  /// False for an empty permission.
-  bool valid() const { return owner_ != 0; }
-
- private:
-  friend class Setup;
-  friend class ModifiedControlStates;
-  ControlSignal signal_;
-  std::uint32_t owner_ = 0;
 };
 
 }  // namespace ctrl_more

@@ -14,7 +14,7 @@ class Plugin : public ctrl_more::FeedbackController {
     d.modifies(ctrl_more::ControlContainer::Zmp, "zmp").in("m").frameOf("world").about("shifted");
     return d;
   }
-  void initialize(ctrl_more::Setup& setup) override { zmp_ = setup.modify("zmp"); }
+  void initialize(ctrl_more::Setup& setup) override { zmp_ = setup.modify<3>("zmp"); }
   void update(const ctrl_more::Cycle&, const ctrl_more::RobotStates&,
               const ctrl_more::ControlStates&,
               ctrl_more::ModifiedControlStates& modified) override {
@@ -23,7 +23,7 @@ class Plugin : public ctrl_more::FeedbackController {
 
  private:
   std::string type_;
-  ctrl_more::ModifySignal zmp_;
+  ctrl_more::Modify<3> zmp_;
 };
 
 }  // namespace ctrl_more_test

@@ -43,10 +43,10 @@ struct CycleInput {
 /// Poses are those of the tool frame in the robot's base frame.
 struct References {
   ctrl_more::ControlStates states;  ///< what feedback controllers modify
-  ctrl_more::ControlSignal pose;    ///< taskSpaceReferencePose: x y z (m), quaternion x y z w
-  ctrl_more::ControlSignal twist;   ///< taskSpaceReferenceVel: m/s, rad/s
-  ctrl_more::ControlSignal joint_position;  ///< jointSpaceReference Position, rad
-  ctrl_more::ControlSignal joint_velocity;  ///< jointSpaceReference Velocity, rad/s
+  ctrl_more::Reference<ctrl_more::Pose> pose;  ///< taskSpaceReferencePose: m, quaternion x y z w
+  ctrl_more::Reference<ctrl_more::Twist> twist;  ///< taskSpaceReferenceVel: m/s, rad/s
+  ctrl_more::Reference<kMaxJoints> joint_position;  ///< jointSpaceReference Position, rad
+  ctrl_more::Reference<kMaxJoints> joint_velocity;  ///< jointSpaceReference Velocity, rad/s
 };
 
 /// What a motion controller does at the moment.

@@ -1,0 +1,13 @@
+#include "plugin.hpp"
+
+// What the author of Good built next.
+class Rebuilt : public ctrl_more_test::Plugin {
+ public:
+  Rebuilt() : Plugin("Good") {}
+  void update(const ctrl_more::Cycle& cycle, const ctrl_more::RobotStates& robot,
+              const ctrl_more::ControlStates& original,
+              ctrl_more::ModifiedControlStates& modified) override {
+    for (int i = 0; i < 10; ++i) Plugin::update(cycle, robot, original, modified);
+  }
+};
+CTRL_MORE_REGISTER_CONTROLLER(Rebuilt, "Good")
