@@ -10,14 +10,16 @@ import unittest
 import rospkg
 import rospy
 import rostest
-from coglab_msgs.msg import DmpGoal, FeedbackStatus, IkDebug
+from coglab_msgs.msg import DmpGoal, FeedbackGain, FeedbackState, FeedbackStatus, IkDebug
 from coglab_msgs.srv import (
     AddPtpRequest,
     DescribeController,
     FeedbackBySignal,
     FeedbackSelect,
+    LoadFeedback,
     ReloadGains,
     SetExecutionOrder,
+    SetGains,
 )
 from diagnostic_msgs.msg import DiagnosticArray
 from sensor_msgs.msg import JointState
@@ -148,6 +150,45 @@ class TopicGoal(unittest.TestCase):
         self.assertFalse(answer.success)
         self.assertTrue(call(name + "disable", FeedbackSelect, ["ee_admittance"], "").success)
         self.assertFalse(call(name + "enable", FeedbackSelect, ["nobody"], "").success)
+
+    def test_5b_feedback_controllers_are_loaded_watched_and_unloaded(self) -> None:
+        """One is added to a running robot, shows its inside and its corrections, and goes again."""
+        name = "controller_manager/feedback/"
+        call, shown = self.robot.call, []
+        rospy.Subscriber(name + "state", FeedbackState, shown.append)
+        config = "package://ctrl_more/config/ee_admittance.yaml"
+        for refused in (("dmp", "EeAdmittance", "", ""), ("joint_limits", "JointLimits", "", ""),
+                        ("second", "NoSuchType", "", ""), ("second", "EeAdmittance", "", "/no/such.yaml")):
+            answer = call(name + "load", LoadFeedback, *refused)
+            self.assertFalse(answer.success, refused)
+            self.assertTrue(answer.message, refused)
+        answer = call(name + "load", LoadFeedback, "second", "EeAdmittance", "", config)
+        self.assertTrue(answer.success, answer.message)
+        gains = [FeedbackGain("force_dead_band", [0.0]), FeedbackGain("stiffness", [20.0])]
+        answer = call(name + "set_gains", SetGains, "second", gains)
+        self.assertTrue(answer.success, answer.message)
+        self.assertFalse(call(name + "set_gains", SetGains, "second", [FeedbackGain("stifness", [1.0])]).success)
+        self.assertFalse(call(name + "set_gains", SetGains, "second", [FeedbackGain("mass", [1.0, 2.0])]).success)
+        self.assertTrue(call(name + "enable", FeedbackSelect, ["second"], "").success)
+
+        def state() -> dict[str, float]:
+            found = [s for s in shown[-1].states if s.controller == "second"] if shown else []
+            return dict(zip(found[0].names, found[0].values, strict=True)) if found else {}
+
+        wait_until(lambda: "offset_x" in state(), 5.0, "state of the controller that was loaded")
+        self.assertEqual(set(shown[-1].states[-1].units), {"m", "rad", "N"})
+        wait_until(lambda: any(c.controller == "second" and c.signal == "taskSpaceReferencePose/ee"
+                               and len(c.before) == len(c.after) == 7 for c in shown[-1].corrections),
+                   5.0, "its correction of the pose")
+        self.assertIn("second", [c.name for c in self.feedback[-1].controllers])
+        answer = call(name + "unload", FeedbackSelect, ["second"], "")
+        self.assertFalse(answer.success)
+        self.assertIn("disable", answer.message)
+        self.assertTrue(call(name + "disable", FeedbackSelect, ["second"], "").success)
+        wait_until(lambda: call(name + "unload", FeedbackSelect, ["second"], "").success, 5.0, "unloaded")
+        wait_until(lambda: "second" not in [c.name for c in self.feedback[-1].controllers], 5.0, "gone")
+        self.assertFalse(call(name + "unload", FeedbackSelect, [], "").success)
+        self.assertFalse(call(name + "unload", FeedbackSelect, ["joint_limits"], "").success, "part of a profile")
 
     def cycle_statistics(self) -> dict[str, str]:
         """Values of the control cycle on /diagnostics, by name; empty before the first."""

@@ -1,5 +1,7 @@
 #include "coglab_controllers/ros/feedback_ros.hpp"
 
+#include <algorithm>
+#include <map>
 #include <sstream>
 #include <stdexcept>
 
@@ -29,6 +31,7 @@ void RosLogSink::write(const ctrl_more::LogRecord& record) {
 FeedbackRos::FeedbackRos(const ros::NodeHandle& node, ControllerManager& manager)
     : node_(node), manager_(manager), feedback_(manager.feedback()) {
   status_ = node_.advertise<coglab_msgs::FeedbackStatus>("status", 5, true);
+  state_ = node_.advertise<coglab_msgs::FeedbackState>("state", 5);
   const auto serve = [this](const std::string& name, auto method) {
     services_.push_back(node_.advertiseService(name, method, this));
   };
@@ -42,6 +45,9 @@ FeedbackRos::FeedbackRos(const ros::NodeHandle& node, ControllerManager& manager
   serve("apply_profile", &FeedbackRos::onProfile);
   serve("set_execution_order", &FeedbackRos::onOrder);
   serve("reload_gains", &FeedbackRos::onReload);
+  serve("set_gains", &FeedbackRos::onSetGains);
+  serve("load", &FeedbackRos::onLoad);
+  serve("unload", &FeedbackRos::onUnload);
   serve("describe", &FeedbackRos::onDescribe);
 }
 
@@ -147,6 +153,54 @@ bool FeedbackRos::onReload(coglab_msgs::ReloadGains::Request& request,
                 response);
 }
 
+bool FeedbackRos::onSetGains(coglab_msgs::SetGains::Request& request,
+                             coglab_msgs::SetGains::Response& response) {
+  const auto lock = manager_.lockRequests();
+  std::map<std::string, std::vector<double>> gains;
+  for (const coglab_msgs::FeedbackGain& gain : request.gains) gains[gain.name] = gain.values;
+  return finish(feedback_.setGains(request.name, gains), response);
+}
+
+bool FeedbackRos::onLoad(coglab_msgs::LoadFeedback::Request& request,
+                         coglab_msgs::LoadFeedback::Response& response) {
+  const auto lock = manager_.lockRequests();
+  std::vector<std::string> ids, types;
+  manager_.list(ids, types);
+  if (std::count(ids.begin(), ids.end(), request.name) != 0) {
+    response.success = false;
+    response.message = "'" + request.name + "' is in use; choose another name, or unload it first";
+    return true;
+  }
+  try {
+    const ctrl_more::SearchPath files("", manager_.settings().plugin_paths);
+    ctrl_more::ControllerEntry entry;
+    entry.type = request.type;
+    if (!request.library.empty()) {
+      entry.library = files.find(request.library);
+    } else {
+      if (entry.type.empty()) entry.type = request.name;
+      entry.library = files.findLibraryOf(entry.type);
+    }
+    if (!request.filename.empty()) entry.config_file = files.find(request.filename);
+    return finish(feedback_.loadController(request.name, entry), response);
+  } catch (const std::exception& error) {
+    response.success = false;
+    response.message = "'" + request.name + "' was not loaded: " + error.what();
+    return true;
+  }
+}
+
+bool FeedbackRos::onUnload(Select::Request& request, Select::Response& response) {
+  const auto lock = manager_.lockRequests();
+  if (request.names.size() != 1) {
+    response.success = false;
+    response.message =
+        "names: expected one controller, got " + std::to_string(request.names.size());
+    return true;
+  }
+  return finish(feedback_.unload(request.names[0]), response);
+}
+
 bool FeedbackRos::onDescribe(coglab_msgs::DescribeController::Request& request,
                              coglab_msgs::DescribeController::Response& response) {
   try {
@@ -157,11 +211,44 @@ bool FeedbackRos::onDescribe(coglab_msgs::DescribeController::Request& request,
   } catch (const std::exception& error) {
     response.text = error.what();
     response.success = false;
+  } catch (...) {
+    response.text =
+        "describe() of '" + request.name + "' threw something that is no std::exception";
+    response.success = false;
   }
   return true;
 }
 
+void FeedbackRos::publishState() {
+  const ctrl_more::CycleRecord record = feedback_.lastCycle();
+  coglab_msgs::FeedbackState message;
+  message.header.stamp = ros::Time::now();
+  message.cycle = record.cycle;
+  for (const ctrl_more::ControllerState& state : record.states) {
+    coglab_msgs::FeedbackControllerState entry;
+    entry.controller = state.controller;
+    for (const ctrl_more::StateSpec& spec : feedback_.describe(state.controller).states) {
+      entry.names.push_back(spec.name);
+      entry.units.push_back(spec.unit);
+    }
+    entry.values = state.values;
+    message.states.push_back(entry);
+  }
+  for (const ctrl_more::Attribution& change : record.changes) {
+    coglab_msgs::FeedbackCorrection entry;
+    entry.controller = change.controller;
+    entry.signal = change.signal;
+    entry.before = change.before;
+    entry.after = change.after;
+    entry.size = change.size;
+    entry.angle = change.angle;
+    message.corrections.push_back(entry);
+  }
+  state_.publish(message);
+}
+
 void FeedbackRos::publishStatus() {
+  if (state_.getNumSubscribers() > 0) publishState();
   coglab_msgs::FeedbackStatus message;
   message.profile = manager_.profile();
   for (const ctrl_more::ControllerStatus& controller : feedback_.statusAll()) {
@@ -175,6 +262,9 @@ void FeedbackRos::publishStatus() {
     entry.pause_reasons = controller.reasons;
     entry.fault = controller.fault_text;
     entry.faults = controller.faults;
+    entry.overruns = controller.overruns;
+    entry.safety = controller.safety;
+    entry.waiting_for = controller.waiting_for;
     message.controllers.push_back(entry);
   }
   message.header.stamp = last_.header.stamp;

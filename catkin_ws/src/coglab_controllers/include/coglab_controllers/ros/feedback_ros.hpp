@@ -14,9 +14,12 @@
 #include "coglab_msgs/DescribeController.h"
 #include "coglab_msgs/FeedbackBySignal.h"
 #include "coglab_msgs/FeedbackSelect.h"
+#include "coglab_msgs/FeedbackState.h"
 #include "coglab_msgs/FeedbackStatus.h"
+#include "coglab_msgs/LoadFeedback.h"
 #include "coglab_msgs/ReloadGains.h"
 #include "coglab_msgs/SetExecutionOrder.h"
+#include "coglab_msgs/SetGains.h"
 #include "ctrl_more/logger.hpp"
 
 namespace coglab_controllers {
@@ -28,14 +31,16 @@ class RosLogSink : public ctrl_more::LogSink {
 };
 
 /// enable, disable, pause, resume, set_execution_order, pause_by_signal, resume_by_signal,
-/// disable_by_signal, reload_gains, describe, apply_profile (names: one profile), and the latched
-/// topic status. Every service answers after the cycle has adopted the change.
+/// disable_by_signal, reload_gains, set_gains, describe, load, unload (names: one controller),
+/// apply_profile (names: one profile); the latched topic status, and state: what each controller
+/// shows of its inside, and who changed which reference by how much. Every service answers after
+/// the cycle has adopted the change.
 class FeedbackRos {
  public:
   FeedbackRos(const ros::NodeHandle& node, ControllerManager& manager);
   ~FeedbackRos();
 
-  /// Publishes status if it changed; publisher thread.
+  /// Publishes status if it changed, and state if somebody listens; publisher thread.
   void publishStatus();
 
  private:
@@ -54,13 +59,19 @@ class FeedbackRos {
                 coglab_msgs::ReloadGains::Response& response);
   bool onDescribe(coglab_msgs::DescribeController::Request& request,
                   coglab_msgs::DescribeController::Response& response);
+  bool onSetGains(coglab_msgs::SetGains::Request& request,
+                  coglab_msgs::SetGains::Response& response);
+  bool onLoad(coglab_msgs::LoadFeedback::Request& request,
+              coglab_msgs::LoadFeedback::Response& response);
+  bool onUnload(Select::Request& request, Select::Response& response);
+  void publishState();
   template <typename Response>
   bool finish(const ctrl_more::Status& status, Response& response);
 
   ros::NodeHandle node_;
   ControllerManager& manager_;
   ctrl_more::FeedbackControllersManager& feedback_;
-  ros::Publisher status_;
+  ros::Publisher status_, state_;
   std::vector<ros::ServiceServer> services_;
   coglab_msgs::FeedbackStatus last_;
   bool published_ = false;
