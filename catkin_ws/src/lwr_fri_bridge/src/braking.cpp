@@ -84,6 +84,11 @@ double lossReserve(double speed, double time, double dt, double max_acceleration
   return std::min(way, std::max(B::kTrusted * dt, B::kTrustedTime) * speed);
 }
 
+double lostTime(double dt) {
+  using B = LossBudget;
+  return std::min(B::kPerWindow * dt, std::max(B::kTrusted * dt, B::kTrustedTime));
+}
+
 BrakingGuard::BrakingGuard(const JointLimits& limits, double margin)
     : lower_(limits.lower_position.array() + (margin + kWireRounding)),
       upper_(limits.upper_position.array() - (margin + kWireRounding)),

@@ -86,7 +86,7 @@ double Guard::speedToStop(int joint, double room) const noexcept {
   // Braking with limited jerk needs v a / (2 j) more room than v^2 / (2 a), and an arm that still
   // speeds up takes another a / j to turn its acceleration round; for small speeds both are on the
   // safe side.
-  const double lag = 1.5 * a / parameters_.jerk[joint] + parameters_.reaction_time;
+  const double lag = 1.5 * a / parameters_.jerk[joint] + parameters_.reaction_time + lost_time_;
   return stoppingSpeed(room - parameters_.position_margin, a, lag);
 }
 

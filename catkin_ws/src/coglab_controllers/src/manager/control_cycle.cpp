@@ -5,6 +5,8 @@
 #include <exception>
 #include <utility>
 
+#include "lwr_fri_bridge/braking.hpp"
+
 namespace coglab_controllers {
 
 namespace {
@@ -263,6 +265,7 @@ void ControlCycle::run(const RobotSample& sample, double dt, VelocityCommand& ou
   adopt();
   if (fine) {
     compute(velocity);
+    guard_.setLostTime(lwr_fri_bridge::lostTime(sample.cycle_time));
     guard_.limit(input_.chain, furthest(sample, velocity), velocity, dt, report_.guard);
     watchGuard(dt);
     ++numbers_;

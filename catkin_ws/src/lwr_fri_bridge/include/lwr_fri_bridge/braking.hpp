@@ -53,6 +53,11 @@ struct LossBudget {
 double lossReserve(double speed, double time, double dt, double max_acceleration, double max_jerk,
                    bool proven);
 
+/// Time (s) of constant speed that the LossBudget costs at most during one stop at FRI period `dt`
+/// (s) on a proven connection: what whoever plans a motion keeps before a limit, so that the
+/// bridge's own guard finds nothing to cut. Real-time safe.
+double lostTime(double dt);
+
 /// Bounds target velocities so that the interpolator's next step leaves every joint able to stop
 /// inside its position limits whatever is lost within the LossBudget. A joint that is already
 /// outside may only stand or come back.

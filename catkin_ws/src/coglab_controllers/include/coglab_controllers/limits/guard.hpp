@@ -70,6 +70,10 @@ class Guard {
   void limit(const ChainState& state, const JointVector& q, const JointVector& request, double dt,
              GuardResult& result) noexcept;
 
+  /// Time (s, >= 0) that the robot may go on without hearing of a stop, kept before joints' stops
+  /// besides reaction_time: lwr_fri_bridge::lostTime() of its period. 0 until it is set.
+  void setLostTime(double seconds) noexcept { lost_time_ = seconds; }
+
   /// Forgets how long a joint has been blocked: a new motion begins.
   void reset() noexcept { blocked_for_ = 0.0; }
 
@@ -83,6 +87,7 @@ class Guard {
   GuardParameters parameters_;
   Chain chain_;
   Workspace workspace_;
+  double lost_time_ = 0.0;
   double blocked_for_ = 0.0;
   int blocking_joint_ = -1;
 };
