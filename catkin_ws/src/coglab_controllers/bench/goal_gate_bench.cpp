@@ -309,6 +309,7 @@ int main(int argc, char** argv) {
     std::fprintf(stderr, "usage: goal_gate_bench PACKAGE_DIR DESCRIPTION_DIR RUNS\n");
     return 2;
   }
+  ros::Time::init();
   const std::string package = argv[1], description = argv[2];
   const int runs = std::stoi(argv[3]);
   std::printf("{\"runs\": %d, \"outlier\": [", runs);

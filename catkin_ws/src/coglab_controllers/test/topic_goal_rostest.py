@@ -246,8 +246,8 @@ class TopicGoal(unittest.TestCase):
         rospy.sleep(0.3)
         robot.see_hand(ASIDE)
         wait_until(lambda: robot.execute(goal_frame="", dmp_ratio=2.0).success, 5.0, "execute_dmp")
-        wait_until(lambda: robot.feedback.state == "running", 5.0, "running")
-        self.assertGreater(robot.feedback.remaining_distance, 0.2)
+        wait_until(lambda: robot.feedback.state == "running" and robot.feedback.remaining_distance > 0.2, 5.0,
+                   "running, toward the goal that replaced the old one")
 
     def test_9_a_frozen_master_ends_no_reach_and_keeps_no_node_from_ending(self) -> None:
         robot, pids = self.robot, robot_processes()
