@@ -26,6 +26,7 @@
 #include "cell_messages.hpp"
 #include "cell_parameters.hpp"
 #include "coglab_sim/real_time_cell.hpp"
+#include "lwr_fri_bridge/logger_service.hpp"
 
 namespace coglab_sim {
 namespace {
@@ -293,6 +294,7 @@ class CellNode {
 int main(int argc, char** argv) {
   ros::init(argc, argv, "cell");
   const ros::NodeHandle keep;  // the last handle that goes would take the log along
+  const ros::ServiceServer logger_level = lwr_fri_bridge::guardLoggerService();
   try {
     const coglab_sim::CellNode node;
     ros::spin();

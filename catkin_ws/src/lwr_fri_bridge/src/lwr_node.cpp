@@ -11,6 +11,7 @@
 
 #include "lwr_fri_bridge/bridge_ros.hpp"
 #include "lwr_fri_bridge/exit_limit.hpp"
+#include "lwr_fri_bridge/logger_service.hpp"
 
 namespace {
 
@@ -26,6 +27,7 @@ int main(int argc, char** argv) {
   std::signal(SIGINT, onSignal);
   std::signal(SIGTERM, onSignal);
   ros::NodeHandle nh(ros::param::param<std::string>("~lwr_namespace", "lwr"));
+  const ros::ServiceServer logger_level = lwr_fri_bridge::guardLoggerService();
   try {
     lwr_fri_bridge::BridgeRos bridge(nh, {});
     bridge.start();

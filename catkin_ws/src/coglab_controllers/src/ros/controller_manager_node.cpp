@@ -15,6 +15,7 @@
 #include "coglab_controllers/ros/robot_topics.hpp"
 #include "coglab_controllers/ros/ros_parameters.hpp"
 #include "lwr_fri_bridge/exit_limit.hpp"
+#include "lwr_fri_bridge/logger_service.hpp"
 
 namespace {
 volatile std::sig_atomic_t asked_to_end = 0;
@@ -27,6 +28,7 @@ int main(int argc, char** argv) {
   std::signal(SIGTERM, onSignal);
   try {
     ros::NodeHandle robot(ros::param::param<std::string>("~lwr_namespace", "lwr"));
+    const ros::ServiceServer logger_level = lwr_fri_bridge::guardLoggerService();
     ros::CallbackQueue queue;  // one thread: the writer of the port
     robot.setCallbackQueue(&queue);
     std::atomic<coglab_controllers::ControlThread*> control{nullptr};

@@ -10,6 +10,7 @@
 #include "coglab_controllers/ros/ros_parameters.hpp"
 #include "coglab_controllers/ros/tf_goal_source.hpp"
 #include "coglab_msgs/DmpGoal.h"
+#include "lwr_fri_bridge/logger_service.hpp"
 
 namespace coglab_controllers {
 
@@ -98,6 +99,7 @@ class GoalHelper {
 int main(int argc, char** argv) {
   ros::init(argc, argv, "goal_helper");
   try {
+    const ros::ServiceServer logger_level = lwr_fri_bridge::guardLoggerService();
     coglab_controllers::GoalHelper(ros::NodeHandle(), ros::NodeHandle("~")).run();
   } catch (const std::exception& error) {
     ROS_FATAL("%s", error.what());

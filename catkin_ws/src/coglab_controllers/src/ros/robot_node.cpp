@@ -15,6 +15,7 @@
 #include "coglab_controllers/ros/manager_ros.hpp"
 #include "lwr_fri_bridge/bridge_ros.hpp"
 #include "lwr_fri_bridge/exit_limit.hpp"
+#include "lwr_fri_bridge/logger_service.hpp"
 
 namespace {
 volatile std::sig_atomic_t asked_to_end = 0;
@@ -27,6 +28,7 @@ int main(int argc, char** argv) {
   std::signal(SIGTERM, onSignal);
   try {
     ros::NodeHandle root;
+    const ros::ServiceServer logger_level = lwr_fri_bridge::guardLoggerService();
     ros::NodeHandle lwr("lwr");
     std::atomic<coglab_controllers::ControlThread*> control{nullptr};
     lwr_fri_bridge::BridgeRos::Options bridge_options;
