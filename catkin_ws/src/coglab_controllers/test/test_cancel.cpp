@@ -265,6 +265,7 @@ TEST(Cancel, OnTheRealClockAnswersWhenTheArmStandsOrAtItsTimeLimit) {
       sample.commanded_acceleration = interpolator.acceleration();
       ++sample.sequence;
       sample.stamp_ns = manager.now_ns();
+      sample.controller_ns += 5'000'000;
       port.publishSample(sample);
       thread.wake(true);
     }

@@ -29,7 +29,7 @@ SERVICES = {
     "SwitchController": ([("controller_id", "string")], [("controller_type", "string")]),
     "GetActiveController": ([], [("controller_id", "string"), ("controller_type", "string")]),
 }
-OURS = {("goal_frame", "string"), ("success", "bool"), ("message", "string"), *IDS}
+OURS = {("goal_frame", "string"), ("success", "bool"), ("reason_code", "uint16"), ("message", "string"), *IDS}
 MESSAGES = {"DmpGoal": [("goal", "geometry_msgs/Point")], "FinishedPtp": [("ptp_id", "int32")]}
 
 

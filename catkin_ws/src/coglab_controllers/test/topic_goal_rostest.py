@@ -189,7 +189,7 @@ class TopicGoal(unittest.TestCase):
         wait_until(lambda: call(name + "unload", FeedbackSelect, ["second"], "").success, 5.0, "unloaded")
         wait_until(lambda: "second" not in [c.name for c in self.feedback[-1].controllers], 5.0, "gone")
         self.assertFalse(call(name + "unload", FeedbackSelect, [], "").success)
-        self.assertFalse(call(name + "unload", FeedbackSelect, ["joint_limits"], "").success, "part of a profile")
+        self.assertFalse(call(name + "unload", FeedbackSelect, ["ee_admittance"], "").success, "part of a profile")
 
     def cycle_statistics(self) -> dict[str, str]:
         """Values of the control cycle on /diagnostics, by name; empty before the first."""

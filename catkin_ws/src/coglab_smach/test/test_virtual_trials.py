@@ -93,7 +93,7 @@ def test_an_object_out_of_reach_all_the_same_ends_with_what_remained():
     trial, results = run(RECEIVE, seed=1, turned=-2.6, **{"handover.check_reach": False})
     assert results[0].outcome == "failed_empty" and trial.last_hub == "wait_without_object"
     assert re.search(r"the end of the reach within \d+\.\d s expected, it did not happen, because the motion is "
-                     r"running with 0\.", trial.ctx.journal.why())
+                     r"running with \d\.", trial.ctx.journal.why())
 
 
 def test_the_same_seed_gives_the_same_trial():

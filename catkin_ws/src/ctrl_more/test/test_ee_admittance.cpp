@@ -162,7 +162,6 @@ TEST(Handover, compliantInTheApproachAndGoneBeforeContactIsArmed) {
   run(1, 12.0);
   EXPECT_EQ(pushed, 0.0);
   EXPECT_EQ(rig.twist().norm(), 0.0);
-  EXPECT_TRUE(rig.manager->isEnabled("joint_limits"));
   for (const ControllerStatus& status : rig.manager->statusAll()) EXPECT_EQ(status.faults, 0u);
 }
 

@@ -4,14 +4,6 @@
 #include <cmath>
 
 namespace lwr_fri_bridge {
-namespace {
-
-// A step on the wire is off by up to 0.24e-6 rad (float32 at 3 rad, both ends), and 20 lost cycles
-// repeat it. rad
-constexpr double kWireRounding = 5e-6;
-
-}  // namespace
-
 BrakingReach brakingReach(double velocity, double acceleration, double max_acceleration,
                           double max_jerk) {
   const AxisProfile stop = planVelocity(velocity, acceleration, 0.0, max_acceleration, max_jerk);

@@ -58,13 +58,17 @@ double lossReserve(double speed, double time, double dt, double max_acceleration
 /// bridge's own guard finds nothing to cut. Real-time safe.
 double lostTime(double dt);
 
+/// What BrakingGuard keeps before a bound besides the margin, rad: a step on the wire is off by up to
+/// 0.24e-6 rad (float32 at 3 rad, both ends), and 20 lost cycles repeat it.
+constexpr double kWireRounding = 5e-6;
+
 /// Bounds target velocities so that the interpolator's next step leaves every joint able to stop
 /// inside its position limits whatever is lost within the LossBudget. A joint that is already
 /// outside may only stand or come back.
 class BrakingGuard {
  public:
   /// `margin` (rad) is kept from both ends of every range; it must leave room between them.
-  /// Another 5e-6 rad are kept for the rounding of the wire.
+  /// Besides, kWireRounding is kept.
   BrakingGuard(const JointLimits& limits, double margin);
 
   /// Cuts `target_velocity` (rad/s) in place and returns the joints that were cut, bit i for joint

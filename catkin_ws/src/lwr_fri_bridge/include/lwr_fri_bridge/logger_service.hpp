@@ -35,10 +35,11 @@ inline bool setLoggerLevel(roscpp::SetLoggerLevel::Request& request,
 }
 
 /// Puts setLoggerLevel() in the place of roscpp's own, which ends the process on some names. Call
-/// it once, after the first node handle; the service lives as long as what is returned.
+/// it once; the service lives as long as what is returned.
 inline ros::ServiceServer guardLoggerService() {
-  ros::ServiceManager::instance()->unadvertiseService(ros::names::resolve("~set_logger_level"));
-  return ros::NodeHandle("~").advertiseService("set_logger_level", &setLoggerLevel);
+  ros::NodeHandle node("~");  // starts roscpp, which advertises its own, if nothing has yet
+  ros::ServiceManager::instance()->unadvertiseService(node.resolveName("set_logger_level"));
+  return node.advertiseService("set_logger_level", &setLoggerLevel);
 }
 
 }  // namespace lwr_fri_bridge
