@@ -5,8 +5,6 @@
 #include <stdexcept>
 #include <string>
 
-#include "lwr_fri_bridge/braking.hpp"
-
 namespace coglab_controllers {
 namespace {
 
@@ -21,10 +19,6 @@ constexpr double kNegligibleShare = 1e-3, kNegligibleSpeed = 1e-5;
 // Kept back of a Cartesian speed limit, m/s, at most this share: joints that follow their target
 // velocities with different lags, and the arm behind its servos, add so much for a moment.
 constexpr double kSpeedMargin = 0.035, kLargestMargin = 0.15;
-
-// The arm's interface stops at its margin less the rounding of the wire; nothing that the guard lets
-// pass may be cut there.
-constexpr double kBridgeRounding = 2.0 * lwr_fri_bridge::kWireRounding;
 
 double bound(double speed_limit) noexcept {
   return speed_limit - std::min(kSpeedMargin, kLargestMargin * speed_limit);
@@ -93,7 +87,7 @@ double Guard::speedToStop(int joint, double room) const noexcept {
   // speeds up takes another a / j to turn its acceleration round; for small speeds both are on the
   // safe side.
   const double lag = 1.5 * a / parameters_.jerk[joint] + parameters_.reaction_time + lost_time_;
-  return stoppingSpeed(room - parameters_.position_margin - kBridgeRounding, a, lag);
+  return stoppingSpeed(room - parameters_.position_margin - rounding_, a, lag);
 }
 
 void Guard::limit(const ChainState& state, const JointVector& q, const JointVector& asked_for,

@@ -265,7 +265,8 @@ void ControlCycle::run(const RobotSample& sample, double dt, VelocityCommand& ou
   adopt();
   if (fine) {
     compute(velocity);
-    guard_.setLostTime(lwr_fri_bridge::lostTime(sample.cycle_time));
+    guard_.setInterfaceReserve(lwr_fri_bridge::lostTime(sample.cycle_time),
+                               2.0 * lwr_fri_bridge::kWireRounding);
     guard_.limit(input_.chain, furthest(sample, velocity), velocity, dt, report_.guard);
     watchGuard(dt);
     ++numbers_;

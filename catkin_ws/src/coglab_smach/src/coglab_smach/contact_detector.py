@@ -52,7 +52,9 @@ class DetectorSettings:
     load_share: float = 0.5
     """share of the weight whose coming counts as load and whose going as release, unless the request says otherwise."""
     release_confirm: float = 0.05
-    """s the load has to be gone, or has to be there."""
+    """s the load has to be gone."""
+    load_confirm: float = 0.3
+    """s the load has to be there: a hand that holds on presses down now and then."""
     user_direction: tuple[float, float, float] = (1.0, 0.0, 0.0)
     """from the robot to the person, base frame."""
 
@@ -272,7 +274,8 @@ class ContactDetector:
             return None
         if armed.gone_since is None:
             armed.gone_since = stamp
-        if stamp - armed.gone_since < self.settings.release_confirm:
+        confirm = self.settings.load_confirm if armed.mode == "load" else self.settings.release_confirm
+        if stamp - armed.gone_since < confirm:
             return None
         verb = "carried now" if armed.mode == "load" else "of the load are gone"
         return self._event(armed.mode == "load", "joint_torque", self.margin,

@@ -70,9 +70,13 @@ class Guard {
   void limit(const ChainState& state, const JointVector& q, const JointVector& request, double dt,
              GuardResult& result) noexcept;
 
-  /// Time (s, >= 0) that the robot may go on without hearing of a stop, kept before joints' stops
-  /// besides reaction_time: lwr_fri_bridge::lostTime() of its period. 0 until it is set.
-  void setLostTime(double seconds) noexcept { lost_time_ = seconds; }
+  /// What the robot's interface keeps before joints' stops besides position_margin, so that it cuts
+  /// nothing that was let pass here: the time (s, >= 0) that the arm may go on without hearing of a
+  /// stop, and the rounding of its bound (rad, >= 0). 0 until they are set.
+  void setInterfaceReserve(double lost_time, double rounding) noexcept {
+    lost_time_ = lost_time;
+    rounding_ = rounding;
+  }
 
   /// Forgets how long a joint has been blocked: a new motion begins.
   void reset() noexcept { blocked_for_ = 0.0; }
@@ -87,7 +91,7 @@ class Guard {
   GuardParameters parameters_;
   Chain chain_;
   Workspace workspace_;
-  double lost_time_ = 0.0;
+  double lost_time_ = 0.0, rounding_ = 0.0;
   double blocked_for_ = 0.0;
   int blocking_joint_ = -1;
 };
