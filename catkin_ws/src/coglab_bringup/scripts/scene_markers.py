@@ -18,6 +18,7 @@ import rospy
 import tf2_ros
 from coglab_bringup import scene
 from coglab_msgs.msg import DmpFeedback, MasterState
+from coglab_perception.tf_listener import TfListener
 from visualization_msgs.msg import MarkerArray
 
 PERIOD = 0.2  # s
@@ -37,7 +38,7 @@ class SceneMarkers:
         self.primitive, self.start = "", None  # of the motion that runs; start: m in the base, (3,)
         self.heard = 0.0
         self.frames = tf2_ros.Buffer()
-        self.listener = tf2_ros.TransformListener(self.frames)
+        self.listener = TfListener(self.frames)
         self.publisher = rospy.Publisher("coglab/scene", MarkerArray, queue_size=1, latch=True)
         rospy.Subscriber("controller_manager/dmp/feedback", DmpFeedback, self.on_feedback, queue_size=10)
         rospy.Subscriber("coglab/state", MasterState, self.on_state, queue_size=1)

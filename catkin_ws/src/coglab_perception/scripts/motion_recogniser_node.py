@@ -16,17 +16,7 @@ import tf2_ros
 from coglab_msgs.msg import Recognition
 from coglab_perception.frames import FrameNames
 from coglab_perception.recogniser import CLOCK_JUMP, Recogniser, load_patterns
-
-AHEAD = 0.05  # s by which clocks that are synchronised differ
-
-
-class Listener(tf2_ros.TransformListener):
-    """Keeps transforms from the future out of the buffer: one far ahead would lock out all that come after it."""
-
-    def callback(self, data) -> None:
-        limit = rospy.get_time() + AHEAD
-        data.transforms = [each for each in data.transforms if each.header.stamp.to_sec() <= limit]
-        super().callback(data)
+from coglab_perception.tf_listener import TfListener
 
 
 class RecogniserNode:
@@ -44,7 +34,7 @@ class RecogniserNode:
         self.recogniser = Recogniser(patterns, dataclasses.replace(settings, memory=memory))
         self.hand, self.base = frames.human_hand, frames.world
         self.buffer = tf2_ros.Buffer(rospy.Duration(2.0))
-        self.listener = Listener(self.buffer)
+        self.listener = TfListener(self.buffer)
         self.publisher = rospy.Publisher("perception/recognition", Recognition, queue_size=1)
         self.last = rospy.Time(0)  # stamp of the newest transform taken
         rospy.Timer(rospy.Duration(0.01), self.on_timer)

@@ -294,7 +294,7 @@ class CellNode {
 int main(int argc, char** argv) {
   ros::init(argc, argv, "cell");
   const ros::NodeHandle keep;  // the last handle that goes would take the log along
-  const ros::ServiceServer logger_level = lwr_fri_bridge::guardLoggerService();
+  lwr_fri_bridge::LoggerServices logger_services;
   try {
     const coglab_sim::CellNode node;
     ros::spin();

@@ -27,7 +27,7 @@ int main(int argc, char** argv) {
   std::signal(SIGINT, onSignal);
   std::signal(SIGTERM, onSignal);
   ros::NodeHandle nh(ros::param::param<std::string>("~lwr_namespace", "lwr"));
-  const ros::ServiceServer logger_level = lwr_fri_bridge::guardLoggerService();
+  lwr_fri_bridge::LoggerServices logger_services;
   try {
     lwr_fri_bridge::BridgeRos bridge(nh, {});
     bridge.start();

@@ -28,7 +28,7 @@ int main(int argc, char** argv) {
   std::signal(SIGTERM, onSignal);
   try {
     ros::NodeHandle robot(ros::param::param<std::string>("~lwr_namespace", "lwr"));
-    const ros::ServiceServer logger_level = lwr_fri_bridge::guardLoggerService();
+    lwr_fri_bridge::LoggerServices logger_services;
     ros::CallbackQueue queue;  // one thread: the writer of the port
     robot.setCallbackQueue(&queue);
     std::atomic<coglab_controllers::ControlThread*> control{nullptr};

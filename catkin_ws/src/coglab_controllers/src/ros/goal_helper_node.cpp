@@ -99,7 +99,7 @@ class GoalHelper {
 int main(int argc, char** argv) {
   ros::init(argc, argv, "goal_helper");
   try {
-    const ros::ServiceServer logger_level = lwr_fri_bridge::guardLoggerService();
+    lwr_fri_bridge::LoggerServices logger_services;
     coglab_controllers::GoalHelper(ros::NodeHandle(), ros::NodeHandle("~")).run();
   } catch (const std::exception& error) {
     ROS_FATAL("%s", error.what());

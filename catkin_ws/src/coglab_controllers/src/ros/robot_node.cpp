@@ -28,7 +28,7 @@ int main(int argc, char** argv) {
   std::signal(SIGTERM, onSignal);
   try {
     ros::NodeHandle root;
-    const ros::ServiceServer logger_level = lwr_fri_bridge::guardLoggerService();
+    lwr_fri_bridge::LoggerServices logger_services;
     ros::NodeHandle lwr("lwr");
     std::atomic<coglab_controllers::ControlThread*> control{nullptr};
     lwr_fri_bridge::BridgeRos::Options bridge_options;
