@@ -38,7 +38,7 @@ class SceneMarkers:
         self.primitive, self.start = "", None  # of the motion that runs; start: m in the base, (3,)
         self.heard = 0.0
         self.frames = tf2_ros.Buffer()
-        self.listener = TfListener(self.frames)
+        self.listener = TfListener(self.frames, "world")
         self.publisher = rospy.Publisher("coglab/scene", MarkerArray, queue_size=1, latch=True)
         rospy.Subscriber("controller_manager/dmp/feedback", DmpFeedback, self.on_feedback, queue_size=10)
         rospy.Subscriber("coglab/state", MasterState, self.on_state, queue_size=1)

@@ -13,6 +13,7 @@ import rostest
 from coglab_bringup.ros_fuzz import Fuzz, settle
 from coglab_msgs.srv import LoadController, LwrCommand, SwitchController
 from sensor_msgs.msg import JointState
+from std_msgs.msg import UInt8
 
 LONG = os.environ.get("COGLAB_LONG") == "1"
 PER_TOPIC, PER_SERVICE = (1500, 700) if LONG else (8, 6)
@@ -57,6 +58,9 @@ class FuzzTest(unittest.TestCase):
         cls.arm = Still()
         cls.before = cls.fuzz.talking(1.0)
         cls.report = cls.fuzz.run(PER_TOPIC, PER_SERVICE, limit=20.0)
+        # Every number of people is a valid one, also none; with none in view there is nothing to recognise.
+        people = rospy.Publisher("/perception/people", UInt8, queue_size=1, latch=True)
+        people.publish(1)
         cls.after = cls.fuzz.talking(1.5)
         report = {
             "nodes": len(cls.fuzz.nodes),
@@ -64,6 +68,7 @@ class FuzzTest(unittest.TestCase):
             "services": len(cls.fuzz.services),
             "sent": cls.report.sent,
             "answers": cls.report.answers,
+            "unanswered": sum(cls.report.unanswered.values()),
             "accepted": cls.report.accepted,
             "ended": cls.report.ended,
             "silent": sorted(cls.before - cls.after),
@@ -95,7 +100,7 @@ class FuzzTest(unittest.TestCase):
         self.assertEqual(self.before - self.after, set())
 
     def test_4_every_service_answered(self):
-        self.assertEqual(self.report.answers["no answer"], 0)
+        self.assertEqual({name: n for name, n in self.report.unanswered.items() if n}, {})
 
     def test_5_the_arm_stood(self):
         self.assertIsNotNone(self.arm.first)

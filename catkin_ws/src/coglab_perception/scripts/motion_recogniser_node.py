@@ -34,7 +34,7 @@ class RecogniserNode:
         self.recogniser = Recogniser(patterns, dataclasses.replace(settings, memory=memory))
         self.hand, self.base = frames.human_hand, frames.world
         self.buffer = tf2_ros.Buffer(rospy.Duration(2.0))
-        self.listener = TfListener(self.buffer)
+        self.listener = TfListener(self.buffer, self.base)
         self.publisher = rospy.Publisher("perception/recognition", Recognition, queue_size=1)
         self.last = rospy.Time(0)  # stamp of the newest transform taken
         rospy.Timer(rospy.Duration(0.01), self.on_timer)

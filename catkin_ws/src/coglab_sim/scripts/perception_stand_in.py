@@ -37,6 +37,8 @@ from geometry_msgs.msg import Point, PoseStamped, Quaternion, TransformStamped, 
 from std_msgs.msg import UInt8
 
 PLAYBACK_HZ = 100.0
+LONGEST_WAIT = 10.0
+"""s for which a service waits at most, whatever is asked for."""
 OTHERS = [[1.05, 0.45, 0.35], [1.05, -0.45, 0.35]]
 """m, where the other people's hands are unless ~others says otherwise."""
 
@@ -149,7 +151,7 @@ class PerceptionNode:
     def on_locate(self, request):
         """Newest sight of an object, of the partner's hand or of the board; else why not."""
         try:
-            frame, sight, age = self.vision.locate(request.object_id, request.timeout)
+            frame, sight, age = self.vision.locate(request.object_id, bounded(request.timeout))
         except NotSeen as reason:
             return LocateObjectResponse(success=False, message=str(reason))
         return LocateObjectResponse(
@@ -159,13 +161,18 @@ class PerceptionNode:
     def on_places(self, request):
         """Slots of the board without an object on them; else why there is none."""
         try:
-            places = self.vision.free_places(request.object_id, request.timeout)
+            places = self.vision.free_places(request.object_id, bounded(request.timeout))
         except NotSeen as reason:
             return FreePlacesResponse(False, str(reason), [])
         return FreePlacesResponse(
             True, ", ".join(name for name, _ in places),
             [pose(self.vision.names.board, rospy.get_time(), Frame(place))
              for _, place in places])
+
+
+def bounded(timeout: float) -> float:
+    """A time-out as asked for, s, where a service can keep it: 0 to LONGEST_WAIT."""
+    return min(max(timeout, 0.0), LONGEST_WAIT) if timeout == timeout else 0.0
 
 
 def pose(parent: str, stamp: float, frame: Frame) -> PoseStamped:

@@ -189,6 +189,7 @@ class Report:
     answers: Counter = field(default_factory=Counter)  # of services: success, refused, error, no answer
     accepted: Counter = field(default_factory=Counter)  # malformed requests answered with success, by service
     ended: list[str] = field(default_factory=list)  # nodes
+    unanswered: Counter = field(default_factory=Counter)  # services
 
 
 class Fuzz:
@@ -245,9 +246,9 @@ class Fuzz:
         self._publish(per_topic)
         for thread in threads:
             thread.join(limit + per_service * 0.5)
-        stuck = sum(thread.is_alive() for thread in threads)
-        if stuck:
-            self.report.answers["no answer"] += stuck
+        for thread, name in zip(threads, self.services, strict=True):
+            if thread.is_alive():
+                self.report.unanswered[name] += 1
         self.report.ended = [node for node in self.nodes if self.pid(node) != self.pids[node]]
         return self.report
 
@@ -277,9 +278,9 @@ class Fuzz:
                 verdict = "success" if success else "refused" if success is not None else "answered"
             except Exception:  # an error of the service, or a request that cannot be serialised
                 verdict = "error"
-            if time.monotonic() - started > limit:
-                verdict = "no answer"
+            late = time.monotonic() - started > limit
             with self._lock:
+                self.report.unanswered[name] += late
                 self.report.sent["malformed" if malformed else "valid by nature"] += 1
                 self.report.answers[verdict] += 1
                 if verdict == "success" and malformed:

@@ -3,6 +3,7 @@ from __future__ import annotations
 
 import rospy
 import tf2_ros
+from geometry_msgs.msg import TransformStamped
 from tf2_msgs.msg import TFMessage
 
 AHEAD = 0.05
@@ -12,14 +13,27 @@ LARGEST = 2.0**32 - 1.0
 
 
 class TfListener(tf2_ros.TransformListener):
-    """Keeps transforms from the future out of the buffer, where one far ahead would lock out all that come after it,
-    and static ones with a stamp that tf2 does not survive."""
+    """Keeps out of the buffer: transforms from the future, one of which would lock out all that come after it; static
+    ones with a stamp that tf2 does not survive; static ones of a frame that moves, which would stand from then on; and
+    any that gives ``root`` a parent, which tf2 would never forget."""
+
+    def __init__(self, buffer: tf2_ros.Buffer, root: str) -> None:
+        self._root = root
+        self._moving: set[str] = set()
+        super().__init__(buffer)
 
     def callback(self, data: TFMessage) -> None:
         limit = min(rospy.get_time() + AHEAD, LARGEST)
-        data.transforms = [each for each in data.transforms if 0.0 <= each.header.stamp.to_sec() <= limit]
+        data.transforms = [each for each in data.transforms
+                           if 0.0 <= each.header.stamp.to_sec() <= limit and self._allowed(each)]
+        self._moving.update(each.child_frame_id for each in data.transforms)
         super().callback(data)
 
     def static_callback(self, data: TFMessage) -> None:
-        data.transforms = [each for each in data.transforms if 0.0 <= each.header.stamp.to_sec() < LARGEST]
+        data.transforms = [each for each in data.transforms
+                           if 0.0 <= each.header.stamp.to_sec() < LARGEST and self._allowed(each)
+                           and each.child_frame_id not in self._moving]
         super().static_callback(data)
+
+    def _allowed(self, transform: TransformStamped) -> bool:
+        return transform.child_frame_id.lstrip("/") != self._root

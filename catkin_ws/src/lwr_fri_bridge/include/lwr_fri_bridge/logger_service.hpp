@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include <ros/callback_queue.h>
 #include <ros/console.h>
 #include <ros/ros.h>
 #include <ros/service_manager.h>
@@ -23,12 +24,15 @@ class LoggerServices {
  public:
   /// Takes the place of roscpp's own services; lasts as long as this object.
   LoggerServices() : node_("~") {
+    node_.setCallbackQueue(&queue_);
     for (const char* name : {"get_loggers", "set_logger_level"}) {
       ros::ServiceManager::instance()->unadvertiseService(node_.resolveName(name));
     }
     services_ = {node_.advertiseService("get_loggers", &LoggerServices::onGet, this),
                  node_.advertiseService("set_logger_level", &LoggerServices::onSet, this)};
+    spinner_.start();
   }
+  ~LoggerServices() { spinner_.stop(); }
 
  private:
   bool onGet(roscpp::GetLoggers::Request&, roscpp::GetLoggers::Response& response) {
@@ -60,6 +64,8 @@ class LoggerServices {
     return true;
   }
 
+  ros::CallbackQueue queue_;  // of its own: whatever else the node does, its loggers can be set
+  ros::AsyncSpinner spinner_{1, &queue_};
   ros::NodeHandle node_;
   std::map<std::string, std::string> levels_{{ROSCONSOLE_ROOT_LOGGER_NAME, "info"},
                                              {ROSCONSOLE_DEFAULT_NAME, "info"}};
