@@ -2,8 +2,6 @@
 
 import numpy as np
 import pytest
-
-pytest.importorskip("coglab_msgs", reason="the workspace is not built or not sourced")
 from coglab_bringup.trial_plot import colours_of, draw_trial, lanes_of, rows_without_overlap, state_intervals
 from coglab_bringup.trial_recorder import Trial, summarise
 

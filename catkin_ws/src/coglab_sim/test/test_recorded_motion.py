@@ -36,7 +36,7 @@ def write_npz(path, prefix=""):
 
 
 def write_bag(path, world="world", frames=("human_hand",)):
-    rosbag = pytest.importorskip("rosbag", reason="rosbag is not installed")
+    import rosbag
     import rospy
     from geometry_msgs.msg import TransformStamped
     from tf2_msgs.msg import TFMessage

@@ -4,12 +4,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from coglab_sim import _cell  # noqa: F401
+from coglab_sim import _virtual as virtual
 from coglab_sim.participant import Participant
 from coglab_sim.rigid import Frame
 from coglab_sim.scene import Scene, WorldView
 from coglab_sim.virtual_human import VirtualHuman
 
-virtual = pytest.importorskip('coglab_sim._virtual', reason='the robot in virtual time is not built')
 SOURCES = Path(__file__).resolve().parents[2]
 URDF = str(SOURCES / 'lwr_description' / 'urdf' / 'lwr_ih2.urdf')
 LIMITS = str(SOURCES / 'lwr_description' / 'config' / 'joint_limits.yaml')

@@ -6,9 +6,8 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
+import rospy
 
-pytest.importorskip("coglab_msgs.srv", reason="coglab_msgs is not built")
-rospy = pytest.importorskip("rospy")
 SHARE = Path(__file__).resolve().parent.parent
 HOSTILE = {"list_key": "? [a, b]\n: 1\n", "date": "id: date\nname: 2024-02-31\n", "deep": "a: " + "[" * 50_000,
            "binary": "\x00\x01", "nan": None, "huge": "x" * 1_000_000, "tag": "!!python/object/apply:os.system [true]"}

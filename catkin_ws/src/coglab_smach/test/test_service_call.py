@@ -1,15 +1,12 @@
 """A service call that is given up before it was sent never acts, however late its server comes or thaws."""
 from __future__ import annotations
 
+import io
 import threading
 import time
 from types import SimpleNamespace
 
 import pytest
-
-pytest.importorskip("rospy", reason="rospy is not installed")
-import io
-
 import rospy
 from coglab_msgs.msg import ReasonCode
 from coglab_msgs.srv import LwrCommand
