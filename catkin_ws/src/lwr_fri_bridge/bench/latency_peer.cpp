@@ -27,7 +27,7 @@
 #include <sys/time.h>
 #include <unistd.h>
 
-#include "lwr_fri_bridge/fri_thread.hpp"
+#include "lwr_fri_bridge/bridge/fri_thread.hpp"
 
 namespace {
 
@@ -62,7 +62,7 @@ int echo() {
   const int fd = openSocket(local, 100'000);
   std::printf("%d\n", ntohs(local.sin_port));
   std::fflush(stdout);
-  enterRealTime(kPriority);
+  coglab_rt::enterRealTime(kPriority);
   char buffer[1024];
   while (!ended) {
     socklen_t length = sizeof from;
@@ -114,7 +114,7 @@ struct Controller {
 int measure(int echo_port, int bridge_port, int quads) {
   sockaddr_in local{}, target{};
   const int fd = openSocket(local, 20'000);
-  enterRealTime(kPriority - 5);
+  coglab_rt::enterRealTime(kPriority - 5);
   target = local;
   Controller controller;
   std::uint8_t reply[1024];

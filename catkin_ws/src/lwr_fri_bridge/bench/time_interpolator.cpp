@@ -20,8 +20,8 @@
 #include <string>
 #include <vector>
 
-#include "lwr_fri_bridge/braking.hpp"
-#include "lwr_fri_bridge/joint_limits.hpp"
+#include "lwr_fri_bridge/names.hpp"
+#include "coglab_rt/joint_limits_table.hpp"
 
 namespace {
 
@@ -155,7 +155,7 @@ int main(int argc, char** argv) {
     std::fprintf(stderr, "usage: %s time|limits|braking joint_limits.yaml\n", argv[0]);
     return 2;
   }
-  const JointLimits limits = loadJointLimits(argv[2]);
+  const JointLimits limits = coglab_rt::loadJointLimits(argv[2]);
   if (mode == "time") printTime(limits);
   if (mode == "limits") printLimits(limits);
   if (mode == "braking") printBraking(limits);

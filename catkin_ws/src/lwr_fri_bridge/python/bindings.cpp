@@ -7,8 +7,9 @@
 #include <pybind11/pybind11.h>
 #include <pybind11/stl.h>
 
-#include "lwr_fri_bridge/bridge.hpp"
-#include "lwr_fri_bridge/diagnosis.hpp"
+#include "lwr_fri_bridge/bridge/bridge.hpp"
+#include "lwr_fri_bridge/bridge/diagnosis.hpp"
+#include "coglab_rt/joint_limits_table.hpp"
 
 namespace py = pybind11;
 using namespace lwr_fri_bridge;
@@ -192,7 +193,7 @@ py::dict snapshotDict(const Snapshot& s) {
 BridgeConfig configFrom(const std::string& limits_file, const std::string& profile,
                         const py::dict& parameters) {
   BridgeConfig config;
-  config.limits = loadJointLimits(limits_file, profile);
+  config.limits = coglab_rt::loadJointLimits(limits_file, profile);
   for (const auto& item : parameters) {
     const auto name = item.first.cast<std::string>();
     const py::handle value = item.second;
@@ -241,7 +242,7 @@ PYBIND11_MODULE(lwr_fri_bridge, m) {
 
   py::class_<JointLimits>(m, "JointLimits", py::module_local())
       .def(py::init([](const std::string& path, const std::string& profile) {
-             return loadJointLimits(path, profile);
+             return coglab_rt::loadJointLimits(path, profile);
            }),
            py::arg("path"), py::arg("profile") = "default")
       .def_readonly("lower_position", &JointLimits::lower_position)
@@ -322,8 +323,8 @@ PYBIND11_MODULE(lwr_fri_bridge, m) {
           "send_velocity",
           [](Bridge& bridge, const Vector7& velocity, std::int64_t now_ns) {
             RobotSample sample;
-            bridge.port().newestSample(sample);
-            bridge.port().sendVelocity({velocity, now_ns, sample.motion_epoch});
+            bridge.mailboxes().newestSample(sample);
+            bridge.mailboxes().sendVelocity({velocity, now_ns, sample.motion_epoch});
           },
           "Target velocities (rad/s) as the control thread sends them, for the epoch of the newest "
           "sample.",
