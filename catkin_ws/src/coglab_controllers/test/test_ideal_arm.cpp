@@ -144,7 +144,8 @@ TEST(IdealArm, scalesTheWholeVector) {
   Vector7 wanted;
   wanted << 20.0, 1.0, 0.0, -4.0, 0.0, 0.0, 2.0;
   arm.drive(60, wanted);
-  EXPECT_TRUE(arm.sample.velocity.isApprox(wanted / 20.0 * arm.arm.config().limits.velocity[0], 1e-9));
+  EXPECT_TRUE(
+      arm.sample.velocity.isApprox(wanted / 20.0 * arm.arm.config().limits.velocity[0], 1e-9));
 }
 
 /// 300 000 ticks of random commands, most of them out of bounds, with holds, resets, stops, starts.
@@ -205,10 +206,12 @@ TEST(IdealArm, refusesWhatItCannotDoAndParametersOutOfRange) {
   };
   EXPECT_NE(refusal([](IdealArmConfig& c) { c.period = 0.5; }).find("period = 0.5 is outside"),
             std::string::npos);
-  EXPECT_NE(refusal([](IdealArmConfig& c) { c.command_timeout = std::nan(""); }).find("command_timeout"),
-            std::string::npos);
-  EXPECT_NE(refusal([](IdealArmConfig& c) { c.start_position[3] = 9.0; }).find("start_position[3] = 9"),
-            std::string::npos);
+  EXPECT_NE(
+      refusal([](IdealArmConfig& c) { c.command_timeout = std::nan(""); }).find("command_timeout"),
+      std::string::npos);
+  EXPECT_NE(
+      refusal([](IdealArmConfig& c) { c.start_position[3] = 9.0; }).find("start_position[3] = 9"),
+      std::string::npos);
 }
 
 }  // namespace

@@ -1,5 +1,6 @@
 /// @file
-/// The shortest back end: an arm that stands where its commanded velocities lead. No limits, no ROS.
+/// The shortest back end: an arm that stands where its commanded velocities lead. No limits, no
+/// ROS.
 #pragma once
 
 #include <atomic>
@@ -35,7 +36,7 @@ class ShortestArm : public coglab_rt::ArmPort {
   }
 
  private:
-  static constexpr double kPeriod = 0.005;   // s
+  static constexpr double kPeriod = 0.005;  // s
   static constexpr double kTimeout = 0.05;  // s, age at which a command ends
 
   void measure() {

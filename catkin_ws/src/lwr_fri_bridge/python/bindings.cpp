@@ -227,19 +227,16 @@ BridgeConfig configFrom(const std::string& limits_file, const std::string& profi
   return config;
 }
 
-}  // namespace
-
-PYBIND11_MODULE(lwr_fri_bridge, m) {
-  m.doc() =
-      "FRI bridge of the KUKA LWR 4+: interpolator, braking, datagrams, and the bridge in "
-      "lockstep.";
+void bindDatagrams(py::module_& m) {
   m.attr("MEASUREMENT_SIZE") = fri::kMeasurementSize;
   m.attr("COMMAND_SIZE") = fri::kCommandSize;
   m.def("decode_measurement", &decodeToDict<fri::MeasurementDatagram>, py::arg("datagram"));
   m.def("decode_command", &decodeToDict<fri::CommandDatagram>, py::arg("datagram"));
   m.def("encode_measurement", &encodeFromDict<fri::MeasurementDatagram>, py::arg("fields"));
   m.def("encode_command", &encodeFromDict<fri::CommandDatagram>, py::arg("fields"));
+}
 
+void bindLimits(py::module_& m) {
   py::class_<JointLimits>(m, "JointLimits", py::module_local())
       .def(py::init([](const std::string& path, const std::string& profile) {
              return coglab_rt::loadJointLimits(path, profile);
@@ -251,7 +248,9 @@ PYBIND11_MODULE(lwr_fri_bridge, m) {
       .def_readonly("acceleration", &JointLimits::acceleration)
       .def_readonly("jerk", &JointLimits::jerk)
       .def_readonly("torque", &JointLimits::torque);
+}
 
+void bindMotionFunctions(py::module_& m) {
   m.def(
       "step_axis",
       [](double p, double v, double a, double target, double max_acceleration, double max_jerk,
@@ -271,16 +270,18 @@ PYBIND11_MODULE(lwr_fri_bridge, m) {
       },
       py::arg("velocity"), py::arg("acceleration"), py::arg("target_velocity"),
       py::arg("max_acceleration"), py::arg("max_jerk"));
-  m.def("braking_distance", &brakingDistance, py::arg("speed"), py::arg("max_acceleration"),
+  m.def("braking_distance", &coglab_rt::brakingDistance, py::arg("speed"), py::arg("max_acceleration"),
         py::arg("max_jerk"));
-  m.def("braking_speed", &brakingSpeed, py::arg("distance"), py::arg("max_acceleration"),
+  m.def("braking_speed", &coglab_rt::brakingSpeed, py::arg("distance"), py::arg("max_acceleration"),
         py::arg("max_jerk"), py::arg("delay"));
   m.def(
       "flange_pose",
       [](const Vector7& joints) { return Eigen::Matrix4d(flangePose(joints).matrix()); },
       "4x4 pose of the flange in the base frame.", py::arg("joints"));
   m.def("known_events", &knownEvents);
+}
 
+void bindMotion(py::module_& m) {
   py::class_<Interpolator>(m, "Interpolator", py::module_local())
       .def(py::init<const JointLimits&>(), py::arg("limits"))
       .def("reset", &Interpolator::reset, py::arg("position"))
@@ -297,7 +298,9 @@ PYBIND11_MODULE(lwr_fri_bridge, m) {
       .def_static("delay", &VelocityFilter::delay, py::arg("time_constant"), py::arg("dt"))
       .def_static("noise_gain", &VelocityFilter::noiseGain, py::arg("time_constant"),
                   py::arg("dt"));
+}
 
+void bindBridge(py::module_& m) {
   py::class_<Bridge>(m, "Bridge", py::module_local(),
                      "The bridge without socket and threads: one call of answer() is one FRI tick.")
       .def(py::init([](const std::string& limits_file, const std::string& profile,
@@ -340,4 +343,17 @@ PYBIND11_MODULE(lwr_fri_bridge, m) {
           "(success, message) of a submitted event, or None while it is not finished.",
           py::arg("ticket"))
       .def("snapshot", [](Bridge& bridge) { return snapshotDict(bridge.snapshot()); });
+}
+
+}  // namespace
+
+PYBIND11_MODULE(lwr_fri_bridge, m) {
+  m.doc() =
+      "FRI bridge of the KUKA LWR 4+: interpolator, braking, datagrams, and the bridge in "
+      "lockstep.";
+  bindDatagrams(m);
+  bindLimits(m);
+  bindMotionFunctions(m);
+  bindMotion(m);
+  bindBridge(m);
 }

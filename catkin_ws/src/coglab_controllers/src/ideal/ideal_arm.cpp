@@ -147,9 +147,9 @@ Answer IdealArm::take(const std::string& event) {
                                "': an ideal arm knows no forces; use position, or an arm with "
                                "physics (arm:=fri)");
   }
-  return Answer::refusal(ReasonCode::InvalidArgument,
-                         "unknown event '" + event +
-                             "'; expected one of: start, stop, hold, reset, position");
+  return Answer::refusal(
+      ReasonCode::InvalidArgument,
+      "unknown event '" + event + "'; expected one of: start, stop, hold, reset, position");
 }
 
 }  // namespace coglab_controllers

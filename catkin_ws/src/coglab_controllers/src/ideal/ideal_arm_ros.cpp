@@ -22,9 +22,9 @@ using coglab_rt::RobotSample;
 
 namespace {
 
-constexpr double kServeLimit = 1.0;   // s within which a tick takes a request
-constexpr double kBrakeLimit = 3.0;   // s within which the arm stands after `stop`
-constexpr int kLateTicks = 20;        // so many periods behind, the arm's clock starts anew
+constexpr double kServeLimit = 1.0;  // s within which a tick takes a request
+constexpr double kBrakeLimit = 3.0;  // s within which the arm stands after `stop`
+constexpr int kLateTicks = 20;       // so many periods behind, the arm's clock starts anew
 constexpr std::uint16_t kAllPower = 0x7F;
 
 /// Value of a parameter; one of another type is an error and not silently the default.
@@ -226,8 +226,9 @@ Answer IdealArmRos::request(const std::string& event) {
   });
   if (!settled) {
     return Answer::refusal(ReasonCode::NotAdopted,
-                           event + ": the arm's thread did not get to it in time; relieve this "
-                                   "computer and ask again");
+                           event +
+                               ": the arm's thread did not get to it in time; relieve this "
+                               "computer and ask again");
   }
   return answer;
 }

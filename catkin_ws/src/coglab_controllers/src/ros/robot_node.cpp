@@ -55,8 +55,8 @@ int main(int argc, char** argv) {
     options.target = lwr.advertise<sensor_msgs::JointState>("target_joint_states", 10);
     options.controller_active = [&arm](bool active) { arm->setControllerActive(active); };
     options.highest_priority = arm->highestPriority();
-    coglab_controllers::ManagerRos manager(ros::NodeHandle("controller_manager"),
-                                           arm->mailboxes(), options);
+    coglab_controllers::ManagerRos manager(ros::NodeHandle("controller_manager"), arm->mailboxes(),
+                                           options);
     // However this scope ends: the arm brakes while the control thread still runs, and the arm's
     // thread, which wakes the control thread, ends before the manager goes.
     const std::shared_ptr<void> ends_first(nullptr, [&arm](void*) { arm->shutdown(); });

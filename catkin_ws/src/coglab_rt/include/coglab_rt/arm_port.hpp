@@ -1,11 +1,11 @@
 /// @file
-/// The port of an arm: what every back end (FRI, ideal, or another) offers to the controller manager
-/// in the same process.
+/// The port of an arm: what every back end (FRI, ideal, or another) offers to the controller
+/// manager in the same process.
 ///
-/// Threads. The *main* thread starts and ends the arm. The *arm's* thread writes one RobotSample per
-/// measurement, wakes the control thread, and takes the newest VelocityCommand. The *control* thread
-/// reads the newest sample and writes one command. Neither of the two waits for the other, locks or
-/// allocates.
+/// Threads. The *main* thread starts and ends the arm. The *arm's* thread writes one RobotSample
+/// per measurement, wakes the control thread, and takes the newest VelocityCommand. The *control*
+/// thread reads the newest sample and writes one command. Neither of the two waits for the other,
+/// locks or allocates.
 #pragma once
 
 #include <functional>
@@ -15,8 +15,8 @@
 
 namespace coglab_rt {
 
-/// The two mailboxes between an arm's thread and the control thread; one of each at a time. All four
-/// functions are wait-free.
+/// The two mailboxes between an arm's thread and the control thread; one of each at a time. All
+/// four functions are wait-free.
 class ArmMailboxes {
  public:
   /// Arm's thread: the newest measurement, with the permission to move.
@@ -52,9 +52,9 @@ class ArmPort {
   /// @throws std::exception naming what cannot be had, what was expected, what to do next
   virtual void start(Wake wake) = 0;
 
-  /// Any thread that serves requests, never the arm's or the control thread: whether the commands in
-  /// the mailbox count (true), or only what comes over the topic target_joint_states (false, as long
-  /// as no controller was active).
+  /// Any thread that serves requests, never the arm's or the control thread: whether the commands
+  /// in the mailbox count (true), or only what comes over the topic target_joint_states (false, as
+  /// long as no controller was active).
   virtual void setControllerActive(bool active) = 0;
 
   /// Main thread: brakes within the limits, while commands may still come, then ends the arm's

@@ -60,8 +60,8 @@ double lossReserve(double speed, double time, double dt, double max_acceleration
 /// bridge's own guard finds nothing to cut. Real-time safe.
 double lostTime(double dt);
 
-/// What BrakingGuard keeps before a bound besides the margin, rad: a step on the wire is off by up to
-/// 0.24e-6 rad (float32 at 3 rad, both ends), and 20 lost cycles repeat it.
+/// What BrakingGuard keeps before a bound besides the margin, rad: a step on the wire is off by up
+/// to 0.24e-6 rad (float32 at 3 rad, both ends), and 20 lost cycles repeat it.
 constexpr double kWireRounding = 5e-6;
 
 /// Bounds target velocities so that the interpolator's next step leaves every joint able to stop
@@ -93,7 +93,7 @@ class BrakingGuard {
 // Implementation
 
 inline BrakingReach brakingReach(double velocity, double acceleration, double max_acceleration,
-                          double max_jerk) {
+                                 double max_jerk) {
   const AxisProfile stop = planVelocity(velocity, acceleration, 0.0, max_acceleration, max_jerk);
   BrakingReach reach;
   reach.end = advance({0.0, velocity, acceleration}, stop, stop.totalTime()).position;
@@ -121,7 +121,8 @@ inline double brakingDistance(double speed, double max_acceleration, double max_
   return 0.5 * speed * (speed / max_acceleration + max_acceleration / max_jerk);
 }
 
-inline double brakingSpeed(double distance, double max_acceleration, double max_jerk, double delay) {
+inline double brakingSpeed(double distance, double max_acceleration, double max_jerk,
+                           double delay) {
   if (!(distance > 0.0)) return 0.0;
   // With the acceleration limit reached the equation is quadratic; below that it is cubic in
   // sqrt(v), solved by Newton from above, where it is convex and cannot undershoot.
@@ -143,8 +144,8 @@ inline double brakingSpeed(double distance, double max_acceleration, double max_
   return root * root;
 }
 
-inline double lossReserve(double speed, double time, double dt, double max_acceleration, double max_jerk,
-                   bool proven) {
+inline double lossReserve(double speed, double time, double dt, double max_acceleration,
+                          double max_jerk, bool proven) {
   using B = LossBudget;
   if (!(speed > 0.0)) return 0.0;
   // Up to kInARow cycles before each answer that brakes, and after the last one, whose step still
@@ -177,8 +178,8 @@ inline BrakingGuard::BrakingGuard(const JointLimits& limits, double margin)
       max_jerk_(limits.jerk) {}
 
 /// What one step towards `target` and a stop after it may reach, losses included.
-inline BrakingGuard::Range BrakingGuard::reach(int joint, const AxisState& state, double target, double dt,
-                                        bool proven) const {
+inline BrakingGuard::Range BrakingGuard::reach(int joint, const AxisState& state, double target,
+                                               double dt, bool proven) const {
   const double a = max_acceleration_[joint], j = max_jerk_[joint];
   const AxisState next =
       advance(state, planVelocity(state.velocity, state.acceleration, target, a, j), dt);
@@ -186,8 +187,7 @@ inline BrakingGuard::Range BrakingGuard::reach(int joint, const AxisState& state
   // A lost cycle repeats the last step, so its speed counts as well as those to come; the latter
   // peak where the present acceleration has been brought to zero.
   const double step = (next.position - state.position) / dt;
-  const double coasting =
-      next.velocity + 0.5 * next.acceleration * std::abs(next.acceleration) / j;
+  const double coasting = next.velocity + 0.5 * next.acceleration * std::abs(next.acceleration) / j;
   const double up = std::max({0.0, step, next.velocity, coasting});
   const double down = std::max({0.0, -step, -next.velocity, -coasting});
   return {next.position + stop.lowest - lossReserve(down, stop.time, dt, a, j, proven),
@@ -195,7 +195,7 @@ inline BrakingGuard::Range BrakingGuard::reach(int joint, const AxisState& state
 }
 
 inline unsigned BrakingGuard::bound(const Interpolator& interpolator, double dt, bool proven,
-                             Vector7& target_velocity) const {
+                                    Vector7& target_velocity) const {
   constexpr double tiny = 1e-12;
   unsigned cut = 0;
   for (int i = 0; i < 7; ++i) {

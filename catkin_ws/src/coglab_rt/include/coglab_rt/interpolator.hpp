@@ -77,7 +77,7 @@ class Interpolator {
 // Implementation
 
 inline AxisProfile planVelocity(double velocity, double acceleration, double target_velocity,
-                         double max_acceleration, double max_jerk) {
+                                double max_acceleration, double max_jerk) {
   const double per_jerk = 1.0 / max_jerk;
   // Velocity that is reached by doing nothing but bringing the acceleration to zero.
   const double coasting = velocity + 0.5 * acceleration * std::abs(acceleration) * per_jerk;
@@ -139,7 +139,7 @@ inline void Interpolator::reset(const Vector7& position) {
 }
 
 inline void Interpolator::resume(const Vector7& position, const Vector7& velocity,
-                          const Vector7& acceleration) {
+                                 const Vector7& acceleration) {
   position_ = position;
   velocity_ = velocity;
   acceleration_ = acceleration;

@@ -56,8 +56,8 @@ inline bool readLimitVector(const std::string& path, const YAML::Node& section,
     }
     if (!std::isfinite(number) || (field.positive && number <= 0.0)) {
       failTable(path, node[i].Mark(),
-                name + "[" + std::to_string(i) + "] = " + std::to_string(number) +
-                    ": expected a " + (field.positive ? "positive " : "") + "finite number");
+                name + "[" + std::to_string(i) + "] = " + std::to_string(number) + ": expected a " +
+                    (field.positive ? "positive " : "") + "finite number");
     }
     value[static_cast<Eigen::Index>(i)] = number;
   }
@@ -68,7 +68,8 @@ inline bool readLimitVector(const std::string& path, const YAML::Node& section,
 inline void readLimitProfile(const std::string& path, const YAML::Node& root,
                              const std::string& name, JointLimits& limits) {
   const YAML::Node section = root[name];
-  if (!section || !section.IsMap()) failTable(path, root.Mark(), "profile '" + name + "' is missing");
+  if (!section || !section.IsMap())
+    failTable(path, root.Mark(), "profile '" + name + "' is missing");
   for (const auto& entry : section) {
     bool known = false;
     for (const LimitField& field : kLimitFields)
@@ -105,9 +106,9 @@ inline YAML::Node openLimitsTable(const std::string& path) {
   for (std::size_t i = 0; i < 7; ++i) {
     const auto name = joints[i].as<std::string>("");
     if (name != kJointNames[i]) {
-      failTable(path, joints[i].Mark(),
-                "joints[" + std::to_string(i) + "] = '" + name + "': expected '" +
-                    kJointNames[i] + "'");
+      failTable(
+          path, joints[i].Mark(),
+          "joints[" + std::to_string(i) + "] = '" + name + "': expected '" + kJointNames[i] + "'");
     }
   }
   return root;
@@ -147,8 +148,9 @@ inline JointLimits loadJointLimits(const std::string& path,
   }
   for (int i = 0; i < 7; ++i) {
     if (limits.lower_position[i] >= limits.upper_position[i]) {
-      detail::failTable(path, root.Mark(),
-                        std::string(kJointNames[i]) + ": lower_position must be below upper_position");
+      detail::failTable(
+          path, root.Mark(),
+          std::string(kJointNames[i]) + ": lower_position must be below upper_position");
     }
   }
   limits.velocity /= 1.0 + detail::servoOvershoot(path, root);

@@ -88,7 +88,8 @@ inline void* BoundedThread::entry(void* self) {
   return nullptr;
 }
 
-inline void BoundedThread::start(const char* name, std::size_t stack_bytes, std::function<void()> body) {
+inline void BoundedThread::start(const char* name, std::size_t stack_bytes,
+                                 std::function<void()> body) {
   join();
   name_ = std::string(name).substr(0, 15);
   stack_bytes_ = std::max<std::size_t>(stack_bytes, 128 * 1024);

@@ -13,8 +13,8 @@ struct Range {
   bool holds(double value) const { return value >= low && value <= high; }
 };
 
-/// Range of a parameter by its name in cellParameters(), of a parameter of the node, or of a fault's
-/// value (`fault/…`); low == high if it is none of those, or no number.
+/// Range of a parameter by its name in cellParameters(), of a parameter of the node, or of a
+/// fault's value (`fault/…`); low == high if it is none of those, or no number.
 Range rangeOf(const std::string& name);
 
 /// Throws std::invalid_argument "parameter <shown> = <value> is outside its range <low>..<high>"

@@ -15,8 +15,8 @@ namespace lwr_fri_bridge {
 using coglab_rt::ArmMailboxes;
 using coglab_rt::AxisState;
 using coglab_rt::BoundedThread;
-using coglab_rt::brakingSpeed;
 using coglab_rt::BrakingGuard;
+using coglab_rt::brakingSpeed;
 using coglab_rt::EventRing;
 using coglab_rt::Interpolator;
 using coglab_rt::JointLimits;

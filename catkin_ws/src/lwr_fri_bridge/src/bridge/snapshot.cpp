@@ -11,9 +11,9 @@ namespace lwr_fri_bridge {
 bool StateView::operator==(const StateView& o) const {
   return supervisor == o.supervisor && block == o.block && hold_latched == o.hold_latched &&
          blocking_joint == o.blocking_joint && motion_epoch == o.motion_epoch && loss == o.loss &&
-         state == o.state && quality == o.quality &&
-         control == o.control && power == o.power && drive_error == o.drive_error &&
-         drive_warning == o.drive_warning && cycle_time == o.cycle_time;
+         state == o.state && quality == o.quality && control == o.control && power == o.power &&
+         drive_error == o.drive_error && drive_warning == o.drive_warning &&
+         cycle_time == o.cycle_time;
 }
 
 void Bridge::publish() {

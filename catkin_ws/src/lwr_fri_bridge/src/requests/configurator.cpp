@@ -79,65 +79,58 @@ void Configurator::stepStart(const Observation& seen) {
     request_.phase = fri::KrlPhase::Idle;
     return finish(OutcomeCode::LostConnection, seen);
   }
-  const fri::MeasurementDatagram& m = *seen.measurement;
-  const bool command = m.state == static_cast<std::uint16_t>(fri::FriState::Command);
-  const double waited = elapsed(seen);
-  const bool late = waited > limits_.start_timeout;
-
+  const bool command =
+      seen.measurement->state == static_cast<std::uint16_t>(fri::FriState::Command);
+  const bool late = elapsed(seen) > limits_.start_timeout;
   if (step_ == Step::WaitQuality) {
     if (command) {
       step_ = Step::WaitPower;  // somebody entered command mode before: nothing to request
-    } else if (m.quality >= static_cast<std::uint16_t>(fri::Quality::Ok)) {
+    } else if (seen.measurement->quality >= static_cast<std::uint16_t>(fri::Quality::Ok)) {
       setPhase(fri::KrlPhase::Start, seen);
       step_ = Step::WaitCommand;
     } else if (late) {
       return finish(OutcomeCode::PoorQuality, seen);
     }
   }
-  if (step_ == Step::WaitCommand) {
-    reply_ = fri::readReply(convention_, request_, m.krl);
-    if (command) {
-      step_ = Step::WaitPower;
-    } else if (!reply_.known && waited > kProgramMarkTime) {
-      setPhase(fri::KrlPhase::Stop, seen);
-      return finish(OutcomeCode::NoKrlProgram, seen);
-    } else if (reply_.refused) {
-      setPhase(fri::KrlPhase::Stop, seen);
-      return finish(OutcomeCode::ProgramRefused, seen);
-    } else if (late) {
-      setPhase(fri::KrlPhase::Stop, seen);
-      return finish(OutcomeCode::NotEntered, seen);
-    } else if (convention_ == fri::KrlConvention::RcprgTum) {
-      // Its flag is all it shows: worked on the request, is done with it, and still in monitor mode
-      // means no.
-      if (reply_.busy) {
-        seen_busy_ = true;
-        monitor_since_ns_ = seen.now_ns;
-      } else if (seen_busy_ &&
-                 1e-9 * static_cast<double>(seen.now_ns - monitor_since_ns_) > kRefusalTime) {
-        setPhase(fri::KrlPhase::Stop, seen);
-        return finish(OutcomeCode::ProgramRefused, seen);
-      }
-    }
+  const bool asking = step_ == Step::WaitCommand;
+  if (asking && command) step_ = Step::WaitPower;
+  if (asking) reply_ = fri::readReply(convention_, request_, seen.measurement->krl);
+  if (step_ == Step::WaitCommand) waitCommand(seen, late);
+  if (step_ == Step::WaitPower) waitPower(seen, command, late);
+}
+
+/// Gives the start up: monitor mode is asked for.
+void Configurator::giveUp(OutcomeCode code, const Observation& seen) {
+  setPhase(fri::KrlPhase::Stop, seen);
+  finish(code, seen);
+}
+
+void Configurator::waitCommand(const Observation& seen, bool late) {
+  if (!reply_.known && elapsed(seen) > kProgramMarkTime)
+    return giveUp(OutcomeCode::NoKrlProgram, seen);
+  if (reply_.refused) return giveUp(OutcomeCode::ProgramRefused, seen);
+  if (late) return giveUp(OutcomeCode::NotEntered, seen);
+  if (convention_ != fri::KrlConvention::RcprgTum) return;
+  // Its flag is all it shows: worked on the request, is done with it, and still in monitor mode
+  // means no.
+  if (reply_.busy) {
+    seen_busy_ = true;
+    monitor_since_ns_ = seen.now_ns;
+  } else if (seen_busy_ &&
+             1e-9 * static_cast<double>(seen.now_ns - monitor_since_ns_) > kRefusalTime) {
+    giveUp(OutcomeCode::ProgramRefused, seen);
   }
-  if (step_ == Step::WaitPower) {
-    if (!command) {
-      setPhase(fri::KrlPhase::Stop, seen);
-      return finish(OutcomeCode::NotEntered, seen);
-    }
-    if (m.control != static_cast<std::uint16_t>(outcome_.wanted)) {
-      setPhase(fri::KrlPhase::Stop, seen);
-      return finish(OutcomeCode::WrongStrategy, seen);
-    }
-    if (fri::allDrivesOn(m.power)) {
-      setPhase(fri::KrlPhase::Running, seen);
-      return finish(OutcomeCode::Done, seen);
-    }
-    if (late) {
-      setPhase(fri::KrlPhase::Stop, seen);
-      return finish(OutcomeCode::NoPower, seen);
-    }
+}
+
+void Configurator::waitPower(const Observation& seen, bool command, bool late) {
+  if (!command) return giveUp(OutcomeCode::NotEntered, seen);
+  if (seen.measurement->control != static_cast<std::uint16_t>(outcome_.wanted))
+    return giveUp(OutcomeCode::WrongStrategy, seen);
+  if (fri::allDrivesOn(seen.measurement->power)) {
+    setPhase(fri::KrlPhase::Running, seen);
+    return finish(OutcomeCode::Done, seen);
   }
+  if (late) giveUp(OutcomeCode::NoPower, seen);
 }
 
 void Configurator::stepStop(const Observation& seen) {

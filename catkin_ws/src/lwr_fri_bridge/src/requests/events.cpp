@@ -172,32 +172,11 @@ Event parseEvent(const std::string& text, const ControlMode& current) {
   return event;
 }
 
-std::string describe(const Outcome& o) {
-  char seconds[32];
-  std::snprintf(seconds, sizeof seconds, "%.1f s", o.waited);
-  const std::string word = wordFor(o.kind);
+namespace {
+
+/// Why command mode was not entered or not left, in words; empty for other outcomes.
+std::string whyNotReached(const Outcome& o, const std::string& word, const std::string& seconds) {
   switch (o.code) {
-    case OutcomeCode::Pending:
-      return word + ": not finished yet";
-    case OutcomeCode::Done:
-      if (o.kind == EventKind::Mode) return std::string("next start uses ") + fri::nameOf(o.wanted);
-      if (o.kind == EventKind::Start) {
-        return std::string("command mode with ") + fri::nameOf(o.reported) + " after " + seconds;
-      }
-      return word + ": done";
-    case OutcomeCode::AlreadyThere:
-      return word + ": nothing to do, it is so already";
-    case OutcomeCode::Disconnected:
-      return word +
-             ": no datagrams from the robot controller; is its FRI program running and sending to "
-             "this port?";
-    case OutcomeCode::Held:
-      return word + " refused: hold is latched; send reset first";
-    case OutcomeCode::InCommandMode:
-      return word + " refused: strategy and flags may change in monitor mode only; send stop first";
-    case OutcomeCode::NotSupported:
-      return std::string("start refused: the KRL program of krl_convention ") +
-             fri::nameOf(o.convention) + " cannot run " + fri::nameOf(o.wanted);
     case OutcomeCode::PoorQuality:
       return std::string("start: quality of the connection is ") + fri::nameOf(o.quality) +
              " after " + seconds +
@@ -227,6 +206,44 @@ std::string describe(const Outcome& o) {
     case OutcomeCode::NotLeft:
       return word + ": still in " + fri::nameOf(o.state) + " after " + seconds +
              ", MON expected; stop the KRL program on the pendant";
+    default:
+      return {};
+  }
+}
+
+std::string secondsOf(double waited) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.1f s", waited);
+  return text;
+}
+
+}  // namespace
+
+std::string describe(const Outcome& o) {
+  const std::string seconds = secondsOf(o.waited);
+  const std::string word = wordFor(o.kind);
+  switch (o.code) {
+    case OutcomeCode::Pending:
+      return word + ": not finished yet";
+    case OutcomeCode::Done:
+      if (o.kind == EventKind::Mode) return std::string("next start uses ") + fri::nameOf(o.wanted);
+      if (o.kind == EventKind::Start) {
+        return std::string("command mode with ") + fri::nameOf(o.reported) + " after " + seconds;
+      }
+      return word + ": done";
+    case OutcomeCode::AlreadyThere:
+      return word + ": nothing to do, it is so already";
+    case OutcomeCode::Disconnected:
+      return word +
+             ": no datagrams from the robot controller; is its FRI program running and sending to "
+             "this port?";
+    case OutcomeCode::Held:
+      return word + " refused: hold is latched; send reset first";
+    case OutcomeCode::InCommandMode:
+      return word + " refused: strategy and flags may change in monitor mode only; send stop first";
+    case OutcomeCode::NotSupported:
+      return std::string("start refused: the KRL program of krl_convention ") +
+             fri::nameOf(o.convention) + " cannot run " + fri::nameOf(o.wanted);
     case OutcomeCode::Interrupted:
       return word + ": interrupted by hold, stop or a fall-back";
     case OutcomeCode::Busy:
@@ -235,8 +252,11 @@ std::string describe(const Outcome& o) {
       return word + ": the robot controller fell silent after " + seconds;
     case OutcomeCode::NotServed:
       return word + ": the FRI thread did not take the request within " + seconds;
+    default: {
+      const std::string why = whyNotReached(o, word, seconds);
+      return why.empty() ? word : why;
+    }
   }
-  return word;
 }
 
 }  // namespace lwr_fri_bridge

@@ -21,8 +21,8 @@ struct IdealArmConfig {
   /// rad, inside the limits; the default is the home posture of the simulated cell.
   coglab_rt::Vector7 start_position =
       (coglab_rt::Vector7() << -1.4349, -0.6086, 1.4986, 1.7048, 0.1857, 0.2152, 0.782).finished();
-  double period = 0.005;           ///< s between two measurements, 0.001..0.1
-  double command_timeout = 0.05;   ///< s, age at which a command ends, 0.005..1
+  double period = 0.005;          ///< s between two measurements, 0.001..0.1
+  double command_timeout = 0.05;  ///< s, age at which a command ends, 0.005..1
 
   /// @throws std::invalid_argument naming the parameter, its value and its range
   void check() const;

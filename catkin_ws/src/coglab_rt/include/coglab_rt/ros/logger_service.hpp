@@ -2,8 +2,9 @@
 /// The services ~get_loggers and ~set_logger_level of roscpp, for calls at any time and of any
 /// content.
 ///
-/// Debian 12's rosconsole (1.14.3 with log4cxx 1.0.0) frees the list of loggers in each get_loggers();
-/// the next message that is logged ends the process. So nothing here asks for that list.
+/// Debian 12's rosconsole (1.14.3 with log4cxx 1.0.0) frees the list of loggers in each
+/// get_loggers(); the next message that is logged ends the process. So nothing here asks for that
+/// list.
 #pragma once
 
 #include <map>

@@ -64,6 +64,9 @@ class Configurator {
   void finish(OutcomeCode code, const Observation& seen);
   void setPhase(fri::KrlPhase phase, const Observation& seen);
   void stepStart(const Observation& seen);
+  void waitCommand(const Observation& seen, bool late);
+  void waitPower(const Observation& seen, bool command, bool late);
+  void giveUp(OutcomeCode code, const Observation& seen);
   void stepStop(const Observation& seen);
 
   fri::KrlConvention convention_;
