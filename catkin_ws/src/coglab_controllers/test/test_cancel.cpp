@@ -37,8 +37,7 @@ int brakingCycles(const VirtualRobot& robot) {
     const coglab_rt::AxisState axis = robot.interpolator->axis(joint);
     longest = std::max(
         longest, coglab_rt::planVelocity(axis.velocity, axis.acceleration, 0.0,
-                                              robot.limits.acceleration[joint],
-                                              robot.limits.jerk[joint])
+                                         robot.limits.acceleration[joint], robot.limits.jerk[joint])
                      .totalTime());
   }
   return static_cast<int>(std::ceil(longest / robot.period - 1e-9));

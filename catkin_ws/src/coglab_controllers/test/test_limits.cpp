@@ -3,8 +3,8 @@
 
 #include "coglab_controllers/limits/guard.hpp"
 #include "coglab_controllers/limits/phase_governor.hpp"
-#include "core_support.hpp"
 #include "coglab_rt/interpolator.hpp"
+#include "core_support.hpp"
 
 using namespace coglab_controllers;
 using namespace coglab_controllers::test;

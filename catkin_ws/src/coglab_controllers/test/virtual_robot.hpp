@@ -59,8 +59,7 @@ class VirtualRobot {
   explicit VirtualRobot(const std::string& parameters = "", double period = 0.005,
                         bool lockstep = true)
       : period(period) {
-    limits =
-        coglab_rt::loadJointLimits(std::string(DESCRIPTION_DIR) + "/config/joint_limits.yaml");
+    limits = coglab_rt::loadJointLimits(std::string(DESCRIPTION_DIR) + "/config/joint_limits.yaml");
     ManagerSettings settings = readManagerSettings(
         YAML::Load(parameters), readText(std::string(DESCRIPTION_DIR) + "/urdf/lwr_ih2.urdf"),
         limits, lockstep);

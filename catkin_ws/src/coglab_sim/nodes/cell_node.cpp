@@ -24,8 +24,8 @@
 #include "cell_faults.hpp"
 #include "cell_messages.hpp"
 #include "cell_parameters.hpp"
-#include "coglab_sim/real_time_cell.hpp"
 #include "coglab_rt/ros/logger_service.hpp"
+#include "coglab_sim/real_time_cell.hpp"
 
 namespace coglab_sim {
 namespace {
@@ -77,8 +77,7 @@ class CellNode {
     port_parameter_ =
         portParameter(private_.param<std::string>("port_parameter", "lwr/fri_port_bound"));
     follow_port_ = port == 0;
-    if (follow_port_)
-      port = waitForPort(port_parameter_, within(private_, "port_wait", 60.0));
+    if (follow_port_) port = waitForPort(port_parameter_, within(private_, "port_wait", 60.0));
     const auto host = private_.param<std::string>("fri_host", "127.0.0.1");
     const int source_port = within(private_, "fri_source_port", 0);
     cell_ = std::make_unique<RealTimeCell>(config_, host, static_cast<std::uint16_t>(port), speed,

@@ -9,8 +9,8 @@
 #include <string>
 
 #include "coglab_controllers/manager/feedback_stage.hpp"
-#include "coglab_sim/virtual_robot.hpp"
 #include "coglab_rt/joint_limits_table.hpp"
+#include "coglab_sim/virtual_robot.hpp"
 
 namespace fri = lwr_fri_bridge::fri;
 using namespace coglab_sim;

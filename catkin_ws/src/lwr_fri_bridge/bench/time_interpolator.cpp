@@ -20,8 +20,8 @@
 #include <string>
 #include <vector>
 
-#include "lwr_fri_bridge/names.hpp"
 #include "coglab_rt/joint_limits_table.hpp"
+#include "lwr_fri_bridge/names.hpp"
 
 namespace {
 

@@ -7,9 +7,9 @@
 #include <pybind11/pybind11.h>
 #include <pybind11/stl.h>
 
+#include "coglab_rt/joint_limits_table.hpp"
 #include "lwr_fri_bridge/bridge/bridge.hpp"
 #include "lwr_fri_bridge/bridge/diagnosis.hpp"
-#include "coglab_rt/joint_limits_table.hpp"
 
 namespace py = pybind11;
 using namespace lwr_fri_bridge;
@@ -270,8 +270,8 @@ void bindMotionFunctions(py::module_& m) {
       },
       py::arg("velocity"), py::arg("acceleration"), py::arg("target_velocity"),
       py::arg("max_acceleration"), py::arg("max_jerk"));
-  m.def("braking_distance", &coglab_rt::brakingDistance, py::arg("speed"), py::arg("max_acceleration"),
-        py::arg("max_jerk"));
+  m.def("braking_distance", &coglab_rt::brakingDistance, py::arg("speed"),
+        py::arg("max_acceleration"), py::arg("max_jerk"));
   m.def("braking_speed", &coglab_rt::brakingSpeed, py::arg("distance"), py::arg("max_acceleration"),
         py::arg("max_jerk"), py::arg("delay"));
   m.def(

@@ -10,8 +10,8 @@
 #include <iterator>
 #include <string>
 
-#include "lwr_fri_bridge/bridge/bridge.hpp"
 #include "coglab_rt/joint_limits_table.hpp"
+#include "lwr_fri_bridge/bridge/bridge.hpp"
 
 namespace lwr_fri_bridge::test {
 

@@ -105,7 +105,8 @@ TEST(Bridge, commandsBeforeThePermissionDoNotCount) {
   RobotSample sample;
   cell.bridge.mailboxes().newestSample(sample);
   cell.start();
-  cell.bridge.mailboxes().sendVelocity({Vector7::Constant(0.5), cell.robot.now(), sample.motion_epoch});
+  cell.bridge.mailboxes().sendVelocity(
+      {Vector7::Constant(0.5), cell.robot.now(), sample.motion_epoch});
   cell.run(5);
   EXPECT_TRUE(cell.bridge.snapshot().sample.commanded_velocity.isZero());
   EXPECT_GE(cell.bridge.snapshot().counters.commands_old_epoch, 1U);

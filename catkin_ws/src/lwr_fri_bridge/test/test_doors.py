@@ -1,4 +1,4 @@
-"""The rooms of this package: arrows run only downward, ROS stays in the uppermost, and nothing of the controllers is known."""
+"""The rooms of this package: arrows run only downward, ROS stays in the uppermost, controllers are not known."""
 
 from __future__ import annotations
 

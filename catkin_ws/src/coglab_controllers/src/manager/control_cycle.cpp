@@ -172,8 +172,7 @@ void ControlCycle::watchRobot() noexcept {
   const bool again = input_.motion_allowed;
   abortMotion(Reason(again ? ReasonCode::NotInCommandMode : codeOf(sample.block),
                      "the robot stopped the motion: ")
-              << (again ? "it left command mode for a moment"
-                        : coglab_rt::describe(sample.block)));
+              << (again ? "it left command mode for a moment" : coglab_rt::describe(sample.block)));
 }
 
 void ControlCycle::watchGuard(double dt) noexcept {

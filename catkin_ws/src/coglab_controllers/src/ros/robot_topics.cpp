@@ -87,8 +87,8 @@ void RobotTopics::onJoints(const sensor_msgs::JointState& joints) {
 }
 
 void RobotTopics::onState(const coglab_msgs::LwrState& state) {
-  sample_.block = state.motion_allowed ? MotionBlock::None
-                                       : coglab_rt::motionBlockOf(state.reason_code);
+  sample_.block =
+      state.motion_allowed ? MotionBlock::None : coglab_rt::motionBlockOf(state.reason_code);
   sample_.motion_epoch = state.motion_epoch;
 }
 

@@ -84,8 +84,7 @@ coglab_rt::JointLimits readJointLimits(const ros::NodeHandle& node) {
   const Parameters parameters(readParameters(node), "controller_manager");
   const std::string table = parameters.text(
       "joint_limits_file", ros::package::getPath("lwr_description") + "/config/joint_limits.yaml");
-  return coglab_rt::loadJointLimits(table,
-                                         parameters.text("joint_limits_profile", "default"));
+  return coglab_rt::loadJointLimits(table, parameters.text("joint_limits_profile", "default"));
 }
 
 ManagerSettings readManagerSettings(const ros::NodeHandle& node) {

@@ -197,7 +197,8 @@ void Bridge::runSupervision(const Configurator::Observation& seen, bool fresh_se
   if (supervisor_.epoch() != epoch) permission_since_ns_ = seen.now_ns;
   if (supervisor_.fallBacks() != fall_backs) {
     configurator_.fellBack();
-    // Poor quality and errors of a drive leave command mode in force, and have sentences of their own.
+    // Poor quality and errors of a drive leave command mode in force, and have sentences of their
+    // own.
     const bool still_there = input.command_mode && input.full_power && !fresh_session;
     loss_ = still_there && connected_
                 ? CommandModeLoss{}

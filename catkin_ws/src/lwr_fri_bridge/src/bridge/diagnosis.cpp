@@ -58,8 +58,7 @@ Diagnosis diagnoseConnection(const Snapshot& s, const FriThreadStatistics& threa
                                    ") uses the port and is ignored; the peer is " + thread.peer +
                                    ": if that is not the robot controller, set controller_address"};
   }
-  return {Severity::Ok, std::string("quality ") + fri::nameOf(s.quality) +
-                            " from " + thread.peer +
+  return {Severity::Ok, std::string("quality ") + fri::nameOf(s.quality) + " from " + thread.peer +
                             number(", latency %.2f ms", 1e3 * s.latency) +
                             number(", cycle %.0f ms", 1e3 * cycle)};
 }

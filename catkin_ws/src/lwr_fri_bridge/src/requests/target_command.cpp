@@ -5,8 +5,6 @@
 #include <cmath>
 #include <cstdio>
 
-#include "lwr_fri_bridge/bridge/diagnosis.hpp"
-
 namespace lwr_fri_bridge {
 namespace {
 

@@ -3,8 +3,8 @@
 
 #include <ros/package.h>
 
-#include "lwr_fri_bridge/ros/bridge_ros.hpp"
 #include "coglab_rt/joint_limits_table.hpp"
+#include "lwr_fri_bridge/ros/bridge_ros.hpp"
 
 namespace lwr_fri_bridge {
 namespace {
@@ -86,9 +86,8 @@ FriThreadOptions readFriThreadOptions(const ros::NodeHandle& nh) {
   FriThreadOptions options;
   options.address = parameter<std::string>(nh, "fri_address", options.address, "an IPv4 address");
   options.port = wholeParameter(nh, "fri_port", options.port, 0, 65535);
-  options.controller_address =
-      parameter<std::string>(nh, "controller_address", options.controller_address,
-                             "an IPv4 address or nothing");
+  options.controller_address = parameter<std::string>(
+      nh, "controller_address", options.controller_address, "an IPv4 address or nothing");
   options.priority = wholeParameter(nh, "rt_priority", options.priority, 0, 98);
   options.stack_bytes =
       1024 * static_cast<std::size_t>(wholeParameter(nh, "rt_stack_kib", 256, 128, 8192));

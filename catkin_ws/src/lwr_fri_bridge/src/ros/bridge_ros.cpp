@@ -11,9 +11,9 @@
 #include <coglab_msgs/ReasonCode.h>
 
 #include "bridge_diagnostics.hpp"
+#include "coglab_rt/ros/ros_time.hpp"
 #include "lwr_fri_bridge/bridge/diagnosis.hpp"
 #include "lwr_fri_bridge/ros/reason_codes.hpp"
-#include "coglab_rt/ros/ros_time.hpp"
 #include "target_topic.hpp"
 
 namespace lwr_fri_bridge {

@@ -9,9 +9,9 @@
 
 #include <ros/ros.h>
 
-#include "lwr_fri_bridge/ros/bridge_ros.hpp"
 #include "coglab_rt/ros/exit_limit.hpp"
 #include "coglab_rt/ros/logger_service.hpp"
+#include "lwr_fri_bridge/ros/bridge_ros.hpp"
 
 namespace {
 

@@ -37,9 +37,7 @@ constexpr Row kOutcomes[] = {
 
 }  // namespace
 
-std::uint16_t reasonCode(MotionBlock block) {
-  return static_cast<std::uint16_t>(codeOf(block));
-}
+std::uint16_t reasonCode(MotionBlock block) { return static_cast<std::uint16_t>(codeOf(block)); }
 
 std::uint16_t reasonCode(MotionBlock block, const CommandModeLoss& loss) {
   const bool lost = block == MotionBlock::Monitor || block == MotionBlock::NotStarted;

@@ -1,7 +1,7 @@
 #include "target_topic.hpp"
 
-#include "lwr_fri_bridge/bridge/diagnosis.hpp"
 #include "coglab_rt/ros/ros_time.hpp"
+#include "lwr_fri_bridge/bridge/diagnosis.hpp"
 
 namespace lwr_fri_bridge {
 

@@ -58,7 +58,7 @@ class TargetTopic {
   std::atomic<bool> closing_{false}, controller_active_{false};
   std::atomic<std::uint64_t> invalid_{0}, stamp_{0}, old_permission_{0}, active_{0}, second_{0},
       not_allowed_{0};
-  std::string publisher_;        // whose velocities were followed last
+  std::string publisher_;         // whose velocities were followed last
   std::int64_t followed_ns_ = 0;  // when; both only in the callback
 };
 

@@ -7,13 +7,13 @@
 namespace lwr_fri_bridge {
 namespace {
 
-constexpr double kFading = 1.0;        // s, time constant of what is remembered
-constexpr double kLateCycles = 3.0;    // lateness that may cost command mode
-constexpr double kLostPackets = 3.0;   // the same for packets lost on the way
-constexpr double kRestSpeed = 0.02;    // rad/s; the velocity filter's noise lies far below
-constexpr double kRestTime = 0.5;      // s at rest before the loss
-constexpr double kCalmTime = 0.1;      // s at rest before a restart
-constexpr double kMoved = 0.002;       // rad from where the arm stood
+constexpr double kFading = 1.0;       // s, time constant of what is remembered
+constexpr double kLateCycles = 3.0;   // lateness that may cost command mode
+constexpr double kLostPackets = 3.0;  // the same for packets lost on the way
+constexpr double kRestSpeed = 0.02;   // rad/s; the velocity filter's noise lies far below
+constexpr double kRestTime = 0.5;     // s at rest before the loss
+constexpr double kCalmTime = 0.1;     // s at rest before a restart
+constexpr double kMoved = 0.002;      // rad from where the arm stood
 constexpr std::int64_t kOften_ns = 60'000'000'000;  // no more than three restarts in that time
 
 }  // namespace

@@ -13,8 +13,8 @@
 #include <yaml-cpp/yaml.h>
 
 #include "coglab_controllers/manager/motion_cancel.hpp"
-#include "coglab_controllers/names.hpp"
 #include "coglab_controllers/manager/robot_setup.hpp"
+#include "coglab_controllers/names.hpp"
 #include "ctrl_more/control_states.hpp"
 
 namespace coglab_controllers {

@@ -15,7 +15,7 @@ namespace coglab_controllers {
 /// Immutable after load; shared by the cycle and the controllers.
 struct RobotSetup {
   Chain chain;                         ///< base link to tool link
-  coglab_rt::JointLimits limits;  ///< with the parameters of Table 6 applied
+  coglab_rt::JointLimits limits;       ///< with the parameters of Table 6 applied
   GuardParameters guard;               ///< limits of step 7
   Workspace workspace;                 ///< for goals
   Quaternion tool_from_wrench;         ///< orientation of the measured wrench's frame in the tool

@@ -6,8 +6,8 @@
 #include <tf2_ros/buffer.h>
 
 #include "coglab_controllers/manager/motion_controller.hpp"
-#include "coglab_rt/ros/ros_time.hpp"
 #include "coglab_controllers/ros/tf_listener.hpp"
+#include "coglab_rt/ros/ros_time.hpp"
 
 namespace coglab_controllers {
 

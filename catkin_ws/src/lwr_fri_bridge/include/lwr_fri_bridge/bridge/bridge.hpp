@@ -27,7 +27,8 @@ enum class VelocitySource : std::uint8_t {
   Topic           ///< sendTopicVelocity(), from target_joint_states
 };
 
-/// One thread at a time drives it by answer() or idle(); what else it offers says which thread may ask.
+/// One thread at a time drives it by answer() or idle(); what else it offers says which thread may
+/// ask.
 class Bridge {
  public:
   /// @throws std::invalid_argument if a parameter is out of range.

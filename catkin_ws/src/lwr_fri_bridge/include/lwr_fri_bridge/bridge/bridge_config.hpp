@@ -2,9 +2,9 @@
 /// Parameters of the bridge, with their ranges.
 #pragma once
 
-#include "lwr_fri_bridge/requests/configurator.hpp"
-#include "lwr_fri_bridge/names.hpp"
 #include "lwr_fri_bridge/motion/set_point_leash.hpp"
+#include "lwr_fri_bridge/names.hpp"
+#include "lwr_fri_bridge/requests/configurator.hpp"
 
 namespace lwr_fri_bridge {
 

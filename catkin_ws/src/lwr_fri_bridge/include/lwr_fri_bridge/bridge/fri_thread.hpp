@@ -72,8 +72,8 @@ class FriThread {
   Bridge& bridge_;
   FriThreadOptions options_;
   int socket_ = -1;
-  std::uint32_t controller_ = 0;  // controller_address, 0: any
-  std::uint32_t local_ = 0;       // address bound
+  std::uint32_t controller_ = 0;      // controller_address, 0: any
+  std::uint32_t local_ = 0;           // address bound
   std::int64_t last_receive_ns_ = 0;  // FRI thread
   int bound_port_ = 0;
   BoundedThread thread_;

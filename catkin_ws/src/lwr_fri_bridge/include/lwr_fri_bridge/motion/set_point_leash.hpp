@@ -3,8 +3,8 @@
 /// leap when letting go.
 #pragma once
 
-#include "lwr_fri_bridge/requests/events.hpp"
 #include "lwr_fri_bridge/names.hpp"
+#include "lwr_fri_bridge/requests/events.hpp"
 
 namespace lwr_fri_bridge {
 
@@ -51,7 +51,7 @@ class SetPointLeash {
   int joint_ = -1;
   bool measured_once_ = false;
   Vector7 measured_ = Vector7::Zero();  // of the tick before
-  Vector7 home_ = Vector7::Zero();  // measured positions at the trip, the nearer of two
+  Vector7 home_ = Vector7::Zero();      // measured positions at the trip, the nearer of two
   Vector7 direction_ =
       Vector7::Zero();  // sign of commanded - measured of the joints that must return, else 0
 };

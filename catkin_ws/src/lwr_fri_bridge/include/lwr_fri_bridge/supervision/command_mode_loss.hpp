@@ -15,22 +15,22 @@
 namespace lwr_fri_bridge {
 
 enum class LossCause : std::uint8_t {
-  None,              ///< command mode was not lost since the last start
-  ComputerLate,      ///< the FRI thread of this computer was not run in time
-  ControllerStalled, ///< silence of a controller that runs on this computer itself
-  ControllerSilent,  ///< silence of a controller elsewhere
-  PacketsLost,       ///< datagrams got lost on the way
-  PowerLost,         ///< not all drives have power
-  BeganAnew,         ///< the controller's counter began anew
-  LeftByController   ///< none of these: the controller has its own reason
+  None,               ///< command mode was not lost since the last start
+  ComputerLate,       ///< the FRI thread of this computer was not run in time
+  ControllerStalled,  ///< silence of a controller that runs on this computer itself
+  ControllerSilent,   ///< silence of a controller elsewhere
+  PacketsLost,        ///< datagrams got lost on the way
+  PowerLost,          ///< not all drives have power
+  BeganAnew,          ///< the controller's counter began anew
+  LeftByController    ///< none of these: the controller has its own reason
 };
 
 /// One loss of command mode.
 struct CommandModeLoss {
   LossCause cause = LossCause::None;
-  double seconds = 0.0;       ///< how late, or how long silent
-  bool at_rest = false;       ///< the arm had stood still for some time, commanded and measured
-  float timestamp = 0.0F;     ///< the controller's clock then, s
+  double seconds = 0.0;    ///< how late, or how long silent
+  bool at_rest = false;    ///< the arm had stood still for some time, commanded and measured
+  float timestamp = 0.0F;  ///< the controller's clock then, s
   Vector7 position = Vector7::Zero();  ///< measured then, rad
 
   /// This computer caused it by running a program too late.
@@ -84,10 +84,10 @@ class QuietRestart {
   /// What is seen now.
   struct View {
     CommandModeLoss loss;
-    bool stopped = false;       ///< supervisor: stopped
-    bool held = false;          ///< hold is latched
-    bool may_command = false;   ///< quality is OK or better, no drive error
-    float timestamp = 0.0F;     ///< the controller's clock, s
+    bool stopped = false;      ///< supervisor: stopped
+    bool held = false;         ///< hold is latched
+    bool may_command = false;  ///< quality is OK or better, no drive error
+    float timestamp = 0.0F;    ///< the controller's clock, s
     Vector7 position = Vector7::Zero(), velocity = Vector7::Zero();  ///< measured
   };
   /// One look. True: ask for a start now.
@@ -95,8 +95,8 @@ class QuietRestart {
 
  private:
   bool mayRestart(const View& view) const;
-  CommandModeLoss judged_;           // the loss that was decided about last
-  std::int64_t calm_since_ns_ = 0;   // 0: not calm
+  CommandModeLoss judged_;                     // the loss that was decided about last
+  std::int64_t calm_since_ns_ = 0;             // 0: not calm
   std::array<std::int64_t, 3> restarts_ns_{};  // the last ones, oldest first; 0: none
 };
 
