@@ -1,5 +1,5 @@
-"""Who knows the arm: manager and control thread know coglab_rt alone, robot_node alone knows the back end by FRI, the ideal
-arm knows nothing of the controllers."""
+"""Who knows the arm: manager and control thread know coglab_rt alone, robot_node alone knows the back end by FRI,
+the ideal arm knows nothing of the controllers."""
 
 from __future__ import annotations
 
