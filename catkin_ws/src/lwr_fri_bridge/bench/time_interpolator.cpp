@@ -104,8 +104,8 @@ AxisState randomState(const JointLimits& limits, int i) {
   for (;;) {
     const AxisState s{limits.upper_position[i] * part(), limits.velocity[i] * part(),
                       limits.acceleration[i] * part()};
-    const BrakingReach reach =
-        brakingReach(s.velocity, s.acceleration, limits.acceleration[i], limits.jerk[i]);
+    const coglab_rt::BrakingReach reach =
+        coglab_rt::brakingReach(s.velocity, s.acceleration, limits.acceleration[i], limits.jerk[i]);
     const double peak =
         s.velocity + s.acceleration * std::abs(s.acceleration) / (2.0 * limits.jerk[i]);
     if (std::abs(peak) <= limits.velocity[i] &&
