@@ -2,12 +2,28 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstddef>
+#include <cstdlib>
 #include <random>
 #include <stdexcept>
 #include <string>
 
 #include "coglab_controllers/ideal/ideal_arm.hpp"
 #include "coglab_rt/joint_limits_table.hpp"
+
+namespace {
+thread_local bool counting = false;
+std::size_t allocations = 0;
+}  // namespace
+
+// The C library's allocator with a counter in front.
+extern "C" {
+void* __libc_malloc(std::size_t);
+void* malloc(std::size_t size) {
+  if (counting) ++allocations;
+  return __libc_malloc(size);
+}
+}
 
 namespace coglab_controllers {
 namespace {
@@ -129,7 +145,7 @@ TEST(IdealArm, brakesWhenCommandsEndAndIgnoresWhatIsNotFinite) {
   arm.send(Vector7::Constant(std::nan("")));
   arm.tick();
   EXPECT_TRUE(arm.sample.velocity.isApprox(Vector7::Constant(0.3)));
-  for (int i = 0; i < 9; ++i) arm.tick();
+  for (int i = 0; i < 7; ++i) arm.tick();
   EXPECT_TRUE(arm.sample.velocity.isApprox(Vector7::Constant(0.3)));
   for (int i = 0; i < 100; ++i) arm.tick();
   EXPECT_TRUE(arm.arm.stands());
@@ -186,6 +202,23 @@ TEST(IdealArm, limitsHoldByDifferentiation) {
     }
     EXPECT_GT(at_end, 100) << "the ends of the ranges were not reached";
   }
+}
+
+TEST(IdealArm, aTickAllocatesNothing) {
+  Arm arm;
+  counting = true;
+  delete new int(3);
+  counting = false;
+  EXPECT_EQ(allocations, 1U) << "the counter does not count";
+  allocations = 0;
+  arm.ask("start");
+  for (int i = 0; i < 2000; ++i) {
+    if (i == 1000) ASSERT_TRUE(arm.arm.request("hold").success);
+    counting = true;
+    arm.drive(1, Vector7::Constant(i % 200 < 100 ? 1.0 : -1.0));
+    counting = false;
+  }
+  EXPECT_EQ(allocations, 0U);
 }
 
 TEST(IdealArm, refusesWhatItCannotDoAndParametersOutOfRange) {
