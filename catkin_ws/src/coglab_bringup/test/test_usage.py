@@ -34,6 +34,8 @@ REFUSED = {
     "launch people:=0": "expected a whole number from 1 to 9",
     "launch krl_convention:=x": "there are: coglab, centro_epiaggio, stanford, rcprg_tum, rtt_lwr",
     "launch limits_profile:=x": "there are: default, t1",
+    "launch arm:=steel": "there is no 'steel'; there are: fri, ideal",
+    "launch arm:=ideal split:=true": "the ideal arm and its controllers are one process",
     "launch sim:=maybe": "there are: true, false",
     "launch seed:=-1": "expected a whole number",
     "launch log_file:=/no/such/x": "expected a file in a folder that exists",

@@ -6,6 +6,7 @@
 #include <thread>
 
 #include "coglab_controllers/manager/control_thread.hpp"
+#include "coglab_rt/joint_limits_table.hpp"
 #include "virtual_robot.hpp"
 
 namespace coglab_controllers {
@@ -33,11 +34,10 @@ int finish(VirtualRobot& robot, const CancelOrder& order, CancelAnswer& answer, 
 int brakingCycles(const VirtualRobot& robot) {
   double longest = 0.0;
   for (int joint = 0; joint < kMaxJoints; ++joint) {
-    const lwr_fri_bridge::AxisState axis = robot.interpolator->axis(joint);
+    const coglab_rt::AxisState axis = robot.interpolator->axis(joint);
     longest = std::max(
-        longest, lwr_fri_bridge::planVelocity(axis.velocity, axis.acceleration, 0.0,
-                                              robot.limits.acceleration[joint],
-                                              robot.limits.jerk[joint])
+        longest, coglab_rt::planVelocity(axis.velocity, axis.acceleration, 0.0,
+                                         robot.limits.acceleration[joint], robot.limits.jerk[joint])
                      .totalTime());
   }
   return static_cast<int>(std::ceil(longest / robot.period - 1e-9));
@@ -173,7 +173,7 @@ TEST(Cancel, WorksWhileTheArmMayNotMoveAndNamesAControllerThatMovesItInstead) {
   EXPECT_FALSE(answer.success);
   EXPECT_EQ(answer.code, ReasonCode::NotActive);
   EXPECT_EQ(robot.state(), MotionState::Running);
-  robot.sample.block = lwr_fri_bridge::MotionBlock::Held;
+  robot.sample.block = coglab_rt::MotionBlock::Held;
   ++robot.sample.motion_epoch;
   for (int i = 0; i < 5; ++i) robot.tick();
   EXPECT_EQ(robot.manager->report().reason.code(), ReasonCode::Held);
@@ -228,9 +228,9 @@ TEST(Cancel, AnytimeItStandsWithinTheBrakingTimeAndNothingMovesAfterwards) {
 }
 
 TEST(Cancel, OnTheRealClockAnswersWhenTheArmStandsOrAtItsTimeLimit) {
-  lwr_fri_bridge::ControlPort port;
-  const lwr_fri_bridge::JointLimits limits =
-      lwr_fri_bridge::loadJointLimits(std::string(DESCRIPTION_DIR) + "/config/joint_limits.yaml");
+  coglab_rt::ArmMailboxes mailboxes;
+  const coglab_rt::JointLimits limits =
+      coglab_rt::loadJointLimits(std::string(DESCRIPTION_DIR) + "/config/joint_limits.yaml");
   ctrl_more::Logger logger;
   ManagerSettings settings = readManagerSettings(
       YAML::Node(), readText(std::string(DESCRIPTION_DIR) + "/urdf/lwr_ih2.urdf"), limits, false);
@@ -241,24 +241,24 @@ TEST(Cancel, OnTheRealClockAnswersWhenTheArmStandsOrAtItsTimeLimit) {
   ControllerManager manager(std::move(settings));
   ControlThreadOptions options;
   options.priority = 0;
-  ControlThread thread(manager.cycle(), port, options);
+  ControlThread thread(manager.cycle(), mailboxes, options);
   thread.start();
   std::string type;
   ASSERT_TRUE(VirtualRobot::ok(manager.load("ptp", "coglab/PtpController")));
   ASSERT_TRUE(VirtualRobot::ok(manager.switchTo("ptp", type)));
   std::atomic<bool> stop{false}, blind{false};
   std::thread robot([&] {
-    lwr_fri_bridge::Interpolator interpolator(limits);
+    coglab_rt::Interpolator interpolator(limits);
     RobotSample sample;
     sample.position << -1.4349, -0.6086, 1.4986, 1.7048, 0.1857, 0.2152, 0.782;
     interpolator.reset(sample.position);
     sample.cycle_time = 0.005;
-    sample.block = lwr_fri_bridge::MotionBlock::None;
+    sample.block = coglab_rt::MotionBlock::None;
     VelocityCommand command;
     while (!stop) {
       std::this_thread::sleep_for(std::chrono::milliseconds(5));
       if (blind) continue;
-      port.takeVelocity(command);
+      mailboxes.takeVelocity(command);
       interpolator.step(command.velocity, 0.005);
       sample.position = sample.commanded_position = interpolator.position();
       sample.velocity = sample.commanded_velocity = interpolator.velocity();
@@ -266,7 +266,7 @@ TEST(Cancel, OnTheRealClockAnswersWhenTheArmStandsOrAtItsTimeLimit) {
       ++sample.sequence;
       sample.stamp_ns = manager.now_ns();
       sample.controller_ns += 5'000'000;
-      port.publishSample(sample);
+      mailboxes.publishSample(sample);
       thread.wake(true);
     }
   });

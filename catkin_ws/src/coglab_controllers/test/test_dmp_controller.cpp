@@ -307,13 +307,13 @@ TEST(DmpController, RobotThatStopsAbortsTheMotionAndRefusesNewOnes) {
   robot.see("human_hand", kGoal);
   ASSERT_TRUE(VirtualRobot::ok(robot.dmp().execute(robot.reach())));
   for (int i = 0; i < 40; ++i) robot.tick();
-  robot.sample.block = lwr_fri_bridge::MotionBlock::Held;
+  robot.sample.block = coglab_rt::MotionBlock::Held;
   ++robot.sample.motion_epoch;
   robot.tick();
   EXPECT_EQ(robot.state(), MotionState::Aborted);
   robot.see("human_hand", kGoal);
   EXPECT_TRUE(refused(robot.dmp().execute(robot.reach()), {"reset"}));
-  robot.sample.block = lwr_fri_bridge::MotionBlock::None;
+  robot.sample.block = coglab_rt::MotionBlock::None;
   for (int i = 0; i < 10; ++i) {
     robot.tick();
     EXPECT_EQ(robot.command.velocity, JointVector::Zero().eval());

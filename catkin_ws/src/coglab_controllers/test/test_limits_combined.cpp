@@ -2,7 +2,7 @@
 // joints' ranges keep to their path, arrive, and come to no fault.
 #include <random>
 
-#include "lwr_fri_bridge/braking.hpp"
+#include "coglab_rt/braking.hpp"
 #include "virtual_robot.hpp"
 
 namespace coglab_controllers {
@@ -24,7 +24,6 @@ class DelayedRobot : public VirtualRobot {
     now_ns += 5'000'000;
     ++sample.sequence;
     sample.stamp_ns = now_ns;
-    sample.cycle_time = period;
     if (active_dmp) dmp().pollGoal();
     manager->cycle().run(sample, period, command);
     JointVector velocity = command.velocity;
@@ -48,7 +47,7 @@ class DelayedRobot : public VirtualRobot {
   double least_room = 1.0;  // rad between set-point and the nearest end of a range
 
  private:
-  lwr_fri_bridge::BrakingGuard bound_;
+  coglab_rt::BrakingGuard bound_;
   JointVector arm_ = JointVector::Zero(), last_ = JointVector::Zero();
   std::mt19937 random_{5};
   std::normal_distribution<double> noise_{0.0, 5e-5};

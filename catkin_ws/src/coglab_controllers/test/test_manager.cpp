@@ -4,6 +4,7 @@
 #include <thread>
 
 #include "coglab_controllers/manager/control_thread.hpp"
+#include "coglab_rt/joint_limits_table.hpp"
 #include "virtual_robot.hpp"
 
 namespace coglab_controllers {
@@ -162,9 +163,9 @@ TEST(Manager, BlockedJointAbortsNamingIt) {
 }
 
 TEST(Manager, ControlThreadIdlesWithoutARobotAndSurvivesAStall) {
-  lwr_fri_bridge::ControlPort port;
-  const lwr_fri_bridge::JointLimits limits =
-      lwr_fri_bridge::loadJointLimits(std::string(DESCRIPTION_DIR) + "/config/joint_limits.yaml");
+  coglab_rt::ArmMailboxes mailboxes;
+  const coglab_rt::JointLimits limits =
+      coglab_rt::loadJointLimits(std::string(DESCRIPTION_DIR) + "/config/joint_limits.yaml");
   ctrl_more::Logger logger;
   ManagerSettings settings = readManagerSettings(
       YAML::Load("{odd: {fault: stall, after: 0}, plan_timeout: 0.3, " + kTypes + "}"),
@@ -173,7 +174,7 @@ TEST(Manager, ControlThreadIdlesWithoutARobotAndSurvivesAStall) {
   ControllerManager manager(std::move(settings));
   ControlThreadOptions options;
   options.priority = 0;
-  ControlThread thread(manager.cycle(), port, options);
+  ControlThread thread(manager.cycle(), mailboxes, options);
   thread.start();
   std::string type;
   EXPECT_TRUE(VirtualRobot::ok(manager.load("ptp", "coglab/PtpController")));  // no robot yet
@@ -189,12 +190,12 @@ TEST(Manager, ControlThreadIdlesWithoutARobotAndSurvivesAStall) {
     sample.position << -1.4349, -0.6086, 1.4986, 1.7048, 0.1857, 0.2152, 0.782;
     sample.commanded_position = sample.position;
     sample.cycle_time = 0.005;
-    sample.block = lwr_fri_bridge::MotionBlock::None;
+    sample.block = coglab_rt::MotionBlock::None;
     while (!stop) {
       ++sample.sequence;
       sample.controller_ns += 5'000'000;
       sample.stamp_ns = manager.now_ns();
-      port.publishSample(sample);
+      mailboxes.publishSample(sample);
       thread.wake(true);
       std::this_thread::sleep_for(std::chrono::milliseconds(5));
     }
@@ -239,8 +240,8 @@ class Probe : public ctrl_more::FeedbackController {
 };
 
 TEST(Manager, MotionAndItsFeedbackProfileBeginInTheSameCycle) {
-  const lwr_fri_bridge::JointLimits limits =
-      lwr_fri_bridge::loadJointLimits(std::string(DESCRIPTION_DIR) + "/config/joint_limits.yaml");
+  const coglab_rt::JointLimits limits =
+      coglab_rt::loadJointLimits(std::string(DESCRIPTION_DIR) + "/config/joint_limits.yaml");
   ctrl_more::Logger logger;
   ManagerSettings settings = readManagerSettings(
       YAML::Load("{" + kTypes + "}"), readText(std::string(DESCRIPTION_DIR) + "/urdf/lwr_ih2.urdf"),

@@ -134,7 +134,7 @@ void during(VirtualRobot& robot, Request&& request) {
 }
 
 TEST(PtpController, AMotionThatRacesAHoldIsNeitherReportedAsExecutedNorMadeAfterReset) {
-  using lwr_fri_bridge::MotionBlock;
+  using coglab_rt::MotionBlock;
   for (const bool split : {false, true}) {
     VirtualRobot robot("", 0.005, false);
     during(robot, [&] { robot.loadBoth("ptp"); });

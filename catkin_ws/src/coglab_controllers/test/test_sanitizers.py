@@ -20,9 +20,7 @@ def sources() -> list[Path]:
     """The cores of manager and plug-ins with what they stand on; no ROS."""
     own = [p for p in sorted((PACKAGE / "src").rglob("*.cpp"))
            if p.parent.name not in ("ros", "python") and not p.stem.endswith("_ros")]
-    bridge = [SOURCES / "lwr_fri_bridge" / "src" / name for name in ("joint_limits.cpp", "real_time.cpp",
-                                                                     "events.cpp", "supervisor.cpp")]
-    return own + sorted((SOURCES / "ctrl_more" / "src").glob("*.cpp")) + bridge
+    return own + sorted((SOURCES / "ctrl_more" / "src").glob("*.cpp"))
 
 
 def compiled(command: list[str]) -> None:
@@ -48,7 +46,7 @@ def run(command: list[str], limit: float) -> None:
 def test_requests_against_the_control_thread_and_exceptions_of_plugins(sanitizer: str, tmp_path: Path) -> None:
     seconds = os.environ.get("COGLAB_SANITIZER_SECONDS", "60")
     objects = []
-    includes = [f"-I{SOURCES / name / 'include'}" for name in ("coglab_controllers", "ctrl_more", "lwr_fri_bridge")]
+    includes = [f"-I{SOURCES / name / 'include'}" for name in ("coglab_controllers", "coglab_rt", "ctrl_more")]
     includes += [f"-I{SOURCES / 'ctrl_more' / 'src'}", *(f"-isystem/usr/include/{folder}" for folder in FOLDERS)]
     loaders = sorted(map(str, Path("/usr/lib").glob("*/libclass_loader.so*")))
     assert loaders, "libclass-loader-dev is not installed"

@@ -15,7 +15,9 @@
 #include "coglab_controllers/manager/controller_manager.hpp"
 #include "coglab_controllers/plugins/dmp_controller.hpp"
 #include "coglab_controllers/plugins/ptp_controller.hpp"
-#include "lwr_fri_bridge/interpolator.hpp"
+#include "coglab_rt/braking.hpp"
+#include "coglab_rt/interpolator.hpp"
+#include "coglab_rt/joint_limits_table.hpp"
 
 namespace coglab_controllers {
 
@@ -57,8 +59,7 @@ class VirtualRobot {
   explicit VirtualRobot(const std::string& parameters = "", double period = 0.005,
                         bool lockstep = true)
       : period(period) {
-    limits =
-        lwr_fri_bridge::loadJointLimits(std::string(DESCRIPTION_DIR) + "/config/joint_limits.yaml");
+    limits = coglab_rt::loadJointLimits(std::string(DESCRIPTION_DIR) + "/config/joint_limits.yaml");
     ManagerSettings settings = readManagerSettings(
         YAML::Load(parameters), readText(std::string(DESCRIPTION_DIR) + "/urdf/lwr_ih2.urdf"),
         limits, lockstep);
@@ -69,14 +70,16 @@ class VirtualRobot {
     manager = std::make_unique<ControllerManager>(std::move(settings));
     sample.position << -1.4349, -0.6086, 1.4986, 1.7048, 0.1857, 0.2152, 0.782;
     sample.commanded_position = sample.position;
-    sample.block = lwr_fri_bridge::MotionBlock::None;
+    sample.block = MotionBlock::None;
     sample.cycle_time = period;
+    sample.stop_delay = coglab_rt::lostTime(period);  // as the bridge has it
+    sample.stop_rounding = 2.0 * coglab_rt::kWireRounding;
     tick();
   }
 
   /// From now on the arm follows within its acceleration and jerk limits, as the bridge has it.
   void followWithinLimits() {
-    interpolator = std::make_unique<lwr_fri_bridge::Interpolator>(limits);
+    interpolator = std::make_unique<coglab_rt::Interpolator>(limits);
     interpolator->reset(sample.position);
   }
 
@@ -123,7 +126,7 @@ class VirtualRobot {
       static_cast<DmpController*>(motion)->pollGoal();
     }
     manager->cycle().run(sample, period, command);
-    if (sample.block != lwr_fri_bridge::MotionBlock::None) command.velocity.setZero();
+    if (sample.block != MotionBlock::None) command.velocity.setZero();
     if (interpolator) {
       interpolator->step(command.velocity, period);
       sample.position = interpolator->position();
@@ -157,11 +160,11 @@ class VirtualRobot {
 
   double period;
   std::int64_t now_ns = 1'000'000'000;
-  lwr_fri_bridge::JointLimits limits;
+  coglab_rt::JointLimits limits;
   FrameTable frames;
   ctrl_more::Logger logger;  // without sinks
   std::unique_ptr<ControllerManager> manager;
-  std::unique_ptr<lwr_fri_bridge::Interpolator> interpolator;  // null: velocities count at once
+  std::unique_ptr<coglab_rt::Interpolator> interpolator;  // null: velocities count at once
   RobotSample sample;
   VelocityCommand command;
 };

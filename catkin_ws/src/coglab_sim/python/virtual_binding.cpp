@@ -74,8 +74,8 @@ py::dict reportOf(Robot& robot) {
   result["fault"] = report.fault;
   result["time_scale"] = report.time_scale;
   result["velocity"] = Vector7(report.velocity);
-  result["motion_allowed"] = sample.block == lwr_fri_bridge::MotionBlock::None;
-  result["blocked_by"] = std::string(lwr_fri_bridge::describe(sample.block));
+  result["motion_allowed"] = sample.block == coglab_rt::MotionBlock::None;
+  result["blocked_by"] = std::string(coglab_rt::describe(sample.block));
   result["position"] = Vector7(sample.position);
   result["measured_velocity"] = Vector7(sample.velocity);
   result["commanded_position"] = Vector7(sample.commanded_position);

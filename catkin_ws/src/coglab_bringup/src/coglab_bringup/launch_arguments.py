@@ -96,6 +96,7 @@ def _rules(sources: Path) -> dict[str, Callable[[str], object]]:
     """What each argument takes; a name that is missing here takes any text."""
     boolean = ["true", "false"]
     rules: dict[str, Callable[[str], object]] = {
+        "arm": lambda value: _one_of(["fri", "ideal"], value),
         "seed": seed,
         "fri_period": lambda value: _number(0.001, 0.1, value),
         "fri_address": _address,
@@ -136,6 +137,8 @@ def judge_launch(top: Path, words: list[str]) -> None:
         rows = [f"  {name + ':=' + default:45} {meaning}" for name, (default, meaning) in known.items()]
         print(HELP + "\n".join(rows))
         raise SystemExit(0)
+    if {"arm:=ideal", "split:=true"} <= {word.lower() for word in words}:
+        raise Refused("the ideal arm and its controllers are one process: leave out split:=true or arm:=ideal")
     rules = _rules(sources)
     for word in split_port(words)[1]:
         name, equals, value = word.partition(":=")

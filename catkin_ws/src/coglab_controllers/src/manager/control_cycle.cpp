@@ -1,21 +1,12 @@
 #include "coglab_controllers/manager/control_cycle.hpp"
 
 #include <algorithm>
-#include <chrono>
 #include <exception>
 #include <utility>
-
-#include "lwr_fri_bridge/braking.hpp"
 
 namespace coglab_controllers {
 
 namespace {
-
-std::int64_t steadyNow() {
-  return std::chrono::duration_cast<std::chrono::nanoseconds>(
-             std::chrono::steady_clock::now().time_since_epoch())
-      .count();
-}
 
 bool moving(MotionState state) {
   return state == MotionState::Running || state == MotionState::Holding;
@@ -181,8 +172,7 @@ void ControlCycle::watchRobot() noexcept {
   const bool again = input_.motion_allowed;
   abortMotion(Reason(again ? ReasonCode::NotInCommandMode : codeOf(sample.block),
                      "the robot stopped the motion: ")
-              << (again ? "it left command mode for a moment"
-                        : lwr_fri_bridge::describe(sample.block)));
+              << (again ? "it left command mode for a moment" : coglab_rt::describe(sample.block)));
 }
 
 void ControlCycle::watchGuard(double dt) noexcept {
@@ -251,7 +241,7 @@ void ControlCycle::run(const RobotSample& sample, double dt, VelocityCommand& ou
     // The velocity of this cycle acts until its end: the Jacobian of its middle leads there.
     robot_->chain.evaluate(sample.position, sample.commanded_velocity, dt, input_.chain);
   }
-  input_.motion_allowed = fine && sample.block == lwr_fri_bridge::MotionBlock::None;
+  input_.motion_allowed = fine && sample.block == MotionBlock::None;
   input_.time_scale =
       governor_.update(fine ? dt : settings_.cycle_time, speedScale(), limit_scale_);
   feedback_.begin(sample.stamp_ns, input_.dt);
@@ -265,8 +255,7 @@ void ControlCycle::run(const RobotSample& sample, double dt, VelocityCommand& ou
   adopt();
   if (fine) {
     compute(velocity);
-    guard_.setInterfaceReserve(lwr_fri_bridge::lostTime(sample.cycle_time),
-                               2.0 * lwr_fri_bridge::kWireRounding);
+    guard_.setInterfaceReserve(sample.stop_delay, sample.stop_rounding);
     guard_.limit(input_.chain, furthest(sample, velocity), velocity, dt, report_.guard);
     watchGuard(dt);
     ++numbers_;
@@ -337,7 +326,7 @@ void ControlCycle::publish(std::int64_t begin_ns) noexcept {
     report_.reason = motion_->reason();
   } else if (numbers_ == 0) {
     report_.reason = Reason(ReasonCode::StaleJointState, "no joint state from the robot yet");
-  } else if (input_.robot.block != lwr_fri_bridge::MotionBlock::None) {
+  } else if (input_.robot.block != MotionBlock::None) {
     report_.reason = Reason(codeOf(input_.robot.block), describe(input_.robot.block));
   }
   if (begin_ns != 0) {

@@ -27,7 +27,7 @@ bool validId(const std::string& id) {
 }  // namespace
 
 ManagerSettings readManagerSettings(const YAML::Node& node, const std::string& urdf,
-                                    const lwr_fri_bridge::JointLimits& table, bool lockstep) {
+                                    const coglab_rt::JointLimits& table, bool lockstep) {
   const Parameters parameters(node, "controller_manager");
   ManagerSettings settings;
   settings.parameters = node;
@@ -79,9 +79,7 @@ ControllerManager::~ControllerManager() = default;
 
 std::int64_t ControllerManager::now_ns() const {
   if (settings_.clock) return settings_.clock();
-  return std::chrono::duration_cast<std::chrono::nanoseconds>(
-             std::chrono::steady_clock::now().time_since_epoch())
-      .count();
+  return steadyNow();
 }
 
 std::function<void()> ControllerManager::cycleWait() const {

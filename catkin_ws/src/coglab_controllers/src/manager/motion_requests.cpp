@@ -38,10 +38,10 @@ Answer ControllerManager::motionWelcome(const std::string& controller_id,
                            "the newest joint state is " + std::to_string(age) + " s old; allowed: " +
                                std::to_string(settings_.cycle.sample_timeout) + " s");
   }
-  if (now.robot.block != lwr_fri_bridge::MotionBlock::None) {
+  if (now.robot.block != MotionBlock::None) {
     return Answer::refusal(codeOf(now.robot.block),
                            std::string("the robot follows no motion now: ") +
-                               lwr_fri_bridge::describe(now.robot.block) +
+                               coglab_rt::describe(now.robot.block) +
                                "; see lwr/state, then use lwr/command (reset, start)");
   }
   return {};

@@ -59,7 +59,7 @@ void PtpController::configure(const MotionSetup& setup) {
 }
 
 Answer PtpController::readMotion(const PtpRequest& request, Motion& motion) const {
-  const lwr_fri_bridge::JointLimits& limits = setup_.robot->limits;
+  const coglab_rt::JointLimits& limits = setup_.robot->limits;
   const std::vector<std::string>& names = setup_.robot->chain.jointNames();
   // The guard lets nothing beyond its margin; a target on that border would be reached only where no
   // noise of measurement crosses it.

@@ -10,7 +10,7 @@
 #include "coglab_controllers/ros/ros_parameters.hpp"
 #include "coglab_controllers/ros/tf_goal_source.hpp"
 #include "coglab_msgs/DmpGoal.h"
-#include "lwr_fri_bridge/logger_service.hpp"
+#include "coglab_rt/ros/logger_service.hpp"
 
 namespace coglab_controllers {
 
@@ -99,7 +99,7 @@ class GoalHelper {
 int main(int argc, char** argv) {
   ros::init(argc, argv, "goal_helper");
   try {
-    lwr_fri_bridge::LoggerServices logger_services;
+    coglab_rt::LoggerServices logger_services;
     coglab_controllers::GoalHelper(ros::NodeHandle(), ros::NodeHandle("~")).run();
   } catch (const std::exception& error) {
     ROS_FATAL("%s", error.what());

@@ -28,7 +28,7 @@ void guarded(const char* what, const Function& function) {
 }
 }  // namespace
 
-ManagerRos::ManagerRos(const ros::NodeHandle& node, lwr_fri_bridge::ControlPort& port,
+ManagerRos::ManagerRos(const ros::NodeHandle& node, coglab_rt::ArmMailboxes& mailboxes,
                        Options options)
     : node_(node),
       options_(std::move(options)),
@@ -50,7 +50,7 @@ ManagerRos::ManagerRos(const ros::NodeHandle& node, lwr_fri_bridge::ControlPort&
   for (const std::string& error : manager_->feedbackErrors()) {
     ROS_ERROR("feedback controllers: %s", error.c_str());
   }
-  thread_ = std::make_unique<ControlThread>(manager_->cycle(), port, options_.thread);
+  thread_ = std::make_unique<ControlThread>(manager_->cycle(), mailboxes, options_.thread);
   tf_ = std::make_unique<tf2_ros::Buffer>(ros::Duration(10.0));
   tf_listener_ = std::make_unique<TfListener>(*tf_);
   target_message_.name = manager_->settings().robot->chain.jointNames();

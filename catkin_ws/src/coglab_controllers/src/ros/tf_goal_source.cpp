@@ -19,9 +19,10 @@ bool TfGoalSource::lookup(const std::string& reference, const std::string& frame
   const auto& q = transform.transform.rotation;
   observation.position = Vector3(t.x, t.y, t.z);
   observation.orientation = Quaternion(q.w, q.x, q.y, q.z);
-  observation.frame_ns = nanoseconds(transform.header.stamp);
-  observation.stamp_ns =
-      observation.frame_ns == 0 ? steady_() : toSteady(transform.header.stamp, steady_());
+  observation.frame_ns = coglab_rt::nanoseconds(transform.header.stamp);
+  observation.stamp_ns = observation.frame_ns == 0
+                             ? steady_()
+                             : coglab_rt::toSteady(transform.header.stamp, steady_());
   return true;
 }
 

@@ -41,7 +41,7 @@ struct ManagerSettings {
 /// of this package are known), `plugin_paths`, `feedback_file`, and those of makeRobotSetup().
 /// @throws std::runtime_error naming the parameter
 ManagerSettings readManagerSettings(const YAML::Node& parameters, const std::string& urdf,
-                                    const lwr_fri_bridge::JointLimits& table, bool lockstep);
+                                    const coglab_rt::JointLimits& table, bool lockstep);
 
 /// One motion controller that is loaded.
 struct LoadedMotion {

@@ -8,7 +8,7 @@
 #include <mutex>
 #include <string>
 
-#include "coglab_controllers/manager/reason.hpp"
+#include "coglab_controllers/names.hpp"
 
 namespace coglab_controllers {
 
@@ -63,7 +63,7 @@ class MotionCancel {
   };
 
   std::mutex asking_;
-  lwr_fri_bridge::TripleBuffer<Order> orders_;
+  coglab_rt::TripleBuffer<Order> orders_;
   std::atomic<std::uint64_t> newest_{0}, served_{0}, ended_{0};
   std::uint64_t taken_ = 0;  // control thread
 };

@@ -11,9 +11,8 @@
 #include "coglab_controllers/dmp/cartesian_motion.hpp"
 #include "coglab_controllers/dmp/library.hpp"
 #include "coglab_controllers/ik/two_task_ik.hpp"
-#include "coglab_controllers/manager/event_ring.hpp"
 #include "coglab_controllers/manager/motion_controller.hpp"
-#include "coglab_controllers/manager/plan_exchange.hpp"
+#include "coglab_controllers/names.hpp"
 #include "coglab_controllers/plugins/goal_gate.hpp"
 #include "coglab_controllers/plugins/goal_source.hpp"
 #include "coglab_controllers/plugins/hold.hpp"
@@ -179,7 +178,7 @@ class DmpController : public MotionController {
   GoalObservation topic_goal_;  // newest dmp_goal
   bool topic_goal_known_ = false;
   std::atomic<double> ahead_{0.0};  // s, of the newest goal if it was refused for that
-  lwr_fri_bridge::TripleBuffer<GoalObservation> goals_;
+  coglab_rt::TripleBuffer<GoalObservation> goals_;
 
   // control thread
   MotionState state_ = MotionState::Idle;
@@ -188,7 +187,7 @@ class DmpController : public MotionController {
   Hold hold_;
   bool resting_ = true;
   double since_end_ = 0.0;
-  lwr_fri_bridge::TripleBuffer<DmpProgress> progress_;
+  coglab_rt::TripleBuffer<DmpProgress> progress_;
   EventRing<IkDebugRecord, 256> debug_;
 };
 

@@ -9,9 +9,8 @@
 #include <vector>
 
 #include "coglab_controllers/ik/two_task_ik.hpp"
-#include "coglab_controllers/manager/event_ring.hpp"
 #include "coglab_controllers/manager/motion_controller.hpp"
-#include "coglab_controllers/manager/plan_exchange.hpp"
+#include "coglab_controllers/names.hpp"
 #include "coglab_controllers/plugins/hold.hpp"
 #include "coglab_controllers/ptp/ptp_trajectory.hpp"
 

@@ -32,8 +32,8 @@
 
 namespace coglab_controllers {
 
-/// Owns the manager and its control thread; the robot is behind a ControlPort, in this process or
-/// behind topics.
+/// Owns the manager and its control thread; the robot is behind mailboxes, whose
+/// other side is an arm in this process or topics.
 class ManagerRos {
  public:
   struct Options {
@@ -49,7 +49,7 @@ class ManagerRos {
 
   /// Reads parameters below `node` (…/controller_manager). @throws std::exception naming what is
   /// wrong
-  ManagerRos(const ros::NodeHandle& node, lwr_fri_bridge::ControlPort& port, Options options);
+  ManagerRos(const ros::NodeHandle& node, coglab_rt::ArmMailboxes& mailboxes, Options options);
   ~ManagerRos();
   ManagerRos(const ManagerRos&) = delete;
   ManagerRos& operator=(const ManagerRos&) = delete;

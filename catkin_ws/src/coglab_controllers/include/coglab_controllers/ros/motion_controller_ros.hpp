@@ -6,10 +6,15 @@
 #include <tf2_ros/buffer.h>
 
 #include "coglab_controllers/manager/motion_controller.hpp"
-#include "coglab_controllers/ros/ros_clocks.hpp"
 #include "coglab_controllers/ros/tf_listener.hpp"
+#include "coglab_rt/ros/ros_time.hpp"
 
 namespace coglab_controllers {
+
+using coglab_rt::ageOf;
+using coglab_rt::nanoseconds;
+using coglab_rt::toRos;
+using coglab_rt::toSteady;
 
 /// What every ROS side shares.
 struct RosContext {
