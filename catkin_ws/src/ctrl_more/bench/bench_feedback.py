@@ -69,7 +69,7 @@ def guard_rows(binaries: Path) -> list[dict]:
 
 def realtime_rows(binaries: Path) -> list[dict]:
     """The counters of the real-time test, with services working meanwhile."""
-    text = run(binaries / "ctrl_more_test_realtime", "--gtest_filter=Realtime.nothing*")
+    text = run(binaries / "ctrl_more_test_realtime", "--gtest_filter=Realtime.Nothing*")
     names = ("cycles", "plans adopted", "reorders", "reloads", "faults", "allocations", "locks",
              "syscalls", "allocations of throws")
     found = re.search(", ".join(rf"{name} (\d+)" for name in names), text)

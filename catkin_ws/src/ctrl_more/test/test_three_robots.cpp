@@ -4,7 +4,6 @@
 #include <iterator>
 
 #include "controller_rig.hpp"
-#include "ctrl_more/so3.hpp"
 
 namespace ctrl_more {
 namespace {
@@ -35,7 +34,7 @@ std::string bytesOfLibrary() {
   return {std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
 }
 
-TEST(ThreeRobots, oneLibraryThreeFilesOneResult) {
+TEST(ThreeRobots, OneLibraryThreeFilesOneResult) {
   const std::string gains =
       "kp: [0.6, 0.4, 0.2]\nki: [1, 2, 0.5]\nkd: [0.02, 0.03, 0.01]\nmax_angle: 0.5\n";
   const Eigen::Quaterniond tilted = expOf({0.4, -1.1, 2.0});

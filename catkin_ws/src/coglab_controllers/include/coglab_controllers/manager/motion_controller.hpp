@@ -16,7 +16,7 @@
 #include "coglab_controllers/manager/plan_exchange.hpp"
 #include "coglab_controllers/manager/reason.hpp"
 #include "coglab_controllers/manager/robot_setup.hpp"
-#include "ctrl_more/control_states.hpp"
+#include "ctrl_more/states/control_states.hpp"
 #include "lwr_fri_bridge/control_port.hpp"
 
 namespace coglab_controllers {

@@ -20,7 +20,7 @@
 #include "coglab_msgs/ReloadGains.h"
 #include "coglab_msgs/SetExecutionOrder.h"
 #include "coglab_msgs/SetGains.h"
-#include "ctrl_more/logger.hpp"
+#include "ctrl_more/log/logger.hpp"
 
 namespace coglab_controllers {
 
