@@ -56,7 +56,8 @@ std::vector<std::string> SearchPath::candidates(const std::string& name) const {
     }
     return list;
   }
-  list.push_back((fs::path(base_) / name).string());
+  // Never relative to where the program happens to run.
+  if (!base_.empty()) list.push_back((fs::path(base_) / name).string());
   for (const std::string& folder : extra_) {
     list.push_back((fs::path(base_) / folder / name).string());
   }
@@ -77,7 +78,7 @@ std::string SearchPath::find(const std::string& name) const {
   for (const std::string& file : tried) {
     if (fs::is_regular_file(file, no_error)) return file;
   }
-  throw std::runtime_error("there is no file '" + name + "'; tried " +
+  throw std::runtime_error("file '" + name + "' was not found; tried " +
                            (tried.empty() ? "nothing: no package path is set" : joined(tried)));
 }
 

@@ -46,11 +46,10 @@ class FeedbackRos {
  private:
   using Select = coglab_msgs::FeedbackSelect;
   using BySignal = coglab_msgs::FeedbackBySignal;
-  enum class What { Enable, Disable, Pause, Resume };
 
-  template <What what>
+  template <ctrl_more::Change::Kind kind>
   bool onSelect(Select::Request& request, Select::Response& response);
-  template <What what>
+  template <ctrl_more::Change::Kind kind>
   bool onSignal(BySignal::Request& request, BySignal::Response& response);
   bool onProfile(Select::Request& request, Select::Response& response);
   bool onOrder(coglab_msgs::SetExecutionOrder::Request& request,
