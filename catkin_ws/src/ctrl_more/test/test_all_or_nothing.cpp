@@ -171,7 +171,7 @@ TEST(AllOrNothing, AddingAndUnloading) {
 
 TEST(AllOrNothing, ListFile) {
   // Held open: what is tried here is the manager, not the dynamic linker.
-  const std::shared_ptr<PluginLibrary> held = PluginLibrary::open(kPlugins + "/libgood.so", prototypes());
+  const auto held = PluginLibrary::open(kPlugins + "/libgood.so", prototypes());
   const ConfigNode list = ConfigNode::fromText(
       "loadControllers: [x, y]\nx: {libPath: libgood.so, enabled: true}\n"
       "y: {libPath: libgood.so}\nprofiles: {mine: [x], yours: [y, a]}\nsharedSignals: cascade\n",

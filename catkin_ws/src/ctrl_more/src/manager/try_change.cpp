@@ -182,7 +182,8 @@ class Trial {
     }
     const std::vector<std::string>& list = found->second;
     for (std::size_t i = 0; i < draft_.states.size(); ++i) {
-      draft_.states[i].enabled = std::count(list.begin(), list.end(), roster_.members[i]->name) != 0;
+      const std::string& member = roster_.members[i]->name;
+      draft_.states[i].enabled = std::count(list.begin(), list.end(), member) != 0;
     }
     return {};
   }

@@ -30,8 +30,8 @@ class ControlLaw {
   /// @param setup gives handles for what describe() declares
   virtual void initialize(Setup& setup) = 0;
 
-  /// Runs the controller once. May throw or call FeedbackController::fail(): its writes are then undone, its last
-  /// correction is let go by policy, and it is paused with the reason.
+  /// Runs the controller once. May throw or call FeedbackController::fail(): its writes are then
+  /// undone, its last correction is let go by policy, and it is paused with the reason.
   /// @param cycle time
   /// @param robot robot states of this cycle
   /// @param original references at the start of the stage, before any feedback controller

@@ -104,7 +104,7 @@ class RobotStates {
   /// @throws EmptyHandle
   template <int N>
   Eigen::Map<const Eigen::Matrix<double, N, 1>> view(const Read<N>& handle) const {
-    if (!handle.valid()) throw EmptyHandle("a robot signal is read that initialize() did not fetch");
+    if (!handle.valid()) throw EmptyHandle("a robot signal is read that was never fetched");
     return Eigen::Map<const Eigen::Matrix<double, N, 1>>(
         table_.data().data() + handle.signal_.offset(), handle.size());
   }
