@@ -3,6 +3,7 @@
 #include <new>
 #include <sstream>
 
+#include "ctrl_more/feedback_controller.hpp"
 #include "test_support.hpp"
 
 namespace {
@@ -129,7 +130,7 @@ TEST(AllOrNothing, Changes) {
     GainValues gains = x.manager->getGains("a");
     gains.set("k", {3.0});
     return x.manager
-        ->apply(Change().enable("c").gains("a", gains).pause("a", "rest").resume("b", "other")
+        ->apply(Change().enable("c").gains("a", gains.all()).pause("a", "rest").resume("b", "other")
                     .order({"c", "b", "a"}))
         .ok();
   });

@@ -1,3 +1,4 @@
+#include "ctrl_more/log/words.hpp"
 #include "test_support.hpp"
 
 namespace ctrl_more {

@@ -137,7 +137,12 @@ PluginLibrary::~PluginLibrary() {
   dlclose(handle_);
   if (isMapped(path_)) return;
   list_.forget(types_);
-  InMemory::all().erase({path_, &list_});
+  auto& all = InMemory::all();
+  for (auto it = all.begin(); it != all.end(); ++it) {
+    if (it->first.first != path_ || it->first.second != &list_) continue;
+    all.erase(it);
+    break;
+  }
 }
 
 }  // namespace ctrl_more

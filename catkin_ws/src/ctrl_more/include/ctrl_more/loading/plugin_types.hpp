@@ -99,6 +99,7 @@ class PluginTypesOf : public PluginTypes {
     return found == makers_.end() ? Maker{} : found->second;
   }
 
+  /// All known names, sorted.
   std::vector<std::string> types() const override {
     const std::lock_guard<std::mutex> lock(mutex_);
     std::vector<std::string> names;
@@ -106,14 +107,16 @@ class PluginTypesOf : public PluginTypes {
     return names;
   }
 
+  /// See PluginTypes.
   void setAside(const std::vector<std::string>& types) override {
     const std::lock_guard<std::mutex> lock(mutex_);
     for (const std::string& type : types) {
-      auto node = makers_.extract(type);
-      if (!node.empty()) aside_.insert_or_assign(type, node.mapped());
+      aside_.erase(type);
+      aside_.insert(makers_.extract(type));  // nothing that could fail: a destructor calls this
     }
   }
 
+  /// See PluginTypes.
   std::vector<std::string> bringBack(const std::vector<std::string>& types) override {
     const std::lock_guard<std::mutex> lock(mutex_);
     std::vector<std::string> back;
@@ -131,6 +134,7 @@ class PluginTypesOf : public PluginTypes {
     return back;
   }
 
+  /// See PluginTypes.
   void forget(const std::vector<std::string>& types) override {
     const std::lock_guard<std::mutex> lock(mutex_);
     for (const std::string& type : types) aside_.erase(type);

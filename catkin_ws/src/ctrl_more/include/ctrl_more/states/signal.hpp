@@ -89,7 +89,7 @@ class Signal {
   /// False for an empty handle.
   bool valid() const { return size_ != 0; }
 
- protected:
+ private:
   friend class SignalTable;
   std::uint32_t offset_ = 0;
   std::uint32_t size_ = 0;
