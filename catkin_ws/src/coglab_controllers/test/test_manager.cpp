@@ -21,6 +21,8 @@ TEST(Manager, RefusesBadPluginsAndKeepsWhatIsThere) {
   EXPECT_TRUE(refused(manager.load("a", "test/Twin"), {"test/Misbehaving", "registered already"}));
   EXPECT_TRUE(refused(manager.load("a", "test/Twin"), {"registered already"}));  // and again
   EXPECT_TRUE(refused(manager.load("a", "test/Other"), {"has no type", "test/Misbehaving"}));
+  EXPECT_TRUE(refused(manager.load("a", "test/OtherAbi"),
+                      {"compiled for another coglab_controllers", "interface 2", "interface 1"}));
   EXPECT_TRUE(
       refused(manager.load("a", "my_lab/Unknown"), {"my_lab/Unknown", "coglab/DmpController"}));
   EXPECT_TRUE(refused(manager.load("dmp", "coglab/DmpController"), {"in use"}));
@@ -32,6 +34,17 @@ TEST(Manager, RefusesBadPluginsAndKeepsWhatIsThere) {
   EXPECT_EQ(types, (std::vector<std::string>{"coglab/DmpController", "coglab/PtpController",
                                              "test/Misbehaving"}));
   EXPECT_TRUE(VirtualRobot::ok(manager.load("odd2", "test/Misbehaving")));  // still makes new ones
+}
+
+TEST(Manager, TypesGoWithTheirLibraryAndComeBackWithIt) {
+  MotionTypes& types = MotionTypes::instance();
+  for (int i = 0; i < 2; ++i) {
+    const auto library =
+        ctrl_more::PluginLibrary::open(PLUGIN_DIR "/libcoglab_test_own_exception.so", types);
+    EXPECT_EQ(library->types(), std::vector<std::string>{"test/Throwing"});
+    EXPECT_NE(types.find("test/Throwing").controller, nullptr);
+  }
+  EXPECT_EQ(types.find("test/Throwing").controller, nullptr);
 }
 
 TEST(Manager, BadPluginsAndSwitchesLeaveARunningMotionAsItIs) {

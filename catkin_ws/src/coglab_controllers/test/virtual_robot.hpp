@@ -25,7 +25,8 @@ namespace coglab_controllers {
 inline const std::string kTypes =
     "types: {test/Misbehaving: libcoglab_test_misbehaving.so, test/Twin: "
     "libcoglab_test_twin.so, test/Empty: libcoglab_test_empty.so, test/Missing: libnowhere.so, "
-    "test/Other: libcoglab_test_misbehaving.so, test/Throwing: libcoglab_test_own_exception.so}, "
+    "test/Other: libcoglab_test_misbehaving.so, test/Throwing: libcoglab_test_own_exception.so, "
+    "test/OtherAbi: libcoglab_test_other_abi.so}, "
     "plugin_paths: [" PLUGIN_DIR "]";
 
 /// Frames as a table.

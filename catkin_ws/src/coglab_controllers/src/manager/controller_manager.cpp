@@ -6,6 +6,8 @@
 #include <stdexcept>
 #include <utility>
 
+#include "ctrl_more/loading/search_path.hpp"
+
 namespace coglab_controllers {
 
 namespace {
@@ -120,7 +122,7 @@ Answer ControllerManager::load(const std::string& id, const std::string& type,
     }
     loading_.insert(id);
   }
-  const bool motion = settings_.types.count(type) != 0 || MotionTypes::instance().find(type);
+  const bool motion = settings_.types.count(type) != 0 || MotionTypes::instance().find(type).controller;
   const Answer answer =
       motion ? loadMotion(id, type, attach, requests) : loadFeedback(id, type);
   const std::lock_guard<std::mutex> lock(table_);
@@ -138,17 +140,19 @@ Answer ControllerManager::loadMotion(const std::string& id, const std::string& t
     loaded->type = type;
     const auto place = settings_.types.find(type);
     if (place != settings_.types.end()) {
-      loaded->library = MotionLibrary::open(findLibrary(place->second, settings_.plugin_paths));
+      const ctrl_more::SearchPath files("", settings_.plugin_paths);
+      loaded->library =
+          ctrl_more::PluginLibrary::open(files.find(place->second), MotionTypes::instance());
     }
-    const std::optional<MotionMaker> maker = MotionTypes::instance().find(type);
-    if (!maker) {
+    const MotionMaker maker = MotionTypes::instance().find(type);
+    if (maker.controller == nullptr) {
       return Answer::refusal(
           ReasonCode::UnknownName,
           what + (loaded->library ? "library '" + loaded->library->path() + "' has no type '" +
                                         type + "'; it has: " + joined(loaded->library->types())
                                   : "its library has gone"));
     }
-    loaded->controller.reset(maker->controller());
+    loaded->controller.reset(maker.controller());
     MotionSetup setup;
     setup.id = id;
     setup.cycle_time = settings_.cycle.cycle_time;
@@ -157,7 +161,7 @@ Answer ControllerManager::loadMotion(const std::string& id, const std::string& t
     setup.host = this;
     loaded->controller->configure(setup);
     requests.unlock();  // what is attached may wait for others, such as the ROS master
-    if (attach) attach(*loaded->controller, *maker);
+    if (attach) attach(*loaded->controller, maker);
     const std::lock_guard<std::mutex> lock(table_);
     motions_.push_back(std::move(loaded));
     return {};

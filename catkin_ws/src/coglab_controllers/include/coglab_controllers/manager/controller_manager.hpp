@@ -15,6 +15,7 @@
 
 #include "coglab_controllers/manager/control_cycle.hpp"
 #include "coglab_controllers/manager/plugin_registry.hpp"
+#include "ctrl_more/loading/plugin_library.hpp"
 
 namespace coglab_controllers {
 
@@ -46,7 +47,7 @@ ManagerSettings readManagerSettings(const YAML::Node& parameters, const std::str
 /// One motion controller that is loaded.
 struct LoadedMotion {
   std::string id, type;
-  std::shared_ptr<MotionLibrary> library;  ///< null for types linked into the program
+  std::shared_ptr<ctrl_more::PluginLibrary> library;  ///< null for types linked into the program
   std::unique_ptr<MotionController> controller;
   MotionCancel cancel;
 };

@@ -15,7 +15,7 @@
 #include "coglab_controllers/manager/motion_cancel.hpp"
 #include "coglab_controllers/manager/robot_setup.hpp"
 #include "coglab_controllers/names.hpp"
-#include "ctrl_more/control_states.hpp"
+#include "ctrl_more/states/control_states.hpp"
 
 namespace coglab_controllers {
 
