@@ -19,7 +19,9 @@ add_library(coglab_controllers_core
   src/dmp/primitive.cpp
   src/dmp/transformation_system.cpp
   src/goal/goal_estimator.cpp
+  src/goal/goal_gate.cpp
   src/goal/goal_jitter.cpp
+  src/goal/goal_relay.cpp
   src/ik/second_task.cpp
   src/ik/two_task_ik.cpp
   src/kinematics/chain.cpp
