@@ -19,7 +19,9 @@ add_library(coglab_controllers_core
   src/dmp/primitive.cpp
   src/dmp/transformation_system.cpp
   src/goal/goal_estimator.cpp
+  src/goal/goal_gate.cpp
   src/goal/goal_jitter.cpp
+  src/goal/goal_relay.cpp
   src/ik/second_task.cpp
   src/ik/two_task_ik.cpp
   src/kinematics/chain.cpp
@@ -60,7 +62,7 @@ install(FILES src/coglab_controllers/_core.pyi src/coglab_controllers/py.typed
 install(FILES config/primitives.xml DESTINATION ${CATKIN_PACKAGE_SHARE_DESTINATION}/config)
 
 if(CATKIN_ENABLE_TESTING)
-  foreach(thing allocation cartesian_motion dmp ik kinematics learning library limits ptp)
+  foreach(thing allocation cartesian_motion dmp goal_estimator ik kinematics learning library limits ptp)
     catkin_add_gtest(coglab_controllers_test_${thing} test/test_${thing}.cpp)
     if(TARGET coglab_controllers_test_${thing})
       target_link_libraries(coglab_controllers_test_${thing} coglab_controllers_core yaml-cpp gtest_main gtest)

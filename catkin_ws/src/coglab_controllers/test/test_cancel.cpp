@@ -15,9 +15,9 @@ namespace {
 const std::vector<double> kThere = {-1.0, -0.5, 1.2, 1.5, 0.3, 0.3, 0.6};
 const Vector3 kGoal(0.80, 0.0, 0.45);
 
-std::vector<PtpEnd> endsOf(PtpController& ptp) {
-  std::vector<PtpEnd> ends;
-  for (PtpEnd end; ptp.readEnd(end);) ends.push_back(end);
+std::vector<EndedMotion> endsOf(PtpController& ptp) {
+  std::vector<EndedMotion> ends;
+  for (EndedMotion end; ptp.readEnd(end);) ends.push_back(end);
   return ends;
 }
 
@@ -48,7 +48,7 @@ TEST(Cancel, EndsTheMotionAndItsQueueAndSaysWhy) {
   robot.loadBoth("ptp");
   robot.followWithinLimits();
   std::vector<int> ids;
-  for (int i = 0; i < 3; ++i) ids.push_back(robot.ptp().add({kThere, {}, {}}).ptp_id);
+  for (int i = 0; i < 3; ++i) ids.push_back(robot.ptp().add({kThere, {}, {}}).id);
   for (int i = 0; i < 100; ++i) robot.tick();
   ASSERT_GT(robot.command.velocity.norm(), 0.05);
   EXPECT_FALSE(robot.manager->report().standing);
@@ -64,10 +64,10 @@ TEST(Cancel, EndsTheMotionAndItsQueueAndSaysWhy) {
   EXPECT_EQ(report.state, ManagerState::Idle);
   EXPECT_EQ(report.reason.code(), ReasonCode::Cancelled);
   EXPECT_NE(report.reason.str().find("the state machine gives up"), std::string::npos);
-  const std::vector<PtpEnd> ends = endsOf(robot.ptp());
+  const std::vector<EndedMotion> ends = endsOf(robot.ptp());
   ASSERT_EQ(ends.size(), ids.size());
   for (std::size_t i = 0; i < ids.size(); ++i) {
-    EXPECT_EQ(ends[i].ptp_id, ids[i]);
+    EXPECT_EQ(ends[i].id, ids[i]);
     EXPECT_FALSE(ends[i].executed);
     EXPECT_EQ(ends[i].reason.code(), ReasonCode::Cancelled);
   }
@@ -75,8 +75,8 @@ TEST(Cancel, EndsTheMotionAndItsQueueAndSaysWhy) {
   for (int i = 0; i < 200; ++i) robot.tick();
   EXPECT_EQ(robot.sample.position, stood);
   // What comes after a cancel is executed.
-  const PtpAnswer next = robot.ptp().add({kThere, {}, {}});
-  ASSERT_EQ(next.status, PtpAnswer::kStarted) << next.message;
+  const MotionAnswer next = robot.ptp().add({kThere, {}, {}});
+  ASSERT_EQ(next.status, MotionAnswer::kStarted) << next.message;
   for (int i = 0; i < 2000 && robot.state() != MotionState::Reached; ++i) robot.tick();
   EXPECT_EQ(robot.state(), MotionState::Reached);
 }
@@ -147,8 +147,8 @@ TEST(Cancel, ARequestThatWasMadeBeforeItNeverMovesTheArm) {
 TEST(Cancel, AMotionThatHasNotBegunIsEndedToo) {
   VirtualRobot robot;
   robot.loadBoth("ptp");
-  const PtpAnswer pending = robot.ptp().add({kThere, {}, {}});  // adopted without a joint state
-  ASSERT_EQ(pending.status, PtpAnswer::kStarted);
+  const MotionAnswer pending = robot.ptp().add({kThere, {}, {}});  // adopted without a joint state
+  ASSERT_EQ(pending.status, MotionAnswer::kStarted);
   const JointVector stood = robot.sample.position;
   const CancelOrder order = robot.manager->askCancel("ptp", "");
   CancelAnswer answer;
@@ -156,7 +156,7 @@ TEST(Cancel, AMotionThatHasNotBegunIsEndedToo) {
   EXPECT_TRUE(answer.success && answer.was_running);
   for (int i = 0; i < 100; ++i) robot.tick();
   EXPECT_EQ(robot.sample.position, stood);
-  const std::vector<PtpEnd> ends = endsOf(robot.ptp());
+  const std::vector<EndedMotion> ends = endsOf(robot.ptp());
   ASSERT_EQ(ends.size(), 1u);
   EXPECT_EQ(ends[0].reason.code(), ReasonCode::Cancelled);
 }
@@ -167,7 +167,7 @@ TEST(Cancel, WorksWhileTheArmMayNotMoveAndNamesAControllerThatMovesItInstead) {
   CancelAnswer answer;
   EXPECT_GE(finish(robot, robot.manager->askCancel("dmp", ""), answer), 0);  // is not active
   EXPECT_TRUE(answer.success);
-  ASSERT_EQ(robot.ptp().add({kThere, {}, {}}).status, PtpAnswer::kStarted);
+  ASSERT_EQ(robot.ptp().add({kThere, {}, {}}).status, MotionAnswer::kStarted);
   for (int i = 0; i < 50; ++i) robot.tick();
   EXPECT_GE(finish(robot, robot.manager->askCancel("dmp", ""), answer), 0);
   EXPECT_FALSE(answer.success);
@@ -280,14 +280,14 @@ TEST(Cancel, OnTheRealClockAnswersWhenTheArmStandsOrAtItsTimeLimit) {
     return false;
   };
   while (manager.report().samples == 0) std::this_thread::sleep_for(std::chrono::milliseconds(2));
-  ASSERT_EQ(ptp.add({kThere, {}, {}}).status, PtpAnswer::kStarted);
+  ASSERT_EQ(ptp.add({kThere, {}, {}}).status, MotionAnswer::kStarted);
   ASSERT_TRUE(moves());
   const CancelAnswer good = manager.cancel("ptp", 5.0, "test");
   EXPECT_TRUE(good.success) << good.message;
   EXPECT_TRUE(good.was_running);
   EXPECT_TRUE(manager.report().robot.commanded_velocity.isZero(0.0));
 
-  ASSERT_EQ(ptp.add({kThere, {}, {}}).status, PtpAnswer::kStarted);
+  ASSERT_EQ(ptp.add({kThere, {}, {}}).status, MotionAnswer::kStarted);
   ASSERT_TRUE(moves());
   blind = true;  // measurements stop, so nobody knows whether the arm stands
   std::this_thread::sleep_for(std::chrono::milliseconds(20));

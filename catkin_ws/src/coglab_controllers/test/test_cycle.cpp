@@ -167,13 +167,13 @@ TEST(Cycle, NeitherAllocatesNorLocksWhileServicesAreCalled) {
     count(manager.switchTo("ptp", type).success);
     const double turn = 0.1 * (round % 3);
     for (int i = 0; i < 3; ++i) {
-      count(ptp.add({{-1.4 + turn, -0.6, 1.5, 1.7, 0.2, 0.2, 0.8}, {}, {}}).ptp_id >= 0);
+      count(ptp.add({{-1.4 + turn, -0.6, 1.5, 1.7, 0.2, 0.2, 0.8}, {}, {}}).id >= 0);
     }
     count(manager.feedback().disable("limits", true).ok());
     IkDebugRecord record;
     while (dmp.readIkDebug(record)) {
     }
-    PtpEnd end;
+    EndedMotion end;
     while (ptp.readEnd(end)) {
     }
     manager.report();

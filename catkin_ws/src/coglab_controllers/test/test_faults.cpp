@@ -74,7 +74,7 @@ TEST_P(Fault, GivesZeroVelocityItsReasonAndALivingManager) {
   EXPECT_EQ(welcome.code, ReasonCode::ControllerFault);
   robot.switchTo("ptp");
   EXPECT_EQ(robot.ptp().add({{-1.3, -0.6, 1.5, 1.7, 0.2, 0.2, 0.8}, {}, {}}).status,
-            PtpAnswer::kStarted);
+            MotionAnswer::kStarted);
   robot.tick();
   robot.tick();
   EXPECT_GT(robot.command.velocity.norm(), 0.0);

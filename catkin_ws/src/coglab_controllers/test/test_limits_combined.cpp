@@ -113,9 +113,9 @@ TEST(LimitsCombined, WhatIsAcceptedNearTheEndsOfTheRangesIsReachedOnAStraightWay
       const std::vector<double> target(to.data(), to.data() + 7);
       const JointVector speed = uniform(random, 0.2, 1.0) * setup.limits.velocity;
       const JointVector acceleration = uniform(random, 0.1, 0.5) * setup.limits.acceleration;
-      const PtpAnswer answer = robot.ptp().add(
+      const MotionAnswer answer = robot.ptp().add(
           {target, {speed.data(), speed.data() + 7}, {acceleration.data(), acceleration.data() + 7}});
-      ASSERT_EQ(answer.status, PtpAnswer::kStarted) << answer.message;
+      ASSERT_EQ(answer.status, MotionAnswer::kStarted) << answer.message;
       const JointVector way = (to - from).normalized();
       for (int i = 0; i < 6000; ++i) {
         robot.tick();
@@ -142,7 +142,7 @@ TEST(LimitsCombined, ReachedIsSaidByTheArmAndNotByItsSetPoint) {
     robot.see("human_hand", goal);
     if (active == "ptp") {
       ASSERT_EQ(robot.ptp().add({{-1.0, -0.5, 1.2, 1.5, 0.3, 0.3, 0.6}, {}, {}}).status,
-                PtpAnswer::kStarted);
+                MotionAnswer::kStarted);
     } else {
       ASSERT_TRUE(VirtualRobot::ok(robot.dmp().execute(robot.reach())));
     }
@@ -179,7 +179,7 @@ TEST(LimitsCombined, ReachesUnderPushesNearTheEndsOfTheRangesComeToNoFault) {
     home[4] = uniform(random, -2.9, 2.9);  // a wrist near the end of its range
     home[6] = uniform(random, 0.0, 1.0) < 0.5 ? uniform(random, 2.6, 2.95)
                                               : uniform(random, -2.95, -2.6);
-    ASSERT_EQ(robot.ptp().add({home, {}, {}}).status, PtpAnswer::kStarted);
+    ASSERT_EQ(robot.ptp().add({home, {}, {}}).status, MotionAnswer::kStarted);
     for (int i = 0; i < 4000 && (i < 3 || robot.state() == MotionState::Running); ++i) robot.tick();
     robot.active_dmp = true;
     robot.switchTo("dmp");

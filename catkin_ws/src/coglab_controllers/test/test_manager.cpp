@@ -116,19 +116,19 @@ TEST(Manager, SwitchInMotionBrakesWithoutAJumpAndReportsUnfinished) {
   VirtualRobot robot;
   robot.loadBoth("ptp");
   const std::vector<double> there = {-1.0, -0.5, 1.2, 1.5, 0.3, 0.3, 0.6};
-  EXPECT_EQ(robot.ptp().add({there, {}, {}}).ptp_id, 0);
-  const PtpAnswer queued = robot.ptp().add({there, {}, {}});
-  EXPECT_EQ(queued.status, PtpAnswer::kQueued);
+  EXPECT_EQ(robot.ptp().add({there, {}, {}}).id, 0);
+  const MotionAnswer queued = robot.ptp().add({there, {}, {}});
+  EXPECT_EQ(queued.status, MotionAnswer::kQueued);
   for (int i = 0; i < 100; ++i) robot.tick();
   ASSERT_GT(robot.command.velocity.norm(), 0.01);
   robot.switchTo("dmp");
   robot.tick();
   EXPECT_EQ(robot.command.velocity, JointVector::Zero().eval());  // the interpolator brakes
-  PtpEnd end;
+  EndedMotion end;
   std::vector<int> given_up;
   while (robot.ptp().readEnd(end)) {
     EXPECT_FALSE(end.executed);
-    given_up.push_back(end.ptp_id);
+    given_up.push_back(end.id);
   }
   EXPECT_EQ(given_up, (std::vector<int>{0, 1}));
   std::string type;

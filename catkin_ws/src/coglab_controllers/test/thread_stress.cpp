@@ -162,7 +162,7 @@ int main(int argc, char** argv) {
         }
         case 4:
           note(ptp.add({{-1.4 + 0.05 * (random() % 5), -0.6, 1.5, 1.7, 0.2, 0.2, 0.8}, {}, {}})
-                   .ptp_id >= 0);
+                   .id >= 0);
           break;
         case 5:
           note(manager.setSpeedScale(0.25 * (random() % 6)).success);
@@ -195,7 +195,7 @@ int main(int argc, char** argv) {
   std::thread publisher([&] {  // what the publisher thread of the node does
     DmpProgress progress;
     IkDebugRecord record;
-    PtpEnd end;
+    EndedMotion end;
     while (!stop) {
       dmp.pollGoal();
       dmp.readProgress(progress);

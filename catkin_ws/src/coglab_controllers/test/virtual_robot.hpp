@@ -3,21 +3,15 @@
 #pragma once
 
 #include <cstdint>
-#include <fstream>
 #include <map>
-#include <memory>
-#include <sstream>
 #include <string>
 #include <vector>
 
 #include <gtest/gtest.h>
 
-#include "coglab_controllers/manager/controller_manager.hpp"
 #include "coglab_controllers/plugins/dmp_controller.hpp"
 #include "coglab_controllers/plugins/ptp_controller.hpp"
-#include "coglab_rt/braking.hpp"
-#include "coglab_rt/interpolator.hpp"
-#include "coglab_rt/joint_limits_table.hpp"
+#include "coglab_controllers/testing/virtual_arm.hpp"
 
 namespace coglab_controllers {
 
@@ -45,44 +39,12 @@ class FrameTable : public GoalSource {
   std::map<std::string, GoalObservation> frames;
 };
 
-inline std::string readText(const std::string& path) {
-  std::ifstream file(path);
-  std::ostringstream text;
-  text << file.rdbuf();
-  return text.str();
-}
-
-/// Manager, robot and clock. The robot follows velocities as `follow` says; by default at once and
-/// exactly.
-class VirtualRobot {
+/// A virtual arm with the two plug-ins of this package and a table of frames.
+class VirtualRobot : public VirtualArm {
  public:
-  /// @param lockstep false: requests wait until another thread calls tick()
-  explicit VirtualRobot(const std::string& parameters = "", double period = 0.005,
+  explicit VirtualRobot(const std::string& parameters = "", double cycle = 0.005,
                         bool lockstep = true)
-      : period(period) {
-    limits = coglab_rt::loadJointLimits(std::string(DESCRIPTION_DIR) + "/config/joint_limits.yaml");
-    ManagerSettings settings = readManagerSettings(
-        YAML::Load(parameters), readText(std::string(DESCRIPTION_DIR) + "/urdf/lwr_ih2.urdf"),
-        limits, lockstep);
-    settings.cycle.overrun_time = 0.0;
-    settings.clock = [this] { return now_ns; };
-    settings.plan_timeout = 0.3;
-    settings.logger = &logger;
-    manager = std::make_unique<ControllerManager>(std::move(settings));
-    sample.position << -1.4349, -0.6086, 1.4986, 1.7048, 0.1857, 0.2152, 0.782;
-    sample.commanded_position = sample.position;
-    sample.block = MotionBlock::None;
-    sample.cycle_time = period;
-    sample.stop_delay = coglab_rt::lostTime(period);  // as the bridge has it
-    sample.stop_rounding = 2.0 * coglab_rt::kWireRounding;
-    tick();
-  }
-
-  /// From now on the arm follows within its acceleration and jerk limits, as the bridge has it.
-  void followWithinLimits() {
-    interpolator = std::make_unique<coglab_rt::Interpolator>(limits);
-    interpolator->reset(sample.position);
-  }
+      : VirtualArm(DESCRIPTION_DIR, parameters, cycle, lockstep) {}
 
   /// Both plug-ins, the library of the package, and `active`.
   void loadBoth(const std::string& active = "dmp") {
@@ -118,40 +80,6 @@ class VirtualRobot {
     frames.frames[frame] = observation;
   }
 
-  /// One measurement and one cycle; the robot then follows for one period.
-  const VelocityCommand& tick() {
-    now_ns += static_cast<std::int64_t>(period * 1e9);
-    ++sample.sequence;
-    sample.stamp_ns = now_ns;
-    if (MotionController* motion = manager->motion("dmp")) {
-      static_cast<DmpController*>(motion)->pollGoal();
-    }
-    manager->cycle().run(sample, period, command);
-    if (sample.block != MotionBlock::None) command.velocity.setZero();
-    if (interpolator) {
-      interpolator->step(command.velocity, period);
-      sample.position = interpolator->position();
-      sample.velocity = sample.commanded_velocity = interpolator->velocity();
-      sample.commanded_acceleration = interpolator->acceleration();
-      sample.commanded_position = sample.position;
-      return command;
-    }
-    sample.commanded_acceleration = (command.velocity - sample.commanded_velocity) / period;
-    sample.position += period * command.velocity;
-    sample.velocity = command.velocity;
-    sample.commanded_velocity = command.velocity;
-    sample.commanded_position = sample.position;
-    return command;
-  }
-
-  Pose hand() const { return manager->settings().robot->chain.evaluate(sample.position).tool; }
-  Vector3 handVelocity() const {
-    const ChainState state = manager->settings().robot->chain.evaluate(sample.position);
-    return (state.jacobian * sample.velocity).head<3>();
-  }
-  MotionState state() const { return manager->report().motion; }
-  std::string reason() const { return manager->report().reason.str(); }
-
   DmpRequest reach(const std::string& primitive = "reach_human") const {
     DmpRequest request;
     request.primitive_id = primitive;
@@ -159,15 +87,14 @@ class VirtualRobot {
     return request;
   }
 
-  double period;
-  std::int64_t now_ns = 1'000'000'000;
-  coglab_rt::JointLimits limits;
   FrameTable frames;
-  ctrl_more::Logger logger;  // without sinks
-  std::unique_ptr<ControllerManager> manager;
-  std::unique_ptr<coglab_rt::Interpolator> interpolator;  // null: velocities count at once
-  RobotSample sample;
-  VelocityCommand command;
+
+ private:
+  void beforeCycle() override {
+    if (MotionController* motion = manager->motion("dmp")) {
+      static_cast<DmpController*>(motion)->pollGoal();
+    }
+  }
 };
 
 /// A refusal whose sentence has all these words.

@@ -105,9 +105,8 @@ class VirtualArm:
 
     @staticmethod
     def _fields(request):
-        turned = request.target_orientation is not None
-        return (request.primitive_id, request.dmp_ratio, list(request.goal_offset), turned,
-                list(request.target_orientation) if turned else [0.0, 0.0, 0.0, 0.0])
+        return (request.primitive_id, request.dmp_ratio, list(request.goal_offset), request.orientation_control,
+                list(request.target_orientation))
 
     def _ends_motion(self, pending):
         return Polled(pending.done, pending.result, lambda: self.cancel_motion("its owner has given up waiting"))

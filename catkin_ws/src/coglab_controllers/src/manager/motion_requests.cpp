@@ -53,7 +53,7 @@ MotionRequest ControllerManager::beginRequest(const std::string& controller_id) 
     const std::lock_guard<std::mutex> lock(table_);
     if (const LoadedMotion* motion = find(controller_id)) {
       // Before the wait for the lock: a cancel that comes meanwhile makes this request void.
-      request.stamp.cancels = motion->cancel.newest();
+      request.stamp.cancels = motion->cancel->newest();
     }
   }
   request.lock = lockRequests();
@@ -70,7 +70,7 @@ CancelOrder ControllerManager::askCancel(const std::string& id, const std::strin
   {
     const std::lock_guard<std::mutex> lock(table_);
     LoadedMotion* const motion = find(id);
-    if (motion != nullptr) order.cancel = &motion->cancel;
+    if (motion != nullptr) order.cancel = motion->cancel;
   }
   if (order.cancel == nullptr) return order;
   Reason reason(ReasonCode::Cancelled, "cancelled");

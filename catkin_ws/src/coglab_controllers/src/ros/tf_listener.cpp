@@ -3,7 +3,7 @@
 #include <cmath>
 #include <exception>
 
-#include "coglab_controllers/plugins/goal_source.hpp"
+#include "coglab_controllers/goal/goal_source.hpp"
 #include "coglab_rt/ros/ros_time.hpp"
 
 namespace coglab_controllers {
@@ -112,6 +112,7 @@ void TfListener::clearAfterAStepBack() {
     ROS_WARN("this computer's clock went back by %.3f s: transforms are forgotten",
              1e-9 * static_cast<double>(last_now_ns_ - now));
     buffer_.clear();
+    clock_steps_.fetch_add(1, std::memory_order_relaxed);
   }
   last_now_ns_ = now;
 }

@@ -25,13 +25,16 @@ class Verdict(NamedTuple):
 
 @dataclass(frozen=True)
 class DmpRequest:
-    """One execute_dmp or switch_dmp (D4.10 Table 4); positions and orientation are relative to ``goal_frame``."""
+    """One execute_dmp or switch_dmp (D4.10 Table 4), from the current state; the fields are those of the services.
+    Positions (m) and orientation (quaternion; all zero: the present one) are relative to ``goal_frame``, which
+    switch_dmp leaves as it is."""
 
     primitive_id: str
     goal_frame: str
     goal_offset: Sequence[float]
-    target_orientation: Sequence[float] | None
     dmp_ratio: float = 1.0
+    orientation_control: bool = False
+    target_orientation: Sequence[float] = (0.0, 0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True)

@@ -20,6 +20,7 @@ from coglab_msgs.srv import (
     AddPtp,
     CancelMotion,
     ExecuteDmp,
+    ExecuteDmpRequest,
     FeedbackSelect,
     ListControllers,
     LoadController,
@@ -27,6 +28,7 @@ from coglab_msgs.srv import (
     LwrCommand,
     SwitchController,
     SwitchDmp,
+    SwitchDmpRequest,
 )
 from geometry_msgs.msg import Point, Quaternion
 from sensor_msgs.msg import JointState
@@ -165,9 +167,7 @@ class RosArm:
 
     def execute_dmp(self, request: DmpRequest) -> Pending:
         self._started_at = time.monotonic()
-        fields = _dmp_fields(request)
-        pending = call(f"{self._manager}/dmp/execute_dmp", ExecuteDmp, wait=5.0, initial_state=0,
-                       initial_position=Point(), goal_frame=request.goal_frame, **fields)
+        pending = call(f"{self._manager}/dmp/execute_dmp", ExecuteDmp, wait=5.0, **_fields(request, ExecuteDmpRequest))
 
         def accepted(response: Any) -> None:
             self._started_at = time.monotonic()
@@ -184,8 +184,8 @@ class RosArm:
         return Polled(pending.done, pending.result, cancel)
 
     def switch_dmp(self, request: DmpRequest) -> Pending:
-        return mapped(call(f"{self._manager}/dmp/switch_dmp", SwitchDmp, wait=1.0, **_dmp_fields(request)),
-                      lambda r: None)
+        return mapped(call(f"{self._manager}/dmp/switch_dmp", SwitchDmp, wait=1.0,
+                           **_fields(request, SwitchDmpRequest)), lambda r: None)
 
     def dmp_progress(self) -> DmpProgress:
         message = self._feedback.message
@@ -244,8 +244,11 @@ class RosArm:
         return mapped(run, lambda r: r.message)
 
 
-def _dmp_fields(request: DmpRequest) -> dict[str, Any]:
-    orientation = request.target_orientation
-    return {"primitive_id": request.primitive_id, "dmp_ratio": request.dmp_ratio,
-            "goal_offset": Point(*request.goal_offset), "orientation_control": orientation is not None,
-            "target_orientation": Quaternion(*(orientation if orientation is not None else (0, 0, 0, 0)))}
+def _fields(request: DmpRequest, kind: type[ExecuteDmpRequest | SwitchDmpRequest]) -> dict[str, Any]:
+    """The fields of a request that this service has; the others keep their defaults."""
+    message = kind()
+    for name, value in vars(request).items():
+        if name in message.__slots__:
+            own = type(getattr(message, name))
+            setattr(message, name, own(*value) if own in (Point, Quaternion) else value)
+    return {name: getattr(message, name) for name in message.__slots__}

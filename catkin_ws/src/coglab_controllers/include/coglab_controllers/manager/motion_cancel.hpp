@@ -5,6 +5,7 @@
 
 #include <atomic>
 #include <cstdint>
+#include <memory>
 #include <mutex>
 #include <string>
 
@@ -76,7 +77,7 @@ struct RequestStamp {
 
 /// A cancel on its way, see ControllerManager::askCancel().
 struct CancelOrder {
-  MotionCancel* cancel = nullptr;  ///< null: no such controller
+  std::shared_ptr<MotionCancel> cancel;  ///< null: no such controller
   std::string id;
   std::uint64_t number = 0;
   std::uint64_t cycles = 0;  ///< count of the report when it was asked for

@@ -29,7 +29,7 @@ class MotionControllerRos {
   virtual ~MotionControllerRos() = default;
 
   /// Advertises and subscribes below `node` (…/controller_manager/<id>). The controller outlives
-  /// this object.
+  /// this object, whose destructor ends its services and subscriptions.
   virtual void attach(MotionController& controller, const ros::NodeHandle& node,
                       const RosContext& context) = 0;
 

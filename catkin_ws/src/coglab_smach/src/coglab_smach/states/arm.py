@@ -82,9 +82,12 @@ class SwitchController(CoglabState):
 
 def dmp_request(goal: dict[str, Any], primitive: str | None = None, ratio: float | None = None) -> DmpRequest:
     """The request of a goal as it travels in user data."""
-    return DmpRequest(primitive or goal["primitive"], goal["frame"], list(goal["offset"]),
-                      list(goal["orientation"]) if goal.get("orientation") is not None else None,
-                      float(ratio if ratio is not None else goal.get("dmp_ratio", 1.0)))
+    orientation = goal.get("orientation")
+    return DmpRequest(primitive_id=primitive or goal["primitive"], goal_frame=goal["frame"],
+                      goal_offset=list(goal["offset"]),
+                      dmp_ratio=float(ratio if ratio is not None else goal.get("dmp_ratio", 1.0)),
+                      orientation_control=orientation is not None,
+                      target_orientation=list(orientation if orientation is not None else (0.0, 0.0, 0.0, 0.0)))
 
 
 class ExecuteDmp(CoglabState):

@@ -1,4 +1,4 @@
-#include "coglab_controllers/plugins/hold.hpp"
+#include "coglab_controllers/motion/hold.hpp"
 
 #include <cmath>
 

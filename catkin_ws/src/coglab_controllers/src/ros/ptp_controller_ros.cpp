@@ -24,30 +24,30 @@ class PtpControllerRos : public MotionControllerRos {
   }
 
   void spinOnce() override {
-    PtpEnd end;
+    EndedMotion end;
     while (controller_->readEnd(end)) {
       if (end.executed) {
         coglab_msgs::FinishedPtp message;
-        message.ptp_id = end.ptp_id;
+        message.ptp_id = end.id;
         finished_.publish(message);
       } else {
         coglab_msgs::UnfinishedPtp message;
-        message.ptp_id = end.ptp_id;
+        message.ptp_id = end.id;
         message.reason_code = end.reason.number();
         message.reason = end.reason.str();
         unfinished_.publish(message);
-        ROS_WARN("ptp_id %d was not executed: %s", end.ptp_id, end.reason.c_str());
+        ROS_WARN("ptp_id %d was not executed: %s", end.id, end.reason.c_str());
       }
     }
   }
 
  private:
   bool onAdd(coglab_msgs::AddPtp::Request& request, coglab_msgs::AddPtp::Response& response) {
-    const PtpAnswer answer = controller_->add({request.position, request.max_vel, request.max_acc});
+    const MotionAnswer answer = controller_->add({request.position, request.max_vel, request.max_acc});
     response.status = answer.status;
-    response.ptp_id = answer.ptp_id;
-    response.success = answer.status != PtpAnswer::kRejected;
-    response.reason_code = static_cast<std::uint16_t>(answer.code);
+    response.ptp_id = answer.id;
+    response.success = answer.success;
+    response.reason_code = answer.number();
     response.message = answer.message;
     if (!response.success) ROS_WARN("add_ptp rejected: %s", answer.message.c_str());
     return true;

@@ -19,7 +19,14 @@ struct GoalObservation {
   /// Which frame it is: its stamp as received, ns; later ones are larger. 0: it has none and is
   /// valid as long as it is shown (a static transform).
   std::int64_t frame_ns = 0;
-  std::uint64_t request = 0;  ///< which request asked for this frame; set by the plug-in
+  /// How often the clock of frame_ns has stepped back so far: after a step stamps begin anew.
+  std::uint32_t clock_steps = 0;
+  std::uint64_t request = 0;  ///< which request asked for this frame; set by GoalFeed
+
+  /// Whether this is a later frame than `other`, both with a stamp.
+  bool isLaterThan(const GoalObservation& other) const noexcept {
+    return clock_steps != other.clock_steps || frame_ns > other.frame_ns;
+  }
 };
 
 /// Limits of GoalGate.
@@ -32,10 +39,12 @@ struct GoalGateParameters {
   double lost_time = 1.0;  ///< s without a believable frame after which the goal is lost; 0: never
 };
 
-/// Holds the last believable goal. No allocation, no throw.
+/// Holds the last believable goal. Until reset() there is none: it is believed once
+/// frames_to_accept frames agree, or at once if it is static. No allocation, no throw.
 class GoalGate {
  public:
   enum class State : std::uint8_t {
+    Unsettled,  ///< no goal is believed yet
     Fresh,   ///< the newest frame is followed
     Old,     ///< no frame young enough: the last goal is held
     Jumped,  ///< the newest frames are too far away: the last goal is held
@@ -61,16 +70,20 @@ class GoalGate {
 
  private:
   bool isNew(const GoalObservation& newest) const noexcept;
+  void judge(const GoalObservation& newest) noexcept;
+  void believe(const GoalObservation& newest) noexcept;
 
   GoalGateParameters parameters_;
   GoalObservation goal_;
   GoalObservation candidate_;
   GoalObservation last_;  // the newest frame judged
-  int agreeing_ = 0;
+  int agreeing_ = 0;      // frames in a row that agree, but not with the goal
+  bool settled_ = false;  // a goal is believed
+  bool seen_ = false;     // a frame was judged
   std::int64_t believed_ns_ = 0;
   double age_ = 0.0;
   double jump_ = 0.0;
-  State state_ = State::Fresh;
+  State state_ = State::Unsettled;
 };
 
 }  // namespace coglab_controllers

@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <string>
 
-#include "coglab_controllers/plugins/goal_gate.hpp"
+#include "coglab_controllers/goal/goal_gate.hpp"
 
 namespace coglab_controllers {
 
