@@ -144,16 +144,18 @@ class PerceptionNode:
     def on_init(self, request):
         """Ready once the cell's world is visible."""
         try:
-            return InitVisionResponse(True, self.vision.init_vision(request.timeout))
+            return InitVisionResponse(success=True,
+                                      message=self.vision.init_vision(request.timeout))
         except NotSeen as reason:
-            return InitVisionResponse(False, str(reason))
+            return InitVisionResponse(False, reason.code, str(reason))
 
     def on_locate(self, request):
         """Newest sight of an object, of the partner's hand or of the board; else why not."""
         try:
             frame, sight, age = self.vision.locate(request.object_id, bounded(request.timeout))
         except NotSeen as reason:
-            return LocateObjectResponse(success=False, message=str(reason))
+            return LocateObjectResponse(success=False, reason_code=reason.code,
+                                        message=str(reason))
         return LocateObjectResponse(
             success=True, frame_id=frame, age=age,
             pose=pose(self.vision.names.world, sight.captured, sight.frame))
@@ -163,11 +165,10 @@ class PerceptionNode:
         try:
             places = self.vision.free_places(request.object_id, bounded(request.timeout))
         except NotSeen as reason:
-            return FreePlacesResponse(False, str(reason), [])
+            return FreePlacesResponse(False, reason.code, str(reason), [])
         return FreePlacesResponse(
-            True, ", ".join(name for name, _ in places),
-            [pose(self.vision.names.board, rospy.get_time(), Frame(place))
-             for _, place in places])
+            success=True, message=", ".join(name for name, _ in places),
+            places=[pose(self.vision.names.board, rospy.get_time(), Frame(place)) for _, place in places])
 
 
 def bounded(timeout: float) -> float:

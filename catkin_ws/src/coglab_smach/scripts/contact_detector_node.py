@@ -12,7 +12,7 @@ import threading
 import coglab_controllers as cc
 import numpy as np
 import rospy
-from coglab_msgs.msg import Contact
+from coglab_msgs.msg import Contact, ReasonCode
 from coglab_msgs.srv import ArmContact, ArmContactResponse
 from coglab_smach.contact_detector import ContactDetector, DetectorSettings
 from coglab_smach.ros_publish import publish
@@ -68,7 +68,8 @@ class ContactDetectorNode:
             event = self.detector.feed(self.last_sample, message.effort, self.position, self.velocity)
         if event is None:
             return
-        out = Contact(source=event.source, contact=event.contact, margin=event.margin, message=event.message)
+        out = Contact(source=event.source, contact=event.contact, margin=event.margin, confidence=event.confidence,
+                      reason_code=event.code, message=event.message)
         out.header.stamp = message.header.stamp
         publish(self.publisher, out)
         rospy.loginfo("contact detector: %s", event.message)
@@ -78,18 +79,18 @@ class ContactDetectorNode:
         with self.lock:
             if request.mode == "off":
                 self.detector.disarm()
-                return ArmContactResponse(True, "off")
+                return ArmContactResponse(success=True, message="off")
             now = self.last_sample
             if now is None or abs(rospy.Time.now().to_sec() - now) > 1.0:
-                return ArmContactResponse(False, f"no torques on {self.torques.resolved_name} for 1 s; is the "
-                                                 "robot connected?")
+                return ArmContactResponse(False, ReasonCode.NODE_SILENT, f"no torques on {self.torques.resolved_name} "
+                                          "for 1 s; is the robot connected?")
             try:
                 self.detector.arm(request.mode, now, request.timeout, request.k, request.joints, request.mass,
                                   request.load_share)
             except ValueError as error:
-                return ArmContactResponse(False, str(error))
-        return ArmContactResponse(True, f"watching for {request.mode} for {request.timeout:.1f} s once the arm "
-                                        "is still")
+                return ArmContactResponse(False, ReasonCode.INVALID_ARGUMENT, str(error))
+        return ArmContactResponse(True, ReasonCode.NONE,
+                                  f"watching for {request.mode} for {request.timeout:.1f} s once the arm is still")
 
     def on_timer(self, _event) -> None:
         """Live margin."""

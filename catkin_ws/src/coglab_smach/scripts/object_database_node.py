@@ -7,6 +7,7 @@ Parameters: ~folder; ih2_hand/dialect (legacy), that of the hand. Mirrors the go
 import sys
 
 import rospy
+from coglab_msgs.msg import ReasonCode
 from coglab_msgs.srv import GetObject, GetObjectResponse, ListObjects, ListObjectsResponse
 from coglab_smach.object_database import ObjectDatabase, ObjectError
 from std_srvs.srv import Trigger, TriggerResponse
@@ -73,9 +74,9 @@ class ObjectDatabaseNode:
     def on_get(self, request):
         """One entry as YAML text."""
         try:
-            return GetObjectResponse(True, "", self.database.text(request.object_id))
+            return GetObjectResponse(success=True, yaml=self.database.text(request.object_id))
         except ObjectError as error:
-            return GetObjectResponse(False, str(error), "")
+            return GetObjectResponse(False, ReasonCode.OBJECT_UNKNOWN, str(error), "")
 
     def on_reload(self, _request):
         """Read everything again now."""

@@ -10,6 +10,7 @@ import numpy as np
 import rospkg
 import rospy
 import yaml
+from coglab_msgs.msg import ReasonCode
 from coglab_msgs.srv import Start
 
 from coglab_bringup.trial_recorder import TrialRecorder, summarise
@@ -20,10 +21,18 @@ HUBS = ("wait_without_object", "wait_with_object")
 MASTER = "/coglab_master"
 
 
+class NotTaken(RuntimeError):
+    """The master machine did not take an action; `code` is the ReasonCode of its last refusal."""
+
+    def __init__(self, sentence: str, code: int) -> None:
+        super().__init__(sentence)
+        self.code = code
+
+
 def ask_for(action: str, object_id: str, alive: Callable[[], bool], limit: float) -> None:
-    """Calls /coglab/start until the master machine takes the action. Raises RuntimeError with its last refusal."""
+    """Calls /coglab/start until the master machine takes the action. Raises NotTaken with its last refusal."""
     deadline = time.monotonic() + limit
-    refusal = "the service /coglab/start never appeared"
+    refusal, code = "the service /coglab/start never appeared", ReasonCode.NODE_SILENT
     while time.monotonic() < deadline and alive():
         try:
             rospy.wait_for_service("/coglab/start", timeout=1.0)
@@ -31,13 +40,13 @@ def ask_for(action: str, object_id: str, alive: Callable[[], bool], limit: float
         except rospy.ROSException:
             continue
         except rospy.ServiceException as error:
-            refusal = str(error)
+            refusal, code = str(error), ReasonCode.NODE_SILENT
         else:
             if answer.success:
                 return
-            refusal = answer.message
+            refusal, code = answer.message, answer.reason_code
         time.sleep(0.2)
-    raise RuntimeError(f"{action} was not taken within {limit:.0f} s: {refusal}")
+    raise NotTaken(f"{action} was not taken within {limit:.0f} s: {refusal}", code)
 
 
 def run_handover(
@@ -59,8 +68,10 @@ def run_handover(
     recorder.wait_for(lambda: bool(ended()) or not alive(), HANDOVER_LIMIT)
     end = rospy.get_time()
     if ended():
-        _, _, _, outcome, _, reason = ended()[0]
+        _, _, _, outcome, _, reason, code = ended()[0]
         outcome = "success" if outcome == "succeeded" else f"{outcome}: {reason}"
+    elif alive():
+        outcome, code = f"no end within {HANDOVER_LIMIT:.0f} s", ReasonCode.TIME_LIMIT
     else:
-        outcome = "the system ended" if not alive() else f"no end within {HANDOVER_LIMIT:.0f} s"
-    return summarise(recorder.trial, kind, outcome, start, end, limits), start, end
+        outcome, code = "the system ended", ReasonCode.NODE_SILENT
+    return {**summarise(recorder.trial, kind, outcome, start, end, limits), "reason_code": int(code)}, start, end

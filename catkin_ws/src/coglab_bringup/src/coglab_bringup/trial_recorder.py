@@ -27,7 +27,7 @@ class Trial:
     truth: list[tuple] = field(default_factory=list)  # (t, robot xyz, human xyz, object xyz, palm force)
     fingers: list[tuple] = field(default_factory=list)  # (t, position[5])
     feedback: list[tuple] = field(default_factory=list)  # (t, state, remaining distance)
-    transitions: list[tuple] = field(default_factory=list)  # (t, path, from, outcome, to, reason)
+    transitions: list[tuple] = field(default_factory=list)  # (t, path, from, outcome, to, reason, code)
     contacts: list[tuple] = field(default_factory=list)  # (t, contact, margin)
     fri_lost: list[tuple] = field(default_factory=list)  # (t, FRI packets lost so far), from the bridge's diagnostics
 
@@ -81,7 +81,7 @@ class TrialRecorder:
     def _on_transition(self, message: Transition) -> None:
         with self.changed:
             row = (message.header.stamp.to_sec(), message.path, message.from_state, message.outcome, message.to_state)
-            self.trial.transitions.append((*row, message.reason))
+            self.trial.transitions.append((*row, message.reason, message.reason_code))
             self.changed.notify_all()
 
     def _on_contact(self, message: Contact) -> None:

@@ -12,6 +12,7 @@ import time
 from collections.abc import Callable, Mapping
 
 import numpy as np
+from coglab_msgs.msg import ReasonCode
 from coglab_perception.frames import FrameNames
 
 from .perception_stand_in import Board, PerceptionSettings, Sight, Tracker
@@ -28,7 +29,11 @@ IN_HAND = 0.20
 
 
 class NotSeen(Exception):
-    """Perception cannot answer; the text is the sentence for who asked."""
+    """Perception cannot answer; the text is the sentence for who asked, `code` its ReasonCode."""
+
+    def __init__(self, sentence: str, code: int) -> None:
+        super().__init__(sentence)
+        self.code = code
 
 
 class PartnerChoice:
@@ -123,7 +128,7 @@ class Vision:
             if self._changed.wait_for(self._world_is_visible, limit):
                 return "tracker stand-in sees the cell"
         raise NotSeen(f"the cell was not visible within {limit:.1f} s; is the simulated cell, or "
-                      "the recording, running?")
+                      "the recording, running?", ReasonCode.NOT_PERCEIVED)
 
     def locate(self, target: str, timeout: float) -> tuple[str, Sight, float]:
         """Newest fresh sight of an object (by id), of the partner's hand or of the board.
@@ -138,7 +143,10 @@ class Vision:
             found = self._changed.wait_for(lambda: self._is_fresh(name) and not self._doubt(name),
                                            limit)
             if not found:
-                raise NotSeen(self._doubt(name) or self._absence(name, limit))
+                doubt = self._doubt(name)
+                if doubt:
+                    raise NotSeen(doubt, ReasonCode.NOT_PERCEIVED)
+                raise NotSeen(self._absence(name, limit), ReasonCode.OBJECT_NOT_SEEN)
             sight = self._trackers[name].newest
             assert sight is not None
             return name, sight, max(0.0, self.clock() - sight.captured)
@@ -153,14 +161,14 @@ class Vision:
         with self._changed:
             if not self._changed.wait_for(self._world_is_visible, limit):
                 raise NotSeen(f"the board was not visible within {limit:.1f} s; is the simulated "
-                              "cell, or the recording, running?")
+                              "cell, or the recording, running?", ReasonCode.NOT_PERCEIVED)
             objects = {name: tracker.newest.frame.position
                        for name, tracker in self._trackers.items()
                        if tracker.newest is not None and name not in (self.names.human_hand, own)}
         free = self.board.free(list(objects.values()))
         if not free:
             raise NotSeen(f"no place on the board is free: {', '.join(sorted(objects))} lie near "
-                          f"{', '.join(self.board.slots)}; clear one")
+                          f"{', '.join(self.board.slots)}; clear one", ReasonCode.NO_FREE_PLACE)
         return [(name, self.board.slots[name]) for name in free]
 
     # -- judging ---------------------------------------------------------------------------------

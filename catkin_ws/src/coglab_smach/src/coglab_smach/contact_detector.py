@@ -10,11 +10,13 @@ The detector works only while the arm stands still: it enforces that itself, who
 """
 from __future__ import annotations
 
+import math
 from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+from coglab_msgs.msg import ReasonCode
 
 from .ports import ContactEvent
 
@@ -69,6 +71,12 @@ def sensitive_joints(jacobian: np.ndarray, user_direction: Sequence[float], shar
     across = jacobian - np.outer(d, d @ jacobian)
     lever = np.linalg.norm(across, axis=0)
     return [int(j) for j in np.flatnonzero(lever >= share * lever.max())]
+
+
+def confidence(deviations: float) -> float:
+    """Probability (0..1) that a signal is over its threshold when it was measured so many standard deviations above it,
+    with normal noise."""
+    return 0.5 * (1.0 + math.erf(deviations / math.sqrt(2.0)))
 
 
 @dataclass
@@ -242,7 +250,9 @@ class ContactDetector:
         armed.over = armed.over + 1 if self.margin > 1.0 else 0
         if armed.over < self.settings.confirm:
             return None
-        return self._event(True, "joint_torque", self.margin,
+        # In standard deviations the threshold is k, and the signal margin times k.
+        return self._event(True, "joint_torque", self.margin, confidence((self.margin - 1.0) * armed.k),
+                           ReasonCode.CONTACT_FOUND,
                            f"torque of joints {[j + 1 for j in armed.watched]} changed by {self.margin:.1f} x its "
                            f"threshold within {self.settings.window * 1000:.0f} ms")
 
@@ -251,12 +261,15 @@ class ContactDetector:
         if armed.mode != "contact" or self._rest_before_motion is None or armed.baseline is None:
             return None
         offset = np.abs(armed.baseline - self._rest_before_motion)[armed.watched]
-        ratio = float(np.max(offset)) / self.settings.offset_threshold
+        largest = int(np.argmax(offset))
+        ratio = float(offset[largest]) / self.settings.offset_threshold
         if ratio <= 1.0:
             return None
         self._unloaded = self._rest_before_motion
-        return self._event(True, "torque_offset", ratio,
-                           f"torque offset {float(np.max(offset)):.2f} Nm on arming: the object was there already")
+        over = float(offset[largest]) - self.settings.offset_threshold
+        return self._event(True, "torque_offset", ratio, confidence(over / float(self.sigma()[armed.watched][largest])),
+                           ReasonCode.CONTACT_CAME_EARLY,
+                           f"torque offset {float(offset[largest]):.2f} Nm on arming: the object was there already")
 
     def _watch_weight(self, stamp: float, armed: _Armed, position: Sequence[float]) -> ContactEvent | None:
         """Has the weight come (load) or gone (release)?"""
@@ -278,9 +291,11 @@ class ContactDetector:
         if stamp - armed.gone_since < confirm:
             return None
         verb = "carried now" if armed.mode == "load" else "of the load are gone"
-        return self._event(armed.mode == "load", "joint_torque", self.margin,
+        deviation = float(np.linalg.norm(lever * self.sigma()[armed.watched])) / float(lever @ lever)
+        return self._event(armed.mode == "load", "joint_torque", self.margin, confidence((force - needed) / deviation),
+                           ReasonCode.LOAD_CARRIED if armed.mode == "load" else ReasonCode.LOAD_RELEASED,
                            f"{force:.1f} N {verb} (needed {needed:.1f} N)")
 
-    def _event(self, contact: bool, source: str, margin: float, message: str) -> ContactEvent:
+    def _event(self, contact: bool, source: str, margin: float, sure: float, code: int, message: str) -> ContactEvent:
         self._armed = None
-        return ContactEvent(contact, source, margin, message)
+        return ContactEvent(contact, source, margin, message, sure, code)

@@ -75,7 +75,8 @@ class RosContact:
 
     def _on_contact(self, message: Contact) -> None:
         if self._wanted is not None and self._event is None and message.contact == self._wanted:
-            self._event = ContactEvent(message.contact, message.source, message.margin, message.message)
+            self._event = ContactEvent(message.contact, message.source, message.margin, message.message,
+                                       message.confidence, message.reason_code)
 
     def arm(self, mode: str, time_limit: float, settings: dict[str, Any]) -> Pending:
         self._event = None
