@@ -5,4 +5,4 @@ from setuptools import setup
 setup(**generate_distutils_setup(
     packages=["coglab_smach", "coglab_smach.states", "coglab_smach.machines"],
     package_dir={"": "src"},
-    package_data={"coglab_smach": ["object_schema.json"]}))
+    package_data={"coglab_smach": ["machines_schema.json"]}))

@@ -19,6 +19,7 @@ import tf2_ros
 from coglab_bringup import scene
 from coglab_msgs.msg import DmpFeedback, MasterState
 from coglab_perception.tf_listener import TfListener
+from coglab_py import parameters
 from visualization_msgs.msg import MarkerArray
 
 PERIOD = 0.2  # s
@@ -31,8 +32,8 @@ class SceneMarkers:
 
     def __init__(self) -> None:
         self.library = cc.Library()
-        self.library.load(rospy.get_param("coglab/dmp_library"))
-        self.board_size = tuple(rospy.get_param("~board_size", [0.40, 0.50]))
+        self.library.load(parameters.read("coglab/dmp_library", str))
+        self.board_size = tuple(parameters.numbers("~board_size", [0.40, 0.50], 2))
         self.lock = threading.Lock()
         self.words = ""
         self.primitive, self.start = "", None  # of the motion that runs; start: m in the base, (3,)

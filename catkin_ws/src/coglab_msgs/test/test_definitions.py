@@ -1,4 +1,4 @@
-"""Every definition of this package: a sentence has a code beside it, a field has a comment, a file is listed in CMakeLists.txt."""
+"""Every definition of this package: a sentence has a code beside it, a comment says what it is, CMake generates it."""
 import re
 from pathlib import Path
 
@@ -38,8 +38,8 @@ def test_a_sentence_has_a_code_beside_it(path: Path) -> None:
         for array in (None, "[]"):
             wanted = [match[2] for match in sentences if match[1] == array]
             found = [match[0] for match in codes if match[1] == array]
-            assert len(found) >= len(wanted), (f"{path.name}: each of {wanted} needs a field uint16{array or ''} of its "
-                                               f"own whose comment names ReasonCode; found {found}")
+            assert len(found) >= len(wanted), (f"{path.name}: each of {wanted} needs a field uint16{array or ''} of "
+                                               f"its own whose comment names ReasonCode; found {found}")
 
 
 @pytest.mark.parametrize("path", DEFINITIONS, ids=lambda path: path.name)

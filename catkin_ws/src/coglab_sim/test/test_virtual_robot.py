@@ -3,9 +3,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from coglab_py.pose import Pose
 from coglab_sim import _cell  # noqa: F401
 from coglab_sim.participant import Participant
-from coglab_sim.rigid import Frame
 from coglab_sim.scene import Scene, WorldView
 from coglab_sim.virtual_human import VirtualHuman
 
@@ -36,7 +36,7 @@ class Trial:
         speed = 0.0 if self.last_palm is None else np.linalg.norm(palm['position'] - self.last_palm) / cell.period
         self.last_palm = palm['position']
         obj = truth['object']
-        view = WorldView(Frame(palm['position'], palm['rotation']), speed, Frame(obj['position'], obj['rotation']),
+        view = WorldView(Pose(palm['position'], palm['rotation']), speed, Pose(obj['position'], obj['rotation']),
                          float(np.linalg.norm(truth['palm_force'])), truth['robot_load_share'],
                          truth['human_load_share'], truth['held_by'])
         hand = self.human.step(self.robot.now, view)

@@ -14,6 +14,7 @@ import numpy as np
 import rospy
 from coglab_msgs.msg import Contact, ReasonCode
 from coglab_msgs.srv import ArmContact, ArmContactResponse
+from coglab_py import parameters
 from coglab_smach.contact_detector import ContactDetector, DetectorSettings
 from coglab_smach.ros_publish import publish
 from sensor_msgs.msg import JointState
@@ -26,8 +27,12 @@ class ContactDetectorNode:
     def __init__(self, urdf: str) -> None:
         settings = DetectorSettings()
         for field in dataclasses.fields(settings):
-            if rospy.has_param(f"~{field.name}"):
-                setattr(settings, field.name, rospy.get_param(f"~{field.name}"))
+            default = getattr(settings, field.name)
+            if isinstance(default, tuple):
+                value = tuple(parameters.numbers(f"~{field.name}", default, len(default)))
+            else:
+                value = parameters.read(f"~{field.name}", type(default), default)
+            setattr(settings, field.name, value)
         self.arm = cc.Chain(urdf)
         self.joints = tuple(self.arm.joint_names)
         self.detector = ContactDetector(settings, lambda q: self.arm.jacobian(np.asarray(q, dtype=float))[:3])
@@ -103,12 +108,15 @@ class ContactDetectorNode:
 def main() -> int:
     """Entry point."""
     rospy.init_node("contact_detector")
-    found = rospy.search_param("robot_description")
-    urdf = rospy.get_param(found) if found else None
+    urdf = parameters.found_above("robot_description", str)
     if urdf is None:
         rospy.logfatal("contact_detector: parameter robot_description is missing; load lwr_description's URDF")
         return 1
-    ContactDetectorNode(urdf)
+    try:
+        ContactDetectorNode(urdf)
+    except parameters.ParameterError as error:
+        rospy.logfatal("contact_detector: %s", error)
+        return 1
     rospy.spin()
     return 0
 

@@ -1,6 +1,6 @@
 """The contracts of the ports on their doubles."""
 import pytest
-from coglab_smach.object_database import ObjectDatabase
+from coglab_objects.database import ObjectDatabase, objects_folder
 from coglab_smach.simulated_cell import SimulatedCell
 from coglab_smach.simulated_ports import (
     SimulatedArm,
@@ -9,7 +9,6 @@ from coglab_smach.simulated_ports import (
     SimulatedHand,
     SimulatedPerception,
 )
-from conftest import SHARE
 from port_contracts import SUITES, Place
 
 
@@ -31,7 +30,7 @@ def double_of(name):
     cell = SimulatedCell(clock)
     cell.partner.touch_after = cell.partner.take_after = cell.partner.let_go_after = None
     cell.faults.empty_grasp = True
-    database = ObjectDatabase(str(SHARE / "objects"))
+    database = ObjectDatabase(objects_folder())
     assert database.reload() == []
     ports = {"arm": SimulatedArm, "hand": SimulatedHand, "perception": SimulatedPerception, "contact": SimulatedContact,
              "database": lambda at: SimulatedDatabase(at, database)}

@@ -2,7 +2,7 @@
 
 import ih2_hand.progress as progress
 from coglab_msgs.msg import ReasonCode
-from coglab_smach.object_database import ObjectError
+from coglab_objects.database import ObjectError
 from coglab_smach.pending import Polled, PortError, Ready
 from coglab_smach.ports import DmpProgress, HandState, Located, Recognition, Verdict
 

@@ -8,11 +8,12 @@ from types import SimpleNamespace
 import coglab_controllers as cc
 import numpy as np
 import yaml
+from coglab_objects.database import cell_parameters, objects_folder, read_object
+from coglab_py.pose import Pose, about_z, rotation
 from coglab_sim import _cell  # noqa: F401  (knows the type of VirtualRobot.cell)
 from coglab_sim._virtual import VirtualRobot
 from coglab_sim.participant import Participant
 from coglab_sim.perception_stand_in import PerceptionSettings, Tracker
-from coglab_sim.rigid import Frame, quat_from_rotvec, quat_multiply
 from coglab_sim.scene import Scene, WorldView
 from coglab_sim.virtual_human import VirtualHuman
 from coglab_smach.contact_detector import ContactDetector, DetectorSettings
@@ -27,7 +28,7 @@ SOURCES = Path(__file__).resolve().parents[2]
 URDF = SOURCES / "lwr_description" / "urdf" / "lwr_ih2.urdf"
 LIMITS = str(SOURCES / "lwr_description" / "config" / "joint_limits.yaml")
 MANAGER = SOURCES / "coglab_controllers" / "config" / "controllers.yaml"
-BOARD = Frame(np.array([0.45, -0.55, 0.05]), quat_from_rotvec([0, 0, -np.pi / 2]))
+BOARD = Pose(np.array([0.45, -0.55, 0.05]), about_z(-np.pi / 2))
 DT = 0.005
 FLOAT32 = 5e-4
 """rad/s, what rounding to float32 on the wire adds to a velocity between two answers"""
@@ -145,15 +146,17 @@ class Rig:
 
     def __init__(self, seed=1, behaviour="normal", perfect=False, object_on="human_hand", perception=None, turned=0.0,
                  limits=LIMITS):
-        where = {"object__start": object_on, "object__position": [-0.08, 0.0, -0.05],
-                 "object__rotation": [float(v) for v in quat_from_rotvec([0, 0, turned])]}
+        thing, _ = read_object(objects_folder() / "mug.yaml")
+        where = {**{f"object__{name}": value for name, value in cell_parameters(thing).items()},
+                 "object__start": object_on, "object__position": [-0.08, 0.0, -0.05],
+                 "object__rotation": [float(v) for v in about_z(turned)]}
         if object_on == "world":
             where["object__position"] = [float(v) for v in BOARD.apply([0.0, 0.0, 0.002])]
             where["object__rotation"] = [float(v) for v in BOARD.orientation]
         self.robot = Robot(seed, limits, **where)
         self.cell = self.robot.cell
         self.hand = Hand()
-        self.scene = Scene()
+        self.scene = Scene(object_mass=thing["mass"])
         self.human = VirtualHuman(Participant.draw(seed, behaviour), self.scene, object_on == "human_hand")
         settings = perception or PerceptionSettings(perfect=perfect)
         self.trackers = {name: Tracker(name, settings, seed) for name in ("object_mug", "human_hand")}
@@ -220,17 +223,16 @@ class Rig:
 
 
 def frame_of(pose):
-    """A pose of the truth as a Frame."""
-    return Frame(np.asarray(pose["position"]), np.asarray(pose["rotation"]))
+    """A pose of the truth as a Pose."""
+    return Pose(np.asarray(pose["position"]), np.asarray(pose["rotation"]))
 
 
 def palm_goal(frame, offset, orientation):
     """The palm's goal from the frame it is given in: (position, unit quaternion)."""
-    target = quat_multiply(frame.orientation, orientation)
-    return frame.apply(offset), target / np.linalg.norm(target)
+    goal = frame * Pose(np.asarray(offset, dtype=float), rotation(orientation).as_quat())
+    return goal.position, goal.orientation
 
 
 def distance(a, b):
     """(m, rad) between two poses (position, quaternion)."""
-    d = min(1.0, abs(float(np.dot(a[1], b[1]))))
-    return float(np.linalg.norm(np.asarray(a[0]) - np.asarray(b[0]))), 2.0 * float(np.arccos(d))
+    return Pose(np.asarray(a[0]), np.asarray(a[1])).distance(Pose(np.asarray(b[0]), np.asarray(b[1])))

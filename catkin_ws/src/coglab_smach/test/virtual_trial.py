@@ -2,11 +2,11 @@
 import dataclasses
 from pathlib import Path
 
+from coglab_objects.database import ObjectDatabase, objects_folder
 from coglab_smach.config import Config
 from coglab_smach.context import Context
 from coglab_smach.journal import Journal
 from coglab_smach.machines import build_master
-from coglab_smach.object_database import ObjectDatabase
 from coglab_smach.reachability import default_arm, solve
 from coglab_smach.virtual_clock import VirtualClock, using
 from virtual_ports import VirtualArm, VirtualContact, VirtualDatabase, VirtualHand, VirtualPerception
@@ -28,7 +28,7 @@ class VirtualTrial:
         self.clock = VirtualClock()
         self.recogniser, self.later_behaviour = recogniser, later_behaviour
         self.last_hub = ""
-        database = ObjectDatabase(str(SHARE / "objects"))
+        database = ObjectDatabase(objects_folder())
         database.reload()
         config = Config.load(str(SHARE / "config" / "machines.yaml"),
                              {"auto_trigger": True, "dmp_library": LIBRARY, **overrides})

@@ -14,9 +14,9 @@ from collections.abc import Callable, Mapping
 import numpy as np
 from coglab_msgs.msg import ReasonCode
 from coglab_perception.frames import FrameNames
+from coglab_py.pose import Pose
 
 from .perception_stand_in import Board, PerceptionSettings, Sight, Tracker
-from .rigid import Frame
 
 OLDEST = 0.5
 """s: an older sight is no answer to locate_object, and an older world is not visible."""
@@ -50,7 +50,7 @@ class PartnerChoice:
         self.margin = margin
         self._chosen = ""
 
-    def choose(self, hands: Mapping[str, Frame], robot: Frame | None) -> str:
+    def choose(self, hands: Mapping[str, Pose], robot: Pose | None) -> str:
         """Name of the partner's hand, empty if none can be told."""
         if len(hands) <= 1:
             self._chosen = next(iter(hands), "")
@@ -91,8 +91,8 @@ class Vision:
 
     # -- seeing ----------------------------------------------------------------------------------
 
-    def see(self, hands: Mapping[str, Frame], objects: Mapping[str, Frame],
-            robot: Frame | None = None) -> list[Sight]:
+    def see(self, hands: Mapping[str, Pose], objects: Mapping[str, Pose],
+            robot: Pose | None = None) -> list[Sight]:
         """The world as it is now: hands of people by any name, objects by frame name.
 
         Returns the sights that are to be broadcast: the partner's hand and the objects.
@@ -111,7 +111,7 @@ class Vision:
             self._changed.notify_all()
         return sights
 
-    def _track(self, name: str, now: float, frame: Frame, robot: Frame | None) -> list[Sight]:
+    def _track(self, name: str, now: float, frame: Pose, robot: Pose | None) -> list[Sight]:
         if name not in self._trackers:
             self._trackers[name] = Tracker(name, self.settings, self.seed)
         sights = self._trackers[name].step(now, frame, robot)

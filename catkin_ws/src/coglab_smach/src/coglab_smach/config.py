@@ -1,12 +1,16 @@
-"""Configuration of the machines from one YAML file, read again whenever the file changes."""
+"""Configuration of the machines from one YAML file, checked against machines_schema.json and read again whenever the file
+changes."""
 from __future__ import annotations
 
+import json
 import os
 import threading
 from collections.abc import Callable, Mapping
+from functools import lru_cache
+from pathlib import Path
 from typing import Any
 
-import yaml
+from coglab_py.yaml_file import Document, YamlError, read
 
 
 class ConfigError(Exception):
@@ -29,6 +33,7 @@ class Config:
              warn: Callable[[str], None] | None = None) -> Config:
         """Read a file; ConfigError names file and line. ``overrides`` (dotted names) win over the file for good."""
         config = Config(_read(path), path, warn)
+        _checked(Document("configuration given beside the file", "", _nested(overrides or {}), {}))
         config._overrides = dict(overrides or {})
         return config
 
@@ -71,12 +76,35 @@ class Config:
 
 def _read(path: str) -> dict[str, Any]:
     try:
-        with open(path, encoding="utf-8") as stream:
-            values = yaml.safe_load(stream)
-    except OSError as error:
-        raise ConfigError(f"{path}: cannot be read ({error.strerror})") from error
-    except yaml.YAMLError as error:
-        raise ConfigError(f"{path}: not YAML: {error}") from error
-    if not isinstance(values, dict):
-        raise ConfigError(f"{path}: expected a mapping at the top, got {type(values).__name__}")
+        document = read(path)
+    except YamlError as error:
+        raise ConfigError(str(error)) from None
+    return _checked(document)
+
+
+def _checked(document: Document) -> dict[str, Any]:
+    try:
+        document.check(_schema())
+    except YamlError as error:
+        raise ConfigError(str(error)) from None
+    values: dict[str, Any] = document.value
     return values
+
+
+def _nested(overrides: Mapping[str, Any]) -> dict[str, Any]:
+    """Values by dotted name as the file would have them."""
+    values: dict[str, Any] = {}
+    for name, value in overrides.items():
+        node = values
+        *above, last = name.split(".")
+        for part in above:
+            node = node.setdefault(part, {})
+        node[last] = value
+    return values
+
+
+@lru_cache(maxsize=1)
+def _schema() -> dict[str, Any]:
+    text = Path(__file__).with_name("machines_schema.json").read_text(encoding="utf-8")
+    schema: dict[str, Any] = json.loads(text)
+    return schema

@@ -5,12 +5,13 @@ import threading
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
+from coglab_py.pose import Pose
+
 from .clock import Clock
 from .config import Config
 from .holding import HoldingMemory
 from .journal import Journal
 from .ports import ArmPort, ContactPort, DatabasePort, HandPort, PerceptionPort
-from .pose import Pose
 from .requests import Requests
 
 

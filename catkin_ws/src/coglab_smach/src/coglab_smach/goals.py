@@ -9,8 +9,7 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-
-from .pose import Pose, rotate
+from coglab_py.pose import Pose
 
 
 def _goal(frame: str, palm: Pose, entry: Mapping[str, Any], role: str) -> dict[str, Any]:
@@ -27,7 +26,7 @@ def palm_at_grasp(grasp: Mapping[str, Any], standoff: float | None = None) -> Po
     distance = float(approach.get("distance", 0.0)) if standoff is None else standoff
     if distance == 0.0:
         return palm
-    axis = np.asarray(approach.get("axis", rotate(palm.orientation, [1.0, 0.0, 0.0])), dtype=float)
+    axis = np.asarray(approach.get("axis", palm.axis(0)), dtype=float)
     return Pose(palm.position - distance * axis / np.linalg.norm(axis), palm.orientation)
 
 

@@ -6,14 +6,14 @@ from typing import Any
 
 import coglab_controllers as cc
 import numpy as np
+from coglab_py.packages import package_path
 
 from .motion_time import MotionLimits
-from .reachability import shared_file
 
 
 def read_limits(parameters: Mapping[str, Any]) -> MotionLimits:
     """From the parameters below /controller_manager; what is not there has the manager's own default."""
-    table = str(parameters.get("joint_limits_file") or shared_file("lwr_description", "config", "joint_limits.yaml"))
+    table = str(parameters.get("joint_limits_file") or package_path("lwr_description", "config", "joint_limits.yaml"))
     limits = cc.load_joint_limits(table, str(parameters.get("joint_limits_profile", "default")))
     velocity = np.asarray(parameters.get("joint_vel_limit", limits.velocity), dtype=float)
     acceleration = np.asarray(limits.acceleration, dtype=float)

@@ -7,15 +7,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from functools import lru_cache
-from pathlib import Path
 from typing import Any
 
 import coglab_controllers as cc
 import numpy as np
 import yaml
+from coglab_py.packages import package_path
+from coglab_py.pose import Pose, about_z
 
 from .goals import palm_at_grasp
-from .pose import Pose, conjugate, multiply
 
 POSITION_TOLERANCE = 0.003
 ANGLE_TOLERANCE = np.radians(3.0)
@@ -23,32 +23,22 @@ REGION = ((0.72, 0.78, 0.82), (-0.12, 0.0, 0.12), (0.28, 0.38, 0.45))
 """m, base frame: object positions at a handover."""
 
 
-def shared_file(package: str, *path: str) -> Path:
-    """A file of a package of this workspace, found beside this package or through rospack."""
-    for parent in Path(__file__).resolve().parents:
-        candidate = parent.joinpath(package, *path)
-        if candidate.is_file():
-            return candidate
-    import rospkg
-    return Path(rospkg.RosPack().get_path(package)).joinpath(*path)
-
-
 @lru_cache(maxsize=1)
 def default_arm() -> cc.Chain:
     """The arm of lwr_description."""
-    return cc.Chain(shared_file("lwr_description", "urdf", "lwr_ih2.urdf").read_text(encoding="utf-8"))
+    return cc.Chain(package_path("lwr_description", "urdf", "lwr_ih2.urdf").read_text(encoding="utf-8"))
 
 
 @lru_cache(maxsize=1)
 def joint_limits() -> cc.JointLimits:
     """The table of lwr_description."""
-    return cc.load_joint_limits(str(shared_file("lwr_description", "config", "joint_limits.yaml")))
+    return cc.load_joint_limits(str(package_path("lwr_description", "config", "joint_limits.yaml")))
 
 
 @lru_cache(maxsize=1)
 def home_posture() -> np.ndarray:
     """``postures.home`` of the machines' configuration, rad."""
-    text = shared_file("coglab_smach", "config", "machines.yaml").read_text(encoding="utf-8")
+    text = package_path("coglab_smach", "config", "machines.yaml").read_text(encoding="utf-8")
     return np.array(yaml.safe_load(text)["postures"]["home"], dtype=float)
 
 
@@ -64,7 +54,8 @@ def solve(arm: cc.Chain, target: Pose, start: Sequence[float] | None = None, ste
     lower, upper = 0.98 * joint_limits().lower_position, 0.98 * joint_limits().upper_position
     for _ in range(steps):
         pose = Pose(*arm.fk(q))
-        error = np.concatenate([target.position - pose.position, _rotation_error(target, pose)])
+        turn = (target.rotation * pose.rotation.inv()).as_rotvec()
+        error = np.concatenate([target.position - pose.position, turn])
         if np.linalg.norm(error[:3]) < POSITION_TOLERANCE and np.linalg.norm(error[3:]) < ANGLE_TOLERANCE:
             return q
         error[:3] *= min(1.0, 0.08 / max(1e-9, float(np.linalg.norm(error[:3]))))
@@ -73,12 +64,6 @@ def solve(arm: cc.Chain, target: Pose, start: Sequence[float] | None = None, ste
         dq = j.T @ np.linalg.solve(j @ j.T + 1e-4 * np.eye(6), error)
         q = np.clip(q + dq, lower, upper)
     return None
-
-
-def _rotation_error(target: Pose, pose: Pose) -> np.ndarray:
-    q = multiply(target.orientation, conjugate(pose.orientation))
-    q = q if q[3] >= 0 else -q
-    return 2.0 * q[:3]
 
 
 def share_reached(palm_in_object: Pose, arm: cc.Chain | None = None,
@@ -91,8 +76,7 @@ def share_reached(palm_in_object: Pose, arm: cc.Chain | None = None,
         for y in REGION[1]:
             for z in REGION[2]:
                 for yaw in yaws_deg:
-                    half = np.radians(yaw) / 2
-                    at = Pose(np.array([x, y, z]), np.array([0.0, 0.0, np.sin(half), np.cos(half)]))
+                    at = Pose(np.array([x, y, z]), about_z(np.radians(yaw)))
                     total += 1
                     reached += solve(arm, at * palm_in_object) is not None
     return reached, total

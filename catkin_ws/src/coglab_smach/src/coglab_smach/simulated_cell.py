@@ -12,10 +12,10 @@ from typing import Any
 
 import numpy as np
 from coglab_msgs.msg import ReasonCode
+from coglab_py.pose import Pose
 
 from .clock import Clock
 from .pending import Pending, PortError
-from .pose import Pose
 from .simulated_arm_model import ArmModel
 
 

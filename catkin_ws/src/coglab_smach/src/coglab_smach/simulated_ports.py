@@ -11,13 +11,13 @@ from typing import Any
 
 import numpy as np
 from coglab_msgs.msg import ReasonCode
+from coglab_objects.database import ObjectDatabase, ObjectError
+from coglab_py.pose import Pose
 
 from .clock import Clock
 from .motion_time import MotionLimits
-from .object_database import ObjectDatabase, ObjectError
 from .pending import Pending, Polled, PortError, Ready
 from .ports import ContactEvent, DmpProgress, DmpRequest, HandState, Located, Recognition, Verdict
-from .pose import Pose
 from .simulated_cell import SimulatedCell
 
 MODES = ("cylindrical", "lateral", "tridigit", "bidigit", "tridigit2", "bidigit2")

@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 from coglab_msgs.msg import ReasonCode
+from coglab_py.pose import Pose, mean_pose
 
 from ..context import Context
 from ..goals import delivery_goal, grasp_goal, place_goal
 from ..pending import PortError
-from ..pose import Pose, mean_pose
 from .base import CoglabState
 
 

@@ -9,7 +9,8 @@ import sys
 import rospy
 from coglab_msgs.msg import ReasonCode
 from coglab_msgs.srv import GetObject, GetObjectResponse, ListObjects, ListObjectsResponse
-from coglab_smach.object_database import ObjectDatabase, ObjectError
+from coglab_objects.database import ObjectDatabase, ObjectError
+from coglab_py import parameters
 from std_srvs.srv import Trigger, TriggerResponse
 
 MIRROR = "~objects"
@@ -19,8 +20,8 @@ class ObjectDatabaseNode:
     """Thin node over ObjectDatabase."""
 
     def __init__(self) -> None:
-        self.database = ObjectDatabase(str(rospy.get_param("~folder")),
-                                       str(rospy.get_param("ih2_hand/dialect", "legacy")))
+        self.database = ObjectDatabase(parameters.read("~folder", str),
+                                       parameters.read("ih2_hand/dialect", str, "legacy"))
         self.reported: list[str] = []
         self.mirrored: dict[str, str] | None = None  # text by id; None: what an earlier run has left is not removed yet
         self.behind = False  # the mirror could not be brought up to the database
@@ -89,8 +90,8 @@ def main() -> int:
     rospy.init_node("object_database")
     try:
         ObjectDatabaseNode()
-    except KeyError:
-        rospy.logfatal("object_database: parameter ~folder is missing: the folder with one YAML file per object")
+    except parameters.ParameterError as error:
+        rospy.logfatal("object_database: %s; ~folder is the folder with one YAML file per object", error)
         return 1
     rospy.spin()
     return 0

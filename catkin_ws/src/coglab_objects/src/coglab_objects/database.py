@@ -3,137 +3,55 @@ without a restart."""
 from __future__ import annotations
 
 import json
-import math
 import os
-import stat
 import threading
-from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-import jsonschema
 import numpy as np
-import yaml
+from coglab_py.packages import package_path
+from coglab_py.pose import Pose
+from coglab_py.yaml_file import Document, Field, YamlError, parse, read
 from ih2_hand.grasps import check_grasp
 
-from .pose import Pose
-
 SCHEMA_FILE = Path(__file__).with_name("object_schema.json")
-LARGEST_FILE = 100_000
-"""bytes; an object is a page of text, not a data set."""
-DEEPEST = 16
-"""levels of lists and mappings inside each other; an object has five."""
-LARGEST_INTEGER = 2**31 - 1
-"""of the parameter server."""
 
 
-class ObjectError(Exception):
+class ObjectError(ValueError):
     """An object file cannot be used: file, line where known, field, and what was expected."""
 
 
-class _Loader(yaml.SafeLoader):
-    """Safe loader that refuses aliases and deep nesting."""
-
-    depth = 0
-
-    def compose_node(self, parent: Any, index: Any) -> Any:
-        line = self.peek_event().start_mark.line + 1
-        if self.check_event(yaml.events.AliasEvent):
-            raise ObjectError(f"line {line}: aliases (*name) are not allowed")
-        if self.depth > DEEPEST:
-            raise ObjectError(f"line {line}: nested more than {DEEPEST} levels deep")
-        self.depth += 1
-        node = super().compose_node(parent, index)
-        self.depth -= 1
-        return node
-
-
-def _walk_lines(node: yaml.Node, path: tuple[Any, ...], lines: dict[tuple[Any, ...], int]) -> None:
-    lines[path] = node.start_mark.line + 1
-    if isinstance(node, yaml.MappingNode):
-        seen = set()
-        for key, value in node.value:
-            if not isinstance(key, yaml.ScalarNode):
-                raise ObjectError(f"line {key.start_mark.line + 1}: a field's name is one word, no list or mapping")
-            if key.value in seen:
-                raise ObjectError(f"line {key.start_mark.line + 1}: field '{key.value}' appears twice")
-            seen.add(key.value)
-            _walk_lines(value, (*path, key.value), lines)
-            lines[(*path, key.value)] = key.start_mark.line + 1
-    elif isinstance(node, yaml.SequenceNode):
-        for i, value in enumerate(node.value):
-            _walk_lines(value, (*path, i), lines)
-
-
-def _line(lines: dict[tuple[Any, ...], int], path: tuple[Any, ...]) -> int:
-    while path and path not in lines:
-        path = path[:-1]
-    return lines.get(path, 1)
+def objects_folder() -> Path:
+    """The folder with the objects that are shipped."""
+    return package_path("coglab_objects", "objects")
 
 
 def parse_object(text: str, origin: str, dialect: str = "legacy") -> dict[str, Any]:
     """Parse and check one object for a hand of this dialect; ObjectError says ``origin:line: field: what``."""
-    if len(text) > LARGEST_FILE:
-        raise ObjectError(f"{origin}: {len(text)} bytes; an object file has at most {LARGEST_FILE}")
-    lines: dict[tuple[Any, ...], int] = {}
     try:
-        loader = _Loader(text)
-        node = loader.get_single_node()
-        if node is None:
-            raise ObjectError("line 1: the file is empty")
-        _walk_lines(node, (), lines)
-        entry = loader.construct_document(node)
-    except ObjectError as error:
-        raise ObjectError(f"{origin}: {error}") from None
-    except yaml.YAMLError as error:
-        mark = getattr(error, "problem_mark", None)
-        where = f"{origin}:{mark.line + 1}" if mark else origin
-        raise ObjectError(f"{where}: not YAML: {getattr(error, 'problem', error)}") from None
-    except Exception as error:  # a date that does not exist, a tag that does not fit its value, ...
-        raise ObjectError(f"{origin}: a value cannot be read as what it looks like or is tagged as: {error}") from None
-    errors = sorted(_validator().iter_errors(entry), key=lambda e: (len(e.absolute_path), str(e.absolute_path)))
-    if errors:
-        deepest = jsonschema.exceptions.best_match(errors)
-        path = tuple(deepest.absolute_path)
-        field = ".".join(str(p) for p in path) or "top level"
-        raise ObjectError(f"{origin}:{_line(lines, path)}: {field}: {deepest.message}")
-    problem = next(_unfit(entry, ()), None) or _inconsistency(entry, dialect)
+        return _checked(parse(text, origin), dialect)
+    except YamlError as error:
+        raise ObjectError(str(error)) from None
+
+
+def _checked(document: Document, dialect: str) -> dict[str, Any]:
+    document.check(_schema())
+    problem = _inconsistency(document.value, dialect)
     if problem is not None:
-        path, message = problem
-        raise ObjectError(f"{origin}:{_line(lines, path)}: {'.'.join(map(str, path))}: {message}")
+        raise YamlError(document.sentence(*problem))
+    entry: dict[str, Any] = document.value
     return entry
 
 
-_VALIDATOR: jsonschema.Draft7Validator | None = None
+@lru_cache(maxsize=1)
+def _schema() -> dict[str, Any]:
+    schema: dict[str, Any] = json.loads(SCHEMA_FILE.read_text(encoding="utf-8"))
+    return schema
 
 
-def _validator() -> jsonschema.Draft7Validator:
-    global _VALIDATOR
-    if _VALIDATOR is None:
-        _VALIDATOR = jsonschema.Draft7Validator(json.loads(SCHEMA_FILE.read_text(encoding="utf-8")))
-    return _VALIDATOR
-
-
-def _unfit(value: Any, path: tuple[Any, ...]) -> Iterator[tuple[tuple[Any, ...], str]]:
-    """What a schema lets pass and nobody can use: numbers that are none, texts that no message can carry."""
-    if isinstance(value, dict):
-        for key, item in value.items():
-            yield from _unfit(key, path)
-            yield from _unfit(item, (*path, key))
-    elif isinstance(value, list):
-        for i, item in enumerate(value):
-            yield from _unfit(item, (*path, i))
-    elif isinstance(value, str):
-        if not all(c.isprintable() or c in "\n\t" for c in value):
-            yield path, "a text without control characters expected"
-    elif isinstance(value, float) and not math.isfinite(value):
-        yield path, f"a finite number expected, got {value}"
-    elif isinstance(value, int) and abs(value) > LARGEST_INTEGER:
-        yield path, f"a whole number of at most {LARGEST_INTEGER} expected"
-
-
-def _inconsistency(entry: dict[str, Any], dialect: str) -> tuple[tuple[Any, ...], str] | None:
+def _inconsistency(entry: dict[str, Any], dialect: str) -> tuple[Field, str] | None:
     """What the schema cannot see: references between fields, and geometry. None if all is well."""
     for kind, default in (("grasps", "default_grasp"), ("deliveries", "default_delivery")):
         if entry[default] not in entry[kind]:
@@ -159,18 +77,22 @@ def _inconsistency(entry: dict[str, Any], dialect: str) -> tuple[tuple[Any, ...]
 def read_object(path: Path, dialect: str = "legacy") -> tuple[dict[str, Any], str]:
     """Entry and text of one file; ObjectError if it cannot be read or used."""
     try:
-        found = os.stat(path)
-        if not stat.S_ISREG(found.st_mode):
-            raise ObjectError(f"{path.name}: a file expected, it is something else")
-        if found.st_size > LARGEST_FILE:
-            raise ObjectError(f"{path.name}: {found.st_size} bytes; an object file has at most {LARGEST_FILE}")
-        text = path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise ObjectError(f"{path.name}: cannot be read: {error}") from None
-    entry = parse_object(text, path.name, dialect)
+        document = read(path, path.name)
+        entry = _checked(document, dialect)
+    except YamlError as error:
+        raise ObjectError(str(error)) from None
     if entry["id"] != path.stem:
         raise ObjectError(f"{path.name}:1: id: '{entry['id']}' must be the file's name, '{path.stem}'")
-    return entry, text
+    return entry, document.text
+
+
+def cell_parameters(entry: dict[str, Any]) -> dict[str, Any]:
+    """What the simulated cell needs of an entry, by the names of its parameters below ``object/``.
+
+    The object frame lies in the middle of the underside, so the middle of the solid is half of its height above."""
+    return {"id": entry["id"], "mass": float(entry["mass"]), "shape": entry["shape"]["type"],
+            "size": [float(v) for v in entry["size"]], "center": [0.0, 0.0, float(entry["size"][2]) / 2],
+            "friction": float(entry["friction"])}
 
 
 @dataclass
@@ -189,7 +111,7 @@ class ObjectDatabase:
     ``dialect``: that of the hand, legacy or v17; it decides which grasps there are.
     """
 
-    def __init__(self, folder: str, dialect: str = "legacy") -> None:
+    def __init__(self, folder: str | os.PathLike[str], dialect: str = "legacy") -> None:
         self.folder = Path(folder)
         self.dialect = dialect
         self._lock = threading.Lock()
