@@ -2,7 +2,7 @@
 """The node /contact_detector: external joint torques -> coglab/contact, armed by ~arm (coglab_msgs/ArmContact).
 
 Subscribes lwr/external_torques (effort, Nm) and lwr/joint_states; names are relative. Parameters (private): the fields
-of coglab_smach.contact_detector.DetectorSettings; robot_description is read for the Jacobian.
+of coglab_smach.contact.detector.DetectorSettings; robot_description is read for the Jacobian.
 Publishes ~margin (std_msgs/Float64) at 20 Hz while watching.
 """
 import dataclasses
@@ -15,8 +15,8 @@ import rospy
 from coglab_msgs.msg import Contact, ReasonCode
 from coglab_msgs.srv import ArmContact, ArmContactResponse
 from coglab_py import parameters
-from coglab_smach.contact_detector import ContactDetector, DetectorSettings
-from coglab_smach.ros_publish import publish
+from coglab_smach.contact.detector import ContactDetector, DetectorSettings
+from coglab_smach.ros.publish import publish
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64
 

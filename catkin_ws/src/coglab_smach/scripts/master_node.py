@@ -23,19 +23,20 @@ from coglab_msgs.msg import MasterState as MasterStateMsg
 from coglab_msgs.msg import Transition
 from coglab_msgs.srv import Start, StartResponse
 from coglab_py import parameters
-from coglab_smach.clock import SteadyClock
-from coglab_smach.config import Config, ConfigError
-from coglab_smach.context import Context
-from coglab_smach.holding import HoldingMemory
-from coglab_smach.journal import NOTHING_FAILED, ActionRecord, Journal, TransitionRecord
+from coglab_smach.clocks.clock import SteadyClock
+from coglab_smach.context.config import Config, ConfigError
+from coglab_smach.context.context import Context
+from coglab_smach.context.holding import HoldingMemory
+from coglab_smach.context.journal import NOTHING_FAILED, ActionRecord, Journal, TransitionRecord
+from coglab_smach.context.master_state import MasterState, StateWatch
+from coglab_smach.context.requests import command
+from coglab_smach.context.trigger import ask_for
+from coglab_smach.kinematics.reachability import solve
 from coglab_smach.machines import build_master
-from coglab_smach.master_state import MasterState, StateWatch
-from coglab_smach.reachability import solve
-from coglab_smach.requests import ask_for, command
-from coglab_smach.ros_arm import RosArm
-from coglab_smach.ros_hand import RosHand
-from coglab_smach.ros_ports import RosContact, RosDatabase, RosPerception
-from coglab_smach.ros_publish import publish
+from coglab_smach.ros.arm import RosArm
+from coglab_smach.ros.hand import RosHand
+from coglab_smach.ros.ports import RosContact, RosDatabase, RosPerception
+from coglab_smach.ros.publish import publish
 from std_msgs.msg import String
 from std_srvs.srv import Trigger, TriggerResponse
 

@@ -9,7 +9,7 @@ import sys
 from pathlib import Path
 
 from coglab_objects.database import ObjectDatabase, ObjectError, new_object_text, objects_folder, read_object
-from coglab_smach.reachability import reachability_report
+from coglab_smach.kinematics.reachability import reachability_report
 
 
 def cmd_list(database: ObjectDatabase) -> int:

@@ -17,8 +17,8 @@ import rostest
 import yaml
 from coglab_msgs.msg import Contact, MasterState, ReasonCode, Transition
 from coglab_msgs.srv import ArmContact, GetObject, ListObjects, Start
-from coglab_smach.reachability import default_arm, home_posture, position_jacobian
-from coglab_smach.torque_signal import TorqueSignal
+from coglab_smach.contact.torque_signal import TorqueSignal
+from coglab_smach.kinematics.reachability import default_arm, home_posture, position_jacobian
 from sensor_msgs.msg import JointState
 from smach_msgs.msg import SmachContainerStatus, SmachContainerStructure
 from std_msgs.msg import String

@@ -3,10 +3,10 @@ from pathlib import Path
 
 import pytest
 from coglab_objects.database import ObjectDatabase, objects_folder
-from coglab_smach.config import Config
+from coglab_smach.clocks.virtual_clock import VirtualClock, using
+from coglab_smach.context.config import Config
 from coglab_smach.machines import build_master
-from coglab_smach.simulated_ports import simulated_context
-from coglab_smach.virtual_clock import VirtualClock, using
+from coglab_smach.simulated.ports import simulated_context
 
 SHARE = Path(__file__).resolve().parent.parent
 

@@ -5,7 +5,7 @@ import pytest
 from coglab_msgs.msg import ReasonCode
 from coglab_objects.database import ObjectDatabase, objects_folder
 from coglab_py.pose import Pose
-from coglab_smach.pending import PortError
+from coglab_smach.ports.pending import PortError
 from conftest import Trial
 
 EXCHANGE = "exchange_human_to_robot"

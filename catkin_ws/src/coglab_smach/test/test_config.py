@@ -2,7 +2,7 @@
 from pathlib import Path
 
 import pytest
-from coglab_smach.config import Config, ConfigError
+from coglab_smach.context.config import Config, ConfigError
 
 SHIPPED = Path(__file__).resolve().parents[1] / "config" / "machines.yaml"
 
@@ -13,7 +13,7 @@ def test_the_shipped_file_fits():
 
 @pytest.mark.parametrize("change, sentence", [
     (("open_speed: 400", "open_speed: 600"), "hand.open_speed: 600 is greater than the maximum of 511"),
-    (("open_speed: 400", "opne_speed: 400"), "hand: Additional properties are not allowed ('opne_speed' was unexpected)"),
+    (("open_speed: 400", "opne_speed: 400"), "hand: Additional properties are not allowed ('opne_speed'"),
     (("calibration: fast", "calibration: slow"), "hand.calibration: 'slow' is not one of ['fast'"),
     (("ptp_tolerance: 0.03", "ptp_tolerance: little"), "ptp_tolerance: 'little' is not of type 'number'"),
     (("contact_timeout: 6.0", "contact_timeout: 0"), "contact_timeout: 0 is less than or equal to the minimum of 0"),

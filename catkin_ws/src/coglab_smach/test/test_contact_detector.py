@@ -3,9 +3,9 @@ arm-must-stand-still gate."""
 import numpy as np
 import pytest
 from coglab_py.pose import Pose
-from coglab_smach.contact_detector import ContactDetector, DetectorSettings, sensitive_joints
-from coglab_smach.contact_trials import DT, STILL, ContactTrial, found_within, push
-from coglab_smach.reachability import default_arm, position_jacobian, solve
+from coglab_smach.contact.detector import ContactDetector, DetectorSettings, sensitive_joints
+from coglab_smach.contact.trials import DT, STILL, ContactTrial, found_within, push
+from coglab_smach.kinematics.reachability import default_arm, position_jacobian, solve
 
 
 @pytest.fixture(scope="module")

@@ -268,7 +268,7 @@ def test_every_transition_of_a_failure_carries_its_sentence():
 
 
 def test_configuration_is_read_again_while_running(tmp_path):
-    from coglab_smach.config import Config
+    from coglab_smach.context.config import Config
     path = tmp_path / "c.yaml"
     path.write_text("hand: {open_speed: 1}\n")
     warnings = []

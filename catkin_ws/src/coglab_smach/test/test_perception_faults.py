@@ -15,8 +15,8 @@ from coglab_perception.frames import FrameNames
 from coglab_py.pose import Pose
 from coglab_sim.perception_stand_in import Board, PerceptionSettings
 from coglab_sim.vision import NotSeen, Vision
-from coglab_smach.pending import Polled, PortError, Ready
-from coglab_smach.ports import Located
+from coglab_smach.ports.interfaces import Located
+from coglab_smach.ports.pending import Polled, PortError, Ready
 
 NAMES = FrameNames("world", "human_hand", "board", "object_{id}")
 BESIDE, BEHIND = np.array([1.05, 0.45, 0.35]), np.array([1.75, 0.6, 0.35])

@@ -1,8 +1,8 @@
 """The contracts of the ports on their doubles."""
 import pytest
 from coglab_objects.database import ObjectDatabase, objects_folder
-from coglab_smach.simulated_cell import SimulatedCell
-from coglab_smach.simulated_ports import (
+from coglab_smach.simulated.cell import SimulatedCell
+from coglab_smach.simulated.ports import (
     SimulatedArm,
     SimulatedContact,
     SimulatedDatabase,

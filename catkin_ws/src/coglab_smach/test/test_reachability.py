@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 from coglab_objects.database import objects_folder, parse_object
 from coglab_py.pose import Pose
-from coglab_smach.goals import delivery_goal, grasp_goal, palm_at_grasp, place_goal
-from coglab_smach.reachability import reachability_report, share_reached
+from coglab_smach.kinematics.goals import delivery_goal, grasp_goal, palm_at_grasp, place_goal
+from coglab_smach.kinematics.reachability import reachability_report, share_reached
 
 SHARE = Path(__file__).resolve().parent.parent
 MUG = (objects_folder() / "mug.yaml").read_text()

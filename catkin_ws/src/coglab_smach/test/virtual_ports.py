@@ -3,8 +3,8 @@
 import ih2_hand.progress as progress
 from coglab_msgs.msg import ReasonCode
 from coglab_objects.database import ObjectError
-from coglab_smach.pending import Polled, PortError, Ready
-from coglab_smach.ports import DmpProgress, HandState, Located, Recognition, Verdict
+from coglab_smach.ports.interfaces import DmpProgress, HandState, Located, Recognition, Verdict
+from coglab_smach.ports.pending import Polled, PortError, Ready
 
 
 def answered(good, message, code=0, value=None):

@@ -16,8 +16,8 @@ from coglab_sim.participant import Participant
 from coglab_sim.perception_stand_in import PerceptionSettings, Tracker
 from coglab_sim.scene import Scene, WorldView
 from coglab_sim.virtual_human import VirtualHuman
-from coglab_smach.contact_detector import ContactDetector, DetectorSettings
-from coglab_smach.manager_limits import read_limits
+from coglab_smach.contact.detector import ContactDetector, DetectorSettings
+from coglab_smach.kinematics.manager_limits import read_limits
 from ih2_hand.clock import VirtualClock as HandClock
 from ih2_hand.driver import HandSerialDriver
 from ih2_hand.emulator.hand import EmulatedHand

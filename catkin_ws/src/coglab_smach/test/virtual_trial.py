@@ -3,12 +3,12 @@ import dataclasses
 from pathlib import Path
 
 from coglab_objects.database import ObjectDatabase, objects_folder
-from coglab_smach.config import Config
-from coglab_smach.context import Context
-from coglab_smach.journal import Journal
+from coglab_smach.clocks.virtual_clock import VirtualClock, using
+from coglab_smach.context.config import Config
+from coglab_smach.context.context import Context
+from coglab_smach.context.journal import Journal
+from coglab_smach.kinematics.reachability import default_arm, solve
 from coglab_smach.machines import build_master
-from coglab_smach.reachability import default_arm, solve
-from coglab_smach.virtual_clock import VirtualClock, using
 from virtual_ports import VirtualArm, VirtualContact, VirtualDatabase, VirtualHand, VirtualPerception
 from virtual_rig import DT, LIMITS, Rig, distance, frame_of, palm_goal
 

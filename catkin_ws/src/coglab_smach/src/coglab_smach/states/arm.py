@@ -5,12 +5,12 @@ from typing import Any
 
 from coglab_msgs.msg import ReasonCode
 
-from ..context import Context
-from ..motion_time import ptp_time, reach_time
-from ..pending import PortError
-from ..ports import DmpRequest
-from .base import CoglabState, Interrupted, TimeLimit
-from .motion import await_rest
+from coglab_smach.context.context import Context
+from coglab_smach.kinematics.motion_time import ptp_time, reach_time
+from coglab_smach.ports.interfaces import DmpRequest
+from coglab_smach.ports.pending import PortError
+from coglab_smach.states.base import CoglabState, Interrupted, TimeLimit
+from coglab_smach.states.motion import await_rest
 
 
 class LoadControllers(CoglabState):

@@ -7,12 +7,12 @@ from dataclasses import dataclass, field
 
 from coglab_py.pose import Pose
 
-from .clock import Clock
-from .config import Config
-from .holding import HoldingMemory
-from .journal import Journal
-from .ports import ArmPort, ContactPort, DatabasePort, HandPort, PerceptionPort
-from .requests import Requests
+from coglab_smach.clocks.clock import Clock
+from coglab_smach.context.config import Config
+from coglab_smach.context.holding import HoldingMemory
+from coglab_smach.context.journal import Journal
+from coglab_smach.context.requests import Requests
+from coglab_smach.ports.interfaces import ArmPort, ContactPort, DatabasePort, HandPort, PerceptionPort
 
 
 class StopSwitch:

@@ -5,8 +5,8 @@ import threading
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from .context import Context
-from .requests import COMMAND, command
+from coglab_smach.context.context import Context
+from coglab_smach.context.requests import COMMAND, command
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,7 @@ import yaml
 from coglab_py.packages import package_path
 from coglab_py.pose import Pose, about_z
 
-from .goals import palm_at_grasp
+from coglab_smach.kinematics.goals import palm_at_grasp
 
 POSITION_TOLERANCE = 0.003
 ANGLE_TOLERANCE = np.radians(3.0)

@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from .contact_detector import ContactDetector, DetectorSettings
-from .ports import ContactEvent
-from .torque_signal import TorqueSignal
+from coglab_smach.contact.detector import ContactDetector, DetectorSettings
+from coglab_smach.contact.torque_signal import TorqueSignal
+from coglab_smach.ports.interfaces import ContactEvent
 
 DT = 0.005
 STILL = np.zeros(7)

@@ -12,11 +12,11 @@ from typing import Any
 import numpy as np
 from coglab_msgs.msg import ReasonCode
 
-from .clock import Clock
-from .manager_limits import read_limits
-from .motion_time import MotionLimits, ptp_time
-from .pending import PortError
-from .ports import DmpProgress, DmpRequest
+from coglab_smach.clocks.clock import Clock
+from coglab_smach.kinematics.manager_limits import read_limits
+from coglab_smach.kinematics.motion_time import MotionLimits, ptp_time
+from coglab_smach.ports.interfaces import DmpProgress, DmpRequest
+from coglab_smach.ports.pending import PortError
 
 REACH = np.array([0.9, -0.5, 0.3, -0.4, 0.5, -0.6, 0.4])
 """rad, what a reach of the model adds to the posture it starts from; and back, from where it has ended"""

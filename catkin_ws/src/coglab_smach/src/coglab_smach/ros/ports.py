@@ -1,4 +1,4 @@
-"""The ports over ROS to perception, object database and contact detector; the arm is in ros_arm, the hand in ros_hand.
+"""The ports over ROS to perception, object database and contact detector; the arm is in ros.arm, the hand in ros.hand.
 
 All names are relative: in the node's own namespace, so that two robots fit in one graph.
 """
@@ -12,9 +12,9 @@ from coglab_msgs.msg import Recognition as RecognitionMsg
 from coglab_msgs.srv import ArmContact, FreePlaces, GetObject, InitVision, ListObjects, LocateObject
 from geometry_msgs.msg import Pose
 
-from .pending import Pending
-from .ports import ContactEvent, Located, Recognition
-from .ros_calls import SERVICE_WAIT, Newest, call, mapped
+from coglab_smach.ports.interfaces import ContactEvent, Located, Recognition
+from coglab_smach.ports.pending import Pending
+from coglab_smach.ros.calls import SERVICE_WAIT, Newest, call, mapped
 
 
 class RosPerception:

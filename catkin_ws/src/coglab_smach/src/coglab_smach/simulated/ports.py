@@ -14,11 +14,19 @@ from coglab_msgs.msg import ReasonCode
 from coglab_objects.database import ObjectDatabase, ObjectError
 from coglab_py.pose import Pose
 
-from .clock import Clock
-from .motion_time import MotionLimits
-from .pending import Pending, Polled, PortError, Ready
-from .ports import ContactEvent, DmpProgress, DmpRequest, HandState, Located, Recognition, Verdict
-from .simulated_cell import SimulatedCell
+from coglab_smach.clocks.clock import Clock
+from coglab_smach.kinematics.motion_time import MotionLimits
+from coglab_smach.ports.interfaces import (
+    ContactEvent,
+    DmpProgress,
+    DmpRequest,
+    HandState,
+    Located,
+    Recognition,
+    Verdict,
+)
+from coglab_smach.ports.pending import Pending, Polled, PortError, Ready
+from coglab_smach.simulated.cell import SimulatedCell
 
 MODES = ("cylindrical", "lateral", "tridigit", "bidigit", "tridigit2", "bidigit2")
 """preshapes of the hand"""
@@ -346,8 +354,8 @@ class SimulatedContact:
 
 def simulated_context(clock: Clock, database: ObjectDatabase, config: Any) -> tuple[Any, SimulatedCell]:
     """A complete context on simulated ports, and the cell behind them."""
-    from .context import Context
-    from .journal import Journal
+    from coglab_smach.context.context import Context
+    from coglab_smach.context.journal import Journal
     cell = SimulatedCell(clock)
     ctx = Context(clock=clock, arm=SimulatedArm(cell), hand=SimulatedHand(cell), perception=SimulatedPerception(cell),
                   database=SimulatedDatabase(cell, database), contact=SimulatedContact(cell), config=config,

@@ -31,11 +31,11 @@ from coglab_msgs.srv import (
 from geometry_msgs.msg import Point, Quaternion
 from sensor_msgs.msg import JointState
 
-from .manager_limits import read_limits
-from .motion_time import MotionLimits
-from .pending import Pending, Permit, Polled, PortError, Threaded
-from .ports import DmpProgress, DmpRequest, Verdict
-from .ros_calls import Newest, call, call_now, mapped
+from coglab_smach.kinematics.manager_limits import read_limits
+from coglab_smach.kinematics.motion_time import MotionLimits
+from coglab_smach.ports.interfaces import DmpProgress, DmpRequest, Verdict
+from coglab_smach.ports.pending import Pending, Permit, Polled, PortError, Threaded
+from coglab_smach.ros.calls import Newest, call, call_now, mapped
 
 JOINTS = ("lwr_a1", "lwr_a2", "lwr_e1", "lwr_a3", "lwr_a4", "lwr_a5", "lwr_a6")
 

@@ -18,7 +18,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from coglab_msgs.msg import ReasonCode
 
-from .ports import ContactEvent
+from coglab_smach.ports.interfaces import ContactEvent
 
 GRAVITY = 9.81
 MAD_TO_SIGMA = 1.4826

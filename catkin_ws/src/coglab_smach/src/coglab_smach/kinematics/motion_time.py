@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .reachability import default_arm
+from coglab_smach.kinematics.reachability import default_arm
 
 LEVER = 0.4
 """m: what one joint moves the hand by, per rad, in a bent posture of the arm."""

@@ -14,9 +14,9 @@ import numpy as np
 from coglab_msgs.msg import ReasonCode
 from coglab_py.pose import Pose
 
-from .clock import Clock
-from .pending import Pending, PortError
-from .simulated_arm_model import ArmModel
+from coglab_smach.clocks.clock import Clock
+from coglab_smach.ports.pending import Pending, PortError
+from coglab_smach.simulated.arm_model import ArmModel
 
 
 @dataclass

@@ -1,7 +1,7 @@
 """What the machines need from the rest of the system, as interfaces without ROS.
 
-Adapters: ``ros_arm``, ``ros_hand`` and ``ros_ports`` (services, actions and topics) and ``simulated_ports`` (virtual
-time, for tests and benches).
+Adapters: the package ``ros`` (services, actions and topics) and the package ``simulated`` (virtual time, for tests and
+benches).
 Methods that return a Pending may take time; the states wait on it within their limits. All others return at once.
 Units are SI; joints in wire order lwr_a1 lwr_a2 lwr_e1 lwr_a3 lwr_a4 lwr_a5 lwr_a6; quaternions x y z w.
 """
@@ -11,8 +11,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple, Protocol
 
-from .motion_time import MotionLimits
-from .pending import Pending
+from coglab_smach.kinematics.motion_time import MotionLimits
+from coglab_smach.ports.pending import Pending
 
 
 class Verdict(NamedTuple):

@@ -11,7 +11,7 @@ from typing import Any
 import rospy
 from coglab_msgs.msg import ReasonCode
 
-from .pending import Pending, Permit, Polled, PortError, Threaded
+from coglab_smach.ports.pending import Pending, Permit, Polled, PortError, Threaded
 
 SERVICE_WAIT = 20.0
 """s to wait for a service to appear: a node may still be starting."""

@@ -20,7 +20,7 @@ from typing import Any
 
 import smach
 
-from .clock import Clock
+from coglab_smach.clocks.clock import Clock
 
 
 class ClockStalled(RuntimeError):

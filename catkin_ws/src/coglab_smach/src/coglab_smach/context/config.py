@@ -1,5 +1,6 @@
-"""Configuration of the machines from one YAML file, checked against machines_schema.json and read again whenever the file
-changes."""
+"""Configuration of the machines from one YAML file, checked against machines_schema.json.
+
+It is read again whenever the file changes."""
 from __future__ import annotations
 
 import json

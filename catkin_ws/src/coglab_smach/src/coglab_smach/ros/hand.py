@@ -21,9 +21,9 @@ from coglab_msgs.msg import (
 )
 from std_msgs.msg import String
 
-from .pending import Pending, Polled, PortError
-from .ports import HandState
-from .ros_calls import Newest
+from coglab_smach.ports.interfaces import HandState
+from coglab_smach.ports.pending import Pending, Polled, PortError
+from coglab_smach.ros.calls import Newest
 
 SERVER_WAIT = 10.0
 """s to wait for an action server to appear."""

@@ -8,7 +8,7 @@ import coglab_controllers as cc
 import numpy as np
 from coglab_py.packages import package_path
 
-from .motion_time import MotionLimits
+from coglab_smach.kinematics.motion_time import MotionLimits
 
 
 def read_limits(parameters: Mapping[str, Any]) -> MotionLimits:
