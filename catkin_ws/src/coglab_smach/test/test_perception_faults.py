@@ -7,7 +7,7 @@ import pytest
 import smach
 
 try:
-    from virtual_rig import BOARD
+    from coglab_sim.virtual_world import BOARD
     from virtual_trial import VirtualTrial
 except ImportError as error:
     pytest.skip(f"a compiled module is not there: {error}", allow_module_level=True)

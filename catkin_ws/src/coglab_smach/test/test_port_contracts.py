@@ -53,12 +53,12 @@ RIG_LACKS = ("test_given_up_while_its_node_is_frozen_it_never_acts", "test_a_hol
 def test_the_arm_of_whole_trials():
     """The arm of the trials in virtual time, which has the real controllers behind it."""
     try:
-        from virtual_ports import VirtualArm
-        from virtual_rig import DT, Rig
+        from coglab_sim.virtual_world import DT, World
+        from coglab_smach.simulated.world_ports import VirtualArm
         from virtual_trial import LIBRARY
     except ImportError as error:
         pytest.skip(f"a compiled module is not there: {error}")
-    rig = Rig(1)
+    rig = World(1)
 
     def sleep(duration):
         for _ in range(max(1, round(duration / DT))):

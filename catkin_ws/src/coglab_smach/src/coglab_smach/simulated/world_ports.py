@@ -1,8 +1,16 @@
-"""The ports of the machines on the virtual rig."""
+"""The ports of the machines on the virtual world: the real controllers and bridge, the hand's driver on its emulator.
+
+The world is coglab_sim.virtual_world.World; it is given, so that nothing here imports the simulation.
+"""
+from __future__ import annotations
 
 import ih2_hand.progress as progress
+import numpy as np
 from coglab_msgs.msg import ReasonCode
 from coglab_objects.database import ObjectError
+
+from coglab_smach.contact.detector import ContactDetector, DetectorSettings
+from coglab_smach.kinematics.manager_limits import read_limits
 from coglab_smach.ports.interfaces import DmpProgress, HandState, Located, Recognition, Verdict
 from coglab_smach.ports.pending import Polled, PortError, Ready
 
@@ -13,12 +21,13 @@ def answered(good, message, code=0, value=None):
 
 
 class VirtualArm:
-    """ArmPort on the rig: the real controller manager and bridge. Requests act at once; motions go on until they end,
-    whoever waits."""
+    """ArmPort on the virtual world: the real controller manager and bridge. Requests act at once; motions go on until
+    they end, whoever waits."""
 
     def __init__(self, rig):
         self.rig, self.robot = rig, rig.robot.virtual
         self.request = None
+        self._limits = read_limits(rig.robot.parameters)
 
     def _answered(self, answer, value=None):
         return answered(*answer[:2], self.robot.reason_code, value)
@@ -87,7 +96,7 @@ class VirtualArm:
         return Polled(done, value)
 
     def motion_limits(self):
-        return self.rig.robot.motion_limits
+        return self._limits
 
     def speed_scale(self):
         return self.rig.speed_scale
@@ -154,7 +163,7 @@ class VirtualArm:
 
 
 class VirtualHand:
-    """HandPort on the rig."""
+    """HandPort on the virtual world."""
 
     def __init__(self, rig):
         self.rig = rig
@@ -212,7 +221,7 @@ class VirtualHand:
 
 
 class VirtualPerception:
-    """PerceptionPort on the rig's trackers; the recogniser, if one is given, sees the tracked hand."""
+    """PerceptionPort on the virtual world's trackers; the recogniser, if one is given, sees the tracked hand."""
 
     def __init__(self, rig, recogniser=None):
         self.rig, self.recogniser = rig, recogniser
@@ -230,7 +239,7 @@ class VirtualPerception:
 
         def value():
             if not fresh():
-                raise PortError(f"'{name}' was not seen within {time_limit:.1f} s")
+                raise PortError(f"'{name}' was not seen within {time_limit:.1f} s", code=ReasonCode.OBJECT_NOT_SEEN)
             frame, age = self.rig.newest(name)
             return Located(name, "world", tuple(frame.position), tuple(frame.orientation), age)
 
@@ -256,30 +265,44 @@ class VirtualDatabase:
         try:
             return Ready(self.database.get(object_id))
         except ObjectError as error:
-            return Ready(error=PortError(str(error)))
+            return Ready(error=PortError(str(error), code=ReasonCode.OBJECT_UNKNOWN))
 
     def list_objects(self):
         return Ready(self.database.ids())
 
 
 class VirtualContact:
-    """ContactPort on the rig's detector."""
+    """ContactPort: the detector on the virtual arm's torques."""
 
     def __init__(self, rig):
         self.rig = rig
+        self.detector = ContactDetector(DetectorSettings(), lambda q: rig.robot.chain.jacobian(q)[:3])
+        self.watched_while_moving = 0
+        """periods in which the detector watched though the arm moved"""
+        self._event = None
+        rig.after_period.append(self._sense)
+
+    def _sense(self):
+        report = self.rig.robot.report
+        velocity = np.asarray(report["measured_velocity"])
+        event = self.detector.feed(self.rig.t, report["external_torque"], report["position"], velocity)
+        if event is not None and self._event is None:
+            self._event = event
+        if self.detector.state() == "watching" and np.max(np.abs(velocity)) > 0.05:
+            self.watched_while_moving += 1
 
     def arm(self, mode, time_limit, settings):
-        self.rig.event = None
+        self._event = None
         try:
-            self.rig.detector.arm(mode, self.rig.t, time_limit, float(settings.get("k", 0.0)),
-                                  settings.get("joints", ()), float(settings.get("mass", 0.0)),
-                                  float(settings.get("load_share", 0.0)))
+            self.detector.arm(mode, self.rig.t, time_limit, float(settings.get("k", 0.0)),
+                              settings.get("joints", ()), float(settings.get("mass", 0.0)),
+                              float(settings.get("load_share", 0.0)))
         except ValueError as error:
-            return Ready(error=PortError(str(error)))
+            return Ready(error=PortError(str(error), code=ReasonCode.INVALID_ARGUMENT))
         return Ready()
 
     def disarm(self):
-        self.rig.detector.disarm()
+        self.detector.disarm()
 
     def event(self):
-        return self.rig.event
+        return self._event
