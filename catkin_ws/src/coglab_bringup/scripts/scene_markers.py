@@ -33,10 +33,12 @@ class SceneMarkers:
     def __init__(self) -> None:
         self.library = cc.Library()
         self.library.load(parameters.read("coglab/dmp_library", str))
-        self.board_size = tuple(parameters.numbers("~board_size", [0.40, 0.50], 2))
+        length, width = parameters.numbers("~board_size", [0.40, 0.50], 2)
+        self.board_size = (length, width)
         self.lock = threading.Lock()
         self.words = ""
-        self.primitive, self.start = "", None  # of the motion that runs; start: m in the base, (3,)
+        self.primitive = ""  # of the motion that runs
+        self.start: np.ndarray | None = None  # where it began, m in the base, (3,)
         self.heard = 0.0
         self.frames = tf2_ros.Buffer()
         self.listener = TfListener(self.frames, "world")

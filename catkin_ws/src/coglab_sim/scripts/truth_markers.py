@@ -101,7 +101,7 @@ class TruthMarkers:
         """The object in its shape; another colour once it has fallen."""
         shape = self.shape(truth.object_id)
         middle = pose_message(pose_of(truth.object) * Frame(np.array(shape.get("center", (0.0, 0.0, 0.0)))))
-        marker = self.marker(truth, "object", KINDS.get(shape.get("shape"), Marker.CUBE), middle,
+        marker = self.marker(truth, "object", KINDS.get(str(shape.get("shape")), Marker.CUBE), middle,
                              shape.get("size", (0.08, 0.08, 0.1)), RED if truth.dropped else ORANGE)
         return marker
 

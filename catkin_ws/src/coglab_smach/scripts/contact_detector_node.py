@@ -37,9 +37,10 @@ class ContactDetectorNode:
         self.joints = tuple(self.arm.joint_names)
         self.detector = ContactDetector(settings, lambda q: self.arm.jacobian(np.asarray(q, dtype=float))[:3])
         self.lock = threading.Lock()
-        self.position = None
-        self.velocity = None
-        self.last_sample = None
+        self.position: list[float] | None = None
+        self.velocity: list[float] | None = None
+        self.joint_stamp = 0.0
+        self.last_sample: float | None = None
         self.publisher = rospy.Publisher("coglab/contact", Contact, queue_size=10)
         self.margin = rospy.Publisher("~margin", Float64, queue_size=1)
         rospy.Subscriber("lwr/joint_states", JointState, self.on_joints, queue_size=1, tcp_nodelay=True)
@@ -69,8 +70,8 @@ class ContactDetectorNode:
         if len(message.effort) != 7 or self.position is None or self.velocity is None:
             return
         with self.lock:
-            self.last_sample = message.header.stamp.to_sec()
-            event = self.detector.feed(self.last_sample, message.effort, self.position, self.velocity)
+            stamp = self.last_sample = message.header.stamp.to_sec()
+            event = self.detector.feed(stamp, message.effort, self.position, self.velocity)
         if event is None:
             return
         out = Contact(source=event.source, contact=event.contact, margin=event.margin, confidence=event.confidence,

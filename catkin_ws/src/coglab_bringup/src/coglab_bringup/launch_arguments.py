@@ -41,6 +41,11 @@ def objects_in(folder: Path) -> list[str]:
     return sorted(path.stem for path in folder.glob("*.yaml"))
 
 
+def _object(folder: Path, value: str) -> None:
+    if value:
+        _one_of(objects_in(folder), value)
+
+
 def _profiles(sources: Path) -> list[str]:
     names = re.findall(r"^(\w+):\s*$", (sources / LIMITS).read_text(encoding="utf-8"), re.MULTILINE)
     return names
@@ -103,7 +108,7 @@ def _rules(sources: Path, objects: Path) -> dict[str, Callable[[str], object]]:
         "krl_convention": lambda value: _one_of(_conventions(sources), value),
         "limits_profile": lambda value: _one_of(_profiles(sources), value),
         "behaviour": lambda value: _one_of(_behaviours(sources), value),
-        "object": lambda value: value and _one_of(objects_in(objects), value),
+        "object": lambda value: _object(objects, value),
         "objects": _folder,
         "recording": _file,
     }

@@ -6,6 +6,7 @@ Reads the simulated truth: it measures, it does not control.
 from __future__ import annotations
 
 import threading
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -55,10 +56,10 @@ class TrialRecorder:
             subscriber.unregister()
         return self.trial
 
-    def wait_for(self, condition, limit: float) -> bool:
+    def wait_for(self, condition: Callable[[], bool], limit: float) -> bool:
         """Waits until `condition()` holds, at most `limit` seconds of the steady clock; whether it did."""
         with self.changed:
-            return self.changed.wait_for(lambda: condition() or rospy.is_shutdown(), limit) and condition()
+            return bool(self.changed.wait_for(lambda: condition() or rospy.is_shutdown(), limit)) and condition()
 
     def _on_joints(self, message: JointState) -> None:
         self.trial.joints.append((message.header.stamp.to_sec(), message.position, message.velocity))

@@ -128,8 +128,10 @@ class ObjectDatabase:
             files = {}
             for name, stamp in sorted(stamps.items()):
                 known = self._files.get(name)
-                unchanged = only_changed and known is not None and known.stamp == stamp
-                files[name] = known if unchanged else self._read(name, stamp, known)
+                if only_changed and known is not None and known.stamp == stamp:
+                    files[name] = known
+                else:
+                    files[name] = self._read(name, stamp, known)
             self._files = files
             self.problems = [file.problem for file in files.values() if file.problem]
         return self.problems

@@ -17,7 +17,7 @@ def rotation(quaternion: ArrayLike) -> Rotation:
     """Rotation of a quaternion (x y z w) of any length; ValueError if it has no direction or is not finite."""
     q = np.asarray(quaternion, dtype=float)
     if q.shape != (4,) or not np.all(np.isfinite(q)):
-        raise ValueError(f"a quaternion has four finite numbers x y z w, got {quaternion}")
+        raise ValueError(f"a quaternion has four finite numbers x y z w, got {quaternion!r}")
     if float(np.linalg.norm(q)) < 1e-9:
         raise ValueError("a quaternion of zeros has no direction; write 0 0 0 1 for no rotation")
     return Rotation.from_quat(q)

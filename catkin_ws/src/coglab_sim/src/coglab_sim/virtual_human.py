@@ -93,7 +93,7 @@ class VirtualHuman(Giving, Receiving):
             return
         if (task == "give") != self.holds() or self.participant.behaviour == "absent":
             return
-        self._task = task
+        self._task = task or ""
         self.trial += 1
         self._interrupted = False
         p = self.participant

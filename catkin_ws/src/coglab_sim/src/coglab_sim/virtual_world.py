@@ -21,7 +21,7 @@ from ih2_hand.emulator.hand import EmulatedHand
 from ih2_hand.emulator.virtual_link import VirtualLink
 from ih2_hand.progress import shown_empty, shown_holding
 
-from coglab_sim import _cell  # noqa: F401  (knows the type of VirtualRobot.cell)
+import coglab_sim._cell  # noqa: F401  (knows the type of VirtualRobot.cell)
 from coglab_sim._virtual import VirtualRobot
 from coglab_sim.participant import Participant
 from coglab_sim.perception_stand_in import PerceptionSettings, Sight, Tracker

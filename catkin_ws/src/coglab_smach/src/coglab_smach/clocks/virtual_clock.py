@@ -89,7 +89,7 @@ class VirtualCondition:
     def __enter__(self) -> bool:
         return self._lock.__enter__()
 
-    def __exit__(self, *exception: object) -> None:
+    def __exit__(self, *exception: Any) -> None:
         self._lock.__exit__(*exception)
 
     def wait(self, timeout: float | None = None) -> bool:
@@ -321,10 +321,11 @@ def using(clock: VirtualClock) -> Iterator[VirtualClock]:
             machine = build()
             machine.execute()           # an hour of it takes milliseconds
     """
-    before = smach.concurrence.threading
-    smach.concurrence.threading = _Threading(clock)
+    module: Any = smach.concurrence
+    before = module.threading
+    module.threading = _Threading(clock)
     try:
         with clock.attached():
             yield clock
     finally:
-        smach.concurrence.threading = before
+        module.threading = before

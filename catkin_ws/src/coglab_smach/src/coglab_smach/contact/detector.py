@@ -20,6 +20,9 @@ from coglab_msgs.msg import ReasonCode
 
 from coglab_smach.ports.interfaces import ContactEvent
 
+Joints = Sequence[float] | np.ndarray
+"""seven numbers, one for each joint in wire order"""
+
 GRAVITY = 9.81
 MAD_TO_SIGMA = 1.4826
 """Standard deviation of normal noise per median absolute deviation."""
@@ -97,7 +100,7 @@ class _Armed:
 class ContactDetector:
     """Feed it every torque sample; it answers with at most one event per arming. Times in s on one clock."""
 
-    def __init__(self, settings: DetectorSettings, jacobian: Callable[[Sequence[float]], np.ndarray]) -> None:
+    def __init__(self, settings: DetectorSettings, jacobian: Callable[[Joints], np.ndarray]) -> None:
         self.settings = settings
         self._jacobian = jacobian
         self._armed: _Armed | None = None
@@ -149,8 +152,7 @@ class ContactDetector:
         return (self._still_since is not None and self._last_stamp is not None
                 and self._last_stamp - self._still_since >= self.settings.settle)
 
-    def feed(self, stamp: float, torque: Sequence[float], position: Sequence[float],
-             velocity: Sequence[float]) -> ContactEvent | None:
+    def feed(self, stamp: float, torque: Joints, position: Joints, velocity: Joints) -> ContactEvent | None:
         """One sample: torque (Nm), position (rad), velocity (rad/s), seven joints each. Samples must be finite."""
         tau = np.asarray(torque, dtype=float)
         if not (np.all(np.isfinite(tau)) and np.all(np.isfinite(velocity))):
@@ -186,7 +188,7 @@ class ContactDetector:
         self._last_stamp = self._still_since = None
         return True
 
-    def _follow_motion(self, stamp: float, velocity: Sequence[float]) -> None:
+    def _follow_motion(self, stamp: float, velocity: Joints) -> None:
         moving = float(np.max(np.abs(velocity))) > self.settings.still_speed
         if moving:
             if self._still_since is not None and self._rest_torque is not None:
@@ -206,14 +208,15 @@ class ContactDetector:
             self._filtered = tau.copy()
             self._history.clear()
         blend = 1.0 - np.exp(-2.0 * np.pi * self.settings.cutoff * dt)
-        self._filtered = self._filtered + blend * (tau - self._filtered)
-        self._history.append((stamp, self._filtered))
+        filtered = self._filtered + blend * (tau - self._filtered)
+        self._filtered = filtered
+        self._history.append((stamp, filtered))
         while len(self._history) > 1 and self._history[1][0] <= stamp - self.settings.window + 1e-9:
             self._history.popleft()
         first_stamp, first = self._history[0]
         if first_stamp > stamp - self.settings.window + 1e-9:
             return None
-        return self._filtered - first
+        return filtered - first
 
     def _learn(self, difference: np.ndarray) -> None:
         assert self._filtered is not None
@@ -229,7 +232,7 @@ class ContactDetector:
         mad = np.median(np.abs(values - np.median(values, axis=0)), axis=0)
         return np.maximum(MAD_TO_SIGMA * mad, self.settings.floor)
 
-    def _watch(self, stamp: float, difference: np.ndarray, position: Sequence[float]) -> ContactEvent | None:
+    def _watch(self, stamp: float, difference: np.ndarray, position: Joints) -> ContactEvent | None:
         armed = self._armed
         assert armed is not None and self._filtered is not None
         if len(self._rest_differences) < self.settings.learn_samples:
@@ -271,7 +274,7 @@ class ContactDetector:
                            ReasonCode.CONTACT_CAME_EARLY,
                            f"torque offset {float(offset[largest]):.2f} Nm on arming: the object was there already")
 
-    def _watch_weight(self, stamp: float, armed: _Armed, position: Sequence[float]) -> ContactEvent | None:
+    def _watch_weight(self, stamp: float, armed: _Armed, position: Joints) -> ContactEvent | None:
         """Has the weight come (load) or gone (release)?"""
         reference = self._unloaded if armed.mode == "load" else armed.baseline
         assert reference is not None and self._filtered is not None

@@ -26,7 +26,8 @@ class TorqueSignal:
         self._bias = self._rng.uniform(-self.bias, self.bias, 7)
         self._noise = self.sigma * self._rng.normal(size=7)
 
-    def sample(self, dt: float, jacobian: np.ndarray, force: Sequence[float], velocity: Sequence[float]) -> np.ndarray:
+    def sample(self, dt: float, jacobian: np.ndarray, force: Sequence[float] | np.ndarray,
+               velocity: Sequence[float] | np.ndarray) -> np.ndarray:
         """One sample dt s after the last: ``jacobian`` 3 x 7, ``force`` (N) on the hand, base frame."""
         keep = float(np.exp(-dt / self.correlation_time))
         self._noise = keep * self._noise + np.sqrt(1 - keep**2) * self.sigma * self._rng.normal(size=7)

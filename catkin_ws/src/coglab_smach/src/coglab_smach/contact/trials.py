@@ -15,7 +15,7 @@ from coglab_smach.ports.interfaces import ContactEvent
 
 DT = 0.005
 STILL = np.zeros(7)
-Force = Callable[[float], Sequence[float]]
+Force = Callable[[float], Sequence[float] | np.ndarray]
 
 
 class ContactTrial:

@@ -110,12 +110,14 @@ class RosArm:
             return self._silent()
         return Verdict(status.standing, "" if status.standing else f"the arm is {status.state}")
 
+    def _cancelling(self, name: str, reason: str) -> Threaded:
+        return Threaded(lambda _: self._cancel(name, reason), f"cancelling of '{name}'")
+
     def cancel_motion(self, reason: str) -> Pending:
         status = self._status.message
         running = {self._addressed, status.active_controller if status is not None else ""} & {"dmp", "ptp"}
         # Permits of their own, which nobody withdraws.
-        calls = [Threaded(lambda _, name=name: self._cancel(name, reason), f"cancelling of '{name}'")
-                 for name in sorted(running)]
+        calls = [self._cancelling(name, reason) for name in sorted(running)]
         if not calls:
             return Polled(lambda: self.standing().ok, lambda: None)
 

@@ -107,7 +107,7 @@ class RosHand:
 
     def calibrate(self, mode: str) -> Pending:
         """Publish the order once the hand listens, then follow hand_status: started, ended, or refused."""
-        begun = {"sent": 0.0, "seen": False, "asked": time.monotonic(), "error": None}
+        begun: dict[str, Any] = {"sent": 0.0, "seen": False, "asked": time.monotonic(), "error": None}
 
         def fail(why: str, code: int) -> bool:
             begun["error"] = PortError(f"the hand does not calibrate after the order '{mode}'", (why,), code)

@@ -172,7 +172,7 @@ class ArmModel:
 
     def _begin(self, motion: _Ptp) -> None:
         self._running = motion
-        self._go(motion.target, ptp_time(self.limits, self.position(), motion.target, motion.max_velocity))
+        self._go(motion.target, ptp_time(self.limits, self.position(), list(motion.target), motion.max_velocity))
         self._reached_out = False
 
     def ended(self, identity: int) -> tuple[PortError | None] | None:

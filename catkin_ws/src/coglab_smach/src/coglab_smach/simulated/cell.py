@@ -108,7 +108,7 @@ class SimulatedCell:
         self.fade_time = 0.2
         self.loaded: dict[str, str] = {}
         self.primitives = {"reach_human", "reach_human_high", "give_human", "take_board", "put_board"}
-        self.hand_positions = (0, 0, 0, 0, 0)
+        self.hand_positions: tuple[int, ...] = (0, 0, 0, 0, 0)
         self.calibrated = self.preshaped = False
         self.objects: dict[str, Pose] = {"mug": Pose(np.array([0.78, 0.03, 0.43])),
                                          "board": Pose(np.array([0.45, -0.55, 0.05])),

@@ -195,7 +195,8 @@ class SimulatedHand:
     def _move(self, name: str, after: float, positions: Callable[[], tuple[int, ...]], preshaped: bool) -> Pending:
         """An action: it moves the fingers unless it was cancelled, or replaced, before its time had come."""
         self._order += 1
-        order, cancelled = self._order, []
+        order = self._order
+        cancelled: list[bool] = []
 
         def apply() -> None:
             if not self.cell.calibrated and name != "open":
@@ -275,8 +276,9 @@ class SimulatedPerception:
 
 def _located(pose: Pose, object_id: str, parent: str = "world") -> Located:
     frame = object_id if object_id in ("", "human_hand", "board") else f"object_{object_id}"
-    d = pose.to_dict()
-    return Located(frame, parent, tuple(d["xyz"]), tuple(d["quaternion"]), 0.05)
+    x, y, z = (float(v) for v in pose.position)
+    qx, qy, qz, qw = (float(v) for v in pose.orientation)
+    return Located(frame, parent, (x, y, z), (qx, qy, qz, qw), 0.05)
 
 
 class SimulatedDatabase:

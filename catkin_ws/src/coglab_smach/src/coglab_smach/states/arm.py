@@ -1,6 +1,7 @@
 """States of the arm: plug-ins and primitives, LWR interface, starting a DMP, waiting for its end, point-to-point."""
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 from coglab_msgs.msg import ReasonCode
@@ -133,7 +134,7 @@ class WaitStop(CoglabState):
     owns_motion = True
 
     def __init__(self, ctx: Context, trigger: str) -> None:
-        keys = {"": [], "contact": ["object_entry"], "release": ["object_entry", "delivery"]}
+        keys: dict[str, list[str]] = {"": [], "contact": ["object_entry"], "release": ["object_entry", "delivery"]}
         super().__init__(ctx, input_keys=keys[trigger])
         self.trigger = trigger
 
@@ -242,7 +243,7 @@ class MonitorDmp(CoglabState):
         switches = 0
         while True:
             try:
-                self.wait_for(lambda shown=running: self._other_pattern(family, shown), "another reaching pattern")
+                self.wait_for(partial(self._other_pattern, family, running), "another reaching pattern")
             except Interrupted as end:
                 if end.stop:
                     raise
