@@ -9,8 +9,8 @@ import pytest
 
 TOP = Path(__file__).resolve().parents[4]
 SOURCES = TOP / "catkin_ws" / "src"
-PACKAGES = ("coglab_py", "coglab_objects", "coglab_perception", "coglab_sim", "coglab_smach", "coglab_bringup", "ih2_hand",
-            "executive_smach/smach", "executive_smach/smach_ros")  # fmt: skip
+PACKAGES = ("coglab_py", "coglab_objects", "coglab_perception", "coglab_sim", "coglab_smach", "coglab_bringup",
+            "ih2_hand", "executive_smach/smach", "executive_smach/smach_ros")  # fmt: skip
 ROS = {"rospy", "actionlib", "tf2_ros", "smach_ros", "rosbag", "rosgraph", "rospkg", "genpy", "diagnostic_updater"}
 # What --strict sets for a module, but for numpy's generics, which say nothing here, and for Any from untyped packages.
 STRICT = ("disallow_untyped_defs", "disallow_incomplete_defs", "disallow_untyped_calls", "disallow_untyped_decorators",
@@ -44,6 +44,6 @@ def test_the_python_that_ships_is_typed(tmp_path):
     config = tmp_path / "mypy.ini"
     section = f"\n[mypy-{','.join(strict)}]\n" + "".join(f"{name} = true\n" for name in STRICT)
     config.write_text((TOP / "mypy.ini").read_text(encoding="utf-8") + section)
-    ended = subprocess.run(["mypy", "--config-file", str(config), "--cache-dir", str(tmp_path / "cache"), *map(str, files)],
-                           cwd=TOP, capture_output=True, text=True, timeout=600, check=False)  # fmt: skip
+    command = ["mypy", "--config-file", str(config), "--cache-dir", str(tmp_path / "cache"), *map(str, files)]
+    ended = subprocess.run(command, cwd=TOP, capture_output=True, text=True, timeout=600, check=False)
     assert ended.returncode == 0, ended.stdout[-6000:] + ended.stderr
