@@ -7,10 +7,10 @@ from collections.abc import Callable
 
 import numpy as np
 import rospy
-import yaml
 from coglab_msgs.msg import ReasonCode
 from coglab_msgs.srv import Start
 from coglab_py.packages import package_path
+from coglab_py.yaml_file import read
 
 from coglab_bringup.trial_recorder import TrialRecorder, summarise
 
@@ -56,7 +56,7 @@ def run_handover(
     Returns its result row and when it began and ended (s of ROS time).
     """
     table = package_path("lwr_description", "config", "joint_limits.yaml")
-    limits = np.array(yaml.safe_load(table.read_text())["default"]["velocity"])
+    limits = np.array(read(table).value["default"]["velocity"])
     ask_for(kind, object_id, alive, READY_LIMIT)
     start = rospy.get_time()
 

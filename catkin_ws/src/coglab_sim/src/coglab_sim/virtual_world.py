@@ -15,6 +15,7 @@ import yaml
 from coglab_objects.database import cell_parameters, objects_folder, read_object
 from coglab_py.packages import package_path
 from coglab_py.pose import Pose, about_z
+from coglab_py.yaml_file import read
 from ih2_hand.clock import VirtualClock
 from ih2_hand.driver import HandSerialDriver
 from ih2_hand.emulator.hand import EmulatedHand
@@ -48,7 +49,7 @@ def urdf_file() -> str:
 def manager_parameters() -> dict[str, Any]:
     """The parameters of /controller_manager as the launch file loads them."""
     file = package_path("coglab_controllers", "config", "controllers.yaml")
-    parameters: dict[str, Any] = yaml.safe_load(file.read_text(encoding="utf-8"))
+    parameters: dict[str, Any] = read(file).value
     package, _, path = parameters["feedback_file"].removeprefix("package://").partition("/")
     parameters["feedback_file"] = str(package_path(package, path))
     return parameters

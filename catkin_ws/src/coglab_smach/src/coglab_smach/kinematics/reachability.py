@@ -11,9 +11,9 @@ from typing import Any
 
 import coglab_controllers as cc
 import numpy as np
-import yaml
 from coglab_py.packages import package_path
 from coglab_py.pose import Pose, about_z
+from coglab_py.yaml_file import read
 
 from coglab_smach.kinematics.goals import palm_at_grasp
 
@@ -38,8 +38,8 @@ def joint_limits() -> cc.JointLimits:
 @lru_cache(maxsize=1)
 def home_posture() -> np.ndarray:
     """``postures.home`` of the machines' configuration, rad."""
-    text = package_path("coglab_smach", "config", "machines.yaml").read_text(encoding="utf-8")
-    return np.array(yaml.safe_load(text)["postures"]["home"], dtype=float)
+    machines = read(package_path("coglab_smach", "config", "machines.yaml")).value
+    return np.array(machines["postures"]["home"], dtype=float)
 
 
 def position_jacobian(arm: cc.Chain, q: Sequence[float]) -> np.ndarray:

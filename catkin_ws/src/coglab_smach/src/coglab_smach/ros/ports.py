@@ -6,14 +6,14 @@ from __future__ import annotations
 
 from typing import Any
 
-import yaml
-from coglab_msgs.msg import Contact
+from coglab_msgs.msg import Contact, ReasonCode
 from coglab_msgs.msg import Recognition as RecognitionMsg
 from coglab_msgs.srv import ArmContact, FreePlaces, GetObject, InitVision, ListObjects, LocateObject
+from coglab_py.yaml_file import YamlError, parse
 from geometry_msgs.msg import Pose
 
 from coglab_smach.ports.interfaces import ContactEvent, Located, Recognition
-from coglab_smach.ports.pending import Pending
+from coglab_smach.ports.pending import Pending, PortError
 from coglab_smach.ros.calls import SERVICE_WAIT, Newest, call, mapped
 
 
@@ -50,6 +50,14 @@ def _located(frame: str, parent: str, pose: Pose, age: float) -> Located:
     return Located(frame, parent, (p.x, p.y, p.z), (q.x, q.y, q.z, q.w), age)
 
 
+def _entry(object_id: str, text: str) -> dict[str, Any]:
+    try:
+        entry: dict[str, Any] = parse(text, f"entry of '{object_id}'").value
+    except YamlError as error:
+        raise PortError(str(error), code=ReasonCode.BAD_FILE) from None
+    return entry
+
+
 class RosDatabase:
     """DatabasePort over object_database."""
 
@@ -58,7 +66,7 @@ class RosDatabase:
 
     def get_object(self, object_id: str) -> Pending:
         pending = call(f"{self._ns}/get_object", GetObject, wait=5.0, object_id=object_id)
-        return mapped(pending, lambda r: yaml.safe_load(r.yaml))
+        return mapped(pending, lambda r: _entry(object_id, r.yaml))
 
     def list_objects(self) -> Pending:
         return mapped(call(f"{self._ns}/list_objects", ListObjects, wait=1.0), lambda r: list(r.object_ids))
