@@ -7,6 +7,7 @@ import time
 
 import numpy as np
 import pytest
+from coglab_msgs.msg import ReasonCode
 from coglab_perception.frames import FrameNames
 from coglab_py.pose import Pose
 from coglab_sim.perception_stand_in import Board, PerceptionSettings
@@ -57,8 +58,9 @@ def test_what_is_not_seen_is_said_within_the_limit(limit):
     scene = Scene()
     scene.see()
     began = time.monotonic()
-    with pytest.raises(NotSeen, match="'object_mug' was not seen within .* in view: human_hand"):
+    with pytest.raises(NotSeen, match="'object_mug' was not seen within .* in view: human_hand") as refusal:
         scene.vision.locate("mug", limit)
+    assert refusal.value.code == ReasonCode.OBJECT_NOT_SEEN
     assert time.monotonic() - began < 5.0
 
 
@@ -85,16 +87,18 @@ def test_init_vision():
 
 def test_free_places():
     scene = Scene()
-    with pytest.raises(NotSeen, match="the board was not visible"):
+    with pytest.raises(NotSeen, match="the board was not visible") as refusal:
         scene.vision.free_places("mug", 0.02)
+    assert refusal.value.code == ReasonCode.NOT_PERCEIVED
     scene.see()
     assert [name for name, _ in scene.vision.free_places("mug", 0.1)] == ["A1", "A2"]
     board = scene.vision.board.frame
     on_a1, on_a2 = Pose(board.apply(SLOTS["A1"])), Pose(board.apply(SLOTS["A2"]))
     scene.see(objects={"object_mug": on_a1, "object_ball": on_a2})
     assert [name for name, _ in scene.vision.free_places("mug", 0.1)] == ["A1"]
-    with pytest.raises(NotSeen, match="no place on the board is free: object_ball, object_mug lie"):
+    with pytest.raises(NotSeen, match="no place on the board is free: object_ball, object_mug lie") as refusal:
         scene.vision.free_places("bottle", 0.1)
+    assert refusal.value.code == ReasonCode.NO_FREE_PLACE
 
 
 # -- two people -----------------------------------------------------------------------------------
