@@ -113,5 +113,5 @@ def test_every_value_that_the_launch_files_offer_is_taken():
     judge_launch(TOP, [f"{name}:={value}" for name, (value, _) in defaults.items()])
     for convention in defaults["krl_convention"][1].partition(": ")[2].split(", "):
         judge_launch(TOP, [f"krl_convention:={convention}"])
-    for entry in (sources / "coglab_smach" / "objects").glob("*.yaml"):
+    for entry in (sources / "coglab_objects" / "objects").glob("*.yaml"):
         judge_launch(TOP, [f"object:={entry.stem}"])

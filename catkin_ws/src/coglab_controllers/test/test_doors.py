@@ -66,7 +66,7 @@ def test_a_dmp_request_has_one_shape_from_the_brain_to_the_plugin() -> None:
     assert struct("plugins/dmp_request.hpp", "DmpRequest") == execute
     own_of_execute = {"initial_state", "initial_position", "initial_velocity", "goal_frame"}
     assert [f for f in execute if f not in own_of_execute] == switch
-    brain = dataclass_fields(SOURCES / "coglab_smach" / "src" / "coglab_smach" / "ports.py", "DmpRequest")
+    brain = dataclass_fields(SOURCES / "coglab_smach" / "src" / "coglab_smach" / "ports" / "interfaces.py", "DmpRequest")
     initial = {"initial_state", "initial_position", "initial_velocity"}  # the brain starts from the current state
     assert sorted(brain) == sorted(set(execute) - initial)
 

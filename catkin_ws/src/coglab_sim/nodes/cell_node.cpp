@@ -16,6 +16,7 @@
 #include <coglab_msgs/HumanHand.h>
 #include <coglab_msgs/InjectFault.h>
 #include <coglab_msgs/PlaceObject.h>
+#include <coglab_msgs/ReasonCode.h>
 #include <geometry_msgs/Wrench.h>
 #include <ros/ros.h>
 #include <rosgraph_msgs/Clock.h>
@@ -196,7 +197,11 @@ class CellNode {
       response.message = request.kind + " done";
       ROS_INFO("fault %s, value %g, duration %g s", request.kind.c_str(), request.value,
                request.duration);
+    } catch (const std::invalid_argument& error) {
+      response.reason_code = coglab_msgs::ReasonCode::INVALID_ARGUMENT;
+      response.message = error.what();
     } catch (const std::exception& error) {
+      response.reason_code = coglab_msgs::ReasonCode::UNEXPECTED;
       response.message = error.what();
     }
     return true;
@@ -219,7 +224,11 @@ class CellNode {
       config_.object = object;
       response.success = true;
       response.message = object.id + " placed: " + request.where;
+    } catch (const std::invalid_argument& error) {
+      response.reason_code = coglab_msgs::ReasonCode::INVALID_ARGUMENT;
+      response.message = error.what();
     } catch (const std::exception& error) {
+      response.reason_code = coglab_msgs::ReasonCode::UNEXPECTED;
       response.message = error.what();
     }
     return true;

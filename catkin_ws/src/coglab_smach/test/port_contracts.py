@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 from coglab_msgs.msg import ReasonCode
-from coglab_smach.pending import PortError
-from coglab_smach.ports import DmpRequest
+from coglab_smach.ports.interfaces import DmpRequest
+from coglab_smach.ports.pending import PortError
 
 CONTROLLERS = {"dmp": "coglab/DmpController", "ptp": "coglab/PtpController"}
 

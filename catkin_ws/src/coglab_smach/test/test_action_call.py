@@ -8,8 +8,8 @@ from types import SimpleNamespace
 
 import pytest
 from actionlib_msgs.msg import GoalStatus
-from coglab_smach.pending import PortError
-from coglab_smach.ros_hand import ActionCall
+from coglab_smach.ports.pending import PortError
+from coglab_smach.ros.hand import ActionCall
 
 
 class Client:
