@@ -218,8 +218,11 @@ void ControlCycle::compute(JointVector& velocity) noexcept {
     if (timed) taken_ns += steadyNow() - begin;
     return fine;
   };
+  // Step 4: computeReference() of the motion controller.
   if (!charged("computeReference", [&] { motion_->computeReference(input_, references); })) return;
+  // Step 5: task-stage feedback controllers.
   feedback_.run(ctrl_more::Stage::Task);
+  // Step 6: resolve() of the motion controller.
   if (!charged("resolve", [&] { motion_->resolve(input_, references); })) return;
   if (timed && tooSlow(1e-9 * static_cast<double>(taken_ns))) return;
   if (!references.states.view<kMaxJoints>(references.joint_velocity).allFinite()) {
@@ -227,6 +230,7 @@ void ControlCycle::compute(JointVector& velocity) noexcept {
           << id_.c_str() << "' gave a velocity that is not finite");
     return;
   }
+  // Step 7: joint-stage feedback controllers.
   feedback_.run(ctrl_more::Stage::Joint);
   velocity = references.states.view<kMaxJoints>(references.joint_velocity);
 }
@@ -234,6 +238,7 @@ void ControlCycle::compute(JointVector& velocity) noexcept {
 void ControlCycle::run(const RobotSample& sample, double dt, VelocityCommand& out) noexcept {
   heartbeat_.fetch_add(1, std::memory_order_relaxed);
   const std::int64_t begin = settings_.overrun_time > 0.0 ? steadyNow() : 0;
+  // Step 1: check the joint state.
   const bool fine = usable(sample, dt);
   if (fine) {
     input_.robot = sample;
@@ -249,12 +254,15 @@ void ControlCycle::run(const RobotSample& sample, double dt, VelocityCommand& ou
   limit_scale_ = 1.0;
   report_.guard = GuardResult();
   if (fine) {
+    // Step 2: fill RobotStates.
     feedback_.fill(input_);
     watchRobot();
   }
+  // Step 3: adopt the newest plan, a cancel and new motions.
   adopt();
   if (fine) {
     compute(velocity);
+    // Step 8: guard.
     guard_.setInterfaceReserve(sample.stop_delay, sample.stop_rounding);
     guard_.limit(input_.chain, furthest(sample, velocity), velocity, dt, report_.guard);
     watchGuard(dt);
@@ -263,6 +271,7 @@ void ControlCycle::run(const RobotSample& sample, double dt, VelocityCommand& ou
     ++report_.stale;
   }
   feedback_.end();
+  // Step 9: send the velocity and the report.
   out.velocity = fine ? report_.guard.velocity : JointVector::Zero();
   out.stamp_ns = sample.stamp_ns;
   out.motion_epoch = sample.motion_epoch;
