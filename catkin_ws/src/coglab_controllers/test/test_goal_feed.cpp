@@ -87,7 +87,9 @@ struct TopicGoal : ::testing::Test {
   void run(int cycles) {
     for (int i = 0; i < cycles; ++i) {
       robot.tick();
-      if (i % 6 == 0) EXPECT_TRUE(VirtualRobot::ok(tell()));
+      if (i % 6 == 0) {
+        EXPECT_TRUE(VirtualRobot::ok(tell()));
+      }
     }
   }
 };
