@@ -50,7 +50,9 @@ def test_nothing_is_excused_that_needs_no_excuse():
 def test_cpp_is_formatted():
     assert shutil.which("clang-format"), "clang-format is missing: ./coglab install test"
     files = [str(p) for p in SOURCES.rglob("*") if p.suffix in (".cpp", ".hpp")]
-    done = subprocess.run(["clang-format", "--dry-run", "-Werror", *files], capture_output=True, text=True, timeout=300, cwd=TOP)
+    done = subprocess.run(
+        ["clang-format", "--dry-run", "-Werror", *files], capture_output=True, text=True, timeout=300, cwd=TOP
+    )
     wrong = sorted({line.split(":")[0] for line in done.stderr.splitlines() if ": error:" in line})
     assert not wrong, "clang-format -i " + " ".join(str(Path(w).relative_to(TOP)) for w in wrong)
 

@@ -9,6 +9,7 @@ ratio of echo against echo: on a machine that is not a real-time one it says mor
 
 First, in lockstep and without ROS, limits and braking while datagrams are lost (docs/limits_under_loss.md).
 """
+
 from __future__ import annotations
 
 import json
@@ -91,9 +92,11 @@ class Motion:
         finished: list[int] = []
         rospy.Subscriber("controller_manager/ptp/finished_ptp", FinishedPtp, lambda m: finished.append(m.ptp_id))
         deadline = time.monotonic() + PATIENCE
-        steps = [("controller_manager/load_controller", LoadController, ("ptp", "coglab/PtpController")),
-                 ("lwr/command", LwrCommand, ("start",)),
-                 ("controller_manager/switch_controller", SwitchController, ("ptp",))]
+        steps = [
+            ("controller_manager/load_controller", LoadController, ("ptp", "coglab/PtpController")),
+            ("lwr/command", LwrCommand, ("start",)),
+            ("controller_manager/switch_controller", SwitchController, ("ptp",)),
+        ]
         for name, kind, arguments in steps:
             while True:  # the measuring peer comes a moment later
                 answer = call(name, kind, *arguments)
@@ -134,6 +137,7 @@ def median_interval(values: list[float]) -> tuple[float, float]:
 def bound_port() -> int:
     """UDP port of the node's bridge, once it is up."""
     import rospy
+
     deadline = time.monotonic() + PATIENCE
     while time.monotonic() < deadline:
         port = rospy.get_param("/lwr/fri_port_bound", 0)
@@ -158,6 +162,7 @@ def measure() -> tuple[list[tuple[str, list[float]]], float]:
         echo_port = int(echo.stdout.readline())
         import rosgraph
         import rospy
+
         deadline = time.monotonic() + PATIENCE
         while not rosgraph.is_master_online():
             if time.monotonic() > deadline:
@@ -166,8 +171,13 @@ def measure() -> tuple[list[tuple[str, list[float]]], float]:
         rospy.init_node("bench_fri", disable_signals=True)
         port = bound_port()
         motion.start()
-        run = subprocess.run([binary, "measure", str(echo_port), str(port), str(QUADS)], stdout=subprocess.PIPE,
-                             text=True, check=False, timeout=2 * PATIENCE + 10 * QUADS)
+        run = subprocess.run(
+            [binary, "measure", str(echo_port), str(port), str(QUADS)],
+            stdout=subprocess.PIPE,
+            text=True,
+            check=False,
+            timeout=2 * PATIENCE + 10 * QUADS,
+        )
         if run.returncode != 0:
             sys.exit(f"nothing measured: {motion.error or run.returncode}")
         motion.stop()
@@ -216,20 +226,44 @@ def loss_rows() -> list[dict[str, object]]:
         beyond, failed = max(v[2] for v in approaches), sum(v[5] + v[6] for v in approaches)
         above = max(max(v[3], v[4]) for v in approaches)
         at = f"at {1e3 * period:g} ms"
-        rows.append(row(f"set-point beyond its bound {at}, {SEEDS} seeds x 0, 1, 5, 10 % loss x single, bursts x both "
-                        "kinds of controller", beyond, "mrad", "0", ok=beyond == 0.0 and failed == 0))
-        rows.append(row(f"speed or acceleration beyond its limit {at}, the same runs", above, "rad/s, rad/s^2",
-                        "<= 1e-6", ok=above <= 1e-6))
+        rows.append(
+            row(
+                f"set-point beyond its bound {at}, {SEEDS} seeds x 0, 1, 5, 10 % loss x single, bursts x both "
+                "kinds of controller",
+                beyond,
+                "mrad",
+                "0",
+                ok=beyond == 0.0 and failed == 0,
+            )
+        )
+        rows.append(
+            row(
+                f"speed or acceleration beyond its limit {at}, the same runs",
+                above,
+                "rad/s, rad/s^2",
+                "<= 1e-6",
+                ok=above <= 1e-6,
+            )
+        )
     for period, before in MOTION_TIMES.items():
         time_now = next(float(v[2]) for v in lines if v[0] == "motion" and float(v[1]) == period)
-        rows.append(row(f"full-speed motion of A2 to 0.05 rad before its limit at {1e3 * period:g} ms", time_now, "s",
-                        f"<= {MOTION_LIMIT:g} x before", "commit 5828bb3", before,
-                        time_now <= MOTION_LIMIT * before))
+        rows.append(
+            row(
+                f"full-speed motion of A2 to 0.05 rad before its limit at {1e3 * period:g} ms",
+                time_now,
+                "s",
+                f"<= {MOTION_LIMIT:g} x before",
+                "commit 5828bb3",
+                before,
+                time_now <= MOTION_LIMIT * before,
+            )
+        )
     for _, period, bursts, _, mean, worst in (v for v in lines if v[0] == "stop"):
         kind = "bursts of 1..5" if bursts == "1" else "single"
         what = f"angle of stopping at 10 % loss ({kind}) over that without, {1e3 * float(period):g} ms"
-        rows.append(row(f"{what}, mean of {SEEDS}", float(mean), "ratio", f"<= {STOP_LIMIT:g}",
-                        ok=float(mean) <= STOP_LIMIT))
+        rows.append(
+            row(f"{what}, mean of {SEEDS}", float(mean), "ratio", f"<= {STOP_LIMIT:g}", ok=float(mean) <= STOP_LIMIT)
+        )
         rows.append(row(f"{what}, largest", float(worst), "ratio"))
     return rows
 
@@ -251,10 +285,7 @@ def main() -> None:
         kind: statistics.median(m for (k, _), m in zip(answered, medians, strict=True) if k == kind)
         for kind in ("echo", "bridge")
     }
-    missed = {
-        kind: sum(v < 0.0 for k, values in blocks if k == kind for v in values)
-        for kind in ("echo", "bridge")
-    }
+    missed = {kind: sum(v < 0.0 for k, values in blocks if k == kind for v in values) for kind in ("echo", "bridge")}
 
     print(
         json.dumps(
