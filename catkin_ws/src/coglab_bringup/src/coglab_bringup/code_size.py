@@ -1,4 +1,4 @@
-"""Lengths of files and functions in Python, C++ and JavaScript; `python3 -m coglab_bringup.code_size` lists the longest."""
+"""Lengths of files and functions (Python, C++, JavaScript); `python3 -m coglab_bringup.code_size` lists the longest."""
 
 from __future__ import annotations
 
