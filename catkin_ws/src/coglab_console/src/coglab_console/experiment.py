@@ -114,7 +114,7 @@ class Experiment:
         self._write("note", who=who, text=text)
         return "noted"
 
-    def record(self, kind: str, **fields: object) -> None:
+    def record(self, kind: str, /, **fields: object) -> None:
         """A result or a stop, into the file of the open session."""
         self._write(kind, **fields)
 
@@ -129,7 +129,7 @@ class Experiment:
             "notes": self.notes[-20:],
         }
 
-    def _write(self, kind: str, **fields: object) -> None:
+    def _write(self, kind: str, /, **fields: object) -> None:
         if self._path is None:
             return
         fields = {"type": kind, "stamp": round(self._now(), 3), **fields}

@@ -27,8 +27,8 @@ class Container:
 
 
 def _quoted(text: str) -> str:
-    cleaned = "".join(c if c.isprintable() else "?" for c in text[:200])
-    return '"' + cleaned.replace("\\", "\\\\").replace('"', '\\"') + '"'
+    """A label for dot; what it would take for an escape is replaced."""
+    return '"' + "".join(c if c.isprintable() and c not in '"\\' else "?" for c in text) + '"'
 
 
 def _label(text: str) -> str:
@@ -70,13 +70,22 @@ class Layout:
         if program is None:
             return _rows(containers, "Graphviz is missing (apt install graphviz): no edges are drawn")
         try:
-            done = subprocess.run([program, "-Tjson"], input=_dot_text(containers), capture_output=True, text=True,
+            paths = _paths(containers)
+            done = subprocess.run([program, "-Tjson"], input=_dot_text(containers, paths), capture_output=True, text=True,
                                   timeout=TIME_LIMIT)  # fmt: skip
             if done.returncode != 0:
                 raise ValueError(done.stderr.strip().splitlines()[-1] if done.stderr.strip() else "no message")
-            return _read(json.loads(done.stdout))
+            picture = _read(json.loads(done.stdout), paths)
+            _name_edges(picture, containers)
+            return picture
         except (OSError, subprocess.TimeoutExpired, ValueError, KeyError, IndexError) as error:
             return _rows(containers, f"Graphviz did not lay the graph out ({str(error)[:120]}): no edges are drawn")
+
+
+def _paths(containers: dict[str, Container]) -> list[str]:
+    """Every container and state: their places in this list are their names in dot's text."""
+    states = [f"{c.path}/{child}" for c in containers.values() for child in c.children]
+    return list(dict.fromkeys([*containers, *states]))
 
 
 def _leaf_of(path: str, containers: dict[str, Container]) -> str:
@@ -86,63 +95,69 @@ def _leaf_of(path: str, containers: dict[str, Container]) -> str:
     return path
 
 
-def _dot_text(containers: dict[str, Container]) -> str:
+def _dot_text(containers: dict[str, Container], paths: list[str]) -> str:
+    number = {path: i for i, path in enumerate(paths)}
     lines = ["digraph machine {", "compound=true; rankdir=TB; nodesep=0.18; ranksep=0.32; fontname=sans; fontsize=11;",
-             "node [shape=box, fontname=sans, fontsize=11, height=0.28, margin=\"0.08,0.03\"];",
-             "edge [fontname=sans, fontsize=9];"]  # fmt: skip
+             "node [shape=box, fontname=sans, fontsize=11, height=0.28, margin=\"0.08,0.03\"];"]  # fmt: skip
     for root in roots(containers):
-        _write_container(root, containers, lines)
+        _write_container(root, containers, number, lines)
     for container in containers.values():
-        seen: dict[tuple[str, str], list[str]] = {}
-        for outcome, start, end in container.edges:
-            if start in container.children and end in container.children and start != end:
-                seen.setdefault((start, end), []).append(outcome)
-        for (start, end), outcomes in seen.items():
+        pairs = {(start, end) for _, start, end in container.edges if start != end}
+        for start, end in sorted(pair for pair in pairs if set(pair) <= set(container.children)):
             a, b = f"{container.path}/{start}", f"{container.path}/{end}"
-            more = [f"tooltip={_quoted(', '.join(outcomes))}", f"comment={_quoted(a + ' ' + b)}"]
-            more += [f"ltail={_quoted('cluster' + a)}"] if a in containers else []
-            more += [f"lhead={_quoted('cluster' + b)}"] if b in containers else []
-            ends = f"{_quoted(_leaf_of(a, containers))} -> {_quoted(_leaf_of(b, containers))}"
+            more = [f'comment="{number[a]} {number[b]}"']
+            more += [f"ltail=cluster{number[a]}"] if a in containers else []
+            more += [f"lhead=cluster{number[b]}"] if b in containers else []
+            ends = f"n{number[_leaf_of(a, containers)]} -> n{number[_leaf_of(b, containers)]}"
             lines.append(f"{ends} [{', '.join(more)}];")
     return "\n".join([*lines, "}"])
 
 
-def _write_container(path: str, containers: dict[str, Container], lines: list[str]) -> None:
-    name = path.rsplit("/", 1)[-1]
-    lines.append(f"subgraph {_quoted('cluster' + path)} {{ label={_quoted(_label(name))}; comment={_quoted(path)};")
+def _write_container(path: str, containers: dict[str, Container], number: dict[str, int], lines: list[str]) -> None:
+    lines.append(f"subgraph cluster{number[path]} {{ label={_quoted(_label(path.rsplit('/', 1)[-1]))};")
     for child in containers[path].children:
         below = f"{path}/{child}"
         if below in containers and containers[below].children:
-            _write_container(below, containers, lines)
+            _write_container(below, containers, number, lines)
         else:
-            lines.append(f"{_quoted(below)} [label={_quoted(_label(child))}];")
+            lines.append(f"n{number[below]} [label={_quoted(_label(child))}];")
     lines.append("}")
 
 
-def _read(drawn: dict) -> dict:
+def _read(drawn: dict, paths: list[str]) -> dict:
     """What dot -Tjson printed, y turned downward."""
     _, _, width, height = (float(word) for word in drawn["bb"].split(","))
     boxes, nodes, edges = [], [], []
-    names = {item["_gvid"]: item["name"] for item in drawn.get("objects", [])}
     for item in drawn.get("objects", []):
-        if "bb" in item:
+        name = item["name"]
+        path = paths[int(name.removeprefix("cluster").removeprefix("n"))]
+        shown = {"path": path, "label": _label(path.rsplit("/", 1)[-1])}
+        if name.startswith("cluster"):
             x0, y0, x1, y1 = (float(word) for word in item["bb"].split(","))
-            label = item.get("label", "")
-            boxes.append({"path": item["comment"], "label": label, "box": _box(x0, height - y1, x1 - x0, y1 - y0)})
-        elif "pos" in item:
+            boxes.append({**shown, "box": _box(x0, height - y1, x1 - x0, y1 - y0)})
+        else:
             x, y = (float(word) for word in item["pos"].split(","))
             w, h = 72 * float(item["width"]), 72 * float(item["height"])
-            nodes.append({"path": item["name"], "label": item["label"], "box": _box(x - w / 2, height - y - h / 2, w, h)})
+            nodes.append({**shown, "box": _box(x - w / 2, height - y - h / 2, w, h)})
     for edge in drawn.get("edges", []):
         words = edge["pos"].split()
         tip = next((word[2:] for word in words if word.startswith("e,")), None)
         points = [_point(word, height) for word in words if word[0] not in "es"]
         if tip:
             points.append(_point(tip, height))
-        pair = edge.get("comment", "").split(" ")
-        start, end = pair if len(pair) == 2 else (names[edge["tail"]], names[edge["head"]])
-        edges.append({"from": start, "to": end, "outcomes": edge.get("tooltip", ""), "points": points})
+        start, end = (paths[int(word)] for word in edge["comment"].split())
+        edges.append({"from": start, "to": end, "points": points})
     return {"size": [round(width, 1), round(height, 1)], "boxes": boxes, "nodes": nodes, "edges": edges, "problem": ""}
+
+
+def _name_edges(picture: dict, containers: dict[str, Container]) -> None:
+    """Adds to each edge the outcomes that it stands for."""
+    outcomes: dict[tuple[str, str], list[str]] = {}
+    for container in containers.values():
+        for outcome, start, end in container.edges:
+            outcomes.setdefault((f"{container.path}/{start}", f"{container.path}/{end}"), []).append(outcome)
+    for edge in picture["edges"]:
+        edge["outcomes"] = ", ".join(outcomes[edge["from"], edge["to"]])
 
 
 def _box(x: float, y: float, w: float, h: float) -> list[float]:

@@ -197,9 +197,9 @@ class ConsoleNode:
 
     async def run(self, ended: asyncio.Event) -> None:
         """Serves until `ended`."""
-        runner = web.AppRunner(self.server.app, access_log=None, handle_signals=False, shutdown_timeout=1.0)
+        runner = web.AppRunner(self.server.app, access_log=None, handle_signals=False)
         await runner.setup()
-        await web.SockSite(runner, self.socket).start()
+        await web.SockSite(runner, self.socket, shutdown_timeout=1.0).start()
         print(f"[coglab] console: {self.write_link()}   (one use; the next one is in {self.home / 'console.url'})", flush=True)
         if self.address not in ("127.0.0.1", "localhost"):
             rospy.logwarn("the console listens on %s: whoever gets the link can move the robot", self.address)

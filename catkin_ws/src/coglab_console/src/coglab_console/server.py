@@ -37,6 +37,15 @@ HEADERS = {
 }
 
 
+def parsed(text: str) -> object:
+    """JSON of a browser; ValueError for what is none, also for NaN and Infinity, which Python would take."""
+
+    def refuse(word: str) -> object:
+        raise ValueError(f"{word} is no number")
+
+    return json.loads(text, parse_constant=refuse)
+
+
 class ConsoleServer:
     """One console. `epoch` tells a browser that comes back whether it is the same run."""
 
@@ -137,7 +146,7 @@ class ConsoleServer:
         session = self._changing(request)
         self._limited(session)
         try:
-            body = json.loads(await request.text())
+            body = parsed(await request.text())
             name, arguments = body["name"], body.get("arguments", {})
         except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
             raise Denied(400, 'expected {"name": ..., "arguments": {...}} in JSON') from None
@@ -188,7 +197,7 @@ class ConsoleServer:
         """The number of the newest event that the browser has; 0 where it does not say so properly."""
         try:
             message = await socket.receive(timeout=HELLO_LIMIT)
-            hello = json.loads(message.data) if message.type is WSMsgType.TEXT else {}
+            hello = parsed(message.data) if message.type is WSMsgType.TEXT else {}
             seq = hello.get("seq", 0) if hello.get("epoch") == self._epoch else 0
             return seq if isinstance(seq, int) and not isinstance(seq, bool) else 0
         except (asyncio.TimeoutError, ValueError, AttributeError, RecursionError):
@@ -222,7 +231,7 @@ class ConsoleServer:
         try:
             if message.type is not WSMsgType.TEXT:
                 raise ValueError("expected text")
-            frame = json.loads(message.data)
+            frame = parsed(message.data)
             kind = frame["t"]
         except (ValueError, KeyError, TypeError, RecursionError) as error:
             return f"a frame was not understood: {str(error)[:100]}"
