@@ -45,7 +45,7 @@ export const HAND_SHAPES = [
 
 /** The object of the next action, or in the hand, as a shape in its own frame (origin: middle of its underside). */
 export function objectShape() {
-  const id = store.docs.status?.machine.object || store.docs.desk?.object;
+  const id = store.docs.status?.machine.object || store.docs.desk?.object || store.docs.status?.machine.fallback;
   const row = store.docs.objects?.rows.find((one) => one.id === id);
   if (!row?.shape) return null;
   const { type, radius, height } = row.shape;

@@ -96,7 +96,7 @@ export function showGraph(parent) {
     for (const line of Object.values(parts.edges)) line.classList.remove('last');
     if (step.path) {
       parts.edges[`${step.path}/${step.from} ${step.path}/${step.to}`]?.classList.add('last');
-      setText(last, `${step.from} [${step.outcome}] → ${step.to}${step.reason ? `: ${step.reason}` : ''}`);
+      setText(last, `${step.from}${step.outcome ? ` [${step.outcome}]` : ''} → ${step.to}${step.reason ? `: ${step.reason}` : ''}`);
     } else setText(last, '');
     const deepest = active.reduce((a, b) => (b.length > a.length ? b : a), '');
     setText(crumbs, graph.problem || deepest.split('/').filter(Boolean).slice(1).join(' › ') || 'not active');

@@ -5,8 +5,8 @@ import { fixedShapes, robotShapes, robotPoses, objectShape, path, HAND_SHAPES } 
 import { store } from './store.js';
 
 const CAMERAS = {
-  front: [[2.35, -0.55, 0.95], [0.2, 0, 0.3]],
-  side: [[0.35, -2.3, 0.55], [0.35, 0, 0.3]],
+  front: [[1.75, -1.55, 0.75], [0.42, 0.02, 0.24]],
+  side: [[0.45, -2.2, 0.5], [0.45, 0, 0.27]],
   top: [[0.35, -0.02, 2.6], [0.35, 0, 0.2]],
   hand: null,
 };

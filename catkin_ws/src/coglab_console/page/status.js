@@ -10,7 +10,7 @@ function fri({ alive, fri: state, quality, cycle, reason }) {
   if (!alive) return ['fault', 'the arm’s node is not there'];
   const level = { PERFECT: 'ok', OK: 'ok', BAD: 'warn' }[quality] ?? 'fault';
   const latency = store.state?.fri;
-  const more = latency === null || latency === undefined ? '' : `, ${latency.toFixed(1)} ms late`;
+  const more = latency === null || latency === undefined ? '' : `, late by ${latency.toFixed(1)} ms`;
   return [level, `${state || 'OFF'} ${quality || reason || 'no datagrams'}, ${(cycle * 1000).toFixed(0)} ms${more}`];
 }
 

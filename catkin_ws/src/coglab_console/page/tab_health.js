@@ -3,14 +3,22 @@ import { h, mark, setText, table } from './dom.js';
 import { onDocs, operating, store } from './store.js';
 import { command } from './link.js';
 import { viewKind } from './view.js';
+import { actionButton } from './actions.js';
 
 const LEVELS = [['ok', 'ok'], ['warn', 'warning'], ['fault', 'error'], ['idle', 'silent']];
+
+/** Always a held button: what it does needs a second thought. */
+function heavy(label, args, told) {
+  const blockedBy = () => (operating() ? store.docs.desk?.reasons.calibrate : 'only the operator calibrates');
+  return actionButton(label, { blockedBy, mustHold: () => true, request: () => ['calibrate', args], tell: (text) => setText(told, text) });
+}
 
 export function healthPage(page) {
   page.className = 'page two';
   const tree = h('div');
   const versions = h('div');
   const parameters = h('div');
+  const told = h('p', { 'aria-live': 'polite' });
   const open = new Set();
   const filter = h('input', { type: 'search', placeholder: 'part of a name', oninput: () => show() });
   let known = [];
@@ -20,7 +28,8 @@ export function healthPage(page) {
     show();
   } }, 'Read the parameters');
   page.append(h('div', {}, h('h2', {}, 'Diagnostics'), tree),
-    h('div', {}, h('h2', {}, 'Versions and browsers'), versions, h('h2', {}, 'Parameters'), h('div', { class: 'row' }, read, h('label', {}, 'Filter', filter)), parameters));
+    h('div', {}, h('h2', {}, 'Versions and browsers'), versions, h('h2', {}, 'Hand'), h('p', {}, 'A complete or forced calibration opens the hand, whatever it holds: hold the button.'), h('div', { class: 'row' }, heavy('Complete calibration', { mode: 'complete' }, told), heavy('Forced calibration', { mode: 'complete', force: true }, told)), told,
+      h('h2', {}, 'Parameters'), h('div', { class: 'row' }, read, h('label', {}, 'Filter', filter)), parameters));
   const draw = () => {
     const { rows = [], versions: words = {}, browsers = [] } = store.docs.health ?? {};
     const focused = document.activeElement?.dataset?.name;

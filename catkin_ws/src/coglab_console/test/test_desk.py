@@ -61,7 +61,7 @@ def test_everybody_stops_and_notes(desk):
 
 def test_taking_over_is_announced_and_may_be_refused():
     said, clock = [], Clock()
-    roles = Roles(said.append, clock)
+    roles = Roles(lambda text, level: said.append(text), clock)
     roles.connected("a")
     roles.connected("b")
     roles.take_over("b")
@@ -78,7 +78,7 @@ def test_taking_over_is_announced_and_may_be_refused():
 
 def test_two_who_want_to_operate_and_one_who_went_away():
     clock = Clock()
-    roles = Roles(lambda text: None, clock)
+    roles = Roles(lambda text, level: None, clock)
     for name in "abc":
         roles.connected(name)
     roles.take_over("b")

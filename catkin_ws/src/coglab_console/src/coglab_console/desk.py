@@ -52,7 +52,7 @@ class Desk:
                  now: Callable[[], float], invite: Callable[[], str]) -> None:  # fmt: skip
         self.backend, self.events, self.documents = backend, events, documents
         self._invite = invite
-        self.roles = Roles(lambda text: events.add("control", text, "warning"))
+        self.roles = Roles(lambda text, level: events.add("control", text, level))
         self.guard = MotionGuard(backend.real)
         self.experiment = Experiment(folder, now, lambda text: events.add("experiment", text, "warning"))
         self.object_id = ""

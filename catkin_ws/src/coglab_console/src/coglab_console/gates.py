@@ -96,6 +96,8 @@ def _start_reason(action: str, now: Standing) -> str:
         return "the hand is empty"
     if action in ("exchange_human_to_robot", "take") and now.object_id:
         return f"the hand holds {now.object_id}"
+    if action in ("initialise", "reset"):
+        return "nothing is stopped" if action == "reset" else "it is initialised"
     return f"{now.leaf.replace('_', ' ')} takes {', '.join(now.actions) or 'nothing'}"
 
 

@@ -12,9 +12,9 @@ ABSENCE = 5.0
 
 
 class Roles:
-    """Sessions are known by their name. Called from one thread."""
+    """Sessions are known by their name; `say(text, level)` makes an event. Called from one thread."""
 
-    def __init__(self, say: Callable[[str], None], now: Callable[[], float] = time.monotonic) -> None:
+    def __init__(self, say: Callable[[str, str], None], now: Callable[[], float] = time.monotonic) -> None:
         self._say, self._now = say, now
         self.operator = ""
         self.claimant = ""
@@ -26,7 +26,7 @@ class Roles:
         if name == self.operator:
             self._absent_since = None
         elif not self.operator:
-            self._make(name, f"{name} is the operator")
+            self._make(name, f"{name} is the operator", "info")
 
     def disconnected(self, name: str) -> None:
         """The last connection of a browser closed. It stays the operator until somebody takes over."""
@@ -34,7 +34,7 @@ class Roles:
             self._absent_since = self._now()
         if name == self.claimant:
             self.claimant = ""
-            self._say(f"{name} went away and does not take over any more")
+            self._say(f"{name} went away and does not take over any more", "info")
 
     def take_over(self, name: str) -> str:
         """`name` wants to be the operator; the answer in words."""
@@ -47,14 +47,14 @@ class Roles:
             return "you are the operator now"
         if not self.claimant:
             self.claimant, self._due = name, self._now() + NOTICE
-            self._say(f"{name} takes over from {self.operator} in {NOTICE:.0f} s, unless {self.operator} keeps the control")
+            self._say(f"{name} takes over from {self.operator} in {NOTICE:.0f} s, unless {self.operator} keeps the control", "warning")
         return f"{self.operator} was told; you are the operator in {NOTICE:.0f} s unless they keep the control"
 
     def keep(self, name: str) -> str:
         """The operator refuses; the answer in words."""
         if name != self.operator or not self.claimant:
             return "nobody is taking over from you"
-        self._say(f"{name} keeps the control; {self.claimant} goes on watching")
+        self._say(f"{name} keeps the control; {self.claimant} goes on watching", "warning")
         self.claimant = ""
         return "you keep the control"
 
@@ -72,6 +72,6 @@ class Roles:
     def _absent(self) -> bool:
         return self._absent_since is not None and self._now() - self._absent_since > ABSENCE
 
-    def _make(self, name: str, sentence: str) -> None:
+    def _make(self, name: str, sentence: str, level: str = "warning") -> None:
         self.operator, self.claimant, self._absent_since = name, "", None
-        self._say(sentence)
+        self._say(sentence, level)

@@ -43,11 +43,16 @@ class Knowledge:
         self._told: dict[str, str] = {}
         self._now = threading.Event()
         self._motion: tuple[str, np.ndarray] | None = None
-        view.entry = lambda: self._entries.get(view.machine.object_id or selected(), {})
+        view.entry = self._entry
         view.config = lambda: self._config
         view.objects_read = self.read_again
         threading.Thread(target=self._look, name="knowledge", daemon=True).start()
         threading.Thread(target=self._paths, name="path_ahead", daemon=True).start()
+
+    def _entry(self) -> dict:
+        """Of the object in the hand, or of the next action, or that which the machine takes where none is named."""
+        name = self._view.machine.object_id or self._selected() or str(self._config.get("default_object", ""))
+        return self._entries.get(name, {})
 
     def read_again(self, problems: str) -> None:
         """After the object database has read its files; `problems` in its words."""

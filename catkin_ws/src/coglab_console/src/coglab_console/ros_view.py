@@ -58,6 +58,7 @@ class RosView:
         self.joints: dict[str, float] = {}
         self._joints_at = self._joints_stamp = 0.0
         self._fastest = 0.0
+        self._asked = False  # for learning, by an operator
         self._palm_before: tuple[float, Any] | None = None
         self.palm_speed = 0.0
         self.machine, self.arm, self.hand = MasterState(), LwrState(), HandStatus()
@@ -165,7 +166,7 @@ class RosView:
         return {
             "machine": {"alive": now.master_alive, "state": machine.state, "words": phase(machine.state),
                         "hub": machine.in_hub, "actions": list(machine.actions), "object": machine.object_id,
-                        "why": machine.why, "limit": time_limit(machine.state, self.config(), self.entry())},
+                        "why": machine.why, "fallback": str(self.config().get("default_object", "")), "limit": time_limit(machine.state, self.config(), self.entry())},
             "arm": {"alive": now.arm_alive, "supervisor": arm.supervisor, "fri": arm.fri_state, "quality": arm.quality,
                     "mode": arm.control_mode, "power": arm.power == 0x7F, "allowed": arm.motion_allowed,
                     "held": arm.hold_latched, "reason": arm.reason, "cycle": arm.cycle_time},
@@ -185,6 +186,7 @@ class RosView:
             return False, "no external torques: the arm's node is not there"
         if self._fastest > STILL:
             return False, "the arm moves; learn at rest"
+        self._asked = True
         self.torque.learn()
         return True, "learning for 5 s; leave the arm alone"
 
@@ -225,7 +227,9 @@ class RosView:
         except wire.BadBytes:
             return
         told = self.torque.feed(stamp, effort, self._fastest > STILL)
-        if told:
+        if not self.torque.learnt and not self.torque.learning() and self._fastest <= STILL:
+            self.torque.learn()  # the first time nobody has to ask
+        if told and self._asked:
             self._say("contact", told, "info")
 
     def _on_tf(self, message: rospy.AnyMsg) -> None:
