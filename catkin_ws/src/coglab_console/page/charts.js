@@ -47,7 +47,7 @@ function drawPhases(canvas) {
   const context = canvas.getContext('2d');
   context.clearRect(0, 0, width, height);
   context.font = '13px "DejaVu Sans", Verdana, sans-serif';
-  const left = 38; // where the charts' time axis begins
+  const left = 42; // where the charts' time axis begins
   const x = (stamp) => left + ((stamp - latest + WINDOW) / WINDOW) * (width - left - 4);
   phases.forEach(([from, label], i) => {
     const a = Math.max(left, x(from));
@@ -102,7 +102,7 @@ function optionsOf(strip, last) {
     drawGrid: true,
     gridLineColor: '#dde2e6',
     axisLineColor: '#8b939b',
-    axes: { x: { drawAxis: last, axisLabelFormatter: axis, valueFormatter: axis, axisLabelWidth: 40, pixelsPerLabel: 90 }, y: { axisLabelWidth: 34, pixelsPerLabel: 18 } },
+    axes: { x: { drawAxis: last, axisLabelFormatter: axis, valueFormatter: axis, axisLabelWidth: 40, pixelsPerLabel: 90 }, y: { axisLabelWidth: 38, pixelsPerLabel: 24 } },
     dateWindow: [-WINDOW, 0],
   };
 }

@@ -45,7 +45,8 @@ export function table(header, rows, caption) {
 }
 
 /** Calls `draw` at most so often that it takes a quarter of the time, and never while the page is hidden. */
-export function paced(draw, shortest) {
+export function paced(draw, period) {
+  const shortest = typeof period === 'function' ? period : () => period;
   let due = 0;
   let waiting = false;
   const run = () => {
@@ -53,7 +54,7 @@ export function paced(draw, shortest) {
     const began = performance.now();
     if (!document.hidden) draw();
     const took = performance.now() - began;
-    due = performance.now() + Math.max(shortest, 3 * took);
+    due = performance.now() + Math.max(shortest(), 3 * took);
   };
   return () => {
     if (waiting) return;

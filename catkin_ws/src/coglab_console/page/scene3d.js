@@ -30,10 +30,18 @@ function place(object, [x, y, z, qx, qy, qz, qw]) {
   object.quaternion.set(qx, qy, qz, qw);
 }
 
+/** Without a graphics card each picture costs the processor that the robot runs on: fewer of them then. */
+function drawsInSoftware(renderer) {
+  const context = renderer.getContext();
+  const known = context.getExtension('WEBGL_debug_renderer_info');
+  return !known || /swiftshader|llvmpipe|software/i.test(context.getParameter(known.UNMASKED_RENDERER_WEBGL));
+}
+
 /** A view in `parent`; throws where there is no WebGL. */
 export class Scene3D {
   constructor(parent) {
-    this.renderer = new THREE.WebGLRenderer({ antialias: true });
+    this.renderer = new THREE.WebGLRenderer({ antialias: false });
+    this.shortest = drawsInSoftware(this.renderer) ? 150 : 33;
     this.renderer.setClearColor('#f4f6f8');
     this.canvas = this.renderer.domElement;
     this.canvas.setAttribute('role', 'img');

@@ -39,7 +39,7 @@ export function showView(parent) {
     if (parent.offsetParent === null) return;
     scene?.draw();
     setText(words, viewWords());
-  }, 40);
+  }, () => scene?.shortest ?? 50);
   const buttons = ['front', 'side', 'top', 'hand'].map((name) => h('button', { type: 'button', 'aria-pressed': 'false', onclick: () => look(name) }, name));
   const flat = h('button', { type: 'button', 'aria-pressed': 'false', onclick: () => toggle() }, '2D');
   bar.append(...buttons, flat);

@@ -19,8 +19,16 @@ from coglab_console.page_files import load_all
 from coglab_console.server import ConsoleServer
 
 PAGE = Path(__file__).resolve().parents[1] / "page"
-READY = dict(master_alive=True, state="/coglab_master/wait_without_object", in_hub=True, arm_alive=True,
-             actions=("exchange_human_to_robot", "take"), motion_allowed=True, hand_alive=True, hand_connected=True)  # fmt: skip
+READY = dict(
+    master_alive=True,
+    state="/coglab_master/wait_without_object",
+    in_hub=True,
+    arm_alive=True,
+    actions=("exchange_human_to_robot", "take"),
+    motion_allowed=True,
+    hand_alive=True,
+    hand_connected=True,
+)
 
 
 class RobotDouble:
@@ -78,7 +86,9 @@ class Console:
                 assert response.status == 302
             yield client
 
-    async def post(self, client: aiohttp.ClientSession, name: str, arguments: dict | None = None, **more) -> tuple[int, dict]:
+    async def post(
+        self, client: aiohttp.ClientSession, name: str, arguments: dict | None = None, **more
+    ) -> tuple[int, dict]:
         body = {"name": name, "arguments": arguments or {}}
         async with client.post(f"{self.url}/api/command", json=body, headers={**self.headers, **more}) as response:
             return response.status, await response.json()

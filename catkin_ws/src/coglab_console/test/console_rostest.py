@@ -1,6 +1,6 @@
 #!/usr/bin/python3
-"""The page in Debian's chromium at 1280x720 against the running cell: an exchange by mouse, STOP by key, every tab looked
-at, the scene's hand against tf. Pictures are kept beside the logs."""
+"""The page in Debian's chromium at 1280x720 against the running cell: an exchange by mouse, STOP by key, every tab
+looked at, the scene's hand against tf. Pictures are kept beside the logs."""
 
 import json
 import os
@@ -8,8 +8,10 @@ import sys
 import time
 import unittest
 from pathlib import Path
+from xmlrpc.client import ServerProxy
 
 import numpy as np
+import rosgraph
 import rospkg
 import rospy
 import rostest
@@ -49,7 +51,9 @@ class Console(unittest.TestCase):
     def wait_for_hub(self, name, limit=60.0):
         end = time.monotonic() + limit
         while not self.machine.state.endswith(name):
-            self.assertLess(time.monotonic(), end, f"{name}: the machine is in {self.machine.state}, {self.machine.why}")
+            self.assertLess(
+                time.monotonic(), end, f"{name}: the machine is in {self.machine.state}, {self.machine.why}"
+            )
             time.sleep(0.05)
 
     def button(self, action):
@@ -57,7 +61,9 @@ class Console(unittest.TestCase):
 
     def test_1_everything_is_on_the_page_without_scrolling(self):
         self.wait_for_hub("wait_without_object", 90.0)
-        self.browser.until("return coglab.docs()['graph:/coglab'] && document.querySelectorAll('#graph .node.active').length", 20.0)
+        self.browser.until(
+            "return coglab.docs()['graph:/coglab'] && document.querySelectorAll('#graph .node.active').length", 20.0
+        )
         self.browser.until("return document.querySelectorAll('#charts canvas').length >= 5", 20.0)
         for page in PAGES:
             with self.subTest(page=page):
@@ -75,9 +81,12 @@ class Console(unittest.TestCase):
         seen = []
         for _ in range(60):
             ActionChains(self.browser.driver).send_keys(Keys.TAB).perform()
-            seen.append(self.browser.js(
-                "const a = document.activeElement, s = getComputedStyle(a);"
-                "return [a.id || a.dataset.action || a.textContent.slice(0, 20), s.outlineStyle, s.outlineWidth]"))  # fmt: skip
+            seen.append(
+                self.browser.js(
+                    "const a = document.activeElement, s = getComputedStyle(a);"
+                    "return [a.id || a.dataset.action || a.textContent.slice(0, 20), s.outlineStyle, s.outlineWidth]"
+                )
+            )
             if seen[-1][0] == "stop":
                 break
         names = [row[0] for row in seen]
@@ -91,7 +100,9 @@ class Console(unittest.TestCase):
         self.assertLess(self.distance_to_tf(), 0.002)
 
     def distance_to_tf(self):
-        place = self.frames.lookup_transform("world", "ih2_palm", rospy.Time(0), rospy.Duration(5.0)).transform.translation
+        place = self.frames.lookup_transform(
+            "world", "ih2_palm", rospy.Time(0), rospy.Duration(5.0)
+        ).transform.translation
         return float(np.linalg.norm(np.array(self.browser.js("return coglab.palm()")) - [place.x, place.y, place.z]))
 
     def test_4_an_exchange_by_mouse(self):
@@ -105,14 +116,37 @@ class Console(unittest.TestCase):
         self.assertGreater(len(running["points"]), 10)
         self.wait_for_hub("wait_with_object")
         self.browser.until("return document.getElementById('status').innerText.includes('mug in the hand')", 5.0)
-        self.assertIn("exchange_human_to_robot mug: succeeded", str(self.browser.js("return coglab.events().map(e => e.text)")))
+        self.assertIn(
+            "exchange_human_to_robot mug: succeeded", str(self.browser.js("return coglab.events().map(e => e.text)"))
+        )
         time.sleep(0.5)
         self.assertLess(self.distance_to_tf(), 0.002)
         self.browser.picture(self.pictures / "holds.png")
 
+    def go_on(self):
+        """The two acts after a stop."""
+        self.browser.until("return document.getElementById('acknowledge').offsetParent !== null", 5.0)
+        self.browser.driver.find_element(By.ID, "acknowledge").click()
+        self.browser.until("return coglab.docs().desk.guard.unacknowledged === false", 5.0)
+        self.browser.until("return !document.querySelector('[data-action=reset]').hasAttribute('aria-disabled')", 5.0)
+        press_and_hold(self.browser, self.button("reset"), lambda: not self.machine.state.endswith("/stopped"), 8.0)
+        self.wait_for_hub("wait_with_object")
+
+    def reach(self):
+        """Until the arm is on its way to the person. On a crowded computer the simulated controller loses command mode,
+        and the machine stops by itself: once more then."""
+        for _ in range(3):
+            self.button("exchange_robot_to_human").click()
+            self.browser.until(
+                "return coglab.state().dmp[0] === 'running' || coglab.state().phase.endsWith('/stopped')", 30.0
+            )
+            if not self.machine.state.endswith("/stopped"):
+                return
+            self.go_on()
+        self.fail(f"no reach in three attempts: {self.machine.why}")
+
     def test_5_stop_by_key_then_acknowledge_then_hold(self):
-        self.button("exchange_robot_to_human").click()
-        self.browser.until("return coglab.state().dmp[0] === 'running'", 30.0)
+        self.reach()
         ActionChains(self.browser.driver).send_keys(Keys.SPACE).perform()
         end = time.monotonic() + 5.0
         while not self.arm.hold_latched:
@@ -123,15 +157,11 @@ class Console(unittest.TestCase):
         self.browser.picture(self.pictures / "stopped.png")
         reset = self.button("reset")
         self.assertIn("acknowledge", reset.find_element(By.XPATH, "..").text)
-        reset.click()
-        self.browser.driver.find_element(By.ID, "acknowledge").click()
-        self.browser.until("return coglab.docs().desk.guard.unacknowledged === false", 5.0)
-        self.browser.until("return !document.querySelector('[data-action=reset]').hasAttribute('aria-disabled')", 5.0)
-        reset.click()  # a click is not enough
-        time.sleep(0.5)
+        reset.click()  # refused, and a click would not be enough
+        time.sleep(0.3)
         self.assertTrue(self.arm.hold_latched)
-        press_and_hold(self.browser, reset, lambda: not self.arm.hold_latched)
-        self.wait_for_hub("wait_with_object")
+        self.go_on()
+        self.assertFalse(self.arm.hold_latched)
 
     def test_6_a_lost_connection_greys_the_page_within_a_second_and_loses_no_event(self):
         self.browser.driver.execute_cdp_cmd("Network.enable", {})
@@ -153,9 +183,8 @@ class Console(unittest.TestCase):
 
     @staticmethod
     def console_process():
-        import rosnode
-
-        return rosnode.ServerProxy(rosnode.get_api_uri(rospy.get_master(), "/coglab_console")).getPid("/console_test")[2]
+        uri = rosgraph.Master("/console_test").lookupNode("/coglab_console")
+        return ServerProxy(uri).getPid("/console_test")[2]
 
     def test_7_the_page_had_nothing_to_complain_about(self):
         rows = [row for row in self.browser.complaints() if not any(word in row for word in KNOWN)]
@@ -166,12 +195,17 @@ class Console(unittest.TestCase):
         with Browser(webgl=False) as other:
             other.open(fresh_link(Path(rospkg.get_ros_home()), used))
             self.assertEqual(other.js("return coglab.view()"), "2D")
-            other.until("return coglab.docs().desk.roles.operator !== '' && document.getElementById('role').innerText.includes('watch')", 5)
+            other.until(
+                "return document.getElementById('role').innerText.includes('you watch')",
+                5,
+            )
             time.sleep(1.0)
             other.picture(self.pictures / "flat.png")
             self.assertEqual(other.js(LOOK_AT_PAGE)["problems"], [])
             place = self.frames.lookup_transform("world", "ih2_palm", rospy.Time(0)).transform.translation
-            self.assertLess(np.linalg.norm(np.array(other.js("return coglab.palm()")) - [place.x, place.y, place.z]), 0.002)
+            self.assertLess(
+                np.linalg.norm(np.array(other.js("return coglab.palm()")) - [place.x, place.y, place.z]), 0.002
+            )
 
 
 if __name__ == "__main__":

@@ -58,6 +58,6 @@ while (walker.nextNode()) {
   const [light, dark] = [luminance(channels(style.color)), luminance(ground(element))].sort((a, b) => b - a);
   const ratio = (light + 0.05) / (dark + 0.05);
   if (ratio < 4.5) problems.push(`"${node.textContent.trim().slice(0, 30)}" has a contrast of ${ratio.toFixed(2)}`);
-  if (parseFloat(style.fontSize) < 14 && !element.closest('.dygraph-axis-label')) problems.push(`"${node.textContent.trim().slice(0, 30)}" is ${style.fontSize} high`);
+  if (parseFloat(style.fontSize) < 14) problems.push(`"${node.textContent.trim().slice(0, 30)}" is ${style.fontSize} high`);
 }
 return { problems, texts };

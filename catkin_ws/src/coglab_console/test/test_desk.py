@@ -42,7 +42,7 @@ def ask(desk, who, command, /, **arguments):
     return asyncio.run(desk.command(who, command, arguments))
 
 
-# --- roles --------------------------------------------------------------------------------------------------------------
+# --- roles ----------------------------------------------------------------------------------------------------
 
 
 def test_the_first_operates_and_the_others_watch(desk):
@@ -91,7 +91,7 @@ def test_two_who_want_to_operate_and_one_who_went_away():
     assert "you are the operator" in roles.take_over("c") and roles.operator == "c"
 
 
-# --- after a stop ---------------------------------------------------------------------------------------------------------
+# --- after a stop ---------------------------------------------------------------------------------------------
 
 
 def test_after_a_stop_acknowledge_then_hold(desk):
@@ -164,7 +164,11 @@ def test_another_action_begins_the_holding_anew():
 
 def test_observers_and_unknown_commands_cannot_hold(desk):
     async def press():
-        return [await desk.held("b", "start", RECEIVE), await desk.held("a", "nothing", {}), await desk.held("a", "home", {"x": 1})]
+        return [
+            await desk.held("b", "start", RECEIVE),
+            await desk.held("a", "nothing", {}),
+            await desk.held("a", "home", {"x": 1}),
+        ]
 
     assert all(answer is not None and not answer["success"] for answer in asyncio.run(press()))
 
@@ -178,21 +182,24 @@ def test_the_real_robot_and_calibrations_that_open_the_hand_need_a_held_button()
     assert plain.guarded("calibrate", {"mode": "complete"})
 
 
-# --- reasons ----------------------------------------------------------------------------------------------------------------
+# --- reasons --------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("change, button, part", [
-    ({}, "exchange_human_to_robot", ""),
-    ({"object_id": "mug"}, "exchange_human_to_robot", ""),  # what the machine takes is its own matter
-    ({"actions": ()}, "take", "takes nothing"),
-    ({"in_hub": False, "state": "/m/approach", "actions": ()}, "take", "approach is under way"),
-    ({"master_alive": False}, "take", "not there"),
-    ({}, "exchange_robot_to_human", "the hand is empty"),
-    ({"state": "/m/stopped", "actions": ("reset",)}, "take", "only reset leads on"),
-    ({"hand_connected": False}, "calibrate", "does not answer"),
-    ({"motion_allowed": False, "arm_reason": "hold is latched"}, "home", "hold is latched"),
-    ({"arm_alive": False}, "home", "not there"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "change, button, part",
+    [
+        ({}, "exchange_human_to_robot", ""),
+        ({"object_id": "mug"}, "exchange_human_to_robot", ""),  # what the machine takes is its own matter
+        ({"actions": ()}, "take", "takes nothing"),
+        ({"in_hub": False, "state": "/m/approach", "actions": ()}, "take", "approach is under way"),
+        ({"master_alive": False}, "take", "not there"),
+        ({}, "exchange_robot_to_human", "the hand is empty"),
+        ({"state": "/m/stopped", "actions": ("reset",)}, "take", "only reset leads on"),
+        ({"hand_connected": False}, "calibrate", "does not answer"),
+        ({"motion_allowed": False, "arm_reason": "hold is latched"}, "home", "hold is latched"),
+        ({"arm_alive": False}, "home", "not there"),
+    ],
+)
 def test_reasons(change, button, part):
     found = reasons(replace(Standing(**READY), **change), MotionGuard())[button]
     assert (found == "") == (part == "") and part in found
@@ -205,16 +212,29 @@ def test_thresholds_do_not_change_under_way(desk):
         assert "under way" in ask(desk, "a", name, **arguments)["message"]
 
 
-# --- commands -----------------------------------------------------------------------------------------------------------------
+# --- commands -------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name, arguments", [
-    ("nothing", {}), (None, {}), (["home"], {}), ("home", None), ("home", []), ("speed_scale", {"value": 1.5}),
-    ("speed_scale", {}), ("speed_scale", {"value": "1"}), ("start", {"action": "take", "object_id": "a b"}),
-    ("note", {"text": ""}), ("note", {"text": "x" * 501}), ("contact_arm", {"mode": "contact", "k": 1}),
-    ("contact_arm", {"mode": "contact", "joints": [0]}), ("session_begin", {"participant": "../x", "conditions": ["a"],
-     "repetitions": 1, "order": "random"}), ("feedback", {"verb": "load", "name": "x"}),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "name, arguments",
+    [
+        ("nothing", {}),
+        (None, {}),
+        (["home"], {}),
+        ("home", None),
+        ("home", []),
+        ("speed_scale", {"value": 1.5}),
+        ("speed_scale", {}),
+        ("speed_scale", {"value": "1"}),
+        ("start", {"action": "take", "object_id": "a b"}),
+        ("note", {"text": ""}),
+        ("note", {"text": "x" * 501}),
+        ("contact_arm", {"mode": "contact", "k": 1}),
+        ("contact_arm", {"mode": "contact", "joints": [0]}),
+        ("session_begin", {"participant": "../x", "conditions": ["a"], "repetitions": 1, "order": "random"}),
+        ("feedback", {"verb": "load", "name": "x"}),
+    ],
+)
 def test_what_fits_no_schema_is_refused(name, arguments):
     with pytest.raises(BadCommand):
         judge(name, arguments)
@@ -225,7 +245,7 @@ def test_every_motion_is_the_operators_alone():
     assert not COMMANDS["stop"].operator
 
 
-# --- sessions -----------------------------------------------------------------------------------------------------------------
+# --- sessions -------------------------------------------------------------------------------------------------
 
 
 def test_a_balanced_latin_square():
@@ -269,8 +289,18 @@ def test_the_file_of_a_session(tmp_path):
     session.end()
     (path,) = tmp_path.glob("P07_*.jsonl")
     rows = [json.loads(line) for line in path.read_text().splitlines()]
-    assert [row["type"] for row in rows] == ["session", "trial_begin", "result", "note", "trial_end", "trial_begin", "trial_end",
-                                             "trial_begin", "trial_end", "session_end"]  # fmt: skip
+    assert [row["type"] for row in rows] == [
+        "session",
+        "trial_begin",
+        "result",
+        "note",
+        "trial_end",
+        "trial_begin",
+        "trial_end",
+        "trial_begin",
+        "trial_end",
+        "session_end",
+    ]
     assert rows[2]["trial"] == 1 and rows[5]["trial"] == 1 and rows[7]["condition"] == "give" and rows[-1]["done"] == 1
 
 
@@ -283,7 +313,7 @@ def test_a_full_disk_is_told_and_the_session_goes_on(tmp_path):
     assert "cannot be written" in said[0] and session.view()["participant"] == "P07"
 
 
-# --- over the wire --------------------------------------------------------------------------------------------------------------
+# --- over the wire --------------------------------------------------------------------------------------------
 
 
 def test_a_connection_that_dies_with_the_button_held_starts_nothing(tmp_path):

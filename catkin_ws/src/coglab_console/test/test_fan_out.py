@@ -74,8 +74,18 @@ def deaf_browser(console, key):
     deaf = socket.socket()
     deaf.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
     deaf.connect(("127.0.0.1", console.port))
-    lines = ["GET /ws HTTP/1.1", f"Host: {console.host}", f"Origin: {console.origin}", f"Cookie: c={key}", "Upgrade: websocket",
-             "Connection: Upgrade", "Sec-WebSocket-Version: 13", "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==", "", ""]  # fmt: skip
+    lines = [
+        "GET /ws HTTP/1.1",
+        f"Host: {console.host}",
+        f"Origin: {console.origin}",
+        f"Cookie: c={key}",
+        "Upgrade: websocket",
+        "Connection: Upgrade",
+        "Sec-WebSocket-Version: 13",
+        "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==",
+        "",
+        "",
+    ]
     deaf.sendall("\r\n".join(lines).encode() + bytes([0x81, 0x82, 0, 0, 0, 0]) + b"{}")
     return deaf
 

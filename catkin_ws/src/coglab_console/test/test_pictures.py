@@ -20,12 +20,14 @@ SOURCES = Path(__file__).resolve().parents[2]
 URDF = SOURCES / "lwr_description" / "urdf" / "lwr_ih2.urdf"
 LIBRARY = SOURCES / "coglab_controllers" / "config" / "primitives.xml"
 MACHINE = {
-    "/M": Container("/M", ("A", "SUB", 'odd "name"\\'), (("ok", "A", "SUB"), ("done", "SUB", 'odd "name"\\'), ("again", "SUB", "A"))),
+    "/M": Container(
+        "/M", ("A", "SUB", 'odd "name"\\'), (("ok", "A", "SUB"), ("done", "SUB", 'odd "name"\\'), ("again", "SUB", "A"))
+    ),
     "/M/SUB": Container("/M/SUB", ("X", "Y"), (("next", "X", "Y"), ("out", "Y", "None"))),
 }
 
 
-# --- graph ----------------------------------------------------------------------------------------------------------------
+# --- graph ----------------------------------------------------------------------------------------------------
 
 
 def test_graphviz_lays_nested_machines_out():
@@ -58,7 +60,7 @@ def test_too_many_states_are_bounded():
     assert "more than" in picture["problem"] and len(picture["nodes"]) <= 40
 
 
-# --- robot ----------------------------------------------------------------------------------------------------------------
+# --- robot ----------------------------------------------------------------------------------------------------
 
 
 def test_kinematics_against_the_controllers():
@@ -84,8 +86,16 @@ def test_the_document_of_the_robot():
     assert "ih2_palm" in known and len(shown["shapes"]) > 10
 
 
-@pytest.mark.parametrize("text", ["", "<robot/>", "no xml", "<robot><link name='a'/><link name='b'/></robot>",
-                                  "<robot><link name='a'/><joint name='j' type='fixed'/></robot>"])  # fmt: skip
+@pytest.mark.parametrize(
+    "text",
+    [
+        "",
+        "<robot/>",
+        "no xml",
+        "<robot><link name='a'/><link name='b'/></robot>",
+        "<robot><link name='a'/><joint name='j' type='fixed'/></robot>",
+    ],
+)
 def test_what_is_no_robot(text):
     with pytest.raises(ModelError):
         RobotModel(text)
@@ -100,7 +110,7 @@ def test_rotations_both_ways():
         assert min(np.abs(back - q).max(), np.abs(back + q).max()) < 1e-9
 
 
-# --- primitives -------------------------------------------------------------------------------------------------------------
+# --- primitives -----------------------------------------------------------------------------------------------
 
 
 def test_roll_out_against_the_controllers():
@@ -123,7 +133,14 @@ def test_the_library_for_the_page():
     assert all(row["end_error_mm"] < 5.0 and row["plot"][0][0] == 0.0 for row in rows)
 
 
-@pytest.mark.parametrize("text", ["", "<dmp_library><primitive/></dmp_library>", "<dmp_library><primitive id='a'><system/></primitive></dmp_library>"])
+@pytest.mark.parametrize(
+    "text",
+    [
+        "",
+        "<dmp_library><primitive/></dmp_library>",
+        "<dmp_library><primitive id='a'><system/></primitive></dmp_library>",
+    ],
+)
 def test_bad_libraries_are_refused_in_words(tmp_path, text):
     path = tmp_path / "x.xml"
     path.write_text(text)
@@ -141,11 +158,18 @@ def test_a_shape_is_turned_to_the_line_it_is_for():
 
 
 MUG = {
-    "frame": "object_mug", "default_grasp": "side", "default_delivery": "d", "dmp": {"receive": "r", "give": "g", "take": "t"},
-    "grasps": {"side": {"pose": {"xyz": [0.0, -0.04, 0.05], "quaternion": [0.5, 0.5, 0.5, 0.5]},
-                        "approach": {"axis": [0.0, 1.0, 0.0], "distance": 0.025}}},
+    "frame": "object_mug",
+    "default_grasp": "side",
+    "default_delivery": "d",
+    "dmp": {"receive": "r", "give": "g", "take": "t"},
+    "grasps": {
+        "side": {
+            "pose": {"xyz": [0.0, -0.04, 0.05], "quaternion": [0.5, 0.5, 0.5, 0.5]},
+            "approach": {"axis": [0.0, 1.0, 0.0], "distance": 0.025},
+        }
+    },
     "deliveries": {"d": {"pose": {"xyz": [-0.1, 0.0, -0.05], "rpy_deg": [0, 0, 0]}}},
-}  # fmt: skip
+}
 
 
 def test_where_the_next_reach_would_end():
@@ -156,12 +180,14 @@ def test_where_the_next_reach_would_end():
     assert name == "g" and np.allclose(goal, [0.6, -0.04, 0.4])
 
 
-@pytest.mark.parametrize("entry", [{}, {"grasps": None}, {**MUG, "frame": "gone"}, {**MUG, "grasps": {"side": {"pose": {"xyz": "x"}}}}])
+@pytest.mark.parametrize(
+    "entry", [{}, {"grasps": None}, {**MUG, "frame": "gone"}, {**MUG, "grasps": {"side": {"pose": {"xyz": "x"}}}}]
+)
 def test_nobody_knows_where(entry):
     assert path_ahead.aim("take", entry, {"object_mug": (9.0, 0, 0, 0, 0, 0, 1)}) is None
 
 
-# --- torques ----------------------------------------------------------------------------------------------------------------
+# --- torques --------------------------------------------------------------------------------------------------
 
 
 def test_thresholds_are_learnt_at_rest_and_a_touch_stands_out():
@@ -195,7 +221,7 @@ def test_odd_torques_are_left_out(torque):
     assert rate.feed(1.0, torque, False) == "" and rate.newest() == [0.0] * 7
 
 
-# --- bytes and words --------------------------------------------------------------------------------------------------------
+# --- bytes and words ------------------------------------------------------------------------------------------
 
 
 def test_bytes_against_the_messages_own_decoding():

@@ -1,4 +1,4 @@
-"""Each row of the security table, and the limits: what is not allowed is refused in words, and nothing reaches the robot."""
+"""Each row of the security table, and the limits: what is not allowed is refused in words and reaches no robot."""
 
 import asyncio
 import json
@@ -30,7 +30,9 @@ def test_the_console_page_may_ask(tmp_path):
     go(test, tmp_path)
 
 
-@pytest.mark.parametrize("origin", ["https://evil.example", "null", "http://127.0.0.1", "https://{host}", "http://{host}.evil.example"])
+@pytest.mark.parametrize(
+    "origin", ["https://evil.example", "null", "http://127.0.0.1", "https://{host}", "http://{host}.evil.example"]
+)
 def test_a_foreign_origin_is_refused(tmp_path, origin):
     async def test(console):
         foreign = origin.format(host=console.host)
@@ -124,7 +126,13 @@ def test_the_policy_forbids_inline_and_foreign_script(tmp_path):
                 policy = response.headers["Content-Security-Policy"]
                 text = await response.text()
                 assert response.headers["X-Content-Type-Options"] == "nosniff"
-        for part in ("default-src 'self'", "script-src 'self'", "style-src 'self'", "frame-ancestors 'none'", "object-src 'none'"):
+        for part in (
+            "default-src 'self'",
+            "script-src 'self'",
+            "style-src 'self'",
+            "frame-ancestors 'none'",
+            "object-src 'none'",
+        ):
             assert part in policy
         assert "unsafe" not in policy
         assert "onclick" not in text and "style=" not in text and "<script>" not in text
@@ -132,8 +140,19 @@ def test_the_policy_forbids_inline_and_foreign_script(tmp_path):
     go(test, tmp_path)
 
 
-@pytest.mark.parametrize("path", ["/page/../setup.py", "/page/%2e%2e/setup.py", "/lib/../../../../etc/passwd", "/page//main.js",
-                                  "/..%2f..%2fetc/passwd", "/page/main.js%00", "/lib/three/package.json", "/page/"])  # fmt: skip
+@pytest.mark.parametrize(
+    "path",
+    [
+        "/page/../setup.py",
+        "/page/%2e%2e/setup.py",
+        "/lib/../../../../etc/passwd",
+        "/page//main.js",
+        "/..%2f..%2fetc/passwd",
+        "/page/main.js%00",
+        "/lib/three/package.json",
+        "/page/",
+    ],
+)
 def test_only_listed_files_are_served(tmp_path, path):
     async def test(console):
         async with console.browser() as client:
@@ -145,13 +164,29 @@ def test_only_listed_files_are_served(tmp_path, path):
     go(test, tmp_path)
 
 
-@pytest.mark.parametrize("body", [
-    b"", b"{", b"[]", b"3", b"null", b'{"name": 3}', b'{"name": "rm -rf"}', b'{"name": "home", "arguments": []}',
-    b'{"name": "home", "arguments": {"x": 1}}', b'{"name": "start", "arguments": {"action": "drop"}}',
-    b'{"name": "start", "arguments": {"action": "take", "object_id": "../x"}}', b"\xff\xfe", b"[" * 60000,
-    b'{"name": "speed_scale", "arguments": {"value": NaN}}', b'{"name": "speed_scale", "arguments": {"value": 1e999}}',
-    b'{"name": "speed_scale", "arguments": {"value": true}}', b'{"name": "call", "arguments": {"service": "/lwr/command"}}',
-], ids=lambda body: body[:40].decode(errors="replace"))  # fmt: skip
+@pytest.mark.parametrize(
+    "body",
+    [
+        b"",
+        b"{",
+        b"[]",
+        b"3",
+        b"null",
+        b'{"name": 3}',
+        b'{"name": "rm -rf"}',
+        b'{"name": "home", "arguments": []}',
+        b'{"name": "home", "arguments": {"x": 1}}',
+        b'{"name": "start", "arguments": {"action": "drop"}}',
+        b'{"name": "start", "arguments": {"action": "take", "object_id": "../x"}}',
+        b"\xff\xfe",
+        b"[" * 60000,
+        b'{"name": "speed_scale", "arguments": {"value": NaN}}',
+        b'{"name": "speed_scale", "arguments": {"value": 1e999}}',
+        b'{"name": "speed_scale", "arguments": {"value": true}}',
+        b'{"name": "call", "arguments": {"service": "/lwr/command"}}',
+    ],
+    ids=lambda body: body[:40].decode(errors="replace"),
+)
 def test_what_is_not_in_the_list_or_fits_no_schema_is_refused(tmp_path, body):
     async def test(console):
         async with console.browser() as client, console.socket_of(client):
@@ -169,7 +204,9 @@ def test_what_is_not_in_the_list_or_fits_no_schema_is_refused(tmp_path, body):
 def test_an_oversized_body_is_refused(tmp_path):
     async def test(console):
         async with console.browser() as client:
-            async with client.post(console.url + "/api/command", data=b" " * 70000, headers=console.headers) as response:
+            async with client.post(
+                console.url + "/api/command", data=b" " * 70000, headers=console.headers
+            ) as response:
                 assert response.status == 413
 
     go(test, tmp_path)
@@ -177,7 +214,17 @@ def test_an_oversized_body_is_refused(tmp_path):
 
 def test_malformed_frames_are_told_then_the_connection_closes(tmp_path):
     async def test(console):
-        frames = ["{", "[]", "null", '{"t": 5}', '{"t": "call"}', "[" * 5000, '{"t": "hold"}', '{"t": "hold", "name": []}', "\x00"]
+        frames = [
+            "{",
+            "[]",
+            "null",
+            '{"t": 5}',
+            '{"t": "call"}',
+            "[" * 5000,
+            '{"t": "hold"}',
+            '{"t": "hold", "name": []}',
+            "\x00",
+        ]
         async with console.browser() as client, console.socket_of(client) as ws:
             await ws.send_str("{}")
             for frame in frames * 5:

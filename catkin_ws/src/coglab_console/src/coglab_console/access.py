@@ -116,7 +116,9 @@ class Access:
         """Every request."""
         host = headers.get("Host", "")
         if host not in self.hosts:
-            raise Denied(403, f"host '{host[:80]}' is not served; this console answers to {', '.join(sorted(self.hosts))}")
+            raise Denied(
+                403, f"host '{host[:80]}' is not served; this console answers to {', '.join(sorted(self.hosts))}"
+            )
 
     def check_origin(self, headers: Mapping[str, str]) -> None:
         """What changes something, and the WebSocket."""

@@ -11,9 +11,17 @@ from typing import Any
 
 SIZE = (1280, 720)
 OPTIONS = (
-    "--headless=new", "--no-sandbox", "--disable-quic", "--no-first-run", "--disable-background-networking", "--disable-sync",
-    "--disable-component-update", "--disable-dev-shm-usage", "--hide-scrollbars=false", "--force-device-scale-factor=1",
-)  # fmt: skip
+    "--headless=new",
+    "--no-sandbox",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-sync",
+    "--disable-component-update",
+    "--disable-dev-shm-usage",
+    "--hide-scrollbars=false",
+    "--force-device-scale-factor=1",
+)
 SOFTWARE_GL = ("--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist")
 NO_GL = ("--disable-gpu", "--disable-3d-apis")
 
@@ -33,8 +41,10 @@ class Browser:
         self.driver = webdriver.Chrome(service=service, options=options)
         self.driver.set_script_timeout(20)
         # the page itself gets this size, whatever the window's frame takes
-        self.driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", {
-            "width": size[0], "height": size[1], "deviceScaleFactor": 1, "mobile": False})  # fmt: skip
+        self.driver.execute_cdp_cmd(
+            "Emulation.setDeviceMetricsOverride",
+            {"width": size[0], "height": size[1], "deviceScaleFactor": 1, "mobile": False},
+        )
 
     def __enter__(self) -> Browser:
         return self
@@ -48,7 +58,9 @@ class Browser:
     def open(self, link: str, limit: float = 30.0) -> None:
         """The console at this one-time link; returns when it is live and shows the robot."""
         self.driver.get(link)
-        self.until("return coglab.state() !== null && coglab.docs().desk !== undefined && coglab.view() !== 'none'", limit)
+        self.until(
+            "return coglab.state() !== null && coglab.docs().desk !== undefined && coglab.view() !== 'none'", limit
+        )
 
     def js(self, script: str, *arguments: Any) -> Any:
         """Runs a function body in the page and returns its value."""

@@ -48,8 +48,15 @@ class Backend(Protocol):
 class Desk:
     """Roles, guards and the open session of one console. Called from the event loop alone."""
 
-    def __init__(self, backend: Backend, events: EventLog, documents: Documents, folder: Path,
-                 now: Callable[[], float], invite: Callable[[], str]) -> None:  # fmt: skip
+    def __init__(
+        self,
+        backend: Backend,
+        events: EventLog,
+        documents: Documents,
+        folder: Path,
+        now: Callable[[], float],
+        invite: Callable[[], str],
+    ) -> None:
         self.backend, self.events, self.documents = backend, events, documents
         self._invite = invite
         self.roles = Roles(lambda text, level: events.add("control", text, level))
@@ -59,7 +66,7 @@ class Desk:
         self._held: dict[str, HeldButton] = {}
         self._firing: set[str] = set()
 
-    # --- from the browsers ------------------------------------------------------------------------------------------
+    # --- from the browsers ------------------------------------------------------------------------------------
 
     def stop(self, who: str) -> Answer:
         """STOP: from anybody, any number of times."""
@@ -111,7 +118,7 @@ class Desk:
         self.roles.disconnected(who)
         self.tick()
 
-    # --- from the robot ---------------------------------------------------------------------------------------------
+    # --- from the robot ---------------------------------------------------------------------------------------
 
     def result(self, row: dict) -> None:
         """An action of the state machine has ended."""
@@ -129,16 +136,22 @@ class Desk:
         now = self.backend.standing()
         if now.object_id:
             self.object_id = now.object_id
-        self.documents.put("desk", {
-            "roles": self.roles.view(),
-            "reasons": reasons(now, self.guard),
-            "guard": {"cause": self.guard.cause, "unacknowledged": self.guard.unacknowledged,
-                      "hold": self.guard.needs_hold},
-            "object": self.object_id,
-            "experiment": self.experiment.view(),
-        })  # fmt: skip
+        self.documents.put(
+            "desk",
+            {
+                "roles": self.roles.view(),
+                "reasons": reasons(now, self.guard),
+                "guard": {
+                    "cause": self.guard.cause,
+                    "unacknowledged": self.guard.unacknowledged,
+                    "hold": self.guard.needs_hold,
+                },
+                "object": self.object_id,
+                "experiment": self.experiment.view(),
+            },
+        )
 
-    # --- inside -----------------------------------------------------------------------------------------------------
+    # --- inside -----------------------------------------------------------------------------------------------
 
     def _refusal(self, who: str, name: Any, arguments: Any) -> str:
         """Why this is not done; empty if it is."""
@@ -198,8 +211,16 @@ class Desk:
             self.object_id = given["object_id"]
             return Answer(True, f"object {self.object_id or 'none'}")
         if name == "session_begin":
-            return Answer(True, session.begin(given["participant"], given["conditions"], given["repetitions"],
-                                              given["order"], given.get("number", 0)))  # fmt: skip
+            return Answer(
+                True,
+                session.begin(
+                    given["participant"],
+                    given["conditions"],
+                    given["repetitions"],
+                    given["order"],
+                    given.get("number", 0),
+                ),
+            )
         if name == "session_end":
             return Answer(True, session.end())
         if name == "trial_begin":

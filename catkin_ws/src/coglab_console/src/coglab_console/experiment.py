@@ -34,7 +34,9 @@ def latin_row(conditions: list[str], number: int) -> list[str]:
 def order_of(conditions: list[str], repetitions: int, order: str, number: int) -> list[str]:
     """The condition of each trial, in blocks that hold every condition once."""
     if len(conditions) * repetitions > MAX_TRIALS:
-        raise ExperimentError(f"{len(conditions) * repetitions} trials are more than {MAX_TRIALS}; use fewer repetitions")
+        raise ExperimentError(
+            f"{len(conditions) * repetitions} trials are more than {MAX_TRIALS}; use fewer repetitions"
+        )
     chance = random.Random(number)
     trials: list[str] = []
     for block in range(repetitions):
@@ -72,7 +74,9 @@ class Experiment:
             path = self._folder / f"{participant}_{stamp}.jsonl"
         self._path, self.participant, self.position, self.running, self.notes = path, participant, 0, False, []
         self.trials = [{"condition": condition, "outcome": ""} for condition in trials]
-        self._write("session", participant=participant, number=number, order=order, conditions=conditions, trials=trials)
+        self._write(
+            "session", participant=participant, number=number, order=order, conditions=conditions, trials=trials
+        )
         return f"session of {participant}: {len(trials)} trials, written to {path}"
 
     def end(self) -> str:
@@ -139,4 +143,6 @@ class Experiment:
             with self._path.open("a", encoding="utf-8") as stream:
                 stream.write(json.dumps(fields) + "\n")
         except OSError as error:
-            self._warn(f"{self._path} cannot be written ({error.strerror}); free the disk, the session goes on unwritten")
+            self._warn(
+                f"{self._path} cannot be written ({error.strerror}); free the disk, the session goes on unwritten"
+            )

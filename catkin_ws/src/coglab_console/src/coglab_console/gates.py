@@ -89,7 +89,9 @@ def _start_reason(action: str, now: Standing) -> str:
     if action in now.actions:
         return ""
     if not now.in_hub:
-        return f"{now.leaf.replace('_', ' ') or 'the machine'} is under way" if now.state else "the machine has not begun"
+        return (
+            f"{now.leaf.replace('_', ' ') or 'the machine'} is under way" if now.state else "the machine has not begun"
+        )
     if now.leaf in STANDSTILL:
         return f"{now.leaf}: only {' or '.join(now.actions)} leads on"
     if action in ("exchange_robot_to_human", "put") and not now.object_id:

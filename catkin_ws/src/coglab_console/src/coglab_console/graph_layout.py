@@ -71,8 +71,13 @@ class Layout:
             return _rows(containers, "Graphviz is missing (apt install graphviz): no edges are drawn")
         try:
             paths = _paths(containers)
-            done = subprocess.run([program, "-Tjson"], input=_dot_text(containers, paths), capture_output=True, text=True,
-                                  timeout=TIME_LIMIT)  # fmt: skip
+            done = subprocess.run(
+                [program, "-Tjson"],
+                input=_dot_text(containers, paths),
+                capture_output=True,
+                text=True,
+                timeout=TIME_LIMIT,
+            )
             if done.returncode != 0:
                 raise ValueError(done.stderr.strip().splitlines()[-1] if done.stderr.strip() else "no message")
             picture = _read(json.loads(done.stdout), paths)
@@ -97,8 +102,11 @@ def _leaf_of(path: str, containers: dict[str, Container]) -> str:
 
 def _dot_text(containers: dict[str, Container], paths: list[str]) -> str:
     number = {path: i for i, path in enumerate(paths)}
-    lines = ["digraph machine {", "compound=true; rankdir=TB; nodesep=0.18; ranksep=0.32; fontname=sans; fontsize=11;",
-             "node [shape=box, fontname=sans, fontsize=11, height=0.28, margin=\"0.08,0.03\"];"]  # fmt: skip
+    lines = [
+        "digraph machine {",
+        "compound=true; rankdir=TB; nodesep=0.18; ranksep=0.32; fontname=sans; fontsize=11;",
+        'node [shape=box, fontname=sans, fontsize=11, height=0.28, margin="0.08,0.03"];',
+    ]
     for root in roots(containers):
         _write_container(root, containers, number, lines)
     for container in containers.values():

@@ -13,7 +13,10 @@ from pathlib import Path
 DEBIAN = Path("/usr/share/javascript")
 LIBRARIES = {  # address: file below DEBIAN, Debian package
     "/lib/three/build/three.module.js": ("three/build/three.module.js", "libjs-three"),
-    "/lib/three/examples/jsm/controls/OrbitControls.js": ("three/examples/jsm/controls/OrbitControls.js", "libjs-three"),
+    "/lib/three/examples/jsm/controls/OrbitControls.js": (
+        "three/examples/jsm/controls/OrbitControls.js",
+        "libjs-three",
+    ),
     "/lib/dygraphs/dygraph.js": ("dygraphs/dygraph.min.js", "libjs-dygraphs"),
     "/lib/dygraphs/dygraph.css": ("dygraphs/dygraph.min.css", "libjs-dygraphs"),
 }

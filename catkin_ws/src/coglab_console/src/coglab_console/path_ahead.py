@@ -33,7 +33,9 @@ def as_transform(pose: tuple[float, ...]) -> np.ndarray:
     return transform(pose[:3], rotation(pose[3:]))
 
 
-def aim(action: str, entry: Mapping[str, Any], frames: Mapping[str, tuple[float, ...]]) -> tuple[str, float, np.ndarray] | None:
+def aim(
+    action: str, entry: Mapping[str, Any], frames: Mapping[str, tuple[float, ...]]
+) -> tuple[str, float, np.ndarray] | None:
     """Primitive, its ratio and where the palm would be at the end of the reach of this action; None if nobody knows.
 
     `entry`: of the object database; `frames`: poses in the world of `human_hand` and of the object's frame.

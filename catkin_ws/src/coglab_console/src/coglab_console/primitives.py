@@ -166,14 +166,18 @@ def document(library: dict[str, Primitive]) -> list[dict]:
     for one in library.values():
         times, points = one.roll_out(one.start, one.goal)
         speed = np.linalg.norm(np.gradient(points, times, axis=0), axis=1)
-        rows.append({
-            "name": one.name,
-            "description": one.description,
-            "duration": one.duration,
-            "mapping": one.mapping,
-            "basis": len(one.centres),
-            "end_error_mm": round(float(np.linalg.norm(points[-1] - one.goal)) * 1000, 2),
-            "plot": [[round(float(t), 3), *(round(float(p), 4) for p in point), round(float(v), 4)]
-                     for t, point, v in zip(times[::4], points[::4], speed[::4], strict=True)],
-        })  # fmt: skip
+        rows.append(
+            {
+                "name": one.name,
+                "description": one.description,
+                "duration": one.duration,
+                "mapping": one.mapping,
+                "basis": len(one.centres),
+                "end_error_mm": round(float(np.linalg.norm(points[-1] - one.goal)) * 1000, 2),
+                "plot": [
+                    [round(float(t), 3), *(round(float(p), 4) for p in point), round(float(v), 4)]
+                    for t, point, v in zip(times[::4], points[::4], speed[::4], strict=True)
+                ],
+            }
+        )
     return rows

@@ -47,7 +47,10 @@ class Roles:
             return "you are the operator now"
         if not self.claimant:
             self.claimant, self._due = name, self._now() + NOTICE
-            self._say(f"{name} takes over from {self.operator} in {NOTICE:.0f} s, unless {self.operator} keeps the control", "warning")
+            self._say(
+                f"{name} takes over from {self.operator} in {NOTICE:.0f} s, unless {self.operator} keeps the control",
+                "warning",
+            )
         return f"{self.operator} was told; you are the operator in {NOTICE:.0f} s unless they keep the control"
 
     def keep(self, name: str) -> str:

@@ -74,7 +74,7 @@ class RosBackend:
         threading.Thread(target=work, name=f"command_{name}", daemon=True).start()
         try:
             return await asyncio.wait_for(done, LIMIT)
-        except asyncio.TimeoutError:
+        except TimeoutError:
             return Answer(False, f"{name}: no answer within {LIMIT:.0f} s; look at the event log and at Health")
 
     @staticmethod
@@ -84,9 +84,11 @@ class RosBackend:
 
     def _told(self, service: str, kind: Any, *fields: Any) -> Answer:
         answer = self._ask(service, kind, *fields)
-        return Answer(bool(answer.success), answer.message or ("done" if answer.success else "refused without a reason"))
+        return Answer(
+            bool(answer.success), answer.message or ("done" if answer.success else "refused without a reason")
+        )
 
-    # --- one method per command, in a thread of its own ---------------------------------------------------------------
+    # --- one method per command, in a thread of its own -------------------------------------------------------
 
     def _start(self, action: str, object_id: str = "") -> Answer:
         return self._told("coglab/start", Start, action, object_id)

@@ -48,7 +48,13 @@ class SmachGraphs:
         with self._lock:
             for machine in self._machines.values():
                 if path in machine.containers:
-                    machine.last = {"path": path, "from": from_state, "outcome": outcome, "to": to_state, "reason": reason}
+                    machine.last = {
+                        "path": path,
+                        "from": from_state,
+                        "outcome": outcome,
+                        "to": to_state,
+                        "reason": reason,
+                    }
         self._show()
 
     def _look(self) -> None:
@@ -106,8 +112,13 @@ class SmachGraphs:
                 return
             machine.active[message.path] = active
             if before and active and not machine.last.get("reason"):
-                machine.last = {"path": message.path, "from": ", ".join(before), "outcome": "",
-                                "to": ", ".join(active), "reason": ""}  # fmt: skip
+                machine.last = {
+                    "path": message.path,
+                    "from": ", ".join(before),
+                    "outcome": "",
+                    "to": ", ".join(active),
+                    "reason": "",
+                }
         self._show()
 
     def _show(self) -> None:

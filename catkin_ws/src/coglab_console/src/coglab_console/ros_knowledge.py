@@ -31,8 +31,13 @@ MAX_FILE = 1_000_000  # bytes of a configuration
 class Knowledge:
     """`selected()` is the object of the next action."""
 
-    def __init__(self, view: RosView, put: Callable[[str, Any], None], say: Callable[[str, str], None],
-                 selected: Callable[[], str]) -> None:  # fmt: skip
+    def __init__(
+        self,
+        view: RosView,
+        put: Callable[[str, Any], None],
+        say: Callable[[str, str], None],
+        selected: Callable[[], str],
+    ) -> None:
         self._view, self._put, self._say, self._selected = view, put, say, selected
         self._texts: dict[str, str] = {}
         self._entries: dict[str, dict] = {}
@@ -61,7 +66,11 @@ class Knowledge:
 
     def _look(self) -> None:
         while not rospy.is_shutdown():
-            for name, work in (("objects", self._objects), ("machines", self._machines), ("primitives", self._primitives)):
+            for name, work in (
+                ("objects", self._objects),
+                ("machines", self._machines),
+                ("primitives", self._primitives),
+            ):
                 try:
                     work()
                     self._told.pop(name, None)
@@ -91,9 +100,17 @@ class Knowledge:
         self._show_objects("")
 
     def _show_objects(self, missing: str) -> None:
-        rows = [{"id": name, "name": str(self._entries[name].get("name", name)), "mass": self._entries[name].get("mass"),
-                 "shape": self._entries[name].get("shape"), "size": self._entries[name].get("size"), "text": text[:8000]}
-                for name, text in sorted(self._texts.items())]  # fmt: skip
+        rows = [
+            {
+                "id": name,
+                "name": str(self._entries[name].get("name", name)),
+                "mass": self._entries[name].get("mass"),
+                "shape": self._entries[name].get("shape"),
+                "size": self._entries[name].get("size"),
+                "text": text[:8000],
+            }
+            for name, text in sorted(self._texts.items())
+        ]
         self._put("objects", {"rows": rows, "problems": missing or self._problems})
 
     def _changed(self, path: Path) -> bool:
@@ -121,7 +138,7 @@ class Knowledge:
             raise
         self._put("primitives", {"file": str(path), "problem": "", "rows": library_document(self._library)})
 
-    # --- the path ahead -------------------------------------------------------------------------------------------------
+    # --- the path ahead ---------------------------------------------------------------------------------------
 
     def _paths(self) -> None:
         while not rospy.is_shutdown():
@@ -153,7 +170,11 @@ class Knowledge:
 
     def _ahead(self, palm: np.ndarray) -> dict | None:
         view = self._view
-        actions = [action for action in view.machine.actions if action in ("exchange_human_to_robot", "exchange_robot_to_human")]
+        actions = [
+            action
+            for action in view.machine.actions
+            if action in ("exchange_human_to_robot", "exchange_robot_to_human")
+        ]
         leaf_parent = view.machine.state.split("/")[-2:-1]
         if not actions and leaf_parent and leaf_parent[0] in path_ahead.ROLES:
             actions = leaf_parent  # the action has begun, the reach has not

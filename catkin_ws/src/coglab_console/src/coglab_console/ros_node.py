@@ -87,38 +87,56 @@ class ConsoleNode:
         more = str(rospy.get_param("~hosts", "")).split()
         self.access = Access(allowed_hosts(self.address, self.port, more))
         self.events, self.documents = EventLog(time.time), Documents()
-        self.events.listen(lambda _event: self._soon(self._wake))
+        self.server: ConsoleServer | None = None
+        self.events.listen(lambda _event: self.soon(self._wake))
         self.real = bool(rospy.get_param("~real", False))
         self.selected = ""
         model = self._model()
         self.graphs = SmachGraphs(self.put, lambda text, level: self.say("graph", text, level))
         frames = {**FRAMES, **self._parameter("perception/frames", {})}
-        self.view = RosView(model, self._settings(), frames, self.say, self.put, self.graphs.transition, self._on_result)
+        self.view = RosView(
+            model, self._settings(), frames, self.say, self.put, self.graphs.transition, self._on_result
+        )
         self.stop_path = StopPath(lambda text, level: self.say("stop", text, level))
         backend = RosBackend(self.view, self.stop_path.press, self.real)
         folder = Path(str(rospy.get_param("~sessions", "")) or home / "console_sessions")
         self.desk = Desk(backend, self.events, self.documents, folder, time.time, self.write_link)
-        self.knowledge = Knowledge(self.view, self.put, lambda text, level: self.say("files", text, level),
-                                   lambda: self.desk.object_id)  # fmt: skip
+        self.knowledge = Knowledge(
+            self.view, self.put, lambda text, level: self.say("files", text, level), lambda: self.desk.object_id
+        )
         page = Path(rospkg.RosPack().get_path("coglab_console")) / "page"
         files, missing = load_all(page)
         for package in missing:
-            self.say("console", f"{package} is missing (apt install {package}): " + (
-                "the 2D view takes the place of the 3D view" if "three" in package else "there are no strip charts"), "warning")  # fmt: skip
-        self.server = ConsoleServer(self.access, self.desk, self.events, self.documents, files,
-                                    f"coglab_console_{self.port}", secrets.token_hex(8), self.write_link)  # fmt: skip
+            self.say(
+                "console",
+                f"{package} is missing (apt install {package}): "
+                + ("the 2D view takes the place of the 3D view" if "three" in package else "there are no strip charts"),
+                "warning",
+            )
+        self.server = ConsoleServer(
+            self.access,
+            self.desk,
+            self.events,
+            self.documents,
+            files,
+            f"coglab_console_{self.port}",
+            secrets.token_hex(8),
+            self.write_link,
+        )
         self._put_static(model, missing, files)
 
-    # --- from other threads -------------------------------------------------------------------------------------------
+    # --- from other threads -----------------------------------------------------------------------------------
 
-    def _soon(self, callback: Any, *arguments: Any) -> None:
+    def soon(self, callback: Any, *arguments: Any) -> None:
+        """Calls it in the event loop, if that still runs."""
         try:
             self.loop.call_soon_threadsafe(callback, *arguments)
         except RuntimeError:  # the loop has ended
             pass
 
     def _wake(self) -> None:
-        self.server.wake()
+        if self.server is not None:
+            self.server.wake()
 
     def say(self, source: str, text: str, level: str = "info") -> None:
         """An event, from any thread."""
@@ -127,14 +145,14 @@ class ConsoleNode:
     def put(self, name: str, value: Any) -> None:
         """A document, from any thread; None takes it away."""
         if value is None:
-            self._soon(self.documents.remove, name)
+            self.soon(self.documents.remove, name)
         else:
-            self._soon(self.documents.put, name, value)
+            self.soon(self.documents.put, name, value)
 
     def _on_result(self, row: dict) -> None:
-        self._soon(self.desk.result, row)
+        self.soon(self.desk.result, row)
 
-    # --- at the start -------------------------------------------------------------------------------------------------
+    # --- at the start -----------------------------------------------------------------------------------------
 
     @staticmethod
     def _parameter(name: str, default: Any) -> Any:
@@ -154,21 +172,28 @@ class ConsoleNode:
     def _settings(self) -> Settings:
         given = self._parameter("contact_detector", {})
         names = Settings.__dataclass_fields__
-        return Settings(**{name: float(value) for name, value in given.items()
-                           if name in names and isinstance(value, (int, float))})  # fmt: skip
+        return Settings(
+            **{name: float(value) for name, value in given.items() if name in names and isinstance(value, (int, float))}
+        )
 
     def _put_static(self, model: RobotModel | None, missing: list[str], files: dict) -> None:
         workspace = self._parameter("controller_manager/workspace", {})
-        self.documents.put("model", {
-            "real": self.real,
-            "robot": model.document() if model else None,
-            "order": model.moving() if model else [],
-            "workspace": {"low": workspace.get("box_min", [-1.2, -1.2, 0.0]), "high": workspace.get("box_max", [1.2, 1.2, 1.6])},
-            "missing": missing,
-            "charts": "/lib/dygraphs/dygraph.js" in files,
-            "three": "/lib/three/build/three.module.js" in files,
-            "colours": {"arm": "#d9822b"},
-        })  # fmt: skip
+        self.documents.put(
+            "model",
+            {
+                "real": self.real,
+                "robot": model.document() if model else None,
+                "order": model.moving() if model else [],
+                "workspace": {
+                    "low": workspace.get("box_min", [-1.2, -1.2, 0.0]),
+                    "high": workspace.get("box_max", [1.2, 1.2, 1.6]),
+                },
+                "missing": missing,
+                "charts": "/lib/dygraphs/dygraph.js" in files,
+                "three": "/lib/three/build/three.module.js" in files,
+                "colours": {"arm": "#d9822b"},
+            },
+        )
         self.versions = {
             "ROS": str(rospy.get_param("/rosversion", "?")).strip(),
             "Python": platform.python_version(),
@@ -193,14 +218,17 @@ class ConsoleNode:
             self.say("console", f"{path} cannot be written ({error.strerror}); Help makes links, too", "warning")
         return link
 
-    # --- while it runs ------------------------------------------------------------------------------------------------
+    # --- while it runs ----------------------------------------------------------------------------------------
 
     async def run(self, ended: asyncio.Event) -> None:
         """Serves until `ended`."""
         runner = web.AppRunner(self.server.app, access_log=None, handle_signals=False)
         await runner.setup()
         await web.SockSite(runner, self.socket, shutdown_timeout=1.0).start()
-        print(f"[coglab] console: {self.write_link()}   (one use; the next one is in {self.home / 'console.url'})", flush=True)
+        print(
+            f"[coglab] console: {self.write_link()}   (one use; the next one is in {self.home / 'console.url'})",
+            flush=True,
+        )
         if self.address not in ("127.0.0.1", "localhost"):
             rospy.logwarn("the console listens on %s: whoever gets the link can move the robot", self.address)
         self.say("console", f"console started, {'REAL ROBOT' if self.real else 'simulation'}")
@@ -236,8 +264,15 @@ class ConsoleNode:
 
     def _put_health(self) -> None:
         now = time.monotonic()
-        rows = [{"name": name, "level": row["level"] if now - row["at"] < 5.0 else 3, "message": row["message"],
-                 "values": row["values"]} for name, row in sorted(self.view.diagnostics.items())]  # fmt: skip
+        rows = [
+            {
+                "name": name,
+                "level": row["level"] if now - row["at"] < 5.0 else 3,
+                "message": row["message"],
+                "values": row["values"],
+            }
+            for name, row in sorted(self.view.tables.diagnostics.items())
+        ]
         browsers = [{"name": one.name, "connections": one.sockets} for one in self.access.sessions() if one.sockets]
         self.documents.put("health", {"rows": rows, "versions": self.versions, "browsers": browsers})
 
@@ -255,7 +290,7 @@ async def _main(home: Path) -> None:
     ended = asyncio.Event()
     for number in (signal.SIGINT, signal.SIGTERM):
         loop.add_signal_handler(number, ended.set)
-    rospy.on_shutdown(lambda: loop.call_soon_threadsafe(ended.set))
+    rospy.on_shutdown(lambda: node.soon(ended.set))
     await node.run(ended)
 
 

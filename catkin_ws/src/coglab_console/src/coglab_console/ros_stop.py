@@ -66,8 +66,11 @@ class StopPath:
         self._say(f"STOP by {who}", "fault")
 
     def _ask(self, name: str, call: Callable[[], object], began: float) -> None:
-        watch = threading.Timer(ANSWER_LIMIT, self._say, (
-            f"STOP: the {name} has not answered for {ANSWER_LIMIT:.0f} s; use the red button of the robot", "fault"))  # fmt: skip
+        watch = threading.Timer(
+            ANSWER_LIMIT,
+            self._say,
+            (f"STOP: the {name} has not answered for {ANSWER_LIMIT:.0f} s; use the red button of the robot", "fault"),
+        )
         watch.daemon = True
         watch.start()
         try:

@@ -1,4 +1,4 @@
-"""What the console knows of the robot: the newest of every topic, and from it the state that goes out 30 times a second."""
+"""What the console knows of the robot: the newest of every topic, and from it the state that goes out at 30 Hz."""
 
 from __future__ import annotations
 
@@ -13,21 +13,18 @@ from coglab_msgs.msg import (
     Contact,
     ControllerStatus,
     DmpFeedback,
-    FeedbackState,
-    FeedbackStatus,
     HandStatus,
     LwrState,
     MasterState,
-    Recognition,
     Transition,
     UnfinishedPtp,
 )
-from diagnostic_msgs.msg import DiagnosticArray
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64, String
 
 from . import wire
 from .gates import Standing
+from .ros_tables import Tables
 from .torque_rate import Settings, TorqueRate
 from .urdf_model import RobotModel
 from .words import phase, time_limit
@@ -46,9 +43,16 @@ class RosView:
     """Callbacks write, anybody reads; each value is replaced as a whole. `say(source, text, level)` makes an event,
     `put(name, value)` a document, `transition` goes to the graphs and `result` to the desk."""
 
-    def __init__(self, model: RobotModel | None, settings: Settings, frames: dict[str, str],
-                 say: Callable[[str, str, str], None], put: Callable[[str, Any], None],
-                 transition: Callable[..., None], result: Callable[[dict], None]) -> None:  # fmt: skip
+    def __init__(
+        self,
+        model: RobotModel | None,
+        settings: Settings,
+        frames: dict[str, str],
+        say: Callable[[str, str, str], None],
+        put: Callable[[str, Any], None],
+        transition: Callable[..., None],
+        result: Callable[[dict], None],
+    ) -> None:
         self.model = model
         self._say, self._put, self._transition, self._result = say, put, transition, result
         self._hand_frame, self._board_frame = frames["human_hand"], frames["board"]
@@ -66,8 +70,7 @@ class RosView:
         self._state_since = time.monotonic()
         self.dmp_at = self._hand_at = self._margin_at = 0.0
         self.margin, self.contact = 0.0, ""
-        self.latency = self.answer_time = math.nan
-        self.diagnostics: dict[str, dict] = {}
+        self.tables = Tables(put)
         self.entry: Callable[[], dict] = dict
         self.config: Callable[[], dict] = dict
         self.objects_read: Callable[[str], None] = lambda problems: None
@@ -88,10 +91,6 @@ class RosView:
             ("controller_manager/status", ControllerStatus, self._on_manager, 20),
             ("controller_manager/dmp/feedback", DmpFeedback, self._on_dmp, 5),
             ("controller_manager/ptp/unfinished_ptp", UnfinishedPtp, self._on_unfinished, 10),
-            ("controller_manager/feedback/status", FeedbackStatus, self._on_feedback_status, 2),
-            ("controller_manager/feedback/state", FeedbackState, self._on_feedback_state, 1),
-            ("perception/recognition", Recognition, self._on_recognition, 1),
-            ("diagnostics", DiagnosticArray, self._on_diagnostics, 20),
             ("/tf", rospy.AnyMsg, self._on_tf, 50),
             ("/tf_static", rospy.AnyMsg, self._on_tf, 50),
         ):
@@ -100,7 +99,7 @@ class RosView:
     def _there(self, topic: str) -> bool:
         return self._subscribers[topic].get_num_connections() > 0
 
-    # --- read ---------------------------------------------------------------------------------------------------------
+    # --- read -------------------------------------------------------------------------------------------------
 
     def standing(self) -> Standing:
         """For the desk."""
@@ -151,8 +150,8 @@ class RosView:
             "rate": _round(self.torque.take_peaks()),
             "threshold": _round(self.torque.thresholds()),
             "speed": round(self.palm_speed, 4),
-            "fri": round(1000 * self.latency, 3) if math.isfinite(self.latency) else None,
-            "answer": round(1000 * self.answer_time, 3) if math.isfinite(self.answer_time) else None,
+            "fri": round(1000 * self.tables.latency, 3) if math.isfinite(self.tables.latency) else None,
+            "answer": round(1000 * self.tables.answer_time, 3) if math.isfinite(self.tables.answer_time) else None,
             "current": [motor.current for motor in self.hand.motors] if now - self._hand_at < OLD else [],
             "margin": round(self.margin, 3) if now - self._margin_at < OLD else None,
             "phase": self.machine.state,
@@ -164,21 +163,53 @@ class RosView:
         """What changes seldom: the document `status`."""
         now, machine, arm, hand = self.standing(), self.machine, self.arm, self.hand
         return {
-            "machine": {"alive": now.master_alive, "state": machine.state, "words": phase(machine.state),
-                        "hub": machine.in_hub, "actions": list(machine.actions), "object": machine.object_id,
-                        "why": machine.why, "fallback": str(self.config().get("default_object", "")), "limit": time_limit(machine.state, self.config(), self.entry())},
-            "arm": {"alive": now.arm_alive, "supervisor": arm.supervisor, "fri": arm.fri_state, "quality": arm.quality,
-                    "mode": arm.control_mode, "power": arm.power == 0x7F, "allowed": arm.motion_allowed,
-                    "held": arm.hold_latched, "reason": arm.reason, "cycle": arm.cycle_time},
-            "hand": {"alive": now.hand_alive, "connected": hand.connected, "calibrated": hand.calibrated,
-                     "calibrating": hand.calibrating, "holding": hand.holding, "message": hand.message,
-                     "motors": len(hand.motors)},
-            "manager": {"alive": self._there("controller_manager/status"), "state": self.manager.state,
-                        "active": self.manager.active_controller, "reason": self.manager.reason,
-                        "scale": round(self.manager.speed_scale, 3)},
-            "contact": {"words": self.contact, "learnt": self.torque.learnt, "learning": self.torque.learning(),
-                        "sigma": _round(self.torque.sigma), "k": self.torque.settings.k},
-        }  # fmt: skip
+            "machine": {
+                "alive": now.master_alive,
+                "state": machine.state,
+                "words": phase(machine.state),
+                "hub": machine.in_hub,
+                "actions": list(machine.actions),
+                "object": machine.object_id,
+                "why": machine.why,
+                "fallback": str(self.config().get("default_object", "")),
+                "limit": time_limit(machine.state, self.config(), self.entry()),
+            },
+            "arm": {
+                "alive": now.arm_alive,
+                "supervisor": arm.supervisor,
+                "fri": arm.fri_state,
+                "quality": arm.quality,
+                "mode": arm.control_mode,
+                "power": arm.power == 0x7F,
+                "allowed": arm.motion_allowed,
+                "held": arm.hold_latched,
+                "reason": arm.reason,
+                "cycle": arm.cycle_time,
+            },
+            "hand": {
+                "alive": now.hand_alive,
+                "connected": hand.connected,
+                "calibrated": hand.calibrated,
+                "calibrating": hand.calibrating,
+                "holding": hand.holding,
+                "message": hand.message,
+                "motors": len(hand.motors),
+            },
+            "manager": {
+                "alive": self._there("controller_manager/status"),
+                "state": self.manager.state,
+                "active": self.manager.active_controller,
+                "reason": self.manager.reason,
+                "scale": round(self.manager.speed_scale, 3),
+            },
+            "contact": {
+                "words": self.contact,
+                "learnt": self.torque.learnt,
+                "learning": self.torque.learning(),
+                "sigma": _round(self.torque.sigma),
+                "k": self.torque.settings.k,
+            },
+        }
 
     def learn(self) -> tuple[bool, str]:
         """The noise of the torques at rest, from now on."""
@@ -190,7 +221,7 @@ class RosView:
         self.torque.learn()
         return True, "learning for 5 s; leave the arm alone"
 
-    # --- arm and hand -------------------------------------------------------------------------------------------------
+    # --- arm and hand -----------------------------------------------------------------------------------------
 
     def _measure_palm(self, now: float) -> None:
         if self.palm_at() == (self._palm_before or (0.0,))[0]:
@@ -217,8 +248,9 @@ class RosView:
             return
         dt = stamp - self._joints_stamp
         if 0.0 < dt < OLD:
-            self._fastest = max((abs(joints[name] - before[name]) / dt for name in before if name.startswith("lwr_")),
-                                default=0.0)  # fmt: skip
+            self._fastest = max(
+                (abs(joints[name] - before[name]) / dt for name in before if name.startswith("lwr_")), default=0.0
+            )
         self.joints, self._joints_stamp, self._joints_at = joints, stamp, time.monotonic()
 
     def _on_torques(self, message: rospy.AnyMsg) -> None:
@@ -254,7 +286,7 @@ class RosView:
         if message.message and message.message != before.message:
             self._say("hand", message.message, "info" if message.connected else "fault")
 
-    # --- brain --------------------------------------------------------------------------------------------------------
+    # --- brain ------------------------------------------------------------------------------------------------
 
     def _on_machine(self, message: MasterState) -> None:
         if message.state != self.machine.state:
@@ -278,18 +310,15 @@ class RosView:
         self._result(row)
 
     def _on_contact(self, message: Contact) -> None:
-        self.contact = f"{'contact' if message.contact else 'released'} by {message.source}, margin {message.margin:.1f}"
+        self.contact = (
+            f"{'contact' if message.contact else 'released'} by {message.source}, margin {message.margin:.1f}"
+        )
         self._say("contact", f"{self.contact}: {message.message}", "info")
 
     def _on_margin(self, message: Float64) -> None:
         self.margin, self._margin_at = message.data, time.monotonic()
 
-    def _on_recognition(self, message: Recognition) -> None:
-        rows = [[name, round(p, 2)] for name, p in zip(message.names[:20], message.probabilities[:20], strict=False)]
-        self._put("recognition", {"pattern": message.pattern, "decided": message.decided,
-                                  "progress": round(message.progress, 2), "rows": rows})  # fmt: skip
-
-    # --- controllers --------------------------------------------------------------------------------------------------
+    # --- controllers ------------------------------------------------------------------------------------------
 
     def _on_manager(self, message: ControllerStatus) -> None:
         before, self.manager = self.manager, message
@@ -303,35 +332,3 @@ class RosView:
 
     def _on_unfinished(self, message: UnfinishedPtp) -> None:
         self._say("controller", f"motion {message.ptp_id} ended before its target: {message.reason}", "warning")
-
-    def _on_feedback_status(self, message: FeedbackStatus) -> None:
-        rows = [{"name": c.name, "type": c.type, "stage": c.stage, "enabled": c.enabled, "paused": c.paused,
-                 "safety": c.safety, "activity": c.activity, "waiting": c.waiting_for, "reasons": c.pause_reasons[:10],
-                 "fault": c.fault, "faults": c.faults, "overruns": c.overruns} for c in message.controllers[:64]]  # fmt: skip
-        self._put("feedback", {"profile": message.profile, "rows": rows})
-
-    def _on_feedback_state(self, message: FeedbackState) -> None:
-        rows = [{"controller": c.controller, "signal": c.signal, "size": round(c.size, 6), "angle": round(c.angle, 5)}
-                for c in message.corrections[:64]]  # fmt: skip
-        inside = [{"controller": s.controller, "values": [[n, round(v, 5), u] for n, v, u in
-                   zip(s.names, s.values, s.units, strict=False)][:20]} for s in message.states[:32]]  # fmt: skip
-        self._put("attribution", {"cycle": int(message.cycle), "rows": rows, "inside": inside})
-
-    def _on_diagnostics(self, message: DiagnosticArray) -> None:
-        for status in message.status[:50]:
-            level = status.level if isinstance(status.level, int) else status.level[0]
-            values = [[pair.key[:80], pair.value[:120]] for pair in status.values[:60]]
-            if len(self.diagnostics) < 100 or status.name in self.diagnostics:
-                self.diagnostics[status.name] = {"level": level, "message": status.message[:200], "values": values,
-                                                 "at": time.monotonic()}  # fmt: skip
-            if status.name.endswith("FRI connection"):
-                found = dict(values)
-                self.latency = _number(found.get("latency (s)"))
-                self.answer_time = _number(found.get("mean answer time (s)"))
-
-
-def _number(text: str | None) -> float:
-    try:
-        return float(text or "nan")
-    except ValueError:
-        return math.nan

@@ -24,7 +24,8 @@ MAX_SOCKETS = 4  # of one browser
 SEND_LIMIT = 5.0  # s that a browser may take to read
 HELLO_LIMIT = 3.0  # s until a connection has said what it has seen
 CSP = (
-    "default-src 'self'; script-src 'self'; style-src 'self'; img-src 'self' data: blob:; connect-src 'self' ws://{host}; "
+    "default-src 'self'; script-src 'self'; style-src 'self'; img-src 'self' data: blob:; "
+    "connect-src 'self' ws://{host}; "
     "object-src 'none'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
 )
 HEADERS = {
@@ -49,8 +50,17 @@ def parsed(text: str) -> object:
 class ConsoleServer:
     """One console. `epoch` tells a browser that comes back whether it is the same run."""
 
-    def __init__(self, access: Access, desk: Desk, events: EventLog, documents: Documents, files: dict[str, PageFile],
-                 cookie: str, epoch: str, spent: Callable[[], None] = lambda: None) -> None:  # fmt: skip
+    def __init__(
+        self,
+        access: Access,
+        desk: Desk,
+        events: EventLog,
+        documents: Documents,
+        files: dict[str, PageFile],
+        cookie: str,
+        epoch: str,
+        spent: Callable[[], None] = lambda: None,
+    ) -> None:
         self.access, self.desk, self.events, self.documents = access, desk, events, documents
         self._files, self._cookie, self._epoch, self._spent = files, cookie, epoch, spent
         self.clients: set[Client] = set()
@@ -62,7 +72,7 @@ class ConsoleServer:
         self.app.router.add_get("/{rest:.*}", self._file)
         self._tasks: set[asyncio.Task] = set()
 
-    # --- to the browsers --------------------------------------------------------------------------------------------
+    # --- to the browsers --------------------------------------------------------------------------------------
 
     def wake(self) -> None:
         """New events or documents: call from the event loop."""
@@ -76,7 +86,7 @@ class ConsoleServer:
             for client in self.clients:
                 client.state(text)
 
-    # --- requests ---------------------------------------------------------------------------------------------------
+    # --- requests ---------------------------------------------------------------------------------------------
 
     @web.middleware
     async def _guard(self, request: web.Request, handler: Callable[[web.Request], Awaitable]) -> web.StreamResponse:
@@ -90,7 +100,9 @@ class ConsoleServer:
         if not response.prepared:
             response.headers.update(HEADERS)
             host = request.headers.get("Host", "")
-            response.headers["Content-Security-Policy"] = CSP.format(host=host if host in self.access.hosts else "'none'")
+            response.headers["Content-Security-Policy"] = CSP.format(
+                host=host if host in self.access.hosts else "'none'"
+            )
         return response
 
     def _session(self, request: web.Request) -> Session:
@@ -162,7 +174,7 @@ class ConsoleServer:
             return Answer(True, "STOP was sent a moment ago")
         return self.desk.stop(session.name)
 
-    # --- one connection ---------------------------------------------------------------------------------------------
+    # --- one connection ---------------------------------------------------------------------------------------
 
     async def _socket(self, request: web.Request) -> web.StreamResponse:
         self.access.check_origin(request.headers)
@@ -200,14 +212,14 @@ class ConsoleServer:
             hello = parsed(message.data) if message.type is WSMsgType.TEXT else {}
             seq = hello.get("seq", 0) if hello.get("epoch") == self._epoch else 0
             return seq if isinstance(seq, int) and not isinstance(seq, bool) else 0
-        except (asyncio.TimeoutError, ValueError, AttributeError, RecursionError):
+        except (TimeoutError, ValueError, AttributeError, RecursionError):
             return 0
 
     async def _serve(self, client: Client, socket: web.WebSocketResponse) -> None:
         self.clients.add(client)
         try:
             await client.serve(socket.send_str, SEND_LIMIT)
-        except (asyncio.TimeoutError, ConnectionError, RuntimeError):
+        except (TimeoutError, ConnectionError, RuntimeError):
             pass
         finally:
             self.clients.discard(client)
@@ -260,7 +272,7 @@ class ConsoleServer:
             try:
                 text = to_json({"t": "answer", "id": number if isinstance(number, int) else None, **answer})
                 await asyncio.wait_for(socket.send_str(text), SEND_LIMIT)
-            except (asyncio.TimeoutError, ConnectionError, RuntimeError):
+            except (TimeoutError, ConnectionError, RuntimeError):
                 pass
 
         task = asyncio.create_task(send())

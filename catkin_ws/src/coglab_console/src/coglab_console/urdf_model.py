@@ -41,7 +41,12 @@ def quaternion(rotation: np.ndarray) -> list[float]:
     """x y z w of a rotation matrix."""
     m = rotation
     w2 = 1.0 + m[0, 0] + m[1, 1] + m[2, 2]
-    options = [1.0 + m[0, 0] - m[1, 1] - m[2, 2], 1.0 - m[0, 0] + m[1, 1] - m[2, 2], 1.0 - m[0, 0] - m[1, 1] + m[2, 2], w2]
+    options = [
+        1.0 + m[0, 0] - m[1, 1] - m[2, 2],
+        1.0 - m[0, 0] + m[1, 1] - m[2, 2],
+        1.0 - m[0, 0] - m[1, 1] + m[2, 2],
+        w2,
+    ]
     largest = int(np.argmax(options))
     q = np.array([
         [options[0], m[0, 1] + m[1, 0], m[0, 2] + m[2, 0], m[2, 1] - m[1, 2]],
@@ -129,7 +134,9 @@ class RobotModel:
                     size = [value for name in fields for value in _numbers(tag.attrib[name], "")]
                     material = visual.find("material")
                     colour = material.get("name", "") if material is not None else ""
-                    found.append({"kind": kind, "size": size, "pose": _pose(_origin(visual.find("origin"))), "of": colour})
+                    found.append(
+                        {"kind": kind, "size": size, "pose": _pose(_origin(visual.find("origin"))), "of": colour}
+                    )
         return found
 
     def moving(self) -> list[str]:
@@ -167,4 +174,8 @@ class RobotModel:
             waiting = [joint for joint in waiting if joint.child not in known]
         joints = [{"name": j.name, "kind": j.kind, "parent": j.parent, "child": j.child, "pose": _pose(j.origin),
                    "axis": j.axis.tolist()} for j in ordered]  # fmt: skip
-        return {"root": self.root, "joints": joints, "shapes": {name: rows for name, rows in self.shapes.items() if rows}}
+        return {
+            "root": self.root,
+            "joints": joints,
+            "shapes": {name: rows for name, rows in self.shapes.items() if rows},
+        }
