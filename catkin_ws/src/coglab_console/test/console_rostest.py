@@ -4,6 +4,8 @@ looked at, the scene's hand against tf. Pictures are kept beside the logs."""
 
 import json
 import os
+import signal
+import subprocess
 import sys
 import time
 import unittest
@@ -15,6 +17,8 @@ import rosgraph
 import rospkg
 import rospy
 import rostest
+import smach
+import smach_ros
 import tf2_ros
 from coglab_console.browser import Browser, fresh_link, press_and_hold
 from coglab_msgs.msg import LwrState, MasterState
@@ -163,10 +167,28 @@ class Console(unittest.TestCase):
         self.go_on()
         self.assertFalse(self.arm.hold_latched)
 
+    def test_51_stop_waits_neither_for_the_master_nor_for_a_frozen_brain(self):
+        master = rosgraph.Master("/console_test")
+        frozen = [self.process_of("/coglab"), master.getPid()]
+        for process in frozen:
+            os.kill(process, signal.SIGSTOP)
+        try:
+            ActionChains(self.browser.driver).send_keys(Keys.SPACE).perform()
+            end = time.monotonic() + 2.0
+            while not self.arm.hold_latched and time.monotonic() < end:
+                time.sleep(0.002)
+            held = self.arm.hold_latched
+        finally:
+            for process in frozen:
+                os.kill(process, signal.SIGCONT)
+        self.assertTrue(held, "no hold within 2 s")
+        self.wait_for_hub("stopped", 15.0)
+        self.go_on()
+
     def test_6_a_lost_connection_greys_the_page_within_a_second_and_loses_no_event(self):
-        self.browser.driver.execute_cdp_cmd("Network.enable", {})
         before = self.browser.js("return coglab.events().map(e => e.seq)")
-        os.kill(self.console_process(), 19)  # SIGSTOP: frozen, the connection stands
+        console = self.process_of("/coglab_console")
+        os.kill(console, signal.SIGSTOP)  # SIGSTOP: frozen, the connection stands
         began = time.monotonic()
         try:
             self.browser.until("return document.body.classList.contains('lost')", 3.0)
@@ -174,7 +196,7 @@ class Console(unittest.TestCase):
             self.assertLess(grey, 1.2)  # 1 s and a question of the driver
             self.assertIn("NOT LIVE", self.browser.js("return document.getElementById('lost').textContent"))
         finally:
-            os.kill(self.console_process(), 18)
+            os.kill(console, signal.SIGCONT)
         self.browser.until("return !document.body.classList.contains('lost')", 15.0)
         after = self.browser.js("return coglab.events().map(e => e.seq)")
         self.assertEqual(after, sorted(set(after)))
@@ -182,9 +204,30 @@ class Console(unittest.TestCase):
         self.assertEqual(after, list(range(after[0], after[-1] + 1)))
 
     @staticmethod
-    def console_process():
-        uri = rosgraph.Master("/console_test").lookupNode("/coglab_console")
+    def process_of(node):
+        uri = rosgraph.Master("/console_test").lookupNode(node)
         return ServerProxy(uri).getPid("/console_test")[2]
+
+    def test_61_a_machine_of_somebody_else_is_shown(self):
+        machine = smach.StateMachine(outcomes=["done"])
+        with machine:
+            smach.StateMachine.add("ALPHA", smach.CBState(lambda _: "on", outcomes=["on"]), {"on": "BETA"})
+            smach.StateMachine.add("BETA", smach.CBState(lambda _: "done", outcomes=["done"]))
+        server = smach_ros.IntrospectionServer("somebody", machine, "/SOMEBODY")
+        server.start()
+        try:
+            picture = self.browser.until("return coglab.docs()['graph:/somebody']", 20.0)
+        finally:
+            server.stop()
+        self.assertEqual({node["label"] for node in picture["nodes"]}, {"ALPHA", "BETA"})
+        self.assertEqual([edge["outcomes"] for edge in picture["edges"]], ["on"])
+
+    def test_62_a_second_console_of_this_master_is_refused_and_says_so(self):
+        command = ["rosrun", "coglab_console", "console_node.py", "__name:=another_console"]
+        ended = subprocess.run(command, capture_output=True, text=True, timeout=30)
+        self.assertEqual(ended.returncode, 1)
+        self.assertIn("another console of this ROS master runs", ended.stderr)
+        self.browser.until("return !document.body.classList.contains('lost')", 5.0)
 
     def test_7_the_page_had_nothing_to_complain_about(self):
         rows = [row for row in self.browser.complaints() if not any(word in row for word in KNOWN)]

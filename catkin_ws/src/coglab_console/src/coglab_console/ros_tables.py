@@ -13,7 +13,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 
 
 class Tables:
-    """`put(name, value)` gets the documents `feedback`, `attribution` and `recognition`; diagnostics are kept by name."""
+    """`put(name, value)` gets the documents `feedback`, `attribution`, `recognition`; diagnostics are kept by name."""
 
     def __init__(self, put: Callable[[str, Any], None]) -> None:
         self._put = put
