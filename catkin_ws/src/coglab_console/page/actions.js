@@ -169,11 +169,11 @@ export function showActions(parent) {
 export function showCause(place) {
   const words = h('span');
   const button = h('button', { type: 'button', id: 'acknowledge', onclick: () => command('acknowledge') }, 'Acknowledge');
-  place.append(words, ' ', button);
+  place.append(words, button);
   onDocs(['desk'], () => {
     const guard = store.docs.desk?.guard;
     place.parentElement.classList.toggle('told', Boolean(guard?.unacknowledged));
-    setText(words, guard?.unacknowledged ? guard.cause.slice(0, 110) : guard?.hold ? 'The next motion needs a held button.' : '');
+    setText(words, guard?.unacknowledged ? guard.cause : guard?.hold ? 'The next motion needs a held button.' : '');
     button.hidden = !guard?.unacknowledged || !operating();
     document.getElementById('stop-words').hidden = Boolean(guard?.unacknowledged);
   });

@@ -44,7 +44,7 @@ function person() {
 
 function object() {
   const id = store.docs.status.machine.object;
-  const next = store.docs.desk?.object;
+  const next = store.docs.desk?.object || store.docs.status.machine.fallback;
   const seen = store.state?.ages.object;
   const words = id ? `${id} in the hand` : next ? `${next} next, ${ageWords('object')}` : 'none';
   return [id || (seen !== undefined && seen < OLD) ? 'ok' : 'idle', words];

@@ -63,7 +63,7 @@ class Console(unittest.TestCase):
     def button(self, action):
         return self.browser.driver.find_element(By.CSS_SELECTOR, f"[data-action={action}]")
 
-    def test_1_everything_is_on_the_page_without_scrolling(self):
+    def test_01_everything_is_on_the_page_without_scrolling(self):
         self.wait_for_hub("wait_without_object", 90.0)
         self.browser.until(
             "return coglab.docs()['graph:/coglab'] && document.querySelectorAll('#graph .node.active').length", 20.0
@@ -80,7 +80,7 @@ class Console(unittest.TestCase):
         self.browser.tab("Live")
         self.assertEqual(self.browser.js("return document.getElementById('band').className"), "simulation")
 
-    def test_2_tab_reaches_everything_in_order(self):
+    def test_02_tab_reaches_everything_in_order(self):
         self.browser.js("document.activeElement.blur()")
         seen = []
         for _ in range(60):
@@ -100,7 +100,7 @@ class Console(unittest.TestCase):
         self.assertLess(names.index("tab-Live"), names.index("exchange_human_to_robot"))
         self.assertTrue(all(style == "solid" and width == "3px" for _, style, width in seen), seen)
 
-    def test_3_the_scene_has_the_hand_where_tf_has_it(self):
+    def test_03_the_scene_has_the_hand_where_tf_has_it(self):
         self.assertLess(self.distance_to_tf(), 0.002)
 
     def distance_to_tf(self):
@@ -109,7 +109,7 @@ class Console(unittest.TestCase):
         ).transform.translation
         return float(np.linalg.norm(np.array(self.browser.js("return coglab.palm()")) - [place.x, place.y, place.z]))
 
-    def test_4_an_exchange_by_mouse(self):
+    def test_04_an_exchange_by_mouse(self):
         path = self.browser.until("return coglab.docs().path", 10.0)
         self.assertEqual(path["kind"], "ahead")
         self.browser.js("document.activeElement.blur()")
@@ -149,7 +149,7 @@ class Console(unittest.TestCase):
             self.go_on()
         self.fail(f"no reach in three attempts: {self.machine.why}")
 
-    def test_5_stop_by_key_then_acknowledge_then_hold(self):
+    def test_05_stop_by_key_then_acknowledge_then_hold(self):
         self.reach()
         ActionChains(self.browser.driver).send_keys(Keys.SPACE).perform()
         end = time.monotonic() + 5.0
@@ -167,7 +167,7 @@ class Console(unittest.TestCase):
         self.go_on()
         self.assertFalse(self.arm.hold_latched)
 
-    def test_51_stop_waits_neither_for_the_master_nor_for_a_frozen_brain(self):
+    def test_06_stop_waits_neither_for_the_master_nor_for_a_frozen_brain(self):
         master = rosgraph.Master("/console_test")
         frozen = [self.process_of("/coglab"), master.getPid()]
         for process in frozen:
@@ -185,7 +185,7 @@ class Console(unittest.TestCase):
         self.wait_for_hub("stopped", 15.0)
         self.go_on()
 
-    def test_6_a_lost_connection_greys_the_page_within_a_second_and_loses_no_event(self):
+    def test_07_a_lost_connection_greys_the_page_within_a_second_and_loses_no_event(self):
         before = self.browser.js("return coglab.events().map(e => e.seq)")
         console = self.process_of("/coglab_console")
         os.kill(console, signal.SIGSTOP)  # SIGSTOP: frozen, the connection stands
@@ -208,7 +208,7 @@ class Console(unittest.TestCase):
         uri = rosgraph.Master("/console_test").lookupNode(node)
         return ServerProxy(uri).getPid("/console_test")[2]
 
-    def test_61_a_machine_of_somebody_else_is_shown(self):
+    def test_08_a_machine_of_somebody_else_is_shown(self):
         machine = smach.StateMachine(outcomes=["done"])
         with machine:
             smach.StateMachine.add("ALPHA", smach.CBState(lambda _: "on", outcomes=["on"]), {"on": "BETA"})
@@ -222,18 +222,18 @@ class Console(unittest.TestCase):
         self.assertEqual({node["label"] for node in picture["nodes"]}, {"ALPHA", "BETA"})
         self.assertEqual([edge["outcomes"] for edge in picture["edges"]], ["on"])
 
-    def test_62_a_second_console_of_this_master_is_refused_and_says_so(self):
+    def test_09_a_second_console_of_this_master_is_refused_and_says_so(self):
         command = ["rosrun", "coglab_console", "console_node.py", "__name:=another_console"]
         ended = subprocess.run(command, capture_output=True, text=True, timeout=30)
         self.assertEqual(ended.returncode, 1)
         self.assertIn("another console of this ROS master runs", ended.stderr)
         self.browser.until("return !document.body.classList.contains('lost')", 5.0)
 
-    def test_7_the_page_had_nothing_to_complain_about(self):
+    def test_10_the_page_had_nothing_to_complain_about(self):
         rows = [row for row in self.browser.complaints() if not any(word in row for word in KNOWN)]
         self.assertEqual(rows, [])
 
-    def test_8_without_webgl_there_are_two_dimensions(self):
+    def test_11_without_webgl_there_are_two_dimensions(self):
         used = self.link
         with Browser(webgl=False) as other:
             other.open(fresh_link(Path(rospkg.get_ros_home()), used))

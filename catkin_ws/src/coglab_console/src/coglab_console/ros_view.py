@@ -159,6 +159,11 @@ class RosView:
             "dmp": [dmp.state, round(dmp.phase, 4), round(dmp.remaining_distance, 4), round(dmp.remaining_time, 3)],
         }
 
+    def reaching(self) -> bool:
+        """Whether the arm is on its way in the state that then waits for contact."""
+        fresh = time.monotonic() - self.dmp_at < OLD
+        return fresh and self.dmp.state in ("running", "holding") and self.machine.state.endswith("/wait_stop")
+
     def status(self) -> dict:
         """What changes seldom: the document `status`."""
         now, machine, arm, hand = self.standing(), self.machine, self.arm, self.hand
@@ -166,13 +171,13 @@ class RosView:
             "machine": {
                 "alive": now.master_alive,
                 "state": machine.state,
-                "words": phase(machine.state),
+                "words": "reaches" if self.reaching() else phase(machine.state),
                 "hub": machine.in_hub,
                 "actions": list(machine.actions),
                 "object": machine.object_id,
                 "why": machine.why,
                 "fallback": str(self.config().get("default_object", "")),
-                "limit": time_limit(machine.state, self.config(), self.entry()),
+                "limit": None if self.reaching() else time_limit(machine.state, self.config(), self.entry()),
             },
             "arm": {
                 "alive": now.arm_alive,
@@ -327,6 +332,8 @@ class RosView:
 
     def _on_dmp(self, message: DmpFeedback) -> None:
         before, self.dmp, self.dmp_at = self.dmp, message, time.monotonic()
+        if message.state == "reached" and before.state != "reached" and self.machine.state.endswith("/wait_stop"):
+            self._state_since = self.dmp_at  # the wait for contact begins when the reach has ended
         if message.state == "aborted" and before.state != "aborted":
             self._say("controller", f"motion aborted: {message.reason}", "warning")
 
