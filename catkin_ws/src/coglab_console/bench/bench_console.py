@@ -311,12 +311,10 @@ def main() -> None:
 
 def take_control(browser: Browser) -> None:
     """The browsers that measured before may hold the control; they are gone."""
-    browser.js("document.getElementById('tab-Help').click()")
     operating = "return document.getElementById('role').innerText.startsWith('you operate')"
     if not browser.js(operating):
-        browser.js("[...document.querySelectorAll('#page button')].find((b) => b.textContent === 'Take over').click()")
+        browser.js("document.querySelector('#role button').click()")
     browser.until(operating, 15.0)
-    browser.tab("Live")
 
 
 if __name__ == "__main__":

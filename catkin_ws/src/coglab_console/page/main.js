@@ -1,7 +1,7 @@
 // The page: tabs, keys, and the parts of the first page.
 import { h, setAttribute, setText } from './dom.js';
 import { on, onDocs, operating, store } from './store.js';
-import { command, connect } from './link.js';
+import { connect } from './link.js';
 import { armStop, showActions, showCause } from './actions.js';
 import { eventsPage, showLog } from './log.js';
 import { showStatus } from './status.js';
@@ -11,7 +11,7 @@ import { showCharts } from './charts.js';
 import { experimentPage, showSession } from './tab_experiment.js';
 import { contactPage } from './tab_contact.js';
 import { feedbackPage, objectsPage, primitivesPage } from './tab_lists.js';
-import { healthPage, helpPage } from './tab_health.js';
+import { healthPage, helpPage, takeOver } from './tab_health.js';
 
 const PAGES = [['Live', null], ['Experiment', experimentPage], ['Contact', contactPage], ['Objects', objectsPage], ['Primitives', primitivesPage],
   ['Feedback', feedbackPage], ['Events', eventsPage], ['Health', healthPage], ['Help', helpPage]];
@@ -63,14 +63,15 @@ function keys(buttons) {
 }
 
 function showBand() {
-  const keep = h('button', { type: 'button', hidden: true, onclick: () => command('keep') }, 'Keep the control');
   const words = h('span');
-  at('role').append(words, ' ', keep);
+  const answer = h('span', { 'aria-live': 'polite' });
+  const control = takeOver(answer);
+  at('role').append(words, ' ', control, ' ', answer);
   const draw = () => {
     const roles = store.docs.desk?.roles;
-    const taking = roles?.claimant ? `: ${roles.claimant} takes over` : '';
-    setText(words, roles ? (operating() ? `you operate (${store.you})` : `you watch (${store.you}); ${roles.operator || 'nobody'} operates`) + taking : '');
-    keep.hidden = !(operating() && roles?.claimant);
+    setText(words, roles ? (operating() ? `you operate (${store.you})` : `you watch (${store.you}); ${roles.operator || 'nobody'} operates`) : '');
+    control.hidden = !roles || (operating() && !roles.claimant);
+    if (operating()) setText(answer, '');
   };
   onDocs(['desk'], draw);
   on('link', draw);
