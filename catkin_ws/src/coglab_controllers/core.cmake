@@ -19,7 +19,9 @@ add_library(coglab_controllers_core
   src/dmp/primitive.cpp
   src/dmp/transformation_system.cpp
   src/goal/goal_estimator.cpp
+  src/goal/goal_gate.cpp
   src/goal/goal_jitter.cpp
+  src/goal/goal_relay.cpp
   src/ik/second_task.cpp
   src/ik/two_task_ik.cpp
   src/kinematics/chain.cpp
@@ -37,13 +39,6 @@ target_compile_features(coglab_controllers_core PUBLIC cxx_std_17)
 target_compile_options(coglab_controllers_core PRIVATE -Wall -Wextra)
 set_target_properties(coglab_controllers_core PROPERTIES POSITION_INDEPENDENT_CODE ON)
 
-# The bridge's library: a target in one workspace build, a file otherwise.
-if(TARGET lwr_fri_bridge)
-  set(COGLAB_CORE_BRIDGE lwr_fri_bridge)
-else()
-  find_library(COGLAB_CORE_BRIDGE lwr_fri_bridge REQUIRED)
-endif()
-
 # Python module coglab_controllers._core, beside the Python files of src/coglab_controllers.
 pybind11_add_module(coglab_controllers_python
   src/python/module.cpp
@@ -51,8 +46,8 @@ pybind11_add_module(coglab_controllers_python
   src/python/bind_dmp.cpp
   src/python/bind_limits.cpp
   src/python/bind_motion.cpp)
-target_link_libraries(coglab_controllers_python PRIVATE coglab_controllers_core ${COGLAB_CORE_BRIDGE})
-target_include_directories(coglab_controllers_python SYSTEM PRIVATE ${lwr_fri_bridge_INCLUDE_DIRS})
+target_link_libraries(coglab_controllers_python PRIVATE coglab_controllers_core yaml-cpp)
+target_include_directories(coglab_controllers_python PRIVATE ${coglab_rt_INCLUDE_DIRS})
 set_target_properties(coglab_controllers_python PROPERTIES
   OUTPUT_NAME _core
   LIBRARY_OUTPUT_DIRECTORY ${CATKIN_DEVEL_PREFIX}/${CATKIN_PACKAGE_PYTHON_DESTINATION})
@@ -67,12 +62,11 @@ install(FILES src/coglab_controllers/_core.pyi src/coglab_controllers/py.typed
 install(FILES config/primitives.xml DESTINATION ${CATKIN_PACKAGE_SHARE_DESTINATION}/config)
 
 if(CATKIN_ENABLE_TESTING)
-  foreach(thing allocation cartesian_motion dmp ik kinematics learning library limits ptp)
+  foreach(thing allocation cartesian_motion dmp goal_estimator ik kinematics learning library limits ptp)
     catkin_add_gtest(coglab_controllers_test_${thing} test/test_${thing}.cpp)
     if(TARGET coglab_controllers_test_${thing})
-      target_link_libraries(coglab_controllers_test_${thing} coglab_controllers_core ${COGLAB_CORE_BRIDGE}
-        gtest_main gtest)
-      target_include_directories(coglab_controllers_test_${thing} SYSTEM PRIVATE ${lwr_fri_bridge_INCLUDE_DIRS})
+      target_link_libraries(coglab_controllers_test_${thing} coglab_controllers_core yaml-cpp gtest_main gtest)
+      target_include_directories(coglab_controllers_test_${thing} PRIVATE ${coglab_rt_INCLUDE_DIRS})
       target_compile_definitions(coglab_controllers_test_${thing} PRIVATE
         COGLAB_PACKAGE_DIR="${CMAKE_CURRENT_SOURCE_DIR}")
     endif()

@@ -19,6 +19,7 @@ import tf2_ros
 from coglab_bringup import scene
 from coglab_msgs.msg import DmpFeedback, MasterState
 from coglab_perception.tf_listener import TfListener
+from coglab_py import parameters
 from visualization_msgs.msg import MarkerArray
 
 PERIOD = 0.2  # s
@@ -31,11 +32,13 @@ class SceneMarkers:
 
     def __init__(self) -> None:
         self.library = cc.Library()
-        self.library.load(rospy.get_param("coglab/dmp_library"))
-        self.board_size = tuple(rospy.get_param("~board_size", [0.40, 0.50]))
+        self.library.load(parameters.read("coglab/dmp_library", str))
+        length, width = parameters.numbers("~board_size", [0.40, 0.50], 2)
+        self.board_size = (length, width)
         self.lock = threading.Lock()
         self.words = ""
-        self.primitive, self.start = "", None  # of the motion that runs; start: m in the base, (3,)
+        self.primitive = ""  # of the motion that runs
+        self.start: np.ndarray | None = None  # where it began, m in the base, (3,)
         self.heard = 0.0
         self.frames = tf2_ros.Buffer()
         self.listener = TfListener(self.frames, "world")

@@ -7,8 +7,6 @@ import time
 from pathlib import Path
 
 import pytest
-
-pytest.importorskip("coglab_msgs", reason="the workspace is not built or not sourced")
 from coglab_bringup.ask import brain_of
 from coglab_bringup.run_directory import free_port, record_run, running_systems
 

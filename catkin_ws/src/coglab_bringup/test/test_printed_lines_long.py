@@ -139,7 +139,7 @@ def test_tour(system):
 
 
 def test_own_object(system):
-    target = TOP / "catkin_ws/src/coglab_smach/objects/cup.yaml"
+    target = TOP / "catkin_ws/src/coglab_objects/objects/cup.yaml"
     try:
         for command in ("new cup", "check cup", "list"):
             ended = subprocess.run(f"./coglab object {command}", shell=True, cwd=TOP, timeout=600, check=False)

@@ -2,10 +2,11 @@
 
 import numpy as np
 import pytest
-
-pytest.importorskip("coglab_msgs", reason="the workspace is not built or not sourced")
+from coglab_bringup.demo import unfinished
+from coglab_bringup.handover import NotTaken
 from coglab_bringup.trial_plot import colours_of, draw_trial, lanes_of, rows_without_overlap, state_intervals
 from coglab_bringup.trial_recorder import Trial, summarise
+from coglab_msgs.msg import ReasonCode
 
 LIMITS = np.full(7, 2.0)
 
@@ -29,6 +30,13 @@ def test_summary_without_measurements_says_none():
     row = summarise(Trial(), "take", "no end", 0.0, 1.0, LIMITS)
     assert row["final_error_mm"] is None and row["contact_delay_ms"] is None and row["peak_velocity_share"] is None
     assert row["fri_lost"] is None
+
+
+def test_a_handover_that_did_not_end_has_a_code():
+    assert unfinished("take", KeyboardInterrupt())["reason_code"] == ReasonCode.CANCELLED
+    assert unfinished("take", RuntimeError("roslaunch ended"))["reason_code"] == ReasonCode.NODE_SILENT
+    refused = unfinished("take", NotTaken("take was not taken", ReasonCode.WRONG_STATE))
+    assert refused == {"kind": "take", "outcome": "take was not taken", "reason_code": ReasonCode.WRONG_STATE}
 
 
 def test_state_intervals_end_where_states_end():

@@ -37,6 +37,8 @@ REFUSED = {
     "launch console:=maybe": "there are: true, false",
     "launch console_port:=x": "expected a whole number from 0 to 65535",
     "console": "console expects one of: picture; got nothing",
+    "launch arm:=steel": "there is no 'steel'; there are: fri, ideal",
+    "launch arm:=ideal split:=true": "the ideal arm and its controllers are one process",
     "launch sim:=maybe": "there are: true, false",
     "launch seed:=-1": "expected a whole number",
     "launch log_file:=/no/such/x": "expected a file in a folder that exists",
@@ -114,5 +116,5 @@ def test_every_value_that_the_launch_files_offer_is_taken():
     judge_launch(TOP, [f"{name}:={value}" for name, (value, _) in defaults.items()])
     for convention in defaults["krl_convention"][1].partition(": ")[2].split(", "):
         judge_launch(TOP, [f"krl_convention:={convention}"])
-    for entry in (sources / "coglab_smach" / "objects").glob("*.yaml"):
+    for entry in (sources / "coglab_objects" / "objects").glob("*.yaml"):
         judge_launch(TOP, [f"object:={entry.stem}"])

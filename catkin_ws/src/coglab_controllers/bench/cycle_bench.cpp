@@ -18,6 +18,7 @@
 #include "coglab_controllers/dmp/library.hpp"
 #include "coglab_controllers/manager/controller_manager.hpp"
 #include "coglab_controllers/plugins/dmp_controller.hpp"
+#include "coglab_rt/joint_limits_table.hpp"
 
 namespace {
 
@@ -106,7 +107,7 @@ std::string readText(const std::string& path) {
 /// One manager with an ideal robot.
 struct Bench {
   Bench(const std::string& type, const std::string& package, const std::string& description) {
-    const auto table = lwr_fri_bridge::loadJointLimits(description + "/config/joint_limits.yaml");
+    const auto table = coglab_rt::loadJointLimits(description + "/config/joint_limits.yaml");
     YAML::Node node;
     node["motion"]["dmp_file"] = package + "/config/primitives.xml";
     ManagerSettings settings =
@@ -116,7 +117,7 @@ struct Bench {
     manager = std::make_unique<ControllerManager>(std::move(settings));
     sample.position << -1.4349, -0.6086, 1.4986, 1.7048, 0.1857, 0.2152, 0.782;
     sample.commanded_position = sample.position;
-    sample.block = lwr_fri_bridge::MotionBlock::None;
+    sample.block = coglab_rt::MotionBlock::None;
     tick();
     Answer answer = manager->load("motion", type);
     std::string name;

@@ -20,6 +20,7 @@
 #include "coglab_controllers/plugins/dmp_controller.hpp"
 #include "coglab_controllers/ros/tf_goal_source.hpp"
 #include "coglab_controllers/ros/tf_listener.hpp"
+#include "coglab_rt/joint_limits_table.hpp"
 
 namespace {
 
@@ -123,7 +124,7 @@ class Run {
     node["dmp"]["dmp_file"] = package + "/config/primitives.xml";
     ManagerSettings settings = readManagerSettings(
         node, readText(description + "/urdf/lwr_ih2.urdf"),
-        lwr_fri_bridge::loadJointLimits(description + "/config/joint_limits.yaml"), true);
+        coglab_rt::loadJointLimits(description + "/config/joint_limits.yaml"), true);
     settings.clock = [this] { return clocks_.steady(); };
     settings.logger = &logger_;
     manager_ = std::make_unique<ControllerManager>(std::move(settings));
@@ -131,7 +132,7 @@ class Run {
     dmp().setGoalSource(&watched_);
     sample_.position << -1.4349, -0.6086, 1.4986, 1.7048, 0.1857, 0.2152, 0.782;
     sample_.commanded_position = sample_.position;
-    sample_.block = lwr_fri_bridge::MotionBlock::None;
+    sample_.block = coglab_rt::MotionBlock::None;
     sample_.cycle_time = 0.005;
     std::string type;
     must(manager_->switchTo("dmp", type));

@@ -5,6 +5,7 @@
 #include <sstream>
 
 #include "coglab_controllers/manager/controller_manager.hpp"
+#include "coglab_rt/joint_limits_table.hpp"
 
 int main(int argc, char** argv) {
   using namespace coglab_controllers;
@@ -16,7 +17,7 @@ int main(int argc, char** argv) {
   std::ifstream file(description + "/urdf/lwr_ih2.urdf");
   std::ostringstream urdf;
   urdf << file.rdbuf();
-  const auto table = lwr_fri_bridge::loadJointLimits(description + "/config/joint_limits.yaml");
+  const auto table = coglab_rt::loadJointLimits(description + "/config/joint_limits.yaml");
   ManagerSettings settings = readManagerSettings(YAML::Node(), urdf.str(), table, true);
   settings.types["test/Throwing"] = argv[1];
   ctrl_more::Logger logger;

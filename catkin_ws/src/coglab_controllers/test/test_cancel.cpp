@@ -6,6 +6,7 @@
 #include <thread>
 
 #include "coglab_controllers/manager/control_thread.hpp"
+#include "coglab_rt/joint_limits_table.hpp"
 #include "virtual_robot.hpp"
 
 namespace coglab_controllers {
@@ -14,9 +15,9 @@ namespace {
 const std::vector<double> kThere = {-1.0, -0.5, 1.2, 1.5, 0.3, 0.3, 0.6};
 const Vector3 kGoal(0.80, 0.0, 0.45);
 
-std::vector<PtpEnd> endsOf(PtpController& ptp) {
-  std::vector<PtpEnd> ends;
-  for (PtpEnd end; ptp.readEnd(end);) ends.push_back(end);
+std::vector<EndedMotion> endsOf(PtpController& ptp) {
+  std::vector<EndedMotion> ends;
+  for (EndedMotion end; ptp.readEnd(end);) ends.push_back(end);
   return ends;
 }
 
@@ -33,11 +34,10 @@ int finish(VirtualRobot& robot, const CancelOrder& order, CancelAnswer& answer, 
 int brakingCycles(const VirtualRobot& robot) {
   double longest = 0.0;
   for (int joint = 0; joint < kMaxJoints; ++joint) {
-    const lwr_fri_bridge::AxisState axis = robot.interpolator->axis(joint);
+    const coglab_rt::AxisState axis = robot.interpolator->axis(joint);
     longest = std::max(
-        longest, lwr_fri_bridge::planVelocity(axis.velocity, axis.acceleration, 0.0,
-                                              robot.limits.acceleration[joint],
-                                              robot.limits.jerk[joint])
+        longest, coglab_rt::planVelocity(axis.velocity, axis.acceleration, 0.0,
+                                         robot.limits.acceleration[joint], robot.limits.jerk[joint])
                      .totalTime());
   }
   return static_cast<int>(std::ceil(longest / robot.period - 1e-9));
@@ -48,7 +48,7 @@ TEST(Cancel, EndsTheMotionAndItsQueueAndSaysWhy) {
   robot.loadBoth("ptp");
   robot.followWithinLimits();
   std::vector<int> ids;
-  for (int i = 0; i < 3; ++i) ids.push_back(robot.ptp().add({kThere, {}, {}}).ptp_id);
+  for (int i = 0; i < 3; ++i) ids.push_back(robot.ptp().add({kThere, {}, {}}).id);
   for (int i = 0; i < 100; ++i) robot.tick();
   ASSERT_GT(robot.command.velocity.norm(), 0.05);
   EXPECT_FALSE(robot.manager->report().standing);
@@ -64,10 +64,10 @@ TEST(Cancel, EndsTheMotionAndItsQueueAndSaysWhy) {
   EXPECT_EQ(report.state, ManagerState::Idle);
   EXPECT_EQ(report.reason.code(), ReasonCode::Cancelled);
   EXPECT_NE(report.reason.str().find("the state machine gives up"), std::string::npos);
-  const std::vector<PtpEnd> ends = endsOf(robot.ptp());
+  const std::vector<EndedMotion> ends = endsOf(robot.ptp());
   ASSERT_EQ(ends.size(), ids.size());
   for (std::size_t i = 0; i < ids.size(); ++i) {
-    EXPECT_EQ(ends[i].ptp_id, ids[i]);
+    EXPECT_EQ(ends[i].id, ids[i]);
     EXPECT_FALSE(ends[i].executed);
     EXPECT_EQ(ends[i].reason.code(), ReasonCode::Cancelled);
   }
@@ -75,8 +75,8 @@ TEST(Cancel, EndsTheMotionAndItsQueueAndSaysWhy) {
   for (int i = 0; i < 200; ++i) robot.tick();
   EXPECT_EQ(robot.sample.position, stood);
   // What comes after a cancel is executed.
-  const PtpAnswer next = robot.ptp().add({kThere, {}, {}});
-  ASSERT_EQ(next.status, PtpAnswer::kStarted) << next.message;
+  const MotionAnswer next = robot.ptp().add({kThere, {}, {}});
+  ASSERT_EQ(next.status, MotionAnswer::kStarted) << next.message;
   for (int i = 0; i < 2000 && robot.state() != MotionState::Reached; ++i) robot.tick();
   EXPECT_EQ(robot.state(), MotionState::Reached);
 }
@@ -147,8 +147,8 @@ TEST(Cancel, ARequestThatWasMadeBeforeItNeverMovesTheArm) {
 TEST(Cancel, AMotionThatHasNotBegunIsEndedToo) {
   VirtualRobot robot;
   robot.loadBoth("ptp");
-  const PtpAnswer pending = robot.ptp().add({kThere, {}, {}});  // adopted without a joint state
-  ASSERT_EQ(pending.status, PtpAnswer::kStarted);
+  const MotionAnswer pending = robot.ptp().add({kThere, {}, {}});  // adopted without a joint state
+  ASSERT_EQ(pending.status, MotionAnswer::kStarted);
   const JointVector stood = robot.sample.position;
   const CancelOrder order = robot.manager->askCancel("ptp", "");
   CancelAnswer answer;
@@ -156,7 +156,7 @@ TEST(Cancel, AMotionThatHasNotBegunIsEndedToo) {
   EXPECT_TRUE(answer.success && answer.was_running);
   for (int i = 0; i < 100; ++i) robot.tick();
   EXPECT_EQ(robot.sample.position, stood);
-  const std::vector<PtpEnd> ends = endsOf(robot.ptp());
+  const std::vector<EndedMotion> ends = endsOf(robot.ptp());
   ASSERT_EQ(ends.size(), 1u);
   EXPECT_EQ(ends[0].reason.code(), ReasonCode::Cancelled);
 }
@@ -167,13 +167,13 @@ TEST(Cancel, WorksWhileTheArmMayNotMoveAndNamesAControllerThatMovesItInstead) {
   CancelAnswer answer;
   EXPECT_GE(finish(robot, robot.manager->askCancel("dmp", ""), answer), 0);  // is not active
   EXPECT_TRUE(answer.success);
-  ASSERT_EQ(robot.ptp().add({kThere, {}, {}}).status, PtpAnswer::kStarted);
+  ASSERT_EQ(robot.ptp().add({kThere, {}, {}}).status, MotionAnswer::kStarted);
   for (int i = 0; i < 50; ++i) robot.tick();
   EXPECT_GE(finish(robot, robot.manager->askCancel("dmp", ""), answer), 0);
   EXPECT_FALSE(answer.success);
   EXPECT_EQ(answer.code, ReasonCode::NotActive);
   EXPECT_EQ(robot.state(), MotionState::Running);
-  robot.sample.block = lwr_fri_bridge::MotionBlock::Held;
+  robot.sample.block = coglab_rt::MotionBlock::Held;
   ++robot.sample.motion_epoch;
   for (int i = 0; i < 5; ++i) robot.tick();
   EXPECT_EQ(robot.manager->report().reason.code(), ReasonCode::Held);
@@ -228,9 +228,9 @@ TEST(Cancel, AnytimeItStandsWithinTheBrakingTimeAndNothingMovesAfterwards) {
 }
 
 TEST(Cancel, OnTheRealClockAnswersWhenTheArmStandsOrAtItsTimeLimit) {
-  lwr_fri_bridge::ControlPort port;
-  const lwr_fri_bridge::JointLimits limits =
-      lwr_fri_bridge::loadJointLimits(std::string(DESCRIPTION_DIR) + "/config/joint_limits.yaml");
+  coglab_rt::ArmMailboxes mailboxes;
+  const coglab_rt::JointLimits limits =
+      coglab_rt::loadJointLimits(std::string(DESCRIPTION_DIR) + "/config/joint_limits.yaml");
   ctrl_more::Logger logger;
   ManagerSettings settings = readManagerSettings(
       YAML::Node(), readText(std::string(DESCRIPTION_DIR) + "/urdf/lwr_ih2.urdf"), limits, false);
@@ -241,24 +241,24 @@ TEST(Cancel, OnTheRealClockAnswersWhenTheArmStandsOrAtItsTimeLimit) {
   ControllerManager manager(std::move(settings));
   ControlThreadOptions options;
   options.priority = 0;
-  ControlThread thread(manager.cycle(), port, options);
+  ControlThread thread(manager.cycle(), mailboxes, options);
   thread.start();
   std::string type;
   ASSERT_TRUE(VirtualRobot::ok(manager.load("ptp", "coglab/PtpController")));
   ASSERT_TRUE(VirtualRobot::ok(manager.switchTo("ptp", type)));
   std::atomic<bool> stop{false}, blind{false};
   std::thread robot([&] {
-    lwr_fri_bridge::Interpolator interpolator(limits);
+    coglab_rt::Interpolator interpolator(limits);
     RobotSample sample;
     sample.position << -1.4349, -0.6086, 1.4986, 1.7048, 0.1857, 0.2152, 0.782;
     interpolator.reset(sample.position);
     sample.cycle_time = 0.005;
-    sample.block = lwr_fri_bridge::MotionBlock::None;
+    sample.block = coglab_rt::MotionBlock::None;
     VelocityCommand command;
     while (!stop) {
       std::this_thread::sleep_for(std::chrono::milliseconds(5));
       if (blind) continue;
-      port.takeVelocity(command);
+      mailboxes.takeVelocity(command);
       interpolator.step(command.velocity, 0.005);
       sample.position = sample.commanded_position = interpolator.position();
       sample.velocity = sample.commanded_velocity = interpolator.velocity();
@@ -266,7 +266,7 @@ TEST(Cancel, OnTheRealClockAnswersWhenTheArmStandsOrAtItsTimeLimit) {
       ++sample.sequence;
       sample.stamp_ns = manager.now_ns();
       sample.controller_ns += 5'000'000;
-      port.publishSample(sample);
+      mailboxes.publishSample(sample);
       thread.wake(true);
     }
   });
@@ -280,14 +280,14 @@ TEST(Cancel, OnTheRealClockAnswersWhenTheArmStandsOrAtItsTimeLimit) {
     return false;
   };
   while (manager.report().samples == 0) std::this_thread::sleep_for(std::chrono::milliseconds(2));
-  ASSERT_EQ(ptp.add({kThere, {}, {}}).status, PtpAnswer::kStarted);
+  ASSERT_EQ(ptp.add({kThere, {}, {}}).status, MotionAnswer::kStarted);
   ASSERT_TRUE(moves());
   const CancelAnswer good = manager.cancel("ptp", 5.0, "test");
   EXPECT_TRUE(good.success) << good.message;
   EXPECT_TRUE(good.was_running);
   EXPECT_TRUE(manager.report().robot.commanded_velocity.isZero(0.0));
 
-  ASSERT_EQ(ptp.add({kThere, {}, {}}).status, PtpAnswer::kStarted);
+  ASSERT_EQ(ptp.add({kThere, {}, {}}).status, MotionAnswer::kStarted);
   ASSERT_TRUE(moves());
   blind = true;  // measurements stop, so nobody knows whether the arm stands
   std::this_thread::sleep_for(std::chrono::milliseconds(20));

@@ -5,6 +5,7 @@
 #include <thread>
 
 #include "coglab_controllers/manager/control_thread.hpp"
+#include "coglab_rt/joint_limits_table.hpp"
 #include "virtual_robot.hpp"
 
 namespace coglab_controllers {
@@ -37,11 +38,11 @@ class Timer : public ctrl_more::FeedbackController {
 /// The robot side of the thread in lockstep with it: one measurement, then the cycle that it causes.
 class Robot {
  public:
-  explicit Robot(lwr_fri_bridge::ControlPort& port) : port_(port) {
+  explicit Robot(coglab_rt::ArmMailboxes& mailboxes) : mailboxes_(mailboxes) {
     sample_.position << -1.4349, -0.6086, 1.4986, 1.7048, 0.1857, 0.2152, 0.782;
     sample_.commanded_position = sample_.position;
     sample_.cycle_time = 0.005;
-    sample_.block = lwr_fri_bridge::MotionBlock::None;
+    sample_.block = coglab_rt::MotionBlock::None;
   }
   /// A measurement `cycles` of the controller after the last one. Whether a control cycle followed.
   bool measure(ControllerManager& manager, ControlThread& thread, int cycles) {
@@ -49,7 +50,7 @@ class Robot {
     ++sample_.sequence;
     sample_.controller_ns += cycles * 5'000'000;
     sample_.stamp_ns = manager.now_ns();
-    port_.publishSample(sample_);
+    mailboxes_.publishSample(sample_);
     thread.wake(true);
     for (int i = 0; i < 5000 && cycles_run == before; ++i)
       std::this_thread::sleep_for(std::chrono::milliseconds(1));
@@ -58,14 +59,14 @@ class Robot {
   std::atomic<int> cycles_run{0};
 
  private:
-  lwr_fri_bridge::ControlPort& port_;
+  coglab_rt::ArmMailboxes& mailboxes_;
   RobotSample sample_;
 };
 
 TEST(ControlThread, TimeGoesOnWhileMeasurementsAreLost) {
-  lwr_fri_bridge::ControlPort port;
-  const lwr_fri_bridge::JointLimits limits =
-      lwr_fri_bridge::loadJointLimits(std::string(DESCRIPTION_DIR) + "/config/joint_limits.yaml");
+  coglab_rt::ArmMailboxes mailboxes;
+  const coglab_rt::JointLimits limits =
+      coglab_rt::loadJointLimits(std::string(DESCRIPTION_DIR) + "/config/joint_limits.yaml");
   ctrl_more::Logger logger;
   ManagerSettings settings =
       readManagerSettings(YAML::Load("{overrun_time: 0.0}"),
@@ -79,11 +80,11 @@ TEST(ControlThread, TimeGoesOnWhileMeasurementsAreLost) {
   ASSERT_TRUE(
       manager.feedback().addController(std::make_unique<Timer>(passed_ns), "timer", entry).ok());
   ASSERT_TRUE(manager.feedback().setProfile("dmp", {"timer"}).ok());
-  Robot robot(port);
+  Robot robot(mailboxes);
   ControlThreadOptions options;
   options.priority = 0;
   options.after_cycle = [&robot](const VelocityCommand&) { ++robot.cycles_run; };
-  ControlThread thread(manager.cycle(), port, options);
+  ControlThread thread(manager.cycle(), mailboxes, options);
   thread.start();
   std::string type;
   ASSERT_TRUE(VirtualRobot::ok(manager.load("dmp", "coglab/DmpController")));

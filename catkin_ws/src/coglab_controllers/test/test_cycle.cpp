@@ -8,6 +8,7 @@
 #include <cstdlib>
 #include <thread>
 
+#include "coglab_rt/joint_limits_table.hpp"
 #include "system_calls.hpp"
 #include "virtual_robot.hpp"
 
@@ -84,7 +85,7 @@ TEST(Cycle, TheCounterOfSystemCallsCounts) {
 TEST(Cycle, NeitherAllocatesNorLocksWhileServicesAreCalled) {
   constexpr std::uint64_t kCycles = 100000;
   const auto limits =
-      lwr_fri_bridge::loadJointLimits(std::string(DESCRIPTION_DIR) + "/config/joint_limits.yaml");
+      coglab_rt::loadJointLimits(std::string(DESCRIPTION_DIR) + "/config/joint_limits.yaml");
   ctrl_more::Logger logger;
   FrameTable frames;
   ManagerSettings settings = readManagerSettings(
@@ -105,7 +106,7 @@ TEST(Cycle, NeitherAllocatesNorLocksWhileServicesAreCalled) {
     sample.position << -1.4349, -0.6086, 1.4986, 1.7048, 0.1857, 0.2152, 0.782;
     sample.commanded_position = sample.position;
     sample.cycle_time = 0.005;
-    sample.block = lwr_fri_bridge::MotionBlock::None;
+    sample.block = coglab_rt::MotionBlock::None;
     VelocityCommand command;
     calls_counted = SystemCalls::enable();
     while (!stop) {
@@ -166,13 +167,13 @@ TEST(Cycle, NeitherAllocatesNorLocksWhileServicesAreCalled) {
     count(manager.switchTo("ptp", type).success);
     const double turn = 0.1 * (round % 3);
     for (int i = 0; i < 3; ++i) {
-      count(ptp.add({{-1.4 + turn, -0.6, 1.5, 1.7, 0.2, 0.2, 0.8}, {}, {}}).ptp_id >= 0);
+      count(ptp.add({{-1.4 + turn, -0.6, 1.5, 1.7, 0.2, 0.2, 0.8}, {}, {}}).id >= 0);
     }
     count(manager.feedback().disable("limits", true).ok());
     IkDebugRecord record;
     while (dmp.readIkDebug(record)) {
     }
-    PtpEnd end;
+    EndedMotion end;
     while (ptp.readEnd(end)) {
     }
     manager.report();

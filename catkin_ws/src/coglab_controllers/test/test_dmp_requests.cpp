@@ -74,8 +74,8 @@ TEST(DmpRequests, RefusesBadRequestsAndKeepsMoving) {
         EXPECT_NE(answer.message.find("goal_frame 'human_hand'"), std::string::npos);
       },
       [&] {
-        PtpAnswer answer = robot.ptp().add({std::vector<double>(7, 0.0), {}, {}});
-        EXPECT_EQ(answer.status, PtpAnswer::kRejected);
+        MotionAnswer answer = robot.ptp().add({std::vector<double>(7, 0.0), {}, {}});
+        EXPECT_EQ(answer.status, MotionAnswer::kRejected);
         EXPECT_NE(answer.message.find("active is 'dmp'"), std::string::npos) << answer.message;
       },
       [&] {
@@ -116,8 +116,8 @@ TEST(DmpRequests, RequestsToAnInactiveControllerNameTheActiveOne) {
   EXPECT_TRUE(refused(robot.dmp().execute(robot.reach()), words));
   EXPECT_TRUE(refused(robot.dmp().switchDmp(robot.reach()), words));
   robot.switchTo("dmp");
-  const PtpAnswer answer = robot.ptp().add({std::vector<double>(7, 0.0), {}, {}});
-  EXPECT_EQ(answer.status, PtpAnswer::kRejected);
+  const MotionAnswer answer = robot.ptp().add({std::vector<double>(7, 0.0), {}, {}});
+  EXPECT_EQ(answer.status, MotionAnswer::kRejected);
   EXPECT_NE(answer.message.find("'ptp' is not active; active is 'dmp'"), std::string::npos)
       << answer.message;
   EXPECT_TRUE(refused(robot.dmp().switchDmp(robot.reach()), {"no motion", "execute_dmp"}));

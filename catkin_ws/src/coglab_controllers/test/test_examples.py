@@ -9,9 +9,6 @@ from pathlib import Path
 
 import pytest
 
-pytest.importorskip("coglab_controllers", reason="coglab_controllers is not built or the environment not sourced")
-pytest.importorskip("matplotlib", reason="python3-matplotlib is not installed")
-
 PACKAGE = Path(__file__).resolve().parent.parent
 EXAMPLES = sorted((PACKAGE / "examples").glob("[0-9][0-9]_*.py"))
 

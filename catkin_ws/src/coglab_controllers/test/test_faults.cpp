@@ -3,6 +3,7 @@
 #include <chrono>
 #include <thread>
 
+#include "coglab_rt/joint_limits_table.hpp"
 #include "virtual_robot.hpp"
 
 namespace coglab_controllers {
@@ -73,7 +74,7 @@ TEST_P(Fault, GivesZeroVelocityItsReasonAndALivingManager) {
   EXPECT_EQ(welcome.code, ReasonCode::ControllerFault);
   robot.switchTo("ptp");
   EXPECT_EQ(robot.ptp().add({{-1.3, -0.6, 1.5, 1.7, 0.2, 0.2, 0.8}, {}, {}}).status,
-            PtpAnswer::kStarted);
+            MotionAnswer::kStarted);
   robot.tick();
   robot.tick();
   EXPECT_GT(robot.command.velocity.norm(), 0.0);
@@ -88,8 +89,8 @@ INSTANTIATE_TEST_SUITE_P(Faults, Fault,
                                            std::make_pair("nan", "not finite")));
 
 TEST(Faults, OverrunsInARowFaultTheControllerAndSinglesDoNot) {
-  const lwr_fri_bridge::JointLimits limits =
-      lwr_fri_bridge::loadJointLimits(std::string(DESCRIPTION_DIR) + "/config/joint_limits.yaml");
+  const coglab_rt::JointLimits limits =
+      coglab_rt::loadJointLimits(std::string(DESCRIPTION_DIR) + "/config/joint_limits.yaml");
   ctrl_more::Logger logger;
   // `slow` spins for 20 ms in each cycle but every fifth; the sixth time it does not stop any more.
   ManagerSettings settings = readManagerSettings(
@@ -111,7 +112,7 @@ TEST(Faults, OverrunsInARowFaultTheControllerAndSinglesDoNot) {
   RobotSample sample;
   sample.position << -1.4349, -0.6086, 1.4986, 1.7048, 0.1857, 0.2152, 0.782;
   sample.commanded_position = sample.position;
-  sample.block = lwr_fri_bridge::MotionBlock::None;
+  sample.block = coglab_rt::MotionBlock::None;
   VelocityCommand command;
   const auto run = [&] {
     ++sample.sequence;
@@ -166,8 +167,8 @@ class Slow : public ctrl_more::FeedbackController {
 };
 
 TEST(Faults, TheTimeOfASlowFeedbackControllerIsNotChargedToTheMotionController) {
-  const lwr_fri_bridge::JointLimits limits =
-      lwr_fri_bridge::loadJointLimits(std::string(DESCRIPTION_DIR) + "/config/joint_limits.yaml");
+  const coglab_rt::JointLimits limits =
+      coglab_rt::loadJointLimits(std::string(DESCRIPTION_DIR) + "/config/joint_limits.yaml");
   ctrl_more::Logger logger;
   ManagerSettings settings = readManagerSettings(
       YAML::Load("{odd: {fault: none}, overrun_time: 0.015, " + kTypes + "}"),
@@ -190,7 +191,7 @@ TEST(Faults, TheTimeOfASlowFeedbackControllerIsNotChargedToTheMotionController) 
   RobotSample sample;
   sample.position << -1.4349, -0.6086, 1.4986, 1.7048, 0.1857, 0.2152, 0.782;
   sample.commanded_position = sample.position;
-  sample.block = lwr_fri_bridge::MotionBlock::None;
+  sample.block = coglab_rt::MotionBlock::None;
   VelocityCommand command;
   for (int i = 0; i < 12; ++i) {
     ++sample.sequence;

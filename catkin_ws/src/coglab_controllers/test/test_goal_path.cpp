@@ -8,13 +8,16 @@
 #include <ros/time.h>
 #include <tf2_msgs/TFMessage.h>
 
-#include "coglab_controllers/ros/ros_clocks.hpp"
 #include "coglab_controllers/ros/tf_goal_source.hpp"
 #include "coglab_controllers/ros/tf_listener.hpp"
+#include "coglab_rt/ros/ros_time.hpp"
 #include "virtual_robot.hpp"
 
 namespace coglab_controllers {
 namespace {
+
+using coglab_rt::nanoseconds;
+using coglab_rt::toSteady;
 
 const Vector3 kGoal(0.80, 0.0, 0.45);
 const Vector3 kOutlier = kGoal + Vector3(0.0, -0.5, 0.0);

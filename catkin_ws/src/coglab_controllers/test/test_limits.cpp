@@ -3,8 +3,8 @@
 
 #include "coglab_controllers/limits/guard.hpp"
 #include "coglab_controllers/limits/phase_governor.hpp"
+#include "coglab_rt/interpolator.hpp"
 #include "core_support.hpp"
-#include "lwr_fri_bridge/interpolator.hpp"
 
 using namespace coglab_controllers;
 using namespace coglab_controllers::test;
@@ -74,7 +74,7 @@ TEST(Guard, AJointNeverReachesItsStopAtFullSpeed) {
   p.workspace = everywhere();
   p.hand_speed = p.elbow_speed = 0.0;
   Guard guard(p, robot());
-  lwr_fri_bridge::JointLimits limits;
+  coglab_rt::JointLimits limits;
   limits.lower_position = p.lower_position;
   limits.upper_position = p.upper_position;
   limits.velocity = p.velocity;
@@ -82,7 +82,7 @@ TEST(Guard, AJointNeverReachesItsStopAtFullSpeed) {
   limits.jerk = p.jerk;
   limits.torque.setOnes();
   for (int k = 0; k < 500; ++k) {
-    lwr_fri_bridge::Interpolator interpolator(limits);
+    coglab_rt::Interpolator interpolator(limits);
     interpolator.reset(random.posture(0.3));
     JointVector request = random.joints(3.0), last = JointVector::Zero();
     for (int i = 0; i < 800; ++i) {

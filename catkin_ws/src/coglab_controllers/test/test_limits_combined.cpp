@@ -2,7 +2,7 @@
 // joints' ranges keep to their path, arrive, and come to no fault.
 #include <random>
 
-#include "lwr_fri_bridge/braking.hpp"
+#include "coglab_rt/braking.hpp"
 #include "virtual_robot.hpp"
 
 namespace coglab_controllers {
@@ -24,7 +24,6 @@ class DelayedRobot : public VirtualRobot {
     now_ns += 5'000'000;
     ++sample.sequence;
     sample.stamp_ns = now_ns;
-    sample.cycle_time = period;
     if (active_dmp) dmp().pollGoal();
     manager->cycle().run(sample, period, command);
     JointVector velocity = command.velocity;
@@ -48,7 +47,7 @@ class DelayedRobot : public VirtualRobot {
   double least_room = 1.0;  // rad between set-point and the nearest end of a range
 
  private:
-  lwr_fri_bridge::BrakingGuard bound_;
+  coglab_rt::BrakingGuard bound_;
   JointVector arm_ = JointVector::Zero(), last_ = JointVector::Zero();
   std::mt19937 random_{5};
   std::normal_distribution<double> noise_{0.0, 5e-5};
@@ -114,9 +113,9 @@ TEST(LimitsCombined, WhatIsAcceptedNearTheEndsOfTheRangesIsReachedOnAStraightWay
       const std::vector<double> target(to.data(), to.data() + 7);
       const JointVector speed = uniform(random, 0.2, 1.0) * setup.limits.velocity;
       const JointVector acceleration = uniform(random, 0.1, 0.5) * setup.limits.acceleration;
-      const PtpAnswer answer = robot.ptp().add(
+      const MotionAnswer answer = robot.ptp().add(
           {target, {speed.data(), speed.data() + 7}, {acceleration.data(), acceleration.data() + 7}});
-      ASSERT_EQ(answer.status, PtpAnswer::kStarted) << answer.message;
+      ASSERT_EQ(answer.status, MotionAnswer::kStarted) << answer.message;
       const JointVector way = (to - from).normalized();
       for (int i = 0; i < 6000; ++i) {
         robot.tick();
@@ -143,7 +142,7 @@ TEST(LimitsCombined, ReachedIsSaidByTheArmAndNotByItsSetPoint) {
     robot.see("human_hand", goal);
     if (active == "ptp") {
       ASSERT_EQ(robot.ptp().add({{-1.0, -0.5, 1.2, 1.5, 0.3, 0.3, 0.6}, {}, {}}).status,
-                PtpAnswer::kStarted);
+                MotionAnswer::kStarted);
     } else {
       ASSERT_TRUE(VirtualRobot::ok(robot.dmp().execute(robot.reach())));
     }
@@ -180,7 +179,7 @@ TEST(LimitsCombined, ReachesUnderPushesNearTheEndsOfTheRangesComeToNoFault) {
     home[4] = uniform(random, -2.9, 2.9);  // a wrist near the end of its range
     home[6] = uniform(random, 0.0, 1.0) < 0.5 ? uniform(random, 2.6, 2.95)
                                               : uniform(random, -2.95, -2.6);
-    ASSERT_EQ(robot.ptp().add({home, {}, {}}).status, PtpAnswer::kStarted);
+    ASSERT_EQ(robot.ptp().add({home, {}, {}}).status, MotionAnswer::kStarted);
     for (int i = 0; i < 4000 && (i < 3 || robot.state() == MotionState::Running); ++i) robot.tick();
     robot.active_dmp = true;
     robot.switchTo("dmp");

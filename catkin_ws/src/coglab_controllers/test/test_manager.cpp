@@ -4,6 +4,7 @@
 #include <thread>
 
 #include "coglab_controllers/manager/control_thread.hpp"
+#include "coglab_rt/joint_limits_table.hpp"
 #include "virtual_robot.hpp"
 
 namespace coglab_controllers {
@@ -20,6 +21,8 @@ TEST(Manager, RefusesBadPluginsAndKeepsWhatIsThere) {
   EXPECT_TRUE(refused(manager.load("a", "test/Twin"), {"test/Misbehaving", "registered already"}));
   EXPECT_TRUE(refused(manager.load("a", "test/Twin"), {"registered already"}));  // and again
   EXPECT_TRUE(refused(manager.load("a", "test/Other"), {"has no type", "test/Misbehaving"}));
+  EXPECT_TRUE(refused(manager.load("a", "test/OtherAbi"),
+                      {"compiled for another coglab_controllers", "interface 2", "interface 1"}));
   EXPECT_TRUE(
       refused(manager.load("a", "my_lab/Unknown"), {"my_lab/Unknown", "coglab/DmpController"}));
   EXPECT_TRUE(refused(manager.load("dmp", "coglab/DmpController"), {"in use"}));
@@ -31,6 +34,17 @@ TEST(Manager, RefusesBadPluginsAndKeepsWhatIsThere) {
   EXPECT_EQ(types, (std::vector<std::string>{"coglab/DmpController", "coglab/PtpController",
                                              "test/Misbehaving"}));
   EXPECT_TRUE(VirtualRobot::ok(manager.load("odd2", "test/Misbehaving")));  // still makes new ones
+}
+
+TEST(Manager, TypesGoWithTheirLibraryAndComeBackWithIt) {
+  MotionTypes& types = MotionTypes::instance();
+  for (int i = 0; i < 2; ++i) {
+    const auto library =
+        ctrl_more::PluginLibrary::open(PLUGIN_DIR "/libcoglab_test_own_exception.so", types);
+    EXPECT_EQ(library->types(), std::vector<std::string>{"test/Throwing"});
+    EXPECT_NE(types.find("test/Throwing").controller, nullptr);
+  }
+  EXPECT_EQ(types.find("test/Throwing").controller, nullptr);
 }
 
 TEST(Manager, BadPluginsAndSwitchesLeaveARunningMotionAsItIs) {
@@ -102,19 +116,19 @@ TEST(Manager, SwitchInMotionBrakesWithoutAJumpAndReportsUnfinished) {
   VirtualRobot robot;
   robot.loadBoth("ptp");
   const std::vector<double> there = {-1.0, -0.5, 1.2, 1.5, 0.3, 0.3, 0.6};
-  EXPECT_EQ(robot.ptp().add({there, {}, {}}).ptp_id, 0);
-  const PtpAnswer queued = robot.ptp().add({there, {}, {}});
-  EXPECT_EQ(queued.status, PtpAnswer::kQueued);
+  EXPECT_EQ(robot.ptp().add({there, {}, {}}).id, 0);
+  const MotionAnswer queued = robot.ptp().add({there, {}, {}});
+  EXPECT_EQ(queued.status, MotionAnswer::kQueued);
   for (int i = 0; i < 100; ++i) robot.tick();
   ASSERT_GT(robot.command.velocity.norm(), 0.01);
   robot.switchTo("dmp");
   robot.tick();
   EXPECT_EQ(robot.command.velocity, JointVector::Zero().eval());  // the interpolator brakes
-  PtpEnd end;
+  EndedMotion end;
   std::vector<int> given_up;
   while (robot.ptp().readEnd(end)) {
     EXPECT_FALSE(end.executed);
-    given_up.push_back(end.ptp_id);
+    given_up.push_back(end.id);
   }
   EXPECT_EQ(given_up, (std::vector<int>{0, 1}));
   std::string type;
@@ -162,9 +176,9 @@ TEST(Manager, BlockedJointAbortsNamingIt) {
 }
 
 TEST(Manager, ControlThreadIdlesWithoutARobotAndSurvivesAStall) {
-  lwr_fri_bridge::ControlPort port;
-  const lwr_fri_bridge::JointLimits limits =
-      lwr_fri_bridge::loadJointLimits(std::string(DESCRIPTION_DIR) + "/config/joint_limits.yaml");
+  coglab_rt::ArmMailboxes mailboxes;
+  const coglab_rt::JointLimits limits =
+      coglab_rt::loadJointLimits(std::string(DESCRIPTION_DIR) + "/config/joint_limits.yaml");
   ctrl_more::Logger logger;
   ManagerSettings settings = readManagerSettings(
       YAML::Load("{odd: {fault: stall, after: 0}, plan_timeout: 0.3, " + kTypes + "}"),
@@ -173,7 +187,7 @@ TEST(Manager, ControlThreadIdlesWithoutARobotAndSurvivesAStall) {
   ControllerManager manager(std::move(settings));
   ControlThreadOptions options;
   options.priority = 0;
-  ControlThread thread(manager.cycle(), port, options);
+  ControlThread thread(manager.cycle(), mailboxes, options);
   thread.start();
   std::string type;
   EXPECT_TRUE(VirtualRobot::ok(manager.load("ptp", "coglab/PtpController")));  // no robot yet
@@ -189,12 +203,12 @@ TEST(Manager, ControlThreadIdlesWithoutARobotAndSurvivesAStall) {
     sample.position << -1.4349, -0.6086, 1.4986, 1.7048, 0.1857, 0.2152, 0.782;
     sample.commanded_position = sample.position;
     sample.cycle_time = 0.005;
-    sample.block = lwr_fri_bridge::MotionBlock::None;
+    sample.block = coglab_rt::MotionBlock::None;
     while (!stop) {
       ++sample.sequence;
       sample.controller_ns += 5'000'000;
       sample.stamp_ns = manager.now_ns();
-      port.publishSample(sample);
+      mailboxes.publishSample(sample);
       thread.wake(true);
       std::this_thread::sleep_for(std::chrono::milliseconds(5));
     }
@@ -239,8 +253,8 @@ class Probe : public ctrl_more::FeedbackController {
 };
 
 TEST(Manager, MotionAndItsFeedbackProfileBeginInTheSameCycle) {
-  const lwr_fri_bridge::JointLimits limits =
-      lwr_fri_bridge::loadJointLimits(std::string(DESCRIPTION_DIR) + "/config/joint_limits.yaml");
+  const coglab_rt::JointLimits limits =
+      coglab_rt::loadJointLimits(std::string(DESCRIPTION_DIR) + "/config/joint_limits.yaml");
   ctrl_more::Logger logger;
   ManagerSettings settings = readManagerSettings(
       YAML::Load("{" + kTypes + "}"), readText(std::string(DESCRIPTION_DIR) + "/urdf/lwr_ih2.urdf"),

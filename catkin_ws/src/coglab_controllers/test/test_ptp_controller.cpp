@@ -12,9 +12,9 @@ const std::vector<double> kThere = {-1.0, -0.5, 1.2, 1.5, 0.3, 0.3, 0.6};
 
 std::vector<int> executed(PtpController& ptp) {
   std::vector<int> ids;
-  PtpEnd end;
+  EndedMotion end;
   while (ptp.readEnd(end)) {
-    if (end.executed) ids.push_back(end.ptp_id);
+    if (end.executed) ids.push_back(end.id);
   }
   return ids;
 }
@@ -23,8 +23,8 @@ TEST(PtpController, EndsExactlyWithinItsLimitsAndReportsOnce) {
   VirtualRobot robot;
   robot.loadBoth("ptp");
   const std::vector<double> speed(7, 0.5), acceleration(7, 1.0);
-  const PtpAnswer answer = robot.ptp().add({kThere, speed, acceleration});
-  ASSERT_EQ(answer.status, PtpAnswer::kStarted) << answer.message;
+  const MotionAnswer answer = robot.ptp().add({kThere, speed, acceleration});
+  ASSERT_EQ(answer.status, MotionAnswer::kStarted) << answer.message;
   const JointVector start = robot.sample.position;
   const JointVector target = Eigen::Map<const JointVector>(kThere.data());
   JointVector before = JointVector::Zero();
@@ -42,7 +42,7 @@ TEST(PtpController, EndsExactlyWithinItsLimitsAndReportsOnce) {
   }
   EXPECT_EQ(robot.state(), MotionState::Reached);
   EXPECT_LT((robot.sample.position - target).lpNorm<Eigen::Infinity>(), 1e-6);
-  EXPECT_EQ(executed(robot.ptp()), std::vector<int>{answer.ptp_id});
+  EXPECT_EQ(executed(robot.ptp()), std::vector<int>{answer.id});
 }
 
 TEST(PtpController, QueueRunsInOrderAndRefusesWhenFull) {
@@ -52,12 +52,12 @@ TEST(PtpController, QueueRunsInOrderAndRefusesWhenFull) {
   std::vector<int> statuses, ids;
   for (int i = 0; i < 5; ++i) {
     target[0] = -1.0 + 0.05 * i;
-    const PtpAnswer answer = robot.ptp().add({target, {}, {}});
+    const MotionAnswer answer = robot.ptp().add({target, {}, {}});
     statuses.push_back(answer.status);
-    if (answer.status != PtpAnswer::kRejected) ids.push_back(answer.ptp_id);
+    if (answer.status != MotionAnswer::kRejected) ids.push_back(answer.id);
     if (i >= 3) {
       EXPECT_NE(answer.message.find("full"), std::string::npos) << answer.message;
-      EXPECT_EQ(answer.ptp_id, -1);
+      EXPECT_EQ(answer.id, -1);
     }
   }
   EXPECT_EQ(statuses, (std::vector<int>{0, 1, 1, 2, 2}));
@@ -70,9 +70,9 @@ TEST(PtpController, RejectsBadRequestsSayingWhy) {
   VirtualRobot robot;
   robot.loadBoth("ptp");
   const auto why = [&](const PtpRequest& request, const std::string& word) {
-    const PtpAnswer answer = robot.ptp().add(request);
-    EXPECT_EQ(answer.status, PtpAnswer::kRejected);
-    EXPECT_EQ(answer.ptp_id, -1);
+    const MotionAnswer answer = robot.ptp().add(request);
+    EXPECT_EQ(answer.status, MotionAnswer::kRejected);
+    EXPECT_EQ(answer.id, -1);
     EXPECT_NE(answer.message.find(word), std::string::npos) << answer.message;
   };
   std::vector<double> far = kThere, nan = kThere;
@@ -95,7 +95,7 @@ TEST(PtpController, SpeedScaleStretchesTheProfile) {
     robot.loadBoth("ptp");
     EXPECT_TRUE(robot.manager->setSpeedScale(scale).success);
     for (int i = 0; i < 200; ++i) robot.tick();
-    EXPECT_EQ(robot.ptp().add({kThere, {}, {}}).status, PtpAnswer::kStarted);
+    EXPECT_EQ(robot.ptp().add({kThere, {}, {}}).status, MotionAnswer::kStarted);
     int count = 0;
     for (; count < 5000 && robot.state() != MotionState::Reached; ++count) robot.tick();
     return count;
@@ -107,7 +107,7 @@ TEST(PtpController, SpeedScaleStretchesTheProfile) {
 TEST(PtpController, StandsStillAtScaleZeroAndGoesOn) {
   VirtualRobot robot;
   robot.loadBoth("ptp");
-  ASSERT_EQ(robot.ptp().add({kThere, {}, {}}).status, PtpAnswer::kStarted);
+  ASSERT_EQ(robot.ptp().add({kThere, {}, {}}).status, MotionAnswer::kStarted);
   for (int i = 0; i < 60; ++i) robot.tick();
   robot.manager->setSpeedScale(0.0);
   for (int i = 0; i < 300; ++i) robot.tick();
@@ -134,14 +134,14 @@ void during(VirtualRobot& robot, Request&& request) {
 }
 
 TEST(PtpController, AMotionThatRacesAHoldIsNeitherReportedAsExecutedNorMadeAfterReset) {
-  using lwr_fri_bridge::MotionBlock;
+  using coglab_rt::MotionBlock;
   for (const bool split : {false, true}) {
     VirtualRobot robot("", 0.005, false);
     during(robot, [&] { robot.loadBoth("ptp"); });
-    PtpAnswer first, second;
+    MotionAnswer first, second;
     during(robot, [&] { first = robot.ptp().add({kThere, {}, {}}); });
     for (int i = 0; i < 2000 && robot.state() != MotionState::Reached; ++i) robot.tick();
-    ASSERT_EQ(executed(robot.ptp()), std::vector<int>{first.ptp_id});
+    ASSERT_EQ(executed(robot.ptp()), std::vector<int>{first.id});
     // The request is checked while the arm may move, and taken over by the first cycle that sees
     // the hold.
     std::thread request([&] { second = robot.ptp().add({{0, 0, 0, 1, 0, 0, 0}, {}, {}}); });
@@ -154,7 +154,7 @@ TEST(PtpController, AMotionThatRacesAHoldIsNeitherReportedAsExecutedNorMadeAfter
     if (!split) ++robot.sample.motion_epoch;  // a robot behind topics counts the hold alone
     robot.sample.block = MotionBlock::None;
     for (int i = 0; i < 200; ++i) robot.tick();
-    EXPECT_EQ(second.status, PtpAnswer::kRejected);
+    EXPECT_EQ(second.status, MotionAnswer::kRejected);
     EXPECT_TRUE(second.code == ReasonCode::TooLate || second.code == ReasonCode::Held);
     EXPECT_TRUE(executed(robot.ptp()).empty());
     EXPECT_EQ(robot.sample.position, stood);
@@ -172,8 +172,8 @@ TEST(PtpController, RandomMotionsEndExactly) {
       const double random = 2.0 * std::rand() / RAND_MAX - 1.0;
       target[joint] = random * 0.6 * robot.limits.upper_position[joint];
     }
-    const PtpAnswer answer = robot.ptp().add({target, std::vector<double>(7, 1.5), {}});
-    if (answer.status == PtpAnswer::kRejected) {
+    const MotionAnswer answer = robot.ptp().add({target, std::vector<double>(7, 1.5), {}});
+    if (answer.status == MotionAnswer::kRejected) {
       ++rejected;
       continue;
     }

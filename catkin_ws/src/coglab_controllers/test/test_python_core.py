@@ -6,10 +6,9 @@ import ast
 import csv
 from pathlib import Path
 
+import coglab_controllers as cc
 import numpy as np
 import pytest
-
-cc = pytest.importorskip("coglab_controllers", reason="coglab_controllers is not built or the environment not sourced")
 
 PACKAGE = Path(__file__).resolve().parent.parent
 GOLDEN = PACKAGE / "test" / "golden"

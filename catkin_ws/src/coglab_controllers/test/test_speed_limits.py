@@ -5,11 +5,9 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
+import coglab_controllers as cc
 import numpy as np
 import pytest
-
-cc = pytest.importorskip("coglab_controllers", reason="coglab_controllers is not built or the environment not sourced")
-pytest.importorskip("coglab_sim._virtual", reason="coglab_sim is not built")
 
 PACKAGE = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(PACKAGE / "bench"))

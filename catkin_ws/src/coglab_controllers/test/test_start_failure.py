@@ -19,7 +19,8 @@ SOURCES = PACKAGE.parent
 WATCHED = [PACKAGE / "src" / "ros" / "robot_node.cpp", PACKAGE / "src" / "ros" / "manager_ros.cpp",
            PACKAGE / "src" / "manager" / "control_thread.cpp",
            *(SOURCES / "lwr_fri_bridge" / "src" / name for name in (
-               "bridge_ros.cpp", "bridge_diagnostics.cpp", "bridge_parameters.cpp", "fri_thread.cpp"))]
+               "ros/bridge_ros.cpp", "ros/bridge_diagnostics.cpp", "ros/bridge_parameters.cpp",
+               "bridge/fri_thread.cpp"))]
 
 sys.path.insert(0, str(SOURCES / "lwr_fri_bridge" / "test"))
 
@@ -29,9 +30,10 @@ def robot_node(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("sanitized")
     devel = Path(os.environ["CMAKE_PREFIX_PATH"].split(":")[0])
     flags = ["-std=c++17", "-O1", "-g1", "-fsanitize=address", "-fno-omit-frame-pointer"]
-    includes = [f"-I{SOURCES / name / 'include'}" for name in ("coglab_controllers", "ctrl_more", "lwr_fri_bridge")]
-    includes += [f"-I{SOURCES / 'lwr_fri_bridge' / 'src'}", f"-I{SOURCES / 'coglab_controllers' / 'src' / 'ros'}",
-                 f"-isystem{devel / 'include'}", "-isystem/usr/include/eigen3"]
+    packages = ("coglab_controllers", "coglab_rt", "ctrl_more", "lwr_fri_bridge")
+    includes = [f"-I{SOURCES / name / 'include'}" for name in packages]
+    includes += [f"-I{SOURCES / name / 'src' / 'ros'}" for name in ("lwr_fri_bridge", "coglab_controllers")]
+    includes += [f"-isystem{devel / 'include'}", "-isystem/usr/include/eigen3"]
     objects = []
     for source in WATCHED:
         objects.append(folder / f"{source.stem}.o")
@@ -39,8 +41,8 @@ def robot_node(tmp_path_factory: pytest.TempPathFactory) -> Path:
                                capture_output=True, text=True, timeout=600)
         assert built.returncode == 0, built.stderr[-3000:]
     libraries = [f"-L{devel / 'lib'}", f"-Wl,-rpath,{devel / 'lib'}", "-lcoglab_controllers_ros",
-                 "-lcoglab_controllers_plugins", "-lcoglab_controllers_manager", "-lcoglab_controllers_core",
-                 "-lctrl_more", "-llwr_fri_bridge_ros", "-llwr_fri_bridge"]
+                 "-lcoglab_ideal_arm", "-lcoglab_controllers_plugins", "-lcoglab_controllers_manager",
+                 "-lcoglab_controllers_core", "-lctrl_more", "-llwr_fri_bridge_ros", "-llwr_fri_bridge"]
     system = subprocess.run(["pkg-config", "--libs", "roscpp", "tf2_ros", "diagnostic_updater", "roslib"],
                             capture_output=True, text=True, timeout=60).stdout.split()
     built = subprocess.run(["g++", *flags, "-o", str(folder / "robot_node"), *map(str, objects), *libraries, *system,

@@ -6,9 +6,7 @@ from pathlib import Path
 
 import pytest
 import yaml
-
-msg = pytest.importorskip("coglab_msgs.msg", reason="coglab_msgs is not built or the environment not sourced")
-srv = pytest.importorskip("coglab_msgs.srv", reason="coglab_msgs is not built or the environment not sourced")
+from coglab_msgs import msg, srv
 
 CONFIG = Path(__file__).resolve().parent.parent / "config" / "controllers.yaml"
 

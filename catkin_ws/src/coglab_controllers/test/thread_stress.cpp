@@ -15,6 +15,7 @@
 #include "coglab_controllers/manager/controller_manager.hpp"
 #include "coglab_controllers/plugins/dmp_controller.hpp"
 #include "coglab_controllers/plugins/ptp_controller.hpp"
+#include "coglab_rt/joint_limits_table.hpp"
 
 namespace {
 
@@ -80,7 +81,7 @@ int main(int argc, char** argv) {
       "stress/Dmp", {[]() -> MotionController* { return new DmpController(); }, nullptr});
   MotionTypes::instance().insert(
       "stress/Ptp", {[]() -> MotionController* { return new PtpController(); }, nullptr});
-  const auto table = lwr_fri_bridge::loadJointLimits(description + "/config/joint_limits.yaml");
+  const auto table = coglab_rt::loadJointLimits(description + "/config/joint_limits.yaml");
   ManagerSettings settings =
       readManagerSettings(YAML::Load("{dmp: {enable_ik_debug: true, goal_lost_time: 0}}"),
                           readText(description + "/urdf/lwr_ih2.urdf"), table, false);
@@ -97,28 +98,28 @@ int main(int argc, char** argv) {
   manager.feedback().setProfile("dmp", {"shift"});
   manager.feedback().setProfile("ptp", {});
 
-  lwr_fri_bridge::ControlPort port;
+  coglab_rt::ArmMailboxes mailboxes;
   ControlThreadOptions options;
   options.priority = 0;
   options.stack_bytes = 16 * 1024 * 1024;  // the sanitizers take part of it
-  ControlThread control(manager.cycle(), port, options);
+  ControlThread control(manager.cycle(), mailboxes, options);
   control.start();
   std::atomic<bool> stop{false};
   std::thread robot([&] {
     RobotSample sample;
     sample.position << -1.4349, -0.6086, 1.4986, 1.7048, 0.1857, 0.2152, 0.782;
     sample.cycle_time = 0.005;
-    sample.block = lwr_fri_bridge::MotionBlock::None;
+    sample.block = coglab_rt::MotionBlock::None;
     VelocityCommand command;
     while (!stop) {
-      port.takeVelocity(command);
+      mailboxes.takeVelocity(command);
       sample.position += 0.002 * command.velocity;
       sample.commanded_position = sample.position;
       sample.commanded_velocity = sample.velocity = command.velocity;
       ++sample.sequence;
       sample.controller_ns += 5'000'000;
       sample.stamp_ns = manager.now_ns();
-      port.publishSample(sample);
+      mailboxes.publishSample(sample);
       control.wake(true);
       std::this_thread::sleep_for(std::chrono::milliseconds(1));
     }
@@ -161,7 +162,7 @@ int main(int argc, char** argv) {
         }
         case 4:
           note(ptp.add({{-1.4 + 0.05 * (random() % 5), -0.6, 1.5, 1.7, 0.2, 0.2, 0.8}, {}, {}})
-                   .ptp_id >= 0);
+                   .id >= 0);
           break;
         case 5:
           note(manager.setSpeedScale(0.25 * (random() % 6)).success);
@@ -194,7 +195,7 @@ int main(int argc, char** argv) {
   std::thread publisher([&] {  // what the publisher thread of the node does
     DmpProgress progress;
     IkDebugRecord record;
-    PtpEnd end;
+    EndedMotion end;
     while (!stop) {
       dmp.pollGoal();
       dmp.readProgress(progress);

@@ -3,19 +3,15 @@
 #pragma once
 
 #include <cstdint>
-#include <fstream>
 #include <map>
-#include <memory>
-#include <sstream>
 #include <string>
 #include <vector>
 
 #include <gtest/gtest.h>
 
-#include "coglab_controllers/manager/controller_manager.hpp"
 #include "coglab_controllers/plugins/dmp_controller.hpp"
 #include "coglab_controllers/plugins/ptp_controller.hpp"
-#include "lwr_fri_bridge/interpolator.hpp"
+#include "coglab_controllers/testing/virtual_arm.hpp"
 
 namespace coglab_controllers {
 
@@ -23,7 +19,8 @@ namespace coglab_controllers {
 inline const std::string kTypes =
     "types: {test/Misbehaving: libcoglab_test_misbehaving.so, test/Twin: "
     "libcoglab_test_twin.so, test/Empty: libcoglab_test_empty.so, test/Missing: libnowhere.so, "
-    "test/Other: libcoglab_test_misbehaving.so, test/Throwing: libcoglab_test_own_exception.so}, "
+    "test/Other: libcoglab_test_misbehaving.so, test/Throwing: libcoglab_test_own_exception.so, "
+    "test/OtherAbi: libcoglab_test_other_abi.so}, "
     "plugin_paths: [" PLUGIN_DIR "]";
 
 /// Frames as a table.
@@ -42,43 +39,12 @@ class FrameTable : public GoalSource {
   std::map<std::string, GoalObservation> frames;
 };
 
-inline std::string readText(const std::string& path) {
-  std::ifstream file(path);
-  std::ostringstream text;
-  text << file.rdbuf();
-  return text.str();
-}
-
-/// Manager, robot and clock. The robot follows velocities as `follow` says; by default at once and
-/// exactly.
-class VirtualRobot {
+/// A virtual arm with the two plug-ins of this package and a table of frames.
+class VirtualRobot : public VirtualArm {
  public:
-  /// @param lockstep false: requests wait until another thread calls tick()
-  explicit VirtualRobot(const std::string& parameters = "", double period = 0.005,
+  explicit VirtualRobot(const std::string& parameters = "", double cycle = 0.005,
                         bool lockstep = true)
-      : period(period) {
-    limits =
-        lwr_fri_bridge::loadJointLimits(std::string(DESCRIPTION_DIR) + "/config/joint_limits.yaml");
-    ManagerSettings settings = readManagerSettings(
-        YAML::Load(parameters), readText(std::string(DESCRIPTION_DIR) + "/urdf/lwr_ih2.urdf"),
-        limits, lockstep);
-    settings.cycle.overrun_time = 0.0;
-    settings.clock = [this] { return now_ns; };
-    settings.plan_timeout = 0.3;
-    settings.logger = &logger;
-    manager = std::make_unique<ControllerManager>(std::move(settings));
-    sample.position << -1.4349, -0.6086, 1.4986, 1.7048, 0.1857, 0.2152, 0.782;
-    sample.commanded_position = sample.position;
-    sample.block = lwr_fri_bridge::MotionBlock::None;
-    sample.cycle_time = period;
-    tick();
-  }
-
-  /// From now on the arm follows within its acceleration and jerk limits, as the bridge has it.
-  void followWithinLimits() {
-    interpolator = std::make_unique<lwr_fri_bridge::Interpolator>(limits);
-    interpolator->reset(sample.position);
-  }
+      : VirtualArm(DESCRIPTION_DIR, parameters, cycle, lockstep) {}
 
   /// Both plug-ins, the library of the package, and `active`.
   void loadBoth(const std::string& active = "dmp") {
@@ -114,40 +80,6 @@ class VirtualRobot {
     frames.frames[frame] = observation;
   }
 
-  /// One measurement and one cycle; the robot then follows for one period.
-  const VelocityCommand& tick() {
-    now_ns += static_cast<std::int64_t>(period * 1e9);
-    ++sample.sequence;
-    sample.stamp_ns = now_ns;
-    if (MotionController* motion = manager->motion("dmp")) {
-      static_cast<DmpController*>(motion)->pollGoal();
-    }
-    manager->cycle().run(sample, period, command);
-    if (sample.block != lwr_fri_bridge::MotionBlock::None) command.velocity.setZero();
-    if (interpolator) {
-      interpolator->step(command.velocity, period);
-      sample.position = interpolator->position();
-      sample.velocity = sample.commanded_velocity = interpolator->velocity();
-      sample.commanded_acceleration = interpolator->acceleration();
-      sample.commanded_position = sample.position;
-      return command;
-    }
-    sample.commanded_acceleration = (command.velocity - sample.commanded_velocity) / period;
-    sample.position += period * command.velocity;
-    sample.velocity = command.velocity;
-    sample.commanded_velocity = command.velocity;
-    sample.commanded_position = sample.position;
-    return command;
-  }
-
-  Pose hand() const { return manager->settings().robot->chain.evaluate(sample.position).tool; }
-  Vector3 handVelocity() const {
-    const ChainState state = manager->settings().robot->chain.evaluate(sample.position);
-    return (state.jacobian * sample.velocity).head<3>();
-  }
-  MotionState state() const { return manager->report().motion; }
-  std::string reason() const { return manager->report().reason.str(); }
-
   DmpRequest reach(const std::string& primitive = "reach_human") const {
     DmpRequest request;
     request.primitive_id = primitive;
@@ -155,15 +87,14 @@ class VirtualRobot {
     return request;
   }
 
-  double period;
-  std::int64_t now_ns = 1'000'000'000;
-  lwr_fri_bridge::JointLimits limits;
   FrameTable frames;
-  ctrl_more::Logger logger;  // without sinks
-  std::unique_ptr<ControllerManager> manager;
-  std::unique_ptr<lwr_fri_bridge::Interpolator> interpolator;  // null: velocities count at once
-  RobotSample sample;
-  VelocityCommand command;
+
+ private:
+  void beforeCycle() override {
+    if (MotionController* motion = manager->motion("dmp")) {
+      static_cast<DmpController*>(motion)->pollGoal();
+    }
+  }
 };
 
 /// A refusal whose sentence has all these words.

@@ -17,6 +17,7 @@ from coglab_msgs.msg import Recognition
 from coglab_perception.frames import FrameNames
 from coglab_perception.recogniser import CLOCK_JUMP, Recogniser, load_patterns
 from coglab_perception.tf_listener import TfListener
+from coglab_py import parameters
 
 
 class RecogniserNode:
@@ -25,12 +26,12 @@ class RecogniserNode:
     def __init__(self) -> None:
         frames = FrameNames.from_mapping(rospy.get_param("perception/frames", None),
                                          rospy.resolve_name("perception/frames"))
-        path = rospy.get_param("~patterns", "")
+        path = parameters.read("~patterns", str, "")
         if not path:
             raise ValueError(f"{rospy.resolve_name('~patterns')} is not set: give the path of a "
                              "pattern file (train_patterns.py writes them)")
         patterns, settings = load_patterns(path)
-        memory = float(rospy.get_param("~memory", settings.memory))
+        memory = parameters.read("~memory", float, settings.memory, 0.0)
         self.recogniser = Recogniser(patterns, dataclasses.replace(settings, memory=memory))
         self.hand, self.base = frames.human_hand, frames.world
         self.buffer = tf2_ros.Buffer(rospy.Duration(2.0))

@@ -4,6 +4,8 @@
 #include <functional>
 #include <stdexcept>
 
+#include "coglab_sim/ranges.hpp"
+
 namespace coglab_sim {
 namespace {
 
@@ -26,12 +28,11 @@ Fault faultOf(const std::string& kind, double value) {
             [](Cell& cell) { cell.setLoss(0.0, 0.0); }};
   }
   if (kind == "lose_packets") {
-    if (value < 0.0 || value > 1e6)
-      throw std::invalid_argument("lose_packets: value must lie in 0 .. 1e6");
+    requireWithin("fault/lose_packets", value);
     return {[value](Cell& cell) { cell.loseNext(static_cast<int>(value)); }, {}};
   }
   if (kind == "silence") {
-    if (value < 0.0) throw std::invalid_argument("silence: value must be a duration in s");
+    requireWithin("fault/silence", value);
     return {[value](Cell& cell) { cell.controller().setSilent(value); }, {}};
   }
   if (kind == "drive_error") {

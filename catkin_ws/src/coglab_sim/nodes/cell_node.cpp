@@ -9,7 +9,6 @@
 /// of the parent namespace.
 #include <fstream>
 #include <memory>
-#include <sstream>
 
 #include <coglab_msgs/CellTruth.h>
 #include <coglab_msgs/FingerContact.h>
@@ -17,6 +16,7 @@
 #include <coglab_msgs/HumanHand.h>
 #include <coglab_msgs/InjectFault.h>
 #include <coglab_msgs/PlaceObject.h>
+#include <coglab_msgs/ReasonCode.h>
 #include <geometry_msgs/Wrench.h>
 #include <ros/ros.h>
 #include <rosgraph_msgs/Clock.h>
@@ -25,8 +25,8 @@
 #include "cell_faults.hpp"
 #include "cell_messages.hpp"
 #include "cell_parameters.hpp"
+#include "coglab_rt/ros/logger_service.hpp"
 #include "coglab_sim/real_time_cell.hpp"
-#include "lwr_fri_bridge/logger_service.hpp"
 
 namespace coglab_sim {
 namespace {
@@ -45,18 +45,15 @@ std::uint16_t publishedPort(const std::string& parameter) {
   return static_cast<std::uint16_t>(port);
 }
 
-/// A private parameter within its range. @throws std::invalid_argument naming parameter, value and
-/// range.
+/// A private parameter within the range of its name. @throws std::invalid_argument naming
+/// parameter, value and range.
 template <typename T>
-T within(const ros::NodeHandle& node, const char* name, T otherwise, double low, double high) {
+T within(const ros::NodeHandle& node, const char* name, T otherwise) {
   T value = otherwise;
   if (node.hasParam(name) && !node.getParam(name, value))
     throw std::invalid_argument("parameter " + node.resolveName(name) + ": expected a number");
-  if (value >= low && value <= high) return value;
-  std::ostringstream text;
-  text << "parameter " << node.resolveName(name) << " = " << value << " is outside its range "
-       << low << ".." << high;
-  throw std::invalid_argument(text.str());
+  requireWithin(rangeOf(name), node.resolveName(name), value);
+  return value;
 }
 
 /// Waits for it. @throws std::runtime_error after `limit` s or at shutdown.
@@ -75,16 +72,15 @@ std::uint16_t waitForPort(const std::string& parameter, double limit) {
 class CellNode {
  public:
   CellNode() : private_("~"), config_(readCellConfig(private_)) {
-    int port = within(private_, "fri_port", 0, 0, 65535);
-    const double speed = within(private_, "speed", 1.0, 0.01, 100.0);
-    const double rate = within(private_, "truth_rate", 200.0, 1.0, 1000.0);
+    int port = within(private_, "fri_port", 0);
+    const double speed = within(private_, "speed", 1.0);
+    const double rate = within(private_, "truth_rate", 200.0);
     port_parameter_ =
         portParameter(private_.param<std::string>("port_parameter", "lwr/fri_port_bound"));
     follow_port_ = port == 0;
-    if (follow_port_)
-      port = waitForPort(port_parameter_, within(private_, "port_wait", 60.0, 0.0, 3600.0));
+    if (follow_port_) port = waitForPort(port_parameter_, within(private_, "port_wait", 60.0));
     const auto host = private_.param<std::string>("fri_host", "127.0.0.1");
-    const int source_port = within(private_, "fri_source_port", 0, 0, 65535);
+    const int source_port = within(private_, "fri_source_port", 0);
     cell_ = std::make_unique<RealTimeCell>(config_, host, static_cast<std::uint16_t>(port), speed,
                                            static_cast<std::uint16_t>(source_port));
     openLog(private_.param<std::string>("log_file", ""));
@@ -201,7 +197,11 @@ class CellNode {
       response.message = request.kind + " done";
       ROS_INFO("fault %s, value %g, duration %g s", request.kind.c_str(), request.value,
                request.duration);
+    } catch (const std::invalid_argument& error) {
+      response.reason_code = coglab_msgs::ReasonCode::INVALID_ARGUMENT;
+      response.message = error.what();
     } catch (const std::exception& error) {
+      response.reason_code = coglab_msgs::ReasonCode::UNEXPECTED;
       response.message = error.what();
     }
     return true;
@@ -224,7 +224,11 @@ class CellNode {
       config_.object = object;
       response.success = true;
       response.message = object.id + " placed: " + request.where;
+    } catch (const std::invalid_argument& error) {
+      response.reason_code = coglab_msgs::ReasonCode::INVALID_ARGUMENT;
+      response.message = error.what();
     } catch (const std::exception& error) {
+      response.reason_code = coglab_msgs::ReasonCode::UNEXPECTED;
       response.message = error.what();
     }
     return true;
@@ -294,7 +298,7 @@ class CellNode {
 int main(int argc, char** argv) {
   ros::init(argc, argv, "cell");
   const ros::NodeHandle keep;  // the last handle that goes would take the log along
-  lwr_fri_bridge::LoggerServices logger_services;
+  coglab_rt::LoggerServices logger_services;
   try {
     const coglab_sim::CellNode node;
     ros::spin();

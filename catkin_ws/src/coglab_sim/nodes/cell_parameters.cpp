@@ -2,7 +2,9 @@
 
 #include <ros/package.h>
 #include <ros/param.h>
+#include <yaml-cpp/yaml.h>
 
+#include <cmath>
 #include <stdexcept>
 
 namespace coglab_sim {
@@ -46,6 +48,12 @@ void take(CellConfig& config, const ros::NodeHandle& node, const std::string& ke
     setCellParameter(config, name, valueOf(node.resolveName(key), value));
 }
 
+double numberOf(const YAML::Node& entry, const char* field) {
+  const auto value = entry[field].as<double>(std::nan(""));
+  if (!std::isfinite(value)) throw std::invalid_argument(std::string(field) + ": expected a number");
+  return value;
+}
+
 }  // namespace
 
 CellConfig readCellConfig(const ros::NodeHandle& node) {
@@ -54,28 +62,34 @@ CellConfig readCellConfig(const ros::NodeHandle& node) {
   const ros::NodeHandle above;
   take(config, above, "fri_period", "krc/period");
   take(config, above, "seed", "seed");
+  config.object = readObject(node, node.param<std::string>("object/id", config.object.id));
+  config.object_pose.position[2] = -config.object.center[2];  // held at the height of its middle
   for (const CellParameter& parameter : cellParameters())
     take(config, node, parameter.name, parameter.name);
-  if (const std::string id = node.param<std::string>("start_object", ""); !id.empty()) {
-    config.object = readObject(node, id);
-    config.object_pose.position[2] = -config.object.center[2];  // held at the height of its middle
-  }
   return config;
 }
 
 ObjectParameters readObject(const ros::NodeHandle& node, const std::string& id) {
-  const std::string prefix = "objects/" + id + "/";
-  if (!node.hasParam("objects/" + id)) {
-    throw std::invalid_argument("object '" + id + "' has no parameters " +
-                                node.resolveName("objects/" + id) +
-                                " (mass, shape, size, center, friction, finger_contact)");
+  if (id.find('/') != std::string::npos)
+    throw std::invalid_argument("object id '" + id + "': expected the name of an object file");
+  const auto folder = node.param<std::string>(
+      "objects", ros::package::getPath("coglab_objects") + "/objects");
+  const std::string path = folder + "/" + id + ".yaml";
+  try {
+    const YAML::Node entry = YAML::LoadFile(path);
+    CellConfig config;
+    setCellParameter(config, "object/mass", numberOf(entry, "mass"));
+    setCellParameter(config, "object/friction", numberOf(entry, "friction"));
+    setCellParameter(config, "object/shape", entry["shape"]["type"].as<std::string>());
+    setCellParameter(config, "object/size", entry["size"].as<std::vector<double>>());
+    config.object.center = Vector3d(0.0, 0.0, config.object.size[2] / 2);
+    config.object.id = id;
+    return config.object;
+  } catch (const std::exception& error) {
+    throw std::invalid_argument("object '" + id + "': " + path + " cannot be used (" + error.what() +
+                                "); expected a file of the object database, ./coglab object check " +
+                                id);
   }
-  CellConfig config;
-  for (const char* field : {"mass", "shape", "size", "center", "friction", "finger_contact"}) {
-    take(config, node, prefix + field, std::string("object/") + field);
-  }
-  config.object.id = id;
-  return config.object;
 }
 
 }  // namespace coglab_sim

@@ -8,13 +8,14 @@
 
 namespace coglab_sim {
 
-/// Reads every row of the table that is set under `node`, besides the robot description's path (by
-/// default that of lwr_description), and `fri_period` and `seed` of the namespace above.
+/// Reads the file of the object that `object/id` names, then every row of the table that is set under
+/// `node`, besides the robot description's path (by default that of lwr_description), and
+/// `fri_period` and `seed` of the namespace above.
 /// @throws std::invalid_argument naming what is unknown or does not fit.
 CellConfig readCellConfig(const ros::NodeHandle& node);
 
-/// Parameters of an object from `objects/<id>` under `node`. @throws std::invalid_argument if there
-/// are none.
+/// Mass, size, shape and friction of an object from its file in the folder `objects`, a parameter
+/// under `node` (by default that of coglab_objects). @throws std::invalid_argument naming the file.
 ObjectParameters readObject(const ros::NodeHandle& node, const std::string& id);
 
 }  // namespace coglab_sim

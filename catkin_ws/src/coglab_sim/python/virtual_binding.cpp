@@ -34,10 +34,10 @@ py::dict dictOf(const coglab_controllers::CancelAnswer& answer) {
 
 py::list endsOf(coglab_controllers::PtpController& ptp) {
   py::list ends;
-  coglab_controllers::PtpEnd end;
+  coglab_controllers::EndedMotion end;
   while (ptp.readEnd(end)) {
     py::dict entry;
-    entry["ptp_id"] = end.ptp_id;
+    entry["ptp_id"] = end.id;
     entry["executed"] = end.executed;
     entry["reason_code"] = end.reason.number();
     entry["reason"] = end.reason.str();
@@ -74,8 +74,8 @@ py::dict reportOf(Robot& robot) {
   result["fault"] = report.fault;
   result["time_scale"] = report.time_scale;
   result["velocity"] = Vector7(report.velocity);
-  result["motion_allowed"] = sample.block == lwr_fri_bridge::MotionBlock::None;
-  result["blocked_by"] = std::string(lwr_fri_bridge::describe(sample.block));
+  result["motion_allowed"] = sample.block == coglab_rt::MotionBlock::None;
+  result["blocked_by"] = std::string(coglab_rt::describe(sample.block));
   result["position"] = Vector7(sample.position);
   result["measured_velocity"] = Vector7(sample.velocity);
   result["commanded_position"] = Vector7(sample.commanded_position);
@@ -201,7 +201,7 @@ PYBIND11_MODULE(_virtual, m) {
              const std::vector<double>& max_vel, const std::vector<double>& max_acc) {
             const auto answer = robot.ptp().add({position, max_vel, max_acc});
             robot.reason_code = static_cast<std::uint16_t>(answer.code);
-            return py::make_tuple(answer.status, answer.ptp_id, answer.message);
+            return py::make_tuple(answer.status, answer.id, answer.message);
           },
           py::arg("position"), py::arg("max_vel") = std::vector<double>(),
           py::arg("max_acc") = std::vector<double>(),
@@ -210,8 +210,8 @@ PYBIND11_MODULE(_virtual, m) {
           "finished_ptps",
           [](Robot& robot) {
             std::vector<std::pair<int, bool>> ends;
-            coglab_controllers::PtpEnd end;
-            while (robot.ptp().readEnd(end)) ends.emplace_back(end.ptp_id, end.executed);
+            coglab_controllers::EndedMotion end;
+            while (robot.ptp().readEnd(end)) ends.emplace_back(end.id, end.executed);
             return ends;
           },
           "[(ptp_id, executed)] of the motions that ended since the last call.")

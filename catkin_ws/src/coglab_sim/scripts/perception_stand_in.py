@@ -29,11 +29,13 @@ from coglab_msgs.srv import (
     LocateObjectResponse,
 )
 from coglab_perception.frames import FrameNames
+from coglab_py import parameters
+from coglab_py.messages import pose_message, pose_of
+from coglab_py.pose import Pose, about_z
 from coglab_sim.perception_stand_in import Board, PerceptionSettings, Sight
 from coglab_sim.recorded_motion import Playback, PlaybackSettings
-from coglab_sim.rigid import Frame, quat_from_rotvec
 from coglab_sim.vision import NotSeen, Vision
-from geometry_msgs.msg import Point, PoseStamped, Quaternion, TransformStamped, Vector3
+from geometry_msgs.msg import PoseStamped, Quaternion, TransformStamped, Vector3
 from std_msgs.msg import UInt8
 
 PLAYBACK_HZ = 100.0
@@ -43,37 +45,31 @@ OTHERS = [[1.05, 0.45, 0.35], [1.05, -0.45, 0.35]]
 """m, where the other people's hands are unless ~others says otherwise."""
 
 
-def frame_of(pose) -> Frame:
-    """geometry_msgs/Pose as a Frame."""
-    p, q = pose.position, pose.orientation
-    return Frame(np.array([p.x, p.y, p.z]), np.array([q.x, q.y, q.z, q.w]))
-
-
 class PerceptionNode:
     """Thin node over Vision and Playback."""
 
     def __init__(self) -> None:
         names = FrameNames.from_mapping(rospy.get_param("~frames", None),
                                         rospy.resolve_name("~frames"))
-        settings = dict(rospy.get_param("~settings", {}))
-        settings["perfect"] = bool(rospy.get_param("~perfect", settings.get("perfect", False)))
-        seed = int(rospy.get_param("~seed", rospy.get_param("coglab_sim/seed", 7)))
-        board = dict(rospy.get_param("~board"))
-        turn = quat_from_rotvec([0.0, 0.0, np.radians(float(board.get("yaw_deg", 0.0)))])
+        settings = parameters.read("~settings", dict, {})
+        settings["perfect"] = parameters.read("~perfect", bool, settings.get("perfect", False))
+        seed = parameters.read("~seed", int, parameters.read("coglab_sim/seed", int, 7))
+        board = parameters.read("~board", dict)
+        turn = about_z(np.radians(float(board.get("yaw_deg", 0.0))))
         self.vision = Vision(
             names, PerceptionSettings.from_mapping(settings),
-            Board(Frame(np.array(board["xyz"], dtype=float), turn),
+            Board(Pose(np.array(board["xyz"], dtype=float), turn),
                   {name: np.array(place, dtype=float) for name, place in board["slots"].items()}),
-            seed, rospy.get_time, float(rospy.get_param("~partner_margin", 0.0)))
-        self.others = [Frame(np.array(place, dtype=float))
+            seed, rospy.get_time, parameters.read("~partner_margin", float, 0.0, 0.0))
+        self.others = [Pose(np.array(place, dtype=float))
                        for place in rospy.get_param("~others", OTHERS)]
-        self.people = int(rospy.get_param("~people", 1))
+        self.people = parameters.read("~people", int, 1, 0, 255)
         self.truth: CellTruth | None = None
         self.broadcaster = tf2_ros.TransformBroadcaster()
         self.static = tf2_ros.StaticTransformBroadcaster()
         board_sight = Sight(names.board, rospy.get_time(), self.vision.board.frame)
         self.static.sendTransform(self.transform(board_sight))
-        recording = {"frame": names.human_hand, **dict(rospy.get_param("~recording", {}))}
+        recording = {"frame": names.human_hand, **parameters.read("~recording", dict, {})}
         playback = PlaybackSettings.from_mapping(recording)
         self.playback = None
         if playback.file:
@@ -110,9 +106,9 @@ class PerceptionNode:
         names, truth = self.vision.names, self.truth
         hand, robot, objects = None, None, {}
         if truth is not None:
-            hand, robot = frame_of(truth.human_hand), frame_of(truth.robot_hand)
+            hand, robot = pose_of(truth.human_hand), pose_of(truth.robot_hand)
             if truth.object_id:
-                objects[names.object_frame(truth.object_id)] = frame_of(truth.object)
+                objects[names.object_frame(truth.object_id)] = pose_of(truth.object)
         if self.playback:
             played = self.playback.frames(rospy.get_time(), robot)
             if names.human_hand in self.playback.names:
@@ -144,16 +140,18 @@ class PerceptionNode:
     def on_init(self, request):
         """Ready once the cell's world is visible."""
         try:
-            return InitVisionResponse(True, self.vision.init_vision(request.timeout))
+            return InitVisionResponse(success=True,
+                                      message=self.vision.init_vision(request.timeout))
         except NotSeen as reason:
-            return InitVisionResponse(False, str(reason))
+            return InitVisionResponse(False, reason.code, str(reason))
 
     def on_locate(self, request):
         """Newest sight of an object, of the partner's hand or of the board; else why not."""
         try:
             frame, sight, age = self.vision.locate(request.object_id, bounded(request.timeout))
         except NotSeen as reason:
-            return LocateObjectResponse(success=False, message=str(reason))
+            return LocateObjectResponse(success=False, reason_code=reason.code,
+                                        message=str(reason))
         return LocateObjectResponse(
             success=True, frame_id=frame, age=age,
             pose=pose(self.vision.names.world, sight.captured, sight.frame))
@@ -163,11 +161,10 @@ class PerceptionNode:
         try:
             places = self.vision.free_places(request.object_id, bounded(request.timeout))
         except NotSeen as reason:
-            return FreePlacesResponse(False, str(reason), [])
+            return FreePlacesResponse(False, reason.code, str(reason), [])
         return FreePlacesResponse(
-            True, ", ".join(name for name, _ in places),
-            [pose(self.vision.names.board, rospy.get_time(), Frame(place))
-             for _, place in places])
+            success=True, message=", ".join(name for name, _ in places),
+            places=[pose(self.vision.names.board, rospy.get_time(), Pose(place)) for _, place in places])
 
 
 def bounded(timeout: float) -> float:
@@ -175,13 +172,12 @@ def bounded(timeout: float) -> float:
     return min(max(timeout, 0.0), LONGEST_WAIT) if timeout == timeout else 0.0
 
 
-def pose(parent: str, stamp: float, frame: Frame) -> PoseStamped:
+def pose(parent: str, stamp: float, frame: Pose) -> PoseStamped:
     """PoseStamped of a frame."""
     message = PoseStamped()
     message.header.frame_id = parent
     message.header.stamp = rospy.Time.from_sec(stamp)
-    message.pose.position = Point(*frame.position)
-    message.pose.orientation = Quaternion(*frame.orientation)
+    message.pose = pose_message(frame)
     return message
 
 

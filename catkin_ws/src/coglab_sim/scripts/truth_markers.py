@@ -3,17 +3,22 @@
 
 Subscribes truth/cell. Publishes truth/markers (visualization_msgs/MarkerArray, 10 Hz) and truth/tf (tf2_msgs/TFMessage:
 frames truth/human_hand, truth/object_<id>, truth/robot_hand; a topic of its own, so that no tf listener of the control
-side can look them up). Names are relative to the node's namespace. Sizes come from the cell's parameters
-cell/objects/<id> and cell/object.
+side can look them up). Names are relative to the node's namespace. Sizes come from the object's file in the
+folder of the parameter cell/objects.
 """
 import sys
 import time
+from pathlib import Path
 
 import numpy as np
 import rospy
 from coglab_msgs.msg import CellTruth
-from coglab_sim.rigid import quat_rotate
+from coglab_objects.database import ObjectError, cell_parameters, objects_folder, read_object
+from coglab_py import parameters
+from coglab_py.messages import pose_message, pose_of
+from coglab_py.pose import Pose as Frame
 from geometry_msgs.msg import Point, Pose, Quaternion, TransformStamped, Vector3
+from scipy.spatial.transform import Rotation
 from std_msgs.msg import ColorRGBA
 from tf2_msgs.msg import TFMessage
 from visualization_msgs.msg import Marker, MarkerArray
@@ -86,26 +91,29 @@ class TruthMarkers:
         along = end - begin
         length = float(np.linalg.norm(along))
         marker = self.marker(truth, name, Marker.CYLINDER, at((begin + end) / 2), (width, width, length), colour)
-        x, y, z = along / max(length, 1e-9)
-        w = np.sqrt(max((1.0 + z) / 2.0, 0.0))  # half-angle form of the turn from z to `along`
-        marker.pose.orientation = Quaternion(-y / (2 * w), x / (2 * w), 0.0, w) if w > 1e-6 else Quaternion(1, 0, 0, 0)
+        x, y, z = along
+        # A cylinder lies along z: tilted about y by the angle to the vertical, then turned about the vertical.
+        turn = Rotation.from_euler("yz", [np.arctan2(np.hypot(x, y), z), np.arctan2(y, x)])
+        marker.pose.orientation = Quaternion(*turn.as_quat())
         return marker
 
     def object(self, truth: CellTruth) -> Marker:
         """The object in its shape; another colour once it has fallen."""
         shape = self.shape(truth.object_id)
-        p, q = truth.object.position, truth.object.orientation
-        x, y, z = quat_rotate((q.x, q.y, q.z, q.w), shape.get("center", (0.0, 0.0, 0.0)))
-        middle = Pose(Point(p.x + x, p.y + y, p.z + z), q)
-        marker = self.marker(truth, "object", KINDS.get(shape.get("shape"), Marker.CUBE), middle,
+        middle = pose_message(pose_of(truth.object) * Frame(np.array(shape.get("center", (0.0, 0.0, 0.0)))))
+        marker = self.marker(truth, "object", KINDS.get(str(shape.get("shape")), Marker.CUBE), middle,
                              shape.get("size", (0.08, 0.08, 0.1)), RED if truth.dropped else ORANGE)
         return marker
 
     def shape(self, object_id: str) -> dict:
-        """Shape, size and centre of an object in the cell's parameters."""
+        """Shape, size and centre of an object of the database."""
         if object_id not in self.shapes:
-            found = rospy.get_param(f"cell/objects/{object_id}", None) or rospy.get_param("cell/object", {})
-            self.shapes[object_id] = dict(found)
+            folder = Path(parameters.read("cell/objects", str, str(objects_folder())))
+            try:
+                self.shapes[object_id] = cell_parameters(read_object(folder / f"{object_id}.yaml")[0])
+            except ObjectError as error:
+                rospy.logwarn("truth markers: '%s' is drawn as a box: %s", object_id, error)
+                self.shapes[object_id] = {}
         return self.shapes[object_id]
 
     @staticmethod

@@ -5,45 +5,50 @@ Subscribes truth/cell (what a person sees and feels), human_command (std_msgs/St
 coglab/transitions of the namespace above this one (reacts by itself unless ~react is false). Publishes human_hand
 (coglab_msgs/HumanHand, 100 Hz) and human_state (std_msgs/String). Names are relative to the node's namespace.
 Parameters (private): transitions (topic, where it is another one), seed, behaviour, participant (mapping, overrides),
-holds_object, react, rest, handover_object, object_in_hand (three numbers each, m), object_mass.
+holds_object, react, rest, handover_object, object_in_hand (three numbers each, m), object_mass (kg; by default that
+of the cell's object in the folder cell/objects).
 """
 import sys
 import threading
 import time
+from pathlib import Path
 
 import numpy as np
 import rospy
 from coglab_msgs.msg import CellTruth, HumanHand, Transition
+from coglab_objects.database import objects_folder, read_object
+from coglab_py import parameters
+from coglab_py.messages import pose_message, pose_of
 from coglab_sim.participant import Participant
-from coglab_sim.rigid import Frame
 from coglab_sim.scene import Scene, WorldView
 from coglab_sim.virtual_human import VirtualHuman
-from geometry_msgs.msg import Point, Quaternion, Vector3
+from geometry_msgs.msg import Vector3
 from std_msgs.msg import String
 
 LARGEST = 1e4  # m, N: no number of a cell is larger
 GIVE, RECEIVE = "exchange_human_to_robot", "exchange_robot_to_human"
 
 
-def frame_of(pose) -> Frame:
-    """geometry_msgs/Pose as a Frame."""
-    p, q = pose.position, pose.orientation
-    return Frame(np.array([p.x, p.y, p.z]), np.array([q.x, q.y, q.z, q.w]))
+def object_in_cell() -> dict:
+    """The object that the cell begins with, from its file."""
+    folder = Path(parameters.read("cell/objects", str, str(objects_folder())))
+    return read_object(folder / f"{parameters.read('cell/object/id', str, 'mug')}.yaml")[0]
 
 
 class VirtualHumanNode:
     """Thin node over VirtualHuman."""
 
     def __init__(self) -> None:
-        fields = dict(rospy.get_param("~participant", {}))
-        fields.setdefault("seed", int(rospy.get_param("~seed", rospy.get_param("seed", 7))))
-        fields.setdefault("behaviour", rospy.get_param("~behaviour", "normal"))
+        fields = parameters.read("~participant", dict, {})
+        fields.setdefault("seed", parameters.read("~seed", int, parameters.read("seed", int, 7)))
+        fields.setdefault("behaviour", parameters.read("~behaviour", str, "normal"))
         scene = Scene()
         for name in ("rest", "handover_object", "object_in_hand"):
             if rospy.has_param(f"~{name}"):
-                setattr(scene, name, np.array(rospy.get_param(f"~{name}"), dtype=float))
-        scene.object_mass = float(rospy.get_param("~object_mass", scene.object_mass))
-        self.human = VirtualHuman(Participant.from_mapping(fields), scene, rospy.get_param("~holds_object", True))
+                setattr(scene, name, np.array(parameters.numbers(f"~{name}", length=3)))
+        scene.object_mass = parameters.read("~object_mass", float, object_in_cell()["mass"], 0.0, 100.0)
+        self.human = VirtualHuman(Participant.from_mapping(fields), scene,
+                                  parameters.read("~holds_object", bool, True))
         self.lock = threading.Lock()
         self.view = WorldView()
         self.palm_history: list[tuple[float, np.ndarray]] = []
@@ -52,15 +57,15 @@ class VirtualHumanNode:
         self.last_phase = ""
         rospy.Subscriber("truth/cell", CellTruth, self.on_truth, queue_size=1, tcp_nodelay=True)
         rospy.Subscriber("human_command", String, self.on_command, queue_size=10)
-        if rospy.get_param("~react", True):
+        if parameters.read("~react", bool, True):
             above = rospy.get_namespace().rstrip("/").rpartition("/")[0]
-            topic = rospy.get_param("~transitions", f"{above}/coglab/transitions")
+            topic = parameters.read("~transitions", str, f"{above}/coglab/transitions")
             rospy.Subscriber(topic, Transition, self.on_transition, queue_size=100)
 
     def on_truth(self, message: CellTruth) -> None:
         """What the person sees and feels now; the robot's speed is judged over 0.1 s."""
         now = time.monotonic()
-        robot, held = frame_of(message.robot_hand), frame_of(message.object)
+        robot, held = pose_of(message.robot_hand), pose_of(message.object)
         force = message.palm_force
         numbers = [*robot.position, *robot.orientation, *held.position, *held.orientation, force.x, force.y, force.z,
                    message.robot_load_share, message.human_load_share]
@@ -114,8 +119,7 @@ class VirtualHumanNode:
         message = HumanHand(grip=sample.grip, grip_force=sample.grip_force)
         message.header.stamp = rospy.Time.now()
         message.header.frame_id = "world"
-        message.pose.position = Point(*sample.frame.position)
-        message.pose.orientation = Quaternion(*sample.frame.orientation)
+        message.pose = pose_message(sample.frame)
         message.velocity.linear = Vector3(*sample.velocity)
         self.hand.publish(message)
         if sample.phase != self.last_phase:

@@ -3,6 +3,8 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "coglab_sim/ranges.hpp"
+
 namespace coglab_sim {
 namespace {
 // s for which the hand goes on as it was going after its last message; then it stands still.
@@ -40,9 +42,8 @@ void Cell::setObject(const ObjectParameters& object) {
 }
 
 void Cell::setLoss(double to_pc, double from_pc) {
-  if (!(to_pc >= 0.0 && to_pc <= 1.0 && from_pc >= 0.0 && from_pc <= 1.0)) {
-    throw std::invalid_argument("packet loss must lie in 0 .. 1");
-  }
+  requireWithin("fault/packet_loss", to_pc);
+  requireWithin("fault/packet_loss", from_pc);
   loss_to_pc_ = to_pc;
   loss_from_pc_ = from_pc;
 }

@@ -1,68 +1,16 @@
 #include "coglab_sim/cell_config.hpp"
 
 #include <cmath>
-#include <map>
-#include <sstream>
 #include <stdexcept>
 
 #include "coglab_sim/krc/krl_program.hpp"
+#include "coglab_sim/ranges.hpp"
 
 namespace coglab_sim {
 namespace {
 
 [[noreturn]] void refuse(const std::string& name, const std::string& expected) {
   throw std::invalid_argument("parameter " + name + ": expected " + expected);
-}
-
-struct Range {
-  double low, high;
-};
-
-/// Ranges by name, and for the others by unit: what the cell can compute with, not what is
-/// sensible.
-Range rangeOf(const std::string& name, const std::string& unit) {
-  static const std::map<std::string, Range> by_name = {
-      {"seed", {0, 2147483647}},
-      {"krc/period", {0.001, 0.1}},
-      {"krc/entry_quality", {1, 3}},
-      {"krc/extrapolated_packets", {0, 100}},
-      {"krc/entry_position_tolerance", {0, 0.1}},
-      {"krc/frame_orthonormality", {1e-6, 0.1}},
-      {"krc/position_limit", {0.1, 3.2}},
-      {"krc/krl_poll", {0.001, 10}},
-      {"krc/drive_heating_time", {1, 1e6}},
-      {"arm/torque_limit", {1, 1000}},
-      {"arm/rotor_inertia", {0.01, 100}},
-      {"arm/servo_bandwidth", {1, 500}},
-      {"arm/brake_torque_share", {0.1, 100}},
-      {"torque_noise/correlation_time", {1e-4, 10}},
-      {"object/mass", {0.01, 10}},
-      {"object/size", {1e-3, 2}},
-      {"object/friction", {0, 5}},
-      {"object/finger_contact", {-1, 254}},
-      {"object/rotation", {-1, 1}},
-      {"contact/human_reach", {0, 1}},
-      {"contact/robot_reach", {0, 1}},
-      {"contact/current_per_count", {0, 1000}},
-      {"contact/board_size", {0, 5}}};
-  static const std::map<std::string, Range> by_unit = {
-      {"rad", {-3.2, 3.2}}, {"s", {0, 600}},      {"1", {0, 1}},
-      {"m, rad", {0, 1}},   {"Nm", {0, 1000}},    {"rad/s", {1e-4, 50}},
-      {"m/s", {1e-4, 50}},  {"Nm/rad", {0, 1e7}}, {"N/m", {0, 1e7}},
-      {"kg m^2", {0, 100}}, {"kg", {0, 10}},      {"s/rad", {0, 1000}},
-      {"m", {-5, 5}},       {"s/m", {0, 1000}},   {"N/m^1.5", {0, 1e9}},
-      {"N", {0, 1000}},     {"K", {0, 200}},      {"degree Celsius", {-50, 200}}};
-  if (const auto found = by_name.find(name); found != by_name.end()) return found->second;
-  if (const auto found = by_unit.find(unit); found != by_unit.end()) return found->second;
-  return {0, 0};
-}
-
-void requireRange(const std::string& name, double value, const Range& range) {
-  if (value >= range.low && value <= range.high) return;
-  std::ostringstream text;
-  text << "parameter " << name << " = " << value << " is outside its range " << range.low << ".."
-       << range.high;
-  throw std::invalid_argument(text.str());
 }
 
 double numberOf(const std::string& name, const ParameterValue& value, const Range& range) {
@@ -74,7 +22,7 @@ double numberOf(const std::string& name, const ParameterValue& value, const Rang
   } else {
     refuse(name, "a number");
   }
-  requireRange(name, number, range);
+  requireWithin(range, name, number);
   return number;
 }
 
@@ -86,7 +34,7 @@ Vector vectorOf(const std::string& name, const ParameterValue& value, std::size_
     refuse(name, "a list of " + std::to_string(size) + " numbers");
   Vector result;
   for (std::size_t i = 0; i < size; ++i) {
-    requireRange(name + "[" + std::to_string(i) + "]", (*list)[i], range);
+    requireWithin(range, name + "[" + std::to_string(i) + "]", (*list)[i]);
     result[static_cast<Eigen::Index>(i)] = (*list)[i];
   }
   return result;
@@ -147,7 +95,7 @@ void write(CellConfig& config, const std::string& name, const Range& range,
 template <typename Access>
 CellParameter row(const char* name, const char* unit, const char* source, const char* description,
                   Access access) {
-  const Range range = rangeOf(name, unit);
+  const Range range = rangeOf(name);
   return {name,
           unit,
           source,
@@ -217,7 +165,7 @@ std::vector<CellParameter> makeTable() {
       ROW("urdf", "", "set-up", "path of the robot description", urdf),
       ROW("seed", "", "set-up", "of all random numbers", seed),
       ROW("home", "rad", "set-up", "joint positions at the start, wire order", home),
-      ROW("krc/period", "s", "set-up", "FRI period, 0.001 .. 0.1", krc.period),
+      ROW("krc/period", "s", "set-up", "FRI period", krc.period),
       conventionRow(),
       modeRow(),
       ROW("krc/quality_perfect", "1", "ours", "share of the last 100 packets answered for PERFECT",
@@ -309,7 +257,7 @@ std::vector<CellParameter> makeTable() {
       ROW("torque_noise/hysteresis_speed", "rad/s", "ours", "over which it reverses",
           torque_noise.hysteresis_speed),
       ROW("object/id", "", "set-up", "name of the object", object.id),
-      ROW("object/mass", "kg", "set-up", "0.01 .. 10", object.mass),
+      ROW("object/mass", "kg", "set-up", "of the object", object.mass),
       ROW("object/shape", "", "set-up", "box, cylinder or sphere", object.shape),
       ROW("object/size", "m", "set-up", "along x y z of the object frame", object.size),
       ROW("object/center", "m", "set-up", "centre of mass in the object frame", object.center),

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "coglab_sim/ranges.hpp"
+
 namespace coglab_sim {
 namespace {
 
@@ -44,14 +46,8 @@ std::array<int, 5> fingerContacts(const ObjectParameters& object) {
 }
 
 const ObjectParameters& checked(const ObjectParameters& object) {
-  if (!(object.mass >= 0.01 && object.mass <= 10.0)) {
-    throw std::invalid_argument("object mass is " + std::to_string(object.mass) +
-                                " kg, expected 0.01 .. 10");
-  }
-  if (!(object.friction >= 0.0 && object.friction <= 2.0)) {
-    throw std::invalid_argument("object friction is " + std::to_string(object.friction) +
-                                ", expected 0 .. 2");
-  }
+  requireWithin("object/mass", object.mass);
+  requireWithin("object/friction", object.friction);
   return object;
 }
 

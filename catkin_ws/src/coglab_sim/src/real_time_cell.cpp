@@ -4,6 +4,8 @@
 #include <stdexcept>
 #include <utility>
 
+#include "coglab_sim/ranges.hpp"
+
 namespace coglab_sim {
 namespace {
 
@@ -21,10 +23,7 @@ constexpr std::size_t kMaxRecords = 100000;  // if nobody takes them
 RealTimeCell::RealTimeCell(const CellConfig& config, const std::string& host, std::uint16_t port,
                            double factor, std::uint16_t source_port)
     : cell_(config), socket_(host, source_port), factor_(factor), port_(port) {
-  if (!(factor >= 0.01 && factor <= 100.0)) {
-    throw std::invalid_argument("speed factor is " + std::to_string(factor) +
-                                ", expected 0.01 .. 100");
-  }
+  requireWithin("speed", factor);
 }
 
 RealTimeCell::~RealTimeCell() { stop(); }

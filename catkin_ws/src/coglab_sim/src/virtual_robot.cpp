@@ -1,4 +1,5 @@
 #include "coglab_sim/virtual_robot.hpp"
+#include "coglab_rt/joint_limits_table.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -25,7 +26,7 @@ std::string textOf(const std::string& path) {
 
 lwr_fri_bridge::BridgeConfig bridgeConfig(const VirtualRobotConfig& config) {
   lwr_fri_bridge::BridgeConfig bridge;
-  bridge.limits = lwr_fri_bridge::loadJointLimits(config.limits_file);
+  bridge.limits = coglab_rt::loadJointLimits(config.limits_file);
   bridge.position_margin = bridge.limits.position_margin;
   bridge.krl_convention =
       lwr_fri_bridge::fri::krlConventionFromName(krc::nameOf(config.cell.krc.convention));
@@ -132,14 +133,14 @@ void VirtualRobot::controlCycle(bool answered) {
   if (++since_cycle_ < periods) return;
   since_cycle_ = 0;
   coglab_controllers::RobotSample sample;
-  bridge_.port().newestSample(sample);
+  bridge_.mailboxes().newestSample(sample);
   const double dt = last_controller_ns_ == 0
                         ? wanted
                         : 1e-9 * static_cast<double>(sample.controller_ns - last_controller_ns_);
   last_controller_ns_ = sample.controller_ns;
   coglab_controllers::VelocityCommand command;
   cycle.run(sample, std::min(dt, cycle.settings().sample_timeout), command);
-  bridge_.port().sendVelocity(command);
+  bridge_.mailboxes().sendVelocity(command);
 }
 
 }  // namespace coglab_sim

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import rospy
 import rostest
-from coglab_msgs.msg import CellTruth, FingerContact, FingerPositions, HumanHand
+from coglab_msgs.msg import CellTruth, FingerContact, FingerPositions, HumanHand, ReasonCode
 from coglab_msgs.srv import InjectFault, PlaceObject
 from geometry_msgs.msg import Point, Pose, Quaternion
 from std_msgs.msg import String
@@ -132,6 +132,7 @@ class CellNode(unittest.TestCase):
         answer = self.place('', 'moon', Pose(Point(), Quaternion(0, 0, 0, 1)))
         self.assertFalse(answer.success)
         self.assertIn('human_hand', answer.message)
+        self.assertEqual(answer.reason_code, ReasonCode.INVALID_ARGUMENT)
         self.assertFalse(self.place('', 'world', Pose()).success)  # quaternion of length 0
         self.assertIn('objects/', self.place('unknown_thing', 'world', Pose(Point(), Quaternion(0, 0, 0, 1))).message)
         self.human.publish(HumanHand(grip=float('nan')))

@@ -15,7 +15,7 @@ import numpy as np
 import rospy
 import rostest
 import tf2_ros
-from coglab_msgs.msg import CellTruth, Recognition
+from coglab_msgs.msg import CellTruth, ReasonCode, Recognition
 from coglab_msgs.srv import FreePlaces, InitVision, LocateObject
 from coglab_sim.reach import Reach
 from geometry_msgs.msg import Point, Pose, Quaternion
@@ -101,6 +101,7 @@ class Perception(unittest.TestCase):
                       f"frame {frame}")
         answer = self.call("locate_object", object_id="nothing", timeout=0.2)
         self.assertIn("in view: human_hand, object_mug", answer.message)
+        self.assertEqual(answer.reason_code, ReasonCode.OBJECT_NOT_SEEN)
         answer = self.call("free_places", object_id="mug", timeout=5.0)
         self.assertEqual((answer.success, len(answer.places)), (True, 3))
         self.assertEqual(answer.places[0].header.frame_id, "board")

@@ -2,13 +2,12 @@
 import os
 import struct
 
+import lwr_fri_bridge as bridge_module
 import numpy as np
 import pytest
 import yaml
 from fri_client import Session, parse, set_point
-
-bridge_module = pytest.importorskip('lwr_fri_bridge', reason='the bridge is not built')
-from wire import BLOCKED_MODES, BLOCKED_MOTIONS, LIMITS, MODES, URDF, Wire, lockstep_bytes, speed_after_block  # noqa: E402
+from wire import BLOCKED_MODES, BLOCKED_MOTIONS, LIMITS, MODES, URDF, Wire, lockstep_bytes, speed_after_block
 
 LONG = os.environ.get('COGLAB_LONG') == '1'
 

@@ -1,14 +1,15 @@
-"""config/cell.yaml: every name is one of the table's, and its objects are those of the object database."""
+"""config/cell.yaml: every name is one of the table's, and every object of the database is one for the cell."""
 from pathlib import Path
 
 import pytest
 import yaml
+from coglab_objects.database import cell_parameters, objects_folder, read_object
 from coglab_sim import _cell
 from conftest import URDF
 
 PACKAGE = Path(__file__).resolve().parents[1]
 CONFIG = yaml.safe_load((PACKAGE / 'config' / 'cell.yaml').read_text())
-DATABASE = sorted((PACKAGE.parent / 'coglab_smach' / 'objects').glob('*.yaml'))
+OBJECTS = sorted(path.stem for path in objects_folder().glob('*.yaml'))
 
 
 def test_names_are_known():
@@ -16,17 +17,17 @@ def test_names_are_known():
     given = {f'{group}/{name}': value for group in ('object', 'contact') for name, value in CONFIG[group].items()}
     assert set(given) <= names
     _cell.Cell(URDF, given)
-    assert set(CONFIG) == {'object', 'contact', 'objects'}
+    assert set(CONFIG) == {'object', 'contact'}
 
 
-@pytest.mark.parametrize('path', DATABASE, ids=lambda p: p.stem)
-def test_objects_are_those_of_the_database(path):
-    entry = yaml.safe_load(path.read_text())
-    ours = CONFIG['objects'][entry['id']]
-    assert (ours['mass'], ours['size'], ours['friction'], ours['shape']) == \
-        (entry['mass'], entry['size'], entry['friction'], entry['shape']['type'])
-    assert ours['center'] == pytest.approx([0.0, 0.0, entry['size'][2] / 2])
-    _cell.Cell(URDF, {f'object/{name}': value for name, value in ours.items()})
+@pytest.mark.parametrize('object_id', OBJECTS)
+def test_the_cell_takes_every_object_of_the_database(object_id):
+    entry, _ = read_object(objects_folder() / f'{object_id}.yaml')
+    _cell.Cell(URDF, {f'object/{name}': value for name, value in cell_parameters(entry).items()})
+
+
+def test_the_configuration_repeats_nothing_that_the_database_says():
+    assert set(CONFIG['object']) <= {'id', 'start', 'position', 'rotation'}
 
 
 NUMBERS = [row for row in _cell.parameter_table() if row['low'] < row['high']]

@@ -1,11 +1,11 @@
 """The tracker stand-in: latency, noise, dropouts and swaps as configured, and nothing of it when perfect."""
 import numpy as np
 import pytest
+from coglab_py.pose import Pose
 from coglab_sim.perception_stand_in import Board, PerceptionSettings, Tracker
-from coglab_sim.rigid import Frame
 
 
-def watch(settings, seconds=20.0, truth=lambda t: Frame(np.array([0.8, 0.0, 0.4])), seed=3, robot=None):
+def watch(settings, seconds=20.0, truth=lambda t: Pose(np.array([0.8, 0.0, 0.4])), seed=3, robot=None):
     tracker = Tracker("object_mug", settings, seed)
     sights = []
     for k in range(int(seconds * 200)):
@@ -16,7 +16,7 @@ def watch(settings, seconds=20.0, truth=lambda t: Frame(np.array([0.8, 0.0, 0.4]
 
 
 def test_perfect_perception_is_the_truth_at_the_same_rate():
-    moving = lambda t: Frame(np.array([0.8 + 0.1 * t, 0.0, 0.4]))  # noqa: E731
+    moving = lambda t: Pose(np.array([0.8 + 0.1 * t, 0.0, 0.4]))  # noqa: E731
     sights = watch(PerceptionSettings(perfect=True), truth=moving)
     assert len(sights) == pytest.approx(20 * 30, rel=0.15)
     for t, sight in sights:
@@ -54,8 +54,8 @@ def test_identity_swaps_jump_and_come_back():
 
 def test_occlusion_by_the_robots_hand():
     settings = PerceptionSettings(occlusion_distance=0.10, dropout_start=0.0)
-    far = watch(settings, robot=Frame(np.array([0.5, 0, 0.4])))
-    near = watch(settings, robot=Frame(np.array([0.75, 0, 0.4])))
+    far = watch(settings, robot=Pose(np.array([0.5, 0, 0.4])))
+    near = watch(settings, robot=Pose(np.array([0.75, 0, 0.4])))
     assert len(near) < 0.65 * len(far)
 
 
@@ -73,6 +73,6 @@ def test_settings_are_checked():
 
 
 def test_free_places_are_those_without_an_object():
-    board = Board(Frame(np.array([0.5, -0.5, 0.0])), {"A1": np.zeros(3), "A2": np.array([0.2, 0.0, 0.0])})
+    board = Board(Pose(np.array([0.5, -0.5, 0.0])), {"A1": np.zeros(3), "A2": np.array([0.2, 0.0, 0.0])})
     assert board.free([]) == ["A1", "A2"]
     assert board.free([np.array([0.52, -0.5, 0.0])]) == ["A2"]

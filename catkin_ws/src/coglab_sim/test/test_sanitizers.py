@@ -19,7 +19,8 @@ def test_requests_against_the_cells_thread(tmp_path):
                PACKAGE / 'test' / 'test_cell_core.cpp']
     flags = ['-std=c++17', '-O1', '-g1', '-fsanitize=address,undefined', '-fno-omit-frame-pointer',
              f'-DURDF="{SOURCES}/lwr_description/urdf/lwr_ih2.urdf"']
-    includes = [f'-I{PACKAGE}/include', f'-I{SOURCES}/lwr_fri_bridge/include', '-isystem/usr/include/eigen3']
+    includes = [f'-I{PACKAGE}/include', f'-I{SOURCES}/lwr_fri_bridge/include',
+                f'-I{SOURCES}/coglab_rt/include', '-isystem/usr/include/eigen3']
     objects = []
     for source in sources:
         objects.append(tmp_path / f'{len(objects)}_{source.stem}.o')

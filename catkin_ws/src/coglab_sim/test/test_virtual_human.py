@@ -1,8 +1,8 @@
 """The virtual human against a robot's hand that is simply there: phases, timing, and what each misbehaviour does."""
 import numpy as np
 import pytest
+from coglab_py.pose import Pose
 from coglab_sim.participant import BEHAVIOURS, Participant, population
-from coglab_sim.rigid import Frame
 from coglab_sim.scene import Scene, WorldView
 from coglab_sim.virtual_human import VirtualHuman
 
@@ -43,7 +43,7 @@ class Stage:
         if force > 0.3 and self.touched_at is None:
             self.touched_at = self.t
         self.closed = self.closes and self.touched_at is not None and self.t - self.touched_at > 1.0
-        view = WorldView(Frame(self.palm, PALM_TURN), speed, Frame(self.object), force, 0.0, 1.0,
+        view = WorldView(Pose(self.palm, PALM_TURN), speed, Pose(self.object), force, 0.0, 1.0,
                          "both" if self.closed else "human")
         sample = self.human.step(self.t, view)
         self.samples.append(sample)
@@ -191,7 +191,7 @@ def receive(offered, seed=3, seconds=6.0, appears_at=0.6):
     for _ in range(int(seconds / DT)):
         t += DT
         place = np.asarray(offered) if t >= appears_at else far
-        view = WorldView(Frame(place - [0.0, 0.04, -0.05], PALM_TURN), 0.0, Frame(place), 0.0, 1.0, 0.0, "robot")
+        view = WorldView(Pose(place - [0.0, 0.04, -0.05], PALM_TURN), 0.0, Pose(place), 0.0, 1.0, 0.0, "robot")
         samples.append((t, human.step(t, view)))
     return human, scene, samples
 
@@ -225,6 +225,6 @@ def test_a_giver_who_feels_the_object_slip_holds_on_again():
         t += DT
         sunk = 0.0 if t < 0.10 else 0.02
         place = palm + np.array([0.0, 0.04, -0.05 - sunk])
-        human.step(t, WorldView(Frame(palm, PALM_TURN), 0.0, Frame(place), 1.0, 0.1, 0.9, "human"))
+        human.step(t, WorldView(Pose(palm, PALM_TURN), 0.0, Pose(place), 1.0, 0.1, 0.9, "human"))
         lowest = min(lowest, human._grip)
     assert human.phase == "holding" and lowest < 0.9 and human._grip == 1.0

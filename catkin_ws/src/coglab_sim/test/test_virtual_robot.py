@@ -1,19 +1,14 @@
 """A whole handover in virtual time: person, object, FRI, DMP and point-to-point, in one thread."""
-from pathlib import Path
-
 import numpy as np
 import pytest
-from coglab_sim import _cell  # noqa: F401
+from coglab_py.packages import package_path
+from coglab_sim import virtual_world
 from coglab_sim.participant import Participant
-from coglab_sim.rigid import Frame
-from coglab_sim.scene import Scene, WorldView
+from coglab_sim.scene import Scene
 from coglab_sim.virtual_human import VirtualHuman
+from coglab_sim.virtual_world import move_person, view_of
 
-virtual = pytest.importorskip('coglab_sim._virtual', reason='the robot in virtual time is not built')
-SOURCES = Path(__file__).resolve().parents[2]
-URDF = str(SOURCES / 'lwr_description' / 'urdf' / 'lwr_ih2.urdf')
-LIMITS = str(SOURCES / 'lwr_description' / 'config' / 'joint_limits.yaml')
-PRIMITIVES = str(SOURCES / 'coglab_controllers' / 'config' / 'primitives.xml')
+PRIMITIVES = str(package_path('coglab_controllers', 'config', 'primitives.xml'))
 GRASP = {'goal_offset': [0.0, -0.065, 0.05], 'target_orientation': [0.5, 0.5, 0.5, 0.5]}  # 25 mm before the mug
 
 
@@ -21,8 +16,7 @@ class Trial:
     """Robot and person; the fingers go where they are told, 254 counts per second."""
 
     def __init__(self, seed=3, behaviour='normal', **cell):
-        parameters = {'krc/period': 0.005, 'seed': seed, **{k.replace('__', '/'): v for k, v in cell.items()}}
-        self.robot = virtual.VirtualRobot(URDF, LIMITS, parameters)
+        self.robot = virtual_world.Robot(seed, **cell).virtual
         self.human = VirtualHuman(Participant.draw(seed, behaviour), Scene())
         self.fingers = np.zeros(5)
         self.wanted = np.zeros(5)
@@ -36,12 +30,7 @@ class Trial:
         speed = 0.0 if self.last_palm is None else np.linalg.norm(palm['position'] - self.last_palm) / cell.period
         self.last_palm = palm['position']
         obj = truth['object']
-        view = WorldView(Frame(palm['position'], palm['rotation']), speed, Frame(obj['position'], obj['rotation']),
-                         float(np.linalg.norm(truth['palm_force'])), truth['robot_load_share'],
-                         truth['human_load_share'], truth['held_by'])
-        hand = self.human.step(self.robot.now, view)
-        cell.set_human(hand.frame.position, hand.frame.orientation, hand.velocity, grip=hand.grip,
-                       grip_force=hand.grip_force)
+        move_person(cell, self.human.step(self.robot.now, view_of(truth, speed)))
         self.fingers += np.clip(self.wanted - self.fingers, -254 * cell.period, 254 * cell.period)
         cell.set_fingers([int(x) for x in self.fingers])
         self.robot.set_frame('object_mug', obj['position'], obj['rotation'])

@@ -7,15 +7,16 @@ import time
 
 import numpy as np
 import pytest
+from coglab_msgs.msg import ReasonCode
 from coglab_perception.frames import FrameNames
+from coglab_py.pose import Pose
 from coglab_sim.perception_stand_in import Board, PerceptionSettings
-from coglab_sim.rigid import Frame
 from coglab_sim.vision import NotSeen, PartnerChoice, Vision
 
 NAMES = FrameNames("world", "human_hand", "board", "object_{id}")
 SLOTS = {"A1": np.zeros(3), "A2": np.array([0.0, 0.15, 0.0])}
-ROBOT = Frame(np.array([0.5, 0.0, 0.4]))
-NEAR, BESIDE, FAR = (Frame(np.array(place)) for place in
+ROBOT = Pose(np.array([0.5, 0.0, 0.4]))
+NEAR, BESIDE, FAR = (Pose(np.array(place)) for place in
                      ([0.9, 0.1, 0.4], [0.9, -0.15, 0.4], [1.6, 0.5, 0.4]))
 
 
@@ -25,7 +26,7 @@ class Scene:
     def __init__(self, margin=0.0, **settings):
         self.now = 10.0
         self.vision = Vision(NAMES, PerceptionSettings(**({"perfect": True} | settings)),
-                             Board(Frame(np.array([0.45, -0.55, 0.05])), SLOTS), 1,
+                             Board(Pose(np.array([0.45, -0.55, 0.05])), SLOTS), 1,
                              lambda: self.now, margin)
 
     def see(self, hands=None, objects=None, robot=ROBOT):
@@ -57,8 +58,9 @@ def test_what_is_not_seen_is_said_within_the_limit(limit):
     scene = Scene()
     scene.see()
     began = time.monotonic()
-    with pytest.raises(NotSeen, match="'object_mug' was not seen within .* in view: human_hand"):
+    with pytest.raises(NotSeen, match="'object_mug' was not seen within .* in view: human_hand") as refusal:
         scene.vision.locate("mug", limit)
+    assert refusal.value.code == ReasonCode.OBJECT_NOT_SEEN
     assert time.monotonic() - began < 5.0
 
 
@@ -85,16 +87,18 @@ def test_init_vision():
 
 def test_free_places():
     scene = Scene()
-    with pytest.raises(NotSeen, match="the board was not visible"):
+    with pytest.raises(NotSeen, match="the board was not visible") as refusal:
         scene.vision.free_places("mug", 0.02)
+    assert refusal.value.code == ReasonCode.NOT_PERCEIVED
     scene.see()
     assert [name for name, _ in scene.vision.free_places("mug", 0.1)] == ["A1", "A2"]
     board = scene.vision.board.frame
-    on_a1, on_a2 = Frame(board.apply(SLOTS["A1"])), Frame(board.apply(SLOTS["A2"]))
+    on_a1, on_a2 = Pose(board.apply(SLOTS["A1"])), Pose(board.apply(SLOTS["A2"]))
     scene.see(objects={"object_mug": on_a1, "object_ball": on_a2})
     assert [name for name, _ in scene.vision.free_places("mug", 0.1)] == ["A1"]
-    with pytest.raises(NotSeen, match="no place on the board is free: object_ball, object_mug lie"):
+    with pytest.raises(NotSeen, match="no place on the board is free: object_ball, object_mug lie") as refusal:
         scene.vision.free_places("bottle", 0.1)
+    assert refusal.value.code == ReasonCode.NO_FREE_PLACE
 
 
 # -- two people -----------------------------------------------------------------------------------
@@ -102,7 +106,7 @@ def test_free_places():
 
 def test_two_people_and_nobody_can_tell_whose_hand_is_meant():
     scene = Scene()
-    held = Frame(NEAR.position + [-0.08, 0.0, -0.05])
+    held = Pose(NEAR.position + [-0.08, 0.0, -0.05])
     scene.see(objects={"object_mug": held})
     sights = scene.see({"one": NEAR, "two": BESIDE}, {"object_mug": held})
     assert [sight.name for sight in sights] == ["object_mug"], "no hand is broadcast"
@@ -110,7 +114,7 @@ def test_two_people_and_nobody_can_tell_whose_hand_is_meant():
     for target in ("human_hand", "mug"):
         with pytest.raises(NotSeen, match=sentence):
             scene.vision.locate(target, 0.02)
-    on_board = Frame(scene.vision.board.frame.apply(SLOTS["A1"]))
+    on_board = Pose(scene.vision.board.frame.apply(SLOTS["A1"]))
     scene.see({"one": NEAR, "two": BESIDE}, {"object_ball": on_board})
     assert scene.vision.locate("ball", 0.02)[0] == "object_ball", "what lies there is nobody's"
     scene.see({"one": NEAR}, {"object_mug": held})
@@ -151,5 +155,5 @@ def test_a_bystander_who_walks_by_never_becomes_the_partner():
         assert choice.choose({"partner": NEAR}, ROBOT) == "partner"
         back = rng.uniform(0.3, 0.8)
         for y in np.linspace(-1.0, 1.0, 500):
-            crossing = Frame(np.array([0.9 + back, y, 0.4]))
+            crossing = Pose(np.array([0.9 + back, y, 0.4]))
             assert choice.choose({"bystander": crossing, "partner": NEAR}, ROBOT) == "partner"

@@ -9,6 +9,7 @@
 #include <string>
 
 #include "coglab_controllers/manager/feedback_stage.hpp"
+#include "coglab_rt/joint_limits_table.hpp"
 #include "coglab_sim/virtual_robot.hpp"
 
 namespace fri = lwr_fri_bridge::fri;
@@ -28,7 +29,7 @@ Felt pushed(const Vector7& posture, const Vector6& push) {
   config.torque_noise.sigma = config.torque_noise.bias = config.torque_noise.hysteresis = 0.0;
   Cell cell(config);
   lwr_fri_bridge::BridgeConfig bridge_config;
-  bridge_config.limits = lwr_fri_bridge::loadJointLimits(LIMITS_FILE);
+  bridge_config.limits = coglab_rt::loadJointLimits(LIMITS_FILE);
   lwr_fri_bridge::Bridge bridge(bridge_config);
   cell.setPush({push.head<3>(), push.tail<3>()});
 
@@ -46,7 +47,7 @@ Felt pushed(const Vector7& posture, const Vector6& push) {
   fri::MeasurementDatagram measurement;
   EXPECT_TRUE(fri::decode(cell.measurement().data(), cell.measurement().size(), measurement));
   felt.wire = fri::wrenchFromWire(measurement.external_wrench);
-  const lwr_fri_bridge::RobotSample sample = bridge.snapshot().sample;
+  const coglab_rt::RobotSample sample = bridge.snapshot().sample;
   felt.topic = sample.tool_wrench;
 
   std::ifstream file(URDF);

@@ -6,10 +6,10 @@ import sys
 import time
 
 import numpy as np
-from coglab_smach.contact_trials import ContactTrial, found_within, push
-from coglab_smach.pose import Pose
-from coglab_smach.reachability import default_arm, position_jacobian, solve
-from coglab_smach.torque_signal import TorqueSignal
+from coglab_py.pose import Pose
+from coglab_smach.contact.torque_signal import TorqueSignal
+from coglab_smach.contact.trials import ContactTrial, found_within, push
+from coglab_smach.kinematics.reachability import default_arm, position_jacobian, solve
 
 ABSOLUTE = 1.0
 """Nm, threshold of the peer"""

@@ -46,7 +46,7 @@ def one_trial(job):
     if not stuck and trial.last_hub not in ("wait_without_object", "wait_with_object"):
         stuck = f"the machine waits in '{trial.last_hub}': {trial.ctx.journal.why()}"
     return {"seed": seed, "stuck": stuck, "outcomes": [(r.kind, r.outcome, r.reason) for r in results],
-            "outside": trial.rig.robot.limit_violations, "moving": trial.rig.watched_while_moving,
+            "outside": trial.rig.robot.limit_violations, "moving": trial.ctx.contact.watched_while_moving,
             "virtual": trial.clock.now(), "processor": time.process_time() - started,
             "reaches": [(action, figures(reach)) for action, reach in zip(actions, trial.reaches, strict=False)]}
 

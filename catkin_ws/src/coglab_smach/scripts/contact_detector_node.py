@@ -2,7 +2,7 @@
 """The node /contact_detector: external joint torques -> coglab/contact, armed by ~arm (coglab_msgs/ArmContact).
 
 Subscribes lwr/external_torques (effort, Nm) and lwr/joint_states; names are relative. Parameters (private): the fields
-of coglab_smach.contact_detector.DetectorSettings; robot_description is read for the Jacobian.
+of coglab_smach.contact.detector.DetectorSettings; robot_description is read for the Jacobian.
 Publishes ~margin (std_msgs/Float64) at 20 Hz while watching.
 """
 import dataclasses
@@ -12,10 +12,11 @@ import threading
 import coglab_controllers as cc
 import numpy as np
 import rospy
-from coglab_msgs.msg import Contact
+from coglab_msgs.msg import Contact, ReasonCode
 from coglab_msgs.srv import ArmContact, ArmContactResponse
-from coglab_smach.contact_detector import ContactDetector, DetectorSettings
-from coglab_smach.ros_publish import publish
+from coglab_py import parameters
+from coglab_smach.contact.detector import ContactDetector, DetectorSettings
+from coglab_smach.ros.publish import publish
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64
 
@@ -26,15 +27,20 @@ class ContactDetectorNode:
     def __init__(self, urdf: str) -> None:
         settings = DetectorSettings()
         for field in dataclasses.fields(settings):
-            if rospy.has_param(f"~{field.name}"):
-                setattr(settings, field.name, rospy.get_param(f"~{field.name}"))
+            default = getattr(settings, field.name)
+            if isinstance(default, tuple):
+                value = tuple(parameters.numbers(f"~{field.name}", default, len(default)))
+            else:
+                value = parameters.read(f"~{field.name}", type(default), default)
+            setattr(settings, field.name, value)
         self.arm = cc.Chain(urdf)
         self.joints = tuple(self.arm.joint_names)
         self.detector = ContactDetector(settings, lambda q: self.arm.jacobian(np.asarray(q, dtype=float))[:3])
         self.lock = threading.Lock()
-        self.position = None
-        self.velocity = None
-        self.last_sample = None
+        self.position: list[float] | None = None
+        self.velocity: list[float] | None = None
+        self.joint_stamp = 0.0
+        self.last_sample: float | None = None
         self.publisher = rospy.Publisher("coglab/contact", Contact, queue_size=10)
         self.margin = rospy.Publisher("~margin", Float64, queue_size=1)
         rospy.Subscriber("lwr/joint_states", JointState, self.on_joints, queue_size=1, tcp_nodelay=True)
@@ -64,11 +70,12 @@ class ContactDetectorNode:
         if len(message.effort) != 7 or self.position is None or self.velocity is None:
             return
         with self.lock:
-            self.last_sample = message.header.stamp.to_sec()
-            event = self.detector.feed(self.last_sample, message.effort, self.position, self.velocity)
+            stamp = self.last_sample = message.header.stamp.to_sec()
+            event = self.detector.feed(stamp, message.effort, self.position, self.velocity)
         if event is None:
             return
-        out = Contact(source=event.source, contact=event.contact, margin=event.margin, message=event.message)
+        out = Contact(source=event.source, contact=event.contact, margin=event.margin, confidence=event.confidence,
+                      reason_code=event.code, message=event.message)
         out.header.stamp = message.header.stamp
         publish(self.publisher, out)
         rospy.loginfo("contact detector: %s", event.message)
@@ -78,18 +85,18 @@ class ContactDetectorNode:
         with self.lock:
             if request.mode == "off":
                 self.detector.disarm()
-                return ArmContactResponse(True, "off")
+                return ArmContactResponse(success=True, message="off")
             now = self.last_sample
             if now is None or abs(rospy.Time.now().to_sec() - now) > 1.0:
-                return ArmContactResponse(False, f"no torques on {self.torques.resolved_name} for 1 s; is the "
-                                                 "robot connected?")
+                return ArmContactResponse(False, ReasonCode.NODE_SILENT, f"no torques on {self.torques.resolved_name} "
+                                          "for 1 s; is the robot connected?")
             try:
                 self.detector.arm(request.mode, now, request.timeout, request.k, request.joints, request.mass,
                                   request.load_share)
             except ValueError as error:
-                return ArmContactResponse(False, str(error))
-        return ArmContactResponse(True, f"watching for {request.mode} for {request.timeout:.1f} s once the arm "
-                                        "is still")
+                return ArmContactResponse(False, ReasonCode.INVALID_ARGUMENT, str(error))
+        return ArmContactResponse(True, ReasonCode.NONE,
+                                  f"watching for {request.mode} for {request.timeout:.1f} s once the arm is still")
 
     def on_timer(self, _event) -> None:
         """Live margin."""
@@ -102,12 +109,15 @@ class ContactDetectorNode:
 def main() -> int:
     """Entry point."""
     rospy.init_node("contact_detector")
-    found = rospy.search_param("robot_description")
-    urdf = rospy.get_param(found) if found else None
+    urdf = parameters.found_above("robot_description", str)
     if urdf is None:
         rospy.logfatal("contact_detector: parameter robot_description is missing; load lwr_description's URDF")
         return 1
-    ContactDetectorNode(urdf)
+    try:
+        ContactDetectorNode(urdf)
+    except parameters.ParameterError as error:
+        rospy.logfatal("contact_detector: %s", error)
+        return 1
     rospy.spin()
     return 0
 

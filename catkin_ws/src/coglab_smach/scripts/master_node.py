@@ -22,19 +22,21 @@ import smach_ros
 from coglab_msgs.msg import MasterState as MasterStateMsg
 from coglab_msgs.msg import Transition
 from coglab_msgs.srv import Start, StartResponse
-from coglab_smach.clock import SteadyClock
-from coglab_smach.config import Config, ConfigError
-from coglab_smach.context import Context
-from coglab_smach.holding import HoldingMemory
-from coglab_smach.journal import NOTHING_FAILED, ActionRecord, Journal, TransitionRecord
+from coglab_py import parameters
+from coglab_smach.clocks.clock import SteadyClock
+from coglab_smach.context.config import Config, ConfigError
+from coglab_smach.context.context import Context
+from coglab_smach.context.holding import HoldingMemory
+from coglab_smach.context.journal import NOTHING_FAILED, ActionRecord, Journal, TransitionRecord
+from coglab_smach.context.master_state import MasterState, StateWatch
+from coglab_smach.context.requests import command
+from coglab_smach.context.trigger import ask_for
+from coglab_smach.kinematics.reachability import solve
 from coglab_smach.machines import build_master
-from coglab_smach.master_state import MasterState, StateWatch
-from coglab_smach.reachability import solve
-from coglab_smach.requests import ask_for, command
-from coglab_smach.ros_arm import RosArm
-from coglab_smach.ros_hand import RosHand
-from coglab_smach.ros_ports import RosContact, RosDatabase, RosPerception
-from coglab_smach.ros_publish import publish
+from coglab_smach.ros.arm import RosArm
+from coglab_smach.ros.hand import RosHand
+from coglab_smach.ros.ports import RosContact, RosDatabase, RosPerception
+from coglab_smach.ros.publish import publish
 from std_msgs.msg import String
 from std_srvs.srv import Trigger, TriggerResponse
 
@@ -55,18 +57,19 @@ class MasterNode:
     """Ties the machines to ROS; holds no logic of its own."""
 
     def __init__(self) -> None:
-        frames = rospy.get_param("perception/frames", {})
+        frames = parameters.read("perception/frames", dict, {})
         overrides = {f"perception.{role}": frames[role] for role in ("human_hand", "board") if role in frames}
-        overrides.update(rospy.get_param("~config_overrides", {}))
-        for name in ("dmp_library", "auto_trigger"):
-            if rospy.has_param(f"~{name}"):
-                overrides[name] = rospy.get_param(f"~{name}")
-        config = Config.load(rospy.get_param("~config_file"), overrides, rospy.logwarn)
+        overrides.update(parameters.read("~config_overrides", dict, {}))
+        if rospy.has_param("~dmp_library"):
+            overrides["dmp_library"] = parameters.read("~dmp_library", str)
+        if rospy.has_param("~auto_trigger"):
+            overrides["auto_trigger"] = parameters.read("~auto_trigger", bool)
+        config = Config.load(parameters.read("~config_file", str), overrides, rospy.logwarn)
         clock = SteadyClock()
         self.journal = Journal(clock.now)
         self.transitions = rospy.Publisher("coglab/transitions", Transition, queue_size=200)
         self.results = rospy.Publisher("coglab/results", String, queue_size=20, latch=True)
-        self.result_file = rospy.get_param("~result_file", "")
+        self.result_file = parameters.read("~result_file", str, "")
         self.journal.listen(self.on_transition)
         self.journal.listen_results(self.on_result)
         self.ctx = Context(clock=clock, arm=RosArm(), hand=RosHand(), perception=RosPerception(),
@@ -77,7 +80,7 @@ class MasterNode:
         self.states = rospy.Publisher("coglab/state", MasterStateMsg, queue_size=20, latch=True)
         self.watch = StateWatch(self.ctx, self.on_state)
         self.server = None
-        if rospy.get_param("~introspection", True):
+        if parameters.read("~introspection", bool, True):
             self.server = smach_ros.IntrospectionServer("coglab", self.master, "/coglab_master")
             self.server.start()
         rospy.Service("coglab/start", Start, self.on_start)
@@ -87,17 +90,17 @@ class MasterNode:
     @staticmethod
     def reachable():
         """The check of the arm's reach on the robot's own description, where there is one."""
-        found = rospy.search_param("robot_description")
-        if not found:
+        urdf = parameters.found_above("robot_description", str)
+        if urdf is None:
             return lambda pose: True
-        arm = cc.Chain(rospy.get_param(found))
+        arm = cc.Chain(urdf)
         return lambda pose: solve(arm, pose) is not None
 
     @staticmethod
     def state_file() -> str:
         """Where the held object is noted: one file per namespace."""
         name = "coglab_holding" + rospy.get_namespace().rstrip("/").replace("/", "_") + ".json"
-        return rospy.get_param("~state_file", "") or os.path.join(rospkg.get_ros_home(), name)
+        return parameters.read("~state_file", str, "") or os.path.join(rospkg.get_ros_home(), name)
 
     def on_start(self, request):
         """A trigger for the hub that is open now."""
@@ -173,7 +176,7 @@ def main() -> int:
     rospy.init_node("coglab")
     try:
         node = MasterNode()
-    except (ConfigError, KeyError) as error:
+    except (ConfigError, parameters.ParameterError) as error:
         rospy.logfatal("coglab cannot start: %s", error)
         return 1
     node.run()

@@ -8,18 +8,8 @@ import argparse
 import sys
 from pathlib import Path
 
-from coglab_smach.object_database import ObjectDatabase, ObjectError, new_object_text, read_object
-from coglab_smach.reachability import reachability_report
-
-
-def default_folder() -> Path:
-    """The objects of the source tree or of the installed share folder, whichever this script belongs to."""
-    here = Path(__file__).resolve()
-    beside = here.parent.parent / "objects"
-    if beside.is_dir():
-        return beside
-    import rospkg
-    return Path(rospkg.RosPack().get_path("coglab_smach")) / "objects"
+from coglab_objects.database import ObjectDatabase, ObjectError, new_object_text, objects_folder, read_object
+from coglab_smach.kinematics.reachability import reachability_report
 
 
 def cmd_list(database: ObjectDatabase) -> int:
@@ -81,7 +71,7 @@ def main() -> int:
     new = verbs.add_parser("new")
     new.add_argument("id")
     arguments = parser.parse_args()
-    folder = arguments.folder or default_folder()
+    folder = arguments.folder or objects_folder()
     if arguments.verb == "check":
         return cmd_check(folder, arguments.ids, arguments.dialect)
     if arguments.verb == "new":

@@ -17,8 +17,8 @@ import rostest
 import yaml
 from coglab_msgs.msg import Contact, MasterState, ReasonCode, Transition
 from coglab_msgs.srv import ArmContact, GetObject, ListObjects, Start
-from coglab_smach.reachability import default_arm, home_posture, position_jacobian
-from coglab_smach.torque_signal import TorqueSignal
+from coglab_smach.contact.torque_signal import TorqueSignal
+from coglab_smach.kinematics.reachability import default_arm, home_posture, position_jacobian
 from sensor_msgs.msg import JointState
 from smach_msgs.msg import SmachContainerStatus, SmachContainerStructure
 from std_msgs.msg import String
@@ -68,6 +68,7 @@ class BrainNodes(unittest.TestCase):
         answer = service("/contact_detector/arm", ArmContact)(mode="contact", timeout=1.0)
         self.assertFalse(answer.success)
         self.assertIn("no torques", answer.message)
+        self.assertEqual(answer.reason_code, ReasonCode.NODE_SILENT)
 
     def test_2_contact_is_published_once(self):
         torques = Torques()
@@ -77,7 +78,7 @@ class BrainNodes(unittest.TestCase):
         try:
             arm = service("/contact_detector/arm", ArmContact)
             time.sleep(2.0)
-            self.assertFalse(arm(mode="juggle", timeout=1.0).success)
+            self.assertEqual(arm(mode="juggle", timeout=1.0).reason_code, ReasonCode.INVALID_ARGUMENT)
             self.assertFalse(arm(mode="release", timeout=1.0).success)
             self.assertTrue(arm(mode="contact", timeout=20.0).success)
             time.sleep(1.5)
@@ -89,6 +90,8 @@ class BrainNodes(unittest.TestCase):
             time.sleep(0.5)
             self.assertEqual(len(events), 1)
             self.assertTrue(events[0].contact and events[0].source == "joint_torque" and events[0].margin > 1.0)
+            self.assertEqual(events[0].reason_code, ReasonCode.CONTACT_FOUND)
+            self.assertTrue(0.5 < events[0].confidence <= 1.0)
             self.assertTrue(arm(mode="off").success)
         finally:
             torques.over = True
@@ -96,6 +99,8 @@ class BrainNodes(unittest.TestCase):
     def test_3_object_database(self):
         self.assertEqual(list(service("/object_database/list_objects", ListObjects)().object_ids),
                          ["ball", "bottle", "mug", "screwdriver", "tea_box"])
+        unknown = service("/object_database/get_object", GetObject)("elephant")
+        self.assertEqual((unknown.success, unknown.reason_code), (False, ReasonCode.OBJECT_UNKNOWN))
         mug = service("/object_database/get_object", GetObject)("mug")
         self.assertTrue(mug.success)
         self.assertEqual(yaml.safe_load(mug.yaml)["mass"], 0.31)

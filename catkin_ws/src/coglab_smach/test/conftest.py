@@ -2,11 +2,11 @@
 from pathlib import Path
 
 import pytest
-from coglab_smach.config import Config
+from coglab_objects.database import ObjectDatabase, objects_folder
+from coglab_smach.clocks.virtual_clock import VirtualClock, using
+from coglab_smach.context.config import Config
 from coglab_smach.machines import build_master
-from coglab_smach.object_database import ObjectDatabase
-from coglab_smach.simulated_ports import simulated_context
-from coglab_smach.virtual_clock import VirtualClock, using
+from coglab_smach.simulated.ports import simulated_context
 
 SHARE = Path(__file__).resolve().parent.parent
 
@@ -16,7 +16,7 @@ class Trial:
 
     def __init__(self, **overrides):
         self.clock = VirtualClock()
-        self.database = ObjectDatabase(str(SHARE / "objects"))
+        self.database = ObjectDatabase(objects_folder())
         assert self.database.reload() == []
         config = Config.load(str(SHARE / "config" / "machines.yaml"),
                              {"auto_trigger": True, "dmp_library": "library.xml", **overrides})

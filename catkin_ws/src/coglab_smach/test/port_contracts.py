@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 from coglab_msgs.msg import ReasonCode
-from coglab_smach.pending import PortError
-from coglab_smach.ports import DmpRequest
+from coglab_smach.ports.interfaces import DmpRequest
+from coglab_smach.ports.pending import PortError
 
 CONTROLLERS = {"dmp": "coglab/DmpController", "ptp": "coglab/PtpController"}
 
@@ -153,7 +153,7 @@ class ArmContract(Contract):
     def test_a_reach_goes_on_until_it_is_cancelled(self):
         assert self.settle(self.port.load_dmps(self.place.library)) >= 5
         self.ready("dmp")
-        request = DmpRequest("take_board", "board", [0.0, -0.25, 0.45], None, 2.0)
+        request = DmpRequest("take_board", "board", [0.0, -0.25, 0.45], dmp_ratio=2.0)
         self.settle(self.port.execute_dmp(request))
         self.until(lambda: self.port.dmp_progress().primitive_id == "take_board", 1.0, "news of the motion")
         assert self.port.dmp_progress().state == "running" and self.port.dmp_progress().remaining_distance > 0.05
@@ -169,10 +169,10 @@ class ArmContract(Contract):
         self.refused(port.load_controller("x", "coglab/NoController"))
         self.ready("dmp")
         self.refused(port.move_ptp(self.away(), []), ReasonCode.NOT_ACTIVE)
-        self.refused(port.execute_dmp(DmpRequest("to_the_moon", "board", [0, 0, 0.4], None)), ReasonCode.UNKNOWN_NAME)
-        self.refused(port.switch_dmp(DmpRequest("put_board", "board", [0, 0, 0.4], None)), ReasonCode.NOTHING_RUNS)
+        self.refused(port.execute_dmp(DmpRequest("to_the_moon", "board", [0, 0, 0.4])), ReasonCode.UNKNOWN_NAME)
+        self.refused(port.switch_dmp(DmpRequest("put_board", "board", [0, 0, 0.4])), ReasonCode.NOTHING_RUNS)
         self.ready()
-        self.refused(port.execute_dmp(DmpRequest("take_board", "board", [0, 0, 0.4], None)), ReasonCode.NOT_ACTIVE)
+        self.refused(port.execute_dmp(DmpRequest("take_board", "board", [0, 0, 0.4])), ReasonCode.NOT_ACTIVE)
         self.refused(port.move_ptp(self.away()[:6], []), ReasonCode.INVALID_ARGUMENT)
         self.refused(port.move_ptp([float("nan"), *self.away()[1:]], []), ReasonCode.INVALID_ARGUMENT)
         self.refused(port.move_ptp([3.5, *self.away()[1:]], []), ReasonCode.OUT_OF_RANGE)

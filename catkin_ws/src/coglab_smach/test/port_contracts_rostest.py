@@ -14,9 +14,9 @@ import rosgraph
 import rospkg
 import rospy
 import rostest
-from coglab_smach.ros_arm import RosArm
-from coglab_smach.ros_hand import RosHand
-from coglab_smach.ros_ports import RosContact, RosDatabase, RosPerception
+from coglab_smach.ros.arm import RosArm
+from coglab_smach.ros.hand import RosHand
+from coglab_smach.ros.ports import RosContact, RosDatabase, RosPerception
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 from port_contracts import SUITES, Place

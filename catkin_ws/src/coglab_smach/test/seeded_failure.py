@@ -2,7 +2,7 @@
 afterwards."""
 import numpy as np
 import smach
-from coglab_smach.pending import PortError
+from coglab_smach.ports.pending import PortError
 from coglab_smach.states.base import CoglabState, TimeLimit
 from motion_watch import MotionWatch
 from virtual_trial import VirtualTrial

@@ -7,11 +7,9 @@ import time
 from types import SimpleNamespace
 
 import pytest
-
-pytest.importorskip("actionlib", reason="actionlib is not installed")
 from actionlib_msgs.msg import GoalStatus
-from coglab_smach.pending import PortError
-from coglab_smach.ros_hand import ActionCall
+from coglab_smach.ports.pending import PortError
+from coglab_smach.ros.hand import ActionCall
 
 
 class Client:

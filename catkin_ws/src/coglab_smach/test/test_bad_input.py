@@ -3,10 +3,10 @@ import shutil
 
 import pytest
 from coglab_msgs.msg import ReasonCode
-from coglab_smach.object_database import ObjectDatabase
-from coglab_smach.pending import PortError
-from coglab_smach.pose import Pose
-from conftest import SHARE, Trial
+from coglab_objects.database import ObjectDatabase, objects_folder
+from coglab_py.pose import Pose
+from coglab_smach.ports.pending import PortError
+from conftest import Trial
 
 EXCHANGE = "exchange_human_to_robot"
 
@@ -143,7 +143,7 @@ def test_arm_node_dead_ends_in_fault_with_its_sentence():
 
 
 def test_a_database_file_that_breaks_during_a_trial_keeps_the_old_entry(tmp_path):
-    shutil.copytree(SHARE / "objects", tmp_path / "objects")
+    shutil.copytree(objects_folder(), tmp_path / "objects")
     trial = Trial()
     problems = []
 

@@ -2,10 +2,11 @@
 arm-must-stand-still gate."""
 import numpy as np
 import pytest
-from coglab_smach.contact_detector import ContactDetector, DetectorSettings, sensitive_joints
-from coglab_smach.contact_trials import DT, STILL, ContactTrial, found_within, push
-from coglab_smach.pose import Pose
-from coglab_smach.reachability import default_arm, position_jacobian, solve
+from coglab_msgs.msg import ReasonCode
+from coglab_py.pose import Pose
+from coglab_smach.contact.detector import ContactDetector, DetectorSettings, confidence, sensitive_joints
+from coglab_smach.contact.trials import DT, STILL, ContactTrial, found_within, push
+from coglab_smach.kinematics.reachability import default_arm, position_jacobian, solve
 
 
 @pytest.fixture(scope="module")
@@ -86,6 +87,25 @@ def test_a_person_who_was_early_is_found_by_the_offset(posture):
     run.detector.arm("contact", run.t, 10.0)
     event, _ = run.feed(1.0, pressing)
     assert event is not None and event.source == "torque_offset" and event.contact
+    assert event.code == ReasonCode.CONTACT_CAME_EARLY and event.confidence > 0.5
+
+
+def test_an_event_says_what_it_is_and_how_sure_it_is(posture):
+    """A push far over the threshold is certain; the weight that has just come to its share is a matter of noise."""
+    run = ContactTrial(posture, 8)
+    run.rest_and_arm()
+    touch, _ = run.feed(1.0, push((0, 1, 0), 8.0))
+    assert (touch.code, touch.source) == (ReasonCode.CONTACT_FOUND, "joint_torque")
+    assert touch.confidence == pytest.approx(confidence((touch.margin - 1.0) * DetectorSettings().k)) and \
+        0.5 < touch.confidence <= 1.0
+    run.detector.arm("load", run.t, 10.0, mass=0.5)
+    load, _ = run.feed(3.0, lambda t: (0.0, 0.0, -0.5 * 9.81))
+    assert load.code == ReasonCode.LOAD_CARRIED and 0.5 <= load.confidence <= 1.0
+    run.detector.arm("release", run.t, 10.0, mass=0.5)
+    run.feed(0.2, lambda t: (0.0, 0.0, -0.5 * 9.81))
+    gone, _ = run.feed(3.0)
+    assert gone.code == ReasonCode.LOAD_RELEASED and 0.5 <= gone.confidence <= 1.0
+    assert [confidence(d) for d in (0.0, 10.0)] == pytest.approx([0.5, 1.0])
 
 
 def test_only_one_event_per_arming(posture):

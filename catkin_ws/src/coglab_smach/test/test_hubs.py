@@ -2,8 +2,8 @@
 import json
 
 import pytest
-from coglab_smach.holding import HoldingMemory
-from coglab_smach.ports import Recognition
+from coglab_smach.context.holding import HoldingMemory
+from coglab_smach.ports.interfaces import Recognition
 from conftest import Trial
 
 

@@ -40,7 +40,7 @@ def test_object_that_is_not_seen():
 
 
 def test_nobody_offers_the_object_and_the_arm_does_not_move():
-    from coglab_smach.pose import Pose
+    from coglab_py.pose import Pose
     trial = failed_exchange(lambda t: t.cell.objects.__setitem__("mug", Pose([1.2, 0.2, 0.1])))
     assert_recovered_empty(trial, "'mug' was not offered within 8 s: it stayed at (1.20, 0.20, 0.10) m")
     assert "execute_dmp" not in trial.cell.called()
@@ -268,17 +268,17 @@ def test_every_transition_of_a_failure_carries_its_sentence():
 
 
 def test_configuration_is_read_again_while_running(tmp_path):
-    from coglab_smach.config import Config
+    from coglab_smach.context.config import Config
     path = tmp_path / "c.yaml"
-    path.write_text("a: {b: 1}\n")
+    path.write_text("hand: {open_speed: 1}\n")
     warnings = []
     config = Config.load(str(path), warn=warnings.append)
-    assert config.get("a.b") == 1
-    path.write_text("a: {b: 22}\n")
+    assert config.get("hand.open_speed") == 1
+    path.write_text("hand: {open_speed: 22}\n")
     import os
     os.utime(path, ns=(1, 1))
-    assert config.get("a.b") == 22
-    path.write_text("a: [\n")
+    assert config.get("hand.open_speed") == 22
+    path.write_text("hand: [\n")
     os.utime(path, ns=(2, 2))
-    assert config.get("a.b") == 22
+    assert config.get("hand.open_speed") == 22
     assert len(warnings) == 1 and "stay in force" in warnings[0]

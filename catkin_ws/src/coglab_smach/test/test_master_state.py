@@ -3,8 +3,8 @@ import json
 
 from coglab_msgs.msg import MasterState as Message
 from coglab_msgs.msg import ReasonCode
-from coglab_smach.master_state import MasterState, StateWatch
-from coglab_smach.requests import ask_for
+from coglab_smach.context.master_state import MasterState, StateWatch
+from coglab_smach.context.trigger import ask_for
 from conftest import Trial
 
 RECEIVE, GIVE = "exchange_human_to_robot", "exchange_robot_to_human"

@@ -1,11 +1,11 @@
 """Who starts a motion ends it: whatever fails, runs out of time or is preempted, the arm stands before the next state
 begins, and recovery goes nowhere with an object that a person may hold."""
-import coglab_smach.simulated_arm_model as model
+import coglab_smach.simulated.arm_model as model
 import pytest
 from coglab_msgs.msg import ReasonCode
-from coglab_smach.manager_limits import read_limits
-from coglab_smach.motion_time import ptp_time, reach_time
-from coglab_smach.pending import PortError
+from coglab_smach.kinematics.manager_limits import read_limits
+from coglab_smach.kinematics.motion_time import ptp_time, reach_time
+from coglab_smach.ports.pending import PortError
 from conftest import Trial
 from motion_watch import MotionWatch
 

@@ -7,16 +7,16 @@ import pytest
 import smach
 
 try:
-    from virtual_rig import BOARD
+    from coglab_sim.virtual_world import BOARD
     from virtual_trial import VirtualTrial
 except ImportError as error:
     pytest.skip(f"a compiled module is not there: {error}", allow_module_level=True)
 from coglab_perception.frames import FrameNames
+from coglab_py.pose import Pose
 from coglab_sim.perception_stand_in import Board, PerceptionSettings
-from coglab_sim.rigid import Frame
 from coglab_sim.vision import NotSeen, Vision
-from coglab_smach.pending import Polled, PortError, Ready
-from coglab_smach.ports import Located
+from coglab_smach.ports.interfaces import Located
+from coglab_smach.ports.pending import Polled, PortError, Ready
 
 NAMES = FrameNames("world", "human_hand", "board", "object_{id}")
 BESIDE, BEHIND = np.array([1.05, 0.45, 0.35]), np.array([1.75, 0.6, 0.35])
@@ -46,7 +46,7 @@ class SharedTracker:
             self.object = frame
         else:
             # Neither name nor order tells who the partner is.
-            hands = {"left": Frame(self.other(t)), "right": frame}
+            hands = {"left": Pose(self.other(t)), "right": frame}
             for sight in self.vision.see(hands, {"object_mug": self.object}, palm):
                 self.waiting[sight.name].append(sight)
         sights, self.waiting[name] = self.waiting[name], []

@@ -1,15 +1,14 @@
 """The contracts of the ports on their doubles."""
 import pytest
-from coglab_smach.object_database import ObjectDatabase
-from coglab_smach.simulated_cell import SimulatedCell
-from coglab_smach.simulated_ports import (
+from coglab_objects.database import ObjectDatabase, objects_folder
+from coglab_smach.simulated.cell import SimulatedCell
+from coglab_smach.simulated.ports import (
     SimulatedArm,
     SimulatedContact,
     SimulatedDatabase,
     SimulatedHand,
     SimulatedPerception,
 )
-from conftest import SHARE
 from port_contracts import SUITES, Place
 
 
@@ -31,7 +30,7 @@ def double_of(name):
     cell = SimulatedCell(clock)
     cell.partner.touch_after = cell.partner.take_after = cell.partner.let_go_after = None
     cell.faults.empty_grasp = True
-    database = ObjectDatabase(str(SHARE / "objects"))
+    database = ObjectDatabase(objects_folder())
     assert database.reload() == []
     ports = {"arm": SimulatedArm, "hand": SimulatedHand, "perception": SimulatedPerception, "contact": SimulatedContact,
              "database": lambda at: SimulatedDatabase(at, database)}
@@ -54,12 +53,12 @@ RIG_LACKS = ("test_given_up_while_its_node_is_frozen_it_never_acts", "test_a_hol
 def test_the_arm_of_whole_trials():
     """The arm of the trials in virtual time, which has the real controllers behind it."""
     try:
-        from virtual_ports import VirtualArm
-        from virtual_rig import DT, Rig
+        from coglab_sim.virtual_world import DT, World
+        from coglab_smach.simulated.world_ports import VirtualArm
         from virtual_trial import LIBRARY
     except ImportError as error:
         pytest.skip(f"a compiled module is not there: {error}")
-    rig = Rig(1)
+    rig = World(1)
 
     def sleep(duration):
         for _ in range(max(1, round(duration / DT))):

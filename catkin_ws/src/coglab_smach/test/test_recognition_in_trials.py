@@ -35,7 +35,7 @@ def test_an_object_held_high_gets_the_primitive_for_it():
     assert "primitive 'reach_human' replaced by 'reach_human_high'" in switched[0]
     assert trial.rig.robot.progress["primitive"] == "reach_human_high"
     assert results[0].outcome == "succeeded", results[0].reason
-    assert trial.rig.robot.limit_violations == 0 and trial.rig.watched_while_moving == 0
+    assert trial.rig.robot.limit_violations == 0 and trial.ctx.contact.watched_while_moving == 0
 
 
 def test_a_common_reach_keeps_the_primitive():

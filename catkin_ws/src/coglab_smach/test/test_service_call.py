@@ -1,20 +1,17 @@
 """A service call that is given up before it was sent never acts, however late its server comes or thaws."""
 from __future__ import annotations
 
+import io
 import threading
 import time
 from types import SimpleNamespace
 
 import pytest
-
-pytest.importorskip("rospy", reason="rospy is not installed")
-import io
-
 import rospy
 from coglab_msgs.msg import ReasonCode
 from coglab_msgs.srv import LwrCommand
-from coglab_smach import ros_calls
-from coglab_smach.pending import PortError
+from coglab_smach.ports.pending import PortError
+from coglab_smach.ros import calls
 
 
 class Server:
@@ -24,9 +21,9 @@ class Server:
         self.there, self.thawed = threading.Event(), threading.Event()
         self.heard = []
         self.answer = SimpleNamespace(success=True, message="done", reason_code=0)
-        monkeypatch.setattr(ros_calls.rospy, "resolve_name", lambda name: "/" + name)
-        monkeypatch.setattr(ros_calls.rospy, "wait_for_service", self.wait_for_service)
-        monkeypatch.setattr(ros_calls.rospy, "ServiceProxy", lambda name, kind: self.call)
+        monkeypatch.setattr(calls.rospy, "resolve_name", lambda name: "/" + name)
+        monkeypatch.setattr(calls.rospy, "wait_for_service", self.wait_for_service)
+        monkeypatch.setattr(calls.rospy, "ServiceProxy", lambda name, kind: self.call)
 
     def wait_for_service(self, name, timeout):
         if not self.there.wait(timeout):
@@ -52,7 +49,7 @@ def test_given_up_before_it_was_sent(monkeypatch, late):
     server = Server(monkeypatch)
     if late == "thawed":
         server.there.set()
-    call = ros_calls.call("lwr/command", LwrCommand, event="reset")
+    call = calls.call("lwr/command", LwrCommand, event="reset")
     time.sleep(0.05)
     call.cancel()
     server.there.set()
@@ -69,7 +66,7 @@ def test_a_refusal_brings_its_code(monkeypatch):
     server.there.set()
     server.thawed.set()
     server.answer = SimpleNamespace(success=False, message="hold is latched", reason_code=ReasonCode.HELD)
-    call = ros_calls.call("lwr/command", LwrCommand, event="start")
+    call = calls.call("lwr/command", LwrCommand, event="start")
     assert ended(call) and server.heard == ["start"]
     with pytest.raises(PortError, match="/lwr/command refused: hold is latched") as raised:
         call.result()
@@ -78,7 +75,7 @@ def test_a_refusal_brings_its_code(monkeypatch):
 
 def test_a_server_that_never_comes(monkeypatch):
     Server(monkeypatch)
-    call = ros_calls.call("lwr/command", LwrCommand, wait=0.1, event="start")
+    call = calls.call("lwr/command", LwrCommand, wait=0.1, event="start")
     assert ended(call)
     with pytest.raises(PortError, match="is not there after 0 s; is its node running") as raised:
         call.result()

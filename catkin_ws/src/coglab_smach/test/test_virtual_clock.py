@@ -3,8 +3,8 @@ import threading
 
 import pytest
 import smach
-from coglab_smach.clock import SteadyClock
-from coglab_smach.virtual_clock import ClockStalled, VirtualClock, VirtualCondition, using
+from coglab_smach.clocks.clock import SteadyClock
+from coglab_smach.clocks.virtual_clock import ClockStalled, VirtualClock, VirtualCondition, using
 
 
 class Waits(smach.State):

@@ -11,7 +11,7 @@ try:
     from virtual_trial import VirtualTrial
 except ImportError as error:
     pytest.skip(f"a compiled module is not there: {error}", allow_module_level=True)
-from virtual_rig import LIMITS
+from coglab_sim.virtual_world import LIMITS
 
 LONG = os.environ.get("COGLAB_LONG") == "1"
 SESSION = ("exchange_human_to_robot", "put", "take", "exchange_robot_to_human")

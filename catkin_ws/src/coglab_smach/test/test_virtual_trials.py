@@ -30,7 +30,7 @@ def run(*actions, moves=True, **kw):
     trial = VirtualTrial(**kw)
     results = trial.run(*actions)
     assert trial.rig.robot.limit_violations == 0
-    assert trial.rig.watched_while_moving == 0
+    assert trial.ctx.contact.watched_while_moving == 0
     # "The arm has not moved" where nobody offered anything; else it has.
     assert (trial.rig.robot.peak_share > 0.05) == (moves and kw.get("behaviour") != "absent")
     assert trial.last_hub in ("wait_without_object", "wait_with_object"), trial.ctx.journal.why()

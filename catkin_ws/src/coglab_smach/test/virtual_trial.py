@@ -2,15 +2,23 @@
 import dataclasses
 from pathlib import Path
 
-from coglab_smach.config import Config
-from coglab_smach.context import Context
-from coglab_smach.journal import Journal
+import numpy as np
+from coglab_objects.database import ObjectDatabase, objects_folder
+from coglab_py.pose import Pose
+from coglab_sim.virtual_world import DT, LIMITS, World, pose_of_truth
+from coglab_smach.clocks.virtual_clock import VirtualClock, using
+from coglab_smach.context.config import Config
+from coglab_smach.context.context import Context
+from coglab_smach.context.journal import Journal
+from coglab_smach.kinematics.reachability import default_arm, solve
 from coglab_smach.machines import build_master
-from coglab_smach.object_database import ObjectDatabase
-from coglab_smach.reachability import default_arm, solve
-from coglab_smach.virtual_clock import VirtualClock, using
-from virtual_ports import VirtualArm, VirtualContact, VirtualDatabase, VirtualHand, VirtualPerception
-from virtual_rig import DT, LIMITS, Rig, distance, frame_of, palm_goal
+from coglab_smach.simulated.world_ports import (
+    VirtualArm,
+    VirtualContact,
+    VirtualDatabase,
+    VirtualHand,
+    VirtualPerception,
+)
 
 SHARE = Path(__file__).resolve().parent.parent
 LIBRARY = str(SHARE.parent / "coglab_controllers" / "config" / "primitives.xml")
@@ -24,11 +32,11 @@ class VirtualTrial:
 
     def __init__(self, seed=1, behaviour="normal", perfect=False, object_on="human_hand", perception=None,
                  recogniser=None, later_behaviour="", turned=0.0, limits=LIMITS, **overrides):
-        self.rig = Rig(seed, behaviour, perfect, object_on, perception, turned, limits)
+        self.rig = World(seed, behaviour, perfect, object_on, perception, turned, limits)
         self.clock = VirtualClock()
         self.recogniser, self.later_behaviour = recogniser, later_behaviour
         self.last_hub = ""
-        database = ObjectDatabase(str(SHARE / "objects"))
+        database = ObjectDatabase(objects_folder())
         database.reload()
         config = Config.load(str(SHARE / "config" / "machines.yaml"),
                              {"auto_trigger": True, "dmp_library": LIBRARY, **overrides})
@@ -57,7 +65,7 @@ class VirtualTrial:
             elif record.from_state in task and record.outcome != "succeeded":
                 self.rig.human.command("rest")
         if record.from_state == "execute_dmp" and record.outcome == "succeeded":
-            self._reach = ReachRecord(self.rig, self.ctx.arm.request)
+            self._reach = ReachRecord(self.rig, self.ctx)
         if record.from_state == "wait_stop" and self._reach is not None:
             self.reaches.append(self._reach)
             self._reach = None
@@ -134,8 +142,8 @@ class ReachRecord:
     latched it; ``to_sight``: to the newest single sight; ``to_truth``: to where the grasp pose really is.
     """
 
-    def __init__(self, rig, request):
-        self.rig, self.request = rig, request
+    def __init__(self, rig, ctx):
+        self.rig, self.request, self.contact = rig, ctx.arm.request, ctx.contact
         self.begin = rig.t
         self.path = []
         self.reached = None
@@ -149,16 +157,17 @@ class ReachRecord:
         if self.reached is None and robot.progress["motion"] == "reached":
             self.reached = rig.t
         # Measured when the detector begins to watch: the arm stands still and nobody has touched it yet.
-        if self.to_goal is None and self.reached is not None and rig.detector.state() == "watching":
+        if self.to_goal is None and self.reached is not None and self.contact.detector.state() == "watching":
             self._measure()
 
     def _measure(self):
         rig, request, debug = self.rig, self.request, self.rig.robot.debug
         if debug is None:
             return
-        palm = rig.robot.chain.fk(rig.robot.report["position"])
-        self.to_goal = distance(palm, (debug["goal"], debug["set_point"][1]))
+        palm = Pose(*rig.robot.chain.fk(rig.robot.report["position"]))
+        goal = Pose(np.asarray(request.goal_offset, dtype=float), np.asarray(request.target_orientation))
+        self.to_goal = palm.distance(Pose(np.asarray(debug["goal"]), np.asarray(debug["set_point"][1])))
         seen, _ = rig.newest(request.goal_frame)
         truth = rig.truth["human_hand" if request.goal_frame == "human_hand" else "object"]
-        self.to_sight = distance(palm, palm_goal(seen, request.goal_offset, request.target_orientation))
-        self.to_truth = distance(palm, palm_goal(frame_of(truth), request.goal_offset, request.target_orientation))
+        self.to_sight = palm.distance(seen * goal)
+        self.to_truth = palm.distance(pose_of_truth(truth) * goal)

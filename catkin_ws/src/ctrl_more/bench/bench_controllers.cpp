@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
+#include <functional>
 #include <limits>
 #include <memory>
 #include <vector>
@@ -17,11 +18,15 @@ using namespace ctrl_more;
 // The typical controller: one read of an IMU, one read-modify-write of a pose.
 class Typical : public FeedbackController {
  public:
+  /// @param bounded declares bounds of size and rate, in position and angle
+  explicit Typical(bool bounded = false) : bounded_(bounded) {}
   Description describe() const override {
     Description d;
     d.type = "Typical";
     d.measured("imu").size(9).in("rad").frameOf("imu").about("read");
-    d.modifies(ControlContainer::TaskSpaceReferencePose, "pelvis").in("m").frameOf("w").about("x");
+    ControlSignalUse& pelvis = d.modifies(ControlContainer::TaskSpaceReferencePose, "pelvis");
+    pelvis.in("m").frameOf("w").about("x");
+    if (bounded_) pelvis.bounded({0.1, 1.0, 0.1, 1.0});
     return d;
   }
   void initialize(Setup& setup) override {
@@ -34,6 +39,7 @@ class Typical : public FeedbackController {
   }
 
  private:
+  bool bounded_;
   Read<9> imu_;
   Modify<Pose> pelvis_;
 };
@@ -72,65 +78,87 @@ double nanoseconds(const std::function<void()>& block, int cycles, int controlle
   return std::chrono::duration<double, std::nano>(end - begin).count() / cycles / controllers;
 }
 
+// Stores and managers of the same controllers, run in turn.
+class Bench {
+ public:
+  Bench() {
+    control_.declare(ControlContainer::TaskSpaceReferencePose, "pelvis", 7);
+    robot_.setMeasuredData("imu", Eigen::VectorXd::Constant(9, 0.1), 0);
+    guarded_ = manager(false, false);
+    timed_ = manager(false, true);
+    bounded_ = manager(true, true);
+    unguarded_ = std::make_unique<Unguarded>(kControllers, robot_, control_, logger_);
+    guarded_->freeze();
+    original_ = control_;
+  }
+
+  // One block of each; the smallest time counts.
+  void block() {
+    measure(unguarded_ns, [this] { unguarded_->update(cycle_, robot_, control_, original_); });
+    measure(guarded_ns, [this] { guarded_->update(cycle_, robot_, control_); });
+    measure(timed_ns, [this] { timed_->update(cycle_, robot_, control_); });
+    measure(bounded_ns, [this] { bounded_->update(cycle_, robot_, control_); });
+  }
+
+  std::uint64_t faults() const {
+    std::uint64_t count = 0;
+    for (const auto* manager : {guarded_.get(), timed_.get(), bounded_.get()}) {
+      for (const auto& status : manager->statusAll()) count += status.faults;
+    }
+    return count;
+  }
+
+  static constexpr int kControllers = 100, kCycles = 400;
+  double unguarded_ns = std::numeric_limits<double>::max();
+  double guarded_ns = unguarded_ns, timed_ns = unguarded_ns, bounded_ns = unguarded_ns;
+
+ private:
+  std::unique_ptr<FeedbackControllersManager> manager(bool bounded, bool timed) {
+    ManagerOptions options;
+    options.blend_s = 0.0;
+    options.timed = timed;
+    auto manager =
+        std::make_unique<FeedbackControllersManager>(robot_, control_, options, &logger_);
+    ControllerEntry entry;
+    entry.enabled = true;
+    entry.overrun_us = timed ? 1e6 : 0.0;  // where a duration is judged, it is measured
+    for (int i = 0; i < kControllers; ++i) {
+      const Status status = manager->addController(std::make_unique<Typical>(bounded),
+                                                   "c" + std::to_string(i), entry);
+      if (!status) std::fprintf(stderr, "%s\n", status.message().c_str());
+    }
+    return manager;
+  }
+
+  void measure(double& best, const std::function<void()>& update) {
+    const auto block = [&] {
+      for (int i = 0; i < kCycles; ++i) {
+        ++cycle_.number;
+        update();
+      }
+    };
+    best = std::min(best, nanoseconds(block, kCycles, kControllers));
+  }
+
+  Logger logger_;
+  RobotStates robot_{&logger_};
+  ControlStates control_{0, 0.005, &logger_};
+  ControlStates original_{0, 0.005, &logger_};
+  Cycle cycle_{0, 0.005, 0};
+  std::unique_ptr<FeedbackControllersManager> guarded_, timed_, bounded_;
+  std::unique_ptr<Unguarded> unguarded_;
+};
+
 }  // namespace
 
 // Argument: number of blocks.
 int main(int argc, char** argv) {
-  constexpr int kControllers = 100, kCycles = 400;
   const int blocks = argc > 1 ? std::atoi(argv[1]) : 150;
-  Logger logger;
-  RobotStates robot(&logger);
-  ControlStates control(0, 0.005, &logger);
-  control.declare(ControlContainer::TaskSpaceReferencePose, "pelvis", 7);
-  ManagerOptions plain, timed;
-  plain.blend_s = timed.blend_s = 0.0;
-  timed.timed = true;
-  FeedbackControllersManager guarded(robot, control, plain, &logger);
-  FeedbackControllersManager guarded_timed(robot, control, timed, &logger);
-  ControllerEntry entry;
-  entry.enabled = true;
-  for (int i = 0; i < kControllers; ++i) {
-    for (FeedbackControllersManager* manager : {&guarded, &guarded_timed}) {
-      // Where a duration is judged, it is measured.
-      entry.overrun_us = manager == &guarded_timed ? 1e6 : 0.0;
-      const Status status =
-          manager->addController(std::make_unique<Typical>(), "c" + std::to_string(i), entry);
-      if (!status) std::fprintf(stderr, "%s\n", status.message().c_str());
-    }
-  }
-  robot.setMeasuredData("imu", Eigen::VectorXd::Constant(9, 0.1), 0);
-  Unguarded unguarded(kControllers, robot, control, logger);
-  guarded.freeze();
-  ControlStates original = control;
-  Cycle cycle{0, 0.005, 0};
-
-  double floor_ns = std::numeric_limits<double>::max(), guarded_ns = floor_ns, timed_ns = floor_ns;
-  for (int block = 0; block < blocks; ++block) {
-    floor_ns = std::min(floor_ns, nanoseconds([&] {
-      for (int i = 0; i < kCycles; ++i) {
-        ++cycle.number;
-        unguarded.update(cycle, robot, control, original);
-      }
-    }, kCycles, kControllers));
-    guarded_ns = std::min(guarded_ns, nanoseconds([&] {
-      for (int i = 0; i < kCycles; ++i) {
-        ++cycle.number;
-        guarded.update(cycle, robot, control);
-      }
-    }, kCycles, kControllers));
-    timed_ns = std::min(timed_ns, nanoseconds([&] {
-      for (int i = 0; i < kCycles; ++i) {
-        ++cycle.number;
-        guarded_timed.update(cycle, robot, control);
-      }
-    }, kCycles, kControllers));
-  }
-  std::uint64_t faults = 0;
-  for (const auto& status : guarded.statusAll()) faults += status.faults;
-  for (const auto& status : guarded_timed.statusAll()) faults += status.faults;
+  Bench bench;
+  for (int block = 0; block < blocks; ++block) bench.block();
   std::printf("{\"controllers\": %d, \"unguarded_ns\": %.3f, \"guarded_ns\": %.3f, "
-              "\"timed_ns\": %.3f, \"faults\": %llu}\n",
-              kControllers, floor_ns, guarded_ns, timed_ns,
-              static_cast<unsigned long long>(faults));
+              "\"timed_ns\": %.3f, \"bounded_ns\": %.3f, \"faults\": %llu}\n",
+              Bench::kControllers, bench.unguarded_ns, bench.guarded_ns, bench.timed_ns,
+              bench.bounded_ns, static_cast<unsigned long long>(bench.faults()));
   return 0;
 }

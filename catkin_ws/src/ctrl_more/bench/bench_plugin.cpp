@@ -1,7 +1,7 @@
 // A plug-in that bench_feedback.py multiplies: the ten characters of its type name are replaced in
 // copies of the built library. Registered with class_loader alone when BARE is defined, so that a
 // bare class_loader loads the same code.
-#include "ctrl_more/prototypes.hpp"
+#include "ctrl_more/feedback_controller.hpp"
 #ifdef BARE
 #include <class_loader/register_macro.hpp>
 #endif

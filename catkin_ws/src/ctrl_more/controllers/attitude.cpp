@@ -4,8 +4,7 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 
-#include "ctrl_more/prototypes.hpp"
-#include "ctrl_more/so3.hpp"
+#include "ctrl_more/feedback_controller.hpp"
 
 namespace ctrl_more {
 

@@ -3,7 +3,7 @@
 
 #include <Eigen/Core>
 
-#include "ctrl_more/prototypes.hpp"
+#include "ctrl_more/feedback_controller.hpp"
 #include "second_order.hpp"
 
 namespace ctrl_more {

@@ -4,8 +4,7 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 
-#include "ctrl_more/prototypes.hpp"
-#include "ctrl_more/so3.hpp"
+#include "ctrl_more/feedback_controller.hpp"
 #include "second_order.hpp"
 
 namespace ctrl_more {
@@ -64,6 +63,25 @@ void bound(Offset offset, Velocity velocity, double limit) {
   if (outward > 0.0) velocity -= outward * direction;
 }
 
+void declareGains(Description& d) {
+  d.gain("mass", 0).vector(3, 4.0).range(0.1, 100.0).in("kg").about("virtual mass, x y z");
+  d.gain("damping", 0).vector(3, 60.0).range(0.0, 1e4).in("N s/m").about("virtual damper, x y z");
+  d.gain("stiffness", 0).vector(3, 200.0).range(0.0, 1e5).in("N/m").about(
+      "virtual spring, x y z; 0: stays where it is led");
+  d.gain("inertia", 0).vector(3, 0.2).range(0.001, 10.0).in("kg m^2").about(
+      "virtual inertia about x y z (axes: all)");
+  d.gain("rotary_damping", 0).vector(3, 3.0).range(0.0, 1e3).in("Nm s/rad").about(
+      "virtual damper about x y z (axes: all)");
+  d.gain("rotary_stiffness", 0).vector(3, 10.0).range(0.0, 1e4).in("Nm/rad").about(
+      "virtual spring about x y z (axes: all)");
+  d.gain("force_dead_band", 3.0).range(0.0, 100.0).in("N").about("forces below it count as zero");
+  d.gain("torque_dead_band", 0.5).range(0.0, 50.0).in("Nm").about(
+      "torques below it count as zero");
+  d.gain("max_offset", 0.15).range(0.0, 0.4).in("m").about("largest distance from the reference");
+  d.gain("max_angle", 0.5).range(0.0, 1.5).in("rad").about("largest turn from the reference");
+  d.gain("max_velocity", 0.25).range(0.0, 2.0).in("m/s").about("largest yielding speed");
+}
+
 }  // namespace
 
 Description EeAdmittance::describe() const {
@@ -97,22 +115,7 @@ Description EeAdmittance::describe() const {
   d.modifies(ControlContainer::TaskSpaceReferenceVel, "ee").keyFrom("ee").in("m/s, rad/s").frameOf(
       "base").bounded({5.0, kUnlimited, kUnlimited, kUnlimited}).about(
       "the velocity of the offset is added");
-  d.gain("mass", 0).vector(3, 4.0).range(0.1, 100.0).in("kg").about("virtual mass, x y z");
-  d.gain("damping", 0).vector(3, 60.0).range(0.0, 1e4).in("N s/m").about("virtual damper, x y z");
-  d.gain("stiffness", 0).vector(3, 200.0).range(0.0, 1e5).in("N/m").about(
-      "virtual spring, x y z; 0: stays where it is led");
-  d.gain("inertia", 0).vector(3, 0.2).range(0.001, 10.0).in("kg m^2").about(
-      "virtual inertia about x y z (axes: all)");
-  d.gain("rotary_damping", 0).vector(3, 3.0).range(0.0, 1e3).in("Nm s/rad").about(
-      "virtual damper about x y z (axes: all)");
-  d.gain("rotary_stiffness", 0).vector(3, 10.0).range(0.0, 1e4).in("Nm/rad").about(
-      "virtual spring about x y z (axes: all)");
-  d.gain("force_dead_band", 3.0).range(0.0, 100.0).in("N").about("forces below it count as zero");
-  d.gain("torque_dead_band", 0.5).range(0.0, 50.0).in("Nm").about(
-      "torques below it count as zero");
-  d.gain("max_offset", 0.15).range(0.0, 0.4).in("m").about("largest distance from the reference");
-  d.gain("max_angle", 0.5).range(0.0, 1.5).in("rad").about("largest turn from the reference");
-  d.gain("max_velocity", 0.25).range(0.0, 2.0).in("m/s").about("largest yielding speed");
+  declareGains(d);
   for (const char* name : {"offset_x", "offset_y", "offset_z"}) {
     d.state(name).in("m").about("yielded distance");
   }

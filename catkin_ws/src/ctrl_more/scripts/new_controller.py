@@ -1,10 +1,12 @@
 #!/usr/bin/python3
 """Makes a new feedback controller from the template: code, configuration, list file and test.
 
-    new_controller.py NAME --into DIR
+    new_controller.py [--motion] NAME --into DIR
 
 NAME is the type in CamelCase (for example WristDamper). DIR/wrist_damper is made with a CMake
 project that builds alone or in a catkin workspace, compiles at once, and has a passing test.
+With --motion it is a motion of the arm for coglab_controllers instead: a catkin package, from the
+template of that package.
 """
 
 from __future__ import annotations
@@ -22,21 +24,21 @@ def snake_case(name: str) -> str:
     return re.sub(r"(?<=[a-z])(?=[A-Z])", "_", name).lower()
 
 
-def template_folder() -> Path:
-    """The template beside this script: in the source tree, or where it was installed."""
+def template_folder(package: str = "ctrl_more") -> Path:
+    """The template of a package: beside this script's package in the source tree, or installed."""
     here = Path(__file__).resolve().parent
-    for folder in (
+    places = (
+        here.parent.parent / package / "template",
         here.parent / "template",
-        here.parent.parent / "share" / "ctrl_more" / "template",
-    ):
-        if folder.is_dir():
-            return folder
-    raise FileNotFoundError(
-        f"the template was expected at {here.parent / 'template'}; reinstall ctrl_more"
+        here.parent.parent / "share" / package / "template",
     )
+    for folder in places:
+        if folder.is_dir() and (package == "ctrl_more" or folder.parent.name == package):
+            return folder
+    raise FileNotFoundError(f"the template was expected at {places[0]}; reinstall {package}")
 
 
-def make_controller(name: str, into: Path) -> Path:
+def make_controller(name: str, into: Path, template: Path | None = None) -> Path:
     """Writes the new controller and returns its folder; raises ValueError or FileExistsError."""
     if not re.fullmatch(r"[A-Z][A-Za-z0-9]*[a-z][A-Za-z0-9]*", name):
         raise ValueError(
@@ -48,10 +50,11 @@ def make_controller(name: str, into: Path) -> Path:
     target = into / snake
     if target.exists():
         raise FileExistsError(f"{target} exists already; choose another name or remove it")
-    files = sorted(path for path in template_folder().rglob("*") if path.is_file())
+    template = template or template_folder()
+    files = sorted(path for path in template.rglob("*") if path.is_file())
     target.mkdir()
     for source in files:
-        relative = str(source.relative_to(template_folder()))
+        relative = str(source.relative_to(template))
         for key, value in zip(PLACEHOLDERS, (name, snake), strict=False):
             relative = relative.replace(key, value)
         text = source.read_text(encoding="utf-8")
@@ -60,14 +63,18 @@ def make_controller(name: str, into: Path) -> Path:
         destination = target / relative.removesuffix(".in")
         destination.parent.mkdir(parents=True, exist_ok=True)
         destination.write_text(text, encoding="utf-8")
+        destination.chmod(source.stat().st_mode)
     return target
 
 
-def next_steps(target: Path) -> list[str]:
+def next_steps(target: Path, motion: bool = False) -> list[str]:
     """Commands that build and test the new controller: those of the workspace it lies in, else plain CMake."""
     workspace = target.resolve().parent.parent
     if target.resolve().parent.name == "src" and (workspace.parent / "coglab").is_file():
         return [f"./coglab build && ./coglab test {target.name}"]
+    if motion:
+        workspace = workspace if target.resolve().parent.name == "src" else "WORKSPACE"
+        return [f"catkin_make -C {workspace}", f". {workspace}/devel/setup.bash", f"rostest {target.name} {target.name}.test"]
     return [
         f"cmake -S {target} -B {target}/build && cmake --build {target}/build",
         f"ctest --test-dir {target}/build --output-on-failure",
@@ -79,14 +86,18 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("name", help="type of the controller in CamelCase, for example WristDamper")
     parser.add_argument("--into", type=Path, default=Path("."), help="folder to make it in")
+    parser.add_argument(
+        "--motion", action="store_true", help="a motion of the arm, for coglab_controllers"
+    )
     arguments = parser.parse_args()
     try:
-        target = make_controller(arguments.name, arguments.into)
+        package = "coglab_controllers" if arguments.motion else "ctrl_more"
+        target = make_controller(arguments.name, arguments.into, template_folder(package))
     except (ValueError, OSError) as error:
         print(error, file=sys.stderr)
         return 1
     print(f"made {target}; build and test it:")
-    for line in next_steps(target):
+    for line in next_steps(target, arguments.motion):
         print(f"  {line}")
     return 0
 

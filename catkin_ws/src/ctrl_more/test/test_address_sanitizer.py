@@ -12,10 +12,7 @@ import pytest
 
 PACKAGE = Path(__file__).resolve().parent.parent
 FLAGS = ["-std=c++17", "-O1", "-g1", "-fPIC", "-fsanitize=address", "-fno-omit-frame-pointer", "-fno-gnu-unique",
-         f"-I{PACKAGE / 'include'}", f"-I{PACKAGE / 'src'}", f"-I{PACKAGE / 'test'}"]
-# Debian keeps class_loader and what it includes in folders of their own.
-FLAGS += [f"-isystem/usr/include/{name}" for name in ("eigen3", "class_loader", "rcpputils", "rcutils",
-                                                      "ament_index_cpp")]
+         f"-I{PACKAGE / 'include'}", f"-I{PACKAGE / 'src'}", f"-I{PACKAGE / 'test'}", "-isystem/usr/include/eigen3"]
 PLUGINS = ["good", "none", "two", "again", "paper_maker", "throwing", "wrong_type", "other_abi", "strangers", "rebuilt"]
 
 
@@ -30,12 +27,10 @@ def compiled(*arguments: object) -> None:
 def test_libraries_come_throw_and_go(tmp_path: Path) -> None:
     core, plugins, program = tmp_path / "libctrl_more.so", tmp_path / "plugins", tmp_path / "test_plugins"
     plugins.mkdir()
-    loaders = sorted(map(str, Path("/usr/lib").glob("*/libclass_loader.so")))
-    assert loaders, "libclass-loader-dev is not installed"
-    sources = sorted((PACKAGE / "src").glob("*.cpp"))
+    sources = sorted((PACKAGE / "src").rglob("*.cpp"))
     with ThreadPoolExecutor(2) as pool:
         list(pool.map(lambda s: compiled("-c", s, "-o", tmp_path / f"{s.stem}.o"), sources))
-    compiled("-shared", *(tmp_path / f"{s.stem}.o" for s in sources), "-o", core, loaders[-1], "-lyaml-cpp", "-ldl")
+    compiled("-shared", *(tmp_path / f"{s.stem}.o" for s in sources), "-o", core, "-lyaml-cpp", "-ldl")
     link = [core, f"-Wl,-rpath,{tmp_path}"]
     for name in PLUGINS:
         compiled("-shared", PACKAGE / "test" / "plugins" / f"{name}.cpp", "-o", plugins / f"lib{name}.so", *link)
@@ -45,7 +40,7 @@ def test_libraries_come_throw_and_go(tmp_path: Path) -> None:
              f'-DCTRL_MORE_PLUGIN_DIR="{plugins}"', PACKAGE / "test" / "test_plugins.cpp",
              PACKAGE / "test" / "run_tests.cpp", "-o", program, *link, "-lgtest", "-lpthread")
     result = subprocess.run(
-        [str(program), "--gtest_filter=Plugins.loadsRuns*:Plugins.what*:Plugins.two*:Plugins.known*:TwoBuilds.*"],
+        [str(program), "--gtest_filter=Plugins.LoadsRuns*:Plugins.What*:Plugins.Two*:Plugins.Known*:TwoBuilds.*"],
         env=dict(os.environ, ASAN_OPTIONS="detect_leaks=1", TMPDIR=str(tmp_path)),
         capture_output=True, text=True, timeout=300)
     assert result.returncode == 0, (result.stdout + result.stderr)[-4000:]

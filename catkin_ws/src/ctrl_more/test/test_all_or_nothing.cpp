@@ -3,6 +3,7 @@
 #include <new>
 #include <sstream>
 
+#include "ctrl_more/feedback_controller.hpp"
 #include "test_support.hpp"
 
 namespace {
@@ -124,12 +125,12 @@ void failAtEachAllocation(const std::string& what, const Request& prepare,
   for (const bool frozen : {false, true}) failAtEachAllocation(what, frozen, prepare, request);
 }
 
-TEST(AllOrNothing, changes) {
+TEST(AllOrNothing, Changes) {
   failAtEachAllocation("several steps", nullptr, [](Crowd& x) {
     GainValues gains = x.manager->getGains("a");
     gains.set("k", {3.0});
     return x.manager
-        ->apply(Change().enable("c").gains("a", gains).pause("a", "rest").resume("b", "other")
+        ->apply(Change().enable("c").gains("a", gains.all()).pause("a", "rest").resume("b", "other")
                     .order({"c", "b", "a"}))
         .ok();
   });
@@ -144,7 +145,7 @@ TEST(AllOrNothing, changes) {
                        [](Crowd& x) { return x.manager->setProfile("new", {"b"}).ok(); });
 }
 
-TEST(AllOrNothing, withdrawal) {
+TEST(AllOrNothing, Withdrawal) {
   static std::uint64_t generation = 0;
   failAtEachAllocation(
       "withdraw",
@@ -156,7 +157,7 @@ TEST(AllOrNothing, withdrawal) {
       [](Crowd& x) { return x.manager->withdraw(generation).ok(); });
 }
 
-TEST(AllOrNothing, addingAndUnloading) {
+TEST(AllOrNothing, AddingAndUnloading) {
   failAtEachAllocation("add", nullptr, [](Crowd& x) {
     auto controller = adder("pose", "ee", 1.0);
     controller->description.gain("k", 1.0).in("1").about("not used");
@@ -169,9 +170,9 @@ TEST(AllOrNothing, addingAndUnloading) {
   });
 }
 
-TEST(AllOrNothing, listFile) {
+TEST(AllOrNothing, ListFile) {
   // Held open: what is tried here is the manager, not the dynamic linker.
-  const std::shared_ptr<PluginLibrary> held = PluginLibrary::open(kPlugins + "/libgood.so");
+  const auto held = PluginLibrary::open(kPlugins + "/libgood.so", prototypes());
   const ConfigNode list = ConfigNode::fromText(
       "loadControllers: [x, y]\nx: {libPath: libgood.so, enabled: true}\n"
       "y: {libPath: libgood.so}\nprofiles: {mine: [x], yours: [y, a]}\nsharedSignals: cascade\n",

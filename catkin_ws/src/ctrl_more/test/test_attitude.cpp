@@ -1,7 +1,6 @@
 #include <random>
 
 #include "controller_rig.hpp"
-#include "ctrl_more/so3.hpp"
 
 namespace ctrl_more {
 namespace {
@@ -30,7 +29,7 @@ struct AttitudeTest : ::testing::Test {
   }
 };
 
-TEST_F(AttitudeTest, proportionalAndDampingFollowTheClosedForm) {
+TEST_F(AttitudeTest, ProportionalAndDampingFollowTheClosedForm) {
   const double kp = 2.0, kd = 0.05, tau = 0.2, d = 0.1, dt = 1e-4;
   ASSERT_TRUE(rig.load("attitude", "kp: 2\nkd: 0.05\nmax_angle: 1\n"));
   Plant plant{tau, d};
@@ -50,7 +49,7 @@ TEST_F(AttitudeTest, proportionalAndDampingFollowTheClosedForm) {
   EXPECT_NEAR(plant.angle, d / (1 + kp), 1e-4);
 }
 
-TEST_F(AttitudeTest, integralActionLeavesNoError) {
+TEST_F(AttitudeTest, IntegralActionLeavesNoError) {
   ASSERT_TRUE(rig.load("attitude", "kp: 0.5\nkd: 0\nki: 4\nmax_angle: 1\n"));
   Plant plant{0.05, 0.1};
   for (int i = 0; i < 2000; ++i) {
@@ -62,7 +61,7 @@ TEST_F(AttitudeTest, integralActionLeavesNoError) {
   EXPECT_NEAR(plant.angle, 0.0, 1e-9);
 }
 
-TEST_F(AttitudeTest, oneStepDelayConvergesBelowOneAndDivergesAbove) {
+TEST_F(AttitudeTest, OneStepDelayConvergesBelowOneAndDivergesAbove) {
   for (const double kp : {0.95, 1.05}) {
     ControllerRig fresh;
     ASSERT_TRUE(fresh.load("attitude", "kp: " + std::to_string(kp) + "\nkd: 0\nmax_angle: 1\n"));
@@ -79,7 +78,7 @@ TEST_F(AttitudeTest, oneStepDelayConvergesBelowOneAndDivergesAbove) {
   }
 }
 
-TEST_F(AttitudeTest, turningTheWorldTurnsTheResult) {
+TEST_F(AttitudeTest, TurningTheWorldTurnsTheResult) {
   ASSERT_TRUE(rig.load("attitude",
                        "kp: [0.5, 0.3, 0.1]\nkd: [0.02, 0.01, 0.03]\nki: [1, 2, 3]\n"
                        "max_angle: 1\nimu_layout: quaternion_gyro_acc\n"));
@@ -112,7 +111,7 @@ TEST_F(AttitudeTest, turningTheWorldTurnsTheResult) {
   }
 }
 
-TEST_F(AttitudeTest, saturatesWithoutWindingUpAndHasADeadBand) {
+TEST_F(AttitudeTest, SaturatesWithoutWindingUpAndHasADeadBand) {
   ASSERT_TRUE(rig.load("attitude", "kp: 0\nkd: 0\nki: 10\nmax_angle: 0.1\ndead_band: 0.05\n"));
   for (int i = 0; i < 2000; ++i) {
     setImu(expOf({-0.5, 0, 0}), {0, 0, 0});
@@ -137,7 +136,7 @@ TEST_F(AttitudeTest, saturatesWithoutWindingUpAndHasADeadBand) {
   EXPECT_EQ(quiet.control.getPelvisOrientation(), Eigen::Matrix3d(Eigen::Matrix3d::Identity()));
 }
 
-TEST_F(AttitudeTest, wrongConfigurationsAreRefused) {
+TEST_F(AttitudeTest, WrongConfigurationsAreRefused) {
   EXPECT_FALSE(rig.load("attitude", "kp: 6\n"));
   EXPECT_FALSE(rig.load("attitude", "mount: [0, 0, 0, 0.5]\n"));
   EXPECT_FALSE(rig.load("attitude", "imu_layout: rpy\n"));

@@ -1,7 +1,6 @@
 #include <random>
 
-#include "correction.hpp"
-#include "ctrl_more/so3.hpp"
+#include "cycle/correction.hpp"
 #include "test_support.hpp"
 
 namespace ctrl_more {
@@ -41,7 +40,7 @@ struct Blending : ::testing::Test {
   }
 };
 
-TEST_F(Blending, enableAndDisableAreBumpless) {
+TEST_F(Blending, EnableAndDisableAreBumpless) {
   rig.step();
   rig.manager->enable();
   stepSmoothly(20);
@@ -55,7 +54,7 @@ TEST_F(Blending, enableAndDisableAreBumpless) {
   EXPECT_EQ(rig.manager->status("pose").activity, Activity::Off);
 }
 
-TEST_F(Blending, pausedPoseHoldsItsDifferenceAndPausedVelocityFades) {
+TEST_F(Blending, PausedPoseHoldsItsDifferenceAndPausedVelocityFades) {
   rig.manager->enable();
   rig.step(30);
   rig.manager->pause();
@@ -72,7 +71,7 @@ TEST_F(Blending, pausedPoseHoldsItsDifferenceAndPausedVelocityFades) {
   EXPECT_EQ(rig.twist()[0], 1.0);
 }
 
-TEST_F(Blending, disablingAHeldOneLetsItGo) {
+TEST_F(Blending, DisablingAHeldOneLetsItGo) {
   rig.manager->enable();
   rig.step(30);
   rig.manager->pause();
@@ -82,7 +81,7 @@ TEST_F(Blending, disablingAHeldOneLetsItGo) {
   EXPECT_EQ(rig.pose()[0], 0.0);
 }
 
-TEST_F(Blending, changingOneMindInTheMiddleIsBumpless) {
+TEST_F(Blending, ChangingOneMindInTheMiddleIsBumpless) {
   std::mt19937 random(7);
   rig.step();
   for (int i = 0; i < 300; ++i) {
@@ -99,7 +98,7 @@ TEST_F(Blending, changingOneMindInTheMiddleIsBumpless) {
   }
 }
 
-TEST_F(Blending, publishingUnrelatedPlansDoesNotProlongAFade) {
+TEST_F(Blending, PublishingUnrelatedPlansDoesNotProlongAFade) {
   rig.manager->enable();
   rig.step(30);
   rig.manager->disable("pose");
@@ -110,7 +109,7 @@ TEST_F(Blending, publishingUnrelatedPlansDoesNotProlongAFade) {
   EXPECT_EQ(rig.pose()[0], 0.0);
 }
 
-TEST(BlendingTest, orderChangeOfACascadeIsBumpless) {
+TEST(BlendingTest, OrderChangeOfACascadeIsBumpless) {
   Rig rig(kBlend);
   rig.add(adder("pose", "ee", 1.0), "add");
   auto doubling = adder("pose", "ee", 0.0);
@@ -131,7 +130,7 @@ TEST(BlendingTest, orderChangeOfACascadeIsBumpless) {
   EXPECT_EQ(rig.pose()[0], 1.0);
 }
 
-TEST(BlendingTest, ownBlendTimeOfAController) {
+TEST(BlendingTest, OwnBlendTimeOfAController) {
   Rig rig(kBlend);
   ControllerEntry entry;
   entry.blend_s = 0.0;
@@ -140,7 +139,7 @@ TEST(BlendingTest, ownBlendTimeOfAController) {
   EXPECT_EQ(rig.pose()[0], 1.0);
 }
 
-TEST(CorrectionTest, differenceAndApplyAreInverse) {
+TEST(CorrectionTest, DifferenceAndApplyAreInverse) {
   std::mt19937 random(3);
   std::normal_distribution<double> normal;
   for (const SignalKind kind : {SignalKind::Vector, SignalKind::Pose, SignalKind::Quaternion}) {
@@ -165,7 +164,7 @@ TEST(CorrectionTest, differenceAndApplyAreInverse) {
   }
 }
 
-TEST(CorrectionTest, normsAndChecks) {
+TEST(CorrectionTest, NormsAndChecks) {
   const double pose[7] = {3, 4, 0, 0, std::sin(0.1), 0, std::cos(0.1)};
   const auto n = correction::norms(SignalKind::Pose, 7, pose);
   EXPECT_DOUBLE_EQ(n.size, 5.0);

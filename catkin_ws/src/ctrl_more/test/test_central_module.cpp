@@ -3,7 +3,6 @@
 #include <cstdlib>
 
 #include "ctrl_more/central_module.hpp"
-#include "ctrl_more/so3.hpp"
 #include "test_support.hpp"
 
 namespace ctrl_more {
@@ -51,7 +50,7 @@ struct CentralModuleTest : ::testing::Test {
   }
 };
 
-TEST_F(CentralModuleTest, locomotionRunsBeforeFeedback) {
+TEST_F(CentralModuleTest, LocomotionRunsBeforeFeedback) {
   ASSERT_TRUE(registered);
   const std::string list = ::testing::TempDir() + "/central_list.yaml";
   std::FILE* file = std::fopen(list.c_str(), "w");
@@ -76,7 +75,7 @@ TEST_F(CentralModuleTest, locomotionRunsBeforeFeedback) {
   EXPECT_EQ(other_way.controlStates().getZMP()[0], 0.5) << "the user's order decides";
 }
 
-TEST_F(CentralModuleTest, userCodeOfThePaper) {
+TEST_F(CentralModuleTest, UserCodeOfThePaper) {
   CentralModule locomotor(CTRL_MORE_SOURCE_DIR "/examples/central.yaml", &logger);
   ASSERT_TRUE(locomotor.loadErrors().empty()) << locomotor.loadErrors().front();
   ASSERT_TRUE(locomotor.feedbackControllers().enable("Attitude"));
@@ -91,7 +90,7 @@ TEST_F(CentralModuleTest, userCodeOfThePaper) {
   EXPECT_LT((pelvis - expOf(expected).toRotationMatrix()).norm(), 1e-12);
 }
 
-TEST_F(CentralModuleTest, exampleProgramSaysTheSame) {
+TEST_F(CentralModuleTest, ExampleProgramSaysTheSame) {
   const std::string command = std::string(CTRL_MORE_PLUGIN_DIR) +
                               "/ctrl_more/ctrl_more_attitude_example " CTRL_MORE_SOURCE_DIR
                               "/examples/central.yaml 2>/dev/null";
@@ -105,7 +104,7 @@ TEST_F(CentralModuleTest, exampleProgramSaysTheSame) {
   EXPECT_NEAR(m[5], 0.0499636, 1e-6);
 }
 
-TEST_F(CentralModuleTest, wrongFilesAreRefused) {
+TEST_F(CentralModuleTest, WrongFilesAreRefused) {
   EXPECT_TRUE(contains(errorOf("managers: [a]\n"), "no block 'a:'"));
   EXPECT_TRUE(contains(errorOf("managers: [a]\na: {type: Feedbak}\n"), "did you mean 'Feedback'"));
   EXPECT_TRUE(contains(errorOf("managers: [a]\na: {}\n"), "needs a type"));
@@ -124,7 +123,7 @@ TEST_F(CentralModuleTest, wrongFilesAreRefused) {
   EXPECT_FALSE(CentralModule::registerManager("Feedback", nullptr));
 }
 
-TEST_F(CentralModuleTest, statesThatDoNotFitAreRefused) {
+TEST_F(CentralModuleTest, StatesThatDoNotFitAreRefused) {
   CentralModule module(ConfigNode::fromText("managers: []\njoints: 7\n", "c"), "", &logger);
   ControlStates six(6, 0.005, &logger);
   six.setJointSpaceReference("Velocity", Eigen::VectorXd::Zero(6));

@@ -7,7 +7,7 @@
 namespace ctrl_more {
 namespace {
 
-TEST(SecondOrderTest, criticalDampingIsExactAtTheSamples) {
+TEST(SecondOrderTest, CriticalDampingIsExactAtTheSamples) {
   const double m = 2.0, k = 50.0, f = 3.0, wn = std::sqrt(k / m), dt = 0.005;
   SecondOrder axis;
   axis.prepare(m, 2 * std::sqrt(k * m), k, dt);
@@ -20,7 +20,7 @@ TEST(SecondOrderTest, criticalDampingIsExactAtTheSamples) {
   }
 }
 
-TEST(SecondOrderTest, allDampingsAgreeWithSmallSteps) {
+TEST(SecondOrderTest, AllDampingsAgreeWithSmallSteps) {
   std::mt19937 random(11);
   std::uniform_real_distribution<double> u(0.0, 1.0);
   for (int n = 0; n < 300; ++n) {
@@ -39,7 +39,7 @@ TEST(SecondOrderTest, allDampingsAgreeWithSmallSteps) {
   }
 }
 
-TEST(SecondOrderTest, passive) {
+TEST(SecondOrderTest, Passive) {
   // Stored energy never exceeds initial energy plus work of the force.
   std::mt19937 random(13);
   std::normal_distribution<double> normal;
@@ -85,7 +85,7 @@ struct ClosedLoop : ::testing::Test {
   }
 };
 
-TEST_F(ClosedLoop, stiffnessIsTheOneThatWasSetForEveryMassAndLag) {
+TEST_F(ClosedLoop, StiffnessIsTheOneThatWasSetForEveryMassAndLag) {
   for (const double mass : {20.0, 40.0, 100.0}) {
     for (const double lag : {0.0, 0.02, 0.04, 0.08}) {
       for (const int delay : {1, 3}) {
@@ -102,14 +102,14 @@ TEST_F(ClosedLoop, stiffnessIsTheOneThatWasSetForEveryMassAndLag) {
   }
 }
 
-TEST_F(ClosedLoop, comesBackFromTheWall) {
+TEST_F(ClosedLoop, ComesBackFromTheWall) {
   ASSERT_TRUE(load("total_mass: 100\n"));
   Pendulum plant{100.0, 0.8, 0.02, 1};
   EXPECT_EQ(run(plant, 200.0, 800), 0.08) << "max_offset";
   EXPECT_NEAR(run(plant, 0.0, 1000), 0.0, 1e-5);
 }
 
-TEST_F(ClosedLoop, followsTheLawOfItsPage) {
+TEST_F(ClosedLoop, FollowsTheLawOfItsPage) {
   ASSERT_TRUE(load("mass: 20\ndamping: 400\nstiffness: 2000\nmax_offset: 0.3\ntotal_mass: 40\n"
                    "height: 0.8\nforce_filter: 0.1\n"));
   Pendulum plant;
@@ -127,14 +127,14 @@ TEST_F(ClosedLoop, followsTheLawOfItsPage) {
   EXPECT_NEAR(x, 0.02, 1e-4);
 }
 
-TEST_F(CompliantTest, offsetIsBounded) {
+TEST_F(CompliantTest, OffsetIsBounded) {
   ASSERT_TRUE(rig.load("compliant_stabiliser", "max_offset: 0.05\n"));
   push(0.5, 1000);
   EXPECT_EQ(rig.control.getCoM().x(), 0.05);
   EXPECT_EQ(rig.control.getCoMVelocity().x(), 0.0);
 }
 
-TEST_F(CompliantTest, measuredForceInstead) {
+TEST_F(CompliantTest, MeasuredForceInstead) {
   ASSERT_TRUE(rig.load("compliant_stabiliser", "force_source: force\nmax_offset: 0.3\n"));
   for (int i = 0; i < 3000; ++i) {
     rig.robot.setMeasuredData("contactForce", vectorOf({0, 30, 300}), rig.cycle.now_ns);

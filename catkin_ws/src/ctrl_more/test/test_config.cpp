@@ -1,3 +1,4 @@
+#include "ctrl_more/log/words.hpp"
 #include "test_support.hpp"
 
 namespace ctrl_more {
@@ -12,7 +13,7 @@ std::string messageOf(const std::function<void()>& action) {
   return "";
 }
 
-TEST(ConfigTest, readsScalarsListsAndMapsWithTheirLines) {
+TEST(ConfigTest, ReadsScalarsListsAndMapsWithTheirLines) {
   const ConfigNode root = ConfigNode::fromText("a: 1.5\nb: [1, 2]\nc:\n  d: true\n", "f.yaml");
   EXPECT_EQ(root.find("a")->number("a"), 1.5);
   EXPECT_EQ(root.find("b")->numbers("b"), (std::vector<double>{1, 2}));
@@ -22,7 +23,7 @@ TEST(ConfigTest, readsScalarsListsAndMapsWithTheirLines) {
   EXPECT_EQ(root.keys(), (std::vector<std::string>{"a", "b", "c"}));
 }
 
-TEST(ConfigTest, errorsNameFileLineAndField) {
+TEST(ConfigTest, ErrorsNameFileLineAndField) {
   const ConfigNode root = ConfigNode::fromText("a: x\nb: {c: 1}\nn: .nan\nh: 1e999\n", "f.yaml");
   EXPECT_EQ(messageOf([&] { root.find("a")->number("gain 'a'"); }),
             "f.yaml:1: gain 'a' expects a number, got 'x'");
@@ -36,7 +37,7 @@ TEST(ConfigTest, errorsNameFileLineAndField) {
             "f.yaml:1: it has an unknown key 'a'; did you mean 'aa'?");
 }
 
-TEST(ConfigTest, hostileFilesAreRefused) {
+TEST(ConfigTest, HostileFilesAreRefused) {
   std::string deep;
   for (int i = 0; i < 100; ++i) deep += "[";
   EXPECT_FALSE(messageOf([&] { ConfigNode::fromText(deep, "f"); }).empty());
@@ -60,7 +61,7 @@ TEST(ConfigTest, hostileFilesAreRefused) {
   EXPECT_TRUE(contains(messageOf([&] { ConfigNode::fromText("a: [1\nb: 2", "f"); }), "f:"));
 }
 
-TEST(ConfigTest, nearestNames) {
+TEST(ConfigTest, NearestNames) {
   const std::vector<std::string> known = {"Compliant", "ZmpIP", "AttitudeMPCController"};
   EXPECT_EQ(nearestName("Attitude", known), "AttitudeMPCController");
   EXPECT_EQ(nearestName("zmpip", known), "ZmpIP");
@@ -70,7 +71,7 @@ TEST(ConfigTest, nearestNames) {
   EXPECT_EQ(suggestion("Xyz", {}), "; there is none");
 }
 
-TEST(ConfigTest, gainsAreCheckedOneByOne) {
+TEST(ConfigTest, GainsAreCheckedOneByOne) {
   Description d;
   d.gain("kp", 0).vector(3, 1.0).range(0, 2).in("1").about("x");
   GainValues gains(d.gains);

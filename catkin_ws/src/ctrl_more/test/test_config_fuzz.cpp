@@ -3,7 +3,6 @@
 #include <fstream>
 #include <random>
 
-#include "ctrl_more/documentation.hpp"
 #include "test_support.hpp"
 
 namespace ctrl_more {
@@ -35,7 +34,7 @@ std::string mutate(const std::string& seed, std::mt19937& random) {
   return text;
 }
 
-TEST(ConfigFuzz, listAndGainFilesNeverBreakWhatRuns) {
+TEST(ConfigFuzz, ListAndGainFilesNeverBreakWhatRuns) {
   const long runs = 100000;
   Rig rig(0.0, false, false);
   rig.logger.setLevel(LogLevel::Error);

@@ -11,7 +11,7 @@ struct ControlStatesTest : ::testing::Test {
   Eigen::VectorXd pose = vectorOf({1, 2, 3, 0, 0, 0, 1});
 };
 
-TEST_F(ControlStatesTest, everyContainerGoesRound) {
+TEST_F(ControlStatesTest, EveryContainerGoesRound) {
   const Eigen::VectorXd six = vectorOf({1, 2, 3, 4, 5, 6});
   const Eigen::VectorXd seven = vectorOf({1, 2, 3, 4, 5, 6, 7});
   const Eigen::Vector3d three(1, 2, 3);
@@ -51,12 +51,12 @@ TEST_F(ControlStatesTest, everyContainerGoesRound) {
   EXPECT_EQ(out3, three);
 }
 
-TEST_F(ControlStatesTest, accelerationIsSixBothWays) {
+TEST_F(ControlStatesTest, AccelerationIsSixBothWays) {
   EXPECT_FALSE(control.setTaskSpaceReferenceAcc("ee", Eigen::VectorXd::Zero(7)));
   EXPECT_TRUE(control.setTaskSpaceReferenceAcc("ee", Eigen::VectorXd::Zero(6)));
 }
 
-TEST_F(ControlStatesTest, missingKeyIsFalseAndLeavesTheOutputAlone) {
+TEST_F(ControlStatesTest, MissingKeyIsFalseAndLeavesTheOutputAlone) {
   Eigen::VectorXd out = vectorOf({5});
   EXPECT_FALSE(control.getTaskSpaceReferencePose("ee", out));
   EXPECT_FALSE(control.getTaskSpaceReferenceVel("ee", out));
@@ -64,14 +64,14 @@ TEST_F(ControlStatesTest, missingKeyIsFalseAndLeavesTheOutputAlone) {
   EXPECT_EQ(out, vectorOf({5}));
 }
 
-TEST_F(ControlStatesTest, quaternionsMustBeUnit) {
+TEST_F(ControlStatesTest, QuaternionsMustBeUnit) {
   EXPECT_FALSE(control.setTaskSpaceReferencePose("ee", vectorOf({0, 0, 0, 0, 0, 0, 0})));
   EXPECT_FALSE(control.setTaskSpaceReferencePose("ee", vectorOf({0, 0, 0, 0, 0, 0, 1.1})));
   EXPECT_FALSE(control.find(ControlContainer::TaskSpaceReferencePose, "ee").valid());
   EXPECT_TRUE(control.setTaskSpaceReferencePose("ee", pose));
 }
 
-TEST_F(ControlStatesTest, jointReferencesHaveTheNumberOfJoints) {
+TEST_F(ControlStatesTest, JointReferencesHaveTheNumberOfJoints) {
   EXPECT_FALSE(control.setJointSpaceReference("Velocity", Eigen::VectorXd::Zero(6)));
   EXPECT_FALSE(control.setJointSpaceReference("Velocities", Eigen::VectorXd::Zero(7)));
   ControlStates undecided(0, 0.005, &logger);
@@ -80,12 +80,12 @@ TEST_F(ControlStatesTest, jointReferencesHaveTheNumberOfJoints) {
   EXPECT_FALSE(undecided.setJointSpaceReference("Torque", Eigen::VectorXd::Zero(7)));
 }
 
-TEST_F(ControlStatesTest, otherReferenceKeepsItsSize) {
+TEST_F(ControlStatesTest, OtherReferenceKeepsItsSize) {
   EXPECT_TRUE(control.setOtherReference("horizon", Eigen::VectorXd::Zero(20)));
   EXPECT_FALSE(control.setOtherReference("horizon", Eigen::VectorXd::Zero(21)));
 }
 
-TEST_F(ControlStatesTest, pelvisIsIdentityUntilSetAndAlwaysARotation) {
+TEST_F(ControlStatesTest, PelvisIsIdentityUntilSetAndAlwaysARotation) {
   EXPECT_EQ(control.getPelvisOrientation(), Eigen::Matrix3d(Eigen::Matrix3d::Identity()));
   ASSERT_TRUE(control.setPelvisOrientation(0.1, 0.2, 0.3));
   const Eigen::Matrix3d expected =
@@ -105,7 +105,7 @@ TEST_F(ControlStatesTest, pelvisIsIdentityUntilSetAndAlwaysARotation) {
   EXPECT_FALSE(control.setPelvisOrientation(std::nan(""), 0, 0));
 }
 
-TEST_F(ControlStatesTest, copyHasEverything) {
+TEST_F(ControlStatesTest, CopyHasEverything) {
   control.setTaskSpaceReferencePose("ee", pose);
   control.setCoM({1, 2, 3});
   const ControlStates copy = control;
@@ -119,7 +119,7 @@ TEST_F(ControlStatesTest, copyHasEverything) {
   EXPECT_EQ(other.getCoM(), Eigen::Vector3d(1, 2, 3));
 }
 
-TEST_F(ControlStatesTest, modePeriodAndFreeze) {
+TEST_F(ControlStatesTest, ModePeriodAndFreeze) {
   EXPECT_EQ(control.controlMode(), ControlMode::Task);
   control.setControlMode(ControlMode::JointTorque);
   EXPECT_EQ(control.controlMode(), ControlMode::JointTorque);
@@ -132,7 +132,7 @@ TEST_F(ControlStatesTest, modePeriodAndFreeze) {
   EXPECT_TRUE(control.setCoM({1, 2, 3}));
 }
 
-TEST_F(ControlStatesTest, printShowsEverySignal) {
+TEST_F(ControlStatesTest, PrintShowsEverySignal) {
   control.setTaskSpaceReferencePose("ee", pose);
   control.setOtherReference("horizon", vectorOf({1, 2}));
   std::ostringstream out;

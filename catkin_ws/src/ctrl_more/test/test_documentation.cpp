@@ -1,8 +1,7 @@
 #include <fstream>
 #include <sstream>
 
-#include "ctrl_more/documentation.hpp"
-#include "ctrl_more/prototypes.hpp"
+#include "ctrl_more/feedback_controller.hpp"
 #include "test_support.hpp"
 
 namespace ctrl_more {
@@ -24,14 +23,14 @@ class Documentation : public ::testing::TestWithParam<const char*> {
   }
 };
 
-TEST_P(Documentation, noFieldIsEmpty) {
+TEST_P(Documentation, NoFieldIsEmpty) {
   const auto empty = description().emptyFields();
   EXPECT_TRUE(empty.empty()) << empty.front();
   const auto faults = description().faults();
   EXPECT_TRUE(faults.empty()) << faults.front();
 }
 
-TEST_P(Documentation, committedPageIsTheGeneratedOne) {
+TEST_P(Documentation, CommittedPageIsTheGeneratedOne) {
   const Description d = description();
   EXPECT_EQ(contentOf(std::string(CTRL_MORE_SOURCE_DIR) + "/doc/controllers/" + d.type + ".md"),
             documentationPage(d))
@@ -39,12 +38,12 @@ TEST_P(Documentation, committedPageIsTheGeneratedOne) {
       << ".md";
 }
 
-TEST_P(Documentation, shippedConfigurationHasEveryKeyAtItsInitialValue) {
+TEST_P(Documentation, ShippedConfigurationHasEveryKeyAtItsInitialValue) {
   EXPECT_EQ(contentOf(std::string(CTRL_MORE_SOURCE_DIR) + "/config/" + GetParam() + ".yaml"),
             configurationTemplate(description()));
 }
 
-TEST_P(Documentation, pageShowsEverySignalAndGain) {
+TEST_P(Documentation, PageShowsEverySignalAndGain) {
   const Description d = description();
   const std::string page = documentationPage(d);
   for (const GainSpec& s : d.gains) EXPECT_TRUE(contains(page, "`" + s.name + "`"));

@@ -1,5 +1,4 @@
 #include "controller_rig.hpp"
-#include "ctrl_more/so3.hpp"
 
 namespace ctrl_more {
 namespace {
@@ -18,7 +17,7 @@ struct AdmittanceTest : ::testing::Test {
   }
 };
 
-TEST_F(AdmittanceTest, criticalStepFollowsTheClosedFormInPoseAndVelocity) {
+TEST_F(AdmittanceTest, CriticalStepFollowsTheClosedFormInPoseAndVelocity) {
   ASSERT_TRUE(rig.load("ee_admittance",
                        "mass: 2\ndamping: 40\nstiffness: 200\nforce_dead_band: 0\n"
                        "max_offset: 0.4\nmax_velocity: 2\n"));
@@ -40,7 +39,7 @@ TEST_F(AdmittanceTest, criticalStepFollowsTheClosedFormInPoseAndVelocity) {
   EXPECT_EQ(rig.manager->status("c").faults, 0u);
 }
 
-TEST_F(AdmittanceTest, belowTheDeadBandEveryBitStays) {
+TEST_F(AdmittanceTest, BelowTheDeadBandEveryBitStays) {
   ControllerRig blended(0.2);  // with the default blending, too
   ASSERT_TRUE(blended.load("ee_admittance", "axes: all\n"));
   for (int i = 0; i < 100; ++i) {
@@ -61,13 +60,13 @@ TEST_F(AdmittanceTest, belowTheDeadBandEveryBitStays) {
   EXPECT_EQ(blended.manager->status("c").activity, Activity::Running);
 }
 
-TEST_F(AdmittanceTest, deadBandHasNoStepAtItsEdge) {
+TEST_F(AdmittanceTest, DeadBandHasNoStepAtItsEdge) {
   ASSERT_TRUE(rig.load("ee_admittance", "force_dead_band: 3\nstiffness: 100\n"));
   push(force(3.001), 4000);
   EXPECT_NEAR(rig.pose()[0], 0.001 / 100, 1e-9);
 }
 
-TEST_F(AdmittanceTest, withoutStiffnessTheHandStaysWhereItIsLed) {
+TEST_F(AdmittanceTest, WithoutStiffnessTheHandStaysWhereItIsLed) {
   ASSERT_TRUE(rig.load("ee_admittance", "stiffness: 0\n"));
   push(force(0, 15), 60);
   push(force(0), 400);
@@ -77,7 +76,7 @@ TEST_F(AdmittanceTest, withoutStiffnessTheHandStaysWhereItIsLed) {
   EXPECT_NEAR(rig.pose()[1], led, 1e-9);
 }
 
-TEST_F(AdmittanceTest, offsetAndVelocityAreBounded) {
+TEST_F(AdmittanceTest, OffsetAndVelocityAreBounded) {
   ASSERT_TRUE(rig.load("ee_admittance", "max_offset: 0.1\nmax_velocity: 0.2\n"));
   Eigen::VectorXd last = vectorOf({0, 0.2, 0.3});
   for (int i = 0; i < 600; ++i) {
@@ -91,7 +90,7 @@ TEST_F(AdmittanceTest, offsetAndVelocityAreBounded) {
   EXPECT_EQ(rig.manager->status("c").faults, 0u);
 }
 
-TEST_F(AdmittanceTest, toolFrameAndRotation) {
+TEST_F(AdmittanceTest, ToolFrameAndRotation) {
   ASSERT_TRUE(rig.load("ee_admittance",
                        "wrench_frame: tool\naxes: all\nforce_dead_band: 0\ntorque_dead_band: 0\n"
                        "stiffness: 100\nrotary_stiffness: 10\nmax_velocity: 2\n"));
@@ -110,7 +109,7 @@ TEST_F(AdmittanceTest, toolFrameAndRotation) {
   EXPECT_LT((turned - Eigen::Vector3d(0, 0.1, 0)).norm(), 1e-9);
 }
 
-TEST_F(AdmittanceTest, wrenchOfTheToolTurnsWithWhatHasYielded) {
+TEST_F(AdmittanceTest, WrenchOfTheToolTurnsWithWhatHasYielded) {
   ASSERT_TRUE(rig.load("ee_admittance",
                        "wrench_frame: tool\naxes: all\nforce_dead_band: 0\ntorque_dead_band: 0\n"
                        "stiffness: 100\nrotary_stiffness: 4\nmax_velocity: 2\n"));
@@ -125,7 +124,7 @@ TEST_F(AdmittanceTest, wrenchOfTheToolTurnsWithWhatHasYielded) {
 }
 
 // The profile of a handover: compliant while approaching, off before contact is armed.
-TEST(Handover, compliantInTheApproachAndGoneBeforeContactIsArmed) {
+TEST(Handover, CompliantInTheApproachAndGoneBeforeContactIsArmed) {
   setenv("CTRL_MORE_PATH", CTRL_MORE_PLUGIN_DIR, 1);
   Rig rig(0.2);
   const LoadReport report = rig.manager->load(CTRL_MORE_SOURCE_DIR "/config/feedback.yaml", true);

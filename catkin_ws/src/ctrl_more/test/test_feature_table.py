@@ -23,7 +23,7 @@ def existing_tests() -> set[str]:
 
 def test_every_named_test_exists() -> None:
     page = PAGE.read_text()
-    named = set(re.findall(r"`([A-Z]\w+\.[a-z]\w+|test_\w+\.py::test_\w+)`", page))
+    named = set(re.findall(r"`([A-Z]\w+\.[A-Z]\w+|test_\w+\.py::test_\w+)`", page))
     assert len(named) > 60
     missing = sorted(named - existing_tests())
     assert not missing, missing
@@ -33,6 +33,6 @@ def test_every_row_names_a_test() -> None:
     rows = [line for line in PAGE.read_text().splitlines()
             if re.match(r"\| ([A-J]\d|\d)", line)]
     assert len(rows) > 90
-    bare = [row for row in rows if not re.search(r"`([A-Z]\w+\.[a-z]\w+|test_\w+\.py::\w+)` ?\|?",
+    bare = [row for row in rows if not re.search(r"`([A-Z]\w+\.[A-Z]\w+|test_\w+\.py::\w+)` ?\|?",
                                                  row.rsplit("|", 2)[1])]
     assert not bare, bare

@@ -1,13 +1,12 @@
 #include <fstream>
 #include <sstream>
 
-#include "ctrl_more/documentation.hpp"
 #include "test_support.hpp"
 
 namespace ctrl_more {
 namespace {
 
-TEST(FeedbackControllerTest, documentationMethodsWithoutAManager) {
+TEST(FeedbackControllerTest, DocumentationMethodsWithoutAManager) {
   TestController c;
   c.description.information = "more";
   c.description.gain("kp", 2.0).in("1").about("gain");
@@ -34,7 +33,7 @@ TEST(FeedbackControllerTest, documentationMethodsWithoutAManager) {
   EXPECT_EQ(c.getInformation(), "more");
 }
 
-TEST(FeedbackControllerTest, controlMethodsWithoutAManager) {
+TEST(FeedbackControllerTest, ControlMethodsWithoutAManager) {
   TestController c;
   c.description.gain("kp", 2.0).range(0, 10).in("1").about("gain");
   EXPECT_FALSE(c.isEnabled());
@@ -54,7 +53,7 @@ TEST(FeedbackControllerTest, controlMethodsWithoutAManager) {
   EXPECT_FALSE(c.loadGains("/nowhere/gains.yaml"));
 }
 
-TEST(FeedbackControllerTest, controlMethodsGoToTheManager) {
+TEST(FeedbackControllerTest, ControlMethodsGoToTheManager) {
   Rig rig;
   TestController* c = rig.add(adder("pose", "ee", 0.1), "a", false);
   c->enable();
@@ -71,7 +70,7 @@ TEST(FeedbackControllerTest, controlMethodsGoToTheManager) {
   EXPECT_FALSE(c->addUsedControlState("zmp")) << "too late";
 }
 
-TEST(FeedbackControllerTest, declarationSurvivesLoading) {
+TEST(FeedbackControllerTest, DeclarationSurvivesLoading) {
   Rig rig;
   auto controller = adder("pose", "ee", 0.1);
   controller->description.measured("imu").size(9).in("rad").frameOf("imu").about("imu");
@@ -88,7 +87,7 @@ TEST(FeedbackControllerTest, declarationSurvivesLoading) {
   EXPECT_TRUE(rig.manager->getUsedControlStates(true).empty());
 }
 
-TEST(FeedbackControllerTest, initializeIsCalledOnceAndMayRefuse) {
+TEST(FeedbackControllerTest, InitializeIsCalledOnceAndMayRefuse) {
   Rig rig;
   int calls = 0;
   auto c = adder("pose", "ee", 0.1);
@@ -114,7 +113,7 @@ TEST(FeedbackControllerTest, initializeIsCalledOnceAndMayRefuse) {
   EXPECT_FALSE(rig.manager->has("b"));
 }
 
-TEST(FeedbackControllerTest, askingForWhatIsNotDeclaredIsRefused) {
+TEST(FeedbackControllerTest, AskingForWhatIsNotDeclaredIsRefused) {
   Rig rig;
   for (int what = 0; what < 5; ++what) {
     auto c = adder("pose", "ee", 0.1);
@@ -133,7 +132,7 @@ TEST(FeedbackControllerTest, askingForWhatIsNotDeclaredIsRefused) {
   EXPECT_TRUE(rig.manager->getControllersNames().empty());
 }
 
-TEST(FeedbackControllerTest, wrongDescriptionsAreRefused) {
+TEST(FeedbackControllerTest, WrongDescriptionsAreRefused) {
   Rig rig;
   const auto refused = [&](const std::function<void(Description&)>& spoil) {
     auto c = adder("pose", "ee", 0.1);
@@ -148,7 +147,7 @@ TEST(FeedbackControllerTest, wrongDescriptionsAreRefused) {
   EXPECT_TRUE(refused([](Description& d) { d.measured("imu").maxAge(0.0); }));
 }
 
-TEST(FeedbackControllerTest, plotShowsEverything) {
+TEST(FeedbackControllerTest, PlotShowsEverything) {
   Rig rig;
   auto c = adder("pose", "ee", 0.1);
   c->description.measured("imu").size(9).in("rad").frameOf("imu_link").maxAge(0.05);
@@ -174,7 +173,7 @@ TEST(FeedbackControllerTest, plotShowsEverything) {
   EXPECT_EQ(all.str(), out.str());
 }
 
-TEST(FeedbackControllerTest, emptyFieldsAreFound) {
+TEST(FeedbackControllerTest, EmptyFieldsAreFound) {
   Description d;
   d.type = "X";
   d.measured("imu");
@@ -200,7 +199,7 @@ std::string refusalOf(const std::string& role, bool reads) {
   return rig.manager->addController(std::move(c), "c").message();
 }
 
-TEST(Handles, sizesAreComparedWhenTheyAreFetched) {
+TEST(Handles, SizesAreComparedWhenTheyAreFetched) {
   EXPECT_TRUE(contains(refusalOf<7>("zmp", false), "size 7")) << refusalOf<7>("zmp", false);
   EXPECT_TRUE(contains(refusalOf<2>("com", true), "size 2"));
   EXPECT_TRUE(contains(refusalOf<10>("imu", true), "expects 10"));
@@ -210,7 +209,7 @@ TEST(Handles, sizesAreComparedWhenTheyAreFetched) {
   EXPECT_TRUE(contains(refusalOf<3>("com", false), "read only"));
 }
 
-TEST(Handles, nothingBesideASignalIsWritten) {
+TEST(Handles, NothingBesideASignalIsWritten) {
   using Way = std::function<void(Numbers<> any, Numbers<3> three)>;
   const std::vector<Way> ways = {
       [](Numbers<> any, Numbers<3>) { any[3] = 9.0; },
@@ -246,7 +245,7 @@ TEST(Handles, nothingBesideASignalIsWritten) {
   }
 }
 
-TEST(Handles, emptyOnesAreFaults) {
+TEST(Handles, EmptyOnesAreFaults) {
   Rig rig(0.0, false, false);
   auto c = adder("com", "com", 1.0);
   int way = 0;
@@ -265,7 +264,7 @@ TEST(Handles, emptyOnesAreFaults) {
   }
 }
 
-TEST(Handles, hostsLookUpWithASizeToo) {
+TEST(Handles, HostsLookUpWithASizeToo) {
   Rig rig;
   EXPECT_EQ(rig.control.find<Pose>(ControlContainer::TaskSpaceReferencePose, "ee").size(), 7);
   EXPECT_THROW(rig.control.find<6>(ControlContainer::TaskSpaceReferencePose, "ee"),

@@ -19,7 +19,7 @@ struct JointLimitsTest : ::testing::Test {
   }
 };
 
-TEST_F(JointLimitsTest, constantPushFollowsTheClosedForm) {
+TEST_F(JointLimitsTest, ConstantPushFollowsTheClosedForm) {
   ASSERT_TRUE(rig.load("joint_limits", kConfiguration));
   const double dt = 0.005, rho_s = 0.05, rho_i = 0.3, xi = 1.0;
   Eigen::VectorXd q = Eigen::VectorXd::Constant(7, 0.71);
@@ -31,7 +31,7 @@ TEST_F(JointLimitsTest, constantPushFollowsTheClosedForm) {
   }
 }
 
-TEST_F(JointLimitsTest, farAwayOrLeavingKeepsEveryBit) {
+TEST_F(JointLimitsTest, FarAwayOrLeavingKeepsEveryBit) {
   ASSERT_TRUE(rig.load("joint_limits", kConfiguration));
   const Eigen::VectorXd fast = Eigen::VectorXd::LinSpaced(7, -3.0, 3.0);
   EXPECT_EQ(run(Eigen::VectorXd::Zero(7), fast), fast);
@@ -40,7 +40,7 @@ TEST_F(JointLimitsTest, farAwayOrLeavingKeepsEveryBit) {
   EXPECT_EQ(run(Eigen::VectorXd::Constant(7, -0.99), -leaving), Eigen::VectorXd(-leaving));
 }
 
-TEST_F(JointLimitsTest, neverPushesBackAndNeverSpeedsUp) {
+TEST_F(JointLimitsTest, NeverPushesBackAndNeverSpeedsUp) {
   ASSERT_TRUE(rig.load("joint_limits", kConfiguration));
   std::mt19937 random(2);
   std::uniform_real_distribution<double> position(-1.2, 1.2), speed(-4, 4);
@@ -64,7 +64,7 @@ TEST_F(JointLimitsTest, neverPushesBackAndNeverSpeedsUp) {
   }
 }
 
-TEST_F(JointLimitsTest, wrongConfigurationsAreRefused) {
+TEST_F(JointLimitsTest, WrongConfigurationsAreRefused) {
   EXPECT_FALSE(rig.load("joint_limits", "influence: 0.1\nsafety: 0.2\n"));
   EXPECT_FALSE(rig.load("joint_limits", "lower: [-1, -1]\n"));
   EXPECT_FALSE(rig.load("joint_limits",

@@ -8,7 +8,7 @@
 namespace ctrl_more {
 namespace {
 
-TEST(LoggerTest, recordsCarrySourcePlaceCycleAndNumbers) {
+TEST(LoggerTest, RecordsCarrySourcePlaceCycleAndNumbers) {
   Logger logger;
   auto sink = std::make_shared<ListSink>();
   logger.addSink(sink);
@@ -22,7 +22,7 @@ TEST(LoggerTest, recordsCarrySourcePlaceCycleAndNumbers) {
   EXPECT_TRUE(contains(sink->lines[0], ", cycle 17): force 12.5 N above 10 N"));
 }
 
-TEST(LoggerTest, levels) {
+TEST(LoggerTest, Levels) {
   Logger logger;
   auto sink = std::make_shared<ListSink>();
   logger.addSink(sink);
@@ -35,7 +35,7 @@ TEST(LoggerTest, levels) {
   EXPECT_EQ(sink->lines.size(), 2u);
 }
 
-TEST(LoggerTest, longTextsAreCutNotOverrun) {
+TEST(LoggerTest, LongTextsAreCutNotOverrun) {
   Logger logger;
   auto sink = std::make_shared<ListSink>();
   logger.addSink(sink);
@@ -45,7 +45,7 @@ TEST(LoggerTest, longTextsAreCutNotOverrun) {
   EXPECT_LT(sink->lines[0].size(), 400u);
 }
 
-TEST(LoggerTest, fullRingDropsAndCounts) {
+TEST(LoggerTest, FullRingDropsAndCounts) {
   Logger logger(8);
   for (int i = 0; i < 20; ++i) logger.log(LogLevel::Info, "a", "x");
   EXPECT_EQ(logger.dropped(), 12u);
@@ -54,7 +54,7 @@ TEST(LoggerTest, fullRingDropsAndCounts) {
   EXPECT_EQ(logger.drain(), 1u);
 }
 
-TEST(LoggerTest, fileSinkWritesTheFileThatWasNamed) {
+TEST(LoggerTest, FileSinkWritesTheFileThatWasNamed) {
   const std::string path = ::testing::TempDir() + "/ctrl_more_test.log";
   std::remove(path.c_str());
   {
@@ -69,7 +69,7 @@ TEST(LoggerTest, fileSinkWritesTheFileThatWasNamed) {
   EXPECT_THROW(FileLogSink("/nowhere/x.log"), std::runtime_error);
 }
 
-TEST(LoggerTest, streamSink) {
+TEST(LoggerTest, StreamSink) {
   std::ostringstream out;
   Logger logger;
   logger.addSink(std::make_shared<StreamLogSink>(out));
@@ -78,7 +78,7 @@ TEST(LoggerTest, streamSink) {
   EXPECT_EQ(out.str(), "[INFO] a: b\n");
 }
 
-TEST(LoggerTest, manyProducersLoseNothing) {
+TEST(LoggerTest, ManyProducersLoseNothing) {
   Logger logger(1 << 15);
   auto sink = std::make_shared<ListSink>();
   logger.addSink(sink);
@@ -104,7 +104,7 @@ TEST(LoggerTest, manyProducersLoseNothing) {
   }
 }
 
-TEST(LoggerTest, throttle) {
+TEST(LoggerTest, Throttle) {
   LogThrottle throttle(1000);
   EXPECT_TRUE(throttle.pass(0));
   EXPECT_FALSE(throttle.pass(999));

@@ -62,8 +62,8 @@ def test_loading_running_and_unloading_is_clean() -> None:
     result = subprocess.run(
         ["valgrind", "--error-exitcode=9", "--leak-check=full", "--errors-for-leak-kinds=definite",
          "--num-callers=20", str(program),
-         "--gtest_filter=Plugins.loadsRunsAndUnloads:Plugins.knownTypeName*:Plugins.twoInstances*:"
-         "Plugins.what*:TwoBuilds.*"],
+         "--gtest_filter=Plugins.LoadsRunsAndUnloads:Plugins.KnownTypeName*:Plugins.TwoInstances*:"
+         "Plugins.What*:TwoBuilds.*"],
         capture_output=True, text=True, timeout=300,
     )
     assert result.returncode == 0, result.stderr[-4000:]

@@ -2,7 +2,7 @@
 #include <filesystem>
 #include <fstream>
 
-#include "ctrl_more/prototypes.hpp"
+#include "ctrl_more/feedback_controller.hpp"
 #include "test_support.hpp"
 
 namespace fs = std::filesystem;
@@ -29,7 +29,7 @@ struct Plugins : ::testing::Test {
   }
 };
 
-TEST_F(Plugins, loadsRunsAndUnloads) {
+TEST_F(Plugins, LoadsRunsAndUnloads) {
   ASSERT_TRUE(load("loadControllers: [Good]\nGood: {libPath: libgood.so, enabled: true}\n").ok());
   EXPECT_NE(prototypes().find("Good"), nullptr);
   rig.step();
@@ -44,7 +44,7 @@ TEST_F(Plugins, loadsRunsAndUnloads) {
   ASSERT_TRUE(load("loadControllers: [Good]\nGood: {libPath: libgood.so}\n").ok()) << "again";
 }
 
-TEST_F(Plugins, papersOwnMakerAndNames) {
+TEST_F(Plugins, PapersOwnMakerAndNames) {
   rig.robot.declare(RobotSource::Measured, "imu", 9, "rad, rad/s, m/s^2", "imu");
   ASSERT_TRUE(load("loadControllers: [MyController]\nMyController: {libPath: libpaper_maker.so, "
                    "enabled: true}\n")
@@ -53,7 +53,7 @@ TEST_F(Plugins, papersOwnMakerAndNames) {
   EXPECT_EQ(used, (std::vector<std::string>{"centreOfMass/com", "zmp/zmp"}));
 }
 
-TEST_F(Plugins, addedRobotStateWithoutSizeMustExist) {
+TEST_F(Plugins, AddedRobotStateWithoutSizeMustExist) {
   // "imu" has no declared size: the host has to declare it, or the load is refused in words.
   const LoadReport report =
       load("loadControllers: [MyController]\nMyController: {libPath: libpaper_maker.so}\n");
@@ -61,7 +61,7 @@ TEST_F(Plugins, addedRobotStateWithoutSizeMustExist) {
   EXPECT_TRUE(contains(report.text(), "declare it before loading")) << report.text();
 }
 
-TEST_F(Plugins, papersExampleFileIsRefusedWithLineAndSuggestion) {
+TEST_F(Plugins, PapersExampleFileIsRefusedWithLineAndSuggestion) {
   const std::string paper =
       "loadControllers: [Attitude , ZmpIP]\n"
       "Compliant:\n"
@@ -83,7 +83,7 @@ TEST_F(Plugins, papersExampleFileIsRefusedWithLineAndSuggestion) {
   EXPECT_EQ(rig.control.getZMP()[0], 1.0) << "what was loaded keeps running";
 }
 
-TEST_F(Plugins, papersKeysWorkAsPrintedWithRealFiles) {
+TEST_F(Plugins, PapersKeysWorkAsPrintedWithRealFiles) {
   const std::string yaml = "loadControllers: [Attitude]\nAttitude:\n  libPath: " + kController +
                            "/libctrl_more_attitude.so\n  configFile: " CTRL_MORE_SOURCE_DIR
                            "/config/attitude.yaml\n";
@@ -92,7 +92,7 @@ TEST_F(Plugins, papersKeysWorkAsPrintedWithRealFiles) {
   EXPECT_EQ(report.loaded, std::vector<std::string>{"Attitude"});
 }
 
-TEST_F(Plugins, badLibrariesAreRefusedInWords) {
+TEST_F(Plugins, BadLibrariesAreRefusedInWords) {
   expectRefused("loadControllers: [A]\nA: {libPath: libmissing.so}\n",
                 {"list.yaml:2", "libPath", "libmissing.so", "tried"});
   expectRefused("loadControllers: [A]\nA: {libPath: libnone.so}\n", {"registers no controller"});
@@ -103,7 +103,7 @@ TEST_F(Plugins, badLibrariesAreRefusedInWords) {
   expectRefused("loadControllers: [A]\nA: {libPath: libwrong_type.so}\n",
                 {"'Registered'", "'Described'"});
   expectRefused("loadControllers: [A]\nA: {libPath: libother_abi.so}\n",
-                {"'OtherAbi' compiled for another ctrl_more", "interface 3", "interface 2",
+                {"'OtherAbi' compiled for another ctrl_more", "interface 4", "interface 3",
                  "build it again"});
   expectRefused("loadControllers: [A]\nA: {libPath: libgood.so, type: God}\n",
                 {"no controller of type 'God'", "did you mean 'Good'"});
@@ -112,7 +112,7 @@ TEST_F(Plugins, badLibrariesAreRefusedInWords) {
 }
 
 // What a library throws lives in it, and must be dealt with before it is closed.
-TEST_F(Plugins, whateverALibraryThrowsRefusesTheWholeListInWords) {
+TEST_F(Plugins, WhateverALibraryThrowsRefusesTheWholeListInWords) {
   const std::string own = "an error of its own", strange = "not a std::exception";
   for (const auto& thrown : std::vector<std::pair<std::string, std::string>>{
            {"InMaker", own}, {"InDescribe", own}, {"InInitialize", own},
@@ -139,7 +139,7 @@ TEST_F(Plugins, whateverALibraryThrowsRefusesTheWholeListInWords) {
   }
 }
 
-TEST_F(Plugins, whatALibraryThrowsWhileLoadedIsAFaultOrARefusal) {
+TEST_F(Plugins, WhatALibraryThrowsWhileLoadedIsAFaultOrARefusal) {
   ASSERT_TRUE(load("loadControllers: [update, judge]\n"
                    "update: {libPath: libstrangers.so, type: InUpdate, enabled: true}\n"
                    "judge: {libPath: libstrangers.so, type: InJudge}\n").ok());
@@ -150,7 +150,7 @@ TEST_F(Plugins, whatALibraryThrowsWhileLoadedIsAFaultOrARefusal) {
   EXPECT_EQ(rig.manager->getGains("judge").all()["k"][0], 1.0);
 }
 
-TEST_F(Plugins, knownTypeNameIsRefusedAndTheFirstOneStays) {
+TEST_F(Plugins, KnownTypeNameIsRefusedAndTheFirstOneStays) {
   ASSERT_TRUE(load("loadControllers: [Good]\nGood: {libPath: libgood.so, enabled: true}\n").ok());
   expectRefused("loadControllers: [B]\nB: {libPath: libagain.so}\n",
                 {"registered already", "Good"});
@@ -159,7 +159,7 @@ TEST_F(Plugins, knownTypeNameIsRefusedAndTheFirstOneStays) {
   EXPECT_NE(prototypes().find("Good"), nullptr);
 }
 
-TEST_F(Plugins, twoInstancesOfOneLibrary) {
+TEST_F(Plugins, TwoInstancesOfOneLibrary) {
   ASSERT_TRUE(load("loadControllers: [left, right]\nleft: {libPath: libgood.so, enabled: true}\n"
                    "right: {libPath: libgood.so, enabled: true}\n")
                   .ok());
@@ -167,7 +167,7 @@ TEST_F(Plugins, twoInstancesOfOneLibrary) {
   EXPECT_EQ(rig.control.getZMP()[0], 2.0);
 }
 
-TEST_F(Plugins, allOrNothingUnlessTheRestIsAskedFor) {
+TEST_F(Plugins, AllOrNothingUnlessTheRestIsAskedFor) {
   const std::string yaml =
       "loadControllers: [Bad, Good]\nBad: {libPath: libnone.so}\nGood: {libPath: libgood.so}\n";
   const LoadReport strict = load(yaml);
@@ -179,7 +179,7 @@ TEST_F(Plugins, allOrNothingUnlessTheRestIsAskedFor) {
   EXPECT_EQ(lenient.errors.size(), 1u);
 }
 
-TEST_F(Plugins, refusedListIsNeverSeenByARunningCycle) {
+TEST_F(Plugins, RefusedListIsNeverSeenByARunningCycle) {
   rig.step();  // frozen
   const LoadReport report = load(
       "loadControllers: [Good, Bad]\nGood: {libPath: libgood.so, enabled: true}\n"
@@ -195,13 +195,13 @@ TEST_F(Plugins, refusedListIsNeverSeenByARunningCycle) {
   EXPECT_EQ(rig.control.getZMP()[0], 1.0);
 }
 
-TEST_F(Plugins, refusedListLeavesNoKeyBehind) {
+TEST_F(Plugins, RefusedListLeavesNoKeyBehind) {
   load("loadControllers: [Limits, Bad]\nLimits: {type: JointLimits, libPath: " + kController +
        "/libctrl_more_joint_limits.so}\nBad: {libPath: libnone.so}\n");
   EXPECT_FALSE(rig.robot.find(RobotSource::Measured, "joint_position").valid());
 }
 
-TEST_F(Plugins, wrongFilesAreRefusedWithTheirLine) {
+TEST_F(Plugins, WrongFilesAreRefusedWithTheirLine) {
   expectRefused("loadControllers: [Good]\nGood:\n  libPath: libgood.so\n  confgFile: x\n",
                 {"list.yaml:4", "confgFile", "did you mean 'configFile'"});
   expectRefused("loadControllers: [Good]\nGood: {libPath: libgood.so, enabled: yess}\n",
@@ -219,7 +219,7 @@ TEST_F(Plugins, wrongFilesAreRefusedWithTheirLine) {
   EXPECT_FALSE(rig.manager->load("/nowhere/list.yaml").ok());
 }
 
-TEST_F(Plugins, sharedSignalsCanBeRefused) {
+TEST_F(Plugins, SharedSignalsCanBeRefused) {
   const std::string yaml =
       "loadControllers: [left, right]\nsharedSignals: refuse\n"
       "left: {libPath: libgood.so, enabled: true}\nright: {libPath: libgood.so, enabled: true}\n";
@@ -230,7 +230,7 @@ TEST_F(Plugins, sharedSignalsCanBeRefused) {
   EXPECT_FALSE(rig.manager->has("right"));
 }
 
-TEST_F(Plugins, librariesAreFoundWithoutAbsolutePaths) {
+TEST_F(Plugins, LibrariesAreFoundWithoutAbsolutePaths) {
   const fs::path folder = fs::path(::testing::TempDir()) / "ctrl_more_search";
   fs::create_directories(folder / "share_root/my_pkg");
   fs::copy_file(library("good"), folder / "share_root/my_pkg/libgood_there.so",
@@ -260,7 +260,7 @@ TEST_F(Plugins, librariesAreFoundWithoutAbsolutePaths) {
   EXPECT_FALSE(load("loadControllers: [Nowhere]\nNowhere: {}\n").ok());
 }
 
-TEST_F(Plugins, shippedListAndProfilesLoad) {
+TEST_F(Plugins, ShippedListAndProfilesLoad) {
   setenv("CTRL_MORE_PATH", kController.c_str(), 1);
   const LoadReport report = rig.manager->load(CTRL_MORE_SOURCE_DIR "/config/feedback.yaml", true);
   unsetenv("CTRL_MORE_PATH");
@@ -305,7 +305,7 @@ struct TwoBuilds : Plugins {
   }
 };
 
-TEST_F(TwoBuilds, newCodeRunsAfterUnloadingRebuildingAndLoading) {
+TEST_F(TwoBuilds, NewCodeRunsAfterUnloadingRebuildingAndLoading) {
   build("good");
   ASSERT_TRUE(loadIt().ok());
   EXPECT_EQ(runOnce(), 1.0);
@@ -316,7 +316,7 @@ TEST_F(TwoBuilds, newCodeRunsAfterUnloadingRebuildingAndLoading) {
   EXPECT_EQ(runOnce(), 10.0);
 }
 
-TEST_F(TwoBuilds, oldCodeIsNeverLoadedUnderTheNameOfTheNew) {
+TEST_F(TwoBuilds, OldCodeIsNeverLoadedUnderTheNameOfTheNew) {
   build("good");
   ASSERT_TRUE(loadIt().ok());
   build("rebuilt");
@@ -330,7 +330,7 @@ TEST_F(TwoBuilds, oldCodeIsNeverLoadedUnderTheNameOfTheNew) {
 }
 
 // What static objects of a library cannot do twice, the loader has to remember.
-TEST_F(TwoBuilds, libraryThatStaysInMemoryIsLoadedAgain) {
+TEST_F(TwoBuilds, LibraryThatStaysInMemoryIsLoadedAgain) {
   build("resident");
   for (int i = 0; i < 3; ++i) {
     const LoadReport report = loadIt();

@@ -17,7 +17,7 @@
 namespace ctrl_more {
 namespace {
 
-TEST(ForbiddenCalls, areSeen) {
+TEST(ForbiddenCalls, AreSeen) {
   forbidden::start();
   std::vector<double> memory(100);
   std::mutex mutex;
@@ -56,7 +56,7 @@ std::unique_ptr<TestController> typical(std::atomic<bool>* throw_now) {
   return c;
 }
 
-TEST(Realtime, nothingForbiddenIn100000CyclesWith10000PlanChanges) {
+TEST(Realtime, NothingForbiddenIn100000CyclesWith10000PlanChanges) {
   Rig rig(0.05, true, true);
   std::atomic<bool> throw_now{false};
   constexpr int kControllers = 100;
@@ -153,7 +153,7 @@ TEST(Realtime, nothingForbiddenIn100000CyclesWith10000PlanChanges) {
 
 // The kernel's own word: in strict seccomp mode any system call but read, write and exit kills
 // the process. So does reading the clock, which strict mode forbids too: not timed, no records.
-TEST(Realtime, cyclesRunWhereSystemCallsKill) {
+TEST(Realtime, CyclesRunWhereSystemCallsKill) {
   Rig rig(0.05, false, true);
   rig.logger.setLevel(LogLevel::Error);
   for (int i = 0; i < 10; ++i) rig.add(typical(nullptr), "c" + std::to_string(i));

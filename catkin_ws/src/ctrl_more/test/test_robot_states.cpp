@@ -1,7 +1,6 @@
 #include <limits>
 #include <sstream>
 
-#include "ctrl_more/signal_mailbox.hpp"
 #include "test_support.hpp"
 
 namespace ctrl_more {
@@ -14,7 +13,7 @@ struct RobotStatesTest : ::testing::Test {
   RobotStatesTest() { logger.addSink(sink); }
 };
 
-TEST_F(RobotStatesTest, keepsDataAndStampOfBothMaps) {
+TEST_F(RobotStatesTest, KeepsDataAndStampOfBothMaps) {
   ASSERT_TRUE(robot.setMeasuredData("imu", vectorOf({1, 2, 3}), 42));
   ASSERT_TRUE(robot.setEstimatedData("imu", vectorOf({4, 5}), 43));
   Eigen::VectorXd value;
@@ -28,13 +27,13 @@ TEST_F(RobotStatesTest, keepsDataAndStampOfBothMaps) {
   EXPECT_EQ(robot.newestStamp(), 43);
 }
 
-TEST_F(RobotStatesTest, hasNoKeyOfItsOwn) {
+TEST_F(RobotStatesTest, HasNoKeyOfItsOwn) {
   EXPECT_TRUE(robot.signals(RobotSource::Measured).empty());
   EXPECT_TRUE(robot.signals(RobotSource::Estimated).empty());
   EXPECT_EQ(robot.newestStamp(), kNeverWritten);
 }
 
-TEST_F(RobotStatesTest, announcesEachNewKeyOnce) {
+TEST_F(RobotStatesTest, AnnouncesEachNewKeyOnce) {
   robot.setMeasuredData("imu", vectorOf({1}), 0);
   robot.setMeasuredData("imu", vectorOf({2}), 1);
   robot.setMeasuredData("imu", vectorOf({3}), 2);
@@ -44,7 +43,7 @@ TEST_F(RobotStatesTest, announcesEachNewKeyOnce) {
   EXPECT_EQ(announced, 1);
 }
 
-TEST_F(RobotStatesTest, wrongSizeIsRefusedAndNamesKeyExpectedGotAndWho) {
+TEST_F(RobotStatesTest, WrongSizeIsRefusedAndNamesKeyExpectedGotAndWho) {
   robot.setMeasuredData("imu", vectorOf({1, 2, 3, 4, 5, 6, 7, 8, 9}), 0);
   const Status status = robot.setMeasuredData("imu", vectorOf({1, 2, 3}), 1, "driver");
   ASSERT_FALSE(status);
@@ -58,7 +57,7 @@ TEST_F(RobotStatesTest, wrongSizeIsRefusedAndNamesKeyExpectedGotAndWho) {
   EXPECT_TRUE(sink->contains("WARN"));
 }
 
-TEST_F(RobotStatesTest, missingKeyIsAnErrorAndLeavesTheValueAlone) {
+TEST_F(RobotStatesTest, MissingKeyIsAnErrorAndLeavesTheValueAlone) {
   robot.setMeasuredData("imu", vectorOf({1}), 0);
   Eigen::VectorXd value = vectorOf({7, 7});
   std::int64_t stamp = 5;
@@ -70,7 +69,7 @@ TEST_F(RobotStatesTest, missingKeyIsAnErrorAndLeavesTheValueAlone) {
   EXPECT_FALSE(robot.getEstimatedData("imu", value));
 }
 
-TEST_F(RobotStatesTest, stampWithoutDataIsRefused) {
+TEST_F(RobotStatesTest, StampWithoutDataIsRefused) {
   EXPECT_FALSE(robot.setMeasurementTimeStamp("imu", 1));
   EXPECT_FALSE(robot.setEstimateTimeStamp("zmp", 1));
   robot.setMeasuredData("imu", vectorOf({1}), 0);
@@ -79,7 +78,7 @@ TEST_F(RobotStatesTest, stampWithoutDataIsRefused) {
   EXPECT_EQ(robot.stamp(robot.find(RobotSource::Measured, "imu")), 9);
 }
 
-TEST_F(RobotStatesTest, badNumbersAndStampsAreRefused) {
+TEST_F(RobotStatesTest, BadNumbersAndStampsAreRefused) {
   robot.setMeasuredData("imu", vectorOf({1}), 0);
   EXPECT_FALSE(robot.setMeasuredData("imu", vectorOf({std::nan("")}), 1));
   EXPECT_FALSE(
@@ -93,7 +92,7 @@ TEST_F(RobotStatesTest, badNumbersAndStampsAreRefused) {
   EXPECT_EQ(robot.stamp(imu), 0);
 }
 
-TEST_F(RobotStatesTest, copyHasEverything) {
+TEST_F(RobotStatesTest, CopyHasEverything) {
   robot.setMeasuredData("imu", vectorOf({1, 2}), 3);
   const RobotSignal imu = robot.find(RobotSource::Measured, "imu");
   const RobotStates copy = robot;
@@ -103,7 +102,7 @@ TEST_F(RobotStatesTest, copyHasEverything) {
   EXPECT_EQ(copy.find(RobotSource::Measured, "imu").size(), 2);
 }
 
-TEST_F(RobotStatesTest, frozenRefusesNewKeysOnly) {
+TEST_F(RobotStatesTest, FrozenRefusesNewKeysOnly) {
   robot.setMeasuredData("imu", vectorOf({1}), 0);
   robot.freeze();
   EXPECT_TRUE(robot.setMeasuredData("imu", vectorOf({2}), 1));
@@ -113,7 +112,7 @@ TEST_F(RobotStatesTest, frozenRefusesNewKeysOnly) {
   EXPECT_FALSE(robot.find(RobotSource::Measured, "wrench").valid());
 }
 
-TEST_F(RobotStatesTest, neverWrittenIsAStateOfItsOwn) {
+TEST_F(RobotStatesTest, NeverWrittenIsAStateOfItsOwn) {
   ASSERT_TRUE(robot.declare(RobotSource::Measured, "imu", 9, "rad", "imu"));
   const RobotSignal imu = robot.find(RobotSource::Measured, "imu");
   EXPECT_EQ(robot.stamp(imu), kNeverWritten);
@@ -124,7 +123,7 @@ TEST_F(RobotStatesTest, neverWrittenIsAStateOfItsOwn) {
   EXPECT_FALSE(robot.declare(RobotSource::Measured, "imu", 10));
 }
 
-TEST_F(RobotStatesTest, printShowsKeySizeUnitAgeAndNumbers) {
+TEST_F(RobotStatesTest, PrintShowsKeySizeUnitAgeAndNumbers) {
   robot.declare(RobotSource::Measured, "imu", 2, "rad", "imu_link");
   robot.declare(RobotSource::Estimated, "zmp", 3);
   robot.setMeasuredData("imu", vectorOf({1.5, 2}), 1000000);
@@ -135,7 +134,7 @@ TEST_F(RobotStatesTest, printShowsKeySizeUnitAgeAndNumbers) {
             "estimatedData\n  zmp [3]: never written\n");
 }
 
-TEST_F(RobotStatesTest, mailboxDeliversTheNewestCompleteLetter) {
+TEST_F(RobotStatesTest, MailboxDeliversTheNewestCompleteLetter) {
   robot.declare(RobotSource::Measured, "wrench", 2);
   const RobotSignal wrench = robot.find(RobotSource::Measured, "wrench");
   SignalMailbox mailbox(wrench);
@@ -150,7 +149,7 @@ TEST_F(RobotStatesTest, mailboxDeliversTheNewestCompleteLetter) {
   EXPECT_FALSE(mailbox.deliver(robot));
 }
 
-TEST_F(RobotStatesTest, stampsOfAnotherClockAreNotFresh) {
+TEST_F(RobotStatesTest, StampsOfAnotherClockAreNotFresh) {
   robot.declare(RobotSource::Measured, "imu", 1);
   const RobotSignal imu = robot.find(RobotSource::Measured, "imu");
   const std::int64_t now = 1'000'000'000'000, ms = 1'000'000;

@@ -10,16 +10,13 @@ from pathlib import Path
 import pytest
 
 PACKAGE = Path(__file__).resolve().parent.parent
-# What the stress needs of the core: all but the part that opens libraries.
-LEFT_OUT = {"plugin_library.cpp", "central_module.cpp"}
 
 
 @pytest.mark.skipif(not os.environ.get("COGLAB_LONG"), reason="campaign: set COGLAB_LONG=1")
 @pytest.mark.skipif(shutil.which("g++") is None, reason="g++ is not installed")
 def test_services_against_the_cycle(tmp_path: Path) -> None:
     seconds = os.environ.get("CTRL_MORE_TSAN_SECONDS", "60")
-    sources = [p for p in sorted((PACKAGE / "src").glob("*.cpp")) if p.name not in LEFT_OUT]
-    sources += [PACKAGE / "test" / "thread_stress.cpp", PACKAGE / "test" / "no_libraries.cpp"]
+    sources = [*sorted((PACKAGE / "src").rglob("*.cpp")), PACKAGE / "test" / "thread_stress.cpp"]
     program = tmp_path / "thread_stress"
     built = subprocess.run(
         ["g++", "-std=c++17", "-O1", "-g", "-fsanitize=thread", "-o", str(program),

@@ -4,7 +4,6 @@
 #include <iterator>
 
 #include "controller_rig.hpp"
-#include "ctrl_more/so3.hpp"
 
 namespace ctrl_more {
 namespace {
@@ -35,7 +34,30 @@ std::string bytesOfLibrary() {
   return {std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
 }
 
-TEST(ThreeRobots, oneLibraryThreeFilesOneResult) {
+// What a robot's IMU says, in its own world and on its own mount.
+Eigen::VectorXd sensorData(const Robot& robot, const Body& body, std::string& key) {
+  const Eigen::Quaterniond imu = robot.world.conjugate() * body.orientation * robot.mount;
+  const Eigen::Vector3d gyro = (body.orientation * robot.mount).conjugate() * body.rate;
+  const Eigen::Matrix3d r = imu.toRotationMatrix();
+  if (contains(robot.configuration, "rpy_gyro_acc")) {
+    key = "wrist_imu";
+    Eigen::VectorXd data(9);
+    data << std::atan2(r(2, 1), r(2, 2)), std::asin(-r(2, 0)), std::atan2(r(1, 0), r(0, 0)), gyro,
+        0, 0, 9.81;
+    return data;
+  }
+  Eigen::VectorXd data(10);
+  if (contains(robot.configuration, "wxyz")) {
+    key = "torso_imu";
+    data << imu.w(), imu.x(), imu.y(), imu.z(), 0, 0, 9.81, gyro;
+  } else {
+    key = "imu";
+    data << imu.coeffs(), 0, 0, 9.81, gyro;
+  }
+  return data;
+}
+
+TEST(ThreeRobots, OneLibraryThreeFilesOneResult) {
   const std::string gains =
       "kp: [0.6, 0.4, 0.2]\nki: [1, 2, 0.5]\nkd: [0.02, 0.03, 0.01]\nmax_angle: 0.5\n";
   const Eigen::Quaterniond tilted = expOf({0.4, -1.1, 2.0});
@@ -72,25 +94,8 @@ TEST(ThreeRobots, oneLibraryThreeFilesOneResult) {
     Body body;
     std::vector<Eigen::Quaterniond> path;
     for (int k = 0; k < 1000; ++k) {
-      // What this robot's sensors say, in its own world and on its own mount.
-      const Eigen::Quaterniond imu = to_common.conjugate() * body.orientation * robot.mount;
-      const Eigen::Vector3d gyro = (body.orientation * robot.mount).conjugate() * body.rate;
-      const Eigen::Matrix3d r = imu.toRotationMatrix();
-      Eigen::VectorXd data;
-      std::string key = "imu";
-      if (contains(robot.configuration, "rpy_gyro_acc")) {
-        data.resize(9);
-        data << std::atan2(r(2, 1), r(2, 2)), std::asin(-r(2, 0)), std::atan2(r(1, 0), r(0, 0)),
-            gyro, 0, 0, 9.81;
-        key = "wrist_imu";
-      } else if (contains(robot.configuration, "wxyz")) {
-        data.resize(10);
-        data << imu.w(), imu.x(), imu.y(), imu.z(), 0, 0, 9.81, gyro;
-        key = "torso_imu";
-      } else {
-        data.resize(10);
-        data << imu.coeffs(), 0, 0, 9.81, gyro;
-      }
+      std::string key;
+      const Eigen::VectorXd data = sensorData(robot, body, key);
       ASSERT_TRUE(rig.robot.setMeasuredData(key, data, rig.cycle.now_ns));
       // The common reference, in this robot's world.
       const Eigen::Quaterniond reference =

@@ -24,7 +24,7 @@ double dcmAfter(double k, double height, double e0, int cycles, ControllerRig& r
   return xi;
 }
 
-TEST(ZmpDcmTest, errorDecaysAsTheClosedFormSays) {
+TEST(ZmpDcmTest, ErrorDecaysAsTheClosedFormSays) {
   ControllerRig rig;
   const double k = 20, height = 0.8, w = std::sqrt(9.80665 / height);
   const int n = 100;
@@ -32,7 +32,7 @@ TEST(ZmpDcmTest, errorDecaysAsTheClosedFormSays) {
   EXPECT_NEAR(dcmAfter(k, height, 0.01, n, rig), expected, 1e-13);
 }
 
-TEST(ZmpDcmTest, stableExactlyBelowTheBound) {
+TEST(ZmpDcmTest, StableExactlyBelowTheBound) {
   const double height = 0.8, w = std::sqrt(9.80665 / height);
   const double bound = 2 * w / (std::exp(w * kDt) - 1);
   EXPECT_NEAR(bound, 396.0, 1.0);
@@ -41,7 +41,7 @@ TEST(ZmpDcmTest, stableExactlyBelowTheBound) {
   EXPECT_GT(std::abs(dcmAfter(1.01 * bound, height, 1e-6, 200, above)), 1e-6);
 }
 
-TEST(ZmpDcmTest, staysInTheSupportBox) {
+TEST(ZmpDcmTest, StaysInTheSupportBox) {
   ControllerRig rig;
   ASSERT_TRUE(rig.load("zmp_dcm", "k: 10\nsupport_box: [0.05, 0.12, 0.03, 0.04]\n"));
   for (const double side : {1.0, -1.0}) {
@@ -53,7 +53,7 @@ TEST(ZmpDcmTest, staysInTheSupportBox) {
   }
 }
 
-TEST(ZmpDcmTest, zmpIpFollowsItsClosedForm) {
+TEST(ZmpDcmTest, ZmpIpFollowsItsClosedForm) {
   ControllerRig rig;
   const double kc = 6.0, ki = 3.5, disturbance = 0.01;
   ASSERT_TRUE(rig.load("zmp_dcm", "mode: zmp_ip\nkc: 6\nki: 3.5\nmax_offset: 0.3\nzmp_filter: 0\n"));
@@ -72,7 +72,7 @@ TEST(ZmpDcmTest, zmpIpFollowsItsClosedForm) {
   EXPECT_NEAR(rig.control.getZMP().x(), -kc * com, 1e-9);
 }
 
-TEST(ZmpDcmTest, zmpIpSettlesOnAPendulumThatFollowsLate) {
+TEST(ZmpDcmTest, ZmpIpSettlesOnAPendulumThatFollowsLate) {
   for (const double mass : {20.0, 100.0}) {
     for (const double lag : {0.0, 0.02, 0.1}) {
       for (const int delay : {1, 3}) {
@@ -95,7 +95,7 @@ TEST(ZmpDcmTest, zmpIpSettlesOnAPendulumThatFollowsLate) {
   }
 }
 
-TEST(ZmpDcmTest, zmpIpIsNotAlwaysAtItsLimitAndStaysFinite) {
+TEST(ZmpDcmTest, ZmpIpIsNotAlwaysAtItsLimitAndStaysFinite) {
   for (const double d : {0.0, 0.01, -0.01}) {
     ControllerRig rig;
     ASSERT_TRUE(rig.load("zmp_dcm", "mode: zmp_ip\n"));

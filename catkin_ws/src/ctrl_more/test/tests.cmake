@@ -44,9 +44,10 @@ endforeach()
 target_link_options(ctrl_more_test_plugin_resident PRIVATE -Wl,-z,nodelete)
 
 # One program per file, named after it: the test runner looks for them.
-foreach(name robot_states control_states feedback_controller manager all_or_nothing isolation
-    blending plugins documentation config config_fuzz logger central_module attitude compliant_stabiliser zmp_dcm
-    ee_admittance joint_limits three_robots)
+foreach(name robot_states control_states feedback_controller manager by_signal gains cascade
+    all_or_nothing isolation letting_go overruns attribution blending plugins documentation config
+    config_fuzz logger central_module attitude compliant_stabiliser zmp_dcm ee_admittance
+    joint_limits three_robots)
   ctrl_more_add_test(${name} test/test_${name}.cpp)
 endforeach()
 ctrl_more_add_test(realtime test/test_realtime.cpp test/forbidden_calls.cpp)

@@ -12,7 +12,6 @@
 #include <vector>
 
 #include "ctrl_more/feedback_controllers_manager.hpp"
-#include "ctrl_more/signal_mailbox.hpp"
 
 namespace {
 

@@ -3,9 +3,8 @@
 #include <cstring>
 #include <iostream>
 
-#include "ctrl_more/documentation.hpp"
 #include "ctrl_more/feedback_controllers_manager.hpp"
-#include "ctrl_more/plugin_library.hpp"
+#include "ctrl_more/loading/controller_instance.hpp"
 
 namespace {
 

@@ -74,6 +74,8 @@ class HandNode(unittest.TestCase):
         self.assertTrue(self.hand.status.calibrated)
         for word in ("must be fast", "started", "calibrated already", "ended"):
             self.assertTrue(any(word in status.message for status in self.diagnostics), word)
+        told = {value.value for status in self.diagnostics for value in status.values if value.key == "reason_code"}
+        self.assertLessEqual({str(ReasonCode.HAND_STARTED), str(ReasonCode.HAND_ENDED)}, told)
 
     def test_d_preshape_close_without_preshape(self) -> None:
         result = self.hand.run("hand_preshape_close")

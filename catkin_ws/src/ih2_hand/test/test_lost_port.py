@@ -107,7 +107,7 @@ def test_a_line_that_takes_few_bytes_at_a_time_loses_none(monkeypatch, piece):
 @pytest.fixture
 def node():
     """A hand node without its topics: what it would tell is kept in `told`."""
-    hand_node = pytest.importorskip("ih2_hand.ros.hand_node", reason="rospy or messages missing")
+    from ih2_hand.ros import hand_node
     node = hand_node.HandNode.__new__(hand_node.HandNode)
     node.told = []
     node.port, node.driver, node.calibrated, node.calibrating = "port", None, False, False

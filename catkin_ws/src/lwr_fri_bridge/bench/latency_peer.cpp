@@ -27,7 +27,7 @@
 #include <sys/time.h>
 #include <unistd.h>
 
-#include "lwr_fri_bridge/fri_thread.hpp"
+#include "lwr_fri_bridge/bridge/fri_thread.hpp"
 
 namespace {
 
@@ -62,7 +62,7 @@ int echo() {
   const int fd = openSocket(local, 100'000);
   std::printf("%d\n", ntohs(local.sin_port));
   std::fflush(stdout);
-  enterRealTime(kPriority);
+  coglab_rt::enterRealTime(kPriority);
   char buffer[1024];
   while (!ended) {
     socklen_t length = sizeof from;
@@ -111,50 +111,66 @@ struct Controller {
   }
 };
 
-int measure(int echo_port, int bridge_port, int quads) {
-  sockaddr_in local{}, target{};
-  const int fd = openSocket(local, 20'000);
-  enterRealTime(kPriority - 5);
-  target = local;
-  Controller controller;
-  std::uint8_t reply[1024];
-  std::vector<float> us(kBlock);
-  std::int64_t next = steadyNow() + kPeriod;
+/// Sends packets by turns to the bridge and to the echo, on the beat.
+class Exchange {
+ public:
+  Exchange(int echo_port, int bridge_port)
+      : fd_(openSocket(target_, 20'000)), echo_port_(echo_port), bridge_port_(bridge_port) {}
 
+  /// So many packets to one of the two, timed into us(); the other one gets as many beside them.
+  void block(bool to_bridge, int packets) {
+    for (int i = 0; i < packets; ++i, next_ += kPeriod) {
+      // Late ourselves: not the peer's fault.
+      if (steadyNow() > next_) next_ = steadyNow() + kPeriod;
+      timespec wake{next_ / 1'000'000'000, next_ % 1'000'000'000};
+      clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &wake, nullptr);
+      us_[static_cast<std::size_t>(i % kBlock)] = exchange(to_bridge);
+      exchange(!to_bridge);
+    }
+  }
+
+  Controller& controller() { return controller_; }
+  const std::vector<float>& us() const { return us_; }
+
+ private:
   /// Sends the packet of this millisecond to one of the two and waits for its answer; us.
-  const auto exchange = [&](bool to_bridge) {
-    target.sin_port = htons(static_cast<std::uint16_t>(to_bridge ? bridge_port : echo_port));
-    fri::MeasurementDatagram& d = controller.datagram;
-    d.header = fri::measurementHeader(to_bridge ? ++controller.counter : controller.counter,
+  float exchange(bool to_bridge) {
+    target_.sin_port = htons(static_cast<std::uint16_t>(to_bridge ? bridge_port_ : echo_port_));
+    fri::MeasurementDatagram& d = controller_.datagram;
+    d.header = fri::measurementHeader(to_bridge ? ++controller_.counter : controller_.counter,
                                       d.header.reflected);
     const std::int64_t sent = steadyNow();
-    sendto(fd, &d, sizeof d, 0, reinterpret_cast<sockaddr*>(&target), sizeof target);
+    sendto(fd_, &d, sizeof d, 0, reinterpret_cast<sockaddr*>(&target_), sizeof target_);
     // A late answer of the other one is not mistaken for this one.
+    std::uint8_t reply[1024];
     sockaddr_in from{};
     ssize_t got = 0;
     do {
       socklen_t length = sizeof from;
-      got = recvfrom(fd, reply, sizeof reply, 0, reinterpret_cast<sockaddr*>(&from), &length);
-    } while (got > 0 && from.sin_port != target.sin_port);
+      got = recvfrom(fd_, reply, sizeof reply, 0, reinterpret_cast<sockaddr*>(&from), &length);
+    } while (got > 0 && from.sin_port != target_.sin_port);
     const std::int64_t received = steadyNow();
     if (got != static_cast<ssize_t>(fri::kCommandSize)) return -1.0F;
     fri::CommandDatagram answer;
-    if (to_bridge && fri::decode(reply, fri::kCommandSize, answer)) controller.take(answer);
+    if (to_bridge && fri::decode(reply, fri::kCommandSize, answer)) controller_.take(answer);
     return 1e-3F * static_cast<float>(received - sent);
-  };
-  const auto block = [&](bool to_bridge, int packets) {
-    for (int i = 0; i < packets; ++i, next += kPeriod) {
-      if (steadyNow() > next) next = steadyNow() + kPeriod;  // late ourselves: not the peer's fault
-      timespec wake{next / 1'000'000'000, next % 1'000'000'000};
-      clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &wake, nullptr);
-      us[static_cast<std::size_t>(i % kBlock)] = exchange(to_bridge);
-      exchange(!to_bridge);
-    }
-  };
+  }
+
+  sockaddr_in target_{};
+  const int fd_, echo_port_, bridge_port_;
+  Controller controller_;
+  std::vector<float> us_ = std::vector<float>(kBlock);
+  std::int64_t next_ = steadyNow() + kPeriod;
+};
+
+int measure(int echo_port, int bridge_port, int quads) {
+  Exchange peers(echo_port, bridge_port);
+  coglab_rt::enterRealTime(kPriority - 5);
+  Controller& controller = peers.controller();
   for (int second = 0; second < 60 && !ended; ++second) {
     const std::uint64_t moved = controller.moved;
-    block(false, kBlock);
-    block(true, kBlock);
+    peers.block(false, kBlock);
+    peers.block(true, kBlock);
     if (controller.datagram.state == 2 && controller.moved > moved + kBlock / 2) break;
   }
   if (controller.datagram.state != 2 || controller.moved == 0) {
@@ -166,9 +182,9 @@ int measure(int echo_port, int bridge_port, int quads) {
   controller.answers = controller.moved = 0;
   for (int quad = 0; quad < quads && !ended; ++quad) {
     for (const bool to_bridge : {false, true, true, false}) {
-      block(to_bridge, kBlock);
+      peers.block(to_bridge, kBlock);
       std::fputs(to_bridge ? "bridge" : "echo", stdout);
-      for (const float value : us) std::printf(" %.1f", static_cast<double>(value));
+      for (const float value : peers.us()) std::printf(" %.1f", static_cast<double>(value));
       std::fputc('\n', stdout);
     }
   }

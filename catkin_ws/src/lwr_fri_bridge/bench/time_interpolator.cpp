@@ -20,8 +20,8 @@
 #include <string>
 #include <vector>
 
-#include "lwr_fri_bridge/braking.hpp"
-#include "lwr_fri_bridge/joint_limits.hpp"
+#include "coglab_rt/joint_limits_table.hpp"
+#include "lwr_fri_bridge/names.hpp"
 
 namespace {
 
@@ -104,8 +104,8 @@ AxisState randomState(const JointLimits& limits, int i) {
   for (;;) {
     const AxisState s{limits.upper_position[i] * part(), limits.velocity[i] * part(),
                       limits.acceleration[i] * part()};
-    const BrakingReach reach =
-        brakingReach(s.velocity, s.acceleration, limits.acceleration[i], limits.jerk[i]);
+    const coglab_rt::BrakingReach reach =
+        coglab_rt::brakingReach(s.velocity, s.acceleration, limits.acceleration[i], limits.jerk[i]);
     const double peak =
         s.velocity + s.acceleration * std::abs(s.acceleration) / (2.0 * limits.jerk[i]);
     if (std::abs(peak) <= limits.velocity[i] &&
@@ -155,7 +155,7 @@ int main(int argc, char** argv) {
     std::fprintf(stderr, "usage: %s time|limits|braking joint_limits.yaml\n", argv[0]);
     return 2;
   }
-  const JointLimits limits = loadJointLimits(argv[2]);
+  const JointLimits limits = coglab_rt::loadJointLimits(argv[2]);
   if (mode == "time") printTime(limits);
   if (mode == "limits") printLimits(limits);
   if (mode == "braking") printBraking(limits);

@@ -7,8 +7,9 @@
 #include <pybind11/pybind11.h>
 #include <pybind11/stl.h>
 
-#include "lwr_fri_bridge/bridge.hpp"
-#include "lwr_fri_bridge/diagnosis.hpp"
+#include "coglab_rt/joint_limits_table.hpp"
+#include "lwr_fri_bridge/bridge/bridge.hpp"
+#include "lwr_fri_bridge/bridge/diagnosis.hpp"
 
 namespace py = pybind11;
 using namespace lwr_fri_bridge;
@@ -192,7 +193,7 @@ py::dict snapshotDict(const Snapshot& s) {
 BridgeConfig configFrom(const std::string& limits_file, const std::string& profile,
                         const py::dict& parameters) {
   BridgeConfig config;
-  config.limits = loadJointLimits(limits_file, profile);
+  config.limits = coglab_rt::loadJointLimits(limits_file, profile);
   for (const auto& item : parameters) {
     const auto name = item.first.cast<std::string>();
     const py::handle value = item.second;
@@ -226,22 +227,19 @@ BridgeConfig configFrom(const std::string& limits_file, const std::string& profi
   return config;
 }
 
-}  // namespace
-
-PYBIND11_MODULE(lwr_fri_bridge, m) {
-  m.doc() =
-      "FRI bridge of the KUKA LWR 4+: interpolator, braking, datagrams, and the bridge in "
-      "lockstep.";
+void bindDatagrams(py::module_& m) {
   m.attr("MEASUREMENT_SIZE") = fri::kMeasurementSize;
   m.attr("COMMAND_SIZE") = fri::kCommandSize;
   m.def("decode_measurement", &decodeToDict<fri::MeasurementDatagram>, py::arg("datagram"));
   m.def("decode_command", &decodeToDict<fri::CommandDatagram>, py::arg("datagram"));
   m.def("encode_measurement", &encodeFromDict<fri::MeasurementDatagram>, py::arg("fields"));
   m.def("encode_command", &encodeFromDict<fri::CommandDatagram>, py::arg("fields"));
+}
 
+void bindLimits(py::module_& m) {
   py::class_<JointLimits>(m, "JointLimits", py::module_local())
       .def(py::init([](const std::string& path, const std::string& profile) {
-             return loadJointLimits(path, profile);
+             return coglab_rt::loadJointLimits(path, profile);
            }),
            py::arg("path"), py::arg("profile") = "default")
       .def_readonly("lower_position", &JointLimits::lower_position)
@@ -250,7 +248,9 @@ PYBIND11_MODULE(lwr_fri_bridge, m) {
       .def_readonly("acceleration", &JointLimits::acceleration)
       .def_readonly("jerk", &JointLimits::jerk)
       .def_readonly("torque", &JointLimits::torque);
+}
 
+void bindMotionFunctions(py::module_& m) {
   m.def(
       "step_axis",
       [](double p, double v, double a, double target, double max_acceleration, double max_jerk,
@@ -270,16 +270,18 @@ PYBIND11_MODULE(lwr_fri_bridge, m) {
       },
       py::arg("velocity"), py::arg("acceleration"), py::arg("target_velocity"),
       py::arg("max_acceleration"), py::arg("max_jerk"));
-  m.def("braking_distance", &brakingDistance, py::arg("speed"), py::arg("max_acceleration"),
-        py::arg("max_jerk"));
-  m.def("braking_speed", &brakingSpeed, py::arg("distance"), py::arg("max_acceleration"),
+  m.def("braking_distance", &coglab_rt::brakingDistance, py::arg("speed"),
+        py::arg("max_acceleration"), py::arg("max_jerk"));
+  m.def("braking_speed", &coglab_rt::brakingSpeed, py::arg("distance"), py::arg("max_acceleration"),
         py::arg("max_jerk"), py::arg("delay"));
   m.def(
       "flange_pose",
       [](const Vector7& joints) { return Eigen::Matrix4d(flangePose(joints).matrix()); },
       "4x4 pose of the flange in the base frame.", py::arg("joints"));
   m.def("known_events", &knownEvents);
+}
 
+void bindMotion(py::module_& m) {
   py::class_<Interpolator>(m, "Interpolator", py::module_local())
       .def(py::init<const JointLimits&>(), py::arg("limits"))
       .def("reset", &Interpolator::reset, py::arg("position"))
@@ -296,7 +298,9 @@ PYBIND11_MODULE(lwr_fri_bridge, m) {
       .def_static("delay", &VelocityFilter::delay, py::arg("time_constant"), py::arg("dt"))
       .def_static("noise_gain", &VelocityFilter::noiseGain, py::arg("time_constant"),
                   py::arg("dt"));
+}
 
+void bindBridge(py::module_& m) {
   py::class_<Bridge>(m, "Bridge", py::module_local(),
                      "The bridge without socket and threads: one call of answer() is one FRI tick.")
       .def(py::init([](const std::string& limits_file, const std::string& profile,
@@ -322,8 +326,8 @@ PYBIND11_MODULE(lwr_fri_bridge, m) {
           "send_velocity",
           [](Bridge& bridge, const Vector7& velocity, std::int64_t now_ns) {
             RobotSample sample;
-            bridge.port().newestSample(sample);
-            bridge.port().sendVelocity({velocity, now_ns, sample.motion_epoch});
+            bridge.mailboxes().newestSample(sample);
+            bridge.mailboxes().sendVelocity({velocity, now_ns, sample.motion_epoch});
           },
           "Target velocities (rad/s) as the control thread sends them, for the epoch of the newest "
           "sample.",
@@ -339,4 +343,17 @@ PYBIND11_MODULE(lwr_fri_bridge, m) {
           "(success, message) of a submitted event, or None while it is not finished.",
           py::arg("ticket"))
       .def("snapshot", [](Bridge& bridge) { return snapshotDict(bridge.snapshot()); });
+}
+
+}  // namespace
+
+PYBIND11_MODULE(lwr_fri_bridge, m) {
+  m.doc() =
+      "FRI bridge of the KUKA LWR 4+: interpolator, braking, datagrams, and the bridge in "
+      "lockstep.";
+  bindDatagrams(m);
+  bindLimits(m);
+  bindMotionFunctions(m);
+  bindMotion(m);
+  bindBridge(m);
 }

@@ -177,7 +177,7 @@ inline double motionTime(double period) {
   const double target = limits.upper_position[1] - 0.05;
   for (int i = 1; i * period < 30.0; ++i) {
     RobotSample sample;
-    bridge.port().newestSample(sample);
+    bridge.mailboxes().newestSample(sample);
     const double way = target - sample.commanded_position[1];
     Vector7 wish = Vector7::Zero();
     wish[1] = std::copysign(

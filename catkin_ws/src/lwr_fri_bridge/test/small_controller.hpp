@@ -10,13 +10,14 @@
 #include <iterator>
 #include <string>
 
-#include "lwr_fri_bridge/bridge.hpp"
+#include "coglab_rt/joint_limits_table.hpp"
+#include "lwr_fri_bridge/bridge/bridge.hpp"
 
 namespace lwr_fri_bridge::test {
 
 inline BridgeConfig defaultConfig(const std::string& profile = "default") {
   BridgeConfig config;
-  config.limits = loadJointLimits(LIMITS_FILE, profile);
+  config.limits = coglab_rt::loadJointLimits(LIMITS_FILE, profile);
   return config;
 }
 
@@ -143,8 +144,8 @@ inline Outcome runEvent(Bridge& bridge, SmallController& robot, const std::strin
 /// Sends a target velocity as the control thread does.
 inline void drive(Bridge& bridge, const SmallController& robot, const Vector7& velocity) {
   RobotSample sample;
-  bridge.port().newestSample(sample);
-  bridge.port().sendVelocity({velocity, robot.now(), sample.motion_epoch});
+  bridge.mailboxes().newestSample(sample);
+  bridge.mailboxes().sendVelocity({velocity, robot.now(), sample.motion_epoch});
 }
 
 }  // namespace lwr_fri_bridge::test

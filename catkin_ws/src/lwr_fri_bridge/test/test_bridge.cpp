@@ -78,86 +78,6 @@ TEST(Bridge, followsVelocitiesAfterStartOnly) {
   EXPECT_EQ(cell.bridge.snapshot().supervisor, SupervisorState::Command);
 }
 
-TEST(Bridge, strategyChangesInMonitorModeOnly) {
-  Cell cell;
-  cell.start();
-  const Outcome refused = runEvent(cell.bridge, cell.robot, "joint_impedance");
-  EXPECT_EQ(refused.code, OutcomeCode::InCommandMode);
-  cell.run(1);
-  EXPECT_EQ(cell.robot.answer.flags, 0x0001U);
-  EXPECT_TRUE(runEvent(cell.bridge, cell.robot, "stop").success());
-  EXPECT_TRUE(runEvent(cell.bridge, cell.robot, "joint_impedance").success());
-  cell.start();
-  EXPECT_EQ(cell.robot.control, fri::ControlStrategy::JointImpedance);
-  EXPECT_EQ(cell.robot.answer.flags, 0x0035U);
-}
-
-/// Flags of the answer stay those of the entry, whatever is asked for in command mode.
-TEST(Bridge, flagsStayInCommandModeWhateverIsAsked) {
-  for (const char* mode : {"position", "joint_impedance", "cartesian_impedance"}) {
-    Cell cell;
-    cell.run(2);
-    ASSERT_TRUE(runEvent(cell.bridge, cell.robot, mode).success());
-    cell.start();
-    const std::uint32_t flags = cell.robot.answer.flags;
-    EXPECT_EQ(flags, fri::flagsFor(cell.robot.control));
-    for (const char* event : {"position", "joint_impedance stiffness 50", "cartesian_impedance",
-                              "start", "hold", "reset", "jump"}) {
-      try {
-        cell.bridge.submit(event);
-      } catch (const std::invalid_argument&) {  // the unknown one
-      }
-      for (int i = 0; i < 20; ++i) {
-        drive(cell.bridge, cell.robot, Vector7::Constant(0.1));
-        cell.robot.cycle(cell.bridge);
-        ASSERT_EQ(cell.robot.answer.flags, flags) << mode << ", " << event;
-        ASSERT_EQ(cell.robot.state, fri::FriState::Command);
-      }
-    }
-  }
-}
-
-/// Nothing adds torques or forces, in no mode and at no time.
-TEST(Bridge, addedTorquesAndForcesStayZero) {
-  for (const char* mode : {"position", "joint_impedance", "cartesian_impedance"}) {
-    Cell cell;
-    cell.run(2);
-    ASSERT_TRUE(runEvent(cell.bridge, cell.robot, mode).success());
-    cell.start();
-    for (int i = 0; i < 300; ++i) {
-      if (i == 100) cell.bridge.submit("hold");
-      if (i == 150) cell.bridge.submit("reset");
-      if (i == 250) cell.bridge.submit("stop");
-      drive(cell.bridge, cell.robot, Vector7::Constant(0.3));
-      cell.robot.cycle(cell.bridge, i % 37 == 0, i % 41 == 0);
-      for (const float torque : cell.robot.answer.joint_torque) ASSERT_EQ(torque, 0.0F);
-      for (const float force : cell.robot.answer.cartesian_force) ASSERT_EQ(force, 0.0F);
-    }
-  }
-}
-
-TEST(Bridge, everyStrategyFollows) {
-  for (const char* mode : {"position", "joint_impedance", "cartesian_impedance"}) {
-    Cell cell;
-    cell.run(2);
-    ASSERT_TRUE(runEvent(cell.bridge, cell.robot, mode).success());
-    cell.start();
-    const float x = cell.robot.answer.cartesian_frame[3], y = cell.robot.answer.cartesian_frame[7];
-    Vector7 velocity = Vector7::Zero();
-    velocity[0] = 0.3;
-    cell.runDriven(100, velocity);
-    EXPECT_GT(cell.bridge.snapshot().sample.commanded_position[0], 0.1 + 0.1) << mode;
-    if (std::string(mode) == "cartesian_impedance") {
-      // Joint 1 turns about the vertical: the frame turns with it.
-      const double angle = cell.bridge.snapshot().sample.commanded_position[0] - 0.1;
-      EXPECT_NEAR(cell.robot.answer.cartesian_frame[3], x * std::cos(angle) - y * std::sin(angle),
-                  1e-3);
-      EXPECT_NEAR(cell.robot.answer.cartesian_frame[7], x * std::sin(angle) + y * std::cos(angle),
-                  1e-3);
-    }
-  }
-}
-
 TEST(Bridge, holdBrakesLatchesAndNeedsReset) {
   Cell cell;
   cell.start();
@@ -183,9 +103,10 @@ TEST(Bridge, commandsBeforeThePermissionDoNotCount) {
   Cell cell;
   cell.run(3);
   RobotSample sample;
-  cell.bridge.port().newestSample(sample);
+  cell.bridge.mailboxes().newestSample(sample);
   cell.start();
-  cell.bridge.port().sendVelocity({Vector7::Constant(0.5), cell.robot.now(), sample.motion_epoch});
+  cell.bridge.mailboxes().sendVelocity(
+      {Vector7::Constant(0.5), cell.robot.now(), sample.motion_epoch});
   cell.run(5);
   EXPECT_TRUE(cell.bridge.snapshot().sample.commanded_velocity.isZero());
   EXPECT_GE(cell.bridge.snapshot().counters.commands_old_epoch, 1U);
@@ -344,8 +265,8 @@ TEST(Bridge, aNewBridgeStartsNothing) {
   Bridge other(defaultConfig());
   for (int i = 0; i < 50; ++i) {
     RobotSample sample;
-    other.port().newestSample(sample);
-    other.port().sendVelocity({Vector7::Constant(0.5), cell.robot.now(), sample.motion_epoch});
+    other.mailboxes().newestSample(sample);
+    other.mailboxes().sendVelocity({Vector7::Constant(0.5), cell.robot.now(), sample.motion_epoch});
     cell.robot.cycle(other);
   }
   EXPECT_TRUE(other.snapshot().sample.commanded_velocity.isZero());
@@ -356,56 +277,6 @@ TEST(Bridge, aNewBridgeStartsNothing) {
     EXPECT_TRUE(outcome.success()) << describe(outcome);
   }
   EXPECT_EQ(cell.robot.state, fri::FriState::Monitor);
-}
-
-TEST(Bridge, refusesParametersOutOfRangeByName) {
-  struct Case {
-    const char* name;
-    double value;
-    const char* range;
-    std::function<void(BridgeConfig&, double)> set;
-  };
-  const std::vector<Case> cases = {
-      {"tool_number", 17, "0..16",
-       [](BridgeConfig& c, double v) { c.tool_number = static_cast<int>(v); }},
-      {"position_margin", 0.6, "0..0.5", [](BridgeConfig& c, double v) { c.position_margin = v; }},
-      {"set_point_leash/position", 3, "0.005..0.5",
-       [](BridgeConfig& c, double v) { c.leash.position = v; }},
-      {"set_point_leash/impedance", 0.001, "0.005..0.5",
-       [](BridgeConfig& c, double v) { c.leash.impedance = v; }},
-      {"set_point_leash/load", 71, "0..70", [](BridgeConfig& c, double v) { c.leash.load = v; }},
-      {"velocity_filter_time", -1, "0..0.2",
-       [](BridgeConfig& c, double v) { c.velocity_filter_time = v; }},
-      {"command_timeout", 2, "0.005..1", [](BridgeConfig& c, double v) { c.command_timeout = v; }},
-      {"topic_timeout", 2, "0.005..1", [](BridgeConfig& c, double v) { c.topic_timeout = v; }},
-      {"receive_timeout", 6, "0.05..5", [](BridgeConfig& c, double v) { c.receive_timeout = v; }},
-      {"start_timeout", 0.1, "0.5..120",
-       [](BridgeConfig& c, double v) { c.requests.start_timeout = v; }},
-      {"stop_timeout", 31, "0.1..30",
-       [](BridgeConfig& c, double v) { c.requests.stop_timeout = v; }},
-      {"silent_stop_timeout", 31, "0.1..30",
-       [](BridgeConfig& c, double v) { c.requests.silent_stop_timeout = v; }},
-      {"limits.velocity", 11, "0.001..10",
-       [](BridgeConfig& c, double v) { c.limits.velocity[3] = v; }},
-      {"limits.acceleration", 2000, "0.01..1000",
-       [](BridgeConfig& c, double v) { c.limits.acceleration[3] = v; }},
-      {"limits.jerk", 0.01, "0.1..1e+06", [](BridgeConfig& c, double v) { c.limits.jerk[3] = v; }}};
-  for (const Case& one : cases) {
-    for (const double value : {one.value, std::nan("")}) {
-      if (std::isnan(value) && std::string(one.name) == "tool_number") continue;
-      BridgeConfig config = defaultConfig();
-      one.set(config, value);
-      try {
-        Bridge bridge(config);
-        ADD_FAILURE() << one.name << " accepted";
-      } catch (const std::invalid_argument& error) {
-        std::ostringstream expected;
-        expected << one.name << " = " << value << " is outside its range " << one.range;
-        EXPECT_NE(std::string(error.what()).find(expected.str()), std::string::npos)
-            << error.what() << " instead of " << expected.str();
-      }
-    }
-  }
 }
 
 TEST(Bridge, theVelocitySourceIsSwitched) {

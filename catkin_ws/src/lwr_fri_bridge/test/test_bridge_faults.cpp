@@ -138,12 +138,12 @@ TEST(BridgeFaults, aHoldBrakesEvenIfItIsResetAtOnce) {
   cell.start();
   cell.runDriven(60, Vector7::Constant(0.5));
   RobotSample old;
-  cell.bridge.port().newestSample(old);
+  cell.bridge.mailboxes().newestSample(old);
   const std::uint32_t hold = cell.bridge.submit("hold"), reset = cell.bridge.submit("reset");
   bool stood = false;
   for (int i = 0; i < 60; ++i) {
     // What runs does not look at the permission.
-    cell.bridge.port().sendVelocity(
+    cell.bridge.mailboxes().sendVelocity(
         {Vector7::Constant(0.5), cell.robot.now(), old.motion_epoch});
     cell.run(1);
     stood = stood || cell.bridge.snapshot().sample.commanded_velocity.isZero();

@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "bridge_cell.hpp"
-#include "lwr_fri_bridge/diagnosis.hpp"
+#include "lwr_fri_bridge/bridge/diagnosis.hpp"
 
 namespace lwr_fri_bridge {
 namespace {
@@ -61,7 +61,7 @@ TEST(CommandModeLoss, aStalledControllerOnThisComputerIsNamedAndStartedAgainAtRe
   EXPECT_EQ(cell.bridge.snapshot().loss.cause, LossCause::ControllerStalled);
   const std::uint32_t epoch = cell.bridge.snapshot().sample.motion_epoch;
   // What was commanded before does not count after the restart.
-  cell.bridge.port().sendVelocity({Vector7::Constant(0.3), cell.robot.now(), epoch});
+  cell.bridge.mailboxes().sendVelocity({Vector7::Constant(0.3), cell.robot.now(), epoch});
   const Vector7 stood = cell.robot.setPoint();
   cell.run(1);
   EXPECT_EQ(cell.bridge.snapshot().sample.block, MotionBlock::NotStarted);

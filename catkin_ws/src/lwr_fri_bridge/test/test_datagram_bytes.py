@@ -11,11 +11,8 @@ from __future__ import annotations
 import pathlib
 import struct
 
+import lwr_fri_bridge
 import pytest
-
-lwr_fri_bridge = pytest.importorskip(
-    "lwr_fri_bridge", reason="the workspace is not built or not sourced"
-)
 
 HEADER = [
     (0, "H", "counter"),

@@ -4,7 +4,7 @@
 
 #include <stdexcept>
 
-#include "lwr_fri_bridge/diagnosis.hpp"
+#include "lwr_fri_bridge/bridge/diagnosis.hpp"
 #include "small_controller.hpp"
 
 namespace lwr_fri_bridge {

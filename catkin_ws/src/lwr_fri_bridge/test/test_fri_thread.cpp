@@ -19,7 +19,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include "lwr_fri_bridge/fri_thread.hpp"
+#include "lwr_fri_bridge/bridge/fri_thread.hpp"
 #include "small_controller.hpp"
 
 namespace lwr_fri_bridge {
@@ -263,7 +263,7 @@ int answersWithoutRights() {
   rlimit none{0, 0};
   setrlimit(RLIMIT_RTPRIO, &none);
   setrlimit(RLIMIT_MEMLOCK, &none);
-  if (lockMemory().find("mlockall not granted") == std::string::npos) return 11;
+  if (coglab_rt::lockMemory().find("mlockall not granted") == std::string::npos) return 11;
   Bridge bridge(test::defaultConfig());
   FriThreadOptions options;
   options.port = 0;

@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import random
 
+import lwr_fri_bridge
 import pytest
 
-lwr_fri_bridge = pytest.importorskip(
-    "lwr_fri_bridge", reason="the workspace is not built or not sourced"
-)
 ruckig = pytest.importorskip("ruckig", reason="oracle: pip install ruckig==0.19.4")
 
 STATES = 100_000

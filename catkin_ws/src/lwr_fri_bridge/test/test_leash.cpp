@@ -43,7 +43,7 @@ TEST(Leash, relaxesABlockedArmInEveryMode) {
       cell.push(1000);  // 5 s against the block
       const double leash = std::string(mode) == "position" ? 0.05 : 0.10;
       const double v = std::abs(speed);
-      EXPECT_LE(cell.ahead, leash + 1.1 * brakingDistance(v, 10.0, 500.0) + 0.01 * v)
+      EXPECT_LE(cell.ahead, leash + 1.1 * coglab_rt::brakingDistance(v, 10.0, 500.0) + 0.01 * v)
           << mode << speed;
       EXPECT_LE(cell.stored(), 2e-3) << mode << speed;
       const Snapshot s = cell.bridge.snapshot();

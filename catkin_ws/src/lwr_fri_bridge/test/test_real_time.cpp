@@ -8,13 +8,11 @@
 
 #include <dlfcn.h>
 #include <pthread.h>
-#include <sys/mman.h>
 #include <sys/prctl.h>
 #include <sys/syscall.h>
 #include <ucontext.h>
 #include <unistd.h>
 
-#include "lwr_fri_bridge/real_time.hpp"
 #include "small_controller.hpp"
 
 namespace {
@@ -136,26 +134,6 @@ TEST(RealTime, aTickAllocatesAndLocksNothingAndCallsNoSystem) {
     EXPECT_EQ(system_calls, 0U) << mode;
   }
   if (!dispatched) GTEST_SKIP() << "system calls were not counted: no syscall user dispatch here";
-}
-
-/// The pages that a body uses first are there before it runs: no page fault comes later.
-TEST(BoundedThread, theStackBelowTheBodyIsTouchedBeforeItRuns) {
-  constexpr std::size_t kStack = 4096 * 1024;  // no stack that the C library keeps from before
-  std::size_t present = 0, looked_at = 0;
-  BoundedThread thread;
-  thread.start("touched", kStack, [&] {
-    const auto page = static_cast<std::size_t>(sysconf(_SC_PAGESIZE));
-    const auto here = reinterpret_cast<std::uintptr_t>(__builtin_frame_address(0)) / page * page;
-    for (std::size_t depth = page; depth < kStack * 4 / 10; depth += page) {
-      unsigned char resident = 0;
-      ++looked_at;
-      if (mincore(reinterpret_cast<void*>(here - depth), page, &resident) == 0 && (resident & 1))
-        ++present;
-    }
-  });
-  thread.join();
-  EXPECT_GT(looked_at, 300U);
-  EXPECT_EQ(present, looked_at);
 }
 
 }  // namespace

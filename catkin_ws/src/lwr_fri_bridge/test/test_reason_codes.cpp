@@ -6,7 +6,7 @@
 
 #include <coglab_msgs/ReasonCode.h>
 
-#include "lwr_fri_bridge/reason_codes.hpp"
+#include "lwr_fri_bridge/ros/reason_codes.hpp"
 
 namespace lwr_fri_bridge {
 namespace {

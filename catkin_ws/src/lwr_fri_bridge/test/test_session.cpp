@@ -186,6 +186,40 @@ TEST(Session, cartesianSetPointIsCommandTimesOffset) {
   for (int i = 0; i < 12; ++i) EXPECT_FLOAT_EQ(frame[i], expected[i]) << i;
 }
 
+/// Fills `buffer` with a bad datagram and returns its size: random, with a true header, or one of
+/// `past` again, whole, truncated or oversized.
+std::size_t badDatagram(std::mt19937& random, const std::deque<Bytes>& past,
+                        std::vector<std::uint8_t>& buffer) {
+  const auto dice = [&random](int n) {
+    return static_cast<int>(random() % static_cast<unsigned>(n));
+  };
+  const auto scramble = [&](std::size_t from, std::size_t to) {
+    for (std::size_t i = from; i < to; i += 4) {
+      const std::uint32_t word = random();
+      std::memcpy(&buffer[i], &word, 4);
+    }
+  };
+  const int way = dice(6);
+  if (way == 0) {
+    const auto size = static_cast<std::size_t>(dice(1500));
+    scramble(0, size);
+    return size;
+  }
+  if (way == 1) {
+    scramble(8, fri::kMeasurementSize);
+    const fri::Header h = fri::measurementHeader(static_cast<std::uint16_t>(random()), 0);
+    std::memcpy(buffer.data(), &h, sizeof h);
+    return fri::kMeasurementSize;
+  }
+  if (past.empty()) return 1;
+  const Bytes& old = past[static_cast<std::size_t>(dice(static_cast<int>(past.size())))];
+  std::copy(old.begin(), old.end(), buffer.begin());
+  const int kind = dice(3);
+  return kind == 0   ? old.size()
+         : kind == 1 ? static_cast<std::size_t>(dice(916))
+                     : 917 + static_cast<std::size_t>(dice(100));
+}
+
 /// A million bad datagrams between good ones while the arm moves: no crash, all counted, no leap in
 /// the answers.
 TEST(Session, aMillionBadDatagramsMakeNoLeap) {
@@ -210,38 +244,7 @@ TEST(Session, aMillionBadDatagramsMakeNoLeap) {
   std::vector<std::uint8_t> buffer(2048);
   while (bad < kBad) {
     for (int k = 0; k < 20; ++k, ++bad) {
-      std::size_t size = 0;
-      switch (dice(6)) {
-        case 0:  // random bytes of random length
-          size = static_cast<std::size_t>(dice(1500));
-          for (std::size_t i = 0; i < size; i += 4) {
-            const std::uint32_t word = random();
-            std::memcpy(&buffer[i], &word, 4);
-          }
-          break;
-        case 1:  // a true header, random content
-          size = fri::kMeasurementSize;
-          for (std::size_t i = 8; i < size; i += 4) {
-            const std::uint32_t word = random();
-            std::memcpy(&buffer[i], &word, 4);
-          }
-          {
-            const fri::Header h = fri::measurementHeader(static_cast<std::uint16_t>(random()), 0);
-            std::memcpy(buffer.data(), &h, sizeof h);
-          }
-          break;
-        default:  // replayed, truncated or oversized
-          if (past.empty()) {
-            size = 1;
-          } else {
-            const Bytes& old = past[static_cast<std::size_t>(dice(static_cast<int>(past.size())))];
-            std::copy(old.begin(), old.end(), buffer.begin());
-            const int kind = dice(3);
-            size = kind == 0   ? old.size()
-                   : kind == 1 ? static_cast<std::size_t>(dice(916))
-                               : 917 + static_cast<std::size_t>(dice(100));
-          }
-      }
+      const std::size_t size = badDatagram(random, past, buffer);
       if (bridge.answer(buffer.data(), size, robot.now() + 1000 * k, answer)) ++bad_answered;
     }
     if (dice(400) == 0) {

@@ -6,7 +6,7 @@
 #include <limits>
 #include <random>
 
-#include "lwr_fri_bridge/target_command.hpp"
+#include "lwr_fri_bridge/requests/target_command.hpp"
 
 namespace lwr_fri_bridge {
 namespace {

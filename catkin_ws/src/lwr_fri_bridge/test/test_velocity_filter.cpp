@@ -4,7 +4,7 @@
 #include <cmath>
 #include <random>
 
-#include "lwr_fri_bridge/velocity_filter.hpp"
+#include "lwr_fri_bridge/motion/velocity_filter.hpp"
 
 namespace lwr_fri_bridge {
 namespace {

@@ -9,7 +9,9 @@ import sys
 import threading
 import time
 import xmlrpc.client
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 from urllib.parse import urlparse
 
 from coglab_bringup.arguments import ask_parser
@@ -29,7 +31,8 @@ def brain_of(master: str) -> bool:
     before = socket.getdefaulttimeout()
     socket.setdefaulttimeout(1.0)
     try:
-        return xmlrpc.client.ServerProxy(master).lookupService("/coglab_ask", "/coglab/start")[0] == 1
+        answer: Any = xmlrpc.client.ServerProxy(master).lookupService("/coglab_ask", "/coglab/start")
+        return bool(answer[0] == 1)
     except (OSError, xmlrpc.client.Error):
         return False
     finally:
@@ -64,7 +67,7 @@ class Brain:
         from coglab_msgs.msg import MasterState
 
         self.changed = threading.Condition()
-        self.state: MasterState | None = None
+        self.state: Any = None
         rospy.init_node("coglab_ask", anonymous=True, disable_rosout=True, disable_rostime=True, disable_signals=True)
         rospy.Subscriber("/coglab/state", MasterState, self._on_state, queue_size=1)
 
@@ -73,13 +76,13 @@ class Brain:
             self.state = message
             self.changed.notify_all()
 
-    def wait_for_state(self, condition, limit: float) -> bool:
+    def wait_for_state(self, condition: Callable[[Any], bool], limit: float) -> bool:
         """Waits until a state has come for which the condition holds; whether it did within `limit` s."""
         with self.changed:
             return self.changed.wait_for(lambda: self.state is not None and condition(self.state), limit)
 
     @staticmethod
-    def call(name: str, kind: type, *request: object) -> object:
+    def call(name: str, kind: type, *request: object) -> Any:
         """The answer of a service. Refused if it does not exist or does not answer."""
         import rospy
 
@@ -90,7 +93,7 @@ class Brain:
             raise Refused(f"{name} does not answer ({error}); what runs: ./coglab shell rosnode list") from error
 
 
-def sentence_of(state: object) -> str:
+def sentence_of(state: Any) -> str:
     """State, object and why, a line each."""
     name = state.state.rpartition("/")[2]
     takes = f"takes {', '.join(state.actions)}" if state.in_hub else "an action is under way"
@@ -111,7 +114,7 @@ def status(brain: Brain, _options: argparse.Namespace) -> int:
     return 0
 
 
-def choose(options: argparse.Namespace, state: object) -> tuple[str, str]:
+def choose(options: argparse.Namespace, state: Any) -> tuple[str, str]:
     """Action and object to ask for: what was named, else what this hub is there for. Refused if that cannot be said."""
     import rospy
 

@@ -89,6 +89,15 @@ def wait_for_master(system: System, limit: float) -> None:
         time.sleep(0.1)
 
 
+def unfinished(kind: str, error: BaseException) -> dict:
+    """The row of a handover that did not come to its end."""
+    from coglab_msgs.msg import ReasonCode
+
+    interrupted = isinstance(error, KeyboardInterrupt)
+    code = ReasonCode.CANCELLED if interrupted else getattr(error, "code", ReasonCode.NODE_SILENT)
+    return {"kind": kind, "outcome": str(error) or "interrupted", "reason_code": int(code)}
+
+
 def main(arguments: list[str]) -> int:
     """Exit status 0 if every handover succeeded."""
     top = Path(os.environ["COGLAB_TOP"])
@@ -135,8 +144,7 @@ def main(arguments: list[str]) -> int:
             recorder.stop(), f"{OBJECT}, seed {options.seed}; {title}", spans[0][0], spans[-1][1], out / "trial.png"
         )
     except (RuntimeError, KeyboardInterrupt) as error:
-        reason = str(error) or "interrupted"
-        result["handovers"].append({"kind": KINDS[min(len(result["handovers"]), len(KINDS) - 1)], "outcome": reason})
+        result["handovers"].append(unfinished(KINDS[min(len(result["handovers"]), len(KINDS) - 1)], error))
     finally:
         (out / "result.json").write_text(json.dumps(result, indent=1) + "\n")
         system.stop()

@@ -47,15 +47,9 @@ def smach_copies(top: Path) -> list[Path]:
     return sorted(copies)
 
 
-def findings(top: Path) -> list[tuple[bool, str]]:
-    """Each finding: whether it is fine, and a sentence (with what to do where it is not)."""
+def package_findings(top: Path) -> list[tuple[bool, str]]:
+    """Whether the Debian packages of each group are installed."""
     result: list[tuple[bool, str]] = []
-    system = release()
-    fine = system.get("VERSION_CODENAME") == "bookworm"
-    name = system.get("PRETTY_NAME", "unknown")
-    result.append(
-        (fine, f"Debian 12 (bookworm): {name}" + ("" if fine else "; use Debian 12, or a container: docker/run"))
-    )
     for group, packages in package_groups(top).items():
         there = installed(packages)
         missing = [package for package in packages if package not in there]
@@ -69,6 +63,19 @@ def findings(top: Path) -> list[tuple[bool, str]]:
             )
         else:
             result.append((True, f"packages to {group}: all {len(packages)} installed"))
+    return result
+
+
+def findings(top: Path) -> list[tuple[bool, str]]:
+    """Each finding: whether it is fine, and a sentence (with what to do where it is not)."""
+    result: list[tuple[bool, str]] = []
+    system = release()
+    fine = system.get("VERSION_CODENAME") == "bookworm"
+    name = system.get("PRETTY_NAME", "unknown")
+    result.append(
+        (fine, f"Debian 12 (bookworm): {name}" + ("" if fine else "; use Debian 12, or a container: docker/run"))
+    )
+    result += package_findings(top)
     built = (top / "catkin_ws" / "devel" / "setup.bash").exists()
     result.append((built, "workspace: built" if built else "workspace: not built yet; do it: ./coglab build"))
     python = shutil.which("python3")

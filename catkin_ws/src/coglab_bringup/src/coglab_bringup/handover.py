@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from pathlib import Path
 
 import numpy as np
-import rospkg
 import rospy
-import yaml
+from coglab_msgs.msg import ReasonCode
 from coglab_msgs.srv import Start
+from coglab_py.packages import package_path
+from coglab_py.yaml_file import read
 
 from coglab_bringup.trial_recorder import TrialRecorder, summarise
 
@@ -20,10 +20,18 @@ HUBS = ("wait_without_object", "wait_with_object")
 MASTER = "/coglab_master"
 
 
+class NotTaken(RuntimeError):
+    """The master machine did not take an action; `code` is the ReasonCode of its last refusal."""
+
+    def __init__(self, sentence: str, code: int) -> None:
+        super().__init__(sentence)
+        self.code = code
+
+
 def ask_for(action: str, object_id: str, alive: Callable[[], bool], limit: float) -> None:
-    """Calls /coglab/start until the master machine takes the action. Raises RuntimeError with its last refusal."""
+    """Calls /coglab/start until the master machine takes the action. Raises NotTaken with its last refusal."""
     deadline = time.monotonic() + limit
-    refusal = "the service /coglab/start never appeared"
+    refusal, code = "the service /coglab/start never appeared", ReasonCode.NODE_SILENT
     while time.monotonic() < deadline and alive():
         try:
             rospy.wait_for_service("/coglab/start", timeout=1.0)
@@ -31,13 +39,13 @@ def ask_for(action: str, object_id: str, alive: Callable[[], bool], limit: float
         except rospy.ROSException:
             continue
         except rospy.ServiceException as error:
-            refusal = str(error)
+            refusal, code = str(error), ReasonCode.NODE_SILENT
         else:
             if answer.success:
                 return
-            refusal = answer.message
+            refusal, code = answer.message, answer.reason_code
         time.sleep(0.2)
-    raise RuntimeError(f"{action} was not taken within {limit:.0f} s: {refusal}")
+    raise NotTaken(f"{action} was not taken within {limit:.0f} s: {refusal}", code)
 
 
 def run_handover(
@@ -47,8 +55,8 @@ def run_handover(
 
     Returns its result row and when it began and ended (s of ROS time).
     """
-    table = Path(rospkg.RosPack().get_path("lwr_description")) / "config" / "joint_limits.yaml"
-    limits = np.array(yaml.safe_load(table.read_text())["default"]["velocity"])
+    table = package_path("lwr_description", "config", "joint_limits.yaml")
+    limits = np.array(read(table).value["default"]["velocity"])
     ask_for(kind, object_id, alive, READY_LIMIT)
     start = rospy.get_time()
 
@@ -59,8 +67,10 @@ def run_handover(
     recorder.wait_for(lambda: bool(ended()) or not alive(), HANDOVER_LIMIT)
     end = rospy.get_time()
     if ended():
-        _, _, _, outcome, _, reason = ended()[0]
+        _, _, _, outcome, _, reason, code = ended()[0]
         outcome = "success" if outcome == "succeeded" else f"{outcome}: {reason}"
+    elif alive():
+        outcome, code = f"no end within {HANDOVER_LIMIT:.0f} s", ReasonCode.TIME_LIMIT
     else:
-        outcome = "the system ended" if not alive() else f"no end within {HANDOVER_LIMIT:.0f} s"
-    return summarise(recorder.trial, kind, outcome, start, end, limits), start, end
+        outcome, code = "the system ended", ReasonCode.NODE_SILENT
+    return {**summarise(recorder.trial, kind, outcome, start, end, limits), "reason_code": int(code)}, start, end

@@ -13,7 +13,7 @@ from coglab_bringup.usage import Refused, master_port, seed, writable_file
 
 ROSLAUNCH_OPTIONS = ("--screen", "--log", "-v", "--dump-params", "--nodes", "--files", "--ros-args", "--wait")
 BEHAVIOURS = "coglab_sim/src/coglab_sim/participant.py"
-CELL = "coglab_sim/config/cell.yaml"
+OBJECTS = "coglab_objects/objects"
 LIMITS = "lwr_description/config/joint_limits.yaml"
 CONVENTIONS = "lwr_fri_bridge/src/fri/krl_convention.cpp"
 HELP = """usage: ./coglab launch [-p PORT] [ARGUMENT:=VALUE ...] [OPTION of roslaunch ...]
@@ -36,10 +36,14 @@ def _behaviours(sources: Path) -> list[str]:
     raise Refused(f"{BEHAVIOURS} holds no BEHAVIOURS")
 
 
-def cell_objects(sources: Path) -> list[str]:
-    """Objects that the simulated cell knows: the keys below `objects` of its configuration."""
-    block = re.search(r"^objects:\n((?:[ ]+.*\n|#.*\n)+)", (sources / CELL).read_text(encoding="utf-8"), re.MULTILINE)
-    return re.findall(r"^[ ]{2}(\w+):", block.group(1), re.MULTILINE) if block else []
+def objects_in(folder: Path) -> list[str]:
+    """Objects of a database folder: its files."""
+    return sorted(path.stem for path in folder.glob("*.yaml"))
+
+
+def _object(folder: Path, value: str) -> None:
+    if value:
+        _one_of(objects_in(folder), value)
 
 
 def _profiles(sources: Path) -> list[str]:
@@ -92,10 +96,11 @@ def _whole(low: int, high: int, value: str) -> None:
         raise ValueError(f"expected a whole number from {low} to {high}, got '{value}'")
 
 
-def _rules(sources: Path) -> dict[str, Callable[[str], object]]:
-    """What each argument takes; a name that is missing here takes any text."""
+def _rules(sources: Path, objects: Path) -> dict[str, Callable[[str], object]]:
+    """What each argument takes; a name that is missing here takes any text. `objects` is the database's folder."""
     boolean = ["true", "false"]
     rules: dict[str, Callable[[str], object]] = {
+        "arm": lambda value: _one_of(["fri", "ideal"], value),
         "seed": seed,
         "fri_period": lambda value: _number(0.001, 0.1, value),
         "fri_address": _address,
@@ -106,7 +111,7 @@ def _rules(sources: Path) -> dict[str, Callable[[str], object]]:
         "krl_convention": lambda value: _one_of(_conventions(sources), value),
         "limits_profile": lambda value: _one_of(_profiles(sources), value),
         "behaviour": lambda value: _one_of(_behaviours(sources), value),
-        "object": lambda value: value and _one_of(cell_objects(sources), value),
+        "object": lambda value: _object(objects, value),
         "objects": _folder,
         "recording": _file,
     }
@@ -138,7 +143,10 @@ def judge_launch(top: Path, words: list[str]) -> None:
         rows = [f"  {name + ':=' + default:45} {meaning}" for name, (default, meaning) in known.items()]
         print(HELP + "\n".join(rows))
         raise SystemExit(0)
-    rules = _rules(sources)
+    if {"arm:=ideal", "split:=true"} <= {word.lower() for word in words}:
+        raise Refused("the ideal arm and its controllers are one process: leave out split:=true or arm:=ideal")
+    folders = [value for name, _, value in (word.partition(":=") for word in words) if name == "objects"]
+    rules = _rules(sources, Path(folders[-1]) if folders and "$(" not in folders[-1] else sources / OBJECTS)
     for word in split_port(words)[1]:
         name, equals, value = word.partition(":=")
         if not equals:

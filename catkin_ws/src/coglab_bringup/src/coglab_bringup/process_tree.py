@@ -24,6 +24,7 @@ import sys
 import time
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 PR_SET_PDEATHSIG, PR_SET_CHILD_SUBREAPER = 1, 36  # linux/prctl.h
 SI_KERNEL = 128  # siginfo_t.si_code of what a terminal sends; it reaches the whole foreground group
@@ -70,7 +71,7 @@ def descendants(root: int) -> list[int]:
 
 def _reap() -> dict[int, int]:
     """Statuses of the children that have ended, by process id."""
-    ended = {}
+    ended: dict[int, int] = {}
     while True:
         try:
             process, status = os.waitpid(-1, os.WNOHANG)
@@ -134,7 +135,7 @@ def _heard_signals() -> set[signal.Signals]:
     return {*ending, signal.SIGCHLD}
 
 
-def _start(command: list[str], mask: set[signal.Signals]) -> int:
+def _start(command: list[str], mask: set[int | signal.Signals]) -> int:
     """The process id of the command, with the signal mask that we were started with; 127 if it cannot start."""
     process = os.fork()
     if process:
@@ -147,7 +148,7 @@ def _start(command: list[str], mask: set[signal.Signals]) -> int:
     os._exit(COULD_NOT_START)
 
 
-def _keep(command: list[str], front: int, mask: set[signal.Signals], signals: set[signal.Signals]) -> int:
+def _keep(command: list[str], front: int, mask: set[int | signal.Signals], signals: set[signal.Signals]) -> int:
     """Waits for the command, or for the order to end it; ends all of its tree; returns the exit status."""
     _prctl(PR_SET_CHILD_SUBREAPER, 1)
     _prctl(PR_SET_PDEATHSIG, signal.SIGTERM)
@@ -187,10 +188,10 @@ def main(command: list[str]) -> int:
         heard = signal.sigwaitinfo(signals)
         if heard.si_signo in ENDING and not _from_terminal(heard):
             _send(signal.Signals(heard.si_signo), [keeper])
-        status = _reap().get(keeper)
-        if status is not None:
+        ended = _reap().get(keeper)
+        if ended is not None:
             _Ending(AT_ONCE).finish()  # nothing is left, unless the keeper was killed
-            return _shell_status(status)
+            return _shell_status(ended)
 
 
 def above(command: Sequence[str]) -> list[str]:
@@ -198,7 +199,7 @@ def above(command: Sequence[str]) -> list[str]:
     return [sys.executable, "-I", __file__, *command]
 
 
-def run(command: Sequence[str], limit: float, **options) -> int | None:
+def run(command: Sequence[str], limit: float, **options: Any) -> int | None:
     """Runs a command of ours such that nothing of it outlives this call: its exit status, None if `limit` (s) ended it.
 
     `options` go to subprocess.Popen. An exception here (Ctrl-C) ends the command, too.

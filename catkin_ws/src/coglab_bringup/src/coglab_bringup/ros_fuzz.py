@@ -74,7 +74,7 @@ class Generator:
     def __init__(self, seed: int) -> None:
         self.random = random.Random(seed)
 
-    def message(self, kind: type) -> tuple[Any, bool]:
+    def message(self, kind: Any) -> tuple[Any, bool]:
         """A message of a class, and whether it is malformed (else it is valid by nature)."""
         message = kind()
         leaves: list[tuple[Any, Any, str]] = []  # who holds it, attribute or index, type
@@ -108,7 +108,7 @@ class Generator:
             if element in ("uint8", "char"):
                 setattr(message, name, bytes(self.random.randrange(256) for _ in range(count)))
                 continue
-            values = [None] * min(count, int(fixed) if fixed else (30 if "/" in element else count))
+            values: list[Any] = [None] * min(count, int(fixed) if fixed else (30 if "/" in element else count))
             setattr(message, name, values)
             for i in range(len(values)):
                 self._set(values, i, element, leaves, fine)
@@ -139,7 +139,7 @@ class Generator:
         put(holder, name, value)
         leaves.append((holder, name, of))
 
-    def _odd_time(self, kind: type) -> Any:
+    def _odd_time(self, kind: Any) -> Any:
         value = kind()
         if self.random.random() < 0.3 and kind is genpy.Time:  # ahead of the clock, or behind
             now = time.time() + self.random.choice((-1e4, -0.3, 0.06, 10.0, 1e4))
@@ -158,7 +158,7 @@ def put(holder: Any, name: Any, value: Any) -> None:
         setattr(holder, name, value)
 
 
-def types_in(kind: type) -> list[str]:
+def types_in(kind: Any) -> list[str]:
     """The types of all fields of a message class, those of its parts included."""
     found: list[str] = []
     for of in kind._slot_types:
@@ -171,12 +171,12 @@ def types_in(kind: type) -> list[str]:
     return found
 
 
-def has_time(kind: type) -> bool:
+def has_time(kind: Any) -> bool:
     """Whether a stamp can be odd."""
     return "time" in types_in(kind)
 
 
-def has_float_array(kind: type) -> bool:
+def has_float_array(kind: Any) -> bool:
     """Whether its numbers may be a command of as many joints as by chance."""
     return any(of.startswith("float") and "[" in of for of in types_in(kind))
 
@@ -215,7 +215,8 @@ class Fuzz:
     def pid(self, node: str) -> int:
         """Process of a node; 0 if it does not answer."""
         try:
-            code, _, pid = ServerProxy(self.master.lookupNode(node)).getPid(rospy.get_name())
+            answer: Any = ServerProxy(self.master.lookupNode(node)).getPid(rospy.get_name())
+            code, _, pid = answer
         except Exception:  # of whatever kind: no answer
             return 0
         return int(pid) if code == 1 else 0
@@ -266,7 +267,7 @@ class Fuzz:
         for publisher in publishers.values():
             publisher.unregister()
 
-    def _call(self, name: str, kind: type, count: int, limit: float) -> None:
+    def _call(self, name: str, kind: Any, count: int, limit: float) -> None:
         generator = Generator(self.seed + hash_of(name))
         proxy = rospy.ServiceProxy(name, kind)
         for _ in range(count):

@@ -73,6 +73,7 @@ def count_cases(program: Program, report: Path) -> None:
         name = f"{case.get('classname', '')}.{case.get('name', '')}"
         if case.find("failure") is not None or case.find("error") is not None:
             problem = case.find("failure") if case.find("failure") is not None else case.find("error")
+            assert problem is not None
             program.failed += 1
             text = (problem.get("message") or problem.text or "").strip().splitlines()
             program.failures.append(f"{name}: {text[0] if text else 'no message'}")

@@ -49,8 +49,8 @@ def state_intervals(trial: Trial, end: float) -> dict[str, list[tuple[float, flo
     intervals: dict[str, list[tuple[float, float, str]]] = {}
     entered: dict[tuple[str, str], float] = {}  # (container, state) -> time
     begun: dict[str, float] = {}  # container -> time
-    left = {(path, from_state) for _, path, from_state, _, _, _ in trial.transitions}
-    for t, path, from_state, outcome, to_state, _ in trial.transitions:
+    left = {(path, from_state) for _, path, from_state, *_ in trial.transitions}
+    for t, path, from_state, outcome, to_state, *_ in trial.transitions:
         above = path  # a child of a concurrence begins with it, and no transition leads to it
         while above and above not in begun:
             above = above.rpartition("/")[0]

@@ -6,6 +6,7 @@ Reads the simulated truth: it measures, it does not control.
 from __future__ import annotations
 
 import threading
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -27,7 +28,7 @@ class Trial:
     truth: list[tuple] = field(default_factory=list)  # (t, robot xyz, human xyz, object xyz, palm force)
     fingers: list[tuple] = field(default_factory=list)  # (t, position[5])
     feedback: list[tuple] = field(default_factory=list)  # (t, state, remaining distance)
-    transitions: list[tuple] = field(default_factory=list)  # (t, path, from, outcome, to, reason)
+    transitions: list[tuple] = field(default_factory=list)  # (t, path, from, outcome, to, reason, code)
     contacts: list[tuple] = field(default_factory=list)  # (t, contact, margin)
     fri_lost: list[tuple] = field(default_factory=list)  # (t, FRI packets lost so far), from the bridge's diagnostics
 
@@ -55,10 +56,10 @@ class TrialRecorder:
             subscriber.unregister()
         return self.trial
 
-    def wait_for(self, condition, limit: float) -> bool:
+    def wait_for(self, condition: Callable[[], bool], limit: float) -> bool:
         """Waits until `condition()` holds, at most `limit` seconds of the steady clock; whether it did."""
         with self.changed:
-            return self.changed.wait_for(lambda: condition() or rospy.is_shutdown(), limit) and condition()
+            return bool(self.changed.wait_for(lambda: condition() or rospy.is_shutdown(), limit)) and condition()
 
     def _on_joints(self, message: JointState) -> None:
         self.trial.joints.append((message.header.stamp.to_sec(), message.position, message.velocity))
@@ -81,7 +82,7 @@ class TrialRecorder:
     def _on_transition(self, message: Transition) -> None:
         with self.changed:
             row = (message.header.stamp.to_sec(), message.path, message.from_state, message.outcome, message.to_state)
-            self.trial.transitions.append((*row, message.reason))
+            self.trial.transitions.append((*row, message.reason, message.reason_code))
             self.changed.notify_all()
 
     def _on_contact(self, message: Contact) -> None:

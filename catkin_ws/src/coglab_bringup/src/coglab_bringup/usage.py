@@ -6,6 +6,7 @@ import argparse
 import os
 import re
 from pathlib import Path
+from typing import NoReturn
 
 
 class Refused(Exception):
@@ -15,7 +16,7 @@ class Refused(Exception):
 class Parser(argparse.ArgumentParser):
     """Refuses in one sentence instead of a usage block."""
 
-    def error(self, message: str) -> None:
+    def error(self, message: str) -> NoReturn:
         """Called by argparse."""
         raise Refused(f"{message}; what there is: ./{self.prog} --help")
 

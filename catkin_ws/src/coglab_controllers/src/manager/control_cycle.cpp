@@ -1,21 +1,12 @@
 #include "coglab_controllers/manager/control_cycle.hpp"
 
 #include <algorithm>
-#include <chrono>
 #include <exception>
 #include <utility>
-
-#include "lwr_fri_bridge/braking.hpp"
 
 namespace coglab_controllers {
 
 namespace {
-
-std::int64_t steadyNow() {
-  return std::chrono::duration_cast<std::chrono::nanoseconds>(
-             std::chrono::steady_clock::now().time_since_epoch())
-      .count();
-}
 
 bool moving(MotionState state) {
   return state == MotionState::Running || state == MotionState::Holding;
@@ -181,8 +172,7 @@ void ControlCycle::watchRobot() noexcept {
   const bool again = input_.motion_allowed;
   abortMotion(Reason(again ? ReasonCode::NotInCommandMode : codeOf(sample.block),
                      "the robot stopped the motion: ")
-              << (again ? "it left command mode for a moment"
-                        : lwr_fri_bridge::describe(sample.block)));
+              << (again ? "it left command mode for a moment" : coglab_rt::describe(sample.block)));
 }
 
 void ControlCycle::watchGuard(double dt) noexcept {
@@ -228,8 +218,11 @@ void ControlCycle::compute(JointVector& velocity) noexcept {
     if (timed) taken_ns += steadyNow() - begin;
     return fine;
   };
+  // Step 4: computeReference() of the motion controller.
   if (!charged("computeReference", [&] { motion_->computeReference(input_, references); })) return;
+  // Step 5: task-stage feedback controllers.
   feedback_.run(ctrl_more::Stage::Task);
+  // Step 6: resolve() of the motion controller.
   if (!charged("resolve", [&] { motion_->resolve(input_, references); })) return;
   if (timed && tooSlow(1e-9 * static_cast<double>(taken_ns))) return;
   if (!references.states.view<kMaxJoints>(references.joint_velocity).allFinite()) {
@@ -237,6 +230,7 @@ void ControlCycle::compute(JointVector& velocity) noexcept {
           << id_.c_str() << "' gave a velocity that is not finite");
     return;
   }
+  // Step 7: joint-stage feedback controllers.
   feedback_.run(ctrl_more::Stage::Joint);
   velocity = references.states.view<kMaxJoints>(references.joint_velocity);
 }
@@ -244,6 +238,7 @@ void ControlCycle::compute(JointVector& velocity) noexcept {
 void ControlCycle::run(const RobotSample& sample, double dt, VelocityCommand& out) noexcept {
   heartbeat_.fetch_add(1, std::memory_order_relaxed);
   const std::int64_t begin = settings_.overrun_time > 0.0 ? steadyNow() : 0;
+  // Step 1: check the joint state.
   const bool fine = usable(sample, dt);
   if (fine) {
     input_.robot = sample;
@@ -251,7 +246,7 @@ void ControlCycle::run(const RobotSample& sample, double dt, VelocityCommand& ou
     // The velocity of this cycle acts until its end: the Jacobian of its middle leads there.
     robot_->chain.evaluate(sample.position, sample.commanded_velocity, dt, input_.chain);
   }
-  input_.motion_allowed = fine && sample.block == lwr_fri_bridge::MotionBlock::None;
+  input_.motion_allowed = fine && sample.block == MotionBlock::None;
   input_.time_scale =
       governor_.update(fine ? dt : settings_.cycle_time, speedScale(), limit_scale_);
   feedback_.begin(sample.stamp_ns, input_.dt);
@@ -259,14 +254,16 @@ void ControlCycle::run(const RobotSample& sample, double dt, VelocityCommand& ou
   limit_scale_ = 1.0;
   report_.guard = GuardResult();
   if (fine) {
+    // Step 2: fill RobotStates.
     feedback_.fill(input_);
     watchRobot();
   }
+  // Step 3: adopt the newest plan, a cancel and new motions.
   adopt();
   if (fine) {
     compute(velocity);
-    guard_.setInterfaceReserve(lwr_fri_bridge::lostTime(sample.cycle_time),
-                               2.0 * lwr_fri_bridge::kWireRounding);
+    // Step 8: guard.
+    guard_.setInterfaceReserve(sample.stop_delay, sample.stop_rounding);
     guard_.limit(input_.chain, furthest(sample, velocity), velocity, dt, report_.guard);
     watchGuard(dt);
     ++numbers_;
@@ -274,6 +271,7 @@ void ControlCycle::run(const RobotSample& sample, double dt, VelocityCommand& ou
     ++report_.stale;
   }
   feedback_.end();
+  // Step 9: send the velocity and the report.
   out.velocity = fine ? report_.guard.velocity : JointVector::Zero();
   out.stamp_ns = sample.stamp_ns;
   out.motion_epoch = sample.motion_epoch;
@@ -337,7 +335,7 @@ void ControlCycle::publish(std::int64_t begin_ns) noexcept {
     report_.reason = motion_->reason();
   } else if (numbers_ == 0) {
     report_.reason = Reason(ReasonCode::StaleJointState, "no joint state from the robot yet");
-  } else if (input_.robot.block != lwr_fri_bridge::MotionBlock::None) {
+  } else if (input_.robot.block != MotionBlock::None) {
     report_.reason = Reason(codeOf(input_.robot.block), describe(input_.robot.block));
   }
   if (begin_ns != 0) {

@@ -1,7 +1,6 @@
 #include "coglab_controllers/manager/control_thread.hpp"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <ctime>
 #include <stdexcept>
@@ -20,17 +19,11 @@ timespec after(double seconds) {
   return time;
 }
 
-std::int64_t steadyNow() {
-  return std::chrono::duration_cast<std::chrono::nanoseconds>(
-             std::chrono::steady_clock::now().time_since_epoch())
-      .count();
-}
-
 }  // namespace
 
-ControlThread::ControlThread(ControlCycle& cycle, lwr_fri_bridge::ControlPort& port,
+ControlThread::ControlThread(ControlCycle& cycle, coglab_rt::ArmMailboxes& mailboxes,
                              ControlThreadOptions options)
-    : cycle_(cycle), port_(port), options_(std::move(options)) {
+    : cycle_(cycle), mailboxes_(mailboxes), options_(std::move(options)) {
   if (sem_init(&semaphore_, 0, 0) != 0) throw std::runtime_error("sem_init failed");
 }
 
@@ -65,7 +58,7 @@ std::string ControlThread::warning() const {
 }
 
 void ControlThread::run() {
-  if (options_.priority > 0) warning_ = lwr_fri_bridge::enterRealTime(options_.priority);
+  if (options_.priority > 0) warning_ = coglab_rt::enterRealTime(options_.priority);
   scheduled_.store(true, std::memory_order_release);
   while (!stopping_.load(std::memory_order_relaxed)) {
     const timespec end = after(options_.idle_period);
@@ -76,7 +69,7 @@ void ControlThread::run() {
 
 void ControlThread::once(bool woken) {
   RobotSample sample;
-  port_.newestSample(sample);
+  mailboxes_.newestSample(sample);
   const std::uint64_t passed = sample.sequence - last_sequence_;
   const int periods = periods_.load(std::memory_order_relaxed);
   const bool due = passed > 0 && (woken || passed >= static_cast<std::uint64_t>(periods));
@@ -96,7 +89,7 @@ void ControlThread::once(bool woken) {
   last_controller_ns_ = sample.controller_ns;
   VelocityCommand command;
   cycle_.run(sample, std::min(dt, cycle_.settings().sample_timeout), command);
-  port_.sendVelocity(command);
+  mailboxes_.sendVelocity(command);
   if (options_.after_cycle) options_.after_cycle(command);
 }
 

@@ -6,6 +6,8 @@
 #include <stdexcept>
 #include <utility>
 
+#include "ctrl_more/loading/search_path.hpp"
+
 namespace coglab_controllers {
 
 namespace {
@@ -27,7 +29,7 @@ bool validId(const std::string& id) {
 }  // namespace
 
 ManagerSettings readManagerSettings(const YAML::Node& node, const std::string& urdf,
-                                    const lwr_fri_bridge::JointLimits& table, bool lockstep) {
+                                    const coglab_rt::JointLimits& table, bool lockstep) {
   const Parameters parameters(node, "controller_manager");
   ManagerSettings settings;
   settings.parameters = node;
@@ -79,9 +81,7 @@ ControllerManager::~ControllerManager() = default;
 
 std::int64_t ControllerManager::now_ns() const {
   if (settings_.clock) return settings_.clock();
-  return std::chrono::duration_cast<std::chrono::nanoseconds>(
-             std::chrono::steady_clock::now().time_since_epoch())
-      .count();
+  return steadyNow();
 }
 
 std::function<void()> ControllerManager::cycleWait() const {
@@ -122,7 +122,7 @@ Answer ControllerManager::load(const std::string& id, const std::string& type,
     }
     loading_.insert(id);
   }
-  const bool motion = settings_.types.count(type) != 0 || MotionTypes::instance().find(type);
+  const bool motion = !libraryOf(type).empty() || MotionTypes::instance().find(type).controller;
   const Answer answer =
       motion ? loadMotion(id, type, attach, requests) : loadFeedback(id, type);
   const std::lock_guard<std::mutex> lock(table_);
@@ -130,27 +130,45 @@ Answer ControllerManager::load(const std::string& id, const std::string& type,
   return answer;
 }
 
+/// The library that the parameter `types` names, else lib<package>.so of a type <package>/<class>
+/// if there is one; empty: none.
+std::string ControllerManager::libraryOf(const std::string& type) const {
+  const auto place = settings_.types.find(type);
+  if (place != settings_.types.end()) return place->second;
+  const std::size_t slash = type.find('/');
+  if (slash == std::string::npos || MotionTypes::instance().find(type).controller != nullptr)
+    return "";
+  try {
+    return ctrl_more::SearchPath("", settings_.plugin_paths)
+        .find("lib" + type.substr(0, slash) + ".so");
+  } catch (const std::exception&) {
+    return "";
+  }
+}
+
 Answer ControllerManager::loadMotion(const std::string& id, const std::string& type,
                                      const Attach& attach, std::unique_lock<std::mutex>& requests) {
   const std::string what = "controller '" + id + "' of type '" + type + "' was not loaded: ";
   // Outlives what is thrown below: the type of an exception may live in the library.
-  auto loaded = std::make_unique<LoadedMotion>();
+  auto loaded = std::make_shared<LoadedMotion>();
   try {
     loaded->id = id;
     loaded->type = type;
-    const auto place = settings_.types.find(type);
-    if (place != settings_.types.end()) {
-      loaded->library = MotionLibrary::open(findLibrary(place->second, settings_.plugin_paths));
+    const std::string library = libraryOf(type);
+    if (!library.empty()) {
+      const ctrl_more::SearchPath files("", settings_.plugin_paths);
+      loaded->library =
+          ctrl_more::PluginLibrary::open(files.find(library), MotionTypes::instance());
     }
-    const std::optional<MotionMaker> maker = MotionTypes::instance().find(type);
-    if (!maker) {
+    const MotionMaker maker = MotionTypes::instance().find(type);
+    if (maker.controller == nullptr) {
       return Answer::refusal(
           ReasonCode::UnknownName,
           what + (loaded->library ? "library '" + loaded->library->path() + "' has no type '" +
                                         type + "'; it has: " + joined(loaded->library->types())
                                   : "its library has gone"));
     }
-    loaded->controller.reset(maker->controller());
+    loaded->controller.reset(maker.controller());
     MotionSetup setup;
     setup.id = id;
     setup.cycle_time = settings_.cycle.cycle_time;
@@ -159,7 +177,7 @@ Answer ControllerManager::loadMotion(const std::string& id, const std::string& t
     setup.host = this;
     loaded->controller->configure(setup);
     requests.unlock();  // what is attached may wait for others, such as the ROS master
-    if (attach) attach(*loaded->controller, *maker);
+    if (attach) attach(*loaded->controller, maker);
     const std::lock_guard<std::mutex> lock(table_);
     motions_.push_back(std::move(loaded));
     return {};
@@ -205,30 +223,74 @@ void ControllerManager::list(std::vector<std::string>& ids, std::vector<std::str
   }
 }
 
+Answer ControllerManager::unload(const std::string& id, const Detach& detach) {
+  std::shared_ptr<LoadedMotion> gone;
+  {
+    const std::lock_guard<std::mutex> requests(requests_);
+    if (feedback_.manager().has(id)) {
+      const ctrl_more::Status status = feedback_.manager().unload(id);
+      if (status.ok()) return {};
+      return Answer::refusal(ReasonCode::Busy, status.message());
+    }
+    const CycleReport now = report();
+    const std::lock_guard<std::mutex> lock(table_);
+    const auto found = std::find_if(motions_.begin(), motions_.end(),
+                                    [&id](const auto& motion) { return motion->id == id; });
+    if (found == motions_.end()) {
+      return Answer::refusal(ReasonCode::UnknownName, "controller_id '" + id +
+                                                          "' is not loaded; loaded: " +
+                                                          loadedMotions());
+    }
+    // As ordered, and as the cycle last told: a switch may not have come into effect yet.
+    if (id == active_id_ || id == now.active.c_str()) {
+      return Answer::refusal(ReasonCode::Busy,
+                             "'" + id + "' is the active controller; switch_controller to another "
+                             "one, or to '' for none, first");
+    }
+    gone = *found;
+    motions_.erase(found);
+    loading_.insert(id);  // the id is free again when all of it is gone
+  }
+  // Requests that are under way end first, and they may need the lock.
+  if (detach) detach(gone);
+  gone.reset();
+  const std::lock_guard<std::mutex> lock(table_);
+  loading_.erase(id);
+  return {};
+}
+
+/// What a switch to this controller runs; refused if it cannot, with a note if there is nothing to
+/// do.
+Answer ControllerManager::planSwitch(const std::string& id, CyclePlan& plan, std::string& type) {
+  const std::lock_guard<std::mutex> lock(table_);
+  type.clear();
+  const bool active = id == active_id_ && !report().fault;
+  if (id.empty()) return {true, active ? "no controller is active" : ""};
+  LoadedMotion* const found = find(id);
+  if (found == nullptr) {
+    if (feedback_.manager().has(id)) {
+      return Answer::refusal(ReasonCode::UnknownName,
+                             "'" + id +
+                                 "' is a feedback controller: use feedback/enable; motion "
+                                 "controllers: " +
+                                 loadedMotions());
+    }
+    return Answer::refusal(ReasonCode::UnknownName,
+                           "controller_id '" + id + "' is not loaded; loaded: " + loadedMotions() +
+                               "; use load_controller first");
+  }
+  type = found->type;
+  plan.motion = found->controller.get();
+  plan.cancel = found->cancel.get();
+  plan.id << id.c_str();
+  return {true, active ? "'" + id + "' is active already" : ""};
+}
+
 Answer ControllerManager::switchTo(const std::string& id, std::string& type) {
   const std::lock_guard<std::mutex> requests(requests_);
   auto plan = std::make_unique<CyclePlan>();
-  {
-    const std::lock_guard<std::mutex> lock(table_);
-    LoadedMotion* const found = find(id);
-    if (found == nullptr) {
-      if (feedback_.manager().has(id)) {
-        return Answer::refusal(ReasonCode::UnknownName,
-                               "'" + id +
-                               "' is a feedback controller: use feedback/enable; motion "
-                               "controllers: " +
-                               loadedMotions());
-      }
-      return Answer::refusal(ReasonCode::UnknownName,
-                             "controller_id '" + id + "' is not loaded; loaded: " +
-                             loadedMotions() + "; use load_controller first");
-    }
-    type = found->type;
-    if (id == active_id_ && !report().fault) return {true, "'" + id + "' is active already"};
-    plan->motion = found->controller.get();
-    plan->cancel = &found->cancel;
-    plan->id << id.c_str();
-  }
+  const Answer planned = planSwitch(id, *plan, type);
+  if (!planned.success || !planned.message.empty()) return planned;
   // The profile of its name is prepared here and begins in the cycle that switches.
   ctrl_more::FeedbackControllersManager& feedback = feedback_.manager();
   std::string note;

@@ -74,7 +74,7 @@ bool FeedbackStage::fill(const CycleInput& input) noexcept {
   const RobotSample& sample = input.robot;
   const std::int64_t stamp = sample.stamp_ns;
   const Quaternion turn = input.chain.tool.orientation * tool_from_wrench_;
-  lwr_fri_bridge::Vector6 wrench;
+  coglab_rt::Vector6 wrench;
   wrench << turn * Vector3(sample.tool_wrench.head<3>()),
       turn * Vector3(sample.tool_wrench.tail<3>());
   Eigen::Matrix<double, 7, 1> pose;

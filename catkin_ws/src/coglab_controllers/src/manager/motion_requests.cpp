@@ -38,10 +38,10 @@ Answer ControllerManager::motionWelcome(const std::string& controller_id,
                            "the newest joint state is " + std::to_string(age) + " s old; allowed: " +
                                std::to_string(settings_.cycle.sample_timeout) + " s");
   }
-  if (now.robot.block != lwr_fri_bridge::MotionBlock::None) {
+  if (now.robot.block != MotionBlock::None) {
     return Answer::refusal(codeOf(now.robot.block),
                            std::string("the robot follows no motion now: ") +
-                               lwr_fri_bridge::describe(now.robot.block) +
+                               coglab_rt::describe(now.robot.block) +
                                "; see lwr/state, then use lwr/command (reset, start)");
   }
   return {};
@@ -53,7 +53,7 @@ MotionRequest ControllerManager::beginRequest(const std::string& controller_id) 
     const std::lock_guard<std::mutex> lock(table_);
     if (const LoadedMotion* motion = find(controller_id)) {
       // Before the wait for the lock: a cancel that comes meanwhile makes this request void.
-      request.stamp.cancels = motion->cancel.newest();
+      request.stamp.cancels = motion->cancel->newest();
     }
   }
   request.lock = lockRequests();
@@ -70,7 +70,7 @@ CancelOrder ControllerManager::askCancel(const std::string& id, const std::strin
   {
     const std::lock_guard<std::mutex> lock(table_);
     LoadedMotion* const motion = find(id);
-    if (motion != nullptr) order.cancel = &motion->cancel;
+    if (motion != nullptr) order.cancel = motion->cancel;
   }
   if (order.cancel == nullptr) return order;
   Reason reason(ReasonCode::Cancelled, "cancelled");

@@ -5,9 +5,9 @@
 namespace coglab_controllers {
 
 std::shared_ptr<const RobotSetup> makeRobotSetup(const std::string& urdf,
-                                                 const lwr_fri_bridge::JointLimits& table,
+                                                 const coglab_rt::JointLimits& table,
                                                  const Parameters& parameters) {
-  lwr_fri_bridge::JointLimits limits = table;
+  coglab_rt::JointLimits limits = table;
   limits.upper_position = parameters.numbers("upper_joint_pos_limit", table.upper_position);
   limits.lower_position = parameters.numbers("lower_joint_pos_limit", table.lower_position);
   limits.velocity = parameters.numbers("joint_vel_limit", table.velocity);

@@ -1,404 +1,208 @@
+// Requests of the DMP plug-in: checked here, outside the cycle, and turned into plans.
 #include "coglab_controllers/plugins/dmp_controller.hpp"
 
-#include <algorithm>
 #include <cmath>
-#include <limits>
+#include <sstream>
 #include <stdexcept>
 #include <utility>
 
 #include "coglab_controllers/kinematics/rotation.hpp"
-#include "coglab_controllers/plugins/dmp_plan.hpp"
 
 namespace coglab_controllers {
 
 namespace {
 
-constexpr double kRestError =
-    3e-4;  // m: after the end the loop is opened once the hand is this close,
-constexpr double kRestAngle = 3e-3;  // rad, and turned this close,
-constexpr double kRestTime = 0.5;    // s, or after this time, slowly:
-constexpr double kFadeTime = 0.3;  // s. A hand that still turns then would leave its place if each
-                                   // joint braked by itself.
+constexpr double kFastestStart = 2.0;  // m/s
 
-Pose inverse(const Pose& pose) {
-  const Quaternion back = pose.orientation.conjugate();
-  return {-(back * pose.position), back};
+std::string text(const Vector3& v) {
+  std::ostringstream out;
+  out << "(" << v.x() << ", " << v.y() << ", " << v.z() << ") m";
+  return out.str();
 }
 
-Pose operator*(const Pose& a, const Pose& b) {
-  return {a.position + a.orientation * b.position, (a.orientation * b.orientation).normalized()};
+Answer invalid(std::string why) {
+  return Answer::refusal(ReasonCode::InvalidArgument, std::move(why));
+}
+
+/// Refuses a target orientation that is none. Sets whether the hand keeps the one it has.
+Answer readOrientation(const DmpRequest& request, HandGoal& hand) {
+  const Eigen::Vector4d& q = request.target_orientation;
+  hand.keep_orientation = true;
+  if (!request.orientation_control) return {};
+  if (!q.allFinite()) return invalid("target_orientation holds a number that is not finite");
+  if (q.isZero(0.0)) return {};
+  const Quaternion orientation(q[3], q[0], q[1], q[2]);
+  if (!isUnit(orientation)) {
+    std::ostringstream out;
+    out << "target_orientation has norm " << q.norm()
+        << "; expected a unit quaternion x y z w, or all zero to keep the present orientation";
+    return invalid(out.str());
+  }
+  hand.orientation = orientation.normalized();
+  hand.keep_orientation = false;
+  return {};
+}
+
+RunnerPolicy policy() {
+  RunnerPolicy policy;
+  policy.open_end = true;
+  policy.waits_at_border = true;
+  policy.id_name = nullptr;
+  policy.longest_queue = 0;
+  return policy;
 }
 
 }  // namespace
 
 DmpController::DmpController()
-    : plans_(std::make_unique<PlanExchange<Plan>>()), loop_(std::make_unique<Loop>()) {}
-
-DmpController::~DmpController() = default;
+    : MotionRunner<DmpPlan>(std::make_unique<DmpCycle>(goals_), policy()),
+      cycle_(static_cast<DmpCycle*>(&inner())) {}
 
 void DmpController::configure(const MotionSetup& setup) {
-  setup_ = setup;
   const Parameters parameters(setup.parameters, setup.id);
-  const std::string base = setup.robot->chain.baseLink();
-  base_frame_ = parameters.text("robot_base_frame_name", base);
+  base_frame_ = parameters.text("robot_base_frame_name", setup.robot->chain.baseLink());
   dmp_frame_ = parameters.text("dmp_frame_name", base_frame_);
   goal_tf_frame_ = parameters.text("goal_tf_frame", "dmp_goal");
   setIkDebug(parameters.flag("enable_ik_debug", false));
-  finish_distance_ = parameters.number("goal_finish_distance", 0.12, 0.0, 1.0);
   reach_margin_ = parameters.number("goal_reach_margin", 0.5, 0.0, 5.0);
   max_initial_distance_ = parameters.number("max_initial_distance", 0.1, 0.0, 1.0);
-
-  IkParameters ik;
-  const double most = std::min(200.0, largestGain(setup.cycle_time));
-  ik.pos_clik_gain =
-      parameters.number("pos_clik_gain", std::min(ik.pos_clik_gain, most), 0.0, most);
-  ik.rot_clik_gain =
-      parameters.number("rot_clik_gain", std::min(ik.rot_clik_gain, most), 0.0, most);
-  ik.singularity_threshold =
-      parameters.number("singularity_threshold", ik.singularity_threshold, 0.0, 1.0);
-  ik.rotation_first_scaling = parameters.flag("rotation_first_scaling", ik.rotation_first_scaling);
-  ik.velocity_limit = setup.robot->limits.velocity;
-  ik.acceleration_limit = setup.robot->limits.acceleration;
-  ik.jerk_limit = setup.robot->limits.jerk;
-  ik_ = std::make_unique<TwoTaskIk>(ik);
-
-  GoalGateParameters& gate = frame_gate_;
-  gate.max_age = parameters.number("goal_max_age", gate.max_age, 0.01, 10.0);
-  gate.max_jump = parameters.number("goal_max_jump", gate.max_jump, 0.01, 5.0);
-  gate.lost_time = parameters.number("goal_lost_time", gate.lost_time, 0.0, 60.0);
-  // A goal on dmp_goal is meant as it is, also when it is far from the last one.
-  topic_gate_ = gate;
-  topic_gate_.max_age = parameters.number("goal_timeout", 0.0, 0.0, 3600.0);
-  topic_gate_.max_jump = std::numeric_limits<double>::infinity();
-
-  GoalEstimatorParameters estimator;
-  estimator.time_constant =
-      parameters.number("goal_time_constant", estimator.time_constant, 0.0, 2.0);
-  estimator.noisy_time_constant =
-      parameters.number("noisy_goal_time_constant", estimator.noisy_time_constant, 0.005, 2.0);
-  MotionEndParameters end;
-  end.phase = parameters.number("end_phase", end.phase, 1e-6, 0.5);
-  end.speed = parameters.number("end_speed", end.speed, 1e-6, 1.0);
-  end.turning = parameters.number("end_turning", end.turning, 1e-6, 10.0);
-  end.distance = parameters.number("end_distance", end.distance, 1e-6, 0.5);
-  end.noisy_speed = parameters.number("noisy_end_speed", end.noisy_speed, 1e-6, 1.0);
-  end.noisy_turning = parameters.number("noisy_end_turning", end.noisy_turning, 1e-6, 10.0);
-  end.noisy_distance = parameters.number("noisy_end_distance", end.noisy_distance, 1e-6, 0.5);
-  end.follow_distance = parameters.number("follow_distance", end.follow_distance, 1e-3, 1.0);
-  end.follow_time = parameters.number("follow_time", end.follow_time, 0.0, 10.0);
-
-  arrive_distance_ = parameters.number("arrive_distance", arrive_distance_, 1e-4, 0.5);
-  settle_time_ = parameters.number("settle_time", settle_time_, 0.0, 60.0);
-
-  loop_ = std::make_unique<Loop>(estimator, end);
-  loop_->blend.setTime(parameters.number("hold_blend", 0.15, 0.0, 5.0));
-  if (std::function<void()> wait = setup.host->cycleWait()) plans_->setWait(wait);
+  goals_.configure(dmp_frame_, readGoalGate(parameters), *setup.host);
+  MotionRunner<DmpPlan>::configure(setup);
   const std::string file = parameters.text("dmp_file", "");
+  if (file.empty()) return;
   int loaded = 0;
-  if (!file.empty()) {
-    const Answer answer = loadDmps(file, loaded);
-    if (!answer.success) throw std::runtime_error(answer.message);
-  }
+  const Answer answer = loadDmps(file, loaded);
+  if (!answer.success) throw std::runtime_error(answer.message);
 }
 
-// ---- the control thread
-// -----------------------------------------------------------------------------------------
+// ---- the control thread --------------------------------------------------------------------------
 
-void DmpController::start(const CycleInput& input) {
-  loop_->motion.stop();
-  loop_->pending = false;
-  state_ = MotionState::Idle;
-  reason_.clear();
-  resting_ = true;
-  hold_.begin();
-  report(input);
+Reason DmpController::unwelcome(const DmpPlan& plan) const {
+  if (plan.execute || stage() == RunnerStage::Moving) return {};
+  if (stage() == RunnerStage::Rest) {
+    return Reason(ReasonCode::NothingRuns, "no motion is running; use execute_dmp");
+  }
+  return Reason(ReasonCode::Busy, "a motion is about to begin; ask again when it runs");
 }
 
-void DmpController::stop() {
-  loop_->motion.stop();
-  loop_->pending = false;
-  if (state_ == MotionState::Running || state_ == MotionState::Holding) {
-    state_ = MotionState::Aborted;
-    reason_ = Reason(ReasonCode::Switched, "ended by a switch to another controller");
-  } else if (state_ == MotionState::Reached) {
-    state_ = MotionState::Idle;
-  }
-  resting_ = true;
-  progress_.write(loop_->progress(state_, reason_));
-}
-
-void DmpController::abort(const Reason& reason) {
-  if (state_ == MotionState::Idle || state_ == MotionState::Aborted) return;
-  loop_->motion.stop();
-  loop_->pending = false;
-  state_ = MotionState::Aborted;
-  reason_ = reason;
-  resting_ = true;
-  hold_.begin();
-}
-
-void DmpController::adopt(const CycleInput& input) {
-  Plan* const plan = plans_->take();
-  if (plan == nullptr) return;
-  const bool under_way = following() || state_ == MotionState::Reached;
-  plan->refusal = voidReason(plan->stamp, input);
-  if (plan->refusal.empty() && !plan->execute && !under_way) {
-    plan->refusal = Reason(ReasonCode::NothingRuns, "no motion is running; use execute_dmp");
-  }
-  if (plan->refusal.empty()) {
-    // It begins with the next joint state: in a cycle without one, the commanded state is that of
-    // the last.
-    if (!loop_->pending) loop_->was_following = following();
-    loop_->pending = true;
-    loop_->next = *plan;
-    state_ = MotionState::Running;
-    reason_.clear();
-  }
-  plans_->acknowledge();
-}
-
-void DmpController::begin(const CycleInput& input, const Plan& plan) {
-  Loop& loop = *loop_;
-  const bool was_following = loop.was_following;
-  loop.pending = false;
-  loop.ended = false;
-  loop.base_from_dmp = plan.base_from_dmp;
-  loop.dmp_from_base = inverse(plan.base_from_dmp);
-  loop.primitive = plan.primitive;
-  loop.plan = plan.motion;
-  const HandGoal before = loop.hand;
-  loop.hand = plan.hand;
-
-  if (!plan.execute) {
-    loop.hand.in_goal_frame = before.in_goal_frame;
-    if (plan.hand.keep_orientation) loop.hand.orientation = before.orientation;
-    const Pose goal = handGoal(loop.gate.goal(), loop.hand);
-    bool projected = false;
-    loop.motion.switchTo(plan.motion, inWorkspace(goal, projected));
-    if (resting_) closeLoop(input);
-    return;
-  }
-
-  // Where the motion begins: on the set-point of the motion it replaces, else on the commanded
-  // state.
-  ChainState commanded;
-  setup_.robot->chain.evaluate(input.robot.commanded_position, commanded);
-  Pose pose = loop.dmp_from_base * commanded.tool;
-  const Eigen::Matrix<double, 6, 1> twist = commanded.jacobian * input.robot.commanded_velocity;
-  const Quaternion& turn = loop.dmp_from_base.orientation;
-  const double rate = std::max(input.time_scale, 0.1);
-  Vector3 velocity = turn * Vector3(twist.head<3>()) / rate;
-  Vector3 angular = turn * Vector3(twist.tail<3>()) / rate;
-  if (was_following) {
-    pose = loop.reference.pose;
-    velocity = loop.motion.dmp().state().velocity;
-    angular = loop.reference.angular_velocity / rate;
-  }
-  if (plan.given) {
-    pose.position = plan.initial_position;
-    velocity = plan.initial_velocity;
-  }
-  if (loop.hand.keep_orientation) loop.hand.orientation = pose.orientation;
-  loop.request = plan.goal.request;
-  loop.gate = GoalGate(plan.hand.in_goal_frame ? frame_gate_ : topic_gate_);
-  loop.gate.reset(plan.goal);
-  bool projected = false;
-  const Pose goal = inWorkspace(handGoal(plan.goal, loop.hand), projected);
-  loop.motion.start(plan.motion, pose, velocity, angular, goal);
-  loop.reference.pose = pose;
-  if (!was_following || plan.given) closeLoop(input);
-}
-
-void DmpController::closeLoop(const CycleInput& input) {
-  Loop& loop = *loop_;
-  const Pose set_point = loop.base_from_dmp * loop.reference.pose;
-  loop.blend.begin(set_point.position - input.chain.tool.position,
-                   rotationBetween(input.chain.tool.orientation, set_point.orientation),
-                   JointVector::Zero());
-  resting_ = false;
-  since_end_ = 0.0;
-}
-
-Pose DmpController::handGoal(const GoalObservation& goal, const HandGoal& hand) const {
-  if (!hand.in_goal_frame) return {goal.position + hand.offset, hand.orientation};
-  Pose pose;
-  pose.position = goal.position + goal.orientation * hand.offset;
-  pose.orientation =
-      hand.keep_orientation ? hand.orientation : (goal.orientation * hand.orientation).normalized();
-  return pose;
-}
-
-Pose DmpController::inWorkspace(const Pose& hand_in_dmp, bool& projected) const {
-  const Loop& loop = *loop_;
-  const Pose hand = loop.base_from_dmp * hand_in_dmp;
-  const Vector3 allowed = setup_.robot->workspace.project(hand.position);
-  projected = (allowed - hand.position).squaredNorm() > 1e-12;
-  if (!projected) return hand_in_dmp;
-  return {(loop.dmp_from_base * Pose{allowed, hand.orientation}).position, hand_in_dmp.orientation};
-}
-
-void DmpController::watchGoal(const CycleInput& input) {
-  Loop& loop = *loop_;
-  GoalObservation newest;
-  goals_.read(newest);
-  const bool mine = newest.request == loop.request;
-  const GoalGate::State gate =
-      loop.gate.update(input.robot.stamp_ns, mine ? newest : loop.gate.goal());
-  loop.goal = inWorkspace(handGoal(loop.gate.goal(), loop.hand), loop.projected);
-  const Vector3 hand = (loop.dmp_from_base * input.chain.tool).position;
-  if (state_ == MotionState::Reached || loop.ended) {
-    // The motion stands at the goal it latched; newer sights differ from it by their noise.
-    loop.remaining_distance = (loop.motion.goal() - hand).norm();
-    return;
-  }
-  loop.remaining_distance = (handGoal(loop.gate.goal(), loop.hand).position - hand).norm();
-
-  const double ahead = ahead_.load(std::memory_order_relaxed);
-  state_ = gate == GoalGate::State::Fresh ? MotionState::Running : MotionState::Holding;
-  reason_.clear();
-  switch (gate) {
-    case GoalGate::State::Fresh:
-      if (loop.projected) {
-        reason_ = Reason(ReasonCode::GoalOutsideWorkspace, "the goal is outside the workspace (")
-                  << describe(setup_.robot->workspace.violated(
-                         (loop.base_from_dmp * handGoal(loop.gate.goal(), loop.hand)).position))
-                  << "): the motion goes to the border";
-      }
-      break;
-    case GoalGate::State::Old:
-      reason_ = Reason(ReasonCode::GoalStale, "the newest goal is ")
-                << loop.gate.age() << " s old: the last one is held";
-      if (ahead > 0.0) {
-        reason_ << "; newer ones are refused: stamped " << ahead << " s ahead of the clock";
-      }
-      break;
-    case GoalGate::State::Jumped:
-      reason_ = Reason(ReasonCode::GoalJumped, "the goal jumped by ")
-                << loop.gate.jump() << " m: the last one is held until frames agree";
-      break;
-    case GoalGate::State::Lost:
-      if (loop.remaining_distance < finish_distance_) {
-        reason_ = Reason(ReasonCode::GoalStale, "the goal is lost: finishing on the held one");
-      } else {
-        abort(Reason(ReasonCode::GoalLost, "the goal is lost for ")
-              << loop.gate.age() << " s with " << loop.remaining_distance
-              << " m to go; "
-              << (ahead > 0.0 ? "newer ones are stamped ahead of the clock: synchronise the clocks"
-                              : "check what publishes it"));
-      }
-      break;
-  }
-}
-
-void DmpController::followEnd(const CycleInput& input) {
-  Loop& loop = *loop_;
-  switch (loop.motion.event()) {
-    case MotionEnd::Event::Ended:
-      state_ = MotionState::Running;
-      reason_.clear();
-      loop.ended = true;
-      loop.settling = 0.0;
-      break;
-    case MotionEnd::Event::FollowsAgain:
-      state_ = MotionState::Running;
-      loop.ended = false;
-      if (resting_) closeLoop(input);
-      break;
-    case MotionEnd::Event::None:
-      break;
-  }
-  if (loop.ended && state_ == MotionState::Running) arrive(input.dt);
-}
-
-/// The set-point is at the goal; the motion has reached it when the hand, as measured, is too.
-void DmpController::arrive(double dt) {
-  Loop& loop = *loop_;
-  const double away = loop.ik.position_error.norm();
-  if (away <= arrive_distance_) {
-    state_ = MotionState::Reached;
-    reason_.clear();
-    since_end_ = 0.0;
-    return;
-  }
-  loop.settling += dt;
-  if (loop.settling <= settle_time_) return;
-  abort(Reason(ReasonCode::TargetNotReached, "the hand does not come to the goal: ")
-        << away << " m are left; is the arm blocked?");
-}
-
-void DmpController::computeReference(const CycleInput& input, References& references) {
-  Loop& loop = *loop_;
-  if (loop.pending && input.motion_allowed) begin(input, loop.next);
-  if (following() || state_ == MotionState::Reached) watchGoal(input);
-  if (following() || state_ == MotionState::Reached) {
-    loop.reference = loop.motion.step(input.dt, loop.goal, input.time_scale);
-    followEnd(input);
-  }
-  if (following()) {
-    const Quaternion& turn = loop.base_from_dmp.orientation;
-    loop.in_base = loop.reference;
-    loop.in_base.pose = loop.base_from_dmp * loop.reference.pose;
-    loop.in_base.velocity = turn * loop.reference.velocity;
-    loop.in_base.angular_velocity = turn * loop.reference.angular_velocity;
-    writePose(references, loop.in_base.pose);
-    references.states.view<6>(references.twist) << loop.in_base.velocity,
-        loop.in_base.angular_velocity;
-  } else {
-    hold_.computeReference(input, setup_.robot->chain, references);
-  }
+void DmpController::report(std::int64_t stamp_ns) {
+  progress_.write(cycle_->progress(stamp_ns, state(), reason()));
 }
 
 void DmpController::resolve(const CycleInput& input, References& references) {
-  Loop& loop = *loop_;
-  if (!following()) {
-    loop.ik.scale = 1.0;
-    hold_.resolve(input, references,
-                  [&](const ChainState& state, const JointVector& q, const CartesianReference& to) {
-                    ik_->solve(state, q, to, loop.ik);
-                    return loop.ik.velocity;
-                  });
-    report(input);
-    return;
-  }
-  const auto pose = references.states.view<7>(references.pose);
-  const auto twist = references.states.view<6>(references.twist);
-  CartesianReference to = loop.in_base;
-  to.pose.position = pose.head<3>();
-  to.pose.orientation = Quaternion(pose[6], pose[3], pose[4], pose[5]);
-  to.velocity = twist.head<3>();
-  to.angular_velocity = twist.tail<3>();
-  ChainState chain = input.chain;
-  chain.tool.position += loop.blend.position();
-  chain.tool.orientation = expRotation(loop.blend.rotation()) * chain.tool.orientation;
-  loop.blend.advance(input.dt);
-  ik_->solve(chain, input.robot.position, to, loop.ik);
-  references.states.view<kMaxJoints>(references.joint_velocity) = loop.ik.velocity;
-
-  if (state_ == MotionState::Reached) {
-    since_end_ += input.dt;
-    const bool there = loop.ik.position_error.norm() < kRestError &&
-                       loop.ik.rotation_error.norm() < kRestAngle &&
-                       loop.reference.velocity.norm() < 1e-6;
-    const double left = 1.0 - (since_end_ - kRestTime) / kFadeTime;
-    references.states.view<kMaxJoints>(references.joint_velocity) *= std::clamp(left, 0.0, 1.0);
-    if (there || left <= 0.0) {
-      resting_ = true;
-      hold_.begin();
-    }
-  }
-  report(input);
+  MotionRunner<DmpPlan>::resolve(input, references);
+  if (ikDebug() && cycle_->loopClosed()) debug_.push(cycle_->debug(input, loop().ik()));
 }
 
-double DmpController::limitScale() const { return loop_->ik.scale; }
+// ---- requests ------------------------------------------------------------------------------------
 
-const CartesianMotion& DmpController::motion() const { return loop_->motion; }
+Answer DmpController::loadDmps(const std::string& filename, int& loaded) {
+  loaded = 0;
+  const std::lock_guard<std::mutex> lock(library_mutex_);
+  try {
+    loaded = library_.load(filename);
+    return {};
+  } catch (const std::exception& error) {
+    return Answer::refusal(ReasonCode::BadFile, error.what());
+  }
+}
 
-void DmpController::report(const CycleInput& input) {
-  Loop& loop = *loop_;
-  loop.stamp_ns = input.robot.stamp_ns;
-  progress_.write(loop.progress(state_, reason_));
-  if (!ikDebug() || !following()) return;
-  debug_.push(loop.debug(input.chain.tool));
+Answer DmpController::ask(const DmpRequest& request, bool execute) {
+  const MotionRequest begun = setup().host->beginRequest(id());
+  if (!begun.welcome.success) return begun.welcome;
+  DmpPlan plan;
+  const Answer checked = check(request, execute, plan);
+  if (!checked.success) return checked;
+  const Answer answer = offer(begun, plan, false);
+  if (answer.success && execute) goals_.follow(request.goal_frame, plan.goal);
+  return answer;
+}
+
+Answer DmpController::check(const DmpRequest& request, bool execute, DmpPlan& plan) {
+  plan.execute = execute;
+  Answer checked = checkPrimitive(request, plan);
+  if (checked.success) checked = readOrientation(request, plan.hand);
+  if (checked.success && execute) checked = checkStart(request, plan);
+  if (checked.success && dmp_frame_ != base_frame_) {
+    checked = goals_.transform(base_frame_, dmp_frame_, "dmp_frame_name", plan.base_from_dmp);
+  }
+  if (checked.success && execute) checked = goals_.first(request.goal_frame, plan.goal);
+  if (checked.success && execute) checked = checkReach(plan);
+  return checked;
+}
+
+Answer DmpController::checkPrimitive(const DmpRequest& request, DmpPlan& plan) const {
+  try {
+    const std::lock_guard<std::mutex> lock(library_mutex_);
+    plan.motion.system = TransformationSystem(library_.at(request.primitive_id));
+  } catch (const std::exception& error) {
+    return Answer::refusal(ReasonCode::UnknownName, error.what());
+  }
+  plan.primitive << request.primitive_id.c_str();
+  try {
+    requireRatio(request.dmp_ratio);
+  } catch (const std::exception& error) {
+    return Answer::refusal(ReasonCode::OutOfRange, error.what());
+  }
+  plan.motion.ratio = request.dmp_ratio;
+  plan.motion.orientation_control = request.orientation_control;
+  if (!request.goal_offset.allFinite()) {
+    return invalid("goal_offset holds a number that is not finite");
+  }
+  plan.hand.offset = request.goal_offset;
+  plan.hand.in_goal_frame = !request.goal_frame.empty();
+  return {};
+}
+
+Answer DmpController::checkStart(const DmpRequest& request, DmpPlan& plan) const {
+  if (request.initial_state != DmpRequest::kCurrent &&
+      request.initial_state != DmpRequest::kGiven) {
+    return invalid("initial_state " + std::to_string(request.initial_state) +
+                   " is unknown; expected CURRENT=0 or GIVEN=1");
+  }
+  plan.given = request.initial_state == DmpRequest::kGiven;
+  if (!plan.given) return {};
+  if (!request.initial_position.allFinite() || !request.initial_velocity.allFinite()) {
+    return invalid("initial_position or initial_velocity holds a number that is not finite");
+  }
+  plan.initial_position = request.initial_position;
+  plan.initial_velocity = request.initial_velocity;
+  return {};
+}
+
+/// Whether the goal is where the hand can be, and a given start where it is.
+Answer DmpController::checkReach(const DmpPlan& plan) const {
+  const Workspace& workspace = setup().robot->workspace;
+  const Pose& to_base = plan.base_from_dmp;
+  const Vector3 goal = to_base.position + to_base.orientation * plan.hand.at(plan.goal).position;
+  const double outside = (workspace.project(goal) - goal).norm();
+  const double margin = plan.hand.in_goal_frame ? reach_margin_ : 0.0;
+  if (outside > margin + 1e-9) {
+    return Answer::refusal(
+        ReasonCode::GoalOutsideWorkspace,
+        "the hand's goal " + text(goal) + " is " + std::to_string(outside) +
+            " m outside the workspace (" + describe(workspace.violated(goal)) + "); box from " +
+            text(workspace.parameters().box_min) + " to " + text(workspace.parameters().box_max) +
+            ", " + std::to_string(workspace.parameters().base_radius) + " m from the base");
+  }
+  if (!plan.given) return {};
+  const Vector3 start = to_base.position + to_base.orientation * plan.initial_position;
+  const RobotSample robot = setup().host->robotSnapshot();
+  const Vector3 hand = setup().robot->chain.evaluate(robot.commanded_position).tool.position;
+  const double distance = (start - hand).norm();
+  if (distance > max_initial_distance_) {
+    return Answer::refusal(
+        ReasonCode::OutOfRange,
+        "initial_position is " + std::to_string(distance) + " m from the hand at " + text(hand) +
+            "; allowed: " + std::to_string(max_initial_distance_) +
+            " m (max_initial_distance); use initial_state CURRENT");
+  }
+  if (plan.initial_velocity.norm() > kFastestStart) {
+    return Answer::refusal(ReasonCode::OutOfRange,
+                           "initial_velocity is " + std::to_string(plan.initial_velocity.norm()) +
+                               " m/s; expected at most 2 m/s");
+  }
+  return {};
 }
 
 }  // namespace coglab_controllers

@@ -1,14 +1,14 @@
 #include "bindings.hpp"
 #include "coglab_controllers/limits/guard.hpp"
 #include "coglab_controllers/limits/phase_governor.hpp"
-#include "lwr_fri_bridge/interpolator.hpp"
-#include "lwr_fri_bridge/joint_limits.hpp"
+#include "coglab_rt/interpolator.hpp"
+#include "coglab_rt/joint_limits_table.hpp"
 
 namespace coglab_controllers::python {
 namespace {
 
-using lwr_fri_bridge::Interpolator;
-using lwr_fri_bridge::JointLimits;
+using coglab_rt::Interpolator;
+using coglab_rt::JointLimits;
 
 void bindTable(py::module_& module) {
   py::class_<JointLimits>(module, "JointLimits",
@@ -20,7 +20,7 @@ void bindTable(py::module_& module) {
       .def_readwrite("acceleration", &JointLimits::acceleration)
       .def_readwrite("jerk", &JointLimits::jerk)
       .def_readwrite("torque", &JointLimits::torque);
-  module.def("load_joint_limits", &lwr_fri_bridge::loadJointLimits, py::arg("path"),
+  module.def("load_joint_limits", &coglab_rt::loadJointLimits, py::arg("path"),
              py::arg("profile") = "default", "Reads lwr_description/config/joint_limits.yaml.");
 
   py::class_<Interpolator>(module, "Interpolator",

@@ -64,7 +64,7 @@ CancelRos::CancelRos(const ros::NodeHandle& node, ControllerManager& manager)
 
 CancelRos::~CancelRos() {
   manager_.endWaits();
-  for (ros::ServiceServer& service : services_) service.shutdown();
+  for (auto& entry : services_) entry.second.shutdown();
   spinner_.stop();
 }
 
@@ -81,7 +81,19 @@ void CancelRos::serve(const std::string& id) {
         return true;
       };
   const std::lock_guard<std::mutex> lock(services_mutex_);
-  services_.push_back(node_.advertiseService(id + "/cancel", answer));
+  services_[id] = node_.advertiseService(id + "/cancel", answer);
+}
+
+void CancelRos::withdraw(const std::string& id) {
+  ros::ServiceServer service;
+  {
+    const std::lock_guard<std::mutex> lock(services_mutex_);
+    const auto found = services_.find(id);
+    if (found == services_.end()) return;
+    service = found->second;
+    services_.erase(found);
+  }
+  service.shutdown();
 }
 
 }  // namespace coglab_controllers

@@ -14,8 +14,8 @@
 #include "coglab_controllers/ros/manager_ros.hpp"
 #include "coglab_controllers/ros/robot_topics.hpp"
 #include "coglab_controllers/ros/ros_parameters.hpp"
-#include "lwr_fri_bridge/exit_limit.hpp"
-#include "lwr_fri_bridge/logger_service.hpp"
+#include "coglab_rt/ros/exit_limit.hpp"
+#include "coglab_rt/ros/logger_service.hpp"
 
 namespace {
 volatile std::sig_atomic_t asked_to_end = 0;
@@ -28,8 +28,8 @@ int main(int argc, char** argv) {
   std::signal(SIGTERM, onSignal);
   try {
     ros::NodeHandle robot(ros::param::param<std::string>("~lwr_namespace", "lwr"));
-    lwr_fri_bridge::LoggerServices logger_services;
-    ros::CallbackQueue queue;  // one thread: the writer of the port
+    coglab_rt::LoggerServices logger_services;
+    ros::CallbackQueue queue;  // one thread: the writer of the samples
     robot.setCallbackQueue(&queue);
     std::atomic<coglab_controllers::ControlThread*> control{nullptr};
     const ros::NodeHandle manager_node("controller_manager");
@@ -42,12 +42,12 @@ int main(int argc, char** argv) {
     options.publish_target = false;
     // Both may run on one computer, and the answers to the robot come first.
     options.highest_priority = std::max(0, robot.param("rt_priority", 80) - 1);
-    options.thread.after_cycle = [&](const lwr_fri_bridge::VelocityCommand& command) {
+    options.thread.after_cycle = [&](const coglab_controllers::VelocityCommand& command) {
       // Without an active controller others may use the topic.
       const auto* manager = ready.load(std::memory_order_acquire);
       if (manager != nullptr && manager->controllerActive()) topics.send(command);
     };
-    coglab_controllers::ManagerRos manager(manager_node, topics.port(), options);
+    coglab_controllers::ManagerRos manager(manager_node, topics.mailboxes(), options);
     ready.store(&manager, std::memory_order_release);
     control.store(&manager.controlThread(), std::memory_order_release);
     ros::AsyncSpinner spinner(1, &queue);
@@ -57,7 +57,7 @@ int main(int argc, char** argv) {
       std::this_thread::sleep_for(std::chrono::milliseconds(20));
     }
     spinner.stop();
-    lwr_fri_bridge::endProcessWithin(std::chrono::seconds(1));
+    coglab_rt::endProcessWithin(std::chrono::seconds(1));
     manager.shutdown();
     ros::shutdown();
   } catch (const std::exception& error) {

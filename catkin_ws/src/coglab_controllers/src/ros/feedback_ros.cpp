@@ -8,6 +8,8 @@
 #include <ros/console.h>
 #include <ros/serialization.h>
 
+#include "ctrl_more/loading/search_path.hpp"
+
 namespace coglab_controllers {
 
 void RosLogSink::write(const ctrl_more::LogRecord& record) {
@@ -35,13 +37,14 @@ FeedbackRos::FeedbackRos(const ros::NodeHandle& node, ControllerManager& manager
   const auto serve = [this](const std::string& name, auto method) {
     services_.push_back(node_.advertiseService(name, method, this));
   };
-  serve("enable", &FeedbackRos::onSelect<What::Enable>);
-  serve("disable", &FeedbackRos::onSelect<What::Disable>);
-  serve("pause", &FeedbackRos::onSelect<What::Pause>);
-  serve("resume", &FeedbackRos::onSelect<What::Resume>);
-  serve("disable_by_signal", &FeedbackRos::onSignal<What::Disable>);
-  serve("pause_by_signal", &FeedbackRos::onSignal<What::Pause>);
-  serve("resume_by_signal", &FeedbackRos::onSignal<What::Resume>);
+  using Kind = ctrl_more::Change::Kind;
+  serve("enable", &FeedbackRos::onSelect<Kind::Enable>);
+  serve("disable", &FeedbackRos::onSelect<Kind::Disable>);
+  serve("pause", &FeedbackRos::onSelect<Kind::Pause>);
+  serve("resume", &FeedbackRos::onSelect<Kind::Resume>);
+  serve("disable_by_signal", &FeedbackRos::onSignal<Kind::Disable>);
+  serve("pause_by_signal", &FeedbackRos::onSignal<Kind::Pause>);
+  serve("resume_by_signal", &FeedbackRos::onSignal<Kind::Resume>);
   serve("apply_profile", &FeedbackRos::onProfile);
   serve("set_execution_order", &FeedbackRos::onOrder);
   serve("reload_gains", &FeedbackRos::onReload);
@@ -67,57 +70,26 @@ bool FeedbackRos::finish(const ctrl_more::Status& status, Response& response) {
   return true;
 }
 
-template <FeedbackRos::What what>
+template <ctrl_more::Change::Kind kind>
 bool FeedbackRos::onSelect(Select::Request& request, Select::Response& response) {
+  using Who = ctrl_more::Change::Who;
   const auto lock = manager_.lockRequests();
   const std::string reason = request.reason.empty() ? "user" : request.reason;
   ctrl_more::Change change;
-  for (const std::string& name : request.names) {
-    switch (what) {
-      case What::Enable:
-        change.enable(name);
-        break;
-      case What::Disable:
-        change.disable(name);
-        break;
-      case What::Pause:
-        change.pause(name, reason);
-        break;
-      case What::Resume:
-        change.resume(name, reason);
-        break;
-    }
-  }
-  if (!request.names.empty()) return finish(feedback_.apply(change), response);
-  switch (what) {
-    case What::Enable:
-      return finish(feedback_.enable(), response);
-    case What::Disable:
-      return finish(feedback_.disable(), response);
-    case What::Pause:
-      return finish(feedback_.pause(), response);
-    case What::Resume:
-      return finish(feedback_.resume(), response);
-  }
-  return true;
+  for (const std::string& name : request.names) change.add({kind, name, Who::Named, reason});
+  // No name: all controllers.
+  if (request.names.empty()) change.add({kind, "", Who::Named, "user"});
+  return finish(feedback_.apply(change), response);
 }
 
-template <FeedbackRos::What what>
+template <ctrl_more::Change::Kind kind>
 bool FeedbackRos::onSignal(BySignal::Request& request, BySignal::Response& response) {
+  using Who = ctrl_more::Change::Who;
   const auto lock = manager_.lockRequests();
   const auto before = feedback_.statusAll();
-  const std::string& signal = request.signal;
-  ctrl_more::Status status;
-  if (what == What::Disable) {
-    status = request.is_control_state ? feedback_.disableAllUsingControlState(signal)
-                                      : feedback_.disableAllUsingRobotState(signal);
-  } else if (what == What::Pause) {
-    status = request.is_control_state ? feedback_.pauseAllUsingControlState(signal)
-                                      : feedback_.pauseAllUsingRobotState(signal);
-  } else {
-    status = request.is_control_state ? feedback_.resumeAllUsingControlState(signal)
-                                      : feedback_.resumeAllUsingRobotState(signal);
-  }
+  const Who who = request.is_control_state ? Who::UsingControlState : Who::UsingRobotState;
+  const ctrl_more::Status status =
+      feedback_.apply(ctrl_more::Change().bySignal(kind, who, request.signal));
   for (const ctrl_more::ControllerStatus& was : before) {
     const ctrl_more::ControllerStatus is = feedback_.status(was.name);
     if (is.enabled != was.enabled || is.reasons != was.reasons) {

@@ -6,17 +6,18 @@
 #include <ros/ros.h>
 #include <tf2/buffer_core.h>
 
+#include "coglab_controllers/goal/goal_relay.hpp"
 #include "coglab_controllers/kinematics/rotation.hpp"
 #include "coglab_controllers/ros/ros_parameters.hpp"
 #include "coglab_controllers/ros/tf_goal_source.hpp"
 #include "coglab_msgs/DmpGoal.h"
-#include "lwr_fri_bridge/logger_service.hpp"
+#include "coglab_rt/ros/logger_service.hpp"
 
 namespace coglab_controllers {
 
 /// Publishes the position of a frame whenever a new transform has come, stamped with its time of
-/// capture. What is old, from the future, not finite, or far from the frames before it is not
-/// published: the DMP plug-in takes a goal on dmp_goal as it is.
+/// capture. What is from the future or not finite is not published, and of the rest what GoalRelay
+/// lets pass.
 class GoalHelper {
  public:
   /// @param node of the topic's name, which is relative to it  @param own the node's parameters
@@ -54,22 +55,11 @@ class GoalHelper {
       ROS_WARN_THROTTLE(5.0, "no goal: the transform of '%s' is not finite", frame_.c_str());
       return;
     }
-    const std::int64_t now = steadyNow();
-    if (sent_ns_ == 0) gate_.reset(seen);
-    const GoalGate::State state = gate_.update(now, seen);
-    if (state != GoalGate::State::Fresh) {
-      ROS_WARN_THROTTLE(5.0,
-                        "no goal: the newest transform of '%s' is %.3f s old and %.3f m away from "
-                        "the last goal",
-                        frame_.c_str(), gate_.age(), gate_.jump());
+    if (!relay_.see(steadyNow(), seen)) {
+      tellWhyNot();
       return;
     }
-    // A static frame has no stamp: it is told again and again, as captured now.
-    const GoalObservation& goal = gate_.goal();
-    const bool told = sent_ns_ != 0 && goal.frame_ns == sent_frame_ns_;
-    if (told && (goal.frame_ns != 0 || now - sent_ns_ < kStaticPeriod_ns)) return;
-    sent_ns_ = now;
-    sent_frame_ns_ = goal.frame_ns;
+    const GoalObservation& goal = relay_.goal();
     const Vector3 position = goal.position + goal.orientation * offset_;
     coglab_msgs::DmpGoal message;
     message.header.stamp.fromNSec(static_cast<std::uint64_t>(goal.frame_ns));
@@ -80,18 +70,31 @@ class GoalHelper {
     goal_.publish(message);
   }
 
-  static constexpr std::int64_t kStaticPeriod_ns = 1'000'000'000;
+  void tellWhyNot() {
+    const GoalGate& gate = relay_.gate();
+    switch (gate.state()) {
+      case GoalGate::State::Fresh:
+        return;  // told already
+      case GoalGate::State::Unsettled:
+        ROS_WARN_THROTTLE(5.0, "no goal yet: too few transforms of '%s' agree", frame_.c_str());
+        return;
+      default:
+        ROS_WARN_THROTTLE(5.0,
+                          "no goal: the newest transform of '%s' is %.3f s old and %.3f m away "
+                          "from the last goal",
+                          frame_.c_str(), gate.age(), gate.jump());
+    }
+  }
 
   ros::NodeHandle node_;
   tf2::BufferCore buffer_;
   TfListener listener_;
   TfGoalSource source_{buffer_, listener_};
-  GoalGate gate_;
+  GoalRelay relay_;
   ros::Publisher goal_;
   std::string frame_, dmp_frame_;
   Vector3 offset_ = Vector3::Zero();
   double rate_ = 100.0;
-  std::int64_t sent_ns_ = 0, sent_frame_ns_ = 0;
 };
 
 }  // namespace coglab_controllers
@@ -99,7 +102,7 @@ class GoalHelper {
 int main(int argc, char** argv) {
   ros::init(argc, argv, "goal_helper");
   try {
-    lwr_fri_bridge::LoggerServices logger_services;
+    coglab_rt::LoggerServices logger_services;
     coglab_controllers::GoalHelper(ros::NodeHandle(), ros::NodeHandle("~")).run();
   } catch (const std::exception& error) {
     ROS_FATAL("%s", error.what());

@@ -5,6 +5,7 @@
 #include <exception>
 #include <utility>
 
+#include "coglab_controllers/ros/authored_controller_ros.hpp"
 #include "coglab_controllers/ros/ros_parameters.hpp"
 #include "coglab_msgs/ControllerStatus.h"
 
@@ -13,6 +14,7 @@ namespace coglab_controllers {
 namespace {
 constexpr auto kPublishPeriod = std::chrono::milliseconds(5);
 constexpr double kStallTime = 0.25;  // s without a cycle that count as a stall
+constexpr auto kDetachTime = std::chrono::seconds(2);
 constexpr double kWordsPeriod = 0.5;  // s between two status messages that differ in words alone
 
 /// An exception here would end the process that moves the arm.
@@ -28,7 +30,7 @@ void guarded(const char* what, const Function& function) {
 }
 }  // namespace
 
-ManagerRos::ManagerRos(const ros::NodeHandle& node, lwr_fri_bridge::ControlPort& port,
+ManagerRos::ManagerRos(const ros::NodeHandle& node, coglab_rt::ArmMailboxes& mailboxes,
                        Options options)
     : node_(node),
       options_(std::move(options)),
@@ -50,7 +52,7 @@ ManagerRos::ManagerRos(const ros::NodeHandle& node, lwr_fri_bridge::ControlPort&
   for (const std::string& error : manager_->feedbackErrors()) {
     ROS_ERROR("feedback controllers: %s", error.c_str());
   }
-  thread_ = std::make_unique<ControlThread>(manager_->cycle(), port, options_.thread);
+  thread_ = std::make_unique<ControlThread>(manager_->cycle(), mailboxes, options_.thread);
   tf_ = std::make_unique<tf2_ros::Buffer>(ros::Duration(10.0));
   tf_listener_ = std::make_unique<TfListener>(*tf_);
   target_message_.name = manager_->settings().robot->chain.jointNames();
@@ -64,6 +66,7 @@ void ManagerRos::start() {
   tf_listener_->start();
   status_ = node_.advertise<coglab_msgs::ControllerStatus>("status", 10, true);
   services_.push_back(node_.advertiseService("load_controller", &ManagerRos::onLoad, this));
+  services_.push_back(node_.advertiseService("unload_controller", &ManagerRos::onUnload, this));
   services_.push_back(node_.advertiseService("list_controllers", &ManagerRos::onList, this));
   services_.push_back(node_.advertiseService("switch_controller", &ManagerRos::onSwitch, this));
   services_.push_back(node_.advertiseService("get_active_controller", &ManagerRos::onActive, this));
@@ -117,12 +120,19 @@ void ManagerRos::loadFromParameters() {
 
 Answer ManagerRos::load(const std::string& id, const std::string& type) {
   const auto attach = [this, &id](MotionController& controller, const MotionMaker& maker) {
-    if (maker.ros == nullptr) return;
-    std::shared_ptr<MotionControllerRos> side(maker.ros());
+    auto side = std::make_shared<Side>();
+    side->id = id;
+    if (maker.ros != nullptr) {
+      side->ros.reset(maker.ros());
+    } else if (dynamic_cast<AuthoredController*>(&controller) != nullptr) {
+      side->ros = std::make_unique<AuthoredControllerRos>();
+    } else {
+      return;
+    }
     RosContext context;
     context.tf = tf_.get();
     context.listener = tf_listener_.get();
-    side->attach(controller, ros::NodeHandle(node_, id), context);
+    side->ros->attach(controller, ros::NodeHandle(node_, id), context);
     const std::lock_guard<std::mutex> lock(sides_mutex_);
     sides_.push_back(std::move(side));
   };
@@ -131,11 +141,31 @@ Answer ManagerRos::load(const std::string& id, const std::string& type) {
   return answer;
 }
 
+/// Ends the services and topics of a controller that is unloaded.
+void ManagerRos::detach(const std::string& id, std::shared_ptr<const LoadedMotion> motion) {
+  cancel_->withdraw(id);
+  std::shared_ptr<Side> side;
+  {
+    const std::lock_guard<std::mutex> lock(sides_mutex_);
+    const auto found = std::find_if(sides_.begin(), sides_.end(),
+                                    [&id](const auto& one) { return one->id == id; });
+    if (found == sides_.end()) return;
+    side = *found;
+    sides_.erase(found);
+  }
+  side->motion = std::move(motion);
+  // The loops may be in it. What takes longer frees it there.
+  const auto end = std::chrono::steady_clock::now() + kDetachTime;
+  while (side.use_count() > 1 && std::chrono::steady_clock::now() < end) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  }
+}
+
 Answer ManagerRos::switchTo(const std::string& id, std::string& type) {
   const Answer answer = manager_->switchTo(id, type);
   if (answer.success) {
-    active_.store(true, std::memory_order_relaxed);
-    if (options_.controller_active) options_.controller_active(true);
+    active_.store(!id.empty(), std::memory_order_relaxed);
+    if (options_.controller_active) options_.controller_active(!id.empty());
   }
   return answer;
 }
@@ -148,6 +178,20 @@ bool ManagerRos::onLoad(coglab_msgs::LoadController::Request& request,
   response.message = answer.message;
   manager_->list(response.controller_ids, response.controller_types);
   if (!answer.success) ROS_WARN("load_controller refused: %s", answer.message.c_str());
+  return true;
+}
+
+bool ManagerRos::onUnload(coglab_msgs::UnloadController::Request& request,
+                          coglab_msgs::UnloadController::Response& response) {
+  const std::string& id = request.controller_id;
+  const Answer answer = manager_->unload(id, [this, &id](std::shared_ptr<const LoadedMotion> motion) {
+    detach(id, std::move(motion));
+  });
+  response.success = answer.success;
+  response.reason_code = answer.number();
+  response.message = answer.message;
+  manager_->list(response.controller_ids, response.controller_types);
+  if (!answer.success) ROS_WARN("unload_controller refused: %s", answer.message.c_str());
   return true;
 }
 
@@ -186,7 +230,7 @@ void ManagerRos::onSpeedTopic(const std_msgs::Float64& message) {
   if (!answer.success) ROS_WARN_THROTTLE(1.0, "%s", answer.message.c_str());
 }
 
-std::vector<std::shared_ptr<MotionControllerRos>> ManagerRos::sides() {
+std::vector<std::shared_ptr<ManagerRos::Side>> ManagerRos::sides() {
   const std::lock_guard<std::mutex> lock(sides_mutex_);
   return sides_;
 }
@@ -197,7 +241,7 @@ void ManagerRos::goalLoop() {
   auto next = std::chrono::steady_clock::now();
   while (!stopping_) {
     for (const auto& side : sides()) {
-      guarded("following of goals", [&side] { side->pollGoal(); });
+      guarded("following of goals", [&side] { side->ros->pollGoal(); });
     }
     next = std::max(next + kPublishPeriod, std::chrono::steady_clock::now() - kPublishPeriod);
     std::this_thread::sleep_until(next);
@@ -209,7 +253,7 @@ void ManagerRos::publishLoop() {
   auto next = std::chrono::steady_clock::now();
   for (std::uint64_t round = 0; !stopping_; ++round) {
     for (const auto& side : sides()) {
-      guarded("publication of a controller", [&side] { side->spinOnce(); });
+      guarded("publication of a controller", [&side] { side->ros->spinOnce(); });
     }
     guarded("publication", [this, round] {
       const CycleReport report = manager_->report();

@@ -1,25 +1,40 @@
 // /robot: the arm's interface and the controller manager in one process, coupled in memory (D4.10:
 // "in a single ROS component on top of the robot HAL component, to avoid delays inherent to the IPC
-// mechanisms").
+// mechanisms"). Which arm: the parameter lwr/arm.
 #include <atomic>
 #include <chrono>
 #include <csignal>
 #include <cstdio>
 #include <exception>
 #include <memory>
+#include <stdexcept>
+#include <string>
 #include <thread>
 
 #include <ros/ros.h>
 #include <sensor_msgs/JointState.h>
 
+#include "coglab_controllers/ideal/ideal_arm_ros.hpp"
 #include "coglab_controllers/ros/manager_ros.hpp"
-#include "lwr_fri_bridge/bridge_ros.hpp"
-#include "lwr_fri_bridge/exit_limit.hpp"
-#include "lwr_fri_bridge/logger_service.hpp"
+#include "coglab_rt/arm_port.hpp"
+#include "coglab_rt/ros/exit_limit.hpp"
+#include "coglab_rt/ros/logger_service.hpp"
+#include "lwr_fri_bridge/ros/bridge_ros.hpp"
 
 namespace {
+
 volatile std::sig_atomic_t asked_to_end = 0;
 void onSignal(int) { asked_to_end = 1; }
+
+/// The back ends by name. @throws std::exception naming a parameter
+std::unique_ptr<coglab_rt::ArmPort> makeArm(const ros::NodeHandle& lwr) {
+  const auto name = lwr.param<std::string>("arm", "fri");
+  if (name == "fri") return std::make_unique<lwr_fri_bridge::BridgeRos>(lwr, true);
+  if (name == "ideal") return std::make_unique<coglab_controllers::IdealArmRos>(lwr);
+  throw std::invalid_argument("parameter " + lwr.resolveName("arm") + " = '" + name +
+                              "': expected fri or ideal");
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -28,34 +43,31 @@ int main(int argc, char** argv) {
   std::signal(SIGTERM, onSignal);
   try {
     ros::NodeHandle root;
-    lwr_fri_bridge::LoggerServices logger_services;
+    coglab_rt::LoggerServices logger_services;
     ros::NodeHandle lwr("lwr");
     std::atomic<coglab_controllers::ControlThread*> control{nullptr};
-    lwr_fri_bridge::BridgeRos::Options bridge_options;
-    bridge_options.one_process = true;
-    bridge_options.after_answer = [&control](bool answered) {
-      if (auto* thread = control.load(std::memory_order_acquire)) thread->wake(answered);
-    };
-    lwr_fri_bridge::BridgeRos bridge(lwr, bridge_options);
-    bridge.start();
+    const std::unique_ptr<coglab_rt::ArmPort> arm = makeArm(lwr);
+    arm->start([&control](bool measured) {
+      if (auto* thread = control.load(std::memory_order_acquire)) thread->wake(measured);
+    });
 
     coglab_controllers::ManagerRos::Options options;
     options.target = lwr.advertise<sensor_msgs::JointState>("target_joint_states", 10);
-    options.controller_active = [&bridge](bool active) { bridge.setControllerActive(active); };
-    options.highest_priority = bridge.priorityBelow();
-    coglab_controllers::ManagerRos manager(ros::NodeHandle("controller_manager"), bridge.port(),
+    options.controller_active = [&arm](bool active) { arm->setControllerActive(active); };
+    options.highest_priority = arm->highestPriority();
+    coglab_controllers::ManagerRos manager(ros::NodeHandle("controller_manager"), arm->mailboxes(),
                                            options);
-    // However this scope ends: the bridge brakes and leaves command mode while the control thread
-    // still runs, and the FRI thread, which wakes the control thread, ends before the manager goes.
-    const std::shared_ptr<void> ends_first(nullptr, [&bridge](void*) { bridge.shutdown(); });
+    // However this scope ends: the arm brakes while the control thread still runs, and the arm's
+    // thread, which wakes the control thread, ends before the manager goes.
+    const std::shared_ptr<void> ends_first(nullptr, [&arm](void*) { arm->shutdown(); });
     control.store(&manager.controlThread(), std::memory_order_release);
     manager.start();
     while (ros::ok() && asked_to_end == 0) {
       std::this_thread::sleep_for(std::chrono::milliseconds(20));
     }
-    bridge.shutdown();
-    lwr_fri_bridge::endProcessWithin(std::chrono::seconds(1));
-    bridge.unregister();
+    arm->shutdown();
+    coglab_rt::endProcessWithin(std::chrono::seconds(1));
+    arm->unregister();
     manager.shutdown();
     ros::shutdown();
   } catch (const std::exception& error) {

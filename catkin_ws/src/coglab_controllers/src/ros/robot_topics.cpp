@@ -2,23 +2,23 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <string>
 #include <utility>
 #include <vector>
 
-#include "lwr_fri_bridge/reason_codes.hpp"
-#include "lwr_fri_bridge/ros_time.hpp"
-#include "lwr_fri_bridge/target_command.hpp"
+#include "coglab_rt/braking.hpp"
+#include "coglab_rt/reason.hpp"
+#include "coglab_rt/ros/ros_time.hpp"
 
 namespace coglab_controllers {
 
 namespace {
 
-using lwr_fri_bridge::MotionBlock;
-using lwr_fri_bridge::Vector7;
+using coglab_rt::Vector7;
 
-const std::vector<std::string> kJoints = {"lwr_a1", "lwr_a2", "lwr_e1", "lwr_a3",
-                                          "lwr_a4", "lwr_a5", "lwr_a6"};
+const std::vector<std::string> kJoints(std::begin(coglab_rt::kJointNames),
+                                       std::end(coglab_rt::kJointNames));
 
 /// Sorts values into wire order. False if a joint is missing or a value is not finite.
 bool inWireOrder(const std::vector<std::string>& names, const std::vector<double>& values,
@@ -34,9 +34,10 @@ bool inWireOrder(const std::vector<std::string>& names, const std::vector<double
 
 }  // namespace
 
-RobotTopics::RobotTopics(const ros::NodeHandle& node, const lwr_fri_bridge::JointLimits& limits,
+RobotTopics::RobotTopics(const ros::NodeHandle& node, const coglab_rt::JointLimits& limits,
                          std::function<void()> sample_written)
     : node_(node), sample_written_(std::move(sample_written)), set_point_(limits) {
+  sample_.stop_rounding = 2.0 * coglab_rt::kWireRounding;
   target_ = node_.advertise<sensor_msgs::JointState>("target_joint_states", 5);
   target_message_.name = kJoints;
   target_message_.velocity.resize(kJoints.size());
@@ -48,10 +49,10 @@ RobotTopics::RobotTopics(const ros::NodeHandle& node, const lwr_fri_bridge::Join
 }
 
 void RobotTopics::onJoints(const sensor_msgs::JointState& joints) {
-  const std::int64_t stamp = lwr_fri_bridge::steadyTime(joints.header.stamp);
-  const std::int64_t ahead = -lwr_fri_bridge::ageOf(joints.header.stamp);
+  const std::int64_t stamp = coglab_rt::toSteady(joints.header.stamp);
+  const std::int64_t ahead = -coglab_rt::ageOf(joints.header.stamp);
   // One stamp from the future would make all that follow look old.
-  if (stamp <= last_stamp_ns_ || ahead > lwr_fri_bridge::kFutureAllowance_ns ||
+  if (stamp <= last_stamp_ns_ || ahead > coglab_rt::kFutureAllowance_ns ||
       !inWireOrder(joints.name, joints.position, sample_.position)) {
     ROS_WARN_THROTTLE(
         1.0,
@@ -68,24 +69,26 @@ void RobotTopics::onJoints(const sensor_msgs::JointState& joints) {
     sample_.cycle_time =
         sample_.cycle_time > 0.0 ? 0.98 * sample_.cycle_time + 0.02 * passed : passed;
   }
+  // The interface in the other process may be one that loses packets.
+  sample_.stop_delay = coglab_rt::lostTime(sample_.cycle_time);
   last_stamp_ns_ = stamp;
   ++sample_.sequence;
   sample_.stamp_ns = stamp;
   sample_.controller_ns = stamp;  // the topic carries no counter
-  lwr_fri_bridge::VelocityCommand sent;
+  VelocityCommand sent;
   sent_.read(sent);
   const bool follows = sample_.block == MotionBlock::None;
   set_point_.step(follows ? sent.velocity : Vector7(Vector7::Zero()), std::min(passed, 0.1));
   sample_.commanded_velocity = set_point_.velocity();
   sample_.commanded_acceleration = set_point_.acceleration();
   sample_.commanded_position = sample_.position;
-  port_.publishSample(sample_);
+  mailboxes_.publishSample(sample_);
   sample_written_();
 }
 
 void RobotTopics::onState(const coglab_msgs::LwrState& state) {
-  sample_.block = state.motion_allowed ? MotionBlock::None
-                                       : lwr_fri_bridge::motionBlockOf(state.reason_code);
+  sample_.block =
+      state.motion_allowed ? MotionBlock::None : coglab_rt::motionBlockOf(state.reason_code);
   sample_.motion_epoch = state.motion_epoch;
 }
 
@@ -96,16 +99,16 @@ void RobotTopics::onTorques(const sensor_msgs::JointState& torques) {
 void RobotTopics::onWrench(const geometry_msgs::WrenchStamped& wrench) {
   const auto& f = wrench.wrench.force;
   const auto& t = wrench.wrench.torque;
-  lwr_fri_bridge::Vector6 values;
+  coglab_rt::Vector6 values;
   values << f.x, f.y, f.z, t.x, t.y, t.z;
   if (values.allFinite()) sample_.tool_wrench = values;
 }
 
-void RobotTopics::send(const lwr_fri_bridge::VelocityCommand& command) {
+void RobotTopics::send(const VelocityCommand& command) {
   sent_.write(command);
   // Age and permission of the joint state that the velocity was computed from: a message that was
   // late, or made before a hold, is known by them.
-  target_message_.header.stamp = lwr_fri_bridge::rosTime(command.stamp_ns);
+  target_message_.header.stamp = coglab_rt::toRos(command.stamp_ns);
   target_message_.header.frame_id = std::to_string(command.motion_epoch);
   for (int joint = 0; joint < 7; ++joint) {
     target_message_.velocity[static_cast<std::size_t>(joint)] = command.velocity[joint];

@@ -1,4 +1,5 @@
 #include "coglab_controllers/ros/ros_parameters.hpp"
+#include "coglab_rt/joint_limits_table.hpp"
 
 #include <filesystem>
 #include <fstream>
@@ -79,12 +80,11 @@ YAML::Node readParameters(const ros::NodeHandle& node) {
                                                             : YAML::Node(YAML::NodeType::Map);
 }
 
-lwr_fri_bridge::JointLimits readJointLimits(const ros::NodeHandle& node) {
+coglab_rt::JointLimits readJointLimits(const ros::NodeHandle& node) {
   const Parameters parameters(readParameters(node), "controller_manager");
   const std::string table = parameters.text(
       "joint_limits_file", ros::package::getPath("lwr_description") + "/config/joint_limits.yaml");
-  return lwr_fri_bridge::loadJointLimits(table,
-                                         parameters.text("joint_limits_profile", "default"));
+  return coglab_rt::loadJointLimits(table, parameters.text("joint_limits_profile", "default"));
 }
 
 ManagerSettings readManagerSettings(const ros::NodeHandle& node) {

@@ -8,6 +8,7 @@ namespace coglab_controllers {
 
 bool TfGoalSource::lookup(const std::string& reference, const std::string& frame,
                           GoalObservation& observation, std::string& why) {
+  const std::uint32_t steps = listener_.clockSteps();  // before the buffer is read
   geometry_msgs::TransformStamped transform;
   try {
     transform = buffer_.lookupTransform(reference, frame, ros::Time(0));
@@ -19,9 +20,11 @@ bool TfGoalSource::lookup(const std::string& reference, const std::string& frame
   const auto& q = transform.transform.rotation;
   observation.position = Vector3(t.x, t.y, t.z);
   observation.orientation = Quaternion(q.w, q.x, q.y, q.z);
-  observation.frame_ns = nanoseconds(transform.header.stamp);
-  observation.stamp_ns =
-      observation.frame_ns == 0 ? steady_() : toSteady(transform.header.stamp, steady_());
+  observation.clock_steps = steps;
+  observation.frame_ns = coglab_rt::nanoseconds(transform.header.stamp);
+  observation.stamp_ns = observation.frame_ns == 0
+                             ? steady_()
+                             : coglab_rt::toSteady(transform.header.stamp, steady_());
   return true;
 }
 

@@ -3,8 +3,8 @@
 #include <cmath>
 #include <exception>
 
-#include "coglab_controllers/plugins/goal_source.hpp"
-#include "coglab_controllers/ros/ros_clocks.hpp"
+#include "coglab_controllers/goal/goal_source.hpp"
+#include "coglab_rt/ros/ros_time.hpp"
 
 namespace coglab_controllers {
 
@@ -77,7 +77,7 @@ bool TfListener::acceptable(const geometry_msgs::TransformStamped& transform,
   }
   if (is_static) return true;  // valid at any time: nobody reads its stamp
   const std::int64_t ahead =
-      nanoseconds(transform.header.stamp) - nanoseconds(ros::Time::now());
+      coglab_rt::nanoseconds(transform.header.stamp) - coglab_rt::nanoseconds(ros::Time::now());
   const bool future = ahead > kClockTolerance_ns;
   {
     const std::lock_guard<std::mutex> lock(mutex_);
@@ -106,12 +106,13 @@ double TfListener::ahead(const std::string& frame) const {
 
 void TfListener::clearAfterAStepBack() {
   // Everything in the buffer is from the future now.
-  const std::int64_t now = nanoseconds(ros::Time::now());
+  const std::int64_t now = coglab_rt::nanoseconds(ros::Time::now());
   const std::lock_guard<std::mutex> lock(mutex_);
   if (now < last_now_ns_ - kClockTolerance_ns) {
     ROS_WARN("this computer's clock went back by %.3f s: transforms are forgotten",
              1e-9 * static_cast<double>(last_now_ns_ - now));
     buffer_.clear();
+    clock_steps_.fetch_add(1, std::memory_order_relaxed);
   }
   last_now_ns_ = now;
 }

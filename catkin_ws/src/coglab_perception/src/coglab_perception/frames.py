@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
-from pathlib import Path
 from typing import Any
 
-import yaml
+from coglab_py.yaml_file import YamlError, read
 
 
 class FramesError(ValueError):
@@ -65,9 +64,6 @@ class FrameNames:
     def load(path: str) -> FrameNames:
         """From a YAML file. FramesError names file and line."""
         try:
-            data = yaml.safe_load(Path(path).read_text(encoding="utf-8"))
-        except OSError as error:
-            raise FramesError(f"{path}: cannot be read ({error.strerror})") from None
-        except yaml.YAMLError as error:
-            raise FramesError(f"{path}: not YAML: {error}") from None
-        return FrameNames.from_mapping(data, path)
+            return FrameNames.from_mapping(read(path).value, path)
+        except YamlError as error:
+            raise FramesError(str(error)) from None

@@ -71,7 +71,7 @@ class LeftRightHmm:
                 raise ValueError(f"sequence {i} has shape {s.shape}; expected at least {states} finite frames")
         parts = [np.concatenate([s[len(s) * k // states:len(s) * (k + 1) // states] for s in data])
                  for k in range(states)]
-        length = np.mean([len(s) for s in data]) / states
+        length = float(np.mean([len(s) for s in data])) / states
         model = LeftRightHmm(np.full(states, 1.0 - 1.0 / max(length, 1.5)), np.array([p.mean(axis=0) for p in parts]),
                              np.array([p.var(axis=0) + VARIANCE_FLOOR for p in parts]))
         last = -np.inf

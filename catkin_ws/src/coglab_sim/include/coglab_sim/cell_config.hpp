@@ -42,7 +42,7 @@ using ParameterValue = std::variant<bool, int, double, std::string, std::vector<
 struct CellParameter {
   std::string name;  ///< such as "krc/quality_ok"
   std::string unit;
-  std::string source;  ///< "published" (fri.md names where), "ours" or "set-up"
+  std::string source;  ///< "published", "ours" or "set-up"
   std::string description;
   double low = 0.0, high = 0.0;  ///< range of numbers, also of each one in a list; equal: no number
   std::function<ParameterValue(const CellConfig&)> get;

@@ -6,12 +6,12 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 
-#include "lwr_fri_bridge/control_port.hpp"
+#include "coglab_rt/robot_sample.hpp"
 
 namespace coglab_sim {
 
-using lwr_fri_bridge::Vector6;  ///< Fx Fy Fz Tx Ty Tz, or vx vy vz wx wy wz
-using lwr_fri_bridge::Vector7;  ///< joints in wire order A1 A2 E1 A3 A4 A5 A6
+using coglab_rt::Vector6;  ///< Fx Fy Fz Tx Ty Tz, or vx vy vz wx wy wz
+using coglab_rt::Vector7;  ///< joints in wire order A1 A2 E1 A3 A4 A5 A6
 using Matrix7 = Eigen::Matrix<double, 7, 7>;
 using Matrix67 = Eigen::Matrix<double, 6, 7>;
 using Eigen::Matrix3d;

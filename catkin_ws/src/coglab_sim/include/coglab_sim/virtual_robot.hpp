@@ -16,8 +16,8 @@
 #include "coglab_controllers/plugins/dmp_controller.hpp"
 #include "coglab_controllers/plugins/ptp_controller.hpp"
 #include "coglab_sim/cell.hpp"
-#include "ctrl_more/logger.hpp"
-#include "lwr_fri_bridge/bridge.hpp"
+#include "ctrl_more/log/logger.hpp"
+#include "lwr_fri_bridge/bridge/bridge.hpp"
 
 namespace coglab_sim {
 

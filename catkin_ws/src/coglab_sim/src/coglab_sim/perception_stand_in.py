@@ -12,8 +12,8 @@ from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
-
-from .rigid import Frame, quat_from_rotvec, quat_multiply
+from coglab_py.pose import Pose
+from scipy.spatial.transform import Rotation
 
 
 @dataclass(frozen=True)
@@ -61,7 +61,7 @@ class Sight:
 
     name: str
     captured: float
-    frame: Frame
+    frame: Pose
 
 
 class Tracker:
@@ -81,7 +81,7 @@ class Tracker:
         self._count = 0
         self.newest: Sight | None = None
 
-    def step(self, now: float, truth: Frame, robot_hand: Frame | None = None) -> list[Sight]:
+    def step(self, now: float, truth: Pose, robot_hand: Pose | None = None) -> list[Sight]:
         """At time ``now`` (s): capture if it is time, deliver what has arrived."""
         if now >= self._next:
             s = self.settings
@@ -97,7 +97,7 @@ class Tracker:
                 delivered.append(sight)
         return delivered
 
-    def _capture(self, now: float, truth: Frame, robot_hand: Frame | None) -> None:
+    def _capture(self, now: float, truth: Pose, robot_hand: Pose | None) -> None:
         s = self.settings
         if s.perfect:
             self._push(now, Sight(self.name, now, truth))
@@ -108,9 +108,9 @@ class Tracker:
             self._lost = self.rng.random() < s.dropout_start
         hidden = (s.occlusion_distance > 0.0 and robot_hand is not None and self.rng.random() < 0.5
                   and np.linalg.norm(robot_hand.position - truth.position) < s.occlusion_distance)
-        seen = Frame(truth.position + self._noise_step(now)[:3], truth.orientation)
-        turned = quat_multiply(quat_from_rotvec(self._noise[3:]), truth.orientation)
-        seen = Frame(seen.position + self._swapped(), turned / np.linalg.norm(turned))
+        noise = self._noise_step(now)
+        turned = Rotation.from_rotvec(noise[3:]) * truth.rotation
+        seen = Pose(truth.position + noise[:3] + self._swapped(), turned.as_quat())
         if not self._lost and not hidden:
             delay = max(0.0, s.latency + float(self.rng.normal(0, s.latency_sigma)))
             self._push(now + delay, Sight(self.name, now, seen))
@@ -145,7 +145,7 @@ class Tracker:
 class Board:
     """The storage board: its frame in world and the places on it (object positions in the board frame, m)."""
 
-    frame: Frame
+    frame: Pose
     slots: dict[str, np.ndarray]
 
     def free(self, occupied: list[np.ndarray], clearance: float = 0.10) -> list[str]:

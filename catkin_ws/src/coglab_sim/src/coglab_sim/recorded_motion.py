@@ -18,8 +18,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-
-from .rigid import IDENTITY, Frame, quat_from_rotvec, quat_multiply, quat_rotate
+from coglab_py.pose import IDENTITY, Pose, about_z
+from scipy.spatial.transform import Rotation
 
 MOST_SAMPLES = 1_000_000
 """Samples that are read of one file; a day at 10 Hz."""
@@ -37,7 +37,7 @@ class Track:
     positions: np.ndarray
     orientations: np.ndarray
 
-    def at(self, t: float) -> Frame:
+    def at(self, t: float) -> Pose:
         """The frame at time t (s of the recording), interpolated; the ends are held."""
         t = min(max(t, float(self.stamps[0])), float(self.stamps[-1]))
         i = min(max(int(np.searchsorted(self.stamps, t, side="right")) - 1, 0),
@@ -46,9 +46,9 @@ class Track:
         span = float(self.stamps[j] - self.stamps[i])
         share = (t - float(self.stamps[i])) / span if span > 0.0 else 0.0
         position = (1.0 - share) * self.positions[i] + share * self.positions[j]
-        a, b = self.orientations[i], self.orientations[j]
-        turned = (1.0 - share) * a + share * (b if float(a @ b) >= 0.0 else -b)
-        return Frame(position, turned / np.linalg.norm(turned))
+        a, b = Rotation.from_quat(self.orientations[i]), Rotation.from_quat(self.orientations[j])
+        turned = a * Rotation.from_rotvec(share * (a.inv() * b).as_rotvec())
+        return Pose(position, turned.as_quat())
 
 
 @dataclass(frozen=True)
@@ -245,11 +245,10 @@ class Playback:
         self.recording = Recording({settings.rename.get(name, name): track
                                     for name, track in recording.tracks.items()})
         self.first = next(iter(self.recording.tracks))
-        self._turn = quat_from_rotvec([0.0, 0.0, np.radians(settings.turn_deg)])
-        self._shift = np.zeros(3)
+        self._world = Pose(orientation=about_z(np.radians(settings.turn_deg)))
         if settings.end_at is not None:
             end = self._placed(self.recording.tracks[self.first].at(np.inf)).position
-            self._shift = np.array(settings.end_at, dtype=float) - end
+            self._world = Pose(np.array(settings.end_at, dtype=float) - end, self._world.orientation)
         self._playhead = 0.0
         self._then: float | None = None
         self._waited = 0.0
@@ -275,7 +274,7 @@ class Playback:
         """The frames that are played."""
         return self.recording.tracks.keys()
 
-    def frames(self, now: float, robot: Frame | None = None) -> dict[str, Frame]:
+    def frames(self, now: float, robot: Pose | None = None) -> dict[str, Pose]:
         """The frames at time `now` (s, any origin, not decreasing); `robot` is the robot's hand."""
         dt = max(0.0, now - self._then) if self._then is not None else 0.0
         self._then = now
@@ -290,7 +289,7 @@ class Playback:
         return {name: self._placed(track.at(self._playhead))
                 for name, track in self.recording.tracks.items()}
 
-    def _advance(self, dt: float, robot: Frame | None) -> None:
+    def _advance(self, dt: float, robot: Pose | None) -> None:
         s = self.settings
         ahead = self._playhead + dt / s.time_scale
         if s.wait_at is not None and self._playhead <= s.wait_at < ahead and not self._met(robot):
@@ -299,17 +298,15 @@ class Playback:
                 ahead = s.wait_at
         self._playhead = ahead
 
-    def _met(self, robot: Frame | None) -> bool:
+    def _met(self, robot: Pose | None) -> bool:
         if robot is None:
             return False
         hand = self._placed(self.recording.tracks[self.first].at(self._playhead))
         return float(np.linalg.norm(hand.position - robot.position)) <= self.settings.wait_distance
 
-    def _placed(self, frame: Frame) -> Frame:
+    def _placed(self, frame: Pose) -> Pose:
         position, q = frame.position, frame.orientation
         if self.settings.mirror:
             position = position * np.array([1.0, -1.0, 1.0])
             q = q * np.array([-1.0, 1.0, -1.0, 1.0])
-        turned = quat_multiply(self._turn, q)
-        return Frame(quat_rotate(self._turn, position) + self._shift,
-                     turned / np.linalg.norm(turned))
+        return self._world * Pose(position, q)

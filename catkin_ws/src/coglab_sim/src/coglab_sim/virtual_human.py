@@ -9,13 +9,13 @@ from __future__ import annotations
 from collections import deque
 
 import numpy as np
+from coglab_py.pose import Pose
 
 from .giving import Giving
 from .involuntary import involuntary
 from .participant import Participant
 from .reach import CorrectedReach, Reach, duration_for
 from .receiving import Receiving
-from .rigid import IDENTITY, Frame
 from .scene import HandSample, Scene, WorldView
 
 NEAR = 0.16
@@ -78,7 +78,7 @@ class VirtualHuman(Giving, Receiving):
         if self._pending is not None:
             self._take_up(t)
         getattr(self, f"_{self.phase}")(t, dt, view)
-        shown = Frame(self._hand + involuntary(self.participant, self._noise_phase, t), np.array(IDENTITY))
+        shown = Pose(self._hand + involuntary(self.participant, self._noise_phase, t))
         return HandSample(shown, self._velocity.copy(), self._grip, self.participant.grip_force, self.phase)
 
     # -- what to do ---------------------------------------------------------------------------------------------
@@ -93,7 +93,7 @@ class VirtualHuman(Giving, Receiving):
             return
         if (task == "give") != self.holds() or self.participant.behaviour == "absent":
             return
-        self._task = task
+        self._task = task or ""
         self.trial += 1
         self._interrupted = False
         p = self.participant

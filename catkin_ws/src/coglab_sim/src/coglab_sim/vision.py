@@ -12,10 +12,11 @@ import time
 from collections.abc import Callable, Mapping
 
 import numpy as np
+from coglab_msgs.msg import ReasonCode
 from coglab_perception.frames import FrameNames
+from coglab_py.pose import Pose
 
 from .perception_stand_in import Board, PerceptionSettings, Sight, Tracker
-from .rigid import Frame
 
 OLDEST = 0.5
 """s: an older sight is no answer to locate_object, and an older world is not visible."""
@@ -28,7 +29,11 @@ IN_HAND = 0.20
 
 
 class NotSeen(Exception):
-    """Perception cannot answer; the text is the sentence for who asked."""
+    """Perception cannot answer; the text is the sentence for who asked, `code` its ReasonCode."""
+
+    def __init__(self, sentence: str, code: int) -> None:
+        super().__init__(sentence)
+        self.code = code
 
 
 class PartnerChoice:
@@ -45,7 +50,7 @@ class PartnerChoice:
         self.margin = margin
         self._chosen = ""
 
-    def choose(self, hands: Mapping[str, Frame], robot: Frame | None) -> str:
+    def choose(self, hands: Mapping[str, Pose], robot: Pose | None) -> str:
         """Name of the partner's hand, empty if none can be told."""
         if len(hands) <= 1:
             self._chosen = next(iter(hands), "")
@@ -86,8 +91,8 @@ class Vision:
 
     # -- seeing ----------------------------------------------------------------------------------
 
-    def see(self, hands: Mapping[str, Frame], objects: Mapping[str, Frame],
-            robot: Frame | None = None) -> list[Sight]:
+    def see(self, hands: Mapping[str, Pose], objects: Mapping[str, Pose],
+            robot: Pose | None = None) -> list[Sight]:
         """The world as it is now: hands of people by any name, objects by frame name.
 
         Returns the sights that are to be broadcast: the partner's hand and the objects.
@@ -106,7 +111,7 @@ class Vision:
             self._changed.notify_all()
         return sights
 
-    def _track(self, name: str, now: float, frame: Frame, robot: Frame | None) -> list[Sight]:
+    def _track(self, name: str, now: float, frame: Pose, robot: Pose | None) -> list[Sight]:
         if name not in self._trackers:
             self._trackers[name] = Tracker(name, self.settings, self.seed)
         sights = self._trackers[name].step(now, frame, robot)
@@ -123,7 +128,7 @@ class Vision:
             if self._changed.wait_for(self._world_is_visible, limit):
                 return "tracker stand-in sees the cell"
         raise NotSeen(f"the cell was not visible within {limit:.1f} s; is the simulated cell, or "
-                      "the recording, running?")
+                      "the recording, running?", ReasonCode.NOT_PERCEIVED)
 
     def locate(self, target: str, timeout: float) -> tuple[str, Sight, float]:
         """Newest fresh sight of an object (by id), of the partner's hand or of the board.
@@ -138,7 +143,10 @@ class Vision:
             found = self._changed.wait_for(lambda: self._is_fresh(name) and not self._doubt(name),
                                            limit)
             if not found:
-                raise NotSeen(self._doubt(name) or self._absence(name, limit))
+                doubt = self._doubt(name)
+                if doubt:
+                    raise NotSeen(doubt, ReasonCode.NOT_PERCEIVED)
+                raise NotSeen(self._absence(name, limit), ReasonCode.OBJECT_NOT_SEEN)
             sight = self._trackers[name].newest
             assert sight is not None
             return name, sight, max(0.0, self.clock() - sight.captured)
@@ -153,14 +161,14 @@ class Vision:
         with self._changed:
             if not self._changed.wait_for(self._world_is_visible, limit):
                 raise NotSeen(f"the board was not visible within {limit:.1f} s; is the simulated "
-                              "cell, or the recording, running?")
+                              "cell, or the recording, running?", ReasonCode.NOT_PERCEIVED)
             objects = {name: tracker.newest.frame.position
                        for name, tracker in self._trackers.items()
                        if tracker.newest is not None and name not in (self.names.human_hand, own)}
         free = self.board.free(list(objects.values()))
         if not free:
             raise NotSeen(f"no place on the board is free: {', '.join(sorted(objects))} lie near "
-                          f"{', '.join(self.board.slots)}; clear one")
+                          f"{', '.join(self.board.slots)}; clear one", ReasonCode.NO_FREE_PLACE)
         return [(name, self.board.slots[name]) for name in free]
 
     # -- judging ---------------------------------------------------------------------------------

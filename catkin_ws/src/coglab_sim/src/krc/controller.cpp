@@ -3,6 +3,8 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "coglab_sim/ranges.hpp"
+
 namespace coglab_sim::krc {
 
 namespace fri = lwr_fri_bridge::fri;
@@ -11,28 +13,26 @@ using fri::FriState;
 
 namespace {
 
-void requireRange(const char* name, double value, double low, double high) {
-  if (value >= low && value <= high) return;
-  throw std::invalid_argument(std::string("parameter ") + name + " is " + std::to_string(value) +
-                              ", expected " + std::to_string(low) + " .. " + std::to_string(high));
-}
-
 const Parameters& checked(const Parameters& p) {
-  requireRange("period", p.period, kShortestPeriod, kLongestPeriod);
-  requireRange("quality_perfect", p.quality_perfect, p.quality_ok, 1.0);
-  requireRange("quality_ok", p.quality_ok, p.quality_bad, 1.0);
-  requireRange("quality_bad", p.quality_bad, 0.0, 1.0);
-  requireRange("entry_quality", p.entry_quality, 1, 3);
-  requireRange("extrapolated_packets", p.extrapolated_packets, 0, 100);
-  requireRange("speed_margin", p.speed_margin, 0.0, 1.0);
-  requireRange("krl_poll", p.krl_poll, 0.001, 10.0);
-  requireRange("krl_drive_wait", p.krl_drive_wait, 0.0, 600.0);
-  requireRange("krl_quality_wait", p.krl_quality_wait, 0.0, 600.0);
-  requireRange("frame_speed_limit", p.frame_speed_limit, 0.0, 100.0);
-  requireRange("frame_turn_limit", p.frame_turn_limit, 0.0, 100.0);
-  requireRange("frame_orthonormality", p.frame_orthonormality, 1e-6, 0.1);
-  requireRange("close_linger", p.close_linger, 0.0, 600.0);
-  requireRange("drive_heating_time", p.drive_heating_time, 1.0, 1e6);
+  requireWithin("krc/period", p.period);
+  requireWithin("krc/quality_perfect", p.quality_perfect);
+  requireWithin("krc/quality_ok", p.quality_ok);
+  requireWithin("krc/quality_bad", p.quality_bad);
+  requireWithin("krc/entry_quality", p.entry_quality);
+  requireWithin("krc/extrapolated_packets", p.extrapolated_packets);
+  requireWithin("krc/speed_margin", p.speed_margin);
+  requireWithin("krc/krl_poll", p.krl_poll);
+  requireWithin("krc/krl_drive_wait", p.krl_drive_wait);
+  requireWithin("krc/krl_quality_wait", p.krl_quality_wait);
+  requireWithin("krc/frame_speed_limit", p.frame_speed_limit);
+  requireWithin("krc/frame_turn_limit", p.frame_turn_limit);
+  requireWithin("krc/frame_orthonormality", p.frame_orthonormality);
+  requireWithin("krc/close_linger", p.close_linger);
+  requireWithin("krc/drive_heating_time", p.drive_heating_time);
+  if (!(p.quality_bad <= p.quality_ok && p.quality_ok <= p.quality_perfect)) {
+    throw std::invalid_argument(
+        "parameters krc/quality_bad, krc/quality_ok, krc/quality_perfect: expected rising values");
+  }
   return p;
 }
 
@@ -333,7 +333,7 @@ void Controller::acknowledge() {
 }
 
 void Controller::restartProgram(double period, double pause) {
-  requireRange("period", period, kShortestPeriod, kLongestPeriod);
+  requireWithin("krc/period", period);
   if (!(pause >= 0.0)) throw std::invalid_argument("pause must not be negative");
   friClose();
   lingers_until_ = time_;  // the program was cancelled and did not run to its end

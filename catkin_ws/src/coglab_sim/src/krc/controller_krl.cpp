@@ -3,6 +3,8 @@
 
 #include "coglab_sim/krc/controller.hpp"
 
+#include "coglab_sim/ranges.hpp"
+
 namespace coglab_sim::krc {
 
 namespace fri = lwr_fri_bridge::fri;
@@ -34,7 +36,7 @@ bool Controller::setKrlStrategy(int strategy) {
 void Controller::friOpen(double period) {
   if (state_ != FriState::Off) return;
   if (period > 0.0) {
-    if (!(period >= kShortestPeriod && period <= kLongestPeriod)) {
+    if (!rangeOf("krc/period").holds(period)) {
       show("friOpen: period " + std::to_string(period) + " s is not in 0.001 .. 0.1");
       return;
     }

@@ -1,4 +1,5 @@
-"""High-level cognitive controller of CogLab: state machines, object database, contact detection.
+"""High-level cognitive controller of CogLab: state machines and contact detection.
 
-The core (everything but the modules ``ros_*`` and the scripts) imports no ROS client library: states talk to ports.
+Packages from the bottom up, each of which imports only those before it: clocks, kinematics, ports, contact, context,
+states, machines, simulated, ros. None but ros imports a ROS client library: states talk to ports.
 """

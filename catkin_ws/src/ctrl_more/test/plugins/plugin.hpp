@@ -1,6 +1,6 @@
 #pragma once
 
-#include "ctrl_more/prototypes.hpp"
+#include "ctrl_more/feedback_controller.hpp"
 
 namespace ctrl_more_test {
 

@@ -120,3 +120,17 @@ def wait_for(condition, limit=10.0):
             return True
         time.sleep(0.002)
     return bool(condition())
+
+
+def concurrence(
+    outcomes=("done", "failed", "preempted"), default="failed", children=None, **kwargs
+):
+    """A Concurrence of these children."""
+    result = smach.Concurrence(outcomes=list(outcomes), default_outcome=default, **kwargs)
+    with result:
+        for label, state in (children or {}).items():
+            smach.Concurrence.add(label, state)
+    return result
+
+
+ALL_DONE = {"done": {"A": "done", "B": "done"}}

@@ -324,81 +324,45 @@ def watch() -> dict[str, Any]:
     }
 
 
+def row(
+    figure: str, value: float, unit: str, goal: str, ok: bool, peer=None, peer_value=None
+) -> dict:
+    """One row of the bench table."""
+    return {"bench": "smach", "figure": figure, "value": round(value, 3), "unit": unit, "goal": goal, "peer": peer,
+            "peer_value": peer_value and round(peer_value, 3), "ok": ok}  # fmt: skip
+
+
+def wire_rows() -> list[dict]:
+    """What arrives at a viewer, and what watching costs."""
+    wire = introspection_figures()
+    logged, log_alone, logged_extra = wire["logged"]
+    where = f"{CONTAINERS} nested containers, {RUN_SECONDS:.0f} s"
+    beats = f"heartbeats and structures that arrive, of {wire['beats_sent']:.0f}; {where}"
+    moves = f"statuses at start, transition and end that arrive, of {wire['moves_sent']:.0f}; {where}"
+    return [
+        row(beats, wire["beats"], "%", ">= 100", wire["beats"] >= 100.0),
+        row(moves, wire["moves"], "%", ">= 100", wire["moves"] >= 100.0),
+        row("processor time of an idle machine with one viewer", wire["idle"], "% of a core", "<= 2",
+            wire["idle"] <= 2.0),
+        row("extra threads with one viewer", wire["extra"], "threads", "<= 4", wire["extra"] <= 4),
+        row("a transition in a node, which logs it through rospy.loginfo", logged, "us", "<= peer + 50",
+            logged_extra <= 50.0, "one rospy.loginfo", log_alone),
+    ]  # fmt: skip
+
+
 def main() -> None:
     if "--node" in sys.argv:
         node_main()
         return
     transition, bare = transition_cost()
     lost, left = preempt_campaign()
-    wire = introspection_figures()
-    logged, log_alone, logged_extra = wire["logged"]
-
-    def row(
-        figure: str, value: float, unit: str, goal: str, ok: bool, peer=None, peer_value=None
-    ) -> dict:
-        return {
-            "bench": "smach",
-            "figure": figure,
-            "value": round(value, 3),
-            "unit": unit,
-            "goal": goal,
-            "peer": peer,
-            "peer_value": peer_value and round(peer_value, 3),
-            "ok": ok,
-        }
-
-    where = f"{CONTAINERS} nested containers, {RUN_SECONDS:.0f} s"
     rows = [
-        row(
-            f"heartbeats and structures that arrive, of {wire['beats_sent']:.0f}; {where}",
-            wire["beats"],
-            "%",
-            ">= 100",
-            wire["beats"] >= 100.0,
-        ),
-        row(
-            f"statuses at start, transition and end that arrive, of {wire['moves_sent']:.0f}; "
-            f"{where}",
-            wire["moves"],
-            "%",
-            ">= 100",
-            wire["moves"] >= 100.0,
-        ),
-        row(
-            "processor time of an idle machine with one viewer",
-            wire["idle"],
-            "% of a core",
-            "<= 2",
-            wire["idle"] <= 2.0,
-        ),
-        row("extra threads with one viewer", wire["extra"], "threads", "<= 4", wire["extra"] <= 4),
-        row(
-            "a transition",
-            transition,
-            "us",
-            "<= 50",
-            transition <= 50.0,
-            "bare loop over the same states",
-            bare,
-        ),
-        row(
-            "a transition in a node, which logs it through rospy.loginfo",
-            logged,
-            "us",
-            "<= peer + 50",
-            logged_extra <= 50.0,
-            "one rospy.loginfo",
-            log_alone,
-        ),
-        row(
-            f"preempts lost, of {PREEMPTS} at random moments of nested concurrent machines",
-            lost,
-            "preempts",
-            "<= 0",
-            lost == 0,
-        ),
+        *wire_rows(),
+        row("a transition", transition, "us", "<= 50", transition <= 50.0, "bare loop over the same states", bare),
+        row(f"preempts lost, of {PREEMPTS} at random moments of nested concurrent machines", lost, "preempts", "<= 0",
+            lost == 0),
         row(f"preempt flags left over after {PREEMPTS} preempts", left, "flags", "<= 0", left == 0),
-    ]
+    ]  # fmt: skip
     print(json.dumps(rows, indent=1))
 
 

@@ -149,7 +149,10 @@ class SpeedTask(Task):
             driver.move_motor(motor, self.speed, self.close)
 
     def _judge(self, motors: Sequence[MotorReading], elapsed: float) -> Verdict:
-        at_end, met, moving, lost = [], [], [], []
+        at_end: list[int] = []
+        met: list[int] = []
+        moving: list[int] = []
+        lost: list[int] = []
         for motor in motors:
             number = motor.motor
             if number not in self.motors:
@@ -268,7 +271,8 @@ class GraspTask(Task):
             self._started = True
         if not self._started:
             return self._not_started(closing, elapsed)
-        met, moving = [], []
+        met: list[int] = []
+        moving: list[int] = []
         for motor in closing:
             number = motor.motor
             if motor.fully_closed:

@@ -80,6 +80,7 @@ class SerialTransport:
 
     def _write_some(self, data: bytes) -> int:
         """Number of bytes that the line took, maybe after a wait."""
+        assert self._fd is not None
         try:
             return os.write(self._fd, data)
         except BlockingIOError:
@@ -107,6 +108,7 @@ class SerialTransport:
         return data
 
     def _read_rest(self, data: bytes, count: int, timeout: float) -> bytes:
+        assert self._fd is not None
         end = time.monotonic() + timeout
         more = data
         while more and len(data) < count:

@@ -102,32 +102,43 @@ Verdict Session::checkOrder(const MeasurementDatagram& candidate, Reception& rec
                                                                              : Verdict::Accepted;
 }
 
-Reception Session::receive(const std::uint8_t* bytes, std::size_t size,
-                           MeasurementDatagram& measurement) {
-  Reception reception;
-  MeasurementDatagram candidate;
+Verdict Session::checkForm(const std::uint8_t* bytes, std::size_t size,
+                           MeasurementDatagram& candidate) {
+  Verdict verdict = Verdict::Accepted;
   if (!decode(bytes, size, candidate)) {
-    reception.verdict = Verdict::WrongSize;
     ++counters_.wrong_size;
-    return reception;
+    return Verdict::WrongSize;
   }
   const Header& header = candidate.header;
   const bool zeros = lenient_ && header.size == 0 && header.id == 0;
   if (!zeros && header.id != kMeasurementId) {
-    reception.verdict = Verdict::WrongId;
+    verdict = Verdict::WrongId;
     ++counters_.wrong_id;
-    return reception;
-  }
-  if (!zeros && header.size != kMeasurementSize) {
-    reception.verdict = Verdict::WrongSize;
+  } else if (!zeros && header.size != kMeasurementSize) {
+    verdict = Verdict::WrongSize;
     ++counters_.wrong_size;
-    return reception;
-  }
-  if (!plausible(candidate)) {
-    reception.verdict = Verdict::Implausible;
+  } else if (!plausible(candidate)) {
+    verdict = Verdict::Implausible;
     ++counters_.implausible;
-    return reception;
   }
+  return verdict;
+}
+
+/// Datagrams that do not fit to what came before, but to each other: the controller began anew.
+bool Session::provesRestart(const MeasurementDatagram& candidate) {
+  const bool successive = static_cast<std::uint16_t>(suspect_ + 1) == candidate.header.counter;
+  suspects_in_a_row_ = successive && suspects_in_a_row_ > 0 ? suspects_in_a_row_ + 1 : 1;
+  suspect_ = candidate.header.counter;
+  return suspects_in_a_row_ >= kProofOfRestart &&
+         suspects_in_a_row_ * cycleTimeOf(candidate) >= kProofTime;
+}
+
+Reception Session::receive(const std::uint8_t* bytes, std::size_t size,
+                           MeasurementDatagram& measurement) {
+  Reception reception;
+  MeasurementDatagram candidate;
+  reception.verdict = checkForm(bytes, size, candidate);
+  if (reception.verdict != Verdict::Accepted) return reception;
 
   reception.verdict = connected_ ? checkOrder(candidate, reception) : Verdict::Accepted;
   reception.fresh_session = !connected_;
@@ -136,12 +147,7 @@ Reception Session::receive(const std::uint8_t* bytes, std::size_t size,
     return reception;
   }
   if (reception.verdict != Verdict::Accepted) {
-    // Datagrams that do not fit to what came before, but to each other: the controller began anew.
-    const bool successive = static_cast<std::uint16_t>(suspect_ + 1) == header.counter;
-    suspects_in_a_row_ = successive && suspects_in_a_row_ > 0 ? suspects_in_a_row_ + 1 : 1;
-    suspect_ = header.counter;
-    if (suspects_in_a_row_ < kProofOfRestart ||
-        suspects_in_a_row_ * cycleTimeOf(candidate) < kProofTime) {
+    if (!provesRestart(candidate)) {
       ++(reception.verdict == Verdict::Implausible ? counters_.implausible
                                                    : counters_.out_of_order);
       return reception;
@@ -151,7 +157,12 @@ Reception Session::receive(const std::uint8_t* bytes, std::size_t size,
     reception.verdict = Verdict::Accepted;
     reception.fresh_session = true;
   }
+  accept(candidate, reception);
+  measurement = candidate;
+  return reception;
+}
 
+void Session::accept(const MeasurementDatagram& candidate, const Reception& reception) {
   suspects_in_a_row_ = 0;
   if (reception.fresh_session) {
     answered_ = false;
@@ -162,13 +173,11 @@ Reception Session::receive(const std::uint8_t* bytes, std::size_t size,
   }
   ++counters_.accepted;
   connected_ = true;
-  received_ = header.counter;
+  received_ = candidate.header.counter;
   setPointOf(candidate, set_point_);
   std::copy(std::begin(candidate.measured_position), std::end(candidate.measured_position),
             measured_);
   period_ = cycleTimeOf(candidate);
-  measurement = candidate;
-  return reception;
 }
 
 Header Session::nextHeader() {

@@ -14,7 +14,7 @@ constexpr int kMaxJoints = 7;
 using Vector3 = Eigen::Vector3d;
 using Matrix3 = Eigen::Matrix3d;
 using Quaternion = Eigen::Quaterniond;
-/// rad or rad/s; the same type as lwr_fri_bridge::Vector7.
+/// rad or rad/s; the same type as coglab_rt::Vector7.
 using JointVector = Eigen::Matrix<double, kMaxJoints, 1>;
 /// One column per joint; columns beyond the chain's joints are zero.
 using Matrix37 = Eigen::Matrix<double, 3, kMaxJoints>;

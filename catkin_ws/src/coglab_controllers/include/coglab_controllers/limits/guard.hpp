@@ -7,7 +7,7 @@
 
 namespace coglab_controllers {
 
-/// Limits of the guard. Defaults come from lwr_fri_bridge::JointLimits.
+/// Limits of the guard. Defaults come from coglab_rt::JointLimits.
 struct GuardParameters {
   JointVector lower_position = JointVector::Constant(-2.0);  ///< rad
   JointVector upper_position = JointVector::Constant(2.0);   ///< rad, above lower_position

@@ -11,12 +11,9 @@
 #include "coglab_controllers/limits/phase_governor.hpp"
 #include "coglab_controllers/manager/feedback_stage.hpp"
 #include "coglab_controllers/manager/motion_controller.hpp"
-#include "coglab_controllers/manager/plan_exchange.hpp"
-#include "lwr_fri_bridge/control_port.hpp"
+#include "coglab_controllers/names.hpp"
 
 namespace coglab_controllers {
-
-using lwr_fri_bridge::VelocityCommand;
 
 /// How the cycle runs.
 struct CycleSettings {
@@ -146,7 +143,7 @@ class ControlCycle {
   bool asked_still_ = false;   // the last cycle with a joint state asked for no velocity
   int overruns_in_row_ = 0;
   double at_border_ = 0.0;  // s that a border of the workspace has stopped the motion
-  lwr_fri_bridge::TripleBuffer<CycleReport> reports_;
+  coglab_rt::TripleBuffer<CycleReport> reports_;
 };
 
 }  // namespace coglab_controllers

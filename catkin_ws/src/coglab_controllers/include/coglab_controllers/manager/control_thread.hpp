@@ -10,7 +10,7 @@
 #include <semaphore.h>
 
 #include "coglab_controllers/manager/control_cycle.hpp"
-#include "lwr_fri_bridge/real_time.hpp"
+#include "coglab_rt/real_time.hpp"
 
 namespace coglab_controllers {
 
@@ -24,14 +24,14 @@ struct ControlThreadOptions {
   std::function<void(const VelocityCommand&)> after_cycle;
 };
 
-/// Reads the newest sample of a ControlPort, runs the cycle, writes the velocity back.
+/// Reads the newest sample of the arm's mailboxes, runs the cycle, writes the velocity back.
 ///
 /// The period is the smallest whole number of measurement periods that is not shorter than
 /// cycle_time. Without measurements idle cycles run, so that controllers load before the robot is
 /// there.
 class ControlThread {
  public:
-  ControlThread(ControlCycle& cycle, lwr_fri_bridge::ControlPort& port,
+  ControlThread(ControlCycle& cycle, coglab_rt::ArmMailboxes& mailboxes,
                 ControlThreadOptions options = {});
   ~ControlThread();
   ControlThread(const ControlThread&) = delete;
@@ -53,10 +53,10 @@ class ControlThread {
   void once(bool woken);
 
   ControlCycle& cycle_;
-  lwr_fri_bridge::ControlPort& port_;
+  coglab_rt::ArmMailboxes& mailboxes_;
   ControlThreadOptions options_;
   sem_t semaphore_;
-  lwr_fri_bridge::BoundedThread thread_;
+  coglab_rt::BoundedThread thread_;
   std::atomic<bool> stopping_{false};
   std::atomic<int> periods_{1};      // measurement periods per cycle
   int since_wake_ = 0;               // writer's thread

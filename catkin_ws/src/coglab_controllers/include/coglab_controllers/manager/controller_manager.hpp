@@ -15,6 +15,7 @@
 
 #include "coglab_controllers/manager/control_cycle.hpp"
 #include "coglab_controllers/manager/plugin_registry.hpp"
+#include "ctrl_more/loading/plugin_library.hpp"
 
 namespace coglab_controllers {
 
@@ -41,14 +42,14 @@ struct ManagerSettings {
 /// of this package are known), `plugin_paths`, `feedback_file`, and those of makeRobotSetup().
 /// @throws std::runtime_error naming the parameter
 ManagerSettings readManagerSettings(const YAML::Node& parameters, const std::string& urdf,
-                                    const lwr_fri_bridge::JointLimits& table, bool lockstep);
+                                    const coglab_rt::JointLimits& table, bool lockstep);
 
 /// One motion controller that is loaded.
 struct LoadedMotion {
   std::string id, type;
-  std::shared_ptr<MotionLibrary> library;  ///< null for types linked into the program
+  std::shared_ptr<ctrl_more::PluginLibrary> library;  ///< null for types linked into the program
   std::unique_ptr<MotionController> controller;
-  MotionCancel cancel;
+  std::shared_ptr<MotionCancel> cancel = std::make_shared<MotionCancel>();
 };
 
 /// Loads controllers and decides which one is active. Services call it from any thread; requests
@@ -70,11 +71,18 @@ class ControllerManager : public MotionHost {
   /// Loads a controller of a type under an id: a motion controller, or a feedback controller if the
   /// type is one of Ctrl-MORE's. All or nothing, whatever the plug-in throws.
   Answer load(const std::string& id, const std::string& type, const Attach& attach = {});
+  /// What has to end before a controller that is unloaded may go: its services. It keeps the
+  /// controller for as long as it needs it.
+  using Detach = std::function<void(std::shared_ptr<const LoadedMotion>)>;
+
+  /// Unloads a motion or feedback controller. The active motion controller is refused.
+  Answer unload(const std::string& id, const Detach& detach = {});
   /// Ids and types of all loaded controllers, in load order; feedback controllers after motion
   /// controllers.
   void list(std::vector<std::string>& ids, std::vector<std::string>& types) const;
   /// Makes a motion controller the active one, and applies the feedback profile of its name. The
   /// one that is active already goes on undisturbed, unless it is at fault: then it starts afresh.
+  /// An empty id: none is active; what moves the arm ends, feedback controllers stay as they are.
   Answer switchTo(const std::string& id, std::string& type);
   /// Id and type of the active one; empty if there is none.
   void active(std::string& id, std::string& type) const;
@@ -102,7 +110,7 @@ class ControllerManager : public MotionHost {
   void endWaits() { ending_.store(true, std::memory_order_relaxed); }
   /// @}
 
-  /// A loaded motion controller; null if the id is unknown. Valid as long as the manager.
+  /// A loaded motion controller; null if the id is unknown. Valid until it is unloaded.
   MotionController* motion(const std::string& id);
   /// Its type; empty if unknown.
   std::string typeOf(const std::string& id) const;
@@ -137,6 +145,8 @@ class ControllerManager : public MotionHost {
   Answer loadMotion(const std::string& id, const std::string& type, const Attach& attach,
                     std::unique_lock<std::mutex>& requests);
   Answer loadFeedback(const std::string& id, const std::string& type);
+  std::string libraryOf(const std::string& type) const;
+  Answer planSwitch(const std::string& id, CyclePlan& plan, std::string& type);
   LoadedMotion* find(const std::string& id) const;  // under table_
   std::string loadedMotions() const;
 
@@ -148,7 +158,7 @@ class ControllerManager : public MotionHost {
   std::atomic<bool> ending_{false};
   mutable std::mutex requests_;  // requests one after another
   mutable std::mutex table_;     // the members below, for short
-  std::vector<std::unique_ptr<LoadedMotion>> motions_;
+  std::vector<std::shared_ptr<LoadedMotion>> motions_;
   std::set<std::string> loading_;  // ids that are on their way into motions_
   std::string active_id_, active_type_, profile_;
   mutable std::mutex report_mutex_;

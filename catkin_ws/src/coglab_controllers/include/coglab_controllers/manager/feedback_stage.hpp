@@ -7,7 +7,7 @@
 
 #include "coglab_controllers/manager/motion_controller.hpp"
 #include "ctrl_more/feedback_controllers_manager.hpp"
-#include "ctrl_more/robot_states.hpp"
+#include "ctrl_more/states/robot_states.hpp"
 
 namespace coglab_controllers {
 

@@ -5,10 +5,11 @@
 
 #include <atomic>
 #include <cstdint>
+#include <memory>
 #include <mutex>
 #include <string>
 
-#include "coglab_controllers/manager/reason.hpp"
+#include "coglab_controllers/names.hpp"
 
 namespace coglab_controllers {
 
@@ -63,7 +64,7 @@ class MotionCancel {
   };
 
   std::mutex asking_;
-  lwr_fri_bridge::TripleBuffer<Order> orders_;
+  coglab_rt::TripleBuffer<Order> orders_;
   std::atomic<std::uint64_t> newest_{0}, served_{0}, ended_{0};
   std::uint64_t taken_ = 0;  // control thread
 };
@@ -76,7 +77,7 @@ struct RequestStamp {
 
 /// A cancel on its way, see ControllerManager::askCancel().
 struct CancelOrder {
-  MotionCancel* cancel = nullptr;  ///< null: no such controller
+  std::shared_ptr<MotionCancel> cancel;  ///< null: no such controller
   std::string id;
   std::uint64_t number = 0;
   std::uint64_t cycles = 0;  ///< count of the report when it was asked for

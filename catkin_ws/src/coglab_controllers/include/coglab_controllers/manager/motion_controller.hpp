@@ -13,15 +13,11 @@
 #include <yaml-cpp/yaml.h>
 
 #include "coglab_controllers/manager/motion_cancel.hpp"
-#include "coglab_controllers/manager/plan_exchange.hpp"
-#include "coglab_controllers/manager/reason.hpp"
 #include "coglab_controllers/manager/robot_setup.hpp"
-#include "ctrl_more/control_states.hpp"
-#include "lwr_fri_bridge/control_port.hpp"
+#include "coglab_controllers/names.hpp"
+#include "ctrl_more/states/control_states.hpp"
 
 namespace coglab_controllers {
-
-using lwr_fri_bridge::RobotSample;
 
 /// What the control cycle tells a motion controller, every cycle.
 struct CycleInput {

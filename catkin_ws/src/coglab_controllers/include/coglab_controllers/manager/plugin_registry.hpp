@@ -1,16 +1,12 @@
 /// @file
-/// Which motion controller types exist in this process, and how they get into it from shared
-/// objects.
+/// Which motion controller types exist in this process. Libraries with more of them are opened by
+/// ctrl_more::PluginLibrary, as those of feedback controllers are.
 #pragma once
 
-#include <map>
-#include <memory>
-#include <mutex>
-#include <optional>
 #include <string>
-#include <vector>
 
 #include "coglab_controllers/manager/motion_controller.hpp"
+#include "ctrl_more/loading/plugin_types.hpp"
 
 namespace coglab_controllers {
 
@@ -20,39 +16,41 @@ class MotionControllerRos;
 struct MotionMaker {
   MotionController* (*controller)() = nullptr;  ///< the caller owns the result
   MotionControllerRos* (*ros)() = nullptr;      ///< its ROS side; null: it has none
+
+  /// True if it makes the same.
+  bool operator==(const MotionMaker& other) const {
+    return controller == other.controller && ros == other.ros;
+  }
 };
 
-/// The types that libraries have registered. Unlike class_loader's own map, in which a second
-/// registration of a name silently replaces the first, it refuses one and remembers that, so that
-/// the library can be refused as a whole.
-///
-/// Any thread.
-class MotionTypes {
+/// The numbers of the file that is being compiled, for libraries of motion controllers. The first
+/// one is raised when classes or meanings change. Static, so that a library keeps its own.
+static inline constexpr ctrl_more::Abi motionAbi() {
+  return ctrl_more::abiOf<MotionController, MotionSetup, CycleInput, References, MotionRequest,
+                          RobotSample, RobotSetup, Reason>(1);
+}
+
+/// The types that libraries have registered; a name that is known is refused. Any thread.
+class MotionTypes : public ctrl_more::PluginTypesOf<MotionMaker> {
  public:
   static MotionTypes& instance();
 
-  /// Registers a type; returns false, and remembers the refusal, if the name is known.
-  bool insert(const std::string& type, const MotionMaker& maker);
-  /// Removes a type if it is this maker's.
-  void erase(const std::string& type, const MotionMaker& maker);
-  /// Maker of a type, if it is known.
-  std::optional<MotionMaker> find(const std::string& type) const;
-  /// Known type names, sorted.
-  std::vector<std::string> names() const;
-  /// Names refused since the last call.
-  std::vector<std::string> takeRefused();
+  /// Registers a type; returns false, and remembers the refusal, if the name is known or the
+  /// library was compiled with other headers.
+  bool insert(const std::string& type, const MotionMaker& maker,
+              const ctrl_more::Abi& abi = motionAbi());
 
  private:
-  mutable std::mutex mutex_;
-  std::map<std::string, MotionMaker> makers_;
-  std::vector<std::string> refused_;
+  MotionTypes();
 };
 
 /// Registers a type for as long as its library is loaded; used by the macro below.
 class MotionRegistration {
  public:
-  MotionRegistration(const char* type, const MotionMaker& maker) : type_(type), maker_(maker) {
-    MotionTypes::instance().insert(type_, maker_);
+  MotionRegistration(const char* type, const MotionMaker& maker,
+                     const ctrl_more::Abi& abi = motionAbi())
+      : type_(type), maker_(maker) {
+    MotionTypes::instance().insert(type_, maker_, abi);
   }
   ~MotionRegistration() { MotionTypes::instance().erase(type_, maker_); }
   MotionRegistration(const MotionRegistration&) = delete;
@@ -62,38 +60,6 @@ class MotionRegistration {
   std::string type_;
   MotionMaker maker_;
 };
-
-/// A shared object with motion controllers, loaded by class_loader; stays loaded while anything
-/// holds it.
-class MotionLibrary {
- public:
-  /// Loads a library, or returns it if it is loaded already.
-  /// @throws std::runtime_error with a sentence: the file is missing or not loadable, registers no
-  /// type, or registers a
-  ///         type that is known already (then it is unloaded again and what was there stays as it
-  ///         was)
-  static std::shared_ptr<MotionLibrary> open(const std::string& path);
-
-  ~MotionLibrary();
-  MotionLibrary(const MotionLibrary&) = delete;
-  MotionLibrary& operator=(const MotionLibrary&) = delete;
-
-  const std::string& path() const { return path_; }
-  /// Types that it registers, sorted.
-  const std::vector<std::string>& types() const { return types_; }
-
- private:
-  struct Handle;
-  MotionLibrary() = default;
-  std::string path_;
-  std::vector<std::string> types_;
-  std::unique_ptr<Handle> handle_;
-};
-
-/// Finds a library by its name: absolute paths as they are, else in `folders`, in the folder of
-/// this library, and in `lib` of every entry of CMAKE_PREFIX_PATH. @throws std::runtime_error
-/// listing the places.
-std::string findLibrary(const std::string& name, const std::vector<std::string>& folders);
 
 }  // namespace coglab_controllers
 

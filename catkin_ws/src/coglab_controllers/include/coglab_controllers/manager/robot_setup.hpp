@@ -8,14 +8,14 @@
 #include "coglab_controllers/kinematics/chain.hpp"
 #include "coglab_controllers/limits/guard.hpp"
 #include "coglab_controllers/manager/parameters.hpp"
-#include "lwr_fri_bridge/joint_limits.hpp"
+#include "coglab_rt/joint_limits.hpp"
 
 namespace coglab_controllers {
 
 /// Immutable after load; shared by the cycle and the controllers.
 struct RobotSetup {
   Chain chain;                         ///< base link to tool link
-  lwr_fri_bridge::JointLimits limits;  ///< with the parameters of Table 6 applied
+  coglab_rt::JointLimits limits;       ///< with the parameters of Table 6 applied
   GuardParameters guard;               ///< limits of step 7
   Workspace workspace;                 ///< for goals
   Quaternion tool_from_wrench;         ///< orientation of the measured wrench's frame in the tool
@@ -30,7 +30,7 @@ struct RobotSetup {
 /// @param urdf text of the model
 /// @throws std::runtime_error or std::invalid_argument naming the parameter, link or joint
 std::shared_ptr<const RobotSetup> makeRobotSetup(const std::string& urdf,
-                                                 const lwr_fri_bridge::JointLimits& table,
+                                                 const coglab_rt::JointLimits& table,
                                                  const Parameters& parameters);
 
 }  // namespace coglab_controllers

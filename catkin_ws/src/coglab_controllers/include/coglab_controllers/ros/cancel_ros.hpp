@@ -2,9 +2,9 @@
 /// The services that end motions.
 #pragma once
 
+#include <map>
 #include <mutex>
 #include <string>
-#include <vector>
 
 #include <ros/callback_queue.h>
 #include <ros/node_handle.h>
@@ -27,13 +27,15 @@ class CancelRos {
 
   /// Advertises the service of a motion controller. Any thread.
   void serve(const std::string& id);
+  /// Takes it away again, after calls that are under way.
+  void withdraw(const std::string& id);
 
  private:
   ros::NodeHandle node_;
   ControllerManager& manager_;
   ros::CallbackQueue queue_;
   std::mutex services_mutex_;
-  std::vector<ros::ServiceServer> services_;
+  std::map<std::string, ros::ServiceServer> services_;  // by id
   ros::AsyncSpinner spinner_;
 };
 

@@ -20,7 +20,7 @@
 #include "coglab_msgs/ReloadGains.h"
 #include "coglab_msgs/SetExecutionOrder.h"
 #include "coglab_msgs/SetGains.h"
-#include "ctrl_more/logger.hpp"
+#include "ctrl_more/log/logger.hpp"
 
 namespace coglab_controllers {
 
@@ -46,11 +46,10 @@ class FeedbackRos {
  private:
   using Select = coglab_msgs::FeedbackSelect;
   using BySignal = coglab_msgs::FeedbackBySignal;
-  enum class What { Enable, Disable, Pause, Resume };
 
-  template <What what>
+  template <ctrl_more::Change::Kind kind>
   bool onSelect(Select::Request& request, Select::Response& response);
-  template <What what>
+  template <ctrl_more::Change::Kind kind>
   bool onSignal(BySignal::Request& request, BySignal::Response& response);
   bool onProfile(Select::Request& request, Select::Response& response);
   bool onOrder(coglab_msgs::SetExecutionOrder::Request& request,

@@ -29,11 +29,12 @@
 #include "coglab_msgs/LoadController.h"
 #include "coglab_msgs/SetSpeedScale.h"
 #include "coglab_msgs/SwitchController.h"
+#include "coglab_msgs/UnloadController.h"
 
 namespace coglab_controllers {
 
-/// Owns the manager and its control thread; the robot is behind a ControlPort, in this process or
-/// behind topics.
+/// Owns the manager and its control thread; the robot is behind mailboxes, whose
+/// other side is an arm in this process or topics.
 class ManagerRos {
  public:
   struct Options {
@@ -43,13 +44,13 @@ class ManagerRos {
     ros::Publisher target;  ///< lwr/target_joint_states
     ControlThreadOptions thread;
     int highest_priority = 99;  ///< the control thread's is kept to it: below the FRI thread's
-    /// Told when a controller becomes the active one (true) for the first time.
+    /// Told after each switch whether a controller is active.
     std::function<void(bool)> controller_active;
   };
 
   /// Reads parameters below `node` (…/controller_manager). @throws std::exception naming what is
   /// wrong
-  ManagerRos(const ros::NodeHandle& node, lwr_fri_bridge::ControlPort& port, Options options);
+  ManagerRos(const ros::NodeHandle& node, coglab_rt::ArmMailboxes& mailboxes, Options options);
   ~ManagerRos();
   ManagerRos(const ManagerRos&) = delete;
   ManagerRos& operator=(const ManagerRos&) = delete;
@@ -62,12 +63,21 @@ class ManagerRos {
 
   ControllerManager& manager() { return *manager_; }
   ControlThread& controlThread() { return *thread_; }
-  /// Whether a controller was ever made the active one. Any thread, wait-free.
+  /// Whether a controller is the active one. Any thread, wait-free.
   bool controllerActive() const { return active_.load(std::memory_order_relaxed); }
 
  private:
+  /// The ROS side of a motion controller. Whoever holds it keeps both.
+  struct Side {
+    std::string id;
+    std::shared_ptr<const LoadedMotion> motion;  ///< once it is unloaded: until nobody uses it
+    std::unique_ptr<MotionControllerRos> ros;    ///< goes before the motion
+  };
+
   bool onLoad(coglab_msgs::LoadController::Request& request,
               coglab_msgs::LoadController::Response& response);
+  bool onUnload(coglab_msgs::UnloadController::Request& request,
+                coglab_msgs::UnloadController::Response& response);
   bool onList(coglab_msgs::ListControllers::Request& request,
               coglab_msgs::ListControllers::Response& response);
   bool onSwitch(coglab_msgs::SwitchController::Request& request,
@@ -78,9 +88,10 @@ class ManagerRos {
                coglab_msgs::SetSpeedScale::Response& response);
   void onSpeedTopic(const std_msgs::Float64& message);
   Answer load(const std::string& id, const std::string& type);
+  void detach(const std::string& id, std::shared_ptr<const LoadedMotion> motion);
   Answer switchTo(const std::string& id, std::string& type);
   void loadFromParameters();
-  std::vector<std::shared_ptr<MotionControllerRos>> sides();
+  std::vector<std::shared_ptr<Side>> sides();
   void goalLoop();
   void publishLoop();
   void publishTarget(const CycleReport& report);
@@ -100,7 +111,7 @@ class ManagerRos {
   std::unique_ptr<FeedbackRos> feedback_;
   std::unique_ptr<CancelRos> cancel_;
   std::mutex sides_mutex_;
-  std::vector<std::shared_ptr<MotionControllerRos>> sides_;
+  std::vector<std::shared_ptr<Side>> sides_;
   std::vector<ros::ServiceServer> services_;
   ros::Publisher status_;
   ros::Subscriber speed_;

@@ -6,10 +6,15 @@
 #include <tf2_ros/buffer.h>
 
 #include "coglab_controllers/manager/motion_controller.hpp"
-#include "coglab_controllers/ros/ros_clocks.hpp"
 #include "coglab_controllers/ros/tf_listener.hpp"
+#include "coglab_rt/ros/ros_time.hpp"
 
 namespace coglab_controllers {
+
+using coglab_rt::ageOf;
+using coglab_rt::nanoseconds;
+using coglab_rt::toRos;
+using coglab_rt::toSteady;
 
 /// What every ROS side shares.
 struct RosContext {
@@ -24,7 +29,7 @@ class MotionControllerRos {
   virtual ~MotionControllerRos() = default;
 
   /// Advertises and subscribes below `node` (…/controller_manager/<id>). The controller outlives
-  /// this object.
+  /// this object, whose destructor ends its services and subscriptions.
   virtual void attach(MotionController& controller, const ros::NodeHandle& node,
                       const RosContext& context) = 0;
 

@@ -11,29 +11,29 @@
 #include <ros/ros.h>
 #include <sensor_msgs/JointState.h>
 
-#include "lwr_fri_bridge/control_port.hpp"
-#include "lwr_fri_bridge/interpolator.hpp"
+#include "coglab_controllers/names.hpp"
+#include "coglab_rt/interpolator.hpp"
 
 namespace coglab_controllers {
 
-/// Makes a ControlPort of the topics of a robot interface in another process.
+/// Fills mailboxes from the topics of a robot interface in another process.
 ///
 /// Measured values come from `joint_states`, `external_torques` and `tool_wrench`, the permission
 /// to move from `state`. What is commanded cannot be seen from here: position counts as commanded
 /// where it is measured; velocity and acceleration are what the interface's interpolator makes of
-/// the velocities that were sent. Callbacks run in one thread; that thread is the port's writer.
+/// the velocities that were sent. Callbacks run in one thread; that thread writes the samples.
 class RobotTopics {
  public:
   /// @param node namespace of the robot interface (…/lwr)
   /// @param limits with which the robot interface brakes and accelerates
   /// @param sample_written called after each joint state: wakes the control thread
-  RobotTopics(const ros::NodeHandle& node, const lwr_fri_bridge::JointLimits& limits,
+  RobotTopics(const ros::NodeHandle& node, const coglab_rt::JointLimits& limits,
               std::function<void()> sample_written);
 
-  lwr_fri_bridge::ControlPort& port() { return port_; }
+  coglab_rt::ArmMailboxes& mailboxes() { return mailboxes_; }
 
   /// Publishes a velocity and remembers it as commanded. Control thread.
-  void send(const lwr_fri_bridge::VelocityCommand& command);
+  void send(const VelocityCommand& command);
 
  private:
   void onJoints(const sensor_msgs::JointState& joints);
@@ -43,10 +43,10 @@ class RobotTopics {
 
   ros::NodeHandle node_;
   std::function<void()> sample_written_;
-  lwr_fri_bridge::ControlPort port_;
-  lwr_fri_bridge::RobotSample sample_;
-  lwr_fri_bridge::Interpolator set_point_;
-  lwr_fri_bridge::TripleBuffer<lwr_fri_bridge::VelocityCommand> sent_;  // control thread to callbacks
+  coglab_rt::ArmMailboxes mailboxes_;
+  RobotSample sample_;
+  coglab_rt::Interpolator set_point_;
+  TripleBuffer<VelocityCommand> sent_;  // control thread to callbacks
   ros::Subscriber joints_, state_, torques_, wrench_;
   ros::Publisher target_;
   sensor_msgs::JointState target_message_;  // control thread

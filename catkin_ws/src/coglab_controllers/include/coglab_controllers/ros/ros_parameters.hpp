@@ -15,7 +15,7 @@ YAML::Node readParameters(const ros::NodeHandle& node);
 
 /// The table of joint limits that the parameters below `node` name (`joint_limits_file`,
 /// `joint_limits_profile`).
-lwr_fri_bridge::JointLimits readJointLimits(const ros::NodeHandle& node);
+coglab_rt::JointLimits readJointLimits(const ros::NodeHandle& node);
 
 /// Settings of the controller manager from the parameters below `node`: those of
 /// readManagerSettings(), and `joint_limits_file`, `joint_limits_profile`, `urdf_file` (else the

@@ -9,9 +9,9 @@
 
 #include <tf2/buffer_core.h>
 
-#include "coglab_controllers/plugins/goal_source.hpp"
-#include "coglab_controllers/ros/ros_clocks.hpp"
+#include "coglab_controllers/goal/goal_source.hpp"
 #include "coglab_controllers/ros/tf_listener.hpp"
+#include "coglab_rt/ros/ros_time.hpp"
 
 namespace coglab_controllers {
 

@@ -37,6 +37,8 @@ class TfListener {
 
   /// Transforms refused so far.
   std::uint64_t refused() const { return refused_.load(std::memory_order_relaxed); }
+  /// How often this computer's clock has stepped back, as far as messages have shown.
+  std::uint32_t clockSteps() const { return clock_steps_.load(std::memory_order_relaxed); }
   /// How far the newest transform of this child frame was ahead of the clock, s, if it was refused
   /// for that; else 0.
   double ahead(const std::string& frame) const;
@@ -49,6 +51,7 @@ class TfListener {
 
   tf2::BufferCore& buffer_;
   std::atomic<std::uint64_t> refused_{0};
+  std::atomic<std::uint32_t> clock_steps_{0};
   mutable std::mutex mutex_;
   std::map<std::string, double> ahead_;  ///< s, by child frame; frames that were refused last
   std::int64_t last_now_ns_ = 0;

@@ -17,11 +17,9 @@ enum class OperatingMode { T1, T2, Automatic };
 /// arrays.
 enum class KrlConvention { Coglab, CentroEpiaggio, Stanford, RcprgTum, RttLwr, OpenKc, KukaSample };
 
-constexpr double kShortestPeriod = 0.001, kLongestPeriod = 0.1;  ///< s, of FRI (published)
-
 /// @see the file's comment. Times in s, angles in rad.
 struct Parameters {
-  double period = 0.005;  ///< FRI period, 0.001 .. 0.1 (published range)
+  double period = 0.005;  ///< FRI period; its range in ranges.cpp is published
   OperatingMode mode = OperatingMode::Automatic;
   KrlConvention convention = KrlConvention::Coglab;
 

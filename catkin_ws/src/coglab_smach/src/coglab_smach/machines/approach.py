@@ -1,10 +1,10 @@
 """The reach shared by all actions: arm motion, hand preshape and monitor_dmp side by side."""
 from __future__ import annotations
 
-from ..context import Context
-from ..states.arm import ExecuteDmp, MonitorDmp, SwitchController, WaitStop
-from ..states.base import CoglabConcurrence, CoglabMachine, require_all
-from ..states.hand import HandPreshape
+from coglab_smach.context.context import Context
+from coglab_smach.states.arm import ExecuteDmp, MonitorDmp, SwitchController, WaitStop
+from coglab_smach.states.base import CoglabConcurrence, CoglabMachine, require_all
+from coglab_smach.states.hand import HandPreshape
 
 KEYS = ["goal", "grasp", "object_entry", "object_id"]
 RELEASE_KEYS = [*KEYS, "delivery"]

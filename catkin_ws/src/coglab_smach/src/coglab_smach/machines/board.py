@@ -1,13 +1,13 @@
 """take and put (D4.10 Figures 7 and 8): the storage board instead of a person."""
 from __future__ import annotations
 
-from ..context import Context
-from ..states.arm import HomeRobot, PtpMotion, SwitchController
-from ..states.base import CoglabConcurrence, CoglabMachine, CoglabState, require_all
-from ..states.hand import HandClose, HandOpen, HandPreshape
-from ..states.knowledge import FindPlace, LocateOnBoard, QueryDatabase, SetPlaceGoal, SetTakeGoal
-from .approach import build_approach
-from .recovery import ACTION_OUTCOMES, RECOVERY_TRANSITIONS, build_recovery, to_recovery
+from coglab_smach.context.context import Context
+from coglab_smach.machines.approach import build_approach
+from coglab_smach.machines.recovery import ACTION_OUTCOMES, RECOVERY_TRANSITIONS, build_recovery, to_recovery
+from coglab_smach.states.arm import HomeRobot, PtpMotion, SwitchController
+from coglab_smach.states.base import CoglabConcurrence, CoglabMachine, CoglabState, require_all
+from coglab_smach.states.hand import HandClose, HandOpen, HandPreshape
+from coglab_smach.states.knowledge import FindPlace, LocateOnBoard, QueryDatabase, SetPlaceGoal, SetTakeGoal
 
 
 def build_look_while_moving(ctx: Context, label: str, look_label: str, look: CoglabState,

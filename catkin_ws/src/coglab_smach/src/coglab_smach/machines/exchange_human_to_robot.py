@@ -1,13 +1,13 @@
 """exchange_human_to_robot (D4.10 Figure 5): the person gives, the robot takes."""
 from __future__ import annotations
 
-from ..context import Context
-from ..states.arm import HomeRobot, SwitchController
-from ..states.base import CoglabMachine
-from ..states.hand import HandClose
-from ..states.knowledge import QueryDatabase, SetGraspGoal
-from .approach import build_approach
-from .recovery import ACTION_OUTCOMES, RECOVERY_TRANSITIONS, build_recovery, to_recovery
+from coglab_smach.context.context import Context
+from coglab_smach.machines.approach import build_approach
+from coglab_smach.machines.recovery import ACTION_OUTCOMES, RECOVERY_TRANSITIONS, build_recovery, to_recovery
+from coglab_smach.states.arm import HomeRobot, SwitchController
+from coglab_smach.states.base import CoglabMachine
+from coglab_smach.states.hand import HandClose
+from coglab_smach.states.knowledge import QueryDatabase, SetGraspGoal
 
 SHARED = ["object_entry", "grasp", "grasp_name"]
 

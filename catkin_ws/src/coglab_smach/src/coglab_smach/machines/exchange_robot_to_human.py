@@ -1,13 +1,13 @@
 """exchange_robot_to_human (D4.10 Figure 6): the robot gives, the person takes."""
 from __future__ import annotations
 
-from ..context import Context
-from ..states.arm import HomeRobot, SwitchController
-from ..states.base import CoglabMachine
-from ..states.hand import HandOpen
-from ..states.knowledge import SetDeliveryGoal
-from .approach import build_approach
-from .recovery import ACTION_OUTCOMES, RECOVERY_TRANSITIONS, build_recovery, to_recovery
+from coglab_smach.context.context import Context
+from coglab_smach.machines.approach import build_approach
+from coglab_smach.machines.recovery import ACTION_OUTCOMES, RECOVERY_TRANSITIONS, build_recovery, to_recovery
+from coglab_smach.states.arm import HomeRobot, SwitchController
+from coglab_smach.states.base import CoglabMachine
+from coglab_smach.states.hand import HandOpen
+from coglab_smach.states.knowledge import SetDeliveryGoal
 
 
 def build_exchange_robot_to_human(ctx: Context) -> CoglabMachine:

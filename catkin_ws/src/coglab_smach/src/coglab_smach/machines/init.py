@@ -1,12 +1,12 @@
 """coglab_init_system: perception and robot are initialised in parallel (D4.10, Figures 3 and 4)."""
 from __future__ import annotations
 
-from ..context import Context
-from ..states.arm import ConfigureLwr, HomeRobot, LoadControllers, LoadDmps
-from ..states.base import CoglabConcurrence, CoglabMachine, require_all
-from ..states.hand import CalibrateHand
-from ..states.hub import WaitForTrigger
-from ..states.knowledge import InitVision
+from coglab_smach.context.context import Context
+from coglab_smach.states.arm import ConfigureLwr, HomeRobot, LoadControllers, LoadDmps
+from coglab_smach.states.base import CoglabConcurrence, CoglabMachine, require_all
+from coglab_smach.states.hand import CalibrateHand
+from coglab_smach.states.hub import WaitForTrigger
+from coglab_smach.states.knowledge import InitVision
 
 
 def build_calibrate_and_home(ctx: Context) -> CoglabConcurrence:

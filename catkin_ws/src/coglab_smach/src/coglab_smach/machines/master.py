@@ -2,14 +2,14 @@
 it returns."""
 from __future__ import annotations
 
-from ..context import Context
-from ..states.base import CoglabMachine
-from ..states.hub import Fault, Hub, Stopped
-from .board import build_put, build_take
-from .exchange_human_to_robot import build_exchange_human_to_robot
-from .exchange_robot_to_human import build_exchange_robot_to_human
-from .init import build_init_system
-from .recovery import WhatIsHeld, build_recovery
+from coglab_smach.context.context import Context
+from coglab_smach.machines.board import build_put, build_take
+from coglab_smach.machines.exchange_human_to_robot import build_exchange_human_to_robot
+from coglab_smach.machines.exchange_robot_to_human import build_exchange_robot_to_human
+from coglab_smach.machines.init import build_init_system
+from coglab_smach.machines.recovery import WhatIsHeld, build_recovery
+from coglab_smach.states.base import CoglabMachine
+from coglab_smach.states.hub import Fault, Hub, Stopped
 
 ACTIONS_EMPTY = ("exchange_human_to_robot", "take")
 ACTIONS_HOLDING = ("exchange_robot_to_human", "put")

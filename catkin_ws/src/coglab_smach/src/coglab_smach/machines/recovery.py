@@ -6,14 +6,14 @@ from typing import Any
 
 from coglab_msgs.msg import ReasonCode
 
-from ..context import Context
-from ..holding import UNKNOWN
-from ..pending import PortError
-from ..ports import Verdict
-from ..requests import command
-from ..states.arm import HomeRobot
-from ..states.base import CoglabMachine, CoglabState
-from ..states.motion import end_motion
+from coglab_smach.context.context import Context
+from coglab_smach.context.holding import UNKNOWN
+from coglab_smach.context.requests import command
+from coglab_smach.ports.interfaces import Verdict
+from coglab_smach.ports.pending import PortError
+from coglab_smach.states.arm import HomeRobot
+from coglab_smach.states.base import CoglabMachine, CoglabState
+from coglab_smach.states.motion import end_motion
 
 
 def arm_is_blocked(state: CoglabState) -> Verdict:

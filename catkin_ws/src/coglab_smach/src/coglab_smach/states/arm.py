@@ -1,16 +1,17 @@
 """States of the arm: plug-ins and primitives, LWR interface, starting a DMP, waiting for its end, point-to-point."""
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 from coglab_msgs.msg import ReasonCode
 
-from ..context import Context
-from ..motion_time import ptp_time, reach_time
-from ..pending import PortError
-from ..ports import DmpRequest
-from .base import CoglabState, Interrupted, TimeLimit
-from .motion import await_rest
+from coglab_smach.context.context import Context
+from coglab_smach.kinematics.motion_time import ptp_time, reach_time
+from coglab_smach.ports.interfaces import DmpRequest
+from coglab_smach.ports.pending import PortError
+from coglab_smach.states.base import CoglabState, Interrupted, TimeLimit
+from coglab_smach.states.motion import await_rest
 
 
 class LoadControllers(CoglabState):
@@ -82,9 +83,12 @@ class SwitchController(CoglabState):
 
 def dmp_request(goal: dict[str, Any], primitive: str | None = None, ratio: float | None = None) -> DmpRequest:
     """The request of a goal as it travels in user data."""
-    return DmpRequest(primitive or goal["primitive"], goal["frame"], list(goal["offset"]),
-                      list(goal["orientation"]) if goal.get("orientation") is not None else None,
-                      float(ratio if ratio is not None else goal.get("dmp_ratio", 1.0)))
+    orientation = goal.get("orientation")
+    return DmpRequest(primitive_id=primitive or goal["primitive"], goal_frame=goal["frame"],
+                      goal_offset=list(goal["offset"]),
+                      dmp_ratio=float(ratio if ratio is not None else goal.get("dmp_ratio", 1.0)),
+                      orientation_control=orientation is not None,
+                      target_orientation=list(orientation if orientation is not None else (0.0, 0.0, 0.0, 0.0)))
 
 
 class ExecuteDmp(CoglabState):
@@ -133,7 +137,7 @@ class WaitStop(CoglabState):
     owns_motion = True
 
     def __init__(self, ctx: Context, trigger: str) -> None:
-        keys = {"": [], "contact": ["object_entry"], "release": ["object_entry", "delivery"]}
+        keys: dict[str, list[str]] = {"": [], "contact": ["object_entry"], "release": ["object_entry", "delivery"]}
         super().__init__(ctx, input_keys=keys[trigger])
         self.trigger = trigger
 
@@ -242,7 +246,7 @@ class MonitorDmp(CoglabState):
         switches = 0
         while True:
             try:
-                self.wait_for(lambda shown=running: self._other_pattern(family, shown), "another reaching pattern")
+                self.wait_for(partial(self._other_pattern, family, running), "another reaching pattern")
             except Interrupted as end:
                 if end.stop:
                     raise

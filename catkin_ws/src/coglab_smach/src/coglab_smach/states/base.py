@@ -8,12 +8,12 @@ from typing import Any
 import smach
 from coglab_msgs.msg import ReasonCode
 
-from ..config import ConfigError
-from ..context import Context
-from ..journal import Failure
-from ..pending import Pending, PortError
-from ..requests import command
-from .motion import end_motion
+from coglab_smach.context.config import ConfigError
+from coglab_smach.context.context import Context
+from coglab_smach.context.journal import Failure
+from coglab_smach.context.requests import command
+from coglab_smach.ports.pending import Pending, PortError
+from coglab_smach.states.motion import end_motion
 
 POLL_PERIOD = 0.01
 """s between two looks at a condition: well below the 60 ms in which a contact has to be found."""

@@ -5,9 +5,9 @@ from typing import Any
 
 from coglab_msgs.msg import ReasonCode
 
-from ..context import Context
-from ..pending import PortError
-from .base import CoglabState, TimeLimit
+from coglab_smach.context.context import Context
+from coglab_smach.ports.pending import PortError
+from coglab_smach.states.base import CoglabState, TimeLimit
 
 
 class CalibrateHand(CoglabState):

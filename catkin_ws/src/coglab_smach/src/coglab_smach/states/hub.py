@@ -7,11 +7,11 @@ from typing import Any
 
 from coglab_msgs.msg import ReasonCode
 
-from ..context import Context
-from ..holding import UNKNOWN
-from ..pending import PortError
-from ..requests import Request, command
-from .base import CoglabState, Interrupted
+from coglab_smach.context.context import Context
+from coglab_smach.context.holding import UNKNOWN
+from coglab_smach.context.requests import Request, command
+from coglab_smach.ports.pending import PortError
+from coglab_smach.states.base import CoglabState, Interrupted
 
 
 class WaitForTrigger(CoglabState):

@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 from coglab_msgs.msg import ReasonCode
+from coglab_py.pose import Pose, mean_pose
 
-from ..context import Context
-from ..goals import delivery_goal, grasp_goal, place_goal
-from ..pending import PortError
-from ..pose import Pose, mean_pose
-from .base import CoglabState
+from coglab_smach.context.context import Context
+from coglab_smach.kinematics.goals import delivery_goal, grasp_goal, place_goal
+from coglab_smach.ports.pending import PortError
+from coglab_smach.states.base import CoglabState
 
 
 class InitVision(CoglabState):

@@ -3,8 +3,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from ..context import Context
-from ..pending import Pending, PortError
+from coglab_smach.context.context import Context
+from coglab_smach.ports.pending import Pending, PortError
 
 POLL_PERIOD = 0.01
 """s"""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 import weakref
-from typing import Any
+from typing import Any, SupportsIndex
 
 # Special methods Python looks up on the type, never on the instance: each needs its own forwarder.
 _FORWARDED = """
@@ -71,12 +71,12 @@ class Const:
         view = _classes.get(kind)
         if view is None:
             view = _classes[kind] = _view_class(kind)
-        self = object.__new__(view)
+        self: Const = object.__new__(view)
         object.__setattr__(self, "_const_obj", obj)
         return self
 
-    @property
-    def __class__(self) -> type:  # type: ignore[override]
+    @property  # type: ignore[misc]
+    def __class__(self) -> type:
         return type(_target(self, "_const_obj"))
 
     def __getattr__(self, name: str) -> Any:
@@ -115,7 +115,7 @@ class Const:
     def __deepcopy__(self, memo: dict) -> Any:
         return copy.deepcopy(_target(self, "_const_obj"), memo)
 
-    def __reduce_ex__(self, protocol: int) -> Any:
+    def __reduce_ex__(self, protocol: SupportsIndex) -> Any:
         return _target(self, "_const_obj").__reduce_ex__(protocol)
 
 

@@ -1,16 +1,15 @@
-"""What all containers have in common: construction, user data, callbacks and the bookkeeping of a
-run.
-"""
+"""What all containers have in common: construction, user data and the bookkeeping of a run."""
 
 from __future__ import annotations
 
 import threading
 import traceback
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
 import smach
+from smach.callbacks import Callbacks
 from smach.exceptions import InvalidConstructionError, InvalidStateError, InvalidTransitionError
 from smach.state import State
 from smach.user_data import UserData
@@ -26,7 +25,7 @@ _STATE_METHODS = (
 )
 
 
-class Container(State):
+class Container(Callbacks, State):
     """A state that holds states. Base of StateMachine, Concurrence and Iterator.
 
     `userdata` is the store its children share; it is kept between runs. On entry every registered
@@ -59,10 +58,7 @@ class Container(State):
         self._is_running = False
         self._run_thread: int | None = None
         self._preempt_lock = threading.RLock()
-        self._start_cbs: list[tuple[Callable, Sequence]] = []
-        self._transition_cbs: list[tuple[Callable, Sequence]] = []
-        self._termination_cbs: list[tuple[Callable, Sequence]] = []
-        self._end_cbs: list[tuple[Callable, Sequence]] = []
+        self._init_callbacks()
 
     def __getstate__(self) -> dict:
         # Locks cannot be pickled; __setstate__ makes them anew.
@@ -249,82 +245,6 @@ class Container(State):
     def _name(self) -> str:
         return f"{type(self).__name__} with outcomes {list(self.get_registered_outcomes())}"
 
-    # Callbacks.
-
-    def register_start_cb(self, start_cb: Callable, cb_args: Sequence = ()) -> None:
-        """Call `start_cb(userdata, initial_states, *cb_args)` at the start of each run.
-
-        Example: `machine.register_start_cb(lambda ud, labels: print(labels))`.
-        """
-        self._start_cbs.append(_callback("start_cb", start_cb, cb_args))
-
-    def register_transition_cb(self, transition_cb: Callable, cb_args: Sequence = ()) -> None:
-        """Call `transition_cb(userdata, active_states, *cb_args)` at each transition between
-        children.
-
-        Example: `machine.register_transition_cb(lambda ud, labels: print(labels))`.
-        """
-        self._transition_cbs.append(_callback("transition_cb", transition_cb, cb_args))
-
-    def register_termination_cb(self, termination_cb: Callable, cb_args: Sequence = ()) -> None:
-        """Call `termination_cb(userdata, terminal_states, outcome, *cb_args)` when a run ends with
-        an outcome.
-
-        Example: `machine.register_termination_cb(lambda ud, labels, outcome: print(outcome))`.
-        """
-        self._termination_cbs.append(_callback("termination_cb", termination_cb, cb_args))
-
-    def register_end_cb(self, end_cb: Callable, cb_args: Sequence = ()) -> None:
-        """Call `end_cb(userdata, outcome, *cb_args)` when a run is over in whatever way, the
-        container being idle.
-
-        `outcome` is None if the run ended with an error or at shutdown.
-        Example: `machine.register_end_cb(lambda ud, outcome: print(machine.get_active_states()))`.
-        """
-        self._end_cbs.append(_callback("end_cb", end_cb, cb_args))
-
-    def unregister_cb(self, cb: Callable) -> None:
-        """Never call `cb` again, however it was registered.
-
-        Example: `machine.unregister_cb(my_start_cb)`.
-        """
-        for name in ("_start_cbs", "_transition_cbs", "_termination_cbs", "_end_cbs"):
-            setattr(self, name, [entry for entry in getattr(self, name) if entry[0] != cb])
-
-    def call_start_cbs(self) -> None:
-        """Call the start callbacks.
-
-        Example: `self.call_start_cbs()` in an `execute` of your own.
-        """
-        self._call("start", self._start_cbs, self.get_initial_states)
-
-    def call_transition_cbs(self) -> None:
-        """Call the transition callbacks. Example: `self.call_transition_cbs()`."""
-        self._call("transition", self._transition_cbs, self.get_active_states)
-
-    def call_termination_cbs(self, terminal_states: Any, outcome: str | None) -> None:
-        """Call the termination callbacks.
-
-        Example: `self.call_termination_cbs([label], outcome)`.
-        """
-        self._call("termination", self._termination_cbs, lambda: terminal_states, outcome)
-
-    def _call(
-        self,
-        what: str,
-        callbacks: list[tuple[Callable, Sequence]],
-        states: Callable[[], Any],
-        *more: Any,
-    ) -> None:
-        for cb, args in callbacks:
-            try:
-                cb(self.userdata, states(), *more, *args)
-            except Exception:
-                smach.logerr(
-                    f"{what} callback {_cb_name(cb)} of {self._name()} raised; the run goes on:\n"
-                    f"{traceback.format_exc()}"
-                )
-
     # A run.
 
     @contextmanager
@@ -347,14 +267,7 @@ class Container(State):
                 self._is_running = False
                 self._run_thread = None
                 self._spend_preempt()
-            for cb, args in self._end_cbs:
-                try:
-                    cb(self.userdata, result["outcome"], *args)
-                except Exception:
-                    smach.logerr(
-                        f"end callback {_cb_name(cb)} of {self._name()} "
-                        f"raised:\n{traceback.format_exc()}"
-                    )
+            self._call_end_cbs(result["outcome"])
 
     def request_preempt(self) -> None:
         """Ask the container, and with it the children that run, to end early. Example:
@@ -417,16 +330,6 @@ def _copy(source: Any, target: Any, keys: Iterable[str], what: str) -> None:
                 f"{what}: user data key {key!r} is not there; present: "
                 f"{', '.join(source.keys()) or 'none'}"
             )
-
-
-def _callback(what: str, cb: Callable, cb_args: Sequence) -> tuple[Callable, Sequence]:
-    if not callable(cb):
-        raise TypeError(f"{what}: expected a callable, got {type(cb).__name__}")
-    return cb, tuple(cb_args)
-
-
-def _cb_name(cb: Callable) -> str:
-    return getattr(cb, "__qualname__", None) or repr(cb)
 
 
 def _stack_text() -> str:

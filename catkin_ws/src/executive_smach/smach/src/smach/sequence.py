@@ -35,7 +35,7 @@ class Sequence(StateMachine):
         self._last_label: str | None = None
 
     @staticmethod
-    def add(
+    def add(  # type: ignore[override]
         label: str,
         state: State,
         transitions: Mapping[str, str | None] | None = None,

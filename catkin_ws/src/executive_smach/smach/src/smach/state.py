@@ -159,9 +159,10 @@ class CBState(State):
         self._cb_args = tuple(cb_args)
         self._cb_kwargs = dict(cb_kwargs or {})
         if has_smach_interface(cb):
-            self.register_outcomes(cb.get_registered_outcomes())
-            self.register_input_keys(cb.get_registered_input_keys())
-            self.register_output_keys(cb.get_registered_output_keys())
+            declared: Any = cb
+            self.register_outcomes(declared.get_registered_outcomes())
+            self.register_input_keys(declared.get_registered_input_keys())
+            self.register_output_keys(declared.get_registered_output_keys())
 
     def execute(self, ud: Any) -> str:
         """Call the function.

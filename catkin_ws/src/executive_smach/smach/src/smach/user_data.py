@@ -179,7 +179,7 @@ class Remapper:
             self[name] = value
 
     def __contains__(self, key: object) -> bool:
-        return key in self._input_keys and self._remap(key) in self._ud  # type: ignore[arg-type]
+        return key in self._input_keys and self._remap(key) in self._ud  # type: ignore
 
     def keys(self) -> list[str]:
         """The state's own names of the input keys that are present. Example: `ud.keys()`."""

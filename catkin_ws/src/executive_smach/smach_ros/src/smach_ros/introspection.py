@@ -17,7 +17,7 @@ import threading
 import time
 import traceback
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import rospy
@@ -68,7 +68,10 @@ class _Watched:
         self.container.register_end_cb(self.on_end)
 
     def detach(self) -> None:
-        for cb in (self.on_start, self.on_transition, self.on_termination, self.on_end):
+        callbacks: tuple[Callable, ...] = (
+            self.on_start, self.on_transition, self.on_termination, self.on_end
+        )
+        for cb in callbacks:
             self.container.unregister_cb(cb)
 
     # The container calls these in its own thread: take a snapshot and be gone.
@@ -222,7 +225,7 @@ class IntrospectionServer:
 
         Example: `server.construct("executive", machine, "/SM_ROOT")`.
         """
-        if not self._watch(state, path):
+        if not self._watch(state, path) or not isinstance(state, smach.Container):
             return
         for label, child in state.get_children().items():
             if isinstance(child, smach.Container):

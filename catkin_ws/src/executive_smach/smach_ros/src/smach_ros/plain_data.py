@@ -107,7 +107,7 @@ def _check_opcodes(raw: bytes) -> None:
                 )
             if step >= MAX_STEPS:
                 raise InvalidDataError(f"local_data is larger than {MAX_STEPS} pickle steps")
-            if "PUT" in opcode.name and not 0 <= int(argument) <= MAX_STEPS:
+            if "PUT" in opcode.name and not 0 <= int(argument or 0) <= MAX_STEPS:
                 raise InvalidDataError(
                     f"local_data uses memo number {argument}, at most {MAX_STEPS} is read"
                 )

@@ -35,7 +35,7 @@ class ServiceState(smach.State):
     def __init__(
         self,
         service_name: str,
-        service_spec: type,
+        service_spec: Any,
         request: Any = None,
         request_cb: Callable | None = None,
         request_cb_args: Sequence = (),

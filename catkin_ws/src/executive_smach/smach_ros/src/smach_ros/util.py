@@ -58,12 +58,12 @@ class TimeLimit:
         return self._spent + silence >= self.limit
 
 
-def callback_userdata(ud: Any, cb: Callable, state: smach.State) -> smach.Remapper:
+def callback_userdata(ud: Any, cb: Callable | None, state: smach.State) -> smach.Remapper:
     """What a callback of a state sees: the keys it declares itself, else those of the state.
 
     Example: `goal_cb(callback_userdata(ud, goal_cb, self), goal)`.
     """
-    source = cb if smach.has_smach_interface(cb) else state
+    source: Any = cb if smach.has_smach_interface(cb) else state
     return smach.Remapper(
         ud, source.get_registered_input_keys(), source.get_registered_output_keys(), {}
     )
@@ -82,12 +82,13 @@ def register_callback(state: smach.State, what: str, cb: Callable | None) -> Non
             f"{type(state).__name__}: {what} must be callable, got {type(cb).__name__}"
         )
     if smach.has_smach_interface(cb):
-        state.register_outcomes(cb.get_registered_outcomes())
-        state.register_input_keys(cb.get_registered_input_keys())
-        state.register_output_keys(cb.get_registered_output_keys())
+        declared: Any = cb
+        state.register_outcomes(declared.get_registered_outcomes())
+        state.register_input_keys(declared.get_registered_input_keys())
+        state.register_output_keys(declared.get_registered_output_keys())
 
 
-def check_slots(state: smach.State, what: str, slots: Any, message_class: type) -> None:
+def check_slots(state: smach.State, what: str, slots: Any, message_class: Any) -> None:
     """Raise InvalidStateError if a message has no such fields.
 
     Example: `check_slots(self, "goal_slots", ["x"], MoveGoal)`.

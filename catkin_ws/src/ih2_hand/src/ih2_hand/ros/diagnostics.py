@@ -5,8 +5,8 @@ from __future__ import annotations
 import time
 from typing import Any
 
-import rospy
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from diagnostic_msgs.msg import DiagnosticStatus
+from diagnostic_updater import DiagnosticStatusWrapper, Updater
 
 from ih2_hand.reasons import BROKEN, NEUTRAL
 
@@ -14,11 +14,16 @@ PERIOD_S = 1.0
 
 
 class Diagnostics:
-    """Publishes the state of `node` (a HandNode)."""
+    """Publishes the state of `node` (a HandNode).
+
+    The updater is asked by the steady clock: by its own it would follow ROS time, and a silent
+    /clock would silence the hand as well.
+    """
 
     def __init__(self, node: Any):
         self._node = node
-        self._publisher = rospy.Publisher("/diagnostics", DiagnosticArray, queue_size=10)
+        self._updater = Updater()
+        self._updater.add("hand", self._fill)
         self._next = 0.0
 
     def tick(self) -> None:
@@ -29,15 +34,21 @@ class Diagnostics:
     def publish(self) -> None:
         """Publish now."""
         self._next = time.monotonic() + PERIOD_S
+        self._updater.setHardwareID(self._node.port or "none")
+        self._updater.force_update()
+
+    def _fill(self, status: DiagnosticStatusWrapper) -> DiagnosticStatusWrapper:
         node, driver = self._node, self._node.driver
         level = DiagnosticStatus.OK
         if driver is None or node.event_code in BROKEN:
             level = DiagnosticStatus.ERROR
         elif not node.calibrated or node.event_code not in NEUTRAL:
             level = DiagnosticStatus.WARN
+        status.summary(level, node.message)
         values = {"port": node.port, "connected": driver is not None,
                   "calibrated": node.calibrated, "calibrating": node.calibrating,
                   "holding": node.holding, "rate (Hz)": node.rate,
+                  "reason_code": int(node.event_code),
                   "action": node.goals.active if hasattr(node, "goals") else None}
         if driver is not None:
             counters = driver.counters
@@ -45,10 +56,6 @@ class Diagnostics:
                            "resynchronisations": counters.resynchronisations,
                            "of these by StopALL": counters.fillers,
                            "failed requests": counters.failures})
-        status = DiagnosticStatus(
-            level=level, name=f"{rospy.get_name().strip('/')}: hand", message=node.message,
-            hardware_id=node.port,
-            values=[KeyValue(key, str(value)) for key, value in values.items()])
-        array = DiagnosticArray(status=[status])
-        array.header.stamp = rospy.Time.now()
-        self._publisher.publish(array)
+        for key, value in values.items():
+            status.add(key, str(value))
+        return status

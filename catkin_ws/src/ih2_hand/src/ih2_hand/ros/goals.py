@@ -298,6 +298,7 @@ class GoalQueue:
         running, verdict = self._running, Verdict(text, done=True, reason=reason)
         self._stop_fingers()
         self._running = None
+        assert running is not None
         self._owner.task_ended(running.task, verdict)
         running.handle.set_canceled(_result(running.name, verdict), text)
 
@@ -311,6 +312,7 @@ class GoalQueue:
         running = self._running
         self._running = None
         self._unsubscribe()
+        assert running is not None
         self._finish_handle(running.name, running.handle, verdict)
 
     def _unsubscribe(self) -> None:

@@ -9,6 +9,7 @@ from typing import Any
 
 import rospy
 from coglab_msgs.msg import HandStatus
+from coglab_py import parameters
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 from std_srvs.srv import Trigger, TriggerResponse
@@ -52,6 +53,9 @@ from ih2_hand.wire_choices import WIRE
 RECONNECT_S = 0.5
 """Pause between attempts to open the port."""
 
+SHORTEST_GOAL_S = 0.001
+"""Least time limit of a goal."""
+
 CONTRADICTIONS = 3
 """Polls in a row with contradicting readings before the connection counts as lost."""
 
@@ -69,23 +73,14 @@ class HandNode:
     """
 
     def __init__(self) -> None:
-        self._port_setting = str(rospy.get_param("~serial_port", "") or "")
-        self.rate = float(rospy.get_param("~rate", 30.0))
-        if not 1.0 <= self.rate <= 200.0:
-            raise ValueError(f"~rate must be 1..200 Hz; got {self.rate}")
-        self._dialect = str(rospy.get_param("~dialect", "legacy"))
-        if self._dialect not in DIALECTS:
-            raise ValueError(f"~dialect must be {' or '.join(DIALECTS)}; got {self._dialect!r}")
-        self._is_current = not bool(rospy.get_param("~use_tension", False))
-        self._read_timeout = float(rospy.get_param("~read_timeout", WIRE.read_timeout_s))
-        if not LEAST_READ_TIMEOUT_S <= self._read_timeout <= LARGEST_READ_TIMEOUT_S:
-            raise ValueError(f"~read_timeout must be {LEAST_READ_TIMEOUT_S}.."
-                             f"{LARGEST_READ_TIMEOUT_S} s; got {self._read_timeout}")
-        self._limit = float(rospy.get_param("~goal_time_limit", 10.0))
-        if not 0.0 < self._limit <= LONGEST_S:
-            raise ValueError(f"~goal_time_limit must be above 0, at most {LONGEST_S:.0f} s; got "
-                             f"{self._limit}")
-        self._preshapes = grasps.load_preshapes(rospy.get_param("~grasps_file", "") or None)
+        self._port_setting = parameters.read("~serial_port", str, "")
+        self.rate = parameters.read("~rate", float, 30.0, 1.0, 200.0)
+        self._dialect = parameters.read("~dialect", str, "legacy", among=DIALECTS)
+        self._is_current = not parameters.read("~use_tension", bool, False)
+        self._read_timeout = parameters.read("~read_timeout", float, WIRE.read_timeout_s,
+                                             LEAST_READ_TIMEOUT_S, LARGEST_READ_TIMEOUT_S)
+        self._limit = parameters.read("~goal_time_limit", float, 10.0, SHORTEST_GOAL_S, LONGEST_S)
+        self._preshapes = grasps.load_preshapes(parameters.read("~grasps_file", str, "") or None)
         self.driver: HandSerialDriver | None = None
         self.port = self._port_setting or "(the only serial device)"
         self.calibrated = False

@@ -14,7 +14,7 @@
 #include <cstring>
 #include <type_traits>
 
-#include "lwr_fri_bridge/control_port.hpp"
+#include "lwr_fri_bridge/names.hpp"
 
 namespace lwr_fri_bridge::fri {
 

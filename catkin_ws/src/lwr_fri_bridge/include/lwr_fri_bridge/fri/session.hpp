@@ -80,6 +80,9 @@ class Session {
   std::uint16_t lastSent() const { return sent_; }
 
  private:
+  Verdict checkForm(const std::uint8_t* bytes, std::size_t size, MeasurementDatagram& candidate);
+  bool provesRestart(const MeasurementDatagram& candidate);
+  void accept(const MeasurementDatagram& candidate, const Reception& reception);
   Verdict checkOrder(const MeasurementDatagram& candidate, Reception& reception);
   bool leaps(const MeasurementDatagram& candidate, std::uint32_t cycles) const;
   bool newPeriod(const MeasurementDatagram& candidate) const;

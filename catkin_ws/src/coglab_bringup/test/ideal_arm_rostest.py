@@ -1,0 +1,126 @@
+#!/usr/bin/python3
+"""Controllers on the ideal arm: point-to-point, DMP, feedback, hold and reset, an orderly end."""
+
+from __future__ import annotations
+
+import sys
+import time
+import unittest
+
+import rosnode
+import rospkg
+import rospy
+import rostest
+
+sys.path.insert(0, rospkg.RosPack().get_path("coglab_controllers") + "/test")
+from coglab_msgs.msg import FeedbackStatus, LwrState, ReasonCode
+from coglab_msgs.srv import AddPtpRequest, FeedbackSelect, LwrCommand
+from robot_fixture import HOME, JOINTS, Robot, end_within, robot_processes, wait_until
+from sensor_msgs.msg import JointState
+from std_msgs.msg import String
+
+GOAL = (0.80, 0.0, 0.45)
+AWAY = [HOME[0] + 0.5, *HOME[1:]]
+
+
+class IdealArm(unittest.TestCase):
+    """One robot for all tests; they run in the order of their names."""
+
+    @classmethod
+    def setUpClass(cls) -> None:
+        cls.robot = Robot()
+        cls.events = rospy.Publisher("lwr/ros_events", String, queue_size=1)
+        cls.states: list[LwrState] = []
+        rospy.Subscriber("lwr/state", LwrState, cls.states.append)
+
+    def command(self, event: str) -> object:
+        return self.robot.call("lwr/command", LwrCommand, event)
+
+    def test_1_stands_at_home_until_start(self) -> None:
+        joints = rospy.wait_for_message("lwr/joint_states", JointState, 20.0)
+        self.assertEqual(joints.name, JOINTS)
+        self.assertEqual(list(joints.position), HOME)
+        state = rospy.wait_for_message("lwr/state", LwrState, 20.0)
+        self.assertEqual((state.supervisor, state.motion_allowed), ("monitor", False))
+        self.assertEqual(state.reason_code, ReasonCode.NOT_IN_COMMAND_MODE)
+        self.assertIn("rosservice call /lwr/command start", state.reason)
+        wait_until(lambda: self.robot.manager("get_active_controller").controller_id == "ptp", 20.0, "ptp active")
+        self.assertEqual(self.robot.manager("list_controllers").controller_ids[:2], ["dmp", "ptp"])
+        refused = self.robot.add_ptp(AWAY)
+        self.assertEqual(refused.status, AddPtpRequest.REJECTED)
+        self.assertEqual(refused.reason_code, ReasonCode.NOT_IN_COMMAND_MODE)
+        nodes = set(rosnode.get_node_names())
+        self.assertIn("/robot", nodes)
+        self.assertFalse(nodes & {"/lwr", "/cell", "/coglab_sim", "/ih2_hand", "/coglab", "/perception"}, nodes)
+
+    def test_2_goes_from_point_to_point(self) -> None:
+        self.robot.start()
+        self.robot.go(AWAY)
+        for value, wanted in zip(self.robot.arm(), AWAY, strict=True):
+            self.assertAlmostEqual(value, wanted, delta=1e-3)
+
+    def test_3_hold_brakes_and_latches_until_reset(self) -> None:
+        robot = self.robot
+        motion = robot.add_ptp(HOME)
+        self.assertEqual(motion.status, AddPtpRequest.STARTED, motion.message)
+        wait_until(lambda: max(abs(v) for v in robot.joints.velocity) > 0.1, 10.0, "in motion")
+        self.events.publish("hold")
+        wait_until(lambda: robot.state.hold_latched, 10.0, "hold")
+        self.assertEqual((robot.state.supervisor, robot.state.reason_code), ("holding", ReasonCode.HELD))
+        wait_until(lambda: not any(robot.joints.velocity), 10.0, "stand-still")
+        wait_until(lambda: motion.ptp_id in robot.unfinished, 10.0, "unfinished_ptp")
+        held = robot.arm()
+        refused = self.command("start")
+        self.assertEqual((refused.success, refused.reason_code), (False, ReasonCode.HELD))
+        self.assertEqual(robot.add_ptp(HOME).status, AddPtpRequest.REJECTED)
+        time.sleep(0.3)
+        self.assertEqual(robot.arm(), held)
+        self.assertTrue(self.command("reset").success)
+        wait_until(lambda: robot.state.motion_allowed, 10.0, "motion allowed")
+        self.assertEqual(robot.arm(), held)  # what ran before the hold is over
+        robot.go(HOME)
+
+    def test_4_reaches_a_goal_of_tf_and_takes_feedback(self) -> None:
+        robot = self.robot
+        path = rospkg.RosPack().get_path("coglab_controllers") + "/config/primitives.xml"
+        self.assertTrue(robot.dmp("load_dmps", path).success)
+        robot.switch("dmp")
+        enabled = robot.call("controller_manager/feedback/enable", FeedbackSelect, ["ee_admittance"], "")
+        self.assertTrue(enabled.success, enabled.message)
+        status = rospy.wait_for_message("controller_manager/feedback/status", FeedbackStatus, 20.0)
+        self.assertTrue(status.controllers)
+        robot.see_hand(GOAL)
+        answers = []
+
+        def begun() -> bool:
+            answers.append(robot.execute())
+            return answers[-1].success
+
+        wait_until(begun, 10.0, "execute_dmp")
+        wait_until(lambda: robot.feedback.state == "reached", 20.0, "reached")
+        self.assertLess(robot.feedback.remaining_distance, 0.006)
+
+    def test_5_modes_with_forces_are_refused(self) -> None:
+        refused = self.command("joint_impedance stiffness 500")
+        self.assertEqual((refused.success, refused.reason_code), (False, ReasonCode.NOT_SUPPORTED))
+        unknown = self.command("jump")
+        self.assertEqual(unknown.reason_code, ReasonCode.INVALID_ARGUMENT)
+        self.assertIn("start, stop, hold, reset, position", unknown.message)
+
+    def test_6_a_stop_needs_a_start(self) -> None:
+        self.assertTrue(self.command("stop").success)
+        wait_until(lambda: self.robot.state.supervisor == "monitor", 10.0, "monitor")
+        self.assertFalse(self.robot.state.motion_allowed)
+        epochs = [state.motion_epoch for state in self.states]
+        self.assertEqual(epochs, sorted(epochs))
+
+    def test_7_ends_at_once_and_comes_again(self) -> None:
+        first = robot_processes()
+        self.assertEqual(len(first), 1)
+        end_within(first, 10.0)
+        wait_until(lambda: robot_processes() not in ([], first), 20.0, "a new process")
+
+
+if __name__ == "__main__":
+    rospy.init_node("ideal_arm_rostest")
+    rostest.rosrun("coglab_bringup", "ideal_arm", IdealArm, sys.argv)

@@ -1,0 +1,64 @@
+/// @file
+/// The motion controller around a motion that somebody wrote against motion/motion.hpp, and how such
+/// a motion is registered.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "coglab_controllers/manager/plugin_registry.hpp"
+#include "coglab_controllers/motion/motion_runner.hpp"
+
+namespace coglab_controllers {
+
+/// Arguments of start_motion.
+struct MotionRequestByName {
+  std::vector<std::string> names;  ///< arguments that are given; the others have their default
+  std::vector<double> values;      ///< one for each name, in the unit that the motion declared
+  bool queue = false;  ///< wait for the end of the motion under way; false: take its place
+};
+
+/// Progress of the motion under way, for motion_feedback.
+struct MotionProgress {
+  std::int64_t stamp_ns = 0;
+  int id = -1;  ///< of the motion under way or the last one; -1: none yet
+  MotionState state = MotionState::Idle;
+  Reason reason;
+  double time = 0.0;  ///< s since it began, on its own clock
+  int queued = 0;
+};
+
+/// Runs any Motion<>. Parameters: those of MotionRunner, and one for the default of each argument.
+class AuthoredController : public MotionRunner<MotionArguments> {
+ public:
+  explicit AuthoredController(std::unique_ptr<Motion<>> motion);
+  ~AuthoredController() override;
+
+  /// start_motion; any thread.
+  MotionAnswer startMotion(const MotionRequestByName& request);
+  /// What start_motion may give: name, unit, default and range of each argument, one line each.
+  std::string describeArguments() const;
+  /// Newest progress; one reader thread.
+  bool readProgress(MotionProgress& progress) { return progress_.read(progress); }
+
+ private:
+  void report(std::int64_t stamp_ns) override;
+  Answer readArguments(const MotionRequestByName& request, MotionArguments& values) const;
+
+  TripleBuffer<MotionProgress> progress_;
+};
+
+}  // namespace coglab_controllers
+
+/// Registers a class derived from Motion<> from one of its library's source files, outside of any
+/// namespace: `COGLAB_REGISTER_MOTION("wave/Wave", Wave)`. Where the library is lib<name>.so and the
+/// type <name>/…, load_controller finds it by the type alone.
+#define COGLAB_REGISTER_MOTION(type, Class)                                               \
+  namespace {                                                                             \
+  const ::coglab_controllers::MotionRegistration coglab_motion_registration(              \
+      type, {[]() -> ::coglab_controllers::MotionController* {                            \
+               return new ::coglab_controllers::AuthoredController(std::make_unique<Class>()); \
+             },                                                                           \
+             nullptr});                                                                   \
+  }

@@ -1,0 +1,105 @@
+/// @file
+/// The DMP plug-in in the control cycle: eq. (1)-(5) towards a goal that may move, jump or vanish.
+#pragma once
+
+#include <cstdint>
+
+#include "coglab_controllers/goal/goal_feed.hpp"
+#include "coglab_controllers/motion/motion.hpp"
+#include "coglab_controllers/motion/reference_loop.hpp"
+#include "coglab_controllers/plugins/dmp_plan.hpp"
+
+namespace coglab_controllers {
+
+/// Progress of the motion, for dmp/feedback.
+struct DmpProgress {
+  std::int64_t stamp_ns = 0;
+  Name primitive;
+  MotionState state = MotionState::Idle;
+  Reason reason;
+  double phase = 0.0;
+  double remaining_distance = 0.0;  ///< m, end-effector to goal as received
+  double remaining_time = 0.0;      ///< s
+  Pose goal;  ///< of the hand in dmp_frame_name, as estimated, or as latched at the end
+};
+
+/// One cycle, for dmp/ik_debug. Poses and vectors in the robot's base frame.
+struct IkDebugRecord {
+  std::int64_t stamp_ns = 0;
+  double phase = 0.0;
+  Vector3 goal = Vector3::Zero();
+  Pose set_point, measured;
+  Vector3 velocity = Vector3::Zero(), angular_velocity = Vector3::Zero();
+  IkResult ik;
+};
+
+/// Where a DMP motion is.
+enum class DmpStage : std::uint8_t {
+  Rest,     ///< no motion
+  Travel,   ///< the set-point is on its way
+  Arrive,   ///< the set-point is at the goal, the hand is not yet
+  Settle,   ///< reached; the hand comes to rest
+  Watch,    ///< reached, the arm stands; a goal that leaves its ball is followed again
+  GivenUp   ///< the reason says why
+};
+
+/// The real-time half of the plug-in. Parameters: the goal's (GoalGateParameters), the estimator's
+/// and the end's (MotionEndParameters) as DmpController lists them.
+class DmpCycle : public Motion<DmpPlan> {
+ public:
+  /// @param goals outlives this object
+  explicit DmpCycle(GoalFeed& goals) : goals_(goals) {}
+
+  void configure(MotionConfiguration& configuration) override;
+  void start(const MotionStart<DmpPlan>& start) override;
+  void computeReference(const MotionCycle& cycle, MotionReference& reference) override;
+  MotionState state() const override;
+  const Reason& reason() const override { return reason_; }
+  void stop() noexcept override;
+
+  DmpStage stage() const noexcept { return stage_; }
+  /// The arm follows the set-point.
+  bool loopClosed() const noexcept {
+    return stage_ == DmpStage::Travel || stage_ == DmpStage::Arrive || stage_ == DmpStage::Settle;
+  }
+  const CartesianMotion& motion() const noexcept { return motion_; }
+  DmpProgress progress(std::int64_t stamp_ns, MotionState state, const Reason& reason) const;
+  IkDebugRecord debug(const CycleInput& input, const IkResult& ik) const;
+
+ private:
+  void execute(const MotionStart<DmpPlan>& start);
+  void substitute(const DmpPlan& plan);
+  Pose inWorkspace(const Pose& hand_in_dmp, bool& projected) const;
+  void watchGoal(const CycleInput& input);
+  void judgeGoal();
+  void comeToRest(const IkResult& last);
+  void followEnd(const MotionCycle& cycle);
+  void giveUp(const Reason& why) noexcept;
+  void write(MotionReference& reference, double dt);
+
+  GoalFeed& goals_;
+
+  // set once, by configure()
+  std::shared_ptr<const RobotSetup> robot_;
+  GoalGateParameters frame_gate_, topic_gate_;
+  double arrive_distance_ = 0.01, finish_distance_ = 0.12;
+
+  DmpStage stage_ = DmpStage::Rest;
+  Reason reason_;
+  CartesianMotion motion_;
+  GoalGate gate_;
+  HandGoal hand_;
+  Name primitive_;
+  Pose base_from_dmp_, dmp_from_base_;
+  Pose goal_;                     // of the hand, in dmp_frame_name, inside the workspace
+  CartesianReference reference_;  // in dmp_frame_name
+  CartesianReference in_base_;
+  std::uint64_t request_ = 0;     // whose goals are followed
+  double remaining_distance_ = 0.0;
+  bool projected_ = false;    // the goal is outside the workspace
+  bool jumps_ = false;        // the motion begins elsewhere than where the arm is
+  Arrival arrival_;
+  double since_reached_ = 0.0;  // s
+};
+
+}  // namespace coglab_controllers

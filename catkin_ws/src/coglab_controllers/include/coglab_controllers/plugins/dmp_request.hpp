@@ -1,0 +1,28 @@
+/// @file
+/// A request for a DMP motion, as execute_dmp and switch_dmp have it.
+#pragma once
+
+#include <string>
+
+#include "coglab_controllers/kinematics/types.hpp"
+
+namespace coglab_controllers {
+
+/// The fields of execute_dmp, with their names. switch_dmp has no initial state and no goal_frame:
+/// it leaves both as they are.
+struct DmpRequest {
+  static constexpr int kCurrent = 0, kGiven = 1;  ///< initial_state
+
+  std::string primitive_id;
+  int initial_state = kCurrent;
+  Vector3 initial_position = Vector3::Zero();  ///< m, in dmp_frame_name; only with kGiven
+  Vector3 initial_velocity = Vector3::Zero();  ///< m/s
+  double dmp_ratio = 1.0;
+  Vector3 goal_offset = Vector3::Zero();  ///< m, in the goal frame, or dmp_frame_name (dmp_goal)
+  bool orientation_control = false;
+  Eigen::Vector4d target_orientation =
+      Eigen::Vector4d::Zero();  ///< x y z w; all zero: keep the current one
+  std::string goal_frame;  ///< tf2 frame that the motion follows; empty: what comes on dmp_goal
+};
+
+}  // namespace coglab_controllers

@@ -1,0 +1,125 @@
+/// @file
+/// An arm in virtual time, for tests of motions: the controller manager as on the robot, and an arm
+/// that follows it. No ROS, no threads; a second takes a few milliseconds.
+#pragma once
+
+#include <cstdint>
+#include <fstream>
+#include <memory>
+#include <sstream>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "coglab_controllers/manager/controller_manager.hpp"
+#include "coglab_controllers/motion/authored_controller.hpp"
+#include "coglab_rt/braking.hpp"
+#include "coglab_rt/interpolator.hpp"
+#include "coglab_rt/joint_limits_table.hpp"
+
+namespace coglab_controllers {
+
+inline std::string readText(const std::string& path) {
+  std::ifstream file(path);
+  std::ostringstream text;
+  text << file.rdbuf();
+  return text.str();
+}
+
+/// Manager, arm and clock. The arm follows velocities at once and exactly, or, after
+/// followWithinLimits(), as the robot's interface does. Time advances by tick() alone.
+class VirtualArm {
+ public:
+  /// @param description folder of the package lwr_description
+  /// @param parameters YAML text as below /controller_manager
+  /// @param lockstep false: requests wait until another thread calls tick()
+  explicit VirtualArm(const std::string& description, const std::string& parameters = "",
+                      double cycle = 0.005, bool lockstep = true)
+      : period(cycle),
+        limits(coglab_rt::loadJointLimits(description + "/config/joint_limits.yaml")) {
+    ManagerSettings settings =
+        readManagerSettings(YAML::Load(parameters), readText(description + "/urdf/lwr_ih2.urdf"),
+                            limits, lockstep);
+    settings.cycle.overrun_time = 0.0;
+    settings.clock = [this] { return now_ns; };
+    settings.plan_timeout = 0.3;
+    settings.logger = &logger;
+    manager = std::make_unique<ControllerManager>(std::move(settings));
+    sample.position << -1.4349, -0.6086, 1.4986, 1.7048, 0.1857, 0.2152, 0.782;
+    sample.commanded_position = sample.position;
+    sample.block = MotionBlock::None;
+    sample.cycle_time = period;
+    sample.stop_delay = coglab_rt::lostTime(period);  // as the bridge has it
+    sample.stop_rounding = 2.0 * coglab_rt::kWireRounding;
+    tick();
+  }
+  virtual ~VirtualArm() = default;
+  VirtualArm(const VirtualArm&) = delete;
+  VirtualArm& operator=(const VirtualArm&) = delete;
+
+  /// Loads a motion and makes it the active controller. @throws std::runtime_error with the refusal
+  AuthoredController& load(const std::string& id, const std::string& type) {
+    std::string active;
+    Answer answer = manager->load(id, type);
+    if (answer.success) answer = manager->switchTo(id, active);
+    if (!answer.success) throw std::runtime_error(answer.message);
+    return dynamic_cast<AuthoredController&>(*manager->motion(id));
+  }
+
+  /// From now on the arm follows within its acceleration and jerk limits.
+  void followWithinLimits() {
+    interpolator = std::make_unique<coglab_rt::Interpolator>(limits);
+    interpolator->reset(sample.position);
+  }
+
+  /// One measurement and one cycle; the arm then follows for one period.
+  const VelocityCommand& tick() {
+    now_ns += static_cast<std::int64_t>(period * 1e9);
+    ++sample.sequence;
+    sample.stamp_ns = now_ns;
+    beforeCycle();
+    manager->cycle().run(sample, period, command);
+    if (sample.block != MotionBlock::None) command.velocity.setZero();
+    if (interpolator) {
+      interpolator->step(command.velocity, period);
+      sample.position = interpolator->position();
+      sample.velocity = sample.commanded_velocity = interpolator->velocity();
+      sample.commanded_acceleration = interpolator->acceleration();
+      sample.commanded_position = sample.position;
+      return command;
+    }
+    sample.commanded_acceleration = (command.velocity - sample.commanded_velocity) / period;
+    sample.position += period * command.velocity;
+    sample.velocity = command.velocity;
+    sample.commanded_velocity = command.velocity;
+    sample.commanded_position = sample.position;
+    return command;
+  }
+  /// So many seconds of cycles.
+  void run(double seconds) {
+    for (double t = 0.0; t < seconds - 1e-9; t += period) tick();
+  }
+
+  Pose hand() const { return manager->settings().robot->chain.evaluate(sample.position).tool; }
+  Vector3 handVelocity() const {
+    const ChainState state = manager->settings().robot->chain.evaluate(sample.position);
+    return (state.jacobian * sample.velocity).head<3>();
+  }
+  MotionState state() const { return manager->report().motion; }
+  std::string reason() const { return manager->report().reason.str(); }
+
+  double period;
+  std::int64_t now_ns = 1'000'000'000;
+  coglab_rt::JointLimits limits;
+  ctrl_more::Logger logger;  // without sinks
+  std::unique_ptr<ControllerManager> manager;
+  std::unique_ptr<coglab_rt::Interpolator> interpolator;  // null: velocities count at once
+  RobotSample sample;
+  VelocityCommand command;
+
+ private:
+  /// What others do between two cycles.
+  virtual void beforeCycle() {}
+};
+
+}  // namespace coglab_controllers

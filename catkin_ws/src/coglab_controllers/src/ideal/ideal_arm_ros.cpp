@@ -1,0 +1,256 @@
+#include "coglab_controllers/ideal/ideal_arm_ros.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <ctime>
+#include <stdexcept>
+#include <utility>
+#include <vector>
+
+#include <ros/package.h>
+
+#include "coglab_rt/clock.hpp"
+#include "coglab_rt/joint_limits_table.hpp"
+#include "coglab_rt/ros/ros_time.hpp"
+
+namespace coglab_controllers {
+
+using coglab_rt::Answer;
+using coglab_rt::MotionBlock;
+using coglab_rt::ReasonCode;
+using coglab_rt::RobotSample;
+
+namespace {
+
+constexpr double kServeLimit = 1.0;  // s within which a tick takes a request
+constexpr double kBrakeLimit = 3.0;  // s within which the arm stands after `stop`
+constexpr int kLateTicks = 20;       // so many periods behind, the arm's clock starts anew
+constexpr std::uint16_t kAllPower = 0x7F;
+
+/// Value of a parameter; one of another type is an error and not silently the default.
+template <typename T>
+T parameter(const ros::NodeHandle& node, const char* name, const T& otherwise,
+            const char* expected) {
+  T value = otherwise;
+  if (node.hasParam(name) && !node.getParam(name, value)) {
+    throw std::invalid_argument("parameter " + node.resolveName(name) + ": expected " + expected);
+  }
+  return value;
+}
+
+double within(const ros::NodeHandle& node, const char* name, double otherwise, double low,
+              double high) {
+  const double value = parameter<double>(node, name, otherwise, "a number");
+  if (value >= low && value <= high) return value;
+  throw std::invalid_argument("parameter " + node.resolveName(name) + " = " +
+                              std::to_string(value) + " is outside its range " +
+                              std::to_string(low) + ".." + std::to_string(high));
+}
+
+/// Waits until the condition holds; false if it did not within the limit.
+template <typename Condition>
+bool waitFor(double limit, const Condition& condition) {
+  const auto end = std::chrono::steady_clock::now() + std::chrono::duration<double>(limit);
+  while (!condition()) {
+    if (std::chrono::steady_clock::now() > end) return false;
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  }
+  return true;
+}
+
+bool sameState(const IdealArmView& one, const IdealArmView& other) {
+  return one.state == other.state && one.hold_latched == other.hold_latched &&
+         one.sample.block == other.sample.block &&
+         one.sample.motion_epoch == other.sample.motion_epoch;
+}
+
+}  // namespace
+
+IdealArmConfig readIdealArmConfig(const ros::NodeHandle& node) {
+  IdealArmConfig config;
+  auto table = parameter<std::string>(node, "limits_file", "", "a path");
+  if (table.empty()) {
+    const std::string package = ros::package::getPath("lwr_description");
+    if (package.empty()) {
+      throw std::runtime_error(
+          "package lwr_description is not found; build and source the workspace or set " +
+          node.resolveName("limits_file"));
+    }
+    table = package + "/config/joint_limits.yaml";
+  }
+  config.limits = coglab_rt::loadJointLimits(
+      table, parameter<std::string>(node, "limits_profile", "default", "a name"));
+  config.period = parameter<double>(node, "ideal_period", config.period, "a number");
+  config.command_timeout =
+      parameter<double>(node, "command_timeout", config.command_timeout, "a number");
+  if (node.hasParam("start_position")) {
+    const auto start =
+        parameter<std::vector<double>>(node, "start_position", {}, "a list of 7 numbers");
+    if (start.size() != 7) {
+      throw std::invalid_argument("parameter " + node.resolveName("start_position") +
+                                  ": expected 7 numbers, got " + std::to_string(start.size()));
+    }
+    std::copy(start.begin(), start.end(), config.start_position.data());
+  }
+  config.check();
+  return config;
+}
+
+IdealArmRos::IdealArmRos(const ros::NodeHandle& node)
+    : node_(node), arm_(readIdealArmConfig(node)) {
+  node_.setCallbackQueue(&queue_);
+  priority_ = static_cast<int>(within(node_, "rt_priority", 80, 0, 98));
+  const double rate = within(node_, "joint_states_rate", 200.0, 1.0, 1000.0);
+  publish_period_ = std::max(1.0 / rate, arm_.config().period);
+  for (const char* name : coglab_rt::kJointNames) joint_message_.name.emplace_back(name);
+}
+
+IdealArmRos::~IdealArmRos() { shutdown(); }
+
+void IdealArmRos::start(Wake wake) {
+  wake_ = std::move(wake);
+  joint_states_ = node_.advertise<sensor_msgs::JointState>("joint_states", 10);
+  state_ = node_.advertise<coglab_msgs::LwrState>("state", 10, true);
+  command_ = node_.advertiseService("command", &IdealArmRos::onCommand, this);
+  events_ = node_.subscribe("ros_events", 10, &IdealArmRos::onEvent, this,
+                            ros::TransportHints().tcpNoDelay());
+  running_ = true;
+  try {
+    thread_.start("ideal_arm", 256 * 1024, [this] { armLoop(); });
+    publisher_ = std::thread([this] { publishLoop(); });
+    spinner_ = std::make_unique<ros::AsyncSpinner>(2, &queue_);
+    spinner_->start();
+  } catch (...) {
+    shutdown();  // nothing may run on behind the caller's back, who frees what it uses
+    throw;
+  }
+  waitFor(kServeLimit, [this] { return scheduled_.load(); });
+  ROS_INFO("lwr: an ideal arm: no FRI, no physics; a measurement every %g ms",
+           1e3 * arm_.config().period);
+}
+
+void IdealArmRos::shutdown() {
+  if (!running_) return;
+  running_ = false;
+  closing_ = true;
+  arm_.request("stop");
+  waitFor(kBrakeLimit, [this] { return arm_.served() == arm_.requested() && arm_.stands(); });
+  arm_ends_ = true;
+  thread_.join();
+  if (spinner_) spinner_->stop();
+  publisher_ends_ = true;
+  if (publisher_.joinable()) publisher_.join();
+}
+
+void IdealArmRos::unregister() {
+  events_.shutdown();
+  command_.shutdown();
+}
+
+int IdealArmRos::highestPriority() { return real_time_ ? priority_ - 1 : 0; }
+
+void IdealArmRos::armLoop() {
+  std::string refused;
+  if (priority_ > 0) refused = coglab_rt::enterRealTime(priority_);
+  if (!refused.empty()) ROS_WARN("lwr: %s", refused.c_str());
+  real_time_ = priority_ > 0 && refused.empty();
+  scheduled_ = true;
+  const auto period = static_cast<std::int64_t>(1e9 * arm_.config().period);
+  std::int64_t next = coglab_rt::steadyNow();
+  while (!arm_ends_.load(std::memory_order_relaxed)) {
+    const std::int64_t now = coglab_rt::steadyNow();
+    arm_.tick(now);
+    if (wake_) wake_(true);
+    next += period;
+    if (now - next > kLateTicks * period) next = now + period;
+    const timespec until{static_cast<time_t>(next / 1'000'000'000),
+                         static_cast<long>(next % 1'000'000'000)};
+    clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &until, nullptr);
+  }
+}
+
+void IdealArmRos::publishLoop() {
+  IdealArmView view, last;
+  bool shown = false;
+  while (!publisher_ends_.load(std::memory_order_relaxed)) {
+    if (arm_.newestView(view)) {
+      const RobotSample& sample = view.sample;
+      joint_message_.header.stamp = coglab_rt::toRos(sample.stamp_ns);
+      const auto copy = [](const coglab_rt::Vector7& from, std::vector<double>& to) {
+        to.assign(from.data(), from.data() + from.size());
+      };
+      copy(sample.position, joint_message_.position);
+      copy(sample.velocity, joint_message_.velocity);
+      copy(sample.torque, joint_message_.effort);
+      joint_states_.publish(joint_message_);
+      if (!shown || !sameState(view, last)) publishState(view);
+      shown = true;
+      last = view;
+    }
+    std::this_thread::sleep_for(std::chrono::duration<double>(publish_period_));
+  }
+}
+
+void IdealArmRos::publishState(const IdealArmView& view) {
+  const MotionBlock block = view.sample.block;
+  coglab_msgs::LwrState& message = state_message_;
+  message.header.stamp = ros::Time::now();
+  message.supervisor = nameOf(view.state);
+  // What a robot controller in good order would report.
+  message.fri_state = view.state == IdealArmState::Monitor ? "MON" : "CMD";
+  message.quality = "PERFECT";
+  message.control_mode = "POSITION";
+  message.power = kAllPower;
+  message.motion_allowed = block == MotionBlock::None;
+  message.hold_latched = view.hold_latched;
+  message.reason_code = static_cast<std::uint16_t>(coglab_rt::codeOf(block));
+  message.reason = coglab_rt::describe(block);
+  const std::string event = coglab_rt::wayOut(block);
+  if (!event.empty()) message.reason += ": rosservice call " + command_.getService() + " " + event;
+  message.motion_epoch = view.sample.motion_epoch;
+  message.cycle_time = view.sample.cycle_time;
+  state_.publish(message);
+}
+
+Answer IdealArmRos::request(const std::string& event) {
+  if (closing_) {
+    return Answer::refusal(ReasonCode::Stopping,
+                           "this node is ending: the arm stops and takes no command");
+  }
+  Answer answer = arm_.request(event);
+  if (!answer.success) return answer;
+  const std::uint32_t number = arm_.requested();
+  const bool stop = event == "stop";
+  const bool settled = waitFor(stop ? kBrakeLimit : kServeLimit, [this, number, stop] {
+    return arm_.served() - number < 0x80000000U && (!stop || arm_.stands());
+  });
+  if (!settled) {
+    return Answer::refusal(ReasonCode::NotAdopted,
+                           event +
+                               ": the arm's thread did not get to it in time; relieve this "
+                               "computer and ask again");
+  }
+  return answer;
+}
+
+void IdealArmRos::onEvent(const std_msgs::String& message) {
+  const Answer answer = request(message.data);
+  if (answer.success) {
+    ROS_INFO("lwr: %s", answer.message.c_str());
+  } else {
+    ROS_WARN("lwr: ros_events: %s", answer.message.c_str());
+  }
+}
+
+bool IdealArmRos::onCommand(coglab_msgs::LwrCommand::Request& request,
+                            coglab_msgs::LwrCommand::Response& response) {
+  const Answer answer = this->request(request.event);
+  response.success = answer.success;
+  response.reason_code = answer.number();
+  response.message = answer.message;
+  if (!answer.success)
+    ROS_WARN("lwr: command '%s': %s", request.event.c_str(), answer.message.c_str());
+  return true;
+}
+
+}  // namespace coglab_controllers

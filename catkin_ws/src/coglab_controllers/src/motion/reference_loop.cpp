@@ -1,0 +1,174 @@
+#include "coglab_controllers/motion/reference_loop.hpp"
+
+#include <algorithm>
+
+#include "coglab_controllers/kinematics/rotation.hpp"
+
+namespace coglab_controllers {
+
+using Space = MotionReference::Space;
+
+Reason Arrival::handStuck(double away) noexcept {
+  return Reason(ReasonCode::TargetNotReached, "the hand does not come to the goal: ")
+         << away << " m are left; is the arm blocked?";
+}
+
+void ReferenceLoop::configure(const MotionSetup& setup) {
+  robot_ = setup.robot;
+  const Parameters parameters(setup.parameters, setup.id);
+  IkParameters ik;
+  const double most = std::min(200.0, largestGain(setup.cycle_time));
+  ik.pos_clik_gain =
+      parameters.number("pos_clik_gain", std::min(ik.pos_clik_gain, most), 0.0, most);
+  ik.rot_clik_gain =
+      parameters.number("rot_clik_gain", std::min(ik.rot_clik_gain, most), 0.0, most);
+  ik.singularity_threshold =
+      parameters.number("singularity_threshold", ik.singularity_threshold, 0.0, 1.0);
+  ik.rotation_first_scaling = parameters.flag("rotation_first_scaling", ik.rotation_first_scaling);
+  ik.velocity_limit = robot_->limits.velocity;
+  ik.acceleration_limit = robot_->limits.acceleration;
+  ik.jerk_limit = robot_->limits.jerk;
+  ik_ = std::make_unique<TwoTaskIk>(ik);
+  const double most_joints = std::min(100.0, largestGain(setup.cycle_time));
+  gain_ = parameters.number("Kp", std::min(gain_, most_joints), 0.0, most_joints);
+  tolerance_ = parameters.number("tolerance", tolerance_, 1e-5, 0.1);
+  arrive_distance_ = parameters.number("arrive_distance", arrive_distance_, 1e-4, 0.5);
+  blend_.setTime(parameters.number("hold_blend", 0.15, 0.0, 5.0));
+}
+
+void ReferenceLoop::open() noexcept {
+  reference_.rest();
+  hold_.begin();
+}
+
+void ReferenceLoop::write(const CycleInput& input, const MotionReference& reference,
+                          References& references) noexcept {
+  const Space before = reference_.space;
+  reference_ = reference;
+  if (reference.space == Space::Rest) {
+    if (before != Space::Rest) hold_.begin();
+    hold_.computeReference(input, robot_->chain, references);
+    return;
+  }
+  if (reference.jumps || reference.space != before) beginBlend(input);
+  if (reference.space == Space::Joint) {
+    references.states.view<kMaxJoints>(references.joint_position) = reference.joint_position;
+    references.states.view<kMaxJoints>(references.joint_velocity) = reference.joint_velocity;
+    // The pose where the tool is, for feedback controllers that look at it.
+    writePose(references, input.chain.tool);
+    references.states.view<6>(references.twist).setZero();
+  } else {
+    writePose(references, reference.tool.pose);
+    references.states.view<6>(references.twist) << reference.tool.velocity,
+        reference.tool.angular_velocity;
+  }
+}
+
+void ReferenceLoop::beginBlend(const CycleInput& input) noexcept {
+  if (reference_.space == Space::Joint) {
+    blend_.begin(Vector3::Zero(), Vector3::Zero(),
+                 reference_.joint_position - input.robot.position);
+    return;
+  }
+  const Pose& measured = input.chain.tool;
+  blend_.begin(reference_.tool.pose.position - measured.position,
+               rotationBetween(measured.orientation, reference_.tool.pose.orientation),
+               JointVector::Zero());
+}
+
+void ReferenceLoop::resolve(const CycleInput& input, References& references) noexcept {
+  switch (reference_.space) {
+    case Space::Rest:
+      ik_result_.scale = 1.0;
+      hold_.resolve(input, references, [&](const ChainState& state, const JointVector& q,
+                                           const CartesianReference& to) {
+        ik_->solve(state, q, to, ik_result_);
+        return ik_result_.velocity;
+      });
+      break;
+    case Space::Joint:
+      resolveJoints(input, references);
+      break;
+    case Space::Pose:
+      resolvePose(input, references);
+      break;
+  }
+}
+
+void ReferenceLoop::resolveJoints(const CycleInput& input, References& references) noexcept {
+  ik_result_.scale = 1.0;
+  const JointVector error = references.states.view<kMaxJoints>(references.joint_position) -
+                            input.robot.position - blend_.joints();
+  blend_.advance(input.dt);
+  references.states.view<kMaxJoints>(references.joint_velocity) += gain_ * error;
+}
+
+void ReferenceLoop::resolvePose(const CycleInput& input, References& references) noexcept {
+  const auto pose = references.states.view<7>(references.pose);
+  const auto twist = references.states.view<6>(references.twist);
+  CartesianReference to = reference_.tool;
+  to.pose.position = pose.head<3>();
+  to.pose.orientation = Quaternion(pose[6], pose[3], pose[4], pose[5]);
+  to.velocity = twist.head<3>();
+  to.angular_velocity = twist.tail<3>();
+  ChainState chain = input.chain;
+  chain.tool.position += blend_.position();
+  chain.tool.orientation = expRotation(blend_.rotation()) * chain.tool.orientation;
+  blend_.advance(input.dt);
+  ik_->solve(chain, input.robot.position, to, ik_result_);
+  references.states.view<kMaxJoints>(references.joint_velocity) =
+      reference_.share * ik_result_.velocity;
+}
+
+SetPoint ReferenceLoop::setPoint(const CycleInput& input, bool at_rest) const noexcept {
+  const double rate = std::max(input.time_scale, 0.1);
+  const RobotSample& robot = input.robot;
+  SetPoint from;
+  from.joints = robot.commanded_position;
+  from.joint_velocity = robot.commanded_velocity / rate;
+  if (reference_.space == Space::Joint) {
+    from.joints = reference_.joint_next;
+    from.joint_velocity = reference_.joint_velocity / rate;
+  }
+  ChainState state;
+  robot_->chain.evaluate(from.joints, state);
+  const Eigen::Matrix<double, 6, 1> twist = state.jacobian * from.joint_velocity;
+  from.pose = state.tool;
+  from.velocity = twist.head<3>();
+  from.angular_velocity = twist.tail<3>();
+  if (reference_.space == Space::Pose) {
+    from.pose = reference_.nextTool();
+    from.velocity = reference_.tool.velocity / rate;
+    from.angular_velocity = reference_.tool.angular_velocity / rate;
+  }
+  if (at_rest && reference_.space != Space::Rest) {
+    from.joint_velocity.setZero();
+    from.velocity.setZero();
+    from.angular_velocity.setZero();
+  }
+  return from;
+}
+
+double ReferenceLoop::error(const CycleInput& input) const noexcept {
+  switch (reference_.space) {
+    case Space::Joint:
+      return (reference_.joint_next - input.robot.position).lpNorm<Eigen::Infinity>();
+    case Space::Pose:
+      return ik_result_.position_error.norm();
+    case Space::Rest:
+      break;
+  }
+  return 0.0;
+}
+
+double ReferenceLoop::allowedError() const noexcept {
+  return reference_.space == Space::Joint ? tolerance_ : arrive_distance_;
+}
+
+Reason ReferenceLoop::stuck(const CycleInput& input) const noexcept {
+  if (reference_.space == Space::Pose) return Arrival::handStuck(error(input));
+  return Reason(ReasonCode::TargetNotReached,
+                "the arm does not reach the target: is it blocked?");
+}
+
+}  // namespace coglab_controllers

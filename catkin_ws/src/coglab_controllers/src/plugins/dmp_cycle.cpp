@@ -1,0 +1,310 @@
+#include "coglab_controllers/plugins/dmp_cycle.hpp"
+
+#include <algorithm>
+#include <limits>
+
+#include "coglab_controllers/kinematics/rotation.hpp"
+
+namespace coglab_controllers {
+
+namespace {
+
+// After the end the loop is opened once the hand is this close (m) and turned this close (rad), or
+// after kRestTime (s), slowly, in kFadeTime (s): a hand that still turns then would leave its place
+// if each joint braked by itself.
+constexpr double kRestError = 3e-4;
+constexpr double kRestAngle = 3e-3;
+constexpr double kRestTime = 0.5;
+constexpr double kFadeTime = 0.3;
+
+Pose inverse(const Pose& pose) {
+  const Quaternion back = pose.orientation.conjugate();
+  return {-(back * pose.position), back};
+}
+
+Pose operator*(const Pose& a, const Pose& b) {
+  return {a.position + a.orientation * b.position, (a.orientation * b.orientation).normalized()};
+}
+
+GoalEstimatorParameters readEstimator(const Parameters& parameters) {
+  GoalEstimatorParameters estimator;
+  estimator.time_constant =
+      parameters.number("goal_time_constant", estimator.time_constant, 0.0, 2.0);
+  estimator.noisy_time_constant =
+      parameters.number("noisy_goal_time_constant", estimator.noisy_time_constant, 0.005, 2.0);
+  return estimator;
+}
+
+MotionEndParameters readEnd(const Parameters& parameters) {
+  MotionEndParameters end;
+  end.phase = parameters.number("end_phase", end.phase, 1e-6, 0.5);
+  end.speed = parameters.number("end_speed", end.speed, 1e-6, 1.0);
+  end.turning = parameters.number("end_turning", end.turning, 1e-6, 10.0);
+  end.distance = parameters.number("end_distance", end.distance, 1e-6, 0.5);
+  end.noisy_speed = parameters.number("noisy_end_speed", end.noisy_speed, 1e-6, 1.0);
+  end.noisy_turning = parameters.number("noisy_end_turning", end.noisy_turning, 1e-6, 10.0);
+  end.noisy_distance = parameters.number("noisy_end_distance", end.noisy_distance, 1e-6, 0.5);
+  end.follow_distance = parameters.number("follow_distance", end.follow_distance, 1e-3, 1.0);
+  end.follow_time = parameters.number("follow_time", end.follow_time, 0.0, 10.0);
+  return end;
+}
+
+}  // namespace
+
+Pose HandGoal::at(const GoalObservation& goal) const noexcept {
+  if (!in_goal_frame) return {goal.position + offset, orientation};
+  Pose pose;
+  pose.position = goal.position + goal.orientation * offset;
+  pose.orientation =
+      keep_orientation ? orientation : (goal.orientation * orientation).normalized();
+  return pose;
+}
+
+void DmpCycle::configure(MotionConfiguration& configuration) {
+  const Parameters& parameters = configuration.parameters;
+  robot_ = configuration.setup.robot;
+  finish_distance_ = parameters.number("goal_finish_distance", finish_distance_, 0.0, 1.0);
+  arrive_distance_ = parameters.number("arrive_distance", arrive_distance_, 1e-4, 0.5);
+  arrival_.configure(parameters);
+  frame_gate_ = readGoalGate(parameters);
+  // A goal on dmp_goal is meant as it is, also when it is far from the last one.
+  topic_gate_ = frame_gate_;
+  topic_gate_.max_age = parameters.number("goal_timeout", 0.0, 0.0, 3600.0);
+  topic_gate_.max_jump = std::numeric_limits<double>::infinity();
+  motion_ = CartesianMotion(readEstimator(parameters), readEnd(parameters));
+}
+
+// ---- begin and end -------------------------------------------------------------------------------
+
+void DmpCycle::start(const MotionStart<DmpPlan>& start) {
+  const DmpPlan& plan = start.request;
+  base_from_dmp_ = plan.base_from_dmp;
+  dmp_from_base_ = inverse(plan.base_from_dmp);
+  primitive_ = plan.primitive;
+  reason_.clear();
+  if (plan.execute) {
+    execute(start);
+  } else {
+    substitute(plan);
+  }
+  stage_ = DmpStage::Travel;
+}
+
+void DmpCycle::substitute(const DmpPlan& plan) {
+  const HandGoal before = hand_;
+  hand_ = plan.hand;
+  hand_.in_goal_frame = before.in_goal_frame;
+  if (plan.hand.keep_orientation) hand_.orientation = before.orientation;
+  bool projected = false;
+  motion_.switchTo(plan.motion, inWorkspace(hand_.at(gate_.goal()), projected));
+}
+
+void DmpCycle::execute(const MotionStart<DmpPlan>& start) {
+  // Where the motion begins: on the set-point of the motion it replaces, else on the commanded
+  // state.
+  const DmpPlan& plan = start.request;
+  const Quaternion& turn = dmp_from_base_.orientation;
+  Pose pose = dmp_from_base_ * start.from.pose;
+  Vector3 velocity = turn * start.from.velocity;
+  Vector3 angular = turn * start.from.angular_velocity;
+  if (loopClosed()) {
+    pose = reference_.pose;
+    velocity = motion_.dmp().state().velocity;
+    angular = reference_.angular_velocity / std::max(start.input.time_scale, 0.1);
+  }
+  if (plan.given) {
+    pose.position = plan.initial_position;
+    velocity = plan.initial_velocity;
+  }
+  hand_ = plan.hand;
+  if (hand_.keep_orientation) hand_.orientation = pose.orientation;
+  request_ = plan.goal.request;
+  gate_ = GoalGate(plan.hand.in_goal_frame ? frame_gate_ : topic_gate_);
+  gate_.reset(plan.goal);
+  bool projected = false;
+  motion_.start(plan.motion, pose, velocity, angular,
+                inWorkspace(hand_.at(plan.goal), projected));
+  reference_.pose = pose;
+  jumps_ = plan.given;
+}
+
+void DmpCycle::stop() noexcept {
+  motion_.stop();
+  if (stage_ != DmpStage::GivenUp) stage_ = DmpStage::Rest;
+}
+
+void DmpCycle::giveUp(const Reason& why) noexcept {
+  stage_ = DmpStage::GivenUp;
+  reason_ = why;
+}
+
+MotionState DmpCycle::state() const {
+  switch (stage_) {
+    case DmpStage::Rest:
+      return MotionState::Idle;
+    case DmpStage::Travel:
+      return gate_.state() == GoalGate::State::Fresh ? MotionState::Running : MotionState::Holding;
+    case DmpStage::Arrive:
+      return MotionState::Running;
+    case DmpStage::Settle:
+    case DmpStage::Watch:
+      return MotionState::Reached;
+    case DmpStage::GivenUp:
+      return MotionState::Aborted;
+  }
+  return MotionState::Idle;
+}
+
+// ---- the goal ------------------------------------------------------------------------------------
+
+Pose DmpCycle::inWorkspace(const Pose& hand_in_dmp, bool& projected) const {
+  const Pose hand = base_from_dmp_ * hand_in_dmp;
+  const Vector3 allowed = robot_->workspace.project(hand.position);
+  projected = (allowed - hand.position).squaredNorm() > 1e-12;
+  if (!projected) return hand_in_dmp;
+  return {(dmp_from_base_ * Pose{allowed, hand.orientation}).position, hand_in_dmp.orientation};
+}
+
+void DmpCycle::watchGoal(const CycleInput& input) {
+  GoalObservation newest;
+  goals_.read(newest);
+  const bool mine = newest.request == request_;
+  gate_.update(input.robot.stamp_ns, mine ? newest : gate_.goal());
+  const Pose wanted = hand_.at(gate_.goal());
+  goal_ = inWorkspace(wanted, projected_);
+  const Vector3 hand = (dmp_from_base_ * input.chain.tool).position;
+  // After the end the motion stands at the goal it latched; newer sights differ from it by their
+  // noise.
+  const bool travels = stage_ == DmpStage::Travel;
+  remaining_distance_ = ((travels ? wanted.position : motion_.goal()) - hand).norm();
+  if (travels) judgeGoal();
+}
+
+void DmpCycle::judgeGoal() {
+  const double ahead = goals_.ahead();
+  reason_.clear();
+  switch (gate_.state()) {
+    case GoalGate::State::Unsettled:  // never of a motion, which begins with a goal
+    case GoalGate::State::Fresh:
+      if (projected_) {
+        reason_ = Reason(ReasonCode::GoalOutsideWorkspace, "the goal is outside the workspace (")
+                  << describe(robot_->workspace.violated(
+                         (base_from_dmp_ * hand_.at(gate_.goal())).position))
+                  << "): the motion goes to the border";
+      }
+      break;
+    case GoalGate::State::Old:
+      reason_ = Reason(ReasonCode::GoalStale, "the newest goal is ")
+                << gate_.age() << " s old: the last one is held";
+      if (ahead > 0.0) {
+        reason_ << "; newer ones are refused: stamped " << ahead << " s ahead of the clock";
+      }
+      break;
+    case GoalGate::State::Jumped:
+      reason_ = Reason(ReasonCode::GoalJumped, "the goal jumped by ")
+                << gate_.jump() << " m: the last one is held until frames agree";
+      break;
+    case GoalGate::State::Lost:
+      if (remaining_distance_ < finish_distance_) {
+        reason_ = Reason(ReasonCode::GoalStale, "the goal is lost: finishing on the held one");
+      } else {
+        giveUp(Reason(ReasonCode::GoalLost, "the goal is lost for ")
+               << gate_.age() << " s with " << remaining_distance_ << " m to go; "
+               << (ahead > 0.0 ? "newer ones are stamped ahead of the clock: synchronise the clocks"
+                               : "check what publishes it"));
+      }
+      break;
+  }
+}
+
+// ---- the cycle -----------------------------------------------------------------------------------
+
+void DmpCycle::computeReference(const MotionCycle& cycle, MotionReference& reference) {
+  if (stage_ == DmpStage::Settle) comeToRest(cycle.last);
+  watchGoal(cycle.input);
+  if (stage_ == DmpStage::GivenUp) return;
+  reference_ = motion_.step(cycle.input.dt, goal_, cycle.input.time_scale);
+  followEnd(cycle);
+  if (loopClosed()) write(reference, cycle.input.dt);
+}
+
+/// Whether the hand stands at the goal, so that the arm can be left standing.
+void DmpCycle::comeToRest(const IkResult& last) {
+  const bool there = last.position_error.norm() < kRestError &&
+                     last.rotation_error.norm() < kRestAngle && reference_.velocity.norm() < 1e-6;
+  if (there || since_reached_ >= kRestTime + kFadeTime) stage_ = DmpStage::Watch;
+}
+
+void DmpCycle::followEnd(const MotionCycle& cycle) {
+  switch (motion_.event()) {
+    case MotionEnd::Event::Ended:
+      stage_ = DmpStage::Arrive;
+      reason_.clear();
+      arrival_.begin();
+      break;
+    case MotionEnd::Event::FollowsAgain:
+      stage_ = DmpStage::Travel;
+      break;
+    case MotionEnd::Event::None:
+      break;
+  }
+  if (stage_ != DmpStage::Arrive) return;
+  // The set-point is at the goal; the motion has reached it when the hand, as measured, is too.
+  const double away = cycle.last.position_error.norm();
+  switch (arrival_.update(cycle.input.dt, away, arrive_distance_)) {
+    case Arrival::State::Waiting:
+      break;
+    case Arrival::State::There:
+      stage_ = DmpStage::Settle;
+      since_reached_ = 0.0;
+      break;
+    case Arrival::State::Stuck:
+      giveUp(Arrival::handStuck(away));
+      break;
+  }
+}
+
+void DmpCycle::write(MotionReference& reference, double dt) {
+  const Quaternion& turn = base_from_dmp_.orientation;
+  in_base_ = reference_;
+  in_base_.pose = base_from_dmp_ * reference_.pose;
+  in_base_.velocity = turn * reference_.velocity;
+  in_base_.angular_velocity = turn * reference_.angular_velocity;
+  reference.cartesian(in_base_);
+  reference.jumps = jumps_;
+  jumps_ = false;
+  if (stage_ != DmpStage::Settle) return;
+  since_reached_ += dt;
+  reference.share = std::clamp(1.0 - (since_reached_ - kRestTime) / kFadeTime, 0.0, 1.0);
+}
+
+// ---- what it tells -------------------------------------------------------------------------------
+
+DmpProgress DmpCycle::progress(std::int64_t stamp_ns, MotionState state,
+                               const Reason& reason) const {
+  DmpProgress now;
+  now.stamp_ns = stamp_ns;
+  now.primitive = primitive_;
+  now.state = state;
+  now.reason = reason;
+  now.phase = motion_.dmp().state().phase;
+  now.remaining_distance = remaining_distance_;
+  now.remaining_time = motion_.remainingTime();
+  now.goal = {motion_.goal(), motion_.goalOrientation()};
+  return now;
+}
+
+IkDebugRecord DmpCycle::debug(const CycleInput& input, const IkResult& ik) const {
+  IkDebugRecord now;
+  now.stamp_ns = input.robot.stamp_ns;
+  now.phase = motion_.dmp().state().phase;
+  now.goal = base_from_dmp_.position + base_from_dmp_.orientation * motion_.goal();
+  now.set_point = in_base_.pose;
+  now.velocity = in_base_.velocity;
+  now.angular_velocity = in_base_.angular_velocity;
+  now.measured = input.chain.tool;
+  now.ik = ik;
+  return now;
+}
+
+}  // namespace coglab_controllers

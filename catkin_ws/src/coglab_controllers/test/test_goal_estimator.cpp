@@ -1,0 +1,132 @@
+// Goal estimator and orientation curve: what a goal and an orientation become before eq. (1).
+#include <gtest/gtest.h>
+
+#include "coglab_controllers/dmp/orientation_curve.hpp"
+#include "coglab_controllers/goal/goal_estimator.hpp"
+#include "coglab_controllers/kinematics/rotation.hpp"
+#include "core_support.hpp"
+
+using namespace coglab_controllers;
+using namespace coglab_controllers::test;
+
+namespace {
+constexpr double kCycle = 0.005;
+}
+
+TEST(GoalEstimator, MeetsASteadyRampWithoutLag) {
+  GoalEstimator estimator;
+  Vector3 goal = Vector3::Zero();
+  const Vector3 speed(0.1, -0.2, 0.05);
+  estimator.reset(goal);
+  for (int i = 0; i < 400; ++i) {
+    goal += kCycle * speed;
+    estimator.update(kCycle, goal);
+  }
+  // The input is held over the cycle, so what can be met is its value within that cycle.
+  EXPECT_LT((estimator.position() - goal).norm(), kCycle * speed.norm());
+  EXPECT_LT((estimator.velocity() - speed).norm(), 1e-6);
+}
+
+TEST(GoalEstimator, HasNoStepWhenTheGoalHasOne) {
+  GoalEstimator estimator;
+  estimator.reset(Vector3::Zero());
+  Vector3 last_position = Vector3::Zero(), last_velocity = Vector3::Zero();
+  for (int i = 0; i < 200; ++i) {
+    estimator.update(0.001, Vector3(0.1, 0, 0));
+    EXPECT_LT((estimator.position() - last_position).norm(), 0.1 * 0.001 / 0.06);
+    EXPECT_LT((estimator.velocity() - last_velocity).norm(), 0.25 * 0.1 * 0.001 / (0.06 * 0.06));
+    last_position = estimator.position();
+    last_velocity = estimator.velocity();
+  }
+}
+
+TEST(GoalEstimator, IsExactForAnyCycleTime) {
+  Random random(1);
+  for (int k = 0; k < 2000; ++k) {
+    GoalEstimator one, many;
+    const Vector3 start = random.point(0.02), goal = random.point(0.02);
+    one.reset(start);
+    many.reset(start);
+    const double dt = random.uniform(0.001, 0.2);
+    one.update(dt, goal);
+    for (int i = 0; i < 20; ++i) many.update(dt / 20, goal);
+    EXPECT_LT((one.position() - many.position()).norm(), 1e-12);
+    EXPECT_LT((one.velocity() - many.velocity()).norm(), 1e-11);
+  }
+}
+
+TEST(GoalEstimator, AFarGoalPullsNoHarder) {
+  GoalEstimator estimator;
+  estimator.reset(Vector3::Zero());
+  double fastest = 0.0;
+  for (int i = 0; i < 2000; ++i) {
+    estimator.update(kCycle, Vector3(2.0, 0, 0));
+    fastest = std::max(fastest, estimator.velocity().norm());
+  }
+  EXPECT_LT(fastest, 0.15 / (2.0 * 0.06));
+  EXPECT_LT((estimator.position() - Vector3(2.0, 0, 0)).norm(), 1e-6);
+}
+
+TEST(GoalEstimator, OffIsThePlainInput) {
+  GoalEstimatorParameters parameters;
+  parameters.time_constant = 0.0;
+  GoalEstimator estimator(parameters);
+  estimator.reset(Vector3::Zero());
+  estimator.update(kCycle, Vector3(1, 2, 3));
+  EXPECT_EQ(estimator.position(), Vector3(1, 2, 3));
+  EXPECT_TRUE(estimator.velocity().isZero(0.0));
+  parameters.time_constant = -1.0;
+  EXPECT_THROW(GoalEstimator{parameters}, std::invalid_argument);
+}
+
+TEST(OrientationEstimator, FollowsATurningObject) {
+  OrientationEstimator estimator;
+  const Vector3 rate(0.3, 0.2, -0.4);
+  Quaternion target = Quaternion::Identity();
+  estimator.reset(target);
+  for (int i = 0; i < 1000; ++i) {
+    target = expRotation(kCycle * rate) * target;
+    // Both signs of a quaternion mean the same orientation.
+    if (i % 2) target.coeffs() *= -1.0;
+    estimator.update(kCycle, target);
+  }
+  EXPECT_LT(estimator.orientation().angularDistance(target), 0.02);
+  EXPECT_LT((estimator.angularVelocity() - rate).norm(), 0.02);
+}
+
+TEST(OrientationCurve, StartsAndEndsAsGiven) {
+  Random random(2);
+  for (int k = 0; k < 20000; ++k) {
+    const Quaternion start = random.rotation(), target = random.rotation();
+    const Vector3 velocity = random.point(1.0);
+    const double duration = random.uniform(0.3, 3.0);
+    OrientationCurve curve;
+    curve.start(start, velocity, target, duration);
+    ASSERT_LT(curve.at(0.0).angularDistance(start), 1e-7);
+    ASSERT_LT(curve.at(1.0).angularDistance(target), 1e-7);
+    const double h = 1e-6;
+    ASSERT_LT((rotationBetween(curve.at(0.0), curve.at(h)) / (h * duration) - velocity).norm(),
+              1e-3);
+    ASSERT_LT(rotationBetween(curve.at(1.0 - h), curve.at(1.0)).norm() / h, 1e-3);
+  }
+}
+
+TEST(OrientationCurve, ATurnFromRestFollowsTheMinimumJerkProfile) {
+  OrientationCurve curve;
+  const Vector3 turn(0.3, 1.0, -0.5);
+  curve.start(Quaternion::Identity(), Vector3::Zero(), expRotation(turn), 1.0);
+  for (double u = 0.0; u <= 1.0; u += 0.01) {
+    EXPECT_LT(curve.at(u).angularDistance(expRotation(minimumJerk(u) * turn)), 1e-7);
+  }
+}
+
+TEST(OrientationCurve, ATargetThatPassesHalfATurnMakesNoJump) {
+  OrientationCurve curve;
+  curve.start(Quaternion::Identity(), Vector3::Zero(), expRotation(Vector3(0, 0, 3.0)), 1.0);
+  Quaternion last = curve.at(0.6);
+  for (double angle = 3.0; angle < 4.0; angle += 0.01) {
+    curve.setTarget(expRotation(Vector3(0, 0, angle)));
+    EXPECT_LT(curve.at(0.6).angularDistance(last), 0.011);
+    last = curve.at(0.6);
+  }
+}

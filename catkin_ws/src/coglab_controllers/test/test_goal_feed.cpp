@@ -1,0 +1,135 @@
+// Which sights of a goal count: one frame once, the first ones, and those after a step of the clock.
+#include <cmath>
+
+#include "coglab_controllers/goal/goal_relay.hpp"
+#include "virtual_robot.hpp"
+
+namespace coglab_controllers {
+namespace {
+
+const Vector3 kGoal(0.80, 0.0, 0.45);
+const Vector3 kOutlier = kGoal + Vector3(0.0, -0.5, 0.0);
+constexpr std::int64_t kSecond = 1'000'000'000;
+
+GoalObservation sight(const Vector3& position, std::int64_t frame_ns, std::int64_t stamp_ns) {
+  GoalObservation seen;
+  seen.position = position;
+  seen.frame_ns = frame_ns;
+  seen.stamp_ns = stamp_ns;
+  return seen;
+}
+
+/// Looks at one frame again and again for 50 ms, as the goal helper does at 100 Hz, through a clock
+/// that maps its stamp anew each time. @return how often it was to be published
+int look(GoalRelay& relay, const Vector3& position, std::int64_t frame_ns) {
+  int told = 0;
+  for (int i = 0; i < 5; ++i) {
+    const std::int64_t now = frame_ns + 10'000'000 * i;
+    told += relay.see(now, sight(position, frame_ns, frame_ns + 137 * i)) ? 1 : 0;
+  }
+  return told;
+}
+
+TEST(GoalRelay, AFirstFrameAloneIsNoGoalHoweverOftenItIsLookedAt) {
+  GoalRelay relay;
+  std::int64_t t = kSecond;
+  EXPECT_EQ(look(relay, kOutlier, t), 0);
+  EXPECT_EQ(relay.gate().state(), GoalGate::State::Unsettled);
+  for (int frame = 1; frame <= 2; ++frame) {
+    EXPECT_EQ(look(relay, kGoal, t += 33'000'000), 0) << frame;
+  }
+  EXPECT_EQ(look(relay, kGoal, t += 33'000'000), 1);  // the third that agrees
+  EXPECT_EQ(relay.goal().position, kGoal);
+  EXPECT_EQ(look(relay, kGoal, t += 33'000'000), 1);
+  EXPECT_EQ(look(relay, kOutlier, t += 33'000'000), 0);
+  EXPECT_EQ(look(relay, kGoal, t += 33'000'000), 1);
+}
+
+TEST(GoalRelay, AStaticFrameIsToldAtOnceAndThenOnceASecond) {
+  GoalRelay relay;
+  int told = 0;
+  for (int i = 0; i < 350; ++i) {
+    const std::int64_t now = kSecond + 10'000'000 * i;
+    told += relay.see(now, sight(kGoal, 0, now)) ? 1 : 0;
+    EXPECT_EQ(relay.goal().position, kGoal);
+  }
+  EXPECT_EQ(told, 4);
+}
+
+TEST(GoalRelay, AfterAStepBackOfTheClockItGoesOn) {
+  GoalRelay relay;
+  for (int frame = 0; frame < 5; ++frame) look(relay, kGoal, kSecond * 100 + frame * 33'000'000);
+  GoalObservation seen = sight(kGoal, kSecond, kSecond * 101);
+  EXPECT_FALSE(relay.see(kSecond * 101, seen));  // looks like an old frame …
+  ++seen.clock_steps;
+  EXPECT_TRUE(relay.see(kSecond * 101, seen));  // … unless the clock was set back
+  EXPECT_FALSE(relay.see(kSecond * 101, seen));
+}
+
+/// A motion that follows dmp_goal; the clock of the stamps is `ahead` of that of the samples.
+struct TopicGoal : ::testing::Test {
+  VirtualRobot robot;
+  std::int64_t ahead = 1000 * kSecond;
+  Vector3 goal = kGoal;
+
+  void SetUp() override {
+    robot.loadBoth();
+    ASSERT_TRUE(VirtualRobot::ok(tell()));
+    DmpRequest request = robot.reach();
+    request.goal_frame.clear();
+    ASSERT_TRUE(VirtualRobot::ok(robot.dmp().execute(request)));
+    run(50);
+  }
+
+  Answer tell() {
+    return robot.dmp().setGoal("lwr_base_link", goal, robot.now_ns, robot.now_ns + ahead);
+  }
+  void run(int cycles) {
+    for (int i = 0; i < cycles; ++i) {
+      robot.tick();
+      if (i % 6 == 0) {
+        EXPECT_TRUE(VirtualRobot::ok(tell()));
+      }
+    }
+  }
+};
+
+TEST_F(TopicGoal, AStepBackOfTheClockStartsAnew) {
+  for (const double step : {0.2, 10.0, 500.0}) {
+    ahead -= std::llround(step * 1e9);
+    goal.y() += 0.05;
+    run(400);
+    EXPECT_LT((robot.dmp().motion().goal() - goal).norm(), 2e-3) << step << " s back";
+    EXPECT_EQ(robot.manager->report().reason.code(), ReasonCode::None) << robot.reason();
+  }
+}
+
+TEST_F(TopicGoal, WithoutAStepOldAndRepeatedGoalsAreRefused) {
+  EXPECT_TRUE(VirtualRobot::ok(tell()));
+  EXPECT_EQ(tell().code, ReasonCode::TooLate);
+  const Answer late = robot.dmp().setGoal("lwr_base_link", kOutlier, robot.now_ns - kSecond,
+                                          robot.now_ns - kSecond + ahead);
+  EXPECT_EQ(late.code, ReasonCode::TooLate) << late.message;
+  run(50);
+  EXPECT_LT((robot.dmp().motion().goal() - goal).norm(), 1e-2);
+}
+
+TEST(FrameGoal, AStepBackOfTheClockStartsAnew) {
+  VirtualRobot robot;
+  robot.loadBoth();
+  const auto see = [&robot](std::int64_t ahead, std::uint32_t steps) {
+    robot.see("human_hand", kGoal);
+    robot.frames.frames["human_hand"].frame_ns += ahead;
+    robot.frames.frames["human_hand"].clock_steps = steps;
+  };
+  see(1000 * kSecond, 0);
+  ASSERT_TRUE(VirtualRobot::ok(robot.dmp().execute(robot.reach())));
+  for (int i = 0; i < 200; ++i) {
+    see(i < 100 ? 1000 * kSecond : 0, i < 100 ? 0 : 1);
+    robot.tick();
+    ASSERT_EQ(robot.state(), MotionState::Running) << "cycle " << i << ": " << robot.reason();
+  }
+}
+
+}  // namespace
+}  // namespace coglab_controllers

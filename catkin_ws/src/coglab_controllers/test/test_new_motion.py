@@ -1,0 +1,71 @@
+"""A motion from the template: made, built in a workspace of its own, tested, and the simulated arm moves."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+PACKAGE = Path(__file__).resolve().parent.parent
+TOOL = PACKAGE.parent / "ctrl_more" / "scripts" / "new_controller.py"
+LONGEST = 90.0  # s, from `controller new --motion` until the arm has moved, where the machine is free
+
+
+def run(*command: str | Path) -> str:
+    """Runs a command with a time limit; its output, which is shown if it fails."""
+    done = subprocess.run(
+        [str(part) for part in command], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, timeout=400
+    )
+    assert done.returncode == 0, done.stdout[-6000:]
+    return done.stdout
+
+
+def in_workspace(workspace: Path, *command: str | Path) -> str:
+    """The same with the environment of that workspace, over the one that is sourced."""
+    words = " ".join(str(part) for part in command)
+    return run("bash", "-c", f". {workspace}/devel/setup.bash && exec {words}")
+
+
+def built_prefix() -> bool:
+    """Whether a workspace with this package is sourced."""
+    prefixes = os.environ.get("CMAKE_PREFIX_PATH", "").split(":")
+    return any(p and (Path(p) / "lib" / "libcoglab_controllers_plugins.so").is_file() for p in prefixes)
+
+
+def test_a_new_motion_is_built_tested_and_moves_the_simulated_arm(tmp_path: Path) -> None:
+    if not built_prefix() or not shutil.which("catkin_make") or not shutil.which("rostest"):
+        pytest.skip("coglab_controllers is not built: source the workspace's setup file first")
+    sources = tmp_path / "src"
+    sources.mkdir()
+    begin = time.monotonic()
+    made = run(sys.executable, TOOL, "--motion", "SideSway", "--into", sources)
+    assert "catkin_make" in made
+    folder = sources / "side_sway"
+    left = [p for p in folder.rglob("*") if p.is_file() and ("@name@" in p.read_text() or "@TYPE@" in p.read_text())]
+    assert not left, left
+    built = run(
+        "catkin_make", "-C", tmp_path, "-DPYTHON_EXECUTABLE=/usr/bin/python3", "-DCMAKE_BUILD_TYPE=RelWithDebInfo"
+    )
+    assert "warning:" not in built
+    ready = time.monotonic()
+    moved = in_workspace(tmp_path, "rostest", "side_sway", "side_sway.test")
+    assert "RESULT: SUCCESS" in moved, moved[-6000:]
+    end = time.monotonic()
+    print(f"\nfrom `controller new --motion` to an arm that has moved: {end - begin:.1f} s, of them to build {ready - begin:.1f} s")
+    if os.getloadavg()[0] < 1.5 * (os.cpu_count() or 1):
+        assert end - begin < LONGEST
+    run("catkin_make", "-C", tmp_path, "side_sway_test_motion")
+    tested = in_workspace(tmp_path, tmp_path / "devel" / "lib" / "side_sway" / "side_sway_test_motion")
+    assert "PASSED" in tested and "FAILED" not in tested
+
+
+def test_wrong_names_and_places_are_refused(tmp_path: Path) -> None:
+    for name in ("sideSway", "../Up"):
+        done = subprocess.run([sys.executable, TOOL, "--motion", name, "--into", tmp_path], capture_output=True, text=True)
+        assert done.returncode == 1 and "CamelCase" in done.stderr
+    assert not list(tmp_path.iterdir())

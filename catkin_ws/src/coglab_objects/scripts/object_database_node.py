@@ -1,0 +1,101 @@
+#!/usr/bin/python3
+"""The node /object_database: serves the object files of a folder and reads them again when they change.
+
+Services (private): get_object, list_objects, reload (std_srvs/Trigger: problems in words).
+Parameters: ~folder; ih2_hand/dialect (legacy), that of the hand. Mirrors the good entries read-only to ~objects/<id>.
+"""
+import sys
+
+import rospy
+from coglab_msgs.msg import ReasonCode
+from coglab_msgs.srv import GetObject, GetObjectResponse, ListObjects, ListObjectsResponse
+from coglab_objects.database import ObjectDatabase, ObjectError
+from coglab_py import parameters
+from std_srvs.srv import Trigger, TriggerResponse
+
+MIRROR = "~objects"
+
+
+class ObjectDatabaseNode:
+    """Thin node over ObjectDatabase."""
+
+    def __init__(self) -> None:
+        self.database = ObjectDatabase(parameters.read("~folder", str),
+                                       parameters.read("ih2_hand/dialect", str, "legacy"))
+        self.reported: list[str] = []
+        self.mirrored: dict[str, str] | None = None  # text by id; None: what an earlier run has left is not removed yet
+        self.behind = False  # the mirror could not be brought up to the database
+        self.reload(only_changed=False)
+        rospy.Service("~get_object", GetObject, self.on_get)
+        rospy.Service("~list_objects", ListObjects, lambda _request: ListObjectsResponse(self.database.ids()))
+        rospy.Service("~reload", Trigger, self.on_reload)
+        rospy.Timer(rospy.Duration(1.0), self.on_timer)
+
+    def reload(self, only_changed: bool) -> list[str]:
+        """Read, warn about each problem that is new, mirror to the parameter server."""
+        problems = self.database.reload(only_changed)
+        for problem in problems:
+            if problem not in self.reported:
+                rospy.logwarn("object database: %s", problem)
+        self.reported = list(problems)
+        self.mirror()
+        return problems
+
+    def mirror(self) -> None:
+        """Bring ~objects up to the database; what the master does not take is tried again each second."""
+        try:
+            if self.mirrored is None:
+                if rospy.has_param(MIRROR):
+                    rospy.delete_param(MIRROR)
+                self.mirrored = {}
+            wanted = {object_id: self.database.text(object_id) for object_id in self.database.ids()}
+            for gone in set(self.mirrored) - set(wanted):
+                rospy.delete_param(f"{MIRROR}/{gone}")
+                del self.mirrored[gone]
+            for object_id, text in wanted.items():
+                if self.mirrored.get(object_id) != text:
+                    rospy.set_param(f"{MIRROR}/{object_id}", self.database.get(object_id))
+                    self.mirrored[object_id] = text
+            self.behind = False
+        except Exception as error:  # the master is away, or will not have a value: the services go on
+            if not self.behind:
+                rospy.logwarn("object database: %s is not up to date: %s", rospy.resolve_name(MIRROR), error)
+            self.behind = True
+
+    def on_timer(self, _event) -> None:
+        """Hot reload. Nothing may end the timer."""
+        try:
+            if self.database.changed():
+                self.reload(only_changed=True)
+            elif self.behind:
+                self.mirror()
+        except Exception as error:
+            rospy.logerr_throttle(10.0, f"object database: not read again ({type(error).__name__}: {error})")
+
+    def on_get(self, request):
+        """One entry as YAML text."""
+        try:
+            return GetObjectResponse(success=True, yaml=self.database.text(request.object_id))
+        except ObjectError as error:
+            return GetObjectResponse(False, ReasonCode.OBJECT_UNKNOWN, str(error), "")
+
+    def on_reload(self, _request):
+        """Read everything again now."""
+        problems = self.reload(only_changed=False)
+        return TriggerResponse(not problems, "; ".join(problems) or f"{len(self.database.ids())} objects")
+
+
+def main() -> int:
+    """Entry point."""
+    rospy.init_node("object_database")
+    try:
+        ObjectDatabaseNode()
+    except parameters.ParameterError as error:
+        rospy.logfatal("object_database: %s; ~folder is the folder with one YAML file per object", error)
+        return 1
+    rospy.spin()
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

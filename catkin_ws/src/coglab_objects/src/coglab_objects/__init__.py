@@ -1,0 +1,1 @@
+"""The objects that are handed over: files, schema and loader."""

@@ -1,0 +1,114 @@
+"""The database's node beside a parameter server that takes what XML-RPC takes: no file ends it or its timer."""
+import importlib.util
+import shutil
+import xmlrpc.client
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+import rospy
+
+SHARE = Path(__file__).resolve().parent.parent
+HOSTILE = {"list_key": "? [a, b]\n: 1\n", "date": "id: date\nname: 2024-02-31\n", "deep": "a: " + "[" * 50_000,
+           "binary": "\x00\x01", "nan": None, "huge": "x" * 1_000_000, "tag": "!!python/object/apply:os.system [true]"}
+
+
+class Master:
+    """The parameter server, and a switch that makes it fail."""
+
+    def __init__(self, folder):
+        self.values, self.down, self.calls = {"~folder": str(folder), "~objects": {"elephant": {}}}, False, 0
+
+    def get_param(self, name, default=None):
+        return self.values.get(name, default)
+
+    def has_param(self, name):
+        return name in self.values
+
+    def set_param(self, name, value):
+        self.calls += 1
+        if self.down:
+            raise OSError("the master does not answer")
+        xmlrpc.client.loads(xmlrpc.client.dumps((value,)))
+        self.values[name] = value
+
+    def delete_param(self, name):
+        if self.down:
+            raise OSError("the master does not answer")
+        del self.values[name]
+
+    def objects(self):
+        return sorted(name.rpartition("/")[2] for name in self.values if name.startswith("~objects"))
+
+
+@pytest.fixture
+def make(tmp_path, monkeypatch):
+    """A started node with its master and folder."""
+    shutil.copy(SHARE / "objects" / "mug.yaml", tmp_path)
+    shutil.copy(SHARE / "objects" / "ball.yaml", tmp_path)
+    master, warnings = Master(tmp_path), []
+    for name in ("get_param", "has_param", "set_param", "delete_param"):
+        monkeypatch.setattr(rospy, name, getattr(master, name))
+    for name in ("Service", "Timer"):
+        monkeypatch.setattr(rospy, name, lambda *_: None)
+    for name in ("logwarn", "logerr_throttle"):
+        monkeypatch.setattr(rospy, name, lambda *args: warnings.append(args))
+    monkeypatch.setattr(rospy, "resolve_name", lambda name: name)
+    spec = importlib.util.spec_from_file_location("node", SHARE / "scripts" / "object_database_node.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return lambda: SimpleNamespace(node=module.ObjectDatabaseNode(), master=master, folder=tmp_path, warnings=warnings)
+
+
+def hostile(folder):
+    for name, text in HOSTILE.items():
+        good = (SHARE / "objects" / "mug.yaml").read_text().replace("id: mug", f"id: {name}")
+        (folder / f"{name}.yaml").write_text(good.replace("mass: 0.31", "mass: .nan") if text is None else text)
+
+
+def test_what_an_earlier_run_left_is_gone(make):
+    assert make().master.objects() == ["ball", "mug"]
+
+
+def test_no_file_ends_the_node_at_its_start(make, tmp_path):
+    hostile(tmp_path)
+    started = make()
+    assert started.node.database.ids() == ["ball", "mug"] and len(started.warnings) == len(HOSTILE)
+
+
+def test_no_file_ends_the_timer_and_each_is_reported_once(make):
+    started = make()
+    hostile(started.folder)
+    for _ in range(3):
+        started.node.on_timer(None)
+    assert len(started.warnings) == len(HOSTILE)
+    assert started.node.on_get(SimpleNamespace(object_id="x" * 1_000_000)).success is False
+
+
+def test_deleted_objects_leave_the_parameter_server_and_only_changes_go_there(make):
+    started = make()
+    before = started.master.calls
+    (started.folder / "mug.yaml").unlink()
+    started.node.on_timer(None)
+    assert started.master.objects() == ["ball"] and started.node.database.ids() == ["ball"]
+    assert started.master.calls == before
+
+
+def test_a_master_that_is_away_is_caught_up_with(make):
+    started = make()
+    started.master.down = True
+    (started.folder / "mug.yaml").unlink()
+    started.node.on_timer(None)
+    started.node.on_timer(None)
+    assert started.node.database.ids() == ["ball"] and started.master.objects() == ["ball", "mug"]
+    assert len(started.warnings) == 1
+    started.master.down = False
+    started.node.on_timer(None)
+    assert started.master.objects() == ["ball"]
+
+
+def test_an_unexpected_error_is_told_and_the_timer_goes_on(make, monkeypatch):
+    started = make()
+    monkeypatch.setattr(started.node.database, "changed", lambda: 1 / 0)
+    started.node.on_timer(None)
+    assert "ZeroDivisionError" in started.warnings[-1][1]

@@ -1,0 +1,63 @@
+"""Poses: composition, inverse, reading and averaging, on seeded random poses and against matrices."""
+import numpy as np
+import pytest
+from coglab_py.pose import Pose, about_z, mean_pose, rotation
+
+RNG = np.random.default_rng(5)
+
+
+def random_pose() -> Pose:
+    q = RNG.normal(size=4)
+    return Pose(RNG.normal(size=3), q / np.linalg.norm(q))
+
+
+def matrix(pose: Pose) -> np.ndarray:
+    """Homogeneous, from the quaternion's own formula."""
+    x, y, z, w = pose.orientation
+    turn = np.array([[1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+                     [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+                     [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)]])
+    return np.block([[turn, pose.position[:, None]], [np.zeros((1, 3)), np.ones((1, 1))]])
+
+
+def test_poses_compose_as_matrices_do():
+    for _ in range(200):
+        a, b = random_pose(), random_pose()
+        assert matrix(a * b) == pytest.approx(matrix(a) @ matrix(b), abs=1e-12)
+        assert matrix(a * a.inverse()) == pytest.approx(np.eye(4), abs=1e-12)
+        point = RNG.normal(size=3)
+        assert a.apply(point) == pytest.approx((matrix(a) @ [*point, 1.0])[:3], abs=1e-12)
+        assert np.array([a.axis(i) for i in range(3)]).T == pytest.approx(matrix(a)[:3, :3], abs=1e-12)
+
+
+def test_distance_is_that_of_position_and_of_the_smallest_turn():
+    far, angle = Pose().distance(Pose(np.array([3.0, 4.0, 0.0]), -about_z(0.3)))
+    assert (far, angle) == pytest.approx((5.0, 0.3))
+
+
+def test_reading():
+    assert Pose.from_dict({"xyz": [1, 2, 3]}).orientation == pytest.approx([0, 0, 0, 1])
+    assert Pose.from_dict({"xyz": [0, 0, 0], "rpy_deg": [0, 0, 90]}).axis(0) == pytest.approx([0, 1, 0], abs=1e-12)
+    # Fixed axes: the roll comes first, so a yaw after it carries the rolled y axis.
+    assert Pose.from_dict({"rpy_deg": [90, 0, 90]}).axis(1) == pytest.approx([0, 0, 1], abs=1e-12)
+    pose = random_pose()
+    assert matrix(Pose.from_dict(pose.to_dict())) == pytest.approx(matrix(pose))
+
+
+@pytest.mark.parametrize("data, sentence", [
+    ({"xyz": [0, 0]}, "xyz has three finite numbers"), ({"rpy_deg": [0, float("nan"), 0]}, "rpy_deg has three"),
+    ({"quaternion": [0, 0, 0, 0]}, "no direction"), ({"quaternion": [0, 0, 1]}, "four finite numbers")])
+def test_malformed_poses_are_refused(data, sentence):
+    with pytest.raises(ValueError, match=sentence):
+        Pose.from_dict(data)
+
+
+def test_the_mean_of_noisy_poses_is_near_the_truth_whatever_the_signs_of_their_quaternions():
+    truth = random_pose()
+    noisy = [truth * Pose(0.01 * RNG.normal(size=3), rotation([*(0.01 * RNG.normal(size=3)), 1.0]).as_quat())
+             for _ in range(400)]
+    mixed = [Pose(pose.position, pose.orientation * (-1) ** i) for i, pose in enumerate(noisy)]
+    far, angle = mean_pose(mixed).distance(truth)
+    assert far < 0.003 and angle < 0.004
+    with pytest.raises(ValueError):
+        mean_pose([])

@@ -1,0 +1,42 @@
+"""YAML files: lines, strictness, schema."""
+import pytest
+from coglab_py.yaml_file import LARGEST_FILE, YamlError, parse, read
+
+SCHEMA = {"properties": {"a": {"properties": {"b": {"type": "number", "maximum": 5}}}}}
+
+
+def test_a_field_is_named_with_its_line():
+    document = parse("x: 1\na:\n  b: 7\n", "f.yaml")
+    assert document.value == {"x": 1, "a": {"b": 7}}
+    with pytest.raises(YamlError, match=r"^f.yaml:3: a.b: 7 is greater than the maximum of 5"):
+        document.check(SCHEMA)
+    assert document.sentence(("a", "c"), "is missing") == "f.yaml:2: a.c: is missing"
+
+
+@pytest.mark.parametrize("text, sentence", [
+    ("", "f.yaml: line 1: the file is empty"), ("a: [1", r"f.yaml:\d+: not YAML"),
+    ("a: &x 1\nb: *x", "line 2: aliases"),
+    ("a: 1\na: 2", "line 2: field 'a' appears twice"), ("[" * 20 + "]" * 20, "nested more than 16"),
+    ("? [1]\n: 2", "name is one word"), ("a: 2020-13-45", "cannot be read as what it looks like"),
+    ("#" * (LARGEST_FILE + 1), "at most"), ("a: !!python/object:x.Y {}", "not YAML")])
+def test_what_is_refused(text, sentence):
+    with pytest.raises(YamlError, match=sentence):
+        parse(text, "f.yaml")
+
+
+@pytest.mark.parametrize("text, sentence", [
+    ("a: .nan", "a finite number"), ("a: 3000000000", "a whole number of at most"),
+    ('a: "\\x07"', "control characters")])
+def test_what_ros_cannot_carry_is_refused(text, sentence):
+    with pytest.raises(YamlError, match=f"f.yaml:1: a: .*{sentence}"):
+        parse(text, "f.yaml").check({})
+
+
+def test_files(tmp_path):
+    with pytest.raises(YamlError, match="cannot be read"):
+        read(tmp_path / "none.yaml")
+    with pytest.raises(YamlError, match="a file expected"):
+        read(tmp_path)
+    (tmp_path / "f.yaml").write_bytes(b"\xff\xfe")
+    with pytest.raises(YamlError, match="cannot be read"):
+        read(tmp_path / "f.yaml", "f.yaml")

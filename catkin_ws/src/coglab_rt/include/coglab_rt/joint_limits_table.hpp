@@ -1,0 +1,160 @@
+/// @file
+/// Reader of the one table of joint limits, lwr_description/config/joint_limits.yaml. Not for
+/// real-time threads.
+#pragma once
+
+#include <cmath>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include <yaml-cpp/yaml.h>
+
+#include "coglab_rt/joint_limits.hpp"
+
+namespace coglab_rt {
+
+namespace detail {
+
+/// A vector of the table: its name, where it goes, whether its values must be positive.
+struct LimitField {
+  const char* name;
+  Vector7 JointLimits::*member;
+  bool positive;
+};
+constexpr LimitField kLimitFields[] = {{"lower_position", &JointLimits::lower_position, false},
+                                       {"upper_position", &JointLimits::upper_position, false},
+                                       {"velocity", &JointLimits::velocity, true},
+                                       {"acceleration", &JointLimits::acceleration, true},
+                                       {"jerk", &JointLimits::jerk, true},
+                                       {"torque", &JointLimits::torque, true}};
+
+[[noreturn]] inline void failTable(const std::string& path, const YAML::Mark& mark,
+                                   const std::string& what) {
+  const std::string line = mark.is_null() ? "" : ":" + std::to_string(mark.line + 1);
+  throw std::runtime_error("joint limits " + path + line + ": " + what);
+}
+
+/// Overwrites `value` if the section has the field; returns whether it had.
+inline bool readLimitVector(const std::string& path, const YAML::Node& section,
+                            const std::string& section_name, const LimitField& field,
+                            Vector7& value) {
+  const YAML::Node node = section[field.name];
+  const std::string name = section_name + "." + field.name;
+  if (!node) return false;
+  if (!node.IsSequence() || node.size() != 7) {
+    failTable(path, node.Mark(),
+              name + ": expected a list of 7 numbers, got " +
+                  (node.IsSequence() ? std::to_string(node.size()) + " entries" : "no list"));
+  }
+  for (std::size_t i = 0; i < 7; ++i) {
+    double number = 0.0;
+    try {
+      number = node[i].as<double>();
+    } catch (const YAML::Exception&) {
+      failTable(path, node[i].Mark(), name + "[" + std::to_string(i) + "]: expected a number");
+    }
+    if (!std::isfinite(number) || (field.positive && number <= 0.0)) {
+      failTable(path, node[i].Mark(),
+                name + "[" + std::to_string(i) + "] = " + std::to_string(number) + ": expected a " +
+                    (field.positive ? "positive " : "") + "finite number");
+    }
+    value[static_cast<Eigen::Index>(i)] = number;
+  }
+  return true;
+}
+
+/// Reads one profile over what `limits` holds already.
+inline void readLimitProfile(const std::string& path, const YAML::Node& root,
+                             const std::string& name, JointLimits& limits) {
+  const YAML::Node section = root[name];
+  if (!section || !section.IsMap())
+    failTable(path, root.Mark(), "profile '" + name + "' is missing");
+  for (const auto& entry : section) {
+    bool known = false;
+    for (const LimitField& field : kLimitFields)
+      known = known || entry.first.as<std::string>() == field.name;
+    if (!known)
+      failTable(path, entry.first.Mark(),
+                name + "." + entry.first.as<std::string>() + ": unknown field");
+  }
+  for (const LimitField& field : kLimitFields) {
+    const bool found = readLimitVector(path, section, name, field, limits.*field.member);
+    if (!found && name == "default")
+      failTable(path, section.Mark(), "default." + std::string(field.name) + " is missing");
+  }
+}
+
+/// The table as YAML, with the names of the joints checked.
+inline YAML::Node openLimitsTable(const std::string& path) {
+  YAML::Node root;
+  try {
+    root = YAML::LoadFile(path);
+  } catch (const YAML::BadFile&) {
+    throw std::runtime_error(
+        "joint limits " + path +
+        ": cannot be opened; expected lwr_description/config/joint_limits.yaml");
+  } catch (const YAML::ParserException& error) {
+    failTable(path, error.mark, error.msg);
+  }
+  if (!root.IsMap())
+    failTable(path, root.Mark(), "expected a map with 'joints', 'default' and profiles");
+  const YAML::Node joints = root["joints"];
+  if (!joints || !joints.IsSequence() || joints.size() != 7) {
+    failTable(path, root.Mark(), "joints: expected the 7 names in wire order");
+  }
+  for (std::size_t i = 0; i < 7; ++i) {
+    const auto name = joints[i].as<std::string>("");
+    if (name != kJointNames[i]) {
+      failTable(
+          path, joints[i].Mark(),
+          "joints[" + std::to_string(i) + "] = '" + name + "': expected '" + kJointNames[i] + "'");
+    }
+  }
+  return root;
+}
+
+/// Share by which the servos pass the speed that they are told; 0 if the table does not say.
+inline double servoOvershoot(const std::string& path, const YAML::Node& root) {
+  const YAML::Node node = root["servo_overshoot"];
+  if (!node) return 0.0;
+  double share = -1.0;
+  try {
+    share = node.as<double>();
+  } catch (const YAML::Exception&) {
+  }
+  if (!(share >= 0.0 && share <= 0.5))
+    failTable(path, node.Mark(), "servo_overshoot: expected a number in 0..0.5");
+  return share;
+}
+
+}  // namespace detail
+
+/// Reads the table. `profile` is "default" or a profile of the file such as "t1", which overrides
+/// what it names.
+/// @throws std::runtime_error naming file, line, field and what was expected if anything is
+/// missing, of the wrong length, not finite or out of order.
+inline JointLimits loadJointLimits(const std::string& path,
+                                   const std::string& profile = "default") {
+  const YAML::Node root = detail::openLimitsTable(path);
+  JointLimits limits;
+  detail::readLimitProfile(path, root, "default", limits);
+  if (profile != "default") detail::readLimitProfile(path, root, profile, limits);
+  const YAML::Node margin = root["position_margin"];
+  limits.position_margin = margin && margin.IsScalar() ? margin.as<double>(-1.0) : -1.0;
+  if (!(limits.position_margin >= 0.0 && limits.position_margin <= 0.5)) {
+    detail::failTable(path, margin ? margin.Mark() : root.Mark(),
+                      "position_margin: expected a number from 0 to 0.5 (rad)");
+  }
+  for (int i = 0; i < 7; ++i) {
+    if (limits.lower_position[i] >= limits.upper_position[i]) {
+      detail::failTable(
+          path, root.Mark(),
+          std::string(kJointNames[i]) + ": lower_position must be below upper_position");
+    }
+  }
+  limits.velocity /= 1.0 + detail::servoOvershoot(path, root);
+  return limits;
+}
+
+}  // namespace coglab_rt

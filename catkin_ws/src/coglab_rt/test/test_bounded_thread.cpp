@@ -1,0 +1,35 @@
+/// A thread of the real-time side.
+#include <gtest/gtest.h>
+
+#include <cstdint>
+
+#include <sys/mman.h>
+#include <unistd.h>
+
+#include "coglab_rt/real_time.hpp"
+
+namespace coglab_rt {
+namespace {
+
+/// The pages that a body uses first are there before it runs: no page fault comes later.
+TEST(BoundedThread, theStackBelowTheBodyIsTouchedBeforeItRuns) {
+  constexpr std::size_t kStack = 4096 * 1024;  // no stack that the C library keeps from before
+  std::size_t present = 0, looked_at = 0;
+  BoundedThread thread;
+  thread.start("touched", kStack, [&] {
+    const auto page = static_cast<std::size_t>(sysconf(_SC_PAGESIZE));
+    const auto here = reinterpret_cast<std::uintptr_t>(__builtin_frame_address(0)) / page * page;
+    for (std::size_t depth = page; depth < kStack * 4 / 10; depth += page) {
+      unsigned char resident = 0;
+      ++looked_at;
+      if (mincore(reinterpret_cast<void*>(here - depth), page, &resident) == 0 && (resident & 1))
+        ++present;
+    }
+  });
+  thread.join();
+  EXPECT_GT(looked_at, 300U);
+  EXPECT_EQ(present, looked_at);
+}
+
+}  // namespace
+}  // namespace coglab_rt

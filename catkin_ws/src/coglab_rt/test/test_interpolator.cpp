@@ -1,0 +1,112 @@
+/// Interpolator: limits checked by differentiating the output (each quantity by one difference of
+/// the next lower one), exact arrival, equality with fine numeric integration. Equality with ruckig
+/// is in test_interpolator_oracle.py.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+#include "coglab_rt/interpolator.hpp"
+#include "coglab_rt/joint_limits_table.hpp"
+
+namespace coglab_rt {
+namespace {
+
+TEST(Interpolator, limitsHoldByDifferentiation) {
+  std::mt19937 random(11);
+  std::uniform_real_distribution<double> part(-1.0, 1.0);
+  for (const char* profile : {"default", "t1"}) {
+    const JointLimits limits = loadJointLimits(LIMITS_FILE, profile);
+    for (const double dt : {0.001, 0.005, 0.020, 0.100}) {
+      Interpolator interpolator(limits);
+      interpolator.reset(Vector7::Zero());
+      Vector7 target = Vector7::Zero();
+      for (int step = 0; step < 20000; ++step) {
+        if (step % 17 == 0) {
+          for (int i = 0; i < 7; ++i)
+            target[i] = 1.5 * part(random) * limits.velocity[i];  // beyond the limit, too
+        }
+        const Vector7 p = interpolator.position(), v = interpolator.velocity(),
+                      a = interpolator.acceleration();
+        interpolator.step(target, dt);
+        const Vector7 dp = (interpolator.position() - p) / dt;
+        const Vector7 dv = (interpolator.velocity() - v) / dt;
+        const Vector7 da = (interpolator.acceleration() - a) / dt;
+        for (int i = 0; i < 7; ++i) {
+          const double rounding = 4e-16 * std::abs(interpolator.position()[i]) / dt;
+          ASSERT_LE(std::abs(dp[i]), limits.velocity[i] * (1.0 + 1e-9) + rounding);
+          ASSERT_LE(std::abs(dv[i]), limits.acceleration[i] * (1.0 + 1e-9));
+          ASSERT_LE(std::abs(da[i]), limits.jerk[i] * (1.0 + 1e-9));
+        }
+      }
+    }
+  }
+}
+
+TEST(Interpolator, arrivesExactlyAndStays) {
+  const JointLimits limits = loadJointLimits(LIMITS_FILE);
+  Interpolator interpolator(limits);
+  Vector7 target;
+  target << 0.5, -0.5, 1.0, -1.0, 0.1, -0.1, 0.0;
+  for (int i = 0; i < 1000; ++i) interpolator.step(target, 0.001);
+  EXPECT_EQ(interpolator.velocity(), target);
+  EXPECT_TRUE(interpolator.acceleration().isZero(0.0));
+  for (int i = 0; i < 1000; ++i) interpolator.step(Vector7::Zero(), 0.001);
+  EXPECT_TRUE(interpolator.standsStill());
+}
+
+TEST(Interpolator, planIsConsistentAlongItself) {
+  // Re-planning after a part of the way leads to the same state as following the first plan.
+  std::mt19937 random(5);
+  std::uniform_real_distribution<double> part(-1.0, 1.0);
+  for (int i = 0; i < 20000; ++i) {
+    const double A = 10.0, J = 500.0;
+    const AxisState start{0.0, 2.0 * part(random), A * part(random)};
+    const double target = 2.0 * part(random);
+    const AxisProfile whole = planVelocity(start.velocity, start.acceleration, target, A, J);
+    const double t = whole.totalTime() * std::abs(part(random)), rest = 0.05;
+    const AxisState middle = advance(start, whole, t);
+    const AxisState twice =
+        advance(middle, planVelocity(middle.velocity, middle.acceleration, target, A, J), rest);
+    const AxisState once = advance(start, whole, t + rest);
+    ASSERT_NEAR(twice.position, once.position, 1e-11);
+    ASSERT_NEAR(twice.velocity, once.velocity, 1e-11);
+    // Near the end of a phase the acceleration follows the square root of the rounding of the
+    // velocity.
+    ASSERT_NEAR(twice.acceleration, once.acceleration, 1e-5);
+  }
+}
+
+TEST(Interpolator, accelerationBeyondTheLimitComesBackFirst) {
+  AxisState s{0.0, 0.0, 15.0};
+  for (int i = 0; i < 500; ++i) {
+    const double before = s.acceleration;
+    s = advance(s, planVelocity(s.velocity, s.acceleration, 1.5, 10.0, 500.0), 0.001);
+    ASSERT_LE(std::abs(s.acceleration - before), 0.5 * (1 + 1e-9));
+    ASSERT_LE(s.acceleration, before > 10.0 ? before : 10.0 + 1e-9);
+  }
+  EXPECT_EQ(s.velocity, 1.5);
+}
+
+TEST(Interpolator, matchesNumericIntegrationOfItsJerk) {
+  const AxisState start{0.0, 0.4, -3.0};
+  const AxisProfile profile = planVelocity(start.velocity, start.acceleration, -1.2, 10.0, 500.0);
+  double p = start.position, v = start.velocity, a = start.acceleration, t = 0.0;
+  const double h = 1e-7, end = 0.9 * profile.totalTime();
+  while (t < end) {
+    const double j = t < profile.duration[0]                         ? profile.jerk[0]
+                     : t < profile.duration[0] + profile.duration[1] ? profile.jerk[1]
+                                                                     : profile.jerk[2];
+    p += h * v;
+    v += h * a;
+    a += h * j;
+    t += h;
+  }
+  const AxisState s = advance(start, profile, t);
+  EXPECT_NEAR(s.position, p, 1e-6);
+  EXPECT_NEAR(s.velocity, v, 1e-5);
+  EXPECT_NEAR(s.acceleration, a, 1e-3);
+}
+
+}  // namespace
+}  // namespace coglab_rt

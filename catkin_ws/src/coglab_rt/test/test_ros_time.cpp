@@ -1,0 +1,52 @@
+/// Stamps and the steady clock: there and back, and for any stamp that a wire can carry.
+#include <gtest/gtest.h>
+
+#include <cstdint>
+#include <random>
+
+#include <ros/time.h>
+
+#include "coglab_rt/ros/ros_time.hpp"
+
+namespace coglab_rt {
+namespace {
+
+constexpr std::int64_t kJitter_ns = 500'000'000;  // between two readings on a busy machine
+
+/// The last test leaves simulated time behind.
+class RosTime : public ::testing::Test {
+ protected:
+  static void SetUpTestSuite() { ros::Time::init(); }
+};
+
+TEST_F(RosTime, thereAndBack) {
+  for (const std::int64_t age : {0LL, 1'000'000LL, 10'000'000'000LL}) {
+    const std::int64_t steady = steadyNow() - age;
+    EXPECT_NEAR(static_cast<double>(toSteady(toRos(steady)) - steady), 0.0, kJitter_ns);
+    EXPECT_NEAR(static_cast<double>(ageOf(toRos(steady)) - age), 0.0, kJitter_ns);
+  }
+}
+
+TEST_F(RosTime, anyStampHasAnAge) {
+  std::mt19937 random(5);
+  for (int i = 0; i < 10000; ++i) {
+    ros::Time stamp;
+    stamp.sec = static_cast<std::uint32_t>(random());
+    stamp.nsec = static_cast<std::uint32_t>(random());
+    EXPECT_NO_THROW(ageOf(stamp));
+    if (!stamp.isZero()) {
+      const std::int64_t now = steadyNow();
+      EXPECT_NEAR(static_cast<double>(now - toSteady(stamp, now) - ageOf(stamp)), 0.0, kJitter_ns);
+    }
+  }
+}
+
+TEST_F(RosTime, zeroMeansNoStampAndIsNeverMade) {
+  EXPECT_EQ(toSteady(ros::Time()), 0);
+  ros::Time::setNow(ros::Time(3.0));  // simulated time has just begun
+  EXPECT_EQ(toRos(steadyNow() - 10'000'000'000), ros::Time(3.0));
+  EXPECT_NEAR(toRos(steadyNow() - 1'000'000'000).toSec(), 2.0, 0.5);
+}
+
+}  // namespace
+}  // namespace coglab_rt

@@ -1,0 +1,251 @@
+"""The whole cell in one process and in virtual time: the robot (KRC stand-in, bridge and controller manager, byte for
+byte in lockstep), the hand emulator behind its driver, virtual human, tracker. One step() is one FRI period.
+
+Tests, trials and benches make their world here, and nowhere else.
+"""
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from types import SimpleNamespace
+from typing import Any
+
+import coglab_controllers as cc
+import numpy as np
+import yaml
+from coglab_objects.database import cell_parameters, objects_folder, read_object
+from coglab_py.packages import package_path
+from coglab_py.pose import Pose, about_z
+from coglab_py.yaml_file import read
+from ih2_hand.clock import VirtualClock
+from ih2_hand.driver import HandSerialDriver
+from ih2_hand.emulator.hand import EmulatedHand
+from ih2_hand.emulator.virtual_link import VirtualLink
+from ih2_hand.progress import shown_empty, shown_holding
+
+import coglab_sim._cell  # noqa: F401  (knows the type of VirtualRobot.cell)
+from coglab_sim._virtual import VirtualRobot
+from coglab_sim.participant import Participant
+from coglab_sim.perception_stand_in import PerceptionSettings, Sight, Tracker
+from coglab_sim.scene import HandSample, Scene, WorldView
+from coglab_sim.virtual_human import VirtualHuman
+
+LIMITS = str(package_path("lwr_description", "config", "joint_limits.yaml"))
+BOARD = Pose(np.array([0.45, -0.55, 0.05]), about_z(-np.pi / 2))
+"""of the frame board in world"""
+OBJECT = "mug"
+DT = 0.005
+"""s, FRI period"""
+FLOAT32 = 5e-4
+"""rad/s, what rounding to float32 on the wire adds to a velocity between two answers"""
+OLDEST = 1e9
+"""s, age of a frame that was never seen"""
+
+
+def urdf_file() -> str:
+    """Path of the robot description."""
+    return str(package_path("lwr_description", "urdf", "lwr_ih2.urdf"))
+
+
+def manager_parameters() -> dict[str, Any]:
+    """The parameters of /controller_manager as the launch file loads them."""
+    file = package_path("coglab_controllers", "config", "controllers.yaml")
+    parameters: dict[str, Any] = read(file).value
+    package, _, path = parameters["feedback_file"].removeprefix("package://").partition("/")
+    parameters["feedback_file"] = str(package_path(package, path))
+    return parameters
+
+
+def pose_of_truth(pose: Mapping[str, Any]) -> Pose:
+    """A pose of the cell's truth."""
+    return Pose(np.asarray(pose["position"]), np.asarray(pose["rotation"]))
+
+
+def view_of(truth: Mapping[str, Any], speed: float) -> WorldView:
+    """What a person perceives of the cell's truth; ``speed`` of the robot's hand, m/s."""
+    return WorldView(pose_of_truth(truth["robot_hand"]), speed, pose_of_truth(truth["object"]),
+                     float(np.linalg.norm(truth["palm_force"])), truth["robot_load_share"],
+                     truth["human_load_share"], truth["held_by"])
+
+
+def move_person(cell: Any, hand: HandSample) -> None:
+    """The person's hand, for the cell."""
+    cell.set_human(hand.frame.position, hand.frame.orientation, hand.velocity, np.zeros(3), hand.grip,
+                   hand.grip_force)
+
+
+class Robot:
+    """VirtualRobot with what figures and detectors need of each period.
+
+    ``cell``: parameters of the simulated cell, ``__`` for ``/`` in their names; ``limits``: table of joint limits.
+    """
+
+    def __init__(self, seed: int, limits: str = LIMITS, **cell: Any) -> None:
+        parameters = {"seed": int(seed), "krc/period": DT, "contact/board_center": list(BOARD.position),
+                      **{name.replace("__", "/"): value for name, value in cell.items()}}
+        self.parameters = {**manager_parameters(), "joint_limits_file": limits}
+        self.virtual = VirtualRobot(urdf_file(), limits, parameters, yaml.safe_dump(manager_parameters()))
+        self.cell = self.virtual.cell
+        self.limits = cc.load_joint_limits(limits)
+        with open(urdf_file(), encoding="utf-8") as stream:
+            self.chain = cc.Chain(stream.read())
+        self.report = self.virtual.report()
+        self.progress: dict[str, Any] = {"motion": "idle", "reason": "", "primitive": "", "phase": 0.0,
+                                         "remaining_distance": 0.0}
+        self.ended: dict[int, dict[str, Any]] = {}
+        self.loaded: dict[str, str] = {}
+        self.peak_share = 0.0
+        self.limit_violations = 0
+        self.debug: dict[str, Any] | None = None
+        self._commanded: np.ndarray | None = None
+
+    def step(self) -> None:
+        """One FRI period; the limits are looked at in what was measured and in what was answered."""
+        self.virtual.tick()
+        self.report = report = self.virtual.report()
+        if report["fri_period"] <= 0.0:
+            return
+        if "ptp" in self.loaded:
+            self.ended.update((end["ptp_id"], end) for end in self.virtual.ptp_ends())
+        q, commanded = np.asarray(report["position"]), np.asarray(report["commanded_position"])
+        outside = any(np.any(v < self.limits.lower_position) or np.any(v > self.limits.upper_position)
+                      for v in (q, commanded))
+        if self._commanded is not None and report["motion_allowed"]:
+            speed = np.abs(commanded - self._commanded) / DT
+            self.peak_share = max(self.peak_share, float(np.max(speed / self.limits.velocity)))
+            outside = outside or bool(np.any(speed > self.limits.velocity + FLOAT32))
+        self._commanded = commanded if report["motion_allowed"] else None
+        self.limit_violations += outside
+
+    def look_at_motion(self) -> list[dict[str, Any]]:
+        """Progress of the DMP and, while it moves, the newest set-point and goal."""
+        self.progress = self.virtual.dmp_progress()
+        records: list[dict[str, Any]] = self.virtual.ik_debug()
+        if records:
+            self.debug = records[-1]
+        return records
+
+
+class Hand:
+    """Driver on the emulator over a line without a pty; one task at a time, polled at 30 Hz while it runs."""
+
+    def __init__(self) -> None:
+        self.clock = VirtualClock()
+        self.emulator = EmulatedHand(self.clock)
+        self.driver = HandSerialDriver(transport=VirtualLink(self.emulator, self.clock), clock=self.clock)
+        self.calibrated = False
+        self.holding = False
+        self.message = ""
+        self.task: Any = None
+        self.begun = 0.0
+        self.verdict: Any = None
+        self.positions: tuple[int, ...] = (0, 0, 0, 0, 0)
+        self.dead = False
+        self._next_poll = 0.0
+
+    def begin(self, task: Any) -> None:
+        """Start a task of ih2_hand.progress."""
+        self.task, self.begun, self.verdict = task, self.clock.monotonic(), None
+        task.begin(self.driver)
+
+    def step(self, t: float, contact: Callable[[], tuple[Any, Any]]) -> None:
+        """Follow the time; ``contact()`` gives where the fingers meet the object."""
+        self.clock.now = max(self.clock.now, t)
+        self.emulator.advance()
+        if t < self._next_poll or self.dead:
+            return
+        self._next_poll = t + (1 / 30 if self.task is not None else 0.2)
+        positions, stiffness = contact()
+        self.emulator.set_contacts(positions, stiffness)
+        if self.calibrated:
+            self._poll()
+
+    def _poll(self) -> None:
+        readings = [SimpleNamespace(**r) for r in self.driver.read_motors()]
+        self.positions = tuple(r.position for r in readings)
+        if self.holding and shown_empty(readings):
+            self.holding = False
+        elif not self.holding and shown_holding(readings):
+            self.holding = True
+        if self.task is None:
+            return
+        elapsed = self.clock.monotonic() - self.begun
+        verdict = self.task.judge(readings, elapsed)
+        if verdict.done or elapsed > self.task.limit:
+            self.verdict, self.task = verdict, None
+            if verdict.holding is not None:
+                self.holding = verdict.holding
+            if verdict.stop:
+                self.driver.stop_all()
+            self.message = verdict.text
+
+
+class World:
+    """Everything together. ``seed`` makes person, noise and tracker; ``behaviour`` is the person's.
+
+    ``after_period`` are called at the end of each FRI period, with a robot that is connected.
+    """
+
+    def __init__(self, seed: int = 1, behaviour: str = "normal", perfect: bool = False,
+                 object_on: str = "human_hand", perception: PerceptionSettings | None = None, turned: float = 0.0,
+                 limits: str = LIMITS) -> None:
+        thing, _ = read_object(objects_folder() / f"{OBJECT}.yaml")
+        where = {**{f"object__{name}": value for name, value in cell_parameters(thing).items()},
+                 "object__start": object_on, "object__position": [-0.08, 0.0, -0.05],
+                 "object__rotation": [float(v) for v in about_z(turned)]}
+        if object_on == "world":
+            where["object__position"] = [float(v) for v in BOARD.apply([0.0, 0.0, 0.002])]
+            where["object__rotation"] = [float(v) for v in BOARD.orientation]
+        self.robot = Robot(seed, limits, **where)
+        self.cell = self.robot.cell
+        self.hand = Hand()
+        self.scene = Scene(object_mass=float(thing["mass"]))
+        self.human = VirtualHuman(Participant.draw(seed, behaviour), self.scene, object_on == "human_hand")
+        settings = perception or PerceptionSettings(perfect=perfect)
+        self.trackers = {name: Tracker(name, settings, seed) for name in (f"object_{OBJECT}", "human_hand")}
+        self.after_period: list[Callable[[], None]] = []
+        self.speed_scale = 1.0
+        self.t = self.robot.virtual.now
+        self.ticks = 0
+        self.truth = self.cell.truth()
+        self.sights: dict[str, Sight] = {}
+        self.blind: set[str] = set()
+        self._palms: list[np.ndarray] = []
+
+    def newest(self, name: str) -> tuple[Pose | None, float]:
+        """Newest sight of a frame and its age; the board is known."""
+        if name == "board":
+            return BOARD, 0.0
+        sight = self.sights.get(name)
+        if sight is None:
+            return None, OLDEST
+        return sight.frame, self.t - sight.captured
+
+    def step(self) -> None:
+        """One FRI period."""
+        if self.ticks % 2 == 0:
+            self._person_and_tracker()
+        self.hand.step(self.t, self.cell.finger_contact)
+        self.cell.set_fingers([min(254, int(m.position)) for m in self.hand.emulator.motors])
+        self.robot.virtual.set_frame("board", BOARD.position, BOARD.orientation)
+        self.robot.step()
+        self.ticks += 1
+        self.t = self.robot.virtual.now
+        if self.robot.report["fri_period"] > 0.0:
+            for look in self.after_period:
+                look()
+
+    def _person_and_tracker(self) -> None:
+        self.truth = truth = self.cell.truth()
+        palm = pose_of_truth(truth["robot_hand"])
+        self._palms.append(palm.position)
+        del self._palms[:-10]
+        speed = float(np.linalg.norm(palm.position - self._palms[0])) / 0.09 if len(self._palms) > 9 else 1.0
+        view = view_of(truth, speed)
+        hand = self.human.step(self.t, view)
+        move_person(self.cell, hand)
+        for name, frame in ((f"object_{OBJECT}", view.object), ("human_hand", hand.frame)):
+            for sight in self.trackers[name].step(self.t, frame, palm):
+                if name not in self.blind:
+                    self.sights[name] = sight
+                    self.robot.virtual.set_frame(name, sight.frame.position, sight.frame.orientation,
+                                                 self.t - sight.captured)

@@ -1,0 +1,1 @@
+"""What every state is given: configuration, journal, triggers, memory."""

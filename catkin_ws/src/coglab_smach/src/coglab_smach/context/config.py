@@ -1,0 +1,111 @@
+"""Configuration of the machines from one YAML file, checked against machines_schema.json.
+
+It is read again whenever the file changes."""
+from __future__ import annotations
+
+import json
+import os
+import threading
+from collections.abc import Callable, Mapping
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+from coglab_py.yaml_file import Document, YamlError, read
+
+
+class ConfigError(Exception):
+    """The configuration file cannot be used; the sentence names file and field."""
+
+
+class Config:
+    """Values by dotted name. A file that has become bad keeps the old values and says so once."""
+
+    def __init__(self, values: Mapping[str, Any], path: str = "",
+                 warn: Callable[[str], None] | None = None) -> None:
+        self._values = dict(values)
+        self.path = path
+        self._warn = warn or (lambda text: None)
+        self._stamp = os.stat(path).st_mtime_ns if path else 0
+        self._lock = threading.Lock()
+
+    @staticmethod
+    def load(path: str, overrides: Mapping[str, Any] | None = None,
+             warn: Callable[[str], None] | None = None) -> Config:
+        """Read a file; ConfigError names file and line. ``overrides`` (dotted names) win over the file for good."""
+        config = Config(_read(path), path, warn)
+        _checked(Document("configuration given beside the file", "", _nested(overrides or {}), {}))
+        config._overrides = dict(overrides or {})
+        return config
+
+    _overrides: dict[str, Any] = {}
+
+    def get(self, name: str, default: Any = None) -> Any:
+        """Value of ``a.b.c``; KeyError-like ConfigError if it is absent and no default is given."""
+        if name in self._overrides:
+            return self._overrides[name]
+        self._reload_if_changed()
+        node: Any = self._values
+        for part in name.split("."):
+            if not isinstance(node, Mapping) or part not in node:
+                if default is None:
+                    raise ConfigError(f"{self.path or 'configuration'}: '{name}' is missing")
+                return default
+            node = node[part]
+        return node
+
+    def set(self, name: str, value: Any) -> None:
+        """Override one value while running (the console and tests use it)."""
+        self._overrides = {**self._overrides, name: value}
+
+    def _reload_if_changed(self) -> None:
+        if not self.path:
+            return
+        with self._lock:
+            try:
+                stamp = os.stat(self.path).st_mtime_ns
+            except OSError:
+                return
+            if stamp == self._stamp:
+                return
+            self._stamp = stamp
+            try:
+                self._values = _read(self.path)
+            except ConfigError as error:
+                self._warn(f"{error}; the values read before stay in force")
+
+
+def _read(path: str) -> dict[str, Any]:
+    try:
+        document = read(path)
+    except YamlError as error:
+        raise ConfigError(str(error)) from None
+    return _checked(document)
+
+
+def _checked(document: Document) -> dict[str, Any]:
+    try:
+        document.check(_schema())
+    except YamlError as error:
+        raise ConfigError(str(error)) from None
+    values: dict[str, Any] = document.value
+    return values
+
+
+def _nested(overrides: Mapping[str, Any]) -> dict[str, Any]:
+    """Values by dotted name as the file would have them."""
+    values: dict[str, Any] = {}
+    for name, value in overrides.items():
+        node = values
+        *above, last = name.split(".")
+        for part in above:
+            node = node.setdefault(part, {})
+        node[last] = value
+    return values
+
+
+@lru_cache(maxsize=1)
+def _schema() -> dict[str, Any]:
+    text = Path(__file__).with_name("machines_schema.json").read_text(encoding="utf-8")
+    schema: dict[str, Any] = json.loads(text)
+    return schema

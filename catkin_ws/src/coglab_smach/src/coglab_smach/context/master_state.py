@@ -1,0 +1,51 @@
+"""Where the brain stands, for people and programs that look on: what coglab/state shows."""
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from coglab_smach.context.context import Context
+from coglab_smach.context.requests import COMMAND, command
+
+
+@dataclass(frozen=True)
+class MasterState:
+    """The fields of coglab_msgs/MasterState but its header."""
+
+    state: str = ""
+    in_hub: bool = False
+    actions: tuple[str, ...] = ()
+    object_id: str = ""
+    why: str = ""
+    reason_code: int = 0
+
+
+class StateWatch:
+    """Calls ``publish`` with each new MasterState, in order, from whichever thread made the change."""
+
+    def __init__(self, ctx: Context, publish: Callable[[MasterState], None]) -> None:
+        self._ctx = ctx
+        self._publish = publish
+        self._lock = threading.Lock()
+        self._shown: MasterState | None = None
+        ctx.journal.listen_changes(self._look)
+        self._look()
+
+    def _look(self) -> None:
+        with self._lock:
+            now = self.now()
+            if now != self._shown:
+                self._shown = now
+                self._publish(now)
+
+    def now(self) -> MasterState:
+        """As it stands."""
+        ctx = self._ctx
+        failure, hub = ctx.journal.newest_failure(), ctx.requests.hub()
+        why = str(failure)
+        if hub in ("stopped", "fault") and COMMAND not in why:
+            why = f"{why or f'the machine is in {hub}'}; to go on {command(*ctx.requests.allowed())}"
+        active = ctx.journal.active()  # of several side by side the one that began last
+        return MasterState(active[-1] if active else "", bool(hub), ctx.requests.allowed(), ctx.holding, why,
+                           failure.code)

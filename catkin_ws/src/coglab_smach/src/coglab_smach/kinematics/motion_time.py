@@ -1,0 +1,57 @@
+"""How long the arm may take: from the way it has to go, its limits of speed and acceleration, and the speed scale.
+
+Estimates that are meant to be too long rather than too short: they bound a wait, they plan nothing.
+"""
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from coglab_smach.kinematics.reachability import default_arm
+
+LEVER = 0.4
+"""m: what one joint moves the hand by, per rad, in a bent posture of the arm."""
+HALF_TURN = float(np.pi)
+"""rad: more than this the hand never turns on its way."""
+
+
+@dataclass(frozen=True)
+class MotionLimits:
+    """What bounds the speed of the arm now, seven joints each, in wire order."""
+
+    velocity: tuple[float, ...]
+    """rad/s, limits of the arm"""
+    acceleration: tuple[float, ...]
+    """rad/s^2, limits of the arm"""
+    ptp_velocity: tuple[float, ...]
+    """rad/s, of a point-to-point motion that asks for none"""
+    ptp_acceleration: tuple[float, ...]
+    """rad/s^2, likewise"""
+    hand_speed: float = float("inf")
+    """m/s, at which the reference is slowed down; the smaller one of hand and elbow"""
+
+
+def ptp_time(limits: MotionLimits, start: Sequence[float], target: Sequence[float],
+             max_velocity: Sequence[float] = ()) -> float:
+    """s that a point-to-point motion takes at full speed scale; ``max_velocity`` (rad/s) as in its request."""
+    way = np.abs(np.asarray(target, dtype=float) - np.asarray(start, dtype=float))
+    velocity = np.asarray(max_velocity if len(max_velocity) else limits.ptp_velocity, dtype=float)
+    acceleration = np.asarray(limits.ptp_acceleration, dtype=float)
+    joints = float(np.max(way / velocity + velocity / acceleration))
+    return max(joints, hand_path(start, target) / limits.hand_speed)
+
+
+def reach_time(limits: MotionLimits, distance: float) -> float:
+    """s for which the limits hold up a reach over ``distance`` (m) that also turns the hand, at full speed scale."""
+    slowest = min(limits.velocity)
+    along = distance / min(limits.hand_speed, LEVER * slowest)
+    return along + HALF_TURN / slowest + max(np.divide(limits.velocity, limits.acceleration))
+
+
+def hand_path(start: Sequence[float], target: Sequence[float], steps: int = 20) -> float:
+    """m that the hand moves on the straight line between two postures in joint space."""
+    line = np.linspace(np.asarray(start, dtype=float), np.asarray(target, dtype=float), steps)
+    places = np.array([default_arm().fk(q)[0] for q in line])
+    return float(np.sum(np.linalg.norm(np.diff(places, axis=0), axis=1)))

@@ -1,0 +1,93 @@
+"""Can the arm bring the palm to an object's grasp and delivery poses in the handover region?
+
+A damped least-squares descent from the home posture, with joint limits, to grid points of the region: what the motion
+itself will do. Coarse on purpose; it finds the grasp that asks the wrist for the impossible.
+"""
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import lru_cache
+from typing import Any
+
+import coglab_controllers as cc
+import numpy as np
+from coglab_py.packages import package_path
+from coglab_py.pose import Pose, about_z
+from coglab_py.yaml_file import read
+
+from coglab_smach.kinematics.goals import palm_at_grasp
+
+POSITION_TOLERANCE = 0.003
+ANGLE_TOLERANCE = np.radians(3.0)
+REGION = ((0.72, 0.78, 0.82), (-0.12, 0.0, 0.12), (0.28, 0.38, 0.45))
+"""m, base frame: object positions at a handover."""
+
+
+@lru_cache(maxsize=1)
+def default_arm() -> cc.Chain:
+    """The arm of lwr_description."""
+    return cc.Chain(package_path("lwr_description", "urdf", "lwr_ih2.urdf").read_text(encoding="utf-8"))
+
+
+@lru_cache(maxsize=1)
+def joint_limits() -> cc.JointLimits:
+    """The table of lwr_description."""
+    return cc.load_joint_limits(str(package_path("lwr_description", "config", "joint_limits.yaml")))
+
+
+@lru_cache(maxsize=1)
+def home_posture() -> np.ndarray:
+    """``postures.home`` of the machines' configuration, rad."""
+    machines = read(package_path("coglab_smach", "config", "machines.yaml")).value
+    return np.array(machines["postures"]["home"], dtype=float)
+
+
+def position_jacobian(arm: cc.Chain, q: Sequence[float]) -> np.ndarray:
+    """3 x 7: velocity of the palm (m/s, base frame) per joint velocity; its transpose maps force to torque."""
+    return np.asarray(arm.jacobian(np.asarray(q, dtype=float)))[:3]
+
+
+def solve(arm: cc.Chain, target: Pose, start: Sequence[float] | None = None, steps: int = 120) -> np.ndarray | None:
+    """Joint positions (rad) that bring the palm to ``target`` within 3 mm and 3 deg, or None. Begins at ``start``, by
+    default at home."""
+    q = np.array(home_posture() if start is None else start, dtype=float)
+    lower, upper = 0.98 * joint_limits().lower_position, 0.98 * joint_limits().upper_position
+    for _ in range(steps):
+        pose = Pose(*arm.fk(q))
+        turn = (target.rotation * pose.rotation.inv()).as_rotvec()
+        error = np.concatenate([target.position - pose.position, turn])
+        if np.linalg.norm(error[:3]) < POSITION_TOLERANCE and np.linalg.norm(error[3:]) < ANGLE_TOLERANCE:
+            return q
+        error[:3] *= min(1.0, 0.08 / max(1e-9, float(np.linalg.norm(error[:3]))))
+        error[3:] *= min(1.0, 0.3 / max(1e-9, float(np.linalg.norm(error[3:]))))
+        j = arm.jacobian(q)
+        dq = j.T @ np.linalg.solve(j @ j.T + 1e-4 * np.eye(6), error)
+        q = np.clip(q + dq, lower, upper)
+    return None
+
+
+def share_reached(palm_in_object: Pose, arm: cc.Chain | None = None,
+                  yaws_deg: Sequence[float] = (-20.0, 0.0, 20.0)) -> tuple[int, int]:
+    """How many object poses of the handover region (27 places, turned about z) the palm can be brought to:
+    (n, of m)."""
+    arm = arm or default_arm()
+    reached = total = 0
+    for x in REGION[0]:
+        for y in REGION[1]:
+            for z in REGION[2]:
+                for yaw in yaws_deg:
+                    at = Pose(np.array([x, y, z]), about_z(np.radians(yaw)))
+                    total += 1
+                    reached += solve(arm, at * palm_in_object) is not None
+    return reached, total
+
+
+def reachability_report(entry: Mapping[str, Any], needed: float = 0.7) -> list[tuple[str, bool]]:
+    """One sentence per grasp and whether it is good enough."""
+    report = []
+    for name, grasp in entry["grasps"].items():
+        reached, total = share_reached(palm_at_grasp(grasp), yaws_deg=(0.0,))
+        ok = reached >= needed * total
+        report.append((f"grasp '{name}': {reached} of {total} places of the handover region reached"
+                       f"{'' if ok else f' (at least {needed:.0%} expected: turn or move the grasp pose)'}", ok))
+    return report

@@ -1,0 +1,1 @@
+"""Ports over services, actions and topics."""

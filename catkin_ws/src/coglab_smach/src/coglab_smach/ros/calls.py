@@ -1,0 +1,89 @@
+"""Services and topics as the ports over ROS use them.
+
+A rospy service call has no time limit of its own, so each runs in a thread and the state that waits gives it one.
+"""
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from typing import Any
+
+import rospy
+from coglab_msgs.msg import ReasonCode
+
+from coglab_smach.ports.pending import Pending, Permit, Polled, PortError, Threaded
+
+SERVICE_WAIT = 20.0
+"""s to wait for a service to appear: a node may still be starting."""
+
+
+class Newest:
+    """The newest message of a topic with the time it came (monotonic s)."""
+
+    def __init__(self, topic: str, kind: Any, on_message: Callable[[Any], None] | None = None) -> None:
+        self.message: Any = None
+        self.stamp = -1e9
+        self._on_message = on_message
+        self._subscriber = rospy.Subscriber(topic, kind, self._take, queue_size=50)
+
+    def _take(self, message: Any) -> None:
+        self.message, self.stamp = message, time.monotonic()
+        if self._on_message is not None:
+            self._on_message(message)
+
+    def age(self) -> float:
+        """s since the last message; large if there was none."""
+        return time.monotonic() - self.stamp
+
+
+def call(name: str, kind: Any, wait: float = SERVICE_WAIT, **fields: Any) -> Pending:
+    """Call a service in a thread; a response with ``success`` false becomes a PortError with message and reason_code.
+
+    Cancelled before the server has taken the connection, the request is never sent, however late the server comes.
+    """
+    return Threaded(lambda permit: call_now(name, kind, permit, wait, **fields), f"service {name}")
+
+
+def call_now(name: str, kind: Any, permit: Permit, wait: float = SERVICE_WAIT, **fields: Any) -> Any:
+    """The same in the thread of the caller, which must be one of its own; returns the response."""
+    full = rospy.resolve_name(name)
+    _await_service(full, wait, permit)
+
+    class Request(kind._request_class):
+        """rospy serialises a request when its server has answered the connection's header, and sends it then: that is
+        the last moment at which it can be given up. A frozen server answers no header."""
+
+        def serialize(self, buff: Any) -> None:
+            permit.check()
+            super().serialize(buff)
+
+    try:
+        response = rospy.ServiceProxy(full, kind)(Request(**fields))
+    except rospy.ServiceException as error:
+        raise PortError(f"service {full} broke off; its node may have died", (str(error),),
+                        ReasonCode.NODE_SILENT) from None
+    if getattr(response, "success", True) is False:
+        raise PortError(f"{full} refused: {response.message}", code=getattr(response, "reason_code", ReasonCode.NONE))
+    return response
+
+
+def _await_service(full: str, wait: float, permit: Permit) -> None:
+    """Until the service is registered; in short waits, so that a call that is given up leaves no thread behind."""
+    end = time.monotonic() + wait
+    while True:
+        permit.check()
+        try:
+            rospy.wait_for_service(full, timeout=max(0.05, min(0.5, end - time.monotonic())))
+            return
+        except rospy.ROSException:
+            if rospy.is_shutdown():
+                raise PortError(f"service {full} was not called: this node shuts down",
+                                code=ReasonCode.PREEMPTED) from None
+            if time.monotonic() >= end:
+                raise PortError(f"service {full} is not there after {wait:.0f} s; is its node running?",
+                                code=ReasonCode.NODE_SILENT) from None
+
+
+def mapped(pending: Pending, value: Callable[[Any], Any]) -> Pending:
+    """The same call with its response turned into a value."""
+    return Polled(pending.done, lambda: value(pending.result()), pending.cancel)

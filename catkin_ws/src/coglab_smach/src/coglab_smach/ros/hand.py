@@ -1,0 +1,151 @@
+"""HandPort over the four actions, the calibration topic and the status of ih2_hand."""
+from __future__ import annotations
+
+import threading
+import time
+from typing import Any
+
+import actionlib
+import rospy
+from actionlib_msgs.msg import GoalStatus
+from coglab_msgs.msg import (
+    HandCloseAction,
+    HandOpenAction,
+    HandOpenGoal,
+    HandPreshapeAction,
+    HandPreshapeCloseAction,
+    HandPreshapeCloseGoal,
+    HandPreshapeGoal,
+    HandStatus,
+    ReasonCode,
+)
+from std_msgs.msg import String
+
+from coglab_smach.ports.interfaces import HandState
+from coglab_smach.ports.pending import Pending, Polled, PortError
+from coglab_smach.ros.calls import Newest
+
+SERVER_WAIT = 10.0
+"""s to wait for an action server to appear."""
+
+
+class ActionCall(Pending):
+    """One goal sent to an action server; the result's ``isOk`` decides, ``message`` is the reason."""
+
+    def __init__(self, client: actionlib.SimpleActionClient, name: str, goal: Any) -> None:
+        self._client, self._name = client, name
+        self._done = threading.Event()
+        self._error: PortError | None = None
+        self._result: Any = None
+        self._lock = threading.Lock()
+        self._sent = self._cancelled = False
+        threading.Thread(target=self._send, args=(goal,), name=f"action:{name}", daemon=True).start()
+
+    def _send(self, goal: Any) -> None:
+        if not self._client.wait_for_server(rospy.Duration(SERVER_WAIT)):
+            self._fail(f"action {self._name} has no server after {SERVER_WAIT:.0f} s; is the hand node running?",
+                       code=ReasonCode.NODE_SILENT)
+            return
+        with self._lock:
+            if self._cancelled:
+                self._fail(f"action {self._name} was cancelled before its goal was sent", code=ReasonCode.CANCELLED)
+                return
+            self._client.send_goal(goal, done_cb=self._on_done)
+            self._sent = True
+
+    def _fail(self, sentence: str, causes: tuple[str, ...] = (), code: int = 0) -> None:
+        self._error = PortError(sentence, causes, code)
+        self._done.set()
+
+    def _on_done(self, status: int, result: Any) -> None:
+        self._result = result
+        message = getattr(result, "message", "") or self._client.get_goal_status_text()
+        if status != GoalStatus.SUCCEEDED or (result is not None and not result.isOk):
+            self._fail(f"action {self._name} ended {GoalStatus.to_string(status)}", (message,) if message else (),
+                       getattr(result, "reason_code", ReasonCode.NONE))
+            return
+        self._done.set()
+
+    def done(self) -> bool:
+        return self._done.is_set()
+
+    def result(self) -> Any:
+        if self._error is not None:
+            raise self._error
+        return self._result
+
+    def cancel(self) -> None:
+        """End the action; a goal that is not sent yet never will be."""
+        with self._lock:
+            self._cancelled = True
+            if self._sent and not self._done.is_set():
+                self._client.cancel_goal()
+
+
+class RosHand:
+    """HandPort over ROS."""
+
+    def __init__(self, namespace: str = "ih2_hand") -> None:
+        self._ns = namespace
+        self._clients = {name: actionlib.SimpleActionClient(f"{namespace}/{name}", kind) for name, kind in
+                         (("hand_open", HandOpenAction), ("hand_close", HandCloseAction),
+                          ("hand_preshape", HandPreshapeAction), ("hand_preshape_close", HandPreshapeCloseAction))}
+        self._status = Newest(f"{namespace}/hand_status", HandStatus)
+        self._calibration = rospy.Publisher(f"{namespace}/hand_calibration", String, queue_size=1)
+
+    def _call(self, name: str, goal: Any) -> Pending:
+        return ActionCall(self._clients[name], f"{self._ns}/{name}", goal)
+
+    def preshape(self, mode: str, level: str) -> Pending:
+        return self._call("hand_preshape", HandPreshapeGoal(mode=mode, level=level))
+
+    def close_on_object(self) -> Pending:
+        return self._call("hand_preshape_close", HandPreshapeCloseGoal())
+
+    def open(self, speed: int) -> Pending:
+        return self._call("hand_open", HandOpenGoal(speed=speed))
+
+    def calibrate(self, mode: str) -> Pending:
+        """Publish the order once the hand listens, then follow hand_status: started, ended, or refused."""
+        begun: dict[str, Any] = {"sent": 0.0, "seen": False, "asked": time.monotonic(), "error": None}
+
+        def fail(why: str, code: int) -> bool:
+            begun["error"] = PortError(f"the hand does not calibrate after the order '{mode}'", (why,), code)
+            return True
+
+        def done() -> bool:
+            state = self.state()
+            if begun["error"] is not None:
+                return True
+            if not begun["sent"]:
+                # After a start the hand counts as holding until a poll has shown it empty: give it 2 s for that.
+                settled = not state.holding or time.monotonic() - begun["asked"] > 2.0
+                if state.connected and settled and self._calibration.get_num_connections() > 0:
+                    self._calibration.publish(String(mode))
+                    begun["sent"] = time.monotonic()
+                return False
+            since = time.monotonic() - begun["sent"]
+            if state.calibrating:
+                begun["seen"] = True
+                return False
+            if state.event == ReasonCode.HAND_REFUSED and since > 0.2:
+                return fail(state.message, state.event)
+            if begun["seen"] or (state.calibrated and since > 0.5):
+                return True
+            return since > 3.0 and fail(state.message or "hand_status says nothing about it", ReasonCode.NODE_SILENT)
+
+        def value() -> None:
+            if begun["error"] is not None:
+                raise begun["error"]
+            state = self.state()
+            if not state.calibrated:
+                raise PortError("the hand's calibration ended without success", (state.message,), state.event)
+
+        return Polled(done, value)
+
+    def state(self) -> HandState:
+        message = self._status.message
+        if message is None or self._status.age() > 1.0:
+            return HandState(message=f"{self._ns}/hand_status is silent", event=ReasonCode.NODE_SILENT)
+        return HandState(message.connected, message.calibrated, message.calibrating, message.holding, message.message,
+                         tuple(motor.position for motor in message.motors), message.event_code)

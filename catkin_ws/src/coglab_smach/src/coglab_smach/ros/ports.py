@@ -1,0 +1,104 @@
+"""The ports over ROS to perception, object database and contact detector; the arm is in ros.arm, the hand in ros.hand.
+
+All names are relative: in the node's own namespace, so that two robots fit in one graph.
+"""
+from __future__ import annotations
+
+from typing import Any
+
+from coglab_msgs.msg import Contact, ReasonCode
+from coglab_msgs.msg import Recognition as RecognitionMsg
+from coglab_msgs.srv import ArmContact, FreePlaces, GetObject, InitVision, ListObjects, LocateObject
+from coglab_py.yaml_file import YamlError, parse
+from geometry_msgs.msg import Pose
+
+from coglab_smach.ports.interfaces import ContactEvent, Located, Recognition
+from coglab_smach.ports.pending import Pending, PortError
+from coglab_smach.ros.calls import SERVICE_WAIT, Newest, call, mapped
+
+
+class RosPerception:
+    """PerceptionPort over perception and the recogniser's topic."""
+
+    def __init__(self, namespace: str = "perception") -> None:
+        self._ns = namespace
+        self._recognition = Newest(f"{namespace}/recognition", RecognitionMsg)
+
+    def init_vision(self, time_limit: float) -> Pending:
+        # A service that is not there is said before the limit of whoever waits runs out.
+        wait = max(0.5, min(SERVICE_WAIT, time_limit - 1.0))
+        return mapped(call(f"{self._ns}/init_vision", InitVision, wait, timeout=time_limit), lambda r: r.message)
+
+    def locate_object(self, object_id: str, time_limit: float) -> Pending:
+        pending = call(f"{self._ns}/locate_object", LocateObject, wait=2.0, object_id=object_id, timeout=time_limit)
+        return mapped(pending, lambda r: _located(r.frame_id, r.pose.header.frame_id, r.pose.pose, r.age))
+
+    def free_places(self, object_id: str, time_limit: float) -> Pending:
+        pending = call(f"{self._ns}/free_places", FreePlaces, wait=2.0, object_id=object_id, timeout=time_limit)
+        return mapped(pending, lambda r: [_located("", p.header.frame_id, p.pose, 0.0) for p in r.places])
+
+    def recognition(self) -> Recognition:
+        message = self._recognition.message
+        if message is None or self._recognition.age() > 0.5:
+            return Recognition()
+        return Recognition(message.pattern, message.confidence, message.decided,
+                           dict(zip(message.names, message.probabilities, strict=False)))
+
+
+def _located(frame: str, parent: str, pose: Pose, age: float) -> Located:
+    p, q = pose.position, pose.orientation
+    return Located(frame, parent, (p.x, p.y, p.z), (q.x, q.y, q.z, q.w), age)
+
+
+def _entry(object_id: str, text: str) -> dict[str, Any]:
+    try:
+        entry: dict[str, Any] = parse(text, f"entry of '{object_id}'").value
+    except YamlError as error:
+        raise PortError(str(error), code=ReasonCode.BAD_FILE) from None
+    return entry
+
+
+class RosDatabase:
+    """DatabasePort over object_database."""
+
+    def __init__(self, namespace: str = "object_database") -> None:
+        self._ns = namespace
+
+    def get_object(self, object_id: str) -> Pending:
+        pending = call(f"{self._ns}/get_object", GetObject, wait=5.0, object_id=object_id)
+        return mapped(pending, lambda r: _entry(object_id, r.yaml))
+
+    def list_objects(self) -> Pending:
+        return mapped(call(f"{self._ns}/list_objects", ListObjects, wait=1.0), lambda r: list(r.object_ids))
+
+
+class RosContact:
+    """ContactPort: the topic coglab/contact, and the service that arms whoever publishes there."""
+
+    def __init__(self, topic: str = "coglab/contact", service: str = "contact_detector/arm") -> None:
+        self._service = service
+        self._event: ContactEvent | None = None
+        self._wanted: bool | None = None
+        self._newest = Newest(topic, Contact, self._on_contact)
+
+    def _on_contact(self, message: Contact) -> None:
+        if self._wanted is not None and self._event is None and message.contact == self._wanted:
+            self._event = ContactEvent(message.contact, message.source, message.margin, message.message,
+                                       message.confidence, message.reason_code)
+
+    def arm(self, mode: str, time_limit: float, settings: dict[str, Any]) -> Pending:
+        self._event = None
+        self._wanted = mode != "release"
+        return mapped(call(self._service, ArmContact, wait=2.0, mode=mode, timeout=time_limit,
+                           k=float(settings.get("k", 0.0)), joints=list(settings.get("joints", [])),
+                           mass=float(settings.get("mass", 0.0)),
+                           load_share=float(settings.get("load_share", 0.0))), lambda r: None)
+
+    def disarm(self) -> None:
+        if self._wanted is not None:
+            self._wanted = None
+            call(self._service, ArmContact, wait=0.5, mode="off", timeout=0.0, k=0.0, joints=[], mass=0.0,
+                 load_share=0.0)
+
+    def event(self) -> ContactEvent | None:
+        return self._event

@@ -1,0 +1,156 @@
+"""The kinematic cell behind the simulated ports: state, faults and the partner's script.
+
+A request acts when its time has come, whether or not anybody waits for it, as over ROS: only what could not be sent
+yet, because the node behind the port is frozen, can be given up.
+"""
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from coglab_msgs.msg import ReasonCode
+from coglab_py.pose import Pose
+
+from coglab_smach.clocks.clock import Clock
+from coglab_smach.ports.pending import Pending, PortError
+from coglab_smach.simulated.arm_model import ArmModel
+
+
+@dataclass
+class Faults:
+    """What is broken. Sets of names are compared with the port method that is called."""
+
+    dead: set[str] = field(default_factory=set)
+    """ports whose node is frozen: arm, hand, perception, database, contact. What is asked of it acts when it comes
+    back, unless it was given up."""
+    refuse: dict[str, str | PortError] = field(default_factory=dict)
+    """port method -> sentence, or error with its code, with which it refuses"""
+    not_seen: set[str] = field(default_factory=set)
+    """objects perception does not see"""
+    abort_dmp_after: float = 0.0
+    """s into the motion at which it aborts (0: never)"""
+    abort_reason: str = "goal lost for 1.0 s"
+    arm_disabled: str = ""
+    """reason why motion is not allowed"""
+    empty_grasp: bool = False
+    """the hand closes on nothing"""
+
+
+@dataclass
+class Partner:
+    """The person's script: seconds from arming to the touch, to the taking and to the letting go; None: never."""
+
+    touch_after: float | None = 0.8
+    take_after: float | None = 1.0
+    let_go_after: float | None = 0.2
+    pattern: str = "unknown"
+    pattern_at: float = 0.0
+    """s into the motion at which the pattern is decided"""
+
+
+class _Call(Pending):
+    """One request on its way."""
+
+    def __init__(self, cell: SimulatedCell, port: str, method: str, after: float, apply: Callable[[], Any]) -> None:
+        self.cell, self.port, self.method, self.after, self.apply = cell, port, method, after, apply
+        self.due: float | None = None
+        """when it acts; None while it is not sent"""
+        self.over = self.given_up = False
+        self.value: Any = None
+        self.error: PortError | None = None
+
+    def done(self) -> bool:
+        self.cell.advance()
+        return self.over
+
+    def result(self) -> Any:
+        if self.error is not None:
+            raise self.error
+        return self.value
+
+    def cancel(self) -> None:
+        self.given_up = True
+        self.cell.note(f"cancel {self.method}")
+
+    def look(self, now: float) -> None:
+        """Send it if its node is there, let it act if its time has come."""
+        if self.port in self.cell.faults.dead:
+            return
+        if self.due is None and self.given_up:
+            self.over = True
+            self.error = PortError("the request was given up before it was sent", code=ReasonCode.CANCELLED)
+            return
+        if self.due is None:
+            self.due = now + self.after
+        if now >= self.due:
+            self.over = True
+            try:
+                self.value = self.apply()
+            except PortError as error:
+                self.error = error
+
+
+class SimulatedCell:
+    """State shared by the simulated ports, advanced by looking at the clock: no thread of its own."""
+
+    def __init__(self, clock: Clock, reach_time: float = 1.3) -> None:
+        self.clock = clock
+        self.faults = Faults()
+        self.partner = Partner()
+        self.arm = ArmModel(clock, self.faults)
+        self.reach_time = reach_time
+        self.calls: list[tuple[float, str]] = []
+        self.profile = ""
+        self.profile_since = 0.0
+        self.fade_time = 0.2
+        self.loaded: dict[str, str] = {}
+        self.primitives = {"reach_human", "reach_human_high", "give_human", "take_board", "put_board"}
+        self.hand_positions: tuple[int, ...] = (0, 0, 0, 0, 0)
+        self.calibrated = self.preshaped = False
+        self.objects: dict[str, Pose] = {"mug": Pose(np.array([0.78, 0.03, 0.43])),
+                                         "board": Pose(np.array([0.45, -0.55, 0.05])),
+                                         "human_hand": Pose(np.array([0.86, 0.03, 0.43]))}
+        self._lock = threading.RLock()
+        self._under_way: list[_Call] = []
+
+    def note(self, what: str) -> None:
+        """Remember a call with its time."""
+        self.calls.append((self.clock.now(), what))
+
+    def called(self, prefix: str = "") -> list[str]:
+        """Names of the calls so far that begin with ``prefix``."""
+        return [what for _, what in self.calls if what.startswith(prefix)]
+
+    def answer(self, port: str, method: str, after: float, apply: Callable[[], Any]) -> Pending:
+        """A request that reaches its node, acts ``after`` s later and is answered then; it respects the faults."""
+        self.note(method)
+
+        def act() -> Any:
+            refusal = self.faults.refuse.get(method)
+            if refusal is not None:
+                raise refusal if isinstance(refusal, PortError) else PortError(refusal)
+            return apply()
+
+        call = _Call(self, port, method, after, act)
+        with self._lock:
+            self._under_way.append(call)
+        self.advance()
+        return call
+
+    def advance(self) -> None:
+        """Let everything act whose time has come."""
+        with self._lock:
+            now = self.clock.now()
+            for call in list(self._under_way):
+                call.look(now)
+            self._under_way = [call for call in self._under_way if not call.over]
+            self.arm.follow()
+
+    @property
+    def joints(self) -> tuple[float, ...]:
+        """Where the arm is, rad."""
+        self.advance()
+        return self.arm.position()

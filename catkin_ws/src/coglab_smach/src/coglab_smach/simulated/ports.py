@@ -1,0 +1,365 @@
+"""Ports without ROS: a kinematic cell in which the machines run in virtual time, for tests and quick trials.
+
+The arm is a model that moves and brakes (simulated_arm_model), the hand takes fixed times, the partner follows a
+script. Faults are attributes that a test sets at any time. Physics belongs to coglab_sim; here only order, timing and
+outcomes matter.
+"""
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+from coglab_msgs.msg import ReasonCode
+from coglab_objects.database import ObjectDatabase, ObjectError
+from coglab_py.pose import Pose
+
+from coglab_smach.clocks.clock import Clock
+from coglab_smach.kinematics.motion_time import MotionLimits
+from coglab_smach.ports.interfaces import (
+    ContactEvent,
+    DmpProgress,
+    DmpRequest,
+    HandState,
+    Located,
+    Recognition,
+    Verdict,
+)
+from coglab_smach.ports.pending import Pending, Polled, PortError, Ready
+from coglab_smach.simulated.cell import SimulatedCell
+
+MODES = ("cylindrical", "lateral", "tridigit", "bidigit", "tridigit2", "bidigit2")
+"""preshapes of the hand"""
+
+
+class SimulatedArm:
+    """ArmPort of the kinematic cell."""
+
+    def __init__(self, cell: SimulatedCell) -> None:
+        self.cell = cell
+        self._progress = DmpProgress()
+
+    def load_controller(self, controller_id: str, controller_type: str) -> Pending:
+        def apply() -> None:
+            if controller_type not in ("coglab/DmpController", "coglab/PtpController"):
+                raise PortError(f"load_controller refused: no controller of type '{controller_type}'",
+                                code=ReasonCode.UNKNOWN_NAME)
+            self.cell.loaded[controller_id] = controller_type
+
+        return self.cell.answer("arm", "load_controller", 0.1, apply)
+
+    def load_dmps(self, filename: str) -> Pending:
+        return self.cell.answer("arm", "load_dmps", 0.1, lambda: len(self.cell.primitives))
+
+    def lwr_command(self, event: str) -> Pending:
+        def apply() -> str:
+            arm = self.cell.arm
+            if event == "start" and arm.held:
+                raise PortError("'start' refused: hold is latched; send reset first", code=ReasonCode.HELD)
+            if event not in ("start", "hold", "reset", "stop", "position"):
+                raise PortError(f"event '{event}' is not known", code=ReasonCode.UNKNOWN_NAME)
+            arm.enabled = event == "start" or (arm.enabled and event != "stop")
+            arm.held = event == "hold" or (arm.held and event != "reset")
+            return event
+
+        return self.cell.answer("arm", f"lwr {event}", 0.05, apply)
+
+    def _here(self) -> bool:
+        self.cell.advance()
+        return "arm" not in self.cell.faults.dead
+
+    def motion_allowed(self) -> Verdict:
+        if not self._here():
+            return Verdict(False, "/lwr/state is silent", ReasonCode.NODE_SILENT)
+        why, code = self.cell.arm.blocked()
+        return Verdict(code == ReasonCode.NONE, why, code)
+
+    def standing(self) -> Verdict:
+        if not self._here():
+            return Verdict(False, "/lwr/state is silent", ReasonCode.NODE_SILENT)
+        standing = self.cell.arm.standing()
+        return Verdict(standing, "" if standing else "the arm moves")
+
+    def cancel_motion(self, reason: str) -> Pending:
+        arm = self.cell.arm
+        asked = self.cell.answer("arm", "cancel", 0.02, lambda: arm.end(reason, ReasonCode.CANCELLED))
+        # Never withdrawn: whoever gives up waiting leaves it in force.
+        return Polled(lambda: asked.done() and self.standing().ok, lambda: asked.result() and None)
+
+    def motion_limits(self) -> MotionLimits:
+        return self.cell.arm.limits
+
+    def speed_scale(self) -> float:
+        return self.cell.arm.speed_scale
+
+    def switch_controller(self, controller_id: str) -> Pending:
+        def apply() -> str:
+            if controller_id not in self.cell.loaded:
+                raise PortError(f"controller '{controller_id}' is not loaded", code=ReasonCode.UNKNOWN_NAME)
+            self.cell.arm.switch(controller_id)
+            # As the controller manager does: the profile of the motion controller's name comes with it.
+            self.cell.profile, self.cell.profile_since = controller_id, self.cell.clock.now()
+            return self.cell.loaded[controller_id]
+
+        return self.cell.answer("arm", f"switch {controller_id}", 0.02, apply)
+
+    def apply_profile(self, profile: str) -> Pending:
+        def apply() -> None:
+            self.cell.profile, self.cell.profile_since = profile, self.cell.clock.now()
+
+        return self.cell.answer("arm", f"profile {profile}", 0.01, apply)
+
+    def profile_settled(self, profile: str) -> Verdict:
+        cell = self.cell
+        if cell.profile != profile:
+            return Verdict(False, f"profile '{cell.profile}' is in force")
+        faded = cell.clock.now() - cell.profile_since >= cell.fade_time
+        return Verdict(faded, "" if faded else "ee_admittance is stopping")
+
+    def execute_dmp(self, request: DmpRequest) -> Pending:
+        def apply() -> None:
+            self.cell.arm.check_dmp(request, self.cell.primitives)
+            self.cell.arm.execute(request)
+
+        return self._ends_motion(self.cell.answer("arm", "execute_dmp", 0.02, apply))
+
+    def switch_dmp(self, request: DmpRequest) -> Pending:
+        def apply() -> None:
+            self.cell.arm.check_dmp(request, self.cell.primitives)
+            self.cell.arm.substitute(request)
+
+        return self.cell.answer("arm", f"switch_dmp {request.primitive_id}", 0.02, apply)
+
+    def dmp_progress(self) -> DmpProgress:
+        if self._here():
+            self._progress = self.cell.arm.dmp
+        return self._progress
+
+    def move_ptp(self, position: Sequence[float], max_velocity: Sequence[float]) -> Pending:
+        arm = self.cell.arm
+        added = self.cell.answer("arm", "move_ptp", 0.02, lambda: arm.add_ptp(position, max_velocity))
+        ended: list[PortError | None] = []
+
+        def finished() -> bool:
+            if not ended and added.done():
+                ended.extend(self._end_of_ptp(added) or ())
+            return bool(ended)
+
+        def value() -> None:
+            if ended[0] is not None:
+                raise ended[0]
+
+        return self._ends_motion(Polled(finished, value, added.cancel))
+
+    def _end_of_ptp(self, added: Pending) -> tuple[PortError | None] | None:
+        try:
+            end = self.cell.arm.ended(added.result())
+        except PortError as error:
+            return (error,)
+        allowed = self.motion_allowed()
+        if end is None and not allowed.ok:
+            return (PortError("the arm does not follow any more", (allowed.why,), allowed.code),)
+        return end
+
+    def _ends_motion(self, pending: Pending) -> Pending:
+        def cancel() -> None:
+            pending.cancel()
+            self.cancel_motion("its owner has given up waiting")
+
+        return Polled(pending.done, pending.result, cancel)
+
+    def joint_positions(self) -> tuple[float, ...] | None:
+        return self.cell.joints if self._here() else None
+
+    def hold(self, reason: str) -> Pending:
+        return self.lwr_command("hold")
+
+
+class SimulatedHand:
+    """HandPort of the kinematic cell; the hand is calibrated from the first calibration on. One order at a time: a
+    newer one ends the older."""
+
+    def __init__(self, cell: SimulatedCell) -> None:
+        self.cell = cell
+        self._order = 0
+
+    def calibrate(self, mode: str) -> Pending:
+        def apply() -> None:
+            if mode.split(" ")[0] not in ("fast", "complete"):
+                raise PortError(f"the hand does not calibrate after the order '{mode}'", ("no such order",),
+                                ReasonCode.HAND_REFUSED)
+            self.cell.calibrated, self.cell.hand_positions = True, (0, 0, 0, 0, 0)
+
+        return self.cell.answer("hand", f"calibrate {mode}", 1.7, apply)
+
+    def _move(self, name: str, after: float, positions: Callable[[], tuple[int, ...]], preshaped: bool) -> Pending:
+        """An action: it moves the fingers unless it was cancelled, or replaced, before its time had come."""
+        self._order += 1
+        order = self._order
+        cancelled: list[bool] = []
+
+        def apply() -> None:
+            if not self.cell.calibrated and name != "open":
+                raise PortError(f"{name} refused: the hand is not calibrated", code=ReasonCode.HAND_NOT_CALIBRATED)
+            if cancelled or order != self._order:
+                raise PortError(f"{name} ended PREEMPTED", code=ReasonCode.CANCELLED)
+            self.cell.hand_positions, self.cell.preshaped = positions(), preshaped
+
+        call = self.cell.answer("hand", name, after, apply)
+
+        def cancel() -> None:
+            cancelled.append(True)
+            call.cancel()
+
+        return Polled(call.done, call.result, cancel)
+
+    def preshape(self, mode: str, level: str) -> Pending:
+        if mode not in MODES:
+            return Ready(error=PortError(f"preshape refused: no mode '{mode}'; there are: {', '.join(MODES)}",
+                                         code=ReasonCode.UNKNOWN_NAME))
+        return self._move(f"preshape {mode}", 0.8, lambda: (200, 40, 40, 40, 40), True)
+
+    def close_on_object(self) -> Pending:
+        def positions() -> tuple[int, ...]:
+            if not self.cell.preshaped:
+                raise PortError("hand_preshape_close without a preshape", code=ReasonCode.HAND_REFUSED)
+            return (200, 254, 254, 254, 254) if self.cell.faults.empty_grasp else (200, 150, 160, 155, 170)
+
+        return self._move("close", 1.0, positions, True)
+
+    def open(self, speed: int) -> Pending:
+        if not 1 <= speed <= 511:
+            return Ready(error=PortError(f"open refused: speed is {speed}, expected 1..511",
+                                         code=ReasonCode.OUT_OF_RANGE))
+        return self._move("open", 0.8, lambda: (0, 0, 0, 0, 0), False)
+
+    def state(self) -> HandState:
+        self.cell.advance()
+        if "hand" in self.cell.faults.dead:
+            return HandState(message="hand_status is silent", event=ReasonCode.NODE_SILENT)
+        closed = self.cell.hand_positions[2] > 100 and not self.cell.faults.empty_grasp
+        return HandState(True, self.cell.calibrated, False, closed, "", self.cell.hand_positions)
+
+
+class SimulatedPerception:
+    """PerceptionPort of the kinematic cell."""
+
+    def __init__(self, cell: SimulatedCell) -> None:
+        self.cell = cell
+        self.places = [Pose(np.array([0.0, 0.0, 0.05]))]
+
+    def init_vision(self, time_limit: float) -> Pending:
+        return self.cell.answer("perception", "init_vision", 0.5, lambda: "ready")
+
+    def locate_object(self, object_id: str, time_limit: float) -> Pending:
+        unseen = object_id in self.cell.faults.not_seen or object_id not in self.cell.objects
+
+        def value() -> Located:
+            if unseen:
+                raise PortError(f"'{object_id}' was not seen within {time_limit:.1f} s",
+                                code=ReasonCode.OBJECT_NOT_SEEN)
+            return _located(self.cell.objects[object_id], object_id)
+
+        return self.cell.answer("perception", f"locate {object_id}", time_limit if unseen else 0.05, value)
+
+    def free_places(self, object_id: str, time_limit: float) -> Pending:
+        return self.cell.answer("perception", "free_places", 0.1,
+                                lambda: [_located(place, "", parent="board") for place in self.places])
+
+    def recognition(self) -> Recognition:
+        cell, partner = self.cell, self.cell.partner
+        started = cell.arm.motion_started
+        if started is None or cell.clock.now() - started < partner.pattern_at:
+            return Recognition()
+        return Recognition(partner.pattern, 0.95, partner.pattern != "unknown")
+
+
+def _located(pose: Pose, object_id: str, parent: str = "world") -> Located:
+    frame = object_id if object_id in ("", "human_hand", "board") else f"object_{object_id}"
+    x, y, z = (float(v) for v in pose.position)
+    qx, qy, qz, qw = (float(v) for v in pose.orientation)
+    return Located(frame, parent, (x, y, z), (qx, qy, qz, qw), 0.05)
+
+
+class SimulatedDatabase:
+    """DatabasePort over the real object files."""
+
+    def __init__(self, cell: SimulatedCell, database: ObjectDatabase) -> None:
+        self.cell = cell
+        self.database = database
+
+    def get_object(self, object_id: str) -> Pending:
+        def value() -> dict[str, Any]:
+            try:
+                return self.database.get(object_id)
+            except ObjectError as error:
+                raise PortError(str(error), code=ReasonCode.OBJECT_UNKNOWN) from None
+
+        return self.cell.answer("database", f"get {object_id}", 0.02, value)
+
+    def list_objects(self) -> Pending:
+        return self.cell.answer("database", "list", 0.02, self.database.ids)
+
+
+class SimulatedContact:
+    """ContactPort of the kinematic cell: the partner's script decides, once the arm stands still."""
+
+    def __init__(self, cell: SimulatedCell) -> None:
+        self.cell = cell
+        self._mode = ""
+        self._until = 0.0
+        self._due: float | None = None
+        self._event: ContactEvent | None = None
+        self._touched = False
+        self.armed_while_moving = False
+        self.armed_with_profile: list[str] = []
+        """profile in force at each arming, with ' fading' while another one's correction was not gone"""
+
+    def arm(self, mode: str, time_limit: float, settings: dict[str, Any]) -> Pending:
+        cell = self.cell
+        self._event, self._mode = None, ""
+
+        def apply() -> None:
+            partner = cell.partner
+            if mode not in ("contact", "load", "release"):
+                raise PortError(f"arm refused: mode is contact, load or release, got '{mode}'")
+            if mode != "contact" and not float(settings.get("mass", 0.0)) > 0.0:
+                raise PortError(f"arm refused: {mode} needs the mass of the object in kg")
+            if mode == "load" and not self._touched:
+                raise PortError("arm refused: load is counted from the torque before the contact: arm for "
+                                "contact first")
+            after = {"contact": partner.touch_after, "load": partner.let_go_after, "release": partner.take_after}[mode]
+            now = cell.clock.now()
+            self._touched = self._touched or mode == "contact"
+            self._mode, self._until, self._due = mode, now + time_limit, None if after is None else now + after
+            self.armed_while_moving = self.armed_while_moving or not cell.arm.standing()
+            fading = now - cell.profile_since < cell.fade_time
+            self.armed_with_profile.append(cell.profile + (" fading" if fading else ""))
+
+        return cell.answer("contact", f"arm {mode}", 0.01, apply)
+
+    def disarm(self) -> None:
+        if self._mode:
+            self.event()
+            self.cell.note("disarm")
+            self._mode = ""
+
+    def event(self) -> ContactEvent | None:
+        self.cell.advance()
+        now = self.cell.clock.now()
+        happens = self._due is not None and self._due <= min(now, self._until)
+        if self._event is None and self._mode and happens and "contact" not in self.cell.faults.dead:
+            self._event = ContactEvent(self._mode != "release", "simulated", 2.0,
+                                       f"{self._mode} by the partner's script")
+        return self._event
+
+
+def simulated_context(clock: Clock, database: ObjectDatabase, config: Any) -> tuple[Any, SimulatedCell]:
+    """A complete context on simulated ports, and the cell behind them."""
+    from coglab_smach.context.context import Context
+    from coglab_smach.context.journal import Journal
+    cell = SimulatedCell(clock)
+    ctx = Context(clock=clock, arm=SimulatedArm(cell), hand=SimulatedHand(cell), perception=SimulatedPerception(cell),
+                  database=SimulatedDatabase(cell, database), contact=SimulatedContact(cell), config=config,
+                  journal=Journal(clock.now))
+    return ctx, cell

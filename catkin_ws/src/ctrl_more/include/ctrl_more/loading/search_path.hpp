@@ -1,0 +1,34 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+namespace ctrl_more {
+
+/// Where libraries and configuration files are looked for, so that no absolute path is needed.
+///
+/// In this order: absolute paths as they are; `package://name/rest` below ROS_PACKAGE_PATH and
+/// CMAKE_PREFIX_PATH; relative to the file that names them; the folders given by the user
+/// (`searchPath` in the list file, CTRL_MORE_PATH in the environment); the folder of the core
+/// library, `lib` of each CMAKE_PREFIX_PATH entry, `share/ctrl_more/config` beside it.
+class SearchPath {
+ public:
+  /// @param base folder of the file that names others
+  /// @param extra folders of the list file's `searchPath`
+  explicit SearchPath(std::string base, std::vector<std::string> extra = {});
+
+  /// The file a name stands for; throws std::runtime_error listing the places tried.
+  std::string find(const std::string& name) const;
+
+  /// The library of a type when the list file gives no `libPath`: `lib<Type>.so`,
+  /// `libfbkCtrl<Type>.so`, `lib<type_in_snake_case>.so` or `libctrl_more_<type_in_snake_case>.so`;
+  /// throws std::runtime_error.
+  std::string findLibraryOf(const std::string& type) const;
+
+ private:
+  std::vector<std::string> candidates(const std::string& name) const;
+  std::string base_;
+  std::vector<std::string> extra_;
+};
+
+}  // namespace ctrl_more

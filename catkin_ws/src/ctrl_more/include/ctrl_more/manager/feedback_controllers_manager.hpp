@@ -1,0 +1,189 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "ctrl_more/cycle/controller_entry.hpp"
+#include "ctrl_more/cycle/controller_status.hpp"
+#include "ctrl_more/description/change.hpp"
+#include "ctrl_more/description/config_node.hpp"
+#include "ctrl_more/manager/controller_changes.hpp"
+#include "ctrl_more/manager/controller_questions.hpp"
+#include "ctrl_more/manager/manager.hpp"
+#include "ctrl_more/states/control_states.hpp"
+#include "ctrl_more/states/cycle.hpp"
+#include "ctrl_more/states/robot_states.hpp"
+#include "ctrl_more/states/status.hpp"
+
+namespace ctrl_more {
+
+class CycleRunner;
+class ListFile;
+struct ControllerInstance;
+struct Draft;
+
+/// What a list file did.
+struct LoadReport {
+  std::vector<std::string> loaded;  ///< controllers that are there now
+  std::vector<std::string> errors;  ///< one sentence each for those that are not
+  /// True if nothing was refused.
+  bool ok() const { return errors.empty(); }
+  /// All errors as one text.
+  std::string text() const;
+};
+
+/// Loads, orders, runs, pauses and guards feedback controllers (Ctrl-MORE paper, section V-B).
+///
+/// Two sides. The *cycle* calls beginCycle(), updateStage() and endCycle(): no allocation, no
+/// lock, no system call, no exception. *Services* (any other thread, serialised here by a mutex)
+/// call everything else: each change is validated against a copy, becomes one immutable plan, and
+/// is published through one atomic pointer. The cycle adopts the newest plan at its start and
+/// acknowledges its generation; what it no longer uses is freed by the service side. A refused
+/// change leaves everything as it was.
+///
+/// In the cycle each controller is guarded: on an exception, a number that is not finite, a
+/// quaternion that is not unit, or a correction beyond its declared size or rate, its writes are
+/// undone in the same cycle, its last correction is let go by policy, it is paused with the
+/// reason, and the controllers after it run. A crash of the process is not isolated.
+///
+/// Everything that starts, stops or moves a controller is blended over `blend_s`, so that
+/// corrections are continuous. With no enabled controller the references keep their bits.
+/// ControllerChanges has the paper's changing methods, ControllerQuestions what can be asked.
+class FeedbackControllersManager : public Manager,
+                                   public ControllerQuestions,
+                                   public ControllerChanges {
+ public:
+  /// A manager without controllers.
+  /// @param robot shared robot states; must outlive the manager
+  /// @param control shared control states; must outlive the manager
+  /// @param options see ManagerOptions
+  /// @param logger null: Logger::standard()
+  FeedbackControllersManager(RobotStates& robot, ControlStates& control,
+                             const ManagerOptions& options = {}, Logger* logger = nullptr);
+  ~FeedbackControllersManager() override;
+
+  /// @name Loading (services)
+  /// @{
+
+  /// Loads a list file as printed in the paper: `loadControllers: [..]`, and for each name
+  /// `libPath` and `configFile`. Further keys per controller: `type`, `enabled`, `overrun_us`,
+  /// `on_fault` (hold, fade, zero), `blend_s`; of the file: `profiles` (name: [controllers]),
+  /// `searchPath` ([folders]), `sharedSignals` (cascade or refuse).
+  /// All or nothing: if anything is refused, nothing of the file is loaded, and the report says
+  /// why, one sentence for each. What was loaded before keeps running.
+  /// @param file path of the list file
+  /// @param strict false: load what can be loaded, and report the rest
+  LoadReport load(const std::string& file, bool strict = true);
+
+  /// As load(), from a parsed file or text.
+  /// @param list the tree
+  /// @param base folder that relative paths refer to
+  /// @param strict false: load what can be loaded, and report the rest
+  LoadReport load(const ConfigNode& list, const std::string& base, bool strict = true);
+
+  /// Loads one controller under a name.
+  Status loadController(const std::string& name, const ControllerEntry& entry);
+
+  /// Takes a controller that the program made itself.
+  /// @param controller the instance
+  /// @param name its name
+  /// @param entry `library` and `type` are not used
+  Status addController(std::unique_ptr<FeedbackController> controller, const std::string& name,
+                       const ControllerEntry& entry = {});
+
+  /// Unloads a controller; refused unless it is disabled and its last correction has faded.
+  Status unload(const std::string& name);
+
+  /// Sets or replaces a profile: exactly these controllers are enabled when it is applied.
+  /// Names must be loaded.
+  Status setProfile(const std::string& profile, const std::vector<std::string>& controllers);
+  /// @}
+
+  /// @name Changing (services)
+  /// @{
+
+  Status apply(const Change& change) override;
+
+  /// As apply(), but the cycle takes the plan only where it calls adoptPrepared(): for a change
+  /// that must begin in the same cycle as something else, as a profile with its motion controller.
+  /// The next ordinary change includes what is prepared.
+  Status prepare(const Change& change);
+
+  /// Waits until the cycle has adopted a plan.
+  /// @param generation from Status::generation()
+  /// @param timeout_s longest wait [s]
+  /// @return false on time-out; the plan stays published and will be adopted
+  bool waitAdopted(std::uint64_t generation, double timeout_s) const;
+
+  /// Takes back the newest plan if the cycle has not adopted it; everything is then as before it.
+  /// Only the newest plan of apply(), its short forms and prepare() can be withdrawn, not a load.
+  /// @param generation from Status::generation()
+  /// @return failure if the plan is adopted already, or is not the newest one
+  Status withdraw(std::uint64_t generation);
+  /// @}
+
+  /// @name Asking (services)
+  /// @{
+
+  /// Who changed which reference by how much in the last complete cycle, in execution order;
+  /// controllers that are off are left out. Waits for the end of the cycle that is running, 50 ms
+  /// at most.
+  std::vector<Attribution> attribution() const { return lastCycle().changes; }
+  /// The same with the states of the controllers.
+  CycleRecord lastCycle() const;
+  /// As constructed.
+  const ManagerOptions& options() const { return options_; }
+  /// @}
+
+  /// @name Manager interface (the cycle)
+  /// @{
+
+  /// `feedback`, or what setName() said.
+  const std::string& name() const override { return name_; }
+  /// Name under which a central module lists it; before the first cycle.
+  void setName(const std::string& name) { name_ = name; }
+  /// Fixes the layout of both stores and allocates what the cycle needs. Call it before the first
+  /// cycle of a real-time thread (outside of it); otherwise the first cycle does it, once.
+  void freeze();
+  /// Adopts the newest plan.
+  void beginCycle(const Cycle& cycle) noexcept override;
+  /// Adopts what prepare() left, if anything; between beginCycle() and the first stage.
+  void adoptPrepared() noexcept;
+  /// Snapshots the references as `original`, then runs the controllers of the stage in order.
+  /// Both stores must be those of the constructor, or copies of them.
+  void updateStage(Stage stage, const RobotStates& robot, ControlStates& control) noexcept override;
+  /// Closes the cycle.
+  void endCycle() noexcept override;
+
+  /// A whole cycle: begin, all stages, end.
+  void update(const Cycle& cycle, const RobotStates& robot, ControlStates& control) noexcept;
+
+  /// The paper's form, for users without a clock: now is the newest stamp in `robot`, dt the
+  /// control period of `control`.
+  void update(const RobotStates& robot, ControlStates* control) noexcept;
+  /// @}
+
+ private:
+  class Undo;
+
+  Status change(const Change& change, bool prepared);
+  Status publish(Draft draft, bool prepared = false);
+  Status commit(Draft draft, bool prepared) noexcept;
+  void readList(const ListFile& list, LoadReport& report);
+  Status loadNamed(const std::string& name, const ControllerEntry& entry, bool offer);
+  Status take(ControllerInstance instance, const std::string& name, const ControllerEntry& entry,
+              bool offer);
+
+  RobotStates& robot_;
+  ControlStates& control_;
+  ManagerOptions options_;
+  Logger* logger_;
+  std::string name_ = "feedback";
+  std::uint32_t next_owner_ = 1;
+  std::unique_ptr<Draft> before_last_;  // what withdraw() returns to; under the roster's mutex
+  std::unique_ptr<CycleRunner> runner_;
+};
+
+}  // namespace ctrl_more

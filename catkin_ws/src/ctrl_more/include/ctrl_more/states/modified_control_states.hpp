@@ -1,0 +1,67 @@
+#pragma once
+
+#include <cstdint>
+
+#include <Eigen/Core>
+
+#include "ctrl_more/states/control_states.hpp"
+#include "ctrl_more/states/handles.hpp"
+
+namespace ctrl_more {
+
+/// The references as modified so far in this cycle, as one controller may touch them: everything
+/// readable, writable only what it declared.
+class ModifiedControlStates {
+ public:
+  /// A view for one controller.
+  /// @param control the store; must outlive the view
+  /// @param owner the controller's number, as in its permissions
+  ModifiedControlStates(ControlStates& control, std::uint32_t owner)
+      : control_(control), owner_(owner) {}
+
+  /// The numbers of a signal, as left by the controllers before this one.
+  /// @throws EmptyHandle
+  template <int N>
+  Eigen::Map<const Eigen::Matrix<double, N, 1>> view(const Reference<N>& handle) const {
+    return states().view(handle);
+  }
+
+  /// As above, of a signal that the controller modifies.
+  /// @throws EmptyHandle
+  template <int N>
+  Eigen::Map<const Eigen::Matrix<double, N, 1>> view(const Modify<N>& handle) const {
+    return states().view(handle);
+  }
+
+  /// The numbers of a signal, writable; reaching beside them throws WrongSize.
+  /// @throws UndeclaredWrite if the permission is empty or another controller's
+  template <int N>
+  Numbers<N> operator[](const Modify<N>& handle) {
+    if (handle.owner_ != owner_) refuse();
+    return Numbers<N>(control_.data() + handle.signal_.offset(), handle.size());
+  }
+
+  /// Replaces a signal.
+  /// @throws UndeclaredWrite as above, WrongSize if `value` has another size
+  template <int N, typename Derived>
+  void set(const Modify<N>& handle, const Eigen::MatrixBase<Derived>& value) {
+    Numbers<N> numbers = (*this)[handle];
+    if (value.size() != numbers.size()) {
+      throw WrongSize("value has another size than the declared signal");
+    }
+    numbers = value;
+  }
+
+  /// The store, for reading.
+  const ControlStates& states() const { return control_; }
+
+ private:
+  [[noreturn, gnu::cold, gnu::noinline]] static void refuse() {
+    throw UndeclaredWrite("the controller has no permission to modify this signal");
+  }
+
+  ControlStates& control_;
+  std::uint32_t owner_;
+};
+
+}  // namespace ctrl_more

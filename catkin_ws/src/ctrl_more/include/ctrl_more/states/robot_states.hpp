@@ -1,0 +1,168 @@
+#pragma once
+
+#include <cstdint>
+#include <ostream>
+#include <string>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "ctrl_more/states/handles.hpp"
+#include "ctrl_more/states/signal.hpp"
+#include "ctrl_more/states/signal_table.hpp"
+#include "ctrl_more/states/status.hpp"
+
+namespace ctrl_more {
+
+/// What the robot measures and what other modules estimate (Ctrl-MORE paper, section IV-A).
+///
+/// The paper's four maps are `measuredData` with `measurementTimeStamp` and `estimatedData` with
+/// `estimateTimeStamp`. Here all of them are one SignalTable with a stamp for each row: users read
+/// and write by key outside the cycle, controllers and the host by handle inside it. Stamps are
+/// monotonic nanoseconds; a signal that was declared but never written has the stamp kNeverWritten
+/// and reads as zeros.
+///
+/// Threads: one thread at a time. Data from other threads comes through SignalMailbox.
+class RobotStates {
+ public:
+  /// An empty store.
+  /// @param logger where new keys and wrong accesses are reported; null: Logger::standard()
+  explicit RobotStates(Logger* logger = nullptr);
+
+  /// @name Declaring keys (outside the cycle, before freeze())
+  /// @{
+
+  /// Declares a signal, or completes the unit and frame of one that exists with the same size.
+  /// @param source which map
+  /// @param key name, not empty
+  /// @param size number of doubles, > 0
+  /// @param unit SI unit or list of units
+  /// @param frame frame the numbers are expressed in
+  Status declare(RobotSource source, const std::string& key, int size, const std::string& unit = "",
+                 const std::string& frame = "");
+
+  /// Forbids new keys from now on. Called by the manager before the first cycle.
+  void freeze() { table_.freeze(); }
+
+  /// True after freeze().
+  bool frozen() const { return table_.frozen(); }
+  /// @}
+
+  /// @name The paper's accessors, by key (outside the cycle)
+  /// Errors name the key, the expected size, the size that came and who asked.
+  /// @{
+
+  /// Writes `measuredData[key]` and its stamp; a new key is added and announced.
+  /// @param key name of the signal
+  /// @param value all of its numbers, finite
+  /// @param stamp_ns time of measurement, monotonic nanoseconds >= 0
+  /// @param who name of the writer for messages
+  Status setMeasuredData(const std::string& key, const Eigen::Ref<const Eigen::VectorXd>& value,
+                         std::int64_t stamp_ns, const char* who = "user");
+
+  /// As setMeasuredData(), in `estimatedData`.
+  Status setEstimatedData(const std::string& key, const Eigen::Ref<const Eigen::VectorXd>& value,
+                          std::int64_t stamp_ns, const char* who = "user");
+
+  /// Reads `measuredData[key]`; on failure `value` is untouched.
+  Status getMeasuredData(const std::string& key, Eigen::VectorXd& value,
+                         const char* who = "user") const;
+
+  /// Reads `measuredData[key]` with its stamp; on failure both are untouched.
+  Status getMeasuredData(const std::string& key, Eigen::VectorXd& value, std::int64_t& stamp_ns,
+                         const char* who = "user") const;
+
+  /// As getMeasuredData(), from `estimatedData`.
+  Status getEstimatedData(const std::string& key, Eigen::VectorXd& value,
+                          const char* who = "user") const;
+
+  /// As getMeasuredData(), from `estimatedData`.
+  Status getEstimatedData(const std::string& key, Eigen::VectorXd& value, std::int64_t& stamp_ns,
+                          const char* who = "user") const;
+
+  /// Writes `measurementTimeStamp[key]`; refused when `measuredData` has no such key.
+  Status setMeasurementTimeStamp(const std::string& key, std::int64_t stamp_ns,
+                                 const char* who = "user");
+
+  /// Writes `estimateTimeStamp[key]`; refused when `estimatedData` has no such key.
+  Status setEstimateTimeStamp(const std::string& key, std::int64_t stamp_ns,
+                              const char* who = "user");
+  /// @}
+
+  /// @name Access by handle (inside the cycle: no allocation, no lock)
+  /// @{
+
+  /// Handle of a key; an invalid handle if there is none (outside the cycle).
+  RobotSignal find(RobotSource source, const std::string& key) const;
+
+  /// The numbers of a signal.
+  Eigen::Map<const Eigen::VectorXd> view(RobotSignal signal) const {
+    return Eigen::Map<const Eigen::VectorXd>(table_.data().data() + signal.offset(), signal.size());
+  }
+
+  /// The numbers of a signal whose size was checked when its handle was made.
+  /// @throws EmptyHandle
+  template <int N>
+  Eigen::Map<const Eigen::Matrix<double, N, 1>> view(const Read<N>& handle) const {
+    if (!handle.valid()) throw EmptyHandle("a robot signal is read that was never fetched");
+    return Eigen::Map<const Eigen::Matrix<double, N, 1>>(
+        table_.data().data() + handle.signal_.offset(), handle.size());
+  }
+
+  /// Stamp of a signal, monotonic nanoseconds, or kNeverWritten.
+  template <int N>
+  std::int64_t stamp(const Read<N>& handle) const {
+    return stamps_[handle.signal_.index()];
+  }
+
+  /// Stamp of a signal, monotonic nanoseconds, or kNeverWritten.
+  std::int64_t stamp(RobotSignal signal) const { return stamps_[signal.index()]; }
+
+  /// How far ahead of now a stamp may be [ns]: sensors and the cycle do not read the clock at the
+  /// same moment. What is further ahead comes from another clock, and is not fresh.
+  static constexpr std::int64_t kMostAhead = 50'000'000;
+
+  /// True if the signal was written not longer than `max_age_ns` before `now_ns`, and not more than
+  /// kMostAhead after it.
+  bool isFresh(RobotSignal signal, std::int64_t now_ns, std::int64_t max_age_ns) const {
+    const std::int64_t stamp = stamps_[signal.index()];
+    // Too far ahead becomes a number larger than any age.
+    const auto age = static_cast<std::uint64_t>(now_ns - stamp + kMostAhead);
+    return stamp != kNeverWritten && age <= static_cast<std::uint64_t>(max_age_ns) + kMostAhead;
+  }
+
+  /// Writes a signal. Returns false, and leaves it untouched, if a number is not finite.
+  /// @param signal handle from find()
+  /// @param values `signal.size()` doubles
+  /// @param stamp_ns monotonic nanoseconds >= 0
+  bool write(RobotSignal signal, const double* values, std::int64_t stamp_ns);
+  /// @}
+
+  /// Newest stamp of any signal, kNeverWritten if none was written. This is "now" for users who
+  /// run a manager without a clock.
+  std::int64_t newestStamp() const { return newest_; }
+
+  /// Table of one map, in order of declaration.
+  std::vector<SignalInfo> signals(RobotSource source) const;
+
+  /// Prints every signal of both maps with its numbers, unit and age.
+  /// @param out stream
+  /// @param now_ns time the ages refer to; kNeverWritten: newestStamp()
+  void print(std::ostream& out, std::int64_t now_ns = kNeverWritten) const;
+
+ private:
+  Status set(RobotSource source, const std::string& key,
+             const Eigen::Ref<const Eigen::VectorXd>& value, std::int64_t stamp_ns,
+             const char* who);
+  Status get(RobotSource source, const std::string& key, Eigen::VectorXd& value,
+             std::int64_t* stamp_ns, const char* who) const;
+  Status setStamp(RobotSource source, const std::string& key, std::int64_t stamp_ns,
+                  const char* who);
+  void stampSignal(std::uint32_t index, std::int64_t stamp_ns);
+
+  SignalTable table_;
+  std::vector<std::int64_t> stamps_;  // one for each row
+  std::int64_t newest_ = kNeverWritten;
+};
+
+}  // namespace ctrl_more

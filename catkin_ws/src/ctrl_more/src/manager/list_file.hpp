@@ -1,0 +1,49 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "ctrl_more/cycle/controller_entry.hpp"
+#include "ctrl_more/description/config_node.hpp"
+#include "ctrl_more/loading/search_path.hpp"
+
+namespace ctrl_more {
+
+/// A list file of controllers (Ctrl-MORE paper, section III-A), read against what it may hold.
+/// Errors are ConfigErrors, or sentences that name the controller.
+class ListFile {
+ public:
+  /// One listed controller.
+  struct Controller {
+    std::string name;         ///< its name
+    ControllerEntry entry;    ///< how it is to be loaded
+    const ConfigNode* block;  ///< where the file says so
+  };
+
+  /// @param list the tree, which must outlive this
+  /// @param base folder that relative paths refer to
+  ListFile(const ConfigNode& list, const std::string& base);
+
+  /// The items of `loadControllers`.
+  const std::vector<ConfigNode>& items() const { return items_->items(); }
+  /// What the file says of one of them; throws.
+  Controller read(const ConfigNode& item) const;
+  /// `sharedSignals`, if it is there: true for `refuse`.
+  std::optional<bool> refuseShared() const { return refuse_shared_; }
+  /// The map of profiles, null if there is none.
+  const ConfigNode* profiles() const { return profiles_; }
+
+ private:
+  static SearchPath filesOf(const ConfigNode& list, const std::string& base);
+  void readShared();
+
+  const ConfigNode& list_;
+  SearchPath files_;
+  std::vector<std::string> blocks_;
+  const ConfigNode* items_;
+  const ConfigNode* profiles_;
+  std::optional<bool> refuse_shared_;
+};
+
+}  // namespace ctrl_more

@@ -1,0 +1,106 @@
+#include "ctrl_more/states/control_store.hpp"
+
+#include <cstring>
+#include <stdexcept>
+
+#include "ctrl_more/log/words.hpp"
+
+namespace ctrl_more {
+
+ControlStore::ControlStore(int joints, double period_s, Logger* logger)
+    : table_("ControlStates", logger), joints_(joints), period_s_(period_s) {
+  using C = ControlContainer;
+  const auto add = [this](C container, const char* key, int size, const char* unit) {
+    table_.declare(groupOf(container), key, size, unit, "world", false);
+  };
+  add(C::CentreOfMass, "com", 3, "m");
+  add(C::CentreOfMass, "comVelocity", 3, "m/s");
+  add(C::CentreOfMass, "comAcceleration", 3, "m/s^2");
+  add(C::LinearMomentum, "linearMomentum", 3, "kg m/s");
+  add(C::AngularMomentum, "angularMomentum", 3, "kg m^2/s");
+  add(C::Zmp, "zmp", 3, "m");
+  add(C::PelvisOrientation, "pelvis", 4, "1");
+}
+
+// Every jointSpaceReference is of a known type and has one number for each joint.
+Status ControlStore::checkJoints(ControlContainer container, const std::string& key, int size,
+                                 const char* who) const {
+  if (container != ControlContainer::JointSpaceReference) return {};
+  const std::string what = std::string(who) + ": " + nameOf(container) + "/" + key;
+  if (key != "Position" && key != "Velocity" && key != "Torque") {
+    return refuse(what + " is no type of jointSpaceReference" +
+                  suggestion(key, {"Position", "Velocity", "Torque"}));
+  }
+  if (joints_ != 0 && size != joints_) {
+    return refuse(what + " expects " + std::to_string(joints_) + " numbers, got " +
+                  std::to_string(size) + "; the old value stays");
+  }
+  return {};
+}
+
+Status ControlStore::declare(ControlContainer container, const std::string& key, int size,
+                             const std::string& unit, const std::string& frame) {
+  Status status = checkJoints(container, key, size, "declare");
+  if (status) status = table_.declare(groupOf(container), key, size, unit, frame);
+  if (status && container == ControlContainer::JointSpaceReference) joints_ = size;
+  return status;
+}
+
+Status ControlStore::set(ControlContainer container, const std::string& key,
+                         const Eigen::Ref<const Eigen::VectorXd>& value, const char* who) {
+  Status status = checkJoints(container, key, static_cast<int>(value.size()), who);
+  if (status) status = table_.set(groupOf(container), key, value, who);
+  if (status && container == ControlContainer::JointSpaceReference) {
+    joints_ = static_cast<int>(value.size());
+  }
+  return status;
+}
+
+ControlSignal ControlStore::find(ControlContainer container, const std::string& key) const {
+  return ControlSignal(table_.find(groupOf(container), key));
+}
+
+ControlSignal ControlStore::findSized(ControlContainer container, const std::string& key,
+                                      int size) const {
+  const ControlSignal signal = find(container, key);
+  if (!signal.valid()) {
+    throw std::invalid_argument(table_.unknownKey(groupOf(container), key, "find"));
+  }
+  if (size != AnySize && signal.size() != size) {
+    throw std::invalid_argument("find: " + nameOfSignal(signal) + " has size " +
+                                std::to_string(signal.size()) + ", asked for " +
+                                std::to_string(size));
+  }
+  return signal;
+}
+
+void ControlStore::copyValuesFrom(const ControlStore& other) {
+  if (dataSize() == other.dataSize()) {
+    std::memcpy(data(), other.data(), dataSize() * sizeof(double));
+  }
+}
+
+Status ControlStore::setControlPeriod(double period_s) {
+  if (!(period_s > 0.0 && period_s < 1.0)) {
+    return refuse("control period must be between 0 and 1 s, got " + std::to_string(period_s));
+  }
+  period_s_ = period_s;
+  return {};
+}
+
+std::vector<SignalInfo> ControlStore::signals(ControlContainer container) const {
+  return table_.signals(groupOf(container));
+}
+
+std::string ControlStore::nameOfSignal(ControlSignal signal) const {
+  return table_.entries().at(signal.index()).name();
+}
+
+void ControlStore::print(std::ostream& out) const {
+  for (const SignalTable::Entry& entry : table_.entries()) {
+    out << entry.group->name << '/' << SignalTable::label(entry.info) << ':'
+        << table_.numbers(entry.info) << '\n';
+  }
+}
+
+}  // namespace ctrl_more

@@ -1,0 +1,76 @@
+#include <fstream>
+
+#include "test_support.hpp"
+
+namespace ctrl_more {
+namespace {
+
+std::string temporaryFile(const std::string& name, const std::string& text) {
+  const std::string path = ::testing::TempDir() + "/" + name;
+  std::ofstream(path) << text;
+  return path;
+}
+
+struct WithGain : ::testing::Test {
+  Rig rig{0.1};
+  TestController* c = nullptr;
+  WithGain() {
+    auto made = adder("vel", "ee", 0.0);
+    made->description.gain("kp", 1.0).range(0, 10).in("1").about("what is added");
+    made->description.setting("mode", "fast").oneOf({"fast", "slow"}).about("a mode");
+    made->on_initialize = [](TestController& self, ctrl_more::Setup& setup) {
+      self.out = setup.modify("ee");
+      self.gain_handle = setup.gain("kp");
+    };
+    made->on_update = [](TestController& self, const Cycle&, const RobotStates&,
+                         const ControlStates&, ModifiedControlStates& modified) {
+      modified[self.out][0] += self.scalar(self.gain_handle);
+    };
+    c = rig.add(std::move(made), "c");
+    rig.step(40);
+  }
+};
+
+TEST_F(WithGain, HotReloadBlendsIn) {
+  EXPECT_EQ(rig.twist()[0], 1.0);
+  const std::string file = temporaryFile("gains.yaml", "kp: 3\n");
+  ASSERT_TRUE(rig.manager->loadGains("c", file));
+  double last = 1.0;
+  for (int i = 0; i < 20; ++i) {
+    rig.step();
+    EXPECT_NEAR(rig.twist()[0] - last, 0.1, 1e-12) << "2 in 0.1 s";
+    last = rig.twist()[0];
+  }
+  EXPECT_EQ(rig.twist()[0], 3.0);
+  rig.step();
+  EXPECT_EQ(rig.twist()[0], 3.0);
+  EXPECT_EQ(rig.manager->getGains("c").all().at("kp"), std::vector<double>{3.0});
+  EXPECT_EQ(c->getGains().at("kp"), std::vector<double>{3.0});
+}
+
+TEST_F(WithGain, RefusedFilesLeaveTheOldGains) {
+  for (const char* text : {"kp: 11\n", "kp: x\n", "kp: [1, 2]\n", "kq: 1\n", "kp: .nan\n", "[1]\n",
+                           "kp: 2\nmode: slow\n", "kp: 2\ntype: Other\n", "kp: {a: 1}\n"}) {
+    const Status status = rig.manager->loadGains("c", temporaryFile("bad.yaml", text));
+    EXPECT_FALSE(status) << text;
+    EXPECT_TRUE(contains(status.message(), "bad.yaml")) << status.message();
+  }
+  EXPECT_TRUE(contains(
+      rig.manager->loadGains("c", temporaryFile("bad.yaml", "\n\nkq: 1\n")).message(), ":3:"));
+  rig.step(40);
+  EXPECT_EQ(rig.twist()[0], 1.0);
+  EXPECT_FALSE(rig.manager->reloadGains("c")) << "it was loaded without a file";
+  EXPECT_FALSE(rig.manager->setGains("c", {{"kp", {1, 2}}}));
+}
+
+TEST_F(WithGain, GainsByNameAndThroughTheInstance) {
+  ASSERT_TRUE(rig.manager->setGains("c", {{"kp", {2.0}}}));
+  rig.step(40);
+  EXPECT_EQ(rig.twist()[0], 2.0);
+  ASSERT_TRUE(c->setGains({{"kp", {4.0}}}));
+  rig.step(40);
+  EXPECT_EQ(rig.twist()[0], 4.0);
+}
+
+}  // namespace
+}  // namespace ctrl_more

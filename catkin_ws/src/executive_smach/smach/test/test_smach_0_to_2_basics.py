@@ -1,0 +1,196 @@
+"""Sections 0 to 2 of the specification: packaging, errors and log, states."""
+
+import importlib
+import io
+from contextlib import redirect_stderr, redirect_stdout
+
+import pytest
+import smach
+from smach.exceptions import SmachError
+
+
+def test_s0_public_names_and_submodules():
+    public = """State CBState Container StateMachine Sequence Concurrence Iterator UserData Remapper
+        CBInterface cb_interface has_smach_interface InvalidTransitionError InvalidStateError
+        InvalidConstructionError InvalidUserCodeError set_loggers loginfo logwarn logerr logdebug
+        set_shutdown_check is_shutdown"""
+    assert [name for name in public.split() if not hasattr(smach, name)] == []
+    for name in """state user_data container state_machine sequence concurrence iterator util log
+            exceptions""".split():
+        importlib.import_module(f"smach.{name}")
+
+
+def test_s0_names_that_must_not_exist():
+    assert not hasattr(smach, "SmachError")
+    assert not any(hasattr(smach.StateMachine, name) for name in ("add_next",))
+    assert not hasattr(smach.Sequence, "add_next")
+
+
+def test_s1_public_errors_derive_from_smach_error():
+    for name in ("InvalidTransition", "InvalidState", "InvalidConstruction", "InvalidUserCode"):
+        assert getattr(smach, f"{name}Error").__bases__ == (SmachError,)
+    assert issubclass(SmachError, Exception)
+
+
+def test_s1_creating_an_error_logs_class_and_message(log):
+    smach.InvalidStateError("no such thing")
+    assert log.error == ["InvalidStateError: no such thing"]
+
+
+def test_s1_set_loggers_order_and_lookup_at_call_time():
+    got = []
+    smach.set_loggers(*[lambda m, level=level: got.append(level) for level in "iwde"])
+    smach.loginfo("x"), smach.logwarn("x"), smach.logdebug("x"), smach.logerr("x")
+    assert got == ["i", "w", "d", "e"]
+    smach.logerr = lambda m: got.append("patched")
+    SmachError("x")
+    assert got[-1] == "patched"
+
+
+def test_s1_default_loggers_print_with_a_prefix():
+    from smach import log
+
+    module = importlib.util.module_from_spec(log.__spec__)
+    log.__spec__.loader.exec_module(module)
+    for name, level in (
+        ("loginfo", "INFO"),
+        ("logwarn", "WARN"),
+        ("logdebug", "DEBUG"),
+        ("logerr", "ERROR"),
+    ):
+        text = io.StringIO()
+        with redirect_stdout(text), redirect_stderr(text):
+            getattr(module, name)("hello")
+        assert level in text.getvalue() and "hello" in text.getvalue()
+    assert module.is_shutdown() is False
+
+
+def test_s1_set_shutdown_check():
+    smach.set_shutdown_check(lambda: True)
+    assert smach.is_shutdown() is True
+
+
+def test_s1_loggers_that_cannot_be_called_are_refused():
+    before = smach.loginfo
+    with pytest.raises(TypeError):
+        smach.set_loggers(print, print, print, None)
+    with pytest.raises(TypeError):
+        smach.set_shutdown_check(True)
+    assert smach.loginfo is before
+
+
+def test_s2_outcomes_and_keys():
+    state = smach.State(["b", "a", "b"], ["i"], ["o"], ["x"])
+    assert state.get_registered_outcomes() == ("b", "a")
+    assert state.get_registered_input_keys() == ("i", "x")
+    assert state.get_registered_output_keys() == ("o", "x")
+    state.register_outcomes(["c"])
+    state.register_input_keys(["i2"])
+    state.register_output_keys(["o2"])
+    state.register_io_keys(["y"])
+    assert state.get_registered_outcomes() == ("b", "a", "c")
+    assert state.get_registered_input_keys() == ("i", "x", "i2", "y")
+    assert state.get_registered_output_keys() == ("o", "x", "o2", "y")
+
+
+def test_s2_declared_order_is_stable_better():
+    names = [f"outcome_{i}" for i in range(50)]
+    assert list(smach.State(names).get_registered_outcomes()) == names
+
+
+def test_s2_any_iterable_but_no_lone_string():
+    assert smach.State(("a",), {"k": 1}).get_registered_input_keys() == ("k",)
+    with pytest.raises(TypeError, match=r"\['done'\]"):
+        smach.State("done")
+    with pytest.raises(TypeError):
+        smach.State(outcomes=None)
+
+
+def test_s2_sets_of_outcomes_act_like_sets():
+    state = smach.State(["a"])
+    state._outcomes.add("b")
+    state._outcomes |= {"c"}
+    assert state._outcomes == {"a", "b", "c"} and state._outcomes.union(["d"]) == {
+        "a",
+        "b",
+        "c",
+        "d",
+    }
+    state._outcomes.discard("b")
+    assert state.get_registered_outcomes() == ("a", "c")
+
+
+def test_s2_base_execute_is_not_implemented():
+    with pytest.raises(NotImplementedError):
+        smach.State(["a"]).execute(smach.UserData())
+
+
+def test_s2_preemption_flag():
+    state = smach.State(["a"])
+    assert state.preempt_requested() is False and state._preempt_requested is False
+    for clear in (state.service_preempt, state.recall_preempt):
+        state.request_preempt()
+        assert state.preempt_requested() and state._preempt_requested
+        clear()
+        assert not state.preempt_requested()
+    state._preempt_requested = True
+    assert state.preempt_requested()
+
+
+def test_s2_cb_state():
+    def cb(ud, *args, **kwargs):
+        ud.seen = (args, kwargs)
+        return "yes"
+
+    state = smach.CBState(
+        cb, cb_args=[1, 2], cb_kwargs={"k": 3}, outcomes=["yes"], output_keys=["seen"]
+    )
+    ud = smach.UserData()
+    assert state.execute(ud) == "yes" and ud.seen == ((1, 2), {"k": 3})
+
+
+def test_s2_cb_state_merges_a_decorated_callback():
+    @smach.cb_interface(outcomes=["a"], input_keys=["i"], output_keys=["o"])
+    def cb(ud):
+        return "a"
+
+    state = smach.CBState(cb, outcomes=["b"], input_keys=["j"], io_keys=["x"])
+    assert state.get_registered_outcomes() == ("b", "a")
+    assert set(state.get_registered_input_keys()) == {"i", "j", "x"}
+    assert set(state.get_registered_output_keys()) == {"o", "x"}
+    assert state.execute(smach.UserData()) == "a"
+
+
+def test_s2_cb_interface():
+    @smach.cb_interface(outcomes=["a"], input_keys=["i"], output_keys=["o"])
+    def cb(x):
+        """Text."""
+        return x + 1
+
+    assert isinstance(cb, smach.CBInterface) and cb(1) == 2 and cb.__doc__ == "Text."
+    assert cb.get_registered_outcomes() == ("a",)
+    assert cb.get_registered_input_keys() == ("i",) and cb.get_registered_output_keys() == ("o",)
+    assert smach.cb_interface()(lambda: 1)() == 1
+
+
+def test_s2_cb_interface_io_keys_are_honoured_better():
+    cb = smach.CBInterface(lambda: None, ["a"], ["i"], ["o"], ["x"])
+    assert cb.get_registered_input_keys() == ("i", "x")
+    assert cb.get_registered_output_keys() == ("o", "x")
+
+
+def test_s2_cb_interface_on_a_method_better():
+    class Robot:
+        @smach.cb_interface(outcomes=["a"])
+        def cb(self, ud):
+            return self, ud
+
+    robot = Robot()
+    assert robot.cb(3) == (robot, 3) and robot.cb.get_registered_outcomes() == ("a",)
+
+
+def test_s2_has_smach_interface():
+    assert smach.has_smach_interface(smach.State()) and smach.has_smach_interface(
+        smach.CBInterface(print)
+    )
+    assert not smach.has_smach_interface(print) and not smach.has_smach_interface(None)

@@ -1,0 +1,254 @@
+"""Section 3 of the specification: user data."""
+
+import copy
+import pickle
+import threading
+import time
+import types
+
+import pytest
+import smach
+from smach.user_data import Const
+
+
+def test_s3_attributes_and_items_are_the_same():
+    ud = smach.UserData()
+    ud.a = 1
+    ud["b"] = 2
+    assert (ud["a"], ud.b) == (1, 2) and ud._data == {"a": 1, "b": 2}
+    assert "a" in ud and "c" not in ud and ud.keys() == ["a", "b"]
+
+
+def test_s3_missing_key_is_a_key_error_after_an_error_log(log):
+    ud = smach.UserData()
+    with pytest.raises(KeyError):
+        ud.x  # noqa: B018
+    with pytest.raises(KeyError, match="'x'"):
+        ud["x"]
+    assert len(log.error) == 2
+
+
+def test_s3_hasattr_is_false_better():
+    assert not hasattr(smach.UserData(), "x")
+
+
+def test_s3_underscore_names_are_real_attributes():
+    ud = smach.UserData()
+    ud._mine = 1
+    assert ud._mine == 1 and "_mine" not in ud
+    with pytest.raises(AttributeError):
+        ud._other  # noqa: B018
+
+
+def test_s3_update():
+    a, b = smach.UserData(), smach.UserData()
+    a.x, b.x, b.y = 1, 2, 3
+    a.update(b)
+    assert a._data == {"x": 2, "y": 3}
+
+
+def test_s3_no_deletion_length_or_iteration():
+    ud = smach.UserData()
+    ud.x = 1
+    with pytest.raises(AttributeError):
+        del ud.x
+    with pytest.raises((AttributeError, TypeError)):
+        del ud["x"]
+    with pytest.raises(TypeError):
+        len(ud)
+    with pytest.raises(KeyError):
+        iter(ud).__next__()
+    assert ud._data == {"x": 1}
+
+
+def test_s3_extract_and_merge_with_remapping():
+    ud = smach.UserData()
+    ud.a, ud.b = [1], 2
+    local = ud.extract(["a", "b"], {"x": "a"})
+    assert local._data == {"x": [1], "b": 2}
+    assert local.x is not ud.a  # a shallow copy
+    local.x = [9]
+    ud.merge(local, ["x"], {"x": "a"})
+    assert ud.a == [9] and ud.a is not local.x
+    with pytest.raises(KeyError):
+        ud.extract(["nothing"], {})
+
+
+def test_s3_pickles_and_copies():
+    ud = smach.UserData()
+    ud.a = 1
+    assert pickle.loads(pickle.dumps(ud)).a == 1 and copy.deepcopy(ud).a == 1
+
+
+def test_s3_s15_8_locked_makes_transactions_better():
+    ud = smach.UserData()
+    ud.n = 0
+    view = smach.Remapper(ud, ["n"], ["n"], {})
+
+    def count():
+        for _ in range(100):
+            with smach.user_data.locked(view):
+                before = view.n
+                time.sleep(0.0001)  # here the others come in
+                view.n = before + 1
+
+    threads = [threading.Thread(target=count) for _ in range(4)]
+    [t.start() for t in threads], [t.join() for t in threads]
+    assert ud.n == 400
+
+
+class Thing:
+    """An instance of a user class: it has a __dict__."""
+
+    def __init__(self):
+        self.x = 1
+        self.inner = types.SimpleNamespace(y=2)
+        self.items = {"k": types.SimpleNamespace(z=3)}
+
+    def double(self):
+        return 2 * self.x
+
+    def __getitem__(self, key):
+        return self.items[key]
+
+    def __eq__(self, other):
+        return isinstance(other, Thing) and other.x == self.x
+
+    def __hash__(self):
+        return 5
+
+    def __str__(self):
+        return "a thing"
+
+    def __add__(self, other):
+        return self.x + other
+
+    def __len__(self):
+        return 7
+
+
+def view_of(value, outputs=()):
+    ud = smach.UserData()
+    ud.v = value
+    return smach.Remapper(ud, ["v", "absent"], ["w", *outputs], {"w": "outer_w"}), ud
+
+
+def test_s3_remapper_undeclared_read_is_a_user_code_error():
+    view, _ = view_of(1)
+    for key in ("nothing", "w"):  # also keys that are only output keys
+        with pytest.raises(smach.InvalidUserCodeError, match=key):
+            view[key]
+        with pytest.raises(smach.InvalidUserCodeError):
+            getattr(view, key)
+
+
+def test_s3_remapper_declared_but_absent_is_a_key_error():
+    with pytest.raises(KeyError):
+        view_of(1)[0].absent  # noqa: B018
+
+
+def test_s3_remapper_undeclared_write_is_logged_and_ignored(log):
+    view, ud = view_of(1)
+    view.v = 2
+    view["z"] = 3
+    assert ud._data == {"v": 1} and len(log.error) == 2 and "'v'" in log.error[0]
+
+
+def test_s3_remapper_renames():
+    view, ud = view_of(1)
+    view.w = 5
+    assert ud.outer_w == 5 and "w" not in ud
+
+
+def test_s3_remapper_contains():
+    view, _ = view_of(1)
+    view.w = 2
+    assert "v" in view and "absent" not in view and "w" not in view and "nothing" not in view
+
+
+def test_s3_remapper_gives_the_very_object_without_dict():
+    for value in (3, 2.5, "s", [1], {"a": 1}, None, (1,)):
+        assert view_of(value)[0].v is value
+    assert view_of(list)[0].v is list
+
+
+def test_s3_remapper_wraps_instances_and_functions_in_const():
+    for value in (Thing(), lambda: 3):
+        assert issubclass(type(view_of(value)[0].v), Const)
+
+
+def test_s3_remapper_io_key_gives_the_very_object():
+    thing = Thing()
+    view, _ = view_of(thing, outputs=["v"])
+    assert view.v is thing
+    view.v.x = 9
+    assert thing.x == 9
+
+
+def test_s3_const_reads_recursively():
+    const = view_of(Thing())[0].v
+    assert const.x == 1 and const.inner.y == 2 and const["k"].z == 3
+    assert issubclass(type(const.inner), Const) and issubclass(type(const["k"]), Const)
+    assert const.items["k"].z == 3
+
+
+def test_s3_s15_8_const_refuses_assignment_and_del_better():
+    thing = Thing()
+    const = view_of(thing)[0].v
+    for target in (const, const.inner):
+        with pytest.raises(TypeError, match="io_keys"):
+            target.x = 5
+        with pytest.raises(TypeError):
+            del target.x
+    assert thing.x == 1 and not hasattr(thing.inner, "x")
+    writable = types.SimpleNamespace(data={})
+    type_with_items = type(
+        "T", (), {"__setitem__": lambda s, k, v: None, "__delitem__": lambda s, k: None}
+    )
+    items = view_of(type_with_items())[0].v
+    with pytest.raises(TypeError):
+        items["a"] = 1
+    with pytest.raises(TypeError):
+        del items["a"]
+    assert writable.data == {}
+
+
+def test_s3_const_forwards_calls_comparison_text_and_kind_better():
+    const = view_of(Thing())[0].v
+    assert const.double() == 2 and str(const) == "a thing" and f"{const}" == "a thing"
+    assert const == Thing() and Thing() == const and const != 3 and const == view_of(Thing())[0].v
+    assert isinstance(const, Thing) and hash(const) == 5
+    assert const + 1 == 2 and len(const) == 7 and not callable(const)
+    assert view_of(lambda x: x + 1)[0].v(1) == 2
+
+
+def test_s3_const_copies_are_free_better():
+    thing = Thing()
+    const = view_of(thing)[0].v
+    for clone in (copy.copy(const), copy.deepcopy(const), pickle.loads(pickle.dumps(const))):
+        clone.x = 4
+        assert type(clone) is Thing and thing.x == 1
+
+
+def test_s3_const_with_locks_and_events():
+    event = threading.Event()
+    const = view_of(event)[0].v
+    const.set()
+    assert event.is_set() and const.wait(0)
+    condition = threading.Condition()
+    with view_of(condition)[0].v:
+        assert not condition.acquire(blocking=False) or condition.release() is None
+
+
+def test_s3_remapper_keys_are_the_states_own_names_better():
+    ud = smach.UserData()
+    ud.outer, ud.other = 1, 2
+    assert smach.Remapper(ud, ["mine", "gone"], [], {"mine": "outer"}).keys() == ["mine"]
+
+
+def test_s3_remapper_update_writes_through():
+    view, ud = view_of(1)
+    other = smach.UserData()
+    other.anything = 3
+    view.update(other)
+    assert ud.anything == 3

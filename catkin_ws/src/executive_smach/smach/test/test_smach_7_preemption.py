@@ -1,0 +1,222 @@
+"""Section 7 of the specification: preemption, shutdown and errors of a Concurrence."""
+
+import os
+import pickle
+import signal
+import subprocess
+import sys
+import threading
+import time
+
+import pytest
+import smach
+from machine_parts import ALL_DONE, Calls, Ignores, Says, Serves, concurrence, in_thread, machine, wait_for
+
+
+def test_s7_preempt_served_by_all():
+    children = {"A": Serves(patience=20), "B": Serves(patience=20)}
+    both = concurrence(children=children, outcome_map=ALL_DONE)
+    run = in_thread(both.execute)
+    assert all(child.started.wait(5) for child in children.values())
+    both.request_preempt()
+    run.join(10)
+    assert run.result == "preempted" and not both.preempt_requested()
+    assert not any(child.preempt_requested() for child in children.values())
+
+
+def test_s7_preempt_served_gives_preempted_even_unregistered():
+    both = concurrence(outcomes=["done"], default="done", children={"A": Serves(patience=20)})
+    both.request_preempt()
+    assert both.execute() == "preempted"
+
+
+def test_s7_preempt_ignored_by_one(log):
+    stubborn = Ignores("done")
+    both = concurrence(children={"A": Serves(patience=20), "B": stubborn}, outcome_map=ALL_DONE)
+    stubborn.machine = both
+    assert both.execute() == "failed"
+    assert both.preempt_requested() and not stubborn.preempt_requested()
+    assert "'B'" in log.text("warn")
+
+
+def test_s7_preempt_ignored_is_carried_by_the_machine_around():
+    stubborn, after = Ignores("done"), Serves()
+    both = concurrence(outcomes=["done"], default="done", children={"B": stubborn})
+    outer = machine(both, after)
+    stubborn.machine = outer
+    assert outer.execute() == "preempted" and after.seen == [True]
+
+
+@pytest.mark.parametrize("moment", ["before", "start_cb", "transition_cb"])
+def test_s7_a_request_before_or_during_the_start_reaches_every_child_better(moment):
+    for _ in range(20):
+        children = {"A": Serves(patience=20), "B": Serves(patience=20)}
+        both = concurrence(children=children, outcome_map=ALL_DONE)
+        once = iter([1])
+
+        def ask(*args, both=both, once=once):
+            if next(once, None):
+                both.request_preempt()
+
+        if moment == "before":
+            ask()
+        elif moment == "start_cb":
+            both.register_start_cb(ask)
+        else:
+            both.register_transition_cb(ask)
+        begun = time.monotonic()
+        assert both.execute() == "preempted"
+        assert time.monotonic() - begun < 15  # not by patience
+
+
+def test_s15_2_ignored_requests_do_not_poison_the_next_run_better():
+    stubborn, polite = Ignores("done"), Serves()
+    both = concurrence(children={"A": polite, "B": stubborn}, outcome_map=ALL_DONE)
+    stubborn.machine = both
+    both.execute()
+    stubborn.machine = None
+    assert both.execute() == "done" and polite.seen[-1] is False and not both.preempt_requested()
+
+
+def test_s15_1_a_request_after_all_children_have_ended_is_carried_on():
+    both = concurrence(children={"A": Says("done")}, outcome_map={"done": {"A": "done"}})
+    both._outcome_cb = lambda outcomes: both.request_preempt()
+    assert both.execute() == "done" and both.preempt_requested()
+
+
+@pytest.mark.parametrize("moment", ["transition_cb", "child_termination_cb"])
+@pytest.mark.parametrize("whom", ["concurrence", "machine around"])
+def test_s7_a_request_when_the_last_child_has_just_ended_gives_preempted(moment, whom):
+    after = Serves()
+
+    def ask():
+        (both if whom == "concurrence" else outer).request_preempt()
+        return True
+
+    both = concurrence(
+        children={"A": Says("done"), "B": Says("done")},
+        outcome_map=ALL_DONE,
+        child_termination_cb=lambda outcomes: (
+            moment == "child_termination_cb" and all(outcomes.values()) and ask()
+        ),
+    )
+    outer = machine(both, after, outcomes=["done", "failed", "preempted"])
+    if moment == "transition_cb":
+        both.register_transition_cb(lambda ud, labels: labels or ask())
+    assert outer.execute() == "preempted"
+    assert after.seen == [] and not both.preempt_requested() and not outer.preempt_requested()
+
+
+def test_s15_1_a_request_that_a_child_did_not_take_is_carried_on(log):
+    class Deaf(Says):
+        def request_preempt(self):
+            raise OSError("deaf")
+
+    after = Serves()
+    both = concurrence(children={"A": Deaf("done")}, outcome_map={"done": {"A": "done"}})
+    outer = machine(both, after, outcomes=["done", "failed", "preempted"])
+    both.register_start_cb(lambda ud, labels: outer.request_preempt())
+    assert outer.execute() == "preempted" and after.seen == [True]
+    assert "deaf" in log.text("error")
+
+
+def test_s7_s15_7_is_running_better():
+    seen = []
+    both = concurrence(children={"A": Calls(lambda ud: seen.append(both.is_running()))})
+    both.execute()
+    assert seen == [True] and not both.is_running()
+
+
+def test_s7_set_initial_state_better(log):
+    both = concurrence(children={"A": Says("done"), "B": Says("done")})
+    ud = smach.UserData()
+    ud.x = 1
+    both.set_initial_state(["A", "B"], ud)
+    assert both.userdata.x == 1 and log.warn == []
+    both.set_initial_state(["A"], smach.UserData())
+    assert len(log.warn) == 1 and both.get_initial_states() == ["A", "B"]
+
+
+def test_s7_states_and_edges():
+    seen = []
+    first = threading.Event()
+    both = concurrence(
+        children={"A": Calls(lambda ud: first.set()), "B": Calls(lambda ud: seen.append(wait()))},
+        outcome_map=ALL_DONE,
+    )
+
+    def wait():
+        wait_for(lambda: both.get_active_states() == ["B"])
+        return both.get_active_states()
+
+    assert both.get_initial_states() == ["A", "B"] and both.get_active_states() == []
+    assert both.get_internal_edges() == [("done", "A", "done"), ("done", "B", "done")]
+    both.execute()
+    assert seen == [["B"]] and both.get_active_states() == []
+
+
+def test_s7_shutdown_takes_the_children_along_better():
+    children = {"A": Serves(patience=30), "B": Serves(patience=30)}
+    both = concurrence(children=children)
+    run = in_thread(both.execute)
+    assert all(child.started.wait(5) for child in children.values())
+    smach.set_shutdown_check(lambda: True)
+    run.join(10)
+    assert not run.is_alive()
+
+
+def test_s7_ctrl_c_in_the_main_thread_takes_the_children_along_better():
+    code = """
+import smach, machine_parts
+both = smach.Concurrence(["done", "preempted"], "done")
+with both:
+    smach.Concurrence.add("A", machine_parts.Serves(patience=60))
+    smach.Concurrence.add("B", machine_parts.Serves(patience=60))
+both.register_transition_cb(lambda ud, labels: print("READY", flush=True))
+try:
+    both.execute()
+except KeyboardInterrupt:
+    print("INTERRUPTED", both.is_running(), flush=True)
+"""
+    env = {**os.environ, "PYTHONPATH": os.pathsep.join([p for p in sys.path if p])}
+    process = subprocess.Popen(
+        [sys.executable, "-c", code], stdout=subprocess.PIPE, text=True, env=env
+    )
+    try:
+        while "READY" not in process.stdout.readline():
+            pass
+        process.send_signal(signal.SIGINT)
+        assert "INTERRUPTED False" in process.communicate(timeout=30)[0]
+    finally:
+        process.kill()
+        process.wait()
+
+
+def test_s7_too_few_threads_is_an_error_and_nothing_runs(monkeypatch):
+    children = {"A": Says("done"), "B": Says("done")}
+    both = concurrence(children=children)
+    real, count = threading.Thread.start, []
+
+    def start(self):
+        if self.name.startswith("concurrent_split"):
+            count.append(1)
+            if len(count) == 2:
+                raise RuntimeError("can't start new thread")
+        real(self)
+
+    monkeypatch.setattr(threading.Thread, "start", start)
+    with pytest.raises(smach.InvalidStateError, match="'B'"):
+        both.execute()
+    monkeypatch.undo()
+    assert children["A"].runs == 0 and both.execute() == "failed"
+
+
+def test_s7_pickles():
+    both = concurrence(children={"A": Says("done"), "B": Says("done")}, outcome_map=ALL_DONE)
+    assert pickle.loads(pickle.dumps(both)).execute() == "done"
+
+
+def test_s7_nested_concurrences():
+    inner = concurrence(children={"A": Says("done"), "B": Says("done")}, outcome_map=ALL_DONE)
+    outer = concurrence(children={"A": inner, "B": Says("done")}, outcome_map=ALL_DONE)
+    assert [outer.execute() for _ in range(20)] == ["done"] * 20

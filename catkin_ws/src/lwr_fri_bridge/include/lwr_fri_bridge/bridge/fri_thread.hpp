@@ -1,0 +1,88 @@
+/// @file
+/// The FRI thread: one UDP socket, and nothing but Bridge::answer() between receive and send.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <functional>
+#include <string>
+
+#include "lwr_fri_bridge/bridge/bridge.hpp"
+#include "lwr_fri_bridge/names.hpp"
+
+namespace lwr_fri_bridge {
+
+struct FriThreadOptions {
+  std::string address = "127.0.0.1";  ///< local address to bind; that of the network card towards
+                                      ///< the cabinet, 0.0.0.0: all
+  int port = fri::kDefaultPort;       ///< local UDP port, 0: any free one
+  std::string controller_address;     ///< of the robot controller; empty: the first that sends
+  int priority = 80;                  ///< SCHED_FIFO, 0: leave the scheduling alone
+  std::size_t stack_bytes = 256 * 1024;
+  /// Called in the FRI thread after each answer has been sent (and after each time-out without
+  /// datagrams, with answered = false): wakes the control thread. Must be real-time safe.
+  std::function<void(bool answered)> after_answer;
+};
+
+/// What the thread counts; readable from any thread.
+struct FriThreadStatistics {
+  std::uint64_t answers = 0;
+  std::uint64_t superseded = 0;  ///< datagrams skipped because a newer one was waiting already
+  std::uint64_t foreign = 0;     ///< datagrams from a second sender, ignored
+  std::uint64_t send_errors = 0;
+  std::string peer;               ///< "address:port" of the robot controller, empty if none
+  std::string last_foreign;       ///< "address:port" of the last second sender
+  double mean_answer_time = 0.0;  ///< s, receive to sent, exponential mean over about 1000 answers
+  double longest_answer_time = 0.0;  ///< s, since the last call of statistics(true)
+  bool real_time = false;            ///< SCHED_FIFO was granted
+};
+
+/// Answers go to where the datagrams come from: the first sender of a valid datagram, from
+/// `controller_address` if that is set, is the peer until it falls silent. If several datagrams
+/// wait, only the newest is answered; the controller has given up the others.
+class FriThread {
+ public:
+  FriThread(Bridge& bridge, FriThreadOptions options);
+  ~FriThread();
+  FriThread(const FriThread&) = delete;
+  FriThread& operator=(const FriThread&) = delete;
+
+  /// Binds the socket and starts the thread. With options.port 0, `preferred_port` is tried first:
+  /// a node that was killed and started again is found where it was. Returns warnings (scheduling),
+  /// empty if none.
+  /// @throws std::runtime_error naming address and port if the socket cannot be bound, or the
+  /// address that is none.
+  std::string start(int preferred_port = 0);
+  /// Ends the thread at once; braking and leaving command mode (Bridge::command("stop")) is the
+  /// caller's matter.
+  void stop();
+
+  int port() const { return bound_port_; }  ///< the one bound
+  int priority() const { return options_.priority; }
+  const std::string& controllerAddress() const { return options_.controller_address; }
+  FriThreadStatistics statistics(bool restart_longest = false);
+
+ private:
+  struct Batch;
+  void run();
+  int receive(Batch& batch);
+  bool isController(std::uint64_t endpoint) const;
+  void serve(Batch& batch, int received, std::int64_t now_ns);
+
+  Bridge& bridge_;
+  FriThreadOptions options_;
+  int socket_ = -1;
+  std::uint32_t controller_ = 0;      // controller_address, 0: any
+  std::uint32_t local_ = 0;           // address bound
+  std::int64_t last_receive_ns_ = 0;  // FRI thread
+  int bound_port_ = 0;
+  BoundedThread thread_;
+  std::atomic<bool> stopping_{false};
+  std::atomic<int> scheduling_{0};  // 0 not known yet, 1 granted, 2 refused, 3 not wanted
+  std::string scheduling_warning_;  // written before scheduling_
+  std::atomic<std::uint64_t> answers_{0}, superseded_{0}, foreign_{0}, send_errors_{0};
+  std::atomic<std::uint64_t> peer_{0}, last_foreign_{0};  // address << 16 | port, 0: none
+  std::atomic<float> mean_answer_time_{0.0F}, longest_answer_time_{0.0F};
+};
+
+}  // namespace lwr_fri_bridge

@@ -1,0 +1,45 @@
+/// @file
+/// Velocity filter (D4.10 Figure 1): joint velocities from joint positions.
+///
+/// Difference quotient over the cycles that really passed, then a first-order low-pass with time
+/// constant T. With k = 1 - exp(-dt/T): delay of a ramp dt/2 + dt (1-k)/k, standard deviation of
+/// the velocity per standard deviation of white noise on the positions (k/dt) sqrt(2/(2-k)). A gap
+/// of n cycles counts as n samples on the straight line between its ends, so lost packets neither
+/// make a spike nor change the time constant.
+#pragma once
+
+#include <cstdint>
+
+#include "lwr_fri_bridge/names.hpp"
+
+namespace lwr_fri_bridge {
+
+/// Real-time safe.
+class VelocityFilter {
+ public:
+  /// `time_constant` in s, >= 0; 0: plain difference quotient.
+  explicit VelocityFilter(double time_constant) : time_constant_(time_constant) {}
+
+  /// Forgets the past: the next sample gives velocity 0.
+  void reset() { primed_ = false; }
+
+  /// Takes the position (rad) measured `cycles` (>= 1) FRI cycles of `dt` seconds after the
+  /// previous one.
+  const Vector7& update(const Vector7& position, std::uint32_t cycles, double dt);
+
+  const Vector7& velocity() const { return velocity_; }
+
+  /// Delay of a constant acceleration, s; see above.
+  static double delay(double time_constant, double dt);
+  /// Noise gain, 1/s; see above.
+  static double noiseGain(double time_constant, double dt);
+
+ private:
+  static double weight(double time_constant, double dt, std::uint32_t cycles);
+
+  double time_constant_;
+  bool primed_ = false;
+  Vector7 last_ = Vector7::Zero(), velocity_ = Vector7::Zero();
+};
+
+}  // namespace lwr_fri_bridge

@@ -1,0 +1,35 @@
+/// @file
+/// The names of coglab_rt in which this package is written.
+#pragma once
+
+#include "coglab_rt/arm_port.hpp"
+#include "coglab_rt/braking.hpp"
+#include "coglab_rt/clock.hpp"
+#include "coglab_rt/event_ring.hpp"
+#include "coglab_rt/interpolator.hpp"
+#include "coglab_rt/joint_limits.hpp"
+#include "coglab_rt/real_time.hpp"
+
+namespace lwr_fri_bridge {
+
+using coglab_rt::ArmMailboxes;
+using coglab_rt::AxisState;
+using coglab_rt::BoundedThread;
+using coglab_rt::BrakingGuard;
+using coglab_rt::brakingSpeed;
+using coglab_rt::EventRing;
+using coglab_rt::Interpolator;
+using coglab_rt::JointLimits;
+using coglab_rt::kFutureAllowance_ns;
+using coglab_rt::kJointNames;
+using coglab_rt::LossBudget;
+using coglab_rt::MotionBlock;
+using coglab_rt::planVelocity;
+using coglab_rt::RobotSample;
+using coglab_rt::steadyNow;
+using coglab_rt::TripleBuffer;
+using coglab_rt::Vector6;
+using coglab_rt::Vector7;
+using coglab_rt::VelocityCommand;
+
+}  // namespace lwr_fri_bridge

@@ -1,0 +1,84 @@
+/// @file
+/// Configurator (D4.10 Figure 1): the requests that take long, entering and leaving command mode,
+/// each with a time limit and an outcome.
+///
+/// It is stepped by every FRI tick (and by the FRI thread's time-outs when the controller is
+/// silent) and never waits itself, so it runs beside the supervisor in the same thread, and in
+/// lockstep it is as reproducible as the rest.
+#pragma once
+
+#include "lwr_fri_bridge/requests/events.hpp"
+
+namespace lwr_fri_bridge {
+
+struct ConfiguratorLimits {
+  double start_timeout = 10.0;  ///< s, from the request to command mode with power; KRL programs
+                                ///< need up to some seconds
+  double stop_timeout = 2.0;    ///< s, from the request to monitor mode
+  double silent_stop_timeout = 1.0;  ///< s, the same when the controller is silent
+};
+
+/// Real-time safe, one thread.
+class Configurator {
+ public:
+  Configurator(fri::KrlConvention convention, std::int32_t tool, const ConfiguratorLimits& limits)
+      : convention_(convention), limits_(limits) {
+    request_.tool = tool;
+  }
+
+  /// What one tick shows; `measurement` is the newest one, also when the controller is silent.
+  struct Observation {
+    bool connected = false;
+    const fri::MeasurementDatagram* measurement = nullptr;
+    std::int64_t now_ns = 0;
+  };
+
+  /// Begins to enter command mode with `strategy`. A request in progress is interrupted.
+  void start(std::uint32_t ticket, fri::ControlStrategy strategy, const Observation& seen);
+  /// Begins to leave it.
+  void stop(std::uint32_t ticket, const Observation& seen);
+  /// Ends a start in progress with `code` and withdraws it at the KRL program.
+  void abandon(OutcomeCode code, const Observation& seen);
+  /// The controller left command mode by itself: withdraws what would bring it back.
+  void fellBack() {
+    if (request_.phase == fri::KrlPhase::Running) request_.phase = fri::KrlPhase::Idle;
+  }
+
+  /// One step. Returns true if a request ended; `outcome` says how.
+  bool update(const Observation& seen, Outcome& outcome);
+
+  /// Writes the request of the moment for the KRL program.
+  void write(fri::UserData& to_controller) const {
+    fri::writeRequest(convention_, request_, to_controller);
+  }
+
+  bool busy() const { return step_ != Step::Idle; }
+  fri::KrlConvention convention() const { return convention_; }
+
+ private:
+  enum class Step : std::uint8_t { Idle, WaitQuality, WaitCommand, WaitPower, WaitMonitor, Ended };
+
+  double elapsed(const Observation& seen) const {
+    return 1e-9 * static_cast<double>(seen.now_ns - began_ns_);
+  }
+  void finish(OutcomeCode code, const Observation& seen);
+  void setPhase(fri::KrlPhase phase, const Observation& seen);
+  void stepStart(const Observation& seen);
+  void waitCommand(const Observation& seen, bool late);
+  void waitPower(const Observation& seen, bool command, bool late);
+  void giveUp(OutcomeCode code, const Observation& seen);
+  void stepStop(const Observation& seen);
+
+  fri::KrlConvention convention_;
+  ConfiguratorLimits limits_;
+  fri::KrlRequest request_;
+  Step step_ = Step::Idle;
+  std::int64_t began_ns_ = 0;
+  bool seen_busy_ = false;
+  bool settle_ = false;  // a start was withdrawn: monitor mode must last before it counts
+  std::int64_t monitor_since_ns_ = 0;
+  fri::KrlReply reply_;
+  Outcome outcome_;
+};
+
+}  // namespace lwr_fri_bridge

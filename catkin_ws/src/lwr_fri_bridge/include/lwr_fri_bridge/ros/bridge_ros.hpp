@@ -1,0 +1,118 @@
+/// @file
+/// The bridge on ROS (D4.10 Table 1): topics, service, diagnostics and parameters of the namespace
+/// `/lwr`. Used by lwr_node and, in one process with the controller manager, by robot_node.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <vector>
+
+#include <semaphore.h>
+
+#include <coglab_msgs/LwrCommand.h>
+#include <geometry_msgs/WrenchStamped.h>
+#include <ros/callback_queue.h>
+#include <ros/ros.h>
+#include <ros/spinner.h>
+#include <sensor_msgs/JointState.h>
+#include <std_msgs/String.h>
+
+#include "lwr_fri_bridge/bridge/bridge.hpp"
+#include "lwr_fri_bridge/bridge/fri_thread.hpp"
+
+namespace lwr_fri_bridge {
+
+class BridgeDiagnostics;
+class TargetTopic;
+
+/// Reads the parameters of the bridge from the namespace of `nh` (README: table of parameters).
+/// @throws std::exception naming parameter, value and range, or file, line and field of the limits
+/// table.
+BridgeConfig readBridgeConfig(const ros::NodeHandle& nh);
+FriThreadOptions readFriThreadOptions(const ros::NodeHandle& nh);
+
+/// Publishes joint_states, external_torques, tool_wrench (all at joint_states_rate or the FRI rate,
+/// the lower one) and state (latched, on change); subscribes target_joint_states and ros_events;
+/// serves command. Has its own callback queue and threads, so a long start does not delay a hold.
+class BridgeRos : public coglab_rt::ArmPort {
+ public:
+  /// Reads the parameters under `nh` (normally ros::NodeHandle("lwr")).
+  /// @param one_process true: a control thread of this process feeds mailboxes();
+  /// target_joint_states is then accepted only while no controller is active
+  /// (setControllerActive). false: target_joint_states is the only source.
+  /// @throws std::exception as readBridgeConfig().
+  BridgeRos(const ros::NodeHandle& nh, bool one_process);
+  ~BridgeRos() override;
+  BridgeRos(const BridgeRos&) = delete;
+  BridgeRos& operator=(const BridgeRos&) = delete;
+
+  /// Binds the socket, sets the parameter fri_port_bound, starts all threads. `wake` is called in
+  /// the FRI thread after each answer (true) and on idle ticks without datagrams (false); it may be
+  /// empty. @throws std::runtime_error if the socket cannot be bound, std::exception naming a
+  /// parameter that is out of range.
+  void start(Wake wake) override;
+
+  /// Brakes, requests monitor mode, keeps answering until it comes or its time limit is over, then
+  /// ends all threads. To be called on SIGINT, SIGTERM and at the end of main; works without a
+  /// roscore. Safe to call twice.
+  void shutdown() override;
+  /// After shutdown(): tells the ROS master, and waits for it; see endProcessWithin().
+  void unregister() override;
+
+  Bridge& bridge() { return bridge_; }
+  ArmMailboxes& mailboxes() override { return bridge_.mailboxes(); }
+  /// Below that of the FRI thread; 0: none, because it has none itself.
+  int highestPriority() override;
+
+  /// One process only: whether the control thread's velocities count (true) or those of
+  /// target_joint_states (false).
+  void setControllerActive(bool active) override;
+
+ private:
+  friend class BridgeDiagnostics;
+
+  void startThreads();
+  void endThreads();
+  void onEvent(const std_msgs::String& message);
+  bool onCommand(coglab_msgs::LwrCommand::Request& request,
+                 coglab_msgs::LwrCommand::Response& response);
+  void publishLoop();
+  void publishSample(const Snapshot& snapshot);
+  void restartQuietly(const Snapshot& now);
+  void publishState(const StateView& view);
+  void reportOutcomes();
+
+  ros::NodeHandle nh_;
+  const bool one_process_;
+  Wake wake_;  // FRI thread, from start() on
+  ros::CallbackQueue queue_;
+  Bridge bridge_;
+  FriThread fri_thread_;
+  std::unique_ptr<ros::AsyncSpinner> spinner_;
+  std::unique_ptr<BridgeDiagnostics> diagnostics_;
+  ros::Publisher joint_states_, external_torques_, tool_wrench_, state_;
+  std::unique_ptr<TargetTopic> target_;
+  ros::Subscriber events_;
+  ros::ServiceServer command_;
+  ros::Timer diagnostics_timer_;
+  BoundedThread publisher_;
+  sem_t new_sample_;
+  std::int64_t publish_period_ns_ = 5'000'000;
+  std::int64_t last_post_ns_ = 0;  // FRI thread
+  std::int64_t started_ns_ = 0;
+  std::uint64_t published_sequence_ = 0;
+  std::atomic<bool> stopping_{false};
+  std::atomic<bool> closing_{false};  // the node ends: nothing is asked of the arm any more
+  bool started_ = false;
+  bool restarts_quietly_ = true;
+  QuietRestart quiet_restart_;  // publisher thread
+  std::mutex tickets_mutex_;
+  std::vector<std::uint32_t> tickets_;  // of ros_events, whose outcomes go to the log
+  sensor_msgs::JointState joint_message_, torque_message_;
+  geometry_msgs::WrenchStamped wrench_message_;
+};
+
+}  // namespace lwr_fri_bridge

@@ -1,0 +1,350 @@
+#include "lwr_fri_bridge/bridge/bridge.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+
+namespace lwr_fri_bridge {
+namespace {
+
+constexpr double kCommandCycles = 2.5;  // FRI cycles that a command lives at least
+
+bool allFinite(const Vector7& v) { return v.allFinite(); }
+
+double seconds(std::int64_t from_ns, std::int64_t to_ns) {
+  return 1e-9 * static_cast<double>(to_ns - from_ns);
+}
+
+}  // namespace
+
+Bridge::Bridge(const BridgeConfig& config)
+    : config_((config.check(), config)),
+      session_(config.lenient_headers),
+      velocity_filter_(config.velocity_filter_time),
+      interpolator_(config.limits),
+      braking_(config.limits, config.position_margin),
+      configurator_(config.krl_convention, config.tool_number, config.requests),
+      wanted_mode_(config.mode),
+      active_mode_(config.mode) {
+  sample_.stop_rounding = 2.0 * coglab_rt::kWireRounding;
+  changes_.push(last_view_);
+  publish();
+}
+
+// FRI thread
+
+bool Bridge::answer(const std::uint8_t* datagram, std::size_t size, std::int64_t now_ns,
+                    fri::CommandDatagram& answer) {
+  if (!compute(datagram, size, now_ns, answer)) return false;
+  publish();
+  return true;
+}
+
+bool Bridge::compute(const std::uint8_t* datagram, std::size_t size, std::int64_t now_ns,
+                     fri::CommandDatagram& answer) {
+  const fri::Reception reception = session_.receive(datagram, size, measurement_);
+  if (reception.verdict != fri::Verdict::Accepted) return false;
+
+  const bool first_contact = !connected_;
+  connected_ = true;
+  last_receive_ns_ = now_ns;
+  const double dt = fri::cycleTimeOf(measurement_);
+  if (reception.fresh_session || reception.new_period) velocity_filter_.reset();
+  if (first_contact || reception.new_period) following_ = false;
+  if (reception.fresh_session || reception.gap()) {
+    cycles_without_loss_ = 0;
+  } else if (cycles_without_loss_ < LossBudget::kProvenCycles) {
+    ++cycles_without_loss_;
+  }
+
+  sample_.stamp_ns = now_ns;
+  sample_.cycle_time = dt;
+  sample_.stop_delay = coglab_rt::lostTime(dt);
+  sample_.controller_ns += static_cast<std::int64_t>(std::llround(1e9 * dt * reception.cycles));
+  sample_.position = fri::jointsFromWire(measurement_.measured_position);
+  sample_.velocity = velocity_filter_.update(sample_.position, reception.cycles, dt);
+  sample_.torque = fri::jointsFromWire(measurement_.measured_torque);
+  sample_.external_torque = fri::jointsFromWire(measurement_.external_torque);
+  sample_.tool_wrench = toolWrench(measurement_, config_.wrench_in_tool_axes);
+  ++sample_.sequence;
+  const bool unseen = !reception.fresh_session && !reception.answer_arrived;
+  watch_.tick(dt * reception.cycles, reception.cycles - 1 + (unseen ? 1 : 0),
+              sample_.velocity.cwiseAbs().maxCoeff(),
+              sample_.commanded_velocity.cwiseAbs().maxCoeff());
+
+  const bool monitor = measurement_.state == static_cast<std::uint16_t>(fri::FriState::Monitor);
+  if (first_contact && !monitor) {
+    // Somebody else brought the controller into command mode: its flags may not change now, so
+    // speak its strategy.
+    active_mode_ = wanted_mode_;
+    active_mode_.strategy = static_cast<fri::ControlStrategy>(measurement_.control);
+  }
+
+  const Configurator::Observation seen{true, &measurement_, now_ns};
+  serveRequests(seen);
+  runSupervision(seen, reception.fresh_session);
+  if (monitor) active_mode_ = wanted_mode_;
+
+  answer = fri::CommandDatagram{};
+  // Before the answer is made, so that it is known when the answer is lost.
+  answer.header = session_.nextHeader();
+  move(reception, answer);
+  fillMode(answer);
+  configurator_.write(answer.krl);
+  return true;
+}
+
+void Bridge::idle(std::int64_t now_ns) {
+  const double limit = std::max(config_.receive_timeout, 5.0 * sample_.cycle_time);
+  if (connected_ && seconds(last_receive_ns_, now_ns) > limit) {
+    connected_ = false;
+    following_ = false;
+    session_.forget();
+    leash_.reset();
+  }
+  const Configurator::Observation seen{connected_, sample_.sequence > 0 ? &measurement_ : nullptr,
+                                       now_ns};
+  serveRequests(seen);
+  runSupervision(seen, false);
+  publish();
+}
+
+void Bridge::finish(const Request& request, OutcomeCode code) {
+  Outcome outcome;
+  outcome.ticket = request.ticket;
+  outcome.kind = request.event.kind;
+  outcome.code = code;
+  outcome.wanted =
+      request.event.kind == EventKind::Mode ? request.event.mode.strategy : wanted_mode_.strategy;
+  outcome.reported = static_cast<fri::ControlStrategy>(measurement_.control);
+  outcome.state = static_cast<fri::FriState>(measurement_.state);
+  outcome.quality = static_cast<fri::Quality>(measurement_.quality);
+  outcome.convention = config_.krl_convention;
+  outcomes_.push(outcome);
+}
+
+void Bridge::serveRequests(const Configurator::Observation& seen) {
+  Request request;
+  while (requests_.pop(request)) serve(request, seen);
+}
+
+void Bridge::serve(const Request& request, const Configurator::Observation& seen) {
+  const bool monitor =
+      connected_ && measurement_.state == static_cast<std::uint16_t>(fri::FriState::Monitor);
+  switch (request.event.kind) {
+    case EventKind::Hold:
+      supervisor_.hold();
+      configurator_.abandon(OutcomeCode::Interrupted, seen);
+      return finish(request, OutcomeCode::Done);
+    case EventKind::Reset:
+      if (!supervisor_.held()) return finish(request, OutcomeCode::AlreadyThere);
+      supervisor_.reset();
+      return finish(request, OutcomeCode::Done);
+    case EventKind::Mode:
+      if (supervisor_.held()) return finish(request, OutcomeCode::Held);
+      if (connected_ && !monitor) return finish(request, OutcomeCode::InCommandMode);
+      if (supervisor_.starting()) return finish(request, OutcomeCode::Busy);
+      wanted_mode_ = request.event.mode;
+      return finish(request, OutcomeCode::Done);
+    case EventKind::Start:
+      if (!connected_) return finish(request, OutcomeCode::Disconnected);
+      if (supervisor_.held()) return finish(request, OutcomeCode::Held);
+      if (supervisor_.stopping() || supervisor_.starting())
+        return finish(request, OutcomeCode::Busy);
+      if (supervisor_.state() == SupervisorState::Command)
+        return finish(request, OutcomeCode::AlreadyThere);
+      supervisor_.startBegins();
+      configurator_.start(request.ticket, monitor ? wanted_mode_.strategy : active_mode_.strategy,
+                          seen);
+      return;
+    case EventKind::Stop:
+      if (supervisor_.stopping()) return finish(request, OutcomeCode::Busy);
+      if (!connected_) return finish(request, OutcomeCode::Disconnected);
+      if (monitor && !supervisor_.starting()) {
+        supervisor_.stopEnds();
+        return finish(request, OutcomeCode::AlreadyThere);
+      }
+      configurator_.abandon(OutcomeCode::Interrupted, seen);
+      supervisor_.stopBegins();
+      stop_ticket_ = request.ticket;
+      stop_began_ns_ = seen.now_ns;
+      monitor_asked_ = false;
+      return;
+  }
+}
+
+void Bridge::runSupervision(const Configurator::Observation& seen, bool fresh_session) {
+  Outcome ended;
+  if (configurator_.update(seen, ended)) {
+    outcomes_.push(ended);
+    if (ended.kind == EventKind::Start && supervisor_.starting())
+      supervisor_.startEnds(ended.success());
+    if (ended.kind == EventKind::Stop) supervisor_.stopEnds();
+  }
+
+  SupervisorInput input;
+  input.connected = connected_;
+  input.fresh_session = fresh_session;
+  input.command_mode = measurement_.state == static_cast<std::uint16_t>(fri::FriState::Command);
+  input.full_power = fri::allDrivesOn(measurement_.power);
+  input.quality_unacceptable =
+      measurement_.quality == static_cast<std::uint16_t>(fri::Quality::Unacceptable);
+  input.drive_error = (measurement_.drive_error & fri::kAllDrivesOn) != 0;
+  input.stands_still = interpolator_.standsStill();
+  input.leashed = leash_.joint() >= 0;
+  const std::uint32_t fall_backs = supervisor_.fallBacks(), epoch = supervisor_.epoch();
+  supervisor_.update(input);
+  if (supervisor_.epoch() != epoch) permission_since_ns_ = seen.now_ns;
+  if (supervisor_.fallBacks() != fall_backs) {
+    configurator_.fellBack();
+    // Poor quality and errors of a drive leave command mode in force, and have sentences of their
+    // own.
+    const bool still_there = input.command_mode && input.full_power && !fresh_session;
+    loss_ = still_there && connected_
+                ? CommandModeLoss{}
+                : watch_.judge({connected_, fresh_session, input.command_mode,
+                                seconds(last_receive_ns_, seen.now_ns), sample_.cycle_time,
+                                measurement_.timestamp, sample_.position});
+  }
+  if (supervisor_.state() == SupervisorState::Command) loss_ = CommandModeLoss{};
+
+  // The first half of a stop is the supervisor's (brake), the second the configurator's (monitor
+  // mode).
+  const bool brake_too_long = seconds(stop_began_ns_, seen.now_ns) > kBrakeTimeLimit;
+  if (supervisor_.stopping() && !monitor_asked_ &&
+      (supervisor_.readyForMonitor() || brake_too_long)) {
+    monitor_asked_ = true;
+    configurator_.stop(stop_ticket_, seen);
+  }
+}
+
+void Bridge::move(const fri::Reception& reception, fri::CommandDatagram& answer) {
+  bounded_joints_ = 0;
+  const bool command_mode =
+      measurement_.state == static_cast<std::uint16_t>(fri::FriState::Command);
+  if (command_mode && fri::allDrivesOn(measurement_.power)) {
+    follow(reception, answer);
+  } else {
+    mirror(answer);
+  }
+  sample_.commanded_position = interpolator_.position();
+  sample_.commanded_velocity = interpolator_.velocity();
+  sample_.commanded_acceleration = interpolator_.acceleration();
+}
+
+void Bridge::mirror(fri::CommandDatagram& answer) {
+  fri::setPointOf(measurement_, answer.joint_position);
+  fri::cartesianSetPointOf(measurement_, answer.cartesian_frame);
+  interpolator_.reset(fri::jointsFromWire(answer.joint_position));
+  leash_.reset();
+  following_ = false;
+  command_expired_ = false;
+  session_.sent(fri::SentSetPoint());
+}
+
+/// The interpolator begins or goes on where the controller's set-point is, with the velocity and
+/// the acceleration that it has there.
+void Bridge::takeOver(const fri::Reception& reception) {
+  if (following_ && !reception.fresh_session && !reception.gap()) return;
+  float frame[fri::kFrameValues];
+  fri::cartesianSetPointOf(measurement_, frame);
+  fri::SetPointHistory& history = session_.history();
+  fri::SetPointState state;
+  if (following_) {
+    state = history.afterGap(measurement_, reception.fresh_session);
+    ++counters_.resumed_after_gap;
+  } else {
+    float joints[fri::kJoints];
+    fri::setPointOf(measurement_, joints);
+    state.position = fri::jointsFromWire(joints);
+  }
+  if (!following_ || reception.fresh_session) history.beginWith(measurement_, state);
+  interpolator_.resume(state.position, state.velocity, state.acceleration);
+  cartesian_.anchor(state.position, frame);
+  following_ = true;
+}
+
+void Bridge::noteSent(const Vector7& from, const fri::CommandDatagram& answer) {
+  fri::SentSetPoint sent;
+  sent.followed = true;
+  sent.from = from;
+  sent.position = interpolator_.position();
+  sent.velocity = interpolator_.velocity();
+  sent.acceleration = interpolator_.acceleration();
+  std::copy(std::begin(answer.cartesian_frame), std::end(answer.cartesian_frame), sent.frame);
+  session_.sent(sent);
+}
+
+void Bridge::follow(const fri::Reception& reception, fri::CommandDatagram& answer) {
+  takeOver(reception);
+  const Vector7 from = interpolator_.position();
+  const Vector7 wanted = targetVelocity();
+  Vector7 target = wanted;
+  const double excess = (target.cwiseAbs().array() / config_.limits.velocity.array()).maxCoeff();
+  if (excess > 1.0)
+    target /= excess;  // the whole vector, so that the direction of the motion is kept
+
+  const bool was_leashed = leash_.joint() >= 0;
+  leash_.update(interpolator_, sample_.position, wanted, leashOf(active_mode_, config_.leash),
+                config_.limits, target);
+  if (!was_leashed && leash_.joint() >= 0) ++counters_.leash_trips;
+
+  const bool proven = cycles_without_loss_ >= LossBudget::kProvenCycles;
+  bounded_joints_ = braking_.bound(interpolator_, sample_.cycle_time, proven, target);
+  if (bounded_joints_ != 0) ++counters_.position_bounds;
+  interpolator_.step(target, sample_.cycle_time);
+  fri::jointsToWire(interpolator_.position(), answer.joint_position);
+  if (active_mode_.strategy == fri::ControlStrategy::CartesianImpedance) {
+    cartesian_.frame(interpolator_.position(), answer.cartesian_frame);
+  } else {
+    fri::cartesianSetPointOf(measurement_, answer.cartesian_frame);
+  }
+  noteSent(from, answer);
+}
+
+Vector7 Bridge::targetVelocity() {
+  const VelocitySource source = source_.load(std::memory_order_relaxed);
+  const bool from_topic = source == VelocitySource::Topic;
+  if (source != last_source_) valid_command_ = VelocityCommand();  // nothing outlives its source
+  last_source_ = source;
+  VelocityCommand command;
+  const bool fresh = from_topic ? topic_.read(command) : mailboxes_.takeVelocity(command);
+  if (fresh && command.stamp_ns != 0) {
+    if (!allFinite(command.velocity)) {
+      ++counters_.commands_invalid;
+    } else if (command.motion_epoch != supervisor_.epoch()) {
+      ++counters_.commands_old_epoch;
+    } else {
+      valid_command_ = command;
+    }
+  }
+
+  const double age = seconds(valid_command_.stamp_ns, sample_.stamp_ns);
+  // With long FRI periods a command is two cycles old before its successor can be there.
+  const double limit = std::max(from_topic ? config_.topic_timeout : config_.command_timeout,
+                                kCommandCycles * sample_.cycle_time);
+  const bool current =
+      valid_command_.stamp_ns != 0 && valid_command_.motion_epoch == supervisor_.epoch();
+  const bool expired = current && (age > limit || age < -limit);
+  if (expired && !command_expired_ && !valid_command_.velocity.isZero()) {
+    ++counters_.command_timeouts;
+  }
+  command_expired_ = expired;
+  // While leashed the wish is still looked at, to see when the outward motion is not asked for any
+  // more.
+  const bool allowed =
+      supervisor_.block() == MotionBlock::None || supervisor_.block() == MotionBlock::Leashed;
+  return current && !expired && allowed ? valid_command_.velocity : Vector7::Zero();
+}
+
+void Bridge::fillMode(fri::CommandDatagram& answer) const {
+  // Added torques and forces stay 0: nothing here commands them, and a leap there makes the
+  // controller drop its contactors.
+  answer.flags = fri::flagsFor(active_mode_.strategy);
+  fri::jointsToWire(active_mode_.joint_stiffness, answer.joint_stiffness);
+  fri::jointsToWire(active_mode_.joint_damping, answer.joint_damping);
+  fri::wrenchToWire(active_mode_.cartesian_stiffness, answer.cartesian_stiffness);
+  fri::wrenchToWire(active_mode_.cartesian_damping, answer.cartesian_damping);
+}
+
+}  // namespace lwr_fri_bridge

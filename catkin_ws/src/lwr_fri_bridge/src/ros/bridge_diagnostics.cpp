@@ -1,0 +1,104 @@
+#include "bridge_diagnostics.hpp"
+
+#include "lwr_fri_bridge/bridge/diagnosis.hpp"
+#include "target_topic.hpp"
+
+namespace lwr_fri_bridge {
+namespace {
+
+double checkedTemperature(const ros::NodeHandle& nh) {
+  const double hot = nh.param("hot_drive", 70.0);
+  checkParameter("hot_drive", hot, 0.0, 200.0);
+  return hot;
+}
+
+unsigned char levelOf(Severity severity) { return static_cast<unsigned char>(severity); }
+
+}  // namespace
+
+BridgeDiagnostics::BridgeDiagnostics(BridgeRos& owner)
+    : owner_(owner),
+      hot_(checkedTemperature(owner.nh_)),
+      updater_(ros::NodeHandle(), owner.nh_, owner.nh_.getNamespace()) {
+  updater_.setHardwareID("KUKA LWR 4+");
+  updater_.add("FRI connection", this, &BridgeDiagnostics::connection);
+  updater_.add("arm", this, &BridgeDiagnostics::arm);
+  updater_.add("commands", this, &BridgeDiagnostics::commands);
+}
+
+void BridgeDiagnostics::connection(diagnostic_updater::DiagnosticStatusWrapper& status) {
+  const Snapshot s = owner_.bridge_.snapshot();
+  const FriThreadStatistics thread = owner_.fri_thread_.statistics(true);
+  const std::int64_t since = s.sample.stamp_ns != 0 ? s.sample.stamp_ns : owner_.started_ns_;
+  const double silence = 1e-9 * static_cast<double>(steadyNow() - since);
+  const Diagnosis d = diagnoseConnection(s, thread, owner_.fri_thread_.port(), silence);
+  status.summary(levelOf(d.severity), d.text);
+  status.add("port", owner_.fri_thread_.port());
+  status.add("peer", thread.peer);
+  status.add("controller_address", owner_.fri_thread_.controllerAddress());
+  status.add("FRI state", fri::nameOf(s.state));
+  status.add("quality", fri::nameOf(s.quality));
+  status.add("cycle time (s)", s.sample.cycle_time);
+  status.add("answer rate", s.answer_rate);
+  status.add("latency (s)", s.latency);
+  status.add("jitter (s)", s.jitter);
+  status.add("miss rate", s.miss_rate);
+  status.add("misses", s.miss_counter);
+  status.add("mean answer time (s)", thread.mean_answer_time);
+  status.add("longest answer time (s)", thread.longest_answer_time);
+  status.add("real-time priority", thread.real_time);
+  status.add("datagrams accepted", s.session.accepted);
+  status.add("measurements lost", s.session.lost_measurements);
+  status.add("answers lost", s.session.lost_answers);
+  status.add("rejected: wrong size", s.session.wrong_size);
+  status.add("rejected: wrong id", s.session.wrong_id);
+  status.add("rejected: implausible", s.session.implausible);
+  status.add("rejected: doubled", s.session.duplicate);
+  status.add("rejected: out of order", s.session.out_of_order);
+  status.add("superseded in the queue", thread.superseded);
+  status.add("restarts of the controller", s.session.restarts);
+  status.add("changes of the period", s.session.new_periods);
+  status.add("datagrams of a second sender", thread.foreign);
+  status.add("last second sender", thread.last_foreign);
+  status.add("send errors", thread.send_errors);
+}
+
+void BridgeDiagnostics::arm(diagnostic_updater::DiagnosticStatusWrapper& status) {
+  const Snapshot s = owner_.bridge_.snapshot();
+  const Diagnosis d = diagnoseArm(s, hot_);
+  status.summary(levelOf(d.severity), d.text);
+  status.add("supervisor", nameOf(s.supervisor));
+  status.add("control mode reported", fri::nameOf(s.control));
+  status.add("control mode wanted", fri::nameOf(s.mode.strategy));
+  status.addf("power", "0x%02X", s.power);
+  status.addf("drive error", "0x%02X", s.drive_error);
+  status.addf("drive warning", "0x%02X", s.drive_warning);
+  status.add("safety scale (friStart)", s.safety_scale);
+  status.add("fall-backs", s.fall_backs);
+  for (std::size_t i = 0; i < 7; ++i) {
+    status.add(std::string("temperature ") + kJointNames[i] + " (degC)", s.temperature[i]);
+  }
+}
+
+void BridgeDiagnostics::commands(diagnostic_updater::DiagnosticStatusWrapper& status) {
+  const Snapshot s = owner_.bridge_.snapshot();
+  const TargetTopic::Refused refused = owner_.target_->refused();
+  const std::uint64_t total = refused.total() + s.counters.commands_invalid;
+  status.summary(levelOf(total > refused_before_ ? Severity::Warning : Severity::Ok),
+                 total > refused_before_ ? "target velocities were refused" : "ok");
+  refused_before_ = total;
+  status.add("refused: not valid", refused.invalid + s.counters.commands_invalid);
+  status.add("refused: stamp missing, too old or from the future", refused.stamp);
+  status.add("refused: made before motion was allowed", refused.old_permission);
+  status.add("refused: a controller is active", refused.controller_active);
+  status.add("refused: another publisher moves the arm", refused.second_publisher);
+  status.add("refused: motion not allowed", refused.not_allowed);
+  status.add("ignored: older than the permission", s.counters.commands_old_epoch);
+  status.add("commands stopped while moving", s.counters.command_timeouts);
+  status.add("resumed after a gap", s.counters.resumed_after_gap);
+  status.add("ticks bounded by braking distance", s.counters.position_bounds);
+  status.add("leash trips", s.counters.leash_trips);
+  status.add("events dropped, too many at once", s.counters.requests_dropped);
+}
+
+}  // namespace lwr_fri_bridge

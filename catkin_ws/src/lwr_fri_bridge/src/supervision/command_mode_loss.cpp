@@ -1,0 +1,113 @@
+#include "lwr_fri_bridge/supervision/command_mode_loss.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+namespace lwr_fri_bridge {
+namespace {
+
+constexpr double kFading = 1.0;       // s, time constant of what is remembered
+constexpr double kLateCycles = 3.0;   // lateness that may cost command mode
+constexpr double kLostPackets = 3.0;  // the same for packets lost on the way
+constexpr double kRestSpeed = 0.02;   // rad/s; the velocity filter's noise lies far below
+constexpr double kRestTime = 0.5;     // s at rest before the loss
+constexpr double kCalmTime = 0.1;     // s at rest before a restart
+constexpr double kMoved = 0.002;      // rad from where the arm stood
+constexpr std::int64_t kOften_ns = 60'000'000'000;  // no more than three restarts in that time
+
+}  // namespace
+
+std::string describe(const CommandModeLoss& loss) {
+  char text[160] = "";
+  switch (loss.cause) {
+    case LossCause::None:
+      break;
+    case LossCause::ComputerLate:
+      std::snprintf(text, sizeof text,
+                    "command mode was lost because this computer was %.0f ms late with its answers "
+                    "(load, or no real-time priority)",
+                    1e3 * loss.seconds);
+      break;
+    case LossCause::ControllerStalled:
+      std::snprintf(text, sizeof text,
+                    "command mode was lost because the robot controller, which runs on this "
+                    "computer, was not run for %.0f ms (load)",
+                    1e3 * loss.seconds);
+      break;
+    case LossCause::ControllerSilent:
+      std::snprintf(text, sizeof text,
+                    "command mode was lost because the robot controller was silent for %.0f ms "
+                    "(cable, or its program ended)",
+                    1e3 * loss.seconds);
+      break;
+    case LossCause::PacketsLost:
+      return "command mode was lost after packets had been lost on the way (cable, switch)";
+    case LossCause::PowerLost:
+      return "the drives lost their power (enabling switch, emergency stop)";
+    case LossCause::BeganAnew:
+      return "the robot controller began anew";
+    case LossCause::LeftByController:
+      return "the robot controller left command mode by itself; its messages say why";
+  }
+  return text;
+}
+
+void CommandModeWatch::tick(double seconds, std::uint32_t lost, double measured_speed,
+                            double commanded_speed) {
+  const double kept = std::exp(-seconds / kFading);
+  late_ *= kept;
+  lost_ = kept * lost_ + lost;
+  const bool rests = commanded_speed < kRestSpeed && measured_speed < kRestSpeed;
+  rest_ = rests ? rest_ + seconds : 0.0;
+}
+
+CommandModeLoss CommandModeWatch::judge(const Facts& facts) const {
+  CommandModeLoss loss;
+  loss.at_rest = rest_ >= kRestTime;
+  loss.timestamp = facts.timestamp;
+  loss.position = facts.position;
+  loss.seconds = late_;
+  const bool late = late_ > kLateCycles * facts.cycle_time;
+  if (!facts.connected) {
+    loss.seconds = facts.silence;
+    // A thread that slept through most of the silence cannot tell it from its own.
+    loss.cause = late && late_ > 0.5 * facts.silence ? LossCause::ComputerLate
+                 : controller_here_                  ? LossCause::ControllerStalled
+                                                     : LossCause::ControllerSilent;
+  } else if (facts.fresh_session) {
+    loss.cause = LossCause::BeganAnew;
+  } else if (facts.command_mode) {
+    loss.cause = LossCause::PowerLost;
+  } else {
+    loss.cause = late                    ? LossCause::ComputerLate
+                 : lost_ >= kLostPackets ? LossCause::PacketsLost
+                                         : LossCause::LeftByController;
+  }
+  return loss;
+}
+
+bool QuietRestart::mayRestart(const View& view) const {
+  return view.stopped && !view.held && view.may_command && view.loss.byComputer() &&
+         view.loss.at_rest && !(view.loss == judged_) &&
+         view.timestamp > view.loss.timestamp &&  // the same controller, not one that began anew
+         (view.position - view.loss.position).cwiseAbs().maxCoeff() < kMoved &&
+         view.velocity.cwiseAbs().maxCoeff() < kRestSpeed;
+}
+
+bool QuietRestart::due(const View& view, std::int64_t now_ns) {
+  if (!mayRestart(view)) {
+    calm_since_ns_ = 0;
+    return false;
+  }
+  if (calm_since_ns_ == 0) calm_since_ns_ = now_ns;
+  if (1e-9 * static_cast<double>(now_ns - calm_since_ns_) < kCalmTime) return false;
+  if (restarts_ns_[0] != 0 && now_ns - restarts_ns_[0] < kOften_ns) return false;
+  judged_ = view.loss;
+  calm_since_ns_ = 0;
+  std::rotate(restarts_ns_.begin(), restarts_ns_.begin() + 1, restarts_ns_.end());
+  restarts_ns_.back() = now_ns;
+  return true;
+}
+
+}  // namespace lwr_fri_bridge
