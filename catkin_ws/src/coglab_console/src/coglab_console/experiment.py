@@ -52,7 +52,7 @@ def order_of(conditions: list[str], repetitions: int, order: str, number: int) -
 class Experiment:
     """At most one session at a time. A file that cannot be written is told, and the session goes on in memory."""
 
-    def __init__(self, folder: Path, now: Callable[[], float], warn: Callable[[str], None]) -> None:
+    def __init__(self, folder: Path, now: Callable[[], float], warn: Callable[[str], object]) -> None:
         self._folder, self._now, self._warn = folder, now, warn
         self._path: Path | None = None
         self.participant = ""

@@ -11,6 +11,7 @@ import json
 import shutil
 import subprocess
 from dataclasses import dataclass, field
+from typing import Any
 
 TIME_LIMIT = 5.0  # s, for dot
 MAX_STATES = 400
@@ -139,7 +140,7 @@ def _read(drawn: dict, paths: list[str]) -> dict:
     for item in drawn.get("objects", []):
         name = item["name"]
         path = paths[int(name.removeprefix("cluster").removeprefix("n"))]
-        shown = {"path": path, "label": _label(path.rsplit("/", 1)[-1])}
+        shown: dict[str, Any] = {"path": path, "label": _label(path.rsplit("/", 1)[-1])}
         if name.startswith("cluster"):
             x0, y0, x1, y1 = (float(word) for word in item["bb"].split(","))
             boxes.append({**shown, "box": _box(x0, height - y1, x1 - x0, y1 - y0)})
@@ -177,9 +178,11 @@ def _point(text: str, height: float) -> list[float]:
     return [round(x, 1), round(height - y, 1)]
 
 
-def _rows(containers: dict[str, Container], problem: str) -> dict:
+def _rows(containers: dict[str, Container], problem: str) -> dict[str, Any]:
     """A row of boxes per container, nested ones below; legible, but no edges."""
-    boxes, nodes, y, widest = [], [], 8.0, 100.0
+    boxes: list[dict[str, Any]] = []
+    nodes: list[dict[str, Any]] = []
+    y, widest = 8.0, 100.0
     for path in sorted(containers)[:60]:
         container, x, top = containers[path], 12.0, y
         boxes.append({"path": path, "label": _label(path), "box": [4.0, top, 0.0, 52.0]})

@@ -50,7 +50,7 @@ def aim(
             palm = as_transform(frames[entry["frame"]]) @ _pose(grasp["pose"])
             approach = grasp.get("approach", {})
             axis = np.asarray(approach.get("axis", [0.0, 0.0, 0.0]), dtype=float)
-            back = axis / max(np.linalg.norm(axis), 1e-9) * float(approach.get("distance", 0.0))
+            back = axis / max(float(np.linalg.norm(axis)), 1e-9) * float(approach.get("distance", 0.0))
             palm[:3, 3] -= as_transform(frames[entry["frame"]])[:3, :3] @ back
         goal = palm[:3, 3]
         if not np.all(np.isfinite(goal)) or np.linalg.norm(goal) > REACH:

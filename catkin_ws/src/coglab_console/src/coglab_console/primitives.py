@@ -118,6 +118,13 @@ def _triple(text: str) -> np.ndarray:
     return values
 
 
+def _place(element: ElementTree.Element, tag: str) -> str:
+    found = element.find(tag)
+    if found is None:
+        raise ValueError(f"<{tag}> is missing")
+    return found.attrib["position"]
+
+
 def _primitive(element: ElementTree.Element) -> Primitive:
     system, weight, shape = element.find("system"), element.find("goal_weight"), element.find("shape")
     basis = element.findall("basis")
@@ -135,8 +142,8 @@ def _primitive(element: ElementTree.Element) -> Primitive:
         float(system.attrib["damping"]),
         kind,
         shape.get("mapping", "none") if shape is not None else "none",
-        _triple(element.find("start").attrib["position"]),
-        _triple(element.find("goal").attrib["position"]),
+        _triple(_place(element, "start")),
+        _triple(_place(element, "goal")),
         np.array([float(one.attrib["centre"]) for one in basis]),
         np.array([float(one.attrib["width"]) for one in basis]),
         np.array([_triple(one.attrib["weight"]) for one in basis]),

@@ -14,7 +14,7 @@ ABSENCE = 5.0
 class Roles:
     """Sessions are known by their name; `say(text, level)` makes an event. Called from one thread."""
 
-    def __init__(self, say: Callable[[str, str], None], now: Callable[[], float] = time.monotonic) -> None:
+    def __init__(self, say: Callable[[str, str], object], now: Callable[[], float] = time.monotonic) -> None:
         self._say, self._now = say, now
         self.operator = ""
         self.claimant = ""

@@ -87,8 +87,6 @@ class ConsoleNode:
         more = str(rospy.get_param("~hosts", "")).split()
         self.access = Access(allowed_hosts(self.address, self.port, more))
         self.events, self.documents = EventLog(time.time), Documents()
-        self.server: ConsoleServer | None = None
-        self.events.listen(lambda _event: self.soon(self._wake))
         self.real = bool(rospy.get_param("~real", False))
         self.selected = ""
         model = self._model()
@@ -123,6 +121,7 @@ class ConsoleNode:
             secrets.token_hex(8),
             self.write_link,
         )
+        self.events.listen(lambda _event: self.soon(self._wake))
         self._put_static(model, missing, files)
 
     # --- from other threads -----------------------------------------------------------------------------------
@@ -135,8 +134,7 @@ class ConsoleNode:
             pass
 
     def _wake(self) -> None:
-        if self.server is not None:
-            self.server.wake()
+        self.server.wake()
 
     def say(self, source: str, text: str, level: str = "info") -> None:
         """An event, from any thread."""

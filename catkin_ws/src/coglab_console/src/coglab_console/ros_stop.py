@@ -10,6 +10,7 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable
+from typing import Any
 
 import rospy
 from coglab_msgs.srv import LwrCommand
@@ -65,7 +66,7 @@ class StopPath:
                 threading.Thread(target=self._ask, args=(name, call, began), name=f"stop_{name}", daemon=True).start()
         self._say(f"STOP by {who}", "fault")
 
-    def _ask(self, name: str, call: Callable[[], object], began: float) -> None:
+    def _ask(self, name: str, call: Callable[[], Any], began: float) -> None:
         watch = threading.Timer(
             ANSWER_LIMIT,
             self._say,

@@ -74,7 +74,7 @@ class RosView:
         self.entry: Callable[[], dict] = dict
         self.config: Callable[[], dict] = dict
         self.objects_read: Callable[[str], None] = lambda problems: None
-        self._subscribers = {}
+        self._subscribers: dict[str, rospy.Subscriber] = {}
         self._subscribe()
 
     def _subscribe(self) -> None:

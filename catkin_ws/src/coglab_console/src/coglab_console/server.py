@@ -9,8 +9,9 @@ from __future__ import annotations
 import asyncio
 import json
 from collections.abc import Awaitable, Callable
+from typing import Any
 
-from aiohttp import WSMsgType, web
+from aiohttp import WSMessage, WSMsgType, web
 
 from .access import Access, Denied, Session
 from .desk import Answer, Desk
@@ -38,7 +39,7 @@ HEADERS = {
 }
 
 
-def parsed(text: str) -> object:
+def parsed(text: str) -> Any:
     """JSON of a browser; ValueError for what is none, also for NaN and Infinity, which Python would take."""
 
     def refuse(word: str) -> object:
@@ -59,7 +60,7 @@ class ConsoleServer:
         files: dict[str, PageFile],
         cookie: str,
         epoch: str,
-        spent: Callable[[], None] = lambda: None,
+        spent: Callable[[], object] = lambda: None,
     ) -> None:
         self.access, self.desk, self.events, self.documents = access, desk, events, documents
         self._files, self._cookie, self._epoch, self._spent = files, cookie, epoch, spent
@@ -238,7 +239,7 @@ class ConsoleServer:
                     return
                 await asyncio.wait_for(socket.send_str(to_json({"t": "refused", "message": told})), SEND_LIMIT)
 
-    def _frame(self, message: object, session: Session, client: Client, socket: web.WebSocketResponse) -> str:
+    def _frame(self, message: WSMessage, session: Session, client: Client, socket: web.WebSocketResponse) -> str:
         """One frame of the browser; what is wrong with it, or an empty string."""
         try:
             if message.type is not WSMsgType.TEXT:

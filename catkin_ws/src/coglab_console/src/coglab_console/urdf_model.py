@@ -96,6 +96,14 @@ class Joint:
     axis: np.ndarray
 
 
+def _child(element: ElementTree.Element, tag: str) -> dict[str, str]:
+    """Attributes of the child of that name; KeyError if there is none."""
+    found = element.find(tag)
+    if found is None:
+        raise KeyError(f"<{element.tag}> has no <{tag}>")
+    return found.attrib
+
+
 class RobotModel:
     """Links, shapes and joints of one URDF. ModelError if it is none."""
 
@@ -119,8 +127,8 @@ class RobotModel:
     def _joint(element: ElementTree.Element) -> Joint:
         axis_tag = element.find("axis")
         axis = np.array(_numbers(axis_tag.get("xyz") if axis_tag is not None else None, "1 0 0"))
-        return Joint(element.attrib["name"], element.attrib["type"], element.find("parent").attrib["link"],
-                     element.find("child").attrib["link"], _origin(element.find("origin")),
+        return Joint(element.attrib["name"], element.attrib["type"], _child(element, "parent")["link"],
+                     _child(element, "child")["link"], _origin(element.find("origin")),
                      axis / np.linalg.norm(axis))  # fmt: skip
 
     @staticmethod
@@ -155,7 +163,7 @@ class RobotModel:
     @staticmethod
     def _motion(joint: Joint, q: float) -> np.ndarray:
         if joint.kind == "prismatic":
-            return transform(joint.axis * q, np.eye(3))
+            return transform((joint.axis * q).tolist(), np.eye(3))
         if joint.kind in ("revolute", "continuous"):
             half = q / 2
             return transform((0.0, 0.0, 0.0), rotation([*(joint.axis * math.sin(half)), math.cos(half)]))
