@@ -1,4 +1,5 @@
 """Python package of coglab_py, installed by catkin."""
+
 from catkin_pkg.python_setup import generate_distutils_setup
 from setuptools import setup
 

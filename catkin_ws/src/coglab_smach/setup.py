@@ -1,9 +1,28 @@
 """Python package of coglab_smach, installed by catkin."""
+
 from catkin_pkg.python_setup import generate_distutils_setup
 from setuptools import setup
 
-setup(**generate_distutils_setup(
-    packages=["coglab_smach", *(f"coglab_smach.{door}" for door in (
-        "clocks", "kinematics", "ports", "contact", "context", "states", "machines", "simulated", "ros"))],
-    package_dir={"": "src"},
-    package_data={"coglab_smach.context": ["machines_schema.json"]}))
+setup(
+    **generate_distutils_setup(
+        packages=[
+            "coglab_smach",
+            *(
+                f"coglab_smach.{door}"
+                for door in (
+                    "clocks",
+                    "kinematics",
+                    "ports",
+                    "contact",
+                    "context",
+                    "states",
+                    "machines",
+                    "simulated",
+                    "ros",
+                )
+            ),
+        ],
+        package_dir={"": "src"},
+        package_data={"coglab_smach.context": ["machines_schema.json"]},
+    )
+)

@@ -17,7 +17,9 @@ CODE = {".py", ".cpp", ".hpp", ".launch", ".test", ".yaml", ".msg", ".srv", ".ac
 
 def test_the_drawings_are_those_of_their_sources():
     assert shutil.which("dot"), "Graphviz is missing: ./coglab install test"
-    done = subprocess.run([str(TOP / "docs" / "drawings" / "draw"), "--check"], capture_output=True, text=True, timeout=120)
+    done = subprocess.run(
+        [str(TOP / "docs" / "drawings" / "draw"), "--check"], capture_output=True, text=True, timeout=120
+    )
     assert done.returncode == 0, f"{done.stdout}{done.stderr}run docs/drawings/draw and look at the pictures"
 
 
@@ -28,7 +30,9 @@ def test_every_picture_of_the_page_is_drawn_from_source():
 
 def test_the_table_of_packages_is_complete():
     table = PAGE.split("## Packages")[1].split("## ")[0]
-    packages = {p.parent.relative_to(SOURCES).parts[0] for p in SOURCES.glob("**/package.xml") if "template" not in p.parts}
+    packages = {
+        p.parent.relative_to(SOURCES).parts[0] for p in SOURCES.glob("**/package.xml") if "template" not in p.parts
+    }
     assert packages <= set(re.findall(r"`(\w+)`", table)), packages - set(re.findall(r"`(\w+)`", table))
 
 

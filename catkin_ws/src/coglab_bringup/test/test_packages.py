@@ -1,4 +1,5 @@
 """debian-packages.txt holds nothing that nothing uses: each package has a file that this repository names."""
+
 import ast
 import re
 import shutil

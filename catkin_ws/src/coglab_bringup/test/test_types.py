@@ -1,4 +1,5 @@
 """mypy on the Python that ships: strict on modules that import no ROS, plain on the others and on the nodes."""
+
 import ast
 import shutil
 import subprocess

@@ -4,6 +4,7 @@
 Prints a JSON list of rows. Allocations, locks and system calls are counted by the package's test of the cycle, run
 here.
 """
+
 from __future__ import annotations
 
 import json
@@ -27,15 +28,24 @@ def find(name: str) -> str:
     found = shutil.which(name)
     if found:
         return found
-    raise FileNotFoundError(f"{name}: not in any workspace of CMAKE_PREFIX_PATH; build "
-                            "coglab_controllers (tests too) and source its setup.bash")
+    raise FileNotFoundError(
+        f"{name}: not in any workspace of CMAKE_PREFIX_PATH; build "
+        "coglab_controllers (tests too) and source its setup.bash"
+    )
 
 
-def row(figure: str, value: float, unit: str, goal: str, peer: str | None,
-        peer_value: float | None, ok: bool) -> dict:
+def row(figure: str, value: float, unit: str, goal: str, peer: str | None, peer_value: float | None, ok: bool) -> dict:
     """One row of the result."""
-    return {"bench": "cycle", "figure": figure, "value": value, "unit": unit, "goal": goal,
-            "peer": peer, "peer_value": peer_value, "ok": ok}
+    return {
+        "bench": "cycle",
+        "figure": figure,
+        "value": value,
+        "unit": unit,
+        "goal": goal,
+        "peer": peer,
+        "peer_value": peer_value,
+        "ok": ok,
+    }
 
 
 COUNTED = {"allocations": "allocations", "locks": "locks", "system_calls": "system calls"}
@@ -50,8 +60,12 @@ def forbidden_calls() -> dict[str, int]:
     counts: dict[str, int] = {}
     with TemporaryDirectory() as folder:
         result = Path(folder) / "cycle.xml"
-        subprocess.run([program, "--gtest_filter=Cycle.Neither*", f"--gtest_output=xml:{result}"],
-                       stdout=sys.stderr, timeout=300, check=False)
+        subprocess.run(
+            [program, "--gtest_filter=Cycle.Neither*", f"--gtest_output=xml:{result}"],
+            stdout=sys.stderr,
+            timeout=300,
+            check=False,
+        )
         cases = ElementTree.parse(result).iter("testcase")
         for case in cases:
             for prop in case.iter("property"):
@@ -64,19 +78,31 @@ def main() -> int:
     """Runs the timings and prints the rows."""
     output = subprocess.run(
         [find("coglab_controllers_cycle_bench"), str(HERE), str(HERE.parent / "lwr_description")],
-        stdout=subprocess.PIPE, timeout=300, check=True, text=True).stdout
+        stdout=subprocess.PIPE,
+        timeout=300,
+        check=True,
+        text=True,
+    ).stdout
     times = json.loads(output)
     ours, ratio = times["ours_us"], min(times["ratio_pinv"], times["ratio_wdls"])
     rows = [
-        row("whole cycle, median", ours, "us", "<= 5", "the same cycle on KDL pinv",
-            times["kdl_pinv_us"], ours <= 5.0),
-        row("whole cycle, median", ours, "us", "<= 5", "the same cycle on KDL wdls",
-            times["kdl_wdls_us"], ours <= 5.0),
-        row("times faster than on KDL (the faster solver), median of block ratios", ratio, "x",
-            ">= 2", "KDL", 1.0, ratio >= 2.0)]
-    rows += [row(f"{COUNTED[name]} in 1e5 cycles, services called meanwhile", count, "1", "0", None,
-                 None, count == 0)
-             for name, count in forbidden_calls().items() if count >= 0]
+        row("whole cycle, median", ours, "us", "<= 5", "the same cycle on KDL pinv", times["kdl_pinv_us"], ours <= 5.0),
+        row("whole cycle, median", ours, "us", "<= 5", "the same cycle on KDL wdls", times["kdl_wdls_us"], ours <= 5.0),
+        row(
+            "times faster than on KDL (the faster solver), median of block ratios",
+            ratio,
+            "x",
+            ">= 2",
+            "KDL",
+            1.0,
+            ratio >= 2.0,
+        ),
+    ]
+    rows += [
+        row(f"{COUNTED[name]} in 1e5 cycles, services called meanwhile", count, "1", "0", None, None, count == 0)
+        for name, count in forbidden_calls().items()
+        if count >= 0
+    ]
     print(json.dumps(rows, indent=1))
     return 0
 

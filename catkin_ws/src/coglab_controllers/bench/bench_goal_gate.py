@@ -8,6 +8,7 @@ Followed: in any cycle after the disturbance the goal that the motion follows is
 correct frame. Ignored: a correct frame, newest at a poll, that was not the goal, or that the motion was held during.
 Beside it: the same runs with frames told apart by the time they map to on the clock of the samples.
 """
+
 from __future__ import annotations
 
 import json
@@ -24,18 +25,36 @@ def main() -> int:
     """Runs the campaign and prints the rows."""
     output = subprocess.run(
         [find("coglab_controllers_goal_gate_bench"), str(HERE), str(HERE.parent / "lwr_description"), str(RUNS)],
-        stdout=subprocess.PIPE, timeout=1500, check=True, text=True).stdout
+        stdout=subprocess.PIPE,
+        timeout=1500,
+        check=True,
+        text=True,
+    ).stdout
     result = json.loads(output)
     rows = [
-        row("goal_gate", f"one outlier of 0.5 m at {one['rate']:.0f} Hz, then "
-            f"{'silence' if one['silence'] else 'correct frames'}: followed, of {RUNS}", one["followed"], "1", "<= 0",
-            "frames told apart by mapped times", one["mapped"])
-        for one in result["outlier"]]
+        row(
+            "goal_gate",
+            f"one outlier of 0.5 m at {one['rate']:.0f} Hz, then "
+            f"{'silence' if one['silence'] else 'correct frames'}: followed, of {RUNS}",
+            one["followed"],
+            "1",
+            "<= 0",
+            "frames told apart by mapped times",
+            one["mapped"],
+        )
+        for one in result["outlier"]
+    ]
     future = result["future"]
     rows += [
-        row("goal_gate", f"5 frames 0.06 to 4e9 s ahead of the clock among correct ones at 30 Hz: followed, of {RUNS}",
-            future["followed"], "1", "<= 0"),
-        row("goal_gate", f"the same: correct frames ignored, of {future['correct']}", future["ignored"], "1", "<= 0")]
+        row(
+            "goal_gate",
+            f"5 frames 0.06 to 4e9 s ahead of the clock among correct ones at 30 Hz: followed, of {RUNS}",
+            future["followed"],
+            "1",
+            "<= 0",
+        ),
+        row("goal_gate", f"the same: correct frames ignored, of {future['correct']}", future["ignored"], "1", "<= 0"),
+    ]
     json.dump(rows, sys.stdout, indent=1)
     print()
     return 0

@@ -23,8 +23,9 @@ FIGURE = "Cancel of a motion: standing after <= braking time + 2 cycles, median"
 
 def braking_time(report: dict, limits: lwr_fri_bridge.JointLimits) -> float:
     """Time-optimal braking of the set-point as it is, slowest joint, s."""
-    state = zip(report["commanded_velocity"], report["commanded_acceleration"], limits.acceleration, limits.jerk,
-                strict=True)
+    state = zip(
+        report["commanded_velocity"], report["commanded_acceleration"], limits.acceleration, limits.jerk, strict=True
+    )
     return max(lwr_fri_bridge.time_to_velocity(v, a, 0.0, most, jerk) for v, a, most, jerk in state)
 
 
@@ -42,8 +43,9 @@ def begin(robot: object, controller: str, speed: float, goal: np.ndarray, random
         must(robot.execute_dmp("reach_human", dmp_ratio=1.0 / speed, goal_frame="goal"))
 
 
-def cancelled(robot: object, controller: str, speed: float, seed: int,
-              limits: lwr_fri_bridge.JointLimits) -> tuple[float, float]:
+def cancelled(
+    robot: object, controller: str, speed: float, seed: int, limits: lwr_fri_bridge.JointLimits
+) -> tuple[float, float]:
     """Cycles beyond the braking time until the answer came, and the fastest joint (rad/s) at the cancel."""
     random = np.random.default_rng([seed, int(100 * speed), controller == "ptp"])
     goal = GOAL + random.uniform(-0.15, 0.15, 3)
@@ -80,9 +82,11 @@ def main() -> int:
     moving = [cycles for cycles, fastest in runs if fastest > 0.01]
     if len(moving) < len(runs) // 2:
         raise RuntimeError(f"only {len(moving)} of {len(runs)} motions were under way when they were cancelled")
-    rows = [row("recovery", FIGURE, float(np.median(moving)), "cycles beyond braking", "<= 2"),
-            row("recovery", "Cancel of a motion: the slowest of these", max(moving), "cycles beyond braking"),
-            row("recovery", "Cancel of a motion: motions under way, both controllers", len(moving), "1")]
+    rows = [
+        row("recovery", FIGURE, float(np.median(moving)), "cycles beyond braking", "<= 2"),
+        row("recovery", "Cancel of a motion: the slowest of these", max(moving), "cycles beyond braking"),
+        row("recovery", "Cancel of a motion: motions under way, both controllers", len(moving), "1"),
+    ]
     print(json.dumps(rows, indent=1))
     return 0
 

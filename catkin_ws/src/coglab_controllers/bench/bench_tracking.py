@@ -261,9 +261,7 @@ def lockstep_rows(limits: cc.JointLimits, reaches: list[Reach]) -> list[Row]:
     """The reaches without a joint at its stop through the whole robot in virtual time; nothing if it is not built."""
     if lockstep._virtual is None:
         return []
-    outcomes = [
-        lockstep.reach(r.posture, r.goal, r.target, limits.velocity) for r in reaches[:LOCKSTEP_REACHES]
-    ]
+    outcomes = [lockstep.reach(r.posture, r.goal, r.target, limits.velocity) for r in reaches[:LOCKSTEP_REACHES]]
     done = [o for o in outcomes if not isinstance(o, str)]
     for refused in (o for o in outcomes if isinstance(o, str)):
         print(refused, file=sys.stderr)

@@ -102,10 +102,10 @@ class Watched : public GoalSource {
 
 /// What one run does to the goal.
 struct Disturbance {
-  double rate = 30.0;     ///< frames per second
-  bool outlier = false;   ///< one frame 0.5 m off
-  bool silence = false;   ///< and none after it
-  double ahead = 0.0;     ///< s: frames 0.5 m off, stamped so far from now; 0: none
+  double rate = 30.0;    ///< frames per second
+  bool outlier = false;  ///< one frame 0.5 m off
+  bool silence = false;  ///< and none after it
+  double ahead = 0.0;    ///< s: frames 0.5 m off, stamped so far from now; 0: none
   bool mapped = false;
 };
 
@@ -294,8 +294,7 @@ Outcome campaign(const std::string& package, const std::string& description, int
   followed = 0;
   for (int i = 0; i < runs; ++i) {
     if (!ahead.empty()) what.ahead = ahead[static_cast<std::size_t>(i) % ahead.size()];
-    const Outcome one =
-        Run(package, description, static_cast<unsigned>(1000 + i), what).run();
+    const Outcome one = Run(package, description, static_cast<unsigned>(1000 + i), what).run();
     followed += one.followed ? 1 : 0;
     all.correct += one.correct;
     all.ignored += one.ignored;

@@ -1,5 +1,6 @@
 #!/usr/bin/python3
 """Over ROS: a motion of one's own is loaded by its type, started, watched and cancelled; unload, and no controller."""
+
 from __future__ import annotations
 
 import os
@@ -53,7 +54,9 @@ class OwnMotion(unittest.TestCase):
         self.assertEqual(first.status, StartMotionRequest.STARTED)
         second = self.start(queue=True, duration=2.0)
         self.assertEqual(second.status, StartMotionRequest.QUEUED)
-        wait_until(lambda: max(abs(a - b) for a, b in zip(robot.arm(), home, strict=True)) > 0.05, 10.0, "the arm moves")
+        wait_until(
+            lambda: max(abs(a - b) for a, b in zip(robot.arm(), home, strict=True)) > 0.05, 10.0, "the arm moves"
+        )
         wait_until(lambda: bool(self.ended(second.motion_id)), 15.0, "the end of both")
         self.assertEqual([self.ended(a.motion_id)[0].state for a in (first, second)], ["reached", "reached"])
         self.assertTrue(any(f.state == "running" and f.queued == 1 and f.time > 0.5 for f in self.feedback))
@@ -81,7 +84,9 @@ class OwnMotion(unittest.TestCase):
         rospy.sleep(1.0)
         answer = robot.manager("switch_controller", "")
         self.assertTrue(answer.success, answer.message)
-        wait_until(lambda: robot.status.active_controller == "" and robot.status.standing, 5.0, "no controller, standing")
+        wait_until(
+            lambda: robot.status.active_controller == "" and robot.status.standing, 5.0, "no controller, standing"
+        )
         self.assertEqual(self.start().reason_code, ReasonCode.NOT_ACTIVE)
         for name in ("circle", "dmp"):
             self.assertTrue(any(f"/{name}/" in s for s in services()))

@@ -1,4 +1,5 @@
 """What the rostests of this package share: the robot's services, a tf2 goal, and bounded waits."""
+
 from __future__ import annotations
 
 import os
@@ -35,9 +36,12 @@ from sensor_msgs.msg import JointState
 HOME = [-1.4349, -0.6086, 1.4986, 1.7048, 0.1857, 0.2152, 0.782]
 JOINTS = ["lwr_a1", "lwr_a2", "lwr_e1", "lwr_a3", "lwr_a4", "lwr_a5", "lwr_a6"]
 SERVICES = {
-    "load_controller": LoadController, "list_controllers": ListControllers,
-    "switch_controller": SwitchController, "get_active_controller": GetActiveController,
-    "speed_scale": SetSpeedScale}
+    "load_controller": LoadController,
+    "list_controllers": ListControllers,
+    "switch_controller": SwitchController,
+    "get_active_controller": GetActiveController,
+    "speed_scale": SetSpeedScale,
+}
 DMP_SERVICES = {"load_dmps": LoadDmps, "execute_dmp": ExecuteDmp, "switch_dmp": SwitchDmp}
 
 
@@ -98,13 +102,12 @@ class Robot:
         self.unfinished: dict[int, UnfinishedPtp] = {}
         rospy.Subscriber("lwr/joint_states", JointState, self._on_joints)
         rospy.Subscriber("lwr/state", LwrState, lambda m: setattr(self, "state", m))
-        rospy.Subscriber("controller_manager/status", ControllerStatus,
-                         lambda m: setattr(self, "status", m))
+        rospy.Subscriber("controller_manager/status", ControllerStatus, lambda m: setattr(self, "status", m))
         rospy.Subscriber("controller_manager/dmp/feedback", DmpFeedback, self._on_feedback)
-        rospy.Subscriber("controller_manager/ptp/finished_ptp", FinishedPtp,
-                         lambda m: self.finished.append(m.ptp_id))
-        rospy.Subscriber("controller_manager/ptp/unfinished_ptp", UnfinishedPtp,
-                         lambda m: self.unfinished.update({m.ptp_id: m}))
+        rospy.Subscriber("controller_manager/ptp/finished_ptp", FinishedPtp, lambda m: self.finished.append(m.ptp_id))
+        rospy.Subscriber(
+            "controller_manager/ptp/unfinished_ptp", UnfinishedPtp, lambda m: self.unfinished.update({m.ptp_id: m})
+        )
         self._goal: tuple[float, float, float] | None = None
         self._quaternion = (0.0, 0.0, 0.0, 1.0)
         self._broadcaster = tf2_ros.TransformBroadcaster()
@@ -158,8 +161,11 @@ class Robot:
 
     def start(self) -> None:
         """Brings the arm into command mode."""
-        wait_until(lambda: self.state is not None and self.state.supervisor != "disconnected", 20.0,
-                   "datagrams of the robot controller")
+        wait_until(
+            lambda: self.state is not None and self.state.supervisor != "disconnected",
+            20.0,
+            "datagrams of the robot controller",
+        )
         if self.state.motion_allowed:
             return
         answers: list[str] = []

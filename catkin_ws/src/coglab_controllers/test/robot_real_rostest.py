@@ -1,5 +1,6 @@
 #!/usr/bin/python3
 """robot_real.launch against the simulated cell: neither hand nor elbow is faster than 0.25 m/s."""
+
 from __future__ import annotations
 
 import os

@@ -1,5 +1,6 @@
 #!/usr/bin/python3
 """Who may move the arm of /robot over target_joint_states: others while no controller is active, nobody else after."""
+
 from __future__ import annotations
 
 import os

@@ -35,7 +35,8 @@ class Timer : public ctrl_more::FeedbackController {
   std::atomic<std::int64_t>& passed_ns_;
 };
 
-/// The robot side of the thread in lockstep with it: one measurement, then the cycle that it causes.
+/// The robot side of the thread in lockstep with it: one measurement, then the cycle that it
+/// causes.
 class Robot {
  public:
   explicit Robot(coglab_rt::ArmMailboxes& mailboxes) : mailboxes_(mailboxes) {
@@ -68,10 +69,9 @@ TEST(ControlThread, TimeGoesOnWhileMeasurementsAreLost) {
   const coglab_rt::JointLimits limits =
       coglab_rt::loadJointLimits(std::string(DESCRIPTION_DIR) + "/config/joint_limits.yaml");
   ctrl_more::Logger logger;
-  ManagerSettings settings =
-      readManagerSettings(YAML::Load("{overrun_time: 0.0}"),
-                          readText(std::string(DESCRIPTION_DIR) + "/urdf/lwr_ih2.urdf"), limits,
-                          false);
+  ManagerSettings settings = readManagerSettings(
+      YAML::Load("{overrun_time: 0.0}"),
+      readText(std::string(DESCRIPTION_DIR) + "/urdf/lwr_ih2.urdf"), limits, false);
   settings.logger = &logger;
   ControllerManager manager(std::move(settings));
   std::atomic<std::int64_t> passed_ns{0};

@@ -66,7 +66,9 @@ def test_a_dmp_request_has_one_shape_from_the_brain_to_the_plugin() -> None:
     assert struct("plugins/dmp_request.hpp", "DmpRequest") == execute
     own_of_execute = {"initial_state", "initial_position", "initial_velocity", "goal_frame"}
     assert [f for f in execute if f not in own_of_execute] == switch
-    brain = dataclass_fields(SOURCES / "coglab_smach" / "src" / "coglab_smach" / "ports" / "interfaces.py", "DmpRequest")
+    brain = dataclass_fields(
+        SOURCES / "coglab_smach" / "src" / "coglab_smach" / "ports" / "interfaces.py", "DmpRequest"
+    )
     initial = {"initial_state", "initial_position", "initial_velocity"}  # the brain starts from the current state
     assert sorted(brain) == sorted(set(execute) - initial)
 
@@ -86,9 +88,13 @@ def test_the_shortest_example_is_short() -> None:
 
 def files_and_includes(folder: str) -> dict[Path, list[str]]:
     """What each C++ file below a folder includes, by its path in the package."""
-    found = {path.relative_to(PACKAGE): re.findall(r'^\s*#\s*include\s*[<"]([^>"]+)[>"]',
-                                                   path.read_text(encoding="utf-8"), re.MULTILINE)
-             for path in (PACKAGE / folder).rglob("*") if path.suffix in (".cpp", ".hpp")}
+    found = {
+        path.relative_to(PACKAGE): re.findall(
+            r'^\s*#\s*include\s*[<"]([^>"]+)[>"]', path.read_text(encoding="utf-8"), re.MULTILINE
+        )
+        for path in (PACKAGE / folder).rglob("*")
+        if path.suffix in (".cpp", ".hpp")
+    }
     assert found, folder
     return found
 
@@ -98,14 +104,22 @@ def in_room(room: str) -> dict[Path, list[str]]:
 
 
 def test_robot_node_alone_knows_the_back_end_by_fri() -> None:
-    knows = {path for folder in ("include", "src") for path, names in files_and_includes(folder).items()
-             if any(name.startswith("lwr_fri_bridge/") for name in names)}
+    knows = {
+        path
+        for folder in ("include", "src")
+        for path, names in files_and_includes(folder).items()
+        if any(name.startswith("lwr_fri_bridge/") for name in names)
+    }
     assert knows == {ROBOT_NODE}
 
 
 def test_robot_node_alone_knows_the_ideal_arm() -> None:
-    knows = {path for folder in ("include", "src") for path, names in files_and_includes(folder).items()
-             if any(name.startswith("coglab_controllers/ideal/") for name in names) and "ideal" not in path.parts}
+    knows = {
+        path
+        for folder in ("include", "src")
+        for path, names in files_and_includes(folder).items()
+        if any(name.startswith("coglab_controllers/ideal/") for name in names) and "ideal" not in path.parts
+    }
     assert knows == {ROBOT_NODE}
 
 

@@ -29,6 +29,10 @@ def test_example_runs_and_plots(example: Path, tmp_path: Path) -> None:
 @pytest.mark.skipif(shutil.which("mypy") is None, reason="mypy is not installed")
 def test_stubs_satisfy_mypy() -> None:
     stub = PACKAGE / "src" / "coglab_controllers" / "_core.pyi"
-    result = subprocess.run(["mypy", "--strict", "--no-error-summary", "--follow-imports=skip", str(stub)],
-                            capture_output=True, text=True, timeout=300)
+    result = subprocess.run(
+        ["mypy", "--strict", "--no-error-summary", "--follow-imports=skip", str(stub)],
+        capture_output=True,
+        text=True,
+        timeout=300,
+    )
     assert result.returncode == 0, result.stdout

@@ -1,4 +1,5 @@
-// Which sights of a goal count: one frame once, the first ones, and those after a step of the clock.
+// Which sights of a goal count: one frame once, the first ones, and those after a step of the
+// clock.
 #include <cmath>
 
 #include "coglab_controllers/goal/goal_relay.hpp"

@@ -71,7 +71,7 @@ class Arm {
   std::int64_t now_ns = 1'000'000'000;
 };
 
-TEST(IdealArm, standsUntilStartAndFollowsThen) {
+TEST(IdealArm, StandsUntilStartAndFollowsThen) {
   Arm arm;
   EXPECT_EQ(arm.sample.sequence, 1U);
   EXPECT_EQ(arm.sample.block, MotionBlock::Monitor);
@@ -87,7 +87,7 @@ TEST(IdealArm, standsUntilStartAndFollowsThen) {
   EXPECT_EQ(arm.sample.commanded_position, arm.sample.position);
 }
 
-TEST(IdealArm, whatWasComputedBeforeThePermissionDoesNotCount) {
+TEST(IdealArm, WhatWasComputedBeforeThePermissionDoesNotCount) {
   Arm arm;
   arm.send(Vector7::Constant(0.5));
   arm.ask("start");
@@ -96,7 +96,7 @@ TEST(IdealArm, whatWasComputedBeforeThePermissionDoesNotCount) {
   EXPECT_EQ(arm.sample.position, before);
 }
 
-TEST(IdealArm, holdBrakesLatchesAndNeedsReset) {
+TEST(IdealArm, HoldBrakesLatchesAndNeedsReset) {
   Arm arm;
   arm.ask("start");
   arm.drive(100, Vector7::Constant(0.3));
@@ -124,7 +124,7 @@ TEST(IdealArm, holdBrakesLatchesAndNeedsReset) {
   EXPECT_GT(arm.sample.position[0], held[0]);
 }
 
-TEST(IdealArm, stopBrakesAndNeedsStart) {
+TEST(IdealArm, StopBrakesAndNeedsStart) {
   Arm arm;
   arm.ask("start");
   arm.drive(100, Vector7::Constant(0.3));
@@ -138,7 +138,7 @@ TEST(IdealArm, stopBrakesAndNeedsStart) {
   EXPECT_EQ(view.state, IdealArmState::Monitor);
 }
 
-TEST(IdealArm, brakesWhenCommandsEndAndIgnoresWhatIsNotFinite) {
+TEST(IdealArm, BrakesWhenCommandsEndAndIgnoresWhatIsNotFinite) {
   Arm arm;
   arm.ask("start");
   arm.drive(100, Vector7::Constant(0.3));
@@ -154,7 +154,7 @@ TEST(IdealArm, brakesWhenCommandsEndAndIgnoresWhatIsNotFinite) {
   EXPECT_TRUE(arm.sample.velocity.isApprox(Vector7::Constant(0.3)));
 }
 
-TEST(IdealArm, scalesTheWholeVector) {
+TEST(IdealArm, ScalesTheWholeVector) {
   Arm arm;
   arm.ask("start");
   Vector7 wanted;
@@ -165,7 +165,7 @@ TEST(IdealArm, scalesTheWholeVector) {
 }
 
 /// 300 000 ticks of random commands, most of them out of bounds, with holds, resets, stops, starts.
-TEST(IdealArm, limitsHoldByDifferentiation) {
+TEST(IdealArm, LimitsHoldByDifferentiation) {
   std::mt19937 random(23);
   std::uniform_real_distribution<double> part(-1.0, 1.0);
   const char* const events[] = {"hold", "reset", "stop", "start", "start", "start"};
@@ -204,7 +204,7 @@ TEST(IdealArm, limitsHoldByDifferentiation) {
   }
 }
 
-TEST(IdealArm, aTickAllocatesNothing) {
+TEST(IdealArm, ATickAllocatesNothing) {
   Arm arm;
   counting = true;
   delete new int(3);
@@ -221,7 +221,7 @@ TEST(IdealArm, aTickAllocatesNothing) {
   EXPECT_EQ(allocations, 0U);
 }
 
-TEST(IdealArm, refusesWhatItCannotDoAndParametersOutOfRange) {
+TEST(IdealArm, RefusesWhatItCannotDoAndParametersOutOfRange) {
   Arm arm;
   EXPECT_EQ(arm.arm.request("jump").code, coglab_rt::ReasonCode::InvalidArgument);
   EXPECT_EQ(arm.arm.request("joint_impedance stiffness 500").code,

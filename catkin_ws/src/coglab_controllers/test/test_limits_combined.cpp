@@ -103,18 +103,20 @@ TEST(LimitsCombined, WhatIsAcceptedNearTheEndsOfTheRangesIsReachedOnAStraightWay
           const double upper = setup.limits.upper_position[joint] - margin;
           const double room = uniform(random, 0.0, 1.0) < 0.3 ? 0.0 : uniform(random, 0.0, 0.2);
           const bool end = uniform(random, 0.0, 1.0) < 0.5;
-          to[joint] = !end ? uniform(random, lower, upper)
-                           : uniform(random, 0.0, 1.0) < 0.5 ? lower + room : upper - room;
+          to[joint] = !end                              ? uniform(random, lower, upper)
+                      : uniform(random, 0.0, 1.0) < 0.5 ? lower + room
+                                                        : upper - room;
         }
       } while (!staysInside(setup, from, to));
-      const JointVector distance = (setup.limits.upper_position - to)
-                                       .cwiseMin(to - setup.limits.lower_position);
+      const JointVector distance =
+          (setup.limits.upper_position - to).cwiseMin(to - setup.limits.lower_position);
       near += distance.minCoeff() < 0.03 ? 1 : 0;
       const std::vector<double> target(to.data(), to.data() + 7);
       const JointVector speed = uniform(random, 0.2, 1.0) * setup.limits.velocity;
       const JointVector acceleration = uniform(random, 0.1, 0.5) * setup.limits.acceleration;
-      const MotionAnswer answer = robot.ptp().add(
-          {target, {speed.data(), speed.data() + 7}, {acceleration.data(), acceleration.data() + 7}});
+      const MotionAnswer answer = robot.ptp().add({target,
+                                                   {speed.data(), speed.data() + 7},
+                                                   {acceleration.data(), acceleration.data() + 7}});
       ASSERT_EQ(answer.status, MotionAnswer::kStarted) << answer.message;
       const JointVector way = (to - from).normalized();
       for (int i = 0; i < 6000; ++i) {
@@ -177,8 +179,8 @@ TEST(LimitsCombined, ReachesUnderPushesNearTheEndsOfTheRangesComeToNoFault) {
     robot.switchTo("ptp");
     std::vector<double> home = {-1.4349, -0.6086, 1.4986, 1.7048, 0.1857, 0.2152, 0.782};
     home[4] = uniform(random, -2.9, 2.9);  // a wrist near the end of its range
-    home[6] = uniform(random, 0.0, 1.0) < 0.5 ? uniform(random, 2.6, 2.95)
-                                              : uniform(random, -2.95, -2.6);
+    home[6] =
+        uniform(random, 0.0, 1.0) < 0.5 ? uniform(random, 2.6, 2.95) : uniform(random, -2.95, -2.6);
     ASSERT_EQ(robot.ptp().add({home, {}, {}}).status, MotionAnswer::kStarted);
     for (int i = 0; i < 4000 && (i < 3 || robot.state() == MotionState::Running); ++i) robot.tick();
     robot.active_dmp = true;

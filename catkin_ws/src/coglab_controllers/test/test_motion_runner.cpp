@@ -28,7 +28,8 @@ class Turn : public Motion<> {
     time_ = cycle.next;
     if (request_[fault_] == 2.0) return;  // asks for nothing: the arm rests
     reference.joints(at(cycle.time), at(cycle.next));
-    if (request_[fault_] == 3.0) reference.joint_velocity[2] = std::numeric_limits<double>::quiet_NaN();
+    if (request_[fault_] == 3.0)
+      reference.joint_velocity[2] = std::numeric_limits<double>::quiet_NaN();
   }
   MotionState state() const override {
     if (request_[fault_] == 4.0 && time_ > 0.5) return MotionState::Aborted;

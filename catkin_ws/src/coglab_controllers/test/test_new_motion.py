@@ -56,7 +56,10 @@ def test_a_new_motion_is_built_tested_and_moves_the_simulated_arm(tmp_path: Path
     moved = in_workspace(tmp_path, "rostest", "side_sway", "side_sway.test")
     assert "RESULT: SUCCESS" in moved, moved[-6000:]
     end = time.monotonic()
-    print(f"\nfrom `controller new --motion` to an arm that has moved: {end - begin:.1f} s, of them to build {ready - begin:.1f} s")
+    print(
+        f"\nfrom `controller new --motion` to an arm that has moved: {end - begin:.1f} s, "
+        f"of them to build {ready - begin:.1f} s"
+    )
     if os.getloadavg()[0] < 1.5 * (os.cpu_count() or 1):
         assert end - begin < LONGEST
     run("catkin_make", "-C", tmp_path, "side_sway_test_motion")
@@ -66,6 +69,8 @@ def test_a_new_motion_is_built_tested_and_moves_the_simulated_arm(tmp_path: Path
 
 def test_wrong_names_and_places_are_refused(tmp_path: Path) -> None:
     for name in ("sideSway", "../Up"):
-        done = subprocess.run([sys.executable, TOOL, "--motion", name, "--into", tmp_path], capture_output=True, text=True)
+        done = subprocess.run(
+            [sys.executable, TOOL, "--motion", name, "--into", tmp_path], capture_output=True, text=True
+        )
         assert done.returncode == 1 and "CamelCase" in done.stderr
     assert not list(tmp_path.iterdir())

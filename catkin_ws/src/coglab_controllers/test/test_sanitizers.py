@@ -16,8 +16,11 @@ LIBRARIES = ["-lorocos-kdl", "-lkdl_parser", "-ltinyxml2", "-lyaml-cpp", "-lpthr
 
 def sources() -> list[Path]:
     """The cores of manager and plug-ins with what they stand on; no ROS."""
-    own = [p for p in sorted((PACKAGE / "src").rglob("*.cpp"))
-           if p.parent.name not in ("ros", "python") and not p.stem.endswith("_ros")]
+    own = [
+        p
+        for p in sorted((PACKAGE / "src").rglob("*.cpp"))
+        if p.parent.name not in ("ros", "python") and not p.stem.endswith("_ros")
+    ]
     return own + sorted((SOURCES / "ctrl_more" / "src").rglob("*.cpp"))
 
 
@@ -31,9 +34,15 @@ def run(command: list[str], limit: float) -> None:
     """Runs an instrumented program; fails with what the sanitizer found."""
     result = subprocess.run(
         ["setarch", os.uname().machine, "-R", *command],
-        env=dict(os.environ, TSAN_OPTIONS="halt_on_error=1 exitcode=66", UBSAN_OPTIONS="halt_on_error=1",
-                 ASAN_OPTIONS="detect_leaks=1"),
-        capture_output=True, text=True, timeout=limit,
+        env=dict(
+            os.environ,
+            TSAN_OPTIONS="halt_on_error=1 exitcode=66",
+            UBSAN_OPTIONS="halt_on_error=1",
+            ASAN_OPTIONS="detect_leaks=1",
+        ),
+        capture_output=True,
+        text=True,
+        timeout=limit,
     )
     assert result.returncode == 0, (result.stdout + result.stderr)[-4000:]
 
@@ -51,12 +60,34 @@ def test_requests_against_the_control_thread_and_exceptions_of_plugins(sanitizer
         objects.append(tmp_path / f"{len(objects)}_{source.stem}.o")
         compiled(["g++", *flags, "-c", str(source), "-o", str(objects[-1]), *includes])
     for program in ("thread_stress", "plugin_exceptions"):
-        compiled(["g++", *flags, "-rdynamic", str(PACKAGE / "test" / f"{program}.cpp"), "-o", str(tmp_path / program),
-                  *map(str, objects), *includes, *LIBRARIES])
+        compiled(
+            [
+                "g++",
+                *flags,
+                "-rdynamic",
+                str(PACKAGE / "test" / f"{program}.cpp"),
+                "-o",
+                str(tmp_path / program),
+                *map(str, objects),
+                *includes,
+                *LIBRARIES,
+            ]
+        )
     # Without unique symbols the library is really unmapped when it is unloaded.
     plugin = tmp_path / "libown_exception.so"
-    compiled(["g++", *flags, "-fPIC", "-shared", "-fno-gnu-unique", str(PACKAGE / "test/plugins/own_exception.cpp"),
-              "-o", str(plugin), *includes])
+    compiled(
+        [
+            "g++",
+            *flags,
+            "-fPIC",
+            "-shared",
+            "-fno-gnu-unique",
+            str(PACKAGE / "test/plugins/own_exception.cpp"),
+            "-o",
+            str(plugin),
+            *includes,
+        ]
+    )
     description = str(SOURCES / "lwr_description")
     run([str(tmp_path / "plugin_exceptions"), str(plugin), description], 120.0)
     run([str(tmp_path / "thread_stress"), seconds, str(PACKAGE), description], float(seconds) * 5 + 120)

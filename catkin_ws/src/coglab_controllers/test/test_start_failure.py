@@ -16,11 +16,20 @@ import pytest
 PACKAGE = Path(__file__).resolve().parent.parent
 SOURCES = PACKAGE.parent
 # Where the FRI thread and what it wakes are written and freed; the rest is linked as built.
-WATCHED = [PACKAGE / "src" / "ros" / "robot_node.cpp", PACKAGE / "src" / "ros" / "manager_ros.cpp",
-           PACKAGE / "src" / "manager" / "control_thread.cpp",
-           *(SOURCES / "lwr_fri_bridge" / "src" / name for name in (
-               "ros/bridge_ros.cpp", "ros/bridge_diagnostics.cpp", "ros/bridge_parameters.cpp",
-               "bridge/fri_thread.cpp"))]
+WATCHED = [
+    PACKAGE / "src" / "ros" / "robot_node.cpp",
+    PACKAGE / "src" / "ros" / "manager_ros.cpp",
+    PACKAGE / "src" / "manager" / "control_thread.cpp",
+    *(
+        SOURCES / "lwr_fri_bridge" / "src" / name
+        for name in (
+            "ros/bridge_ros.cpp",
+            "ros/bridge_diagnostics.cpp",
+            "ros/bridge_parameters.cpp",
+            "bridge/fri_thread.cpp",
+        )
+    ),
+]
 
 sys.path.insert(0, str(SOURCES / "lwr_fri_bridge" / "test"))
 
@@ -37,16 +46,47 @@ def robot_node(tmp_path_factory: pytest.TempPathFactory) -> Path:
     objects = []
     for source in WATCHED:
         objects.append(folder / f"{source.stem}.o")
-        built = subprocess.run(["g++", *flags, "-c", str(source), "-o", str(objects[-1]), *includes],
-                               capture_output=True, text=True, timeout=600)
+        built = subprocess.run(
+            ["g++", *flags, "-c", str(source), "-o", str(objects[-1]), *includes],
+            capture_output=True,
+            text=True,
+            timeout=600,
+        )
         assert built.returncode == 0, built.stderr[-3000:]
-    libraries = [f"-L{devel / 'lib'}", f"-Wl,-rpath,{devel / 'lib'}", "-lcoglab_controllers_ros",
-                 "-lcoglab_ideal_arm", "-lcoglab_controllers_plugins", "-lcoglab_controllers_manager",
-                 "-lcoglab_controllers_core", "-lctrl_more", "-llwr_fri_bridge_ros", "-llwr_fri_bridge"]
-    system = subprocess.run(["pkg-config", "--libs", "roscpp", "tf2_ros", "diagnostic_updater", "roslib"],
-                            capture_output=True, text=True, timeout=60).stdout.split()
-    built = subprocess.run(["g++", *flags, "-o", str(folder / "robot_node"), *map(str, objects), *libraries, *system,
-                            "-lyaml-cpp", "-lpthread"], capture_output=True, text=True, timeout=600)
+    libraries = [
+        f"-L{devel / 'lib'}",
+        f"-Wl,-rpath,{devel / 'lib'}",
+        "-lcoglab_controllers_ros",
+        "-lcoglab_ideal_arm",
+        "-lcoglab_controllers_plugins",
+        "-lcoglab_controllers_manager",
+        "-lcoglab_controllers_core",
+        "-lctrl_more",
+        "-llwr_fri_bridge_ros",
+        "-llwr_fri_bridge",
+    ]
+    system = subprocess.run(
+        ["pkg-config", "--libs", "roscpp", "tf2_ros", "diagnostic_updater", "roslib"],
+        capture_output=True,
+        text=True,
+        timeout=60,
+    ).stdout.split()
+    built = subprocess.run(
+        [
+            "g++",
+            *flags,
+            "-o",
+            str(folder / "robot_node"),
+            *map(str, objects),
+            *libraries,
+            *system,
+            "-lyaml-cpp",
+            "-lpthread",
+        ],
+        capture_output=True,
+        text=True,
+        timeout=600,
+    )
     assert built.returncode == 0, built.stderr[-3000:]
     return folder / "robot_node"
 
@@ -57,9 +97,11 @@ def master(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
         probe.bind(("127.0.0.1", 0))
         port = probe.getsockname()[1]
     monkeypatch.setenv("ROS_MASTER_URI", f"http://127.0.0.1:{port}")
-    core = subprocess.Popen(["rosmaster", "--core", "-p", str(port)], stdout=subprocess.DEVNULL,
-                            stderr=subprocess.DEVNULL)
+    core = subprocess.Popen(
+        ["rosmaster", "--core", "-p", str(port)], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+    )
     import rosgraph
+
     end = time.monotonic() + 20.0
     while not rosgraph.is_master_online() and time.monotonic() < end:
         time.sleep(0.1)
@@ -70,10 +112,12 @@ def master(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
 
 @pytest.mark.skipif(not os.environ.get("COGLAB_LONG"), reason="campaign: set COGLAB_LONG=1")
 @pytest.mark.skipif(shutil.which("g++") is None, reason="g++ is not installed")
-@pytest.mark.parametrize("space, name, value", [("lwr", "hot_drive", -300.0),
-                                                ("controller_manager", "cycle_time", 7.0)])
-def test_nothing_runs_on_over_what_is_freed(robot_node: Path, master: None, space: str, name: str,
-                                            value: float) -> None:
+@pytest.mark.parametrize(
+    "space, name, value", [("lwr", "hot_drive", -300.0), ("controller_manager", "cycle_time", 7.0)]
+)
+def test_nothing_runs_on_over_what_is_freed(
+    robot_node: Path, master: None, space: str, name: str, value: float
+) -> None:
     """A parameter that is judged late is out of range while a controller sends at 1 kHz."""
     import rosgraph
     from udp_controller import UdpController
@@ -87,8 +131,13 @@ def test_nothing_runs_on_over_what_is_freed(robot_node: Path, master: None, spac
     server.setParam("/robot_description", (SOURCES / "lwr_description" / "urdf" / "lwr_ih2.urdf").read_text())
     controller = UdpController(port, period=0.001).start()
     try:
-        run = subprocess.run([str(robot_node)], capture_output=True, text=True, timeout=60.0,
-                             env=dict(os.environ, ASAN_OPTIONS="detect_leaks=0"))
+        run = subprocess.run(
+            [str(robot_node)],
+            capture_output=True,
+            text=True,
+            timeout=60.0,
+            env=dict(os.environ, ASAN_OPTIONS="detect_leaks=0"),
+        )
     finally:
         controller.close()
     told = run.stdout + run.stderr

@@ -11,17 +11,27 @@ from coglab_msgs import msg, srv
 CONFIG = Path(__file__).resolve().parent.parent / "config" / "controllers.yaml"
 
 # As printed; `int` is int32, `float` is float64, `intinitial_state` lost its space.
-DMP = [("primitive_id", "string"), ("dmp_ratio", "float64"), ("goal_offset", "geometry_msgs/Point"),
-       ("orientation_control", "bool"), ("target_orientation", "geometry_msgs/Quaternion")]
-INITIAL = [("initial_state", "int32"), ("initial_position", "geometry_msgs/Point"),
-           ("initial_velocity", "geometry_msgs/Vector3")]
+DMP = [
+    ("primitive_id", "string"),
+    ("dmp_ratio", "float64"),
+    ("goal_offset", "geometry_msgs/Point"),
+    ("orientation_control", "bool"),
+    ("target_orientation", "geometry_msgs/Quaternion"),
+]
+INITIAL = [
+    ("initial_state", "int32"),
+    ("initial_position", "geometry_msgs/Point"),
+    ("initial_velocity", "geometry_msgs/Vector3"),
+]
 IDS = [("controller_ids", "string[]"), ("controller_types", "string[]")]
 SERVICES = {
     "LoadDmps": ([("filename", "string")], [("num_loaded", "int16")]),
     "ExecuteDmp": (DMP[:1] + INITIAL + DMP[1:], []),
     "SwitchDmp": (DMP, []),
-    "AddPtp": ([("position", "float64[]"), ("max_vel", "float64[]"), ("max_acc", "float64[]")],
-               [("status", "int32"), ("ptp_id", "int32")]),
+    "AddPtp": (
+        [("position", "float64[]"), ("max_vel", "float64[]"), ("max_acc", "float64[]")],
+        [("status", "int32"), ("ptp_id", "int32")],
+    ),
     "LoadController": ([("controller_id", "string"), ("controller_type", "string")], []),
     "ListControllers": ([], IDS),
     "SwitchController": ([("controller_id", "string")], [("controller_type", "string")]),
@@ -42,7 +52,7 @@ def test_services_begin_with_the_fields_of_the_table(name: str) -> None:
     for kind, table in zip((service._request_class, service._response_class), SERVICES[name], strict=True):
         there = fields(kind)
         assert there[: len(table)] == table
-        assert set(there[len(table):]) <= OURS, "what is appended is known and documented"
+        assert set(there[len(table) :]) <= OURS, "what is appended is known and documented"
 
 
 @pytest.mark.parametrize("name", MESSAGES)
@@ -58,8 +68,13 @@ def test_states_and_statuses_have_their_numbers() -> None:
 
 def test_parameters_of_the_tables_are_in_the_parameter_file() -> None:
     parameters = yaml.safe_load(CONFIG.read_text())
-    kinds = {"pos_clik_gain": float, "rot_clik_gain": float, "robot_base_frame_name": str, "dmp_frame_name": str,
-             "enable_ik_debug": bool}
+    kinds = {
+        "pos_clik_gain": float,
+        "rot_clik_gain": float,
+        "robot_base_frame_name": str,
+        "dmp_frame_name": str,
+        "enable_ik_debug": bool,
+    }
     assert {name: type(parameters["dmp"][name]) for name in kinds} == kinds
     assert (type(parameters["ptp"]["Kp"]), type(parameters["ptp"]["max_queue"])) == (float, int)
     assert type(parameters["cycle_time"]) is float

@@ -161,8 +161,9 @@ int main(int argc, char** argv) {
           break;
         }
         case 4:
-          note(ptp.add({{-1.4 + 0.05 * (random() % 5), -0.6, 1.5, 1.7, 0.2, 0.2, 0.8}, {}, {}})
-                   .id >= 0);
+          note(
+              ptp.add({{-1.4 + 0.05 * (random() % 5), -0.6, 1.5, 1.7, 0.2, 0.2, 0.8}, {}, {}}).id >=
+              0);
           break;
         case 5:
           note(manager.setSpeedScale(0.25 * (random() % 6)).success);

@@ -1,5 +1,6 @@
 #!/usr/bin/python3
 """Over ROS: goals from the goal helper, ik_debug, refusals, speed scale, feedback services."""
+
 from __future__ import annotations
 
 import math
@@ -46,8 +47,11 @@ class TopicGoal(unittest.TestCase):
         rospy.Subscriber("controller_manager/dmp/ik_debug", IkDebug, cls.debug.append)
         rospy.Subscriber("controller_manager/feedback/status", FeedbackStatus, cls.feedback.append)
         rospy.Subscriber("lwr/target_joint_states", JointState, cls.targets.append)
-        rospy.Subscriber("/diagnostics", DiagnosticArray, lambda m: cls.diagnostics.update(
-            {s.name: {v.key: v.value for v in s.values} for s in m.status}))
+        rospy.Subscriber(
+            "/diagnostics",
+            DiagnosticArray,
+            lambda m: cls.diagnostics.update({s.name: {v.key: v.value for v in s.values} for s in m.status}),
+        )
         cls.robot = Robot()
         cls.robot.load()
         path = rospkg.RosPack().get_path("coglab_controllers") + "/config/primitives.xml"
@@ -81,8 +85,7 @@ class TopicGoal(unittest.TestCase):
         wait_until(lambda: len(self.debug) > 50, 5.0, "ik_debug")
         record = self.debug[len(self.debug) // 2]
         self.assertEqual(record.header.frame_id, "lwr_base_link")
-        self.assertEqual((len(record.joint_velocity_position), len(record.joint_velocity_rotation)),
-                         (7, 7))
+        self.assertEqual((len(record.joint_velocity_position), len(record.joint_velocity_rotation)), (7, 7))
         self.assertGreater(record.smallest_singular_value_position, 0.0)
         q = record.measured.orientation
         self.assertAlmostEqual(q.x**2 + q.y**2 + q.z**2 + q.w**2, 1.0, places=6)
@@ -91,8 +94,11 @@ class TopicGoal(unittest.TestCase):
     def test_4_refusals(self) -> None:
         robot = self.robot
         for fields, word in (
-                ({"primitive": "wave"}, "reach_human"), ({"dmp_ratio": 0.0}, "ratio"),
-                ({"dmp_ratio": math.nan}, "ratio"), ({"initial_state": 9}, "CURRENT=0")):
+            ({"primitive": "wave"}, "reach_human"),
+            ({"dmp_ratio": 0.0}, "ratio"),
+            ({"dmp_ratio": math.nan}, "ratio"),
+            ({"initial_state": 9}, "CURRENT=0"),
+        ):
             answer = robot.execute(**{"primitive": "reach_human", **fields})
             self.assertFalse(answer.success)
             self.assertIn(word, answer.message)
@@ -138,8 +144,9 @@ class TopicGoal(unittest.TestCase):
         self.assertTrue(answer.success, answer.message)
         answer = call(name + "enable", FeedbackSelect, ["ee_admittance"], "")
         self.assertTrue(answer.success, answer.message)
-        wait_until(lambda: next(c for c in self.feedback[-1].controllers
-                                if c.name == "ee_admittance").enabled, 5.0, "enabled")
+        wait_until(
+            lambda: next(c for c in self.feedback[-1].controllers if c.name == "ee_admittance").enabled, 5.0, "enabled"
+        )
         answer = call(name + "pause_by_signal", FeedbackBySignal, "wrench", False)
         self.assertTrue(answer.success, answer.message)
         self.assertEqual(list(answer.affected), ["ee_admittance"])
@@ -158,8 +165,12 @@ class TopicGoal(unittest.TestCase):
         call, shown = self.robot.call, []
         rospy.Subscriber(name + "state", FeedbackState, shown.append)
         config = "package://ctrl_more/config/ee_admittance.yaml"
-        for refused in (("dmp", "EeAdmittance", "", ""), ("joint_limits", "JointLimits", "", ""),
-                        ("second", "NoSuchType", "", ""), ("second", "EeAdmittance", "", "/no/such.yaml")):
+        for refused in (
+            ("dmp", "EeAdmittance", "", ""),
+            ("joint_limits", "JointLimits", "", ""),
+            ("second", "NoSuchType", "", ""),
+            ("second", "EeAdmittance", "", "/no/such.yaml"),
+        ):
             answer = call(name + "load", LoadFeedback, *refused)
             self.assertFalse(answer.success, refused)
             self.assertTrue(answer.message, refused)
@@ -178,9 +189,16 @@ class TopicGoal(unittest.TestCase):
 
         wait_until(lambda: "offset_x" in state(), 5.0, "state of the controller that was loaded")
         self.assertEqual(set(shown[-1].states[-1].units), {"m", "rad", "N"})
-        wait_until(lambda: any(c.controller == "second" and c.signal == "taskSpaceReferencePose/ee"
-                               and len(c.before) == len(c.after) == 7 for c in shown[-1].corrections),
-                   5.0, "its correction of the pose")
+        wait_until(
+            lambda: any(
+                c.controller == "second"
+                and c.signal == "taskSpaceReferencePose/ee"
+                and len(c.before) == len(c.after) == 7
+                for c in shown[-1].corrections
+            ),
+            5.0,
+            "its correction of the pose",
+        )
         self.assertIn("second", [c.name for c in self.feedback[-1].controllers])
         answer = call(name + "unload", FeedbackSelect, ["second"], "")
         self.assertFalse(answer.success)
@@ -206,8 +224,9 @@ class TopicGoal(unittest.TestCase):
         self.assertTrue(0.0 < last <= longest)
         self.assertAlmostEqual(float(values["cycle time (s)"]), 0.01, delta=0.005)
         self.assertGreaterEqual(int(values["overruns"]), 0)
-        wait_until(lambda: int(self.cycle_statistics()["cycles with a joint state"]) > cycles + 20, 5.0,
-                   "newer statistics")
+        wait_until(
+            lambda: int(self.cycle_statistics()["cycles with a joint state"]) > cycles + 20, 5.0, "newer statistics"
+        )
         answer = self.robot.add_ptp(HOME)
         self.assertEqual(answer.status, AddPtpRequest.REJECTED)
         self.robot.switch("ptp")
@@ -246,8 +265,11 @@ class TopicGoal(unittest.TestCase):
         rospy.sleep(0.3)
         robot.see_hand(ASIDE)
         wait_until(lambda: robot.execute(goal_frame="", dmp_ratio=2.0).success, 5.0, "execute_dmp")
-        wait_until(lambda: robot.feedback.state == "running" and robot.feedback.remaining_distance > 0.2, 5.0,
-                   "running, toward the goal that replaced the old one")
+        wait_until(
+            lambda: robot.feedback.state == "running" and robot.feedback.remaining_distance > 0.2,
+            5.0,
+            "running, toward the goal that replaced the old one",
+        )
 
     def test_9_a_frozen_master_ends_no_reach_and_keeps_no_node_from_ending(self) -> None:
         robot, pids = self.robot, robot_processes()

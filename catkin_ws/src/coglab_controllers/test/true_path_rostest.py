@@ -1,5 +1,6 @@
 #!/usr/bin/python3
 """The true path through /robot and the simulated cell: load, ptp, reach, switch, refuse."""
+
 from __future__ import annotations
 
 import os
@@ -44,8 +45,7 @@ class TruePath(unittest.TestCase):
     def test_1_list_and_active(self) -> None:
         listed = self.robot.manager("list_controllers")
         self.assertEqual(listed.controller_ids[:2], ["dmp", "ptp"])
-        self.assertEqual(listed.controller_types[:2],
-                         ["coglab/DmpController", "coglab/PtpController"])
+        self.assertEqual(listed.controller_types[:2], ["coglab/DmpController", "coglab/PtpController"])
         active = self.robot.manager("get_active_controller")
         self.assertEqual(active.controller_id, "ptp")
         self.assertEqual(active.controller_type, "coglab/PtpController")
@@ -57,8 +57,9 @@ class TruePath(unittest.TestCase):
         robot.see_hand(GOAL)
         wait_until(lambda: robot.execute().success, 5.0, "execute_dmp")
         wait_until(lambda: robot.feedback.state == "running", 5.0, "running")
-        wait_until(lambda: self.frames.can_transform("lwr_base_link", "dmp_goal", rospy.Time(0)), 5.0,
-                   "tf2 frame dmp_goal")
+        wait_until(
+            lambda: self.frames.can_transform("lwr_base_link", "dmp_goal", rospy.Time(0)), 5.0, "tf2 frame dmp_goal"
+        )
         goal = self.frames.lookup_transform("lwr_base_link", "dmp_goal", rospy.Time(0))
         place = goal.transform.translation
         for value, wanted in zip((place.x, place.y, place.z), GOAL, strict=False):
@@ -73,8 +74,7 @@ class TruePath(unittest.TestCase):
         robot.go(HOME)
         robot.switch("dmp")
         self.assertTrue(robot.execute().success)
-        wait_until(lambda: robot.feedback.state == "running" and robot.feedback.phase < 0.6, 5.0,
-                   "in mid-motion")
+        wait_until(lambda: robot.feedback.state == "running" and robot.feedback.phase < 0.6, 5.0, "in mid-motion")
         refused = robot.add_ptp(HOME)
         self.assertEqual(refused.status, AddPtpRequest.REJECTED)
         self.assertEqual(refused.reason_code, ReasonCode.NOT_ACTIVE)
@@ -115,8 +115,11 @@ class TruePath(unittest.TestCase):
         for i in ids:
             self.assertEqual(robot.unfinished[i].reason_code, ReasonCode.CANCELLED)
             self.assertNotIn(i, robot.finished)
-        wait_until(lambda: robot.status.standing and robot.status.reason_code == ReasonCode.CANCELLED, 5.0,
-                   "status after the cancel")
+        wait_until(
+            lambda: robot.status.standing and robot.status.reason_code == ReasonCode.CANCELLED,
+            5.0,
+            "status after the cancel",
+        )
         self.assertIn("a test gives up", robot.status.reason)
         # The simulated arm follows its set-point with a delay; after that nothing moves any more.
         rospy.sleep(0.3)
@@ -153,8 +156,11 @@ class TruePath(unittest.TestCase):
             self.assertAlmostEqual(now, then, delta=0.01)
         keys = ("refused: a controller is active", "refused: another publisher moves the arm")
         wait_until(lambda: sum(counted.get(key, 0) for key in keys) > 100, 5.0, "refusals counted")
-        wait_until(lambda: any(f"target_joint_states of {rospy.get_name()} refused" in line
-                               for line in told), 8.0, "the reason with the publisher's name")
+        wait_until(
+            lambda: any(f"target_joint_states of {rospy.get_name()} refused" in line for line in told),
+            8.0,
+            "the reason with the publisher's name",
+        )
         foreign.unregister()
         robot.go(HOME)  # and the controller's own velocities still count
 

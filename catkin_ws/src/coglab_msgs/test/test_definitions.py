@@ -1,4 +1,5 @@
 """Every definition of this package: a sentence has a code beside it, a comment says what it is, CMake generates it."""
+
 import re
 from pathlib import Path
 
@@ -33,13 +34,16 @@ def answers(path: Path) -> list[list[str]]:
 def test_a_sentence_has_a_code_beside_it(path: Path) -> None:
     for part in answers(path):
         sentences = [match for line in part if (match := SENTENCE.match(line))]
-        codes = [match for line in part if (match := CODE.match(line))
-                 if "ReasonCode" in match[2] or path.name in OWN_CODE]
+        codes = [
+            match for line in part if (match := CODE.match(line)) if "ReasonCode" in match[2] or path.name in OWN_CODE
+        ]
         for array in (None, "[]"):
             wanted = [match[2] for match in sentences if match[1] == array]
             found = [match[0] for match in codes if match[1] == array]
-            assert len(found) >= len(wanted), (f"{path.name}: each of {wanted} needs a field uint16{array or ''} of "
-                                               f"its own whose comment names ReasonCode; found {found}")
+            assert len(found) >= len(wanted), (
+                f"{path.name}: each of {wanted} needs a field uint16{array or ''} of "
+                f"its own whose comment names ReasonCode; found {found}"
+            )
 
 
 @pytest.mark.parametrize("path", DEFINITIONS, ids=lambda path: path.name)

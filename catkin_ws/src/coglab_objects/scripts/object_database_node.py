@@ -4,6 +4,7 @@
 Services (private): get_object, list_objects, reload (std_srvs/Trigger: problems in words).
 Parameters: ~folder; ih2_hand/dialect (legacy), that of the hand. Mirrors the good entries read-only to ~objects/<id>.
 """
+
 import sys
 
 import rospy
@@ -20,8 +21,9 @@ class ObjectDatabaseNode:
     """Thin node over ObjectDatabase."""
 
     def __init__(self) -> None:
-        self.database = ObjectDatabase(parameters.read("~folder", str),
-                                       parameters.read("ih2_hand/dialect", str, "legacy"))
+        self.database = ObjectDatabase(
+            parameters.read("~folder", str), parameters.read("ih2_hand/dialect", str, "legacy")
+        )
         self.reported: list[str] = []
         self.mirrored: dict[str, str] | None = None  # text by id; None: what an earlier run has left is not removed yet
         self.behind = False  # the mirror could not be brought up to the database

@@ -1,5 +1,6 @@
 """The object database: the sample objects are good, bad files are refused with file, line and field, the old
 entry stays."""
+
 import os
 
 import pytest
@@ -22,36 +23,44 @@ def test_five_sample_objects_without_a_problem():
     assert database.ids() == OBJECTS
 
 
-@pytest.mark.parametrize("change, sentence", [
-    (("mass: 0.31", "mass: -1"), "mug.yaml:5: mass: -1 is less than or equal to the minimum of 0"),
-    (("mass: 0.31", "mass: heavy"), "mug.yaml:5: mass: 'heavy' is not of type 'number'"),
-    (("mass: 0.31\n", ""), "mug.yaml:2: top level: 'mass' is a required property"),
-    (("friction: 0.6", "friction: 0.6\nfrction: 0.6"), "'frction' was unexpected"),
-    (("mode: cylindrical", "mode: claw"), "grasps.side.hand.mode: 'claw' is not one of"),
-    (("default_grasp: side", "default_grasp: top"), "default_grasp: 'top' is none of grasps: side"),
-    (("[0.5, 0.5, 0.5, 0.5]", "[0, 0, 0, 0]"), "a quaternion of zeros has no direction"),
-    (("[0.5, 0.5, 0.5, 0.5]", "[.nan, 0, 0, 1]"), "quaternion.0: a finite number expected"),
-    (("xyz: [0.0, -0.04, 0.05]", "xyz: [0.0, -40.0, 0.05]"), "more than 1 m away; lengths are in m"),
-    (("axis: [0.0, 1.0, 0.0]", "axis: [0.0, 0.0, 0.0]"), "a direction must not be zero"),
-    (("id: mug", "id: Mug Cup"), "id: 'Mug Cup' does not match"),
-    (("mass: 0.31", "mass: 0.31\nmass: 0.4"), "field 'mass' appears twice"),
-    (("mass: 0.31", "mass: [0.31"), "not YAML"),
-    (("mass: 0.31", "mass: &m 0.31\nnotes: *m"), "aliases"),
-    (("mass: 0.31", "mass: .nan"), "mug.yaml:5: mass: a finite number expected, got nan"),
-    (("friction: 0.6", "friction: .inf"), "mug.yaml:8: friction"),
-    (("[0.08, 0.08, 0.10]", "[0.08, .nan, 0.10]"), "mug.yaml:6: size.1: a finite number expected, got nan"),
-    (("axis: [0.0, 1.0, 0.0]", "axis: [0, 99999999999, 0]"), "axis.1: a whole number of at most 2147483647 expected"),
-    (("name: Coffee mug", 'name: "a\\x01b"'), "mug.yaml:4: name: a text without control characters expected"),
-    (("name: Coffee mug", "name: 2024-02-31"), "a value cannot be read as what it looks like"),
-    (("name: Coffee mug", "name: 2024-02-01"), "mug.yaml:4: name: "),
-    (("mass: 0.31", "mass: !!int heavy"), "a value cannot be read as what it looks like or is tagged as"),
-    (("mass: 0.31", "? [mass, 1]\n: 0.31"), "mug.yaml: line 5: a field's name is one word"),
-    (("mass: 0.31", "? {mass: 1}\n: 0.31"), "mug.yaml: line 5: a field's name is one word"),
-    (("mass: 0.31", "mass: " + "[" * 40_000), "mug.yaml: line 5: nested more than 16 levels deep"),
-    (("mass: 0.31", "mass: " + "{a: " * 400 + "1" + "}" * 400), "nested more than 16 levels deep"),
-    (("mode: cylindrical, level: medium", "mode: lateral, level: medium"),
-     "grasps.side.hand.level: grasp mode lateral has force level high in the legacy dialect; got 'medium'"),
-])
+@pytest.mark.parametrize(
+    "change, sentence",
+    [
+        (("mass: 0.31", "mass: -1"), "mug.yaml:5: mass: -1 is less than or equal to the minimum of 0"),
+        (("mass: 0.31", "mass: heavy"), "mug.yaml:5: mass: 'heavy' is not of type 'number'"),
+        (("mass: 0.31\n", ""), "mug.yaml:2: top level: 'mass' is a required property"),
+        (("friction: 0.6", "friction: 0.6\nfrction: 0.6"), "'frction' was unexpected"),
+        (("mode: cylindrical", "mode: claw"), "grasps.side.hand.mode: 'claw' is not one of"),
+        (("default_grasp: side", "default_grasp: top"), "default_grasp: 'top' is none of grasps: side"),
+        (("[0.5, 0.5, 0.5, 0.5]", "[0, 0, 0, 0]"), "a quaternion of zeros has no direction"),
+        (("[0.5, 0.5, 0.5, 0.5]", "[.nan, 0, 0, 1]"), "quaternion.0: a finite number expected"),
+        (("xyz: [0.0, -0.04, 0.05]", "xyz: [0.0, -40.0, 0.05]"), "more than 1 m away; lengths are in m"),
+        (("axis: [0.0, 1.0, 0.0]", "axis: [0.0, 0.0, 0.0]"), "a direction must not be zero"),
+        (("id: mug", "id: Mug Cup"), "id: 'Mug Cup' does not match"),
+        (("mass: 0.31", "mass: 0.31\nmass: 0.4"), "field 'mass' appears twice"),
+        (("mass: 0.31", "mass: [0.31"), "not YAML"),
+        (("mass: 0.31", "mass: &m 0.31\nnotes: *m"), "aliases"),
+        (("mass: 0.31", "mass: .nan"), "mug.yaml:5: mass: a finite number expected, got nan"),
+        (("friction: 0.6", "friction: .inf"), "mug.yaml:8: friction"),
+        (("[0.08, 0.08, 0.10]", "[0.08, .nan, 0.10]"), "mug.yaml:6: size.1: a finite number expected, got nan"),
+        (
+            ("axis: [0.0, 1.0, 0.0]", "axis: [0, 99999999999, 0]"),
+            "axis.1: a whole number of at most 2147483647 expected",
+        ),
+        (("name: Coffee mug", 'name: "a\\x01b"'), "mug.yaml:4: name: a text without control characters expected"),
+        (("name: Coffee mug", "name: 2024-02-31"), "a value cannot be read as what it looks like"),
+        (("name: Coffee mug", "name: 2024-02-01"), "mug.yaml:4: name: "),
+        (("mass: 0.31", "mass: !!int heavy"), "a value cannot be read as what it looks like or is tagged as"),
+        (("mass: 0.31", "? [mass, 1]\n: 0.31"), "mug.yaml: line 5: a field's name is one word"),
+        (("mass: 0.31", "? {mass: 1}\n: 0.31"), "mug.yaml: line 5: a field's name is one word"),
+        (("mass: 0.31", "mass: " + "[" * 40_000), "mug.yaml: line 5: nested more than 16 levels deep"),
+        (("mass: 0.31", "mass: " + "{a: " * 400 + "1" + "}" * 400), "nested more than 16 levels deep"),
+        (
+            ("mode: cylindrical, level: medium", "mode: lateral, level: medium"),
+            "grasps.side.hand.level: grasp mode lateral has force level high in the legacy dialect; got 'medium'",
+        ),
+    ],
+)
 def test_bad_files_name_place_and_field(change, sentence):
     with pytest.raises(ObjectError) as error:
         parse_object(MUG.replace(*change), "mug.yaml")
@@ -79,8 +88,9 @@ def test_each_file_is_read_once_whatever_is_wrong_with_it(tmp_path, monkeypatch)
     os.mkfifo(tmp_path / "pipe.yaml")
     database = ObjectDatabase(str(tmp_path))
     problems = database.reload()
-    assert [p.split(":")[0] for p in problems] == [f"{name}.yaml" for name in
-                                                  ("bad", "binary", "folder", "nowhere", "pipe")]
+    assert [p.split(":")[0] for p in problems] == [
+        f"{name}.yaml" for name in ("bad", "binary", "folder", "nowhere", "pipe")
+    ]
     assert database.ids() == ["mug"] and not database.changed()
     read = []
     monkeypatch.setattr("coglab_objects.database.read_object", lambda path, dialect: read.append(path.name))
@@ -134,5 +144,11 @@ def test_new_object_is_valid_and_ids_are_checked(tmp_path):
 
 def test_the_cell_gets_the_solid_whose_underside_is_the_object_frame():
     mug = cell_parameters(parse_object(MUG, "mug.yaml"))
-    assert mug == {"id": "mug", "mass": 0.31, "shape": "cylinder", "size": [0.08, 0.08, 0.10],
-                   "center": [0.0, 0.0, 0.05], "friction": 0.6}
+    assert mug == {
+        "id": "mug",
+        "mass": 0.31,
+        "shape": "cylinder",
+        "size": [0.08, 0.08, 0.10],
+        "center": [0.0, 0.0, 0.05],
+        "friction": 0.6,
+    }

@@ -1,4 +1,5 @@
 """The database's node beside a parameter server that takes what XML-RPC takes: no file ends it or its timer."""
+
 import importlib.util
 import shutil
 import xmlrpc.client
@@ -9,8 +10,15 @@ import pytest
 import rospy
 
 SHARE = Path(__file__).resolve().parent.parent
-HOSTILE = {"list_key": "? [a, b]\n: 1\n", "date": "id: date\nname: 2024-02-31\n", "deep": "a: " + "[" * 50_000,
-           "binary": "\x00\x01", "nan": None, "huge": "x" * 1_000_000, "tag": "!!python/object/apply:os.system [true]"}
+HOSTILE = {
+    "list_key": "? [a, b]\n: 1\n",
+    "date": "id: date\nname: 2024-02-31\n",
+    "deep": "a: " + "[" * 50_000,
+    "binary": "\x00\x01",
+    "nan": None,
+    "huge": "x" * 1_000_000,
+    "tag": "!!python/object/apply:os.system [true]",
+}
 
 
 class Master:

@@ -1,5 +1,6 @@
 #!/usr/bin/python3
 """Bench of motion recognition on unseen synthetic reaches; the peer is the nearest end point seen so far."""
+
 import json
 import sys
 import time
@@ -17,9 +18,16 @@ REACHES = 100
 
 def row(figure, value, unit, goal="", ok=True, peer=None, peer_value=None):
     """One row of the bench table."""
-    return {"bench": "recognition", "figure": figure, "value": round(float(value), 4), "unit": unit, "goal": goal,
-            "peer": peer, "peer_value": peer_value if peer_value is None else round(float(peer_value), 4),
-            "ok": bool(ok)}
+    return {
+        "bench": "recognition",
+        "figure": figure,
+        "value": round(float(value), 4),
+        "unit": unit,
+        "goal": goal,
+        "peer": peer,
+        "peer_value": peer_value if peer_value is None else round(float(peer_value), 4),
+        "ok": bool(ok),
+    }
 
 
 def nearest_direction(displacement):
@@ -58,9 +66,18 @@ def main() -> int:
             wrong += was_wrong
             decided += last != UNKNOWN
     n = REACHES * len(ENDS)
-    rows = [row(f"right after {share:.0%} of the reach", right[share] / n, "share", ">= 0.95" if share == 0.4 else "",
-                share != 0.4 or right[share] / n >= 0.95, "nearest direction", peer_right[share] / n)
-            for share in shares]
+    rows = [
+        row(
+            f"right after {share:.0%} of the reach",
+            right[share] / n,
+            "share",
+            ">= 0.95" if share == 0.4 else "",
+            share != 0.4 or right[share] / n >= 0.95,
+            "nearest direction",
+            peer_right[share] / n,
+        )
+        for share in shares
+    ]
     rows.append(row("reaches with a wrong decision", wrong / n, "share", "<= 0.01", wrong / n <= 0.01))
     rows.append(row("reaches decided", decided / n, "share"))
     rows.append(row("decided after, median", float(np.median(delays)), "share of the reach"))

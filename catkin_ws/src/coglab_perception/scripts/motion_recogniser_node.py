@@ -24,12 +24,15 @@ class RecogniserNode:
     """Thin node over Recogniser."""
 
     def __init__(self) -> None:
-        frames = FrameNames.from_mapping(rospy.get_param("perception/frames", None),
-                                         rospy.resolve_name("perception/frames"))
+        frames = FrameNames.from_mapping(
+            rospy.get_param("perception/frames", None), rospy.resolve_name("perception/frames")
+        )
         path = parameters.read("~patterns", str, "")
         if not path:
-            raise ValueError(f"{rospy.resolve_name('~patterns')} is not set: give the path of a "
-                             "pattern file (train_patterns.py writes them)")
+            raise ValueError(
+                f"{rospy.resolve_name('~patterns')} is not set: give the path of a "
+                "pattern file (train_patterns.py writes them)"
+            )
         patterns, settings = load_patterns(path)
         memory = parameters.read("~memory", float, settings.memory, 0.0)
         self.recogniser = Recogniser(patterns, dataclasses.replace(settings, memory=memory))
@@ -67,10 +70,14 @@ class RecogniserNode:
         """What the recogniser says after this transform."""
         p = transform.transform.translation
         estimate = self.recogniser.update(self.last.to_sec(), (p.x, p.y, p.z))
-        message = Recognition(pattern=estimate.pattern, confidence=estimate.confidence,
-                              decided=estimate.decided, progress=estimate.progress,
-                              names=list(estimate.probabilities),
-                              probabilities=list(estimate.probabilities.values()))
+        message = Recognition(
+            pattern=estimate.pattern,
+            confidence=estimate.confidence,
+            decided=estimate.decided,
+            progress=estimate.progress,
+            names=list(estimate.probabilities),
+            probabilities=list(estimate.probabilities.values()),
+        )
         message.header.stamp = self.last
         message.header.frame_id = self.base
         return message

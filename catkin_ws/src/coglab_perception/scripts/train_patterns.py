@@ -5,6 +5,7 @@ Usage: train_patterns.py -o patterns.json NAME=FILE.csv[,FILE.csv...] ...
 Each CSV holds one reach: a header line, then t,x,y,z[,...] in s and m (robot base frame), with at least 0.4 s of rest
 before the reach. Exit status: 0 well, 1 the recordings cannot be used, 2 usage.
 """
+
 import argparse
 import sys
 

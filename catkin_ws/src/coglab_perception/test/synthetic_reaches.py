@@ -6,8 +6,12 @@ Self-contained: the recogniser must not depend on the simulator that it is tried
 import numpy as np
 
 START = np.array([1.30, 0.20, 0.15])
-ENDS = {"centre": (0.86, 0.03, 0.44), "high": (0.86, 0.05, 0.66), "left": (0.90, -0.28, 0.42),
-        "right": (0.92, 0.42, 0.40)}
+ENDS = {
+    "centre": (0.86, 0.03, 0.44),
+    "high": (0.86, 0.05, 0.66),
+    "left": (0.90, -0.28, 0.42),
+    "right": (0.92, 0.42, 0.40),
+}
 
 
 def share(x):

@@ -21,11 +21,17 @@ def test_the_file():
     assert [name for name in tracked if frames.is_tracked(name)] == ["human_hand", "object_mug"]
 
 
-@pytest.mark.parametrize(("change", "words"), [
-    ({"board": ""}, "missing: board"), ({"palm": "x"}, "unknown: palm"),
-    ({"object": "thing"}, "must contain {id}"), ({"board": "world"}, "differ from each other"),
-    ({"world": "/world"}, "no leading slash"), ({"world": 3}, "missing: world"),
-])
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"board": ""}, "missing: board"),
+        ({"palm": "x"}, "unknown: palm"),
+        ({"object": "thing"}, "must contain {id}"),
+        ({"board": "world"}, "differ from each other"),
+        ({"world": "/world"}, "no leading slash"),
+        ({"world": 3}, "missing: world"),
+    ],
+)
 def test_bad_frames(tmp_path, change, words):
     path = tmp_path / "frames.yaml"
     path.write_text(yaml.safe_dump(GOOD | change))
@@ -48,9 +54,11 @@ def test_bad_files(tmp_path):
 def test_no_node_of_perception_names_a_frame_itself():
     """Other names come from the file, so that a lab changes them there and nowhere else."""
     names = [value for value in yaml.safe_load(FILE.read_text()).values() if value != "world"]
-    for path in [SOURCES / "coglab_perception" / "scripts" / "motion_recogniser_node.py",
-                 SOURCES / "coglab_sim" / "scripts" / "perception_stand_in.py",
-                 SOURCES / "coglab_sim" / "src" / "coglab_sim" / "vision.py"]:
+    for path in [
+        SOURCES / "coglab_perception" / "scripts" / "motion_recogniser_node.py",
+        SOURCES / "coglab_sim" / "scripts" / "perception_stand_in.py",
+        SOURCES / "coglab_sim" / "src" / "coglab_sim" / "vision.py",
+    ]:
         code = path.read_text(encoding="utf-8")
         for name in names:
             assert f'"{name}"' not in code, path

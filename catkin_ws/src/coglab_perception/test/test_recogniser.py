@@ -1,5 +1,6 @@
 """Recognition of reaching patterns: the filter against brute force and hmmlearn, earliness, unknown motions,
 hysteresis."""
+
 import itertools
 import json
 
@@ -63,8 +64,9 @@ def test_training_raises_the_likelihood_and_finds_the_means():
 def hmmlearn_twin(model, dimensions):
     """The same model in the oracle."""
     hmm = pytest.importorskip("hmmlearn.hmm", reason="the oracle hmmlearn is not installed")
-    peer = hmm.GaussianHMM(model.states, covariance_type="diag", init_params="", params="tmc", n_iter=1, tol=0.0,
-                           covars_prior=0.0)
+    peer = hmm.GaussianHMM(
+        model.states, covariance_type="diag", init_params="", params="tmc", n_iter=1, tol=0.0, covars_prior=0.0
+    )
     peer.n_features = dimensions
     peer.startprob_ = np.eye(model.states)[0]
     peer.transmat_ = model.transition()
@@ -134,8 +136,9 @@ def test_more_of_the_reach_is_never_worse(patterns):
     shares = []
     for share in (0.2, 0.4, 0.7):
         rng = np.random.default_rng(5)
-        shares.append(np.mean([outcome_at(patterns, name, rng, share)[0].pattern == name
-                               for name in ENDS for _ in range(15)]))
+        shares.append(
+            np.mean([outcome_at(patterns, name, rng, share)[0].pattern == name for name in ENDS for _ in range(15)])
+        )
     assert shares[0] <= shares[1] + 0.05 and shares[1] <= shares[2] + 0.05
 
 

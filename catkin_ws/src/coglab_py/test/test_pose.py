@@ -1,4 +1,5 @@
 """Poses: composition, inverse, reading and averaging, on seeded random poses and against matrices."""
+
 import numpy as np
 import pytest
 from coglab_py.pose import Pose, about_z, mean_pose, rotation
@@ -14,9 +15,13 @@ def random_pose() -> Pose:
 def matrix(pose: Pose) -> np.ndarray:
     """Homogeneous, from the quaternion's own formula."""
     x, y, z, w = pose.orientation
-    turn = np.array([[1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-                     [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-                     [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)]])
+    turn = np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+        ]
+    )
     return np.block([[turn, pose.position[:, None]], [np.zeros((1, 3)), np.ones((1, 1))]])
 
 
@@ -44,9 +49,15 @@ def test_reading():
     assert matrix(Pose.from_dict(pose.to_dict())) == pytest.approx(matrix(pose))
 
 
-@pytest.mark.parametrize("data, sentence", [
-    ({"xyz": [0, 0]}, "xyz has three finite numbers"), ({"rpy_deg": [0, float("nan"), 0]}, "rpy_deg has three"),
-    ({"quaternion": [0, 0, 0, 0]}, "no direction"), ({"quaternion": [0, 0, 1]}, "four finite numbers")])
+@pytest.mark.parametrize(
+    "data, sentence",
+    [
+        ({"xyz": [0, 0]}, "xyz has three finite numbers"),
+        ({"rpy_deg": [0, float("nan"), 0]}, "rpy_deg has three"),
+        ({"quaternion": [0, 0, 0, 0]}, "no direction"),
+        ({"quaternion": [0, 0, 1]}, "four finite numbers"),
+    ],
+)
 def test_malformed_poses_are_refused(data, sentence):
     with pytest.raises(ValueError, match=sentence):
         Pose.from_dict(data)
@@ -54,8 +65,10 @@ def test_malformed_poses_are_refused(data, sentence):
 
 def test_the_mean_of_noisy_poses_is_near_the_truth_whatever_the_signs_of_their_quaternions():
     truth = random_pose()
-    noisy = [truth * Pose(0.01 * RNG.normal(size=3), rotation([*(0.01 * RNG.normal(size=3)), 1.0]).as_quat())
-             for _ in range(400)]
+    noisy = [
+        truth * Pose(0.01 * RNG.normal(size=3), rotation([*(0.01 * RNG.normal(size=3)), 1.0]).as_quat())
+        for _ in range(400)
+    ]
     mixed = [Pose(pose.position, pose.orientation * (-1) ** i) for i, pose in enumerate(noisy)]
     far, angle = mean_pose(mixed).distance(truth)
     assert far < 0.003 and angle < 0.004

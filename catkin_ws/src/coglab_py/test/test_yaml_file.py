@@ -1,4 +1,5 @@
 """YAML files: lines, strictness, schema."""
+
 import pytest
 from coglab_py.yaml_file import LARGEST_FILE, YamlError, parse, read
 
@@ -13,20 +14,33 @@ def test_a_field_is_named_with_its_line():
     assert document.sentence(("a", "c"), "is missing") == "f.yaml:2: a.c: is missing"
 
 
-@pytest.mark.parametrize("text, sentence", [
-    ("", "f.yaml: line 1: the file is empty"), ("a: [1", r"f.yaml:\d+: not YAML"),
-    ("a: &x 1\nb: *x", "line 2: aliases"),
-    ("a: 1\na: 2", "line 2: field 'a' appears twice"), ("[" * 20 + "]" * 20, "nested more than 16"),
-    ("? [1]\n: 2", "name is one word"), ("a: 2020-13-45", "cannot be read as what it looks like"),
-    ("#" * (LARGEST_FILE + 1), "at most"), ("a: !!python/object:x.Y {}", "not YAML")])
+@pytest.mark.parametrize(
+    "text, sentence",
+    [
+        ("", "f.yaml: line 1: the file is empty"),
+        ("a: [1", r"f.yaml:\d+: not YAML"),
+        ("a: &x 1\nb: *x", "line 2: aliases"),
+        ("a: 1\na: 2", "line 2: field 'a' appears twice"),
+        ("[" * 20 + "]" * 20, "nested more than 16"),
+        ("? [1]\n: 2", "name is one word"),
+        ("a: 2020-13-45", "cannot be read as what it looks like"),
+        ("#" * (LARGEST_FILE + 1), "at most"),
+        ("a: !!python/object:x.Y {}", "not YAML"),
+    ],
+)
 def test_what_is_refused(text, sentence):
     with pytest.raises(YamlError, match=sentence):
         parse(text, "f.yaml")
 
 
-@pytest.mark.parametrize("text, sentence", [
-    ("a: .nan", "a finite number"), ("a: 3000000000", "a whole number of at most"),
-    ('a: "\\x07"', "control characters")])
+@pytest.mark.parametrize(
+    "text, sentence",
+    [
+        ("a: .nan", "a finite number"),
+        ("a: 3000000000", "a whole number of at most"),
+        ('a: "\\x07"', "control characters"),
+    ],
+)
 def test_what_ros_cannot_carry_is_refused(text, sentence):
     with pytest.raises(YamlError, match=f"f.yaml:1: a: .*{sentence}"):
         parse(text, "f.yaml").check({})

@@ -12,7 +12,7 @@ namespace coglab_rt {
 namespace {
 
 /// The pages that a body uses first are there before it runs: no page fault comes later.
-TEST(BoundedThread, theStackBelowTheBodyIsTouchedBeforeItRuns) {
+TEST(BoundedThread, TheStackBelowTheBodyIsTouchedBeforeItRuns) {
   constexpr std::size_t kStack = 4096 * 1024;  // no stack that the C library keeps from before
   std::size_t present = 0, looked_at = 0;
   BoundedThread thread;

@@ -11,7 +11,7 @@
 namespace coglab_rt {
 namespace {
 
-TEST(Braking, reachEqualsTheSampledStop) {
+TEST(Braking, ReachEqualsTheSampledStop) {
   std::mt19937 random(2);
   std::uniform_real_distribution<double> part(-1.0, 1.0);
   for (int i = 0; i < 3000; ++i) {
@@ -31,7 +31,7 @@ TEST(Braking, reachEqualsTheSampledStop) {
   }
 }
 
-TEST(Braking, distanceAndSpeedAreInverse) {
+TEST(Braking, DistanceAndSpeedAreInverse) {
   for (const double A : {0.5, 10.0}) {
     for (const double J : {10.0, 500.0}) {
       for (const double delay : {0.0, 0.001, 0.1}) {
@@ -48,7 +48,7 @@ TEST(Braking, distanceAndSpeedAreInverse) {
 }
 
 /// 10 000 random states per tick length, each joint driven at top speed towards one of its limits.
-TEST(Braking, noPositionLimitIsCrossedFromAnyState) {
+TEST(Braking, NoPositionLimitIsCrossedFromAnyState) {
   const JointLimits limits = loadJointLimits(LIMITS_FILE);
   const BrakingGuard guard(limits, 0.0);
   std::mt19937 random(17);
@@ -95,7 +95,7 @@ TEST(Braking, noPositionLimitIsCrossedFromAnyState) {
   EXPECT_GT(at_border, 10000);
 }
 
-TEST(Braking, standsAtTheBorderAndComesBack) {
+TEST(Braking, StandsAtTheBorderAndComesBack) {
   const JointLimits limits = loadJointLimits(LIMITS_FILE);
   const BrakingGuard guard(limits, 0.01);
   Interpolator interpolator(limits);
@@ -117,7 +117,7 @@ TEST(Braking, standsAtTheBorderAndComesBack) {
   EXPECT_LT(interpolator.position()[0], guard.upper()[0] - 0.2);
 }
 
-TEST(Braking, aJointOutsideMayOnlyComeBack) {
+TEST(Braking, AJointOutsideMayOnlyComeBack) {
   const JointLimits limits = loadJointLimits(LIMITS_FILE);
   const BrakingGuard guard(limits, 0.05);
   Interpolator interpolator(limits);
@@ -137,7 +137,7 @@ TEST(Braking, aJointOutsideMayOnlyComeBack) {
   EXPECT_LT(interpolator.position()[0], outside[0] - 0.3);
 }
 
-TEST(Braking, theWayToTheBorderIsSmooth) {
+TEST(Braking, TheWayToTheBorderIsSmooth) {
   // No chatter: on the way in, the acceleration changes its direction of change only a few times.
   const JointLimits limits = loadJointLimits(LIMITS_FILE);
   const BrakingGuard guard(limits, 0.0);

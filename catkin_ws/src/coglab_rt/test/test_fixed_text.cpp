@@ -12,7 +12,7 @@
 namespace coglab_rt {
 namespace {
 
-TEST(FixedText, isCutAndAlwaysTerminated) {
+TEST(FixedText, IsCutAndAlwaysTerminated) {
   FixedText<8> text("abc");
   text << "defghij" << std::uint64_t{42};
   EXPECT_EQ(text.str(), "abcdefg");
@@ -24,7 +24,7 @@ TEST(FixedText, isCutAndAlwaysTerminated) {
   EXPECT_TRUE(text.empty());
 }
 
-TEST(FixedText, numbersReadAsTheCLibraryWritesThem) {
+TEST(FixedText, NumbersReadAsTheCLibraryWritesThem) {
   std::mt19937 random(3);
   std::uniform_real_distribution<double> size(-5.0, 12.0);
   for (int i = 0; i < 20000; ++i) {
@@ -41,7 +41,7 @@ TEST(FixedText, numbersReadAsTheCLibraryWritesThem) {
   EXPECT_EQ(odd.str(), "nan inf >1e15");
 }
 
-TEST(FixedText, equalityIsThatOfTheText) {
+TEST(FixedText, EqualityIsThatOfTheText) {
   FixedText<8> one("abc"), other("abd");
   EXPECT_NE(one, other);
   other.clear();

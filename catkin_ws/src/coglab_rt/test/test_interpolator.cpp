@@ -12,7 +12,7 @@
 namespace coglab_rt {
 namespace {
 
-TEST(Interpolator, limitsHoldByDifferentiation) {
+TEST(Interpolator, LimitsHoldByDifferentiation) {
   std::mt19937 random(11);
   std::uniform_real_distribution<double> part(-1.0, 1.0);
   for (const char* profile : {"default", "t1"}) {
@@ -43,7 +43,7 @@ TEST(Interpolator, limitsHoldByDifferentiation) {
   }
 }
 
-TEST(Interpolator, arrivesExactlyAndStays) {
+TEST(Interpolator, ArrivesExactlyAndStays) {
   const JointLimits limits = loadJointLimits(LIMITS_FILE);
   Interpolator interpolator(limits);
   Vector7 target;
@@ -55,7 +55,7 @@ TEST(Interpolator, arrivesExactlyAndStays) {
   EXPECT_TRUE(interpolator.standsStill());
 }
 
-TEST(Interpolator, planIsConsistentAlongItself) {
+TEST(Interpolator, PlanIsConsistentAlongItself) {
   // Re-planning after a part of the way leads to the same state as following the first plan.
   std::mt19937 random(5);
   std::uniform_real_distribution<double> part(-1.0, 1.0);
@@ -77,7 +77,7 @@ TEST(Interpolator, planIsConsistentAlongItself) {
   }
 }
 
-TEST(Interpolator, accelerationBeyondTheLimitComesBackFirst) {
+TEST(Interpolator, AccelerationBeyondTheLimitComesBackFirst) {
   AxisState s{0.0, 0.0, 15.0};
   for (int i = 0; i < 500; ++i) {
     const double before = s.acceleration;
@@ -88,7 +88,7 @@ TEST(Interpolator, accelerationBeyondTheLimitComesBackFirst) {
   EXPECT_EQ(s.velocity, 1.5);
 }
 
-TEST(Interpolator, matchesNumericIntegrationOfItsJerk) {
+TEST(Interpolator, MatchesNumericIntegrationOfItsJerk) {
   const AxisState start{0.0, 0.4, -3.0};
   const AxisProfile profile = planVelocity(start.velocity, start.acceleration, -1.2, 10.0, 500.0);
   double p = start.position, v = start.velocity, a = start.acceleration, t = 0.0;

@@ -41,7 +41,7 @@ std::string replaced(std::string text, const std::string& from, const std::strin
   return text.replace(at, from.size(), to);
 }
 
-TEST(JointLimits, readsTheTableAndItsProfiles) {
+TEST(JointLimits, ReadsTheTableAndItsProfiles) {
   const JointLimits full = loadJointLimits(LIMITS_FILE);
   EXPECT_NEAR(full.upper_position[0], 2.9670597, 1e-6);
   EXPECT_NEAR(full.lower_position[1], -2.0943951, 1e-6);
@@ -53,7 +53,7 @@ TEST(JointLimits, readsTheTableAndItsProfiles) {
   EXPECT_EQ(t1.upper_position, full.upper_position);
 }
 
-TEST(JointLimits, aTableWithoutServoOvershootIsCommandedInFull) {
+TEST(JointLimits, ATableWithoutServoOvershootIsCommandedInFull) {
   EXPECT_EQ(errorFor(replaced(original(), "servo_overshoot: 0.04", "")), "");
   for (const char* bad : {"-0.1", "0.6", "much", ".nan", "[0.04]"}) {
     const std::string error =
@@ -62,7 +62,7 @@ TEST(JointLimits, aTableWithoutServoOvershootIsCommandedInFull) {
   }
 }
 
-TEST(JointLimits, errorsNameFileLineAndField) {
+TEST(JointLimits, ErrorsNameFileLineAndField) {
   EXPECT_EQ(errorFor(original()), "");
   EXPECT_NE(errorFor(original(), "t3").find("profile 't3' is missing"), std::string::npos);
   const std::string short_list = errorFor(replaced(original(), "torque: [176.0, ", "torque: ["));

@@ -11,7 +11,7 @@ namespace coglab_rt {
 namespace {
 
 /// Every value that is read was written as a whole, and none comes before an older one.
-TEST(Mailbox, aReaderSeesWholeValuesInOrder) {
+TEST(Mailbox, AReaderSeesWholeValuesInOrder) {
   constexpr std::uint64_t kValues = 300'000;
   ArmMailboxes mailboxes;
   std::atomic<bool> over{false};
@@ -47,7 +47,7 @@ TEST(Mailbox, aReaderSeesWholeValuesInOrder) {
 }
 
 /// A queue loses nothing and changes no order, and says so when it is full.
-TEST(Mailbox, aQueueKeepsEverythingInOrder) {
+TEST(Mailbox, AQueueKeepsEverythingInOrder) {
   constexpr int kValues = 200'000;
   EventRing<int, 64> queue;
   std::thread writer([&] {

@@ -24,7 +24,7 @@ struct Plan {
   int answer = 0;
 };
 
-TEST(PlanExchange, aPlanThatNobodyTakesIsWithdrawnAndHasNoEffect) {
+TEST(PlanExchange, APlanThatNobodyTakesIsWithdrawnAndHasNoEffect) {
   PlanExchange<Plan> plans;
   EXPECT_EQ(plans.offer(std::make_unique<Plan>(1), 0.01), PlanOutcome::Withdrawn);
   EXPECT_EQ(plans.take(), nullptr);
@@ -32,7 +32,7 @@ TEST(PlanExchange, aPlanThatNobodyTakesIsWithdrawnAndHasNoEffect) {
   EXPECT_EQ(alive, 0);
 }
 
-TEST(PlanExchange, aPlanThatIsTakenTooLateStaysValidUntilTheNextOne) {
+TEST(PlanExchange, APlanThatIsTakenTooLateStaysValidUntilTheNextOne) {
   PlanExchange<Plan> plans;
   Plan* taken = nullptr;
   plans.setWait([&] { taken = taken != nullptr ? taken : plans.take(); });
@@ -43,7 +43,7 @@ TEST(PlanExchange, aPlanThatIsTakenTooLateStaysValidUntilTheNextOne) {
   EXPECT_EQ(plans.generation(), 1U);
 }
 
-TEST(PlanExchange, withAThreadThatTakesThemEachComesOnceAndInOrder) {
+TEST(PlanExchange, WithAThreadThatTakesThemEachComesOnceAndInOrder) {
   constexpr int kPlans = 300;
   {
     PlanExchange<Plan> plans;

@@ -10,7 +10,7 @@
 namespace coglab_rt {
 namespace {
 
-TEST(Reason, everyBlockHasWordsACodeOfItsOwnAndTheWayBack) {
+TEST(Reason, EveryBlockHasWordsACodeOfItsOwnAndTheWayBack) {
   std::set<std::uint16_t> seen;
   for (int i = 0; i < 256; ++i) {
     const auto block = static_cast<MotionBlock>(i);
@@ -24,7 +24,7 @@ TEST(Reason, everyBlockHasWordsACodeOfItsOwnAndTheWayBack) {
   EXPECT_EQ(motionBlockOf(12345), MotionBlock::NotStarted);
 }
 
-TEST(Reason, isEmptyOnlyWithoutACode) {
+TEST(Reason, IsEmptyOnlyWithoutACode) {
   Reason reason;
   EXPECT_TRUE(reason.empty());
   reason = Reason(ReasonCode::GoalStale, "the goal is ") << 0.25 << " s old";

@@ -19,7 +19,7 @@ class RosTime : public ::testing::Test {
   static void SetUpTestSuite() { ros::Time::init(); }
 };
 
-TEST_F(RosTime, thereAndBack) {
+TEST_F(RosTime, ThereAndBack) {
   for (const std::int64_t age : {0LL, 1'000'000LL, 10'000'000'000LL}) {
     const std::int64_t steady = steadyNow() - age;
     EXPECT_NEAR(static_cast<double>(toSteady(toRos(steady)) - steady), 0.0, kJitter_ns);
@@ -27,7 +27,7 @@ TEST_F(RosTime, thereAndBack) {
   }
 }
 
-TEST_F(RosTime, anyStampHasAnAge) {
+TEST_F(RosTime, AnyStampHasAnAge) {
   std::mt19937 random(5);
   for (int i = 0; i < 10000; ++i) {
     ros::Time stamp;
@@ -41,7 +41,7 @@ TEST_F(RosTime, anyStampHasAnAge) {
   }
 }
 
-TEST_F(RosTime, zeroMeansNoStampAndIsNeverMade) {
+TEST_F(RosTime, ZeroMeansNoStampAndIsNeverMade) {
   EXPECT_EQ(toSteady(ros::Time()), 0);
   ros::Time::setNow(ros::Time(3.0));  // simulated time has just begun
   EXPECT_EQ(toRos(steadyNow() - 10'000'000'000), ros::Time(3.0));

@@ -1,5 +1,6 @@
 #!/usr/bin/python3
 """The simulated cell: time of a step, dynamics against MuJoCo's, a blocked arm, lockstep. Prints JSON rows only."""
+
 import json
 import os
 import statistics
@@ -10,18 +11,18 @@ from pathlib import Path
 import numpy as np
 
 PACKAGE = Path(__file__).resolve().parents[1]
-sys.path.insert(0, str(PACKAGE / 'test'))
-URDF = PACKAGE.parent / 'lwr_description' / 'urdf' / 'lwr_ih2.urdf'
+sys.path.insert(0, str(PACKAGE / "test"))
+URDF = PACKAGE.parent / "lwr_description" / "urdf" / "lwr_ih2.urdf"
 BLOCKS, STEPS = 40, 2000
 
 
 def binary() -> str:
     """The timing program in the devel or install space on CMAKE_PREFIX_PATH."""
-    for prefix in os.environ.get('CMAKE_PREFIX_PATH', '').split(':'):
-        path = Path(prefix) / 'lib' / 'coglab_sim' / 'coglab_sim_bench_cell'
+    for prefix in os.environ.get("CMAKE_PREFIX_PATH", "").split(":"):
+        path = Path(prefix) / "lib" / "coglab_sim" / "coglab_sim_bench_cell"
         if path.is_file():
             return str(path)
-    sys.exit('coglab_sim_bench_cell not found: build the package and source its setup.bash first')
+    sys.exit("coglab_sim_bench_cell not found: build the package and source its setup.bash first")
 
 
 def equality() -> float | None:
@@ -32,11 +33,12 @@ def equality() -> float | None:
         return None
     from coglab_sim import _cell
     from test_dynamics_oracle import Oracle
+
     oracle, random, worst = Oracle(), np.random.default_rng(1), 0.0
     for _ in range(1000):
         position, velocity = random.uniform(-2.0, 2.0, 7), random.uniform(-2.0, 2.0, 7)
         theirs, ours = oracle.terms(position, velocity), _cell.arm_terms(str(URDF), position, velocity)
-        for name in ('mass', 'gravity', 'coriolis', 'jacobian'):
+        for name in ("mass", "gravity", "coriolis", "jacobian"):
             scale = max(1.0, np.abs(theirs[name]).max())
             worst = max(worst, np.abs(ours[name] - theirs[name]).max() / scale)
     return float(worst)
@@ -44,46 +46,87 @@ def equality() -> float | None:
 
 def row(figure: str, value: float, unit: str, limit: float) -> dict[str, object]:
     """A figure without a peer; fine up to `limit`."""
-    return {'bench': 'dynamics', 'figure': figure, 'value': value, 'unit': unit, 'goal': f'<= {limit:g}',
-            'peer': None, 'peer_value': None, 'ok': value <= limit}
+    return {
+        "bench": "dynamics",
+        "figure": figure,
+        "value": value,
+        "unit": unit,
+        "goal": f"<= {limit:g}",
+        "peer": None,
+        "peer_value": None,
+        "ok": value <= limit,
+    }
 
 
 def blocked_rows() -> list[dict[str, object]]:
     """Bridge and cell: the moving arm is held for 5 s and released; worst of two motions and three periods."""
     from wire import BLOCKED_MODES, BLOCKED_MOTIONS, Wire, speed_after_block
-    return [row(f'{mode}: peak speed after 5 s against a block', round(max(
-        speed_after_block(Wire(krc__period=period), mode, moving)
-        for moving in BLOCKED_MOTIONS for period in (0.001, 0.005, 0.02)), 5), 'rad/s', 0.1) for mode in BLOCKED_MODES]
+
+    return [
+        row(
+            f"{mode}: peak speed after 5 s against a block",
+            round(
+                max(
+                    speed_after_block(Wire(krc__period=period), mode, moving)
+                    for moving in BLOCKED_MOTIONS
+                    for period in (0.001, 0.005, 0.02)
+                ),
+                5,
+            ),
+            "rad/s",
+            0.1,
+        )
+        for mode in BLOCKED_MODES
+    ]
 
 
 def lockstep_row() -> dict[str, object]:
     """Two runs with the same seed, byte by byte."""
     from wire import lockstep_bytes
+
     periods = 3000
     first, second = lockstep_bytes(6, periods), lockstep_bytes(6, periods)
     different = sum(a != b for a, b in zip(first, second, strict=True))
-    return row(f'lockstep: datagrams that differ between two runs of {periods} periods', different, 'datagrams', 0)
+    return row(f"lockstep: datagrams that differ between two runs of {periods} periods", different, "datagrams", 0)
 
 
 def main() -> None:
-    output = subprocess.run([binary(), str(URDF), str(BLOCKS), str(STEPS)], check=True, capture_output=True, text=True,
-                            timeout=300).stdout
+    output = subprocess.run(
+        [binary(), str(URDF), str(BLOCKS), str(STEPS)], check=True, capture_output=True, text=True, timeout=300
+    ).stdout
     cell, terms = zip(*((float(a), float(b)) for a, b in (line.split() for line in output.splitlines())), strict=True)
     step = statistics.median(cell) * 1e-3
-    rows = [{'bench': 'dynamics', 'figure': 'complete step of the cell, 1 ms period, median processor time',
-             'value': round(step, 2),
-             'unit': 'us', 'goal': '<= 30', 'peer': 'KDL terms alone',
-             'peer_value': round(statistics.median(terms) * 1e-3, 2), 'ok': step <= 30.0}]
+    rows = [
+        {
+            "bench": "dynamics",
+            "figure": "complete step of the cell, 1 ms period, median processor time",
+            "value": round(step, 2),
+            "unit": "us",
+            "goal": "<= 30",
+            "peer": "KDL terms alone",
+            "peer_value": round(statistics.median(terms) * 1e-3, 2),
+            "ok": step <= 30.0,
+        }
+    ]
     difference = equality()
     if difference is None:
-        print('no row for the comparison with MuJoCo: mujoco-core is not installed', file=sys.stderr)
+        print("no row for the comparison with MuJoCo: mujoco-core is not installed", file=sys.stderr)
     else:
-        rows.append({'bench': 'dynamics', 'figure': 'M, C, g, J against MuJoCo, 1000 random states, largest difference',
-                     'value': difference, 'unit': 'relative', 'goal': '<= 1e-9', 'peer': None, 'peer_value': None,
-                     'ok': difference <= 1e-9})
+        rows.append(
+            {
+                "bench": "dynamics",
+                "figure": "M, C, g, J against MuJoCo, 1000 random states, largest difference",
+                "value": difference,
+                "unit": "relative",
+                "goal": "<= 1e-9",
+                "peer": None,
+                "peer_value": None,
+                "ok": difference <= 1e-9,
+            }
+        )
     rows += blocked_rows() + [lockstep_row()]
     print(json.dumps(rows, indent=1))
 
 
-if __name__ == '__main__':
+if __name__ == "__main__":
     main()

@@ -26,6 +26,7 @@
 #include "cell_messages.hpp"
 #include "cell_parameters.hpp"
 #include "coglab_rt/ros/logger_service.hpp"
+#include "coglab_sim/ranges.hpp"
 #include "coglab_sim/real_time_cell.hpp"
 
 namespace coglab_sim {

@@ -50,7 +50,8 @@ void take(CellConfig& config, const ros::NodeHandle& node, const std::string& ke
 
 double numberOf(const YAML::Node& entry, const char* field) {
   const auto value = entry[field].as<double>(std::nan(""));
-  if (!std::isfinite(value)) throw std::invalid_argument(std::string(field) + ": expected a number");
+  if (!std::isfinite(value))
+    throw std::invalid_argument(std::string(field) + ": expected a number");
   return value;
 }
 
@@ -72,8 +73,8 @@ CellConfig readCellConfig(const ros::NodeHandle& node) {
 ObjectParameters readObject(const ros::NodeHandle& node, const std::string& id) {
   if (id.find('/') != std::string::npos)
     throw std::invalid_argument("object id '" + id + "': expected the name of an object file");
-  const auto folder = node.param<std::string>(
-      "objects", ros::package::getPath("coglab_objects") + "/objects");
+  const auto folder =
+      node.param<std::string>("objects", ros::package::getPath("coglab_objects") + "/objects");
   const std::string path = folder + "/" + id + ".yaml";
   try {
     const YAML::Node entry = YAML::LoadFile(path);
@@ -86,9 +87,9 @@ ObjectParameters readObject(const ros::NodeHandle& node, const std::string& id) 
     config.object.id = id;
     return config.object;
   } catch (const std::exception& error) {
-    throw std::invalid_argument("object '" + id + "': " + path + " cannot be used (" + error.what() +
-                                "); expected a file of the object database, ./coglab object check " +
-                                id);
+    throw std::invalid_argument(
+        "object '" + id + "': " + path + " cannot be used (" + error.what() +
+        "); expected a file of the object database, ./coglab object check " + id);
   }
 }
 

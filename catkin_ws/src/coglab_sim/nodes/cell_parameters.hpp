@@ -8,8 +8,8 @@
 
 namespace coglab_sim {
 
-/// Reads the file of the object that `object/id` names, then every row of the table that is set under
-/// `node`, besides the robot description's path (by default that of lwr_description), and
+/// Reads the file of the object that `object/id` names, then every row of the table that is set
+/// under `node`, besides the robot description's path (by default that of lwr_description), and
 /// `fri_period` and `seed` of the namespace above.
 /// @throws std::invalid_argument naming what is unknown or does not fit.
 CellConfig readCellConfig(const ros::NodeHandle& node);

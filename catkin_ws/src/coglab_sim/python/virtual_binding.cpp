@@ -139,9 +139,7 @@ PYBIND11_MODULE(_virtual, m) {
 
       .def(
           "submit",
-          [](Robot& robot, const std::string& event) {
-            return robot.bridge().submit(event);
-          },
+          [](Robot& robot, const std::string& event) { return robot.bridge().submit(event); },
           "An event of ros_events; returns a ticket for outcome().")
       .def(
           "outcome",
@@ -197,8 +195,8 @@ PYBIND11_MODULE(_virtual, m) {
 
       .def(
           "add_ptp",
-          [](Robot& robot, const std::vector<double>& position,
-             const std::vector<double>& max_vel, const std::vector<double>& max_acc) {
+          [](Robot& robot, const std::vector<double>& position, const std::vector<double>& max_vel,
+             const std::vector<double>& max_acc) {
             const auto answer = robot.ptp().add({position, max_vel, max_acc});
             robot.reason_code = static_cast<std::uint16_t>(answer.code);
             return py::make_tuple(answer.status, answer.id, answer.message);
@@ -232,8 +230,8 @@ PYBIND11_MODULE(_virtual, m) {
           py::arg("filename"), "(success, message, number of primitives)")
       .def(
           "execute_dmp",
-          [](Robot& robot, const std::string& primitive, double ratio,
-             const Vector3d& offset, bool orientation_control, const Eigen::Vector4d& orientation,
+          [](Robot& robot, const std::string& primitive, double ratio, const Vector3d& offset,
+             bool orientation_control, const Eigen::Vector4d& orientation,
              const std::string& goal_frame) {
             return robot.tell(robot.dmp().execute(
                 requestOf(primitive, ratio, offset, orientation_control, orientation, goal_frame)));
@@ -244,8 +242,8 @@ PYBIND11_MODULE(_virtual, m) {
           py::arg("goal_frame") = "", "Starts from the current state; (success, message).")
       .def(
           "switch_dmp",
-          [](Robot& robot, const std::string& primitive, double ratio,
-             const Vector3d& offset, bool orientation_control, const Eigen::Vector4d& orientation) {
+          [](Robot& robot, const std::string& primitive, double ratio, const Vector3d& offset,
+             bool orientation_control, const Eigen::Vector4d& orientation) {
             return robot.tell(robot.dmp().switchDmp(
                 requestOf(primitive, ratio, offset, orientation_control, orientation, "")));
           },
@@ -253,8 +251,8 @@ PYBIND11_MODULE(_virtual, m) {
           py::arg("goal_offset") = Vector3d(Vector3d::Zero()),
           py::arg("orientation_control") = false, py::arg("target_orientation") = noOrientation())
       .def(
-          "set_ik_debug", [](Robot& robot, bool on) { robot.dmp().setIkDebug(on); },
-          py::arg("on"), "Whether ik_debug() gets records; the DMP controller must be loaded.")
+          "set_ik_debug", [](Robot& robot, bool on) { robot.dmp().setIkDebug(on); }, py::arg("on"),
+          "Whether ik_debug() gets records; the DMP controller must be loaded.")
       .def(
           "ik_debug",
           [](Robot& robot) {
@@ -264,7 +262,8 @@ PYBIND11_MODULE(_virtual, m) {
             return records;
           },
           "What dmp/ik_debug tells of the cycles since the last call: time s, goal m as estimated "
-          "or latched, set_point and measured (position, quaternion) of the hand in the base frame.")
+          "or latched, set_point and measured (position, quaternion) of the hand in the base "
+          "frame.")
       .def("dmp_progress",
            [](Robot& robot) {
              coglab_controllers::DmpProgress progress;

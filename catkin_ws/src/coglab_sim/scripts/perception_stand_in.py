@@ -49,20 +49,24 @@ class PerceptionNode:
     """Thin node over Vision and Playback."""
 
     def __init__(self) -> None:
-        names = FrameNames.from_mapping(rospy.get_param("~frames", None),
-                                        rospy.resolve_name("~frames"))
+        names = FrameNames.from_mapping(rospy.get_param("~frames", None), rospy.resolve_name("~frames"))
         settings = parameters.read("~settings", dict, {})
         settings["perfect"] = parameters.read("~perfect", bool, settings.get("perfect", False))
         seed = parameters.read("~seed", int, parameters.read("coglab_sim/seed", int, 7))
         board = parameters.read("~board", dict)
         turn = about_z(np.radians(float(board.get("yaw_deg", 0.0))))
         self.vision = Vision(
-            names, PerceptionSettings.from_mapping(settings),
-            Board(Pose(np.array(board["xyz"], dtype=float), turn),
-                  {name: np.array(place, dtype=float) for name, place in board["slots"].items()}),
-            seed, rospy.get_time, parameters.read("~partner_margin", float, 0.0, 0.0))
-        self.others = [Pose(np.array(place, dtype=float))
-                       for place in rospy.get_param("~others", OTHERS)]
+            names,
+            PerceptionSettings.from_mapping(settings),
+            Board(
+                Pose(np.array(board["xyz"], dtype=float), turn),
+                {name: np.array(place, dtype=float) for name, place in board["slots"].items()},
+            ),
+            seed,
+            rospy.get_time,
+            parameters.read("~partner_margin", float, 0.0, 0.0),
+        )
+        self.others = [Pose(np.array(place, dtype=float)) for place in rospy.get_param("~others", OTHERS)]
         self.people = parameters.read("~people", int, 1, 0, 255)
         self.truth: CellTruth | None = None
         self.broadcaster = tf2_ros.TransformBroadcaster()
@@ -74,11 +78,14 @@ class PerceptionNode:
         self.playback = None
         if playback.file:
             self.playback = Playback.open(playback, names.world, names.is_tracked)
-            rospy.loginfo("perception plays %s: %s, %.1f s", playback.file,
-                          ", ".join(self.playback.names), self.playback.recording.duration)
+            rospy.loginfo(
+                "perception plays %s: %s, %.1f s",
+                playback.file,
+                ", ".join(self.playback.names),
+                self.playback.recording.duration,
+            )
             self.timer = rospy.Timer(rospy.Duration(1.0 / PLAYBACK_HZ), self.on_timer)
-        rospy.Subscriber("coglab_sim/truth/cell", CellTruth, self.on_truth, queue_size=1,
-                         tcp_nodelay=True)
+        rospy.Subscriber("coglab_sim/truth/cell", CellTruth, self.on_truth, queue_size=1, tcp_nodelay=True)
         rospy.Subscriber("~people", UInt8, self.on_people, queue_size=1)
         rospy.Service("~init_vision", InitVision, self.on_init)
         rospy.Service("~locate_object", LocateObject, self.on_locate)
@@ -116,7 +123,7 @@ class PerceptionNode:
             hand = played.pop(names.human_hand, hand)
             objects.update(played)
         crowd = ([hand] if hand is not None else []) + self.others
-        hands = {f"person {i + 1}": each for i, each in enumerate(crowd[:self.people])}
+        hands = {f"person {i + 1}": each for i, each in enumerate(crowd[: self.people])}
         sights = self.vision.see(hands, objects, robot)
         try:
             if sights:
@@ -140,8 +147,7 @@ class PerceptionNode:
     def on_init(self, request):
         """Ready once the cell's world is visible."""
         try:
-            return InitVisionResponse(success=True,
-                                      message=self.vision.init_vision(request.timeout))
+            return InitVisionResponse(success=True, message=self.vision.init_vision(request.timeout))
         except NotSeen as reason:
             return InitVisionResponse(False, reason.code, str(reason))
 
@@ -150,11 +156,10 @@ class PerceptionNode:
         try:
             frame, sight, age = self.vision.locate(request.object_id, bounded(request.timeout))
         except NotSeen as reason:
-            return LocateObjectResponse(success=False, reason_code=reason.code,
-                                        message=str(reason))
+            return LocateObjectResponse(success=False, reason_code=reason.code, message=str(reason))
         return LocateObjectResponse(
-            success=True, frame_id=frame, age=age,
-            pose=pose(self.vision.names.world, sight.captured, sight.frame))
+            success=True, frame_id=frame, age=age, pose=pose(self.vision.names.world, sight.captured, sight.frame)
+        )
 
     def on_places(self, request):
         """Slots of the board without an object on them; else why there is none."""
@@ -163,8 +168,10 @@ class PerceptionNode:
         except NotSeen as reason:
             return FreePlacesResponse(False, reason.code, str(reason), [])
         return FreePlacesResponse(
-            success=True, message=", ".join(name for name, _ in places),
-            places=[pose(self.vision.names.board, rospy.get_time(), Pose(place)) for _, place in places])
+            success=True,
+            message=", ".join(name for name, _ in places),
+            places=[pose(self.vision.names.board, rospy.get_time(), Pose(place)) for _, place in places],
+        )
 
 
 def bounded(timeout: float) -> float:

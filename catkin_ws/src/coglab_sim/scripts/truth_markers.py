@@ -6,6 +6,7 @@ frames truth/human_hand, truth/object_<id>, truth/robot_hand; a topic of its own
 side can look them up). Names are relative to the node's namespace. Sizes come from the object's file in the
 folder of the parameter cell/objects.
 """
+
 import sys
 import time
 from pathlib import Path
@@ -64,8 +65,9 @@ class TruthMarkers:
 
     def marker(self, truth: CellTruth, name: str, kind: int, pose, size, colour) -> Marker:
         """One marker in the frame of the truth."""
-        marker = Marker(ns=name, id=0, type=kind, action=Marker.ADD, pose=pose, scale=Vector3(*size),
-                        color=ColorRGBA(*colour))
+        marker = Marker(
+            ns=name, id=0, type=kind, action=Marker.ADD, pose=pose, scale=Vector3(*size), color=ColorRGBA(*colour)
+        )
         marker.header.frame_id = truth.header.frame_id or "world"
         marker.header.stamp = rospy.Time.now()
         return marker
@@ -80,11 +82,13 @@ class TruthMarkers:
         hand = np.array([p.x, p.y, p.z])
         shoulder, elbow = arm_of(hand)
         trunk, head = shoulder + [0.06, -0.20, -0.28], shoulder + [0.04, -0.20, 0.24]
-        return [self.limb(truth, "forearm", hand, elbow, 0.075, SKIN),
-                self.limb(truth, "upper_arm", elbow, shoulder, 0.095, CLOTH),
-                self.marker(truth, "trunk", Marker.SPHERE, at(trunk), (0.26, 0.44, 0.68), CLOTH),
-                self.limb(truth, "legs", trunk - [0.0, 0.0, 0.2], np.array([*trunk[:2], FLOOR]), 0.26, DARK),
-                self.marker(truth, "head", Marker.SPHERE, at(head), (0.19, 0.17, 0.24), SKIN)]
+        return [
+            self.limb(truth, "forearm", hand, elbow, 0.075, SKIN),
+            self.limb(truth, "upper_arm", elbow, shoulder, 0.095, CLOTH),
+            self.marker(truth, "trunk", Marker.SPHERE, at(trunk), (0.26, 0.44, 0.68), CLOTH),
+            self.limb(truth, "legs", trunk - [0.0, 0.0, 0.2], np.array([*trunk[:2], FLOOR]), 0.26, DARK),
+            self.marker(truth, "head", Marker.SPHERE, at(head), (0.19, 0.17, 0.24), SKIN),
+        ]
 
     def limb(self, truth: CellTruth, name: str, end: np.ndarray, begin: np.ndarray, width: float, colour) -> Marker:
         """A cylinder from one joint to the next."""
@@ -101,8 +105,14 @@ class TruthMarkers:
         """The object in its shape; another colour once it has fallen."""
         shape = self.shape(truth.object_id)
         middle = pose_message(pose_of(truth.object) * Frame(np.array(shape.get("center", (0.0, 0.0, 0.0)))))
-        marker = self.marker(truth, "object", KINDS.get(str(shape.get("shape")), Marker.CUBE), middle,
-                             shape.get("size", (0.08, 0.08, 0.1)), RED if truth.dropped else ORANGE)
+        marker = self.marker(
+            truth,
+            "object",
+            KINDS.get(str(shape.get("shape")), Marker.CUBE),
+            middle,
+            shape.get("size", (0.08, 0.08, 0.1)),
+            RED if truth.dropped else ORANGE,
+        )
         return marker
 
     def shape(self, object_id: str) -> dict:

@@ -8,6 +8,7 @@ Parameters (private): transitions (topic, where it is another one), seed, behavi
 holds_object, react, rest, handover_object, object_in_hand (three numbers each, m), object_mass (kg; by default that
 of the cell's object in the folder cell/objects).
 """
+
 import sys
 import threading
 import time
@@ -47,8 +48,7 @@ class VirtualHumanNode:
             if rospy.has_param(f"~{name}"):
                 setattr(scene, name, np.array(parameters.numbers(f"~{name}", length=3)))
         scene.object_mass = parameters.read("~object_mass", float, object_in_cell()["mass"], 0.0, 100.0)
-        self.human = VirtualHuman(Participant.from_mapping(fields), scene,
-                                  parameters.read("~holds_object", bool, True))
+        self.human = VirtualHuman(Participant.from_mapping(fields), scene, parameters.read("~holds_object", bool, True))
         self.lock = threading.Lock()
         self.view = WorldView()
         self.palm_history: list[tuple[float, np.ndarray]] = []
@@ -67,11 +67,21 @@ class VirtualHumanNode:
         now = time.monotonic()
         robot, held = pose_of(message.robot_hand), pose_of(message.object)
         force = message.palm_force
-        numbers = [*robot.position, *robot.orientation, *held.position, *held.orientation, force.x, force.y, force.z,
-                   message.robot_load_share, message.human_load_share]
+        numbers = [
+            *robot.position,
+            *robot.orientation,
+            *held.position,
+            *held.orientation,
+            force.x,
+            force.y,
+            force.z,
+            message.robot_load_share,
+            message.human_load_share,
+        ]
         if not np.all(np.abs(numbers) < LARGEST):  # not finite either
-            rospy.logwarn_throttle(5.0, "virtual human: truth/cell ignored: a number is not finite, or beyond "
-                                        f"{LARGEST:g}")
+            rospy.logwarn_throttle(
+                5.0, f"virtual human: truth/cell ignored: a number is not finite, or beyond {LARGEST:g}"
+            )
             return
         with self.lock:
             self.palm_history.append((now, robot.position))
@@ -79,9 +89,15 @@ class VirtualHumanNode:
                 self.palm_history.pop(0)
             then, place = self.palm_history[0]
             speed = float(np.linalg.norm(robot.position - place)) / (now - then) if now - then > 0.03 else 1.0
-            self.view = WorldView(robot, speed, held,
-                                  float(np.linalg.norm([force.x, force.y, force.z])), message.robot_load_share,
-                                  message.human_load_share, message.held_by)
+            self.view = WorldView(
+                robot,
+                speed,
+                held,
+                float(np.linalg.norm([force.x, force.y, force.z])),
+                message.robot_load_share,
+                message.human_load_share,
+                message.held_by,
+            )
 
     def on_command(self, message: String) -> None:
         """What the person is asked to do."""

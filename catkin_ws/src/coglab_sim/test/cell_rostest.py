@@ -1,5 +1,6 @@
 #!/usr/bin/python3
 """The node /coglab_sim/cell: UDP, truth, finger contact, faults, placing, log file."""
+
 import csv
 import os
 import socket
@@ -25,16 +26,16 @@ from fri_client import COMMAND, MONITOR, Client, parse
 class Bridge(threading.Thread):
     """Answers on a UDP port of its own and publishes it as the bridge does."""
 
-    def __init__(self, namespace: str = '') -> None:
+    def __init__(self, namespace: str = "") -> None:
         super().__init__(daemon=True)
         self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        self.socket.bind(('127.0.0.1', 0))
+        self.socket.bind(("127.0.0.1", 0))
         self.socket.settimeout(0.2)
         self.client = Client()
         self.fields = None
         self.received = 0
         self.peers = set()
-        rospy.set_param(namespace + '/lwr/fri_port_bound', self.socket.getsockname()[1])
+        rospy.set_param(namespace + "/lwr/fri_port_bound", self.socket.getsockname()[1])
 
     def run(self) -> None:
         while not rospy.is_shutdown():
@@ -66,42 +67,42 @@ class CellNode(unittest.TestCase):
         cls.truth = []
         cls.contact = []
         cls.messages = []
-        rospy.Subscriber('/coglab_sim/truth/cell', CellTruth, cls.truth.append)
-        rospy.Subscriber('/coglab_sim/finger_contact', FingerContact, cls.contact.append)
-        rospy.Subscriber('/coglab_sim/cell/messages', String, lambda m: cls.messages.append(m.data))
-        cls.human = rospy.Publisher('/coglab_sim/human_hand', HumanHand, queue_size=1)
-        cls.fingers = rospy.Publisher('/coglab_sim/finger_positions', FingerPositions, queue_size=1)
-        rospy.wait_for_service('/coglab_sim/cell/fault', 20.0)
-        cls.fault = rospy.ServiceProxy('/coglab_sim/cell/fault', InjectFault)
-        cls.place = rospy.ServiceProxy('/coglab_sim/cell/place_object', PlaceObject)
+        rospy.Subscriber("/coglab_sim/truth/cell", CellTruth, cls.truth.append)
+        rospy.Subscriber("/coglab_sim/finger_contact", FingerContact, cls.contact.append)
+        rospy.Subscriber("/coglab_sim/cell/messages", String, lambda m: cls.messages.append(m.data))
+        cls.human = rospy.Publisher("/coglab_sim/human_hand", HumanHand, queue_size=1)
+        cls.fingers = rospy.Publisher("/coglab_sim/finger_positions", FingerPositions, queue_size=1)
+        rospy.wait_for_service("/coglab_sim/cell/fault", 20.0)
+        cls.fault = rospy.ServiceProxy("/coglab_sim/cell/fault", InjectFault)
+        cls.place = rospy.ServiceProxy("/coglab_sim/cell/place_object", PlaceObject)
         assert wait_for(lambda: cls.bridge.fields is not None and cls.truth)
 
     def command_mode(self) -> None:
-        self.assertTrue(wait_for(lambda: self.bridge.fields['quality'] >= 2))
+        self.assertTrue(wait_for(lambda: self.bridge.fields["quality"] >= 2))
         self.bridge.client.request(1, 10)
-        self.assertTrue(wait_for(lambda: self.bridge.fields['state'] == COMMAND), self.messages)
+        self.assertTrue(wait_for(lambda: self.bridge.fields["state"] == COMMAND), self.messages)
 
     def test_1_one_socket_and_the_period(self) -> None:
         self.assertEqual(len(self.bridge.peers), 1)
-        self.assertAlmostEqual(self.bridge.fields['measurement_period'], 0.01)
+        self.assertAlmostEqual(self.bridge.fields["measurement_period"], 0.01)
         before = self.bridge.received
         time.sleep(1.0)
         self.assertGreater(self.bridge.received - before, 70)
 
     def test_2_command_mode_and_faults(self) -> None:
         self.command_mode()
-        self.assertTrue(self.fault('leave_command_mode', 0.0, 0.0).success)
-        self.assertTrue(wait_for(lambda: self.bridge.fields['state'] == MONITOR))
-        self.assertTrue(wait_for(lambda: 'fault injected' in self.messages))
+        self.assertTrue(self.fault("leave_command_mode", 0.0, 0.0).success)
+        self.assertTrue(wait_for(lambda: self.bridge.fields["state"] == MONITOR))
+        self.assertTrue(wait_for(lambda: "fault injected" in self.messages))
         self.command_mode()
-        self.assertTrue(self.fault('enabling_switch', 0.0, 0.5).success)
-        self.assertTrue(wait_for(lambda: self.bridge.fields['power'] == 0))
-        self.assertTrue(wait_for(lambda: self.bridge.fields['power'] == 0x7F))  # undone by itself
-        refused = self.fault('earthquake', 1.0, 0.0)
+        self.assertTrue(self.fault("enabling_switch", 0.0, 0.5).success)
+        self.assertTrue(wait_for(lambda: self.bridge.fields["power"] == 0))
+        self.assertTrue(wait_for(lambda: self.bridge.fields["power"] == 0x7F))  # undone by itself
+        refused = self.fault("earthquake", 1.0, 0.0)
         self.assertFalse(refused.success)
-        self.assertIn('packet_loss', refused.message)
-        self.assertFalse(self.fault('packet_loss', 2.0, 0.0).success)
-        self.assertFalse(self.fault('drive_error', 9.0, 0.0).success)
+        self.assertIn("packet_loss", refused.message)
+        self.assertFalse(self.fault("packet_loss", 2.0, 0.0).success)
+        self.assertFalse(self.fault("drive_error", 9.0, 0.0).success)
 
     def test_3_person_and_fingers(self) -> None:
         palm = self.truth[-1].robot_hand.position
@@ -113,86 +114,91 @@ class CellNode(unittest.TestCase):
                 message.header.stamp = rospy.Time.now()
                 self.human.publish(message)
                 return until()
+
             return wait_for(poll, limit)
 
-        self.assertTrue(self.place('', 'human_hand', Pose(Point(-0.08, 0, -0.05), Quaternion(0, 0, 0, 1))).success)
-        self.assertTrue(show(lambda: self.truth[-1].held_by == 'human' and self.truth[-1].human_load_share > 0.9))
-        self.assertEqual(self.truth[-1].object_id, 'mug')
+        self.assertTrue(self.place("", "human_hand", Pose(Point(-0.08, 0, -0.05), Quaternion(0, 0, 0, 1))).success)
+        self.assertTrue(show(lambda: self.truth[-1].held_by == "human" and self.truth[-1].human_load_share > 0.9))
+        self.assertEqual(self.truth[-1].object_id, "mug")
         self.assertTrue(show(lambda: any(m.contact_position[2] < 255 for m in self.contact[-3:])))
         contact = self.contact[-1].contact_position[2]
         self.fingers.publish(FingerPositions(position=[0] + [contact + 20] * 4, current=[0] * 5))
-        self.assertTrue(show(lambda: self.truth[-1].held_by == 'both'))
+        self.assertTrue(show(lambda: self.truth[-1].held_by == "both"))
         message.grip = 0.0
-        self.assertTrue(show(lambda: self.truth[-1].held_by == 'robot' and self.truth[-1].robot_load_share > 0.9))
+        self.assertTrue(show(lambda: self.truth[-1].held_by == "robot" and self.truth[-1].robot_load_share > 0.9))
         self.assertLess(self.truth[-1].palm_force.z, -2.0)
         self.fingers.publish(FingerPositions(position=[0] * 5, current=[0] * 5))
         self.assertTrue(show(lambda: self.truth[-1].dropped))
 
     def test_4_bad_requests_are_refused_with_words(self) -> None:
-        answer = self.place('', 'moon', Pose(Point(), Quaternion(0, 0, 0, 1)))
+        answer = self.place("", "moon", Pose(Point(), Quaternion(0, 0, 0, 1)))
         self.assertFalse(answer.success)
-        self.assertIn('human_hand', answer.message)
+        self.assertIn("human_hand", answer.message)
         self.assertEqual(answer.reason_code, ReasonCode.INVALID_ARGUMENT)
-        self.assertFalse(self.place('', 'world', Pose()).success)  # quaternion of length 0
-        self.assertIn('objects/', self.place('unknown_thing', 'world', Pose(Point(), Quaternion(0, 0, 0, 1))).message)
-        self.human.publish(HumanHand(grip=float('nan')))
+        self.assertFalse(self.place("", "world", Pose()).success)  # quaternion of length 0
+        self.assertIn("objects/", self.place("unknown_thing", "world", Pose(Point(), Quaternion(0, 0, 0, 1))).message)
+        self.human.publish(HumanHand(grip=float("nan")))
         self.fingers.publish(FingerPositions(position=[1, 2]))
         ticks = len(self.truth)
         self.assertTrue(wait_for(lambda: len(self.truth) > ticks + 20))
 
     def test_5_every_period_is_in_the_log(self) -> None:
-        path = rospy.get_param('/coglab_sim/cell/log_file')
+        path = rospy.get_param("/coglab_sim/cell/log_file")
         time.sleep(0.3)
         with open(path) as file:
             rows = list(csv.DictReader(file))
-        times = np.array([float(row['time']) for row in rows])
+        times = np.array([float(row["time"]) for row in rows])
         self.assertGreater(len(rows), 100)
         self.assertTrue(np.allclose(np.diff(times), 0.01, atol=1e-6))
-        self.assertIn('commanded_lwr_a6', rows[0])
-        measured = np.array([float(row['measured_lwr_a1']) for row in rows])
+        self.assertIn("commanded_lwr_a6", rows[0])
+        measured = np.array([float(row["measured_lwr_a1"]) for row in rows])
         self.assertTrue(np.all(np.abs(measured) <= 2.97))
         os.unlink(path)
 
     def test_6_friopen_with_another_period(self) -> None:
-        refused = self.fault('reopen', 0.5, 0.0)
+        refused = self.fault("reopen", 0.5, 0.0)
         self.assertFalse(refused.success)
-        self.assertIn('0.001', refused.message)
-        self.assertTrue(self.fault('reopen', 0.02, 0.0).success)
-        self.assertTrue(wait_for(lambda: abs(self.bridge.fields['command_period'] - 0.02) < 1e-6))
-        self.assertTrue(wait_for(lambda: self.bridge.fields['quality'] >= 2))
+        self.assertIn("0.001", refused.message)
+        self.assertTrue(self.fault("reopen", 0.02, 0.0).success)
+        self.assertTrue(wait_for(lambda: abs(self.bridge.fields["command_period"] - 0.02) < 1e-6))
+        self.assertTrue(wait_for(lambda: self.bridge.fields["quality"] >= 2))
         self.command_mode()
         before = self.bridge.received
         time.sleep(1.0)
         self.assertTrue(30 < self.bridge.received - before < 70)
 
     def test_8_parameters_out_of_range_are_refused_at_start(self) -> None:
-        binary = subprocess.check_output(['catkin_find', '--first-only', '--libexec', 'coglab_sim', 'cell_node'],
-                                         text=True).strip()
-        for name, value, expected in (('fri_port', 70000, '= 70000 is outside its range 0..65535'),
-                                      ('speed', 1000.0, '= 1000 is outside its range 0.01..100'),
-                                      ('truth_rate', 0.1, '= 0.1 is outside its range 1..1000'),
-                                      ('krc/period', 0.5, 'krc/period = 0.5 is outside its range 0.001..0.1'),
-                                      ('arm/unknown_load', -1.0, 'arm/unknown_load = -1 is outside its range 0..10'),
-                                      ('krc/convention', 'nobody', 'known: coglab, centro_epiaggio, stanford')):
-            node = f'bad_{name.replace("/", "_")}'
-            rospy.set_param(f'/{node}/fri_port', 49999)
-            rospy.set_param(f'/{node}/{name}', value)
-            run = subprocess.run([binary, f'__name:={node}'], stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
-                                 text=True, timeout=20)
+        binary = subprocess.check_output(
+            ["catkin_find", "--first-only", "--libexec", "coglab_sim", "cell_node"], text=True
+        ).strip()
+        for name, value, expected in (
+            ("fri_port", 70000, "= 70000 is outside its range 0..65535"),
+            ("speed", 1000.0, "= 1000 is outside its range 0.01..100"),
+            ("truth_rate", 0.1, "= 0.1 is outside its range 1..1000"),
+            ("krc/period", 0.5, "krc/period = 0.5 is outside its range 0.001..0.1"),
+            ("arm/unknown_load", -1.0, "arm/unknown_load = -1 is outside its range 0..10"),
+            ("krc/convention", "nobody", "known: coglab, centro_epiaggio, stanford"),
+        ):
+            node = f"bad_{name.replace('/', '_')}"
+            rospy.set_param(f"/{node}/fri_port", 49999)
+            rospy.set_param(f"/{node}/{name}", value)
+            run = subprocess.run(
+                [binary, f"__name:={node}"], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, timeout=20
+            )
             self.assertNotEqual(run.returncode, 0, name)
             self.assertIn(expected, run.stdout)
 
     def test_7_two_robots_in_one_graph(self) -> None:
         """All names are relative: the cell of another namespace finds the bridge of that namespace."""
-        second = Bridge('/second')
+        second = Bridge("/second")
         second.start()
         self.assertTrue(wait_for(lambda: second.fields is not None, 15.0))
         self.assertFalse(second.peers & self.bridge.peers)
-        rospy.wait_for_message('/second/coglab_sim/truth/cell', CellTruth, 10.0)
-        self.assertTrue(rospy.ServiceProxy('/second/coglab_sim/cell/fault', InjectFault)('block', 1.0, 0.0).success)
+        rospy.wait_for_message("/second/coglab_sim/truth/cell", CellTruth, 10.0)
+        self.assertTrue(rospy.ServiceProxy("/second/coglab_sim/cell/fault", InjectFault)("block", 1.0, 0.0).success)
         self.assertEqual(len(self.bridge.peers), 1)
 
 
-if __name__ == '__main__':
-    rospy.init_node('cell_rostest')
-    rostest.rosrun('coglab_sim', 'cell', CellNode)
+if __name__ == "__main__":
+    rospy.init_node("cell_rostest")
+    rostest.rosrun("coglab_sim", "cell", CellNode)

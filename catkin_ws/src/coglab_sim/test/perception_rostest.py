@@ -42,8 +42,9 @@ class Cell(threading.Thread):
 
     def run(self):
         while self.running and not rospy.is_shutdown():
-            self.publisher.publish(CellTruth(object_id="mug", object=pose(self.object),
-                                             human_hand=pose(HAND), robot_hand=pose(PALM)))
+            self.publisher.publish(
+                CellTruth(object_id="mug", object=pose(self.object), human_hand=pose(HAND), robot_hand=pose(PALM))
+            )
             time.sleep(0.01)
 
 
@@ -53,8 +54,7 @@ class Perception(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
         cls.services = {}
-        for name, kind in (("init_vision", InitVision), ("locate_object", LocateObject),
-                           ("free_places", FreePlaces)):
+        for name, kind in (("init_vision", InitVision), ("locate_object", LocateObject), ("free_places", FreePlaces)):
             rospy.wait_for_service(f"perception/{name}", LIMIT_S)
             cls.services[name] = rospy.ServiceProxy(f"perception/{name}", kind)
         cls.buffer = tf2_ros.Buffer()
@@ -97,8 +97,7 @@ class Perception(unittest.TestCase):
         self.assertLess(np.linalg.norm(np.array([place.x, place.y, place.z]) - OBJECT), 0.05)
         self.assertLess(answer.age, 0.5)
         for frame in ("human_hand", "object_mug", "board"):
-            self.wait(lambda frame=frame: self.buffer.can_transform("world", frame, rospy.Time(0)),
-                      f"frame {frame}")
+            self.wait(lambda frame=frame: self.buffer.can_transform("world", frame, rospy.Time(0)), f"frame {frame}")
         answer = self.call("locate_object", object_id="nothing", timeout=0.2)
         self.assertIn("in view: human_hand, object_mug", answer.message)
         self.assertEqual(answer.reason_code, ReasonCode.OBJECT_NOT_SEEN)
@@ -109,8 +108,7 @@ class Perception(unittest.TestCase):
     def test_c_two_people(self):
         self.wait(lambda: self.people.get_num_connections() > 0, "subscriber of people")
         self.people.publish(2)
-        self.wait(lambda: not self.call("locate_object", object_id="human_hand",
-                                        timeout=0.05).success, "doubt")
+        self.wait(lambda: not self.call("locate_object", object_id="human_hand", timeout=0.05).success, "doubt")
         for target in ("human_hand", "mug"):
             answer = self.call("locate_object", object_id=target, timeout=0.1)
             self.assertIn("2 people are in view; one partner is expected", answer.message)
@@ -133,17 +131,22 @@ class Perception(unittest.TestCase):
         frames = dict(rospy.get_param("perception/frames"), human_hand="played_hand")
         rospy.set_param("played/perception/frames", frames)
         rospy.set_param("played/perception/recording", {"file": str(path), "at_end": "loop"})
-        rospy.set_param("played/motion_recogniser/patterns",
-                        str(SOURCES / "coglab_perception" / "config" / "patterns.json"))
-        scripts = [SOURCES / "coglab_sim" / "scripts" / "perception_stand_in.py",
-                   SOURCES / "coglab_perception" / "scripts" / "motion_recogniser_node.py"]
+        rospy.set_param(
+            "played/motion_recogniser/patterns", str(SOURCES / "coglab_perception" / "config" / "patterns.json")
+        )
+        scripts = [
+            SOURCES / "coglab_sim" / "scripts" / "perception_stand_in.py",
+            SOURCES / "coglab_perception" / "scripts" / "motion_recogniser_node.py",
+        ]
         names = ("perception", "motion_recogniser")
-        nodes = [subprocess.Popen([sys.executable, str(script), "__ns:=played", f"__name:={name}"],
-                                  stderr=subprocess.PIPE, text=True)
-                 for script, name in zip(scripts, names, strict=True)]
+        nodes = [
+            subprocess.Popen(
+                [sys.executable, str(script), "__ns:=played", f"__name:={name}"], stderr=subprocess.PIPE, text=True
+            )
+            for script, name in zip(scripts, names, strict=True)
+        ]
         try:
-            self.wait(lambda: any(m.decided and m.pattern == "high" for m in seen),
-                      "the recognition of 'high'")
+            self.wait(lambda: any(m.decided and m.pattern == "high" for m in seen), "the recognition of 'high'")
             self.assertFalse([m.pattern for m in seen if m.decided and m.pattern != "high"])
             message = next(m for m in seen if m.decided)
             self.assertAlmostEqual(sum(message.probabilities), 1.0)

@@ -1,4 +1,5 @@
 """Both ends of the wire in lockstep: the bridge against the controller stand-in, bytes in between."""
+
 import os
 import struct
 
@@ -9,16 +10,22 @@ import yaml
 from fri_client import Session, parse, set_point
 from wire import BLOCKED_MODES, BLOCKED_MOTIONS, LIMITS, MODES, URDF, Wire, lockstep_bytes, speed_after_block
 
-LONG = os.environ.get('COGLAB_LONG') == '1'
+LONG = os.environ.get("COGLAB_LONG") == "1"
 
 
-@pytest.mark.parametrize('convention, mode', [
-    (convention, mode) for convention in ('coglab', 'centro_epiaggio', 'stanford', 'rcprg_tum', 'rtt_lwr', 'openkc')
-    for mode in MODES if convention != 'rcprg_tum' or mode == 'joint_impedance'])  # that program fixes the strategy
+@pytest.mark.parametrize(
+    "convention, mode",
+    [
+        (convention, mode)
+        for convention in ("coglab", "centro_epiaggio", "stanford", "rcprg_tum", "rtt_lwr", "openkc")
+        for mode in MODES
+        if convention != "rcprg_tum" or mode == "joint_impedance"
+    ],
+)  # that program fixes the strategy
 def test_every_convention_reaches_every_strategy_it_knows(convention, mode):
-    wire = Wire({'krl_convention': convention}, krc__convention=convention)
+    wire = Wire({"krl_convention": convention}, krc__convention=convention)
     wire.start(mode)
-    assert parse(wire.measurement)['control'] == MODES[mode]
+    assert parse(wire.measurement)["control"] == MODES[mode]
     before = wire.cell.position.copy()
     wire.velocity = np.array([0.3, 0, 0, 0, 0, 0, 0.0])
     wire.run(1.0)
@@ -26,24 +33,24 @@ def test_every_convention_reaches_every_strategy_it_knows(convention, mode):
     moved = wire.cell.position - before
     assert 0.2 < moved[0] < 0.31 and np.abs(moved[1:]).max() < 0.03
     wire.velocity = None
-    assert wire.request('stop')[0]
+    assert wire.request("stop")[0]
     assert wire.cell.fri_state == 1 and wire.cell.messages == []
 
 
-@pytest.mark.parametrize('period', [0.001, 0.005, 0.02])
-@pytest.mark.parametrize('moving', BLOCKED_MOTIONS)
-@pytest.mark.parametrize('mode', BLOCKED_MODES)
+@pytest.mark.parametrize("period", [0.001, 0.005, 0.02])
+@pytest.mark.parametrize("moving", BLOCKED_MOTIONS)
+@pytest.mark.parametrize("mode", BLOCKED_MODES)
 def test_blocked_for_5_s_then_released(mode, moving, period):
     wire = Wire(krc__period=period)
     assert speed_after_block(wire, mode, moving) <= 0.1
     # A stiff servo reaches the full torque of a small joint before the leash: then the controller's monitor ends it.
-    torque = any('maximum torque' in text for _, text in wire.cell.messages)
-    assert torque or wire.bridge.snapshot()['leash_trips'] == 1
-    if mode not in ('position', 'cartesian_impedance') and moving == 'A1 A2':
+    torque = any("maximum torque" in text for _, text in wire.cell.messages)
+    assert torque or wire.bridge.snapshot()["leash_trips"] == 1
+    if mode not in ("position", "cartesian_impedance") and moving == "A1 A2":
         assert not torque and wire.cell.fri_state == 2
 
 
-@pytest.mark.parametrize('burst', [1, 2, 3, 5])
+@pytest.mark.parametrize("burst", [1, 2, 3, 5])
 def test_losses_within_tolerance_are_ridden_through(burst):
     wire = Wire(krc__period=0.001)
     wire.start()
@@ -60,14 +67,14 @@ def test_losses_within_tolerance_are_ridden_through(burst):
     assert wire.cell.fri_state == 2, wire.cell.messages
 
 
-@pytest.mark.parametrize('how', ['10 % both ways', 'burst of 50 ms'])
-@pytest.mark.parametrize('seed', range(5))
+@pytest.mark.parametrize("how", ["10 % both ways", "burst of 50 ms"])
+@pytest.mark.parametrize("seed", range(5))
 def test_losses_beyond_tolerance_end_mirrored_in_monitor_mode(how, seed):
     wire = Wire(krc__period=0.001, seed=seed)
     wire.start()
     wire.velocity = np.array([0.5, -0.3, 0.2, 0.1, -0.5, 0.4, 0.6])
     wire.run(0.4)
-    if how.startswith('10'):
+    if how.startswith("10"):
         wire.cell.set_loss(0.1, 0.1)
     else:
         wire.cell.lose_next(50)
@@ -90,19 +97,20 @@ def test_losses_beyond_tolerance_end_mirrored_in_monitor_mode(how, seed):
         if wire.measurement is not None and wire.commands:
             assert np.abs(wire.commands[-1] - wire.cell.position).max() < 0.05
     assert np.abs(wire.cell.position - stood).max() < 0.06
-    assert any('successive answers missing' in text or 'quality unacceptable' in text
-               for _, text in wire.cell.messages)  # the controller says why
+    assert any(
+        "successive answers missing" in text or "quality unacceptable" in text for _, text in wire.cell.messages
+    )  # the controller says why
     fields = parse(wire.measurement)
-    assert fields['power'] == 0 and np.abs(wire.cell.velocity).max() == 0.0
+    assert fields["power"] == 0 and np.abs(wire.cell.velocity).max() == 0.0
     assert np.abs(wire.commands[-1] - set_point(fields)).max() < 1e-6  # mirrored
     snapshot = wire.bridge.snapshot()
-    assert not snapshot['motion_allowed'] and snapshot['fall_backs'] == 1
-    assert snapshot['supervisor'] == 'stopped' and 'start' in snapshot['reason']
-    assert snapshot['lost_measurements'] > 0
+    assert not snapshot["motion_allowed"] and snapshot["fall_backs"] == 1
+    assert snapshot["supervisor"] == "stopped" and "start" in snapshot["reason"]
+    assert snapshot["lost_measurements"] > 0
     before = wire.cell.position.copy()  # it stands, and only a start gets it going again
     wire.run(1.0)
     assert np.abs(wire.cell.position - before).max() < 1e-9
-    assert wire.request('start')[0]
+    assert wire.request("start")[0]
     wire.run(0.3)
     assert wire.cell.fri_state == 2
 
@@ -125,11 +133,11 @@ def test_no_position_limit_is_crossed_at_top_speed():
         assert abs(wire.cell.set_point[joint]) > limits.upper_position[joint] - 0.05
 
 
-@pytest.mark.parametrize('period', [0.001, 0.01])
+@pytest.mark.parametrize("period", [0.001, 0.01])
 def test_the_measured_arm_keeps_the_speed_limits_of_the_table(period):
     """To full speed and back, every joint: the servos pass what they are told, not what the table says."""
     with open(LIMITS) as table:
-        limit = np.array(yaml.safe_load(table)['default']['velocity'])
+        limit = np.array(yaml.safe_load(table)["default"]["velocity"])
     measured, true, sent = np.zeros(7), np.zeros(7), np.zeros(7)
     wire = Wire(krc__period=period, home=[0.0, 0.3, 0.0, 0.9, 0.0, 0.3, 0.0])
     wire.start()
@@ -140,8 +148,8 @@ def test_the_measured_arm_keeps_the_speed_limits_of_the_table(period):
             for _ in range(round(0.45 / period)):
                 wire.tick()
                 snapshot = wire.bridge.snapshot()
-                measured = np.maximum(measured, np.abs(snapshot['velocity']) / limit)
-                sent = np.maximum(sent, np.abs(snapshot['commanded_velocity']) / limit)
+                measured = np.maximum(measured, np.abs(snapshot["velocity"]) / limit)
+                sent = np.maximum(sent, np.abs(snapshot["commanded_velocity"]) / limit)
                 true = np.maximum(true, np.abs(wire.cell.velocity) / limit)
     assert true.max() <= 1.0 and measured.max() <= 1.0, (true, measured)
     assert measured.min() > 0.95 and sent.max() < 1.0  # and the limits are used
@@ -171,7 +179,7 @@ def rubbish(random, good: bytes, old: list[bytes]) -> bytes:
     if kind == 0:
         return random.bytes(int(random.integers(0, 1500)))
     if kind == 1:
-        return good[:int(random.integers(0, 376))]
+        return good[: int(random.integers(0, 376))]
     if kind == 2:
         return good + random.bytes(int(random.integers(1, 1200)))
     if kind == 3:
@@ -179,10 +187,10 @@ def rubbish(random, good: bytes, old: list[bytes]) -> bytes:
     data = bytearray(good)
     if kind == 4:  # true length and header, but for a measurement that is gone; the rest at random
         data[8:] = random.bytes(368)
-        reflected = struct.unpack_from('<H', good, 2)[0] - int(random.integers(1, 60000))
-        struct.pack_into('<H', data, 2, reflected & 0xFFFF)
+        reflected = struct.unpack_from("<H", good, 2)[0] - int(random.integers(1, 60000))
+        struct.pack_into("<H", data, 2, reflected & 0xFFFF)
     else:
-        struct.pack_into('<H', data, int(random.choice([4, 6])), int(random.integers(0x1100, 0xFFFF)))
+        struct.pack_into("<H", data, int(random.choice([4, 6])), int(random.integers(0x1100, 0xFFFF)))
         data[0:2] = random.bytes(2)
     return bytes(data)
 
@@ -241,11 +249,11 @@ def test_a_well_formed_answer_with_random_content_is_refused_and_moves_nothing()
         assert np.abs(wire.cell.velocity).max() == 0.0
 
 
-@pytest.mark.parametrize('convention', ['coglab', 'rcprg_tum'])
+@pytest.mark.parametrize("convention", ["coglab", "rcprg_tum"])
 def test_friopen_with_another_period(convention):
     """1, 5, 100, 2 ms in one session of the bridge: closed and opened again, then it moves as before."""
-    wire = Wire({'krl_convention': convention}, krc__period=0.001, krc__convention=convention)
-    mode = 'joint_impedance' if convention == 'rcprg_tum' else 'position'
+    wire = Wire({"krl_convention": convention}, krc__period=0.001, krc__convention=convention)
+    mode = "joint_impedance" if convention == "rcprg_tum" else "position"
     wire.start(mode)
     limits = bridge_module.JointLimits(LIMITS)
     for changes, period in enumerate([0.001, 0.005, 0.1, 0.002]):
@@ -254,9 +262,9 @@ def test_friopen_with_another_period(convention):
             wire.run(0.01)
             wire.start(mode)
         assert wire.cell.period == pytest.approx(period)
-        assert parse(wire.measurement)['command_period'] == pytest.approx(period)
+        assert parse(wire.measurement)["command_period"] == pytest.approx(period)
         snapshot = wire.bridge.snapshot()
-        assert snapshot['cycle_time'] == pytest.approx(period)
+        assert snapshot["cycle_time"] == pytest.approx(period)
         before, last = wire.cell.set_point.copy(), wire.cell.set_point.copy()
         wire.velocity = np.array([0.2, 0, 0, 0, 0, 0.2, 0])
         speed = np.zeros(7)
@@ -268,19 +276,19 @@ def test_friopen_with_another_period(convention):
             last, speed = wire.cell.set_point.copy(), now
         moved = wire.cell.set_point - before
         assert moved[0] == pytest.approx(0.4, abs=0.06) and moved[5] == pytest.approx(0.4, abs=0.06)
-        assert abs(wire.bridge.snapshot()['velocity'][0] - 0.2) < 0.05
+        assert abs(wire.bridge.snapshot()["velocity"][0] - 0.2) < 0.05
         wire.velocity = -wire.velocity
         wire.run(2.0)
         wire.velocity = None
-        assert wire.request('stop')[0]
+        assert wire.request("stop")[0]
         assert wire.cell.fri_state == 1, wire.cell.messages
 
 
-@pytest.mark.parametrize('pause', [0.0, 0.1, 0.6])
-@pytest.mark.parametrize('convention', ['coglab', 'centro_epiaggio', 'stanford', 'rtt_lwr'])
+@pytest.mark.parametrize("pause", [0.0, 0.1, 0.6])
+@pytest.mark.parametrize("convention", ["coglab", "centro_epiaggio", "stanford", "rtt_lwr"])
 def test_friopen_in_the_middle_of_a_motion(convention, pause):
     """The operator starts the KRL program anew while the arm moves: it stands, mirrored, until an explicit start."""
-    wire = Wire({'krl_convention': convention}, krc__period=0.002, krc__convention=convention)
+    wire = Wire({"krl_convention": convention}, krc__period=0.002, krc__convention=convention)
     wire.start()
     wire.velocity = np.array([0.4, 0, 0, 0, 0, 0.4, 0])
     wire.run(0.5)
@@ -290,11 +298,11 @@ def test_friopen_in_the_middle_of_a_motion(convention, pause):
         wire.tick()
         assert np.abs(wire.cell.set_point - stood).max() < 1e-6
     fields = parse(wire.measurement)
-    assert (fields['state'], fields['command_period']) == (1, pytest.approx(0.010))
+    assert (fields["state"], fields["command_period"]) == (1, pytest.approx(0.010))
     assert np.abs(wire.commands[-1] - set_point(fields)).max() < 1e-6  # mirrored
     snapshot = wire.bridge.snapshot()
-    assert snapshot['fall_backs'] == 1 and not snapshot['motion_allowed']
-    assert wire.request('start')[0], wire.cell.messages
+    assert snapshot["fall_backs"] == 1 and not snapshot["motion_allowed"]
+    assert wire.request("start")[0], wire.cell.messages
     before = wire.cell.set_point.copy()
     wire.run(1.0)
     assert wire.cell.set_point[0] - before[0] == pytest.approx(0.4, abs=0.05)
@@ -303,36 +311,36 @@ def test_friopen_in_the_middle_of_a_motion(convention, pause):
 
 def test_the_program_of_rcprg_opens_fri_again_on_request():
     """FRM_INT[1] = 3 with the period in ms in FRM_INT[2], as its own PC stack asks."""
-    s = Session(URDF, krc__period=0.002, krc__convention='rcprg_tum')
+    s = Session(URDF, krc__period=0.002, krc__convention="rcprg_tum")
     s.monitor()
     s.client.ints[0:2], s.client.bools = [3, 10], 1
     s.run(0.3)
     assert s.cell.period == pytest.approx(0.010)
     s.client.bools = 0
     fields = s.run(1.5)
-    assert fields['command_period'] == pytest.approx(0.010) and fields['quality'] == 3
+    assert fields["command_period"] == pytest.approx(0.010) and fields["quality"] == 3
     s.client.ints[0:2], s.client.bools = [3, 500], 1  # out of range: said, and FRI stays closed
     s.run(0.3)
-    assert any('friOpen: period' in text for text in s.texts())
+    assert any("friOpen: period" in text for text in s.texts())
 
 
 def test_t1_profile_is_slow_enough_for_t1():
     """At full wish the t1 profile never trips the controller's T1 limit; the default profile does."""
-    for profile, good in (('t1', True), ('default', False)):
-        wire = Wire(profile=profile, krc__mode='T1')
+    for profile, good in (("t1", True), ("default", False)):
+        wire = Wire(profile=profile, krc__mode="T1")
         wire.start()
         for tick in range(1500):
             wire.velocity = np.full(7, 2.0) * np.sin(0.01 * tick)
             wire.tick()
         assert (wire.cell.fri_state == 2) == good, wire.cell.messages
-        assert any('FRI speed limit' in text for _, text in wire.cell.messages) != good
+        assert any("FRI speed limit" in text for _, text in wire.cell.messages) != good
 
 
-@pytest.mark.parametrize('mode', ['joint_impedance stiffness 25', 'cartesian_impedance stiffness 60 10'])
-@pytest.mark.parametrize('leash_load', [10.0, 0.0])
+@pytest.mark.parametrize("mode", ["joint_impedance stiffness 25", "cartesian_impedance stiffness 60 10"])
+@pytest.mark.parametrize("leash_load", [10.0, 0.0])
 def test_a_soft_arm_with_a_load_moves_on(mode, leash_load):
     """0.8 kg that the load data do not know, in a soft impedance: its sag is no block; without the allowance it was."""
-    wire = Wire({'leash_load': leash_load}, arm__unknown_load=0.8)
+    wire = Wire({"leash_load": leash_load}, arm__unknown_load=0.8)
     wire.start(mode)
     wire.run(1.0)
     sag = 0.0
@@ -340,10 +348,10 @@ def test_a_soft_arm_with_a_load_moves_on(mode, leash_load):
         wire.velocity = np.array(velocity)
         for _ in range(round(1.5 / wire.cell.period)):
             wire.tick()
-            sag = max(sag, np.abs(wire.bridge.snapshot()['commanded_position'] - wire.cell.position).max())
+            sag = max(sag, np.abs(wire.bridge.snapshot()["commanded_position"] - wire.cell.position).max())
     assert wire.cell.fri_state == 2, wire.cell.messages
     assert sag > 0.10
-    assert (wire.bridge.snapshot()['leash_trips'] == 0) == (leash_load > 0.0)
+    assert (wire.bridge.snapshot()["leash_trips"] == 0) == (leash_load > 0.0)
 
 
 def test_command_goes_on_from_the_reported_set_point_after_a_gap():
@@ -357,9 +365,9 @@ def test_command_goes_on_from_the_reported_set_point_after_a_gap():
             wire.tick()
         assert wire.measurement is not None
         reported = np.array(set_point(parse(wire.measurement)))
-        resumed = wire.bridge.snapshot()['resumed_after_gap']
+        resumed = wire.bridge.snapshot()["resumed_after_gap"]
         wire.tick()
-        assert wire.bridge.snapshot()['resumed_after_gap'] == resumed + 1
+        assert wire.bridge.snapshot()["resumed_after_gap"] == resumed + 1
         assert np.abs(wire.commands[-1] - reported - wire.velocity * 0.001).max() < 1e-5
         wire.run(0.05)
     assert wire.cell.fri_state == 2, wire.cell.messages
@@ -367,22 +375,22 @@ def test_command_goes_on_from_the_reported_set_point_after_a_gap():
 
 def test_kuka_sample_application():
     """What KUKA's firstApp does: 1, then 10 once the quality is OK; a real is echoed; -1 ends it."""
-    s = Session(URDF, krc__convention='kuka_sample')
+    s = Session(URDF, krc__convention="kuka_sample")
     ended, moved, start = False, 0.0, None
     for _ in range(4000):
         fields = s.tick()
         if fields is None:
             continue
-        if fields['ints'][0] == -1:
+        if fields["ints"][0] == -1:
             ended = True
             break
-        s.client.ints[0] = 10 if fields['quality'] >= 2 else 1
-        s.client.reals[0] = fields['reals'][1]
-        if fields['state'] == 2:
+        s.client.ints[0] = 10 if fields["quality"] >= 2 else 1
+        s.client.reals[0] = fields["reals"][1]
+        if fields["state"] == 2:
             # The sample follows the controller's own command and adds nothing; then the key switch is turned.
             start = start or s.cell.time
-            moved = max(moved, np.abs(np.array(fields['offset'])).max())
+            moved = max(moved, np.abs(np.array(fields["offset"])).max())
             if s.cell.time - start > 1.0:
-                s.cell.leave_command_mode('end of the sample')
+                s.cell.leave_command_mode("end of the sample")
     assert ended and start is not None and moved < 1e-6
     assert s.client.reals[0] > 0.0

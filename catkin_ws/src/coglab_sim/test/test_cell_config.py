@@ -1,4 +1,5 @@
 """config/cell.yaml: every name is one of the table's, and every object of the database is one for the cell."""
+
 from pathlib import Path
 
 import pytest
@@ -8,46 +9,46 @@ from coglab_sim import _cell
 from conftest import URDF
 
 PACKAGE = Path(__file__).resolve().parents[1]
-CONFIG = yaml.safe_load((PACKAGE / 'config' / 'cell.yaml').read_text())
-OBJECTS = sorted(path.stem for path in objects_folder().glob('*.yaml'))
+CONFIG = yaml.safe_load((PACKAGE / "config" / "cell.yaml").read_text())
+OBJECTS = sorted(path.stem for path in objects_folder().glob("*.yaml"))
 
 
 def test_names_are_known():
-    names = {row['name'] for row in _cell.parameter_table()}
-    given = {f'{group}/{name}': value for group in ('object', 'contact') for name, value in CONFIG[group].items()}
+    names = {row["name"] for row in _cell.parameter_table()}
+    given = {f"{group}/{name}": value for group in ("object", "contact") for name, value in CONFIG[group].items()}
     assert set(given) <= names
     _cell.Cell(URDF, given)
-    assert set(CONFIG) == {'object', 'contact'}
+    assert set(CONFIG) == {"object", "contact"}
 
 
-@pytest.mark.parametrize('object_id', OBJECTS)
+@pytest.mark.parametrize("object_id", OBJECTS)
 def test_the_cell_takes_every_object_of_the_database(object_id):
-    entry, _ = read_object(objects_folder() / f'{object_id}.yaml')
-    _cell.Cell(URDF, {f'object/{name}': value for name, value in cell_parameters(entry).items()})
+    entry, _ = read_object(objects_folder() / f"{object_id}.yaml")
+    _cell.Cell(URDF, {f"object/{name}": value for name, value in cell_parameters(entry).items()})
 
 
 def test_the_configuration_repeats_nothing_that_the_database_says():
-    assert set(CONFIG['object']) <= {'id', 'start', 'position', 'rotation'}
+    assert set(CONFIG["object"]) <= {"id", "start", "position", "rotation"}
 
 
-NUMBERS = [row for row in _cell.parameter_table() if row['low'] < row['high']]
+NUMBERS = [row for row in _cell.parameter_table() if row["low"] < row["high"]]
 
 
 def test_every_number_has_a_range_and_a_default_within():
     for row in _cell.parameter_table():
-        value = row['default']
+        value = row["default"]
         if isinstance(value, (str, bool)):
             continue
-        assert row['low'] < row['high'], row['name']
+        assert row["low"] < row["high"], row["name"]
         for number in value if isinstance(value, list) else [value]:
-            assert row['low'] <= number <= row['high'], row['name']
+            assert row["low"] <= number <= row["high"], row["name"]
 
 
-@pytest.mark.parametrize('row', NUMBERS, ids=lambda row: row['name'])
+@pytest.mark.parametrize("row", NUMBERS, ids=lambda row: row["name"])
 def test_numbers_out_of_range_are_refused_with_name_value_and_range(row):
-    width = row['high'] - row['low']
-    for bad in (row['low'] - 0.5 * width - 1.0, row['high'] + 0.5 * width + 1.0, float('nan'), float('inf')):
-        value = row['default']
+    width = row["high"] - row["low"]
+    for bad in (row["low"] - 0.5 * width - 1.0, row["high"] + 0.5 * width + 1.0, float("nan"), float("inf")):
+        value = row["default"]
         if isinstance(value, list):
             value = [*value[:-1], bad]
         elif isinstance(value, int) and bad == bad and abs(bad) < 2e9:
@@ -55,7 +56,7 @@ def test_numbers_out_of_range_are_refused_with_name_value_and_range(row):
         else:
             value = bad
         with pytest.raises(ValueError) as error:
-            _cell.Cell(URDF, {row['name']: value})
+            _cell.Cell(URDF, {row["name"]: value})
         text = str(error.value)
-        assert row['name'] in text and f"range {row['low']:g}..{row['high']:g}" in text, text
-        assert f'= {bad:g}'[:6] in text or 'nan' in text or 'inf' in text, text
+        assert row["name"] in text and f"range {row['low']:g}..{row['high']:g}" in text, text
+        assert f"= {bad:g}"[:6] in text or "nan" in text or "inf" in text, text

@@ -1,4 +1,5 @@
 """The controller stand-in's session: states, statistics, power, entry, faults; fri_client reads the bytes again."""
+
 import math
 import random
 
@@ -15,48 +16,48 @@ def test_first_measurements_look_like_a_controllers(session):
         raw.append(s.measurement)
     first, second = parse(raw[0]), parse(raw[1])
     assert raw[0][:8] == bytes([1, 0, 0, 0, 0x94, 0x03, 0x06, 0x20])
-    assert second['header'] == (2, 1, 916, 0x2006)
-    assert first['state'] == MONITOR and first['quality'] == 0 and first['control'] == 1
-    assert first['measurement_period'] == first['command_period'] == pytest.approx(0.005)
-    times = [parse(data)['timestamp'] for data in raw]
+    assert second["header"] == (2, 1, 916, 0x2006)
+    assert first["state"] == MONITOR and first["quality"] == 0 and first["control"] == 1
+    assert first["measurement_period"] == first["command_period"] == pytest.approx(0.005)
+    times = [parse(data)["timestamp"] for data in raw]
     assert times == sorted(times) and len(set(times)) == 3
 
 
 def test_quality_is_earned_over_100_packets(session):
     s = session()
-    seen = [s.tick()['quality'] for _ in range(101)]
+    seen = [s.tick()["quality"] for _ in range(101)]
     changes = {level: seen.index(level) for level in (1, 2, 3)}
     assert changes == {1: 80, 2: 95, 3: 99}
     levels = []
     for _ in range(25):  # without answers it falls again through all levels
-        levels.append(s.tick(answer=False)['quality'])
+        levels.append(s.tick(answer=False)["quality"])
     assert sorted(set(levels), reverse=True) == [3, 2, 1, 0]
     fields = s.tick(answer=False)
-    assert fields['miss_counter'] >= 25
-    assert fields['miss_rate'] == pytest.approx(1.0 - fields['answer_rate'])
+    assert fields["miss_counter"] >= 25
+    assert fields["miss_rate"] == pytest.approx(1.0 - fields["answer_rate"])
 
 
 def test_power_is_the_true_pattern(session):
     s = session()
-    patterns = {s.tick()['power'] for _ in range(600)}
+    patterns = {s.tick()["power"] for _ in range(600)}
     assert patterns == {0, 0x7F}
 
 
 def test_command_mode_follows_and_keeps_the_controllers_own_command(session):
     s = session()
-    own = s.command()['commanded']
+    own = s.command()["commanded"]
     start = np.array(set_point(parse(s.measurement)))
     for i in range(400):
         target = start.copy()
         target[0] += 0.1 * (1 - math.cos(i * 0.01))
         fields = s.tick(position=target)
-    assert fields['state'] == COMMAND
-    assert fields['commanded'] == own
+    assert fields["state"] == COMMAND
+    assert fields["commanded"] == own
     assert np.abs(np.array(set_point(fields)) - target).max() < 1e-6
-    assert abs(fields['position'][0] - target[0]) < 2e-3
+    assert abs(fields["position"][0] - target[0]) < 2e-3
 
 
-@pytest.mark.parametrize('joint', range(7))
+@pytest.mark.parametrize("joint", range(7))
 def test_jump_on_entry_is_an_interpolation_error(session, joint):
     s = session()
     fields = s.monitor()
@@ -64,12 +65,12 @@ def test_jump_on_entry_is_an_interpolation_error(session, joint):
     wrong[joint] += 2e-4
     s.client.request(1, 10)
     s.run(0.5, position=wrong)
-    assert parse(s.measurement)['state'] == MONITOR
-    assert any(text.startswith('FRI interpolation error') for text in s.texts())
-    assert parse(s.measurement)['power'] == 0  # brakes
+    assert parse(s.measurement)["state"] == MONITOR
+    assert any(text.startswith("FRI interpolation error") for text in s.texts())
+    assert parse(s.measurement)["power"] == 0  # brakes
 
 
-@pytest.mark.parametrize('share, ok', [(0.98, True), (1.20, False)])
+@pytest.mark.parametrize("share, ok", [(0.98, True), (1.20, False)])
 def test_speed_limit_per_joint(session, share, ok):
     limits = [2.0943951, 2.0943951, 2.7925268, 2.7925268, 4.3633231, 3.8397244, 3.8397244]
     for joint, limit in enumerate(limits):
@@ -79,18 +80,18 @@ def test_speed_limit_per_joint(session, share, ok):
         for _ in range(3):
             target[joint] += direction * limit * s.cell.period * share
             fields = s.tick(position=target)
-        assert (fields['state'] == COMMAND) == ok
+        assert (fields["state"] == COMMAND) == ok
         if not ok:
-            assert any(text.startswith(f'FRI speed limit J{joint + 1}') for text in s.texts())
+            assert any(text.startswith(f"FRI speed limit J{joint + 1}") for text in s.texts())
 
 
 def test_t1_is_slower(session):
-    s = session(krc__mode='T1')
+    s = session(krc__mode="T1")
     target = np.array(set_point(s.command()))
     target[0] += 0.5 * s.cell.period
     s.tick(position=target)
     s.tick(position=target)
-    assert 'FRI speed limit J1 (A1)' in s.texts()
+    assert "FRI speed limit J1 (A1)" in s.texts()
 
 
 def test_axis_limits_are_kept(session):
@@ -100,19 +101,19 @@ def test_axis_limits_are_kept(session):
     for _ in range(5):
         target[1] += 0.002
         fields = s.tick(position=target)
-    assert fields['state'] == MONITOR
-    assert 'software limit switch A2' in s.texts()
+    assert fields["state"] == MONITOR
+    assert "software limit switch A2" in s.texts()
 
 
-@pytest.mark.parametrize('bad', [float('nan'), float('inf'), -float('inf')])
+@pytest.mark.parametrize("bad", [float("nan"), float("inf"), -float("inf")])
 def test_not_a_number_is_not_followed(session, bad):
     s = session()
     target = np.array(set_point(s.command()))
     before = np.array(s.cell.set_point)
     target[3] = bad
     fields = s.tick(position=target)
-    assert fields['state'] == MONITOR
-    assert 'cmd.jntPos not properly initialized' in s.texts()
+    assert fields["state"] == MONITOR
+    assert "cmd.jntPos not properly initialized" in s.texts()
     assert np.all(np.isfinite(s.cell.set_point)) and np.abs(s.cell.set_point - before).max() < 0.01
 
 
@@ -120,8 +121,8 @@ def test_flags_may_not_change_in_command_mode(session):
     s = session()
     s.command()
     s.tick(flags=JOINT_IMPEDANCE)
-    assert parse(s.measurement)['state'] == MONITOR
-    assert 'cmdFlags changed during cmd mode' in s.texts()
+    assert parse(s.measurement)["state"] == MONITOR
+    assert "cmdFlags changed during cmd mode" in s.texts()
 
 
 def test_flags_must_fit_the_strategy(session):
@@ -130,8 +131,8 @@ def test_flags_must_fit_the_strategy(session):
     s.client.flags = JOINT_POSITION
     s.client.request(1, 20)
     s.run(0.5)
-    assert parse(s.measurement)['state'] == MONITOR
-    assert 'cmdFlags do not fit the control strategy' in s.texts()
+    assert parse(s.measurement)["state"] == MONITOR
+    assert "cmdFlags do not fit the control strategy" in s.texts()
 
 
 def test_added_torque_has_to_be_ramped(session):
@@ -141,28 +142,28 @@ def test_added_torque_has_to_be_ramped(session):
     s.client.flags = JOINT_IMPEDANCE
     s.client.request(1, 30)
     s.run(0.5)
-    assert 'cmd.addJntTrq not properly initialized' in s.texts()
+    assert "cmd.addJntTrq not properly initialized" in s.texts()
 
     s = session()
     s.command(30)
     for step in range(1, 11):
         s.client.torque = [0.5 * step] + [0.0] * 6
         fields = s.tick()
-    assert fields['state'] == COMMAND
+    assert fields["state"] == COMMAND
     s.client.torque = [8.0] + [0.0] * 6
-    assert s.tick()['state'] == MONITOR
+    assert s.tick()["state"] == MONITOR
 
 
 def test_cartesian_frame_has_to_be_mirrored(session):
     s = session()
     fields = s.monitor()
-    frame = list(fields['commanded_frame'])
+    frame = list(fields["commanded_frame"])
     frame[3] += 0.01
     s.client.frame = frame
     s.client.flags = 0x3500
     s.client.request(1, 20)
     s.run(0.5)
-    assert 'cmd.cartPos not properly initialized' in s.texts()
+    assert "cmd.cartPos not properly initialized" in s.texts()
 
 
 def test_strategies_move_the_arm(session):
@@ -173,23 +174,23 @@ def test_strategies_move_the_arm(session):
         target[3] = start[3] - 0.1 * (1 - math.cos(min(i, 314) * 0.01))
         fields = s.tick(position=target)
     s.run(1.0, position=target)
-    assert abs(parse(s.measurement)['position'][3] - target[3]) < 0.01
+    assert abs(parse(s.measurement)["position"][3] - target[3]) < 0.01
 
     s = session()
     fields = s.command(20)
-    frame = list(fields['commanded_frame'])
+    frame = list(fields["commanded_frame"])
     s.client.frame = frame
     for _ in range(200):
         frame[7] += 0.0005
         s.client.frame = list(frame)
         fields = s.tick()
     fields = s.run(1.0)
-    assert fields['state'] == COMMAND
-    assert fields['frame'][7] == pytest.approx(frame[7], abs=0.005)
-    assert fields['frame'][3] == pytest.approx(frame[3], abs=0.005)
+    assert fields["state"] == COMMAND
+    assert fields["frame"][7] == pytest.approx(frame[7], abs=0.005)
+    assert fields["frame"][3] == pytest.approx(frame[3], abs=0.005)
 
 
-@pytest.mark.parametrize('lost, ridden', [(1, True), (3, True), (5, True), (6, False), (20, False)])
+@pytest.mark.parametrize("lost, ridden", [(1, True), (3, True), (5, True), (6, False), (20, False)])
 def test_losses_are_bridged_by_extrapolation(session, lost, ridden):
     s = session()
     target = np.array(set_point(s.command()))
@@ -201,14 +202,14 @@ def test_losses_are_bridged_by_extrapolation(session, lost, ridden):
     for _ in range(lost):
         fields = s.tick(position=None, answer=False)
     if ridden:
-        assert fields['state'] == COMMAND
+        assert fields["state"] == COMMAND
         assert set_point(fields)[0] == pytest.approx(target[0] + lost * 0.002, abs=1e-5)
         target[0] = set_point(fields)[0] + 0.002
-        assert s.tick(position=target)['state'] == COMMAND
+        assert s.tick(position=target)["state"] == COMMAND
     else:
         fields = s.tick()
-        assert fields['state'] == MONITOR and fields['power'] == 0
-        assert any('successive answers missing' in text for text in s.texts())
+        assert fields["state"] == MONITOR and fields["power"] == 0
+        assert any("successive answers missing" in text for text in s.texts())
 
 
 def test_ten_percent_loss_both_ways_ends_in_monitor_mode(session):
@@ -232,40 +233,40 @@ def test_fall_back_brakes_and_the_program_comes_back(session):
         target[0] += 0.005
         s.tick(position=target)
     assert abs(s.cell.velocity[0]) > 0.5
-    s.cell.leave_command_mode('fault injected')
+    s.cell.leave_command_mode("fault injected")
     s.run(0.3)
     assert np.abs(s.cell.velocity).max() == 0.0
     fields = parse(s.measurement)
-    assert np.abs(np.array(set_point(fields)) - fields['position']).max() < 1e-6  # nothing to jump to
+    assert np.abs(np.array(set_point(fields)) - fields["position"]).max() < 1e-6  # nothing to jump to
     s.client.request(1, 10)
     s.run(2.0)
-    assert parse(s.measurement)['state'] == COMMAND
+    assert parse(s.measurement)["state"] == COMMAND
 
 
 def test_errors_can_wait_for_an_operator(session):
     s = session(krc__acknowledge_by_program=False)
     s.command()
-    s.cell.leave_command_mode('fault injected')
+    s.cell.leave_command_mode("fault injected")
     s.client.request(1, 10)
     s.run(4.0)
     fields = parse(s.measurement)
-    assert fields['state'] == MONITOR and fields['power'] == 0
-    assert fields['ints'][1] == -4 and 'acknowledgement required' in s.texts()
+    assert fields["state"] == MONITOR and fields["power"] == 0
+    assert fields["ints"][1] == -4 and "acknowledgement required" in s.texts()
     s.cell.acknowledge()
     s.client.request(1, 10)
     s.run(2.0)
-    assert parse(s.measurement)['state'] == COMMAND
+    assert parse(s.measurement)["state"] == COMMAND
 
 
 def test_enabling_switch_takes_power_and_asks_for_a_new_mirror(session):
-    s = session(krc__mode='T2')
+    s = session(krc__mode="T2")
     s.command()
     s.cell.enabling_switch(False)
     fields = s.run(0.2)
-    assert fields['state'] == COMMAND and fields['power'] == 0
+    assert fields["state"] == COMMAND and fields["power"] == 0
     s.cell.enabling_switch(True)
-    assert s.run(0.2)['state'] == COMMAND
-    assert parse(s.measurement)['power'] == 0x7F
+    assert s.run(0.2)["state"] == COMMAND
+    assert parse(s.measurement)["power"] == 0x7F
 
     s.cell.enabling_switch(False)
     s.run(0.2)
@@ -273,7 +274,7 @@ def test_enabling_switch_takes_power_and_asks_for_a_new_mirror(session):
     wrong = np.array(set_point(parse(s.measurement))) + 0.003
     s.run(0.1, position=wrong)
     assert s.cell.fri_state == MONITOR
-    assert any('interpolation error' in text for text in s.texts())
+    assert any("interpolation error" in text for text in s.texts())
 
 
 def test_drive_error_switches_everything_off(session):
@@ -281,12 +282,12 @@ def test_drive_error_switches_everything_off(session):
     s.command()
     s.cell.drive_error(4)
     fields = s.run(0.05)
-    assert (fields['state'], fields['power'], fields['error']) == (MONITOR, 0, 1 << 4)
+    assert (fields["state"], fields["power"], fields["error"]) == (MONITOR, 0, 1 << 4)
     s.client.request(1, 10)
-    assert s.run(5.0)['ints'][1] == -4  # no drives
+    assert s.run(5.0)["ints"][1] == -4  # no drives
     s.cell.drive_error(4, False)
     s.client.request(1, 10)
-    assert s.run(2.0)['state'] == COMMAND
+    assert s.run(2.0)["state"] == COMMAND
 
 
 def test_blocked_arm_in_position_mode_trips_on_torque(session):
@@ -297,7 +298,7 @@ def test_blocked_arm_in_position_mode_trips_on_torque(session):
         target[0] += 0.002
         s.tick(position=target)
     assert s.cell.fri_state == MONITOR
-    assert 'maximum torque exceeded J1' in s.texts()
+    assert "maximum torque exceeded J1" in s.texts()
 
 
 def test_silence_sends_nothing_and_does_not_count(session):
@@ -308,11 +309,11 @@ def test_silence_sends_nothing_and_does_not_count(session):
     s.run(0.4)
     assert s.sent == sent
     later = s.run(1.0)
-    assert later['miss_counter'] <= fields['miss_counter'] + 1
-    assert later['quality'] == 3
+    assert later["miss_counter"] <= fields["miss_counter"] + 1
+    assert later["quality"] == 3
 
 
-@pytest.mark.parametrize('period', [0.001, 0.002, 0.005, 0.012, 0.1])
+@pytest.mark.parametrize("period", [0.001, 0.002, 0.005, 0.012, 0.1])
 def test_periods(session, period):
     s = session(krc__period=period)
     s.command()
@@ -321,14 +322,26 @@ def test_periods(session, period):
     assert s.cell.time - before == pytest.approx(period)
 
 
-@pytest.mark.parametrize('name, value', [
-    ('krc/period', 0.0005), ('krc/period', 0.2), ('krc/quality_ok', 2.0), ('krc/extrapolated_packets', -1),
-    ('krc/nonsense', 1.0), ('krc/convention', 'nobody'), ('krc/mode', 'T3'), ('home', [0.0] * 6),
-    ('object/mass', -1.0), ('object/shape', 'pyramid'), ('krc/krl_poll', float('nan'))])
+@pytest.mark.parametrize(
+    "name, value",
+    [
+        ("krc/period", 0.0005),
+        ("krc/period", 0.2),
+        ("krc/quality_ok", 2.0),
+        ("krc/extrapolated_packets", -1),
+        ("krc/nonsense", 1.0),
+        ("krc/convention", "nobody"),
+        ("krc/mode", "T3"),
+        ("home", [0.0] * 6),
+        ("object/mass", -1.0),
+        ("object/shape", "pyramid"),
+        ("krc/krl_poll", float("nan")),
+    ],
+)
 def test_parameters_out_of_range_are_refused_by_name(session, name, value):
     with pytest.raises(ValueError) as error:
-        session(**{name.replace('/', '__'): value})
-    assert name.split('/')[-1].split('_')[0] in str(error.value)
+        session(**{name.replace("/", "__"): value})
+    assert name.split("/")[-1].split("_")[0] in str(error.value)
 
 
 def test_rubbish_is_no_answer(session):
@@ -347,11 +360,11 @@ def test_rubbish_is_no_answer(session):
         if kind == 0:
             data = dice.randbytes(dice.choice([0, 1, 8, 375, 376, 377, 2000]))
         elif kind == 1:
-            data = good[-1][:dice.randrange(376)]
+            data = good[-1][: dice.randrange(376)]
         elif kind == 2:
-            data = dice.choice(good[:-1]) if len(good) > 1 else b''
+            data = dice.choice(good[:-1]) if len(good) > 1 else b""
         elif kind == 3:
-            data = good[-1] + b'x'
+            data = good[-1] + b"x"
         else:
             wrong = bytearray(good[-1])
             at = dice.choice([4, 6])
@@ -368,7 +381,7 @@ def test_first_counter_of_the_peer_is_free_and_wraps(session):
     s = session()
     s.client.counter = 65500
     s.command()
-    assert s.cell.rejections == {'wrong_size': 0, 'wrong_header': 0, 'stale': 0, 'repeated': 0}
+    assert s.cell.rejections == {"wrong_size": 0, "wrong_header": 0, "stale": 0, "repeated": 0}
 
 
 def test_same_seed_same_bytes(session):

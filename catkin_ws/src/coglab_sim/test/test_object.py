@@ -1,4 +1,5 @@
 """The object: weight that moves from hand to hand, contact that the arm feels, and falling."""
+
 import numpy as np
 import pytest
 from fri_client import parse
@@ -11,7 +12,7 @@ def scene(session, **parameters):
     """Session in monitor mode and where the hand has to be so that the object stands 20 mm before the palm."""
     s = session(**parameters)
     s.monitor()
-    palm = s.cell.truth()['robot_hand']['position']
+    palm = s.cell.truth()["robot_hand"]["position"]
     return s, palm + [0.0, 0.06, -0.05] - IN_HAND
 
 
@@ -25,7 +26,7 @@ def approach(s, hand, speed=0.1, distance=0.03):
         hand = hand - [0.0, speed * s.cell.period, 0.0]
         s.cell.set_human(hand, velocity=[0.0, -speed, 0.0], grip=1.0)
         s.tick()
-        if first_touch is None and np.linalg.norm(s.cell.truth()['palm_force']) > 0.1:
+        if first_touch is None and np.linalg.norm(s.cell.truth()["palm_force"]) > 0.1:
             first_touch = s.cell.time
     for _ in range(100):
         s.cell.set_human(hand, grip=1.0)
@@ -47,24 +48,24 @@ def test_a_person_carries_the_object(session):
         s.cell.set_human(hand, grip=1.0)
         s.tick()
     truth = s.cell.truth()
-    assert truth['held_by'] == 'human' and truth['human_load_share'] == pytest.approx(1.0, abs=0.02)
-    assert np.linalg.norm(truth['object']['position'] - (hand + IN_HAND)) < 0.015
-    assert np.abs(truth['object_velocity']).max() < 1e-3
-    assert np.abs(truth['external_torque']).max() == 0.0
+    assert truth["held_by"] == "human" and truth["human_load_share"] == pytest.approx(1.0, abs=0.02)
+    assert np.linalg.norm(truth["object"]["position"] - (hand + IN_HAND)) < 0.015
+    assert np.abs(truth["object_velocity"]).max() < 1e-3
+    assert np.abs(truth["external_torque"]).max() == 0.0
 
 
 def test_touch_is_felt_in_the_joint_torques(session):
     s, hand = scene(session, torque_noise__sigma=0.0, torque_noise__bias=0.0)
-    before = np.array(parse(s.measurement)['external_torque'])
+    before = np.array(parse(s.measurement)["external_torque"])
     hand, touched = approach(s, hand)
     truth = s.cell.truth()
     assert touched is not None
-    assert truth['palm_force'][1] < -1.0  # pressed into the palm, toward -y
+    assert truth["palm_force"][1] < -1.0  # pressed into the palm, toward -y
     fields = parse(s.measurement)
-    felt = np.array(fields['external_torque']) - before
-    assert np.abs(felt - truth['external_torque']).max() < 0.01
-    jacobian = np.array(fields['jacobian']).reshape(6, 7)[:3]
-    assert np.abs(felt - jacobian.T @ truth['palm_force']).max() < 0.15  # the rest: off-centre contact
+    felt = np.array(fields["external_torque"]) - before
+    assert np.abs(felt - truth["external_torque"]).max() < 0.01
+    jacobian = np.array(fields["jacobian"]).reshape(6, 7)[:3]
+    assert np.abs(felt - jacobian.T @ truth["palm_force"]).max() < 0.15  # the rest: off-centre contact
     assert abs(felt[0]) > 0.5
 
 
@@ -74,21 +75,21 @@ def test_load_moves_gradually_from_person_to_robot(session):
     positions, _ = s.cell.finger_contact()
     assert positions[0] == 255 and all(20 <= p <= 230 for p in positions[1:])
     fingers(s, hand, positions[2] + 20)
-    assert s.cell.truth()['held_by'] == 'both'
+    assert s.cell.truth()["held_by"] == "both"
     shares, speeds = [], []
     for i in range(200):
         s.cell.set_human(hand, grip=max(0.0, 1.0 - i / 50))
         s.tick()
         truth = s.cell.truth()
-        shares.append((truth['robot_load_share'], truth['human_load_share']))
-        speeds.append(np.linalg.norm(truth['object_velocity']))
+        shares.append((truth["robot_load_share"], truth["human_load_share"]))
+        speeds.append(np.linalg.norm(truth["object_velocity"]))
     robot, human = np.array(shares).T
     assert robot[0] < 0.2 and robot[-1] == pytest.approx(1.0, abs=0.02) and human[-1] < 0.02
     assert np.abs(np.diff(robot)).max() < 0.2
     assert max(speeds) < 0.1
     truth = s.cell.truth()
-    assert truth['held_by'] == 'robot' and not truth['dropped']
-    assert truth['palm_force'][2] == pytest.approx(-WEIGHT, abs=0.05)
+    assert truth["held_by"] == "robot" and not truth["dropped"]
+    assert truth["palm_force"][2] == pytest.approx(-WEIGHT, abs=0.05)
 
 
 def test_early_release_drops_it(session):
@@ -98,8 +99,8 @@ def test_early_release_drops_it(session):
         s.cell.set_human(hand, grip=max(0.0, 1.0 - i / 20))
         s.tick()
     truth = s.cell.truth()
-    assert truth['dropped'] and truth['held_by'] == 'floor'
-    assert truth['object']['position'][2] < -0.6
+    assert truth["dropped"] and truth["held_by"] == "floor"
+    assert truth["object"]["position"][2] < -0.6
 
 
 def test_opening_fingers_drop_it_and_weak_ones_let_it_slip(session):
@@ -111,10 +112,10 @@ def test_opening_fingers_drop_it_and_weak_ones_let_it_slip(session):
         for i in range(600):
             s.cell.set_human(hand + [0.3, 0.0, 0.0] if i > 60 else hand, grip=max(0.0, 1.0 - i / 50))
             s.tick()
-        assert s.cell.truth()['dropped'] == falls
+        assert s.cell.truth()["dropped"] == falls
     s.cell.set_fingers([0, 0, 0, 0, 0])
     s.run(1.5)
-    assert s.cell.truth()['dropped']
+    assert s.cell.truth()["dropped"]
 
 
 def test_fingers_folded_before_the_object_came_do_not_grasp(session):
@@ -123,68 +124,80 @@ def test_fingers_folded_before_the_object_came_do_not_grasp(session):
         s.cell.set_human(hand + [0.0, 0.2, 0.0], grip=1.0)
         s.cell.set_fingers([254, 60, 80, 80, 245])  # a tripod preshape: ring and little lie in the palm
         s.tick()
-    s.cell.place('human_hand', IN_HAND)
+    s.cell.place("human_hand", IN_HAND)
     hand, _ = approach(s, hand)
     truth = s.cell.truth()
-    assert truth['held_by'] == 'human' and truth['human_load_share'] > 0.9
+    assert truth["held_by"] == "human" and truth["human_load_share"] > 0.9
     positions, _ = s.cell.finger_contact()
     assert positions[4] == 255 and positions[2] < 255
     s.cell.set_fingers([254, positions[1] + 20, positions[2] + 20, positions[3] + 20, 245])
     s.tick()
-    assert s.cell.truth()['held_by'] == 'both'
+    assert s.cell.truth()["held_by"] == "both"
 
 
 def test_robot_hands_over_to_a_person(session):
-    s = session(object__start='robot_hand', object__position=[0.04, 0.0, 0.0], object__rotation=[-0.5, -0.5, -0.5, 0.5])
+    s = session(object__start="robot_hand", object__position=[0.04, 0.0, 0.0], object__rotation=[-0.5, -0.5, -0.5, 0.5])
     s.cell.set_fingers([0, 160, 160, 160, 160])
     s.monitor()
     truth = s.cell.truth()
-    assert truth['held_by'] == 'robot' and truth['robot_load_share'] == pytest.approx(1.0, abs=0.02)
-    up = truth['object']['rotation']
+    assert truth["held_by"] == "robot" and truth["robot_load_share"] == pytest.approx(1.0, abs=0.02)
+    up = truth["object"]["rotation"]
     assert np.allclose(np.abs(up), [0, 0, 0, 1], atol=0.05)
-    hand = truth['object']['position'] - IN_HAND
+    hand = truth["object"]["position"] - IN_HAND
     for i in range(100):
         s.cell.set_human(hand, grip=min(1.0, i / 50))
         s.tick()
-    assert s.cell.truth()['held_by'] == 'both'
+    assert s.cell.truth()["held_by"] == "both"
     for i in range(100):
         s.cell.set_human(hand, grip=1.0)
         count = max(0, 160 - 4 * i)
         s.cell.set_fingers([0, count, count, count, count])
         s.tick()
     truth = s.cell.truth()
-    assert truth['held_by'] == 'human' and truth['human_load_share'] == pytest.approx(1.0, abs=0.05)
-    assert not truth['dropped']
+    assert truth["held_by"] == "human" and truth["human_load_share"] == pytest.approx(1.0, abs=0.05)
+    assert not truth["dropped"]
 
 
 def test_it_stands_on_the_board(session):
-    s = session(object__start='world', object__position=[0.45, -0.55, 0.055])
+    s = session(object__start="world", object__position=[0.45, -0.55, 0.055])
     s.run(2.0)
     truth = s.cell.truth()
-    assert truth['held_by'] == 'board' and not truth['dropped']
-    assert truth['object']['position'][2] == pytest.approx(0.05, abs=0.002)
-    assert np.abs(truth['object_velocity']).max() < 1e-3 and abs(truth['object']['rotation'][3]) > 0.999
+    assert truth["held_by"] == "board" and not truth["dropped"]
+    assert truth["object"]["position"][2] == pytest.approx(0.05, abs=0.002)
+    assert np.abs(truth["object_velocity"]).max() < 1e-3 and abs(truth["object"]["rotation"][3]) > 0.999
 
 
-@pytest.mark.parametrize('shape, size, mass', [
-    ('box', [0.06, 0.05, 0.12], 0.5), ('sphere', [0.07, 0.07, 0.07], 0.1), ('cylinder', [0.03, 0.03, 0.15], 0.03),
-    ('box', [0.2, 0.2, 0.2], 3.0)])
+@pytest.mark.parametrize(
+    "shape, size, mass",
+    [
+        ("box", [0.06, 0.05, 0.12], 0.5),
+        ("sphere", [0.07, 0.07, 0.07], 0.1),
+        ("cylinder", [0.03, 0.03, 0.15], 0.03),
+        ("box", [0.2, 0.2, 0.2], 3.0),
+    ],
+)
 def test_other_objects_neither_explode_nor_sink(session, shape, size, mass):
     center = [0.0, 0.0, size[2] / 2]
-    s = session(object__shape=shape, object__size=size, object__mass=mass, object__center=center,
-                object__start='world', object__position=[0.45, -0.55, 0.15])
+    s = session(
+        object__shape=shape,
+        object__size=size,
+        object__mass=mass,
+        object__center=center,
+        object__start="world",
+        object__position=[0.45, -0.55, 0.15],
+    )
     for _ in range(600):
         s.tick()
-        assert np.linalg.norm(s.cell.truth()['object_velocity']) < 2.0
+        assert np.linalg.norm(s.cell.truth()["object_velocity"]) < 2.0
     truth = s.cell.truth()
-    middle = truth['object']['position'] + [0, 0, size[2] / 2]
-    assert truth['held_by'] == 'board' and 0.04 < middle[2] < 0.2
-    s.cell.place('human_hand', [-0.08, 0.0, -size[2] / 2])
+    middle = truth["object"]["position"] + [0, 0, size[2] / 2]
+    assert truth["held_by"] == "board" and 0.04 < middle[2] < 0.2
+    s.cell.place("human_hand", [-0.08, 0.0, -size[2] / 2])
     for _ in range(400):
         s.cell.set_human([1.0, 0.2, 0.5], grip=1.0, grip_force=60.0)
         s.tick()
     truth = s.cell.truth()
-    assert truth['held_by'] == 'human' and truth['human_load_share'] == pytest.approx(1.0, abs=0.05)
+    assert truth["held_by"] == "human" and truth["human_load_share"] == pytest.approx(1.0, abs=0.05)
 
 
 def test_block_and_push_show_in_the_torques(session):
@@ -192,9 +205,9 @@ def test_block_and_push_show_in_the_torques(session):
     s.monitor()
     s.cell.set_push([0.0, 5.0, 0.0])
     fields = s.run(0.5)
-    jacobian = np.array(fields['jacobian']).reshape(6, 7)
-    assert np.abs(np.array(fields['external_torque']) - 5.0 * jacobian[1]).max() < 1e-3
-    wrench = np.array(fields['wrench'])
+    jacobian = np.array(fields["jacobian"]).reshape(6, 7)
+    assert np.abs(np.array(fields["external_torque"]) - 5.0 * jacobian[1]).max() < 1e-3
+    wrench = np.array(fields["wrench"])
     assert np.abs(wrench - [0, 5, 0, 0, 0, 0]).max() < 0.05
 
 
@@ -202,7 +215,7 @@ def test_noise_model(session):
     """Deviation at rest, its growth with speed, and the offset of the estimate."""
     s = session(seed=4, krc__period=0.001)
     s.command()
-    rest = np.array([s.tick()['external_torque'] for _ in range(4000)])
+    rest = np.array([s.tick()["external_torque"] for _ in range(4000)])
     assert rest.std(axis=0) == pytest.approx(np.full(7, 0.05), rel=0.25)
     assert np.abs(rest.mean(axis=0)).max() < 0.41 and np.abs(rest.mean(axis=0)).max() > 0.1
     start = s.cell.set_point.copy()
@@ -210,7 +223,7 @@ def test_noise_model(session):
     for i in range(2000):
         target = start.copy()
         target[6] += 1.0 * (i + 1) * 0.001
-        moving.append(s.tick(position=target)['external_torque'][1])  # a joint that does not move itself
+        moving.append(s.tick(position=target)["external_torque"][1])  # a joint that does not move itself
     assert np.std(moving[200:]) / 0.05 == pytest.approx(8.0, rel=0.3)
 
 
@@ -218,17 +231,24 @@ def test_rotations_are_reversed_on_the_wire_and_axes_are_those_of_the_base(sessi
     """Table: wrench Fx Fy Fz Tz Ty Tx, Jacobian rows X Y Z RZ RY RX; read here against the model's own terms."""
     from coglab_sim import _cell
     from conftest import URDF
+
     s = session(torque_noise__sigma=0.0, torque_noise__bias=0.0, torque_noise__hysteresis=0.0)
     s.monitor()
     s.cell.set_push([1.0, 2.0, 3.0], [0.4, 0.5, 0.6])
     fields = s.run(0.5)
-    assert np.abs(np.array(fields['wrench']) - [1.0, 2.0, 3.0, 0.6, 0.5, 0.4]).max() < 0.02
-    terms = _cell.arm_terms(URDF, fields['position'], [0.0] * 7)
-    jacobian = np.array(fields['jacobian']).reshape(6, 7)
-    assert np.abs(jacobian - terms['jacobian'][[0, 1, 2, 5, 4, 3]]).max() < 1e-6
-    assert np.abs(np.array(fields['mass']).reshape(7, 7) - terms['mass']).max() < 1e-5
-    assert np.abs(np.array(fields['gravity']) - terms['gravity']).max() < 1e-4
-    frame = np.array(fields['frame']).reshape(3, 4)
-    assert np.abs(frame[:, 3] - terms['tip']['position']).max() < 1e-6
-    assert np.abs(np.array(fields['torque']) - fields['gravity'] + jacobian[[0, 1, 2, 5, 4, 3]].T
-                  @ [1.0, 2.0, 3.0, 0.4, 0.5, 0.6]).max() < 0.01
+    assert np.abs(np.array(fields["wrench"]) - [1.0, 2.0, 3.0, 0.6, 0.5, 0.4]).max() < 0.02
+    terms = _cell.arm_terms(URDF, fields["position"], [0.0] * 7)
+    jacobian = np.array(fields["jacobian"]).reshape(6, 7)
+    assert np.abs(jacobian - terms["jacobian"][[0, 1, 2, 5, 4, 3]]).max() < 1e-6
+    assert np.abs(np.array(fields["mass"]).reshape(7, 7) - terms["mass"]).max() < 1e-5
+    assert np.abs(np.array(fields["gravity"]) - terms["gravity"]).max() < 1e-4
+    frame = np.array(fields["frame"]).reshape(3, 4)
+    assert np.abs(frame[:, 3] - terms["tip"]["position"]).max() < 1e-6
+    assert (
+        np.abs(
+            np.array(fields["torque"])
+            - fields["gravity"]
+            + jacobian[[0, 1, 2, 5, 4, 3]].T @ [1.0, 2.0, 3.0, 0.4, 0.5, 0.6]
+        ).max()
+        < 0.01
+    )

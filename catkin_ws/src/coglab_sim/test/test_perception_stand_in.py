@@ -1,4 +1,5 @@
 """The tracker stand-in: latency, noise, dropouts and swaps as configured, and nothing of it when perfect."""
+
 import numpy as np
 import pytest
 from coglab_py.pose import Pose
@@ -32,8 +33,9 @@ def test_stamp_is_the_capture_time_and_latency_is_as_configured():
 
 
 def test_noise_per_axis_and_its_correlation():
-    settings = PerceptionSettings(position_noise=(0.004, 0.001, 0.008), correlation_time=0.10, dropout_start=0.0,
-                                  latency_sigma=0.0)
+    settings = PerceptionSettings(
+        position_noise=(0.004, 0.001, 0.008), correlation_time=0.10, dropout_start=0.0, latency_sigma=0.0
+    )
     points = np.array([s.frame.position for _, s in watch(settings, 200.0)])
     assert points.std(axis=0) == pytest.approx([0.004, 0.001, 0.008], rel=0.25)
     x = points[:, 0] - points[:, 0].mean()

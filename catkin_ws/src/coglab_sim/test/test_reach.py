@@ -1,4 +1,5 @@
 """The shape of a human reach: minimum jerk in closed form, decoupled, conic."""
+
 import numpy as np
 import pytest
 from coglab_sim.reach import Reach, duration_for, min_jerk

@@ -14,8 +14,7 @@ from coglab_sim.recorded_motion import (
 )
 
 STAMPS = 100.0 + np.arange(0.0, 1.01, 0.1)
-POSITIONS = np.column_stack([1.3 - 0.4 * (STAMPS - 100.0), 0.2 + 0.1 * (STAMPS - 100.0),
-                             0.15 + 0.3 * (STAMPS - 100.0)])
+POSITIONS = np.column_stack([1.3 - 0.4 * (STAMPS - 100.0), 0.2 + 0.1 * (STAMPS - 100.0), 0.15 + 0.3 * (STAMPS - 100.0)])
 TURNS = np.array([about_z(0.5 * (t - 100.0)) for t in STAMPS])
 
 
@@ -30,8 +29,7 @@ def write_csv(path, frames=("",)):
 
 
 def write_npz(path, prefix=""):
-    np.savez(path, **{f"{prefix}t": STAMPS, f"{prefix}position": POSITIONS,
-                      f"{prefix}orientation": TURNS})
+    np.savez(path, **{f"{prefix}t": STAMPS, f"{prefix}position": POSITIONS, f"{prefix}orientation": TURNS})
     return str(path)
 
 
@@ -70,19 +68,16 @@ def test_every_kind_of_file_says_the_same(tmp_path, kind):
     assert track.stamps[0] == 0.0
     frame = track.at(0.55)
     assert frame.position == pytest.approx([1.08, 0.255, 0.315])
-    assert frame.axis(0) == pytest.approx(
-        [np.cos(0.275), np.sin(0.275), 0.0], abs=1e-6)
+    assert frame.axis(0) == pytest.approx([np.cos(0.275), np.sin(0.275), 0.0], abs=1e-6)
     assert track.at(-5.0).position == pytest.approx(POSITIONS[0])
     assert track.at(np.inf).position == pytest.approx(POSITIONS[-1])
 
 
 def test_several_frames_in_one_file(tmp_path):
     frames = ("human_hand", "object_mug")
-    for path in (write_csv(tmp_path / "two.csv", frames),
-                 write_bag(tmp_path / "two.bag", frames=frames)):
+    for path in (write_csv(tmp_path / "two.csv", frames), write_bag(tmp_path / "two.bag", frames=frames)):
         assert sorted(load_recording(path).tracks) == sorted(frames)
-    assert list(load_recording(write_npz(tmp_path / "o.npz", "object_mug.")).tracks) == [
-        "object_mug"]
+    assert list(load_recording(write_npz(tmp_path / "o.npz", "object_mug.")).tracks) == ["object_mug"]
 
 
 def test_a_csv_without_orientation(tmp_path):
@@ -115,8 +110,7 @@ def test_mirror_turn_and_anchor(tmp_path):
     assert mirrored.position == pytest.approx(POSITIONS[0] * [1, -1, 1])
     play = playback(tmp_path, mirror=True)
     play.frames(0.0)
-    assert play.frames(1.0)["human_hand"].axis(0) == pytest.approx(
-        [np.cos(0.5), -np.sin(0.5), 0.0])
+    assert play.frames(1.0)["human_hand"].axis(0) == pytest.approx([np.cos(0.5), -np.sin(0.5), 0.0])
     turned = playback(tmp_path, turn_deg=90.0).frames(0.0)["human_hand"]
     assert turned.position == pytest.approx([-0.2, 1.3, 0.15])
     anchored = playback(tmp_path, end_at=(0.8, 0.0, 0.4))
@@ -138,8 +132,7 @@ def test_of_a_bag_only_what_a_tracker_sees(tmp_path):
 
 
 def test_rename(tmp_path):
-    assert list(playback(tmp_path, rename={"human_hand": "object_mug"}).frames(0.0)) == [
-        "object_mug"]
+    assert list(playback(tmp_path, rename={"human_hand": "object_mug"}).frames(0.0)) == ["object_mug"]
 
 
 def test_the_recorded_hand_waits_for_the_robot(tmp_path):
@@ -214,9 +207,12 @@ def test_bad_names_and_settings(tmp_path):
         load_recording("reach.txt")
     with pytest.raises(RecordingError, match="no such file"):
         load_recording(str(tmp_path / "none.csv"))
-    for fault, words in (({"speed": 2}, "unknown fields speed"), ({"time_scale": 0}, "time_scale"),
-                         ({"at_end": "stop"}, "hold, loop or vanish"),
-                         ({"end_at": [1, 2]}, "three finite numbers"),
-                         ({"wait_distance": 0}, "wait_distance")):
+    for fault, words in (
+        ({"speed": 2}, "unknown fields speed"),
+        ({"time_scale": 0}, "time_scale"),
+        ({"at_end": "stop"}, "hold, loop or vanish"),
+        ({"end_at": [1, 2]}, "three finite numbers"),
+        ({"wait_distance": 0}, "wait_distance"),
+    ):
         with pytest.raises(RecordingError, match=words):
             PlaybackSettings.from_mapping(fault)

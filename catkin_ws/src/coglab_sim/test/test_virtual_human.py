@@ -1,4 +1,5 @@
 """The virtual human against a robot's hand that is simply there: phases, timing, and what each misbehaviour does."""
+
 import numpy as np
 import pytest
 from coglab_py.pose import Pose
@@ -43,8 +44,9 @@ class Stage:
         if force > 0.3 and self.touched_at is None:
             self.touched_at = self.t
         self.closed = self.closes and self.touched_at is not None and self.t - self.touched_at > 1.0
-        view = WorldView(Pose(self.palm, PALM_TURN), speed, Pose(self.object), force, 0.0, 1.0,
-                         "both" if self.closed else "human")
+        view = WorldView(
+            Pose(self.palm, PALM_TURN), speed, Pose(self.object), force, 0.0, 1.0, "both" if self.closed else "human"
+        )
         sample = self.human.step(self.t, view)
         self.samples.append(sample)
         if sample.phase != self.phases[-1]:
@@ -68,8 +70,17 @@ def give(**kw):
 
 def test_a_normal_giver_goes_through_all_phases():
     stage = give()
-    assert stage.phases == ["idle", "reacting", "reaching", "waiting", "placing", "holding", "releasing",
-                            "retreating", "idle"]
+    assert stage.phases == [
+        "idle",
+        "reacting",
+        "reaching",
+        "waiting",
+        "placing",
+        "holding",
+        "releasing",
+        "retreating",
+        "idle",
+    ]
     assert stage.samples[-1].grip == 0.0
     assert stage.samples[-1].frame.position == pytest.approx(stage.scene.rest, abs=0.01)
 
@@ -122,6 +133,7 @@ def test_absent_does_nothing():
 def test_slow_takes_about_twice_as_long():
     def reaching(b):
         return sum(s.phase == "reaching" for s in give(behaviour=b, seed=3).samples)
+
     assert reaching("slow") > 1.6 * reaching("normal")
 
 
@@ -209,8 +221,9 @@ def test_a_nearer_robot_hand_draws_the_reach_toward_it():
 def test_the_correction_comes_after_the_sensorimotor_delay_and_without_a_step():
     _, _, corrected = receive(np.array([0.90, 0.10, 0.36]))
     _, _, plain = receive(np.array([0.3, 0.0, 0.6]))
-    differs = next(t for (t, a), (_, b) in zip(corrected, plain, strict=True)
-                   if np.linalg.norm(a.velocity - b.velocity) > 1e-9)
+    differs = next(
+        t for (t, a), (_, b) in zip(corrected, plain, strict=True) if np.linalg.norm(a.velocity - b.velocity) > 1e-9
+    )
     assert 0.6 + 0.15 - 1e-9 <= differs <= 0.6 + 0.15 + 0.10 + 2 * DT
     reaching = [s.velocity for _, s in corrected if s.phase == "reaching"]
     assert max(np.linalg.norm(b - a) for a, b in zip(reaching, reaching[1:], strict=False)) < 0.12

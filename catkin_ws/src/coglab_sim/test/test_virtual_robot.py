@@ -1,4 +1,5 @@
 """A whole handover in virtual time: person, object, FRI, DMP and point-to-point, in one thread."""
+
 import numpy as np
 import pytest
 from coglab_py.packages import package_path
@@ -8,14 +9,14 @@ from coglab_sim.scene import Scene
 from coglab_sim.virtual_human import VirtualHuman
 from coglab_sim.virtual_world import move_person, view_of
 
-PRIMITIVES = str(package_path('coglab_controllers', 'config', 'primitives.xml'))
-GRASP = {'goal_offset': [0.0, -0.065, 0.05], 'target_orientation': [0.5, 0.5, 0.5, 0.5]}  # 25 mm before the mug
+PRIMITIVES = str(package_path("coglab_controllers", "config", "primitives.xml"))
+GRASP = {"goal_offset": [0.0, -0.065, 0.05], "target_orientation": [0.5, 0.5, 0.5, 0.5]}  # 25 mm before the mug
 
 
 class Trial:
     """Robot and person; the fingers go where they are told, 254 counts per second."""
 
-    def __init__(self, seed=3, behaviour='normal', **cell):
+    def __init__(self, seed=3, behaviour="normal", **cell):
         self.robot = virtual_world.Robot(seed, **cell).virtual
         self.human = VirtualHuman(Participant.draw(seed, behaviour), Scene())
         self.fingers = np.zeros(5)
@@ -26,14 +27,14 @@ class Trial:
     def tick(self):
         cell = self.robot.cell
         truth = cell.truth()
-        palm = truth['robot_hand']
-        speed = 0.0 if self.last_palm is None else np.linalg.norm(palm['position'] - self.last_palm) / cell.period
-        self.last_palm = palm['position']
-        obj = truth['object']
+        palm = truth["robot_hand"]
+        speed = 0.0 if self.last_palm is None else np.linalg.norm(palm["position"] - self.last_palm) / cell.period
+        self.last_palm = palm["position"]
+        obj = truth["object"]
         move_person(cell, self.human.step(self.robot.now, view_of(truth, speed)))
         self.fingers += np.clip(self.wanted - self.fingers, -254 * cell.period, 254 * cell.period)
         cell.set_fingers([int(x) for x in self.fingers])
-        self.robot.set_frame('object_mug', obj['position'], obj['rotation'])
+        self.robot.set_frame("object_mug", obj["position"], obj["rotation"])
         self.robot.tick()
         self.peak = max(self.peak, float(np.abs(cell.velocity).max()))
         return self.robot.report()
@@ -45,8 +46,10 @@ class Trial:
             report = self.tick()
             if condition(report, self.robot.cell.truth()):
                 return report
-        raise AssertionError(f'not within {limit} s: {report}, {self.robot.cell.truth()["held_by"]}, '
-                             f'{self.human.phase}, {self.robot.cell.messages[-3:]}')
+        raise AssertionError(
+            f"not within {limit} s: {report}, {self.robot.cell.truth()['held_by']}, "
+            f"{self.human.phase}, {self.robot.cell.messages[-3:]}"
+        )
 
     def request(self, event):
         ticket, ended = self.robot.submit(event), []
@@ -61,65 +64,66 @@ class Trial:
         assert ended[0][0], ended
 
     def start(self):
-        for controller, kind in (('dmp', 'coglab/DmpController'), ('ptp', 'coglab/PtpController')):
+        for controller, kind in (("dmp", "coglab/DmpController"), ("ptp", "coglab/PtpController")):
             good, message = self.robot.load_controller(controller, kind)
             assert good, message
         good, message, count = self.robot.load_dmps(PRIMITIVES)
         assert good and count > 0, message
         self.until(lambda *_: self.robot.cell.quality == 3, 5)
-        self.request('start')
-        assert self.robot.switch_controller('dmp')[0]
+        self.request("start")
+        assert self.robot.switch_controller("dmp")[0]
 
     def handover(self):
         self.start()
-        self.human.command('give mug')
-        self.until(lambda *_: self.human.phase == 'waiting', 6)
-        good, message = self.robot.execute_dmp('reach_human', orientation_control=True,
-                                                goal_frame='object_mug', **GRASP)
+        self.human.command("give mug")
+        self.until(lambda *_: self.human.phase == "waiting", 6)
+        good, message = self.robot.execute_dmp(
+            "reach_human", orientation_control=True, goal_frame="object_mug", **GRASP
+        )
         assert good, message
-        self.until(lambda report, _: report['motion'] == 'reached', 8)
+        self.until(lambda report, _: report["motion"] == "reached", 8)
         self.reached = self.robot.cell.truth()
-        assert self.robot.switch_controller('ptp')[0]
-        self.until(lambda _, truth: np.linalg.norm(truth['palm_force']) > 0.5, 8)
+        assert self.robot.switch_controller("ptp")[0]
+        self.until(lambda _, truth: np.linalg.norm(truth["palm_force"]) > 0.5, 8)
         contact = self.robot.cell.finger_contact()[0][2]
         self.wanted = np.array([245, contact + 25, contact + 25, contact + 25, contact + 25], float)
-        self.until(lambda _, truth: truth['held_by'] == 'robot', 10)
+        self.until(lambda _, truth: truth["held_by"] == "robot", 10)
         status, _, message = self.robot.add_ptp([-1.4349, -0.6086, 1.4986, 1.7048, 0.1857, 0.2152, 0.782])
         assert status == 0, message
-        self.until(lambda report, _: report['motion'] == 'reached', 10)
+        self.until(lambda report, _: report["motion"] == "reached", 10)
         return self.robot.cell.truth()
 
 
-@pytest.mark.parametrize('seed', [1, 2, 3])
+@pytest.mark.parametrize("seed", [1, 2, 3])
 def test_handover_from_person_to_robot(seed):
     trial = Trial(seed)
     truth = trial.handover()
-    assert truth['held_by'] == 'robot' and not truth['dropped']
-    assert truth['robot_load_share'] == pytest.approx(1.0, abs=0.05)
-    place = trial.reached['robot_hand']['position'] - trial.reached['object']['position']
-    assert np.linalg.norm(place - GRASP['goal_offset']) < 0.005
+    assert truth["held_by"] == "robot" and not truth["dropped"]
+    assert truth["robot_load_share"] == pytest.approx(1.0, abs=0.05)
+    place = trial.reached["robot_hand"]["position"] - trial.reached["object"]["position"]
+    assert np.linalg.norm(place - GRASP["goal_offset"]) < 0.005
     assert trial.peak < 2.0 and trial.robot.cell.messages == []
     assert trial.robot.finished_ptps() == [(0, True)]
 
 
 def test_the_same_trial_twice_is_the_same():
     first, second = Trial(5).handover(), Trial(5).handover()
-    assert first['time'] == second['time']
-    assert np.array_equal(first['object']['position'], second['object']['position'])
-    assert np.array_equal(first['position'], second['position'])
+    assert first["time"] == second["time"]
+    assert np.array_equal(first["object"]["position"], second["object"]["position"])
+    assert np.array_equal(first["position"], second["position"])
 
 
 def test_faults_reach_the_controllers():
     trial = Trial(2)
     trial.start()
     trial.robot.add_ptp([0.0] * 7)
-    assert trial.robot.switch_controller('ptp')[0]
+    assert trial.robot.switch_controller("ptp")[0]
     status, _, message = trial.robot.add_ptp([-1.2, -0.6, 1.4, 1.6, 0.1, 0.2, 0.7])
     assert status == 0, message
     trial.until(lambda *_: np.abs(trial.robot.cell.velocity).max() > 0.05, 3)
-    trial.robot.cell.leave_command_mode('fault injected')
-    report = trial.until(lambda report, _: not report['motion_allowed'], 1)
-    assert report['motion'] == 'aborted'
+    trial.robot.cell.leave_command_mode("fault injected")
+    report = trial.until(lambda report, _: not report["motion_allowed"], 1)
+    assert report["motion"] == "aborted"
     trial.until(lambda *_: np.abs(trial.robot.cell.velocity).max() == 0.0, 1)
     assert trial.robot.add_ptp([0.0] * 7)[0] == 2
 
@@ -127,5 +131,5 @@ def test_faults_reach_the_controllers():
 def test_nobody_knows_the_goal_frame():
     trial = Trial(1)
     trial.start()
-    good, message = trial.robot.execute_dmp('reach_human', goal_frame='object_cup')
-    assert not good and 'object_cup' in message
+    good, message = trial.robot.execute_dmp("reach_human", goal_frame="object_cup")
+    assert not good and "object_cup" in message

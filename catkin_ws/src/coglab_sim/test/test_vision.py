@@ -16,8 +16,7 @@ from coglab_sim.vision import NotSeen, PartnerChoice, Vision
 NAMES = FrameNames("world", "human_hand", "board", "object_{id}")
 SLOTS = {"A1": np.zeros(3), "A2": np.array([0.0, 0.15, 0.0])}
 ROBOT = Pose(np.array([0.5, 0.0, 0.4]))
-NEAR, BESIDE, FAR = (Pose(np.array(place)) for place in
-                     ([0.9, 0.1, 0.4], [0.9, -0.15, 0.4], [1.6, 0.5, 0.4]))
+NEAR, BESIDE, FAR = (Pose(np.array(place)) for place in ([0.9, 0.1, 0.4], [0.9, -0.15, 0.4], [1.6, 0.5, 0.4]))
 
 
 class Scene:
@@ -25,9 +24,14 @@ class Scene:
 
     def __init__(self, margin=0.0, **settings):
         self.now = 10.0
-        self.vision = Vision(NAMES, PerceptionSettings(**({"perfect": True} | settings)),
-                             Board(Pose(np.array([0.45, -0.55, 0.05])), SLOTS), 1,
-                             lambda: self.now, margin)
+        self.vision = Vision(
+            NAMES,
+            PerceptionSettings(**({"perfect": True} | settings)),
+            Board(Pose(np.array([0.45, -0.55, 0.05])), SLOTS),
+            1,
+            lambda: self.now,
+            margin,
+        )
 
     def see(self, hands=None, objects=None, robot=ROBOT):
         self.now += 0.05
@@ -125,11 +129,11 @@ def test_with_a_margin_the_nearer_one_is_the_partner_and_stays_so():
     scene = Scene(margin=0.3)
     sights = scene.see({"one": FAR, "two": NEAR})
     assert [sight.name for sight in sights] == ["human_hand"]
-    assert scene.vision.locate("human_hand", 0.02)[1].frame.position == pytest.approx(
-        NEAR.position)
+    assert scene.vision.locate("human_hand", 0.02)[1].frame.position == pytest.approx(NEAR.position)
     scene.see({"one": BESIDE, "two": NEAR})
-    assert scene.vision.locate("human_hand", 0.02)[1].frame.position == pytest.approx(
-        NEAR.position), "somebody beside the partner changes nothing"
+    assert scene.vision.locate("human_hand", 0.02)[1].frame.position == pytest.approx(NEAR.position), (
+        "somebody beside the partner changes nothing"
+    )
 
 
 def test_partner_choice():

@@ -1,21 +1,23 @@
 """Bridge and controller stand-in in lockstep, bytes in between; for tests and benches of both ends."""
+
 from pathlib import Path
 
 import lwr_fri_bridge as bridge_module
 import numpy as np
 
 SOURCES = Path(__file__).resolve().parents[2]
-URDF = str(SOURCES / 'lwr_description' / 'urdf' / 'lwr_ih2.urdf')
-LIMITS = str(SOURCES / 'lwr_description' / 'config' / 'joint_limits.yaml')
-MODES = {'position': 1, 'cartesian_impedance': 2, 'joint_impedance': 3}
+URDF = str(SOURCES / "lwr_description" / "urdf" / "lwr_ih2.urdf")
+LIMITS = str(SOURCES / "lwr_description" / "config" / "joint_limits.yaml")
+MODES = {"position": 1, "cartesian_impedance": 2, "joint_impedance": 3}
 
 
 class Wire:
     """Bridge and cell, one FRI period per tick()."""
 
-    def __init__(self, bridge=None, profile='default', **parameters) -> None:
+    def __init__(self, bridge=None, profile="default", **parameters) -> None:
         from coglab_sim import _cell
-        parameters = {key.replace('__', '/'): value for key, value in parameters.items()}
+
+        parameters = {key.replace("__", "/"): value for key, value in parameters.items()}
         self.cell = _cell.Cell(URDF, parameters)
         self.bridge = bridge_module.Bridge(LIMITS, profile, **(bridge or {}))
         self.measurement = None
@@ -49,21 +51,27 @@ class Wire:
             outcome = self.bridge.outcome(ticket)
             if outcome is not None:
                 return outcome
-        raise AssertionError(f'{event}: no outcome within {limit} s')
+        raise AssertionError(f"{event}: no outcome within {limit} s")
 
-    def start(self, mode: str = 'position') -> None:
+    def start(self, mode: str = "position") -> None:
         self.run(max(1.5, 110 * self.cell.period))
-        for event in (mode, 'start'):
+        for event in (mode, "start"):
             good, message = self.request(event)
             assert good, (message, self.cell.messages)
 
 
 # Modes in which the arm is blocked for 5 s and released; the last two are soft, with a longer leash.
-BLOCKED_MODES = ('position', 'joint_impedance', 'joint_impedance stiffness 200 damping 0.7', 'cartesian_impedance',
-                 'joint_impedance stiffness 25', 'cartesian_impedance stiffness 200 30')
+BLOCKED_MODES = (
+    "position",
+    "joint_impedance",
+    "joint_impedance stiffness 200 damping 0.7",
+    "cartesian_impedance",
+    "joint_impedance stiffness 25",
+    "cartesian_impedance stiffness 200 30",
+)
 
 
-BLOCKED_MOTIONS = {'A1 A2': [0.4, 0.2, 0, 0, 0, 0, 0], 'with the wrist': [0.4, 0.2, 0, 0, 0, 0.3, 0]}  # rad/s
+BLOCKED_MOTIONS = {"A1 A2": [0.4, 0.2, 0, 0, 0, 0, 0], "with the wrist": [0.4, 0.2, 0, 0, 0, 0.3, 0]}  # rad/s
 
 
 def speed_after_block(wire: Wire, mode: str, moving: str) -> float:
@@ -84,7 +92,7 @@ def speed_after_block(wire: Wire, mode: str, moving: str) -> float:
 def lockstep_bytes(seed: int, periods: int) -> list[bytes | None]:
     """The controller's datagrams of a joint impedance motion with losses, from a seed."""
     wire = Wire(krc__period=0.002, seed=seed)
-    wire.start('joint_impedance')
+    wire.start("joint_impedance")
     out = []
     for tick in range(periods):
         wire.velocity = 0.4 * np.sin(tick * 0.002 * np.arange(1, 8))

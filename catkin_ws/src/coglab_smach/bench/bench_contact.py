@@ -1,6 +1,7 @@
 #!/usr/bin/python3
 """Bench of contact detection: sensitivity, delay, false alarms; the peer is an absolute threshold on the
 same signals."""
+
 import json
 import sys
 import time
@@ -17,9 +18,16 @@ ABSOLUTE = 1.0
 
 def row(figure, value, unit, goal="", ok=True, peer=None, peer_value=None):
     """One row of the bench table."""
-    return {"bench": "contact", "figure": figure, "value": round(float(value), 4), "unit": unit, "goal": goal,
-            "peer": peer, "peer_value": peer_value if peer_value is None else round(float(peer_value), 4),
-            "ok": bool(ok)}
+    return {
+        "bench": "contact",
+        "figure": figure,
+        "value": round(float(value), 4),
+        "unit": unit,
+        "goal": goal,
+        "peer": peer,
+        "peer_value": peer_value if peer_value is None else round(float(peer_value), 4),
+        "ok": bool(ok),
+    }
 
 
 def absolute_alarms(jacobian, trials, samples, force):
@@ -27,8 +35,10 @@ def absolute_alarms(jacobian, trials, samples, force):
     alarms = 0
     for seed in range(trials):
         signal = TorqueSignal(seed)
-        alarms += any(np.max(np.abs(signal.sample(0.005, jacobian, force(k * 0.005), np.zeros(7)))) > ABSOLUTE
-                      for k in range(samples))
+        alarms += any(
+            np.max(np.abs(signal.sample(0.005, jacobian, force(k * 0.005), np.zeros(7)))) > ABSOLUTE
+            for k in range(samples)
+        )
     return alarms / trials
 
 
@@ -41,9 +51,11 @@ def main() -> int:
     share, delay = found_within(posture, (0, 1, 0), 3.0)
     rows.append(row("lateral 3 N found within 60 ms", share, "share", ">= 0.95", share >= 0.95, "absolute 1 Nm", peer))
     rows.append(row("lateral 3 N, median delay", delay * 1000, "ms", "<= 60", delay <= 0.06))
-    for name, direction, newton, sigma in (("down 3 N", (0, 0, -1), 3.0, 0.05),
-                                           ("toward robot 3 N", (-1, 0, 0), 3.0, 0.05),
-                                           ("lateral 3 N, noisy sensors 0.15 Nm", (0, 1, 0), 3.0, 0.15)):
+    for name, direction, newton, sigma in (
+        ("down 3 N", (0, 0, -1), 3.0, 0.05),
+        ("toward robot 3 N", (-1, 0, 0), 3.0, 0.05),
+        ("lateral 3 N, noisy sensors 0.15 Nm", (0, 1, 0), 3.0, 0.15),
+    ):
         share, _ = found_within(posture, direction, newton, sigma=sigma)
         rows.append(row(f"{name} found within 60 ms", share, "share"))
     false = 0

@@ -8,6 +8,7 @@ between the moment at which the next state begins, or at which the machine has e
 asked for. A trial whose machine was over before its moment had come is drawn again; 200 that were struck make the
 figure.
 """
+
 import json
 import multiprocessing
 import os
@@ -34,8 +35,16 @@ def one(seed):
 
 def row(figure, value, unit, goal, ok):
     """One row of the bench table."""
-    return {"bench": "recovery", "figure": figure, "value": value, "unit": unit, "goal": goal, "peer": None,
-            "peer_value": None, "ok": bool(ok)}
+    return {
+        "bench": "recovery",
+        "figure": figure,
+        "value": value,
+        "unit": unit,
+        "goal": goal,
+        "peer": None,
+        "peer_value": None,
+        "ok": bool(ok),
+    }
 
 
 def main() -> int:
@@ -46,8 +55,10 @@ def main() -> int:
             if trial["happened"] or trial["stuck"]:
                 struck.append(trial)
                 for where, speed in trial["moved"][:1]:
-                    print(f"seed {trial['seed']}: {trial['happened']}: {speed:.3f} rad/s in {where or 'the end'}",
-                          file=sys.stderr)
+                    print(
+                        f"seed {trial['seed']}: {trial['happened']}: {speed:.3f} rad/s in {where or 'the end'}",
+                        file=sys.stderr,
+                    )
                 if trial["stuck"]:
                     print(f"seed {trial['seed']}: {trial['happened']}: stuck: {trial['stuck']}", file=sys.stderr)
             if len(struck) == STRUCK:
@@ -57,11 +68,18 @@ def main() -> int:
     stuck = sum(bool(trial["stuck"]) for trial in struck)
     kinds = Counter(trial["happened"].split(" in ")[0] for trial in struck)
     fastest = max((speed for trial in moved for _, speed in trial["moved"]), default=0.0)
-    rows = [row(f"seeded failures ({', '.join(f'{n} by {kind}' for kind, n in sorted(kinds.items()) if kind)})",
-                len(struck), "trials", f">= {STRUCK}", len(struck) >= STRUCK),
-            row("the arm moves after a failed state", len(moved), "trials", "<= 0", not moved),
-            row("fastest joint among these", round(fastest, 4), "rad/s", "<= 0.02", fastest <= 0.02),
-            row("the machine is stuck after it", stuck, "trials", "<= 0", stuck == 0)]
+    rows = [
+        row(
+            f"seeded failures ({', '.join(f'{n} by {kind}' for kind, n in sorted(kinds.items()) if kind)})",
+            len(struck),
+            "trials",
+            f">= {STRUCK}",
+            len(struck) >= STRUCK,
+        ),
+        row("the arm moves after a failed state", len(moved), "trials", "<= 0", not moved),
+        row("fastest joint among these", round(fastest, 4), "rad/s", "<= 0.02", fastest <= 0.02),
+        row("the machine is stuck after it", stuck, "trials", "<= 0", stuck == 0),
+    ]
     print(json.dumps(rows))
     return 0
 

@@ -2,6 +2,7 @@
 """Bench of whole trials in virtual time: each action, each misbehaviour, reaches with noisy and with perfect
 perception. A sample by default; with COGLAB_LONG=1 the campaigns (100 trials of each action, 20 of each misbehaviour)
 and five sessions of the whole system in real time."""
+
 import json
 import multiprocessing
 import os
@@ -27,9 +28,16 @@ BOARD_ACTIONS = ("take", "put")
 
 def row(figure, value, unit, goal="", ok=True, peer=None, peer_value=None):
     """One row of the bench table."""
-    return {"bench": "trials", "figure": figure, "value": round(float(value), 4), "unit": unit, "goal": goal,
-            "peer": peer, "peer_value": peer_value if peer_value is None else round(float(peer_value), 4),
-            "ok": bool(ok)}
+    return {
+        "bench": "trials",
+        "figure": figure,
+        "value": round(float(value), 4),
+        "unit": unit,
+        "goal": goal,
+        "peer": peer,
+        "peer_value": peer_value if peer_value is None else round(float(peer_value), 4),
+        "ok": bool(ok),
+    }
 
 
 def one_trial(job):
@@ -45,10 +53,16 @@ def one_trial(job):
         stuck = str(error)
     if not stuck and trial.last_hub not in ("wait_without_object", "wait_with_object"):
         stuck = f"the machine waits in '{trial.last_hub}': {trial.ctx.journal.why()}"
-    return {"seed": seed, "stuck": stuck, "outcomes": [(r.kind, r.outcome, r.reason) for r in results],
-            "outside": trial.rig.robot.limit_violations, "moving": trial.ctx.contact.watched_while_moving,
-            "virtual": trial.clock.now(), "processor": time.process_time() - started,
-            "reaches": [(action, figures(reach)) for action, reach in zip(actions, trial.reaches, strict=False)]}
+    return {
+        "seed": seed,
+        "stuck": stuck,
+        "outcomes": [(r.kind, r.outcome, r.reason) for r in results],
+        "outside": trial.rig.robot.limit_violations,
+        "moving": trial.ctx.contact.watched_while_moving,
+        "virtual": trial.clock.now(),
+        "processor": time.process_time() - started,
+        "reaches": [(action, figures(reach)) for action, reach in zip(actions, trial.reaches, strict=False)],
+    }
 
 
 class Campaign:
@@ -75,7 +89,7 @@ class Campaign:
         self.stuck += bool(trial["stuck"])
         if trial["stuck"]:
             print(f"{behaviour}, seed {trial['seed']}: stuck: {trial['stuck']}", file=sys.stderr)
-        for action in actions[len(trial["outcomes"]):]:
+        for action in actions[len(trial["outcomes"]) :]:
             self.outcomes[(action, "not started")] += 1
         for kind, outcome, reason in trial["outcomes"]:
             self.outcomes[(kind, outcome)] += 1
@@ -91,10 +105,17 @@ class Campaign:
 
     def safety_rows(self, what):
         """Nothing stuck, no limit violated, never armed while moving."""
-        return [row(f"{what}: stuck", self.stuck, "trials", "<= 0", self.stuck == 0),
-                row(f"{what}: periods outside a joint limit", self.outside, "periods", "<= 0", self.outside == 0),
-                row(f"{what}: contact detector watching while the arm moves", self.moving, "periods", "<= 0",
-                    self.moving == 0)]
+        return [
+            row(f"{what}: stuck", self.stuck, "trials", "<= 0", self.stuck == 0),
+            row(f"{what}: periods outside a joint limit", self.outside, "periods", "<= 0", self.outside == 0),
+            row(
+                f"{what}: contact detector watching while the arm moves",
+                self.moving,
+                "periods",
+                "<= 0",
+                self.moving == 0,
+            ),
+        ]
 
 
 def reach_rows(campaign, action, perception):
@@ -106,21 +127,28 @@ def reach_rows(campaign, action, perception):
 
     def judged(name, value, unit, goal, least=False):
         limit = float(goal.split()[-1]) if goal else 0.0
-        return row(f"{action}, {perception}: {name}", value, unit, goal,
-                   not goal or (value >= limit if least else value <= limit))
+        return row(
+            f"{action}, {perception}: {name}",
+            value,
+            unit,
+            goal,
+            not goal or (value >= limit if least else value <= limit),
+        )
 
     true_goals = ("<= 5", "<= 3") if perception == "perfect perception" else ("", "")
-    return [judged("hand to goal as received, p95", np.percentile(many["goal_mm"], 95), "mm", "<= 5"),
-            judged("hand to goal as received, p95", np.percentile(many["goal_deg"], 95), "deg", "<= 3"),
-            judged("hand to the newest single sight, p95", np.percentile(many["sight_mm"], 95), "mm", ""),
-            judged("hand to the newest single sight, p95", np.percentile(many["sight_deg"], 95), "deg", ""),
-            judged("hand to the true grasp pose, p95", np.percentile(many["truth_mm"], 95), "mm", true_goals[0]),
-            judged("hand to the true grasp pose, p95", np.percentile(many["truth_deg"], 95), "deg", true_goals[1]),
-            judged("arm there later than a person, median", np.median(many["late"]), "s", "<= 0.25"),
-            judged("arm there later than a person, p95", np.percentile(many["late"], 95), "s", ""),
-            judged("'reached' later than a person, median", np.median(many["reached_late"]), "s", ""),
-            judged("SPARC, median", np.median(many["sparc"]), "1", ">= -1.6", least=True),
-            judged("SPARC, p5", np.percentile(many["sparc"], 5), "1", "")]
+    return [
+        judged("hand to goal as received, p95", np.percentile(many["goal_mm"], 95), "mm", "<= 5"),
+        judged("hand to goal as received, p95", np.percentile(many["goal_deg"], 95), "deg", "<= 3"),
+        judged("hand to the newest single sight, p95", np.percentile(many["sight_mm"], 95), "mm", ""),
+        judged("hand to the newest single sight, p95", np.percentile(many["sight_deg"], 95), "deg", ""),
+        judged("hand to the true grasp pose, p95", np.percentile(many["truth_mm"], 95), "mm", true_goals[0]),
+        judged("hand to the true grasp pose, p95", np.percentile(many["truth_deg"], 95), "deg", true_goals[1]),
+        judged("arm there later than a person, median", np.median(many["late"]), "s", "<= 0.25"),
+        judged("arm there later than a person, p95", np.percentile(many["late"], 95), "s", ""),
+        judged("'reached' later than a person, median", np.median(many["reached_late"]), "s", ""),
+        judged("SPARC, median", np.median(many["sparc"]), "1", ">= -1.6", least=True),
+        judged("SPARC, p5", np.percentile(many["sparc"], 5), "1", ""),
+    ]
 
 
 def misbehaviour_rows():
@@ -132,8 +160,15 @@ def misbehaviour_rows():
         campaign = Campaign().run(actions, range(30, 30 + MISBEHAVED), **kw)
         share = campaign.share(action, allowed)
         got = ", ".join(f"{outcome} {n}" for (kind, outcome), n in sorted(campaign.outcomes.items()) if kind == action)
-        rows.append(row(f"{action} with '{behaviour}' x {MISBEHAVED} ends as documented ({got})", share, "share",
-                        ">= 1", share >= 1.0 and campaign.stuck == 0))
+        rows.append(
+            row(
+                f"{action} with '{behaviour}' x {MISBEHAVED} ends as documented ({got})",
+                share,
+                "share",
+                ">= 1",
+                share >= 1.0 and campaign.stuck == 0,
+            )
+        )
         for name in ("outside", "moving", "stuck", "trials"):
             setattr(everything, name, getattr(everything, name) + getattr(campaign, name))
     return rows + everything.safety_rows("misbehaving partners")
@@ -158,6 +193,7 @@ def main() -> int:
     rows += misbehaviour_rows()
     if LONG:
         from real_time_sessions import session_rows
+
         rows += session_rows(row)
     print(json.dumps(rows))
     return 0

@@ -1,4 +1,5 @@
 """Figures of a recorded reach: how late it is compared with a person's, how smooth, how far off at its end."""
+
 from __future__ import annotations
 
 import numpy as np
@@ -24,7 +25,7 @@ def sparc(speed, rate: float, cut: float = 10.0, amplitude: float = 0.05) -> flo
     keep = f <= cut
     f, spectrum = f[keep], spectrum[keep]
     above = np.flatnonzero(spectrum >= amplitude)
-    f, spectrum = f[above[0]:above[-1] + 1], spectrum[above[0]:above[-1] + 1]
+    f, spectrum = f[above[0] : above[-1] + 1], spectrum[above[0] : above[-1] + 1]
     return -float(np.sum(np.sqrt((np.diff(f) / (f[-1] - f[0])) ** 2 + np.diff(spectrum) ** 2)))
 
 
@@ -41,8 +42,12 @@ def figures(reach) -> dict[str, float] | None:
     arrived = float(times[far[-1]]) if len(far) else reach.begin
     way = float(np.linalg.norm(palm[-1] - palm[0]))
     speed = np.linalg.norm(np.diff(palm[inside], axis=0), axis=1) / np.diff(times[inside])
-    out = {"late": arrived - times[0] - human_time(way), "reached_late": reach.reached - times[0] - human_time(way),
-           "reached": reach.reached - reach.begin, "sparc": sparc(speed, 1.0 / float(np.median(np.diff(times))))}
+    out = {
+        "late": arrived - times[0] - human_time(way),
+        "reached_late": reach.reached - times[0] - human_time(way),
+        "reached": reach.reached - reach.begin,
+        "sparc": sparc(speed, 1.0 / float(np.median(np.diff(times)))),
+    }
     for name in ("goal", "sight", "truth"):
         metres, angle = getattr(reach, f"to_{name}")
         out[f"{name}_mm"], out[f"{name}_deg"] = 1000.0 * metres, float(np.degrees(angle))

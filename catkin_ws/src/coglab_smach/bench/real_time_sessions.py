@@ -3,6 +3,7 @@
 
 As a program: real_time_sessions.py SEED runs one session and prints {action: outcome} as JSON. Needs coglab_bringup.
 """
+
 from __future__ import annotations
 
 import json
@@ -51,8 +52,13 @@ def session_rows(row) -> list[dict]:
     good = dict.fromkeys(ORDER, 0)
     for seed in range(SESSIONS):
         try:
-            done = subprocess.run([sys.executable, __file__, str(seed + 1)], capture_output=True, text=True,
-                                  timeout=SESSION_LIMIT, check=True)
+            done = subprocess.run(
+                [sys.executable, __file__, str(seed + 1)],
+                capture_output=True,
+                text=True,
+                timeout=SESSION_LIMIT,
+                check=True,
+            )
             outcomes = json.loads(done.stdout.splitlines()[-1])
         except (subprocess.SubprocessError, ValueError, IndexError) as error:
             print(f"session {seed + 1}: {error}", file=sys.stderr)
@@ -62,8 +68,16 @@ def session_rows(row) -> list[dict]:
             good[action] += outcome == "success"
             if outcome != "success":
                 print(f"session {seed + 1}, {action}: {outcome}", file=sys.stderr)
-    return [row(f"{action}: whole system in real time, {SESSIONS} sessions, succeeded", good[action], "sessions",
-                f">= {SESSIONS}", good[action] == SESSIONS) for action in ORDER]
+    return [
+        row(
+            f"{action}: whole system in real time, {SESSIONS} sessions, succeeded",
+            good[action],
+            "sessions",
+            f">= {SESSIONS}",
+            good[action] == SESSIONS,
+        )
+        for action in ORDER
+    ]
 
 
 if __name__ == "__main__":

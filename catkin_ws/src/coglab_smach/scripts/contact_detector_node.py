@@ -5,6 +5,7 @@ Subscribes lwr/external_torques (effort, Nm) and lwr/joint_states; names are rel
 of coglab_smach.contact.detector.DetectorSettings; robot_description is read for the Jacobian.
 Publishes ~margin (std_msgs/Float64) at 20 Hz while watching.
 """
+
 import dataclasses
 import sys
 import threading
@@ -44,8 +45,9 @@ class ContactDetectorNode:
         self.publisher = rospy.Publisher("coglab/contact", Contact, queue_size=10)
         self.margin = rospy.Publisher("~margin", Float64, queue_size=1)
         rospy.Subscriber("lwr/joint_states", JointState, self.on_joints, queue_size=1, tcp_nodelay=True)
-        self.torques = rospy.Subscriber("lwr/external_torques", JointState, self.on_torques, queue_size=20,
-                                        tcp_nodelay=True)
+        self.torques = rospy.Subscriber(
+            "lwr/external_torques", JointState, self.on_torques, queue_size=20, tcp_nodelay=True
+        )
         rospy.Service("~arm", ArmContact, self.on_arm)
         rospy.Timer(rospy.Duration(0.05), self.on_timer)
 
@@ -74,8 +76,14 @@ class ContactDetectorNode:
             event = self.detector.feed(stamp, message.effort, self.position, self.velocity)
         if event is None:
             return
-        out = Contact(source=event.source, contact=event.contact, margin=event.margin, confidence=event.confidence,
-                      reason_code=event.code, message=event.message)
+        out = Contact(
+            source=event.source,
+            contact=event.contact,
+            margin=event.margin,
+            confidence=event.confidence,
+            reason_code=event.code,
+            message=event.message,
+        )
         out.header.stamp = message.header.stamp
         publish(self.publisher, out)
         rospy.loginfo("contact detector: %s", event.message)
@@ -88,15 +96,20 @@ class ContactDetectorNode:
                 return ArmContactResponse(success=True, message="off")
             now = self.last_sample
             if now is None or abs(rospy.Time.now().to_sec() - now) > 1.0:
-                return ArmContactResponse(False, ReasonCode.NODE_SILENT, f"no torques on {self.torques.resolved_name} "
-                                          "for 1 s; is the robot connected?")
+                return ArmContactResponse(
+                    False,
+                    ReasonCode.NODE_SILENT,
+                    f"no torques on {self.torques.resolved_name} for 1 s; is the robot connected?",
+                )
             try:
-                self.detector.arm(request.mode, now, request.timeout, request.k, request.joints, request.mass,
-                                  request.load_share)
+                self.detector.arm(
+                    request.mode, now, request.timeout, request.k, request.joints, request.mass, request.load_share
+                )
             except ValueError as error:
                 return ArmContactResponse(False, ReasonCode.INVALID_ARGUMENT, str(error))
-        return ArmContactResponse(True, ReasonCode.NONE,
-                                  f"watching for {request.mode} for {request.timeout:.1f} s once the arm is still")
+        return ArmContactResponse(
+            True, ReasonCode.NONE, f"watching for {request.mode} for {request.timeout:.1f} s once the arm is still"
+        )
 
     def on_timer(self, _event) -> None:
         """Live margin."""

@@ -10,6 +10,7 @@ Parameters: perception/frames (names of human_hand and board). Private: config_f
 primitives), auto_trigger, result_file (JSON lines), state_file (what the hand holds, to survive a restart; default
 coglab_holding.json in ROS_HOME), config_overrides (mapping of dotted names), introspection (default true).
 """
+
 import json
 import os
 import sys
@@ -72,9 +73,18 @@ class MasterNode:
         self.result_file = parameters.read("~result_file", str, "")
         self.journal.listen(self.on_transition)
         self.journal.listen_results(self.on_result)
-        self.ctx = Context(clock=clock, arm=RosArm(), hand=RosHand(), perception=RosPerception(),
-                           database=RosDatabase(), contact=RosContact(), config=config, journal=self.journal,
-                           memory=Memory(self.state_file(), rospy.logwarn), reachable=self.reachable())
+        self.ctx = Context(
+            clock=clock,
+            arm=RosArm(),
+            hand=RosHand(),
+            perception=RosPerception(),
+            database=RosDatabase(),
+            contact=RosContact(),
+            config=config,
+            journal=self.journal,
+            memory=Memory(self.state_file(), rospy.logwarn),
+            reachable=self.reachable(),
+        )
         self.master = build_master(self.ctx)
         self.thread = threading.Thread(target=self.master.execute, name="coglab_master", daemon=True)
         self.states = rospy.Publisher("coglab/state", MasterStateMsg, queue_size=20, latch=True)
@@ -117,8 +127,11 @@ class MasterNode:
             self.ctx.clock.sleep(0.005)
         try:
             if not pending.done():
-                return TriggerResponse(False, "STOP is latched in the machine, but the LWR interface did not answer "
-                                              "within 2 s: use the emergency stop of the robot")
+                return TriggerResponse(
+                    False,
+                    "STOP is latched in the machine, but the LWR interface did not answer "
+                    "within 2 s: use the emergency stop of the robot",
+                )
             return TriggerResponse(True, f"STOP: {pending.result()}; to go on {command('reset')}")
         except Exception as error:
             return TriggerResponse(False, f"STOP is latched in the machine, but: {error}")
@@ -129,16 +142,28 @@ class MasterNode:
 
     def on_state(self, state: MasterState) -> None:
         """Latched topic."""
-        message = MasterStateMsg(state=state.state, in_hub=state.in_hub, actions=list(state.actions),
-                                 object_id=state.object_id, why=state.why, reason_code=state.reason_code)
+        message = MasterStateMsg(
+            state=state.state,
+            in_hub=state.in_hub,
+            actions=list(state.actions),
+            object_id=state.object_id,
+            why=state.why,
+            reason_code=state.reason_code,
+        )
         message.header.stamp = rospy.Time.now()
         publish(self.states, message)
 
     def on_transition(self, record: TransitionRecord) -> None:
         """Topic and log."""
-        message = Transition(path=record.path, from_state=record.from_state, outcome=record.outcome,
-                             to_state=record.to_state, reason_code=record.code, reason=record.reason,
-                             causes=list(record.causes))
+        message = Transition(
+            path=record.path,
+            from_state=record.from_state,
+            outcome=record.outcome,
+            to_state=record.to_state,
+            reason_code=record.code,
+            reason=record.reason,
+            causes=list(record.causes),
+        )
         message.header.stamp = rospy.Time.now()
         publish(self.transitions, message)
         (rospy.logwarn if record.outcome in ("failed", "fault", "stopped") else rospy.loginfo)(record.sentence())

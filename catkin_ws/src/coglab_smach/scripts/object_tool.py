@@ -4,6 +4,7 @@
 Usage: ./coglab object [--folder DIR] [--dialect D] list | check [ID ...] | new ID. Exit status: 0 well, 1 a check
 failed, 2 usage.
 """
+
 import argparse
 import sys
 from pathlib import Path
@@ -62,8 +63,9 @@ def main() -> int:
     """Entry point."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--folder", type=Path, default=None, help="folder of the object files")
-    parser.add_argument("--dialect", choices=("legacy", "v17"), default="legacy",
-                        help="of the hand: decides which grasps there are")
+    parser.add_argument(
+        "--dialect", choices=("legacy", "v17"), default="legacy", help="of the hand: decides which grasps there are"
+    )
     verbs = parser.add_subparsers(dest="verb", required=True)
     verbs.add_parser("list")
     check = verbs.add_parser("check")

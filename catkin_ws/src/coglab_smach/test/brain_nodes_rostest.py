@@ -1,5 +1,6 @@
 #!/usr/bin/python3
 """Services and topics of the brain's nodes, over ROS: database, contact detector fed with synthetic torques, master."""
+
 import base64
 import json
 import os
@@ -97,8 +98,10 @@ class BrainNodes(unittest.TestCase):
             torques.over = True
 
     def test_3_object_database(self):
-        self.assertEqual(list(service("/object_database/list_objects", ListObjects)().object_ids),
-                         ["ball", "bottle", "mug", "screwdriver", "tea_box"])
+        self.assertEqual(
+            list(service("/object_database/list_objects", ListObjects)().object_ids),
+            ["ball", "bottle", "mug", "screwdriver", "tea_box"],
+        )
         unknown = service("/object_database/get_object", GetObject)("elephant")
         self.assertEqual((unknown.success, unknown.reason_code), (False, ReasonCode.OBJECT_UNKNOWN))
         mug = service("/object_database/get_object", GetObject)("mug")
@@ -114,9 +117,14 @@ class BrainNodes(unittest.TestCase):
         paths, states = set(), {}
         rospy.Subscriber("/coglab/smach/container_structure", SmachContainerStructure, lambda m: paths.add(m.path))
         rospy.Subscriber("/coglab/smach/container_status", SmachContainerStatus, lambda m: states.update({m.path: m}))
-        wanted = {"/coglab_master", "/coglab_master/exchange_human_to_robot", "/coglab_master/take/precise_motion",
-                  "/coglab_master/exchange_robot_to_human/approach/arm_motion", "/coglab_master/put",
-                  "/coglab_master/coglab_init_system/coglab_init_robot"}
+        wanted = {
+            "/coglab_master",
+            "/coglab_master/exchange_human_to_robot",
+            "/coglab_master/take/precise_motion",
+            "/coglab_master/exchange_robot_to_human/approach/arm_motion",
+            "/coglab_master/put",
+            "/coglab_master/coglab_init_system/coglab_init_robot",
+        }
         end = time.monotonic() + LIMIT
         while not wanted <= paths and time.monotonic() < end:
             time.sleep(0.1)
@@ -157,14 +165,27 @@ class BrainNodes(unittest.TestCase):
         end = time.monotonic() + LIMIT
         while not any("is its node running?" in t.reason for t in transitions) and time.monotonic() < end:
             time.sleep(0.1)
-        self.assertTrue(any("is its node running?" in t.reason and t.reason_code == ReasonCode.NODE_SILENT
-                            for t in transitions))
+        self.assertTrue(
+            any("is its node running?" in t.reason and t.reason_code == ReasonCode.NODE_SILENT for t in transitions)
+        )
 
     def test_6_a_second_one_in_its_own_namespace_ends_without_a_traceback(self):
         config = rospy.get_param("/coglab/config_file")
-        node = subprocess.Popen(["rosrun", "coglab_smach", "master_node.py", "__ns:=two", "__name:=coglab",
-                                 f"_config_file:={config}", "_dmp_library:=none.xml"],
-                                stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, start_new_session=True)
+        node = subprocess.Popen(
+            [
+                "rosrun",
+                "coglab_smach",
+                "master_node.py",
+                "__ns:=two",
+                "__name:=coglab",
+                f"_config_file:={config}",
+                "_dmp_library:=none.xml",
+            ],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            start_new_session=True,
+        )
         try:
             start = service("/two/coglab/start", Start)
             self.assertFalse(start("take", "mug").success)

@@ -1,4 +1,5 @@
 """Fixtures of the machine tests: the master in virtual time on simulated ports, walked by a script."""
+
 from pathlib import Path
 
 import pytest
@@ -18,8 +19,9 @@ class Trial:
         self.clock = VirtualClock()
         self.database = ObjectDatabase(objects_folder())
         assert self.database.reload() == []
-        config = Config.load(str(SHARE / "config" / "machines.yaml"),
-                             {"auto_trigger": True, "dmp_library": "library.xml", **overrides})
+        config = Config.load(
+            str(SHARE / "config" / "machines.yaml"), {"auto_trigger": True, "dmp_library": "library.xml", **overrides}
+        )
         self.ctx, self.cell = simulated_context(self.clock, self.database, config)
         with using(self.clock):
             self.master = build_master(self.ctx)
@@ -28,6 +30,7 @@ class Trial:
     def run(self, script, limit=600.0):
         """Walk the machine until the script ends; whatever the script raises is raised here."""
         with using(self.clock):
+
             def scripted():
                 try:
                     script(self)
@@ -49,7 +52,8 @@ class Trial:
         while self.ctx.requests.hub() != label:
             assert self.clock.now() < end, (
                 f"{label} not reached in {limit} s; hub '{self.ctx.requests.hub()}', why: {self.ctx.journal.why()}\n"
-                + "\n".join(t.sentence() for t in self.ctx.journal.transitions[-15:]))
+                + "\n".join(t.sentence() for t in self.ctx.journal.transitions[-15:])
+            )
             self.clock.sleep(0.05)
 
     def start(self, action, object_id="mug"):

@@ -3,6 +3,7 @@
 From the moment at which the next state begins after a state that has ended failed or preempted (or at which the machine
 has ended), until somebody asks for a motion or the trial is over, the true speed of every joint stays below STILL.
 """
+
 import numpy as np
 
 STILL = 0.02
@@ -30,6 +31,7 @@ class MotionWatch:
         def ask(*arguments):
             self._watching = self._failed = False
             return call(*arguments)
+
         return ask
 
     def _on_transition(self, record):

@@ -3,6 +3,7 @@
 FOLDER holds a package ``smach``. ``names``: our engine behind modules that have the names and signatures of the ROS
 distributions' smach and nothing else. Prints one JSON object.
 """
+
 import importlib
 import json
 import pickle
@@ -12,18 +13,26 @@ import types
 
 MODULES = {
     "smach": "State CBState Container StateMachine Sequence Concurrence Iterator UserData Remapper CBInterface "
-             "cb_interface has_smach_interface InvalidTransitionError InvalidStateError InvalidConstructionError "
-             "InvalidUserCodeError set_loggers loginfo logwarn logerr logdebug set_shutdown_check is_shutdown",
-    "smach.state": "State CBState", "smach.user_data": "UserData Remapper", "smach.container": "Container",
-    "smach.state_machine": "StateMachine", "smach.sequence": "Sequence", "smach.concurrence": "Concurrence",
-    "smach.iterator": "Iterator", "smach.util": "CBInterface cb_interface has_smach_interface",
+    "cb_interface has_smach_interface InvalidTransitionError InvalidStateError InvalidConstructionError "
+    "InvalidUserCodeError set_loggers loginfo logwarn logerr logdebug set_shutdown_check is_shutdown",
+    "smach.state": "State CBState",
+    "smach.user_data": "UserData Remapper",
+    "smach.container": "Container",
+    "smach.state_machine": "StateMachine",
+    "smach.sequence": "Sequence",
+    "smach.concurrence": "Concurrence",
+    "smach.iterator": "Iterator",
+    "smach.util": "CBInterface cb_interface has_smach_interface",
     "smach.log": "set_loggers loginfo logwarn logerr logdebug",
     "smach.exceptions": "SmachError InvalidTransitionError InvalidStateError InvalidConstructionError "
-                        "InvalidUserCodeError"}
+    "InvalidUserCodeError",
+}
 """Public names of each module of smach 2.5."""
 
-ROS_NAMES = ("IntrospectionServer IntrospectionClient SimpleActionState ServiceState MonitorState ConditionState "
-             "ActionServerWrapper set_preempt_handler")
+ROS_NAMES = (
+    "IntrospectionServer IntrospectionClient SimpleActionState ServiceState MonitorState ConditionState "
+    "ActionServerWrapper set_preempt_handler"
+)
 """Public names of smach_ros 2.5 that are not those of its modules."""
 
 
@@ -47,10 +56,19 @@ def narrow(smach):
             return super().execute(parent_ud)
 
     class Concurrence(smach.Concurrence):
-        def __init__(self, outcomes, default_outcome, input_keys=[], output_keys=[], outcome_map={},  # noqa: B006
-                     outcome_cb=None, child_termination_cb=None):
-            super().__init__(outcomes, default_outcome, input_keys, output_keys, outcome_map, outcome_cb,
-                             child_termination_cb)
+        def __init__(
+            self,
+            outcomes,
+            default_outcome,
+            input_keys=[],  # noqa: B006
+            output_keys=[],  # noqa: B006
+            outcome_map={},  # noqa: B006
+            outcome_cb=None,
+            child_termination_cb=None,
+        ):
+            super().__init__(
+                outcomes, default_outcome, input_keys, output_keys, outcome_map, outcome_cb, child_termination_cb
+            )
 
         @staticmethod
         def add(label, state, remapping={}):  # noqa: B006
@@ -101,16 +119,27 @@ def main(where):
     else:
         use_engine(where)
     import smach
+
     smach.set_loggers(*[lambda *a: None] * 4)
     from virtual_trial import VirtualTrial
+
     trial, seen = VirtualTrial(seed=0), []
     watch_user_data(trial.master, seen)
     results = trial.run("exchange_human_to_robot", "exchange_robot_to_human")
     truth = trial.rig.cell.truth()
-    print(json.dumps({
-        "engine": getattr(smach, "__file__", "names"), "outcomes": [[r.kind, r.outcome, r.reason] for r in results],
-        "held_by": truth["held_by"], "dropped": truth["dropped"], "last_hub": trial.last_hub,
-        "limit_violations": trial.rig.robot.limit_violations, "pickled": len(seen)}))
+    print(
+        json.dumps(
+            {
+                "engine": getattr(smach, "__file__", "names"),
+                "outcomes": [[r.kind, r.outcome, r.reason] for r in results],
+                "held_by": truth["held_by"],
+                "dropped": truth["dropped"],
+                "last_hub": trial.last_hub,
+                "limit_violations": trial.rig.robot.limit_violations,
+                "pickled": len(seen),
+            }
+        )
+    )
 
 
 if __name__ == "__main__":

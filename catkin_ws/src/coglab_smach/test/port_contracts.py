@@ -4,6 +4,7 @@ happens while its node is frozen. A double that is kinder than the real port fai
 
 A suite gets a Place: the port, the clock that it lives on, and how its node is frozen and thawed.
 """
+
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -363,5 +364,10 @@ class ContactContract(Contract):
         self.test_disarmed_it_says_nothing()
 
 
-SUITES = {"arm": ArmContract, "hand": HandContract, "perception": PerceptionContract, "database": DatabaseContract,
-          "contact": ContactContract}
+SUITES = {
+    "arm": ArmContract,
+    "hand": HandContract,
+    "perception": PerceptionContract,
+    "database": DatabaseContract,
+    "contact": ContactContract,
+}

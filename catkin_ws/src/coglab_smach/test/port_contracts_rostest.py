@@ -1,5 +1,6 @@
 #!/usr/bin/python3
 """The contracts of the ports on the real adapters. The suites of different nodes run side by side, to be quick."""
+
 import os
 import signal
 import sys
@@ -23,8 +24,13 @@ from port_contracts import SUITES, Place
 
 LIMIT = 90.0
 """s, of the whole"""
-NODES = {"arm": "/robot", "hand": "/ih2_hand", "perception": "/perception", "database": "/object_database",
-         "contact": "/contact_detector"}
+NODES = {
+    "arm": "/robot",
+    "hand": "/ih2_hand",
+    "perception": "/perception",
+    "database": "/object_database",
+    "contact": "/contact_detector",
+}
 PORTS = {"arm": RosArm, "hand": RosHand, "perception": RosPerception, "database": RosDatabase, "contact": RosContact}
 
 
@@ -55,8 +61,13 @@ class PortContracts(unittest.TestCase):
         cls.failures = {name: [] for name in SUITES}
         cls.ran = dict.fromkeys(SUITES, 0)
         cls.arm_may_freeze = threading.Event()
-        waits = ("/lwr/command", "/controller_manager/list_controllers", "/perception/locate_object",
-                 "/object_database/get_object", "/contact_detector/arm")
+        waits = (
+            "/lwr/command",
+            "/controller_manager/list_controllers",
+            "/perception/locate_object",
+            "/object_database/get_object",
+            "/contact_detector/arm",
+        )
         for service in waits:
             rospy.wait_for_service(service, 30.0)
         cls.threads = {name: threading.Thread(target=cls.run_suite, args=(name,), daemon=True) for name in SUITES}

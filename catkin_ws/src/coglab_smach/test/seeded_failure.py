@@ -1,5 +1,6 @@
 """One seeded failure in a whole trial in virtual time: which machine, at which moment, how; and whether the arm moved
 afterwards."""
+
 import numpy as np
 import smach
 from coglab_smach.ports.pending import PortError
@@ -9,8 +10,13 @@ from virtual_trial import VirtualTrial
 
 HOLDING = {"exchange_robot_to_human": "exchange_human_to_robot", "put": "take"}
 """action -> the one that brings the object into the hand before it"""
-DURATION = {"coglab_init_system": 5.0, "exchange_human_to_robot": 9.0, "exchange_robot_to_human": 8.0, "take": 12.0,
-            "put": 11.0}
+DURATION = {
+    "coglab_init_system": 5.0,
+    "exchange_human_to_robot": 9.0,
+    "exchange_robot_to_human": 8.0,
+    "take": 12.0,
+    "put": 11.0,
+}
 """s, about what each takes: the moment is drawn from it"""
 MACHINES = [*DURATION, "recover"]
 KINDS = ("failure", "time limit", "preemption")

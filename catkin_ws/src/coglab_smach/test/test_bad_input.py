@@ -1,4 +1,5 @@
 """Bad input, one case per line of the table in the README: what is wrong, where the machine ends, the sentence."""
+
 import shutil
 
 import pytest
@@ -33,7 +34,7 @@ def no_person(t):
 
 
 def two_people(t):
-    t.cell.faults.refuse["locate mug"] = ("2 people are in view; one partner is expected: ask the others to step back")
+    t.cell.faults.refuse["locate mug"] = "2 people are in view; one partner is expected: ask the others to step back"
 
 
 def goal_lost(t):
@@ -76,14 +77,18 @@ def test_bad_input_ends_in_the_hub_with_its_sentence(prepare):
     assert trial.result().outcome == "failed_empty"
     assert CASES[prepare] in trial.ctx.journal.why()
     # The same sentence on the topic (transitions) and in the result file.
-    assert any(CASES[prepare].split(", because")[0] in r.reason for r in trial.ctx.journal.transitions
-               if r.path == "/coglab_master" and r.from_state == EXCHANGE)
+    assert any(
+        CASES[prepare].split(", because")[0] in r.reason
+        for r in trial.ctx.journal.transitions
+        if r.path == "/coglab_master" and r.from_state == EXCHANGE
+    )
     assert CASES[prepare].split(", because")[0] in trial.result().to_dict()["reason"]
     assert list(trial.cell.joints) == trial.ctx.config.get("postures.home")
 
 
-@pytest.mark.parametrize("moment, hub, sentence", [
-    (0.3, "wait_without_object", "hand"), (2.6, "stopped", "closing of the hand")])
+@pytest.mark.parametrize(
+    "moment, hub, sentence", [(0.3, "wait_without_object", "hand"), (2.6, "stopped", "closing of the hand")]
+)
 def test_hand_node_dies_during_the_exchange(moment, hub, sentence):
     trial = Trial()
 
@@ -137,8 +142,10 @@ def test_arm_node_dead_ends_in_fault_with_its_sentence():
         t.wait_hub("fault")
 
     trial.run(script)
-    assert trial.ctx.journal.why() == ("wait_stop: the arm does not follow any more; the motion could not be ended: "
-                                       "the robot is silent, because /lwr/state is silent")
+    assert trial.ctx.journal.why() == (
+        "wait_stop: the arm does not follow any more; the motion could not be ended: "
+        "the robot is silent, because /lwr/state is silent"
+    )
     assert trial.result().outcome == "fault"
 
 
@@ -172,8 +179,10 @@ def test_trigger_in_the_wrong_hub():
     def script(t):
         t.wait_hub("wait_without_object")
         ok, message, _ = t.ctx.requests.submit("put", "mug")
-        assert not ok and message == ("'put' refused: wait_without_object takes exchange_human_to_robot, take; type: "
-                                      "./coglab start exchange_human_to_robot or ./coglab start take")
+        assert not ok and message == (
+            "'put' refused: wait_without_object takes exchange_human_to_robot, take; type: "
+            "./coglab start exchange_human_to_robot or ./coglab start take"
+        )
         t.clock.sleep(1.0)
         assert t.ctx.requests.hub() == "wait_without_object"
 

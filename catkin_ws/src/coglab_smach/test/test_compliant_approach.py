@@ -1,4 +1,5 @@
 """A compliant approach: the feedback profile is on during the reach, and gone before the contact detector is armed."""
+
 import pytest
 from conftest import Trial
 
@@ -22,10 +23,13 @@ def test_profile_is_on_in_the_reach_and_off_before_contact_is_armed():
     trial = Trial(approach_profile="dmp_compliant")
     trial.run(handover)
     assert [r.outcome for r in trial.ctx.journal.results[-2:]] == ["succeeded", "succeeded"]
-    order = [what for what in trial.cell.called()
-             if what.startswith(("switch", "profile", "execute_dmp", "arm contact", "arm release"))]
+    order = [
+        what
+        for what in trial.cell.called()
+        if what.startswith(("switch", "profile", "execute_dmp", "arm contact", "arm release"))
+    ]
     reach = ["switch dmp", "profile dmp_compliant", "execute_dmp", "profile dmp"]
-    assert order[order.index("switch dmp"):][:5] == [*reach, "arm contact"]
+    assert order[order.index("switch dmp") :][:5] == [*reach, "arm contact"]
     again = order.index("switch dmp", order.index("arm contact"))
     assert [what for what in order[again:] if what != "switch ptp"][:5] == [*reach, "arm release"]
     assert not trial.ctx.contact.armed_while_moving
@@ -36,8 +40,9 @@ def test_profile_is_on_in_the_reach_and_off_before_contact_is_armed():
 def test_contact_is_not_armed_while_the_correction_fades():
     trial = Trial(approach_profile="dmp_compliant")
     trial.cell.fade_time = 1.5
-    trial.run(lambda t: (t.wait_hub("wait_without_object"), t.start(ACTIONS["contact"]),
-                         t.wait_hub("wait_with_object")))
+    trial.run(
+        lambda t: (t.wait_hub("wait_without_object"), t.start(ACTIONS["contact"]), t.wait_hub("wait_with_object"))
+    )
     assert trial.ctx.contact.armed_with_profile[0] == "dmp"
 
 

@@ -1,5 +1,6 @@
 """Contact and release detection on synthetic torques: sensitivity by direction, false alarms, the
 arm-must-stand-still gate."""
+
 import numpy as np
 import pytest
 from coglab_msgs.msg import ReasonCode
@@ -96,8 +97,10 @@ def test_an_event_says_what_it_is_and_how_sure_it_is(posture):
     run.rest_and_arm()
     touch, _ = run.feed(1.0, push((0, 1, 0), 8.0))
     assert (touch.code, touch.source) == (ReasonCode.CONTACT_FOUND, "joint_torque")
-    assert touch.confidence == pytest.approx(confidence((touch.margin - 1.0) * DetectorSettings().k)) and \
-        0.5 < touch.confidence <= 1.0
+    assert (
+        touch.confidence == pytest.approx(confidence((touch.margin - 1.0) * DetectorSettings().k))
+        and 0.5 < touch.confidence <= 1.0
+    )
     run.detector.arm("load", run.t, 10.0, mass=0.5)
     load, _ = run.feed(3.0, lambda t: (0.0, 0.0, -0.5 * 9.81))
     assert load.code == ReasonCode.LOAD_CARRIED and 0.5 <= load.confidence <= 1.0

@@ -1,4 +1,5 @@
 """Arrows between the packages of coglab_smach run downward only; ROS client libraries stay behind the last door."""
+
 import ast
 from pathlib import Path
 

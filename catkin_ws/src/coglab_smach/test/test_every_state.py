@@ -1,4 +1,5 @@
 """What holds for every state of the hierarchy: a time limit, a way out on failure, and an end on preemption."""
+
 import math
 
 import pytest

@@ -1,4 +1,5 @@
 """What happens while a hub waits: STOP and hold show and are reset by the operator; what is held survives a restart."""
+
 import json
 
 import pytest
@@ -23,8 +24,9 @@ def test_a_hold_in_a_hub_is_shown_and_needs_a_reset(with_object):
         before = len(t.cell.called())
         t.cell.arm.held = True  # somebody sent 'hold' to the robot without asking this machine
         t.wait_hub("stopped", limit=2.0)
-        assert t.ctx.journal.why() == ("the arm is blocked: hold is latched; reset first; when its cause is away, "
-                                       "type: ./coglab start reset")
+        assert t.ctx.journal.why() == (
+            "the arm is blocked: hold is latched; reset first; when its cause is away, type: ./coglab start reset"
+        )
         ok, message, _ = t.ctx.requests.submit("take", "mug")
         assert not ok and message == "'take' refused: stopped takes reset; type: ./coglab start reset"
         assert t.cell.called()[before:] == [], "something moved in a hub that is blocked"
@@ -100,7 +102,8 @@ def test_a_hold_during_an_action_never_opens_the_hand():
 
     trial.run(script)
     assert trial.result().outcome == "stopped" and "hold is latched" in trial.result().reason + str(
-        trial.result().causes)
+        trial.result().causes
+    )
 
 
 def test_a_hold_while_the_person_gives_does_not_move_the_hand():
@@ -135,7 +138,8 @@ def test_why_names_the_block_and_not_only_what_failed_before_it():
     assert trial.ctx.journal.why() == (
         "the arm is blocked: hold is latched; reset first; the hand keeps what it holds; when its cause is "
         "away, type: ./coglab start reset, because set_dmp_goal: 'mug' "
-        "was not seen within 5.0 s")
+        "was not seen within 5.0 s"
+    )
     assert trial.result().reason.startswith("the arm is blocked: hold is latched")
 
 
@@ -194,12 +198,16 @@ def test_a_restart_that_remembers_nothing_asks_for_the_objects_name(tmp_path):
     def script(t):
         t.wait_hub("wait_with_object")
         ok, message, _ = t.ctx.requests.submit("put", "")
-        assert not ok and message == ("'put' refused: the hand holds an object that is not known after a restart; "
-                                      "name its object_id, type: ./coglab start put OBJECT")
+        assert not ok and message == (
+            "'put' refused: the hand holds an object that is not known after a restart; "
+            "name its object_id, type: ./coglab start put OBJECT"
+        )
         t.start("put", "elephant")
         t.wait_hub("wait_with_object")
-        assert "'elephant' is not in the database" in [r for r in t.ctx.journal.transitions
-                                                       if r.outcome == "refused"][-1].reason
+        assert (
+            "'elephant' is not in the database"
+            in [r for r in t.ctx.journal.transitions if r.outcome == "refused"][-1].reason
+        )
         t.start("put", "mug")
         t.wait_hub("wait_without_object")
 
@@ -239,8 +247,13 @@ def test_an_object_that_was_taken_away_ends_in_the_hub_without():
 
 
 def test_an_old_recognition_does_not_trigger_twice():
-    trial = Trial(**{"recognition_trigger.enabled": True, "monitor.enabled": False,
-                     "recognition_trigger.actions": {"offer": ["exchange_human_to_robot", "exchange_robot_to_human"]}})
+    trial = Trial(
+        **{
+            "recognition_trigger.enabled": True,
+            "monitor.enabled": False,
+            "recognition_trigger.actions": {"offer": ["exchange_human_to_robot", "exchange_robot_to_human"]},
+        }
+    )
     seen = [Recognition()]
     trial.ctx.perception.recognition = lambda: seen[0]
 

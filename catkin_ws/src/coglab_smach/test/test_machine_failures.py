@@ -1,5 +1,6 @@
 """Whatever breaks, the machine ends in a hub, in 'stopped' or in 'fault', with a sentence; never stuck,
 never by opening the hand."""
+
 import pytest
 from conftest import Trial
 
@@ -41,6 +42,7 @@ def test_object_that_is_not_seen():
 
 def test_nobody_offers_the_object_and_the_arm_does_not_move():
     from coglab_py.pose import Pose
+
     trial = failed_exchange(lambda t: t.cell.objects.__setitem__("mug", Pose([1.2, 0.2, 0.1])))
     assert_recovered_empty(trial, "'mug' was not offered within 8 s: it stayed at (1.20, 0.20, 0.10) m")
     assert "execute_dmp" not in trial.cell.called()
@@ -59,9 +61,9 @@ def test_goal_lost_half_way():
 
 def test_primitive_that_does_not_exist():
     trial = failed_exchange(lambda t: t.cell.primitives.discard("reach_human"))
-    assert_recovered_empty(trial, "primitive 'reach_human' does not exist; loaded: give_human, put_board, "
-                                  "reach_human_high, "
-                                  "take_board")
+    assert_recovered_empty(
+        trial, "primitive 'reach_human' does not exist; loaded: give_human, put_board, reach_human_high, take_board"
+    )
 
 
 def test_contact_detector_dead():
@@ -205,9 +207,11 @@ def test_trigger_in_the_wrong_hub_is_refused_with_a_sentence(trial):
     def script(t):
         t.wait_hub("wait_without_object")
         ok, message, _ = t.ctx.requests.submit("exchange_robot_to_human", "mug")
-        assert not ok and message == ("'exchange_robot_to_human' refused: wait_without_object takes "
-                                      "exchange_human_to_robot, take; type: ./coglab start exchange_human_to_robot or "
-                                      "./coglab start take")
+        assert not ok and message == (
+            "'exchange_robot_to_human' refused: wait_without_object takes "
+            "exchange_human_to_robot, take; type: ./coglab start exchange_human_to_robot or "
+            "./coglab start take"
+        )
         t.start("exchange_human_to_robot")
         ok, message, _ = t.ctx.requests.submit("take", "mug")
         assert not ok and "not in a hub now" in message
@@ -248,8 +252,9 @@ def test_a_programming_error_in_a_state_is_a_failure_not_a_stuck_machine():
 
 
 def test_recognition_leaves_the_hub_where_configured():
-    trial = Trial(**{"recognition_trigger.enabled": True,
-                     "recognition_trigger.actions": {"offer": "exchange_human_to_robot"}})
+    trial = Trial(
+        **{"recognition_trigger.enabled": True, "recognition_trigger.actions": {"offer": "exchange_human_to_robot"}}
+    )
 
     def script(t):
         t.wait_hub("wait_without_object")
@@ -269,6 +274,7 @@ def test_every_transition_of_a_failure_carries_its_sentence():
 
 def test_configuration_is_read_again_while_running(tmp_path):
     from coglab_smach.context.config import Config
+
     path = tmp_path / "c.yaml"
     path.write_text("hand: {open_speed: 1}\n")
     warnings = []
@@ -276,6 +282,7 @@ def test_configuration_is_read_again_while_running(tmp_path):
     assert config.get("hand.open_speed") == 1
     path.write_text("hand: {open_speed: 22}\n")
     import os
+
     os.utime(path, ns=(1, 1))
     assert config.get("hand.open_speed") == 22
     path.write_text("hand: [\n")

@@ -1,4 +1,5 @@
 """The machines walk in D4.10's order (section 3.2, Figures 3 to 8): asserted from the journal, not from the code."""
+
 import pytest
 from conftest import Trial
 
@@ -11,8 +12,13 @@ def receive(t):
 
 def test_init_loads_configures_and_only_then_calibrates_and_homes(trial):
     trial.run(lambda t: t.wait_hub("wait_without_object"))
-    assert trial.labels("/coglab_init_robot") == ["load_controllers", "load_dmps", "configure_lwr", "wait_trigger",
-                                                  "calibrate_and_home"]
+    assert trial.labels("/coglab_init_robot") == [
+        "load_controllers",
+        "load_dmps",
+        "configure_lwr",
+        "wait_trigger",
+        "calibrate_and_home",
+    ]
     assert set(trial.labels("/coglab_init_system")) == {"coglab_init_vision", "coglab_init_robot"}
     assert trial.cell.called("load_controller") == ["load_controller"] * 2
     assert trial.cell.loaded == {"dmp": "coglab/DmpController", "ptp": "coglab/PtpController"}
@@ -47,14 +53,25 @@ def test_init_waits_for_the_trigger_before_anything_moves():
 def test_human_to_robot_order(trial):
     trial.run(receive)
     assert trial.labels("/exchange_human_to_robot") == [
-        "query_database", "set_dmp_goal", "approach", "switch_to_ptp", "hand_close", "coglab_home_robot"]
+        "query_database",
+        "set_dmp_goal",
+        "approach",
+        "switch_to_ptp",
+        "hand_close",
+        "coglab_home_robot",
+    ]
     assert trial.labels("/approach/arm_motion") == ["switch_to_dmp", "execute_dmp", "wait_stop"]
     order = trial.cell.called()
-    for earlier, later in (("get mug", "locate mug"), ("locate mug", "switch dmp"), ("switch dmp", "execute_dmp"),
-                           ("execute_dmp", "arm contact"), ("arm contact", "close")):
+    for earlier, later in (
+        ("get mug", "locate mug"),
+        ("locate mug", "switch dmp"),
+        ("switch dmp", "execute_dmp"),
+        ("execute_dmp", "arm contact"),
+        ("arm contact", "close"),
+    ):
         assert order.index(earlier) < order.index(later)
     # The switch to point-to-point, which ends the DMP, comes between contact and closing.
-    assert "switch ptp" in order[order.index("arm contact"):order.index("close")]
+    assert "switch ptp" in order[order.index("arm contact") : order.index("close")]
     assert order.index("close") < len(order) - 1 - order[::-1].index("move_ptp")
     assert trial.ctx.holding == "mug"
     assert trial.result().outcome == "succeeded"
@@ -98,8 +115,9 @@ def test_monitor_keeps_the_primitive_that_fits():
 
 
 def test_monitor_waits_until_it_is_sure():
-    trial = Trial(**{"monitor.primitives": {"mid": "reach_human", "high": "reach_human_high"},
-                     "monitor.confidence": 0.9999})
+    trial = Trial(
+        **{"monitor.primitives": {"mid": "reach_human", "high": "reach_human_high"}, "monitor.confidence": 0.9999}
+    )
     trial.cell.partner.pattern, trial.cell.partner.pattern_at = "high", 0.4
     trial.run(receive)
     assert trial.cell.called("switch_dmp") == []
@@ -127,12 +145,17 @@ def test_robot_to_human_order_without_a_new_query(trial):
         t.wait_hub("wait_without_object")
 
     trial.run(script)
-    assert trial.labels("/exchange_robot_to_human") == ["set_dmp_goal", "approach", "switch_to_ptp", "hand_open",
-                                                        "coglab_home_robot"]
+    assert trial.labels("/exchange_robot_to_human") == [
+        "set_dmp_goal",
+        "approach",
+        "switch_to_ptp",
+        "hand_open",
+        "coglab_home_robot",
+    ]
     assert not trial.cell.called("get")
     order = trial.cell.called()
     assert order.index("arm release") < order.index("open")
-    assert "switch ptp" in order[order.index("arm release"):order.index("open")]
+    assert "switch ptp" in order[order.index("arm release") : order.index("open")]
     assert trial.ctx.holding == ""
 
 
@@ -157,9 +180,17 @@ def test_take_order_with_preshape_before(trial):
         t.wait_hub("wait_with_object")
 
     trial.run(script)
-    assert trial.labels("/take") == ["query_database", "approach_board", "set_dmp_goal", "hand_preshape",
-                                     "precise_motion", "switch_to_ptp", "hand_close", "leave_board",
-                                     "coglab_home_robot"]
+    assert trial.labels("/take") == [
+        "query_database",
+        "approach_board",
+        "set_dmp_goal",
+        "hand_preshape",
+        "precise_motion",
+        "switch_to_ptp",
+        "hand_close",
+        "leave_board",
+        "coglab_home_robot",
+    ]
     assert set(trial.labels("/approach_board")) == {"locate_object", "move_to_board"}
     goal = trial.master.get_children()["take"].userdata.goal
     # In the board frame, from detection and database: the object as seen there, the grasp, 12 mm of clearance.
@@ -187,8 +218,15 @@ def test_put_asks_for_free_places_while_moving(trial):
         t.wait_hub("wait_without_object")
 
     trial.run(script)
-    assert trial.labels("/put") == ["approach_board", "set_dmp_goal", "precise_motion", "switch_to_ptp", "hand_open",
-                                    "leave_board", "coglab_home_robot"]
+    assert trial.labels("/put") == [
+        "approach_board",
+        "set_dmp_goal",
+        "precise_motion",
+        "switch_to_ptp",
+        "hand_open",
+        "leave_board",
+        "coglab_home_robot",
+    ]
     times = {what: when for when, what in trial.cell.calls}
     assert "free_places" in times
     assert trial.master.get_children()["put"].userdata.goal["frame"] == "board"

@@ -1,4 +1,5 @@
 """coglab/state and coglab/why follow what happens; a start that cannot work is refused at once, by name."""
+
 import json
 
 from coglab_msgs.msg import MasterState as Message
@@ -104,7 +105,8 @@ def test_an_object_that_does_not_exist_is_refused_by_name():
         assert not refused.ok and refused.code == ReasonCode.OBJECT_UNKNOWN
         assert refused.message == (
             f"'{RECEIVE}' refused: object 'elephant' is not in the database; it has: ball, bottle, mug, screwdriver, "
-            f"tea_box; type: ./coglab start {RECEIVE} ball")
+            f"tea_box; type: ./coglab start {RECEIVE} ball"
+        )
         t.clock.sleep(1.0)
         assert t.ctx.requests.hub() == "wait_without_object" and "execute_dmp" not in t.cell.called()
         t.ctx.config.set("default_object", "gnu")

@@ -1,5 +1,6 @@
 """Who starts a motion ends it: whatever fails, runs out of time or is preempted, the arm stands before the next state
 begins, and recovery goes nowhere with an object that a person may hold."""
+
 import coglab_smach.simulated.arm_model as model
 import pytest
 from coglab_msgs.msg import ReasonCode
@@ -131,8 +132,12 @@ def test_a_limit_follows_the_limits_of_speed_and_the_speed_scale():
 
     def script(t):
         t.wait_hub("wait_without_object", 300.0)
-        for action, hub in (("take", "wait_with_object"), ("put", "wait_without_object"),
-                            (RECEIVE, "wait_with_object"), (GIVE, "wait_without_object")):
+        for action, hub in (
+            ("take", "wait_with_object"),
+            ("put", "wait_without_object"),
+            (RECEIVE, "wait_with_object"),
+            (GIVE, "wait_without_object"),
+        ):
             t.start(action)
             t.wait_hub(hub, 400.0)
             assert t.result().outcome == "succeeded", t.ctx.journal.why()
@@ -154,6 +159,7 @@ def test_times_are_those_of_the_limits():
 @pytest.mark.parametrize("hub_after", ["stopped"])
 def test_a_person_who_holds_on_and_a_hand_that_does_not_open(hub_after):
     """The arm must not go away with the person's object."""
+
     def script(t):
         t.wait_hub("wait_without_object")
         t.cell.partner.let_go_after = None
@@ -212,6 +218,8 @@ def test_a_failed_monitor_is_no_reason_of_a_success():
     trial.run(script)
     result = trial.result()
     assert (result.outcome, result.reason, result.code) == ("succeeded", "", 0)
-    assert any(r.from_state == "monitor_dmp" and r.outcome == "failed" and "no estimate" in r.reason
-               for r in trial.ctx.journal.transitions)
+    assert any(
+        r.from_state == "monitor_dmp" and r.outcome == "failed" and "no estimate" in r.reason
+        for r in trial.ctx.journal.transitions
+    )
     assert trial.ctx.journal.newest_failure().sentence == ""

@@ -1,4 +1,5 @@
 """The brain needs nothing of smach and smach_ros but what the ROS distributions' packages have too."""
+
 import ast
 import importlib.metadata
 import json
@@ -45,8 +46,14 @@ def test_only_names_that_every_engine_has():
 
 def handover_on(engine):
     """The report of other_engine.py, in a process of its own."""
-    ended = subprocess.run([sys.executable, str(PACKAGE / "test" / "other_engine.py"), engine], cwd=PACKAGE / "test",
-                           capture_output=True, text=True, timeout=120, check=False)
+    ended = subprocess.run(
+        [sys.executable, str(PACKAGE / "test" / "other_engine.py"), engine],
+        cwd=PACKAGE / "test",
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+    )
     if "No module named 'coglab_" in ended.stderr:
         pytest.skip("a compiled module is not there")
     assert ended.returncode == 0, ended.stderr[-3000:]
@@ -70,7 +77,9 @@ def test_a_handover_on_the_engine_of_the_ros_distributions():
     assert Path(handover_on(str(distribution()))["engine"]).resolve().is_relative_to(distribution())
 
 
-@pytest.mark.skipif(distribution() is not None and os.environ.get("COGLAB_LONG") != "1",
-                    reason="run on the engine of the ROS distributions itself; COGLAB_LONG=1 does both")
+@pytest.mark.skipif(
+    distribution() is not None and os.environ.get("COGLAB_LONG") != "1",
+    reason="run on the engine of the ROS distributions itself; COGLAB_LONG=1 does both",
+)
 def test_a_handover_with_every_other_name_of_our_engine_hidden():
     assert handover_on("names")["engine"] == "names"

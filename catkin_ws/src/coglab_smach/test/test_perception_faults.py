@@ -92,8 +92,15 @@ def two_people(seed, margin, other):
     """A trial whose perception sees the partner and somebody else at ``other(t)``."""
     trial = VirtualTrial(seed=seed)
     trial.perception = trial.ctx.perception
-    vision = Vision(NAMES, PerceptionSettings(), Board(BOARD, {"A1": np.zeros(3)}), seed,
-                    lambda: trial.rig.t, margin, steady=lambda: trial.rig.t)
+    vision = Vision(
+        NAMES,
+        PerceptionSettings(),
+        Board(BOARD, {"A1": np.zeros(3)}),
+        seed,
+        lambda: trial.rig.t,
+        margin,
+        steady=lambda: trial.rig.t,
+    )
     shared = SharedTracker(vision, other)
     trial.rig.trackers = {name: shared.of(name) for name in ("object_mug", "human_hand")}
     trial.ctx.perception = VisionPort(trial, vision)

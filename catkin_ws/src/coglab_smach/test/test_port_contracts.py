@@ -1,4 +1,5 @@
 """The contracts of the ports on their doubles."""
+
 import pytest
 from coglab_objects.database import ObjectDatabase, objects_folder
 from coglab_smach.simulated.cell import SimulatedCell
@@ -32,14 +33,25 @@ def double_of(name):
     cell.faults.empty_grasp = True
     database = ObjectDatabase(objects_folder())
     assert database.reload() == []
-    ports = {"arm": SimulatedArm, "hand": SimulatedHand, "perception": SimulatedPerception, "contact": SimulatedContact,
-             "database": lambda at: SimulatedDatabase(at, database)}
-    return Place(ports[name](cell), clock.now, clock.sleep, lambda: cell.faults.dead.add(name),
-                 lambda: cell.faults.dead.discard(name))
+    ports = {
+        "arm": SimulatedArm,
+        "hand": SimulatedHand,
+        "perception": SimulatedPerception,
+        "contact": SimulatedContact,
+        "database": lambda at: SimulatedDatabase(at, database),
+    }
+    return Place(
+        ports[name](cell),
+        clock.now,
+        clock.sleep,
+        lambda: cell.faults.dead.add(name),
+        lambda: cell.faults.dead.discard(name),
+    )
 
 
-@pytest.mark.parametrize("name, test", [(name, test) for name, suite in SUITES.items() for test in vars(suite)
-                                        if test.startswith("test_")])
+@pytest.mark.parametrize(
+    "name, test", [(name, test) for name, suite in SUITES.items() for test in vars(suite) if test.startswith("test_")]
+)
 def test_double(name, test):
     contract = SUITES[name](double_of(name))
     contract.begin()

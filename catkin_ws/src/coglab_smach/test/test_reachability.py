@@ -1,4 +1,5 @@
 """Goals from database entries, the arm's reach of them, and the tool that checks objects."""
+
 import subprocess
 import sys
 from pathlib import Path

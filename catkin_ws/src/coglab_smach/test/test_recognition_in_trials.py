@@ -1,4 +1,5 @@
 """Recognition of the partner's reach in whole trials: monitor_dmp substitutes the primitive; a reach leaves a hub."""
+
 from pathlib import Path
 
 import numpy as np

@@ -1,4 +1,5 @@
 """A service call that is given up before it was sent never acts, however late its server comes or thaws."""
+
 from __future__ import annotations
 
 import io

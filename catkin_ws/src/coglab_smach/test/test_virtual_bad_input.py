@@ -1,4 +1,5 @@
 """Bad input against the real controller manager, bridge and hand driver: the sentences are theirs."""
+
 import pytest
 import smach
 
@@ -82,8 +83,10 @@ def test_command_mode_lost_in_mid_reach_and_reset():
         t.wait_hub("wait_without_object")
         t.ctx.requests.submit(RECEIVE, "mug")
         t.wait_hub("stopped")
-        assert t.ctx.journal.why() == ("wait_stop: the reach was aborted, because the robot stopped the motion: the "
-                                       "robot controller is in monitor mode; send start")
+        assert t.ctx.journal.why() == (
+            "wait_stop: the reach was aborted, because the robot stopped the motion: the "
+            "robot controller is in monitor mode; send start"
+        )
         assert t.ctx.requests.submit("reset", "")[0]
         t.wait_hub("wait_without_object")
 

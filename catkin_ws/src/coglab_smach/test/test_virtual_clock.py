@@ -1,4 +1,5 @@
 """The clock in which waiting costs no time, and machines that run by it."""
+
 import threading
 
 import pytest

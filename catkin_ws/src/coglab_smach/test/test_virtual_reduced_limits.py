@@ -1,6 +1,7 @@
 """With the reduced limits of the operating mode T1, on the real controllers, what takes long is waited for. The way
 to the board and back by default; COGLAB_LONG=1: all four actions. (test_motion_ownership: all four on the simulated
 arm.)"""
+
 import os
 
 import pytest

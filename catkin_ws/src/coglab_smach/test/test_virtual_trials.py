@@ -2,6 +2,7 @@
 
 A sample by default; COGLAB_LONG=1 runs the campaign (100 trials of each action, each misbehaviour 20 times).
 """
+
 import ast
 import os
 import re
@@ -92,20 +93,26 @@ def test_an_object_that_cannot_be_reached_is_refused_before_the_arm_moves():
 def test_an_object_out_of_reach_all_the_same_ends_with_what_remained():
     trial, results = run(RECEIVE, seed=1, turned=-2.6, **{"handover.check_reach": False})
     assert results[0].outcome == "failed_empty" and trial.last_hub == "wait_without_object"
-    assert re.search(r"the end of the reach within \d+\.\d s expected, it did not happen, because the motion is "
-                     r"running with \d\.", trial.ctx.journal.why())
+    assert re.search(
+        r"the end of the reach within \d+\.\d s expected, it did not happen, because the motion is "
+        r"running with \d\.",
+        trial.ctx.journal.why(),
+    )
 
 
 def test_the_same_seed_gives_the_same_trial():
     def marks():
         _, results = run("exchange_human_to_robot", seed=12)
         return results[0].marks
+
     assert marks() == marks()
 
 
 @pytest.mark.skipif(not LONG, reason="campaign: COGLAB_LONG=1")
-@pytest.mark.parametrize("actions, where", [(("exchange_human_to_robot", "exchange_robot_to_human"), "human_hand"),
-                                            (("take", "put"), "world")])
+@pytest.mark.parametrize(
+    "actions, where",
+    [(("exchange_human_to_robot", "exchange_robot_to_human"), "human_hand"), (("take", "put"), "world")],
+)
 def test_campaign(actions, where):
     good = {action: 0 for action in actions}
     reasons = []
@@ -120,8 +127,14 @@ def test_campaign(actions, where):
 
 def test_nothing_in_control_reads_the_truth():
     """Only the partner, the tracker stand-in, recorders and tests may: no file of a control package names the topic."""
-    for package in ("coglab_smach", "coglab_perception", "coglab_controllers", "ctrl_more", "lwr_fri_bridge",
-                    "ih2_hand"):
+    for package in (
+        "coglab_smach",
+        "coglab_perception",
+        "coglab_controllers",
+        "ctrl_more",
+        "lwr_fri_bridge",
+        "ih2_hand",
+    ):
         for folder in ("src", "scripts", "include", "launch", "config"):
             for path in (SOURCES / package / folder).rglob("*"):
                 if path.suffix in (".py", ".cpp", ".hpp", ".launch", ".yaml"):

@@ -1,4 +1,5 @@
 """A whole trial in virtual time: the master beside the world, and what its reaches did."""
+
 import dataclasses
 from pathlib import Path
 
@@ -30,20 +31,39 @@ class VirtualTrial:
     ``reaches`` gets one ReachRecord per DMP motion.
     """
 
-    def __init__(self, seed=1, behaviour="normal", perfect=False, object_on="human_hand", perception=None,
-                 recogniser=None, later_behaviour="", turned=0.0, limits=LIMITS, **overrides):
+    def __init__(
+        self,
+        seed=1,
+        behaviour="normal",
+        perfect=False,
+        object_on="human_hand",
+        perception=None,
+        recogniser=None,
+        later_behaviour="",
+        turned=0.0,
+        limits=LIMITS,
+        **overrides,
+    ):
         self.rig = World(seed, behaviour, perfect, object_on, perception, turned, limits)
         self.clock = VirtualClock()
         self.recogniser, self.later_behaviour = recogniser, later_behaviour
         self.last_hub = ""
         database = ObjectDatabase(objects_folder())
         database.reload()
-        config = Config.load(str(SHARE / "config" / "machines.yaml"),
-                             {"auto_trigger": True, "dmp_library": LIBRARY, **overrides})
-        self.ctx = Context(clock=self.clock, arm=VirtualArm(self.rig), hand=VirtualHand(self.rig),
-                           perception=VirtualPerception(self.rig, recogniser), database=VirtualDatabase(database),
-                           contact=VirtualContact(self.rig), config=config, journal=Journal(self.clock.now),
-                           reachable=lambda pose: solve(default_arm(), pose) is not None)
+        config = Config.load(
+            str(SHARE / "config" / "machines.yaml"), {"auto_trigger": True, "dmp_library": LIBRARY, **overrides}
+        )
+        self.ctx = Context(
+            clock=self.clock,
+            arm=VirtualArm(self.rig),
+            hand=VirtualHand(self.rig),
+            perception=VirtualPerception(self.rig, recogniser),
+            database=VirtualDatabase(database),
+            contact=VirtualContact(self.rig),
+            config=config,
+            journal=Journal(self.clock.now),
+            reachable=lambda pose: solve(default_arm(), pose) is not None,
+        )
         self.ctx.journal.listen(self._on_transition)
         with using(self.clock):
             self.master = build_master(self.ctx)

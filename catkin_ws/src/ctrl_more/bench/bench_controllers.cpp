@@ -156,9 +156,10 @@ int main(int argc, char** argv) {
   const int blocks = argc > 1 ? std::atoi(argv[1]) : 150;
   Bench bench;
   for (int block = 0; block < blocks; ++block) bench.block();
-  std::printf("{\"controllers\": %d, \"unguarded_ns\": %.3f, \"guarded_ns\": %.3f, "
-              "\"timed_ns\": %.3f, \"bounded_ns\": %.3f, \"faults\": %llu}\n",
-              Bench::kControllers, bench.unguarded_ns, bench.guarded_ns, bench.timed_ns,
-              bench.bounded_ns, static_cast<unsigned long long>(bench.faults()));
+  std::printf(
+      "{\"controllers\": %d, \"unguarded_ns\": %.3f, \"guarded_ns\": %.3f, "
+      "\"timed_ns\": %.3f, \"bounded_ns\": %.3f, \"faults\": %llu}\n",
+      Bench::kControllers, bench.unguarded_ns, bench.guarded_ns, bench.timed_ns, bench.bounded_ns,
+      static_cast<unsigned long long>(bench.faults()));
   return 0;
 }

@@ -29,22 +29,31 @@ def workspace_lib() -> Path:
 
 def run(*command: str | Path) -> str:
     """Output of a program; ends the bench with its words if it fails."""
-    result = subprocess.run(
-        [str(part) for part in command], capture_output=True, text=True, timeout=600
-    )
+    result = subprocess.run([str(part) for part in command], capture_output=True, text=True, timeout=600)
     if result.returncode != 0:
         sys.exit(f"{command[0]} failed ({result.returncode}): {result.stderr[-500:]}")
     return result.stdout
 
 
-def row(figure: str, value: float, unit: str, goal: float | None, peer: str | None = None,
-        peer_value: float | None = None, at_least: bool = False) -> dict:
+def row(
+    figure: str,
+    value: float,
+    unit: str,
+    goal: float | None,
+    peer: str | None = None,
+    peer_value: float | None = None,
+    at_least: bool = False,
+) -> dict:
     """One figure; better is smaller, unless it has to be at least the goal. No goal: reported."""
     met = goal is None or (value >= goal if at_least else value <= goal)
     return {
-        "bench": "feedback", "figure": figure, "value": round(value, 4), "unit": unit,
+        "bench": "feedback",
+        "figure": figure,
+        "value": round(value, 4),
+        "unit": unit,
         "goal": "reported" if goal is None else f"{'>=' if at_least else '<='} {goal:g}",
-        "peer": peer, "peer_value": None if peer_value is None else round(peer_value, 4),
+        "peer": peer,
+        "peer_value": None if peer_value is None else round(peer_value, 4),
         "ok": met,
     }
 
@@ -61,22 +70,28 @@ def guard_rows(binaries: Path) -> list[dict]:
     bare = "the same controllers called in a bare loop [ns each]"
     public = "public implementation of 2017, no guard, measured elsewhere [ns each]"
     return [
-        row("guarded / unguarded update, N = 100", data["guarded_ns"] / floor, "1", None, bare,
-            floor),
-        row("guarded and timed / unguarded update, N = 100", data["timed_ns"] / floor, "1", None,
-            bare, floor),
+        row("guarded / unguarded update, N = 100", data["guarded_ns"] / floor, "1", None, bare, floor),
+        row("guarded and timed / unguarded update, N = 100", data["timed_ns"] / floor, "1", None, bare, floor),
         row("guarded update, N = 100", data["guarded_ns"], "ns", 100, public, 100),
         row("guarded and timed update, N = 100", data["timed_ns"], "ns", 100, public, 100),
-        row("guarded, bounded and timed update, N = 100", data["bounded_ns"], "ns", 100, public,
-            100),
+        row("guarded, bounded and timed update, N = 100", data["bounded_ns"], "ns", 100, public, 100),
     ]
 
 
 def realtime_rows(binaries: Path) -> list[dict]:
     """The counters of the real-time test, with services working meanwhile."""
     text = run(binaries / "ctrl_more_test_realtime", "--gtest_filter=Realtime.Nothing*")
-    names = ("cycles", "plans adopted", "reorders", "reloads", "faults", "allocations", "locks",
-             "syscalls", "allocations of throws")
+    names = (
+        "cycles",
+        "plans adopted",
+        "reorders",
+        "reloads",
+        "faults",
+        "allocations",
+        "locks",
+        "syscalls",
+        "allocations of throws",
+    )
     found = re.search(", ".join(rf"{name} (\d+)" for name in names), text)
     if not found:
         sys.exit("the real-time test printed no figures")
@@ -91,8 +106,7 @@ def realtime_rows(binaries: Path) -> list[dict]:
         row(f"allocations {what}", count["allocations"], "1", 0),
         row(f"locks {what}", count["locks"], "1", 0),
         row(f"system calls {what}", count["syscalls"], "1", 0),
-        row(f"allocations of the C++ runtime at throws {what}", count["allocations of throws"], "1",
-            None),
+        row(f"allocations of the C++ runtime at throws {what}", count["allocations of throws"], "1", None),
     ]
 
 
@@ -103,12 +117,20 @@ def thread_sanitizer_rows() -> list[dict]:
         return []
     result = subprocess.run(
         [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", str(test)],
-        capture_output=True, text=True, timeout=3600,
+        capture_output=True,
+        text=True,
+        timeout=3600,
     )
     if "1 passed" not in result.stdout and "data race" not in result.stdout:
         sys.exit(f"the campaign did not run: {result.stdout[-500:]}")
-    return [row("ThreadSanitizer: services against the cycle for 60 s, first finding ends it",
-                0 if "1 passed" in result.stdout else 1, "findings", 0)]
+    return [
+        row(
+            "ThreadSanitizer: services against the cycle for 60 s, first finding ends it",
+            0 if "1 passed" in result.stdout else 1,
+            "findings",
+            0,
+        )
+    ]
 
 
 def copies(library: Path, folder: Path) -> None:
@@ -130,11 +152,9 @@ def loading_rows(lib: Path, binaries: Path) -> list[dict]:
             copies(lib / f"libctrl_more_bench_plugin_{kind}.so", Path(folder) / kind)
         for _ in range(7):
             for kind, values in times.items():
-                values.append(float(run(binaries / "ctrl_more_bench_loading", kind,
-                                        Path(folder) / kind)))
+                values.append(float(run(binaries / "ctrl_more_bench_loading", kind, Path(folder) / kind)))
     ours, bare = min(times["ours"]), min(times["bare"])
-    return [row(f"loading {PLUGINS} plug-ins / bare class_loader", ours / bare, "1", 2,
-                "bare class_loader [ms]", bare)]
+    return [row(f"loading {PLUGINS} plug-ins / bare class_loader", ours / bare, "1", 2, "bare class_loader [ms]", bare)]
 
 
 def main() -> None:

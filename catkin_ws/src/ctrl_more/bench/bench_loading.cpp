@@ -35,16 +35,14 @@ int main(int argc, char** argv) {
     if (ours) {
       ctrl_more::ControllerEntry entry;
       entry.library = file;
-      const ctrl_more::Status status =
-          manager.loadController("c" + std::to_string(loaded), entry);
+      const ctrl_more::Status status = manager.loadController("c" + std::to_string(loaded), entry);
       if (!status) {
         std::fprintf(stderr, "%s\n", status.message().c_str());
         return 1;
       }
     } else {
       loaders.push_back(std::make_unique<class_loader::ClassLoader>(file));
-      const auto classes =
-          loaders.back()->getAvailableClasses<ctrl_more::FeedbackController>();
+      const auto classes = loaders.back()->getAvailableClasses<ctrl_more::FeedbackController>();
       if (classes.size() != 1) {
         std::fprintf(stderr, "%s lists %zu classes\n", file.c_str(), classes.size());
         return 1;

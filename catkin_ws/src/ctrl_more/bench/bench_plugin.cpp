@@ -8,8 +8,7 @@
 
 // Not constant, so that the compiler reads it where the copies have it changed; hidden, so that
 // each copy reads its own.
-__attribute__((visibility("hidden")))
-char bench_plugin_type[] = "BenchPlug#000";
+__attribute__((visibility("hidden"))) char bench_plugin_type[] = "BenchPlug#000";
 
 namespace {
 

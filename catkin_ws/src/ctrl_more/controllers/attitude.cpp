@@ -66,15 +66,28 @@ Description Attitude::describe() const {
       "the world frame. The integral holds K_i times the error, so a new gain changes nothing at "
       "once; it stands still while the output is saturated and would grow.";
   d.stage = Stage::Task;
-  d.measured("imu").keyFrom("imu").size(9).size(10).in("rad or 1, rad/s, m/s^2").frameOf(
-      "orientation: world; rates: IMU").maxAge(0.05).about(
-      "orientation, angular velocity and linear acceleration in the order of `imu_layout`");
+  d.measured("imu")
+      .keyFrom("imu")
+      .size(9)
+      .size(10)
+      .in("rad or 1, rad/s, m/s^2")
+      .frameOf("orientation: world; rates: IMU")
+      .maxAge(0.05)
+      .about("orientation, angular velocity and linear acceleration in the order of `imu_layout`");
   const CorrectionLimit limit{kUnlimited, kUnlimited, 1.2, 60.0};
-  d.modifies(ControlContainer::PelvisOrientation, "pelvis").in("1").frameOf("world").bounded(limit)
-      .ifAsked().about("orientation reference of the pelvis, if `target` is `pelvis`");
-  d.modifies(ControlContainer::TaskSpaceReferencePose, "pose").keyFrom("pose").in("m, 1").frameOf(
-      "world").bounded({1e-12, kUnlimited, 1.2, 60.0}).ifAsked().about(
-      "pose whose orientation is corrected, if `target` is `pose`");
+  d.modifies(ControlContainer::PelvisOrientation, "pelvis")
+      .in("1")
+      .frameOf("world")
+      .bounded(limit)
+      .ifAsked()
+      .about("orientation reference of the pelvis, if `target` is `pelvis`");
+  d.modifies(ControlContainer::TaskSpaceReferencePose, "pose")
+      .keyFrom("pose")
+      .in("m, 1")
+      .frameOf("world")
+      .bounded({1e-12, kUnlimited, 1.2, 60.0})
+      .ifAsked()
+      .about("pose whose orientation is corrected, if `target` is `pose`");
   d.gain("kp", 0).vector(3, 0.5).range(0.0, 5.0).in("1").about("share of the error corrected");
   d.gain("ki", 0).vector(3, 0.0).range(0.0, 50.0).in("1/s").about("integral action");
   d.gain("kd", 0).vector(3, 0.02).range(0.0, 2.0).in("s").about("damping of the measured rate");
@@ -88,10 +101,13 @@ Description Attitude::describe() const {
       .oneOf({"rpy_gyro_acc", "quaternion_gyro_acc", "quaternion_acc_gyro",
               "quaternion_wxyz_acc_gyro"})
       .about("order of the IMU's numbers; roll, pitch, yaw mean Rz Ry Rx, `quaternion` x y z w");
-  d.setting("mount", std::vector<double>{0, 0, 0, 1}).range(-1.0, 1.0).in("1").about(
-      "orientation of the IMU in the body frame, quaternion x y z w");
-  d.setting("target", "pelvis").oneOf({"pelvis", "pose"}).about(
-      "which orientation reference is corrected");
+  d.setting("mount", std::vector<double>{0, 0, 0, 1})
+      .range(-1.0, 1.0)
+      .in("1")
+      .about("orientation of the IMU in the body frame, quaternion x y z w");
+  d.setting("target", "pelvis")
+      .oneOf({"pelvis", "pose"})
+      .about("which orientation reference is corrected");
   d.setting("pose", "torso").about("key of the pose, if `target` is `pose`");
   return d;
 }
@@ -152,8 +168,7 @@ void Attitude::update(const Cycle& cycle, const RobotStates& robot, const Contro
     return;
   }
   const Eigen::Quaterniond body = imu.orientation.normalized() * mount_.conjugate();
-  const Eigen::Quaterniond reference(
-      original.view(target_).segment<4>(first_).data());
+  const Eigen::Quaterniond reference(original.view(target_).segment<4>(first_).data());
   const Eigen::Vector3d rate_world = imu.orientation.normalized() * imu.rate;
 
   // Error and rate about the axes of the reference body.

@@ -35,8 +35,8 @@ class CompliantStabiliser : public FeedbackController {
   Modify<3> com_, com_velocity_;
   Gain mass_, damping_, stiffness_, max_offset_, force_filter_;
   SecondOrder axis_[2];
-  Eigen::Vector2d offset_ = Eigen::Vector2d::Zero();    // [m]
-  Eigen::Vector2d velocity_ = Eigen::Vector2d::Zero();  // [m/s]
+  Eigen::Vector2d offset_ = Eigen::Vector2d::Zero();          // [m]
+  Eigen::Vector2d velocity_ = Eigen::Vector2d::Zero();        // [m/s]
   Eigen::Vector2d force_estimate_ = Eigen::Vector2d::Zero();  // [N]
   LogThrottle said_{1'000'000'000};
 };
@@ -55,43 +55,60 @@ Description CompliantStabiliser::describe() const {
       "together with another controller that moves the centre of mass by the same error.";
   d.limitations =
       "Horizontal directions only; no stepping: beyond `max_offset` it pushes back like a wall. "
-      "The force from the ZMP is that of a pendulum of constant height whose centre of mass follows "
+      "The force from the ZMP is that of a pendulum of constant height whose centre of mass "
+      "follows "
       "its reference; what the robot's own mass takes to accelerate is not told from a push, so a "
       "quick push meets M + m instead of M. A robot that follows much later than `force_filter` "
       "needs a longer one.";
   d.law =
-      "M \\ddot x + D \\dot x + K x = f,\\quad \\tau \\dot f + f = m g (p_{meas} - p_{ref} - x) / h "
+      "M \\ddot x + D \\dot x + K x = f,\\quad \\tau \\dot f + f = m g (p_{meas} - p_{ref} - x) / "
+      "h "
       "\\text{ or } f = f_{meas},\\quad c' = c + x,\\ \\dot c' = \\dot c + \\dot x";
   d.source = "Mass-spring-damper admittance of the centre of mass, discretised exactly.";
   d.estimated("zmp").size(3).in("m").frameOf("world").maxAge(0.05).ifAsked().about(
       "estimated ZMP, if `force_source` is `zmp`");
-  d.measured("contactForce").size(3).in("N").frameOf("world").maxAge(0.05).ifAsked().about(
-      "net contact force on the robot, if `force_source` is `force`");
+  d.measured("contactForce")
+      .size(3)
+      .in("N")
+      .frameOf("world")
+      .maxAge(0.05)
+      .ifAsked()
+      .about("net contact force on the robot, if `force_source` is `force`");
   d.reads(ControlContainer::Zmp, "zmp").in("m").frameOf("world").about("ZMP reference");
-  d.modifies(ControlContainer::CentreOfMass, "com").in("m").frameOf("world")
-      .bounded({0.5, 5.0, kUnlimited, kUnlimited}).whenPaused(StopPolicy::Fade)
+  d.modifies(ControlContainer::CentreOfMass, "com")
+      .in("m")
+      .frameOf("world")
+      .bounded({0.5, 5.0, kUnlimited, kUnlimited})
+      .whenPaused(StopPolicy::Fade)
       .about("the yielded distance is added to x and y");
-  d.modifies(ControlContainer::CentreOfMass, "comVelocity").in("m/s").frameOf("world")
+  d.modifies(ControlContainer::CentreOfMass, "comVelocity")
+      .in("m/s")
+      .frameOf("world")
       .bounded({5.0, kUnlimited, kUnlimited, kUnlimited})
       .about("its velocity is added to x and y");
   d.gain("mass", 0).vector(2, 20.0).range(0.1, 1000.0).in("kg").about("virtual mass, x and y");
   d.gain("damping", 0).vector(2, 300.0).range(0.0, 1e5).in("N s/m").about("virtual damper");
   d.gain("stiffness", 0).vector(2, 1000.0).range(0.0, 1e6).in("N/m").about("virtual spring");
   d.gain("max_offset", 0.08).range(0.0, 0.3).in("m").about("largest distance, each axis");
-  d.gain("force_filter", 0.05).range(0.01, 1.0).in("s").about(
-      "time constant tau of the force inferred from the ZMP");
+  d.gain("force_filter", 0.05)
+      .range(0.01, 1.0)
+      .in("s")
+      .about("time constant tau of the force inferred from the ZMP");
   for (const char* name : {"offset_x", "offset_y"}) {
     d.state(name).in("m").about("yielded distance");
   }
   for (const char* name : {"force_x", "force_y"}) {
     d.state(name).in("N").about("force that moves it");
   }
-  d.setting("force_source", "zmp").oneOf({"zmp", "force"}).about(
-      "where the force comes from");
-  d.setting("total_mass", std::vector<double>{40.0}).range(0.1, 1000.0).in("kg").about(
-      "mass of the robot");
-  d.setting("height", std::vector<double>{0.8}).range(0.05, 5.0).in("m").about(
-      "height of the centre of mass");
+  d.setting("force_source", "zmp").oneOf({"zmp", "force"}).about("where the force comes from");
+  d.setting("total_mass", std::vector<double>{40.0})
+      .range(0.1, 1000.0)
+      .in("kg")
+      .about("mass of the robot");
+  d.setting("height", std::vector<double>{0.8})
+      .range(0.05, 5.0)
+      .in("m")
+      .about("height of the centre of mass");
   return d;
 }
 

@@ -37,8 +37,8 @@ class EeAdmittance : public FeedbackController {
   Gain mass_, damping_, stiffness_, inertia_, rotary_damping_, rotary_stiffness_;
   Gain force_dead_band_, torque_dead_band_, max_offset_, max_angle_, max_velocity_;
   SecondOrder axis_[6];
-  Vector6 offset_ = Vector6::Zero();    // [m], [rad]
-  Vector6 velocity_ = Vector6::Zero();  // [m/s], [rad/s]
+  Vector6 offset_ = Vector6::Zero();                 // [m], [rad]
+  Vector6 velocity_ = Vector6::Zero();               // [m/s], [rad/s]
   Eigen::Vector3d force_ = Eigen::Vector3d::Zero();  // that moves it, base frame [N]
   LogThrottle said_{1'000'000'000};
 };
@@ -66,17 +66,28 @@ void bound(Offset offset, Velocity velocity, double limit) {
 void declareGains(Description& d) {
   d.gain("mass", 0).vector(3, 4.0).range(0.1, 100.0).in("kg").about("virtual mass, x y z");
   d.gain("damping", 0).vector(3, 60.0).range(0.0, 1e4).in("N s/m").about("virtual damper, x y z");
-  d.gain("stiffness", 0).vector(3, 200.0).range(0.0, 1e5).in("N/m").about(
-      "virtual spring, x y z; 0: stays where it is led");
-  d.gain("inertia", 0).vector(3, 0.2).range(0.001, 10.0).in("kg m^2").about(
-      "virtual inertia about x y z (axes: all)");
-  d.gain("rotary_damping", 0).vector(3, 3.0).range(0.0, 1e3).in("Nm s/rad").about(
-      "virtual damper about x y z (axes: all)");
-  d.gain("rotary_stiffness", 0).vector(3, 10.0).range(0.0, 1e4).in("Nm/rad").about(
-      "virtual spring about x y z (axes: all)");
+  d.gain("stiffness", 0)
+      .vector(3, 200.0)
+      .range(0.0, 1e5)
+      .in("N/m")
+      .about("virtual spring, x y z; 0: stays where it is led");
+  d.gain("inertia", 0)
+      .vector(3, 0.2)
+      .range(0.001, 10.0)
+      .in("kg m^2")
+      .about("virtual inertia about x y z (axes: all)");
+  d.gain("rotary_damping", 0)
+      .vector(3, 3.0)
+      .range(0.0, 1e3)
+      .in("Nm s/rad")
+      .about("virtual damper about x y z (axes: all)");
+  d.gain("rotary_stiffness", 0)
+      .vector(3, 10.0)
+      .range(0.0, 1e4)
+      .in("Nm/rad")
+      .about("virtual spring about x y z (axes: all)");
   d.gain("force_dead_band", 3.0).range(0.0, 100.0).in("N").about("forces below it count as zero");
-  d.gain("torque_dead_band", 0.5).range(0.0, 50.0).in("Nm").about(
-      "torques below it count as zero");
+  d.gain("torque_dead_band", 0.5).range(0.0, 50.0).in("Nm").about("torques below it count as zero");
   d.gain("max_offset", 0.15).range(0.0, 0.4).in("m").about("largest distance from the reference");
   d.gain("max_angle", 0.5).range(0.0, 1.5).in("rad").about("largest turn from the reference");
   d.gain("max_velocity", 0.25).range(0.0, 2.0).in("m/s").about("largest yielding speed");
@@ -108,13 +119,25 @@ Description EeAdmittance::describe() const {
   d.information =
       "Below the dead band, from rest, the references keep their bits. Offset and velocity are "
       "bounded as balls; at the bound the outward velocity is taken away.";
-  d.measured("wrench").keyFrom("wrench").size(6).in("N, Nm").frameOf("setting `wrench_frame`")
-      .maxAge(0.1).about("external force and torque on the end-effector");
-  d.modifies(ControlContainer::TaskSpaceReferencePose, "ee").keyFrom("ee").in("m, 1").frameOf(
-      "base").bounded({0.5, 5.0, 1.6, 30.0}).about("the yielded offset is added");
-  d.modifies(ControlContainer::TaskSpaceReferenceVel, "ee").keyFrom("ee").in("m/s, rad/s").frameOf(
-      "base").bounded({5.0, kUnlimited, kUnlimited, kUnlimited}).about(
-      "the velocity of the offset is added");
+  d.measured("wrench")
+      .keyFrom("wrench")
+      .size(6)
+      .in("N, Nm")
+      .frameOf("setting `wrench_frame`")
+      .maxAge(0.1)
+      .about("external force and torque on the end-effector");
+  d.modifies(ControlContainer::TaskSpaceReferencePose, "ee")
+      .keyFrom("ee")
+      .in("m, 1")
+      .frameOf("base")
+      .bounded({0.5, 5.0, 1.6, 30.0})
+      .about("the yielded offset is added");
+  d.modifies(ControlContainer::TaskSpaceReferenceVel, "ee")
+      .keyFrom("ee")
+      .in("m/s, rad/s")
+      .frameOf("base")
+      .bounded({5.0, kUnlimited, kUnlimited, kUnlimited})
+      .about("the velocity of the offset is added");
   declareGains(d);
   for (const char* name : {"offset_x", "offset_y", "offset_z"}) {
     d.state(name).in("m").about("yielded distance");
@@ -127,10 +150,12 @@ Description EeAdmittance::describe() const {
   }
   d.setting("wrench", "wrench").about("key of the wrench in `measuredData`");
   d.setting("ee", "ee").about("key of pose and velocity references");
-  d.setting("wrench_frame", "base").oneOf({"base", "tool"}).about(
-      "frame the wrench is expressed in");
-  d.setting("axes", "translation").oneOf({"translation", "all"}).about(
-      "whether orientation yields too");
+  d.setting("wrench_frame", "base")
+      .oneOf({"base", "tool"})
+      .about("frame the wrench is expressed in");
+  d.setting("axes", "translation")
+      .oneOf({"translation", "all"})
+      .about("whether orientation yields too");
   return d;
 }
 
@@ -153,8 +178,8 @@ void EeAdmittance::initialize(Setup& setup) {
   max_velocity_ = setup.gain("max_velocity");
 }
 
-void EeAdmittance::update(const Cycle& cycle, const RobotStates& robot,
-                          const ControlStates&, ModifiedControlStates& modified) {
+void EeAdmittance::update(const Cycle& cycle, const RobotStates& robot, const ControlStates&,
+                          ModifiedControlStates& modified) {
   const auto wrench = robot.view(wrench_);
   Eigen::Vector3d force = withoutDeadBand(wrench.head<3>(), scalar(force_dead_band_));
   Eigen::Vector3d torque = withoutDeadBand(wrench.tail<3>(), scalar(torque_dead_band_));
@@ -185,8 +210,8 @@ void EeAdmittance::update(const Cycle& cycle, const RobotStates& robot,
   bound(offset_.head<3>(), velocity_.head<3>(), max_offset);
   if (rotates_) {
     for (int i = 0; i < 3; ++i) {
-      axis_[3 + i].prepare(gain(inertia_)[i], gain(rotary_damping_)[i],
-                           gain(rotary_stiffness_)[i], cycle.dt);
+      axis_[3 + i].prepare(gain(inertia_)[i], gain(rotary_damping_)[i], gain(rotary_stiffness_)[i],
+                           cycle.dt);
       axis_[3 + i].step(torque[i], offset_[3 + i], velocity_[3 + i]);
     }
     bound(offset_.tail<3>(), velocity_.tail<3>(), scalar(max_angle_));

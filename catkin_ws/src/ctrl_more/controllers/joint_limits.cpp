@@ -25,8 +25,8 @@ class JointLimits : public FeedbackController {
   Modify<> velocity_;
   Gain influence_, safety_, xi_;
   std::vector<double> lower_, upper_;  // [rad]
-  int slowed_ = 0;          // joints in this cycle
-  double nearest_ = 0.0;    // distance of any joint to an end of its range [rad]
+  int slowed_ = 0;                     // joints in this cycle
+  double nearest_ = 0.0;               // distance of any joint to an end of its range [rad]
   LogThrottle said_{1'000'000'000};
 };
 
@@ -54,23 +54,38 @@ Description JointLimits::describe() const {
   d.stage = Stage::Joint;
   d.safety = true;
   d.on_switch = SwitchPolicy::Hold;
-  d.measured("joint_position").keyFrom("joint_position").in("rad").frameOf("joint").maxAge(0.1)
+  d.measured("joint_position")
+      .keyFrom("joint_position")
+      .in("rad")
+      .frameOf("joint")
+      .maxAge(0.1)
       .about("measured positions, one per joint");
-  d.modifies(ControlContainer::JointSpaceReference, "Velocity").in("rad/s").frameOf("joint")
-      .bounded({100.0, kUnlimited, kUnlimited, kUnlimited}).whenPaused(StopPolicy::Zero)
+  d.modifies(ControlContainer::JointSpaceReference, "Velocity")
+      .in("rad/s")
+      .frameOf("joint")
+      .bounded({100.0, kUnlimited, kUnlimited, kUnlimited})
+      .whenPaused(StopPolicy::Zero)
       .about("velocity reference, one per joint");
-  d.gain("influence", 0.20).range(0.001, 1.0).in("rad").about(
-      "distance to an end below which the speed is bounded");
+  d.gain("influence", 0.20)
+      .range(0.001, 1.0)
+      .in("rad")
+      .about("distance to an end below which the speed is bounded");
   d.gain("safety", 0.03).range(0.0, 0.5).in("rad").about("distance that is kept");
   d.gain("xi", 1.0).range(0.001, 10.0).in("rad/s").about("bound at the influence distance");
   d.state("slowed").in("1").about("number of joints whose speed is bounded now");
   d.state("nearest").in("rad").about("smallest distance of a joint to an end of its range");
-  d.setting("joint_position", "joint_position").about(
-      "key of the joint positions in `measuredData`");
+  d.setting("joint_position", "joint_position")
+      .about("key of the joint positions in `measuredData`");
   d.setting("lower", std::vector<double>{-wide, -narrow, -wide, -narrow, -wide, -narrow, -wide})
-      .range(-1000.0, 1000.0).in("rad").anySize().about("lower end of each joint");
+      .range(-1000.0, 1000.0)
+      .in("rad")
+      .anySize()
+      .about("lower end of each joint");
   d.setting("upper", std::vector<double>{wide, narrow, wide, narrow, wide, narrow, wide})
-      .range(-1000.0, 1000.0).in("rad").anySize().about("upper end of each joint");
+      .range(-1000.0, 1000.0)
+      .in("rad")
+      .anySize()
+      .about("upper end of each joint");
   return d;
 }
 

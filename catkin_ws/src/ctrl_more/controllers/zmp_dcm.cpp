@@ -61,7 +61,8 @@ Description ZmpDcm::describe() const {
   d.limitations =
       "Horizontal directions, constant height. In mode `dcm` with a held ZMP the loop is stable "
       "only for 0 < k < 2 w / (exp(w T) - 1). In mode `zmp_ip` for ki T (1 + kc) < 2, and with a "
-      "`zmp_filter` longer than 1 / (w sqrt(kc)): the measured ZMP also holds what accelerating the "
+      "`zmp_filter` longer than 1 / (w sqrt(kc)): the measured ZMP also holds what accelerating "
+      "the "
       "centre of mass takes, and unfiltered that drives the offset the wrong way.";
   d.law =
       "\\omega = \\sqrt{g/h},\\ \\xi = c + \\dot c/\\omega,\\ p' = p + (1 + k/\\omega)(\\xi - "
@@ -74,24 +75,37 @@ Description ZmpDcm::describe() const {
       "position and velocity of the centre of mass (mode dcm)");
   d.estimated("zmp").size(3).in("m").frameOf("world").maxAge(0.05).ifAsked().about(
       "estimated ZMP (mode zmp_ip)");
-  d.reads(ControlContainer::CentreOfMass, "comVelocity").in("m/s").frameOf("world").about(
-      "velocity reference of the centre of mass (mode dcm)");
-  d.modifies(ControlContainer::Zmp, "zmp").in("m").frameOf("world")
-      .bounded({2.0, kUnlimited, kUnlimited, kUnlimited}).whenPaused(StopPolicy::Fade)
+  d.reads(ControlContainer::CentreOfMass, "comVelocity")
+      .in("m/s")
+      .frameOf("world")
+      .about("velocity reference of the centre of mass (mode dcm)");
+  d.modifies(ControlContainer::Zmp, "zmp")
+      .in("m")
+      .frameOf("world")
+      .bounded({2.0, kUnlimited, kUnlimited, kUnlimited})
+      .whenPaused(StopPolicy::Fade)
       .about("ZMP reference, x and y");
-  d.modifies(ControlContainer::CentreOfMass, "com").in("m").frameOf("world")
-      .bounded({0.5, kUnlimited, kUnlimited, kUnlimited}).whenPaused(StopPolicy::Hold)
+  d.modifies(ControlContainer::CentreOfMass, "com")
+      .in("m")
+      .frameOf("world")
+      .bounded({0.5, kUnlimited, kUnlimited, kUnlimited})
+      .whenPaused(StopPolicy::Hold)
       .about("reference of the centre of mass, x and y; changed in mode zmp_ip only");
   d.gain("k", 4.0).range(0.0, 1000.0).in("1/s").about("decay rate of the DCM error (mode dcm)");
-  d.gain("support_box", 0).vector(4, 0.1).range(0.0, 1.0).in("m").about(
-      "how far p' may leave the ZMP reference: back, front, right, left (mode dcm)");
+  d.gain("support_box", 0)
+      .vector(4, 0.1)
+      .range(0.0, 1.0)
+      .in("m")
+      .about("how far p' may leave the ZMP reference: back, front, right, left (mode dcm)");
   d.gain("kc", 0).vector(2, 1.0).range(0.0, 20.0).in("1").about(
       "virtual spring from the offset to the ZMP reference, x and y (mode zmp_ip)");
   d.gain("ki", 0).vector(2, 3.5).range(0.0, 50.0).in("1/s").about(
       "integral action of the ZMP error, x and y (mode zmp_ip)");
   d.gain("max_offset", 0.05).range(0.0, 0.3).in("m").about("bound of both corrections (zmp_ip)");
-  d.gain("zmp_filter", 0.4).range(0.0, 5.0).in("s").about(
-      "time constant tau of the measured ZMP (zmp_ip)");
+  d.gain("zmp_filter", 0.4)
+      .range(0.0, 5.0)
+      .in("s")
+      .about("time constant tau of the measured ZMP (zmp_ip)");
   for (const char* name : {"offset_x", "offset_y"}) {
     d.state(name).in("m").about("offset of the centre of mass (mode zmp_ip)");
   }
@@ -99,8 +113,10 @@ Description ZmpDcm::describe() const {
     d.state(name).in("m").about("correction of the ZMP reference");
   }
   d.setting("mode", "dcm").oneOf({"dcm", "zmp_ip"}).about("which law");
-  d.setting("height", std::vector<double>{0.8}).range(0.05, 5.0).in("m").about(
-      "height of the centre of mass above the ground");
+  d.setting("height", std::vector<double>{0.8})
+      .range(0.05, 5.0)
+      .in("m")
+      .about("height of the centre of mass above the ground");
   return d;
 }
 
@@ -137,13 +153,12 @@ void ZmpDcm::update(const Cycle& cycle, const RobotStates& robot, const ControlS
   }
 }
 
-void ZmpDcm::followDcm(const Cycle& cycle, const RobotStates& robot,
-                       const ControlStates& original, ModifiedControlStates& modified) {
+void ZmpDcm::followDcm(const Cycle& cycle, const RobotStates& robot, const ControlStates& original,
+                       ModifiedControlStates& modified) {
   const auto com = robot.view(com_);
   const Eigen::Vector2d dcm = com.head<2>() + com.segment<2>(3) / omega_;
   const Eigen::Vector2d reference =
-      original.view(com_out_).head<2>() +
-      original.view(com_velocity_reference_).head<2>() / omega_;
+      original.view(com_out_).head<2>() + original.view(com_velocity_reference_).head<2>() / omega_;
   const Eigen::Vector2d wanted = (1.0 + scalar(k_) / omega_) * (dcm - reference);
   const auto box = gain(support_);
   shift_ << std::clamp(wanted[0], -box[0], box[1]), std::clamp(wanted[1], -box[2], box[3]);
@@ -154,8 +169,8 @@ void ZmpDcm::followDcm(const Cycle& cycle, const RobotStates& robot,
   }
 }
 
-void ZmpDcm::followZmp(const Cycle& cycle, const RobotStates& robot,
-                       const ControlStates& original, ModifiedControlStates& modified) {
+void ZmpDcm::followZmp(const Cycle& cycle, const RobotStates& robot, const ControlStates& original,
+                       ModifiedControlStates& modified) {
   const double limit = scalar(max_offset_);
   const double share = -std::expm1(-cycle.dt / scalar(zmp_filter_));
   apart_ += share * ((robot.view(zmp_) - original.view(zmp_out_)).head<2>() - apart_);

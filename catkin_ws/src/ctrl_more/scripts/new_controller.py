@@ -41,9 +41,7 @@ def template_folder(package: str = "ctrl_more") -> Path:
 def make_controller(name: str, into: Path, template: Path | None = None) -> Path:
     """Writes the new controller and returns its folder; raises ValueError or FileExistsError."""
     if not re.fullmatch(r"[A-Z][A-Za-z0-9]*[a-z][A-Za-z0-9]*", name):
-        raise ValueError(
-            f"a controller's name is CamelCase, letters and digits, like WristDamper; got '{name}'"
-        )
+        raise ValueError(f"a controller's name is CamelCase, letters and digits, like WristDamper; got '{name}'")
     if not into.is_dir():
         raise FileNotFoundError(f"there is no folder {into}; make it first")
     snake = snake_case(name)
@@ -74,7 +72,11 @@ def next_steps(target: Path, motion: bool = False) -> list[str]:
         return [f"./coglab build && ./coglab test {target.name}"]
     if motion:
         workspace = workspace if target.resolve().parent.name == "src" else "WORKSPACE"
-        return [f"catkin_make -C {workspace}", f". {workspace}/devel/setup.bash", f"rostest {target.name} {target.name}.test"]
+        return [
+            f"catkin_make -C {workspace}",
+            f". {workspace}/devel/setup.bash",
+            f"rostest {target.name} {target.name}.test",
+        ]
     return [
         f"cmake -S {target} -B {target}/build && cmake --build {target}/build",
         f"ctest --test-dir {target}/build --output-on-failure",
@@ -86,9 +88,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("name", help="type of the controller in CamelCase, for example WristDamper")
     parser.add_argument("--into", type=Path, default=Path("."), help="folder to make it in")
-    parser.add_argument(
-        "--motion", action="store_true", help="a motion of the arm, for coglab_controllers"
-    )
+    parser.add_argument("--motion", action="store_true", help="a motion of the arm, for coglab_controllers")
     arguments = parser.parse_args()
     try:
         package = "coglab_controllers" if arguments.motion else "ctrl_more"

@@ -11,8 +11,19 @@ from pathlib import Path
 import pytest
 
 PACKAGE = Path(__file__).resolve().parent.parent
-FLAGS = ["-std=c++17", "-O1", "-g1", "-fPIC", "-fsanitize=address", "-fno-omit-frame-pointer", "-fno-gnu-unique",
-         f"-I{PACKAGE / 'include'}", f"-I{PACKAGE / 'src'}", f"-I{PACKAGE / 'test'}", "-isystem/usr/include/eigen3"]
+FLAGS = [
+    "-std=c++17",
+    "-O1",
+    "-g1",
+    "-fPIC",
+    "-fsanitize=address",
+    "-fno-omit-frame-pointer",
+    "-fno-gnu-unique",
+    f"-I{PACKAGE / 'include'}",
+    f"-I{PACKAGE / 'src'}",
+    f"-I{PACKAGE / 'test'}",
+    "-isystem/usr/include/eigen3",
+]
 PLUGINS = ["good", "none", "two", "again", "paper_maker", "throwing", "wrong_type", "other_abi", "strangers", "rebuilt"]
 
 
@@ -34,14 +45,27 @@ def test_libraries_come_throw_and_go(tmp_path: Path) -> None:
     link = [core, f"-Wl,-rpath,{tmp_path}"]
     for name in PLUGINS:
         compiled("-shared", PACKAGE / "test" / "plugins" / f"{name}.cpp", "-o", plugins / f"lib{name}.so", *link)
-    compiled("-shared", PACKAGE / "test" / "plugins" / "good.cpp", "-Wl,-z,nodelete", "-o",
-             plugins / "libresident.so", *link)
-    compiled(f'-DCTRL_MORE_TEST_PLUGIN_DIR="{plugins}"', f'-DCTRL_MORE_SOURCE_DIR="{PACKAGE}"',
-             f'-DCTRL_MORE_PLUGIN_DIR="{plugins}"', PACKAGE / "test" / "test_plugins.cpp",
-             PACKAGE / "test" / "run_tests.cpp", "-o", program, *link, "-lgtest", "-lpthread")
+    compiled(
+        "-shared", PACKAGE / "test" / "plugins" / "good.cpp", "-Wl,-z,nodelete", "-o", plugins / "libresident.so", *link
+    )
+    compiled(
+        f'-DCTRL_MORE_TEST_PLUGIN_DIR="{plugins}"',
+        f'-DCTRL_MORE_SOURCE_DIR="{PACKAGE}"',
+        f'-DCTRL_MORE_PLUGIN_DIR="{plugins}"',
+        PACKAGE / "test" / "test_plugins.cpp",
+        PACKAGE / "test" / "run_tests.cpp",
+        "-o",
+        program,
+        *link,
+        "-lgtest",
+        "-lpthread",
+    )
     result = subprocess.run(
         [str(program), "--gtest_filter=Plugins.LoadsRuns*:Plugins.What*:Plugins.Two*:Plugins.Known*:TwoBuilds.*"],
         env=dict(os.environ, ASAN_OPTIONS="detect_leaks=1", TMPDIR=str(tmp_path)),
-        capture_output=True, text=True, timeout=300)
+        capture_output=True,
+        text=True,
+        timeout=300,
+    )
     assert result.returncode == 0, (result.stdout + result.stderr)[-4000:]
     assert "[  PASSED  ] 8 tests" in result.stdout, result.stdout[-500:]

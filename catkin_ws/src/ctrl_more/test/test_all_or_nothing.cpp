@@ -120,8 +120,7 @@ void failAtEachAllocation(const std::string& what, bool frozen, const Request& p
   }
 }
 
-void failAtEachAllocation(const std::string& what, const Request& prepare,
-                          const Request& request) {
+void failAtEachAllocation(const std::string& what, const Request& prepare, const Request& request) {
   for (const bool frozen : {false, true}) failAtEachAllocation(what, frozen, prepare, request);
 }
 
@@ -130,17 +129,21 @@ TEST(AllOrNothing, Changes) {
     GainValues gains = x.manager->getGains("a");
     gains.set("k", {3.0});
     return x.manager
-        ->apply(Change().enable("c").gains("a", gains.all()).pause("a", "rest").resume("b", "other")
+        ->apply(Change()
+                    .enable("c")
+                    .gains("a", gains.all())
+                    .pause("a", "rest")
+                    .resume("b", "other")
                     .order({"c", "b", "a"}))
         .ok();
   });
   failAtEachAllocation("profile", nullptr,
                        [](Crowd& x) { return x.manager->applyProfile("some").ok(); });
-  failAtEachAllocation("by signal", nullptr, [](Crowd& x) {
-    return x.manager->pauseAllUsingControlState("ee").ok();
+  failAtEachAllocation("by signal", nullptr,
+                       [](Crowd& x) { return x.manager->pauseAllUsingControlState("ee").ok(); });
+  failAtEachAllocation("gains", nullptr, [](Crowd& x) {
+    return x.manager->setGains("b", {{"k", {2.0}}}).ok();
   });
-  failAtEachAllocation("gains", nullptr,
-                       [](Crowd& x) { return x.manager->setGains("b", {{"k", {2.0}}}).ok(); });
   failAtEachAllocation("new profile", nullptr,
                        [](Crowd& x) { return x.manager->setProfile("new", {"b"}).ok(); });
 }

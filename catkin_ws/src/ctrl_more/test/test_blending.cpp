@@ -6,8 +6,8 @@
 namespace ctrl_more {
 namespace {
 
-constexpr double kBlend = 0.1;                  // [s]
-constexpr double kShare = 0.005 / kBlend;       // of a change, per cycle
+constexpr double kBlend = 0.1;             // [s]
+constexpr double kShare = 0.005 / kBlend;  // of a change, per cycle
 
 // A pose controller that shifts by 1 and turns by 0.4 rad, and a velocity one that adds 1.
 struct Blending : ::testing::Test {
@@ -15,8 +15,8 @@ struct Blending : ::testing::Test {
   TestController *pose, *velocity;
   Blending() {
     auto p = adder("pose", "ee", 0.0);
-    p->on_update = [](TestController& self, const Cycle&, const RobotStates&,
-                      const ControlStates&, ModifiedControlStates& m) {
+    p->on_update = [](TestController& self, const Cycle&, const RobotStates&, const ControlStates&,
+                      ModifiedControlStates& m) {
       auto v = m[self.out];
       v[0] += 1.0;
       const Eigen::Quaterniond before(v.tail<4>().data());
@@ -25,9 +25,7 @@ struct Blending : ::testing::Test {
     pose = rig.add(std::move(p), "pose", false);
     velocity = rig.add(adder("vel", "ee", 1.0), "velocity", false);
   }
-  double angle() const {
-    return logOf(Eigen::Quaterniond(rig.pose().tail<4>().data())).norm();
-  }
+  double angle() const { return logOf(Eigen::Quaterniond(rig.pose().tail<4>().data())).norm(); }
   // Steps and checks that nothing moved by more than its share.
   void stepSmoothly(int cycles, double largest = 1.0) {
     for (int i = 0; i < cycles; ++i) {
@@ -86,13 +84,22 @@ TEST_F(Blending, ChangingOneMindInTheMiddleIsBumpless) {
   rig.step();
   for (int i = 0; i < 300; ++i) {
     switch (random() % 5) {
-      case 0: rig.manager->enable(); break;
-      case 1: rig.manager->disable(); break;
-      case 2: rig.manager->pause("pose"); break;
-      case 3: rig.manager->resume("pose"); break;
-      case 4: rig.manager->setExecutionOrder(random() % 2 == 0
-                                                 ? std::vector<std::string>{"pose", "velocity"}
-                                                 : std::vector<std::string>{"velocity", "pose"});
+      case 0:
+        rig.manager->enable();
+        break;
+      case 1:
+        rig.manager->disable();
+        break;
+      case 2:
+        rig.manager->pause("pose");
+        break;
+      case 3:
+        rig.manager->resume("pose");
+        break;
+      case 4:
+        rig.manager->setExecutionOrder(random() % 2 == 0
+                                           ? std::vector<std::string>{"pose", "velocity"}
+                                           : std::vector<std::string>{"velocity", "pose"});
     }
     stepSmoothly(1 + static_cast<int>(random() % 9));
   }
@@ -114,9 +121,8 @@ TEST(BlendingTest, OrderChangeOfACascadeIsBumpless) {
   rig.add(adder("pose", "ee", 1.0), "add");
   auto doubling = adder("pose", "ee", 0.0);
   doubling->on_update = [](TestController& self, const Cycle&, const RobotStates&,
-                           const ControlStates&, ModifiedControlStates& m) {
-    m[self.out][0] *= 2.0;
-  };
+                           const ControlStates&,
+                           ModifiedControlStates& m) { m[self.out][0] *= 2.0; };
   rig.add(std::move(doubling), "double");
   rig.step(30);
   EXPECT_EQ(rig.pose()[0], 2.0);

@@ -53,8 +53,7 @@ TEST_F(BySignal, ReasonsDoNotCancelEachOther) {
   rig.manager->resumeAllUsingRobotState("wrench");
   EXPECT_TRUE(rig.manager->isPaused("force"));
   const Status status = rig.manager->resume("force");
-  EXPECT_TRUE(contains(status.message(),
-                       "still paused: control signal taskSpaceReferencePose/ee"))
+  EXPECT_TRUE(contains(status.message(), "still paused: control signal taskSpaceReferencePose/ee"))
       << status.message();
   EXPECT_TRUE(rig.manager->isPaused("force"));
   rig.manager->resumeAllUsingControlState("ee");
@@ -119,8 +118,7 @@ TEST_F(BySignal, KeyAndFullNameAreTheSameReason) {
   for (const std::string robot : {"wrench", "measuredData/wrench"}) {
     for (const std::string back : {"wrench", "measuredData/wrench"}) {
       ASSERT_TRUE(rig.manager->pauseAllUsingRobotState(robot));
-      EXPECT_EQ(rig.manager->status("force").reasons,
-                Names{"robot signal measuredData/wrench"});
+      EXPECT_EQ(rig.manager->status("force").reasons, Names{"robot signal measuredData/wrench"});
       ASSERT_TRUE(rig.manager->resumeAllUsingRobotState(back));
       EXPECT_FALSE(rig.manager->isPaused("force")) << robot << " " << back;
     }

@@ -63,8 +63,7 @@ TEST(CascadeTest, EmptyListKeepsEveryBit) {
   Eigen::VectorXd pose = vectorOf({-0.0, 1e-310, -5, 0.1, 0.2, 0.3, 0});
   pose[6] = std::sqrt(1.0 - pose.segment<3>(3).squaredNorm());
   rig.control.setTaskSpaceReferencePose("ee", pose);
-  const std::vector<double> before(rig.control.data(),
-                                   rig.control.data() + rig.control.dataSize());
+  const std::vector<double> before(rig.control.data(), rig.control.data() + rig.control.dataSize());
   for (int i = 0; i < 10; ++i) {
     ++rig.cycle.number;
     rig.manager->update(rig.cycle, rig.robot, rig.control);

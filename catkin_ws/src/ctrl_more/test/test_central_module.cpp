@@ -30,8 +30,8 @@ const bool registered = CentralModule::registerManager(
     "LocomotionStandIn",
     [](const std::string& name, const ConfigNode& block, RobotStates&, ControlStates&, Logger*) {
       block.requireKeys("manager '" + name + "'", {"type", "step_length"});
-      return std::make_unique<LocomotionStandIn>(
-          name, block.find("step_length")->number("step_length"));
+      return std::make_unique<LocomotionStandIn>(name,
+                                                 block.find("step_length")->number("step_length"));
     });
 
 struct CentralModuleTest : ::testing::Test {
@@ -56,8 +56,10 @@ TEST_F(CentralModuleTest, LocomotionRunsBeforeFeedback) {
   std::FILE* file = std::fopen(list.c_str(), "w");
   std::fputs("loadControllers: [Good]\nGood: {libPath: libgood.so, enabled: true}\n", file);
   std::fclose(file);
-  const std::string both = "locomotion: {type: LocomotionStandIn, step_length: 0.5}\n"
-                           "feedback: {type: Feedback, blend_s: 0, listFile: " + list + "}\n";
+  const std::string both =
+      "locomotion: {type: LocomotionStandIn, step_length: 0.5}\n"
+      "feedback: {type: Feedback, blend_s: 0, listFile: " +
+      list + "}\n";
   CentralModule module(ConfigNode::fromText("managers: [locomotion, feedback]\n" + both, "c.yaml"),
                        "", &logger);
   ASSERT_TRUE(module.loadErrors().empty()) << module.loadErrors().front();
@@ -109,8 +111,8 @@ TEST_F(CentralModuleTest, WrongFilesAreRefused) {
   EXPECT_TRUE(contains(errorOf("managers: [a]\na: {type: Feedbak}\n"), "did you mean 'Feedback'"));
   EXPECT_TRUE(contains(errorOf("managers: [a]\na: {}\n"), "needs a type"));
   EXPECT_TRUE(contains(errorOf("managers: [a, a]\na: {type: Feedback}\n"), "twice"));
-  EXPECT_TRUE(contains(errorOf("managers: [a, b]\na: {type: Feedback}\nb: {type: Feedback}\n"),
-                       "already"));
+  EXPECT_TRUE(
+      contains(errorOf("managers: [a, b]\na: {type: Feedback}\nb: {type: Feedback}\n"), "already"));
   EXPECT_TRUE(contains(errorOf("managers: []\njoints: 1.5\n"), "whole number"));
   EXPECT_TRUE(contains(errorOf("managers: []\nperiod: 0\n"), "period"));
   EXPECT_TRUE(contains(errorOf("managers: []\nperiods: 0\n"), "did you mean 'period'"));

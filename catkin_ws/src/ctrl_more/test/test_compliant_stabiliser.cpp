@@ -110,8 +110,9 @@ TEST_F(ClosedLoop, ComesBackFromTheWall) {
 }
 
 TEST_F(ClosedLoop, FollowsTheLawOfItsPage) {
-  ASSERT_TRUE(load("mass: 20\ndamping: 400\nstiffness: 2000\nmax_offset: 0.3\ntotal_mass: 40\n"
-                   "height: 0.8\nforce_filter: 0.1\n"));
+  ASSERT_TRUE(
+      load("mass: 20\ndamping: 400\nstiffness: 2000\nmax_offset: 0.3\ntotal_mass: 40\n"
+           "height: 0.8\nforce_filter: 0.1\n"));
   Pendulum plant;
   // M x'' + D x' + K x = f, tau f' + f = push - m x'', in small steps.
   double x = 0.0, v = 0.0, f = 0.0;

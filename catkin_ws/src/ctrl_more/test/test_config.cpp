@@ -33,7 +33,9 @@ TEST(ConfigTest, ErrorsNameFileLineAndField) {
   EXPECT_FALSE(messageOf([&] { root.find("n")->number("n"); }).empty());
   EXPECT_FALSE(messageOf([&] { root.find("h")->number("h"); }).empty());
   EXPECT_FALSE(messageOf([&] { root.find("a")->boolean("a"); }).empty());
-  EXPECT_EQ(messageOf([&] { root.requireKeys("it", {"aa", "b", "n", "h"}); }),
+  EXPECT_EQ(messageOf([&] {
+              root.requireKeys("it", {"aa", "b", "n", "h"});
+            }),
             "f.yaml:1: it has an unknown key 'a'; did you mean 'aa'?");
 }
 
@@ -55,8 +57,8 @@ TEST(ConfigTest, HostileFilesAreRefused) {
   EXPECT_TRUE(contains(messageOf([&] { ConfigNode::fromText("a: &a [*a]\n", "f"); }), "f:"));
   EXPECT_TRUE(contains(messageOf([&] { ConfigNode::fromText("a: 1\na: 2\n", "f"); }), "twice"));
   EXPECT_TRUE(contains(messageOf([&] { ConfigNode::fromText("? [1]\n: 2\n", "f"); }), "key"));
-  EXPECT_TRUE(contains(
-      messageOf([&] { ConfigNode::fromText(std::string(2000000, ' '), "f"); }), "1 MB"));
+  EXPECT_TRUE(
+      contains(messageOf([&] { ConfigNode::fromText(std::string(2000000, ' '), "f"); }), "1 MB"));
   EXPECT_TRUE(contains(messageOf([] { ConfigNode::fromFile("/nowhere.yaml"); }), "/nowhere.yaml"));
   EXPECT_TRUE(contains(messageOf([&] { ConfigNode::fromText("a: [1\nb: 2", "f"); }), "f:"));
 }

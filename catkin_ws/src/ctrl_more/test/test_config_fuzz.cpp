@@ -9,22 +9,30 @@ namespace ctrl_more {
 namespace {
 
 std::string mutate(const std::string& seed, std::mt19937& random) {
-  static const std::string kPieces[] = {":",  "- ", "[",    "]",   "{",       "}",   "&a ",  "*a",
-                                        "!!", "|",  ">",    "#",   "\n",      "\t",  "\"",   "'",
-                                        "?",  ",",  ".nan", "1e9", "-1",      "~",   "null", "0x1",
+  static const std::string kPieces[] = {":",  "- ", "[",    "]",   "{",        "}",   "&a ",  "*a",
+                                        "!!", "|",  ">",    "#",   "\n",       "\t",  "\"",   "'",
+                                        "?",  ",",  ".nan", "1e9", "-1",       "~",   "null", "0x1",
                                         "%",  "@",  "---",  "...", "\xff\xfe", "<<:", "type", "  "};
   std::string text = seed;
   const int changes = 1 + static_cast<int>(random() % 6);
   for (int i = 0; i < changes; ++i) {
     const std::size_t at = text.empty() ? 0 : random() % text.size();
     switch (random() % 6) {
-      case 0: text.insert(at, kPieces[random() % std::size(kPieces)]); break;
-      case 1: text.erase(at, 1 + random() % 8); break;
+      case 0:
+        text.insert(at, kPieces[random() % std::size(kPieces)]);
+        break;
+      case 1:
+        text.erase(at, 1 + random() % 8);
+        break;
       case 2:
         if (!text.empty()) text[at] = static_cast<char>(random() % 256);
         break;
-      case 3: text.insert(at, text.substr(at, random() % 30)); break;
-      case 4: text = text.substr(0, at); break;
+      case 3:
+        text.insert(at, text.substr(at, random() % 30));
+        break;
+      case 4:
+        text = text.substr(0, at);
+        break;
       case 5: {
         const std::size_t other = text.empty() ? 0 : random() % text.size();
         if (!text.empty()) std::swap(text[at], text[other]);

@@ -88,11 +88,10 @@ TEST_F(ControlStatesTest, OtherReferenceKeepsItsSize) {
 TEST_F(ControlStatesTest, PelvisIsIdentityUntilSetAndAlwaysARotation) {
   EXPECT_EQ(control.getPelvisOrientation(), Eigen::Matrix3d(Eigen::Matrix3d::Identity()));
   ASSERT_TRUE(control.setPelvisOrientation(0.1, 0.2, 0.3));
-  const Eigen::Matrix3d expected =
-      (Eigen::AngleAxisd(0.3, Eigen::Vector3d::UnitZ()) *
-       Eigen::AngleAxisd(0.2, Eigen::Vector3d::UnitY()) *
-       Eigen::AngleAxisd(0.1, Eigen::Vector3d::UnitX()))
-          .toRotationMatrix();
+  const Eigen::Matrix3d expected = (Eigen::AngleAxisd(0.3, Eigen::Vector3d::UnitZ()) *
+                                    Eigen::AngleAxisd(0.2, Eigen::Vector3d::UnitY()) *
+                                    Eigen::AngleAxisd(0.1, Eigen::Vector3d::UnitX()))
+                                       .toRotationMatrix();
   EXPECT_LT((control.getPelvisOrientation() - expected).norm(), 1e-15);
   Eigen::Matrix3d nearly = expected;
   nearly(0, 0) += 1e-4;

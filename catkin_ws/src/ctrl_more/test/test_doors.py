@@ -27,8 +27,11 @@ def sources(package: Path) -> dict[str, tuple[str, list[str]]]:
 def faults(package: Path) -> list[str]:
     """Arrows back up, ways around the rooms, and circles: one sentence each."""
     files = sources(package)
-    found = [f"{name} is in the room '{room}', which is not in the order" for name, (room, _) in files.items()
-             if room not in ROOMS]
+    found = [
+        f"{name} is in the room '{room}', which is not in the order"
+        for name, (room, _) in files.items()
+        if room not in ROOMS
+    ]
     for name, (room, includes) in files.items():
         for include in includes:
             if include not in files:
@@ -47,7 +50,7 @@ def circles(files: dict[str, list[str]]) -> list[str]:
 
     def walk(name: str, way: list[str]) -> None:
         if name in way:
-            found.append(" -> ".join([*way[way.index(name):], name]))
+            found.append(" -> ".join([*way[way.index(name) :], name]))
         elif name not in done:
             for include in files[name]:
                 walk(include, [*way, name])
@@ -86,6 +89,10 @@ def test_an_arrow_back_up_and_a_circle_are_found(tmp_path: Path) -> None:
 
 
 def test_files_are_short() -> None:
-    long = [path.name for folder in ("include", "src", "controllers", "test", "bench", "tools")
-            for path in (PACKAGE / folder).rglob("*.?pp") if len(path.read_text().splitlines()) > LONGEST_FILE]
+    long = [
+        path.name
+        for folder in ("include", "src", "controllers", "test", "bench", "tools")
+        for path in (PACKAGE / folder).rglob("*.?pp")
+        if len(path.read_text().splitlines()) > LONGEST_FILE
+    ]
     assert not long, f"more than {LONGEST_FILE} lines; split them by subject"

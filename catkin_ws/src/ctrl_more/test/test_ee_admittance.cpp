@@ -54,8 +54,8 @@ TEST_F(AdmittanceTest, BelowTheDeadBandEveryBitStays) {
     const std::vector<double> before(blended.control.data(),
                                      blended.control.data() + blended.control.dataSize());
     blended.cycleOnce();
-    ASSERT_EQ(0, std::memcmp(before.data(), blended.control.data(),
-                             before.size() * sizeof(double)));
+    ASSERT_EQ(0,
+              std::memcmp(before.data(), blended.control.data(), before.size() * sizeof(double)));
   }
   EXPECT_EQ(blended.manager->status("c").activity, Activity::Running);
 }

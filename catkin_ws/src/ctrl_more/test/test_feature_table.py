@@ -30,9 +30,9 @@ def test_every_named_test_exists() -> None:
 
 
 def test_every_row_names_a_test() -> None:
-    rows = [line for line in PAGE.read_text().splitlines()
-            if re.match(r"\| ([A-J]\d|\d)", line)]
+    rows = [line for line in PAGE.read_text().splitlines() if re.match(r"\| ([A-J]\d|\d)", line)]
     assert len(rows) > 90
-    bare = [row for row in rows if not re.search(r"`([A-Z]\w+\.[A-Z]\w+|test_\w+\.py::\w+)` ?\|?",
-                                                 row.rsplit("|", 2)[1])]
+    bare = [
+        row for row in rows if not re.search(r"`([A-Z]\w+\.[A-Z]\w+|test_\w+\.py::\w+)` ?\|?", row.rsplit("|", 2)[1])
+    ]
     assert not bare, bare

@@ -140,7 +140,10 @@ TEST(FeedbackControllerTest, WrongDescriptionsAreRefused) {
     return !rig.manager->addController(std::move(c), "c");
   };
   EXPECT_TRUE(refused([](Description& d) { d.type = ""; }));
-  EXPECT_TRUE(refused([](Description& d) { d.gain("k", 1); d.gain("k", 1); }));
+  EXPECT_TRUE(refused([](Description& d) {
+    d.gain("k", 1);
+    d.gain("k", 1);
+  }));
   EXPECT_TRUE(refused([](Description& d) { d.gain("k", 1).range(2, 3); }));
   EXPECT_TRUE(refused([](Description& d) { d.stage = Stage::Joint; }));
   EXPECT_TRUE(refused([](Description& d) { d.measured("imu").keyFrom("nothing"); }));
@@ -192,9 +195,12 @@ std::string refusalOf(const std::string& role, bool reads) {
   c->description.reads(ControlContainer::CentreOfMass, "com").in("m").frameOf("w").about("read");
   c->description.modifies(ControlContainer::Zmp, "zmp").in("m").frameOf("w").about("moved");
   c->on_initialize = [&](TestController&, Setup& setup) {
-    if (role == "imu") setup.read<N>(role);
-    else if (reads) setup.reference<N>(role);
-    else setup.modify<N>(role);
+    if (role == "imu")
+      setup.read<N>(role);
+    else if (reads)
+      setup.reference<N>(role);
+    else
+      setup.modify<N>(role);
   };
   return rig.manager->addController(std::move(c), "c").message();
 }
@@ -230,8 +236,8 @@ TEST(Handles, NothingBesideASignalIsWritten) {
       self.out = setup.modify("zmp");
       three = setup.modify<3>("zmp");
     };
-    c->on_update = [&](TestController& self, const Cycle&, const RobotStates&,
-                       const ControlStates&, ModifiedControlStates& modified) {
+    c->on_update = [&](TestController& self, const Cycle&, const RobotStates&, const ControlStates&,
+                       ModifiedControlStates& modified) {
       ways[i](modified[self.out], modified[three]);
     };
     rig.add(std::move(c), "c");
@@ -240,8 +246,8 @@ TEST(Handles, NothingBesideASignalIsWritten) {
                                      rig.control.data() + rig.control.dataSize());
     rig.step();
     EXPECT_TRUE(contains(rig.manager->status("c").fault_text, "beside")) << i;
-    EXPECT_EQ(before, std::vector<double>(rig.control.data(),
-                                          rig.control.data() + rig.control.dataSize()));
+    EXPECT_EQ(before,
+              std::vector<double>(rig.control.data(), rig.control.data() + rig.control.dataSize()));
   }
 }
 

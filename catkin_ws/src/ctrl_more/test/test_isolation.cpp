@@ -143,13 +143,12 @@ struct Spoilt {
   bool quaternion;
 };
 
-const Spoilt kSignals[] = {
-    {ControlContainer::TaskSpaceReferencePose, "ee", 7, true},
-    {ControlContainer::PelvisOrientation, "pelvis", 4, true},
-    {ControlContainer::CentreOfMass, "com", 3, false},
-    {ControlContainer::TaskSpaceReferenceVel, "ee", 6, false},
-    {ControlContainer::JointSpaceReference, "Velocity", 7, false},
-    {ControlContainer::OtherReference, "samples", 11, false}};
+const Spoilt kSignals[] = {{ControlContainer::TaskSpaceReferencePose, "ee", 7, true},
+                           {ControlContainer::PelvisOrientation, "pelvis", 4, true},
+                           {ControlContainer::CentreOfMass, "com", 3, false},
+                           {ControlContainer::TaskSpaceReferenceVel, "ee", 6, false},
+                           {ControlContainer::JointSpaceReference, "Velocity", 7, false},
+                           {ControlContainer::OtherReference, "samples", 11, false}};
 
 // What a controller that spoils one number is faulted for.
 FaultKind spoil(const Spoilt& signal, int index, double value, bool first_is_good = false) {
@@ -161,10 +160,15 @@ FaultKind spoil(const Spoilt& signal, int index, double value, bool first_is_goo
   }
   Modify<> good;
   if (first_is_good) {
-    c->description.modifies(ControlContainer::JointSpaceReference, "Velocity").in("rad/s")
-        .frameOf("joint").about("untouched");
+    c->description.modifies(ControlContainer::JointSpaceReference, "Velocity")
+        .in("rad/s")
+        .frameOf("joint")
+        .about("untouched");
   }
-  c->description.modifies(signal.container, signal.key).size(signal.size).in("1").frameOf("w")
+  c->description.modifies(signal.container, signal.key)
+      .size(signal.size)
+      .in("1")
+      .frameOf("w")
       .about("spoilt");
   const std::string role = std::string(nameOf(signal.container)) + "/" + signal.key;
   c->on_initialize = [&](TestController& self, Setup& setup) {
@@ -215,7 +219,9 @@ TEST(IsolationTest, SecondSignalIsUndoneRecordedAndFadesLikeTheFirst) {
   Rig rig(0.1, true, false);
   bool wrong = false;
   auto c = adder("pose", "ee", 0.0);
-  c->description.modifies(ControlContainer::TaskSpaceReferenceVel, "ee").in("m/s").frameOf("base")
+  c->description.modifies(ControlContainer::TaskSpaceReferenceVel, "ee")
+      .in("m/s")
+      .frameOf("base")
       .about("pushed");
   Modify<> velocity;
   c->on_initialize = [&](TestController& self, ctrl_more::Setup& setup) {

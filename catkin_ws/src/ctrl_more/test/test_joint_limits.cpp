@@ -67,8 +67,8 @@ TEST_F(JointLimitsTest, NeverPushesBackAndNeverSpeedsUp) {
 TEST_F(JointLimitsTest, WrongConfigurationsAreRefused) {
   EXPECT_FALSE(rig.load("joint_limits", "influence: 0.1\nsafety: 0.2\n"));
   EXPECT_FALSE(rig.load("joint_limits", "lower: [-1, -1]\n"));
-  EXPECT_FALSE(rig.load("joint_limits",
-                        "lower: [1, 1, 1, 1, 1, 1, 1]\nupper: [0, 1, 1, 1, 1, 1, 1]\n"));
+  EXPECT_FALSE(
+      rig.load("joint_limits", "lower: [1, 1, 1, 1, 1, 1, 1]\nupper: [0, 1, 1, 1, 1, 1, 1]\n"));
   EXPECT_FALSE(rig.load("joint_limits", "lower: [-1, -1]\nupper: [1, 1]\n")) << "7 joints here";
   ASSERT_TRUE(rig.load("joint_limits", kConfiguration));
   EXPECT_FALSE(rig.manager->setGains("c", {{"safety", {0.4}}})) << "not below influence";

@@ -30,8 +30,8 @@ TEST(LettingGoTest, FaultPolicyHoldAndZero) {
     Rig rig(0.1);
     bool wrong = false;
     auto c = adder("pose", "ee", 0.0);
-    c->on_update = [&](TestController& self, const Cycle&, const RobotStates&,
-                       const ControlStates&, ModifiedControlStates& m) {
+    c->on_update = [&](TestController& self, const Cycle&, const RobotStates&, const ControlStates&,
+                       ModifiedControlStates& m) {
       m[self.out][0] += 1.0;
       if (wrong) self.fail("now");
     };

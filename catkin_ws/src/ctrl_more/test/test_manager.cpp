@@ -8,10 +8,8 @@ using Names = std::vector<std::string>;
 // A controller that writes down in which order it runs.
 std::unique_ptr<TestController> recorder(std::vector<std::string>* log) {
   auto c = adder("pose", "ee", 0.0);
-  c->on_update = [log](TestController& self, const Cycle&, const RobotStates&,
-                       const ControlStates&, ModifiedControlStates&) {
-    log->push_back(self.getName());
-  };
+  c->on_update = [log](TestController& self, const Cycle&, const RobotStates&, const ControlStates&,
+                       ModifiedControlStates&) { log->push_back(self.getName()); };
   return c;
 }
 

@@ -15,9 +15,7 @@ SCRIPT = PACKAGE / "scripts" / "new_controller.py"
 
 def run(*command: str | Path, **options) -> subprocess.CompletedProcess:
     """Runs a command with a time limit and keeps what it says."""
-    return subprocess.run(
-        [str(part) for part in command], capture_output=True, text=True, timeout=300, **options
-    )
+    return subprocess.run([str(part) for part in command], capture_output=True, text=True, timeout=300, **options)
 
 
 def need_workspace() -> None:
@@ -33,8 +31,11 @@ def test_new_controller_compiles_is_tested_and_documented(tmp_path: Path) -> Non
     made = run(sys.executable, SCRIPT, "WristDamper", "--into", tmp_path)
     assert made.returncode == 0, made.stderr
     folder = tmp_path / "wrist_damper"
-    left = [p for p in folder.rglob("*") if p.is_file() and "@" in p.name + p.read_text()
-            and "example.org" not in p.read_text()]
+    left = [
+        p
+        for p in folder.rglob("*")
+        if p.is_file() and "@" in p.name + p.read_text() and "example.org" not in p.read_text()
+    ]
     assert not left, left
     build = folder / "build"
     configured = run("cmake", "-S", folder, "-B", build)
@@ -50,15 +51,16 @@ def test_new_controller_compiles_is_tested_and_documented(tmp_path: Path) -> Non
     assert run("ctrl_more_describe", "check", plugin).returncode == 0
     page = run("ctrl_more_describe", "page", plugin)
     assert page.stdout.startswith("# WristDamper\n")
-    assert all(f"## {part}" in page.stdout for part in ("Use", "When to apply it", "Limitations",
-                                                        "Robot signals", "Control signals"))
+    assert all(
+        f"## {part}" in page.stdout
+        for part in ("Use", "When to apply it", "Limitations", "Robot signals", "Control signals")
+    )
     config = run("ctrl_more_describe", "config", plugin)
     assert "k: 0.5" in config.stdout
     # Outside of the folder it was made in: found by its name in CTRL_MORE_PATH.
     elsewhere = tmp_path / "list.yaml"
     elsewhere.write_text("loadControllers: [mine]\nmine: {type: WristDamper}\n")
-    checked = run("ctrl_more_describe", "list", elsewhere,
-                  env=dict(os.environ, CTRL_MORE_PATH=str(build)))
+    checked = run("ctrl_more_describe", "list", elsewhere, env=dict(os.environ, CTRL_MORE_PATH=str(build)))
     assert checked.returncode == 0, checked.stderr
     assert "mine (WristDamper" in checked.stdout
     lost = run("ctrl_more_describe", "list", elsewhere)

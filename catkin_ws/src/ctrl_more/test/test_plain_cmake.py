@@ -14,8 +14,14 @@ from pathlib import Path
 import pytest
 
 PACKAGE = Path(__file__).resolve().parent.parent
-CATKIN_VARIABLES = ("CMAKE_PREFIX_PATH", "ROS_PACKAGE_PATH", "LD_LIBRARY_PATH", "PYTHONPATH",
-                    "PKG_CONFIG_PATH", "CTRL_MORE_PATH")
+CATKIN_VARIABLES = (
+    "CMAKE_PREFIX_PATH",
+    "ROS_PACKAGE_PATH",
+    "LD_LIBRARY_PATH",
+    "PYTHONPATH",
+    "PKG_CONFIG_PATH",
+    "CTRL_MORE_PATH",
+)
 
 pytestmark = pytest.mark.skipif(shutil.which("cmake") is None, reason="cmake is not installed")
 
@@ -29,7 +35,10 @@ def clean_environment(**more: str) -> dict[str, str]:
 def run(*command: str | Path, **more: str) -> str:
     """Output of a command that must succeed."""
     result = subprocess.run(
-        [str(part) for part in command], capture_output=True, text=True, timeout=1200,
+        [str(part) for part in command],
+        capture_output=True,
+        text=True,
+        timeout=1200,
         env=clean_environment(**more),
     )
     said = result.stdout + result.stderr
@@ -43,18 +52,25 @@ def prefix(tmp_path_factory: pytest.TempPathFactory) -> Path:
     build = tmp_path_factory.mktemp("build")
     installed = tmp_path_factory.mktemp("prefix")
     launcher = ["-DCMAKE_CXX_COMPILER_LAUNCHER=ccache"] if shutil.which("ccache") else []
-    said = run("cmake", "-S", PACKAGE, "-B", build, "-DCMAKE_BUILD_TYPE=None",
-               f"-DCMAKE_INSTALL_PREFIX={installed}", *launcher)
+    said = run(
+        "cmake", "-S", PACKAGE, "-B", build, "-DCMAKE_BUILD_TYPE=None", f"-DCMAKE_INSTALL_PREFIX={installed}", *launcher
+    )
     assert "catkin" not in said
     run("cmake", "--build", build, "-j2")
     run("cmake", "--install", build)
     return installed
 
 
-def test_consumer_finds_links_and_runs_an_installed_controller(
-        prefix: Path, tmp_path: Path) -> None:
-    run("cmake", "-S", PACKAGE / "test" / "consumer", "-B", tmp_path,
-        f"-DCMAKE_PREFIX_PATH={prefix}", "-DCMAKE_BUILD_TYPE=None")
+def test_consumer_finds_links_and_runs_an_installed_controller(prefix: Path, tmp_path: Path) -> None:
+    run(
+        "cmake",
+        "-S",
+        PACKAGE / "test" / "consumer",
+        "-B",
+        tmp_path,
+        f"-DCMAKE_PREFIX_PATH={prefix}",
+        "-DCMAKE_BUILD_TYPE=None",
+    )
     run("cmake", "--build", tmp_path)
     # 0.05 rad from the end, bounded to xi (0.05 / 0.1); the other joint is free.
     assert run(tmp_path / "consumer").split()[:2] == ["0.2", "1"]
@@ -62,28 +78,28 @@ def test_consumer_finds_links_and_runs_an_installed_controller(
 
 def test_wrong_version_is_refused(prefix: Path, tmp_path: Path) -> None:
     (tmp_path / "CMakeLists.txt").write_text(
-        "cmake_minimum_required(VERSION 3.10)\nproject(other LANGUAGES CXX)\n"
-        "find_package(ctrl_more 7.0 REQUIRED)\n")
+        "cmake_minimum_required(VERSION 3.10)\nproject(other LANGUAGES CXX)\nfind_package(ctrl_more 7.0 REQUIRED)\n"
+    )
     result = subprocess.run(
         ["cmake", "-S", tmp_path, "-B", tmp_path / "build", f"-DCMAKE_PREFIX_PATH={prefix}"],
-        capture_output=True, text=True, timeout=120, env=clean_environment())
+        capture_output=True,
+        text=True,
+        timeout=120,
+        env=clean_environment(),
+    )
     assert result.returncode != 0 and "0.1.0" in result.stderr
 
 
 def test_installed_tool_describes_an_installed_controller(prefix: Path) -> None:
-    page = run(prefix / "bin" / "ctrl_more_describe", "page",
-               prefix / "lib" / "libctrl_more_joint_limits.so")
+    page = run(prefix / "bin" / "ctrl_more_describe", "page", prefix / "lib" / "libctrl_more_joint_limits.so")
     assert page == (PACKAGE / "doc" / "controllers" / "JointLimits.md").read_text()
 
 
-def test_template_builds_runs_and_is_documented_from_the_prefix(
-        prefix: Path, tmp_path: Path) -> None:
-    run(sys.executable, prefix / "lib" / "ctrl_more" / "new_controller.py", "WristDamper", "--into",
-        tmp_path)
+def test_template_builds_runs_and_is_documented_from_the_prefix(prefix: Path, tmp_path: Path) -> None:
+    run(sys.executable, prefix / "lib" / "ctrl_more" / "new_controller.py", "WristDamper", "--into", tmp_path)
     folder, build = tmp_path / "wrist_damper", tmp_path / "wrist_damper" / "build"
     assert "ctrl_more was not found" in failed_configure(folder)
-    run("cmake", "-S", folder, "-B", build, f"-DCMAKE_PREFIX_PATH={prefix}",
-        "-DCMAKE_BUILD_TYPE=None")
+    run("cmake", "-S", folder, "-B", build, f"-DCMAKE_PREFIX_PATH={prefix}", "-DCMAKE_BUILD_TYPE=None")
     assert "warning" not in run("cmake", "--build", build)
     said = run("ctest", "--test-dir", build, "--output-on-failure")
     assert "wrist_damper_test_controller" in said and "100% tests passed" in said
@@ -96,8 +112,12 @@ def test_template_builds_runs_and_is_documented_from_the_prefix(
 def failed_configure(folder: Path) -> str:
     """What CMake says where no ctrl_more is."""
     result = subprocess.run(
-        ["cmake", "-S", folder, "-B", folder / "elsewhere"], capture_output=True, text=True,
-        timeout=120, env=clean_environment())
+        ["cmake", "-S", folder, "-B", folder / "elsewhere"],
+        capture_output=True,
+        text=True,
+        timeout=120,
+        env=clean_environment(),
+    )
     assert result.returncode != 0
     shutil.rmtree(folder / "elsewhere")
     return " ".join((result.stdout + result.stderr).split())

@@ -27,11 +27,13 @@ def test_symbols_are_hidden(controller: str) -> None:
     # A plug-in registers itself by a static object when it is loaded: nobody looks a symbol up.
     library = workspace_lib() / f"libctrl_more_{controller}.so"
     listed = subprocess.run(
-        ["nm", "-DC", "--defined-only", str(library)], capture_output=True, text=True, check=True,
+        ["nm", "-DC", "--defined-only", str(library)],
+        capture_output=True,
+        text=True,
+        check=True,
         timeout=60,
     ).stdout
-    foreign = [line for line in listed.splitlines()
-               if not re.search(r" [VWu] .*(std::|__gnu_cxx::)", line)]
+    foreign = [line for line in listed.splitlines() if not re.search(r" [VWu] .*(std::|__gnu_cxx::)", line)]
     assert not foreign, "\n".join(foreign[:10])
     # Unique symbols would keep the library in the process for good.
     assert not [line for line in listed.splitlines() if " u " in line]
@@ -43,7 +45,11 @@ def test_plugins_are_thin(controller: str, tmp_path: Path) -> None:
     # The core is linked, not contained; nor is class_loader or another controller.
     library = workspace_lib() / f"libctrl_more_{controller}.so"
     needed = subprocess.run(
-        ["readelf", "-d", str(library)], capture_output=True, text=True, check=True, timeout=60,
+        ["readelf", "-d", str(library)],
+        capture_output=True,
+        text=True,
+        check=True,
+        timeout=60,
     ).stdout
     assert "[libctrl_more.so]" in needed
     assert "libclass_loader" not in needed and "libyaml" not in needed
@@ -60,11 +66,19 @@ def test_loading_running_and_unloading_is_clean() -> None:
     if not program.is_file():
         pytest.skip("ctrl_more_test_plugins is not built: build the target 'tests'")
     result = subprocess.run(
-        ["valgrind", "--error-exitcode=9", "--leak-check=full", "--errors-for-leak-kinds=definite",
-         "--num-callers=20", str(program),
-         "--gtest_filter=Plugins.LoadsRunsAndUnloads:Plugins.KnownTypeName*:Plugins.TwoInstances*:"
-         "Plugins.What*:TwoBuilds.*"],
-        capture_output=True, text=True, timeout=300,
+        [
+            "valgrind",
+            "--error-exitcode=9",
+            "--leak-check=full",
+            "--errors-for-leak-kinds=definite",
+            "--num-callers=20",
+            str(program),
+            "--gtest_filter=Plugins.LoadsRunsAndUnloads:Plugins.KnownTypeName*:Plugins.TwoInstances*:"
+            "Plugins.What*:TwoBuilds.*",
+        ],
+        capture_output=True,
+        text=True,
+        timeout=300,
     )
     assert result.returncode == 0, result.stderr[-4000:]
     assert "[  PASSED  ] 8 tests" in result.stdout

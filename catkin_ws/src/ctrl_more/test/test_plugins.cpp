@@ -114,15 +114,20 @@ TEST_F(Plugins, BadLibrariesAreRefusedInWords) {
 // What a library throws lives in it, and must be dealt with before it is closed.
 TEST_F(Plugins, WhateverALibraryThrowsRefusesTheWholeListInWords) {
   const std::string own = "an error of its own", strange = "not a std::exception";
-  for (const auto& thrown : std::vector<std::pair<std::string, std::string>>{
-           {"InMaker", own}, {"InDescribe", own}, {"InInitialize", own},
-           {"NumberInMaker", strange}, {"ThingInMaker", strange},
-           {"ThingInInitialize", strange}}) {
+  for (const auto& thrown :
+       std::vector<std::pair<std::string, std::string>>{{"InMaker", own},
+                                                        {"InDescribe", own},
+                                                        {"InInitialize", own},
+                                                        {"NumberInMaker", strange},
+                                                        {"ThingInMaker", strange},
+                                                        {"ThingInInitialize", strange}}) {
     for (const bool strict : {true, false}) {
       SCOPED_TRACE(thrown.first);
-      const LoadReport report =
-          load("loadControllers: [first, odd]\nfirst: {libPath: libgood.so, enabled: true}\n"
-               "odd: {libPath: libstrangers.so, type: " + thrown.first + "}\n", strict);
+      const LoadReport report = load(
+          "loadControllers: [first, odd]\nfirst: {libPath: libgood.so, enabled: true}\n"
+          "odd: {libPath: libstrangers.so, type: " +
+              thrown.first + "}\n",
+          strict);
       ASSERT_EQ(report.errors.size(), 1u);
       EXPECT_TRUE(contains(report.errors[0], thrown.second)) << report.errors[0];
       EXPECT_TRUE(contains(report.errors[0], "odd")) << report.errors[0];
@@ -142,7 +147,8 @@ TEST_F(Plugins, WhateverALibraryThrowsRefusesTheWholeListInWords) {
 TEST_F(Plugins, WhatALibraryThrowsWhileLoadedIsAFaultOrARefusal) {
   ASSERT_TRUE(load("loadControllers: [update, judge]\n"
                    "update: {libPath: libstrangers.so, type: InUpdate, enabled: true}\n"
-                   "judge: {libPath: libstrangers.so, type: InJudge}\n").ok());
+                   "judge: {libPath: libstrangers.so, type: InJudge}\n")
+                  .ok());
   rig.step();
   EXPECT_TRUE(contains(rig.manager->status("update").fault_text, "an error of its own"));
   const Status status = rig.manager->setGains("judge", {{"k", {3.0}}});
@@ -243,7 +249,8 @@ TEST_F(Plugins, LibrariesAreFoundWithoutAbsolutePaths) {
   // searchPath of the file, relative to it
   const LoadReport relative = rig.manager->load(
       ConfigNode::fromText("loadControllers: [a]\nsearchPath: [share_root/my_pkg]\n"
-                           "a: {libPath: libgood_there.so}\n", "x.yaml"),
+                           "a: {libPath: libgood_there.so}\n",
+                           "x.yaml"),
       folder.string());
   EXPECT_TRUE(relative.ok()) << relative.text();
   rig.manager->unload("a");
@@ -290,7 +297,8 @@ struct TwoBuilds : Plugins {
   LoadReport loadIt(const std::string& controller = "it") {
     return rig.manager->load(
         ConfigNode::fromText("loadControllers: [" + controller + "]\n" + controller +
-                             ": {libPath: libit.so, enabled: true}\n", "list.yaml"),
+                                 ": {libPath: libit.so, enabled: true}\n",
+                             "list.yaml"),
         folder.string());
   }
   double runOnce() {

@@ -102,19 +102,33 @@ TEST(Realtime, NothingForbiddenIn100000CyclesWith10000PlanChanges) {
     Status status;
     const int kind = static_cast<int>(random() % 8);
     switch (kind) {
-      case 0: status = rig.manager->disable(name); break;
-      case 1: status = rig.manager->enable(); break;
-      case 2: status = rig.manager->pause(name); break;
-      case 3: status = rig.manager->resume(); break;
+      case 0:
+        status = rig.manager->disable(name);
+        break;
+      case 1:
+        status = rig.manager->enable();
+        break;
+      case 2:
+        status = rig.manager->pause(name);
+        break;
+      case 3:
+        status = rig.manager->resume();
+        break;
       case 4: {
         std::vector<std::string> order = rig.manager->getExecutionOrder();
         std::swap(order[random() % order.size()], order[random() % order.size()]);
         status = rig.manager->setExecutionOrder(order);
         break;
       }
-      case 5: status = rig.manager->loadGains(name, gains); break;
-      case 6: status = rig.manager->pauseAllUsingRobotState("imu"); break;
-      case 7: status = rig.manager->resumeAllUsingRobotState("imu"); break;
+      case 5:
+        status = rig.manager->loadGains(name, gains);
+        break;
+      case 6:
+        status = rig.manager->pauseAllUsingRobotState("imu");
+        break;
+      case 7:
+        status = rig.manager->resumeAllUsingRobotState("imu");
+        break;
     }
     ASSERT_TRUE(status) << status.message();
     if (rig.manager->waitAdopted(status.generation(), 1.0)) {
@@ -136,11 +150,12 @@ TEST(Realtime, NothingForbiddenIn100000CyclesWith10000PlanChanges) {
   run = false;
   cycle_thread.join();
   const auto number = [](std::uint64_t n) { return static_cast<unsigned long long>(n); };
-  std::printf("cycles %llu, plans adopted %llu, reorders %llu, reloads %llu, faults %llu, "
-              "allocations %llu, locks %llu, syscalls %llu, allocations of throws %llu\n",
-              number(cycles.load()), number(adopted), number(reorders), number(reloads),
-              number(faults), number(counts.allocations), number(counts.locks),
-              number(counts.syscalls), number(counts.of_throw));
+  std::printf(
+      "cycles %llu, plans adopted %llu, reorders %llu, reloads %llu, faults %llu, "
+      "allocations %llu, locks %llu, syscalls %llu, allocations of throws %llu\n",
+      number(cycles.load()), number(adopted), number(reorders), number(reloads), number(faults),
+      number(counts.allocations), number(counts.locks), number(counts.syscalls),
+      number(counts.of_throw));
   EXPECT_EQ(counts.allocations, 0u);
   EXPECT_EQ(counts.locks, 0u);
   EXPECT_EQ(counts.syscalls, 0u);

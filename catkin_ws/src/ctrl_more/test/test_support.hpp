@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include <Eigen/Core>
 #include <gtest/gtest.h>
+#include <Eigen/Core>
 
 #include "ctrl_more/feedback_controllers_manager.hpp"
 
@@ -59,9 +59,8 @@ inline std::unique_ptr<TestController> adder(const std::string& container, const
   c->description.modifies(where, key).in("m").frameOf("base").about("x is shifted");
   c->on_initialize = [key](TestController& self, Setup& setup) { self.out = setup.modify(key); };
   c->on_update = [amount](TestController& self, const Cycle&, const RobotStates&,
-                          const ControlStates&, ModifiedControlStates& modified) {
-    modified[self.out][0] += amount;
-  };
+                          const ControlStates&,
+                          ModifiedControlStates& modified) { modified[self.out][0] += amount; };
   return c;
 }
 

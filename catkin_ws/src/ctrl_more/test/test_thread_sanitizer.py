@@ -19,15 +19,32 @@ def test_services_against_the_cycle(tmp_path: Path) -> None:
     sources = [*sorted((PACKAGE / "src").rglob("*.cpp")), PACKAGE / "test" / "thread_stress.cpp"]
     program = tmp_path / "thread_stress"
     built = subprocess.run(
-        ["g++", "-std=c++17", "-O1", "-g", "-fsanitize=thread", "-o", str(program),
-         *map(str, sources), f"-I{PACKAGE / 'include'}", f"-I{PACKAGE / 'src'}",
-         "-I/usr/include/eigen3", "-lyaml-cpp", "-lpthread", "-ldl"],
-        capture_output=True, text=True, timeout=1800,
+        [
+            "g++",
+            "-std=c++17",
+            "-O1",
+            "-g",
+            "-fsanitize=thread",
+            "-o",
+            str(program),
+            *map(str, sources),
+            f"-I{PACKAGE / 'include'}",
+            f"-I{PACKAGE / 'src'}",
+            "-I/usr/include/eigen3",
+            "-lyaml-cpp",
+            "-lpthread",
+            "-ldl",
+        ],
+        capture_output=True,
+        text=True,
+        timeout=1800,
     )
     assert built.returncode == 0, built.stderr[-3000:]
     result = subprocess.run(
         ["setarch", os.uname().machine, "-R", str(program), seconds],
         env=dict(os.environ, TSAN_OPTIONS="halt_on_error=1 exitcode=66"),
-        capture_output=True, text=True, timeout=float(seconds) * 5 + 120,
+        capture_output=True,
+        text=True,
+        timeout=float(seconds) * 5 + 120,
     )
     assert result.returncode == 0, (result.stdout + result.stderr)[-4000:]

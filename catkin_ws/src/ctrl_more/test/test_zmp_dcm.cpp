@@ -56,7 +56,8 @@ TEST(ZmpDcmTest, StaysInTheSupportBox) {
 TEST(ZmpDcmTest, ZmpIpFollowsItsClosedForm) {
   ControllerRig rig;
   const double kc = 6.0, ki = 3.5, disturbance = 0.01;
-  ASSERT_TRUE(rig.load("zmp_dcm", "mode: zmp_ip\nkc: 6\nki: 3.5\nmax_offset: 0.3\nzmp_filter: 0\n"));
+  ASSERT_TRUE(
+      rig.load("zmp_dcm", "mode: zmp_ip\nkc: 6\nki: 3.5\nmax_offset: 0.3\nzmp_filter: 0\n"));
   double com = 0.0;
   for (int i = 1; i <= 600; ++i) {
     // Quasi-static: the ZMP stands under the centre of mass, plus a constant disturbance.
@@ -64,8 +65,7 @@ TEST(ZmpDcmTest, ZmpIpFollowsItsClosedForm) {
     rig.setReferences();
     rig.cycleOnce(kDt);
     com = rig.control.getCoM().x();
-    const double exact =
-        -disturbance / (1 + kc) * (1 - std::pow(1 - ki * kDt * (1 + kc), i));
+    const double exact = -disturbance / (1 + kc) * (1 - std::pow(1 - ki * kDt * (1 + kc), i));
     ASSERT_NEAR(com, exact, 1e-14);
   }
   EXPECT_NEAR(com, -disturbance / 7, 1e-9);

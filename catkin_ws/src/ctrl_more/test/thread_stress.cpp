@@ -23,8 +23,11 @@ class Pusher : public FeedbackController {
     Description d;
     d.type = "Pusher";
     d.measured("wrench").size(6).in("N, Nm").frameOf("base").about("read");
-    d.modifies(ControlContainer::TaskSpaceReferencePose, "ee").in("m, 1").frameOf("base")
-        .bounded({10, 1e9, 3, 1e9}).about("shifted");
+    d.modifies(ControlContainer::TaskSpaceReferencePose, "ee")
+        .in("m, 1")
+        .frameOf("base")
+        .bounded({10, 1e9, 3, 1e9})
+        .about("shifted");
     d.gain("k", 0.01).range(0, 1).in("1").about("share");
     return d;
   }
@@ -100,23 +103,45 @@ int main(int argc, char** argv) {
         const std::string& name = names[random() % names.size()];
         Status status;
         switch (random() % 14) {
-          case 0: status = manager.enable(name); break;
-          case 1: status = manager.disable(name); break;
-          case 2: status = manager.pause(name); break;
-          case 3: status = manager.resume(name); break;
-          case 4: status = manager.resume(name, "fault"); break;
-          case 5: status = manager.pauseAllUsingRobotState("wrench"); break;
-          case 6: status = manager.resumeAllUsingRobotState("wrench"); break;
-          case 7: status = manager.setGains(name, {{"k", {0.001 * (random() % 100)}}}); break;
-          case 8: status = manager.applyProfile(random() % 2 ? "few" : "all"); break;
+          case 0:
+            status = manager.enable(name);
+            break;
+          case 1:
+            status = manager.disable(name);
+            break;
+          case 2:
+            status = manager.pause(name);
+            break;
+          case 3:
+            status = manager.resume(name);
+            break;
+          case 4:
+            status = manager.resume(name, "fault");
+            break;
+          case 5:
+            status = manager.pauseAllUsingRobotState("wrench");
+            break;
+          case 6:
+            status = manager.resumeAllUsingRobotState("wrench");
+            break;
+          case 7:
+            status = manager.setGains(name, {{"k", {0.001 * (random() % 100)}}});
+            break;
+          case 8:
+            status = manager.applyProfile(random() % 2 ? "few" : "all");
+            break;
           case 9: {
             auto order = manager.getExecutionOrder();
             std::swap(order.front(), order.back());
             status = manager.setExecutionOrder(order);
             break;
           }
-          case 10: manager.attribution(); break;
-          case 11: manager.statusAll(); break;
+          case 10:
+            manager.attribution();
+            break;
+          case 11:
+            manager.statusAll();
+            break;
           case 12: {
             std::ostringstream out;
             manager.plotAll(out);

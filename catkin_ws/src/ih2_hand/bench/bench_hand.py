@@ -40,11 +40,25 @@ SLOW = 30
 Row = dict[str, object]
 
 
-def row(figure: str, value: float, unit: str, goal: str | None, ok: bool, peer: str | None = None,
-        peer_value: float | None = None) -> Row:
-    return {"bench": "hand", "figure": figure, "value": round(value, 4), "unit": unit, "goal": goal,
-            "peer": peer, "peer_value": None if peer_value is None else round(peer_value, 4),
-            "ok": bool(ok)}
+def row(
+    figure: str,
+    value: float,
+    unit: str,
+    goal: str | None,
+    ok: bool,
+    peer: str | None = None,
+    peer_value: float | None = None,
+) -> Row:
+    return {
+        "bench": "hand",
+        "figure": figure,
+        "value": round(value, 4),
+        "unit": unit,
+        "goal": goal,
+        "peer": peer,
+        "peer_value": None if peer_value is None else round(peer_value, 4),
+        "ok": bool(ok),
+    }
 
 
 # -- bytes -----------------------------------------------------------------------------------------
@@ -53,14 +67,25 @@ def row(figure: str, value: float, unit: str, goal: str | None, ok: bool, peer: 
 def golden_vectors() -> list[Row]:
     with tempfile.TemporaryDirectory() as folder:
         report = Path(folder) / "golden.xml"
-        subprocess.run([sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider",
-                        f"--junit-xml={report}", str(PACKAGE / "test" / "test_golden_bytes.py")],
-                       stdout=subprocess.DEVNULL, timeout=120, check=False)
+        subprocess.run(
+            [
+                sys.executable,
+                "-m",
+                "pytest",
+                "-q",
+                "-p",
+                "no:cacheprovider",
+                f"--junit-xml={report}",
+                str(PACKAGE / "test" / "test_golden_bytes.py"),
+            ],
+            stdout=subprocess.DEVNULL,
+            timeout=120,
+            check=False,
+        )
         suite = ElementTree.parse(report).getroot().find("testsuite")
     total = int(suite.get("tests"))
     wrong = int(suite.get("failures")) + int(suite.get("errors")) + int(suite.get("skipped"))
-    return [row("golden vectors that differ, both dialects", wrong, f"of {total}", "<= 0",
-                wrong == 0 and total > 0)]
+    return [row("golden vectors that differ, both dialects", wrong, f"of {total}", "<= 0", wrong == 0 and total > 0)]
 
 
 # -- time per request ------------------------------------------------------------------------------
@@ -109,8 +134,9 @@ def time_of(sweep, *arguments) -> float:
 
 
 def request_time() -> list[Row]:
-    emulator = subprocess.Popen([sys.executable, str(PACKAGE / "scripts" / "hand_emulator.py"),
-                                 "--greeting"], stdout=subprocess.PIPE, text=True)
+    emulator = subprocess.Popen(
+        [sys.executable, str(PACKAGE / "scripts" / "hand_emulator.py"), "--greeting"], stdout=subprocess.PIPE, text=True
+    )
     try:
         port = emulator.stdout.readline().split()[1]
         # A busy machine may hold the emulator back for longer than a hand ever takes.
@@ -120,8 +146,12 @@ def request_time() -> list[Row]:
             poll.register(bare, select.POLLIN)
             plain = serial.Serial(port, timeout=0.5)
             blocking = os.open(port, os.O_RDWR | os.O_NOCTTY)
-            contestants = ((driver_sweep, driver), (bare_sweep, bare, poll),
-                           (blocking_sweep, blocking), (pyserial_sweep, plain))
+            contestants = (
+                (driver_sweep, driver),
+                (bare_sweep, bare, poll),
+                (blocking_sweep, blocking),
+                (pyserial_sweep, plain),
+            )
             for contestant in contestants * 3:
                 time_of(*contestant)
             times = []
@@ -134,26 +164,55 @@ def request_time() -> list[Row]:
             os.close(bare)
             os.close(blocking)
             if len(times) < 0.9 * BLOCKS:
-                raise RuntimeError(f"the line was disturbed in {BLOCKS - len(times)} of {BLOCKS} "
-                                   f"blocks: {driver.counters.reasons}")
+                raise RuntimeError(
+                    f"the line was disturbed in {BLOCKS - len(times)} of {BLOCKS} blocks: {driver.counters.reasons}"
+                )
     finally:
         emulator.terminate()
         emulator.wait(10)
-    ours, bare_us, blocking_us, pyserial_us = (statistics.median(column)
-                                               for column in zip(*times, strict=True))
+    ours, bare_us, blocking_us, pyserial_us = (statistics.median(column) for column in zip(*times, strict=True))
     ratio, blocking_ratio, pyserial_ratio = (
-        statistics.median(block[0] / block[peer] for block in times) for peer in (1, 2, 3))
+        statistics.median(block[0] / block[peer] for block in times) for peer in (1, 2, 3)
+    )
     wire_us = (3 + 3 + 4) / 3 * 10 / WIRE.baud * 1e6
-    return [row("driver time per request / bare write and read on the same pty", ratio, "ratio",
-                "<= 1.25", ratio <= 1.25, "bare write/poll/read loop (us)", bare_us),
-            row("driver time per request / write and blocking read, which has no time limit",
-                blocking_ratio, "ratio", "<= 1.25", blocking_ratio <= 1.25,
-                "write/blocking read loop (us)", blocking_us),
-            row("driver time per request / pyserial write and read", pyserial_ratio, "ratio",
-                "<= 1.25", pyserial_ratio <= 1.25, "pyserial write/read loop (us)", pyserial_us),
-            row("driver time per request on the pty", ours, "us", None, True,
-                "the wire's own time per request at 115200 baud, hand's delay not counted (us)",
-                wire_us)]
+    return [
+        row(
+            "driver time per request / bare write and read on the same pty",
+            ratio,
+            "ratio",
+            "<= 1.25",
+            ratio <= 1.25,
+            "bare write/poll/read loop (us)",
+            bare_us,
+        ),
+        row(
+            "driver time per request / write and blocking read, which has no time limit",
+            blocking_ratio,
+            "ratio",
+            "<= 1.25",
+            blocking_ratio <= 1.25,
+            "write/blocking read loop (us)",
+            blocking_us,
+        ),
+        row(
+            "driver time per request / pyserial write and read",
+            pyserial_ratio,
+            "ratio",
+            "<= 1.25",
+            pyserial_ratio <= 1.25,
+            "pyserial write/read loop (us)",
+            pyserial_us,
+        ),
+        row(
+            "driver time per request on the pty",
+            ours,
+            "us",
+            None,
+            True,
+            "the wire's own time per request at 115200 baud, hand's delay not counted (us)",
+            wire_us,
+        ),
+    ]
 
 
 # -- node ------------------------------------------------------------------------------------------
@@ -167,8 +226,9 @@ class TimedHand(EmulatedHand):
     def _move_motor(self, frame: bytes) -> None:
         super()._move_motor(frame)
         rate = FULL_SCALE / WIRE.full_stroke_s / WIRE.speed_max
-        self.end = max(time.monotonic() + motor.position / (rate * motor.speed)
-                       for motor in self.motors if motor.mode == "speed")
+        self.end = max(
+            time.monotonic() + motor.position / (rate * motor.speed) for motor in self.motors if motor.mode == "speed"
+        )
 
 
 def free_port() -> int:
@@ -238,11 +298,9 @@ def node_figures() -> list[Row]:
         stack.callback(rospy.signal_shutdown, "done")
         rospy.set_param("/ih2_hand/serial_port", server.path)
         rospy.set_param("/ih2_hand/rate", RATE_HZ)
-        node = start(stack, [sys.executable, str(PACKAGE / "scripts" / "hand_node.py"),
-                             "__name:=ih2_hand"])
+        node = start(stack, [sys.executable, str(PACKAGE / "scripts" / "hand_node.py"), "__name:=ih2_hand"])
         latest: list[HandStatus] = []
-        rospy.Subscriber("/ih2_hand/hand_status", HandStatus,
-                         lambda status: latest.__setitem__(slice(0, 1), [status]))
+        rospy.Subscriber("/ih2_hand/hand_status", HandStatus, lambda status: latest.__setitem__(slice(0, 1), [status]))
         wait_for(lambda: latest and latest[0].connected, 20.0, "the hand node")
         client = actionlib.SimpleActionClient("/ih2_hand/hand_open", HandOpenAction)
         if not client.wait_for_server(rospy.Duration(10.0)):
@@ -259,12 +317,25 @@ def node_figures() -> list[Row]:
         if closing.get_state() != actionlib.GoalStatus.ACTIVE:
             raise RuntimeError("hand_close ended during the measurement")
     median_ms, limit_ms = statistics.median(delays) * 1e3, 1e3 / RATE_HZ + 20.0
-    return [row("finger stop to action result, median", median_ms, "ms",
-                f"<= {limit_ms:.1f}", median_ms <= limit_ms, "one poll period (ms)", 1e3 / RATE_HZ),
-            row("hand node at 30 Hz hand_status", share * 100.0, "% of one core", "<= 5",
-                share <= 0.05),
-            row("hand node at 30 Hz hand_status while a goal moves the fingers",
-                moving_share * 100.0, "% of one core", "reported", True)]
+    return [
+        row(
+            "finger stop to action result, median",
+            median_ms,
+            "ms",
+            f"<= {limit_ms:.1f}",
+            median_ms <= limit_ms,
+            "one poll period (ms)",
+            1e3 / RATE_HZ,
+        ),
+        row("hand node at 30 Hz hand_status", share * 100.0, "% of one core", "<= 5", share <= 0.05),
+        row(
+            "hand node at 30 Hz hand_status while a goal moves the fingers",
+            moving_share * 100.0,
+            "% of one core",
+            "reported",
+            True,
+        ),
+    ]
 
 
 def one_move(server: PtyServer, hand: TimedHand, client, goal_type, number: int) -> float:

@@ -16,22 +16,29 @@ from ih2_hand.trace import Tracer
 
 
 def parse(arguments: list[str]) -> argparse.Namespace:
-    parser = argparse.ArgumentParser(description=__doc__, epilog="Fault commands:\n" + HELP,
-                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, epilog="Fault commands:\n" + HELP, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--link", help="symlink to keep on the pty's path")
     parser.add_argument("--dialect", choices=("both", "legacy", "v17"), default="both")
-    parser.add_argument("--calibration-scale", type=float, default=1.0,
-                        help="factor on the calibration times; 0 ends them at once, above 1.2 "
-                             "the fast one outlasts the 2.0 s that published drivers wait")
+    parser.add_argument(
+        "--calibration-scale",
+        type=float,
+        default=1.0,
+        help="factor on the calibration times; 0 ends them at once, above 1.2 "
+        "the fast one outlasts the 2.0 s that published drivers wait",
+    )
     parser.add_argument("--greeting", action="store_true", help="start calibrated")
-    parser.add_argument("--strict-force", action="store_true",
-                        help="leave a force read of motor 0 unanswered")
-    parser.add_argument("--positions", type=int, nargs=5, default=[0] * 5, metavar="P",
-                        help="positions at power-on, 0..255")
-    parser.add_argument("--contact", type=float, nargs=5, metavar="P",
-                        help="positions at which the fingers meet an object; 255: free")
-    parser.add_argument("--stiffness", type=float, default=25.0,
-                        help="counts of current for each count pressed into the object")
+    parser.add_argument("--strict-force", action="store_true", help="leave a force read of motor 0 unanswered")
+    parser.add_argument(
+        "--positions", type=int, nargs=5, default=[0] * 5, metavar="P", help="positions at power-on, 0..255"
+    )
+    parser.add_argument(
+        "--contact", type=float, nargs=5, metavar="P", help="positions at which the fingers meet an object; 255: free"
+    )
+    parser.add_argument(
+        "--stiffness", type=float, default=25.0, help="counts of current for each count pressed into the object"
+    )
     parser.add_argument("--trace", help="file for every frame in hex with its meaning; - is stdout")
     parser.add_argument("--seed", type=int, default=1, help="seed of random garbage")
     parser.add_argument("--fault", action="append", default=[], help="fault command at start")
@@ -66,14 +73,19 @@ def main() -> int:
         import rospy
         from ih2_hand.ros.emulator_node import EmulatorNode
         from ih2_hand.ros.shutdown import end_quietly
+
         rospy.init_node("hand_emulator", disable_signals=True)
         end_quietly()
         arguments, announce = rospy.myargv(sys.argv)[1:], EmulatorNode.announce
     options = parse(arguments)
     try:
-        hand = EmulatedHand(dialect=options.dialect, calibration_scale=options.calibration_scale,
-                            greeting=options.greeting, strict_force=options.strict_force,
-                            positions=options.positions)
+        hand = EmulatedHand(
+            dialect=options.dialect,
+            calibration_scale=options.calibration_scale,
+            greeting=options.greeting,
+            strict_force=options.strict_force,
+            positions=options.positions,
+        )
         if options.contact:
             hand.set_contacts(options.contact, [options.stiffness] * 5)
     except ValueError as error:
@@ -85,8 +97,9 @@ def main() -> int:
         if announce:
             announce(path)
 
-    server = PtyServer(hand, Faults(hand, seed=options.seed), options.link, tell,
-                       tracer_to(options.trace) if options.trace else None)
+    server = PtyServer(
+        hand, Faults(hand, seed=options.seed), options.link, tell, tracer_to(options.trace) if options.trace else None
+    )
     for fault in options.fault:
         try:
             server.fault(fault)

@@ -51,11 +51,10 @@ def explain(text: str) -> int:
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__,
-                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--topic", default="ih2_hand/trace", help="trace topic of the hand node")
     parser.add_argument("--count", type=int, default=0, help="end after this many lines")
-    parser.add_argument("--hex", help="explain these bytes, for instance \"44 04 64\"")
+    parser.add_argument("--hex", help='explain these bytes, for instance "44 04 64"')
     arguments = [item for item in sys.argv[1:] if ":=" not in item]
     options = parser.parse_args(arguments)
     return explain(options.hex) if options.hex is not None else follow(options.topic, options.count)

@@ -35,10 +35,10 @@ def make_bench():
         hand = EmulatedHand(clock, **({"greeting": True} | hand_options))
         faults = Faults(hand)
         link = VirtualLink(hand, clock, faults=faults)
-        bench = Bench(clock, hand, link, HandSerialDriver(transport=link, clock=clock,
-                                                          dialect=dialect), faults)
+        bench = Bench(clock, hand, link, HandSerialDriver(transport=link, clock=clock, dialect=dialect), faults)
         bench.sent()
         return bench
+
     return make
 
 

@@ -12,8 +12,7 @@ import rostest
 from actionlib import GoalStatus
 from ih2_hand.ros.client import HandClient
 
-GOALS = {"hand_open": (60,), "hand_close": (60,), "hand_preshape": ("cylindrical", "low"),
-         "hand_preshape_close": ()}
+GOALS = {"hand_open": (60,), "hand_close": (60,), "hand_preshape": ("cylindrical", "low"), "hand_preshape_close": ()}
 ABORT_LIMIT_S = 2.0
 
 

@@ -28,8 +28,7 @@ class HandNode(unittest.TestCase):
     def setUpClass(cls) -> None:
         cls.hand = HandClient()
         cls.diagnostics = []
-        rospy.Subscriber("/diagnostics", DiagnosticArray,
-                         lambda array: cls.diagnostics.extend(array.status))
+        rospy.Subscriber("/diagnostics", DiagnosticArray, lambda array: cls.diagnostics.extend(array.status))
         cls.trace = []
         rospy.Subscriber("ih2_hand/trace", String, lambda line: cls.trace.append(line.data))
         cls.hand.wait_ready()
@@ -43,8 +42,7 @@ class HandNode(unittest.TestCase):
         self.assertEqual([motor.motor for motor in status.motors], [0, 1, 2, 3, 4])
         self.assertEqual([motor.force for motor in status.motors], [-1, 0, 0, 0, 0])
         self.hand.wait(lambda: len(self.trace) > 200, "trace lines")
-        meanings = {line.split(maxsplit=2)[2].split("  ", 1)[-1].strip() for line in self.trace
-                    if " > " in line}
+        meanings = {line.split(maxsplit=2)[2].split("  ", 1)[-1].strip() for line in self.trace if " > " in line}
         quiet = [meaning for meaning in meanings if "Get" in meaning or "filler" in meaning]
         self.assertEqual(len(quiet), len(meanings), f"readings and StopALL only: {meanings}")
 
@@ -85,8 +83,7 @@ class HandNode(unittest.TestCase):
 
     def test_e_refusals_list_what_exists(self) -> None:
         result = self.hand.run("hand_preshape", "power", "low")
-        self.assertIn("cylindrical, lateral, tridigit, bidigit, tridigit2, bidigit2",
-                      result.message)
+        self.assertIn("cylindrical, lateral, tridigit, bidigit, tridigit2, bidigit2", result.message)
         result = self.hand.run("hand_preshape", "lateral", "low")
         self.assertIn("lateral has force level high", result.message)
         for speed in (-1, 0, 512):
@@ -134,9 +131,16 @@ class HandNode(unittest.TestCase):
         self.assertTrue(result.isOk and "without meeting" in result.message, result.message)
         self.assertFalse(self.hand.fresh_status().holding)
         self.hand.wait(lambda: self.hand.joints.position[2] == 1.5, "closed joints")
-        self.assertEqual(list(self.hand.joints.name), [
-            "ih2_thumb_abduction", "ih2_thumb_flexion", "ih2_index_flexion", "ih2_middle_flexion",
-            "ih2_ring_little_flexion"])
+        self.assertEqual(
+            list(self.hand.joints.name),
+            [
+                "ih2_thumb_abduction",
+                "ih2_thumb_flexion",
+                "ih2_index_flexion",
+                "ih2_middle_flexion",
+                "ih2_ring_little_flexion",
+            ],
+        )
 
     def test_j_speed_is_what_the_goal_says(self) -> None:
         durations = {}
@@ -180,8 +184,7 @@ class HandNode(unittest.TestCase):
             told.update({item.goal_id.id: item.status for item in array.status_list})
 
         names = ("hand_open", "hand_close")
-        topics = [rospy.Subscriber(f"ih2_hand/{name}/status", GoalStatusArray, on_status)
-                  for name in names]
+        topics = [rospy.Subscriber(f"ih2_hand/{name}/status", GoalStatusArray, on_status) for name in names]
         for _ in range(25):
             name = rng.choice(names)
             client = self.hand.send(name, 300)
@@ -237,7 +240,7 @@ class HandNode(unittest.TestCase):
             self.hand.calibrate("slow")
         self.hand.wait(lambda: self.hand.status.event_code == ReasonCode.HAND_REFUSED, "refusal")
         self.assertLess(max(len(status.message) for status in self.hand.statuses), 400)
-        for name, speed in (("hand_open", 2**31 - 1), ("hand_close", -2**31)):
+        for name, speed in (("hand_open", 2**31 - 1), ("hand_close", -(2**31))):
             result = self.hand.run(name, speed)
             self.assertEqual((result.isOk, result.reason_code), (False, ReasonCode.OUT_OF_RANGE))
         for mode, level in (("", ""), ("x" * 1_000_000, "low"), ("lateral", "y" * 1_000_000)):
@@ -251,7 +254,7 @@ class HandNode(unittest.TestCase):
         foreign = rospy.Publisher("ih2_hand/hand_status", HandStatus, queue_size=10)
         self.hand.wait(cancel.get_num_connections, "cancel topic")
         cancel.publish(GoalID(stamp=rospy.Time(4294967295), id="nobody's"))
-        nonsense = HandStatus(motors=[MotorStatus(motor=99, position=-2**31)] * 1000)
+        nonsense = HandStatus(motors=[MotorStatus(motor=99, position=-(2**31))] * 1000)
         nonsense.header.stamp = rospy.Time(4294967295)
         time.sleep(0.2)
         self.hand.send("hand_close", 511)

@@ -33,14 +33,17 @@ class HandShutdown(unittest.TestCase):
             process.communicate()
 
     def start(self, script: str, *arguments: str) -> subprocess.Popen:
-        process = subprocess.Popen([sys.executable, str(SCRIPTS / script), *arguments],
-                                   stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        process = subprocess.Popen(
+            [sys.executable, str(SCRIPTS / script), *arguments],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
         self.processes.append(process)
         return process
 
     def start_emulator(self, name: str) -> subprocess.Popen:
-        process = self.start("hand_emulator.py", "--greeting", f"__name:={name}",
-                             "__ns:=coglab_sim")
+        process = self.start("hand_emulator.py", "--greeting", f"__name:={name}", "__ns:=coglab_sim")
         self.assertTrue(process.stdout.readline().startswith("port /"))
         end = time.monotonic() + LIMIT_S
         while f"/coglab_sim/{name}" not in rosnode.get_node_names():
@@ -58,8 +61,7 @@ class HandShutdown(unittest.TestCase):
 
     def test_emulator_and_signals(self) -> None:
         for number in (signal.SIGINT, signal.SIGTERM):
-            processes = [self.start_emulator(f"emulator_{number.name.lower()}_{i}")
-                         for i in range(3)]
+            processes = [self.start_emulator(f"emulator_{number.name.lower()}_{i}") for i in range(3)]
             time.sleep(0.3)  # let the timers run
             for process in processes:
                 process.send_signal(number)

@@ -70,10 +70,12 @@ class Corrupter:
 def truth(hand: EmulatedHand, call: str, motor: int) -> int:
     hand.advance()
     model = hand.motors[motor]
-    return {"get_raw_position": lambda: model.position_byte,
-            "get_finger_force": lambda: min(254, model.tension // 4),
-            "get_motor_current": lambda: min(1023, int(model.current)),
-            "get_finger_status": lambda: model.status_byte}[call]()
+    return {
+        "get_raw_position": lambda: model.position_byte,
+        "get_finger_force": lambda: min(254, model.tension // 4),
+        "get_motor_current": lambda: min(1023, int(model.current)),
+        "get_finger_status": lambda: model.status_byte,
+    }[call]()
 
 
 READS = ("get_raw_position", "get_finger_force", "get_motor_current", "get_finger_status")
@@ -87,8 +89,7 @@ class Campaign:
         self.clock = VirtualClock()
         self.hand = EmulatedHand(self.clock, greeting=True)
         self.corrupter = Corrupter(self.rng, self.clock)
-        self.link = VirtualLink(self.hand, self.clock, to_hand=self.corrupter.to_hand,
-                                to_host=self.corrupter.tamper)
+        self.link = VirtualLink(self.hand, self.clock, to_hand=self.corrupter.to_hand, to_host=self.corrupter.tamper)
         self.driver = HandSerialDriver(transport=self.link, clock=self.clock)
         self.wrong: list[tuple] = []
         self.wrong_but_counted = self.refused = self.read = 0
@@ -97,8 +98,9 @@ class Campaign:
         """Another posture, object and driver state."""
         rng = self.rng
         self.hand.calibrated = True
-        self.hand.set_contacts([rng.choice((255, rng.randrange(40, 250))) for _ in range(5)],
-                               [rng.uniform(5, 60) for _ in range(5)])
+        self.hand.set_contacts(
+            [rng.choice((255, rng.randrange(40, 250))) for _ in range(5)], [rng.uniform(5, 60) for _ in range(5)]
+        )
         self.driver.close()
         self.link.plugged = True
         self.driver = HandSerialDriver(transport=self.link, clock=self.clock)
@@ -164,9 +166,11 @@ def run(seed: int, streams: int, events: tuple[int, ...]) -> Campaign:
         if number % 50 == 0:
             campaign.new_scene()
         campaign.stream(campaign.rng.choice(events))
-    print(f"{campaign.corrupter.done} corruptions, {campaign.read} values, {campaign.refused} "
-          f"refused, {campaign.wrong_but_counted} wrong with a resynchronisation counted, "
-          f"{len(campaign.wrong)} wrong")
+    print(
+        f"{campaign.corrupter.done} corruptions, {campaign.read} values, {campaign.refused} "
+        f"refused, {campaign.wrong_but_counted} wrong with a resynchronisation counted, "
+        f"{len(campaign.wrong)} wrong"
+    )
     return campaign
 
 

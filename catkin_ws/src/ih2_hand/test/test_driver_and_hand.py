@@ -56,9 +56,21 @@ def test_grasp_holds_an_object(make_bench, dialect):
 def test_read_motors_has_every_field(bench):
     readings = bench.driver.read_motors()
     assert [reading["force"] for reading in readings] == [-1, 0, 0, 0, 0]
-    assert set(readings[0]) == {"motor", "raw", "mode", "mode_code", "target_reached", "fully_open",
-                                "fully_closed", "over_current", "moving", "com_error", "position",
-                                "force", "current"}
+    assert set(readings[0]) == {
+        "motor",
+        "raw",
+        "mode",
+        "mode_code",
+        "target_reached",
+        "fully_open",
+        "fully_closed",
+        "over_current",
+        "moving",
+        "com_error",
+        "position",
+        "force",
+        "current",
+    }
 
 
 def test_bus_error_says_nothing_else(bench):
@@ -103,5 +115,6 @@ def test_every_wire_choice_is_there_once():
 
 def test_readme_shows_the_table_of_wire_choices():
     from pathlib import Path
+
     readme = Path(__file__).resolve().parents[1] / "README.md"
     assert as_markdown() in readme.read_text(encoding="utf-8")

@@ -42,12 +42,17 @@ def raw() -> Raw:
 
 
 # Lengths typed from the last paragraph of section 8 of the protocol facts.
-LENGTHS = ({first: 1 for first in range(0x40)} | {0x41: 1, 0x42: 1, 0x46: 1, 0x4C: 1}
-           | {0x45: 2, 0x49: 2, 0x4B: 2, 0x44: 3, 0x4A: 3}
-           | {first: 7 for first in (0x48, 0x58, 0x59, 0x5A, 0x5B, 0x6A, 0x6B)}
-           | {0x5C: 6, 0x5D: 6, 0x5E: 6, 0x6C: 10, 0x6D: 10, 0x6E: 10}
-           | {first: 1 for first in range(0x50, 0x58)} | {first: 1 for first in range(0x60, 0x6A)}
-           | {0x70: 1, 0x71: 1, 0x6F: 4} | {first: 2 for first in range(0x80, 0x100)})
+LENGTHS = (
+    {first: 1 for first in range(0x40)}
+    | {0x41: 1, 0x42: 1, 0x46: 1, 0x4C: 1}
+    | {0x45: 2, 0x49: 2, 0x4B: 2, 0x44: 3, 0x4A: 3}
+    | {first: 7 for first in (0x48, 0x58, 0x59, 0x5A, 0x5B, 0x6A, 0x6B)}
+    | {0x5C: 6, 0x5D: 6, 0x5E: 6, 0x6C: 10, 0x6D: 10, 0x6E: 10}
+    | {first: 1 for first in range(0x50, 0x58)}
+    | {first: 1 for first in range(0x60, 0x6A)}
+    | {0x70: 1, 0x71: 1, 0x6F: 4}
+    | {first: 2 for first in range(0x80, 0x100)}
+)
 UNASSIGNED = [0x40, 0x43, 0x47, 0x4D, 0x4E, 0x4F, *range(0x72, 0x80)]
 
 
@@ -57,10 +62,35 @@ def test_frame_lengths(first):
     assert frames.is_known(first) == (first not in UNASSIGNED)
 
 
-@pytest.mark.parametrize(("command", "data"), [
-    (0x70, 0), (0x71, 0), (0x72, 2), (0x73, 2), (0x74, 2), (0x76, 0), (0x77, 0), (0x21, 2),
-    (0x31, 2), (0x22, 0), (0x23, 0), (0x24, 4), (0x25, 0), (0x41, 2), (0x42, 0), (0x43, 0),
-    (0x44, 4), (0x45, 0), (0x61, 2), (0x62, 0), (0x63, 0), (0x64, 4), (0x65, 0), (0x66, 2)])
+@pytest.mark.parametrize(
+    ("command", "data"),
+    [
+        (0x70, 0),
+        (0x71, 0),
+        (0x72, 2),
+        (0x73, 2),
+        (0x74, 2),
+        (0x76, 0),
+        (0x77, 0),
+        (0x21, 2),
+        (0x31, 2),
+        (0x22, 0),
+        (0x23, 0),
+        (0x24, 4),
+        (0x25, 0),
+        (0x41, 2),
+        (0x42, 0),
+        (0x43, 0),
+        (0x44, 4),
+        (0x45, 0),
+        (0x61, 2),
+        (0x62, 0),
+        (0x63, 0),
+        (0x64, 4),
+        (0x65, 0),
+        (0x66, 2),
+    ],
+)
 def test_low_level_lengths(command, data):
     assert frames.frame_length(bytes((0x5F, 1, command))) == 4 + data
     parser = FrameParser()
@@ -278,9 +308,17 @@ def test_stuck_motor_trips(raw):
     assert raw.walk(2, 2.0)[-1] == "0A"
 
 
-@pytest.mark.parametrize(("positions", "stiffness"), [
-    ([0] * 4, [1] * 5), ([0] * 5, [1] * 4), ([-1] + [0] * 4, [1] * 5), ([256] * 5, [1] * 5),
-    ([0] * 5, [-1.0] * 5), ([0] * 5, [float("nan")] * 5)])
+@pytest.mark.parametrize(
+    ("positions", "stiffness"),
+    [
+        ([0] * 4, [1] * 5),
+        ([0] * 5, [1] * 4),
+        ([-1] + [0] * 4, [1] * 5),
+        ([256] * 5, [1] * 5),
+        ([0] * 5, [-1.0] * 5),
+        ([0] * 5, [float("nan")] * 5),
+    ],
+)
 def test_bad_contacts_are_refused(raw, positions, stiffness):
     with pytest.raises(ValueError):
         raw.hand.set_contacts(positions, stiffness)
@@ -318,10 +356,20 @@ def test_a_relaxed_hand_gives_way(raw):
     assert [raw.status(motor) for motor in range(1, 5)] == ["08"] * 4
 
 
-@pytest.mark.parametrize("positions, stiffness", [
-    ([100] * 5, [float("inf")] * 5), ([100] * 5, [float("nan")] * 5), ([100] * 5, [-1.0] * 5),
-    ([100] * 5, [1e300] * 5), ([float("nan")] * 5, [1.0] * 5), ([-1] * 5, [1.0] * 5),
-    ([256] * 5, [1.0] * 5), ([], []), ([100] * 1000, [1.0] * 1000)])
+@pytest.mark.parametrize(
+    "positions, stiffness",
+    [
+        ([100] * 5, [float("inf")] * 5),
+        ([100] * 5, [float("nan")] * 5),
+        ([100] * 5, [-1.0] * 5),
+        ([100] * 5, [1e300] * 5),
+        ([float("nan")] * 5, [1.0] * 5),
+        ([-1] * 5, [1.0] * 5),
+        ([256] * 5, [1.0] * 5),
+        ([], []),
+        ([100] * 1000, [1.0] * 1000),
+    ],
+)
 def test_no_contact_can_break_the_hand(raw, positions, stiffness):
     with pytest.raises(ValueError, match="contact"):
         raw.hand.set_contacts(positions, stiffness)
@@ -329,8 +377,20 @@ def test_no_contact_can_break_the_hand(raw, positions, stiffness):
     assert len(raw.walk(2, 2.0)) > 1
 
 
-@pytest.mark.parametrize("command", ["", " ", "unplug nan", "unplug -1", "unplug inf", "lose -1",
-                                     "garbage 99999999999999999999", "stuck x", "x" * 100_000])
+@pytest.mark.parametrize(
+    "command",
+    [
+        "",
+        " ",
+        "unplug nan",
+        "unplug -1",
+        "unplug inf",
+        "lose -1",
+        "garbage 99999999999999999999",
+        "stuck x",
+        "x" * 100_000,
+    ],
+)
 def test_no_fault_command_can_break_the_hand(raw, command):
     with pytest.raises(ValueError, match="no such fault"):
         Faults(raw.hand).command(command)

@@ -19,9 +19,12 @@ def start(tmp_path):
     processes = []
 
     def run(*arguments: str) -> subprocess.Popen:
-        process = subprocess.Popen([sys.executable, SCRIPT, "--link", str(tmp_path / "hand"),
-                                    *arguments], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
-                                   text=True)
+        process = subprocess.Popen(
+            [sys.executable, SCRIPT, "--link", str(tmp_path / "hand"), *arguments],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+        )
         processes.append(process)
         return process
 
@@ -34,8 +37,21 @@ def start(tmp_path):
 
 def test_port_link_commands_and_trace(start, tmp_path):
     trace = tmp_path / "trace.txt"
-    process = start("--calibration-scale", "0", "--commands", "--trace", str(trace),
-                    "--contact", "255", "100", "100", "100", "100", "--stiffness", "20")
+    process = start(
+        "--calibration-scale",
+        "0",
+        "--commands",
+        "--trace",
+        str(trace),
+        "--contact",
+        "255",
+        "100",
+        "100",
+        "100",
+        "100",
+        "--stiffness",
+        "20",
+    )
     port = process.stdout.readline().split()
     assert port[0] == "port"
     with HandSerialDriver(str(tmp_path / "hand"), read_timeout=0.3) as driver:
@@ -62,11 +78,11 @@ def test_port_link_commands_and_trace(start, tmp_path):
     assert "position 105" in text
 
 
-@pytest.mark.parametrize("arguments", [
-    ("--contact", "255", "100", "100", "100", "300"), ("--calibration-scale", "-1"),
-    ("--fault", "explode")])
+@pytest.mark.parametrize(
+    "arguments",
+    [("--contact", "255", "100", "100", "100", "300"), ("--calibration-scale", "-1"), ("--fault", "explode")],
+)
 def test_bad_arguments(tmp_path, arguments):
-    done = subprocess.run([sys.executable, SCRIPT, *arguments], capture_output=True, text=True,
-                          timeout=30, check=False)
+    done = subprocess.run([sys.executable, SCRIPT, *arguments], capture_output=True, text=True, timeout=30, check=False)
     assert done.returncode == 2
     assert "hand_emulator:" in done.stderr

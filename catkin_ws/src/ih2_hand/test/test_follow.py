@@ -18,9 +18,18 @@ def grasp(bench, mode: str, level: str, is_current: bool = True):
     return follow(bench.driver, GraspTask(CLOSING_MOTORS[mode], 10.0))
 
 
-@pytest.mark.parametrize(("mode", "level"), [
-    ("cylindrical", "low"), ("cylindrical", "high"), ("tridigit", "medium"), ("bidigit", "low"),
-    ("tridigit2", "low"), ("bidigit2", "low"), ("lateral", "high")])
+@pytest.mark.parametrize(
+    ("mode", "level"),
+    [
+        ("cylindrical", "low"),
+        ("cylindrical", "high"),
+        ("tridigit", "medium"),
+        ("bidigit", "low"),
+        ("tridigit2", "low"),
+        ("bidigit2", "low"),
+        ("lateral", "high"),
+    ],
+)
 @pytest.mark.parametrize("is_current", [True, False])
 def test_every_grasp_holds_what_it_meets(bench, mode, level, is_current):
     closing = CLOSING_MOTORS[mode]  # the others fold out of the way, past the object
@@ -63,8 +72,9 @@ def test_too_slow_ends_in_time(bench):
 
 def test_breaking_off_stops_the_fingers(bench):
     polls = []
-    verdict = follow(bench.driver, CloseTask(100),
-                     on_poll=lambda verdict, motors: polls.append(motors) or len(polls) > 10)
+    verdict = follow(
+        bench.driver, CloseTask(100), on_poll=lambda verdict, motors: polls.append(motors) or len(polls) > 10
+    )
     assert "broken off" in verdict.text and len(polls) == 11
     assert verdict.reason is Reason.CANCELLED
     bench.hand.advance()
@@ -96,10 +106,11 @@ def test_a_line_that_slips_again_and_again_is_reported(bench):
 
 
 def test_core_needs_pyserial_alone():
-    script = ("import sys; import ih2_hand.driver, ih2_hand.follow, ih2_hand.trace\n"
-              "import ih2_hand.emulator.pty_server\n"
-              "print([name for name in sys.modules if name.split('.')[0] in "
-              "('rospy', 'roslib', 'actionlib', 'yaml', 'numpy', 'coglab_msgs')])")
-    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True,
-                          timeout=30, check=True)
+    script = (
+        "import sys; import ih2_hand.driver, ih2_hand.follow, ih2_hand.trace\n"
+        "import ih2_hand.emulator.pty_server\n"
+        "print([name for name in sys.modules if name.split('.')[0] in "
+        "('rospy', 'roslib', 'actionlib', 'yaml', 'numpy', 'coglab_msgs')])"
+    )
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, timeout=30, check=True)
     assert done.stdout.strip() == "[]"

@@ -48,24 +48,27 @@ def connect(answers: dict[str, str] | None = None, dialect: str = "legacy", **op
     return driver, line
 
 
-@pytest.mark.parametrize(("call", "arguments", "expected"), [
-    ("move_motor", (0, 511, True), "C1 FF"),
-    ("move_motor", (3, 256, False), "8D 00"),
-    ("move_motor", (2, 300, True), "C9 2C"),
-    ("move_motor", (4, 0, True), "D0 00"),
-    ("move_motor", (1, 1, False), "84 01"),
-    ("set_finger_position", (4, 100), "44 04 64"),
-    ("set_finger_position", (0, 254), "44 00 FE"),
-    ("set_finger_force", (2, 25), "4A 02 64"),
-    ("set_finger_force", (4, 128), "4A 84 00"),
-    ("set_finger_force", (3, 64), "4A 43 00"),
-    ("set_finger_force", (1, 254), "4A C1 F8"),
-    ("stop_all", (), "41"),
-    ("open_all", (), "4C"),
-    ("set_hand_posture", ([0, 30, 254, 200, 100],), "48 00 1E FE C8 64 48"),
-    ("set_finger_current", (3, 100), "5F 03 61 00 64 03"),
-    ("set_finger_current", (4, 1023), "5F 04 61 03 FF 04"),
-])
+@pytest.mark.parametrize(
+    ("call", "arguments", "expected"),
+    [
+        ("move_motor", (0, 511, True), "C1 FF"),
+        ("move_motor", (3, 256, False), "8D 00"),
+        ("move_motor", (2, 300, True), "C9 2C"),
+        ("move_motor", (4, 0, True), "D0 00"),
+        ("move_motor", (1, 1, False), "84 01"),
+        ("set_finger_position", (4, 100), "44 04 64"),
+        ("set_finger_position", (0, 254), "44 00 FE"),
+        ("set_finger_force", (2, 25), "4A 02 64"),
+        ("set_finger_force", (4, 128), "4A 84 00"),
+        ("set_finger_force", (3, 64), "4A 43 00"),
+        ("set_finger_force", (1, 254), "4A C1 F8"),
+        ("stop_all", (), "41"),
+        ("open_all", (), "4C"),
+        ("set_hand_posture", ([0, 30, 254, 200, 100],), "48 00 1E FE C8 64 48"),
+        ("set_finger_current", (3, 100), "5F 03 61 00 64 03"),
+        ("set_finger_current", (4, 1023), "5F 04 61 03 FF 04"),
+    ],
+)
 @pytest.mark.parametrize("dialect", ["legacy", "v17"])
 def test_commands(dialect, call, arguments, expected):
     driver, line = connect(dialect=dialect)
@@ -73,15 +76,18 @@ def test_commands(dialect, call, arguments, expected):
     assert line.frames == [expected]
 
 
-@pytest.mark.parametrize(("call", "motor", "ask", "tell", "value"), [
-    ("get_finger_position", 2, "45 02", "1E", 30),
-    ("get_finger_position", 4, "45 04", "FF", 254),
-    ("get_raw_position", 4, "45 04", "FF", 255),
-    ("get_finger_force", 3, "03", "03 33", 204),
-    ("get_finger_force", 1, "01", "03 FF", 254),
-    ("get_motor_current", 3, "49 03", "03 D4", 980),
-    ("get_motor_current", 0, "49 00", "00 00", 0),
-])
+@pytest.mark.parametrize(
+    ("call", "motor", "ask", "tell", "value"),
+    [
+        ("get_finger_position", 2, "45 02", "1E", 30),
+        ("get_finger_position", 4, "45 04", "FF", 254),
+        ("get_raw_position", 4, "45 04", "FF", 255),
+        ("get_finger_force", 3, "03", "03 33", 204),
+        ("get_finger_force", 1, "01", "03 FF", 254),
+        ("get_motor_current", 3, "49 03", "03 D4", 980),
+        ("get_motor_current", 0, "49 00", "00 00", 0),
+    ],
+)
 def test_readings(call, motor, ask, tell, value):
     driver, line = connect({f"4B 0{number}": "08" for number in range(5)} | {ask: tell})
     assert getattr(driver, call)(motor) == value
@@ -96,9 +102,17 @@ def test_readings(call, motor, ask, tell, value):
 def test_status_byte():
     driver, line = connect({"4B 00": "50"})
     assert driver.get_finger_status(0) == {
-        "motor": 0, "raw": 0x50, "mode": "position", "mode_code": 2, "target_reached": True,
-        "fully_open": False, "fully_closed": False, "over_current": False, "moving": False,
-        "com_error": False}
+        "motor": 0,
+        "raw": 0x50,
+        "mode": "position",
+        "mode_code": 2,
+        "target_reached": True,
+        "fully_open": False,
+        "fully_closed": False,
+        "over_current": False,
+        "moving": False,
+        "com_error": False,
+    }
     assert set(line.frames) == {"4B 00"}
 
 
@@ -120,15 +134,25 @@ def test_calibration_sends_one_byte_and_polls(kind, code):
 
 
 LEGACY = {
-    ("cylindrical", "low"): ("60", "50"), ("cylindrical", "medium"): ("61", "51"),
-    ("cylindrical", "high"): ("62", "52"), ("lateral", "high"): ("63", "53"),
-    ("tridigit", "low"): ("64", "54"), ("tridigit", "medium"): ("65", "55"),
-    ("tridigit", "high"): ("66", "56"), ("bidigit", "low"): ("67", "57"),
-    ("bidigit2", "low"): ("69", "68"), ("tridigit2", "low"): ("71", "70"),
+    ("cylindrical", "low"): ("60", "50"),
+    ("cylindrical", "medium"): ("61", "51"),
+    ("cylindrical", "high"): ("62", "52"),
+    ("lateral", "high"): ("63", "53"),
+    ("tridigit", "low"): ("64", "54"),
+    ("tridigit", "medium"): ("65", "55"),
+    ("tridigit", "high"): ("66", "56"),
+    ("bidigit", "low"): ("67", "57"),
+    ("bidigit2", "low"): ("69", "68"),
+    ("tridigit2", "low"): ("71", "70"),
 }
-PRESHAPES = {"cylindrical": (1, 2, 3, 4, 5), "lateral": (6, 7, 8, 9, 10),
-             "tridigit": (11, 12, 13, 14, 15), "bidigit": (16, 17, 18, 19, 20),
-             "tridigit2": (21, 22, 23, 24, 25), "bidigit2": (26, 27, 28, 29, 30)}
+PRESHAPES = {
+    "cylindrical": (1, 2, 3, 4, 5),
+    "lateral": (6, 7, 8, 9, 10),
+    "tridigit": (11, 12, 13, 14, 15),
+    "bidigit": (16, 17, 18, 19, 20),
+    "tridigit2": (21, 22, 23, 24, 25),
+    "bidigit2": (26, 27, 28, 29, 30),
+}
 
 
 @pytest.mark.parametrize(("grasp", "codes"), LEGACY.items())
@@ -142,12 +166,18 @@ def test_legacy_grasps(grasp, codes, is_current):
     assert line.frames[1:] == [codes[0] if is_current else codes[1]]
 
 
-@pytest.mark.parametrize(("grasp", "expected"), [
-    (("cylindrical", "high"), "6F 04 C8 14"), (("cylindrical", "low"), "6F 04 50 14"),
-    (("lateral", "medium"), "6F 01 8C 14"), (("bidigit", "high"), "6F 02 C8 14"),
-    (("tridigit", "low"), "6F 03 50 14"), (("bidigit2", "low"), "6F 15 50 14"),
-    (("tridigit2", "medium"), "6F 1F 8C 14"),
-])
+@pytest.mark.parametrize(
+    ("grasp", "expected"),
+    [
+        (("cylindrical", "high"), "6F 04 C8 14"),
+        (("cylindrical", "low"), "6F 04 50 14"),
+        (("lateral", "medium"), "6F 01 8C 14"),
+        (("bidigit", "high"), "6F 02 C8 14"),
+        (("tridigit", "low"), "6F 03 50 14"),
+        (("bidigit2", "low"), "6F 15 50 14"),
+        (("tridigit2", "medium"), "6F 1F 8C 14"),
+    ],
+)
 def test_v17_grasps(grasp, expected):
     driver, line = connect(dialect="v17")
     driver.set_grasp_mode(*grasp)

@@ -108,6 +108,7 @@ def test_a_line_that_takes_few_bytes_at_a_time_loses_none(monkeypatch, piece):
 def node():
     """A hand node without its topics: what it would tell is kept in `told`."""
     from ih2_hand.ros import hand_node
+
     node = hand_node.HandNode.__new__(hand_node.HandNode)
     node.told = []
     node.port, node.driver, node.calibrated, node.calibrating = "port", None, False, False
@@ -143,9 +144,14 @@ class Calibrates:
         pass
 
 
-@pytest.mark.parametrize("error, reason", [
-    (None, Reason.HAND_ENDED), (HandConnectionLost("gone"), Reason.HAND_LINK_LOST),
-    (AttributeError("'NoneType' object"), Reason.UNEXPECTED)])
+@pytest.mark.parametrize(
+    "error, reason",
+    [
+        (None, Reason.HAND_ENDED),
+        (HandConnectionLost("gone"), Reason.HAND_LINK_LOST),
+        (AttributeError("'NoneType' object"), Reason.UNEXPECTED),
+    ],
+)
 def test_a_calibration_ends_however_it_ends(node, error, reason):
     node.driver, node.calibrating = Calibrates(error), True
     node._run_calibration(node.driver, "fast")

@@ -231,8 +231,7 @@ def test_no_permission(server):
     """)
     if os.geteuid() != 0:
         pytest.skip("needs root to become a user without permission")
-    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True,
-                          timeout=30, check=False)
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, timeout=30, check=False)
     assert "no permission for" in done.stdout, done.stderr
     assert "dialout" in done.stdout
 
@@ -253,9 +252,10 @@ def test_not_a_url():
         HandSerialDriver("nonsense://x")
 
 
-@pytest.mark.parametrize(("ports", "words"), [
-    ([], "no serial device found"),
-    (["/dev/ttyUSB0", "/dev/ttyUSB1"], "/dev/ttyUSB0, /dev/ttyUSB1")])
+@pytest.mark.parametrize(
+    ("ports", "words"),
+    [([], "no serial device found"), (["/dev/ttyUSB0", "/dev/ttyUSB1"], "/dev/ttyUSB0, /dev/ttyUSB1")],
+)
 def test_the_only_port(monkeypatch, ports, words):
     monkeypatch.setattr(transport, "serial_ports", lambda: ports)
     with pytest.raises(HandPortError, match=words):

@@ -24,8 +24,7 @@ def poll(raws: str, positions: list[int]) -> list[SimpleNamespace]:
     """Five motors from STATUS bytes in hex and positions."""
     motors = []
     for motor, raw in enumerate(bytes.fromhex(raws)):
-        status = {key: bool(value) if value is None else value
-                  for key, value in decode_status(motor, raw).items()}
+        status = {key: bool(value) if value is None else value for key, value in decode_status(motor, raw).items()}
         motors.append(SimpleNamespace(**status, position=positions[motor]))
     return motors
 
@@ -178,37 +177,53 @@ def test_what_shows_an_empty_hand():
 FREE = {"calibrated": False, "holding": False, "busy": None}
 
 
-@pytest.mark.parametrize(("words", "state", "reason"), [
-    ("fast", {}, None), ("complete", {}, None), ("fast force", {}, None),
-    ("complete force", {"calibrated": True, "holding": True}, None),
-    ("fast", {"calibrated": True}, "calibrated already"),
-    ("complete", {"holding": True}, "may hold an object"),
-    ("fast", {"busy": "hand_open runs"}, "hand_open runs"),
-    ("fast force", {"busy": "a calibration runs"}, "a calibration runs"),
-    ("", {}, "must be fast"), ("slow", {}, "must be fast"), ("fast now", {}, "must be fast"),
-    ("fast force force", {}, "must be fast"),
-])
+@pytest.mark.parametrize(
+    ("words", "state", "reason"),
+    [
+        ("fast", {}, None),
+        ("complete", {}, None),
+        ("fast force", {}, None),
+        ("complete force", {"calibrated": True, "holding": True}, None),
+        ("fast", {"calibrated": True}, "calibrated already"),
+        ("complete", {"holding": True}, "may hold an object"),
+        ("fast", {"busy": "hand_open runs"}, "hand_open runs"),
+        ("fast force", {"busy": "a calibration runs"}, "a calibration runs"),
+        ("", {}, "must be fast"),
+        ("slow", {}, "must be fast"),
+        ("fast now", {}, "must be fast"),
+        ("fast force force", {}, "must be fast"),
+    ],
+)
 def test_calibration_rules(words, state, reason):
     answer = refuse_calibration(words.split(), **(FREE | state))
     assert answer is None if reason is None else reason in answer
 
 
-@pytest.mark.parametrize("task, raw, reason", [
-    (OpenTask(511), "e8", Reason.DRIVE_ERROR),
-    (CloseTask(511), "00", Reason.HAND_STALLED),
-    (GraspTask((1, 2, 3, 4), 10.0), "00", Reason.HAND_NOT_CALIBRATED)])
+@pytest.mark.parametrize(
+    "task, raw, reason",
+    [
+        (OpenTask(511), "e8", Reason.DRIVE_ERROR),
+        (CloseTask(511), "00", Reason.HAND_STALLED),
+        (GraspTask((1, 2, 3, 4), 10.0), "00", Reason.HAND_NOT_CALIBRATED),
+    ],
+)
 def test_a_failure_says_to_programs_what_it_is(task, raw, reason):
     task.judge(poll(" ".join([raw] * 5), [9] * 5), 0.0)
     verdict = task.judge(poll(" ".join([raw] * 5), [9] * 5), 2.0)
     assert verdict.done and not verdict.ok and verdict.reason is reason, verdict
 
 
-@pytest.mark.parametrize("call, reason", [
-    (lambda: OpenTask(512), Reason.OUT_OF_RANGE), (lambda: OpenTask(0), Reason.OUT_OF_RANGE),
-    (lambda: OpenTask(-2**31), Reason.OUT_OF_RANGE),
-    (lambda: check_grasp("power", "low", "legacy"), Reason.UNKNOWN_NAME),
-    (lambda: check_grasp("lateral", "", "legacy"), Reason.UNKNOWN_NAME),
-    (lambda: check_grasp("lateral", "low", "legacy"), Reason.NOT_SUPPORTED)])
+@pytest.mark.parametrize(
+    "call, reason",
+    [
+        (lambda: OpenTask(512), Reason.OUT_OF_RANGE),
+        (lambda: OpenTask(0), Reason.OUT_OF_RANGE),
+        (lambda: OpenTask(-(2**31)), Reason.OUT_OF_RANGE),
+        (lambda: check_grasp("power", "low", "legacy"), Reason.UNKNOWN_NAME),
+        (lambda: check_grasp("lateral", "", "legacy"), Reason.UNKNOWN_NAME),
+        (lambda: check_grasp("lateral", "low", "legacy"), Reason.NOT_SUPPORTED),
+    ],
+)
 def test_a_refusal_says_to_programs_what_it_is(call, reason):
     with pytest.raises(RefusedError) as refusal:
         call()

@@ -62,6 +62,7 @@ TABLE_3 = {
 def test_table_3_actions(name):
     from coglab_msgs import msg as messages
     from ih2_hand.ros import goals
+
     stem, goal = TABLE_3[name]
     assert goals.SPECS[name][0] is getattr(messages, f"{stem}Action")
 
@@ -76,10 +77,12 @@ def test_table_3_actions(name):
 
 def test_table_3_has_no_other_action():
     from ih2_hand.ros import goals
+
     assert sorted(goals.SPECS) == sorted(TABLE_3)
 
 
 def test_reasons_have_the_numbers_of_the_message():
     from coglab_msgs.msg import ReasonCode as codes
+
     for reason in Reason:
         assert getattr(codes, reason.name) == reason

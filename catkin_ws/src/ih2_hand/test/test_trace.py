@@ -14,18 +14,29 @@ def said(tracer: Tracer, direction: str, text: str) -> list[str]:
     return [line[17:] for line in tracer.feed(direction, bytes.fromhex(text), 1.0)]
 
 
-@pytest.mark.parametrize(("frame", "meaning"), [
-    ("41", "StopALL"), ("46", "FastCalibration"), ("42", "FirstCalibration (complete)"),
-    ("4C", "OpenALL"), ("44 04 64", "SetFingerPosition motor 4 to 100"),
-    ("C9 2C", "MoveMotor motor 2 close speed 300"), ("8D 00", "MoveMotor motor 3 open speed 256"),
-    ("4A 84 00", "SetFingerForce motor 4 tension 512"),
-    ("48 00 1E FE C8 64 48", "SetHandPosture [0, 30, 254, 200, 100]"),
-    ("61", "grasp cylindrical medium by current"), ("54", "grasp tridigit low by tension"),
-    ("6F 04 C8 14", "grasp type 4 GF 200 step 20"), ("4B 02", "GetFingerStatus motor 2"),
-    ("03", "GetFingerForce motor 3"), ("5F 03 61 00 64 03", "LLMC command 61 motor 3 data 00 64"),
-    ("43", "not a frame: dropped by the hand"), ("44 02", "incomplete frame"),
-    ("41 " * 13, "resynchronisation"),
-])
+@pytest.mark.parametrize(
+    ("frame", "meaning"),
+    [
+        ("41", "StopALL"),
+        ("46", "FastCalibration"),
+        ("42", "FirstCalibration (complete)"),
+        ("4C", "OpenALL"),
+        ("44 04 64", "SetFingerPosition motor 4 to 100"),
+        ("C9 2C", "MoveMotor motor 2 close speed 300"),
+        ("8D 00", "MoveMotor motor 3 open speed 256"),
+        ("4A 84 00", "SetFingerForce motor 4 tension 512"),
+        ("48 00 1E FE C8 64 48", "SetHandPosture [0, 30, 254, 200, 100]"),
+        ("61", "grasp cylindrical medium by current"),
+        ("54", "grasp tridigit low by tension"),
+        ("6F 04 C8 14", "grasp type 4 GF 200 step 20"),
+        ("4B 02", "GetFingerStatus motor 2"),
+        ("03", "GetFingerForce motor 3"),
+        ("5F 03 61 00 64 03", "LLMC command 61 motor 3 data 00 64"),
+        ("43", "not a frame: dropped by the hand"),
+        ("44 02", "incomplete frame"),
+        ("41 " * 13, "resynchronisation"),
+    ],
+)
 def test_frames(frame, meaning):
     lines = said(Tracer(), ">", frame)
     assert len(lines) == 1
@@ -37,17 +48,22 @@ def test_answers_follow_their_requests():
     tracer = Tracer()
     said(tracer, ">", "4B 00 45 01 49 03")
     lines = said(tracer, "<", "50 1E 03 D4")
-    assert ["status: position, target reached" in lines[0], "position 30" in lines[1],
-            "current 980 counts" in lines[2]] == [True] * 3
+    assert [
+        "status: position, target reached" in lines[0],
+        "position 30" in lines[1],
+        "current 980 counts" in lines[2],
+    ] == [True] * 3
     assert "nobody asked" in said(tracer, "<", "99")[0]
 
 
 def test_script_explains_hex():
     script = Path(__file__).resolve().parents[1] / "scripts" / "hand_trace.py"
-    done = subprocess.run([sys.executable, str(script), "--hex", "44 04 64 61"],
-                          capture_output=True, text=True, timeout=30, check=True)
+    done = subprocess.run(
+        [sys.executable, str(script), "--hex", "44 04 64 61"], capture_output=True, text=True, timeout=30, check=True
+    )
     assert "SetFingerPosition motor 4 to 100" in done.stdout
     assert "grasp cylindrical medium" in done.stdout
-    bad = subprocess.run([sys.executable, str(script), "--hex", "4"], capture_output=True,
-                         text=True, timeout=30, check=False)
+    bad = subprocess.run(
+        [sys.executable, str(script), "--hex", "4"], capture_output=True, text=True, timeout=30, check=False
+    )
     assert bad.returncode == 2 and "pairs of hex digits" in bad.stderr

@@ -1,5 +1,5 @@
 /// @file
-/// The two processes beside the robot node in bench_fri.py (coglab_controllers), over UDP on
+/// The two processes beside the robot node in coglab_bringup/bench/bench_fri.py, over UDP on
 /// 127.0.0.1:
 ///
 ///   echo                       bare recv/send: the floor. Prints its port.
@@ -11,6 +11,7 @@
 ///                              moves; then per block one line: kind, then the latencies in us, -1
 ///                              for a missing answer; at last the word moving and the share of the
 ///                              bridge's answers that moved the arm.
+///   monitor ECHO BRIDGE QUADS  the same without waiting for a motion: monitor mode stays.
 #include <algorithm>
 #include <atomic>
 #include <csignal>
@@ -163,17 +164,17 @@ class Exchange {
   std::int64_t next_ = steadyNow() + kPeriod;
 };
 
-int measure(int echo_port, int bridge_port, int quads) {
+int measure(bool moving, int echo_port, int bridge_port, int quads) {
   Exchange peers(echo_port, bridge_port);
   coglab_rt::enterRealTime(kPriority - 5);
   Controller& controller = peers.controller();
-  for (int second = 0; second < 60 && !ended; ++second) {
+  for (int second = 0; moving && second < 60 && !ended; ++second) {
     const std::uint64_t moved = controller.moved;
     peers.block(false, kBlock);
     peers.block(true, kBlock);
     if (controller.datagram.state == 2 && controller.moved > moved + kBlock / 2) break;
   }
-  if (controller.datagram.state != 2 || controller.moved == 0) {
+  if (moving && (controller.datagram.state != 2 || controller.moved == 0)) {
     std::fprintf(stderr, "the bridge did not move the arm within 60 s\n");
     return 1;
   }
@@ -201,8 +202,8 @@ int main(int argc, char** argv) {
   std::signal(SIGTERM, onSignal);
   const std::string mode = argc > 1 ? argv[1] : "";
   if (mode == "echo") return echo();
-  if (mode == "measure" && argc == 5)
-    return measure(std::atoi(argv[2]), std::atoi(argv[3]), std::atoi(argv[4]));
-  std::fprintf(stderr, "usage: %s echo | measure ECHO_PORT BRIDGE_PORT QUADS\n", argv[0]);
+  if ((mode == "measure" || mode == "monitor") && argc == 5)
+    return measure(mode == "measure", std::atoi(argv[2]), std::atoi(argv[3]), std::atoi(argv[4]));
+  std::fprintf(stderr, "usage: %s echo | measure|monitor ECHO_PORT BRIDGE_PORT QUADS\n", argv[0]);
   return 2;
 }

@@ -181,8 +181,8 @@ inline double motionTime(double period) {
     const double way = target - sample.commanded_position[1];
     Vector7 wish = Vector7::Zero();
     wish[1] = std::copysign(
-        std::min(limits.velocity[1], brakingSpeed(std::abs(way), limits.acceleration[1],
-                                                  limits.jerk[1], 2.0 * period)),
+        std::min(limits.velocity[1],
+                 brakingSpeed(std::abs(way), limits.acceleration[1], limits.jerk[1], 2.0 * period)),
         way);
     drive(bridge, robot, wish);
     robot.cycle(bridge);

@@ -29,9 +29,7 @@ class LwrNodeProcesses(unittest.TestCase):
         rospy.set_param(f"/{name}/fri_port", 0)
         rospy.set_param(f"/{name}/rt_priority", 0)
         rospy.set_param(f"/{name}/receive_timeout", 2.0)  # of a controller played in Python
-        node = subprocess.Popen(
-            [node_binary(), f"__name:={name}", f"_lwr_namespace:=/{name}"], env=os.environ
-        )
+        node = subprocess.Popen([node_binary(), f"__name:={name}", f"_lwr_namespace:=/{name}"], env=os.environ)
         robot = UdpController(bound_port(f"/{name}")).start()
         rospy.wait_for_service(f"/{name}/command", LIMIT)
         command = rospy.ServiceProxy(f"/{name}/command", LwrCommand)
@@ -99,9 +97,7 @@ class LwrNodeProcesses(unittest.TestCase):
         rospy.set_param("/lwr_six/rt_priority", 0)
         told: list[str] = []
         rospy.Subscriber("/rosout", Log, lambda m: told.append(m.msg))
-        node = subprocess.Popen(
-            [node_binary(), "__name:=lwr_six", "_lwr_namespace:=/lwr_six"], env=os.environ
-        )
+        node = subprocess.Popen([node_binary(), "__name:=lwr_six", "_lwr_namespace:=/lwr_six"], env=os.environ)
         try:
             port = bound_port("/lwr_six")
             wait_for(
@@ -117,14 +113,24 @@ class LwrNodeProcesses(unittest.TestCase):
         rospy.set_param("/lwr_eight/fri_port", port)
         known = subprocess.Popen(
             [node_binary(), "__name:=lwr_eight", "_lwr_namespace:=/lwr_eight"],
-            env=os.environ, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
+            env=os.environ,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
         )
         # Beside a node that fails for a parameter: what a start and an end cost on this machine now.
         rospy.set_param("/lwr_nine/fri_port", 70000)
         began = time.monotonic()
-        self.assertNotEqual(subprocess.run(
-            [node_binary(), "__name:=lwr_nine", "_lwr_namespace:=/lwr_nine"], env=os.environ,
-            stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, timeout=LIMIT).returncode, 0)
+        self.assertNotEqual(
+            subprocess.run(
+                [node_binary(), "__name:=lwr_nine", "_lwr_namespace:=/lwr_nine"],
+                env=os.environ,
+                stdout=subprocess.DEVNULL,
+                stderr=subprocess.DEVNULL,
+                timeout=LIMIT,
+            ).returncode,
+            0,
+        )
         parameter = time.monotonic() - began
         told, _ = known.communicate(timeout=LIMIT)
         busy = time.monotonic() - began

@@ -67,9 +67,7 @@ class LwrNode(unittest.TestCase):
 
     def test_joint_states_torques_and_wrench(self) -> None:
         joints = rospy.wait_for_message("/lwr/joint_states", JointState, LIMIT)
-        self.assertEqual(
-            joints.name, ["lwr_a1", "lwr_a2", "lwr_e1", "lwr_a3", "lwr_a4", "lwr_a5", "lwr_a6"]
-        )
+        self.assertEqual(joints.name, ["lwr_a1", "lwr_a2", "lwr_e1", "lwr_a3", "lwr_a4", "lwr_a5", "lwr_a6"])
         self.assertEqual(list(joints.effort), [1, 2, 3, 4, 5, 6, 7])
         self.assertEqual(len(joints.velocity), 7)
         torques = rospy.wait_for_message("/lwr/external_torques", JointState, LIMIT)
@@ -113,9 +111,7 @@ class LwrNode(unittest.TestCase):
         self.ask("stop")
         self.wait_state("monitor")
         self.assertEqual(self.robot.requests[-1][0], 2)
-        self.assertLess(
-            self.robot.requests[-1][1], 1e-6
-        )  # the arm stood when monitor mode was asked for
+        self.assertLess(self.robot.requests[-1][1], 1e-6)  # the arm stood when monitor mode was asked for
         self.assertLess(max(self.robot.steps), 0.2 * 0.005 * 1.01 + 1e-6)
 
     def test_malformed_targets_are_refused(self) -> None:

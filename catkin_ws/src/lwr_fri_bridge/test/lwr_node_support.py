@@ -55,9 +55,7 @@ class Twist:
     """Publishes a target velocity at 50 Hz, made when it is sent, until stopped."""
 
     def __init__(self, publisher: rospy.Publisher, velocity: list[float]) -> None:
-        self.timer = rospy.Timer(
-            rospy.Duration(0.02), lambda _: publisher.publish(target_message(velocity))
-        )
+        self.timer = rospy.Timer(rospy.Duration(0.02), lambda _: publisher.publish(target_message(velocity)))
 
     def stop(self) -> None:
         self.timer.shutdown()

@@ -104,8 +104,8 @@ class SmallController {
   fri::ControlStrategy control = fri::ControlStrategy::Position;
   std::uint16_t power = fri::kAllDrivesOn;
   double clock_offset = 0.0;  ///< s, of its time stamps
-  bool obeys = true;     ///< whether the KRL program runs
-  bool blocked = false;  ///< something holds the arm
+  bool obeys = true;          ///< whether the KRL program runs
+  bool blocked = false;       ///< something holds the arm
   bool extrapolates = true;  ///< goes on with the last step where an answer is lost; else it stands
   fri::CommandDatagram answer{};
 

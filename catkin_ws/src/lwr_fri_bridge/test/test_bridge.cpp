@@ -18,7 +18,7 @@ using test::drive;
 using test::expectMirror;
 using test::runEvent;
 
-TEST(Bridge, mirrorsTheSetPointInMonitorModeAndWithoutPower) {
+TEST(Bridge, MirrorsTheSetPointInMonitorModeAndWithoutPower) {
   Cell cell;
   cell.run(5);
   expectMirror(cell, cell.robot.setPoint());
@@ -34,7 +34,7 @@ TEST(Bridge, mirrorsTheSetPointInMonitorModeAndWithoutPower) {
   EXPECT_EQ(cell.bridge.snapshot().supervisor, SupervisorState::Stopped);
 }
 
-TEST(Bridge, answersWithHeaderAndFlags) {
+TEST(Bridge, AnswersWithHeaderAndFlags) {
   Cell cell;
   cell.robot.setCounter(65534);
   cell.run(1);
@@ -60,7 +60,7 @@ TEST(Bridge, answersWithHeaderAndFlags) {
   for (int i = 0; i < 7; ++i) EXPECT_EQ(cell.robot.answer.joint_torque[i], 0.0F);
 }
 
-TEST(Bridge, followsVelocitiesAfterStartOnly) {
+TEST(Bridge, FollowsVelocitiesAfterStartOnly) {
   Cell cell;
   cell.run(3);
   cell.robot.state = fri::FriState::Command;  // nobody asked
@@ -78,7 +78,7 @@ TEST(Bridge, followsVelocitiesAfterStartOnly) {
   EXPECT_EQ(cell.bridge.snapshot().supervisor, SupervisorState::Command);
 }
 
-TEST(Bridge, holdBrakesLatchesAndNeedsReset) {
+TEST(Bridge, HoldBrakesLatchesAndNeedsReset) {
   Cell cell;
   cell.start();
   Vector7 velocity = Vector7::Constant(0.5);
@@ -99,7 +99,7 @@ TEST(Bridge, holdBrakesLatchesAndNeedsReset) {
   EXPECT_NEAR(cell.bridge.snapshot().sample.commanded_velocity[0], 0.5, 1e-9);
 }
 
-TEST(Bridge, commandsBeforeThePermissionDoNotCount) {
+TEST(Bridge, CommandsBeforeThePermissionDoNotCount) {
   Cell cell;
   cell.run(3);
   RobotSample sample;
@@ -112,7 +112,7 @@ TEST(Bridge, commandsBeforeThePermissionDoNotCount) {
   EXPECT_GE(cell.bridge.snapshot().counters.commands_old_epoch, 1U);
 }
 
-TEST(Bridge, stopBrakesThenAsksForMonitorMode) {
+TEST(Bridge, StopBrakesThenAsksForMonitorMode) {
   Cell cell;
   cell.start();
   const Vector7 velocity = Vector7::Constant(1.0);
@@ -136,7 +136,7 @@ TEST(Bridge, stopBrakesThenAsksForMonitorMode) {
   EXPECT_EQ(cell.bridge.snapshot().supervisor, SupervisorState::Monitor);
 }
 
-TEST(Bridge, requestsEndWithinTheirTimeLimits) {
+TEST(Bridge, RequestsEndWithinTheirTimeLimits) {
   Cell cell;
   cell.robot.obeys = false;
   cell.run(3);
@@ -156,7 +156,7 @@ TEST(Bridge, requestsEndWithinTheirTimeLimits) {
   EXPECT_NEAR(stop.waited, 2.0, 0.1);
 }
 
-TEST(Bridge, startWithTheWrongStrategyIsNotAccepted) {
+TEST(Bridge, StartWithTheWrongStrategyIsNotAccepted) {
   Cell cell;
   cell.run(3);
   const std::uint32_t ticket = cell.bridge.submit("start");
@@ -170,7 +170,7 @@ TEST(Bridge, startWithTheWrongStrategyIsNotAccepted) {
   EXPECT_NE(cell.bridge.snapshot().supervisor, SupervisorState::Command);
 }
 
-TEST(Bridge, holdInterruptsAStart) {
+TEST(Bridge, HoldInterruptsAStart) {
   Cell cell;
   cell.robot.obeys = false;
   cell.run(3);
@@ -185,7 +185,7 @@ TEST(Bridge, holdInterruptsAStart) {
   EXPECT_EQ(cell.robot.answer.krl.ints[0], 2);
 }
 
-TEST(Bridge, fallBackLatchesUntilAnExplicitStart) {
+TEST(Bridge, FallBackLatchesUntilAnExplicitStart) {
   Cell cell;
   cell.start();
   cell.runDriven(60, Vector7::Constant(0.4));
@@ -206,7 +206,7 @@ TEST(Bridge, fallBackLatchesUntilAnExplicitStart) {
   EXPECT_GT(cell.robot.setPoint()[0], before[0] + 0.05);
 }
 
-TEST(Bridge, brakesWhenCommandsStopAndResumes) {
+TEST(Bridge, BrakesWhenCommandsStopAndResumes) {
   Cell cell;
   cell.start();
   cell.runDriven(60, Vector7::Constant(0.4));
@@ -218,7 +218,7 @@ TEST(Bridge, brakesWhenCommandsStopAndResumes) {
   EXPECT_NEAR(cell.bridge.snapshot().sample.commanded_velocity[0], 0.4, 1e-9);
 }
 
-TEST(Bridge, keepsTheLastValidCommandWhenOneIsNotFinite) {
+TEST(Bridge, KeepsTheLastValidCommandWhenOneIsNotFinite) {
   Cell cell;
   cell.start();
   cell.runDriven(60, Vector7::Constant(0.4));
@@ -231,7 +231,7 @@ TEST(Bridge, keepsTheLastValidCommandWhenOneIsNotFinite) {
   EXPECT_TRUE(cell.bridge.snapshot().sample.commanded_velocity.isZero());
 }
 
-TEST(Bridge, scalesTheWholeVectorToTheSpeedLimit) {
+TEST(Bridge, ScalesTheWholeVectorToTheSpeedLimit) {
   Cell cell;
   cell.start();
   Vector7 velocity = Vector7::Constant(1.0);
@@ -243,7 +243,7 @@ TEST(Bridge, scalesTheWholeVectorToTheSpeedLimit) {
   EXPECT_NEAR(v[5], limit / 4.0, 1e-9);
 }
 
-TEST(Bridge, silenceIsDisconnectionAndEndsRequests) {
+TEST(Bridge, SilenceIsDisconnectionAndEndsRequests) {
   Cell cell;
   cell.start();
   cell.runDriven(20, Vector7::Constant(0.2));
@@ -257,7 +257,7 @@ TEST(Bridge, silenceIsDisconnectionAndEndsRequests) {
   EXPECT_EQ(cell.bridge.snapshot().sample.block, MotionBlock::Disconnected);
 }
 
-TEST(Bridge, aNewBridgeStartsNothing) {
+TEST(Bridge, ANewBridgeStartsNothing) {
   Cell cell;
   cell.start();
   cell.runDriven(50, Vector7::Constant(0.2));
@@ -279,7 +279,7 @@ TEST(Bridge, aNewBridgeStartsNothing) {
   EXPECT_EQ(cell.robot.state, fri::FriState::Monitor);
 }
 
-TEST(Bridge, theVelocitySourceIsSwitched) {
+TEST(Bridge, TheVelocitySourceIsSwitched) {
   Cell cell;
   cell.start();
   const auto topic = [&](double speed) {

@@ -28,7 +28,7 @@ bool cycleWith(Cell& cell, Change change) {
 
 /// A joint cannot have moved by 0.3 rad within a cycle: refused and counted, no velocity is
 /// reported that the arm cannot have, and the motion goes on.
-TEST(BridgeFaults, aMeasuredPositionTheArmCannotHaveReachedIsRefused) {
+TEST(BridgeFaults, AMeasuredPositionTheArmCannotHaveReachedIsRefused) {
   for (const double period : {0.001, 0.005, 0.020}) {
     Cell cell(period);
     cell.start();
@@ -46,7 +46,7 @@ TEST(BridgeFaults, aMeasuredPositionTheArmCannotHaveReachedIsRefused) {
 }
 
 /// A false sample that the arm could have reached: it trips nothing and moves nothing.
-TEST(BridgeFaults, oneFalseSampleNeverMovesTheArm) {
+TEST(BridgeFaults, OneFalseSampleNeverMovesTheArm) {
   Cell cell(0.020);
   cell.start();
   const Vector7 velocity = Vector7::Constant(0.3);
@@ -60,7 +60,7 @@ TEST(BridgeFaults, oneFalseSampleNeverMovesTheArm) {
 
 /// What we sent is known, so a set-point that cannot follow from it is no true one, after a loss
 /// either.
-TEST(BridgeFaults, aSetPointThatCannotFollowFromWhatWasSentIsRefused) {
+TEST(BridgeFaults, ASetPointThatCannotFollowFromWhatWasSentIsRefused) {
   for (const bool after_a_loss : {false, true}) {
     for (const float shift : {0.02F, -0.02F, 0.002F, -0.002F}) {
       Cell cell(0.001);
@@ -84,7 +84,7 @@ TEST(BridgeFaults, aSetPointThatCannotFollowFromWhatWasSentIsRefused) {
   }
 }
 
-TEST(BridgeFaults, higherBitsOfPowerAreNotDrives) {
+TEST(BridgeFaults, HigherBitsOfPowerAreNotDrives) {
   Cell cell;
   cell.robot.power = 0xFF7F;
   cell.start();
@@ -97,7 +97,7 @@ TEST(BridgeFaults, higherBitsOfPowerAreNotDrives) {
 
 /// Quality UNACCEPTABLE or a drive error with full power: brakes, says why and what to do, also
 /// after it has gone, and needs a start.
-TEST(BridgeFaults, poorQualityAndDriveErrorsStopTheMotion) {
+TEST(BridgeFaults, PoorQualityAndDriveErrorsStopTheMotion) {
   for (const MotionBlock expected : {MotionBlock::PoorQuality, MotionBlock::DriveError}) {
     Cell cell;
     cell.start();
@@ -133,7 +133,7 @@ TEST(BridgeFaults, poorQualityAndDriveErrorsStopTheMotion) {
 }
 
 /// Hold and reset that arrive together: the motion that ran has ended, the arm has stood.
-TEST(BridgeFaults, aHoldBrakesEvenIfItIsResetAtOnce) {
+TEST(BridgeFaults, AHoldBrakesEvenIfItIsResetAtOnce) {
   Cell cell;
   cell.start();
   cell.runDriven(60, Vector7::Constant(0.5));

@@ -16,7 +16,7 @@ using test::defaultConfig;
 using test::drive;
 using test::runEvent;
 
-TEST(Bridge, strategyChangesInMonitorModeOnly) {
+TEST(Bridge, StrategyChangesInMonitorModeOnly) {
   Cell cell;
   cell.start();
   const Outcome refused = runEvent(cell.bridge, cell.robot, "joint_impedance");
@@ -31,7 +31,7 @@ TEST(Bridge, strategyChangesInMonitorModeOnly) {
 }
 
 /// Flags of the answer stay those of the entry, whatever is asked for in command mode.
-TEST(Bridge, flagsStayInCommandModeWhateverIsAsked) {
+TEST(Bridge, FlagsStayInCommandModeWhateverIsAsked) {
   for (const char* mode : {"position", "joint_impedance", "cartesian_impedance"}) {
     Cell cell;
     cell.run(2);
@@ -56,7 +56,7 @@ TEST(Bridge, flagsStayInCommandModeWhateverIsAsked) {
 }
 
 /// Nothing adds torques or forces, in no mode and at no time.
-TEST(Bridge, addedTorquesAndForcesStayZero) {
+TEST(Bridge, AddedTorquesAndForcesStayZero) {
   for (const char* mode : {"position", "joint_impedance", "cartesian_impedance"}) {
     Cell cell;
     cell.run(2);
@@ -74,7 +74,7 @@ TEST(Bridge, addedTorquesAndForcesStayZero) {
   }
 }
 
-TEST(Bridge, everyStrategyFollows) {
+TEST(Bridge, EveryStrategyFollows) {
   for (const char* mode : {"position", "joint_impedance", "cartesian_impedance"}) {
     Cell cell;
     cell.run(2);
@@ -96,7 +96,7 @@ TEST(Bridge, everyStrategyFollows) {
   }
 }
 
-TEST(Bridge, refusesParametersOutOfRangeByName) {
+TEST(Bridge, RefusesParametersOutOfRangeByName) {
   struct Case {
     const char* name;
     double value;

@@ -18,7 +18,7 @@ using test::SmallController;
 
 /// Single losses: the set-point goes on without a leap and within speed and acceleration limits, as
 /// the controller sees it.
-TEST(Bridge, ridesThroughLossesWithoutALeap) {
+TEST(Bridge, RidesThroughLossesWithoutALeap) {
   for (const double period : {0.001, 0.005, 0.010}) {
     Cell cell(period);
     cell.start();
@@ -54,7 +54,7 @@ TEST(Bridge, ridesThroughLossesWithoutALeap) {
   }
 }
 
-TEST(Bridge, noPositionLimitIsCrossedWhateverIsAsked) {
+TEST(Bridge, NoPositionLimitIsCrossedWhateverIsAsked) {
   for (const double period : {0.001, 0.005, 0.020}) {
     Cell cell(period);
     cell.start();
@@ -85,7 +85,7 @@ TEST(Bridge, noPositionLimitIsCrossedWhateverIsAsked) {
 
 /// friOpen with another period: the counters go on, no velocity spike, and every bound holds at the
 /// new period.
-TEST(Bridge, followsAnotherPeriodAfterFriWasOpenedAgain) {
+TEST(Bridge, FollowsAnotherPeriodAfterFriWasOpenedAgain) {
   Cell cell(0.001);
   const JointLimits& limits = cell.bridge.config().limits;
   std::uint64_t changes = 0;
@@ -128,7 +128,7 @@ TEST(Bridge, followsAnotherPeriodAfterFriWasOpenedAgain) {
 }
 
 /// The estimate comes in the base's axes about the tool, and is told in the tool's axes.
-TEST(Bridge, wrenchIsToldInTheToolsAxes) {
+TEST(Bridge, WrenchIsToldInTheToolsAxes) {
   for (const bool filled : {true, false}) {
     SmallController robot(0.005);
     Vector7 posture;
@@ -156,7 +156,7 @@ TEST(Bridge, wrenchIsToldInTheToolsAxes) {
 }
 
 /// What a person sees on the wire: float32 positions, speed and acceleration by differences.
-TEST(Bridge, theWireKeepsTheLimitsAtEveryPeriod) {
+TEST(Bridge, TheWireKeepsTheLimitsAtEveryPeriod) {
   for (const double period : {0.001, 0.005, 0.020, 0.100}) {
     Cell cell(period);
     cell.start();
@@ -184,7 +184,7 @@ TEST(Bridge, theWireKeepsTheLimitsAtEveryPeriod) {
   }
 }
 
-TEST(Bridge, everyPeriodOfFriFollows) {
+TEST(Bridge, EveryPeriodOfFriFollows) {
   for (const double period : {0.001, 0.002, 0.005, 0.010, 0.020, 0.050, 0.100}) {
     Cell cell(period);
     cell.start();
@@ -196,7 +196,7 @@ TEST(Bridge, everyPeriodOfFriFollows) {
   }
 }
 
-TEST(Bridge, t1ProfileBoundsSpeed) {
+TEST(Bridge, T1ProfileBoundsSpeed) {
   Cell cell(0.005, defaultConfig("t1"));
   cell.start();
   cell.runDriven(400, Vector7::Constant(1.0));

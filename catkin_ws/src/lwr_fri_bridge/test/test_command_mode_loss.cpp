@@ -53,7 +53,7 @@ struct Watched : Cell {
   QuietRestart restart;
 };
 
-TEST(CommandModeLoss, aStalledControllerOnThisComputerIsNamedAndStartedAgainAtRest) {
+TEST(CommandModeLoss, AStalledControllerOnThisComputerIsNamedAndStartedAgainAtRest) {
   Watched cell;
   cell.start();
   EXPECT_EQ(cell.watch(200), 0);
@@ -76,7 +76,7 @@ TEST(CommandModeLoss, aStalledControllerOnThisComputerIsNamedAndStartedAgainAtRe
   EXPECT_TRUE(cell.reason().empty());
 }
 
-TEST(CommandModeLoss, aMovingArmIsNotStartedAgain) {
+TEST(CommandModeLoss, AMovingArmIsNotStartedAgain) {
   Watched cell;
   cell.start();
   cell.runDriven(200, Vector7::Constant(0.1));
@@ -86,7 +86,7 @@ TEST(CommandModeLoss, aMovingArmIsNotStartedAgain) {
   EXPECT_TRUE(runEvent(cell.bridge, cell.robot, "start").success());
 }
 
-TEST(CommandModeLoss, anArmThatMovedMeanwhileIsNotStartedAgain) {
+TEST(CommandModeLoss, AnArmThatMovedMeanwhileIsNotStartedAgain) {
   Watched cell;
   cell.start();
   cell.run(200);
@@ -96,7 +96,7 @@ TEST(CommandModeLoss, anArmThatMovedMeanwhileIsNotStartedAgain) {
   EXPECT_EQ(cell.watch(1000), 0);
 }
 
-TEST(CommandModeLoss, aControllerThatBeganAnewIsNotStarted) {
+TEST(CommandModeLoss, AControllerThatBeganAnewIsNotStarted) {
   Watched cell;
   cell.start();
   cell.run(200);
@@ -105,7 +105,7 @@ TEST(CommandModeLoss, aControllerThatBeganAnewIsNotStarted) {
   EXPECT_EQ(cell.watch(1000), 0);
 }
 
-TEST(CommandModeLoss, whatThePcDidNotCauseIsLeftToTheUser) {
+TEST(CommandModeLoss, WhatThePcDidNotCauseIsLeftToTheUser) {
   {
     Watched cell;  // elsewhere: a cable
     cell.bridge.setControllerHere(false);
@@ -145,7 +145,7 @@ TEST(CommandModeLoss, whatThePcDidNotCauseIsLeftToTheUser) {
   }
 }
 
-TEST(CommandModeLoss, aLateFriThreadIsNamedAndStartedAgainAtRest) {
+TEST(CommandModeLoss, ALateFriThreadIsNamedAndStartedAgainAtRest) {
   Watched cell;
   cell.bridge.setControllerHere(false);
   cell.start();
@@ -160,7 +160,7 @@ TEST(CommandModeLoss, aLateFriThreadIsNamedAndStartedAgainAtRest) {
   EXPECT_EQ(cell.bridge.snapshot().supervisor, SupervisorState::Command);
 }
 
-TEST(CommandModeLoss, holdAndRepeatedLossesEndTheRestarts) {
+TEST(CommandModeLoss, HoldAndRepeatedLossesEndTheRestarts) {
   Watched held;
   held.start();
   held.run(200);

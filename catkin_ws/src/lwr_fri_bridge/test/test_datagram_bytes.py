@@ -119,13 +119,9 @@ def test_wrong_size_is_refused(kind: str) -> None:
 
 
 def test_golden_headers() -> None:
-    command = lwr_fri_bridge.encode_command(
-        {"counter": 1, "reflected": 0x1234, "size": 376, "id": 0x1005}
-    )
+    command = lwr_fri_bridge.encode_command({"counter": 1, "reflected": 0x1234, "size": 376, "id": 0x1005})
     assert command[:8] == bytes.fromhex("01 00 34 12 78 01 05 10")
-    measurement = lwr_fri_bridge.encode_measurement(
-        {"counter": 2, "reflected": 1, "size": 916, "id": 0x2006}
-    )
+    measurement = lwr_fri_bridge.encode_measurement({"counter": 2, "reflected": 1, "size": 916, "id": 0x2006})
     assert measurement[:8] == bytes.fromhex("02 00 01 00 94 03 06 20")
     # The controller's own self-test of the byte order of floats.
     assert struct.pack("<I", 0x40490FDB) == bytes.fromhex("DB 0F 49 40")
@@ -134,9 +130,7 @@ def test_golden_headers() -> None:
 
 
 def monitor_datagram(counter: int, **fields: object) -> bytes:
-    values: dict[str, object] = {
-        name: [0] * int(form[:-1]) if len(form) > 1 else 0 for _, form, name in MEASUREMENT
-    }
+    values: dict[str, object] = {name: [0] * int(form[:-1]) if len(form) > 1 else 0 for _, form, name in MEASUREMENT}
     identity = [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0]
     values.update(
         counter=counter,
@@ -184,9 +178,7 @@ def test_bridge_reads_joint_order_and_reversed_torques() -> None:
 def test_wrench_is_turned_from_the_axes_of_the_base_into_those_of_the_tool() -> None:
     bridge = lwr_fri_bridge.Bridge(str(LIMITS))
     turned = [0, -1, 0, 0.5, 1, 0, 0, 0.1, 0, 0, 1, 0.4]  # tool x along base y, tool y along base -x
-    data = monitor_datagram(
-        5, measured_frame=turned, external_wrench=[21, 22, 23, 24, 25, 26]
-    )
+    data = monitor_datagram(5, measured_frame=turned, external_wrench=[21, 22, 23, 24, 25, 26])
     assert bridge.answer(data, 10**9) is not None
     assert list(bridge.snapshot()["tool_wrench"]) == [22, -21, 23, 25, -26, 24]
     bridge = lwr_fri_bridge.Bridge(str(LIMITS), wrench_in_tool_axes=True)
@@ -201,9 +193,7 @@ def test_bridge_writes_stiffness_with_reversed_rotations() -> None:
     )
     answer = bridge.answer(monitor_datagram(5), 10**9)
     assert read(COMMAND, answer, "cartesian_stiffness") == (1, 2, 3, 6, 5, 4)
-    assert read(COMMAND, answer, "cartesian_damping") == pytest.approx(
-        (0.1, 0.2, 0.3, 0.6, 0.5, 0.4)
-    )
+    assert read(COMMAND, answer, "cartesian_damping") == pytest.approx((0.1, 0.2, 0.3, 0.6, 0.5, 0.4))
     assert read(COMMAND, answer, "flags") == (0x3500,)
 
 

@@ -53,12 +53,21 @@ def test_arrows_run_only_downward() -> None:
 
 
 def test_ros_stays_in_its_room() -> None:
-    wrong = [f"{path.relative_to(PACKAGE)}: {name}" for path in sources() if room_of(path) != "ros"
-             for name in includes(path) if ROS.match(name)]
+    wrong = [
+        f"{path.relative_to(PACKAGE)}: {name}"
+        for path in sources()
+        if room_of(path) != "ros"
+        for name in includes(path)
+        if ROS.match(name)
+    ]
     assert not wrong, wrong
 
 
 def test_nothing_above_is_known() -> None:
-    wrong = [f"{path.relative_to(PACKAGE)}: {name}" for path in sources() for name in includes(path)
-             if name.split("/")[0] in ("coglab_controllers", "coglab_sim", "ctrl_more")]
+    wrong = [
+        f"{path.relative_to(PACKAGE)}: {name}"
+        for path in sources()
+        for name in includes(path)
+        if name.split("/")[0] in ("coglab_controllers", "coglab_sim", "ctrl_more")
+    ]
     assert not wrong, wrong

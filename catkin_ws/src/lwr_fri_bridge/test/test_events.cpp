@@ -23,7 +23,7 @@ std::string errorOf(const std::string& event) {
   return {};
 }
 
-TEST(Events, knownOnesAreRead) {
+TEST(Events, KnownOnesAreRead) {
   const ControlMode current;
   EXPECT_EQ(parseEvent("start", current).kind, EventKind::Start);
   EXPECT_EQ(parseEvent(" hold ", current).kind, EventKind::Hold);
@@ -44,7 +44,7 @@ TEST(Events, knownOnesAreRead) {
   EXPECT_DOUBLE_EQ(frame.joint_stiffness[6], 7.0);  // kept
 }
 
-TEST(Events, unknownOnesAreRejectedWithTheList) {
+TEST(Events, UnknownOnesAreRejectedWithTheList) {
   for (const char* event :
        {"", "jump", "start now", "joint_impedance 100", "joint_impedance stiffness",
         "joint_impedance stiffness 1 2", "joint_impedance stiffness 1x", "position stiffness 3",
@@ -59,7 +59,7 @@ TEST(Events, unknownOnesAreRejectedWithTheList) {
   EXPECT_NE(errorOf("joint_impedance stiffness 2001").find("0.01..2000"), std::string::npos);
 }
 
-TEST(Events, everyOutcomeHasWords) {
+TEST(Events, EveryOutcomeHasWords) {
   for (int code = 0; code <= static_cast<int>(OutcomeCode::NotServed); ++code) {
     Outcome outcome;
     outcome.kind = EventKind::Start;
@@ -68,7 +68,7 @@ TEST(Events, everyOutcomeHasWords) {
   }
 }
 
-TEST(Krl, conventionsWriteTheTable) {
+TEST(Krl, ConventionsWriteTheTable) {
   struct Row {
     KrlConvention convention;
     KrlPhase phase;
@@ -103,7 +103,7 @@ TEST(Krl, conventionsWriteTheTable) {
   }
 }
 
-TEST(Krl, namesAndStrategies) {
+TEST(Krl, NamesAndStrategies) {
   for (const char* name : {"coglab", "centro_epiaggio", "stanford", "rcprg_tum", "rtt_lwr"}) {
     EXPECT_STREQ(nameOf(fri::krlConventionFromName(name)), name);
   }
@@ -113,7 +113,7 @@ TEST(Krl, namesAndStrategies) {
   EXPECT_TRUE(supports(KrlConvention::Stanford, ControlStrategy::CartesianImpedance));
 }
 
-TEST(Krl, ourProgramsResultsAreRead) {
+TEST(Krl, OurProgramsResultsAreRead) {
   fri::UserData data{};
   const fri::KrlRequest request{KrlPhase::Start, ControlStrategy::Position, 5, 0};
   EXPECT_FALSE(readReply(KrlConvention::Coglab, request, data).known);
@@ -129,7 +129,7 @@ TEST(Krl, ourProgramsResultsAreRead) {
   EXPECT_FALSE(readReply(KrlConvention::Coglab, request, data).refused);
 }
 
-TEST(Krl, aStartWithoutOurProgramSaysSo) {
+TEST(Krl, AStartWithoutOurProgramSaysSo) {
   BridgeConfig config = test::defaultConfig();
   Bridge bridge(config);
   test::SmallController robot(0.005);
@@ -164,7 +164,7 @@ TEST(Krl, aStartWithoutOurProgramSaysSo) {
   EXPECT_NE(describe(outcome).find("krl_convention"), std::string::npos);
 }
 
-TEST(Diagnosis, givesAHintWhenQualityIsPoor) {
+TEST(Diagnosis, GivesAHintWhenQualityIsPoor) {
   Snapshot s;
   FriThreadStatistics thread;
   EXPECT_NE(diagnoseConnection(s, thread, 49938, 12.0)
@@ -191,7 +191,7 @@ TEST(Diagnosis, givesAHintWhenQualityIsPoor) {
   EXPECT_NE(diagnoseArm(s, 70.0).text.find("lwr_a4"), std::string::npos);
 }
 
-TEST(Events, aFullQueueIsCountedAndSaid) {
+TEST(Events, AFullQueueIsCountedAndSaid) {
   Bridge bridge(test::defaultConfig());
   std::uint32_t last = 0;
   for (int i = 0; i < 20; ++i) last = bridge.submit("hold");  // nobody serves them

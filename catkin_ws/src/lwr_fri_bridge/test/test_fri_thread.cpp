@@ -74,7 +74,7 @@ struct Fixture : testing::Test {
 
 using FriThreadTest = Fixture;
 
-TEST_F(FriThreadTest, answersToTheSourceOfTheDatagram) {
+TEST_F(FriThreadTest, AnswersToTheSourceOfTheDatagram) {
   Peer peer(fri.port());
   fri::CommandDatagram c{};
   for (int i = 0; i < 10; ++i) {
@@ -87,7 +87,7 @@ TEST_F(FriThreadTest, answersToTheSourceOfTheDatagram) {
   EXPECT_NE(fri.statistics().peer.find("127.0.0.1:"), std::string::npos);
 }
 
-TEST_F(FriThreadTest, aSecondSenderIsIgnoredAndNamed) {
+TEST_F(FriThreadTest, ASecondSenderIsIgnoredAndNamed) {
   Peer peer(fri.port()), other(fri.port());
   fri::CommandDatagram c{};
   peer.send(robot.measure());
@@ -104,7 +104,7 @@ TEST_F(FriThreadTest, aSecondSenderIsIgnoredAndNamed) {
 }
 
 /// Datagrams that waited because the thread was not run make it late, not the controller silent.
-TEST(FriThreadLate, aLateThreadIsKnownAsTheCauseOfALoss) {
+TEST(FriThreadLate, ALateThreadIsKnownAsTheCauseOfALoss) {
   Bridge bridge(test::defaultConfig());
   std::atomic<bool> sleeps{false};
   FriThreadOptions options = Fixture::options();
@@ -140,7 +140,7 @@ TEST(FriThreadLate, aLateThreadIsKnownAsTheCauseOfALoss) {
   EXPECT_EQ(bridge.snapshot().loss.cause, LossCause::ComputerLate);
 }
 
-TEST(FriThreadPeer, onlyTheControllersAddressIsAnswered) {
+TEST(FriThreadPeer, OnlyTheControllersAddressIsAnswered) {
   Bridge bridge(test::defaultConfig());
   FriThreadOptions options = Fixture::options();
   options.controller_address = "127.0.0.2";
@@ -163,7 +163,7 @@ TEST(FriThreadPeer, onlyTheControllersAddressIsAnswered) {
   EXPECT_THROW(named.start(), std::runtime_error);
 }
 
-TEST_F(FriThreadTest, rubbishMakesNoPeerAndIsCounted) {
+TEST_F(FriThreadTest, RubbishMakesNoPeerAndIsCounted) {
   Peer rubbish(fri.port()), peer(fri.port());
   std::vector<std::uint8_t> bytes(60000, 0x55);
   for (const std::size_t size : {0, 1, 375, 915, 917, 1024, 1025, 2000, 60000}) {
@@ -177,7 +177,7 @@ TEST_F(FriThreadTest, rubbishMakesNoPeerAndIsCounted) {
   EXPECT_TRUE(peer.receive(c));
 }
 
-TEST_F(FriThreadTest, silenceIsDisconnection) {
+TEST_F(FriThreadTest, SilenceIsDisconnection) {
   Peer peer(fri.port());
   peer.send(robot.measure());
   fri::CommandDatagram c{};
@@ -190,7 +190,7 @@ TEST_F(FriThreadTest, silenceIsDisconnection) {
 }
 
 /// The receive has a time-out: nobody has to send something to let the thread end.
-TEST_F(FriThreadTest, stopsAtOnceWithoutDatagrams) {
+TEST_F(FriThreadTest, StopsAtOnceWithoutDatagrams) {
   std::atomic<bool> stopped{false};
   std::thread stopper([&] {
     fri.stop();
@@ -203,7 +203,7 @@ TEST_F(FriThreadTest, stopsAtOnceWithoutDatagrams) {
 
 /// 20 000 bad datagrams from elsewhere while the peer is served: every one of the peer's is
 /// answered with what belongs to it.
-TEST_F(FriThreadTest, floodOfRubbishDisturbsNoAnswer) {
+TEST_F(FriThreadTest, FloodOfRubbishDisturbsNoAnswer) {
   Peer rubbish(fri.port()), peer(fri.port());
   fri::CommandDatagram c{};
   peer.send(robot.measure());
@@ -227,7 +227,7 @@ TEST_F(FriThreadTest, floodOfRubbishDisturbsNoAnswer) {
   EXPECT_GT(fri.statistics().foreign, 10'000U);
 }
 
-TEST_F(FriThreadTest, aPortInUseIsSaid) {
+TEST_F(FriThreadTest, APortInUseIsSaid) {
   FriThreadOptions same = options();
   same.port = fri.port();
   Bridge other(test::defaultConfig());
@@ -244,7 +244,7 @@ TEST_F(FriThreadTest, aPortInUseIsSaid) {
   EXPECT_THROW(third.start(), std::runtime_error);
 }
 
-TEST_F(FriThreadTest, aRestartedThreadIsFoundWhereItWas) {
+TEST_F(FriThreadTest, ARestartedThreadIsFoundWhereItWas) {
   const int port = fri.port();
   fri.stop();
   Bridge other(test::defaultConfig());
@@ -278,7 +278,7 @@ int answersWithoutRights() {
   return peer.receive(c) ? 0 : 14;
 }
 
-TEST(FriThreadRights, withoutThemItWarnsAndRunsOn) {
+TEST(FriThreadRights, WithoutThemItWarnsAndRunsOn) {
   const pid_t child = fork();
   if (child == 0) _exit(answersWithoutRights());
   int status = 0;
@@ -287,7 +287,7 @@ TEST(FriThreadRights, withoutThemItWarnsAndRunsOn) {
   EXPECT_EQ(WEXITSTATUS(status), 0);
 }
 
-TEST_F(FriThreadTest, commandReachesTheThreadAndComesBack) {
+TEST_F(FriThreadTest, CommandReachesTheThreadAndComesBack) {
   Peer peer(fri.port());
   std::atomic<bool> end{false};
   std::thread controller([&] {

@@ -43,8 +43,6 @@ def test_equal_to_ruckig() -> None:
             got = lwr_fri_bridge.step_axis(p, v, a, target, max_a, max_j, tick)
             duration = lwr_fri_bridge.time_to_velocity(v, a, target, max_a, max_j)
             worst["duration"] = max(worst["duration"], abs(duration - trajectory.duration))
-            for name, ours, theirs in zip(
-                ("position", "velocity", "acceleration"), got, expected, strict=True
-            ):
+            for name, ours, theirs in zip(("position", "velocity", "acceleration"), got, expected, strict=True):
                 worst[name] = max(worst[name], abs(ours - theirs))
     assert max(worst.values()) <= 1e-12, worst

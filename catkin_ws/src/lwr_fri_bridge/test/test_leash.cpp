@@ -36,7 +36,7 @@ struct Blocked {
   double ahead = 0.0;
 };
 
-TEST(Leash, relaxesABlockedArmInEveryMode) {
+TEST(Leash, RelaxesABlockedArmInEveryMode) {
   for (const char* mode : {"position", "joint_impedance", "cartesian_impedance"}) {
     for (const double speed : {0.1, 0.5, 1.5, -1.5}) {
       Blocked cell(mode, speed);
@@ -55,7 +55,7 @@ TEST(Leash, relaxesABlockedArmInEveryMode) {
 }
 
 /// Lengths by mode and stiffness, worked out by hand from the documented rule.
-TEST(Leash, growsAsTheStiffnessFalls) {
+TEST(Leash, GrowsAsTheStiffnessFalls) {
   const LeashLengths lengths;
   ControlMode mode;
   EXPECT_TRUE(leashOf(mode, lengths).isApprox(Vector7::Constant(0.05)));
@@ -77,7 +77,7 @@ TEST(Leash, growsAsTheStiffnessFalls) {
 
 /// A soft arm sags under what it holds, friction holds it back: no block, it goes on. A stiff one
 /// that lies back as far is blocked.
-TEST(Leash, aSoftArmThatSagsIsNotBlocked) {
+TEST(Leash, ASoftArmThatSagsIsNotBlocked) {
   for (const bool soft : {true, false}) {
     Bridge bridge(defaultConfig());
     SmallController robot(0.005);
@@ -100,7 +100,7 @@ TEST(Leash, aSoftArmThatSagsIsNotBlocked) {
   }
 }
 
-TEST(Leash, needsANewRequest) {
+TEST(Leash, NeedsANewRequest) {
   Blocked cell("position", 0.5);
   cell.push(1000);
   cell.robot.blocked = false;
@@ -115,7 +115,7 @@ TEST(Leash, needsANewRequest) {
   EXPECT_GT(cell.robot.setPoint()[1], before + 0.1);
 }
 
-TEST(Leash, motionBackIsFollowedOnceTheSetPointHasReturned) {
+TEST(Leash, MotionBackIsFollowedOnceTheSetPointHasReturned) {
   Blocked cell("position", 0.5);
   cell.push(1000);
   cell.velocity[1] = -0.3;
@@ -124,7 +124,7 @@ TEST(Leash, motionBackIsFollowedOnceTheSetPointHasReturned) {
   EXPECT_LT(cell.robot.setPoint()[1], cell.blocked_at[1] - 0.1);
 }
 
-TEST(Leash, anArmThatIsPushedOrSagsDoesNotDragTheSetPoint) {
+TEST(Leash, AnArmThatIsPushedOrSagsDoesNotDragTheSetPoint) {
   Bridge bridge(defaultConfig());
   SmallController robot(0.005);
   for (int i = 0; i < 3; ++i) robot.cycle(bridge);

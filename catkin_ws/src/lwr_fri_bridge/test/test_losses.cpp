@@ -16,7 +16,7 @@ using test::runEvent;
 
 /// A sample of the campaign that bench/loss_campaign.cpp runs in whole; with COGLAB_LONG more of
 /// it.
-TEST(Losses, noSetPointLeavesItsBoundsWhateverIsLost) {
+TEST(Losses, NoSetPointLeavesItsBoundsWhateverIsLost) {
   const unsigned seeds = std::getenv("COGLAB_LONG") != nullptr ? 200 : 2;
   for (const double period : {0.001, 0.002, 0.005, 0.020}) {
     for (const double share : {0.0, 0.01, 0.05, 0.10}) {
@@ -44,7 +44,7 @@ TEST(Losses, noSetPointLeavesItsBoundsWhateverIsLost) {
 
 /// Braking goes on where the answer that the controller saw last has left it: the losses cost their
 /// own way and nothing more.
-TEST(Losses, brakingDoesNotBeginAnewAfterALoss) {
+TEST(Losses, BrakingDoesNotBeginAnewAfterALoss) {
   for (const double period : {0.001, 0.005, 0.020}) {
     double angle[2];
     int lost = 0;
@@ -74,7 +74,7 @@ TEST(Losses, brakingDoesNotBeginAnewAfterALoss) {
 }
 
 /// Where the controller stood, the set-point starts from rest; where it went on, at its speed.
-TEST(Losses, afterAGapTheSetPointGoesOnAsTheControllerDid) {
+TEST(Losses, AfterAGapTheSetPointGoesOnAsTheControllerDid) {
   for (const bool extrapolates : {true, false}) {
     for (const int gap : {1, 2, 5}) {
       for (const bool measurements : {false, true}) {
@@ -102,7 +102,7 @@ TEST(Losses, afterAGapTheSetPointGoesOnAsTheControllerDid) {
 /// In Cartesian impedance mode the frame tells what the controller did, for the joint set-point
 /// that it reports is the arm's. Joint 1 turns about the vertical, so its angle is the frame's:
 /// what was lost must not add up between them.
-TEST(Losses, theCartesianSetPointDoesNotDriftFromTheFrame) {
+TEST(Losses, TheCartesianSetPointDoesNotDriftFromTheFrame) {
   Cell cell(0.005);
   cell.run(3);
   ASSERT_TRUE(runEvent(cell.bridge, cell.robot, "cartesian_impedance").success());
@@ -123,7 +123,7 @@ TEST(Losses, theCartesianSetPointDoesNotDriftFromTheFrame) {
 }
 
 /// The controller's counter begins anew at full speed: the set-point brakes from what was sent.
-TEST(Losses, aRestartedCounterBrakesFromWhatWasSent) {
+TEST(Losses, ARestartedCounterBrakesFromWhatWasSent) {
   for (const double period : {0.005, 0.020}) {
     Cell cell(period);
     cell.robot.moveOwn(Vector7::Constant(-1.0));
@@ -147,7 +147,7 @@ TEST(Losses, aRestartedCounterBrakesFromWhatWasSent) {
 }
 
 /// The controllers' time goes on while measurements are lost.
-TEST(Losses, timeCountsTheLostCycles) {
+TEST(Losses, TimeCountsTheLostCycles) {
   Cell cell(0.005);
   cell.start();
   const std::int64_t before = cell.bridge.snapshot().sample.controller_ns;

@@ -79,7 +79,7 @@ int pthread_mutex_lock(pthread_mutex_t* mutex) {
 namespace lwr_fri_bridge {
 namespace {
 
-TEST(RealTime, theCountersCount) {
+TEST(RealTime, TheCountersCount) {
   pthread_mutex_t mutex = PTHREAD_MUTEX_INITIALIZER;
   const bool dispatched = dispatchSystemCalls();
   count(true);
@@ -95,7 +95,7 @@ TEST(RealTime, theCountersCount) {
   EXPECT_EQ(system_calls, dispatched ? 1U : 0U);
 }
 
-TEST(RealTime, aTickAllocatesAndLocksNothingAndCallsNoSystem) {
+TEST(RealTime, ATickAllocatesAndLocksNothingAndCallsNoSystem) {
   const bool dispatched = dispatchSystemCalls();
   for (const char* mode : {"position", "joint_impedance", "cartesian_impedance"}) {
     Bridge bridge(test::defaultConfig());

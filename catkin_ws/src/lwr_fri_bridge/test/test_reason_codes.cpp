@@ -13,7 +13,7 @@ namespace {
 
 using Code = coglab_msgs::ReasonCode;
 
-TEST(ReasonCodes, everyMotionBlockHasOneOfItsOwn) {
+TEST(ReasonCodes, EveryMotionBlockHasOneOfItsOwn) {
   std::set<std::uint16_t> seen;
   for (int i = 0; i < 256; ++i) {
     const auto block = static_cast<MotionBlock>(i);
@@ -28,7 +28,7 @@ TEST(ReasonCodes, everyMotionBlockHasOneOfItsOwn) {
   EXPECT_EQ(motionBlockOf(Code::COMPUTER_LATE), MotionBlock::NotStarted);
 }
 
-TEST(ReasonCodes, everyOutcomeHasOne) {
+TEST(ReasonCodes, EveryOutcomeHasOne) {
   int values = 0;
   for (int i = 0; i < 256; ++i) {
     Outcome outcome;
@@ -44,7 +44,7 @@ TEST(ReasonCodes, everyOutcomeHasOne) {
   EXPECT_GE(values, 18);
 }
 
-TEST(ReasonCodes, aLossThatTheComputerCausedIsNamed) {
+TEST(ReasonCodes, ALossThatTheComputerCausedIsNamed) {
   CommandModeLoss loss;
   loss.cause = LossCause::ComputerLate;
   EXPECT_EQ(reasonCode(MotionBlock::Monitor, loss), Code::COMPUTER_LATE);

@@ -30,7 +30,7 @@ fri::Reception receive(Session& session, const fri::MeasurementDatagram& m) {
   return session.receive(bytes.data(), bytes.size(), out);
 }
 
-TEST(Session, countsWhatItRejects) {
+TEST(Session, CountsWhatItRejects) {
   Session session(false);
   SmallController robot(0.005);
   fri::MeasurementDatagram m = robot.measure();
@@ -63,7 +63,7 @@ TEST(Session, countsWhatItRejects) {
   EXPECT_EQ(session.counters().rejected(), 8U);
 }
 
-TEST(Session, findsGapsAcrossTheWrapOfTheCounter) {
+TEST(Session, FindsGapsAcrossTheWrapOfTheCounter) {
   Session session(false);
   SmallController robot(0.001);
   fri::MeasurementDatagram m = robot.measure();
@@ -76,7 +76,7 @@ TEST(Session, findsGapsAcrossTheWrapOfTheCounter) {
   EXPECT_EQ(session.counters().lost_measurements, 4U);
 }
 
-TEST(Session, knowsWhetherTheAnswerArrived) {
+TEST(Session, KnowsWhetherTheAnswerArrived) {
   Session session(false);
   SmallController robot(0.001);
   fri::MeasurementDatagram m = robot.measure();
@@ -92,7 +92,7 @@ TEST(Session, knowsWhetherTheAnswerArrived) {
   EXPECT_EQ(session.counters().lost_answers, 1U);
 }
 
-TEST(Session, acceptsARestartAfterProof) {
+TEST(Session, AcceptsARestartAfterProof) {
   Session session(false);
   SmallController robot(0.005);
   fri::MeasurementDatagram m = robot.measure();
@@ -111,7 +111,7 @@ TEST(Session, acceptsARestartAfterProof) {
 }
 
 /// friOpen sets the period; while it is open in command mode another one is no true datagram.
-TEST(Session, thePeriodChangesInMonitorModeOnly) {
+TEST(Session, ThePeriodChangesInMonitorModeOnly) {
   Session session(false);
   SmallController robot(0.001);
   fri::MeasurementDatagram m = robot.measure();
@@ -133,7 +133,7 @@ TEST(Session, thePeriodChangesInMonitorModeOnly) {
 }
 
 /// What is rejected leaves the measurement as it was: state and joints do not leap to zero.
-TEST(Session, aRejectedDatagramLeavesTheMeasurement) {
+TEST(Session, ARejectedDatagramLeavesTheMeasurement) {
   Session session(false);
   SmallController robot(0.005);
   fri::MeasurementDatagram kept;
@@ -147,7 +147,7 @@ TEST(Session, aRejectedDatagramLeavesTheMeasurement) {
   }
 }
 
-TEST(Session, lenientModeAcceptsZeroHeaders) {
+TEST(Session, LenientModeAcceptsZeroHeaders) {
   SmallController robot(0.005);
   fri::MeasurementDatagram m = robot.measure();
   m.header = {};
@@ -159,7 +159,7 @@ TEST(Session, lenientModeAcceptsZeroHeaders) {
   EXPECT_EQ(receive(lenient, m).verdict, Verdict::WrongId);
 }
 
-TEST(Session, aLeapOfTheSetPointIsImplausible) {
+TEST(Session, ALeapOfTheSetPointIsImplausible) {
   Session session(false);
   SmallController robot(0.001);
   fri::MeasurementDatagram m = robot.measure();
@@ -169,7 +169,7 @@ TEST(Session, aLeapOfTheSetPointIsImplausible) {
   EXPECT_EQ(receive(session, m).verdict, Verdict::Implausible);
 }
 
-TEST(Session, cartesianSetPointIsCommandTimesOffset) {
+TEST(Session, CartesianSetPointIsCommandTimesOffset) {
   fri::MeasurementDatagram m{};
   float frame[12];
   for (int i = 0; i < 3; ++i) m.commanded_frame[5 * i] = 1.0F;
@@ -222,7 +222,7 @@ std::size_t badDatagram(std::mt19937& random, const std::deque<Bytes>& past,
 
 /// A million bad datagrams between good ones while the arm moves: no crash, all counted, no leap in
 /// the answers.
-TEST(Session, aMillionBadDatagramsMakeNoLeap) {
+TEST(Session, AMillionBadDatagramsMakeNoLeap) {
   const double period = 0.001;
   Bridge bridge(test::defaultConfig());
   SmallController robot(period);
@@ -274,7 +274,7 @@ TEST(Session, aMillionBadDatagramsMakeNoLeap) {
 
 /// Reordered: a datagram that was overtaken is not answered, and the command goes on without a
 /// leap.
-TEST(Session, reorderedDatagramsMakeNoLeap) {
+TEST(Session, ReorderedDatagramsMakeNoLeap) {
   const double period = 0.005;
   Bridge bridge(test::defaultConfig());
   SmallController robot(period);

@@ -25,7 +25,7 @@ struct Message {
   }
 };
 
-TEST(TargetCommand, carriesTheAgeAndTheEpochOfWhereItWasMade) {
+TEST(TargetCommand, CarriesTheAgeAndTheEpochOfWhereItWasMade) {
   Message m;
   m.epoch = "7";
   const TargetVerdict verdict = m.judge();
@@ -36,7 +36,7 @@ TEST(TargetCommand, carriesTheAgeAndTheEpochOfWhereItWasMade) {
 }
 
 /// Held and released while the message was on its way: by its epoch, or by its stamp without one.
-TEST(TargetCommand, whatWasMadeBeforeThePermissionMovesNothing) {
+TEST(TargetCommand, WhatWasMadeBeforeThePermissionMovesNothing) {
   Message m;
   m.epoch = "6";
   EXPECT_EQ(m.judge().fault, TargetFault::Epoch);
@@ -48,7 +48,7 @@ TEST(TargetCommand, whatWasMadeBeforeThePermissionMovesNothing) {
   EXPECT_EQ(m.judge(7, kNow - 6 * kMs).fault, TargetFault::None);
 }
 
-TEST(TargetCommand, extremeStampsAreRefusedAndSaid) {
+TEST(TargetCommand, ExtremeStampsAreRefusedAndSaid) {
   Message m;
   m.stamped = false;
   EXPECT_EQ(m.judge().fault, TargetFault::Stamp);
@@ -68,7 +68,7 @@ TEST(TargetCommand, extremeStampsAreRefusedAndSaid) {
   EXPECT_EQ(m.judge().command.stamp_ns, kNow);
 }
 
-TEST(TargetCommand, malformedMessagesAreRefused) {
+TEST(TargetCommand, MalformedMessagesAreRefused) {
   const auto fault = [](auto change) {
     Message m;
     change(m);
@@ -87,7 +87,7 @@ TEST(TargetCommand, malformedMessagesAreRefused) {
     EXPECT_EQ(fault([&](Message& m) { m.epoch = epoch; }), TargetFault::Invalid) << epoch;
 }
 
-TEST(TargetCommand, namesSortIntoWireOrder) {
+TEST(TargetCommand, NamesSortIntoWireOrder) {
   Message m;
   m.names = {"lwr_a6", "lwr_a5", "lwr_a4", "lwr_a3", "lwr_e1", "lwr_a2", "lwr_a1"};
   const TargetVerdict verdict = m.judge();
@@ -97,7 +97,7 @@ TEST(TargetCommand, namesSortIntoWireOrder) {
 
 /// Whatever comes, what passes was made within the permission, is not too old, and is never newer
 /// than now.
-TEST(TargetCommand, nothingOldPassesWhateverTheStamp) {
+TEST(TargetCommand, NothingOldPassesWhateverTheStamp) {
   std::mt19937_64 random(11);
   int passed = 0;
   for (int i = 0; i < 100'000; ++i) {

@@ -9,7 +9,7 @@
 namespace lwr_fri_bridge {
 namespace {
 
-TEST(VelocityFilter, delayIsAsStated) {
+TEST(VelocityFilter, DelayIsAsStated) {
   for (const double T : {0.0, 0.004, 0.008, 0.02}) {
     for (const double dt : {0.001, 0.005, 0.010}) {
       VelocityFilter filter(T);
@@ -25,7 +25,7 @@ TEST(VelocityFilter, delayIsAsStated) {
   EXPECT_NEAR(VelocityFilter::delay(0.008, 0.005), 0.0083, 2e-4);
 }
 
-TEST(VelocityFilter, noiseGainIsAsStated) {
+TEST(VelocityFilter, NoiseGainIsAsStated) {
   std::mt19937 random(1);
   std::normal_distribution<double> noise(0.0, 1e-5);
   for (const double T : {0.0, 0.008, 0.02}) {
@@ -47,7 +47,7 @@ TEST(VelocityFilter, noiseGainIsAsStated) {
   }
 }
 
-TEST(VelocityFilter, lostSamplesMakeNoSpikeAndKeepTheTimeConstant) {
+TEST(VelocityFilter, LostSamplesMakeNoSpikeAndKeepTheTimeConstant) {
   const double dt = 0.001;
   VelocityFilter all(0.008), some(0.008);
   std::mt19937 random(4);
@@ -67,7 +67,7 @@ TEST(VelocityFilter, lostSamplesMakeNoSpikeAndKeepTheTimeConstant) {
   EXPECT_LT(worst, 0.01);  // of 0.6 rad/s
 }
 
-TEST(VelocityFilter, constantSpeedIsExactAndTheFirstSampleGivesZero) {
+TEST(VelocityFilter, ConstantSpeedIsExactAndTheFirstSampleGivesZero) {
   VelocityFilter filter(0.008);
   EXPECT_TRUE(filter.update(Vector7::Constant(1.0), 1, 0.005).isZero());
   for (int i = 1; i < 200; ++i) filter.update(Vector7::Constant(1.0 + 0.2 * 0.005 * i), 1, 0.005);

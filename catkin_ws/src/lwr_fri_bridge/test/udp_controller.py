@@ -80,9 +80,7 @@ class UdpController:
                         "measured_torque": [1, 2, 3, 4, 5, 6, 7],
                         "external_torque": [7, 6, 5, 4, 3, 2, 1],
                         "temperature": [30, 31, 32, 33, 34, 35, 36],
-                        "krl_ints": [self._finished, 1 if self._finished else 0]
-                        + [0] * 13
-                        + [4010],
+                        "krl_ints": [self._finished, 1 if self._finished else 0] + [0] * 13 + [4010],
                     }
                 ),
                 ("127.0.0.1", self.port),
@@ -103,14 +101,10 @@ class UdpController:
                 continue
             self._reflected = answer["counter"]
             self.answered += 1
-            step = max(
-                abs(a - b) for a, b in zip(answer["joint_position"], self.position, strict=True)
-            )
+            step = max(abs(a - b) for a, b in zip(answer["joint_position"], self.position, strict=True))
             if self.state == 2:
                 self.steps.append(step)
-                self.offset = [
-                    a - b for a, b in zip(answer["joint_position"], self.own, strict=True)
-                ]
+                self.offset = [a - b for a, b in zip(answer["joint_position"], self.own, strict=True)]
             request, strategy, number = answer["krl_ints"][:3]
             if self.obeys and number and number != self._finished and request in (1, 2):
                 self._finished = number

@@ -1,4 +1,4 @@
-"""How long files and functions are, for Python, C++ and JavaScript: `python3 -m coglab_bringup.code_size` lists the longest."""
+"""Lengths of files and functions (Python, C++, JavaScript); `python3 -m coglab_bringup.code_size` lists the longest."""
 
 from __future__ import annotations
 
@@ -12,7 +12,9 @@ SKIPPED = {"__pycache__", ".pytest_cache", ".ruff_cache", ".mypy_cache"}
 # What may stand before the brace of a function: a parameter list, then words like const, noexcept, an initialiser list.
 _FUNCTION = re.compile(r"\)\s*(const|noexcept|override|final|mutable|->\s*[\w:<>,&*\s]+|:\s.*)*\s*$", re.DOTALL)
 _NO_FUNCTION = re.compile(r"^\s*(if|for|while|switch|catch|else|do|return|namespace|class|struct|enum|union)\b")
-_PIECES = re.compile(r'//[^\n]*|/\*.*?\*/|R"\w*\((?:.|\n)*?\)\w*"|"(?:\\.|[^"\\\n])*"|\'(?:\\.|[^\'\\\n])*\'', re.DOTALL)
+_PIECES = re.compile(
+    r'//[^\n]*|/\*.*?\*/|R"\w*\((?:.|\n)*?\)\w*"|"(?:\\.|[^"\\\n])*"|\'(?:\\.|[^\'\\\n])*\'', re.DOTALL
+)
 
 
 def source_files(top: Path) -> Iterator[Path]:

@@ -1,4 +1,5 @@
-// The hand draws one circle in the plane across its pointing direction and comes back to where it began.
+// The hand draws one circle in the plane across its pointing direction and comes back to where it
+// began.
 #include <cmath>
 
 #include "coglab_controllers/motion/authored_controller.hpp"
@@ -33,7 +34,8 @@ class Circle : public Motion<> {
  private:
   Pose at(double time) const {
     const double u = std::min(time / all_, 1.0);
-    const double turned = 2.0 * M_PI * u * u * u * (10.0 - 15.0 * u + 6.0 * u * u);  // from rest to rest
+    const double turned =
+        2.0 * M_PI * u * u * u * (10.0 - 15.0 * u + 6.0 * u * u);  // from rest to rest
     const Vector3 way(0.0, r_ * std::sin(turned), r_ * (1.0 - std::cos(turned)));
     return {from_.position + from_.orientation * way, from_.orientation};
   }

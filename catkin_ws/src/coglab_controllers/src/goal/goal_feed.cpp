@@ -41,15 +41,15 @@ void GoalFeed::setSource(GoalSource* source) {
   source_ = source;
 }
 
-Answer GoalFeed::transform(const std::string& reference, const std::string& frame,
-                           const char* what, Pose& pose) {
+Answer GoalFeed::transform(const std::string& reference, const std::string& frame, const char* what,
+                           Pose& pose) {
   const std::lock_guard<std::mutex> lock(mutex_);
   GoalObservation seen;
   std::string why = "nothing provides frames";
   if (source_ == nullptr || !source_->lookup(reference, frame, seen, why)) {
-    return Answer::refusal(ReasonCode::UnknownName, "frame '" + frame + "' (" + what +
-                                                        ") is not known in '" + reference +
-                                                        "': " + why);
+    return Answer::refusal(
+        ReasonCode::UnknownName,
+        "frame '" + frame + "' (" + what + ") is not known in '" + reference + "': " + why);
   }
   pose = {seen.position, seen.orientation};
   return {};
@@ -65,9 +65,9 @@ Answer GoalFeed::first(const std::string& frame, GoalObservation& goal) {
   const bool known = source_->lookup(frame_, frame, goal, why);
   const double ahead = source_->ahead(frame);
   if (!known) {
-    return Answer::refusal(ahead > 0.0 ? ReasonCode::GoalFromFuture : ReasonCode::UnknownName,
-                           "goal frame '" + frame + "' is not known in '" + frame_ + "': " + why +
-                               aheadNote(ahead));
+    return Answer::refusal(
+        ahead > 0.0 ? ReasonCode::GoalFromFuture : ReasonCode::UnknownName,
+        "goal frame '" + frame + "' is not known in '" + frame_ + "': " + why + aheadNote(ahead));
   }
   if (!goal.position.allFinite() || !isUnit(goal.orientation)) {
     return invalid("goal frame '" + frame + "' has a pose that is not finite");

@@ -26,8 +26,7 @@ void OrientationTask::evaluate(const ChainState& state, const JointVector&,
   constraint.reject_whole = true;
   constraint.jacobian.topRows<3>() = state.jacobian.bottomRows<3>();
   constraint.velocity.head<3>() = reference.angular_velocity;
-  constraint.error.head<3>() =
-      rotationBetween(state.tool.orientation, reference.pose.orientation);
+  constraint.error.head<3>() = rotationBetween(state.tool.orientation, reference.pose.orientation);
   constraint.gain = gain_;
 }
 

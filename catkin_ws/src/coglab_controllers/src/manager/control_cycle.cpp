@@ -152,11 +152,11 @@ MotionState ControlCycle::motionState() const noexcept {
 bool ControlCycle::usable(const RobotSample& sample, double dt) noexcept {
   input_reason_.clear();
   if (!finite(sample)) {
-    input_reason_ = Reason(ReasonCode::StaleJointState,
-                           "the joint state holds a number that is not finite");
+    input_reason_ =
+        Reason(ReasonCode::StaleJointState, "the joint state holds a number that is not finite");
   } else if (!(dt > 0.0)) {
-    input_reason_ = Reason(ReasonCode::StaleJointState,
-                           "the joint state is not newer than the last one");
+    input_reason_ =
+        Reason(ReasonCode::StaleJointState, "the joint state is not newer than the last one");
   } else if (dt > settings_.sample_timeout) {
     input_reason_ = Reason(ReasonCode::StaleJointState, "no joint state for ") << dt << " s";
   }

@@ -116,15 +116,14 @@ Answer ControllerManager::load(const std::string& id, const std::string& type,
   {
     const std::lock_guard<std::mutex> lock(table_);
     if (find(id) != nullptr || loading_.count(id) != 0 || feedback_.manager().has(id)) {
-      return Answer::refusal(ReasonCode::InvalidArgument,
-                             "controller_id '" + id +
-                                 "' is in use; choose another id, or go on with the loaded one");
+      return Answer::refusal(
+          ReasonCode::InvalidArgument,
+          "controller_id '" + id + "' is in use; choose another id, or go on with the loaded one");
     }
     loading_.insert(id);
   }
   const bool motion = !libraryOf(type).empty() || MotionTypes::instance().find(type).controller;
-  const Answer answer =
-      motion ? loadMotion(id, type, attach, requests) : loadFeedback(id, type);
+  const Answer answer = motion ? loadMotion(id, type, attach, requests) : loadFeedback(id, type);
   const std::lock_guard<std::mutex> lock(table_);
   loading_.erase(id);
   return answer;
@@ -202,7 +201,7 @@ Answer ControllerManager::loadFeedback(const std::string& id, const std::string&
   } catch (const std::exception& error) {
     return Answer::refusal(ReasonCode::UnknownName,
                            "controller_type '" + type + "' is unknown; motion controllers: " +
-                           joined(types) + "; as a feedback controller: " + error.what());
+                               joined(types) + "; as a feedback controller: " + error.what());
   }
 }
 
@@ -237,15 +236,16 @@ Answer ControllerManager::unload(const std::string& id, const Detach& detach) {
     const auto found = std::find_if(motions_.begin(), motions_.end(),
                                     [&id](const auto& motion) { return motion->id == id; });
     if (found == motions_.end()) {
-      return Answer::refusal(ReasonCode::UnknownName, "controller_id '" + id +
-                                                          "' is not loaded; loaded: " +
-                                                          loadedMotions());
+      return Answer::refusal(
+          ReasonCode::UnknownName,
+          "controller_id '" + id + "' is not loaded; loaded: " + loadedMotions());
     }
     // As ordered, and as the cycle last told: a switch may not have come into effect yet.
     if (id == active_id_ || id == now.active.c_str()) {
       return Answer::refusal(ReasonCode::Busy,
-                             "'" + id + "' is the active controller; switch_controller to another "
-                             "one, or to '' for none, first");
+                             "'" + id +
+                                 "' is the active controller; switch_controller to another "
+                                 "one, or to '' for none, first");
     }
     gone = *found;
     motions_.erase(found);
@@ -342,9 +342,9 @@ void ControllerManager::active(std::string& id, std::string& type) const {
 
 Answer ControllerManager::setSpeedScale(double scale) {
   if (!std::isfinite(scale) || scale < 0.0 || scale > 1.0) {
-    return Answer::refusal(ReasonCode::OutOfRange,
-                           "speed_scale " + std::to_string(scale) +
-                           ": expected 0 (stand still) to 1 (as planned)");
+    return Answer::refusal(
+        ReasonCode::OutOfRange,
+        "speed_scale " + std::to_string(scale) + ": expected 0 (stand still) to 1 (as planned)");
   }
   cycle_.setSpeedScale(scale);
   return {};

@@ -23,10 +23,10 @@ Answer ControllerManager::motionWelcome(const std::string& controller_id,
                                "; call switch_controller with '" + controller_id + "' first");
   }
   if (now.fault) {
-    return Answer::refusal(ReasonCode::ControllerFault,
-                           "controller '" + controller_id + "' is at fault: " + now.reason.str() +
-                               "; call switch_controller with '" + controller_id +
-                               "' to start it afresh");
+    return Answer::refusal(ReasonCode::ControllerFault, "controller '" + controller_id +
+                                                            "' is at fault: " + now.reason.str() +
+                                                            "; call switch_controller with '" +
+                                                            controller_id + "' to start it afresh");
   }
   if (now.samples == 0) {
     return Answer::refusal(ReasonCode::StaleJointState,
@@ -34,9 +34,10 @@ Answer ControllerManager::motionWelcome(const std::string& controller_id,
   }
   const double age = 1e-9 * static_cast<double>(now_ns() - now.robot.stamp_ns);
   if (age > settings_.cycle.sample_timeout) {
-    return Answer::refusal(ReasonCode::StaleJointState,
-                           "the newest joint state is " + std::to_string(age) + " s old; allowed: " +
-                               std::to_string(settings_.cycle.sample_timeout) + " s");
+    return Answer::refusal(
+        ReasonCode::StaleJointState,
+        "the newest joint state is " + std::to_string(age) +
+            " s old; allowed: " + std::to_string(settings_.cycle.sample_timeout) + " s");
   }
   if (now.robot.block != MotionBlock::None) {
     return Answer::refusal(codeOf(now.robot.block),
@@ -82,8 +83,8 @@ CancelOrder ControllerManager::askCancel(const std::string& id, const std::strin
 bool ControllerManager::cancelEnded(const CancelOrder& order, CancelAnswer& answer) const {
   answer = CancelAnswer();
   if (order.cancel == nullptr) {
-    static_cast<Answer&>(answer) = Answer::refusal(
-        ReasonCode::UnknownName, "controller_id '" + order.id + "' is not loaded");
+    static_cast<Answer&>(answer) =
+        Answer::refusal(ReasonCode::UnknownName, "controller_id '" + order.id + "' is not loaded");
     return true;
   }
   // Asked before the report is read, which is then that of the cycle before the one that served it,

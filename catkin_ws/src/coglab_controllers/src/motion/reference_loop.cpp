@@ -80,11 +80,12 @@ void ReferenceLoop::resolve(const CycleInput& input, References& references) noe
   switch (reference_.space) {
     case Space::Rest:
       ik_result_.scale = 1.0;
-      hold_.resolve(input, references, [&](const ChainState& state, const JointVector& q,
-                                           const CartesianReference& to) {
-        ik_->solve(state, q, to, ik_result_);
-        return ik_result_.velocity;
-      });
+      hold_.resolve(
+          input, references,
+          [&](const ChainState& state, const JointVector& q, const CartesianReference& to) {
+            ik_->solve(state, q, to, ik_result_);
+            return ik_result_.velocity;
+          });
       break;
     case Space::Joint:
       resolveJoints(input, references);
@@ -167,8 +168,7 @@ double ReferenceLoop::allowedError() const noexcept {
 
 Reason ReferenceLoop::stuck(const CycleInput& input) const noexcept {
   if (reference_.space == Space::Pose) return Arrival::handStuck(error(input));
-  return Reason(ReasonCode::TargetNotReached,
-                "the arm does not reach the target: is it blocked?");
+  return Reason(ReasonCode::TargetNotReached, "the arm does not reach the target: is it blocked?");
 }
 
 }  // namespace coglab_controllers

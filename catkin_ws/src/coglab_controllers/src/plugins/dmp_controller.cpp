@@ -75,7 +75,8 @@ void DmpController::configure(const MotionSetup& setup) {
   if (!answer.success) throw std::runtime_error(answer.message);
 }
 
-// ---- the control thread --------------------------------------------------------------------------
+// ---- the control thread
+// --------------------------------------------------------------------------
 
 Reason DmpController::unwelcome(const DmpPlan& plan) const {
   if (plan.execute || stage() == RunnerStage::Moving) return {};
@@ -94,7 +95,8 @@ void DmpController::resolve(const CycleInput& input, References& references) {
   if (ikDebug() && cycle_->loopClosed()) debug_.push(cycle_->debug(input, loop().ik()));
 }
 
-// ---- requests ------------------------------------------------------------------------------------
+// ---- requests
+// ------------------------------------------------------------------------------------
 
 Answer DmpController::loadDmps(const std::string& filename, int& loaded) {
   loaded = 0;
@@ -191,11 +193,11 @@ Answer DmpController::checkReach(const DmpPlan& plan) const {
   const Vector3 hand = setup().robot->chain.evaluate(robot.commanded_position).tool.position;
   const double distance = (start - hand).norm();
   if (distance > max_initial_distance_) {
-    return Answer::refusal(
-        ReasonCode::OutOfRange,
-        "initial_position is " + std::to_string(distance) + " m from the hand at " + text(hand) +
-            "; allowed: " + std::to_string(max_initial_distance_) +
-            " m (max_initial_distance); use initial_state CURRENT");
+    return Answer::refusal(ReasonCode::OutOfRange,
+                           "initial_position is " + std::to_string(distance) +
+                               " m from the hand at " + text(hand) +
+                               "; allowed: " + std::to_string(max_initial_distance_) +
+                               " m (max_initial_distance); use initial_state CURRENT");
   }
   if (plan.initial_velocity.norm() > kFastestStart) {
     return Answer::refusal(ReasonCode::OutOfRange,

@@ -55,8 +55,7 @@ Pose HandGoal::at(const GoalObservation& goal) const noexcept {
   if (!in_goal_frame) return {goal.position + offset, orientation};
   Pose pose;
   pose.position = goal.position + goal.orientation * offset;
-  pose.orientation =
-      keep_orientation ? orientation : (goal.orientation * orientation).normalized();
+  pose.orientation = keep_orientation ? orientation : (goal.orientation * orientation).normalized();
   return pose;
 }
 
@@ -74,7 +73,8 @@ void DmpCycle::configure(MotionConfiguration& configuration) {
   motion_ = CartesianMotion(readEstimator(parameters), readEnd(parameters));
 }
 
-// ---- begin and end -------------------------------------------------------------------------------
+// ---- begin and end
+// -------------------------------------------------------------------------------
 
 void DmpCycle::start(const MotionStart<DmpPlan>& start) {
   const DmpPlan& plan = start.request;
@@ -122,8 +122,7 @@ void DmpCycle::execute(const MotionStart<DmpPlan>& start) {
   gate_ = GoalGate(plan.hand.in_goal_frame ? frame_gate_ : topic_gate_);
   gate_.reset(plan.goal);
   bool projected = false;
-  motion_.start(plan.motion, pose, velocity, angular,
-                inWorkspace(hand_.at(plan.goal), projected));
+  motion_.start(plan.motion, pose, velocity, angular, inWorkspace(hand_.at(plan.goal), projected));
   reference_.pose = pose;
   jumps_ = plan.given;
 }
@@ -155,7 +154,8 @@ MotionState DmpCycle::state() const {
   return MotionState::Idle;
 }
 
-// ---- the goal ------------------------------------------------------------------------------------
+// ---- the goal
+// ------------------------------------------------------------------------------------
 
 Pose DmpCycle::inWorkspace(const Pose& hand_in_dmp, bool& projected) const {
   const Pose hand = base_from_dmp_ * hand_in_dmp;
@@ -217,7 +217,8 @@ void DmpCycle::judgeGoal() {
   }
 }
 
-// ---- the cycle -----------------------------------------------------------------------------------
+// ---- the cycle
+// -----------------------------------------------------------------------------------
 
 void DmpCycle::computeReference(const MotionCycle& cycle, MotionReference& reference) {
   if (stage_ == DmpStage::Settle) comeToRest(cycle.last);
@@ -278,7 +279,8 @@ void DmpCycle::write(MotionReference& reference, double dt) {
   reference.share = std::clamp(1.0 - (since_reached_ - kRestTime) / kFadeTime, 0.0, 1.0);
 }
 
-// ---- what it tells -------------------------------------------------------------------------------
+// ---- what it tells
+// -------------------------------------------------------------------------------
 
 DmpProgress DmpCycle::progress(std::int64_t stamp_ns, MotionState state,
                                const Reason& reason) const {

@@ -69,8 +69,7 @@ RunnerPolicy policy() {
 
 }  // namespace
 
-PtpController::PtpController()
-    : MotionRunner<PtpTarget>(std::make_unique<PtpMotion>(), policy()) {}
+PtpController::PtpController() : MotionRunner<PtpTarget>(std::make_unique<PtpMotion>(), policy()) {}
 
 void PtpController::configure(const MotionSetup& setup) {
   if (setup.robot->chain.joints() != kMaxJoints) {
@@ -88,8 +87,8 @@ Answer PtpController::readTarget(const PtpRequest& request, PtpTarget& target) c
   const coglab_rt::JointLimits& limits = setup().robot->limits;
   const Chain& chain = setup().robot->chain;
   const std::vector<std::string>& names = chain.jointNames();
-  // The guard lets nothing beyond its margin; a target on that border would be reached only where no
-  // noise of measurement crosses it.
+  // The guard lets nothing beyond its margin; a target on that border would be reached only where
+  // no noise of measurement crosses it.
   const JointVector margin =
       JointVector::Constant(setup().robot->guard.position_margin + tolerance_);
   const JointVector least = JointVector::Constant(1e-4);

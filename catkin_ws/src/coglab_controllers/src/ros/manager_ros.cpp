@@ -43,9 +43,10 @@ ManagerRos::ManagerRos(const ros::NodeHandle& node, coglab_rt::ArmMailboxes& mai
   settings.logger = logger_.get();
   options_.thread.priority = node_.param("priority", options_.thread.priority);
   if (options_.thread.priority > options_.highest_priority) {
-    ROS_WARN("controller_manager: priority %d is kept to %d, below that of the FRI thread "
-             "(lwr/rt_priority)",
-             options_.thread.priority, options_.highest_priority);
+    ROS_WARN(
+        "controller_manager: priority %d is kept to %d, below that of the FRI thread "
+        "(lwr/rt_priority)",
+        options_.thread.priority, options_.highest_priority);
     options_.thread.priority = options_.highest_priority;
   }
   manager_ = std::make_unique<ControllerManager>(std::move(settings));
@@ -184,9 +185,9 @@ bool ManagerRos::onLoad(coglab_msgs::LoadController::Request& request,
 bool ManagerRos::onUnload(coglab_msgs::UnloadController::Request& request,
                           coglab_msgs::UnloadController::Response& response) {
   const std::string& id = request.controller_id;
-  const Answer answer = manager_->unload(id, [this, &id](std::shared_ptr<const LoadedMotion> motion) {
-    detach(id, std::move(motion));
-  });
+  const Answer answer = manager_->unload(
+      id,
+      [this, &id](std::shared_ptr<const LoadedMotion> motion) { detach(id, std::move(motion)); });
   response.success = answer.success;
   response.reason_code = answer.number();
   response.message = answer.message;
@@ -301,8 +302,8 @@ void ManagerRos::publishTarget(const CycleReport& report) {
 void ManagerRos::publishStatus(const CycleReport& report) {
   coglab_msgs::ControllerStatus message;
   manager_->active(message.active_controller, message.active_type);
-  const Reason reason = stalled_.empty() ? report.reason
-                                         : Reason(ReasonCode::CycleStalled, stalled_.c_str());
+  const Reason reason =
+      stalled_.empty() ? report.reason : Reason(ReasonCode::CycleStalled, stalled_.c_str());
   message.state = stalled_.empty() ? nameOf(report.state) : "fault";
   message.standing = stalled_.empty() && report.standing;
   message.reason_code = reason.number();
@@ -310,11 +311,10 @@ void ManagerRos::publishStatus(const CycleReport& report) {
   message.plan_generation = report.generation;
   message.speed_scale = report.speed_scale;
   const coglab_msgs::ControllerStatus& last = status_shown_;
-  const bool same = message.active_controller == last.active_controller &&
-                    message.state == last.state && message.standing == last.standing &&
-                    message.reason_code == last.reason_code &&
-                    message.plan_generation == last.plan_generation &&
-                    message.speed_scale == last.speed_scale;
+  const bool same =
+      message.active_controller == last.active_controller && message.state == last.state &&
+      message.standing == last.standing && message.reason_code == last.reason_code &&
+      message.plan_generation == last.plan_generation && message.speed_scale == last.speed_scale;
   // Numbers in a sentence change all the time.
   const std::int64_t now = steadyNow();
   const bool words = message.reason != last.reason &&

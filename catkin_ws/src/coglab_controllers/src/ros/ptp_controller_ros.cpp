@@ -43,7 +43,8 @@ class PtpControllerRos : public MotionControllerRos {
 
  private:
   bool onAdd(coglab_msgs::AddPtp::Request& request, coglab_msgs::AddPtp::Response& response) {
-    const MotionAnswer answer = controller_->add({request.position, request.max_vel, request.max_acc});
+    const MotionAnswer answer =
+        controller_->add({request.position, request.max_vel, request.max_acc});
     response.status = answer.status;
     response.ptp_id = answer.id;
     response.success = answer.success;

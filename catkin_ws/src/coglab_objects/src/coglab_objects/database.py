@@ -1,5 +1,6 @@
 """Object database: one YAML file per object, checked against a JSON schema and against itself, reloaded
 without a restart."""
+
 from __future__ import annotations
 
 import json
@@ -90,9 +91,14 @@ def cell_parameters(entry: dict[str, Any]) -> dict[str, Any]:
     """What the simulated cell needs of an entry, by the names of its parameters below ``object/``.
 
     The object frame lies in the middle of the underside, so the middle of the solid is half of its height above."""
-    return {"id": entry["id"], "mass": float(entry["mass"]), "shape": entry["shape"]["type"],
-            "size": [float(v) for v in entry["size"]], "center": [0.0, 0.0, float(entry["size"][2]) / 2],
-            "friction": float(entry["friction"])}
+    return {
+        "id": entry["id"],
+        "mass": float(entry["mass"]),
+        "shape": entry["shape"]["type"],
+        "size": [float(v) for v in entry["size"]],
+        "center": [0.0, 0.0, float(entry["size"][2]) / 2],
+        "friction": float(entry["friction"]),
+    }
 
 
 @dataclass
@@ -172,8 +178,9 @@ class ObjectDatabase:
         with self._lock:
             good = self._good()
         if object_id not in good:
-            raise ObjectError(f"object '{object_id[:40]}' is not in the database; it has: "
-                              f"{', '.join(sorted(good)) or 'no objects'}")
+            raise ObjectError(
+                f"object '{object_id[:40]}' is not in the database; it has: {', '.join(sorted(good)) or 'no objects'}"
+            )
         return good[object_id]
 
     def get(self, object_id: str) -> dict[str, Any]:

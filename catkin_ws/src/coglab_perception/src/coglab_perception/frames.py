@@ -35,8 +35,7 @@ class FrameNames:
     def is_tracked(self, frame: str) -> bool:
         """Whether a tracker shows this frame: the partner's hand, or an object's."""
         before, _, after = self.object.partition("{id}")
-        is_object = (frame.startswith(before) and frame.endswith(after)
-                     and len(frame) > len(before) + len(after))
+        is_object = frame.startswith(before) and frame.endswith(after) and len(frame) > len(before) + len(after)
         return frame == self.human_hand or is_object
 
     @staticmethod
@@ -44,20 +43,24 @@ class FrameNames:
         """From the parameter, or any mapping. FramesError names what is missing, unknown or empty."""
         roles = [f.name for f in fields(FrameNames)]
         if not isinstance(data, Mapping):
-            raise FramesError(f"{source}: expected a mapping with {', '.join(roles)}: load "
-                              "coglab_perception/config/frames.yaml there")
+            raise FramesError(
+                f"{source}: expected a mapping with {', '.join(roles)}: load coglab_perception/config/frames.yaml there"
+            )
         missing = [role for role in roles if not (isinstance(data.get(role), str) and data[role])]
         unknown = sorted(set(map(str, data)) - set(roles))
         if missing or unknown:
-            raise FramesError(f"{source}: missing: {', '.join(missing) or 'none'}; unknown: "
-                              f"{', '.join(unknown) or 'none'}; expected {', '.join(roles)}")
+            raise FramesError(
+                f"{source}: missing: {', '.join(missing) or 'none'}; unknown: "
+                f"{', '.join(unknown) or 'none'}; expected {', '.join(roles)}"
+            )
         if "{id}" not in data["object"]:
             raise FramesError(f"{source}: object is '{data['object']}'; it must contain {{id}}")
         names = [data[role] for role in roles]
         slashed = [name for name in names if name.startswith("/")]
         if slashed or len(set(names)) < len(names):
-            raise FramesError(f"{source}: tf2 frames differ from each other and have no leading "
-                              f"slash; got {', '.join(names)}")
+            raise FramesError(
+                f"{source}: tf2 frames differ from each other and have no leading slash; got {', '.join(names)}"
+            )
         return FrameNames(**{role: data[role] for role in roles})
 
     @staticmethod

@@ -3,6 +3,7 @@
 Rabiner (1989), scaled forward-backward; the chain can stay in a state or go on to the next one. Plain numpy, because a
 model of five states needs nothing more.
 """
+
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
@@ -28,10 +29,12 @@ class LeftRightHmm:
         self.variance = np.atleast_2d(np.asarray(self.variance, dtype=float))
         n = len(self.stay)
         if self.mean.shape != self.variance.shape or len(self.mean) != n or n < 1:
-            raise ValueError(f"stay has {n} states, mean {self.mean.shape}, variance {self.variance.shape}: "
-                             "sizes differ")
-        if not (np.all(np.isfinite(self.mean)) and np.all(self.variance > 0)
-                and np.all((self.stay >= 0) & (self.stay <= 1))):
+            raise ValueError(
+                f"stay has {n} states, mean {self.mean.shape}, variance {self.variance.shape}: sizes differ"
+            )
+        if not (
+            np.all(np.isfinite(self.mean)) and np.all(self.variance > 0) and np.all((self.stay >= 0) & (self.stay <= 1))
+        ):
             raise ValueError("means must be finite, variances positive, probabilities to stay within 0..1")
 
     @property
@@ -59,8 +62,9 @@ class LeftRightHmm:
         return alpha.log_likelihood
 
     @staticmethod
-    def train(sequences: Sequence[np.ndarray], states: int = 5, iterations: int = 40,
-              tolerance: float = 1e-4) -> LeftRightHmm:
+    def train(
+        sequences: Sequence[np.ndarray], states: int = 5, iterations: int = 40, tolerance: float = 1e-4
+    ) -> LeftRightHmm:
         """Baum-Welch over several sequences (T_i, d), started from equal shares of each sequence.
 
         ValueError if a sequence is shorter than the number of states or not finite.
@@ -69,11 +73,15 @@ class LeftRightHmm:
         for i, s in enumerate(data):
             if s.ndim != 2 or len(s) < states or not np.all(np.isfinite(s)):
                 raise ValueError(f"sequence {i} has shape {s.shape}; expected at least {states} finite frames")
-        parts = [np.concatenate([s[len(s) * k // states:len(s) * (k + 1) // states] for s in data])
-                 for k in range(states)]
+        parts = [
+            np.concatenate([s[len(s) * k // states : len(s) * (k + 1) // states] for s in data]) for k in range(states)
+        ]
         length = float(np.mean([len(s) for s in data])) / states
-        model = LeftRightHmm(np.full(states, 1.0 - 1.0 / max(length, 1.5)), np.array([p.mean(axis=0) for p in parts]),
-                             np.array([p.var(axis=0) + VARIANCE_FLOOR for p in parts]))
+        model = LeftRightHmm(
+            np.full(states, 1.0 - 1.0 / max(length, 1.5)),
+            np.array([p.mean(axis=0) for p in parts]),
+            np.array([p.var(axis=0) + VARIANCE_FLOOR for p in parts]),
+        )
         last = -np.inf
         for _ in range(iterations):
             model, score = model._reestimate(data)

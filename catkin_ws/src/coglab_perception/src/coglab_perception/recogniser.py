@@ -5,6 +5,7 @@ over the patterns comes from the models' forward filters; 'unknown' where even t
 A decision needs a confident posterior for several frames, and is kept until another pattern has been as confident for
 as long, or the reach has been over for a while.
 """
+
 from __future__ import annotations
 
 import json
@@ -194,19 +195,25 @@ class Recogniser:
         return Estimate(shown, probabilities[shown], decided, self._filters[best].progress(), probabilities)
 
 
-def train_patterns(demonstrations: Mapping[str, Sequence[tuple[np.ndarray, np.ndarray]]],
-                   settings: RecogniserSettings = RecogniserSettings(), states: int = 5) -> list[Pattern]:
+def train_patterns(
+    demonstrations: Mapping[str, Sequence[tuple[np.ndarray, np.ndarray]]],
+    settings: RecogniserSettings = RecogniserSettings(),
+    states: int = 5,
+) -> list[Pattern]:
     """One pattern per name from demonstrations [(stamps (T,), positions (T, 3)), ...].
 
     The floor is the mean less five standard deviations of the log-likelihood per frame over the demonstrations.
     """
     patterns = []
     for name, recordings in demonstrations.items():
-        sequences = [f for stamps, positions in recordings
-                     if len(f := reach_features(stamps, positions, settings)) > states]
+        sequences = [
+            f for stamps, positions in recordings if len(f := reach_features(stamps, positions, settings)) > states
+        ]
         if len(sequences) < 2:
-            raise ValueError(f"pattern '{name}': {len(sequences)} usable demonstrations; at least 2 are needed, "
-                             f"each with a rest before the reach and more than {states} frames of motion")
+            raise ValueError(
+                f"pattern '{name}': {len(sequences)} usable demonstrations; at least 2 are needed, "
+                f"each with a rest before the reach and more than {states} frames of motion"
+            )
         model = LeftRightHmm.train(sequences, states)
         per_frame = np.array([model.log_likelihood(s) / len(s) for s in sequences])
         patterns.append(Pattern(name, model, float(per_frame.mean() - 5.0 * per_frame.std() - 1.0)))
@@ -228,8 +235,12 @@ def reach_features(stamps: np.ndarray, positions: np.ndarray, settings: Recognis
 
 def save_patterns(path: str, patterns: Sequence[Pattern], settings: RecogniserSettings, source: str) -> None:
     """Write a pattern file (JSON)."""
-    data = {"version": FILE_VERSION, "source": source, "settings": asdict(settings),
-            "patterns": [{"name": p.name, "floor": p.floor, **p.model.to_dict()} for p in patterns]}
+    data = {
+        "version": FILE_VERSION,
+        "source": source,
+        "settings": asdict(settings),
+        "patterns": [{"name": p.name, "floor": p.floor, **p.model.to_dict()} for p in patterns],
+    }
     Path(path).write_text(json.dumps(data, indent=1) + "\n", encoding="utf-8")
 
 

@@ -1,4 +1,5 @@
 """tf2 listener for nodes in Python that stand whatever stamp a transform has."""
+
 from __future__ import annotations
 
 import rospy
@@ -24,15 +25,20 @@ class TfListener(tf2_ros.TransformListener):
 
     def callback(self, data: TFMessage) -> None:
         limit = min(rospy.get_time() + AHEAD, LARGEST)
-        data.transforms = [each for each in data.transforms
-                           if 0.0 <= each.header.stamp.to_sec() <= limit and self._allowed(each)]
+        data.transforms = [
+            each for each in data.transforms if 0.0 <= each.header.stamp.to_sec() <= limit and self._allowed(each)
+        ]
         self._moving.update(each.child_frame_id for each in data.transforms)
         super().callback(data)
 
     def static_callback(self, data: TFMessage) -> None:
-        data.transforms = [each for each in data.transforms
-                           if 0.0 <= each.header.stamp.to_sec() < LARGEST and self._allowed(each)
-                           and each.child_frame_id not in self._moving]
+        data.transforms = [
+            each
+            for each in data.transforms
+            if 0.0 <= each.header.stamp.to_sec() < LARGEST
+            and self._allowed(each)
+            and each.child_frame_id not in self._moving
+        ]
         super().static_callback(data)
 
     def _allowed(self, transform: TransformStamped) -> bool:

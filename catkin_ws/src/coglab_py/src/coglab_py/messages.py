@@ -1,4 +1,5 @@
 """Poses from and to geometry_msgs."""
+
 from __future__ import annotations
 
 from typing import Any

@@ -1,4 +1,5 @@
 """Where the files of the packages are, in the source tree and in an install space alike."""
+
 from __future__ import annotations
 
 from pathlib import Path

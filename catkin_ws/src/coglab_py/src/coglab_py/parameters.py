@@ -1,4 +1,5 @@
 """ROS parameters of a type and range, read once when a node starts. What does not fit is said in one sentence."""
+
 from __future__ import annotations
 
 import math
@@ -14,8 +15,14 @@ class ParameterError(ValueError):
     """A parameter cannot be used; the sentence names it, what was expected and what came."""
 
 
-def read(name: str, kind: type[T], default: T | None = None, low: float = -math.inf, high: float = math.inf,
-         among: Sequence[str] = ()) -> T:
+def read(
+    name: str,
+    kind: type[T],
+    default: T | None = None,
+    low: float = -math.inf,
+    high: float = math.inf,
+    among: Sequence[str] = (),
+) -> T:
     """A parameter of this type: bool, int, float, str or dict. A whole number is a float, too.
 
     ``default`` is taken where there is none; without one the parameter has to be there. Numbers lie in low..high, a
@@ -35,8 +42,9 @@ def found_above(name: str, kind: type[T]) -> T | None:
     return None if found is None else read(found, kind)
 
 
-def checked(name: str, value: Any, kind: type[T], low: float = -math.inf, high: float = math.inf,
-            among: Sequence[str] = ()) -> T:
+def checked(
+    name: str, value: Any, kind: type[T], low: float = -math.inf, high: float = math.inf, among: Sequence[str] = ()
+) -> T:
     """``value`` if it has this type and lies in this range; ParameterError otherwise."""
     wanted = _wanted(kind, low, high, among)
     if value is None:
@@ -54,10 +62,13 @@ def checked(name: str, value: Any, kind: type[T], low: float = -math.inf, high: 
 def checked_numbers(name: str, value: Any, length: int = 0) -> list[float]:
     """``value`` if it is a list of finite numbers of that length (0: any); ParameterError otherwise."""
     good = isinstance(value, (list, tuple)) and all(
-        isinstance(v, (int, float)) and not isinstance(v, bool) and math.isfinite(v) for v in value)
+        isinstance(v, (int, float)) and not isinstance(v, bool) and math.isfinite(v) for v in value
+    )
     if not good or (length and len(value) != length):
-        raise ParameterError(f"parameter {name}: expected a list of {f'{length} ' if length else ''}finite numbers, "
-                             f"got {str(value)[:60]!r}")
+        raise ParameterError(
+            f"parameter {name}: expected a list of {f'{length} ' if length else ''}finite numbers, "
+            f"got {str(value)[:60]!r}"
+        )
     return [float(v) for v in value]
 
 

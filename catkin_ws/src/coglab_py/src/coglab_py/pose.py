@@ -1,4 +1,5 @@
 """Poses of rigid frames: a position (m) and a unit quaternion (x y z w), turned by scipy's Rotation."""
+
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
@@ -68,8 +69,7 @@ class Pose:
 
     def to_dict(self) -> dict[str, list[float]]:
         """Plain lists, as user data and files hold it."""
-        return {"xyz": [float(v) for v in self.position],
-                "quaternion": [float(v) for v in self.orientation]}
+        return {"xyz": [float(v) for v in self.position], "quaternion": [float(v) for v in self.orientation]}
 
     @staticmethod
     def from_dict(data: Mapping[str, Any]) -> Pose:

@@ -2,6 +2,7 @@
 
 Stricter than YAML: no aliases, no field twice, no deep nesting, numbers and texts that ROS can carry.
 """
+
 from __future__ import annotations
 
 import math
@@ -67,8 +68,10 @@ class Document:
 
     def check(self, schema: Mapping[str, Any]) -> None:
         """YamlError with the first thing that does not fit a JSON schema (draft 7), or that ROS cannot carry."""
-        errors = sorted(jsonschema.Draft7Validator(schema).iter_errors(self.value),
-                        key=lambda e: (len(e.absolute_path), str(e.absolute_path)))
+        errors = sorted(
+            jsonschema.Draft7Validator(schema).iter_errors(self.value),
+            key=lambda e: (len(e.absolute_path), str(e.absolute_path)),
+        )
         if errors:
             deepest = jsonschema.exceptions.best_match(errors)
             raise YamlError(self.sentence(tuple(deepest.absolute_path), deepest.message))

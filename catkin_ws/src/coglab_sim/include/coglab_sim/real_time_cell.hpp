@@ -39,8 +39,8 @@ class RealTimeCell {
   /// @param factor  simulated over real time, 0.01 .. 100
   /// @param source_port  from which the controller sends, 0: any free one
   /// @throws what Cell and FriSocket throw, std::invalid_argument for the factor
-  RealTimeCell(const CellConfig& config, const std::string& host, std::uint16_t port,
-               double factor, std::uint16_t source_port = 0);
+  RealTimeCell(const CellConfig& config, const std::string& host, std::uint16_t port, double factor,
+               std::uint16_t source_port = 0);
   ~RealTimeCell();
   RealTimeCell(const RealTimeCell&) = delete;
   RealTimeCell& operator=(const RealTimeCell&) = delete;

@@ -1,4 +1,5 @@
 """How the virtual human gives: place the object into the robot's palm, hold on, let go."""
+
 from __future__ import annotations
 
 import numpy as np

@@ -1,4 +1,5 @@
 """What a hand does without its owner's will."""
+
 from __future__ import annotations
 
 import numpy as np

@@ -2,6 +2,7 @@
 
 The figures are plausible defaults from the handover literature, not validated against a population.
 """
+
 from __future__ import annotations
 
 from collections.abc import Mapping
@@ -10,8 +11,18 @@ from typing import Any
 
 import numpy as np
 
-BEHAVIOURS = ("normal", "slow", "hesitant", "early_release", "never_release", "pull_back", "change_side", "absent",
-              "tug", "early_contact")
+BEHAVIOURS = (
+    "normal",
+    "slow",
+    "hesitant",
+    "early_release",
+    "never_release",
+    "pull_back",
+    "change_side",
+    "absent",
+    "tug",
+    "early_contact",
+)
 
 
 @dataclass(frozen=True)
@@ -60,7 +71,8 @@ class Participant:
         """The person with this seed."""
         rng = np.random.default_rng([seed, 17])
         return Participant(
-            seed=seed, behaviour=behaviour,
+            seed=seed,
+            behaviour=behaviour,
             reaction_median=float(np.clip(0.35 * np.exp(rng.normal(0, 0.15)), 0.2, 0.7)),
             reach_time=float(np.clip(1.1 * np.exp(rng.normal(0, 0.10)), 0.8, 1.5)),
             point_offset=(float(rng.normal(0, 0.008)), float(rng.normal(0, 0.02)), float(rng.normal(0, 0.02))),
@@ -69,7 +81,8 @@ class Participant:
             press=float(rng.uniform(0.005, 0.008)),
             release_share=float(np.clip(rng.normal(0.3, 0.1), 0.1, 0.6)),
             release_delay=float(rng.uniform(0.05, 0.2)),
-            grip_force=float(rng.uniform(9, 16)))
+            grip_force=float(rng.uniform(9, 16)),
+        )
 
     @staticmethod
     def from_mapping(data: Mapping[str, Any]) -> Participant:
@@ -77,8 +90,9 @@ class Participant:
         known = {f.name for f in fields(Participant)}
         unknown = sorted(set(data) - known)
         if unknown:
-            raise ValueError(f"participant file: unknown fields {', '.join(unknown)}; known: "
-                             f"{', '.join(sorted(known))}")
+            raise ValueError(
+                f"participant file: unknown fields {', '.join(unknown)}; known: {', '.join(sorted(known))}"
+            )
         drawn = asdict(Participant.draw(int(data.get("seed", 0)), str(data.get("behaviour", "normal"))))
         drawn.update({k: tuple(v) if isinstance(v, list) else v for k, v in data.items()})
         return Participant(**drawn)

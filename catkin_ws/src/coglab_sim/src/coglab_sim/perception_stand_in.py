@@ -4,6 +4,7 @@ Rate and its jitter, latency (stamp = capture time, delivered later), noise that
 of dropout (two-state Gilbert model), occlusion by the robot's hand, identity swaps. Each can be switched off;
 ``perfect`` delivers the truth as it is at the same rate.
 """
+
 from __future__ import annotations
 
 import heapq
@@ -50,8 +51,9 @@ class PerceptionSettings:
         known = {f.name for f in fields(PerceptionSettings)}
         unknown = sorted(set(data) - known)
         if unknown:
-            raise ValueError(f"perception settings: unknown fields {', '.join(unknown)}; known: "
-                             f"{', '.join(sorted(known))}")
+            raise ValueError(
+                f"perception settings: unknown fields {', '.join(unknown)}; known: {', '.join(sorted(known))}"
+            )
         return PerceptionSettings(**{k: tuple(v) if isinstance(v, list) else v for k, v in data.items()})
 
 
@@ -106,8 +108,12 @@ class Tracker:
             self._lost = self.rng.random() >= s.dropout_end
         elif s.dropout_start > 0.0:
             self._lost = self.rng.random() < s.dropout_start
-        hidden = (s.occlusion_distance > 0.0 and robot_hand is not None and self.rng.random() < 0.5
-                  and np.linalg.norm(robot_hand.position - truth.position) < s.occlusion_distance)
+        hidden = (
+            s.occlusion_distance > 0.0
+            and robot_hand is not None
+            and self.rng.random() < 0.5
+            and np.linalg.norm(robot_hand.position - truth.position) < s.occlusion_distance
+        )
         noise = self._noise_step(now)
         turned = Rotation.from_rotvec(noise[3:]) * truth.rotation
         seen = Pose(truth.position + noise[:3] + self._swapped(), turned.as_quat())
@@ -150,5 +156,8 @@ class Board:
 
     def free(self, occupied: list[np.ndarray], clearance: float = 0.10) -> list[str]:
         """Slots farther than ``clearance`` m from every object (world positions), best first."""
-        return [name for name, place in self.slots.items()
-                if all(np.linalg.norm(self.frame.apply(place) - o) > clearance for o in occupied)]
+        return [
+            name
+            for name, place in self.slots.items()
+            if all(np.linalg.norm(self.frame.apply(place) - o) > clearance for o in occupied)
+        ]

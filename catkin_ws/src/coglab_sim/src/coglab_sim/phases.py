@@ -1,4 +1,5 @@
 """What the phases of the virtual human share: the state that VirtualHuman makes, and how a phase ends."""
+
 from __future__ import annotations
 
 import numpy as np

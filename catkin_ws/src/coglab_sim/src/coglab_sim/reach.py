@@ -4,6 +4,7 @@ Minimum jerk: Flash and Hogan's fifth-order polynomial. Decoupled: the vertical 
 horizontal one. Conic: the same timing along an ellipse arc, as unconstrained handovers show. Corrections on the way are
 superposed.
 """
+
 from __future__ import annotations
 
 from dataclasses import dataclass

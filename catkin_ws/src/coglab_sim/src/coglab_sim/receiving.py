@@ -1,4 +1,5 @@
 """How the virtual human takes an object: close the last way, grip, lift until the robot lets go."""
+
 from __future__ import annotations
 
 import numpy as np

@@ -40,8 +40,7 @@ class Track:
     def at(self, t: float) -> Pose:
         """The frame at time t (s of the recording), interpolated; the ends are held."""
         t = min(max(t, float(self.stamps[0])), float(self.stamps[-1]))
-        i = min(max(int(np.searchsorted(self.stamps, t, side="right")) - 1, 0),
-                max(0, len(self.stamps) - 2))
+        i = min(max(int(np.searchsorted(self.stamps, t, side="right")) - 1, 0), max(0, len(self.stamps) - 2))
         j = min(i + 1, len(self.stamps) - 1)
         span = float(self.stamps[j] - self.stamps[i])
         share = (t - float(self.stamps[i])) / span if span > 0.0 else 0.0
@@ -63,15 +62,17 @@ class Recording:
         return max(float(track.stamps[-1]) for track in self.tracks.values())
 
 
-def load_recording(path: str, frame: str = "human_hand", world: str = "world",
-                   topic: str = "/tf") -> Recording:
+def load_recording(path: str, frame: str = "human_hand", world: str = "world", topic: str = "/tf") -> Recording:
     """Read a .csv, .npz or .bag file.
 
     `frame` names the track of a file that does not name its own; `world` is the parent frame, and
     `topic` the topic, of transforms in a bag. Raises RecordingError.
     """
-    readers = {".csv": lambda: _read_csv(path, frame), ".npz": lambda: _read_npz(path, frame),
-               ".bag": lambda: _read_bag(path, world, topic)}
+    readers = {
+        ".csv": lambda: _read_csv(path, frame),
+        ".npz": lambda: _read_npz(path, frame),
+        ".bag": lambda: _read_bag(path, world, topic),
+    }
     kind = Path(path).suffix.lower()
     if kind not in readers:
         raise RecordingError(f"{path}: a recording is a .csv, .npz or .bag file, got '{kind}'")
@@ -81,8 +82,7 @@ def load_recording(path: str, frame: str = "human_hand", world: str = "world",
     if not samples:
         raise RecordingError(f"{path}: no samples in it")
     begin = min(track[0][0] for track in samples.values())
-    return Recording({name: _track(f"{path}: frame '{name}'", rows, begin)
-                      for name, rows in samples.items()})
+    return Recording({name: _track(f"{path}: frame '{name}'", rows, begin) for name, rows in samples.items()})
 
 
 Rows = dict[str, list[tuple[float, ...]]]
@@ -92,16 +92,17 @@ Rows = dict[str, list[tuple[float, ...]]]
 def _track(where: str, rows: list[tuple[float, ...]], begin: float) -> Track:
     data = np.array(rows, dtype=float)
     if not np.all(np.isfinite(data)):
-        raise RecordingError(f"{where}: sample {int(np.argmin(np.isfinite(data).all(axis=1))) + 1} "
-                             "is not finite")
+        raise RecordingError(f"{where}: sample {int(np.argmin(np.isfinite(data).all(axis=1))) + 1} is not finite")
     falls = np.flatnonzero(np.diff(data[:, 0]) <= 0.0)
     if len(falls):
         raise RecordingError(f"{where}: time must increase, sample {int(falls[0]) + 2} does not")
     lengths = np.linalg.norm(data[:, 4:], axis=1)
     if np.any(np.abs(lengths - 1.0) > 0.05):
-        raise RecordingError(f"{where}: sample {int(np.argmax(np.abs(lengths - 1.0))) + 1} has a "
-                             f"quaternion of length {lengths[np.argmax(np.abs(lengths - 1.0))]:.2f}"
-                             ", expected 1 (x y z w)")
+        raise RecordingError(
+            f"{where}: sample {int(np.argmax(np.abs(lengths - 1.0))) + 1} has a "
+            f"quaternion of length {lengths[np.argmax(np.abs(lengths - 1.0))]:.2f}"
+            ", expected 1 (x y z w)"
+        )
     return Track(data[:, 0] - begin, data[:, 1:4], data[:, 4:] / lengths[:, None])
 
 
@@ -112,8 +113,9 @@ def _read_csv(path: str, frame: str) -> Rows:
         names = [name.strip() for name in reader.fieldnames or []]
         missing = [name for name in ("t", "x", "y", "z") if name not in names]
         if missing:
-            raise RecordingError(f"{path}:1: the header must name t,x,y,z[,qx,qy,qz,qw][,frame]; "
-                                 f"missing: {', '.join(missing)}")
+            raise RecordingError(
+                f"{path}:1: the header must name t,x,y,z[,qx,qy,qz,qw][,frame]; missing: {', '.join(missing)}"
+            )
         reader.fieldnames = names
         turned = all(name in names for name in ("qx", "qy", "qz", "qw"))
         columns = ("t", "x", "y", "z", *(("qx", "qy", "qz", "qw") if turned else ()))
@@ -123,10 +125,10 @@ def _read_csv(path: str, frame: str) -> Rows:
             try:
                 values = tuple(float(line[name]) for name in columns)
             except (TypeError, ValueError):
-                raise RecordingError(f"{path}:{reader.line_num}: expected numbers for "
-                                     f"{','.join(columns)}, got {list(line.values())}") from None
-            rows.setdefault(line.get("frame") or frame, []).append(
-                values if turned else (*values, *IDENTITY))
+                raise RecordingError(
+                    f"{path}:{reader.line_num}: expected numbers for {','.join(columns)}, got {list(line.values())}"
+                ) from None
+            rows.setdefault(line.get("frame") or frame, []).append(values if turned else (*values, *IDENTITY))
     return rows
 
 
@@ -146,12 +148,13 @@ def _read_npz(path: str, frame: str) -> Rows:
         n = len(stamps) if stamps.ndim == 1 else -1
         orientations = arrays.get(f"{before}orientation", np.tile(IDENTITY, (max(n, 0), 1)))
         if positions is None or positions.shape != (n, 3) or orientations.shape != (n, 4):
-            raise RecordingError(f"{path}: '{name}' needs '{before}position' of shape (N, 3), and "
-                                 f"'{before}orientation', where it is given, of shape (N, 4)")
+            raise RecordingError(
+                f"{path}: '{name}' needs '{before}position' of shape (N, 3), and "
+                f"'{before}orientation', where it is given, of shape (N, 4)"
+            )
         if not 0 < n <= MOST_SAMPLES:
             raise RecordingError(f"{path}: '{name}' has {n} samples, expected 1..{MOST_SAMPLES}")
-        rows[prefix or frame] = [tuple(row) for row in
-                                 np.column_stack([stamps, positions, orientations])]
+        rows[prefix or frame] = [tuple(row) for row in np.column_stack([stamps, positions, orientations])]
     if not rows:
         raise RecordingError(f"{path}: no array 't' in it; it has {', '.join(arrays) or 'none'}")
     return rows
@@ -181,8 +184,7 @@ def _read_bag(path: str, world: str, topic: str) -> Rows:
         raise RecordingError(f"{path}: not a readable bag ({error}); try `rosbag reindex`") from None
     if not rows:
         seen = ", ".join(sorted(parents)) or "none"
-        raise RecordingError(f"{path}: no transforms from '{world}' on {topic}; parents seen: "
-                             f"{seen}")
+        raise RecordingError(f"{path}: no transforms from '{world}' on {topic}; parents seen: {seen}")
     for track in rows.values():
         track.sort()
     return rows
@@ -219,8 +221,7 @@ class PlaybackSettings:
             raise RecordingError(f"time_scale must be above 0, got {self.time_scale}")
         if self.at_end not in ("hold", "loop", "vanish"):
             raise RecordingError(f"at_end must be hold, loop or vanish, got '{self.at_end}'")
-        if self.end_at is not None and (len(self.end_at) != 3
-                                        or not np.all(np.isfinite(self.end_at))):
+        if self.end_at is not None and (len(self.end_at) != 3 or not np.all(np.isfinite(self.end_at))):
             raise RecordingError(f"end_at needs three finite numbers (m), got {self.end_at}")
         if self.wait_distance <= 0.0 or self.wait_limit < 0.0:
             raise RecordingError("wait_distance must be above 0 m and wait_limit not negative")
@@ -231,10 +232,8 @@ class PlaybackSettings:
         known = [f.name for f in fields(PlaybackSettings)]
         unknown = sorted(set(data) - set(known))
         if unknown:
-            raise RecordingError(f"recording: unknown fields {', '.join(unknown)}; known: "
-                                 f"{', '.join(known)}")
-        return PlaybackSettings(**{k: tuple(v) if isinstance(v, list) else v
-                                   for k, v in data.items()})
+            raise RecordingError(f"recording: unknown fields {', '.join(unknown)}; known: {', '.join(known)}")
+        return PlaybackSettings(**{k: tuple(v) if isinstance(v, list) else v for k, v in data.items()})
 
 
 class Playback:
@@ -242,8 +241,7 @@ class Playback:
 
     def __init__(self, recording: Recording, settings: PlaybackSettings = PlaybackSettings()):
         self.settings = settings
-        self.recording = Recording({settings.rename.get(name, name): track
-                                    for name, track in recording.tracks.items()})
+        self.recording = Recording({settings.rename.get(name, name): track for name, track in recording.tracks.items()})
         self.first = next(iter(self.recording.tracks))
         self._world = Pose(orientation=about_z(np.radians(settings.turn_deg)))
         if settings.end_at is not None:
@@ -254,19 +252,21 @@ class Playback:
         self._waited = 0.0
 
     @staticmethod
-    def open(settings: PlaybackSettings, world: str = "world",
-             wanted: Callable[[str], bool] = lambda name: True) -> Playback:
+    def open(
+        settings: PlaybackSettings, world: str = "world", wanted: Callable[[str], bool] = lambda name: True
+    ) -> Playback:
         """Load the settings' file; of its frames, under their new names, those that are `wanted`.
 
         A bag also holds frames that no tracker sees. Raises RecordingError.
         """
         recording = load_recording(settings.file, settings.frame, world)
-        kept = {name: track for name, track in recording.tracks.items()
-                if wanted(settings.rename.get(name, name))}
+        kept = {name: track for name, track in recording.tracks.items() if wanted(settings.rename.get(name, name))}
         if not kept:
-            raise RecordingError(f"{settings.file}: none of its frames "
-                                 f"({', '.join(recording.tracks)}) is one that perception shows; "
-                                 "see rename")
+            raise RecordingError(
+                f"{settings.file}: none of its frames "
+                f"({', '.join(recording.tracks)}) is one that perception shows; "
+                "see rename"
+            )
         return Playback(Recording(kept), settings)
 
     @property
@@ -286,8 +286,7 @@ class Playback:
             if s.at_end == "loop":
                 self._playhead %= self.recording.duration or 1.0
                 self._waited = 0.0
-        return {name: self._placed(track.at(self._playhead))
-                for name, track in self.recording.tracks.items()}
+        return {name: self._placed(track.at(self._playhead)) for name, track in self.recording.tracks.items()}
 
     def _advance(self, dt: float, robot: Pose | None) -> None:
         s = self.settings

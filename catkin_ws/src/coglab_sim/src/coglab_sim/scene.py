@@ -1,4 +1,5 @@
 """What the virtual human is put into, sees, and shows: plain data. All frames in world, SI units."""
+
 from __future__ import annotations
 
 from dataclasses import dataclass, field

@@ -4,6 +4,7 @@ Phases: idle, reacting, reaching, waiting (hand at the handover point, the robot
 gently into the robot's palm; for receiving: the hand closes and lifts), holding, releasing, retreating. The person sees
 the scene (WorldView) as a person would: the robot's hand, the object, the forces felt. All frames in world, SI units.
 """
+
 from __future__ import annotations
 
 from collections import deque
@@ -113,7 +114,8 @@ class VirtualHuman(Giving, Receiving):
         duration = duration_for(float(np.linalg.norm(target - self._hand)), p.reach_time) * slower
         duration *= float(np.exp(self.rng.normal(0, p.reach_sigma)))
         self._reach = CorrectedReach(
-            Reach(self._hand.copy(), target, t, duration, bow=p.bow if self.phase == "reaching" else 0.0))
+            Reach(self._hand.copy(), target, t, duration, bow=p.bow if self.phase == "reaching" else 0.0)
+        )
         self._target = target
 
     def _look(self, t: float, view: WorldView) -> None:
@@ -168,8 +170,9 @@ class VirtualHuman(Giving, Receiving):
             if behaviour == "change_side":
                 self._interrupted = True
                 aside = reach.end + np.array([0.0, self.scene.other_side, 0.0])
-                reach.retarget(t, aside, duration_for(float(np.linalg.norm(aside - self._hand)),
-                                                      self.participant.reach_time))
+                reach.retarget(
+                    t, aside, duration_for(float(np.linalg.norm(aside - self._hand)), self.participant.reach_time)
+                )
                 self._target = aside
         self._correct(t)
         self._hand, self._velocity = reach.at(t)

@@ -3,6 +3,7 @@ byte in lockstep), the hand emulator behind its driver, virtual human, tracker. 
 
 Tests, trials and benches make their world here, and nowhere else.
 """
+
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
@@ -62,15 +63,20 @@ def pose_of_truth(pose: Mapping[str, Any]) -> Pose:
 
 def view_of(truth: Mapping[str, Any], speed: float) -> WorldView:
     """What a person perceives of the cell's truth; ``speed`` of the robot's hand, m/s."""
-    return WorldView(pose_of_truth(truth["robot_hand"]), speed, pose_of_truth(truth["object"]),
-                     float(np.linalg.norm(truth["palm_force"])), truth["robot_load_share"],
-                     truth["human_load_share"], truth["held_by"])
+    return WorldView(
+        pose_of_truth(truth["robot_hand"]),
+        speed,
+        pose_of_truth(truth["object"]),
+        float(np.linalg.norm(truth["palm_force"])),
+        truth["robot_load_share"],
+        truth["human_load_share"],
+        truth["held_by"],
+    )
 
 
 def move_person(cell: Any, hand: HandSample) -> None:
     """The person's hand, for the cell."""
-    cell.set_human(hand.frame.position, hand.frame.orientation, hand.velocity, np.zeros(3), hand.grip,
-                   hand.grip_force)
+    cell.set_human(hand.frame.position, hand.frame.orientation, hand.velocity, np.zeros(3), hand.grip, hand.grip_force)
 
 
 class Robot:
@@ -80,8 +86,12 @@ class Robot:
     """
 
     def __init__(self, seed: int, limits: str = LIMITS, **cell: Any) -> None:
-        parameters = {"seed": int(seed), "krc/period": DT, "contact/board_center": list(BOARD.position),
-                      **{name.replace("__", "/"): value for name, value in cell.items()}}
+        parameters = {
+            "seed": int(seed),
+            "krc/period": DT,
+            "contact/board_center": list(BOARD.position),
+            **{name.replace("__", "/"): value for name, value in cell.items()},
+        }
         self.parameters = {**manager_parameters(), "joint_limits_file": limits}
         self.virtual = VirtualRobot(urdf_file(), limits, parameters, yaml.safe_dump(manager_parameters()))
         self.cell = self.virtual.cell
@@ -89,8 +99,13 @@ class Robot:
         with open(urdf_file(), encoding="utf-8") as stream:
             self.chain = cc.Chain(stream.read())
         self.report = self.virtual.report()
-        self.progress: dict[str, Any] = {"motion": "idle", "reason": "", "primitive": "", "phase": 0.0,
-                                         "remaining_distance": 0.0}
+        self.progress: dict[str, Any] = {
+            "motion": "idle",
+            "reason": "",
+            "primitive": "",
+            "phase": 0.0,
+            "remaining_distance": 0.0,
+        }
         self.ended: dict[int, dict[str, Any]] = {}
         self.loaded: dict[str, str] = {}
         self.peak_share = 0.0
@@ -107,8 +122,9 @@ class Robot:
         if "ptp" in self.loaded:
             self.ended.update((end["ptp_id"], end) for end in self.virtual.ptp_ends())
         q, commanded = np.asarray(report["position"]), np.asarray(report["commanded_position"])
-        outside = any(np.any(v < self.limits.lower_position) or np.any(v > self.limits.upper_position)
-                      for v in (q, commanded))
+        outside = any(
+            np.any(v < self.limits.lower_position) or np.any(v > self.limits.upper_position) for v in (q, commanded)
+        )
         if self._commanded is not None and report["motion_allowed"]:
             speed = np.abs(commanded - self._commanded) / DT
             self.peak_share = max(self.peak_share, float(np.max(speed / self.limits.velocity)))
@@ -185,13 +201,23 @@ class World:
     ``after_period`` are called at the end of each FRI period, with a robot that is connected.
     """
 
-    def __init__(self, seed: int = 1, behaviour: str = "normal", perfect: bool = False,
-                 object_on: str = "human_hand", perception: PerceptionSettings | None = None, turned: float = 0.0,
-                 limits: str = LIMITS) -> None:
+    def __init__(
+        self,
+        seed: int = 1,
+        behaviour: str = "normal",
+        perfect: bool = False,
+        object_on: str = "human_hand",
+        perception: PerceptionSettings | None = None,
+        turned: float = 0.0,
+        limits: str = LIMITS,
+    ) -> None:
         thing, _ = read_object(objects_folder() / f"{OBJECT}.yaml")
-        where = {**{f"object__{name}": value for name, value in cell_parameters(thing).items()},
-                 "object__start": object_on, "object__position": [-0.08, 0.0, -0.05],
-                 "object__rotation": [float(v) for v in about_z(turned)]}
+        where = {
+            **{f"object__{name}": value for name, value in cell_parameters(thing).items()},
+            "object__start": object_on,
+            "object__position": [-0.08, 0.0, -0.05],
+            "object__rotation": [float(v) for v in about_z(turned)],
+        }
         if object_on == "world":
             where["object__position"] = [float(v) for v in BOARD.apply([0.0, 0.0, 0.002])]
             where["object__rotation"] = [float(v) for v in BOARD.orientation]
@@ -247,5 +273,6 @@ class World:
             for sight in self.trackers[name].step(self.t, frame, palm):
                 if name not in self.blind:
                     self.sights[name] = sight
-                    self.robot.virtual.set_frame(name, sight.frame.position, sight.frame.orientation,
-                                                 self.t - sight.captured)
+                    self.robot.virtual.set_frame(
+                        name, sight.frame.position, sight.frame.orientation, self.t - sight.captured
+                    )

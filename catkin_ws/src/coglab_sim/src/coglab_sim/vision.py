@@ -58,8 +58,7 @@ class PartnerChoice:
         if self.margin <= 0.0 or robot is None:
             self._chosen = ""
             return ""
-        far = {name: float(np.linalg.norm(hand.position - robot.position))
-               for name, hand in hands.items()}
+        far = {name: float(np.linalg.norm(hand.position - robot.position)) for name, hand in hands.items()}
         nearest, second = sorted(far, key=far.__getitem__)[:2]
         kept = self._chosen in far and far[self._chosen] - far[nearest] < self.margin
         if not kept:
@@ -75,9 +74,16 @@ class Vision:
     other stands still.
     """
 
-    def __init__(self, names: FrameNames, settings: PerceptionSettings, board: Board, seed: int,
-                 clock: Callable[[], float], partner_margin: float = 0.0,
-                 steady: Callable[[], float] = time.monotonic) -> None:
+    def __init__(
+        self,
+        names: FrameNames,
+        settings: PerceptionSettings,
+        board: Board,
+        seed: int,
+        clock: Callable[[], float],
+        partner_margin: float = 0.0,
+        steady: Callable[[], float] = time.monotonic,
+    ) -> None:
         self.names, self.settings, self.board, self.seed = names, settings, board, seed
         self.clock, self.steady = clock, steady
         self.choice = PartnerChoice(partner_margin)
@@ -91,8 +97,7 @@ class Vision:
 
     # -- seeing ----------------------------------------------------------------------------------
 
-    def see(self, hands: Mapping[str, Pose], objects: Mapping[str, Pose],
-            robot: Pose | None = None) -> list[Sight]:
+    def see(self, hands: Mapping[str, Pose], objects: Mapping[str, Pose], robot: Pose | None = None) -> list[Sight]:
         """The world as it is now: hands of people by any name, objects by frame name.
 
         Returns the sights that are to be broadcast: the partner's hand and the objects.
@@ -127,8 +132,10 @@ class Vision:
         with self._changed:
             if self._changed.wait_for(self._world_is_visible, limit):
                 return "tracker stand-in sees the cell"
-        raise NotSeen(f"the cell was not visible within {limit:.1f} s; is the simulated cell, or "
-                      "the recording, running?", ReasonCode.NOT_PERCEIVED)
+        raise NotSeen(
+            f"the cell was not visible within {limit:.1f} s; is the simulated cell, or the recording, running?",
+            ReasonCode.NOT_PERCEIVED,
+        )
 
     def locate(self, target: str, timeout: float) -> tuple[str, Sight, float]:
         """Newest fresh sight of an object (by id), of the partner's hand or of the board.
@@ -140,8 +147,7 @@ class Vision:
         name = target if target == self.names.human_hand else self.names.object_frame(target)
         limit = _limit(timeout)
         with self._changed:
-            found = self._changed.wait_for(lambda: self._is_fresh(name) and not self._doubt(name),
-                                           limit)
+            found = self._changed.wait_for(lambda: self._is_fresh(name) and not self._doubt(name), limit)
             if not found:
                 doubt = self._doubt(name)
                 if doubt:
@@ -160,15 +166,23 @@ class Vision:
         own = self.names.object_frame(object_id)
         with self._changed:
             if not self._changed.wait_for(self._world_is_visible, limit):
-                raise NotSeen(f"the board was not visible within {limit:.1f} s; is the simulated "
-                              "cell, or the recording, running?", ReasonCode.NOT_PERCEIVED)
-            objects = {name: tracker.newest.frame.position
-                       for name, tracker in self._trackers.items()
-                       if tracker.newest is not None and name not in (self.names.human_hand, own)}
+                raise NotSeen(
+                    f"the board was not visible within {limit:.1f} s; is the simulated "
+                    "cell, or the recording, running?",
+                    ReasonCode.NOT_PERCEIVED,
+                )
+            objects = {
+                name: tracker.newest.frame.position
+                for name, tracker in self._trackers.items()
+                if tracker.newest is not None and name not in (self.names.human_hand, own)
+            }
         free = self.board.free(list(objects.values()))
         if not free:
-            raise NotSeen(f"no place on the board is free: {', '.join(sorted(objects))} lie near "
-                          f"{', '.join(self.board.slots)}; clear one", ReasonCode.NO_FREE_PLACE)
+            raise NotSeen(
+                f"no place on the board is free: {', '.join(sorted(objects))} lie near "
+                f"{', '.join(self.board.slots)}; clear one",
+                ReasonCode.NO_FREE_PLACE,
+            )
         return [(name, self.board.slots[name]) for name in free]
 
     # -- judging ---------------------------------------------------------------------------------
@@ -181,8 +195,7 @@ class Vision:
         if tracker is None or tracker.newest is None:
             return False
         # By both clocks: the stamps' clock may stand still.
-        return (self.clock() - tracker.newest.captured < OLDEST
-                and self.steady() - self._arrived[name] < OLDEST)
+        return self.clock() - tracker.newest.captured < OLDEST and self.steady() - self._arrived[name] < OLDEST
 
     def _doubt(self, name: str) -> str:
         """The sentence if somebody's hand is meant and it cannot be told whose; else empty."""
@@ -190,8 +203,7 @@ class Vision:
             return ""
         if name != self.names.human_hand and not self._is_held(name):
             return ""
-        return (f"{self.people} people are in view; one partner is expected: ask the others to "
-                "step back")
+        return f"{self.people} people are in view; one partner is expected: ask the others to step back"
 
     def _is_held(self, name: str) -> bool:
         tracker = self._trackers.get(name)
@@ -202,8 +214,10 @@ class Vision:
 
     def _absence(self, name: str, limit: float) -> str:
         seen = sorted(n for n in self._trackers if self._is_fresh(n))
-        return (f"'{name}' was not seen within {limit:.1f} s; in view: "
-                f"{', '.join(seen) or 'nothing'}; bring it into view of the tracker")
+        return (
+            f"'{name}' was not seen within {limit:.1f} s; in view: "
+            f"{', '.join(seen) or 'nothing'}; bring it into view of the tracker"
+        )
 
 
 def _limit(timeout: float) -> float:

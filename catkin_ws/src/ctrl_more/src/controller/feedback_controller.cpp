@@ -20,9 +20,8 @@ std::vector<Resolved> unresolved(const Uses& declared) {
 
 template <typename Uses>
 bool contains(const Uses& uses, const std::string& name) {
-  return std::any_of(uses.begin(), uses.end(), [&](const auto& use) {
-    return name == use.key || name == use.name();
-  });
+  return std::any_of(uses.begin(), uses.end(),
+                     [&](const auto& use) { return name == use.key || name == use.name(); });
 }
 
 Status tooLate(const std::string& name) {
@@ -59,17 +58,16 @@ Description FeedbackController::declaration() const {
 Status FeedbackController::addUsedControlState(const std::string& name) {
   if (initialized_) return tooLate(name);
   using C = ControlContainer;
-  static const std::map<std::string, C> well_known = {
-      {"com", C::CentreOfMass},
-      {"comVelocity", C::CentreOfMass},
-      {"comAcceleration", C::CentreOfMass},
-      {"linearMomentum", C::LinearMomentum},
-      {"angularMomentum", C::AngularMomentum},
-      {"zmp", C::Zmp},
-      {"pelvis", C::PelvisOrientation},
-      {"Position", C::JointSpaceReference},
-      {"Velocity", C::JointSpaceReference},
-      {"Torque", C::JointSpaceReference}};
+  static const std::map<std::string, C> well_known = {{"com", C::CentreOfMass},
+                                                      {"comVelocity", C::CentreOfMass},
+                                                      {"comAcceleration", C::CentreOfMass},
+                                                      {"linearMomentum", C::LinearMomentum},
+                                                      {"angularMomentum", C::AngularMomentum},
+                                                      {"zmp", C::Zmp},
+                                                      {"pelvis", C::PelvisOrientation},
+                                                      {"Position", C::JointSpaceReference},
+                                                      {"Velocity", C::JointSpaceReference},
+                                                      {"Torque", C::JointSpaceReference}};
   ControlSignalUse use;
   use.modifies = true;
   use.text = "declared with addUsedControlState()";

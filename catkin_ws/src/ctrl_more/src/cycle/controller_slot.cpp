@@ -189,8 +189,12 @@ void ControllerSlot::addRecord(const ControlStates& names, unsigned buffer,
     change.resize(w.size);
     correction::difference(w.kind, w.size, before, after, change.data());
     const correction::Norms n = correction::norms(w.kind, w.size, change.data());
-    of_cycle.changes.push_back({name(), names.nameOfSignal(w.signal), of_cycle.cycle,
-                                {before, before + w.size}, {after, after + w.size}, n.size,
+    of_cycle.changes.push_back({name(),
+                                names.nameOfSignal(w.signal),
+                                of_cycle.cycle,
+                                {before, before + w.size},
+                                {after, after + w.size},
+                                n.size,
                                 n.angle});
   }
   if (!record.state.empty()) of_cycle.states.push_back({name(), record.state});

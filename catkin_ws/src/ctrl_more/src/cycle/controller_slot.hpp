@@ -43,9 +43,8 @@ class ControllerSlot {
   /// @param entry overrun, blend time and fault policy
   /// @param options of the manager
   /// @param owner number for permissions
-  ControllerSlot(ControllerInstance instance, const std::string& name,
-                 const ControllerEntry& entry, const ManagerOptions& options,
-                 std::uint32_t owner);
+  ControllerSlot(ControllerInstance instance, const std::string& name, const ControllerEntry& entry,
+                 const ManagerOptions& options, std::uint32_t owner);
 
   /// Gives the controller its configuration, and finds its signals. Throws what initialize()
   /// throws, std::invalid_argument for a description that cannot be run.

@@ -42,8 +42,7 @@ void ControllerSlot::runActive(StageRun& run) noexcept {
     // The text dies with the exception: it is used before that.
     return takeFault(run, FaultKind::Exception, e.what());
   } catch (...) {
-    return takeFault(run, FaultKind::Exception,
-                     "it threw something that is not a std::exception");
+    return takeFault(run, FaultKind::Exception, "it threw something that is not a std::exception");
   }
   if (run.timed && isLate(run)) return overrun(run);
   advanceBlend(run.cycle.dt);
@@ -135,9 +134,11 @@ StopPolicy ControllerSlot::policyOf(const WrittenSignal& written) const {
   switch (why_) {
     case Why::Paused:
       return written.on_pause == StopPolicy::ByKind ? by_kind : written.on_pause;
-    case Why::Fault: return on_fault_ == StopPolicy::ByKind ? by_kind : on_fault_;
+    case Why::Fault:
+      return on_fault_ == StopPolicy::ByKind ? by_kind : on_fault_;
     case Why::Disabled:
-    case Why::Stale: break;
+    case Why::Stale:
+      break;
   }
   return StopPolicy::Fade;
 }

@@ -49,8 +49,7 @@ inline void difference(SignalKind kind, int size, const double* before, const do
                        double* c) {
   const int n = linearPart(kind, size);
   for (int i = 0; i < n; ++i) c[i] = after[i] - before[i];
-  if (kind != SignalKind::Vector &&
-      std::memcmp(before + n, after + n, 4 * sizeof(double)) == 0) {
+  if (kind != SignalKind::Vector && std::memcmp(before + n, after + n, 4 * sizeof(double)) == 0) {
     setIdentity(kind, 4, c + n);
     return;
   }
@@ -75,7 +74,7 @@ inline void apply(SignalKind kind, int size, const double* before, const double*
 
 /// `out` between two corrections, `share` in [0, 1] on the shorter way; may alias either.
 inline void between(SignalKind kind, int size, const double* from, const double* to, double share,
-             double* out) {
+                    double* out) {
   const int n = linearPart(kind, size);
   for (int i = 0; i < n; ++i) out[i] = from[i] + share * (to[i] - from[i]);
   if (kind == SignalKind::Vector) return;
@@ -124,8 +123,7 @@ inline double squareOff(const double* q) {
 
 /// True if the quaternion in the signal, if it has one, is unit within 1e-6.
 inline bool isUnit(SignalKind kind, int size, const double* values) {
-  return kind == SignalKind::Vector ||
-         std::abs(squareOff(values + size - 4)) <= kUnitTolerance;
+  return kind == SignalKind::Vector || std::abs(squareOff(values + size - 4)) <= kUnitTolerance;
 }
 
 }  // namespace ctrl_more::correction

@@ -50,8 +50,7 @@ void CycleRunner::adopt(const Plan* plan) noexcept {
   plans_.acknowledge(*plan);
 }
 
-void CycleRunner::runStage(Stage stage, const RobotStates& robot,
-                           ControlStates& control) noexcept {
+void CycleRunner::runStage(Stage stage, const RobotStates& robot, ControlStates& control) noexcept {
   if (!plan_ || plan_->stages[static_cast<int>(stage)].empty()) return;
   if (control.dataSize() != original_.dataSize()) {
     CTRL_MORE_LOG(log_, Error, "control states of {} numbers were given, {} expected: nothing run",

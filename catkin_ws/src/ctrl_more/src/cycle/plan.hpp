@@ -5,8 +5,8 @@
 #include <memory>
 #include <vector>
 
-#include "ctrl_more/states/cycle.hpp"
 #include "ctrl_more/description/gains.hpp"
+#include "ctrl_more/states/cycle.hpp"
 
 namespace ctrl_more {
 
@@ -28,8 +28,8 @@ struct PlanEntry {
 /// Everything a manager is to do, immutable; see FeedbackControllersManager.
 struct Plan {
   std::uint64_t generation = 0;
-  bool timed = false;  ///< some controller's duration is judged
-  std::vector<PlanEntry> entries;                               ///< execution order
+  bool timed = false;              ///< some controller's duration is judged
+  std::vector<PlanEntry> entries;  ///< execution order
   std::array<std::vector<ControllerSlot*>, kStages> stages{};  ///< the same, per stage
 };
 

@@ -46,8 +46,7 @@ void PlanExchange::collect() {
 }
 
 bool PlanExchange::wait(std::uint64_t generation, double timeout_s) const {
-  const auto deadline =
-      std::chrono::steady_clock::now() + std::chrono::duration<double>(timeout_s);
+  const auto deadline = std::chrono::steady_clock::now() + std::chrono::duration<double>(timeout_s);
   while (acknowledged_.load(std::memory_order_acquire) < generation) {
     if (std::chrono::steady_clock::now() >= deadline) return false;
     std::this_thread::sleep_for(std::chrono::microseconds(200));

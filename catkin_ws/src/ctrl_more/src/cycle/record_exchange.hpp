@@ -14,9 +14,7 @@ class RecordExchange {
  public:
   /// The cycle: from now until end() the buffer is the cycle's alone.
   /// @return its index
-  unsigned begin() {
-    return word_.fetch_or(kBusy, std::memory_order_acquire) & kIndex;
-  }
+  unsigned begin() { return word_.fetch_or(kBusy, std::memory_order_acquire) & kIndex; }
 
   /// The cycle: the buffer is complete. If a reader asked, the next cycle gets the other one.
   /// @param wrote false: no record was written since begin()

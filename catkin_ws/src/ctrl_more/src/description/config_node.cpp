@@ -141,8 +141,7 @@ std::vector<std::string> ConfigNode::keys() const {
   return list;
 }
 
-void ConfigNode::requireKeys(const std::string& what,
-                             const std::vector<std::string>& known) const {
+void ConfigNode::requireKeys(const std::string& what, const std::vector<std::string>& known) const {
   if (kind_ != Kind::Map) throw error(what + " expects a map");
   for (const auto& entry : entries_) {
     if (std::find(known.begin(), known.end(), entry.first) == known.end()) {

@@ -8,10 +8,14 @@ namespace ctrl_more {
 
 const char* nameOf(StopPolicy policy) {
   switch (policy) {
-    case StopPolicy::ByKind: return "by kind";
-    case StopPolicy::Hold: return "hold";
-    case StopPolicy::Fade: return "fade";
-    case StopPolicy::Zero: return "zero";
+    case StopPolicy::ByKind:
+      return "by kind";
+    case StopPolicy::Hold:
+      return "hold";
+    case StopPolicy::Fade:
+      return "fade";
+    case StopPolicy::Zero:
+      return "zero";
   }
   return "";
 }

@@ -28,8 +28,7 @@ Status SettingValues::set(const std::string& name, const std::string& text) {
   if (i < 0) return Status::failure("'" + name + "' is no text setting");
   const auto& choices = specs_[i].choices;
   if (!choices.empty() && std::find(choices.begin(), choices.end(), text) == choices.end()) {
-    return Status::failure("'" + name + "' cannot be '" + text + "'" +
-                           suggestion(text, choices));
+    return Status::failure("'" + name + "' cannot be '" + text + "'" + suggestion(text, choices));
   }
   if (text.empty()) return Status::failure("'" + name + "' must not be empty");
   texts_[i] = text;

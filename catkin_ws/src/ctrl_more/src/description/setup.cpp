@@ -20,15 +20,15 @@ int decideSize(const std::string& what, const std::vector<int>& allowed, int ask
     return allowed.empty() || std::find(allowed.begin(), allowed.end(), size) != allowed.end();
   };
   if (asked != 0 && !isAllowed(asked)) {
-    throw std::invalid_argument(what + ": size " + std::to_string(asked) +
-                                " was asked for, but " + listOf(allowed) + " is declared");
+    throw std::invalid_argument(what + ": size " + std::to_string(asked) + " was asked for, but " +
+                                listOf(allowed) + " is declared");
   }
   const int expected = asked != 0 ? asked : (allowed.size() == 1 ? allowed[0] : 0);
   if (existing != 0) {
     if ((expected != 0 && existing != expected) || !isAllowed(existing)) {
-      throw std::invalid_argument(
-          what + " has size " + std::to_string(existing) + ", but the controller expects " +
-          (expected != 0 ? std::to_string(expected) : listOf(allowed)));
+      throw std::invalid_argument(what + " has size " + std::to_string(existing) +
+                                  ", but the controller expects " +
+                                  (expected != 0 ? std::to_string(expected) : listOf(allowed)));
     }
     return existing;
   }
@@ -68,8 +68,7 @@ void Setup::resolveIn(Store& store, Group group, Entry& entry, const std::vector
                       int size) {
   const std::string what = name_ + ": " + nameOf(group) + " '" + entry.key + "'";
   const int decided = decideSize(what, allowed, size, store.find(group, entry.key).size());
-  const Status status =
-      store.declare(group, entry.key, decided, entry.use.unit, entry.use.frame);
+  const Status status = store.declare(group, entry.key, decided, entry.use.unit, entry.use.frame);
   if (!status) throw std::invalid_argument(name_ + ": " + status.message());
   entry.signal = store.find(group, entry.key);
 }

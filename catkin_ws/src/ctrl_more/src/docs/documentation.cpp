@@ -72,8 +72,7 @@ void robotSection(std::ostream& out, const Description& d) {
         << "| --- | --- | --- | --- | --- | --- | --- |\n";
     for (const RobotSignalUse& s : d.robot_signals) {
       out << "| " << keyText(s.role, s.key_setting, s.if_asked) << " | " << nameOf(s.source)
-          << " | "
-          << sizesText(s.sizes, 0) << " | " << s.unit << " | " << s.frame << " | "
+          << " | " << sizesText(s.sizes, 0) << " | " << s.unit << " | " << s.frame << " | "
           << ageText(s.max_age_s) << " | " << s.text << " |\n";
     }
     out << '\n';
@@ -94,7 +93,9 @@ void controlSection(std::ostream& out, const Description& d) {
         << " | " << s.unit << " | " << s.frame << " | "
         << (s.modifies ? (s.exclusive ? "modified, alone" : "modified") : "read") << " | "
         << (s.modifies ? limitText(s.limit) : "-") << " | "
-        << (!s.modifies ? "-" : s.on_pause == StopPolicy::ByKind ? by_kind : nameOf(s.on_pause))
+        << (!s.modifies                        ? "-"
+            : s.on_pause == StopPolicy::ByKind ? by_kind
+                                               : nameOf(s.on_pause))
         << " | " << s.text << " |\n";
   }
 }
@@ -127,8 +128,7 @@ void settingSection(std::ostream& out, const Description& d) {
         for (const std::string& c : s.choices) allowed += (allowed.empty() ? "`" : ", `") + c + "`";
       }
       out << "| `" << s.name << "` | " << (text ? "-" : s.unit) << " | " << allowed << " | "
-          << (text ? "`" + s.initial_text + "`" : listText(s.initial)) << " | " << s.text
-          << " |\n";
+          << (text ? "`" + s.initial_text + "`" : listText(s.initial)) << " | " << s.text << " |\n";
     }
   }
 }
@@ -187,9 +187,11 @@ std::string documentationPage(const Description& d) {
   out << "| stage | safety | at a switch of motion |\n| --- | --- | --- |\n| " << nameOf(d.stage)
       << " | " << (d.safety ? "yes: refuses pause and disable unless forced" : "no") << " | "
       << (d.on_switch == SwitchPolicy::Reset ? "reset" : "state kept") << " |\n\n";
-  out << "## Use\n\n" << d.use << "\n\n## When to apply it\n\n" << d.when
-      << "\n\n## Limitations\n\n" << d.limitations << "\n\n## Law\n\n```math\n" << d.law
-      << "\n```\n\nSource: " << d.source << "\n\n";
+  out << "## Use\n\n"
+      << d.use << "\n\n## When to apply it\n\n"
+      << d.when << "\n\n## Limitations\n\n"
+      << d.limitations << "\n\n## Law\n\n```math\n"
+      << d.law << "\n```\n\nSource: " << d.source << "\n\n";
   robotSection(out, d);
   controlSection(out, d);
   gainSection(out, d);

@@ -43,8 +43,8 @@ ControllerInstance makeController(const std::string& library_path, const std::st
     throw std::runtime_error("the maker of controller type '" + wanted + "' returned nothing");
   }
   if (described != wanted) {
-    throw std::runtime_error("the controller registered as '" + wanted +
-                             "' describes itself as '" + described + "'; make them the same");
+    throw std::runtime_error("the controller registered as '" + wanted + "' describes itself as '" +
+                             described + "'; make them the same");
   }
   return instance;
 }

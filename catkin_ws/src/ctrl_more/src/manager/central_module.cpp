@@ -151,8 +151,7 @@ std::unique_ptr<Manager> CentralModule::makeFeedback(const std::string& name,
   return manager;
 }
 
-std::unique_ptr<Manager> CentralModule::makeOther(const std::string& name,
-                                                  const ConfigNode& block,
+std::unique_ptr<Manager> CentralModule::makeOther(const std::string& name, const ConfigNode& block,
                                                   const ConfigNode& type) {
   const std::string type_name = type.text("type");
   ManagerMaker maker;

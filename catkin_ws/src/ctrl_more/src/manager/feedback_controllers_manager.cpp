@@ -111,8 +111,7 @@ void FeedbackControllersManager::update(const Cycle& cycle, const RobotStates& r
   endCycle();
 }
 
-void FeedbackControllersManager::update(const RobotStates& robot,
-                                        ControlStates* control) noexcept {
+void FeedbackControllersManager::update(const RobotStates& robot, ControlStates* control) noexcept {
   if (!control) return;
   update({robot.newestStamp(), control->controlPeriod(), runner_->cycle().number + 1}, robot,
          *control);

@@ -117,8 +117,8 @@ ListFile::Controller ListFile::read(const ConfigNode& item) const {
   const std::string name = item.text("a name in loadControllers");
   const ConfigNode* block = list_.find(name);
   if (!block || std::find(blocks_.begin(), blocks_.end(), name) == blocks_.end()) {
-    throw item.error("loadControllers lists '" + name + "', but there is no block '" + name +
-                     ":'" + suggestion(name, blocks_));
+    throw item.error("loadControllers lists '" + name + "', but there is no block '" + name + ":'" +
+                     suggestion(name, blocks_));
   }
   return {name, readEntry(name, *block, files_), block};
 }

@@ -109,8 +109,8 @@ void FeedbackControllersManager::readList(const ListFile& list, LoadReport& repo
   if (!profiles) return;
   if (profiles->kind() != ConfigNode::Kind::Map) throw profiles->error("profiles expects a map");
   for (const auto& entry : profiles->entries()) {
-    const Status status = roster_->setProfile(
-        entry.first, entry.second.texts("profile '" + entry.first + "'"));
+    const Status status =
+        roster_->setProfile(entry.first, entry.second.texts("profile '" + entry.first + "'"));
     if (!status) report.errors.push_back(entry.second.place() + ": " + status.message());
   }
 }
@@ -122,8 +122,8 @@ Status FeedbackControllersManager::loadController(const std::string& name,
 }
 
 // Without `offer` the cycle is not told: the caller publishes.
-Status FeedbackControllersManager::loadNamed(const std::string& name,
-                                             const ControllerEntry& entry, bool offer) {
+Status FeedbackControllersManager::loadNamed(const std::string& name, const ControllerEntry& entry,
+                                             bool offer) {
   // A library that only an outdated plan holds is closed, so that a new build of it is loaded.
   runner_->plans().collect();
   try {
@@ -159,8 +159,8 @@ Status FeedbackControllersManager::take(ControllerInstance instance, const std::
     auto member = std::make_unique<Member>();
     member->name = name;
     member->entry = entry;
-    member->slot = std::make_shared<ControllerSlot>(std::move(instance), name, entry, options_,
-                                                    next_owner_);
+    member->slot =
+        std::make_shared<ControllerSlot>(std::move(instance), name, entry, options_, next_owner_);
     member->description = member->slot->controller().declaration();
     const ControllerConfig config =
         entry.config_file.empty()

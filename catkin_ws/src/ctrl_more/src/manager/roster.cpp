@@ -93,8 +93,7 @@ void Roster::accept(Draft draft) noexcept {
   order = std::move(draft.order);
 }
 
-Status Roster::setProfile(const std::string& profile,
-                          const std::vector<std::string>& controllers) {
+Status Roster::setProfile(const std::string& profile, const std::vector<std::string>& controllers) {
   if (profile.empty()) return Status::failure("a profile needs a name that is not empty");
   for (const std::string& name : controllers) {
     if (indexOf(name) < 0) {

@@ -47,12 +47,17 @@ class Trial {
 
   Status step(const Change::Step& step) {
     switch (step.kind) {
-      case Kind::Order: return order(step.order);
-      case Kind::Profile: return profile(step.name);
-      case Kind::MotionSwitched: return motionSwitched();
+      case Kind::Order:
+        return order(step.order);
+      case Kind::Profile:
+        return profile(step.name);
+      case Kind::MotionSwitched:
+        return motionSwitched();
       case Kind::Gains:
-      case Kind::GainFile: return gains(step);
-      default: break;
+      case Kind::GainFile:
+        return gains(step);
+      default:
+        break;
     }
     if (step.who != Who::Named) return bySignal(step);
     if (!step.name.empty()) {
@@ -123,8 +128,7 @@ class Trial {
   }
 
   Status bySignal(const Change::Step& step) {
-    const std::string what =
-        step.who == Who::UsingRobotState ? "robot signal " : "control signal ";
+    const std::string what = step.who == Who::UsingRobotState ? "robot signal " : "control signal ";
     bool used = false;
     for (std::size_t i = 0; i < draft_.states.size(); ++i) {
       const Member& member = *roster_.members[i];

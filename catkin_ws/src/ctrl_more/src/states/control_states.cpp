@@ -67,14 +67,12 @@ Status ControlStates::setZMP(const Eigen::Vector3d& zmp, const char* who) {
   return set(ControlContainer::Zmp, "zmp", zmp, who);
 }
 
-Status ControlStates::setZMP(const std::string& key, const Eigen::Vector3d& zmp,
-                             const char* who) {
+Status ControlStates::setZMP(const std::string& key, const Eigen::Vector3d& zmp, const char* who) {
   return set(ControlContainer::Zmp, key, zmp, who);
 }
 
 Status ControlStates::setPelvisOrientation(const Eigen::Matrix3d& orientation, const char* who) {
-  const double error =
-      (orientation * orientation.transpose() - Eigen::Matrix3d::Identity()).norm();
+  const double error = (orientation * orientation.transpose() - Eigen::Matrix3d::Identity()).norm();
   if (!(error <= kRotationTolerance) || !(orientation.determinant() > 0.0)) {
     return refuse(std::string(who) + ": pelvisOrientation/pelvis expects a rotation matrix, got " +
                   "one with |R R^T - 1| = " + std::to_string(error) + " and determinant " +
@@ -84,8 +82,7 @@ Status ControlStates::setPelvisOrientation(const Eigen::Matrix3d& orientation, c
   return set(ControlContainer::PelvisOrientation, "pelvis", q, who);
 }
 
-Status ControlStates::setPelvisOrientation(double roll, double pitch, double yaw,
-                                           const char* who) {
+Status ControlStates::setPelvisOrientation(double roll, double pitch, double yaw, const char* who) {
   if (!std::isfinite(roll) || !std::isfinite(pitch) || !std::isfinite(yaw)) {
     return refuse(std::string(who) + ": pelvisOrientation/pelvis got an angle that is not finite");
   }
@@ -119,8 +116,7 @@ Status ControlStates::getOtherReference(const std::string& key, Eigen::VectorXd&
   return get(ControlContainer::OtherReference, key, reference, who);
 }
 
-Status ControlStates::getZMP(const std::string& key, Eigen::Vector3d& zmp,
-                             const char* who) const {
+Status ControlStates::getZMP(const std::string& key, Eigen::Vector3d& zmp, const char* who) const {
   Eigen::VectorXd value;
   const Status status = get(ControlContainer::Zmp, key, value, who);
   if (status) zmp = value;

@@ -127,8 +127,8 @@ void RobotStates::print(std::ostream& out, std::int64_t now_ns) const {
       if (written == kNeverWritten) {
         out << ": never written\n";
       } else {
-        out << ", age " << 1e-6 * static_cast<double>(now - written) << " ms:"
-            << table_.numbers(info) << '\n';
+        out << ", age " << 1e-6 * static_cast<double>(now - written)
+            << " ms:" << table_.numbers(info) << '\n';
       }
     }
   }

@@ -45,8 +45,7 @@ Status SignalTable::add(const SignalGroup& group, const std::string& key, int si
   const std::string name = fullName(group, key);
   const std::string what = std::string(who) + ": " + name;
   if (key.empty() || size <= 0) {
-    return refuse(what + " needs a name and at least one number, got size " +
-                  std::to_string(size));
+    return refuse(what + " needs a name and at least one number, got size " + std::to_string(size));
   }
   if (group.size != 0 && size != group.size) {
     return refuse(what + " expects " + std::to_string(group.size) + " numbers, got " +
@@ -77,8 +76,8 @@ Status SignalTable::declare(const SignalGroup& group, const std::string& key, in
   if (found == index_.end()) return add(group, key, size, unit, frame, "declare", announce);
   SignalInfo& info = entries_[found->second].info;
   if (static_cast<int>(info.size) != size) {
-    return refuse("declare: " + found->first + " has size " + std::to_string(info.size) +
-                  ", got " + std::to_string(size) + "; a key keeps its size");
+    return refuse("declare: " + found->first + " has size " + std::to_string(info.size) + ", got " +
+                  std::to_string(size) + "; a key keeps its size");
   }
   if (info.unit.empty()) info.unit = unit;
   if (info.frame.empty()) info.frame = frame;

@@ -12,15 +12,11 @@ class ControlExample : public ctrl_more_test::Plugin {
 };
 
 extern "C" {
-FeedbackController* feedbackExampleMaker() {
-  return new ControlExample();
-}
+FeedbackController* feedbackExampleMaker() { return new ControlExample(); }
 }
 
 class dummyExample {
  public:
-  dummyExample() {
-    feedbackControllerPrototypes.insert({"MyController", feedbackExampleMaker});
-  }
+  dummyExample() { feedbackControllerPrototypes.insert({"MyController", feedbackExampleMaker}); }
 };
 dummyExample localDummyExample;

@@ -84,14 +84,10 @@ FeedbackController* inUpdate() { return new InUpdate("InUpdate"); }
 FeedbackController* inJudge() { return new InJudge("InJudge"); }
 
 const PrototypeRegistration registrations[] = {
-    {"InMaker", &inMaker},
-    {"NumberInMaker", &numberInMaker},
-    {"ThingInMaker", &thingInMaker},
-    {"InDescribe", &inDescribe},
-    {"InInitialize", &inInitialize},
-    {"ThingInInitialize", &thingInInitialize},
-    {"InUpdate", &inUpdate},
-    {"InJudge", &inJudge},
+    {"InMaker", &inMaker},           {"NumberInMaker", &numberInMaker},
+    {"ThingInMaker", &thingInMaker}, {"InDescribe", &inDescribe},
+    {"InInitialize", &inInitialize}, {"ThingInInitialize", &thingInInitialize},
+    {"InUpdate", &inUpdate},         {"InJudge", &inJudge},
 };
 
 }  // namespace

@@ -20,9 +20,7 @@ def log():
     before = (smach.loginfo, smach.logwarn, smach.logdebug, smach.logerr)
     shutdown = smach.is_shutdown
     record = Log()
-    smach.set_loggers(
-        record.info.append, record.warn.append, record.debug.append, record.error.append
-    )
+    smach.set_loggers(record.info.append, record.warn.append, record.debug.append, record.error.append)
     smach.set_shutdown_check(lambda: False)
     yield record
     smach.set_loggers(*before)

@@ -122,9 +122,7 @@ def wait_for(condition, limit=10.0):
     return bool(condition())
 
 
-def concurrence(
-    outcomes=("done", "failed", "preempted"), default="failed", children=None, **kwargs
-):
+def concurrence(outcomes=("done", "failed", "preempted"), default="failed", children=None, **kwargs):
     """A Concurrence of these children."""
     result = smach.Concurrence(outcomes=list(outcomes), default_outcome=default, **kwargs)
     with result:

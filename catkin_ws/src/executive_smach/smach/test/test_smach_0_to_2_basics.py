@@ -142,9 +142,7 @@ def test_s2_cb_state():
         ud.seen = (args, kwargs)
         return "yes"
 
-    state = smach.CBState(
-        cb, cb_args=[1, 2], cb_kwargs={"k": 3}, outcomes=["yes"], output_keys=["seen"]
-    )
+    state = smach.CBState(cb, cb_args=[1, 2], cb_kwargs={"k": 3}, outcomes=["yes"], output_keys=["seen"])
     ud = smach.UserData()
     assert state.execute(ud) == "yes" and ud.seen == ((1, 2), {"k": 3})
 
@@ -190,7 +188,5 @@ def test_s2_cb_interface_on_a_method_better():
 
 
 def test_s2_has_smach_interface():
-    assert smach.has_smach_interface(smach.State()) and smach.has_smach_interface(
-        smach.CBInterface(print)
-    )
+    assert smach.has_smach_interface(smach.State()) and smach.has_smach_interface(smach.CBInterface(print))
     assert not smach.has_smach_interface(print) and not smach.has_smach_interface(None)

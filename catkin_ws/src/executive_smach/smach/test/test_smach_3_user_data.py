@@ -202,9 +202,7 @@ def test_s3_s15_8_const_refuses_assignment_and_del_better():
             del target.x
     assert thing.x == 1 and not hasattr(thing.inner, "x")
     writable = types.SimpleNamespace(data={})
-    type_with_items = type(
-        "T", (), {"__setitem__": lambda s, k, v: None, "__delitem__": lambda s, k: None}
-    )
+    type_with_items = type("T", (), {"__setitem__": lambda s, k, v: None, "__delitem__": lambda s, k: None})
     items = view_of(type_with_items())[0].v
     with pytest.raises(TypeError):
         items["a"] = 1

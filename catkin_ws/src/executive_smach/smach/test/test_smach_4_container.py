@@ -73,12 +73,8 @@ def test_s4_callbacks_get_the_containers_own_user_data_and_arguments():
     calls = []
     sm = machine(Says("done"), Says("done"))
     sm.register_start_cb(lambda ud, states, x: calls.append(("start", ud, states, x)), [1])
-    sm.register_transition_cb(
-        lambda ud, states, x: calls.append(("transition", ud, states, x)), [2]
-    )
-    sm.register_termination_cb(
-        lambda ud, states, o, x: calls.append(("end", ud, states, o, x)), cb_args=[3]
-    )
+    sm.register_transition_cb(lambda ud, states, x: calls.append(("transition", ud, states, x)), [2])
+    sm.register_termination_cb(lambda ud, states, o, x: calls.append(("end", ud, states, o, x)), cb_args=[3])
     sm.execute()
     assert calls == [
         ("start", sm.userdata, ["S0"], 1),
@@ -105,11 +101,7 @@ def test_s4_end_callback_comes_in_every_case_with_the_container_idle_better():
     for state, outcome in ((Says("done"), "done"), (Raises(ValueError()), None)):
         sm = machine(state)
         seen = []
-        sm.register_end_cb(
-            lambda ud, o, sm=sm, seen=seen: seen.append(
-                (o, sm.get_active_states(), sm.is_running())
-            )
-        )
+        sm.register_end_cb(lambda ud, o, sm=sm, seen=seen: seen.append((o, sm.get_active_states(), sm.is_running())))
         try:
             sm.execute()
         except smach.InvalidUserCodeError:
@@ -232,9 +224,7 @@ def test_s4_another_thread_cannot_add_to_an_open_container_better():
 def test_s4_construction_in_many_threads():
     results = []
     threads = [
-        threading.Thread(
-            target=lambda: results.append(machine(Says("done"), Says("done")).execute())
-        )
+        threading.Thread(target=lambda: results.append(machine(Says("done"), Says("done")).execute()))
         for _ in range(20)
     ]
     [t.start() for t in threads], [t.join(20) for t in threads]

@@ -182,9 +182,7 @@ def test_s5_order_of_callbacks_and_output_keys():
     )
     sm.register_start_cb(lambda ud, labels: events.append(("start", labels)))
     sm.register_transition_cb(lambda ud, labels: events.append(("to", labels)))
-    sm.register_termination_cb(
-        lambda ud, labels, o: events.append(("end", labels, o, "o" in parent))
-    )
+    sm.register_termination_cb(lambda ud, labels, o: events.append(("end", labels, o, "o" in parent)))
     sm.execute(parent)
     assert events == [("start", ["S0"]), "run", ("to", ["S1"]), ("end", ["S1"], "done", False)]
     assert parent.o == 1

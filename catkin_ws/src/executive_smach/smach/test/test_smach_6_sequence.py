@@ -37,9 +37,7 @@ def test_s6_an_explicit_target_stays_and_none_does_not():
 
 
 def test_s6_other_outcomes_leave_the_sequence():
-    seq = sequence(
-        ("A", Says("failed", registered=["done", "failed"]), None), ("B", Says("done"), None)
-    )
+    seq = sequence(("A", Says("failed", registered=["done", "failed"]), None), ("B", Says("done"), None))
     assert seq.execute() == "failed" and seq["B"].runs == 0
 
 

@@ -135,9 +135,7 @@ def test_s7_child_termination_cb_is_serialised():
         time.sleep(0.01)
         inside.pop()
 
-    concurrence(
-        children={str(i): Says("done") for i in range(8)}, child_termination_cb=ended
-    ).execute()
+    concurrence(children={str(i): Says("done") for i in range(8)}, child_termination_cb=ended).execute()
     assert max(worst) == 1 and len(worst) == 8
 
 
@@ -171,10 +169,7 @@ def test_s7_outcome_cb_non_string_is_logged_and_ignored(log):
 
 
 def test_s7_outcome_cb_is_not_checked_against_the_outcomes():
-    assert (
-        concurrence(children={"A": Says("done")}, outcome_cb=lambda o: "anything").execute()
-        == "anything"
-    )
+    assert concurrence(children={"A": Says("done")}, outcome_cb=lambda o: "anything").execute() == "anything"
 
 
 def test_s7_outcome_cb_that_raises():
@@ -195,9 +190,7 @@ def test_s7_the_map_entry_with_most_conditions_wins():
 
 
 def test_s7_default_outcome():
-    both = concurrence(
-        children={"A": Says("done"), "B": Says("x", registered=["x", "done"])}, outcome_map=ALL_DONE
-    )
+    both = concurrence(children={"A": Says("done"), "B": Says("x", registered=["x", "done"])}, outcome_map=ALL_DONE)
     assert both.execute() == "failed"
 
 
@@ -228,15 +221,11 @@ def test_s7_child_termination_cb_that_raises_ends_the_container_better():
     )
     run = in_thread(both.execute)
     run.join(10)
-    assert isinstance(run.error, smach.InvalidUserCodeError) and "child_termination_cb" in str(
-        run.error
-    )
+    assert isinstance(run.error, smach.InvalidUserCodeError) and "child_termination_cb" in str(run.error)
     assert not both.is_running()
 
 
 def test_s7_a_child_that_calls_exit_ends_the_container_better():
-    run = in_thread(
-        concurrence(children={"A": Raises(SystemExit()), "B": Serves(patience=20)}).execute
-    )
+    run = in_thread(concurrence(children={"A": Raises(SystemExit()), "B": Serves(patience=20)}).execute)
     run.join(10)
     assert isinstance(run.error, smach.InvalidStateError)

@@ -96,9 +96,7 @@ def test_s7_a_request_when_the_last_child_has_just_ended_gives_preempted(moment,
     both = concurrence(
         children={"A": Says("done"), "B": Says("done")},
         outcome_map=ALL_DONE,
-        child_termination_cb=lambda outcomes: (
-            moment == "child_termination_cb" and all(outcomes.values()) and ask()
-        ),
+        child_termination_cb=lambda outcomes: moment == "child_termination_cb" and all(outcomes.values()) and ask(),
     )
     outer = machine(both, after, outcomes=["done", "failed", "preempted"])
     if moment == "transition_cb":
@@ -179,9 +177,7 @@ except KeyboardInterrupt:
     print("INTERRUPTED", both.is_running(), flush=True)
 """
     env = {**os.environ, "PYTHONPATH": os.pathsep.join([p for p in sys.path if p])}
-    process = subprocess.Popen(
-        [sys.executable, "-c", code], stdout=subprocess.PIPE, text=True, env=env
-    )
+    process = subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True, env=env)
     try:
         while "READY" not in process.stdout.readline():
             pass

@@ -7,9 +7,7 @@ import smach
 from machine_parts import Calls, Ignores, Raises, Says, Serves, in_thread, machine
 
 
-def iterator(
-    state, it=(), outcomes=("done", "failed"), label="it_data", exhausted="exhausted", **contained
-):
+def iterator(state, it=(), outcomes=("done", "failed"), label="it_data", exhausted="exhausted", **contained):
     result = smach.Iterator(list(outcomes), [], [], it, label, exhausted)
     with result:
         smach.Iterator.set_contained_state("CHILD", state, **contained)
@@ -154,9 +152,7 @@ def test_s8_termination_callback_gets_the_label_after_the_output_keys():
     with each:
         state = Calls(lambda ud: setattr(ud, "o", 5))
         smach.Iterator.set_contained_state("C", state, loop_outcomes=["done"])
-    each.register_termination_cb(
-        lambda ud, states, outcome: seen.append((states, outcome, parent.o))
-    )
+    each.register_termination_cb(lambda ud, states, outcome: seen.append((states, outcome, parent.o)))
     assert each.execute(parent) == "done" and seen == [("C", "done", 5)]
 
 
@@ -192,9 +188,7 @@ def test_s8_without_contained_state():
 
 
 def test_s8_in_a_machine_and_pickled():
-    each = iterator(
-        Says("done"), [1, 2], outcomes=["done"], exhausted="done", loop_outcomes=["done"]
-    )
+    each = iterator(Says("done"), [1, 2], outcomes=["done"], exhausted="done", loop_outcomes=["done"])
     assert machine(pickle.loads(pickle.dumps(each))).execute() == "done"
 
 

@@ -56,9 +56,7 @@ def nested(depth: int, seconds: float) -> smach.StateMachine:
     with machine:
         if depth > 1:
             smach.StateMachine.add("CHILD", nested(depth - 1, seconds), {"done": "TICK"})
-        smach.StateMachine.add(
-            "TICK", Tick(seconds), {"once": "CHILD" if depth > 1 else "TICK", "twice": "done"}
-        )
+        smach.StateMachine.add("TICK", Tick(seconds), {"once": "CHILD" if depth > 1 else "TICK", "twice": "done"})
     return machine
 
 
@@ -111,9 +109,7 @@ def flags_up(state: smach.State) -> int:
 
 def chain(count: int) -> tuple[smach.StateMachine, list[smach.State]]:
     """A machine of `count` states that do nothing, and the states."""
-    states: list[smach.State] = [
-        smach.CBState(lambda ud: "next", outcomes=["next"]) for _ in range(count)
-    ]
+    states: list[smach.State] = [smach.CBState(lambda ud: "next", outcomes=["next"]) for _ in range(count)]
     machine = smach.StateMachine(["end"])
     with machine:
         for i, state in enumerate(states):
@@ -303,15 +299,11 @@ def watch() -> dict[str, Any]:
     finally:
         node.kill()
         node.wait()
-    report = json.loads(
-        next(line for line in output.splitlines() if line.startswith("REPORT "))[7:]
-    )
+    report = json.loads(next(line for line in output.splitlines() if line.startswith("REPORT "))[7:])
     time.sleep(1.0)
     rospy.signal_shutdown("done")
     beats_sent = 2 * CONTAINERS * report["rounds"]
-    beats_got = sum(
-        min(c, report["rounds"]) for counter in (beats, structures) for c in counter.values()
-    )
+    beats_got = sum(min(c, report["rounds"]) for counter in (beats, structures) for c in counter.values())
     moves_got = sum(min(moves[path], count) for path, count in report["sent"].items())
     return {
         "beats": 100.0 * beats_got / beats_sent,
@@ -324,9 +316,7 @@ def watch() -> dict[str, Any]:
     }
 
 
-def row(
-    figure: str, value: float, unit: str, goal: str, ok: bool, peer=None, peer_value=None
-) -> dict:
+def row(figure: str, value: float, unit: str, goal: str, ok: bool, peer=None, peer_value=None) -> dict:
     """One row of the bench table."""
     return {"bench": "smach", "figure": figure, "value": round(value, 3), "unit": unit, "goal": goal, "peer": peer,
             "peer_value": peer_value and round(peer_value, 3), "ok": ok}  # fmt: skip

@@ -39,9 +39,7 @@ class Viewer:
         self.first_beat = None
         self._subs = [
             rospy.Subscriber(server + STATUS_TOPIC, SmachContainerStatus, self.on_status),
-            rospy.Subscriber(
-                server + STRUCTURE_TOPIC, SmachContainerStructure, self.structures.append
-            ),
+            rospy.Subscriber(server + STRUCTURE_TOPIC, SmachContainerStructure, self.structures.append),
         ]
 
     def on_status(self, message):
@@ -138,9 +136,7 @@ class TestSection11(unittest.TestCase):
         self.assertEqual(root.children, ["INNER", "BOTH", "EACH"])
         self.assertEqual(root.container_outcomes, ["end"])
         edges = list(zip(root.internal_outcomes, root.outcomes_from, root.outcomes_to, strict=True))
-        self.assertEqual(
-            edges, [("done", "INNER", "BOTH"), ("done", "BOTH", "EACH"), ("done", "EACH", "end")]
-        )
+        self.assertEqual(edges, [("done", "INNER", "BOTH"), ("done", "BOTH", "EACH"), ("done", "EACH", "end")])
         inner = by_path["/SM_ROOT/INNER"]
         self.assertEqual(inner.outcomes_to, ["None", "GATE"], "falls through")
         self.assertEqual(by_path["/SM_ROOT/BOTH"].outcomes_to, ["done"])
@@ -173,12 +169,8 @@ class TestSection11(unittest.TestCase):
     def test_s11_heartbeats_of_every_container(self):
         self.start()
         for path in ("/SM_ROOT", "/SM_ROOT/INNER", "/SM_ROOT/BOTH", "/SM_ROOT/EACH"):
-            self.assertTrue(
-                wait_for(lambda p=path: self.viewer.infos(p).count("HEARTBEAT") >= 2), path
-            )
-        self.assertTrue(
-            wait_for(lambda: [m.path for m in self.viewer.structures].count("/SM_ROOT") >= 2)
-        )
+            self.assertTrue(wait_for(lambda p=path: self.viewer.infos(p).count("HEARTBEAT") >= 2), path)
+        self.assertTrue(wait_for(lambda: [m.path for m in self.viewer.structures].count("/SM_ROOT") >= 2))
 
     def test_s12_a_new_viewer_gets_no_beat_until_its_window_exists(self):
         smach_ros.introspection.WELCOME_DELAY = 1.5
@@ -255,15 +247,11 @@ class TestSection11(unittest.TestCase):
         server = smach_ros.IntrospectionServer("/quiet", self.root, "/SM_ROOT")
         server.start()
         ours = set(threading.enumerate()) - before
-        self.assertEqual(
-            [t.name for t in ours if "introspection" in t.name], ["smach_introspection:/quiet"]
-        )
+        self.assertEqual([t.name for t in ours if "introspection" in t.name], ["smach_introspection:/quiet"])
         server.stop()
         self.assertFalse([t for t in threading.enumerate() if "introspection:/quiet" in t.name])
         self.assertEqual((self.root._start_cbs, self.root._transition_cbs), ([], []))
-        self.assertNotIn(
-            "/quiet" + STATUS_TOPIC, [name for name, _ in rospy.get_published_topics()]
-        )
+        self.assertNotIn("/quiet" + STATUS_TOPIC, [name for name, _ in rospy.get_published_topics()])
 
     def test_s11_stop_sends_what_is_left(self):
         self.start()
@@ -288,9 +276,7 @@ class TestSection11(unittest.TestCase):
         ud = smach.UserData()
         ud.count, ud.raw = 7, b"\x01"
         client = smach_ros.IntrospectionClient()
-        self.assertTrue(
-            client.set_initial_state(self.name, "/SM_ROOT", ["EACH"], ud, rospy.Duration(LIMIT))
-        )
+        self.assertTrue(client.set_initial_state(self.name, "/SM_ROOT", ["EACH"], ud, rospy.Duration(LIMIT)))
         self.assertEqual(self.root.get_initial_states(), ["EACH"])
         self.assertEqual((self.root.userdata.count, self.root.userdata.raw), (7, b"\x01"))
         self.assertTrue(wait_for(lambda: "REMOTE_INIT" in self.viewer.infos("/SM_ROOT")))
@@ -299,32 +285,22 @@ class TestSection11(unittest.TestCase):
 
     def test_s11_client_without_timeout_waits_for_the_connection_better(self):
         self.start()
-        self.assertTrue(
-            smach_ros.IntrospectionClient().set_initial_state(self.name, "/SM_ROOT", ["BOTH"])
-        )
+        self.assertTrue(smach_ros.IntrospectionClient().set_initial_state(self.name, "/SM_ROOT", ["BOTH"]))
         self.assertTrue(wait_for(lambda: self.root.get_initial_states() == ["BOTH"]))
 
     def test_s11_client_unknown_state_or_path(self):
         self.start()
         client = smach_ros.IntrospectionClient()
         for path, states in (("/SM_ROOT", ["NOWHERE"]), ("/NOWHERE", ["EACH"])):
-            self.assertFalse(
-                client.set_initial_state(self.name, path, states, timeout=rospy.Duration(1.0))
-            )
+            self.assertFalse(client.set_initial_state(self.name, path, states, timeout=rospy.Duration(1.0)))
         self.assertEqual(self.root.get_initial_states(), ["INNER"])
 
     def test_s11_client_nobody_there(self):
-        self.assertFalse(
-            smach_ros.IntrospectionClient().set_initial_state(
-                "/nobody", "/SM_ROOT", ["A"], timeout=0.3
-            )
-        )
+        self.assertFalse(smach_ros.IntrospectionClient().set_initial_state("/nobody", "/SM_ROOT", ["A"], timeout=0.3))
 
     def test_s11_hostile_commands_change_nothing_and_run_nothing(self):
         self.start()
-        pub = rospy.Publisher(
-            self.name + INIT_TOPIC, SmachContainerInitialStatusCmd, queue_size=1000
-        )
+        pub = rospy.Publisher(self.name + INIT_TOPIC, SmachContainerInitialStatusCmd, queue_size=1000)
         self.assertTrue(wait_for(lambda: pub.get_num_connections() > 0))
 
         def b64(raw):
@@ -346,9 +322,7 @@ class TestSection11(unittest.TestCase):
         self.assertTrue(wait_for(lambda: self.root.get_initial_states() == ["BOTH"]))
         self.assertFalse(os.path.exists(NEVER))
         self.assertEqual((self.root.userdata.count, self.root.userdata.last), (3, 1))
-        self.assertTrue(
-            wait_for(lambda: decode(self.viewer.of("/SM_ROOT")[-1].local_data).get("last") == 1)
-        )
+        self.assertTrue(wait_for(lambda: decode(self.viewer.of("/SM_ROOT")[-1].local_data).get("last") == 1))
 
     def test_s11_a_state_that_is_no_container_is_not_shown(self):
         server = smach_ros.IntrospectionServer("/leaf", smach.State(["done"]), "/SM_ROOT")
@@ -368,11 +342,7 @@ class TestSection11(unittest.TestCase):
         self.viewer.statuses.clear()
         machine.execute()
         self.assertTrue(wait_for(lambda: "END end" in self.viewer.infos("/LONG")))
-        active = [
-            s.active_states[0]
-            for s in self.viewer.of("/LONG")
-            if not s.info.startswith(("TERM", "HEART"))
-        ]
+        active = [s.active_states[0] for s in self.viewer.of("/LONG") if not s.info.startswith(("TERM", "HEART"))]
         self.assertEqual(active, [f"S{i}" for i in range(400)] + ["None"])
 
 

@@ -17,9 +17,7 @@ class ReferenceServer:
     def __init__(self, name):
         self.goals, self.cancelled = [], 0
         self.release = threading.Event()  # lets a deaf goal end
-        self._server = actionlib.SimpleActionServer(
-            name, TestAction, execute_cb=self._execute, auto_start=False
-        )
+        self._server = actionlib.SimpleActionServer(name, TestAction, execute_cb=self._execute, auto_start=False)
         self._server.register_preempt_callback(self._on_cancel)
         self._server.start()
 

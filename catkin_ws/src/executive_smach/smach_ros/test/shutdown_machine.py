@@ -69,9 +69,7 @@ def main():
     server.start()
     if kind.startswith("handler"):
         smach_ros.set_preempt_handler(machine)
-    machine.register_start_cb(
-        lambda *args: threading.Timer(0.5, print, ["READY"], {"flush": True}).start()
-    )
+    machine.register_start_cb(lambda *args: threading.Timer(0.5, print, ["READY"], {"flush": True}).start())
     if kind == "handler_in_main_thread":
         print("OUTCOME", machine.execute(), flush=True)
         return

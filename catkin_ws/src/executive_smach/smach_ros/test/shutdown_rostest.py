@@ -36,10 +36,7 @@ class TestShutdown(unittest.TestCase):
         cls.service = rospy.Service("hangs", Trigger, hang)
         script = os.path.join(HERE, "shutdown_machine.py")
         cls.processes = {
-            kind: subprocess.Popen(
-                [sys.executable, script, kind], stdout=subprocess.PIPE, text=True
-            )
-            for kind in KINDS
+            kind: subprocess.Popen([sys.executable, script, kind], stdout=subprocess.PIPE, text=True) for kind in KINDS
         }
 
     @classmethod

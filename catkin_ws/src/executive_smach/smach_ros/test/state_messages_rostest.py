@@ -53,9 +53,7 @@ class TestSection9Service(unittest.TestCase):
         make = smach_ros.ServiceState
         self.assertEqual(make("set", SetBool).execute(self.ud), "aborted", "the service fails")
         self.assertEqual(make("set", SetBool, request_key="absent").execute(self.ud), "aborted")
-        self.assertEqual(
-            make("set", SetBool, request_cb=lambda ud, r: 1 / 0).execute(self.ud), "aborted"
-        )
+        self.assertEqual(make("set", SetBool, request_cb=lambda ud, r: 1 / 0).execute(self.ud), "aborted")
 
     def test_s9_response(self):
         @smach.cb_interface(outcomes=["special"], output_keys=["own"])
@@ -74,9 +72,7 @@ class TestSection9Service(unittest.TestCase):
         )
         self.assertEqual(set(state.get_registered_output_keys()), {"own", "whole", "success"})
         self.assertEqual(state.execute(self.ud), "special")
-        self.assertEqual(
-            (self.ud.own, self.ud.whole.message, self.ud.success), ("text", "text", True)
-        )
+        self.assertEqual((self.ud.own, self.ud.whole.message, self.ud.success), ("text", "text", True))
         for bad in (lambda ud, r: "nothing", lambda ud, r: 1 / 0):
             self.assertEqual(
                 smach_ros.ServiceState("set", SetBool, true, response_cb=bad).execute(self.ud),
@@ -123,9 +119,7 @@ class TestSection9Topic(unittest.TestCase):
 
     def test_s9_monitor_valid_after_max_checks(self):
         count = []
-        state = smach_ros.MonitorState(
-            "flag", Bool, lambda ud, msg: count.append(1) or msg.data, max_checks=3
-        )
+        state = smach_ros.MonitorState("flag", Bool, lambda ud, msg: count.append(1) or msg.data, max_checks=3)
         self.assertEqual(state.get_registered_outcomes(), ("valid", "invalid", "preempted"))
         self.assertEqual(state.execute(self.ud), "valid")
         self.assertEqual(len(count), 3)
@@ -139,9 +133,7 @@ class TestSection9Topic(unittest.TestCase):
         self.value = False
         run.join(LIMIT)
         self.assertEqual(run.result, "invalid")
-        self.assertEqual(
-            smach_ros.MonitorState("flag", Bool, lambda ud, msg: 1 / 0).execute(self.ud), "invalid"
-        )
+        self.assertEqual(smach_ros.MonitorState("flag", Bool, lambda ud, msg: 1 / 0).execute(self.ud), "invalid")
 
     def test_s9_monitor_user_data(self):
         def cond(ud, msg):
@@ -167,18 +159,14 @@ class TestSection9Topic(unittest.TestCase):
     def test_s9_monitor_in_a_concurrence_is_preempted(self):
         both = smach.Concurrence(["done", "preempted"], "done", child_termination_cb=lambda o: True)
         with both:
-            smach.Concurrence.add(
-                "M", smach_ros.MonitorState("silence", Empty, lambda ud, msg: True)
-            )
+            smach.Concurrence.add("M", smach_ros.MonitorState("silence", Empty, lambda ud, msg: True))
             smach.Concurrence.add("S", smach.CBState(lambda ud: "ok", outcomes=["ok"]))
         self.assertEqual([both.execute() for _ in range(5)], ["done"] * 5)
 
 
 class TestSection9Condition(unittest.TestCase):
     def run_state(self, cond, **kwargs):
-        return smach_ros.ConditionState(cond, poll_rate=rospy.Duration(0.01), **kwargs).execute(
-            smach.UserData()
-        )
+        return smach_ros.ConditionState(cond, poll_rate=rospy.Duration(0.01), **kwargs).execute(smach.UserData())
 
     def test_s9_condition_true(self):
         self.assertEqual(self.run_state(lambda ud: True), "true")
@@ -188,23 +176,17 @@ class TestSection9Condition(unittest.TestCase):
     def test_s9_condition_max_checks_allows_one_more(self):
         for checks, calls in ((1, 2), (3, 4)):
             count = []
-            self.assertEqual(
-                self.run_state(lambda ud, c=count: c.append(1), max_checks=checks), "false"
-            )
+            self.assertEqual(self.run_state(lambda ud, c=count: c.append(1), max_checks=checks), "false")
             self.assertEqual(len(count), calls)
 
     def test_s9_condition_unlimited_with_timeout(self):
         count = []
-        outcome = self.run_state(
-            lambda ud: count.append(1), max_checks=-1, timeout=rospy.Duration(0.3)
-        )
+        outcome = self.run_state(lambda ud: count.append(1), max_checks=-1, timeout=rospy.Duration(0.3))
         self.assertEqual(outcome, "false")
         self.assertGreater(len(count), 3)
 
     def test_s9_condition_preempted(self):
-        state = smach_ros.ConditionState(
-            lambda ud: False, max_checks=-1, poll_rate=rospy.Duration(60)
-        )
+        state = smach_ros.ConditionState(lambda ud: False, max_checks=-1, poll_rate=rospy.Duration(60))
         run = in_thread(state.execute, smach.UserData())
         time.sleep(0.1)
         state.request_preempt()

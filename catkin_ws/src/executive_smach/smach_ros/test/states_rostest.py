@@ -26,6 +26,8 @@ from reference_server import (
 from states_support import LIMIT, in_thread, wait_for
 
 HERE = os.path.dirname(os.path.abspath(__file__))
+
+
 def action_state(goal, name="reference", **kwargs):
     return smach_ros.SimpleActionState(name, TestAction, goal=TestGoal(goal=goal), **kwargs)
 
@@ -41,9 +43,7 @@ class TestSection9Action(unittest.TestCase):
 
     def test_s9_outcomes_and_constants(self):
         state = action_state(SUCCEED, outcomes=["extra"])
-        self.assertEqual(
-            state.get_registered_outcomes(), ("succeeded", "aborted", "preempted", "extra")
-        )
+        self.assertEqual(state.get_registered_outcomes(), ("succeeded", "aborted", "preempted", "extra"))
         names = ("WAITING_FOR_SERVER", "INACTIVE", "ACTIVE", "PREEMPTING", "COMPLETED")
         self.assertEqual([getattr(state, name) for name in names], [0, 1, 2, 3, 4])
 
@@ -87,9 +87,7 @@ class TestSection9Action(unittest.TestCase):
         self.assertEqual(state.execute(self.ud), "aborted")
         state = smach_ros.SimpleActionState("reference", TestAction, goal_slots=["goal"])
         self.assertEqual(state.execute(self.ud), "aborted", "a missing key")
-        state = smach_ros.SimpleActionState(
-            "reference", TestAction, goal_cb=lambda ud, goal: "text"
-        )
+        state = smach_ros.SimpleActionState("reference", TestAction, goal_cb=lambda ud, goal: "text")
         self.assertEqual(state.execute(self.ud), "aborted", "no goal")
 
     def test_s9_result_key_slots_and_callback(self):
@@ -101,21 +99,15 @@ class TestSection9Action(unittest.TestCase):
             ud.own = 1
             return "special"
 
-        state = action_state(
-            SUCCEED, result_key="whole", result_slots=["result"], result_cb=result_cb
-        )
+        state = action_state(SUCCEED, result_key="whole", result_slots=["result"], result_cb=result_cb)
         self.assertEqual(set(state.get_registered_output_keys()), {"own", "whole", "result"})
         self.assertEqual(state.execute(self.ud), "special")
         self.assertEqual(got, [(GoalStatus.SUCCEEDED, 101)])
         self.assertEqual((self.ud.own, self.ud.whole.result, self.ud.result), (1, 101, 101))
 
     def test_s9_result_cb_unregistered_raising_and_with_arguments(self):
-        self.assertEqual(
-            action_state(SUCCEED, result_cb=lambda *a: "nothing").execute(self.ud), "aborted"
-        )
-        self.assertEqual(
-            action_state(SUCCEED, result_cb=lambda *a: 1 / 0).execute(self.ud), "aborted"
-        )
+        self.assertEqual(action_state(SUCCEED, result_cb=lambda *a: "nothing").execute(self.ud), "aborted")
+        self.assertEqual(action_state(SUCCEED, result_cb=lambda *a: 1 / 0).execute(self.ud), "aborted")
         got = []
         state = action_state(
             SUCCEED,
@@ -176,9 +168,7 @@ class TestSection9Action(unittest.TestCase):
     def test_s15_2_cancelled_but_succeeded_the_machine_carries_the_request_on(self):
         machine = smach.StateMachine(["done", "preempted", "aborted"])
         with machine:
-            smach.StateMachine.add(
-                "ACT", action_state(SUCCEED_WHEN_CANCELLED), {"succeeded": "NEXT"}
-            )
+            smach.StateMachine.add("ACT", action_state(SUCCEED_WHEN_CANCELLED), {"succeeded": "NEXT"})
             smach.StateMachine.add("NEXT", action_state(UNTIL_CANCELLED), {"succeeded": "done"})
         run = in_thread(machine.execute)
         self.assertTrue(wait_for(lambda: self.server.goals))
@@ -196,9 +186,7 @@ class TestSection9Action(unittest.TestCase):
 
     def test_s9_s15_3_preempt_timeout_gives_up_better(self):
         for how in ("exec_timeout", "request"):
-            state = action_state(
-                DEAF, preempt_timeout=0.3, exec_timeout=0.2 if how == "exec_timeout" else None
-            )
+            state = action_state(DEAF, preempt_timeout=0.3, exec_timeout=0.2 if how == "exec_timeout" else None)
             run = in_thread(state.execute, self.ud)
             self.assertTrue(wait_for(lambda: self.server.goals))
             if how == "request":
@@ -223,9 +211,7 @@ class TestSection9Action(unittest.TestCase):
         self.assertEqual(run.result, "preempted")
 
     def test_s15_3_the_server_dies_better(self):
-        process = subprocess.Popen(
-            [sys.executable, os.path.join(HERE, "reference_server.py"), "mortal"]
-        )
+        process = subprocess.Popen([sys.executable, os.path.join(HERE, "reference_server.py"), "mortal"])
         try:
             state = action_state(UNTIL_CANCELLED, name="mortal")
             run = in_thread(state.execute, self.ud)

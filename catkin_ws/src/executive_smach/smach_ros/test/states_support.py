@@ -8,9 +8,7 @@ LIMIT = 20.0
 
 def in_thread(function, *args):
     """Runs it; .result after .join()."""
-    thread = threading.Thread(
-        target=lambda: setattr(thread, "result", function(*args)), daemon=True
-    )
+    thread = threading.Thread(target=lambda: setattr(thread, "result", function(*args)), daemon=True)
     thread.result = "did not end"
     thread.start()
     return thread

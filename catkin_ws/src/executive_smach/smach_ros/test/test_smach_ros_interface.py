@@ -17,16 +17,14 @@ SIGNATURES = {
     smach.Container: "outcomes input_keys output_keys",
     smach.StateMachine: "outcomes input_keys output_keys",
     smach.Sequence: "outcomes connector_outcome input_keys output_keys",
-    smach.Concurrence: "outcomes default_outcome input_keys output_keys outcome_map outcome_cb "
-    "child_termination_cb",
+    smach.Concurrence: "outcomes default_outcome input_keys output_keys outcome_map outcome_cb child_termination_cb",
     smach.Iterator: "outcomes input_keys output_keys it it_label exhausted_outcome",
     smach.Remapper: "ud input_keys output_keys remapping",
     smach.StateMachine.add: "label state transitions remapping constants",
     smach.StateMachine.add_auto: "label state connector_outcomes transitions remapping constants",
     smach.Sequence.add: "label state transitions remapping",
     smach.Concurrence.add: "label state remapping",
-    smach.Iterator.set_contained_state: "label state loop_outcomes break_outcomes "
-    "final_outcome_map",
+    smach.Iterator.set_contained_state: "label state loop_outcomes break_outcomes final_outcome_map",
     smach.Iterator.set_iteritems: "it it_label",
     smach.UserData.extract: "self keys remapping",
     smach.UserData.merge: "self ud keys remapping",
@@ -44,15 +42,12 @@ SIGNATURES = {
     "feedback_slots_map result_slots_map expand_goal_slots pack_result_slots",
     smach_ros.IntrospectionServer: "server_name state path",
     ContainerProxy: "server_name container path update_rate",
-    smach_ros.IntrospectionClient.set_initial_state: "self server path initial_states "
-    "initial_userdata timeout",
+    smach_ros.IntrospectionClient.set_initial_state: "self server path initial_states initial_userdata timeout",
     smach_ros.set_preempt_handler: "container",
 }
 
 
-@pytest.mark.parametrize(
-    "function, names", SIGNATURES.items(), ids=lambda v: getattr(v, "__qualname__", "")
-)
+@pytest.mark.parametrize("function, names", SIGNATURES.items(), ids=lambda v: getattr(v, "__qualname__", ""))
 def test_s13_signatures(function, names):
     assert list(inspect.signature(function).parameters) == names.split()
 
@@ -100,6 +95,7 @@ def test_s0_the_core_does_not_import_ros():
 def test_s0_manifest_loads_and_version_is_2_5():
     import roslib
     import rospkg
+
     roslib.load_manifest("smach_ros")
     for name in ("smach", "smach_msgs", "smach_ros"):
         assert rospkg.RosPack().get_manifest(name).version.startswith("2.5.")

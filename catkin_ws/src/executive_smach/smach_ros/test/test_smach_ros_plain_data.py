@@ -78,9 +78,7 @@ class Colour(enum.IntEnum):
 
 def test_s15_4_what_is_not_plain_shows_as_its_repr_better():
     lock = threading.Lock()
-    shown = decode(
-        encode({"lock": lock, "f": len, "odd": Odd(), "set": {1}, "inside": [lock, {"x": lock}]})
-    )
+    shown = decode(encode({"lock": lock, "f": len, "odd": Odd(), "set": {1}, "inside": [lock, {"x": lock}]}))
     assert shown["lock"] == repr(lock) == shown["inside"][0] == shown["inside"][1]["x"]
     assert shown["f"] == repr(len) and shown["set"] == "{1}" and "Odd" in shown["odd"]
 
@@ -103,6 +101,7 @@ def test_s15_4_subclasses_of_plain_types_become_plain():
 
 def test_s15_4_numpy():
     import numpy
+
     shown = decode(encode({"i": numpy.int32(3), "f": numpy.float32(0.5), "a": numpy.zeros(3)}))
     assert shown["i"] == 3 and shown["f"] == 0.5 and isinstance(shown["a"], str)
 
@@ -133,10 +132,7 @@ def test_s15_4_cycles_depth_and_size_end():
             }
         )
     )
-    assert (
-        set(shown) == {"loop", "deep", "shared", "long", "s"}
-        and len(encode({"s": "x" * 10**7})) < 200_000
-    )
+    assert set(shown) == {"loop", "deep", "shared", "long", "s"} and len(encode({"s": "x" * 10**7})) < 200_000
 
 
 def test_s15_4_keys_that_are_no_strings():
@@ -211,18 +207,14 @@ def hostile():
     yield "old strings", b"\x80\x02}U\x01aK\x01s."
 
 
-@pytest.mark.parametrize(
-    "name, raw", hostile(), ids=lambda value: value if isinstance(value, str) else ""
-)
+@pytest.mark.parametrize("name, raw", hostile(), ids=lambda value: value if isinstance(value, str) else "")
 def test_s11_hostile_pickles_are_refused(name, raw):
     with pytest.raises(InvalidDataError):
         decode(b64(raw))
     assert fired == [] and not os.path.exists("/tmp/never")
 
 
-@pytest.mark.parametrize(
-    "text", ["hello", "====", "gAJ9cQAu\n", "\x00", "ä", "A" * (2 << 20), "gAJ9cQ"]
-)
+@pytest.mark.parametrize("text", ["hello", "====", "gAJ9cQAu\n", "\x00", "ä", "A" * (2 << 20), "gAJ9cQ"])
 def test_s11_texts_that_are_no_base64_pickle_are_refused(text):
     with pytest.raises(InvalidDataError):
         decode(text)
@@ -230,9 +222,7 @@ def test_s11_texts_that_are_no_base64_pickle_are_refused(text):
 
 def test_s11_ten_thousand_damaged_pickles_never_do_more_than_be_refused():
     seed = random.Random(11)
-    sources = [pickle.dumps(PLAIN, p) for p in range(6)] + [
-        pickle.dumps({"a": Bomb()}, p) for p in range(6)
-    ]
+    sources = [pickle.dumps(PLAIN, p) for p in range(6)] + [pickle.dumps({"a": Bomb()}, p) for p in range(6)]
     for _ in range(10_000):
         raw = bytearray(seed.choice(sources))
         for _ in range(seed.randint(1, 6)):

@@ -34,9 +34,7 @@ class Work(smach.State):
     """What the wrapped machine does, by the number in the goal."""
 
     def __init__(self):
-        super().__init__(
-            ["succeeded", "aborted", "preempted", "other"], ["action_goal"], ["action_result"]
-        )
+        super().__init__(["succeeded", "aborted", "preempted", "other"], ["action_goal"], ["action_result"])
         self.seen = []
 
     def execute(self, ud):
@@ -68,9 +66,7 @@ class TestSection9Wrapper(unittest.TestCase):
         return client
 
     def machine(self, state=None):
-        machine = smach.StateMachine(
-            ["succeeded", "aborted", "preempted", "other"], ["action_goal"], ["action_result"]
-        )
+        machine = smach.StateMachine(["succeeded", "aborted", "preempted", "other"], ["action_goal"], ["action_result"])
         with machine:
             smach.StateMachine.add("WORK", state or Work())
         return machine
@@ -86,9 +82,7 @@ class TestSection9Wrapper(unittest.TestCase):
         self.assertEqual(self.send(client, ABORT), (GoalStatus.ABORTED, 1000 + ABORT))
         self.assertEqual(self.send(client, 50), (GoalStatus.ABORTED, 1050), "in none of the lists")
         self.assertEqual(self.send(client, 99)[0], GoalStatus.ABORTED, "an error")
-        self.assertEqual(
-            self.send(client, SUCCEED)[0], GoalStatus.SUCCEEDED, "works after an error"
-        )
+        self.assertEqual(self.send(client, SUCCEED)[0], GoalStatus.SUCCEEDED, "works after an error")
 
     def test_s9_wrapper_cancel_and_s15_2_nothing_left_over(self):
         state = Work()
@@ -96,9 +90,7 @@ class TestSection9Wrapper(unittest.TestCase):
         for _ in range(5):
             client.send_goal(TestGoal(goal=UNTIL_CANCELLED))
             before = len(state.seen)
-            self.assertTrue(
-                wait_for(lambda before=before: len(state.seen) > before or rospy.is_shutdown())
-            )
+            self.assertTrue(wait_for(lambda before=before: len(state.seen) > before or rospy.is_shutdown()))
             client.cancel_goal()
             self.assertTrue(client.wait_for_result(rospy.Duration(LIMIT)))
             self.assertEqual(client.get_state(), GoalStatus.PREEMPTED)
@@ -123,9 +115,7 @@ class TestSection9Wrapper(unittest.TestCase):
 
         with machine:
             smach.StateMachine.add("A", smach.CBState(first), {"ok": "B"})
-            smach.StateMachine.add(
-                "B", smach.CBState(lambda ud: "succeeded", outcomes=["succeeded"])
-            )
+            smach.StateMachine.add("B", smach.CBState(lambda ud: "succeeded", outcomes=["succeeded"]))
         client = self.serve(machine, goal_slots_map={"goal": "n"}, result_slots_map={"result": "m"})
         got = []
         state = self.send(client, 21, feedback_cb=lambda feedback: got.append(feedback.feedback))
@@ -154,9 +144,7 @@ class TestSection9Wrapper(unittest.TestCase):
             return "succeeded"
 
         seen = []
-        machine = smach.StateMachine(
-            ["succeeded"], ["action_goal", "action_result"], ["action_result"]
-        )
+        machine = smach.StateMachine(["succeeded"], ["action_goal", "action_result"], ["action_result"])
         with machine:
             keys = {"input_keys": ["action_goal"], "io_keys": ["action_result"]}
             smach.StateMachine.add("FILL", smach.CBState(fill, outcomes=["succeeded"], **keys))
@@ -167,9 +155,7 @@ class TestSection9Wrapper(unittest.TestCase):
 
     def test_s9_wrapper_bad_slots(self):
         with self.assertRaises(smach.InvalidStateError):
-            smach_ros.ActionServerWrapper(
-                "x", TestAction, self.machine(), goal_slots_map={"nothing": "n"}
-            )
+            smach_ros.ActionServerWrapper("x", TestAction, self.machine(), goal_slots_map={"nothing": "n"})
 
 
 if __name__ == "__main__":

@@ -61,11 +61,18 @@ class HandSerialDriver:
     several threads.
     """
 
-    def __init__(self, serial_port: str | None = None, *, dialect: str | None = None,
-                 preshapes: Mapping[str, Sequence[int]] | None = None,
-                 send_preshape: bool = WIRE.send_preshape, transport: Transport | None = None,
-                 clock: Clock | None = None, trace: TraceHook | None = None,
-                 read_timeout: float = WIRE.read_timeout_s):
+    def __init__(
+        self,
+        serial_port: str | None = None,
+        *,
+        dialect: str | None = None,
+        preshapes: Mapping[str, Sequence[int]] | None = None,
+        send_preshape: bool = WIRE.send_preshape,
+        transport: Transport | None = None,
+        clock: Clock | None = None,
+        trace: TraceHook | None = None,
+        read_timeout: float = WIRE.read_timeout_s,
+    ):
         """Open the port, bring the line in step, and ask the hand for one status.
 
         `serial_port` is a device, a pty or `socket://host:port`; None takes the one serial device
@@ -78,11 +85,14 @@ class HandSerialDriver:
         self.dialect = dialect if dialect is not None else WIRE.dialect
         if self.dialect not in DIALECTS:
             raise ValueError(f"dialect must be {' or '.join(DIALECTS)}; got {dialect!r}")
-        self.preshapes = {mode: tuple(_positions(list(positions))) for mode, positions in
-                          (preshapes or grasps.load_preshapes()).items()}
+        self.preshapes = {
+            mode: tuple(_positions(list(positions)))
+            for mode, positions in (preshapes or grasps.load_preshapes()).items()
+        }
         if not LEAST_READ_TIMEOUT_S <= read_timeout <= LARGEST_READ_TIMEOUT_S:
-            raise ValueError(f"read_timeout must be {LEAST_READ_TIMEOUT_S}.."
-                             f"{LARGEST_READ_TIMEOUT_S} s; got {read_timeout!r}")
+            raise ValueError(
+                f"read_timeout must be {LEAST_READ_TIMEOUT_S}..{LARGEST_READ_TIMEOUT_S} s; got {read_timeout!r}"
+            )
         self.send_preshape = send_preshape
         self._grasp: bytes | None = None
         self._grasp_mode: tuple[str, str] | None = None
@@ -95,7 +105,8 @@ class HandSerialDriver:
             if not self.line.answers(_STATUS[0], 1) and not self.line.answers(_STATUS[0], 1):
                 raise HandPortError(
                     f"no hand answers on {self.port}: check that it is powered, that this is its "
-                    "port, and that it is not calibrating")
+                    "port, and that it is not calibrating"
+                )
         except BaseException:
             self.line.close()
             raise
@@ -135,8 +146,9 @@ class HandSerialDriver:
 
     def _check_free(self) -> None:
         if self._calibrating:
-            raise HandCalibratingError(f"the hand on {self.port} calibrates and discards every "
-                                       "request; wait until `calibrating` is False")
+            raise HandCalibratingError(
+                f"the hand on {self.port} calibrates and discards every request; wait until `calibrating` is False"
+            )
 
     def _value(self, frame: bytes, length: int, slack: Slack) -> int:
         if self._calibrating:
@@ -182,17 +194,21 @@ class HandSerialDriver:
                 raise HandCalibrationError(
                     f"the hand on {self.port} did not answer within {limit:.0f} s after the {data} "
                     "calibration began; cycle its power and look for a blocked finger",
-                    Reason.TIME_LIMIT)
+                    Reason.TIME_LIMIT,
+                )
             clock.sleep(WIRE.calibration_poll_s)
             answered = answered + 1 if self.line.answers(poll, 1) else 0
-        wrong = [motor for motor in _MOTORS
-                 if self.line.value(_STATUS[motor], 1, STATUS_SLACK) & 0xFE
-                 != WIRE.status_after_calibration & 0xFE]
+        wrong = [
+            motor
+            for motor in _MOTORS
+            if self.line.value(_STATUS[motor], 1, STATUS_SLACK) & 0xFE != WIRE.status_after_calibration & 0xFE
+        ]
         if wrong:
             raise HandCalibrationError(
                 f"the {data} calibration on {self.port} left motor(s) "
                 f"{', '.join(map(str, wrong))} not fully open: free the fingers and repeat it",
-                Reason.HAND_STALLED)
+                Reason.HAND_STALLED,
+            )
 
     def stop_all(self) -> None:
         """Stop every motor where it is. Waits for no running request, only for a running frame."""
@@ -206,8 +222,7 @@ class HandSerialDriver:
         _motor(motor)
         _whole("speed", speed, WIRE.speed_max)
         if not isinstance(is_close_direction, (bool, int)) or is_close_direction not in (0, 1):
-            raise ValueError("is_close_direction must be True (close) or False (open); got "
-                             f"{is_close_direction!r}")
+            raise ValueError(f"is_close_direction must be True (close) or False (open); got {is_close_direction!r}")
         self._command(frames.move_motor(motor, speed, bool(is_close_direction)))
 
     def set_finger_position(self, finger: int, position: int) -> None:
@@ -271,8 +286,7 @@ class HandSerialDriver:
         for motor in _MOTORS:
             reading = self.get_finger_status(motor)
             reading["position"] = self.get_finger_position(motor)
-            reading["force"] = (-1 if motor == WIRE.unsensed_motor
-                                else self.get_finger_force(motor))
+            reading["force"] = -1 if motor == WIRE.unsensed_motor else self.get_finger_force(motor)
             reading["current"] = self.get_motor_current(motor)
             readings.append(reading)
         return readings
@@ -324,8 +338,9 @@ def _motor(motor: int) -> None:
 def _sensed(motor: int) -> None:
     _motor(motor)
     if motor == WIRE.unsensed_motor:
-        raise NoForceSensorError(f"motor {motor} (thumb abduction) has no tension sensor: force "
-                                 f"exists for motors 1..{WIRE.motors - 1} only")
+        raise NoForceSensorError(
+            f"motor {motor} (thumb abduction) has no tension sensor: force exists for motors 1..{WIRE.motors - 1} only"
+        )
 
 
 def _positions(pos: Sequence[int]) -> list[int]:

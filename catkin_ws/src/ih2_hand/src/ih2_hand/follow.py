@@ -14,8 +14,13 @@ PERIOD_S = 1.0 / 30.0
 """Time between polls."""
 
 
-def follow(driver: HandSerialDriver, task: Task, *, period: float = PERIOD_S,
-           on_poll: Callable[[Verdict, Sequence[Any]], bool] | None = None) -> Verdict:
+def follow(
+    driver: HandSerialDriver,
+    task: Task,
+    *,
+    period: float = PERIOD_S,
+    on_poll: Callable[[Verdict, Sequence[Any]], bool] | None = None,
+) -> Verdict:
     """Begin `task` and poll every `period` s until it is done or its time limit is over.
 
     `on_poll` sees each verdict with the five readings; True from it breaks the movement off. The
@@ -31,16 +36,18 @@ def follow(driver: HandSerialDriver, task: Task, *, period: float = PERIOD_S,
         asked = clock.monotonic()
         if asked - begun > task.limit:
             driver.stop_all()
-            return Verdict(f"not done within {task.limit:.0f} s; fingers stopped", done=True,
-                           reason=Reason.TIME_LIMIT)
+            return Verdict(f"not done within {task.limit:.0f} s; fingers stopped", done=True, reason=Reason.TIME_LIMIT)
         motors = [SimpleNamespace(**reading) for reading in driver.read_motors()]
         if driver.counters.fillers != fillers:
             resends += 1
             if resends > RESENDS:
                 driver.stop_all()
-                return Verdict(f"the line to {driver.port} had to be resynchronised {resends} "
-                               "times during the movement: check the cable", done=True,
-                               reason=Reason.HAND_LINK_LOST)
+                return Verdict(
+                    f"the line to {driver.port} had to be resynchronised {resends} "
+                    "times during the movement: check the cable",
+                    done=True,
+                    reason=Reason.HAND_LINK_LOST,
+                )
             fillers = driver.counters.fillers
             task.begin(driver)
             continue

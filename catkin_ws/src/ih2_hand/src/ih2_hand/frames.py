@@ -14,30 +14,68 @@ STOP_ALL, FIRST_CALIBRATION, FAST_CALIBRATION, OPEN_ALL = 0x41, 0x42, 0x46, 0x4C
 SET_POSITION, GET_POSITION, SET_POSTURE, GET_CURRENT = 0x44, 0x45, 0x48, 0x49
 SET_TENSION, GET_STATUS, LLMC, GRASP_V17 = 0x4A, 0x4B, 0x5F, 0x6F
 
-MEM_PRESHAPE = {0x58: "cylindrical", 0x59: "lateral", 0x5A: "tridigit", 0x5B: "bidigit",
-                0x6A: "bidigit2", 0x6B: "tridigit2"}
+MEM_PRESHAPE = {
+    0x58: "cylindrical",
+    0x59: "lateral",
+    0x5A: "tridigit",
+    0x5B: "bidigit",
+    0x6A: "bidigit2",
+    0x6B: "tridigit2",
+}
 MEM_TENSION = {0x5C: "high", 0x5D: "medium", 0x5E: "low"}
 MEM_CURRENT = {0x6C: "high", 0x6D: "medium", 0x6E: "low"}
 
-LEGACY_GRASPS = {byte: (mode, level, byte == pair[0])
-                 for (mode, level), pair in WIRE.legacy_grasps.items() for byte in pair}
+LEGACY_GRASPS = {
+    byte: (mode, level, byte == pair[0]) for (mode, level), pair in WIRE.legacy_grasps.items() for byte in pair
+}
 """Grasp byte -> (mode, level, is_current)."""
 
-LLMC_DATA = {0x70: 0, 0x71: 0, 0x72: 2, 0x73: 2, 0x74: 2, 0x76: 0, 0x77: 0, 0x21: 2, 0x31: 2,
-             0x22: 0, 0x23: 0, 0x24: 4, 0x25: 0, 0x41: 2, 0x42: 0, 0x43: 0, 0x44: 4, 0x45: 0,
-             0x61: 2, 0x62: 0, 0x63: 0, 0x64: 4, 0x65: 0, 0x66: 2}
+LLMC_DATA = {
+    0x70: 0,
+    0x71: 0,
+    0x72: 2,
+    0x73: 2,
+    0x74: 2,
+    0x76: 0,
+    0x77: 0,
+    0x21: 2,
+    0x31: 2,
+    0x22: 0,
+    0x23: 0,
+    0x24: 4,
+    0x25: 0,
+    0x41: 2,
+    0x42: 0,
+    0x43: 0,
+    0x44: 4,
+    0x45: 0,
+    0x61: 2,
+    0x62: 0,
+    0x63: 0,
+    0x64: 4,
+    0x65: 0,
+    0x66: 2,
+}
 """Data bytes of each low-level command; an unknown one is framed as if it had none."""
 
-LLMC_REPLY = {0x70: 1, 0x76: 2, 0x77: 2, 0x22: 3, 0x25: 4, 0x42: WIRE.llmc_reading_bytes,
-              0x45: 4, 0x62: WIRE.llmc_reading_bytes, 0x65: 4}
+LLMC_REPLY = {
+    0x70: 1,
+    0x76: 2,
+    0x77: 2,
+    0x22: 3,
+    0x25: 4,
+    0x42: WIRE.llmc_reading_bytes,
+    0x45: 4,
+    0x62: WIRE.llmc_reading_bytes,
+    0x65: 4,
+}
 """Reply bytes of the low-level commands that answer."""
 
 
 def move_motor(motor: int, speed: int, close: bool) -> bytes:
     """MoveMotor: `1 S M3 M2 M1 M0 X D8`, `D7..D0`."""
     direction = WIRE.close_direction if close else 1 - WIRE.close_direction
-    return bytes((0x80 + 0x40 * direction + 4 * motor + 2 * WIRE.move_dont_care_bit
-                  + (speed >> 8), speed & 0xFF))
+    return bytes((0x80 + 0x40 * direction + 4 * motor + 2 * WIRE.move_dont_care_bit + (speed >> 8), speed & 0xFF))
 
 
 def set_finger_position(motor: int, position: int) -> bytes:
@@ -103,8 +141,12 @@ def is_known(first: int, dialects: Sequence[str] = ("legacy", "v17")) -> bool:
         return "legacy" in dialects
     if first == GRASP_V17:
         return "v17" in dialects
-    return (first < 0x40 or first >= 0x80 or _LENGTHS[first] > 1
-            or first in (STOP_ALL, FIRST_CALIBRATION, FAST_CALIBRATION, OPEN_ALL, LLMC))
+    return (
+        first < 0x40
+        or first >= 0x80
+        or _LENGTHS[first] > 1
+        or first in (STOP_ALL, FIRST_CALIBRATION, FAST_CALIBRATION, OPEN_ALL, LLMC)
+    )
 
 
 def reply_length(frame: bytes) -> int:

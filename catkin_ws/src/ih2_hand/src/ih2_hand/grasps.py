@@ -24,16 +24,21 @@ MODES = ("cylindrical", "lateral", "tridigit", "bidigit", "tridigit2", "bidigit2
 LEVELS = ("low", "medium", "high")
 """Force levels."""
 
-CLOSING_MOTORS = {"cylindrical": (1, 2, 3, 4), "lateral": (1,), "tridigit": (1, 2, 3),
-                  "bidigit": (1, 2), "tridigit2": (1, 2, 3), "bidigit2": (1, 2)}
+CLOSING_MOTORS = {
+    "cylindrical": (1, 2, 3, 4),
+    "lateral": (1,),
+    "tridigit": (1, 2, 3),
+    "bidigit": (1, 2),
+    "tridigit2": (1, 2, 3),
+    "bidigit2": (1, 2),
+}
 """Motors that close in each mode (EH1 guide 4.3 for the IH2's five motors)."""
 
 
 def check_mode(mode: str) -> str:
     """`mode` if it exists, else RefusedError, a ValueError, that lists the modes."""
     if mode not in MODES:
-        raise RefusedError(f"grasp mode must be one of {', '.join(MODES)}; got {quoted(mode)}",
-                           Reason.UNKNOWN_NAME)
+        raise RefusedError(f"grasp mode must be one of {', '.join(MODES)}; got {quoted(mode)}", Reason.UNKNOWN_NAME)
     return mode
 
 
@@ -49,22 +54,24 @@ def check_grasp(mode: str, level: str, dialect: str) -> None:
     check_mode(mode)
     existing = levels_of(mode, dialect)
     if level not in existing:
-        raise RefusedError(f"grasp mode {mode} has force level {', '.join(existing)} in the "
-                           f"{dialect} dialect; got {quoted(level)}",
-                           Reason.NOT_SUPPORTED if level in LEVELS else Reason.UNKNOWN_NAME)
+        raise RefusedError(
+            f"grasp mode {mode} has force level {', '.join(existing)} in the {dialect} dialect; got {quoted(level)}",
+            Reason.NOT_SUPPORTED if level in LEVELS else Reason.UNKNOWN_NAME,
+        )
 
 
 def grasps_file() -> Path:
     """Path of grasps.yaml: in the source tree, else in the install space's share folder."""
     here = Path(__file__).resolve()
     candidates = [here.parents[2] / "config" / "grasps.yaml"]
-    candidates += [parent / "share" / "ih2_hand" / "config" / "grasps.yaml"
-                   for parent in here.parents]
+    candidates += [parent / "share" / "ih2_hand" / "config" / "grasps.yaml" for parent in here.parents]
     for path in candidates:
         if path.is_file():
             return path
-    raise FileNotFoundError(f"grasps.yaml not found beside {here} nor in a share/ih2_hand/config "
-                            "above it; install the package again or pass the file's path")
+    raise FileNotFoundError(
+        f"grasps.yaml not found beside {here} nor in a share/ih2_hand/config "
+        "above it; install the package again or pass the file's path"
+    )
 
 
 def load_preshapes(path: str | Path | None = None) -> dict[str, tuple[int, ...]]:
@@ -92,8 +99,7 @@ def load_preshapes(path: str | Path | None = None) -> dict[str, tuple[int, ...]]
             raise ValueError(f"{where}: {mode} needs {WIRE.motors} whole numbers, got {match[2]!r}")
         positions = tuple(int(item) for item in values)
         if max(positions) > WIRE.position_max:
-            raise ValueError(f"{where}: {mode} has {max(positions)}, positions are "
-                             f"0..{WIRE.position_max}")
+            raise ValueError(f"{where}: {mode} has {max(positions)}, positions are 0..{WIRE.position_max}")
         table[mode] = positions
     missing = [mode for mode in MODES if mode not in table]
     if missing:

@@ -77,8 +77,13 @@ class LineCounters:
 class HandLine:
     """Thread-safe request and answer over a transport."""
 
-    def __init__(self, transport: Transport, clock: Clock | None = None,
-                 read_timeout: float = WIRE.read_timeout_s, trace: TraceHook | None = None):
+    def __init__(
+        self,
+        transport: Transport,
+        clock: Clock | None = None,
+        read_timeout: float = WIRE.read_timeout_s,
+        trace: TraceHook | None = None,
+    ):
         self.transport = transport
         self.port = transport.port
         self.clock: Clock = clock or SteadyClock()
@@ -148,7 +153,8 @@ class HandLine:
             raise HandTimeoutError(
                 f"the hand on {self.port} gave no complete answer to `{frame.hex(' ')}` "
                 f"({length} byte(s) within {self.read_timeout * 1000:.0f} ms, twice); last byte "
-                f"received {last}; check power, cable and that no calibration runs")
+                f"received {last}; check power, cable and that no calibration runs"
+            )
 
     # -- resynchronisation -----------------------------------------------------------------------
 
@@ -242,7 +248,8 @@ class HandLine:
         raise HandInconsistentError(
             f"readings of `{frame.hex(' ')}` on {self.port} contradict each other ({seen}; last "
             f"byte received {format_byte(self.transport.last_byte)}): the line is disturbed; check "
-            "cable, ground and supply")
+            "cable, ground and supply"
+        )
 
 
 def status_request(motor: int) -> bytes:

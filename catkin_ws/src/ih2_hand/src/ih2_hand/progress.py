@@ -109,8 +109,7 @@ class Task:
         """Verdict on a poll that began `elapsed` s after the command."""
         bus = [motor.motor for motor in motors if motor.com_error]
         if bus:
-            return _failed(f"internal bus error of {_names(bus)}: cycle the hand's power",
-                           Reason.DRIVE_ERROR)
+            return _failed(f"internal bus error of {_names(bus)}: cycle the hand's power", Reason.DRIVE_ERROR)
         self._stall.update(motors, elapsed)
         return self._judge(motors, elapsed)
 
@@ -171,8 +170,7 @@ class SpeedTask(Task):
         if moving:
             return Verdict(f"{_names(moving)} moving")
         if lost:
-            return _failed(f"{_names(lost)} stopped on the way without a reason on the status",
-                           Reason.HAND_STALLED)
+            return _failed(f"{_names(lost)} stopped on the way without a reason on the status", Reason.HAND_STALLED)
         return self._ended(at_end, met)
 
     def _ended(self, at_end: list[int], met: list[int]) -> Verdict:
@@ -190,8 +188,7 @@ class OpenTask(SpeedTask):
 
     def _ended(self, at_end: list[int], met: list[int]) -> Verdict:
         if met:
-            return _failed(f"{_names(met)} blocked before the open end: free the fingers",
-                           Reason.HAND_STALLED)
+            return _failed(f"{_names(met)} blocked before the open end: free the fingers", Reason.HAND_STALLED)
         return Verdict("open", done=True, ok=True, holding=False)
 
 
@@ -206,8 +203,7 @@ class CloseTask(SpeedTask):
 
     def _ended(self, at_end: list[int], met: list[int]) -> Verdict:
         if met:
-            return Verdict(f"closed on an object: {_names(met)} met it", done=True, ok=True,
-                           holding=True, stop=True)
+            return Verdict(f"closed on an object: {_names(met)} met it", done=True, ok=True, holding=True, stop=True)
         return Verdict("closed without meeting an object", done=True, ok=True, holding=False)
 
 
@@ -234,19 +230,25 @@ class PreshapeTask(Task):
                 if motor.target_reached and near:
                     continue
                 if self._stall.standing(number, elapsed) >= BLOCKED_S:
-                    return _failed(f"{MOTOR_NAMES[number]} stands at {motor.position} of {target}: "
-                                   "something is in the way", Reason.HAND_STALLED)
+                    return _failed(
+                        f"{MOTOR_NAMES[number]} stands at {motor.position} of {target}: something is in the way",
+                        Reason.HAND_STALLED,
+                    )
                 waiting.append(number)
             elif motor.over_current:
-                return _failed(f"{MOTOR_NAMES[number]} stopped by over-current at "
-                               f"{motor.position} of {target}", Reason.HAND_STALLED)
+                return _failed(
+                    f"{MOTOR_NAMES[number]} stopped by over-current at {motor.position} of {target}",
+                    Reason.HAND_STALLED,
+                )
             elif elapsed < START_GRACE_S:
                 waiting.append(number)
             else:
                 ignored.append(number)
         if ignored:
-            return _failed("the hand did not take the preshape: it is probably not calibrated; "
-                           "publish `fast` on hand_calibration", Reason.HAND_NOT_CALIBRATED)
+            return _failed(
+                "the hand did not take the preshape: it is probably not calibrated; publish `fast` on hand_calibration",
+                Reason.HAND_NOT_CALIBRATED,
+            )
         if waiting:
             return Verdict(f"{_names(waiting)} moving")
         return Verdict(f"preshape {self.mode} reached", done=True, ok=True)
@@ -283,23 +285,26 @@ class GraspTask(Task):
             elif motor.mode in in_grasp or motor.mode == "position":
                 (met if stalled else moving).append(number)
             else:
-                return _failed(f"{MOTOR_NAMES[number]} stopped at {motor.position} before it met "
-                               "anything: the grasp was interrupted", Reason.HAND_STALLED)
+                return _failed(
+                    f"{MOTOR_NAMES[number]} stopped at {motor.position} before it met "
+                    "anything: the grasp was interrupted",
+                    Reason.HAND_STALLED,
+                )
         if moving:
             return Verdict(f"{_names(moving)} closing")
         if met:
-            return Verdict(f"holding: {_names(met)} met the object", done=True, ok=True,
-                           holding=True)
+            return Verdict(f"holding: {_names(met)} met the object", done=True, ok=True, holding=True)
         return Verdict("closed without meeting an object", done=True, ok=True, holding=False)
 
     def _not_started(self, closing: Sequence[MotorReading], elapsed: float) -> Verdict:
         # The hand takes the preshape first, so a motor may move in position mode for a while.
         if all(self._stall.standing(motor.motor, elapsed) >= BLOCKED_S for motor in closing):
             if all(motor.fully_closed for motor in closing):
-                return Verdict("closed without meeting an object", done=True, ok=True,
-                               holding=False)
-            return _failed("the hand did not begin to close: it is probably not calibrated; "
-                           "publish `fast` on hand_calibration", Reason.HAND_NOT_CALIBRATED)
+                return Verdict("closed without meeting an object", done=True, ok=True, holding=False)
+            return _failed(
+                "the hand did not begin to close: it is probably not calibrated; publish `fast` on hand_calibration",
+                Reason.HAND_NOT_CALIBRATED,
+            )
         return Verdict("taking the preshape")
 
 
@@ -311,27 +316,32 @@ def shown_empty(motors: Sequence[Any]) -> bool:
 
 def shown_holding(motors: Sequence[Any]) -> bool:
     """Whether a poll proves a grip: a finger at its closing force before its closed end."""
-    return any(motor.motor in FLEXION and motor.target_reached and not motor.fully_closed
-               and motor.mode in ("current_position", "tension", "current") for motor in motors)
+    return any(
+        motor.motor in FLEXION
+        and motor.target_reached
+        and not motor.fully_closed
+        and motor.mode in ("current_position", "tension", "current")
+        for motor in motors
+    )
 
 
-def refuse_calibration(words: Sequence[str], *, calibrated: bool, holding: bool,
-                       busy: str | None) -> str | None:
+def refuse_calibration(words: Sequence[str], *, calibrated: bool, holding: bool, busy: str | None) -> str | None:
     """Reason to refuse a calibration request (`fast` or `complete`, then maybe `force`), or None.
 
     `busy` names what runs now. A second calibration, or one while the hand holds something (or may
     hold something), opens the fingers and therefore needs ` force`.
     """
     if not words or words[0] not in ("fast", "complete") or list(words[1:]) not in ([], ["force"]):
-        return (f"calibration must be fast, complete, fast force or complete force; got "
-                f"{quoted(' '.join(words))}")
+        return f"calibration must be fast, complete, fast force or complete force; got {quoted(' '.join(words))}"
     if busy:
         return f"{busy}: calibrate when it has ended"
     if len(words) == 2:
         return None
     if holding:
-        return (f"the hand may hold an object and calibration opens it: open it first (hand_open), "
-                f"or send `{words[0]} force`")
+        return (
+            f"the hand may hold an object and calibration opens it: open it first (hand_open), "
+            f"or send `{words[0]} force`"
+        )
     if calibrated:
         return f"the hand is calibrated already: send `{words[0]} force` to repeat it"
     return None

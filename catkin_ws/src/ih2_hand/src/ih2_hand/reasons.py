@@ -32,8 +32,7 @@ class Reason(IntEnum):
 NEUTRAL = (Reason.NONE, Reason.HAND_STARTED, Reason.HAND_ENDED)
 """What is no failure."""
 
-BROKEN = (Reason.DRIVE_ERROR, Reason.TIME_LIMIT, Reason.HAND_LINK_LOST, Reason.HAND_STALLED,
-          Reason.UNEXPECTED)
+BROKEN = (Reason.DRIVE_ERROR, Reason.TIME_LIMIT, Reason.HAND_LINK_LOST, Reason.HAND_STALLED, Reason.UNEXPECTED)
 """Failures of hand or line, other than of a request."""
 
 

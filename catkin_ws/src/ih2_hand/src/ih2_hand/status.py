@@ -6,8 +6,7 @@ from typing import Any
 
 from ih2_hand.wire_choices import WIRE
 
-MODES = ("stop", "speed", "position", "tension", "current", "unassigned", "current_position",
-         "bus_error")
+MODES = ("stop", "speed", "position", "tension", "current", "unassigned", "current_position", "bus_error")
 """Control mode by code (bits 7..5)."""
 
 REACHED, OPEN_END, CLOSED_END, OVER_CURRENT = 0x10, 0x08, 0x04, 0x02
@@ -21,10 +20,16 @@ def _decode(raw: int) -> dict[str, Any]:
         return None if com_error else bool(raw & bit)
 
     return {
-        "motor": 0, "raw": raw, "mode": MODES[code], "mode_code": code,
-        "target_reached": flag(REACHED), "fully_open": flag(OPEN_END),
-        "fully_closed": flag(CLOSED_END), "over_current": flag(OVER_CURRENT),
-        "moving": flag(WIRE.moving_bit), "com_error": com_error,
+        "motor": 0,
+        "raw": raw,
+        "mode": MODES[code],
+        "mode_code": code,
+        "target_reached": flag(REACHED),
+        "fully_open": flag(OPEN_END),
+        "fully_closed": flag(CLOSED_END),
+        "over_current": flag(OVER_CURRENT),
+        "moving": flag(WIRE.moving_bit),
+        "com_error": com_error,
     }
 
 
@@ -45,8 +50,7 @@ def decode_status(motor: int, raw: int) -> dict[str, Any]:
 def at_rest(raw: int) -> bool:
     """Whether a motor with this STATUS byte changes nothing by itself: off, or at its position."""
     mode = MODES[raw >> 5]
-    return mode == "stop" or (mode == "position" and bool(raw & REACHED)
-                              and not raw & WIRE.moving_bit)
+    return mode == "stop" or (mode == "position" and bool(raw & REACHED) and not raw & WIRE.moving_bit)
 
 
 def describe_status(raw: int) -> str:
@@ -54,7 +58,9 @@ def describe_status(raw: int) -> str:
     status = decode_status(0, raw)
     words = [status["mode"]]
     if not status["com_error"]:
-        words += [name.replace("_", " ") for name in
-                  ("target_reached", "fully_open", "fully_closed", "over_current", "moving")
-                  if status[name]]
+        words += [
+            name.replace("_", " ")
+            for name in ("target_reached", "fully_open", "fully_closed", "over_current", "moving")
+            if status[name]
+        ]
     return ", ".join(words)

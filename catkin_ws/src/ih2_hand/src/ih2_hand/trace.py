@@ -6,8 +6,12 @@ from ih2_hand import frames
 from ih2_hand.emulator.parser import FrameParser
 from ih2_hand.status import describe_status
 
-_NAMES = {frames.STOP_ALL: "StopALL", frames.FIRST_CALIBRATION: "FirstCalibration (complete)",
-          frames.FAST_CALIBRATION: "FastCalibration", frames.OPEN_ALL: "OpenALL"}
+_NAMES = {
+    frames.STOP_ALL: "StopALL",
+    frames.FIRST_CALIBRATION: "FirstCalibration (complete)",
+    frames.FAST_CALIBRATION: "FastCalibration",
+    frames.OPEN_ALL: "OpenALL",
+}
 
 
 def describe_frame(frame: bytes) -> str:
@@ -21,14 +25,16 @@ def describe_frame(frame: bytes) -> str:
         way = "close" if first & 0x40 else "open"
         return f"MoveMotor motor {first >> 2 & 0x0F} {way} speed {(first & 1) << 8 | frame[1]}"
     if first in (frames.GET_POSITION, frames.GET_CURRENT, frames.GET_STATUS):
-        name = {frames.GET_POSITION: "GetFingerPosition", frames.GET_CURRENT: "GetMotorCurrent",
-                frames.GET_STATUS: "GetFingerStatus"}[first]
+        name = {
+            frames.GET_POSITION: "GetFingerPosition",
+            frames.GET_CURRENT: "GetMotorCurrent",
+            frames.GET_STATUS: "GetFingerStatus",
+        }[first]
         return f"{name} motor {frame[1] & 0x0F}"
     if first == frames.SET_POSITION:
         return f"SetFingerPosition motor {frame[1] & 0x0F} to {frame[2]}"
     if first == frames.SET_TENSION:
-        return (f"SetFingerForce motor {frame[1] & 0x0F} tension "
-                f"{(frame[1] >> 6) << 8 | frame[2]}")
+        return f"SetFingerForce motor {frame[1] & 0x0F} tension {(frame[1] >> 6) << 8 | frame[2]}"
     if first == frames.SET_POSTURE:
         return f"SetHandPosture {list(frame[1:-1])}"
     if first in frames.LEGACY_GRASPS:
@@ -40,8 +46,7 @@ def describe_frame(frame: bytes) -> str:
         return f"MemPreShape {frames.MEM_PRESHAPE[first]} {list(frame[1:-1])}"
     if first in frames.MEM_TENSION or first in frames.MEM_CURRENT:
         return f"Mem force levels {frame[1:-1].hex(' ')}"
-    return (f"LLMC command {frame[2]:02x} motor {frame[1] & 0x0F} "
-            f"data {frame[3:-1].hex(' ') or 'none'}")
+    return f"LLMC command {frame[2]:02x} motor {frame[1] & 0x0F} data {frame[3:-1].hex(' ') or 'none'}"
 
 
 def describe_answer(frame: bytes, answer: bytes) -> str:
@@ -72,8 +77,7 @@ class Tracer:
     def feed(self, direction: str, data: bytes, stamp: float) -> list[str]:
         """Lines for bytes seen at `stamp` (s); direction ">" goes to the hand, "<" comes back."""
         lines = self._to_hand(data) if direction == ">" else self._to_host(data)
-        return [f"{stamp:14.6f} {direction} {shown.hex(' '):<20} {meaning}"
-                for shown, meaning in lines]
+        return [f"{stamp:14.6f} {direction} {shown.hex(' '):<20} {meaning}" for shown, meaning in lines]
 
     def _to_hand(self, data: bytes) -> list[tuple[bytes, str]]:
         lines: list[tuple[bytes, str]] = []

@@ -74,7 +74,7 @@ class SerialTransport:
                 self._serial.write(data)
                 return
             while data:
-                data = data[self._write_some(data):]
+                data = data[self._write_some(data) :]
         except PORT_ERRORS as error:
             raise self._lost(error) from error
 
@@ -86,9 +86,11 @@ class SerialTransport:
         except BlockingIOError:
             _, ready, _ = select.select([], [self._fd], [], WRITE_TIMEOUT_S)
         if not ready:
-            raise HandConnectionLost(f"{self.port} took no byte for {WRITE_TIMEOUT_S} s (last byte "
-                                     f"received {format_byte(self.last_byte)}): the other end is "
-                                     "stuck; unplug and replug the hand's cable")
+            raise HandConnectionLost(
+                f"{self.port} took no byte for {WRITE_TIMEOUT_S} s (last byte "
+                f"received {format_byte(self.last_byte)}): the other end is "
+                "stuck; unplug and replug the hand's cable"
+            )
         return 0
 
     def read(self, count: int, timeout: float) -> bytes:
@@ -149,9 +151,11 @@ class SerialTransport:
             pass  # a pulled device cannot be closed in order; nothing is left to do
 
     def _lost(self, error: Exception) -> HandConnectionLost:
-        return HandConnectionLost(f"the hand's port {self.port} is gone ({error}); "
-                                  f"last byte received {format_byte(self.last_byte)}; "
-                                  "check the cable")
+        return HandConnectionLost(
+            f"the hand's port {self.port} is gone ({error}); "
+            f"last byte received {format_byte(self.last_byte)}; "
+            "check the cable"
+        )
 
 
 def format_byte(value: int | None) -> str:
@@ -170,21 +174,24 @@ def find_port() -> str:
     if len(ports) == 1:
         return ports[0]
     if not ports:
-        raise HandPortError("no serial device found: plug in the hand's USB adapter, or name the "
-                            "port (a device, a pty or socket://host:port)")
+        raise HandPortError(
+            "no serial device found: plug in the hand's USB adapter, or name the "
+            "port (a device, a pty or socket://host:port)"
+        )
     raise HandPortError(f"several serial devices found ({', '.join(ports)}): name the hand's one")
 
 
 def _open(port: str) -> Any:
     try:
         if "://" in port:
-            return serial.serial_for_url(port, baudrate=WIRE.baud, timeout=WIRE.read_timeout_s,
-                                         write_timeout=WRITE_TIMEOUT_S)
-        device = serial.Serial(port, baudrate=WIRE.baud, timeout=WIRE.read_timeout_s,
-                               write_timeout=WRITE_TIMEOUT_S, exclusive=True)
+            return serial.serial_for_url(
+                port, baudrate=WIRE.baud, timeout=WIRE.read_timeout_s, write_timeout=WRITE_TIMEOUT_S
+            )
+        device = serial.Serial(
+            port, baudrate=WIRE.baud, timeout=WIRE.read_timeout_s, write_timeout=WRITE_TIMEOUT_S, exclusive=True
+        )
     except ValueError as error:
-        raise HandPortError(f"{port!r} is not a port: give a device, a pty or socket://host:port "
-                            f"({error})") from error
+        raise HandPortError(f"{port!r} is not a port: give a device, a pty or socket://host:port ({error})") from error
     except PORT_ERRORS as error:
         raise HandPortError(_why_not(port, error)) from error
     _shorten_latency(device)
@@ -207,8 +214,10 @@ def _why_not(port: str, error: Exception) -> str:
         there = ", ".join(serial_ports()) or "none"
         return f"no such port {port} (serial devices here: {there}): plug it in or correct the name"
     if code in (errno.EACCES, errno.EPERM):
-        return (f"no permission for {port}: add the user to the group that owns it "
-                "(`sudo adduser $USER dialout`) and log in again")
+        return (
+            f"no permission for {port}: add the user to the group that owns it "
+            "(`sudo adduser $USER dialout`) and log in again"
+        )
     if code in (errno.EAGAIN, errno.EBUSY) or "exclusively lock" in str(error):
         return f"port {port} is busy: end the other program that has it open (`fuser {port}`)"
     return f"port {port} cannot be opened ({error}): check that it is the hand's serial device"

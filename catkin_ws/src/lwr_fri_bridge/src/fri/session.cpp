@@ -17,8 +17,8 @@ constexpr double kProofTime = 0.1;  // s
 // No joint is faster than the KRC's limits (rsidef7.dat: 120 120 160 160 250 220 220 deg/s), so
 // neither its set-point nor the arm is; with half as much again. rad/s
 constexpr float kFastest[kJoints] = {3.15F, 3.15F, 4.2F, 4.2F, 6.6F, 5.8F, 5.8F};
-constexpr float kSetPointAllowance = 0.02F;   // rad
-constexpr float kMeasuredAllowance = 0.005F;  // rad, noise and rounding
+constexpr float kSetPointAllowance = 0.02F;                       // rad
+constexpr float kMeasuredAllowance = 0.005F;                      // rad, noise and rounding
 constexpr float kLargestAngle = 6.4F;                             // rad; the arm reaches 2.97
 constexpr float kShortestCycle = 0.0005F, kLongestCycle = 0.11F;  // s; FRI offers 1..100 ms
 
@@ -70,9 +70,9 @@ bool Session::leaps(const MeasurementDatagram& candidate, std::uint32_t cycles) 
   bool leap = false;
   for (std::size_t i = 0; i < kJoints; ++i) {
     const float reach = kFastest[i] * time;
-    leap = leap || !(std::fabs(set_point[i] - set_point_[i]) <= kSetPointAllowance + reach) ||
-           !(std::fabs(candidate.measured_position[i] - measured_[i]) <=
-             kMeasuredAllowance + reach);
+    leap =
+        leap || !(std::fabs(set_point[i] - set_point_[i]) <= kSetPointAllowance + reach) ||
+        !(std::fabs(candidate.measured_position[i] - measured_[i]) <= kMeasuredAllowance + reach);
   }
   return leap;
 }

@@ -11,7 +11,7 @@ struct MotionEndParameters {
   double phase = 0.012;  ///< the phase must be below this (0.01 is reached with the duration over),
   double speed = 0.02;   ///< m/s, the set-point move slower than this,
   double turning = 0.2;  ///< rad/s, and turn slower than this,
-  double distance = 0.005;         ///< m, and be closer to the goal than this
+  double distance = 0.005;  ///< m, and be closer to the goal than this
   /// What speed, turning and distance grow to when the goal as received trembles: a set-point that
   /// follows it never gets slower or closer than its noise.
   double noisy_speed = 0.10;

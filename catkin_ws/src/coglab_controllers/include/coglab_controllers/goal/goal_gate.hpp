@@ -45,10 +45,10 @@ class GoalGate {
  public:
   enum class State : std::uint8_t {
     Unsettled,  ///< no goal is believed yet
-    Fresh,   ///< the newest frame is followed
-    Old,     ///< no frame young enough: the last goal is held
-    Jumped,  ///< the newest frames are too far away: the last goal is held
-    Lost     ///< held for longer than lost_time
+    Fresh,      ///< the newest frame is followed
+    Old,        ///< no frame young enough: the last goal is held
+    Jumped,     ///< the newest frames are too far away: the last goal is held
+    Lost        ///< held for longer than lost_time
   };
 
   explicit GoalGate(const GoalGateParameters& parameters = {}) : parameters_(parameters) {}

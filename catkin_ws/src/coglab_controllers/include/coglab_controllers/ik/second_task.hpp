@@ -7,8 +7,8 @@
 
 namespace coglab_controllers {
 
-/// A linear constraint on the joint velocities: jacobian * qd = velocity + gain * error, with `rows`
-/// rows of 7 in use.
+/// A linear constraint on the joint velocities: jacobian * qd = velocity + gain * error, with
+/// `rows` rows of 7 in use.
 struct TaskConstraint {
   int rows = 0;  ///< 0: no constraint in this cycle; else 3 or 7
   Eigen::Matrix<double, kMaxJoints, kMaxJoints> jacobian =

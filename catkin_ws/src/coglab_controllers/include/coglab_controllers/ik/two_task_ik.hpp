@@ -24,8 +24,7 @@ struct IkParameters {
   /// What the arm can follow, rad/s^2 and rad/s^3: an error is answered only by speeds from which
   /// each joint can brake on the way that takes the error away. Small errors see K_pos and K_rot as
   /// they are; without limits, the default, all do.
-  JointVector acceleration_limit =
-      JointVector::Constant(std::numeric_limits<double>::infinity());
+  JointVector acceleration_limit = JointVector::Constant(std::numeric_limits<double>::infinity());
   JointVector jerk_limit = JointVector::Constant(std::numeric_limits<double>::infinity());
   double reaction_time = 0.015;  ///< s from a measurement until the arm follows what it led to
 };

@@ -43,9 +43,9 @@ const char* describe(GuardReason reason) noexcept;
 struct GuardResult {
   /// rad/s: `scale` times the request, but for a joint at its stop that asked for next to nothing
   JointVector velocity = JointVector::Zero();
-  double scale = 1.0;                          ///< 0..1
-  GuardReason reason = GuardReason::None;      ///< of the restriction that bound hardest
-  int joint = -1;                              ///< for JointVelocity and JointPosition
+  double scale = 1.0;                      ///< 0..1
+  GuardReason reason = GuardReason::None;  ///< of the restriction that bound hardest
+  int joint = -1;                          ///< for JointVelocity and JointPosition
   WorkspaceBorder border = WorkspaceBorder::None;
   /// Joint at its stop that has held up the motion for block_time, or -1: abort the motion and name
   /// it.

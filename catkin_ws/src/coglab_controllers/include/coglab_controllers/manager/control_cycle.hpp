@@ -48,14 +48,14 @@ struct CycleReport {
   Name active;                   ///< id of the active motion controller
   ManagerState state = ManagerState::Idle;
   MotionState motion = MotionState::Idle;
-  Reason reason;             ///< why it holds, aborted or is at fault; empty while all is well
-  bool fault = false;        ///< the active controller is at fault until switched to again
+  Reason reason;       ///< why it holds, aborted or is at fault; empty while all is well
+  bool fault = false;  ///< the active controller is at fault until switched to again
   /// The set-point of the arm stands: no velocity, no acceleration, and none was asked for by this
   /// cycle and the one before. False without a usable joint state.
   bool standing = false;
-  double time_scale = 1.0;   ///< what the references run at
-  double speed_scale = 1.0;  ///< as requested
-  RobotSample robot;         ///< the joint state used
+  double time_scale = 1.0;                     ///< what the references run at
+  double speed_scale = 1.0;                    ///< as requested
+  RobotSample robot;                           ///< the joint state used
   JointVector velocity = JointVector::Zero();  ///< as sent, rad/s
   GuardResult guard;                           ///< what step 7 did
   double dt = 0.0;                             ///< of the last cycle with a joint state, s

@@ -62,7 +62,7 @@ class ControlThread {
   int since_wake_ = 0;               // writer's thread
   std::uint64_t last_sequence_ = 0;  // control thread
   std::int64_t last_controller_ns_ = 0;
-  std::string warning_;              // written before scheduled_
+  std::string warning_;  // written before scheduled_
   std::atomic<bool> scheduled_{false};
 };
 

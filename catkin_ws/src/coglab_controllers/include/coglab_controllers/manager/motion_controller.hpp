@@ -36,8 +36,8 @@ Reason voidReason(const RequestStamp& stamp, const CycleInput& input) noexcept;
 /// The references of one cycle and where the motion controller finds its own in them.
 /// Poses are those of the tool frame in the robot's base frame.
 struct References {
-  ctrl_more::ControlStates states;  ///< what feedback controllers modify
-  ctrl_more::Reference<ctrl_more::Pose> pose;  ///< taskSpaceReferencePose: m, quaternion x y z w
+  ctrl_more::ControlStates states;               ///< what feedback controllers modify
+  ctrl_more::Reference<ctrl_more::Pose> pose;    ///< taskSpaceReferencePose: m, quaternion x y z w
   ctrl_more::Reference<ctrl_more::Twist> twist;  ///< taskSpaceReferenceVel: m/s, rad/s
   ctrl_more::Reference<kMaxJoints> joint_position;  ///< jointSpaceReference Position, rad
   ctrl_more::Reference<kMaxJoints> joint_velocity;  ///< jointSpaceReference Velocity, rad/s
@@ -88,9 +88,9 @@ class MotionHost {
 
 /// What a plug-in gets when it is loaded.
 struct MotionSetup {
-  std::string id;         ///< the controller's id, also its namespace
+  std::string id;             ///< the controller's id, also its namespace
   double cycle_time = 0.005;  ///< intended period of the cycle, s
-  YAML::Node parameters;  ///< its parameters (ROS: below /controller_manager/<id>); may be null
+  YAML::Node parameters;      ///< its parameters (ROS: below /controller_manager/<id>); may be null
   std::shared_ptr<const RobotSetup> robot;  ///< model, limits, workspace
   MotionHost* host = nullptr;               ///< outlives the controller
 };

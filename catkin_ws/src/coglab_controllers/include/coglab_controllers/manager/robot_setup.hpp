@@ -14,19 +14,20 @@ namespace coglab_controllers {
 
 /// Immutable after load; shared by the cycle and the controllers.
 struct RobotSetup {
-  Chain chain;                         ///< base link to tool link
-  coglab_rt::JointLimits limits;       ///< with the parameters of Table 6 applied
-  GuardParameters guard;               ///< limits of step 7
-  Workspace workspace;                 ///< for goals
-  Quaternion tool_from_wrench;         ///< orientation of the measured wrench's frame in the tool
+  Chain chain;                    ///< base link to tool link
+  coglab_rt::JointLimits limits;  ///< with the parameters of Table 6 applied
+  GuardParameters guard;          ///< limits of step 7
+  Workspace workspace;            ///< for goals
+  Quaternion tool_from_wrench;    ///< orientation of the measured wrench's frame in the tool
 };
 
 /// Builds it from the robot's model, its table of limits, and the manager's parameters (D4.10 Table
 /// 6): `base_link` (lwr_base_link), `tool_link` (ih2_palm), `wrench_link` (ih2_palm; what the
-/// bridge's `tool_frame` says), `upper_joint_pos_limit`, `lower_joint_pos_limit`, `joint_vel_limit` (rad, rad, rad/s; seven
-/// each, wire order; default: the table), `position_margin` (rad), `hand_speed_limit`,
-/// `elbow_speed_limit` (m/s; 0: none), block `workspace`: `box_min`, `box_max`, `base_centre` (m),
-/// `base_radius` (m), `max_stretch` (share of the reach), `deceleration` (m/s^2).
+/// bridge's `tool_frame` says), `upper_joint_pos_limit`, `lower_joint_pos_limit`, `joint_vel_limit`
+/// (rad, rad, rad/s; seven each, wire order; default: the table), `position_margin` (rad),
+/// `hand_speed_limit`, `elbow_speed_limit` (m/s; 0: none), block `workspace`: `box_min`, `box_max`,
+/// `base_centre` (m), `base_radius` (m), `max_stretch` (share of the reach), `deceleration`
+/// (m/s^2).
 /// @param urdf text of the model
 /// @throws std::runtime_error or std::invalid_argument naming the parameter, link or joint
 std::shared_ptr<const RobotSetup> makeRobotSetup(const std::string& urdf,

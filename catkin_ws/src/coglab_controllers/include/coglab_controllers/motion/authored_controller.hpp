@@ -1,6 +1,6 @@
 /// @file
-/// The motion controller around a motion that somebody wrote against motion/motion.hpp, and how such
-/// a motion is registered.
+/// The motion controller around a motion that somebody wrote against motion/motion.hpp, and how
+/// such a motion is registered.
 #pragma once
 
 #include <memory>
@@ -52,13 +52,13 @@ class AuthoredController : public MotionRunner<MotionArguments> {
 }  // namespace coglab_controllers
 
 /// Registers a class derived from Motion<> from one of its library's source files, outside of any
-/// namespace: `COGLAB_REGISTER_MOTION("wave/Wave", Wave)`. Where the library is lib<name>.so and the
-/// type <name>/…, load_controller finds it by the type alone.
-#define COGLAB_REGISTER_MOTION(type, Class)                                               \
-  namespace {                                                                             \
-  const ::coglab_controllers::MotionRegistration coglab_motion_registration(              \
-      type, {[]() -> ::coglab_controllers::MotionController* {                            \
+/// namespace: `COGLAB_REGISTER_MOTION("wave/Wave", Wave)`. Where the library is lib<name>.so and
+/// the type <name>/…, load_controller finds it by the type alone.
+#define COGLAB_REGISTER_MOTION(type, Class)                                                    \
+  namespace {                                                                                  \
+  const ::coglab_controllers::MotionRegistration coglab_motion_registration(                   \
+      type, {[]() -> ::coglab_controllers::MotionController* {                                 \
                return new ::coglab_controllers::AuthoredController(std::make_unique<Class>()); \
-             },                                                                           \
-             nullptr});                                                                   \
+             },                                                                                \
+             nullptr});                                                                        \
   }

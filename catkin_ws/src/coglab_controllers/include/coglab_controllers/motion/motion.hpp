@@ -19,8 +19,8 @@ namespace coglab_controllers {
 /// One number that a request for a motion may give, as start_motion takes it.
 struct MotionArgument {
   std::string name, unit;
-  double fallback = 0.0;            ///< used where a request does not name it
-  double least = 0.0, most = 0.0;   ///< a request outside of them is refused
+  double fallback = 0.0;           ///< used where a request does not name it
+  double least = 0.0, most = 0.0;  ///< a request outside of them is refused
 };
 
 /// Which argument: what MotionConfiguration::argument() returns.
@@ -66,9 +66,9 @@ class MotionConfiguration {
   std::vector<MotionArgument> arguments_;
 };
 
-/// Where a motion begins: the state of the set-point, which the first reference must continue. Poses
-/// and velocities are those of the tool frame in the robot's base frame; velocities are per second
-/// of the motion's own time.
+/// Where a motion begins: the state of the set-point, which the first reference must continue.
+/// Poses and velocities are those of the tool frame in the robot's base frame; velocities are per
+/// second of the motion's own time.
 struct SetPoint {
   JointVector joints = JointVector::Zero();          ///< rad
   JointVector joint_velocity = JointVector::Zero();  ///< rad/s

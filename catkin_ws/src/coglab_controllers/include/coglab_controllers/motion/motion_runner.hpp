@@ -40,17 +40,17 @@ struct EndedMotion {
 struct RunnerPolicy {
   /// The motion goes on after it was reached (a goal may leave again) until something ends it.
   bool open_end = false;
-  bool waits_at_border = false;  ///< see MotionController::waitsAtBorder()
+  bool waits_at_border = false;       ///< see MotionController::waitsAtBorder()
   const char* id_name = "motion_id";  ///< of motions in reasons; null: they are not named
   int longest_queue = 64;             ///< largest max_queue; 0: no queue
 };
 
 /// What a runner does at the moment.
 enum class RunnerStage : std::uint8_t {
-  Rest,       ///< no motion; the arm brakes to, or is at, stand-still
-  Starting,   ///< one was adopted and begins with the next joint state that allows it
-  Moving,     ///< one is under way
-  Replacing   ///< one is under way until the next one begins
+  Rest,      ///< no motion; the arm brakes to, or is at, stand-still
+  Starting,  ///< one was adopted and begins with the next joint state that allows it
+  Moving,    ///< one is under way
+  Replacing  ///< one is under way until the next one begins
 };
 
 /// Runs motions of one kind, one after another. A motion that begins while the arm moves goes on
@@ -96,7 +96,7 @@ class MotionRunner : public MotionController {
   virtual void report(std::int64_t stamp_ns) = 0;
 
   Motion<Request>& inner() { return *motion_; }
-  RunnerStage stage() const { return stage_; }      ///< control thread
+  RunnerStage stage() const { return stage_; }         ///< control thread
   const ReferenceLoop& loop() const { return loop_; }  ///< control thread
   const MotionSetup& setup() const { return setup_; }
   const std::vector<MotionArgument>& arguments() const { return arguments_; }

@@ -32,9 +32,10 @@ MotionAnswer MotionRunner<Request>::offer(const MotionRequest& begun, const Requ
   plan->queue = queue;
   plan->entry = {next_id_, request};
   MotionAnswer answer;
-  const PlanOutcome outcome = plans_.offer(
-      std::move(plan), setup_.host->planTimeout(), [&answer](const Plan& adopted) {
-        if (!adopted.refusal.empty()) answer = MotionAnswer::rejected(Answer::refusal(adopted.refusal));
+  const PlanOutcome outcome =
+      plans_.offer(std::move(plan), setup_.host->planTimeout(), [&answer](const Plan& adopted) {
+        if (!adopted.refusal.empty())
+          answer = MotionAnswer::rejected(Answer::refusal(adopted.refusal));
         answer.status = adopted.status;
       });
   if (outcome == PlanOutcome::Withdrawn) {
@@ -49,7 +50,8 @@ MotionAnswer MotionRunner<Request>::offer(const MotionRequest& begun, const Requ
   return answer;
 }
 
-// ---- the control thread --------------------------------------------------------------------------
+// ---- the control thread
+// --------------------------------------------------------------------------
 
 template <typename Request>
 void MotionRunner<Request>::start(const CycleInput& input) {
@@ -96,8 +98,7 @@ void MotionRunner<Request>::place(Plan& plan) {
     if (static_cast<std::size_t>(queued_) == queue_.size()) {
       plan.refusal = Reason(ReasonCode::QueueFull, "the queue is full: ")
                      << static_cast<std::uint64_t>(queued_) << " motions wait (max_queue "
-                     << static_cast<std::uint64_t>(queue_.size())
-                     << "); wait for the end of one";
+                     << static_cast<std::uint64_t>(queue_.size()) << "); wait for the end of one";
       return;
     }
     queue_[(first_ + static_cast<std::size_t>(queued_++)) % queue_.size()] = plan.entry;
@@ -114,7 +115,7 @@ void MotionRunner<Request>::place(Plan& plan) {
   // the last.
   next_ = plan.entry;
   stage_ = stage_ == RunnerStage::Rest || stage_ == RunnerStage::Starting ? RunnerStage::Starting
-                                                                         : RunnerStage::Replacing;
+                                                                          : RunnerStage::Replacing;
   state_ = MotionState::Running;
   reason_.clear();
   plan.status = MotionAnswer::kStarted;

@@ -30,8 +30,8 @@ namespace coglab_controllers {
 /// `end_turning` (rad/s), `end_distance` (m), `noisy_end_speed`, `noisy_end_turning`,
 /// `noisy_end_distance`, `follow_distance` (m), `follow_time` (s), `arrive_distance` (m),
 /// `settle_time` (s), `singularity_threshold`, `rotation_first_scaling`,
-/// `hold_blend` (s), `dmp_file` (a library to load at once); on ROS also `goal_tf_frame` (name under
-/// which the estimated goal is broadcast; empty: it is not).
+/// `hold_blend` (s), `dmp_file` (a library to load at once); on ROS also `goal_tf_frame` (name
+/// under which the estimated goal is broadcast; empty: it is not).
 class DmpController : public MotionRunner<DmpPlan> {
  public:
   DmpController();

@@ -35,12 +35,12 @@ struct IkDebugRecord {
 
 /// Where a DMP motion is.
 enum class DmpStage : std::uint8_t {
-  Rest,     ///< no motion
-  Travel,   ///< the set-point is on its way
-  Arrive,   ///< the set-point is at the goal, the hand is not yet
-  Settle,   ///< reached; the hand comes to rest
-  Watch,    ///< reached, the arm stands; a goal that leaves its ball is followed again
-  GivenUp   ///< the reason says why
+  Rest,    ///< no motion
+  Travel,  ///< the set-point is on its way
+  Arrive,  ///< the set-point is at the goal, the hand is not yet
+  Settle,  ///< reached; the hand comes to rest
+  Watch,   ///< reached, the arm stands; a goal that leaves its ball is followed again
+  GivenUp  ///< the reason says why
 };
 
 /// The real-time half of the plug-in. Parameters: the goal's (GoalGateParameters), the estimator's
@@ -94,10 +94,10 @@ class DmpCycle : public Motion<DmpPlan> {
   Pose goal_;                     // of the hand, in dmp_frame_name, inside the workspace
   CartesianReference reference_;  // in dmp_frame_name
   CartesianReference in_base_;
-  std::uint64_t request_ = 0;     // whose goals are followed
+  std::uint64_t request_ = 0;  // whose goals are followed
   double remaining_distance_ = 0.0;
-  bool projected_ = false;    // the goal is outside the workspace
-  bool jumps_ = false;        // the motion begins elsewhere than where the arm is
+  bool projected_ = false;  // the goal is outside the workspace
+  bool jumps_ = false;      // the motion begins elsewhere than where the arm is
   Arrival arrival_;
   double since_reached_ = 0.0;  // s
 };

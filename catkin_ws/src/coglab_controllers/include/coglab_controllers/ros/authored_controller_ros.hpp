@@ -10,8 +10,8 @@
 
 namespace coglab_controllers {
 
-/// `<id>/start_motion` (service) and `<id>/motion_feedback` (latched topic): 50 Hz while a motion is
-/// under way, 5 Hz otherwise, every change and the end of each motion at once.
+/// `<id>/start_motion` (service) and `<id>/motion_feedback` (latched topic): 50 Hz while a motion
+/// is under way, 5 Hz otherwise, every change and the end of each motion at once.
 class AuthoredControllerRos : public MotionControllerRos {
  public:
   ~AuthoredControllerRos() override { service_.shutdown(); }

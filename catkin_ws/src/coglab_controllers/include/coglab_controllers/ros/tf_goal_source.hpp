@@ -10,6 +10,7 @@
 #include <tf2/buffer_core.h>
 
 #include "coglab_controllers/goal/goal_source.hpp"
+#include "coglab_controllers/names.hpp"
 #include "coglab_controllers/ros/tf_listener.hpp"
 #include "coglab_rt/ros/ros_time.hpp"
 

@@ -37,9 +37,8 @@ class VirtualArm {
                       double cycle = 0.005, bool lockstep = true)
       : period(cycle),
         limits(coglab_rt::loadJointLimits(description + "/config/joint_limits.yaml")) {
-    ManagerSettings settings =
-        readManagerSettings(YAML::Load(parameters), readText(description + "/urdf/lwr_ih2.urdf"),
-                            limits, lockstep);
+    ManagerSettings settings = readManagerSettings(
+        YAML::Load(parameters), readText(description + "/urdf/lwr_ih2.urdf"), limits, lockstep);
     settings.cycle.overrun_time = 0.0;
     settings.clock = [this] { return now_ns; };
     settings.plan_timeout = 0.3;

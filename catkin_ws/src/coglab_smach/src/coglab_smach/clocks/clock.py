@@ -1,4 +1,5 @@
 """The clock that states measure time and wait by: the steady one of the machine, or a virtual one (virtual_clock)."""
+
 from __future__ import annotations
 
 import time

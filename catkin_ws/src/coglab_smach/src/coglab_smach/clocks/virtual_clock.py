@@ -7,6 +7,7 @@ belong to the clock may set events and sleep on it too, but when they do so is u
 `using` puts a machine under such a clock. It needs nothing of the engine but that `smach.concurrence` takes its
 threads, events and conditions from `threading`, as ours and the ROS distributions' do.
 """
+
 from __future__ import annotations
 
 import heapq
@@ -290,7 +291,8 @@ class VirtualClock(Clock):
             raise ClockStalled(
                 f"virtual time has stood still at {self._now:.6f} s for {self._stall_limit:g} s of wall time: "
                 f"{running} is running, {waiting} wait; a running thread must wait through the clock, and an event "
-                "that is waited for without a time limit must be set by somebody")
+                "that is waited for without a time limit must be set by somebody"
+            )
 
 
 class _Threading:

@@ -8,6 +8,7 @@ the object's weight; load counts from the torque before the contact, release fro
 
 The detector works only while the arm stands still: it enforces that itself, whoever arms it.
 """
+
 from __future__ import annotations
 
 import math
@@ -116,8 +117,16 @@ class ContactDetector:
         self._unloaded: np.ndarray | None = None
         self.margin = 0.0
 
-    def arm(self, mode: str, now: float, timeout: float, k: float = 0.0, joints: Sequence[int] = (),
-            mass: float = 0.0, load_share: float = 0.0) -> None:
+    def arm(
+        self,
+        mode: str,
+        now: float,
+        timeout: float,
+        k: float = 0.0,
+        joints: Sequence[int] = (),
+        mass: float = 0.0,
+        load_share: float = 0.0,
+    ) -> None:
         """Watch for 'contact', 'load' or 'release' for ``timeout`` s, as soon as the arm stands still.
         ``joints`` as 1..7.
 
@@ -133,9 +142,14 @@ class ContactDetector:
             raise ValueError("load is counted from the torque before the contact: arm for contact first")
         if any(not 1 <= j <= 7 for j in joints):
             raise ValueError(f"joints are numbered 1..7, got {list(joints)}")
-        self._armed = _Armed(mode, now + timeout, k if k > 0.0 else self.settings.k,
-                             [j - 1 for j in joints] or None, mass,
-                             load_share if load_share > 0.0 else self.settings.load_share)
+        self._armed = _Armed(
+            mode,
+            now + timeout,
+            k if k > 0.0 else self.settings.k,
+            [j - 1 for j in joints] or None,
+            mass,
+            load_share if load_share > 0.0 else self.settings.load_share,
+        )
 
     def disarm(self) -> None:
         """Stop watching."""
@@ -149,8 +163,11 @@ class ContactDetector:
 
     def still(self) -> bool:
         """Whether the arm has stood still long enough."""
-        return (self._still_since is not None and self._last_stamp is not None
-                and self._last_stamp - self._still_since >= self.settings.settle)
+        return (
+            self._still_since is not None
+            and self._last_stamp is not None
+            and self._last_stamp - self._still_since >= self.settings.settle
+        )
 
     def feed(self, stamp: float, torque: Joints, position: Joints, velocity: Joints) -> ContactEvent | None:
         """One sample: torque (Nm), position (rad), velocity (rad/s), seven joints each. Samples must be finite."""
@@ -221,8 +238,11 @@ class ContactDetector:
     def _learn(self, difference: np.ndarray) -> None:
         assert self._filtered is not None
         self._rest_differences.append(difference)
-        self._rest_torque = (self._filtered if self._rest_torque is None
-                             else self._rest_torque + 0.02 * (self._filtered - self._rest_torque))
+        self._rest_torque = (
+            self._filtered
+            if self._rest_torque is None
+            else self._rest_torque + 0.02 * (self._filtered - self._rest_torque)
+        )
 
     def sigma(self) -> np.ndarray:
         """Robust standard deviation (Nm) of the difference at rest, per joint; the floor where too little was seen."""
@@ -240,8 +260,9 @@ class ContactDetector:
             return None
         if armed.baseline is None:
             armed.baseline = self._filtered.copy()
-            armed.watched = armed.joints or sensitive_joints(self._jacobian(position), self.settings.user_direction,
-                                                             self.settings.sensitivity_share)
+            armed.watched = armed.joints or sensitive_joints(
+                self._jacobian(position), self.settings.user_direction, self.settings.sensitivity_share
+            )
             armed.threshold = armed.k * self.sigma()[armed.watched]
             if armed.mode == "contact":
                 self._unloaded = armed.baseline
@@ -254,10 +275,15 @@ class ContactDetector:
         if armed.over < self.settings.confirm:
             return None
         # In standard deviations the threshold is k, and the signal margin times k.
-        return self._event(True, "joint_torque", self.margin, confidence((self.margin - 1.0) * armed.k),
-                           ReasonCode.CONTACT_FOUND,
-                           f"torque of joints {[j + 1 for j in armed.watched]} changed by {self.margin:.1f} x its "
-                           f"threshold within {self.settings.window * 1000:.0f} ms")
+        return self._event(
+            True,
+            "joint_torque",
+            self.margin,
+            confidence((self.margin - 1.0) * armed.k),
+            ReasonCode.CONTACT_FOUND,
+            f"torque of joints {[j + 1 for j in armed.watched]} changed by {self.margin:.1f} x its "
+            f"threshold within {self.settings.window * 1000:.0f} ms",
+        )
 
     def _check_offset(self, armed: _Armed) -> ContactEvent | None:
         """Once per arming: a person who was early has left an offset against the last rest before the motion."""
@@ -270,9 +296,14 @@ class ContactDetector:
             return None
         self._unloaded = self._rest_before_motion
         over = float(offset[largest]) - self.settings.offset_threshold
-        return self._event(True, "torque_offset", ratio, confidence(over / float(self.sigma()[armed.watched][largest])),
-                           ReasonCode.CONTACT_CAME_EARLY,
-                           f"torque offset {float(offset[largest]):.2f} Nm on arming: the object was there already")
+        return self._event(
+            True,
+            "torque_offset",
+            ratio,
+            confidence(over / float(self.sigma()[armed.watched][largest])),
+            ReasonCode.CONTACT_CAME_EARLY,
+            f"torque offset {float(offset[largest]):.2f} Nm on arming: the object was there already",
+        )
 
     def _watch_weight(self, stamp: float, armed: _Armed, position: Joints) -> ContactEvent | None:
         """Has the weight come (load) or gone (release)?"""
@@ -295,9 +326,14 @@ class ContactDetector:
             return None
         verb = "carried now" if armed.mode == "load" else "of the load are gone"
         deviation = float(np.linalg.norm(lever * self.sigma()[armed.watched])) / float(lever @ lever)
-        return self._event(armed.mode == "load", "joint_torque", self.margin, confidence((force - needed) / deviation),
-                           ReasonCode.LOAD_CARRIED if armed.mode == "load" else ReasonCode.LOAD_RELEASED,
-                           f"{force:.1f} N {verb} (needed {needed:.1f} N)")
+        return self._event(
+            armed.mode == "load",
+            "joint_torque",
+            self.margin,
+            confidence((force - needed) / deviation),
+            ReasonCode.LOAD_CARRIED if armed.mode == "load" else ReasonCode.LOAD_RELEASED,
+            f"{force:.1f} N {verb} (needed {needed:.1f} N)",
+        )
 
     def _event(self, contact: bool, source: str, margin: float, sure: float, code: int, message: str) -> ContactEvent:
         self._armed = None

@@ -2,6 +2,7 @@
 
 ``J^T F + bias + AR(1) noise``; the noise grows with joint speed as friction does. Defaults: 0.05 Nm for good sensors.
 """
+
 from __future__ import annotations
 
 from collections.abc import Sequence
@@ -26,8 +27,13 @@ class TorqueSignal:
         self._bias = self._rng.uniform(-self.bias, self.bias, 7)
         self._noise = self.sigma * self._rng.normal(size=7)
 
-    def sample(self, dt: float, jacobian: np.ndarray, force: Sequence[float] | np.ndarray,
-               velocity: Sequence[float] | np.ndarray) -> np.ndarray:
+    def sample(
+        self,
+        dt: float,
+        jacobian: np.ndarray,
+        force: Sequence[float] | np.ndarray,
+        velocity: Sequence[float] | np.ndarray,
+    ) -> np.ndarray:
         """One sample dt s after the last: ``jacobian`` 3 x 7, ``force`` (N) on the hand, base frame."""
         keep = float(np.exp(-dt / self.correlation_time))
         self._noise = keep * self._noise + np.sqrt(1 - keep**2) * self.sigma * self._rng.normal(size=7)

@@ -2,6 +2,7 @@
 
 Used by the tests, by the bench and for tuning a detector before a robot is at hand.
 """
+
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
@@ -27,8 +28,12 @@ class ContactTrial:
         self.signal = TorqueSignal(seed, sigma)
         self.t = 0.0
 
-    def feed(self, duration: float, force: Force = lambda t: (0.0, 0.0, 0.0),
-             velocity: Callable[[float], np.ndarray] = lambda t: STILL) -> tuple[ContactEvent | None, float]:
+    def feed(
+        self,
+        duration: float,
+        force: Force = lambda t: (0.0, 0.0, 0.0),
+        velocity: Callable[[float], np.ndarray] = lambda t: STILL,
+    ) -> tuple[ContactEvent | None, float]:
         """Feed samples; (event, time since the start of this call) or (None, duration)."""
         start = self.t
         for _ in range(int(round(duration / DT))):
@@ -53,8 +58,14 @@ def push(direction: Sequence[float], newton: float, rise: float = 0.06) -> Force
     return lambda t: d * newton * min(1.0, t / rise)
 
 
-def found_within(posture: tuple[np.ndarray, np.ndarray], direction: Sequence[float], newton: float,
-                 limit: float = 0.06, sigma: float = 0.05, trials: int = 60) -> tuple[float, float]:
+def found_within(
+    posture: tuple[np.ndarray, np.ndarray],
+    direction: Sequence[float],
+    newton: float,
+    limit: float = 0.06,
+    sigma: float = 0.05,
+    trials: int = 60,
+) -> tuple[float, float]:
     """(share of pushes found within ``limit`` s, median delay in s of those found at all)."""
     found, delays = 0, []
     for seed in range(trials):

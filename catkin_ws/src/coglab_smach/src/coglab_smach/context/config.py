@@ -1,6 +1,7 @@
 """Configuration of the machines from one YAML file, checked against machines_schema.json.
 
 It is read again whenever the file changes."""
+
 from __future__ import annotations
 
 import json
@@ -21,8 +22,7 @@ class ConfigError(Exception):
 class Config:
     """Values by dotted name. A file that has become bad keeps the old values and says so once."""
 
-    def __init__(self, values: Mapping[str, Any], path: str = "",
-                 warn: Callable[[str], None] | None = None) -> None:
+    def __init__(self, values: Mapping[str, Any], path: str = "", warn: Callable[[str], None] | None = None) -> None:
         self._values = dict(values)
         self.path = path
         self._warn = warn or (lambda text: None)
@@ -30,8 +30,9 @@ class Config:
         self._lock = threading.Lock()
 
     @staticmethod
-    def load(path: str, overrides: Mapping[str, Any] | None = None,
-             warn: Callable[[str], None] | None = None) -> Config:
+    def load(
+        path: str, overrides: Mapping[str, Any] | None = None, warn: Callable[[str], None] | None = None
+    ) -> Config:
         """Read a file; ConfigError names file and line. ``overrides`` (dotted names) win over the file for good."""
         config = Config(_read(path), path, warn)
         _checked(Document("configuration given beside the file", "", _nested(overrides or {}), {}))

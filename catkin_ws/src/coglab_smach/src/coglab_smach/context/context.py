@@ -1,4 +1,5 @@
 """What every state is given: ports, clock, configuration, journal, triggers."""
+
 from __future__ import annotations
 
 import threading

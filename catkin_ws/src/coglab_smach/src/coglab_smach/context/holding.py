@@ -2,6 +2,7 @@
 
 The file is only believed where the hand itself says that it is holding something: see WhatIsHeld.
 """
+
 from __future__ import annotations
 
 import json
@@ -41,5 +42,6 @@ class HoldingMemory:
                 json.dump({"object_id": object_id}, stream)
             os.replace(beside, self.path)
         except OSError as error:
-            self._warn(f"{self.path} cannot be written ({error.strerror}): after a restart the held object will be "
-                       "unknown")
+            self._warn(
+                f"{self.path} cannot be written ({error.strerror}): after a restart the held object will be unknown"
+            )

@@ -1,4 +1,5 @@
 """What happened and why: transitions with their reason, the cause chain of a failure, the result of each action."""
+
 from __future__ import annotations
 
 import threading
@@ -58,9 +59,18 @@ class ActionRecord:
 
     def to_dict(self) -> dict[str, Any]:
         """Plain types for a result file."""
-        return {"kind": self.kind, "object_id": self.object_id, "outcome": self.outcome, "reason": self.reason,
-                "reason_code": self.code, "causes": list(self.causes), "started": self.started, "ended": self.ended,
-                "duration_s": self.ended - self.started, "marks": dict(self.marks)}
+        return {
+            "kind": self.kind,
+            "object_id": self.object_id,
+            "outcome": self.outcome,
+            "reason": self.reason,
+            "reason_code": self.code,
+            "causes": list(self.causes),
+            "started": self.started,
+            "ended": self.ended,
+            "duration_s": self.ended - self.started,
+            "marks": dict(self.marks),
+        }
 
 
 class Journal:
@@ -113,13 +123,21 @@ class Journal:
         with self._lock:
             return tuple(self._active)
 
-    def transition(self, path: str, from_state: str, outcome: str, to_state: str, reason: str,
-                   causes: tuple[str, ...] = (), code: int = 0) -> None:
+    def transition(
+        self,
+        path: str,
+        from_state: str,
+        outcome: str,
+        to_state: str,
+        reason: str,
+        causes: tuple[str, ...] = (),
+        code: int = 0,
+    ) -> None:
         """Record one transition."""
         record = TransitionRecord(self._now(), path, from_state, outcome, to_state, reason, causes, code)
         with self._lock:
             self.transitions.append(record)
-            del self.transitions[:-self._keep]
+            del self.transitions[: -self._keep]
         for listener in self._listeners:
             listener(record)
 

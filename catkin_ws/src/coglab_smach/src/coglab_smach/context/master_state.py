@@ -1,4 +1,5 @@
 """Where the brain stands, for people and programs that look on: what coglab/state shows."""
+
 from __future__ import annotations
 
 import threading
@@ -47,5 +48,6 @@ class StateWatch:
         if hub in ("stopped", "fault") and COMMAND not in why:
             why = f"{why or f'the machine is in {hub}'}; to go on {command(*ctx.requests.allowed())}"
         active = ctx.journal.active()  # of several side by side the one that began last
-        return MasterState(active[-1] if active else "", bool(hub), ctx.requests.allowed(), ctx.holding, why,
-                           failure.code)
+        return MasterState(
+            active[-1] if active else "", bool(hub), ctx.requests.allowed(), ctx.holding, why, failure.code
+        )

@@ -1,4 +1,5 @@
 """Triggers of the hubs: who asks for what, and which hub takes it."""
+
 from __future__ import annotations
 
 import threading
@@ -47,8 +48,9 @@ class Requests:
         self.default_object: str | None = None
         """object of a trigger that names none; None where triggers are about no object of the database"""
 
-    def open(self, hub: str, allowed: Iterable[str], names_object: bool = False,
-             default_object: str | None = None) -> None:
+    def open(
+        self, hub: str, allowed: Iterable[str], names_object: bool = False, default_object: str | None = None
+    ) -> None:
         """A hub starts to wait for one of these actions; a trigger left over is dropped.
 
         ``names_object``: nobody knows what the hand holds, so the trigger has to say it."""
@@ -70,17 +72,29 @@ class Requests:
 
     def _refusal(self, action: str, object_id: str) -> Answer | None:
         if not self._hub:
-            return Answer(False, f"'{action}' refused: the machine is not in a hub now; to wait until it is in "
-                                 f"wait_without_object or wait_with_object, {command(action)}", ReasonCode.WRONG_STATE)
+            return Answer(
+                False,
+                f"'{action}' refused: the machine is not in a hub now; to wait until it is in "
+                f"wait_without_object or wait_with_object, {command(action)}",
+                ReasonCode.WRONG_STATE,
+            )
         if action not in self._allowed:
-            return Answer(False, f"'{action}' refused: {self._hub} takes {', '.join(self._allowed)}; "
-                                 f"{command(*self._allowed)}", ReasonCode.WRONG_STATE)
+            return Answer(
+                False,
+                f"'{action}' refused: {self._hub} takes {', '.join(self._allowed)}; {command(*self._allowed)}",
+                ReasonCode.WRONG_STATE,
+            )
         if self._names_object and not object_id:
-            return Answer(False, f"'{action}' refused: the hand holds an object that is not known after a restart; "
-                                 f"name its object_id, {command(action)} OBJECT", ReasonCode.OBJECT_UNKNOWN)
+            return Answer(
+                False,
+                f"'{action}' refused: the hand holds an object that is not known after a restart; "
+                f"name its object_id, {command(action)} OBJECT",
+                ReasonCode.OBJECT_UNKNOWN,
+            )
         if self._request is not None:
-            return Answer(False, f"'{action}' refused: '{self._request.action}' was asked for a moment ago",
-                          ReasonCode.BUSY)
+            return Answer(
+                False, f"'{action}' refused: '{self._request.action}' was asked for a moment ago", ReasonCode.BUSY
+            )
         return None
 
     def submit(self, action: str, object_id: str = "", source: str = "operator") -> Answer:

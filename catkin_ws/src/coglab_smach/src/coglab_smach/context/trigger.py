@@ -1,4 +1,5 @@
 """A trigger from outside, judged before a hub gets it."""
+
 from __future__ import annotations
 
 from coglab_msgs.msg import ReasonCode
@@ -25,9 +26,12 @@ def ask_for(ctx: Context, action: str, object_id: str = "", source: str = "opera
         except PortError as error:
             return Answer(False, f"'{action}' refused: {error.sentence}", error.code)
         if wanted not in known:
-            return Answer(False, f"'{action}' refused: object '{wanted}' is not in the database; it has: "
-                                 f"{', '.join(known)}; {command(action)} {known[0] if known else 'OBJECT'}",
-                          ReasonCode.OBJECT_UNKNOWN)
+            return Answer(
+                False,
+                f"'{action}' refused: object '{wanted}' is not in the database; it has: "
+                f"{', '.join(known)}; {command(action)} {known[0] if known else 'OBJECT'}",
+                ReasonCode.OBJECT_UNKNOWN,
+            )
     return ctx.requests.submit(action, object_id, source)
 
 
@@ -37,7 +41,9 @@ def _objects(ctx: Context) -> list[str]:
     while not pending.done():
         if ctx.clock.now() >= end:
             pending.cancel()
-            raise PortError(f"the object database has not answered within {DATABASE_WAIT:.0f} s; is its node running?",
-                            code=ReasonCode.NODE_SILENT)
+            raise PortError(
+                f"the object database has not answered within {DATABASE_WAIT:.0f} s; is its node running?",
+                code=ReasonCode.NODE_SILENT,
+            )
         ctx.clock.sleep(0.01)
     return sorted(pending.result())

@@ -3,6 +3,7 @@
 A goal travels in user data as plain types: ``{frame, offset [m], orientation [x y z w], primitive, dmp_ratio}``; offset
 and orientation are the pose of ``ih2_palm`` relative to ``frame``.
 """
+
 from __future__ import annotations
 
 from collections.abc import Mapping
@@ -14,8 +15,13 @@ from coglab_py.pose import Pose
 
 def _goal(frame: str, palm: Pose, entry: Mapping[str, Any], role: str) -> dict[str, Any]:
     dmp = entry["dmp"]
-    return {"frame": frame, "offset": palm.to_dict()["xyz"], "orientation": palm.to_dict()["quaternion"],
-            "primitive": dmp[role], "dmp_ratio": float(dmp.get("dmp_ratio", 1.0))}
+    return {
+        "frame": frame,
+        "offset": palm.to_dict()["xyz"],
+        "orientation": palm.to_dict()["quaternion"],
+        "primitive": dmp[role],
+        "dmp_ratio": float(dmp.get("dmp_ratio", 1.0)),
+    }
 
 
 def palm_at_grasp(grasp: Mapping[str, Any], standoff: float | None = None) -> Pose:
@@ -30,20 +36,23 @@ def palm_at_grasp(grasp: Mapping[str, Any], standoff: float | None = None) -> Po
     return Pose(palm.position - distance * axis / np.linalg.norm(axis), palm.orientation)
 
 
-def grasp_goal(entry: Mapping[str, Any], grasp: Mapping[str, Any], frame: str, role: str,
-               standoff: float | None = None) -> dict[str, Any]:
+def grasp_goal(
+    entry: Mapping[str, Any], grasp: Mapping[str, Any], frame: str, role: str, standoff: float | None = None
+) -> dict[str, Any]:
     """Goal at the grasp pose relative to the object's tracked frame. ``role`` names the primitive."""
     return _goal(frame, palm_at_grasp(grasp, standoff), entry, role)
 
 
-def delivery_goal(entry: Mapping[str, Any], grasp: Mapping[str, Any], delivery: Mapping[str, Any],
-                  frame: str) -> dict[str, Any]:
+def delivery_goal(
+    entry: Mapping[str, Any], grasp: Mapping[str, Any], delivery: Mapping[str, Any], frame: str
+) -> dict[str, Any]:
     """Goal that offers the held object in its delivery pose relative to the human hand frame."""
     return _goal(frame, Pose.from_dict(delivery["pose"]) * palm_at_grasp(grasp, 0.0), entry, "give")
 
 
-def place_goal(entry: Mapping[str, Any], grasp: Mapping[str, Any], place: Mapping[str, Any], role: str,
-               clearance: float = 0.0) -> dict[str, Any]:
+def place_goal(
+    entry: Mapping[str, Any], grasp: Mapping[str, Any], place: Mapping[str, Any], role: str, clearance: float = 0.0
+) -> dict[str, Any]:
     """Goal on the board: the palm at the grasp of an object whose pose in the board frame is ``place``.
 
     ``role`` take: the object is there; put: it is held and is to be set down there. ``clearance`` (m) keeps

@@ -1,4 +1,5 @@
 """The limits in force at the controller manager, from its parameters, as it reads them itself at its start."""
+
 from __future__ import annotations
 
 from collections.abc import Mapping
@@ -19,7 +20,10 @@ def read_limits(parameters: Mapping[str, Any]) -> MotionLimits:
     acceleration = np.asarray(limits.acceleration, dtype=float)
     ptp = dict(parameters.get("ptp", {}))
     speeds = [float(parameters.get(name, 1.0)) for name in ("hand_speed_limit", "elbow_speed_limit")]
-    return MotionLimits(tuple(velocity), tuple(acceleration),
-                        tuple(float(ptp.get("default_speed", 0.3)) * velocity),
-                        tuple(float(ptp.get("default_acceleration", 0.2)) * acceleration),
-                        min((v for v in speeds if v > 0.0), default=float("inf")))
+    return MotionLimits(
+        tuple(velocity),
+        tuple(acceleration),
+        tuple(float(ptp.get("default_speed", 0.3)) * velocity),
+        tuple(float(ptp.get("default_acceleration", 0.2)) * acceleration),
+        min((v for v in speeds if v > 0.0), default=float("inf")),
+    )

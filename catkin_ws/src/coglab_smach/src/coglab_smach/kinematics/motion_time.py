@@ -2,6 +2,7 @@
 
 Estimates that are meant to be too long rather than too short: they bound a wait, they plan nothing.
 """
+
 from __future__ import annotations
 
 from collections.abc import Sequence
@@ -33,8 +34,9 @@ class MotionLimits:
     """m/s, at which the reference is slowed down; the smaller one of hand and elbow"""
 
 
-def ptp_time(limits: MotionLimits, start: Sequence[float], target: Sequence[float],
-             max_velocity: Sequence[float] = ()) -> float:
+def ptp_time(
+    limits: MotionLimits, start: Sequence[float], target: Sequence[float], max_velocity: Sequence[float] = ()
+) -> float:
     """s that a point-to-point motion takes at full speed scale; ``max_velocity`` (rad/s) as in its request."""
     way = np.abs(np.asarray(target, dtype=float) - np.asarray(start, dtype=float))
     velocity = np.asarray(max_velocity if len(max_velocity) else limits.ptp_velocity, dtype=float)

@@ -3,6 +3,7 @@
 A damped least-squares descent from the home posture, with joint limits, to grid points of the region: what the motion
 itself will do. Coarse on purpose; it finds the grasp that asks the wrist for the impossible.
 """
+
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
@@ -66,8 +67,9 @@ def solve(arm: cc.Chain, target: Pose, start: Sequence[float] | None = None, ste
     return None
 
 
-def share_reached(palm_in_object: Pose, arm: cc.Chain | None = None,
-                  yaws_deg: Sequence[float] = (-20.0, 0.0, 20.0)) -> tuple[int, int]:
+def share_reached(
+    palm_in_object: Pose, arm: cc.Chain | None = None, yaws_deg: Sequence[float] = (-20.0, 0.0, 20.0)
+) -> tuple[int, int]:
     """How many object poses of the handover region (27 places, turned about z) the palm can be brought to:
     (n, of m)."""
     arm = arm or default_arm()
@@ -88,6 +90,11 @@ def reachability_report(entry: Mapping[str, Any], needed: float = 0.7) -> list[t
     for name, grasp in entry["grasps"].items():
         reached, total = share_reached(palm_at_grasp(grasp), yaws_deg=(0.0,))
         ok = reached >= needed * total
-        report.append((f"grasp '{name}': {reached} of {total} places of the handover region reached"
-                       f"{'' if ok else f' (at least {needed:.0%} expected: turn or move the grasp pose)'}", ok))
+        report.append(
+            (
+                f"grasp '{name}': {reached} of {total} places of the handover region reached"
+                f"{'' if ok else f' (at least {needed:.0%} expected: turn or move the grasp pose)'}",
+                ok,
+            )
+        )
     return report

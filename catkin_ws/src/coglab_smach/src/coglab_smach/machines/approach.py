@@ -1,4 +1,5 @@
 """The reach shared by all actions: arm motion, hand preshape and monitor_dmp side by side."""
+
 from __future__ import annotations
 
 from coglab_smach.context.context import Context
@@ -12,8 +13,12 @@ RELEASE_KEYS = [*KEYS, "delivery"]
 
 def build_arm_motion(ctx: Context, trigger: str) -> CoglabMachine:
     """switch_to_dmp, execute_dmp (starts only), wait_stop (waits for everything)."""
-    machine = CoglabMachine(ctx, "arm_motion", ["succeeded", "failed", "preempted"],
-                            input_keys=RELEASE_KEYS if trigger == "release" else KEYS)
+    machine = CoglabMachine(
+        ctx,
+        "arm_motion",
+        ["succeeded", "failed", "preempted"],
+        input_keys=RELEASE_KEYS if trigger == "release" else KEYS,
+    )
     with machine:
         machine.add_state("switch_to_dmp", SwitchController(ctx, "dmp"), {"succeeded": "execute_dmp"})
         machine.add_state("execute_dmp", ExecuteDmp(ctx), {"succeeded": "wait_stop"})
@@ -26,8 +31,15 @@ def build_approach(ctx: Context, label: str, trigger: str, preshape: bool, monit
     preempted."""
     essential = ["arm_motion", "hand_preshape"] if preshape else ["arm_motion"]
     decide, conclude = require_all(essential)
-    group = CoglabConcurrence(ctx, label, ["succeeded", "failed", "preempted"], "failed", decide, conclude,
-                              input_keys=RELEASE_KEYS if trigger == "release" else KEYS)
+    group = CoglabConcurrence(
+        ctx,
+        label,
+        ["succeeded", "failed", "preempted"],
+        "failed",
+        decide,
+        conclude,
+        input_keys=RELEASE_KEYS if trigger == "release" else KEYS,
+    )
     with group:
         group.add_state("arm_motion", build_arm_motion(ctx, trigger))
         if preshape:

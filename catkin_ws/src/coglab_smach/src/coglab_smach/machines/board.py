@@ -1,4 +1,5 @@
 """take and put (D4.10 Figures 7 and 8): the storage board instead of a person."""
+
 from __future__ import annotations
 
 from coglab_smach.context.context import Context
@@ -10,12 +11,21 @@ from coglab_smach.states.hand import HandClose, HandOpen, HandPreshape
 from coglab_smach.states.knowledge import FindPlace, LocateOnBoard, QueryDatabase, SetPlaceGoal, SetTakeGoal
 
 
-def build_look_while_moving(ctx: Context, label: str, look_label: str, look: CoglabState,
-                            output_key: str) -> CoglabConcurrence:
+def build_look_while_moving(
+    ctx: Context, label: str, look_label: str, look: CoglabState, output_key: str
+) -> CoglabConcurrence:
     """The arm moves toward the board while perception looks."""
     decide, conclude = require_all([look_label, "move_to_board"])
-    group = CoglabConcurrence(ctx, label, ["succeeded", "failed", "preempted"], "failed", decide, conclude,
-                              input_keys=["object_id"], output_keys=[output_key])
+    group = CoglabConcurrence(
+        ctx,
+        label,
+        ["succeeded", "failed", "preempted"],
+        "failed",
+        decide,
+        conclude,
+        input_keys=["object_id"],
+        output_keys=[output_key],
+    )
     with group:
         group.add_state(look_label, look)
         group.add_state("move_to_board", PtpMotion(ctx, "board"))
@@ -28,21 +38,27 @@ def build_take(ctx: Context) -> CoglabMachine:
     ``take.preshape`` in the configuration: 'before' the precise motion or 'during' it (read when the machine is built).
     """
     during = str(ctx.config.get("take.preshape", "before")) == "during"
-    machine = CoglabMachine(ctx, "take", ACTION_OUTCOMES, input_keys=["object_id"],
-                            output_keys=["object_entry", "grasp", "grasp_name"])
+    machine = CoglabMachine(
+        ctx, "take", ACTION_OUTCOMES, input_keys=["object_id"], output_keys=["object_entry", "grasp", "grasp_name"]
+    )
     machine.is_action = True
     with machine:
         machine.add_state("query_database", QueryDatabase(ctx), to_recovery(succeeded="approach_board"))
-        machine.add_state("approach_board",
-                          build_look_while_moving(ctx, "approach_board", "locate_object", LocateOnBoard(ctx),
-                                                  "located"),
-                          to_recovery(succeeded="set_dmp_goal"))
-        machine.add_state("set_dmp_goal", SetTakeGoal(ctx),
-                          to_recovery(succeeded="precise_motion" if during else "hand_preshape"))
+        machine.add_state(
+            "approach_board",
+            build_look_while_moving(ctx, "approach_board", "locate_object", LocateOnBoard(ctx), "located"),
+            to_recovery(succeeded="set_dmp_goal"),
+        )
+        machine.add_state(
+            "set_dmp_goal", SetTakeGoal(ctx), to_recovery(succeeded="precise_motion" if during else "hand_preshape")
+        )
         if not during:
             machine.add_state("hand_preshape", HandPreshape(ctx), to_recovery(succeeded="precise_motion"))
-        machine.add_state("precise_motion", build_approach(ctx, "precise_motion", "", preshape=during, monitor=False),
-                          to_recovery(succeeded="switch_to_ptp"))
+        machine.add_state(
+            "precise_motion",
+            build_approach(ctx, "precise_motion", "", preshape=during, monitor=False),
+            to_recovery(succeeded="switch_to_ptp"),
+        )
         machine.add_state("switch_to_ptp", SwitchController(ctx, "ptp"), to_recovery(succeeded="hand_close"))
         machine.add_state("hand_close", HandClose(ctx, from_person=False), to_recovery(succeeded="leave_board"))
         machine.add_state("leave_board", PtpMotion(ctx, "board"), to_recovery(succeeded="coglab_home_robot"))
@@ -53,16 +69,22 @@ def build_take(ctx: Context) -> CoglabMachine:
 
 def build_put(ctx: Context) -> CoglabMachine:
     """free place while moving to the board -> precise DMP motion -> open -> home; ends with an empty hand."""
-    machine = CoglabMachine(ctx, "put", ACTION_OUTCOMES,
-                            input_keys=["object_id", "object_entry", "grasp", "grasp_name"])
+    machine = CoglabMachine(
+        ctx, "put", ACTION_OUTCOMES, input_keys=["object_id", "object_entry", "grasp", "grasp_name"]
+    )
     machine.is_action = True
     with machine:
-        machine.add_state("approach_board",
-                          build_look_while_moving(ctx, "approach_board", "free_places", FindPlace(ctx), "place"),
-                          to_recovery(succeeded="set_dmp_goal"))
+        machine.add_state(
+            "approach_board",
+            build_look_while_moving(ctx, "approach_board", "free_places", FindPlace(ctx), "place"),
+            to_recovery(succeeded="set_dmp_goal"),
+        )
         machine.add_state("set_dmp_goal", SetPlaceGoal(ctx), to_recovery(succeeded="precise_motion"))
-        machine.add_state("precise_motion", build_approach(ctx, "precise_motion", "", preshape=False, monitor=False),
-                          to_recovery(succeeded="switch_to_ptp"))
+        machine.add_state(
+            "precise_motion",
+            build_approach(ctx, "precise_motion", "", preshape=False, monitor=False),
+            to_recovery(succeeded="switch_to_ptp"),
+        )
         machine.add_state("switch_to_ptp", SwitchController(ctx, "ptp"), to_recovery(succeeded="hand_open"))
         machine.add_state("hand_open", HandOpen(ctx), to_recovery(succeeded="leave_board"))
         machine.add_state("leave_board", PtpMotion(ctx, "board"), to_recovery(succeeded="coglab_home_robot"))

@@ -1,4 +1,5 @@
 """exchange_human_to_robot (D4.10 Figure 5): the person gives, the robot takes."""
+
 from __future__ import annotations
 
 from coglab_smach.context.context import Context
@@ -14,14 +15,18 @@ SHARED = ["object_entry", "grasp", "grasp_name"]
 
 def build_exchange_human_to_robot(ctx: Context) -> CoglabMachine:
     """query -> goal from the nominal grasp -> reach and preshape -> contact -> point-to-point -> close -> home."""
-    machine = CoglabMachine(ctx, "exchange_human_to_robot", ACTION_OUTCOMES, input_keys=["object_id"],
-                            output_keys=SHARED)
+    machine = CoglabMachine(
+        ctx, "exchange_human_to_robot", ACTION_OUTCOMES, input_keys=["object_id"], output_keys=SHARED
+    )
     machine.is_action = True
     with machine:
         machine.add_state("query_database", QueryDatabase(ctx), to_recovery(succeeded="set_dmp_goal"))
         machine.add_state("set_dmp_goal", SetGraspGoal(ctx), to_recovery(succeeded="approach"))
-        machine.add_state("approach", build_approach(ctx, "approach", "contact", preshape=True, monitor=True),
-                          to_recovery(succeeded="switch_to_ptp"))
+        machine.add_state(
+            "approach",
+            build_approach(ctx, "approach", "contact", preshape=True, monitor=True),
+            to_recovery(succeeded="switch_to_ptp"),
+        )
         machine.add_state("switch_to_ptp", SwitchController(ctx, "ptp"), to_recovery(succeeded="hand_close"))
         machine.add_state("hand_close", HandClose(ctx, from_person=True), to_recovery(succeeded="coglab_home_robot"))
         machine.add_state("coglab_home_robot", HomeRobot(ctx), to_recovery(succeeded="succeeded"))

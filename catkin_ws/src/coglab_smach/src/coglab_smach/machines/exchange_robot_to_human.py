@@ -1,4 +1,5 @@
 """exchange_robot_to_human (D4.10 Figure 6): the robot gives, the person takes."""
+
 from __future__ import annotations
 
 from coglab_smach.context.context import Context
@@ -12,14 +13,21 @@ from coglab_smach.states.knowledge import SetDeliveryGoal
 
 def build_exchange_robot_to_human(ctx: Context) -> CoglabMachine:
     """delivery goal (no new query: the entry travels in user data) -> reach -> release trigger -> open -> home."""
-    machine = CoglabMachine(ctx, "exchange_robot_to_human", ACTION_OUTCOMES,
-                            input_keys=["object_id", "object_entry", "grasp", "grasp_name"],
-                            output_keys=["delivery_name", "delivery_pose"])
+    machine = CoglabMachine(
+        ctx,
+        "exchange_robot_to_human",
+        ACTION_OUTCOMES,
+        input_keys=["object_id", "object_entry", "grasp", "grasp_name"],
+        output_keys=["delivery_name", "delivery_pose"],
+    )
     machine.is_action = True
     with machine:
         machine.add_state("set_dmp_goal", SetDeliveryGoal(ctx), to_recovery(succeeded="approach"))
-        machine.add_state("approach", build_approach(ctx, "approach", "release", preshape=False, monitor=True),
-                          to_recovery(succeeded="switch_to_ptp"))
+        machine.add_state(
+            "approach",
+            build_approach(ctx, "approach", "release", preshape=False, monitor=True),
+            to_recovery(succeeded="switch_to_ptp"),
+        )
         machine.add_state("switch_to_ptp", SwitchController(ctx, "ptp"), to_recovery(succeeded="hand_open"))
         machine.add_state("hand_open", HandOpen(ctx), to_recovery(succeeded="coglab_home_robot"))
         machine.add_state("coglab_home_robot", HomeRobot(ctx), to_recovery(succeeded="succeeded"))

@@ -1,4 +1,5 @@
 """coglab_init_system: perception and robot are initialised in parallel (D4.10, Figures 3 and 4)."""
+
 from __future__ import annotations
 
 from coglab_smach.context.context import Context
@@ -12,8 +13,9 @@ from coglab_smach.states.knowledge import InitVision
 def build_calibrate_and_home(ctx: Context) -> CoglabConcurrence:
     """Hand calibration while the arm goes to its home posture."""
     decide, conclude = require_all(["hand_calibration", "coglab_home_robot"])
-    group = CoglabConcurrence(ctx, "calibrate_and_home", ["succeeded", "failed", "preempted"], "failed", decide,
-                              conclude)
+    group = CoglabConcurrence(
+        ctx, "calibrate_and_home", ["succeeded", "failed", "preempted"], "failed", decide, conclude
+    )
     with group:
         group.add_state("hand_calibration", CalibrateHand(ctx))
         group.add_state("coglab_home_robot", HomeRobot(ctx))
@@ -35,8 +37,9 @@ def build_init_robot(ctx: Context) -> CoglabMachine:
 def build_init_system(ctx: Context) -> CoglabConcurrence:
     """coglab_init_system: coglab_init_vision beside coglab_init_robot."""
     decide, conclude = require_all(["coglab_init_vision", "coglab_init_robot"])
-    group = CoglabConcurrence(ctx, "coglab_init_system", ["succeeded", "failed", "preempted"], "failed", decide,
-                              conclude)
+    group = CoglabConcurrence(
+        ctx, "coglab_init_system", ["succeeded", "failed", "preempted"], "failed", decide, conclude
+    )
     group.is_action = True
     with group:
         group.add_state("coglab_init_vision", InitVision(ctx))

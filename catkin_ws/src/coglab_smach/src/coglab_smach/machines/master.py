@@ -1,5 +1,6 @@
 """coglab_master (D4.10 Figure 3): initialisation, then two hubs from which every action leaves and to which
 it returns."""
+
 from __future__ import annotations
 
 from coglab_smach.context.context import Context
@@ -17,8 +18,14 @@ LABEL = "coglab_master"
 
 
 def _after_action(succeeded: str) -> dict[str, str]:
-    return {"succeeded": succeeded, "failed_empty": "wait_without_object", "failed_holding": "wait_with_object",
-            "stopped": "stopped", "fault": "fault", "preempted": "preempted"}
+    return {
+        "succeeded": succeeded,
+        "failed_empty": "wait_without_object",
+        "failed_holding": "wait_with_object",
+        "stopped": "stopped",
+        "fault": "fault",
+        "preempted": "preempted",
+    }
 
 
 def build_master(ctx: Context) -> CoglabMachine:
@@ -27,29 +34,55 @@ def build_master(ctx: Context) -> CoglabMachine:
     master.userdata.object_id = master.userdata.grasp_name = ""
     master.userdata.object_entry, master.userdata.grasp = {}, {}
     with master:
-        master.add_state("coglab_init_system", build_init_system(ctx),
-                         {"succeeded": "which_hub", "failed": "fault", "preempted": "preempted"})
+        master.add_state(
+            "coglab_init_system",
+            build_init_system(ctx),
+            {"succeeded": "which_hub", "failed": "fault", "preempted": "preempted"},
+        )
         # After a repair the hand may still hold the object of the action that failed.
-        master.add_state("which_hub", WhatIsHeld(ctx),
-                         {"empty": "wait_without_object", "holding": "wait_with_object", "failed": "fault",
-                          "preempted": "preempted"})
-        master.add_state("wait_without_object", Hub(ctx, ACTIONS_EMPTY, with_object=False),
-                         {action: action for action in ACTIONS_EMPTY}
-                         | {"stopped": "stopped", "failed": "fault", "preempted": "preempted"})
-        master.add_state("exchange_human_to_robot", build_exchange_human_to_robot(ctx),
-                         _after_action("wait_with_object"))
+        master.add_state(
+            "which_hub",
+            WhatIsHeld(ctx),
+            {
+                "empty": "wait_without_object",
+                "holding": "wait_with_object",
+                "failed": "fault",
+                "preempted": "preempted",
+            },
+        )
+        master.add_state(
+            "wait_without_object",
+            Hub(ctx, ACTIONS_EMPTY, with_object=False),
+            {action: action for action in ACTIONS_EMPTY}
+            | {"stopped": "stopped", "failed": "fault", "preempted": "preempted"},
+        )
+        master.add_state(
+            "exchange_human_to_robot", build_exchange_human_to_robot(ctx), _after_action("wait_with_object")
+        )
         master.add_state("take", build_take(ctx), _after_action("wait_with_object"))
-        master.add_state("wait_with_object", Hub(ctx, ACTIONS_HOLDING, with_object=True),
-                         {action: action for action in ACTIONS_HOLDING}
-                         | {"stopped": "stopped", "failed": "fault", "preempted": "preempted"})
-        master.add_state("exchange_robot_to_human", build_exchange_robot_to_human(ctx),
-                         _after_action("wait_without_object"))
+        master.add_state(
+            "wait_with_object",
+            Hub(ctx, ACTIONS_HOLDING, with_object=True),
+            {action: action for action in ACTIONS_HOLDING}
+            | {"stopped": "stopped", "failed": "fault", "preempted": "preempted"},
+        )
+        master.add_state(
+            "exchange_robot_to_human", build_exchange_robot_to_human(ctx), _after_action("wait_without_object")
+        )
         master.add_state("put", build_put(ctx), _after_action("wait_without_object"))
-        master.add_state("stopped", Stopped(ctx),
-                         {"succeeded": "recover", "failed": "fault", "preempted": "preempted"})
-        master.add_state("fault", Fault(ctx),
-                         {"succeeded": "coglab_init_system", "failed": "fault", "preempted": "preempted"})
-        master.add_state("recover", build_recovery(ctx, operator=True),
-                         {"empty": "wait_without_object", "holding": "wait_with_object", "stopped": "stopped",
-                          "fault": "fault", "preempted": "preempted"})
+        master.add_state("stopped", Stopped(ctx), {"succeeded": "recover", "failed": "fault", "preempted": "preempted"})
+        master.add_state(
+            "fault", Fault(ctx), {"succeeded": "coglab_init_system", "failed": "fault", "preempted": "preempted"}
+        )
+        master.add_state(
+            "recover",
+            build_recovery(ctx, operator=True),
+            {
+                "empty": "wait_without_object",
+                "holding": "wait_with_object",
+                "stopped": "stopped",
+                "fault": "fault",
+                "preempted": "preempted",
+            },
+        )
     return master

@@ -1,5 +1,6 @@
 """Recovery: whatever failed, the arm ends at home and the hand is open or holding, unless STOP or a fault
 forbids motion."""
+
 from __future__ import annotations
 
 from typing import Any
@@ -42,8 +43,10 @@ class EndMotion(CoglabState):
         trouble = "" if arm_is_blocked(self).ok else end_motion(self.ctx, "recovery after a failure")
         blocked = arm_is_blocked(self)
         if blocked.ok:
-            self.reason = (f"the arm is blocked: {blocked.why}; the hand keeps what it holds; when its cause is away, "
-                           f"{command('reset')}")
+            self.reason = (
+                f"the arm is blocked: {blocked.why}; the hand keeps what it holds; when its cause is away, "
+                f"{command('reset')}"
+            )
             self.ctx.journal.stopped(self.reason, blocked.why, blocked.code)
             return "stopped"
         if trouble:
@@ -73,12 +76,14 @@ class SecureHand(CoglabState):
         if self.ctx.holding:
             return self._stay(f"the person may still hold '{self.ctx.holding}', which is in the robot's fingers")
         try:
-            self.await_pending(self.ctx.hand.open(int(self.ctx.config.get("hand.open_speed", 400))),
-                               "opening of the empty hand", 8.0)
+            self.await_pending(
+                self.ctx.hand.open(int(self.ctx.config.get("hand.open_speed", 400))), "opening of the empty hand", 8.0
+            )
         except PortError as error:
             if self.ctx.shared:
-                return self._stay(f"the hand could not be opened, and the person may hold what is in it "
-                                  f"({error.sentence})")
+                return self._stay(
+                    f"the hand could not be opened, and the person may hold what is in it ({error.sentence})"
+                )
             # A dead hand must not keep the arm from going home; what it may hold is unknown, so it is not forced.
             self.reason = f"the hand could not be opened: {error.sentence}"
         self.ctx.shared = False
@@ -105,8 +110,10 @@ class WhatIsHeld(CoglabState):
     def run(self, ud: Any) -> str:
         held = self._seen_by_the_hand()
         if held is None:
-            self.reason = (f"the hand does not tell; as noted before, "
-                           f"{f'it holds {self.ctx.holding!r}' if self.ctx.holding else 'it is empty'}")
+            self.reason = (
+                f"the hand does not tell; as noted before, "
+                f"{f'it holds {self.ctx.holding!r}' if self.ctx.holding else 'it is empty'}"
+            )
         elif held and not self.ctx.holding:
             self.ctx.holding = self.ctx.memory.recall() or UNKNOWN
             self.reason = f"the hand holds an object since before this start: {self.ctx.holding}"
@@ -135,13 +142,20 @@ def build_recovery(ctx: Context, operator: bool = False) -> CoglabMachine:
     failed = {"failed": "check_stop", "preempted": "preempted"}
     with machine:
         machine.add_state("end_motion", EndMotion(ctx), {"succeeded": "secure_hand", "stopped": "stopped", **failed})
-        machine.add_state("secure_hand", SecureHand(ctx, operator),
-                          {"succeeded": "coglab_home_robot", "stopped": "stopped", **failed})
+        machine.add_state(
+            "secure_hand", SecureHand(ctx, operator), {"succeeded": "coglab_home_robot", "stopped": "stopped", **failed}
+        )
         machine.add_state("coglab_home_robot", HomeRobot(ctx), {"succeeded": "what_is_held", **failed})
-        machine.add_state("what_is_held", WhatIsHeld(ctx),
-                          {"empty": "empty", "holding": "holding", "failed": "fault", "preempted": "preempted"})
-        machine.add_state("check_stop", CheckStop(ctx),
-                          {"stopped": "stopped", "fault": "fault", "failed": "fault", "preempted": "preempted"})
+        machine.add_state(
+            "what_is_held",
+            WhatIsHeld(ctx),
+            {"empty": "empty", "holding": "holding", "failed": "fault", "preempted": "preempted"},
+        )
+        machine.add_state(
+            "check_stop",
+            CheckStop(ctx),
+            {"stopped": "stopped", "fault": "fault", "failed": "fault", "preempted": "preempted"},
+        )
     return machine
 
 
@@ -160,8 +174,13 @@ class CheckStop(CoglabState):
 ACTION_OUTCOMES = ["succeeded", "failed_empty", "failed_holding", "stopped", "fault", "preempted"]
 """Outcomes of every action machine; the master's transitions depend on nothing else."""
 
-RECOVERY_TRANSITIONS = {"empty": "failed_empty", "holding": "failed_holding", "stopped": "stopped", "fault": "fault",
-                        "preempted": "preempted"}
+RECOVERY_TRANSITIONS = {
+    "empty": "failed_empty",
+    "holding": "failed_holding",
+    "stopped": "stopped",
+    "fault": "fault",
+    "preempted": "preempted",
+}
 """How the outcomes of 'recover' end an action."""
 
 

@@ -5,6 +5,7 @@ benches).
 Methods that return a Pending may take time; the states wait on it within their limits. All others return at once.
 Units are SI; joints in wire order lwr_a1 lwr_a2 lwr_e1 lwr_a3 lwr_a4 lwr_a5 lwr_a6; quaternions x y z w.
 """
+
 from __future__ import annotations
 
 from collections.abc import Sequence

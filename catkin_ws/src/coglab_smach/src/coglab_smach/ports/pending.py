@@ -1,4 +1,5 @@
 """Answers that take time: every port call that may wait returns a Pending, and states wait on it with a limit."""
+
 from __future__ import annotations
 
 import threading
@@ -56,8 +57,9 @@ class Ready(Pending):
 class Polled(Pending):
     """A value computed from callables: ``ready()`` says when, ``value()`` gives it (may raise PortError)."""
 
-    def __init__(self, ready: Callable[[], bool], value: Callable[[], Any],
-                 cancel: Callable[[], None] | None = None) -> None:
+    def __init__(
+        self, ready: Callable[[], bool], value: Callable[[], Any], cancel: Callable[[], None] | None = None
+    ) -> None:
         self._ready = ready
         self._value = value
         self._cancel = cancel

@@ -1,4 +1,5 @@
 """ArmPort over the services and topics of the controller manager and of the LWR interface. Names are relative."""
+
 from __future__ import annotations
 
 import threading
@@ -66,8 +67,9 @@ class RosArm:
 
     def _on_unfinished(self, message: UnfinishedPtp) -> None:
         with self._lock:
-            self._ended[message.ptp_id] = PortError("the point-to-point motion ended before its target",
-                                                    (message.reason,), message.reason_code)
+            self._ended[message.ptp_id] = PortError(
+                "the point-to-point motion ended before its target", (message.reason,), message.reason_code
+            )
 
     def load_controller(self, controller_id: str, controller_type: str) -> Pending:
         def run(permit: Permit) -> None:
@@ -76,8 +78,13 @@ class RosArm:
             loaded = call_now(f"{self._manager}/list_controllers", ListControllers, permit)
             if (controller_id, controller_type) in zip(loaded.controller_ids, loaded.controller_types, strict=False):
                 return
-            call_now(f"{self._manager}/load_controller", LoadController, permit, controller_id=controller_id,
-                     controller_type=controller_type)
+            call_now(
+                f"{self._manager}/load_controller",
+                LoadController,
+                permit,
+                controller_id=controller_id,
+                controller_type=controller_type,
+            )
 
         return Threaded(run, f"loading of plug-in '{controller_id}'")
 
@@ -90,24 +97,34 @@ class RosArm:
     def motion_allowed(self) -> Verdict:
         state = self._lwr_state.message
         if state is None:
-            return Verdict(False, f"{self._lwr}/state has never been published; is the robot node running?",
-                           ReasonCode.NODE_SILENT)
+            return Verdict(
+                False, f"{self._lwr}/state has never been published; is the robot node running?", ReasonCode.NODE_SILENT
+            )
         if self._joints.age() > 1.0:
             return self._silent()
         if state.motion_allowed:
             return Verdict(True)
-        return Verdict(False, state.reason or f"the LWR interface is in state '{state.supervisor}'",
-                       state.reason_code or (ReasonCode.HELD if state.hold_latched else ReasonCode.NONE))
+        return Verdict(
+            False,
+            state.reason or f"the LWR interface is in state '{state.supervisor}'",
+            state.reason_code or (ReasonCode.HELD if state.hold_latched else ReasonCode.NONE),
+        )
 
     def _silent(self) -> Verdict:
-        return Verdict(False, f"{self._lwr}/joint_states is silent for {min(self._joints.age(), 999):.1f} s",
-                       ReasonCode.NODE_SILENT)
+        return Verdict(
+            False,
+            f"{self._lwr}/joint_states is silent for {min(self._joints.age(), 999):.1f} s",
+            ReasonCode.NODE_SILENT,
+        )
 
     def standing(self) -> Verdict:
         status = self._status.message
         if status is None:
-            return Verdict(False, f"{self._manager}/status has never been published; is the robot node running?",
-                           ReasonCode.NODE_SILENT)
+            return Verdict(
+                False,
+                f"{self._manager}/status has never been published; is the robot node running?",
+                ReasonCode.NODE_SILENT,
+            )
         if self._joints.age() > 1.0:
             return self._silent()
         return Verdict(status.standing, "" if status.standing else f"the arm is {status.state}")
@@ -127,13 +144,21 @@ class RosArm:
             return any(c.failed() for c in calls)
 
         # The answer may be here before the status that says so.
-        return Polled(lambda: failed() or (all(c.done() for c in calls) and self.standing().ok),
-                      lambda: [c.result() for c in calls][0])
+        return Polled(
+            lambda: failed() or (all(c.done() for c in calls) and self.standing().ok),
+            lambda: [c.result() for c in calls][0],
+        )
 
     def _cancel(self, controller_id: str, reason: str) -> None:
         try:
-            call_now(f"{self._manager}/{controller_id}/cancel", CancelMotion, Permit(), wait=1.0, time_limit=0.0,
-                     reason=reason[:200])
+            call_now(
+                f"{self._manager}/{controller_id}/cancel",
+                CancelMotion,
+                Permit(),
+                wait=1.0,
+                time_limit=0.0,
+                reason=reason[:200],
+            )
         except PortError as error:
             status = self._status.message
             # A robot node that has started anew has nothing loaded: no service, and nothing that moves.
@@ -150,18 +175,25 @@ class RosArm:
 
     def switch_controller(self, controller_id: str) -> Pending:
         self._addressed = controller_id
-        return mapped(call(f"{self._manager}/switch_controller", SwitchController, wait=5.0,
-                           controller_id=controller_id), lambda r: r.controller_type)
+        return mapped(
+            call(f"{self._manager}/switch_controller", SwitchController, wait=5.0, controller_id=controller_id),
+            lambda r: r.controller_type,
+        )
 
     def apply_profile(self, profile: str) -> Pending:
-        return mapped(call(f"{self._manager}/feedback/apply_profile", FeedbackSelect, wait=5.0, names=[profile],
-                           reason=""), lambda r: None)
+        return mapped(
+            call(f"{self._manager}/feedback/apply_profile", FeedbackSelect, wait=5.0, names=[profile], reason=""),
+            lambda r: None,
+        )
 
     def profile_settled(self, profile: str) -> Verdict:
         message = self._cascade.message
         if message is None:
-            return Verdict(False, f"{self._manager}/feedback/status has never been published; is the robot node "
-                                  "running?", ReasonCode.NODE_SILENT)
+            return Verdict(
+                False,
+                f"{self._manager}/feedback/status has never been published; is the robot node running?",
+                ReasonCode.NODE_SILENT,
+            )
         if message.profile != profile:
             return Verdict(False, f"profile '{message.profile}' is in force")
         busy = [f"{c.name} is {c.activity}" for c in message.controllers if not c.enabled and c.activity != "off"]
@@ -186,21 +218,35 @@ class RosArm:
         return Polled(pending.done, pending.result, cancel)
 
     def switch_dmp(self, request: DmpRequest) -> Pending:
-        return mapped(call(f"{self._manager}/dmp/switch_dmp", SwitchDmp, wait=1.0,
-                           **_fields(request, SwitchDmpRequest)), lambda r: None)
+        return mapped(
+            call(f"{self._manager}/dmp/switch_dmp", SwitchDmp, wait=1.0, **_fields(request, SwitchDmpRequest)),
+            lambda r: None,
+        )
 
     def dmp_progress(self) -> DmpProgress:
         message = self._feedback.message
         if message is None or self._feedback.stamp < self._started_at:
             return DmpProgress("running" if self._started_at else "idle")
-        return DmpProgress(message.state, message.reason, message.primitive_id, message.phase,
-                           message.remaining_distance, message.reason_code)
+        return DmpProgress(
+            message.state,
+            message.reason,
+            message.primitive_id,
+            message.phase,
+            message.remaining_distance,
+            message.reason_code,
+        )
 
     def move_ptp(self, position: Sequence[float], max_velocity: Sequence[float]) -> Pending:
         with self._lock:
             self._ended.clear()
-        added = call(f"{self._manager}/ptp/add_ptp", AddPtp, wait=5.0, position=list(position),
-                     max_vel=list(max_velocity), max_acc=[])
+        added = call(
+            f"{self._manager}/ptp/add_ptp",
+            AddPtp,
+            wait=5.0,
+            position=list(position),
+            max_vel=list(max_velocity),
+            max_acc=[],
+        )
         ended: list[PortError | None] = []
 
         def finished() -> bool:
@@ -227,8 +273,13 @@ class RosArm:
                 return (self._ended.pop(identity),)
         status = self._status.message
         if status is not None and status.state == "fault":
-            return (PortError("the point-to-point motion ended in a fault of the controller manager", (status.reason,),
-                              status.reason_code),)
+            return (
+                PortError(
+                    "the point-to-point motion ended in a fault of the controller manager",
+                    (status.reason,),
+                    status.reason_code,
+                ),
+            )
         allowed = self.motion_allowed()
         if not allowed.ok:
             return (PortError("the arm does not follow any more", (allowed.why,), allowed.code),)

@@ -2,6 +2,7 @@
 
 A rospy service call has no time limit of its own, so each runs in a thread and the state that waits gives it one.
 """
+
 from __future__ import annotations
 
 import time
@@ -60,8 +61,9 @@ def call_now(name: str, kind: Any, permit: Permit, wait: float = SERVICE_WAIT, *
     try:
         response = rospy.ServiceProxy(full, kind)(Request(**fields))
     except rospy.ServiceException as error:
-        raise PortError(f"service {full} broke off; its node may have died", (str(error),),
-                        ReasonCode.NODE_SILENT) from None
+        raise PortError(
+            f"service {full} broke off; its node may have died", (str(error),), ReasonCode.NODE_SILENT
+        ) from None
     if getattr(response, "success", True) is False:
         raise PortError(f"{full} refused: {response.message}", code=getattr(response, "reason_code", ReasonCode.NONE))
     return response
@@ -77,11 +79,13 @@ def _await_service(full: str, wait: float, permit: Permit) -> None:
             return
         except rospy.ROSException:
             if rospy.is_shutdown():
-                raise PortError(f"service {full} was not called: this node shuts down",
-                                code=ReasonCode.PREEMPTED) from None
+                raise PortError(
+                    f"service {full} was not called: this node shuts down", code=ReasonCode.PREEMPTED
+                ) from None
             if time.monotonic() >= end:
-                raise PortError(f"service {full} is not there after {wait:.0f} s; is its node running?",
-                                code=ReasonCode.NODE_SILENT) from None
+                raise PortError(
+                    f"service {full} is not there after {wait:.0f} s; is its node running?", code=ReasonCode.NODE_SILENT
+                ) from None
 
 
 def mapped(pending: Pending, value: Callable[[Any], Any]) -> Pending:

@@ -1,4 +1,5 @@
 """HandPort over the four actions, the calibration topic and the status of ih2_hand."""
+
 from __future__ import annotations
 
 import threading
@@ -43,8 +44,10 @@ class ActionCall(Pending):
 
     def _send(self, goal: Any) -> None:
         if not self._client.wait_for_server(rospy.Duration(SERVER_WAIT)):
-            self._fail(f"action {self._name} has no server after {SERVER_WAIT:.0f} s; is the hand node running?",
-                       code=ReasonCode.NODE_SILENT)
+            self._fail(
+                f"action {self._name} has no server after {SERVER_WAIT:.0f} s; is the hand node running?",
+                code=ReasonCode.NODE_SILENT,
+            )
             return
         with self._lock:
             if self._cancelled:
@@ -61,8 +64,11 @@ class ActionCall(Pending):
         self._result = result
         message = getattr(result, "message", "") or self._client.get_goal_status_text()
         if status != GoalStatus.SUCCEEDED or (result is not None and not result.isOk):
-            self._fail(f"action {self._name} ended {GoalStatus.to_string(status)}", (message,) if message else (),
-                       getattr(result, "reason_code", ReasonCode.NONE))
+            self._fail(
+                f"action {self._name} ended {GoalStatus.to_string(status)}",
+                (message,) if message else (),
+                getattr(result, "reason_code", ReasonCode.NONE),
+            )
             return
         self._done.set()
 
@@ -87,9 +93,15 @@ class RosHand:
 
     def __init__(self, namespace: str = "ih2_hand") -> None:
         self._ns = namespace
-        self._clients = {name: actionlib.SimpleActionClient(f"{namespace}/{name}", kind) for name, kind in
-                         (("hand_open", HandOpenAction), ("hand_close", HandCloseAction),
-                          ("hand_preshape", HandPreshapeAction), ("hand_preshape_close", HandPreshapeCloseAction))}
+        self._clients = {
+            name: actionlib.SimpleActionClient(f"{namespace}/{name}", kind)
+            for name, kind in (
+                ("hand_open", HandOpenAction),
+                ("hand_close", HandCloseAction),
+                ("hand_preshape", HandPreshapeAction),
+                ("hand_preshape_close", HandPreshapeCloseAction),
+            )
+        }
         self._status = Newest(f"{namespace}/hand_status", HandStatus)
         self._calibration = rospy.Publisher(f"{namespace}/hand_calibration", String, queue_size=1)
 
@@ -147,5 +159,12 @@ class RosHand:
         message = self._status.message
         if message is None or self._status.age() > 1.0:
             return HandState(message=f"{self._ns}/hand_status is silent", event=ReasonCode.NODE_SILENT)
-        return HandState(message.connected, message.calibrated, message.calibrating, message.holding, message.message,
-                         tuple(motor.position for motor in message.motors), message.event_code)
+        return HandState(
+            message.connected,
+            message.calibrated,
+            message.calibrating,
+            message.holding,
+            message.message,
+            tuple(motor.position for motor in message.motors),
+            message.event_code,
+        )

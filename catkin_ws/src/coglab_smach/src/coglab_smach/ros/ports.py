@@ -2,6 +2,7 @@
 
 All names are relative: in the node's own namespace, so that two robots fit in one graph.
 """
+
 from __future__ import annotations
 
 from typing import Any
@@ -41,8 +42,12 @@ class RosPerception:
         message = self._recognition.message
         if message is None or self._recognition.age() > 0.5:
             return Recognition()
-        return Recognition(message.pattern, message.confidence, message.decided,
-                           dict(zip(message.names, message.probabilities, strict=False)))
+        return Recognition(
+            message.pattern,
+            message.confidence,
+            message.decided,
+            dict(zip(message.names, message.probabilities, strict=False)),
+        )
 
 
 def _located(frame: str, parent: str, pose: Pose, age: float) -> Located:
@@ -83,22 +88,39 @@ class RosContact:
 
     def _on_contact(self, message: Contact) -> None:
         if self._wanted is not None and self._event is None and message.contact == self._wanted:
-            self._event = ContactEvent(message.contact, message.source, message.margin, message.message,
-                                       message.confidence, message.reason_code)
+            self._event = ContactEvent(
+                message.contact,
+                message.source,
+                message.margin,
+                message.message,
+                message.confidence,
+                message.reason_code,
+            )
 
     def arm(self, mode: str, time_limit: float, settings: dict[str, Any]) -> Pending:
         self._event = None
         self._wanted = mode != "release"
-        return mapped(call(self._service, ArmContact, wait=2.0, mode=mode, timeout=time_limit,
-                           k=float(settings.get("k", 0.0)), joints=list(settings.get("joints", [])),
-                           mass=float(settings.get("mass", 0.0)),
-                           load_share=float(settings.get("load_share", 0.0))), lambda r: None)
+        return mapped(
+            call(
+                self._service,
+                ArmContact,
+                wait=2.0,
+                mode=mode,
+                timeout=time_limit,
+                k=float(settings.get("k", 0.0)),
+                joints=list(settings.get("joints", [])),
+                mass=float(settings.get("mass", 0.0)),
+                load_share=float(settings.get("load_share", 0.0)),
+            ),
+            lambda r: None,
+        )
 
     def disarm(self) -> None:
         if self._wanted is not None:
             self._wanted = None
-            call(self._service, ArmContact, wait=0.5, mode="off", timeout=0.0, k=0.0, joints=[], mass=0.0,
-                 load_share=0.0)
+            call(
+                self._service, ArmContact, wait=0.5, mode="off", timeout=0.0, k=0.0, joints=[], mass=0.0, load_share=0.0
+            )
 
     def event(self) -> ContactEvent | None:
         return self._event

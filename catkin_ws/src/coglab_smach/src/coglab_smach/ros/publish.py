@@ -1,4 +1,5 @@
 """Publishing from threads that outlive the node's topics for a moment."""
+
 from __future__ import annotations
 
 from typing import Any

@@ -3,6 +3,7 @@
 A motion goes on until its end, whoever waits for it; it ends before only by cancelling, a switch, a hold, an abort or
 the loss of command mode, and then the arm brakes.
 """
+
 from __future__ import annotations
 
 from collections.abc import Sequence
@@ -66,7 +67,7 @@ class ArmModel:
             return 1.0, 0.0
         if self._braking:
             return 2.0 * s - s * s, 2.0 * (1.0 - s) / self._duration
-        return s ** 3 * (10.0 - 15.0 * s + 6.0 * s * s), 30.0 * s * s * (1.0 - s) ** 2 / self._duration
+        return s**3 * (10.0 - 15.0 * s + 6.0 * s * s), 30.0 * s * s * (1.0 - s) ** 2 / self._duration
 
     def position(self) -> tuple[float, ...]:
         """Seven joints, rad."""
@@ -120,8 +121,9 @@ class ArmModel:
             self.end(faults.abort_reason, ReasonCode.GOAL_LOST)
             return
         share = self._share()[0]
-        self.dmp = DmpProgress("reached" if over else "running", "", self.request.primitive_id, 1.0 - share,
-                               REACH_WAY * (1.0 - share))
+        self.dmp = DmpProgress(
+            "reached" if over else "running", "", self.request.primitive_id, 1.0 - share, REACH_WAY * (1.0 - share)
+        )
         self._reached_out = self._reached_out or over
 
     def blocked(self) -> tuple[str, int]:
@@ -136,13 +138,15 @@ class ArmModel:
         """End what runs and what waits; the arm brakes. Whether there was anything."""
         unfinished = ([self._running] if self._running is not None else []) + self._queue
         for motion in unfinished:
-            self._ended[motion.identity] = PortError("the point-to-point motion ended before its target", (reason,),
-                                                     code)
+            self._ended[motion.identity] = PortError(
+                "the point-to-point motion ended before its target", (reason,), code
+            )
         self._running, self._queue = None, []
         ran = bool(unfinished) or self.dmp.state == "running"
         if self.dmp.state == "running":
-            self.dmp = DmpProgress("aborted", reason, self.dmp.primitive_id, self.dmp.phase,
-                                   self.dmp.remaining_distance, code)
+            self.dmp = DmpProgress(
+                "aborted", reason, self.dmp.primitive_id, self.dmp.phase, self.dmp.remaining_distance, code
+            )
         self.brake()
         return ran
 
@@ -158,8 +162,10 @@ class ArmModel:
         self._require("ptp")
         table = np.asarray(target, dtype=float)
         if table.shape != (7,) or not np.all(np.isfinite(table)):
-            raise PortError(f"add_ptp refused: position has {table.size} numbers, or one that is none; expected 7",
-                            code=ReasonCode.INVALID_ARGUMENT)
+            raise PortError(
+                f"add_ptp refused: position has {table.size} numbers, or one that is none; expected 7",
+                code=ReasonCode.INVALID_ARGUMENT,
+            )
         if np.any(np.abs(table) > 2.95):
             raise PortError("add_ptp refused: a joint outside its limits", code=ReasonCode.OUT_OF_RANGE)
         motion = _Ptp(self._next_id, table, max_velocity)
@@ -183,8 +189,10 @@ class ArmModel:
         """PortError as execute_dmp and switch_dmp refuse."""
         self._require("dmp")
         if request.primitive_id not in primitives:
-            raise PortError(f"primitive '{request.primitive_id}' does not exist; loaded: "
-                            f"{', '.join(sorted(primitives))}", code=ReasonCode.UNKNOWN_NAME)
+            raise PortError(
+                f"primitive '{request.primitive_id}' does not exist; loaded: {', '.join(sorted(primitives))}",
+                code=ReasonCode.UNKNOWN_NAME,
+            )
 
     def execute(self, request: DmpRequest) -> None:
         """Begin a reach: out from where the arm is, or back if it is out already."""
@@ -207,5 +215,6 @@ class ArmModel:
         if code:
             raise PortError(f"refused: {why}", code=code)
         if self.active != controller_id:
-            raise PortError(f"refused: '{self.active}' is the active controller, not '{controller_id}'",
-                            code=ReasonCode.NOT_ACTIVE)
+            raise PortError(
+                f"refused: '{self.active}' is the active controller, not '{controller_id}'", code=ReasonCode.NOT_ACTIVE
+            )

@@ -3,6 +3,7 @@
 A request acts when its time has come, whether or not anybody waits for it, as over ROS: only what could not be sent
 yet, because the node behind the port is frozen, can be given up.
 """
+
 from __future__ import annotations
 
 import threading
@@ -110,9 +111,11 @@ class SimulatedCell:
         self.primitives = {"reach_human", "reach_human_high", "give_human", "take_board", "put_board"}
         self.hand_positions: tuple[int, ...] = (0, 0, 0, 0, 0)
         self.calibrated = self.preshaped = False
-        self.objects: dict[str, Pose] = {"mug": Pose(np.array([0.78, 0.03, 0.43])),
-                                         "board": Pose(np.array([0.45, -0.55, 0.05])),
-                                         "human_hand": Pose(np.array([0.86, 0.03, 0.43]))}
+        self.objects: dict[str, Pose] = {
+            "mug": Pose(np.array([0.78, 0.03, 0.43])),
+            "board": Pose(np.array([0.45, -0.55, 0.05])),
+            "human_hand": Pose(np.array([0.86, 0.03, 0.43])),
+        }
         self._lock = threading.RLock()
         self._under_way: list[_Call] = []
 

@@ -4,6 +4,7 @@ The arm is a model that moves and brakes (simulated_arm_model), the hand takes f
 script. Faults are attributes that a test sets at any time. Physics belongs to coglab_sim; here only order, timing and
 outcomes matter.
 """
+
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
@@ -42,8 +43,9 @@ class SimulatedArm:
     def load_controller(self, controller_id: str, controller_type: str) -> Pending:
         def apply() -> None:
             if controller_type not in ("coglab/DmpController", "coglab/PtpController"):
-                raise PortError(f"load_controller refused: no controller of type '{controller_type}'",
-                                code=ReasonCode.UNKNOWN_NAME)
+                raise PortError(
+                    f"load_controller refused: no controller of type '{controller_type}'", code=ReasonCode.UNKNOWN_NAME
+                )
             self.cell.loaded[controller_id] = controller_type
 
         return self.cell.answer("arm", "load_controller", 0.1, apply)
@@ -186,8 +188,9 @@ class SimulatedHand:
     def calibrate(self, mode: str) -> Pending:
         def apply() -> None:
             if mode.split(" ")[0] not in ("fast", "complete"):
-                raise PortError(f"the hand does not calibrate after the order '{mode}'", ("no such order",),
-                                ReasonCode.HAND_REFUSED)
+                raise PortError(
+                    f"the hand does not calibrate after the order '{mode}'", ("no such order",), ReasonCode.HAND_REFUSED
+                )
             self.cell.calibrated, self.cell.hand_positions = True, (0, 0, 0, 0, 0)
 
         return self.cell.answer("hand", f"calibrate {mode}", 1.7, apply)
@@ -215,8 +218,11 @@ class SimulatedHand:
 
     def preshape(self, mode: str, level: str) -> Pending:
         if mode not in MODES:
-            return Ready(error=PortError(f"preshape refused: no mode '{mode}'; there are: {', '.join(MODES)}",
-                                         code=ReasonCode.UNKNOWN_NAME))
+            return Ready(
+                error=PortError(
+                    f"preshape refused: no mode '{mode}'; there are: {', '.join(MODES)}", code=ReasonCode.UNKNOWN_NAME
+                )
+            )
         return self._move(f"preshape {mode}", 0.8, lambda: (200, 40, 40, 40, 40), True)
 
     def close_on_object(self) -> Pending:
@@ -229,8 +235,9 @@ class SimulatedHand:
 
     def open(self, speed: int) -> Pending:
         if not 1 <= speed <= 511:
-            return Ready(error=PortError(f"open refused: speed is {speed}, expected 1..511",
-                                         code=ReasonCode.OUT_OF_RANGE))
+            return Ready(
+                error=PortError(f"open refused: speed is {speed}, expected 1..511", code=ReasonCode.OUT_OF_RANGE)
+            )
         return self._move("open", 0.8, lambda: (0, 0, 0, 0, 0), False)
 
     def state(self) -> HandState:
@@ -256,15 +263,17 @@ class SimulatedPerception:
 
         def value() -> Located:
             if unseen:
-                raise PortError(f"'{object_id}' was not seen within {time_limit:.1f} s",
-                                code=ReasonCode.OBJECT_NOT_SEEN)
+                raise PortError(
+                    f"'{object_id}' was not seen within {time_limit:.1f} s", code=ReasonCode.OBJECT_NOT_SEEN
+                )
             return _located(self.cell.objects[object_id], object_id)
 
         return self.cell.answer("perception", f"locate {object_id}", time_limit if unseen else 0.05, value)
 
     def free_places(self, object_id: str, time_limit: float) -> Pending:
-        return self.cell.answer("perception", "free_places", 0.1,
-                                lambda: [_located(place, "", parent="board") for place in self.places])
+        return self.cell.answer(
+            "perception", "free_places", 0.1, lambda: [_located(place, "", parent="board") for place in self.places]
+        )
 
     def recognition(self) -> Recognition:
         cell, partner = self.cell, self.cell.partner
@@ -326,8 +335,9 @@ class SimulatedContact:
             if mode != "contact" and not float(settings.get("mass", 0.0)) > 0.0:
                 raise PortError(f"arm refused: {mode} needs the mass of the object in kg")
             if mode == "load" and not self._touched:
-                raise PortError("arm refused: load is counted from the torque before the contact: arm for "
-                                "contact first")
+                raise PortError(
+                    "arm refused: load is counted from the torque before the contact: arm for contact first"
+                )
             after = {"contact": partner.touch_after, "load": partner.let_go_after, "release": partner.take_after}[mode]
             now = cell.clock.now()
             self._touched = self._touched or mode == "contact"
@@ -349,8 +359,9 @@ class SimulatedContact:
         now = self.cell.clock.now()
         happens = self._due is not None and self._due <= min(now, self._until)
         if self._event is None and self._mode and happens and "contact" not in self.cell.faults.dead:
-            self._event = ContactEvent(self._mode != "release", "simulated", 2.0,
-                                       f"{self._mode} by the partner's script")
+            self._event = ContactEvent(
+                self._mode != "release", "simulated", 2.0, f"{self._mode} by the partner's script"
+            )
         return self._event
 
 
@@ -358,8 +369,16 @@ def simulated_context(clock: Clock, database: ObjectDatabase, config: Any) -> tu
     """A complete context on simulated ports, and the cell behind them."""
     from coglab_smach.context.context import Context
     from coglab_smach.context.journal import Journal
+
     cell = SimulatedCell(clock)
-    ctx = Context(clock=clock, arm=SimulatedArm(cell), hand=SimulatedHand(cell), perception=SimulatedPerception(cell),
-                  database=SimulatedDatabase(cell, database), contact=SimulatedContact(cell), config=config,
-                  journal=Journal(clock.now))
+    ctx = Context(
+        clock=clock,
+        arm=SimulatedArm(cell),
+        hand=SimulatedHand(cell),
+        perception=SimulatedPerception(cell),
+        database=SimulatedDatabase(cell, database),
+        contact=SimulatedContact(cell),
+        config=config,
+        journal=Journal(clock.now),
+    )
     return ctx, cell

@@ -2,6 +2,7 @@
 
 The world is coglab_sim.virtual_world.World; it is given, so that nothing here imports the simulation.
 """
+
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
@@ -128,8 +129,13 @@ class VirtualArm:
 
     @staticmethod
     def _fields(request: DmpRequest) -> tuple[Any, ...]:
-        return (request.primitive_id, request.dmp_ratio, list(request.goal_offset), request.orientation_control,
-                list(request.target_orientation))
+        return (
+            request.primitive_id,
+            request.dmp_ratio,
+            list(request.goal_offset),
+            request.orientation_control,
+            list(request.target_orientation),
+        )
 
     def _ends_motion(self, pending: Pending) -> Pending:
         def cancel() -> None:
@@ -139,8 +145,9 @@ class VirtualArm:
 
     def dmp_progress(self) -> DmpProgress:
         now = self.robot.dmp_progress()
-        return DmpProgress(now["motion"], now["reason"], now["primitive"], now["phase"], now["remaining_distance"],
-                           now["reason_code"])
+        return DmpProgress(
+            now["motion"], now["reason"], now["primitive"], now["phase"], now["remaining_distance"], now["reason_code"]
+        )
 
     def move_ptp(self, position: Sequence[float], max_velocity: Sequence[float]) -> Pending:
         status, identity, message = self.robot.add_ptp(list(position), list(max_velocity))
@@ -165,8 +172,9 @@ class VirtualArm:
         if end is not None and end["executed"]:
             return [None]
         if end is not None:
-            return [PortError("the point-to-point motion ended before its target", (end["reason"],),
-                              end["reason_code"])]
+            return [
+                PortError("the point-to-point motion ended before its target", (end["reason"],), end["reason_code"])
+            ]
         if robot.report["fault"]:
             return [PortError("the point-to-point motion ended in a fault", (robot.report["reason"],))]
         return [] if allowed.ok else [PortError("the arm does not follow any more", (allowed.why,))]
@@ -312,9 +320,15 @@ class VirtualContact:
     def arm(self, mode: str, time_limit: float, settings: Mapping[str, Any]) -> Pending:
         self._event = None
         try:
-            self.detector.arm(mode, self.rig.t, time_limit, float(settings.get("k", 0.0)),
-                              settings.get("joints", ()), float(settings.get("mass", 0.0)),
-                              float(settings.get("load_share", 0.0)))
+            self.detector.arm(
+                mode,
+                self.rig.t,
+                time_limit,
+                float(settings.get("k", 0.0)),
+                settings.get("joints", ()),
+                float(settings.get("mass", 0.0)),
+                float(settings.get("load_share", 0.0)),
+            )
         except ValueError as error:
             return Ready(error=PortError(str(error), code=ReasonCode.INVALID_ARGUMENT))
         return Ready()

@@ -1,4 +1,5 @@
 """States of the arm: plug-ins and primitives, LWR interface, starting a DMP, waiting for its end, point-to-point."""
+
 from __future__ import annotations
 
 from functools import partial
@@ -21,8 +22,10 @@ class LoadControllers(CoglabState):
 
     def run(self, ud: Any) -> str:
         for controller_id, controller_type in dict(self.ctx.config.get("controllers")).items():
-            self.await_pending(self.ctx.arm.load_controller(controller_id, controller_type),
-                               f"loading plug-in '{controller_id}' of type {controller_type}")
+            self.await_pending(
+                self.ctx.arm.load_controller(controller_id, controller_type),
+                f"loading plug-in '{controller_id}' of type {controller_type}",
+            )
         return "succeeded"
 
 
@@ -76,19 +79,23 @@ class SwitchController(CoglabState):
         self.controller_id = controller_id
 
     def run(self, ud: Any) -> str:
-        self.await_pending(self.ctx.arm.switch_controller(self.controller_id),
-                           f"switching to controller '{self.controller_id}'")
+        self.await_pending(
+            self.ctx.arm.switch_controller(self.controller_id), f"switching to controller '{self.controller_id}'"
+        )
         return "succeeded"
 
 
 def dmp_request(goal: dict[str, Any], primitive: str | None = None, ratio: float | None = None) -> DmpRequest:
     """The request of a goal as it travels in user data."""
     orientation = goal.get("orientation")
-    return DmpRequest(primitive_id=primitive or goal["primitive"], goal_frame=goal["frame"],
-                      goal_offset=list(goal["offset"]),
-                      dmp_ratio=float(ratio if ratio is not None else goal.get("dmp_ratio", 1.0)),
-                      orientation_control=orientation is not None,
-                      target_orientation=list(orientation if orientation is not None else (0.0, 0.0, 0.0, 0.0)))
+    return DmpRequest(
+        primitive_id=primitive or goal["primitive"],
+        goal_frame=goal["frame"],
+        goal_offset=list(goal["offset"]),
+        dmp_ratio=float(ratio if ratio is not None else goal.get("dmp_ratio", 1.0)),
+        orientation_control=orientation is not None,
+        target_orientation=list(orientation if orientation is not None else (0.0, 0.0, 0.0, 0.0)),
+    )
 
 
 class ExecuteDmp(CoglabState):
@@ -176,14 +183,17 @@ class WaitStop(CoglabState):
         arm = self.ctx.arm
         try:
             self.wait_for(lambda: self._reached() or arm.dmp_progress().primitive_id != "", "news of the reach", 2.0)
-            limit = (float(self.ctx.config.get("reach_timeout", 6.0))
-                     + reach_time(arm.motion_limits(), arm.dmp_progress().remaining_distance))
+            limit = float(self.ctx.config.get("reach_timeout", 6.0)) + reach_time(
+                arm.motion_limits(), arm.dmp_progress().remaining_distance
+            )
             self.allow(limit + 10.0)
             self.wait_for(self._reached, "the end of the reach", limit, arm.speed_scale)
         except TimeLimit as error:
             progress = arm.dmp_progress()
-            error.causes = error.causes or (f"the motion is {progress.state} with {progress.remaining_distance:.2f} m "
-                                            f"to go{': ' if progress.reason else ''}{progress.reason}",)
+            error.causes = error.causes or (
+                f"the motion is {progress.state} with {progress.remaining_distance:.2f} m "
+                f"to go{': ' if progress.reason else ''}{progress.reason}",
+            )
             raise
 
     def _leave_approach_profile(self) -> None:
@@ -216,8 +226,9 @@ class WaitStop(CoglabState):
     def _reached(self) -> bool:
         progress = self.ctx.arm.dmp_progress()
         if progress.state == "aborted":
-            raise TimeLimit("the reach was aborted", (progress.reason or "the controller gave no reason",),
-                            progress.code)
+            raise TimeLimit(
+                "the reach was aborted", (progress.reason or "the controller gave no reason",), progress.code
+            )
         blocked = self.ctx.arm.motion_allowed()
         if not blocked.ok:
             raise TimeLimit("the arm does not follow any more", (blocked.why,), blocked.code)
@@ -254,12 +265,18 @@ class MonitorDmp(CoglabState):
                 return "preempted"
             seen = self.ctx.perception.recognition()
             target = family[seen.pattern]
-            self.await_pending(self.ctx.arm.switch_dmp(dmp_request(ud.goal, primitive=target)),
-                               f"switch to primitive '{target}'", 1.0)
+            self.await_pending(
+                self.ctx.arm.switch_dmp(dmp_request(ud.goal, primitive=target)), f"switch to primitive '{target}'", 1.0
+            )
             self.ctx.journal.mark("switch_dmp")
-            self.ctx.journal.transition(self.path(), self.label, "switched", self.label,
-                                        f"pattern '{seen.pattern}' recognised with confidence {seen.confidence:.2f}: "
-                                        f"primitive '{running}' replaced by '{target}'")
+            self.ctx.journal.transition(
+                self.path(),
+                self.label,
+                "switched",
+                self.label,
+                f"pattern '{seen.pattern}' recognised with confidence {seen.confidence:.2f}: "
+                f"primitive '{running}' replaced by '{target}'",
+            )
             running = target
             switches += 1
 
@@ -290,10 +307,11 @@ class PtpMotion(CoglabState):
         self.await_pending(arm.switch_controller("ptp"), "switching to controller 'ptp'", 5.0)
         here = arm.joint_positions()
         if here is not None:
-            self.allow(float(self.ctx.config.get("ptp_timeout", 5.0))
-                       + 1.5 * ptp_time(arm.motion_limits(), here, target, speed))
-        self.await_pending(arm.move_ptp(target, speed), f"the motion to posture '{self.posture}'",
-                           pace=arm.speed_scale)
+            self.allow(
+                float(self.ctx.config.get("ptp_timeout", 5.0))
+                + 1.5 * ptp_time(arm.motion_limits(), here, target, speed)
+            )
+        self.await_pending(arm.move_ptp(target, speed), f"the motion to posture '{self.posture}'", pace=arm.speed_scale)
         self._verify(target)
         return "succeeded"
 

@@ -1,4 +1,5 @@
 """The state every other one derives from: time limit, preemption, STOP, reasons; and containers that record them."""
+
 from __future__ import annotations
 
 import traceback
@@ -53,11 +54,18 @@ class CoglabState(smach.State):
     essential = True
     """False where a failure of this state is no failure of its action: it is recorded as a transition alone."""
 
-    def __init__(self, ctx: Context, outcomes: Iterable[str] = ("succeeded",), input_keys: Sequence[str] = (),
-                 output_keys: Sequence[str] = (), io_keys: Sequence[str] = ()) -> None:
+    def __init__(
+        self,
+        ctx: Context,
+        outcomes: Iterable[str] = ("succeeded",),
+        input_keys: Sequence[str] = (),
+        output_keys: Sequence[str] = (),
+        io_keys: Sequence[str] = (),
+    ) -> None:
         every = list(dict.fromkeys([*outcomes, "failed", "preempted"]))
-        super().__init__(outcomes=every, input_keys=list(input_keys), output_keys=list(output_keys),
-                         io_keys=list(io_keys))
+        super().__init__(
+            outcomes=every, input_keys=list(input_keys), output_keys=list(output_keys), io_keys=list(io_keys)
+        )
         self.ctx = ctx
         self.label = type(self).__name__
         self.container: Any | None = None
@@ -90,8 +98,15 @@ class CoglabState(smach.State):
                     failure = Failure(f"{failure.sentence}; {trouble}", failure.causes, failure.code)
             if outcome == "failed" and self.essential:
                 self.ctx.journal.failure(failure.sentence, failure.causes, failure.code)
-            self.ctx.journal.transition(self.path(), self.label, outcome, self.targets.get(outcome) or outcome,
-                                        failure.sentence, failure.causes, failure.code)
+            self.ctx.journal.transition(
+                self.path(),
+                self.label,
+                outcome,
+                self.targets.get(outcome) or outcome,
+                failure.sentence,
+                failure.causes,
+                failure.code,
+            )
         finally:
             self.ctx.journal.left(f"{self.path()}/{self.label}")
         return outcome
@@ -112,8 +127,9 @@ class CoglabState(smach.State):
         except Exception as error:
             last = traceback.extract_tb(error.__traceback__)[-1]
             smach.logerr(traceback.format_exc())
-            return "failed", Failure(f"{self.label}: {type(error).__name__}: {error} ({last.name}:{last.lineno})", (),
-                                     ReasonCode.UNEXPECTED)
+            return "failed", Failure(
+                f"{self.label}: {type(error).__name__}: {error} ({last.name}:{last.lineno})", (), ReasonCode.UNEXPECTED
+            )
 
     def time_limit(self) -> float:
         """Longest duration of this state, s."""
@@ -138,8 +154,13 @@ class CoglabState(smach.State):
         if self.ctx.stop.pressed() and not self.ignores_stop:
             raise Interrupted(True, f"STOP: {self.ctx.stop.reason}; to go on {command('reset')}")
 
-    def wait_for(self, condition: Callable[[], bool], what: str, limit: float | None = None,
-                 pace: Callable[[], float] | None = None) -> None:
+    def wait_for(
+        self,
+        condition: Callable[[], bool],
+        what: str,
+        limit: float | None = None,
+        pace: Callable[[], float] | None = None,
+    ) -> None:
         """Wait until ``condition()``; TimeLimit naming ``what`` after ``limit`` s or at the end of the
         state's own limit.
 
@@ -161,8 +182,9 @@ class CoglabState(smach.State):
                 raise TimeLimit(f"{what} within {max(0.0, allowed):.1f} s expected, it did not happen")
             self.ctx.clock.sleep(POLL_PERIOD)
 
-    def await_pending(self, pending: Pending, what: str, limit: float | None = None,
-                      pace: Callable[[], float] | None = None) -> Any:
+    def await_pending(
+        self, pending: Pending, what: str, limit: float | None = None, pace: Callable[[], float] | None = None
+    ) -> Any:
         """The pending call's value; cancelled if the wait ends otherwise."""
         try:
             self.wait_for(pending.done, what, limit, pace)
@@ -215,9 +237,15 @@ class _Placed:
             return
         failure = self.ctx.journal.first_failure() if outcome != "succeeded" else Failure()
         if self.container is not None:
-            self.ctx.journal.transition(self.container.full_path(), self.label, outcome,
-                                        self.targets.get(outcome) or outcome, failure.sentence, failure.causes,
-                                        failure.code)
+            self.ctx.journal.transition(
+                self.container.full_path(),
+                self.label,
+                outcome,
+                self.targets.get(outcome) or outcome,
+                failure.sentence,
+                failure.causes,
+                failure.code,
+            )
         if self.is_action:
             self.ctx.journal.end_action(outcome)
 
@@ -225,14 +253,22 @@ class _Placed:
 class CoglabMachine(_Placed, smach.StateMachine):
     """A state machine of labelled states that records how it ended."""
 
-    def __init__(self, ctx: Context, label: str, outcomes: Sequence[str], input_keys: Sequence[str] = (),
-                 output_keys: Sequence[str] = ()) -> None:
-        smach.StateMachine.__init__(self, outcomes=list(outcomes), input_keys=list(input_keys),
-                                    output_keys=list(output_keys))
+    def __init__(
+        self,
+        ctx: Context,
+        label: str,
+        outcomes: Sequence[str],
+        input_keys: Sequence[str] = (),
+        output_keys: Sequence[str] = (),
+    ) -> None:
+        smach.StateMachine.__init__(
+            self, outcomes=list(outcomes), input_keys=list(input_keys), output_keys=list(output_keys)
+        )
         self.place(ctx, label)
 
-    def add_state(self, label: str, state: Any, transitions: Mapping[str, str],
-                  remapping: Mapping[str, str] | None = None) -> Any:
+    def add_state(
+        self, label: str, state: Any, transitions: Mapping[str, str], remapping: Mapping[str, str] | None = None
+    ) -> Any:
         """Add a state inside ``with machine:``; outcomes left out of ``transitions`` are outcomes of the machine."""
         smach.StateMachine.add(label, state, transitions=dict(transitions), remapping=dict(remapping or {}))
         self.adopt(label, state, transitions)
@@ -248,13 +284,26 @@ class CoglabConcurrence(_Placed, smach.Concurrence):
     """Children side by side. ``decide(outcomes)`` is asked after each child's end: True preempts those still
     running."""
 
-    def __init__(self, ctx: Context, label: str, outcomes: Sequence[str], default_outcome: str,
-                 decide: Callable[[Mapping[str, str | None]], bool],
-                 conclude: Callable[[Mapping[str, str]], str], input_keys: Sequence[str] = (),
-                 output_keys: Sequence[str] = ()) -> None:
-        smach.Concurrence.__init__(self, outcomes=list(outcomes), default_outcome=default_outcome,
-                                   input_keys=list(input_keys), output_keys=list(output_keys), outcome_cb=conclude,
-                                   child_termination_cb=decide)
+    def __init__(
+        self,
+        ctx: Context,
+        label: str,
+        outcomes: Sequence[str],
+        default_outcome: str,
+        decide: Callable[[Mapping[str, str | None]], bool],
+        conclude: Callable[[Mapping[str, str]], str],
+        input_keys: Sequence[str] = (),
+        output_keys: Sequence[str] = (),
+    ) -> None:
+        smach.Concurrence.__init__(
+            self,
+            outcomes=list(outcomes),
+            default_outcome=default_outcome,
+            input_keys=list(input_keys),
+            output_keys=list(output_keys),
+            outcome_cb=conclude,
+            child_termination_cb=decide,
+        )
         self.place(ctx, label)
 
     def add_state(self, label: str, state: Any, remapping: Mapping[str, str] | None = None) -> Any:

@@ -1,4 +1,5 @@
 """States of the hand: calibration, preshape, closing on the object, opening."""
+
 from __future__ import annotations
 
 from typing import Any
@@ -70,8 +71,11 @@ class HandClose(CoglabState):
         state = self.ctx.hand.state()
         if state.connected and not state.holding:
             self.ctx.holding, self.ctx.shared = "", False
-            raise PortError(f"the hand closed on nothing: motors at {list(state.positions)} of 254",
-                            (state.message,) if state.message else (), ReasonCode.OBJECT_NOT_SEEN)
+            raise PortError(
+                f"the hand closed on nothing: motors at {list(state.positions)} of 254",
+                (state.message,) if state.message else (),
+                ReasonCode.OBJECT_NOT_SEEN,
+            )
         if self.from_person:
             self._await_load(ud.object_id, float(ud.object_entry.get("mass", 0.0)))
         return "succeeded"
@@ -79,14 +83,20 @@ class HandClose(CoglabState):
     def _await_load(self, object_id: str, mass: float) -> None:
         limit = float(self.ctx.config.get("hand.load_timeout", 5.0))
         share = float(self.ctx.config.get("hand.load_share", 0.5))
-        self.await_pending(self.ctx.contact.arm("load", limit, {"mass": mass, "load_share": share}),
-                           "arming of the contact detector", 2.0)
+        self.await_pending(
+            self.ctx.contact.arm("load", limit, {"mass": mass, "load_share": share}),
+            "arming of the contact detector",
+            2.0,
+        )
         try:
             self.wait_for(lambda: self.ctx.contact.event() is not None, f"the weight of '{object_id}'", limit)
         except TimeLimit:
             self.ctx.holding = ""
-            raise PortError(f"the person did not let go of '{object_id}' within {limit:.0f} s",
-                            ("its weight has not come into the robot's hand",), ReasonCode.NOT_RELEASED) from None
+            raise PortError(
+                f"the person did not let go of '{object_id}' within {limit:.0f} s",
+                ("its weight has not come into the robot's hand",),
+                ReasonCode.NOT_RELEASED,
+            ) from None
         finally:
             self.ctx.contact.disarm()
         self.ctx.shared = False

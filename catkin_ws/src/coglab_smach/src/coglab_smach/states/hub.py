@@ -1,4 +1,5 @@
 """States in which the machine waits for somebody: the trigger of the initialisation and the hubs of the master."""
+
 from __future__ import annotations
 
 import math
@@ -31,8 +32,9 @@ class WaitForTrigger(CoglabState):
             return "succeeded"
         self.ctx.requests.open(self.label, [self.action])
         try:
-            self.wait_for(lambda: self.ctx.requests.take() is not None,
-                          f"trigger '{self.action}' ({command(self.action)})")
+            self.wait_for(
+                lambda: self.ctx.requests.take() is not None, f"trigger '{self.action}' ({command(self.action)})"
+            )
         finally:
             self.ctx.requests.close()
         return "succeeded"
@@ -83,8 +85,9 @@ class Hub(CoglabState):
             refusal = self._learn_what_is_held(ud, request)
             if not refusal:
                 break
-            self.ctx.journal.transition(self.path(), self.label, "refused", self.label, refusal, (),
-                                        ReasonCode.OBJECT_UNKNOWN)
+            self.ctx.journal.transition(
+                self.path(), self.label, "refused", self.label, refusal, (), ReasonCode.OBJECT_UNKNOWN
+            )
         self.reason += f"{request.source} asked for {request.action} of '{ud.object_id}'"
         return request.action
 

@@ -1,4 +1,5 @@
 """States that turn knowledge into a goal: the object database and perception."""
+
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
@@ -84,14 +85,23 @@ def locate(state: CoglabState, target: str) -> dict[str, Any]:
     """Wait for perception to see ``target`` (object id or 'human_hand'); plain dict for user data."""
     limit = float(state.ctx.config.get("perception.locate_timeout", 5.0))
     with refused_as(ReasonCode.OBJECT_NOT_SEEN):
-        found = state.await_pending(state.ctx.perception.locate_object(target, limit), f"sight of '{target}'",
-                                    limit + 1.0)
+        found = state.await_pending(
+            state.ctx.perception.locate_object(target, limit), f"sight of '{target}'", limit + 1.0
+        )
     oldest = float(state.ctx.config.get("perception.max_age", 0.5))
     if found.age > oldest:
-        raise PortError(f"'{target}' was last seen {found.age:.2f} s ago, expected at most {oldest} s",
-                        ("the tracker has lost it; bring it into view",), ReasonCode.OBJECT_NOT_SEEN)
-    return {"frame": found.frame, "parent": found.parent, "xyz": list(found.xyz),
-            "quaternion": list(found.quaternion), "age": found.age}
+        raise PortError(
+            f"'{target}' was last seen {found.age:.2f} s ago, expected at most {oldest} s",
+            ("the tracker has lost it; bring it into view",),
+            ReasonCode.OBJECT_NOT_SEEN,
+        )
+    return {
+        "frame": found.frame,
+        "parent": found.parent,
+        "xyz": list(found.xyz),
+        "quaternion": list(found.quaternion),
+        "age": found.age,
+    }
 
 
 def await_offer(state: CoglabState, target: str, goal: Mapping[str, Any], margin: float = 0.0) -> dict[str, Any]:
@@ -114,15 +124,20 @@ def await_offer(state: CoglabState, target: str, goal: Mapping[str, Any], margin
         seen = [(t, p) for t, p in seen if now - t <= 0.4] + [(now, place)]
         still = now - seen[0][0] > 0.3 and float(np.linalg.norm(place - seen[0][1])) < 0.025
         offered = bool(np.all(place >= low) and np.all(place <= high)) or (
-            still and bool(np.all(place >= low - wider) and np.all(place <= high + wider)))
+            still and bool(np.all(place >= low - wider) and np.all(place <= high + wider))
+        )
         if offered and reachable(state.ctx, located, goal):
             break
         if now > end and offered:
             raise PortError(*out_of_reach(target, located, goal), ReasonCode.GOAL_UNREACHABLE)
         if now > end:
             where = ", ".join(f"{v:.2f}" for v in place)
-            raise PortError(f"'{target}' was not offered within {limit:.0f} s: it stayed at ({where}) m, outside the "
-                            "handover region", ("nobody reaches toward the robot",), ReasonCode.OBJECT_NOT_SEEN)
+            raise PortError(
+                f"'{target}' was not offered within {limit:.0f} s: it stayed at ({where}) m, outside the "
+                "handover region",
+                ("nobody reaches toward the robot",),
+                ReasonCode.OBJECT_NOT_SEEN,
+            )
         state.pause(0.03)
     state.ctx.journal.mark("offered")
     return located
@@ -141,8 +156,10 @@ def reachable(ctx: Context, seen: Mapping[str, Any], goal: Mapping[str, Any]) ->
 def out_of_reach(target: str, seen: Mapping[str, Any], goal: Mapping[str, Any]) -> tuple[str, tuple[str, ...]]:
     """Sentence and cause of an offer that cannot be taken."""
     where = ", ".join(f"{v:.2f}" for v in palm_of(seen, goal).position)
-    return (f"'{target}' cannot be reached: the arm has no posture for the hand at ({where}) m turned like that",
-            ("it is too far, or turned so that the grasp points away from the robot; turn or move it",))
+    return (
+        f"'{target}' cannot be reached: the arm has no posture for the hand at ({where}) m turned like that",
+        ("it is too far, or turned so that the grasp points away from the robot; turn or move it",),
+    )
 
 
 def paced(ctx: Context, goal: dict[str, Any]) -> dict[str, Any]:
@@ -193,8 +210,11 @@ class SetDeliveryGoal(CoglabState):
     default_time_limit = 20.0
 
     def __init__(self, ctx: Context) -> None:
-        super().__init__(ctx, input_keys=["object_entry", "grasp"],
-                         output_keys=["goal", "delivery", "delivery_name", "delivery_pose"])
+        super().__init__(
+            ctx,
+            input_keys=["object_entry", "grasp"],
+            output_keys=["goal", "delivery", "delivery_name", "delivery_pose"],
+        )
 
     def run(self, ud: Any) -> str:
         entry = ud.object_entry
@@ -203,8 +223,12 @@ class SetDeliveryGoal(CoglabState):
         ud.delivery_name = name
         ud.delivery = delivery
         goal = paced(self.ctx, delivery_goal(entry, ud.grasp, delivery, ""))
-        located = await_offer(self, str(self.ctx.config.get("perception.human_hand", "human_hand")), goal,
-                              float(self.ctx.config.get("handover.hand_margin", 0.10)))
+        located = await_offer(
+            self,
+            str(self.ctx.config.get("perception.human_hand", "human_hand")),
+            goal,
+            float(self.ctx.config.get("handover.hand_margin", 0.10)),
+        )
         goal["frame"] = located["frame"]
         ud.delivery_pose = {"xyz": goal["offset"], "quaternion": goal["orientation"]}
         ud.goal = goal
@@ -221,8 +245,9 @@ class FindPlace(CoglabState):
 
     def run(self, ud: Any) -> str:
         limit = float(self.ctx.config.get("perception.locate_timeout", 5.0))
-        places = self.await_pending(self.ctx.perception.free_places(ud.object_id, limit), "a free place on the board",
-                                    limit + 1.0)
+        places = self.await_pending(
+            self.ctx.perception.free_places(ud.object_id, limit), "a free place on the board", limit + 1.0
+        )
         if not places:
             raise PortError("perception names no free place on the board; clear one", code=ReasonCode.NO_FREE_PLACE)
         best = places[0]

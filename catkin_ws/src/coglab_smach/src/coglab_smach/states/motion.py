@@ -1,4 +1,5 @@
 """The end of a motion: whoever started one ends it before anything else begins."""
+
 from __future__ import annotations
 
 from collections.abc import Callable

@@ -78,12 +78,12 @@ class FeedbackController : public ControlLaw {
   /// With a manager they do what the manager's methods of the same name do; without one they act
   /// on the instance.
   /// @{
-  Status enable();                 ///< starts contributing
-  Status disable();                ///< stops contributing; identity on the control states
-  Status pause();                  ///< stops running; the last correction follows its policy
-  Status resume();                 ///< withdraws the pause of the user
-  bool isEnabled() const;          ///< true if enabled
-  bool isPaused() const;           ///< true if paused for any reason
+  Status enable();         ///< starts contributing
+  Status disable();        ///< stops contributing; identity on the control states
+  Status pause();          ///< stops running; the last correction follows its policy
+  Status resume();         ///< withdraws the pause of the user
+  bool isEnabled() const;  ///< true if enabled
+  bool isPaused() const;   ///< true if paused for any reason
   /// Reads gains from a file; all or nothing. Errors name file, line and field.
   Status loadGains(const std::string& file);
   /// Sets gains by name; all or nothing.

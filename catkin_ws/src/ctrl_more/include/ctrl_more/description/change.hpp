@@ -39,14 +39,14 @@ class Change {
 
   /// One step.
   struct Step {
-    Kind kind;                          ///< what to do
-    std::string name = {};              ///< controller, signal or profile
-    Who who = Who::Named;               ///< what `name` names
-    std::string reason = {};            ///< of Pause and Resume by name
-    bool force = false;                 ///< also for safety controllers
+    Kind kind;                            ///< what to do
+    std::string name = {};                ///< controller, signal or profile
+    Who who = Who::Named;                 ///< what `name` names
+    std::string reason = {};              ///< of Pause and Resume by name
+    bool force = false;                   ///< also for safety controllers
     std::vector<std::string> order = {};  ///< of Order
-    Gains gains = {};                   ///< of Gains
-    std::string file = {};              ///< of GainFile
+    Gains gains = {};                     ///< of Gains
+    std::string file = {};                ///< of GainFile
   };
 
   /// Adds a step.
@@ -64,8 +64,7 @@ class Change {
   }
 
   /// Adds a reason to pause one controller, or all; safety controllers only if forced.
-  Change& pause(const std::string& name, const std::string& reason = "user",
-                bool force = false) {
+  Change& pause(const std::string& name, const std::string& reason = "user", bool force = false) {
     return add({Kind::Pause, name, Who::Named, reason, force});
   }
 

@@ -73,8 +73,8 @@ struct RobotSignalUse : SignalUse<RobotSignalUse> {
 
 /// Bounds on what a controller may do to one signal; beyond them its writes are undone.
 struct CorrectionLimit {
-  double size = kUnlimited;  ///< norm of the correction (for poses: of the position) [unit]
-  double rate = kUnlimited;  ///< norm of its change per second [unit/s]
+  double size = kUnlimited;        ///< norm of the correction (for poses: of the position) [unit]
+  double rate = kUnlimited;        ///< norm of its change per second [unit/s]
   double angle = kUnlimited;       ///< angle of the correction of an orientation [rad]
   double angle_rate = kUnlimited;  ///< its change per second [rad/s]
 };
@@ -82,9 +82,9 @@ struct CorrectionLimit {
 /// One control signal that a controller reads or modifies.
 struct ControlSignalUse : SignalUse<ControlSignalUse> {
   ControlContainer container = ControlContainer::OtherReference;  ///< where it belongs
-  bool modifies = false;    ///< false: read only
-  bool exclusive = false;   ///< no other enabled controller may modify the signal
-  CorrectionLimit limit;    ///< bounds on the correction
+  bool modifies = false;                                          ///< false: read only
+  bool exclusive = false;                    ///< no other enabled controller may modify the signal
+  CorrectionLimit limit;                     ///< bounds on the correction
   StopPolicy on_pause = StopPolicy::ByKind;  ///< the correction while paused
 
   /// Makes the use exclusive.
@@ -106,9 +106,7 @@ struct GainSpec : Documented<GainSpec> {
   /// Makes it `n` elements, all `value` by default.
   GainSpec& vector(int n, double value) { return size = n, initial.assign(n, value), *this; }
   /// Sets min and max.
-  GainSpec& range(double smallest, double largest) {
-    return min = smallest, max = largest, *this;
-  }
+  GainSpec& range(double smallest, double largest) { return min = smallest, max = largest, *this; }
 };
 
 /// One setting: read once at initialize(), fixed until the controller is loaded again.
@@ -143,17 +141,17 @@ struct StateSpec : Documented<StateSpec> {
 /// The one declaration of a controller. The run-time checks, the schema of its configuration file,
 /// plot(), its generated page and the template of its configuration all come from here.
 struct Description {
-  std::string type;        ///< name under which the class is registered
-  std::string summary;     ///< one sentence
-  std::string use;         ///< how to use it: what must be connected to what
-  std::string when;        ///< when to apply it, and when not
-  std::string limitations;  ///< what it does not do
-  std::string law;          ///< the control law, in LaTeX
-  std::string source;       ///< where the law comes from
-  std::string information;  ///< anything else the developer wants to say; may be empty
+  std::string type;           ///< name under which the class is registered
+  std::string summary;        ///< one sentence
+  std::string use;            ///< how to use it: what must be connected to what
+  std::string when;           ///< when to apply it, and when not
+  std::string limitations;    ///< what it does not do
+  std::string law;            ///< the control law, in LaTeX
+  std::string source;         ///< where the law comes from
+  std::string information;    ///< anything else the developer wants to say; may be empty
   Stage stage = Stage::Task;  ///< where in the cycle it runs
-  bool safety = false;  ///< true: refuses pause and disable unless they are forced
-  SwitchPolicy on_switch = SwitchPolicy::Reset;  ///< when the motion controller changes
+  bool safety = false;        ///< true: refuses pause and disable unless they are forced
+  SwitchPolicy on_switch = SwitchPolicy::Reset;   ///< when the motion controller changes
   std::vector<RobotSignalUse> robot_signals;      ///< what it reads of the robot
   std::vector<ControlSignalUse> control_signals;  ///< what it reads and modifies
   std::vector<GainSpec> gains;                    ///< changeable while running

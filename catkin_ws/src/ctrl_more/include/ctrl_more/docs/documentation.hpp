@@ -11,12 +11,12 @@ namespace ctrl_more {
 
 /// One controller as plot() shows it: declaration, present state, signals, gains.
 struct ControllerPlot {
-  std::string name;                         ///< of the instance
-  Description description;                  ///< what it declares
-  bool enabled = false;                     ///< as requested
-  bool paused = false;                      ///< for any reason
-  std::vector<ResolvedRobotUse> robot;      ///< what it reads of the robot
-  std::vector<ResolvedControlUse> control;  ///< what it reads and modifies
+  std::string name;                                  ///< of the instance
+  Description description;                           ///< what it declares
+  bool enabled = false;                              ///< as requested
+  bool paused = false;                               ///< for any reason
+  std::vector<ResolvedRobotUse> robot;               ///< what it reads of the robot
+  std::vector<ResolvedControlUse> control;           ///< what it reads and modifies
   std::map<std::string, std::vector<double>> gains;  ///< present values
 };
 

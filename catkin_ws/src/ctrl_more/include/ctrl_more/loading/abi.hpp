@@ -41,9 +41,11 @@ struct Abi {
 /// @param interface version of the headers
 template <typename... Shared>
 static constexpr Abi abiOf(int interface) {
-  return {interface, __GXX_ABI_VERSION,
+  return {interface,
+          __GXX_ABI_VERSION,
           10000 * EIGEN_WORLD_VERSION + 100 * EIGEN_MAJOR_VERSION + EIGEN_MINOR_VERSION,
-          EIGEN_MAX_ALIGN_BYTES, {sizeof(Shared)...}};
+          EIGEN_MAX_ALIGN_BYTES,
+          {sizeof(Shared)...}};
 }
 
 }  // namespace ctrl_more

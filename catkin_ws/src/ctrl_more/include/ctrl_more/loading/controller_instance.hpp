@@ -10,7 +10,7 @@ namespace ctrl_more {
 
 /// A controller together with the library its code lives in; destroyed in the right order.
 struct ControllerInstance {
-  std::shared_ptr<PluginLibrary> library;           ///< null for code linked into the program
+  std::shared_ptr<PluginLibrary> library;          ///< null for code linked into the program
   std::unique_ptr<FeedbackController> controller;  ///< declared after, so destroyed first
 
   /// Holds nothing.

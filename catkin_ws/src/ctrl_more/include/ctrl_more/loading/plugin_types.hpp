@@ -29,10 +29,7 @@ class PluginTypes {
   /// @param package whose headers libraries are compiled with
   /// @param abi what the program was compiled with
   PluginTypes(std::string kind, std::string macro, std::string package, const Abi& abi)
-      : kind_(std::move(kind)),
-        macro_(std::move(macro)),
-        package_(std::move(package)),
-        abi_(abi) {}
+      : kind_(std::move(kind)), macro_(std::move(macro)), package_(std::move(package)), abi_(abi) {}
   virtual ~PluginTypes() = default;
   PluginTypes(const PluginTypes&) = delete;
   PluginTypes& operator=(const PluginTypes&) = delete;

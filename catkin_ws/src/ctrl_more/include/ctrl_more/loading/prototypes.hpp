@@ -41,15 +41,13 @@ class FeedbackControllerPrototypes : public PluginTypesOf<FeedbackControllerMake
 FeedbackControllerPrototypes& prototypes();
 
 /// The same under the name that the paper's listing uses.
-[[maybe_unused]] static FeedbackControllerPrototypes& feedbackControllerPrototypes =
-    prototypes();
+[[maybe_unused]] static FeedbackControllerPrototypes& feedbackControllerPrototypes = prototypes();
 
 /// Registers for as long as the library is loaded. Used by the macro below.
 class PrototypeRegistration {
  public:
   /// Inserts.
-  PrototypeRegistration(const char* type, FeedbackControllerMaker maker,
-                        const Abi& abi = thisAbi())
+  PrototypeRegistration(const char* type, FeedbackControllerMaker maker, const Abi& abi = thisAbi())
       : type_(type), maker_(maker) {
     prototypes().insert({type_, maker_}, abi);
   }
@@ -68,8 +66,8 @@ class PrototypeRegistration {
 /// Registers a controller class from its source file:
 /// `CTRL_MORE_REGISTER_CONTROLLER(my_lab::WristDamper, "WristDamper")`. The name must be the one
 /// in describe().type. Use it once per library, outside of any namespace.
-#define CTRL_MORE_REGISTER_CONTROLLER(Class, type)                                        \
-  namespace {                                                                             \
-  ::ctrl_more::FeedbackController* ctrlMoreMaker() { return new Class(); }                \
+#define CTRL_MORE_REGISTER_CONTROLLER(Class, type)                                       \
+  namespace {                                                                            \
+  ::ctrl_more::FeedbackController* ctrlMoreMaker() { return new Class(); }               \
   const ::ctrl_more::PrototypeRegistration ctrl_more_registration(type, &ctrlMoreMaker); \
   }

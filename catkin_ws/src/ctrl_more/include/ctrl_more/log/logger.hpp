@@ -136,8 +136,7 @@ class LogSource {
   /// @param text message; each {} takes one number
   /// @param value the numbers
   template <typename... Numbers>
-  void write(LogLevel level, const char* file, int line, const char* text,
-             Numbers... value) const {
+  void write(LogLevel level, const char* file, int line, const char* text, Numbers... value) const {
     static_assert(sizeof...(Numbers) <= 4, "a record holds four numbers");
     const double values[5] = {static_cast<double>(value)..., 0.0};
     put(level, file, line, text, values, static_cast<int>(sizeof...(Numbers)));

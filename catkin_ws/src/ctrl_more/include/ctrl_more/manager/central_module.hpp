@@ -7,10 +7,10 @@
 #include <vector>
 
 #include "ctrl_more/description/config_node.hpp"
-#include "ctrl_more/states/control_states.hpp"
-#include "ctrl_more/manager/feedback_controllers_manager.hpp"
 #include "ctrl_more/log/logger.hpp"
+#include "ctrl_more/manager/feedback_controllers_manager.hpp"
 #include "ctrl_more/manager/manager.hpp"
+#include "ctrl_more/states/control_states.hpp"
 #include "ctrl_more/states/robot_states.hpp"
 
 namespace ctrl_more {
@@ -32,8 +32,8 @@ class CentralModule {
  public:
   /// Makes a manager from its block of the file. May throw ConfigError.
   using ManagerMaker = std::function<std::unique_ptr<Manager>(
-      const std::string& name, const ConfigNode& block, RobotStates& robot,
-      ControlStates& control, Logger* logger)>;
+      const std::string& name, const ConfigNode& block, RobotStates& robot, ControlStates& control,
+      Logger* logger)>;
 
   /// Makes a type of manager known to all central modules of the program. `Feedback` is known
   /// from the start.

@@ -38,7 +38,7 @@ class ControlStates : public ControlStore {
   Status setOtherReference(const std::string& key,
                            const Eigen::Ref<const Eigen::VectorXd>& reference,
                            const char* who = "user");  ///< size fixed by its first writer
-  Status setCoM(const Eigen::Vector3d& position, const char* who = "user");      ///< [m]
+  Status setCoM(const Eigen::Vector3d& position, const char* who = "user");          ///< [m]
   Status setCoMVelocity(const Eigen::Vector3d& velocity, const char* who = "user");  ///< [m/s]
   Status setCoMAcceleration(const Eigen::Vector3d& acceleration,
                             const char* who = "user");  ///< [m/s^2]
@@ -66,14 +66,14 @@ class ControlStates : public ControlStore {
                            const char* who = "user") const;  ///< as declared
   Status getZMP(const std::string& key, Eigen::Vector3d& zmp, const char* who = "user") const;
   ///< a named one [m]
-  Eigen::Vector3d getCoM() const;              ///< [m]
-  Eigen::Vector3d getCoMVelocity() const;      ///< [m/s]
-  Eigen::Vector3d getCoMAcceleration() const;  ///< [m/s^2]
-  Eigen::Vector3d getLinearMomentum() const;   ///< [kg m/s]
-  Eigen::Vector3d getAngularMomentum() const;  ///< [kg m^2/s]
-  Eigen::Vector3d getZMP() const;              ///< [m]
+  Eigen::Vector3d getCoM() const;                ///< [m]
+  Eigen::Vector3d getCoMVelocity() const;        ///< [m/s]
+  Eigen::Vector3d getCoMAcceleration() const;    ///< [m/s^2]
+  Eigen::Vector3d getLinearMomentum() const;     ///< [kg m/s]
+  Eigen::Vector3d getAngularMomentum() const;    ///< [kg m^2/s]
+  Eigen::Vector3d getZMP() const;                ///< [m]
   Eigen::Matrix3d getPelvisOrientation() const;  ///< rotation, identity until set
-  /// @}
+                                                 /// @}
 
  private:
   Eigen::Vector3d get3(ControlContainer container, const char* key) const {

@@ -95,8 +95,7 @@ class ControlStore {
   template <int N>
   Eigen::Map<Eigen::Matrix<double, N, 1>> view(const Reference<N>& handle) {
     if (!handle.valid()) throw EmptyHandle("a control signal is used that was never looked up");
-    return Eigen::Map<Eigen::Matrix<double, N, 1>>(data() + handle.signal_.offset(),
-                                                   handle.size());
+    return Eigen::Map<Eigen::Matrix<double, N, 1>>(data() + handle.signal_.offset(), handle.size());
   }
 
   /// The whole buffer; offsets as in ControlSignal::offset().

@@ -67,9 +67,9 @@ constexpr double kUnlimited = std::numeric_limits<double>::infinity();
 
 /// What a store knows of one signal.
 struct SignalInfo {
-  std::string key;     ///< key within its map or container
-  std::string unit;    ///< SI unit or list of units, "" if the writer declared none
-  std::string frame;   ///< frame the numbers are expressed in, "" if not declared
+  std::string key;           ///< key within its map or container
+  std::string unit;          ///< SI unit or list of units, "" if the writer declared none
+  std::string frame;         ///< frame the numbers are expressed in, "" if not declared
   std::uint32_t offset = 0;  ///< first double in the store's buffer
   std::uint32_t size = 0;    ///< number of doubles
   SignalKind kind = SignalKind::Vector;  ///< algebra of corrections

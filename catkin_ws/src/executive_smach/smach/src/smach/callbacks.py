@@ -104,10 +104,7 @@ class Callbacks:
             try:
                 cb(self.userdata, outcome, *args)
             except Exception:
-                smach.logerr(
-                    f"end callback {_cb_name(cb)} of {self._name()} "
-                    f"raised:\n{traceback.format_exc()}"
-                )
+                smach.logerr(f"end callback {_cb_name(cb)} of {self._name()} raised:\n{traceback.format_exc()}")
 
 
 def _callback(what: str, cb: Callable, cb_args: Sequence) -> tuple[Callable, Sequence]:

@@ -53,29 +53,23 @@ class Concurrence(Container):
         super().__init__(outcomes, input_keys, output_keys)
         if not isinstance(default_outcome, str) or default_outcome not in self._outcomes:
             raise InvalidStateError(
-                f"Concurrence: default_outcome {default_outcome!r} is not among its outcomes "
-                f"{list(self._outcomes)}"
+                f"Concurrence: default_outcome {default_outcome!r} is not among its outcomes {list(self._outcomes)}"
             )
         for outcome in outcome_map or {}:
             if outcome not in self._outcomes:
                 raise InvalidStateError(
-                    f"Concurrence: outcome_map has {outcome!r}, which is not among its outcomes "
-                    f"{list(self._outcomes)}"
+                    f"Concurrence: outcome_map has {outcome!r}, which is not among its outcomes {list(self._outcomes)}"
                 )
         for what, cb in (
             ("outcome_cb", outcome_cb),
             ("child_termination_cb", child_termination_cb),
         ):
             if cb and not callable(cb):
-                raise InvalidStateError(
-                    f"Concurrence: {what} must be callable, got {type(cb).__name__}"
-                )
+                raise InvalidStateError(f"Concurrence: {what} must be callable, got {type(cb).__name__}")
         self._states: dict[str, State] = {}
         self._remappings: dict[str, dict[str, str]] = {}
         self._default_outcome = default_outcome
-        self._outcome_map = {
-            outcome: dict(conditions) for outcome, conditions in (outcome_map or {}).items()
-        }
+        self._outcome_map = {outcome: dict(conditions) for outcome, conditions in (outcome_map or {}).items()}
         self._outcome_cb = outcome_cb
         self._child_termination_cb = child_termination_cb
         self._callback_lock = threading.Lock()
@@ -125,9 +119,7 @@ class Concurrence(Container):
         """All labels. Example: `both.get_initial_states()`."""
         return list(self._states)
 
-    def set_initial_state(
-        self, initial_states: Sequence[str], userdata: UserData | None = None
-    ) -> None:
+    def set_initial_state(self, initial_states: Sequence[str], userdata: UserData | None = None) -> None:
         """Merge `userdata`; every run begins with all children, so labels have no effect beyond a
         warning.
 
@@ -135,8 +127,7 @@ class Concurrence(Container):
         """
         if len(initial_states) > 0 and set(initial_states) != set(self._states):
             smach.logwarn(
-                f"a concurrence begins with all its children {list(self._states)}, not only with "
-                f"{list(initial_states)}"
+                f"a concurrence begins with all its children {list(self._states)}, not only with {list(initial_states)}"
             )
         if userdata is not None:
             self.userdata.update(userdata)
@@ -169,10 +160,7 @@ class Concurrence(Container):
         faults = []
         for child_outcome, label, outcome in self.get_internal_edges():
             if label not in self._states:
-                faults.append(
-                    f"{outcome!r} depends on {label!r}, which is not among its labels "
-                    f"{list(self._states)}"
-                )
+                faults.append(f"{outcome!r} depends on {label!r}, which is not among its labels {list(self._states)}")
             elif child_outcome not in self._states[label].get_registered_outcomes():
                 faults.append(
                     f"{outcome!r} depends on outcome {child_outcome!r} of {label!r}, which has "
@@ -180,9 +168,7 @@ class Concurrence(Container):
                     f"{list(self._states[label].get_registered_outcomes())}"
                 )
         if faults:
-            raise InvalidTransitionError(
-                f"outcome_map of the concurrence is wrong: {'; '.join(faults)}"
-            )
+            raise InvalidTransitionError(f"outcome_map of the concurrence is wrong: {'; '.join(faults)}")
 
     # Running.
 
@@ -195,9 +181,7 @@ class Concurrence(Container):
         both.execute()`.
         """
         if not self._states:
-            raise InvalidStateError(
-                "concurrence not executed: it has no children; add at least one"
-            )
+            raise InvalidStateError("concurrence not executed: it has no children; add at least one")
         self.check_consistency()
         with self._run() as result:
             try:
@@ -283,10 +267,7 @@ class Concurrence(Container):
                 self._child_outcomes[label] = outcome
                 if self._take_back(label, state) and label in self._told:
                     self._ignored.add(label)
-                    smach.logwarn(
-                        f"concurrent state '{label}' was asked to end early and has not served the "
-                        "request"
-                    )
+                    smach.logwarn(f"concurrent state '{label}' was asked to end early and has not served the request")
             self.call_transition_cbs()
             if error is None and self._child_termination_cb and not self._abandoned:
                 stop, error = self._ask_termination_cb(label)
@@ -318,8 +299,7 @@ class Concurrence(Container):
             traceback.print_exc()
             return None, _error(
                 InvalidStateError,
-                f"concurrent state '{label}' ({kind}) raised "
-                f"{type(error).__name__}: {error}\n{traceback.format_exc()}",
+                f"concurrent state '{label}' ({kind}) raised {type(error).__name__}: {error}\n{traceback.format_exc()}",
                 error,
             )
         registered = state.get_registered_outcomes()
@@ -357,8 +337,7 @@ class Concurrence(Container):
                 outcome = self._outcome_cb(dict(self._child_outcomes))
             except Exception as error:
                 raise InvalidUserCodeError(
-                    f"outcome_cb of the concurrence raised {type(error).__name__}: {error}\n"
-                    f"{traceback.format_exc()}"
+                    f"outcome_cb of the concurrence raised {type(error).__name__}: {error}\n{traceback.format_exc()}"
                 ) from error
             if isinstance(outcome, str) and outcome:
                 return outcome
@@ -389,9 +368,7 @@ class Concurrence(Container):
                 self._tell(label, self._states[label])
 
 
-def _error(
-    kind: type[smach.exceptions.SmachError], message: str, cause: BaseException | None = None
-) -> Exception:
+def _error(kind: type[smach.exceptions.SmachError], message: str, cause: BaseException | None = None) -> Exception:
     error = kind(message)
     error.__cause__ = cause
     return error

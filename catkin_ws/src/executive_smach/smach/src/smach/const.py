@@ -32,11 +32,7 @@ def is_wrapped_kind(value: Any) -> bool:
     Classes are left alone: `isinstance(x, wrapped_class)` could not work. Example:
     `is_wrapped_kind(3)` is False.
     """
-    return (
-        not isinstance(value, type)
-        and not issubclass(type(value), Const)
-        and hasattr(value, "__dict__")
-    )
+    return not isinstance(value, type) and not issubclass(type(value), Const) and hasattr(value, "__dict__")
 
 
 def const(value: Any) -> Any:
@@ -121,10 +117,7 @@ class Const:
 
 def _refusal(view: Const, what: str) -> str:
     kind = type(_target(view, "_const_obj")).__name__
-    return (
-        f"{what}: this {kind} came through an input-only key; "
-        f"declare the key among io_keys to change it"
-    )
+    return f"{what}: this {kind} came through an input-only key; declare the key among io_keys to change it"
 
 
 def _forwarder(name: str) -> Any:

@@ -83,16 +83,12 @@ class Container(Callbacks, State):
         """Labels with which a run begins. Example: `machine.get_initial_states()`."""
         raise NotImplementedError(f"{type(self).__name__} must override get_initial_states()")
 
-    def set_initial_state(
-        self, initial_states: Sequence[str], userdata: UserData | None = None
-    ) -> None:
+    def set_initial_state(self, initial_states: Sequence[str], userdata: UserData | None = None) -> None:
         """Begin the next run elsewhere, with this merged into the user data.
 
         Example: `m.set_initial_state(["B"])`.
         """
-        raise NotImplementedError(
-            f"{type(self).__name__} must override set_initial_state(labels, userdata)"
-        )
+        raise NotImplementedError(f"{type(self).__name__} must override set_initial_state(labels, userdata)")
 
     def get_active_states(self) -> list[str]:
         """Labels of the children that run now. Example: `machine.get_active_states()`."""
@@ -202,8 +198,7 @@ class Container(Callbacks, State):
         stack = Container._construction_stack
         if not stack or Container._construction_thread != threading.get_ident():
             raise InvalidStateError(
-                f"{cls.__name__}.add and the like need an open container; "
-                f"call them inside 'with container:'"
+                f"{cls.__name__}.add and the like need an open container; call them inside 'with container:'"
             )
         if not isinstance(stack[-1], cls):
             raise InvalidStateError(
@@ -216,9 +211,7 @@ class Container(Callbacks, State):
         if not isinstance(label, str):
             raise InvalidStateError(f"a label must be a string, got {label!r}")
         if isinstance(state, type):
-            raise InvalidStateError(
-                f"state {label!r}: expected an instance, got the class {state.__name__}; call it"
-            )
+            raise InvalidStateError(f"state {label!r}: expected an instance, got the class {state.__name__}; call it")
         missing = [name for name in _STATE_METHODS if not callable(getattr(state, name, None))]
         if missing:
             raise InvalidStateError(
@@ -238,8 +231,7 @@ class Container(Callbacks, State):
             ) from error
         if label in taken:
             raise InvalidStateError(
-                f"label {label!r} is already taken in this {type(self).__name__}; labels: "
-                f"{', '.join(taken)}"
+                f"label {label!r} is already taken in this {type(self).__name__}; labels: {', '.join(taken)}"
             )
 
     def _name(self) -> str:
@@ -326,13 +318,8 @@ def _copy(source: Any, target: Any, keys: Iterable[str], what: str) -> None:
         if key in source:
             target[key] = source[key]
         else:
-            smach.logwarn(
-                f"{what}: user data key {key!r} is not there; present: "
-                f"{', '.join(source.keys()) or 'none'}"
-            )
+            smach.logwarn(f"{what}: user data key {key!r} is not there; present: {', '.join(source.keys()) or 'none'}")
 
 
 def _stack_text() -> str:
-    return "open: " + (
-        " > ".join(type(c).__name__ for c in Container._construction_stack) or "none"
-    )
+    return "open: " + (" > ".join(type(c).__name__ for c in Container._construction_stack) or "none")

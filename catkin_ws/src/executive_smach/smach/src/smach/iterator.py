@@ -66,9 +66,7 @@ class Iterator(Container):
         translates the last outcome of the state into the iterator's. Example: see the class.
         """
         iterator = Iterator._currently_opened()
-        iterator._check_new_child(
-            label, state, [iterator._label] if iterator._label is not None else []
-        )
+        iterator._check_new_child(label, state, [iterator._label] if iterator._label is not None else [])
         outcomes = state.get_registered_outcomes()
         breaks, loops = (
             names("break_outcomes", break_outcomes),
@@ -101,28 +99,19 @@ class Iterator(Container):
 
     def get_children(self) -> dict[str, State]:
         """The contained state under its label. Example: `each.get_children()`."""
-        return (
-            {self._label: self._state}
-            if self._label is not None and self._state is not None
-            else {}
-        )
+        return {self._label: self._state} if self._label is not None and self._state is not None else {}
 
     def get_initial_states(self) -> list[str]:
         """The label of the contained state, as a list. Example: `each.get_initial_states()`."""
         return list(self.get_children())
 
-    def set_initial_state(
-        self, initial_states: Sequence[str], userdata: UserData | None = None
-    ) -> None:
+    def set_initial_state(self, initial_states: Sequence[str], userdata: UserData | None = None) -> None:
         """Merge `userdata`; there is only one state to begin with.
 
         Example: `each.set_initial_state([], ud)`.
         """
         if any(label != self._label for label in initial_states):
-            smach.logwarn(
-                f"an iterator begins with its only state {self._label!r}, not with "
-                f"{list(initial_states)}"
-            )
+            smach.logwarn(f"an iterator begins with its only state {self._label!r}, not with {list(initial_states)}")
         if userdata is not None:
             self.userdata.update(userdata)
 
@@ -138,8 +127,7 @@ class Iterator(Container):
         if self._label is None:
             return []
         return [(outcome, self._label, self._label) for outcome in self._loop_outcomes] + [
-            (outcome, self._label, self._final_outcome_map.get(outcome))
-            for outcome in self._break_outcomes
+            (outcome, self._label, self._final_outcome_map.get(outcome)) for outcome in self._break_outcomes
         ]
 
     def check_consistency(self) -> None:
@@ -149,18 +137,14 @@ class Iterator(Container):
         Example: `each.check_consistency()`.
         """
         if self._state is None:
-            raise InvalidStateError(
-                "iterator has no contained state; call Iterator.set_contained_state inside 'with'"
-            )
+            raise InvalidStateError("iterator has no contained state; call Iterator.set_contained_state inside 'with'")
         known = self._state.get_registered_outcomes()
         unknown = [
             outcome
             for outcome in (*self._loop_outcomes, *self._break_outcomes, *self._final_outcome_map)
             if outcome not in known
         ]
-        wrong = [
-            outcome for outcome in self._final_outcome_map.values() if outcome not in self._outcomes
-        ]
+        wrong = [outcome for outcome in self._final_outcome_map.values() if outcome not in self._outcomes]
         if unknown or wrong:
             raise InvalidTransitionError(
                 f"iterator over {self._label!r}: {unknown} are not among the state's outcomes "
@@ -213,9 +197,7 @@ class Iterator(Container):
                 if asked and result not in self._outcomes:
                     # A loop outcome, cut short by a request: no outcome of ours, so say what
                     # happened.
-                    result = (
-                        "preempted" if "preempted" in self._outcomes else self._exhausted_outcome
-                    )
+                    result = "preempted" if "preempted" in self._outcomes else self._exhausted_outcome
                 break
             self.call_transition_cbs()
         self._copy_output_keys(parent_ud, self._output_keys)

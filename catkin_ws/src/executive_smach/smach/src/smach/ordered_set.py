@@ -58,9 +58,7 @@ def names(what: str, items: Iterable[str]) -> tuple[str, ...]:
     Example: `names("outcomes", ["done", "failed"])`.
     """
     if isinstance(items, (str, bytes)):
-        raise TypeError(
-            f"{what}: expected a list of names, got the single string {items!r}; write [{items!r}]"
-        )
+        raise TypeError(f"{what}: expected a list of names, got the single string {items!r}; write [{items!r}]")
     try:
         return tuple(items)
     except TypeError:

@@ -66,9 +66,7 @@ class StateMachine(Container):
 
         Example: `StateMachine.add("A", A(), transitions={"ok": "B"}, remapping={"x": "count"})`.
         """
-        return StateMachine._currently_opened()._add(
-            label, state, transitions, remapping, constants
-        )
+        return StateMachine._currently_opened()._add(label, state, transitions, remapping, constants)
 
     @staticmethod
     def add_auto(
@@ -91,8 +89,7 @@ class StateMachine(Container):
         for outcome in connector_outcomes:
             if outcome not in outcomes:
                 raise InvalidStateError(
-                    f"state {label!r}: connector outcome {outcome!r} is not among its outcomes "
-                    f"{list(outcomes)}"
+                    f"state {label!r}: connector outcome {outcome!r} is not among its outcomes {list(outcomes)}"
                 )
         machine._add(label, state, transitions, remapping, constants)
         machine._connector_label, machine._connector_outcomes = label, connector_outcomes
@@ -111,8 +108,7 @@ class StateMachine(Container):
         for outcome, target in (transitions or {}).items():
             if outcome not in outcomes:
                 raise InvalidTransitionError(
-                    f"state {label!r}: transition from {outcome!r}, which is not among its "
-                    f"outcomes {list(outcomes)}"
+                    f"state {label!r}: transition from {outcome!r}, which is not among its outcomes {list(outcomes)}"
                 )
             if target is not None and not isinstance(target, str):
                 raise InvalidTransitionError(
@@ -120,9 +116,7 @@ class StateMachine(Container):
                     f"label, an outcome of the machine, or None"
                 )
         if self._connector_label is not None:
-            self._transitions[self._connector_label].update(
-                dict.fromkeys(self._connector_outcomes, label)
-            )
+            self._transitions[self._connector_label].update(dict.fromkeys(self._connector_outcomes, label))
             self._connector_label = None
         self._states[label] = state
         self._transitions[label] = {**dict.fromkeys(outcomes), **(transitions or {})}
@@ -138,9 +132,7 @@ class StateMachine(Container):
         try:
             return self._states[key]
         except KeyError:
-            raise KeyError(
-                f"no state {key!r} in this machine; labels: {', '.join(self._states) or 'none'}"
-            ) from None
+            raise KeyError(f"no state {key!r} in this machine; labels: {', '.join(self._states) or 'none'}") from None
 
     def get_children(self) -> dict[str, State]:
         """The states by label, in the order they were added. Example: `machine.get_children()`."""
@@ -150,19 +142,14 @@ class StateMachine(Container):
         """The label with which a run begins, as a list. Example: `machine.get_initial_states()`."""
         return [str(self._initial_state_label)]
 
-    def set_initial_state(
-        self, initial_states: Sequence[str], userdata: UserData | None = None
-    ) -> None:
+    def set_initial_state(self, initial_states: Sequence[str], userdata: UserData | None = None) -> None:
         """Begin with the first label given ([]: leave it), and merge `userdata`.
 
         Example: `machine.set_initial_state(["GRASP"])`. Labels are checked by `check_consistency`.
         """
         smach.logdebug(f"initial state set to {list(initial_states)}")
         if len(initial_states) > 1:
-            smach.logwarn(
-                f"a state machine begins with one state; of {list(initial_states)} the first is "
-                "taken"
-            )
+            smach.logwarn(f"a state machine begins with one state; of {list(initial_states)} the first is taken")
         if len(initial_states) > 0:
             self._initial_state_label = initial_states[0]
         if userdata is not None:
@@ -196,15 +183,11 @@ class StateMachine(Container):
         if not self._states:
             faults.append("there are no states in it")
         elif self._initial_state_label not in self._states:
-            faults.append(
-                f"the initial state {self._initial_state_label!r} is not among its labels"
-            )
+            faults.append(f"the initial state {self._initial_state_label!r} is not among its labels")
         for outcome, label, target in self.get_internal_edges():
             if target is None and outcome not in self._outcomes:
                 faults.append(
-                    f"outcome {outcome!r} of state {label!r} has no transition and is no outcome "
-                    "of the "
-                    f"machine"
+                    f"outcome {outcome!r} of state {label!r} has no transition and is no outcome of the machine"
                 )
             elif target is not None and target not in self._states and target not in self._outcomes:
                 faults.append(
@@ -241,10 +224,7 @@ class StateMachine(Container):
     def _execute(self, parent_ud: Any) -> str | None:
         label = self._current_label = str(self._initial_state_label)
         self._copy_input_keys(parent_ud, self._input_keys)
-        smach.loginfo(
-            f"State machine starting in initial state '{label}' with user data "
-            f"{self.userdata.keys()}"
-        )
+        smach.loginfo(f"State machine starting in initial state '{label}' with user data {self.userdata.keys()}")
         self.call_start_cbs()
         while not smach.is_shutdown():
             outcome = self._execute_state(label)
@@ -288,9 +268,7 @@ class StateMachine(Container):
             with self._preempt_lock:
                 self._current_state = None
                 if not self._take_back(label, state) and self._current_told:
-                    self._preempt_requested = (
-                        False  # served below, so not for the next state nor for the parent
-                    )
+                    self._preempt_requested = False  # served below, so not for the next state nor for the parent
                 self._current_told = False
 
     def _target(self, label: str, outcome: Any) -> str:
@@ -299,10 +277,7 @@ class StateMachine(Container):
             if outcome in transitions:
                 target = transitions[outcome]
                 return outcome if target is None else target
-            if (
-                outcome in self._states[label].get_registered_outcomes()
-                and outcome in self._outcomes
-            ):
+            if outcome in self._states[label].get_registered_outcomes() and outcome in self._outcomes:
                 return outcome  # registered after the state was added
         except TypeError:
             pass  # not even hashable
@@ -314,7 +289,5 @@ class StateMachine(Container):
         )
 
     def _forward_preempt(self) -> None:
-        if self._current_state is not None and self._tell(
-            str(self._current_label), self._current_state
-        ):
+        if self._current_state is not None and self._tell(str(self._current_label), self._current_state):
             self._current_told = True

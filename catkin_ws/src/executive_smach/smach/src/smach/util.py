@@ -42,9 +42,7 @@ class CBInterface:
         """A decorated method is bound like any other method."""
         if instance is None or not hasattr(self._cb, "__get__"):
             return self
-        return CBInterface(
-            self._cb.__get__(instance, owner), self._outcomes, self._input_keys, self._output_keys
-        )
+        return CBInterface(self._cb.__get__(instance, owner), self._outcomes, self._input_keys, self._output_keys)
 
     def get_registered_outcomes(self) -> tuple[str, ...]:
         """The declared outcomes. Example: `check.get_registered_outcomes()`."""
@@ -88,6 +86,4 @@ def has_smach_interface(obj: Any) -> bool:
 
     Example: `has_smach_interface(smach.State())` is True.
     """
-    return all(
-        hasattr(obj, f"get_registered_{what}") for what in ("outcomes", "input_keys", "output_keys")
-    )
+    return all(hasattr(obj, f"get_registered_{what}") for what in ("outcomes", "input_keys", "output_keys"))

@@ -60,13 +60,9 @@ class ActionServerWrapper:
         self._succeeded, self._preempted = tuple(succeeded_outcomes), tuple(preempted_outcomes)
         self._aborted = tuple(aborted_outcomes)
         known = wrapped_container.get_registered_outcomes()
-        unknown = [
-            o for o in (*self._succeeded, *self._aborted, *self._preempted) if o not in known
-        ]
+        unknown = [o for o in (*self._succeeded, *self._aborted, *self._preempted) if o not in known]
         if unknown:
-            smach.logwarn(
-                f"action '{server_name}': {unknown} are no outcomes of its container {list(known)}"
-            )
+            smach.logwarn(f"action '{server_name}': {unknown} are no outcomes of its container {list(known)}")
         self._goal_key, self._feedback_key, self._result_key = goal_key, feedback_key, result_key
         self._goal_slots_map = dict(goal_slots_map or {})
         self._feedback_slots_map = dict(feedback_slots_map or {})
@@ -115,9 +111,7 @@ class ActionServerWrapper:
                 ud[slot] = getattr(goal, slot)
         for slot, key in self._goal_slots_map.items():
             ud[key] = getattr(goal, slot)
-        parent = smach.Remapper(
-            ud, container.get_registered_input_keys(), container.get_registered_output_keys(), {}
-        )
+        parent = smach.Remapper(ud, container.get_registered_input_keys(), container.get_registered_output_keys(), {})
         with self._lock:
             self._executing = True
             if server.is_preempt_requested():
@@ -126,9 +120,7 @@ class ActionServerWrapper:
             outcome = container.execute(parent)
             result = self._make_result(ud)
         except Exception:
-            rospy.logerr(
-                f"action '{self._server_name}': its container failed:\n{traceback.format_exc()}"
-            )
+            rospy.logerr(f"action '{self._server_name}': its container failed:\n{traceback.format_exc()}")
             server.set_aborted(text="the state machine behind this action failed; see its log")
             return
         finally:
@@ -142,8 +134,7 @@ class ActionServerWrapper:
         else:
             if outcome not in self._aborted:
                 rospy.logwarn(
-                    f"action '{self._server_name}': outcome {outcome!r} is in none of the lists of "
-                    "outcomes; aborted"
+                    f"action '{self._server_name}': outcome {outcome!r} is in none of the lists of outcomes; aborted"
                 )
             server.set_aborted(result, f"outcome {outcome}")
 
@@ -151,10 +142,7 @@ class ActionServerWrapper:
         result = ud[self._result_key] if self._result_key in ud else None
         if getattr(result, "_type", None) != self._result_class._type:
             if result is not None:
-                raise TypeError(
-                    f"user data {self._result_key!r} must be a {self._result_class._type}, got "
-                    f"{result!r}"
-                )
+                raise TypeError(f"user data {self._result_key!r} must be a {self._result_class._type}, got {result!r}")
             result = self._result_class()
         for slot in self._result_class.__slots__ if self._pack_result_slots else ():
             if slot in ud:

@@ -68,9 +68,7 @@ class _Watched:
         self.container.register_end_cb(self.on_end)
 
     def detach(self) -> None:
-        callbacks: tuple[Callable, ...] = (
-            self.on_start, self.on_transition, self.on_termination, self.on_end
-        )
+        callbacks: tuple[Callable, ...] = (self.on_start, self.on_transition, self.on_termination, self.on_end)
         for cb in callbacks:
             self.container.unregister_cb(cb)
 
@@ -182,22 +180,14 @@ class IntrospectionServer:
             self.construct(self._server_name, self._state, self._path)
         queue_size = max(100, 4 * len(self._watched))
         options = {"queue_size": queue_size, "subscriber_listener": _Newcomers(self)}
-        self._status_pub = rospy.Publisher(
-            self._server_name + STATUS_TOPIC, SmachContainerStatus, **options
-        )
-        self._structure_pub = rospy.Publisher(
-            self._server_name + STRUCTURE_TOPIC, SmachContainerStructure, **options
-        )
+        self._status_pub = rospy.Publisher(self._server_name + STATUS_TOPIC, SmachContainerStatus, **options)
+        self._structure_pub = rospy.Publisher(self._server_name + STRUCTURE_TOPIC, SmachContainerStructure, **options)
         self._running = True
         for watched in self._watched:
             watched.attach()
             self._enqueue(watched.snapshot("Initial state"))
-        self._init_sub = rospy.Subscriber(
-            self._server_name + INIT_TOPIC, SmachContainerInitialStatusCmd, self._on_init
-        )
-        self._thread = threading.Thread(
-            target=self._work, name=f"smach_introspection:{self._server_name}", daemon=True
-        )
+        self._init_sub = rospy.Subscriber(self._server_name + INIT_TOPIC, SmachContainerInitialStatusCmd, self._on_init)
+        self._thread = threading.Thread(target=self._work, name=f"smach_introspection:{self._server_name}", daemon=True)
         self._thread.start()
 
     def stop(self) -> None:
@@ -233,10 +223,7 @@ class IntrospectionServer:
 
     def _watch(self, state: smach.State, path: str) -> bool:
         if not isinstance(state, smach.Container):
-            smach.logwarn(
-                f"introspection of {path!r}: expected a container, got {type(state).__name__}; not "
-                "shown"
-            )
+            smach.logwarn(f"introspection of {path!r}: expected a container, got {type(state).__name__}; not shown")
             return False
         watched = _Watched(self, path, state)
         self._watched = [*self._watched, watched]
@@ -292,10 +279,7 @@ class IntrospectionServer:
     def _publish_heartbeats(self) -> None:
         for watched in self._watched:
             try:
-                if (
-                    self._structure_pub is not None
-                    and self._structure_pub.get_num_connections() > 0
-                ):
+                if self._structure_pub is not None and self._structure_pub.get_num_connections() > 0:
                     self._structure_pub.publish(watched.structure())
                 if self._status_pub is not None and self._status_pub.get_num_connections() > 0:
                     self._publish_status(*watched.snapshot("HEARTBEAT"))
@@ -320,15 +304,10 @@ class IntrospectionServer:
             if watched.path != msg.path:
                 continue
             try:
-                unknown = [
-                    label
-                    for label in msg.initial_states
-                    if label not in watched.container.get_children()
-                ]
+                unknown = [label for label in msg.initial_states if label not in watched.container.get_children()]
                 if unknown:
                     raise InvalidDataError(
-                        f"{unknown[:5]} are not among the children "
-                        f"{list(watched.container.get_children())}"
+                        f"{unknown[:5]} are not among the children {list(watched.container.get_children())}"
                     )
                 userdata = smach.UserData()
                 userdata.update(decode(msg.local_data))

@@ -61,16 +61,10 @@ class IntrospectionClient:
         shown = threading.Event()
 
         def on_status(msg: SmachContainerStatus) -> None:
-            if (
-                msg.path == path
-                and list(msg.initial_states) == list(initial_states)
-                and _shows(msg.local_data, wanted)
-            ):
+            if msg.path == path and list(msg.initial_states) == list(initial_states) and _shows(msg.local_data, wanted):
                 shown.set()
 
-        publisher = rospy.Publisher(
-            server + INIT_TOPIC, SmachContainerInitialStatusCmd, queue_size=1
-        )
+        publisher = rospy.Publisher(server + INIT_TOPIC, SmachContainerInitialStatusCmd, queue_size=1)
         subscriber = rospy.Subscriber(server + STATUS_TOPIC, SmachContainerStatus, on_status)
         try:
             if timeout is None:
@@ -95,10 +89,7 @@ class IntrospectionClient:
         limit = time.monotonic() + 2.0
         while publisher.get_num_connections() == 0:
             if time.monotonic() > limit or rospy.is_shutdown():
-                smach.logerr(
-                    f"nobody takes commands on {publisher.name}; is the introspection server "
-                    "running?"
-                )
+                smach.logerr(f"nobody takes commands on {publisher.name}; is the introspection server running?")
                 return False
             time.sleep(0.02)
         publisher.publish(command)

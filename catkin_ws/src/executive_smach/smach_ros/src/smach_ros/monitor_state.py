@@ -55,9 +55,7 @@ class MonitorState(smach.State):
         if not self.preempt_requested():
             subscriber = rospy.Subscriber(self._topic, self._msg_type, run.on_message)
             try:
-                while (
-                    run.outcome is None and not self.preempt_requested() and not rospy.is_shutdown()
-                ):
+                while run.outcome is None and not self.preempt_requested() and not rospy.is_shutdown():
                     self._wake.wait(POLL)
                     self._wake.clear()
             finally:
@@ -88,9 +86,7 @@ class _Watch:
             try:
                 valid = self._state._cond_cb(self._ud, msg)
             except Exception:
-                smach.logerr(
-                    f"cond_cb on topic '{self._state._topic}' raised:\n{traceback.format_exc()}"
-                )
+                smach.logerr(f"cond_cb on topic '{self._state._topic}' raised:\n{traceback.format_exc()}")
                 valid = False
             self._left -= 1
             if not valid:

@@ -63,9 +63,7 @@ def decode(text: str) -> dict[str, Any]:
     if not text:
         return {}
     if len(text) > MAX_TEXT:
-        raise InvalidDataError(
-            f"local_data has {len(text)} characters, at most {MAX_TEXT} are read"
-        )
+        raise InvalidDataError(f"local_data has {len(text)} characters, at most {MAX_TEXT} are read")
     try:
         raw = base64.b64decode(text, validate=True)
     except (binascii.Error, ValueError) as error:
@@ -74,9 +72,7 @@ def decode(text: str) -> dict[str, Any]:
     try:
         data = _PlainUnpickler(io.BytesIO(raw)).load()
     except Exception as error:
-        raise InvalidDataError(
-            f"local_data is no pickle of plain data: {type(error).__name__}: {error}"
-        ) from error
+        raise InvalidDataError(f"local_data is no pickle of plain data: {type(error).__name__}: {error}") from error
     if type(data) is not dict or not all(type(key) is str for key in data):
         raise InvalidDataError("local_data must be a dict with strings as keys")
     _check_values(data)
@@ -87,9 +83,7 @@ class _PlainUnpickler(pickle.Unpickler):
     """An unpickler that knows no class and no function."""
 
     def find_class(self, module_name: str, global_name: str) -> Any:
-        raise pickle.UnpicklingError(
-            f"{module_name}.{global_name} is refused: only plain data is read"
-        )
+        raise pickle.UnpicklingError(f"{module_name}.{global_name} is refused: only plain data is read")
 
     def persistent_load(self, pid: Any) -> Any:
         raise pickle.UnpicklingError("persistent ids are refused: only plain data is read")
@@ -102,21 +96,15 @@ def _check_opcodes(raw: bytes) -> None:
     try:
         for step, (opcode, argument, _position) in enumerate(pickletools.genops(raw)):
             if opcode.name not in _ALLOWED:
-                raise InvalidDataError(
-                    f"local_data contains {opcode.name}: only plain data is read"
-                )
+                raise InvalidDataError(f"local_data contains {opcode.name}: only plain data is read")
             if step >= MAX_STEPS:
                 raise InvalidDataError(f"local_data is larger than {MAX_STEPS} pickle steps")
             if "PUT" in opcode.name and not 0 <= int(argument or 0) <= MAX_STEPS:
-                raise InvalidDataError(
-                    f"local_data uses memo number {argument}, at most {MAX_STEPS} is read"
-                )
+                raise InvalidDataError(f"local_data uses memo number {argument}, at most {MAX_STEPS} is read")
     except InvalidDataError:
         raise
     except Exception as error:
-        raise InvalidDataError(
-            f"local_data is no pickle: {type(error).__name__}: {error}"
-        ) from error
+        raise InvalidDataError(f"local_data is no pickle: {type(error).__name__}: {error}") from error
 
 
 def _check_values(data: Any) -> None:
@@ -129,17 +117,13 @@ def _check_values(data: Any) -> None:
         value, depth = todo.pop()
         nodes += 1
         if nodes > MAX_NODES or depth > MAX_DEPTH:
-            raise InvalidDataError(
-                f"local_data holds more than {MAX_NODES} values or {MAX_DEPTH} levels"
-            )
+            raise InvalidDataError(f"local_data holds more than {MAX_NODES} values or {MAX_DEPTH} levels")
         if type(value) is dict:
             todo.extend((part, depth + 1) for item in value.items() for part in item)
         elif type(value) in (list, tuple):
             todo.extend((part, depth + 1) for part in value)
         elif type(value) not in _LEAVES:
-            raise InvalidDataError(
-                f"local_data holds a {type(value).__name__}: only plain data is read"
-            )
+            raise InvalidDataError(f"local_data holds a {type(value).__name__}: only plain data is read")
 
 
 def to_plain(value: Any) -> Any:
@@ -170,10 +154,7 @@ def _to_plain(value: Any, depth: int, nodes: list[int]) -> Any:
             # Not its repr, which may be longer than any memory: parts can be shared many times.
             return f"<{type(value).__name__} of {len(value)} items, too large or too deep to show>"
         if isinstance(value, dict):
-            return {
-                _to_key(key, depth, nodes): _to_plain(item, depth + 1, nodes)
-                for key, item in list(value.items())
-            }
+            return {_to_key(key, depth, nodes): _to_plain(item, depth + 1, nodes) for key, item in list(value.items())}
         items = [_to_plain(item, depth + 1, nodes) for item in list(value)]
         return items if isinstance(value, list) else tuple(items)
     except Exception:  # a property or conversion of the value itself

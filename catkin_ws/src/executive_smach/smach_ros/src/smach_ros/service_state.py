@@ -87,10 +87,7 @@ class ServiceState(smach.State):
         try:
             request = self._make_request(ud)
         except Exception:
-            smach.logerr(
-                f"request to service '{self._service_name}' could not be "
-                f"made:\n{traceback.format_exc()}"
-            )
+            smach.logerr(f"request to service '{self._service_name}' could not be made:\n{traceback.format_exc()}")
             return "aborted"
         response = self._call_service(request)
         if response is None:
@@ -98,9 +95,7 @@ class ServiceState(smach.State):
         try:
             return self._take_response(ud, response)
         except Exception:
-            smach.logerr(
-                f"response of service '{self._service_name}' not taken:\n{traceback.format_exc()}"
-            )
+            smach.logerr(f"response of service '{self._service_name}' not taken:\n{traceback.format_exc()}")
             return "aborted"
 
     def _await_service(self) -> str | None:
@@ -123,15 +118,9 @@ class ServiceState(smach.State):
                     smach.logwarn(f"waiting for service '{rospy.resolve_name(self._service_name)}'")
 
     def _make_request(self, ud: Any) -> Any:
-        request = (
-            self._service_spec._request_class()
-            if self._request is None
-            else copy.deepcopy(self._request)
-        )
+        request = self._service_spec._request_class() if self._request is None else copy.deepcopy(self._request)
         if self._request_key is not None:
-            request = (
-                copy.copy(ud[self._request_key]) if self._request_slots else ud[self._request_key]
-            )
+            request = copy.copy(ud[self._request_key]) if self._request_slots else ud[self._request_key]
         for slot in self._request_slots:
             setattr(request, slot, ud[slot])
         if self._request_cb is not None:
@@ -159,9 +148,7 @@ class ServiceState(smach.State):
 
         # A call blocks until the server answers; in a thread of its own it cannot keep us from
         # shutting down.
-        threading.Thread(
-            target=call, name=f"service_call:{self._service_name}", daemon=True
-        ).start()
+        threading.Thread(target=call, name=f"service_call:{self._service_name}", daemon=True).start()
         while not done.wait(POLL):
             if rospy.is_shutdown():
                 return None

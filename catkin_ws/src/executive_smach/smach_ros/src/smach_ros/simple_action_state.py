@@ -18,11 +18,7 @@ from actionlib_msgs.msg import GoalStatus
 from smach_ros.util import POLL, TimeLimit, callback_userdata, check_slots, register_callback
 
 _MINUTE = rospy.Duration(60.0)
-_STATUS_NAMES = {
-    value: name
-    for name, value in vars(GoalStatus).items()
-    if name.isupper() and isinstance(value, int)
-}
+_STATUS_NAMES = {value: name for name, value in vars(GoalStatus).items() if name.isupper() and isinstance(value, int)}
 
 
 class SimpleActionState(smach.State):
@@ -147,16 +143,12 @@ class SimpleActionState(smach.State):
         try:
             goal = self._make_goal(ud)
         except Exception:
-            smach.logerr(
-                f"goal of action '{self._action_name}' could not be made:\n{traceback.format_exc()}"
-            )
+            smach.logerr(f"goal of action '{self._action_name}' could not be made:\n{traceback.format_exc()}")
             return "aborted"
         self.status = self.ACTIVE
         try:
             handle = self._action_client.send_goal(goal, lambda _handle: self._wake.set())
-        except (
-            Exception
-        ) as error:  # what rospy raises for fields of a wrong type, or when shut down
+        except Exception as error:  # what rospy raises for fields of a wrong type, or when shut down
             smach.logerr(f"goal of action '{self._action_name}' could not be sent: {error}")
             return "aborted"
         if not self._await_end(handle):
@@ -215,9 +207,7 @@ class SimpleActionState(smach.State):
             if made is not None:
                 goal = made
         if getattr(goal, "_type", None) != self._goal_class._type:
-            raise TypeError(
-                f"expected a {self._goal_class._type}, got {type(goal).__name__} {goal!r}"
-            )
+            raise TypeError(f"expected a {self._goal_class._type}, got {type(goal).__name__} {goal!r}")
         return goal
 
     def _await_end(self, handle: ClientGoalHandle) -> bool:
@@ -232,20 +222,14 @@ class SimpleActionState(smach.State):
                 return False
             if self._server_is_there():
                 if lost_at and handle.get_comm_state() == CommState.WAITING_FOR_GOAL_ACK:
-                    smach.logerr(
-                        f"{name}: the server came back without having acknowledged the goal; goal "
-                        "given up"
-                    )
+                    smach.logerr(f"{name}: the server came back without having acknowledged the goal; goal given up")
                     handle.cancel()
                     return False
                 lost_at = None
             else:
                 lost_at = lost_at or time.monotonic()
                 if time.monotonic() - lost_at > self.LOST_AFTER:
-                    smach.logerr(
-                        f"{name}: connection to the server lost for {self.LOST_AFTER:g} s; goal "
-                        "given up"
-                    )
+                    smach.logerr(f"{name}: connection to the server lost for {self.LOST_AFTER:g} s; goal given up")
                     return False
             unacknowledged = (
                 handle.get_comm_state() == CommState.WAITING_FOR_GOAL_ACK
@@ -254,17 +238,12 @@ class SimpleActionState(smach.State):
             if cancel_limit is None:
                 if not unacknowledged and (self.preempt_requested() or exec_limit.expired()):
                     if not self.preempt_requested():
-                        smach.logwarn(
-                            f"{name}: not finished within {exec_limit.limit:g} s; goal cancelled"
-                        )
+                        smach.logwarn(f"{name}: not finished within {exec_limit.limit:g} s; goal cancelled")
                     self.status = self.PREEMPTING
                     handle.cancel()
                     cancel_limit = TimeLimit(self._preempt_timeout)
             elif cancel_limit.expired():
-                smach.logerr(
-                    f"{name}: cancelled goal has not ended within {cancel_limit.limit:g} s; given "
-                    "up"
-                )
+                smach.logerr(f"{name}: cancelled goal has not ended within {cancel_limit.limit:g} s; given up")
                 return False
             self._pause()
         return True
@@ -292,9 +271,7 @@ class SimpleActionState(smach.State):
                 for slot in self._result_slots:
                     ud[slot] = getattr(result, slot)
         except Exception:
-            smach.logerr(
-                f"result of action '{self._action_name}' not taken:\n{traceback.format_exc()}"
-            )
+            smach.logerr(f"result of action '{self._action_name}' not taken:\n{traceback.format_exc()}")
             return "aborted"
         return outcome
 

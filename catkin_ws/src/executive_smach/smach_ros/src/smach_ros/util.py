@@ -64,9 +64,7 @@ def callback_userdata(ud: Any, cb: Callable | None, state: smach.State) -> smach
     Example: `goal_cb(callback_userdata(ud, goal_cb, self), goal)`.
     """
     source: Any = cb if smach.has_smach_interface(cb) else state
-    return smach.Remapper(
-        ud, source.get_registered_input_keys(), source.get_registered_output_keys(), {}
-    )
+    return smach.Remapper(ud, source.get_registered_input_keys(), source.get_registered_output_keys(), {})
 
 
 def register_callback(state: smach.State, what: str, cb: Callable | None) -> None:
@@ -78,9 +76,7 @@ def register_callback(state: smach.State, what: str, cb: Callable | None) -> Non
     if cb is None:
         return
     if not callable(cb):
-        raise smach.InvalidStateError(
-            f"{type(state).__name__}: {what} must be callable, got {type(cb).__name__}"
-        )
+        raise smach.InvalidStateError(f"{type(state).__name__}: {what} must be callable, got {type(cb).__name__}")
     if smach.has_smach_interface(cb):
         declared: Any = cb
         state.register_outcomes(declared.get_registered_outcomes())

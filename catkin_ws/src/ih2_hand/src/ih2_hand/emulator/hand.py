@@ -53,11 +53,18 @@ class EmulatedHand:
     before a posture is executed (for virtual time: a pty does not tell when bytes arrived).
     """
 
-    def __init__(self, clock: Clock | None = None, *, dialect: str = "both",
-                 calibration_scale: float = 1.0, greeting: bool = False,
-                 strict_force: bool = False, enforce_spacing: bool = False,
-                 positions: Sequence[int] = (0,) * WIRE.motors,
-                 preshapes: Mapping[str, Sequence[int]] | None = None):
+    def __init__(
+        self,
+        clock: Clock | None = None,
+        *,
+        dialect: str = "both",
+        calibration_scale: float = 1.0,
+        greeting: bool = False,
+        strict_force: bool = False,
+        enforce_spacing: bool = False,
+        positions: Sequence[int] = (0,) * WIRE.motors,
+        preshapes: Mapping[str, Sequence[int]] | None = None,
+    ):
         if not 0.0 <= calibration_scale <= 1000.0:
             raise ValueError(f"calibration_scale must be 0..1000; got {calibration_scale}")
         self.clock = clock or SteadyClock()
@@ -68,8 +75,7 @@ class EmulatedHand:
         self.strict_force = strict_force
         self.enforce_spacing = enforce_spacing
         self.calibrated = greeting
-        self.preshapes = {mode: tuple(values) for mode, values in
-                          (preshapes or grasps.load_preshapes()).items()}
+        self.preshapes = {mode: tuple(values) for mode, values in (preshapes or grasps.load_preshapes()).items()}
         self.grasp_current = dict(GRASP_CURRENT)
         self.grasp_tension = dict(GRASP_TENSION)
         self.low_level = LowLevel(self.motors)
@@ -88,12 +94,15 @@ class EmulatedHand:
     def set_contacts(self, positions: Sequence[float], stiffness: Sequence[float]) -> None:
         """Where the object is for each motor: contact position 0..254 (255 free) and stiffness."""
         if len(positions) != WIRE.motors or len(stiffness) != WIRE.motors:
-            raise ValueError(f"contact needs {WIRE.motors} positions and stiffnesses; got "
-                             f"{len(positions)} and {len(stiffness)}")
+            raise ValueError(
+                f"contact needs {WIRE.motors} positions and stiffnesses; got {len(positions)} and {len(stiffness)}"
+            )
         for motor, position, stiff in zip(self.motors, positions, stiffness, strict=True):
             if not 0 <= position <= FREE or not 0.0 <= stiff <= STIFFEST:
-                raise ValueError(f"contact position must be 0..255 and stiffness 0..{STIFFEST:g}; got "
-                                 f"{position} and {stiff} for motor {motor.number}")
+                raise ValueError(
+                    f"contact position must be 0..255 and stiffness 0..{STIFFEST:g}; got "
+                    f"{position} and {stiff} for motor {motor.number}"
+                )
             motor.contact = Contact(float(position), float(stiff))
 
     # -- time ------------------------------------------------------------------------------------
@@ -228,8 +237,7 @@ class EmulatedHand:
         motor = self._motor(frame[0] >> 2 & 0x0F)
         if motor is not None:
             self._after_preshape = []
-            motor.drive((frame[0] & 1) << 8 | frame[1],
-                        (frame[0] >> 6 & 1) == WIRE.close_direction)
+            motor.drive((frame[0] & 1) << 8 | frame[1], (frame[0] >> 6 & 1) == WIRE.close_direction)
 
     def _position_command(self, frame: bytes) -> None:
         """Commands that need a calibrated hand (W14)."""
@@ -254,8 +262,11 @@ class EmulatedHand:
             self._grasp_v17(frame)
         else:
             mode, level, is_current = frames.LEGACY_GRASPS[first]
-            self._grasp(mode, "current" if is_current else "tension",
-                        (self.grasp_current if is_current else self.grasp_tension)[level])
+            self._grasp(
+                mode,
+                "current" if is_current else "tension",
+                (self.grasp_current if is_current else self.grasp_tension)[level],
+            )
 
     def _posture(self, positions: Sequence[int]) -> None:
         self._busy_until = self.clock.monotonic() + WIRE.posture_spacing_s

@@ -19,9 +19,16 @@ class LowLevel:
     """Executes low-level frames on the motors and keeps what they store."""
 
     def __init__(self, motors: Sequence[Motor]):
-        self._stored = {motor.number: {0x25: bytes(4), 0x45: bytes(4), 0x65: bytes(4),
-                                       0x76: bytes((1, 0xFF)), 0x77: bytes((3, 0xFF))}
-                        for motor in motors}
+        self._stored = {
+            motor.number: {
+                0x25: bytes(4),
+                0x45: bytes(4),
+                0x65: bytes(4),
+                0x76: bytes((1, 0xFF)),
+                0x77: bytes((3, 0xFF)),
+            }
+            for motor in motors
+        }
         self._raw_zero = {motor.number: 0.0 for motor in motors}
 
     def execute(self, motor: Motor, frame: bytes) -> bytes:

@@ -144,8 +144,9 @@ class Motor:
             return
         before = self.position
         rate = FULL_SCALE / WIRE.full_stroke_s * self.speed / WIRE.speed_max
-        {"speed": self._speed_step, "position": self._position_step,
-         "tension": self._tension_step}.get(self.mode, self._current_step)(rate * dt)
+        {"speed": self._speed_step, "position": self._position_step, "tension": self._tension_step}.get(
+            self.mode, self._current_step
+        )(rate * dt)
         if self.mode == "stop":
             return
         self._moving = abs(self.position - before) > 1e-9
@@ -169,7 +170,7 @@ class Motor:
     def _speed_step(self, step: float) -> None:
         self.wrapped = False
         self._move(self.direction * step, STALL_CURRENT * self.speed / WIRE.speed_max)
-        at_end = (self.position >= FULL_SCALE if self.direction > 0 else self.position <= 0.0)
+        at_end = self.position >= FULL_SCALE if self.direction > 0 else self.position <= 0.0
         if at_end and WIRE.stop_at_end:
             self.stop()
 

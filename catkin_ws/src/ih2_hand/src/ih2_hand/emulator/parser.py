@@ -68,7 +68,11 @@ def _closed_well(frame: bytes) -> bool:
     first = frame[0]
     if first == frames.LLMC:
         return frame[1] == frame[-1]
-    if first == frames.SET_POSTURE or first in frames.MEM_PRESHAPE \
-            or first in frames.MEM_TENSION or first in frames.MEM_CURRENT:
+    if (
+        first == frames.SET_POSTURE
+        or first in frames.MEM_PRESHAPE
+        or first in frames.MEM_TENSION
+        or first in frames.MEM_CURRENT
+    ):
         return frame[-1] == first
     return True

@@ -25,10 +25,14 @@ class PtyServer:
     (empty while unplugged); `trace` gets (direction, bytes, time) as the hand sees them.
     """
 
-    def __init__(self, hand: EmulatedHand, faults: Faults | None = None,
-                 link: str | None = None,
-                 on_port: Callable[[str], None] = lambda _path: None,
-                 trace: Callable[[str, bytes, float], None] | None = None):
+    def __init__(
+        self,
+        hand: EmulatedHand,
+        faults: Faults | None = None,
+        link: str | None = None,
+        on_port: Callable[[str], None] = lambda _path: None,
+        trace: Callable[[str, bytes, float], None] | None = None,
+    ):
         self.hand = hand
         self.faults = faults or Faults(hand)
         self.faults.on_unplug, self.faults.on_replug = self.unplug, self.replug
@@ -99,11 +103,9 @@ class PtyServer:
                 poll.register(master, select.POLLIN)
             self._serve_port(poll, master, plug, ended)
 
-    def _serve_port(self, poll: select.poll, master: int, plug: int,
-                    ended: Callable[[], bool]) -> None:
+    def _serve_port(self, poll: select.poll, master: int, plug: int, ended: Callable[[], bool]) -> None:
         """Serve while the same pty is open. Its number alone does not tell: numbers return."""
-        while (self._running and self._master == master and self._plugs == plug
-               and not ended()):
+        while self._running and self._master == master and self._plugs == plug and not ended():
             events = poll.poll(self._wait_s() * 1000.0)
             with self.lock:
                 for descriptor, _ in events:

@@ -20,9 +20,15 @@ class VirtualLink:
     its time-out pass on the clock, so that a VirtualClock makes silence cost nothing.
     """
 
-    def __init__(self, hand: EmulatedHand, clock: Clock, port: str = "virtual",
-                 faults: Faults | None = None, to_hand: Tamper | None = None,
-                 to_host: Tamper | None = None):
+    def __init__(
+        self,
+        hand: EmulatedHand,
+        clock: Clock,
+        port: str = "virtual",
+        faults: Faults | None = None,
+        to_hand: Tamper | None = None,
+        to_host: Tamper | None = None,
+    ):
         self.port = port
         self.last_byte: int | None = None
         self.hand = hand

@@ -25,10 +25,12 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
-ACTIONS = {"hand_open": (HandOpenAction, HandOpenGoal),
-           "hand_close": (HandCloseAction, HandCloseGoal),
-           "hand_preshape": (HandPreshapeAction, HandPreshapeGoal),
-           "hand_preshape_close": (HandPreshapeCloseAction, HandPreshapeCloseGoal)}
+ACTIONS = {
+    "hand_open": (HandOpenAction, HandOpenGoal),
+    "hand_close": (HandCloseAction, HandCloseGoal),
+    "hand_preshape": (HandPreshapeAction, HandPreshapeGoal),
+    "hand_preshape_close": (HandPreshapeCloseAction, HandPreshapeCloseGoal),
+}
 """Action and goal type by action name."""
 
 
@@ -52,8 +54,9 @@ class HandClient:
         self._fault = rospy.Publisher(f"{cell}/hand_fault", String, queue_size=5)
         self._contact = rospy.Publisher(f"{cell}/finger_contact", FingerContact, queue_size=5)
         self.stop_service = rospy.ServiceProxy(f"{hand}/stop", Trigger)
-        self.clients = {name: actionlib.SimpleActionClient(f"{hand}/{name}", types[0])
-                        for name, types in ACTIONS.items()}
+        self.clients = {
+            name: actionlib.SimpleActionClient(f"{hand}/{name}", types[0]) for name, types in ACTIONS.items()
+        }
 
     def _on_status(self, status: HandStatus) -> None:
         self.status = status
@@ -70,8 +73,7 @@ class HandClient:
         end = time.monotonic() + (limit or self.limit)
         while not what():
             if time.monotonic() > end:
-                raise TimeoutError(f"{text}: not within {limit or self.limit} s; "
-                                   f"last status: {self.status.message}")
+                raise TimeoutError(f"{text}: not within {limit or self.limit} s; last status: {self.status.message}")
             time.sleep(0.01)
 
     def wait_ready(self) -> None:
@@ -84,8 +86,7 @@ class HandClient:
     def send(self, name: str, *arguments: Any) -> Any:
         """Send a goal; the action client."""
         self.feedback = []
-        self.clients[name].send_goal(ACTIONS[name][1](*arguments),
-                                     feedback_cb=lambda item: self.feedback.append(item))
+        self.clients[name].send_goal(ACTIONS[name][1](*arguments), feedback_cb=lambda item: self.feedback.append(item))
         return self.clients[name]
 
     def result(self, name: str) -> Any:

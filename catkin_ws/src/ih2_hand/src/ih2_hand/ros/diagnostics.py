@@ -45,17 +45,26 @@ class Diagnostics:
         elif not node.calibrated or node.event_code not in NEUTRAL:
             level = DiagnosticStatus.WARN
         status.summary(level, node.message)
-        values = {"port": node.port, "connected": driver is not None,
-                  "calibrated": node.calibrated, "calibrating": node.calibrating,
-                  "holding": node.holding, "rate (Hz)": node.rate,
-                  "reason_code": int(node.event_code),
-                  "action": node.goals.active if hasattr(node, "goals") else None}
+        values = {
+            "port": node.port,
+            "connected": driver is not None,
+            "calibrated": node.calibrated,
+            "calibrating": node.calibrating,
+            "holding": node.holding,
+            "rate (Hz)": node.rate,
+            "reason_code": int(node.event_code),
+            "action": node.goals.active if hasattr(node, "goals") else None,
+        }
         if driver is not None:
             counters = driver.counters
-            values.update({"requests": counters.requests,
-                           "resynchronisations": counters.resynchronisations,
-                           "of these by StopALL": counters.fillers,
-                           "failed requests": counters.failures})
+            values.update(
+                {
+                    "requests": counters.requests,
+                    "resynchronisations": counters.resynchronisations,
+                    "of these by StopALL": counters.fillers,
+                    "failed requests": counters.failures,
+                }
+            )
         for key, value in values.items():
             status.add(key, str(value))
         return status

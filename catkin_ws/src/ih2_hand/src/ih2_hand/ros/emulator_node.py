@@ -38,8 +38,7 @@ class EmulatorNode:
             elif rospy.has_param("hand_port"):
                 rospy.delete_param("hand_port")
         except Exception as error:  # whatever the master's absence raises; the hand lives on
-            rospy.logwarn("parameter hand_port not updated, the ROS master does not answer: %s",
-                          error)
+            rospy.logwarn("parameter hand_port not updated, the ROS master does not answer: %s", error)
 
     def _on_contact(self, contact: FingerContact) -> None:
         try:

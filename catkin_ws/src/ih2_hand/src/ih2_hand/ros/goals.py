@@ -55,8 +55,7 @@ SPECS: dict[str, tuple[Any, Any, Any]] = {
     "hand_open": (HandOpenAction, HandOpenResult, HandOpenFeedback),
     "hand_close": (HandCloseAction, HandCloseResult, HandCloseFeedback),
     "hand_preshape": (HandPreshapeAction, HandPreshapeResult, HandPreshapeFeedback),
-    "hand_preshape_close": (HandPreshapeCloseAction, HandPreshapeCloseResult,
-                            HandPreshapeCloseFeedback),
+    "hand_preshape_close": (HandPreshapeCloseAction, HandPreshapeCloseResult, HandPreshapeCloseFeedback),
 }
 """Action, result and feedback type by action name."""
 
@@ -110,10 +109,12 @@ class GoalQueue:
         self._servers = {}
         for name, (action, _, _) in SPECS.items():
             self._servers[name] = HandActionServer(
-                rospy.resolve_name("~" + name), action,
+                rospy.resolve_name("~" + name),
+                action,
                 lambda handle, name=name: self._on_goal(name, handle),
                 lambda handle, name=name: self._mailbox.put(Item("cancel", name, handle)),
-                auto_start=False)
+                auto_start=False,
+            )
         self._thread = threading.Thread(target=self._work, name="goals", daemon=True)
 
     def start(self) -> None:
@@ -209,16 +210,16 @@ class GoalQueue:
         try:
             task = self._owner.make_task(name, handle.get_goal())
         except (ValueError, HandError) as error:
-            self._finish_handle(name, handle,
-                                Verdict(str(error), done=True, reason=reason_of(error)))
+            self._finish_handle(name, handle, Verdict(str(error), done=True, reason=reason_of(error)))
             return
         if handle.get_goal_status().status == actionlib.GoalStatus.PREEMPTING:
             cancelled = Verdict("cancelled before it began", reason=Reason.CANCELLED)
             handle.set_canceled(_result(name, cancelled))
             return
         if self._status is None:  # else the replaced goal's subscription goes on
-            self._status = rospy.Subscriber(rospy.resolve_name("~hand_status"), HandStatus,
-                                            self._on_status, queue_size=2, tcp_nodelay=True)
+            self._status = rospy.Subscriber(
+                rospy.resolve_name("~hand_status"), HandStatus, self._on_status, queue_size=2, tcp_nodelay=True
+            )
         now = time.monotonic()
         self._running = Running(name, handle, task, now, rospy.Time.now(), last_status=now)
         self._begin(self._running)
@@ -243,8 +244,7 @@ class GoalQueue:
             self._fail(status.message, Reason.HAND_LINK_LOST)
             return
         if self._owner.driver is not running.driver:
-            self._fail(f"the connection to {self._owner.port} was lost during the goal",
-                       Reason.HAND_LINK_LOST)
+            self._fail(f"the connection to {self._owner.port} was lost during the goal", Reason.HAND_LINK_LOST)
             return
         if running.driver.counters.fillers != running.fillers:
             self._resend(running)
@@ -254,8 +254,9 @@ class GoalQueue:
             return
         verdict = running.task.judge(status.motors, time.monotonic() - running.begun)
         _, _, feedback = SPECS[running.name]
-        running.handle.publish_feedback(feedback(
-            status=verdict.text, positions=[motor.position for motor in status.motors]))
+        running.handle.publish_feedback(
+            feedback(status=verdict.text, positions=[motor.position for motor in status.motors])
+        )
         if verdict.done:
             if verdict.stop:
                 self._stop_fingers()
@@ -266,9 +267,11 @@ class GoalQueue:
         """A resynchronisation has sent StopALL: the fingers stand; go on with the goal."""
         if running.resends >= RESENDS:
             self._stop_fingers()
-            self._fail(f"the line to {self._owner.port} had to be resynchronised "
-                       f"{RESENDS + 1} times during the goal: check the cable",
-                       Reason.HAND_LINK_LOST)
+            self._fail(
+                f"the line to {self._owner.port} had to be resynchronised "
+                f"{RESENDS + 1} times during the goal: check the cable",
+                Reason.HAND_LINK_LOST,
+            )
             return
         running.resends += 1
         self._begin(running)
@@ -277,12 +280,10 @@ class GoalQueue:
         now = time.monotonic()
         if now - running.last_status > SILENCE_S:
             self._stop_fingers()
-            self._fail(f"no hand_status for {SILENCE_S} s from {self._owner.port}",
-                       Reason.HAND_LINK_LOST)
+            self._fail(f"no hand_status for {SILENCE_S} s from {self._owner.port}", Reason.HAND_LINK_LOST)
         elif now - running.begun > running.task.limit:
             self._stop_fingers()
-            self._fail(f"not done within {running.task.limit:.0f} s; fingers stopped",
-                       Reason.TIME_LIMIT)
+            self._fail(f"not done within {running.task.limit:.0f} s; fingers stopped", Reason.TIME_LIMIT)
 
     # -- ends ------------------------------------------------------------------------------------
 

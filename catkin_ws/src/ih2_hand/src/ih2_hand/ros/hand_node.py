@@ -77,8 +77,9 @@ class HandNode:
         self.rate = parameters.read("~rate", float, 30.0, 1.0, 200.0)
         self._dialect = parameters.read("~dialect", str, "legacy", among=DIALECTS)
         self._is_current = not parameters.read("~use_tension", bool, False)
-        self._read_timeout = parameters.read("~read_timeout", float, WIRE.read_timeout_s,
-                                             LEAST_READ_TIMEOUT_S, LARGEST_READ_TIMEOUT_S)
+        self._read_timeout = parameters.read(
+            "~read_timeout", float, WIRE.read_timeout_s, LEAST_READ_TIMEOUT_S, LARGEST_READ_TIMEOUT_S
+        )
         self._limit = parameters.read("~goal_time_limit", float, 10.0, SHORTEST_GOAL_S, LONGEST_S)
         self._preshapes = grasps.load_preshapes(parameters.read("~grasps_file", str, "") or None)
         self.driver: HandSerialDriver | None = None
@@ -92,8 +93,7 @@ class HandNode:
         self._contradictions = 0
         self._lost_lock = threading.Lock()
         self._ended = threading.Event()
-        self._publisher = rospy.Publisher("~hand_status", HandStatus, queue_size=5,
-                                          tcp_nodelay=True)
+        self._publisher = rospy.Publisher("~hand_status", HandStatus, queue_size=5, tcp_nodelay=True)
         self._joints = rospy.Publisher("~joint_states", JointState, queue_size=5)
         self._diagnostics = Diagnostics(self)
         self._trace = TracePublisher()
@@ -150,17 +150,26 @@ class HandNode:
         try:
             self._open()
         except Exception as error:  # whatever a port can raise: it is tried again
-            text = str(error) if isinstance(error, HandError) else (
-                f"the hand's port {self.port} cannot be opened ({type(error).__name__}: {error}): "
-                "check that it is the hand's serial device")
+            text = (
+                str(error)
+                if isinstance(error, HandError)
+                else (
+                    f"the hand's port {self.port} cannot be opened ({type(error).__name__}: {error}): "
+                    "check that it is the hand's serial device"
+                )
+            )
             if text != self.message:
                 self.event(text, Reason.HAND_LINK_LOST)
 
     def _open(self) -> None:
         self.port = self._resolve_port()
-        driver = HandSerialDriver(None if self.port == "" else self.port, dialect=self._dialect,
-                                  preshapes=self._preshapes, trace=self._trace.hook,
-                                  read_timeout=self._read_timeout)
+        driver = HandSerialDriver(
+            None if self.port == "" else self.port,
+            dialect=self._dialect,
+            preshapes=self._preshapes,
+            trace=self._trace.hook,
+            read_timeout=self._read_timeout,
+        )
         self.port = driver.port
         self.calibrated, self.holding, self._preshape = False, True, None
         self._contradictions = 0
@@ -170,15 +179,15 @@ class HandNode:
     def _resolve_port(self) -> str:
         if not self._port_setting.startswith("param:"):
             return self._port_setting
-        name = self._port_setting[len("param:"):]
+        name = self._port_setting[len("param:") :]
         try:
             port = rospy.get_param(name, "")
         except Exception as error:  # whatever the master's absence raises: try again later
-            raise HandPortError(f"parameter {name} cannot be read ({error}): is the ROS master "
-                                "there?") from error
+            raise HandPortError(f"parameter {name} cannot be read ({error}): is the ROS master there?") from error
         if not port:
-            raise HandPortError(f"parameter {rospy.resolve_name(name)} is not set: start what "
-                                "publishes the hand's port there")
+            raise HandPortError(
+                f"parameter {rospy.resolve_name(name)} is not set: start what publishes the hand's port there"
+            )
         return str(port)
 
     def lost(self, error: Exception, driver: HandSerialDriver | None = None) -> None:
@@ -274,9 +283,11 @@ class HandNode:
             task = PreshapeTask(goal.mode, goal.level, self._is_current, self._limit)
         else:
             if self._preshape is None:
-                raise RefusedError("the hand is not preshaped: call hand_preshape first (hand_open, "
-                                   "hand_close, calibration or reconnection undo it)",
-                                   Reason.HAND_REFUSED)
+                raise RefusedError(
+                    "the hand is not preshaped: call hand_preshape first (hand_open, "
+                    "hand_close, calibration or reconnection undo it)",
+                    Reason.HAND_REFUSED,
+                )
             task = GraspTask(grasps.CLOSING_MOTORS[self._preshape[0]], self._limit)
         if name != "hand_preshape_close":
             self._preshape = None
@@ -303,8 +314,7 @@ class HandNode:
         busy = "a calibration runs" if self.calibrating else None
         if self.goals.active:
             busy = f"{self.goals.active} runs"
-        reason = refuse_calibration(words, calibrated=self.calibrated, holding=self.holding,
-                                    busy=busy)
+        reason = refuse_calibration(words, calibrated=self.calibrated, holding=self.holding, busy=busy)
         driver = self.driver
         if reason is None and driver is None:
             reason = f"the hand is not connected: {self.message}"
@@ -313,8 +323,7 @@ class HandNode:
             return
         self.calibrating, self.calibrated, self._preshape = True, False, None
         self.event(f"calibration {words[0]} started", Reason.HAND_STARTED)
-        threading.Thread(target=self._run_calibration, args=(driver, words[0]),
-                         name="calibration", daemon=True).start()
+        threading.Thread(target=self._run_calibration, args=(driver, words[0]), name="calibration", daemon=True).start()
 
     def _run_calibration(self, driver: HandSerialDriver, kind: str) -> None:
         failure: Exception | None = None
@@ -342,8 +351,10 @@ class HandNode:
         try:
             driver.stop_all()
             if self.calibrating:
-                return TriggerResponse(False, "StopALL sent, but the hand discards everything "
-                                              "while it calibrates; cut its power if it must stop")
+                return TriggerResponse(
+                    False,
+                    "StopALL sent, but the hand discards everything while it calibrates; cut its power if it must stop",
+                )
             for attempt in range(STOP_CHECKS):
                 if all(status["mode"] == "stop" for status in driver.get_all_finger_status()):
                     return TriggerResponse(True, "every motor stands")
@@ -352,5 +363,4 @@ class HandNode:
                 driver.stop_all()
         except HandError as error:
             return TriggerResponse(False, f"StopALL sent, not confirmed: {error}")
-        return TriggerResponse(False, "StopALL sent, but a motor still reports a driven mode: "
-                                      "cut the hand's power")
+        return TriggerResponse(False, "StopALL sent, but a motor still reports a driven mode: cut the hand's power")

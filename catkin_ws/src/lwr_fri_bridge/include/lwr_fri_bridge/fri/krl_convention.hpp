@@ -18,8 +18,8 @@
 // clang-format on
 ///
 /// openkc takes one command after the other, each with BOOL[1]: it is over when the program shows
-/// the command in TO_INT[15] and sets TO_BOOL[1] (TO_INT[14] counts them); the PC then takes BOOL[1]
-/// back and waits for the program to do so too. Commands: 9 position, 6 Cartesian, 7 joint
+/// the command in TO_INT[15] and sets TO_BOOL[1] (TO_INT[14] counts them); the PC then takes
+/// BOOL[1] back and waits for the program to do so too. Commands: 9 position, 6 Cartesian, 7 joint
 /// impedance, 1 friStart, 2 friStop. Source: public clients and emulators of that program.
 ///
 /// Our own program (krl/coglab_fri.src) acts once per request number (1..32767, wraps to 1) and
@@ -69,8 +69,8 @@ constexpr std::uint16_t kMaxRequestNumber = 32767;
 struct KrlRequest {
   KrlPhase phase = KrlPhase::Idle;
   ControlStrategy strategy = ControlStrategy::Position;  ///< for Start
-  std::uint16_t number = 0;  ///< grows with every Start and Stop; coglab only
-  std::int32_t tool = 0;     ///< tool number; rtt_lwr only
+  std::uint16_t number = 0;       ///< grows with every Start and Stop; coglab only
+  std::int32_t tool = 0;          ///< tool number; rtt_lwr only
   std::uint8_t acknowledged = 0;  ///< commands of this phase that are over; openkc only
   bool asserted = false;          ///< the next one is asked for; openkc only
 };

@@ -19,7 +19,7 @@ struct SentSetPoint {
   std::uint16_t counter = 0;      ///< of the answer
   std::uint16_t measurement = 0;  ///< counter of the measurement that it answers
   bool valid = false;
-  bool followed = false;  ///< came from the interpolator; otherwise it mirrored
+  bool followed = false;                   ///< came from the interpolator; otherwise it mirrored
   Vector7 from = Vector7::Zero();          ///< set-point before this answer, rad
   Vector7 position = Vector7::Zero();      ///< rad
   Vector7 velocity = Vector7::Zero();      ///< at its end, rad/s
