@@ -11,6 +11,7 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
+import rospkg
 import rospy
 from coglab_console.browser import Browser, press_and_hold
 from coglab_msgs.msg import LwrState, MasterState
@@ -44,8 +45,9 @@ class Cell:
             PYTHONUNBUFFERED="1",
         )
         words = ["fri_period:=0.010", f"console:={str(console).lower()}", "console_port:=0"]
+        launch = Path(rospkg.RosPack().get_path("coglab_bringup"), "launch", "coglab.launch")
         self._log = (self.home / "roslaunch.log").open("w")
-        command = ["roslaunch", "-p", str(port), "coglab_bringup", "coglab.launch", *words]
+        command = ["roslaunch", "-p", str(port), str(launch), *words]
         self._process = subprocess.Popen(command, stdout=self._log, stderr=subprocess.STDOUT)
         self._console: subprocess.Popen | None = None
         self.machine, self.arm = MasterState(), LwrState()

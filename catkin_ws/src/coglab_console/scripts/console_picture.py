@@ -16,6 +16,7 @@ import tempfile
 import time
 from pathlib import Path
 
+import rospkg
 from coglab_console.browser import Browser, fresh_link
 from selenium.webdriver.common.by import By
 
@@ -62,8 +63,7 @@ def main(words: list[str]) -> int:
             "roslaunch",
             "-p",
             str(port),
-            "coglab_bringup",
-            "coglab.launch",
+            str(Path(rospkg.RosPack().get_path("coglab_bringup"), "launch", "coglab.launch")),
             "fri_period:=0.010",
             "console_port:=0",
         ]
