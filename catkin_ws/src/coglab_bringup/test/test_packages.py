@@ -23,6 +23,8 @@ UNNAMED = {
     "python3-venv": "python3 -m venv of ./coglab for the oracles",
     "libtinyxml-dev": "CMake files of urdfdom, which kdl_parser brings, name its library",
     "libgtest-dev": "catkin_add_gtest builds gtest from its sources",
+    "libjs-three": "scene3d.js of the console, served from where Debian puts it",
+    "libjs-dygraphs": "charts.js of the console, served from where Debian puts it",
     "joint-state-publisher-gui": "lwr_description's display.launch, on a screen",
     "rviz": "lwr_description's display.launch and coglab.launch, on a screen",
 }

@@ -34,6 +34,9 @@ REFUSED = {
     "launch people:=0": "expected a whole number from 1 to 9",
     "launch krl_convention:=x": "there are: coglab, centro_epiaggio, stanford, rcprg_tum, rtt_lwr",
     "launch limits_profile:=x": "there are: default, t1",
+    "launch console:=maybe": "there are: true, false",
+    "launch console_port:=x": "expected a whole number from 0 to 65535",
+    "console": "console expects one of: picture; got nothing",
     "launch arm:=steel": "there is no 'steel'; there are: fri, ideal",
     "launch arm:=ideal split:=true": "the ideal arm and its controllers are one process",
     "launch sim:=maybe": "there are: true, false",
@@ -41,7 +44,7 @@ REFUSED = {
     "launch log_file:=/no/such/x": "expected a file in a folder that exists",
     "launch -p high": "expected a port number, such as 11411, got 'high'",
     "launch -p": "expected a port number",
-    "install vizz": "no group named vizz; there are: run, build, test, viz",
+    "install vizz": "no group named vizz; there are: run, build, test, browser, viz",
     "build nosuch": "build takes --upstream-smach, tests, not nosuch",
     "docs foo": "docs takes no arguments, got 'foo'",
     "doctor foo": "doctor takes no arguments, got 'foo'",
@@ -60,7 +63,7 @@ def bare(tmp_path_factory):
     """The sources with a package list of which nothing is installed: to install or to build would be seen."""
     top = tmp_path_factory.mktemp("bare")
     shutil.copy(TOP / "coglab", top)
-    (top / "debian-packages.txt").write_text(f"run: {ABSENT}\nbuild: {ABSENT}\ntest: {ABSENT}\nviz: {ABSENT}\n")
+    (top / "debian-packages.txt").write_text("".join(f"{group}: {ABSENT}\n" for group in ("run", "build", "test", "browser", "viz")))
     (top / "catkin_ws" / "devel").mkdir(parents=True)
     (top / "catkin_ws" / "src").symlink_to(TOP / "catkin_ws" / "src")
     (top / "catkin_ws" / "devel" / "setup.bash").write_text("exit 99\n")

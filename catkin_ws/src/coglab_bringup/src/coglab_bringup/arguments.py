@@ -28,6 +28,7 @@ def demo_parser(top: Path) -> Parser:
     """./coglab demo"""
     parser = Parser(prog="coglab demo", description="Takes an object from the simulated person and gives it back.")
     parser.add_argument("--headless", action="store_true", help="no rviz, whatever is installed")
+    parser.add_argument("--no-console", action="store_true", help="without the experimenter's page")
     parser.add_argument("--seed", type=seed, default=7, help="seed of the virtual person and of all noise")
     parser.add_argument(
         "--out",
@@ -157,7 +158,7 @@ def _judge_nothing(command: str, words: list[str]) -> None:
         raise Refused(f"{command} takes no arguments, got '{' '.join(words)}'")
 
 
-TOOLS = {"hand": {"trace": 0}, "controller": {"new": 1}, "object": {"new": 1, "check": 0, "list": 0}}
+TOOLS = {"hand": {"trace": 0}, "controller": {"new": 1}, "object": {"new": 1, "check": 0, "list": 0}, "console": {"picture": 0}}
 
 
 def judge(top: Path, command: str, words: list[str]) -> None:

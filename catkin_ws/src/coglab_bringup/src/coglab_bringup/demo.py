@@ -7,6 +7,7 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 import time
 from pathlib import Path
 
@@ -62,6 +63,15 @@ class System:
         self._log.close()
 
 
+def say_console(home: Path, limit: float = 30.0) -> None:
+    """Prints where the experimenter's page is, as soon as its node has written it; gives up after `limit` s."""
+    deadline, link = time.monotonic() + limit, home / "console.url"
+    while not link.is_file() and time.monotonic() < deadline:
+        time.sleep(0.2)
+    words = link.read_text().strip() if link.is_file() else f"no address within {limit:.0f} s; see roslaunch.log"
+    print(f"[coglab] console: {words}", flush=True)
+
+
 def _interrupt(*_signal: object) -> None:
     raise KeyboardInterrupt
 
@@ -106,10 +116,14 @@ def main(arguments: list[str]) -> int:
     record_run(top, port, "demo")
     screen = bool(os.environ.get("DISPLAY")) and not options.headless and Path("/usr/bin/rviz").exists()
     launch = [f"seed:={options.seed}", f"rviz:={'true' if screen else 'false'}", f"log_file:={out / 'fri_ticks.csv'}"]
+    launch.append(f"console:={'false' if options.no_console else 'true'}")
+    (out / "ros_home" / "console.url").unlink(missing_ok=True)  # of an earlier demo
     system = System(environment, port, launch, out / "roslaunch.log")
     result: dict = {"commit": commit_of(top), "seed": options.seed, "handovers": []}
     try:
         wait_for_master(system, MASTER_LIMIT)
+        if not options.no_console:
+            threading.Thread(target=say_console, args=(out / "ros_home",), daemon=True).start()
         import rospy
 
         from coglab_bringup.handover import run_handover

@@ -53,7 +53,9 @@ def package_findings(top: Path) -> list[tuple[bool, str]]:
     for group, packages in package_groups(top).items():
         there = installed(packages)
         missing = [package for package in packages if package not in there]
-        if missing and group == "viz":
+        if missing and group == "browser":
+            result.append((True, "no browser is installed (only needed to test the console): ./coglab install browser"))
+        elif missing and group == "viz":
             result.append((True, "rviz is not installed (only needed where there is a screen): ./coglab install viz"))
         elif missing:
             result.append(

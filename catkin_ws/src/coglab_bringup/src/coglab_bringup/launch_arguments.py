@@ -105,6 +105,8 @@ def _rules(sources: Path, objects: Path) -> dict[str, Callable[[str], object]]:
         "fri_period": lambda value: _number(0.001, 0.1, value),
         "fri_address": _address,
         "fri_port": lambda value: _whole(0, 65535, value),
+        "console_port": lambda value: _whole(0, 65535, value),
+        "console_address": _address,
         "people": lambda value: _whole(1, 9, value),
         "krl_convention": lambda value: _one_of(_conventions(sources), value),
         "limits_profile": lambda value: _one_of(_profiles(sources), value),
@@ -113,7 +115,7 @@ def _rules(sources: Path, objects: Path) -> dict[str, Callable[[str], object]]:
         "objects": _folder,
         "recording": _file,
     }
-    for name in ("sim", "split", "rviz", "perfect_perception", "auto_trigger", "recogniser"):
+    for name in ("sim", "split", "rviz", "perfect_perception", "auto_trigger", "recogniser", "console"):
         rules[name] = lambda value: _one_of(boolean, value.lower())
     for name in ("controllers", "dmp_library", "machines", "patterns"):
         rules[name] = _required_file

@@ -1,0 +1,173 @@
+"""A simulated cell of its own for the bench: launching, the page's operator by mouse and by keyboard, what ROS says."""
+
+from __future__ import annotations
+
+import os
+import signal
+import socket
+import subprocess
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import rospkg
+import rospy
+from coglab_console.browser import Browser, press_and_hold
+from coglab_msgs.msg import LwrState, MasterState
+from coglab_msgs.srv import LwrCommand
+from diagnostic_msgs.msg import DiagnosticArray
+from selenium.webdriver.common.action_chains import ActionChains
+from selenium.webdriver.common.by import By
+from selenium.webdriver.common.keys import Keys
+
+READY = 120.0  # s until the hub
+
+
+def free_port() -> int:
+    """A TCP port on loopback."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
+
+
+class Cell:
+    """The launched system; `launch_console` and `end_console` for a console beside it."""
+
+    def __init__(self, console: bool) -> None:
+        self.home = Path(tempfile.mkdtemp(prefix="coglab-bench-"))
+        port = free_port()
+        os.environ.update(
+            ROS_MASTER_URI=f"http://127.0.0.1:{port}",
+            ROS_IP="127.0.0.1",
+            ROS_HOME=str(self.home),
+            ROS_LOG_DIR=str(self.home / "log"),
+            PYTHONUNBUFFERED="1",
+        )
+        words = ["fri_period:=0.010", f"console:={str(console).lower()}", "console_port:=0"]
+        launch = Path(rospkg.RosPack().get_path("coglab_bringup"), "launch", "coglab.launch")
+        self._log = (self.home / "roslaunch.log").open("w")
+        command = ["roslaunch", "-p", str(port), str(launch), *words]
+        self._process = subprocess.Popen(command, stdout=self._log, stderr=subprocess.STDOUT)
+        self._console: subprocess.Popen | None = None
+        self.machine, self.arm = MasterState(), LwrState()
+        self.held_at = 0.0  # s of the bridge's own clock, when the hold latched last
+        self.latencies: list[tuple[float, float]] = []  # (time, latency) s
+        self.answers: list[tuple[float, float]] = []  # (time, mean answer time) s
+
+    def connect(self) -> None:
+        """Becomes a node of it and waits for the hub."""
+        import rosgraph
+
+        end = time.monotonic() + READY
+        while not rosgraph.is_master_online() and time.monotonic() < end:
+            time.sleep(0.2)
+        rospy.init_node("console_bench", disable_signals=True)
+        rospy.Subscriber("/coglab/state", MasterState, lambda message: setattr(self, "machine", message))
+        rospy.Subscriber("/lwr/state", LwrState, self._on_arm, tcp_nodelay=True)
+        rospy.Subscriber("/diagnostics", DiagnosticArray, self._on_diagnostics)
+        self.wait(lambda: self.machine.in_hub and "wait" in self.machine.state, READY, "the hub")
+
+    def _on_arm(self, message: LwrState) -> None:
+        if message.hold_latched and not self.arm.hold_latched:
+            self.held_at = message.header.stamp.to_sec()
+        self.arm = message
+
+    def _on_diagnostics(self, message: DiagnosticArray) -> None:
+        for status in message.status:
+            if status.name.endswith("FRI connection"):
+                values = {pair.key: pair.value for pair in status.values}
+                self.latencies.append((time.monotonic(), float(values["latency (s)"])))
+                self.answers.append((time.monotonic(), float(values["mean answer time (s)"])))
+
+    def wait(self, ready: Callable[[], bool], limit: float, what: str) -> None:
+        """TimeoutError where it does not come."""
+        end = time.monotonic() + limit
+        while not ready():
+            if time.monotonic() > end:
+                raise TimeoutError(
+                    f"{what} did not come within {limit:.0f} s: {self.machine.state}, {self.machine.why}"
+                )
+            time.sleep(0.01)
+
+    @property
+    def leaf(self) -> str:
+        """Label of the active state."""
+        return self.machine.state.rsplit("/", 1)[-1]
+
+    def reset_arm(self) -> None:
+        """Frees the arm's own latch; the machine stays where it is."""
+        rospy.ServiceProxy("/lwr/command", LwrCommand)("reset")
+        self.wait(lambda: not self.arm.hold_latched, 3.0, "the end of the hold")
+
+    def launch_console(self) -> None:
+        """A console beside the cell."""
+        (self.home / "console.url").unlink(missing_ok=True)
+        command = ["rosrun", "coglab_console", "console_node.py", "_port:=0"]
+        self._console = subprocess.Popen(command, stdout=self._log, stderr=subprocess.STDOUT)
+
+    def end_console(self) -> None:
+        """Ends it."""
+        if self._console is not None:
+            self._console.send_signal(signal.SIGINT)
+            self._console.wait(20)
+            self._console = None
+
+    def close(self) -> None:
+        """Ends everything."""
+        self.end_console()
+        self._process.send_signal(signal.SIGINT)
+        self._process.wait(60)
+        self._log.close()
+
+
+class Operator:
+    """Uses the page as a person does, by mouse or by keyboard."""
+
+    def __init__(self, browser: Browser, cell: Cell, pictures: Path) -> None:
+        self.browser, self.cell, self.pictures = browser, cell, pictures
+
+    def button(self, action: str):
+        """The element."""
+        return self.browser.driver.find_element(By.CSS_SELECTOR, f"[data-action={action}]")
+
+    def enabled(self, action: str, limit: float = 20.0) -> None:
+        """Waits until the page lets it be pressed."""
+        self.browser.until(
+            "return !document.querySelector(arguments[0]).hasAttribute('aria-disabled')",
+            limit,
+            f"[data-action={action}]",
+        )
+
+    def press(self, action: str, keyboard: bool) -> None:
+        """One action."""
+        self.enabled(action)
+        if keyboard:
+            number = self.button(action).text.split()[0]
+            self.browser.js("document.activeElement.blur()")
+            ActionChains(self.browser.driver).send_keys(number).send_keys(Keys.ENTER).perform()
+        else:
+            self.button(action).click()
+
+    def stop(self) -> None:
+        """Space."""
+        ActionChains(self.browser.driver).send_keys(Keys.SPACE).perform()
+
+    def do(self, action: str, keyboard: bool, name: str) -> bool:
+        """One action from hub to hub; whether it succeeded."""
+        self.press(action, keyboard)
+        self.cell.wait(lambda: not self.cell.machine.in_hub, 15.0, f"the begin of {action}")
+        time.sleep(1.5)
+        self.browser.picture(self.pictures / f"{name}.png")
+        self.cell.wait(lambda: self.cell.machine.in_hub, 90.0, f"the end of {action}")
+        wanted = "wait_with_object" if action in ("exchange_human_to_robot", "take") else "wait_without_object"
+        return self.cell.leaf == wanted
+
+    def go_on(self) -> None:
+        """Acknowledge, then hold the button of reset, and wait for the hub."""
+        self.cell.wait(lambda: self.cell.leaf == "stopped", 15.0, "stopped")
+        self.browser.until("return document.getElementById('acknowledge').offsetParent !== null", 5.0)
+        self.browser.driver.find_element(By.ID, "acknowledge").click()
+        self.enabled("reset")
+        press_and_hold(self.browser, self.button("reset"), lambda: self.cell.leaf != "stopped", 8.0)
+        self.cell.wait(lambda: self.cell.machine.in_hub and self.cell.leaf.startswith("wait_"), 60.0, "the hub")

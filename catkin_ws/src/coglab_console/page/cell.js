@@ -1,0 +1,77 @@
+// What there is to draw, whatever draws it: plain shapes with their poses in the world, in metres.
+import { store } from './store.js';
+import { compose, linkPoses, IDENTITY } from './kinematics.js';
+
+const COLOURS = { arm: '#e08a2c', joint: '#5b6670', hand: '#39434c', finger: '#6b7680', '': '#8b939b' };
+const SKIN = '#d8a47f';
+const SLEEVE = '#7d93a8';
+const OBJECT = '#009e73';
+const WOOD = '#cdb489';
+const PALM = 'ih2_palm';
+
+/** Shapes that stand still once they are known: { kind, size, pose, colour }. */
+export function fixedShapes() {
+  const shapes = [{ kind: 'box', size: [0.3, 0.3, 0.75], pose: [0, 0, -0.375, 0, 0, 0, 1], colour: '#9aa2aa' }];
+  const board = store.state?.frames.board;
+  if (board) shapes.push({ kind: 'box', size: [0.4, 0.5, 0.02], pose: compose(board, [0, 0, -0.01, 0, 0, 0, 1]), colour: WOOD });
+  return shapes;
+}
+
+/** Shapes of the robot: [{ link, kind, size, pose (in the link), colour }]. */
+export function robotShapes() {
+  const robot = store.docs.model?.robot;
+  if (!robot) return [];
+  return Object.entries(robot.shapes).flatMap(([link, shapes]) => shapes.map((shape) => ({ ...shape, link, colour: COLOURS[shape.of] ?? COLOURS[''] })));
+}
+
+/** Pose of each link of the robot now. */
+export function robotPoses() {
+  const model = store.docs.model;
+  return model?.robot && store.state ? linkPoses(model.robot, model.order, store.state.q) : {};
+}
+
+/** Where the palm of the robot's hand is in the picture, m; null before it is known. */
+export function palmInScene() {
+  return robotPoses()[PALM]?.slice(0, 3) ?? null;
+}
+
+/** A person's right hand in its own frame: palm centre, x toward the robot's side of the grip. */
+export const HAND_SHAPES = [
+  { kind: 'box', size: [0.03, 0.09, 0.1], pose: IDENTITY, colour: SKIN },
+  ...[-0.034, -0.011, 0.011, 0.034].map((y) => ({ kind: 'cylinder', size: [0.009, 0.08], pose: [-0.03, y, 0.06, 0, -0.3, 0, 0.954], colour: SKIN })),
+  { kind: 'cylinder', size: [0.011, 0.06], pose: [-0.03, 0.055, 0.01, 0.38, 0, 0, 0.925], colour: SKIN },
+  { kind: 'cylinder', size: [0.035, 0.26], pose: [0.16, 0, -0.06, 0, 0.79, 0, 0.61], colour: SLEEVE },
+];
+
+/** The object of the next action, or in the hand, as a shape in its own frame (origin: middle of its underside). */
+export function objectShape() {
+  const id = store.docs.status?.machine.object || store.docs.desk?.object || store.docs.status?.machine.fallback;
+  const row = store.docs.objects?.rows.find((one) => one.id === id);
+  if (!row?.shape) return null;
+  const { type, radius, height } = row.shape;
+  if (type === 'cylinder') return { kind: 'cylinder', size: [radius, height], pose: [0, 0, height / 2, 0, 0, 0, 1], colour: OBJECT };
+  if (type === 'sphere') return { kind: 'sphere', size: [radius], pose: [0, 0, radius, 0, 0, 0, 1], colour: OBJECT };
+  return { kind: 'box', size: row.size, pose: [0, 0, row.size[2] / 2, 0, 0, 0, 1], colour: OBJECT };
+}
+
+/** What is known of a frame: seen now, long ago, or never. */
+export function ageWords(role) {
+  const age = store.state?.ages[role];
+  if (age === undefined) return 'not seen';
+  return age < 1 ? `${Math.round(age * 1000)} ms old` : `${age.toFixed(age < 10 ? 1 : 0)} s old`;
+}
+
+/** Path and goal to show: { kind, points, goal }, or null. */
+export function path() {
+  return store.docs.path ?? null;
+}
+
+export function viewWords() {
+  const shown = path();
+  const model = store.docs.model;
+  if (model && !model.robot) return 'No robot_description: the robot is not drawn.';
+  if (store.state && !store.state.live) return 'No joint states: the arm is shown as it was last.';
+  if (!shown) return '';
+  const kind = shown.kind === 'running' ? 'Path of this motion' : 'Path of the next motion, if it began now';
+  return `${kind}: ${shown.primitive}, ${shown.duration.toFixed(1)} s`;
+}

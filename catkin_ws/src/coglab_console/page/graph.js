@@ -1,0 +1,110 @@
+// The graph of a state machine as Graphviz laid it out; active states thick and filled, the last transition in words.
+import { h, setText, svg } from './dom.js';
+import { onDocs, store, on } from './store.js';
+
+const MAIN = '/coglab';
+let drawn = null;
+let parts = {};
+
+function machines() {
+  return Object.keys(store.docs).filter((name) => name.startsWith('graph:') && store.docs[name]).map((name) => name.slice(6));
+}
+
+function pathOf(points) {
+  const [first, ...rest] = points;
+  let text = `M${first}`;
+  for (let i = 0; i + 2 < rest.length; i += 3) text += `C${rest[i]} ${rest[i + 1]} ${rest[i + 2]}`;
+  const left = rest.slice(rest.length - (rest.length % 3));
+  return text + left.map((point) => `L${point}`).join('');
+}
+
+function draw(picture, graph) {
+  picture.replaceChildren();
+  parts = { items: {}, edges: {} };
+  const arrow = svg('marker', { id: 'arrow', viewBox: '0 0 8 8', refX: 7, refY: 4, markerWidth: 7, markerHeight: 7, orient: 'auto-start-reverse' }, svg('path', { d: 'M0 0L8 4L0 8z', fill: '#5c646c' }));
+  picture.append(svg('defs', {}, arrow));
+  for (const box of graph.boxes) picture.append(...shape(box, 'box', box.box[0] + 6, box.box[1] + 13, 'start'));
+  for (const edge of graph.edges) {
+    const line = svg('path', { class: 'edge', d: pathOf(edge.points), 'marker-end': 'url(#arrow)' }, svg('title', {}, edge.outcomes));
+    parts.edges[`${edge.from} ${edge.to}`] = line;
+    picture.append(line);
+  }
+  for (const node of graph.nodes) {
+    const [x, y, w, high] = node.box;
+    picture.append(...shape(node, 'node', x + w / 2, y + high / 2 + 4, 'middle'));
+  }
+  drawn = graph;
+}
+
+function shape(item, kind, x, y, anchor) {
+  const [left, top, width, height] = item.box;
+  const rect = svg('rect', { class: kind, x: left, y: top, width, height, rx: 4 });
+  const text = svg('text', { x, y, 'text-anchor': anchor }, item.label);
+  parts.items[item.path] = [rect, text, item.box];
+  return [rect, text];
+}
+
+/** The part of the picture to show: the innermost active container, or all of it. */
+function frameOf(active, follow) {
+  const whole = [0, 0, ...drawn.size];
+  if (!follow || !active.length) return whole;
+  const deepest = active.reduce((a, b) => (b.split('/').length > a.split('/').length ? b : a));
+  const box = drawn.boxes.filter((one) => deepest.startsWith(`${one.path}/`)).sort((a, b) => b.path.length - a.path.length)[0];
+  const leaf = parts.items[deepest]?.[2];
+  if (!box || !leaf) return whole;
+  const [x, y, w, high] = box.box;
+  const limit = [520, 300]; // larger than this nobody can read it: the surroundings of the state instead
+  if (w <= limit[0] && high <= limit[1]) return [x - 6, y - 6, w + 12, high + 12];
+  const width = Math.min(w, limit[0]);
+  const height = Math.min(high, limit[1]);
+  const clamp = (value, low, top) => Math.max(low, Math.min(value, Math.max(low, top)));
+  return [clamp(leaf[0] + leaf[2] / 2 - width / 2, x, x + w - width) - 4, clamp(leaf[1] + leaf[3] / 2 - height / 2, y, y + high - height) - 4, width + 8, height + 8];
+}
+
+export function showGraph(parent) {
+  const select = h('select', { 'aria-label': 'State machine to show', onchange: update });
+  const extent = h('select', { 'aria-label': 'How much of it', onchange: update }, h('option', { value: 'follow' }, 'follow'), h('option', { value: 'whole' }, 'whole'));
+  const crumbs = h('p', { class: 'crumbs', 'aria-live': 'polite' });
+  const last = h('p', { class: 'last' });
+  const picture = svg('svg', { role: 'img', 'aria-label': 'Graph of the state machine' });
+  parent.append(h('header', {}, h('label', {}, select), extent), crumbs, picture, last);
+
+  function names() {
+    const known = machines();
+    const wanted = select.value;
+    if (known.join() !== [...select.options].map((option) => option.value).join()) {
+      select.replaceChildren(...known.map((name) => h('option', { value: name }, name.replace(/^\//, ''))));
+      select.value = known.includes(wanted) ? wanted : known.includes(MAIN) ? MAIN : known[0] ?? '';
+    }
+    return select.value;
+  }
+
+  function update() {
+    const name = names();
+    const graph = store.docs[`graph:${name}`];
+    if (!graph) {
+      setText(crumbs, 'No state machine is on this master.');
+      return;
+    }
+    if (graph !== drawn) draw(picture, graph);
+    const { active, last: step } = store.docs.active?.[name] ?? { active: [], last: {} };
+    for (const [path, [rect, text]] of Object.entries(parts.items)) {
+      const on = active.includes(path) || active.some((one) => one.startsWith(`${path}/`));
+      rect.classList.toggle('active', on);
+      text.classList.toggle('active', on);
+    }
+    for (const line of Object.values(parts.edges)) line.classList.remove('last');
+    if (step.path) {
+      parts.edges[`${step.path}/${step.from} ${step.path}/${step.to}`]?.classList.add('last');
+      setText(last, `${step.from}${step.outcome ? ` [${step.outcome}]` : ''} → ${step.to}${step.reason ? `: ${step.reason}` : ''}`);
+    } else setText(last, '');
+    const deepest = active.reduce((a, b) => (b.length > a.length ? b : a), '');
+    setText(crumbs, graph.problem || deepest.split('/').filter(Boolean).slice(1).join(' › ') || 'not active');
+    picture.setAttribute('viewBox', frameOf(active, extent.value === 'follow').join(' '));
+  }
+
+  on('doc', (name) => {
+    if (name.startsWith('graph:') || name === 'active') update();
+  });
+  onDocs(['active'], update);
+}

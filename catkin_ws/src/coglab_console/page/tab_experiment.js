@@ -1,0 +1,87 @@
+// Experiment: participant, conditions, order of trials, notes. One file per session, written by the server.
+import { h, setText, table } from './dom.js';
+import { onDocs, operating, store } from './store.js';
+import { command } from './link.js';
+import { clock } from './log.js';
+
+export function field(label, input) {
+  return h('label', {}, label, input);
+}
+
+/** A button that sends a command and shows the answer in `told`. */
+export function sender(label, told, request) {
+  return h('button', { type: 'button', onclick: async () => {
+    const [name, args] = request();
+    setText(told, (await command(name, args)).message);
+  } }, label);
+}
+
+function form(told) {
+  const participant = h('input', { type: 'text', maxlength: 32, autocomplete: 'off', placeholder: 'P07' });
+  const number = h('input', { type: 'number', min: 0, max: 9999, value: 0 });
+  const conditions = h('input', { type: 'text', value: 'receive, give', maxlength: 400 });
+  const repetitions = h('input', { type: 'number', min: 1, max: 50, value: 5 });
+  const order = h('select', {}, ['latin_square', 'random', 'as_listed'].map((word) => h('option', { value: word }, word.replace('_', ' '))));
+  const begin = sender('Begin the session', told, () => ['session_begin', {
+    participant: participant.value.trim(),
+    number: Number(number.value),
+    conditions: conditions.value.split(',').map((word) => word.trim()).filter(Boolean),
+    repetitions: Number(repetitions.value),
+    order: order.value,
+  }]);
+  return h('form', { onsubmit: (event) => event.preventDefault() },
+    field('Participant (a pseudonym, never a name)', participant), field('Number of the participant (row of the Latin square, seed)', number),
+    field('Conditions, separated by commas', conditions), field('Repetitions of each', repetitions), field('Order', order), h('div', { class: 'row' }, begin));
+}
+
+function running(told, session) {
+  const next = session.trials[session.position];
+  const rows = session.trials.map((trial, i) => [i + 1, trial.condition, i === session.position && session.running ? 'under way' : trial.outcome || '·']);
+  const around = rows.slice(Math.max(0, session.position - 4), session.position + 9);
+  return [
+    h('p', {}, `Session of ${session.participant}: ${session.position} of ${session.trials.length} trials. File: ${session.file}`),
+    h('div', { class: 'row' },
+      sender(next ? `Begin trial ${session.position + 1}: ${next.condition}` : 'All trials are done', told, () => ['trial_begin', {}]),
+      ...['done', 'repeat', 'skipped'].map((outcome) => sender(`Trial ${outcome}`, told, () => ['trial_end', { outcome }])),
+      sender('End the session', told, () => ['session_end', {}])),
+    table(['Trial', 'Condition', 'Outcome'], around, 'Trials around the present one'),
+  ];
+}
+
+export function experimentPage(page) {
+  page.className = 'page two';
+  const told = h('p', { 'aria-live': 'polite' });
+  const left = h('div');
+  const text = h('textarea', { id: 'note', rows: 3, maxlength: 500 });
+  const notes = h('div');
+  const add = sender('Add the note', told, () => {
+    const note = text.value.trim();
+    text.value = '';
+    return ['note', { text: note }];
+  });
+  page.append(
+    h('div', {}, h('h2', {}, 'Session'), left, told),
+    h('div', {}, h('h2', {}, 'Notes'), field('A note with the time of now (M)', text), h('div', { class: 'row' }, add), notes));
+  let shown = '';
+  const draw = () => {
+    const session = store.docs.desk?.experiment;
+    if (!session) return;
+    const key = JSON.stringify([session.participant, session.position, session.running, operating()]);
+    if (key !== shown) {
+      shown = key;
+      left.replaceChildren(...(session.participant ? running(told, session) : [form(told)]));
+      if (!operating()) left.prepend(h('p', {}, 'You watch: only the operator begins and ends sessions and trials.'));
+    }
+    notes.replaceChildren(table(['Time', 'Who', 'Note'], session.notes.slice().reverse().map((note) => [clock(note.stamp), note.who, note.text]), 'Notes'));
+  };
+  draw();
+  return { docs: { desk: draw } };
+}
+
+/** Fits the band at the top. */
+export function showSession(place) {
+  onDocs(['desk'], () => {
+    const session = store.docs.desk?.experiment;
+    setText(place, session?.participant ? `session ${session.participant} · trial ${Math.min(session.position + 1, session.trials.length)} of ${session.trials.length}${session.running ? ' (under way)' : ''}` : 'no session');
+  });
+}

@@ -1,0 +1,84 @@
+// Health: diagnostics tree, versions, parameters, browsers; and Help.
+import { h, mark, setText, table } from './dom.js';
+import { onDocs, operating, store } from './store.js';
+import { command } from './link.js';
+import { viewKind } from './view.js';
+import { actionButton } from './actions.js';
+
+const LEVELS = [['ok', 'ok'], ['warn', 'warning'], ['fault', 'error'], ['idle', 'silent']];
+
+/** Always a held button: what it does needs a second thought. */
+function heavy(label, args, told) {
+  const blockedBy = () => (operating() ? store.docs.desk?.reasons.calibrate : 'only the operator calibrates');
+  return actionButton(label, { blockedBy, mustHold: () => true, request: () => ['calibrate', args], tell: (text) => setText(told, text) });
+}
+
+export function healthPage(page) {
+  page.className = 'page two';
+  const tree = h('div');
+  const versions = h('div');
+  const parameters = h('div');
+  const told = h('p', { 'aria-live': 'polite' });
+  const open = new Set();
+  const filter = h('input', { type: 'search', placeholder: 'part of a name', oninput: () => show() });
+  let known = [];
+  const show = () => parameters.replaceChildren(table(['Parameter', 'Value'], known.filter(([name]) => name.includes(filter.value)).slice(0, 150), 'Parameters'));
+  const read = h('button', { type: 'button', onclick: async () => {
+    known = (await command('parameters')).data ?? [];
+    show();
+  } }, 'Read the parameters');
+  page.append(h('div', {}, h('h2', {}, 'Diagnostics'), tree),
+    h('div', {}, h('h2', {}, 'Versions and browsers'), versions, h('h2', {}, 'Hand'), h('p', {}, 'A complete or forced calibration opens the hand, whatever it holds: hold the button.'), h('div', { class: 'row' }, heavy('Complete calibration', { mode: 'complete' }, told), heavy('Forced calibration', { mode: 'complete', force: true }, told)), told,
+      h('h2', {}, 'Parameters'), h('div', { class: 'row' }, read, h('label', {}, 'Filter', filter)), parameters));
+  const draw = () => {
+    const { rows = [], versions: words = {}, browsers = [] } = store.docs.health ?? {};
+    const focused = document.activeElement?.dataset?.name;
+    tree.replaceChildren(...rows.map((row) => {
+      const [level, word] = LEVELS[row.level] ?? LEVELS[2];
+      const button = h('summary', { 'data-name': row.name }, mark(level), `${row.name}: ${word}, ${row.message}`);
+      const item = h('details', { ontoggle: () => (item.open ? open.add(row.name) : open.delete(row.name)) }, button, table(['Value', ''], row.values, row.name));
+      item.open = open.has(row.name);
+      return item;
+    }));
+    if (focused) [...tree.querySelectorAll('summary')].find((one) => one.dataset.name === focused)?.focus();
+    const more = [['view', viewKind()], ['browsers', browsers.map((one) => `${one.name}${one.name === store.you ? ' (you)' : ''}`).join(', ')]];
+    versions.replaceChildren(table(['', ''], [...Object.entries(words), ...more], 'Versions'));
+  };
+  draw();
+  return { docs: { health: draw } };
+}
+
+const KEYS = [
+  ['Space', 'STOP, everywhere; in a text field Ctrl+Space'], ['1 … 8', 'to an action; Enter triggers it, or is held where a held button is asked for'],
+  ['O', 'to the list of objects'], ['M', 'to a new note'], ['?', 'this page'], ['Tab, Shift+Tab', 'through everything'], ['← →', 'between pages, with the focus on one'],
+];
+
+export function helpPage(page) {
+  page.className = 'page two';
+  const told = h('p', { 'aria-live': 'polite' });
+  const link = h('input', { type: 'text', readonly: true, 'aria-label': 'Link for one more browser' });
+  const invite = h('button', { type: 'button', onclick: async () => {
+    const answer = await command('invite');
+    link.value = answer.data ?? '';
+    setText(told, answer.message);
+  } }, 'A link for one more browser');
+  page.append(
+    h('div', {}, h('h2', {}, 'Keys'), table(['Key', 'Does'], KEYS, 'Keys'),
+      h('h2', {}, 'After a stop'), h('p', {}, 'STOP brakes the arm, latches, and ends the action; the hand keeps what it holds. Then two acts: acknowledge the cause, and hold the button of the next motion for 0.8 s. Nothing is ever reset by itself.'),
+      h('h2', {}, 'What this is not'), h('p', {}, 'STOP MOTION is software. It has no safety function: the red button of the robot controller is the emergency stop. Whether the robot is real or simulated is decided when the system is launched, never here.')),
+    h('div', {}, h('h2', {}, 'One operator'), h('p', {}, 'One browser operates, all others watch; STOP and notes are everybody’s. Taking over is announced to the operator, who has 3 s to keep the control.'),
+      h('div', { class: 'row' }, takeOver(told), invite), h('label', {}, 'To be used once', link), told,
+      h('h2', {}, 'Who can move the robot'), h('p', {}, 'This page asks for a link with a one-time token, and listens on this computer alone unless it was launched otherwise. ROS 1 itself has no authentication: whoever reaches the ROS master can do everything, without this page. Keep the master on loopback or on a private network. From elsewhere: ssh -L 8790:127.0.0.1:8790 LAB-PC.'),
+      h('h2', {}, 'Words of the picture'), h('p', {}, 'Orange: arm. Green: object. Pink: goal. Thin sky-blue path: where the next motion would go; thick blue: the motion under way. Sky-blue lines: workspace.')));
+  return {};
+}
+
+/** Take over, or keep the control while another browser takes over. */
+export function takeOver(told) {
+  const button = h('button', { type: 'button', onclick: async () => setText(told, (await command(operating() ? 'keep' : 'take_over')).message) }, 'Take over');
+  onDocs(['desk'], () => {
+    const claimant = store.docs.desk?.roles.claimant;
+    setText(button, operating() ? (claimant ? `Keep the control (${claimant} takes over)` : 'You operate') : 'Take over');
+  });
+  return button;
+}

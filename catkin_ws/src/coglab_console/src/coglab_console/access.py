@@ -1,0 +1,141 @@
+"""Who may speak to the console: one-time tokens, sessions, and the lists of hosts and origins. No web library here.
+
+A browser comes once with a token that the terminal printed (/?t=TOKEN) and gets a session, which its cookie carries.
+Every request must name a host of the list (against DNS rebinding); one that changes something, and the WebSocket,
+must also come from an origin of the list and, a POST, carry a header that a foreign page cannot set.
+"""
+
+from __future__ import annotations
+
+import hmac
+import secrets
+import time
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
+
+CSRF_HEADER = "X-CogLab-Console"
+MAX_SESSIONS = 32
+SESSION_LIFE = 24 * 3600.0
+"""s without a request after which a session is forgotten"""
+
+
+class Denied(Exception):
+    """A request that is refused: HTTP status and one sentence."""
+
+    def __init__(self, status: int, sentence: str) -> None:
+        super().__init__(sentence)
+        self.status = status
+
+
+class TokenBucket:
+    """So many requests a second, and so many at once; more are refused."""
+
+    def __init__(self, rate: float, burst: float, now: Callable[[], float] = time.monotonic) -> None:
+        self._rate, self._burst, self._now = rate, burst, now
+        self._level, self._since = burst, now()
+
+    def take(self) -> bool:
+        """Whether one more fits."""
+        now = self._now()
+        self._level = min(self._burst, self._level + (now - self._since) * self._rate)
+        self._since = now
+        if self._level < 1.0:
+            return False
+        self._level -= 1.0
+        return True
+
+
+@dataclass
+class Session:
+    """One browser; `name` is what the others see of it."""
+
+    key: str
+    name: str
+    seen: float
+    requests: TokenBucket
+    stops: TokenBucket
+    sockets: int = 0
+    last_socket: float = field(default=-1e9)
+    """when its last WebSocket closed, s of the steady clock"""
+
+
+def allowed_hosts(address: str, port: int, more: Iterable[str] = ()) -> tuple[str, ...]:
+    """Values of the header Host that are served: where the console listens, loopback (a tunnel), and what was named."""
+    names = {"127.0.0.1", "localhost"} | ({address} if address not in ("0.0.0.0", "::") else set())
+    found = {f"{name}:{port}" for name in names} | {host if ":" in host else f"{host}:{port}" for host in more}
+    return tuple(sorted(found))
+
+
+class Access:
+    """Tokens and sessions of one launch; both live in memory alone. Called from one thread."""
+
+    def __init__(self, hosts: Iterable[str], now: Callable[[], float] = time.monotonic) -> None:
+        self.hosts = frozenset(hosts)
+        self.origins = frozenset(f"http://{host}" for host in self.hosts)
+        self._now = now
+        self._tokens: list[str] = []
+        self._sessions: dict[str, Session] = {}
+        self._count = 0
+        self.refused = TokenBucket(200.0, 200.0, now)
+        """of requests without a session: more than these are answered with 429"""
+
+    def new_token(self) -> str:
+        """A token that makes one session; at most eight wait, older ones end."""
+        token = secrets.token_urlsafe(24)
+        self._tokens = [*self._tokens[-7:], token]
+        return token
+
+    def redeem(self, token: str) -> Session | None:
+        """The session for a token, once."""
+        spent = next((known for known in self._tokens if hmac.compare_digest(known.encode(), token.encode())), None)
+        if spent is None:
+            return None
+        self._tokens.remove(spent)
+        return self._new_session()
+
+    def _new_session(self) -> Session:
+        now = self._now()
+        for key in [key for key, one in self._sessions.items() if now - one.seen > SESSION_LIFE and not one.sockets]:
+            del self._sessions[key]
+        if len(self._sessions) >= MAX_SESSIONS:
+            idle = [one for one in self._sessions.values() if not one.sockets]
+            if not idle:
+                raise Denied(503, f"{MAX_SESSIONS} browsers are connected; close one of them, then ask for a new link")
+            del self._sessions[min(idle, key=lambda one: one.seen).key]
+        self._count += 1
+        limits = TokenBucket(40.0, 120.0, self._now), TokenBucket(50.0, 50.0, self._now)
+        session = Session(secrets.token_urlsafe(24), f"browser {self._count}", now, *limits)
+        self._sessions[session.key] = session
+        return session
+
+    def sessions(self) -> list[Session]:
+        """All of them."""
+        return list(self._sessions.values())
+
+    def check_host(self, headers: Mapping[str, str]) -> None:
+        """Every request."""
+        host = headers.get("Host", "")
+        if host not in self.hosts:
+            raise Denied(
+                403, f"host '{host[:80]}' is not served; this console answers to {', '.join(sorted(self.hosts))}"
+            )
+
+    def check_origin(self, headers: Mapping[str, str]) -> None:
+        """What changes something, and the WebSocket."""
+        origin = headers.get("Origin")
+        if origin not in self.origins:
+            came = f"'{origin[:80]}'" if origin else "none"
+            raise Denied(403, f"origin {came} may not ask for this; expected the console's own page")
+
+    def check_csrf(self, headers: Mapping[str, str]) -> None:
+        """A POST."""
+        if headers.get(CSRF_HEADER) != "1":
+            raise Denied(403, f"the header {CSRF_HEADER}: 1 is missing; only the console's own page sends it")
+
+    def session_of(self, key: str | None) -> Session:
+        """The session of a cookie."""
+        session = self._sessions.get(key or "")
+        if session is None:
+            raise Denied(401, "no session: open the link that the terminal printed; a new one is in console.url")
+        session.seen = self._now()
+        return session

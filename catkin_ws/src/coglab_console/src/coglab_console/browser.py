@@ -1,0 +1,129 @@
+"""Debian's chromium, without a screen, for tests, benches and pictures of the console (package group `browser`)."""
+
+from __future__ import annotations
+
+import shutil
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+SIZE = (1280, 720)
+OPTIONS = (
+    "--headless=new",
+    "--no-sandbox",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-sync",
+    "--disable-component-update",
+    "--disable-dev-shm-usage",
+    "--hide-scrollbars=false",
+    "--force-device-scale-factor=1",
+)
+SOFTWARE_GL = ("--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist")
+NO_GL = ("--disable-gpu", "--disable-3d-apis")
+
+
+class Browser:
+    """One browser with a profile of its own; `driver` is selenium's. Closes with the context."""
+
+    def __init__(self, webgl: bool = True, size: tuple[int, int] = SIZE) -> None:
+        from selenium import webdriver
+
+        options = webdriver.ChromeOptions()
+        self._profile = tempfile.mkdtemp(prefix="coglab-browser-")
+        for word in (*OPTIONS, *(SOFTWARE_GL if webgl else NO_GL), f"--user-data-dir={self._profile}"):
+            options.add_argument(word)
+        options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
+        service = webdriver.chrome.service.Service("/usr/bin/chromedriver")
+        self.driver = webdriver.Chrome(service=service, options=options)
+        self.driver.set_script_timeout(20)
+        # the page itself gets this size, whatever the window's frame takes
+        self.driver.execute_cdp_cmd(
+            "Emulation.setDeviceMetricsOverride",
+            {"width": size[0], "height": size[1], "deviceScaleFactor": 1, "mobile": False},
+        )
+
+    def __enter__(self) -> Browser:
+        return self
+
+    def __exit__(self, *_error: object) -> None:
+        try:
+            self.driver.quit()
+        finally:
+            shutil.rmtree(self._profile, ignore_errors=True)
+
+    def open(self, link: str, limit: float = 30.0) -> None:
+        """The console at this one-time link; returns when it is live and shows the robot."""
+        self.driver.get(link)
+        self.until(
+            "return coglab.state() !== null && coglab.docs().desk !== undefined && coglab.view() !== 'none'", limit
+        )
+
+    def js(self, script: str, *arguments: Any) -> Any:
+        """Runs a function body in the page and returns its value."""
+        return self.driver.execute_script(script, *arguments)
+
+    def until(self, script: str, limit: float, *arguments: Any) -> Any:
+        """Waits until the script returns something true. TimeoutError after `limit` s, with what the page shows."""
+        end = time.monotonic() + limit
+        while True:
+            try:
+                value = self.js(script, *arguments)
+                if value:
+                    return value
+                problem = repr(value)
+            except Exception as error:  # the page is not there yet
+                problem = str(error).splitlines()[0]
+            if time.monotonic() > end:
+                raise TimeoutError(f"not within {limit:.0f} s: {script} ({problem}); {self.summary()}")
+            time.sleep(0.1)
+
+    def summary(self) -> str:
+        """What the page says, for a message."""
+        try:
+            return str(self.js("return document.body.innerText.slice(0, 600)"))
+        except Exception as error:
+            return str(error).splitlines()[0]
+
+    def tab(self, name: str) -> None:
+        """Goes to a page of the console."""
+        self.js("document.getElementById('tab-' + arguments[0]).click()", name)
+
+    def picture(self, path: Path) -> None:
+        """Keeps what is seen now."""
+        path.parent.mkdir(parents=True, exist_ok=True)
+        self.driver.save_screenshot(str(path))
+
+    def complaints(self) -> list[str]:
+        """Warnings and errors of the page's console since the last call."""
+        return [row["message"] for row in self.driver.get_log("browser") if row["level"] in ("SEVERE", "WARNING")]
+
+
+def fresh_link(home: Path, used: str = "", limit: float = 30.0) -> str:
+    """The link in console.url of this ROS_HOME, another one than `used`."""
+    end = time.monotonic() + limit
+    path = home / "console.url"
+    while time.monotonic() < end:
+        link = path.read_text().strip() if path.is_file() else ""
+        if link and link != used:
+            return link
+        time.sleep(0.1)
+    raise TimeoutError(f"no new link in {path} within {limit:.0f} s; does the console run?")
+
+
+def press_and_hold(browser: Browser, element: Any, done: Callable[[], bool], limit: float = 5.0) -> None:
+    """Holds a button with the mouse until `done()`. TimeoutError after `limit` s."""
+    from selenium.webdriver.common.action_chains import ActionChains
+
+    ActionChains(browser.driver).move_to_element(element).click_and_hold().perform()
+    end = time.monotonic() + limit
+    try:
+        while not done():
+            if time.monotonic() > end:
+                raise TimeoutError(f"holding the button did nothing within {limit:.0f} s; {browser.summary()}")
+            time.sleep(0.05)
+    finally:
+        ActionChains(browser.driver).release().perform()

@@ -1,0 +1,95 @@
+"""The closed list of commands with a JSON Schema each. What is not here cannot be asked for by a browser."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import jsonschema
+
+STARTS = ("initialise", "reset", "exchange_human_to_robot", "exchange_robot_to_human", "take", "put")
+"""Actions of the service coglab/start"""
+_OBJECT = {"type": "string", "pattern": "^([a-z][a-z0-9_]{0,31})?$"}
+_NAME = {"type": "string", "pattern": "^[A-Za-z0-9_./-]{1,64}$"}
+_LABEL = {"type": "string", "pattern": "^[A-Za-z0-9_ .-]{1,40}$"}
+
+
+class BadCommand(Exception):
+    """Not in the list, or its arguments do not fit; the sentence says what was expected and what came."""
+
+
+@dataclass(frozen=True)
+class Command:
+    """`operator`: only the operator may ask for it; `motion`: it sets the arm or the hand in motion."""
+
+    name: str
+    about: str
+    properties: dict[str, Any]
+    required: tuple[str, ...] = ()
+    operator: bool = True
+    motion: bool = False
+
+    def schema(self) -> dict[str, Any]:
+        """JSON Schema of the arguments."""
+        return {
+            "type": "object",
+            "additionalProperties": False,
+            "properties": self.properties,
+            "required": list(self.required),
+        }
+
+
+_ALL = (
+    Command("stop", "brake, latch, end the action", {}, operator=False),
+    Command("note", "a note with the time of now", {"text": {"type": "string", "minLength": 1, "maxLength": 500}},
+            ("text",), operator=False),
+    Command("take_over", "become the operator", {}, operator=False),
+    Command("keep", "stay the operator while another browser takes over", {}),
+    Command("invite", "a link for one more browser", {}),
+    Command("parameters", "what the parameter server holds", {}, operator=False),
+    Command("acknowledge", "the cause of the stop was read", {}),
+    Command("start", "an action of the state machine", {"action": {"enum": list(STARTS)}, "object_id": _OBJECT},
+            ("action",), motion=True),
+    Command("calibrate", "the hand", {"mode": {"enum": ["fast", "complete"]}, "force": {"type": "boolean"}},
+            ("mode",), motion=True),
+    Command("home", "the arm to its home posture", {}, motion=True),
+    Command("speed_scale", "slows the references down", {"value": {"type": "number", "minimum": 0, "maximum": 1}},
+            ("value",)),
+    Command("select_object", "the object of the next action", {"object_id": _OBJECT}, ("object_id",)),
+    Command("session_begin", "a session with a participant", {
+        "participant": {"type": "string", "pattern": "^[A-Za-z0-9_-]{1,32}$"},
+        "number": {"type": "integer", "minimum": 0, "maximum": 9999},
+        "conditions": {"type": "array", "minItems": 1, "maxItems": 12, "uniqueItems": True, "items": _LABEL},
+        "repetitions": {"type": "integer", "minimum": 1, "maximum": 50},
+        "order": {"enum": ["as_listed", "latin_square", "random"]},
+    }, ("participant", "conditions", "repetitions", "order")),
+    Command("session_end", "closes the session's file", {}),
+    Command("trial_begin", "the next trial of the order", {}),
+    Command("trial_end", "the trial is over", {"outcome": {"enum": ["done", "repeat", "skipped"]}}, ("outcome",)),
+    Command("contact_learn", "noise of the torques from 5 s at rest", {}),
+    Command("contact_arm", "the contact detector, to try it", {
+        "mode": {"enum": ["contact", "off"]},
+        "k": {"type": "number", "minimum": 3, "maximum": 50},
+        "timeout": {"type": "number", "minimum": 1, "maximum": 60},
+        "joints": {"type": "array", "maxItems": 7, "uniqueItems": True,
+                   "items": {"type": "integer", "minimum": 1, "maximum": 7}},
+    }, ("mode",)),
+    Command("objects_reload", "reads the object files again", {}),
+    Command("feedback", "one feedback controller", {
+        "verb": {"enum": ["enable", "disable", "pause", "resume"]}, "name": _NAME}, ("verb", "name")),
+    Command("feedback_order", "execution order of the feedback controllers", {
+        "names": {"type": "array", "minItems": 1, "maxItems": 64, "items": _NAME}}, ("names",)),
+)  # fmt: skip
+COMMANDS = {command.name: command for command in _ALL}
+_VALIDATORS = {command.name: jsonschema.Draft7Validator(command.schema()) for command in _ALL}
+
+
+def judge(name: Any, arguments: Any) -> Command:
+    """The command; BadCommand if there is none of that name or its arguments do not fit the schema."""
+    if not isinstance(name, str) or name not in COMMANDS:
+        raise BadCommand(f"there is no command '{str(name)[:40]}'; there are: {', '.join(COMMANDS)}")
+    error = jsonschema.exceptions.best_match(_VALIDATORS[name].iter_errors(arguments))
+    if error is not None:
+        where = ".".join(str(part) for part in error.absolute_path)
+        raise BadCommand(f"{name}{': ' + where if where else ''}: {error.message[:200]}")
+    return COMMANDS[name]

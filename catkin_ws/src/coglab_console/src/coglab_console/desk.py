@@ -1,0 +1,230 @@
+"""What the console does with a command, without ROS and without a web library: who may, when, and what is written down.
+
+The robot is reached through a Backend; the node has the real one, tests have a double.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Awaitable, Callable
+from pathlib import Path
+from typing import Any, Protocol
+
+from .commands import STARTS, BadCommand, judge
+from .events import EventLog
+from .experiment import Experiment, ExperimentError
+from .fan_out import Documents
+from .gates import MotionGuard, Standing, reasons
+from .hold import HeldButton
+from .roles import Roles
+
+IN_TRIAL = ("contact_arm", "feedback", "feedback_order")
+"""Changes of limits, gains or thresholds: not while an action or a trial is under way"""
+
+
+class Answer(dict):
+    """{"success", "message"} and, where a command gives data, "data"."""
+
+    def __init__(self, success: bool, message: str, data: Any = None) -> None:
+        super().__init__(success=success, message=message)
+        if data is not None:
+            self["data"] = data
+
+
+class Backend(Protocol):
+    """The robot as the desk sees it."""
+
+    real: bool
+
+    def standing(self) -> Standing:
+        """How it stands, from the newest messages; never waits."""
+
+    def stop(self, who: str) -> None:
+        """Brake, latch, end the action; returns at once, the outcome comes as events."""
+
+    def call(self, name: str, arguments: dict) -> Awaitable[Answer]:
+        """A command of the list that needs the robot; ends within its time limit."""
+
+
+class Desk:
+    """Roles, guards and the open session of one console. Called from the event loop alone."""
+
+    def __init__(
+        self,
+        backend: Backend,
+        events: EventLog,
+        documents: Documents,
+        folder: Path,
+        now: Callable[[], float],
+        invite: Callable[[], str],
+    ) -> None:
+        self.backend, self.events, self.documents = backend, events, documents
+        self._invite = invite
+        self.roles = Roles(lambda text, level: events.add("control", text, level))
+        self.guard = MotionGuard(backend.real)
+        self.experiment = Experiment(folder, now, lambda text: events.add("experiment", text, "warning"))
+        self.object_id = ""
+        self._held: dict[str, HeldButton] = {}
+        self._firing: set[str] = set()
+
+    # --- from the browsers ------------------------------------------------------------------------------------
+
+    def stop(self, who: str) -> Answer:
+        """STOP: from anybody, any number of times."""
+        self.backend.stop(who)
+        self.guard.stop(f"{who} pressed STOP")
+        self.experiment.record("stop", who=who)
+        self.tick()
+        return Answer(True, "STOP was sent to the arm and to the brain")
+
+    async def command(self, who: str, name: Any, arguments: Any) -> Answer:
+        """One command of the list by the browser `who`."""
+        refusal = self._refusal(who, name, arguments)
+        if refusal:
+            return Answer(False, refusal)
+        if name == "stop":
+            return self.stop(who)
+        if self.guard.guarded(name, arguments):
+            return Answer(False, "press and hold the button for 0.8 s")
+        return await self._perform(who, name, arguments)
+
+    async def held(self, who: str, name: Any, arguments: Any) -> Answer | None:
+        """One message of a held button; None while nothing has come of it."""
+        refusal = self._refusal(who, name, arguments)
+        if refusal:
+            self.released(who)
+            return Answer(False, refusal)
+        button = self._held.setdefault(who, HeldButton())
+        if not button.held((name, sorted(arguments.items(), key=str))) or who in self._firing:
+            return None
+        self._firing.add(who)
+        try:
+            answer = await self._perform(who, name, arguments)
+        finally:
+            self._firing.discard(who)
+        return answer
+
+    def released(self, who: str) -> None:
+        """The held button went up, or the connection of its browser went away."""
+        self._held.pop(who, None)
+
+    def connected(self, who: str) -> None:
+        """A browser's first connection."""
+        self.roles.connected(who)
+        self.tick()
+
+    def disconnected(self, who: str) -> None:
+        """A browser's last connection closed."""
+        self.released(who)
+        self.roles.disconnected(who)
+        self.tick()
+
+    # --- from the robot ---------------------------------------------------------------------------------------
+
+    def result(self, row: dict) -> None:
+        """An action of the state machine has ended."""
+        self.experiment.record("result", **{key: row[key] for key in row if key not in ("type", "stamp", "trial")})
+
+    def observe(self, stopped: bool, cause: str) -> None:
+        """Whether the arm or the machine stands after a stop, and why."""
+        if self.guard.observe(stopped, cause):
+            self.events.add("stop", f"stopped: {cause or 'no reason was told'}", "fault")
+            self.tick()
+
+    def tick(self) -> None:
+        """Several times a second: what every browser is shown of all this."""
+        self.roles.tick()
+        now = self.backend.standing()
+        if now.object_id:
+            self.object_id = now.object_id
+        self.documents.put(
+            "desk",
+            {
+                "roles": self.roles.view(),
+                "reasons": reasons(now, self.guard),
+                "guard": {
+                    "cause": self.guard.cause,
+                    "unacknowledged": self.guard.unacknowledged,
+                    "hold": self.guard.needs_hold,
+                },
+                "object": self.object_id,
+                "experiment": self.experiment.view(),
+            },
+        )
+
+    # --- inside -----------------------------------------------------------------------------------------------
+
+    def _refusal(self, who: str, name: Any, arguments: Any) -> str:
+        """Why this is not done; empty if it is."""
+        try:
+            command = judge(name, arguments)
+        except BadCommand as error:
+            return str(error)
+        if command.operator and who != self.roles.operator:
+            return f"{who} watches; {self.roles.operator or 'nobody'} is the operator: take over first"
+        now = self.backend.standing()
+        if command.motion:
+            button = arguments["action"] if name == "start" else name
+            reason = reasons(now, self.guard)[button]
+            if reason:
+                return f"{button}: {reason}"
+        under_way = now.master_alive and not now.in_hub
+        if name in IN_TRIAL and (under_way or self.experiment.running):
+            return f"{name}: not while an action or a trial is under way"
+        return ""
+
+    async def _perform(self, who: str, name: str, arguments: dict) -> Answer:
+        try:
+            answer = self._own(who, name, arguments)
+        except ExperimentError as error:
+            answer = Answer(False, str(error))
+        except OSError as error:
+            answer = Answer(False, f"the session's file cannot be written: {error}")
+        if answer is None:
+            if name == "start" and arguments["action"] in STARTS[2:]:
+                arguments = {"object_id": self.object_id, **arguments}
+            answer = await self.backend.call(name, arguments)
+            if answer["success"] and judge(name, {**arguments}).motion:
+                self.guard.moved()
+        if name not in ("parameters", "note"):
+            words = " ".join(str(value) for value in arguments.values())
+            told = f"{who}: {name} {words}: {answer['message']}".replace(" :", ":")
+            self.events.add("command", told, "info" if answer["success"] else "warning")
+        self.tick()
+        return answer
+
+    def _own(self, who: str, name: str, given: dict) -> Answer | None:
+        """Commands that the robot has no part in; None for the others."""
+        session = self.experiment
+        if name == "note":
+            self.events.add("note", f"{who}: {given['text']}")
+            return Answer(True, session.note(who, given["text"]))
+        if name == "acknowledge":
+            self.guard.acknowledge()
+            return Answer(True, "acknowledged; the first motion needs a held button")
+        if name == "take_over":
+            return Answer(True, self.roles.take_over(who))
+        if name == "keep":
+            return Answer(True, self.roles.keep(who))
+        if name == "invite":
+            return Answer(True, "a link for one more browser, to be used once", self._invite())
+        if name == "select_object":
+            self.object_id = given["object_id"]
+            return Answer(True, f"object {self.object_id or 'none'}")
+        if name == "session_begin":
+            return Answer(
+                True,
+                session.begin(
+                    given["participant"],
+                    given["conditions"],
+                    given["repetitions"],
+                    given["order"],
+                    given.get("number", 0),
+                ),
+            )
+        if name == "session_end":
+            return Answer(True, session.end())
+        if name == "trial_begin":
+            return Answer(True, session.trial_begin())
+        if name == "trial_end":
+            return Answer(True, session.trial_end(given["outcome"]))
+        return None

@@ -1,0 +1,108 @@
+"""What goes to the browsers: documents with versions, the newest state, and every event since the last one seen.
+
+Nothing is queued per browser but the newest state: documents and events are looked up when there is room to send. So a
+browser that reads slowly misses states, never an event, and costs nobody anything.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import json
+from collections.abc import Awaitable, Callable, Iterator
+
+from .events import EventLog
+
+
+def to_json(value: object) -> str:
+    """Compact JSON; numbers that are not finite become null."""
+    try:
+        return json.dumps(value, separators=(",", ":"), allow_nan=False)
+    except ValueError:
+        return json.dumps(_finite(value), separators=(",", ":"))
+
+
+def _finite(value: object) -> object:
+    if isinstance(value, float):
+        return value if value - value == 0.0 else None
+    if isinstance(value, dict):
+        return {key: _finite(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_finite(item) for item in value]
+    return value
+
+
+class Documents:
+    """Named values that change seldom. Called from the event loop alone."""
+
+    def __init__(self) -> None:
+        self._texts: dict[str, tuple[int, str]] = {}
+        self.changed: Callable[[], None] = lambda: None
+
+    def put(self, name: str, value: object) -> bool:
+        """Sets one; True if it differs from what was there."""
+        text = to_json({"t": "doc", "name": name, "value": value})
+        version, before = self._texts.get(name, (0, ""))
+        if text == before:
+            return False
+        self._texts[name] = (version + 1, text)
+        self.changed()
+        return True
+
+    def remove(self, name: str) -> None:
+        """Forgets one; browsers are told null."""
+        if name in self._texts:
+            self.put(name, None)
+
+    def newer(self, known: dict[str, int]) -> Iterator[str]:
+        """Texts that a browser with these versions has not got; brings `known` up to date."""
+        for name, (version, text) in list(self._texts.items()):
+            if known.get(name, 0) != version:
+                known[name] = version
+                yield text
+
+
+class Client:
+    """One connection. `send` is awaited; it may take as long as the browser needs to read."""
+
+    def __init__(self, name: str, seq: int, documents: Documents, events: EventLog) -> None:
+        self.name = name
+        self._seq = seq
+        self._documents, self._events = documents, events
+        self._versions: dict[str, int] = {}
+        self._state: str | None = None
+        self._wake = asyncio.Event()
+        self._wake.set()
+        self.states_dropped = 0
+
+    def state(self, text: str) -> None:
+        """The newest state takes the place of one that was not sent yet."""
+        self.states_dropped += self._state is not None
+        self._state = text
+        self._wake.set()
+
+    def wake(self) -> None:
+        """There are new events or documents."""
+        self._wake.set()
+
+    def take(self) -> list[str]:
+        """All that is to be sent now, oldest first."""
+        texts = list(self._documents.newer(self._versions))
+        events, lost = self._events.since(self._seq)
+        if events or lost:
+            texts.append(to_json({"t": "events", "lost": lost, "events": events}))
+        if events:
+            self._seq = events[-1]["seq"]
+        if self._seq < self._events.newest():
+            self._wake.set()
+        if self._state is not None:
+            texts.append(self._state)
+            self._state = None
+        return texts
+
+    async def serve(self, send: Callable[[str], Awaitable[None]], limit: float) -> None:
+        """Sends until cancelled; TimeoutError if one message was not taken within `limit` s."""
+        while True:
+            await self._wake.wait()
+            self._wake.clear()
+            for text in self.take():
+                await asyncio.wait_for(send(text), limit)

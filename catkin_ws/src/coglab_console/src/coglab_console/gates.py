@@ -1,0 +1,137 @@
+"""Why a button is disabled, and the two acts after a stop: acknowledge the cause, then press and hold.
+
+What the state machine takes is its own decision (MasterState.actions); here only its words are repeated, and what
+belongs to the console alone is added: who is the operator, what was not acknowledged yet.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from .commands import COMMANDS, STARTS
+
+BUTTONS = (*STARTS, "calibrate", "home")
+STANDSTILL = ("stopped", "fault")
+
+
+@dataclass
+class MotionGuard:
+    """After a stop nothing moves before its cause was acknowledged, and the first motion needs a held button."""
+
+    real: bool = False
+    cause: str = ""
+    unacknowledged: bool = False
+    needs_hold: bool = field(default=False)
+    _was_stopped: bool = False
+
+    def __post_init__(self) -> None:
+        self.needs_hold = self.real
+
+    def stop(self, cause: str) -> None:
+        """A stop, by whomever."""
+        self.cause, self.unacknowledged, self.needs_hold = cause, True, True
+
+    def observe(self, stopped: bool, cause: str) -> bool:
+        """How the robot stands, several times a second; True where a stop has just begun."""
+        begun = stopped and not self._was_stopped
+        self._was_stopped = stopped
+        if begun:
+            self.stop(cause or self.cause)
+        elif stopped and cause:
+            self.cause = cause
+        return begun
+
+    def acknowledge(self) -> None:
+        """The operator has read the cause."""
+        self.unacknowledged = False
+
+    def moved(self) -> None:
+        """A motion was begun with a held button."""
+        self.needs_hold = False
+
+    def guarded(self, name: str, arguments: dict) -> bool:
+        """Whether this command needs a held button now. Calibrations that open the hand whatever it holds always do."""
+        if name == "calibrate" and (arguments.get("force") or arguments.get("mode") == "complete"):
+            return True
+        return COMMANDS[name].motion and self.needs_hold
+
+
+@dataclass
+class Standing:
+    """What the reasons depend on; the node fills it in."""
+
+    master_alive: bool = False
+    state: str = ""
+    in_hub: bool = False
+    actions: tuple[str, ...] = ()
+    object_id: str = ""
+    arm_alive: bool = False
+    motion_allowed: bool = False
+    arm_reason: str = ""
+    hand_alive: bool = False
+    hand_connected: bool = False
+    calibrating: bool = False
+
+    @property
+    def leaf(self) -> str:
+        """Label of the innermost active state."""
+        return self.state.rsplit("/", 1)[-1]
+
+    @property
+    def stopped(self) -> bool:
+        """Whether the machine waits for somebody after a stop or a fault."""
+        return self.master_alive and self.leaf in STANDSTILL
+
+
+def _start_reason(action: str, now: Standing) -> str:
+    if not now.master_alive:
+        return "the brain (/coglab) is not there"
+    if action in now.actions:
+        return ""
+    if not now.in_hub:
+        return (
+            f"{now.leaf.replace('_', ' ') or 'the machine'} is under way" if now.state else "the machine has not begun"
+        )
+    if now.leaf in STANDSTILL:
+        return f"{now.leaf}: only {' or '.join(now.actions)} leads on"
+    if action in ("exchange_robot_to_human", "put") and not now.object_id:
+        return "the hand is empty"
+    if action in ("exchange_human_to_robot", "take") and now.object_id:
+        return f"the hand holds {now.object_id}"
+    if action in ("initialise", "reset"):
+        return "nothing is stopped" if action == "reset" else "it is initialised"
+    return f"{now.leaf.replace('_', ' ')} takes {', '.join(now.actions) or 'nothing'}"
+
+
+def _calibrate_reason(now: Standing) -> str:
+    if not now.hand_alive:
+        return "the hand's node is not there"
+    if not now.hand_connected:
+        return "the hand does not answer"
+    if now.calibrating:
+        return "the hand calibrates"
+    return "" if not now.master_alive or now.in_hub else "an action is under way"
+
+
+def _home_reason(now: Standing) -> str:
+    if not now.arm_alive:
+        return "the arm's node is not there"
+    if now.master_alive and (not now.in_hub or now.leaf in STANDSTILL):
+        return f"not in {now.leaf.replace('_', ' ')}" if now.in_hub else "an action is under way"
+    return "" if now.motion_allowed else (now.arm_reason or "the arm may not move")
+
+
+def reasons(now: Standing, guard: MotionGuard) -> dict[str, str]:
+    """Reason by button, empty where it may be pressed; whether one is the operator is each browser's own matter."""
+    found = {}
+    for button in BUTTONS:
+        if button == "calibrate":
+            reason = _calibrate_reason(now)
+        elif button == "home":
+            reason = _home_reason(now)
+        else:
+            reason = _start_reason(button, now)
+        if not reason and guard.unacknowledged:
+            reason = "acknowledge the stop first"
+        found[button] = reason
+    return found

@@ -1,0 +1,80 @@
+"""One operator; everybody else watches. Taking over is announced, and the operator may keep the control."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+
+NOTICE = 3.0
+"""s between the announcement and the change"""
+ABSENCE = 5.0
+"""s without a connection after which the operator is not asked any more"""
+
+
+class Roles:
+    """Sessions are known by their name; `say(text, level)` makes an event. Called from one thread."""
+
+    def __init__(self, say: Callable[[str, str], object], now: Callable[[], float] = time.monotonic) -> None:
+        self._say, self._now = say, now
+        self.operator = ""
+        self.claimant = ""
+        self._due = 0.0
+        self._absent_since: float | None = None
+
+    def connected(self, name: str) -> None:
+        """A browser is there; the first one becomes the operator."""
+        if name == self.operator:
+            self._absent_since = None
+        elif not self.operator:
+            self._make(name, f"{name} is the operator", "info")
+
+    def disconnected(self, name: str) -> None:
+        """The last connection of a browser closed. It stays the operator until somebody takes over."""
+        if name == self.operator:
+            self._absent_since = self._now()
+        if name == self.claimant:
+            self.claimant = ""
+            self._say(f"{name} went away and does not take over any more", "info")
+
+    def take_over(self, name: str) -> str:
+        """`name` wants to be the operator; the answer in words."""
+        if name == self.operator:
+            return "you are the operator"
+        if self.claimant and self.claimant != name:
+            return f"{self.claimant} is taking over already"
+        if not self.operator or self._absent():
+            self._make(name, f"{name} is the operator now; {self.operator or 'nobody'} was not there")
+            return "you are the operator now"
+        if not self.claimant:
+            self.claimant, self._due = name, self._now() + NOTICE
+            self._say(
+                f"{name} takes over from {self.operator} in {NOTICE:.0f} s, unless {self.operator} keeps the control",
+                "warning",
+            )
+        return f"{self.operator} was told; you are the operator in {NOTICE:.0f} s unless they keep the control"
+
+    def keep(self, name: str) -> str:
+        """The operator refuses; the answer in words."""
+        if name != self.operator or not self.claimant:
+            return "nobody is taking over from you"
+        self._say(f"{name} keeps the control; {self.claimant} goes on watching", "warning")
+        self.claimant = ""
+        return "you keep the control"
+
+    def tick(self) -> bool:
+        """Called several times a second; whether the operator changed."""
+        if not self.claimant or not (self._now() >= self._due or self._absent()):
+            return False
+        self._make(self.claimant, f"{self.claimant} is the operator now, {self.operator} watches")
+        return True
+
+    def view(self) -> dict:
+        """What every browser is shown."""
+        return {"operator": self.operator, "claimant": self.claimant, "absent": self._absent()}
+
+    def _absent(self) -> bool:
+        return self._absent_since is not None and self._now() - self._absent_since > ABSENCE
+
+    def _make(self, name: str, sentence: str, level: str = "warning") -> None:
+        self.operator, self.claimant, self._absent_since = name, "", None
+        self._say(sentence, level)

@@ -1,0 +1,143 @@
+"""Commands of the page as services and topics that everybody can call. Each ends within its time limit."""
+
+from __future__ import annotations
+
+import asyncio
+import threading
+from collections.abc import Callable
+from typing import Any
+
+import rospy
+from coglab_msgs.srv import (
+    AddPtp,
+    ArmContact,
+    FeedbackSelect,
+    SetExecutionOrder,
+    SetSpeedScale,
+    Start,
+    SwitchController,
+)
+from std_msgs.msg import String
+from std_srvs.srv import Trigger
+
+from .desk import Answer
+from .gates import Standing
+from .ros_view import RosView
+from .words import lookup
+
+LIMIT = 6.0  # s, of one command
+MAX_WAITING = 12  # services that have not answered
+HOME_CONTROLLER = "ptp"
+HIDDEN = ("robot_description", "roslaunch", "rosdistro", "run_id")
+MAX_PARAMETERS = 2000
+
+
+class RosBackend:
+    """The Backend of the desk."""
+
+    def __init__(self, view: RosView, stop: Callable[[str], None], real: bool) -> None:
+        self.real = real
+        self._view, self._stop = view, stop
+        self._calibration = rospy.Publisher("ih2_hand/hand_calibration", String, queue_size=2)
+        self._waiting = threading.Semaphore(MAX_WAITING)
+
+    def standing(self) -> Standing:
+        """See Backend."""
+        return self._view.standing()
+
+    def stop(self, who: str) -> None:
+        """See Backend."""
+        self._stop(who)
+
+    async def call(self, name: str, arguments: dict) -> Answer:
+        """Runs the command in a thread of its own; an answer that does not come is told after LIMIT s."""
+        if not self._waiting.acquire(blocking=False):
+            return Answer(False, f"{MAX_WAITING} earlier requests have not been answered; is the ROS master there?")
+        loop = asyncio.get_running_loop()
+        done: asyncio.Future[Answer] = loop.create_future()
+
+        def give(answer: Answer) -> None:
+            if not done.done():
+                done.set_result(answer)
+
+        def work() -> None:
+            try:
+                answer = getattr(self, f"_{name}")(**arguments)
+            except rospy.ROSException as error:
+                answer = Answer(False, f"{name}: {error}")
+            except Exception as error:  # nothing from outside ends the node
+                answer = Answer(False, f"{name}: {type(error).__name__}: {error}")
+            finally:
+                self._waiting.release()
+            loop.call_soon_threadsafe(give, answer)
+
+        threading.Thread(target=work, name=f"command_{name}", daemon=True).start()
+        try:
+            return await asyncio.wait_for(done, LIMIT)
+        except TimeoutError:
+            return Answer(False, f"{name}: no answer within {LIMIT:.0f} s; look at the event log and at Health")
+
+    @staticmethod
+    def _ask(service: str, kind: Any, *fields: Any) -> Any:
+        rospy.wait_for_service(service, timeout=2.0)
+        return rospy.ServiceProxy(service, kind)(*fields)
+
+    def _told(self, service: str, kind: Any, *fields: Any) -> Answer:
+        answer = self._ask(service, kind, *fields)
+        return Answer(
+            bool(answer.success), answer.message or ("done" if answer.success else "refused without a reason")
+        )
+
+    # --- one method per command, in a thread of its own -------------------------------------------------------
+
+    def _start(self, action: str, object_id: str = "") -> Answer:
+        return self._told("coglab/start", Start, action, object_id)
+
+    def _calibrate(self, mode: str, force: bool = False) -> Answer:
+        if self._calibration.get_num_connections() == 0:
+            return Answer(False, "the hand's node is not there")
+        self._calibration.publish(String(mode + (" force" if force else "")))
+        return Answer(True, f"{mode} calibration was asked for; the hand tells how it ends")
+
+    def _home(self) -> Answer:
+        home = lookup(self._view.config(), "postures.home")
+        if not isinstance(home, list) or len(home) != 7:
+            return Answer(False, "postures.home is not in the configuration of the machines (/coglab/config_file)")
+        answer = self._told("controller_manager/switch_controller", SwitchController, HOME_CONTROLLER)
+        if not answer["success"]:
+            return answer
+        return self._told("controller_manager/ptp/add_ptp", AddPtp, [float(value) for value in home], [], [])
+
+    def _speed_scale(self, value: float) -> Answer:
+        return self._told("controller_manager/speed_scale", SetSpeedScale, float(value))
+
+    def _contact_learn(self) -> Answer:
+        return Answer(*self._view.learn())
+
+    def _contact_arm(self, mode: str, k: float = 0.0, timeout: float = 10.0, joints: list[int] | None = None) -> Answer:
+        return self._told("contact_detector/arm", ArmContact, mode, float(timeout), float(k), joints or [], 0.0, 0.0)
+
+    def _objects_reload(self) -> Answer:
+        answer = self._told("object_database/reload", Trigger)
+        self._view.objects_read(answer["message"] if not answer["success"] else "")
+        return answer
+
+    def _feedback(self, verb: str, name: str) -> Answer:
+        return self._told(f"controller_manager/feedback/{verb}", FeedbackSelect, [name], "console")
+
+    def _feedback_order(self, names: list[str]) -> Answer:
+        return self._told("controller_manager/feedback/set_execution_order", SetExecutionOrder, names)
+
+    def _parameters(self) -> Answer:
+        rows: list[list[str]] = []
+
+        def walk(path: str, value: Any) -> None:
+            if isinstance(value, dict) and value:
+                for key in sorted(value):
+                    if not (path == "" and key in HIDDEN):
+                        walk(f"{path}/{key}", value[key])
+            elif len(rows) < MAX_PARAMETERS:
+                rows.append([path, str(value)[:200]])
+
+        walk("", rospy.get_param("/"))
+        return Answer(True, f"{len(rows)} parameters", rows)

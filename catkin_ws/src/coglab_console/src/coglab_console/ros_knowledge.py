@@ -1,0 +1,187 @@
+"""Files and services that change seldom: objects, configuration of the machines, primitives; and the path ahead.
+
+Each in a thread that may wait for the ROS master without anybody else waiting.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import rospy
+import yaml
+from coglab_msgs.srv import GetObject, ListObjects
+
+from . import path_ahead
+from .primitives import LibraryError, Primitive, load_library
+from .primitives import document as library_document
+from .ros_view import RosView
+
+PERIOD = 5.0  # s between two looks at files and at the object database
+PATH_PERIOD = 0.25  # s
+RUNNING = ("running", "holding")
+MAX_OBJECTS = 100
+MAX_FILE = 1_000_000  # bytes of a configuration
+
+
+class Knowledge:
+    """`selected()` is the object of the next action."""
+
+    def __init__(
+        self,
+        view: RosView,
+        put: Callable[[str, Any], None],
+        say: Callable[[str, str], None],
+        selected: Callable[[], str],
+    ) -> None:
+        self._view, self._put, self._say, self._selected = view, put, say, selected
+        self._texts: dict[str, str] = {}
+        self._entries: dict[str, dict] = {}
+        self._problems = ""
+        self._config: dict = {}
+        self._library: dict[str, Primitive] = {}
+        self._stamps: dict[str, int] = {}
+        self._told: dict[str, str] = {}
+        self._now = threading.Event()
+        self._motion: tuple[str, np.ndarray] | None = None
+        view.entry = self._entry
+        view.config = lambda: self._config
+        view.objects_read = self.read_again
+        threading.Thread(target=self._look, name="knowledge", daemon=True).start()
+        threading.Thread(target=self._paths, name="path_ahead", daemon=True).start()
+
+    def _entry(self) -> dict:
+        """Of the object in the hand, or of the next action, or that which the machine takes where none is named."""
+        name = self._view.machine.object_id or self._selected() or str(self._config.get("default_object", ""))
+        return self._entries.get(name, {})
+
+    def read_again(self, problems: str) -> None:
+        """After the object database has read its files; `problems` in its words."""
+        self._problems = problems
+        self._now.set()
+
+    def _look(self) -> None:
+        while not rospy.is_shutdown():
+            for name, work in (
+                ("objects", self._objects),
+                ("machines", self._machines),
+                ("primitives", self._primitives),
+            ):
+                try:
+                    work()
+                    self._told.pop(name, None)
+                except Exception as error:  # a service or file that is not there now: the old content stays
+                    if self._told.get(name) != str(error):
+                        self._told[name] = str(error)
+                        self._say(f"{name}: {error}", "warning")
+            self._now.wait(PERIOD)
+            self._now.clear()
+
+    def _objects(self) -> None:
+        try:
+            rospy.wait_for_service("object_database/list_objects", timeout=1.0)
+        except rospy.ROSException:
+            self._show_objects("the object database is not there")
+            return
+        ids = rospy.ServiceProxy("object_database/list_objects", ListObjects)().object_ids[:MAX_OBJECTS]
+        ask = rospy.ServiceProxy("object_database/get_object", GetObject)
+        for name in ids:
+            answer = ask(name)
+            if answer.success and answer.yaml != self._texts.get(name):
+                entry = yaml.safe_load(answer.yaml)
+                if isinstance(entry, dict):
+                    self._texts[name], self._entries[name] = answer.yaml, entry
+        for gone in set(self._texts) - set(ids):
+            del self._texts[gone], self._entries[gone]
+        self._show_objects("")
+
+    def _show_objects(self, missing: str) -> None:
+        rows = [
+            {
+                "id": name,
+                "name": str(self._entries[name].get("name", name)),
+                "mass": self._entries[name].get("mass"),
+                "shape": self._entries[name].get("shape"),
+                "size": self._entries[name].get("size"),
+                "text": text[:8000],
+            }
+            for name, text in sorted(self._texts.items())
+        ]
+        self._put("objects", {"rows": rows, "problems": missing or self._problems})
+
+    def _changed(self, path: Path) -> bool:
+        stamp = path.stat().st_mtime_ns
+        if self._stamps.get(str(path)) == stamp:
+            return False
+        self._stamps[str(path)] = stamp
+        return True
+
+    def _machines(self) -> None:
+        path = Path(str(rospy.get_param("coglab/config_file", "")))
+        if path.is_file() and path.stat().st_size < MAX_FILE and self._changed(path):
+            values = yaml.safe_load(path.read_text(encoding="utf-8"))
+            if isinstance(values, dict):
+                self._config = values
+
+    def _primitives(self) -> None:
+        path = Path(str(rospy.get_param("coglab/dmp_library", "")))
+        if not path.is_file() or not self._changed(path):
+            return
+        try:
+            self._library = load_library(path)
+        except LibraryError as error:
+            self._put("primitives", {"file": str(path), "problem": str(error), "rows": []})
+            raise
+        self._put("primitives", {"file": str(path), "problem": "", "rows": library_document(self._library)})
+
+    # --- the path ahead ---------------------------------------------------------------------------------------
+
+    def _paths(self) -> None:
+        while not rospy.is_shutdown():
+            time.sleep(PATH_PERIOD)
+            try:
+                self._put("path", self._path())
+            except Exception as error:  # nothing that comes from outside ends this thread
+                if self._told.get("path") != str(error):
+                    self._told["path"] = str(error)
+                    self._say(f"the path ahead cannot be drawn: {error}", "warning")
+
+    def _path(self) -> dict | None:
+        view, palm = self._view, self._view.palm()
+        if palm is None:
+            return None
+        running = view.dmp.state in RUNNING and time.monotonic() - view.dmp_at < 1.0
+        if not running:
+            self._motion = None
+            return self._ahead(palm)
+        name = view.dmp.primitive_id
+        if self._motion is None or self._motion[0] != name:
+            self._motion = (name, palm)
+        goal = view.frames.get("dmp_goal")
+        if goal is None or name not in self._library:
+            return None
+        entry = view.entry()
+        ratio = float(entry.get("dmp", {}).get("dmp_ratio", 1.0)) if isinstance(entry.get("dmp"), dict) else 1.0
+        return path_ahead.document("running", self._library[name], self._motion[1], np.array(goal[:3]), ratio)
+
+    def _ahead(self, palm: np.ndarray) -> dict | None:
+        view = self._view
+        actions = [
+            action
+            for action in view.machine.actions
+            if action in ("exchange_human_to_robot", "exchange_robot_to_human")
+        ]
+        leaf_parent = view.machine.state.split("/")[-2:-1]
+        if not actions and leaf_parent and leaf_parent[0] in path_ahead.ROLES:
+            actions = leaf_parent  # the action has begun, the reach has not
+        if not actions:
+            return None
+        found = path_ahead.aim(actions[0], view.entry(), view.frames)
+        if found is None or found[0] not in self._library:
+            return None
+        name, ratio, goal = found
+        return path_ahead.document("ahead", self._library[name], palm, goal, ratio)

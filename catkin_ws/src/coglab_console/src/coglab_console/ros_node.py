@@ -1,0 +1,309 @@
+"""Ties view, commands, STOP and the web server together; the process of /coglab_console."""
+
+from __future__ import annotations
+
+import asyncio
+import fcntl
+import os
+import platform
+import secrets
+import signal
+import socket
+import sys
+import time
+from pathlib import Path
+from typing import Any
+from urllib.parse import urlsplit
+
+import aiohttp
+import rospkg
+import rospy
+from aiohttp import web
+from rospy.exceptions import ROSInitException
+
+from .access import Access, allowed_hosts
+from .desk import Desk
+from .events import EventLog
+from .fan_out import Documents
+from .page_files import load_all
+from .ros_commands import RosBackend
+from .ros_graph import SmachGraphs
+from .ros_knowledge import Knowledge
+from .ros_stop import StopPath
+from .ros_view import RosView
+from .server import ConsoleServer
+from .torque_rate import Settings
+from .urdf_model import ModelError, RobotModel
+
+PORT = 8790
+STATE_RATE = 30.0  # Hz
+TICK = 0.1  # s
+HEALTH = 1.0  # s
+FRAMES = {"human_hand": "human_hand", "board": "board"}
+
+
+class StartError(Exception):
+    """The console cannot begin; the sentence says what to do."""
+
+
+def bind(address: str, port: int, fixed: bool) -> socket.socket:
+    """A listening socket; where the port is taken and not `fixed`, on one of the next nine, or on any."""
+    wanted = [port] if fixed or port == 0 else [*range(port, port + 10), 0]
+    for number in wanted:
+        found = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
+        found.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            found.bind((address, number))
+            found.listen(64)
+            return found
+        except OSError as error:
+            found.close()
+            problem = error.strerror
+    raise StartError(f"{address}:{port} cannot be used ({problem}); choose another console_port, or leave it out")
+
+
+def only_one(home: Path) -> int:
+    """A lock that one console of this ROS master holds until its process ends."""
+    master = urlsplit(os.environ.get("ROS_MASTER_URI", "")).port or 11311
+    lock = os.open(home / f"console_{master}.lock", os.O_RDWR | os.O_CREAT, 0o600)
+    for _ in range(20):  # one that is being respawned may still end
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            return lock
+        except OSError:
+            time.sleep(0.1)
+    raise StartError(f"another console of this ROS master runs; its link is in {home / 'console.url'}")
+
+
+class ConsoleNode:
+    """Everything of one run."""
+
+    def __init__(self, loop: asyncio.AbstractEventLoop, home: Path) -> None:
+        self.loop, self.home = loop, home
+        self.address = str(rospy.get_param("~address", "127.0.0.1"))
+        fixed = rospy.has_param("~port") and int(rospy.get_param("~port")) != PORT
+        self.socket = bind(self.address, int(rospy.get_param("~port", PORT)), fixed)
+        self.port = self.socket.getsockname()[1]
+        more = str(rospy.get_param("~hosts", "")).split()
+        self.access = Access(allowed_hosts(self.address, self.port, more))
+        self.events, self.documents = EventLog(time.time), Documents()
+        self.real = bool(rospy.get_param("~real", False))
+        self.selected = ""
+        model = self._model()
+        self.graphs = SmachGraphs(self.put, lambda text, level: self.say("graph", text, level))
+        frames = {**FRAMES, **self._parameter("perception/frames", {})}
+        self.view = RosView(
+            model, self._settings(), frames, self.say, self.put, self.graphs.transition, self._on_result
+        )
+        self.stop_path = StopPath(lambda text, level: self.say("stop", text, level))
+        backend = RosBackend(self.view, self.stop_path.press, self.real)
+        folder = Path(str(rospy.get_param("~sessions", "")) or home / "console_sessions")
+        self.desk = Desk(backend, self.events, self.documents, folder, time.time, self.write_link)
+        self.knowledge = Knowledge(
+            self.view, self.put, lambda text, level: self.say("files", text, level), lambda: self.desk.object_id
+        )
+        page = Path(rospkg.RosPack().get_path("coglab_console")) / "page"
+        files, missing = load_all(page)
+        for package in missing:
+            self.say(
+                "console",
+                f"{package} is missing (apt install {package}): "
+                + ("the 2D view takes the place of the 3D view" if "three" in package else "there are no strip charts"),
+                "warning",
+            )
+        self.server = ConsoleServer(
+            self.access,
+            self.desk,
+            self.events,
+            self.documents,
+            files,
+            f"coglab_console_{self.port}",
+            secrets.token_hex(8),
+            self.write_link,
+        )
+        self.events.listen(lambda _event: self.soon(self._wake))
+        self._put_static(model, missing, files)
+
+    # --- from other threads -----------------------------------------------------------------------------------
+
+    def soon(self, callback: Any, *arguments: Any) -> None:
+        """Calls it in the event loop, if that still runs."""
+        try:
+            self.loop.call_soon_threadsafe(callback, *arguments)
+        except RuntimeError:  # the loop has ended
+            pass
+
+    def _wake(self) -> None:
+        self.server.wake()
+
+    def say(self, source: str, text: str, level: str = "info") -> None:
+        """An event, from any thread."""
+        self.events.add(source, text, level)
+
+    def put(self, name: str, value: Any) -> None:
+        """A document, from any thread; None takes it away."""
+        if value is None:
+            self.soon(self.documents.remove, name)
+        else:
+            self.soon(self.documents.put, name, value)
+
+    def _on_result(self, row: dict) -> None:
+        self.soon(self.desk.result, row)
+
+    # --- at the start -----------------------------------------------------------------------------------------
+
+    @staticmethod
+    def _parameter(name: str, default: Any) -> Any:
+        value = rospy.get_param(name, default)
+        return value if isinstance(value, type(default)) else default
+
+    def _model(self) -> RobotModel | None:
+        found = rospy.search_param("robot_description")
+        try:
+            if not found:
+                raise ModelError("the parameter robot_description is missing")
+            return RobotModel(str(rospy.get_param(found)))
+        except ModelError as error:
+            self.say("console", f"the robot is not drawn: {error}", "warning")
+            return None
+
+    def _settings(self) -> Settings:
+        given = self._parameter("contact_detector", {})
+        names = Settings.__dataclass_fields__
+        return Settings(
+            **{name: float(value) for name, value in given.items() if name in names and isinstance(value, (int, float))}
+        )
+
+    def _put_static(self, model: RobotModel | None, missing: list[str], files: dict) -> None:
+        workspace = self._parameter("controller_manager/workspace", {})
+        self.documents.put(
+            "model",
+            {
+                "real": self.real,
+                "robot": model.document() if model else None,
+                "order": model.moving() if model else [],
+                "workspace": {
+                    "low": workspace.get("box_min", [-1.2, -1.2, 0.0]),
+                    "high": workspace.get("box_max", [1.2, 1.2, 1.6]),
+                },
+                "missing": missing,
+                "charts": "/lib/dygraphs/dygraph.js" in files,
+                "three": "/lib/three/build/three.module.js" in files,
+                "colours": {"arm": "#d9822b"},
+            },
+        )
+        self.versions = {
+            "ROS": str(rospy.get_param("/rosversion", "?")).strip(),
+            "Python": platform.python_version(),
+            "aiohttp": aiohttp.__version__,
+            "Linux": platform.release(),
+            "console": f"http://{self.address}:{self.port}",
+            "ROS master": os.environ.get("ROS_MASTER_URI", ""),
+            "packed page": f"{sum(len(file.packed) for file in files.values()) / 1e6:.2f} MB",
+        }
+
+    def write_link(self) -> str:
+        """A new link for one browser, kept in console.url; the one before stays good until it is used."""
+        name = "127.0.0.1" if self.address in ("0.0.0.0", "") else self.address
+        link = f"http://{name}:{self.port}/?t={self.access.new_token()}"
+        path = self.home / "console.url"
+        try:
+            handle = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o600)
+            os.fchmod(handle, 0o600)
+            with os.fdopen(handle, "w") as stream:
+                stream.write(link + "\n")
+        except OSError as error:
+            self.say("console", f"{path} cannot be written ({error.strerror}); Help makes links, too", "warning")
+        return link
+
+    # --- while it runs ----------------------------------------------------------------------------------------
+
+    async def run(self, ended: asyncio.Event) -> None:
+        """Serves until `ended`."""
+        runner = web.AppRunner(self.server.app, access_log=None, handle_signals=False)
+        await runner.setup()
+        await web.SockSite(runner, self.socket, shutdown_timeout=1.0).start()
+        print(
+            f"[coglab] console: {self.write_link()}   (one use; the next one is in {self.home / 'console.url'})",
+            flush=True,
+        )
+        if self.address not in ("127.0.0.1", "localhost"):
+            rospy.logwarn("the console listens on %s: whoever gets the link can move the robot", self.address)
+        self.say("console", f"console started, {'REAL ROBOT' if self.real else 'simulation'}")
+        tasks = [asyncio.create_task(work()) for work in (self._states, self._ticks, self._health)]
+        await ended.wait()
+        for task in tasks:
+            task.cancel()
+        await runner.cleanup()
+
+    async def _states(self) -> None:
+        """30 times a second, on a grid that does not drift."""
+        due = self.loop.time()
+        while True:
+            due = max(due + 1.0 / STATE_RATE, self.loop.time() - 1.0)
+            await asyncio.sleep(max(0.0, due - self.loop.time()))
+            if self.server.clients:
+                self._careful(lambda: self.server.publish_state(self.view.frame()))
+
+    async def _ticks(self) -> None:
+        while True:
+            await asyncio.sleep(TICK)
+            self._careful(self._tick)
+
+    def _tick(self) -> None:
+        self.desk.observe(*self.view.stopped())
+        self.desk.tick()
+        self.documents.put("status", self.view.status())
+
+    async def _health(self) -> None:
+        while True:
+            await asyncio.sleep(HEALTH)
+            self._careful(self._put_health)
+
+    def _put_health(self) -> None:
+        now = time.monotonic()
+        rows = [
+            {
+                "name": name,
+                "level": row["level"] if now - row["at"] < 5.0 else 3,
+                "message": row["message"],
+                "values": row["values"],
+            }
+            for name, row in sorted(self.view.tables.diagnostics.items())
+        ]
+        browsers = [{"name": one.name, "connections": one.sockets} for one in self.access.sessions() if one.sockets]
+        self.documents.put("health", {"rows": rows, "versions": self.versions, "browsers": browsers})
+
+    def _careful(self, work: Any) -> None:
+        """Nothing that a topic carries may end the loop."""
+        try:
+            work()
+        except Exception as error:
+            rospy.logerr_throttle(10.0, f"console: {type(error).__name__}: {error}")
+
+
+async def _main(home: Path) -> None:
+    loop = asyncio.get_running_loop()
+    node = await loop.run_in_executor(None, ConsoleNode, loop, home)
+    ended = asyncio.Event()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        loop.add_signal_handler(number, ended.set)
+    rospy.on_shutdown(lambda: node.soon(ended.set))
+    await node.run(ended)
+
+
+def main() -> int:
+    """Exit status 1 where the console cannot begin."""
+    home = Path(rospkg.get_ros_home())
+    try:
+        home.mkdir(parents=True, exist_ok=True)
+        lock = only_one(home)
+        rospy.init_node("coglab_console", disable_signals=True)
+        asyncio.run(_main(home))
+        os.close(lock)
+    except (StartError, ROSInitException, OSError) as error:
+        print(f"[coglab] console: error: {error}", file=sys.stderr, flush=True)
+        return 1
+    finally:
+        rospy.signal_shutdown("the console ends")
+    return 0

@@ -1,0 +1,341 @@
+"""What the console knows of the robot: the newest of every topic, and from it the state that goes out at 30 Hz."""
+
+from __future__ import annotations
+
+import json
+import math
+import time
+from collections.abc import Callable
+from typing import Any
+
+import rospy
+from coglab_msgs.msg import (
+    Contact,
+    ControllerStatus,
+    DmpFeedback,
+    HandStatus,
+    LwrState,
+    MasterState,
+    Transition,
+    UnfinishedPtp,
+)
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Float64, String
+
+from . import wire
+from .gates import Standing
+from .ros_tables import Tables
+from .torque_rate import Settings, TorqueRate
+from .urdf_model import RobotModel
+from .words import phase, time_limit
+
+PALM = "ih2_palm"
+FRAME_PARENTS = ("world", "lwr_base_link")
+OLD = 1.0  # s without a message after which a fast topic counts as silent
+STILL = 0.02  # rad/s
+
+
+def _round(values: Any, digits: int = 4) -> list[float]:
+    return [round(value, digits) if math.isfinite(value) else 0.0 for value in values]
+
+
+class RosView:
+    """Callbacks write, anybody reads; each value is replaced as a whole. `say(source, text, level)` makes an event,
+    `put(name, value)` a document, `transition` goes to the graphs and `result` to the desk."""
+
+    def __init__(
+        self,
+        model: RobotModel | None,
+        settings: Settings,
+        frames: dict[str, str],
+        say: Callable[[str, str, str], None],
+        put: Callable[[str, Any], None],
+        transition: Callable[..., None],
+        result: Callable[[dict], None],
+    ) -> None:
+        self.model = model
+        self._say, self._put, self._transition, self._result = say, put, transition, result
+        self._hand_frame, self._board_frame = frames["human_hand"], frames["board"]
+        self.torque = TorqueRate(settings)
+        self.frames: dict[str, tuple[float, ...]] = {}
+        self._stamps: dict[str, float] = {}
+        self.joints: dict[str, float] = {}
+        self._joints_at = self._joints_stamp = 0.0
+        self._fastest = 0.0
+        self._asked = False  # for learning, by an operator
+        self._palm_before: tuple[float, Any] | None = None
+        self.palm_speed = 0.0
+        self.machine, self.arm, self.hand = MasterState(), LwrState(), HandStatus()
+        self.manager, self.dmp = ControllerStatus(), DmpFeedback()
+        self._state_since = time.monotonic()
+        self.dmp_at = self._hand_at = self._margin_at = 0.0
+        self.margin, self.contact = 0.0, ""
+        self.tables = Tables(put)
+        self.entry: Callable[[], dict] = dict
+        self.config: Callable[[], dict] = dict
+        self.objects_read: Callable[[str], None] = lambda problems: None
+        self._subscribers: dict[str, rospy.Subscriber] = {}
+        self._subscribe()
+
+    def _subscribe(self) -> None:
+        for topic, kind, callback, queue in (
+            ("coglab/state", MasterState, self._on_machine, 20),
+            ("coglab/transitions", Transition, self._on_transition, 200),
+            ("coglab/results", String, self._on_result, 20),
+            ("coglab/contact", Contact, self._on_contact, 20),
+            ("contact_detector/margin", Float64, self._on_margin, 1),
+            ("lwr/state", LwrState, self._on_arm, 20),
+            ("lwr/external_torques", rospy.AnyMsg, self._on_torques, 50),
+            ("joint_states", JointState, self._on_joints, 2),
+            ("ih2_hand/hand_status", HandStatus, self._on_hand, 5),
+            ("controller_manager/status", ControllerStatus, self._on_manager, 20),
+            ("controller_manager/dmp/feedback", DmpFeedback, self._on_dmp, 5),
+            ("controller_manager/ptp/unfinished_ptp", UnfinishedPtp, self._on_unfinished, 10),
+            ("/tf", rospy.AnyMsg, self._on_tf, 50),
+            ("/tf_static", rospy.AnyMsg, self._on_tf, 50),
+        ):
+            self._subscribers[topic] = rospy.Subscriber(topic, kind, callback, queue_size=queue, tcp_nodelay=True)
+
+    def _there(self, topic: str) -> bool:
+        return self._subscribers[topic].get_num_connections() > 0
+
+    # --- read -------------------------------------------------------------------------------------------------
+
+    def standing(self) -> Standing:
+        """For the desk."""
+        machine, arm, hand = self.machine, self.arm, self.hand
+        return Standing(
+            master_alive=self._there("coglab/state"),
+            state=machine.state,
+            in_hub=machine.in_hub,
+            actions=tuple(machine.actions),
+            object_id=machine.object_id,
+            arm_alive=self._there("lwr/state"),
+            motion_allowed=arm.motion_allowed,
+            arm_reason=arm.reason,
+            hand_alive=self._there("ih2_hand/hand_status"),
+            hand_connected=hand.connected,
+            calibrating=hand.calibrating,
+        )
+
+    def stopped(self) -> tuple[bool, str]:
+        """Whether the robot stands after a stop or a fault, and why."""
+        now = self.standing()
+        held = now.arm_alive and self.arm.hold_latched
+        return now.stopped or held, self.machine.why or self.arm.reason
+
+    def palm(self) -> Any:
+        """Place of the palm in the world, m; None where it is not known."""
+        if self.model is None or not self.joints:
+            return None
+        return self.model.place(PALM, self.joints)[:3, 3]
+
+    def frame(self) -> dict:
+        """What goes out 30 times a second."""
+        now = time.monotonic()
+        self._measure_palm(now)
+        object_frame = str(self.entry().get("frame", ""))
+        wanted = {"hand": self._hand_frame, "object": object_frame, "board": self._board_frame, "goal": "dmp_goal"}
+        stamp = rospy.get_time()
+        shown = {role: _round(self.frames[name], 4) for role, name in wanted.items() if name in self.frames}
+        ages = {role: round(stamp - self._stamps[name], 3) for role, name in wanted.items() if name in self._stamps}
+        order = self.model.moving() if self.model else []
+        dmp = self.dmp if now - self.dmp_at < OLD else DmpFeedback()
+        return {
+            "stamp": round(stamp, 3),
+            "q": _round(self.joints.get(name, 0.0) for name in order),
+            "live": now - self._joints_at < OLD,
+            "frames": shown,
+            "ages": ages,
+            "rate": _round(self.torque.take_peaks()),
+            "threshold": _round(self.torque.thresholds()),
+            "speed": round(self.palm_speed, 4),
+            "fri": round(1000 * self.tables.latency, 3) if math.isfinite(self.tables.latency) else None,
+            "answer": round(1000 * self.tables.answer_time, 3) if math.isfinite(self.tables.answer_time) else None,
+            "current": [motor.current for motor in self.hand.motors] if now - self._hand_at < OLD else [],
+            "margin": round(self.margin, 3) if now - self._margin_at < OLD else None,
+            "phase": self.machine.state,
+            "since": round(now - self._state_since, 2),
+            "dmp": [dmp.state, round(dmp.phase, 4), round(dmp.remaining_distance, 4), round(dmp.remaining_time, 3)],
+        }
+
+    def reaching(self) -> bool:
+        """Whether the arm is on its way in the state that then waits for contact."""
+        fresh = time.monotonic() - self.dmp_at < OLD
+        return fresh and self.dmp.state in ("running", "holding") and self.machine.state.endswith("/wait_stop")
+
+    def status(self) -> dict:
+        """What changes seldom: the document `status`."""
+        now, machine, arm, hand = self.standing(), self.machine, self.arm, self.hand
+        return {
+            "machine": {
+                "alive": now.master_alive,
+                "state": machine.state,
+                "words": "reaches" if self.reaching() else phase(machine.state),
+                "hub": machine.in_hub,
+                "actions": list(machine.actions),
+                "object": machine.object_id,
+                "why": machine.why,
+                "fallback": str(self.config().get("default_object", "")),
+                "limit": None if self.reaching() else time_limit(machine.state, self.config(), self.entry()),
+            },
+            "arm": {
+                "alive": now.arm_alive,
+                "supervisor": arm.supervisor,
+                "fri": arm.fri_state,
+                "quality": arm.quality,
+                "mode": arm.control_mode,
+                "power": arm.power == 0x7F,
+                "allowed": arm.motion_allowed,
+                "held": arm.hold_latched,
+                "reason": arm.reason,
+                "cycle": arm.cycle_time,
+            },
+            "hand": {
+                "alive": now.hand_alive,
+                "connected": hand.connected,
+                "calibrated": hand.calibrated,
+                "calibrating": hand.calibrating,
+                "holding": hand.holding,
+                "message": hand.message,
+                "motors": len(hand.motors),
+            },
+            "manager": {
+                "alive": self._there("controller_manager/status"),
+                "state": self.manager.state,
+                "active": self.manager.active_controller,
+                "reason": self.manager.reason,
+                "scale": round(self.manager.speed_scale, 3),
+            },
+            "contact": {
+                "words": self.contact,
+                "learnt": self.torque.learnt,
+                "learning": self.torque.learning(),
+                "sigma": _round(self.torque.sigma),
+                "k": self.torque.settings.k,
+            },
+        }
+
+    def learn(self) -> tuple[bool, str]:
+        """The noise of the torques at rest, from now on."""
+        if not self._there("lwr/external_torques"):
+            return False, "no external torques: the arm's node is not there"
+        if self._fastest > STILL:
+            return False, "the arm moves; learn at rest"
+        self._asked = True
+        self.torque.learn()
+        return True, "learning for 5 s; leave the arm alone"
+
+    # --- arm and hand -----------------------------------------------------------------------------------------
+
+    def _measure_palm(self, now: float) -> None:
+        if self.palm_at() == (self._palm_before or (0.0,))[0]:
+            if now - self._joints_at > OLD:
+                self.palm_speed = 0.0
+            return
+        palm, before = self.palm(), self._palm_before
+        self._palm_before = (self.palm_at(), palm)
+        if palm is not None and before is not None and before[1] is not None:
+            dt = self.palm_at() - before[0]
+            if 0.0 < dt < OLD:
+                self.palm_speed = math.dist(palm, before[1]) / dt
+
+    def palm_at(self) -> float:
+        """Stamp of the joint state, s."""
+        return self._joints_stamp
+
+    def _on_joints(self, message: JointState) -> None:
+        if len(message.name) != len(message.position):
+            return
+        stamp, before = message.header.stamp.to_sec(), self.joints
+        joints = {**before, **dict(zip(message.name, message.position, strict=True))}
+        if not all(map(math.isfinite, joints.values())) or len(joints) > 200:
+            return
+        dt = stamp - self._joints_stamp
+        if 0.0 < dt < OLD:
+            self._fastest = max(
+                (abs(joints[name] - before[name]) / dt for name in before if name.startswith("lwr_")), default=0.0
+            )
+        self.joints, self._joints_stamp, self._joints_at = joints, stamp, time.monotonic()
+
+    def _on_torques(self, message: rospy.AnyMsg) -> None:
+        try:
+            stamp, effort = wire.joint_state_effort(message._buff)
+        except wire.BadBytes:
+            return
+        told = self.torque.feed(stamp, effort, self._fastest > STILL)
+        if not self.torque.learnt and not self.torque.learning() and self._fastest <= STILL:
+            self.torque.learn()  # the first time nobody has to ask
+        if told and self._asked:
+            self._say("contact", told, "info")
+
+    def _on_tf(self, message: rospy.AnyMsg) -> None:
+        try:
+            for parent, child, stamp, pose in wire.transforms(message._buff):
+                if parent in FRAME_PARENTS and not child.startswith(("lwr_", "ih2_")) and len(self.frames) < 100:
+                    if all(map(math.isfinite, pose)) and any(pose[3:]):
+                        self.frames[child] = pose
+                        self._stamps[child] = stamp
+        except wire.BadBytes:
+            return
+
+    def _on_arm(self, message: LwrState) -> None:
+        before, self.arm = self.arm, message
+        if (message.supervisor, message.quality) != (before.supervisor, before.quality):
+            bad = message.supervisor in ("stopped", "disconnected")
+            words = f"arm {message.supervisor}, quality {message.quality}"
+            self._say("arm", f"{words}: {message.reason}" if message.reason else words, "fault" if bad else "info")
+
+    def _on_hand(self, message: HandStatus) -> None:
+        before, self.hand, self._hand_at = self.hand, message, time.monotonic()
+        if message.message and message.message != before.message:
+            self._say("hand", message.message, "info" if message.connected else "fault")
+
+    # --- brain ------------------------------------------------------------------------------------------------
+
+    def _on_machine(self, message: MasterState) -> None:
+        if message.state != self.machine.state:
+            self._state_since = time.monotonic()
+        self.machine = message
+
+    def _on_transition(self, message: Transition) -> None:
+        level = {"failed": "warning", "stopped": "fault", "fault": "fault"}.get(message.outcome, "info")
+        causes = "".join(f", because {cause}" for cause in message.causes[:4])
+        reason = f": {message.reason}{causes}" if message.reason else ""
+        self._say("machine", f"{message.from_state} [{message.outcome}] {message.to_state}{reason}", level)
+        self._transition(message.path, message.from_state, message.outcome, message.to_state, message.reason + causes)
+
+    def _on_result(self, message: String) -> None:
+        try:
+            row = json.loads(message.data)
+            words = f"{row['kind']} {row['object_id']}: {row['outcome']} after {float(row['duration_s']):.1f} s"
+        except (ValueError, KeyError, TypeError):
+            return
+        self._say("result", words, "info" if row["outcome"] == "succeeded" else "warning")
+        self._result(row)
+
+    def _on_contact(self, message: Contact) -> None:
+        self.contact = (
+            f"{'contact' if message.contact else 'released'} by {message.source}, margin {message.margin:.1f}"
+        )
+        self._say("contact", f"{self.contact}: {message.message}", "info")
+
+    def _on_margin(self, message: Float64) -> None:
+        self.margin, self._margin_at = message.data, time.monotonic()
+
+    # --- controllers ------------------------------------------------------------------------------------------
+
+    def _on_manager(self, message: ControllerStatus) -> None:
+        before, self.manager = self.manager, message
+        if message.state == "fault" and before.state != "fault":
+            self._say("controller", f"fault: {message.reason}", "fault")
+
+    def _on_dmp(self, message: DmpFeedback) -> None:
+        before, self.dmp, self.dmp_at = self.dmp, message, time.monotonic()
+        if message.state == "reached" and before.state != "reached" and self.machine.state.endswith("/wait_stop"):
+            self._state_since = self.dmp_at  # the wait for contact begins when the reach has ended
+        if message.state == "aborted" and before.state != "aborted":
+            self._say("controller", f"motion aborted: {message.reason}", "warning")
+
+    def _on_unfinished(self, message: UnfinishedPtp) -> None:
+        self._say("controller", f"motion {message.ptp_id} ended before its target: {message.reason}", "warning")

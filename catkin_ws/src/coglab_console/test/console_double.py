@@ -1,0 +1,118 @@
+"""A console on a free port of loopback with a double in place of the robot, for tests of the core."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import socket
+import time
+from pathlib import Path
+
+import aiohttp
+from aiohttp import web
+from coglab_console.access import CSRF_HEADER, Access, allowed_hosts
+from coglab_console.desk import Answer, Desk
+from coglab_console.events import EventLog
+from coglab_console.fan_out import Documents
+from coglab_console.gates import Standing
+from coglab_console.page_files import load_all
+from coglab_console.server import ConsoleServer
+
+PAGE = Path(__file__).resolve().parents[1] / "page"
+READY = dict(
+    master_alive=True,
+    state="/coglab_master/wait_without_object",
+    in_hub=True,
+    arm_alive=True,
+    actions=("exchange_human_to_robot", "take"),
+    motion_allowed=True,
+    hand_alive=True,
+    hand_connected=True,
+)
+
+
+class RobotDouble:
+    """Writes down what it is asked for."""
+
+    def __init__(self, real: bool = False) -> None:
+        self.real = real
+        self.now = Standing(**READY)
+        self.stops: list[str] = []
+        self.calls: list[tuple[str, dict]] = []
+        self.stop_times: list[float] = []
+
+    def standing(self) -> Standing:
+        return self.now
+
+    def stop(self, who: str) -> None:
+        self.stops.append(who)
+        self.stop_times.append(time.monotonic())
+
+    async def call(self, name: str, arguments: dict) -> Answer:
+        self.calls.append((name, arguments))
+        return Answer(True, "done")
+
+
+class Console:
+    """One server and what stands behind it."""
+
+    def __init__(self, folder: Path, robot: RobotDouble, **files: object) -> None:
+        self.robot, self.socket = robot, socket.socket()
+        self.socket.bind(("127.0.0.1", 0))
+        self.port = self.socket.getsockname()[1]
+        self.host = f"127.0.0.1:{self.port}"
+        self.url, self.origin = f"http://{self.host}", f"http://{self.host}"
+        self.access = Access(allowed_hosts("127.0.0.1", self.port))
+        self.events, self.documents = EventLog(time.time), Documents()
+        self.desk = Desk(robot, self.events, self.documents, folder, time.time, self.link)
+        page, self.missing = load_all(PAGE, **files)
+        self.server = ConsoleServer(self.access, self.desk, self.events, self.documents, page, "c", "run1")
+        self.events.listen(lambda _event: self.server.wake())
+
+    def link(self) -> str:
+        return f"{self.url}/?t={self.access.new_token()}"
+
+    @property
+    def headers(self) -> dict[str, str]:
+        """Of a POST by the console's own page."""
+        return {"Origin": self.origin, CSRF_HEADER: "1"}
+
+    @contextlib.asynccontextmanager
+    async def browser(self):
+        """A client with a session; nothing but its cookie."""
+        jar = aiohttp.CookieJar(unsafe=True)
+        async with aiohttp.ClientSession(cookie_jar=jar) as client:
+            async with client.get(self.link(), allow_redirects=False) as response:
+                assert response.status == 302
+            yield client
+
+    async def post(
+        self, client: aiohttp.ClientSession, name: str, arguments: dict | None = None, **more
+    ) -> tuple[int, dict]:
+        body = {"name": name, "arguments": arguments or {}}
+        async with client.post(f"{self.url}/api/command", json=body, headers={**self.headers, **more}) as response:
+            return response.status, await response.json()
+
+    def socket_of(self, client: aiohttp.ClientSession, **more):
+        return client.ws_connect(f"ws://{self.host}/ws", headers={"Origin": self.origin, **more})
+
+
+@contextlib.asynccontextmanager
+async def running(folder: Path, robot: RobotDouble | None = None, **files: object):
+    """A console that serves, with its 10 Hz tick."""
+    console = Console(folder, robot or RobotDouble(), **files)
+    runner = web.AppRunner(console.server.app, access_log=None)
+    await runner.setup()
+    await web.SockSite(runner, console.socket, shutdown_timeout=0.2).start()
+
+    async def ticks() -> None:
+        while True:
+            console.desk.tick()
+            await asyncio.sleep(0.05)
+
+    task = asyncio.create_task(ticks())
+    try:
+        yield console
+    finally:
+        task.cancel()
+        await runner.cleanup()

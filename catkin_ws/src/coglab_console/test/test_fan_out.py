@@ -1,0 +1,132 @@
+"""Events without a gap, states bounded: a browser that comes back misses nothing, one that never reads slows nobody."""
+
+import asyncio
+import contextlib
+import json
+import socket
+import time
+
+from coglab_console.events import EventLog
+from coglab_console.fan_out import Client, Documents, to_json
+from console_double import running
+
+
+def test_events_are_numbered_and_what_is_lost_is_counted():
+    log = EventLog(time.time, keep=10)
+    for i in range(25):
+        log.add("test", str(i))
+    events, lost = log.since(5)
+    assert [event["seq"] for event in events] == list(range(16, 26)) and lost == 10
+    assert log.since(25) == ([], 0)
+    assert len(log.since(99)[0]) == 10  # of a console that ran before
+    assert len(log.since(-3)[0]) == 10
+    assert len(log.add("test", "x" * 5000)["text"]) == 600
+
+
+def test_a_slow_client_gets_the_newest_state_and_every_event():
+    log, documents = EventLog(time.time), Documents()
+    client = Client("a", 0, documents, log)
+    documents.put("x", 1)
+    for i in range(700):
+        client.state(f"state {i}")
+        log.add("test", str(i))
+    documents.put("x", 2)
+    first, second = client.take(), client.take()
+    assert first[0] == to_json({"t": "doc", "name": "x", "value": 2}) and first[-1] == "state 699"
+    seen = [event["seq"] for text in (first[1], second[0]) for event in json.loads(text)["events"]]
+    assert seen == list(range(1, 701))
+    assert client.states_dropped == 699
+
+
+def test_numbers_that_are_not_finite_become_null():
+    assert to_json({"a": [float("nan"), 1.5], "b": float("inf")}) == '{"a":[null,1.5],"b":null}'
+
+
+def test_a_reconnect_has_no_gap(tmp_path):
+    async def read(ws, until):
+        seen = []
+        while not seen or seen[-1] < until:
+            message = await ws.receive_json(timeout=5)
+            if message["t"] == "events":
+                assert message["lost"] == 0
+                seen += [event["seq"] for event in message["events"]]
+        return seen
+
+    async def test():
+        async with running(tmp_path) as console, console.browser() as client:
+            seen = []
+            for part in range(4):
+                for i in range(50):
+                    console.events.add("test", f"{part} {i}")
+                async with console.socket_of(client) as ws:
+                    await ws.send_json({"seq": seen[-1] if seen else 0, "epoch": "run1" if part else ""})
+                    assert (await ws.receive_json())["epoch"] == "run1"
+                    for i in range(50):
+                        console.events.add("test", f"{part} {i}")
+                    seen += await read(ws, console.events.newest())
+            assert seen == list(range(1, console.events.newest() + 1))
+
+    asyncio.run(test())
+
+
+def deaf_browser(console, key):
+    """A WebSocket that shakes hands and then never reads; its buffer is small."""
+    deaf = socket.socket()
+    deaf.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+    deaf.connect(("127.0.0.1", console.port))
+    lines = [
+        "GET /ws HTTP/1.1",
+        f"Host: {console.host}",
+        f"Origin: {console.origin}",
+        f"Cookie: c={key}",
+        "Upgrade: websocket",
+        "Connection: Upgrade",
+        "Sec-WebSocket-Version: 13",
+        "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==",
+        "",
+        "",
+    ]
+    deaf.sendall("\r\n".join(lines).encode() + bytes([0x81, 0x82, 0, 0, 0, 0]) + b"{}")
+    return deaf
+
+
+def test_a_browser_that_never_reads_slows_nobody_and_is_cut_off(tmp_path):
+    async def test():
+        async with running(tmp_path) as console, console.browser() as other, console.socket_of(other) as good:
+            deaf = deaf_browser(console, console.access.redeem(console.access.new_token()).key)
+            await good.send_str("{}")
+            while len(console.server.clients) < 2:
+                await asyncio.sleep(0.02)
+            text, got, late = "x" * 20000, 0, []
+            began = time.monotonic()
+            while time.monotonic() - began < 12.0 and len(console.server.clients) == 2:
+                console.server.publish_state({"at": time.monotonic(), "text": text})
+                while (message := await good.receive_json(timeout=5))["t"] != "state":
+                    pass
+                got += 1
+                late.append(time.monotonic() - message["at"])
+                await asyncio.sleep(0.005)
+            assert got > 100 and sorted(late)[len(late) // 2] < 0.1
+            assert [client.name for client in console.server.clients] == ["browser 1"]  # the deaf one was cut off
+            deaf.close()
+
+    asyncio.run(test())
+
+
+def test_five_browsers_get_the_same(tmp_path):
+    async def test():
+        async with running(tmp_path) as console, contextlib.AsyncExitStack() as stack:
+            sockets = []
+            for _ in range(5):
+                client = await stack.enter_async_context(console.browser())
+                sockets.append(await stack.enter_async_context(console.socket_of(client)))
+            for ws in sockets:
+                await ws.send_str("{}")
+            number = console.events.add("test", "hello")["seq"]
+            for ws in sockets:
+                seen = 0
+                while seen < number:
+                    message = await ws.receive_json(timeout=5)
+                    seen = message["events"][-1]["seq"] if message["t"] == "events" else seen
+
+    asyncio.run(test())

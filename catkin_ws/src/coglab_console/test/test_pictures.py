@@ -1,0 +1,270 @@
+"""What is drawn: the graph by Graphviz and without it, the robot's kinematics, primitives and the path ahead, bytes."""
+
+import io
+import math
+import random
+import struct
+from pathlib import Path
+
+import numpy as np
+import pytest
+from coglab_console import path_ahead, wire
+from coglab_console.graph_layout import Container, Layout, roots
+from coglab_console.primitives import LibraryError, load_library, shape_map
+from coglab_console.primitives import document as library_document
+from coglab_console.torque_rate import LEARN_TIME, Settings, TorqueRate
+from coglab_console.urdf_model import ModelError, RobotModel, quaternion, rotation
+from coglab_console.words import phase, time_limit
+
+SOURCES = Path(__file__).resolve().parents[2]
+URDF = SOURCES / "lwr_description" / "urdf" / "lwr_ih2.urdf"
+LIBRARY = SOURCES / "coglab_controllers" / "config" / "primitives.xml"
+MACHINE = {
+    "/M": Container(
+        "/M", ("A", "SUB", 'odd "name"\\'), (("ok", "A", "SUB"), ("done", "SUB", 'odd "name"\\'), ("again", "SUB", "A"))
+    ),
+    "/M/SUB": Container("/M/SUB", ("X", "Y"), (("next", "X", "Y"), ("out", "Y", "None"))),
+}
+
+
+# --- graph ----------------------------------------------------------------------------------------------------
+
+
+def test_graphviz_lays_nested_machines_out():
+    picture = Layout().of(MACHINE)
+    assert picture["problem"] == ""
+    assert {box["path"] for box in picture["boxes"]} == {"/M", "/M/SUB"}
+    assert {node["path"] for node in picture["nodes"]} == {"/M/A", '/M/odd "name"\\', "/M/SUB/X", "/M/SUB/Y"}
+    pairs = {(edge["from"], edge["to"]) for edge in picture["edges"]}
+    assert ("/M/A", "/M/SUB") in pairs and ("/M/SUB/X", "/M/SUB/Y") in pairs and len(pairs) == 4
+    inside = {box["path"]: box["box"] for box in picture["boxes"]}["/M/SUB"]
+    x, y, w, h = next(node["box"] for node in picture["nodes"] if node["path"] == "/M/SUB/X")
+    assert inside[0] <= x and x + w <= inside[0] + inside[2] and inside[1] <= y and y + h <= inside[1] + inside[3]
+    assert roots(MACHINE) == ["/M"]
+
+
+def test_the_same_structure_is_laid_out_once():
+    layout = Layout()
+    assert layout.of(MACHINE) is layout.of(dict(reversed(MACHINE.items())))
+
+
+@pytest.mark.parametrize("dot", ["no-such-program", "/bin/false", "/bin/echo"])
+def test_without_graphviz_the_states_are_shown_and_it_is_said(dot):
+    picture = Layout(dot).of(MACHINE)
+    assert "Graphviz" in picture["problem"]
+    assert len(picture["nodes"]) == 5 and picture["edges"] == []
+
+
+def test_too_many_states_are_bounded():
+    picture = Layout().of({"/M": Container("/M", tuple(f"s{i}" for i in range(1000)))})
+    assert "more than" in picture["problem"] and len(picture["nodes"]) <= 40
+
+
+# --- robot ----------------------------------------------------------------------------------------------------
+
+
+def test_kinematics_against_the_controllers():
+    cc = pytest.importorskip("coglab_controllers")
+    text = URDF.read_text()
+    arm, model = cc.Chain(text), RobotModel(text)
+    chance = random.Random(1)
+    for _ in range(50):
+        q = [chance.uniform(-1.5, 1.5) for _ in range(7)]
+        place, turn = arm.fk(np.array(q))
+        found = model.place("ih2_palm", dict(zip(arm.joint_names, q, strict=True)))
+        assert np.allclose(found[:3, 3], place, atol=1e-9)
+        assert abs(abs(np.dot(quaternion(found[:3, :3]), turn)) - 1.0) < 1e-9
+
+
+def test_the_document_of_the_robot():
+    shown = RobotModel(URDF.read_text()).document()
+    known = {shown["root"]}
+    for joint in shown["joints"]:
+        assert joint["parent"] in known
+        known.add(joint["child"])
+    assert "ih2_palm" in known and len(shown["shapes"]) > 10
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "",
+        "<robot/>",
+        "no xml",
+        "<robot><link name='a'/><link name='b'/></robot>",
+        "<robot><link name='a'/><joint name='j' type='fixed'/></robot>",
+    ],
+)
+def test_what_is_no_robot(text):
+    with pytest.raises(ModelError):
+        RobotModel(text)
+
+
+def test_rotations_both_ways():
+    chance = random.Random(2)
+    for _ in range(200):
+        q = np.array([chance.gauss(0, 1) for _ in range(4)])
+        q /= np.linalg.norm(q)
+        back = np.array(quaternion(rotation(q)))
+        assert min(np.abs(back - q).max(), np.abs(back + q).max()) < 1e-9
+
+
+# --- primitives -----------------------------------------------------------------------------------------------
+
+
+def test_roll_out_against_the_controllers():
+    cc = pytest.importorskip("coglab_controllers")
+    library = cc.Library()
+    library.load(str(LIBRARY))
+    chance = np.random.default_rng(3)
+    for name, one in load_library(LIBRARY).items():
+        start = chance.uniform([0.2, -0.3, 0.2], [0.4, 0.3, 0.6])
+        goal = start + chance.uniform([0.2, -0.2, -0.1], [0.4, 0.2, 0.2])
+        times, points = one.roll_out(start, goal)
+        peer_times, peer, _ = cc.Dmp(library[name], position=start, goal=goal).roll_out(goal, times[-1], 0.001)
+        peer_times, peer = np.asarray(peer_times), np.asarray(peer)
+        expected = np.array([np.interp(times, peer_times, peer[:, axis]) for axis in range(3)]).T
+        assert np.abs(points - expected).max() < 0.006, name
+
+
+def test_the_library_for_the_page():
+    rows = library_document(load_library(LIBRARY))
+    assert all(row["end_error_mm"] < 5.0 and row["plot"][0][0] == 0.0 for row in rows)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "",
+        "<dmp_library><primitive/></dmp_library>",
+        "<dmp_library><primitive id='a'><system/></primitive></dmp_library>",
+    ],
+)
+def test_bad_libraries_are_refused_in_words(tmp_path, text):
+    path = tmp_path / "x.xml"
+    path.write_text(text)
+    with pytest.raises(LibraryError, match="x.xml"):
+        load_library(path)
+
+
+def test_a_shape_is_turned_to_the_line_it_is_for():
+    chance = np.random.default_rng(4)
+    for mapping in ("similarity", "upright"):
+        for _ in range(100):
+            before, after = chance.normal(size=3), chance.normal(size=3)
+            assert np.allclose(shape_map(mapping, before, after) @ before, after)
+    assert np.allclose(shape_map("similarity", np.array([1.0, 0, 0]), np.array([-1.0, 0, 0])) @ [1, 0, 0], [-1, 0, 0])
+
+
+MUG = {
+    "frame": "object_mug",
+    "default_grasp": "side",
+    "default_delivery": "d",
+    "dmp": {"receive": "r", "give": "g", "take": "t"},
+    "grasps": {
+        "side": {
+            "pose": {"xyz": [0.0, -0.04, 0.05], "quaternion": [0.5, 0.5, 0.5, 0.5]},
+            "approach": {"axis": [0.0, 1.0, 0.0], "distance": 0.025},
+        }
+    },
+    "deliveries": {"d": {"pose": {"xyz": [-0.1, 0.0, -0.05], "rpy_deg": [0, 0, 0]}}},
+}
+
+
+def test_where_the_next_reach_would_end():
+    frames = {"object_mug": (0.6, 0.1, 0.3, 0, 0, 0, 1), "human_hand": (0.7, 0.0, 0.4, 0, 0, 0, 1)}
+    name, ratio, goal = path_ahead.aim("exchange_human_to_robot", MUG, frames)
+    assert (name, ratio) == ("r", 1.0) and np.allclose(goal, [0.6, 0.1 - 0.04 - 0.025, 0.35])
+    name, _, goal = path_ahead.aim("exchange_robot_to_human", MUG, frames)
+    assert name == "g" and np.allclose(goal, [0.6, -0.04, 0.4])
+
+
+@pytest.mark.parametrize(
+    "entry", [{}, {"grasps": None}, {**MUG, "frame": "gone"}, {**MUG, "grasps": {"side": {"pose": {"xyz": "x"}}}}]
+)
+def test_nobody_knows_where(entry):
+    assert path_ahead.aim("take", entry, {"object_mug": (9.0, 0, 0, 0, 0, 0, 1)}) is None
+
+
+# --- torques --------------------------------------------------------------------------------------------------
+
+
+def test_thresholds_are_learnt_at_rest_and_a_touch_stands_out():
+    chance = random.Random(5)
+    rate = TorqueRate(Settings())
+    said, t = [], 0.0
+
+    def feed(seconds, extra=0.0, moving=False):
+        nonlocal t
+        for _ in range(int(seconds * 200)):
+            t += 0.005
+            said.append(rate.feed(t, tuple(chance.gauss(0.0, 0.05) + extra for _ in range(7)), moving))
+
+    feed(0.2)
+    rate.learn()
+    feed(LEARN_TIME + 0.1)
+    assert rate.learnt and not rate.learning() and any("learnt" in words for words in said)
+    rate.take_peaks()
+    feed(2.0)
+    assert all(abs(peak) < limit for peak, limit in zip(rate.take_peaks(), rate.thresholds(), strict=True))
+    feed(0.05, extra=1.5)
+    assert all(abs(peak) > limit for peak, limit in zip(rate.take_peaks(), rate.thresholds(), strict=True))
+    rate.learn()
+    feed(0.1, moving=True)
+    assert not rate.learning() and any("moved" in words for words in said)
+
+
+@pytest.mark.parametrize("torque", [(), (1.0,) * 6, (math.nan,) * 7, (math.inf,) * 7])
+def test_odd_torques_are_left_out(torque):
+    rate = TorqueRate(Settings())
+    assert rate.feed(1.0, torque, False) == "" and rate.newest() == [0.0] * 7
+
+
+# --- bytes and words ------------------------------------------------------------------------------------------
+
+
+def test_bytes_against_the_messages_own_decoding():
+    from geometry_msgs.msg import Quaternion, TransformStamped, Vector3
+    from rospy import Time
+    from sensor_msgs.msg import JointState
+    from tf2_msgs.msg import TFMessage
+
+    message = TFMessage()
+    for i in range(3):
+        one = TransformStamped(child_frame_id=f"child_{i}")
+        one.header.frame_id, one.header.stamp = "world", Time(5, 250000000)
+        one.transform.translation, one.transform.rotation = Vector3(i, 2, 3), Quaternion(0, 0, 0, 1)
+        message.transforms.append(one)
+    stream = io.BytesIO()
+    message.serialize(stream)
+    found = list(wire.transforms(stream.getvalue()))
+    assert found[2] == ("world", "child_2", 5.25, (2.0, 2.0, 3.0, 0.0, 0.0, 0.0, 1.0))
+    state = JointState(name=["a", "b"], position=[1.0, 2.0], velocity=[], effort=[3.0, 4.0])
+    state.header.stamp, state.header.frame_id = Time(7, 0), "x"
+    stream = io.BytesIO()
+    state.serialize(stream)
+    assert wire.joint_state_effort(stream.getvalue()) == (7.0, (3.0, 4.0))
+
+
+def test_bytes_that_are_none_are_refused():
+    chance = random.Random(6)
+    for size in (0, 3, 4, 20, 100):
+        for _ in range(200):
+            data = bytes(chance.randrange(256) for _ in range(size))
+            for read in (lambda d: list(wire.transforms(d)), wire.joint_state_effort):
+                try:
+                    read(data)
+                except wire.BadBytes:
+                    pass
+    with pytest.raises(wire.BadBytes):
+        list(wire.transforms(struct.pack("<I", 4000000000)))
+
+
+def test_phases_and_their_limits():
+    config = {"handover": {"offer_timeout": 8.0}, "contact_timeout": 6.0, "time_limits": {"set_dmp_goal": 3}}
+    assert phase("/coglab_master/x/wait_stop") == "waits for contact"
+    assert phase("/m/some_state") == "some state"
+    assert time_limit("/m/wait_stop", config, {}) == 6.0
+    assert time_limit("/m/wait_stop", config, {"contact": {"timeout": 4.0}}) == 4.0
+    assert time_limit("/m/set_dmp_goal", config, {}) == 3.0
+    assert time_limit("/m/hand_open", config, {}) is None
