@@ -76,7 +76,8 @@ def folder(tmp_path_factory):
 def test_the_arguments_of_every_coglab_line_are_taken(command, folder, monkeypatch):
     monkeypatch.setenv("PWD", str(folder))
     for part in command.split(" && "):
-        part = part.replace("wrist_damper", "ctrl_more") if " test " in part else part  # made by the line before it
+        if " test " in part:  # packages made by the line before
+            part = part.replace("wrist_damper", "ctrl_more").replace("side_sway", "coglab_controllers")
         words = shlex.split(os.path.expandvars(part))[1:]
         words = [
             "object:=mug" if word == "object:=cup" else word for word in words

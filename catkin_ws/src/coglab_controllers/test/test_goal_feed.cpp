@@ -49,7 +49,7 @@ TEST(GoalRelay, AFirstFrameAloneIsNoGoalHoweverOftenItIsLookedAt) {
 TEST(GoalRelay, AStaticFrameIsToldAtOnceAndThenOnceASecond) {
   GoalRelay relay;
   int told = 0;
-  for (int i = 0; i < 350; ++i) {
+  for (std::int64_t i = 0; i < 350; ++i) {
     const std::int64_t now = kSecond + 10'000'000 * i;
     told += relay.see(now, sight(kGoal, 0, now)) ? 1 : 0;
     EXPECT_EQ(relay.goal().position, kGoal);

@@ -6,6 +6,7 @@
 
 #include <coglab_msgs/ReasonCode.h>
 
+#include "coglab_rt/reason.hpp"
 #include "lwr_fri_bridge/ros/reason_codes.hpp"
 
 namespace lwr_fri_bridge {
@@ -22,10 +23,10 @@ TEST(ReasonCodes, EveryMotionBlockHasOneOfItsOwn) {
     EXPECT_NE(code, Code::UNEXPECTED) << describe(block);
     EXPECT_EQ(code == Code::NONE, block == MotionBlock::None) << describe(block);
     EXPECT_TRUE(seen.insert(code).second) << describe(block);
-    EXPECT_EQ(motionBlockOf(code), block) << describe(block);
+    EXPECT_EQ(coglab_rt::motionBlockOf(code), block) << describe(block);
   }
   EXPECT_GE(seen.size(), 8U);
-  EXPECT_EQ(motionBlockOf(Code::COMPUTER_LATE), MotionBlock::NotStarted);
+  EXPECT_EQ(coglab_rt::motionBlockOf(Code::COMPUTER_LATE), MotionBlock::NotStarted);
 }
 
 TEST(ReasonCodes, EveryOutcomeHasOne) {

@@ -1,12 +1,13 @@
 """Types of the compiled module. Shapes in brackets, units SI, quaternions x y z w, joints in wire order."""
 
 from collections.abc import Sequence
+from typing import TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
-Array = npt.NDArray[np.float64]
-ArrayLike = npt.ArrayLike
+Array: TypeAlias = npt.NDArray[np.float64]
+ArrayLike: TypeAlias = npt.ArrayLike
 
 MAX_BASIS: int
 """Largest number of basis functions of a primitive."""

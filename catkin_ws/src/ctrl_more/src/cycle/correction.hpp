@@ -93,7 +93,8 @@ inline Norms norms(SignalKind kind, int size, const double* c) {
   if (kind != SignalKind::Vector) {
     const double* q = c + n;
     const double sine = std::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2]);
-    result.angle = 2.0 * std::atan2(sine, std::abs(q[3]));
+    // Most corrections do not turn anything.
+    if (sine != 0.0) result.angle = 2.0 * std::atan2(sine, std::abs(q[3]));
   }
   return result;
 }
