@@ -40,7 +40,7 @@ def take(home: Path, path: Path) -> None:
         time.sleep(12.0)  # charts fill
         browser.driver.find_element(By.CSS_SELECTOR, button).click()
         browser.js("document.activeElement.blur()")
-        browser.until("const s = coglab.state(); return s.dmp[0] === 'running' && s.dmp[2] < 0.2", 30.0)
+        browser.until("const s = coglab.state(); return s.dmp[0] === 'running' && s.dmp[2] < 0.3", 90.0)
         browser.picture(path)
 
 

@@ -224,7 +224,7 @@ class Console(unittest.TestCase):
 
     def test_09_a_second_console_of_this_master_is_refused_and_says_so(self):
         command = ["rosrun", "coglab_console", "console_node.py", "__name:=another_console"]
-        ended = subprocess.run(command, capture_output=True, text=True, timeout=30)
+        ended = subprocess.run(command, capture_output=True, text=True, timeout=90)
         self.assertEqual(ended.returncode, 1)
         self.assertIn("another console of this ROS master runs", ended.stderr)
         self.browser.until("return !document.body.classList.contains('lost')", 5.0)
