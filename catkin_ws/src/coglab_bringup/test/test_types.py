@@ -11,7 +11,7 @@ import pytest
 TOP = Path(__file__).resolve().parents[4]
 SOURCES = TOP / "catkin_ws" / "src"
 PACKAGES = ("coglab_py", "coglab_objects", "coglab_perception", "coglab_sim", "coglab_smach", "coglab_bringup",
-            "coglab_console",             "ih2_hand", "executive_smach/smach", "executive_smach/smach_ros")  # fmt: skip
+            "coglab_console", "ih2_hand", "executive_smach/smach", "executive_smach/smach_ros")  # fmt: skip
 ROS = {"rospy", "actionlib", "tf2_ros", "smach_ros", "rosbag", "rosgraph", "rospkg", "genpy", "diagnostic_updater"}
 # What --strict sets for a module, but for numpy's generics, which say nothing here, and for Any from untyped packages.
 STRICT = ("disallow_untyped_defs", "disallow_incomplete_defs", "disallow_untyped_calls", "disallow_untyped_decorators",

@@ -63,7 +63,9 @@ def bare(tmp_path_factory):
     """The sources with a package list of which nothing is installed: to install or to build would be seen."""
     top = tmp_path_factory.mktemp("bare")
     shutil.copy(TOP / "coglab", top)
-    (top / "debian-packages.txt").write_text("".join(f"{group}: {ABSENT}\n" for group in ("run", "build", "test", "browser", "viz")))
+    (top / "debian-packages.txt").write_text(
+        "".join(f"{group}: {ABSENT}\n" for group in ("run", "build", "test", "browser", "viz"))
+    )
     (top / "catkin_ws" / "devel").mkdir(parents=True)
     (top / "catkin_ws" / "src").symlink_to(TOP / "catkin_ws" / "src")
     (top / "catkin_ws" / "devel" / "setup.bash").write_text("exit 99\n")

@@ -158,7 +158,12 @@ def _judge_nothing(command: str, words: list[str]) -> None:
         raise Refused(f"{command} takes no arguments, got '{' '.join(words)}'")
 
 
-TOOLS = {"hand": {"trace": 0}, "controller": {"new": 1}, "object": {"new": 1, "check": 0, "list": 0}, "console": {"picture": 0}}
+TOOLS = {
+    "hand": {"trace": 0},
+    "controller": {"new": 1},
+    "object": {"new": 1, "check": 0, "list": 0},
+    "console": {"picture": 0},
+}
 
 
 def judge(top: Path, command: str, words: list[str]) -> None:
