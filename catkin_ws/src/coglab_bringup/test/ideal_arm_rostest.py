@@ -57,7 +57,7 @@ class IdealArm(unittest.TestCase):
         self.robot.start()
         self.robot.go(AWAY)
         for value, wanted in zip(self.robot.arm(), AWAY, strict=True):
-            self.assertAlmostEqual(value, wanted, delta=1e-3)
+            self.assertAlmostEqual(value, wanted, delta=2e-3)  # ptp/tolerance
 
     def test_3_hold_brakes_and_latches_until_reset(self) -> None:
         robot = self.robot
