@@ -11,7 +11,7 @@ import unittest
 import rospkg
 import rospy
 import rostest
-from coglab_msgs.msg import DmpGoal, FeedbackGain, FeedbackState, FeedbackStatus, IkDebug
+from coglab_msgs.msg import DmpGoal, FeedbackGain, FeedbackState, FeedbackStatus, IkDebug, ReasonCode
 from coglab_msgs.srv import (
     AddPtpRequest,
     DescribeController,
@@ -165,15 +165,16 @@ class TopicGoal(unittest.TestCase):
         call, shown = self.robot.call, []
         rospy.Subscriber(name + "state", FeedbackState, shown.append)
         config = "package://ctrl_more/config/ee_admittance.yaml"
-        for refused in (
-            ("dmp", "EeAdmittance", "", ""),
-            ("joint_limits", "JointLimits", "", ""),
-            ("second", "NoSuchType", "", ""),
-            ("second", "EeAdmittance", "", "/no/such.yaml"),
+        for code, *refused in (
+            (ReasonCode.BUSY, "dmp", "EeAdmittance", "", ""),
+            (ReasonCode.INVALID_ARGUMENT, "joint_limits", "JointLimits", "", ""),
+            (ReasonCode.BAD_FILE, "second", "NoSuchType", "", ""),
+            (ReasonCode.BAD_FILE, "second", "EeAdmittance", "", "/no/such.yaml"),
         ):
             answer = call(name + "load", LoadFeedback, *refused)
             self.assertFalse(answer.success, refused)
             self.assertTrue(answer.message, refused)
+            self.assertEqual(answer.reason_code, code, (refused, answer.message))
         answer = call(name + "load", LoadFeedback, "second", "EeAdmittance", "", config)
         self.assertTrue(answer.success, answer.message)
         gains = [FeedbackGain("force_dead_band", [0.0]), FeedbackGain("stiffness", [20.0])]
@@ -203,6 +204,7 @@ class TopicGoal(unittest.TestCase):
         answer = call(name + "unload", FeedbackSelect, ["second"], "")
         self.assertFalse(answer.success)
         self.assertIn("disable", answer.message)
+        self.assertEqual(answer.reason_code, ReasonCode.BUSY)
         self.assertTrue(call(name + "disable", FeedbackSelect, ["second"], "").success)
         wait_until(lambda: call(name + "unload", FeedbackSelect, ["second"], "").success, 5.0, "unloaded")
         wait_until(lambda: "second" not in [c.name for c in self.feedback[-1].controllers], 5.0, "gone")

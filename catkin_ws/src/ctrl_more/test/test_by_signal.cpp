@@ -114,11 +114,24 @@ TEST_F(BySignal, MotionSwitchResetsWhoWantsIt) {
   EXPECT_EQ(limits->resets, held + 1) << "Reset is the default";
 }
 
+TEST_F(BySignal, RefusalsAndPausesHaveACauseBesideTheSentence) {
+  EXPECT_EQ(rig.manager->pauseAllUsingRobotState("nothing").cause(), Cause::UnknownName);
+  EXPECT_EQ(rig.manager->enable("nobody").cause(), Cause::UnknownName);
+  EXPECT_EQ(rig.manager->setExecutionOrder({"force", "force"}).cause(), Cause::InvalidArgument);
+  EXPECT_EQ(rig.manager->unload("force").cause(), Cause::Busy) << "it is enabled";
+  ASSERT_TRUE(rig.manager->pause("force"));
+  EXPECT_EQ(rig.manager->status("force").causes, std::vector<PauseCause>{PauseCause::User});
+  ASSERT_TRUE(rig.manager->resume("force"));
+  EXPECT_EQ(rig.manager->resume("force").cause(), Cause::None);
+}
+
 TEST_F(BySignal, KeyAndFullNameAreTheSameReason) {
   for (const std::string robot : {"wrench", "measuredData/wrench"}) {
     for (const std::string back : {"wrench", "measuredData/wrench"}) {
       ASSERT_TRUE(rig.manager->pauseAllUsingRobotState(robot));
       EXPECT_EQ(rig.manager->status("force").reasons, Names{"robot signal measuredData/wrench"});
+      ASSERT_EQ(rig.manager->status("force").causes.size(), 1U);
+      EXPECT_EQ(rig.manager->status("force").causes[0], PauseCause::Signal);
       ASSERT_TRUE(rig.manager->resumeAllUsingRobotState(back));
       EXPECT_FALSE(rig.manager->isPaused("force")) << robot << " " << back;
     }

@@ -103,6 +103,7 @@ class DmpControllerRos : public MotionControllerRos {
     const Answer answer = controller_->loadDmps(request.filename, loaded);
     response.num_loaded = static_cast<std::int16_t>(loaded);
     response.success = answer.success;
+    response.reason_code = answer.number();
     response.message = answer.message;
     if (!answer.success) ROS_WARN("load_dmps refused: %s", answer.message.c_str());
     return true;

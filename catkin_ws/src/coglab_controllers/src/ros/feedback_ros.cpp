@@ -5,12 +5,57 @@
 #include <sstream>
 #include <stdexcept>
 
+#include <coglab_msgs/ReasonCode.h>
 #include <ros/console.h>
 #include <ros/serialization.h>
 
 #include "ctrl_more/loading/search_path.hpp"
 
 namespace coglab_controllers {
+namespace {
+
+using Code = coglab_msgs::ReasonCode;
+
+std::uint16_t codeOf(ctrl_more::Cause cause) {
+  switch (cause) {
+    case ctrl_more::Cause::None:
+      return Code::NONE;
+    case ctrl_more::Cause::InvalidArgument:
+      return Code::INVALID_ARGUMENT;
+    case ctrl_more::Cause::UnknownName:
+      return Code::UNKNOWN_NAME;
+    case ctrl_more::Cause::Busy:
+      return Code::BUSY;
+    case ctrl_more::Cause::BadFile:
+      return Code::BAD_FILE;
+    case ctrl_more::Cause::Fault:
+      return Code::CONTROLLER_FAULT;
+  }
+  return Code::UNEXPECTED;
+}
+
+std::uint16_t codeOf(ctrl_more::PauseCause cause) {
+  switch (cause) {
+    case ctrl_more::PauseCause::User:
+      return Code::PAUSED_BY_USER;
+    case ctrl_more::PauseCause::Signal:
+      return Code::PAUSED_BY_SIGNAL;
+    case ctrl_more::PauseCause::Fault:
+      return Code::CONTROLLER_FAULT;
+  }
+  return Code::UNEXPECTED;
+}
+
+/// A refusal that is this node's own.
+template <typename Response>
+bool refuse(Response& response, std::uint16_t code, const std::string& message) {
+  response.success = false;
+  response.reason_code = code;
+  response.message = message;
+  return true;
+}
+
+}  // namespace
 
 void RosLogSink::write(const ctrl_more::LogRecord& record) {
   const std::string line = record.toLine();
@@ -61,9 +106,11 @@ FeedbackRos::~FeedbackRos() {
 template <typename Response>
 bool FeedbackRos::finish(const ctrl_more::Status& status, Response& response) {
   response.success = status.ok();
+  response.reason_code = codeOf(status.cause());
   response.message = status.message();
   if (status.ok() && status.generation() != 0 &&
       !feedback_.waitAdopted(status.generation(), manager_.planTimeout())) {
+    response.reason_code = Code::NOT_ADOPTED;
     response.message +=
         "the control cycle has not taken the change yet; it will with its next cycle";
   }
@@ -101,12 +148,12 @@ bool FeedbackRos::onSignal(BySignal::Request& request, BySignal::Response& respo
 
 bool FeedbackRos::onProfile(Select::Request& request, Select::Response& response) {
   if (request.names.size() != 1) {
-    response.success = false;
-    response.message = "names: expected one profile, got " + std::to_string(request.names.size());
-    return true;
+    return refuse(response, Code::INVALID_ARGUMENT,
+                  "names: expected one profile, got " + std::to_string(request.names.size()));
   }
   const Answer answer = manager_.applyProfile(request.names[0]);
   response.success = answer.success;
+  response.reason_code = answer.number();
   response.message = answer.message;
   return true;
 }
@@ -139,9 +186,8 @@ bool FeedbackRos::onLoad(coglab_msgs::LoadFeedback::Request& request,
   std::vector<std::string> ids, types;
   manager_.list(ids, types);
   if (std::count(ids.begin(), ids.end(), request.name) != 0) {
-    response.success = false;
-    response.message = "'" + request.name + "' is in use; choose another name, or unload it first";
-    return true;
+    return refuse(response, Code::BUSY,
+                  "'" + request.name + "' is in use; choose another name, or unload it first");
   }
   try {
     const ctrl_more::SearchPath files("", manager_.settings().plugin_paths);
@@ -156,19 +202,16 @@ bool FeedbackRos::onLoad(coglab_msgs::LoadFeedback::Request& request,
     if (!request.filename.empty()) entry.config_file = files.find(request.filename);
     return finish(feedback_.loadController(request.name, entry), response);
   } catch (const std::exception& error) {
-    response.success = false;
-    response.message = "'" + request.name + "' was not loaded: " + error.what();
-    return true;
+    return refuse(response, Code::BAD_FILE,
+                  "'" + request.name + "' was not loaded: " + error.what());
   }
 }
 
 bool FeedbackRos::onUnload(Select::Request& request, Select::Response& response) {
   const auto lock = manager_.lockRequests();
   if (request.names.size() != 1) {
-    response.success = false;
-    response.message =
-        "names: expected one controller, got " + std::to_string(request.names.size());
-    return true;
+    return refuse(response, Code::INVALID_ARGUMENT,
+                  "names: expected one controller, got " + std::to_string(request.names.size()));
   }
   return finish(feedback_.unload(request.names[0]), response);
 }
@@ -182,10 +225,12 @@ bool FeedbackRos::onDescribe(coglab_msgs::DescribeController::Request& request,
     response.success = true;
   } catch (const std::exception& error) {
     response.text = error.what();
+    response.reason_code = Code::UNKNOWN_NAME;
     response.success = false;
   } catch (...) {
     response.text =
         "describe() of '" + request.name + "' threw something that is no std::exception";
+    response.reason_code = Code::CONTROLLER_FAULT;
     response.success = false;
   }
   return true;
@@ -232,7 +277,11 @@ void FeedbackRos::publishStatus() {
     entry.paused = controller.paused;
     entry.activity = ctrl_more::nameOf(controller.activity);
     entry.pause_reasons = controller.reasons;
+    for (const ctrl_more::PauseCause cause : controller.causes) {
+      entry.pause_codes.push_back(codeOf(cause));
+    }
     entry.fault = controller.fault_text;
+    if (controller.fault != ctrl_more::FaultKind::None) entry.fault_code = Code::CONTROLLER_FAULT;
     entry.faults = controller.faults;
     entry.overruns = controller.overruns;
     entry.safety = controller.safety;

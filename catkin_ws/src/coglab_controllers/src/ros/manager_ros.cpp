@@ -222,6 +222,7 @@ bool ManagerRos::onSpeed(coglab_msgs::SetSpeedScale::Request& request,
                          coglab_msgs::SetSpeedScale::Response& response) {
   const Answer answer = manager_->setSpeedScale(request.speed_scale);
   response.success = answer.success;
+  response.reason_code = answer.number();
   response.message = answer.message;
   return true;
 }

@@ -53,7 +53,7 @@ Status GainValues::set(const std::string& name, const std::vector<double>& value
     }
     return {};
   }
-  return Status::failure("no gain '" + name + "'" + suggestion(name, known));
+  return Status::failure("no gain '" + name + "'" + suggestion(name, known), Cause::UnknownName);
 }
 
 std::map<std::string, std::vector<double>> GainValues::all() const {

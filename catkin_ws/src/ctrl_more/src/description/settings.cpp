@@ -25,7 +25,7 @@ int SettingValues::indexOf(const std::string& name, SettingSpec::Kind kind) cons
 
 Status SettingValues::set(const std::string& name, const std::string& text) {
   const int i = indexOf(name, SettingSpec::Kind::Text);
-  if (i < 0) return Status::failure("'" + name + "' is no text setting");
+  if (i < 0) return Status::failure("'" + name + "' is no text setting", Cause::UnknownName);
   const auto& choices = specs_[i].choices;
   if (!choices.empty() && std::find(choices.begin(), choices.end(), text) == choices.end()) {
     return Status::failure("'" + name + "' cannot be '" + text + "'" + suggestion(text, choices));
@@ -37,7 +37,7 @@ Status SettingValues::set(const std::string& name, const std::string& text) {
 
 Status SettingValues::set(const std::string& name, const std::vector<double>& numbers) {
   const int i = indexOf(name, SettingSpec::Kind::Numbers);
-  if (i < 0) return Status::failure("'" + name + "' is no numeric setting");
+  if (i < 0) return Status::failure("'" + name + "' is no numeric setting", Cause::UnknownName);
   const SettingSpec& spec = specs_[i];
   if (numbers.empty() || (!spec.any_size && numbers.size() != spec.initial.size())) {
     return Status::failure("'" + name + "' expects " + std::to_string(spec.initial.size()) +

@@ -74,7 +74,8 @@ Status FeedbackControllersManager::withdraw(std::uint64_t generation) {
   }
   plans.store(roster_->planOf(*before_last_, generation + 1));
   if (!plans.retract()) {
-    return Status::failure("plan " + std::to_string(generation) + " is adopted already");
+    return Status::failure("plan " + std::to_string(generation) + " is adopted already",
+                           Cause::Busy);
   }
   const std::unique_ptr<Draft> back = std::move(before_last_);
   return commit(std::move(*back), false);

@@ -175,7 +175,8 @@ Status FeedbackControllersManager::take(ControllerInstance instance, const std::
     Draft draft = roster_->draft();
     draft.order.push_back(name);
     Status status = roster_->checkShared(draft);
-    if (!status) return Status::failure("controller '" + name + "': " + status.message());
+    if (!status)
+      return Status::failure("controller '" + name + "': " + status.message(), status.cause());
     if (offer) {
       status = publish(std::move(draft));
     } else {
@@ -188,8 +189,9 @@ Status FeedbackControllersManager::take(ControllerInstance instance, const std::
   } catch (const std::exception& e) {
     return Status::failure("controller '" + name + "': " + e.what());
   } catch (...) {
-    return Status::failure("controller '" + name +
-                           "': initialize() threw something that is not a std::exception");
+    return Status::failure(
+        "controller '" + name + "': initialize() threw something that is not a std::exception",
+        Cause::Fault);
   }
 }
 
@@ -197,18 +199,20 @@ Status FeedbackControllersManager::unload(const std::string& name) {
   const RosterLock lock(roster_->mutex);
   auto& members = roster_->members;
   const int i = roster_->indexOf(name);
-  if (i < 0) return Status::failure(roster_->unknownName(name));
+  if (i < 0) return Status::failure(roster_->unknownName(name), Cause::UnknownName);
   const Member& m = *members[i];
   if (m.state.enabled || m.slot->activity() != Activity::Off) {
     return Status::failure("'" + name + "' is " +
-                           (m.state.enabled ? "enabled" : nameOf(m.slot->activity())) +
-                           "; disable it and wait until its correction has faded");
+                               (m.state.enabled ? "enabled" : nameOf(m.slot->activity())) +
+                               "; disable it and wait until its correction has faded",
+                           Cause::Busy);
   }
   for (const auto& profile : roster_->profiles) {
     const auto& list = profile.second;
     if (std::find(list.begin(), list.end(), name) != list.end()) {
-      return Status::failure("'" + name + "' is part of profile '" + profile.first +
-                             "'; change the profile first");
+      return Status::failure(
+          "'" + name + "' is part of profile '" + profile.first + "'; change the profile first",
+          Cause::Busy);
     }
   }
   Draft draft = roster_->draft();

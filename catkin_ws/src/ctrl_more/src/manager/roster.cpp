@@ -14,8 +14,14 @@ ControllerStatus Member::status() const {
   status.type = description.type;
   status.safety = description.safety;
   status.enabled = state.enabled;
-  status.reasons.assign(state.reasons.begin(), state.reasons.end());
-  if (status.fault != FaultKind::None) status.reasons.push_back("fault: " + status.fault_text);
+  for (const auto& [reason, cause] : state.reasons) {
+    status.reasons.push_back(reason);
+    status.causes.push_back(cause);
+  }
+  if (status.fault != FaultKind::None) {
+    status.reasons.push_back("fault: " + status.fault_text);
+    status.causes.push_back(PauseCause::Fault);
+  }
   status.paused = !status.reasons.empty();
   return status;
 }
@@ -97,7 +103,7 @@ Status Roster::setProfile(const std::string& profile, const std::vector<std::str
   if (profile.empty()) return Status::failure("a profile needs a name that is not empty");
   for (const std::string& name : controllers) {
     if (indexOf(name) < 0) {
-      return Status::failure("profile '" + profile + "': " + unknownName(name));
+      return Status::failure("profile '" + profile + "': " + unknownName(name), Cause::UnknownName);
     }
     if (std::count(controllers.begin(), controllers.end(), name) > 1) {
       return Status::failure("profile '" + profile + "': '" + name + "' appears twice");

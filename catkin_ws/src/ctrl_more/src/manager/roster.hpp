@@ -3,7 +3,6 @@
 #include <map>
 #include <memory>
 #include <mutex>
-#include <set>
 #include <string>
 #include <vector>
 
@@ -17,7 +16,7 @@ namespace ctrl_more {
 /// What can be changed of one controller, as services see it.
 struct MemberState {
   bool enabled = false;
-  std::set<std::string> reasons;  ///< to be paused, the latched fault not among them
+  std::map<std::string, PauseCause> reasons;  ///< to be paused, the latched fault not among them
   std::uint32_t fault_clears = 0;
   std::uint32_t resets = 0;
   std::uint32_t reorders = 0;

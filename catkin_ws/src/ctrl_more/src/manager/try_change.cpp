@@ -62,7 +62,8 @@ class Trial {
     if (step.who != Who::Named) return bySignal(step);
     if (!step.name.empty()) {
       const int i = roster_.indexOf(step.name);
-      return i < 0 ? Status::failure(roster_.unknownName(step.name)) : byName(step, i, true);
+      return i < 0 ? Status::failure(roster_.unknownName(step.name), Cause::UnknownName)
+                   : byName(step, i, true);
     }
     for (std::size_t i = 0; i < draft_.states.size(); ++i) {
       const Status status = byName(step, i, false);
@@ -91,7 +92,8 @@ class Trial {
   std::vector<std::string> reasonsLeft(int index) const {
     const Member& member = *roster_.members[index];
     const MemberState& state = draft_.states[index];
-    std::vector<std::string> left(state.reasons.begin(), state.reasons.end());
+    std::vector<std::string> left;
+    for (const auto& entry : state.reasons) left.push_back(entry.first);
     const ControllerStatus now = member.status();
     if (now.fault != FaultKind::None && state.fault_clears == member.state.fault_clears) {
       left.push_back("fault: " + now.fault_text);
@@ -122,7 +124,7 @@ class Trial {
     if (step.kind == Kind::Resume && step.reason == "fault") {
       ++state.fault_clears;
     } else {
-      set(state, step.kind, step.reason);
+      set(state, step.kind, step.reason, PauseCause::User);
     }
     return {};
   }
@@ -139,15 +141,18 @@ class Trial {
         spared_.push_back(member.name);
         continue;
       }
-      for (const std::string& full : signals) set(draft_.states[i], step.kind, what + full);
+      for (const std::string& full : signals)
+        set(draft_.states[i], step.kind, what + full, PauseCause::Signal);
     }
     if (used) return {};
     return Status::failure("no loaded controller uses " + what + step.name + "; see getUsed" +
-                           (step.who == Who::UsingRobotState ? "Robot" : "Control") + "States()");
+                               (step.who == Who::UsingRobotState ? "Robot" : "Control") +
+                               "States()",
+                           Cause::UnknownName);
   }
 
-  static void set(MemberState& state, Kind kind, const std::string& reason) {
-    if (kind == Kind::Pause) state.reasons.insert(reason);
+  static void set(MemberState& state, Kind kind, const std::string& reason, PauseCause cause) {
+    if (kind == Kind::Pause) state.reasons.emplace(reason, cause);
     if (kind == Kind::Resume) state.reasons.erase(reason);
     if (kind == Kind::Enable || kind == Kind::Disable) state.enabled = kind == Kind::Enable;
   }
@@ -155,7 +160,7 @@ class Trial {
   Status order(const std::vector<std::string>& wanted) {
     for (const std::string& name : wanted) {
       if (roster_.indexOf(name) < 0) {
-        return Status::failure("execution order: " + roster_.unknownName(name));
+        return Status::failure("execution order: " + roster_.unknownName(name), Cause::UnknownName);
       }
       if (std::count(wanted.begin(), wanted.end(), name) > 1) {
         return Status::failure("execution order: '" + name + "' appears twice");
@@ -182,7 +187,8 @@ class Trial {
     if (found == roster_.profiles.end()) {
       std::vector<std::string> known;
       for (const auto& entry : roster_.profiles) known.push_back(entry.first);
-      return Status::failure("there is no profile '" + name + "'" + suggestion(name, known));
+      return Status::failure("there is no profile '" + name + "'" + suggestion(name, known),
+                             Cause::UnknownName);
     }
     const std::vector<std::string>& list = found->second;
     for (std::size_t i = 0; i < draft_.states.size(); ++i) {
@@ -203,7 +209,7 @@ class Trial {
   // Values are checked against the declaration of the controller, one by one and together.
   Status gains(const Change::Step& step) {
     const int i = roster_.indexOf(step.name);
-    if (i < 0) return Status::failure(roster_.unknownName(step.name));
+    if (i < 0) return Status::failure(roster_.unknownName(step.name), Cause::UnknownName);
     const Member& member = *roster_.members[i];
     MemberState& state = draft_.states[i];
     GainValues values = *state.gains;
@@ -213,7 +219,8 @@ class Trial {
     }
     for (const auto& gain : step.gains) {
       const Status status = values.set(gain.first, gain.second);
-      if (!status) return Status::failure("'" + member.name + "': " + status.message());
+      if (!status)
+        return Status::failure("'" + member.name + "': " + status.message(), status.cause());
     }
     const std::string complaint = complaintOf(member.slot->controller(), values);
     if (!complaint.empty()) return Status::failure("'" + member.name + "': " + complaint);
@@ -238,7 +245,7 @@ class Trial {
       values = config.gains;
       return {};
     } catch (const std::exception& e) {
-      return Status::failure(e.what());
+      return Status::failure(e.what(), Cause::BadFile);
     }
   }
 

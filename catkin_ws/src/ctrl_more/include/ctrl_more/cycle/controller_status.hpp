@@ -36,6 +36,13 @@ enum class FaultKind : std::uint8_t {
 /// Words for a kind of fault.
 const char* nameOf(FaultKind kind);
 
+/// Who or what pauses a controller.
+enum class PauseCause : std::uint8_t {
+  User,    ///< a request by its name
+  Signal,  ///< a request by a signal that it uses
+  Fault    ///< its latched fault
+};
+
 /// State of one controller for users, services and displays.
 struct ControllerStatus {
   std::string name;                   ///< instance
@@ -45,6 +52,7 @@ struct ControllerStatus {
   bool paused = false;                ///< for any reason, a latched fault included
   bool safety = false;                ///< refuses pause and disable unless forced
   std::vector<std::string> reasons;   ///< why it is paused
+  std::vector<PauseCause> causes;     ///< of each of the reasons
   Activity activity = Activity::Off;  ///< what the cycle does with it
   FaultKind fault = FaultKind::None;  ///< the latched fault
   std::string fault_text;             ///< the latched fault in words

@@ -6,6 +6,16 @@
 
 namespace ctrl_more {
 
+/// What kind of failure a Status tells of, for programs; the sentence is for people.
+enum class Cause : std::uint8_t {
+  None,             ///< success
+  InvalidArgument,  ///< a value, size, name or combination that is not allowed
+  UnknownName,      ///< no controller, gain, setting, signal or profile of that name
+  Busy,             ///< something has to end or to be undone first
+  BadFile,          ///< a file was not read; the sentence names it
+  Fault             ///< the controller's own code threw
+};
+
 /// Outcome of a request made outside the control cycle.
 ///
 /// A success carries no text and allocates nothing. A failure carries one sentence that says what
@@ -25,18 +35,22 @@ class Status {
 
   /// Failure with its sentence.
   /// @param message expected, got, and what to do next; must not be empty
-  static Status failure(std::string message) {
+  /// @param cause of which kind it is
+  static Status failure(std::string message, Cause cause = Cause::InvalidArgument) {
     Status status;
-    status.ok_ = false;
+    status.cause_ = cause;
     status.message_ = std::move(message);
     return status;
   }
 
   /// True for success.
-  bool ok() const { return ok_; }
+  bool ok() const { return cause_ == Cause::None; }
 
   /// True for success.
-  explicit operator bool() const { return ok_; }
+  explicit operator bool() const { return ok(); }
+
+  /// Kind of the failure; None for a success.
+  Cause cause() const { return cause_; }
 
   /// The sentence of a failure; for a success empty, or a note (for example which controllers a
   /// request left alone).
@@ -54,7 +68,7 @@ class Status {
   std::uint64_t generation() const { return generation_; }
 
  private:
-  bool ok_ = true;
+  Cause cause_ = Cause::None;
   std::uint64_t generation_ = 0;
   std::string message_;
 };
