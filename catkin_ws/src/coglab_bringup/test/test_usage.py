@@ -18,7 +18,7 @@ REFUSED = {
     "demo --seed 1.5": "expected a whole number",
     "demo --out /proc/x": "/proc/x cannot be written",
     "demo --bogus": "unrecognized arguments: --bogus",
-    "test nosuch": "no package named nosuch; there are: coglab_bringup, coglab_controllers",
+    "test nosuch": "no package named nosuch; there are: coglab_bringup, coglab_console, coglab_controllers",
     "test --out /usr": "--out /usr holds other files",
     "bench nosuch": "no bench named nosuch; there are: ",
     "bench --json /no/such/folder/x": "expected a file in a folder that exists, got /no/such/folder/x",
