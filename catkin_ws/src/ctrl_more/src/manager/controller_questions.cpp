@@ -1,5 +1,7 @@
 #include "ctrl_more/manager/controller_questions.hpp"
 
+#include <set>
+
 #include "manager/roster.hpp"
 
 namespace ctrl_more {

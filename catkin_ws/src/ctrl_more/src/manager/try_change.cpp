@@ -1,5 +1,6 @@
 // Changes of a manager's controllers, tried on a draft.
 #include <algorithm>
+#include <set>
 #include <stdexcept>
 
 #include "ctrl_more/description/config_node.hpp"
