@@ -167,7 +167,7 @@ class TopicGoal(unittest.TestCase):
         config = "package://ctrl_more/config/ee_admittance.yaml"
         for code, *refused in (
             (ReasonCode.BUSY, "dmp", "EeAdmittance", "", ""),
-            (ReasonCode.INVALID_ARGUMENT, "joint_limits", "JointLimits", "", ""),
+            (ReasonCode.BUSY, "joint_limits", "JointLimits", "", ""),
             (ReasonCode.BAD_FILE, "second", "NoSuchType", "", ""),
             (ReasonCode.BAD_FILE, "second", "EeAdmittance", "", "/no/such.yaml"),
         ):
