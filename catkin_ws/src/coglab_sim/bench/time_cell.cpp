@@ -43,7 +43,7 @@ int main(int argc, char** argv) {
   config.krc.period = 0.001;
   const int blocks = std::atoi(argv[2]), steps = std::atoi(argv[3]);
   Cell cell(config);
-  HumanInput human;
+  plant::PersonInput human;
   human.hand.position = Vector3d(0.7, 0.0, 0.6);
   human.grip = 1.0;
   ArmModel model(config.urdf);
@@ -64,7 +64,7 @@ int main(int argc, char** argv) {
     const double cell_ns = (processorTime() - begin) / steps;
     begin = processorTime();
     for (int i = 0; i < steps; ++i) {
-      model.evaluate(cell.arm().position(), cell.arm().velocity(), terms);
+      model.evaluate(cell.plant().position(), cell.plant().velocity(), terms);
       sum += terms.gravity[1];
     }
     std::printf("%.1f %.1f\n", cell_ns, (processorTime() - begin) / steps);

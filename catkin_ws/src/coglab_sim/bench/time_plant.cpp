@@ -80,7 +80,7 @@ int main(int argc, char** argv) {
   for (int i = 0; i < kMotors; ++i) plant.motors().set(i, preshape[i]);
   const Quaterniond turn(0.5, -0.5, -0.5, -0.5);
   plant.place(Place::RobotHand, {Vector3d(0.04, 0.0, 0.0) - turn * config.object.center, turn});
-  for (int i = 1; i < kMotors; ++i) plant.motors().command(i, {1.0, 1.0, 0.5});
+  for (int i = 1; i < kMotors; ++i) plant.motors().command(i, {1.0, 1.0, 240.0});
   for (int i = 0; i < 1500; ++i) plant.step(servo(plant, config.home));
 
   const mjModel* m = plant.model().get();

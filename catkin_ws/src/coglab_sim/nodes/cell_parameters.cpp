@@ -63,15 +63,15 @@ CellConfig readCellConfig(const ros::NodeHandle& node) {
   return config;
 }
 
-ObjectParameters readObject(const ros::NodeHandle& node, const std::string& id) {
+plant::Object readObject(const ros::NodeHandle& node, const std::string& id) {
   const std::string prefix = "objects/" + id + "/";
   if (!node.hasParam("objects/" + id)) {
     throw std::invalid_argument("object '" + id + "' has no parameters " +
                                 node.resolveName("objects/" + id) +
-                                " (mass, shape, size, center, friction, finger_contact)");
+                                " (mass, shape, size, center, friction)");
   }
   CellConfig config;
-  for (const char* field : {"mass", "shape", "size", "center", "friction", "finger_contact"}) {
+  for (const char* field : {"mass", "shape", "size", "center", "friction"}) {
     take(config, node, prefix + field, std::string("object/") + field);
   }
   config.object.id = id;

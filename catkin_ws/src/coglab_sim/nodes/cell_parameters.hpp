@@ -15,6 +15,6 @@ CellConfig readCellConfig(const ros::NodeHandle& node);
 
 /// Parameters of an object from `objects/<id>` under `node`. @throws std::invalid_argument if there
 /// are none.
-ObjectParameters readObject(const ros::NodeHandle& node, const std::string& id);
+plant::Object readObject(const ros::NodeHandle& node, const std::string& id);
 
 }  // namespace coglab_sim

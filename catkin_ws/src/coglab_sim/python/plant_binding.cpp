@@ -203,13 +203,15 @@ PYBIND11_MODULE(_plant, m) {
            [](Plant& plant, const py::dict& object) { plant.setObject(objectFrom(object)); })
       .def(
           "command_motor",
-          [](Plant& plant, int motor, double target, double speed, double effort) {
+          [](Plant& plant, int motor, double target, double speed, double current) {
             if (motor < 0 || motor >= kMotors)
               throw std::invalid_argument("motor is " + std::to_string(motor) + ", expected 0 .. 4");
-            plant.motors().command(motor, {speed, target, effort});
+            plant.motors().command(motor, {speed, target, current});
           },
-          py::arg("motor"), py::arg("target"), py::arg("speed") = 1.0, py::arg("effort") = 1.0,
-          "target: share of the stroke; speed and effort: shares of the largest.")
+          py::arg("motor"), py::arg("target"), py::arg("speed") = 1.0,
+          py::arg("current") = 1000.0,
+          "target and speed: shares of the stroke and of the full speed; current: counts at which it "
+          "stops.")
       .def(
           "set_motor",
           [](Plant& plant, int motor, double position) { plant.motors().set(motor, position); },

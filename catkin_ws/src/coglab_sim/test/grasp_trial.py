@@ -44,10 +44,10 @@ class Outcome:
 class GraspTrial:
     """The hand around an object whose axis lies across the palm."""
 
-    def __init__(self, thing, direction='index up', effort=0.5, shift=(0.0, 0.0), seed=1, depth=None, preshape=CYLINDRICAL):
+    def __init__(self, thing, direction='index up', current=240.0, shift=(0.0, 0.0), seed=1, depth=None, preshape=CYLINDRICAL):
         self.plant = plant = _plant.Plant(URDF, HOME, thing, seed=seed, board=False)
         self.centre = np.array(thing['center'], dtype=float)
-        self.effort = effort
+        self.current = current
         palm_rotation = plant.state()['palm'][1]
         plant.set_gravity(9.81 * rotated(palm_rotation, np.array(DIRECTIONS[direction], dtype=float)))
         for motor, position in enumerate(preshape):
@@ -71,7 +71,7 @@ class GraspTrial:
     def close(self, motors=(1, 2, 3, 4), seconds=1.6):
         """Close on the object, take away whatever held it there, and wait."""
         for motor in motors:
-            self.plant.command_motor(motor, 1.0, 1.0, self.effort)
+            self.plant.command_motor(motor, 1.0, 1.0, self.current)
         self.plant.hold(HOME, steps=int(seconds / STEP))
         self.plant.place('world', *self.plant.state()['object'])
         self.plant.hold(HOME, steps=300)
@@ -97,7 +97,7 @@ class GraspTrial:
     def open(self, limit=1.0):
         """Open and tell how long the hand went on holding, s; infinite if it never let go."""
         for motor in range(1, 5):
-            self.plant.command_motor(motor, 0.0, 1.0)
+            self.plant.command_motor(motor, 0.0)
         for step in range(int(limit / 0.01)):
             if self.plant.state()['held_by'] != 'robot':
                 return 0.01 * step

@@ -32,6 +32,8 @@ def parse(arguments: list[str]) -> argparse.Namespace:
                         help="positions at which the fingers meet an object; 255: free")
     parser.add_argument("--stiffness", type=float, default=25.0,
                         help="counts of current for each count pressed into the object")
+    parser.add_argument("--physical", action="store_true",
+                        help="the motors are turned by the physics of the simulated cell (motor_states, motor_commands)")
     parser.add_argument("--trace", help="file for every frame in hex with its meaning; - is stdout")
     parser.add_argument("--seed", type=int, default=1, help="seed of random garbage")
     parser.add_argument("--fault", action="append", default=[], help="fault command at start")
@@ -73,7 +75,9 @@ def main() -> int:
     try:
         hand = EmulatedHand(dialect=options.dialect, calibration_scale=options.calibration_scale,
                             greeting=options.greeting, strict_force=options.strict_force,
-                            positions=options.positions)
+                            positions=options.positions, physical=options.physical)
+        if options.contact and options.physical:
+            raise ValueError("--contact is for a hand without a cell: leave it or --physical away")
         if options.contact:
             hand.set_contacts(options.contact, [options.stiffness] * 5)
     except ValueError as error:

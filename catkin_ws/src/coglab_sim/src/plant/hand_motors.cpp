@@ -14,10 +14,10 @@ constexpr double kThere = 1e-6;
 void HandMotors::command(int motor, const MotorCommand& command) {
   const auto i = static_cast<std::size_t>(motor);
   MotorCommand& old = commands_[i];
-  if (old.speed == command.speed && old.target == command.target && old.effort == command.effort)
+  if (old.speed == command.speed && old.target == command.target && old.current == command.current)
     return;
   old = {std::clamp(command.speed, 0.0, 1.0), std::clamp(command.target, 0.0, 1.0),
-         std::clamp(command.effort, 0.0, 1.0)};
+         std::max(0.0, command.current)};
   states_[i].locked = false;
   slow_[i] = 0.0;
 }
@@ -26,7 +26,7 @@ void HandMotors::set(int motor, double position) {
   const auto i = static_cast<std::size_t>(motor);
   states_[i] = MotorState{};
   states_[i].position = std::clamp(position, 0.0, 1.0);
-  commands_[i] = {0.0, states_[i].position, 1.0};
+  commands_[i] = {0.0, states_[i].position, 0.0};
   slow_[i] = 0.0;
 }
 
@@ -41,6 +41,7 @@ void HandMotors::step(const std::array<double, kMotors>& tension, double dt) {
     MotorState& state = states_[i];
     const double load = std::abs(tension[i]), limit = table_.motors[i].limit;
     state.tension = load;
+    state.effort = table_.stall_current * load / limit;
     state.moving = false;
     state.current = 0.0;
     const double way = command.target - state.position;
@@ -49,7 +50,8 @@ void HandMotors::step(const std::array<double, kMotors>& tension, double dt) {
     const double full = command.speed / table_.full_stroke;  // share of the stroke per second
     double rate = full;
     if (way > 0.0) {
-      const double stop = std::max(1e-6, command.effort * limit);
+      const double share = (command.current - table_.free_current) / table_.stall_current;
+      const double stop = limit * std::clamp(share, 1e-6, 1.0);
       rate *= std::clamp((stop - load) / (kSlowing * stop), 0.0, 1.0);
     }
     state.position += std::copysign(std::min(std::abs(way), rate * dt), way);
@@ -57,7 +59,7 @@ void HandMotors::step(const std::array<double, kMotors>& tension, double dt) {
     slow_[i] = state.moving ? 0.0 : slow_[i] + dt;
     state.locked = slow_[i] >= table_.lock_time;
     state.current = table_.free_current + table_.speed_current * rate * table_.full_stroke +
-                    (way > 0.0 ? table_.stall_current * load / limit : 0.0);
+                    (way > 0.0 ? state.effort : 0.0);
   }
 }
 

@@ -45,7 +45,7 @@ class Writer {
                                ": expected 7 joints to the hand's palm " + scene.hand.palm +
                                ", found " + std::to_string(arm_.size()));
     const double hand = robot_.links.at(scene.hand.palm).mass;
-    if (scene.hand.phalangesMass() >= hand)
+    if (scene.hand.phalangesMass() >= hand)  // what the palm itself would be left with
       throw std::invalid_argument("hand table: the phalanges weigh " +
                                   std::to_string(scene.hand.phalangesMass()) +
                                   " kg, more than the whole hand " + scene.hand.palm + " in " +
@@ -93,14 +93,30 @@ class Writer {
     group(kGroundGroup, 4) << "/>\n";
   }
 
-  void inertial(const Link& link, double share) {
+  void inertial(const Link& link, double mass, const Vector3d& center) {
     if (!link.has_inertia) return;
     const Matrix3d turn = link.inertia_frame.rotation.toRotationMatrix();
-    const Matrix3d i = share * (turn * link.inertia * turn.transpose());
-    out_ << "<inertial mass=\"" << share * link.mass << '"';
-    vector("pos", link.inertia_frame.position);
-    out_ << " fullinertia=\"" << i(0, 0) << ' ' << i(1, 1) << ' ' << i(2, 2) << ' ' << i(0, 1)
-         << ' ' << i(0, 2) << ' ' << i(1, 2) << "\"/>\n";
+    const Matrix3d i = mass / link.mass * (turn * link.inertia * turn.transpose());
+    out_ << "<inertial mass=\"" << mass << '"';
+    vector("pos", center);
+    tensor(i) << "/>\n";
+  }
+  std::ostream& tensor(const Matrix3d& i) {
+    return out_ << " fullinertia=\"" << i(0, 0) << ' ' << i(1, 1) << ' ' << i(2, 2) << ' '
+                << i(0, 1) << ' ' << i(0, 2) << ' ' << i(1, 2) << '"';
+  }
+
+  /// The palm is what is left of the description's hand without the phalanges, so that mass and
+  /// centre of mass of the whole open hand stay.
+  void palmInertial(const Link& palm) {
+    MassMoment rest = robot_.withMovableLinks(palm.name);
+    Vector3d pivot = Vector3d::Zero();
+    for (const Phalanx& p : scene_.hand.phalanges) {
+      pivot = p.first ? p.pivot : Vector3d(pivot + p.pivot);
+      rest.mass -= p.mass;
+      rest.moment -= p.mass * (pivot + 0.5 * p.length * p.along);
+    }
+    inertial(palm, rest.mass, rest.moment / rest.mass);
   }
 
   void solids(const Link& link, const Group& who, int condim) {
@@ -129,8 +145,11 @@ class Writer {
     out_ << "<body name=\"" << name << '"';
     if (joint != nullptr) pose(joint->origin);
     out_ << ">\n";
-    const double share = palm ? 1.0 - scene_.hand.phalangesMass() / link.mass : 1.0;
-    inertial(link, share);
+    if (palm) {
+      palmInertial(link);
+    } else {
+      inertial(link, link.mass, link.inertia_frame.position);
+    }
     if (joint != nullptr && joint->moves()) this->joint(*joint);
     solids(link, palm ? kHandGroup : kArmGroup, palm ? 4 : 3);
     if (palm) fingers();
@@ -175,8 +194,7 @@ class Writer {
     const double across = p.mass * (3.0 * p.radius * p.radius + p.length * p.length) / 12.0;
     const double about = 0.5 * p.mass * p.radius * p.radius;
     const Matrix3d i = across * Matrix3d::Identity() + (about - across) * p.along * p.along.transpose();
-    out_ << " fullinertia=\"" << i(0, 0) << ' ' << i(1, 1) << ' ' << i(2, 2) << ' ' << i(0, 1)
-         << ' ' << i(0, 2) << ' ' << i(1, 2) << "\"/>\n";
+    tensor(i) << "/>\n";
     out_ << "<joint name=\"" << p.name << "\" type=\"hinge\"";
     vector("axis", p.axis);
     out_ << " limited=\"true\" range=\"" << p.lower << ' ' << p.upper << "\" stiffness=\""

@@ -172,6 +172,18 @@ std::vector<const Joint*> RobotDescription::below(const std::string& link) const
   return found;
 }
 
+MassMoment RobotDescription::withMovableLinks(const std::string& link) const {
+  const Link& first = links.at(link);
+  MassMoment sum{first.mass, first.mass * first.inertia_frame.position};
+  for (const Joint* joint : below(link)) {
+    if (!joint->moves()) continue;
+    const MassMoment more = withMovableLinks(joint->child);
+    sum.mass += more.mass;
+    sum.moment += more.mass * joint->origin.position + joint->origin.rotation * more.moment;
+  }
+  return sum;
+}
+
 std::vector<const Joint*> RobotDescription::chainTo(const std::string& link) const {
   if (links.count(link) == 0)
     throw std::runtime_error("robot description " + path + " has no link '" + link + "'");

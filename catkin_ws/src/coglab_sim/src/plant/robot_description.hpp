@@ -34,6 +34,12 @@ struct Joint {
   bool limited() const { return type == "revolute" || type == "prismatic"; }
 };
 
+/// Mass and first moment (kg m) of a part of the tree, in the frame of its first link.
+struct MassMoment {
+  double mass = 0.0;
+  Vector3d moment = Vector3d::Zero();
+};
+
 /// A robot description as a tree.
 struct RobotDescription {
   std::string path, root;
@@ -41,6 +47,8 @@ struct RobotDescription {
   std::vector<Joint> joints;  ///< in the order of the file
 
   std::vector<const Joint*> below(const std::string& link) const;
+  /// A link with all that hangs on it by movable joints, these at zero.
+  MassMoment withMovableLinks(const std::string& link) const;
   /// Movable joints from the root to a link. @throws std::runtime_error if there is no such link.
   std::vector<const Joint*> chainTo(const std::string& link) const;
 };

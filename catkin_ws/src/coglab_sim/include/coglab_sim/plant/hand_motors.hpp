@@ -12,18 +12,21 @@ namespace coglab_sim::plant {
 struct MotorCommand {
   double speed = 0.0;   ///< share of the full speed, 0 .. 1; 0: off
   double target = 0.0;  ///< share of the stroke to go to, 0 open .. 1 closed
-  double effort = 1.0;  ///< share of the tension limit at which it stops winding
+  double current = 1e3;  ///< counts of motor current at which it stops winding
 };
 
 /// What a motor is doing.
 struct MotorState {
   double position = 0.0;  ///< share of the stroke, 0 open .. 1 closed
   double tension = 0.0;   ///< N
-  double current = 0.0;   ///< counts as on the wire; 0 when off or locked
+  double effort = 0.0;    ///< counts of current that the tension stands for
+  double current = 0.0;   ///< counts as on the wire; 0 when off, at its target or locked
   bool moving = false;
   bool locked = false;    ///< it met resistance and stands; its gear holds what it has wound
 };
 
+/// A command whose current is that of a motor running free winds nothing that resists.
+///
 /// Motors wind tendons at a speed that falls to nothing over the last fifth before the tension at
 /// which they are to stop. A load never drives one backward. One that is nearly stopped for a
 /// while is locked until the next command, else shaking would ratchet it tighter.
