@@ -76,6 +76,7 @@ class Cell {
   CellTruth truth() const;
   MotorStates motors() const;
   const plant::Plant& plant() const { return plant_; }
+  plant::Plant& plant() { return plant_; }
   const CellConfig& config() const { return config_; }
 
  private:

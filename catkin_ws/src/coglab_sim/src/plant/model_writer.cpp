@@ -238,7 +238,7 @@ class Writer {
     out_ << "<body name=\"" << kPersonBody << "\" pos=\"5 0 5\">\n<freejoint name=\"person\"/>\n"
          << "<inertial pos=\"0 0 0\" mass=\"" << kPersonMass
          << "\" diaginertia=\"0.01 0.01 0.01\"/>\n"
-         << "<geom type=\"capsule\" fromto=\"0.04 0 0 0.25 0 0\" size=\"0.03\"";
+         << "<geom type=\"capsule\" fromto=\"0.07 0 0 0.25 0 0\" size=\"0.03\"";
     group(kPersonGroup, 3) << "/>\n</body>\n";
   }
 
