@@ -139,12 +139,14 @@ void Plant::step(const Vector7& motor_torque, double dt) {
     mj_step1(m, d);
   }
   applyArm(motor_torque);
-  if (brakes_ || blocked_) {
+  const bool stiff = brakes_ || blocked_;
+  if (stiff || was_stiff_) {
     // The inertias, dampers and springs of the joints that step1 has used were those of before.
     mj_crb(m, d);
     mj_factorM(m, d);
     mj_passive(m, d);
   }
+  was_stiff_ = stiff;
   applyPerson(dt);
   applyMotors(dt);
   mj_step2(m, d);

@@ -175,6 +175,7 @@ class Plant {
   HoldSpring arm_of_person_, grip_;
   Wrench push_;
   bool brakes_ = false, locked_ = false, blocked_ = false;
+  bool was_stiff_ = false;  // brakes or block in the step before
   Vector7 position_, velocity_ = Vector7::Zero(), block_position_ = Vector7::Zero();
   Vector7 friction_ = Vector7::Zero(), motor_torque_ = Vector7::Zero();
   Vector7 joint_torque_ = Vector7::Zero(), external_torque_ = Vector7::Zero(),
