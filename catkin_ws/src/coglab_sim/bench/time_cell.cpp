@@ -81,7 +81,9 @@ class Bench {
     cell_.step(bytes_.data(), bytes_.size());
   }
   /// Somebody sways the hand.
-  void sway(int tick) { cell_.setPush({Vector3d(0.0, tick / 200 % 2 == 0 ? 4.0 : -4.0, 0.0), {0, 0, 0}}); }
+  void sway(int tick) {
+    cell_.setPush({Vector3d(0.0, tick / 200 % 2 == 0 ? 4.0 : -4.0, 0.0), Vector3d::Zero()});
+  }
   Cell& cell() { return cell_; }
 
  private:

@@ -193,7 +193,8 @@ class Writer {
     // A solid cylinder of the capsule's length and radius.
     const double across = p.mass * (3.0 * p.radius * p.radius + p.length * p.length) / 12.0;
     const double about = 0.5 * p.mass * p.radius * p.radius;
-    const Matrix3d i = across * Matrix3d::Identity() + (about - across) * p.along * p.along.transpose();
+    const Matrix3d i =
+        across * Matrix3d::Identity() + (about - across) * p.along * p.along.transpose();
     tensor(i) << "/>\n";
     out_ << "<joint name=\"" << p.name << "\" type=\"hinge\"";
     vector("axis", p.axis);

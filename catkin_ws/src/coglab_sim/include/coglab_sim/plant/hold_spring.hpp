@@ -27,9 +27,12 @@ struct HoldFigures {
 class HoldSpring {
  public:
   /// The body is to stay where it is now in the frame of the hand.
-  void engage(const Pose& hand, const Pose& center) { in_hand_ = hand.inverse() * center; engaged_ = true; }
+  void engage(const Pose& hand, const Pose& center) { engageAt(hand.inverse() * center); }
   /// The body is to be there in the frame of the hand.
-  void engageAt(const Pose& in_hand) { in_hand_ = in_hand; engaged_ = true; }
+  void engageAt(const Pose& in_hand) {
+    in_hand_ = in_hand;
+    engaged_ = true;
+  }
   void release() { engaged_ = slipping_ = false; }
 
   /// Force and torque on the body about its centre, world axes. `share` 0..1 fades the hold.
