@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from coglab_py.packages import package_path
 from coglab_sim import virtual_world
-from coglab_sim.participant import Participant
+from coglab_sim.person.participant import Participant
 from coglab_sim.scene import Scene
 from coglab_sim.virtual_human import VirtualHuman
 from coglab_sim.virtual_world import move_person, view_of

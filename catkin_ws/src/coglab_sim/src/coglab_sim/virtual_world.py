@@ -25,15 +25,16 @@ from ih2_hand.progress import shown_empty, shown_holding
 
 import coglab_sim._cell  # noqa: F401  (knows the type of VirtualRobot.cell)
 from coglab_sim._virtual import VirtualRobot
-from coglab_sim.participant import Participant
-from coglab_sim.perception_stand_in import PerceptionSettings, Sight, Tracker
-from coglab_sim.scene import HandSample, Scene, WorldView
-from coglab_sim.virtual_human import VirtualHuman
+from coglab_sim.conditions import Conditions
+from coglab_sim.person.in_cell import closure, move_person, pose_of_truth, view_of
+from coglab_sim.person.recorded_person import RecordedPerson, open_recorded_hand, scene_of
+from coglab_sim.person.scene import Scene
+from coglab_sim.person.virtual_human import VirtualHuman
+from coglab_sim.tracker.tracker import Sight, Tracker
 
 LIMITS = str(package_path("lwr_description", "config", "joint_limits.yaml"))
 BOARD = Pose(np.array([0.45, -0.55, 0.05]), about_z(-np.pi / 2))
 """of the frame board in world"""
-OBJECT = "mug"
 DT = 0.005
 """s, FRI period"""
 FLOAT32 = 5e-4
@@ -54,29 +55,6 @@ def manager_parameters() -> dict[str, Any]:
     package, _, path = parameters["feedback_file"].removeprefix("package://").partition("/")
     parameters["feedback_file"] = str(package_path(package, path))
     return parameters
-
-
-def pose_of_truth(pose: Mapping[str, Any]) -> Pose:
-    """A pose of the cell's truth."""
-    return Pose(np.asarray(pose["position"]), np.asarray(pose["rotation"]))
-
-
-def view_of(truth: Mapping[str, Any], speed: float) -> WorldView:
-    """What a person perceives of the cell's truth; ``speed`` of the robot's hand, m/s."""
-    return WorldView(
-        pose_of_truth(truth["robot_hand"]),
-        speed,
-        pose_of_truth(truth["object"]),
-        float(np.linalg.norm(truth["palm_force"])),
-        truth["robot_load_share"],
-        truth["human_load_share"],
-        truth["held_by"],
-    )
-
-
-def move_person(cell: Any, hand: HandSample) -> None:
-    """The person's hand, for the cell."""
-    cell.set_human(hand.frame.position, hand.frame.orientation, hand.velocity, np.zeros(3), hand.grip, hand.grip_force)
 
 
 class Robot:
@@ -196,27 +174,40 @@ class Hand:
 
 
 class World:
-    """Everything together. ``seed`` makes person, noise and tracker; ``behaviour`` is the person's.
+    """Everything together. ``seed`` makes person, noise and tracker; ``conditions`` say what they are like.
 
+    ``recording`` (settings of recorded_person.open_recorded_hand): the person's hand goes as recorded.
     ``after_period`` are called at the end of each FRI period, with a robot that is connected.
     """
 
     def __init__(
         self,
         seed: int = 1,
-        behaviour: str = "normal",
-        perfect: bool = False,
+        conditions: Conditions = Conditions(),
         object_on: str = "human_hand",
-        perception: PerceptionSettings | None = None,
         turned: float = 0.0,
         limits: str = LIMITS,
+        recording: Mapping[str, Any] | None = None,
     ) -> None:
-        thing, _ = read_object(objects_folder() / f"{OBJECT}.yaml")
+        thing, _ = read_object(objects_folder() / f"{conditions.object_id}.yaml")
+        self.object_frame = f"object_{conditions.object_id}"
+        scene = Scene.of(thing, conditions.mass, conditions.friction)
+        scene.object_turn = about_z(turned)
+        participant = conditions.participant(seed)
+        if recording is None:
+            self.human = VirtualHuman(participant, scene, object_on == "human_hand")
+        else:
+            hand, way = open_recorded_hand(recording, self.object_frame)
+            scene = scene_of(scene, hand)
+            self.human = RecordedPerson(participant, scene, hand, way)
+        self.scene = scene
         where = {
             **{f"object__{name}": value for name, value in cell_parameters(thing).items()},
+            "object__mass": scene.object_mass,
+            "object__friction": scene.object_friction,
             "object__start": object_on,
-            "object__position": [-0.08, 0.0, -0.05],
-            "object__rotation": [float(v) for v in about_z(turned)],
+            "object__position": [float(v) for v in scene.object_in_hand],
+            "object__rotation": [float(v) for v in scene.object_turn],
         }
         if object_on == "world":
             where["object__position"] = [float(v) for v in BOARD.apply([0.0, 0.0, 0.002])]
@@ -224,10 +215,9 @@ class World:
         self.robot = Robot(seed, limits, **where)
         self.cell = self.robot.cell
         self.hand = Hand()
-        self.scene = Scene(object_mass=float(thing["mass"]))
-        self.human = VirtualHuman(Participant.draw(seed, behaviour), self.scene, object_on == "human_hand")
-        settings = perception or PerceptionSettings(perfect=perfect)
-        self.trackers = {name: Tracker(name, settings, seed) for name in (f"object_{OBJECT}", "human_hand")}
+        self.trackers = {
+            name: Tracker(name, conditions.perception, seed) for name in (self.object_frame, "human_hand")
+        }
         self.after_period: list[Callable[[], None]] = []
         self.speed_scale = 1.0
         self.t = self.robot.virtual.now
@@ -235,7 +225,6 @@ class World:
         self.truth = self.cell.truth()
         self.sights: dict[str, Sight] = {}
         self.blind: set[str] = set()
-        self._palms: list[np.ndarray] = []
 
     def newest(self, name: str) -> tuple[Pose | None, float]:
         """Newest sight of a frame and its age; the board is known."""
@@ -262,15 +251,14 @@ class World:
 
     def _person_and_tracker(self) -> None:
         self.truth = truth = self.cell.truth()
-        palm = pose_of_truth(truth["robot_hand"])
-        self._palms.append(palm.position)
-        del self._palms[:-10]
-        speed = float(np.linalg.norm(palm.position - self._palms[0])) / 0.09 if len(self._palms) > 9 else 1.0
-        view = view_of(truth, speed)
+        fingers = closure([motor.position for motor in self.hand.emulator.motors])
+        view = view_of(truth, fingers, self.scene.object_mass)
         hand = self.human.step(self.t, view)
         move_person(self.cell, hand)
-        for name, frame in ((f"object_{OBJECT}", view.object), ("human_hand", hand.frame)):
-            for sight in self.trackers[name].step(self.t, frame, palm):
+        frames = {self.object_frame: view.object, "human_hand": hand.frame}
+        for name, frame in frames.items():
+            others = [other for each, other in frames.items() if each != name]
+            for sight in self.trackers[name].step(self.t, frame, view.robot_hand, others):
                 if name not in self.blind:
                     self.sights[name] = sight
                     self.robot.virtual.set_frame(

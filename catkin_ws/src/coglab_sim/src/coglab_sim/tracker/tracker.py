@@ -1,14 +1,15 @@
-"""Perception as a tracker would deliver it: between the truth of the cell and the frames that control sees.
+"""Perception as a tracker delivers it: between the truth of the cell and the frames that control sees.
 
 Rate and its jitter, latency (stamp = capture time, delivered later), noise that is correlated like a tracker's, bursts
-of dropout (two-state Gilbert model), occlusion by the robot's hand, identity swaps. Each can be switched off;
-``perfect`` delivers the truth as it is at the same rate.
+of dropout (two-state Gilbert model), occlusion while the robot's hand is near, identity swaps, and the constant error of
+its calibration to the robot. Each can be switched off; ``perfect`` delivers the truth as it is at the same rate.
+docs/people.md says where the figures come from.
 """
 
 from __future__ import annotations
 
 import heapq
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from typing import Any
 
@@ -16,10 +17,13 @@ import numpy as np
 from coglab_py.pose import Pose
 from scipy.spatial.transform import Rotation
 
+CALIBRATED_AT = np.array([0.75, 0.0, 0.40])
+"""m, world: where the calibration was made; an angle off turns everything about this point"""
+
 
 @dataclass(frozen=True)
 class PerceptionSettings:
-    """Of the stand-in. Times in s, lengths in m, angles in rad."""
+    """Of the stand-in. Times in s, lengths in m, angles in rad unless their names say degrees."""
 
     perfect: bool = False
     rate: float = 30.0
@@ -34,12 +38,21 @@ class PerceptionSettings:
     dropout_start: float = 0.02
     """probability per frame that a burst of dropout begins; 0 switches dropouts off"""
     dropout_end: float = 0.3
-    occlusion_distance: float = 0.0
-    """a robot hand nearer to the object than this hides it half of the time; 0 switches occlusion off"""
-    swap_probability: float = 0.0
-    """per frame: the tracker takes something else for the object"""
+    occlusion_distance: float = 0.15
+    """a robot hand nearer than this hides the frame now and then; 0 switches occlusion off"""
+    occlusion_start: float = 0.08
+    """probability per frame, while the robot's hand is near, that it begins to hide the frame"""
+    occlusion_end: float = 0.25
+    swap_probability: float = 0.002
+    """per frame: the tracker takes something else for it, the nearest other thing that it tracks; 0: never"""
     swap_jump: float = 0.08
+    """from the thing where there is no other one within swap_reach"""
+    swap_reach: float = 0.25
     swap_frames: int = 4
+    calibration_offset: float = 0.005
+    """length of the constant error of all frames, its direction drawn by the seed; 0: none"""
+    calibration_turn_deg: float = 1.0
+    """and of its angle, about the middle of the handover region"""
 
     def __post_init__(self) -> None:
         if not self.rate > 0.0 or self.latency < 0.0:
@@ -55,6 +68,16 @@ class PerceptionSettings:
                 f"perception settings: unknown fields {', '.join(unknown)}; known: {', '.join(sorted(known))}"
             )
         return PerceptionSettings(**{k: tuple(v) if isinstance(v, list) else v for k, v in data.items()})
+
+    def calibration(self, seed: int) -> Pose:
+        """The constant error of the tracker with this seed: every true frame is seen at this pose times itself."""
+        if self.perfect:
+            return Pose()
+        rng = np.random.default_rng([seed, 37])
+        aside, axis = (v / np.linalg.norm(v) for v in rng.normal(size=(2, 3)))
+        turn = Rotation.from_rotvec(np.radians(self.calibration_turn_deg) * axis)
+        off = CALIBRATED_AT - turn.apply(CALIBRATED_AT) + self.calibration_offset * aside
+        return Pose(off, turn.as_quat())
 
 
 @dataclass(frozen=True)
@@ -73,23 +96,30 @@ class Tracker:
         self.name = name
         self.settings = settings
         self.rng = np.random.default_rng([seed, sum(name.encode()), 31])
+        self.calibration = settings.calibration(seed)
         self._next = 0.0
-        self._lost = False
+        self._lost = self._hidden = False
         self._noise = np.zeros(6)
         self._noise_stamp: float | None = None
         self._swap_left = 0
-        self._swap = np.zeros(3)
+        self._swap: int | None = None
+        self._jump = np.zeros(3)
         self._queue: list[tuple[float, int, Sight]] = []
         self._count = 0
         self.newest: Sight | None = None
 
-    def step(self, now: float, truth: Pose, robot_hand: Pose | None = None) -> list[Sight]:
-        """At time ``now`` (s): capture if it is time, deliver what has arrived."""
+    def step(
+        self, now: float, truth: Pose, robot_hand: Pose | None = None, others: Sequence[Pose] = ()
+    ) -> list[Sight]:
+        """At time ``now`` (s): capture if it is time, deliver what has arrived.
+
+        ``others``: true poses of the other things that are tracked, always in the same order.
+        """
         if now >= self._next:
             s = self.settings
             jitter = 0.0 if s.perfect else float(self.rng.normal(0, s.rate_jitter))
             self._next = now + max(0.001, 1.0 / s.rate + jitter)
-            self._capture(now, truth, robot_hand)
+            self._capture(now, truth, robot_hand, others)
         delivered = []
         while self._queue and self._queue[0][0] <= now:
             sight = heapq.heappop(self._queue)[2]
@@ -99,27 +129,24 @@ class Tracker:
                 delivered.append(sight)
         return delivered
 
-    def _capture(self, now: float, truth: Pose, robot_hand: Pose | None) -> None:
+    def _capture(self, now: float, truth: Pose, robot_hand: Pose | None, others: Sequence[Pose]) -> None:
         s = self.settings
         if s.perfect:
             self._push(now, Sight(self.name, now, truth))
             return
-        if self._lost:
-            self._lost = self.rng.random() >= s.dropout_end
-        elif s.dropout_start > 0.0:
-            self._lost = self.rng.random() < s.dropout_start
-        hidden = (
-            s.occlusion_distance > 0.0
-            and robot_hand is not None
-            and self.rng.random() < 0.5
-            and np.linalg.norm(robot_hand.position - truth.position) < s.occlusion_distance
-        )
+        self._lost = self._burst(self._lost, s.dropout_start, s.dropout_end)
+        near = robot_hand is not None and np.linalg.norm(robot_hand.position - truth.position) < s.occlusion_distance
+        self._hidden = self._burst(self._hidden, s.occlusion_start, s.occlusion_end) if near else False
         noise = self._noise_step(now)
-        turned = Rotation.from_rotvec(noise[3:]) * truth.rotation
-        seen = Pose(truth.position + noise[:3] + self._swapped(), turned.as_quat())
-        if not self._lost and not hidden:
+        taken = self.calibration * self._swapped(truth, others)
+        turned = Rotation.from_rotvec(noise[3:]) * taken.rotation
+        if not self._lost and not self._hidden:
             delay = max(0.0, s.latency + float(self.rng.normal(0, s.latency_sigma)))
-            self._push(now + delay, Sight(self.name, now, seen))
+            self._push(now + delay, Sight(self.name, now, Pose(taken.position + noise[:3], turned.as_quat())))
+
+    def _burst(self, lost: bool, start: float, end: float) -> bool:
+        """One frame of a two-state chain."""
+        return bool(self.rng.random() >= end) if lost else bool(start > 0.0 and self.rng.random() < start)
 
     def _push(self, due: float, sight: Sight) -> None:
         self._count += 1
@@ -134,17 +161,21 @@ class Tracker:
         self._noise = keep * self._noise + np.sqrt(1 - keep**2) * sigma * self.rng.normal(size=6)
         return self._noise
 
-    def _swapped(self) -> np.ndarray:
+    def _swapped(self, truth: Pose, others: Sequence[Pose]) -> Pose:
+        """The pose of what the tracker takes for the frame now."""
         s = self.settings
-        if self._swap_left > 0:
-            self._swap_left -= 1
-            return self._swap
-        if s.swap_probability > 0.0 and self.rng.random() < s.swap_probability:
-            direction = self.rng.normal(size=3)
-            self._swap = s.swap_jump * direction / np.linalg.norm(direction)
+        if self._swap_left == 0 and s.swap_probability > 0.0 and self.rng.random() < s.swap_probability:
             self._swap_left = s.swap_frames
-            return self._swap
-        return np.zeros(3)
+            away = [float(np.linalg.norm(other.position - truth.position)) for other in others]
+            self._swap = int(np.argmin(away)) if away and min(away) < s.swap_reach else None
+            direction = self.rng.normal(size=3)
+            self._jump = s.swap_jump * direction / np.linalg.norm(direction)
+        if self._swap_left == 0:
+            return truth
+        self._swap_left -= 1
+        if self._swap is not None and self._swap < len(others):
+            return others[self._swap]
+        return Pose(truth.position + self._jump, truth.orientation)
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ from coglab_msgs.msg import ReasonCode
 from coglab_perception.frames import FrameNames
 from coglab_py.pose import Pose
 
-from .perception_stand_in import Board, PerceptionSettings, Sight, Tracker
+from coglab_sim.tracker.tracker import Board, PerceptionSettings, Sight, Tracker
 
 OLDEST = 0.5
 """s: an older sight is no answer to locate_object, and an older world is not visible."""
@@ -108,18 +108,19 @@ class Vision:
             self.people = len(hands)
             self._hands = [hand.position for hand in hands.values()]
             self._partner = self.choice.choose(hands, robot)
+            seen = {self.names.human_hand: hands[self._partner]} if self._partner else {}
+            seen.update(objects)
             sights = []
-            if self._partner:
-                sights += self._track(self.names.human_hand, now, hands[self._partner], robot)
-            for name, frame in objects.items():
-                sights += self._track(name, now, frame, robot)
+            for name, frame in seen.items():
+                others = [other for each, other in seen.items() if each != name]
+                sights += self._track(name, now, frame, robot, others)
             self._changed.notify_all()
         return sights
 
-    def _track(self, name: str, now: float, frame: Pose, robot: Pose | None) -> list[Sight]:
+    def _track(self, name: str, now: float, frame: Pose, robot: Pose | None, others: list[Pose]) -> list[Sight]:
         if name not in self._trackers:
             self._trackers[name] = Tracker(name, self.settings, self.seed)
-        sights = self._trackers[name].step(now, frame, robot)
+        sights = self._trackers[name].step(now, frame, robot, others)
         if sights:
             self._arrived[name] = self.steady()
         return sights

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .participant import Participant
+from coglab_sim.person.participant import Participant
 
 
 def involuntary(p: Participant, f: np.ndarray, t: float) -> np.ndarray:

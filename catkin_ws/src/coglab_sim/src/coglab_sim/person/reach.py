@@ -10,6 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 
 def min_jerk(x: float) -> tuple[float, float]:
@@ -86,6 +87,22 @@ class CorrectedReach:
     def over(self, t: float) -> bool:
         """Whether the reach and all its corrections have ended."""
         return all(part.over(t) for part in self.parts)
+
+
+@dataclass(frozen=True)
+class Turn:
+    """The hand's turn beside a reach: about one axis, with minimum jerk, from ``start`` to ``end``."""
+
+    start: Rotation
+    end: Rotation
+    begin: float
+    duration: float
+
+    def at(self, t: float) -> tuple[Rotation, np.ndarray]:
+        """Orientation and spin (rad/s, world axes) at time t (s)."""
+        s, ds = min_jerk((t - self.begin) / self.duration)
+        way = (self.end * self.start.inv()).as_rotvec()
+        return Rotation.from_rotvec(s * way) * self.start, way * ds / self.duration
 
 
 def duration_for(distance: float, base: float) -> float:

@@ -286,7 +286,11 @@ class Playback:
             if s.at_end == "loop":
                 self._playhead %= self.recording.duration or 1.0
                 self._waited = 0.0
-        return {name: self._placed(track.at(self._playhead)) for name, track in self.recording.tracks.items()}
+        return {name: self.at(name, self._playhead) for name in self.names}
+
+    def at(self, name: str, seconds: float) -> Pose:
+        """A frame at a time of the recording (s), in the robot's world."""
+        return self._placed(self.recording.tracks[name].at(seconds))
 
     def _advance(self, dt: float, robot: Pose | None) -> None:
         s = self.settings

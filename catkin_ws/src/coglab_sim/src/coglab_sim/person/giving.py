@@ -1,0 +1,128 @@
+"""How the virtual human gives: place the object into the robot's palm, hold on, let go."""
+
+from __future__ import annotations
+
+import numpy as np
+from coglab_msgs.msg import Say
+from scipy.spatial.transform import Rotation
+
+from coglab_sim.person.phases import Phases
+from coglab_sim.person.senses import Percept
+
+ASIDE = 0.010
+"""m by which the object may be off the middle of the palm before the person corrects it"""
+BEYOND = 0.05
+"""m past where the palm was seen after which the person stops: nothing is there"""
+FOLLOW_UP = 0.015
+"""m, most that the hand goes on after first touch"""
+CLOSED = 0.08
+"""share of their way by which the robot's fingers must have been seen to close"""
+TOUCH_PART, TOLD_PART = 0.7, 0.4
+"""what a closed hand whose grip is felt, and a spoken 'I have it', count of what it takes to let go"""
+CLOSED_LONG = 3.0
+"""s after which a hand that is seen closed is believed to hold, felt or not"""
+LOOSE = 0.5
+"""share of the grip at which the fingers stop until it is felt who carries"""
+CHECK = 0.6
+"""s that they stop there at most"""
+CARRIES = 0.8
+"""share of the weight felt then from which on the robot does not hold"""
+
+
+class Giving(Phases):
+    """Phases of VirtualHuman."""
+
+    def _placing(self, t: float, dt: float, seen: Percept) -> None:
+        """Bring the object into the palm, against the palm's outward axis, until it is felt; then press a little."""
+        p = self.participant
+        normal, along = seen.robot_hand.axis(0), seen.robot_hand.axis(2)
+        to_object = self._middle() - seen.robot_hand.position
+        gap = float(to_object @ normal) - self._thickness(normal)
+        pressing = float(np.linalg.norm(seen.load - self._held_load))
+        if self._felt_since is None and pressing > 0.0:
+            self._felt_since, self._travelled = t, 0.0
+        if self._felt_since is not None and p.behaviour == "early_release":
+            self._go("releasing", t)
+            return
+        if self._felt_since is not None and (pressing >= p.press or self._travelled >= FOLLOW_UP):
+            if p.behaviour == "pull_back":
+                self._retreat(t)
+            else:
+                self._go("holding", t)
+            return
+        if self._felt_since is None and (gap < -BEYOND or t - self._since > 4.0):
+            self._go("holding", t)
+            return
+        ramp = min(1.0, (t - self._since) / 0.15)
+        speed = ramp * min(p.place_speed, 2.0 * max(gap, 0.0) + 0.04)
+        self._velocity = -normal * (0.02 if self._felt_since is not None else speed)
+        aside = float(to_object @ along)
+        if self._felt_since is None and abs(aside) > ASIDE:
+            self._velocity = self._velocity - ramp * along * float(np.clip(2.0 * aside, -0.05, 0.05))
+        self._hand = self._hand + self._velocity * dt
+        self._travelled += float(np.linalg.norm(self._velocity)) * dt
+
+    def _thickness(self, direction: np.ndarray) -> float:
+        """m, half of the object along a direction."""
+        turned = self._turn * Rotation.from_quat(self.scene.object_turn)
+        return float(np.abs(turned.inv().apply(direction)) @ self.scene.object_size) / 2
+
+    def _holding(self, t: float, dt: float, seen: Percept) -> None:
+        """Hold on until load and grip say that the robot has it."""
+        self._velocity = np.zeros(3)
+        p = self.participant
+        self._grip = min(1.0, self._grip + dt / 0.10)
+        closed = seen.hand_closure - self._closure > CLOSED and seen.closing_speed < 0.1
+        if p.behaviour == "tug" and closed:
+            self._tug(t, dt)
+            return
+        if p.behaviour == "never_release":
+            if t - self._since > p.patience:
+                self._retreat(t)
+            return
+        if self._signs(t, seen, closed) < 1.0:
+            self._sure_since = None
+        elif self._sure_since is None:
+            self._sure_since = t
+        if self._sure_since is not None and t - self._sure_since > p.assurance:
+            self._go("releasing", t)
+        elif t - self._since > p.patience:
+            self._retreat(t)
+
+    def _signs(self, t: float, seen: Percept, closed: bool) -> float:
+        """How surely the robot holds; the person lets go from 1 on."""
+        signs = max(0.0, 1.0 - self._load_share(seen)) / self.participant.release_share
+        if not closed:
+            self._felt_since = None
+            return signs
+        if self._felt_since is None:
+            self._felt_since, self._touched = t, self._held_load
+        grip_felt = bool(np.any(seen.load != self._touched)) or t - self._felt_since > CLOSED_LONG
+        return signs + TOUCH_PART * grip_felt + TOLD_PART * (self._told == Say.I_HAVE_IT)
+
+    def _tug(self, t: float, dt: float) -> None:
+        """Pull to and fro before letting go."""
+        if self._sure_since is None:
+            self._sure_since = t
+        since = t - self._sure_since
+        rate = 2 * np.pi * 1.5
+        self._velocity = np.array([0.012 * rate * np.cos(rate * since), 0.0, 0.0])
+        self._hand = self._hand + self._velocity * dt
+        if since > 3.0 and abs(np.sin(rate * since)) < 0.2:
+            self._go("releasing", t)
+
+    def _releasing(self, t: float, dt: float, seen: Percept) -> None:
+        """Open the grip; halfway, whoever gives waits to feel that the robot carries, else holds on again."""
+        self._velocity = np.zeros(3)
+        p = self.participant
+        careful = self._task == "give" and p.behaviour != "early_release"
+        if careful and self._grip <= LOOSE and not self._checked:
+            loosened = p.release_time * (1.0 - LOOSE) + p.feeling_delay
+            if self._load_share(seen) < CARRIES and t - self._since > loosened:
+                self._checked = True
+            elif t - self._since > loosened + CHECK:
+                self._go("holding", t)
+            return
+        self._grip = max(0.0, self._grip - dt / p.release_time)
+        if self._grip == 0.0:
+            self._retreat(t)

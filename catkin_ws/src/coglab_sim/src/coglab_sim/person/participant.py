@@ -1,0 +1,193 @@
+"""Seeded virtual participants: everything that differs between people, drawn once per person.
+
+docs/people.md lists every parameter with its distribution and where that comes from. Nothing is clipped: a draw
+outside its range is drawn again.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass, fields, replace
+from typing import Any
+
+import numpy as np
+
+BEHAVIOURS = (
+    "normal",
+    "slow",
+    "hesitant",
+    "early_release",
+    "never_release",
+    "pull_back",
+    "change_side",
+    "absent",
+    "tug",
+    "early_contact",
+)
+
+PROFILES = ("drawn", "patient")
+"""drawn: a person as people are; patient: trusts after 1.0 s of rest, holds upright, stays inside the box."""
+
+
+@dataclass(frozen=True)
+class Participant:
+    """One person. Times in s, lengths in m, forces in N, angles in deg."""
+
+    seed: int = 0
+    behaviour: str = "normal"
+    left_handed: bool = False
+    """rest and handover are mirrored to the other side"""
+    reaction_median: float = 0.35
+    reaction_sigma: float = 0.30
+    """of the logarithm"""
+    learning: float = 0.08
+    """share by which the reaction gets shorter per trial, for the first three"""
+    reach_time: float = 1.1
+    """of a reach of 0.45 m"""
+    reach_sigma: float = 0.12
+    """of the logarithm, from trial to trial"""
+    bow: float = 0.0
+    """height of a conic reach's arc; 0: straight"""
+    point_offset: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    """of this person's handover point: distance, side, height"""
+    point_sigma: tuple[float, float, float] = (0.02, 0.04, 0.03)
+    """scatter of the handover point from trial to trial, world axes"""
+    inside_box: bool = False
+    """True: the handover point is brought into the scene's box"""
+    tilt: float = 12.0
+    """standard deviation of the turn of hand and object about each world axis, from trial to trial"""
+    seeing_delay: float = 0.20
+    """from what happens to what is seen and acted on"""
+    seen_noise: float = 0.003
+    """standard deviation per axis of a seen position"""
+    seen_turn: float = 2.0
+    """standard deviation per axis of a seen orientation"""
+    seen_speed: float = 0.10
+    """standard deviation of a seen speed as share of it; below 0.005 m/s nothing is seen to move"""
+    feeling_delay: float = 0.125
+    """from a force at the hand to what the hand does about it"""
+    felt_threshold: float = 0.4
+    """smallest change of force that is felt"""
+    felt_share: float = 0.08
+    """and smallest change as share of the force that is felt already"""
+    hearing_delay: float = 0.5
+    """from the beginning of a spoken sentence to its being understood"""
+    trust: float = 0.5
+    """for which the robot's hand has to be seen at rest before the person places or takes"""
+    places_while_moving: bool = False
+    """True: places as soon as the robot's hand is seen near, moving or not"""
+    place_speed: float = 0.10
+    """m/s at which the object is brought into the robot's palm"""
+    press: float = 1.5
+    """force felt beyond first contact with which the object is pressed into the palm"""
+    release_share: float = 0.3
+    """share of the weight whose loss alone makes the person let go"""
+    assurance: float = 0.2
+    """for which the signs of a firm hold must last before the person lets go"""
+    release_time: float = 0.35
+    """in which the fingers open, without the look in between whether the robot holds"""
+    grip_safety: float = 2.0
+    """grip force over the one at which the object would slip"""
+    grip_limit: float = 40.0
+    """largest grip force"""
+    weight_error: float = 0.0
+    """of the logarithm of the weight expected before an object was ever held"""
+    grip_time: float = 0.25
+    """in which the fingers close"""
+    patience: float = 12.0
+    """how long the person waits for the robot before giving up"""
+    sway: float = 0.002
+    tremor: float = 0.0003
+
+    def __post_init__(self) -> None:
+        if self.behaviour not in BEHAVIOURS:
+            raise ValueError(f"behaviour '{self.behaviour}' is none of {', '.join(BEHAVIOURS)}")
+
+    @staticmethod
+    def draw(seed: int, behaviour: str = "normal", profile: str = "drawn") -> Participant:
+        """The person with this seed. ValueError for an unknown profile."""
+        if profile not in PROFILES:
+            raise ValueError(f"profile '{profile}' is none of {', '.join(PROFILES)}")
+        drawn = _drawn(seed, behaviour)
+        return drawn if profile == "drawn" else _patient(drawn)
+
+    @staticmethod
+    def from_mapping(data: Mapping[str, Any]) -> Participant:
+        """A participant file: ``seed`` and ``profile`` draw the person, every other field overrides what was drawn."""
+        known = {f.name for f in fields(Participant)} | {"profile"}
+        unknown = sorted(set(data) - known)
+        if unknown:
+            raise ValueError(
+                f"participant file: unknown fields {', '.join(unknown)}; known: {', '.join(sorted(known))}"
+            )
+        profile = str(data.get("profile", "drawn"))
+        drawn = asdict(Participant.draw(int(data.get("seed", 0)), str(data.get("behaviour", "normal")), profile))
+        drawn.update({k: tuple(v) if isinstance(v, list) else v for k, v in data.items() if k != "profile"})
+        return Participant(**drawn)
+
+
+def within(low: float, high: float, draw: Callable[[], float]) -> float:
+    """The first of the draws that lies in the range; its middle if none of a hundred does."""
+    for _ in range(100):
+        value = float(draw())
+        if low <= value <= high:
+            return value
+    return (low + high) / 2
+
+
+def _drawn(seed: int, behaviour: str) -> Participant:
+    rng = np.random.default_rng([seed, 17])
+
+    def normal(mean: float, sigma: float, low: float, high: float) -> float:
+        return within(low, high, lambda: rng.normal(mean, sigma))
+
+    def lognormal(median: float, sigma: float, low: float, high: float) -> float:
+        return within(low, high, lambda: median * np.exp(rng.normal(0, sigma)))
+
+    return Participant(
+        seed=seed,
+        behaviour=behaviour,
+        left_handed=bool(rng.random() < 0.1),
+        reaction_median=lognormal(0.35, 0.15, 0.2, 0.7),
+        reach_time=lognormal(1.1, 0.10, 0.8, 1.5),
+        bow=float(abs(rng.normal(0.0, 0.02))) if rng.random() < 0.5 else 0.0,
+        point_offset=(float(rng.normal(0, 0.02)), float(rng.normal(0, 0.04)), float(rng.normal(0, 0.045))),
+        seeing_delay=float(rng.uniform(0.15, 0.25)),
+        seen_noise=float(rng.uniform(0.002, 0.005)),
+        feeling_delay=float(rng.uniform(0.10, 0.15)),
+        felt_threshold=float(rng.uniform(0.2, 0.6)),
+        felt_share=float(rng.uniform(0.05, 0.10)),
+        hearing_delay=float(rng.uniform(0.4, 0.8)),
+        trust=lognormal(0.45, 0.7, 0.1, 1.5),
+        places_while_moving=bool(rng.random() < 0.2),
+        place_speed=float(rng.uniform(0.06, 0.18)),
+        press=float(rng.uniform(1.0, 3.0)),
+        release_share=normal(0.3, 0.1, 0.1, 0.6),
+        assurance=float(rng.uniform(0.1, 0.4)),
+        release_time=float(rng.uniform(0.25, 0.5)),
+        grip_safety=lognormal(2.0, 0.15, 1.6, 3.0),
+        weight_error=float(rng.normal(0, 0.15)),
+        grip_time=float(rng.uniform(0.2, 0.35)),
+        patience=float(rng.uniform(8, 16)),
+    )
+
+
+def _patient(person: Participant) -> Participant:
+    """The same person, as considerate toward the robot as all were in the first versions of this cell."""
+    x, y, z = person.point_offset
+    return replace(
+        person,
+        left_handed=False,
+        trust=1.0,
+        places_while_moving=False,
+        tilt=0.0,
+        point_offset=(0.4 * x, 0.5 * y, 0.45 * z),
+        inside_box=True,
+        patience=12.0,
+    )
+
+
+def population(n: int, seed: int, behaviour: str = "normal", profile: str = "drawn") -> list[Participant]:
+    """n different people, the same ones for the same seed."""
+    seeds = np.random.default_rng(seed).integers(0, 2**31, size=n)
+    return [Participant.draw(int(s), behaviour, profile) for s in seeds]

@@ -1,0 +1,1 @@
+"""The simulated tracker: what perception delivers of the cell."""
