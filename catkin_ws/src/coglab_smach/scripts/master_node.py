@@ -5,7 +5,7 @@ Names are relative to the node's namespace.
 Services: coglab/start (coglab_msgs/Start), coglab/stop, coglab/why (std_srvs/Trigger).
 Topics: coglab/transitions (coglab_msgs/Transition), coglab/results (std_msgs/String, one JSON object per action,
 latched), coglab/holding (std_msgs/String, what the hand holds, latched), coglab/state (coglab_msgs/MasterState,
-latched).
+latched), say (coglab_msgs/Say, what the robot says to the person).
 Parameters: perception/frames (names of human_hand and board). Private: config_file, dmp_library (path of the
 primitives), auto_trigger, result_file (JSON lines), state_file (what the hand holds, to survive a restart; default
 coglab_holding.json in ROS_HOME), config_overrides (mapping of dotted names), introspection (default true).
@@ -21,7 +21,7 @@ import rospkg
 import rospy
 import smach_ros
 from coglab_msgs.msg import MasterState as MasterStateMsg
-from coglab_msgs.msg import Transition
+from coglab_msgs.msg import Say, Transition
 from coglab_msgs.srv import Start, StartResponse
 from coglab_py import parameters
 from coglab_smach.clocks.clock import SteadyClock
@@ -70,6 +70,7 @@ class MasterNode:
         self.journal = Journal(clock.now)
         self.transitions = rospy.Publisher("coglab/transitions", Transition, queue_size=200)
         self.results = rospy.Publisher("coglab/results", String, queue_size=20, latch=True)
+        self.spoken = rospy.Publisher("say", Say, queue_size=20)
         self.result_file = parameters.read("~result_file", str, "")
         self.journal.listen(self.on_transition)
         self.journal.listen_results(self.on_result)
@@ -84,6 +85,7 @@ class MasterNode:
             journal=self.journal,
             memory=Memory(self.state_file(), rospy.logwarn),
             reachable=self.reachable(),
+            say=self.say,
         )
         self.master = build_master(self.ctx)
         self.thread = threading.Thread(target=self.master.execute, name="coglab_master", daemon=True)
@@ -111,6 +113,12 @@ class MasterNode:
         """Where the held object is noted: one file per namespace."""
         name = "coglab_holding" + rospy.get_namespace().rstrip("/").replace("/", "_") + ".json"
         return parameters.read("~state_file", str, "") or os.path.join(rospkg.get_ros_home(), name)
+
+    def say(self, code: int, text: str) -> None:
+        """Something for the person; a speech synthesiser or the simulated person listens."""
+        message = Say(code=code, text=text)
+        message.header.stamp = rospy.Time.now()
+        publish(self.spoken, message)
 
     def on_start(self, request):
         """A trigger for the hub that is open now."""

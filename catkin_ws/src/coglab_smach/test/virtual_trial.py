@@ -1,18 +1,23 @@
 """A whole trial in virtual time: the master beside the world, and what its reaches did."""
 
-import dataclasses
+import copy
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 from coglab_objects.database import ObjectDatabase, objects_folder
 from coglab_py.pose import Pose
-from coglab_sim.virtual_world import DT, LIMITS, World, pose_of_truth
+from coglab_sim.conditions import Conditions
+from coglab_sim.person.in_cell import pose_of_truth
+from coglab_sim.tracker.tracker import PerceptionSettings
+from coglab_sim.virtual_world import DT, LIMITS, World
 from coglab_smach.clocks.virtual_clock import VirtualClock, using
 from coglab_smach.context.config import Config
 from coglab_smach.context.context import Context
 from coglab_smach.context.journal import Journal
 from coglab_smach.kinematics.reachability import default_arm, solve
 from coglab_smach.machines import build_master
+from coglab_smach.ports.pending import Ready
 from coglab_smach.simulated.world_ports import (
     VirtualArm,
     VirtualContact,
@@ -28,7 +33,9 @@ LIBRARY = str(SHARE.parent / "coglab_controllers" / "config" / "primitives.xml")
 class VirtualTrial:
     """One trial: ``actions`` one after the other, each from its hub; results in the journal.
 
-    ``reaches`` gets one ReachRecord per DMP motion.
+    ``conditions`` of the world: by default people and tracker as they are; ``behaviour``, ``profile``, ``perfect`` and
+    ``perception`` change them. ``reaches`` gets one ReachRecord per DMP motion, ``touches`` one TouchRecord per wait for
+    contact.
     """
 
     def __init__(
@@ -42,9 +49,17 @@ class VirtualTrial:
         later_behaviour="",
         turned=0.0,
         limits=LIMITS,
+        profile="drawn",
+        conditions=None,
+        recording=None,
+        power=False,
         **overrides,
     ):
-        self.rig = World(seed, behaviour, perfect, object_on, perception, turned, limits)
+        if conditions is None:
+            perception = perception or PerceptionSettings(perfect=perfect)
+            conditions = Conditions(behaviour, profile, perception=perception)
+        self.rig = World(seed, conditions, object_on, turned, limits, recording)
+        self.object_id = conditions.object_id
         self.clock = VirtualClock()
         self.recogniser, self.later_behaviour = recogniser, later_behaviour
         self.last_hub = ""
@@ -58,37 +73,40 @@ class VirtualTrial:
             arm=VirtualArm(self.rig),
             hand=VirtualHand(self.rig),
             perception=VirtualPerception(self.rig, recogniser),
-            database=VirtualDatabase(database),
+            database=PowerGrasps(database) if power else VirtualDatabase(database),
             contact=VirtualContact(self.rig),
             config=config,
             journal=Journal(self.clock.now),
             reachable=lambda pose: solve(default_arm(), pose) is not None,
+            say=self._say,
         )
         self.ctx.journal.listen(self._on_transition)
         with using(self.clock):
             self.master = build_master(self.ctx)
         self.over = False
         self.failure = None
-        self.reaches = []
+        self.reaches, self.touches = [], []
+        self.said = []
         self.beside = lambda trial: None
-        self._reach = None
+        self._reach = self._touch = None
+
+    def _say(self, code, text):
+        """The person hears it."""
+        self.said.append((self.clock.now(), code))
+        self.rig.human.hear(self.rig.t, code)
 
     def _on_transition(self, record):
-        """The person sees what the robot is about to do; reaches are recorded."""
-        if record.path == "/coglab_master":
-            task = {"exchange_human_to_robot": "give", "exchange_robot_to_human": "receive"}
-            if record.to_state == "exchange_robot_to_human" and self.later_behaviour:
-                human = self.rig.human
-                human.participant = dataclasses.replace(human.participant, behaviour=self.later_behaviour)
-            if record.to_state in task:
-                self.rig.human.command(task[record.to_state])
-            elif record.from_state in task and record.outcome != "succeeded":
-                self.rig.human.command("rest")
+        """Another person comes for the second exchange, if that was asked for; reaches are recorded."""
+        if record.to_state == "exchange_robot_to_human" and self.later_behaviour:
+            human = self.rig.human
+            human.participant = replace(human.participant, behaviour=self.later_behaviour)
         if record.from_state == "execute_dmp" and record.outcome == "succeeded":
             self._reach = ReachRecord(self.rig, self.ctx)
+            self._touch = TouchRecord(self.rig, self.ctx.contact)
         if record.from_state == "wait_stop" and self._reach is not None:
             self.reaches.append(self._reach)
-            self._reach = None
+            self.touches.append(self._touch)
+            self._reach = self._touch = None
 
     def run(self, *actions, limit=60.0, script=None):
         """Execute ``actions``, or ``script(trial)``; returns the results of the actions as the journal holds them."""
@@ -108,6 +126,7 @@ class VirtualTrial:
                 self.rig.step()
                 if self._reach is not None:
                     self._reach.look()
+                    self._touch.look()
                 if self.recogniser is not None and self.rig.ticks % 6 == 0:
                     sight = self.rig.sights.get("human_hand")
                     if sight is not None:
@@ -140,7 +159,7 @@ class VirtualTrial:
             end = self.clock.now() + limit
             while self.ctx.requests.hub() == "" and self.clock.now() < end:
                 self.clock.sleep(0.1)
-            if not self.ctx.requests.submit(action, "mug")[0]:
+            if not self.ctx.requests.submit(action, self.object_id)[0]:
                 return  # the action before it failed, so that this hub does not take it
             before = len(self.ctx.journal.results)
             while len(self.ctx.journal.results) == before:
@@ -191,3 +210,42 @@ class ReachRecord:
         truth = rig.truth["human_hand" if request.goal_frame == "human_hand" else "object"]
         self.to_sight = palm.distance(seen * goal)
         self.to_truth = palm.distance(pose_of_truth(truth) * goal)
+
+
+TOUCH = 0.3
+"""N on the robot's hand from which somebody touches it"""
+
+
+class TouchRecord:
+    """When the object first touched the robot's hand in one reach (s), whether the arm moved then, and when contact was
+    found; None: never."""
+
+    def __init__(self, rig, contact):
+        self.rig, self.contact = rig, contact
+        self.touched = self.found = None
+        self.moving = False
+
+    def look(self):
+        """After each period of the rig."""
+        if self.touched is None and np.linalg.norm(self.rig.truth["palm_force"]) > TOUCH:
+            self.touched = self.rig.t
+            self.moving = not self.rig.robot.report["standing"]
+        if self.found is None and self.contact.event() is not None:
+            self.found = self.rig.t
+
+    @property
+    def false_alarm(self):
+        """Found before anything had touched the hand."""
+        return self.found is not None and (self.touched is None or self.found < self.touched)
+
+
+class PowerGrasps(VirtualDatabase):
+    """The objects, each grasped with all fingers, whatever its file asks for."""
+
+    def get_object(self, object_id):
+        pending = super().get_object(object_id)
+        entry = copy.deepcopy(pending.result())
+        for grasp in entry["grasps"].values():
+            level = grasp["hand"]["level"] if grasp["hand"]["mode"] == "cylindrical" else "medium"
+            grasp["hand"] = {"mode": "cylindrical", "level": level}
+        return Ready(entry)

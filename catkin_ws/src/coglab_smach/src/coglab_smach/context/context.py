@@ -55,6 +55,8 @@ class Context:
     memory: HoldingMemory = field(default_factory=HoldingMemory)
     reachable: Callable[[Pose], bool] = lambda pose: True
     """whether the arm can bring the palm to a pose in the base frame"""
+    say: Callable[[int, str], None] = lambda code, text: None
+    """tell the person something: code of coglab_msgs/Say and a sentence"""
     shared: bool = False
     """the person may hold the object that is in the robot's fingers: from the closing on an object that is offered
     until its weight is felt, and from the person's taking of the load until the hand is open"""

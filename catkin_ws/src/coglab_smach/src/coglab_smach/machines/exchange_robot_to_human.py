@@ -29,7 +29,7 @@ def build_exchange_robot_to_human(ctx: Context) -> CoglabMachine:
             to_recovery(succeeded="switch_to_ptp"),
         )
         machine.add_state("switch_to_ptp", SwitchController(ctx, "ptp"), to_recovery(succeeded="hand_open"))
-        machine.add_state("hand_open", HandOpen(ctx), to_recovery(succeeded="coglab_home_robot"))
+        machine.add_state("hand_open", HandOpen(ctx, to_person=True), to_recovery(succeeded="coglab_home_robot"))
         machine.add_state("coglab_home_robot", HomeRobot(ctx), to_recovery(succeeded="succeeded"))
         machine.add_state("recover", build_recovery(ctx), RECOVERY_TRANSITIONS)
     return machine

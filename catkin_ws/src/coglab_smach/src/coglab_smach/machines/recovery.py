@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from coglab_msgs.msg import ReasonCode
+from coglab_msgs.msg import ReasonCode, Say
 
 from coglab_smach.context.context import Context
 from coglab_smach.context.holding import UNKNOWN
@@ -69,6 +69,12 @@ class SecureHand(CoglabState):
         self.operator = operator
 
     def run(self, ud: Any) -> str:
+        outcome = self._secure()
+        if outcome == "succeeded" and not self.operator:
+            self.ctx.say(Say.GIVEN_UP, "That did not work; I stop here.")
+        return outcome
+
+    def _secure(self) -> str:
         if self.ctx.holding and (self.operator or not self.ctx.shared):
             self.ctx.shared = False
             self.reason = f"the hand keeps '{self.ctx.holding}'"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from coglab_msgs.msg import ReasonCode
+from coglab_msgs.msg import ReasonCode, Say
 
 from coglab_smach.context.context import Context
 from coglab_smach.ports.pending import PortError
@@ -77,6 +77,7 @@ class HandClose(CoglabState):
                 ReasonCode.OBJECT_NOT_SEEN,
             )
         if self.from_person:
+            self.ctx.say(Say.I_HAVE_IT, "I have it.")
             self._await_load(ud.object_id, float(ud.object_entry.get("mass", 0.0)))
         return "succeeded"
 
@@ -106,12 +107,18 @@ class HandClose(CoglabState):
 
 
 class HandOpen(CoglabState):
-    """Open the hand; afterwards nothing is held."""
+    """Open the hand; afterwards nothing is held. ``to_person``: who has taken the object is told."""
 
     default_time_limit = 8.0
 
+    def __init__(self, ctx: Context, to_person: bool = False) -> None:
+        super().__init__(ctx)
+        self.to_person = to_person
+
     def run(self, ud: Any) -> str:
         self.ctx.journal.mark("opening")
+        if self.to_person:
+            self.ctx.say(Say.YOU_HAVE_IT, "You have it.")
         self.await_pending(self.ctx.hand.open(int(self.ctx.config.get("hand.open_speed", 400))), "opening of the hand")
         self.ctx.holding, self.ctx.shared = "", False
         return "succeeded"

@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
-from coglab_msgs.msg import ReasonCode
+from coglab_msgs.msg import ReasonCode, Say
 from coglab_py.pose import Pose, mean_pose
 
 from coglab_smach.context.context import Context
@@ -180,6 +180,7 @@ class SetGraspGoal(CoglabState):
         super().__init__(ctx, input_keys=["object_id", "object_entry", "grasp"], output_keys=["goal", "located"])
 
     def run(self, ud: Any) -> str:
+        self.ctx.say(Say.READY_TO_RECEIVE, f"Please hand me the object '{ud.object_id}'.")
         goal = paced(self.ctx, grasp_goal(ud.object_entry, ud.grasp, "", "receive"))
         located = await_offer(self, ud.object_id, goal)
         ud.located = located
@@ -218,6 +219,7 @@ class SetDeliveryGoal(CoglabState):
 
     def run(self, ud: Any) -> str:
         entry = ud.object_entry
+        self.ctx.say(Say.READY_TO_GIVE, "Please take the object out of my hand.")
         name = entry["default_delivery"]
         delivery = entry["deliveries"][name]
         ud.delivery_name = name
