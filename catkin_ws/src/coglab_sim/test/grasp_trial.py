@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import yaml
+from coglab_objects.database import cell_parameters, objects_folder, read_object
 from coglab_sim import _plant
 
 SOURCES = Path(__file__).resolve().parents[2]
@@ -30,9 +30,12 @@ def rotated(rotation, vector):
 
 
 def objects():
-    """Objects of the cell by name, as the plant takes them."""
-    config = yaml.safe_load((SOURCES / "coglab_sim" / "config" / "cell.yaml").read_text())
-    return {name: {"id": name, **figures} for name, figures in config["objects"].items()}
+    """Objects of the database by name, as the plant takes them."""
+    things = {}
+    for path in sorted(objects_folder().glob("*.yaml")):
+        entry, _ = read_object(path)
+        things[path.stem] = {"id": path.stem, **cell_parameters(entry)}
+    return things
 
 
 @dataclass
