@@ -93,8 +93,12 @@ def test_touch_is_felt_in_the_joint_torques(session):
     fields = parse(s.measurement)
     felt = np.array(fields["external_torque"]) - before
     assert np.abs(felt - truth["external_torque"]).max() < 0.05
-    jacobian = np.array(fields["jacobian"]).reshape(6, 7)[:3]
-    assert np.abs(felt - jacobian.T @ truth["palm_force"]).max() < 0.5  # the rest: off-centre contact
+    # It is that force at a point of the hand: what is left after the force alone is the torque of a short lever.
+    jacobian = np.array(fields["jacobian"]).reshape(6, 7)[[0, 1, 2, 5, 4, 3]]
+    rest = felt - jacobian[:3].T @ truth["palm_force"]
+    torque, *_ = np.linalg.lstsq(jacobian[3:].T, rest, rcond=None)
+    assert np.abs(rest - jacobian[3:].T @ torque).max() < 0.02
+    assert np.linalg.norm(torque) < 0.08 * np.linalg.norm(truth["palm_force"])
     assert abs(felt[0]) > 0.5
 
 
@@ -109,7 +113,8 @@ def test_load_moves_from_person_to_robot(session):
     truths = let_go(s, hand)
     robot = np.array([truth["robot_load_share"] for truth in truths])
     assert robot[-1] == pytest.approx(1.0, abs=0.05) and truths[-1]["human_load_share"] < 0.02
-    assert max(np.linalg.norm(truth["object_velocity"]) for truth in truths) < 0.3
+    assert np.abs(np.diff(robot)).max() < 0.2
+    assert max(np.linalg.norm(truth["object_velocity"]) for truth in truths) < 0.1
     truth = truths[-1]
     assert truth["held_by"] == "robot" and not truth["dropped"]
     assert truth["palm_force"][2] == pytest.approx(-WEIGHT, abs=0.1)
@@ -237,11 +242,11 @@ def test_block_and_push_show_in_the_torques(session):
 
 def test_noise_model(session):
     """Deviation at rest, its growth with speed, and the offset of the estimate."""
-    s = session(seed=4, krc__period=0.001)
+    s = session(seed=4, krc__period=0.001, krc__payload_error=0.0, krc__inertia_error=0.0)
     s.command()
     rest = np.array([s.tick()["external_torque"] for _ in range(4000)])
     assert rest.std(axis=0) == pytest.approx(np.full(7, 0.05), rel=0.25)
-    assert np.abs(rest.mean(axis=0)).max() < 0.41 + 0.3 + 1.0 and np.abs(rest.mean(axis=0)).max() > 0.1
+    assert np.abs(rest.mean(axis=0)).max() < 0.41 + 0.3 and np.abs(rest.mean(axis=0)).max() > 0.1
     start = s.cell.set_point.copy()
     moving = []
     for i in range(2000):
