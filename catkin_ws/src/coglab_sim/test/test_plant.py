@@ -6,7 +6,7 @@ import xml.etree.ElementTree as ET
 import numpy as np
 import pytest
 from coglab_sim import _plant
-from grasp_trial import HOME, SOURCES, URDF, GraspTrial, objects
+from grasp_trial import DIRECTIONS, HOME, SOURCES, URDF, GraspTrial, objects, rotated
 
 G = 9.81
 STEP = 1e-3
@@ -198,6 +198,24 @@ def test_a_person_carries_and_gives_way_beyond_their_grip():
         plant.set_person(hand, grip=0.0)
         plant.hold(HOME)
     assert plant.state()["held_by"] in ("none", "floor") and plant.state()["object"][0][2] < 0.0
+
+
+def test_a_person_who_takes_carries_what_they_lift():
+    """A grip on what the robot holds takes no load by itself; the hand has to rise."""
+    trial = GraspTrial(objects()["mug"], "index up")
+    trial.close()
+    plant = trial.plant
+    gravity = 9.81 * rotated(plant.state()["palm"][1], np.array(DIRECTIONS["index up"], dtype=float))
+    assert np.allclose(gravity, [0.0, 0.0, -G], atol=0.5)
+    hand = plant.state()["object"][0] + [0.08, 0.0, 0.05]
+    shares = []
+    for lift in (0.0, 0.006):
+        for _ in range(800):
+            plant.set_person(hand + [0.0, 0.0, lift], grip=1.0)
+            plant.hold(HOME)
+        assert plant.state()["held_by"] == "both"
+        shares.append(plant.state()["person_share"])
+    assert shares[0] < 0.15 and shares[1] > 0.6
 
 
 def test_the_same_run_gives_the_same_bytes():

@@ -16,7 +16,8 @@ Wrench HoldSpring::evaluate(const Pose& hand, const Twist& hand_twist, const Fre
   const Pose wanted = hand * in_hand_;
   const Vector3d speed = hand_twist.at(wanted.position - hand.position);
   const Vector3d stretch = wanted.position - body.center.position;
-  const Vector3d spring = body.mass * w * w * stretch + Vector3d(0.0, 0.0, body.mass * kGravity);
+  const Vector3d weight(0.0, 0.0, carries_ahead_ ? body.mass * kGravity : 0.0);
+  const Vector3d spring = body.mass * w * w * stretch + weight;
   Vector3d force = share * (spring + 2.0 * w * body.mass * (speed - body.twist.linear));
   if (const double size = force.norm(); size > figures.force) {
     slipping_ = true;

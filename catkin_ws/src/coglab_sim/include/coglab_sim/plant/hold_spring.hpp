@@ -22,16 +22,20 @@ struct HoldFigures {
 };
 
 /// The gains follow from the mass and from each axis's own inertia, so that a light body is held
-/// as steadily as a heavy one; the weight is carried ahead of the error. What the limits do not
-/// carry slips: the place where the hold would have the body follows it.
+/// as steadily as a heavy one. The weight of a body that belongs to the hand is carried ahead of the
+/// error; of one that is taken where another holds it, the hold carries only what the hand lifts.
+/// What the limits do not carry slips: the place where the hold would have the body follows it.
 class HoldSpring {
  public:
-  /// The body is to stay where it is now in the frame of the hand.
-  void engage(const Pose& hand, const Pose& center) { engageAt(hand.inverse() * center); }
-  /// The body is to be there in the frame of the hand.
+  /// The body, held by another or at rest, is to stay where it is now in the frame of the hand.
+  void engage(const Pose& hand, const Pose& center) {
+    engageAt(hand.inverse() * center);
+    carries_ahead_ = false;
+  }
+  /// The body belongs to the hand, there in its frame.
   void engageAt(const Pose& in_hand) {
     in_hand_ = in_hand;
-    engaged_ = true;
+    engaged_ = carries_ahead_ = true;
   }
   void release() { engaged_ = slipping_ = false; }
 
@@ -43,7 +47,7 @@ class HoldSpring {
   bool slipping() const { return slipping_; }
 
  private:
-  bool engaged_ = false, slipping_ = false;
+  bool engaged_ = false, slipping_ = false, carries_ahead_ = false;
   Pose in_hand_;  // where the body's centre belongs
 };
 
