@@ -24,8 +24,6 @@ LONG: dict[str, str] = {
     "coglab_controllers/test/test_cycle.cpp": "one story told in order",
     "coglab_controllers/test/test_dmp_requests.cpp": "a table of refusals",
     "coglab_controllers/test/thread_stress.cpp": "threads that share locals",
-    "coglab_sim/src/arm_dynamics.cpp": "goes when the cell's physics is MuJoCo's",
-    "coglab_sim/src/object_physics.cpp": "goes when the cell's physics is MuJoCo's",
     "coglab_sim/test/test_krc_session.py": "one table of conditions of the robot controller",
     "ctrl_more/test/test_realtime.cpp": "one story told in order",
     "ctrl_more/test/test_three_robots.cpp": "one story told in order",

@@ -3,7 +3,13 @@
 #pragma once
 
 #include <coglab_msgs/CellTruth.h>
-#include <coglab_msgs/FingerContact.h>
+#include <coglab_msgs/FingertipForces.h>
+#include <coglab_msgs/MotorCommands.h>
+#include <coglab_msgs/MotorStates.h>
+
+#include <stdexcept>
+#include <string>
+#include <vector>
 
 #include "coglab_sim/cell.hpp"
 
@@ -73,13 +79,54 @@ inline coglab_msgs::CellTruth truthMessage(const CellTruth& truth, const std::st
   return message;
 }
 
-inline coglab_msgs::FingerContact contactMessage(const FingerContactState& state,
-                                                 const ros::Time& stamp) {
-  coglab_msgs::FingerContact message;
+inline coglab_msgs::MotorStates motorsMessage(const MotorStates& motors, const ros::Time& stamp) {
+  coglab_msgs::MotorStates message;
   message.header.stamp = stamp;
-  message.contact_position.assign(state.position.begin(), state.position.end());
-  message.stiffness.assign(state.stiffness.begin(), state.stiffness.end());
+  for (const plant::MotorState& motor : motors) {
+    message.position.push_back(motor.position);
+    message.current.push_back(motor.current);
+    message.effort.push_back(motor.effort);
+    message.moving.push_back(motor.moving);
+    message.locked.push_back(motor.locked);
+  }
   return message;
+}
+
+/// Touch without noise, as the physics has it.
+inline coglab_msgs::FingertipForces touchMessage(const plant::Touch& touch,
+                                                 const plant::HandTable& hand,
+                                                 const ros::Time& stamp) {
+  coglab_msgs::FingertipForces message;
+  message.header.stamp = stamp;
+  message.header.frame_id = plant::kPalmFrame;
+  for (std::size_t i = 0; i < touch.phalanges.size(); ++i) {
+    message.phalanges.push_back(hand.phalanges[i].name);
+    message.fingers.push_back(static_cast<int>(hand.phalanges[i].finger));
+    message.forces.push_back(vectorMessage(touch.phalanges[i]));
+  }
+  message.palm = vectorMessage(touch.palm);
+  return message;
+}
+
+/// @throws std::invalid_argument with what was expected and what came.
+inline MotorCommands motorsOf(const coglab_msgs::MotorCommands& message) {
+  MotorCommands commands;
+  const auto check = [&](const std::vector<double>& list, const char* name, double most) {
+    if (list.size() != commands.size())
+      throw std::invalid_argument(std::string("expected ") + name + " of 5 motors, got " +
+                                  std::to_string(list.size()));
+    for (const double value : list) {
+      if (!(value >= 0.0 && value <= most))
+        throw std::invalid_argument(std::string("expected ") + name + " in 0.." +
+                                    std::to_string(most) + ", got " + std::to_string(value));
+    }
+  };
+  check(message.speed, "speed", 1.0);
+  check(message.target, "target", 1.0);
+  check(message.current, "current", 1e4);
+  for (std::size_t i = 0; i < commands.size(); ++i)
+    commands[i] = {message.speed[i], message.target[i], message.current[i]};
+  return commands;
 }
 
 }  // namespace coglab_sim

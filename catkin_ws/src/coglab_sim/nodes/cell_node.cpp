@@ -1,18 +1,16 @@
 /// The node /coglab_sim/cell: the simulated cell in real time, behind UDP and topics.
 ///
-/// Subscribes (relative names) human_hand, finger_positions, ~push (geometry_msgs/Wrench on the
-/// palm, world axes). Publishes truth/cell, finger_contact, ~messages (the controller's message
-/// window), /clock if ~publish_clock. Serves ~fault, ~place_object. Parameters: every row of the
-/// cell's table under the private namespace; ~speed, ~fri_host, ~fri_port (0: wait for
-/// ~port_parameter, by default lwr/fri_port_bound beside this namespace), ~port_wait,
-/// ~fri_source_port (0: any free one), ~log_file, ~truth_rate, ~publish_clock; fri_period and seed
-/// of the parent namespace.
+/// Subscribes (relative names) human_hand, motor_commands, ~push (geometry_msgs/Wrench on the palm,
+/// world axes). Publishes truth/cell, motor_states, ~messages (the controller's message window),
+/// /clock if ~publish_clock, and fingertip_forces if ~tactile. Serves ~fault, ~place_object.
+/// Parameters: every row of the cell's table under the private namespace; ~speed, ~fri_host,
+/// ~fri_port (0: wait for ~port_parameter, by default lwr/fri_port_bound beside this namespace),
+/// ~port_wait, ~fri_source_port (0: any free one), ~log_file, ~truth_rate, ~publish_clock,
+/// ~tactile; fri_period and seed of the parent namespace.
 #include <fstream>
 #include <memory>
 
 #include <coglab_msgs/CellTruth.h>
-#include <coglab_msgs/FingerContact.h>
-#include <coglab_msgs/FingerPositions.h>
 #include <coglab_msgs/HumanHand.h>
 #include <coglab_msgs/InjectFault.h>
 #include <coglab_msgs/PlaceObject.h>
@@ -72,7 +70,11 @@ std::uint16_t waitForPort(const std::string& parameter, double limit) {
 
 class CellNode {
  public:
-  CellNode() : private_("~"), config_(readCellConfig(private_)) {
+  CellNode()
+      : private_("~"),
+        config_(readCellConfig(private_)),
+        hand_(config_.hand_model.empty() ? plant::builtInHandTable()
+                                         : plant::readHandTable(config_.hand_model)) {
     int port = within(private_, "fri_port", 0);
     const double speed = within(private_, "speed", 1.0);
     const double rate = within(private_, "truth_rate", 200.0);
@@ -87,17 +89,19 @@ class CellNode {
     openLog(private_.param<std::string>("log_file", ""));
 
     truth_ = node_.advertise<coglab_msgs::CellTruth>("truth/cell", 1);
-    contact_ = node_.advertise<coglab_msgs::FingerContact>("finger_contact", 1, true);
+    motor_states_ = node_.advertise<coglab_msgs::MotorStates>("motor_states", 1);
     messages_ = private_.advertise<std_msgs::String>("messages", 50, true);
+    if (private_.param("tactile", false))
+      touch_ = node_.advertise<coglab_msgs::FingertipForces>("fingertip_forces", 1);
     if (private_.param("publish_clock", false))
       clock_ = node_.advertise<rosgraph_msgs::Clock>("/clock", 1);
     const auto hints = ros::TransportHints().tcpNoDelay();
     human_ = node_.subscribe<coglab_msgs::HumanHand>(
         "human_hand", 1, [this](const coglab_msgs::HumanHand::ConstPtr& m) { onHuman(*m); },
         nullptr, hints);
-    fingers_ = node_.subscribe<coglab_msgs::FingerPositions>(
-        "finger_positions", 1,
-        [this](const coglab_msgs::FingerPositions::ConstPtr& m) { onFingers(*m); }, nullptr, hints);
+    motors_ = node_.subscribe<coglab_msgs::MotorCommands>(
+        "motor_commands", 1,
+        [this](const coglab_msgs::MotorCommands::ConstPtr& m) { onMotors(*m); }, nullptr, hints);
     push_ = private_.subscribe<geometry_msgs::Wrench>(
         "push", 1, [this](const geometry_msgs::Wrench::ConstPtr& m) { onPush(*m); });
     fault_ = private_.advertiseService("fault", &CellNode::onFault, this);
@@ -159,7 +163,7 @@ class CellNode {
   }
 
   void onHuman(const coglab_msgs::HumanHand& message) {
-    HumanInput human;
+    plant::PersonInput human;
     human.twist = {vectorOf(message.velocity.linear), vectorOf(message.velocity.angular)};
     if (!poseOf(message.pose, human.hand) || !(message.grip >= 0.0 && message.grip <= 1.0) ||
         !(message.grip_force >= 0.0 && message.grip_force <= 1000.0) ||
@@ -174,20 +178,12 @@ class CellNode {
     cell_->setHuman(human);
   }
 
-  void onFingers(const coglab_msgs::FingerPositions& message) {
-    if (message.position.size() != 5) {
-      ROS_WARN_THROTTLE(1.0, "finger_positions ignored: expected 5 positions, got %zu",
-                        message.position.size());
-      return;
+  void onMotors(const coglab_msgs::MotorCommands& message) {
+    try {
+      cell_->setMotors(motorsOf(message));
+    } catch (const std::invalid_argument& error) {
+      ROS_WARN_THROTTLE(1.0, "motor_commands ignored: %s", error.what());
     }
-    for (const auto position : message.position) {
-      if (position >= 0 && position <= 255) continue;
-      ROS_WARN_THROTTLE(1.0, "finger_positions ignored: expected 0..255, got %d", position);
-      return;
-    }
-    FingerInput fingers{};
-    std::copy(message.position.begin(), message.position.end(), fingers.begin());
-    cell_->setFingers(fingers);
   }
 
   bool onFault(coglab_msgs::InjectFault::Request& request,
@@ -211,11 +207,11 @@ class CellNode {
   bool onPlace(coglab_msgs::PlaceObject::Request& request,
                coglab_msgs::PlaceObject::Response& response) {
     try {
-      const Placement where = placementOf(request.where);
+      const plant::Place where = placeOf(request.where);
       Pose pose;
       if (!poseOf(request.pose, pose))
         throw std::invalid_argument("pose needs finite numbers and a quaternion of length 1");
-      ObjectParameters object = config_.object;
+      plant::Object object = config_.object;
       const bool exchange = !request.object_id.empty() && request.object_id != config_.object.id;
       if (exchange) object = readObject(private_, request.object_id);
       cell_->apply([exchange, object, where, pose](Cell& cell) {
@@ -250,15 +246,8 @@ class CellNode {
     }
     const ros::Time now = ros::Time::now();
     truth_.publish(truthMessage(snapshot.truth, config_.object.id, now));
-
-    coglab_msgs::FingerContact contact = contactMessage(snapshot.finger_contact, now);
-    const bool changed = contact.contact_position != last_contact_.contact_position;
-    const ros::WallTime wall = ros::WallTime::now();
-    if (changed || wall - contact_published_ >= ros::WallDuration(0.05)) {
-      contact_.publish(contact);
-      contact_published_ = wall;
-      last_contact_ = std::move(contact);
-    }
+    motor_states_.publish(motorsMessage(snapshot.motors, now));
+    if (touch_) touch_.publish(touchMessage(snapshot.touch, hand_, now));
     for (const krc::Message& message : cell_->takeMessages()) {
       ROS_WARN("KRC %.3f s: %s", message.time, message.text.c_str());
       std_msgs::String text;
@@ -280,17 +269,16 @@ class CellNode {
 
   ros::NodeHandle node_, private_;
   CellConfig config_;
+  plant::HandTable hand_;  // names of the phalanges
   std::unique_ptr<RealTimeCell> cell_;
   std::string port_parameter_;
   bool follow_port_ = false;
   std::uint64_t answers_seen_ = 0;
   std::ofstream log_;
-  ros::Publisher truth_, contact_, messages_, clock_;
-  ros::Subscriber human_, fingers_, push_;
+  ros::Publisher truth_, motor_states_, messages_, clock_, touch_;
+  ros::Subscriber human_, motors_, push_;
   ros::ServiceServer fault_, place_;
   ros::WallTimer publish_timer_, log_timer_, port_timer_;
-  ros::WallTime contact_published_;
-  coglab_msgs::FingerContact last_contact_;
 };
 
 }  // namespace

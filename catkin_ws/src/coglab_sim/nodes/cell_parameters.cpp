@@ -70,7 +70,7 @@ CellConfig readCellConfig(const ros::NodeHandle& node) {
   return config;
 }
 
-ObjectParameters readObject(const ros::NodeHandle& node, const std::string& id) {
+plant::Object readObject(const ros::NodeHandle& node, const std::string& id) {
   if (id.find('/') != std::string::npos)
     throw std::invalid_argument("object id '" + id + "': expected the name of an object file");
   const auto folder =

@@ -16,6 +16,6 @@ CellConfig readCellConfig(const ros::NodeHandle& node);
 
 /// Mass, size, shape and friction of an object from its file in the folder `objects`, a parameter
 /// under `node` (by default that of coglab_objects). @throws std::invalid_argument naming the file.
-ObjectParameters readObject(const ros::NodeHandle& node, const std::string& id);
+plant::Object readObject(const ros::NodeHandle& node, const std::string& id);
 
 }  // namespace coglab_sim

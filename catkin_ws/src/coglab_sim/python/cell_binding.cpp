@@ -27,9 +27,9 @@ PYBIND11_MODULE(_cell, m) {
       .def_property_readonly("set_point",
                              [](const PyCell& c) { return c.cell().controller().setPoint(); })
       .def_property_readonly("position",
-                             [](const PyCell& c) { return Vector7(c.cell().arm().position()); })
+                             [](const PyCell& c) { return Vector7(c.cell().plant().position()); })
       .def_property_readonly("velocity",
-                             [](const PyCell& c) { return Vector7(c.cell().arm().velocity()); })
+                             [](const PyCell& c) { return Vector7(c.cell().plant().velocity()); })
       .def_property_readonly(
           "fri_state",
           [](const PyCell& c) { return static_cast<int>(c.cell().controller().friState()); })
@@ -76,16 +76,21 @@ PYBIND11_MODULE(_cell, m) {
           py::arg("spin") = Vector3d(Vector3d::Zero()), py::arg("grip") = 0.0,
           py::arg("grip_force") = 20.0, "The person's hand in the world; grip 0..1, force N.")
       .def(
-          "set_fingers",
-          [](PyCell& c, const FingerInput& fingers) { c.cell().setFingers(fingers); },
-          "Positions of the five motors, 0..254.")
-      .def(
-          "finger_contact",
-          [](const PyCell& c) {
-            const auto state = c.cell().fingerContact();
-            return py::make_tuple(state.position, state.stiffness);
+          "set_motors",
+          [](PyCell& c, const std::array<double, 5>& speed, const std::array<double, 5>& target,
+             const std::array<double, 5>& current) {
+            MotorCommands commands;
+            for (std::size_t i = 0; i < commands.size(); ++i)
+              commands[i] = {speed[i], target[i], current[i]};
+            c.cell().setMotors(commands);
           },
-          "(positions, stiffness) where the five motors meet the object; 255: free.")
+          py::arg("speed"), py::arg("target"), py::arg("current"),
+          "Commands of the five motors of the hand: shares of the full speed and of the stroke (0 "
+          "open), counts of current at which they stop.")
+      .def("motors", &PyCell::motors,
+           "Of each motor: position (share of the stroke), current (counts), effort (counts that "
+           "the tension stands for), tension (N), moving, locked.")
+      .def("touch", &PyCell::touch, "Forces on phalanges and palm, N, axes of ih2_palm.")
       .def(
           "set_push",
           [](PyCell& c, const Vector3d& force, const Vector3d& torque) {
@@ -97,7 +102,7 @@ PYBIND11_MODULE(_cell, m) {
           "place",
           [](PyCell& c, const std::string& where, const Vector3d& position,
              const Eigen::Vector4d& rotation) {
-            c.cell().place(placementOf(where), makePose(position, rotation));
+            c.cell().place(placeOf(where), makePose(position, rotation));
           },
           py::arg("where"), py::arg("position") = Vector3d(Vector3d::Zero()),
           py::arg("rotation") = Eigen::Vector4d(0, 0, 0, 1),

@@ -74,6 +74,30 @@ class PyCell {
     return result;
   }
 
+  py::list motors() const {
+    py::list list;
+    for (const plant::MotorState& state : cell_.motors()) {
+      py::dict motor;
+      motor["position"] = state.position;
+      motor["current"] = state.current;
+      motor["effort"] = state.effort;
+      motor["tension"] = state.tension;
+      motor["moving"] = state.moving;
+      motor["locked"] = state.locked;
+      list.append(motor);
+    }
+    return list;
+  }
+
+  py::dict touch() const {
+    const plant::Plant& plant = cell_.plant();
+    py::dict touch;
+    for (std::size_t i = 0; i < plant.touch().phalanges.size(); ++i)
+      touch[py::str(plant.config().hand.phalanges[i].name)] = plant.touch().phalanges[i];
+    touch["palm"] = plant.touch().palm;
+    return touch;
+  }
+
   Cell& cell() { return cell_; }
   const Cell& cell() const { return cell_; }
 

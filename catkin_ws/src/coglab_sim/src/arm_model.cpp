@@ -1,9 +1,9 @@
 #include "coglab_sim/arm_model.hpp"
 
+#include <algorithm>
 #include <set>
 #include <stdexcept>
 
-#include <tinyxml2.h>
 #include <kdl/tree.hpp>
 #include <kdl_parser/kdl_parser.hpp>
 
@@ -19,19 +19,32 @@ KDL::RigidBodyInertia branchInertia(const KDL::TreeElement& element) {
   return element.segment.pose(0.0) * inertia;
 }
 
+/// The same mass with its inertia about the centre of mass taken by a share.
+KDL::RigidBodyInertia scaled(const KDL::RigidBodyInertia& inertia, double share) {
+  if (inertia.getMass() <= 0.0) return inertia;
+  KDL::RigidBodyInertia about_origin = inertia;
+  const KDL::RigidBodyInertia centred = about_origin.RefPoint(inertia.getCOG());
+  return KDL::RigidBodyInertia(inertia.getMass(), inertia.getCOG(),
+                               share * centred.getRotationalInertia());
+}
+
 /// The chain with side branches added to their parents and bodies behind fixed joints merged into
 /// the moving ones.
-KDL::Chain condensed(const KDL::Tree& tree, const KDL::Chain& chain) {
+KDL::Chain condensed(const KDL::Tree& tree, const KDL::Chain& chain, const ModelErrors& errors) {
   std::set<std::string> on_chain;
   for (const auto& segment : chain.segments) on_chain.insert(segment.getName());
 
   std::vector<KDL::Segment> bodies;
+  std::size_t moving = 0;
   for (const auto& segment : chain.segments) {
     KDL::RigidBodyInertia inertia = segment.getInertia();
     for (const auto& child : tree.getSegment(segment.getName())->second.children) {
       if (on_chain.count(child->first) == 0) inertia = inertia + branchInertia(child->second);
     }
-    if (segment.getJoint().getType() == KDL::Joint::None && !bodies.empty()) {
+    const bool fixed = segment.getJoint().getType() == KDL::Joint::None;
+    if (!fixed) inertia = scaled(inertia, errors.inertia[std::min<std::size_t>(moving++, 6)]);
+    if (fixed && moving == static_cast<std::size_t>(kJoints)) inertia = errors.payload * inertia;
+    if (fixed && !bodies.empty()) {
       const KDL::Segment& carrier = bodies.back();
       const KDL::Frame step = segment.getFrameToTip();
       bodies.back() =
@@ -46,7 +59,8 @@ KDL::Chain condensed(const KDL::Tree& tree, const KDL::Chain& chain) {
   return result;
 }
 
-KDL::Chain readChain(const std::string& urdf, const std::string& base, const std::string& tip) {
+KDL::Chain readChain(const std::string& urdf, const ModelErrors& errors, const std::string& base,
+                     const std::string& tip) {
   KDL::Tree tree;
   if (!kdl_parser::treeFromFile(urdf, tree)) {
     throw std::runtime_error("robot description " + urdf + " cannot be read as a URDF");
@@ -60,39 +74,17 @@ KDL::Chain readChain(const std::string& urdf, const std::string& base, const std
     throw std::runtime_error("robot description " + urdf + ": expected 7 joints from " + base +
                              " to " + tip + ", found " + std::to_string(chain.getNrOfJoints()));
   }
-  return condensed(tree, chain);
-}
-
-/// `<dynamics damping>` of the chain's joints; KDL's tree does not keep it.
-Vector7 readDamping(const std::string& urdf, const KDL::Chain& chain) {
-  tinyxml2::XMLDocument document;
-  document.LoadFile(urdf.c_str());
-  const tinyxml2::XMLElement* robot = document.FirstChildElement("robot");
-  Vector7 damping = Vector7::Zero();
-  int index = 0;
-  for (const auto& segment : chain.segments) {
-    if (segment.getJoint().getType() == KDL::Joint::None) continue;
-    const tinyxml2::XMLElement* joint =
-        robot != nullptr ? robot->FirstChildElement("joint") : nullptr;
-    while (joint != nullptr && !joint->Attribute("name", segment.getJoint().getName().c_str())) {
-      joint = joint->NextSiblingElement("joint");
-    }
-    const tinyxml2::XMLElement* dynamics =
-        joint != nullptr ? joint->FirstChildElement("dynamics") : nullptr;
-    if (dynamics != nullptr) damping[index] = dynamics->DoubleAttribute("damping");
-    ++index;
-  }
-  return damping;
+  return condensed(tree, chain, errors);
 }
 
 }  // namespace
 
-ArmModel::ArmModel(const std::string& urdf, const std::string& base, const std::string& tip)
-    : chain_(readChain(urdf, base, tip)),
+ArmModel::ArmModel(const std::string& urdf, const ModelErrors& errors, const std::string& base,
+                   const std::string& tip)
+    : chain_(readChain(urdf, errors, base, tip)),
       dynamics_(chain_, KDL::Vector(0.0, 0.0, -9.81)),
       forward_(chain_),
       jacobian_solver_(chain_),
-      damping_(readDamping(urdf, chain_)),
       q_(kJoints),
       dq_(kJoints),
       coriolis_(kJoints),

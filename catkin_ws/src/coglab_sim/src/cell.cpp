@@ -7,37 +7,57 @@
 
 namespace coglab_sim {
 namespace {
-// s for which the hand goes on as it was going after its last message; then it stands still.
-constexpr double kHumanAge = 0.05;
+
+plant::PlantConfig plantConfig(const CellConfig& config) {
+  plant::PlantConfig plant;
+  plant.urdf = config.urdf;
+  plant.seed = config.seed;
+  plant.home = config.home;
+  plant.object = config.object;
+  plant.surroundings = config.surroundings;
+  plant.drives = config.drives;
+  plant.person = config.person;
+  if (!config.hand_model.empty()) plant.hand = plant::readHandTable(config.hand_model);
+  return plant;
+}
+
 }  // namespace
 
-Placement placementOf(const std::string& name) {
-  if (name == "human_hand") return Placement::HumanHand;
-  if (name == "robot_hand") return Placement::RobotHand;
-  if (name == "world") return Placement::World;
+plant::Place placeOf(const std::string& name) {
+  if (name == "human_hand") return plant::Place::PersonHand;
+  if (name == "robot_hand") return plant::Place::RobotHand;
+  if (name == "world") return plant::Place::World;
   throw std::invalid_argument("unknown placement '" + name +
                               "'; known: human_hand, robot_hand, world");
 }
 
 Cell::Cell(const CellConfig& config)
     : config_(config),
-      arm_(config.urdf, config.arm, config.home),
-      controller_(config.krc, config.arm, config.home),
+      plant_(plantConfig(config)),
+      servos_(config.urdf, config.servos, config.drives.rotor_inertia, config.seed),
+      controller_(config.krc, config.servos, config.home),
       torque_sensor_(config.torque_noise, config.seed),
-      object_(config.object, config.contact),
       loss_(config.seed, 2) {
-  object_.place(placementOf(config.object_start), config.object_pose);
-  arm_.setBrakes(true);
+  plant_.setBrakes(true);
+  plant_.setArm(config.home);
+  plant_.place(placeOf(config.object_start), config.object_pose);
+  servos_.observe(plant_.position(), plant_.velocity());
 }
 
-void Cell::setHuman(const HumanInput& human) {
-  human_ = human;
-  human_age_ = 0.0;
-  human_present_ = true;
+void Cell::setMotors(const MotorCommands& commands) {
+  for (int i = 0; i < plant::kMotors; ++i)
+    plant_.motors().command(i, commands[static_cast<std::size_t>(i)]);
 }
 
-void Cell::setObject(const ObjectParameters& object) {
-  object_ = ObjectPhysics(object, config_.contact);
+MotorStates Cell::motors() const {
+  MotorStates states;
+  for (int i = 0; i < plant::kMotors; ++i)
+    states[static_cast<std::size_t>(i)] = plant_.motors().state(i);
+  return states;
+}
+
+void Cell::setObject(const plant::Object& object) {
+  plant_.setObject(object);
   config_.object = object;
 }
 
@@ -60,70 +80,69 @@ const MeasurementBytes& Cell::step(const std::uint8_t* answer, std::size_t size)
 }
 
 const MeasurementBytes& Cell::advance(bool on_time) {
-  const krc::PeriodCommand command = controller_.tick(arm_, on_time);
-  arm_.setBrakes(controller_.brakesWanted());
+  const krc::PeriodCommand command = controller_.tick(servos_, on_time);
+  plant_.setBrakes(controller_.brakesWanted());
 
   const double period = this->period();
-  const int steps = static_cast<int>(std::ceil(period / 1e-3 - 1e-9));
+  const int steps = static_cast<int>(std::ceil(period / plant::kStep - 1e-9));
   const double dt = period / steps;
-  ServoCommand servo = command.servo;
+  krc::ServoCommand servo = command.servo;
   servo.velocity = (command.to - command.from) / period;
   servo.frame_velocity.linear = (command.frame_to.position - command.frame_from.position) / period;
   servo.frame_velocity.angular =
       rotationBetween(command.frame_from.rotation, command.frame_to.rotation) / period;
+  // Torque signals are means over the period: an impact is shorter than the sensors are fast.
+  Vector7 torque = Vector7::Zero(), acceleration = Vector7::Zero();
   for (int i = 1; i <= steps; ++i) {
     const double share = static_cast<double>(i) / steps;
     servo.position = command.from + share * (command.to - command.from);
     servo.frame.position = command.frame_from.position +
                            share * (command.frame_to.position - command.frame_from.position);
     servo.frame.rotation = command.frame_from.rotation.slerp(share, command.frame_to.rotation);
-    const Pose& palm = arm_.terms().tip;
-    Wrench on_palm = object_.step(palm, arm_.palmTwist(), human_, human_present_, fingers_, dt);
-    on_palm.force += push_.force;
-    on_palm.torque += push_.torque;
-    arm_.step(servo, on_palm, dt);
-    torque_sensor_.advance(arm_.velocity(), dt);
-    moveHuman(dt);
+    if (controller_.brakesWanted()) {
+      servos_.off();
+    } else {
+      servos_.command(servo, dt);
+    }
+    plant_.step(servos_.motorTorque(), dt);
+    servos_.observe(plant_.position(), plant_.velocity());
+    torque_sensor_.advance(plant_.velocity(), dt);
+    torque += plant_.jointTorque() / steps;
+    acceleration += plant_.acceleration() / steps;
   }
 
   losing_ = lose_next_ > 0;
   if (losing_) --lose_next_;
   sent_ = controller_.sends();
   if (sent_) {
-    const krc::ArmSignals signals{arm_.position(), torque_sensor_.measured(arm_.jointTorque()),
-                                  torque_sensor_.external(arm_.externalTorque(), arm_.position())};
-    lwr_fri_bridge::fri::encode(controller_.measure(arm_, signals), bytes_.data());
+    lwr_fri_bridge::fri::encode(controller_.measure(servos_, signals(torque, acceleration)),
+                                bytes_.data());
     sent_ = !lost(loss_to_pc_);
   }
   return bytes_;
 }
 
-void Cell::moveHuman(double dt) {
-  if (!human_present_) return;
-  human_age_ += dt;
-  if (human_age_ > kHumanAge) {
-    human_.twist = Twist{};
-    return;
-  }
-  human_.hand.position += dt * human_.twist.linear;
+krc::ArmSignals Cell::signals(const Vector7& torque, const Vector7& acceleration) const {
+  return {plant_.position(), torque_sensor_.measured(torque),
+          torque_sensor_.external(servos_.external(torque, acceleration), plant_.position())};
 }
 
 CellTruth Cell::truth() const {
   CellTruth truth;
   truth.time = controller_.time();
-  truth.object = object_.pose();
-  truth.object_twist = object_.twist();
-  truth.human_hand = human_.hand;
-  truth.robot_hand = arm_.terms().tip;
-  truth.palm_force = object_.palmForce();
-  truth.robot_load_share = object_.robotShare();
-  truth.human_load_share = object_.humanShare();
-  truth.held_by = object_.heldBy();
-  truth.dropped = object_.dropped();
-  truth.position = arm_.position();
-  truth.velocity = arm_.velocity();
+  truth.object = plant_.object();
+  truth.object_twist = plant_.objectTwist();
+  truth.human_hand = plant_.personHand();
+  truth.robot_hand = plant_.palm();
+  truth.palm_force = plant_.objectForce();
+  truth.robot_load_share = plant_.robotShare();
+  truth.human_load_share = plant_.personShare();
+  truth.held_by = plant_.heldBy();
+  truth.dropped = plant_.dropped();
+  truth.position = plant_.position();
+  truth.velocity = plant_.velocity();
   truth.set_point = controller_.setPoint();
-  truth.external_torque = arm_.externalTorque();
+  truth.external_torque = plant_.externalTorque();
   return truth;
 }
 

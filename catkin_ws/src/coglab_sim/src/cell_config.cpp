@@ -53,8 +53,6 @@ ParameterValue read(const CellConfig& config, Access access) {
   using Field = std::decay_t<decltype(field)>;
   if constexpr (std::is_same_v<Field, Vector7> || std::is_same_v<Field, Vector3d>) {
     return std::vector<double>(field.data(), field.data() + field.size());
-  } else if constexpr (std::is_same_v<Field, std::array<int, 5>>) {
-    return std::vector<double>(field.begin(), field.end());
   } else if constexpr (std::is_same_v<Field, Quaterniond>) {
     return std::vector<double>{field.x(), field.y(), field.z(), field.w()};
   } else if constexpr (std::is_same_v<Field, std::uint64_t>) {
@@ -73,10 +71,6 @@ void write(CellConfig& config, const std::string& name, const Range& range,
     field = vectorOf<Vector7>(name, value, 7, range);
   } else if constexpr (std::is_same_v<Field, Vector3d>) {
     field = vectorOf<Vector3d>(name, value, 3, range);
-  } else if constexpr (std::is_same_v<Field, std::array<int, 5>>) {
-    const auto counts = vectorOf<Eigen::Matrix<double, 5, 1>>(name, value, 5, range);
-    for (std::size_t i = 0; i < 5; ++i)
-      field[i] = static_cast<int>(counts[static_cast<Eigen::Index>(i)]);
   } else if constexpr (std::is_same_v<Field, Quaterniond>) {
     const auto q = vectorOf<Eigen::Vector4d>(name, value, 4, range);
     if (std::abs(q.norm() - 1.0) > 1e-3) refuse(name, "a quaternion x y z w of length 1");
@@ -228,22 +222,27 @@ std::vector<CellParameter> makeTable() {
       ROW("krc/drive_heating_time", "s", "ours", "time constant of it", krc.drive_heating_time),
       ROW("krc/drive_warning", "degree Celsius", "ours", "from which a drive warns",
           krc.drive_warning),
-      ROW("arm/torque_limit", "Nm", "published", "of the motors at the joint", arm.torque_limit),
-      ROW("arm/rotor_inertia", "kg m^2", "ours", "reflected to the joint", arm.rotor_inertia),
+      ROW("krc/payload_error", "1", "ours", "largest share by which the hand's mass is wrong",
+          servos.payload_error),
+      ROW("krc/inertia_error", "1", "ours", "largest share by which an inertia is wrong",
+          servos.inertia_error),
+      ROW("hand_model", "", "set-up",
+          "path of another table of the hand; empty: config/hand_model.yaml", hand_model),
+      ROW("arm/torque_limit", "Nm", "published", "of the motors at the joint", servos.torque_limit),
+      ROW("arm/rotor_inertia", "kg m^2", "ours", "reflected to the joint", drives.rotor_inertia),
       ROW("arm/coulomb_friction", "Nm", "ours", "per joint; the viscous part comes from the URDF",
-          arm.coulomb_friction),
+          drives.coulomb_friction),
       ROW("arm/coulomb_speed", "rad/s", "ours", "over which Coulomb friction reverses",
-          arm.coulomb_speed),
+          drives.coulomb_speed),
       ROW("arm/servo_bandwidth", "rad/s", "ours", "of the position servo, critically damped",
-          arm.servo_bandwidth),
+          servos.bandwidth),
       ROW("arm/nullspace_stiffness", "Nm/rad", "ours", "of the posture in Cartesian impedance",
-          arm.nullspace_stiffness),
+          servos.nullspace_stiffness),
       ROW("arm/block_stiffness", "Nm/rad", "ours", "of whatever holds a blocked arm",
-          arm.block_stiffness),
-      ROW("arm/brake_torque_share", "1", "ours", "brake torque over motor torque limit",
-          arm.brake_torque_share),
+          drives.block_stiffness),
+      ROW("arm/brake_torque", "Nm", "ours", "of the brakes at the joint", drives.brake_torque),
       ROW("arm/unknown_load", "kg", "ours", "at the palm, not in the controller's load data",
-          arm.unknown_load),
+          drives.unknown_load),
       ROW("torque_noise/sigma", "Nm", "ours", "0.05 good sensors, 0.15 bad ones",
           torque_noise.sigma),
       ROW("torque_noise/speed_gain", "s/rad", "ours", "growth of the noise with joint speed",
@@ -252,6 +251,8 @@ std::vector<CellParameter> makeTable() {
           torque_noise.correlation_time),
       ROW("torque_noise/bias", "Nm", "ours", "amplitude of the posture-dependent offset",
           torque_noise.bias),
+      ROW("torque_noise/offset", "Nm", "ours", "largest of the constant offsets, drawn per joint",
+          torque_noise.offset),
       ROW("torque_noise/hysteresis", "Nm", "ours", "of the external torque estimate",
           torque_noise.hysteresis),
       ROW("torque_noise/hysteresis_speed", "rad/s", "ours", "over which it reverses",
@@ -262,43 +263,25 @@ std::vector<CellParameter> makeTable() {
       ROW("object/size", "m", "set-up", "along x y z of the object frame", object.size),
       ROW("object/center", "m", "set-up", "centre of mass in the object frame", object.center),
       ROW("object/friction", "1", "set-up", "against hands and planes", object.friction),
-      ROW("object/finger_contact", "counts", "set-up",
-          "motor positions at contact; negative: from the width", object.finger_contact),
       ROW("object/start", "", "set-up", "human_hand, robot_hand or world", object_start),
       ROW("object/position", "m", "set-up", "of the object in that frame", object_pose.position),
       ROW("object/rotation", "1", "set-up", "of the object in that frame, quaternion x y z w",
           object_pose.rotation),
-      ROW("contact/stiffness", "N/m^1.5", "ours", "Hunt-Crossley, per contact point",
-          contact.stiffness),
-      ROW("contact/restitution_damping", "s/m", "ours", "Hunt-Crossley",
-          contact.restitution_damping),
-      ROW("contact/slip_speed", "m/s", "ours", "over which Coulomb friction builds up",
-          contact.slip_speed),
-      ROW("contact/human_stiffness", "N/m", "ours", "of the person's grip, 300-800",
-          contact.human.stiffness),
-      ROW("contact/human_rotation_stiffness", "Nm/rad", "ours", "of the person's grip",
-          contact.human.rotation_stiffness),
-      ROW("contact/robot_stiffness", "N/m", "ours", "of the robot's grasp",
-          contact.robot.stiffness),
-      ROW("contact/robot_rotation_stiffness", "Nm/rad", "ours", "of the robot's grasp",
-          contact.robot.rotation_stiffness),
+      ROW("person/arm_bandwidth", "rad/s", "ours", "of the hold of the person's own hand",
+          person.arm.bandwidth),
+      ROW("person/arm_force", "N", "ours", "by which the person pushes at most", person.arm.force),
+      ROW("person/arm_torque", "Nm", "ours", "the same, turning", person.arm.torque),
+      ROW("person/grip_bandwidth", "rad/s", "ours", "of the person's grip on the object",
+          person.grip_bandwidth),
+      ROW("person/grip_lever", "m", "ours", "torque of that grip over its force",
+          person.grip_lever),
       ROW("contact/human_reach", "m", "ours",
-          "hand to surface at which the person's grip finds the object", contact.human_reach),
-      ROW("contact/robot_reach", "m", "ours",
-          "grasp centre to surface at which the fingers find the object", contact.robot_reach),
-      ROW("contact/grasp_center", "m", "ours", "in ih2_palm, where closing fingers meet",
-          contact.grasp_center),
-      ROW("contact/newton_per_count", "N", "ours", "finger force per position count beyond contact",
-          contact.newton_per_count),
-      ROW("contact/finger_force_max", "N", "ours", "per finger", contact.finger_force_max),
-      ROW("contact/full_grasp_force", "N", "ours", "sum at which the grasp has its full stiffness",
-          contact.full_grasp_force),
-      ROW("contact/current_per_count", "counts", "ours",
-          "of motor current per position count beyond contact", contact.current_per_count),
-      ROW("contact/floor_height", "m", "set-up", "world z", contact.floor_height),
+          "hand to surface at which the person's grip finds the object", person.reach),
+      ROW("contact/floor_height", "m", "set-up", "world z", surroundings.floor_height),
       ROW("contact/board_center", "m", "set-up", "middle of the board's upper side in the world",
-          contact.board_center),
-      ROW("contact/board_size", "m", "set-up", "along world x y; 0: no board", contact.board_size),
+          surroundings.board_center),
+      ROW("contact/board_size", "m", "set-up", "along world x y; 0: no board",
+          surroundings.board_size),
   };
 }
 

@@ -96,7 +96,7 @@ void RealTimeCell::applyInputs() {
     const std::lock_guard<std::mutex> lock(mutex_);
     if (new_human_) cell_.setHuman(human_);
     new_human_ = false;
-    cell_.setFingers(fingers_);
+    cell_.setMotors(motors_);
     cell_.setPush(push_);
     actions.swap(actions_);
     const double time = cell_.controller().time();
@@ -121,13 +121,15 @@ void RealTimeCell::leaveResults(bool answered) {
   record.control = static_cast<int>(controller.strategy());
   record.answered = answered;
   record.commanded = controller.setPoint();
-  record.measured = cell_.arm().position();
+  record.measured = cell_.plant().position();
   const CellTruth truth = cell_.truth();
-  const FingerContactState contact = cell_.fingerContact();
+  const MotorStates motors = cell_.motors();
+  const plant::Touch touch = cell_.plant().touch();
 
   const std::lock_guard<std::mutex> lock(mutex_);
   snapshot_.truth = truth;
-  snapshot_.finger_contact = contact;
+  snapshot_.motors = motors;
+  snapshot_.touch = touch;
   ++snapshot_.tick;
   if (answered) ++snapshot_.answers;
   if (records_.size() < kMaxRecords) records_.push_back(record);
@@ -139,15 +141,15 @@ void RealTimeCell::leaveResults(bool answered) {
   messages_seen_ = controller.messageCount();
 }
 
-void RealTimeCell::setHuman(const HumanInput& human) {
+void RealTimeCell::setHuman(const plant::PersonInput& human) {
   const std::lock_guard<std::mutex> lock(mutex_);
   human_ = human;
   new_human_ = true;
 }
 
-void RealTimeCell::setFingers(const FingerInput& fingers) {
+void RealTimeCell::setMotors(const MotorCommands& motors) {
   const std::lock_guard<std::mutex> lock(mutex_);
-  fingers_ = fingers;
+  motors_ = motors;
 }
 
 void RealTimeCell::setPush(const Wrench& push) {

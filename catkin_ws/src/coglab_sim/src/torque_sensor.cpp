@@ -10,6 +10,8 @@ TorqueSensor::TorqueSensor(const TorqueNoise& noise, std::uint64_t seed)
     bias_phase_[i] = 2.0 * M_PI * random_.uniform();
     bias_rate_[i] = 0.5 + random_.uniform();
   }
+  Random offsets(seed, 3);
+  for (double& offset : offset_) offset = noise.offset * (2.0 * offsets.uniform() - 1.0);
 }
 
 void TorqueSensor::advance(const Vector7& velocity, double dt) {
@@ -30,7 +32,7 @@ Vector7 TorqueSensor::external(const Vector7& ideal, const Vector7& position) co
   Vector7 bias;
   for (int i = 0; i < 7; ++i)
     bias[i] = noise_.bias * std::sin(bias_rate_[i] * position[i] + bias_phase_[i]);
-  return ideal + bias + noise_.hysteresis * friction_ + external_noise_;
+  return ideal - offset_ + bias + noise_.hysteresis * friction_ + external_noise_;
 }
 
 }  // namespace coglab_sim

@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""The node /coglab_sim/cell: UDP, truth, finger contact, faults, placing, log file."""
+"""The node /coglab_sim/cell: UDP, truth, motors of the hand, touch, faults, placing, log file."""
 
 import csv
 import os
@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 import rospy
 import rostest
-from coglab_msgs.msg import CellTruth, FingerContact, FingerPositions, HumanHand, ReasonCode
+from coglab_msgs.msg import CellTruth, FingertipForces, HumanHand, MotorCommands, MotorStates, ReasonCode
 from coglab_msgs.srv import InjectFault, PlaceObject
 from geometry_msgs.msg import Point, Pose, Quaternion
 from std_msgs.msg import String
@@ -65,13 +65,15 @@ class CellNode(unittest.TestCase):
         cls.bridge = Bridge()
         cls.bridge.start()
         cls.truth = []
-        cls.contact = []
+        cls.motors = []
+        cls.touch = []
         cls.messages = []
         rospy.Subscriber("/coglab_sim/truth/cell", CellTruth, cls.truth.append)
-        rospy.Subscriber("/coglab_sim/finger_contact", FingerContact, cls.contact.append)
+        rospy.Subscriber("/coglab_sim/motor_states", MotorStates, cls.motors.append)
+        rospy.Subscriber("/coglab_sim/fingertip_forces", FingertipForces, cls.touch.append)
         rospy.Subscriber("/coglab_sim/cell/messages", String, lambda m: cls.messages.append(m.data))
         cls.human = rospy.Publisher("/coglab_sim/human_hand", HumanHand, queue_size=1)
-        cls.fingers = rospy.Publisher("/coglab_sim/finger_positions", FingerPositions, queue_size=1)
+        cls.commands = rospy.Publisher("/coglab_sim/motor_commands", MotorCommands, queue_size=1)
         rospy.wait_for_service("/coglab_sim/cell/fault", 20.0)
         cls.fault = rospy.ServiceProxy("/coglab_sim/cell/fault", InjectFault)
         cls.place = rospy.ServiceProxy("/coglab_sim/cell/place_object", PlaceObject)
@@ -106,7 +108,9 @@ class CellNode(unittest.TestCase):
 
     def test_3_person_and_fingers(self) -> None:
         palm = self.truth[-1].robot_hand.position
-        pose = Pose(Point(palm.x + 0.08, palm.y + 0.045, palm.z), Quaternion(0, 0, 0, 1))
+        pose = Pose(Point(palm.x + 0.08, palm.y + 0.041, palm.z), Quaternion(0, 0, 0, 1))
+        self.move([1.0] * 5, [245 / 255, 5 / 255, 30 / 255, 50 / 255, 50 / 255], 640.0)
+        self.assertTrue(wait_for(lambda: self.motors and self.motors[-1].position[0] > 0.95))
         message = HumanHand(pose=pose, grip=1.0, grip_force=20.0)
 
         def show(until, limit=8.0):
@@ -120,15 +124,20 @@ class CellNode(unittest.TestCase):
         self.assertTrue(self.place("", "human_hand", Pose(Point(-0.08, 0, -0.05), Quaternion(0, 0, 0, 1))).success)
         self.assertTrue(show(lambda: self.truth[-1].held_by == "human" and self.truth[-1].human_load_share > 0.9))
         self.assertEqual(self.truth[-1].object_id, "mug")
-        self.assertTrue(show(lambda: any(m.contact_position[2] < 255 for m in self.contact[-3:])))
-        contact = self.contact[-1].contact_position[2]
-        self.fingers.publish(FingerPositions(position=[0] + [contact + 20] * 4, current=[0] * 5))
-        self.assertTrue(show(lambda: self.truth[-1].held_by == "both"))
+        self.move([1.0] * 5, [245 / 255, 1.0, 1.0, 1.0, 1.0], 240.0)
+        self.assertTrue(show(lambda: self.truth[-1].held_by == "both" and all(self.motors[-1].locked[1:])))
+        self.assertTrue(all(0.05 < position < 0.95 for position in self.motors[-1].position[1:]))
+        self.assertEqual(len(self.touch[-1].forces), len(self.touch[-1].phalanges))
+        self.assertTrue(any(abs(force.x) > 0.5 for force in self.touch[-1].forces))
         message.grip = 0.0
         self.assertTrue(show(lambda: self.truth[-1].held_by == "robot" and self.truth[-1].robot_load_share > 0.9))
         self.assertLess(self.truth[-1].palm_force.z, -2.0)
-        self.fingers.publish(FingerPositions(position=[0] * 5, current=[0] * 5))
+        self.move([1.0] * 5, [245 / 255, 0.0, 0.0, 0.0, 0.0], 640.0)
         self.assertTrue(show(lambda: self.truth[-1].dropped))
+
+    def move(self, speed, target, current) -> None:
+        """Commands to the motors of the hand."""
+        self.commands.publish(MotorCommands(speed=speed, target=target, current=[current] * 5))
 
     def test_4_bad_requests_are_refused_with_words(self) -> None:
         answer = self.place("", "moon", Pose(Point(), Quaternion(0, 0, 0, 1)))
@@ -138,7 +147,8 @@ class CellNode(unittest.TestCase):
         self.assertFalse(self.place("", "world", Pose()).success)  # quaternion of length 0
         self.assertIn("objects/", self.place("unknown_thing", "world", Pose(Point(), Quaternion(0, 0, 0, 1))).message)
         self.human.publish(HumanHand(grip=float("nan")))
-        self.fingers.publish(FingerPositions(position=[1, 2]))
+        self.commands.publish(MotorCommands(speed=[1.0, 2.0]))
+        self.commands.publish(MotorCommands(speed=[7.0] * 5, target=[0.0] * 5, current=[0.0] * 5))
         ticks = len(self.truth)
         self.assertTrue(wait_for(lambda: len(self.truth) > ticks + 20))
 

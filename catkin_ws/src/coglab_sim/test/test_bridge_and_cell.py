@@ -156,16 +156,20 @@ def test_the_measured_arm_keeps_the_speed_limits_of_the_table(period):
 
 
 def test_no_answer_ever_trips_a_limit_of_the_controller():
-    """Random target velocities at every tick: bridge and controller agree on what is allowed."""
+    """Random target velocities at every tick: bridge and controller agree on what is allowed. An arm that runs into
+    the board or itself begins again at home: there the drives have their own say."""
     random = np.random.default_rng(8)
     for period in (0.001, 0.005, 0.02):
-        wire = Wire(krc__period=period)
-        wire.start()
-        for tick in range(round(6.0 / period)):
-            if tick % 7 == 0:
-                wire.velocity = random.uniform(-3.0, 3.0, 7)
-            wire.tick()
-            assert wire.cell.fri_state == 2, (period, wire.cell.messages)
+        ticks = 0
+        while ticks < round(6.0 / period):
+            wire = Wire(krc__period=period)
+            wire.start()
+            while ticks < round(6.0 / period) and np.abs(wire.cell.truth()["external_torque"]).max() < 0.5:
+                if ticks % 7 == 0:
+                    wire.velocity = random.uniform(-3.0, 3.0, 7)
+                wire.tick()
+                ticks += 1
+                assert wire.cell.fri_state == 2, (period, wire.cell.messages)
 
 
 def test_lockstep_gives_the_same_bytes_twice():

@@ -16,8 +16,12 @@ BRIDGE = ["fri/datagram.cpp"]  # what the cell uses of it
 @pytest.mark.skipif(shutil.which("g++") is None, reason="g++ is not installed")
 def test_requests_against_the_cells_thread(tmp_path):
     own = [p for p in sorted((PACKAGE / "src").rglob("*.cpp")) if p.stem != "virtual_robot"]
+    hand = tmp_path / "built_in_hand.cpp"  # as CMake makes it
+    template = (PACKAGE / "src" / "plant" / "built_in_hand.cpp.in").read_text()
+    hand.write_text(template.replace("@COGLAB_SIM_HAND_MODEL@", (PACKAGE / "config" / "hand_model.yaml").read_text()))
     sources = [
         *own,
+        hand,
         *(SOURCES / "lwr_fri_bridge" / "src" / name for name in BRIDGE),
         PACKAGE / "test" / "test_cell_core.cpp",
     ]
@@ -31,6 +35,7 @@ def test_requests_against_the_cells_thread(tmp_path):
     ]
     includes = [
         f"-I{PACKAGE}/include",
+        f"-I{PACKAGE}/src/plant",
         f"-I{SOURCES}/lwr_fri_bridge/include",
         f"-I{SOURCES}/coglab_rt/include",
         "-isystem/usr/include/eigen3",
@@ -56,6 +61,8 @@ def test_requests_against_the_cells_thread(tmp_path):
             "-lorocos-kdl",
             "-lkdl_parser",
             "-ltinyxml2",
+            "-lyaml-cpp",
+            "-lmujoco",
             "-lgtest_main",
             "-lgtest",
             "-lpthread",

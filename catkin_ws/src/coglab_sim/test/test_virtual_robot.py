@@ -14,13 +14,12 @@ GRASP = {"goal_offset": [0.0, -0.065, 0.05], "target_orientation": [0.5, 0.5, 0.
 
 
 class Trial:
-    """Robot and person; the fingers go where they are told, 254 counts per second."""
+    """Robot and person; the fingers go where they are told, a stroke per second."""
 
     def __init__(self, seed=3, behaviour="normal", **cell):
         self.robot = virtual_world.Robot(seed, **cell).virtual
         self.human = VirtualHuman(Participant.draw(seed, behaviour), Scene())
-        self.fingers = np.zeros(5)
-        self.wanted = np.zeros(5)
+        self.wanted, self.current = [245 / 255, 5 / 255, 30 / 255, 50 / 255, 50 / 255], 640.0
         self.last_palm = None
         self.peak = 0.0
 
@@ -32,8 +31,7 @@ class Trial:
         self.last_palm = palm["position"]
         obj = truth["object"]
         move_person(cell, self.human.step(self.robot.now, view_of(truth, speed)))
-        self.fingers += np.clip(self.wanted - self.fingers, -254 * cell.period, 254 * cell.period)
-        cell.set_fingers([int(x) for x in self.fingers])
+        cell.set_motors([1.0] * 5, self.wanted, [self.current] * 5)
         self.robot.set_frame("object_mug", obj["position"], obj["rotation"])
         self.robot.tick()
         self.peak = max(self.peak, float(np.abs(cell.velocity).max()))
@@ -85,8 +83,7 @@ class Trial:
         self.reached = self.robot.cell.truth()
         assert self.robot.switch_controller("ptp")[0]
         self.until(lambda _, truth: np.linalg.norm(truth["palm_force"]) > 0.5, 8)
-        contact = self.robot.cell.finger_contact()[0][2]
-        self.wanted = np.array([245, contact + 25, contact + 25, contact + 25, contact + 25], float)
+        self.wanted, self.current = [245 / 255, 1.0, 1.0, 1.0, 1.0], 240.0
         self.until(lambda _, truth: truth["held_by"] == "robot", 10)
         status, _, message = self.robot.add_ptp([-1.4349, -0.6086, 1.4986, 1.7048, 0.1857, 0.2152, 0.782])
         assert status == 0, message

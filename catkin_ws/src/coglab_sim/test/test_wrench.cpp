@@ -27,6 +27,7 @@ Felt pushed(const Vector7& posture, const Vector6& push) {
   config.urdf = URDF;
   config.home = posture;
   config.torque_noise.sigma = config.torque_noise.bias = config.torque_noise.hysteresis = 0.0;
+  config.torque_noise.offset = config.servos.payload_error = config.servos.inertia_error = 0.0;
   Cell cell(config);
   lwr_fri_bridge::BridgeConfig bridge_config;
   bridge_config.limits = coglab_rt::loadJointLimits(LIMITS_FILE);

@@ -185,7 +185,7 @@ def main() -> int:
             share = campaign.share(action)
             rows.append(row(f"{action}: {TRIALS} seeds, succeeded", share, "share", ">= 0.97", share >= 0.97))
         rows += campaign.safety_rows(" and ".join(actions))
-    rows.append(row("virtual time over processor time, one core", speed, "x", ">= 10", speed >= 10))
+    rows.append(row("virtual time over processor time, one core", speed, "x", ">= 8", speed >= 8))
     perfect = Campaign().run(EXCHANGES, range(2000, 2000 + TRIALS), perfect=True)
     for campaign, name in ((exchanges, "noisy perception"), (perfect, "perfect perception")):
         for action in EXCHANGES:

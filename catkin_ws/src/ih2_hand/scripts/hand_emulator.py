@@ -39,6 +39,11 @@ def parse(arguments: list[str]) -> argparse.Namespace:
     parser.add_argument(
         "--stiffness", type=float, default=25.0, help="counts of current for each count pressed into the object"
     )
+    parser.add_argument(
+        "--physical",
+        action="store_true",
+        help="the motors are turned by the physics of the simulated cell (motor_states, motor_commands)",
+    )
     parser.add_argument("--trace", help="file for every frame in hex with its meaning; - is stdout")
     parser.add_argument("--seed", type=int, default=1, help="seed of random garbage")
     parser.add_argument("--fault", action="append", default=[], help="fault command at start")
@@ -85,7 +90,10 @@ def main() -> int:
             greeting=options.greeting,
             strict_force=options.strict_force,
             positions=options.positions,
+            physical=options.physical,
         )
+        if options.contact and options.physical:
+            raise ValueError("--contact is for a hand without a cell: leave it or --physical away")
         if options.contact:
             hand.set_contacts(options.contact, [options.stiffness] * 5)
     except ValueError as error:

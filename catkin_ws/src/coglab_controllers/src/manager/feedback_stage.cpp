@@ -63,6 +63,9 @@ FeedbackStage::FeedbackStage(const RobotSetup& setup, double period, bool lockst
   torque_ = declare(robot_, RobotSource::Measured, "joint_torque", kMaxJoints, "Nm", wire);
   external_ = declare(robot_, RobotSource::Measured, "external_torque", kMaxJoints, "Nm", wire);
   wrench_ = declare(robot_, RobotSource::Measured, "wrench", 6, "N, Nm", "base");
+  if (setup.tactile)
+    touch_.emplace(declare(robot_, RobotSource::Measured, "touch",
+                           static_cast<int>(TouchForces().size()), "N", "tool"));
   pose_ = declare(robot_, RobotSource::Estimated, "ee", 7, "m, quaternion x y z w", "base");
 }
 
@@ -71,6 +74,7 @@ void FeedbackStage::begin(std::int64_t now_ns, double dt) noexcept {
 }
 
 bool FeedbackStage::fill(const CycleInput& input) noexcept {
+  if (touch_) touch_->deliver(robot_);
   const RobotSample& sample = input.robot;
   const std::int64_t stamp = sample.stamp_ns;
   const Quaternion turn = input.chain.tool.orientation * tool_from_wrench_;

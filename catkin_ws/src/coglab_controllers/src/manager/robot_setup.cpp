@@ -52,8 +52,9 @@ std::shared_ptr<const RobotSetup> makeRobotSetup(const std::string& urdf,
   const Quaternion tool_from_wrench =
       chain.evaluate(zero).tool.orientation.conjugate() * to_wrench.evaluate(zero).tool.orientation;
   const Guard check(guard, chain);  // throws here, outside the cycle
-  return std::make_shared<const RobotSetup>(RobotSetup{
-      chain, limits, guard, Workspace(guard.workspace, chain.reach()), tool_from_wrench});
+  return std::make_shared<const RobotSetup>(
+      RobotSetup{chain, limits, guard, Workspace(guard.workspace, chain.reach()), tool_from_wrench,
+                 parameters.flag("tactile", false)});
 }
 
 }  // namespace coglab_controllers

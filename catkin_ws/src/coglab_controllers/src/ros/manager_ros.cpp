@@ -75,6 +75,7 @@ void ManagerRos::start() {
   speed_ = node_.subscribe("speed_scale", 1, &ManagerRos::onSpeedTopic, this);
   feedback_ = std::make_unique<FeedbackRos>(ros::NodeHandle(node_, "feedback"), *manager_);
   cancel_ = std::make_unique<CancelRos>(node_, *manager_);
+  if (manager_->settings().robot->tactile) touch_ = std::make_unique<TouchTopic>(node_, *manager_);
   diagnostics_ = std::make_unique<diagnostic_updater::Updater>(node_);
   diagnostics_->setHardwareID("none");
   diagnostics_->add("control cycle", this, &ManagerRos::diagnose);
@@ -98,6 +99,7 @@ void ManagerRos::shutdown() {
   speed_.shutdown();
   feedback_.reset();
   cancel_.reset();
+  touch_.reset();
   const std::lock_guard<std::mutex> lock(sides_mutex_);
   sides_.clear();
 }

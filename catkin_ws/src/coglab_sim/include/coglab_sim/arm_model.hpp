@@ -2,6 +2,7 @@
 /// Kinematics and rigid-body terms of the arm with its hand, from the URDF, by KDL.
 #pragma once
 
+#include <array>
 #include <string>
 
 #include <kdl/chain.hpp>
@@ -22,6 +23,12 @@ struct ArmTerms {
   Pose tip;           ///< ih2_palm in the world
 };
 
+/// By which shares a model differs from the robot description.
+struct ModelErrors {
+  double payload = 1.0;  ///< of the mass of all that is fixed behind the last joint
+  std::array<double, 7> inertia = {1, 1, 1, 1, 1, 1, 1};  ///< of the moving links' inertias
+};
+
 /// Rigid-body model between two links of a URDF with seven joints in between.
 ///
 /// Links that hang beside the chain (fingers) count with their mass in the position zero of their
@@ -31,23 +38,19 @@ class ArmModel {
   /// @param urdf  path of the robot description
   /// @throws std::runtime_error naming file and link if the chain cannot be built or has not
   /// exactly seven joints.
-  explicit ArmModel(const std::string& urdf, const std::string& base = "lwr_base_link",
-                    const std::string& tip = "ih2_palm");
+  explicit ArmModel(const std::string& urdf, const ModelErrors& errors = {},
+                    const std::string& base = "lwr_base_link", const std::string& tip = "ih2_palm");
   ArmModel(const ArmModel&) = delete;
   ArmModel& operator=(const ArmModel&) = delete;
 
   /// Fills `terms` for joint positions (rad) and velocities (rad/s). Allocates nothing.
   void evaluate(const Vector7& position, const Vector7& velocity, ArmTerms& terms);
 
-  /// Viscous friction of the joints as the URDF gives it (`<dynamics damping>`), Nms/rad.
-  const Vector7& damping() const { return damping_; }
-
  private:
   KDL::Chain chain_;
   KDL::ChainDynParam dynamics_;
   KDL::ChainFkSolverPos_recursive forward_;
   KDL::ChainJntToJacSolver jacobian_solver_;
-  Vector7 damping_ = Vector7::Zero();
   KDL::JntArray q_, dq_, coriolis_, gravity_;
   KDL::JntSpaceInertiaMatrix mass_;
   KDL::Jacobian jacobian_;

@@ -7,6 +7,7 @@
 
 #include "coglab_sim/cell_config.hpp"
 #include "coglab_sim/krc/controller.hpp"
+#include "coglab_sim/plant/plant.hpp"
 
 namespace coglab_sim {
 
@@ -24,6 +25,9 @@ struct CellTruth {
   Vector7 position, velocity, set_point;  ///< of the arm
   Vector7 external_torque;                ///< without any error, Nm
 };
+
+using MotorCommands = std::array<plant::MotorCommand, plant::kMotors>;
+using MotorStates = std::array<plant::MotorState, plant::kMotors>;
 
 /// One FRI period at a time; no clock, no thread, no socket of its own. The same configuration and
 /// inputs give the same bytes.
@@ -48,17 +52,18 @@ class Cell {
   const MeasurementBytes& measurement() const { return bytes_; }
 
   // Inputs, valid until changed
-  void setHuman(const HumanInput& human);
-  void setFingers(const FingerInput& fingers) { fingers_ = fingers; }
-  void setPush(const Wrench& push) {
-    push_ = push;
-  }  ///< on the palm about its origin, besides the object
-  void place(Placement placement, const Pose& pose) { object_.place(placement, pose); }
+  void setHuman(const plant::PersonInput& human) { plant_.setPerson(human); }
+  /// What the hand's electronics ask of the five motors.
+  void setMotors(const MotorCommands& commands);
+  /// On the palm about its origin, besides what touches it.
+  void setPush(const Wrench& push) { plant_.setPush(push); }
+  /// @throws std::invalid_argument if the object would stand inside something.
+  void place(plant::Place place, const Pose& pose) { plant_.place(place, pose); }
   /// Exchanges the object; it is then to be placed. @throws std::invalid_argument
-  void setObject(const ObjectParameters& object);
+  void setObject(const plant::Object& object);
 
   // Faults
-  void setBlock(bool on) { arm_.setBlock(on); }
+  void setBlock(bool on) { plant_.setBlock(on); }
   /// Share of lost packets, 0..1, to and from the PC.
   void setLoss(double to_pc, double from_pc);
   /// Loses the next packets, both ways.
@@ -69,26 +74,21 @@ class Cell {
   /// FRI period now, s; friOpen may change it.
   double period() const { return controller_.parameters().period; }
   CellTruth truth() const;
-  FingerContactState fingerContact() const { return object_.fingerContact(arm_.terms().tip); }
-  const ArmDynamics& arm() const { return arm_; }
-  const ObjectPhysics& object() const { return object_; }
+  MotorStates motors() const;
+  const plant::Plant& plant() const { return plant_; }
+  plant::Plant& plant() { return plant_; }
   const CellConfig& config() const { return config_; }
 
  private:
   bool lost(double share);
-  void moveHuman(double dt);
+  krc::ArmSignals signals(const Vector7& torque, const Vector7& acceleration) const;
 
   CellConfig config_;
-  ArmDynamics arm_;
+  plant::Plant plant_;
+  krc::Servos servos_;
   krc::Controller controller_;
   TorqueSensor torque_sensor_;
-  ObjectPhysics object_;
   Random loss_;
-  HumanInput human_;
-  bool human_present_ = false;
-  double human_age_ = 0.0;  // s since its last message
-  FingerInput fingers_{};
-  Wrench push_;
   double loss_to_pc_ = 0.0, loss_from_pc_ = 0.0;
   int lose_next_ = 0;
   bool losing_ = false;
@@ -97,6 +97,6 @@ class Cell {
 };
 
 /// @throws std::invalid_argument for anything but human_hand, robot_hand, world.
-Placement placementOf(const std::string& name);
+plant::Place placeOf(const std::string& name);
 
 }  // namespace coglab_sim

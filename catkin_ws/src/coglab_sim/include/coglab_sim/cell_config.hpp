@@ -13,9 +13,9 @@
 #include <variant>
 #include <vector>
 
-#include "coglab_sim/arm_dynamics.hpp"
 #include "coglab_sim/krc/parameters.hpp"
-#include "coglab_sim/object_physics.hpp"
+#include "coglab_sim/krc/servos.hpp"
+#include "coglab_sim/plant/plant.hpp"
 #include "coglab_sim/torque_sensor.hpp"
 
 namespace coglab_sim {
@@ -25,11 +25,14 @@ struct CellConfig {
   std::uint64_t seed = 1;
   /// rad; the home posture of the system.
   Vector7 home = (Vector7() << -1.4349, -0.6086, 1.4986, 1.7048, 0.1857, 0.2152, 0.782).finished();
+  std::string hand_model;  ///< path of another table of the hand; empty: the one built in
   krc::Parameters krc;
-  ArmParameters arm;
+  krc::ServoParameters servos;
+  plant::Drives drives;
   TorqueNoise torque_noise;
-  ObjectParameters object;
-  ContactParameters contact;
+  plant::Object object;
+  plant::Surroundings surroundings;
+  plant::PersonFigures person;
   std::string object_start = "human_hand";  ///< human_hand, robot_hand, world
   /// In that frame; the default is how the virtual human carries a mug.
   Pose object_pose{Vector3d(-0.08, 0.0, -0.05), Quaterniond::Identity()};

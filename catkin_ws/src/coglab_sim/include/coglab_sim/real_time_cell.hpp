@@ -27,7 +27,8 @@ struct TickRecord {
 /// What the thread leaves for others to look at.
 struct CellSnapshot {
   CellTruth truth;
-  FingerContactState finger_contact;
+  MotorStates motors;
+  plant::Touch touch;
   std::uint64_t tick = 0;        ///< number of periods so far
   std::uint64_t late_ticks = 0;  ///< periods that the thread itself began too late
   std::uint64_t answers = 0;     ///< datagrams received so far
@@ -51,8 +52,8 @@ class RealTimeCell {
   void setPort(std::uint16_t port) { port_ = port; }
 
   // From any thread
-  void setHuman(const HumanInput& human);
-  void setFingers(const FingerInput& fingers);
+  void setHuman(const plant::PersonInput& human);
+  void setMotors(const MotorCommands& motors);
   void setPush(const Wrench& push);
   /// Runs `action` between two periods. It has to own what it uses: when the thread has begun with
   /// it but does not end it in time, it may outlive the call. @throws what it throws,
@@ -90,8 +91,8 @@ class RealTimeCell {
 
   mutable std::mutex mutex_;  // guards everything below
   bool new_human_ = false;
-  HumanInput human_;
-  FingerInput fingers_{};
+  plant::PersonInput human_;
+  MotorCommands motors_{};
   Wrench push_;
   std::vector<std::shared_ptr<Action>> actions_;
   std::vector<Delayed> delayed_;

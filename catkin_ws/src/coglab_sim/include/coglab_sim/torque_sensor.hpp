@@ -1,9 +1,9 @@
 /// @file
 /// Joint torque signals as imperfect as D4.10 describes those of the real arm.
 ///
-///   measured = ideal joint torque + noise
-///   external = J^T F + bias(q) + hysteresis sign(dq) + noise,   noise AR(1) with deviation sigma
-///   (1 + k |dq|)
+///   measured = ideal joint torque + offset + noise
+///   external = estimate from ideal torques - offset + bias(q) + hysteresis sign(dq) + noise,
+///   noise AR(1) with deviation sigma (1 + k |dq|)
 ///
 /// An offset that depends on the posture stays in the estimate and the noise grows about eightfold
 /// at 1 rad/s: this is why contact has to be detected from changes, and only while the arm stands
@@ -21,6 +21,7 @@ struct TorqueNoise {
   double speed_gain = 7.0;         ///< s/rad, k above; |dq| is the largest joint speed
   double correlation_time = 0.01;  ///< s
   double bias = 0.4;               ///< Nm, amplitude of the posture-dependent offset
+  double offset = 0.3;             ///< Nm, largest of the constant offsets of the sensors
   double hysteresis = 0.1;         ///< Nm
   double hysteresis_speed = 0.02;  ///< rad/s over which it reverses
 };
@@ -34,7 +35,7 @@ class TorqueSensor {
   void advance(const Vector7& velocity, double dt);
 
   /// Torque as measured, Nm.
-  Vector7 measured(const Vector7& ideal) const { return ideal + measured_noise_; }
+  Vector7 measured(const Vector7& ideal) const { return ideal + offset_ + measured_noise_; }
 
   /// External torque as the controller estimates it, Nm.
   Vector7 external(const Vector7& ideal, const Vector7& position) const;
@@ -46,7 +47,7 @@ class TorqueSensor {
   Random random_;
   Vector7 measured_noise_ = Vector7::Zero(), external_noise_ = Vector7::Zero(),
           friction_ = Vector7::Zero();
-  Vector7 bias_phase_, bias_rate_;
+  Vector7 bias_phase_, bias_rate_, offset_;
 };
 
 }  // namespace coglab_sim

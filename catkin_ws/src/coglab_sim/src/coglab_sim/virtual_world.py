@@ -20,6 +20,7 @@ from coglab_py.yaml_file import read
 from ih2_hand.clock import VirtualClock
 from ih2_hand.driver import HandSerialDriver
 from ih2_hand.emulator.hand import EmulatedHand
+from ih2_hand.emulator.physical_motor import MotorState
 from ih2_hand.emulator.virtual_link import VirtualLink
 from ih2_hand.progress import shown_empty, shown_holding
 
@@ -122,9 +123,10 @@ class Robot:
 class Hand:
     """Driver on the emulator over a line without a pty; one task at a time, polled at 30 Hz while it runs."""
 
-    def __init__(self) -> None:
+    def __init__(self, cell: Any) -> None:
+        self.cell = cell
         self.clock = VirtualClock()
-        self.emulator = EmulatedHand(self.clock)
+        self.emulator = EmulatedHand(self.clock, physical=True)
         self.driver = HandSerialDriver(transport=VirtualLink(self.emulator, self.clock), clock=self.clock)
         self.calibrated = False
         self.holding = False
@@ -141,19 +143,23 @@ class Hand:
         self.task, self.begun, self.verdict = task, self.clock.monotonic(), None
         task.begin(self.driver)
 
-    def step(self, t: float, contact: Callable[[], tuple[Any, Any]]) -> None:
-        """Follow the time; ``contact()`` gives where the fingers meet the object."""
+    def step(self, t: float) -> None:
+        """Follow the time and the motors that the physics turns; tell these what to do."""
         self.clock.now = max(self.clock.now, t)
+        self.emulator.follow(
+            [
+                MotorState(*(motor[name] for name in ("position", "current", "effort", "moving", "locked")))
+                for motor in self.cell.motors()
+            ]
+        )
         self.emulator.advance()
-        if t < self._next_poll or self.dead:
+        self._poll(t)
+        self.cell.set_motors(*map(list, zip(*self.emulator.orders(), strict=True)))
+
+    def _poll(self, t: float) -> None:
+        if t < self._next_poll or self.dead or not self.calibrated:
             return
         self._next_poll = t + (1 / 30 if self.task is not None else 0.2)
-        positions, stiffness = contact()
-        self.emulator.set_contacts(positions, stiffness)
-        if self.calibrated:
-            self._poll()
-
-    def _poll(self) -> None:
         readings = [SimpleNamespace(**r) for r in self.driver.read_motors()]
         self.positions = tuple(r.position for r in readings)
         if self.holding and shown_empty(readings):
@@ -214,7 +220,7 @@ class World:
             where["object__rotation"] = [float(v) for v in BOARD.orientation]
         self.robot = Robot(seed, limits, **where)
         self.cell = self.robot.cell
-        self.hand = Hand()
+        self.hand = Hand(self.cell)
         self.trackers = {
             name: Tracker(name, conditions.perception, seed) for name in (self.object_frame, "human_hand")
         }
@@ -239,8 +245,7 @@ class World:
         """One FRI period."""
         if self.ticks % 2 == 0:
             self._person_and_tracker()
-        self.hand.step(self.t, self.cell.finger_contact)
-        self.cell.set_fingers([min(254, int(m.position)) for m in self.hand.emulator.motors])
+        self.hand.step(self.t)
         self.robot.virtual.set_frame("board", BOARD.position, BOARD.orientation)
         self.robot.step()
         self.ticks += 1

@@ -38,10 +38,10 @@ const Parameters& checked(const Parameters& p) {
 
 }  // namespace
 
-Controller::Controller(const Parameters& parameters, const ArmParameters& arm,
+Controller::Controller(const Parameters& parameters, const ServoParameters& servos,
                        const Vector7& position)
     : parameters_(checked(parameters)),
-      arm_parameters_(arm),
+      servo_parameters_(servos),
       statistics_(parameters_),
       program_(makeKrlProgram(parameters.convention)),
       joint_stiffness_(Vector7::Constant(parameters.joint_stiffness)),
@@ -82,7 +82,7 @@ void Controller::receive(const std::uint8_t* bytes, std::size_t size, double lat
   krl_in_ = command.krl;
 }
 
-PeriodCommand Controller::tick(const ArmDynamics& arm, bool on_time) {
+PeriodCommand Controller::tick(const Servos& arm, bool on_time) {
   PeriodCommand period;
   updateDrives(arm);
   watchTorque(arm);
@@ -105,7 +105,7 @@ PeriodCommand Controller::tick(const ArmDynamics& arm, bool on_time) {
   return period;
 }
 
-void Controller::judgeAnswer(const ArmDynamics& arm, bool on_time) {
+void Controller::judgeAnswer(const Servos& arm, bool on_time) {
   if (answered_ || on_time) statistics_.add(answered_, answer_latency_);
   if (state_ != FriState::Command) return;
 
@@ -175,7 +175,7 @@ void Controller::extrapolate() {
   offset_ = next - own_;
 }
 
-fri::MeasurementDatagram Controller::measure(const ArmDynamics& arm, const ArmSignals& signals) {
+fri::MeasurementDatagram Controller::measure(const Servos& arm, const ArmSignals& signals) {
   fri::MeasurementDatagram m{};
   m.header = fri::measurementHeader(++counter_, peer_counter_);
   measured_once_ = true;
@@ -259,14 +259,14 @@ std::uint16_t Controller::power() const {
   return drives_on_ && enabled_ && drive_error_ == 0 ? fri::kAllDrivesOn : 0;
 }
 
-void Controller::holdMeasured(const ArmDynamics& arm) {
+void Controller::holdMeasured(const Servos& arm) {
   own_ = arm.position();
   offset_.setZero();
   last_step_.setZero();
   frame_own_ = frame_ = arm.terms().tip;
 }
 
-void Controller::updateDrives(const ArmDynamics& arm) {
+void Controller::updateDrives(const Servos& arm) {
   if (drives_on_at_ >= 0.0 && time_ >= drives_on_at_) {
     drives_on_at_ = -1.0;
     if (enabled_ && drive_error_ == 0) {
@@ -277,19 +277,19 @@ void Controller::updateDrives(const ArmDynamics& arm) {
     }
   }
   // Warm-up of the drives.
-  const Vector7 load = arm.motorTorque().cwiseQuotient(arm_parameters_.torque_limit);
+  const Vector7 load = arm.motorTorque().cwiseQuotient(servo_parameters_.torque_limit);
   const Vector7 target = Vector7::Constant(parameters_.ambient_temperature) +
                          parameters_.drive_heating * load.cwiseAbs2();
   temperature_ += (target - temperature_) * (parameters_.period / parameters_.drive_heating_time);
 }
 
-void Controller::watchTorque(const ArmDynamics& arm) {
+void Controller::watchTorque(const Servos& arm) {
   if (power() != fri::kAllDrivesOn) {
     saturated_.setZero();
     return;
   }
   for (int i = 0; i < 7; ++i) {
-    const bool full = std::abs(arm.motorTorque()[i]) >= 0.999 * arm_parameters_.torque_limit[i];
+    const bool full = std::abs(arm.motorTorque()[i]) >= 0.999 * servo_parameters_.torque_limit[i];
     saturated_[i] = full ? saturated_[i] + parameters_.period : 0.0;
     if (saturated_[i] > parameters_.torque_limit_time) {
       leaveCommandMode("maximum torque exceeded J" + std::to_string(i + 1));

@@ -116,6 +116,10 @@ class ControllerManager : public MotionHost {
   std::string typeOf(const std::string& id) const;
 
   ctrl_more::FeedbackControllersManager& feedback() { return feedback_.manager(); }
+  /// Forces of the hand's touch sensors, see FeedbackStage::postTouch().
+  bool postTouch(const TouchForces& forces, std::int64_t stamp_ns) noexcept {
+    return feedback_.postTouch(forces, stamp_ns);
+  }
   /// What the feedback list file could not load, one sentence each.
   const std::vector<std::string>& feedbackErrors() const { return feedback_errors_; }
   ControlCycle& cycle() { return cycle_; }

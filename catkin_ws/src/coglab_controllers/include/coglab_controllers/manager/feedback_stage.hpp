@@ -3,21 +3,29 @@
 /// their signals.
 #pragma once
 
+#include <array>
 #include <cstdint>
+#include <optional>
 
 #include "coglab_controllers/manager/motion_controller.hpp"
 #include "ctrl_more/feedback_controllers_manager.hpp"
 #include "ctrl_more/states/robot_states.hpp"
+#include "ctrl_more/states/signal_mailbox.hpp"
 
 namespace coglab_controllers {
+
+/// Forces of the surroundings on thumb, index, middle, ring, little finger and palm, x y z each; N,
+/// axes of the tool.
+using TouchForces = std::array<double, 18>;
 
 /// The stores that all controllers of the arm share, and the feedback manager over them.
 ///
 /// Signals. measuredData: `joint_position` (rad), `joint_velocity` (rad/s), `joint_torque`,
 /// `external_torque` (Nm), 7 each in wire order; `wrench` (N, Nm at the tool, in the base frame,
-/// 6). estimatedData: `ee` (m, quaternion; base frame, 7), the tool's pose by the measured joints.
-/// References: taskSpaceReferencePose and taskSpaceReferenceVel `ee`; jointSpaceReference
-/// `Position` and `Velocity`.
+/// 6); with `tactile` set `touch` (N, tool frame, 18: see TouchForces). estimatedData: `ee` (m,
+/// quaternion; base frame, 7), the tool's pose by the measured joints. References:
+/// taskSpaceReferencePose and taskSpaceReferenceVel `ee`; jointSpaceReference `Position` and
+/// `Velocity`.
 class FeedbackStage {
  public:
   /// @param setup orientation of the measured wrench
@@ -31,6 +39,12 @@ class FeedbackStage {
   const ctrl_more::FeedbackControllersManager& manager() const { return manager_; }
   References& references() { return references_; }
   const ctrl_more::RobotStates& robot() const { return robot_; }
+  /// Leaves forces of touch sensors for the next cycle; wait-free, one thread at a time.
+  /// @param stamp_ns monotonic nanoseconds
+  /// @return false if the hand has no touch sensors
+  bool postTouch(const TouchForces& forces, std::int64_t stamp_ns) noexcept {
+    return touch_ && touch_->post(forces.data(), static_cast<int>(forces.size()), stamp_ns);
+  }
 
   /// @name In the cycle: no allocation, no lock
   /// @{
@@ -55,6 +69,7 @@ class FeedbackStage {
   ctrl_more::RobotStates robot_;
   References references_;
   ctrl_more::RobotSignal position_, velocity_, torque_, external_, wrench_, pose_;
+  std::optional<ctrl_more::SignalMailbox> touch_;
   ctrl_more::FeedbackControllersManager manager_;
   std::uint64_t number_ = 0;
 };

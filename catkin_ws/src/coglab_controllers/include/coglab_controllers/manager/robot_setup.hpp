@@ -19,6 +19,7 @@ struct RobotSetup {
   GuardParameters guard;          ///< limits of step 7
   Workspace workspace;            ///< for goals
   Quaternion tool_from_wrench;    ///< orientation of the measured wrench's frame in the tool
+  bool tactile = false;           ///< the hand has touch sensors
 };
 
 /// Builds it from the robot's model, its table of limits, and the manager's parameters (D4.10 Table
@@ -27,7 +28,7 @@ struct RobotSetup {
 /// (rad, rad, rad/s; seven each, wire order; default: the table), `position_margin` (rad),
 /// `hand_speed_limit`, `elbow_speed_limit` (m/s; 0: none), block `workspace`: `box_min`, `box_max`,
 /// `base_centre` (m), `base_radius` (m), `max_stretch` (share of the reach), `deceleration`
-/// (m/s^2).
+/// (m/s^2); `tactile` (false).
 /// @param urdf text of the model
 /// @throws std::runtime_error or std::invalid_argument naming the parameter, link or joint
 std::shared_ptr<const RobotSetup> makeRobotSetup(const std::string& urdf,

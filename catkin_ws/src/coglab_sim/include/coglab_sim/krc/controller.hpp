@@ -11,11 +11,11 @@
 #include <memory>
 #include <string>
 
-#include "coglab_sim/arm_dynamics.hpp"
 #include "coglab_sim/krc/answer_statistics.hpp"
 #include "coglab_sim/krc/command_checks.hpp"
 #include "coglab_sim/krc/krl_program.hpp"
 #include "coglab_sim/krc/parameters.hpp"
+#include "coglab_sim/krc/servos.hpp"
 
 namespace coglab_sim::krc {
 
@@ -50,7 +50,7 @@ struct ArmSignals {
 class Controller : private KrlInterface {
  public:
   /// @throws std::invalid_argument naming parameter, value and range if one is out of range.
-  Controller(const Parameters& parameters, const ArmParameters& arm, const Vector7& position);
+  Controller(const Parameters& parameters, const ServoParameters& servos, const Vector7& position);
   Controller(const Controller&) = delete;
   Controller& operator=(const Controller&) = delete;
 
@@ -60,11 +60,10 @@ class Controller : private KrlInterface {
   /// Ends the waiting for an answer. `on_time`: the stand-in itself was; if not, a missing answer
   /// is bridged but not counted.
   /// @param arm  state of the arm now
-  PeriodCommand tick(const ArmDynamics& arm, bool on_time);
+  PeriodCommand tick(const Servos& arm, bool on_time);
 
   /// The next measurement, with its counters.
-  lwr_fri_bridge::fri::MeasurementDatagram measure(const ArmDynamics& arm,
-                                                   const ArmSignals& signals);
+  lwr_fri_bridge::fri::MeasurementDatagram measure(const Servos& arm, const ArmSignals& signals);
 
   bool brakesWanted() const { return !drives_on_; }
   bool sends() const {
@@ -123,14 +122,14 @@ class Controller : private KrlInterface {
   CheckContext checkContext() const;
   void follow(const lwr_fri_bridge::fri::CommandDatagram& command);
   void extrapolate();
-  void judgeAnswer(const ArmDynamics& arm, bool on_time);
-  void updateDrives(const ArmDynamics& arm);
-  void watchTorque(const ArmDynamics& arm);
-  void holdMeasured(const ArmDynamics& arm);
+  void judgeAnswer(const Servos& arm, bool on_time);
+  void updateDrives(const Servos& arm);
+  void watchTorque(const Servos& arm);
+  void holdMeasured(const Servos& arm);
   ServoCommand servoCommand() const;
 
   Parameters parameters_;
-  ArmParameters arm_parameters_;
+  ServoParameters servo_parameters_;
   AnswerStatistics statistics_;
   std::unique_ptr<KrlProgram> program_;
   double time_ = 0.0, krl_due_ = 0.0, silent_until_ = 0.0;

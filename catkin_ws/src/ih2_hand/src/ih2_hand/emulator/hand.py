@@ -10,6 +10,7 @@ from ih2_hand.clock import Clock, SteadyClock
 from ih2_hand.emulator.low_level import LowLevel
 from ih2_hand.emulator.motor import FREE, Contact, Motor
 from ih2_hand.emulator.parser import FrameParser
+from ih2_hand.emulator.physical_motor import MotorState, PhysicalMotor
 from ih2_hand.wire_choices import WIRE
 
 STIFFEST = 1e6
@@ -51,6 +52,8 @@ class EmulatedHand:
     calibrated as the EH1 does, `dialect` is `both`, `legacy` or `v17` (strict), `strict_force`
     leaves a force read of motor 0 unanswered (W6), `enforce_spacing` loses commands that come
     before a posture is executed (for virtual time: a pty does not tell when bytes arrived).
+    `physical`: the motors are turned by the physics of the cell, see `follow` and `orders`;
+    otherwise by the emulator itself, against the contacts of `set_contacts`.
     """
 
     def __init__(
@@ -63,13 +66,16 @@ class EmulatedHand:
         strict_force: bool = False,
         enforce_spacing: bool = False,
         positions: Sequence[int] = (0,) * WIRE.motors,
+        physical: bool = False,
         preshapes: Mapping[str, Sequence[int]] | None = None,
     ):
         if not 0.0 <= calibration_scale <= 1000.0:
             raise ValueError(f"calibration_scale must be 0..1000; got {calibration_scale}")
         self.clock = clock or SteadyClock()
         self.parser = FrameParser(dialect)
-        self.motors = [Motor(number, float(positions[number])) for number in range(WIRE.motors)]
+        kind = PhysicalMotor if physical else Motor
+        self.motors = [kind(number, float(positions[number])) for number in range(WIRE.motors)]
+        self.physical = physical
         self.counters = HandCounters()
         self.calibration_scale = calibration_scale
         self.strict_force = strict_force
@@ -104,6 +110,22 @@ class EmulatedHand:
                     f"{position} and {stiff} for motor {motor.number}"
                 )
             motor.contact = Contact(float(position), float(stiff))
+
+    def follow(self, states: Sequence[MotorState]) -> None:
+        """What the physics says of the five motors; ValueError for other numbers than it can say."""
+        if not self.physical or len(states) != WIRE.motors:
+            raise ValueError(f"states of {WIRE.motors} motors turned by the physics are expected; got {len(states)}")
+        for state in states:
+            state.check()
+        for motor, state in zip(self.motors, states, strict=True):
+            motor.follow(state)
+
+    def orders(self) -> list[tuple[float, float, float]]:
+        """What the physics is to do with each motor: share of the full speed, share of the stroke
+        to go to, counts of current at which to stop."""
+        if self.calibrating:  # all open, at full speed
+            return [(1.0, 0.0, 0.0)] * WIRE.motors
+        return [motor.order() for motor in self.motors]
 
     # -- time ------------------------------------------------------------------------------------
 
@@ -150,7 +172,7 @@ class EmulatedHand:
         for motor in self.motors:
             motor.stop()
             motor.wrapped = False
-            if not motor.stuck:
+            if not motor.stuck and not self.physical:
                 motor.position = 0.0
 
     # -- bytes -----------------------------------------------------------------------------------

@@ -152,6 +152,10 @@ class Motor:
         self._moving = abs(self.position - before) > 1e-9
         self._measure_current(rate)
         self._watch_current(dt)
+        self._end_current_position(dt)
+
+    def _end_current_position(self, dt: float) -> None:
+        """Current/position mode switches the motor off a while after its goal."""
         if self.mode == "current_position" and self.reached:
             self._reached_s += dt
             if self._reached_s >= REACHED_HOLD_S:
@@ -174,13 +178,22 @@ class Motor:
         if at_end and WIRE.stop_at_end:
             self.stop()
 
+    @property
+    def aim(self) -> float:
+        """Where position control goes; not the exact target with the fault "short": real hands
+        stop up to 4 counts before it."""
+        if not self.short_by:
+            return self.target
+        target = self.target + (self.short_by if self.target < self.position else -self.short_by)
+        return max(0.0, min(FULL_SCALE, target))
+
+    @property
+    def tension_goal(self) -> float:
+        """Goal of tension control as counts of motor current."""
+        return self.goal_effort / TENSION_PER_CURRENT
+
     def _position_step(self, step: float) -> None:
-        # Not the exact target with the fault "short": real hands stop up to 4 counts before it.
-        target = self.target
-        if self.short_by:
-            target += self.short_by if self.target < self.position else -self.short_by
-            target = max(0.0, min(FULL_SCALE, target))
-        error = target - self.position
+        error = self.aim - self.position
         self._move(max(-step, min(step, error)), POSITION_STALL_CURRENT)
         self._settle_position()
 
@@ -189,7 +202,7 @@ class Motor:
         self.wrapped = self.wrap and self.target >= FULL_SCALE and self.reached
 
     def _tension_step(self, step: float) -> None:
-        goal = self.goal_effort / TENSION_PER_CURRENT
+        goal = self.tension_goal
         if self.effort > goal + self.contact.stiffness:
             self._move(-min(step, (self.effort - goal) / max(self.contact.stiffness, 1e-6)), goal)
         else:

@@ -3,22 +3,28 @@
 from __future__ import annotations
 
 import rospy
-from coglab_msgs.msg import FingerContact, FingerPositions
+from coglab_msgs.msg import FingerContact, FingerPositions, MotorCommands, MotorStates
 from std_msgs.msg import String
 
+from ih2_hand.emulator.physical_motor import MotorState
 from ih2_hand.emulator.pty_server import PtyServer
 
 PUBLISH_HZ = 50.0
 
 
 class EmulatorNode:
-    """Topics `finger_contact` (in), `finger_positions` (out, 50 Hz), `hand_fault` (in: commands of
-    `emulator.faults`); parameter `hand_port` holds the pty's path. All names are relative."""
+    """Topics `finger_positions` (out, 50 Hz), `hand_fault` (in: commands of `emulator.faults`); in the cell
+    `motor_states` (in) and `motor_commands` (out, at once), without a cell `finger_contact` (in: what stands in for an
+    object). Parameter `hand_port` holds the pty's path. All names are relative."""
 
     def __init__(self, server: PtyServer):
         self._server = server
         self._positions = rospy.Publisher("finger_positions", FingerPositions, queue_size=5)
-        rospy.Subscriber("finger_contact", FingerContact, self._on_contact, queue_size=5)
+        if server.hand.physical:
+            self._commands = rospy.Publisher("motor_commands", MotorCommands, queue_size=1)
+            rospy.Subscriber("motor_states", MotorStates, self._on_states, queue_size=1, tcp_nodelay=True)
+        else:
+            rospy.Subscriber("finger_contact", FingerContact, self._on_contact, queue_size=5)
         rospy.Subscriber("hand_fault", String, self._on_fault, queue_size=5)
         self._timer = rospy.Timer(rospy.Duration(1.0 / PUBLISH_HZ), self._publish)
         # rospy may end without a signal (rosnode kill): the process ends with it.
@@ -47,6 +53,22 @@ class EmulatorNode:
                 self._server.hand.set_contacts(contact.contact_position, contact.stiffness)
         except ValueError as error:
             rospy.logwarn_throttle(1.0, "finger_contact refused: %s", error)
+
+    def _on_states(self, message: MotorStates) -> None:
+        fields = (message.position, message.current, message.effort, message.moving, message.locked)
+        try:
+            states = [MotorState(*values) for values in zip(*fields, strict=True)]
+            with self._server.lock:
+                self._server.hand.follow(states)
+                self._server.hand.advance()
+                orders = self._server.hand.orders()
+        except ValueError as error:
+            rospy.logwarn_throttle(1.0, "motor_states refused: %s", error)
+            return
+        commands = MotorCommands()
+        commands.header.stamp = rospy.Time.now()
+        commands.speed, commands.target, commands.current = (list(values) for values in zip(*orders, strict=True))
+        self._commands.publish(commands)
 
     def _on_fault(self, command: String) -> None:
         try:

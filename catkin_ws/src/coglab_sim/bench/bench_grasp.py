@@ -1,0 +1,45 @@
+#!/usr/bin/env python3
+"""Grasps by friction: five objects x five directions of the palm, shaken at 5 m/s^2 along three axes, and let go."""
+
+import json
+import sys
+from pathlib import Path
+
+PACKAGE = Path(__file__).resolve().parents[1]
+sys.path.insert(0, str(PACKAGE / "test"))
+from grasp_trial import DIRECTIONS, GraspTrial, objects  # noqa: E402
+
+SLIP, RELEASE = 3.0, 0.3
+
+
+def row(figure: str, value: float, unit: str, limit: float, fine: bool) -> dict[str, object]:
+    """A figure that is fine up to `limit`."""
+    return {
+        "bench": "grasp",
+        "figure": figure,
+        "value": round(value, 3),
+        "unit": unit,
+        "goal": f"<= {limit:g}",
+        "peer": None,
+        "peer_value": None,
+        "ok": fine and value <= limit,
+    }
+
+
+def main() -> None:
+    rows = []
+    for name, thing in objects().items():
+        outcomes = {direction: GraspTrial(thing, direction).run() for direction in DIRECTIONS}
+        for direction, outcome in outcomes.items():
+            rows.append(
+                row(f"{name}, {direction}: slip under 5 m/s^2", 1e3 * outcome.slip, "mm", SLIP, not outcome.lost)
+            )
+        slowest = max(outcomes.values(), key=lambda o: o.released)
+        rows.append(
+            row(f"{name}: released after opening, slowest of five directions", slowest.released, "s", RELEASE, True)
+        )
+    print(json.dumps(rows, indent=1))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,198 @@
+/// @file
+/// Everything in the cell that has mass: arm, hand with fingers, object, the person's hand, board
+/// and floor, moved by MuJoCo in steps of 1 ms.
+///
+/// The robot's grasp is contact and friction alone. The person holds an object by a compliant and
+/// limited spring on it, and their own hand is a body on such a spring. A simulation that diverges
+/// stops with its seed and time.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "coglab_sim/plant/hand_motors.hpp"
+#include "coglab_sim/plant/hold_spring.hpp"
+#include "coglab_sim/plant/model.hpp"
+
+namespace coglab_sim::plant {
+
+constexpr double kStep = 1e-3;  ///< s, longest step
+
+/// Figures of the arm's drives that are not in the robot description.
+struct Drives {
+  /// kg m^2 at the link; ours, the order that the gear ratios 160/160/160/160/100/160/160 of the
+  /// DLR LWR III suggest.
+  Vector7 rotor_inertia = (Vector7() << 3.0, 3.0, 2.0, 2.0, 0.8, 0.4, 0.4).finished();
+  /// Nm; ours. The viscous part comes from the robot description.
+  Vector7 coulomb_friction = (Vector7() << 0.4, 0.4, 0.25, 0.25, 0.2, 0.1, 0.1).finished();
+  double coulomb_speed = 0.01;  ///< rad/s over which Coulomb friction reverses
+  /// Nm of the brakes: twice the motors' limits (CentroEPiaggio, FloBaRoID, Gaz et al. 2014).
+  Vector7 brake_torque = (Vector7() << 352, 352, 200, 200, 200, 76, 76).finished();
+  double block_stiffness = 2e5;  ///< Nm/rad of whatever holds the arm when it is blocked
+  double unknown_load = 0.0;     ///< kg at the palm, hangs on it without inertia
+};
+
+/// Figures of the person's hand; ours.
+struct PersonFigures {
+  HoldFigures arm{40.0, 60.0, 6.0};  ///< holds the hand where the person wants it
+  double grip_bandwidth = 60.0;      ///< rad/s of the grip on the object
+  double grip_lever = 0.04;          ///< m, torque of the grip over its force
+  double reach = 0.06;  ///< m between hand frame and the object's surface at which a grip finds it
+};
+
+struct PlantConfig {
+  std::string urdf;        ///< path of the robot description
+  std::uint64_t seed = 1;  ///< of the run, for messages: the plant draws nothing
+  Vector7 home = Vector7::Zero();
+  HandTable hand = builtInHandTable();
+  Object object;
+  Surroundings surroundings;
+  Drives drives;
+  PersonFigures person;
+};
+
+/// What the person's hand does.
+struct PersonInput {
+  Pose hand;
+  Twist twist;
+  double grip = 0.0;         ///< 0 open .. 1 full
+  double grip_force = 20.0;  ///< N, normal force at full grip
+};
+
+/// Where the object can be put.
+enum class Place {
+  PersonHand,  ///< pose is that of the object in human_hand; follows the hand until its grip holds
+  RobotHand,   ///< pose is that of the object in ih2_palm; held there until the fingers hold it
+  World        ///< pose is that of the object in the world, let go at once
+};
+
+/// Forces of the surroundings on the hand, N, axes of ih2_palm.
+struct Touch {
+  std::vector<Vector3d> phalanges;  ///< in the order of the hand's table
+  Vector3d palm = Vector3d::Zero();
+};
+
+class Plant {
+ public:
+  /// @throws std::invalid_argument or std::runtime_error with a sentence on what does not fit.
+  explicit Plant(const PlantConfig& config);
+
+  /// Advances by `dt` s, at most kStep, under the motors' torques (Nm at the joints).
+  /// @throws std::runtime_error with seed and time when the simulation diverges.
+  void step(const Vector7& motor_torque, double dt = kStep);
+
+  // Inputs, valid until changed
+  void setPerson(const PersonInput& person);
+  void setPush(const Wrench& push) { push_ = push; }  ///< on ih2_palm about its origin
+  void setBrakes(bool on);                            ///< motors without torque, brakes closed
+  void setBlock(bool on);                             ///< somebody holds all joints where they are
+  HandMotors& motors() { return motors_; }
+  const HandMotors& motors() const { return motors_; }
+  /// @throws std::invalid_argument if the object would stand inside something by more than 3 mm.
+  void place(Place place, const Pose& pose);
+  /// Exchanges the object; it is then to be placed. The robot stays as it is.
+  void setObject(const Object& object);
+  /// Gravity in the world, m/s^2, for tests.
+  void setGravity(const Vector3d& gravity);
+  /// Puts the arm somewhere, at rest.
+  void setArm(const Vector7& position, const Vector7& velocity = Vector7::Zero());
+
+  // The arm
+  Vector7 position() const { return position_; }
+  Vector7 velocity() const { return velocity_; }
+  bool locked() const { return locked_; }  ///< stands still on its brakes
+  /// What ideal torque sensors between motor and link read, Nm.
+  const Vector7& jointTorque() const { return joint_torque_; }
+  /// Torque of everything outside the arm on its joints, Nm.
+  const Vector7& externalTorque() const { return external_torque_; }
+  Vector7 acceleration() const { return acceleration_; }  ///< over the last step, rad/s^2
+  Pose palm() const { return model_->poseOf(model_->palm_frame); }
+  Twist palmTwist() const { return twistOf(model_->palm_frame); }
+  /// Terms of the whole mechanism, all degrees of freedom: see Terms.
+  struct Terms {
+    Eigen::MatrixXd mass;                   ///< with the reflected inertias of motors and gears
+    Eigen::VectorXd bias;                   ///< C(q, dq) dq + g(q)
+    Eigen::MatrixXd jacobian;               ///< 6 rows x y z rx ry rz of ih2_palm, world axes
+    std::vector<int> arm, fingers, object;  ///< their degrees of freedom
+  };
+  Terms terms() const;
+  /// Kinetic and potential energy of everything, J.
+  double energy();
+
+  // Object and hands
+  Pose object() const { return model_->poseOf(model_->object); }
+  Twist objectTwist() const { return twistOf(model_->object); }
+  Pose personHand() const { return model_->poseOf(model_->person); }
+  const Touch& touch() const { return touch_; }
+  const Vector3d& objectForce() const { return object_force_; }  ///< N, of it on the robot's hand
+  double robotShare() const { return robot_share_; }             ///< of the weight, 0..1
+  double personShare() const { return person_share_; }
+  std::string heldBy() const;  ///< robot, human, both, board, floor, none
+  bool dropped() const { return dropped_; }
+  bool personHolds() const { return grip_.engaged(); }
+  bool robotHolds() const { return squeeze_ > kHolds; }
+  bool slipsFromPerson() const { return grip_.slipping(); }
+  int contacts() const { return contacts_; }  ///< in the last step
+
+  double time() const { return time_; }
+  const PlantConfig& config() const { return config_; }
+  Model& model() { return *model_; }
+
+ private:
+  static constexpr double kHolds = 0.5;  // N that fingers and what opposes them press at least
+
+  /// Forces between the robot's hand and the object in one step.
+  struct Pressing {
+    Vector3d on_object = Vector3d::Zero();  ///< N, world axes
+    double fingers = 0.0, opposing = 0.0;   ///< N, normal; opposing: thumb and palm
+  };
+
+  Twist twistOf(int body) const;
+  void feel(int body, int other, const Vector3d& force, double normal, Pressing& pressing);
+  FreeBody freeBody(int body, int velocity) const;
+  void put(int position, int velocity, const Pose& pose, const Twist& twist);
+  void keepPlaced();
+  void applyArm(const Vector7& motor_torque);
+  void applyPerson(double dt);
+  void updateGrip(const FreeBody& held, const Pose& hand, double friction);
+  void applyMotors(double dt);
+  void readContacts(double dt);
+  void readArm(const Vector7& before, double dt);
+  Vector7 pushedTorque() const;
+  double blockDamping(int dof) const;
+  void refuseInside(const char* where);
+  void check() const;
+
+  PlantConfig config_;
+  std::unique_ptr<Model> model_;
+  HandMotors motors_;
+  PersonInput person_;
+  bool person_present_ = false;
+  double person_age_ = 0.0;  // s since its last message
+  HoldSpring arm_of_person_, grip_;
+  Wrench push_;
+  bool brakes_ = false, locked_ = false, blocked_ = false;
+  bool was_stiff_ = false;  // brakes or block in the step before
+  Vector7 position_, velocity_ = Vector7::Zero(), block_position_ = Vector7::Zero();
+  Vector7 friction_ = Vector7::Zero(), motor_torque_ = Vector7::Zero();
+  Vector7 joint_torque_ = Vector7::Zero(), external_torque_ = Vector7::Zero(),
+          acceleration_ = Vector7::Zero();
+  Place place_ = Place::World;
+  bool placed_ = false;  // held where it was put until a hand holds it
+  Pose in_hand_;         // where it was put
+  Touch touch_;
+  Vector3d object_force_ = Vector3d::Zero();
+  double robot_share_ = 0.0, person_share_ = 0.0, person_lift_ = 0.0;
+  double squeeze_ = 0.0, grasp_force_ = 0.0;  // N, averaged
+  bool on_board_ = false, on_floor_ = false, dropped_ = false;
+  int contacts_ = 0;
+  double time_ = 0.0;
+};
+
+/// Distance of a point of the object's frame from its surface, m, negative inside.
+double distanceFrom(const Object& object, const Vector3d& point);
+
+}  // namespace coglab_sim::plant

@@ -1,0 +1,245 @@
+/// Object, fingers and the person's hand of the plant.
+#include <algorithm>
+#include <cmath>
+#include <sstream>
+#include <stdexcept>
+
+#include "coglab_sim/plant/plant.hpp"
+
+namespace coglab_sim::plant {
+namespace {
+
+constexpr double kGravity = 9.81;
+constexpr double kShareTime = 0.02;  // s over which load shares and the squeeze are averaged
+constexpr double kPersonAge = 0.05;  // s for which the hand goes on as it went after its message
+constexpr double kGripBegins = 0.05, kGripEnds = 0.02;
+constexpr double kSafeGrip = 1.5;  // friction over weight at which a hand that was given it holds
+constexpr double kInside = 0.003;  // m by which a placed object may stand in something
+
+}  // namespace
+
+double distanceFrom(const Object& object, const Vector3d& point) {
+  const Vector3d p = point - object.center, half = 0.5 * object.size;
+  if (object.shape == "sphere") return p.norm() - half.x();
+  Vector3d beyond = p.cwiseAbs() - half;
+  if (object.shape == "cylinder")
+    beyond = Vector3d(std::hypot(p.x(), p.y()) - half.x(), std::abs(p.z()) - half.z(), -1.0);
+  return beyond.cwiseMax(0.0).norm() + std::min(0.0, beyond.maxCoeff());
+}
+
+FreeBody Plant::freeBody(int body, int velocity) const {
+  const mjModel* m = model_->get();
+  const mjData* d = model_->data();
+  FreeBody free;
+  const mjtNum* q = d->xquat + 4 * body;
+  free.center = {Eigen::Map<const Vector3d>(d->xipos + 3 * body),
+                 Quaterniond(q[0], q[1], q[2], q[3])};
+  free.twist.angular = free.center.rotation * Eigen::Map<const Vector3d>(d->qvel + velocity + 3);
+  const Vector3d arm = free.center.position - Eigen::Map<const Vector3d>(d->xpos + 3 * body);
+  free.twist.linear =
+      Eigen::Map<const Vector3d>(d->qvel + velocity) + free.twist.angular.cross(arm);
+  free.mass = m->body_mass[body];
+  free.inertia = Eigen::Map<const Vector3d>(m->body_inertia + 3 * body);
+  return free;
+}
+
+void Plant::put(int position, int velocity, const Pose& pose, const Twist& twist) {
+  mjData* d = model_->data();
+  const Quaterniond q = pose.rotation.normalized();
+  const double values[7] = {
+      pose.position.x(), pose.position.y(), pose.position.z(), q.w(), q.x(), q.y(), q.z()};
+  std::copy(values, values + 7, d->qpos + position);
+  const Vector3d spin = q.conjugate() * twist.angular;
+  std::copy(twist.linear.data(), twist.linear.data() + 3, d->qvel + velocity);
+  std::copy(spin.data(), spin.data() + 3, d->qvel + velocity + 3);
+}
+
+void Plant::setPerson(const PersonInput& person) {
+  person_ = person;
+  person_age_ = 0.0;
+  if (person_present_) return;
+  person_present_ = true;
+  put(model_->person_position, model_->person_velocity, person_.hand, person_.twist);
+  keepPlaced();
+  mj_step1(model_->get(), model_->data());
+}
+
+void Plant::place(Place place, const Pose& pose) {
+  place_ = place;
+  in_hand_ = pose;
+  placed_ = place != Place::World;
+  grip_.release();
+  on_board_ = on_floor_ = dropped_ = false;
+  robot_share_ = person_share_ = person_lift_ = squeeze_ = grasp_force_ = 0.0;
+  object_force_.setZero();
+  if (place == Place::World) put(model_->object_position, model_->object_velocity, pose, {});
+  keepPlaced();
+  mj_step1(model_->get(), model_->data());
+  refuseInside(place == Place::World ? "there" : "in that hand");
+}
+
+void Plant::refuseInside(const char* where) {
+  const mjModel* m = model_->get();
+  const mjData* d = model_->data();
+  for (int i = 0; i < d->ncon; ++i) {
+    const mjContact& contact = d->contact[i];
+    const int one = m->geom_bodyid[contact.geom1], two = m->geom_bodyid[contact.geom2];
+    if ((one != model_->object && two != model_->object) || contact.dist > -kInside) continue;
+    const int other = one == model_->object ? two : one;
+    // A hand that has closed already gives way; what it is put into must not be the palm itself.
+    if (std::find(model_->phalanges.begin(), model_->phalanges.end(), other) !=
+        model_->phalanges.end())
+      continue;
+    const int geom = one == model_->object ? contact.geom2 : contact.geom1;
+    const char* name =
+        other == 0 ? mj_id2name(m, mjOBJ_GEOM, geom) : mj_id2name(m, mjOBJ_BODY, other);
+    std::ostringstream text;
+    text << "object '" << config_.object.id << "' would stand " << -1e3 * contact.dist
+         << " mm inside " << (name != nullptr ? name : "something") << ' ' << where << ", at most "
+         << 1e3 * kInside << " mm are accepted; place it elsewhere";
+    throw std::invalid_argument(text.str());
+  }
+}
+
+/// What was put into a hand stays there until that hand holds it; without a person their hand and
+/// what is in it stand still.
+void Plant::keepPlaced() {
+  if (!person_present_) put(model_->person_position, model_->person_velocity, person_.hand, {});
+  if (!placed_) return;
+  const bool in_robot = place_ == Place::RobotHand;
+  mj_kinematics(model_->get(), model_->data());
+  mj_comPos(model_->get(), model_->data());
+  const Pose hand = in_robot ? palm() : personHand();
+  const Twist twist = in_robot ? palmTwist() : person_present_ ? twistOf(model_->person) : Twist{};
+  const Pose object = hand * in_hand_;
+  put(model_->object_position, model_->object_velocity, object,
+      {twist.at(object.position - hand.position), twist.angular});
+}
+
+/// Whether the person's grip has the object: from where it was put, from where it finds it, or not
+/// any more.
+void Plant::updateGrip(const FreeBody& held, const Pose& hand, double friction) {
+  const Object& object = config_.object;
+  if (placed_ && place_ == Place::PersonHand) {
+    placed_ = friction < kSafeGrip * object.mass * kGravity;
+    if (!placed_) grip_.engageAt(in_hand_ * Pose{object.center, Quaterniond::Identity()});
+    return;
+  }
+  const bool near =
+      distanceFrom(object, this->object().inverse() * hand.position) < config_.person.reach;
+  if (!placed_ && !grip_.engaged() && person_.grip > kGripBegins && near) {
+    grip_.engage(hand, held.center);
+  } else if (person_.grip < kGripEnds) {
+    grip_.release();
+  }
+}
+
+void Plant::applyPerson(double dt) {
+  mjData* d = model_->data();
+  mjtNum* on_hand = d->xfrc_applied + 6 * model_->person;
+  mjtNum* on_object = d->xfrc_applied + 6 * model_->object;
+  std::fill(on_hand, on_hand + 6, 0.0);
+  std::fill(on_object, on_object + 6, 0.0);
+  const Object& object = config_.object;
+  person_lift_ = 0.0;
+  if (placed_ && place_ == Place::RobotHand)
+    placed_ = object.friction * grasp_force_ < kSafeGrip * object.mass * kGravity;
+  if (!person_present_) {
+    put(model_->person_position, model_->person_velocity, person_.hand, {});
+    return;
+  }
+
+  person_age_ += dt;
+  if (person_age_ > kPersonAge) person_.twist = Twist{};
+  person_.hand.position += dt * person_.twist.linear;
+  const FreeBody hand = freeBody(model_->person, model_->person_velocity);
+  const FreeBody held = freeBody(model_->object, model_->object_velocity);
+  const Pose hand_frame = personHand();
+  Wrench hold = arm_of_person_.evaluate(person_.hand, person_.twist, hand, config_.person.arm, 1.0);
+  arm_of_person_.engageAt(Pose{});  // an arm that was pushed aside comes back
+
+  const double friction = 2.0 * object.friction * person_.grip * person_.grip_force;
+  updateGrip(held, hand_frame, friction);
+  if (grip_.engaged()) {
+    const HoldFigures figures{config_.person.grip_bandwidth, friction,
+                              friction * config_.person.grip_lever};
+    const Wrench by_person = grip_.evaluate(hand_frame, twistOf(model_->person), held, figures,
+                                            std::clamp(person_.grip, 0.0, 1.0));
+    person_lift_ = by_person.force.z();
+    std::copy(by_person.force.data(), by_person.force.data() + 3, on_object);
+    std::copy(by_person.torque.data(), by_person.torque.data() + 3, on_object + 3);
+    hold.force -= by_person.force;
+    hold.torque -=
+        by_person.torque + (held.center.position - hand.center.position).cross(by_person.force);
+  }
+  std::copy(hold.force.data(), hold.force.data() + 3, on_hand);
+  std::copy(hold.torque.data(), hold.torque.data() + 3, on_hand + 3);
+}
+
+/// Adds what one body of a contact feels, in world axes; `normal` is the pressing part, N.
+void Plant::feel(int body, int other, const Vector3d& force, double normal, Pressing& pressing) {
+  const auto phalanx = std::find(model_->phalanges.begin(), model_->phalanges.end(), body);
+  const bool on_palm = body == model_->palm;
+  if (phalanx == model_->phalanges.end() && !on_palm) return;
+  const auto index = static_cast<std::size_t>(phalanx - model_->phalanges.begin());
+  (on_palm ? touch_.palm : touch_.phalanges[index]) += force;
+  if (other != model_->object) return;
+  pressing.on_object -= force;
+  const bool finger = !on_palm && config_.hand.phalanges[index].finger != Finger::Thumb;
+  (finger ? pressing.fingers : pressing.opposing) += normal;
+}
+
+/// Who touches what: forces on the fingers and the palm, who carries the object.
+void Plant::readContacts(double dt) {
+  const mjModel* m = model_->get();
+  const mjData* d = model_->data();
+  touch_.phalanges.assign(model_->phalanges.size(), Vector3d::Zero());
+  touch_.palm.setZero();
+  on_board_ = on_floor_ = false;
+  contacts_ = d->ncon;
+  Pressing pressing;
+  for (int i = 0; i < d->ncon; ++i) {
+    const mjContact& contact = d->contact[i];
+    if (contact.efc_address < 0) continue;
+    const int one = m->geom_bodyid[contact.geom1], two = m->geom_bodyid[contact.geom2];
+    if (one == model_->object || two == model_->object) {
+      const int with = one == model_->object ? contact.geom2 : contact.geom1;
+      on_board_ = on_board_ || with == model_->board;
+      on_floor_ = on_floor_ || with == model_->floor;
+    }
+    mjtNum local[6];
+    mj_contactForce(m, d, i, local);
+    // Rows of the frame are normal and tangents; the force acts on the second body.
+    const Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>> frame(contact.frame);
+    const Vector3d force = frame.transpose() * Vector3d(local[0], local[1], local[2]);
+    feel(one, two, -force, local[0], pressing);
+    feel(two, one, force, local[0], pressing);
+  }
+  const Matrix3d to_palm = palm().rotation.toRotationMatrix().transpose();
+  for (Vector3d& force : touch_.phalanges) force = to_palm * force;
+  touch_.palm = to_palm * touch_.palm;
+  object_force_ = -pressing.on_object;
+  dropped_ = dropped_ || on_floor_;
+
+  const double keep = std::exp(-dt / kShareTime), weight = config_.object.mass * kGravity;
+  const double opposed = std::min(pressing.fingers, pressing.opposing);
+  const auto average = [&](double& value, double now) {
+    value = keep * value + (1.0 - keep) * now;
+  };
+  average(robot_share_, std::clamp(pressing.on_object.z() / weight, 0.0, 1.0));
+  average(person_share_, std::clamp(person_lift_ / weight, 0.0, 1.0));
+  average(squeeze_, opposed);
+  average(grasp_force_, opposed > 0.0 ? pressing.fingers + pressing.opposing : 0.0);
+}
+
+std::string Plant::heldBy() const {
+  const bool robot = robotHolds(),
+             person = grip_.engaged() || (placed_ && place_ == Place::PersonHand);
+  if (robot && person) return "both";
+  if (robot || (placed_ && place_ == Place::RobotHand)) return "robot";
+  if (person) return "human";
+  if (on_board_) return "board";
+  return on_floor_ ? "floor" : "none";
+}
+
+}  // namespace coglab_sim::plant

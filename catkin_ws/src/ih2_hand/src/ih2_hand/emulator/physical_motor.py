@@ -1,0 +1,92 @@
+"""A motor of the simulated hand whose motion is computed elsewhere: the physics of the cell turns it, winds its tendon and
+stops at contact; what the electronics make of that stays here."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ih2_hand.emulator.motor import FREE_CURRENT, FULL_SCALE, POSITION_STALL_CURRENT, STALL_CURRENT, Motor
+from ih2_hand.wire_choices import WIRE
+
+END_SHARE = 0.001
+"""Share of the stroke within which an end sensor sees the end."""
+
+
+@dataclass(frozen=True)
+class MotorState:
+    """What the physics says of one motor.
+
+    ``position``: share of the stroke, 0 open .. 1 closed; ``current`` and ``effort``: counts of motor current, now and as
+    the tension of the tendon stands for; ``locked``: it met resistance and stands until the next command.
+    """
+
+    position: float
+    current: float
+    effort: float
+    moving: bool
+    locked: bool
+
+    def check(self) -> None:
+        """ValueError unless every figure is one that a motor can have."""
+        for name, value, most in (
+            ("position", self.position, 1.0),
+            ("current", self.current, 1e4),
+            ("effort", self.effort, 1e4),
+        ):
+            if not 0.0 <= value <= most:
+                raise ValueError(f"{name} of a motor must be 0..{most:g}; got {value}")
+
+
+class PhysicalMotor(Motor):
+    """The electronics of a motor in the cell. ``follow`` before ``advance``; ``order`` goes back to the physics."""
+
+    def __init__(self, number: int, position: float = 0.0):
+        super().__init__(number, position)
+        self.state = MotorState(position / FULL_SCALE, 0.0, 0.0, False, False)
+
+    def follow(self, state: MotorState) -> None:
+        """Take over what the physics says."""
+        self.state = state
+        share = state.position
+        self.position = FULL_SCALE * (0.0 if share < END_SHARE else 1.0 if share > 1.0 - END_SHARE else share)
+
+    @property
+    def effort(self) -> float:
+        """Counts of current that the tension stands for; it stays when the motor is switched off."""
+        return self.state.effort
+
+    def order(self) -> tuple[float, float, float]:
+        """(share of the full speed, share of the stroke to go to, counts of current at which to stop)."""
+        share = self.position / FULL_SCALE
+        if self.mode == "stop" or self.stuck:
+            return 0.0, share, 0.0
+        if self.mode == "speed":
+            pace = self.speed / WIRE.speed_max
+            return pace, 1.0 if self.direction > 0 else 0.0, FREE_CURRENT + STALL_CURRENT * pace
+        if self.mode == "position":
+            return 1.0, self.aim / FULL_SCALE, POSITION_STALL_CURRENT
+        if self.reached:
+            return 0.0, share, 0.0
+        goal = self.goal_effort if self.mode != "tension" else self.tension_goal
+        return 1.0, 1.0, FREE_CURRENT + goal
+
+    def advance(self, dt: float) -> None:
+        """Judge after `dt` (s) what the physics has done."""
+        if self.mode == "stop":
+            return
+        self.current = self.state.current
+        self._moving = self.state.moving
+        if self.mode == "speed":
+            at_end = self.position >= FULL_SCALE if self.direction > 0 else self.position <= 0.0
+            if at_end and WIRE.stop_at_end:
+                self.stop()
+                return
+        elif self.mode == "position":
+            self._settle_position()
+        elif not self.reached:
+            self.reached = self.state.locked and self.position < FULL_SCALE
+            if self.position >= FULL_SCALE and self.mode != "tension":
+                self.stop()
+                return
+        self._watch_current(dt)
+        self._end_current_position(dt)
