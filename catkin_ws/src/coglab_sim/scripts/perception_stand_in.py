@@ -32,9 +32,9 @@ from coglab_perception.frames import FrameNames
 from coglab_py import parameters
 from coglab_py.messages import pose_message, pose_of
 from coglab_py.pose import Pose, about_z
-from coglab_sim.perception_stand_in import Board, PerceptionSettings, Sight
-from coglab_sim.recorded_motion import Playback, PlaybackSettings
-from coglab_sim.vision import NotSeen, Vision
+from coglab_sim.person.recorded_motion import Playback, PlaybackSettings
+from coglab_sim.tracker.tracker import Board, PerceptionSettings, Sight
+from coglab_sim.tracker.vision import NotSeen, Vision
 from geometry_msgs.msg import PoseStamped, Quaternion, TransformStamped, Vector3
 from std_msgs.msg import UInt8
 

@@ -1,12 +1,14 @@
 #!/usr/bin/python3
-"""The node /coglab_sim/virtual_human: a seeded person who gives and takes.
+"""The node /coglab_sim/virtual_human: a seeded person who gives and takes, or whose hand goes as recorded.
 
-Subscribes truth/cell (what a person sees and feels), human_command (std_msgs/String: give <id>, receive <id>, rest) and
-coglab/transitions of the namespace above this one (reacts by itself unless ~react is false). Publishes human_hand
+Subscribes truth/cell and the fingers' joint states of the hand (what there is to be seen and felt; the person perceives
+it late and noisily), human_command (std_msgs/String: give <id>, receive <id>, rest) and, in the namespace above this one,
+say (coglab_msgs/Say: what the robot tells the person, who acts on it unless ~react is false). Publishes human_hand
 (coglab_msgs/HumanHand, 100 Hz) and human_state (std_msgs/String). Names are relative to the node's namespace.
-Parameters (private): transitions (topic, where it is another one), seed, behaviour, participant (mapping, overrides),
-holds_object, react, rest, handover_object, object_in_hand (three numbers each, m), object_mass (kg; by default that
-of the cell's object in the folder cell/objects).
+Parameters (private): say, fingers (topics, where they are others), seed, behaviour, profile (drawn, patient), participant
+(mapping, overrides), holds_object, react, rest, handover_object, object_in_hand (three numbers each, m), object_mass (kg;
+by default that of the cell's object in the folder cell/objects), recording (mapping, see recorded_person; without a file
+nothing is played).
 """
 
 import sys
@@ -16,18 +18,27 @@ from pathlib import Path
 
 import numpy as np
 import rospy
-from coglab_msgs.msg import CellTruth, HumanHand, Transition
+from coglab_msgs.msg import CellTruth, HumanHand, Say
+from coglab_msgs.srv import PlaceObject
 from coglab_objects.database import objects_folder, read_object
 from coglab_py import parameters
 from coglab_py.messages import pose_message, pose_of
-from coglab_sim.participant import Participant
-from coglab_sim.scene import Scene, WorldView
-from coglab_sim.virtual_human import VirtualHuman
+from coglab_py.pose import Pose
+from coglab_sim.person.in_cell import load_on_hand
+from coglab_sim.person.participant import Participant
+from coglab_sim.person.recorded_person import RecordedPerson, open_recorded_hand
+from coglab_sim.person.scene import Scene, WorldView
+from coglab_sim.person.virtual_human import VirtualHuman
 from geometry_msgs.msg import Vector3
+from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 
-LARGEST = 1e4  # m, N: no number of a cell is larger
-GIVE, RECEIVE = "exchange_human_to_robot", "exchange_robot_to_human"
+LARGEST = 1e4
+"""m, N: no number of a cell is larger"""
+BENT = 1.5
+"""rad, of a finger that is closed"""
+CELL_LIMIT = 30.0
+"""s for which the cell may take to put a recorded object into the hand"""
 
 
 def object_in_cell() -> dict:
@@ -40,64 +51,71 @@ class VirtualHumanNode:
     """Thin node over VirtualHuman."""
 
     def __init__(self) -> None:
-        fields = parameters.read("~participant", dict, {})
-        fields.setdefault("seed", parameters.read("~seed", int, parameters.read("seed", int, 7)))
-        fields.setdefault("behaviour", parameters.read("~behaviour", str, "normal"))
-        scene = Scene()
-        for name in ("rest", "handover_object", "object_in_hand"):
-            if rospy.has_param(f"~{name}"):
-                setattr(scene, name, np.array(parameters.numbers(f"~{name}", length=3)))
-        scene.object_mass = parameters.read("~object_mass", float, object_in_cell()["mass"], 0.0, 100.0)
-        self.human = VirtualHuman(Participant.from_mapping(fields), scene, parameters.read("~holds_object", bool, True))
+        self.human = self.person(object_in_cell())
         self.lock = threading.Lock()
         self.view = WorldView()
-        self.palm_history: list[tuple[float, np.ndarray]] = []
+        self.fingers = 0.0
         self.hand = rospy.Publisher("human_hand", HumanHand, queue_size=1, tcp_nodelay=True)
         self.state = rospy.Publisher("human_state", String, queue_size=10, latch=True)
         self.last_phase = ""
         rospy.Subscriber("truth/cell", CellTruth, self.on_truth, queue_size=1, tcp_nodelay=True)
+        above = rospy.get_namespace().rstrip("/").rpartition("/")[0]
+        fingers = parameters.read("~fingers", str, f"{above}/ih2_hand/joint_states")
+        rospy.Subscriber(fingers, JointState, self.on_fingers, queue_size=1)
         rospy.Subscriber("human_command", String, self.on_command, queue_size=10)
         if parameters.read("~react", bool, True):
-            above = rospy.get_namespace().rstrip("/").rpartition("/")[0]
-            topic = parameters.read("~transitions", str, f"{above}/coglab/transitions")
-            rospy.Subscriber(topic, Transition, self.on_transition, queue_size=100)
+            rospy.Subscriber(parameters.read("~say", str, f"{above}/say"), Say, self.on_say, queue_size=10)
+
+    @staticmethod
+    def person(entry: dict) -> VirtualHuman:
+        """Whom the parameters describe."""
+        fields = parameters.read("~participant", dict, {})
+        fields.setdefault("seed", parameters.read("~seed", int, parameters.read("seed", int, 7)))
+        fields.setdefault("behaviour", parameters.read("~behaviour", str, "normal"))
+        fields.setdefault("profile", parameters.read("~profile", str, "drawn"))
+        scene = Scene.of(entry)
+        for name in ("rest", "handover_object", "object_in_hand"):
+            if rospy.has_param(f"~{name}"):
+                setattr(scene, name, np.array(parameters.numbers(f"~{name}", length=3)))
+        scene.object_mass = parameters.read("~object_mass", float, scene.object_mass, 0.0, 100.0)
+        recording = parameters.read("~recording", dict, {})
+        if not recording.get("file"):
+            holds = parameters.read("~holds_object", bool, True)
+            return VirtualHuman(Participant.from_mapping(fields), scene, holds)
+        hand, way = open_recorded_hand(recording, f"object_{entry['id']}")
+        rospy.loginfo("the person's hand goes as recorded in %s (%s), %.1f s", recording["file"], way, hand.end)
+        return RecordedPerson(Participant.from_mapping(fields), scene, hand, way)
+
+    def put_into_hand(self) -> None:
+        """The recorded object lies in the hand as it was recorded. ROSException if the cell does not answer."""
+        scene = self.human.scene
+        rospy.wait_for_service("cell/place_object", CELL_LIMIT)
+        place = pose_message(Pose(scene.object_in_hand, scene.object_turn))
+        answer = rospy.ServiceProxy("cell/place_object", PlaceObject)(where="human_hand", pose=place)
+        if not answer.success:
+            raise ValueError(f"the cell refuses the object in the recorded hand: {answer.message}")
 
     def on_truth(self, message: CellTruth) -> None:
-        """What the person sees and feels now; the robot's speed is judged over 0.1 s."""
-        now = time.monotonic()
+        """What there is to be seen and felt now."""
         robot, held = pose_of(message.robot_hand), pose_of(message.object)
         force = message.palm_force
-        numbers = [
-            *robot.position,
-            *robot.orientation,
-            *held.position,
-            *held.orientation,
-            force.x,
-            force.y,
-            force.z,
-            message.robot_load_share,
-            message.human_load_share,
-        ]
+        push = [force.x, force.y, force.z]
+        numbers = [*robot.position, *robot.orientation, *held.position, *held.orientation, *push]
         if not np.all(np.abs(numbers) < LARGEST):  # not finite either
             rospy.logwarn_throttle(
                 5.0, f"virtual human: truth/cell ignored: a number is not finite, or beyond {LARGEST:g}"
             )
             return
+        in_hand = message.held_by in ("human", "both")
+        load = load_on_hand(in_hand, push, self.human.scene.object_mass)
         with self.lock:
-            self.palm_history.append((now, robot.position))
-            while self.palm_history[0][0] < now - 0.1:
-                self.palm_history.pop(0)
-            then, place = self.palm_history[0]
-            speed = float(np.linalg.norm(robot.position - place)) / (now - then) if now - then > 0.03 else 1.0
-            self.view = WorldView(
-                robot,
-                speed,
-                held,
-                float(np.linalg.norm([force.x, force.y, force.z])),
-                message.robot_load_share,
-                message.human_load_share,
-                message.held_by,
-            )
+            self.view = WorldView(robot, self.fingers, held, load)
+
+    def on_fingers(self, message: JointState) -> None:
+        """How far the robot's fingers are bent: a person sees the links."""
+        angles = [angle for name, angle in zip(message.name, message.position, strict=False) if "thumb" not in name]
+        if angles and np.all(np.isfinite(angles)):
+            self.fingers = min(1.0, max(0.0, float(np.mean(angles)) / BENT))
 
     def on_command(self, message: String) -> None:
         """What the person is asked to do."""
@@ -107,17 +125,10 @@ class VirtualHumanNode:
         except ValueError as error:
             rospy.logwarn("virtual human: %s", error)
 
-    def on_transition(self, message: Transition) -> None:
-        """The person sees what the robot is about to do."""
-        if message.path != "/coglab_master":
-            return
+    def on_say(self, message: Say) -> None:
+        """The robot speaks."""
         with self.lock:
-            if message.to_state == GIVE:
-                self.human.command("give")
-            elif message.to_state == RECEIVE:
-                self.human.command("receive")
-            elif message.from_state in (GIVE, RECEIVE) and message.outcome != "succeeded":
-                self.human.command("rest")
+            self.human.hear(time.monotonic(), message.code)
 
     def run(self) -> None:
         """100 Hz on the steady clock."""
@@ -137,6 +148,7 @@ class VirtualHumanNode:
         message.header.frame_id = "world"
         message.pose = pose_message(sample.frame)
         message.velocity.linear = Vector3(*sample.velocity)
+        message.velocity.angular = Vector3(*sample.spin)
         self.hand.publish(message)
         if sample.phase != self.last_phase:
             self.last_phase = sample.phase
@@ -149,7 +161,9 @@ def main() -> int:
     rospy.init_node("virtual_human")
     try:
         node = VirtualHumanNode()
-    except (ValueError, TypeError) as error:
+        if isinstance(node.human, RecordedPerson) and node.human.recorded.object_in_hand is not None:
+            node.put_into_hand()
+    except (ValueError, TypeError, OSError, rospy.ROSException, rospy.ServiceException) as error:
         rospy.logfatal("virtual human: %s", error)
         return 1
     node.run()

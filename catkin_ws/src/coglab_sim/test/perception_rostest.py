@@ -17,7 +17,7 @@ import rostest
 import tf2_ros
 from coglab_msgs.msg import CellTruth, ReasonCode, Recognition
 from coglab_msgs.srv import FreePlaces, InitVision, LocateObject
-from coglab_sim.reach import Reach
+from coglab_sim.person.reach import Reach
 from geometry_msgs.msg import Point, Pose, Quaternion
 from std_msgs.msg import UInt8
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from coglab_sim.reach import Reach, duration_for, min_jerk
+from coglab_sim.person.reach import Reach, duration_for, min_jerk
 
 
 def test_min_jerk_closed_form():

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from coglab_perception.frames import FrameNames
 from coglab_py.pose import Pose, about_z
-from coglab_sim.recorded_motion import (
+from coglab_sim.person.recorded_motion import (
     Playback,
     PlaybackSettings,
     RecordingError,

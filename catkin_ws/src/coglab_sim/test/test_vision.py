@@ -10,8 +10,8 @@ import pytest
 from coglab_msgs.msg import ReasonCode
 from coglab_perception.frames import FrameNames
 from coglab_py.pose import Pose
-from coglab_sim.perception_stand_in import Board, PerceptionSettings
-from coglab_sim.vision import NotSeen, PartnerChoice, Vision
+from coglab_sim.tracker.tracker import Board, PerceptionSettings
+from coglab_sim.tracker.vision import NotSeen, PartnerChoice, Vision
 
 NAMES = FrameNames("world", "human_hand", "board", "object_{id}")
 SLOTS = {"A1": np.zeros(3), "A2": np.array([0.0, 0.15, 0.0])}

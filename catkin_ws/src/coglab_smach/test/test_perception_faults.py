@@ -13,8 +13,8 @@ except ImportError as error:
     pytest.skip(f"a compiled module is not there: {error}", allow_module_level=True)
 from coglab_perception.frames import FrameNames
 from coglab_py.pose import Pose
-from coglab_sim.perception_stand_in import Board, PerceptionSettings
-from coglab_sim.vision import NotSeen, Vision
+from coglab_sim.tracker.tracker import Board, PerceptionSettings
+from coglab_sim.tracker.vision import NotSeen, Vision
 from coglab_smach.ports.interfaces import Located
 from coglab_smach.ports.pending import Polled, PortError, Ready
 

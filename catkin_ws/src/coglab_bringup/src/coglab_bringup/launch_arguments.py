@@ -12,7 +12,7 @@ from xml.etree import ElementTree
 from coglab_bringup.usage import Refused, master_port, seed, writable_file
 
 ROSLAUNCH_OPTIONS = ("--screen", "--log", "-v", "--dump-params", "--nodes", "--files", "--ros-args", "--wait")
-BEHAVIOURS = "coglab_sim/src/coglab_sim/participant.py"
+BEHAVIOURS = "coglab_sim/src/coglab_sim/person/participant.py"
 OBJECTS = "coglab_objects/objects"
 LIMITS = "lwr_description/config/joint_limits.yaml"
 CONVENTIONS = "lwr_fri_bridge/src/fri/krl_convention.cpp"
@@ -111,6 +111,8 @@ def _rules(sources: Path, objects: Path) -> dict[str, Callable[[str], object]]:
         "krl_convention": lambda value: _one_of(_conventions(sources), value),
         "limits_profile": lambda value: _one_of(_profiles(sources), value),
         "behaviour": lambda value: _one_of(_behaviours(sources), value),
+        "profile": lambda value: _one_of(["drawn", "patient"], value),
+        "recorded_person": lambda value: _one_of(["wait", "no_wait", "leave"], value),
         "object": lambda value: _object(objects, value),
         "objects": _folder,
         "recording": _file,
