@@ -16,16 +16,16 @@ STIFF = 600.0
 
 class Stage:
     """``closes``: the fingers close a second after the first touch; ``carries``: the share of the weight that the robot
-    then takes; ``says``: and says that it has the object."""
+    then takes; ``says``: and says that it has the object; ``pace`` of its arm, m/s."""
 
-    def __init__(self, person=None, robot_comes=True, closes=True, carries=1.0, says=False, human=None):
+    def __init__(self, person=None, robot_comes=True, closes=True, carries=1.0, says=False, human=None, pace=1.0):
         self.scene = Scene()
         self.human = human or VirtualHuman(person or Participant.draw(1, profile="patient"), self.scene)
         self.t = 0.0
         self.palm = np.array([0.58, -0.15, 0.58])
         self.robot_comes, self.closes, self.carries, self.says = robot_comes, closes, carries, says
         self.touched_at = self.waiting_since = None
-        self.closure = 0.3
+        self.closure, self.pace = 0.3, pace
         self.phases, self.samples = ["idle"], []
         self.palms = []
 
@@ -49,7 +49,7 @@ class Stage:
         if self.robot_comes and self.waiting_since is not None and self.t - self.waiting_since > 0.3:
             goal = self.came_to
             way = goal - self.palm
-            self.palm = self.palm + way * min(1.0, 0.01 / max(1e-9, np.linalg.norm(way)))
+            self.palm = self.palm + way * min(1.0, self.pace * DT / max(1e-9, np.linalg.norm(way)))
         deep = self.palm[1] - (place.position[1] - 0.04) if self.near(place) else -1.0
         force = STIFF * max(0.0, deep)
         if force > 0.3 and self.touched_at is None:

@@ -1,6 +1,7 @@
 """The virtual human against a robot's hand that is simply there: phases, timing, and what each misbehaviour does."""
 
 import dataclasses
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from coglab_sim.person.scene import Scene, WorldView, shipped
 from coglab_sim.person.virtual_human import VirtualHuman
 from person_stage import DT, PALM_TURN, Stage, give
 
+PEOPLE = Path(__file__).resolve().parents[4] / "docs" / "people.md"
 WHOLE = ["idle", "reacting", "reaching", "waiting", "placing", "holding", "releasing", "retreating", "idle"]
 
 
@@ -38,7 +40,7 @@ def test_load_alone_lets_go_and_load_and_grip_together_do_with_less():
     assert whole.samples[-1].grip == 0.0 and "releasing" in together.phases
     wait = whole.first("releasing") - whole.touched_at - 1.3
     p = whole.human.participant
-    assert p.feeling_delay + p.assurance <= wait <= p.feeling_delay + p.assurance + 0.3
+    assert p.feeling_delay + p.assurance - DT <= wait <= p.feeling_delay + p.assurance + 0.3
 
 
 def test_a_hand_that_closes_and_carries_nothing_gets_nothing():
@@ -60,7 +62,7 @@ def test_trust_is_waited_for_and_some_do_not_wait():
     calm = give(changes={"trust": 0.8})
     hasty = give(changes={"trust": 0.1})
     assert calm.first("placing") - hasty.first("placing") == pytest.approx(0.7, abs=0.15)
-    early = give(changes={"places_while_moving": True})
+    early = give(changes={"places_while_moving": True}, pace=0.3)
     before = int(early.first("placing") / DT)
     assert np.linalg.norm(early.palms[before + 1] - early.palms[before]) > 0.0, "the arm still moved"
 
@@ -234,7 +236,7 @@ def test_commands_and_files_are_checked():
 
 
 def test_every_parameter_of_a_person_is_documented():
-    text = package_path("coglab_sim", "..", "..", "..", "docs", "people.md").resolve().read_text(encoding="utf-8")
+    text = PEOPLE.read_text(encoding="utf-8")
     for field in dataclasses.fields(Participant):
         assert f"| `{field.name}` |" in text, f"docs/people.md does not say what `{field.name}` is"
 

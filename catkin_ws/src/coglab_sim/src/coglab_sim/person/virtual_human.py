@@ -29,8 +29,8 @@ CORRECTION_TIME = 0.45
 """s, a correction on the way takes at least this long"""
 GONE = 0.35
 """m: a robot's hand that has been near and is then farther away than this has given up"""
-LOST = 0.2
-"""share of the weight below which a hand that goes back with an object has lost it"""
+LOST, AWAY = 0.2, 0.20
+"""share of the weight that is felt no more, and m between hand and object as seen, at which the object is lost"""
 TASKS = {Say.READY_TO_RECEIVE: "give", Say.READY_TO_GIVE: "receive", Say.GIVEN_UP: "rest", Say.PLEASE_STEP_BACK: "rest"}
 """What a prompt asks of the person."""
 
@@ -255,7 +255,8 @@ class VirtualHuman(Giving, Receiving):
     def _retreating(self, t: float, dt: float, seen: Percept) -> None:
         assert self._reach is not None
         self._follow(t)
-        if self._grip == 0.0 or float(np.linalg.norm(seen.load)) > LOST * self._weight():
+        felt = float(np.linalg.norm(seen.load)) > LOST * self._weight()
+        if self._grip == 0.0 or felt or np.linalg.norm(seen.object.position - self._hand) < AWAY:
             self._lost_since = None
         elif self._lost_since is None:
             self._lost_since = t
