@@ -23,14 +23,23 @@ CLOSED_LONG = 3.0
 """s after which a hand that is seen closed is believed to hold, felt or not"""
 LOOSE = 0.5
 """share of the grip at which the fingers stop until it is felt who carries"""
-CHECK = 0.6
-"""s that they stop there at most"""
-CARRIES = 0.8
-"""share of the weight felt then from which on the robot does not hold"""
+SINK_SPEED, SINK = 0.03, 0.015
+"""m/s, m: how the arm that relaxes meanwhile sinks, and how far at most"""
+CARRIES = 0.7
+"""share of the weight that may still be felt then, or the robot does not hold"""
 
 
 class Giving(Phases):
     """Phases of VirtualHuman."""
+
+    def _taken_already(self, seen: Percept, near: bool) -> bool:
+        """While waiting: the robot's hand is felt at the object, or seen to close on it."""
+        if not near:
+            self._held_load, self._closure = seen.load, seen.hand_closure
+            return False
+        self._closure = min(self._closure, seen.hand_closure)
+        pressing = float(np.linalg.norm(seen.load - self._held_load))
+        return pressing >= self.participant.press or seen.hand_closure - self._closure > CLOSED
 
     def _placing(self, t: float, dt: float, seen: Percept) -> None:
         """Bring the object into the palm, against the palm's outward axis, until it is felt; then press a little."""
@@ -72,6 +81,8 @@ class Giving(Phases):
         self._velocity = np.zeros(3)
         p = self.participant
         self._grip = min(1.0, self._grip + dt / 0.10)
+        if self._sunk > 0.0:  # up again, after a try to let go
+            self._sink(SINK_SPEED, dt)
         closed = seen.hand_closure - self._closure > CLOSED and seen.closing_speed < 0.1
         if p.behaviour == "tug" and closed:
             self._tug(t, dt)
@@ -112,17 +123,30 @@ class Giving(Phases):
             self._go("releasing", t)
 
     def _releasing(self, t: float, dt: float, seen: Percept) -> None:
-        """Open the grip; halfway, whoever gives waits to feel that the robot carries, else holds on again."""
+        """Open the grip; halfway, whoever gives relaxes the arm and waits to feel that the robot carries, else holds on
+        again."""
         self._velocity = np.zeros(3)
         p = self.participant
         careful = self._task == "give" and p.behaviour != "early_release"
         if careful and self._grip <= LOOSE and not self._checked:
-            loosened = p.release_time * (1.0 - LOOSE) + p.feeling_delay
-            if self._load_share(seen) < CARRIES and t - self._since > loosened:
-                self._checked = True
-            elif t - self._since > loosened + CHECK:
-                self._go("holding", t)
+            self._relax(t, dt, seen)
             return
         self._grip = max(0.0, self._grip - dt / p.release_time)
         if self._grip == 0.0:
             self._retreat(t)
+
+    def _relax(self, t: float, dt: float, seen: Percept) -> None:
+        """The arm sinks a little: what the robot holds does not sink with it, and that is felt."""
+        loosened = self.participant.release_time * (1.0 - LOOSE) + self.participant.feeling_delay
+        self._checked = self._load_share(seen) < CARRIES and t - self._since > loosened
+        if self._checked:
+            return
+        if self._sunk < SINK:
+            self._sink(-SINK_SPEED, dt)
+        elif t - self._since > loosened + SINK / SINK_SPEED:
+            self._go("holding", t)
+
+    def _sink(self, speed: float, dt: float) -> None:
+        self._velocity = np.array([0.0, 0.0, speed])
+        self._hand = self._hand + self._velocity * dt
+        self._sunk -= speed * dt

@@ -36,6 +36,7 @@ class Phases:
     _sure_since: float | None
     _told: int
     _travelled: float
+    _sunk: float
     _held_load: np.ndarray
     _touched: np.ndarray
     _checked: bool

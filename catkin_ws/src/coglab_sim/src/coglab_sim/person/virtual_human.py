@@ -29,7 +29,7 @@ CORRECTION_TIME = 0.45
 """s, a correction on the way takes at least this long"""
 GONE = 0.35
 """m: a robot's hand that has been near and is then farther away than this has given up"""
-LOST, AWAY = 0.2, 0.20
+LOST, AWAY = 0.2, 0.35
 """share of the weight that is felt no more, and m between hand and object as seen, at which the object is lost"""
 TASKS = {Say.READY_TO_RECEIVE: "give", Say.READY_TO_GIVE: "receive", Say.GIVEN_UP: "rest", Say.PLEASE_STEP_BACK: "rest"}
 """What a prompt asks of the person."""
@@ -73,7 +73,7 @@ class VirtualHuman(Giving, Receiving):
         self._noise_phase = self.rng.uniform(0, 2 * np.pi, size=(3, 4))
         self._last: float | None = None
         self._interrupted = False
-        self._travelled = 0.0
+        self._travelled = self._sunk = 0.0
 
     def command(self, text: str) -> None:
         """'give <object>', 'receive <object>' or 'rest'; taken up at the next step."""
@@ -128,6 +128,7 @@ class VirtualHuman(Giving, Receiving):
         self._task = task or ""
         self.trial += 1
         self._interrupted = self._met = False
+        self._sunk = 0.0
         p = self.participant
         reaction = float(np.exp(np.log(p.reaction_median) + self.rng.normal(0, p.reaction_sigma)))
         reaction *= (1 - p.learning) ** min(self.trial - 1, 3)
@@ -230,7 +231,9 @@ class VirtualHuman(Giving, Receiving):
         gap = self._gap(seen.robot_hand, seen.object) if self._task == "give" else self._way_to(seen.object)
         near, moves = gap < NEAR, seen.robot_speed >= STILL
         self._met = self._met or near
-        self._held_load, self._closure = seen.load, seen.hand_closure
+        if self._task == "give" and self._taken_already(seen, near):
+            self._go("holding", t)
+            return
         early = p.behaviour == "early_contact" and self._task == "give" and gap < NEAR + 0.1 and moves
         if early or (near and p.places_while_moving):
             self._begin_exchange(t)
@@ -255,6 +258,8 @@ class VirtualHuman(Giving, Receiving):
     def _retreating(self, t: float, dt: float, seen: Percept) -> None:
         assert self._reach is not None
         self._follow(t)
+        if self._grip > 0.0:  # who had begun to let go holds on again
+            self._grip = min(1.0, self._grip + dt / 0.10)
         felt = float(np.linalg.norm(seen.load)) > LOST * self._weight()
         if self._grip == 0.0 or felt or np.linalg.norm(seen.object.position - self._hand) < AWAY:
             self._lost_since = None
