@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from coglab_py.packages import package_path
 from coglab_sim import virtual_world
+from coglab_sim.person.in_cell import move_person, view_of
 from coglab_sim.person.participant import Participant
-from coglab_sim.scene import Scene
-from coglab_sim.virtual_human import VirtualHuman
-from coglab_sim.virtual_world import move_person, view_of
+from coglab_sim.person.scene import Scene
+from coglab_sim.person.virtual_human import VirtualHuman
 
 PRIMITIVES = str(package_path("coglab_controllers", "config", "primitives.xml"))
 GRASP = {"goal_offset": [0.0, -0.065, 0.05], "target_orientation": [0.5, 0.5, 0.5, 0.5]}  # 25 mm before the mug
@@ -18,19 +18,16 @@ class Trial:
 
     def __init__(self, seed=3, behaviour="normal", **cell):
         self.robot = virtual_world.Robot(seed, **cell).virtual
-        self.human = VirtualHuman(Participant.draw(seed, behaviour), Scene())
+        self.human = VirtualHuman(Participant.draw(seed, behaviour, "patient"), Scene())
         self.wanted, self.current = [245 / 255, 5 / 255, 30 / 255, 50 / 255, 50 / 255], 640.0
-        self.last_palm = None
         self.peak = 0.0
 
     def tick(self):
         cell = self.robot.cell
         truth = cell.truth()
-        palm = truth["robot_hand"]
-        speed = 0.0 if self.last_palm is None else np.linalg.norm(palm["position"] - self.last_palm) / cell.period
-        self.last_palm = palm["position"]
         obj = truth["object"]
-        move_person(cell, self.human.step(self.robot.now, view_of(truth, speed)))
+        fingers = float(np.mean([motor["position"] for motor in cell.motors()][2:]))
+        move_person(cell, self.human.step(self.robot.now, view_of(truth, fingers, self.human.scene.object_mass)))
         cell.set_motors([1.0] * 5, self.wanted, [self.current] * 5)
         self.robot.set_frame("object_mug", obj["position"], obj["rotation"])
         self.robot.tick()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 HUMAN_BASE = 1.1
-"""s, a person's reach over 0.45 m (coglab_sim.participant.Participant.reach_time)"""
+"""s, a person's reach over 0.45 m (coglab_sim.person.participant.Participant.reach_time)"""
 NEAR = 0.010
 """m: the hand has arrived when it stays this close to the goal as received"""
 

@@ -35,7 +35,8 @@ class SeededFailure:
         self.later = float(draw.uniform(0.0, 3.0))
         board = self.action in ("take", "put")
         smach.set_loggers(*[lambda *a: None] * 4)
-        self.trial = VirtualTrial(seed=3000 + seed, object_on="world" if board else "human_hand")
+        where = "world" if board else "human_hand"
+        self.trial = VirtualTrial(seed=3000 + seed, object_on=where, profile="patient", perfect=True)
         self.happened = ""
         self._due = None
         self._recovery = self._waited = False

@@ -39,7 +39,7 @@ class SharedTracker:
 
     def of(self, name):
         """The rig's view of it: a tracker of one frame."""
-        return type("Tracker", (), {"step": lambda _, t, frame, palm: self.step(name, t, frame, palm)})()
+        return type("Tracker", (), {"step": lambda _, t, frame, palm, others: self.step(name, t, frame, palm)})()
 
     def step(self, name, t, frame, palm):
         if name == "object_mug":
@@ -90,11 +90,11 @@ class VisionPort:
 
 def two_people(seed, margin, other):
     """A trial whose perception sees the partner and somebody else at ``other(t)``."""
-    trial = VirtualTrial(seed=seed)
+    trial = VirtualTrial(seed=seed, profile="patient", perfect=True)
     trial.perception = trial.ctx.perception
     vision = Vision(
         NAMES,
-        PerceptionSettings(),
+        PerceptionSettings(perfect=True),
         Board(BOARD, {"A1": np.zeros(3)}),
         seed,
         lambda: trial.rig.t,
@@ -132,7 +132,7 @@ def test_identity_swaps_neither_mislead_the_arm_nor_go_unsaid(jump):
     settings = PerceptionSettings(swap_probability=0.01, swap_jump=jump)
     good = 0
     for seed in range(3):
-        trial = VirtualTrial(seed=seed, perception=settings)
+        trial = VirtualTrial(seed=seed, profile="patient", perception=settings)
         result = trial.run("exchange_human_to_robot")[0]
         assert trial.rig.robot.limit_violations == 0
         assert result.outcome == "succeeded" or (result.outcome == "failed_empty" and result.reason)

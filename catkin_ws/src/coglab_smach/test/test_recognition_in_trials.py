@@ -23,7 +23,7 @@ def quiet():
 
 
 def trial_of(**kw):
-    return VirtualTrial(seed=5, recogniser=Recogniser(*load_patterns(PATTERNS)), **kw)
+    return VirtualTrial(seed=5, recogniser=Recogniser(*load_patterns(PATTERNS)), profile="patient", perfect=True, **kw)
 
 
 def test_an_object_held_high_gets_the_primitive_for_it():

@@ -46,7 +46,7 @@ class VirtualHuman(Giving, Receiving):
         self.senses = Senses(participant, np.random.default_rng([participant.seed, 29]))
         self.grip_force = GripForce(participant, self.scene, holds_object)
         side = np.array([1.0, -1.0 if participant.left_handed else 1.0, 1.0])
-        self.rest, self.handover = self.scene.rest * side, self.scene.handover_object * side
+        self.rest, self._side = self.scene.rest * side, side
         self.rest_turn = Rotation.identity()
         self.phase = "idle"
         self.trial = 0
@@ -176,7 +176,7 @@ class VirtualHuman(Giving, Receiving):
     def _handover_pose(self) -> tuple[np.ndarray, Rotation]:
         """Where the hand goes: the handover point with this person's habits and this trial's scatter and turn."""
         p, s = self.participant, self.scene
-        point = self.handover + np.asarray(p.point_offset) + self.rng.normal(0, 1, 3) * np.asarray(p.point_sigma)
+        point = s.handover_object * self._side + np.asarray(p.point_offset) + self.rng.normal(0, 1, 3) * np.asarray(p.point_sigma)
         if p.inside_box:
             point = np.clip(point, s.region_low, s.region_high)
         turn = Rotation.from_rotvec(np.radians(p.tilt) * self.rng.normal(0, 1, 3))
