@@ -2,13 +2,13 @@
 """The node /coglab_sim/virtual_human: a seeded person who gives and takes, or whose hand goes as recorded.
 
 Subscribes truth/cell and the fingers' joint states of the hand (what there is to be seen and felt; the person perceives
-it late and noisily), human_command (std_msgs/String: give <id>, receive <id>, rest) and, in the namespace above this one,
-say (coglab_msgs/Say: what the robot tells the person, who acts on it unless ~react is false). Publishes human_hand
+it late and noisily), human_command (std_msgs/String: give <id>, receive <id>, rest) and, in the namespace above this
+one, say (coglab_msgs/Say: what the robot tells the person, who acts on it unless ~react is false). Publishes human_hand
 (coglab_msgs/HumanHand, 100 Hz) and human_state (std_msgs/String). Names are relative to the node's namespace.
-Parameters (private): say, fingers (topics, where they are others), seed, behaviour, profile (drawn, patient), participant
-(mapping, overrides), holds_object, react, rest, handover_object, object_in_hand (three numbers each, m), object_mass (kg;
-by default that of the cell's object in the folder cell/objects), recording (mapping, see recorded_person; without a file
-nothing is played).
+Parameters (private): say, fingers (topics, where they are others), seed, behaviour, profile (drawn, patient),
+participant (mapping, overrides), holds_object, react, rest, handover_object, object_in_hand (three numbers each, m),
+object_mass (kg; by default that of the cell's object in the folder cell/objects), recording (mapping, see
+recorded_person; without a file nothing is played).
 """
 
 import sys

@@ -86,7 +86,7 @@ class Stage:
         return next(i for i, sample in enumerate(self.samples) if sample.phase == phase) * DT
 
 
-def give(behaviour="normal", seed=1, profile="patient", seconds=25.0, **kw):
+def give(behaviour="normal", seed=1, profile="patient", seconds=18.0, **kw):
     """A person who is asked to give."""
     changes = kw.pop("changes", {})
     fields = {"seed": seed, "behaviour": behaviour, "profile": profile, **changes}

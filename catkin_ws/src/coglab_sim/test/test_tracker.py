@@ -1,10 +1,10 @@
-"""The tracker: latency, noise, dropouts, occlusion, swaps and calibration as configured, and none of it when perfect."""
+"""The tracker: latency, noise, dropouts, occlusion, swaps and calibration as configured, and none of it when
+perfect."""
 
 import numpy as np
 import pytest
 from coglab_py.pose import Pose
 from coglab_sim.tracker.tracker import Board, PerceptionSettings, Tracker
-
 
 CALIBRATED = {"calibration_offset": 0.0, "calibration_turn_deg": 0.0, "swap_probability": 0.0}
 """for tests of something else"""
@@ -64,7 +64,9 @@ def test_an_identity_swap_shows_the_nearest_other_thing_and_comes_back():
     swapped = [np.allclose(s.frame.position, hand.position) for _, s in sights]
     right = [np.allclose(s.frame.position, [0.8, 0, 0.4]) for _, s in sights]
     assert sum(swapped) >= 8 and all(a != b for a, b in zip(swapped, right, strict=True))
-    alone = np.array([np.linalg.norm(s.frame.position - [0.8, 0, 0.4]) for _, s in watch(settings, 60.0, others=(far,))])
+    alone = np.array(
+        [np.linalg.norm(s.frame.position - [0.8, 0, 0.4]) for _, s in watch(settings, 60.0, others=(far,))]
+    )
     assert alone.max() == pytest.approx(0.08) and np.median(alone) == pytest.approx(0.0, abs=1e-9)
 
 

@@ -73,7 +73,7 @@ def test_nothing_but_what_is_perceived_reaches_the_person():
     person = package_path("coglab_sim", "src", "coglab_sim", "person")
     for path in person.glob("*.py"):
         text = path.read_text(encoding="utf-8")
-        assert "transition" not in text.lower() and "load_share\"" not in text, path
+        assert "transition" not in text.lower() and 'load_share"' not in text, path
         assert path.name == "in_cell.py" or "held_by" not in text, f"{path} reads a flag of the simulation"
 
 
@@ -123,7 +123,9 @@ def test_hand_and_object_are_tilted_and_nobody_is_clipped():
 def test_patient_people_hold_upright_inside_the_box():
     middles, turns = handovers("patient")
     assert not turns.any()
-    assert np.all(middles >= [0.72 - 1e-9, -0.12, 0.34 - 1e-9]) and np.all(middles <= np.array([0.81, 0.16, 0.51]) + 1e-9)
+    assert np.all(middles >= [0.72 - 1e-9, -0.12, 0.34 - 1e-9]) and np.all(
+        middles <= np.array([0.81, 0.16, 0.51]) + 1e-9
+    )
     for seed in range(20):
         p = Participant.draw(seed, profile="patient")
         assert p.trust == 1.0 and not p.places_while_moving and not p.left_handed
@@ -252,9 +254,7 @@ def receive(offered, seed=3, seconds=6.0, appears_at=0.6, opens_at=np.inf, **cha
         t += DT
         place = np.asarray(offered) if t >= appears_at else far
         load = np.zeros(3) if t < opens_at else np.array([0, 0, -3.0])
-        view = WorldView(
-            Pose(place - [0.0, 0.04, -0.05], PALM_TURN), 0.5 if t < opens_at else 0.1, Pose(place), load
-        )
+        view = WorldView(Pose(place - [0.0, 0.04, -0.05], PALM_TURN), 0.5 if t < opens_at else 0.1, Pose(place), load)
         samples.append((t, human.step(t, view)))
     return human, scene, samples
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from coglab_msgs.msg import Say
 from coglab_py.packages import package_path
 from coglab_sim import virtual_world
 from coglab_sim.person.in_cell import move_person, view_of
@@ -81,6 +82,8 @@ class Trial:
         assert self.robot.switch_controller("ptp")[0]
         self.until(lambda _, truth: np.linalg.norm(truth["palm_force"]) > 0.5, 8)
         self.wanted, self.current = [245 / 255, 1.0, 1.0, 1.0, 1.0], 240.0
+        self.until(lambda _, truth: truth["held_by"] == "both", 3)
+        self.human.hear(self.robot.now, Say.I_HAVE_IT)  # as the brain does
         self.until(lambda _, truth: truth["held_by"] == "robot", 10)
         status, _, message = self.robot.add_ptp([-1.4349, -0.6086, 1.4986, 1.7048, 0.1857, 0.2152, 0.782])
         assert status == 0, message

@@ -69,7 +69,12 @@ class Campaign:
         return self.run_each(actions, [(seed, kw) for seed in seeds], name)
 
     def run_under(
-        self, actions: Sequence[str], seeds: Iterable[int], name: str, conditions: Callable[[int], Conditions], **kw: Any
+        self,
+        actions: Sequence[str],
+        seeds: Iterable[int],
+        name: str,
+        conditions: Callable[[int], Conditions],
+        **kw: Any,
     ) -> Campaign:
         """One trial per seed, each under its own conditions; returns self."""
         return self.run_each(actions, [(seed, {"conditions": conditions(seed), **kw}) for seed in seeds], name)

@@ -1,9 +1,10 @@
 """Figures of a world that nobody tuned: whether the physics are right, the default world, each hardship alone.
 
 Definitions. A trial is a person who gives the object (receive) and asks for it again (give): every person is a trial of
-both directions, a second direction that never began counts as failed. Physics right: profile patient, perfect perception,
-every object grasped with all fingers (power grasp); what an object's file asks for otherwise is printed beside. An object
-has fallen if it lies, or lay, on the floor. The default world is `Conditions()`; a hardship changes one thing of it.
+both directions, a second direction that never began counts as failed. Physics right: profile patient, perfect
+perception, every object grasped with all fingers (power grasp); what an object's file asks for otherwise is printed
+beside. An object has fallen if it lies, or lay, on the floor. The default world is `Conditions()`; a hardship changes
+one thing of it.
 """
 
 from __future__ import annotations
@@ -66,8 +67,8 @@ def direction_rows(row: Row, campaign: Campaign, what: str) -> list[dict]:
     """Success and failures by reason, per direction; no goal."""
     return [
         row(
-            f"{what}, {NAMES[action]}: succeeded of {campaign.trials} (failures: {campaign.failures(action)}; not begun: "
-            f"{campaign.trials - campaign.begun(action)})",
+            f"{what}, {NAMES[action]}: succeeded of {campaign.trials} (failures: {campaign.failures(action)}; "
+            f"not begun: {campaign.trials - campaign.begun(action)})",
             campaign.share(action),
             "share",
         )

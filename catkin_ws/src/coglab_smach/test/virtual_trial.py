@@ -34,8 +34,8 @@ class VirtualTrial:
     """One trial: ``actions`` one after the other, each from its hub; results in the journal.
 
     ``conditions`` of the world: by default people and tracker as they are; ``behaviour``, ``profile``, ``perfect`` and
-    ``perception`` change them. ``reaches`` gets one ReachRecord per DMP motion, ``touches`` one TouchRecord per wait for
-    contact.
+    ``perception`` change them. ``reaches`` gets one ReachRecord per DMP motion, ``touches`` one TouchRecord per wait
+    for contact.
     """
 
     def __init__(

@@ -29,6 +29,7 @@ class Conditions:
         return replace(Participant.draw(seed, self.behaviour, self.profile), **self.person)
 
 
+THE_WORLD_AS_IT_IS = Conditions()
 CONSIDERATE = Conditions(profile="patient", perception=PerceptionSettings(perfect=True))
 """For what is about machinery and not about people: a patient person, perfect perception."""
 
@@ -43,7 +44,7 @@ HARDSHIPS: dict[str, Callable[[Conditions, int], Conditions]] = {
 """Each alone makes the world harder; the seed decides where there are two ways."""
 
 
-def hardship(name: str, seed: int, conditions: Conditions = Conditions()) -> Conditions:
+def hardship(name: str, seed: int, conditions: Conditions = THE_WORLD_AS_IT_IS) -> Conditions:
     """The conditions with one hardship; none for an empty name. ValueError for an unknown one."""
     if not name:
         return conditions

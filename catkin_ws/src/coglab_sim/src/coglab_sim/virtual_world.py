@@ -26,8 +26,8 @@ from ih2_hand.progress import shown_empty, shown_holding
 
 import coglab_sim._cell  # noqa: F401  (knows the type of VirtualRobot.cell)
 from coglab_sim._virtual import VirtualRobot
-from coglab_sim.conditions import Conditions
-from coglab_sim.person.in_cell import closure, move_person, pose_of_truth, view_of
+from coglab_sim.conditions import THE_WORLD_AS_IT_IS, Conditions
+from coglab_sim.person.in_cell import closure, move_person, view_of
 from coglab_sim.person.recorded_person import RecordedPerson, open_recorded_hand, scene_of
 from coglab_sim.person.scene import Scene
 from coglab_sim.person.virtual_human import VirtualHuman
@@ -189,7 +189,7 @@ class World:
     def __init__(
         self,
         seed: int = 1,
-        conditions: Conditions = Conditions(),
+        conditions: Conditions = THE_WORLD_AS_IT_IS,
         object_on: str = "human_hand",
         turned: float = 0.0,
         limits: str = LIMITS,

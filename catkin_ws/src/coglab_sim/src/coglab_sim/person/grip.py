@@ -1,8 +1,8 @@
 """How hard a person grips: as mass and friction ask, with a margin, and more where the load is felt to grow.
 
 Grip force follows load force and the load's turning moment with a safety margin that each person keeps (Westling and
-Johansson 1984; Kinoshita, Bäckström, Flanagan and Johansson 1997); friction is known after a moment of touch. The margin is
-drawn, see docs/people.md.
+Johansson 1984; Kinoshita, Bäckström, Flanagan and Johansson 1997); friction is known after a moment of touch. The
+margin is drawn, see docs/people.md.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
 """A person whose hand goes as one was recorded, with the object in it, through a whole handover to the robot.
 
 The reach is the recorded one. After it there are three ways: ``wait``: the hand waits at the end of its reach until it
-trusts the robot's hand, then places and lets go as the simulated person does; ``no_wait``: it goes on as recorded to where
-the object was let go, and holds it there until load and grip say that the robot has it; ``leave``: everything happens at
-its recorded time, and an object that the robot does not hold then goes away with the hand.
+trusts the robot's hand, then places and lets go as the simulated person does; ``no_wait``: it goes on as recorded to
+where the object was let go, and holds it there until load and grip say that the robot has it; ``leave``: everything
+happens at its recorded time, and an object that the robot does not hold then goes away with the hand.
 """
 
 from __future__ import annotations
@@ -47,8 +47,8 @@ class RecordedHand:
         for name in (HAND, object_frame):
             if name is not None and name not in names:
                 raise RecordingError(
-                    f"{file}: a handover needs the frame '{name}', the recording has {', '.join(names)}; rename what is "
-                    f"meant, or say `object: in_hand` for a hand that was recorded without its object"
+                    f"{file}: a handover needs the frame '{name}', the recording has {', '.join(names)}; rename what "
+                    f"is meant, or say `object: in_hand` for a hand that was recorded without its object"
                 )
         self.playback = playback
         self.end = float(playback.recording.duration)

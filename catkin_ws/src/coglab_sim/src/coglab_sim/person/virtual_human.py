@@ -1,9 +1,9 @@
 """The virtual human: gives objects to the robot and takes them, with the timing, scatter and slips of people.
 
 Phases: idle, reacting, reaching, waiting (hand at the handover point, the robot comes), placing (the object is brought
-gently into the robot's palm; for receiving: the hand closes and lifts), holding, releasing, retreating. The person knows
-of the cell what eyes and hand perceive (senses), and of the robot's intention what it says (coglab_msgs/Say). All frames
-in world, SI units.
+gently into the robot's palm; for receiving: the hand closes and lifts), holding, releasing, retreating. The person
+knows of the cell what eyes and hand perceive (senses), and of the robot's intention what it says (coglab_msgs/Say).
+All frames in world, SI units.
 """
 
 from __future__ import annotations
@@ -176,7 +176,11 @@ class VirtualHuman(Giving, Receiving):
     def _handover_pose(self) -> tuple[np.ndarray, Rotation]:
         """Where the hand goes: the handover point with this person's habits and this trial's scatter and turn."""
         p, s = self.participant, self.scene
-        point = s.handover_object * self._side + np.asarray(p.point_offset) + self.rng.normal(0, 1, 3) * np.asarray(p.point_sigma)
+        point = (
+            s.handover_object * self._side
+            + np.asarray(p.point_offset)
+            + self.rng.normal(0, 1, 3) * np.asarray(p.point_sigma)
+        )
         if p.inside_box:
             point = np.clip(point, s.region_low, s.region_high)
         turn = Rotation.from_rotvec(np.radians(p.tilt) * self.rng.normal(0, 1, 3))

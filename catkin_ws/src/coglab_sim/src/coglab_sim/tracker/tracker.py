@@ -1,8 +1,8 @@
 """Perception as a tracker delivers it: between the truth of the cell and the frames that control sees.
 
 Rate and its jitter, latency (stamp = capture time, delivered later), noise that is correlated like a tracker's, bursts
-of dropout (two-state Gilbert model), occlusion while the robot's hand is near, identity swaps, and the constant error of
-its calibration to the robot. Each can be switched off; ``perfect`` delivers the truth as it is at the same rate.
+of dropout (two-state Gilbert model), occlusion while the robot's hand is near, identity swaps, and the constant error
+of its calibration to the robot. Each can be switched off; ``perfect`` delivers the truth as it is at the same rate.
 docs/people.md says where the figures come from.
 """
 
@@ -108,9 +108,7 @@ class Tracker:
         self._count = 0
         self.newest: Sight | None = None
 
-    def step(
-        self, now: float, truth: Pose, robot_hand: Pose | None = None, others: Sequence[Pose] = ()
-    ) -> list[Sight]:
+    def step(self, now: float, truth: Pose, robot_hand: Pose | None = None, others: Sequence[Pose] = ()) -> list[Sight]:
         """At time ``now`` (s): capture if it is time, deliver what has arrived.
 
         ``others``: true poses of the other things that are tracked, always in the same order.
