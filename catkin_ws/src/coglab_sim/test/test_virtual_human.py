@@ -159,7 +159,7 @@ def test_grip_follows_mass_and_friction_and_is_limited():
 
 
 def test_nobody_waits_for_ever_for_a_robot_that_does_not_come():
-    stage = give(robot_comes=False)
+    stage = give(robot_comes=False, seconds=25.0)
     assert stage.phases[-2:] == ["retreating", "idle"] and stage.samples[-1].grip == 1.0
 
 
@@ -185,7 +185,7 @@ def test_early_release_lets_go_before_the_robot_has_closed():
 
 
 def test_never_release_keeps_the_object():
-    stage = give(behaviour="never_release")
+    stage = give(behaviour="never_release", seconds=25.0)
     assert min(s.grip for s in stage.samples) == 1.0 and stage.phases[-1] == "idle"
 
 
