@@ -163,7 +163,13 @@ def test_motors_stop_at_contact_and_lock():
     motors = trial.plant.motors()
     for motor, limit in zip(motors[1:], (90.0, 90.0, 90.0, 180.0), strict=True):
         assert motor["locked"] and motor["current"] == 0.0 and 0.1 < motor["position"] < 0.9
-        assert 0.7 * 0.5 * limit < motor["tension"] < 1.1 * 0.5 * limit  # 240 counts
+        # 240 counts are half of the limit; a gear that holds is pulled further by the fingers that close after it.
+        assert 0.7 * 0.5 * limit < motor["tension"] < 1.25 * 0.5 * limit
+    alone = GraspTrial(objects()["mug"], "index up")
+    alone.plant.command_motor(2, 1.0, 1.0, 240.0)
+    alone.plant.hold(HOME, steps=1600)
+    index = alone.plant.motors()[2]
+    assert index["locked"] and 0.9 * 0.5 * 90.0 < index["tension"] <= 0.5 * 90.0  # the object gives way a little
     empty = _plant.Plant(URDF, HOME, BOX)
     for motor in range(1, 5):
         empty.command_motor(motor, 1.0)

@@ -58,6 +58,7 @@ Servos::Law Servos::jointLaw(const ServoCommand& command, const Vector7& stiffne
   law.constant =
       stiffness.cwiseProduct(command.position - position_) + damping.cwiseProduct(command.velocity);
   law.damping.diagonal() = damping + dt * stiffness;
+  law.pull = law.damping * command.velocity;
   return law;
 }
 
@@ -83,6 +84,7 @@ Servos::Law Servos::frameLaw(const ServoCommand& command, double dt) const {
   law.constant = jacobian.transpose() * force;
   law.damping =
       jacobian.transpose() * (damping + dt * command.frame_stiffness).asDiagonal() * jacobian;
+  law.pull = jacobian.transpose() * (damping + dt * command.frame_stiffness).cwiseProduct(wanted);
 
   // Posture of the redundant joint: a soft spring to the joint set-point, filtered so that the tip
   // does not feel it.
@@ -119,7 +121,7 @@ const Vector7& Servos::command(const ServoCommand& command, double dt) {
     case ControlStrategy::Other:
       break;
   }
-  const Vector7 push = system * velocity_ + dt * law.constant;
+  const Vector7 push = system * velocity_ + dt * law.pull;
   const Vector7 after = (system + dt * law.damping).llt().solve(push);
   // The controller carries the arm's own weight and velocity forces in every strategy; it does not
   // know of loads.

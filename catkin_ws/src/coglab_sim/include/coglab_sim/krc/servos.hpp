@@ -39,8 +39,8 @@ struct ServoCommand {
   Vector6 frame_damping = Vector6::Zero();    ///< normalised
 };
 
-/// Servos of the three strategies on a model of the arm. Springs and dampers are linearly implicit
-/// in the velocity that the model expects after the step, so that a stiff servo is stable at 1 ms.
+/// Servos of the three strategies on a model of the arm. Dampers are linearly implicit in the
+/// velocity that the model expects after the step, so that a stiff servo is stable at 1 ms.
 class Servos {
  public:
   /// @param rotor_inertia  true ones, kg m^2; the servos know them with an error drawn by `seed`
@@ -69,9 +69,11 @@ class Servos {
   const ServoParameters& parameters() const { return parameters_; }
 
  private:
-  /// Linear law: torque = constant - damping * velocity after the step.
+  /// Linear law: torque = constant - damping * velocity after the step. That velocity is expected
+  /// from the dampers alone (`pull`: what they do where the arm stands still), since an arm that
+  /// something else holds does not follow its springs.
   struct Law {
-    Vector7 constant = Vector7::Zero();
+    Vector7 constant = Vector7::Zero(), pull = Vector7::Zero();
     Matrix7 damping = Matrix7::Zero();
   };
   Law jointLaw(const ServoCommand& command, const Vector7& stiffness, const Vector7& damping,
