@@ -32,7 +32,8 @@ def run_session(seed: int) -> dict[str, str]:
     port = free_port()
     environment = run_environment(port, home)
     os.environ.update(environment)
-    system = System(environment, port, [f"seed:={seed}", "fri_period:=0.010", "console:=false"], home / "roslaunch.log")
+    arguments = [f"seed:={seed}", "fri_period:=0.010", "console:=false", "profile:=patient", "perfect_perception:=true"]
+    system = System(environment, port, arguments, home / "roslaunch.log")
     outcomes = {}
     try:
         wait_for_master(system, 30.0)

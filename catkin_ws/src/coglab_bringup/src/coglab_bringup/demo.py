@@ -116,6 +116,7 @@ def main(arguments: list[str]) -> int:
     record_run(top, port, "demo")
     screen = bool(os.environ.get("DISPLAY")) and not options.headless and Path("/usr/bin/rviz").exists()
     launch = [f"seed:={options.seed}", f"rviz:={'true' if screen else 'false'}", f"log_file:={out / 'fri_ticks.csv'}"]
+    launch += ["profile:=patient", "perfect_perception:=true"]  # what is shown is the robot
     launch.append(f"console:={'false' if options.no_console else 'true'}")
     (out / "ros_home" / "console.url").unlink(missing_ok=True)  # of an earlier demo
     system = System(environment, port, launch, out / "roslaunch.log")
