@@ -98,6 +98,9 @@ def unfinished(kind: str, error: BaseException) -> dict:
     return {"kind": kind, "outcome": str(error) or "interrupted", "reason_code": int(code)}
 
 
+CONSIDERATE = ("profile:=patient", "perfect_perception:=true")
+
+
 def main(arguments: list[str]) -> int:
     """Exit status 0 if every handover succeeded."""
     top = Path(os.environ["COGLAB_TOP"])
@@ -116,8 +119,8 @@ def main(arguments: list[str]) -> int:
     record_run(top, port, "demo")
     screen = bool(os.environ.get("DISPLAY")) and not options.headless and Path("/usr/bin/rviz").exists()
     launch = [f"seed:={options.seed}", f"rviz:={'true' if screen else 'false'}", f"log_file:={out / 'fri_ticks.csv'}"]
-    launch += ["profile:=patient", "perfect_perception:=true"]  # what is shown is the robot
-    launch.append(f"console:={'false' if options.no_console else 'true'}")
+    # What is shown is the robot, so the person is a patient one.
+    launch += [f"console:={'false' if options.no_console else 'true'}", *CONSIDERATE]
     (out / "ros_home" / "console.url").unlink(missing_ok=True)  # of an earlier demo
     system = System(environment, port, launch, out / "roslaunch.log")
     result: dict = {"commit": commit_of(top), "seed": options.seed, "handovers": []}

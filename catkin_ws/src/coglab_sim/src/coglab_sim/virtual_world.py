@@ -221,9 +221,7 @@ class World:
         self.robot = Robot(seed, limits, **where)
         self.cell = self.robot.cell
         self.hand = Hand(self.cell)
-        self.trackers = {
-            name: Tracker(name, conditions.perception, seed) for name in (self.object_frame, "human_hand")
-        }
+        self.trackers = {name: Tracker(name, conditions.perception, seed) for name in (self.object_frame, "human_hand")}
         self.after_period: list[Callable[[], None]] = []
         self.speed_scale = 1.0
         self.t = self.robot.virtual.now
