@@ -21,7 +21,7 @@ WHOLE = ["idle", "reacting", "reaching", "waiting", "placing", "holding", "relea
 def test_a_normal_giver_goes_through_all_phases(profile):
     for seed in range(1, 8):
         stage = give(seed=seed, profile=profile)
-        assert stage.phases == WHOLE, seed
+        assert list(dict.fromkeys(stage.phases[1:-1])) == WHOLE[1:-1] and stage.phases[-1] == "idle", seed
         assert stage.samples[-1].grip == 0.0
         assert stage.samples[-1].frame.position == pytest.approx(stage.human.rest, abs=0.01)
 
@@ -56,6 +56,22 @@ def test_a_giver_who_feels_the_whole_weight_while_loosening_holds_on_again():
     assert phases[:3] == ["holding", "releasing", "holding"]
     loosening = [s.grip for s in stage.samples if s.phase == "releasing"]
     assert min(loosening) > 0.4, "never opened while the weight was felt"
+
+
+def test_an_object_is_pressed_again_into_an_open_hand_that_backs_away_but_not_for_ever():
+    """The palm stands 3 cm farther away from the moment on at which it was touched first."""
+    stage = Stage(closes=False)
+    stage.human.hear(0.0, Say.READY_TO_RECEIVE)
+    while stage.human.phase != "holding":
+        stage.step()
+    stage.palm = stage.palm - [0.0, 0.03, 0.0]
+    stage.came_to = stage.palm
+    stage.touched_at = None
+    stage.run(4.0)
+    assert stage.phases[stage.phases.index("holding") :][:3] == ["holding", "placing", "holding"]
+    assert stage.touched_at is not None, "touched again"
+    away = give(closes=False, seconds=30.0)
+    assert 1 <= away.phases.count("placing") <= 5 and away.samples[-1].grip == 1.0
 
 
 def test_trust_is_waited_for_and_some_do_not_wait():

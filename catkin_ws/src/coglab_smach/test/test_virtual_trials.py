@@ -15,6 +15,7 @@ try:
     from virtual_trial import VirtualTrial
 except ImportError as error:
     pytest.skip(f"a compiled module is not there: {error}", allow_module_level=True)
+from coglab_msgs.msg import Say
 from misbehaviours import GIVE, OUTCOMES, RECEIVE
 
 LONG = os.environ.get("COGLAB_LONG") == "1"
@@ -54,6 +55,14 @@ def test_people_and_tracker_as_they_are(seed):
     for result in results:
         assert result.outcome in ("succeeded", "failed_empty", "failed_holding"), result.reason
         assert (result.outcome == "succeeded") != bool(result.reason)
+
+
+def test_the_person_is_told_what_the_robot_is_about():
+    trial, _ = run(RECEIVE, GIVE, seed=0)
+    codes = [code for _, code in trial.said]
+    assert codes == [Say.READY_TO_RECEIVE, Say.I_HAVE_IT, Say.READY_TO_GIVE, Say.YOU_HAVE_IT]
+    trial, _ = run(RECEIVE, seed=0, behaviour="absent")
+    assert [code for _, code in trial.said] == [Say.READY_TO_RECEIVE, Say.GIVEN_UP]
 
 
 def test_take_and_put():

@@ -6,7 +6,7 @@ import numpy as np
 from coglab_msgs.msg import Say
 from scipy.spatial.transform import Rotation
 
-from coglab_sim.person.phases import Phases
+from coglab_sim.person.phases import NEAR, STILL, Phases
 from coglab_sim.person.senses import Percept
 
 ASIDE = 0.010
@@ -19,6 +19,8 @@ CLOSED = 0.08
 """share of their way by which the robot's fingers must have been seen to close"""
 TOUCH_PART, TOLD_PART = 0.7, 0.4
 """what a closed hand whose grip is felt, and a spoken 'I have it', count of what it takes to let go"""
+AGAIN, TRIES = 0.5, 4
+"""s without enough touch in a hand that is not closing, after which the person presses again; so many times"""
 CLOSED_LONG = 3.0
 """s after which a hand that is seen closed is believed to hold, felt or not"""
 LOOSE = 0.5
@@ -91,6 +93,10 @@ class Giving(Phases):
             if t - self._since > p.patience:
                 self._retreat(t)
             return
+        if not closed and self._lost_touch(t, seen):
+            self._tries += 1
+            self._go("placing", t)
+            return
         if self._signs(t, seen, closed) < 1.0:
             self._sure_since = None
         elif self._sure_since is None:
@@ -99,6 +105,16 @@ class Giving(Phases):
             self._go("releasing", t)
         elif t - self._since > p.patience:
             self._retreat(t)
+
+    def _lost_touch(self, t: float, seen: Percept) -> bool:
+        """The robot's open hand has backed away from the object: time to press again, if it was not in vain so often."""
+        touch = float(np.linalg.norm(seen.load - self._held_load))
+        if touch >= 0.5 * self.participant.press or seen.robot_speed >= STILL or seen.closing_speed > 0.1:
+            self._still_since = None
+        elif self._still_since is None:
+            self._still_since = t
+        away = self._still_since is not None and t - self._still_since > AGAIN
+        return away and self._tries < TRIES and self._gap(seen.robot_hand, seen.object) < NEAR
 
     def _signs(self, t: float, seen: Percept, closed: bool) -> float:
         """How surely the robot holds; the person lets go from 1 on."""

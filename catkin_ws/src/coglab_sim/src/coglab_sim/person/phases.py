@@ -37,6 +37,7 @@ class Phases:
     _told: int
     _travelled: float
     _sunk: float
+    _tries: int
     _held_load: np.ndarray
     _touched: np.ndarray
     _checked: bool

@@ -73,6 +73,7 @@ class VirtualHuman(Giving, Receiving):
         self._noise_phase = self.rng.uniform(0, 2 * np.pi, size=(3, 4))
         self._last: float | None = None
         self._interrupted = False
+        self._tries = 0
         self._travelled = self._sunk = 0.0
 
     def command(self, text: str) -> None:
@@ -128,7 +129,7 @@ class VirtualHuman(Giving, Receiving):
         self._task = task or ""
         self.trial += 1
         self._interrupted = self._met = False
-        self._sunk = 0.0
+        self._sunk, self._tries = 0.0, 0
         p = self.participant
         reaction = float(np.exp(np.log(p.reaction_median) + self.rng.normal(0, p.reaction_sigma)))
         reaction *= (1 - p.learning) ** min(self.trial - 1, 3)
