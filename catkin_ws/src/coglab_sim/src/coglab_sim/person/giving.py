@@ -107,7 +107,7 @@ class Giving(Phases):
             self._retreat(t)
 
     def _lost_touch(self, t: float, seen: Percept) -> bool:
-        """The robot's open hand has backed away from the object: time to press again, if it was not in vain so often."""
+        """The robot's open hand has backed away from the object: time to press again, if not tried too often."""
         touch = float(np.linalg.norm(seen.load - self._held_load))
         if touch >= 0.5 * self.participant.press or seen.robot_speed >= STILL or seen.closing_speed > 0.1:
             self._still_since = None
