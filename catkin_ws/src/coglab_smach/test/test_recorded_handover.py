@@ -123,6 +123,19 @@ def test_a_recorded_person_goes_on_or_leaves_at_the_recorded_time(tmp_path, hand
         assert np.linalg.norm(human._hand - human.recorded.at(human.recorded.end).position) < 0.02
 
 
+@pytest.mark.parametrize("person, outcome", [("leave", "failed_empty"), ("no_wait", "succeeded")])
+def test_who_leaves_early_takes_the_object_along(tmp_path, handover, person, outcome):
+    """The same handover without its waiting, so fast that the robot comes too late: two seconds in all."""
+    begin, end = handover[0][0], handover[-1][0]
+    reach = [row for row in handover if row[0] < begin + 1.6]
+    back = [(row[0] - end + begin + 3.0, *row[1:]) for row in handover if row[0] > end - 1.4]
+    back = [(t, hand, hand * (handover[0][1].inverse() * handover[0][2])) for t, hand, _ in back]
+    result, trial, _ = play(write_csv(tmp_path / "early.csv", reach + back), person)
+    assert result.outcome == outcome, result.reason
+    truth = trial.rig.cell.truth()
+    assert truth["held_by"] == ("human" if person == "leave" else "robot") and not truth["dropped"]
+
+
 def test_a_hand_without_its_object_is_refused_or_gets_one(tmp_path, handover):
     alone = write_csv(tmp_path / "hand.csv", handover, frames=("human_hand",))
     with pytest.raises(RecordingError, match="a handover needs the frame 'object_mug', the recording has human_hand"):
