@@ -57,7 +57,7 @@ def test_no_node_of_perception_names_a_frame_itself():
     for path in [
         SOURCES / "coglab_perception" / "scripts" / "motion_recogniser_node.py",
         SOURCES / "coglab_sim" / "scripts" / "perception_stand_in.py",
-        SOURCES / "coglab_sim" / "src" / "coglab_sim" / "vision.py",
+        SOURCES / "coglab_sim" / "src" / "coglab_sim" / "tracker" / "vision.py",
     ]:
         code = path.read_text(encoding="utf-8")
         for name in names:
