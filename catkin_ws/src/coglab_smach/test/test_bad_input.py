@@ -51,7 +51,7 @@ def missing_primitive(t):
 
 CASES = {
     missing_object: "object 'elephant' is not in the database; it has: ball, bottle, mug, screwdriver, tea_box",
-    unreachable_object: "'mug' cannot be reached: the arm has no posture for the hand at (0.78, -0.04, 0.48) m",
+    unreachable_object: "'mug' cannot be reached: the arm has no posture for the hand at (0.78, -0.04, 0.50) m",
     object_behind_a_stop: "the reach was aborted, because joint lwr_a3 at its stop blocks the motion",
     object_out_of_reach: "'mug' was not offered within 8 s: it stayed at (1.40, 0.20, 0.10) m, outside the handover",
     no_person: "'mug' was not seen within 5.0 s",

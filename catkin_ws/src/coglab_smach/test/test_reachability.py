@@ -33,8 +33,8 @@ def test_goals_are_the_palm_relative_to_the_goal_frame():
     grasp = mug["grasps"]["side"]
     receive = grasp_goal(mug, grasp, "object_mug", "receive")
     assert receive["frame"] == "object_mug" and receive["primitive"] == "reach_human"
-    assert receive["offset"] == pytest.approx([0.0, -0.065, 0.05])
-    assert grasp_goal(mug, grasp, "object_mug", "take", 0.0)["offset"] == pytest.approx([0.0, -0.04, 0.05])
+    assert receive["offset"] == pytest.approx([0.0, -0.065, 0.07])
+    assert grasp_goal(mug, grasp, "object_mug", "take", 0.0)["offset"] == pytest.approx([0.0, -0.04, 0.07])
     give = delivery_goal(mug, grasp, mug["deliveries"]["handle_first"], "human_hand")
     # Palm in the hand frame, then the object from the palm, must give the delivery pose back.
     palm = Pose.from_dict({"xyz": give["offset"], "quaternion": give["orientation"]})
