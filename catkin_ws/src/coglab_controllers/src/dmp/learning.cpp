@@ -18,7 +18,7 @@ constexpr int kGridSteps = 600;
 constexpr double kHoldShare = 0.3, kHoldWeight = 0.3;
 // A demonstration rests at an end where it is slower than this share of its mean speed, over this
 // share of its samples: what noise there is must not be learnt as a start in motion.
-constexpr double kRestSpeed = 0.1, kRestWindow = 0.05;
+constexpr double kRestingSpeed = 0.1, kRestingWindow = 0.05;
 
 // One demonstration, prepared: time from its start, the goal is its last point.
 struct Example {
@@ -110,11 +110,11 @@ Example prepare(const Trajectory& trajectory) {
                                 std::to_string(example.scale) + " m");
   }
   const auto window = std::max<Eigen::Index>(
-      1, static_cast<Eigen::Index>(kRestWindow * static_cast<double>(count)));
+      1, static_cast<Eigen::Index>(kRestingWindow * static_cast<double>(count)));
   const auto rests = [&](Eigen::Index from, Eigen::Index to) {
     const double way = (example.positions.col(to) - example.positions.col(from)).norm();
     const double time = example.times[to] - example.times[from];
-    return way / time < kRestSpeed * example.scale / example.duration;
+    return way / time < kRestingSpeed * example.scale / example.duration;
   };
   example.starts_at_rest = rests(0, window);
   example.ends_at_rest = rests(count - 1 - window, count - 1);

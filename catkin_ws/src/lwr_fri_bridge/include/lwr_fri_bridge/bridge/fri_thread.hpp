@@ -1,5 +1,6 @@
 /// @file
 /// The FRI thread: one UDP socket, and nothing but Bridge::answer() between receive and send.
+/// Threads: docs/architecture.md.
 #pragma once
 
 #include <atomic>
