@@ -169,7 +169,7 @@ TEST(Rotation, TheShortestTurnTurnsOneDirectionIntoTheOther) {
                            : Vector3(-3.0 * from + std::pow(10.0, -(i % 20)) * direction());
     const Quaternion turn = shortestTurn(from, to);
     EXPECT_NEAR(turn.norm(), 1.0, 1e-12);
-    EXPECT_LT((turn * from.normalized() - to.normalized()).norm(), 2e-8) << i;
+    EXPECT_LT((turn * from.normalized() - to.normalized()).norm(), 1e-7) << i;
     EXPECT_LT(std::abs(turn.vec().dot(from)), 1e-6 * from.norm()) << "a turn about another axis";
   }
   for (const Vector3& axis : {Vector3::UnitX(), Vector3::UnitY(), Vector3::UnitZ()}) {

@@ -28,10 +28,10 @@ Vector3 rotationBetween(const Quaternion& from, const Quaternion& to) noexcept {
 // compiler seconds in each file.
 Quaternion shortestTurn(const Vector3& from, const Vector3& to) noexcept {
   const Vector3 a = from.stableNormalized(), b = to.stableNormalized();
-  const double twice_squared = 1.0 + a.dot(b);  // twice the squared cosine of half the angle
-  if (twice_squared > 1e-12) {
-    const Vector3 axis = a.cross(b);
-    return Quaternion(twice_squared, axis.x(), axis.y(), axis.z()).normalized();
+  const Vector3 between = a + b;
+  if (const double length = between.norm(); length > 1e-8) {
+    const Vector3 half = between / length, axis = a.cross(half);
+    return Quaternion(a.dot(half), axis.x(), axis.y(), axis.z()).normalized();
   }
   Vector3::Index least = 0;
   a.cwiseAbs().minCoeff(&least);
