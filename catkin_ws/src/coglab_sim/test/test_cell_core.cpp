@@ -4,10 +4,13 @@
 #include <atomic>
 #include <chrono>
 #include <cmath>
+#include <map>
 #include <memory>
 #include <numeric>
+#include <string>
 #include <thread>
 #include <utility>
+#include <vector>
 
 #include <netinet/in.h>
 #include <sys/socket.h>
@@ -194,56 +197,202 @@ TEST(Statistics, WindowLatencyAndJitter) {
   EXPECT_EQ(statistics.missCounter(), 2U);
 }
 
-TEST(CellConfig, EveryParameterGoesInAndOut) {
-  CellConfig config;
+/// Another value than the one that is there; no two numbers of a list are equal.
+ParameterValue another(const CellParameter& parameter, ParameterValue value) {
+  const auto moved = [&](double number, double share) {
+    const double up = number + share * (parameter.high - number);
+    return up > number ? up : parameter.low + (1.0 - share) * (number - parameter.low);
+  };
+  if (auto* flag = std::get_if<bool>(&value)) *flag = !*flag;
+  if (auto* whole = std::get_if<int>(&value)) *whole += *whole < parameter.high ? 1 : -1;
+  if (auto* number = std::get_if<double>(&value)) *number = moved(*number, 0.3);
+  if (auto* list = std::get_if<std::vector<double>>(&value)) {
+    if (parameter.name == "object/rotation") return std::vector<double>{0.0, 0.6, 0.0, 0.8};
+    for (std::size_t i = 0; i < list->size(); ++i)
+      (*list)[i] = moved((*list)[i], 0.3 + 0.02 * static_cast<double>(i));
+    if (parameter.unit == "counts") *list = {11.0, 12.0, 13.0, 14.0, 15.0};
+  }
+  if (auto* text = std::get_if<std::string>(&value)) {
+    const std::map<std::string, std::string> words = {{"krc/convention", "stanford"},
+                                                      {"krc/mode", "T1"},
+                                                      {"object/shape", "sphere"},
+                                                      {"object/start", "world"}};
+    const auto found = words.find(parameter.name);
+    *text = found != words.end() ? found->second : *text + "x";
+  }
+  return value;
+}
+
+TEST(CellConfig, EveryParameterChangesItselfAndNothingElse) {
+  const CellConfig untouched;
   for (const CellParameter& parameter : cellParameters()) {
     SCOPED_TRACE(parameter.name);
     EXPECT_FALSE(parameter.description.empty());
     EXPECT_TRUE(parameter.source == "published" || parameter.source == "ours" ||
                 parameter.source == "set-up");
-    const ParameterValue value = parameter.get(config);
-    parameter.set(config, value);
+    CellConfig config;
+    const ParameterValue value = another(parameter, parameter.get(untouched));
+    ASSERT_FALSE(value == parameter.get(untouched));
+    setCellParameter(config, parameter.name, value);
     EXPECT_TRUE(parameter.get(config) == value);
+    for (const CellParameter& other : cellParameters()) {
+      if (other.name == parameter.name) continue;
+      EXPECT_TRUE(other.get(config) == other.get(untouched)) << "it also changed " << other.name;
+    }
   }
+  CellConfig config;
   EXPECT_THROW(setCellParameter(config, "krc/nothing", 1.0), std::invalid_argument);
   EXPECT_THROW(setCellParameter(config, "krc/period", std::string("fast")), std::invalid_argument);
   EXPECT_THROW(setCellParameter(config, "home", std::vector<double>{1.0}), std::invalid_argument);
 }
 
-/// Real time times any factor; nobody has to answer, and a flood of datagrams stops nothing.
+/// The names once more, typed from what they mean: a row that reads and writes the field of another
+/// name agrees with itself.
+TEST(CellConfig, ANameSetsTheFieldOfThatName) {
+  using P = krc::Parameters;
+  const std::map<std::string, double P::*> krc = {
+      {"period", &P::period},
+      {"quality_perfect", &P::quality_perfect},
+      {"quality_ok", &P::quality_ok},
+      {"quality_bad", &P::quality_bad},
+      {"entry_position_tolerance", &P::entry_position_tolerance},
+      {"entry_frame_tolerance", &P::entry_frame_tolerance},
+      {"torque_tolerance", &P::torque_tolerance},
+      {"t1_speed_limit", &P::t1_speed_limit},
+      {"speed_margin", &P::speed_margin},
+      {"frame_speed_limit", &P::frame_speed_limit},
+      {"frame_turn_limit", &P::frame_turn_limit},
+      {"frame_orthonormality", &P::frame_orthonormality},
+      {"torque_limit_time", &P::torque_limit_time},
+      {"joint_stiffness_max", &P::joint_stiffness_max},
+      {"frame_stiffness_max", &P::frame_stiffness_max},
+      {"rotation_stiffness_max", &P::rotation_stiffness_max},
+      {"joint_stiffness", &P::joint_stiffness},
+      {"frame_stiffness", &P::frame_stiffness},
+      {"rotation_stiffness", &P::rotation_stiffness},
+      {"damping", &P::damping},
+      {"krl_poll", &P::krl_poll},
+      {"krl_message_wait", &P::krl_message_wait},
+      {"krl_drive_wait", &P::krl_drive_wait},
+      {"krl_quality_wait", &P::krl_quality_wait},
+      {"brake_release", &P::brake_release},
+      {"power_up", &P::power_up},
+      {"close_linger", &P::close_linger},
+      {"ambient_temperature", &P::ambient_temperature},
+      {"drive_heating", &P::drive_heating},
+      {"drive_heating_time", &P::drive_heating_time},
+      {"drive_warning", &P::drive_warning}};
+  const std::map<std::string, double TorqueNoise::*> noise = {
+      {"sigma", &TorqueNoise::sigma},
+      {"speed_gain", &TorqueNoise::speed_gain},
+      {"correlation_time", &TorqueNoise::correlation_time},
+      {"bias", &TorqueNoise::bias},
+      {"hysteresis", &TorqueNoise::hysteresis},
+      {"hysteresis_speed", &TorqueNoise::hysteresis_speed}};
+  std::size_t numbers = 0;
+  for (const CellParameter& parameter : cellParameters()) {
+    SCOPED_TRACE(parameter.name);
+    const std::size_t slash = parameter.name.find('/') + 1;
+    const std::string group = parameter.name.substr(0, slash), name = parameter.name.substr(slash);
+    CellConfig config;
+    const ParameterValue value = another(parameter, parameter.get(config));
+    const auto* number = std::get_if<double>(&value);
+    if (number == nullptr || (group != "krc/" && krc.count(name) + noise.count(name) == 0)) continue;
+    setCellParameter(config, parameter.name, value);
+    if (group == "krc/") {
+      ASSERT_EQ(krc.count(name), 1U) << "type its field here";
+      EXPECT_EQ(config.krc.*krc.at(name), *number);
+      ++numbers;
+    } else if (group == "torque_noise/") {
+      EXPECT_EQ(config.torque_noise.*noise.at(name), *number);
+      ++numbers;
+    }
+  }
+  EXPECT_EQ(numbers, krc.size() + noise.size());
+  CellConfig config;
+  setCellParameter(config, "seed", 77);
+  setCellParameter(config, "home", std::vector<double>{0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7});
+  setCellParameter(config, "krc/mode", std::string("T2"));
+  setCellParameter(config, "krc/convention", std::string("rtt_lwr"));
+  setCellParameter(config, "krc/entry_quality", 3);
+  setCellParameter(config, "krc/extrapolated_packets", 7);
+  setCellParameter(config, "krc/acknowledge_by_program", false);
+  EXPECT_EQ(config.seed, 77U);
+  for (int i = 0; i < 7; ++i) EXPECT_EQ(config.home[i], 0.1 * (i + 1)) << i;
+  EXPECT_EQ(config.krc.mode, krc::OperatingMode::T2);
+  EXPECT_EQ(config.krc.convention, krc::KrlConvention::RttLwr);
+  EXPECT_EQ(config.krc.entry_quality, 3);
+  EXPECT_EQ(config.krc.extrapolated_packets, 7);
+  EXPECT_FALSE(config.krc.acknowledge_by_program);
+}
+
+/// The estimate stays aside by the hysteresis after a movement, on the side of the movement.
+TEST(TorqueSensor, TheEstimateKeepsTheSideOfTheLastMovement) {
+  TorqueNoise noise;
+  noise.sigma = noise.bias = 0.0;
+  noise.hysteresis = 0.3;
+  TorqueSensor sensor(noise, 1);
+  const Vector7 ideal = Vector7::LinSpaced(-3.0, 3.0), posture = Vector7::Zero();
+  const Vector7 at_rest = sensor.external(ideal, posture), measured = sensor.measured(ideal);
+  const auto aside = [&] { return Vector7(sensor.external(ideal, posture) - at_rest); };
+  Vector7 velocity = Vector7::Zero();
+  velocity[1] = 0.1;
+  velocity[4] = -0.1;
+  Vector7 expected = Vector7::Zero();
+  expected[1] = 0.3;
+  expected[4] = -0.3;
+  for (int direction : {1, -1}) {
+    for (int i = 0; i < 400; ++i) sensor.advance(direction * velocity, 0.001);
+    EXPECT_LT((aside() - direction * expected).cwiseAbs().maxCoeff(), 1e-3) << direction;
+    for (int i = 0; i < 400; ++i) sensor.advance(Vector7::Zero(), 0.001);
+    EXPECT_LT((aside() - direction * expected).cwiseAbs().maxCoeff(), 1e-3) << "after the stop";
+  }
+  // It reverses over hysteresis_speed: far below that the side changes slowly.
+  sensor.advance(0.01 * noise.hysteresis_speed / 0.1 * velocity, 0.001);
+  EXPECT_LT((aside() + expected).cwiseAbs().maxCoeff(), 0.02);
+  EXPECT_EQ(sensor.measured(ideal), measured);  // the joint torque itself has none
+}
+
+/// Real time times any factor; nobody has to answer, and a flood of datagrams stops nothing. A
+/// busy machine may lose periods: of five runs the one that lost least tells the factor.
 TEST(RealTimeCell, TheFactorScalesTimeAndAFloodDoesNotStopIt) {
-  for (const double factor : {0.5, 4.0}) {
+  const auto share_of = [](double factor) {  // simulated time over factor x real time
     const int fd = socket(AF_INET, SOCK_DGRAM, 0);
-    sockaddr_in own{};
+    sockaddr_in own{}, peer{};
     own.sin_family = AF_INET;
     own.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
     socklen_t length = sizeof own;
-    ASSERT_EQ(bind(fd, reinterpret_cast<sockaddr*>(&own), length), 0);
-    ASSERT_EQ(getsockname(fd, reinterpret_cast<sockaddr*>(&own), &length), 0);
+    EXPECT_EQ(bind(fd, reinterpret_cast<sockaddr*>(&own), length), 0);
+    EXPECT_EQ(getsockname(fd, reinterpret_cast<sockaddr*>(&own), &length), 0);
     CellConfig config;
     config.urdf = URDF;
-    config.krc.period = 0.01;
+    config.krc.period = 0.02;
     RealTimeCell cell(config, "127.0.0.1", ntohs(own.sin_port), factor);
-    const auto begin = std::chrono::steady_clock::now();
     cell.start();
     std::array<char, 1024> bytes{};
-    sockaddr_in peer{};
     length = sizeof peer;
-    ASSERT_EQ(
+    EXPECT_EQ(
         recvfrom(fd, bytes.data(), bytes.size(), 0, reinterpret_cast<sockaddr*>(&peer), &length),
         916);
+    const auto begin = std::chrono::steady_clock::now();
+    const double simulated_before = cell.snapshot().truth.time;
     double simulated = 0.0, real = 0.0;
-    while (real < 0.6) {
+    while (real < 0.4) {
       for (int i = 0; i < 50; ++i)
         sendto(fd, bytes.data(), 376, 0, reinterpret_cast<sockaddr*>(&peer), sizeof peer);
-      simulated = cell.snapshot().truth.time;
+      simulated = cell.snapshot().truth.time - simulated_before;
       real = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
     }
     cell.stop();
     close(fd);
     EXPECT_TRUE(cell.failure().empty()) << cell.failure();
-    EXPECT_LT(simulated, factor * real * 1.05 + 0.02);
-    EXPECT_GT(simulated, 0.1 * factor * real);  // a busy machine may lose periods, never all
+    EXPECT_LT(simulated, factor * real * 1.05 + 0.05) << factor;
+    return simulated / (factor * real);
+  };
+  for (const double factor : {0.5, 1.0, 4.0}) {
+    double best = 0.0;
+    for (int run = 0; run < 5 && best < 0.85; ++run) best = std::max(best, share_of(factor));
+    EXPECT_GE(best, 0.85) << factor << " times real time";
   }
   CellConfig config;
   config.urdf = URDF;
