@@ -146,7 +146,7 @@ class TopicGoal(unittest.TestCase):
         first = next(m for m in self.debug if m.phase > 0.97)
         place = first.set_point.position
         self.assertLess(math.dist((place.x, place.y, place.z), (near.x, near.y, near.z)), 0.005)
-        self.assertAlmostEqual(first.velocity.y, 0.1, delta=0.03)
+        self.assertAlmostEqual(first.set_point_velocity.linear.y, 0.1, delta=0.03)
         wait_until(lambda: robot.feedback.state == "reached", 10.0, "reached")
 
     def test_4_refusals(self) -> None:
