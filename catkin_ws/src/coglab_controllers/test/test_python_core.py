@@ -163,8 +163,8 @@ def test_golden_files_follow_from_the_equations_and_not_from_what_they_test() ->
                if isinstance(n, (ast.Import, ast.ImportFrom))]  # fmt: skip
     assert sorted(imports) == ["__future__", "dataclasses", "numpy", "pathlib", "xml.etree.ElementTree"]
     derivation = golden()
-    primitives = derivation.derive()
-    for name, text in (("weights.xml", derivation.library(primitives)), ("motions.csv", derivation.motions(primitives))):
+    learnt = derivation.derive()
+    for name, text in (("weights.xml", derivation.library(learnt)), ("motions.csv", derivation.motions(learnt))):
         stored = (GOLDEN / name).read_text()
         assert re.sub(r"[-\d.e]+", "", stored) == re.sub(r"[-\d.e]+", "", text), f"{name}: run make_golden.py"
         np.testing.assert_allclose(numbers(stored), numbers(text), rtol=1e-7, atol=1e-7, err_msg=name)

@@ -1,4 +1,4 @@
-"""A goal lives on hand_status: without it, and only then, it is aborted within its time, and the fingers are stopped."""
+"""A goal lives on hand_status: without it, and only then, it is aborted in time, and the fingers are stopped."""
 
 from __future__ import annotations
 

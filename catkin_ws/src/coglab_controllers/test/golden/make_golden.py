@@ -1,8 +1,8 @@
 #!/usr/bin/python3
 """Rewrites the golden files from demonstrations.xml: the library as weights, and the motion of each primitive.
 
-Derived from the equations alone, in numpy: nothing of what is tested is imported. Eq. (1) and (2) of D4.10 are, in units
-of the duration and with D = 2 sqrt(K), a critically damped spring under a force that depends on the phase alone,
+Derived from the equations alone, in numpy: nothing of what is tested is imported. Eq. (1) and (2) of D4.10 are, in
+units of the duration and with D = 2 sqrt(K), a critically damped spring under a force that depends on the phase alone,
 
     x'' + 2 k x' + k^2 x = f(s),   k = sqrt(K),   f(s) = (1 - w(s)) K (M phi(s) + x0) + w(s) K g,   s = exp(-alpha t)
 
@@ -30,8 +30,8 @@ RATIO = 1.3
 PERIOD = 0.005
 """s, of one step of the golden motion"""
 STEPS = range(20, 401, 20)
-# The choices of the least squares (coglab_controllers/dmp/learning.hpp): a path that ends at rest is held at its goal for
-# a while; an end rests where it is slower than a share of the mean speed over a share of the samples.
+# The choices of the least squares (coglab_controllers/dmp/learning.hpp): a path that ends at rest is held at its goal
+# for a while; an end rests where it is slower than a share of the mean speed over a share of the samples.
 HOLD, HOLD_WEIGHT, HOLDS = 0.3, 0.3, 60
 REST_SPEED, REST_WINDOW = 0.1, 0.05
 
@@ -99,6 +99,7 @@ def read(path: Path) -> list[Primitive]:
     for entry in ElementTree.parse(path).getroot().findall("primitive"):
         learn, weight, shape = (getattr(entry.find(name), "attrib", {}) for name in ("learn", "goal_weight", "shape"))
         paths = []
+        bent = (float(weight["centre"]), float(weight["steepness"])) if weight.get("kind") == "sigmoid" else None
         for trajectory in entry.findall("trajectory"):
             samples = trajectory.findall("sample")
             times = np.array([float(sample.get("t", "nan")) for sample in samples])
@@ -111,7 +112,7 @@ def read(path: Path) -> list[Primitive]:
                 stiffness=float(learn.get("stiffness", 150.0)),
                 regularisation=float(learn.get("regularisation", 1e-6)),
                 count=int(learn.get("basis", 20)),
-                sigmoid=(float(weight["centre"]), float(weight["steepness"])) if weight.get("kind") == "sigmoid" else None,
+                sigmoid=bent,
                 mapping=shape.get("mapping", "none"),
                 paths=paths,
             )
@@ -189,8 +190,8 @@ def shape_map(mapping: str, demonstrated: np.ndarray, line: np.ndarray) -> np.nd
         x, y, z = np.cross(a, b)
         cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
         return scale * (np.eye(3) + cross + cross @ cross / (1.0 + a @ b))
-    # Upright: a turn about the vertical that brings the level parts together, scaled by their lengths; heights scaled by
-    # the lengths of the lines, and tilted along the way by what is then missing at the end.
+    # Upright: a turn about the vertical that brings the level parts together, scaled by their lengths; heights scaled
+    # by the lengths of the lines, and tilted along the way by what is then missing at the end.
     flat, flat_line = np.hypot(*demonstrated[:2]), np.hypot(*line[:2])
     turn = np.arctan2(line[1], line[0]) - np.arctan2(demonstrated[1], demonstrated[0])
     result = np.zeros((3, 3))
@@ -225,7 +226,8 @@ def library(primitives: list[Primitive]) -> str:
         described = f' description="{p.description}"' if p.description else ""
         weight = "linear" if p.sigmoid is None else "sigmoid"
         of_sigmoid = "" if p.sigmoid is None else f' centre="{words(p.sigmoid[0])}" steepness="{words(p.sigmoid[1])}"'
-        system = ("duration", p.duration), ("alpha", p.alpha), ("stiffness", p.stiffness), ("damping", 2 * p.stiffness**0.5)
+        damping = 2.0 * np.sqrt(p.stiffness)
+        system = ("duration", p.duration), ("alpha", p.alpha), ("stiffness", p.stiffness), ("damping", damping)
         lines += [
             f'    <primitive id="{p.id}"{described}>',
             "        <system " + " ".join(f'{name}="{words(value)}"' for name, value in system) + "/>",
@@ -245,7 +247,8 @@ def motions(primitives: list[Primitive]) -> str:
     rows = ["primitive,step,x,y,z"]
     for primitive in primitives:
         path = motion(primitive, primitive.goal + GOAL_OFFSET, RATIO, PERIOD * np.array(STEPS))
-        rows += [f"{primitive.id},{step}," + words(place).replace(" ", ",") for step, place in zip(STEPS, path, strict=True)]
+        places = [words(place).replace(" ", ",") for place in path]
+        rows += [f"{primitive.id},{step},{place}" for step, place in zip(STEPS, places, strict=True)]
     return "\n".join(rows) + "\n"
 
 
