@@ -4,8 +4,9 @@ A stream is a handful of calls during which bytes anywhere, in either direction,
 flipped or preceded by a stray byte: one or two apart from each other, or a burst of neighbours. The
 truth is read from the emulated motors at every request, and most requests must be answered: who
 refuses everything says nothing wrong either. A value needs three equal readings, so one or two
-corruptions cannot forge one. Three that forge the same lie can: `test_as_many_equal_lies_as_readings_are_the_truth` shows that no driver can
-tell, whatever number of readings it takes. Worse bursts are therefore counted, not excluded.
+corruptions cannot forge one. Three that forge the same lie can:
+`test_as_many_equal_lies_as_readings_are_the_truth` shows that no driver can tell, whatever number of
+readings it takes. Worse bursts are therefore counted, not excluded.
 """
 
 from __future__ import annotations
