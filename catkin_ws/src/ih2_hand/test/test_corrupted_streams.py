@@ -189,13 +189,21 @@ def run(seed: int, streams: int, events: tuple[int, ...], burst: bool = False) -
 @pytest.mark.parametrize("part", range(PARTS))
 def test_corrupted_streams(part):
     campaign = run(1000 + part, STREAMS // PARTS, (1, 1, 2))
-    assert campaign.corrupter.done > STREAMS // PARTS * 0.7
+    assert campaign.corrupter.done > STREAMS // PARTS
     assert campaign.wrong == []
+    assert campaign.read >= 0.98 * campaign.asked, "the line is good enough for nearly all of them"
+
+
+def test_two_corruptions():
+    campaign = run(2000, STREAMS // 10, (2,))
+    assert campaign.wrong == []
+    assert campaign.read >= 0.96 * campaign.asked
 
 
 def test_bursts_of_two():
-    campaign = run(2000, STREAMS // 10, (2,))
+    campaign = run(2500, STREAMS // 10, (2,), burst=True)
     assert campaign.wrong == []
+    assert campaign.read >= 0.96 * campaign.asked
 
 
 def test_worse_bursts():
@@ -203,7 +211,17 @@ def test_worse_bursts():
     or changed first bytes of GetMotorCurrent read the tension instead, three times.
     """
     campaign = run(3000, STREAMS // 10, (3, 4, 6))
+    assert campaign.corrupter.done > STREAMS // 10 * 3
     assert len(campaign.wrong) * 2_000 <= campaign.read
+    assert campaign.read >= 0.85 * campaign.asked
+
+
+def test_longer_bursts_anywhere():
+    """Neighbours in a row, from a few bytes to whole requests with their answers: counted, too."""
+    campaign = run(4000, STREAMS // 10, (3, 4, 8, 12, 20), burst=True)
+    assert campaign.corrupter.done > STREAMS // 10 * 5
+    assert len(campaign.wrong) * 2_000 <= campaign.read
+    assert campaign.read >= 0.80 * campaign.asked
 
 
 class Flipped:

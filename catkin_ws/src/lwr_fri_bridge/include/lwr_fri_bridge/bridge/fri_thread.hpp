@@ -38,7 +38,9 @@ class AnswerTimes {
   }
   double mean() const noexcept { return mean_; }  ///< s, 0: no answer yet
   /// s, since the last call with restart
-  double longest(bool restart) noexcept { return restart ? longest_.exchange(0.0F) : longest_; }
+  double longest(bool restart) noexcept {
+    return restart ? longest_.exchange(0.0F) : longest_.load();
+  }
 
  private:
   std::atomic<float> mean_{0.0F}, longest_{0.0F};
