@@ -31,7 +31,7 @@ def take_with(aside):
     def script(t):
         t.wait_hub("wait_without_object")
         t.start("take")
-        t.wait_hub("wait_with_object" if aside(10.0) < 0.03 else "wait_without_object")
+        t.wait_hub("wait_with_object" if abs(aside(10.0)) < 0.03 else "wait_without_object")
 
     trial.run(script)
     assert ended, "it never came to the board"

@@ -93,6 +93,7 @@ class Server:
 @pytest.fixture
 def queue(monkeypatch):
     """A queue of goals without a master, on the clock of the computer."""
+    rospy.rostime.set_rostime_initialized(True)
     rospy.rostime.switch_to_wallclock()
     monkeypatch.setattr(goals, "HandActionServer", Server)
     monkeypatch.setattr(goals.rospy, "Subscriber", lambda *a, **k: SimpleNamespace(unregister=lambda: None))
