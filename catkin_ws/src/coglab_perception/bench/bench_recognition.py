@@ -2,8 +2,8 @@
 """Recognition of reaches by the shipped patterns, on people that they were not trained on.
 
 Each person has habits of their own (where the hand rests, where each reach ends, tempo, arc), drawn anew for each; the
-tracker's error wanders instead of being white; one motion in five is no reach of these patterns. Every motion counts, and
-what is asked of reaches and of other motions is counted apart. The peer is the nearest direction seen so far.
+tracker's error wanders instead of being white; one motion in five is no reach of these patterns. Every motion counts,
+and reaches and other motions are counted apart as well. The peer is the nearest direction seen so far.
 """
 
 import json
@@ -15,11 +15,10 @@ from pathlib import Path
 import numpy as np
 from coglab_perception.recogniser import UNKNOWN, Recogniser, load_patterns
 
-PACKAGE = Path(__file__).resolve().parent.parent
-sys.path.insert(0, str(PACKAGE / "test"))
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "test"))
 from synthetic_reaches import ENDS, START, path, share
 
-PATTERNS = PACKAGE / "config" / "patterns.json"
+PATTERNS = Path(__file__).resolve().parent.parent / "config" / "patterns.json"
 PEOPLE, EACH, OTHERS = 60, 2, 2
 """people; reaches of each pattern and motions of no pattern by each: 20 % of all are of none"""
 SEED = 91
