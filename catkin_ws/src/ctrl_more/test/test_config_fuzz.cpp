@@ -73,6 +73,49 @@ std::unique_ptr<TestController> configurable() {
   return c;
 }
 
+const std::string kGains =
+    "type: TestController\nkp: [0.1, 0.2, 0.3]\nmax_angle: 0.5\nmode: fast\n";
+const std::string kList =
+    "loadControllers: [listed]\nlisted:\n  libPath: " CTRL_MORE_TEST_PLUGIN_DIR
+    "/libgood.so\n  configFile: good.yaml\n  enabled: false\n"
+    "  overrun_us: 100\n  blend_s: 0.1\nprofiles:\n  dmp: [running]\n";
+
+enum Way { kAsList, kAsGains, kAsConfiguration, kWays };
+
+/// Loads a file; empty if it was taken, else the sentence.
+std::string load(Rig& rig, Way way, const std::string& file) {
+  if (way == kAsList) {
+    const LoadReport report = rig.manager->load(file);
+    for (const std::string& error : report.errors) EXPECT_FALSE(error.empty());
+    return report.ok() ? "" : report.errors.front();
+  }
+  Status status;
+  if (way == kAsGains) {
+    status = rig.manager->loadGains("running", file);
+  } else {
+    ControllerEntry entry;
+    entry.config_file = file;
+    status = rig.manager->addController(configurable(), "configured", entry);
+  }
+  EXPECT_TRUE(status.ok() || !status.message().empty());
+  return status ? "" : status.message();
+}
+
+/// What was taken goes again, so that the next file finds everything as this one did.
+void unloadTheRest(Rig& rig) {
+  for (const std::string& name : rig.manager->getControllersNames()) {
+    if (name == "running") continue;
+    ASSERT_TRUE(rig.manager->setProfile("dmp", {"running"}));
+    rig.manager->disable(name, true);
+    Status gone = Status::failure("not tried");
+    for (int cycle = 0; cycle < 1000 && !gone; ++cycle) {  // until its correction has faded
+      rig.step();
+      gone = rig.manager->unload(name);
+    }
+    ASSERT_TRUE(gone) << gone.message();
+  }
+}
+
 /// Every file is written and loaded, as list, as gains of a controller that runs, and as the
 /// configuration of a new one; half of them differ from a good one by one word.
 TEST(ConfigFuzz, ListAndGainAndConfigurationFilesNeverBreakWhatRuns) {
@@ -81,72 +124,34 @@ TEST(ConfigFuzz, ListAndGainAndConfigurationFilesNeverBreakWhatRuns) {
   rig.logger.setLevel(LogLevel::Error);
   rig.add(configurable(), "running");
   const std::string folder = ::testing::TempDir(), file = folder + "/ctrl_more_fuzz.yaml";
-  const std::string gains =
-      "type: TestController\nkp: [0.1, 0.2, 0.3]\nmax_angle: 0.5\nmode: fast\n";
   std::ofstream(folder + "/good.yaml") << "type: Good\n";
-  const std::string list = "loadControllers: [listed]\nlisted:\n  libPath: " CTRL_MORE_TEST_PLUGIN_DIR
-                           "/libgood.so\n  configFile: good.yaml\n  enabled: false\n"
-                           "  overrun_us: 100\n  blend_s: 0.1\nprofiles:\n  dmp: [running]\n";
-  enum Way { kList, kGains, kConfiguration, kWays };
   long taken[kWays] = {}, refused[kWays] = {};
   std::mt19937 random(20180521);
   for (long i = 0; i < kRuns; ++i) {
     const Way way = static_cast<Way>(i % kWays);
-    const std::string& good = way == kList ? list : gains;
+    const std::string& good = way == kAsList ? kList : kGains;
     const std::string text = (i / kWays) % 2 == 0 ? mutate(good, random) : mistype(good, random);
+    SCOPED_TRACE(text);
     {
       std::ofstream out(file, std::ios::binary);
       out << text;
       ASSERT_TRUE(out.flush().good());
     }
-    bool fine = false;
-    std::string why;
-    if (way == kList) {
-      const LoadReport report = rig.manager->load(file);
-      fine = report.ok();
-      for (const std::string& error : report.errors) {
-        ASSERT_FALSE(error.empty());
-        why = error;
-      }
-    } else if (way == kGains) {
-      const Status status = rig.manager->loadGains("running", file);
-      fine = status.ok();
-      why = status.message();
-    } else {
-      ControllerEntry entry;
-      entry.config_file = file;
-      const Status status = rig.manager->addController(configurable(), "configured", entry);
-      fine = status.ok();
-      why = status.message();
-    }
-    ASSERT_TRUE(fine || !why.empty()) << text;
-    ++(fine ? taken : refused)[way];
-    if (i % 50 == 0) rig.step();
-    for (const std::string& name : rig.manager->getControllersNames()) {
-      if (name == "running") continue;
-      // What was taken goes again, so that the next file finds everything as this one did.
-      ASSERT_TRUE(rig.manager->setProfile("dmp", {"running"}));
-      rig.manager->disable(name, true);
-      Status gone = Status::failure("not tried");
-      for (int cycle = 0; cycle < 1000 && !gone; ++cycle) {  // until its correction has faded
-        rig.step();
-        gone = rig.manager->unload(name);
-      }
-      ASSERT_TRUE(gone) << gone.message() << "\n" << text;
-    }
-    if (i % 50 == 0) {
-      rig.step();
-      ASSERT_EQ(rig.pose()[0], 1.0);
-      ASSERT_EQ(rig.manager->getControllersNames().size(), 1u);
-    }
+    ++(load(rig, way, file).empty() ? taken : refused)[way];
+    ASSERT_NO_FATAL_FAILURE(unloadTheRest(rig));
+    if (i % 50 != 0) continue;
+    rig.step();
+    ASSERT_EQ(rig.pose()[0], 1.0);
+    ASSERT_EQ(rig.manager->getControllersNames().size(), 1u);
   }
-  for (const Way way : {kList, kGains, kConfiguration}) {
+  for (const Way way : {kAsList, kAsGains, kAsConfiguration}) {
     EXPECT_EQ(taken[way] + refused[way], kRuns / kWays);
     EXPECT_GT(taken[way], kRuns / kWays / 20) << way;
     EXPECT_GT(refused[way], kRuns / kWays / 4) << way;
   }
-  std::printf("files written and loaded %ld, of these taken as list %ld, gains %ld, configuration %ld\n",
-              kRuns, taken[kList], taken[kGains], taken[kConfiguration]);
+  std::printf(
+      "files written and loaded %ld, of these taken as list %ld, gains %ld, configuration %ld\n",
+      kRuns, taken[kAsList], taken[kAsGains], taken[kAsConfiguration]);
 }
 
 }  // namespace

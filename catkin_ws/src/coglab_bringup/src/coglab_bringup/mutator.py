@@ -112,11 +112,12 @@ def _in_line(line: str, python: bool) -> Iterator[tuple[int, int, str, str]]:
         first, second = found.groups()
         if first != second:
             yield found.start(), found.end(), f"({second}, {first})", "swapped arguments"
-    found = (PYTHON_EXIT if python else CPP_EXIT).match(line)
-    complete = found and all(line.count(a) == line.count(b) for a, b in ("()", "[]", "{}"))
+    left = (PYTHON_EXIT if python else CPP_EXIT).match(line)
+    if left is None or any(line.count(pair[0]) != line.count(pair[1]) for pair in (("(", ")"), ("[", "]"), ("{", "}"))):
+        return
     # A C++ function that only returns something would end nowhere; an exit behind a condition may be dropped.
-    if found and complete and (python or found.group(1).strip() or not found.group(2).startswith("return ")):
-        yield found.start(2), found.end(2), "pass" if python else ";", "dropped exit"
+    if python or left.group(1).strip() or not left.group(2).startswith("return "):
+        yield left.start(2), left.end(2), "pass" if python else ";", "dropped exit"
 
 
 def code_lines(text: str, name: str) -> list[int]:
