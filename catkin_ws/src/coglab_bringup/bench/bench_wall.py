@@ -12,27 +12,47 @@ from pathlib import Path
 
 
 def row(figure: str, value: float | None, limit: float) -> dict:
-    """A row whose goal is an upper limit in s; a figure that was never recorded is not ok."""
+    """A row whose goal is an upper limit in s; a figure that was not measured is missed."""
     fine = value is not None and value <= limit
     return dict(
         bench="wall", figure=figure, value=value, unit="s", goal=f"<= {limit:.0f}", peer=None, peer_value=None, ok=fine
     )
 
 
+def first_demo(times: dict) -> tuple[str, float | None]:
+    """What installing, building and the first demo of this checkout took together, and in words what is known of it.
+
+    Each part as it was measured when it was done, whichever command did it. A checkout where a part was not done, as on
+    a machine that had the packages already, has no such figure.
+    """
+    setup, demo = times.get("setup", {}), times.get("first_demo", {})
+    parts = {
+        "installation": setup.get("install_s") or None,
+        "build": setup.get("build_s") or None,
+        "first demo": demo.get("run_s") or None,
+    }
+    known = ", ".join(f"{name} {f'{value:.0f} s' if value else 'not measured here'}" for name, value in parts.items())
+    value = sum(parts.values()) if all(parts.values()) else None
+    return f"installation, build and first demo of this checkout ({known})", value
+
+
 def main() -> None:
     top = Path(os.environ["COGLAB_TOP"])
+    recorded = top / ".coglab" / "times.json"
+    times = json.loads(recorded.read_text()) if recorded.is_file() else {}
+    figure, first = first_demo(times)
     with tempfile.TemporaryDirectory() as out:
         start = time.monotonic()
         subprocess.run([top / "coglab", "demo", "--headless", "--out", out], stdout=subprocess.DEVNULL, check=True)
         later = round(time.monotonic() - start, 1)
-    recorded = top / ".coglab" / "times.json"
-    times = json.loads(recorded.read_text()) if recorded.is_file() else {}
-    setup = times.get("setup", {"install_s": 0.0, "build_s": 0.0})
-    first = setup["install_s"] + setup["build_s"] + later
     rows = [
-        row("demo with the longest installation and build recorded in this checkout", round(first, 1), 600),
-        row("demo again", later, 60),
-        row("./coglab test, as last run", times.get("last_test", {}).get("total_s"), 900),
+        row(figure, first and round(first, 1), 600),
+        row("demo again, run by this bench", later, 60),
+        row(
+            "./coglab test of all packages, as last run in this checkout",
+            times.get("last_test", {}).get("total_s"),
+            900,
+        ),
     ]
     print(json.dumps(rows))
 

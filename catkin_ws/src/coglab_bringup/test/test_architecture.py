@@ -36,6 +36,15 @@ def test_the_table_of_packages_is_complete():
     assert packages <= set(re.findall(r"`(\w+)`", table)), packages - set(re.findall(r"`(\w+)`", table))
 
 
+def test_headers_name_this_page_and_no_other_design():
+    rooms = ("control_cycle", "control_thread", "transformation_system", "fri_thread", "feedback_controllers_manager")
+    for room in rooms:
+        headers = list(SOURCES.rglob(f"include/**/{room}.hpp"))
+        assert any("docs/architecture.md" in header.read_text(encoding="utf-8") for header in headers), room
+    stray = [path for path in code_files() if "design, section" in path.read_text(encoding="utf-8", errors="replace")]
+    assert [path for path in stray if path != Path(__file__).resolve()] == []
+
+
 def test_the_steps_of_the_cycle_are_those_of_the_code():
     page = re.findall(r"^(\d)\. \*\*(.+?)\*\*", PAGE, flags=re.MULTILINE)
     code = (SOURCES / "coglab_controllers" / "src" / "manager" / "control_cycle.cpp").read_text(encoding="utf-8")

@@ -9,6 +9,7 @@ import asyncio
 import json
 import os
 import random
+import signal
 import statistics
 import subprocess
 import sys
@@ -277,6 +278,7 @@ def latency_rows(pairs: int) -> list[dict]:
 
 
 def main() -> None:
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit("ended by SIGTERM"))  # the cell ends with us
     pictures = Path(os.environ.get("COGLAB_TOP", ".")) / "out" / "bench_console"
     rows: list[dict] = []
     parts = os.environ.get("CONSOLE_BENCH_PARTS", "page load stop actions phases latency").split()

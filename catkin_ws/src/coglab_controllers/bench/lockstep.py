@@ -1,12 +1,14 @@
 """The random reaches through bridge, controller manager and the stand-in for the robot controller, in lockstep.
 
-Needs the robot in virtual time of coglab_sim; without it the bench reports the interpolator alone.
+Needs the robot in virtual time of coglab_sim; without it the figures are missed.
 """
 
+import re
 from dataclasses import dataclass
 
+import coglab_controllers as cc
 import numpy as np
-from core_bench import LIMITS, PRIMITIVES, URDF
+from core_bench import LIMITS, PACKAGE, PRIMITIVES, URDF
 
 try:
     from coglab_sim import _cell, _virtual  # noqa: F401  (_cell knows the types that _virtual uses)
@@ -19,13 +21,20 @@ START_LIMIT, REACH_LIMIT, WATCHED = 10.0, 6.0, 1.5  # s of simulated time
 
 @dataclass
 class LockstepReach:
-    """Distance of the hand from its goal when it stands (m), time until it stood (s), largest joint speed over its
-    limit: of the set-point that the bridge sends, and of the arm behind its servos."""
+    """One reach. Distance of the hand from its goal at the end as the simulated arm has it (m, deg), largest distance
+    from the reference as measured (m), time until it stood (s). Largest of the joints over their limits: speed and
+    acceleration of the set-point that the bridge sends, speed of the arm behind its servos. `why`: it was refused or
+    given up."""
 
+    begun: bool
+    why: str
     last: float
-    duration: float
-    over: float
-    arm_over: float
+    turned: float
+    off_path: float = 0.0
+    duration: float = 0.0
+    over: float = 0.0
+    acceleration: float = 0.0
+    arm_over: float = 0.0
 
 
 def wait(robot, condition, limit: float) -> None:
@@ -61,36 +70,72 @@ def ready(posture: np.ndarray, manager: str = ""):
     return robot
 
 
-def reach(posture: np.ndarray, goal: np.ndarray, target: np.ndarray, limit: np.ndarray) -> LockstepReach | str:
-    """One DMP motion from rest in a posture to a goal frame that stays; a sentence if it is refused or aborted.
+def as_shipped() -> str:
+    """The controller manager's shipped parameters, with the shipped list of feedback controllers."""
+    text = (PACKAGE / "config" / "controllers.yaml").read_text()
+    return re.sub(r"package://(\w+)", lambda found: str(PACKAGE.parent / found.group(1)), text)
 
-    `limit` (7,): joint speeds, rad/s. The hand is where the simulated arm has it, not where measurement says.
-    """
-    robot = ready(posture)
+
+class Watch:
+    """What one reach does, tick by tick."""
+
+    def __init__(self, robot, limits, outcome: LockstepReach) -> None:
+        self.robot, self.limits, self.outcome = robot, limits, outcome
+        self.before = robot.report()["commanded_position"]
+        self.velocity = np.zeros(7)
+        self.hands: list[tuple[float, np.ndarray]] = []
+        self.stood: float | None = None
+
+    def look(self) -> dict:
+        """Takes one tick into account; the report of the control cycle."""
+        robot, limits, outcome = self.robot, self.limits, self.outcome
+        report = robot.report()
+        set_point = report["commanded_position"]
+        velocity = (set_point - self.before) / PERIOD
+        outcome.over = max(outcome.over, float(np.max(np.abs(velocity) / limits.velocity)))
+        change = np.abs(velocity - self.velocity) / PERIOD
+        outcome.acceleration = max(outcome.acceleration, float(np.max(change / limits.acceleration)))
+        self.before, self.velocity = set_point, velocity
+        speed = float(np.max(np.abs(robot.cell.velocity) / limits.velocity))
+        outcome.arm_over = max(outcome.arm_over, speed)
+        self.stood = (self.stood or robot.now) if speed < 1e-3 else None
+        for record in robot.ik_debug():
+            off = float(np.linalg.norm(record["set_point"][0] - record["measured"][0]))
+            outcome.off_path = max(outcome.off_path, off)
+        return report
+
+
+def reach(posture: np.ndarray, goal: np.ndarray, target: np.ndarray, limits: cc.JointLimits) -> LockstepReach:
+    """One DMP motion from rest in a posture to a goal frame that stays, with the robot as it ships."""
+    robot = ready(posture, as_shipped())
     robot.set_frame("goal", goal, target)
     answer = robot.execute_dmp(
         "reach_human", orientation_control=True, target_orientation=[0.0, 0.0, 0.0, 1.0], goal_frame="goal"
     )
-    if not answer[0]:
-        return answer[1]
-    begin, over, arm_over, reached, stood = robot.now, 0.0, 0.0, None, None
-    before = robot.report()["commanded_position"]
+    outcome = LockstepReach(bool(answer[0]), "" if answer[0] else answer[1], 0.0, 0.0)
+    if outcome.begun:
+        robot.set_ik_debug(True)
+        follow(robot, goal, target, limits, outcome)
+    hand = robot.cell.truth()["robot_hand"]
+    outcome.last = float(np.linalg.norm(hand["position"] - goal))
+    outcome.turned = float(np.degrees(np.linalg.norm(cc.rotation_between(hand["rotation"], target))))
+    return outcome
+
+
+def follow(robot, goal: np.ndarray, target: np.ndarray, limits: cc.JointLimits, outcome: LockstepReach) -> None:
+    """Runs a reach until it has been over for WATCHED s, or is given up."""
+    begin, reached, watch = robot.now, None, Watch(robot, limits, outcome)
     while reached is None or robot.now - reached < WATCHED:
         robot.set_frame("goal", goal, target)
         for _ in range(round(FRAME_PERIOD / PERIOD)):
             robot.tick()
-            speed = float(np.max(np.abs(robot.cell.velocity) / limit))
-            arm_over = max(arm_over, speed)
-            report = robot.report()
-            set_point = report["commanded_position"]
-            over = max(over, float(np.max(np.abs(set_point - before) / (PERIOD * limit))))
-            before = set_point
+            report = watch.look()
         if report["motion"] == "aborted":
-            return report["reason"]
+            outcome.why = report["reason"]
+            return
         if report["motion"] == "reached" and reached is None:
             reached = robot.now
-        if robot.now - begin > REACH_LIMIT:
-            return report["reason"] or "the motion waits at a border of the workspace"
-        stood = (stood or robot.now) if speed < 1e-3 else None
-    hand = robot.cell.truth()["robot_hand"]["position"]
-    return LockstepReach(float(np.linalg.norm(hand - goal)), (stood or robot.now) - begin, over, arm_over)
+        if reached is None and robot.now - begin > REACH_LIMIT:
+            outcome.why = report["reason"] or "the motion waits at a border of the workspace"
+            return
+    outcome.duration = (watch.stood or robot.now) - begin

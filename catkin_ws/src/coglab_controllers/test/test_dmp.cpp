@@ -261,6 +261,15 @@ TEST(ShapeMap, TakesTheDemonstratedLineToTheNewOne) {
     for (const ShapeMapping mapping : {ShapeMapping::Similarity, ShapeMapping::Upright}) {
       ASSERT_LT((shapeMap(mapping, from, to) * from - to).norm(), 1e-9) << describe(mapping);
     }
+    // A similarity: the smallest rotation from one line to the other, and one scale. It leaves the
+    // axis across both lines where it is, but for the scale.
+    const Matrix3 similar = shapeMap(ShapeMapping::Similarity, from, to);
+    const double scale = to.norm() / from.norm();
+    const Vector3 across = from.cross(to);
+    ASSERT_LT((similar.transpose() * similar - scale * scale * Matrix3::Identity()).norm(),
+              1e-9 * scale * scale);
+    ASSERT_GT(similar.determinant(), 0.0);
+    ASSERT_LT((similar * across - scale * across).norm(), 1e-9 * scale);
     const Matrix3 upright = shapeMap(ShapeMapping::Upright, from, to);
     EXPECT_GT(upright.col(2).z(), 0.0);
     EXPECT_EQ(upright.col(2).head<2>().norm(), 0.0);

@@ -245,21 +245,59 @@ TEST(DmpController, RobotThatStopsAbortsTheMotionAndRefusesNewOnes) {
 }
 
 TEST(DmpController, GivenStateBeginsThereWithItsVelocity) {
+  for (const bool given : {true, false}) {
+    VirtualRobot robot("dmp: {enable_ik_debug: true}");
+    robot.loadBoth();
+    robot.see("human_hand", kGoal);
+    const Vector3 hand = robot.hand().position;
+    DmpRequest request = robot.reach();
+    request.initial_state = given ? DmpRequest::kGiven : DmpRequest::kCurrent;
+    request.initial_position = hand + Vector3(0.0, 0.03, 0.0);
+    request.initial_velocity = Vector3(0.1, 0.0, 0.0);
+    ASSERT_TRUE(VirtualRobot::ok(robot.dmp().execute(request)));
+    robot.tick();
+    IkDebugRecord record;
+    ASSERT_TRUE(robot.dmp().readIkDebug(record));
+    const Vector3 begin = given ? request.initial_position : hand;
+    const Vector3 velocity = given ? request.initial_velocity : Vector3(Vector3::Zero());
+    EXPECT_LT((record.set_point.position - begin).norm(), 1e-9);
+    EXPECT_LT((record.velocity - velocity).norm(), 0.01);
+    // The arm follows its velocity from the first cycle on; the way to the place is blended in.
+    EXPECT_LT((robot.handVelocity() - velocity).norm(), 0.03);
+    for (int i = 0; i < 1000; ++i) {
+      robot.see("human_hand", kGoal);
+      robot.tick();
+    }
+    EXPECT_EQ(robot.state(), MotionState::Reached) << robot.reason();
+  }
+}
+
+TEST(DmpController, AfterTheEndTheRemainingDistanceIsThatToTheGoalThatWasLatched) {
   VirtualRobot robot;
   robot.loadBoth();
   robot.see("human_hand", kGoal);
-  DmpRequest request = robot.reach();
-  request.initial_state = DmpRequest::kGiven;
-  request.initial_position = robot.hand().position + Vector3(0.0, 0.01, 0.0);
-  request.initial_velocity = Vector3(0.1, 0.0, 0.0);
-  ASSERT_TRUE(VirtualRobot::ok(robot.dmp().execute(request)));
-  robot.tick();
-  EXPECT_LT((robot.handVelocity() - request.initial_velocity).norm(), 0.03);
-  for (int i = 0; i < 1000; ++i) {
+  ASSERT_TRUE(VirtualRobot::ok(robot.dmp().execute(robot.reach())));
+  DmpProgress progress;
+  double least = 1.0;
+  for (int i = 0; i < 1000 && robot.state() != MotionState::Reached; ++i) {
     robot.see("human_hand", kGoal);
     robot.tick();
+    ASSERT_TRUE(robot.dmp().readProgress(progress));
+    least = std::min(least, progress.remaining_distance);
+    if (progress.state == MotionState::Running && i > 5) {
+      ASSERT_NEAR(progress.remaining_distance, (kGoal - robot.hand().position).norm(), 0.01) << i;
+    }
   }
-  EXPECT_EQ(robot.state(), MotionState::Reached);
+  ASSERT_EQ(robot.state(), MotionState::Reached) << robot.reason();
+  for (int i = 0; i < 200; ++i) {  // sights that differ by less than what is followed again
+    robot.see("human_hand", kGoal + Vector3(0.0, i % 2 == 0 ? 0.02 : -0.02, 0.0));
+    robot.tick();
+    ASSERT_TRUE(robot.dmp().readProgress(progress));
+    ASSERT_EQ(robot.state(), MotionState::Reached);
+    ASSERT_LT(progress.remaining_distance, 0.005) << i;
+  }
+  EXPECT_NEAR(progress.remaining_distance, (progress.goal.position - robot.hand().position).norm(),
+              1e-3);
 }
 
 TEST(DmpController, IkDebugSaysWhatTheCycleDid) {

@@ -132,5 +132,54 @@ TEST(FrameGoal, AStepBackOfTheClockStartsAnew) {
   }
 }
 
+/// While a motion runs, each sight is judged as the first one was.
+TEST(FrameGoal, ASightThatIsNoPoseIsNotFollowed) {
+  VirtualRobot robot;
+  robot.loadBoth();
+  DmpRequest request = robot.reach();
+  request.goal_offset = Vector3(0.05, 0.0, 0.0);  // the goal turns with the frame
+  robot.see("human_hand", kGoal);
+  ASSERT_TRUE(VirtualRobot::ok(robot.dmp().execute(request)));
+  for (int i = 0; i < 300; ++i) {
+    robot.see("human_hand", kGoal);
+    GoalObservation& seen = robot.frames.frames["human_hand"];
+    if (i >= 60 && i < 90) {
+      if (i % 3 == 0) seen.position.y() = std::nan("");
+      if (i % 3 == 1) seen.orientation.coeffs() << 0.0, 0.0, 1.0, 1.0;
+      if (i % 3 == 2) seen.orientation.coeffs()[0] = std::nan("");
+    }
+    robot.tick();
+    ASSERT_TRUE(robot.command.velocity.allFinite()) << i;
+    ASSERT_EQ(robot.state(), i < 200 ? MotionState::Running : robot.state()) << robot.reason();
+    ASSERT_LT((robot.dmp().motion().goal() - kGoal - request.goal_offset).norm(), 1e-9) << i;
+  }
+}
+
+TEST(FrameGoal, ASightStampedAheadOfTheClockIsNotFollowed) {
+  VirtualRobot robot;
+  robot.loadBoth();
+  robot.see("human_hand", kGoal);
+  ASSERT_TRUE(VirtualRobot::ok(robot.dmp().execute(robot.reach())));
+  const auto tick = [&](double ahead, const Vector3& place) {
+    robot.see("human_hand", place);
+    GoalObservation& seen = robot.frames.frames["human_hand"];
+    seen.stamp_ns += std::llround(1e9 * ahead);
+    seen.frame_ns += std::llround(1e9 * ahead);
+    robot.tick();
+  };
+  const Vector3 aside = kGoal + Vector3(0.0, 0.05, 0.0);
+  for (int i = 0; i < 60; ++i) tick(0.0, kGoal);
+  for (int i = 0; i < 60; ++i) {
+    tick(0.2, aside);
+    ASSERT_LT((robot.dmp().motion().goal() - kGoal).norm(), 1e-9) << i;
+  }
+  EXPECT_EQ(robot.state(), MotionState::Holding);
+  EXPECT_NE(robot.reason().find("ahead of the clock"), std::string::npos) << robot.reason();
+  // What clocks that are synchronised differ by is let pass.
+  for (int i = 0; i < 100; ++i) tick(0.04, aside);
+  EXPECT_EQ(robot.state(), MotionState::Running) << robot.reason();
+  EXPECT_GT((robot.dmp().motion().goal() - kGoal).norm(), 0.04);
+}
+
 }  // namespace
 }  // namespace coglab_controllers

@@ -142,10 +142,9 @@ TEST(TwoTaskIk, DropsTheSecondTaskNearASingularity) {
   reference.angular_velocity = Vector3(0.0, 0.0, 0.3);
   IkResult result;
   ik.solve(state, q, reference, result);
-  if (result.smallest_singular_value_rotation < 0.05) {
-    EXPECT_TRUE(result.rotation_rejected);
-    EXPECT_TRUE(result.rotation_velocity.isZero(0.0));
-  }
+  ASSERT_LT(result.smallest_singular_value_rotation, 0.05) << "the posture is no singular one";
+  EXPECT_TRUE(result.rotation_rejected);
+  EXPECT_TRUE(result.rotation_velocity.isZero(0.0));
   EXPECT_LT((state.jacobian.topRows<3>() * result.velocity - reference.velocity).norm(), 1e-9);
 }
 

@@ -157,6 +157,26 @@ TEST(Rotation, LogarithmInvertsExponential) {
   EXPECT_TRUE(logRotation(Quaternion::Identity()).isZero(0.0));
 }
 
+TEST(Rotation, TheShortestTurnTurnsOneDirectionIntoTheOther) {
+  Random random(5);
+  const auto direction = [&] { return random.point(1.0); };
+  for (int i = 0; i < 3000; ++i) {
+    const Vector3 from = direction();
+    // Any direction, one nearly the same, one nearly or exactly opposite.
+    const Vector3 to = i % 3 == 0 ? direction()
+                       : i % 3 == 1
+                           ? Vector3(2.0 * from + 1e-9 * direction())
+                           : Vector3(-3.0 * from + std::pow(10.0, -(i % 20)) * direction());
+    const Quaternion turn = shortestTurn(from, to);
+    EXPECT_NEAR(turn.norm(), 1.0, 1e-12);
+    EXPECT_LT((turn * from.normalized() - to.normalized()).norm(), 1e-7) << i;
+    EXPECT_LT(std::abs(turn.vec().dot(from)), 1e-6 * from.norm()) << "a turn about another axis";
+  }
+  for (const Vector3& axis : {Vector3::UnitX(), Vector3::UnitY(), Vector3::UnitZ()}) {
+    EXPECT_LT((shortestTurn(axis, -axis) * axis + axis).norm(), 1e-12);
+  }
+}
+
 TEST(Rotation, DifferenceEqualsKdl) {
   Random random(6);
   for (int k = 0; k < 20000; ++k) {

@@ -125,12 +125,13 @@ TEST(Library, LearnsTrajectoriesWhenRead) {
   EXPECT_NEAR(path(0, 1), 0.25, 0.002);
 }
 
+/// The golden files are derived apart, from the equations in numpy (golden/make_golden.py).
 TEST(Library, GoldenFilesMeanTheSameAsInPython) {
   const std::string folder = std::string(COGLAB_PACKAGE_DIR) + "/test/golden/";
   Library weights, learnt;
-  EXPECT_EQ(weights.load(folder + "weights.xml"), 2);
+  EXPECT_EQ(weights.load(folder + "weights.xml"), 3);
   EXPECT_EQ(weights.format(), readFile(folder + "weights.xml"));
-  EXPECT_EQ(learnt.load(folder + "demonstrations.xml"), 2);
+  EXPECT_EQ(learnt.load(folder + "demonstrations.xml"), 3);
   for (const auto& [id, p] : weights.primitives()) {
     EXPECT_LT((learnt.at(id).weights - p.weights).norm(), 1e-6) << id;
   }
@@ -154,10 +155,10 @@ TEST(Library, GoldenFilesMeanTheSameAsInPython) {
       step = 0;
     }
     for (; step < until; ++step) dmp.step(0.005, goal);
-    EXPECT_LT((dmp.state().position - expected).norm(), 1e-9) << line;
+    EXPECT_LT((dmp.state().position - expected).norm(), 2e-8) << line;
     ++compared;
   }
-  EXPECT_EQ(compared, 40);
+  EXPECT_EQ(compared, 60);
 }
 
 TEST(Library, AnUnknownIdNamesThoseLoaded) {

@@ -173,7 +173,7 @@ TEST(LimitsCombined, ReachesUnderPushesNearTheEndsOfTheRangesComeToNoFault) {
   DelayedRobot robot("{" + kShipped + "}");
   robot.loadBoth("ptp");
   std::mt19937 random(12);
-  int reached = 0;
+  int reached = 0, blocked = 0;
   for (int run = 0; run < 25; ++run) {
     robot.active_dmp = false;
     robot.switchTo("ptp");
@@ -206,8 +206,22 @@ TEST(LimitsCombined, ReachesUnderPushesNearTheEndsOfTheRangesComeToNoFault) {
     const ReasonCode why = robot.manager->report().reason.code();
     EXPECT_TRUE(robot.state() == MotionState::Reached || why == ReasonCode::JointBlocked)
         << nameOf(robot.state()) << ": " << robot.reason();
+    if (why != ReasonCode::JointBlocked) continue;
+    // The sentence names the joint, and that one is at its stop.
+    int named = -1;
+    for (int joint = 0; joint < kMaxJoints; ++joint) {
+      const std::string& name = robot.manager->settings().robot->chain.jointNames()[joint];
+      if (robot.reason() == "joint " + name + " is at its stop and blocks the motion")
+        named = joint;
+    }
+    ASSERT_GE(named, 0) << robot.reason();
+    EXPECT_LT(std::min(robot.limits.upper_position[named] - robot.sample.position[named],
+                       robot.sample.position[named] - robot.limits.lower_position[named]),
+              robot.limits.position_margin + 0.02);
+    ++blocked;
   }
   EXPECT_GT(reached, 12);
+  EXPECT_GT(blocked, 0);
   EXPECT_GE(robot.least_room, robot.limits.position_margin - 2e-3);
   EXPECT_EQ(robot.cuts, 0);
   expectNoFault(robot);

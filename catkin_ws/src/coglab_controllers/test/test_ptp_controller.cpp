@@ -1,8 +1,11 @@
 // The point-to-point plug-in in virtual time: D4.10 Table 5.
+#include <array>
 #include <atomic>
 #include <chrono>
+#include <random>
 #include <thread>
 
+#include "coglab_controllers/limits/workspace.hpp"
 #include "virtual_robot.hpp"
 
 namespace coglab_controllers {
@@ -161,36 +164,74 @@ TEST(PtpController, AMotionThatRacesAHoldIsNeitherReportedAsExecutedNorMadeAfter
   }
 }
 
+/// The least distance of the hand to a border of the workspace on the straight way in joint space,
+/// m; negative: outside.
+double roomOnTheWay(const VirtualRobot& robot, const JointVector& from, const JointVector& to) {
+  const RobotSetup& setup = *robot.manager->settings().robot;
+  const Workspace workspace(setup.guard.workspace, setup.chain.reach());
+  double least = 1.0;
+  for (int step = 0; step <= 400; ++step) {
+    const JointVector q = from + step / 400.0 * (to - from);
+    std::array<Workspace::Margin, Workspace::kBorders> margins;
+    workspace.margins(setup.chain, setup.chain.evaluate(q), JointVector::Zero(), margins);
+    for (const Workspace::Margin& margin : margins) {
+      if (margin.border != WorkspaceBorder::None) least = std::min(least, margin.distance);
+    }
+  }
+  return least;
+}
+
+/// A motion is refused only for its target, given up only for a border on its way, and otherwise
+/// ends on its target.
 TEST(PtpController, RandomMotionsEndExactly) {
-  std::srand(7);
+  std::mt19937 random(7);
+  std::uniform_real_distribution<double> share(-0.6, 0.6);
   VirtualRobot robot;
   robot.loadBoth("ptp");
-  int rejected = 0;
-  for (int run = 0; run < 40; ++run) {
-    std::vector<double> target(7);
-    for (int joint = 0; joint < 7; ++joint) {
-      const double random = 2.0 * std::rand() / RAND_MAX - 1.0;
-      target[joint] = random * 0.6 * robot.limits.upper_position[joint];
-    }
+  const RobotSetup& setup = *robot.manager->settings().robot;
+  int reached = 0, rejected = 0, aborted = 0;
+  std::vector<int> expected, ends;
+  for (int run = 0; run < 120; ++run) {
+    JointVector to;
+    for (double& joint : to) joint = share(random);
+    to = to.cwiseProduct(robot.limits.upper_position);
+    const JointVector from = robot.sample.position;
+    const std::vector<double> target(to.data(), to.data() + 7);
     const MotionAnswer answer = robot.ptp().add({target, std::vector<double>(7, 1.5), {}});
-    if (answer.status == MotionAnswer::kRejected) {
+    const bool inside = setup.workspace.contains(setup.chain.evaluate(to).tool.position);
+    ASSERT_EQ(answer.status, inside ? MotionAnswer::kStarted : MotionAnswer::kRejected)
+        << answer.message;
+    if (!inside) {
+      ASSERT_EQ(answer.code, ReasonCode::GoalOutsideWorkspace) << answer.message;
       ++rejected;
       continue;
     }
-    int i = 0;
     robot.tick();
-    for (; i < 20000 && robot.state() == MotionState::Running; ++i) {
+    for (int i = 0; i < 20000 && robot.state() == MotionState::Running; ++i) {
       robot.tick();
       ASSERT_TRUE(
           (robot.command.velocity.cwiseAbs().array() <= robot.limits.velocity.array() + 1e-9)
               .all());
     }
-    if (robot.state() == MotionState::Aborted) continue;  // a border of the workspace on the way
-    for (int joint = 0; joint < 7; ++joint) {
-      ASSERT_NEAR(robot.sample.position[joint], target[joint], 2e-3) << robot.reason();
+    const std::vector<int> now = executed(robot.ptp());
+    ends.insert(ends.end(), now.begin(), now.end());
+    if (robot.state() == MotionState::Aborted) {
+      ++aborted;
+      ASSERT_EQ(robot.manager->report().reason.code(), ReasonCode::WorkspaceBorder)
+          << robot.reason();
+      ASSERT_LT(roomOnTheWay(robot, from, to), 0.01) << "nothing was in its way";
+      continue;
     }
+    ASSERT_EQ(robot.state(), MotionState::Reached) << robot.reason();
+    ++reached;
+    expected.push_back(answer.id);
+    ASSERT_LT((robot.sample.position - to).lpNorm<Eigen::Infinity>(), 2e-3);
   }
-  EXPECT_LT(rejected, 30);
+  EXPECT_EQ(ends, expected);
+  EXPECT_EQ(reached + aborted + rejected, 120);
+  EXPECT_GE(reached, 50);
+  EXPECT_LE(aborted, 30);
+  EXPECT_LE(rejected, 60);
 }
 
 }  // namespace

@@ -15,14 +15,17 @@ from coglab_msgs.msg import DmpGoal, FeedbackGain, FeedbackState, FeedbackStatus
 from coglab_msgs.srv import (
     AddPtpRequest,
     DescribeController,
+    ExecuteDmpRequest,
     FeedbackBySignal,
     FeedbackSelect,
     LoadFeedback,
     ReloadGains,
     SetExecutionOrder,
     SetGains,
+    SwitchDmpRequest,
 )
 from diagnostic_msgs.msg import DiagnosticArray
+from geometry_msgs.msg import Point, Vector3
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64
 
@@ -90,6 +93,61 @@ class TopicGoal(unittest.TestCase):
         q = record.measured.orientation
         self.assertAlmostEqual(q.x**2 + q.y**2 + q.z**2 + q.w**2, 1.0, places=6)
         self.assertTrue(self.targets and len(self.targets[-1].velocity) == 7)
+
+    def test_3b_switch_dmp_goes_on_in_the_phase_of_the_motion(self) -> None:
+        robot = self.robot
+        robot.see_hand(ASIDE)
+        wait_until(lambda: abs(self.goals[-1].goal.x - ASIDE[0]) < 1e-6, 5.0, "the helper's goal aside")
+        answer = robot.execute(goal_frame="", dmp_ratio=3.0)
+        self.assertTrue(answer.success, answer.message)
+        wait_until(lambda: robot.feedback.state == "running" and 0.1 < robot.feedback.phase < 0.4, 10.0, "half way")
+        robot.feedbacks.clear()
+        answer = robot.dmp("switch_dmp", SwitchDmpRequest(primitive_id="wave", dmp_ratio=3.0))
+        self.assertEqual((answer.success, answer.reason_code), (False, ReasonCode.UNKNOWN_NAME))
+        answer = robot.dmp("switch_dmp", SwitchDmpRequest(primitive_id="give_human", dmp_ratio=2.0))
+        self.assertTrue(answer.success, answer.message)
+        wait_until(lambda: robot.feedback.state == "reached", 15.0, "reached")
+        told = list(robot.feedbacks)
+        primitives = [m.primitive_id for m in told]
+        self.assertIn("give_human", primitives)
+        first = primitives.index("give_human")
+        self.assertEqual(set(primitives[:first]), {"reach_human"})
+        self.assertEqual(set(primitives[first:]), {"give_human"})
+        phases = [m.phase for m in told]
+        self.assertEqual(phases, sorted(phases, reverse=True), "the phase never begins anew")
+        self.assertLess(phases[0], 0.4)
+        way = [m.remaining_distance for m in told if m.state == "running"]
+        self.assertTrue(all(later < before + 0.01 for before, later in zip(way, way[1:], strict=False)), "no step back")
+        self.assertEqual({m.state for m in told}, {"running", "reached"})
+        answer = robot.dmp("switch_dmp", SwitchDmpRequest(primitive_id="reach_human", dmp_ratio=1.0))
+        self.assertTrue(answer.success or answer.reason_code == ReasonCode.NOTHING_RUNS, answer.message)
+
+    def test_3c_a_given_initial_state_comes_through(self) -> None:
+        robot = self.robot
+        robot.see_hand(GOAL)
+        wait_until(lambda: abs(self.goals[-1].goal.x - GOAL[0]) < 1e-6, 5.0, "the helper's goal")
+        far, near = Point(ASIDE[0], ASIDE[1] + 0.3, ASIDE[2] + 0.02), Point(ASIDE[0], ASIDE[1], ASIDE[2] + 0.02)
+        answer = robot.execute(goal_frame="", initial_state=ExecuteDmpRequest.GIVEN, initial_position=far)
+        self.assertEqual((answer.success, answer.reason_code), (False, ReasonCode.OUT_OF_RANGE))
+        self.assertRegex(answer.message, r"initial_position is 0\.(29|30|31)")
+        fast = Vector3(0.0, 0.0, 2.5)
+        answer = robot.execute(
+            goal_frame="", initial_state=ExecuteDmpRequest.GIVEN, initial_position=near, initial_velocity=fast
+        )
+        self.assertEqual((answer.success, answer.reason_code), (False, ReasonCode.OUT_OF_RANGE))
+        self.assertIn("initial_velocity is 2.5", answer.message)
+        self.debug.clear()
+        slow = Vector3(0.0, 0.1, 0.0)
+        answer = robot.execute(
+            goal_frame="", initial_state=ExecuteDmpRequest.GIVEN, initial_position=near, initial_velocity=slow
+        )
+        self.assertTrue(answer.success, answer.message)
+        wait_until(lambda: any(m.phase > 0.97 for m in self.debug), 5.0, "the first references")
+        first = next(m for m in self.debug if m.phase > 0.97)
+        place = first.set_point.position
+        self.assertLess(math.dist((place.x, place.y, place.z), (near.x, near.y, near.z)), 0.005)
+        self.assertAlmostEqual(first.set_point_velocity.linear.y, 0.1, delta=0.03)
+        wait_until(lambda: robot.feedback.state == "reached", 10.0, "reached")
 
     def test_4_refusals(self) -> None:
         robot = self.robot

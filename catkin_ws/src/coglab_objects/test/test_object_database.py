@@ -34,7 +34,7 @@ def test_five_sample_objects_without_a_problem():
         (("default_grasp: side", "default_grasp: top"), "default_grasp: 'top' is none of grasps: side"),
         (("[0.5, 0.5, 0.5, 0.5]", "[0, 0, 0, 0]"), "a quaternion of zeros has no direction"),
         (("[0.5, 0.5, 0.5, 0.5]", "[.nan, 0, 0, 1]"), "quaternion.0: a finite number expected"),
-        (("xyz: [0.0, -0.04, 0.05]", "xyz: [0.0, -40.0, 0.05]"), "more than 1 m away; lengths are in m"),
+        (("xyz: [0.0, -0.04, 0.07]", "xyz: [0.0, -40.0, 0.07]"), "more than 1 m away; lengths are in m"),
         (("axis: [0.0, 1.0, 0.0]", "axis: [0.0, 0.0, 0.0]"), "a direction must not be zero"),
         (("id: mug", "id: Mug Cup"), "id: 'Mug Cup' does not match"),
         (("mass: 0.31", "mass: 0.31\nmass: 0.4"), "field 'mass' appears twice"),

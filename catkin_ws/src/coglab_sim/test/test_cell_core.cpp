@@ -6,8 +6,10 @@
 #include <cmath>
 #include <memory>
 #include <numeric>
+#include <string>
 #include <thread>
 #include <utility>
+#include <vector>
 
 #include <netinet/in.h>
 #include <sys/socket.h>
@@ -53,56 +55,73 @@ TEST(Statistics, WindowLatencyAndJitter) {
   EXPECT_EQ(statistics.missCounter(), 2U);
 }
 
-TEST(CellConfig, EveryParameterGoesInAndOut) {
-  CellConfig config;
-  for (const CellParameter& parameter : cellParameters()) {
-    SCOPED_TRACE(parameter.name);
-    EXPECT_FALSE(parameter.description.empty());
-    EXPECT_TRUE(parameter.source == "published" || parameter.source == "ours" ||
-                parameter.source == "set-up");
-    const ParameterValue value = parameter.get(config);
-    parameter.set(config, value);
-    EXPECT_TRUE(parameter.get(config) == value);
+/// The estimate stays aside by the hysteresis after a movement, on the side of the movement.
+TEST(TorqueSensor, TheEstimateKeepsTheSideOfTheLastMovement) {
+  TorqueNoise noise;
+  noise.sigma = noise.bias = 0.0;
+  noise.hysteresis = 0.3;
+  TorqueSensor sensor(noise, 1);
+  const Vector7 ideal = Vector7::LinSpaced(-3.0, 3.0), posture = Vector7::Zero();
+  const Vector7 at_rest = sensor.external(ideal, posture), measured = sensor.measured(ideal);
+  const auto aside = [&] { return Vector7(sensor.external(ideal, posture) - at_rest); };
+  Vector7 velocity = Vector7::Zero();
+  velocity[1] = 0.1;
+  velocity[4] = -0.1;
+  Vector7 expected = Vector7::Zero();
+  expected[1] = 0.3;
+  expected[4] = -0.3;
+  for (int direction : {1, -1}) {
+    for (int i = 0; i < 400; ++i) sensor.advance(direction * velocity, 0.001);
+    EXPECT_LT((aside() - direction * expected).cwiseAbs().maxCoeff(), 1e-3) << direction;
+    for (int i = 0; i < 400; ++i) sensor.advance(Vector7::Zero(), 0.001);
+    EXPECT_LT((aside() - direction * expected).cwiseAbs().maxCoeff(), 1e-3) << "after the stop";
   }
-  EXPECT_THROW(setCellParameter(config, "krc/nothing", 1.0), std::invalid_argument);
-  EXPECT_THROW(setCellParameter(config, "krc/period", std::string("fast")), std::invalid_argument);
-  EXPECT_THROW(setCellParameter(config, "home", std::vector<double>{1.0}), std::invalid_argument);
+  // It reverses over hysteresis_speed: far below that the side changes slowly.
+  sensor.advance(0.01 * noise.hysteresis_speed / 0.1 * velocity, 0.001);
+  EXPECT_LT((aside() + expected).cwiseAbs().maxCoeff(), 0.02);
+  EXPECT_EQ(sensor.measured(ideal), measured);  // the joint torque itself has none
 }
 
-/// Real time times any factor; nobody has to answer, and a flood of datagrams stops nothing.
+/// Real time times any factor; nobody has to answer, and a flood of datagrams stops nothing. A
+/// busy machine may lose periods: of five runs the one that lost least tells the factor.
 TEST(RealTimeCell, TheFactorScalesTimeAndAFloodDoesNotStopIt) {
-  for (const double factor : {0.5, 4.0}) {
+  const auto share_of = [](double factor) {  // simulated time over factor x real time
     const int fd = socket(AF_INET, SOCK_DGRAM, 0);
-    sockaddr_in own{};
+    sockaddr_in own{}, peer{};
     own.sin_family = AF_INET;
     own.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
     socklen_t length = sizeof own;
-    ASSERT_EQ(bind(fd, reinterpret_cast<sockaddr*>(&own), length), 0);
-    ASSERT_EQ(getsockname(fd, reinterpret_cast<sockaddr*>(&own), &length), 0);
+    EXPECT_EQ(bind(fd, reinterpret_cast<sockaddr*>(&own), length), 0);
+    EXPECT_EQ(getsockname(fd, reinterpret_cast<sockaddr*>(&own), &length), 0);
     CellConfig config;
     config.urdf = URDF;
-    config.krc.period = 0.01;
+    config.krc.period = 0.02;
     RealTimeCell cell(config, "127.0.0.1", ntohs(own.sin_port), factor);
-    const auto begin = std::chrono::steady_clock::now();
     cell.start();
     std::array<char, 1024> bytes{};
-    sockaddr_in peer{};
     length = sizeof peer;
-    ASSERT_EQ(
+    EXPECT_EQ(
         recvfrom(fd, bytes.data(), bytes.size(), 0, reinterpret_cast<sockaddr*>(&peer), &length),
         916);
+    const auto begin = std::chrono::steady_clock::now();
+    const double simulated_before = cell.snapshot().truth.time;
     double simulated = 0.0, real = 0.0;
-    while (real < 0.6) {
+    while (real < 0.4) {
       for (int i = 0; i < 50; ++i)
         sendto(fd, bytes.data(), 376, 0, reinterpret_cast<sockaddr*>(&peer), sizeof peer);
-      simulated = cell.snapshot().truth.time;
+      simulated = cell.snapshot().truth.time - simulated_before;
       real = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
     }
     cell.stop();
     close(fd);
     EXPECT_TRUE(cell.failure().empty()) << cell.failure();
-    EXPECT_LT(simulated, factor * real * 1.05 + 0.02);
-    EXPECT_GT(simulated, 0.1 * factor * real);  // a busy machine may lose periods, never all
+    EXPECT_LT(simulated, factor * real * 1.05 + 0.05) << factor;
+    return simulated / (factor * real);
+  };
+  for (const double factor : {0.5, 1.0, 4.0}) {
+    double best = 0.0;
+    for (int run = 0; run < 5 && best < 0.85; ++run) best = std::max(best, share_of(factor));
+    EXPECT_GE(best, 0.85) << factor << " times real time";
   }
   CellConfig config;
   config.urdf = URDF;

@@ -260,7 +260,10 @@ class HandContract(Contract):
         self.place.freeze()
         try:
             self.until(lambda: not self.port.state().connected, 2.5, "silence")
-            assert self.port.state().message
+            state = self.port.state()
+            assert state.message and state.event == ReasonCode.NODE_SILENT
+            # What was true of the hand before is not known any more.
+            assert not state.calibrated and not state.holding and state.positions == ()
             opening = self.port.open(400)
             self.place.sleep(0.3)
             assert not opening.done()

@@ -1,4 +1,10 @@
-"""Bad input, one case per line of the table in the README: what is wrong, where the machine ends, the sentence."""
+"""Bad input, one case per line of the table in the README: what is wrong, where the machine ends, the sentence.
+
+CASES are sentences that the brain itself makes. What a node says is only passed on here (PASSED_ON, in words that no
+node has); its own words are asked of the node: coglab_controllers/test/test_limits_combined.cpp (a joint at its stop),
+test_virtual_bad_input.py (a goal that is lost, a primitive that does not exist), coglab_sim/test/test_vision.py (two
+people, an object that is not seen).
+"""
 
 import shutil
 
@@ -20,11 +26,6 @@ def unreachable_object(t):
     t.ctx.reachable = lambda palm: False
 
 
-def object_behind_a_stop(t):
-    t.cell.faults.abort_dmp_after = 0.05
-    t.cell.faults.abort_reason = "joint lwr_a3 at its stop blocks the motion for 0.5 s"
-
-
 def object_out_of_reach(t):
     t.cell.objects["mug"] = Pose([1.4, 0.2, 0.1])
 
@@ -33,32 +34,16 @@ def no_person(t):
     t.cell.faults.not_seen.add("mug")
 
 
-def two_people(t):
-    t.cell.faults.refuse["locate mug"] = "2 people are in view; one partner is expected: ask the others to step back"
-
-
-def goal_lost(t):
-    t.cell.faults.abort_dmp_after = 0.6
-
-
 def hand_dead(t):
     t.cell.faults.dead.add("hand")
-
-
-def missing_primitive(t):
-    t.cell.primitives.discard("reach_human")
 
 
 CASES = {
     missing_object: "object 'elephant' is not in the database; it has: ball, bottle, mug, screwdriver, tea_box",
     unreachable_object: "'mug' cannot be reached: the arm has no posture for the hand at (0.78, -0.04, 0.50) m",
-    object_behind_a_stop: "the reach was aborted, because joint lwr_a3 at its stop blocks the motion",
     object_out_of_reach: "'mug' was not offered within 8 s: it stayed at (1.40, 0.20, 0.10) m, outside the handover",
     no_person: "'mug' was not seen within 5.0 s",
-    two_people: "2 people are in view; one partner is expected",
-    goal_lost: "the reach was aborted, because goal lost for 1.0 s",
     hand_dead: "preshape 'cylindrical' within 6.0 s expected",
-    missing_primitive: "primitive 'reach_human' does not exist; loaded: ",
 }
 
 
@@ -83,6 +68,67 @@ def test_bad_input_ends_in_the_hub_with_its_sentence(prepare):
         if r.path == "/coglab_master" and r.from_state == EXCHANGE
     )
     assert CASES[prepare].split(", because")[0] in trial.result().to_dict()["reason"]
+    assert list(trial.cell.joints) == trial.ctx.config.get("postures.home")
+
+
+WORDS = "the words of a node that this test has made up 4711"
+
+
+def joint_at_its_stop(t):
+    t.cell.faults.abort_dmp_after, t.cell.faults.abort_reason = 0.05, WORDS
+
+
+def goal_lost(t):
+    t.cell.faults.abort_dmp_after, t.cell.faults.abort_reason = 0.6, WORDS
+
+
+def two_people(t):
+    t.cell.faults.refuse["locate mug"] = PortError(WORDS, code=ReasonCode.NOT_PERCEIVED)
+
+
+def not_seen(t):
+    t.cell.faults.refuse["locate mug"] = PortError(WORDS, code=ReasonCode.OBJECT_NOT_SEEN)
+
+
+def missing_primitive(t):
+    t.cell.faults.refuse["execute_dmp"] = PortError(WORDS, code=ReasonCode.UNKNOWN_NAME)
+
+
+def database_refuses(t):
+    t.cell.faults.refuse["get mug"] = PortError(WORDS, code=ReasonCode.OBJECT_UNKNOWN)
+
+
+def hand_refuses(t):
+    t.cell.faults.refuse["preshape cylindrical"] = PortError(WORDS, code=ReasonCode.HAND_STALLED)
+
+
+PASSED_ON = {
+    joint_at_its_stop: ("the reach was aborted, because ", ReasonCode.GOAL_LOST),
+    goal_lost: ("the reach was aborted, because ", ReasonCode.GOAL_LOST),
+    two_people: ("", ReasonCode.NOT_PERCEIVED),
+    not_seen: ("", ReasonCode.OBJECT_NOT_SEEN),
+    missing_primitive: ("", ReasonCode.UNKNOWN_NAME),
+    database_refuses: ("", ReasonCode.OBJECT_UNKNOWN),
+    hand_refuses: ("", ReasonCode.HAND_STALLED),
+}
+
+
+@pytest.mark.parametrize("prepare", PASSED_ON, ids=lambda f: f.__name__)
+def test_what_a_node_says_reaches_the_person_word_for_word_with_its_code(prepare):
+    trial = Trial()
+
+    def script(t):
+        t.wait_hub("wait_without_object")
+        prepare(t)
+        t.start(EXCHANGE)
+        t.wait_hub("wait_without_object")
+
+    trial.run(script)
+    result = trial.result()
+    frame, code = PASSED_ON[prepare]
+    assert result.outcome == "failed_empty" and result.code == code
+    assert frame + WORDS in trial.ctx.journal.why(), trial.ctx.journal.why()
+    assert WORDS in " ".join([result.reason, *result.causes])
     assert list(trial.cell.joints) == trial.ctx.config.get("postures.home")
 
 

@@ -5,18 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import smach
-
-try:
-    from coglab_sim.virtual_world import BOARD
-    from virtual_trial import VirtualTrial
-except ImportError as error:
-    pytest.skip(f"a compiled module is not there: {error}", allow_module_level=True)
 from coglab_perception.frames import FrameNames
 from coglab_py.pose import Pose
 from coglab_sim.tracker.tracker import Board, PerceptionSettings
 from coglab_sim.tracker.vision import NotSeen, Vision
+from coglab_sim.virtual_world import BOARD
 from coglab_smach.ports.interfaces import Located
 from coglab_smach.ports.pending import Polled, PortError, Ready
+from virtual_trial import VirtualTrial
 
 NAMES = FrameNames("world", "human_hand", "board", "object_{id}")
 BESIDE, BEHIND = np.array([1.05, 0.45, 0.35]), np.array([1.75, 0.6, 0.35])

@@ -2,6 +2,7 @@
 
 import pytest
 from coglab_objects.database import ObjectDatabase, objects_folder
+from coglab_sim.virtual_world import DT, World
 from coglab_smach.simulated.cell import SimulatedCell
 from coglab_smach.simulated.ports import (
     SimulatedArm,
@@ -10,7 +11,9 @@ from coglab_smach.simulated.ports import (
     SimulatedHand,
     SimulatedPerception,
 )
+from coglab_smach.simulated.world_ports import VirtualArm
 from port_contracts import SUITES, Place
+from virtual_trial import LIBRARY
 
 
 class ManualClock:
@@ -64,12 +67,6 @@ RIG_LACKS = ("test_given_up_while_its_node_is_frozen_it_never_acts", "test_a_hol
 
 def test_the_arm_of_whole_trials():
     """The arm of the trials in virtual time, which has the real controllers behind it."""
-    try:
-        from coglab_sim.virtual_world import DT, World
-        from coglab_smach.simulated.world_ports import VirtualArm
-        from virtual_trial import LIBRARY
-    except ImportError as error:
-        pytest.skip(f"a compiled module is not there: {error}")
     rig = World(1)
 
     def sleep(duration):

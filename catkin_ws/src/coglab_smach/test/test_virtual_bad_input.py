@@ -1,13 +1,9 @@
 """Bad input against the real controller manager, bridge and hand driver: the sentences are theirs."""
 
+import numpy as np
 import pytest
 import smach
-
-try:
-    from virtual_trial import VirtualTrial
-except ImportError as error:
-    pytest.skip(f"a compiled module is not there: {error}", allow_module_level=True)
-import numpy as np
+from virtual_trial import VirtualTrial
 
 RECEIVE, GIVE = "exchange_human_to_robot", "exchange_robot_to_human"
 

@@ -7,12 +7,8 @@ import os
 import pytest
 import smach
 import yaml
-
-try:
-    from virtual_trial import VirtualTrial
-except ImportError as error:
-    pytest.skip(f"a compiled module is not there: {error}", allow_module_level=True)
 from coglab_sim.virtual_world import LIMITS
+from virtual_trial import VirtualTrial
 
 LONG = os.environ.get("COGLAB_LONG") == "1"
 SESSION = ("exchange_human_to_robot", "put", "take", "exchange_robot_to_human")

@@ -108,6 +108,9 @@ class Bench {
     return count;
   }
 
+  /// Controllers whose correction of the last cycle was recorded.
+  std::size_t attributed() const { return bounded_->attribution().size(); }
+
   static constexpr int kControllers = 100, kCycles = 400;
   double unguarded_ns = std::numeric_limits<double>::max();
   double guarded_ns = unguarded_ns, timed_ns = unguarded_ns, bounded_ns = unguarded_ns;
@@ -158,8 +161,8 @@ int main(int argc, char** argv) {
   for (int block = 0; block < blocks; ++block) bench.block();
   std::printf(
       "{\"controllers\": %d, \"unguarded_ns\": %.3f, \"guarded_ns\": %.3f, "
-      "\"timed_ns\": %.3f, \"bounded_ns\": %.3f, \"faults\": %llu}\n",
+      "\"timed_ns\": %.3f, \"bounded_ns\": %.3f, \"faults\": %llu, \"attributed\": %zu}\n",
       Bench::kControllers, bench.unguarded_ns, bench.guarded_ns, bench.timed_ns, bench.bounded_ns,
-      static_cast<unsigned long long>(bench.faults()));
+      static_cast<unsigned long long>(bench.faults()), bench.attributed());
   return 0;
 }

@@ -63,6 +63,26 @@ TEST_F(WithGain, RefusedFilesLeaveTheOldGains) {
   EXPECT_FALSE(rig.manager->setGains("c", {{"kp", {1, 2}}}));
 }
 
+TEST_F(WithGain, TheControllerIsToldOnceOfEachChangeBeforeItsNextUpdate) {
+  const int before = c->gains_changes;
+  rig.step(5);
+  EXPECT_EQ(c->gains_changes, before);
+  c->on_update = [&](TestController& self, const Cycle&, const RobotStates&, const ControlStates&,
+                     ModifiedControlStates&) {
+    EXPECT_EQ(self.scalar(self.gain_handle) == 2.0, self.gains_changes == before + 1);
+  };
+  ASSERT_TRUE(rig.manager->setGains("c", {{"kp", {2.0}}}));
+  rig.step(5);
+  EXPECT_EQ(c->gains_changes, before + 1);
+  ASSERT_TRUE(rig.manager->loadGains("c", temporaryFile("told.yaml", "kp: 3\n")));
+  c->on_update = nullptr;
+  rig.step(5);
+  EXPECT_EQ(c->gains_changes, before + 2);
+  EXPECT_FALSE(rig.manager->setGains("c", {{"kp", {11.0}}}));
+  rig.step(5);
+  EXPECT_EQ(c->gains_changes, before + 2) << "refused";
+}
+
 TEST_F(WithGain, GainsByNameAndThroughTheInstance) {
   ASSERT_TRUE(rig.manager->setGains("c", {{"kp", {2.0}}}));
   rig.step(40);

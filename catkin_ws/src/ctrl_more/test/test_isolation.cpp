@@ -136,6 +136,34 @@ TEST_F(Isolation, AngleTooLarge) {
   expectFault(FaultKind::CorrectionSize, "larger");
 }
 
+TEST_F(Isolation, TurningTooFast) {
+  build(
+      [](TestController& self, ModifiedControlStates& m) {
+        m[self.out].tail<4>() = Eigen::Vector4d(std::sin(0.01), 0, 0, std::cos(0.01));
+      },
+      {}, {kUnlimited, kUnlimited, kUnlimited, 3.0});  // 0.015 rad per cycle, and this is 0.02
+  expectFault(FaultKind::CorrectionRate, "faster");
+}
+
+TEST(IsolationTest, TheRateOfATurnIsThatOfItsChange) {
+  // A turn of 0.5 rad that grows by 0.014 rad per cycle is within 3 rad/s, however large it is.
+  Rig rig;
+  double angle = 0.0;
+  auto c = adder("pose", "ee", 0.0);
+  c->description.control_signals[0].limit = {kUnlimited, kUnlimited, kUnlimited, 3.0};
+  c->on_update = [&](TestController& self, const Cycle&, const RobotStates&, const ControlStates&,
+                     ModifiedControlStates& m) {
+    angle += 0.014;
+    m[self.out].tail<4>() = Eigen::Vector4d(0, std::sin(angle / 2), 0, std::cos(angle / 2));
+  };
+  rig.add(std::move(c), "c");
+  rig.step(36);
+  EXPECT_EQ(rig.manager->status("c").fault, FaultKind::None);
+  angle += 0.002;
+  rig.step();
+  EXPECT_EQ(rig.manager->status("c").fault, FaultKind::CorrectionRate);
+}
+
 struct Spoilt {
   ControlContainer container;
   const char* key;

@@ -23,6 +23,7 @@ class TestController : public FeedbackController {
       on_update;
   int updates = 0;
   int resets = 0;
+  int gains_changes = 0;
   Modify<> out;
   Read<> in;
   Gain gain_handle;
@@ -41,6 +42,7 @@ class TestController : public FeedbackController {
     if (on_update) on_update(*this, cycle, robot, original, modified);
   }
   void reset() override { ++resets; }
+  void gainsChanged() override { ++gains_changes; }
   using FeedbackController::fail;
   using FeedbackController::gain;
   using FeedbackController::log;

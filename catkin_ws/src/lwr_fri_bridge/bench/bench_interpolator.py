@@ -17,7 +17,7 @@ LIMIT_DIFFERENCE = 1e-12
 LIMIT_EXCESS = 1e-9
 WIRE_SPEED, WIRE_ACCELERATION = 5e-4, 1.0  # rad/s, rad/s^2 that float32 positions may add
 STATES = 100_000  # per tick length
-BINARY = "lwr_fri_bridge_bench_interpolator"
+BINARY = "lwr_fri_bridge_time_interpolator"
 LIMITS = pathlib.Path(__file__).resolve().parents[2] / "lwr_description/config/joint_limits.yaml"
 
 

@@ -218,6 +218,36 @@ TEST(Bridge, BrakesWhenCommandsStopAndResumes) {
   EXPECT_NEAR(cell.bridge.snapshot().sample.commanded_velocity[0], 0.4, 1e-9);
 }
 
+/// With the defaults: 50 ms for the control thread, 100 ms for commands over a topic.
+TEST(Bridge, ACommandEndsAfterTheTimeThatIsDocumented) {
+  for (const bool topic : {false, true}) {
+    Cell cell;
+    cell.start();
+    if (topic) cell.bridge.setVelocitySource(VelocitySource::Topic);
+    const auto send = [&] {
+      RobotSample sample;
+      cell.bridge.mailboxes().newestSample(sample);
+      const VelocityCommand command{Vector7::Constant(0.4), cell.robot.now(), sample.motion_epoch};
+      if (topic) {
+        cell.bridge.sendTopicVelocity(command);
+      } else {
+        cell.bridge.mailboxes().sendVelocity(command);
+      }
+    };
+    for (int i = 0; i < 80; ++i) {
+      send();
+      cell.run(1);
+    }
+    ASSERT_NEAR(cell.bridge.snapshot().sample.commanded_velocity[0], 0.4, 1e-9);
+    const std::int64_t last_sent = cell.robot.now() - 5'000'000;
+    while (cell.bridge.snapshot().sample.commanded_velocity[0] > 0.4 - 1e-9) cell.run(1);
+    const double age =
+        1e-9 * static_cast<double>(cell.bridge.snapshot().sample.stamp_ns - last_sent);
+    EXPECT_GT(age, topic ? 0.1 : 0.05) << topic;
+    EXPECT_LT(age, (topic ? 0.1 : 0.05) + 0.0101) << topic;
+  }
+}
+
 TEST(Bridge, KeepsTheLastValidCommandWhenOneIsNotFinite) {
   Cell cell;
   cell.start();

@@ -129,6 +129,61 @@ TEST(Krl, OurProgramsResultsAreRead) {
   EXPECT_FALSE(readReply(KrlConvention::Coglab, request, data).refused);
 }
 
+TEST(Krl, TheBusyFlagOfEachConventionIsRead) {
+  const fri::KrlRequest request{KrlPhase::Start, ControlStrategy::JointImpedance, 5, 0};
+  fri::UserData data{};
+  for (int bit = 0; bit < 16; ++bit) {
+    data.bools = static_cast<std::uint16_t>(1U << bit);
+    EXPECT_EQ(readReply(KrlConvention::RcprgTum, request, data).busy, bit == 0) << bit;
+    EXPECT_FALSE(readReply(KrlConvention::Coglab, request, data).busy);
+    EXPECT_FALSE(readReply(KrlConvention::RttLwr, request, data).busy);
+  }
+  data = {};
+  data.ints[2] = 4;  // it works on an older request of ours
+  EXPECT_FALSE(readReply(KrlConvention::Coglab, request, data).busy);
+  data.ints[2] = 5;
+  EXPECT_TRUE(readReply(KrlConvention::Coglab, request, data).busy);
+}
+
+/// The program of rcprg_tum shows nothing but that it works: done, and still in monitor mode, it
+/// has refused.
+TEST(Krl, AProgramThatWasBusyAndLeavesMonitorModeInForceHasRefused) {
+  struct Case {
+    int busy_from, busy_until;  // cycles of 5 ms after the request
+    OutcomeCode code;
+    double least, most;  // s until the outcome
+  };
+  const double late = BridgeConfig().requests.start_timeout;
+  for (const Case& one : {Case{20, 60, OutcomeCode::ProgramRefused, 0.75, 0.85},
+                          Case{20, 1000000, OutcomeCode::NotEntered, late, late + 0.1},
+                          Case{0, 0, OutcomeCode::NotEntered, late, late + 0.1}}) {
+    BridgeConfig config = test::defaultConfig();
+    config.krl_convention = KrlConvention::RcprgTum;
+    config.mode.strategy = ControlStrategy::JointImpedance;
+    Bridge bridge(config);
+    test::SmallController robot(0.005);
+    robot.obeys = false;
+    std::uint32_t ticket = 0;
+    Outcome outcome;
+    int cycle = -10;
+    for (; cycle < 4000 && outcome.code == OutcomeCode::Pending; ++cycle) {
+      if (cycle == 0) ticket = bridge.submit("start");
+      fri::MeasurementDatagram m = robot.measure();
+      m.krl = {};
+      m.krl.bools = cycle >= one.busy_from && cycle < one.busy_until ? 1 : 0;
+      std::uint8_t bytes[fri::kMeasurementSize];
+      fri::encode(m, bytes);
+      fri::CommandDatagram answer;
+      ASSERT_TRUE(bridge.answer(bytes, sizeof bytes, robot.now(), answer));
+      robot.take(&answer);
+      if (cycle >= 0) outcome = bridge.outcome(ticket);
+    }
+    EXPECT_EQ(outcome.code, one.code) << describe(outcome);
+    EXPECT_GE(cycle * 0.005, one.least);
+    EXPECT_LE(cycle * 0.005, one.most);
+  }
+}
+
 TEST(Krl, AStartWithoutOurProgramSaysSo) {
   BridgeConfig config = test::defaultConfig();
   Bridge bridge(config);

@@ -4,6 +4,7 @@
 
 #include <atomic>
 #include <chrono>
+#include <cmath>
 #include <cstdlib>
 #include <functional>
 #include <random>
@@ -85,6 +86,40 @@ TEST_F(FriThreadTest, AnswersToTheSourceOfTheDatagram) {
   }
   EXPECT_TRUE(eventually([&] { return fri.statistics().answers == 10; }));  // counted after sending
   EXPECT_NE(fri.statistics().peer.find("127.0.0.1:"), std::string::npos);
+}
+
+TEST(AnswerTimes, TheMeanForgetsOverAThousandAnswersAndTheLongestStaysUntilAsked) {
+  AnswerTimes times;
+  EXPECT_EQ(times.mean(), 0.0);
+  times.add(0.004F);
+  EXPECT_FLOAT_EQ(times.mean(), 0.004F);
+  for (int i = 0; i < 1000; ++i) times.add(0.001F);
+  EXPECT_NEAR(times.mean(), 0.001 + 0.003 * std::exp(-1.0), 2e-6);
+  for (int i = 0; i < 9000; ++i) times.add(0.001F);
+  EXPECT_NEAR(times.mean(), 0.001, 1e-6);
+  EXPECT_FLOAT_EQ(times.longest(false), 0.004F);
+  EXPECT_FLOAT_EQ(times.longest(true), 0.004F);
+  times.add(0.002F);
+  EXPECT_FLOAT_EQ(times.longest(false), 0.002F);
+}
+
+/// The thread's mean is that of its own work: no longer than what the peer waits on average.
+TEST_F(FriThreadTest, AnswerTimesAreTold) {
+  Peer peer(fri.port());
+  fri::CommandDatagram c{};
+  double waited = 0.0;
+  constexpr int kAnswers = 200;
+  for (int i = 0; i < kAnswers; ++i) {
+    const auto begin = std::chrono::steady_clock::now();
+    peer.send(robot.measure());
+    ASSERT_TRUE(peer.receive(c));
+    waited += std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  }
+  EXPECT_TRUE(eventually([&] { return fri.statistics().answers == kAnswers; }));
+  const FriThreadStatistics told = fri.statistics();
+  EXPECT_GT(told.mean_answer_time, 1e-7);
+  EXPECT_LE(told.mean_answer_time, told.longest_answer_time);
+  EXPECT_LT(told.longest_answer_time, waited);
 }
 
 TEST_F(FriThreadTest, ASecondSenderIsIgnoredAndNamed) {

@@ -12,6 +12,7 @@ import argparse
 import os
 import re
 import shutil
+import subprocess
 import sys
 from collections.abc import Iterable
 from pathlib import Path
@@ -20,6 +21,8 @@ from coglab_bringup.launch_arguments import judge_launch
 from coglab_bringup.usage import Parser, Refused, master_port, seed, writable_file, writable_folder
 
 HELP_GIVEN = 10
+CORES = ("lwr_fri_bridge", "coglab_controllers", "ctrl_more", "ih2_hand", "smach", "coglab_smach", "coglab_sim")
+"""the packages with a core: bridge, controllers, ctrl_more, hand, engine, brain, cell"""
 BUILD_OPTIONS = ("--upstream-smach",)
 BUILD_TARGETS = ("tests",)
 
@@ -92,6 +95,35 @@ def bench_options(top: Path, words: list[str]) -> argparse.Namespace:
     parser.add_argument("--long", action="store_true", help="the campaigns too (hours)")
     options = parser.parse_args(words)
     _named(options.names, find_benches(top / "catkin_ws" / "src"), "bench")
+    return options
+
+
+def commit_seed(top: Path) -> int:
+    """A seed from the commit of this checkout, the same for all who have it; 1 without git."""
+    try:
+        words = ["git", "-C", str(top), "rev-parse", "HEAD"]
+        commit = subprocess.run(words, capture_output=True, text=True, timeout=10, check=True).stdout
+        return int(commit[:7], 16)
+    except (OSError, subprocess.SubprocessError, ValueError):
+        return 1
+
+
+def mutants_options(top: Path, words: list[str]) -> argparse.Namespace:
+    """./coglab bench mutants"""
+    parser = Parser(
+        prog="coglab bench mutants",
+        description="Changes one line at a time, in a copy: do the tests notice? Goes on where it was ended.",
+    )
+    parser.add_argument("packages", nargs="*", metavar="PACKAGE", help=f"default: {', '.join(CORES)}")
+    parser.add_argument("--seed", type=seed, metavar="N", help="of the lines drawn (default: from the commit)")
+    parser.add_argument("--count", type=int, default=12, metavar="N", help="mutants per package (default 12)")
+    parser.add_argument("--json", type=writable_file, metavar="FILE", help="write rows and mutants as JSON")
+    options = parser.parse_args(words)
+    _named(options.packages, package_folders(top / "catkin_ws" / "src"), "package")
+    if not 1 <= options.count <= 10000:
+        raise Refused(f"--count: expected 1 to 10000, got {options.count}")
+    if options.seed is None:
+        options.seed = commit_seed(top)
     return options
 
 
@@ -172,6 +204,8 @@ def judge(top: Path, command: str, words: list[str]) -> None:
         demo_parser(top).parse_args(words)
     elif command == "test":
         test_options(top, words)
+    elif command == "bench" and words[:1] == ["mutants"]:
+        mutants_options(top, words[1:])
     elif command == "bench":
         bench_options(top, words)
     elif command in ("start", "status", "hold", "stop"):

@@ -18,7 +18,7 @@ constexpr int kGridSteps = 600;
 constexpr double kHoldShare = 0.3, kHoldWeight = 0.3;
 // A demonstration rests at an end where it is slower than this share of its mean speed, over this
 // share of its samples: what noise there is must not be learnt as a start in motion.
-constexpr double kRestSpeed = 0.1, kRestWindow = 0.05;
+constexpr double kRestingSpeed = 0.1, kRestingWindow = 0.05;
 
 // One demonstration, prepared: time from its start, the goal is its last point.
 struct Example {
@@ -110,11 +110,11 @@ Example prepare(const Trajectory& trajectory) {
                                 std::to_string(example.scale) + " m");
   }
   const auto window = std::max<Eigen::Index>(
-      1, static_cast<Eigen::Index>(kRestWindow * static_cast<double>(count)));
+      1, static_cast<Eigen::Index>(kRestingWindow * static_cast<double>(count)));
   const auto rests = [&](Eigen::Index from, Eigen::Index to) {
     const double way = (example.positions.col(to) - example.positions.col(from)).norm();
     const double time = example.times[to] - example.times[from];
-    return way / time < kRestSpeed * example.scale / example.duration;
+    return way / time < kRestingSpeed * example.scale / example.duration;
   };
   example.starts_at_rest = rests(0, window);
   example.ends_at_rest = rests(count - 1 - window, count - 1);
@@ -134,12 +134,7 @@ void alignTo(const Example& reference, ShapeMapping mapping, Example& example) {
       ((map * (example.positions.colwise() - start)).colwise() + reference_start).eval();
 }
 
-}  // namespace
-
-Primitive learn(const std::string& id, const std::vector<Trajectory>& demonstrations,
-                const LearningOptions& options) {
-  if (demonstrations.empty())
-    throw std::invalid_argument("expected at least one demonstration, got none");
+void check(const LearningOptions& options) {
   if (options.basis_count < 2 || options.basis_count > kMaxBasis) {
     throw std::invalid_argument("basis_count: expected 2 to " + std::to_string(kMaxBasis) +
                                 ", got " + std::to_string(options.basis_count));
@@ -148,6 +143,12 @@ Primitive learn(const std::string& id, const std::vector<Trajectory>& demonstrat
     throw std::invalid_argument("regularisation: expected 0 to 1, got " +
                                 std::to_string(options.regularisation));
   }
+}
+
+std::vector<Example> prepareAll(const std::vector<Trajectory>& demonstrations,
+                                ShapeMapping mapping) {
+  if (demonstrations.empty())
+    throw std::invalid_argument("expected at least one demonstration, got none");
   std::vector<Example> examples;
   for (std::size_t i = 0; i < demonstrations.size(); ++i) {
     try {
@@ -156,10 +157,14 @@ Primitive learn(const std::string& id, const std::vector<Trajectory>& demonstrat
     } catch (const std::invalid_argument& error) {
       throw std::invalid_argument("demonstration " + std::to_string(i + 1) + ": " + error.what());
     }
-    if (options.mapping != ShapeMapping::None && i > 0)
-      alignTo(examples.front(), options.mapping, examples.back());
+    if (mapping != ShapeMapping::None && i > 0) alignTo(examples.front(), mapping, examples.back());
   }
+  return examples;
+}
 
+// The primitive without its weights: mean duration, start and goal of the examples.
+Primitive withoutWeights(const std::string& id, const std::vector<Example>& examples,
+                         const LearningOptions& options) {
   Primitive primitive;
   primitive.id = id;
   primitive.alpha = CanonicalSystem(options.alpha).alpha();
@@ -177,51 +182,77 @@ Primitive learn(const std::string& id, const std::vector<Trajectory>& demonstrat
   }
   primitive.weights = Eigen::Matrix3Xd::Zero(3, options.basis_count);
   validate(primitive);
+  return primitive;
+}
 
-  // Unknowns: the weights, and the start velocity of each demonstration. A column of zeros, for one
-  // that starts at rest, gives zero.
-  const Eigen::Index n = options.basis_count,
-                     unknowns = n + static_cast<Eigen::Index>(examples.size());
-  Eigen::Index rows = unknowns;
-  for (const Example& example : examples) {
-    rows += example.times.size();
-    if (example.ends_at_rest) rows += kGridSteps / 10;
+// Least squares. Unknowns: the weights, and the start velocity of each demonstration. A column of
+// zeros, for one that starts at rest, gives zero.
+class Equations {
+ public:
+  Equations(const Primitive& primitive, const std::vector<Example>& examples)
+      : n_(primitive.basisCount()) {
+    const Eigen::Index unknowns = n_ + static_cast<Eigen::Index>(examples.size());
+    Eigen::Index rows = unknowns;
+    for (const Example& example : examples) {
+      rows += example.times.size() + (example.ends_at_rest ? kHolds : 0);
+    }
+    a_ = Eigen::MatrixXd::Zero(rows, unknowns);
+    b_ = Eigen::MatrixX3d::Zero(rows, 3);
+    for (std::size_t k = 0; k < examples.size(); ++k) {
+      add(examples[k], n_ + static_cast<Eigen::Index>(k),
+          Responses(primitive, examples[k].duration));
+    }
   }
-  Eigen::MatrixXd a = Eigen::MatrixXd::Zero(rows, unknowns);
-  Eigen::MatrixX3d b = Eigen::MatrixX3d::Zero(rows, 3);
-  Eigen::Index row = 0;
-  for (std::size_t k = 0; k < examples.size(); ++k) {
-    const Example& example = examples[k];
-    const Responses responses(primitive, example.duration);
+
+  // One row per unknown: the weights first, then the start velocities.
+  Eigen::MatrixX3d solve(double regularisation) {
+    const double ridge =
+        std::sqrt(regularisation * a_.leftCols(n_).squaredNorm() / static_cast<double>(n_));
+    for (Eigen::Index i = 0; i < n_; ++i) a_(row_ + i, i) = ridge;
+    return a_.colPivHouseholderQr().solve(b_);
+  }
+
+ private:
+  static constexpr int kHolds = kGridSteps / 10;  // rows that ask a motion to stay at its goal
+
+  void add(const Example& example, Eigen::Index velocity_column, const Responses& responses) {
     const Eigen::RowVector3d start = example.positions.leftCols<1>().transpose();
     const Eigen::RowVector3d goal = example.positions.rightCols<1>().transpose();
-    const auto add = [&](double t, const Eigen::RowVector3d& position, double weight) {
+    const auto row = [&](double t, const Eigen::RowVector3d& position, double weight) {
       const Eigen::RowVectorXd response = responses.at(t);
-      a.row(row).head(n) = weight * response.head(n);
-      if (!example.starts_at_rest) {
-        a(row, n + static_cast<Eigen::Index>(k)) = weight * response[n + 2];
-      }
-      b.row(row) = weight * (position - response[n] * goal - response[n + 1] * start);
-      ++row;
+      a_.row(row_).head(n_) = weight * response.head(n_);
+      if (!example.starts_at_rest) a_(row_, velocity_column) = weight * response[n_ + 2];
+      b_.row(row_) = weight * (position - response[n_] * goal - response[n_ + 1] * start);
+      ++row_;
     };
     const double weight =
         1.0 / (example.scale * std::sqrt(static_cast<double>(example.times.size())));
     for (Eigen::Index i = 0; i < example.times.size(); ++i) {
-      add(example.times[i], example.positions.col(i).transpose(), weight);
+      row(example.times[i], example.positions.col(i).transpose(), weight);
     }
-    if (!example.ends_at_rest) continue;
-    const int holds = kGridSteps / 10;
+    if (!example.ends_at_rest) return;
     const double hold_weight =
-        kHoldWeight / (example.scale * std::sqrt(static_cast<double>(holds)));
-    for (int i = 1; i <= holds; ++i)
-      add(example.duration * (1.0 + kHoldShare * i / holds), goal, hold_weight);
+        kHoldWeight / (example.scale * std::sqrt(static_cast<double>(kHolds)));
+    for (int i = 1; i <= kHolds; ++i)
+      row(example.duration * (1.0 + kHoldShare * i / kHolds), goal, hold_weight);
   }
-  const double ridge =
-      std::sqrt(options.regularisation * a.leftCols(n).squaredNorm() / static_cast<double>(n));
-  for (Eigen::Index i = 0; i < n; ++i) a(row + i, i) = ridge;
-  const Eigen::MatrixX3d solution = a.colPivHouseholderQr().solve(b);
+
+  Eigen::Index n_, row_ = 0;
+  Eigen::MatrixXd a_;
+  Eigen::MatrixX3d b_;
+};
+
+}  // namespace
+
+Primitive learn(const std::string& id, const std::vector<Trajectory>& demonstrations,
+                const LearningOptions& options) {
+  check(options);
+  const std::vector<Example> examples = prepareAll(demonstrations, options.mapping);
+  Primitive primitive = withoutWeights(id, examples, options);
+  const Eigen::MatrixX3d solution = Equations(primitive, examples).solve(options.regularisation);
+  const Eigen::Index n = primitive.basisCount();
   primitive.weights = solution.topRows(n).transpose();
-  primitive.start_velocity = solution.bottomRows(unknowns - n).colwise().mean().transpose();
+  primitive.start_velocity = solution.bottomRows(solution.rows() - n).colwise().mean().transpose();
   validate(primitive);
   return primitive;
 }

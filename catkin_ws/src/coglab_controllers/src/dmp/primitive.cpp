@@ -4,6 +4,8 @@
 #include <sstream>
 #include <stdexcept>
 
+#include "coglab_controllers/kinematics/rotation.hpp"
+
 namespace coglab_controllers {
 namespace {
 
@@ -48,7 +50,7 @@ Matrix3 shapeMap(ShapeMapping mapping, const Vector3& demonstrated, const Vector
       level_to(line.x(), line.y(), 0.0);
   const double flat_from = level_from.norm(), flat_to = level_to.norm();
   if (mapping == ShapeMapping::Similarity || flat_from < kShortestLine || flat_to < kShortestLine) {
-    return scale * Quaternion::FromTwoVectors(demonstrated, line).toRotationMatrix();
+    return scale * shortestTurn(demonstrated, line).toRotationMatrix();
   }
   // Level part turned about the vertical; heights scaled, and tilted along the way so that the end
   // fits.

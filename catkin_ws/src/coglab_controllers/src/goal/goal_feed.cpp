@@ -8,10 +8,6 @@ namespace coglab_controllers {
 
 namespace {
 
-Answer invalid(std::string why) {
-  return Answer::refusal(ReasonCode::InvalidArgument, std::move(why));
-}
-
 /// What to add to a sentence about a goal whose newest frame was refused.
 std::string aheadNote(double ahead) {
   if (ahead <= 0.0) return "";
@@ -70,7 +66,7 @@ Answer GoalFeed::first(const std::string& frame, GoalObservation& goal) {
         "goal frame '" + frame + "' is not known in '" + frame_ + "': " + why + aheadNote(ahead));
   }
   if (!goal.position.allFinite() || !isUnit(goal.orientation)) {
-    return invalid("goal frame '" + frame + "' has a pose that is not finite");
+    return Answer::invalid("goal frame '" + frame + "' has a pose that is not finite");
   }
   const double age = 1e-9 * static_cast<double>(host_->now_ns() - goal.stamp_ns);
   if (age > max_age_) {
@@ -125,7 +121,7 @@ Answer GoalFeed::offer(const std::string& frame, const Vector3& position, std::i
                                "' (dmp_frame_name); the goal helper transforms goals");
   }
   if (!position.allFinite()) {
-    return invalid("dmp_goal refused: it holds a number that is not finite");
+    return Answer::invalid("dmp_goal refused: it holds a number that is not finite");
   }
   const std::lock_guard<std::mutex> lock(mutex_);
   const bool followed = owner_.empty();

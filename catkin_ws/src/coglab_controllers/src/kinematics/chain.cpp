@@ -6,6 +6,8 @@
 #include <kdl/tree.hpp>
 #include <kdl_parser/kdl_parser.hpp>
 
+#include "coglab_controllers/kinematics/rotation.hpp"
+
 namespace coglab_controllers {
 namespace {
 
@@ -20,9 +22,7 @@ Matrix3 toEigen(const KDL::Rotation& rotation) {
 Vector3 toEigen(const KDL::Vector& vector) { return Vector3(vector.x(), vector.y(), vector.z()); }
 
 // A rotation that takes z to the given unit axis, so that every joint turns about its own z.
-Matrix3 zTo(const Vector3& axis) {
-  return Eigen::Quaterniond::FromTwoVectors(Vector3::UnitZ(), axis).toRotationMatrix();
-}
+Matrix3 zTo(const Vector3& axis) { return shortestTurn(Vector3::UnitZ(), axis).toRotationMatrix(); }
 
 }  // namespace
 

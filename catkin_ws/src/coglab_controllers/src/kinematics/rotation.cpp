@@ -24,6 +24,21 @@ Vector3 rotationBetween(const Quaternion& from, const Quaternion& to) noexcept {
   return logRotation(to * from.conjugate());
 }
 
+// Quaternion::FromTwoVectors does the same by a singular value decomposition, which takes the
+// compiler seconds in each file.
+Quaternion shortestTurn(const Vector3& from, const Vector3& to) noexcept {
+  const Vector3 a = from.stableNormalized(), b = to.stableNormalized();
+  const Vector3 between = a + b;
+  if (const double length = between.norm(); length > 1e-8) {
+    const Vector3 half = between / length, axis = a.cross(half);
+    return Quaternion(a.dot(half), axis.x(), axis.y(), axis.z()).normalized();
+  }
+  Vector3::Index least = 0;
+  a.cwiseAbs().minCoeff(&least);
+  const Vector3 axis = a.cross(Vector3::Unit(least)).normalized();
+  return Quaternion(0.0, axis.x(), axis.y(), axis.z());
+}
+
 bool isUnit(const Quaternion& q) noexcept {
   return q.coeffs().allFinite() && std::abs(q.norm() - 1.0) <= 1e-3;
 }

@@ -108,10 +108,9 @@ Answer ControllerManager::load(const std::string& id, const std::string& type,
                                const Attach& attach) {
   std::unique_lock<std::mutex> requests(requests_);
   if (!validId(id)) {
-    return Answer::refusal(ReasonCode::InvalidArgument,
-                           "controller_id '" + id +
-                               "': expected up to 48 letters, digits and '_', beginning with a "
-                               "letter");
+    return Answer::invalid("controller_id '" + id +
+                           "': expected up to 48 letters, digits and '_', beginning with a "
+                           "letter");
   }
   {
     const std::lock_guard<std::mutex> lock(table_);
@@ -181,7 +180,7 @@ Answer ControllerManager::loadMotion(const std::string& id, const std::string& t
     motions_.push_back(std::move(loaded));
     return {};
   } catch (const std::exception& error) {
-    return Answer::refusal(ReasonCode::InvalidArgument, what + error.what());
+    return Answer::invalid(what + error.what());
   } catch (...) {
     return Answer::refusal(ReasonCode::ControllerFault,
                            what + "its code threw something that is no std::exception");
@@ -196,7 +195,7 @@ Answer ControllerManager::loadFeedback(const std::string& id, const std::string&
     entry.type = type;
     entry.library = ctrl_more::SearchPath("", settings_.plugin_paths).findLibraryOf(type);
     const ctrl_more::Status status = feedback_.manager().loadController(id, entry);
-    if (!status.ok()) return Answer::refusal(ReasonCode::InvalidArgument, status.message());
+    if (!status.ok()) return Answer::invalid(status.message());
     return {};
   } catch (const std::exception& error) {
     return Answer::refusal(ReasonCode::UnknownName,
@@ -304,7 +303,7 @@ Answer ControllerManager::switchTo(const std::string& id, std::string& type) {
       note = "no feedback profile of this name: feedback controllers stay as they are";
     }
     prepared = feedback.prepare(change.motionSwitched());
-    if (!prepared.ok()) return Answer::refusal(ReasonCode::InvalidArgument, prepared.message());
+    if (!prepared.ok()) return Answer::invalid(prepared.message());
   }
   const PlanOutcome outcome = cycle_.plans().offer(std::move(plan), settings_.plan_timeout);
   if (outcome == PlanOutcome::Withdrawn) {

@@ -37,10 +37,9 @@ Answer AuthoredController::readArguments(const MotionRequestByName& request,
   const std::vector<MotionArgument>& known = arguments();
   for (std::size_t i = 0; i < known.size(); ++i) values.values[i] = known[i].fallback;
   if (request.names.size() != request.values.size()) {
-    return Answer::refusal(ReasonCode::InvalidArgument,
-                           "start_motion has " + std::to_string(request.names.size()) +
-                               " names and " + std::to_string(request.values.size()) +
-                               " values; expected one value for each name");
+    return Answer::invalid("start_motion has " + std::to_string(request.names.size()) +
+                           " names and " + std::to_string(request.values.size()) +
+                           " values; expected one value for each name");
   }
   for (std::size_t i = 0; i < request.names.size(); ++i) {
     const std::string& name = request.names[i];

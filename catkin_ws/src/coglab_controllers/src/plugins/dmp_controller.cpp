@@ -20,30 +20,27 @@ std::string text(const Vector3& v) {
   return out.str();
 }
 
-Answer invalid(std::string why) {
-  return Answer::refusal(ReasonCode::InvalidArgument, std::move(why));
-}
-
 /// Refuses a target orientation that is none. Sets whether the hand keeps the one it has.
 Answer readOrientation(const DmpRequest& request, HandGoal& hand) {
   const Eigen::Vector4d& q = request.target_orientation;
   hand.keep_orientation = true;
   if (!request.orientation_control) return {};
-  if (!q.allFinite()) return invalid("target_orientation holds a number that is not finite");
+  if (!q.allFinite())
+    return Answer::invalid("target_orientation holds a number that is not finite");
   if (q.isZero(0.0)) return {};
   const Quaternion orientation(q[3], q[0], q[1], q[2]);
   if (!isUnit(orientation)) {
     std::ostringstream out;
     out << "target_orientation has norm " << q.norm()
         << "; expected a unit quaternion x y z w, or all zero to keep the present orientation";
-    return invalid(out.str());
+    return Answer::invalid(out.str());
   }
   hand.orientation = orientation.normalized();
   hand.keep_orientation = false;
   return {};
 }
 
-RunnerPolicy policy() {
+RunnerPolicy dmpPolicy() {
   RunnerPolicy policy;
   policy.open_end = true;
   policy.waits_at_border = true;
@@ -55,7 +52,7 @@ RunnerPolicy policy() {
 }  // namespace
 
 DmpController::DmpController()
-    : MotionRunner<DmpPlan>(std::make_unique<DmpCycle>(goals_), policy()),
+    : MotionRunner<DmpPlan>(std::make_unique<DmpCycle>(goals_), dmpPolicy()),
       cycle_(static_cast<DmpCycle*>(&inner())) {}
 
 void DmpController::configure(const MotionSetup& setup) {
@@ -149,7 +146,7 @@ Answer DmpController::checkPrimitive(const DmpRequest& request, DmpPlan& plan) c
   plan.motion.ratio = request.dmp_ratio;
   plan.motion.orientation_control = request.orientation_control;
   if (!request.goal_offset.allFinite()) {
-    return invalid("goal_offset holds a number that is not finite");
+    return Answer::invalid("goal_offset holds a number that is not finite");
   }
   plan.hand.offset = request.goal_offset;
   plan.hand.in_goal_frame = !request.goal_frame.empty();
@@ -159,13 +156,14 @@ Answer DmpController::checkPrimitive(const DmpRequest& request, DmpPlan& plan) c
 Answer DmpController::checkStart(const DmpRequest& request, DmpPlan& plan) const {
   if (request.initial_state != DmpRequest::kCurrent &&
       request.initial_state != DmpRequest::kGiven) {
-    return invalid("initial_state " + std::to_string(request.initial_state) +
-                   " is unknown; expected CURRENT=0 or GIVEN=1");
+    return Answer::invalid("initial_state " + std::to_string(request.initial_state) +
+                           " is unknown; expected CURRENT=0 or GIVEN=1");
   }
   plan.given = request.initial_state == DmpRequest::kGiven;
   if (!plan.given) return {};
   if (!request.initial_position.allFinite() || !request.initial_velocity.allFinite()) {
-    return invalid("initial_position or initial_velocity holds a number that is not finite");
+    return Answer::invalid(
+        "initial_position or initial_velocity holds a number that is not finite");
   }
   plan.initial_position = request.initial_position;
   plan.initial_velocity = request.initial_velocity;

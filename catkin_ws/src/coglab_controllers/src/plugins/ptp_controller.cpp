@@ -17,7 +17,7 @@ Answer readJoints(const std::vector<double>& values, const char* field,
   if (values.size() != static_cast<std::size_t>(kMaxJoints)) {
     why << field << " has " << values.size() << " numbers; expected " << kMaxJoints
         << ", in wire order lwr_a1 lwr_a2 lwr_e1 lwr_a3 lwr_a4 lwr_a5 lwr_a6";
-    return Answer::refusal(ReasonCode::InvalidArgument, why.str());
+    return Answer::invalid(why.str());
   }
   for (int joint = 0; joint < kMaxJoints; ++joint) {
     const double value = values[joint];
@@ -61,7 +61,7 @@ class PtpMotion : public Motion<PtpTarget> {
   double time_ = 0.0;
 };
 
-RunnerPolicy policy() {
+RunnerPolicy ptpPolicy() {
   RunnerPolicy policy;
   policy.id_name = "ptp_id";
   return policy;
@@ -69,7 +69,8 @@ RunnerPolicy policy() {
 
 }  // namespace
 
-PtpController::PtpController() : MotionRunner<PtpTarget>(std::make_unique<PtpMotion>(), policy()) {}
+PtpController::PtpController()
+    : MotionRunner<PtpTarget>(std::make_unique<PtpMotion>(), ptpPolicy()) {}
 
 void PtpController::configure(const MotionSetup& setup) {
   if (setup.robot->chain.joints() != kMaxJoints) {

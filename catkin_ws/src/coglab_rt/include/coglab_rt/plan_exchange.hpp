@@ -26,7 +26,7 @@ enum class PlanOutcome : std::uint8_t {
 /// Builders (services) come one after another. Each offers a plan by one atomic pointer; the cycle
 /// takes it at its start, acknowledges its number, and never looks at the one before again; the
 /// builder then frees the old one. So the cycle neither locks nor frees, and what it reads is never
-/// changed under it (design, section 2, step 1).
+/// changed under it (docs/architecture.md, step 3).
 ///
 /// @tparam Plan what is handed over; the cycle may write fields of it that the builder reads after
 /// Adopted

@@ -93,6 +93,9 @@ struct Answer {
   ReasonCode code = ReasonCode::None;
 
   static Answer refusal(ReasonCode code, std::string why) { return {false, std::move(why), code}; }
+  static Answer invalid(std::string why) {
+    return refusal(ReasonCode::InvalidArgument, std::move(why));
+  }
   static Answer refusal(const Reason& why) { return {false, why.str(), why.code()}; }
   /// The code as the messages carry it.
   std::uint16_t number() const { return static_cast<std::uint16_t>(code); }

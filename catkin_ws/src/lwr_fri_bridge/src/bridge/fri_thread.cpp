@@ -209,13 +209,7 @@ void FriThread::serve(Batch& batch, int received, std::int64_t now_ns) {
   if (!answered) return;
 
   answers_.fetch_add(1, std::memory_order_relaxed);
-  const auto taken = static_cast<float>(1e-9 * static_cast<double>(steadyNow() - now_ns));
-  const float mean = mean_answer_time_.load(std::memory_order_relaxed);
-  mean_answer_time_.store(mean == 0.0F ? taken : mean + 1e-3F * (taken - mean),
-                          std::memory_order_relaxed);
-  if (taken > longest_answer_time_.load(std::memory_order_relaxed)) {
-    longest_answer_time_.store(taken, std::memory_order_relaxed);
-  }
+  answer_times_.add(static_cast<float>(1e-9 * static_cast<double>(steadyNow() - now_ns)));
   if (options_.after_answer) options_.after_answer(true);
 }
 
@@ -227,9 +221,8 @@ FriThreadStatistics FriThread::statistics(bool restart_longest) {
   s.send_errors = send_errors_;
   s.peer = nameOf(peer_);
   s.last_foreign = nameOf(last_foreign_);
-  s.mean_answer_time = mean_answer_time_;
-  s.longest_answer_time =
-      restart_longest ? longest_answer_time_.exchange(0.0F) : longest_answer_time_.load();
+  s.mean_answer_time = answer_times_.mean();
+  s.longest_answer_time = answer_times_.longest(restart_longest);
   s.real_time = scheduling_ == 1;
   return s;
 }

@@ -1,6 +1,6 @@
 /// @file
 /// Eq. (1), (2), (4) and (5) of one primitive on three axes, in fixed-size form for the control
-/// cycle.
+/// cycle. Notation: docs/architecture.md, the motion primitive.
 #pragma once
 
 #include "coglab_controllers/dmp/primitive.hpp"

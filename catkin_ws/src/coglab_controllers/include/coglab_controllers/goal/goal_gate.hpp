@@ -1,5 +1,5 @@
 /// @file
-/// Which goal frames a motion believes (design, section 4): age, jumps, loss.
+/// Which goal frames a motion believes (docs/reference.md has the limits): age, jumps, loss.
 #pragma once
 
 #include <cstdint>

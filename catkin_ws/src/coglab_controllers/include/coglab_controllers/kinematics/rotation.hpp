@@ -16,6 +16,10 @@ Vector3 logRotation(const Quaternion& q) noexcept;
 /// eq. (7), equal to KDL::diff(from, to).
 Vector3 rotationBetween(const Quaternion& from, const Quaternion& to) noexcept;
 
+/// The shortest rotation that turns the direction `from` into the direction `to`, neither of them
+/// zero; for opposite directions half a turn about some axis perpendicular to them.
+Quaternion shortestTurn(const Vector3& from, const Vector3& to) noexcept;
+
 /// True if all four entries are finite and the norm is within 1e-3 of one.
 bool isUnit(const Quaternion& q) noexcept;
 

@@ -1,6 +1,5 @@
 /// @file
-/// One control cycle, steps 1 to 8 of the design: adopt, read, reference, task feedback, resolve,
-/// joint feedback, guard.
+/// One control cycle: the numbered steps of docs/architecture.md.
 #pragma once
 
 #include <atomic>

@@ -1,5 +1,6 @@
 /// @file
-/// The thread that runs the control cycle, woken by the arriving measurements (design, section 2).
+/// The thread that runs the control cycle, woken by the arriving measurements
+/// (docs/architecture.md, processes and threads).
 #pragma once
 
 #include <atomic>

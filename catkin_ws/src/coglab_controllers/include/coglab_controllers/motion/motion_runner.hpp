@@ -1,6 +1,6 @@
 /// @file
 /// The motion controller around a motion: requests, queue, start, end, abort and stand-still, once
-/// for all.
+/// for all. Where it stands in the control cycle: docs/architecture.md.
 #pragma once
 
 #include <cstdint>

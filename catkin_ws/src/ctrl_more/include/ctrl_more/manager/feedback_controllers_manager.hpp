@@ -1,3 +1,6 @@
+/// @file
+/// The manager of feedback controllers: loads, orders, pauses and runs them in the two stages of a
+/// control cycle (docs/architecture.md, steps 5 and 7).
 #pragma once
 
 #include <cstdint>

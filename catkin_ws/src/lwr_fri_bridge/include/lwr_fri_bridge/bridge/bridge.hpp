@@ -1,7 +1,8 @@
 /// @file
 /// The bridge: composes FRI session, Interpolator, VelocityFilter, Supervisor and Configurator
 /// (D4.10 Figure 1) into the answer to one datagram. It owns no socket and no thread, so the FRI
-/// thread, lockstep tests and a simulation in virtual time drive the same code.
+/// thread, lockstep tests and a simulation in virtual time drive the same code. Threads:
+/// docs/architecture.md.
 #pragma once
 
 #include <atomic>

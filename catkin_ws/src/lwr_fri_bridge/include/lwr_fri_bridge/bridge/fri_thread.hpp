@@ -1,5 +1,6 @@
 /// @file
 /// The FRI thread: one UDP socket, and nothing but Bridge::answer() between receive and send.
+/// Threads: docs/architecture.md.
 #pragma once
 
 #include <atomic>
@@ -22,6 +23,28 @@ struct FriThreadOptions {
   /// Called in the FRI thread after each answer has been sent (and after each time-out without
   /// datagrams, with answered = false): wakes the control thread. Must be real-time safe.
   std::function<void(bool answered)> after_answer;
+};
+
+/// Times from receive to sent: an exponential mean over about 1000 answers, and the longest. One
+/// thread adds, any may read. No allocation, no lock.
+class AnswerTimes {
+ public:
+  /// @param taken s
+  void add(float taken) noexcept {
+    const float mean = mean_.load(std::memory_order_relaxed);
+    mean_.store(mean == 0.0F ? taken : mean + 1e-3F * (taken - mean), std::memory_order_relaxed);
+    if (taken > longest_.load(std::memory_order_relaxed)) {
+      longest_.store(taken, std::memory_order_relaxed);
+    }
+  }
+  double mean() const noexcept { return mean_; }  ///< s, 0: no answer yet
+  /// s, since the last call with restart
+  double longest(bool restart) noexcept {
+    return restart ? longest_.exchange(0.0F) : longest_.load();
+  }
+
+ private:
+  std::atomic<float> mean_{0.0F}, longest_{0.0F};
 };
 
 /// What the thread counts; readable from any thread.
@@ -82,7 +105,7 @@ class FriThread {
   std::string scheduling_warning_;  // written before scheduling_
   std::atomic<std::uint64_t> answers_{0}, superseded_{0}, foreign_{0}, send_errors_{0};
   std::atomic<std::uint64_t> peer_{0}, last_foreign_{0};  // address << 16 | port, 0: none
-  std::atomic<float> mean_answer_time_{0.0F}, longest_answer_time_{0.0F};
+  AnswerTimes answer_times_;
 };
 
 }  // namespace lwr_fri_bridge

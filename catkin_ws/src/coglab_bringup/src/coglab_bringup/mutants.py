@@ -1,0 +1,334 @@
+"""./coglab bench mutants [PACKAGE ...] [--seed N]: would the tests notice a slip of the hand?
+
+Changes one line at a time of the code that ships, drawn over all its lines (mutator.py), builds what that touches, and
+runs the tests of the package and of what stands on it until the first red one. All of it happens in a copy of the
+checkout below .coglab/mutants: the checkout itself is never changed. A line that does not compile is drawn again. A red
+rostest is run once more before it is believed. What a run has found is kept: the same command goes on where it was
+ended, as long as the sources are the same. Hours; run only when named.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import hashlib
+import json
+import os
+import random
+import re
+import shutil
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+from coglab_bringup import bench, process_tree, test_runner
+from coglab_bringup.arguments import CORES, mutants_options, package_folders
+from coglab_bringup.mutator import ENDINGS, Change, changes, code_lines
+from coglab_bringup.usage import Refused
+
+NOT_COPIED = (".git", ".coglab", "out", "build", "devel", "install", "__pycache__", ".pytest_cache", ".ruff_cache")
+NOT_SHIPPED = {"test", "bench", "example", "examples", "template", "testing"}
+BUILD_LIMIT = 3600.0  # s
+SLOWER = 4.0
+"""by which a test may take longer than it did on the unchanged sources before it counts as one that hangs"""
+GOAL_ALL, GOAL_EACH = 85.0, 75.0
+
+
+@dataclass
+class Mutant:
+    """One changed line and what became of it."""
+
+    package: str
+    file: str
+    line: int
+    kind: str
+    before: str
+    after: str
+    verdict: str  # killed, survived
+    by: str  # the test program that was red first
+    seconds: float
+
+
+def shipped(folder: Path) -> list[Path]:
+    """The source files of a package that ship, in a fixed order: not its tests, benches, examples and templates."""
+    found = [path for path in folder.rglob("*") if path.suffix in ENDINGS and path.is_file()]
+    return sorted(
+        path
+        for path in found
+        if not (NOT_SHIPPED | {"__pycache__"}) & set(path.relative_to(folder).parts[:-1]) and path.name != "setup.py"
+    )
+
+
+def draw(folder: Path, dice: random.Random) -> tuple[Path, Change]:
+    """One change, of a line drawn over all lines of code of a package; lines that offer no change are drawn again."""
+    lines = []
+    for path in shipped(folder):
+        lines += [(path, number) for number in code_lines(path.read_text(encoding="utf-8"), path.name)]
+    while lines:
+        path, number = lines.pop(dice.randrange(len(lines)))
+        offered = [c for c in changes(path.read_text(encoding="utf-8"), path.name) if c.line == number]
+        if offered:
+            return path, dice.choice(offered)
+    raise Refused(f"{folder.name} holds no line of C++ or Python that could be changed")
+
+
+def standing_on(package: str, folders: dict[str, Path]) -> list[str]:
+    """The packages that need `package`, directly or not, the nearest first."""
+    needs = {
+        name: set(re.findall(r"<(?:\w*_)?depend>\s*([\w-]+)\s*<", (folder / "package.xml").read_text(encoding="utf-8")))
+        for name, folder in folders.items()
+    }
+    found: list[str] = []
+    front = {package}
+    while front:
+        front = {name for name in folders if needs[name] & front and name not in (*found, package)}
+        found += sorted(front)
+    return found
+
+
+def update_copy(top: Path, copy: Path) -> str:
+    """Makes the copy hold the files of the checkout, touching none that is the same; a digest of them all."""
+    digest, there = hashlib.sha256(), set()
+    for folder, names, files in os.walk(top):
+        names[:] = sorted(name for name in names if name not in NOT_COPIED and not (Path(folder) / name).is_symlink())
+        for name in sorted(files):
+            path = Path(folder) / name
+            relative = path.relative_to(top)
+            if path.is_symlink():  # catkin's own, made anew by the build
+                continue
+            content = path.read_bytes()
+            digest.update(str(relative).encode() + b"\0" + hashlib.sha256(content).digest())
+            target = copy / relative
+            there.add(target)
+            if not target.is_file() or target.read_bytes() != content:
+                target.parent.mkdir(parents=True, exist_ok=True)
+                target.write_bytes(content)
+            shutil.copymode(path, target)
+    for folder, names, files in os.walk(copy):
+        names[:] = [name for name in names if name not in NOT_COPIED and not (Path(folder) / name).is_symlink()]
+        for name in files:
+            path = Path(folder) / name
+            if path not in there and not path.is_symlink():
+                path.unlink()
+    return digest.hexdigest()
+
+
+class Workspace:
+    """The copy: builds it and runs its tests."""
+
+    def __init__(self, top: Path) -> None:
+        self.root = top / ".coglab" / "mutants" / "checkout"
+        self.logs = self.root.parent / "logs"
+        self.logs.mkdir(parents=True, exist_ok=True)
+        self.digest = update_copy(top, self.root)
+        oracles = top / ".coglab" / "venv"
+        link = self.root / ".coglab" / "venv"
+        if oracles.is_dir() and not link.exists():
+            link.parent.mkdir(exist_ok=True)
+            link.symlink_to(oracles)
+        self.stale = True
+        """Whether what is built is not what the sources say."""
+
+    def build(self) -> bool:
+        """Whether it builds, with its tests."""
+        self.stale = False
+        with (self.logs / "build.log").open("w") as log:
+            command = [str(self.root / "coglab"), "build", "tests"]
+            return process_tree.run(command, BUILD_LIMIT, stdout=log, stderr=subprocess.STDOUT) == 0
+
+    def enter(self) -> None:
+        """From now on this process and what it starts live in the copy's workspace."""
+        script = f'set -e; . "{self.root}/catkin_ws/devel/setup.bash" >/dev/null; env -0'
+        without = ("PYTHONPATH", "CMAKE_PREFIX_PATH", "ROS_PACKAGE_PATH")
+        clean = {name: value for name, value in os.environ.items() if name not in without}
+        text = subprocess.run(["bash", "-c", script], env=clean, capture_output=True, check=True, timeout=60).stdout
+        entered = dict(entry.split("=", 1) for entry in text.decode().split("\0") if "=" in entry)
+        os.environ.clear()
+        os.environ.update(entered, COGLAB_TOP=str(self.root), PYTHONDONTWRITEBYTECODE="1")
+
+    def programs(self, packages: list[str]) -> list[test_runner.Program]:
+        """The tests of some packages: the first package's first, quick kinds before rostests."""
+        python = os.environ.get("COGLAB_TEST_PYTHON", "/usr/bin/python3")
+        found = test_runner.find_programs(self.root, self.logs, python, packages)
+        return sorted(found, key=lambda p: (p.kind == "rostest", packages.index(p.package), p.kind != "gtest", p.name))
+
+    def red(self, program: test_runner.Program, limit: float) -> bool:
+        """Whether a test is red; one that does not end within `limit` (s) is."""
+        if program.kind == "rostest":
+            shutil.rmtree(program.junit, ignore_errors=True)
+        else:
+            program.junit.unlink(missing_ok=True)
+        program.passed = program.failed = program.skipped = 0
+        program.failures.clear()
+        test_runner.run(program, self.logs / f"{program.package}.{program.name}.log", limit)
+        return program.failed > 0
+
+
+class Campaign:
+    """The mutants of one package, drawn with one seed; goes on where it was ended."""
+
+    def __init__(self, workspace: Workspace, package: str, seed: int, times: dict[str, float]) -> None:
+        self.workspace, self.package, self.times = workspace, package, times
+        self.folders = package_folders(workspace.root / "catkin_ws" / "src")
+        self.dice = random.Random(f"{package} {seed}")
+        self.kept = workspace.root.parent / f"{package}.{seed}.json"
+        self.drawn: list[Mutant | None] = []  # None: did not compile
+        self.fallen = 0  # of the drawn, those that the dice have given
+        try:
+            state = json.loads(self.kept.read_text())
+            if state["digest"] == workspace.digest:
+                self.drawn = [Mutant(**row) if row else None for row in state["drawn"]]
+        except (OSError, ValueError, KeyError, TypeError):
+            pass
+
+    def mutants(self) -> list[Mutant]:
+        """Those judged so far."""
+        return [mutant for mutant in self.drawn if mutant is not None]
+
+    def keep(self) -> None:
+        """Writes what is known, whole or not at all."""
+        rows = [asdict(mutant) if mutant else None for mutant in self.drawn]
+        new = self.kept.with_suffix(".new")
+        new.write_text(json.dumps({"digest": self.workspace.digest, "drawn": rows}, indent=1) + "\n")
+        new.replace(self.kept)
+
+    def run(self, count: int, say: Callable[[str], None]) -> None:
+        """Draws and judges until there are `count` mutants."""
+        folder = self.folders[self.package]
+        while len(self.mutants()) < count:
+            path, change = draw(folder, self.dice)
+            self.fallen += 1
+            if self.fallen <= len(self.drawn):  # judged before: the dice fall as they did
+                continue
+            mutant = self.judge(path, change)
+            self.drawn.append(mutant)
+            self.keep()
+            if mutant is None:
+                say(f"{self.package}: {path.name}:{change.line} does not compile; drawn again")
+            else:
+                by = f" by {mutant.by}" if mutant.by else ""
+                say(f"{self.package} {len(self.mutants())}/{count}: {sentence(mutant)}: {mutant.verdict}{by}")
+
+    def judge(self, path: Path, change: Change) -> Mutant | None:
+        """What the tests say of one change; None if it does not compile. The file is as before afterwards."""
+        text, since = path.read_text(encoding="utf-8"), time.monotonic()
+        file = str(path.relative_to(self.workspace.root))
+        compiled = path.suffix != ".py"
+        if not compiled and self.workspace.stale:
+            self.workspace.build()
+        try:
+            path.write_text(change.apply(text), encoding="utf-8")
+            if compiled and not self.workspace.build():
+                return None
+            by = self.first_red()
+        finally:
+            path.write_text(text, encoding="utf-8")
+            self.workspace.stale = self.workspace.stale or compiled
+        verdict = "killed" if by else "survived"
+        seconds = round(time.monotonic() - since, 1)
+        return Mutant(self.package, file, change.line, change.kind, change.before, change.after, verdict, by, seconds)
+
+    def first_red(self) -> str:
+        """Package and name of the first test that is red; empty if none is."""
+        for program in self.workspace.programs([self.package, *standing_on(self.package, self.folders)]):
+            name = f"{program.package}/{program.name}"
+            if name not in self.times:
+                continue
+            limit = SLOWER * self.times[name] + 30.0
+            if self.workspace.red(program, limit):
+                # A crowded machine can turn a rostest red, too.
+                if program.kind != "rostest" or self.workspace.red(program, limit):
+                    return name
+        return ""
+
+
+def measure(workspace: Workspace, packages: list[str], say: Callable[[str], None]) -> dict[str, float]:
+    """Runs every test that will be needed on the unchanged sources: its time, s. A red one is left out and said."""
+    kept = workspace.root.parent / "times.json"
+    times: dict[str, float | None] = {}
+    try:
+        state = json.loads(kept.read_text())
+        times = state["times"] if state["digest"] == workspace.digest else {}
+    except (OSError, ValueError, KeyError, TypeError):
+        pass
+    for program in workspace.programs(packages):
+        name = f"{program.package}/{program.name}"
+        if name not in times:
+            red = workspace.red(program, test_runner.TIME_LIMIT) and workspace.red(program, test_runner.TIME_LIMIT)
+            times[name] = None if red else program.seconds
+            kept.write_text(json.dumps({"digest": workspace.digest, "times": times}, indent=1) + "\n")
+        if times[name] is None:
+            say(f"{name} is red on the unchanged sources and tells nothing: it is left out")
+    return {name: seconds for name, seconds in times.items() if seconds is not None}
+
+
+def sentence(mutant: Mutant) -> str:
+    """File, line and change."""
+    after = mutant.after or "nothing"
+    return f"{mutant.file}:{mutant.line}: {mutant.kind}: '{mutant.before}' -> '{after}'"
+
+
+def rows_of(campaigns: list[Campaign]) -> list[dict]:
+    """The table of the bench: one row per package, one over all."""
+    rows = []
+
+    def row(what: str, mutants: list[Mutant], goal: float) -> None:
+        share = 100.0 * sum(m.verdict == "killed" for m in mutants) / len(mutants)
+        figure = f"changed lines that a test notices, {what}, of {len(mutants)}"
+        values = ("mutants", figure, round(share, 1), "%", f">= {goal:g}", None, None, share >= goal)
+        rows.append(dict(zip(bench.COLUMNS, values, strict=True)))
+
+    for campaign in campaigns:
+        row(campaign.package, campaign.mutants(), GOAL_EACH)
+    if len(campaigns) > 1:
+        row("all", [m for campaign in campaigns for m in campaign.mutants()], GOAL_ALL)
+    return rows
+
+
+def main(arguments: list[str]) -> int:
+    """Exit status 0 if every row is ok, 1 if one is not, 2 if it cannot be run."""
+    top = Path(os.environ["COGLAB_TOP"])
+
+    def say(text: str) -> None:
+        print(f"[coglab] mutants: {text}", file=sys.stderr, flush=True)
+
+    try:
+        options = mutants_options(top, arguments)
+        lock = (top / ".coglab").resolve() / "mutants.lock"
+        lock.parent.mkdir(exist_ok=True)
+        holder = lock.open("w")
+        try:
+            fcntl.flock(holder, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError:
+            raise Refused("another `bench mutants` of this checkout runs; wait for it, or end it") from None
+        say("copying and building; the first time this takes as long as a whole build")
+        workspace = Workspace(top)
+        if not workspace.build():
+            raise Refused(f"the unchanged sources do not build; see {workspace.logs / 'build.log'}")
+        workspace.enter()
+        packages = options.packages or list(CORES)
+        folders = package_folders(workspace.root / "catkin_ws" / "src")
+        needed = list(dict.fromkeys(name for p in packages for name in (p, *standing_on(p, folders))))
+        times = measure(workspace, needed, say)
+        campaigns = [Campaign(workspace, package, options.seed, times) for package in packages]
+        for campaign in campaigns:
+            campaign.run(options.count, say)
+    except Refused as error:
+        print(f"[coglab] error: {error}", file=sys.stderr)
+        return 2
+    rows = rows_of(campaigns)
+    bench.print_table(rows)
+    survivors = [m for campaign in campaigns for m in campaign.mutants() if m.verdict == "survived"]
+    print(f"\nseed {options.seed}; {len(survivors)} survived" + (":" if survivors else ""))
+    for mutant in survivors:
+        print(f"  {sentence(mutant)}")
+    if options.json:
+        found = [asdict(m) for campaign in campaigns for m in campaign.mutants()]
+        options.json.write_text(json.dumps({"seed": options.seed, "rows": rows, "mutants": found}, indent=1) + "\n")
+    return 0 if all(row["ok"] for row in rows) else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

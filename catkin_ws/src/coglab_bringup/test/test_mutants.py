@@ -1,0 +1,191 @@
+"""./coglab bench mutants: what it changes, what it leaves alone, that it goes on where it was ended."""
+
+from __future__ import annotations
+
+import random
+from pathlib import Path
+
+import pytest
+from coglab_bringup import mutants
+from coglab_bringup.arguments import CORES, mutants_options, package_folders
+from coglab_bringup.mutator import changes, code_lines
+from coglab_bringup.usage import Refused
+
+TOP = Path(__file__).resolve().parents[4]
+
+CPP = """// if (a < b) return;
+#define LIMIT 3
+/* a + b
+   a - b */
+double limit(double a, double b) {
+  if (a < b) return 0.5;
+  const char* text = "a < b && 7";
+  for (int i = 0; i < 10; ++i) a += scale(b, a) * 2.0;
+  if (!ready() && a >= 1e-3) return;
+  std::vector<double> list;
+  continue;
+  return a - b;
+}
+"""
+
+PYTHON = '''"""a < b and 3"""
+import os
+
+
+def limit(a, b):
+    """a + b"""
+    if a < b and not ready(a, b):  # a < 7
+        return "a == b"
+    x = 2 * a - 1.5
+    return True
+'''
+
+
+def words(text: str, name: str) -> set[tuple[int, str, str]]:
+    return {(change.line, change.before, change.after) for change in changes(text, name)}
+
+
+def test_cpp_is_changed_where_it_is_code():
+    assert words(CPP, "limit.cpp") == {
+        (6, "<", "<="), (6, "0.5", "1.0"), (6, "return 0.5;", ";"),
+        (8, "0", "1"), (8, "<", "<="), (8, "10", "11"), (8, "+=", "-="), (8, "(b, a)", "(a, b)"), (8, "*", "/"),
+        (8, "2.0", "4.0"),
+        (9, "!", ""), (9, "&&", "||"), (9, ">=", ">"), (9, "1e-3", "0.002"), (9, "return;", ";"),
+        (11, "continue;", ";"), (12, "-", "+"),
+    }  # fmt: skip
+
+
+def test_python_is_changed_where_it_is_code():
+    assert words(PYTHON, "limit.py") == {
+        (7, "<", "<="), (7, "and", "or"), (7, "not ", ""), (7, "(a, b)", "(b, a)"),
+        (8, 'return "a == b"', "pass"),
+        (9, "2", "3"), (9, "*", "/"), (9, "-", "+"), (9, "1.5", "3.0"),
+        (10, "True", "False"), (10, "return True", "pass"),
+    }  # fmt: skip
+
+
+def test_lines_of_code_are_counted_without_comments_and_texts():
+    assert code_lines(CPP, "limit.cpp") == [5, 6, 7, 8, 9, 10, 11, 12]
+    assert code_lines(PYTHON, "limit.py") == [2, 5, 7, 8, 9, 10]
+
+
+@pytest.mark.parametrize("package", CORES)
+def test_every_change_of_what_ships_fits_its_line(package):
+    folder = package_folders(TOP / "catkin_ws" / "src")[package]
+    files = mutants.shipped(folder)
+    assert files and not [path for path in files if {"test", "bench"} & set(path.relative_to(folder).parts)]
+    total = 0
+    for path in files:
+        text = path.read_text()
+        for change in changes(text, path.name):
+            old, new = text.splitlines(), change.apply(text).splitlines()
+            assert [o for o, n in zip(old, new, strict=True) if o != n] == [old[change.line - 1]]
+            total += 1
+        if path.suffix == ".py":
+            for change in random.Random(1).sample(changes(text, path.name), min(3, len(changes(text, path.name)))):
+                compile(change.apply(text), path.name, "exec")
+    assert total > 200
+
+
+def test_who_stands_on_a_package_is_found_by_the_manifests():
+    folders = package_folders(TOP / "catkin_ws" / "src")
+    on_smach = mutants.standing_on("smach", folders)
+    assert on_smach[0] == "smach_ros" or "smach_ros" in on_smach[:3]
+    assert "coglab_smach" in on_smach and "coglab_bringup" in on_smach and "ctrl_more" not in on_smach
+    assert "coglab_controllers" in mutants.standing_on("ctrl_more", folders)
+
+
+class FakeWorkspace:
+    """A checkout of one package whose tests are red where the file says 'red'."""
+
+    def __init__(self, top: Path):
+        self.root, self.digest, self.stale = top / "copy", "one", True
+        folder = self.root / "catkin_ws" / "src" / "one"
+        (folder / "src").mkdir(parents=True, exist_ok=True)
+        (folder / "package.xml").write_text("<package><name>one</name></package>")
+        self.file = folder / "src" / "one.cpp"
+        self.file.write_text("int f(int a) {\n  if (a < 3) return 1;\n  return a + 4;\n}\n")
+        self.builds = 0
+        self.seen: list[str] = []
+
+    def build(self) -> bool:
+        self.builds += 1
+        self.stale = False
+        return "return a - 4" not in self.file.read_text()  # this one does not compile
+
+    def programs(self, packages):
+        class Program:
+            package, name, kind = "one", "test_one", "gtest"
+
+        return [Program()]
+
+    def red(self, program, limit):
+        self.seen.append(self.file.read_text())
+        return "return 2" in self.file.read_text()
+
+
+def test_a_campaign_judges_keeps_and_goes_on(tmp_path):
+    def campaign(workspace):
+        return mutants.Campaign(workspace, "one", 5, {"one/test_one": 1.0})
+
+    workspace = FakeWorkspace(tmp_path)
+    before = workspace.file.read_text()
+    first = campaign(workspace)
+    first.run(3, lambda text: None)
+    assert workspace.file.read_text() == before and len(first.mutants()) == 3
+    again = FakeWorkspace(tmp_path)
+    second = campaign(again)
+    second.run(3, lambda text: None)
+    assert second.mutants() == first.mutants() and again.builds == 0
+    second.run(6, lambda text: None)
+    assert second.mutants()[:3] == first.mutants() and len(second.mutants()) == 6
+    whole = FakeWorkspace(tmp_path / "other")
+    third = campaign(whole)
+    third.run(6, lambda text: None)
+    assert [(m.line, m.after, m.verdict) for m in third.mutants()] == [
+        (m.line, m.after, m.verdict) for m in second.mutants()
+    ]
+    assert {m.verdict for m in third.mutants()} <= {"killed", "survived"}
+    for mutant in third.mutants():
+        assert (mutant.verdict == "killed") == (mutant.before == "1" and mutant.by == "one/test_one")
+    changed = FakeWorkspace(tmp_path)
+    changed.digest = "other sources"
+    assert campaign(changed).drawn == []
+
+
+def test_a_time_that_is_not_known_leaves_the_test_out(tmp_path):
+    workspace = FakeWorkspace(tmp_path)
+    campaign = mutants.Campaign(workspace, "one", 5, {})
+    campaign.run(4, lambda text: None)
+    assert workspace.seen == [] and {m.verdict for m in campaign.mutants()} == {"survived"}
+
+
+def test_the_copy_follows_the_checkout_and_nothing_flows_back(tmp_path):
+    top, copy = tmp_path / "top", tmp_path / "top" / ".coglab" / "copy"
+    (top / "src").mkdir(parents=True)
+    (top / "out").mkdir()
+    (top / "src" / "a.py").write_text("a = 1\n")
+    (top / "src" / "b.py").write_text("b = 1\n")
+    (top / "out" / "c.py").write_text("c = 1\n")
+    digest = mutants.update_copy(top, copy)
+    (copy / "src" / "a.py").write_text("a = 2\n")  # a run that was killed in the middle
+    (copy / "src" / "stray.py").write_text("")
+    (copy / ".coglab").mkdir()
+    (copy / ".coglab" / "built.all").write_text("")
+    kept = (copy / "src" / "b.py").stat().st_mtime_ns
+    assert mutants.update_copy(top, copy) == digest
+    assert (copy / "src" / "a.py").read_text() == (top / "src" / "a.py").read_text() == "a = 1\n"
+    assert not (copy / "src" / "stray.py").exists() and not (copy / "out").exists()
+    assert (copy / ".coglab" / "built.all").exists() and (copy / "src" / "b.py").stat().st_mtime_ns == kept
+    (top / "src" / "b.py").write_text("b = 2\n")
+    assert mutants.update_copy(top, copy) != digest
+
+
+def test_options():
+    assert mutants_options(TOP, ["ih2_hand", "--seed", "9"]).seed == 9
+    options = mutants_options(TOP, [])
+    assert options.packages == [] and options.count == 12 and options.seed == mutants_options(TOP, []).seed
+    assert mutants_options(TOP, ["--count", "3"]).count == 3
+    for bad in (["nobody"], ["--seed", "-1"], ["--count", "0"], ["--seed"]):
+        with pytest.raises(Refused):
+            mutants_options(TOP, bad)

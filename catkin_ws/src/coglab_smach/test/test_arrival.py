@@ -1,0 +1,56 @@
+"""After a point-to-point motion the brain looks where the arm is: what the controller says alone is not believed."""
+
+import numpy as np
+import pytest
+from coglab_msgs.msg import ReasonCode
+from conftest import Trial
+
+JOINT = 3
+
+
+def take_with(aside):
+    """Take with an arm whose joint 3 is measured ``aside(seconds since the motion's end)`` rad from where it was sent,
+    while it was sent to the board. Returns the trial and how long the state took after the motion's end."""
+    trial = Trial()
+    arm, board = trial.ctx.arm, trial.ctx.config.get("postures.board")
+    real, ended, looked = arm.joint_positions, [], []
+
+    def positions():
+        place = real()
+        if place is None or np.max(np.abs(np.subtract(place, board))) > 1e-3:
+            return place
+        if not ended:
+            ended.append(trial.clock.now())
+        looked.append(trial.clock.now() - ended[0])
+        place = list(place)
+        place[JOINT] += aside(looked[-1])
+        return tuple(place)
+
+    arm.joint_positions = positions
+
+    def script(t):
+        t.wait_hub("wait_without_object")
+        t.start("take")
+        t.wait_hub("wait_with_object" if abs(aside(10.0)) < 0.03 else "wait_without_object")
+
+    trial.run(script)
+    assert ended, "it never came to the board"
+    return trial
+
+
+@pytest.mark.parametrize("size", [0.031, 0.1, -0.1])
+def test_an_arm_that_is_elsewhere_has_not_arrived(size):
+    trial = take_with(lambda t: size)
+    result = trial.result()
+    assert result.outcome == "failed_empty"
+    assert "all measured joints within 0.03 rad of posture 'board' within 1.0 s" in result.reason
+    assert result.code == ReasonCode.TIME_LIMIT
+    assert not trial.cell.called("close"), "it did not close the hand there"
+
+
+def test_an_arm_that_settles_within_a_second_has_arrived():
+    assert take_with(lambda t: 0.1 if t < 0.8 else 0.0).result().outcome == "succeeded"
+
+
+def test_within_the_tolerance_it_has_arrived():
+    assert take_with(lambda t: 0.029).result().outcome == "succeeded"
