@@ -35,13 +35,10 @@ class Giving(Phases):
     """Phases of VirtualHuman."""
 
     def _taken_already(self, seen: Percept, near: bool) -> bool:
-        """While waiting: the robot's hand is felt at the object, or seen to close on it."""
-        if not near:
-            self._held_load, self._closure = seen.load, seen.hand_closure
-            return False
-        self._closure = min(self._closure, seen.hand_closure)
-        pressing = float(np.linalg.norm(seen.load - self._held_load))
-        return pressing >= self.participant.press or seen.hand_closure - self._closure > CLOSED
+        """While waiting: the robot's hand is seen to close on the object. A touch of the open hand is got used to."""
+        self._held_load = seen.load
+        self._closure = min(self._closure, seen.hand_closure) if near else seen.hand_closure
+        return seen.hand_closure - self._closure > CLOSED
 
     def _placing(self, t: float, dt: float, seen: Percept) -> None:
         """Bring the object into the palm, against the palm's outward axis, until it is felt; then press a little."""
