@@ -1,6 +1,6 @@
 #!/usr/bin/python3
-"""The simulated cell: time of a step, load of the node, dynamics of the plant against KDL's and of the controller's model
-against another MuJoCo's, a blocked arm, lockstep. Prints JSON rows only."""
+"""The simulated cell: time of a step, load of the node, dynamics of the plant against KDL's and of the controller's
+model against another MuJoCo's, a blocked arm, lockstep. Prints JSON rows only."""
 
 import json
 import os
@@ -197,7 +197,7 @@ def main() -> None:
         rows.append(
             {
                 "bench": "dynamics",
-                "figure": "M, C, g, J of the controller's model against another MuJoCo, 1000 random states, largest difference",
+                "figure": "M, C, g, J of the controller's model against another MuJoCo, 1000 states, largest",
                 "value": difference,
                 "unit": "relative",
                 "goal": "<= 1e-9",

@@ -22,9 +22,10 @@ struct HoldFigures {
 };
 
 /// The gains follow from the mass and from each axis's own inertia, so that a light body is held
-/// as steadily as a heavy one. The weight of a body that belongs to the hand is carried ahead of the
-/// error; of one that is taken where another holds it, the hold carries only what the hand lifts.
-/// What the limits do not carry slips: the place where the hold would have the body follows it.
+/// as steadily as a heavy one. The weight of a body that belongs to the hand is carried ahead of
+/// the error; of one that is taken where another holds it, the hold carries only what the hand
+/// lifts. What the limits do not carry slips: the place where the hold would have the body follows
+/// it.
 class HoldSpring {
  public:
   /// The body, held by another or at rest, is to stay where it is now in the frame of the hand.

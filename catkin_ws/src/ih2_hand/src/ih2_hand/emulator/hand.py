@@ -113,11 +113,12 @@ class EmulatedHand:
 
     def follow(self, states: Sequence[MotorState]) -> None:
         """What the physics says of the five motors; ValueError for other numbers than it can say."""
-        if not self.physical or len(states) != WIRE.motors:
+        physical = self._physical_motors()
+        if len(states) != len(physical) or not physical:
             raise ValueError(f"states of {WIRE.motors} motors turned by the physics are expected; got {len(states)}")
         for state in states:
             state.check()
-        for motor, state in zip(self.motors, states, strict=True):
+        for motor, state in zip(physical, states, strict=True):
             motor.follow(state)
 
     def orders(self) -> list[tuple[float, float, float]]:
@@ -125,7 +126,10 @@ class EmulatedHand:
         to go to, counts of current at which to stop."""
         if self.calibrating:  # all open, at full speed
             return [(1.0, 0.0, 0.0)] * WIRE.motors
-        return [motor.order() for motor in self.motors]
+        return [motor.order() for motor in self._physical_motors()]
+
+    def _physical_motors(self) -> list[PhysicalMotor]:
+        return [motor for motor in self.motors if isinstance(motor, PhysicalMotor)]
 
     # -- time ------------------------------------------------------------------------------------
 

@@ -1,5 +1,5 @@
-"""A motor of the simulated hand whose motion is computed elsewhere: the physics of the cell turns it, winds its tendon and
-stops at contact; what the electronics make of that stays here."""
+"""A motor of the simulated hand whose motion is computed elsewhere: the physics of the cell turns it, winds its tendon
+and stops at contact; what the electronics make of that stays here."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ END_SHARE = 0.001
 class MotorState:
     """What the physics says of one motor.
 
-    ``position``: share of the stroke, 0 open .. 1 closed; ``current`` and ``effort``: counts of motor current, now and as
-    the tension of the tendon stands for; ``locked``: it met resistance and stands until the next command.
+    ``position``: share of the stroke, 0 open .. 1 closed; ``current`` and ``effort``: counts of motor current, now and
+    as the tension of the tendon stands for; ``locked``: it met resistance and stands until the next command.
     """
 
     position: float
