@@ -220,6 +220,13 @@ TEST(PtpController, RandomMotionsEndExactly) {
       ASSERT_EQ(robot.manager->report().reason.code(), ReasonCode::WorkspaceBorder)
           << robot.reason();
       ASSERT_LT(roomOnTheWay(robot, from, to), 0.01) << "nothing was in its way";
+      // Back the way it came is free.
+      const MotionAnswer back = robot.ptp().add({{from.data(), from.data() + 7}, {}, {}});
+      ASSERT_EQ(back.status, MotionAnswer::kStarted) << back.message;
+      robot.tick();
+      for (int i = 0; i < 20000 && robot.state() == MotionState::Running; ++i) robot.tick();
+      ASSERT_EQ(robot.state(), MotionState::Reached) << robot.reason();
+      expected.push_back(back.id);
       continue;
     }
     ASSERT_EQ(robot.state(), MotionState::Reached) << robot.reason();
