@@ -134,7 +134,7 @@ TEST(TwoTaskIk, StaysInsideTheSpeedLimits) {
 TEST(TwoTaskIk, DropsTheSecondTaskNearASingularity) {
   const TwoTaskIk ik;
   JointVector q;
-  q << 0.0, 0.5, 0.0, -1.2, 0.0, 0.0, 0.0;  // wrist stretched: a4 and a6 turn about one axis
+  q << 0.0, 0.5, 0.0, -1.2, M_PI / 2, 0.0, 0.0;  // wrist stretched, and what is left turns it not
   const ChainState state = robot().evaluate(q);
   CartesianReference reference;
   reference.pose = state.tool;

@@ -63,24 +63,29 @@ TEST_F(WithGain, RefusedFilesLeaveTheOldGains) {
   EXPECT_FALSE(rig.manager->setGains("c", {{"kp", {1, 2}}}));
 }
 
-TEST_F(WithGain, TheControllerIsToldOnceOfEachChangeBeforeItsNextUpdate) {
-  const int before = c->gains_changes;
-  rig.step(5);
-  EXPECT_EQ(c->gains_changes, before);
+TEST_F(WithGain, TheControllerIsToldBeforeEachUpdateWhoseGainsDiffer) {
+  double last = c->scalar(c->gain_handle);
+  int told = c->gains_changes, changed = 0;
   c->on_update = [&](TestController& self, const Cycle&, const RobotStates&, const ControlStates&,
                      ModifiedControlStates&) {
-    EXPECT_EQ(self.scalar(self.gain_handle) == 2.0, self.gains_changes == before + 1);
+    const double value = self.scalar(self.gain_handle);
+    EXPECT_EQ(self.gains_changes - told, value == last ? 0 : 1) << last << " -> " << value;
+    changed += value == last ? 0 : 1;
+    last = value;
+    told = self.gains_changes;
   };
+  rig.step(5);
+  EXPECT_EQ(changed, 0);
   ASSERT_TRUE(rig.manager->setGains("c", {{"kp", {2.0}}}));
-  rig.step(5);
-  EXPECT_EQ(c->gains_changes, before + 1);
+  rig.step(40);
+  EXPECT_EQ(changed, 20) << "blended in, in 0.1 s";
+  EXPECT_EQ(last, 2.0);
   ASSERT_TRUE(rig.manager->loadGains("c", temporaryFile("told.yaml", "kp: 3\n")));
-  c->on_update = nullptr;
-  rig.step(5);
-  EXPECT_EQ(c->gains_changes, before + 2);
+  rig.step(40);
+  EXPECT_EQ(changed, 40);
   EXPECT_FALSE(rig.manager->setGains("c", {{"kp", {11.0}}}));
   rig.step(5);
-  EXPECT_EQ(c->gains_changes, before + 2) << "refused";
+  EXPECT_EQ(changed, 40) << "refused";
 }
 
 TEST_F(WithGain, GainsByNameAndThroughTheInstance) {

@@ -239,7 +239,7 @@ def library(primitives: list[Primitive]) -> str:
         for centre, width, row in zip(p.centres, p.widths, p.weights, strict=True):
             lines.append(f'        <basis centre="{words(centre)}" width="{words(width)}" weight="{words(row)}"/>')
         lines.append("    </primitive>")
-    return "\n".join([*lines, "</dmp_library>"]) + "\n"
+    return "\n".join([*lines, "</dmp_library>", "", ""])
 
 
 def motions(primitives: list[Primitive]) -> str:
