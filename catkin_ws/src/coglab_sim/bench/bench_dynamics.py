@@ -19,8 +19,8 @@ PACKAGE = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(PACKAGE / "test"))
 URDF = PACKAGE.parent / "lwr_description" / "urdf" / "lwr_ih2.urdf"
 BLOCKS, STEPS = 40, 2000
-PLACE, TURN = "_object/position:=[0.04, -0.05, 0.0]", "_object/rotation:=[-0.5, -0.5, -0.5, 0.5]"
-"""of a mug across the palm"""
+MUG = "{start: robot_hand, position: [0.04, -0.05, 0.0], rotation: [-0.5, -0.5, -0.5, 0.5]}"
+"""across the palm"""
 
 
 def built(program: str) -> str:
@@ -170,7 +170,13 @@ def real_time_rows() -> list[dict[str, object]]:
     with tempfile.TemporaryDirectory() as folder:
         environment = run_environment(port, Path(folder))
         try:
-            for words in (["roscore", "-p", str(port)], [*cell, "_object/start:=robot_hand", PLACE, TURN], hand):
+            processes.append(subprocess.Popen(["roscore", "-p", str(port)], env=environment, stdout=sys.stderr))
+            mug = ["rosparam", "set", "/coglab_sim/cell/object", MUG]
+            online = time.monotonic() + 30.0
+            while subprocess.run(mug, env=environment, stderr=subprocess.DEVNULL).returncode != 0:
+                if time.monotonic() > online:
+                    sys.exit("roscore does not answer within 30 s; see above")
+            for words in (cell, hand):
                 processes.append(subprocess.Popen(words, env=environment, stdout=sys.stderr))
             client = Client()
             used = [0.0, 0.0]
