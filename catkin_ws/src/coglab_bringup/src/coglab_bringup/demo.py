@@ -99,6 +99,7 @@ def unfinished(kind: str, error: BaseException) -> dict:
 
 
 CONSIDERATE = ("profile:=patient", "perfect_perception:=true")
+"""What is shown is the robot, so the person is a patient one."""
 
 
 def main(arguments: list[str]) -> int:
@@ -119,7 +120,6 @@ def main(arguments: list[str]) -> int:
     record_run(top, port, "demo")
     screen = bool(os.environ.get("DISPLAY")) and not options.headless and Path("/usr/bin/rviz").exists()
     launch = [f"seed:={options.seed}", f"rviz:={'true' if screen else 'false'}", f"log_file:={out / 'fri_ticks.csv'}"]
-    # What is shown is the robot, so the person is a patient one.
     launch += [f"console:={'false' if options.no_console else 'true'}", *CONSIDERATE]
     (out / "ros_home" / "console.url").unlink(missing_ok=True)  # of an earlier demo
     system = System(environment, port, launch, out / "roslaunch.log")
