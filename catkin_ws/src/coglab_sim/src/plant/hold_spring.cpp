@@ -3,9 +3,7 @@
 #include <algorithm>
 
 namespace coglab_sim::plant {
-namespace {
-constexpr double kGravity = 9.81;
-}
+namespace {}
 
 Wrench HoldSpring::evaluate(const Pose& hand, const Twist& hand_twist, const FreeBody& body,
                             const HoldFigures& figures, double share) {

@@ -105,7 +105,7 @@ void Plant::applyArm(const Vector7& motor_torque) {
     d->qfrc_applied[dof] = locked_ ? 0.0 : motor_torque_[k] + friction_[k];
   }
   Wrench outside = push_;
-  outside.force.z() -= 9.81 * drives.unknown_load;
+  outside.force.z() -= kGravity * drives.unknown_load;
   mjtNum* applied = d->xfrc_applied + 6 * model_->palm;
   const Vector3d arm = palm().position - Eigen::Map<const Vector3d>(d->xipos + 3 * model_->palm);
   const Vector3d torque = outside.torque + arm.cross(outside.force);
@@ -169,7 +169,7 @@ double Plant::blockDamping(int dof) const {
 Vector7 Plant::pushedTorque() const {
   const mjModel* m = model_->get();
   Wrench outside = push_;
-  outside.force.z() -= 9.81 * config_.drives.unknown_load;
+  outside.force.z() -= kGravity * config_.drives.unknown_load;
   Eigen::Matrix<double, 3, Eigen::Dynamic, Eigen::RowMajor> linear(3, m->nv), angular(3, m->nv);
   mj_jacBody(m, model_->data(), linear.data(), angular.data(), model_->palm_frame);
   Vector7 torque;

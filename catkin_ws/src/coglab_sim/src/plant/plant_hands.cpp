@@ -9,7 +9,6 @@
 namespace coglab_sim::plant {
 namespace {
 
-constexpr double kGravity = 9.81;
 constexpr double kShareTime = 0.02;  // s over which load shares and the squeeze are averaged
 constexpr double kPersonAge = 0.05;  // s for which the hand goes on as it went after its message
 constexpr double kGripBegins = 0.05, kGripEnds = 0.02;

@@ -6,6 +6,8 @@
 
 namespace coglab_sim::plant {
 
+constexpr double kGravity = 9.81;  ///< m/s^2, along -z, as the model has it
+
 /// A free body about its centre of mass.
 struct FreeBody {
   Pose center;  ///< centre of mass with the body's axes, in the world
