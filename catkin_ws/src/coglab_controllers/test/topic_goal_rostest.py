@@ -102,6 +102,7 @@ class TopicGoal(unittest.TestCase):
         self.assertTrue(answer.success, answer.message)
         wait_until(lambda: robot.feedback.state == "running" and 0.1 < robot.feedback.phase < 0.4, 10.0, "half way")
         robot.feedbacks.clear()
+        wait_until(lambda: len(robot.feedbacks) > 0, 2.0, "a report before the switch")
         answer = robot.dmp("switch_dmp", SwitchDmpRequest(primitive_id="wave", dmp_ratio=3.0))
         self.assertEqual((answer.success, answer.reason_code), (False, ReasonCode.UNKNOWN_NAME))
         answer = robot.dmp("switch_dmp", SwitchDmpRequest(primitive_id="give_human", dmp_ratio=2.0))

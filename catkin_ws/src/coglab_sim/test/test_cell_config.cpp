@@ -45,11 +45,15 @@ const std::map<std::string, double P::*> kKrc = {
     {"drive_heating", &P::drive_heating},
     {"drive_heating_time", &P::drive_heating_time},
     {"drive_warning", &P::drive_warning}};
+using S = krc::ServoParameters;
+const std::map<std::string, double S::*> kServos = {{"payload_error", &S::payload_error},
+                                                    {"inertia_error", &S::inertia_error}};
 const std::map<std::string, double TorqueNoise::*> kNoise = {
     {"sigma", &TorqueNoise::sigma},
     {"speed_gain", &TorqueNoise::speed_gain},
     {"correlation_time", &TorqueNoise::correlation_time},
     {"bias", &TorqueNoise::bias},
+    {"offset", &TorqueNoise::offset},
     {"hysteresis", &TorqueNoise::hysteresis},
     {"hysteresis_speed", &TorqueNoise::hysteresis_speed}};
 
@@ -117,15 +121,16 @@ TEST(CellConfig, ANumberIsSetInTheFieldOfItsName) {
       continue;
     setCellParameter(config, parameter.name, value);
     if (group == "krc/") {
-      ASSERT_EQ(kKrc.count(name), 1U) << "type its field here";
-      EXPECT_EQ(config.krc.*kKrc.at(name), *number);
+      ASSERT_EQ(kKrc.count(name) + kServos.count(name), 1U) << "type its field here";
+      EXPECT_EQ(kKrc.count(name) ? config.krc.*kKrc.at(name) : config.servos.*kServos.at(name),
+                *number);
       ++numbers;
     } else if (group == "torque_noise/") {
       EXPECT_EQ(config.torque_noise.*kNoise.at(name), *number);
       ++numbers;
     }
   }
-  EXPECT_EQ(numbers, kKrc.size() + kNoise.size());
+  EXPECT_EQ(numbers, kKrc.size() + kServos.size() + kNoise.size());
 }
 
 TEST(CellConfig, AnythingElseIsSetInTheFieldOfItsName) {
@@ -138,7 +143,7 @@ TEST(CellConfig, AnythingElseIsSetInTheFieldOfItsName) {
   setCellParameter(config, "krc/extrapolated_packets", 7);
   setCellParameter(config, "krc/acknowledge_by_program", false);
   EXPECT_EQ(config.seed, 77U);
-  for (int i = 0; i < 7; ++i) EXPECT_EQ(config.home[i], 0.1 * (i + 1)) << i;
+  for (int i = 0; i < 7; ++i) EXPECT_DOUBLE_EQ(config.home[i], 0.1 * (i + 1)) << i;
   EXPECT_EQ(config.krc.mode, krc::OperatingMode::T2);
   EXPECT_EQ(config.krc.convention, krc::KrlConvention::RttLwr);
   EXPECT_EQ(config.krc.entry_quality, 3);
