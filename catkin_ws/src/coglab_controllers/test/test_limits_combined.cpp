@@ -27,7 +27,7 @@ class DelayedRobot : public VirtualRobot {
     if (active_dmp) dmp().pollGoal();
     manager->cycle().run(sample, period, command);
     JointVector velocity = command.velocity;
-    cuts += bound_.bound(*interpolator, period, false, velocity) != 0 ? 1 : 0;
+    cuts += bound_.bound(*interpolator, period, velocity) != 0 ? 1 : 0;
     interpolator->step(velocity, period);
     arm_ += (1.0 - std::exp(-period / 0.015)) * (interpolator->position() - arm_);
     sample.velocity = (arm_ - last_) / period;

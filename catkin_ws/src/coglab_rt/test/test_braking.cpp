@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <deque>
 #include <random>
 
 #include "coglab_rt/braking.hpp"
@@ -79,7 +80,7 @@ TEST(Braking, NoPositionLimitIsCrossedFromAnyState) {
       for (int i = 0; i < 7; ++i) wish[i] = part(random) > 0.0 ? 10.0 : -10.0;
       for (int step = 0; step < static_cast<int>(4.5 / dt) && step < 900; ++step) {
         Vector7 target = wish;
-        const unsigned cut = guard.bound(interpolator, dt, false, target);
+        const unsigned cut = guard.bound(interpolator, dt, target);
         at_border += cut != 0 ? 1 : 0;
         interpolator.step(target, dt);
         for (int i = 0; i < 7; ++i) {
@@ -95,6 +96,79 @@ TEST(Braking, NoPositionLimitIsCrossedFromAnyState) {
   EXPECT_GT(at_border, 10000);
 }
 
+/// One axis that was led by an answer and brakes from then on; losses within the budget, drawn or
+/// as early as they can be.
+TEST(Braking, TheReserveCoversWhateverTheBudgetLoses) {
+  using B = LossBudget;
+  std::mt19937 random(23);
+  std::uniform_real_distribution<double> part(-1.0, 1.0);
+  double tightest = 1.0;  // rad between what was reserved and reached
+  for (const double dt : {0.001, 0.002, 0.005, 0.010, 0.020, 0.100}) {
+    for (int trial = 0; trial < 4000; ++trial) {
+      const bool slow = trial % 4 == 0;  // limits of the profile t1: stops of several windows
+      const double A = slow ? 0.5 : 10.0, J = slow ? 10.0 : 500.0;
+      const AxisState before{0.0, (slow ? 0.25 : 2.0) * part(random), A * part(random)};
+      const double target = trial % 3 == 0 ? 0.0 : (slow ? 0.25 : 2.0) * part(random);
+      const AxisState after =
+          advance(before, planVelocity(before.velocity, before.acceleration, target, A, J), dt);
+      const AxisProfile stop = planVelocity(after.velocity, after.acceleration, 0.0, A, J);
+      const BrakingReach reach = brakingReach(after.velocity, after.acceleration, A, J);
+      const LossReserve reserve = lossReserve(before, after, stop, dt, J);
+      const double chance = trial % 2 == 0 ? 1.0 : 0.5 * (1.0 + part(random));
+      std::deque<bool> window(B::kWindow - 1, false);
+      int lost = 0, in_a_row = 0, answers = 0;
+      double q = after.position, step = after.position - before.position;
+      double highest = q, lowest = q;
+      while (answers * dt < stop.totalTime() + dt || in_a_row > 0) {
+        const bool lose = in_a_row < B::kInARow && lost < B::kPerWindow &&
+                          0.5 * (1.0 + part(random)) <= chance;
+        if (!lose) {
+          step = advance(after, stop, (answers + 1) * dt).position -
+                 advance(after, stop, answers * dt).position;
+          ++answers;
+        }
+        q += step;
+        highest = std::max(highest, q);
+        lowest = std::min(lowest, q);
+        in_a_row = lose ? in_a_row + 1 : 0;
+        window.push_back(lose);
+        lost += (lose ? 1 : 0) - (window.front() ? 1 : 0);
+        window.pop_front();
+      }
+      const double above = after.position + reach.highest + reserve.up - highest;
+      const double below = lowest - (after.position + reach.lowest - reserve.down);
+      ASSERT_GE(above, -1e-12) << dt << " " << trial;
+      ASSERT_GE(below, -1e-12) << dt << " " << trial;
+      if (before.velocity > 0.5) tightest = std::min(tightest, above);
+    }
+  }
+  EXPECT_LT(tightest, 1e-9);  // nothing is given away where the losses come first
+}
+
+/// What BrakingGuard lets pass where braking at once may pass a bound: no step is longer towards
+/// the bound than the same step of the stop.
+TEST(Braking, TurningAwayGoesNoFartherThanBraking) {
+  std::mt19937 random(29);
+  std::uniform_real_distribution<double> part(-1.0, 1.0);
+  const double A = 10.0, J = 500.0;
+  for (int trial = 0; trial < 40000; ++trial) {
+    const double dt = std::pow(10.0, -2.0 + part(random)), v = 2.0 * part(random);
+    const double a = A * part(random), target = -1.0 - part(random);
+    const AxisProfile stop = planVelocity(v, a, 0.0, A, J);
+    const AxisState turned = advance({0.0, v, a}, planVelocity(v, a, target, A, J), dt);
+    const AxisProfile later = planVelocity(turned.velocity, turned.acceleration, 0.0, A, J);
+    double last = 0.0, last_turned = 0.0;
+    for (int k = 1; (k - 1) * dt < stop.totalTime() + dt && k < 400; ++k) {
+      const double q = advance({0.0, v, a}, stop, k * dt).position;
+      const double q_turned = advance(turned, later, (k - 1) * dt).position;
+      ASSERT_LE(q_turned - last_turned, std::max(0.0, q - last) + 1e-12)
+          << v << " " << a << " " << dt;
+      last = q;
+      last_turned = q_turned;
+    }
+  }
+}
+
 TEST(Braking, StandsAtTheBorderAndComesBack) {
   const JointLimits limits = loadJointLimits(LIMITS_FILE);
   const BrakingGuard guard(limits, 0.01);
@@ -102,7 +176,7 @@ TEST(Braking, StandsAtTheBorderAndComesBack) {
   interpolator.reset(limits.upper_position - Vector7::Constant(0.5));
   for (int step = 0; step < 3000; ++step) {
     Vector7 target = limits.velocity;
-    guard.bound(interpolator, 0.002, false, target);
+    guard.bound(interpolator, 0.002, target);
     interpolator.step(target, 0.002);
   }
   for (int i = 0; i < 7; ++i) {
@@ -111,7 +185,7 @@ TEST(Braking, StandsAtTheBorderAndComesBack) {
   }
   for (int step = 0; step < 500; ++step) {
     Vector7 target = Vector7::Constant(-0.3);
-    EXPECT_EQ(guard.bound(interpolator, 0.002, false, target), 0U);
+    EXPECT_EQ(guard.bound(interpolator, 0.002, target), 0U);
     interpolator.step(target, 0.002);
   }
   EXPECT_LT(interpolator.position()[0], guard.upper()[0] - 0.2);
@@ -125,13 +199,13 @@ TEST(Braking, AJointOutsideMayOnlyComeBack) {
   interpolator.reset(outside);
   for (int step = 0; step < 200; ++step) {
     Vector7 target = Vector7::Constant(0.5);
-    guard.bound(interpolator, 0.005, false, target);
+    guard.bound(interpolator, 0.005, target);
     interpolator.step(target, 0.005);
     ASSERT_LE(interpolator.position()[0], outside[0] + 1e-9);
   }
   for (int step = 0; step < 200; ++step) {
     Vector7 target = Vector7::Constant(-0.5);
-    guard.bound(interpolator, 0.005, false, target);
+    guard.bound(interpolator, 0.005, target);
     interpolator.step(target, 0.005);
   }
   EXPECT_LT(interpolator.position()[0], outside[0] - 0.3);
@@ -149,7 +223,7 @@ TEST(Braking, TheWayToTheBorderIsSmooth) {
     Vector7 target = Vector7::Zero();
     target[0] = 5.0;
     const double before = interpolator.acceleration()[0];
-    guard.bound(interpolator, 0.001, false, target);
+    guard.bound(interpolator, 0.001, target);
     interpolator.step(target, 0.001);
     const double change = interpolator.acceleration()[0] - before;
     if (std::abs(change) > 0.05 && change * last_change < 0.0) ++turns;

@@ -75,7 +75,7 @@ def main() -> None:
     lines = [(words[0], list(map(float, words[1:]))) for words in map(str.split, run.stdout.splitlines())]
     rows = []
     for period in MOTION_TIMES:
-        for way, when in (("approach", "losses from the first cycle on"), ("proven", "losses after 1200 clean cycles")):
+        for way, when in (("approach", "losses from the first cycle on"), ("later", "losses after 1200 clean cycles")):
             rows += approach_rows(period, [v for kind, v in lines if kind == way and v[0] == period], when)
     for period, before in MOTION_TIMES.items():
         now = next(v[1] for kind, v in lines if kind == "motion" and v[0] == period)

@@ -79,7 +79,7 @@ void printLimits(const JointLimits& limits) {
       const Vector7 p = interpolator.position(), v = interpolator.velocity(),
                     a = interpolator.acceleration();
       Vector7 bounded = target;
-      guard.bound(interpolator, dt, false, bounded);
+      guard.bound(interpolator, dt, bounded);
       interpolator.step(bounded, dt);
       excess((interpolator.position() - p) / dt, limits.velocity, speed);
       excess((interpolator.velocity() - v) / dt, limits.acceleration, acceleration);
@@ -135,7 +135,7 @@ void printBraking(const JointLimits& limits) {
       interpolator.resume(p, v, a);
       for (int step = 0; step < static_cast<int>(4.5 / dt); ++step) {
         Vector7 target = wish;
-        guard.bound(interpolator, dt, false, target);
+        guard.bound(interpolator, dt, target);
         interpolator.step(target, dt);
         const Vector7& q = interpolator.position();
         beyond = std::max({beyond, (q - limits.upper_position).maxCoeff(),

@@ -55,9 +55,9 @@ struct LossCase {
   bool bursts;
   bool extrapolates;  ///< the kind of controller
   unsigned seed;
-  /// The connection has lost nothing for kProvenCycles when the motion begins, and loses from a
+  /// The connection has lost nothing for 1200 cycles when the motion begins, and loses from a
   /// random moment of it on; else it loses from its first cycle on.
-  bool proven = false;
+  bool clean_first = false;
 };
 
 /// The worst of what a controller's set-points did in a run, over all joints.
@@ -78,7 +78,7 @@ class LossRun {
         robot_(c.period),
         loss_(c.share, c.bursts, c.seed),
         random_(c.seed + 77),
-        clean_(c.proven ? 1 : 0) {
+        clean_(c.clean_first ? 1 : 0) {
     robot_.extrapolates = c.extrapolates;
     const JointLimits& limits = bridge_.config().limits;
     for (int i = 0; i < 7; ++i) {
@@ -92,11 +92,9 @@ class LossRun {
     started_ = runEvent(bridge_, robot_, "start").success();
     last_ = robot_.setPoint();
     last_velocity_.setZero();
-    const unsigned idle = case_.proven ? LossBudget::kProvenCycles + 200 : random_() % 1500;
+    const unsigned idle = case_.clean_first ? 1200 : random_() % 1500;
     for (unsigned i = idle; i > 0; --i) cycle(Vector7::Zero());
-    // A proven connection loses from some moment of the motion on, so that it is trusted until
-    // then.
-    if (case_.proven) clean_ = static_cast<int>(part(0.0, 1.8) / case_.period);
+    if (case_.clean_first) clean_ = static_cast<int>(part(0.0, 1.8) / case_.period);
   }
 
   SetPointExtremes approach() {
@@ -111,6 +109,20 @@ class LossRun {
       if (i % std::max(1, static_cast<int>(0.25 / case_.period)) == 0)
         wish = (random_() % 8 == 0 ? -1.0 : 1.0) * towards;
       cycle(wish);
+    }
+    return extremes_;
+  }
+
+  /// The worst of the budget, from a cycle of the motion on: 20 lost cycles in groups of 5, one
+  /// answer between them.
+  SetPointExtremes approachLosing(int begin) {
+    const Vector7 towards = direction_.cwiseProduct(bridge_.config().limits.velocity);
+    for (int i = 0; i < static_cast<int>(1.8 / case_.period); ++i) {
+      const int since = i - begin;
+      const bool lost = since >= 0 && since < 23 && since % 6 != 5;
+      cycle(towards, !lost              ? LossPattern::Lost::Nothing
+                     : since % 2 == 0 ? LossPattern::Lost::Measurement
+                                      : LossPattern::Lost::Answer);
     }
     return extremes_;
   }
@@ -137,9 +149,12 @@ class LossRun {
   }
 
   void cycle(const Vector7& wish) {
-    drive(bridge_, robot_, wish);
-    const LossPattern::Lost lost = clean_ > 0 ? LossPattern::Lost::Nothing : loss_.next();
+    cycle(wish, clean_ > 0 ? LossPattern::Lost::Nothing : loss_.next());
     if (begun_ && clean_ > 0) --clean_;
+  }
+
+  void cycle(const Vector7& wish, LossPattern::Lost lost) {
+    drive(bridge_, robot_, wish);
     const bool answered = lost == LossPattern::Lost::Nothing;
     robot_.cycle(bridge_, lost == LossPattern::Lost::Measurement,
                  lost == LossPattern::Lost::Answer);

@@ -18,7 +18,7 @@ using test::runEvent;
 /// it.
 TEST(Losses, NoSetPointLeavesItsBoundsWhateverIsLost) {
   const unsigned seeds = std::getenv("COGLAB_LONG") != nullptr ? 200 : 2;
-  for (const double period : {0.001, 0.002, 0.005, 0.020}) {
+  for (const double period : {0.001, 0.002, 0.005, 0.010, 0.020}) {
     for (const double share : {0.0, 0.01, 0.05, 0.10}) {
       for (const bool bursts : {false, true}) {
         for (const bool extrapolates : {true, false}) {
@@ -39,6 +39,26 @@ TEST(Losses, NoSetPointLeavesItsBoundsWhateverIsLost) {
         }
       }
     }
+  }
+}
+
+/// The worst that the budget allows, beginning at each cycle of an approach at full speed on a
+/// connection that had lost nothing: 5 cycles, an answer, 5 cycles, ... 20 in all. The bounds hold,
+/// and at long periods, where losses decide, the set-point comes close to them.
+TEST(Losses, TheWorstPatternOfTheBudgetKeepsTheBounds) {
+  for (const double period : {0.001, 0.002, 0.005, 0.010, 0.020}) {
+    double closest = -1e9;
+    const int step = std::max(1, static_cast<int>(0.02 / period));
+    for (int begin = 0; begin < static_cast<int>(1.2 / period); begin += step) {
+      LossRun run({period, 0.0, false, true, 1, true});
+      ASSERT_TRUE(run.started());
+      const test::SetPointExtremes worst = run.approachLosing(begin);
+      EXPECT_LE(worst.beyond, 0.0) << period << " s, losses from cycle " << begin << " on";
+      EXPECT_LE(worst.speed, 0.0) << period;
+      EXPECT_LE(worst.acceleration, 1e-6) << period;
+      closest = std::max(closest, worst.beyond);
+    }
+    EXPECT_GT(closest, -2e-3) << period;
   }
 }
 

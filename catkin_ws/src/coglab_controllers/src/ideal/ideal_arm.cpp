@@ -98,7 +98,7 @@ void IdealArm::tick(std::int64_t now_ns) noexcept {
   const std::uint32_t requested = requested_.load(std::memory_order_acquire);
   judge();
   Vector7 target = targetVelocity(now_ns);
-  braking_.bound(interpolator_, config_.period, true, target);
+  braking_.bound(interpolator_, config_.period, target);
   interpolator_.step(target, config_.period);
   coglab_rt::RobotSample& sample = view_.sample;
   ++sample.sequence;

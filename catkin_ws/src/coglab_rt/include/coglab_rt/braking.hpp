@@ -5,7 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdint>
+#include <limits>
 
 #include "coglab_rt/interpolator.hpp"
 
@@ -17,12 +17,14 @@ struct BrakingReach {
   double lowest = 0.0;   ///< rad, <= 0
   double highest = 0.0;  ///< rad, >= 0
   double end = 0.0;      ///< rad, where it comes to rest
-  double time = 0.0;     ///< s until then
 };
 
 /// Reach of the time-optimal stop from (velocity, acceleration). Real-time safe.
 BrakingReach brakingReach(double velocity, double acceleration, double max_acceleration,
                           double max_jerk);
+
+/// The same along that stop's profile.
+BrakingReach brakingReach(double velocity, double acceleration, const AxisProfile& stop);
 
 /// Distance of the stop from constant speed (rad/s, >= 0), acceleration 0: v/2 (v/A + A/J), or v
 /// sqrt(v/J) where the acceleration limit is not reached.
@@ -34,39 +36,44 @@ double brakingDistance(double speed, double max_acceleration, double max_jerk);
 /// tick ahead with the exact state (BrakingGuard).
 double brakingSpeed(double distance, double max_acceleration, double max_jerk, double delay);
 
-/// The cycles without our answer that the bridge reckons with while it brakes: as many as a
+/// The cycles without our answer that the bridge reckons with, at every period: as many as a
 /// controller rides through before it ends command mode (coglab_sim's figures; KUKA publishes
 /// none). docs/limits_under_loss.md says why the limits hold.
 struct LossBudget {
-  static constexpr double kInARow = 5.0;
-  static constexpr double kPerWindow = 20.0;  ///< of any kWindow cycles: quality UNACCEPTABLE
-  static constexpr double kWindow = 100.0;
-  /// A connection that has lost nothing for so many cycles is trusted to lose no more than
-  /// max(kTrusted cycles, kTrustedTime) during one stop. Matters for periods above 5 ms only, where
-  /// the full budget would cost much time near a limit.
-  static constexpr std::uint32_t kProvenCycles = 1000;
-  static constexpr double kTrusted = 6.0;
-  static constexpr double kTrustedTime = 0.1;  ///< s
+  static constexpr int kInARow = 5;
+  static constexpr int kPerWindow = 20;  ///< of any kWindow cycles: quality UNACCEPTABLE
+  static constexpr int kWindow = 100;
 };
 
-/// Way (rad) that an axis may make in lost cycles of `dt` (s) while it stops within `time` (s),
-/// going on with at most `speed` (rad/s, >= 0) in each of them: an upper bound over all losses
-/// within the budget. `proven`: the connection is trusted, see LossBudget. Real-time safe.
-double lossReserve(double speed, double time, double dt, double max_acceleration, double max_jerk,
-                   bool proven);
+/// What lost cycles may add to the way of a stop, rad, both >= 0.
+struct LossReserve {
+  double down, up;
+};
 
-/// Time (s) of constant speed that the LossBudget costs at most during one stop at FRI period `dt`
-/// (s) on a proven connection: what whoever plans a motion keeps before a limit, so that the
+/// Way that an axis may make in lost cycles of `dt` (s), an upper bound over all losses within the
+/// LossBudget: the answer that the controller saw last led it from `before` to `after`, each answer
+/// from then on brakes at once along `stop`, and each lost cycle repeats the step of the answer
+/// before it. The way of the answers themselves is brakingReach's. Real-time safe.
+LossReserve lossReserve(const AxisState& before, const AxisState& after, const AxisProfile& stop,
+                        double dt, double max_jerk);
+
+/// Time (s) of constant speed that is at least what lossReserve keeps of one window of the
+/// LossBudget at FRI period `dt` (s): what whoever plans a motion keeps before a limit, so that the
 /// bridge's own guard finds nothing to cut. Real-time safe.
 double lostTime(double dt);
 
-/// What BrakingGuard keeps before a bound besides the margin, rad: a step on the wire is off by up
-/// to 0.24e-6 rad (float32 at 3 rad, both ends), and 20 lost cycles repeat it.
-constexpr double kWireRounding = 5e-6;
+/// Rounding on the wire (float32 at 3 rad) that one lost cycle can add, rad: 0.24e-6 by the step
+/// that is repeated, both its ends, and 0.24e-6 by the set-point that is reported after it.
+constexpr double kLossRounding = 0.5e-6;
+
+/// What BrakingGuard keeps before a bound besides the margin, rad: the rounding of one window of
+/// lost cycles.
+constexpr double kWireRounding = LossBudget::kPerWindow * kLossRounding;
 
 /// Bounds target velocities so that the interpolator's next step leaves every joint able to stop
-/// inside its position limits whatever is lost within the LossBudget. A joint that is already
-/// outside may only stand or come back.
+/// inside its position limits whatever is lost within the LossBudget. A joint for which even braking
+/// at once leaves that open, such as one that is outside already, brakes at once or turns away from
+/// the limit.
 class BrakingGuard {
  public:
   /// `margin` (rad) is kept from both ends of every range; it must leave room between them.
@@ -74,9 +81,8 @@ class BrakingGuard {
   BrakingGuard(const JointLimits& limits, double margin);
 
   /// Cuts `target_velocity` (rad/s) in place and returns the joints that were cut, bit i for joint
-  /// i. `proven`: see LossBudget. Real-time safe.
-  unsigned bound(const Interpolator& interpolator, double dt, bool proven,
-                 Vector7& target_velocity) const;
+  /// i. Real-time safe.
+  unsigned bound(const Interpolator& interpolator, double dt, Vector7& target_velocity) const;
 
   const Vector7& lower() const { return lower_; }
   const Vector7& upper() const { return upper_; }
@@ -85,7 +91,7 @@ class BrakingGuard {
   struct Range {
     double low, high;  // rad
   };
-  Range reach(int joint, const AxisState& state, double target, double dt, bool proven) const;
+  Range reach(int joint, const AxisState& state, double target, double dt) const;
 
   Vector7 lower_, upper_, max_velocity_, max_acceleration_, max_jerk_;
 };
@@ -94,10 +100,13 @@ class BrakingGuard {
 
 inline BrakingReach brakingReach(double velocity, double acceleration, double max_acceleration,
                                  double max_jerk) {
-  const AxisProfile stop = planVelocity(velocity, acceleration, 0.0, max_acceleration, max_jerk);
+  return brakingReach(velocity, acceleration,
+                      planVelocity(velocity, acceleration, 0.0, max_acceleration, max_jerk));
+}
+
+inline BrakingReach brakingReach(double velocity, double acceleration, const AxisProfile& stop) {
   BrakingReach reach;
   reach.end = advance({0.0, velocity, acceleration}, stop, stop.totalTime()).position;
-  reach.time = stop.totalTime();
   reach.lowest = std::min(0.0, reach.end);
   reach.highest = std::max(0.0, reach.end);
   // The velocity changes its sign at most once, in the first phase, where the acceleration still
@@ -144,31 +153,45 @@ inline double brakingSpeed(double distance, double max_acceleration, double max_
   return root * root;
 }
 
-inline double lossReserve(double speed, double time, double dt, double max_acceleration,
-                          double max_jerk, bool proven) {
+inline LossReserve lossReserve(const AxisState& before, const AxisState& after,
+                               const AxisProfile& stop, double dt, double max_jerk) {
   using B = LossBudget;
-  if (!(speed > 0.0)) return 0.0;
-  // Up to kInARow cycles before each answer that brakes, and after the last one, whose step still
-  // has a length.
-  const double cycles = std::min(B::kPerWindow, B::kInARow * (time / dt + 2.0));
-  double way = cycles * dt * speed;
-  // Losses of later windows come at the speed that is left then. While the acceleration turns round
-  // (2 A/J) nothing is gained, at the end the speed lies above the straight line (A/J / 2).
-  const double late = 2.5 * max_acceleration / max_jerk;
-  const double spacing = (B::kWindow - B::kPerWindow) * dt;
-  for (double begin = spacing; begin < time; begin += spacing) {
-    const double left = std::min(speed, speed - max_acceleration * (begin - late));
-    if (left <= 0.0) break;
-    way += B::kPerWindow * dt * left;
+  // Longest step of a stop from its part `from`..`to` on. An axis slows down once its acceleration
+  // points against its motion; until then its speed peaks where the acceleration comes to zero.
+  const auto longest = [&](const AxisState& from, const AxisState& to) {
+    const double step = to.position - from.position;
+    const double peak =
+        dt * (from.velocity + 0.5 * from.acceleration * std::abs(from.acceleration) / max_jerk);
+    return LossReserve{std::max(0.0, from.acceleration < 0.0 ? -peak : -step),
+                       std::max(0.0, from.acceleration > 0.0 ? peak : step)};
+  };
+  LossReserve way{0.0, 0.0};
+  const auto lose = [&](int cycles, const LossReserve& step) {
+    way.down += cycles * step.down;
+    way.up += cycles * step.up;
+  };
+  // The first window is lost as early as it can be: kInARow cycles after each of the first answers.
+  const double step = after.position - before.position;
+  AxisState last = after;
+  for (int answer = 1; answer < B::kPerWindow / B::kInARow; ++answer) {
+    const AxisState next = advance(after, stop, answer * dt);
+    const LossReserve repeated = longest(last, next);
+    if (answer == 1)
+      lose(B::kInARow, {std::max(-step, repeated.down), std::max(step, repeated.up)});
+    lose(B::kInARow, repeated);
+    last = next;
   }
-  if (!proven) return way;
-  return std::min(way, std::max(B::kTrusted * dt, B::kTrustedTime) * speed);
+  // Another window's losses can only come after as many answers as a window has.
+  constexpr int kAnswers = B::kWindow - B::kPerWindow;
+  for (int k = kAnswers; (k - 1) * dt < stop.totalTime(); k += kAnswers) {
+    const LossReserve repeated =
+        longest(advance(after, stop, (k - 1) * dt), advance(after, stop, k * dt));
+    lose(B::kPerWindow, {repeated.down + kLossRounding, repeated.up + kLossRounding});
+  }
+  return way;
 }
 
-inline double lostTime(double dt) {
-  using B = LossBudget;
-  return std::min(B::kPerWindow * dt, std::max(B::kTrusted * dt, B::kTrustedTime));
-}
+inline double lostTime(double dt) { return LossBudget::kPerWindow * dt; }
 
 inline BrakingGuard::BrakingGuard(const JointLimits& limits, double margin)
     : lower_(limits.lower_position.array() + (margin + kWireRounding)),
@@ -179,51 +202,49 @@ inline BrakingGuard::BrakingGuard(const JointLimits& limits, double margin)
 
 /// What one step towards `target` and a stop after it may reach, losses included.
 inline BrakingGuard::Range BrakingGuard::reach(int joint, const AxisState& state, double target,
-                                               double dt, bool proven) const {
+                                               double dt) const {
   const double a = max_acceleration_[joint], j = max_jerk_[joint];
   const AxisState next =
       advance(state, planVelocity(state.velocity, state.acceleration, target, a, j), dt);
-  const BrakingReach stop = brakingReach(next.velocity, next.acceleration, a, j);
-  // A lost cycle repeats the last step, so its speed counts as well as those to come; the latter
-  // peak where the present acceleration has been brought to zero.
-  const double step = (next.position - state.position) / dt;
-  const double coasting = next.velocity + 0.5 * next.acceleration * std::abs(next.acceleration) / j;
-  const double up = std::max({0.0, step, next.velocity, coasting});
-  const double down = std::max({0.0, -step, -next.velocity, -coasting});
-  return {next.position + stop.lowest - lossReserve(down, stop.time, dt, a, j, proven),
-          next.position + stop.highest + lossReserve(up, stop.time, dt, a, j, proven)};
+  const AxisProfile stop = planVelocity(next.velocity, next.acceleration, 0.0, a, j);
+  const BrakingReach way = brakingReach(next.velocity, next.acceleration, stop);
+  const LossReserve lost = lossReserve(state, next, stop, dt, j);
+  return {next.position + way.lowest - lost.down, next.position + way.highest + lost.up};
 }
 
-inline unsigned BrakingGuard::bound(const Interpolator& interpolator, double dt, bool proven,
+inline unsigned BrakingGuard::bound(const Interpolator& interpolator, double dt,
                                     Vector7& target_velocity) const {
-  constexpr double tiny = 1e-12;
   unsigned cut = 0;
   for (int i = 0; i < 7; ++i) {
     const AxisState state = interpolator.axis(i);
-    const double target = std::clamp(target_velocity[i], -max_velocity_[i], max_velocity_[i]);
+    double target = std::clamp(target_velocity[i], -max_velocity_[i], max_velocity_[i]);
     target_velocity[i] = target;
-    const auto within = [&](double part, double low, double high) {
-      const Range range = reach(i, state, part * target, dt, proven);
+    double low = lower_[i], high = upper_[i];
+    const auto within = [&](double part) {
+      const Range range = reach(i, state, part * target, dt);
       return range.low >= low && range.high <= high;
     };
-    if (within(1.0, lower_[i], upper_[i])) continue;
+    if (within(1.0)) continue;
 
-    // What braking at once would reach is unavoidable; a joint outside its range must still be
-    // allowed to come back.
-    const Range braked = reach(i, state, 0.0, dt, proven);
-    const double high = std::max(upper_[i], braked.high + tiny);
-    const double low = std::min(lower_[i], braked.low - tiny);
-    if (within(1.0, low, high) && (low < lower_[i] ? target >= 0.0 : true) &&
-        (high > upper_[i] ? target <= 0.0 : true)) {
-      continue;
+    // Where braking at once may pass a bound, losses before it have used what was kept for them, or
+    // the joint is outside; turning away goes no farther than braking does.
+    const Range braked = reach(i, state, 0.0, dt);
+    if (braked.high > high) {
+      high = std::numeric_limits<double>::infinity();
+      target = std::min(target, 0.0);
     }
-    // Largest admissible part of the target; 0 is admissible by construction. 30 halvings: 1e-9 of
-    // the target.
+    if (braked.low < low) {
+      low = -std::numeric_limits<double>::infinity();
+      target = std::max(target, 0.0);
+    }
+    // Largest admissible part of the target; 0 is admissible. 20 halvings: 1e-6 of the target.
     double good = 0.0, bad = 1.0;
-    for (int step = 0; step < 30; ++step) {
+    if (within(bad)) good = bad;
+    for (int step = 0; step < 20 && good < bad; ++step) {
       const double middle = 0.5 * (good + bad);
-      (within(middle, low, high) ? good : bad) = middle;
+      (within(middle) ? good : bad) = middle;
     }
+    if (good * target == target_velocity[i]) continue;
     target_velocity[i] = good * target;
     cut |= 1U << i;
   }

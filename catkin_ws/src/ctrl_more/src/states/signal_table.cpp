@@ -6,6 +6,7 @@
 
 #include "ctrl_more/log/logger.hpp"
 #include "ctrl_more/log/words.hpp"
+#include "ctrl_more/states/handles.hpp"
 
 namespace ctrl_more {
 namespace {
@@ -147,6 +148,26 @@ std::string SignalTable::numbers(const SignalInfo& info) const {
   std::ostringstream out;
   for (std::uint32_t k = 0; k < info.size; ++k) out << ' ' << data_[info.offset + k];
   return out.str();
+}
+
+namespace {
+
+std::string nameFor(const SignalTable::Entry* signal) {
+  return signal != nullptr ? signal->name() : "the controller's state";
+}
+
+}  // namespace
+
+void refuseSize(const SignalTable::Entry* signal, int expected, int given) {
+  throw WrongSize("it gave " + std::to_string(given) + " numbers to " + nameFor(signal) +
+                  ", expected a size of " + std::to_string(expected));
+}
+
+void refuseReach(const SignalTable::Entry* signal, int size, std::ptrdiff_t start,
+                 std::ptrdiff_t count) {
+  throw WrongSize("it reached beside " + nameFor(signal) + ": " + std::to_string(count) +
+                  " from number " + std::to_string(start) + " on, expected a part of its " +
+                  std::to_string(size));
 }
 
 }  // namespace ctrl_more

@@ -51,11 +51,6 @@ bool Bridge::compute(const std::uint8_t* datagram, std::size_t size, std::int64_
   const double dt = fri::cycleTimeOf(measurement_);
   if (reception.fresh_session || reception.new_period) velocity_filter_.reset();
   if (first_contact || reception.new_period) following_ = false;
-  if (reception.fresh_session || reception.gap()) {
-    cycles_without_loss_ = 0;
-  } else if (cycles_without_loss_ < LossBudget::kProvenCycles) {
-    ++cycles_without_loss_;
-  }
 
   sample_.stamp_ns = now_ns;
   sample_.cycle_time = dt;
@@ -289,8 +284,7 @@ void Bridge::follow(const fri::Reception& reception, fri::CommandDatagram& answe
                 config_.limits, target);
   if (!was_leashed && leash_.joint() >= 0) ++counters_.leash_trips;
 
-  const bool proven = cycles_without_loss_ >= LossBudget::kProvenCycles;
-  bounded_joints_ = braking_.bound(interpolator_, sample_.cycle_time, proven, target);
+  bounded_joints_ = braking_.bound(interpolator_, sample_.cycle_time, target);
   if (bounded_joints_ != 0) ++counters_.position_bounds;
   interpolator_.step(target, sample_.cycle_time);
   fri::jointsToWire(interpolator_.position(), answer.joint_position);

@@ -123,6 +123,11 @@ class ControlStore {
   /// Table of one container, in order of declaration.
   std::vector<SignalInfo> signals(ControlContainer container) const;
 
+  /// The row of a handle that find() made.
+  const SignalTable::Entry& entryOf(ControlSignal signal) const {
+    return table_.entries()[signal.index()];
+  }
+
   /// Container and key of a handle, as `container/key`, for reports.
   std::string nameOfSignal(ControlSignal signal) const;
 

@@ -1,10 +1,12 @@
 #pragma once
 
+#include <cstddef>
 #include <stdexcept>
 
 #include <Eigen/Core>
 
 #include "ctrl_more/states/signal.hpp"
+#include "ctrl_more/states/signal_table.hpp"
 
 namespace ctrl_more {
 
@@ -29,11 +31,21 @@ class EmptyHandle : public std::logic_error {
   using std::logic_error::logic_error;
 };
 
-/// Thrown when a controller writes beside the numbers of a signal. A fault.
+/// Thrown when a controller writes beside the numbers of a signal. A fault; the sentence names the
+/// signal, its size and what was given.
 class WrongSize : public std::length_error {
  public:
   using std::length_error::length_error;
 };
+
+/// Throws WrongSize: `given` numbers for a signal (or a part of one) that has `expected`. Null: the
+/// controller's state.
+[[noreturn, gnu::cold]] void refuseSize(const SignalTable::Entry* signal, int expected, int given);
+
+/// Throws WrongSize: `count` numbers from `start` on, of a signal (or a part of one) that has
+/// `size`.
+[[noreturn, gnu::cold]] void refuseReach(const SignalTable::Entry* signal, int size,
+                                         std::ptrdiff_t start, std::ptrdiff_t count);
 
 /// Handle of a robot signal of N numbers, for reading: `robot.view(handle)`. Only Setup makes one
 /// that is not empty, and has compared N with the signal's size then.
@@ -100,70 +112,120 @@ class Modify {
   std::uint32_t owner_ = 0;
 };
 
-/// N numbers that may be written, and none beside them: an Eigen vector whose elements and parts
-/// are checked in every build. What lies outside throws WrongSize.
+/// N numbers that may be written, and none beside them, in every build. For reading it is a constant
+/// Eigen vector. Written is by assignment, `+= -= *= /=`, numbers and parts of it; a size that can
+/// be compared by the compiler must fit, all others throw WrongSize. What Eigen offers besides for
+/// writing (`<<`, coeffRef, blocks, resize) does not compile or does nothing.
 template <int N = AnySize>
-class Numbers : public Eigen::Map<Eigen::Matrix<double, N, 1>> {
-  using Base = Eigen::Map<Eigen::Matrix<double, N, 1>>;
+class Numbers : public Eigen::Map<const Eigen::Matrix<double, N, 1>> {
+  using Base = Eigen::Map<const Eigen::Matrix<double, N, 1>>;
   using Index = Eigen::Index;
 
  public:
   /// @param data first number
   /// @param size how many there are; N if that is fixed
-  Numbers(double* data, int size) : Base(data, size) {}
-  using Base::operator=;
-  /// Copies the numbers of another view of the same size.
-  Numbers& operator=(const Numbers& other) {
-    Base::operator=(other);
-    return *this;
-  }
+  /// @param signal to which they belong, for messages; null: the controller's state
+  Numbers(double* data, int size, const SignalTable::Entry* signal = nullptr)
+      : Base(data, size), begin_(data), signal_(signal) {}
   /// Another view of the same numbers.
   Numbers(const Numbers&) = default;
 
+  /// Copies the numbers of another view of the same size.
+  /// @throws WrongSize
+  Numbers& operator=(const Numbers& other) { return *this = static_cast<const Base&>(other); }
+  /// Copies a vector of the same size.
+  /// @throws WrongSize
+  template <typename Derived>
+  Numbers& operator=(const Eigen::DenseBase<Derived>& value) {
+    return fit(value), written() = value.derived(), *this;
+  }
+  /// Adds a vector of the same size.
+  /// @throws WrongSize
+  template <typename Derived>
+  Numbers& operator+=(const Eigen::MatrixBase<Derived>& value) {
+    return fit(value), written() += value.derived(), *this;
+  }
+  /// Subtracts a vector of the same size.
+  /// @throws WrongSize
+  template <typename Derived>
+  Numbers& operator-=(const Eigen::MatrixBase<Derived>& value) {
+    return fit(value), written() -= value.derived(), *this;
+  }
+  /// Multiplies every number.
+  Numbers& operator*=(double factor) { return written() *= factor, *this; }
+  /// Divides every number.
+  Numbers& operator/=(double divisor) { return written() /= divisor, *this; }
+  /// Gives every number the same value.
+  Numbers& setConstant(double value) { return written().setConstant(value), *this; }
+  /// Gives every number the value 0.
+  Numbers& setZero() { return setConstant(0.0); }
+  /// Nothing says how many numbers follow.
+  template <typename Value>
+  void operator<<(const Value&) = delete;
+
   /// One number.
-  double& operator[](Index i) { return need(i, 1), this->coeffRef(i); }
+  /// @throws WrongSize
+  double& operator[](Index i) { return need(i, 1), begin_[i]; }
   /// One number.
-  double operator[](Index i) const { return need(i, 1), this->coeff(i); }
+  /// @throws WrongSize
+  double operator[](Index i) const { return need(i, 1), begin_[i]; }
   /// One number.
+  /// @throws WrongSize
   double& operator()(Index i) { return (*this)[i]; }
   /// One number.
+  /// @throws WrongSize
   double operator()(Index i) const { return (*this)[i]; }
 
   /// The first M numbers.
   template <int M>
-  auto head() {
-    return need<M>(0), Base::template head<M>();
+  Numbers<M> head() {
+    return segment<M>(0);
   }
   /// The last M numbers.
   template <int M>
-  auto tail() {
-    return need<M>(0), Base::template tail<M>();
+  Numbers<M> tail() {
+    return segment<M>(this->size() - M);
   }
   /// M numbers from `start` on.
+  /// @throws WrongSize
   template <int M>
-  auto segment(Index start) {
-    return need(start, M), Base::template segment<M>(start);
+  Numbers<M> segment(Index start) {
+    static_assert(M >= 0 && (N == AnySize || M <= N), "the signal has fewer numbers");
+    return need(start, M), Numbers<M>(begin_ + start, M, signal_);
   }
   /// The first `count` numbers.
-  auto head(Index count) { return need(0, count), Base::head(count); }
+  /// @throws WrongSize
+  Numbers<> head(Index count) { return segment(0, count); }
   /// The last `count` numbers.
-  auto tail(Index count) { return need(0, count), Base::tail(count); }
+  /// @throws WrongSize
+  Numbers<> tail(Index count) { return segment(this->size() - count, count); }
   /// `count` numbers from `start` on.
-  auto segment(Index start, Index count) { return need(start, count), Base::segment(start, count); }
+  /// @throws WrongSize
+  Numbers<> segment(Index start, Index count) {
+    return need(start, count), Numbers<>(begin_ + start, static_cast<int>(count), signal_);
+  }
 
  private:
-  template <int M>
-  void need(Index start) const {
-    static_assert(N == AnySize || M <= N, "the signal has fewer numbers");
-    if constexpr (N == AnySize) need(start, M);
+  Eigen::Map<Eigen::Matrix<double, N, 1>> written() {
+    return Eigen::Map<Eigen::Matrix<double, N, 1>>(begin_, this->size());
+  }
+  template <typename Derived>
+  void fit(const Eigen::DenseBase<Derived>& value) const {
+    static_assert(Derived::ColsAtCompileTime == 1 || Derived::ColsAtCompileTime == AnySize,
+                  "the numbers of a signal are a column");
+    static_assert(N == AnySize || Derived::RowsAtCompileTime == AnySize ||
+                      Derived::RowsAtCompileTime == N,
+                  "the signal has another number of numbers");
+    if (value.rows() != this->size() || value.cols() != 1)
+      refuseSize(signal_, static_cast<int>(this->size()), static_cast<int>(value.size()));
   }
   void need(Index start, Index count) const {
     if (start >= 0 && count >= 0 && start <= this->size() - count) return;
-    outside();
+    refuseReach(signal_, static_cast<int>(this->size()), start, count);
   }
-  [[noreturn, gnu::cold, gnu::noinline]] static void outside() {
-    throw WrongSize("it reached beside the numbers of a signal");
-  }
+
+  double* begin_;
+  const SignalTable::Entry* signal_;
 };
 
 }  // namespace ctrl_more

@@ -38,18 +38,15 @@ class ModifiedControlStates {
   template <int N>
   Numbers<N> operator[](const Modify<N>& handle) {
     if (handle.owner_ != owner_) refuse();
-    return Numbers<N>(control_.data() + handle.signal_.offset(), handle.size());
+    return Numbers<N>(control_.data() + handle.signal_.offset(), handle.size(),
+                      &control_.entryOf(handle.signal_));
   }
 
   /// Replaces a signal.
   /// @throws UndeclaredWrite as above, WrongSize if `value` has another size
   template <int N, typename Derived>
   void set(const Modify<N>& handle, const Eigen::MatrixBase<Derived>& value) {
-    Numbers<N> numbers = (*this)[handle];
-    if (value.size() != numbers.size()) {
-      throw WrongSize("value has another size than the declared signal");
-    }
-    numbers = value;
+    (*this)[handle] = value;
   }
 
   /// The store, for reading.

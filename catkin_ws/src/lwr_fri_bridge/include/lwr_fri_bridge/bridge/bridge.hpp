@@ -144,7 +144,6 @@ class Bridge {
   std::int64_t permission_since_ns_ = 0;
   std::uint32_t stop_ticket_ = 0;
   unsigned bounded_joints_ = 0;
-  std::uint32_t cycles_without_loss_ = 0;
   bool connected_ = false;
   bool following_ = false;  // the last answer came from the interpolator
   bool monitor_asked_ = false;
