@@ -1,5 +1,6 @@
 #include <fstream>
 #include <sstream>
+#include <type_traits>
 
 #include "test_support.hpp"
 
@@ -226,6 +227,13 @@ TEST(Handles, NothingBesideASignalIsWritten) {
       [](Numbers<> any, Numbers<3>) { any.tail(4).setConstant(9.0); },
       [](Numbers<> any, Numbers<3>) { any.segment<2>(2).setConstant(9.0); },
       [](Numbers<>, Numbers<3> three) { three.segment(1, 3).setConstant(9.0); },
+      [](Numbers<> any, Numbers<3>) { any.head(2)[2] = 9.0; },
+      [](Numbers<> any, Numbers<3>) { any = Eigen::VectorXd::Constant(5, 9.0); },
+      [](Numbers<> any, Numbers<3>) { any += Eigen::VectorXd::Constant(5, 9.0); },
+      [](Numbers<> any, Numbers<3>) { any -= Eigen::VectorXd::Constant(2, 9.0); },
+      [](Numbers<>, Numbers<3> three) { three = Eigen::VectorXd::Constant(5, 9.0); },
+      [](Numbers<> any, Numbers<3>) { any = Eigen::MatrixXd::Constant(3, 2, 9.0); },
+      [](Numbers<> any, Numbers<3>) { any = any.head(2); },
   };
   for (std::size_t i = 0; i < ways.size(); ++i) {
     Rig rig(0.0, false, false);
@@ -245,10 +253,62 @@ TEST(Handles, NothingBesideASignalIsWritten) {
     const std::vector<double> before(rig.control.data(),
                                      rig.control.data() + rig.control.dataSize());
     rig.step();
-    EXPECT_TRUE(contains(rig.manager->status("c").fault_text, "beside")) << i;
+    const std::string fault = rig.manager->status("c").fault_text;
+    EXPECT_TRUE(contains(fault, "zmp/zmp") && contains(fault, "expected")) << i << ": " << fault;
     EXPECT_EQ(before,
               std::vector<double>(rig.control.data(), rig.control.data() + rig.control.dataSize()));
   }
+}
+
+TEST(Handles, AWrongSizeNamesSignalExpectedAndGiven) {
+  SignalTable::Entry row{&groupOf(ControlContainer::Zmp), {}};
+  row.info.key = "zmp";
+  double numbers[5] = {};
+  const auto sentence = [&](const std::function<void(Numbers<>)>& way) -> std::string {
+    try {
+      way(Numbers<>(numbers, 3, &row));
+    } catch (const WrongSize& wrong) {
+      return wrong.what();
+    }
+    return "";
+  };
+  EXPECT_EQ(sentence([](Numbers<> n) { n = Eigen::VectorXd::Zero(5); }),
+            "it gave 5 numbers to zmp/zmp, expected a size of 3");
+  EXPECT_EQ(sentence([](Numbers<> n) { n.segment(1, 3) *= 2.0; }),
+            "it reached beside zmp/zmp: 3 from number 1 on, expected a part of its 3");
+}
+
+template <typename T, typename = void>
+constexpr bool kShifts = false;
+template <typename T>
+constexpr bool kShifts<T, std::void_t<decltype(std::declval<T&>() << 1.0)>> = true;
+template <typename T>
+constexpr bool kLvalue = (std::decay_t<T>::Flags & Eigen::LvalueBit) != 0;
+
+/// What Eigen would write without looking at sizes is not there, or is constant.
+TEST(Handles, NothingElseOfEigenWrites) {
+  using Three = Numbers<3>;
+  static_assert(kShifts<Eigen::Vector3d> && !kShifts<Three> && !kShifts<Numbers<>>);
+  static_assert(kLvalue<decltype(std::declval<Eigen::Vector3d&>().topRows(2))>);
+  static_assert(!kLvalue<Three> && !kLvalue<decltype(std::declval<Three&>().topRows(2))> &&
+                !kLvalue<decltype(std::declval<Three&>().bottomRows<2>())> &&
+                !kLvalue<decltype(std::declval<Three&>().middleRows(0, 2))> &&
+                !kLvalue<decltype(std::declval<Three&>().block(0, 0, 2, 1))> &&
+                !kLvalue<decltype(std::declval<Three&>().row(0))> &&
+                !kLvalue<decltype(std::declval<Three&>().array())> &&
+                !kLvalue<decltype(std::declval<Three&>().matrix())> &&
+                !kLvalue<decltype(std::declval<Three&>().transpose())> &&
+                !kLvalue<decltype(std::declval<Three&>().reverse())>);
+  static_assert(!std::is_assignable_v<decltype(std::declval<Three&>().coeffRef(0)), double>);
+  static_assert(!std::is_assignable_v<decltype(std::declval<Three&>().x()), double>);
+  static_assert(!std::is_assignable_v<decltype(*std::declval<Three&>().data()), double>);
+  double numbers[4] = {1.0, 2.0, 3.0, 4.0};
+  Three three(numbers, 3);
+  three = three + Eigen::Vector3d::UnitX();
+  three.head<2>() += Eigen::Vector2d(0.5, 0.5);
+  three.tail(1) /= 2.0;
+  EXPECT_EQ(std::vector<double>(numbers, numbers + 4), (std::vector<double>{2.5, 2.5, 1.5, 4.0}));
+  EXPECT_EQ(three.norm(), Eigen::Vector3d(2.5, 2.5, 1.5).norm());
 }
 
 TEST(Handles, EmptyOnesAreFaults) {

@@ -20,6 +20,7 @@ function(ctrl_more_add_test name)
   target_include_directories(${target} PRIVATE test src controllers)
   target_compile_features(${target} PRIVATE cxx_std_17)
   target_compile_definitions(${target} PRIVATE
+    EIGEN_NO_DEBUG  # as in a release build, where Eigen checks nothing
     CTRL_MORE_SOURCE_DIR="${CMAKE_CURRENT_SOURCE_DIR}"
     CTRL_MORE_TEST_PLUGIN_DIR="${CMAKE_CURRENT_BINARY_DIR}/test_plugins"
     CTRL_MORE_PLUGIN_DIR="$<TARGET_FILE_DIR:ctrl_more_attitude>")

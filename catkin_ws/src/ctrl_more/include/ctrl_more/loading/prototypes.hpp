@@ -12,7 +12,8 @@ namespace ctrl_more {
 /// one is raised when classes or meanings change. Static, so that a library keeps its own.
 static inline constexpr Abi thisAbi() {
   return abiOf<FeedbackController, RobotStates, ControlStates, ModifiedControlStates, Description,
-               RobotSignalUse, ControlSignalUse, GainSpec, SettingSpec, StateSpec, Setup, Cycle>(3);
+               RobotSignalUse, ControlSignalUse, GainSpec, SettingSpec, StateSpec, Setup, Numbers<>,
+               Cycle>(4);
 }
 
 /// Makes one controller; the caller owns it. The paper's type for its prototypes.

@@ -211,11 +211,9 @@ class Numbers : public Eigen::Map<const Eigen::Matrix<double, N, 1>> {
   }
   template <typename Derived>
   void fit(const Eigen::DenseBase<Derived>& value) const {
-    static_assert(Derived::ColsAtCompileTime == 1 || Derived::ColsAtCompileTime == AnySize,
-                  "the numbers of a signal are a column");
-    static_assert(N == AnySize || Derived::RowsAtCompileTime == AnySize ||
-                      Derived::RowsAtCompileTime == N,
-                  "the signal has another number of numbers");
+    constexpr int rows = Derived::RowsAtCompileTime, columns = Derived::ColsAtCompileTime;
+    static_assert(columns == 1 || columns == AnySize, "the numbers of a signal are a column");
+    static_assert(N == AnySize || rows == AnySize || rows == N, "the signal has another size");
     if (value.rows() != this->size() || value.cols() != 1)
       refuseSize(signal_, static_cast<int>(this->size()), static_cast<int>(value.size()));
   }
