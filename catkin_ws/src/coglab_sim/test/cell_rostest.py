@@ -59,6 +59,13 @@ def wait_for(condition, limit: float = 10.0) -> bool:
     return False
 
 
+def cell_binary() -> str:
+    """Path of the node's program."""
+    return subprocess.check_output(
+        ["catkin_find", "--first-only", "--libexec", "coglab_sim", "cell_node"], text=True
+    ).strip()
+
+
 class CellNode(unittest.TestCase):
     @classmethod
     def setUpClass(cls) -> None:
@@ -177,12 +184,36 @@ class CellNode(unittest.TestCase):
         time.sleep(1.0)
         self.assertTrue(30 < self.bridge.received - before < 70)
 
+    def test_9_sends_from_the_source_port_of_its_parameter_or_ends(self) -> None:
+        """For clients that know the controller by its port. A port that is taken is not replaced by another."""
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as client, socket.socket(
+            socket.AF_INET, socket.SOCK_DGRAM
+        ) as taken:
+            for end in (client, taken):
+                end.bind(("127.0.0.1", 0))
+            client.settimeout(10.0)
+            source_port = taken.getsockname()[1]
+            command = [cell_binary(), "__name:=with_source_port", f"_fri_port:={client.getsockname()[1]}"]
+            command.append(f"_fri_source_port:={source_port}")
+            refused = subprocess.run(
+                command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, timeout=20, check=False
+            )
+            self.assertNotEqual(refused.returncode, 0)
+            self.assertIn(f"from port {source_port}", refused.stdout)
+            taken.close()
+            node = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+            try:
+                data, peer = client.recvfrom(2048)
+                self.assertEqual((len(data), peer), (916, ("127.0.0.1", source_port)))
+            finally:
+                node.terminate()
+                node.wait(10.0)
+
     def test_8_parameters_out_of_range_are_refused_at_start(self) -> None:
-        binary = subprocess.check_output(
-            ["catkin_find", "--first-only", "--libexec", "coglab_sim", "cell_node"], text=True
-        ).strip()
+        binary = cell_binary()
         for name, value, expected in (
             ("fri_port", 70000, "= 70000 is outside its range 0..65535"),
+            ("fri_source_port", 70000, "= 70000 is outside its range 0..65535"),
             ("speed", 1000.0, "= 1000 is outside its range 0.01..100"),
             ("truth_rate", 0.1, "= 0.1 is outside its range 1..1000"),
             ("krc/period", 0.5, "krc/period = 0.5 is outside its range 0.001..0.1"),

@@ -19,10 +19,9 @@ bool TargetTopic::mayMove(const std::string& publisher) {
     ++active_;
     ROS_WARN_THROTTLE(5.0,
                       "lwr: target_joint_states of %s refused: a controller of this process moves "
-                      "the arm until this node ends; to move it by the topic, start the node "
-                      "without the parameter controller_manager/active and do not call "
-                      "switch_controller",
-                      publisher.c_str());
+                      "the arm; end that first: rosservice call %s \"''\"",
+                      publisher.c_str(),
+                      ros::names::resolve("controller_manager/switch_controller").c_str());
     return false;
   }
   // Two publishers would pull the arm to and fro: the one whose velocities are followed keeps it
