@@ -146,12 +146,16 @@ class TruePath(unittest.TestCase):
         foreign = rospy.Publisher("lwr/target_joint_states", JointState, queue_size=1)
         wait_until(lambda: foreign.get_num_connections() > 0 and counted, 10.0, "connections")
         before = robot.arm()
-        rate = rospy.Rate(100)
-        for _ in range(150):
-            message = JointState(velocity=[0.0] * 6 + [0.4])
-            message.header.stamp = rospy.Time.now()
-            foreign.publish(message)
-            rate.sleep()
+
+        def publish(cycles: int) -> None:
+            rate = rospy.Rate(100)
+            for _ in range(cycles):
+                message = JointState(velocity=[0.0] * 6 + [0.4])
+                message.header.stamp = rospy.Time.now()
+                foreign.publish(message)
+                rate.sleep()
+
+        publish(150)
         for now, then in zip(robot.arm(), before, strict=True):
             self.assertAlmostEqual(now, then, delta=0.01)
         keys = ("refused: a controller is active", "refused: another publisher moves the arm")
@@ -161,6 +165,12 @@ class TruePath(unittest.TestCase):
             8.0,
             "the reason with the publisher's name",
         )
+        helps = "rosservice call " + rospy.resolve_name("controller_manager/switch_controller") + ' "\'\'"'
+        self.assertTrue([line for line in told if helps in line], told)
+        answer = robot.manager("switch_controller", "")
+        self.assertTrue(answer.success, answer.message)
+        publish(100)
+        self.assertGreater(robot.arm()[6] - before[6], 0.1)
         foreign.unregister()
         robot.go(HOME)  # and the controller's own velocities still count
 
