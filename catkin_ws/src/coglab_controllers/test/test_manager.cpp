@@ -112,6 +112,27 @@ TEST(Manager, StaleAndBrokenJointStatesGiveZeroVelocity) {
   EXPECT_NE(robot.reason().find("no joint state"), std::string::npos);
 }
 
+/// With the parameters as shipped.
+TEST(Manager, AnArmThatFallsSilentIsKnownWithinASecond) {
+  VirtualRobot robot;
+  robot.loadBoth();
+  robot.see("human_hand", kGoal);
+  ASSERT_TRUE(VirtualRobot::ok(robot.dmp().execute(robot.reach())));
+  for (int i = 0; i < 50; ++i) robot.tick();
+  ASSERT_EQ(robot.state(), MotionState::Running) << robot.reason();
+  double silent = 0.0, zero = 0.0;
+  while (robot.state() == MotionState::Running && silent < 5.0) {
+    silent += 0.005;
+    robot.manager->cycle().idle(robot.now_ns + std::llround(1e9 * silent));
+    if (zero == 0.0 && robot.manager->report().velocity.isZero()) zero = silent;
+  }
+  EXPECT_LE(silent, 1.0);
+  EXPECT_GT(silent, 0.1);  // a few lost cycles end nothing
+  EXPECT_LE(zero, 0.1);
+  EXPECT_EQ(robot.manager->report().reason.code(), ReasonCode::StaleJointState);
+  EXPECT_FALSE(robot.manager->report().standing);
+}
+
 TEST(Manager, SwitchInMotionBrakesWithoutAJumpAndReportsUnfinished) {
   VirtualRobot robot;
   robot.loadBoth("ptp");

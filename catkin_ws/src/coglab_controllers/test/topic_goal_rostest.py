@@ -333,8 +333,23 @@ class TopicGoal(unittest.TestCase):
         )
 
     def test_9_a_frozen_master_ends_no_reach_and_keeps_no_node_from_ending(self) -> None:
+        """Of the topic, and of a frame of tf2, whose goals age: seen they are followed, unseen they are lost in time."""
         robot, pids = self.robot, robot_processes()
         self.assertTrue(pids)
+        robot.switch("ptp")  # and back: nothing is left of the motion of before
+        robot.switch("dmp")
+        robot.see_hand(GOAL)
+        wait_until(lambda: robot.execute(dmp_ratio=6.0).success, 5.0, "execute_dmp of a frame")
+        wait_until(lambda: robot.feedback.state == "running", 5.0, "running")
+        with frozen_master():
+            rospy.sleep(2.0)  # longer than goal_max_age and goal_lost_time together
+            self.assertEqual((robot.feedback.state, robot.feedback.reason), ("running", ""))
+            robot.see_hand(None)
+            wait_until(lambda: robot.feedback.state == "aborted", 3.0, "the goal that aged")
+            self.assertEqual(robot.feedback.reason_code, ReasonCode.GOAL_LOST)
+        robot.see_hand(ASIDE)
+        wait_until(lambda: robot.execute(goal_frame="", dmp_ratio=2.0).success, 10.0, "execute_dmp of the topic")
+        wait_until(lambda: robot.feedback.state == "running", 5.0, "running")
         with frozen_master():
             wait_until(lambda: robot.feedback.state not in ("running", "holding"), 20.0, "the end of the motion")
             self.assertEqual((robot.feedback.state, robot.feedback.reason), ("reached", ""))
