@@ -97,6 +97,8 @@ class SmallController {
   const Vector7& own() const { return own_; }
   /// friOpen with another period, s.
   void setPeriod(double period) { period_ = period; }
+  /// Its Cartesian set-point leaps along x by so many m, as where it goes on by itself in a gap.
+  void moveFrame(double x) { frame_[3] += static_cast<float>(x); }
   void setCounter(std::uint16_t counter) { counter_ = counter; }
 
   fri::FriState state = fri::FriState::Monitor;

@@ -142,6 +142,30 @@ TEST(Losses, TheCartesianSetPointDoesNotDriftFromTheFrame) {
   EXPECT_NEAR(commanded, turned, 1e-3);
 }
 
+/// Where the controller has taken the frame by itself in a gap, the next answer goes on from there
+/// and does not leap back onto the way of the answers before.
+TEST(Losses, AfterAGapTheCartesianFrameGoesOnFromTheOneThatIsReported) {
+  for (const int gap : {1, 3, 5}) {
+    Cell cell(0.005);
+    cell.run(3);
+    ASSERT_TRUE(runEvent(cell.bridge, cell.robot, "cartesian_impedance").success());
+    cell.start();
+    Vector7 velocity = Vector7::Zero();
+    velocity[0] = 0.05;
+    cell.runDriven(100, velocity);
+    for (int i = 0; i < gap; ++i) {
+      drive(cell.bridge, cell.robot, velocity);
+      cell.robot.cycle(cell.bridge, i % 2 == 0, i % 2 != 0);
+    }
+    cell.robot.moveFrame(0.005);
+    const float before = cell.robot.answer.cartesian_frame[3];
+    cell.runDriven(1, velocity);
+    EXPECT_NEAR(cell.robot.answer.cartesian_frame[3], before + 0.005F, 1e-3F) << gap;
+    cell.runDriven(20, velocity);
+    EXPECT_NEAR(cell.robot.answer.cartesian_frame[3], before + 0.005F, 1e-2F) << gap;
+  }
+}
+
 /// The controller's counter begins anew at full speed: the set-point brakes from what was sent.
 TEST(Losses, ARestartedCounterBrakesFromWhatWasSent) {
   for (const double period : {0.005, 0.020}) {
