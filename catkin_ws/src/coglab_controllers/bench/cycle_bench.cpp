@@ -1,4 +1,4 @@
-// Times the whole control cycle (steps 1 to 8) with the DMP plug-in against the same cycle on KDL's
+// Times the whole control cycle (steps 1 to 9) with the DMP plug-in against the same cycle on KDL's
 // velocity solvers, in interleaved blocks. Prints one JSON object.
 #include <algorithm>
 #include <chrono>

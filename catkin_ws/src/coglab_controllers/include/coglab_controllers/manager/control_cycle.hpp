@@ -56,7 +56,7 @@ struct CycleReport {
   double speed_scale = 1.0;                    ///< as requested
   RobotSample robot;                           ///< the joint state used
   JointVector velocity = JointVector::Zero();  ///< as sent, rad/s
-  GuardResult guard;                           ///< what step 7 did
+  GuardResult guard;                           ///< what step 8 did
   double dt = 0.0;                             ///< of the last cycle with a joint state, s
   double duration = 0.0;                       ///< of the last cycle, s; 0 in lockstep
   double longest = 0.0;                        ///< longest cycle so far, s

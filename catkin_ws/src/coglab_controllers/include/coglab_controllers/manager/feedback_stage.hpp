@@ -56,7 +56,7 @@ class FeedbackStage {
   /// Step 2: measurement to robot states. False if a number is not finite (then nothing was
   /// written).
   bool fill(const CycleInput& input) noexcept;
-  /// Steps 4 and 6.
+  /// Steps 5 and 7.
   void run(ctrl_more::Stage stage) noexcept {
     manager_.updateStage(stage, robot_, references_.states);
   }

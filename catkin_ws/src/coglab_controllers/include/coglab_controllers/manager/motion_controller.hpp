@@ -129,11 +129,11 @@ class MotionController {
   /// cancel). The arm brakes by itself.
   virtual void abort(const Reason& reason) = 0;
 
-  /// Step 3: computes the reference of this cycle and writes pose and twist (Cartesian motions) or
+  /// Step 4: computes the reference of this cycle and writes pose and twist (Cartesian motions) or
   /// joint position and velocity.
   virtual void computeReference(const CycleInput& input, References& references) = 0;
 
-  /// Step 5: from the references, perhaps modified by feedback controllers, to joint velocities
+  /// Step 6: from the references, perhaps modified by feedback controllers, to joint velocities
   /// (joint_velocity of references).
   virtual void resolve(const CycleInput& input, References& references) = 0;
 

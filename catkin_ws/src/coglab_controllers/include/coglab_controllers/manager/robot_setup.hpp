@@ -16,7 +16,7 @@ namespace coglab_controllers {
 struct RobotSetup {
   Chain chain;                    ///< base link to tool link
   coglab_rt::JointLimits limits;  ///< with the parameters of Table 6 applied
-  GuardParameters guard;          ///< limits of step 7
+  GuardParameters guard;          ///< limits of step 8
   Workspace workspace;            ///< for goals
   Quaternion tool_from_wrench;    ///< orientation of the measured wrench's frame in the tool
   bool tactile = false;           ///< the hand has touch sensors
