@@ -29,6 +29,15 @@ def commit_of_sources() -> str:
         return "unknown"
 
 
+def commit_in(path: Path) -> str:
+    """The commit whose trials a file holds. ValueError if it is none."""
+    try:
+        with open(path, encoding="utf-8") as stream:
+            return str(json.loads(stream.readline())["sources"])
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise ValueError(f"{path} is no file of trials ({error!r}); name another one") from None
+
+
 class TrialFile:
     """Results of trials by key. ``known``: what the file holds."""
 
@@ -50,8 +59,8 @@ class TrialFile:
             os.truncate(self.path, len(whole))
         lines = whole.decode("utf-8").splitlines()
         try:
-            head, *entries = map(json.loads, lines)
-            theirs = head["sources"]
+            theirs = commit_in(self.path)
+            entries = list(map(json.loads, lines[1:]))
             self.known = {entry["key"]: entry["trial"] for entry in entries}
         except (json.JSONDecodeError, KeyError, TypeError, ValueError) as error:
             raise ValueError(f"{self.path} is no file of trials ({error!r}); name another one") from None

@@ -88,28 +88,35 @@ def power_grasped(object_id: str) -> bool:
 
 def physics_rows(row: Row) -> list[dict]:
     """Patient people, perfect perception, control as it is."""
-    rows, everything, good = [], Campaign(), 0.0
+    rows, campaigns = [], []
     for object_id in OBJECTS:
-        campaign = physics_plan(object_id).run()
-        good += sum(campaign.share(action) for action in EXCHANGES) * campaign.trials
-        for count in ("trials", "asked", "fell", "stuck", "outside"):
-            setattr(everything, count, getattr(everything, count) + getattr(campaign, count))
-        rows += direction_rows(row, campaign, f"physics right, {object_id}, power grasp")
-    trials = max(1, everything.trials)
-    share, fallen = good / (2 * trials), everything.fell / trials
-    what = f"physics right, {PEOPLE} patient people x {len(OBJECTS)} objects x 2 directions, power grasps"
-    judged, stuck, outside = everything.marked(row), everything.stuck, everything.outside
-    rows += [
-        judged(f"{what}: succeeded", share, "share", ">= 0.97", share >= 0.97),
-        judged(f"{what}: object fell", fallen, "share of trials", "<= 0.01", fallen <= 0.01),
-        judged(f"{what}: stuck", stuck, "trials", "<= 0", stuck == 0),
-        judged(f"{what}: measured periods outside a joint limit", outside, "periods", "<= 0", outside == 0),
-    ]
+        campaigns.append(physics_plan(object_id).run())
+        rows += direction_rows(row, campaigns[-1], f"physics right, {object_id}, power grasp")
+    rows += judged_rows(row, campaigns)
     for object_id in own_grasps():
         campaign, what = physics_plan(object_id, power=False).run(), f"{object_id}, the grasp of its file"
         rows += direction_rows(row, campaign, f"physics right, {what}")
         rows.append(campaign.marked(row)(f"physics right, {what}: object fell", campaign.fell, "trials"))
     return rows
+
+
+def judged_rows(row: Row, campaigns: list[Campaign]) -> list[dict]:
+    """The goals of power grasps, over all objects."""
+    everything, good = Campaign(), 0.0
+    for campaign in campaigns:
+        good += sum(campaign.share(action) for action in EXCHANGES) * campaign.trials
+        for count in ("trials", "asked", "fell", "stuck", "outside"):
+            setattr(everything, count, getattr(everything, count) + getattr(campaign, count))
+    trials = max(1, everything.trials)
+    share, fallen = good / (2 * trials), everything.fell / trials
+    what = f"physics right, {PEOPLE} patient people x {len(OBJECTS)} objects x 2 directions, power grasps"
+    row, stuck, outside = everything.marked(row), everything.stuck, everything.outside
+    return [
+        row(f"{what}: succeeded", share, "share", ">= 0.97", share >= 0.97),
+        row(f"{what}: object fell", fallen, "share of trials", "<= 0.01", fallen <= 0.01),
+        row(f"{what}: stuck", stuck, "trials", "<= 0", stuck == 0),
+        row(f"{what}: measured periods outside a joint limit", outside, "periods", "<= 0", outside == 0),
+    ]
 
 
 def direction_rows(row: Row, campaign: Campaign, what: str) -> list[dict]:
