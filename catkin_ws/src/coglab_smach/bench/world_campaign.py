@@ -47,7 +47,7 @@ def off(found: list[dict[str, float]]) -> str:
     parts = []
     for key, unit in (("truth_mm", "mm"), ("truth_deg", "deg")):
         values = [each[key] for each in found]
-        parts.append(f"{np.median(values):.0f} ({np.percentile(values, 95):.0f}) {unit}")
+        parts.append(f"{np.median(values):.1f} ({np.percentile(values, 95):.1f}) {unit}")
     return ", ".join(parts)
 
 
@@ -82,10 +82,15 @@ def table(commit: str) -> None:
     """Of what the file holds, as Markdown."""
     campaign.RUN_MISSING = False
     print(f"Sources: {commit}.\n\n| campaign | {' | '.join(COLUMNS)} |\n| --- |{' --- |' * len(COLUMNS)}")
+    virtual = processor = 0.0
     for plan in world_rows.plans():
-        print(line(plan)[0])
+        text, done = line(plan)
+        virtual, processor = virtual + done.virtual, processor + done.processor
+        print(text)
     print("\n| figure | value | goal | |\n| --- | --- | --- | --- |")
     world_rows.judged_rows(judged, [line(world_rows.physics_plan(name))[1] for name in world_rows.OBJECTS])
+    speed = virtual / max(1e-9, processor)
+    judged("all campaigns: virtual time over processor time, one core", speed, "x", ">= 8", speed >= 8.0)
     world_rows.contact_rows(judged, world_rows.run_default())
 
 
