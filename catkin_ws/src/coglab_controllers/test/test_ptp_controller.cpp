@@ -181,15 +181,27 @@ double roomOnTheWay(const VirtualRobot& robot, const JointVector& from, const Jo
   return least;
 }
 
-/// A motion is refused only for its target, given up only for a border on its way, and otherwise
-/// ends on its target.
+/// A motion from its first cycle to its last, within the speed limits.
+void whole(VirtualRobot& robot) {
+  robot.tick();
+  for (int i = 0; i < 20000 && robot.state() == MotionState::Running; ++i) {
+    robot.tick();
+    ASSERT_TRUE(
+        (robot.command.velocity.cwiseAbs().array() <= robot.limits.velocity.array() + 1e-9).all());
+  }
+}
+
+/// A motion is refused for its target alone. Geometry says what has to come of the others: one
+/// whose way keeps clear of every border ends on its target, one whose way leaves the workspace is
+/// given up; within 10 mm of a border, where the guard slows it down, it may be either.
 TEST(PtpController, RandomMotionsEndExactly) {
   std::mt19937 random(7);
   std::uniform_real_distribution<double> share(-0.6, 0.6);
   VirtualRobot robot;
   robot.loadBoth("ptp");
   const RobotSetup& setup = *robot.manager->settings().robot;
-  int reached = 0, rejected = 0, aborted = 0;
+  constexpr double kNear = 0.01;  // m
+  int reached = 0, rejected = 0, aborted = 0, clear = 0, leaving = 0;
   std::vector<int> expected, ends;
   for (int run = 0; run < 120; ++run) {
     JointVector to;
@@ -206,25 +218,22 @@ TEST(PtpController, RandomMotionsEndExactly) {
       ++rejected;
       continue;
     }
-    robot.tick();
-    for (int i = 0; i < 20000 && robot.state() == MotionState::Running; ++i) {
-      robot.tick();
-      ASSERT_TRUE(
-          (robot.command.velocity.cwiseAbs().array() <= robot.limits.velocity.array() + 1e-9)
-              .all());
-    }
+    const double room = roomOnTheWay(robot, from, to);
+    clear += room >= kNear;
+    leaving += room <= -kNear;
+    whole(robot);
+    ASSERT_FALSE(HasFatalFailure());
     const std::vector<int> now = executed(robot.ptp());
     ends.insert(ends.end(), now.begin(), now.end());
     if (robot.state() == MotionState::Aborted) {
       ++aborted;
       ASSERT_EQ(robot.manager->report().reason.code(), ReasonCode::WorkspaceBorder)
           << robot.reason();
-      ASSERT_LT(roomOnTheWay(robot, from, to), 0.01) << "nothing was in its way";
+      ASSERT_LT(room, kNear) << "nothing was in its way";
       // Back the way it came is free.
       const MotionAnswer back = robot.ptp().add({{from.data(), from.data() + 7}, {}, {}});
       ASSERT_EQ(back.status, MotionAnswer::kStarted) << back.message;
-      robot.tick();
-      for (int i = 0; i < 20000 && robot.state() == MotionState::Running; ++i) robot.tick();
+      whole(robot);
       ASSERT_EQ(robot.state(), MotionState::Reached) << robot.reason();
       expected.push_back(back.id);
       continue;
@@ -232,12 +241,15 @@ TEST(PtpController, RandomMotionsEndExactly) {
     ASSERT_EQ(robot.state(), MotionState::Reached) << robot.reason();
     ++reached;
     expected.push_back(answer.id);
+    ASSERT_GT(room, -kNear) << "its way leaves the workspace";
     ASSERT_LT((robot.sample.position - to).lpNorm<Eigen::Infinity>(), 2e-3);
   }
   EXPECT_EQ(ends, expected);
   EXPECT_EQ(reached + aborted + rejected, 120);
-  EXPECT_GE(reached, 30);
-  EXPECT_LE(aborted, 90);
+  EXPECT_GT(clear, 0);
+  EXPECT_GE(reached, clear);
+  EXPECT_GT(leaving, 0);
+  EXPECT_GE(aborted, leaving);
 }
 
 }  // namespace

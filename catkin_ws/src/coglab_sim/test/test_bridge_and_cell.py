@@ -155,23 +155,6 @@ def test_the_measured_arm_keeps_the_speed_limits_of_the_table(period):
     assert measured.min() > 0.95 and sent.max() < 1.0  # and the limits are used
 
 
-def test_no_answer_ever_trips_a_limit_of_the_controller():
-    """Random target velocities at every tick: bridge and controller agree on what is allowed. An arm that runs into
-    the board or itself begins again at home: there the drives have their own say."""
-    random = np.random.default_rng(8)
-    for period in (0.001, 0.005, 0.02):
-        ticks = 0
-        while ticks < round(6.0 / period):
-            wire = Wire(krc__period=period)
-            wire.start()
-            while ticks < round(6.0 / period) and np.abs(wire.cell.truth()["external_torque"]).max() < 0.5:
-                if ticks % 7 == 0:
-                    wire.velocity = random.uniform(-3.0, 3.0, 7)
-                wire.tick()
-                ticks += 1
-                assert wire.cell.fri_state == 2, (period, wire.cell.messages)
-
-
 def test_lockstep_gives_the_same_bytes_twice():
     assert lockstep_bytes(6, 3000) == lockstep_bytes(6, 3000)
     assert lockstep_bytes(6, 300) != lockstep_bytes(7, 300)

@@ -79,11 +79,11 @@ def test_a_person_carries_the_object(session):
     assert truth["held_by"] == "human" and truth["human_load_share"] == pytest.approx(1.0, abs=0.02)
     assert np.linalg.norm(truth["object"]["position"] - (hand + IN_HAND)) < 0.015
     assert np.abs(truth["object_velocity"]).max() < 1e-3
-    assert np.abs(truth["external_torque"]).max() < 1e-9
+    assert np.abs(truth["external_torque"]).max() == 0.0
 
 
 def test_touch_is_felt_in_the_joint_torques(session):
-    s, hand = scene(session, torque_noise__sigma=0.0)
+    s, hand = scene(session, **EXACT)
     preshape(s)
     before = np.array(s.run(0.5)["external_torque"])
     hand, touched = approach(s, hand)
@@ -92,13 +92,15 @@ def test_touch_is_felt_in_the_joint_torques(session):
     assert truth["palm_force"][1] < -1.0  # pressed into the palm, toward -y
     fields = parse(s.measurement)
     felt = np.array(fields["external_torque"]) - before
-    assert np.abs(felt - truth["external_torque"]).max() < 0.05
-    # It is that force at a point of the hand: what is left after the force alone is the torque of a short lever.
+    assert np.abs(felt - truth["external_torque"]).max() < 0.01
+    # It is that force at a point of the hand: what is left after the force alone is a torque, and its lever is at most
+    # what the object may hang off the middle of the palm (15 mm, as above).
     jacobian = np.array(fields["jacobian"]).reshape(6, 7)[[0, 1, 2, 5, 4, 3]]
     rest = felt - jacobian[:3].T @ truth["palm_force"]
+    assert np.abs(rest).max() < 0.15
     torque, *_ = np.linalg.lstsq(jacobian[3:].T, rest, rcond=None)
-    assert np.abs(rest - jacobian[3:].T @ torque).max() < 0.02
-    assert np.linalg.norm(torque) < 0.08 * np.linalg.norm(truth["palm_force"])
+    assert np.abs(rest - jacobian[3:].T @ torque).max() < 0.01
+    assert np.linalg.norm(torque) < 0.015 * np.linalg.norm(truth["palm_force"])
     assert abs(felt[0]) > 0.5
 
 
@@ -112,12 +114,12 @@ def test_load_moves_from_person_to_robot(session):
     assert all(motor["locked"] and 0.1 < motor["position"] < 0.95 and motor["current"] == 0.0 for motor in motors[1:])
     truths = let_go(s, hand)
     robot = np.array([truth["robot_load_share"] for truth in truths])
-    assert robot[-1] == pytest.approx(1.0, abs=0.05) and truths[-1]["human_load_share"] < 0.02
+    assert robot[0] < 0.2 and robot[-1] == pytest.approx(1.0, abs=0.02) and truths[-1]["human_load_share"] < 0.02
     assert np.abs(np.diff(robot)).max() < 0.2
     assert max(np.linalg.norm(truth["object_velocity"]) for truth in truths) < 0.1
     truth = truths[-1]
     assert truth["held_by"] == "robot" and not truth["dropped"]
-    assert truth["palm_force"][2] == pytest.approx(-WEIGHT, abs=0.1)
+    assert truth["palm_force"][2] == pytest.approx(-WEIGHT, abs=0.05)
     touch = s.cell.touch()
     assert (
         touch["palm"][0] < -1.0
@@ -147,6 +149,37 @@ def test_opening_fingers_drop_it(session):
     assert s.cell.truth()["dropped"]
 
 
+def test_fingers_folded_before_the_object_came_do_not_grasp(session):
+    """Ring and little lie in the palm, the thumb is open: what they meet is pushed, and nothing opposes them.
+
+    Who carries it is not asked: the person presses it on fingers whose friction (0.6 x 11 N) could bear all of it."""
+    s, hand = scene(session)
+    folded = [254 / 255, 5 / 255, 80 / 255, 80 / 255, 245 / 255]
+    s.cell.set_motors([1.0] * 5, folded, [640.0] * 5)
+    for _ in range(300):
+        s.cell.set_human(hand + [0.0, 0.2, 0.0], grip=1.0)
+        s.tick()
+    hand, touched = approach(s, hand)
+    truth = s.cell.truth()
+    assert touched is not None and np.linalg.norm(s.cell.touch()["ring_distal"]) > 1.0
+    assert truth["held_by"] == "human"
+    s.cell.set_motors([1.0] * 5, [254 / 255, 1.0, 1.0, 1.0, 245 / 255], [240.0] * 5)
+    for _ in range(320):
+        s.cell.set_human(hand, grip=1.0)
+        s.tick()
+    assert s.cell.truth()["held_by"] == "both"
+
+
+def test_weak_fingers_let_it_slip(session):
+    """Motors that stop 4 counts above what they draw freely pull with 0.9 N: the palm's 4 N alone carry 0.6 x 4 N, less
+    than the weight of 3 N."""
+    s, hand = scene(session)
+    preshape(s)
+    hand, _ = approach(s, hand)
+    close(s, hand, current=44.0)
+    assert let_go(s, hand)[-1]["dropped"]
+
+
 def test_a_slippery_object_is_lost(session):
     s, hand = scene(session, object__friction=0.03)
     preshape(s)
@@ -162,8 +195,8 @@ def test_robot_hands_over_to_a_person(session):
     s.cell.set_motors([1.0] * 5, CLOSED, [240.0] * 5)
     s.monitor()
     truth = s.cell.truth()
-    assert truth["held_by"] == "robot" and truth["robot_load_share"] == pytest.approx(1.0, abs=0.05)
-    assert np.allclose(np.abs(truth["object"]["rotation"]), [0, 0, 0, 1], atol=0.08)
+    assert truth["held_by"] == "robot" and truth["robot_load_share"] == pytest.approx(1.0, abs=0.02)
+    assert np.allclose(np.abs(truth["object"]["rotation"]), [0, 0, 0, 1], atol=0.05)
     hand = truth["object"]["position"] - IN_HAND
     for i in range(100):
         s.cell.set_human(hand, grip=min(1.0, i / 50))
@@ -174,7 +207,7 @@ def test_robot_hands_over_to_a_person(session):
         s.cell.set_human(hand, grip=1.0)
         s.tick()
     truth = s.cell.truth()
-    assert truth["held_by"] == "human" and truth["human_load_share"] == pytest.approx(1.0, abs=0.1)
+    assert truth["held_by"] == "human" and truth["human_load_share"] == pytest.approx(1.0, abs=0.05)
     assert not truth["dropped"]
 
 
@@ -232,21 +265,32 @@ def test_other_objects_neither_explode_nor_sink(session, shape, size, mass):
 def test_block_and_push_show_in_the_torques(session):
     s = session(**EXACT)
     s.monitor()
+    # The controller's model has a rigid hand: fingers that hang otherwise are felt, but the same before and after.
+    before = np.array(s.run(0.5)["external_torque"])
+    assert np.abs(before).max() < 0.01
     s.cell.set_push([0.0, 5.0, 0.0])
     fields = s.run(0.5)
     jacobian = np.array(fields["jacobian"]).reshape(6, 7)
-    assert np.abs(np.array(fields["external_torque"]) - 5.0 * jacobian[1]).max() < 0.01
+    assert np.abs(np.array(fields["external_torque"]) - before - 5.0 * jacobian[1]).max() < 1e-3
     wrench = np.array(fields["wrench"])
     assert np.abs(wrench - [0, 5, 0, 0, 0, 0]).max() < 0.05
 
 
 def test_noise_model(session):
     """Deviation at rest, its growth with speed, and the offset of the estimate."""
-    s = session(seed=4, krc__period=0.001, krc__payload_error=0.0, krc__inertia_error=0.0)
+    errors = {"seed": 4, "krc__period": 0.001, "krc__payload_error": 0.0, "krc__inertia_error": 0.0}
+    s = session(**errors)
+    s.command()
+    with_offset = np.array([s.tick()["external_torque"] for _ in range(4000)])
+    s = session(**errors, torque_noise__offset=0.0)
     s.command()
     rest = np.array([s.tick()["external_torque"] for _ in range(4000)])
-    assert rest.std(axis=0) == pytest.approx(np.full(7, 0.05), rel=0.25)
-    assert np.abs(rest.mean(axis=0)).max() < 0.41 + 0.3 and np.abs(rest.mean(axis=0)).max() > 0.1
+    for each in (with_offset, rest):
+        assert each.std(axis=0) == pytest.approx(np.full(7, 0.05), rel=0.25)
+    assert np.abs(rest.mean(axis=0)).max() < 0.41 and np.abs(rest.mean(axis=0)).max() > 0.1
+    # The same noise in both: what differs is the offset, and where the arm comes to rest with it.
+    offset = with_offset.mean(axis=0) - rest.mean(axis=0)
+    assert np.abs(offset).max() < 0.31 and np.abs(offset).max() > 0.1
     start = s.cell.set_point.copy()
     moving = []
     for i in range(2000):

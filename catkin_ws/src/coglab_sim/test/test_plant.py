@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from coglab_sim import _plant
 from grasp_trial import DIRECTIONS, HOME, SOURCES, URDF, GraspTrial, objects, rotated
+from scipy import special
 
 G = 9.81
 STEP = 1e-3
@@ -53,7 +54,6 @@ def test_free_fall():
 @pytest.mark.parametrize("swing", [0.2, 1.5])
 def test_pendulum(tmp_path, swing):
     """The whole arm swings about A1, gravity across it; its period is that of a physical pendulum of any amplitude."""
-    special = pytest.importorskip("scipy.special")
     plant = _plant.Plant(undamped(tmp_path), np.zeros(7), BOX, drives=drives([0.0] + [1e6] * 6))
     plant.set_arm([0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0])
     plant.set_gravity([-G, 0.0, 0.0])
@@ -128,6 +128,27 @@ def test_brakes_hold_against_a_push_and_weigh_as_much():
     assert np.array_equal(state["position"], held) and not state["velocity"].any()
     pushed = plant.terms()["jacobian"][:3, :7].T @ [50.0, 50.0, 50.0]
     assert np.allclose(plant.external_torque, pushed, atol=1e-6)
+
+
+FOLDED = np.array([-0.6, 0.8, -2.0, 2.0, 2.7, 2.0, 1.6])
+"""the hand bent back onto the arm"""
+
+
+@pytest.mark.parametrize("what", ["nothing", "itself", "the person's hand", "the object"])
+def test_the_arm_collides_with_everything(what):
+    """The board: test_random_velocities.py."""
+    plant = _plant.Plant(URDF, HOME, BOX, board=False)
+    plant.place("world", [0.0, 0.0, 1.2] if what == "the object" else [2.0, 0.0, 5.0])  # above the shoulder
+    target = FOLDED if what == "itself" else HOME
+    plant.set_arm(target)
+    palm, turn = plant.state()["palm"]
+    out, felt = rotated(turn, np.array([1.0, 0.0, 0.0])), 0.0
+    for step in range(400):
+        if what == "the person's hand":  # goes on until it is 2 cm deep in the palm
+            plant.set_person(palm + (0.10 - 0.0003 * step) * out, grip=0.0)
+        plant.hold(target)
+        felt = max(felt, np.abs(plant.external_torque).max())
+    assert felt == 0.0 if what == "nothing" else felt > 1.0
 
 
 @pytest.mark.parametrize("name", ["mug", "ball", "tea_box"])

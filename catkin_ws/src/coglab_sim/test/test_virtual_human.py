@@ -8,7 +8,8 @@ import pytest
 from coglab_msgs.msg import Say
 from coglab_py.packages import package_path
 from coglab_py.pose import Pose
-from coglab_sim.person.participant import BEHAVIOURS, Participant, population
+from coglab_sim.conditions import CAREFUL, THE_WORLD_AS_IT_IS
+from coglab_sim.person.participant import BEHAVIOURS, HABITS, Participant, population
 from coglab_sim.person.scene import Scene, WorldView, shipped
 from coglab_sim.person.virtual_human import VirtualHuman
 from person_stage import DT, PALM_TURN, Stage, give
@@ -72,6 +73,74 @@ def test_an_object_is_pressed_again_into_an_open_hand_that_backs_away_but_not_fo
     assert stage.touched_at is not None, "touched again"
     away = give(closes=False, seconds=30.0)
     assert 1 <= away.phases.count("placing") <= 5 and away.samples[-1].grip == 1.0
+
+
+WITHOUT = {f.name: f.default for f in dataclasses.fields(Participant) if f.name in HABITS}
+"""what nobody drawn has"""
+
+
+def test_habits_that_help_the_robot_belong_to_the_patient_alone():
+    for seed in range(200):
+        drawn = Participant.draw(seed)
+        assert {name: getattr(drawn, name) for name in HABITS} == WITHOUT
+        patient, careful = Participant.draw(seed, profile="patient"), CAREFUL.participant(seed)
+        assert all(getattr(p, name) == value for p in (patient, careful) for name, value in HABITS.items())
+        assert dataclasses.replace(careful, **WITHOUT) == THE_WORLD_AS_IT_IS.participant(seed)
+
+
+def test_without_the_habit_an_object_is_pressed_once():
+    away = give(closes=False, seconds=30.0, changes=WITHOUT)
+    assert away.phases.count("placing") == 1 and away.samples[-1].grip == 1.0
+
+
+def touched_while_waiting(**changes):
+    """Phases after the robot's open hand has come 10 mm deeper than the object's side, and presses with 6 N."""
+    stage = Stage(Participant.from_mapping({"seed": 1, "profile": "patient", **changes}), closes=False)
+    stage.human.hear(0.0, Say.READY_TO_RECEIVE)
+    while stage.waiting_since is None:
+        stage.step()
+    stage.came_to = stage.object().position + np.array([0.0, -0.03, 0.05])
+    stage.run(2.0)
+    return stage.phases[stage.phases.index("waiting") :]
+
+
+def test_a_hand_that_presses_while_the_person_waits_has_been_given_the_object():
+    assert touched_while_waiting(**WITHOUT)[:2] == ["waiting", "holding"]
+    assert touched_while_waiting()[:2] == ["waiting", "placing"]
+
+
+def test_a_hand_seen_closed_is_believed_out_of_habit_alone(monkeypatch):
+    """It says that it has the object, but is too soft to be felt: 0.05 m of 15 N/m, below the threshold of 1 N."""
+    monkeypatch.setattr("person_stage.STIFF", 15.0)
+    numb = {"felt_threshold": 1.0}
+    assert "releasing" in give(carries=0.0, says=True, seconds=12.0, changes=numb).phases
+    assert "releasing" not in give(carries=0.0, says=True, seconds=12.0, changes={**WITHOUT, **numb}).phases
+
+
+def aside(**changes):
+    """m along the fingers from the palm to the object's middle, once it was placed into a palm 40 mm off."""
+    stage = Stage(Participant.from_mapping({"seed": 1, "profile": "patient", "seen_noise": 0.0, **changes}))
+    stage.human.hear(0.0, Say.READY_TO_RECEIVE)
+    while stage.waiting_since is None:
+        stage.step()
+    stage.came_to = stage.came_to + np.array([-0.04, 0.0, 0.0])
+    while stage.human.phase != "holding":
+        stage.step()
+    return float(Pose(stage.palm, PALM_TURN).axis(2) @ (stage.human._middle() - stage.palm))
+
+
+def test_the_object_is_brought_to_the_middle_of_the_palm_out_of_habit_alone():
+    assert abs(aside()) < 0.02 and abs(aside(**WITHOUT)) > 0.03
+
+
+def test_the_arm_sinks_out_of_habit_alone():
+    def sunk(**changes):
+        still = {"sway": 0.0, "tremor": 0.0}
+        stage = give(carries=0.0, says=True, seconds=12.0, changes=changes | still)
+        heights = [s.frame.position[2] for s in stage.samples if s.phase == "releasing"]
+        return heights[0] - min(heights)
+
+    assert sunk() == pytest.approx(0.015, abs=0.001) and sunk(**WITHOUT) == 0.0
 
 
 def test_trust_is_waited_for_and_some_do_not_wait():

@@ -7,7 +7,8 @@ import os
 import sys
 import time
 from collections import Counter
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -17,25 +18,43 @@ from coglab_msgs.msg import ReasonCode
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "test"))
 from coglab_sim.conditions import Conditions
 from reach_figures import figures
+from trial_file import TrialFile
 from virtual_trial import VirtualTrial
 
 EXCHANGES = ("exchange_human_to_robot", "exchange_robot_to_human")
 REASONS = {value: name for name, value in vars(ReasonCode).items() if name.isupper() and isinstance(value, int)}
+FILE = TrialFile(Path(os.environ["COGLAB_TRIALS"])) if os.environ.get("COGLAB_TRIALS") else None
+"""Trials that are in this file are not run again, those that are not are added to it."""
+RUN_MISSING = True
+"""False: only what is in the file counts."""
 
 
-def one_trial(job: tuple[Sequence[str], int, dict[str, Any]]) -> dict[str, Any]:
+@dataclass(frozen=True)
+class Job:
+    """One trial that is to be run; ``name`` and seed are its key in a file."""
+
+    name: str
+    actions: Sequence[str]
+    seed: int
+    arguments: dict[str, Any]
+
+    @property
+    def key(self) -> str:
+        """Of this trial among all."""
+        return f"{self.name} | {' '.join(self.actions)} | {self.seed}"
+
+
+def one_trial(job: Job) -> dict[str, Any]:
     """Run one trial in a worker process; plain data only."""
-    actions, seed, kw = job
+    actions, seed, kw = job.actions, job.seed, job.arguments
     smach.set_loggers(*[lambda *a: None] * 4)
     started = time.process_time()
     trial = VirtualTrial(seed=seed, **kw)
     stuck, results = "", []
     try:
         results = trial.run(*actions)
-    except AssertionError as error:  # the script's own limit: the machine hangs
-        stuck = str(error)
-    except RuntimeError as error:  # the physics has ended
-        stuck = str(error)
+    except Exception as error:  # the script's own limit, or the physics has ended
+        stuck = f"{type(error).__name__}: {error}"
     if not stuck and trial.last_hub not in ("wait_without_object", "wait_with_object"):
         stuck = f"the machine waits in '{trial.last_hub}': {trial.ctx.journal.why()}"
     return {
@@ -52,6 +71,45 @@ def one_trial(job: tuple[Sequence[str], int, dict[str, Any]]) -> dict[str, Any]:
     }
 
 
+def pool_of(processes: int) -> Any:
+    """Processes that trials run in."""
+    return multiprocessing.get_context("fork").Pool(processes)
+
+
+def results_of(jobs: Sequence[Job]) -> Iterator[dict[str, Any]]:
+    """The trials in the order of the jobs, on all cores; those of the file are taken from there."""
+    known = FILE.known if FILE is not None else {}
+    missing = [job for job in jobs if job.key not in known] if RUN_MISSING else []
+    if missing:
+        with pool_of(min(len(missing), os.cpu_count() or 1)) as pool:
+            fresh = pool.imap(one_trial, missing)
+            for job in jobs:
+                if job.key in known:
+                    yield known[job.key]
+                else:
+                    yield next(fresh) if FILE is None else FILE.add(job.key, next(fresh))
+    else:
+        yield from (known[job.key] for job in jobs if job.key in known)
+
+
+def in_turn(rows: Sequence[Sequence[Job]]) -> list[Job]:
+    """The first job of each row, then the second of each, and so on."""
+    return [row[k] for k in range(max(map(len, rows), default=0)) for row in rows if k < len(row)]
+
+
+def fill(jobs: Sequence[Job], processes: int, seconds: float) -> int:
+    """Run what the file has not, for at most so long (s); returns how many of the jobs it has then."""
+    assert FILE is not None, "fill() needs a file of trials"
+    end = time.monotonic() + seconds
+    missing = [job for job in jobs if job.key not in FILE.known]
+    with pool_of(processes) as pool:
+        for job, trial in zip(missing, pool.imap(one_trial, missing), strict=True):
+            FILE.add(job.key, trial)
+            if time.monotonic() > end:
+                break
+    return sum(job.key in FILE.known for job in jobs)
+
+
 class Campaign:
     """Trials, on all cores; keeps counts, reasons, reach figures and touches of the first action."""
 
@@ -61,6 +119,8 @@ class Campaign:
         self.reaches: dict[str, list[dict[str, float]]] = {action: [] for action in EXCHANGES}
         self.touches: list[tuple[float | None, float | None, bool, bool]] = []
         self.outside = self.moving = self.stuck = self.trials = self.fell = 0
+        self.asked = 0
+        self.palms: list[tuple[dict[str, float], bool]] = []
         self.virtual = self.processor = 0.0
 
     def run(self, actions: Sequence[str], seeds: Iterable[int], **kw: Any) -> Campaign:
@@ -81,11 +141,21 @@ class Campaign:
 
     def run_each(self, actions: Sequence[str], trials: list[tuple[int, dict[str, Any]]], name: str) -> Campaign:
         """One trial per seed and its arguments; returns self."""
-        jobs = [(actions, seed, kw) for seed, kw in trials]
-        with multiprocessing.get_context("fork").Pool(min(len(jobs), os.cpu_count() or 1)) as pool:
-            for trial in pool.imap(one_trial, jobs):
-                self._count(actions, trial, name)
+        jobs = [Job(name, tuple(actions), seed, kw) for seed, kw in trials]
+        self.asked += len(jobs)
+        for trial in results_of(jobs):
+            self._count(actions, trial, name)
         return self
+
+    def marked(self, row: Callable[..., dict]) -> Callable[..., dict]:
+        """The same rows, but incomplete and missed where fewer trials were run than asked."""
+        if self.trials == self.asked:
+            return row
+
+        def incomplete(figure: str, value: float, unit: str, goal: str = "", ok: bool = False) -> dict:
+            return row(f"{figure} [incomplete: {self.trials} of {self.asked} trials]", value, unit, goal, False)
+
+        return incomplete
 
     def _count(self, actions: Sequence[str], trial: dict[str, Any], name: str) -> None:
         self.trials += 1
@@ -105,6 +175,9 @@ class Campaign:
             if action in self.reaches and found is not None:
                 self.reaches[action].append(found)
         self.touches += trial["touches"][:1]
+        for (_, found), touch in zip(trial["reaches"][:1], trial["touches"], strict=False):
+            if found is not None and touch[0] is not None:
+                self.palms.append((found, touch[2]))
 
     def share(self, action: str, good: Sequence[str] = ("succeeded",)) -> float:
         """Share of the trials whose action ended so."""

@@ -4,19 +4,19 @@ Definitions. A trial is a person who gives the object (receive) and asks for it 
 both directions, a second direction that never began counts as failed. Physics right: profile patient, perfect
 perception, every object grasped with all fingers (power grasp); what an object's file asks for otherwise is printed
 beside. An object has fallen if it lies, or lay, on the floor. The default world is `Conditions()`; a hardship changes
-one thing of it.
+one thing of it. Beside them: the default world with people whose habits make a handover easier (`CAREFUL`).
 """
 
 from __future__ import annotations
 
 import os
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
-from campaign import EXCHANGES, Campaign
+from campaign import EXCHANGES, Campaign, Job
 from coglab_objects.database import objects_folder, read_object
-from coglab_sim.conditions import CONSIDERATE, HARDSHIPS, Conditions, hardship
+from coglab_sim.conditions import CAREFUL, CONSIDERATE, HARDSHIPS, Conditions, hardship
 
 LONG = os.environ.get("COGLAB_LONG") == "1"
 PEOPLE = 100 if LONG else 2
@@ -27,6 +27,59 @@ OBJECTS = sorted(path.stem for path in objects_folder().glob("*.yaml"))
 Row = Callable[..., dict]
 
 
+@dataclass(frozen=True)
+class Plan:
+    """Trials of both directions under one name: seeds, conditions of each; ``power``: with all fingers in any case."""
+
+    name: str
+    seeds: range
+    conditions: Callable[[int], Conditions]
+    power: bool = False
+
+    def jobs(self) -> list[Job]:
+        """As they are run."""
+        return [
+            Job(self.name, EXCHANGES, seed, {"conditions": self.conditions(seed), "power": self.power})
+            for seed in self.seeds
+        ]
+
+    def run(self) -> Campaign:
+        """All of them."""
+        return Campaign().run_under(EXCHANGES, self.seeds, self.name, self.conditions, power=self.power)
+
+
+def physics_plan(object_id: str, power: bool = True) -> Plan:
+    """Patient people, perfect perception."""
+    conditions = replace(CONSIDERATE, object_id=object_id)
+    name = f"physics, {object_id}" + ("" if power else ", own grasp")
+    return Plan(name, range(5000, 5000 + PEOPLE), lambda seed: conditions, power)
+
+
+def default_plan(n: int = DEFAULT_TRIALS) -> Plan:
+    """The world as it is."""
+    return Plan("default", range(6000, 6000 + n), lambda seed: Conditions())
+
+
+def beside_plans() -> list[Plan]:
+    """Each hardship alone, and the people with habits."""
+    seeds = range(6000, 6000 + HARDSHIP_TRIALS)
+    return [
+        *(Plan(f"hardship '{name}'", seeds, lambda seed, name=name: hardship(name, seed)) for name in HARDSHIPS),
+        Plan("careful people", seeds, lambda seed: CAREFUL),
+    ]
+
+
+def own_grasps() -> list[str]:
+    """Objects whose file asks for something else than all fingers."""
+    return [name for name in OBJECTS if not power_grasped(name)]
+
+
+def plans() -> list[Plan]:
+    """Everything whose figures the rows below are."""
+    physics = [physics_plan(name) for name in OBJECTS] + [physics_plan(name, power=False) for name in own_grasps()]
+    return [*physics, default_plan(), *beside_plans()]
+
+
 def power_grasped(object_id: str) -> bool:
     """Whether the object's own file asks for all fingers."""
     entry = read_object(objects_folder() / f"{object_id}.yaml")[0]
@@ -35,38 +88,41 @@ def power_grasped(object_id: str) -> bool:
 
 def physics_rows(row: Row) -> list[dict]:
     """Patient people, perfect perception, control as it is."""
-    rows, good, fell, stuck, outside, trials = [], 0.0, 0, 0, 0, 0
+    rows, campaigns = [], []
     for object_id in OBJECTS:
-        conditions = replace(CONSIDERATE, object_id=object_id)
-        campaign = Campaign().run_under(
-            EXCHANGES, range(5000, 5000 + PEOPLE), f"physics, {object_id}", lambda seed, c=conditions: c, power=True
-        )
-        trials += campaign.trials
+        campaigns.append(physics_plan(object_id).run())
+        rows += direction_rows(row, campaigns[-1], f"physics right, {object_id}, power grasp")
+    rows += judged_rows(row, campaigns)
+    for object_id in own_grasps():
+        campaign, what = physics_plan(object_id, power=False).run(), f"{object_id}, the grasp of its file"
+        rows += direction_rows(row, campaign, f"physics right, {what}")
+        rows.append(campaign.marked(row)(f"physics right, {what}: object fell", campaign.fell, "trials"))
+    return rows
+
+
+def judged_rows(row: Row, campaigns: list[Campaign]) -> list[dict]:
+    """The goals of power grasps, over all objects."""
+    everything, good = Campaign(), 0.0
+    for campaign in campaigns:
         good += sum(campaign.share(action) for action in EXCHANGES) * campaign.trials
-        fell, stuck, outside = fell + campaign.fell, stuck + campaign.stuck, outside + campaign.outside
-        rows += direction_rows(row, campaign, f"physics right, {object_id}, power grasp")
-    share, fallen = good / (2 * trials), fell / trials
+        for count in ("trials", "asked", "fell", "stuck", "outside"):
+            setattr(everything, count, getattr(everything, count) + getattr(campaign, count))
+    trials = max(1, everything.trials)
+    share, fallen = good / (2 * trials), everything.fell / trials
     what = f"physics right, {PEOPLE} patient people x {len(OBJECTS)} objects x 2 directions, power grasps"
-    rows += [
+    row, stuck, outside = everything.marked(row), everything.stuck, everything.outside
+    return [
         row(f"{what}: succeeded", share, "share", ">= 0.97", share >= 0.97),
         row(f"{what}: object fell", fallen, "share of trials", "<= 0.01", fallen <= 0.01),
         row(f"{what}: stuck", stuck, "trials", "<= 0", stuck == 0),
         row(f"{what}: measured periods outside a joint limit", outside, "periods", "<= 0", outside == 0),
     ]
-    for object_id in [name for name in OBJECTS if not power_grasped(name)]:
-        conditions = replace(CONSIDERATE, object_id=object_id)
-        campaign = Campaign().run_under(
-            EXCHANGES, range(5000, 5000 + PEOPLE), f"physics, {object_id}, own grasp", lambda seed, c=conditions: c
-        )
-        rows += direction_rows(row, campaign, f"physics right, {object_id}, the grasp of its file")
-        rows.append(row(f"physics right, {object_id}, the grasp of its file: object fell", campaign.fell, "trials"))
-    return rows
 
 
 def direction_rows(row: Row, campaign: Campaign, what: str) -> list[dict]:
     """Success and failures by reason, per direction; no goal."""
     return [
-        row(
+        campaign.marked(row)(
             f"{what}, {NAMES[action]}: succeeded of {campaign.trials} (failures: {campaign.failures(action)}; "
             f"not begun: {campaign.trials - campaign.begun(action)})",
             campaign.share(action),
@@ -77,20 +133,17 @@ def direction_rows(row: Row, campaign: Campaign, what: str) -> list[dict]:
 
 
 def world_rows(row: Row, default: Campaign) -> list[dict]:
-    """The default world and each hardship alone, printed with control as it is."""
+    """The default world and what stands beside it, printed with control as it is."""
     rows = whole_rows(row, default, "default world")
-    for name in HARDSHIPS:
-        campaign = Campaign().run_under(
-            EXCHANGES, range(6000, 6000 + HARDSHIP_TRIALS), name, lambda seed, name=name: hardship(name, seed)
-        )
-        rows += whole_rows(row, campaign, f"hardship '{name}'")
+    for plan in beside_plans():
+        rows += whole_rows(row, plan.run(), plan.name)
     return rows
 
 
 def whole_rows(row: Row, campaign: Campaign, what: str) -> list[dict]:
     """Of one campaign: success by direction, falls, stuck, limits, palm against the true grasp pose."""
     rows = direction_rows(row, campaign, what)
-    give = EXCHANGES[1]
+    row, give = campaign.marked(row), EXCHANGES[1]
     rows += [
         row(f"{what}, give: succeeded of {campaign.begun(give)} begun", campaign.share_of_begun(give), "share"),
         row(f"{what}: object fell", campaign.fell, "trials"),
@@ -111,13 +164,13 @@ def whole_rows(row: Row, campaign: Campaign, what: str) -> list[dict]:
 
 def run_default(n: int = DEFAULT_TRIALS) -> Campaign:
     """Trials in the world as it is."""
-    return Campaign().run_under(EXCHANGES, range(6000, 6000 + n), "default", lambda seed: Conditions())
+    return default_plan(n).run()
 
 
-def contact_rows(row: Row, people: int) -> list[dict]:
-    """Contact over drawn people who place while the arm stands, and while it moves; nothing is left out."""
-    campaign = Campaign().run_under(EXCHANGES[:1], range(6000, 6000 + people), "contact", lambda seed: Conditions())
-    rows = []
+def contact_rows(row: Row, campaign: Campaign) -> list[dict]:
+    """Contact and palm over drawn people who place while the arm stands, and while it moves; nothing is left out."""
+    rows, people = [], campaign.trials
+    row = campaign.marked(row)
     for moving, what in ((False, "arm still"), (True, "arm moving")):
         touched = [each for each in campaign.touches if each[0] is not None and each[2] == moving]
         found = [each[1] - each[0] for each in touched if each[1] is not None and not each[3]]
@@ -127,6 +180,11 @@ def contact_rows(row: Row, people: int) -> list[dict]:
         if found:
             rows.append(row(f"{name}: delay from 0.3 N to contact, median", 1000 * np.median(found), "ms"))
             rows.append(row(f"{name}: delay from 0.3 N to contact, p95", 1000 * np.percentile(found, 95), "ms"))
+        for key, unit in (("truth_mm", "mm"), ("truth_deg", "deg")):
+            off = [each[key] for each, while_moving in campaign.palms if while_moving == moving]
+            if off:
+                rows.append(row(f"{name}: palm to the true goal pose, median", np.median(off), unit))
+                rows.append(row(f"{name}: palm to the true goal pose, p95", np.percentile(off, 95), unit))
     false = sum(each[3] for each in campaign.touches)
     rows.append(row("drawn people: contact found before anything touched", false, f"of {len(campaign.touches)} waits"))
     untouched = sum(each[0] is None for each in campaign.touches)

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from coglab_sim.person.participant import Participant
+from coglab_sim.person.participant import HABITS, Participant
 from coglab_sim.tracker.tracker import PerceptionSettings
 
 
@@ -32,6 +32,8 @@ class Conditions:
 THE_WORLD_AS_IT_IS = Conditions()
 CONSIDERATE = Conditions(profile="patient", perception=PerceptionSettings(perfect=True))
 """For what is about machinery and not about people: a patient person, perfect perception."""
+CAREFUL = Conditions(person=HABITS)
+"""The world as it is, but for people with the habits of the patient: printed beside it."""
 
 HARDSHIPS: dict[str, Callable[[Conditions, int], Conditions]] = {
     "trust 0.1 s": lambda c, seed: replace(c, person={**c.person, "trust": 0.1}),

@@ -24,14 +24,21 @@ from ih2_hand.emulator.physical_motor import MotorState
 from ih2_hand.emulator.virtual_link import VirtualLink
 from ih2_hand.progress import shown_empty, shown_holding
 
-import coglab_sim._cell  # noqa: F401  (knows the type of VirtualRobot.cell)
-from coglab_sim._virtual import VirtualRobot
 from coglab_sim.conditions import THE_WORLD_AS_IT_IS, Conditions
 from coglab_sim.person.in_cell import closure, move_person, view_of
 from coglab_sim.person.recorded_person import RecordedPerson, open_recorded_hand, scene_of
 from coglab_sim.person.scene import Scene
 from coglab_sim.person.virtual_human import VirtualHuman
 from coglab_sim.tracker.tracker import Sight, Tracker
+
+try:
+    import coglab_sim._cell  # noqa: F401  (knows the type of VirtualRobot.cell)
+    from coglab_sim._virtual import VirtualRobot
+except ImportError as error:
+    raise ImportError(
+        f"the simulated cell cannot be loaded ({error}): its library is missing or was not built; "
+        "run ./coglab build, which also installs Debian's libmujoco-dev"
+    ) from error
 
 LIMITS = str(package_path("lwr_description", "config", "joint_limits.yaml"))
 BOARD = Pose(np.array([0.45, -0.55, 0.05]), about_z(-np.pi / 2))

@@ -9,8 +9,6 @@ from scipy.spatial.transform import Rotation
 from coglab_sim.person.phases import NEAR, STILL, Phases
 from coglab_sim.person.senses import Percept
 
-ASIDE = 0.010
-"""m by which the object may be off the middle of the palm before the person corrects it"""
 BEYOND = 0.05
 """m past where the palm was seen after which the person stops: nothing is there"""
 FOLLOW_UP = 0.015
@@ -19,14 +17,12 @@ CLOSED = 0.08
 """share of their way by which the robot's fingers must have been seen to close"""
 TOUCH_PART, TOLD_PART = 0.7, 0.4
 """what a closed hand whose grip is felt, and a spoken 'I have it', count of what it takes to let go"""
-AGAIN, TRIES = 0.5, 4
-"""s without enough touch in a hand that is not closing, after which the person presses again; so many times"""
-CLOSED_LONG = 3.0
-"""s after which a hand that is seen closed is believed to hold, felt or not"""
-LOOSE = 0.5
-"""share of the grip at which the fingers stop until it is felt who carries"""
-SINK_SPEED, SINK = 0.03, 0.015
-"""m/s, m: how the arm that relaxes meanwhile sinks, and how far at most"""
+AGAIN = 0.5
+"""s without enough touch in a hand that is not closing, after which who has the habit presses again"""
+LOOSE, FEELS = 0.5, 0.5
+"""share of the grip at which the fingers stop, s at most, until it is felt who carries"""
+SINK_SPEED = 0.03
+"""m/s at which an arm that relaxes sinks meanwhile"""
 CARRIES = 0.7
 """share of the weight that may still be felt then, or the robot does not hold"""
 
@@ -35,10 +31,12 @@ class Giving(Phases):
     """Phases of VirtualHuman."""
 
     def _taken_already(self, seen: Percept, near: bool) -> bool:
-        """While waiting: the robot's hand is seen to close on the object. A touch of the open hand is got used to."""
-        self._held_load = seen.load
+        """While waiting: the robot's hand is seen to close on the object, or is felt to press on it already."""
+        if not near or self.participant.used_to_touch:
+            self._held_load = seen.load
         self._closure = min(self._closure, seen.hand_closure) if near else seen.hand_closure
-        return seen.hand_closure - self._closure > CLOSED
+        pressed = float(np.linalg.norm(seen.load - self._held_load)) >= self.participant.press
+        return pressed or seen.hand_closure - self._closure > CLOSED
 
     def _placing(self, t: float, dt: float, seen: Percept) -> None:
         """Bring the object into the palm, against the palm's outward axis, until it is felt; then press a little."""
@@ -65,7 +63,7 @@ class Giving(Phases):
         speed = ramp * min(p.place_speed, 2.0 * max(gap, 0.0) + 0.04)
         self._velocity = -normal * (0.02 if self._felt_since is not None else speed)
         aside = float(to_object @ along)
-        if self._felt_since is None and abs(aside) > ASIDE:
+        if self._felt_since is None and abs(aside) > p.aligns_within:
             self._velocity = self._velocity - ramp * along * float(np.clip(2.0 * aside, -0.05, 0.05))
         self._hand = self._hand + self._velocity * dt
         self._travelled += float(np.linalg.norm(self._velocity)) * dt
@@ -111,7 +109,7 @@ class Giving(Phases):
         elif self._still_since is None:
             self._still_since = t
         away = self._still_since is not None and t - self._still_since > AGAIN
-        return away and self._tries < TRIES and self._gap(seen.robot_hand, seen.object) < NEAR
+        return away and self._tries < self.participant.presses_again and self._gap(seen.robot_hand, seen.object) < NEAR
 
     def _signs(self, t: float, seen: Percept, closed: bool) -> float:
         """How surely the robot holds; the person lets go from 1 on."""
@@ -121,7 +119,7 @@ class Giving(Phases):
             return signs
         if self._felt_since is None:
             self._felt_since, self._touched = t, self._held_load
-        grip_felt = bool(np.any(seen.load != self._touched)) or t - self._felt_since > CLOSED_LONG
+        grip_felt = bool(np.any(seen.load != self._touched)) or t - self._felt_since > self.participant.believes_closed
         return signs + TOUCH_PART * grip_felt + TOLD_PART * (self._told == Say.I_HAVE_IT)
 
     def _tug(self, t: float, dt: float) -> None:
@@ -136,27 +134,27 @@ class Giving(Phases):
             self._go("releasing", t)
 
     def _releasing(self, t: float, dt: float, seen: Percept) -> None:
-        """Open the grip; halfway, whoever gives relaxes the arm and waits to feel that the robot carries, else holds on
-        again."""
+        """Open the grip; halfway, whoever gives waits to feel that the robot carries, else holds on again."""
         self._velocity = np.zeros(3)
         p = self.participant
         careful = self._task == "give" and p.behaviour != "early_release"
         if careful and self._grip <= LOOSE and not self._checked:
-            self._relax(t, dt, seen)
+            self._feel_who_carries(t, dt, seen)
             return
         self._grip = max(0.0, self._grip - dt / p.release_time)
         if self._grip == 0.0:
             self._retreat(t)
 
-    def _relax(self, t: float, dt: float, seen: Percept) -> None:
-        """The arm sinks a little: what the robot holds does not sink with it, and that is felt."""
+    def _feel_who_carries(self, t: float, dt: float, seen: Percept) -> None:
+        """Less of the weight must be felt. An arm that relaxes sinks a little: what the robot holds does not sink with
+        it."""
         loosened = self.participant.release_time * (1.0 - LOOSE) + self.participant.feeling_delay
         self._checked = self._load_share(seen) < CARRIES and t - self._since > loosened
         if self._checked:
             return
-        if self._sunk < SINK:
+        if self.participant.relaxes and self._sunk < SINK_SPEED * FEELS:
             self._sink(-SINK_SPEED, dt)
-        elif t - self._since > loosened + SINK / SINK_SPEED:
+        elif t - self._since > loosened + FEELS:
             self._go("holding", t)
 
     def _sink(self, speed: float, dt: float) -> None:

@@ -6,6 +6,7 @@ outside its range is drawn again.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, fields, replace
 from typing import Any
@@ -26,7 +27,17 @@ BEHAVIOURS = (
 )
 
 PROFILES = ("drawn", "patient")
-"""drawn: a person as people are; patient: trusts after 1.0 s of rest, holds upright, stays inside the box."""
+"""drawn: a person as people are; patient: trusts after 1.0 s of rest, holds upright, stays inside the box, and has
+the habits of HABITS."""
+
+HABITS: Mapping[str, Any] = {
+    "presses_again": 4,
+    "used_to_touch": True,
+    "believes_closed": 3.0,
+    "aligns_within": 0.010,
+    "relaxes": True,
+}
+"""What a giver may do to make a handover easier for the robot: nobody drawn has it, `patient` has all of it."""
 
 
 @dataclass(frozen=True)
@@ -96,6 +107,16 @@ class Participant:
     """in which the fingers close"""
     patience: float = 12.0
     """how long the person waits for the robot before giving up"""
+    presses_again: int = 0
+    """how often an object is pressed again into an open hand that has backed away"""
+    used_to_touch: bool = False
+    """True: who is touched by the open hand while waiting places the object all the same; else it counts as placed"""
+    believes_closed: float = math.inf
+    """s after which a hand that is seen closed is believed to hold, felt or not"""
+    aligns_within: float = math.inf
+    """m off the palm's middle, along the fingers, from which on the person corrects while placing"""
+    relaxes: bool = False
+    """True: with half of the grip the arm sinks, so that the weight comes to lie on whoever holds"""
     sway: float = 0.002
     tremor: float = 0.0003
 
@@ -184,6 +205,7 @@ def _patient(person: Participant) -> Participant:
         point_offset=(0.4 * x, 0.5 * y, 0.45 * z),
         inside_box=True,
         patience=12.0,
+        **HABITS,
     )
 
 

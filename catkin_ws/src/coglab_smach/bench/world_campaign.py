@@ -1,0 +1,119 @@
+#!/usr/bin/python3
+"""The campaigns of the world (world_rows.py) into a file, a trial of each row in turn, so that all rows grow alike.
+
+world_campaign.py FILE [--processes N] [--seconds S]: goes on where FILE ends, until all is there or S seconds are over.
+world_campaign.py FILE --table: what FILE holds, as Markdown; what is fewer than asked is marked incomplete and missed.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from pathlib import Path
+from typing import Any
+
+os.environ["COGLAB_LONG"] = "1"
+import campaign
+import numpy as np
+import world_rows
+from campaign import EXCHANGES, Campaign
+from trial_file import TrialFile, commit_in
+
+COLUMNS = (
+    "trials of asked",
+    "receive",
+    "give of all",
+    "give of begun",
+    "fell",
+    "stuck",
+    "outside a limit",
+    "palm off, receive",
+    "palm off, give",
+    "failures, receive",
+    "failures, give",
+)
+
+
+def percent(share: float, of: int) -> str:
+    """Or a dash where there was nothing."""
+    return f"{100.0 * share:.0f} %" if of else "-"
+
+
+def off(found: list[dict[str, float]]) -> str:
+    """Palm to the true goal pose: median (p95) in mm and deg."""
+    if not found:
+        return "-"
+    parts = []
+    for key, unit in (("truth_mm", "mm"), ("truth_deg", "deg")):
+        values = [each[key] for each in found]
+        parts.append(f"{np.median(values):.1f} ({np.percentile(values, 95):.1f}) {unit}")
+    return ", ".join(parts)
+
+
+def line(plan: world_rows.Plan) -> tuple[str, Campaign]:
+    """One row of the table."""
+    done = plan.run()
+    receive, give = EXCHANGES
+    cells = (
+        f"{done.trials} of {done.asked}" + ("" if done.trials == done.asked else ": incomplete"),
+        percent(done.share(receive), done.trials),
+        percent(done.share(give), done.trials),
+        percent(done.share_of_begun(give), done.begun(give)),
+        str(done.fell),
+        str(done.stuck),
+        str(done.outside),
+        off(done.reaches[receive]),
+        off(done.reaches[give]),
+        done.failures(receive),
+        done.failures(give),
+    )
+    return f"| {plan.name} | {' | '.join(cells)} |", done
+
+
+def judged(figure: str, value: float, unit: str, goal: str = "", ok: bool = True) -> dict[str, Any]:
+    """A figure as a line of its own."""
+    verdict = "" if ok and not goal else "ok" if ok else "**missed**"
+    print(f"| {figure} | {round(float(value), 4):g} {unit} | {goal} | {verdict} |")
+    return {}
+
+
+def table(commit: str) -> None:
+    """Of what the file holds, as Markdown."""
+    campaign.RUN_MISSING = False
+    print(f"Sources: {commit}.\n\n| campaign | {' | '.join(COLUMNS)} |\n| --- |{' --- |' * len(COLUMNS)}")
+    virtual = processor = 0.0
+    for plan in world_rows.plans():
+        text, done = line(plan)
+        virtual, processor = virtual + done.virtual, processor + done.processor
+        print(text)
+    print("\n| figure | value | goal | |\n| --- | --- | --- | --- |")
+    world_rows.judged_rows(judged, [line(world_rows.physics_plan(name))[1] for name in world_rows.OBJECTS])
+    speed = virtual / max(1e-9, processor)
+    judged("all campaigns: virtual time over processor time, one core", speed, "x", ">= 8", speed >= 8.0)
+    world_rows.contact_rows(judged, world_rows.run_default())
+
+
+def main() -> int:
+    """Run or show."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("file", type=Path)
+    parser.add_argument("--processes", type=int, default=os.cpu_count() or 1)
+    parser.add_argument("--seconds", type=float, default=float("inf"))
+    parser.add_argument("--table", action="store_true")
+    options = parser.parse_args()
+    try:
+        campaign.FILE = TrialFile(options.file, commit_in(options.file) if options.table else None)
+    except ValueError as error:
+        sys.exit(f"error: {error}")
+    if options.table:
+        table(campaign.FILE.commit)
+        return 0
+    jobs = campaign.in_turn([plan.jobs() for plan in world_rows.plans()])
+    done = campaign.fill(jobs, options.processes, options.seconds)
+    print(f"{done} of {len(jobs)} trials are in {options.file}")
+    return 0 if done == len(jobs) else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())
