@@ -1,4 +1,4 @@
-"""Golden vectors of the protocol facts, section 8, typed a second time: driver against raw bytes.
+"""Golden vectors of the wire, typed by hand a second time: driver against raw bytes.
 
 The other end is a script, not the emulator, so that a slip shared by both ends is seen here.
 """
