@@ -74,7 +74,8 @@ def test_no_comment_cites_a_page_that_is_not_there():
 SECTION = re.compile(r"\b[Ss]ections?\s+(?:\d+|[IVX]+\b)|\b[Cc]omplaints?\s+\d+")
 NAMED = re.compile(r"D4\.10|\bpaper\b")
 NOT_HERE = re.compile(
-    r"\b(?:the|this|our|of) (?:specification|design page|brief|audit)\b|\bfacts(?: page|/)|\b(?:protocol|of the) facts\b"
+    r"\b(?:the|this|our|of) (?:specification|design page|brief|audit)\b"
+    r"|\bfacts(?: page|/)|\b(?:protocol|of the) facts\b"
     r"|\bthe issue (?:asks|says|wants|names)\b|\b[Ii]ssues? #?\d|\bgoal \d+\.\d+\b",
 )
 
