@@ -46,7 +46,7 @@ def main() -> None:
         subprocess.run([top / "coglab", "demo", "--headless", "--out", out], stdout=subprocess.DEVNULL, check=True)
         later = round(time.monotonic() - start, 1)
     rows = [
-        row(figure, first and round(first, 1), 600),
+        row(figure, first and round(first, 1), 300),
         row("demo again, run by this bench", later, 60),
         row(
             "./coglab test of all packages, as last run in this checkout",

@@ -93,6 +93,7 @@ def bench_options(top: Path, words: list[str]) -> argparse.Namespace:
     parser.add_argument("names", nargs="*", metavar="NAME", help="default: all")
     parser.add_argument("--json", type=writable_file, metavar="FILE", help="write the rows as a JSON list")
     parser.add_argument("--long", action="store_true", help="the campaigns too (hours)")
+    parser.add_argument("--report", action="store_true", help="write docs/figures.md; runs only the benches named")
     options = parser.parse_args(words)
     _named(options.names, find_benches(top / "catkin_ws" / "src"), "bench")
     return options

@@ -25,7 +25,7 @@ from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from coglab_bringup import bench, process_tree, test_runner
+from coglab_bringup import bench, figures, process_tree, test_runner
 from coglab_bringup.arguments import CORES, mutants_options, package_folders
 from coglab_bringup.mutator import ENDINGS, Change, changes, code_lines
 from coglab_bringup.usage import Refused
@@ -380,6 +380,8 @@ def main(arguments: list[str]) -> int:
     print(f"\nseed {options.seed}; {len(survivors)} survived" + (":" if survivors else ""))
     for mutant in survivors:
         print(f"  {sentence(mutant)}")
+    if not options.packages and not options.own:
+        figures.record(top, "mutants", rows, False)
     if options.json:
         found = [asdict(m) for campaign in campaigns for m in campaign.mutants()]
         options.json.write_text(json.dumps({"seed": options.seed, "rows": rows, "mutants": found}, indent=1) + "\n")
