@@ -36,6 +36,41 @@ def test_the_table_of_packages_is_complete():
     assert packages <= set(re.findall(r"`(\w+)`", table)), packages - set(re.findall(r"`(\w+)`", table))
 
 
+def shipped_code(suffixes: set[str], *packages: str) -> list[Path]:
+    folders = ("src", "include", "scripts", "nodes")
+    found = [p for name in packages for folder in folders for p in (SOURCES / name / folder).rglob("*")]
+    return [path for path in found if path.suffix in suffixes]
+
+
+def test_every_thread_of_the_robot_is_in_its_table():
+    section = PAGE.split("## Processes and threads")[1].split("## ")[0]
+    names, rooms = set(), set()
+    for path in shipped_code({".cpp", ".hpp"}, "coglab_controllers", "lwr_fri_bridge", "ctrl_more", "coglab_rt"):
+        text = path.read_text(encoding="utf-8")
+        names |= set(re.findall(r"pthread_setname_np\(pthread_self\(\), \"(\w+)\"", text))
+        names |= set(re.findall(r"\b\w*(?:thread|publisher)_\.start\(\"(\w+)\"", text))
+        if re.search(r"\bstd::thread\b(?!::)|\bAsyncSpinner\b", text):
+            rooms.add(path.stem)
+    assert {"fri", "control", "goals", "lwr_publisher"} <= names and "tf_listener" in rooms
+    assert not [name for name in names if f"`{name}`" not in section]
+    # The nodes of split:=true have a spinner each, in place of the main thread of /robot.
+    rooms -= {"lwr_node", "controller_manager_node"}
+    assert not [room for room in rooms if not re.search(rf"/{room}`", section)]
+
+
+def test_every_node_and_every_thread_of_a_node_is_in_the_tables():
+    section = PAGE.split("## Processes and threads")[1].split("## ")[0]
+    launched = [p for p in SOURCES.glob("*/launch/*.launch") if p.name not in ("display.launch", "goal_helper.launch")]
+    nodes = {n for p in launched for n in re.findall(r"<node[^>]*?\bname=\"(\w+)\"", p.read_text(encoding="utf-8"))}
+    assert not sorted(name for name in nodes - {"rviz", "lwr", "controller_manager"} if f"/{name}`" not in section)
+    threads = set()
+    packages = ("coglab_smach", "coglab_console", "ih2_hand", "coglab_objects", "coglab_perception")
+    for path in shipped_code({".py"}, *packages):
+        threads |= set(re.findall(r"Thread\([^\n]*\bname=f?\"([\w:]+)", path.read_text(encoding="utf-8")))
+    assert {"poll", "coglab_master"} <= threads
+    assert not sorted(name for name in threads if f"`{name}" not in section)
+
+
 def test_headers_name_this_page():
     rooms = ("control_cycle", "control_thread", "transformation_system", "fri_thread", "feedback_controllers_manager")
     for room in rooms:
