@@ -41,7 +41,7 @@ def raw() -> Raw:
     return Raw()
 
 
-# Bytes of a frame by its first byte; a finger number stands in the low bits of those below 0x40. Typed here a second time.
+# Bytes of a frame by its first byte, typed here a second time.
 LENGTHS = (
     {first: 1 for first in range(0x40)}
     | {0x41: 1, 0x42: 1, 0x46: 1, 0x4C: 1}

@@ -32,7 +32,7 @@ def action_state(goal, name="reference", **kwargs):
     return smach_ros.SimpleActionState(name, TestAction, goal=TestGoal(goal=goal), **kwargs)
 
 
-class TestAction(unittest.TestCase):
+class TestActionState(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
         cls.server = ReferenceServer("reference")

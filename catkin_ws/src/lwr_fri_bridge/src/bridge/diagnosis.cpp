@@ -55,9 +55,10 @@ Diagnosis diagnoseConnection(const Snapshot& s, const FriThreadStatistics& threa
             ReasonCode::PoorQuality};
   }
   if (!thread.last_foreign.empty()) {
-    return {Severity::Warning, "a second sender (" + thread.last_foreign +
-                                   ") uses the port and is ignored; the peer is " + thread.peer +
-                                   ": if that is not the robot controller, set controller_address",
+    return {Severity::Warning,
+            "a second sender (" + thread.last_foreign +
+                ") uses the port and is ignored; the peer is " + thread.peer +
+                ": if that is not the robot controller, set controller_address",
             ReasonCode::SecondSender};
   }
   return {Severity::Ok, std::string("quality ") + fri::nameOf(s.quality) + " from " + thread.peer +
@@ -73,8 +74,7 @@ Diagnosis diagnoseArm(const Snapshot& s, double hot) {
   unsigned hot_joints = 0;
   for (unsigned i = 0; i < 7; ++i) hot_joints |= s.temperature[i] > hot ? 1U << i : 0U;
   if (hot_joints != 0)
-    return {Severity::Warning, "drives are hot: " + jointsIn(hot_joints),
-            ReasonCode::DriveWarning};
+    return {Severity::Warning, "drives are hot: " + jointsIn(hot_joints), ReasonCode::DriveWarning};
   if (s.drive_warning != 0)
     return {Severity::Warning, "drive warning: " + jointsIn(s.drive_warning),
             ReasonCode::DriveWarning};
