@@ -371,6 +371,9 @@ def main(arguments: list[str]) -> int:
         campaigns = [Campaign(workspace, package, options.seed, times, say, options.own) for package in packages]
         for campaign in campaigns:
             campaign.run(options.count)
+    except KeyboardInterrupt:
+        say("ended; what was judged is kept, and the same command goes on from there")
+        return 130
     except Refused as error:
         print(f"[coglab] error: {error}", file=sys.stderr)
         return 2

@@ -17,15 +17,15 @@ from coglab_objects.database import cell_parameters, objects_folder, read_object
 from coglab_py.packages import package_path
 from coglab_py.pose import Pose, about_z
 from coglab_py.yaml_file import read
-from ih2_hand.clock import VirtualClock
+from ih2_hand.clock import SteppedClock
 from ih2_hand.driver import HandSerialDriver
 from ih2_hand.emulator.hand import EmulatedHand
 from ih2_hand.emulator.physical_motor import MotorState
 from ih2_hand.emulator.virtual_link import VirtualLink
 from ih2_hand.progress import shown_empty, shown_holding
 
-import coglab_sim._cell  # noqa: F401  (knows the type of VirtualRobot.cell)
-from coglab_sim._virtual import VirtualRobot
+import coglab_sim._cell  # noqa: F401  (knows the type of LockstepRobot.cell)
+from coglab_sim._virtual import LockstepRobot
 from coglab_sim.conditions import THE_WORLD_AS_IT_IS, Conditions
 from coglab_sim.person.in_cell import closure, move_person, view_of
 from coglab_sim.person.recorded_person import RecordedPerson, open_recorded_hand, scene_of
@@ -59,7 +59,7 @@ def manager_parameters() -> dict[str, Any]:
 
 
 class Robot:
-    """VirtualRobot with what figures and detectors need of each period.
+    """LockstepRobot with what figures and detectors need of each period.
 
     ``cell``: parameters of the simulated cell, ``__`` for ``/`` in their names; ``limits``: table of joint limits.
     """
@@ -72,7 +72,7 @@ class Robot:
             **{name.replace("__", "/"): value for name, value in cell.items()},
         }
         self.parameters = {**manager_parameters(), "joint_limits_file": limits}
-        self.virtual = VirtualRobot(urdf_file(), limits, parameters, yaml.safe_dump(manager_parameters()))
+        self.virtual = LockstepRobot(urdf_file(), limits, parameters, yaml.safe_dump(manager_parameters()))
         self.cell = self.virtual.cell
         self.limits = cc.load_joint_limits(limits)
         with open(urdf_file(), encoding="utf-8") as stream:
@@ -125,7 +125,7 @@ class Hand:
 
     def __init__(self, cell: Any) -> None:
         self.cell = cell
-        self.clock = VirtualClock()
+        self.clock = SteppedClock()
         self.emulator = EmulatedHand(self.clock, physical=True)
         self.driver = HandSerialDriver(transport=VirtualLink(self.emulator, self.clock), clock=self.clock)
         self.calibrated = False
