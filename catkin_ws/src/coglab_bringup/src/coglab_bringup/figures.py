@@ -113,7 +113,8 @@ def page(top: Path) -> str:
     """The whole text of docs/figures.md."""
     parts = [HEAD]
     benches = find_benches(top / "catkin_ws" / "src")
-    for name, paths in sorted({**benches, "mutants": []}.items()):
+    benches["mutants"] = []
+    for name, paths in sorted(benches.items()):
         run = measured(top, name)
         text = (
             definition(paths)
