@@ -1,8 +1,8 @@
 #!/usr/bin/python3
 """Wall times a newcomer meets: the first demo and the whole test run as recorded, a later demo as run here.
 
-One run each. The first is the sum of installation, build and demo of this checkout; where a part was not done here, on a
-machine that had it already, the row has no value and is missed. `docker/prove_bare` does all of it on a bare machine.
+One run each. The first is the sum of installation, build and demo of this checkout; where a part was not done here, on
+a machine that had it already, the row has no value and is missed. `docker/prove_bare` does it on a bare machine.
 """
 
 from __future__ import annotations

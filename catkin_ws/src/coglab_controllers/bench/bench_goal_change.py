@@ -1,8 +1,7 @@
 #!/usr/bin/python3
 """What a goal that steps, moves or trembles does to the motion, beside PyPI movement_primitives (if it is there).
 
-One reach of 1 s in cycles of 5 ms, watched for 6 s; rows with noise over 60 seeds, none left out. A motion that has not
-ended then counts as not ended.
+One reach of 1 s in cycles of 5 ms, watched for 6 s; rows with noise over 60 seeds, none left out.
 """
 
 import json
