@@ -51,7 +51,7 @@ bool WorldFrames::find(const std::string& frame, Seen& seen) const {
 }
 
 bool WorldFrames::lookup(const std::string& reference, const std::string& frame,
-                        coglab_controllers::GoalObservation& observation, std::string& why) {
+                         coglab_controllers::GoalObservation& observation, std::string& why) {
   Seen from, to;
   for (const auto& [name, seen] : {std::pair{&reference, &from}, std::pair{&frame, &to}}) {
     if (find(*name, *seen)) continue;
