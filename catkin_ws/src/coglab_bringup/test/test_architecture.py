@@ -36,13 +36,46 @@ def test_the_table_of_packages_is_complete():
     assert packages <= set(re.findall(r"`(\w+)`", table)), packages - set(re.findall(r"`(\w+)`", table))
 
 
-def test_headers_name_this_page_and_no_other_design():
+def shipped_code(suffixes: set[str], *packages: str) -> list[Path]:
+    folders = ("src", "include", "scripts", "nodes")
+    found = [p for name in packages for folder in folders for p in (SOURCES / name / folder).rglob("*")]
+    return [path for path in found if path.suffix in suffixes]
+
+
+def test_every_thread_of_the_robot_is_in_its_table():
+    section = PAGE.split("## Processes and threads")[1].split("## ")[0]
+    names, rooms = set(), set()
+    for path in shipped_code({".cpp", ".hpp"}, "coglab_controllers", "lwr_fri_bridge", "ctrl_more", "coglab_rt"):
+        text = path.read_text(encoding="utf-8")
+        names |= set(re.findall(r"pthread_setname_np\(pthread_self\(\), \"(\w+)\"", text))
+        names |= set(re.findall(r"\b\w*(?:thread|publisher)_\.start\(\"(\w+)\"", text))
+        if re.search(r"\bstd::thread\b(?!::)|\bAsyncSpinner\b", text):
+            rooms.add(path.stem)
+    assert {"fri", "control", "goals", "lwr_publisher"} <= names and "tf_listener" in rooms
+    assert not [name for name in names if f"`{name}`" not in section]
+    # The nodes of split:=true have a spinner each, in place of the main thread of /robot.
+    rooms -= {"lwr_node", "controller_manager_node"}
+    assert not [room for room in rooms if not re.search(rf"/{room}`", section)]
+
+
+def test_every_node_and_every_thread_of_a_node_is_in_the_tables():
+    section = PAGE.split("## Processes and threads")[1].split("## ")[0]
+    launched = [p for p in SOURCES.glob("*/launch/*.launch") if p.name not in ("display.launch", "goal_helper.launch")]
+    nodes = {n for p in launched for n in re.findall(r"<node[^>]*?\bname=\"(\w+)\"", p.read_text(encoding="utf-8"))}
+    assert not sorted(name for name in nodes - {"rviz", "lwr", "controller_manager"} if f"/{name}`" not in section)
+    threads = set()
+    packages = ("coglab_smach", "coglab_console", "ih2_hand", "coglab_objects", "coglab_perception")
+    for path in shipped_code({".py"}, *packages):
+        threads |= set(re.findall(r"Thread\([^\n]*\bname=f?\"([\w:]+)", path.read_text(encoding="utf-8")))
+    assert {"poll", "coglab_master"} <= threads
+    assert not sorted(name for name in threads if f"`{name}" not in section)
+
+
+def test_headers_name_this_page():
     rooms = ("control_cycle", "control_thread", "transformation_system", "fri_thread", "feedback_controllers_manager")
     for room in rooms:
         headers = list(SOURCES.rglob(f"include/**/{room}.hpp"))
         assert any("docs/architecture.md" in header.read_text(encoding="utf-8") for header in headers), room
-    stray = [path for path in code_files() if "design, section" in path.read_text(encoding="utf-8", errors="replace")]
-    assert [path for path in stray if path != Path(__file__).resolve()] == []
 
 
 def test_the_steps_of_the_cycle_are_those_of_the_code():
@@ -70,6 +103,44 @@ def test_no_comment_cites_a_page_that_is_not_there():
                 continue
             wrong.append(f"{path.relative_to(TOP)}: {cited}")
     assert not [w for w in wrong if "/test/" not in w], "\n".join(wrong)
+
+
+# A document that a reader can get is named beside its section: D4.10, and the Ctrl-MORE paper.
+SECTION = re.compile(r"\b[Ss]ections?\s+(?:\d+|[IVX]+\b)|\b[Cc]omplaints?\s+\d+")
+NAMED = re.compile(r"D4\.10|\bpaper\b")
+NOT_HERE = re.compile(
+    r"\b(?:the|this|our|of) (?:specification|design page|brief|audit)\b"
+    r"|\bfacts(?: page|/)|\b(?:protocol|of the) facts\b"
+    r"|\bthe issue (?:asks|says|wants|names)\b|\b[Ii]ssues? #?\d|\bgoal \d+\.\d+\b",
+)
+
+
+def foreign_citations(text: str) -> list[str]:
+    """Passages that send the reader to a page that is not in the repository."""
+    found = [match.group() for match in NOT_HERE.finditer(text)]
+    for match in SECTION.finditer(text):
+        if not NAMED.search(text[max(0, match.start() - 80) : match.end() + 80]):
+            found.append(match.group())
+    return found
+
+
+def test_a_foreign_citation_is_found():
+    assert foreign_citations("Section 7 of the specification: Concurrence") == ["the specification", "Section 7"]
+    assert foreign_citations("What the issue asks of a reach") == ["the issue asks"]
+    assert foreign_citations("typed from the last paragraph of section 8 of the protocol facts")
+    assert foreign_citations("as D4.10 section 3.2 describes; the user code of the paper's section VI-A") == []
+
+
+def test_nothing_cites_a_document_that_a_reader_cannot_get():
+    pages = [*TOP.glob("*.md"), *TOP.glob("docs/*.md"), *SOURCES.rglob("*.md"), *SOURCES.rglob("*.xml")]
+    pages += [TOP / "coglab", *(TOP / "docker").iterdir()]
+    wrong = []
+    for path in [*code_files(), *pages]:
+        if path == Path(__file__).resolve():
+            continue
+        for passage in foreign_citations(path.read_text(encoding="utf-8", errors="replace")):
+            wrong.append(f"{path.relative_to(TOP)}: {passage}")
+    assert not wrong, "say the fact itself:\n" + "\n".join(wrong)
 
 
 def test_the_readme_leads_to_it_first():

@@ -9,11 +9,11 @@ import sys
 from pathlib import Path
 
 import pytest
-from coglab_bringup.code_size import functions, source_files
+from coglab_bringup.code_size import functions, public_methods, source_files
 
 TOP = Path(__file__).resolve().parents[4]
 SOURCES = TOP / "catkin_ws" / "src"
-FILE_LIMIT, FUNCTION_LIMIT = 400, 60
+FILE_LIMIT, FUNCTION_LIMIT, METHOD_LIMIT = 400, 60, 25
 # Tables and not functions: one statement per line, nothing to divide.
 TABLES = re.compile(r"PYBIND11_MODULE|bind[A-Z]\w*|makeTable|\w+::describe")
 # Longer than the limits, and why it stays. Nothing is added here without a reason.
@@ -28,6 +28,10 @@ LONG: dict[str, str] = {
     "ctrl_more/test/test_three_robots.cpp": "one story told in order",
     "ctrl_more/test/thread_stress.cpp": "threads that share locals",
     "ih2_hand/bench/bench_hand.py": "one figure after another",
+}
+# Classes with more public methods of their own than the limit, and why they stay; docs/house.md says it, too.
+MANY_METHODS = {
+    "Plant": "one world: each method reads or sets one quantity of the one state that MuJoCo holds",
 }
 BUILT = ("catkin_ws/build", "catkin_ws/devel", "catkin_ws/install", ".coglab")
 
@@ -49,6 +53,51 @@ def test_no_function_is_too_long():
         if length > FUNCTION_LIMIT and not TABLES.fullmatch(name) and shown(path) not in LONG
     ]
     assert not long, "\n".join(map(str, long))
+
+
+def test_no_class_has_too_many_public_methods():
+    many = [
+        (f"{shown(path)}:{line}", name, len(methods))
+        for path in source_files(SOURCES)
+        for line, methods, name in public_methods(path)
+        if len(methods) > METHOD_LIMIT
+    ]
+    assert sorted(name for _, name, _ in many) == sorted(MANY_METHODS), many
+    house = (TOP / "docs" / "house.md").read_text(encoding="utf-8")
+    assert not [name for name in MANY_METHODS if f"`{name}`" not in house]
+
+
+def test_public_methods_are_counted(tmp_path):
+    cpp = tmp_path / "a.hpp"
+    cpp.write_text(
+        """template <typename T>
+class Arm final : public Base<T> {
+ public:
+  explicit Arm(int a);
+  ~Arm();
+  Arm(const Arm&) = delete;
+  Arm& operator=(const Arm&) = delete;
+  using Attach = std::function<void(int)>;
+  void move(double x);  // not rest()
+  void move(int x) { if (x) { other(x); } }
+  std::function<void()> wait() const override;
+  [[nodiscard]] virtual int count() const noexcept = 0;
+  struct Inner {
+    int size() const { return 1; }
+  };
+  std::atomic<bool> ending{false};
+  int number = compute(3);
+ private:
+  void hidden();
+};
+struct Plain { int value() const; };
+"""
+    )
+    found = {name: methods for _, methods, name in public_methods(cpp)}
+    assert found == {"Arm": {"move", "wait", "count"}, "Inner": {"size"}, "Plain": {"value"}}
+    python = tmp_path / "a.py"
+    python.write_text("class A:\n    def b(self): ...\n    def _c(self): ...\n    def __init__(self): ...\n")
+    assert [(methods, name) for _, methods, name in public_methods(python)] == [({"b"}, "A")]
 
 
 def test_nothing_is_excused_that_needs_no_excuse():

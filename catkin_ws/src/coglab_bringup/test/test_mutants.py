@@ -115,7 +115,7 @@ class FakeWorkspace:
 
     def programs(self, packages):
         class Program:
-            package, name, kind = "one", "test_one", "gtest"
+            package, name, kind, seconds = "one", "test_one", "gtest", 1.0
 
         return [Program()]
 
@@ -126,22 +126,22 @@ class FakeWorkspace:
 
 def test_a_campaign_judges_keeps_and_goes_on(tmp_path):
     def campaign(workspace):
-        return mutants.Campaign(workspace, "one", 5, {"one/test_one": 1.0})
+        return mutants.Campaign(workspace, "one", 5, mutants.Times(workspace))
 
     workspace = FakeWorkspace(tmp_path)
     before = workspace.file.read_text()
     first = campaign(workspace)
-    first.run(3, lambda text: None)
+    first.run(3)
     assert workspace.file.read_text() == before and len(first.mutants()) == 3
     again = FakeWorkspace(tmp_path)
     second = campaign(again)
-    second.run(3, lambda text: None)
+    second.run(3)
     assert second.mutants() == first.mutants() and again.builds == 0
-    second.run(6, lambda text: None)
+    second.run(6)
     assert second.mutants()[:3] == first.mutants() and len(second.mutants()) == 6
     whole = FakeWorkspace(tmp_path / "other")
     third = campaign(whole)
-    third.run(6, lambda text: None)
+    third.run(6)
     assert [(m.line, m.after, m.verdict) for m in third.mutants()] == [
         (m.line, m.after, m.verdict) for m in second.mutants()
     ]
@@ -153,11 +153,40 @@ def test_a_campaign_judges_keeps_and_goes_on(tmp_path):
     assert campaign(changed).drawn == []
 
 
-def test_a_time_that_is_not_known_leaves_the_test_out(tmp_path):
+def test_a_test_that_is_red_anyway_is_left_out_and_said(tmp_path):
     workspace = FakeWorkspace(tmp_path)
-    campaign = mutants.Campaign(workspace, "one", 5, {})
-    campaign.run(4, lambda text: None)
-    assert workspace.seen == [] and {m.verdict for m in campaign.mutants()} == {"survived"}
+    workspace.red = lambda program, limit: True
+    said: list[str] = []
+    campaign = mutants.Campaign(workspace, "one", 5, mutants.Times(workspace), said.append)
+    campaign.run(4)
+    assert {m.verdict for m in campaign.mutants()} == {"survived"}
+    assert [line for line in said if "red on the unchanged sources" in line] == [said[0]]
+    assert mutants.Times(workspace).of("one/test_one") is None
+
+
+def test_a_test_never_seen_green_is_run_on_the_unchanged_sources_before_it_is_believed(tmp_path):
+    workspace = FakeWorkspace(tmp_path)
+    before = workspace.file.read_text()
+    campaign = mutants.Campaign(workspace, "one", 5, mutants.Times(workspace))
+    campaign.run(6)
+    first = next(m for m in campaign.mutants() if m.verdict == "killed")
+    assert first.by == "one/test_one"
+    if campaign.mutants()[0] is first:
+        assert workspace.seen[1] == before
+
+
+def test_an_end_in_the_middle_leaves_the_file_as_it_was(tmp_path):
+    workspace = FakeWorkspace(tmp_path)
+    before = workspace.file.read_text()
+
+    def ended(program, limit):
+        raise KeyboardInterrupt
+
+    workspace.red = ended
+    campaign = mutants.Campaign(workspace, "one", 5, mutants.Times(workspace))
+    with pytest.raises(KeyboardInterrupt):
+        campaign.run(3)
+    assert workspace.file.read_text() == before and workspace.stale
 
 
 def test_the_copy_follows_the_checkout_and_nothing_flows_back(tmp_path):

@@ -138,3 +138,20 @@ def imports_of(path: Path) -> set[str]:
         elif isinstance(node, ast.ImportFrom) and node.level == 0 and node.module:
             names.add(node.module.split(".")[0])
     return names
+
+
+def test_the_target_of_the_first_demo_holds_what_a_launched_system_runs():
+    cmake = (SOURCES / "coglab_bringup" / "CMakeLists.txt").read_text(encoding="utf-8")
+    listed = set(re.search(r"foreach\(target ([^)]*)\)", cmake)[1].split())
+    feedback = (SOURCES / "ctrl_more" / "config" / "feedback.yaml").read_text(encoding="utf-8")
+    plugins = set(re.findall(r"lib(\w+)\.so", feedback))
+    launch = "".join(p.read_text(encoding="utf-8") for p in SOURCES.glob("*/launch/*.launch"))
+    nodes = set(re.findall(r'type="(\w+_node)"', launch)) - {"lwr_node", "controller_manager_node", "goal_helper_node"}
+    messages = {
+        f"{p.parent.name}_generate_messages" for p in SOURCES.rglob("package.xml") if (p.parent / "msg").is_dir()
+    }
+    assert plugins and nodes == {"robot_node", "cell_node"} and len(messages) == 2
+    assert listed == plugins | nodes | messages | {"coglab_controllers_python"}
+    # The plug-ins of the manager, which nobody links, come with its node.
+    controllers = (SOURCES / "coglab_controllers" / "CMakeLists.txt").read_text(encoding="utf-8")
+    assert "add_dependencies(robot_node coglab_dmp_controller coglab_ptp_controller)" in controllers

@@ -1,5 +1,8 @@
 #!/usr/bin/python3
-"""What a goal that steps, moves or trembles does to the motion, beside PyPI movement_primitives (if it is there)."""
+"""What a goal that steps, moves or trembles does to the motion, beside PyPI movement_primitives (if it is there).
+
+One reach of 1 s in cycles of 5 ms, watched for 6 s; rows with noise over 60 seeds, none left out.
+"""
 
 import json
 import sys

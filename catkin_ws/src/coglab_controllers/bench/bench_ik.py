@@ -1,5 +1,9 @@
 #!/usr/bin/python3
-"""Time of kinematics, inverse kinematics and of the cores' whole cycle beside KDL's velocity solvers."""
+"""Time of kinematics, inverse kinematics and of the cores' whole cycle beside KDL's velocity solvers.
+
+Processor time of one call: median over 401 blocks of 240 calls, which alternate between all candidates, over 256
+postures. Shares are the median of the blocks' own ratios. Nothing is left out.
+"""
 
 import json
 import sys

@@ -279,6 +279,7 @@ class TopicGoal(unittest.TestCase):
         values = self.cycle_statistics()
         self.assertEqual(values["active controller"], "dmp")
         self.assertEqual(values["faults"], "0")
+        self.assertIn("reason_code", values)
         cycles = int(values["cycles with a joint state"])
         self.assertGreater(cycles, 100)
         last, longest = (float(values[f"{name} cycle (us)"]) for name in ("duration of the last", "longest"))

@@ -11,6 +11,7 @@ def test_a_field_is_named_with_its_line():
     assert document.value == {"x": 1, "a": {"b": 7}}
     with pytest.raises(YamlError, match=r"^f.yaml:3: a.b: 7 is greater than the maximum of 5"):
         document.check(SCHEMA)
+    assert parse("a:\n- 7\n- 8\n", "f.yaml").lines == {(): 1, ("a",): 1, ("a", 0): 2, ("a", 1): 3}
     assert document.sentence(("a", "c"), "is missing") == "f.yaml:2: a.c: is missing"
 
 

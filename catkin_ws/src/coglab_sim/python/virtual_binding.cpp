@@ -12,9 +12,9 @@ using coglab_controllers::DmpRequest;
 namespace {
 
 /// The robot with the code of the newest answer, which the tuples do not carry.
-class Robot : public VirtualRobot {
+class Robot : public LockstepRobot {
  public:
-  using VirtualRobot::VirtualRobot;
+  using LockstepRobot::LockstepRobot;
   std::uint16_t reason_code = 0;
 
   py::tuple tell(const Answer& answer) {
@@ -104,16 +104,16 @@ PYBIND11_MODULE(_virtual, m) {
   m.doc() =
       "Cell, bridge and controller manager in one thread and in virtual time. SI units, "
       "quaternions x y z w.";
-  py::module_::import("coglab_sim._cell");  // knows the type of VirtualRobot.cell
+  py::module_::import("coglab_sim._cell");  // knows the type of LockstepRobot.cell
 
   py::class_<coglab_controllers::CancelOrder>(m, "CancelOrder", "A cancel on its way.");
 
   py::class_<Robot>(
-      m, "VirtualRobot",
+      m, "LockstepRobot",
       "Time advances only by tick() and advance(); requests take effect between two ticks.")
       .def(py::init([](const std::string& urdf, const std::string& limits_file,
                        const py::dict& cell, const std::string& manager) {
-             VirtualRobotConfig config;
+             LockstepRobotConfig config;
              config.cell = configFrom(urdf, cell);
              config.limits_file = limits_file;
              config.manager_parameters = manager;

@@ -24,7 +24,7 @@ std::string textOf(const std::string& path) {
   return text.str();
 }
 
-lwr_fri_bridge::BridgeConfig bridgeConfig(const VirtualRobotConfig& config) {
+lwr_fri_bridge::BridgeConfig bridgeConfig(const LockstepRobotConfig& config) {
   lwr_fri_bridge::BridgeConfig bridge;
   bridge.limits = coglab_rt::loadJointLimits(config.limits_file);
   bridge.position_margin = bridge.limits.position_margin;
@@ -35,11 +35,11 @@ lwr_fri_bridge::BridgeConfig bridgeConfig(const VirtualRobotConfig& config) {
 
 }  // namespace
 
-void FrameTable::set(const std::string& frame, const Pose& in_world, std::int64_t stamp_ns) {
+void WorldFrames::set(const std::string& frame, const Pose& in_world, std::int64_t stamp_ns) {
   frames_[frame] = {in_world, stamp_ns};
 }
 
-bool FrameTable::find(const std::string& frame, Seen& seen) const {
+bool WorldFrames::find(const std::string& frame, Seen& seen) const {
   if (frame == "world" || frame == "lwr_base_link") {
     seen = Seen{};
     return true;
@@ -50,8 +50,8 @@ bool FrameTable::find(const std::string& frame, Seen& seen) const {
   return true;
 }
 
-bool FrameTable::lookup(const std::string& reference, const std::string& frame,
-                        coglab_controllers::GoalObservation& observation, std::string& why) {
+bool WorldFrames::lookup(const std::string& reference, const std::string& frame,
+                         coglab_controllers::GoalObservation& observation, std::string& why) {
   Seen from, to;
   for (const auto& [name, seen] : {std::pair{&reference, &from}, std::pair{&frame, &to}}) {
     if (find(*name, *seen)) continue;
@@ -65,7 +65,7 @@ bool FrameTable::lookup(const std::string& reference, const std::string& frame,
   return true;
 }
 
-VirtualRobot::VirtualRobot(const VirtualRobotConfig& config)
+LockstepRobot::LockstepRobot(const LockstepRobotConfig& config)
     : cell_(config.cell), bridge_(bridgeConfig(config)) {
   auto settings = coglab_controllers::readManagerSettings(YAML::Load(config.manager_parameters),
                                                           textOf(config.cell.urdf),
@@ -78,11 +78,11 @@ VirtualRobot::VirtualRobot(const VirtualRobotConfig& config)
   manager_ = std::make_unique<coglab_controllers::ControllerManager>(std::move(settings));
 }
 
-VirtualRobot::~VirtualRobot() {
+LockstepRobot::~LockstepRobot() {
   for (auto* dmp : dmps_) dmp->setGoalSource(nullptr);
 }
 
-coglab_controllers::Answer VirtualRobot::load(const std::string& id, const std::string& type) {
+coglab_controllers::Answer LockstepRobot::load(const std::string& id, const std::string& type) {
   coglab_controllers::Answer answer = manager_->load(id, type);
   if (!answer.success) return answer;
   if (auto* dmp = dynamic_cast<coglab_controllers::DmpController*>(manager_->motion(id))) {
@@ -92,19 +92,19 @@ coglab_controllers::Answer VirtualRobot::load(const std::string& id, const std::
   return answer;
 }
 
-coglab_controllers::DmpController& VirtualRobot::dmp(const std::string& id) {
+coglab_controllers::DmpController& LockstepRobot::dmp(const std::string& id) {
   if (auto* dmp = dynamic_cast<coglab_controllers::DmpController*>(manager_->motion(id)))
     return *dmp;
   throw std::invalid_argument("no DMP controller is loaded under the id '" + id + "'");
 }
 
-coglab_controllers::PtpController& VirtualRobot::ptp(const std::string& id) {
+coglab_controllers::PtpController& LockstepRobot::ptp(const std::string& id) {
   if (auto* ptp = dynamic_cast<coglab_controllers::PtpController*>(manager_->motion(id)))
     return *ptp;
   throw std::invalid_argument("no point-to-point controller is loaded under the id '" + id + "'");
 }
 
-void VirtualRobot::tick() {
+void LockstepRobot::tick() {
   lwr_fri_bridge::fri::CommandDatagram command;
   std::array<std::uint8_t, lwr_fri_bridge::fri::kCommandSize> answer{};
   bool answered = false;
@@ -121,7 +121,7 @@ void VirtualRobot::tick() {
   now_ns_ += static_cast<std::int64_t>(std::llround(1e9 * cell_.period()));
 }
 
-void VirtualRobot::controlCycle(bool answered) {
+void LockstepRobot::controlCycle(bool answered) {
   for (auto* dmp : dmps_) dmp->pollGoal();
   auto& cycle = manager_->cycle();
   const double period = cell_.period(), wanted = cycle.settings().cycle_time;

@@ -1,6 +1,10 @@
 #!/usr/bin/python3
-"""Bench of contact detection: sensitivity, delay, false alarms; the peer is an absolute threshold on the
-same signals."""
+"""Bench of contact detection: sensitivity, delay, false alarms; the peer is an absolute threshold on the same signals.
+
+Pushes: 60 of each kind on synthetic torques; the median delay is that of the pushes that were found at all, the share
+beside it says how many were. False alarms: 200 still and 50 moving runs. People: 12 drawn ones who give the mug in
+whole trials, 200 with --long.
+"""
 
 import json
 import os

@@ -42,7 +42,7 @@ def row(figure, value, unit, goal="", ok=True, peer=None, peer_value=None):
 
 
 def reach_rows(campaign, action, perception):
-    """What the issue asks of a reach. Distances to the goal as received; to the truth only with perfect perception."""
+    """Duration, smoothness, end. Distances to the goal as received; to the truth only with perfect perception."""
     found = campaign.reaches[action]
     if not found:
         return [row(f"{action}, {perception}: reaches measured", 0, "reaches", ">= 1", False)]

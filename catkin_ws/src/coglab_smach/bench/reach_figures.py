@@ -11,7 +11,7 @@ NEAR = 0.010
 
 
 def human_time(way: float) -> float:
-    """Duration (s) of a person's reach over ``way`` m: facts of coglab_sim.person.reach.duration_for."""
+    """Duration (s) of a person's reach over ``way`` m, as coglab_sim.person.reach.duration_for has it."""
     return HUMAN_BASE * max(0.3, (max(way, 1e-3) / 0.45) ** 0.3)
 
 

@@ -1,6 +1,9 @@
 #!/usr/bin/python3
 """Figures of the hand: golden bytes, time per request beside a bare loop, latency, CPU share.
 
+Times are medians over 401 blocks that alternate between driver and bare loops; a block in which the line had to be
+resynchronised is left out, and the bench fails where that is more than a tenth. Latency: 25 moves.
+
 Prints one JSON list of rows. Needs a sourced workspace; starts its own ROS master on a free port.
 """
 

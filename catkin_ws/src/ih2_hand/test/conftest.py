@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import pytest
-from ih2_hand.clock import VirtualClock
+from ih2_hand.clock import SteppedClock
 from ih2_hand.driver import HandSerialDriver
 from ih2_hand.emulator.faults import Faults
 from ih2_hand.emulator.hand import EmulatedHand
@@ -16,7 +16,7 @@ from ih2_hand.emulator.virtual_link import VirtualLink
 class Bench:
     """One driver, one hand, one clock."""
 
-    clock: VirtualClock
+    clock: SteppedClock
     hand: EmulatedHand
     link: VirtualLink
     driver: HandSerialDriver
@@ -31,7 +31,7 @@ class Bench:
 @pytest.fixture
 def make_bench():
     def make(dialect: str = "legacy", **hand_options) -> Bench:
-        clock = VirtualClock()
+        clock = SteppedClock()
         hand = EmulatedHand(clock, **({"greeting": True} | hand_options))
         faults = Faults(hand)
         link = VirtualLink(hand, clock, faults=faults)

@@ -15,7 +15,7 @@ import os
 import random
 
 import pytest
-from ih2_hand.clock import VirtualClock
+from ih2_hand.clock import SteppedClock
 from ih2_hand.driver import HandSerialDriver
 from ih2_hand.emulator.hand import EmulatedHand
 from ih2_hand.emulator.virtual_link import VirtualLink
@@ -35,7 +35,7 @@ class Corrupter:
 
     KINDS = ("lost", "doubled", "flipped", "inserted")
 
-    def __init__(self, rng: random.Random, clock: VirtualClock):
+    def __init__(self, rng: random.Random, clock: SteppedClock):
         self.rng, self.clock = rng, clock
         self.plan: dict[int, str] = {}
         self.passed = 0
@@ -95,7 +95,7 @@ class Campaign:
 
     def __init__(self, seed: int):
         self.rng = random.Random(seed)
-        self.clock = VirtualClock()
+        self.clock = SteppedClock()
         self.hand = EmulatedHand(self.clock, greeting=True)
         self.corrupter = Corrupter(self.rng, self.clock)
         self.link = VirtualLink(self.hand, self.clock, to_hand=self.corrupter.to_hand, to_host=self.corrupter.tamper)
@@ -240,7 +240,7 @@ def test_as_many_equal_lies_as_readings_are_the_truth():
     """
     answers, values = [], []
     for position, tamper in ((100, Flipped(3)), (108, None)):
-        clock = VirtualClock()
+        clock = SteppedClock()
         hand = EmulatedHand(clock, greeting=True, positions=[0, position, 0, 0, 0])
         link = VirtualLink(hand, clock)
         driver = HandSerialDriver(transport=link, clock=clock)
@@ -267,7 +267,7 @@ class Forger:
 
 @pytest.mark.parametrize("lies", [1, 2])
 def test_fewer_equal_lies_than_readings_are_found_out(lies):
-    clock = VirtualClock()
+    clock = SteppedClock()
     hand = EmulatedHand(clock, greeting=True, positions=[0, 100, 0, 0, 0])
     link = VirtualLink(hand, clock)
     driver = HandSerialDriver(transport=link, clock=clock)

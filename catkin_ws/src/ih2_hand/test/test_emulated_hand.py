@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 from ih2_hand import frames
-from ih2_hand.clock import VirtualClock
+from ih2_hand.clock import SteppedClock
 from ih2_hand.emulator.faults import Faults
 from ih2_hand.emulator.hand import EmulatedHand
 from ih2_hand.emulator.parser import FrameParser
@@ -15,7 +15,7 @@ class Raw:
     """A hand spoken to in hex."""
 
     def __init__(self, **options):
-        self.clock = VirtualClock()
+        self.clock = SteppedClock()
         self.hand = EmulatedHand(self.clock, **({"greeting": True} | options))
 
     def ask(self, text: str) -> str:
@@ -41,7 +41,7 @@ def raw() -> Raw:
     return Raw()
 
 
-# Lengths typed from the last paragraph of section 8 of the protocol facts.
+# Bytes of a frame by its first byte, typed here a second time.
 LENGTHS = (
     {first: 1 for first in range(0x40)}
     | {0x41: 1, 0x42: 1, 0x46: 1, 0x4C: 1}

@@ -1,4 +1,4 @@
-"""Golden vectors of the protocol facts, section 8, typed a second time: driver against raw bytes.
+"""Golden vectors of the wire, typed by hand a second time: driver against raw bytes.
 
 The other end is a script, not the emulator, so that a slip shared by both ends is seen here.
 """
@@ -6,7 +6,7 @@ The other end is a script, not the emulator, so that a slip shared by both ends 
 from __future__ import annotations
 
 import pytest
-from ih2_hand.clock import VirtualClock
+from ih2_hand.clock import SteppedClock
 from ih2_hand.driver import HandSerialDriver, handSerialDriver
 from ih2_hand.errors import NoGraspModeError
 
@@ -42,7 +42,7 @@ class Scripted:
 
 def connect(answers: dict[str, str] | None = None, dialect: str = "legacy", **options):
     line = Scripted({"4B 00": "08"} | (answers or {}))
-    driver = HandSerialDriver(transport=line, clock=VirtualClock(), dialect=dialect, **options)
+    driver = HandSerialDriver(transport=line, clock=SteppedClock(), dialect=dialect, **options)
     assert line.frames == [RESYNC.strip(), "4B 00"], "constructor: 13 times StopALL, one probe"
     line.frames.clear()
     return driver, line

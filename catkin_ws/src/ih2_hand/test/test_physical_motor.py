@@ -1,7 +1,7 @@
 """The emulator's bytes where the physics turns the motors: positions, currents and the stop at contact are its."""
 
 import pytest
-from ih2_hand.clock import VirtualClock
+from ih2_hand.clock import SteppedClock
 from ih2_hand.driver import HandSerialDriver
 from ih2_hand.emulator.hand import EmulatedHand
 from ih2_hand.emulator.physical_motor import MotorState
@@ -51,7 +51,7 @@ class Physics:
 
 class Bench:
     def __init__(self, **kw):
-        self.clock = VirtualClock()
+        self.clock = SteppedClock()
         self.hand = EmulatedHand(self.clock, physical=True, greeting=True)
         self.driver = HandSerialDriver(transport=VirtualLink(self.hand, self.clock), clock=self.clock)
         self.physics = Physics(**kw)
@@ -127,6 +127,6 @@ def test_calibration_opens_all():
 )
 def test_bad_states_are_refused_with_words(states, words):
     with pytest.raises(ValueError, match=words):
-        EmulatedHand(VirtualClock(), physical=True).follow(states)
+        EmulatedHand(SteppedClock(), physical=True).follow(states)
     with pytest.raises(ValueError, match="turned by the physics are expected"):
-        EmulatedHand(VirtualClock()).follow([MotorState(0.0, 0.0, 0.0, False, False)] * 5)
+        EmulatedHand(SteppedClock()).follow([MotorState(0.0, 0.0, 0.0, False, False)] * 5)

@@ -1,5 +1,8 @@
 #!/usr/bin/python3
-"""The interpolator: time of a step, distance from ruckig (if installed), limits, braking. Prints JSON."""
+"""The interpolator: time of a step, distance from ruckig (if installed), limits, braking. Prints JSON.
+
+1e5 random states at each of four periods; distance and excess are the largest of all of them, nothing is left out.
+"""
 
 from __future__ import annotations
 

@@ -185,6 +185,8 @@ class LwrNode(unittest.TestCase):
         self.assertEqual(found["FRI connection"]["quality"], "PERFECT")
         for key in ("latency (s)", "jitter (s)", "misses", "longest answer time (s)", "peer"):
             self.assertIn(key, found["FRI connection"])
+        self.assertEqual(found["FRI connection"]["reason_code"], str(ReasonCode.NONE))
+        self.assertTrue(all("reason_code" in values for values in found.values()))
         self.assertEqual(float(found["arm"]["temperature lwr_a6 (degC)"]), 36.0)
 
     def test_a_second_sender_is_ignored_and_named(self) -> None:

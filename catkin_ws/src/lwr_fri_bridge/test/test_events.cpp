@@ -225,6 +225,8 @@ TEST(Diagnosis, GivesAHintWhenQualityIsPoor) {
   EXPECT_NE(diagnoseConnection(s, thread, 49938, 12.0)
                 .text.find("no valid packet received on port 49938 for 12 s"),
             std::string::npos);
+  EXPECT_EQ(diagnoseConnection(s, thread, 49938, 12.0).code, ReasonCode::RobotDisconnected);
+  EXPECT_EQ(diagnoseArm(s, 70.0).code, ReasonCode::RobotDisconnected);
   s.supervisor = SupervisorState::Monitor;
   s.sample.cycle_time = 0.001;
   s.quality = fri::Quality::Bad;
@@ -238,12 +240,20 @@ TEST(Diagnosis, GivesAHintWhenQualityIsPoor) {
   s.miss_rate = 0.0F;
   s.session.lost_measurements = 10;
   EXPECT_NE(diagnoseConnection(s, thread, 49938, 0.0).text.find("cable"), std::string::npos);
+  EXPECT_EQ(diagnoseConnection(s, thread, 49938, 0.0).code, ReasonCode::PoorQuality);
   s.quality = fri::Quality::Perfect;
   EXPECT_EQ(diagnoseConnection(s, thread, 49938, 0.0).severity, Severity::Ok);
+  EXPECT_EQ(diagnoseConnection(s, thread, 49938, 0.0).code, ReasonCode::None);
   thread.last_foreign = "127.0.0.1:9";
   EXPECT_NE(diagnoseConnection(s, thread, 49938, 0.0).text.find("127.0.0.1:9"), std::string::npos);
+  EXPECT_EQ(diagnoseConnection(s, thread, 49938, 0.0).code, ReasonCode::SecondSender);
+  s.sample.block = MotionBlock::Held;
+  EXPECT_EQ(diagnoseArm(s, 70.0).code, ReasonCode::Held);
+  s.temperature[2] = 80.0F;
+  EXPECT_EQ(diagnoseArm(s, 70.0).code, ReasonCode::DriveWarning);
   s.drive_error = 0x10;
   EXPECT_NE(diagnoseArm(s, 70.0).text.find("lwr_a4"), std::string::npos);
+  EXPECT_EQ(diagnoseArm(s, 70.0).code, ReasonCode::DriveError);
 }
 
 TEST(Events, AFullQueueIsCountedAndSaid) {

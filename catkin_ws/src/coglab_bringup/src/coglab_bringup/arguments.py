@@ -93,6 +93,7 @@ def bench_options(top: Path, words: list[str]) -> argparse.Namespace:
     parser.add_argument("names", nargs="*", metavar="NAME", help="default: all")
     parser.add_argument("--json", type=writable_file, metavar="FILE", help="write the rows as a JSON list")
     parser.add_argument("--long", action="store_true", help="the campaigns too (hours)")
+    parser.add_argument("--report", action="store_true", help="write docs/figures.md; runs only the benches named")
     options = parser.parse_args(words)
     _named(options.names, find_benches(top / "catkin_ws" / "src"), "bench")
     return options
@@ -117,6 +118,7 @@ def mutants_options(top: Path, words: list[str]) -> argparse.Namespace:
     parser.add_argument("packages", nargs="*", metavar="PACKAGE", help=f"default: {', '.join(CORES)}")
     parser.add_argument("--seed", type=seed, metavar="N", help="of the lines drawn (default: from the commit)")
     parser.add_argument("--count", type=int, default=12, metavar="N", help="mutants per package (default 12)")
+    parser.add_argument("--own", action="store_true", help="judged by the tests of the package alone")
     parser.add_argument("--json", type=writable_file, metavar="FILE", help="write rows and mutants as JSON")
     options = parser.parse_args(words)
     _named(options.packages, package_folders(top / "catkin_ws" / "src"), "package")

@@ -3,7 +3,8 @@
 A bench is an executable `bench/bench_<name>.py` in a package; it prints a JSON list of rows
 {bench, figure, value, unit, goal, peer, peer_value, ok} and nothing else on standard output, and ends with status 0,
 also where a figure misses its goal. Another status is a failure of its own, whatever rows were printed. Packages that
-have one of the same name share the bench: each gives its rows.
+have one of the same name share the bench: each gives its rows. The rows are kept; `--report` writes docs/figures.md
+from what was kept, and runs nothing but the benches named (figures.py).
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ import sys
 import tempfile
 from pathlib import Path
 
-from coglab_bringup import process_tree
+from coglab_bringup import figures, process_tree
 from coglab_bringup.arguments import bench_options, find_benches
 from coglab_bringup.usage import Refused
 
@@ -66,9 +67,10 @@ def print_table(rows: list[dict]) -> None:
 
 def main(arguments: list[str]) -> int:
     """Exit status 0 if every row is ok, 1 if one is not, 2 for an unknown name."""
-    sources = Path(os.environ["COGLAB_TOP"]) / "catkin_ws" / "src"
+    top = Path(os.environ["COGLAB_TOP"])
+    sources = top / "catkin_ws" / "src"
     try:
-        options = bench_options(sources.parents[1], arguments)
+        options = bench_options(top, arguments)
     except Refused as error:
         print(f"[coglab] error: {error}", file=sys.stderr)
         return 2
@@ -78,11 +80,15 @@ def main(arguments: list[str]) -> int:
     benches = find_benches(sources)
     python = os.environ.get("COGLAB_TEST_PYTHON", "/usr/bin/python3")
     rows: list[dict] = []
-    for name in options.names or benches:
+    for name in options.names or ([] if options.report else benches):
         print(f"[coglab] bench {name} ...", file=sys.stderr, flush=True)
-        for path in benches[name]:
-            rows += run_bench(name, path, python, limit)
-    print_table(rows)
+        found = [row for path in benches[name] for row in run_bench(name, path, python, limit)]
+        figures.record(top, name, found, options.long)
+        rows += found
+    if rows:
+        print_table(rows)
+    if options.report:
+        print(f"[coglab] wrote {figures.write_report(top)}", file=sys.stderr)
     if options.json:
         options.json.write_text(json.dumps(rows, indent=1) + "\n")
     return 0 if all(row["ok"] for row in rows) else 1

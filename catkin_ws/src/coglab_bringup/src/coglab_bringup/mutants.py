@@ -2,9 +2,11 @@
 
 Changes one line at a time of the code that ships, drawn over all its lines (mutator.py), builds what that touches, and
 runs the tests of the package and of what stands on it until the first red one. All of it happens in a copy of the
-checkout below .coglab/mutants: the checkout itself is never changed. A line that does not compile is drawn again. A red
-rostest is run once more before it is believed. What a run has found is kept: the same command goes on where it was
-ended, as long as the sources are the same. Hours; run only when named.
+checkout below .coglab/mutants: the checkout itself is never changed, however this ends. A line that does not compile is
+drawn again. A red rostest is run once more before it is believed, and a test that was never seen green is run on the
+unchanged sources first: one that is red there tells nothing and is left out, and said. What a run has found is kept:
+the same command goes on where it was ended, as long as the sources are the same. Hours; run only when named. With
+--own the tests of the package alone judge, which is quicker and harder: a survivor may be killed by what stands on it.
 """
 
 from __future__ import annotations
@@ -23,7 +25,7 @@ from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from coglab_bringup import bench, process_tree, test_runner
+from coglab_bringup import bench, figures, process_tree, test_runner
 from coglab_bringup.arguments import CORES, mutants_options, package_folders
 from coglab_bringup.mutator import ENDINGS, Change, changes, code_lines
 from coglab_bringup.usage import Refused
@@ -166,14 +168,56 @@ class Workspace:
         return program.failed > 0
 
 
+class Times:
+    """Of each test program: s that it takes where it is green, or None if the unchanged sources turn it red."""
+
+    def __init__(self, workspace: Workspace) -> None:
+        self._file, self._digest = workspace.root.parent / "times.json", workspace.digest
+        self._known: dict[str, float | None] = {}
+        try:
+            state = json.loads(self._file.read_text())
+            self._known = state["times"] if state["digest"] == workspace.digest else {}
+        except (OSError, ValueError, KeyError, TypeError):
+            pass
+
+    def knows(self, name: str) -> bool:
+        """Whether it has been seen green, or red on the unchanged sources."""
+        return name in self._known
+
+    def of(self, name: str) -> float | None:
+        """Its time, s; None: it tells nothing."""
+        return self._known[name]
+
+    def keep(self, name: str, seconds: float | None) -> None:
+        """Remembers it for the next run, whole or not at all."""
+        self._known[name] = seconds
+        write_whole(self._file, {"digest": self._digest, "times": self._known})
+
+
+def write_whole(path: Path, content: dict) -> None:
+    """A JSON file that is the old or the new one, whenever this process ends."""
+    new = path.with_suffix(".new")
+    new.write_text(json.dumps(content, indent=1) + "\n")
+    new.replace(path)
+
+
 class Campaign:
     """The mutants of one package, drawn with one seed; goes on where it was ended."""
 
-    def __init__(self, workspace: Workspace, package: str, seed: int, times: dict[str, float]) -> None:
-        self.workspace, self.package, self.times = workspace, package, times
+    def __init__(
+        self,
+        workspace: Workspace,
+        package: str,
+        seed: int,
+        times: Times,
+        say: Callable[[str], None] = print,
+        own: bool = False,
+    ) -> None:
+        self.workspace, self.package, self.times, self.say = workspace, package, times, say
         self.folders = package_folders(workspace.root / "catkin_ws" / "src")
         self.dice = random.Random(f"{package} {seed}")
-        self.kept = workspace.root.parent / f"{package}.{seed}.json"
+        self.judges = [package] if own else [package, *standing_on(package, self.folders)]
+        self.kept = workspace.root.parent / f"{package}.{seed}{'.own' if own else ''}.json"
         self.drawn: list[Mutant | None] = []  # None: did not compile
         self.fallen = 0  # of the drawn, those that the dice have given
         try:
@@ -190,11 +234,9 @@ class Campaign:
     def keep(self) -> None:
         """Writes what is known, whole or not at all."""
         rows = [asdict(mutant) if mutant else None for mutant in self.drawn]
-        new = self.kept.with_suffix(".new")
-        new.write_text(json.dumps({"digest": self.workspace.digest, "drawn": rows}, indent=1) + "\n")
-        new.replace(self.kept)
+        write_whole(self.kept, {"digest": self.workspace.digest, "drawn": rows})
 
-    def run(self, count: int, say: Callable[[str], None]) -> None:
+    def run(self, count: int) -> None:
         """Draws and judges until there are `count` mutants."""
         folder = self.folders[self.package]
         while len(self.mutants()) < count:
@@ -206,62 +248,78 @@ class Campaign:
             self.drawn.append(mutant)
             self.keep()
             if mutant is None:
-                say(f"{self.package}: {path.name}:{change.line} does not compile; drawn again")
+                self.say(f"{self.package}: {path.name}:{change.line} does not compile; drawn again")
             else:
                 by = f" by {mutant.by}" if mutant.by else ""
-                say(f"{self.package} {len(self.mutants())}/{count}: {sentence(mutant)}: {mutant.verdict}{by}")
+                self.say(f"{self.package} {len(self.mutants())}/{count}: {sentence(mutant)}: {mutant.verdict}{by}")
 
     def judge(self, path: Path, change: Change) -> Mutant | None:
         """What the tests say of one change; None if it does not compile. The file is as before afterwards."""
         text, since = path.read_text(encoding="utf-8"), time.monotonic()
         file = str(path.relative_to(self.workspace.root))
-        compiled = path.suffix != ".py"
-        if not compiled and self.workspace.stale:
-            self.workspace.build()
+        changed = Edited(self.workspace, path, text, change.apply(text))
         try:
-            path.write_text(change.apply(text), encoding="utf-8")
-            if compiled and not self.workspace.build():
+            if not changed.enter():
                 return None
-            by = self.first_red()
+            by = self.first_red(changed)
         finally:
-            path.write_text(text, encoding="utf-8")
-            self.workspace.stale = self.workspace.stale or compiled
+            changed.leave()
         verdict = "killed" if by else "survived"
         seconds = round(time.monotonic() - since, 1)
         return Mutant(self.package, file, change.line, change.kind, change.before, change.after, verdict, by, seconds)
 
-    def first_red(self) -> str:
+    def first_red(self, changed: Edited) -> str:
         """Package and name of the first test that is red; empty if none is."""
-        for program in self.workspace.programs([self.package, *standing_on(self.package, self.folders)]):
+        for program in self.workspace.programs(self.judges):
             name = f"{program.package}/{program.name}"
-            if name not in self.times:
+            known = self.times.knows(name)
+            usual = self.times.of(name) if known else None
+            if known and usual is None:
                 continue
-            limit = SLOWER * self.times[name] + 30.0
-            if self.workspace.red(program, limit):
-                # A crowded machine can turn a rostest red, too.
-                if program.kind != "rostest" or self.workspace.red(program, limit):
-                    return name
+            limit = test_runner.TIME_LIMIT if usual is None else SLOWER * usual + 30.0
+            if not self._red_twice(program, limit):
+                if not known:
+                    self.times.keep(name, program.seconds)
+                continue
+            if known or self._green_unchanged(program, name, changed):
+                return name
         return ""
 
+    def _red_twice(self, program: test_runner.Program, limit: float) -> bool:
+        """A crowded machine can turn a rostest red, too: that one is run again."""
+        return self.workspace.red(program, limit) and (program.kind != "rostest" or self.workspace.red(program, limit))
 
-def measure(workspace: Workspace, packages: list[str], say: Callable[[str], None]) -> dict[str, float]:
-    """Runs every test that will be needed on the unchanged sources: its time, s. A red one is left out and said."""
-    kept = workspace.root.parent / "times.json"
-    times: dict[str, float | None] = {}
-    try:
-        state = json.loads(kept.read_text())
-        times = state["times"] if state["digest"] == workspace.digest else {}
-    except (OSError, ValueError, KeyError, TypeError):
-        pass
-    for program in workspace.programs(packages):
-        name = f"{program.package}/{program.name}"
-        if name not in times:
-            red = workspace.red(program, test_runner.TIME_LIMIT) and workspace.red(program, test_runner.TIME_LIMIT)
-            times[name] = None if red else program.seconds
-            kept.write_text(json.dumps({"digest": workspace.digest, "times": times}, indent=1) + "\n")
-        if times[name] is None:
-            say(f"{name} is red on the unchanged sources and tells nothing: it is left out")
-    return {name: seconds for name, seconds in times.items() if seconds is not None}
+    def _green_unchanged(self, program: test_runner.Program, name: str, changed: Edited) -> bool:
+        """Whether a test that the change turns red is green without it; the change is back where it is not."""
+        changed.leave()
+        self.workspace.build()
+        green = not self._red_twice(program, test_runner.TIME_LIMIT)
+        self.times.keep(name, program.seconds if green else None)
+        if not green:
+            self.say(f"{name} is red on the unchanged sources and tells nothing: it is left out")
+            changed.enter()
+        return green
+
+
+class Edited:
+    """One file of the copy with its change in, or out again."""
+
+    def __init__(self, workspace: Workspace, path: Path, before: str, after: str) -> None:
+        self._workspace, self._path, self._before, self._after = workspace, path, before, after
+        self._compiled = path.suffix != ".py"
+
+    def enter(self) -> bool:
+        """Puts the change in and builds what it touches; whether that compiles."""
+        if not self._compiled and self._workspace.stale:
+            self._workspace.build()
+        self._path.write_text(self._after, encoding="utf-8")
+        return not self._compiled or self._workspace.build()
+
+    def leave(self) -> None:
+        """The file as it was; what is built from it is stale until the next build."""
+        if self._path.read_text(encoding="utf-8") != self._before:
+            self._path.write_text(self._before, encoding="utf-8")
+            self._workspace.stale = self._workspace.stale or self._compiled
 
 
 def sentence(mutant: Mutant) -> str:
@@ -309,12 +367,13 @@ def main(arguments: list[str]) -> int:
             raise Refused(f"the unchanged sources do not build; see {workspace.logs / 'build.log'}")
         workspace.enter()
         packages = options.packages or list(CORES)
-        folders = package_folders(workspace.root / "catkin_ws" / "src")
-        needed = list(dict.fromkeys(name for p in packages for name in (p, *standing_on(p, folders))))
-        times = measure(workspace, needed, say)
-        campaigns = [Campaign(workspace, package, options.seed, times) for package in packages]
+        times = Times(workspace)
+        campaigns = [Campaign(workspace, package, options.seed, times, say, options.own) for package in packages]
         for campaign in campaigns:
-            campaign.run(options.count, say)
+            campaign.run(options.count)
+    except KeyboardInterrupt:
+        say("ended; what was judged is kept, and the same command goes on from there")
+        return 130
     except Refused as error:
         print(f"[coglab] error: {error}", file=sys.stderr)
         return 2
@@ -324,6 +383,8 @@ def main(arguments: list[str]) -> int:
     print(f"\nseed {options.seed}; {len(survivors)} survived" + (":" if survivors else ""))
     for mutant in survivors:
         print(f"  {sentence(mutant)}")
+    if not options.packages and not options.own:
+        figures.record(top, "mutants", rows, False)
     if options.json:
         found = [asdict(m) for campaign in campaigns for m in campaign.mutants()]
         options.json.write_text(json.dumps({"seed": options.seed, "rows": rows, "mutants": found}, indent=1) + "\n")

@@ -1,5 +1,7 @@
 #include "coglab_controllers/ros/manager_ros.hpp"
 
+#include <pthread.h>
+
 #include <algorithm>
 #include <chrono>
 #include <exception>
@@ -242,6 +244,7 @@ std::vector<std::shared_ptr<ManagerRos::Side>> ManagerRos::sides() {
 // A thread of its own: what hinders publication (a full pipe behind the log, a plug-in's own ROS
 // side) must not take the goal from a motion.
 void ManagerRos::goalLoop() {
+  pthread_setname_np(pthread_self(), "goals");
   auto next = std::chrono::steady_clock::now();
   while (!stopping_) {
     for (const auto& side : sides()) {
@@ -253,6 +256,7 @@ void ManagerRos::goalLoop() {
 }
 
 void ManagerRos::publishLoop() {
+  pthread_setname_np(pthread_self(), "publisher");
   heartbeat_ns_ = steadyNow();
   auto next = std::chrono::steady_clock::now();
   for (std::uint64_t round = 0; !stopping_; ++round) {
@@ -336,17 +340,21 @@ void ManagerRos::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) {
   using diagnostic_msgs::DiagnosticStatus;
   const CycleReport report = manager_->report();
   const std::string warning = thread_->warning();
+  ReasonCode code = report.reason.code();
   if (!stalled_.empty()) {
+    code = ReasonCode::CycleStalled;
     status.summary(DiagnosticStatus::ERROR, stalled_);
   } else if (report.fault) {
     status.summary(DiagnosticStatus::ERROR, report.reason.str());
   } else if (!report.reason.empty()) {
     status.summary(DiagnosticStatus::WARN, report.reason.str());
   } else if (!warning.empty()) {
+    code = ReasonCode::NoRealTime;
     status.summary(DiagnosticStatus::WARN, warning);
   } else {
     status.summary(DiagnosticStatus::OK, nameOf(report.state));
   }
+  status.add("reason_code", static_cast<int>(code));
   status.add("active controller", report.active.str());
   status.add("state", nameOf(report.state));
   status.add("cycles", report.cycles);

@@ -38,6 +38,11 @@ enum class ReasonCode : std::uint16_t {
   PoorQuality = 207,
   DriveError = 208,
   StaleJointState = 209,
+  ComputerLate = 210,
+  SecondSender = 220,
+  DriveWarning = 221,
+  CommandsRefused = 222,
+  NoRealTime = 223,
 
   GoalMissing = 300,
   GoalStale = 301,

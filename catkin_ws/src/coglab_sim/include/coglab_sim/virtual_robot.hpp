@@ -22,7 +22,7 @@
 namespace coglab_sim {
 
 /// Frames as a table, in place of tf2. All poses are in `world`, which is `lwr_base_link`.
-class FrameTable : public coglab_controllers::GoalSource {
+class WorldFrames : public coglab_controllers::GoalSource {
  public:
   /// Tells where a frame was seen, at a time of the robot's clock, ns.
   void set(const std::string& frame, const Pose& in_world, std::int64_t stamp_ns);
@@ -39,18 +39,18 @@ class FrameTable : public coglab_controllers::GoalSource {
   std::map<std::string, Seen> frames_;
 };
 
-/// Settings of a VirtualRobot.
-struct VirtualRobotConfig {
+/// Settings of a LockstepRobot.
+struct LockstepRobotConfig {
   CellConfig cell;
   std::string limits_file;         ///< lwr_description/config/joint_limits.yaml
   std::string manager_parameters;  ///< YAML text as below /controller_manager
 };
 
-class VirtualRobot {
+class LockstepRobot {
  public:
   /// @throws what Cell, Bridge and readManagerSettings() throw.
-  explicit VirtualRobot(const VirtualRobotConfig& config);
-  ~VirtualRobot();
+  explicit LockstepRobot(const LockstepRobotConfig& config);
+  ~LockstepRobot();
 
   /// One FRI period.
   void tick();
@@ -60,7 +60,7 @@ class VirtualRobot {
   Cell& cell() { return cell_; }
   lwr_fri_bridge::Bridge& bridge() { return bridge_; }
   coglab_controllers::ControllerManager& manager() { return *manager_; }
-  FrameTable& frames() { return frames_; }
+  WorldFrames& frames() { return frames_; }
 
   /// Loads a controller; a DMP controller gets the frame table as goal source.
   coglab_controllers::Answer load(const std::string& id, const std::string& type);
@@ -77,7 +77,7 @@ class VirtualRobot {
   bool measured_ = false;
   int since_cycle_ = 0;
   std::int64_t last_controller_ns_ = 0;  // of the sample of the last control cycle
-  FrameTable frames_;
+  WorldFrames frames_;
   ctrl_more::Logger
       logger_;  // of the feedback stage; without a sink: the answers of requests say what matters
   std::unique_ptr<coglab_controllers::ControllerManager> manager_;

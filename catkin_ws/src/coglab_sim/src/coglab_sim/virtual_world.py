@@ -17,7 +17,7 @@ from coglab_objects.database import cell_parameters, objects_folder, read_object
 from coglab_py.packages import package_path
 from coglab_py.pose import Pose, about_z
 from coglab_py.yaml_file import read
-from ih2_hand.clock import VirtualClock
+from ih2_hand.clock import SteppedClock
 from ih2_hand.driver import HandSerialDriver
 from ih2_hand.emulator.hand import EmulatedHand
 from ih2_hand.emulator.physical_motor import MotorState
@@ -32,8 +32,8 @@ from coglab_sim.person.virtual_human import VirtualHuman
 from coglab_sim.tracker.tracker import Sight, Tracker
 
 try:
-    import coglab_sim._cell  # noqa: F401  (knows the type of VirtualRobot.cell)
-    from coglab_sim._virtual import VirtualRobot
+    import coglab_sim._cell  # noqa: F401  (knows the type of LockstepRobot.cell)
+    from coglab_sim._virtual import LockstepRobot
 except ImportError as error:
     raise ImportError(
         f"the simulated cell cannot be loaded ({error}): its library is missing or was not built; "
@@ -66,7 +66,7 @@ def manager_parameters() -> dict[str, Any]:
 
 
 class Robot:
-    """VirtualRobot with what figures and detectors need of each period.
+    """LockstepRobot with what figures and detectors need of each period.
 
     ``cell``: parameters of the simulated cell, ``__`` for ``/`` in their names; ``limits``: table of joint limits.
     """
@@ -79,7 +79,7 @@ class Robot:
             **{name.replace("__", "/"): value for name, value in cell.items()},
         }
         self.parameters = {**manager_parameters(), "joint_limits_file": limits}
-        self.virtual = VirtualRobot(urdf_file(), limits, parameters, yaml.safe_dump(manager_parameters()))
+        self.virtual = LockstepRobot(urdf_file(), limits, parameters, yaml.safe_dump(manager_parameters()))
         self.cell = self.virtual.cell
         self.limits = cc.load_joint_limits(limits)
         with open(urdf_file(), encoding="utf-8") as stream:
@@ -132,7 +132,7 @@ class Hand:
 
     def __init__(self, cell: Any) -> None:
         self.cell = cell
-        self.clock = VirtualClock()
+        self.clock = SteppedClock()
         self.emulator = EmulatedHand(self.clock, physical=True)
         self.driver = HandSerialDriver(transport=VirtualLink(self.emulator, self.clock), clock=self.clock)
         self.calibrated = False

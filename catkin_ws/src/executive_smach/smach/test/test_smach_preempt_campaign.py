@@ -52,7 +52,7 @@ def flags(state):
             yield from flags(child)
 
 
-def test_s15_1_2_preempts_at_random_moments_none_lost_none_left_over():
+def test_preempts_at_random_moments_none_lost_none_left_over():
     seed = random.Random(20240)
     machine = nest(2)
     runs = 3000 if os.environ.get("COGLAB_LONG") else 300
@@ -71,7 +71,7 @@ def test_s15_1_2_preempts_at_random_moments_none_lost_none_left_over():
     assert threading.active_count() == threads_before
 
 
-def test_s15_2_after_preempted_runs_a_normal_run_is_normal():
+def test_after_preempted_runs_a_normal_run_is_normal():
     states = [Hops() for _ in range(3)]
     both = smach.Concurrence(
         ["done", "preempted"], "preempted", outcome_map={"done": {str(i): "done" for i in range(3)}}

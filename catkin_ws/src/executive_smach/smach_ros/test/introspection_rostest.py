@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""Section 11 of the specification: introspection on the wire, between real nodes."""
+"""Introspection on the wire, between real nodes."""
 
 import base64
 import os
@@ -101,7 +101,7 @@ def build():
     return root, gate
 
 
-class TestSection11(unittest.TestCase):
+class TestIntrospection(unittest.TestCase):
     count = 0
 
     def setUp(self):
@@ -121,13 +121,13 @@ class TestSection11(unittest.TestCase):
         self.server.start()
         self.assertTrue(wait_for(lambda: len(self.viewer.of("/SM_ROOT/EACH")) > 0))
 
-    def test_s11_topic_names(self):
+    def test_topic_names(self):
         self.assertEqual(
             (STATUS_TOPIC, STRUCTURE_TOPIC, INIT_TOPIC),
             ("/smach/container_status", "/smach/container_structure", "/smach/container_init"),
         )
 
-    def test_s11_structure_of_every_container(self):
+    def test_structure_of_every_container(self):
         self.start()
         paths = {"/SM_ROOT", "/SM_ROOT/INNER", "/SM_ROOT/BOTH", "/SM_ROOT/EACH"}
         self.assertTrue(wait_for(lambda: {m.path for m in self.viewer.structures} == paths))
@@ -144,7 +144,7 @@ class TestSection11(unittest.TestCase):
         self.assertEqual(root.header.frame_id, "")
         self.assertLess(abs((rospy.Time.now() - root.header.stamp).to_sec()), LIMIT)
 
-    def test_s12_what_a_viewer_needs(self):
+    def test_what_a_viewer_needs(self):
         self.start()
         self.gate.open.set()
         self.root.execute()
@@ -166,13 +166,13 @@ class TestSection11(unittest.TestCase):
         self.assertEqual(header["md5sum"], "5ba2bb79ac19e3842d562a191f2a675b")
         self.assertEqual(header.get("latching", "0"), "0")
 
-    def test_s11_heartbeats_of_every_container(self):
+    def test_heartbeats_of_every_container(self):
         self.start()
         for path in ("/SM_ROOT", "/SM_ROOT/INNER", "/SM_ROOT/BOTH", "/SM_ROOT/EACH"):
             self.assertTrue(wait_for(lambda p=path: self.viewer.infos(p).count("HEARTBEAT") >= 2), path)
         self.assertTrue(wait_for(lambda: [m.path for m in self.viewer.structures].count("/SM_ROOT") >= 2))
 
-    def test_s12_a_new_viewer_gets_no_beat_until_its_window_exists(self):
+    def test_a_new_viewer_gets_no_beat_until_its_window_exists(self):
         smach_ros.introspection.WELCOME_DELAY = 1.5
         before = time.monotonic()  # it connects after this
         self.server.start()
@@ -180,7 +180,7 @@ class TestSection11(unittest.TestCase):
         self.assertGreaterEqual(self.viewer.first_beat - before, 1.5)
         self.assertTrue(wait_for(lambda: len({m.path for m in self.viewer.structures}) == 4))
 
-    def test_s11_a_proxy_shows_one_container_alone(self):
+    def test_a_proxy_shows_one_container_alone(self):
         proxy = smach_ros.introspection.ContainerProxy(
             self.name, self.root, "/SM_ROOT", update_rate=rospy.Duration(0.5)
         )
@@ -195,7 +195,7 @@ class TestSection11(unittest.TestCase):
         self.assertEqual({m.path for m in self.viewer.structures + self.viewer.statuses}, {"/SM_ROOT"})
         self.assertEqual((self.root._start_cbs, self.root._transition_cbs), ([], []))
 
-    def test_s11_user_data_and_s15_4_what_cannot_be_pickled(self):
+    def test_user_data_and_what_cannot_be_pickled(self):
         self.start()
         status = self.viewer.of("/SM_ROOT")[-1]
         raw = base64.b64decode(status.local_data, validate=True)
@@ -204,7 +204,7 @@ class TestSection11(unittest.TestCase):
         self.assertEqual(data["count"], 3)
         self.assertEqual(data["lock"], repr(self.root.userdata.lock))
 
-    def test_s11_a_status_at_each_transition_and_s15_5_at_start_and_end(self):
+    def test_a_status_at_each_transition_and_at_start_and_end(self):
         self.start()
         self.viewer.statuses.clear()
         self.gate.open.set()
@@ -219,7 +219,7 @@ class TestSection11(unittest.TestCase):
             self.assertEqual(seen[-1].active_states, idle, f"{path} looks idle at once")
         self.assertEqual(statuses[0].initial_states, ["INNER"])
 
-    def test_s15_7_a_container_that_ends_with_an_error_looks_idle(self):
+    def test_a_container_that_ends_with_an_error_looks_idle(self):
         def broken(ud):
             raise ValueError("broken")
 
@@ -235,12 +235,12 @@ class TestSection11(unittest.TestCase):
         self.assertTrue(wait_for(lambda: "END None" in self.viewer.infos("/OTHER")))
         self.assertEqual(self.viewer.of("/OTHER")[-1].active_states, ["None"])
 
-    def test_s11_paths_below_a_root_of_one_slash(self):
+    def test_paths_below_a_root_of_one_slash(self):
         self.server.clear()
         self.server.construct(self.name, self.root, "/")
         self.assertEqual([w.path for w in self.server._watched], ["/", "/INNER", "/BOTH", "/EACH"])
 
-    def test_s15_6_one_thread_per_server_and_nothing_left_by_stop(self):
+    def test_one_thread_per_server_and_nothing_left_by_stop(self):
         self.viewer.close()
         time.sleep(0.2)
         before = set(threading.enumerate())
@@ -253,25 +253,25 @@ class TestSection11(unittest.TestCase):
         self.assertEqual((self.root._start_cbs, self.root._transition_cbs), ([], []))
         self.assertNotIn("/quiet" + STATUS_TOPIC, [name for name, _ in rospy.get_published_topics()])
 
-    def test_s11_stop_sends_what_is_left(self):
+    def test_stop_sends_what_is_left(self):
         self.start()
         self.gate.open.set()
         self.root.execute()
         self.server.stop()
         self.assertTrue(wait_for(lambda: "END end" in self.viewer.infos("/SM_ROOT"), 5.0))
 
-    def test_s11_start_again(self):
+    def test_start_again(self):
         self.start()
         self.server.stop()
         self.viewer.statuses.clear()
         self.server.start()
         self.assertTrue(wait_for(lambda: self.viewer.of("/SM_ROOT")))
 
-    def test_s11_client_finds_servers(self):
+    def test_client_finds_servers(self):
         self.start()
         self.assertIn(self.name, smach_ros.IntrospectionClient().get_servers())
 
-    def test_s11_client_sets_initial_state(self):
+    def test_client_sets_initial_state(self):
         self.start()
         ud = smach.UserData()
         ud.count, ud.raw = 7, b"\x01"
@@ -283,22 +283,22 @@ class TestSection11(unittest.TestCase):
         self.assertEqual(self.root.execute(), "end")
         self.assertFalse(self.gate.inside.is_set())
 
-    def test_s11_client_without_timeout_waits_for_the_connection_better(self):
+    def test_client_without_timeout_waits_for_the_connection_better(self):
         self.start()
         self.assertTrue(smach_ros.IntrospectionClient().set_initial_state(self.name, "/SM_ROOT", ["BOTH"]))
         self.assertTrue(wait_for(lambda: self.root.get_initial_states() == ["BOTH"]))
 
-    def test_s11_client_unknown_state_or_path(self):
+    def test_client_unknown_state_or_path(self):
         self.start()
         client = smach_ros.IntrospectionClient()
         for path, states in (("/SM_ROOT", ["NOWHERE"]), ("/NOWHERE", ["EACH"])):
             self.assertFalse(client.set_initial_state(self.name, path, states, timeout=rospy.Duration(1.0)))
         self.assertEqual(self.root.get_initial_states(), ["INNER"])
 
-    def test_s11_client_nobody_there(self):
+    def test_client_nobody_there(self):
         self.assertFalse(smach_ros.IntrospectionClient().set_initial_state("/nobody", "/SM_ROOT", ["A"], timeout=0.3))
 
-    def test_s11_hostile_commands_change_nothing_and_run_nothing(self):
+    def test_hostile_commands_change_nothing_and_run_nothing(self):
         self.start()
         pub = rospy.Publisher(self.name + INIT_TOPIC, SmachContainerInitialStatusCmd, queue_size=1000)
         self.assertTrue(wait_for(lambda: pub.get_num_connections() > 0))
@@ -324,12 +324,12 @@ class TestSection11(unittest.TestCase):
         self.assertEqual((self.root.userdata.count, self.root.userdata.last), (3, 1))
         self.assertTrue(wait_for(lambda: decode(self.viewer.of("/SM_ROOT")[-1].local_data).get("last") == 1))
 
-    def test_s11_a_state_that_is_no_container_is_not_shown(self):
+    def test_a_state_that_is_no_container_is_not_shown(self):
         server = smach_ros.IntrospectionServer("/leaf", smach.State(["done"]), "/SM_ROOT")
         server.start()
         server.stop()
 
-    def test_s15_6_bursts_lose_nothing(self):
+    def test_bursts_lose_nothing(self):
         machine = smach.StateMachine(["end"])
         with machine:
             for i in range(400):

@@ -14,14 +14,14 @@ from smach_ros.introspection import STATUS_TOPIC
 
 
 class TestSilentClock(unittest.TestCase):
-    def test_s9_time_limits_run_on(self):
+    def test_time_limits_run_on(self):
         self.assertFalse(rospy.rostime.is_wallclock())
         state = smach_ros.SimpleActionState("nobody", TestAction, goal=TestGoal(), server_wait_timeout=0.5)
         self.assertEqual(state.execute(smach.UserData()), "aborted")
         state = smach_ros.ConditionState(lambda ud: False, timeout=rospy.Duration(0.5), max_checks=-1)
         self.assertEqual(state.execute(smach.UserData()), "false")
 
-    def test_s11_heartbeats_go_on(self):
+    def test_heartbeats_go_on(self):
         machine = smach.StateMachine(["done"])
         with machine:
             smach.StateMachine.add("A", smach.CBState(lambda ud: "done", outcomes=["done"]))

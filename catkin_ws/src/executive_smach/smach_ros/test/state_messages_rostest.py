@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""Section 9 of the specification: the states on services, topics and conditions."""
+"""The states on services, topics and conditions."""
 
 import os
 import sys
@@ -16,7 +16,7 @@ sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 from states_support import LIMIT, in_thread
 
 
-class TestSection9Service(unittest.TestCase):
+class TestService(unittest.TestCase):
     def setUp(self):
         self.ud = smach.UserData()
         self.asked = []
@@ -30,7 +30,7 @@ class TestSection9Service(unittest.TestCase):
         self.asked.append(request.data)
         return SetBoolResponse(success=request.data, message="text") if request.data else None
 
-    def test_s9_request_in_its_three_ways(self):
+    def test_request_in_its_three_ways(self):
         self.ud.whole, self.ud.data = SetBoolRequest(data=False), True
         make = smach_ros.ServiceState
         state = make("set", SetBool, request=SetBoolRequest(data=True))
@@ -49,13 +49,13 @@ class TestSection9Service(unittest.TestCase):
         self.assertEqual(state.execute(self.ud), "succeeded")
         self.assertEqual(self.asked, [True] * 3)
 
-    def test_s9_aborted_by_service_key_or_callback(self):
+    def test_aborted_by_service_key_or_callback(self):
         make = smach_ros.ServiceState
         self.assertEqual(make("set", SetBool).execute(self.ud), "aborted", "the service fails")
         self.assertEqual(make("set", SetBool, request_key="absent").execute(self.ud), "aborted")
         self.assertEqual(make("set", SetBool, request_cb=lambda ud, r: 1 / 0).execute(self.ud), "aborted")
 
-    def test_s9_response(self):
+    def test_response(self):
         @smach.cb_interface(outcomes=["special"], output_keys=["own"])
         def response_cb(ud, response):
             ud.own = response.message
@@ -79,7 +79,7 @@ class TestSection9Service(unittest.TestCase):
                 "aborted",
             )
 
-    def test_s9_service_bad_construction(self):
+    def test_service_bad_construction(self):
         for wrong in (
             {"request_slots": ["x"]},
             {"response_slots": ["x"]},
@@ -89,7 +89,7 @@ class TestSection9Service(unittest.TestCase):
             with self.assertRaises(smach.InvalidStateError):
                 smach_ros.ServiceState("set", SetBool, **wrong)
 
-    def test_s9_preempted_before_and_while_waiting_for_the_service(self):
+    def test_preempted_before_and_while_waiting_for_the_service(self):
         state = smach_ros.ServiceState("nobody", Trigger)
         state.request_preempt()
         self.assertEqual(state.execute(self.ud), "preempted")
@@ -100,7 +100,7 @@ class TestSection9Service(unittest.TestCase):
         self.assertEqual(run.result, "preempted")
 
 
-class TestSection9Topic(unittest.TestCase):
+class TestTopic(unittest.TestCase):
     def setUp(self):
         self.ud = smach.UserData()
         self.pub = rospy.Publisher("flag", Bool, queue_size=10)
@@ -117,7 +117,7 @@ class TestSection9Topic(unittest.TestCase):
             self.pub.publish(self.value)
             time.sleep(0.02)
 
-    def test_s9_monitor_valid_after_max_checks(self):
+    def test_monitor_valid_after_max_checks(self):
         count = []
         state = smach_ros.MonitorState("flag", Bool, lambda ud, msg: count.append(1) or msg.data, max_checks=3)
         self.assertEqual(state.get_registered_outcomes(), ("valid", "invalid", "preempted"))
@@ -125,7 +125,7 @@ class TestSection9Topic(unittest.TestCase):
         self.assertEqual(len(count), 3)
         self.assertEqual(state.execute(self.ud), "valid", "again")
 
-    def test_s9_monitor_invalid_by_false_and_by_an_error(self):
+    def test_monitor_invalid_by_false_and_by_an_error(self):
         state = smach_ros.MonitorState("flag", Bool, lambda ud, msg: msg.data)
         run = in_thread(state.execute, self.ud)
         time.sleep(0.3)
@@ -135,7 +135,7 @@ class TestSection9Topic(unittest.TestCase):
         self.assertEqual(run.result, "invalid")
         self.assertEqual(smach_ros.MonitorState("flag", Bool, lambda ud, msg: 1 / 0).execute(self.ud), "invalid")
 
-    def test_s9_monitor_user_data(self):
+    def test_monitor_user_data(self):
         def cond(ud, msg):
             ud.n = ud.n + 1
             return ud.n < 3
@@ -145,7 +145,7 @@ class TestSection9Topic(unittest.TestCase):
         self.assertEqual(state.execute(self.ud), "invalid")
         self.assertEqual(self.ud.n, 3)
 
-    def test_s15_1_a_monitor_without_messages_is_woken_by_a_request(self):
+    def test_a_monitor_without_messages_is_woken_by_a_request(self):
         state = smach_ros.MonitorState("silence", Empty, lambda ud, msg: True)
         run = in_thread(state.execute, self.ud)
         time.sleep(0.1)
@@ -156,7 +156,7 @@ class TestSection9Topic(unittest.TestCase):
         self.assertLess(time.monotonic() - asked, LIMIT)
         self.assertFalse(state.preempt_requested())
 
-    def test_s9_monitor_in_a_concurrence_is_preempted(self):
+    def test_monitor_in_a_concurrence_is_preempted(self):
         both = smach.Concurrence(["done", "preempted"], "done", child_termination_cb=lambda o: True)
         with both:
             smach.Concurrence.add("M", smach_ros.MonitorState("silence", Empty, lambda ud, msg: True))
@@ -164,28 +164,28 @@ class TestSection9Topic(unittest.TestCase):
         self.assertEqual([both.execute() for _ in range(5)], ["done"] * 5)
 
 
-class TestSection9Condition(unittest.TestCase):
+class TestCondition(unittest.TestCase):
     def run_state(self, cond, **kwargs):
         return smach_ros.ConditionState(cond, poll_rate=rospy.Duration(0.01), **kwargs).execute(smach.UserData())
 
-    def test_s9_condition_true(self):
+    def test_condition_true(self):
         self.assertEqual(self.run_state(lambda ud: True), "true")
         state = smach_ros.ConditionState(lambda ud: True)
         self.assertEqual(state.get_registered_outcomes(), ("true", "false", "preempted"))
 
-    def test_s9_condition_max_checks_allows_one_more(self):
+    def test_condition_max_checks_allows_one_more(self):
         for checks, calls in ((1, 2), (3, 4)):
             count = []
             self.assertEqual(self.run_state(lambda ud, c=count: c.append(1), max_checks=checks), "false")
             self.assertEqual(len(count), calls)
 
-    def test_s9_condition_unlimited_with_timeout(self):
+    def test_condition_unlimited_with_timeout(self):
         count = []
         outcome = self.run_state(lambda ud: count.append(1), max_checks=-1, timeout=rospy.Duration(0.3))
         self.assertEqual(outcome, "false")
         self.assertGreater(len(count), 3)
 
-    def test_s9_condition_preempted(self):
+    def test_condition_preempted(self):
         state = smach_ros.ConditionState(lambda ud: False, max_checks=-1, poll_rate=rospy.Duration(60))
         run = in_thread(state.execute, smach.UserData())
         time.sleep(0.1)
@@ -194,11 +194,11 @@ class TestSection9Condition(unittest.TestCase):
         self.assertEqual(run.result, "preempted")
         self.assertFalse(state.preempt_requested())
 
-    def test_s9_condition_that_raises(self):
+    def test_condition_that_raises(self):
         with self.assertRaises(smach.InvalidUserCodeError):
             self.run_state(lambda ud: 1 / 0)
 
-    def test_s9_condition_user_data(self):
+    def test_condition_user_data(self):
         ud = smach.UserData()
         ud.n = 5
         state = smach_ros.ConditionState(lambda ud: ud.n == 5, input_keys=["n"])

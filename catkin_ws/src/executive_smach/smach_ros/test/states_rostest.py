@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""Section 9 of the specification: the states on actions, services and topics."""
+"""The states on actions, services and topics."""
 
 import os
 import signal
@@ -32,7 +32,7 @@ def action_state(goal, name="reference", **kwargs):
     return smach_ros.SimpleActionState(name, TestAction, goal=TestGoal(goal=goal), **kwargs)
 
 
-class TestSection9Action(unittest.TestCase):
+class TestActionState(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
         cls.server = ReferenceServer("reference")
@@ -41,17 +41,17 @@ class TestSection9Action(unittest.TestCase):
         self.server.goals.clear()
         self.ud = smach.UserData()
 
-    def test_s9_outcomes_and_constants(self):
+    def test_outcomes_and_constants(self):
         state = action_state(SUCCEED, outcomes=["extra"])
         self.assertEqual(state.get_registered_outcomes(), ("succeeded", "aborted", "preempted", "extra"))
         names = ("WAITING_FOR_SERVER", "INACTIVE", "ACTIVE", "PREEMPTING", "COMPLETED")
         self.assertEqual([getattr(state, name) for name in names], [0, 1, 2, 3, 4])
 
-    def test_s9_succeeded_and_aborted(self):
+    def test_succeeded_and_aborted(self):
         self.assertEqual(action_state(SUCCEED).execute(self.ud), "succeeded")
         self.assertEqual(action_state(ABORT).execute(self.ud), "aborted")
 
-    def test_s9_goal_key_slots_and_callback_in_this_order(self):
+    def test_goal_key_slots_and_callback_in_this_order(self):
         self.ud.whole, self.ud.goal = TestGoal(goal=ABORT), SUCCEED
         make = smach_ros.SimpleActionState
         state = make("reference", TestAction, goal=TestGoal(goal=DEAF), goal_key="whole")
@@ -75,7 +75,7 @@ class TestSection9Action(unittest.TestCase):
         self.assertEqual(state.execute(self.ud), "aborted")
         self.assertEqual(self.server.goals, [ABORT, SUCCEED, ABORT])
 
-    def test_s9_goal_cb_in_place_and_raising(self):
+    def test_goal_cb_in_place_and_raising(self):
         def in_place(ud, goal):
             goal.goal = SUCCEED
 
@@ -90,7 +90,7 @@ class TestSection9Action(unittest.TestCase):
         state = smach_ros.SimpleActionState("reference", TestAction, goal_cb=lambda ud, goal: "text")
         self.assertEqual(state.execute(self.ud), "aborted", "no goal")
 
-    def test_s9_result_key_slots_and_callback(self):
+    def test_result_key_slots_and_callback(self):
         got = []
 
         @smach.cb_interface(outcomes=["special"], output_keys=["own"])
@@ -105,7 +105,7 @@ class TestSection9Action(unittest.TestCase):
         self.assertEqual(got, [(GoalStatus.SUCCEEDED, 101)])
         self.assertEqual((self.ud.own, self.ud.whole.result, self.ud.result), (1, 101, 101))
 
-    def test_s9_result_cb_unregistered_raising_and_with_arguments(self):
+    def test_result_cb_unregistered_raising_and_with_arguments(self):
         self.assertEqual(action_state(SUCCEED, result_cb=lambda *a: "nothing").execute(self.ud), "aborted")
         self.assertEqual(action_state(SUCCEED, result_cb=lambda *a: 1 / 0).execute(self.ud), "aborted")
         got = []
@@ -118,7 +118,7 @@ class TestSection9Action(unittest.TestCase):
         self.assertEqual(state.execute(self.ud), "succeeded")
         self.assertEqual(got, [(1, 2)])
 
-    def test_s9_bad_construction(self):
+    def test_bad_construction(self):
         for wrong in (
             {"goal": lambda: 1},
             {"goal_slots": ["nothing"]},
@@ -129,7 +129,7 @@ class TestSection9Action(unittest.TestCase):
             with self.assertRaises(smach.InvalidStateError):
                 smach_ros.SimpleActionState("reference", TestAction, **wrong)
 
-    def test_s9_preempted_cancels_the_goal(self):
+    def test_preempted_cancels_the_goal(self):
         state = action_state(UNTIL_CANCELLED)
         run = in_thread(state.execute, self.ud)
         self.assertTrue(wait_for(lambda: self.server.goals == [UNTIL_CANCELLED]))
@@ -138,7 +138,7 @@ class TestSection9Action(unittest.TestCase):
         self.assertEqual(run.result, "preempted")
         self.assertFalse(state.preempt_requested())
 
-    def test_s9_s15_1_preempted_right_after_the_goal_was_sent(self):
+    def test_preempted_right_after_the_goal_was_sent(self):
         for delay in [0.0, 0.0005, 0.002, 0.005, 0.01] * 8:
             state = action_state(UNTIL_CANCELLED)
             run = in_thread(state.execute, self.ud)
@@ -148,14 +148,14 @@ class TestSection9Action(unittest.TestCase):
             run.join(LIMIT)
             self.assertEqual(run.result, "preempted", f"{delay} s after the goal")
 
-    def test_s9_preempted_before_the_start_sends_nothing(self):
+    def test_preempted_before_the_start_sends_nothing(self):
         state = action_state(SUCCEED)
         state.request_preempt()
         self.assertEqual(state.execute(self.ud), "preempted")
         self.assertEqual(self.server.goals, [])
         self.assertEqual(state.execute(self.ud), "succeeded")
 
-    def test_s15_2_cancelled_but_succeeded_does_not_poison_the_next_run_better(self):
+    def test_cancelled_but_succeeded_does_not_poison_the_next_run_better(self):
         state = action_state(SUCCEED_WHEN_CANCELLED)
         run = in_thread(state.execute, self.ud)
         self.assertTrue(wait_for(lambda: self.server.goals))
@@ -165,7 +165,7 @@ class TestSection9Action(unittest.TestCase):
         state._goal = TestGoal(goal=SUCCEED)
         self.assertEqual(state.execute(self.ud), "succeeded")
 
-    def test_s15_2_cancelled_but_succeeded_the_machine_carries_the_request_on(self):
+    def test_cancelled_but_succeeded_the_machine_carries_the_request_on(self):
         machine = smach.StateMachine(["done", "preempted", "aborted"])
         with machine:
             smach.StateMachine.add("ACT", action_state(SUCCEED_WHEN_CANCELLED), {"succeeded": "NEXT"})
@@ -177,14 +177,14 @@ class TestSection9Action(unittest.TestCase):
         self.assertEqual(run.result, "preempted")
         self.assertEqual(self.server.goals, [SUCCEED_WHEN_CANCELLED])
 
-    def test_s9_exec_timeout_cancels_and_aborts(self):
+    def test_exec_timeout_cancels_and_aborts(self):
         before = self.server.cancelled
         state = action_state(UNTIL_CANCELLED, exec_timeout=rospy.Duration(0.3))
         self.assertEqual(state.execute(self.ud), "aborted")
         self.assertEqual(self.server.cancelled, before + 1)
         self.assertFalse(state.preempt_requested())
 
-    def test_s9_s15_3_preempt_timeout_gives_up_better(self):
+    def test_preempt_timeout_gives_up_better(self):
         for how in ("exec_timeout", "request"):
             state = action_state(DEAF, preempt_timeout=0.3, exec_timeout=0.2 if how == "exec_timeout" else None)
             run = in_thread(state.execute, self.ud)
@@ -198,11 +198,11 @@ class TestSection9Action(unittest.TestCase):
             self.server.release.clear()
             self.server.goals.clear()
 
-    def test_s9_no_server(self):
+    def test_no_server(self):
         state = action_state(SUCCEED, name="nobody", server_wait_timeout=rospy.Duration(0.3))
         self.assertEqual(state.execute(self.ud), "aborted")
 
-    def test_s9_waiting_for_the_server_is_preemptible(self):
+    def test_waiting_for_the_server_is_preemptible(self):
         state = action_state(SUCCEED, name="nobody")
         run = in_thread(state.execute, self.ud)
         time.sleep(0.1)
@@ -210,7 +210,7 @@ class TestSection9Action(unittest.TestCase):
         run.join(LIMIT)
         self.assertEqual(run.result, "preempted")
 
-    def test_s15_3_the_server_dies_better(self):
+    def test_the_server_dies_better(self):
         process = subprocess.Popen([sys.executable, os.path.join(HERE, "reference_server.py"), "mortal"])
         try:
             state = action_state(UNTIL_CANCELLED, name="mortal")

@@ -1,4 +1,4 @@
-"""Sections 0 and 13: names, modules, signatures, and what importing smach_ros does. No roscore."""
+"""Names, modules, signatures, and what importing smach_ros does. No roscore."""
 
 import importlib
 import inspect
@@ -48,11 +48,11 @@ SIGNATURES = {
 
 
 @pytest.mark.parametrize("function, names", SIGNATURES.items(), ids=lambda v: getattr(v, "__qualname__", ""))
-def test_s13_signatures(function, names):
+def test_signatures(function, names):
     assert list(inspect.signature(function).parameters) == names.split()
 
 
-def test_s13_defaults():
+def test_defaults():
     def default(function, name):
         return inspect.signature(function).parameters[name].default
 
@@ -71,13 +71,13 @@ def test_s13_defaults():
     ]
 
 
-def test_s0_submodules():
+def test_submodules():
     for name in """util introspection simple_action_state service_state monitor_state
             condition_state action_server_wrapper""".split():
         assert importlib.import_module(f"smach_ros.{name}").__doc__
 
 
-def test_s0_importing_smach_ros_redirects_log_and_shutdown_check():
+def test_importing_smach_ros_redirects_log_and_shutdown_check():
     code = (
         "import rospy, smach, smach_ros;"
         "assert (smach.loginfo, smach.logwarn, smach.logdebug, smach.logerr) =="
@@ -87,12 +87,12 @@ def test_s0_importing_smach_ros_redirects_log_and_shutdown_check():
     subprocess.run([sys.executable, "-c", code], check=True, timeout=60)
 
 
-def test_s0_the_core_does_not_import_ros():
+def test_the_core_does_not_import_ros():
     code = "import sys, smach; assert not {'rospy', 'genpy', 'roslib'} & set(sys.modules)"
     subprocess.run([sys.executable, "-c", code], check=True, timeout=60)
 
 
-def test_s0_manifest_loads_and_version_is_2_5():
+def test_manifest_loads_and_version_is_2_5():
     import roslib
     import rospkg
 
@@ -101,7 +101,7 @@ def test_s0_manifest_loads_and_version_is_2_5():
         assert rospkg.RosPack().get_manifest(name).version.startswith("2.5.")
 
 
-def test_s12_the_beat_spares_a_viewer_that_has_just_connected():
+def test_the_beat_spares_a_viewer_that_has_just_connected():
     beat = _Beat(100.0, 2.0)
     beat.done(100.0)
     assert beat.due == 102.0
@@ -113,7 +113,7 @@ def test_s12_the_beat_spares_a_viewer_that_has_just_connected():
     assert beat.due == pytest.approx(beat.last + 0.1 + WELCOME_DELAY)
 
 
-def test_s12_a_stream_of_new_viewers_does_not_hold_up_the_beat():
+def test_a_stream_of_new_viewers_does_not_hold_up_the_beat():
     beat, now, beats = _Beat(0.0, 2.0), 0.0, []
     beat.done(now)
     while now < 35.0:
@@ -125,7 +125,7 @@ def test_s12_a_stream_of_new_viewers_does_not_hold_up_the_beat():
     assert len(beats) >= 8
 
 
-def test_s11_beats_that_were_missed_are_not_made_up_for():
+def test_beats_that_were_missed_are_not_made_up_for():
     beat = _Beat(0.0, 2.0)
     beat.done(1000.0)
     assert beat.due == 1002.0

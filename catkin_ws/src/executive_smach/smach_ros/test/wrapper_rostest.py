@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""Section 9 of the specification: a machine as an action server."""
+"""A machine as an action server."""
 
 import os
 import sys
@@ -51,7 +51,7 @@ class Work(smach.State):
         return {SUCCEED: "succeeded", ABORT: "aborted"}.get(goal, "other")
 
 
-class TestSection9Wrapper(unittest.TestCase):
+class TestWrapper(unittest.TestCase):
     count = 0
 
     def serve(self, machine, **kwargs):
@@ -76,7 +76,7 @@ class TestSection9Wrapper(unittest.TestCase):
         self.assertTrue(client.wait_for_result(rospy.Duration(LIMIT)))
         return client.get_state(), client.get_result().result if client.get_result() else None
 
-    def test_s9_wrapper_outcomes(self):
+    def test_wrapper_outcomes(self):
         client = self.serve(self.machine())
         self.assertEqual(self.send(client, SUCCEED), (GoalStatus.SUCCEEDED, 1000 + SUCCEED))
         self.assertEqual(self.send(client, ABORT), (GoalStatus.ABORTED, 1000 + ABORT))
@@ -84,7 +84,7 @@ class TestSection9Wrapper(unittest.TestCase):
         self.assertEqual(self.send(client, 99)[0], GoalStatus.ABORTED, "an error")
         self.assertEqual(self.send(client, SUCCEED)[0], GoalStatus.SUCCEEDED, "works after an error")
 
-    def test_s9_wrapper_cancel_and_s15_2_nothing_left_over(self):
+    def test_wrapper_cancel_and_nothing_left_over(self):
         state = Work()
         client = self.serve(self.machine(state))
         for _ in range(5):
@@ -97,14 +97,14 @@ class TestSection9Wrapper(unittest.TestCase):
             self.assertEqual(self.send(client, SUCCEED)[0], GoalStatus.SUCCEEDED)
         self.assertFalse(any(asked for goal, asked in state.seen if goal == SUCCEED))
 
-    def test_s9_wrapper_a_new_goal_preempts_the_old(self):
+    def test_wrapper_a_new_goal_preempts_the_old(self):
         state = Work()
         client = self.serve(self.machine(state))
         client.send_goal(TestGoal(goal=UNTIL_CANCELLED))
         self.assertTrue(wait_for(lambda: state.seen))
         self.assertEqual(self.send(client, SUCCEED)[0], GoalStatus.SUCCEEDED)
 
-    def test_s9_wrapper_slots_and_feedback(self):
+    def test_wrapper_slots_and_feedback(self):
         machine = smach.StateMachine(["succeeded", "aborted", "preempted"], ["n"], ["m", "result"])
 
         @smach.cb_interface(outcomes=["ok"], input_keys=["n"], output_keys=["action_feedback", "m"])
@@ -122,7 +122,7 @@ class TestSection9Wrapper(unittest.TestCase):
         self.assertEqual(state, (GoalStatus.SUCCEEDED, 42))
         self.assertTrue(wait_for(lambda: got == [22]))
 
-    def test_s9_wrapper_expand_and_pack(self):
+    def test_wrapper_expand_and_pack(self):
         machine = smach.StateMachine(["succeeded", "aborted", "preempted"], ["goal"], ["result"])
 
         @smach.cb_interface(outcomes=["succeeded"], input_keys=["goal"], output_keys=["result"])
@@ -135,7 +135,7 @@ class TestSection9Wrapper(unittest.TestCase):
         client = self.serve(machine, expand_goal_slots=True, pack_result_slots=True)
         self.assertEqual(self.send(client, 1), (GoalStatus.SUCCEEDED, 6))
 
-    def test_s9_wrapper_a_fresh_result_is_there_to_be_filled_in(self):
+    def test_wrapper_a_fresh_result_is_there_to_be_filled_in(self):
         """As the machines of others do it: the result is an input and an output key."""
 
         def fill(ud):
@@ -153,7 +153,7 @@ class TestSection9Wrapper(unittest.TestCase):
             self.assertEqual(self.send(client, goal), (GoalStatus.SUCCEEDED, 40 + goal))
         self.assertEqual(seen, [0, 0], "no goal sees the result of another")
 
-    def test_s9_wrapper_bad_slots(self):
+    def test_wrapper_bad_slots(self):
         with self.assertRaises(smach.InvalidStateError):
             smach_ros.ActionServerWrapper("x", TestAction, self.machine(), goal_slots_map={"nothing": "n"})
 

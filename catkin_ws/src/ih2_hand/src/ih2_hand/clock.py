@@ -23,7 +23,7 @@ class SteadyClock:
     sleep = staticmethod(time.sleep)
 
 
-class VirtualClock:
+class SteppedClock:
     """A clock that moves only when somebody sleeps on it."""
 
     def __init__(self, start: float = 0.0):

@@ -9,6 +9,7 @@
 #include "coglab_rt/interpolator.hpp"
 #include "coglab_rt/joint_limits.hpp"
 #include "coglab_rt/real_time.hpp"
+#include "coglab_rt/reason.hpp"
 
 namespace lwr_fri_bridge {
 
@@ -25,6 +26,7 @@ using coglab_rt::kJointNames;
 using coglab_rt::LossBudget;
 using coglab_rt::MotionBlock;
 using coglab_rt::planVelocity;
+using coglab_rt::ReasonCode;
 using coglab_rt::RobotSample;
 using coglab_rt::steadyNow;
 using coglab_rt::TripleBuffer;

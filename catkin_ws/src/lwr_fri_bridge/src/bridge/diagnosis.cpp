@@ -31,7 +31,7 @@ Diagnosis diagnoseConnection(const Snapshot& s, const FriThreadStatistics& threa
                                        "controller of this version?"
                                      : "; check cable, FRIHOST and FRISOCK (or friSetup) of the "
                                        "controller, and that its KRL program called friOpen";
-    return {Severity::Error, text};
+    return {Severity::Error, text, ReasonCode::RobotDisconnected};
   }
   const double cycle = s.sample.cycle_time;
   if (s.quality <= fri::Quality::Bad) {
@@ -51,12 +51,15 @@ Diagnosis diagnoseConnection(const Snapshot& s, const FriThreadStatistics& threa
       text +=
           "it needs 100 answered packets to judge; if it stays, look at the load of this computer";
     }
-    return {s.quality == fri::Quality::Unacceptable ? Severity::Error : Severity::Warning, text};
+    return {s.quality == fri::Quality::Unacceptable ? Severity::Error : Severity::Warning, text,
+            ReasonCode::PoorQuality};
   }
   if (!thread.last_foreign.empty()) {
-    return {Severity::Warning, "a second sender (" + thread.last_foreign +
-                                   ") uses the port and is ignored; the peer is " + thread.peer +
-                                   ": if that is not the robot controller, set controller_address"};
+    return {Severity::Warning,
+            "a second sender (" + thread.last_foreign +
+                ") uses the port and is ignored; the peer is " + thread.peer +
+                ": if that is not the robot controller, set controller_address",
+            ReasonCode::SecondSender};
   }
   return {Severity::Ok, std::string("quality ") + fri::nameOf(s.quality) + " from " + thread.peer +
                             number(", latency %.2f ms", 1e3 * s.latency) +
@@ -64,15 +67,25 @@ Diagnosis diagnoseConnection(const Snapshot& s, const FriThreadStatistics& threa
 }
 
 Diagnosis diagnoseArm(const Snapshot& s, double hot) {
-  if (s.supervisor == SupervisorState::Disconnected) return {Severity::Warning, "not connected"};
-  if (s.drive_error != 0) return {Severity::Error, "drive error: " + jointsIn(s.drive_error)};
+  if (s.supervisor == SupervisorState::Disconnected)
+    return {Severity::Warning, "not connected", ReasonCode::RobotDisconnected};
+  if (s.drive_error != 0)
+    return {Severity::Error, "drive error: " + jointsIn(s.drive_error), ReasonCode::DriveError};
   unsigned hot_joints = 0;
   for (unsigned i = 0; i < 7; ++i) hot_joints |= s.temperature[i] > hot ? 1U << i : 0U;
-  if (hot_joints != 0) return {Severity::Warning, "drives are hot: " + jointsIn(hot_joints)};
+  if (hot_joints != 0)
+    return {Severity::Warning, "drives are hot: " + jointsIn(hot_joints), ReasonCode::DriveWarning};
   if (s.drive_warning != 0)
-    return {Severity::Warning, "drive warning: " + jointsIn(s.drive_warning)};
+    return {Severity::Warning, "drive warning: " + jointsIn(s.drive_warning),
+            ReasonCode::DriveWarning};
   const std::string reason = reasonOf(s.sample.block, s.sample.blocking_joint, s.loss);
-  return {Severity::Ok, reason.empty() ? "motion is allowed" : reason};
+  return {Severity::Ok, reason.empty() ? "motion is allowed" : reason,
+          codeOf(s.sample.block, s.loss)};
+}
+
+ReasonCode codeOf(MotionBlock block, const CommandModeLoss& loss) {
+  const bool lost = block == MotionBlock::Monitor || block == MotionBlock::NotStarted;
+  return lost && loss.byComputer() ? ReasonCode::ComputerLate : codeOf(block);
 }
 
 std::string reasonOf(MotionBlock block, int joint, const CommandModeLoss& loss) {

@@ -14,6 +14,12 @@ double checkedTemperature(const ros::NodeHandle& nh) {
 
 unsigned char levelOf(Severity severity) { return static_cast<unsigned char>(severity); }
 
+/// The sentence, and beside it what it means for programs.
+void say(diagnostic_updater::DiagnosticStatusWrapper& status, const Diagnosis& diagnosis) {
+  status.summary(levelOf(diagnosis.severity), diagnosis.text);
+  status.add("reason_code", static_cast<int>(diagnosis.code));
+}
+
 }  // namespace
 
 BridgeDiagnostics::BridgeDiagnostics(BridgeRos& owner)
@@ -32,7 +38,7 @@ void BridgeDiagnostics::connection(diagnostic_updater::DiagnosticStatusWrapper& 
   const std::int64_t since = s.sample.stamp_ns != 0 ? s.sample.stamp_ns : owner_.started_ns_;
   const double silence = 1e-9 * static_cast<double>(steadyNow() - since);
   const Diagnosis d = diagnoseConnection(s, thread, owner_.fri_thread_.port(), silence);
-  status.summary(levelOf(d.severity), d.text);
+  say(status, d);
   status.add("port", owner_.fri_thread_.port());
   status.add("peer", thread.peer);
   status.add("controller_address", owner_.fri_thread_.controllerAddress());
@@ -66,7 +72,7 @@ void BridgeDiagnostics::connection(diagnostic_updater::DiagnosticStatusWrapper& 
 void BridgeDiagnostics::arm(diagnostic_updater::DiagnosticStatusWrapper& status) {
   const Snapshot s = owner_.bridge_.snapshot();
   const Diagnosis d = diagnoseArm(s, hot_);
-  status.summary(levelOf(d.severity), d.text);
+  say(status, d);
   status.add("supervisor", nameOf(s.supervisor));
   status.add("control mode reported", fri::nameOf(s.control));
   status.add("control mode wanted", fri::nameOf(s.mode.strategy));
@@ -84,8 +90,9 @@ void BridgeDiagnostics::commands(diagnostic_updater::DiagnosticStatusWrapper& st
   const Snapshot s = owner_.bridge_.snapshot();
   const TargetTopic::Refused refused = owner_.target_->refused();
   const std::uint64_t total = refused.total() + s.counters.commands_invalid;
-  status.summary(levelOf(total > refused_before_ ? Severity::Warning : Severity::Ok),
-                 total > refused_before_ ? "target velocities were refused" : "ok");
+  const Diagnosis refusals{Severity::Warning, "target velocities were refused",
+                           ReasonCode::CommandsRefused};
+  say(status, total > refused_before_ ? refusals : Diagnosis{Severity::Ok, "ok"});
   refused_before_ = total;
   status.add("refused: not valid", refused.invalid + s.counters.commands_invalid);
   status.add("refused: stamp missing, too old or from the future", refused.stamp);

@@ -3,6 +3,7 @@
 #include <coglab_msgs/ReasonCode.h>
 
 #include "coglab_rt/reason.hpp"
+#include "lwr_fri_bridge/bridge/diagnosis.hpp"
 
 namespace lwr_fri_bridge {
 namespace {
@@ -40,9 +41,7 @@ constexpr Row kOutcomes[] = {
 std::uint16_t reasonCode(MotionBlock block) { return static_cast<std::uint16_t>(codeOf(block)); }
 
 std::uint16_t reasonCode(MotionBlock block, const CommandModeLoss& loss) {
-  const bool lost = block == MotionBlock::Monitor || block == MotionBlock::NotStarted;
-  if (lost && loss.byComputer()) return Code::COMPUTER_LATE;
-  return reasonCode(block);
+  return static_cast<std::uint16_t>(codeOf(block, loss));
 }
 
 std::uint16_t reasonCode(OutcomeCode code) {

@@ -135,17 +135,18 @@ class ControllerManager : public MotionHost {
   Answer motionWelcome(const std::string& controller_id, const CycleReport& now) const;
 
   // MotionHost
-  MotionRequest beginRequest(const std::string& controller_id) override;
-  RobotSample robotSnapshot() const override { return report().robot; }
   std::int64_t now_ns() const override;
-  std::function<void()> cycleWait() const override;
   double planTimeout() const override { return settings_.plan_timeout; }
 
+ private:
+  // The rest of MotionHost is for plug-ins, which know the manager by that interface alone.
+  MotionRequest beginRequest(const std::string& controller_id) override;
+  RobotSample robotSnapshot() const override { return report().robot; }
+  std::function<void()> cycleWait() const override;
   /// Sentence for a plan that the cycle did not adopt; names the controller whose code the cycle is
   /// in.
   std::string notAdopted(PlanOutcome outcome) const override;
 
- private:
   Answer loadMotion(const std::string& id, const std::string& type, const Attach& attach,
                     std::unique_lock<std::mutex>& requests);
   Answer loadFeedback(const std::string& id, const std::string& type);

@@ -9,7 +9,8 @@
 
 namespace coglab_sim::plant {
 
-/// The object that is handed over, from the object database.
+/// The object that is handed over, from the object database. What stands here is that of
+/// coglab_objects/objects/mug.yaml, for programs that have no database; a test compares.
 struct Object {
   std::string id = "mug";
   double mass = 0.31;                          ///< kg, 0.01 .. 10

@@ -17,7 +17,7 @@ class VirtualLink:
     """A `transport.Transport` whose other end is an EmulatedHand.
 
     `to_hand` and `to_host` tamper with the bytes on their way. A read that finds too few bytes lets
-    its time-out pass on the clock, so that a VirtualClock makes silence cost nothing.
+    its time-out pass on the clock, so that a SteppedClock makes silence cost nothing.
     """
 
     def __init__(

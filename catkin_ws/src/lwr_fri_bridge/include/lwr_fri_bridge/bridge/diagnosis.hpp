@@ -15,6 +15,7 @@ enum class Severity : std::uint8_t { Ok = 0, Warning = 1, Error = 2 };
 struct Diagnosis {
   Severity severity = Severity::Ok;
   std::string text;
+  ReasonCode code = ReasonCode::None;  ///< what the text means, for programs
 };
 
 /// Connection: silence, quality, latency, losses, a second sender, with a hint what to do. `port`
@@ -29,5 +30,8 @@ Diagnosis diagnoseArm(const Snapshot& snapshot, double hot);
 /// Why motion is not allowed at the moment, in words, naming the joint if one is the reason, and
 /// how command mode was lost if it was; empty if motion is allowed.
 std::string reasonOf(MotionBlock block, int joint, const CommandModeLoss& loss = {});
+
+/// The same as a number: None if motion is allowed.
+ReasonCode codeOf(MotionBlock block, const CommandModeLoss& loss);
 
 }  // namespace lwr_fri_bridge

@@ -1,10 +1,10 @@
-"""Section 5 of the specification: preemption of machines; complaints 1 and 2 of section 15."""
+"""Preemption of machines: no request is lost, and none is left over for the next run."""
 
 import smach
 from machine_parts import Calls, Ignores, Says, Serves, in_thread, machine
 
 
-def test_s5_served():
+def test_served():
     state = Serves(patience=10)
     sm = machine(state)
     run = in_thread(sm.execute)
@@ -15,14 +15,14 @@ def test_s5_served():
     assert not sm.preempt_requested() and not state.preempt_requested()
 
 
-def test_s5_ignored_at_the_terminal_state_the_flag_stays_for_the_parent():
+def test_ignored_at_the_terminal_state_the_flag_stays_for_the_parent():
     state = Ignores("done")
     sm = machine(state)
     state.machine = sm
     assert sm.execute() == "done" and sm.preempt_requested()
 
 
-def test_s5_ignored_the_next_state_sees_it_on_entry():
+def test_ignored_the_next_state_sees_it_on_entry():
     first, second = Ignores("done"), Serves()
     sm = machine(first, second)
     first.machine = sm
@@ -30,7 +30,7 @@ def test_s5_ignored_the_next_state_sees_it_on_entry():
     assert second.seen == [True] and not first.preempt_requested() and not sm.preempt_requested()
 
 
-def test_s5_served_then_the_next_state_is_normal():
+def test_served_then_the_next_state_is_normal():
     first, second = Serves(), Says("done")
     sm = machine(first, second, transitions={0: {"preempted": "S1"}})
     sm.request_preempt()
@@ -38,7 +38,7 @@ def test_s5_served_then_the_next_state_is_normal():
     assert first.seen == [True] and second.seen == [False] and not sm.preempt_requested()
 
 
-def test_s5_twice_in_one_run():
+def test_twice_in_one_run():
     class AskAgain(Serves):
         def execute(self, ud):
             result = super().execute(ud)
@@ -52,7 +52,7 @@ def test_s5_twice_in_one_run():
     assert second.seen == [True] and not sm.preempt_requested()
 
 
-def test_s5_before_the_start_the_first_state_sees_it():
+def test_before_the_start_the_first_state_sees_it():
     state = Serves()
     sm = machine(state)
     sm.request_preempt()
@@ -60,7 +60,7 @@ def test_s5_before_the_start_the_first_state_sees_it():
     assert sm.execute() == "done" and state.seen == [True, False]
 
 
-def test_s5_nested():
+def test_nested():
     leaf = Serves(patience=10)
     inner, after = machine(leaf), Says("done")
     outer = machine(inner, after)
@@ -72,7 +72,7 @@ def test_s5_nested():
     assert not any(s.preempt_requested() for s in (leaf, inner, outer))
 
 
-def test_s5_nested_and_ignored_is_carried_by_the_parent():
+def test_nested_and_ignored_is_carried_by_the_parent():
     leaf, after = Ignores("done"), Serves()
     inner = machine(leaf)
     outer = machine(inner, after)
@@ -81,7 +81,7 @@ def test_s5_nested_and_ignored_is_carried_by_the_parent():
     assert after.seen == [True] and not inner.preempt_requested() and not outer.preempt_requested()
 
 
-def test_s5_nested_with_concurrence():
+def test_nested_with_concurrence():
     leaf = Serves(patience=10)
     both = smach.Concurrence(["done", "preempted"], "done")
     with both:
@@ -95,7 +95,7 @@ def test_s5_nested_with_concurrence():
     assert run.result == "preempted" and not outer.preempt_requested()
 
 
-def test_s5_a_child_whose_request_preempt_raises_is_logged_and_the_request_kept(log):
+def test_a_child_whose_request_preempt_raises_is_logged_and_the_request_kept(log):
     class Broken(Says):
         def request_preempt(self):
             raise RuntimeError("no preempt here")
@@ -107,11 +107,11 @@ def test_s5_a_child_whose_request_preempt_raises_is_logged_and_the_request_kept(
     assert "no preempt here" in log.text("error")
 
 
-def test_s5_there_is_no_built_in_preempted_outcome():
+def test_there_is_no_built_in_preempted_outcome():
     assert smach.StateMachine(["done"]).get_registered_outcomes() == ("done",)
 
 
-def test_s15_2_an_ignored_request_does_not_poison_the_next_run_better():
+def test_an_ignored_request_does_not_poison_the_next_run_better():
     state = Ignores("done")
     sm = machine(state)
     state.machine = sm
@@ -121,7 +121,7 @@ def test_s15_2_an_ignored_request_does_not_poison_the_next_run_better():
     assert state.seen == [False, False] and not sm.preempt_requested()
 
 
-def test_s15_2_an_ignored_request_in_a_nested_machine_does_not_poison_better():
+def test_an_ignored_request_in_a_nested_machine_does_not_poison_better():
     leaf = Ignores("done")
     inner = machine(leaf)
     outer = machine(inner)
@@ -132,7 +132,7 @@ def test_s15_2_an_ignored_request_in_a_nested_machine_does_not_poison_better():
     assert leaf.seen == [False] * 3
 
 
-def test_s15_1_a_request_after_a_run_is_for_the_next_run():
+def test_a_request_after_a_run_is_for_the_next_run():
     state = Ignores("done")
     sm = machine(state)
     state.machine = sm
@@ -143,7 +143,7 @@ def test_s15_1_a_request_after_a_run_is_for_the_next_run():
     assert state.seen == [False, True]
 
 
-def test_s15_1_a_request_by_assignment_to_the_private_flag_counts():
+def test_a_request_by_assignment_to_the_private_flag_counts():
     state = Serves()
     sm = machine(state)
     sm._preempt_requested = True
@@ -151,7 +151,7 @@ def test_s15_1_a_request_by_assignment_to_the_private_flag_counts():
     assert sm.execute() == "done"
 
 
-def test_s15_2_a_leaf_asked_directly_keeps_no_flag_after_its_run_better():
+def test_a_leaf_asked_directly_keeps_no_flag_after_its_run_better():
     leaf = Says("done")
     sm = machine(leaf)
     leaf.request_preempt()
@@ -159,21 +159,21 @@ def test_s15_2_a_leaf_asked_directly_keeps_no_flag_after_its_run_better():
     assert leaf.seen == [True, False]
 
 
-def test_s15_1_a_request_between_two_states_reaches_the_second():
+def test_a_request_between_two_states_reaches_the_second():
     first, second = Says("done"), Serves()
     sm = machine(first, second)
     sm.register_transition_cb(lambda ud, labels: sm.request_preempt())
     assert sm.execute() == "preempted" and second.seen == [True]
 
 
-def test_s15_1_a_request_in_the_start_callback_reaches_the_first_state():
+def test_a_request_in_the_start_callback_reaches_the_first_state():
     first = Serves()
     sm = machine(first)
     sm.register_start_cb(lambda ud, labels: sm.request_preempt())
     assert sm.execute() == "preempted" and first.seen == [True]
 
 
-def test_s15_2_flags_are_down_after_an_error_and_the_next_run_is_normal():
+def test_flags_are_down_after_an_error_and_the_next_run_is_normal():
     state = Calls(lambda ud: sm.request_preempt() or 1 / 0)
     sm = machine(state)
     try:
@@ -185,7 +185,7 @@ def test_s15_2_flags_are_down_after_an_error_and_the_next_run_is_normal():
     assert sm.execute() == "done" and seen == [False] and not sm.preempt_requested()
 
 
-def test_s15_2_recall_before_the_start():
+def test_recall_before_the_start():
     state = Serves()
     sm = machine(state)
     sm.request_preempt(), sm.recall_preempt()

@@ -1,4 +1,4 @@
-"""Section 7 of the specification: preemption, shutdown and errors of a Concurrence."""
+"""Preemption, shutdown and errors of a Concurrence."""
 
 import os
 import pickle
@@ -13,7 +13,7 @@ import smach
 from machine_parts import ALL_DONE, Calls, Ignores, Says, Serves, concurrence, in_thread, machine, wait_for
 
 
-def test_s7_preempt_served_by_all():
+def test_preempt_served_by_all():
     children = {"A": Serves(patience=20), "B": Serves(patience=20)}
     both = concurrence(children=children, outcome_map=ALL_DONE)
     run = in_thread(both.execute)
@@ -24,13 +24,13 @@ def test_s7_preempt_served_by_all():
     assert not any(child.preempt_requested() for child in children.values())
 
 
-def test_s7_preempt_served_gives_preempted_even_unregistered():
+def test_preempt_served_gives_preempted_even_unregistered():
     both = concurrence(outcomes=["done"], default="done", children={"A": Serves(patience=20)})
     both.request_preempt()
     assert both.execute() == "preempted"
 
 
-def test_s7_preempt_ignored_by_one(log):
+def test_preempt_ignored_by_one(log):
     stubborn = Ignores("done")
     both = concurrence(children={"A": Serves(patience=20), "B": stubborn}, outcome_map=ALL_DONE)
     stubborn.machine = both
@@ -39,7 +39,7 @@ def test_s7_preempt_ignored_by_one(log):
     assert "'B'" in log.text("warn")
 
 
-def test_s7_preempt_ignored_is_carried_by_the_machine_around():
+def test_preempt_ignored_is_carried_by_the_machine_around():
     stubborn, after = Ignores("done"), Serves()
     both = concurrence(outcomes=["done"], default="done", children={"B": stubborn})
     outer = machine(both, after)
@@ -48,7 +48,7 @@ def test_s7_preempt_ignored_is_carried_by_the_machine_around():
 
 
 @pytest.mark.parametrize("moment", ["before", "start_cb", "transition_cb"])
-def test_s7_a_request_before_or_during_the_start_reaches_every_child_better(moment):
+def test_a_request_before_or_during_the_start_reaches_every_child_better(moment):
     for _ in range(20):
         children = {"A": Serves(patience=20), "B": Serves(patience=20)}
         both = concurrence(children=children, outcome_map=ALL_DONE)
@@ -69,7 +69,7 @@ def test_s7_a_request_before_or_during_the_start_reaches_every_child_better(mome
         assert time.monotonic() - begun < 15  # not by patience
 
 
-def test_s15_2_ignored_requests_do_not_poison_the_next_run_better():
+def test_ignored_requests_do_not_poison_the_next_run_better():
     stubborn, polite = Ignores("done"), Serves()
     both = concurrence(children={"A": polite, "B": stubborn}, outcome_map=ALL_DONE)
     stubborn.machine = both
@@ -78,7 +78,7 @@ def test_s15_2_ignored_requests_do_not_poison_the_next_run_better():
     assert both.execute() == "done" and polite.seen[-1] is False and not both.preempt_requested()
 
 
-def test_s15_1_a_request_after_all_children_have_ended_is_carried_on():
+def test_a_request_after_all_children_have_ended_is_carried_on():
     both = concurrence(children={"A": Says("done")}, outcome_map={"done": {"A": "done"}})
     both._outcome_cb = lambda outcomes: both.request_preempt()
     assert both.execute() == "done" and both.preempt_requested()
@@ -86,7 +86,7 @@ def test_s15_1_a_request_after_all_children_have_ended_is_carried_on():
 
 @pytest.mark.parametrize("moment", ["transition_cb", "child_termination_cb"])
 @pytest.mark.parametrize("whom", ["concurrence", "machine around"])
-def test_s7_a_request_when_the_last_child_has_just_ended_gives_preempted(moment, whom):
+def test_a_request_when_the_last_child_has_just_ended_gives_preempted(moment, whom):
     after = Serves()
 
     def ask():
@@ -105,7 +105,7 @@ def test_s7_a_request_when_the_last_child_has_just_ended_gives_preempted(moment,
     assert after.seen == [] and not both.preempt_requested() and not outer.preempt_requested()
 
 
-def test_s15_1_a_request_that_a_child_did_not_take_is_carried_on(log):
+def test_a_request_that_a_child_did_not_take_is_carried_on(log):
     class Deaf(Says):
         def request_preempt(self):
             raise OSError("deaf")
@@ -118,14 +118,14 @@ def test_s15_1_a_request_that_a_child_did_not_take_is_carried_on(log):
     assert "deaf" in log.text("error")
 
 
-def test_s7_s15_7_is_running_better():
+def test_is_running_better():
     seen = []
     both = concurrence(children={"A": Calls(lambda ud: seen.append(both.is_running()))})
     both.execute()
     assert seen == [True] and not both.is_running()
 
 
-def test_s7_set_initial_state_better(log):
+def test_set_initial_state_better(log):
     both = concurrence(children={"A": Says("done"), "B": Says("done")})
     ud = smach.UserData()
     ud.x = 1
@@ -135,7 +135,7 @@ def test_s7_set_initial_state_better(log):
     assert len(log.warn) == 1 and both.get_initial_states() == ["A", "B"]
 
 
-def test_s7_states_and_edges():
+def test_states_and_edges():
     seen = []
     first = threading.Event()
     both = concurrence(
@@ -153,7 +153,7 @@ def test_s7_states_and_edges():
     assert seen == [["B"]] and both.get_active_states() == []
 
 
-def test_s7_shutdown_takes_the_children_along_better():
+def test_shutdown_takes_the_children_along_better():
     children = {"A": Serves(patience=30), "B": Serves(patience=30)}
     both = concurrence(children=children)
     run = in_thread(both.execute)
@@ -163,7 +163,7 @@ def test_s7_shutdown_takes_the_children_along_better():
     assert not run.is_alive()
 
 
-def test_s7_ctrl_c_in_the_main_thread_takes_the_children_along_better():
+def test_ctrl_c_in_the_main_thread_takes_the_children_along_better():
     code = """
 import smach, machine_parts
 both = smach.Concurrence(["done", "preempted"], "done")
@@ -188,7 +188,7 @@ except KeyboardInterrupt:
         process.wait()
 
 
-def test_s7_too_few_threads_is_an_error_and_nothing_runs(monkeypatch):
+def test_too_few_threads_is_an_error_and_nothing_runs(monkeypatch):
     children = {"A": Says("done"), "B": Says("done")}
     both = concurrence(children=children)
     real, count = threading.Thread.start, []
@@ -207,12 +207,12 @@ def test_s7_too_few_threads_is_an_error_and_nothing_runs(monkeypatch):
     assert children["A"].runs == 0 and both.execute() == "failed"
 
 
-def test_s7_pickles():
+def test_pickles():
     both = concurrence(children={"A": Says("done"), "B": Says("done")}, outcome_map=ALL_DONE)
     assert pickle.loads(pickle.dumps(both)).execute() == "done"
 
 
-def test_s7_nested_concurrences():
+def test_nested_concurrences():
     inner = concurrence(children={"A": Says("done"), "B": Says("done")}, outcome_map=ALL_DONE)
     outer = concurrence(children={"A": inner, "B": Says("done")}, outcome_map=ALL_DONE)
     assert [outer.execute() for _ in range(20)] == ["done"] * 20

@@ -1,4 +1,4 @@
-"""Section 5 of the specification: StateMachine, without preemption."""
+"""StateMachine, without preemption."""
 
 import pickle
 
@@ -7,7 +7,7 @@ import smach
 from machine_parts import Calls, Raises, Says, machine
 
 
-def test_s5_first_added_is_initial_and_set_initial_state_wins():
+def test_first_added_is_initial_and_set_initial_state_wins():
     sm = machine(Says("done"), Says("done"))
     assert sm.get_initial_states() == ["S0"]
     other = smach.StateMachine(["done"])
@@ -19,13 +19,13 @@ def test_s5_first_added_is_initial_and_set_initial_state_wins():
     assert other["A"].runs == 0
 
 
-def test_s5_add_returns_the_state():
+def test_add_returns_the_state():
     state = Says("done")
     with smach.StateMachine(["done"]):
         assert smach.StateMachine.add("A", state) is state
 
 
-def test_s5_add_refuses_unknown_outcomes_and_taken_labels():
+def test_add_refuses_unknown_outcomes_and_taken_labels():
     with smach.StateMachine(["done"]) as sm:
         with pytest.raises(smach.InvalidTransitionError, match="nothing"):
             smach.StateMachine.add("A", Says("done"), {"nothing": "A"})
@@ -37,7 +37,7 @@ def test_s5_add_refuses_unknown_outcomes_and_taken_labels():
             smach.StateMachine.add("B", Says("done"), {"done": 3})
 
 
-def test_s5_two_adds_may_share_one_dict_which_stays_as_it_is_better():
+def test_two_adds_may_share_one_dict_which_stays_as_it_is_better():
     shared = {"done": "end"}
     with smach.StateMachine(["end", "x", "y"]) as sm:
         smach.StateMachine.add("A", Says("done", "x"), shared)
@@ -51,12 +51,12 @@ def test_s5_two_adds_may_share_one_dict_which_stays_as_it_is_better():
     ]
 
 
-def test_s5_outcomes_left_out_fall_through():
+def test_outcomes_left_out_fall_through():
     assert machine(Says("done")).execute() == "done"
     assert machine(Says("done"), transitions={0: {"done": None}}).execute() == "done"
 
 
-def test_s5_a_name_that_is_label_and_outcome_is_the_label():
+def test_a_name_that_is_label_and_outcome_is_the_label():
     with smach.StateMachine(["B", "done"]) as sm:
         smach.StateMachine.add("A", Says("ok"), {"ok": "B"})
         smach.StateMachine.add("B", Says("done"))
@@ -71,7 +71,7 @@ def test_s5_a_name_that_is_label_and_outcome_is_the_label():
         lambda: machine(Says("other")),
     ],
 )
-def test_s5_inconsistent_machines_are_logged_and_return_none(build, log):
+def test_inconsistent_machines_are_logged_and_return_none(build, log):
     sm = build()
     with pytest.raises(smach.InvalidTransitionError):
         sm.check_consistency()
@@ -79,7 +79,7 @@ def test_s5_inconsistent_machines_are_logged_and_return_none(build, log):
     assert "inconsistent" in log.text("error")
 
 
-def test_s5_unknown_initial_state_is_inconsistent():
+def test_unknown_initial_state_is_inconsistent():
     sm = machine(Says("done"))
     sm.set_initial_state(["nowhere"])
     with pytest.raises(smach.InvalidTransitionError, match="nowhere"):
@@ -87,7 +87,7 @@ def test_s5_unknown_initial_state_is_inconsistent():
     assert sm.execute() is None
 
 
-def test_s5_add_auto_connects_whatever_comes_next():
+def test_add_auto_connects_whatever_comes_next():
     with smach.StateMachine(["end"]) as sm:
         smach.StateMachine.add_auto("A", Says("a", "x"), ["a", "x"], {"x": "end"})
         smach.StateMachine.add("B", Says("b"), {"b": "C"})
@@ -98,14 +98,14 @@ def test_s5_add_auto_connects_whatever_comes_next():
     assert sm.execute() == "end"
 
 
-def test_s5_add_auto_refuses_unknown_connectors():
+def test_add_auto_refuses_unknown_connectors():
     with smach.StateMachine(["done"]) as sm:
         with pytest.raises(smach.InvalidStateError, match="nothing"):
             smach.StateMachine.add_auto("A", Says("done"), ["nothing"])
         assert sm.get_children() == {}
 
 
-def test_s5_constants_are_written_each_time():
+def test_constants_are_written_each_time():
     seen = []
     with smach.StateMachine(["done"]) as sm:
         state = Calls(lambda ud: seen.append(ud.c) or setattr(ud, "c", 0), io_keys=["c"])
@@ -114,24 +114,24 @@ def test_s5_constants_are_written_each_time():
     assert seen == [7, 7]
 
 
-def test_s5_execute_with_and_without_parent():
+def test_execute_with_and_without_parent():
     sm = machine(Says("done"))
     assert sm.execute() == sm.execute(None) == sm.execute(smach.UserData()) == "done"
     assert sm.execute(parent_ud=smach.UserData()) == "done"
 
 
-def test_s5_shutdown_between_states_returns_none():
+def test_shutdown_between_states_returns_none():
     second = Says("done")
     sm = machine(Calls(lambda ud: smach.set_shutdown_check(lambda: True)), second)
     assert sm.execute() is None and second.runs == 0 and not sm.is_running()
 
 
-def test_s5_shutdown_inside_nested_machines_is_no_error_better(log):
+def test_shutdown_inside_nested_machines_is_no_error_better(log):
     outer = machine(machine(Calls(lambda ud: smach.set_shutdown_check(lambda: True)), Says("done")))
     assert outer.execute() is None and log.error == []
 
 
-def test_s5_s15_7_is_running_only_inside():
+def test_is_running_only_inside():
     seen = []
     sm = machine(Calls(lambda ud: seen.append(sm.is_running())))
     sm.execute()
@@ -142,7 +142,7 @@ def test_s5_s15_7_is_running_only_inside():
     assert not broken.is_running() and broken.get_active_states() == ["None"]
 
 
-def test_s5_a_state_that_raises():
+def test_a_state_that_raises():
     with pytest.raises(smach.InvalidUserCodeError) as caught:
         machine(Raises(ValueError("deep reason"))).execute()
     text = str(caught.value)
@@ -150,7 +150,7 @@ def test_s5_a_state_that_raises():
     assert isinstance(caught.value.__cause__, ValueError)
 
 
-def test_s5_nesting_does_not_wrap_again():
+def test_nesting_does_not_wrap_again():
     inner = Raises(ValueError("reason"))
     with pytest.raises(smach.InvalidUserCodeError) as caught:
         machine(machine(machine(inner))).execute()
@@ -158,21 +158,21 @@ def test_s5_nesting_does_not_wrap_again():
 
 
 @pytest.mark.parametrize("outcome", [None, "unknown", 3, ["done"], {}])
-def test_s5_an_unregistered_outcome(outcome):
+def test_an_unregistered_outcome(outcome):
     with pytest.raises(smach.InvalidTransitionError, match="S0"):
         machine(Says(outcome, registered=["done"])).execute()
     with pytest.raises(smach.InvalidUserCodeError):
         machine(machine(Says(outcome, registered=["done"]))).execute()
 
 
-def test_s5_an_outcome_registered_after_add_falls_through():
+def test_an_outcome_registered_after_add_falls_through():
     state = Says("late", registered=["done"])
     sm = machine(state, outcomes=["done", "late"])
     state.register_outcomes(["late"])
     assert sm.execute() == "late"
 
 
-def test_s5_order_of_callbacks_and_output_keys():
+def test_order_of_callbacks_and_output_keys():
     events = []
     parent = smach.UserData()
     sm = machine(
@@ -188,7 +188,7 @@ def test_s5_order_of_callbacks_and_output_keys():
     assert parent.o == 1
 
 
-def test_s5_active_and_initial_states():
+def test_active_and_initial_states():
     seen = []
     sm = machine(Calls(lambda ud: seen.append(sm.get_active_states())))
     assert sm.get_active_states() == ["None"] and sm.get_initial_states() == ["S0"]
@@ -196,7 +196,7 @@ def test_s5_active_and_initial_states():
     assert seen == [["S0"]] and sm.get_active_states() == ["None"]
 
 
-def test_s5_set_initial_state(log):
+def test_set_initial_state(log):
     sm = machine(Says("done"), Says("done"))
     ud = smach.UserData()
     ud.x = 4
@@ -208,14 +208,14 @@ def test_s5_set_initial_state(log):
     assert sm["S0"].runs == 0
 
 
-def test_s5_pickles():
+def test_pickles():
     sm = machine(Says("done"), machine(Says("done")))
     sm.userdata.x = 1
     clone = pickle.loads(pickle.dumps(sm))
     assert clone.execute() == "done" and clone.userdata.x == 1
 
 
-def test_s5_user_data_nesting_and_remapping():
+def test_user_data_nesting_and_remapping():
     inner = smach.StateMachine(["done"], input_keys=["a"], output_keys=["b"])
     with inner:
         state = Calls(lambda ud: setattr(ud, "y", ud.x * 2), input_keys=["x"], output_keys=["y"])
@@ -227,7 +227,7 @@ def test_s5_user_data_nesting_and_remapping():
     assert outer.execute() == "done" and outer.userdata.second == 42
 
 
-def test_s5_two_runs_of_a_nested_machine_start_anew():
+def test_two_runs_of_a_nested_machine_start_anew():
     leaf = Says("done")
     inner = machine(leaf)
     outer = machine(inner, Says("again", "done"), transitions={1: {"again": "S0"}})

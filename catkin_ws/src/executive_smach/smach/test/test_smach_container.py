@@ -1,4 +1,4 @@
-"""Section 4 of the specification: construction, user data and callbacks of all containers."""
+"""Construction, user data and callbacks of all containers."""
 
 import threading
 
@@ -7,7 +7,7 @@ import smach
 from machine_parts import Calls, Raises, Says, in_thread, machine
 
 
-def test_s4_abstract_methods():
+def test_abstract_methods():
     container = smach.Container(["a"])
     for call in (
         lambda: container["x"],
@@ -22,7 +22,7 @@ def test_s4_abstract_methods():
             call()
 
 
-def test_s4_getitem_and_unknown_label():
+def test_getitem_and_unknown_label():
     state = Says("done")
     sm = machine(state)
     assert sm["S0"] is state
@@ -33,13 +33,13 @@ def test_s4_getitem_and_unknown_label():
             container["nothing"]
 
 
-def test_s4_user_data_is_kept_between_runs():
+def test_user_data_is_kept_between_runs():
     sm = machine(Calls(lambda ud: setattr(ud, "n", (ud.n if "n" in ud else 0) + 1), io_keys=["n"]))
     sm.execute(), sm.execute()
     assert sm.userdata.n == 2
 
 
-def test_s4_keys_are_copied_in_and_out():
+def test_keys_are_copied_in_and_out():
     sm = machine(
         Calls(lambda ud: setattr(ud, "o", ud.i + 1), input_keys=["i"], output_keys=["o"]),
         input_keys=["i"],
@@ -51,13 +51,13 @@ def test_s4_keys_are_copied_in_and_out():
     assert ud.o == 2 and sm.userdata._data == {"i": 1, "o": 2}
 
 
-def test_s4_a_missing_key_is_one_warning(log):
+def test_a_missing_key_is_one_warning(log):
     sm = machine(Says("done"), input_keys=["i"], output_keys=["o"])
     assert sm.execute(smach.UserData()) == "done"
     assert len(log.warn) == 2 and "'i'" in log.warn[0] and "'o'" in log.warn[1] and log.error == []
 
 
-def test_s4_output_keys_are_not_copied_after_an_error():
+def test_output_keys_are_not_copied_after_an_error():
     def run(ud):
         ud.o = 1
         raise ValueError("no")
@@ -69,7 +69,7 @@ def test_s4_output_keys_are_not_copied_after_an_error():
     assert "o" not in ud
 
 
-def test_s4_callbacks_get_the_containers_own_user_data_and_arguments():
+def test_callbacks_get_the_containers_own_user_data_and_arguments():
     calls = []
     sm = machine(Says("done"), Says("done"))
     sm.register_start_cb(lambda ud, states, x: calls.append(("start", ud, states, x)), [1])
@@ -83,7 +83,7 @@ def test_s4_callbacks_get_the_containers_own_user_data_and_arguments():
     ]
 
 
-def test_s4_a_callback_that_raises_is_logged_and_the_others_still_run_better(log):
+def test_a_callback_that_raises_is_logged_and_the_others_still_run_better(log):
     calls = []
 
     def bad(*args):
@@ -97,7 +97,7 @@ def test_s4_a_callback_that_raises_is_logged_and_the_others_still_run_better(log
     assert len(calls) == 3 and log.text("error").count("broken callback") >= 3
 
 
-def test_s4_end_callback_comes_in_every_case_with_the_container_idle_better():
+def test_end_callback_comes_in_every_case_with_the_container_idle_better():
     for state, outcome in ((Says("done"), "done"), (Raises(ValueError()), None)):
         sm = machine(state)
         seen = []
@@ -109,7 +109,7 @@ def test_s4_end_callback_comes_in_every_case_with_the_container_idle_better():
         assert seen == [(outcome, ["None"], False)]
 
 
-def test_s4_unregister_callback():
+def test_unregister_callback():
     calls = []
 
     def cb(*args):
@@ -123,7 +123,7 @@ def test_s4_unregister_callback():
         sm.register_start_cb("no function")
 
 
-def test_s4_open_close_and_stack():
+def test_open_close_and_stack():
     a, b = smach.StateMachine(["done"]), smach.StateMachine(["done"])
     a.open()
     assert a.is_opened() and smach.Container._construction_stack[-1] is a
@@ -137,7 +137,7 @@ def test_s4_open_close_and_stack():
         a.close()
 
 
-def test_s4_assert_opened():
+def test_assert_opened():
     sm = smach.StateMachine(["done"])
     with pytest.raises(smach.InvalidConstructionError, match="my words"):
         sm.assert_opened("my words")
@@ -146,13 +146,13 @@ def test_s4_assert_opened():
         smach.StateMachine.add("A", Says("done"))
 
 
-def test_s4_close_logs_inconsistency_and_does_not_raise(log):
+def test_close_logs_inconsistency_and_does_not_raise(log):
     with smach.StateMachine(["other"]):
         smach.StateMachine.add("A", Says("done"))
     assert "'done'" in log.text("error")
 
 
-def test_s4_opened_again_and_in_itself():
+def test_opened_again_and_in_itself():
     sm = smach.StateMachine(["done"])
     with sm:
         with sm:
@@ -163,7 +163,7 @@ def test_s4_opened_again_and_in_itself():
     assert list(sm.get_children()) == ["A", "B", "C"]
 
 
-def test_s4_with_gives_the_container_better_and_opened_too():
+def test_with_gives_the_container_better_and_opened_too():
     sm = smach.StateMachine(["done"])
     with sm as x:
         smach.StateMachine.add("A", Says("done"))
@@ -172,7 +172,7 @@ def test_s4_with_gives_the_container_better_and_opened_too():
     assert x is sm and y is sm
 
 
-def test_s4_a_with_block_that_raises_is_closed_better(log):
+def test_a_with_block_that_raises_is_closed_better(log):
     sm, inner = smach.StateMachine(["done"]), smach.StateMachine(["done"])
     with pytest.raises(ValueError):
         with sm:
@@ -185,7 +185,7 @@ def test_s4_a_with_block_that_raises_is_closed_better(log):
     assert other.result == "done"
 
 
-def test_s4_errors_already_logged_are_not_logged_again(log):
+def test_errors_already_logged_are_not_logged_again(log):
     with pytest.raises(smach.InvalidStateError):
         with smach.StateMachine(["done"]):
             smach.StateMachine.add("A", Says("done"))
@@ -193,7 +193,7 @@ def test_s4_errors_already_logged_are_not_logged_again(log):
     assert len(log.error) == 1
 
 
-def test_s4_add_needs_an_open_container_of_its_kind():
+def test_add_needs_an_open_container_of_its_kind():
     for add in (
         lambda: smach.StateMachine.add("A", Says("done")),
         lambda: smach.Concurrence.add("A", Says("done")),
@@ -213,7 +213,7 @@ def test_s4_add_needs_an_open_container_of_its_kind():
     assert sequence.execute() == "done"
 
 
-def test_s4_another_thread_cannot_add_to_an_open_container_better():
+def test_another_thread_cannot_add_to_an_open_container_better():
     with smach.StateMachine(["done"]) as sm:
         smach.StateMachine.add("A", Says("done"))
         other = in_thread(lambda: smach.StateMachine.add("B", Says("done")))
@@ -221,7 +221,7 @@ def test_s4_another_thread_cannot_add_to_an_open_container_better():
     assert isinstance(other.error, smach.InvalidStateError) and list(sm.get_children()) == ["A"]
 
 
-def test_s4_construction_in_many_threads():
+def test_construction_in_many_threads():
     results = []
     threads = [
         threading.Thread(target=lambda: results.append(machine(Says("done"), Says("done")).execute()))
@@ -231,7 +231,7 @@ def test_s4_construction_in_many_threads():
     assert results == ["done"] * 20
 
 
-def test_s4_what_is_no_state_is_refused_with_words():
+def test_what_is_no_state_is_refused_with_words():
     with smach.StateMachine(["done"]):
         for wrong in (None, "state", lambda ud: "done", Says):
             with pytest.raises(smach.InvalidStateError, match="'A'"):
@@ -248,7 +248,7 @@ def test_s4_what_is_no_state_is_refused_with_words():
         smach.StateMachine.add("A", Says("done"))
 
 
-def test_s4_running_twice_at_once_is_refused_better():
+def test_running_twice_at_once_is_refused_better():
     sm = machine(Calls(lambda ud: sm.execute()))
     with pytest.raises(smach.InvalidUserCodeError):
         sm.execute()

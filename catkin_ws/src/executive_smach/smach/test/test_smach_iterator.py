@@ -1,4 +1,4 @@
-"""Section 8 of the specification: Iterator."""
+"""Iterator."""
 
 import pickle
 
@@ -14,13 +14,13 @@ def iterator(state, it=(), outcomes=("done", "failed"), label="it_data", exhaust
     return result
 
 
-def test_s8_exhausted_outcome_is_added_and_the_callers_list_untouched_better():
+def test_exhausted_outcome_is_added_and_the_callers_list_untouched_better():
     outcomes = ["done"]
     each = smach.Iterator(outcomes, [], [])
     assert outcomes == ["done"] and each.get_registered_outcomes() == ("done", "exhausted")
 
 
-def test_s8_items_iterable_or_function_evaluated_each_time():
+def test_items_iterable_or_function_evaluated_each_time():
     got = []
     state = Calls(lambda ud: got.append(ud.x))
     assert iterator(state, [1, 2], label="x", loop_outcomes=["done"]).execute() == "exhausted"
@@ -29,7 +29,7 @@ def test_s8_items_iterable_or_function_evaluated_each_time():
     assert got == [1, 2, 3, 4, 3, 4]
 
 
-def test_s8_set_iteritems():
+def test_set_iteritems():
     got = []
     each = smach.Iterator(["done"], [], [], exhausted_outcome="done")
     with each:
@@ -40,37 +40,37 @@ def test_s8_set_iteritems():
     assert each.get_registered_outcomes() == ("done",)
 
 
-def test_s8_break_outcomes_given_all_others_loop():
+def test_break_outcomes_given_all_others_loop():
     state = Says("a", "b", "stop", registered=["a", "b", "stop"])
     each = iterator(state, range(10), outcomes=["stop"], break_outcomes=["stop"])
     assert each.execute() == "stop" and state.runs == 3
 
 
-def test_s8_loop_outcomes_given_all_others_break():
+def test_loop_outcomes_given_all_others_break():
     state = Says("go", "go", "stop", registered=["go", "stop", "x"])
     each = iterator(state, range(10), outcomes=["stop"], loop_outcomes=["go"])
     assert each.execute() == "stop" and state.runs == 3
 
 
-def test_s8_neither_given_breaks_after_the_first_item():
+def test_neither_given_breaks_after_the_first_item():
     state = Says("done")
     assert iterator(state, range(10)).execute() == "done" and state.runs == 1
 
 
-def test_s8_final_outcome_map():
+def test_final_outcome_map():
     state = Says("bad", registered=["ok", "bad"])
     each = iterator(state, range(3), loop_outcomes=["ok"], final_outcome_map={"bad": "failed"})
     assert each.execute() == "failed"
 
 
-def test_s8_the_child_gets_the_containers_user_data_itself():
+def test_the_child_gets_the_containers_user_data_itself():
     got = []
     each = iterator(Calls(lambda ud: got.append(ud)), [1], loop_outcomes=["done"])
     each.execute()
     assert got == [each.userdata]
 
 
-def test_s8_transition_callbacks_after_looping_items_only():
+def test_transition_callbacks_after_looping_items_only():
     seen = []
     each = iterator(
         Says("go", "go", "stop", registered=["go", "stop"]),
@@ -83,7 +83,7 @@ def test_s8_transition_callbacks_after_looping_items_only():
     assert seen == [["CHILD"]] * 2
 
 
-def test_s8_preempted_by_a_served_request():
+def test_preempted_by_a_served_request():
     state = Serves(patience=20)
     each = iterator(state, range(5), ["preempted"], loop_outcomes=["done"])
     run = in_thread(each.execute)
@@ -93,7 +93,7 @@ def test_s8_preempted_by_a_served_request():
     assert run.result == "preempted" and state.runs == 1 and not each.preempt_requested()
 
 
-def test_s8_an_ignored_request_ends_the_iteration_and_is_cleared():
+def test_an_ignored_request_ends_the_iteration_and_is_cleared():
     state = Ignores("done")
     each = iterator(state, range(5), loop_outcomes=["done"])
     state.machine = each
@@ -102,14 +102,14 @@ def test_s8_an_ignored_request_ends_the_iteration_and_is_cleared():
 
 
 @pytest.mark.parametrize("outcomes, wanted", [(["preempted"], "preempted"), (["x"], "exhausted")])
-def test_s8_a_loop_outcome_cut_short_is_no_foreign_outcome_better(outcomes, wanted):
+def test_a_loop_outcome_cut_short_is_no_foreign_outcome_better(outcomes, wanted):
     state = Ignores("go")
     each = iterator(state, range(5), outcomes, loop_outcomes=["go"])
     state.machine = each
     assert each.execute() == wanted
 
 
-def test_s8_a_request_before_the_start_reaches_the_child_better():
+def test_a_request_before_the_start_reaches_the_child_better():
     state = Serves()
     each = iterator(state, range(5), ["preempted"], loop_outcomes=["done"])
     each.request_preempt()
@@ -117,7 +117,7 @@ def test_s8_a_request_before_the_start_reaches_the_child_better():
     assert each.execute() == "exhausted" and state.runs == 6
 
 
-def test_s8_an_error_of_the_items_counts_as_exhausted(log):
+def test_an_error_of_the_items_counts_as_exhausted(log):
     def items():
         yield 1
         raise ValueError("no more")
@@ -127,26 +127,26 @@ def test_s8_an_error_of_the_items_counts_as_exhausted(log):
     assert state.runs == 1 and "no more" in log.text("error")
 
 
-def test_s8_a_child_that_raises():
+def test_a_child_that_raises():
     each = iterator(Raises(ValueError("reason")), [1], loop_outcomes=["done"])
     with pytest.raises(smach.InvalidUserCodeError, match="reason"):
         each.execute()
     assert not each.is_running() and each.get_active_states() == []
 
 
-def test_s8_a_child_with_an_unknown_outcome():
+def test_a_child_with_an_unknown_outcome():
     with pytest.raises(smach.InvalidTransitionError):
         iterator(Says(None, registered=["done"]), [1]).execute()
 
 
-def test_s8_items_that_cannot_be_had():
+def test_items_that_cannot_be_had():
     with pytest.raises(smach.InvalidUserCodeError):
         iterator(Says("done"), lambda: 1 / 0).execute()
     with pytest.raises(smach.InvalidUserCodeError):
         iterator(Says("done"), 3).execute()
 
 
-def test_s8_termination_callback_gets_the_label_after_the_output_keys():
+def test_termination_callback_gets_the_label_after_the_output_keys():
     seen, parent = [], smach.UserData()
     each = smach.Iterator(["done"], [], ["o"], [1], exhausted_outcome="done")
     with each:
@@ -156,12 +156,12 @@ def test_s8_termination_callback_gets_the_label_after_the_output_keys():
     assert each.execute(parent) == "done" and seen == [("C", "done", 5)]
 
 
-def test_s8_execute_with_none_and_without_argument():
+def test_execute_with_none_and_without_argument():
     each = iterator(Says("done"), [1])
     assert each.execute(None) == each.execute() == each.execute(smach.UserData()) == "done"
 
 
-def test_s8_edges_and_states():
+def test_edges_and_states():
     seen = []
     state = Calls(
         lambda ud: seen.append((each.get_active_states(), each.is_running())) or "go",
@@ -178,7 +178,7 @@ def test_s8_edges_and_states():
     assert seen == [(["CHILD"], True)] and each.get_active_states() == [] and not each.is_running()
 
 
-def test_s8_without_contained_state():
+def test_without_contained_state():
     each = smach.Iterator(["done"], [], [])
     with pytest.raises(smach.InvalidStateError):
         each.execute()
@@ -187,17 +187,17 @@ def test_s8_without_contained_state():
     assert each.get_children() == {} and each.get_internal_edges() == []
 
 
-def test_s8_in_a_machine_and_pickled():
+def test_in_a_machine_and_pickled():
     each = iterator(Says("done"), [1, 2], outcomes=["done"], exhausted="done", loop_outcomes=["done"])
     assert machine(pickle.loads(pickle.dumps(each))).execute() == "done"
 
 
-def test_s8_shutdown_ends_the_iteration_better():
+def test_shutdown_ends_the_iteration_better():
     state = Calls(lambda ud: smach.set_shutdown_check(lambda: True))
     assert iterator(state, range(5), loop_outcomes=["done"]).execute() is None
 
 
-def test_s8_set_initial_state_takes_user_data():
+def test_set_initial_state_takes_user_data():
     each = iterator(Says("done"), [1])
     ud = smach.UserData()
     ud.x = 2

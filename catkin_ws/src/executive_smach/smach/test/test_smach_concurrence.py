@@ -1,4 +1,4 @@
-"""Section 7 of the specification: Concurrence; complaints 1, 7 and 8 of section 15."""
+"""Concurrence: results, callbacks, and what ends it while a child hangs or raises."""
 
 import threading
 import time
@@ -19,17 +19,17 @@ from machine_parts import ALL_DONE, Calls, Raises, Says, Serves, concurrence, in
         {"child_termination_cb": 3},
     ],
 )
-def test_s7_bad_arguments(wrong):
+def test_bad_arguments(wrong):
     with pytest.raises(smach.InvalidStateError):
         smach.Concurrence(**{"outcomes": ["done"], "default_outcome": "done", **wrong})
 
 
-def test_s7_s15_7_no_child():
+def test_no_child():
     with pytest.raises(smach.InvalidStateError):
         smach.Concurrence(["done"], "done").execute()
 
 
-def test_s7_a_taken_label_is_refused_better():
+def test_a_taken_label_is_refused_better():
     with smach.Concurrence(["done"], "done"):
         smach.Concurrence.add("A", Says("done"))
         with pytest.raises(smach.InvalidStateError, match="'A'"):
@@ -37,7 +37,7 @@ def test_s7_a_taken_label_is_refused_better():
 
 
 @pytest.mark.parametrize("conditions", [{"A": "nothing"}, {"Z": "done"}])
-def test_s7_outcome_map_is_checked(conditions, log):
+def test_outcome_map_is_checked(conditions, log):
     both = concurrence(children={"A": Says("done")}, outcome_map={"done": conditions})
     assert "outcome_map" in log.text("error")
     with pytest.raises(smach.InvalidTransitionError):
@@ -46,7 +46,7 @@ def test_s7_outcome_map_is_checked(conditions, log):
         both.execute()
 
 
-def test_s7_children_run_in_named_threads_all_released_together():
+def test_children_run_in_named_threads_all_released_together():
     gate, names = threading.Barrier(3, timeout=10), []
 
     def run(ud):
@@ -60,7 +60,7 @@ def test_s7_children_run_in_named_threads_all_released_together():
     assert threading.active_count() == before
 
 
-def test_s7_children_share_user_data_through_remappers():
+def test_children_share_user_data_through_remappers():
     both = smach.Concurrence(["done"], "done", input_keys=["i"], output_keys=["o"])
     with both:
         smach.Concurrence.add(
@@ -73,7 +73,7 @@ def test_s7_children_share_user_data_through_remappers():
     assert both.execute(ud) == "done" and ud.o == 2
 
 
-def test_s7_transition_callbacks_at_each_childs_start_and_end():
+def test_transition_callbacks_at_each_childs_start_and_end():
     seen = []
     both = concurrence(children={"A": Says("done"), "B": Says("done")}, default="done")
     both.register_transition_cb(lambda ud, labels: seen.append(labels))
@@ -81,7 +81,7 @@ def test_s7_transition_callbacks_at_each_childs_start_and_end():
     assert len(seen) == 4 and seen[-1] == []
 
 
-def test_s7_start_and_termination_callbacks():
+def test_start_and_termination_callbacks():
     seen = []
     both = concurrence(children={"A": Says("done"), "B": Says("done")}, default="done")
     both.register_start_cb(lambda ud, labels: seen.append(labels))
@@ -90,7 +90,7 @@ def test_s7_start_and_termination_callbacks():
     assert seen == [["A", "B"], (["A", "B"], "done")]
 
 
-def test_s7_child_termination_cb_true_preempts_the_rest():
+def test_child_termination_cb_true_preempts_the_rest():
     slow = Serves(patience=20)
     calls = []
 
@@ -108,7 +108,7 @@ def test_s7_child_termination_cb_true_preempts_the_rest():
     assert not slow.preempt_requested() and not both.preempt_requested()
 
 
-def test_s7_child_termination_cb_a_list_is_taken_as_true():
+def test_child_termination_cb_a_list_is_taken_as_true():
     both = concurrence(
         children={"A": Says("done"), "B": Serves(patience=20), "C": Serves(patience=20)},
         child_termination_cb=lambda outcomes: ["B"],
@@ -117,7 +117,7 @@ def test_s7_child_termination_cb_a_list_is_taken_as_true():
     assert both.execute() == "done"
 
 
-def test_s7_child_termination_cb_false_waits():
+def test_child_termination_cb_false_waits():
     both = concurrence(
         children={"A": Says("done"), "B": Serves(patience=0.1)},
         outcome_map=ALL_DONE,
@@ -126,7 +126,7 @@ def test_s7_child_termination_cb_false_waits():
     assert both.execute() == "done"
 
 
-def test_s7_child_termination_cb_is_serialised():
+def test_child_termination_cb_is_serialised():
     inside, worst = [], []
 
     def ended(outcomes):
@@ -139,7 +139,7 @@ def test_s7_child_termination_cb_is_serialised():
     assert max(worst) == 1 and len(worst) == 8
 
 
-def test_s7_outcome_cb_comes_first():
+def test_outcome_cb_comes_first():
     got = []
     both = concurrence(
         children={"A": Says("done"), "B": Says("done")},
@@ -150,7 +150,7 @@ def test_s7_outcome_cb_comes_first():
 
 
 @pytest.mark.parametrize("value", [None, "", False])
-def test_s7_outcome_cb_without_an_answer_leaves_it_to_the_map(value):
+def test_outcome_cb_without_an_answer_leaves_it_to_the_map(value):
     both = concurrence(
         children={"A": Says("done"), "B": Says("done")},
         outcome_map=ALL_DONE,
@@ -159,7 +159,7 @@ def test_s7_outcome_cb_without_an_answer_leaves_it_to_the_map(value):
     assert both.execute() == "done"
 
 
-def test_s7_outcome_cb_non_string_is_logged_and_ignored(log):
+def test_outcome_cb_non_string_is_logged_and_ignored(log):
     both = concurrence(
         children={"A": Says("done"), "B": Says("done")},
         outcome_map=ALL_DONE,
@@ -168,18 +168,18 @@ def test_s7_outcome_cb_non_string_is_logged_and_ignored(log):
     assert both.execute() == "done" and "outcome_cb" in log.text("error")
 
 
-def test_s7_outcome_cb_is_not_checked_against_the_outcomes():
+def test_outcome_cb_is_not_checked_against_the_outcomes():
     assert concurrence(children={"A": Says("done")}, outcome_cb=lambda o: "anything").execute() == "anything"
 
 
-def test_s7_outcome_cb_that_raises():
+def test_outcome_cb_that_raises():
     both = concurrence(children={"A": Says("done")}, outcome_cb=lambda o: 1 / 0)
     with pytest.raises(smach.InvalidUserCodeError, match="ZeroDivisionError"):
         both.execute()
     assert not both.is_running()
 
 
-def test_s7_the_map_entry_with_most_conditions_wins():
+def test_the_map_entry_with_most_conditions_wins():
     both = concurrence(
         outcomes=["one", "two", "none"],
         default="none",
@@ -189,12 +189,12 @@ def test_s7_the_map_entry_with_most_conditions_wins():
     assert both.execute() == "two"
 
 
-def test_s7_default_outcome():
+def test_default_outcome():
     both = concurrence(children={"A": Says("done"), "B": Says("x", registered=["x", "done"])}, outcome_map=ALL_DONE)
     assert both.execute() == "failed"
 
 
-def test_s7_s15_7_a_child_that_raises_preempts_the_others_and_ends_the_container(capsys):
+def test_a_child_that_raises_preempts_the_others_and_ends_the_container(capsys):
     other = Serves(patience=20)
     both = concurrence(children={"A": Raises(ValueError("deep reason")), "B": other})
     with pytest.raises(smach.InvalidStateError, match="deep reason"):
@@ -207,14 +207,14 @@ def test_s7_s15_7_a_child_that_raises_preempts_the_others_and_ends_the_container
 
 
 @pytest.mark.parametrize("outcome", [None, "unknown", 7, []])
-def test_s7_a_child_without_a_valid_outcome_ends_the_container_better(outcome):
+def test_a_child_without_a_valid_outcome_ends_the_container_better(outcome):
     both = concurrence(children={"A": Says(outcome, registered=["done"]), "B": Serves(patience=20)})
     run = in_thread(both.execute)
     run.join(10)
     assert isinstance(run.error, smach.InvalidStateError) and "'A'" in str(run.error)
 
 
-def test_s7_child_termination_cb_that_raises_ends_the_container_better():
+def test_child_termination_cb_that_raises_ends_the_container_better():
     both = concurrence(
         children={"A": Says("done"), "B": Serves(patience=20)},
         child_termination_cb=lambda outcomes: 1 / 0,
@@ -225,7 +225,7 @@ def test_s7_child_termination_cb_that_raises_ends_the_container_better():
     assert not both.is_running()
 
 
-def test_s7_a_child_that_calls_exit_ends_the_container_better():
+def test_a_child_that_calls_exit_ends_the_container_better():
     run = in_thread(concurrence(children={"A": Raises(SystemExit()), "B": Serves(patience=20)}).execute)
     run.join(10)
     assert isinstance(run.error, smach.InvalidStateError)

@@ -1,4 +1,4 @@
-"""Sections 0 to 2 of the specification: packaging, errors and log, states."""
+"""Packaging, errors and log, states."""
 
 import importlib
 import io
@@ -9,7 +9,7 @@ import smach
 from smach.exceptions import SmachError
 
 
-def test_s0_public_names_and_submodules():
+def test_public_names_and_submodules():
     public = """State CBState Container StateMachine Sequence Concurrence Iterator UserData Remapper
         CBInterface cb_interface has_smach_interface InvalidTransitionError InvalidStateError
         InvalidConstructionError InvalidUserCodeError set_loggers loginfo logwarn logerr logdebug
@@ -20,24 +20,24 @@ def test_s0_public_names_and_submodules():
         importlib.import_module(f"smach.{name}")
 
 
-def test_s0_names_that_must_not_exist():
+def test_names_that_must_not_exist():
     assert not hasattr(smach, "SmachError")
     assert not any(hasattr(smach.StateMachine, name) for name in ("add_next",))
     assert not hasattr(smach.Sequence, "add_next")
 
 
-def test_s1_public_errors_derive_from_smach_error():
+def test_public_errors_derive_from_smach_error():
     for name in ("InvalidTransition", "InvalidState", "InvalidConstruction", "InvalidUserCode"):
         assert getattr(smach, f"{name}Error").__bases__ == (SmachError,)
     assert issubclass(SmachError, Exception)
 
 
-def test_s1_creating_an_error_logs_class_and_message(log):
+def test_creating_an_error_logs_class_and_message(log):
     smach.InvalidStateError("no such thing")
     assert log.error == ["InvalidStateError: no such thing"]
 
 
-def test_s1_set_loggers_order_and_lookup_at_call_time():
+def test_set_loggers_order_and_lookup_at_call_time():
     got = []
     smach.set_loggers(*[lambda m, level=level: got.append(level) for level in "iwde"])
     smach.loginfo("x"), smach.logwarn("x"), smach.logdebug("x"), smach.logerr("x")
@@ -47,7 +47,7 @@ def test_s1_set_loggers_order_and_lookup_at_call_time():
     assert got[-1] == "patched"
 
 
-def test_s1_default_loggers_print_with_a_prefix():
+def test_default_loggers_print_with_a_prefix():
     from smach import log
 
     module = importlib.util.module_from_spec(log.__spec__)
@@ -65,12 +65,12 @@ def test_s1_default_loggers_print_with_a_prefix():
     assert module.is_shutdown() is False
 
 
-def test_s1_set_shutdown_check():
+def test_set_shutdown_check():
     smach.set_shutdown_check(lambda: True)
     assert smach.is_shutdown() is True
 
 
-def test_s1_loggers_that_cannot_be_called_are_refused():
+def test_loggers_that_cannot_be_called_are_refused():
     before = smach.loginfo
     with pytest.raises(TypeError):
         smach.set_loggers(print, print, print, None)
@@ -79,7 +79,7 @@ def test_s1_loggers_that_cannot_be_called_are_refused():
     assert smach.loginfo is before
 
 
-def test_s2_outcomes_and_keys():
+def test_outcomes_and_keys():
     state = smach.State(["b", "a", "b"], ["i"], ["o"], ["x"])
     assert state.get_registered_outcomes() == ("b", "a")
     assert state.get_registered_input_keys() == ("i", "x")
@@ -93,12 +93,12 @@ def test_s2_outcomes_and_keys():
     assert state.get_registered_output_keys() == ("o", "x", "o2", "y")
 
 
-def test_s2_declared_order_is_stable_better():
+def test_declared_order_is_stable_better():
     names = [f"outcome_{i}" for i in range(50)]
     assert list(smach.State(names).get_registered_outcomes()) == names
 
 
-def test_s2_any_iterable_but_no_lone_string():
+def test_any_iterable_but_no_lone_string():
     assert smach.State(("a",), {"k": 1}).get_registered_input_keys() == ("k",)
     with pytest.raises(TypeError, match=r"\['done'\]"):
         smach.State("done")
@@ -106,7 +106,7 @@ def test_s2_any_iterable_but_no_lone_string():
         smach.State(outcomes=None)
 
 
-def test_s2_sets_of_outcomes_act_like_sets():
+def test_sets_of_outcomes_act_like_sets():
     state = smach.State(["a"])
     state._outcomes.add("b")
     state._outcomes |= {"c"}
@@ -120,12 +120,12 @@ def test_s2_sets_of_outcomes_act_like_sets():
     assert state.get_registered_outcomes() == ("a", "c")
 
 
-def test_s2_base_execute_is_not_implemented():
+def test_base_execute_is_not_implemented():
     with pytest.raises(NotImplementedError):
         smach.State(["a"]).execute(smach.UserData())
 
 
-def test_s2_preemption_flag():
+def test_preemption_flag():
     state = smach.State(["a"])
     assert state.preempt_requested() is False and state._preempt_requested is False
     for clear in (state.service_preempt, state.recall_preempt):
@@ -137,7 +137,7 @@ def test_s2_preemption_flag():
     assert state.preempt_requested()
 
 
-def test_s2_cb_state():
+def test_cb_state():
     def cb(ud, *args, **kwargs):
         ud.seen = (args, kwargs)
         return "yes"
@@ -147,7 +147,7 @@ def test_s2_cb_state():
     assert state.execute(ud) == "yes" and ud.seen == ((1, 2), {"k": 3})
 
 
-def test_s2_cb_state_merges_a_decorated_callback():
+def test_cb_state_merges_a_decorated_callback():
     @smach.cb_interface(outcomes=["a"], input_keys=["i"], output_keys=["o"])
     def cb(ud):
         return "a"
@@ -159,7 +159,7 @@ def test_s2_cb_state_merges_a_decorated_callback():
     assert state.execute(smach.UserData()) == "a"
 
 
-def test_s2_cb_interface():
+def test_cb_interface():
     @smach.cb_interface(outcomes=["a"], input_keys=["i"], output_keys=["o"])
     def cb(x):
         """Text."""
@@ -171,13 +171,13 @@ def test_s2_cb_interface():
     assert smach.cb_interface()(lambda: 1)() == 1
 
 
-def test_s2_cb_interface_io_keys_are_honoured_better():
+def test_cb_interface_io_keys_are_honoured_better():
     cb = smach.CBInterface(lambda: None, ["a"], ["i"], ["o"], ["x"])
     assert cb.get_registered_input_keys() == ("i", "x")
     assert cb.get_registered_output_keys() == ("o", "x")
 
 
-def test_s2_cb_interface_on_a_method_better():
+def test_cb_interface_on_a_method_better():
     class Robot:
         @smach.cb_interface(outcomes=["a"])
         def cb(self, ud):
@@ -187,6 +187,6 @@ def test_s2_cb_interface_on_a_method_better():
     assert robot.cb(3) == (robot, 3) and robot.cb.get_registered_outcomes() == ("a",)
 
 
-def test_s2_has_smach_interface():
+def test_has_smach_interface():
     assert smach.has_smach_interface(smach.State()) and smach.has_smach_interface(smach.CBInterface(print))
     assert not smach.has_smach_interface(print) and not smach.has_smach_interface(None)

@@ -1,4 +1,4 @@
-"""Section 3 of the specification: user data."""
+"""User data."""
 
 import copy
 import pickle
@@ -11,7 +11,7 @@ import smach
 from smach.user_data import Const
 
 
-def test_s3_attributes_and_items_are_the_same():
+def test_attributes_and_items_are_the_same():
     ud = smach.UserData()
     ud.a = 1
     ud["b"] = 2
@@ -19,7 +19,7 @@ def test_s3_attributes_and_items_are_the_same():
     assert "a" in ud and "c" not in ud and ud.keys() == ["a", "b"]
 
 
-def test_s3_missing_key_is_a_key_error_after_an_error_log(log):
+def test_missing_key_is_a_key_error_after_an_error_log(log):
     ud = smach.UserData()
     with pytest.raises(KeyError):
         ud.x  # noqa: B018
@@ -28,11 +28,11 @@ def test_s3_missing_key_is_a_key_error_after_an_error_log(log):
     assert len(log.error) == 2
 
 
-def test_s3_hasattr_is_false_better():
+def test_hasattr_is_false_better():
     assert not hasattr(smach.UserData(), "x")
 
 
-def test_s3_underscore_names_are_real_attributes():
+def test_underscore_names_are_real_attributes():
     ud = smach.UserData()
     ud._mine = 1
     assert ud._mine == 1 and "_mine" not in ud
@@ -40,14 +40,14 @@ def test_s3_underscore_names_are_real_attributes():
         ud._other  # noqa: B018
 
 
-def test_s3_update():
+def test_update():
     a, b = smach.UserData(), smach.UserData()
     a.x, b.x, b.y = 1, 2, 3
     a.update(b)
     assert a._data == {"x": 2, "y": 3}
 
 
-def test_s3_no_deletion_length_or_iteration():
+def test_no_deletion_length_or_iteration():
     ud = smach.UserData()
     ud.x = 1
     with pytest.raises(AttributeError):
@@ -61,7 +61,7 @@ def test_s3_no_deletion_length_or_iteration():
     assert ud._data == {"x": 1}
 
 
-def test_s3_extract_and_merge_with_remapping():
+def test_extract_and_merge_with_remapping():
     ud = smach.UserData()
     ud.a, ud.b = [1], 2
     local = ud.extract(["a", "b"], {"x": "a"})
@@ -74,13 +74,13 @@ def test_s3_extract_and_merge_with_remapping():
         ud.extract(["nothing"], {})
 
 
-def test_s3_pickles_and_copies():
+def test_pickles_and_copies():
     ud = smach.UserData()
     ud.a = 1
     assert pickle.loads(pickle.dumps(ud)).a == 1 and copy.deepcopy(ud).a == 1
 
 
-def test_s3_s15_8_locked_makes_transactions_better():
+def test_locked_makes_transactions_better():
     ud = smach.UserData()
     ud.n = 0
     view = smach.Remapper(ud, ["n"], ["n"], {})
@@ -133,7 +133,7 @@ def view_of(value, outputs=()):
     return smach.Remapper(ud, ["v", "absent"], ["w", *outputs], {"w": "outer_w"}), ud
 
 
-def test_s3_remapper_undeclared_read_is_a_user_code_error():
+def test_remapper_undeclared_read_is_a_user_code_error():
     view, _ = view_of(1)
     for key in ("nothing", "w"):  # also keys that are only output keys
         with pytest.raises(smach.InvalidUserCodeError, match=key):
@@ -142,42 +142,42 @@ def test_s3_remapper_undeclared_read_is_a_user_code_error():
             getattr(view, key)
 
 
-def test_s3_remapper_declared_but_absent_is_a_key_error():
+def test_remapper_declared_but_absent_is_a_key_error():
     with pytest.raises(KeyError):
         view_of(1)[0].absent  # noqa: B018
 
 
-def test_s3_remapper_undeclared_write_is_logged_and_ignored(log):
+def test_remapper_undeclared_write_is_logged_and_ignored(log):
     view, ud = view_of(1)
     view.v = 2
     view["z"] = 3
     assert ud._data == {"v": 1} and len(log.error) == 2 and "'v'" in log.error[0]
 
 
-def test_s3_remapper_renames():
+def test_remapper_renames():
     view, ud = view_of(1)
     view.w = 5
     assert ud.outer_w == 5 and "w" not in ud
 
 
-def test_s3_remapper_contains():
+def test_remapper_contains():
     view, _ = view_of(1)
     view.w = 2
     assert "v" in view and "absent" not in view and "w" not in view and "nothing" not in view
 
 
-def test_s3_remapper_gives_the_very_object_without_dict():
+def test_remapper_gives_the_very_object_without_dict():
     for value in (3, 2.5, "s", [1], {"a": 1}, None, (1,)):
         assert view_of(value)[0].v is value
     assert view_of(list)[0].v is list
 
 
-def test_s3_remapper_wraps_instances_and_functions_in_const():
+def test_remapper_wraps_instances_and_functions_in_const():
     for value in (Thing(), lambda: 3):
         assert issubclass(type(view_of(value)[0].v), Const)
 
 
-def test_s3_remapper_io_key_gives_the_very_object():
+def test_remapper_io_key_gives_the_very_object():
     thing = Thing()
     view, _ = view_of(thing, outputs=["v"])
     assert view.v is thing
@@ -185,14 +185,14 @@ def test_s3_remapper_io_key_gives_the_very_object():
     assert thing.x == 9
 
 
-def test_s3_const_reads_recursively():
+def test_const_reads_recursively():
     const = view_of(Thing())[0].v
     assert const.x == 1 and const.inner.y == 2 and const["k"].z == 3
     assert issubclass(type(const.inner), Const) and issubclass(type(const["k"]), Const)
     assert const.items["k"].z == 3
 
 
-def test_s3_s15_8_const_refuses_assignment_and_del_better():
+def test_const_refuses_assignment_and_del_better():
     thing = Thing()
     const = view_of(thing)[0].v
     for target in (const, const.inner):
@@ -211,7 +211,7 @@ def test_s3_s15_8_const_refuses_assignment_and_del_better():
     assert writable.data == {}
 
 
-def test_s3_const_forwards_calls_comparison_text_and_kind_better():
+def test_const_forwards_calls_comparison_text_and_kind_better():
     const = view_of(Thing())[0].v
     assert const.double() == 2 and str(const) == "a thing" and f"{const}" == "a thing"
     assert const == Thing() and Thing() == const and const != 3 and const == view_of(Thing())[0].v
@@ -220,7 +220,7 @@ def test_s3_const_forwards_calls_comparison_text_and_kind_better():
     assert view_of(lambda x: x + 1)[0].v(1) == 2
 
 
-def test_s3_const_copies_are_free_better():
+def test_const_copies_are_free_better():
     thing = Thing()
     const = view_of(thing)[0].v
     for clone in (copy.copy(const), copy.deepcopy(const), pickle.loads(pickle.dumps(const))):
@@ -228,7 +228,7 @@ def test_s3_const_copies_are_free_better():
         assert type(clone) is Thing and thing.x == 1
 
 
-def test_s3_const_with_locks_and_events():
+def test_const_with_locks_and_events():
     event = threading.Event()
     const = view_of(event)[0].v
     const.set()
@@ -238,13 +238,13 @@ def test_s3_const_with_locks_and_events():
         assert not condition.acquire(blocking=False) or condition.release() is None
 
 
-def test_s3_remapper_keys_are_the_states_own_names_better():
+def test_remapper_keys_are_the_states_own_names_better():
     ud = smach.UserData()
     ud.outer, ud.other = 1, 2
     assert smach.Remapper(ud, ["mine", "gone"], [], {"mine": "outer"}).keys() == ["mine"]
 
 
-def test_s3_remapper_update_writes_through():
+def test_remapper_update_writes_through():
     view, ud = view_of(1)
     other = smach.UserData()
     other.anything = 3

@@ -1,4 +1,4 @@
-"""Section 6 of the specification: Sequence."""
+"""Sequence."""
 
 import smach
 from machine_parts import Says
@@ -12,17 +12,17 @@ def sequence(*items, outcomes=("done", "failed")):
     return result
 
 
-def test_s6_is_a_state_machine():
+def test_is_a_state_machine():
     assert issubclass(smach.Sequence, smach.StateMachine)
 
 
-def test_s6_connects_in_order_and_the_last_falls_through():
+def test_connects_in_order_and_the_last_falls_through():
     seq = sequence(("A", Says("done"), None), ("B", Says("done"), None), ("C", Says("done"), None))
     assert seq.get_internal_edges() == [("done", "A", "B"), ("done", "B", "C"), ("done", "C", None)]
     assert seq.execute() == "done" and [seq[k].runs for k in "ABC"] == [1, 1, 1]
 
 
-def test_s6_an_explicit_target_stays_and_none_does_not():
+def test_an_explicit_target_stays_and_none_does_not():
     seq = sequence(
         ("A", Says("done"), {"done": "C"}),
         ("B", Says("done"), {"done": None}),
@@ -36,17 +36,17 @@ def test_s6_an_explicit_target_stays_and_none_does_not():
     assert seq.execute() == "done" and seq["B"].runs == 0
 
 
-def test_s6_other_outcomes_leave_the_sequence():
+def test_other_outcomes_leave_the_sequence():
     seq = sequence(("A", Says("failed", registered=["done", "failed"]), None), ("B", Says("done"), None))
     assert seq.execute() == "failed" and seq["B"].runs == 0
 
 
-def test_s6_a_state_without_the_connector_is_logged_only(log):
+def test_a_state_without_the_connector_is_logged_only(log):
     seq = sequence(("A", Says("other"), {"other": "B"}), ("B", Says("done"), None))
     assert "connector" in log.text("error") and seq.execute() == "done"
 
 
-def test_s6_user_data_and_remapping():
+def test_user_data_and_remapping():
     seq = smach.Sequence(["done"], "done", input_keys=["a"], output_keys=["b"])
     with seq:
         state = smach.CBState(

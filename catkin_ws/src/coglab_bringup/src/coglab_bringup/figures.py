@@ -1,0 +1,150 @@
+"""docs/figures.md: what ./coglab bench has measured of these sources, each figure with its definition, goal and peer.
+
+A run of a bench leaves its rows in .coglab/figures/NAME.json, with machine, date and commit. `./coglab bench --report`
+writes the page from those files. A bench without a file of the sources as they are now was not measured: it is shown as
+missed, whatever an older file says. The lines of README.md between the two marks are taken from that page.
+"""
+
+from __future__ import annotations
+
+import ast
+import json
+import os
+import platform
+import subprocess
+from datetime import UTC, datetime
+from pathlib import Path
+
+from coglab_bringup.arguments import find_benches
+
+NOT_MEASURED = "not measured on this commit"
+BEGIN, END = "<!-- quoted from docs/figures.md -->", "<!-- end of the quotation -->"
+QUOTED = ("wall", "fri", "trials")
+"""the benches whose rows README.md shows"""
+HEAD = """# Figures
+
+Written by `./coglab bench --report`, from what `./coglab bench NAME ...` has measured on these sources; edit nothing
+here. A row that misses its goal stays and says so. A bench that was not run on these sources counts as missed.
+Definitions, goals and peers are fixed before anything is measured: they stand in the bench itself.
+"""
+TABLE = "| figure | value | goal | | peer | its value |\n| --- | --- | --- | --- | --- | --- |"
+
+
+def _git(top: Path, *words: str) -> str:
+    try:
+        done = subprocess.run(["git", "-C", str(top), *words], capture_output=True, text=True, timeout=20, check=True)
+        return done.stdout.strip()
+    except (OSError, subprocess.SubprocessError):
+        return ""
+
+
+def sources_of(top: Path) -> dict[str, str]:
+    """Commit of a checkout and the name of its sources, which stays the same where only documents change."""
+    changed = _git(top, "status", "--porcelain", "--", "catkin_ws/src", "coglab")
+    tree = " ".join(_git(top, "rev-parse", f"HEAD:{part}") for part in ("catkin_ws/src", "coglab"))
+    return {
+        "commit": _git(top, "rev-parse", "--short=7", "HEAD") + (" with changes" if changed else ""),
+        "sources": "" if changed else tree.strip(),
+    }
+
+
+def machine() -> str:
+    """Processor, cores and kernel."""
+    models = [line for line in Path("/proc/cpuinfo").read_text().splitlines() if line.startswith("model name")]
+    model = models[0].partition(":")[2].strip() if models else platform.machine()
+    return f"{os.cpu_count()} cores of {model}, Linux {platform.release()}"
+
+
+def record(top: Path, name: str, rows: list[dict], long: bool) -> None:
+    """Keeps the rows of one bench as just measured; the load tells how far the machine was alone."""
+    folder = top / ".coglab" / "figures"
+    folder.mkdir(parents=True, exist_ok=True)
+    run = {
+        "rows": rows,
+        "machine": machine(),
+        "load": round(os.getloadavg()[1], 1),
+        "date": datetime.now(UTC).strftime("%Y-%m-%d"),
+        "long": long,
+    }
+    new = folder / f"{name}.new"
+    new.write_text(json.dumps(run | sources_of(top), indent=1) + "\n")
+    new.replace(folder / f"{name}.json")
+
+
+def measured(top: Path, name: str) -> dict | None:
+    """The last run of a bench, if it was one of the sources as they are now."""
+    try:
+        run = json.loads((top / ".coglab" / "figures" / f"{name}.json").read_text())
+        now = sources_of(top)["sources"]
+        return run if now and run["sources"] == now and isinstance(run["rows"], list) else None
+    except (OSError, ValueError, KeyError, TypeError):
+        return None
+
+
+def definition(paths: list[Path]) -> str:
+    """What a bench measures, over how many and what is left out: the text at the head of its files."""
+    texts = [ast.get_docstring(ast.parse(path.read_text(encoding="utf-8"))) or "" for path in paths]
+    return "\n\n".join(texts)
+
+
+def _cell(value: object) -> str:
+    if isinstance(value, float):
+        return f"{value:.4g}"
+    return "-" if value in (None, "") else str(value).replace("|", "\\|").replace("\n", " ")
+
+
+def line_of(bench: str, row: dict) -> str:
+    """One row of a table; a value that is missing is a missed one."""
+    value = NOT_MEASURED if row["value"] is None else f"{_cell(row['value'])} {row['unit'] or ''}".strip()
+    verdict = "met" if row["ok"] and row["value"] is not None else "**missed**"
+    peer, peer_value = _cell(row["peer"]), _cell(row["peer_value"])
+    return f"| {bench}: {_cell(row['figure'])} | {value} | {_cell(row['goal'])} | {verdict} | {peer} | {peer_value} |"
+
+
+def lines_of(top: Path, name: str) -> list[str]:
+    """The rows of a bench; a single one where it was not measured."""
+    run = measured(top, name)
+    if run is None:
+        return [f"| {name}: all of its rows | {NOT_MEASURED} | as in the bench | **missed** | - | - |"]
+    return [line_of(name, row) for row in run["rows"]]
+
+
+def page(top: Path) -> str:
+    """The whole text of docs/figures.md."""
+    parts = [HEAD]
+    benches = find_benches(top / "catkin_ws" / "src")
+    benches["mutants"] = []
+    for name, paths in sorted(benches.items()):
+        run = measured(top, name)
+        text = (
+            definition(paths)
+            if paths
+            else "Changed lines that a test notices: `coglab_bringup/mutants.py`, all packages."
+        )
+        parts.append(f"## {name}\n\n{text}\n")
+        if run is not None:
+            kind = "with --long" if run["long"] else "as sampled by default"
+            parts.append(
+                f"Printed by `./coglab bench {name}`, {kind}, on {run['date']}, commit {run['commit']}, "
+                f"on {run['machine']}, five-minute load {run['load']}.\n"
+            )
+        parts.append("\n".join([TABLE, *lines_of(top, name)]) + "\n")
+    return "\n".join(parts)
+
+
+def quotation(text: str, lines: list[str]) -> str:
+    """A page whose part between the marks holds those lines of the table."""
+    before, begin, rest = text.partition(BEGIN)
+    _, end, after = rest.partition(END)
+    if not begin or not end:
+        return text
+    return "\n".join([before + begin, TABLE, *lines, end]) + after
+
+
+def write_report(top: Path) -> Path:
+    """Writes docs/figures.md, and the rows that README.md quotes."""
+    target, readme = top / "docs" / "figures.md", top / "README.md"
+    target.write_text(page(top), encoding="utf-8")
+    quoted = [line for name in QUOTED for line in lines_of(top, name)]
+    readme.write_text(quotation(readme.read_text(encoding="utf-8"), quoted), encoding="utf-8")
+    return target

@@ -1,0 +1,170 @@
+"""docs/figures.md says what was measured and nothing else, and no document has a measured figure of its own."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+from pathlib import Path
+
+import pytest
+from coglab_bringup import bench, figures
+
+TOP = Path(__file__).resolve().parents[4]
+ROW = dict(zip(bench.COLUMNS, ("one", "time of a | step", 1.23456, "us", "<= 2", "KDL", 3.0, True), strict=True))
+
+
+@pytest.fixture
+def checkout(tmp_path):
+    """A checkout with two benches, `one` and `two`, all of it committed."""
+    folder = tmp_path / "catkin_ws" / "src" / "p" / "bench"
+    folder.mkdir(parents=True)
+    (tmp_path / "docs").mkdir()
+    (tmp_path / "coglab").write_text("")
+    (folder / "bench_one.py").write_text('"""Ten steps, none left out."""\n')
+    (folder / "bench_two.py").write_text('"""Trials."""\n')
+    (tmp_path / "README.md").write_text(f"before\n{figures.BEGIN}\nold\n{figures.END}\nafter\n")
+    commit(tmp_path, "first")
+    return tmp_path
+
+
+def commit(top: Path, message: str) -> None:
+    for words in (["init", "-q"], ["add", "-A"], ["commit", "-q", "-m", message]):
+        git = ["git", "-c", "user.name=a", "-c", "user.email=a@b", "-C", str(top), *words]
+        subprocess.run(git, check=True, capture_output=True, timeout=30)
+
+
+def test_the_page_has_definition_goal_value_peer_machine_date_and_commit(checkout, monkeypatch):
+    monkeypatch.setattr(figures, "QUOTED", ("one", "two"))
+    figures.record(checkout, "one", [ROW, ROW | {"figure": "other", "ok": False}], False)
+    text = figures.write_report(checkout).read_text()
+    assert "Ten steps, none left out." in text and "./coglab bench one" in text
+    assert r"| one: time of a \| step | 1.235 us | <= 2 | met | KDL | 3 |" in text
+    assert "| one: other | 1.235 us | <= 2 | **missed** | KDL | 3 |" in text
+    assert re.search(r"on \d{4}-\d\d-\d\d, commit [0-9a-f]{7}, on \d+ cores of ", text)
+    assert "| two: all of its rows | not measured on this commit | as in the bench | **missed** | - | - |" in text
+    readme = (checkout / "README.md").read_text()
+    assert readme.startswith("before\n") and readme.endswith("after\n") and "old" not in readme
+    assert r"| one: time of a \| step | 1.235 us" in readme and "| two: all of its rows | not measured" in readme
+
+
+def test_a_value_that_is_missing_is_missed(checkout):
+    figures.record(checkout, "one", [ROW | {"value": None, "ok": True}], False)
+    assert "| not measured on this commit | <= 2 | **missed** |" in figures.page(checkout)
+
+
+def test_other_sources_make_a_figure_old_and_other_documents_do_not(checkout):
+    figures.record(checkout, "one", [ROW], False)
+    (checkout / "docs" / "page.md").write_text("words")
+    commit(checkout, "a page")
+    assert figures.measured(checkout, "one") is not None
+    source = checkout / "catkin_ws" / "src" / "p" / "code.py"
+    source.write_text("a = 1\n")
+    assert figures.measured(checkout, "one") is None, "changed and not committed"
+    figures.record(checkout, "one", [ROW], False)
+    assert figures.measured(checkout, "one") is None, "measured on sources that nobody can get"
+    commit(checkout, "code")
+    assert figures.measured(checkout, "one") is None
+    (checkout / ".coglab" / "figures" / "one.json").write_text("[1")
+    assert figures.measured(checkout, "one") is None
+
+
+def test_report_runs_only_what_is_named(checkout, monkeypatch):
+    monkeypatch.setenv("COGLAB_TOP", str(checkout))
+    ran: list[str] = []
+    monkeypatch.setattr(bench, "run_bench", lambda name, *rest: ran.append(name) or [ROW | {"bench": name}])
+    assert bench.main(["--report"]) == 0 and ran == []
+    assert bench.main(["two", "--report"]) == 0 and ran == ["two"]
+    assert "| two: time of a" in (checkout / "docs" / "figures.md").read_text()
+    assert (checkout / ".coglab" / "figures" / "two.json").is_file()
+
+
+def test_every_bench_says_what_it_measures():
+    for name, paths in figures.find_benches(TOP / "catkin_ws" / "src").items():
+        assert len(figures.definition(paths)) > 60, f"{name}: what, over how many, what is left out?"
+
+
+def test_the_page_knows_every_bench_and_the_readme_quotes_it():
+    text = (TOP / "docs" / "figures.md").read_text(encoding="utf-8")
+    names = [*figures.find_benches(TOP / "catkin_ws" / "src"), "mutants"]
+    assert re.findall(r"^## (\w+)$", text, flags=re.M) == sorted(names), "run ./coglab bench --report"
+    readme = (TOP / "README.md").read_text(encoding="utf-8")
+    quoted = readme.partition(figures.BEGIN)[2].partition(figures.END)[0].strip().splitlines()
+    assert len(quoted) >= 3 and all(line in text.splitlines() for line in quoted)
+
+
+# --- figures in documents -----------------------------------------------------------------------------------------
+
+UNIT = r"(?:ms|us|ns|s|min|minutes?|seconds?|h|%|mm|mrad|rad|deg|x|Nm|N|MB|kB|lines)"
+NUMBER = re.compile(r"(?<![\w.])\d[\d.]*\s?" + UNIT + r"(?![\w/])")
+MEASURED = re.compile(
+    r"\bmeasured\b|\bmedian\b|\bp95\b|\bpercentile\b|\btakes?\b|\btook\b|\bslowest\b|\bcosts?\b|\bfaster\b|\bslower\b"
+    r"|\bof \d+ (?:trials|runs|seeds|handovers|reaches)\b|\bon average\b|\bin a run\b",
+    re.I,
+)
+COMMAND = re.compile(
+    r"\./coglab (?:bench|test|demo)|docker/prove_bare|docs/count_lines|code_size|\bbench_\w+|\btest_\w+|_rostest"
+    r"|figures\.md"
+)
+# Figures that are no measurements of ours: what a setting, a source or a rule says. The words identify the passage.
+SOURCED = {
+    "ctrl_more/doc/controllers/JointLimits.md": ("setting `joint_position`",),
+    "ih2_hand/README.md": ("about 50 requests for each poll", "`read_timeout_s`"),
+    "lwr_fri_bridge/README.md": ("set_point_leash/position", "what is commanded stays below the limit"),
+    "arm_back_end.md": ("It holds until the next one",),
+    "deviations.md": ("actionlib's client alone", "`servo_overshoot` (0.04)", "kept on a leash"),
+    "how_to.md": ("Give `add_ptp` the measured position",),
+    "limits_under_loss.md": ("is worth 20, 40 and 100 ms",),
+    "people.md": (
+        "Huber et al. 2008",
+        "recorded handover between people",
+        "| `trust` |",
+        "until 1.2 times",
+        "`recording:=FILE`",
+    ),
+    "reference.md": ("what it started is gone 3 s later", "waits for the hub, 90 s at most"),
+}
+
+
+def passages(text: str) -> list[str]:
+    """Paragraphs, points of lists and rows of tables, without what stands in blocks to type."""
+    text = re.sub(r"```.*?```", "", text, flags=re.DOTALL)
+    return re.split(r"\n\s*\n|\n(?=[*-] |\d+\. |\|)", text)
+
+
+def unprinted(path: Path) -> list[str]:
+    """Passages with a measured figure and without the command that prints it."""
+    excused = [words for name, all_words in SOURCED.items() if str(path).endswith(name) for words in all_words]
+    found = []
+    for passage in passages(path.read_text(encoding="utf-8")):
+        flat = " ".join(passage.split())
+        if (
+            MEASURED.search(flat)
+            and NUMBER.search(flat)
+            and not COMMAND.search(flat)
+            and not any(w in flat for w in excused)
+        ):
+            found.append(f"{path.name}: {flat[:160]}")
+    return found
+
+
+def documents() -> list[Path]:
+    """All pages but the changelog, which says what was, and this test's own page, which is written by the command."""
+    pages = [*TOP.glob("*.md"), *TOP.glob("docs/*.md"), *(TOP / "catkin_ws" / "src").rglob("*.md")]
+    return [page for page in pages if page.name not in ("CHANGELOG.md", "figures.md")]
+
+
+def test_a_figure_without_a_command_is_found(tmp_path):
+    page = tmp_path / "page.md"
+    page.write_text("A step takes 3 us.\n\nThe limit is 3 us.\n\nA step takes 3 us (`./coglab bench dmp`).\n")
+    assert unprinted(page) == ["page.md: A step takes 3 us."]
+
+
+def test_every_measured_figure_of_a_document_has_a_command_that_prints_it():
+    found = [line for page in documents() for line in unprinted(page)]
+    assert not found, "\n".join(found)
+
+
+def test_nothing_is_excused_that_is_gone():
+    for name, all_words in SOURCED.items():
+        text = " ".join(" ".join(p.read_text(encoding="utf-8").split()) for p in documents() if str(p).endswith(name))
+        assert not [words for words in all_words if words not in text], name
