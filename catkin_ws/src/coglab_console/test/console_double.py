@@ -30,6 +30,39 @@ READY = dict(
     hand_connected=True,
 )
 
+PAGE_DOCUMENTS = {
+    "model": {
+        "real": False,
+        "robot": None,
+        "order": [],
+        "workspace": {"low": [-1.2, -1.2, 0.0], "high": [1.2, 1.2, 1.6]},
+        "missing": [],
+        "charts": False,
+        "three": False,
+    },
+}
+
+
+def page_state(stamp: float) -> dict:
+    """A state as the node sends it, of a robot that stands still."""
+    return {
+        "stamp": stamp,
+        "q": [],
+        "live": True,
+        "frames": {},
+        "ages": {},
+        "rate": [0.0] * 7,
+        "threshold": [0.12] * 7,
+        "speed": 0.0,
+        "fri": 0.4,
+        "answer": 0.1,
+        "current": [0] * 5,
+        "margin": None,
+        "phase": READY["state"],
+        "since": 1.0,
+        "dmp": ["idle", 0.0, 0.0, 0.0],
+    }
+
 
 class RobotDouble:
     """Writes down what it is asked for."""

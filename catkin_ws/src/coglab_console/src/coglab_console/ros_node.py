@@ -237,10 +237,10 @@ class ConsoleNode:
         await runner.cleanup()
 
     async def _states(self) -> None:
-        """30 times a second, on a grid that does not drift."""
+        """30 times a second, on a grid that does not drift; what a busy computer missed is left out."""
         due = self.loop.time()
         while True:
-            due = max(due + 1.0 / STATE_RATE, self.loop.time() - 1.0)
+            due = max(due + 1.0 / STATE_RATE, self.loop.time())
             await asyncio.sleep(max(0.0, due - self.loop.time()))
             if self.server.clients:
                 self._careful(lambda: self.server.publish_state(self.view.frame()))
