@@ -68,9 +68,7 @@ class Console(unittest.TestCase):
     def enabled(self, action, limit=30.0):
         """The button, when the page lets it be pressed."""
         button = f"[data-action={action}]"
-        self.browser.until(
-            "return !document.querySelector(arguments[0]).hasAttribute('aria-disabled')", limit, button
-        )
+        self.browser.until("return !document.querySelector(arguments[0]).hasAttribute('aria-disabled')", limit, button)
         return self.button(action)
 
     def says(self, action, word, limit=10.0):
@@ -210,8 +208,8 @@ class Console(unittest.TestCase):
         before = self.browser.js("return coglab.events().map(e => e.seq)")
         console = self.process_of("/coglab_console")
         self.browser.js(
-            "new MutationObserver(() => { if (document.body.classList.contains('lost')) window.greyAt ??= Date.now(); })"
-            ".observe(document.body, { attributes: true }); delete window.greyAt;"
+            "const grey = () => { if (document.body.classList.contains('lost')) window.greyAt ??= Date.now(); };"
+            "delete window.greyAt; new MutationObserver(grey).observe(document.body, { attributes: true });"
         )
         began = time.time()
         os.kill(console, signal.SIGSTOP)  # frozen; the connection stands

@@ -39,7 +39,7 @@ def test_a_slow_client_gets_the_newest_state_and_every_event():
 
 
 def test_no_more_states_are_on_the_way_than_the_window_holds():
-    """What lies in the network's buffers is old when it comes: a browser gets the next state when it has taken the last."""
+    """What lies in the network's buffers is old when it comes: the next state goes when the last was taken."""
     log, documents = EventLog(time.time), Documents()
     client = Client("a", 0, documents, log)
     sent = []

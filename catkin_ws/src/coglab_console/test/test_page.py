@@ -1,4 +1,4 @@
-"""The page in a real browser, with a double in place of the robot: a dead connection, a slow computer, reasons, touch."""
+"""The page in a real browser, a double in place of the robot: a dead connection, a slow computer, reasons, touch."""
 
 import asyncio
 import shutil

@@ -82,7 +82,7 @@ class ConsoleServer:
             client.wake()
 
     def publish_state(self, state: dict) -> None:
-        """The newest state to everybody, numbered, with the time `at` which it left (ms of the console's steady clock)."""
+        """The newest state to everybody, numbered, with the time when it left: `at`, ms of the console's steady clock."""
         if self.clients:
             self._number += 1
             now = round(1000 * asyncio.get_running_loop().time())
