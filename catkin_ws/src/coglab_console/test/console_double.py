@@ -10,13 +10,13 @@ from pathlib import Path
 
 import aiohttp
 from aiohttp import web
-from coglab_console.access import CSRF_HEADER, Access, allowed_hosts
-from coglab_console.desk import Answer, Desk
-from coglab_console.events import EventLog
-from coglab_console.fan_out import Documents
-from coglab_console.gates import Standing
-from coglab_console.page_files import load_all
-from coglab_console.server import ConsoleServer
+from coglab_console.desk.desk import Answer, Desk
+from coglab_console.desk.events import EventLog
+from coglab_console.desk.gates import Standing
+from coglab_console.web.access import CSRF_HEADER, Access, allowed_hosts
+from coglab_console.web.fan_out import Documents
+from coglab_console.web.page_files import load_all
+from coglab_console.web.server import ConsoleServer
 
 PAGE = Path(__file__).resolve().parents[1] / "page"
 READY = dict(

@@ -6,14 +6,14 @@ import time
 from dataclasses import replace
 
 import pytest
-from coglab_console.commands import COMMANDS, BadCommand, judge
-from coglab_console.desk import Desk
-from coglab_console.events import EventLog
-from coglab_console.experiment import Experiment, ExperimentError, latin_row, order_of
-from coglab_console.fan_out import Documents
-from coglab_console.gates import MotionGuard, Standing, reasons
-from coglab_console.hold import HOLD_TIME, HeldButton
-from coglab_console.roles import ABSENCE, NOTICE, Roles
+from coglab_console.desk.commands import COMMANDS, BadCommand, judge
+from coglab_console.desk.desk import Desk
+from coglab_console.desk.events import EventLog
+from coglab_console.desk.experiment import Experiment, ExperimentError, latin_row, order_of
+from coglab_console.desk.gates import MotionGuard, Standing, reasons
+from coglab_console.desk.hold import HOLD_TIME, HeldButton
+from coglab_console.desk.roles import ABSENCE, NOTICE, Roles
+from coglab_console.web.fan_out import Documents
 from console_double import READY, RobotDouble, running
 
 RECEIVE = {"action": "exchange_human_to_robot"}

@@ -6,8 +6,8 @@ import json
 import socket
 import time
 
-from coglab_console.events import EventLog
-from coglab_console.fan_out import WINDOW, Client, Documents, to_json
+from coglab_console.desk.events import EventLog
+from coglab_console.web.fan_out import WINDOW, Client, Documents, to_json
 from console_double import running
 
 

@@ -7,7 +7,7 @@ import time
 
 import pytest
 from coglab_console.browser import Browser
-from coglab_console.gates import Standing
+from coglab_console.desk.gates import Standing
 from console_double import PAGE_DOCUMENTS, READY, RobotDouble, page_state, running
 
 pytestmark = pytest.mark.skipif(

@@ -8,13 +8,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from coglab_console import path_ahead, wire
-from coglab_console.graph_layout import Container, Layout, roots
-from coglab_console.primitives import LibraryError, load_library, shape_map
-from coglab_console.primitives import document as library_document
+from coglab_console.ros import wire
+from coglab_console.ros.words import phase, time_limit
+from coglab_console.scene import path_ahead
+from coglab_console.scene.graph_layout import Container, Layout, roots
+from coglab_console.scene.primitives import LibraryError, load_library, shape_map
+from coglab_console.scene.primitives import document as library_document
+from coglab_console.scene.urdf_model import ModelError, RobotModel, quaternion, rotation
 from coglab_console.torque_rate import LEARN_TIME, Settings, TorqueRate
-from coglab_console.urdf_model import ModelError, RobotModel, quaternion, rotation
-from coglab_console.words import phase, time_limit
 
 SOURCES = Path(__file__).resolve().parents[2]
 URDF = SOURCES / "lwr_description" / "urdf" / "lwr_ih2.urdf"

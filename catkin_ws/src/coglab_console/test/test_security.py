@@ -6,7 +6,7 @@ import time
 
 import aiohttp
 import pytest
-from coglab_console.access import CSRF_HEADER, TokenBucket
+from coglab_console.web.access import CSRF_HEADER, TokenBucket
 from console_double import running
 
 

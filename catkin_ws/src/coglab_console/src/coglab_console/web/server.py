@@ -13,9 +13,9 @@ from typing import Any
 
 from aiohttp import WSMessage, WSMsgType, web
 
+from ..desk.desk import Answer, Desk
+from ..desk.events import EventLog
 from .access import Access, Denied, Session
-from .desk import Answer, Desk
-from .events import EventLog
 from .fan_out import Client, Documents, to_json
 from .page_files import PageFile
 
@@ -82,7 +82,7 @@ class ConsoleServer:
             client.wake()
 
     def publish_state(self, state: dict) -> None:
-        """The newest state to everybody, numbered, with the time when it left: `at`, ms of the console's steady clock."""
+        """The newest state to everybody, numbered, and when it left: `at`, ms of the console's steady clock."""
         if self.clients:
             self._number += 1
             now = round(1000 * asyncio.get_running_loop().time())

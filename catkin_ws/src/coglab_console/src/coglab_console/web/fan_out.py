@@ -12,7 +12,7 @@ import json
 from collections import deque
 from collections.abc import Awaitable, Callable, Iterator
 
-from .events import EventLog
+from ..desk.events import EventLog
 
 WINDOW = 4
 """states on the way to one browser: at 30 Hz enough for a round trip of 0.13 s at the full rate"""
@@ -88,7 +88,7 @@ class Client:
         self._wake.set()
 
     def seen(self, number: object) -> bool:
-        """The browser has taken the state of this number, and all before it. False where that one was not on the way."""
+        """The browser has taken this state, and all before it. False where that one was not on the way."""
         if isinstance(number, bool) or not isinstance(number, int) or number not in self._on_the_way:
             return False
         while self._on_the_way and self._on_the_way[0] <= number:
