@@ -315,7 +315,7 @@ def take_control(browser: Browser) -> None:
     """The browsers that measured before may hold the control; they are gone."""
     operating = "return document.getElementById('role').innerText.startsWith('you operate')"
     if not browser.js(operating):
-        browser.js("document.querySelector('#role button').click()")
+        browser.js("document.querySelector('#control button').click()")
     browser.until(operating, 15.0)
 
 

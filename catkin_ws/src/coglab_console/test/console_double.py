@@ -53,6 +53,7 @@ def page_state(stamp: float) -> dict:
         "ages": {},
         "rate": [0.0] * 7,
         "threshold": [0.12] * 7,
+        "watched": [True] * 7,
         "speed": 0.0,
         "fri": 0.4,
         "answer": 0.1,
@@ -60,6 +61,7 @@ def page_state(stamp: float) -> dict:
         "margin": None,
         "phase": READY["state"],
         "since": 1.0,
+        "left": None,
         "dmp": ["idle", 0.0, 0.0, 0.0],
     }
 
@@ -72,6 +74,7 @@ class RobotDouble:
         self.now = Standing(**READY)
         self.stops: list[str] = []
         self.calls: list[tuple[str, dict]] = []
+        self.told: list[tuple[str, str]] = []
         self.stop_times: list[float] = []
 
     def standing(self) -> Standing:
@@ -80,6 +83,9 @@ class RobotDouble:
     def stop(self, who: str) -> None:
         self.stops.append(who)
         self.stop_times.append(time.monotonic())
+
+    def tell(self, name: str, text: str) -> None:
+        self.told.append((name, text))
 
     async def call(self, name: str, arguments: dict) -> Answer:
         self.calls.append((name, arguments))

@@ -59,6 +59,41 @@ def test_everybody_stops_and_notes(desk):
     assert desk.backend.stops == ["a", "b"]
 
 
+def test_notes_and_the_next_object_are_told_to_ros_and_heard_from_there(desk):
+    assert ask(desk, "b", "note", text="hesitated")["success"]
+    assert ask(desk, "a", "select_object", object_id="mug")["success"]
+    assert desk.backend.told == [("note", "hesitated"), ("select_object", "mug")]
+    desk.told("note", "from a terminal", "/rostopic_1")
+    desk.told("select_object", "ball", "/rostopic_1")
+    assert desk.object_id == "ball" and [row["who"] for row in desk.experiment.notes] == ["b", "/rostopic_1"]
+    for name, text in (("note", ""), ("note", "x" * 501), ("select_object", "no such; name")):
+        desk.told(name, text, "/x")
+    assert desk.object_id == "ball" and len(desk.experiment.notes) == 2
+    events = [event["text"] for event in desk.events.since(0)[0] if event["level"] == "warning"]
+    assert len(events) == 3 and all(text.startswith("/x: ") for text in events)
+
+
+@pytest.mark.parametrize(
+    "name, arguments",
+    [
+        ("feedback", {"verb": "disable", "name": "x"}),
+        ("feedback_order", {"names": ["b", "a"]}),
+        ("contact_learn", {}),
+    ],
+)
+def test_what_nobody_sees_at_once_is_held_down(desk, name, arguments):
+    """One click changes no feedback controller, also between trials."""
+    assert "hold the button" in ask(desk, "a", name, **arguments)["message"] and not desk.backend.calls
+
+    async def hold():
+        for _ in range(10):
+            if (answer := await desk.held("a", name, arguments)) is not None:
+                return answer
+            await asyncio.sleep(0.1)
+
+    assert asyncio.run(hold())["success"] and desk.backend.calls == [(name, arguments)]
+
+
 def test_taking_over_is_announced_and_may_be_refused():
     said, clock = [], Clock()
     roles = Roles(lambda text, level: said.append(text), clock)

@@ -106,7 +106,7 @@ def _start_reason(action: str, now: Standing) -> str:
     if action in ("initialise", "reset"):
         return "nothing is stopped" if action == "reset" else "it is initialised"
     words = [action.replace("_", " ") for action in now.actions]
-    return f"now only {' or '.join(words)}" if words else f"not in {now.leaf.replace('_', ' ')}"
+    return f"now only {' or '.join(words)}" if words else f"{now.leaf.replace('_', ' ')} takes nothing"
 
 
 def _calibrate_reason(now: Standing) -> str:
