@@ -1,7 +1,6 @@
 """What is drawn: the graph by Graphviz and without it, the robot's kinematics, primitives and the path ahead, bytes."""
 
 import io
-import math
 import random
 import struct
 from pathlib import Path
