@@ -1,5 +1,5 @@
 // Strip charts on one time axis (the last 20 s), drawn by Debian's dygraphs; phases as bars above them.
-import { h, paced, setText } from './dom.js';
+import { drawn, h, setText } from './dom.js';
 import { on, onDocs, store } from './store.js';
 
 const WINDOW = 20; // s
@@ -125,7 +125,7 @@ export function showCharts(parent) {
   }
   parent.append(note);
 
-  const redraw = paced(() => {
+  const redraw = drawn(() => {
     if (parent.offsetParent === null) return;
     drawPhases(bars);
     STRIPS.forEach((strip, i) => {
@@ -134,7 +134,7 @@ export function showCharts(parent) {
       if (strip.chart) strip.chart.updateOptions({ file: strip.rows, ...range });
       else strip.chart = new window.Dygraph(strip.place, strip.rows, { ...optionsOf(strip, i === STRIPS.length - 1), ...range });
     });
-  }, 250);
+  }, () => 250);
 
   on('state', (state) => {
     rememberPhase(state);

@@ -45,17 +45,34 @@ export function table(header, rows, caption) {
   return h('table', {}, caption ? h('caption', { hidden: true }, caption) : null, h('thead', {}, head), h('tbody', {}, body));
 }
 
+const MOST = 2000; // ms, the longest rest after a picture
 const asked = new Set(); // drawings that are to be done
 let armed = false;
 let restUntil = 0;
 
+/** A function that asks for `update`, which changes words alone: done at most once a `period` (ms), whatever is drawn. */
+export function paced(update, period) {
+  let due = 0;
+  let waiting = false;
+  return () => {
+    if (waiting) return;
+    waiting = true;
+    setTimeout(() => {
+      waiting = false;
+      const began = performance.now();
+      if (!document.hidden) update();
+      due = performance.now() + Math.max(period, 3 * (performance.now() - began));
+    }, Math.max(0, due - performance.now()));
+  };
+}
+
 /**
- * A function that asks for `draw`: done in the next picture, at most once a `period` (ms), never while the page is hidden.
+ * A function that asks for `draw`: done in the next picture, at most once a `period()` (ms), never while the page is hidden.
  * All drawings together take a quarter of the time: the time of a picture is what the page waited for its turn, drew, and was
  * busy afterwards, which without a graphics card is most of it, and messages and clicks would stand in line behind it.
  */
-export function paced(draw, period) {
-  const job = { draw, shortest: typeof period === 'function' ? period : () => period, due: 0 };
+export function drawn(draw, period) {
+  const job = { draw, period, due: 0 };
   return () => {
     asked.add(job);
     arm();
@@ -76,7 +93,7 @@ function picture(since) {
   const began = performance.now();
   for (const job of [...asked].filter((one) => one.due <= began)) {
     asked.delete(job);
-    job.due = began + job.shortest();
+    job.due = began + job.period();
     try {
       job.draw();
     } catch (error) {
@@ -86,7 +103,7 @@ function picture(since) {
   setTimeout(() => {
     const ended = performance.now();
     const took = Math.max(0, began - since - FRAME) + ended - began;
-    restUntil = ended + 3 * took;
+    restUntil = ended + Math.min(MOST, 3 * took);
     armed = false;
     arm();
   });

@@ -68,7 +68,7 @@ export function showGraph(parent) {
   const crumbs = h('p', { class: 'crumbs', 'aria-live': 'polite' });
   const last = h('p', { class: 'last' });
   const picture = svg('svg', { role: 'img', 'aria-label': 'Graph of the state machine' });
-  parent.append(h('header', {}, h('label', {}, select), extent), crumbs, picture, last);
+  parent.append(h('header', {}, h('label', {}, select), crumbs, extent), picture, last);
 
   function names() {
     const known = machines();
