@@ -30,7 +30,7 @@ function plot(row) {
   const end = row.plot[row.plot.length - 1][0];
   const all = row.plot.flatMap((point) => point.slice(1));
   const [low, high] = [Math.min(...all, 0), Math.max(...all, 0.1)];
-  const x = (t) => 8 + (t / end) * 470;
+  const x = (t) => 8 + (t / end) * 428;
   const y = (value) => 140 - ((value - low) / (high - low)) * 128;
   [['x, m', '#0072b2', []], ['y, m', '#009e73', [8, 4]], ['z, m', '#cc79a7', [2, 3]], ['speed, m/s', '#1b1f24', [12, 3, 3, 3]]].forEach(([name, colour, dash], i) => {
     context.strokeStyle = colour;
@@ -38,14 +38,14 @@ function plot(row) {
     context.setLineDash(dash);
     context.beginPath();
     for (const point of row.plot) context.lineTo(x(point[0]), y(point[i + 1]));
-    context.moveTo(484, 18 + 20 * i);
-    context.lineTo(500, 18 + 20 * i);
+    context.moveTo(444, 18 + 20 * i);
+    context.lineTo(462, 18 + 20 * i);
     context.stroke();
     context.fillStyle = '#1b1f24';
     context.font = '14px "DejaVu Sans", Verdana, sans-serif';
-    context.fillText(name, 503, 22 + 20 * i);
+    context.fillText(name, 466, 23 + 20 * i);
   });
-  context.fillText(`0 … ${end.toFixed(2)} s`, 484, 120);
+  context.fillText(`0 … ${end.toFixed(2)} s`, 444, 120);
   return canvas;
 }
 

@@ -3,7 +3,7 @@
 
 Subscribes lwr/external_torques (effort, Nm) and lwr/joint_states; names are relative. Parameters (private): the fields
 of coglab_smach.contact.detector.DetectorSettings; robot_description is read for the Jacobian.
-Publishes at 20 Hz ~margin (std_msgs/Float64) while watching, and ~signal (coglab_msgs/ContactSignal) while torques come.
+Publishes at 20 Hz ~margin (std_msgs/Float64) while watching, ~signal (coglab_msgs/ContactSignal) while torques come.
 Service ~learn (std_srvs/Trigger): the noise at rest anew.
 """
 

@@ -174,8 +174,8 @@ class ContactDetector:
         self._armed = None
 
     def learn(self) -> str:
-        """Forget the noise at rest and learn it anew, from now on; the answer in words. ValueError where the arm moves or
-        the detector is armed: what it would learn then is no noise."""
+        """Forget the noise at rest and learn it anew, from now on; the answer in words. ValueError where the arm moves
+        or the detector is armed: what it would learn then is no noise."""
         if self._armed is not None:
             raise ValueError(f"armed for {self._armed.mode}; the noise is learnt between actions, send mode off first")
         if not self.still():

@@ -119,7 +119,8 @@ def await_offer(state: CoglabState, target: str, goal: Mapping[str, Any], margin
     limit = float(config.get("handover.offer_timeout", 8.0))
     end = state.ctx.clock.now() + limit
     seen: list[tuple[float, np.ndarray]] = []
-    offer = "the person's hand within reach" if target == config.get("perception.human_hand") else f"'{target}' on offer"
+    person = target == config.get("perception.human_hand", "human_hand")
+    offer = "the person's hand within reach" if person else f"'{target}' on offer"
     with state.ctx.journal.waiting(f"{state.path()}/{state.label}/offer", Wait(offer, end)):
         while True:
             located = locate(state, target)
