@@ -87,7 +87,7 @@ def test_what_is_waited_for_is_told_with_its_deadline():
 def test_a_wait_that_is_put_off_is_told_again():
     journal = Journal(lambda: 0.0)
     told = []
-    journal.listen_changes(lambda: told.append(journal.wait()))
+    journal.listen_waits(lambda: told.append(journal.wait()))
     journal.waits("/m/a", Wait("the reach", 5.0))
     journal.waits("/m/b", Wait("another pattern", math.inf))
     assert journal.wait() == Wait("the reach", 5.0)

@@ -99,6 +99,7 @@ class Journal:
         self._action: ActionRecord | None = None
         self._active: list[str] = []
         self._waits: dict[str, Wait] = {}
+        self._wait_listeners: list[Callable[[], None]] = []
         self._change_listeners: list[Callable[[], None]] = []
 
     def listen(self, on_transition: Callable[[TransitionRecord], None]) -> None:
@@ -112,6 +113,10 @@ class Journal:
     def listen_changes(self, on_change: Callable[[], None]) -> None:
         """Call this whenever another state is active, or something else is to be told as the newest failure."""
         self._change_listeners.append(on_change)
+
+    def listen_waits(self, on_change: Callable[[], None]) -> None:
+        """Call this whenever a state begins to wait for something, puts the end of a wait off, or waits no more."""
+        self._wait_listeners.append(on_change)
 
     def changed(self) -> None:
         """Tell whoever listens for changes."""
@@ -136,7 +141,8 @@ class Journal:
                 self._waits.pop(path, None)
             else:
                 self._waits[path] = wait
-        self.changed()
+        for listener in self._wait_listeners:
+            listener()
 
     @contextmanager
     def waiting(self, path: str, wait: Wait) -> Iterator[None]:

@@ -34,6 +34,7 @@ class StateWatch:
         self._lock = threading.Lock()
         self._shown: MasterState | None = None
         ctx.journal.listen_changes(self._look)
+        ctx.journal.listen_waits(self._look)
         self._look()
 
     def _look(self) -> None:
