@@ -84,7 +84,7 @@ class Console(unittest.TestCase):
         return self.browser.driver.find_element(By.CSS_SELECTOR, f"[data-action={action}]")
 
     def test_01_everything_is_on_the_page_without_scrolling(self):
-        self.page_in("wait_without_object", 90.0)
+        self.ready("wait_without_object")
         self.browser.until(
             "return coglab.docs()['graph:/coglab'] && document.querySelectorAll('#graph .node.active').length", 20.0
         )
@@ -170,18 +170,20 @@ class Console(unittest.TestCase):
         end = time.monotonic() + 120.0
         while not self.machine.state.endswith(hub):
             self.assertLess(time.monotonic(), end, f"{hub}: {self.machine.state}, {self.machine.why}")
-            if self.machine.state.endswith("/stopped"):
+            if self.machine.state.endswith(("/stopped", "/fault")):
                 self.go_on(hub)
             time.sleep(0.05)
         self.page_in(hub)
 
     def go_on(self, hub="wait_with_object"):
-        """The two acts after a stop."""
-        self.page_in("/stopped")
+        """The two acts after a stop or a fault."""
+        leaf = "/fault" if self.machine.state.endswith("/fault") else "/stopped"
+        self.page_in(leaf)
         self.browser.until("return document.getElementById('acknowledge').offsetParent !== null", 20.0)
         self.browser.driver.find_element(By.ID, "acknowledge").click()
         self.browser.until("return coglab.docs().desk.guard.unacknowledged === false", 20.0)
-        press_and_hold(self.browser, self.enabled("reset"), lambda: not self.machine.state.endswith("/stopped"), 30.0)
+        button = self.enabled("initialise" if leaf == "/fault" else "reset")
+        press_and_hold(self.browser, button, lambda: not self.machine.state.endswith(leaf), 30.0)
         self.page_in(hub)
 
     def reach(self):
