@@ -17,17 +17,16 @@ import time
 from pathlib import Path
 from xmlrpc.client import ServerProxy
 
-import aiohttp
 import rosgraph
 from coglab_console.browser import Browser, fresh_link
 from console_cell import Cell, Operator
+from console_load import flooded, load
 
 PRESSES = 200
 PHASES = {  # action: labels in which STOP is pressed
     "exchange_human_to_robot": ("set_dmp_goal", "execute_dmp", "wait_stop", "hand_close", "coglab_home_robot"),
     "exchange_robot_to_human": ("set_dmp_goal", "execute_dmp", "wait_stop", "hand_open", "coglab_home_robot"),
 }
-WATCHED = 15.0  # s, with five browsers
 BLOCK = 10.0  # s, with or without the console
 
 
@@ -143,56 +142,20 @@ def action_rows(cell: Cell, operator: Operator) -> list[dict]:
 # --- load -----------------------------------------------------------------------------------------------------
 
 
-def processor_time(process: int) -> float:
-    """s of processor time that a process has used."""
-    fields = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()
-    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
-
-
-async def watch_as(home: Path, used: set[str], began: asyncio.Event) -> int:
-    """One browser's connection that reads everything; states received after `began`."""
-    link = fresh_link(home, limit=5.0)
-    while link in used:
-        await asyncio.sleep(0.05)
-        link = fresh_link(home, limit=5.0)
-    used.add(link)
-    origin = link.split("/?")[0]
-    count = 0
-    async with aiohttp.ClientSession(cookie_jar=aiohttp.CookieJar(unsafe=True)) as client:
-        async with client.get(link):
-            pass
-        async with client.ws_connect(origin.replace("http", "ws") + "/ws", headers={"Origin": origin}) as ws:
-            await ws.send_str("{}")
-            await began.wait()
-            end = time.monotonic() + WATCHED
-            while time.monotonic() < end:
-                message = await ws.receive_str(timeout=5)
-                count += message.startswith('{"t":"state"')
-    return count
-
-
-async def load(home: Path, process: int) -> tuple[float, float]:
-    """Share of a core that the node uses with five connections, and the slowest one's rate (Hz)."""
-    used: set[str] = set()
-    began = asyncio.Event()
-    watchers = []
-    for _ in range(5):
-        watchers.append(asyncio.create_task(watch_as(home, used, began)))
-        await asyncio.sleep(0.5)
-    await asyncio.sleep(1.0)
-    before, since = processor_time(process), time.monotonic()
-    began.set()
-    counts = await asyncio.gather(*watchers)
-    return (processor_time(process) - before) / (time.monotonic() - since), min(counts) / WATCHED
-
-
 def load_rows(cell: Cell) -> list[dict]:
     uri = rosgraph.Master("/console_bench").lookupNode("/coglab_console")
     process = ServerProxy(uri).getPid("/console_bench")[2]
     share, rate = asyncio.run(load(cell.home, process))
+    sent, refused, states, stop = asyncio.run(flooded(cell.home))
+    cell.wait(lambda: cell.arm.hold_latched, 3.0, "the hold")
+    cell.reset_arm()
+    beside = f"beside a browser that never reads and {sent:.0f} requests/s"
     return [
         row("node with 5 browsers", round(100 * share, 1), "% of a core", "<= 25", share <= 0.25),
         row("state to the slowest of 5 browsers", round(rate, 1), "Hz", ">= 28", rate >= 28.0),
+        row(f"refused of {sent:.0f} requests a second by one browser", round(100 * refused, 1), "%", "told", True),
+        row(f"state to another browser {beside}", round(states, 1), "Hz", ">= 28", states >= 28.0),
+        row(f"longest STOP to its answer {beside}", round(1000 * stop, 1), "ms", "<= 100", stop <= 0.1),
     ]
 
 
@@ -315,7 +278,7 @@ def take_control(browser: Browser) -> None:
     """The browsers that measured before may hold the control; they are gone."""
     operating = "return document.getElementById('role').innerText.startsWith('you operate')"
     if not browser.js(operating):
-        browser.js("document.querySelector('#role button').click()")
+        browser.js("document.querySelector('#control button').click()")
     browser.until(operating, 15.0)
 
 

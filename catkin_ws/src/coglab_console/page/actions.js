@@ -58,6 +58,17 @@ function argumentsOf(name) {
   return ['start', { action: name }];
 }
 
+/** Says above the actions, for some seconds, why something was not done. */
+export function refuse(text) {
+  const told = document.getElementById('told');
+  told.textContent = text;
+  told.hidden = false;
+  clearTimeout(refuse.timer);
+  refuse.timer = setTimeout(() => {
+    told.hidden = true;
+  }, 6000);
+}
+
 /**
  * A button that acts when pressed, or after 0.8 s of holding where `mustHold()`; Enter is as good as the mouse.
  * Letting go, losing the focus or the page ends the holding.
@@ -78,6 +89,7 @@ export function actionButton(label, { blockedBy, mustHold, request, tell }) {
     const [name, args] = request();
     const once = () => send({ t: 'hold', name, arguments: args }, (answer) => {
       tell(answer.message);
+      if (!answer.success) refuse(`${label}: ${answer.message}`);
       release();
     });
     tell('hold …');
@@ -92,7 +104,12 @@ export function actionButton(label, { blockedBy, mustHold, request, tell }) {
       if (event.type === 'keydown') event.preventDefault();
     }
   };
-  button.addEventListener('pointerdown', (event) => event.button === 0 && begin(event));
+  button.addEventListener('pointerdown', (event) => {
+    if (event.button !== 0) return;
+    if (button.hasPointerCapture(event.pointerId)) button.releasePointerCapture(event.pointerId); // a finger that slides away leaves, too
+    begin(event);
+  });
+  button.addEventListener('contextmenu', (event) => event.preventDefault()); // that of a long touch
   for (const name of ['pointerup', 'pointerleave', 'pointercancel', 'blur']) button.addEventListener(name, release);
   document.addEventListener('visibilitychange', release);
   button.addEventListener('keydown', (event) => {
@@ -103,8 +120,14 @@ export function actionButton(label, { blockedBy, mustHold, request, tell }) {
   button.addEventListener('keyup', (event) => event.key === 'Enter' && release());
   button.addEventListener('click', async () => {
     const reason = blockedBy();
-    if (reason) tell(reason);
-    else if (!held && !mustHold()) tell((await command(...request())).message);
+    if (reason) {
+      tell(reason);
+      refuse(`${label}: ${reason}`);
+    } else if (!held && !mustHold()) {
+      const answer = await command(...request());
+      tell(answer.message);
+      if (!answer.success) refuse(`${label}: ${answer.message}`);
+    }
   });
   return button;
 }

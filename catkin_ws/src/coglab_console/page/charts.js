@@ -1,5 +1,5 @@
 // Strip charts on one time axis (the last 20 s), drawn by Debian's dygraphs; phases as bars above them.
-import { h, paced, setText } from './dom.js';
+import { drawn, h, setText } from './dom.js';
 import { on, onDocs, store } from './store.js';
 
 const WINDOW = 20; // s
@@ -10,10 +10,16 @@ const BARS = ['#56b4e9', '#cfd6dc', '#f0e442', '#b9c2ca'];
 
 const STRIPS = [
   { name: 'Speed, m/s', series: ['palm', 'planned'], colours: [0, 1], of: (s, plan) => [s.speed, plan] },
-  { name: 'Torque change, Nm', series: ['A1', 'A2', 'A3', 'limit'], colours: [0, 2, 4, 3], of: (s) => [...JOINTS.map((j) => Math.abs(s.rate[j])), Math.min(...JOINTS.map((j) => s.threshold[j]))] },
+  { name: 'Torque change, Nm', series: ['A1', 'A2', 'A3', 'limit'], colours: [0, 2, 4, 3], of: (s) => [...JOINTS.map((j) => (j in s.rate ? Math.abs(s.rate[j]) : null)), limit(s)] },
   { name: 'FRI, ms', series: ['latency', 'answer'], colours: [0, 1], of: (s) => [s.fri, s.answer] },
-  { name: 'Finger current', series: ['thumb', 'index', 'middle'], colours: [0, 2, 4], of: (s) => [s.current[1] ?? null, s.current[2] ?? null, s.current[3] ?? null] },
+  { name: 'Finger current, counts', series: ['thumb', 'abd.', 'index', 'mid.', 'ring'], colours: [0, 1, 2, 4, 3], of: (s) => [1, 0, 2, 3, 4].map((motor) => s.current[motor] ?? null) },
 ];
+
+/** The smallest threshold of the joints that the detector watches. */
+function limit(state) {
+  const counted = state.threshold.filter((_, j) => state.watched[j]);
+  return counted.length ? Math.min(...counted) : null;
+}
 
 let phases = []; // [from (s), label]
 let latest = 0;
@@ -46,7 +52,7 @@ function drawPhases(canvas) {
   if (canvas.height !== height) canvas.height = height;
   const context = canvas.getContext('2d');
   context.clearRect(0, 0, width, height);
-  context.font = '13px "DejaVu Sans", Verdana, sans-serif';
+  context.font = '14px "DejaVu Sans", Verdana, sans-serif';
   const left = 42; // where the charts' time axis begins
   const x = (stamp) => left + ((stamp - latest + WINDOW) / WINDOW) * (width - left - 4);
   phases.forEach(([from, label], i) => {
@@ -119,7 +125,7 @@ export function showCharts(parent) {
   }
   parent.append(note);
 
-  const redraw = paced(() => {
+  const redraw = drawn(() => {
     if (parent.offsetParent === null) return;
     drawPhases(bars);
     STRIPS.forEach((strip, i) => {
@@ -128,7 +134,7 @@ export function showCharts(parent) {
       if (strip.chart) strip.chart.updateOptions({ file: strip.rows, ...range });
       else strip.chart = new window.Dygraph(strip.place, strip.rows, { ...optionsOf(strip, i === STRIPS.length - 1), ...range });
     });
-  }, 250);
+  }, () => 250);
 
   on('state', (state) => {
     rememberPhase(state);

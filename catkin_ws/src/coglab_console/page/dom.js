@@ -30,6 +30,7 @@ export function setAttribute(element, name, value) {
   else if (element.getAttribute(name) !== String(value)) element.setAttribute(name, value);
 }
 
+const FRAME = 17; // ms, the screen's own
 const MARKS = { ok: '●', warn: '▲', fault: '■', idle: '○' };
 
 /** Shape and word for a level: colour is never the only code. */
@@ -44,21 +45,66 @@ export function table(header, rows, caption) {
   return h('table', {}, caption ? h('caption', { hidden: true }, caption) : null, h('thead', {}, head), h('tbody', {}, body));
 }
 
-/** Calls `draw` at most so often that it takes a quarter of the time, and never while the page is hidden. */
-export function paced(draw, period) {
-  const shortest = typeof period === 'function' ? period : () => period;
+const MOST = 2000; // ms, the longest rest after a picture
+const asked = new Set(); // drawings that are to be done
+let armed = false;
+let restUntil = 0;
+
+/** A function that asks for `update`, which changes words alone: done at most once a `period` (ms), whatever is drawn. */
+export function paced(update, period) {
   let due = 0;
   let waiting = false;
-  const run = () => {
-    waiting = false;
-    const began = performance.now();
-    if (!document.hidden) draw();
-    const took = performance.now() - began;
-    due = performance.now() + Math.max(shortest(), 3 * took);
-  };
   return () => {
     if (waiting) return;
     waiting = true;
-    setTimeout(() => requestAnimationFrame(run), Math.max(0, due - performance.now()));
+    setTimeout(() => {
+      waiting = false;
+      const began = performance.now();
+      if (!document.hidden) update();
+      due = performance.now() + Math.max(period, 3 * (performance.now() - began));
+    }, Math.max(0, due - performance.now()));
   };
+}
+
+/**
+ * A function that asks for `draw`: done in the next picture, at most once a `period()` (ms), never while the page is hidden.
+ * All drawings together take a quarter of the time: the time of a picture is what the page waited for its turn, drew, and was
+ * busy afterwards, which without a graphics card is most of it, and messages and clicks would stand in line behind it.
+ */
+export function drawn(draw, period) {
+  const job = { draw, period, due: 0 };
+  return () => {
+    asked.add(job);
+    arm();
+  };
+}
+
+function arm() {
+  if (armed || !asked.size) return;
+  armed = true;
+  const due = Math.max(restUntil, Math.min(...[...asked].map((job) => job.due)));
+  setTimeout(() => {
+    const since = performance.now();
+    requestAnimationFrame(() => picture(since));
+  }, Math.max(0, due - performance.now()));
+}
+
+function picture(since) {
+  const began = performance.now();
+  for (const job of [...asked].filter((one) => one.due <= began)) {
+    asked.delete(job);
+    job.due = began + job.period();
+    try {
+      job.draw();
+    } catch (error) {
+      console.error(error); // one panel that fails takes no other along
+    }
+  }
+  setTimeout(() => {
+    const ended = performance.now();
+    const took = Math.max(0, began - since - FRAME) + ended - began;
+    restUntil = ended + Math.min(MOST, 3 * took);
+    armed = false;
+    arm();
+  });
 }

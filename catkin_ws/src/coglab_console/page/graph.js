@@ -3,6 +3,7 @@ import { h, setText, svg } from './dom.js';
 import { onDocs, store, on } from './store.js';
 
 const MAIN = '/coglab';
+const READABLE = 14 / 11; // px a unit of the picture, whose letters are 11 high, to be 14
 let drawn = null;
 let parts = {};
 
@@ -45,7 +46,7 @@ function shape(item, kind, x, y, anchor) {
 }
 
 /** The part of the picture to show: the innermost active container, or all of it. */
-function frameOf(active, follow) {
+function frameOf(active, follow, place) {
   const whole = [0, 0, ...drawn.size];
   if (!follow || !active.length) return whole;
   const deepest = active.reduce((a, b) => (b.split('/').length > a.split('/').length ? b : a));
@@ -53,7 +54,7 @@ function frameOf(active, follow) {
   const leaf = parts.items[deepest]?.[2];
   if (!box || !leaf) return whole;
   const [x, y, w, high] = box.box;
-  const limit = [520, 300]; // larger than this nobody can read it: the surroundings of the state instead
+  const limit = [place.clientWidth, place.clientHeight].map((size) => Math.max(60, size / READABLE - 12)); // beyond that nobody can read it: the surroundings of the state instead
   if (w <= limit[0] && high <= limit[1]) return [x - 6, y - 6, w + 12, high + 12];
   const width = Math.min(w, limit[0]);
   const height = Math.min(high, limit[1]);
@@ -67,7 +68,7 @@ export function showGraph(parent) {
   const crumbs = h('p', { class: 'crumbs', 'aria-live': 'polite' });
   const last = h('p', { class: 'last' });
   const picture = svg('svg', { role: 'img', 'aria-label': 'Graph of the state machine' });
-  parent.append(h('header', {}, h('label', {}, select), extent), crumbs, picture, last);
+  parent.append(h('header', {}, h('label', {}, select), crumbs, extent), picture, last);
 
   function names() {
     const known = machines();
@@ -100,7 +101,7 @@ export function showGraph(parent) {
     } else setText(last, '');
     const deepest = active.reduce((a, b) => (b.length > a.length ? b : a), '');
     setText(crumbs, graph.problem || deepest.split('/').filter(Boolean).slice(1).join(' › ') || 'not active');
-    picture.setAttribute('viewBox', frameOf(active, extent.value === 'follow').join(' '));
+    picture.setAttribute('viewBox', frameOf(active, extent.value === 'follow', picture).join(' '));
   }
 
   on('doc', (name) => {

@@ -1,23 +1,40 @@
 // The connection to the server: one WebSocket that comes back by itself, and commands by POST.
 import { store, take, tell } from './store.js';
+import { setText } from './dom.js';
 
 const HEADERS = { 'Content-Type': 'application/json', 'X-CogLab-Console': '1' };
 const SILENCE = 700; // ms without a word after which the page is greyed
+const BEHIND = 500; // ms of age from which the page says how old it is
 const RETRY = 500; // ms
+const GIVEN_UP = 2500; // ms without a word after which a connection that says it is open is taken to be dead
 
 let socket = null;
+let openedAt = -Infinity;
 let nextId = 1;
 const waiting = new Map();
 
+/** A new connection in place of the one before, which is not listened to any more. */
 function open() {
-  socket = new WebSocket(`ws://${location.host}/ws`);
-  socket.onopen = () => socket.send(JSON.stringify({ seq: store.seq, epoch: store.epoch }));
-  socket.onmessage = (event) => {
+  const mine = new WebSocket(`ws://${location.host}/ws`);
+  socket = mine;
+  openedAt = performance.now();
+  mine.onopen = () => mine === socket && mine.send(JSON.stringify({ seq: store.seq, epoch: store.epoch }));
+  mine.onmessage = (event) => {
+    if (mine !== socket) return;
     const message = JSON.parse(event.data);
     if (message.t === 'answer') answered(message);
     else take(message);
+    if (message.t === 'state') mine.send(`{"t":"seen","n":${message.n}}`); // the next ones come only then
   };
-  socket.onclose = () => setTimeout(open, RETRY);
+  mine.onclose = () => setTimeout(() => mine === socket && open(), RETRY);
+}
+
+/** A cable that was pulled closes nothing: the browser would wait for the network's own limit, many minutes. */
+function comeBack() {
+  if (performance.now() - Math.max(store.heardAt, openedAt) < GIVEN_UP) return;
+  const dead = socket;
+  open();
+  dead?.close();
 }
 
 function answered(message) {
@@ -58,17 +75,25 @@ export function stop() {
   return sent ? Promise.resolve({ success: true, message: 'STOP was sent' }) : posted;
 }
 
+/** s from the moment when what is shown left the console until now, without what the fastest message took. */
+export function behind() {
+  return (performance.now() - store.state?.at - store.fastest) / 1000;
+}
+
 function watch() {
   const silent = performance.now() - store.stateAt;
   const lost = silent > SILENCE;
   const band = document.getElementById('lost');
+  const age = 1000 * behind();
   document.body.classList.toggle('lost', lost);
-  band.hidden = !lost;
-  if (lost) band.textContent = Number.isFinite(silent) ? `NOT LIVE for ${Math.round(silent / 1000)} s` : 'NOT LIVE';
+  band.hidden = !lost && !(age > BEHIND);
+  if (lost) setText(band, Number.isFinite(silent) ? `NOT LIVE for ${Math.round(silent / 1000)} s` : 'NOT LIVE');
+  else if (age > BEHIND) setText(band, `${(age / 1000).toFixed(1)} s behind`);
   if (lost !== store.lost) {
     store.lost = lost;
     tell('link');
   }
+  comeBack();
 }
 
 export function connect() {

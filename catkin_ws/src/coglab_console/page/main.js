@@ -66,7 +66,8 @@ function showBand() {
   const words = h('span');
   const answer = h('span', { 'aria-live': 'polite' });
   const control = takeOver(answer);
-  at('role').append(words, ' ', control, ' ', answer);
+  at('role').append(words);
+  at('control').append(answer, ' ', control);
   const draw = () => {
     const roles = store.docs.desk?.roles;
     setText(words, roles ? (operating() ? `you operate (${store.you})` : `you watch (${store.you}); ${roles.operator || 'nobody'} operates`) : '');

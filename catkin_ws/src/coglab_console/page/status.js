@@ -3,7 +3,7 @@ import { h, mark, paced, setText } from './dom.js';
 import { on, onDocs, store } from './store.js';
 import { ageWords } from './cell.js';
 
-const ROWS = ['Phase', 'since', 'FRI', 'Arm', 'Motion', 'Hand', 'Person', 'Object', 'Contact', 'Why', 'Last'];
+const ROWS = ['Phase', 'Waits', 'FRI', 'Arm', 'Motion', 'Hand', 'Person', 'Object', 'Contact', 'Why', 'Last'];
 const OLD = 0.5; // s, sights of perception older than this deserve a mark
 
 function fri({ alive, fri: state, quality, cycle, reason }) {
@@ -52,16 +52,18 @@ function object() {
 
 function contact() {
   const margin = store.state?.margin;
-  const { words } = store.docs.status.contact;
+  const { words, alive, state, mode } = store.docs.status.contact;
+  if (!alive) return ['warn', 'no detector, or no torques'];
+  if (state === 'waiting') return ['idle', `armed for ${mode}, until the arm is still`];
   if (margin === null || margin === undefined) return ['idle', `not armed${words ? `; last: ${words}` : ''}`];
   return [margin > 1 ? 'warn' : 'ok', `armed, margin ${margin.toFixed(2)} of 1`];
 }
 
-function timing({ limit }) {
-  const since = store.state?.since ?? 0;
-  if (!limit) return ['idle', `${since.toFixed(1)} s, no limit of its own`];
-  const left = limit - since;
-  return [left < 1 ? 'warn' : 'idle', `${since.toFixed(1)} s; ${Math.max(0, left).toFixed(1)} s left of ${limit.toFixed(0)} s`];
+/** What the brain waits for and when it gives up, as it tells itself. */
+function waiting({ waits }) {
+  const { since = 0, left = null } = store.state ?? {};
+  if (!waits) return ['idle', `${since.toFixed(1)} s, without a limit`];
+  return [left !== null && left < 1 ? 'warn' : 'idle', `${waits}; ${left === null ? 'without a limit' : `${left.toFixed(1)} s left`}`];
 }
 
 function rows() {
@@ -70,7 +72,7 @@ function rows() {
   const stood = machine.state.endsWith('/fault') || machine.state.endsWith('/stopped');
   return {
     Phase: machine.alive ? [stood ? 'fault' : machine.hub ? 'ok' : 'idle', machine.words] : ['fault', 'the brain (/coglab) is not there'],
-    since: timing(machine),
+    Waits: waiting(machine),
     FRI: fri(a),
     Arm: arm(a),
     Motion: motion(manager),
@@ -88,7 +90,7 @@ export function showStatus(parent) {
   const list = h('dl');
   for (const name of ROWS) {
     const words = h('span');
-    const cell = h('dd', { class: { Phase: 'phase', Why: 'tall', Last: 'tall' }[name] ?? '' }, mark('idle'), words);
+    const cell = h('dd', { class: { Phase: 'phase', Waits: 'tall', Why: 'tall', Last: 'tall' }[name] ?? '' }, mark('idle'), words);
     cells[name] = { cell, words, level: 'idle' };
     list.append(h('dt', {}, name), cell);
   }

@@ -4,6 +4,7 @@ export const store = {
   state: null, // the newest state, see ros_view.frame
   stateAt: -Infinity, // ms of performance.now
   heardAt: -Infinity,
+  fastest: Infinity, // ms of performance.now minus the console's clock, of the state that came fastest: the best guess of their difference
   docs: {},
   events: [],
   seq: 0,
@@ -44,6 +45,7 @@ export function take(message) {
   if (message.t === 'state') {
     store.state = message;
     store.stateAt = store.heardAt;
+    store.fastest = Math.min(store.fastest, store.heardAt - message.at);
     tell('state', message);
   } else if (message.t === 'doc') {
     store.docs[message.name] = message.value;
@@ -55,6 +57,7 @@ export function take(message) {
       store.events = [];
       store.seq = 0;
     }
+    store.fastest = Infinity;
     store.epoch = message.epoch;
     store.you = message.name;
     tell('link');

@@ -1,7 +1,7 @@
-// Contact work-bench: torque change per joint against its threshold, live; learning at rest; trying the detector.
+// Contact work-bench: what the detector itself sees, per joint against its threshold, live; learning at rest; trying it.
 import { h, setText } from './dom.js';
 import { store } from './store.js';
-import { field, sender } from './tab_experiment.js';
+import { field, heldSender, sender } from './tab_experiment.js';
 
 const JOINTS = ['A1', 'A2', 'E1', 'A3', 'A4', 'A5', 'A6'];
 
@@ -14,14 +14,16 @@ export function contactPage(page) {
     const fill = h('i');
     const limit = h('b');
     const value = h('span');
-    return { row: h('div', { class: 'bar' }, h('span', {}, name), h('span', {}, fill, limit), value), fill, limit, value, peak: 0 };
+    const label = h('span', {}, name);
+    return { name: label, row: h('div', { class: 'bar' }, label, h('span', {}, fill, limit), value), fill, limit, value, peak: 0 };
   });
+  const title = h('span', {}, 'Change of the external torques, Nm');
   const k = h('input', { type: 'number', min: 3, max: 50, step: 0.5, value: 6 });
   const timeout = h('input', { type: 'number', min: 1, max: 60, value: 20 });
   page.append(
-    h('div', {}, h('h2', {}, 'Change of the external torques within 40 ms, Nm'), ...bars.map((bar) => bar.row),
-      h('p', {}, 'Bar: the largest change of the last second. Black line: k robust standard deviations at rest. The console’s own figures; the detector learns its own.')),
-    h('div', {}, h('h2', {}, 'Noise at rest'), learnt, h('div', { class: 'row' }, sender('Learn from 5 s at rest', told, () => ['contact_learn', {}])),
+    h('div', {}, h('h2', {}, title), ...bars.map((bar) => bar.row),
+      h('p', {}, 'What the contact detector sees and compares (contact_detector/signal). Bar: the largest change of the last second. Black line: its threshold, k robust standard deviations at rest; with a mark: the joint counts now.')),
+    h('div', {}, h('h2', {}, 'Noise at rest'), learnt, h('div', { class: 'row' }, heldSender('Learn anew at rest', told, () => ['contact_learn', {}])),
       h('h2', {}, 'Try the detector'), detector,
       h('div', { class: 'row' }, field('Threshold k', k), field('For, s', timeout),
         sender('Watch for contact', told, () => ['contact_arm', { mode: 'contact', k: Number(k.value), timeout: Number(timeout.value) }]),
@@ -30,22 +32,26 @@ export function contactPage(page) {
 
   const onState = (state) => {
     bars.forEach((bar, i) => {
-      const rate = Math.abs(state.rate[i]);
+      const rate = Math.abs(state.rate[i] ?? 0);
       bar.peak = Math.max(rate, bar.peak * 0.97);
-      const factor = Number(k.value) / (store.docs.status?.contact.k || 6);
-      const threshold = state.threshold[i] * factor;
+      const threshold = state.threshold[i] ?? 0;
+      setText(bar.name, `${JOINTS[i]} ${state.watched[i] ? '●' : '○'}`);
       const full = Math.max(1.5 * threshold, 0.05);
       bar.fill.style.width = `${Math.min(100, (100 * bar.peak) / full)}%`;
       bar.limit.style.left = `${(100 * threshold) / full}%`;
       setText(bar.value, bar.peak.toFixed(3));
     });
-    setText(detector, state.margin === null ? 'The detector is not watching.' : `Watching: margin ${state.margin.toFixed(2)}; contact counts from 1.`);
+    const { alive, state: stands, mode } = store.docs.status?.contact ?? {};
+    setText(detector, !alive ? 'The detector says nothing: it is not there, or no torques come.'
+      : state.margin !== null ? `Watching for ${mode}: margin ${state.margin.toFixed(2)}; it counts from 1.`
+        : stands === 'waiting' ? `Armed for ${mode}; waits until the arm stands still and enough was learnt.` : 'The detector is off.');
   };
   const onStatus = () => {
     const contact = store.docs.status?.contact;
     if (!contact) return;
-    const sigma = contact.sigma.map((value, i) => `${JOINTS[i]} ${value.toFixed(3)}`).join(', ');
-    setText(learnt, contact.learning ? 'Learning; leave the arm alone …' : `${contact.learnt ? 'Learnt' : 'Not learnt yet; smallest deviation believed'}: ${sigma} Nm`);
+    const sigma = (store.state?.threshold ?? []).map((value, i) => `${JOINTS[i]} ${(value / contact.k).toFixed(3)}`).join(', ');
+    setText(title, `Change of the external torques within ${Math.round(contact.window * 1000)} ms, Nm`);
+    setText(learnt, `${contact.learnt ? 'Learnt' : 'Learning; leave the arm alone'}: ${contact.samples} samples at rest; standard deviations ${sigma} Nm; k ${contact.k}`);
   };
   onStatus();
   return { state: onState, docs: { status: onStatus } };

@@ -2,6 +2,7 @@
 import { h, setText, table } from './dom.js';
 import { onDocs, operating, store } from './store.js';
 import { command } from './link.js';
+import { actionButton } from './actions.js';
 import { clock } from './log.js';
 
 export function field(label, input) {
@@ -14,6 +15,12 @@ export function sender(label, told, request) {
     const [name, args] = request();
     setText(told, (await command(name, args)).message);
   } }, label);
+}
+
+/** The same for what needs a second thought: nothing before the button was held for 0.8 s. */
+export function heldSender(label, told, request) {
+  const blockedBy = () => (operating() ? '' : 'only the operator changes this');
+  return actionButton(label, { blockedBy, mustHold: () => true, request, tell: (text) => setText(told, text) });
 }
 
 function form(told) {

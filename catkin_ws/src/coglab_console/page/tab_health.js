@@ -24,12 +24,15 @@ export function healthPage(page) {
   let known = [];
   const show = () => parameters.replaceChildren(table(['Parameter', 'Value'], known.filter(([name]) => name.includes(filter.value)).slice(0, 150), 'Parameters'));
   const read = h('button', { type: 'button', onclick: async () => {
-    known = (await command('parameters')).data ?? [];
+    const answer = await command('parameters');
+    known = answer.data ?? [];
+    setText(marked, answer.message);
     show();
-  } }, 'Read the parameters');
+  } }, 'Read again');
+  const marked = h('p');
   page.append(h('div', {}, h('h2', {}, 'Diagnostics'), tree),
     h('div', {}, h('h2', {}, 'Versions and browsers'), versions, h('h2', {}, 'Hand'), h('p', {}, 'A complete or forced calibration opens the hand, whatever it holds: hold the button.'), h('div', { class: 'row' }, heavy('Complete calibration', { mode: 'complete' }, told), heavy('Forced calibration', { mode: 'complete', force: true }, told)), told,
-      h('h2', {}, 'Parameters'), h('div', { class: 'row' }, read, h('label', {}, 'Filter', filter)), parameters));
+      h('h2', {}, 'Parameters'), marked, h('div', { class: 'row' }, read, h('label', {}, 'Filter', filter)), parameters));
   const draw = () => {
     const { rows = [], versions: words = {}, browsers = [] } = store.docs.health ?? {};
     const focused = document.activeElement?.dataset?.name;
@@ -45,6 +48,7 @@ export function healthPage(page) {
     versions.replaceChildren(table(['', ''], [...Object.entries(words), ...more], 'Versions'));
   };
   draw();
+  read.click();
   return { docs: { health: draw } };
 }
 

@@ -1,12 +1,12 @@
 // Objects, primitives and feedback controllers.
 import { h, mark, setText, table } from './dom.js';
 import { store } from './store.js';
-import { sender } from './tab_experiment.js';
+import { heldSender, sender } from './tab_experiment.js';
 
 export function objectsPage(page) {
   page.className = 'page two';
   const told = h('p', { 'aria-live': 'polite' });
-  const problems = h('p', { id: 'object-problems' });
+  const problems = h('ul', { id: 'object-problems' });
   const list = h('div');
   const entry = h('pre', { tabindex: '0', 'aria-label': 'Entry of the database' });
   page.append(
@@ -14,8 +14,9 @@ export function objectsPage(page) {
       h('p', {}, 'A new object: ./coglab object new NAME, then ./coglab object check NAME. The console writes no object file.')),
     h('div', {}, h('h2', {}, 'Entry'), entry));
   const draw = () => {
-    const { rows = [], problems: words = '' } = store.docs.objects ?? {};
-    problems.replaceChildren(mark(words ? 'warn' : 'ok'), words || 'Every file fits the schema.');
+    const { rows = [], asked = false, problems: words = [] } = store.docs.objects ?? {};
+    const all = asked ? [['ok', `The database has checked its files: ${rows.length} objects, every file fits.`]] : [['idle', 'The object database has not been asked, or is not there.']];
+    problems.replaceChildren(...(words.length ? words.map((text) => ['warn', text]) : all).map(([level, text]) => h('li', { class: level === 'warn' ? 'warnrow' : '' }, mark(level), text)));
     list.replaceChildren(table(['Object', 'Name', 'kg', 'Shape', ''], rows.map((row) => [row.id, row.name, row.mass, row.shape?.type ?? '', h('button', { type: 'button', 'aria-label': `Show ${row.id}`, onclick: () => setText(entry, row.text) }, 'Show')]), 'Objects'));
     if (!entry.textContent && rows.length) setText(entry, rows[0].text);
   };
@@ -29,7 +30,7 @@ function plot(row) {
   const end = row.plot[row.plot.length - 1][0];
   const all = row.plot.flatMap((point) => point.slice(1));
   const [low, high] = [Math.min(...all, 0), Math.max(...all, 0.1)];
-  const x = (t) => 8 + (t / end) * 470;
+  const x = (t) => 8 + (t / end) * 428;
   const y = (value) => 140 - ((value - low) / (high - low)) * 128;
   [['x, m', '#0072b2', []], ['y, m', '#009e73', [8, 4]], ['z, m', '#cc79a7', [2, 3]], ['speed, m/s', '#1b1f24', [12, 3, 3, 3]]].forEach(([name, colour, dash], i) => {
     context.strokeStyle = colour;
@@ -37,14 +38,14 @@ function plot(row) {
     context.setLineDash(dash);
     context.beginPath();
     for (const point of row.plot) context.lineTo(x(point[0]), y(point[i + 1]));
-    context.moveTo(484, 18 + 20 * i);
-    context.lineTo(500, 18 + 20 * i);
+    context.moveTo(444, 18 + 20 * i);
+    context.lineTo(462, 18 + 20 * i);
     context.stroke();
     context.fillStyle = '#1b1f24';
-    context.font = '12px sans-serif';
-    context.fillText(name, 503, 22 + 20 * i);
+    context.font = '14px "DejaVu Sans", Verdana, sans-serif';
+    context.fillText(name, 466, 23 + 20 * i);
   });
-  context.fillText(`0 … ${end.toFixed(2)} s`, 484, 120);
+  context.fillText(`0 … ${end.toFixed(2)} s`, 444, 120);
   return canvas;
 }
 
@@ -78,24 +79,37 @@ export function feedbackPage(page) {
   const list = h('div');
   const shares = h('div');
   page.append(h('h2', {}, 'Feedback controllers in execution order'), told, list, h('h2', {}, 'Who changed what in the newest cycle'), shares);
-  const verbs = (row) => h('div', { class: 'row' }, ...[row.enabled ? 'disable' : 'enable', row.paused ? 'resume' : 'pause'].map((verb) => {
-    const button = sender(verb, told, () => ['feedback', { verb, name: row.name }]);
-    button.setAttribute('aria-label', `${verb} ${row.name}`);
+  // Rows are made anew only when there are other ones: a button that is held down must stay.
+  let made = '';
+  let shown = [];
+  const heldButton = (label, words, request) => {
+    const button = heldSender(label, told, request);
+    button.setAttribute('aria-label', words);
     return button;
-  }));
+  };
+  const verbs = (row) => [row.enabled ? 'disable' : 'enable', row.paused ? 'resume' : 'pause'].map((verb) => heldButton(verb, `${verb} ${row.name}`, () => ['feedback', { verb, name: row.name }]));
   const order = (rows, i, step) => {
     const names = rows.map((row) => row.name);
+    if (!names[i + step]) return null;
     [names[i], names[i + step]] = [names[i + step], names[i]];
-    const button = sender(step < 0 ? '↑' : '↓', told, () => ['feedback_order', { names }]);
-    button.setAttribute('aria-label', `${rows[i].name} ${step < 0 ? 'earlier' : 'later'}`);
-    return button;
+    return heldButton(step < 0 ? '↑' : '↓', `${rows[i].name} ${step < 0 ? 'earlier' : 'later'}`, () => ['feedback_order', { names }]);
+  };
+  const make = (rows) => {
+    shown = rows.map(() => ({ activity: h('span'), why: h('span'), faults: h('span') }));
+    const cells = rows.map((row, i) => [i + 1, row.name, row.stage, shown[i].activity, shown[i].why, shown[i].faults, h('div', { class: 'row' }, ...verbs(row)), h('div', { class: 'row' }, order(rows, i, -1), order(rows, i, 1))]);
+    list.replaceChildren(h('p', { id: 'feedback-profile' }), table(['', 'Name', 'Stage', 'Activity', 'Paused because', 'Faults / overruns', 'Hold to change', 'Hold to order'], cells, 'Feedback controllers'));
   };
   const draw = () => {
     const { rows = [], profile = '' } = store.docs.feedback ?? {};
-    const cells = rows.map((row, i) => [i + 1, row.name, row.stage, row.activity + (row.waiting ? ` ${row.waiting}` : ''),
-      [...row.reasons, row.fault && `fault: ${row.fault}`].filter(Boolean).join('; ') || '·', `${row.faults} / ${row.overruns}`, verbs(row),
-      h('div', { class: 'row' }, i ? order(rows, i, -1) : null, i + 1 < rows.length ? order(rows, i, 1) : null)]);
-    list.replaceChildren(h('p', {}, rows.length ? `Profile: ${profile || 'none'}` : 'No feedback controllers are loaded.'), table(['', 'Name', 'Stage', 'Activity', 'Paused because', 'Faults / overruns', '', 'Order'], cells, 'Feedback controllers'));
+    const key = JSON.stringify(rows.map((row) => [row.name, row.stage, row.enabled, row.paused]));
+    if (key !== made) make(rows);
+    made = key;
+    setText(document.getElementById('feedback-profile') ?? told, rows.length ? `Profile: ${profile || 'none'}` : 'No feedback controllers are loaded.');
+    rows.forEach((row, i) => {
+      setText(shown[i].activity, row.activity + (row.waiting ? ` ${row.waiting}` : ''));
+      setText(shown[i].why, [...row.reasons, row.fault && `fault: ${row.fault}`].filter(Boolean).join('; ') || '·');
+      setText(shown[i].faults, `${row.faults} / ${row.overruns}`);
+    });
   };
   const attribute = () => {
     const { rows = [], inside = [] } = store.docs.attribution ?? {};

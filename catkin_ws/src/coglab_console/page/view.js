@@ -1,5 +1,5 @@
 // The picture of the cell: 3D where there is WebGL and libjs-three, otherwise 2D; cameras by button.
-import { h, paced, setAttribute, setText } from './dom.js';
+import { drawn, h, setAttribute, setText } from './dom.js';
 import { on, onDocs, store } from './store.js';
 import { viewWords } from './cell.js';
 import { Scene2D } from './scene2d.js';
@@ -35,7 +35,7 @@ async function make(parent, wanted3d) {
 export function showView(parent) {
   const words = document.getElementById('view-words');
   const bar = document.getElementById('cameras');
-  redraw = paced(() => {
+  redraw = drawn(() => {
     if (parent.offsetParent === null) return;
     scene?.draw();
     setText(words, viewWords());

@@ -9,7 +9,7 @@ printed and kept, readable by this user alone, in console.url of ROS_HOME.
 
 import sys
 
-from coglab_console.ros_node import main
+from coglab_console.ros.node import main
 
 if __name__ == "__main__":
     sys.exit(main())

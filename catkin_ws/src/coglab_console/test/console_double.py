@@ -10,13 +10,13 @@ from pathlib import Path
 
 import aiohttp
 from aiohttp import web
-from coglab_console.access import CSRF_HEADER, Access, allowed_hosts
-from coglab_console.desk import Answer, Desk
-from coglab_console.events import EventLog
-from coglab_console.fan_out import Documents
-from coglab_console.gates import Standing
-from coglab_console.page_files import load_all
-from coglab_console.server import ConsoleServer
+from coglab_console.desk.desk import Answer, Desk
+from coglab_console.desk.events import EventLog
+from coglab_console.desk.gates import Standing
+from coglab_console.web.access import CSRF_HEADER, Access, allowed_hosts
+from coglab_console.web.fan_out import Documents
+from coglab_console.web.page_files import load_all
+from coglab_console.web.server import ConsoleServer
 
 PAGE = Path(__file__).resolve().parents[1] / "page"
 READY = dict(
@@ -30,6 +30,41 @@ READY = dict(
     hand_connected=True,
 )
 
+PAGE_DOCUMENTS = {
+    "model": {
+        "real": False,
+        "robot": None,
+        "order": [],
+        "workspace": {"low": [-1.2, -1.2, 0.0], "high": [1.2, 1.2, 1.6]},
+        "missing": [],
+        "charts": False,
+        "three": False,
+    },
+}
+
+
+def page_state(stamp: float) -> dict:
+    """A state as the node sends it, of a robot that stands still."""
+    return {
+        "stamp": stamp,
+        "q": [],
+        "live": True,
+        "frames": {},
+        "ages": {},
+        "rate": [0.0] * 7,
+        "threshold": [0.12] * 7,
+        "watched": [True] * 7,
+        "speed": 0.0,
+        "fri": 0.4,
+        "answer": 0.1,
+        "current": [0] * 5,
+        "margin": None,
+        "phase": READY["state"],
+        "since": 1.0,
+        "left": None,
+        "dmp": ["idle", 0.0, 0.0, 0.0],
+    }
+
 
 class RobotDouble:
     """Writes down what it is asked for."""
@@ -39,6 +74,7 @@ class RobotDouble:
         self.now = Standing(**READY)
         self.stops: list[str] = []
         self.calls: list[tuple[str, dict]] = []
+        self.told: list[tuple[str, str]] = []
         self.stop_times: list[float] = []
 
     def standing(self) -> Standing:
@@ -47,6 +83,9 @@ class RobotDouble:
     def stop(self, who: str) -> None:
         self.stops.append(who)
         self.stop_times.append(time.monotonic())
+
+    def tell(self, name: str, text: str) -> None:
+        self.told.append((name, text))
 
     async def call(self, name: str, arguments: dict) -> Answer:
         self.calls.append((name, arguments))

@@ -60,11 +60,31 @@ class Console(unittest.TestCase):
             )
             time.sleep(0.05)
 
+    def page_in(self, name, limit=60.0):
+        """Waits until the page itself shows this state: on a busy computer it is later than the topic."""
+        self.wait_for_hub(name, limit)
+        self.browser.until("return coglab.state().phase.endsWith(arguments[0])", limit, name)
+
+    def enabled(self, action, limit=30.0):
+        """The button, when the page lets it be pressed."""
+        button = f"[data-action={action}]"
+        self.browser.until("return !document.querySelector(arguments[0]).hasAttribute('aria-disabled')", limit, button)
+        return self.button(action)
+
+    def says(self, action, word, limit=10.0):
+        """Waits until the words below a button say so."""
+        self.browser.until(
+            "return document.getElementById('why-' + arguments[0]).textContent.includes(arguments[1])",
+            limit,
+            action,
+            word,
+        )
+
     def button(self, action):
         return self.browser.driver.find_element(By.CSS_SELECTOR, f"[data-action={action}]")
 
     def test_01_everything_is_on_the_page_without_scrolling(self):
-        self.wait_for_hub("wait_without_object", 90.0)
+        self.ready("wait_without_object")
         self.browser.until(
             "return coglab.docs()['graph:/coglab'] && document.querySelectorAll('#graph .node.active').length", 20.0
         )
@@ -109,44 +129,73 @@ class Console(unittest.TestCase):
         ).transform.translation
         return float(np.linalg.norm(np.array(self.browser.js("return coglab.palm()")) - [place.x, place.y, place.z]))
 
-    def test_04_an_exchange_by_mouse(self):
+    def receive(self):
+        """Once: whether the object is in the hand at the end; the machine may have stopped by itself."""
+        self.ready("wait_without_object")
         path = self.browser.until("return coglab.docs().path", 10.0)
         self.assertEqual(path["kind"], "ahead")
         self.browser.js("document.activeElement.blur()")
-        self.assertIn("empty", self.button("exchange_robot_to_human").find_element(By.XPATH, "..").text)
-        self.button("exchange_human_to_robot").click()
-        running = self.browser.until("const p = coglab.docs().path; return p && p.kind === 'running' && p", 30.0)
+        self.says("exchange_robot_to_human", "empty")
+        self.enabled("exchange_human_to_robot").click()
+        running = self.browser.until(
+            "const p = coglab.docs().path;"
+            "return (p && p.kind === 'running' && p) || coglab.state().phase.endsWith('/stopped')",
+            45.0,
+        )
+        if running is True:
+            return False
         self.browser.picture(self.pictures / "reaching.png")
         self.assertGreater(len(running["points"]), 10)
-        self.wait_for_hub("wait_with_object")
-        self.browser.until("return document.getElementById('status').innerText.includes('mug in the hand')", 5.0)
-        self.assertIn(
-            "exchange_human_to_robot mug: succeeded", str(self.browser.js("return coglab.events().map(e => e.text)"))
+        end = time.monotonic() + 60.0
+        while not self.machine.in_hub and time.monotonic() < end:
+            time.sleep(0.05)
+        return self.machine.state.endswith("wait_with_object")
+
+    def test_04_an_exchange_by_mouse(self):
+        for _ in range(3):
+            if self.receive():
+                break
+        self.page_in("wait_with_object", 5.0)
+        self.browser.until("return document.getElementById('status').innerText.includes('mug in the hand')", 20.0)
+        self.browser.until(
+            "return coglab.events().some(e => e.text.includes('exchange_human_to_robot mug: succeeded'))", 20.0
         )
-        time.sleep(0.5)
+        self.browser.until("return coglab.state().speed < 0.001", 20.0)
         self.assertLess(self.distance_to_tf(), 0.002)
         self.browser.picture(self.pictures / "holds.png")
 
-    def go_on(self):
-        """The two acts after a stop."""
-        self.browser.until("return document.getElementById('acknowledge').offsetParent !== null", 5.0)
+    def ready(self, hub):
+        """In this hub, by the two acts after a stop where the machine has stopped by itself: on a crowded computer the
+        simulated controller loses command mode."""
+        end = time.monotonic() + 120.0
+        while not self.machine.state.endswith(hub):
+            self.assertLess(time.monotonic(), end, f"{hub}: {self.machine.state}, {self.machine.why}")
+            if self.machine.state.endswith(("/stopped", "/fault")):
+                self.go_on(hub)
+            time.sleep(0.05)
+        self.page_in(hub)
+
+    def go_on(self, hub="wait_with_object"):
+        """The two acts after a stop or a fault."""
+        leaf = "/fault" if self.machine.state.endswith("/fault") else "/stopped"
+        self.page_in(leaf)
+        self.browser.until("return document.getElementById('acknowledge').offsetParent !== null", 20.0)
         self.browser.driver.find_element(By.ID, "acknowledge").click()
-        self.browser.until("return coglab.docs().desk.guard.unacknowledged === false", 5.0)
-        self.browser.until("return !document.querySelector('[data-action=reset]').hasAttribute('aria-disabled')", 5.0)
-        press_and_hold(self.browser, self.button("reset"), lambda: not self.machine.state.endswith("/stopped"), 8.0)
-        self.wait_for_hub("wait_with_object")
+        self.browser.until("return coglab.docs().desk.guard.unacknowledged === false", 20.0)
+        button = self.enabled("initialise" if leaf == "/fault" else "reset")
+        press_and_hold(self.browser, button, lambda: not self.machine.state.endswith(leaf), 30.0)
+        self.page_in(hub)
 
     def reach(self):
-        """Until the arm is on its way to the person. On a crowded computer the simulated controller loses command mode,
-        and the machine stops by itself: once more then."""
+        """Until the arm is on its way to the person; once more where the machine has stopped by itself."""
         for _ in range(3):
-            self.button("exchange_robot_to_human").click()
+            self.ready("wait_with_object")
+            self.enabled("exchange_robot_to_human").click()
             self.browser.until(
-                "return coglab.state().dmp[0] === 'running' || coglab.state().phase.endsWith('/stopped')", 30.0
+                "return coglab.state().dmp[0] === 'running' || coglab.state().phase.endsWith('/stopped')", 45.0
             )
-            if not self.machine.state.endswith("/stopped"):
+            if self.browser.js("return coglab.state().dmp[0] === 'running'"):
                 return
-            self.go_on()
         self.fail(f"no reach in three attempts: {self.machine.why}")
 
     def test_05_stop_by_key_then_acknowledge_then_hold(self):
@@ -156,12 +205,12 @@ class Console(unittest.TestCase):
         while not self.arm.hold_latched:
             self.assertLess(time.monotonic(), end, "no hold")
             time.sleep(0.002)
-        self.wait_for_hub("stopped", 10.0)
-        self.browser.until("return document.getElementById('acknowledge').offsetParent !== null", 5.0)
+        self.page_in("/stopped", 20.0)
+        self.browser.until("return document.getElementById('acknowledge').offsetParent !== null", 20.0)
         self.browser.picture(self.pictures / "stopped.png")
-        reset = self.button("reset")
-        self.assertIn("acknowledge", reset.find_element(By.XPATH, "..").text)
-        reset.click()  # refused, and a click would not be enough
+        self.says("reset", "acknowledge")
+        self.button("reset").click()  # refused, and a click would not be enough
+        self.browser.until("return document.getElementById('told').textContent.includes('acknowledge')", 10.0)
         time.sleep(0.3)
         self.assertTrue(self.arm.hold_latched)
         self.go_on()
@@ -182,22 +231,24 @@ class Console(unittest.TestCase):
             for process in frozen:
                 os.kill(process, signal.SIGCONT)
         self.assertTrue(held, "no hold within 2 s")
-        self.wait_for_hub("stopped", 15.0)
         self.go_on()
 
     def test_07_a_lost_connection_greys_the_page_within_a_second_and_loses_no_event(self):
         before = self.browser.js("return coglab.events().map(e => e.seq)")
         console = self.process_of("/coglab_console")
-        os.kill(console, signal.SIGSTOP)  # SIGSTOP: frozen, the connection stands
-        began = time.monotonic()
+        self.browser.js(
+            "const grey = () => { if (document.body.classList.contains('lost')) window.greyAt ??= Date.now(); };"
+            "delete window.greyAt; new MutationObserver(grey).observe(document.body, { attributes: true });"
+        )
+        began = time.time()
+        os.kill(console, signal.SIGSTOP)  # frozen; the connection stands
         try:
-            self.browser.until("return document.body.classList.contains('lost')", 3.0)
-            grey = time.monotonic() - began
-            self.assertLess(grey, 1.2)  # 1 s and a question of the driver
+            grey = self.browser.until("return window.greyAt", 10.0) / 1000 - began
+            self.assertLess(grey, 1.0)
             self.assertIn("NOT LIVE", self.browser.js("return document.getElementById('lost').textContent"))
         finally:
             os.kill(console, signal.SIGCONT)
-        self.browser.until("return !document.body.classList.contains('lost')", 15.0)
+        self.browser.until("return !document.body.classList.contains('lost')", 30.0)
         after = self.browser.js("return coglab.events().map(e => e.seq)")
         self.assertEqual(after, sorted(set(after)))
         self.assertEqual(after[: len(before)], before)
@@ -227,7 +278,7 @@ class Console(unittest.TestCase):
         ended = subprocess.run(command, capture_output=True, text=True, timeout=90)
         self.assertEqual(ended.returncode, 1)
         self.assertIn("another console of this ROS master runs", ended.stderr)
-        self.browser.until("return !document.body.classList.contains('lost')", 5.0)
+        self.browser.until("return !document.body.classList.contains('lost')", 20.0)
 
     def test_10_the_page_had_nothing_to_complain_about(self):
         rows = [row for row in self.browser.complaints() if not any(word in row for word in KNOWN)]
@@ -240,9 +291,9 @@ class Console(unittest.TestCase):
             self.assertEqual(other.js("return coglab.view()"), "2D")
             other.until(
                 "return document.getElementById('role').innerText.includes('you watch')",
-                5,
+                20.0,
             )
-            time.sleep(1.0)
+            other.until("return document.getElementById('status').innerText.includes('mug in the hand')", 20.0)
             other.picture(self.pictures / "flat.png")
             self.assertEqual(other.js(LOOK_AT_PAGE)["problems"], [])
             place = self.frames.lookup_transform("world", "ih2_palm", rospy.Time(0)).transform.translation

@@ -26,9 +26,18 @@ for (const element of document.querySelectorAll('button, input, select, textarea
   if (!seen(element)) continue;
   if (!nameOf(element)) problems.push(`${element.outerHTML.slice(0, 120)} has no name`);
 }
-for (const element of document.querySelectorAll('#actions button, #page button, #page input, #page select, #page textarea')) {
+for (const element of document.querySelectorAll('button, input, select, textarea, summary')) {
   const box = element.getBoundingClientRect();
   if (seen(element) && box.height < 43.5) problems.push(`${element.outerHTML.slice(0, 90)} is ${box.height} px high`);
+}
+
+for (const why of document.querySelectorAll('#actions .why')) {
+  if (seen(why) && why.scrollHeight > why.clientHeight + 1) problems.push(`"${why.textContent}" is cut off`);
+}
+const graph = document.querySelector('#graph svg');
+if (graph && seen(graph)) {
+  const height = 11 * (graph.getScreenCTM()?.a ?? 1);
+  if (height < 13.9) problems.push(`letters of the graph are ${height.toFixed(1)} px high`);
 }
 
 function channels(text) {

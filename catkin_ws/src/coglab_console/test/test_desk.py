@@ -6,14 +6,14 @@ import time
 from dataclasses import replace
 
 import pytest
-from coglab_console.commands import COMMANDS, BadCommand, judge
-from coglab_console.desk import Desk
-from coglab_console.events import EventLog
-from coglab_console.experiment import Experiment, ExperimentError, latin_row, order_of
-from coglab_console.fan_out import Documents
-from coglab_console.gates import MotionGuard, Standing, reasons
-from coglab_console.hold import HOLD_TIME, HeldButton
-from coglab_console.roles import ABSENCE, NOTICE, Roles
+from coglab_console.desk.commands import COMMANDS, BadCommand, judge
+from coglab_console.desk.desk import Desk
+from coglab_console.desk.events import EventLog
+from coglab_console.desk.experiment import Experiment, ExperimentError, latin_row, order_of
+from coglab_console.desk.gates import MotionGuard, Standing, reasons
+from coglab_console.desk.hold import HOLD_TIME, HeldButton
+from coglab_console.desk.roles import ABSENCE, NOTICE, Roles
+from coglab_console.web.fan_out import Documents
 from console_double import READY, RobotDouble, running
 
 RECEIVE = {"action": "exchange_human_to_robot"}
@@ -57,6 +57,41 @@ def test_everybody_stops_and_notes(desk):
         assert ask(desk, who, "stop")["success"]
         assert ask(desk, who, "note", text="x")["success"]
     assert desk.backend.stops == ["a", "b"]
+
+
+def test_notes_and_the_next_object_are_told_to_ros_and_heard_from_there(desk):
+    assert ask(desk, "b", "note", text="hesitated")["success"]
+    assert ask(desk, "a", "select_object", object_id="mug")["success"]
+    assert desk.backend.told == [("note", "hesitated"), ("select_object", "mug")]
+    desk.told("note", "from a terminal", "/rostopic_1")
+    desk.told("select_object", "ball", "/rostopic_1")
+    assert desk.object_id == "ball" and [row["who"] for row in desk.experiment.notes] == ["b", "/rostopic_1"]
+    for name, text in (("note", ""), ("note", "x" * 501), ("select_object", "no such; name")):
+        desk.told(name, text, "/x")
+    assert desk.object_id == "ball" and len(desk.experiment.notes) == 2
+    events = [event["text"] for event in desk.events.since(0)[0] if event["level"] == "warning"]
+    assert len(events) == 3 and all(text.startswith("/x: ") for text in events)
+
+
+@pytest.mark.parametrize(
+    "name, arguments",
+    [
+        ("feedback", {"verb": "disable", "name": "x"}),
+        ("feedback_order", {"names": ["b", "a"]}),
+        ("contact_learn", {}),
+    ],
+)
+def test_what_nobody_sees_at_once_is_held_down(desk, name, arguments):
+    """One click changes no feedback controller, also between trials."""
+    assert "hold the button" in ask(desk, "a", name, **arguments)["message"] and not desk.backend.calls
+
+    async def hold():
+        for _ in range(10):
+            if (answer := await desk.held("a", name, arguments)) is not None:
+                return answer
+            await asyncio.sleep(0.1)
+
+    assert asyncio.run(hold())["success"] and desk.backend.calls == [(name, arguments)]
 
 
 def test_taking_over_is_announced_and_may_be_refused():

@@ -6,8 +6,8 @@ import json
 import socket
 import time
 
-from coglab_console.events import EventLog
-from coglab_console.fan_out import Client, Documents, to_json
+from coglab_console.desk.events import EventLog
+from coglab_console.web.fan_out import WINDOW, Client, Documents, to_json
 from console_double import running
 
 
@@ -28,7 +28,7 @@ def test_a_slow_client_gets_the_newest_state_and_every_event():
     client = Client("a", 0, documents, log)
     documents.put("x", 1)
     for i in range(700):
-        client.state(f"state {i}")
+        client.state(i, f"state {i}")
         log.add("test", str(i))
     documents.put("x", 2)
     first, second = client.take(), client.take()
@@ -36,6 +36,23 @@ def test_a_slow_client_gets_the_newest_state_and_every_event():
     seen = [event["seq"] for text in (first[1], second[0]) for event in json.loads(text)["events"]]
     assert seen == list(range(1, 701))
     assert client.states_dropped == 699
+
+
+def test_no_more_states_are_on_the_way_than_the_window_holds():
+    """What lies in the network's buffers is old when it comes: the next state goes when the last was taken."""
+    log, documents = EventLog(time.time), Documents()
+    client = Client("a", 0, documents, log)
+    sent = []
+    for i in range(20):
+        client.state(i, str(i))
+        log.add("test", str(i))
+        sent += [text for text in client.take() if not text.startswith("{")]
+    assert sent == [str(i) for i in range(WINDOW)] and client.behind()
+    assert not client.seen(7) and not client.seen(True) and not client.seen("1") and not client.seen(-1)
+    assert client.seen(1) and not client.seen(1)
+    late = client.take()
+    assert late[-1] == "19" and json.loads(late[0])["events"][0]["seq"] == WINDOW + 1  # the newest state, every event
+    assert client.take() == []
 
 
 def test_numbers_that_are_not_finite_become_null():
@@ -103,6 +120,7 @@ def test_a_browser_that_never_reads_slows_nobody_and_is_cut_off(tmp_path):
                 console.server.publish_state({"at": time.monotonic(), "text": text})
                 while (message := await good.receive_json(timeout=5))["t"] != "state":
                     pass
+                await good.send_json({"t": "seen", "n": message["n"]})
                 got += 1
                 late.append(time.monotonic() - message["at"])
                 await asyncio.sleep(0.005)

@@ -1,20 +1,20 @@
 """What is drawn: the graph by Graphviz and without it, the robot's kinematics, primitives and the path ahead, bytes."""
 
 import io
-import math
 import random
 import struct
 from pathlib import Path
 
 import numpy as np
 import pytest
-from coglab_console import path_ahead, wire
-from coglab_console.graph_layout import Container, Layout, roots
-from coglab_console.primitives import LibraryError, load_library, shape_map
-from coglab_console.primitives import document as library_document
-from coglab_console.torque_rate import LEARN_TIME, Settings, TorqueRate
-from coglab_console.urdf_model import ModelError, RobotModel, quaternion, rotation
-from coglab_console.words import phase, time_limit
+from coglab_console.ros import versions, wire
+from coglab_console.ros.words import phase
+from coglab_console.scene import path_ahead
+from coglab_console.scene.graph_layout import Container, Layout, roots
+from coglab_console.scene.primitives import LibraryError, load_library, shape_map
+from coglab_console.scene.primitives import document as library_document
+from coglab_console.scene.urdf_model import ModelError, RobotModel
+from scipy.spatial.transform import Rotation
 
 SOURCES = Path(__file__).resolve().parents[2]
 URDF = SOURCES / "lwr_description" / "urdf" / "lwr_ih2.urdf"
@@ -74,7 +74,7 @@ def test_kinematics_against_the_controllers():
         place, turn = arm.fk(np.array(q))
         found = model.place("ih2_palm", dict(zip(arm.joint_names, q, strict=True)))
         assert np.allclose(found[:3, 3], place, atol=1e-9)
-        assert abs(abs(np.dot(quaternion(found[:3, :3]), turn)) - 1.0) < 1e-9
+        assert abs(abs(np.dot(Rotation.from_matrix(found[:3, :3]).as_quat(), turn)) - 1.0) < 1e-9
 
 
 def test_the_document_of_the_robot():
@@ -99,15 +99,6 @@ def test_the_document_of_the_robot():
 def test_what_is_no_robot(text):
     with pytest.raises(ModelError):
         RobotModel(text)
-
-
-def test_rotations_both_ways():
-    chance = random.Random(2)
-    for _ in range(200):
-        q = np.array([chance.gauss(0, 1) for _ in range(4)])
-        q /= np.linalg.norm(q)
-        back = np.array(quaternion(rotation(q)))
-        assert min(np.abs(back - q).max(), np.abs(back + q).max()) < 1e-9
 
 
 # --- primitives -----------------------------------------------------------------------------------------------
@@ -188,47 +179,12 @@ def test_nobody_knows_where(entry):
     assert path_ahead.aim("take", entry, {"object_mug": (9.0, 0, 0, 0, 0, 0, 1)}) is None
 
 
-# --- torques --------------------------------------------------------------------------------------------------
-
-
-def test_thresholds_are_learnt_at_rest_and_a_touch_stands_out():
-    chance = random.Random(5)
-    rate = TorqueRate(Settings())
-    said, t = [], 0.0
-
-    def feed(seconds, extra=0.0, moving=False):
-        nonlocal t
-        for _ in range(int(seconds * 200)):
-            t += 0.005
-            said.append(rate.feed(t, tuple(chance.gauss(0.0, 0.05) + extra for _ in range(7)), moving))
-
-    feed(0.2)
-    rate.learn()
-    feed(LEARN_TIME + 0.1)
-    assert rate.learnt and not rate.learning() and any("learnt" in words for words in said)
-    rate.take_peaks()
-    feed(2.0)
-    assert all(abs(peak) < limit for peak, limit in zip(rate.take_peaks(), rate.thresholds(), strict=True))
-    feed(0.05, extra=1.5)
-    assert all(abs(peak) > limit for peak, limit in zip(rate.take_peaks(), rate.thresholds(), strict=True))
-    rate.learn()
-    feed(0.1, moving=True)
-    assert not rate.learning() and any("moved" in words for words in said)
-
-
-@pytest.mark.parametrize("torque", [(), (1.0,) * 6, (math.nan,) * 7, (math.inf,) * 7])
-def test_odd_torques_are_left_out(torque):
-    rate = TorqueRate(Settings())
-    assert rate.feed(1.0, torque, False) == "" and rate.newest() == [0.0] * 7
-
-
 # --- bytes and words ------------------------------------------------------------------------------------------
 
 
 def test_bytes_against_the_messages_own_decoding():
     from geometry_msgs.msg import Quaternion, TransformStamped, Vector3
     from rospy import Time
-    from sensor_msgs.msg import JointState
     from tf2_msgs.msg import TFMessage
 
     message = TFMessage()
@@ -241,11 +197,6 @@ def test_bytes_against_the_messages_own_decoding():
     message.serialize(stream)
     found = list(wire.transforms(stream.getvalue()))
     assert found[2] == ("world", "child_2", 5.25, (2.0, 2.0, 3.0, 0.0, 0.0, 0.0, 1.0))
-    state = JointState(name=["a", "b"], position=[1.0, 2.0], velocity=[], effort=[3.0, 4.0])
-    state.header.stamp, state.header.frame_id = Time(7, 0), "x"
-    stream = io.BytesIO()
-    state.serialize(stream)
-    assert wire.joint_state_effort(stream.getvalue()) == (7.0, (3.0, 4.0))
 
 
 def test_bytes_that_are_none_are_refused():
@@ -253,20 +204,31 @@ def test_bytes_that_are_none_are_refused():
     for size in (0, 3, 4, 20, 100):
         for _ in range(200):
             data = bytes(chance.randrange(256) for _ in range(size))
-            for read in (lambda d: list(wire.transforms(d)), wire.joint_state_effort):
-                try:
-                    read(data)
-                except wire.BadBytes:
-                    pass
+            try:
+                list(wire.transforms(data))
+            except wire.BadBytes:
+                pass
     with pytest.raises(wire.BadBytes):
         list(wire.transforms(struct.pack("<I", 4000000000)))
 
 
-def test_phases_and_their_limits():
-    config = {"handover": {"offer_timeout": 8.0}, "contact_timeout": 6.0, "time_limits": {"set_dmp_goal": 3}}
-    assert phase("/coglab_master/x/wait_stop") == "waits for contact"
+def test_phases_in_words_depend_on_the_action():
+    """Giving opens the hand because the person has taken the object: nothing is waited for there."""
+    receive, give = "/m/exchange_human_to_robot", "/m/exchange_robot_to_human"
+    assert phase(f"{give}/approach/arm_motion/wait_stop") == "reaches and gives"
+    assert phase(f"{receive}/approach/arm_motion/wait_stop") == "reaches and receives"
+    assert phase(f"{give}/hand_open") == "lets the person have it" and phase("/m/put/hand_open") == "opens the hand"
+    assert phase(f"{give}/set_dmp_goal") == "waits for the person's hand"
     assert phase("/m/some_state") == "some state"
-    assert time_limit("/m/wait_stop", config, {}) == 6.0
-    assert time_limit("/m/wait_stop", config, {"contact": {"timeout": 4.0}}) == 4.0
-    assert time_limit("/m/set_dmp_goal", config, {}) == 3.0
-    assert time_limit("/m/hand_open", config, {}) is None
+
+
+def test_versions_of_debian_packages_and_of_a_checkout(tmp_path):
+    found = versions.debian(("python3-numpy", "no-such-package-here"))
+    assert found["python3-numpy"][0].isdigit() and found["no-such-package-here"] == "not installed"
+    assert versions.commit(tmp_path) == "unknown"
+    (tmp_path / ".git" / "refs" / "heads").mkdir(parents=True)
+    (tmp_path / ".git" / "HEAD").write_text("ref: refs/heads/x\n")
+    (tmp_path / ".git" / "packed-refs").write_text("# pack\n1234567890abcdef refs/heads/x\n")
+    assert versions.commit(tmp_path) == "1234567890"
+    (tmp_path / ".git" / "refs" / "heads" / "x").write_text("abcdef1234567890\n")
+    assert versions.commit(tmp_path) == "abcdef1234"

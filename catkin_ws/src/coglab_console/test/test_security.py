@@ -6,7 +6,7 @@ import time
 
 import aiohttp
 import pytest
-from coglab_console.access import CSRF_HEADER, TokenBucket
+from coglab_console.web.access import CSRF_HEADER, TokenBucket
 from console_double import running
 
 
@@ -263,6 +263,8 @@ def test_a_thousand_requests_a_second_are_bounded_and_stop_goes_through(tmp_path
         async with console.browser() as flooder, console.browser() as other, console.socket_of(other) as ws:
             await ws.send_str("{}")
             statuses, began = [], time.monotonic()
+            for session in console.access.sessions():  # so few that a crowded computer floods it, too
+                session.requests = TokenBucket(5.0, 20.0)
 
             async def flood():
                 for _ in range(150):
@@ -281,7 +283,7 @@ def test_a_thousand_requests_a_second_are_bounded_and_stop_goes_through(tmp_path
             assert await watch() < 1.0
             await asyncio.gather(*floods)
             served = len(statuses) - statuses.count(429)
-            assert served <= 120 + 40 * (time.monotonic() - began) + 1 < len(statuses)
+            assert served <= 20 + 5 * (time.monotonic() - began) + 1 < len(statuses)
             assert console.robot.stops == ["browser 2"]
             async with flooder.post(console.url + "/api/stop", headers=console.headers) as response:
                 assert response.status == 200  # of the one that floods, too

@@ -6,9 +6,9 @@ import stat
 from types import SimpleNamespace
 
 import pytest
-from coglab_console import ros_node
-from coglab_console.access import Access
-from coglab_console.ros_node import ConsoleNode, StartError, bind, only_one
+from coglab_console.ros import node as ros_node
+from coglab_console.ros.node import ConsoleNode, StartError, bind, only_one
+from coglab_console.web.access import Access
 
 
 def taken_port() -> socket.socket:

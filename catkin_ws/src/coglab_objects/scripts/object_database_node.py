@@ -29,7 +29,7 @@ class ObjectDatabaseNode:
         self.behind = False  # the mirror could not be brought up to the database
         self.reload(only_changed=False)
         rospy.Service("~get_object", GetObject, self.on_get)
-        rospy.Service("~list_objects", ListObjects, lambda _request: ListObjectsResponse(self.database.ids()))
+        rospy.Service("~list_objects", ListObjects, self.on_list)
         rospy.Service("~reload", Trigger, self.on_reload)
         rospy.Timer(rospy.Duration(1.0), self.on_timer)
 
@@ -73,6 +73,10 @@ class ObjectDatabaseNode:
                 self.mirror()
         except Exception as error:
             rospy.logerr_throttle(10.0, f"object database: not read again ({type(error).__name__}: {error})")
+
+    def on_list(self, _request):
+        """The ids, and what is wrong with the files that do not fit."""
+        return ListObjectsResponse(self.database.ids(), list(self.database.problems))
 
     def on_get(self, request):
         """One entry as YAML text."""

@@ -120,3 +120,12 @@ def test_an_unexpected_error_is_told_and_the_timer_goes_on(make, monkeypatch):
     monkeypatch.setattr(started.node.database, "changed", lambda: 1 / 0)
     started.node.on_timer(None)
     assert "ZeroDivisionError" in started.warnings[-1][1]
+
+
+def test_the_list_names_the_files_that_do_not_fit(make, tmp_path):
+    started = make()
+    (tmp_path / "mug.yaml").write_text("id: mug\nmass: heavy\n")
+    started.node.on_timer(None)
+    listed = started.node.on_list(None)
+    assert listed.object_ids == ["ball", "mug"] and len(listed.problems) == 1
+    assert "mug.yaml" in listed.problems[0] and "the old entry stays" in listed.problems[0]

@@ -3,7 +3,8 @@
 
 Subscribes lwr/external_torques (effort, Nm) and lwr/joint_states; names are relative. Parameters (private): the fields
 of coglab_smach.contact.detector.DetectorSettings; robot_description is read for the Jacobian.
-Publishes ~margin (std_msgs/Float64) at 20 Hz while watching.
+Publishes at 20 Hz ~margin (std_msgs/Float64) while watching, ~signal (coglab_msgs/ContactSignal) while torques come.
+Service ~learn (std_srvs/Trigger): the noise at rest anew.
 """
 
 import dataclasses
@@ -13,13 +14,14 @@ import threading
 import coglab_controllers as cc
 import numpy as np
 import rospy
-from coglab_msgs.msg import Contact, ReasonCode
+from coglab_msgs.msg import Contact, ContactSignal, ReasonCode
 from coglab_msgs.srv import ArmContact, ArmContactResponse
 from coglab_py import parameters
 from coglab_smach.contact.detector import ContactDetector, DetectorSettings
 from coglab_smach.ros.publish import publish
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64
+from std_srvs.srv import Trigger, TriggerResponse
 
 
 class ContactDetectorNode:
@@ -44,11 +46,14 @@ class ContactDetectorNode:
         self.last_sample: float | None = None
         self.publisher = rospy.Publisher("coglab/contact", Contact, queue_size=10)
         self.margin = rospy.Publisher("~margin", Float64, queue_size=1)
+        self.signal = rospy.Publisher("~signal", ContactSignal, queue_size=1)
+        self.shown: float | None = None  # stamp of the sample that ~signal was published for
         rospy.Subscriber("lwr/joint_states", JointState, self.on_joints, queue_size=1, tcp_nodelay=True)
         self.torques = rospy.Subscriber(
             "lwr/external_torques", JointState, self.on_torques, queue_size=20, tcp_nodelay=True
         )
         rospy.Service("~arm", ArmContact, self.on_arm)
+        rospy.Service("~learn", Trigger, self.on_learn)
         rospy.Timer(rospy.Duration(0.05), self.on_timer)
 
     def on_joints(self, message: JointState) -> None:
@@ -111,12 +116,38 @@ class ContactDetectorNode:
             True, ReasonCode.NONE, f"watching for {request.mode} for {request.timeout:.1f} s once the arm is still"
         )
 
-    def on_timer(self, _event) -> None:
-        """Live margin."""
+    def on_learn(self, _request):
+        """Noise at rest."""
         with self.lock:
-            watching, margin = self.detector.state() == "watching", self.detector.margin
-        if watching:
-            publish(self.margin, Float64(margin))
+            try:
+                return TriggerResponse(True, self.detector.learn())
+            except ValueError as error:
+                return TriggerResponse(False, str(error))
+
+    def on_timer(self, _event) -> None:
+        """Live margin and signal."""
+        with self.lock:
+            before, stamp = self.shown, self.last_sample
+            self.shown = stamp
+            seen, settings = self.detector.look(), self.detector.settings
+        if seen.state == "watching":
+            publish(self.margin, Float64(seen.margin))
+        if stamp is None or stamp == before:
+            return
+        message = ContactSignal(
+            state=seen.state,
+            mode=seen.mode,
+            change=list(seen.change),
+            threshold=list(seen.threshold),
+            watched=list(seen.watched),
+            window=settings.window,
+            k=seen.k,
+            margin=seen.margin,
+            rest_samples=seen.rest_samples,
+            learnt=seen.rest_samples >= settings.learn_samples,
+        )
+        message.header.stamp = rospy.Time.from_sec(stamp)
+        publish(self.signal, message)
 
 
 def main() -> int:

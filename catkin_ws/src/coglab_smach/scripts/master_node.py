@@ -157,8 +157,12 @@ class MasterNode:
             object_id=state.object_id,
             why=state.why,
             reason_code=state.reason_code,
+            waits_for=state.waits_for,
         )
         message.header.stamp = rospy.Time.now()
+        if state.deadline:  # told in the brain's steady clock
+            left = rospy.Duration.from_sec(state.deadline - self.ctx.clock.now())
+            message.deadline = max(rospy.Time(), message.header.stamp + left)
         publish(self.states, message)
 
     def on_transition(self, record: TransitionRecord) -> None:

@@ -173,3 +173,43 @@ def test_hears_again_after_the_clock_was_set(posture, step):
     assert run.detector.state() == "watching"
     event, delay = run.feed(0.3, push((0, 1, 0), 5.0))
     assert event is not None and delay < 0.06
+
+
+def test_what_the_detector_sees_can_be_looked_at(posture):
+    """The largest change since the last look, the thresholds that it would compare with, and which joints count."""
+    run = ContactTrial(posture, 3)
+    run.feed(1.0)
+    quiet = run.detector.look()
+    assert quiet.state == "off" and quiet.mode == "" and quiet.margin == 0.0 and all(quiet.watched)
+    assert quiet.rest_samples >= run.detector.settings.learn_samples
+    assert np.allclose(quiet.threshold, run.detector.settings.k * run.detector.sigma())
+    run.detector.arm("contact", run.t, 30.0, k=9.0)
+    run.feed(0.1)
+    run.detector.look()
+    event, _ = run.feed(0.5, push((0, 1, 0), 8.0))
+    assert event is not None
+    pushed = run.detector.look()
+    assert max(np.abs(pushed.change)) > 3.0 * max(np.abs(quiet.change))
+    assert max(np.abs(run.detector.look().change)) == 0.0  # nothing came since
+
+
+def test_the_noise_is_learnt_anew_at_rest_alone(posture):
+    run = ContactTrial(posture, 4)
+    with pytest.raises(ValueError, match="at rest"):
+        run.detector.learn()
+    run.feed(1.0)
+    assert "100 samples" in run.detector.learn() and run.detector.look().rest_samples == 0
+    run.detector.arm("contact", run.t, 30.0)
+    with pytest.raises(ValueError, match="armed for contact"):
+        run.detector.learn()
+    run.feed(0.2)
+    assert run.detector.state() == "waiting"  # until enough was seen
+    run.feed(1.0)
+    assert run.detector.state() == "watching" and all(
+        mine == (j in run.detector._armed.watched) for j, mine in enumerate(run.detector.look().watched)
+    )
+    moving = ContactTrial(posture, 5)
+    moving.feed(1.0)
+    moving.feed(0.1, velocity=lambda t: np.full(7, 0.1))
+    with pytest.raises(ValueError, match="moves"):
+        moving.detector.learn()

@@ -1,9 +1,11 @@
 """coglab/state and coglab/why follow what happens; a start that cannot work is refused at once, by name."""
 
 import json
+import math
 
 from coglab_msgs.msg import MasterState as Message
 from coglab_msgs.msg import ReasonCode
+from coglab_smach.context.journal import Journal, Wait
 from coglab_smach.context.master_state import MasterState, StateWatch
 from coglab_smach.context.trigger import ask_for
 from conftest import Trial
@@ -57,6 +59,44 @@ def test_why_is_told_until_the_operator_has_answered():
     assert all(a != b for a, b in zip(trial.shown, trial.shown[1:], strict=False))
     held = [s for s in trial.shown if s.object_id == "mug"]
     assert held and any(s.state.endswith("/approach/arm_motion/wait_stop") for s in trial.shown)
+
+
+def test_what_is_waited_for_is_told_with_its_deadline():
+    """Giving: the offer of the hand, the end of the reach, the person's taking; each with the limit that ends it."""
+    trial, timed = Watched(), []
+    StateWatch(trial.ctx, lambda state: timed.append((trial.clock.now(), state)))
+
+    def script(t):
+        t.wait_hub("wait_without_object")
+        assert (t.shown[-1].waits_for, t.shown[-1].deadline) == ("", 0.0)  # a hub waits without end
+        for action, hub in ((RECEIVE, "wait_with_object"), (GIVE, "wait_without_object")):
+            assert t.ask(action, "mug").ok
+            t.wait_hub(hub)
+        assert t.shown[-1].waits_for == ""
+
+    trial.run(script)
+    assert all((s.deadline > 0.0) == bool(s.waits_for) for s in trial.shown)
+    receiving = {s.waits_for for s in trial.shown if f"/{RECEIVE}/" in s.state}
+    giving = {s.waits_for for s in trial.shown if f"/{GIVE}/" in s.state}
+    assert {"'mug' on offer", "the end of the reach", "contact of an object with the hand"} <= receiving
+    assert {"the person's hand within reach", "the end of the reach", "the person's taking of the load"} <= giving
+    left = [s.deadline - stamp for stamp, s in timed if s.waits_for == "the person's taking of the load"]
+    assert left and abs(left[0] - 8.0) < 0.05  # as the mug's delivery says
+
+
+def test_a_wait_that_is_put_off_is_told_again():
+    journal = Journal(lambda: 0.0)
+    told = []
+    journal.listen_waits(lambda: told.append(journal.wait()))
+    journal.waits("/m/a", Wait("the reach", 5.0))
+    journal.waits("/m/b", Wait("another pattern", math.inf))
+    assert journal.wait() == Wait("the reach", 5.0)
+    with journal.waiting("/m/c", Wait("the sight", 2.0)):
+        assert journal.wait().what == "the sight"  # the one that gives up first
+    journal.waits("/m/a", Wait("the reach", 7.0))
+    assert journal.wait().deadline == 7.0
+    journal.waits("/m/a", None)
+    assert journal.wait() == Wait() and len(told) == 6
 
 
 def test_a_failure_is_told_until_the_next_success():

@@ -1,1 +1,1 @@
-"""The experimenter's console. The core (everything but ros_*.py) knows no ROS."""
+"""The experimenter's console. `desk`, `web` and `scene` know no ROS; `ros` ties them to it; `browser` is for tests."""

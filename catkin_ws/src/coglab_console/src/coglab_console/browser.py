@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import shutil
+import socket
 import tempfile
 import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
+from urllib.parse import urlsplit
 
 SIZE = (1280, 720)
 OPTIONS = (
@@ -102,13 +104,24 @@ class Browser:
         return [row["message"] for row in self.driver.get_log("browser") if row["level"] in ("SEVERE", "WARNING")]
 
 
+def listens(link: str) -> bool:
+    """Whether somebody takes connections at the address of this link."""
+    place = urlsplit(link)
+    try:
+        with socket.create_connection((place.hostname or "", place.port or 0), timeout=2.0):
+            return True
+    except (OSError, ValueError):
+        return False
+
+
 def fresh_link(home: Path, used: str = "", limit: float = 30.0) -> str:
-    """The link in console.url of this ROS_HOME, another one than `used`."""
+    """The link in console.url of this ROS_HOME, another one than `used`, of a console that runs: the file may be one
+    that an earlier console has left."""
     end = time.monotonic() + limit
     path = home / "console.url"
     while time.monotonic() < end:
         link = path.read_text().strip() if path.is_file() else ""
-        if link and link != used:
+        if link and link != used and listens(link):
             return link
         time.sleep(0.1)
     raise TimeoutError(f"no new link in {path} within {limit:.0f} s; does the console run?")

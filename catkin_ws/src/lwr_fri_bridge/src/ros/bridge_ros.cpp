@@ -9,6 +9,7 @@
 
 #include <coglab_msgs/LwrState.h>
 #include <coglab_msgs/ReasonCode.h>
+#include <std_msgs/Float64.h>
 
 #include "bridge_diagnostics.hpp"
 #include "coglab_rt/ros/ros_time.hpp"
@@ -21,6 +22,7 @@ namespace {
 
 constexpr int kSpinnerThreads =
     4;  // a start may occupy one for seconds; hold and stop must get through
+constexpr std::int64_t kLatencyPeriodNs = 50'000'000;  // between two fri_latency
 constexpr double kSilenceWarning = 5.0;  // s between warnings about silence
 
 void copyJoints(const Vector7& joints, std::vector<double>& values) {
@@ -94,6 +96,7 @@ void BridgeRos::startThreads() {
   external_torques_ = nh_.advertise<sensor_msgs::JointState>("external_torques", 10);
   tool_wrench_ = nh_.advertise<geometry_msgs::WrenchStamped>("tool_wrench", 10);
   state_ = nh_.advertise<coglab_msgs::LwrState>("state", 10, true);
+  fri_latency_ = nh_.advertise<std_msgs::Float64>("fri_latency", 1);
   command_ = nh_.advertiseService("command", &BridgeRos::onCommand, this);
   events_ = nh_.subscribe("ros_events", 10, &BridgeRos::onEvent, this,
                           ros::TransportHints().tcpNoDelay());
@@ -288,6 +291,12 @@ void BridgeRos::publishSample(const Snapshot& snapshot) {
   wrench_message_.wrench.torque.y = sample.tool_wrench[4];
   wrench_message_.wrench.torque.z = sample.tool_wrench[5];
   tool_wrench_.publish(wrench_message_);
+
+  if (sample.stamp_ns - latency_told_ns_ < kLatencyPeriodNs) return;
+  latency_told_ns_ = sample.stamp_ns;
+  std_msgs::Float64 latency;
+  latency.data = snapshot.latency;
+  fri_latency_.publish(latency);
 }
 
 void BridgeRos::publishState(const StateView& view) {

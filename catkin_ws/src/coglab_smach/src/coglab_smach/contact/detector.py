@@ -83,6 +83,23 @@ def confidence(deviations: float) -> float:
     return 0.5 * (1.0 + math.erf(deviations / math.sqrt(2.0)))
 
 
+@dataclass(frozen=True)
+class Signal:
+    """What the detector sees now, for people who tune it. Joints in wire order."""
+
+    state: str
+    mode: str
+    """what it is armed for; empty while it is off"""
+    change: tuple[float, ...]
+    """Nm, within the window: the largest since the last look, with its sign"""
+    threshold: tuple[float, ...]
+    """Nm"""
+    watched: tuple[bool, ...]
+    k: float
+    margin: float
+    rest_samples: int
+
+
 @dataclass
 class _Armed:
     mode: str
@@ -116,6 +133,7 @@ class ContactDetector:
         self._rest_before_motion: np.ndarray | None = None
         self._unloaded: np.ndarray | None = None
         self.margin = 0.0
+        self._largest = np.zeros(7)
 
     def arm(
         self,
@@ -155,6 +173,34 @@ class ContactDetector:
         """Stop watching."""
         self._armed = None
 
+    def learn(self) -> str:
+        """Forget the noise at rest and learn it anew, from now on; the answer in words. ValueError where the arm moves
+        or the detector is armed: what it would learn then is no noise."""
+        if self._armed is not None:
+            raise ValueError(f"armed for {self._armed.mode}; the noise is learnt between actions, send mode off first")
+        if not self.still():
+            raise ValueError("the arm moves, or no torques come; the noise is learnt at rest")
+        self._rest_differences.clear()
+        return f"learning from the next {self.settings.learn_samples} samples; leave the arm alone"
+
+    def look(self) -> Signal:
+        """What is seen now; the largest change is counted anew from here."""
+        armed, change = self._armed, self._largest
+        self._largest = np.zeros(7)
+        k = armed.k if armed is not None else self.settings.k
+        watched = armed.watched if armed is not None and armed.watched else range(7)
+        watching = self.state() == "watching"
+        return Signal(
+            self.state(),
+            armed.mode if armed is not None else "",
+            tuple(map(float, change)),
+            tuple(map(float, k * self.sigma())),
+            tuple(j in watched for j in range(7)),
+            k,
+            self.margin if watching else 0.0,
+            len(self._rest_differences),
+        )
+
     def state(self) -> str:
         """off, waiting (armed, but the arm moves or too little rest was seen) or watching."""
         if self._armed is None:
@@ -178,6 +224,8 @@ class ContactDetector:
             return None
         self._follow_motion(stamp, velocity)
         difference = self._filter(stamp, tau)
+        if difference is not None:
+            self._largest = np.where(np.abs(difference) > np.abs(self._largest), difference, self._largest)
         if self._armed is not None and stamp > self._armed.until:
             self._armed = None
         if not self.still() or difference is None:

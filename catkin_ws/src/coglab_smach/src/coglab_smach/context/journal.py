@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -41,6 +43,14 @@ class Failure:
 
     def __str__(self) -> str:
         return self.sentence + "".join(f", because {cause}" for cause in self.causes)
+
+
+@dataclass(frozen=True)
+class Wait:
+    """What an active state waits for, in words, and when (s of the journal's clock) it gives up."""
+
+    what: str = ""
+    deadline: float = math.inf
 
 
 @dataclass
@@ -88,6 +98,8 @@ class Journal:
         self._newest = Failure()
         self._action: ActionRecord | None = None
         self._active: list[str] = []
+        self._waits: dict[str, Wait] = {}
+        self._wait_listeners: list[Callable[[], None]] = []
         self._change_listeners: list[Callable[[], None]] = []
 
     def listen(self, on_transition: Callable[[TransitionRecord], None]) -> None:
@@ -101,6 +113,10 @@ class Journal:
     def listen_changes(self, on_change: Callable[[], None]) -> None:
         """Call this whenever another state is active, or something else is to be told as the newest failure."""
         self._change_listeners.append(on_change)
+
+    def listen_waits(self, on_change: Callable[[], None]) -> None:
+        """Call this whenever a state begins to wait for something, puts the end of a wait off, or waits no more."""
+        self._wait_listeners.append(on_change)
 
     def changed(self) -> None:
         """Tell whoever listens for changes."""
@@ -117,6 +133,31 @@ class Journal:
         """A leaf state has ended."""
         with self._lock:
             self._active.remove(path)
+
+    def waits(self, path: str, wait: Wait | None) -> None:
+        """The active state of this path waits for something; None: not any more."""
+        with self._lock:
+            if wait is None:
+                self._waits.pop(path, None)
+            else:
+                self._waits[path] = wait
+        for listener in self._wait_listeners:
+            listener()
+
+    @contextmanager
+    def waiting(self, path: str, wait: Wait) -> Iterator[None]:
+        """``waits`` for as long as the block runs."""
+        self.waits(path, wait)
+        try:
+            yield
+        finally:
+            self.waits(path, None)
+
+    def wait(self) -> Wait:
+        """Of the waits of all active states the one that gives up first; empty where none has a limit."""
+        with self._lock:
+            limited = [wait for wait in self._waits.values() if wait.deadline < math.inf]
+        return min(limited, key=lambda wait: wait.deadline, default=Wait())
 
     def active(self) -> tuple[str, ...]:
         """Paths of the active leaf states, in the order in which they began."""

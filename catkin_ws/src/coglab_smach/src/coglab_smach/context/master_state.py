@@ -20,6 +20,9 @@ class MasterState:
     object_id: str = ""
     why: str = ""
     reason_code: int = 0
+    waits_for: str = ""
+    deadline: float = 0.0
+    """s of the brain's clock; 0 without a limit"""
 
 
 class StateWatch:
@@ -31,6 +34,7 @@ class StateWatch:
         self._lock = threading.Lock()
         self._shown: MasterState | None = None
         ctx.journal.listen_changes(self._look)
+        ctx.journal.listen_waits(self._look)
         self._look()
 
     def _look(self) -> None:
@@ -48,6 +52,14 @@ class StateWatch:
         if hub in ("stopped", "fault") and COMMAND not in why:
             why = f"{why or f'the machine is in {hub}'}; to go on {command(*ctx.requests.allowed())}"
         active = ctx.journal.active()  # of several side by side the one that began last
+        wait = ctx.journal.wait()
         return MasterState(
-            active[-1] if active else "", bool(hub), ctx.requests.allowed(), ctx.holding, why, failure.code
+            active[-1] if active else "",
+            bool(hub),
+            ctx.requests.allowed(),
+            ctx.holding,
+            why,
+            failure.code,
+            wait.what,
+            wait.deadline if wait.what else 0.0,
         )

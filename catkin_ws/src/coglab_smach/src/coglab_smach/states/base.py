@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import traceback
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
@@ -11,13 +12,16 @@ from coglab_msgs.msg import ReasonCode
 
 from coglab_smach.context.config import ConfigError
 from coglab_smach.context.context import Context
-from coglab_smach.context.journal import Failure
+from coglab_smach.context.journal import Failure, Wait
 from coglab_smach.context.requests import command
 from coglab_smach.ports.pending import Pending, PortError
 from coglab_smach.states.motion import end_motion
 
 POLL_PERIOD = 0.01
 """s between two looks at a condition: well below the 60 ms in which a contact has to be found."""
+
+RETOLD = 0.2
+"""s by which the end of a wait that is put off moves until it is told again"""
 
 
 class Interrupted(Exception):
@@ -168,19 +172,27 @@ class CoglabState(smach.State):
         slower, down to a tenth, and the state's own limit is put off likewise.
         """
         allowed = self.left() if limit is None else min(limit, self.left())
-        left, before = allowed, self.ctx.clock.now()
-        while True:
-            self.check()
-            if condition():
-                return
-            now = self.ctx.clock.now()
-            used = (now - before) * (min(1.0, max(0.1, pace())) if pace is not None else 1.0)
-            left -= used
-            self._deadline += now - before - used
-            before = now
-            if left <= 0.0:
-                raise TimeLimit(f"{what} within {max(0.0, allowed):.1f} s expected, it did not happen")
-            self.ctx.clock.sleep(POLL_PERIOD)
+        left, before, told = allowed, self.ctx.clock.now(), -math.inf
+        path = f"{self.path()}/{self.label}"
+        try:
+            while True:
+                self.check()
+                if condition():
+                    return
+                now = self.ctx.clock.now()
+                used = (now - before) * (min(1.0, max(0.1, pace())) if pace is not None else 1.0)
+                left -= used
+                self._deadline += now - before - used
+                before = now
+                if left <= 0.0:
+                    raise TimeLimit(f"{what} within {max(0.0, allowed):.1f} s expected, it did not happen")
+                if now + left > told + RETOLD:
+                    told = now + left
+                    self.ctx.journal.waits(path, Wait(what, told))
+                self.ctx.clock.sleep(POLL_PERIOD)
+        finally:
+            if told > -math.inf:
+                self.ctx.journal.waits(path, None)
 
     def await_pending(
         self, pending: Pending, what: str, limit: float | None = None, pace: Callable[[], float] | None = None

@@ -11,6 +11,7 @@ from coglab_msgs.msg import ReasonCode, Say
 from coglab_py.pose import Pose, mean_pose
 
 from coglab_smach.context.context import Context
+from coglab_smach.context.journal import Wait
 from coglab_smach.kinematics.goals import delivery_goal, grasp_goal, place_goal
 from coglab_smach.ports.pending import PortError
 from coglab_smach.states.base import CoglabState
@@ -118,27 +119,30 @@ def await_offer(state: CoglabState, target: str, goal: Mapping[str, Any], margin
     limit = float(config.get("handover.offer_timeout", 8.0))
     end = state.ctx.clock.now() + limit
     seen: list[tuple[float, np.ndarray]] = []
-    while True:
-        located = locate(state, target)
-        now, place = state.ctx.clock.now(), np.array(located["xyz"])
-        seen = [(t, p) for t, p in seen if now - t <= 0.4] + [(now, place)]
-        still = now - seen[0][0] > 0.3 and float(np.linalg.norm(place - seen[0][1])) < 0.025
-        offered = bool(np.all(place >= low) and np.all(place <= high)) or (
-            still and bool(np.all(place >= low - wider) and np.all(place <= high + wider))
-        )
-        if offered and reachable(state.ctx, located, goal):
-            break
-        if now > end and offered:
-            raise PortError(*out_of_reach(target, located, goal), ReasonCode.GOAL_UNREACHABLE)
-        if now > end:
-            where = ", ".join(f"{v:.2f}" for v in place)
-            raise PortError(
-                f"'{target}' was not offered within {limit:.0f} s: it stayed at ({where}) m, outside the "
-                "handover region",
-                ("nobody reaches toward the robot",),
-                ReasonCode.OBJECT_NOT_SEEN,
+    person = target == config.get("perception.human_hand", "human_hand")
+    offer = "the person's hand within reach" if person else f"'{target}' on offer"
+    with state.ctx.journal.waiting(f"{state.path()}/{state.label}/offer", Wait(offer, end)):
+        while True:
+            located = locate(state, target)
+            now, place = state.ctx.clock.now(), np.array(located["xyz"])
+            seen = [(t, p) for t, p in seen if now - t <= 0.4] + [(now, place)]
+            still = now - seen[0][0] > 0.3 and float(np.linalg.norm(place - seen[0][1])) < 0.025
+            offered = bool(np.all(place >= low) and np.all(place <= high)) or (
+                still and bool(np.all(place >= low - wider) and np.all(place <= high + wider))
             )
-        state.pause(0.03)
+            if offered and reachable(state.ctx, located, goal):
+                break
+            if now > end and offered:
+                raise PortError(*out_of_reach(target, located, goal), ReasonCode.GOAL_UNREACHABLE)
+            if now > end:
+                where = ", ".join(f"{v:.2f}" for v in place)
+                raise PortError(
+                    f"'{target}' was not offered within {limit:.0f} s: it stayed at ({where}) m, outside the "
+                    "handover region",
+                    ("nobody reaches toward the robot",),
+                    ReasonCode.OBJECT_NOT_SEEN,
+                )
+            state.pause(0.03)
     state.ctx.journal.mark("offered")
     return located
 

@@ -93,7 +93,8 @@ class BridgeRos : public coglab_rt::ArmPort {
   FriThread fri_thread_;
   std::unique_ptr<ros::AsyncSpinner> spinner_;
   std::unique_ptr<BridgeDiagnostics> diagnostics_;
-  ros::Publisher joint_states_, external_torques_, tool_wrench_, state_;
+  ros::Publisher joint_states_, external_torques_, tool_wrench_, state_, fri_latency_;
+  std::int64_t latency_told_ns_ = 0;  // stamp of the sample whose latency was published last
   std::unique_ptr<TargetTopic> target_;
   ros::Subscriber events_;
   ros::ServiceServer command_;

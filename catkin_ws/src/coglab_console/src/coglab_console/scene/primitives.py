@@ -12,6 +12,7 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 MAX_FILE = 4_000_000  # bytes
 STEPS = 200
@@ -103,12 +104,14 @@ def shape_map(mapping: str, demonstrated: np.ndarray, line: np.ndarray) -> np.nd
 def _turn_between(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """The smallest rotation that takes the unit vector a to b."""
     axis, cosine = np.cross(a, b), float(a @ b)
-    if cosine < -1.0 + 1e-9:
-        across = np.cross(a, [1.0, 0.0, 0.0] if abs(a[0]) < 0.9 else [0.0, 1.0, 0.0])
-        across /= np.linalg.norm(across)
-        return 2.0 * np.outer(across, across) - np.eye(3)
-    skew = np.array([[0, -axis[2], axis[1]], [axis[2], 0, -axis[0]], [-axis[1], axis[0], 0]])
-    return np.eye(3) + skew + skew @ skew / (1.0 + cosine)
+    sine = float(np.linalg.norm(axis))
+    if sine < 1e-9:
+        if cosine > 0.0:
+            return np.eye(3)
+        axis = np.cross(a, [1.0, 0.0, 0.0] if abs(a[0]) < 0.9 else [0.0, 1.0, 0.0])  # any turn by half will do
+    angle = float(np.arctan2(sine, cosine))
+    turn: np.ndarray = Rotation.from_rotvec(angle * axis / np.linalg.norm(axis)).as_matrix()
+    return turn
 
 
 def _triple(text: str) -> np.ndarray:

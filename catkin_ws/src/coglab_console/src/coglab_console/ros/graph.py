@@ -10,7 +10,7 @@ from typing import Any
 import rospy
 from smach_msgs.msg import SmachContainerStatus, SmachContainerStructure
 
-from .graph_layout import Container, Layout, roots
+from ..scene.graph_layout import Container, Layout, roots
 
 STRUCTURE, STATUS = "/smach/container_structure", "/smach/container_status"
 MAX_MACHINES = 12

@@ -5,11 +5,12 @@ Lengths m, angles rad. A transform is a 4 x 4 array; a pose for the page is [x, 
 
 from __future__ import annotations
 
-import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from xml.etree import ElementTree
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 MAX_URDF = 2_000_000  # characters
 SHAPES = {"box": ("size",), "cylinder": ("radius", "length"), "sphere": ("radius",)}
@@ -23,65 +24,24 @@ def _numbers(text: str | None, default: str) -> list[float]:
     return [float(word) for word in (text or default).split()]
 
 
-def rotation_rpy(roll: float, pitch: float, yaw: float) -> np.ndarray:
-    """Rotation about the fixed axes x, y, z in turn, (3, 3)."""
-    cr, sr, cp, sp, cy, sy = *_cs(roll), *_cs(pitch), *_cs(yaw)
-    return np.array([
-        [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
-        [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
-        [-sp, cp * sr, cp * cr],
-    ])  # fmt: skip
-
-
-def _cs(angle: float) -> tuple[float, float]:
-    return math.cos(angle), math.sin(angle)
-
-
-def quaternion(rotation: np.ndarray) -> list[float]:
-    """x y z w of a rotation matrix."""
-    m = rotation
-    w2 = 1.0 + m[0, 0] + m[1, 1] + m[2, 2]
-    options = [
-        1.0 + m[0, 0] - m[1, 1] - m[2, 2],
-        1.0 - m[0, 0] + m[1, 1] - m[2, 2],
-        1.0 - m[0, 0] - m[1, 1] + m[2, 2],
-        w2,
-    ]
-    largest = int(np.argmax(options))
-    q = np.array([
-        [options[0], m[0, 1] + m[1, 0], m[0, 2] + m[2, 0], m[2, 1] - m[1, 2]],
-        [m[0, 1] + m[1, 0], options[1], m[1, 2] + m[2, 1], m[0, 2] - m[2, 0]],
-        [m[0, 2] + m[2, 0], m[1, 2] + m[2, 1], options[2], m[1, 0] - m[0, 1]],
-        [m[2, 1] - m[1, 2], m[0, 2] - m[2, 0], m[1, 0] - m[0, 1], w2],
-    ])[largest]  # fmt: skip
-    return (q / np.linalg.norm(q)).tolist()
-
-
-def rotation(q: list[float] | tuple[float, ...]) -> np.ndarray:
-    """Rotation matrix of x y z w, which need not be of length one."""
-    x, y, z, w = np.asarray(q, dtype=float) / np.linalg.norm(q)
-    return np.array([
-        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-    ])  # fmt: skip
-
-
-def transform(xyz: list[float] | tuple[float, ...], turn: np.ndarray) -> np.ndarray:
-    """4 x 4 from a place and a rotation matrix."""
+def transform(xyz: Sequence[float] | np.ndarray, turn: Rotation | None = None) -> np.ndarray:
+    """4 x 4 from a place and a rotation (none: not turned)."""
     found = np.eye(4)
-    found[:3, :3], found[:3, 3] = turn, xyz
+    found[:3, 3] = xyz
+    if turn is not None:
+        found[:3, :3] = turn.as_matrix()
     return found
 
 
 def _origin(element: ElementTree.Element | None) -> np.ndarray:
     if element is None:
         return np.eye(4)
-    return transform(_numbers(element.get("xyz"), "0 0 0"), rotation_rpy(*_numbers(element.get("rpy"), "0 0 0")))
+    turn = Rotation.from_euler("xyz", _numbers(element.get("rpy"), "0 0 0"))
+    return transform(_numbers(element.get("xyz"), "0 0 0"), turn)
 
 
 def _pose(matrix: np.ndarray) -> list[float]:
-    return [round(value, 9) for value in (*matrix[:3, 3].tolist(), *quaternion(matrix[:3, :3]))]
+    return [round(float(value), 9) for value in (*matrix[:3, 3], *Rotation.from_matrix(matrix[:3, :3]).as_quat())]
 
 
 @dataclass(frozen=True)
@@ -163,10 +123,9 @@ class RobotModel:
     @staticmethod
     def _motion(joint: Joint, q: float) -> np.ndarray:
         if joint.kind == "prismatic":
-            return transform((joint.axis * q).tolist(), np.eye(3))
+            return transform(joint.axis * q)
         if joint.kind in ("revolute", "continuous"):
-            half = q / 2
-            return transform((0.0, 0.0, 0.0), rotation([*(joint.axis * math.sin(half)), math.cos(half)]))
+            return transform((0.0, 0.0, 0.0), Rotation.from_rotvec(joint.axis * q))
         return np.eye(4)
 
     def document(self) -> dict:

@@ -15,11 +15,13 @@ import numpy as np
 import rospy
 import yaml
 from coglab_msgs.srv import GetObject, ListObjects
+from coglab_py import parameters
 
-from . import path_ahead
-from .primitives import LibraryError, Primitive, load_library
-from .primitives import document as library_document
-from .ros_view import RosView
+from ..scene import path_ahead
+from ..scene.primitives import LibraryError, Primitive, load_library
+from ..scene.primitives import document as library_document
+from .view import RosView
+from .words import lookup
 
 PERIOD = 5.0  # s between two looks at files and at the object database
 PATH_PERIOD = 0.25  # s
@@ -41,7 +43,6 @@ class Knowledge:
         self._view, self._put, self._say, self._selected = view, put, say, selected
         self._texts: dict[str, str] = {}
         self._entries: dict[str, dict] = {}
-        self._problems = ""
         self._config: dict = {}
         self._library: dict[str, Primitive] = {}
         self._stamps: dict[str, int] = {}
@@ -59,9 +60,8 @@ class Knowledge:
         name = self._view.machine.object_id or self._selected() or str(self._config.get("default_object", ""))
         return self._entries.get(name, {})
 
-    def read_again(self, problems: str) -> None:
-        """After the object database has read its files; `problems` in its words."""
-        self._problems = problems
+    def read_again(self) -> None:
+        """After the object database has read its files."""
         self._now.set()
 
     def _look(self) -> None:
@@ -85,9 +85,10 @@ class Knowledge:
         try:
             rospy.wait_for_service("object_database/list_objects", timeout=1.0)
         except rospy.ROSException:
-            self._show_objects("the object database is not there")
+            self._show_objects(None)
             return
-        ids = rospy.ServiceProxy("object_database/list_objects", ListObjects)().object_ids[:MAX_OBJECTS]
+        listed = rospy.ServiceProxy("object_database/list_objects", ListObjects)()
+        ids = listed.object_ids[:MAX_OBJECTS]
         ask = rospy.ServiceProxy("object_database/get_object", GetObject)
         for name in ids:
             answer = ask(name)
@@ -97,9 +98,10 @@ class Knowledge:
                     self._texts[name], self._entries[name] = answer.yaml, entry
         for gone in set(self._texts) - set(ids):
             del self._texts[gone], self._entries[gone]
-        self._show_objects("")
+        self._show_objects([problem[:400] for problem in listed.problems[:MAX_OBJECTS]])
 
-    def _show_objects(self, missing: str) -> None:
+    def _show_objects(self, problems: list[str] | None) -> None:
+        """`problems` in the database's words; None: it is not there to be asked."""
         rows = [
             {
                 "id": name,
@@ -111,7 +113,7 @@ class Knowledge:
             }
             for name, text in sorted(self._texts.items())
         ]
-        self._put("objects", {"rows": rows, "problems": missing or self._problems})
+        self._put("objects", {"rows": rows, "asked": problems is not None, "problems": problems or []})
 
     def _changed(self, path: Path) -> bool:
         stamp = path.stat().st_mtime_ns
@@ -121,14 +123,14 @@ class Knowledge:
         return True
 
     def _machines(self) -> None:
-        path = Path(str(rospy.get_param("coglab/config_file", "")))
+        path = Path(parameters.read("coglab/config_file", str, ""))
         if path.is_file() and path.stat().st_size < MAX_FILE and self._changed(path):
             values = yaml.safe_load(path.read_text(encoding="utf-8"))
             if isinstance(values, dict):
                 self._config = values
 
     def _primitives(self) -> None:
-        path = Path(str(rospy.get_param("coglab/dmp_library", "")))
+        path = Path(parameters.read("coglab/dmp_library", str, ""))
         if not path.is_file() or not self._changed(path):
             return
         try:
@@ -165,8 +167,14 @@ class Knowledge:
         if goal is None or name not in self._library:
             return None
         entry = view.entry()
-        ratio = float(entry.get("dmp", {}).get("dmp_ratio", 1.0)) if isinstance(entry.get("dmp"), dict) else 1.0
+        own = entry.get("dmp", {}).get("dmp_ratio", 1.0) if isinstance(entry.get("dmp"), dict) else 1.0
+        ratio = float(own) * self._pace()
         return path_ahead.document("running", self._library[name], self._motion[1], np.array(goal[:3]), ratio)
+
+    def _pace(self) -> float:
+        """By which the machines slow the primitives of an exchange down."""
+        ratio = lookup(self._config, "handover.reach_ratio")
+        return float(ratio) if isinstance(ratio, (int, float)) and ratio > 0 else 1.0
 
     def _ahead(self, palm: np.ndarray) -> dict | None:
         view = self._view
@@ -184,4 +192,4 @@ class Knowledge:
         if found is None or found[0] not in self._library:
             return None
         name, ratio, goal = found
-        return path_ahead.document("ahead", self._library[name], palm, goal, ratio)
+        return path_ahead.document("ahead", self._library[name], palm, goal, ratio * self._pace())

@@ -13,9 +13,9 @@ from typing import Any
 
 from aiohttp import WSMessage, WSMsgType, web
 
+from ..desk.desk import Answer, Desk
+from ..desk.events import EventLog
 from .access import Access, Denied, Session
-from .desk import Answer, Desk
-from .events import EventLog
 from .fan_out import Client, Documents, to_json
 from .page_files import PageFile
 
@@ -65,6 +65,7 @@ class ConsoleServer:
         self.access, self.desk, self.events, self.documents = access, desk, events, documents
         self._files, self._cookie, self._epoch, self._spent = files, cookie, epoch, spent
         self.clients: set[Client] = set()
+        self._number = 0  # of the newest state
         documents.changed = self.wake
         self.app = web.Application(client_max_size=MAX_MESSAGE, middlewares=[self._guard])
         self.app.router.add_get("/ws", self._socket)
@@ -81,11 +82,13 @@ class ConsoleServer:
             client.wake()
 
     def publish_state(self, state: dict) -> None:
-        """The newest state to everybody."""
+        """The newest state to everybody, numbered, and when it left: `at`, ms of the console's steady clock."""
         if self.clients:
-            text = to_json({"t": "state", **state})
+            self._number += 1
+            now = round(1000 * asyncio.get_running_loop().time())
+            text = to_json({"t": "state", "n": self._number, "at": now, **state})
             for client in self.clients:
-                client.state(text)
+                client.state(self._number, text)
 
     # --- requests ---------------------------------------------------------------------------------------------
 
@@ -251,8 +254,12 @@ class ConsoleServer:
         if kind == "stop":
             self._press(session)
             self._reply(socket, Answer(True, "STOP was sent"), frame.get("id"))
+        elif kind == "seen" and client.seen(frame.get("n")):
+            pass
         elif not session.requests.take():
             return "too many frames; wait a second"
+        elif kind == "seen":
+            pass  # told twice, or of a state that went to another connection
         elif kind == "hold":
             task = asyncio.create_task(self._hold(frame, session, socket))
             self._tasks.add(task)
@@ -260,7 +267,7 @@ class ConsoleServer:
         elif kind == "release":
             self.desk.released(session.name)
         else:
-            return f"a frame of kind '{str(kind)[:20]}' means nothing; there are: stop, hold, release"
+            return f"a frame of kind '{str(kind)[:20]}' means nothing; there are: seen, stop, hold, release"
         return ""
 
     async def _hold(self, frame: dict, session: Session, socket: web.WebSocketResponse) -> None:

@@ -1,4 +1,4 @@
-"""Phases in words, and the time limit of what the machine waits for."""
+"""Phases in words. What is waited for, and how long still, the machine tells itself (MasterState)."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ PHASES = {
     "wait_trigger": "waits for initialise",
     "stopped": "stopped",
     "fault": "fault",
-    "set_dmp_goal": "waits until it is offered",
+    "set_dmp_goal": "sets the goal",
     "query_database": "looks the object up",
     "execute_dmp": "reaches",
-    "wait_stop": "waits for contact",
+    "wait_stop": "reaches",
     "hand_preshape": "shapes the hand",
-    "hand_close": "closes the hand, waits for the load",
-    "hand_open": "waits for the person to take it",
+    "hand_close": "closes the hand",
+    "hand_open": "opens the hand",
     "hand_calibration": "calibrates the hand",
     "coglab_home_robot": "goes home",
     "move_to_board": "goes to the board",
@@ -35,20 +35,22 @@ PHASES = {
     "load_dmps": "loads the primitives",
     "configure_lwr": "configures the arm",
 }
-_LIMITS = {  # names in the configuration of the machines
-    "set_dmp_goal": "handover.offer_timeout",
-    "wait_stop": "contact_timeout",
-    "hand_open": "release_timeout",
-    "hand_close": "hand.load_timeout",
-    "wait_trigger": "trigger_timeout",
-    "locate_object": "perception.locate_timeout",
-    "free_places": "perception.locate_timeout",
+IN_ACTION = {  # where the same state means something else in another action
+    ("exchange_human_to_robot", "set_dmp_goal"): "waits until it is offered",
+    ("exchange_robot_to_human", "set_dmp_goal"): "waits for the person's hand",
+    ("exchange_human_to_robot", "wait_stop"): "reaches and receives",
+    ("exchange_robot_to_human", "wait_stop"): "reaches and gives",
+    ("exchange_robot_to_human", "hand_open"): "lets the person have it",
 }
 
 
 def phase(state: str) -> str:
     """Words for the path of a state."""
-    leaf = state.rsplit("/", 1)[-1]
+    labels = state.split("/")
+    leaf = labels[-1]
+    for action in labels:
+        if (action, leaf) in IN_ACTION:
+            return IN_ACTION[action, leaf]
     return PHASES.get(leaf, leaf.replace("_", " ")) or "no state"
 
 
@@ -60,15 +62,3 @@ def lookup(values: Mapping[str, Any], name: str) -> Any:
             return None
         node = node[part]
     return node
-
-
-def time_limit(state: str, config: Mapping[str, Any], entry: Mapping[str, Any]) -> float | None:
-    """s that the machine waits in this state, from its configuration and the object's entry; None if it is not told."""
-    leaf = state.rsplit("/", 1)[-1]
-    own = lookup(config, f"time_limits.{leaf}")
-    if leaf == "wait_stop":
-        own = lookup(entry, "contact.timeout") or own
-    if leaf == "hand_open":
-        own = lookup(entry, f"deliveries.{entry.get('default_delivery', '')}.release.timeout") or own
-    value = own if own is not None else lookup(config, _LIMITS.get(leaf, "?"))
-    return float(value) if isinstance(value, (int, float)) and not isinstance(value, bool) else None

@@ -7,9 +7,9 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+from coglab_py.pose import Pose
 
 from .primitives import Primitive
-from .urdf_model import rotation, rotation_rpy, transform
 
 ROLES = {
     "exchange_human_to_robot": "receive",
@@ -19,18 +19,9 @@ ROLES = {
 REACH = 1.5  # m; what lies further away is no goal
 
 
-def _pose(entry: Mapping[str, Any]) -> np.ndarray:
-    """Transform of a pose of an object file."""
-    if "quaternion" in entry:
-        turn = rotation(entry["quaternion"])
-    else:
-        turn = rotation_rpy(*np.radians(entry.get("rpy_deg", [0.0, 0.0, 0.0])))
-    return transform(entry["xyz"], turn)
-
-
-def as_transform(pose: tuple[float, ...]) -> np.ndarray:
+def placed(pose: tuple[float, ...]) -> Pose:
     """Of (x, y, z, qx, qy, qz, qw)."""
-    return transform(pose[:3], rotation(pose[3:]))
+    return Pose.from_dict({"xyz": pose[:3], "quaternion": pose[3:]})
 
 
 def aim(
@@ -45,14 +36,14 @@ def aim(
         grasp = entry["grasps"][entry["default_grasp"]]
         if role == "give":
             delivery = entry["deliveries"][entry["default_delivery"]]
-            palm = as_transform(frames["human_hand"]) @ _pose(delivery["pose"]) @ _pose(grasp["pose"])
+            palm = placed(frames["human_hand"]) * Pose.from_dict(delivery["pose"]) * Pose.from_dict(grasp["pose"])
+            goal = palm.position
         else:
-            palm = as_transform(frames[entry["frame"]]) @ _pose(grasp["pose"])
+            tracked = placed(frames[entry["frame"]])
             approach = grasp.get("approach", {})
             axis = np.asarray(approach.get("axis", [0.0, 0.0, 0.0]), dtype=float)
             back = axis / max(float(np.linalg.norm(axis)), 1e-9) * float(approach.get("distance", 0.0))
-            palm[:3, 3] -= as_transform(frames[entry["frame"]])[:3, :3] @ back
-        goal = palm[:3, 3]
+            goal = (tracked * Pose.from_dict(grasp["pose"])).position - tracked.rotation.apply(back)
         if not np.all(np.isfinite(goal)) or np.linalg.norm(goal) > REACH:
             return None
         return str(entry["dmp"][role]), float(entry["dmp"].get("dmp_ratio", 1.0)), goal

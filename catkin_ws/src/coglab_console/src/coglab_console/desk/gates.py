@@ -12,6 +12,8 @@ from .commands import COMMANDS, STARTS
 
 BUTTONS = (*STARTS, "calibrate", "home")
 STANDSTILL = ("stopped", "fault")
+SECOND_THOUGHT = ("feedback", "feedback_order", "contact_learn")
+"""commands that are held down, not clicked: nobody sees at once what they have changed"""
 
 
 @dataclass
@@ -50,8 +52,11 @@ class MotionGuard:
         self.needs_hold = False
 
     def guarded(self, name: str, arguments: dict) -> bool:
-        """Whether this command needs a held button now. Calibrations that open the hand whatever it holds always do."""
+        """Whether this command needs a held button now. Always: calibrations that open the hand whatever it holds, and
+        what changes how the arm yields or is watched."""
         if name == "calibrate" and (arguments.get("force") or arguments.get("mode") == "complete"):
+            return True
+        if name in SECOND_THOUGHT:
             return True
         return COMMANDS[name].motion and self.needs_hold
 
@@ -85,7 +90,7 @@ class Standing:
 
 def _start_reason(action: str, now: Standing) -> str:
     if not now.master_alive:
-        return "the brain (/coglab) is not there"
+        return "/coglab is not there"
     if action in now.actions:
         return ""
     if not now.in_hub:
@@ -100,7 +105,8 @@ def _start_reason(action: str, now: Standing) -> str:
         return f"the hand holds {now.object_id}"
     if action in ("initialise", "reset"):
         return "nothing is stopped" if action == "reset" else "it is initialised"
-    return f"{now.leaf.replace('_', ' ')} takes {', '.join(now.actions) or 'nothing'}"
+    words = [action.replace("_", " ") for action in now.actions]
+    return f"now only {' or '.join(words)}" if words else f"{now.leaf.replace('_', ' ')} takes nothing"
 
 
 def _calibrate_reason(now: Standing) -> str:
@@ -118,7 +124,7 @@ def _home_reason(now: Standing) -> str:
         return "the arm's node is not there"
     if now.master_alive and (not now.in_hub or now.leaf in STANDSTILL):
         return f"not in {now.leaf.replace('_', ' ')}" if now.in_hub else "an action is under way"
-    return "" if now.motion_allowed else (now.arm_reason or "the arm may not move")
+    return "" if now.motion_allowed else f"the arm may not move: {now.arm_reason.split(':')[0] or 'no reason told'}"
 
 
 def reasons(now: Standing, guard: MotionGuard) -> dict[str, str]:

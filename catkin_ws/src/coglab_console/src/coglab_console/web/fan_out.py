@@ -1,16 +1,21 @@
 """What goes to the browsers: documents with versions, the newest state, and every event since the last one seen.
 
-Nothing is queued per browser but the newest state: documents and events are looked up when there is room to send. So a
-browser that reads slowly misses states, never an event, and costs nobody anything.
+Nothing is queued per browser but the newest state: documents and events are looked up when there is room to send. There
+is room while fewer than WINDOW states wait for the browser's word that it has taken them; buffers of the network would
+otherwise hold seconds of old states. So a browser that is slow misses states, never an event, and shows what is new.
 """
 
 from __future__ import annotations
 
 import asyncio
 import json
+from collections import deque
 from collections.abc import Awaitable, Callable, Iterator
 
-from .events import EventLog
+from ..desk.events import EventLog
+
+WINDOW = 4
+"""states on the way to one browser: at 30 Hz enough for a round trip of 0.13 s at the full rate"""
 
 
 def to_json(value: object) -> str:
@@ -69,23 +74,40 @@ class Client:
         self._seq = seq
         self._documents, self._events = documents, events
         self._versions: dict[str, int] = {}
-        self._state: str | None = None
+        self._state: tuple[int, str] | None = None
+        self._on_the_way: deque[int] = deque()
+        self._behind_since = 0.0
         self._wake = asyncio.Event()
         self._wake.set()
         self.states_dropped = 0
 
-    def state(self, text: str) -> None:
-        """The newest state takes the place of one that was not sent yet."""
+    def state(self, number: int, text: str) -> None:
+        """The newest state takes the place of one that was not sent yet. `number` grows."""
         self.states_dropped += self._state is not None
-        self._state = text
+        self._state = (number, text)
         self._wake.set()
+
+    def seen(self, number: object) -> bool:
+        """The browser has taken this state, and all before it. False where that one was not on the way."""
+        if isinstance(number, bool) or not isinstance(number, int) or number not in self._on_the_way:
+            return False
+        while self._on_the_way and self._on_the_way[0] <= number:
+            self._on_the_way.popleft()
+        self._wake.set()
+        return True
+
+    def behind(self) -> bool:
+        """Whether so many states are on the way that nothing more is sent."""
+        return len(self._on_the_way) >= WINDOW
 
     def wake(self) -> None:
         """There are new events or documents."""
         self._wake.set()
 
     def take(self) -> list[str]:
-        """All that is to be sent now, oldest first."""
+        """All that is to be sent now, oldest first; nothing while the browser is behind."""
+        if self.behind():
+            return []
         texts = list(self._documents.newer(self._versions))
         events, lost = self._events.since(self._seq)
         if events or lost:
@@ -95,14 +117,21 @@ class Client:
         if self._seq < self._events.newest():
             self._wake.set()
         if self._state is not None:
-            texts.append(self._state)
+            number, text = self._state
+            texts.append(text)
+            self._on_the_way.append(number)
             self._state = None
         return texts
 
     async def serve(self, send: Callable[[str], Awaitable[None]], limit: float) -> None:
-        """Sends until cancelled; TimeoutError if one message was not taken within `limit` s."""
+        """Sends until cancelled; TimeoutError if one message was not taken, or no state seen, within `limit` s."""
+        loop = asyncio.get_running_loop()
         while True:
             await self._wake.wait()
             self._wake.clear()
+            if not self.behind():
+                self._behind_since = loop.time()
+            elif loop.time() - self._behind_since > limit:
+                raise TimeoutError(f"no state was seen for {limit:.0f} s")
             for text in self.take():
                 await asyncio.wait_for(send(text), limit)

@@ -11,6 +11,7 @@ from typing import Any
 import rospy
 from coglab_msgs.msg import (
     Contact,
+    ContactSignal,
     ControllerStatus,
     DmpFeedback,
     HandStatus,
@@ -22,17 +23,16 @@ from coglab_msgs.msg import (
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64, String
 
+from ..desk.gates import Standing
+from ..scene.urdf_model import RobotModel
 from . import wire
-from .gates import Standing
-from .ros_tables import Tables
-from .torque_rate import Settings, TorqueRate
-from .urdf_model import RobotModel
-from .words import phase, time_limit
+from .tables import Tables
+from .words import phase
 
 PALM = "ih2_palm"
 FRAME_PARENTS = ("world", "lwr_base_link")
 OLD = 1.0  # s without a message after which a fast topic counts as silent
-STILL = 0.02  # rad/s
+ALL_DRIVES = 0x7F  # one bit a joint; further bits of the word say something else
 
 
 def _round(values: Any, digits: int = 4) -> list[float]:
@@ -46,7 +46,6 @@ class RosView:
     def __init__(
         self,
         model: RobotModel | None,
-        settings: Settings,
         frames: dict[str, str],
         say: Callable[[str, str, str], None],
         put: Callable[[str, Any], None],
@@ -56,24 +55,21 @@ class RosView:
         self.model = model
         self._say, self._put, self._transition, self._result = say, put, transition, result
         self._hand_frame, self._board_frame = frames["human_hand"], frames["board"]
-        self.torque = TorqueRate(settings)
         self.frames: dict[str, tuple[float, ...]] = {}
         self._stamps: dict[str, float] = {}
         self.joints: dict[str, float] = {}
         self._joints_at = self._joints_stamp = 0.0
-        self._fastest = 0.0
-        self._asked = False  # for learning, by an operator
         self._palm_before: tuple[float, Any] | None = None
         self.palm_speed = 0.0
         self.machine, self.arm, self.hand = MasterState(), LwrState(), HandStatus()
         self.manager, self.dmp = ControllerStatus(), DmpFeedback()
         self._state_since = time.monotonic()
-        self.dmp_at = self._hand_at = self._margin_at = 0.0
-        self.margin, self.contact = 0.0, ""
+        self.signal, self.contact, self.latency = ContactSignal(), "", math.nan
+        self.dmp_at = self._hand_at = self._signal_at = self._latency_at = 0.0
         self.tables = Tables(put)
         self.entry: Callable[[], dict] = dict
         self.config: Callable[[], dict] = dict
-        self.objects_read: Callable[[str], None] = lambda problems: None
+        self.objects_read: Callable[[], None] = lambda: None
         self._subscribers: dict[str, rospy.Subscriber] = {}
         self._subscribe()
 
@@ -83,9 +79,9 @@ class RosView:
             ("coglab/transitions", Transition, self._on_transition, 200),
             ("coglab/results", String, self._on_result, 20),
             ("coglab/contact", Contact, self._on_contact, 20),
-            ("contact_detector/margin", Float64, self._on_margin, 1),
+            ("contact_detector/signal", ContactSignal, self._on_signal, 1),
             ("lwr/state", LwrState, self._on_arm, 20),
-            ("lwr/external_torques", rospy.AnyMsg, self._on_torques, 50),
+            ("lwr/fri_latency", Float64, self._on_latency, 1),
             ("joint_states", JointState, self._on_joints, 2),
             ("ih2_hand/hand_status", HandStatus, self._on_hand, 5),
             ("controller_manager/status", ControllerStatus, self._on_manager, 20),
@@ -141,28 +137,28 @@ class RosView:
         ages = {role: round(stamp - self._stamps[name], 3) for role, name in wanted.items() if name in self._stamps}
         order = self.model.moving() if self.model else []
         dmp = self.dmp if now - self.dmp_at < OLD else DmpFeedback()
+        signal = self.signal if now - self._signal_at < OLD else None
+        latency = self.latency if now - self._latency_at < OLD else self.tables.latency
+        deadline = self.machine.deadline.to_sec()
         return {
             "stamp": round(stamp, 3),
             "q": _round(self.joints.get(name, 0.0) for name in order),
             "live": now - self._joints_at < OLD,
             "frames": shown,
             "ages": ages,
-            "rate": _round(self.torque.take_peaks()),
-            "threshold": _round(self.torque.thresholds()),
+            "rate": _round(signal.change) if signal else [],
+            "threshold": _round(signal.threshold) if signal else [],
+            "watched": list(signal.watched) if signal else [],
             "speed": round(self.palm_speed, 4),
-            "fri": round(1000 * self.tables.latency, 3) if math.isfinite(self.tables.latency) else None,
+            "fri": round(1000 * latency, 3) if math.isfinite(latency) else None,
             "answer": round(1000 * self.tables.answer_time, 3) if math.isfinite(self.tables.answer_time) else None,
             "current": [motor.current for motor in self.hand.motors] if now - self._hand_at < OLD else [],
-            "margin": round(self.margin, 3) if now - self._margin_at < OLD else None,
+            "margin": round(signal.margin, 3) if signal and signal.state == "watching" else None,
             "phase": self.machine.state,
             "since": round(now - self._state_since, 2),
+            "left": round(max(0.0, deadline - stamp), 2) if deadline else None,
             "dmp": [dmp.state, round(dmp.phase, 4), round(dmp.remaining_distance, 4), round(dmp.remaining_time, 3)],
         }
-
-    def reaching(self) -> bool:
-        """Whether the arm is on its way in the state that then waits for contact."""
-        fresh = time.monotonic() - self.dmp_at < OLD
-        return fresh and self.dmp.state in ("running", "holding") and self.machine.state.endswith("/wait_stop")
 
     def status(self) -> dict:
         """What changes seldom: the document `status`."""
@@ -171,13 +167,13 @@ class RosView:
             "machine": {
                 "alive": now.master_alive,
                 "state": machine.state,
-                "words": "reaches" if self.reaching() else phase(machine.state),
+                "words": phase(machine.state),
+                "waits": machine.waits_for,
                 "hub": machine.in_hub,
                 "actions": list(machine.actions),
                 "object": machine.object_id,
                 "why": machine.why,
                 "fallback": str(self.config().get("default_object", "")),
-                "limit": None if self.reaching() else time_limit(machine.state, self.config(), self.entry()),
             },
             "arm": {
                 "alive": now.arm_alive,
@@ -185,7 +181,7 @@ class RosView:
                 "fri": arm.fri_state,
                 "quality": arm.quality,
                 "mode": arm.control_mode,
-                "power": arm.power == 0x7F,
+                "power": arm.power & ALL_DRIVES == ALL_DRIVES,
                 "allowed": arm.motion_allowed,
                 "held": arm.hold_latched,
                 "reason": arm.reason,
@@ -209,22 +205,15 @@ class RosView:
             },
             "contact": {
                 "words": self.contact,
-                "learnt": self.torque.learnt,
-                "learning": self.torque.learning(),
-                "sigma": _round(self.torque.sigma),
-                "k": self.torque.settings.k,
+                "alive": time.monotonic() - self._signal_at < OLD,
+                "state": self.signal.state,
+                "mode": self.signal.mode,
+                "learnt": self.signal.learnt,
+                "samples": self.signal.rest_samples,
+                "k": round(self.signal.k, 3),
+                "window": round(self.signal.window, 4),
             },
         }
-
-    def learn(self) -> tuple[bool, str]:
-        """The noise of the torques at rest, from now on."""
-        if not self._there("lwr/external_torques"):
-            return False, "no external torques: the arm's node is not there"
-        if self._fastest > STILL:
-            return False, "the arm moves; learn at rest"
-        self._asked = True
-        self.torque.learn()
-        return True, "learning for 5 s; leave the arm alone"
 
     # --- arm and hand -----------------------------------------------------------------------------------------
 
@@ -251,23 +240,13 @@ class RosView:
         joints = {**before, **dict(zip(message.name, message.position, strict=True))}
         if not all(map(math.isfinite, joints.values())) or len(joints) > 200:
             return
-        dt = stamp - self._joints_stamp
-        if 0.0 < dt < OLD:
-            self._fastest = max(
-                (abs(joints[name] - before[name]) / dt for name in before if name.startswith("lwr_")), default=0.0
-            )
         self.joints, self._joints_stamp, self._joints_at = joints, stamp, time.monotonic()
 
-    def _on_torques(self, message: rospy.AnyMsg) -> None:
-        try:
-            stamp, effort = wire.joint_state_effort(message._buff)
-        except wire.BadBytes:
-            return
-        told = self.torque.feed(stamp, effort, self._fastest > STILL)
-        if not self.torque.learnt and not self.torque.learning() and self._fastest <= STILL:
-            self.torque.learn()  # the first time nobody has to ask
-        if told and self._asked:
-            self._say("contact", told, "info")
+    def _on_signal(self, message: ContactSignal) -> None:
+        self.signal, self._signal_at = message, time.monotonic()
+
+    def _on_latency(self, message: Float64) -> None:
+        self.latency, self._latency_at = message.data, time.monotonic()
 
     def _on_tf(self, message: rospy.AnyMsg) -> None:
         try:
@@ -294,7 +273,7 @@ class RosView:
     # --- brain ------------------------------------------------------------------------------------------------
 
     def _on_machine(self, message: MasterState) -> None:
-        if message.state != self.machine.state:
+        if (message.state, message.waits_for) != (self.machine.state, self.machine.waits_for):
             self._state_since = time.monotonic()
         self.machine = message
 
@@ -320,9 +299,6 @@ class RosView:
         )
         self._say("contact", f"{self.contact}: {message.message}", "info")
 
-    def _on_margin(self, message: Float64) -> None:
-        self.margin, self._margin_at = message.data, time.monotonic()
-
     # --- controllers ------------------------------------------------------------------------------------------
 
     def _on_manager(self, message: ControllerStatus) -> None:
@@ -332,8 +308,6 @@ class RosView:
 
     def _on_dmp(self, message: DmpFeedback) -> None:
         before, self.dmp, self.dmp_at = self.dmp, message, time.monotonic()
-        if message.state == "reached" and before.state != "reached" and self.machine.state.endswith("/wait_stop"):
-            self._state_since = self.dmp_at  # the wait for contact begins when the reach has ended
         if message.state == "aborted" and before.state != "aborted":
             self._say("controller", f"motion aborted: {message.reason}", "warning")
 

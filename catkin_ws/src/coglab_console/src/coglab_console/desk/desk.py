@@ -9,15 +9,15 @@ from collections.abc import Awaitable, Callable
 from pathlib import Path
 from typing import Any, Protocol
 
+from ..web.fan_out import Documents
 from .commands import STARTS, BadCommand, judge
 from .events import EventLog
 from .experiment import Experiment, ExperimentError
-from .fan_out import Documents
 from .gates import MotionGuard, Standing, reasons
 from .hold import HeldButton
 from .roles import Roles
 
-IN_TRIAL = ("contact_arm", "feedback", "feedback_order")
+IN_TRIAL = ("contact_arm", "contact_learn", "feedback", "feedback_order")
 """Changes of limits, gains or thresholds: not while an action or a trial is under way"""
 
 
@@ -40,6 +40,9 @@ class Backend(Protocol):
 
     def stop(self, who: str) -> None:
         """Brake, latch, end the action; returns at once, the outcome comes as events."""
+
+    def tell(self, name: str, text: str) -> None:
+        """Show a note, or the object of the next action, to everybody on ROS; returns at once."""
 
     def call(self, name: str, arguments: dict) -> Awaitable[Answer]:
         """A command of the list that needs the robot; ends within its time limit."""
@@ -124,6 +127,20 @@ class Desk:
         """An action of the state machine has ended."""
         self.experiment.record("result", **{key: row[key] for key in row if key not in ("type", "stamp", "trial")})
 
+    def told(self, name: str, text: str, who: str) -> None:
+        """A note, or the object of the next action, told by another node; what does not fit is an event."""
+        arguments = {"text": text} if name == "note" else {"object_id": text}
+        try:
+            judge(name, arguments)
+        except BadCommand as error:
+            self.events.add("command", f"{who}: {error}", "warning")
+            return
+        if name == "note":
+            self._note(who, text)
+        else:
+            self._select(who, text)
+        self.tick()
+
     def observe(self, stopped: bool, cause: str) -> None:
         """Whether the arm or the machine stands after a stop, and why."""
         if self.guard.observe(stopped, cause):
@@ -185,19 +202,28 @@ class Desk:
             answer = await self.backend.call(name, arguments)
             if answer["success"] and judge(name, {**arguments}).motion:
                 self.guard.moved()
-        if name not in ("parameters", "note"):
+        if name not in ("parameters", "note", "select_object"):
             words = " ".join(str(value) for value in arguments.values())
             told = f"{who}: {name} {words}: {answer['message']}".replace(" :", ":")
             self.events.add("command", told, "info" if answer["success"] else "warning")
         self.tick()
         return answer
 
+    def _note(self, who: str, text: str) -> str:
+        self.events.add("note", f"{who}: {text}")
+        return self.experiment.note(who, text)
+
+    def _select(self, who: str, object_id: str) -> str:
+        self.object_id = object_id
+        self.events.add("object", f"{who}: the next object is {object_id or 'the default'}")
+        return f"object {object_id or 'none'}"
+
     def _own(self, who: str, name: str, given: dict) -> Answer | None:
         """Commands that the robot has no part in; None for the others."""
         session = self.experiment
         if name == "note":
-            self.events.add("note", f"{who}: {given['text']}")
-            return Answer(True, session.note(who, given["text"]))
+            self.backend.tell("note", given["text"])
+            return Answer(True, self._note(who, given["text"]))
         if name == "acknowledge":
             self.guard.acknowledge()
             return Answer(True, "acknowledged; the first motion needs a held button")
@@ -208,8 +234,8 @@ class Desk:
         if name == "invite":
             return Answer(True, "a link for one more browser, to be used once", self._invite())
         if name == "select_object":
-            self.object_id = given["object_id"]
-            return Answer(True, f"object {self.object_id or 'none'}")
+            self.backend.tell("select_object", given["object_id"])
+            return Answer(True, self._select(who, given["object_id"]))
         if name == "session_begin":
             return Answer(
                 True,

@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import fcntl
 import os
-import platform
 import secrets
 import signal
 import socket
@@ -15,25 +14,25 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
 
-import aiohttp
 import rospkg
 import rospy
 from aiohttp import web
+from coglab_py import parameters
 from rospy.exceptions import ROSInitException
 
-from .access import Access, allowed_hosts
-from .desk import Desk
-from .events import EventLog
-from .fan_out import Documents
-from .page_files import load_all
-from .ros_commands import RosBackend
-from .ros_graph import SmachGraphs
-from .ros_knowledge import Knowledge
-from .ros_stop import StopPath
-from .ros_view import RosView
-from .server import ConsoleServer
-from .torque_rate import Settings
-from .urdf_model import ModelError, RobotModel
+from ..desk.desk import Desk
+from ..desk.events import EventLog
+from ..scene.urdf_model import ModelError, RobotModel
+from ..web.access import Access, allowed_hosts
+from ..web.fan_out import Documents
+from ..web.page_files import load_all
+from ..web.server import ConsoleServer
+from . import versions
+from .commands import RosBackend
+from .graph import SmachGraphs
+from .knowledge import Knowledge
+from .stop import StopPath
+from .view import RosView
 
 PORT = 8790
 STATE_RATE = 30.0  # Hz
@@ -80,25 +79,24 @@ class ConsoleNode:
 
     def __init__(self, loop: asyncio.AbstractEventLoop, home: Path) -> None:
         self.loop, self.home = loop, home
-        self.address = str(rospy.get_param("~address", "127.0.0.1"))
-        fixed = rospy.has_param("~port") and int(rospy.get_param("~port")) != PORT
-        self.socket = bind(self.address, int(rospy.get_param("~port", PORT)), fixed)
+        self.address = parameters.read("~address", str, "127.0.0.1")
+        port = parameters.read("~port", int, PORT, 0, 65535)
+        self.socket = bind(self.address, port, port != PORT)
         self.port = self.socket.getsockname()[1]
-        more = str(rospy.get_param("~hosts", "")).split()
+        more = parameters.read("~hosts", str, "").split()
         self.access = Access(allowed_hosts(self.address, self.port, more))
         self.events, self.documents = EventLog(time.time), Documents()
-        self.real = bool(rospy.get_param("~real", False))
+        self.real = parameters.read("~real", bool, False)
         self.selected = ""
         model = self._model()
         self.graphs = SmachGraphs(self.put, lambda text, level: self.say("graph", text, level))
-        frames = {**FRAMES, **self._parameter("perception/frames", {})}
-        self.view = RosView(
-            model, self._settings(), frames, self.say, self.put, self.graphs.transition, self._on_result
-        )
+        frames = {**FRAMES, **parameters.read("perception/frames", dict, {})}
+        self.view = RosView(model, frames, self.say, self.put, self.graphs.transition, self._on_result)
         self.stop_path = StopPath(lambda text, level: self.say("stop", text, level))
         backend = RosBackend(self.view, self.stop_path.press, self.real)
-        folder = Path(str(rospy.get_param("~sessions", "")) or home / "console_sessions")
+        folder = Path(parameters.read("~sessions", str, "") or home / "console_sessions")
         self.desk = Desk(backend, self.events, self.documents, folder, time.time, self.write_link)
+        backend.listen(lambda name, text, who: self.soon(self.desk.told, name, text, who))
         self.knowledge = Knowledge(
             self.view, self.put, lambda text, level: self.say("files", text, level), lambda: self.desk.object_id
         )
@@ -152,30 +150,18 @@ class ConsoleNode:
 
     # --- at the start -----------------------------------------------------------------------------------------
 
-    @staticmethod
-    def _parameter(name: str, default: Any) -> Any:
-        value = rospy.get_param(name, default)
-        return value if isinstance(value, type(default)) else default
-
     def _model(self) -> RobotModel | None:
-        found = rospy.search_param("robot_description")
+        urdf = parameters.found_above("robot_description", str)
         try:
-            if not found:
+            if urdf is None:
                 raise ModelError("the parameter robot_description is missing")
-            return RobotModel(str(rospy.get_param(found)))
+            return RobotModel(urdf)
         except ModelError as error:
             self.say("console", f"the robot is not drawn: {error}", "warning")
             return None
 
-    def _settings(self) -> Settings:
-        given = self._parameter("contact_detector", {})
-        names = Settings.__dataclass_fields__
-        return Settings(
-            **{name: float(value) for name, value in given.items() if name in names and isinstance(value, (int, float))}
-        )
-
     def _put_static(self, model: RobotModel | None, missing: list[str], files: dict) -> None:
-        workspace = self._parameter("controller_manager/workspace", {})
+        workspace = parameters.read("controller_manager/workspace", dict, {})
         self.documents.put(
             "model",
             {
@@ -193,10 +179,7 @@ class ConsoleNode:
             },
         )
         self.versions = {
-            "ROS": str(rospy.get_param("/rosversion", "?")).strip(),
-            "Python": platform.python_version(),
-            "aiohttp": aiohttp.__version__,
-            "Linux": platform.release(),
+            **versions.of_everything(),
             "console": f"http://{self.address}:{self.port}",
             "ROS master": os.environ.get("ROS_MASTER_URI", ""),
             "packed page": f"{sum(len(file.packed) for file in files.values()) / 1e6:.2f} MB",
@@ -237,10 +220,10 @@ class ConsoleNode:
         await runner.cleanup()
 
     async def _states(self) -> None:
-        """30 times a second, on a grid that does not drift."""
+        """30 times a second, on a grid that does not drift; what a busy computer missed is left out."""
         due = self.loop.time()
         while True:
-            due = max(due + 1.0 / STATE_RATE, self.loop.time() - 1.0)
+            due = max(due + 1.0 / STATE_RATE, self.loop.time())
             await asyncio.sleep(max(0.0, due - self.loop.time()))
             if self.server.clients:
                 self._careful(lambda: self.server.publish_state(self.view.frame()))
@@ -301,7 +284,7 @@ def main() -> int:
         rospy.init_node("coglab_console", disable_signals=True)
         asyncio.run(_main(home))
         os.close(lock)
-    except (StartError, ROSInitException, OSError) as error:
+    except (StartError, parameters.ParameterError, ROSInitException, OSError) as error:
         print(f"[coglab] console: error: {error}", file=sys.stderr, flush=True)
         return 1
     finally:

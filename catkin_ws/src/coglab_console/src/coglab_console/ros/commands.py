@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import asyncio
+import hashlib
+import json
 import threading
 from collections.abc import Callable
 from typing import Any
@@ -20,14 +22,15 @@ from coglab_msgs.srv import (
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
-from .desk import Answer
-from .gates import Standing
-from .ros_view import RosView
+from ..desk.desk import Answer
+from ..desk.gates import Standing
+from .view import RosView
 from .words import lookup
 
 LIMIT = 6.0  # s, of one command
 MAX_WAITING = 12  # services that have not answered
 HOME_CONTROLLER = "ptp"
+NOTES, NEXT_OBJECT = "coglab/note", "coglab/next_object"
 HIDDEN = ("robot_description", "roslaunch", "rosdistro", "run_id")
 MAX_PARAMETERS = 2000
 
@@ -40,6 +43,25 @@ class RosBackend:
         self._view, self._stop = view, stop
         self._calibration = rospy.Publisher("ih2_hand/hand_calibration", String, queue_size=2)
         self._waiting = threading.Semaphore(MAX_WAITING)
+        self._tellers = {
+            "note": rospy.Publisher(NOTES, String, queue_size=20),
+            "select_object": rospy.Publisher(NEXT_OBJECT, String, queue_size=5, latch=True),
+        }
+
+    def listen(self, told: Callable[[str, str, str], None]) -> None:
+        """`told(name, text, who)` gets what other nodes say on the topics of notes and of the next object."""
+
+        def heard(message: String, name: str) -> None:
+            who = message._connection_header.get("callerid", "somebody")
+            if who != rospy.get_name():
+                told(name, message.data, who)
+
+        for name, topic in (("note", NOTES), ("select_object", NEXT_OBJECT)):
+            rospy.Subscriber(topic, String, heard, name, queue_size=20)
+
+    def tell(self, name: str, text: str) -> None:
+        """See Backend."""
+        self._tellers[name].publish(String(text))
 
     def standing(self) -> Standing:
         """See Backend."""
@@ -112,14 +134,14 @@ class RosBackend:
         return self._told("controller_manager/speed_scale", SetSpeedScale, float(value))
 
     def _contact_learn(self) -> Answer:
-        return Answer(*self._view.learn())
+        return self._told("contact_detector/learn", Trigger)
 
     def _contact_arm(self, mode: str, k: float = 0.0, timeout: float = 10.0, joints: list[int] | None = None) -> Answer:
         return self._told("contact_detector/arm", ArmContact, mode, float(timeout), float(k), joints or [], 0.0, 0.0)
 
     def _objects_reload(self) -> Answer:
         answer = self._told("object_database/reload", Trigger)
-        self._view.objects_read(answer["message"] if not answer["success"] else "")
+        self._view.objects_read()
         return answer
 
     def _feedback(self, verb: str, name: str) -> Answer:
@@ -140,4 +162,5 @@ class RosBackend:
                 rows.append([path, str(value)[:200]])
 
         walk("", rospy.get_param("/"))
-        return Answer(True, f"{len(rows)} parameters", rows)
+        mark = hashlib.sha256(json.dumps(rows).encode()).hexdigest()[:12]
+        return Answer(True, f"{len(rows)} parameters; the same mark means the same values: {mark}", rows)

@@ -1,0 +1,137 @@
+"""Connections without a browser, for the bench: five that read, one that never does, one that asks without end."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import os
+import time
+from pathlib import Path
+
+import aiohttp
+from coglab_console.browser import fresh_link
+
+WATCHED = 15.0  # s, with five browsers
+FLOODED = 8.0  # s, with 1000 requests a second
+
+
+def processor_time(process: int) -> float:
+    """s of processor time that a process has used."""
+    fields = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+
+async def watch_as(home: Path, used: set[str], began: asyncio.Event) -> int:
+    """One browser's connection that reads everything; states received after `began`."""
+    link = await unused_link(home, used)
+    used.add(link)
+    origin = link.split("/?")[0]
+    count = 0
+    async with aiohttp.ClientSession(cookie_jar=aiohttp.CookieJar(unsafe=True)) as client:
+        async with client.get(link):
+            pass
+        async with client.ws_connect(origin.replace("http", "ws") + "/ws", headers={"Origin": origin}) as ws:
+            await ws.send_str("{}")
+            await began.wait()
+            end = time.monotonic() + WATCHED
+            while time.monotonic() < end:
+                count += await take_one(ws)
+    return count
+
+
+async def take_one(ws: aiohttp.ClientWebSocketResponse) -> bool:
+    """Reads one message as the page does: a state is told to have been seen. Whether it was one."""
+    message = await ws.receive_str(timeout=5)
+    if not message.startswith('{"t":"state"'):
+        return False
+    await ws.send_json({"t": "seen", "n": json.loads(message)["n"]})
+    return True
+
+
+async def load(home: Path, process: int) -> tuple[float, float]:
+    """Share of a core that the node uses with five connections, and the slowest one's rate (Hz)."""
+    used: set[str] = set()
+    began = asyncio.Event()
+    watchers = []
+    for _ in range(5):
+        watchers.append(asyncio.create_task(watch_as(home, used, began)))
+        await asyncio.sleep(0.5)
+    await asyncio.sleep(1.0)
+    before, since = processor_time(process), time.monotonic()
+    began.set()
+    counts = await asyncio.gather(*watchers)
+    return (processor_time(process) - before) / (time.monotonic() - since), min(counts) / WATCHED
+
+
+async def flooded(home: Path) -> tuple[float, float, float, float]:
+    """While one browser never reads and another asks 1000 times a second: (requests a second that were sent, share of
+    them refused, states a second to a good browser, longest STOP to its answer in s)."""
+    used: set[str] = set()
+    sessions = []
+    for _ in range(3):
+        link = await unused_link(home, used)
+        used.add(link)
+        sessions.append(await session_of(link))
+    (deaf_cookie, origin), (flood_cookie, _), (good_cookie, _) = sessions
+    address = origin.replace("http", "ws") + "/ws"
+    headers = {"Origin": origin, "X-CogLab-Console": "1"}
+    statuses: list[int] = []
+    stops: list[float] = []
+    states = 0
+    over = time.monotonic() + FLOODED
+    async with (
+        aiohttp.ClientSession(cookies=deaf_cookie) as deaf,
+        aiohttp.ClientSession(cookies=flood_cookie, connector=aiohttp.TCPConnector(limit=50)) as flooder,
+        aiohttp.ClientSession(cookies=good_cookie) as good,
+        deaf.ws_connect(address, headers=headers) as silent,
+        good.ws_connect(address, headers=headers) as ws,
+    ):
+        await silent.send_str("{}")
+        await ws.send_str("{}")
+
+        async def one() -> None:
+            body = {"name": "note", "arguments": {"text": "x"}}
+            async with flooder.post(f"{origin}/api/command", json=body, headers=headers) as answer:
+                statuses.append(answer.status)
+
+        async def flood() -> None:
+            running: set[asyncio.Task] = set()
+            due = time.monotonic()
+            while time.monotonic() < over:
+                due += 0.02
+                running |= {asyncio.create_task(one()) for _ in range(20)}
+                running = {task for task in running if not task.done()}
+                await asyncio.sleep(max(0.0, due - time.monotonic()))
+            await asyncio.gather(*running, return_exceptions=True)
+
+        async def press() -> None:
+            while time.monotonic() < over:
+                began = time.monotonic()
+                async with good.post(f"{origin}/api/stop", json={}, headers=headers) as answer:
+                    await answer.read()
+                stops.append(time.monotonic() - began)
+                await asyncio.sleep(0.5)
+
+        others = [asyncio.create_task(flood()), asyncio.create_task(press())]
+        while time.monotonic() < over:
+            states += await take_one(ws)
+        await asyncio.gather(*others)
+    refused = sum(status == 429 for status in statuses) / max(1, len(statuses))
+    return len(statuses) / FLOODED, refused, states / FLOODED, max(stops)
+
+
+async def unused_link(home: Path, used: set[str]) -> str:
+    """A link that was not used yet."""
+    for _ in range(100):
+        link = fresh_link(home, limit=5.0)
+        if link not in used:
+            return link
+        await asyncio.sleep(0.05)
+    raise TimeoutError("no new link in console.url within 5 s")
+
+
+async def session_of(link: str) -> tuple[dict[str, str], str]:
+    """The cookie of a session for this link, and the console's origin."""
+    async with aiohttp.ClientSession(cookie_jar=aiohttp.CookieJar(unsafe=True)) as client:
+        async with client.get(link, allow_redirects=False) as answer:
+            return {name: one.value for name, one in answer.cookies.items()}, link.split("/?")[0]

@@ -1,0 +1,1 @@
+"""What is drawn: the robot, the path ahead, primitives, graphs of state machines."""

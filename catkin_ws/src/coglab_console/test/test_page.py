@@ -1,0 +1,155 @@
+"""The page in a real browser, a double in place of the robot: a dead connection, a slow computer, reasons, touch."""
+
+import asyncio
+import shutil
+import threading
+import time
+
+import pytest
+from coglab_console.browser import Browser
+from coglab_console.desk.gates import Standing
+from console_double import PAGE_DOCUMENTS, READY, RobotDouble, page_state, running
+
+pytestmark = pytest.mark.skipif(
+    shutil.which("chromedriver") is None, reason="chromium-driver is missing: ./coglab install browser"
+)
+# Puts the page's connections in a test's hand: deaf ones say nothing and stay open, as behind a cable that was pulled;
+# `slow` is what each message costs, as on a computer that is busy.
+IN_HAND = """
+window.connections = []; window.slow = 0;
+const Real = WebSocket;
+window.WebSocket = class extends Real {
+  constructor(address) { super(address); window.connections.push(this); }
+  set onmessage(f) { super.onmessage = (event) => {
+    if (this.deaf) return;
+    const end = performance.now() + window.slow;
+    while (performance.now() < end);
+    f(event);
+  }; }
+  set onclose(f) { super.onclose = (event) => this.deaf || f(event); }
+  send(data) { if (!this.deaf) super.send(data); }
+};
+"""
+
+
+class Desk:
+    """A console that serves in a thread of its own, 30 states a second, and a browser at its page."""
+
+    def __init__(self, folder):
+        self.robot = RobotDouble()
+        self.loop = asyncio.new_event_loop()
+        self._ready, self._over = threading.Event(), asyncio.Event()
+        self._thread = threading.Thread(target=self.loop.run_until_complete, args=(self._serve(folder),))
+        self._thread.start()
+        assert self._ready.wait(20.0)
+        self.browser = Browser()
+        self.browser.driver.execute_cdp_cmd("Page.addScriptToEvaluateOnNewDocument", {"source": IN_HAND})
+        self.browser.open(self.console.link())
+
+    async def _serve(self, folder):
+        async with running(folder, self.robot) as self.console:
+            for name, value in PAGE_DOCUMENTS.items():
+                self.console.documents.put(name, value)
+            self._ready.set()
+            while not self._over.is_set():
+                self.console.server.publish_state(page_state(time.monotonic()))
+                await asyncio.sleep(1 / 30)
+
+    def event(self, text):
+        self.loop.call_soon_threadsafe(self.console.events.add, "test", text)
+
+    def age(self):
+        """s since the newest state that the page has left the console."""
+        return time.monotonic() - self.browser.js("return coglab.state().stamp")
+
+    def close(self):
+        self.browser.__exit__()
+        self.loop.call_soon_threadsafe(self._over.set)
+        self._thread.join(20.0)
+
+
+@pytest.fixture(scope="module")
+def desk(tmp_path_factory):
+    found = Desk(tmp_path_factory.mktemp("console"))
+    yield found
+    found.close()
+
+
+def test_a_connection_that_is_dead_but_open_is_given_up_and_no_event_is_lost(desk):
+    page = desk.browser
+    desk.event("before")
+    page.until("return coglab.events().some((e) => e.text === 'before')", 10.0)
+    page.js("window.connections.at(-1).deaf = true")
+    desk.event("meanwhile")
+    page.until("return document.body.classList.contains('lost')", 5.0)
+    page.until("return !document.body.classList.contains('lost')", 15.0)
+    desk.event("after")
+    page.until("return coglab.events().some((e) => e.text === 'after')", 10.0)
+    seen = page.js("return coglab.events().map((e) => e.seq)")
+    assert seen == list(range(1, len(seen) + 1))
+    assert page.js("return window.connections.length") <= 3
+
+
+def test_a_slow_page_shows_the_newest_state_and_every_event(desk):
+    page = desk.browser
+    page.js("window.slow = 100")
+    for number in range(40):
+        desk.event(f"slow {number}")
+        time.sleep(0.1)
+    ages = [desk.age() for _ in range(5)]
+    page.js("window.slow = 0")
+    page.until("return coglab.events().some((e) => e.text === 'slow 39')", 10.0)
+    texts = page.js("return coglab.events().map((e) => e.text).filter((text) => text.startsWith('slow'))")
+    assert texts == [f"slow {number}" for number in range(40)]
+    assert sorted(ages)[2] < 1.0, ages
+
+
+def test_a_page_that_is_behind_says_by_how_much(desk):
+    page = desk.browser
+    page.js("window.slow = 300")
+    page.until("return /s behind/.test(document.getElementById('lost').textContent)", 10.0)
+    page.js("window.slow = 0")
+    page.until("return document.getElementById('lost').hidden", 10.0)
+
+
+def test_a_click_on_a_disabled_button_says_why(desk):
+    page = desk.browser
+    button = "[data-action=exchange_robot_to_human]"
+    page.until(f"return document.querySelector('{button}').hasAttribute('aria-disabled')", 10.0)
+    page.js(f"document.querySelector('{button}').click()")
+    words = page.js("const told = document.getElementById('told'); return told.checkVisibility() && told.textContent")
+    assert "Give" in words and "the hand is empty" in words
+    assert not desk.robot.calls
+
+
+def test_a_button_is_held_by_touch(desk):
+    """As on a tablet: nothing comes of a short touch, something of a long one, nothing of one that slides away."""
+    page = desk.browser
+    desk.loop.call_soon_threadsafe(desk.console.desk.guard.stop, "a test")
+    desk.loop.call_soon_threadsafe(desk.console.desk.guard.acknowledge)
+    page.until("return document.getElementById('why-home').textContent.includes('hold')", 10.0)
+    box = page.js(
+        "const b = document.querySelector('[data-action=home]').getBoundingClientRect();"
+        "return [b.left + b.width / 2, b.top + b.height / 2]"
+    )
+
+    def touch(kind, *points):
+        page.driver.execute_cdp_cmd(
+            "Input.dispatchTouchEvent", {"type": kind, "touchPoints": [{"x": x, "y": y} for x, y in points]}
+        )
+
+    touch("touchStart", box)
+    time.sleep(0.3)
+    touch("touchEnd")
+    touch("touchStart", box)
+    touch("touchMove", [box[0], box[1] - 200])
+    time.sleep(1.2)
+    touch("touchEnd")
+    assert not desk.robot.calls
+    touch("touchStart", box)
+    end = time.monotonic() + 10.0
+    while not desk.robot.calls and time.monotonic() < end:
+        time.sleep(0.05)
+    touch("touchEnd")
+    assert desk.robot.calls == [("home", {})]
+    assert desk.robot.now == Standing(**READY)
