@@ -1,11 +1,11 @@
 #!/usr/bin/python3
 """Bench of recovery: nothing moves after a failed state.
 
-A trial in virtual time (KRC stand-in, bridge, controller manager and hand emulator, with a person) is struck at a
-seeded moment of every machine in turn (initialisation, both exchanges, take, put, recovery) by a failure, a time
-limit or a preemption. It counts as moved if the true speed of any joint of the simulated arm exceeds 0.02 rad/s
-between the moment at which the next state begins, or at which the machine has ended, and the next motion that is
-asked for. A trial whose machine was over before its moment had come is drawn again; 200 that were struck make the
+A trial in virtual time (KRC stand-in, bridge, controller manager and hand emulator, with a person who is drawn by the
+seed and the tracker with its noise, as by default) is struck at a seeded moment of every machine in turn
+(initialisation, both exchanges, take, put, recovery) by a failure, a time limit or a preemption. It counts as moved if
+the true speed of any joint of the simulated arm exceeds 0.02 rad/s between the moment at which the next state begins,
+or at which the machine has ended, and the next motion that is asked for. A trial whose machine was over before its moment had come is drawn again; 200 that were struck make the
 figure.
 """
 
