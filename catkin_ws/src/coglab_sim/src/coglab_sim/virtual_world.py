@@ -176,6 +176,12 @@ class Hand(HandMemory):
         self._calibrated_at = self.clock.monotonic()
         return None
 
+    def calibration_over(self, t: float) -> bool:
+        """Whether a calibration that was begun has ended by now."""
+        if self.calibrating and t >= self._calibrated_at:
+            self.calibrating, self.calibrated = False, True
+        return not self.calibrating
+
     def step(self, t: float) -> None:
         """Follow the time and the motors that the physics turns; tell these what to do."""
         self.clock.now = max(self.clock.now, t)
@@ -186,8 +192,7 @@ class Hand(HandMemory):
             ]
         )
         self.emulator.advance()
-        if self.calibrating and t >= self._calibrated_at:
-            self.calibrating, self.calibrated = False, True
+        self.calibration_over(t)
         self._poll(t)
         self.cell.set_motors(*map(list, zip(*self.emulator.orders(), strict=True)))
 

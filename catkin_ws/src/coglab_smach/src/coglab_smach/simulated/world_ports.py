@@ -71,7 +71,7 @@ class VirtualHand:
             # After a start the hand counts as holding until a poll has shown it empty: give it 2 s for that.
             if not sent and (not hand.holding or self.rig.t - asked > 2.0):
                 sent.append(hand.calibrate(mode))
-            return bool(sent) and not hand.calibrating
+            return bool(sent) and hand.calibration_over(self.rig.t)
 
         def value() -> None:
             if sent[0] is not None:
