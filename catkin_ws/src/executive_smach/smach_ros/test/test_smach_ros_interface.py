@@ -109,7 +109,9 @@ def test_s12_the_beat_spares_a_viewer_that_has_just_connected():
     beat = _Beat(100.0, 2.0)
     beat.done(100.0)
     assert beat.due == 102.0
-    beat.newcomer(101.9)  # its window does not exist at 102.0 s
+    beat.newcomer(101.9)  # its window does not exist at 102.0 s: the others alone get that beat
+    assert beat.due == 102.0
+    beat.done(102.0, spared_until=101.9 + WELCOME_DELAY)
     assert beat.due == 101.9 + WELCOME_DELAY
     beat.done(beat.due)
     assert beat.due == pytest.approx(101.9 + WELCOME_DELAY + 2.0)
@@ -163,10 +165,10 @@ def test_s12_no_viewer_gets_a_beat_before_its_window_exists_and_all_get_theirs(s
             server._publish_heartbeats(topic.now)
     for i, when in enumerate(comes):
         sent = topic.sent.get(i, [])
-        assert WELCOME_DELAY <= sent[0] - when <= WELCOME_DELAY + 0.5, "its first beat"
+        assert WELCOME_DELAY <= sent[0] - when <= WELCOME_DELAY + 0.02, "its first beat"
         end = min(when + 20.0, 40.0)
         gaps = [after - before for before, after in itertools.pairwise([*sent, end])]
-        assert max(gaps) <= 2.0 + WELCOME_DELAY + 0.02, "a beat was left out"
+        assert max(gaps) <= 2.02, "a beat was left out"
         assert sent[-1] < end
 
 

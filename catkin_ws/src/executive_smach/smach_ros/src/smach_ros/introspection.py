@@ -129,8 +129,10 @@ class _Beat:
             self.due = min(self.due, spared_until)
 
     def newcomer(self, now: float) -> None:
-        """A viewer has connected; a stream of new ones cannot hold the beat up for the others."""
-        self.due = min(now + WELCOME_DELAY, self.last + self.period + WELCOME_DELAY)
+        """A viewer has connected, and gets a beat when it is not spared any more. That which is due
+        for the others comes in time.
+        """
+        self.due = min(self.due, now + WELCOME_DELAY)
 
 
 class _Viewers:
