@@ -17,6 +17,7 @@ REFUSED = {
     "demo --seed -1": "expected a whole number from 0 to 2147483647, got '-1'",
     "demo --seed 1.5": "expected a whole number",
     "demo --out /proc/x": "/proc/x cannot be written",
+    "demo --person robot": "invalid choice: 'robot'",
     "demo --bogus": "unrecognized arguments: --bogus",
     "test nosuch": "no package named nosuch; there are: coglab_bringup, coglab_console, coglab_controllers",
     "test --out /usr": "--out /usr holds other files",

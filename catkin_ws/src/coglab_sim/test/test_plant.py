@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from coglab_sim import _plant
 from grasp_trial import DIRECTIONS, HOME, SOURCES, URDF, GraspTrial, objects, rotated
+from scipy.special import ellipk
 
 G = 9.81
 STEP = 1e-3
@@ -53,7 +54,6 @@ def test_free_fall():
 @pytest.mark.parametrize("swing", [0.2, 1.5])
 def test_pendulum(tmp_path, swing):
     """The whole arm swings about A1, gravity across it; its period is that of a physical pendulum of any amplitude."""
-    special = pytest.importorskip("scipy.special")
     plant = _plant.Plant(undamped(tmp_path), np.zeros(7), BOX, drives=drives([0.0] + [1e6] * 6))
     plant.set_arm([0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0])
     plant.set_gravity([-G, 0.0, 0.0])
@@ -66,7 +66,7 @@ def test_pendulum(tmp_path, swing):
     amplitude = np.hypot(*torques)  # torque = amplitude sin(rest - angle)
     rest = np.arctan2(torques[0], -torques[1])
     plant.set_arm([rest + swing, 1.0, 0, 0, 0, 0, 0])
-    expected = 4.0 * np.sqrt(inertia / amplitude) * special.ellipk(np.sin(swing / 2) ** 2)
+    expected = 4.0 * np.sqrt(inertia / amplitude) * ellipk(np.sin(swing / 2) ** 2)
     crossings, before = [], swing
     for step in range(int(2.6 * expected / STEP)):
         plant.step(np.zeros(7))

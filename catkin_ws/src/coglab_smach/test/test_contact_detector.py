@@ -161,7 +161,9 @@ def test_requests_that_make_no_sense_are_refused():
 def test_a_sample_that_no_arm_can_give_is_ignored_and_the_push_after_it_found(posture, which, value, armed):
     trial = ContactTrial(posture, 3)
     sample = {"torque": np.zeros(7), "position": trial.q, "velocity": np.zeros(7)}
-    sample[which] = {"six": np.zeros(6), "eight": np.zeros(8)}.get(value) if isinstance(value, str) else np.full(7, value)
+    sample[which] = (
+        {"six": np.zeros(6), "eight": np.zeros(8)}.get(value) if isinstance(value, str) else np.full(7, value)
+    )
     trial.detector._jacobian = lambda q: trial.jacobian * (1.0 if np.all(np.abs(q) < 10.0) else np.nan)
     trial.feed(1.5)
     for arm in (False, True):
