@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from coglab_bringup.arguments import judge
+import test_printed_lines_long
 from printed_lines import TOP, printed_block, printed_files, printed_lines
 
 # Where a line runs: the first rule whose page and pattern fit. "entry": the argument check here and the tests of the
@@ -54,6 +55,20 @@ LINES = printed_lines()
 def test_every_printed_line_belongs_to_a_test():
     assert len(LINES) > 60, "the pages were not read"
     assert [line for line in LINES if not where(line)] == []
+
+
+def test_every_line_of_a_running_system_stands_in_a_section_that_is_read_aloud():
+    """By name in a test of test_printed_lines_long.py, which takes all lines of a section."""
+    text = (Path(__file__).parent / "test_printed_lines_long.py").read_text(encoding="utf-8")
+    read = set(re.findall(r'"([^"\n]+)"', text))
+    sections = {(line.page, line.section) for line in LINES if where(line) == "system"} - {("docs/how_to.md", "How to")}
+    assert [section for _, section in sorted(sections) if not any(section.startswith(r) for r in read if len(r) > 2)] == []
+
+
+def test_what_needs_hardware_has_a_stand_in_with_a_reason():
+    stand_ins = test_printed_lines_long.STAND_INS
+    hardware = {line.command for line in LINES if where(line) == "hardware" and line.command.startswith("roslaunch")}
+    assert hardware == set(stand_ins) and all(reason for _, reason in stand_ins.values())
 
 
 @pytest.fixture(scope="module")

@@ -17,6 +17,7 @@ REFUSED = {
     "demo --seed -1": "expected a whole number from 0 to 2147483647, got '-1'",
     "demo --seed 1.5": "expected a whole number",
     "demo --out /proc/x": "/proc/x cannot be written",
+    "demo --person robot": "invalid choice: 'robot'",
     "demo --bogus": "unrecognized arguments: --bogus",
     "test nosuch": "no package named nosuch; there are: coglab_bringup, coglab_console, coglab_controllers",
     "test --out /usr": "--out /usr holds other files",
@@ -105,6 +106,17 @@ def test_refused_before_anything_is_done(bare, words):
     (line,) = ended.stdout.splitlines()
     assert line.startswith("[coglab] error: ") and REFUSED[words] in line
     assert not (bare / ".coglab").exists() and not (bare / "out").exists()
+
+
+def test_an_unknown_group_is_refused_where_python_is_missing_too(tmp_path):
+    """Arguments are judged by a program of Python's; a bare machine has none yet."""
+    for name in ("coglab", "debian-packages.txt"):
+        shutil.copy(TOP / name, tmp_path)
+    ended = subprocess.run(
+        [tmp_path / "coglab", "install", "run", "vizz"], capture_output=True, text=True, timeout=20, check=False
+    )
+    assert ended.returncode == 2 and "installed" not in ended.stderr
+    assert "no group named 'vizz'; there are: browser build run test viz" in ended.stderr
 
 
 @pytest.mark.parametrize("words, part", [("demo --help", "--seed SEED"), ("launch --help", "fri_period:=0.005")])

@@ -1,6 +1,7 @@
 /// Python module coglab_sim._virtual: the whole robot (cell, bridge, controller manager) in virtual
 /// time.
 #include "coglab_sim/virtual_robot.hpp"
+#include "lwr_fri_bridge/ros/reason_codes.hpp"
 #include "py_cell.hpp"
 
 namespace py = pybind11;
@@ -76,6 +77,7 @@ py::dict reportOf(Robot& robot) {
   result["velocity"] = Vector7(report.velocity);
   result["motion_allowed"] = sample.block == coglab_rt::MotionBlock::None;
   result["blocked_by"] = std::string(coglab_rt::describe(sample.block));
+  result["blocked_code"] = static_cast<std::uint16_t>(coglab_rt::codeOf(sample.block));
   result["position"] = Vector7(sample.position);
   result["measured_velocity"] = Vector7(sample.velocity);
   result["commanded_position"] = Vector7(sample.commanded_position);
@@ -135,6 +137,8 @@ PYBIND11_MODULE(_virtual, m) {
       .def_property_readonly(
           "cell", [](Robot& robot) { return std::make_unique<PyCell>(robot.cell()); },
           py::keep_alive<0, 1>(), "The coglab_sim._cell.Cell inside; do not call its step().")
+      .def_property("frozen", &Robot::frozen, &Robot::setFrozen,
+                    "Whether the process of bridge and manager stands still; the cell goes on.")
       .def("report", &reportOf, "The control cycle's newest report.")
 
       .def(
@@ -146,9 +150,10 @@ PYBIND11_MODULE(_virtual, m) {
           [](Robot& robot, std::uint32_t ticket) -> py::object {
             const auto outcome = robot.bridge().outcome(ticket);
             if (outcome.code == lwr_fri_bridge::OutcomeCode::Pending) return py::none();
-            return py::make_tuple(outcome.success(), describe(outcome));
+            return py::make_tuple(outcome.success(), describe(outcome),
+                                  lwr_fri_bridge::reasonCode(outcome.code));
           },
-          py::arg("ticket"), "(success, message), or None while it is not finished.")
+          py::arg("ticket"), "(success, message, reason code), or None while it is not finished.")
 
       .def(
           "load_controller",

@@ -105,20 +105,24 @@ coglab_controllers::PtpController& LockstepRobot::ptp(const std::string& id) {
 }
 
 void LockstepRobot::tick() {
-  lwr_fri_bridge::fri::CommandDatagram command;
-  std::array<std::uint8_t, lwr_fri_bridge::fri::kCommandSize> answer{};
-  bool answered = false;
-  if (measured_) {
-    const MeasurementBytes& measurement = cell_.measurement();
-    answered = bridge_.answer(measurement.data(), measurement.size(), now_ns_, command);
-    if (answered) lwr_fri_bridge::fri::encode(command, answer.data());
-  } else {
-    bridge_.idle(now_ns_);
-  }
-  controlCycle(answered);
-  cell_.step(answered ? answer.data() : nullptr, answer.size());
+  std::array<std::uint8_t, lwr_fri_bridge::fri::kCommandSize> bytes{};
+  const bool answered = !frozen_ && answer(bytes);
+  if (!frozen_) controlCycle(answered);
+  cell_.step(answered ? bytes.data() : nullptr, bytes.size());
   measured_ = cell_.sent();
   now_ns_ += static_cast<std::int64_t>(std::llround(1e9 * cell_.period()));
+}
+
+bool LockstepRobot::answer(std::array<std::uint8_t, lwr_fri_bridge::fri::kCommandSize>& bytes) {
+  if (!measured_) {
+    bridge_.idle(now_ns_);
+    return false;
+  }
+  lwr_fri_bridge::fri::CommandDatagram command;
+  const MeasurementBytes& measurement = cell_.measurement();
+  if (!bridge_.answer(measurement.data(), measurement.size(), now_ns_, command)) return false;
+  lwr_fri_bridge::fri::encode(command, bytes.data());
+  return true;
 }
 
 void LockstepRobot::controlCycle(bool answered) {

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from coglab_sim import _plant
 from grasp_trial import DIRECTIONS, HOME, SOURCES, URDF, GraspTrial, objects, rotated
-from scipy import special
+from scipy.special import ellipk
 
 G = 9.81
 STEP = 1e-3
@@ -66,7 +66,7 @@ def test_pendulum(tmp_path, swing):
     amplitude = np.hypot(*torques)  # torque = amplitude sin(rest - angle)
     rest = np.arctan2(torques[0], -torques[1])
     plant.set_arm([rest + swing, 1.0, 0, 0, 0, 0, 0])
-    expected = 4.0 * np.sqrt(inertia / amplitude) * special.ellipk(np.sin(swing / 2) ** 2)
+    expected = 4.0 * np.sqrt(inertia / amplitude) * ellipk(np.sin(swing / 2) ** 2)
     crossings, before = [], swing
     for step in range(int(2.6 * expected / STEP)):
         plant.step(np.zeros(7))

@@ -59,7 +59,7 @@ class ContactDetectorNode:
     def on_joints(self, message: JointState) -> None:
         """Positions and velocities in wire order; velocities are differentiated where the message has none."""
         index = {name: i for i, name in enumerate(message.name)}
-        if any(name not in index for name in self.joints):
+        if any(name not in index for name in self.joints) or len(message.position) != len(message.name):
             return
         order = [index[name] for name in self.joints]
         position = [message.position[i] for i in order]

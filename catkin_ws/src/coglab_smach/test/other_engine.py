@@ -36,6 +36,23 @@ ROS_NAMES = (
 """Public names of smach_ros 2.5 that are not those of its modules."""
 
 
+ONLY_OURS = {
+    "StateMachine": ("register_end_cb", "unregister_cb"),
+    "Concurrence": ("is_running", "register_end_cb", "unregister_cb"),
+}
+"""Public methods of our containers that smach 2.5 lacks."""
+
+
+class Hidden:
+    """A method that is not there."""
+
+    def __init__(self, name):
+        self.name = name
+
+    def __get__(self, instance, owner):
+        raise AttributeError(f"smach 2.5 has no {owner.__name__}.{self.name}")
+
+
 def narrow(smach):
     """Classes with upstream's signatures in place of ours, which take more."""
 
@@ -77,6 +94,9 @@ def narrow(smach):
         def execute(self, parent_ud=None):
             return super().execute(parent_ud)
 
+    for cls in (StateMachine, Concurrence):
+        for name in ONLY_OURS[cls.__name__]:
+            setattr(cls, name, Hidden(name))
     return {cls.__name__: cls for cls in (State, StateMachine, Concurrence)}
 
 

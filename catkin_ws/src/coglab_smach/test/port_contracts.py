@@ -6,7 +6,8 @@ A suite gets a Place: the port, the clock that it lives on, and how its node is 
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from contextlib import AbstractContextManager, nullcontext
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -28,6 +29,10 @@ class Place:
     """the node behind the port stops as it stands"""
     thaw: Callable[[], None]
     library: str = "library.xml"
+    push: Callable[[float], None] = lambda force: None
+    """somebody lifts the hand with so many N from now on, or presses it down if negative; 0 lets go"""
+    arm_rests: AbstractContextManager = field(default_factory=nullcontext)
+    """within it nobody else moves the arm"""
 
 
 class Contract:
@@ -185,6 +190,7 @@ class ArmContract(Contract):
         self.settle(self.port.hold("the contract"))
         self.until(lambda: not self.port.motion_allowed().ok, 1.0, "the hold")
         assert self.port.motion_allowed().code == ReasonCode.HELD
+        self.refused(self.port.lwr_command("start"), ReasonCode.HELD)
         self.assert_ended(motion, target)
         self.refused(self.port.move_ptp(target, []), ReasonCode.HELD)
         self.settle(self.port.lwr_command("reset"))
@@ -235,7 +241,7 @@ class HandContract(Contract):
         for speed in (9999, 0, -1):
             self.refused(self.port.open(speed), ReasonCode.OUT_OF_RANGE)
         self.settle(self.port.open(511), 8.0)
-        self.refused(self.port.close_on_object())
+        self.refused(self.port.close_on_object(), ReasonCode.HAND_REFUSED)
 
     def test_preshape_close_on_nothing_and_open(self):
         self.calibrated()
@@ -253,7 +259,28 @@ class HandContract(Contract):
         closing = self.port.close_on_object()
         self.place.sleep(0.1)
         closing.cancel()
-        self.refused(closing)
+        self.refused(closing, ReasonCode.CANCELLED)
+        self.settle(self.port.open(511), 8.0)
+
+    def test_a_newer_order_ends_the_older(self):
+        self.calibrated()
+        self.settle(self.port.preshape("cylindrical", "medium"), 8.0)
+        closing = self.port.close_on_object()
+        self.place.sleep(0.1)
+        opening = self.port.open(511)
+        self.refused(closing, ReasonCode.SUPERSEDED)
+        self.settle(opening, 8.0)
+        assert not self.port.state().holding
+
+    def test_a_calibrated_hand_calibrates_only_by_force(self):
+        self.calibrated()
+        self.refused(self.port.calibrate("fast"), ReasonCode.HAND_REFUSED)
+        again = self.port.calibrate("fast force")
+        self.until(lambda: again.done() or self.port.state().calibrating, 1.0, "the calibration")
+        assert not again.done()
+        self.refused(self.port.preshape("cylindrical", "medium"), ReasonCode.HAND_CALIBRATING)
+        self.settle(again, 12.0)
+        assert self.port.state().calibrated
 
     def test_a_frozen_node_shows(self):
         self.calibrated()
@@ -335,25 +362,68 @@ class DatabaseContract(Contract):
 
 
 class ContactContract(Contract):
-    """ContactPort. Nothing touches the hand, and the arm may move."""
+    """ContactPort. Nothing but push() touches the hand, and the arm may move."""
 
     def begin(self):
+        self.place.push(0.0)
         self.port.disarm()
+        self.place.sleep(0.3)  # what was pushed is at rest again
+
+    def watches(self, mode, time_limit=20.0, **settings):
+        """Armed, and the detector has seen enough of the arm at rest."""
+        self.settle(self.port.arm(mode, time_limit, settings))
+        self.place.sleep(1.2)
+        assert self.port.event() is None, self.port.event()
+
+    def happens(self, contact, code):
+        """The event, which has to come soon."""
+        self.until(lambda: self.port.event() is not None, 2.0, "the event")
+        event = self.port.event()
+        assert event.contact == contact and event.code == code, event
+        assert event.margin >= 1.0 and 0.5 <= event.confidence <= 1.0 and event.source and event.message, event
 
     def test_requests_that_make_no_sense_are_refused(self):
-        self.refused(self.port.arm("juggle", 1.0, {}))
-        self.refused(self.port.arm("release", 1.0, {}))
-        self.refused(self.port.arm("load", 1.0, {"mass": 0.3}))  # nobody has watched for a contact yet
+        self.refused(self.port.arm("juggle", 1.0, {}), ReasonCode.INVALID_ARGUMENT)
+        self.refused(self.port.arm("release", 1.0, {}), ReasonCode.INVALID_ARGUMENT)
+        # Nobody has watched for a contact yet.
+        self.refused(self.port.arm("load", 1.0, {"mass": 0.3}), ReasonCode.INVALID_ARGUMENT)
+        self.refused(self.port.arm("contact", -1.0, {}), ReasonCode.INVALID_ARGUMENT)
         assert self.port.event() is None
+
+    def test_touch_weight_and_release_are_found_once_each(self):
+        with self.place.arm_rests:
+            self.watches("contact", k=20.0)
+            self.place.push(-8.0)
+            self.happens(True, ReasonCode.CONTACT_FOUND)
+            self.place.push(0.0)
+            self.stays(lambda: self.port.event().code == ReasonCode.CONTACT_FOUND, 0.3)
+            self.watches("load", mass=0.8, load_share=0.5)
+            self.place.push(-8.0)
+            self.happens(True, ReasonCode.LOAD_CARRIED)
+            self.watches("release", mass=0.8, load_share=0.5)
+            self.place.push(0.0)
+            self.happens(False, ReasonCode.LOAD_RELEASED)
 
     def test_no_event_without_a_touch_and_none_after_the_limit(self):
         self.settle(self.port.arm("contact", 0.4, {"k": 50.0}))
         self.stays(lambda: self.port.event() is None, 1.0)
 
     def test_disarmed_it_says_nothing(self):
-        self.settle(self.port.arm("contact", 5.0, {"k": 50.0}))
-        self.port.disarm()
-        self.stays(lambda: self.port.event() is None, 0.3)
+        with self.place.arm_rests:
+            self.watches("contact", k=20.0)
+            self.port.disarm()
+            self.place.push(-8.0)
+            self.stays(lambda: self.port.event() is None, 0.3)
+            self.place.push(0.0)
+
+    def test_armed_again_at_once_it_watches(self):
+        with self.place.arm_rests:
+            self.settle(self.port.arm("contact", 20.0, {"k": 20.0}))
+            self.port.disarm()
+            self.watches("contact", k=20.0)
+            self.place.push(-8.0)
+            self.happens(True, ReasonCode.CONTACT_FOUND)
+            self.place.push(0.0)
 
     def test_a_frozen_node_does_not_answer(self):
         self.place.freeze()

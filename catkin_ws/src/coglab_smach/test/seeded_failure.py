@@ -36,7 +36,7 @@ class SeededFailure:
         board = self.action in ("take", "put")
         smach.set_loggers(*[lambda *a: None] * 4)
         where = "world" if board else "human_hand"
-        self.trial = VirtualTrial(seed=3000 + seed, object_on=where, profile="patient", perfect=True)
+        self.trial = VirtualTrial(seed=3000 + seed, object_on=where)
         self.happened = ""
         self._due = None
         self._recovery = self._waited = False

@@ -155,6 +155,29 @@ def test_requests_that_make_no_sense_are_refused():
         detector.arm("contact", 0.0, 1.0, joints=[0])
 
 
+@pytest.mark.parametrize("which", ["torque", "position", "velocity"])
+@pytest.mark.parametrize("value", [np.nan, np.inf, 1e308, -1e308, "six", "eight"])
+@pytest.mark.parametrize("armed", [False, True])
+def test_a_sample_that_no_arm_can_give_is_ignored_and_the_push_after_it_found(posture, which, value, armed):
+    trial = ContactTrial(posture, 3)
+    sample = {"torque": np.zeros(7), "position": trial.q, "velocity": np.zeros(7)}
+    sample[which] = (
+        {"six": np.zeros(6), "eight": np.zeros(8)}.get(value) if isinstance(value, str) else np.full(7, value)
+    )
+    trial.detector._jacobian = lambda q: trial.jacobian * (1.0 if np.all(np.abs(q) < 10.0) else np.nan)
+    trial.feed(1.5)
+    for arm in (False, True):
+        if arm:
+            trial.detector.arm("contact", trial.t, 30.0)
+        if arm == armed:
+            for _ in range(3):
+                trial.t += 0.005
+                assert trial.detector.feed(trial.t, **sample) is None
+    assert trial.feed(0.3)[0] is None
+    event, delay = trial.feed(0.3, push((0.0, 0.0, -1.0), 8.0))
+    assert event is not None and event.contact and delay < 0.1
+
+
 def test_nan_and_old_stamps_are_ignored(posture):
     run = ContactTrial(posture, 8)
     run.rest_and_arm()

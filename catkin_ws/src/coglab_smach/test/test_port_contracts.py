@@ -11,7 +11,8 @@ from coglab_smach.simulated.ports import (
     SimulatedHand,
     SimulatedPerception,
 )
-from coglab_smach.simulated.world_ports import VirtualArm
+from coglab_smach.simulated.virtual_arm import VirtualArm
+from coglab_smach.simulated.world_ports import VirtualContact, VirtualDatabase, VirtualHand, VirtualPerception
 from port_contracts import SUITES, Place
 from virtual_trial import LIBRARY
 
@@ -49,6 +50,7 @@ def double_of(name):
         clock.sleep,
         lambda: cell.faults.dead.add(name),
         lambda: cell.faults.dead.discard(name),
+        push=cell.push,
     )
 
 
@@ -61,12 +63,8 @@ def test_double(name, test):
     getattr(contract, test)()
 
 
-RIG_LACKS = ("test_given_up_while_its_node_is_frozen_it_never_acts", "test_a_hold_ends_the_motion_and_latches")
-"""there is no node to freeze, and the report tells in words alone what blocks"""
-
-
-def test_the_arm_of_whole_trials():
-    """The arm of the trials in virtual time, which has the real controllers behind it."""
+def virtual_double_of(name):
+    """A port of the trials in virtual time, which has the real controllers, driver and detector behind it."""
     rig = World(1)
 
     def sleep(duration):
@@ -74,7 +72,23 @@ def test_the_arm_of_whole_trials():
             rig.step()
 
     sleep(1.0)
-    suite = SUITES["arm"](Place(VirtualArm(rig), lambda: rig.t, sleep, None, None, LIBRARY))
-    for test in [name for name in vars(SUITES["arm"]) if name.startswith("test_") and name not in RIG_LACKS]:
+    database = ObjectDatabase(objects_folder())
+    assert database.reload() == []
+    ports = {
+        "arm": VirtualArm,
+        "hand": VirtualHand,
+        "perception": VirtualPerception,
+        "contact": VirtualContact,
+        "database": lambda rig: VirtualDatabase(database),
+    }
+    port = ports[name](rig)
+    push = lambda force: rig.cell.set_push([0.0, 0.0, force])  # noqa: E731
+    return Place(port, lambda: rig.t, sleep, port.freeze, port.thaw, LIBRARY, push)
+
+
+@pytest.mark.parametrize("name", SUITES)
+def test_port_of_whole_trials(name):
+    suite = SUITES[name](virtual_double_of(name))
+    for test in [test for test in vars(SUITES[name]) if test.startswith("test_")]:
         suite.begin()
         getattr(suite, test)()

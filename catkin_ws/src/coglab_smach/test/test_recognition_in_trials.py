@@ -5,12 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 import smach
-
-try:
-    from virtual_trial import VirtualTrial
-except ImportError as error:
-    pytest.skip(f"a compiled module is not there: {error}", allow_module_level=True)
 from coglab_perception.recogniser import Recogniser, load_patterns
+from virtual_trial import VirtualTrial
 
 PATTERNS = str(Path(__file__).resolve().parents[2] / "coglab_perception" / "config" / "patterns.json")
 GIVE = "exchange_human_to_robot"

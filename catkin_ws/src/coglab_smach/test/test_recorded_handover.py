@@ -3,15 +3,11 @@
 import numpy as np
 import pytest
 import smach
-
-try:
-    from virtual_trial import VirtualTrial
-except ImportError as error:
-    pytest.skip(f"a compiled module is not there: {error}", allow_module_level=True)
 from coglab_sim.conditions import CONSIDERATE
 from coglab_sim.person.in_cell import pose_of_truth
 from coglab_sim.person.recorded_motion import RecordingError
 from coglab_sim.virtual_world import World
+from virtual_trial import VirtualTrial
 
 RECEIVE = "exchange_human_to_robot"
 FRAMES = ("human_hand", "object_mug")

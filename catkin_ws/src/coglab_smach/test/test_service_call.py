@@ -62,6 +62,22 @@ def test_given_up_before_it_was_sent(monkeypatch, late):
     assert server.heard == []
 
 
+def test_given_up_while_no_server_is_there_its_thread_ends(monkeypatch):
+    """Not when it would have run out of time: a machine that tries again and again would collect them."""
+    server = Server(monkeypatch)
+    call = calls.call("lwr/command", LwrCommand, wait=20.0, event="reset")
+    time.sleep(0.05)
+    call.cancel()
+    assert ended(call) and server.heard == []
+    with pytest.raises(PortError) as raised:
+        call.result()
+    assert raised.value.code == ReasonCode.CANCELLED
+    until = time.monotonic() + 1.0
+    while any(t.name == "call:service lwr/command" for t in threading.enumerate()):
+        assert time.monotonic() < until, "its thread is left"
+        time.sleep(0.01)
+
+
 def test_a_refusal_brings_its_code(monkeypatch):
     server = Server(monkeypatch)
     server.there.set()

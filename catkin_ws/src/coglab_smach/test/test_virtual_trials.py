@@ -10,13 +10,9 @@ from pathlib import Path
 
 import pytest
 import smach
-
-try:
-    from virtual_trial import VirtualTrial
-except ImportError as error:
-    pytest.skip(f"a compiled module is not there: {error}", allow_module_level=True)
 from coglab_msgs.msg import Say
 from misbehaviours import GIVE, OUTCOMES, RECEIVE
+from virtual_trial import VirtualTrial
 
 LONG = os.environ.get("COGLAB_LONG") == "1"
 SOURCES = Path(__file__).resolve().parents[2]

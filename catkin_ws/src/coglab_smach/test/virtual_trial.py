@@ -18,13 +18,8 @@ from coglab_smach.context.journal import Journal
 from coglab_smach.kinematics.reachability import default_arm, solve
 from coglab_smach.machines import build_master
 from coglab_smach.ports.pending import Ready
-from coglab_smach.simulated.world_ports import (
-    VirtualArm,
-    VirtualContact,
-    VirtualDatabase,
-    VirtualHand,
-    VirtualPerception,
-)
+from coglab_smach.simulated.virtual_arm import VirtualArm
+from coglab_smach.simulated.world_ports import VirtualContact, VirtualDatabase, VirtualHand, VirtualPerception
 
 SHARE = Path(__file__).resolve().parent.parent
 LIBRARY = str(SHARE.parent / "coglab_controllers" / "config" / "primitives.xml")

@@ -12,11 +12,11 @@ import argparse
 import os
 import re
 import shutil
-import subprocess
 import sys
 from collections.abc import Iterable
 from pathlib import Path
 
+from coglab_bringup.commit import commit_seed
 from coglab_bringup.launch_arguments import judge_launch
 from coglab_bringup.usage import Parser, Refused, master_port, seed, writable_file, writable_folder
 
@@ -39,6 +39,13 @@ def demo_parser(top: Path) -> Parser:
         default=top / "out" / "demo",
         metavar="DIR",
         help="where result.json and trial.png go",
+    )
+    parser.add_argument(
+        "--person",
+        choices=("patient", "drawn"),
+        default="patient",
+        help="patient: waits for the robot, seen without noise or delay (default); drawn: as people are, by the seed, "
+        "and seen by the tracker as it is, so that not every handover succeeds",
     )
     return parser
 
@@ -97,16 +104,6 @@ def bench_options(top: Path, words: list[str]) -> argparse.Namespace:
     options = parser.parse_args(words)
     _named(options.names, find_benches(top / "catkin_ws" / "src"), "bench")
     return options
-
-
-def commit_seed(top: Path) -> int:
-    """A seed from the commit of this checkout, the same for all who have it; 1 without git."""
-    try:
-        words = ["git", "-C", str(top), "rev-parse", "HEAD"]
-        commit = subprocess.run(words, capture_output=True, text=True, timeout=10, check=True).stdout
-        return int(commit[:7], 16)
-    except (OSError, subprocess.SubprocessError, ValueError):
-        return 1
 
 
 def mutants_options(top: Path, words: list[str]) -> argparse.Namespace:

@@ -13,28 +13,13 @@ from pathlib import Path
 
 from coglab_bringup import process_tree
 from coglab_bringup.arguments import demo_parser
+from coglab_bringup.commit import commit_of
 from coglab_bringup.run_directory import free_port, record_run, record_times, run_environment
 from coglab_bringup.usage import Refused
 
 OBJECT = "mug"  # what the simulated person offers (coglab_sim/config/cell.yaml)
 KINDS = ("exchange_human_to_robot", "exchange_robot_to_human")  # take it from the person, then give it back
 MASTER_LIMIT = 30.0  # s until the ROS master answers
-
-
-def commit_of(top: Path) -> str:
-    """The commit of this checkout, read from .git (git itself may not be installed); "unknown" outside a checkout."""
-    head = top / ".git" / "HEAD"
-    if not head.is_file():
-        return "unknown"
-    reference = head.read_text().strip().removeprefix("ref: ")
-    loose = top / ".git" / reference
-    if loose.is_file():
-        return loose.read_text().strip()
-    packed = top / ".git" / "packed-refs"
-    for line in packed.read_text().splitlines() if packed.is_file() else []:
-        if line.endswith(" " + reference):
-            return line.split()[0]
-    return reference
 
 
 class System:
@@ -98,8 +83,14 @@ def unfinished(kind: str, error: BaseException) -> dict:
     return {"kind": kind, "outcome": str(error) or "interrupted", "reason_code": int(code)}
 
 
-CONSIDERATE = ("profile:=patient", "perfect_perception:=true")
-"""What is shown is the robot, so the person is a patient one."""
+PEOPLE = {
+    "patient": (
+        ("profile:=patient", "perfect_perception:=true"),
+        "a patient person, who waits for the robot and is seen without noise or delay",
+    ),
+    "drawn": ((), "a person drawn by the seed, as people are, seen by the tracker as it is"),
+}
+"""Arguments of the launch file, and what they mean."""
 
 
 def main(arguments: list[str]) -> int:
@@ -114,16 +105,19 @@ def main(arguments: list[str]) -> int:
     began = time.monotonic()
     out: Path = options.out.absolute()
     out.mkdir(parents=True, exist_ok=True)
+    person, words = PEOPLE[options.person]
+    other = "" if options.person == "drawn" else "; people as they are: ./coglab demo --person drawn"
+    print(f"[coglab] this demo shows {words}{other}", flush=True)
     port = free_port()
     environment = run_environment(port, out / "ros_home")
     os.environ.update(environment)
     record_run(top, port, "demo")
     screen = bool(os.environ.get("DISPLAY")) and not options.headless and Path("/usr/bin/rviz").exists()
     launch = [f"seed:={options.seed}", f"rviz:={'true' if screen else 'false'}", f"log_file:={out / 'fri_ticks.csv'}"]
-    launch += [f"console:={'false' if options.no_console else 'true'}", *CONSIDERATE]
+    launch += [f"console:={'false' if options.no_console else 'true'}", *person]
     (out / "ros_home" / "console.url").unlink(missing_ok=True)  # of an earlier demo
     system = System(environment, port, launch, out / "roslaunch.log")
-    result: dict = {"commit": commit_of(top), "seed": options.seed, "handovers": []}
+    result: dict = {"commit": commit_of(top), "seed": options.seed, "person": options.person, "handovers": []}
     try:
         wait_for_master(system, MASTER_LIMIT)
         if not options.no_console:

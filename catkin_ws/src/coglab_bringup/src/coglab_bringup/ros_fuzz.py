@@ -1,9 +1,9 @@
 """Random messages for every topic that a node of ours listens to and for every service that it offers.
 
 Malformed by design, so that no request is valid by chance: each message holds at least one value that its definition
-excludes. That is a float that is not finite or near 1e308 (one in each array at least), else an odd string; a message
-with a time and without an array of floats may have an odd stamp instead, the rest of it being fine. Only messages
-without any such field are valid by nature (`Empty`, `Trigger`, integers and flags alone): they are sent as well and
+excludes. That is a float that is not finite or near 1e308 (one in each array at least), else an odd string; every third
+message with a time has an odd stamp instead, the rest of it being fine (joint states with all joints of the arm). Only
+messages without any such field are valid by nature (`Empty`, `Trigger`, integers and flags alone): they are sent as well and
 counted apart. What they ask for is no motion of the arm; but `stop` would refuse every motion from then on: left out.
 """
 
@@ -48,6 +48,7 @@ ODD = (
     "\x1b[2J",
     "x" * 65536,
 )
+JOINTS = ("lwr_a1", "lwr_a2", "lwr_e1", "lwr_a3", "lwr_a4", "lwr_a5", "lwr_a6")
 KNOWN = (
     "",
     "mug",
@@ -68,17 +69,23 @@ INTEGER = re.compile(r"(u?)int(8|16|32|64)$")
 BOUND = re.compile(r"(.*)\[(\d*)\]$")
 
 
+MALFORMED, ODD_STAMP, VALID = "malformed", "odd stamp, the rest fine", "valid by nature"
+LAST_WAIT = 60.0
+"""s after the campaign for an answer that is still missing: late, or lost"""
+
+
 class Generator:
     """Messages from a seed."""
 
     def __init__(self, seed: int) -> None:
         self.random = random.Random(seed)
 
-    def message(self, kind: Any) -> tuple[Any, bool]:
-        """A message of a class, and whether it is malformed (else it is valid by nature)."""
+    def message(self, kind: Any, stamp_only: bool = False) -> tuple[Any, str]:
+        """A message of a class, and what it is: MALFORMED, ODD_STAMP (if `stamp_only` and it has a time; malformed in
+        nothing else), or VALID by nature."""
         message = kind()
         leaves: list[tuple[Any, Any, str]] = []  # who holds it, attribute or index, type
-        stamp_only = self.random.random() < 0.3 and has_time(kind) and not has_float_array(kind)
+        stamp_only = stamp_only and has_time(kind)
         self._fill(message, leaves, stamp_only)
         floats, strings, times = (
             [leaf for leaf in leaves if leaf[2] in names]
@@ -87,23 +94,28 @@ class Generator:
         if stamp_only and times:
             holder, name, _ = self.random.choice(times)
             put(holder, name, self._odd_time(kind=genpy.Time))
-        elif floats:
+            return message, ODD_STAMP
+        if floats:
             holder, name, of = self.random.choice(floats)
             put(holder, name, self.random.choice(EXCLUDED[:3] if of == "float32" else EXCLUDED))
         elif strings:
             holder, name, _ = self.random.choice(strings)
             put(holder, name, self.random.choice(ODD))
         else:
-            return message, False
-        return message, True
+            return message, VALID
+        return message, MALFORMED
 
     def _fill(self, message: Any, leaves: list, fine: bool) -> None:
+        joints = fine and message._type == "sensor_msgs/JointState"
         for name, of in zip(message.__slots__, message._slot_types, strict=True):
             bound = BOUND.match(of)
             if not bound:
                 self._set(message, name, of, leaves, fine)
                 continue
             element, fixed = bound.group(1), bound.group(2)
+            if joints:
+                setattr(message, name, list(JOINTS) if element == "string" else [0.05] * len(JOINTS))
+                continue
             count = int(fixed) if fixed else self.random.choice((1, 1, 2, 3, 5, 7, 7, 8, 1000))
             if element in ("uint8", "char"):
                 setattr(message, name, bytes(self.random.randrange(256) for _ in range(count)))
@@ -112,7 +124,7 @@ class Generator:
             setattr(message, name, values)
             for i in range(len(values)):
                 self._set(values, i, element, leaves, fine)
-            if values and element in ("float32", "float64"):  # no array is a command of the joints by chance
+            if values and not fine and element in ("float32", "float64"):  # no array is a command of the joints by chance
                 values[self.random.randrange(len(values))] = self.random.choice(EXCLUDED[:3])
 
     def _set(self, holder: Any, name: Any, of: str, leaves: list, fine: bool) -> None:
@@ -176,20 +188,18 @@ def has_time(kind: Any) -> bool:
     return "time" in types_in(kind)
 
 
-def has_float_array(kind: Any) -> bool:
-    """Whether its numbers may be a command of as many joints as by chance."""
-    return any(of.startswith("float") and "[" in of for of in types_in(kind))
-
-
 @dataclass
 class Report:
     """What was sent and what came of it."""
 
-    sent: Counter = field(default_factory=Counter)  # malformed, valid by nature
+    sent: Counter = field(default_factory=Counter)  # MALFORMED, ODD_STAMP, VALID
+    odd_stamps: Counter = field(default_factory=Counter)  # messages of ODD_STAMP, by topic or service
     answers: Counter = field(default_factory=Counter)  # of services: success, refused, error, no answer
     accepted: Counter = field(default_factory=Counter)  # malformed requests answered with success, by service
     ended: list[str] = field(default_factory=list)  # nodes
-    unanswered: Counter = field(default_factory=Counter)  # services
+    unanswered: Counter = field(default_factory=Counter)  # requests not answered in time, by service
+    late: dict[str, float] = field(default_factory=dict)  # s, longest answer of those that came all the same
+    lost: list[str] = field(default_factory=list)  # services that never answered
 
 
 class Fuzz:
@@ -210,6 +220,7 @@ class Fuzz:
         self.published = sorted(name for name, nodes in publishers if ours & set(nodes))
         self.pids = {node: self.pid(node) for node in self.nodes}
         self.report = Report()
+        self._asked: dict[str, float] = {}
         self._lock = threading.Lock()
 
     def pid(self, node: str) -> int:
@@ -245,11 +256,17 @@ class Fuzz:
         for thread in threads:
             thread.start()
         self._publish(per_topic)
+        end = time.monotonic() + limit + per_service * 0.5
         for thread in threads:
-            thread.join(limit + per_service * 0.5)
-        for thread, name in zip(threads, self.services, strict=True):
-            if thread.is_alive():
-                self.report.unanswered[name] += 1
+            thread.join(max(0.0, end - time.monotonic()))
+        alive = [name for thread, name in zip(threads, self.services, strict=True) if thread.is_alive()]
+        # Late or lost? Nobody asks anything else now.
+        end = time.monotonic() + LAST_WAIT
+        while time.monotonic() < end and any(self._waits(name) > limit for name in alive):
+            time.sleep(0.5)
+        self.report.lost = [name for name in alive if self._waits(name) > limit]
+        for name in self.report.lost:
+            self.report.unanswered[name] += 1
         self.report.ended = [node for node in self.nodes if self.pid(node) != self.pids[node]]
         return self.report
 
@@ -257,11 +274,11 @@ class Fuzz:
         generator = Generator(self.seed)
         publishers = {name: rospy.Publisher(name, kind, queue_size=200) for name, kind in self.topics.items()}
         time.sleep(0.7)  # for the subscribers to connect
-        for _ in range(count):
+        for number in range(count):
             for name, publisher in publishers.items():
-                message, malformed = generator.message(self.topics[name])
+                message, what = generator.message(self.topics[name], number % 3 == 0)
                 publisher.publish(message)
-                self.report.sent["malformed" if malformed else "valid by nature"] += 1
+                self._note(name, what)
                 time.sleep(0.0005)
         time.sleep(0.5)
         for publisher in publishers.values():
@@ -270,22 +287,35 @@ class Fuzz:
     def _call(self, name: str, kind: Any, count: int, limit: float) -> None:
         generator = Generator(self.seed + hash_of(name))
         proxy = rospy.ServiceProxy(name, kind)
-        for _ in range(count):
-            request, malformed = generator.message(kind._request_class)
-            started = time.monotonic()
+        for number in range(count):
+            request, what = generator.message(kind._request_class, number % 3 == 0)
+            started = self._asked[name] = time.monotonic()
             try:
                 answer = proxy(request)
                 success = getattr(answer, "success", None)
                 verdict = "success" if success else "refused" if success is not None else "answered"
             except Exception:  # an error of the service, or a request that cannot be serialised
                 verdict = "error"
-            late = time.monotonic() - started > limit
+            del self._asked[name]
+            took = time.monotonic() - started
+            self._note(name, what)
             with self._lock:
-                self.report.unanswered[name] += late
-                self.report.sent["malformed" if malformed else "valid by nature"] += 1
+                if took > limit:
+                    self.report.unanswered[name] += 1
+                    self.report.late[name] = max(took, self.report.late.get(name, 0.0))
                 self.report.answers[verdict] += 1
-                if verdict == "success" and malformed:
+                if verdict == "success" and what != VALID:
                     self.report.accepted[name] += 1
+
+    def _note(self, name: str, what: str) -> None:
+        with self._lock:
+            self.report.sent[what] += 1
+            self.report.odd_stamps[name] += what == ODD_STAMP
+
+    def _waits(self, name: str) -> float:
+        """s for which the request that a service has now is under way; 0 if it has none."""
+        started = self._asked.get(name)
+        return 0.0 if started is None else time.monotonic() - started
 
 
 def hash_of(name: str) -> int:

@@ -7,6 +7,8 @@
 /// and the same requests give the same bytes.
 #pragma once
 
+#include <array>
+#include <cstdint>
 #include <map>
 #include <memory>
 #include <string>
@@ -57,6 +59,11 @@ class LockstepRobot {
   double now() const { return 1e-9 * static_cast<double>(now_ns_); }  ///< s
   std::int64_t nowNs() const { return now_ns_; }
 
+  /// Whether the process of bridge and manager stands still, as after SIGSTOP: the cell goes on and
+  /// gets no answers.
+  void setFrozen(bool frozen) { frozen_ = frozen; }
+  bool frozen() const { return frozen_; }
+
   Cell& cell() { return cell_; }
   lwr_fri_bridge::Bridge& bridge() { return bridge_; }
   coglab_controllers::ControllerManager& manager() { return *manager_; }
@@ -69,12 +76,14 @@ class LockstepRobot {
   coglab_controllers::PtpController& ptp(const std::string& id = "ptp");
 
  private:
+  bool answer(std::array<std::uint8_t, lwr_fri_bridge::fri::kCommandSize>& bytes);
   void controlCycle(bool answered);
 
   Cell cell_;
   lwr_fri_bridge::Bridge bridge_;
   std::int64_t now_ns_ = 1'000'000'000;  // a stamp of 0 would mean "none"
   bool measured_ = false;
+  bool frozen_ = false;
   int since_cycle_ = 0;
   std::int64_t last_controller_ns_ = 0;  // of the sample of the last control cycle
   WorldFrames frames_;

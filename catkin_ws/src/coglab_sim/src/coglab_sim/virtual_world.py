@@ -22,7 +22,9 @@ from ih2_hand.driver import HandSerialDriver
 from ih2_hand.emulator.hand import EmulatedHand
 from ih2_hand.emulator.physical_motor import MotorState
 from ih2_hand.emulator.virtual_link import VirtualLink
-from ih2_hand.progress import shown_empty, shown_holding
+from ih2_hand.memory import HandMemory
+from ih2_hand.progress import Task, Verdict
+from ih2_hand.reasons import Reason
 
 from coglab_sim.conditions import THE_WORLD_AS_IT_IS, Conditions
 from coglab_sim.person.in_cell import closure, move_person, view_of
@@ -47,6 +49,8 @@ DT = 0.005
 """s, FRI period"""
 FLOAT32 = 5e-4
 """rad/s, what rounding to float32 on the wire adds to a velocity between two answers"""
+TASK_LIMIT = 8.0
+"""s, of a preshape or a grasp"""
 OLDEST = 1e9
 """s, age of a frame that was never seen"""
 
@@ -127,28 +131,63 @@ class Robot:
         return records
 
 
-class Hand:
-    """Driver on the emulator over a line without a pty; one task at a time, polled at 30 Hz while it runs."""
+class Job:
+    """A task of the hand with its end: the verdict, None while it runs."""
+
+    def __init__(self, task: Task, begun: float) -> None:
+        self.task, self.begun = task, begun
+        self.verdict: Verdict | None = None
+
+
+class Hand(HandMemory):
+    """Driver on the emulator over a line without a pty, as the hand's node uses it: one task at a time, polled at 30 Hz
+    while it runs. ``dead``: nothing is polled and nothing told, as if that node were frozen."""
 
     def __init__(self, cell: Any) -> None:
+        super().__init__(is_current=True, limit=TASK_LIMIT)
         self.cell = cell
         self.clock = SteppedClock()
         self.emulator = EmulatedHand(self.clock, physical=True)
         self.driver = HandSerialDriver(transport=VirtualLink(self.emulator, self.clock), clock=self.clock)
-        self.calibrated = False
-        self.holding = False
         self.message = ""
-        self.task: Any = None
-        self.begun = 0.0
-        self.verdict: Any = None
-        self.positions: tuple[int, ...] = (0, 0, 0, 0, 0)
+        self.reason = Reason.NONE
+        self.job: Job | None = None
+        self.positions: tuple[int, ...] = ()
         self.dead = False
         self._next_poll = 0.0
+        self._calibrated_at = 0.0
 
-    def begin(self, task: Any) -> None:
-        """Start a task of ih2_hand.progress."""
-        self.task, self.begun, self.verdict = task, self.clock.monotonic(), None
+    def begin(self, name: str, **fields: Any) -> Job:
+        """Start a goal of one of the hand's actions; what runs ends. Raises what refuses it."""
+        if self.job is not None:
+            self.end(self.job, "replaced by a new goal; fingers stopped", Reason.SUPERSEDED)
+        task = self.task_for(name, SimpleNamespace(**fields), self.driver)
+        self.job = Job(task, self.clock.monotonic())
         task.begin(self.driver)
+        return self.job
+
+    def end(self, job: Job, text: str, reason: Reason) -> None:
+        """End a goal before its time; the fingers stop. One that has ended stays as it is."""
+        if job is self.job:
+            self._over(Verdict(text, done=True, stop=True, reason=reason))
+
+    def calibrate(self, mode: str) -> str | None:
+        """Begin to calibrate; or why not. ``calibrating`` until it has ended."""
+        words = mode.split()
+        why = self.why_not_calibrate(words, self.job.task.name if self.job else None)
+        if why is not None:
+            self.reason, self.message = Reason.HAND_REFUSED, f"calibration refused: {why}"
+            return why
+        self.calibration_began()
+        self.driver.calibration(words[0])  # at once in the emulator's time, which the world's has to catch up with
+        self._calibrated_at = self.clock.monotonic()
+        return None
+
+    def calibration_over(self, t: float) -> bool:
+        """Whether a calibration that was begun has ended by now."""
+        if self.calibrating and t >= self._calibrated_at:
+            self.calibrating, self.calibrated = False, True
+        return not self.calibrating
 
     def step(self, t: float) -> None:
         """Follow the time and the motors that the physics turns; tell these what to do."""
@@ -160,30 +199,35 @@ class Hand:
             ]
         )
         self.emulator.advance()
+        self.calibration_over(t)
         self._poll(t)
         self.cell.set_motors(*map(list, zip(*self.emulator.orders(), strict=True)))
 
     def _poll(self, t: float) -> None:
-        if t < self._next_poll or self.dead or not self.calibrated:
+        if t < self._next_poll or self.dead or self.calibrating:
             return
-        self._next_poll = t + (1 / 30 if self.task is not None else 0.2)
+        self._next_poll = t + (1 / 30 if self.job is not None else 0.2)
         readings = [SimpleNamespace(**r) for r in self.driver.read_motors()]
         self.positions = tuple(r.position for r in readings)
-        if self.holding and shown_empty(readings):
-            self.holding = False
-        elif not self.holding and shown_holding(readings):
-            self.holding = True
-        if self.task is None:
+        self.look(readings)
+        if self.job is None:
             return
-        elapsed = self.clock.monotonic() - self.begun
-        verdict = self.task.judge(readings, elapsed)
-        if verdict.done or elapsed > self.task.limit:
-            self.verdict, self.task = verdict, None
-            if verdict.holding is not None:
-                self.holding = verdict.holding
-            if verdict.stop:
-                self.driver.stop_all()
-            self.message = verdict.text
+        elapsed = self.clock.monotonic() - self.job.begun
+        verdict = self.job.task.judge(readings, elapsed)
+        if verdict.done:
+            self._over(verdict)
+        elif elapsed > self.job.task.limit:
+            text = f"not done within {self.job.task.limit:.0f} s; fingers stopped"
+            self._over(Verdict(text, done=True, stop=True, reason=Reason.TIME_LIMIT))
+
+    def _over(self, verdict: Verdict) -> None:
+        job, self.job = self.job, None
+        assert job is not None
+        if verdict.stop:
+            self.driver.stop_all()
+        job.verdict = verdict
+        self.task_over(job.task, verdict)
+        self.reason, self.message = verdict.reason, f"{job.task.name}: {verdict.text}"
 
 
 class World:

@@ -214,11 +214,11 @@ def node_main() -> None:
         container.register_end_cb(count)
     publish = server._publish_heartbeats
 
-    def counted() -> None:
+    def counted(now: float) -> None:
         nonlocal rounds
         if connected():
             rounds += 1
-        publish()
+        publish(now)
 
     def connected() -> bool:
         topics = (server._status_pub, server._structure_pub)

@@ -2,13 +2,17 @@
 
 import importlib
 import inspect
+import itertools
+import random
 import subprocess
 import sys
+from types import SimpleNamespace
 
 import pytest
 import smach
 import smach_ros
-from smach_ros.introspection import WELCOME_DELAY, ContainerProxy, _Beat
+from smach_ros import introspection
+from smach_ros.introspection import WELCOME_DELAY, ContainerProxy, IntrospectionServer, _Beat, _Viewers
 
 SIGNATURES = {
     smach.State: "outcomes input_keys output_keys io_keys",
@@ -105,7 +109,9 @@ def test_the_beat_spares_a_viewer_that_has_just_connected():
     beat = _Beat(100.0, 2.0)
     beat.done(100.0)
     assert beat.due == 102.0
-    beat.newcomer(101.9)  # its window does not exist at 102.0 s
+    beat.newcomer(101.9)  # its window does not exist at 102.0 s: the others alone get that beat
+    assert beat.due == 102.0
+    beat.done(102.0, spared_until=101.9 + WELCOME_DELAY)
     assert beat.due == 101.9 + WELCOME_DELAY
     beat.done(beat.due)
     assert beat.due == pytest.approx(101.9 + WELCOME_DELAY + 2.0)
@@ -123,6 +129,47 @@ def test_a_stream_of_new_viewers_does_not_hold_up_the_beat():
             beats.append(now)
         beat.newcomer(now)
     assert len(beats) >= 8
+
+
+class Topic:
+    """Stands for a publisher; connections are names, and what each was sent is kept with its time."""
+
+    def __init__(self):
+        self.impl, self.connections, self.now, self.sent = self, [], 0.0, {}
+        self.acquire = self.release = lambda: None
+
+    def get_num_connections(self):
+        return len(self.connections)
+
+    def publish(self, _message, connection):
+        self.sent.setdefault(connection, []).append(self.now)
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_no_viewer_gets_a_beat_before_its_window_exists_and_all_get_theirs(seed, monkeypatch):
+    draw = random.Random(seed)
+    comes = sorted(draw.uniform(0.0, 30.0) for _ in range(draw.choice((2, 3, 40))))
+    topic, server = Topic(), IntrospectionServer("/server", smach.StateMachine(["end"]), "/SM_ROOT")
+    monkeypatch.setattr(introspection.time, "monotonic", lambda: topic.now)
+    server._watched, server._beat = [SimpleNamespace(path="/SM_ROOT", structure=lambda: None)], _Beat(0.0, 2.0)
+    server._structure_pub, server._viewers = topic, [_Viewers(topic)]
+    for step in range(4000):
+        topic.now = 0.01 * step
+        for i, when in enumerate(comes):
+            if i not in topic.connections and when <= topic.now < when + 20.0:
+                topic.connections.append(i)
+                server._welcome()
+            if i in topic.connections and topic.now >= when + 20.0:
+                topic.connections.remove(i)
+        if server._is_due(topic.now):
+            server._publish_heartbeats(topic.now)
+    for i, when in enumerate(comes):
+        sent = topic.sent.get(i, [])
+        assert WELCOME_DELAY <= sent[0] - when <= WELCOME_DELAY + 0.02, "its first beat"
+        end = min(when + 20.0, 40.0)
+        gaps = [after - before for before, after in itertools.pairwise([*sent, end])]
+        assert max(gaps) <= 2.02, "a beat was left out"
+        assert sent[-1] < end
 
 
 def test_beats_that_were_missed_are_not_made_up_for():

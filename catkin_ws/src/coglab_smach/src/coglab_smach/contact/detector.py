@@ -27,6 +27,8 @@ Joints = Sequence[float] | np.ndarray
 GRAVITY = 9.81
 MAD_TO_SIGMA = 1.4826
 """Standard deviation of normal noise per median absolute deviation."""
+LARGEST = 1e4
+"""Nm, rad, rad/s: no number of an arm is larger"""
 LONGEST_STEP = 1.0
 """s between two samples that follow each other"""
 
@@ -216,10 +218,12 @@ class ContactDetector:
         )
 
     def feed(self, stamp: float, torque: Joints, position: Joints, velocity: Joints) -> ContactEvent | None:
-        """One sample: torque (Nm), position (rad), velocity (rad/s), seven joints each. Samples must be finite."""
+        """One sample: torque (Nm), position (rad), velocity (rad/s), seven joints each. One that no arm can give (not
+        finite, beyond LARGEST, of another length) is ignored."""
         tau = np.asarray(torque, dtype=float)
-        if not (np.all(np.isfinite(tau)) and np.all(np.isfinite(velocity))):
-            return None
+        for values in (tau, np.asarray(position), np.asarray(velocity)):
+            if values.shape != (7,) or not np.all(np.abs(values) <= LARGEST):
+                return None
         if not self._in_time(stamp):
             return None
         self._follow_motion(stamp, velocity)

@@ -5,6 +5,8 @@ All names are relative: in the node's own namespace, so that two robots fit in o
 
 from __future__ import annotations
 
+import threading
+import time
 from typing import Any
 
 from coglab_msgs.msg import Contact, ReasonCode
@@ -14,8 +16,8 @@ from coglab_py.yaml_file import YamlError, parse
 from geometry_msgs.msg import Pose
 
 from coglab_smach.ports.interfaces import ContactEvent, Located, Recognition
-from coglab_smach.ports.pending import Pending, PortError
-from coglab_smach.ros.calls import SERVICE_WAIT, Newest, call, mapped
+from coglab_smach.ports.pending import Pending, Permit, PortError, Threaded
+from coglab_smach.ros.calls import SERVICE_WAIT, Newest, call, call_now, mapped
 
 
 class RosPerception:
@@ -84,6 +86,8 @@ class RosContact:
         self._service = service
         self._event: ContactEvent | None = None
         self._wanted: bool | None = None
+        self._before = threading.Event()
+        self._before.set()
         self._newest = Newest(topic, Contact, self._on_contact)
 
     def _on_contact(self, message: Contact) -> None:
@@ -101,10 +105,8 @@ class RosContact:
         self._event = None
         self._wanted = mode != "release"
         return mapped(
-            call(
-                self._service,
-                ArmContact,
-                wait=2.0,
+            self._request(
+                2.0,
                 mode=mode,
                 timeout=time_limit,
                 k=float(settings.get("k", 0.0)),
@@ -115,12 +117,32 @@ class RosContact:
             lambda r: None,
         )
 
+    def _request(self, wait: float, **fields: Any) -> Pending:
+        """One request, sent when the one before it has ended: a disarm must not land after a later arm, nor before the
+        arm that it is to end."""
+        before, self._before = self._before, threading.Event()
+        over = self._before
+
+        def run(permit: Permit) -> Any:
+            try:
+                end = time.monotonic() + SERVICE_WAIT
+                while not before.wait(0.05):
+                    permit.check()
+                    if time.monotonic() > end:
+                        raise PortError(
+                            f"{self._service} has not answered the request before this one for {SERVICE_WAIT:.0f} s",
+                            code=ReasonCode.NODE_SILENT,
+                        )
+                return call_now(self._service, ArmContact, permit, wait, **fields)
+            finally:
+                over.set()
+
+        return Threaded(run, f"service {self._service}")
+
     def disarm(self) -> None:
         if self._wanted is not None:
             self._wanted = None
-            call(
-                self._service, ArmContact, wait=0.5, mode="off", timeout=0.0, k=0.0, joints=[], mass=0.0, load_share=0.0
-            )
+            self._request(0.5, mode="off", timeout=0.0, k=0.0, joints=[], mass=0.0, load_share=0.0)
 
     def event(self) -> ContactEvent | None:
         return self._event

@@ -111,6 +111,8 @@ class SimulatedCell:
         self.primitives = {"reach_human", "reach_human_high", "give_human", "take_board", "put_board"}
         self.hand_positions: tuple[int, ...] = (0, 0, 0, 0, 0)
         self.calibrated = self.preshaped = False
+        self.calibrating_until = 0.0
+        self.lifted = 0.0
         self.objects: dict[str, Pose] = {
             "mug": Pose(np.array([0.78, 0.03, 0.43])),
             "board": Pose(np.array([0.45, -0.55, 0.05])),
@@ -122,6 +124,10 @@ class SimulatedCell:
     def note(self, what: str) -> None:
         """Remember a call with its time."""
         self.calls.append((self.clock.now(), what))
+
+    def push(self, force: float) -> None:
+        """Somebody lifts the hand with so many N from now on, or presses it down if negative."""
+        self.lifted = force
 
     def called(self, prefix: str = "") -> list[str]:
         """Names of the calls so far that begin with ``prefix``."""

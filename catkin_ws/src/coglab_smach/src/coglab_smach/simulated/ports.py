@@ -18,7 +18,6 @@ from coglab_py.pose import Pose
 from coglab_smach.clocks.clock import Clock
 from coglab_smach.kinematics.motion_time import MotionLimits
 from coglab_smach.ports.interfaces import (
-    ContactEvent,
     DmpProgress,
     DmpRequest,
     HandState,
@@ -28,7 +27,10 @@ from coglab_smach.ports.interfaces import (
 )
 from coglab_smach.ports.pending import Pending, Polled, PortError, Ready
 from coglab_smach.simulated.cell import SimulatedCell
+from coglab_smach.simulated.contact import SimulatedContact
 
+CALIBRATION = 1.7
+"""s"""
 MODES = ("cylindrical", "lateral", "tridigit", "bidigit", "tridigit2", "bidigit2")
 """preshapes of the hand"""
 
@@ -186,17 +188,31 @@ class SimulatedHand:
         self._order = 0
 
     def calibrate(self, mode: str) -> Pending:
+        words = mode.split(" ")
+        refused = ""
+        if words[0] not in ("fast", "complete") or words[1:] not in ([], ["force"]):
+            refused = "no such order"
+        elif self.cell.calibrated and len(words) == 1:
+            refused = "the hand is calibrated already"
+        if not refused and "hand" not in self.cell.faults.dead:
+            self.cell.calibrating_until = self.cell.clock.now() + CALIBRATION
+
         def apply() -> None:
-            if mode.split(" ")[0] not in ("fast", "complete"):
+            if refused:
                 raise PortError(
-                    f"the hand does not calibrate after the order '{mode}'", ("no such order",), ReasonCode.HAND_REFUSED
+                    f"the hand does not calibrate after the order '{mode}'", (refused,), ReasonCode.HAND_REFUSED
                 )
             self.cell.calibrated, self.cell.hand_positions = True, (0, 0, 0, 0, 0)
 
-        return self.cell.answer("hand", f"calibrate {mode}", 1.7, apply)
+        return self.cell.answer("hand", f"calibrate {mode}", CALIBRATION, apply)
+
+    def _calibrating(self) -> bool:
+        return self.cell.clock.now() < self.cell.calibrating_until
 
     def _move(self, name: str, after: float, positions: Callable[[], tuple[int, ...]], preshaped: bool) -> Pending:
         """An action: it moves the fingers unless it was cancelled, or replaced, before its time had come."""
+        if self._calibrating():
+            return Ready(error=PortError(f"{name} refused: the hand calibrates", code=ReasonCode.HAND_CALIBRATING))
         self._order += 1
         order = self._order
         cancelled: list[bool] = []
@@ -205,7 +221,8 @@ class SimulatedHand:
             if not self.cell.calibrated and name != "open":
                 raise PortError(f"{name} refused: the hand is not calibrated", code=ReasonCode.HAND_NOT_CALIBRATED)
             if cancelled or order != self._order:
-                raise PortError(f"{name} ended PREEMPTED", code=ReasonCode.CANCELLED)
+                code = ReasonCode.CANCELLED if cancelled else ReasonCode.SUPERSEDED
+                raise PortError(f"{name} ended PREEMPTED", code=code)
             self.cell.hand_positions, self.cell.preshaped = positions(), preshaped
 
         call = self.cell.answer("hand", name, after, apply)
@@ -245,7 +262,9 @@ class SimulatedHand:
         if "hand" in self.cell.faults.dead:
             return HandState(message="hand_status is silent", event=ReasonCode.NODE_SILENT)
         closed = self.cell.hand_positions[2] > 100 and not self.cell.faults.empty_grasp
-        return HandState(True, self.cell.calibrated, False, closed, "", self.cell.hand_positions)
+        calibrating = self._calibrating()
+        calibrated = self.cell.calibrated and not calibrating
+        return HandState(True, calibrated, calibrating, closed, "", () if calibrating else self.cell.hand_positions)
 
 
 class SimulatedPerception:
@@ -308,61 +327,6 @@ class SimulatedDatabase:
 
     def list_objects(self) -> Pending:
         return self.cell.answer("database", "list", 0.02, self.database.ids)
-
-
-class SimulatedContact:
-    """ContactPort of the kinematic cell: the partner's script decides, once the arm stands still."""
-
-    def __init__(self, cell: SimulatedCell) -> None:
-        self.cell = cell
-        self._mode = ""
-        self._until = 0.0
-        self._due: float | None = None
-        self._event: ContactEvent | None = None
-        self._touched = False
-        self.armed_while_moving = False
-        self.armed_with_profile: list[str] = []
-        """profile in force at each arming, with ' fading' while another one's correction was not gone"""
-
-    def arm(self, mode: str, time_limit: float, settings: dict[str, Any]) -> Pending:
-        cell = self.cell
-        self._event, self._mode = None, ""
-
-        def apply() -> None:
-            partner = cell.partner
-            if mode not in ("contact", "load", "release"):
-                raise PortError(f"arm refused: mode is contact, load or release, got '{mode}'")
-            if mode != "contact" and not float(settings.get("mass", 0.0)) > 0.0:
-                raise PortError(f"arm refused: {mode} needs the mass of the object in kg")
-            if mode == "load" and not self._touched:
-                raise PortError(
-                    "arm refused: load is counted from the torque before the contact: arm for contact first"
-                )
-            after = {"contact": partner.touch_after, "load": partner.let_go_after, "release": partner.take_after}[mode]
-            now = cell.clock.now()
-            self._touched = self._touched or mode == "contact"
-            self._mode, self._until, self._due = mode, now + time_limit, None if after is None else now + after
-            self.armed_while_moving = self.armed_while_moving or not cell.arm.standing()
-            fading = now - cell.profile_since < cell.fade_time
-            self.armed_with_profile.append(cell.profile + (" fading" if fading else ""))
-
-        return cell.answer("contact", f"arm {mode}", 0.01, apply)
-
-    def disarm(self) -> None:
-        if self._mode:
-            self.event()
-            self.cell.note("disarm")
-            self._mode = ""
-
-    def event(self) -> ContactEvent | None:
-        self.cell.advance()
-        now = self.cell.clock.now()
-        happens = self._due is not None and self._due <= min(now, self._until)
-        if self._event is None and self._mode and happens and "contact" not in self.cell.faults.dead:
-            self._event = ContactEvent(
-                self._mode != "release", "simulated", 2.0, f"{self._mode} by the partner's script"
-            )
-        return self._event
 
 
 def simulated_context(clock: Clock, database: ObjectDatabase, config: Any) -> tuple[Any, SimulatedCell]:

@@ -117,18 +117,52 @@ class _Beat:
     def __init__(self, now: float, period: float) -> None:
         self.period, self.last, self.due = period, now, now
 
-    def done(self, now: float) -> None:
-        """A heartbeat has been sent. Beats that were missed, the process being suspended, are not
-        made up for.
+    def done(self, now: float, spared_until: float | None = None) -> None:
+        """A heartbeat has been sent, but to viewers that are spared until then. Beats that were
+        missed, the process being suspended, are not made up for.
         """
         self.last = now
         self.due += self.period
         if self.due < now:
             self.due = now + self.period
+        if spared_until is not None:
+            self.due = min(self.due, spared_until)
 
     def newcomer(self, now: float) -> None:
-        """A viewer has connected; a stream of new ones cannot hold the beat up for the others."""
-        self.due = min(now + WELCOME_DELAY, self.last + self.period + WELCOME_DELAY)
+        """A viewer has connected, and gets a beat when it is not spared any more. That which is due
+        for the others comes in time.
+        """
+        self.due = min(self.due, now + WELCOME_DELAY)
+
+
+class _Viewers:
+    """The connections of a publisher, and when each was seen first, in seconds of wall time."""
+
+    def __init__(self, publisher: rospy.Publisher) -> None:
+        self.publisher = publisher
+        self._since: dict[Any, float] = {}
+        self._lock = threading.Lock()
+
+    def look(self, now: float) -> None:
+        """Whoever is there now."""
+        with self._lock:
+            self._since = {c: self._since.get(c, now) for c in self.publisher.impl.connections}
+
+    def spared_until(self, now: float) -> float | None:
+        """When the next one of those that are spared now will not be; None: nobody is."""
+        self.look(now)
+        return min((s + WELCOME_DELAY for s in self._since.values() if now < s + WELCOME_DELAY), default=None)
+
+    def publish(self, message: Any, now: float) -> None:
+        """To all that are not spared."""
+        self.look(now)
+        for connection in [c for c, since in self._since.items() if now >= since + WELCOME_DELAY]:
+            topic = self.publisher.impl
+            topic.acquire()
+            try:
+                topic.publish(message, connection)
+            finally:
+                topic.release()
 
 
 class _Newcomers(rospy.SubscribeListener):
@@ -159,6 +193,7 @@ class IntrospectionServer:
     def __init__(self, server_name: str, state: smach.State, path: str) -> None:
         self._server_name, self._state, self._path = server_name, state, path
         self._watched: list[_Watched] = []
+        self._viewers: list[_Viewers] = []
         self._backlog: deque[tuple[SmachContainerStatus, dict]] = deque()
         self._dropped = 0
         self._changed = threading.Condition()
@@ -182,6 +217,7 @@ class IntrospectionServer:
         options = {"queue_size": queue_size, "subscriber_listener": _Newcomers(self)}
         self._status_pub = rospy.Publisher(self._server_name + STATUS_TOPIC, SmachContainerStatus, **options)
         self._structure_pub = rospy.Publisher(self._server_name + STRUCTURE_TOPIC, SmachContainerStructure, **options)
+        self._viewers = [_Viewers(self._structure_pub), _Viewers(self._status_pub)]
         self._running = True
         for watched in self._watched:
             watched.attach()
@@ -209,6 +245,7 @@ class IntrospectionServer:
                 drain(topic)
                 topic.unregister()
         self._init_sub = self._status_pub = self._structure_pub = self._thread = None
+        self._viewers = []
 
     def construct(self, server_name: str, state: smach.State, path: str) -> None:
         """Watch `state` under `path`, and the containers in it. `start` calls it if nobody has.
@@ -258,9 +295,8 @@ class IntrospectionServer:
                 items, dropped = list(self._backlog), self._dropped
                 self._backlog.clear()
                 self._dropped = 0
-                beat = time.monotonic() >= self._beat.due
-                if beat:
-                    self._beat.done(time.monotonic())
+                now = time.monotonic()
+                beat = self._is_due(now)
             if dropped:
                 smach.logwarn(f"introspection is behind the machine: {dropped} statuses dropped")
             for message, data in items:
@@ -268,21 +304,36 @@ class IntrospectionServer:
             if not running or rospy.is_shutdown():
                 return
             if beat:
-                self._publish_heartbeats()
+                self._publish_heartbeats(now)
+
+    def _is_due(self, now: float) -> bool:
+        if now < self._beat.due:
+            return False
+        spared = [viewers.spared_until(now) for viewers in self._viewers]
+        self._beat.done(now, min((s for s in spared if s is not None), default=None))
+        return True
 
     def _welcome(self) -> None:
         """Somebody has just subscribed: show everything when they are ready for it."""
         with self._changed:
-            self._beat.newcomer(time.monotonic())
+            now = time.monotonic()
+            for viewers in self._viewers:
+                viewers.look(now)
+            self._beat.newcomer(now)
             self._changed.notify()
 
-    def _publish_heartbeats(self) -> None:
+    def _publish_heartbeats(self, now: float) -> None:
         for watched in self._watched:
             try:
-                if self._structure_pub is not None and self._structure_pub.get_num_connections() > 0:
-                    self._structure_pub.publish(watched.structure())
-                if self._status_pub is not None and self._status_pub.get_num_connections() > 0:
-                    self._publish_status(*watched.snapshot("HEARTBEAT"))
+                for viewers in self._viewers:
+                    if viewers.publisher.get_num_connections() == 0:
+                        continue
+                    if viewers.publisher is self._structure_pub:
+                        viewers.publish(watched.structure(), now)
+                    else:
+                        message, data = watched.snapshot("HEARTBEAT")
+                        message.local_data = encode(data)
+                        viewers.publish(message, now)
             except Exception:
                 self._complain(f"heartbeat of {watched.path}")
 

@@ -28,20 +28,9 @@ from ih2_hand.errors import (
     HandInconsistentError,
     HandPortError,
     HandTimeoutError,
-    RefusedError,
 )
-from ih2_hand.progress import (
-    LONGEST_S,
-    CloseTask,
-    GraspTask,
-    OpenTask,
-    PreshapeTask,
-    Task,
-    Verdict,
-    refuse_calibration,
-    shown_empty,
-    shown_holding,
-)
+from ih2_hand.memory import HandMemory
+from ih2_hand.progress import LONGEST_S, Task, Verdict
 from ih2_hand.reasons import NEUTRAL, Reason, reason_of
 from ih2_hand.ros.diagnostics import Diagnostics
 from ih2_hand.ros.goals import GoalQueue
@@ -63,7 +52,7 @@ STOP_CHECKS = 5
 """Rounds in which the stop service looks whether the motors stand."""
 
 
-class HandNode:
+class HandNode(HandMemory):
     """Owns the driver; one thread polls, one works the goals off, one calibrates when asked.
 
     Parameters (private): `serial_port` (device, pty, socket:// URL, `param:NAME` to read it from
@@ -76,19 +65,17 @@ class HandNode:
         self._port_setting = parameters.read("~serial_port", str, "")
         self.rate = parameters.read("~rate", float, 30.0, 1.0, 200.0)
         self._dialect = parameters.read("~dialect", str, "legacy", among=DIALECTS)
-        self._is_current = not parameters.read("~use_tension", bool, False)
         self._read_timeout = parameters.read(
             "~read_timeout", float, WIRE.read_timeout_s, LEAST_READ_TIMEOUT_S, LARGEST_READ_TIMEOUT_S
         )
-        self._limit = parameters.read("~goal_time_limit", float, 10.0, SHORTEST_GOAL_S, LONGEST_S)
+        super().__init__(
+            is_current=not parameters.read("~use_tension", bool, False),
+            limit=parameters.read("~goal_time_limit", float, 10.0, SHORTEST_GOAL_S, LONGEST_S),
+        )
         self._preshapes = grasps.load_preshapes(parameters.read("~grasps_file", str, "") or None)
         self.driver: HandSerialDriver | None = None
         self.port = self._port_setting or "(the only serial device)"
-        self.calibrated = False
-        self.calibrating = False
-        self.holding = True
         self._event = (Reason.HAND_LINK_LOST, "not connected yet")
-        self._preshape: tuple[str, str] | None = None
         self._last_status = HandStatus()
         self._contradictions = 0
         self._lost_lock = threading.Lock()
@@ -171,7 +158,7 @@ class HandNode:
             read_timeout=self._read_timeout,
         )
         self.port = driver.port
-        self.calibrated, self.holding, self._preshape = False, True, None
+        self.forget()
         self._contradictions = 0
         self.driver = driver
         self.event(f"connected on {self.port}; the grip counts as holding until shown empty")
@@ -198,7 +185,7 @@ class HandNode:
                 return
             driver, self.driver = self.driver, None
         driver.close()
-        self.calibrated, self.holding, self._preshape = False, True, None
+        self.forget()
         self.event(f"connection lost: {error}", Reason.HAND_LINK_LOST)
 
     # -- polling ---------------------------------------------------------------------------------
@@ -247,11 +234,8 @@ class HandNode:
     def _publish(self, readings: list[dict[str, Any]], stamp: rospy.Time) -> None:
         status = HandStatus(motors=[motor_status(reading) for reading in readings])
         if readings and not self.calibrating:
-            if self.holding and shown_empty(status.motors):
-                self.holding = False
+            if self.look(status.motors):
                 self.event("the hand is open: it holds nothing")
-            elif not self.holding and shown_holding(status.motors):
-                self.holding = True
             self._joints.publish(joint_state(readings, stamp))
         status.header.stamp = stamp
         self._last_status = status
@@ -271,36 +255,11 @@ class HandNode:
 
     def make_task(self, name: str, goal: Any) -> Task:
         """Task for an accepted goal; RefusedError or HandError with the reason to refuse it."""
-        driver = self.connected_driver()
-        if self.calibrating:
-            raise HandCalibratingError("the hand calibrates; send the goal again afterwards")
-        if name == "hand_open":
-            task: Task = OpenTask(goal.speed)
-        elif name == "hand_close":
-            task = CloseTask(goal.speed)
-        elif name == "hand_preshape":
-            grasps.check_grasp(goal.mode, goal.level, driver.dialect)
-            task = PreshapeTask(goal.mode, goal.level, self._is_current, self._limit)
-        else:
-            if self._preshape is None:
-                raise RefusedError(
-                    "the hand is not preshaped: call hand_preshape first (hand_open, "
-                    "hand_close, calibration or reconnection undo it)",
-                    Reason.HAND_REFUSED,
-                )
-            task = GraspTask(grasps.CLOSING_MOTORS[self._preshape[0]], self._limit)
-        if name != "hand_preshape_close":
-            self._preshape = None
-        return task
+        return self.task_for(name, goal, self.connected_driver())
 
     def task_ended(self, task: Task, verdict: Verdict) -> None:
-        """Remember what a finished task tells about preshape and grip."""
-        if isinstance(task, PreshapeTask) and verdict.ok:
-            self._preshape = (task.mode, task.level)
-        if verdict.holding is not None:
-            self.holding = verdict.holding
-        elif isinstance(task, (CloseTask, GraspTask)) and not verdict.ok:
-            self.holding = True  # broken off on the way: something may be between the fingers
+        """Remember what a finished task tells about preshape and grip, and tell it."""
+        self.task_over(task, verdict)
         self._event = (verdict.reason, f"{task.name}: {verdict.text}")
         self._tell_again()  # who acts on the result finds the grip told with it
 
@@ -311,17 +270,14 @@ class HandNode:
 
     def _calibrate(self, words: list[str]) -> None:
         """Start a calibration, or say why not; runs in the goals' thread, so no goal can begin."""
-        busy = "a calibration runs" if self.calibrating else None
-        if self.goals.active:
-            busy = f"{self.goals.active} runs"
-        reason = refuse_calibration(words, calibrated=self.calibrated, holding=self.holding, busy=busy)
+        reason = self.why_not_calibrate(words, self.goals.active)
         driver = self.driver
         if reason is None and driver is None:
             reason = f"the hand is not connected: {self.message}"
         if reason:
             self.event(f"calibration refused: {reason}", Reason.HAND_REFUSED)
             return
-        self.calibrating, self.calibrated, self._preshape = True, False, None
+        self.calibration_began()
         self.event(f"calibration {words[0]} started", Reason.HAND_STARTED)
         threading.Thread(target=self._run_calibration, args=(driver, words[0]), name="calibration", daemon=True).start()
 

@@ -1,0 +1,66 @@
+"""Launched with a person who cannot begin, the launch ends with a sentence; nothing is started again for ever."""
+
+import signal
+import socket
+import subprocess
+
+import pytest
+from coglab_sim.person.participant import BEHAVIOURS
+from roslaunch.config import load_config_default
+from roslaunch.core import RLException
+
+LAUNCH = ("coglab_bringup", "coglab.launch")
+
+
+def resolve(*arguments):
+    """The launch file as plain roslaunch reads it."""
+    import rospkg
+
+    file = rospkg.RosPack().get_path(LAUNCH[0]) + "/launch/" + LAUNCH[1]
+    return load_config_default([(file, list(arguments))], None, verbose=False)
+
+
+@pytest.mark.parametrize(
+    "argument, said",
+    [
+        ("behaviour:=silly", "there is no 'silly'; there are: normal"),
+        ("profile:=angel", "there is no 'angel'; there are: drawn, patient"),
+        ("recorded_person:=stay", "there is no 'stay'; there are: wait, no_wait, leave"),
+        ("recording:=/nope.bag", "/nope.bag: no such file"),
+        ("recording:=/etc/passwd", "a recording is a .csv, .npz or .bag file"),
+    ],
+)
+def test_refused_before_anything_starts(argument, said, capfd):
+    with pytest.raises(RLException):
+        resolve(argument)
+    assert said in capfd.readouterr().err
+
+
+def test_a_recording_that_cannot_be_read(tmp_path, capfd):
+    (tmp_path / "a b.csv").write_text("t,x,y\n0,1,2\n")
+    with pytest.raises(RLException):
+        resolve(f"recording:={tmp_path}/a b.csv")
+    assert "the header must name t,x,y,z" in capfd.readouterr().err
+
+
+@pytest.mark.parametrize("behaviour", [BEHAVIOURS[0], BEHAVIOURS[-1]])
+def test_what_can_be_used_is_taken(behaviour, tmp_path):
+    (tmp_path / "a b.csv").write_text("t,x,y,z\n0,1,2,3\n1,1,2,3\n")
+    config = resolve(f"behaviour:={behaviour}", f"recording:={tmp_path}/a b.csv")
+    assert config.params["/coglab_sim/virtual_human/behaviour"].value == behaviour
+    assert config.params["/coglab_sim/virtual_human/settings"].value == "usable"
+
+
+def test_plain_roslaunch_ends():
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        port = str(free.getsockname()[1])
+    command = ["roslaunch", "-p", port, *LAUNCH, "behaviour:=silly"]
+    with subprocess.Popen(command, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True) as process:
+        try:
+            _, said = process.communicate(timeout=60)
+        except subprocess.TimeoutExpired:
+            process.send_signal(signal.SIGINT)  # it ends what it has started
+            process.communicate()
+            raise
+    assert process.returncode == 1 and "there is no 'silly'" in said

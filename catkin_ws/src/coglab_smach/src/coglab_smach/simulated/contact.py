@@ -1,0 +1,85 @@
+"""The contact trigger of the kinematic cell."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from coglab_msgs.msg import ReasonCode
+
+from coglab_smach.ports.interfaces import ContactEvent
+from coglab_smach.ports.pending import Pending, PortError
+from coglab_smach.simulated.cell import SimulatedCell
+
+TOUCH = 1.0
+"""N, a contact"""
+EVENTS = {
+    "contact": ReasonCode.CONTACT_FOUND,
+    "load": ReasonCode.LOAD_CARRIED,
+    "release": ReasonCode.LOAD_RELEASED,
+}
+
+
+class SimulatedContact:
+    """ContactPort of the kinematic cell: the partner's script decides, once the arm stands still."""
+
+    def __init__(self, cell: SimulatedCell) -> None:
+        self.cell = cell
+        self._mode = ""
+        self._until = 0.0
+        self._due: float | None = None
+        self._event: ContactEvent | None = None
+        self._touched = False
+        self._lifted_before = self._needed = 0.0
+        self.armed_while_moving = False
+        self.armed_with_profile: list[str] = []
+        """profile in force at each arming, with ' fading' while another one's correction was not gone"""
+
+    def arm(self, mode: str, time_limit: float, settings: dict[str, Any]) -> Pending:
+        cell = self.cell
+        self._event, self._mode = None, ""
+
+        def apply() -> None:
+            partner = cell.partner
+            mass, refused = float(settings.get("mass", 0.0)), ""
+            if mode not in ("contact", "load", "release"):
+                refused = f"mode is contact, load or release, got '{mode}'"
+            elif not time_limit > 0.0:
+                refused = f"timeout must be a positive time in s, got {time_limit}"
+            elif mode != "contact" and not mass > 0.0:
+                refused = f"{mode} needs the mass of the object in kg"
+            elif mode == "load" and not self._touched:
+                refused = "load is counted from the torque before the contact: arm for contact first"
+            if refused:
+                raise PortError(f"arm refused: {refused}", code=ReasonCode.INVALID_ARGUMENT)
+            if mode != "load":  # load counts from the torque before the contact
+                self._lifted_before = cell.lifted
+            self._needed = TOUCH if mode == "contact" else float(settings.get("load_share", 0.5)) * mass * 9.81
+            after = {"contact": partner.touch_after, "load": partner.let_go_after, "release": partner.take_after}[mode]
+            now = cell.clock.now()
+            self._touched = self._touched or mode == "contact"
+            self._mode, self._until, self._due = mode, now + time_limit, None if after is None else now + after
+            self.armed_while_moving = self.armed_while_moving or not cell.arm.standing()
+            fading = now - cell.profile_since < cell.fade_time
+            self.armed_with_profile.append(cell.profile + (" fading" if fading else ""))
+
+        return cell.answer("contact", f"arm {mode}", 0.01, apply)
+
+    def disarm(self) -> None:
+        if self._mode:
+            self.event()
+            self.cell.note("disarm")
+            self._mode = ""
+
+    def event(self) -> ContactEvent | None:
+        self.cell.advance()
+        now = self.cell.clock.now()
+        happens = self._due is not None and self._due <= min(now, self._until)
+        happens = happens or (now <= self._until and self._pushed())
+        if self._event is None and self._mode and happens and "contact" not in self.cell.faults.dead:
+            why = f"{self._mode} by the partner's script"
+            self._event = ContactEvent(self._mode != "release", "simulated", 2.0, why, code=EVENTS[self._mode])
+        return self._event
+
+    def _pushed(self) -> bool:
+        lifted = self.cell.lifted - self._lifted_before
+        return {"contact": abs(lifted), "load": -lifted, "release": lifted}.get(self._mode, 0.0) >= self._needed > 0.0
