@@ -86,6 +86,25 @@ def test_the_steps_of_the_cycle_are_those_of_the_code():
     assert sorted(number for number, _ in steps) == [number for number, _ in page]
 
 
+def test_the_drawing_and_the_headers_number_the_steps_as_the_page_does():
+    controllers = SOURCES / "coglab_controllers"
+    drawing = next(TOP.glob("docs/**/cycle.dot")).read_text(encoding="utf-8")
+    headers = "".join(
+        path.read_text(encoding="utf-8") for path in (controllers / "include/coglab_controllers/manager").glob("*.hpp")
+    )
+    cited = {
+        "computeReference": r"Step (\d): computes the reference",
+        "resolve": r"Step (\d): from the references",
+        "Fill RobotStates": r"Step (\d): measurement to robot states",
+        "Guard": r"step (\d) did|limits of step (\d)",
+    }
+    for title, phrase in cited.items():
+        number = re.search(rf"^(\d)\. \*\*`?{title}", PAGE, flags=re.MULTILINE).group(1)
+        assert re.search(rf'label="{number}  {title}', drawing, flags=re.IGNORECASE), title
+        told = [next(filter(None, match.groups())) for match in re.finditer(phrase, headers)]
+        assert told and set(told) == {number}, (title, told)
+
+
 def code_files() -> list[Path]:
     return [
         path

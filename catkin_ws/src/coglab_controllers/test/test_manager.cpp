@@ -118,10 +118,13 @@ TEST(Manager, AnArmThatFallsSilentIsKnownWithinASecond) {
   robot.loadBoth();
   robot.see("human_hand", kGoal);
   ASSERT_TRUE(VirtualRobot::ok(robot.dmp().execute(robot.reach())));
-  for (int i = 0; i < 50; ++i) robot.tick();
+  for (int i = 0; i < 50; ++i) {
+    robot.see("human_hand", kGoal);
+    robot.tick();
+  }
   ASSERT_EQ(robot.state(), MotionState::Running) << robot.reason();
   double silent = 0.0, zero = 0.0;
-  while (robot.state() == MotionState::Running && silent < 5.0) {
+  while (robot.state() != MotionState::Aborted && silent < 5.0) {
     silent += 0.005;
     robot.manager->cycle().idle(robot.now_ns + std::llround(1e9 * silent));
     if (zero == 0.0 && robot.manager->report().velocity.isZero()) zero = silent;

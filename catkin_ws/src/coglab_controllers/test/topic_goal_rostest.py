@@ -334,7 +334,7 @@ class TopicGoal(unittest.TestCase):
         )
 
     def test_9_a_frozen_master_ends_no_reach_and_keeps_no_node_from_ending(self) -> None:
-        """Of the topic, and of a frame of tf2, whose goals age: seen they are followed, unseen they are lost in time."""
+        """Of the topic, and of a frame of tf2, whose goals age: seen they are followed, unseen they are lost."""
         robot, pids = self.robot, robot_processes()
         self.assertTrue(pids)
         robot.switch("ptp")  # and back: nothing is left of the motion of before

@@ -186,9 +186,10 @@ class CellNode(unittest.TestCase):
 
     def test_9_sends_from_the_source_port_of_its_parameter_or_ends(self) -> None:
         """For clients that know the controller by its port. A port that is taken is not replaced by another."""
-        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as client, socket.socket(
-            socket.AF_INET, socket.SOCK_DGRAM
-        ) as taken:
+        with (
+            socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as client,
+            socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as taken,
+        ):
             for end in (client, taken):
                 end.bind(("127.0.0.1", 0))
             client.settimeout(10.0)
