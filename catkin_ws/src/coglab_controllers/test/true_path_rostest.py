@@ -165,7 +165,7 @@ class TruePath(unittest.TestCase):
             8.0,
             "the reason with the publisher's name",
         )
-        helps = "rosservice call " + rospy.resolve_name("controller_manager/switch_controller") + ' "\'\'"'
+        helps = "rosservice call " + rospy.resolve_name("controller_manager/switch_controller") + " \"''\""
         self.assertTrue([line for line in told if helps in line], told)
         answer = robot.manager("switch_controller", "")
         self.assertTrue(answer.success, answer.message)
