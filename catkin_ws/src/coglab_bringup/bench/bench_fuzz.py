@@ -42,8 +42,12 @@ def main() -> int:
     rows = [
         (f"nodes that ended: {', '.join(found['ended']) or 'none'}", len(found["ended"]), "1", 0),
         (f"topics that fell silent: {', '.join(found['silent']) or 'none'}", len(found["silent"]), "1", 0),
-        (f"requests without an answer within 20 s (late, s: {found['late']}; lost: {found['lost']})",
-         found["unanswered"], "1", 0),
+        (
+            f"requests without an answer within 20 s (late, s: {found['late']}; lost: {found['lost']})",
+            found["unanswered"],
+            "1",
+            0,
+        ),
         ("the arm moved by", 1000.0 * found["moved"], "mrad", 10.0),
     ]
     told = [

@@ -62,7 +62,9 @@ def test_every_line_of_a_running_system_stands_in_a_section_that_is_read_aloud()
     text = (Path(__file__).parent / "test_printed_lines_long.py").read_text(encoding="utf-8")
     read = set(re.findall(r'"([^"\n]+)"', text))
     sections = {(line.page, line.section) for line in LINES if where(line) == "system"} - {("docs/how_to.md", "How to")}
-    assert [section for _, section in sorted(sections) if not any(section.startswith(r) for r in read if len(r) > 2)] == []
+    assert [
+        section for _, section in sorted(sections) if not any(section.startswith(r) for r in read if len(r) > 2)
+    ] == []
 
 
 def test_what_needs_hardware_has_a_stand_in_with_a_reason():

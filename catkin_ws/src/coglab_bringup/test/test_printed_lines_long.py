@@ -20,9 +20,7 @@ from printed_lines import TOP, printed_block, printed_files, printed_lines
 
 pytestmark = pytest.mark.skipif(not os.environ.get("COGLAB_LONG"), reason="campaign: ./coglab test --long")
 
-STREAMS = re.compile(
-    r"rostopic (echo (?!.*-n1)|hz)|rostopic pub .*-r |rosrun tf tf_echo|rosrun ih2_hand hand_trace.py"
-)
+STREAMS = re.compile(r"rostopic (echo (?!.*-n1)|hz)|rostopic pub .*-r |rosrun tf tf_echo|rosrun ih2_hand hand_trace.py")
 STAND_INS = {
     # printed line: (what takes its place, why)
     "roslaunch ih2_hand hand.launch sim:=false serial_port:=/dev/ttyUSB0": (

@@ -124,7 +124,9 @@ class Generator:
             setattr(message, name, values)
             for i in range(len(values)):
                 self._set(values, i, element, leaves, fine)
-            if values and not fine and element in ("float32", "float64"):  # no array is a command of the joints by chance
+            if (
+                values and not fine and element in ("float32", "float64")
+            ):  # no array is a command of the joints by chance
                 values[self.random.randrange(len(values))] = self.random.choice(EXCLUDED[:3])
 
     def _set(self, holder: Any, name: Any, of: str, leaves: list, fine: bool) -> None:
