@@ -2,10 +2,10 @@
 """Figure `fuzz`: the whole system under 1e5 random messages on every topic and service of every node of ours.
 
 The generator (coglab_bringup/ros_fuzz.py says what it sends) makes each message malformed by design: at least one value
-that its definition excludes; or, in every third one with a time, an odd stamp alone. Messages without any field that could be so (`Trigger`, integers alone) are valid by
-nature and counted apart. Ended: a node whose process is another one, or does not answer, afterwards. Silent: a topic on
-which a node of ours spoke within 1 s before, and within 1.5 s afterwards did not. Moved: the farthest that a joint of
-the arm, in command mode, came from where it was.
+that its definition excludes; or, in every third one with a time, an odd stamp alone. Messages without any field that
+could be so (`Trigger`, integers alone) are valid by nature and counted apart. Ended: a node whose process is another
+one, or does not answer, afterwards. Silent: a topic on which a node of ours spoke within 1 s before, and within 1.5 s
+afterwards did not. Moved: the farthest that a joint of the arm, in command mode, came from where it was.
 """
 
 from __future__ import annotations
@@ -54,36 +54,14 @@ def main() -> int:
         *((f"messages sent, {kind}, to {what}", count) for kind, count in sent.items()),
         (f"malformed requests answered with success: {json.dumps(found['accepted'])}", sum(found["accepted"].values())),
     ]
-    table = [
-        dict(
-            bench="fuzz",
-            figure=figure,
-            value=value,
-            unit=unit,
-            goal=f"<= {most:g}",
-            peer=None,
-            peer_value=None,
-            ok=value <= most,
-        )
-        for figure, value, unit, most in rows
-    ]
+
+    def one(figure: str, value: float, unit: str, goal: str, ok: bool) -> dict:
+        return dict(bench="fuzz", figure=figure, value=value, unit=unit, goal=goal, peer=None, peer_value=None, ok=ok)
+
     total = sum(sent.values())
-    table.append(
-        dict(
-            bench="fuzz",
-            figure="messages sent in all",
-            value=total,
-            unit="1",
-            goal=f">= {LEAST:g}",
-            peer=None,
-            peer_value=None,
-            ok=total >= LEAST,
-        )
-    )
-    table += [
-        dict(bench="fuzz", figure=figure, value=value, unit="1", goal="reported", peer=None, peer_value=None, ok=True)
-        for figure, value in told
-    ]
+    table = [one(figure, value, unit, f"<= {most:g}", value <= most) for figure, value, unit, most in rows]
+    table.append(one("messages sent in all", total, "1", f">= {LEAST:g}", total >= LEAST))
+    table += [one(figure, value, "1", "reported", True) for figure, value in told]
     print(json.dumps(table, indent=1))
     return 0
 

@@ -66,10 +66,14 @@ class System:
                 stderr=log,
                 stdin=subprocess.DEVNULL,
             )
-        if ready:
-            self.until(ready, 120.0)
-        else:
-            self.wait_for(READY, 120.0)
+        try:
+            if ready:
+                self.until(ready, 120.0)
+            else:
+                self.wait_for(READY, 120.0)
+        except BaseException:
+            self.end()
+            raise
 
     def _with_port(self, line: str, arguments: tuple[str, ...]) -> list[str]:
         words = line.replace("./coglab", f"{TOP}/coglab").split()

@@ -5,9 +5,9 @@ A trial in virtual time (KRC stand-in, bridge, controller manager and hand emula
 seed and the tracker with its noise, as by default) is struck at a seeded moment of every machine in turn
 (initialisation, both exchanges, take, put, recovery) by a failure, a time limit or a preemption. It counts as moved if
 the true speed of any joint of the simulated arm exceeds 0.02 rad/s between the moment at which the next state begins,
-or at which the machine has ended, and the next motion that is asked for. A trial whose machine was over before its moment had come is drawn again, also one in which the exchange
-failed that was to bring the object before; 200 that were struck make the figure. Those that were stuck before they were
-struck are told.
+or at which the machine has ended, and the next motion that is asked for. A trial whose machine was over before its
+moment had come is drawn again, also one in which the exchange failed that was to bring the object before; 200 that were
+struck make the figure. Those that were stuck before they were struck are told.
 """
 
 import json

@@ -86,7 +86,8 @@ def unfinished(kind: str, error: BaseException) -> dict:
 PEOPLE = {
     "patient": (
         ("profile:=patient", "perfect_perception:=true"),
-        "a patient person, who waits for the robot and is seen without noise or delay",
+        "a patient person, who waits for the robot and is seen without noise or delay; people as they are: "
+        "./coglab demo --person drawn",
     ),
     "drawn": ((), "a person drawn by the seed, as people are, seen by the tracker as it is"),
 }
@@ -106,8 +107,7 @@ def main(arguments: list[str]) -> int:
     out: Path = options.out.absolute()
     out.mkdir(parents=True, exist_ok=True)
     person, words = PEOPLE[options.person]
-    other = "" if options.person == "drawn" else "; people as they are: ./coglab demo --person drawn"
-    print(f"[coglab] this demo shows {words}{other}", flush=True)
+    print(f"[coglab] this demo shows {words}", flush=True)
     port = free_port()
     environment = run_environment(port, out / "ros_home")
     os.environ.update(environment)
@@ -146,15 +146,20 @@ def main(arguments: list[str]) -> int:
     finally:
         (out / "result.json").write_text(json.dumps(result, indent=1) + "\n")
         system.stop()
-    good = sum(row["outcome"] == "success" for row in result["handovers"])
-    for row in result["handovers"]:
+    return summarise(top, out, result["handovers"], time.monotonic() - began)
+
+
+def summarise(top: Path, out: Path, handovers: list[dict], took: float) -> int:
+    """Prints how each handover ended; exit status 0 if all did well, and what they took (s) is remembered then."""
+    good = sum(row["outcome"] == "success" for row in handovers)
+    for row in handovers:
         print(f"{row['kind']}: {row['outcome']}" + (f" in {row['duration_s']:.1f} s" if "duration_s" in row else ""))
     print(
         f"{good} of {len(KINDS)} handovers succeeded; {out}/result.json and trial.png, log: {out}/roslaunch.log",
         flush=True,
     )
     if good == len(KINDS):  # what was interrupted says nothing about how long it takes
-        record_times(top, "demo", time.monotonic() - began)
+        record_times(top, "demo", took)
     return 0 if good == len(KINDS) else 1
 
 

@@ -228,7 +228,11 @@ class VirtualContact:
         return Ready()
 
     def disarm(self) -> None:
-        self.node.ask(lambda: Ready(self.detector.disarm()))
+        def act() -> Pending:
+            self.detector.disarm()
+            return Ready()
+
+        self.node.ask(act)
 
     def event(self) -> ContactEvent | None:
         return self._event

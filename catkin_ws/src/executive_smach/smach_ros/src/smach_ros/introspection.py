@@ -118,9 +118,7 @@ class _Beat:
         self.period, self.last, self.due = period, now, now
 
     def done(self, now: float, spared_until: float | None = None) -> None:
-        """A heartbeat has been sent, but to viewers that are spared until then. Beats that were
-        missed, the process being suspended, are not made up for.
-        """
+        """A beat was sent, but to who is spared until then. Missed ones are not made up for."""
         self.last = now
         self.due += self.period
         if self.due < now:
@@ -129,9 +127,7 @@ class _Beat:
             self.due = min(self.due, spared_until)
 
     def newcomer(self, now: float) -> None:
-        """A viewer has connected, and gets a beat when it is not spared any more. That which is due
-        for the others comes in time.
-        """
+        """A viewer has connected, and gets a beat when it is not spared any more."""
         self.due = min(self.due, now + WELCOME_DELAY)
 
 

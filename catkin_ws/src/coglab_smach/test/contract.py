@@ -1,0 +1,62 @@
+"""Where a contract of a port is checked, and with what words."""
+
+from collections.abc import Callable
+from contextlib import AbstractContextManager, nullcontext
+from dataclasses import dataclass, field
+from typing import Any
+
+from coglab_smach.ports.pending import PortError
+
+
+@dataclass
+class Place:
+    """Where a suite runs."""
+
+    port: Any
+    now: Callable[[], float]
+    sleep: Callable[[float], None]
+    freeze: Callable[[], None]
+    """the node behind the port stops as it stands"""
+    thaw: Callable[[], None]
+    library: str = "library.xml"
+    push: Callable[[float], None] = lambda force: None
+    """somebody lifts the hand with so many N from now on, or presses it down if negative; 0 lets go"""
+    arm_rests: AbstractContextManager = field(default_factory=nullcontext)
+    """within it nobody else moves the arm"""
+
+
+class Contract:
+    """Methods named test_* run in the order in which they are written."""
+
+    def __init__(self, place: Place) -> None:
+        self.place, self.port = place, place.port
+
+    def begin(self) -> None:
+        """Before each test."""
+
+    def until(self, condition, limit=5.0, what="it"):
+        end = self.place.now() + limit
+        while not condition():
+            assert self.place.now() < end, f"{what} did not happen within {limit} s"
+            self.place.sleep(0.01)
+
+    def settle(self, pending, limit=5.0):
+        """The value of a call, which has to come in time."""
+        self.until(pending.done, limit, "the answer")
+        return pending.result()
+
+    def refused(self, pending, *codes, limit=5.0):
+        """The error of a call that must not succeed, with one of these codes."""
+        try:
+            value = self.settle(pending, limit)
+        except PortError as error:
+            assert error.sentence, "a refusal says why"
+            assert not codes or error.code in codes, f"code {error.code}, expected one of {codes}: {error.sentence}"
+            return error
+        raise AssertionError(f"it succeeded with {value!r}")
+
+    def stays(self, condition, duration):
+        end = self.place.now() + duration
+        while self.place.now() < end:
+            assert condition()
+            self.place.sleep(0.01)
