@@ -130,7 +130,7 @@ NAMED = re.compile(r"D4\.10|\bpaper\b")
 NOT_HERE = re.compile(
     r"\b(?:the|this|our|of) (?:specification|design page|brief|audit)\b"
     r"|\bfacts(?: page|/)|\b(?:protocol|of the) facts\b"
-    r"|\bthe issue (?:asks|says|wants|names)\b|\b[Ii]ssues? #?\d|\bgoal \d+\.\d+\b",
+    r"|\bthe issue (?:asks|says|wants|names)\b|\b[Ii]ssues? #?\d",
 )
 
 

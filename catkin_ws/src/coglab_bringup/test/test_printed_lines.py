@@ -13,8 +13,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from coglab_bringup.arguments import judge
 import test_printed_lines_long
+from coglab_bringup.arguments import judge
 from printed_lines import TOP, printed_block, printed_files, printed_lines
 
 # Where a line runs: the first rule whose page and pattern fit. "entry": the argument check here and the tests of the

@@ -67,8 +67,8 @@ def misses(outcomes: list[Outcome]) -> int:
 
 
 def priority_rows(ours: list[Outcome], peers: dict[str, list[Outcome]]) -> list[Row]:
-    """Ours beside each peer, on an ideal robot: over all reaches, also those with a joint at its stop, which are counted
-    beside."""
+    """Ours beside each peer, on an ideal robot: over all reaches, also those with a joint at its stop, which are
+    counted beside."""
     rows = []
     for name, theirs in peers.items():
         what = f"rotation shrunk first, ideal arm, {REACHES} reaches"

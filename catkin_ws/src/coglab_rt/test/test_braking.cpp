@@ -120,8 +120,8 @@ TEST(Braking, TheReserveCoversWhateverTheBudgetLoses) {
       double q = after.position, step = after.position - before.position;
       double highest = q, lowest = q;
       while (answers * dt < stop.totalTime() + dt || in_a_row > 0) {
-        const bool lose = in_a_row < B::kInARow && lost < B::kPerWindow &&
-                          0.5 * (1.0 + part(random)) <= chance;
+        const bool lose =
+            in_a_row < B::kInARow && lost < B::kPerWindow && 0.5 * (1.0 + part(random)) <= chance;
         if (!lose) {
           step = advance(after, stop, (answers + 1) * dt).position -
                  advance(after, stop, answers * dt).position;

@@ -31,8 +31,8 @@ void approaches(double period, unsigned seeds, bool clean_first) {
         }
       }
     }
-    std::printf("%s %g %g %.4f %.6g %.6g %u %u\n", clean_first ? "later" : "approach", period, share,
-                1e3 * std::max(0.0, beyond), speed, acceleration, crossed, failed);
+    std::printf("%s %g %g %.4f %.6g %.6g %u %u\n", clean_first ? "later" : "approach", period,
+                share, 1e3 * std::max(0.0, beyond), speed, acceleration, crossed, failed);
     std::fflush(stdout);
   }
 }

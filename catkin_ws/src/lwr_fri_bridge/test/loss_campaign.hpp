@@ -120,7 +120,7 @@ class LossRun {
     for (int i = 0; i < static_cast<int>(1.8 / case_.period); ++i) {
       const int since = i - begin;
       const bool lost = since >= 0 && since < 23 && since % 6 != 5;
-      cycle(towards, !lost              ? LossPattern::Lost::Nothing
+      cycle(towards, !lost            ? LossPattern::Lost::Nothing
                      : since % 2 == 0 ? LossPattern::Lost::Measurement
                                       : LossPattern::Lost::Answer);
     }

@@ -71,9 +71,9 @@ constexpr double kLossRounding = 0.5e-6;
 constexpr double kWireRounding = LossBudget::kPerWindow * kLossRounding;
 
 /// Bounds target velocities so that the interpolator's next step leaves every joint able to stop
-/// inside its position limits whatever is lost within the LossBudget. A joint for which even braking
-/// at once leaves that open, such as one that is outside already, brakes at once or turns away from
-/// the limit.
+/// inside its position limits whatever is lost within the LossBudget. A joint for which even
+/// braking at once leaves that open, such as one that is outside already, brakes at once or turns
+/// away from the limit.
 class BrakingGuard {
  public:
   /// `margin` (rad) is kept from both ends of every range; it must leave room between them.

@@ -23,7 +23,7 @@ namespace {
 constexpr int kSpinnerThreads =
     4;  // a start may occupy one for seconds; hold and stop must get through
 constexpr std::int64_t kLatencyPeriodNs = 50'000'000;  // between two fri_latency
-constexpr double kSilenceWarning = 5.0;  // s between warnings about silence
+constexpr double kSilenceWarning = 5.0;                // s between warnings about silence
 
 void copyJoints(const Vector7& joints, std::vector<double>& values) {
   values.assign(joints.data(), joints.data() + joints.size());

@@ -112,10 +112,10 @@ class Modify {
   std::uint32_t owner_ = 0;
 };
 
-/// N numbers that may be written, and none beside them, in every build. For reading it is a constant
-/// Eigen vector. Written is by assignment, `+= -= *= /=`, numbers and parts of it; a size that can
-/// be compared by the compiler must fit, all others throw WrongSize. What Eigen offers besides for
-/// writing (`<<`, coeffRef, blocks, resize) does not compile or does nothing.
+/// N numbers that may be written, and none beside them, in every build. For reading it is a
+/// constant Eigen vector. Written is by assignment, `+= -= *= /=`, numbers and parts of it; a size
+/// that can be compared by the compiler must fit, all others throw WrongSize. What Eigen offers
+/// besides for writing (`<<`, coeffRef, blocks, resize) does not compile or does nothing.
 template <int N = AnySize>
 class Numbers : public Eigen::Map<const Eigen::Matrix<double, N, 1>> {
   using Base = Eigen::Map<const Eigen::Matrix<double, N, 1>>;
