@@ -45,7 +45,7 @@ export function table(header, rows, caption) {
   return h('table', {}, caption ? h('caption', { hidden: true }, caption) : null, h('thead', {}, head), h('tbody', {}, body));
 }
 
-const MOST = 2000; // ms, the longest rest after a picture
+const MOST = 10000; // ms, the longest rest after a picture
 const asked = new Set(); // drawings that are to be done
 let armed = false;
 let restUntil = 0;
