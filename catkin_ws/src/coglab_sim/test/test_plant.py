@@ -255,6 +255,21 @@ def test_the_same_run_gives_the_same_bytes():
     assert run_bytes() == run_bytes()
 
 
+@pytest.mark.parametrize(
+    "far, speed", [([1.4, 0, 0], [0, 0, 0]), ([50.0, 0, 0], [90.0, 0, 0]), ([0, 0, 0], [0, 90.0, 0])]
+)
+def test_a_hand_that_is_asked_for_more_than_an_arm_can_does_not_end_the_simulation(far, speed):
+    plant = _plant.Plant(URDF, HOME, BOX, seed=3)
+    here = np.array([1.0, 0.2, 0.4])
+    plant.set_person(here)
+    for step in range(3000):
+        if step % 30 == 0:
+            plant.set_person(here + (-1.0) ** (step // 600) * np.array(far, dtype=float), velocity=speed)
+        run(plant, 0.001)
+    plant.set_person(here)
+    run(plant, 0.001)
+
+
 def test_divergence_stops_with_seed_and_time():
     plant = _plant.Plant(URDF, HOME, BOX, seed=42)
     with pytest.raises(RuntimeError, match=r"diverged at 0\.\d+ s with seed 42: .*"):

@@ -13,7 +13,15 @@ constexpr double kShareTime = 0.02;  // s over which load shares and the squeeze
 constexpr double kPersonAge = 0.05;  // s for which the hand goes on as it went after its message
 constexpr double kGripBegins = 0.05, kGripEnds = 0.02;
 constexpr double kSafeGrip = 1.5;  // friction over weight at which a hand that was given it holds
+// What an arm follows: m that a person's hand lags at most behind where it is wanted, m/s and rad/s
+// of a person's fastest reach and turn. Messages may ask for more; no arm does it.
+constexpr double kLag = 0.15, kFastestReach = 5.0, kFastestTurn = 20.0;
 constexpr double kInside = 0.003;  // m by which a placed object may stand in something
+
+Vector3d clipped(const Vector3d& v, double largest) {
+  const double norm = v.norm();
+  return norm > largest ? Vector3d(v * (largest / norm)) : v;
+}
 
 }  // namespace
 
@@ -55,6 +63,8 @@ void Plant::put(int position, int velocity, const Pose& pose, const Twist& twist
 
 void Plant::setPerson(const PersonInput& person) {
   person_ = person;
+  person_.twist.linear = clipped(person.twist.linear, kFastestReach);
+  person_.twist.angular = clipped(person.twist.angular, kFastestTurn);
   person_age_ = 0.0;
   if (person_present_) return;
   person_present_ = true;
@@ -154,7 +164,9 @@ void Plant::applyPerson(double dt) {
   const FreeBody hand = freeBody(model_->person, model_->person_velocity);
   const FreeBody held = freeBody(model_->object, model_->object_velocity);
   const Pose hand_frame = personHand();
-  Wrench hold = arm_of_person_.evaluate(person_.hand, person_.twist, hand, config_.person.arm, 1.0);
+  Pose wanted = person_.hand;
+  wanted.position = hand_frame.position + clipped(wanted.position - hand_frame.position, kLag);
+  Wrench hold = arm_of_person_.evaluate(wanted, person_.twist, hand, config_.person.arm, 1.0);
   arm_of_person_.engageAt(Pose{});  // an arm that was pushed aside comes back
 
   const double friction = 2.0 * object.friction * person_.grip * person_.grip_force;
