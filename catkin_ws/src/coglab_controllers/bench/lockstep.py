@@ -58,7 +58,7 @@ def ready(posture: np.ndarray, manager: str = ""):
     `manager`: YAML text of the controller manager's parameters.
     """
     cell = {"krc/period": PERIOD, "seed": 1, "home": [float(q) for q in posture]}
-    robot = _virtual.VirtualRobot(str(URDF), str(LIMITS), cell, manager)
+    robot = _virtual.LockstepRobot(str(URDF), str(LIMITS), cell, manager)
     must(robot.load_controller("dmp", "coglab/DmpController"))
     must(robot.load_dmps(str(PRIMITIVES)))
     wait(robot, lambda: robot.cell.quality == 3, START_LIMIT)

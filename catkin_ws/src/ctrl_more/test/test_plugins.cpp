@@ -103,7 +103,7 @@ TEST_F(Plugins, BadLibrariesAreRefusedInWords) {
   expectRefused("loadControllers: [A]\nA: {libPath: libwrong_type.so}\n",
                 {"'Registered'", "'Described'"});
   expectRefused("loadControllers: [A]\nA: {libPath: libother_abi.so}\n",
-                {"'OtherAbi' compiled for another ctrl_more", "interface 4", "interface 3",
+                {"'OtherAbi' compiled for another ctrl_more", "interface 5", "interface 4",
                  "build it again"});
   expectRefused("loadControllers: [A]\nA: {libPath: libgood.so, type: God}\n",
                 {"no controller of type 'God'", "did you mean 'Good'"});
