@@ -166,6 +166,8 @@ class TruePath(unittest.TestCase):
             "the reason with the publisher's name",
         )
         helps = "rosservice call " + rospy.resolve_name("controller_manager/switch_controller") + " \"''\""
+        if rospy.get_param("~split", False):  # the bridge knows only that another node moves the arm
+            helps = "/controller_manager moves the arm; end that one's motion first"
         self.assertTrue([line for line in told if helps in line], told)
         answer = robot.manager("switch_controller", "")
         self.assertTrue(answer.success, answer.message)
