@@ -341,7 +341,7 @@ class TopicGoal(unittest.TestCase):
         robot.go(HOME)  # far from the goal: a reach that has nearly arrived is finished without sights of it
         robot.switch("dmp")
         robot.see_hand(GOAL)
-        wait_until(lambda: robot.execute(dmp_ratio=6.0).success, 5.0, "execute_dmp of a frame")
+        wait_until(lambda: robot.execute(dmp_ratio=20.0).success, 5.0, "execute_dmp of a frame")
         wait_until(lambda: robot.feedback.state == "running", 5.0, "running")
         with frozen_master():
             rospy.sleep(2.0)  # longer than goal_max_age and goal_lost_time together
