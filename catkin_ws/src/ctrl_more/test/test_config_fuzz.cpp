@@ -2,10 +2,14 @@
 // controller that runs keeps running.
 #include <cctype>
 #include <cstdio>
+#include <cstdlib>
 #include <cstring>
+#include <filesystem>
 #include <fstream>
 #include <random>
 #include <utility>
+
+#include <unistd.h>
 
 #include "test_support.hpp"
 
@@ -123,7 +127,11 @@ TEST(ConfigFuzz, ListAndGainAndConfigurationFilesNeverBreakWhatRuns) {
   Rig rig(0.0, false, false);
   rig.logger.setLevel(LogLevel::Error);
   rig.add(configurable(), "running");
-  const std::string folder = ::testing::TempDir(), file = folder + "/ctrl_more_fuzz.yaml";
+  // In memory where that can be written: a hundred thousand files are hard on a disk.
+  std::string folder = access("/dev/shm", W_OK) == 0 ? "/dev/shm" : ::testing::TempDir();
+  folder += "/ctrl_more_fuzz_XXXXXX";
+  ASSERT_NE(mkdtemp(&folder[0]), nullptr) << folder;
+  const std::string file = folder + "/fuzz.yaml";
   std::ofstream(folder + "/good.yaml") << "type: Good\n";
   long taken[kWays] = {}, refused[kWays] = {};
   std::mt19937 random(20180521);
@@ -152,6 +160,7 @@ TEST(ConfigFuzz, ListAndGainAndConfigurationFilesNeverBreakWhatRuns) {
   std::printf(
       "files written and loaded %ld, of these taken as list %ld, gains %ld, configuration %ld\n",
       kRuns, taken[kAsList], taken[kAsGains], taken[kAsConfiguration]);
+  std::filesystem::remove_all(folder);
 }
 
 }  // namespace
