@@ -122,7 +122,9 @@ class VirtualArm:
     def execute_dmp(self, request: DmpRequest) -> Pending:
         self.request = request
         self.rig.robot.debug = None
-        return self._ends_motion(self._answered(self.robot.execute_dmp(*self._fields(request), request.goal_frame)))
+        limits = (request.goal_region_low, request.goal_region_high, request.goal_retreat, request.goal_drop)
+        answer = self.robot.execute_dmp(*self._fields(request), request.goal_frame, *limits)
+        return self._ends_motion(self._answered(answer))
 
     def switch_dmp(self, request: DmpRequest) -> Pending:
         return self._answered(self.robot.switch_dmp(*self._fields(request)))
