@@ -14,7 +14,7 @@ constexpr double kShares[] = {0.0, 0.01, 0.05, 0.10};
 
 /// Worst of all seeds; the last two numbers count runs that crossed a bound, and runs that did not
 /// start or in which the controller left command mode.
-void approaches(unsigned seeds) {
+void approaches(unsigned seeds, bool proven) {
   for (const double period : kPeriods) {
     for (const double share : kShares) {
       double beyond = -1e9, speed = 0.0, acceleration = 0.0;
@@ -22,7 +22,7 @@ void approaches(unsigned seeds) {
       for (const bool bursts : {false, true}) {
         for (const bool extrapolates : {true, false}) {
           for (unsigned seed = 0; seed < seeds; ++seed) {
-            LossRun run({period, share, bursts, extrapolates, seed});
+            LossRun run({period, share, bursts, extrapolates, seed, proven});
             const SetPointExtremes e = run.approach();
             failed += run.started() && run.commanding() ? 0 : 1;
             crossed += e.beyond > 0.0 ? 1 : 0;
@@ -32,7 +32,7 @@ void approaches(unsigned seeds) {
           }
         }
       }
-      std::printf("approach %g %g %.4f %.6g %.6g %u %u\n", period, share,
+      std::printf("%s %g %g %.4f %.6g %.6g %u %u\n", proven ? "proven" : "approach", period, share,
                   1e3 * std::max(0.0, beyond), speed, acceleration, crossed, failed);
       std::fflush(stdout);
     }
@@ -70,7 +70,8 @@ int main(int argc, char** argv) {
     return 2;
   }
   for (const double period : kPeriods) std::printf("motion %g %.4f\n", period, motionTime(period));
-  approaches(seeds);
+  approaches(seeds, false);
+  approaches(seeds, true);
   stops(seeds);
   return 0;
 }

@@ -55,6 +55,9 @@ struct LossCase {
   bool bursts;
   bool extrapolates;  ///< the kind of controller
   unsigned seed;
+  /// The connection has lost nothing for kProvenCycles when the motion begins, and loses from a
+  /// random moment of it on; else it loses from its first cycle on.
+  bool proven = false;
 };
 
 /// The worst of what a controller's set-points did in a run, over all joints.
@@ -74,7 +77,8 @@ class LossRun {
         bridge_(defaultConfig()),
         robot_(c.period),
         loss_(c.share, c.bursts, c.seed),
-        random_(c.seed + 77) {
+        random_(c.seed + 77),
+        clean_(c.proven ? 1 : 0) {
     robot_.extrapolates = c.extrapolates;
     const JointLimits& limits = bridge_.config().limits;
     for (int i = 0; i < 7; ++i) {
@@ -88,7 +92,11 @@ class LossRun {
     started_ = runEvent(bridge_, robot_, "start").success();
     last_ = robot_.setPoint();
     last_velocity_.setZero();
-    for (unsigned i = random_() % 1500; i > 0; --i) cycle(Vector7::Zero());
+    const unsigned idle = case_.proven ? LossBudget::kProvenCycles + 200 : random_() % 1500;
+    for (unsigned i = idle; i > 0; --i) cycle(Vector7::Zero());
+    // A proven connection loses from some moment of the motion on, so that it is trusted until
+    // then.
+    if (case_.proven) clean_ = static_cast<int>(part(0.0, 1.8) / case_.period);
   }
 
   SetPointExtremes approach() {
@@ -96,6 +104,7 @@ class LossRun {
     const int cycles = static_cast<int>(2.0 / case_.period);
     const int hold_at = random_() % 3 == 0 ? static_cast<int>(part(0.0, 1.0) * cycles) : -1;
     Vector7 wish = towards;
+    begun_ = true;
     for (int i = 0; i < cycles; ++i) {
       if (i == hold_at) bridge_.submit("hold");
       if (i == hold_at + static_cast<int>(0.6 / case_.period)) bridge_.submit("reset");
@@ -129,7 +138,8 @@ class LossRun {
 
   void cycle(const Vector7& wish) {
     drive(bridge_, robot_, wish);
-    const LossPattern::Lost lost = loss_.next();
+    const LossPattern::Lost lost = clean_ > 0 ? LossPattern::Lost::Nothing : loss_.next();
+    if (begun_ && clean_ > 0) --clean_;
     const bool answered = lost == LossPattern::Lost::Nothing;
     robot_.cycle(bridge_, lost == LossPattern::Lost::Measurement,
                  lost == LossPattern::Lost::Answer);
@@ -159,7 +169,8 @@ class LossRun {
   std::mt19937 random_;
   Vector7 direction_, start_, last_, last_velocity_;
   SetPointExtremes extremes_;
-  bool started_ = false;
+  bool started_ = false, begun_ = false;
+  int clean_ = 0;  ///< cycles without loss that are still to come
 };
 
 /// Time (s) of a motion of A2 at full speed from the middle of its range to 0.05 rad before its
