@@ -223,6 +223,65 @@ TEST(CartesianMotion, FollowsAMovingGoal) {
   }
 }
 
+TEST(CartesianMotion, AnApproachingGoalDoesNotPushTheHandBackward) {
+  // Half of a person's reach toward the robot is over when the motion starts (docs/people.md).
+  const auto share = [](double u) {
+    u = std::min(1.0, u);
+    return u * u * u * (10.0 - 15.0 * u + 6.0 * u * u);
+  };
+  const auto goal = [&](double t) {
+    const double left = 1.0 - share(0.6 + t / 1.1);
+    return Vector3(0.42 + 0.43 * left, 0.1 * left, 0);
+  };
+  CartesianMotionPlan plan = reachPlan();
+  for (const double ratio : {1.0, 1.2, 1.5}) {
+    plan.ratio = ratio;
+    CartesianMotion motion;
+    motion.start(plan, at(Vector3::Zero()), Vector3::Zero(), Vector3::Zero(), at(goal(0)));
+    double backward = 0.0, way = 0.0;
+    Vector3 last = Vector3::Zero();
+    for (int i = 0; i < 600; ++i) {
+      motion.step(kCycle, at(goal(i * kCycle)));
+      const Vector3 now = motion.dmp().state().position;
+      backward = std::max(backward, -now.x());
+      way += (now - last).norm();
+      last = now;
+    }
+    EXPECT_LT(backward, 0.008) << ratio;
+    EXPECT_LT(way / last.norm(), 1.09) << ratio;
+  }
+}
+
+TEST(CartesianMotion, NoiseOfTheGoalHardlyMovesTheHandAndASlowGoalIsFollowedInIt) {
+  for (const double correlation : {0.0, 0.5}) {
+    for (const double speed : {0.0, 0.1}) {
+      const auto goal = [&](double t) { return Vector3(0.51, speed * t, 0); };
+      std::vector<double> added, behind;
+      for (int seed = 1; seed <= 21; ++seed) {
+        Sights sights(seed, 0.004, correlation);
+        CartesianMotion exact, noisy;
+        const Pose begin = at(Vector3::Zero());
+        exact.start(reachPlan(), begin, Vector3::Zero(), Vector3::Zero(), at(goal(0)));
+        noisy.start(reachPlan(), begin, Vector3::Zero(), Vector3::Zero(), at(sights.at(0, goal)));
+        double power = 0.0, lag = 0.0;
+        for (int i = 0; i < 300; ++i) {
+          exact.step(kCycle, at(goal(i * kCycle)));
+          noisy.step(kCycle, at(sights.at(i, goal)));
+          const Vector3 extra = noisy.reference().velocity - exact.reference().velocity;
+          if (i < 200) power += extra.squaredNorm() / 200;
+          if (i >= 200) lag += (goal(i * kCycle) - noisy.dmp().state().position).y() / 100;
+        }
+        added.push_back(std::sqrt(power));
+        behind.push_back(lag);
+      }
+      std::sort(added.begin(), added.end());
+      std::sort(behind.begin(), behind.end());
+      if (speed == 0.0) EXPECT_LT(added[10], 0.015) << correlation;
+      if (speed > 0.0) EXPECT_LT(std::abs(behind[10]), 0.003) << correlation;
+    }
+  }
+}
+
 TEST(CartesianMotion, ANoisyGoalDoesNotMoveAnArmThatHasArrived) {
   Random random(4);
   CartesianMotion motion;

@@ -1,6 +1,9 @@
 // Goals of the DMP plug-in in virtual time: they move, jump, vanish, turn and leave the workspace.
 #include "virtual_robot.hpp"
 
+#include <functional>
+#include <utility>
+
 namespace coglab_controllers {
 namespace {
 
@@ -31,6 +34,54 @@ TEST(DmpController, FollowsAgainOnlyWhenTheGoalLeavesItsBall) {
   EXPECT_TRUE(ran);
   EXPECT_EQ(robot.state(), MotionState::Reached);
   EXPECT_LT((robot.hand().position - moved).norm(), 2e-3);
+}
+
+/// A reach toward a goal that goes `way(t)` from kGoal, 0.5 s after the start; how it ended, and the
+/// largest distance from kGoal that the goal had by then.
+std::pair<ReasonCode, double> reachAfter(const GoalLimits& limits,
+                                         const std::function<Vector3(double)>& way) {
+  VirtualRobot robot;
+  robot.loadBoth();
+  robot.see("human_hand", kGoal);
+  DmpRequest request = robot.reach();
+  request.goal_limits = limits;
+  request.dmp_ratio = 2.0;
+  EXPECT_TRUE(VirtualRobot::ok(robot.dmp().execute(request)));
+  double largest = 0.0;
+  for (int i = 0; i < 1200; ++i) {
+    const Vector3 moved = way(std::max(0.0, i * 0.005 - 0.5));
+    robot.see("human_hand", kGoal + moved);
+    robot.tick();
+    if (robot.state() == MotionState::Aborted) break;
+    largest = std::max(largest, moved.norm());
+  }
+  return {robot.manager->report().reason.code(), largest};
+}
+
+TEST(DmpController, NothingIsChased) {
+  const GoalLimits limits{Vector3(0.5, -0.3, 0.1), Vector3(0.9, 0.3, 0.8), 0.10, 0.08};
+  const auto back = [](double t) { return Vector3(0.3 * std::min(t, 1.0), 0, 0); };
+  const auto aside = [](double t) { return Vector3(0, 0.5 * std::min(t, 1.0), 0); };
+  const auto fall = [](double t) { return Vector3(0, 0, -4.905 * std::min(t * t, 0.2)); };
+  const auto lowered = [](double t) { return Vector3(0, 0, -0.4 * std::min(t, 0.5)); };
+  const auto sway = [](double t) { return 0.04 * Vector3(std::sin(t), std::cos(3 * t), 0); };
+  const auto [withdrawn, retreat] = reachAfter(limits, back);
+  EXPECT_EQ(withdrawn, ReasonCode::GoalWithdrawn);
+  EXPECT_LT(retreat, 0.125);
+  const auto [left, distance] = reachAfter({limits.region_low, limits.region_high, 0, 0}, aside);
+  EXPECT_EQ(left, ReasonCode::GoalLeftRegion);
+  EXPECT_LT(distance, 0.33);
+  const auto [fell, depth] = reachAfter({Vector3::Zero(), Vector3::Zero(), 0, 0.08}, fall);
+  EXPECT_EQ(fell, ReasonCode::GoalFell);
+  EXPECT_LT(depth, 0.16);
+  EXPECT_EQ(reachAfter(limits, lowered).first, ReasonCode::None);
+  EXPECT_EQ(reachAfter(limits, sway).first, ReasonCode::None);
+  EXPECT_EQ(reachAfter({}, back).first, ReasonCode::None);  // without limits it is followed
+}
+
+TEST(DmpController, AGoalOutsideItsRegionFromTheBeginningIsWaitedFor) {
+  const GoalLimits far{Vector3(0.5, 0.1, 0.1), Vector3(0.9, 0.5, 0.8), 0, 0};
+  EXPECT_EQ(reachAfter(far, [](double) { return Vector3::Zero(); }).first, ReasonCode::None);
 }
 
 TEST(DmpController, OldGoalIsHeldAndALostOneAborts) {

@@ -59,6 +59,14 @@ TEST(DmpRequests, RefusesBadRequestsAndKeepsMoving) {
         EXPECT_TRUE(refused(dmp.execute(with([](auto& r) { r.goal_frame = "cup"; })), {"cup"}));
       },
       [&] {
+        EXPECT_TRUE(refused(dmp.execute(with([](auto& r) { r.goal_limits.retreat = -0.1; })),
+                            {"goal_retreat", "negative"}));
+        EXPECT_TRUE(refused(dmp.execute(with([](auto& r) { r.goal_limits.region_low.x() = 0.1; })),
+                            {"goal_region_low", "above"}));
+        EXPECT_TRUE(refused(dmp.execute(with([](auto& r) { r.goal_limits.drop = std::nan(""); })),
+                            {"goal_drop", "finite"}));
+      },
+      [&] {
         robot.see("far", Vector3(3.0, 0.0, 0.5));
         EXPECT_TRUE(refused(dmp.execute(with([](auto& r) { r.goal_frame = "far"; })),
                             {"workspace", "box"}));

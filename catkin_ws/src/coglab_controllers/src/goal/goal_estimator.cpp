@@ -21,6 +21,14 @@ void validate(const GoalEstimatorParameters& parameters) {
     throw std::invalid_argument("noisy goal time constant: expected 0.005 to 2 s, got " +
                                 std::to_string(noisy));
   }
+  if (!(parameters.noisy_speed >= 0.0 && std::isfinite(parameters.noisy_speed))) {
+    throw std::invalid_argument("noisy goal speed: expected 0 m/s or more, got " +
+                                std::to_string(parameters.noisy_speed));
+  }
+  if (!(parameters.noisy_turning >= 0.0 && std::isfinite(parameters.noisy_turning))) {
+    throw std::invalid_argument("noisy goal turning: expected 0 rad/s or more, got " +
+                                std::to_string(parameters.noisy_turning));
+  }
   if (!(parameters.max_innovation > 0.0 && std::isfinite(parameters.max_innovation))) {
     throw std::invalid_argument("goal max innovation: expected a positive distance in m, got " +
                                 std::to_string(parameters.max_innovation));
@@ -31,7 +39,7 @@ void validate(const GoalEstimatorParameters& parameters) {
   }
 }
 
-// The time constant goes from one value to the other within about this time, s: g = p + 3 T p' must
+// The time constant goes from one value to the other within about this time, s: g = p + 3 T g' must
 // not step.
 constexpr double kChange = 0.3;
 
@@ -40,6 +48,15 @@ double nextTimeConstant(const GoalEstimatorParameters& parameters, double presen
   const double more = std::max(0.0, parameters.noisy_time_constant - parameters.time_constant);
   const double wanted = parameters.time_constant + std::clamp(noise, 0.0, 1.0) * more;
   return present == wanted ? present : wanted + (present - wanted) * std::exp(-dt / kChange);
+}
+
+/// The part of an estimated rate that is more than noise of about `noisy`: nothing well below it,
+/// all of it well above, and smooth between.
+Vector3 beyondNoise(const Vector3& rate, double noisy) {
+  if (noisy <= 0.0) return rate;
+  const double square = rate.squaredNorm() / (noisy * noisy);
+  const double power = square * square * square * square;
+  return std::isfinite(power) ? Vector3(power / (1.0 + power) * rate) : rate;
 }
 
 Vector3 clipped(const Vector3& error, double limit) {
@@ -69,6 +86,7 @@ GoalEstimator::GoalEstimator(const GoalEstimatorParameters& parameters)
 
 void GoalEstimator::reset(const Vector3& goal) noexcept {
   tracker_ = {};
+  velocity_.setZero();
   time_constant_ = parameters_.time_constant;
   smooth_ = position_ = goal;
 }
@@ -82,7 +100,8 @@ void GoalEstimator::update(double dt, const Vector3& goal, double noise) noexcep
   const Vector3 error = clipped(goal - smooth_, parameters_.max_innovation);
   time_constant_ = nextTimeConstant(parameters_, time_constant_, noise, dt);
   smooth_ += tracker_.advance(error, dt, time_constant_);
-  position_ = smooth_ + 3.0 * time_constant_ * tracker_.rate;
+  velocity_ = beyondNoise(tracker_.rate, std::clamp(noise, 0.0, 1.0) * parameters_.noisy_speed);
+  position_ = smooth_ + 3.0 * time_constant_ * velocity_;
 }
 
 OrientationEstimator::OrientationEstimator(const GoalEstimatorParameters& parameters)
@@ -92,6 +111,7 @@ OrientationEstimator::OrientationEstimator(const GoalEstimatorParameters& parame
 
 void OrientationEstimator::reset(const Quaternion& target) noexcept {
   tracker_ = {};
+  velocity_.setZero();
   time_constant_ = parameters_.time_constant;
   smooth_ = orientation_ = target.normalized();
 }
@@ -106,7 +126,8 @@ void OrientationEstimator::update(double dt, const Quaternion& target, double no
   const Vector3 error = clipped(rotationBetween(smooth_, unit), parameters_.max_angle_innovation);
   time_constant_ = nextTimeConstant(parameters_, time_constant_, noise, dt);
   smooth_ = (expRotation(tracker_.advance(error, dt, time_constant_)) * smooth_).normalized();
-  orientation_ = (expRotation(3.0 * time_constant_ * tracker_.rate) * smooth_).normalized();
+  velocity_ = beyondNoise(tracker_.rate, std::clamp(noise, 0.0, 1.0) * parameters_.noisy_turning);
+  orientation_ = (expRotation(3.0 * time_constant_ * velocity_) * smooth_).normalized();
 }
 
 }  // namespace coglab_controllers

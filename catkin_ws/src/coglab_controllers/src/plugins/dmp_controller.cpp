@@ -150,7 +150,9 @@ Answer DmpController::checkPrimitive(const DmpRequest& request, DmpPlan& plan) c
   }
   plan.hand.offset = request.goal_offset;
   plan.hand.in_goal_frame = !request.goal_frame.empty();
-  return {};
+  plan.goal_limits = request.goal_limits;
+  const char* wrong = plan.goal_limits.wrong();
+  return *wrong == '\0' ? Answer() : Answer::invalid(wrong);
 }
 
 Answer DmpController::checkStart(const DmpRequest& request, DmpPlan& plan) const {

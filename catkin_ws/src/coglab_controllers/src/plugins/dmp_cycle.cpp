@@ -32,6 +32,10 @@ GoalEstimatorParameters readEstimator(const Parameters& parameters) {
       parameters.number("goal_time_constant", estimator.time_constant, 0.0, 2.0);
   estimator.noisy_time_constant =
       parameters.number("noisy_goal_time_constant", estimator.noisy_time_constant, 0.005, 2.0);
+  estimator.noisy_speed =
+      parameters.number("noisy_goal_speed", estimator.noisy_speed, 0.0, 1.0);
+  estimator.noisy_turning =
+      parameters.number("noisy_goal_turning", estimator.noisy_turning, 0.0, 10.0);
   return estimator;
 }
 
@@ -121,6 +125,7 @@ void DmpCycle::execute(const MotionStart<DmpPlan>& start) {
   request_ = plan.goal.request;
   gate_ = GoalGate(plan.hand.in_goal_frame ? frame_gate_ : topic_gate_);
   gate_.reset(plan.goal);
+  watch_.begin(plan.goal_limits, pose.position, plan.goal.position);
   bool projected = false;
   motion_.start(plan.motion, pose, velocity, angular, inWorkspace(hand_.at(plan.goal), projected));
   reference_.pose = pose;
@@ -177,7 +182,13 @@ void DmpCycle::watchGoal(const CycleInput& input) {
   // noise.
   const bool travels = stage_ == DmpStage::Travel;
   remaining_distance_ = ((travels ? wanted.position : motion_.goal()) - hand).norm();
-  if (travels) judgeGoal();
+  const Reason away = watch_.update(input.dt, gate_.goal().position);
+  if (!travels) return;
+  if (away.empty()) {
+    judgeGoal();
+  } else {
+    giveUp(away);
+  }
 }
 
 void DmpCycle::judgeGoal() {

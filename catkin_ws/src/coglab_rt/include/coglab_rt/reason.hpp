@@ -51,6 +51,9 @@ enum class ReasonCode : std::uint16_t {
   GoalLost = 304,
   GoalOutsideWorkspace = 305,
   GoalUnreachable = 306,
+  GoalLeftRegion = 307,
+  GoalWithdrawn = 308,
+  GoalFell = 309,
 
   Cancelled = 400,
   Switched = 401,

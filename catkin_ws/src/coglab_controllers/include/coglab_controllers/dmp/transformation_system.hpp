@@ -29,11 +29,15 @@ class TransformationSystem {
   double goalWeight(double s) const noexcept { return goal_weight_(s); }
   /// phi(s) of eq. (5), m relative to the start. Never divides by a vanishing sum.
   Vector3 movingPoint(double s) const noexcept;
+  /// Weight of g' in h: the goal's own weight made smooth at both ends (w^2 (3 - 2 w)). With its
+  /// full weight from the beginning an approaching goal would push the hand backward; with w
+  /// itself a steadily moving goal would be met 20 % later (docs/deviations.md).
+  static double velocityWeight(double w) noexcept { return w * w * (3.0 - 2.0 * w); }
   /// h(w, g, g') of eq. (4), given phi(s): the part that does not depend on the state.
   Vector3 forcing(double w, const Vector3& phi, const Vector3& start, const Vector3& goal,
                   const Vector3& goal_velocity, double tau) const noexcept {
     return (1.0 - w) * stiffness_ * (phi + start) + w * stiffness_ * goal +
-           damping_ * tau * goal_velocity;
+           velocityWeight(w) * damping_ * tau * goal_velocity;
   }
   /// tau * v' of eq. (4).
   Vector3 acceleration(const Vector3& forcing, const Vector3& x, const Vector3& v) const noexcept {

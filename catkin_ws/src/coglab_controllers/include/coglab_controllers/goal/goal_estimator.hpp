@@ -26,6 +26,9 @@ struct GoalEstimatorParameters {
   double time_constant = 0.06;  ///< s; 0 switches the estimator off: g is the input, g' is zero
   /// s; what it grows to when the goal trembles, see GoalJitter; not below time_constant
   double noisy_time_constant = 0.10;
+  /// m/s, rad/s: an estimated speed below this is taken for noise when the goal trembles fully
+  double noisy_speed = 0.04;
+  double noisy_turning = 0.4;
   double max_innovation =
       0.15;  ///< m: a goal further away pulls no harder, which bounds speed and acceleration
   double max_angle_innovation = 0.6;  ///< rad, for orientations
@@ -33,9 +36,10 @@ struct GoalEstimatorParameters {
 
 /// Estimates g and g' from goal positions as received (sample-and-hold between frames).
 ///
-/// A constant-velocity tracker of third order with ramp compensation: g = p + 3 T p', so a steadily
-/// moving goal is met without lag, and g and g' have no step when the input has one. No allocation,
-/// no throw.
+/// A constant-velocity tracker of third order with ramp compensation: g = p + 3 T g', so a steadily
+/// moving goal is met without lag, and g and g' have no step when the input has one. g' is p', but
+/// as good as zero where the goal trembles and p' is no faster than the trembling makes it: a goal
+/// that rests is then not led by its own noise. No allocation, no throw.
 class GoalEstimator {
  public:
   /// @throws std::invalid_argument unless time_constant is 0 or in [0.005, 2] and the others are
@@ -47,8 +51,8 @@ class GoalEstimator {
   /// One cycle of `dt` s with the newest goal as received (m, finite).  @param noise of it, 0..1.
   void update(double dt, const Vector3& goal, double noise = 0.0) noexcept;
 
-  const Vector3& position() const noexcept { return position_; }      ///< g, m
-  const Vector3& velocity() const noexcept { return tracker_.rate; }  ///< g', m/s
+  const Vector3& position() const noexcept { return position_; }  ///< g, m
+  const Vector3& velocity() const noexcept { return velocity_; }  ///< g', m/s
   bool enabled() const noexcept { return parameters_.time_constant > 0.0; }
 
  private:
@@ -56,7 +60,7 @@ class GoalEstimator {
   ThirdOrderTracker tracker_;
   double time_constant_ = 0.0;  // s, at present
   Vector3 smooth_ = Vector3::Zero();
-  Vector3 position_ = Vector3::Zero();
+  Vector3 position_ = Vector3::Zero(), velocity_ = Vector3::Zero();
 };
 
 /// The same for the target orientation of a turning object.
@@ -70,7 +74,7 @@ class OrientationEstimator {
   void update(double dt, const Quaternion& target, double noise = 0.0) noexcept;
 
   const Quaternion& orientation() const noexcept { return orientation_; }
-  const Vector3& angularVelocity() const noexcept { return tracker_.rate; }  ///< rad/s, base frame
+  const Vector3& angularVelocity() const noexcept { return velocity_; }  ///< rad/s, base frame
 
  private:
   GoalEstimatorParameters parameters_;
@@ -78,6 +82,7 @@ class OrientationEstimator {
   double time_constant_ = 0.0;  // s, at present
   Quaternion smooth_ = Quaternion::Identity();
   Quaternion orientation_ = Quaternion::Identity();
+  Vector3 velocity_ = Vector3::Zero();
 };
 
 }  // namespace coglab_controllers

@@ -5,6 +5,7 @@
 #include <cstdint>
 
 #include "coglab_controllers/goal/goal_feed.hpp"
+#include "coglab_controllers/goal/goal_watch.hpp"
 #include "coglab_controllers/motion/motion.hpp"
 #include "coglab_controllers/motion/reference_loop.hpp"
 #include "coglab_controllers/plugins/dmp_plan.hpp"
@@ -88,6 +89,7 @@ class DmpCycle : public Motion<DmpPlan> {
   Reason reason_;
   CartesianMotion motion_;
   GoalGate gate_;
+  GoalWatch watch_;
   HandGoal hand_;
   Name primitive_;
   Pose base_from_dmp_, dmp_from_base_;

@@ -4,6 +4,7 @@
 
 #include "coglab_controllers/dmp/cartesian_motion.hpp"
 #include "coglab_controllers/goal/goal_gate.hpp"
+#include "coglab_controllers/goal/goal_watch.hpp"
 #include "coglab_controllers/names.hpp"
 
 namespace coglab_controllers {
@@ -27,6 +28,7 @@ struct DmpPlan {
   CartesianMotionPlan motion;
   HandGoal hand;
   GoalObservation goal;  ///< the goal as it was when the request came
+  GoalLimits goal_limits;
   Pose base_from_dmp;    ///< dmp_frame_name in robot_base_frame_name
   bool given = false;    ///< initial_state GIVEN
   Vector3 initial_position = Vector3::Zero(), initial_velocity = Vector3::Zero();

@@ -4,7 +4,7 @@
 
 #include <string>
 
-#include "coglab_controllers/kinematics/types.hpp"
+#include "coglab_controllers/goal/goal_watch.hpp"
 
 namespace coglab_controllers {
 
@@ -23,6 +23,7 @@ struct DmpRequest {
   Eigen::Vector4d target_orientation =
       Eigen::Vector4d::Zero();  ///< x y z w; all zero: keep the current one
   std::string goal_frame;  ///< tf2 frame that the motion follows; empty: what comes on dmp_goal
+  GoalLimits goal_limits;  ///< what that frame may do, or the motion ends
 };
 
 }  // namespace coglab_controllers

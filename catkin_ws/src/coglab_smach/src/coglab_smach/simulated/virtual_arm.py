@@ -147,7 +147,8 @@ class VirtualArm:
     def execute_dmp(self, request: DmpRequest) -> Pending:
         self.request = request
         self.rig.robot.debug = None
-        fields = (*self._fields(request), request.goal_frame)
+        limits = (request.goal_region_low, request.goal_region_high, request.goal_retreat, request.goal_drop)
+        fields = (*self._fields(request), request.goal_frame, *limits)
         return self._ends_motion(self.node.ask(lambda: self._answered(self.robot.execute_dmp(*fields))))
 
     def switch_dmp(self, request: DmpRequest) -> Pending:

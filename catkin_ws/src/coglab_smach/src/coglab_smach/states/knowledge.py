@@ -113,8 +113,7 @@ def await_offer(state: CoglabState, target: str, goal: Mapping[str, Any], margin
     object it holds or asks for. PortError if nobody comes within ``handover.offer_timeout``; nothing has moved then.
     """
     config = state.ctx.config
-    low = np.array(config.get("handover.region_low", [-1.0, -1.0, -1.0]), dtype=float) - margin
-    high = np.array(config.get("handover.region_high", [1.5, 1.0, 2.0]), dtype=float) + margin
+    low, high = handover_region(state.ctx, margin)
     wider = float(config.get("handover.still_margin", 0.10))
     limit = float(config.get("handover.offer_timeout", 8.0))
     end = state.ctx.clock.now() + limit
@@ -145,6 +144,25 @@ def await_offer(state: CoglabState, target: str, goal: Mapping[str, Any], margin
             state.pause(0.03)
     state.ctx.journal.mark("offered")
     return located
+
+
+def handover_region(ctx: Context, margin: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
+    """Corners (m, base frame) of the box in which something counts as offered, ``margin`` m wider on all sides."""
+    low = np.array(ctx.config.get("handover.region_low", [-1.0, -1.0, -1.0]), dtype=float) - margin
+    high = np.array(ctx.config.get("handover.region_high", [1.5, 1.0, 2.0]), dtype=float) + margin
+    return low, high
+
+
+def unless_withdrawn(ctx: Context, goal: Mapping[str, Any], margin: float = 0.0) -> dict[str, Any]:
+    """The goal of a motion that ends by itself when what it follows leaves the region, goes back or falls."""
+    low, high = handover_region(ctx, margin)
+    limits = {
+        "goal_region_low": low.tolist(),
+        "goal_region_high": high.tolist(),
+        "goal_retreat": float(ctx.config.get("handover.retreat", 0.10)),
+        "goal_drop": float(ctx.config.get("handover.drop", 0.08)),
+    }
+    return {**goal, "limits": limits}
 
 
 def palm_of(seen: Mapping[str, Any], goal: Mapping[str, Any]) -> Pose:
@@ -188,7 +206,7 @@ class SetGraspGoal(CoglabState):
         goal = paced(self.ctx, grasp_goal(ud.object_entry, ud.grasp, "", "receive"))
         located = await_offer(self, ud.object_id, goal)
         ud.located = located
-        ud.goal = {**goal, "frame": located["frame"]}
+        ud.goal = unless_withdrawn(self.ctx, {**goal, "frame": located["frame"]})
         return "succeeded"
 
 
@@ -229,13 +247,10 @@ class SetDeliveryGoal(CoglabState):
         ud.delivery_name = name
         ud.delivery = delivery
         goal = paced(self.ctx, delivery_goal(entry, ud.grasp, delivery, ""))
-        located = await_offer(
-            self,
-            str(self.ctx.config.get("perception.human_hand", "human_hand")),
-            goal,
-            float(self.ctx.config.get("handover.hand_margin", 0.10)),
-        )
-        goal["frame"] = located["frame"]
+        margin = float(self.ctx.config.get("handover.hand_margin", 0.10))
+        hand = str(self.ctx.config.get("perception.human_hand", "human_hand"))
+        located = await_offer(self, hand, goal, margin)
+        goal = unless_withdrawn(self.ctx, {**goal, "frame": located["frame"]}, margin)
         ud.delivery_pose = {"xyz": goal["offset"], "quaternion": goal["orientation"]}
         ud.goal = goal
         return "succeeded"
