@@ -51,25 +51,6 @@ TEST(MotionEnd, LatchesAndFollowsAgainOutsideTheBall) {
   EXPECT_FALSE(end.latched());
 }
 
-TEST(MotionEnd, ThresholdsGrowWithTheNoiseOfTheGoal) {
-  using Event = MotionEnd::Event;
-  const Vector3 goal(0.5, 0, 0), near = goal + Vector3(0.009, 0, 0);
-  const auto ends = [&](double speed, double turning, const Vector3& at, const GoalNoise& noise) {
-    MotionEnd end;
-    return end.update(kCycle, 0.001, speed, turning, at, goal, goal, noise) == Event::Ended;
-  };
-  EXPECT_FALSE(ends(0.021, 0.0, goal, {}));
-  EXPECT_FALSE(ends(0.021, 0.0, goal, {0.0, 1.0}));
-  EXPECT_TRUE(ends(0.099, 0.0, goal, {1.0, 0.0}));
-  EXPECT_FALSE(ends(0.061, 0.0, goal, {0.5, 0.0}));
-  EXPECT_TRUE(ends(0.059, 0.0, goal, {0.5, 0.0}));
-  EXPECT_FALSE(ends(0.101, 0.0, goal, {5.0, 5.0}));
-  EXPECT_FALSE(ends(0.0, 0.5, goal, {1.0, 0.0}));
-  EXPECT_TRUE(ends(0.0, 0.5, goal, {0.0, 1.0}));
-  EXPECT_FALSE(ends(0.0, 0.0, near, {}));
-  EXPECT_TRUE(ends(0.0, 0.0, near, {1.0, 0.0}));
-}
-
 /// Frames at 30 Hz, 7 cycles apart: `goal(time)` plus noise of 4 mm per axis that wanders with a
 /// correlation time of 0.5 s, or is white with 0.
 class Sights {

@@ -65,16 +65,18 @@ TEST(DmpController, NothingIsChased) {
   const auto fall = [](double t) { return Vector3(0, 0, -4.905 * std::min(t * t, 0.2)); };
   const auto lowered = [](double t) { return Vector3(0, 0, -0.4 * std::min(t, 0.5)); };
   const auto sway = [](double t) { return 0.04 * Vector3(std::sin(t), std::cos(3 * t), 0); };
-  const auto [withdrawn, retreat] = reachAfter(limits, back);
+  const GoalLimits only_back{Vector3::Zero(), Vector3::Zero(), 0.10, 0};
+  const auto [withdrawn, retreat] = reachAfter(only_back, back);
   EXPECT_EQ(withdrawn, ReasonCode::GoalWithdrawn);
   EXPECT_LT(retreat, 0.125);
   const auto [left, distance] = reachAfter({limits.region_low, limits.region_high, 0, 0}, aside);
   EXPECT_EQ(left, ReasonCode::GoalLeftRegion);
   EXPECT_LT(distance, 0.33);
-  const auto [fell, depth] = reachAfter({Vector3::Zero(), Vector3::Zero(), 0, 0.08}, fall);
+  const GoalLimits only_down{Vector3::Zero(), Vector3::Zero(), 0, 0.08};
+  const auto [fell, depth] = reachAfter(only_down, fall);
   EXPECT_EQ(fell, ReasonCode::GoalFell);
   EXPECT_LT(depth, 0.16);
-  EXPECT_EQ(reachAfter(limits, lowered).first, ReasonCode::None);
+  EXPECT_EQ(reachAfter(only_down, lowered).first, ReasonCode::None);
   EXPECT_EQ(reachAfter(limits, sway).first, ReasonCode::None);
   EXPECT_EQ(reachAfter({}, back).first, ReasonCode::None);  // without limits it is followed
 }

@@ -100,7 +100,7 @@ const CartesianReference& CartesianMotion::step(double dt, const Pose& goal, dou
   const double turning =
       reference_.orientation_control ? reference_.angular_velocity.norm() / clock : 0.0;
   event_ = end_.update(dt, state.phase, reference_.velocity.norm() / clock, turning, state.position,
-                       goal_, goal.position, noise());
+                       goal_, goal.position);
   if (event_ == MotionEnd::Event::Ended) phase_ = Phase::Ended;
   if (event_ == MotionEnd::Event::FollowsAgain) {
     phase_ = Phase::Running;

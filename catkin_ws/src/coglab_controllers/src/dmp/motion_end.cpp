@@ -1,19 +1,10 @@
 #include "coglab_controllers/dmp/motion_end.hpp"
 
-#include <algorithm>
 #include <cmath>
 #include <stdexcept>
 #include <string>
 
 namespace coglab_controllers {
-
-namespace {
-
-double between(double exact, double noisy, double share) noexcept {
-  return exact + std::clamp(share, 0.0, 1.0) * (std::max(exact, noisy) - exact);
-}
-
-}  // namespace
 
 MotionEnd::MotionEnd(const MotionEndParameters& parameters) : parameters_(parameters) {
   const auto require = [](const char* name, double value) {
@@ -25,9 +16,6 @@ MotionEnd::MotionEnd(const MotionEndParameters& parameters) : parameters_(parame
   require("end_speed", parameters.speed);
   require("end_turning", parameters.turning);
   require("end_distance", parameters.distance);
-  require("noisy_end_speed", parameters.noisy_speed);
-  require("noisy_end_turning", parameters.noisy_turning);
-  require("noisy_end_distance", parameters.noisy_distance);
   require("follow_distance", parameters.follow_distance);
   require("follow_time", parameters.follow_time);
 }
@@ -39,12 +27,11 @@ void MotionEnd::reset() noexcept {
 
 MotionEnd::Event MotionEnd::update(double dt, double phase, double speed, double turning,
                                    const Vector3& position, const Vector3& goal,
-                                   const Vector3& raw_goal, const GoalNoise& noise) noexcept {
+                                   const Vector3& raw_goal) noexcept {
   if (!latched_) {
     const MotionEndParameters& p = parameters_;
-    if (phase >= p.phase || speed >= between(p.speed, p.noisy_speed, noise.position) ||
-        turning >= between(p.turning, p.noisy_turning, noise.orientation) ||
-        (position - goal).norm() >= between(p.distance, p.noisy_distance, noise.position) ||
+    if (phase >= p.phase || speed >= p.speed || turning >= p.turning ||
+        (position - goal).norm() >= p.distance ||
         (goal - raw_goal).norm() >= p.follow_distance) {
       return Event::None;
     }

@@ -45,9 +45,6 @@ MotionEndParameters readEnd(const Parameters& parameters) {
   end.speed = parameters.number("end_speed", end.speed, 1e-6, 1.0);
   end.turning = parameters.number("end_turning", end.turning, 1e-6, 10.0);
   end.distance = parameters.number("end_distance", end.distance, 1e-6, 0.5);
-  end.noisy_speed = parameters.number("noisy_end_speed", end.noisy_speed, 1e-6, 1.0);
-  end.noisy_turning = parameters.number("noisy_end_turning", end.noisy_turning, 1e-6, 10.0);
-  end.noisy_distance = parameters.number("noisy_end_distance", end.noisy_distance, 1e-6, 0.5);
   end.follow_distance = parameters.number("follow_distance", end.follow_distance, 1e-3, 1.0);
   end.follow_time = parameters.number("follow_time", end.follow_time, 0.0, 10.0);
   return end;

@@ -69,9 +69,6 @@ class CartesianMotion {
     return phase_ == Phase::Running ? dmp_.remainingTime() : 0.0;
   }
 
-  /// How noisy the goal as received is at the moment.
-  GoalNoise noise() const noexcept { return {jitter_.share(), turning_jitter_.share()}; }
-
  private:
   void watchNoise(double dt, const Pose& goal) noexcept;
 

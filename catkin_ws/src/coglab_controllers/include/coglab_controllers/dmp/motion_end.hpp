@@ -12,19 +12,8 @@ struct MotionEndParameters {
   double speed = 0.02;   ///< m/s, the set-point move slower than this,
   double turning = 0.2;  ///< rad/s, and turn slower than this,
   double distance = 0.005;  ///< m, and be closer to the goal than this
-  /// What speed, turning and distance grow to when the goal as received trembles: a set-point that
-  /// follows it never gets slower or closer than its noise.
-  double noisy_speed = 0.10;
-  double noisy_turning = 1.0;
-  double noisy_distance = 0.010;
   double follow_distance = 0.030;  ///< m: a goal that leaves this ball around the latched one …
   double follow_time = 0.2;        ///< s: … for this long is followed again
-};
-
-/// How noisy a goal is, 0: seen exactly, to 1; see GoalJitter::share().
-struct GoalNoise {
-  double position = 0.0;
-  double orientation = 0.0;
 };
 
 /// Latches the goal when a motion has ended, so that a noisy goal does not move an arm that has
@@ -40,9 +29,9 @@ class MotionEnd {
 
   /// One cycle.
   /// @param speed, turning of the set-point, m/s and rad/s.  @param position of the set-point, m.
-  /// @param goal as estimated, m.  @param raw_goal as received, m.  @param noise of the latter.
+  /// @param goal as estimated, m.  @param raw_goal as received, m.
   Event update(double dt, double phase, double speed, double turning, const Vector3& position,
-               const Vector3& goal, const Vector3& raw_goal, const GoalNoise& noise = {}) noexcept;
+               const Vector3& goal, const Vector3& raw_goal) noexcept;
 
   bool latched() const noexcept { return latched_; }
   const Vector3& latchedGoal() const noexcept { return goal_; }  ///< m, if latched()
