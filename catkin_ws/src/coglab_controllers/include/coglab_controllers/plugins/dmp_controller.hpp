@@ -27,8 +27,8 @@ namespace coglab_controllers {
 /// `goal_timeout` (s, dmp_goal; 0: never old), `goal_max_age` (s), `goal_max_jump` (m),
 /// `goal_lost_time` (s), `goal_finish_distance` (m), `goal_reach_margin` (m), `goal_time_constant`,
 /// `noisy_goal_time_constant` (s), `max_initial_distance` (m), `end_phase`, `end_speed` (m/s),
-/// `end_turning` (rad/s), `end_distance` (m), `noisy_end_speed`, `noisy_end_turning`,
-/// `noisy_end_distance`, `follow_distance` (m), `follow_time` (s), `arrive_distance` (m),
+/// `end_turning` (rad/s), `end_distance` (m),
+/// `follow_distance` (m), `follow_time` (s), `arrive_distance` (m),
 /// `settle_time` (s), `singularity_threshold`, `rotation_first_scaling`,
 /// `hold_blend` (s), `dmp_file` (a library to load at once); on ROS also `goal_tf_frame` (name
 /// under which the estimated goal is broadcast; empty: it is not).
