@@ -1,0 +1,326 @@
+"""Is this hand on its way to a handover, and where will it be at rest? A bank of motion hypotheses over its sights.
+
+Bayesian on-line change-point detection (Adams and MacKay 2007) with minimum-jerk motions: at each sight new motions may
+have begun, of each duration of a grid, toward a handover or toward anywhere else. Each hypothesis is a Kalman filter per
+axis on position, velocity, acceleration, end of the motion and the tracker's wandering error; its weight is the
+likelihood of all sights so far. A motion that is over is rest, at a handover or elsewhere.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from .minimum_jerk import ACCELERATION, END, POSITION, VELOCITY, transition
+
+ERROR = 4
+"""index of the tracker's error in the state"""
+STATES = 5
+NEVER = -math.inf
+"""arrival of what rests"""
+SPAWN_STEP = 0.035
+"""s between two beginnings of motions that are told apart, where sights are farther apart than that"""
+
+
+@dataclass(frozen=True)
+class ReachSettings:
+    """What is known before a hand is seen. Lengths in m, times in s, rates in 1/s."""
+
+    place: tuple[float, float, float] = (0.86, 0.0, 0.44)
+    """where a person's hand is at a handover, world axes"""
+    place_deviation: tuple[float, float, float] = (0.08, 0.10, 0.10)
+    handover_rate: float = 0.2
+    """of motions from rest toward a handover"""
+    other_rate: float = 0.2
+    """and of all other motions"""
+    reach_time: float = 1.2
+    """median duration of a motion toward a handover"""
+    reach_time_deviation: float = 0.25
+    """of its logarithm"""
+    reach_times: tuple[float, ...] = (0.7, 0.85, 1.0, 1.2, 1.4, 1.7, 2.1, 2.6)
+    """grid of durations"""
+    other_times: tuple[float, ...] = (0.25, 0.4, 0.6, 0.8, 1.0, 1.25, 1.6)
+    other_ways: tuple[float, float] = (0.06, 0.30)
+    """standard deviations per axis of the ways of all other motions, small and wide, one as likely as the other"""
+    correction_rate: float = 0.4
+    """of changes of a motion's end on the way, and of shifts of a hand at a handover"""
+    correction_times: tuple[float, ...] = (0.45, 0.7, 1.1)
+    correction_way: float = 0.10
+    """standard deviation per axis"""
+    vertical_share: float = 0.9
+    """of a motion's duration, within which its vertical part is over (Huber et al. 2009)"""
+    noise: float = 0.004
+    """standard deviation of the tracker's error per axis"""
+    noise_time: float = 0.5
+    """over which it wanders"""
+    rest_wander: float = 0.003
+    """of a hand at rest, m per square root of s"""
+    acceleration_wander: float = 0.8
+    """of a motion about minimum jerk, m/s^2 per square root of s"""
+    end_wander: float = 0.02
+    """of the end of a motion, m per square root of s"""
+    clutter_density: float = 0.01
+    """1/m^3, probability density of a sight that shows something else; where no hypothesis explains one better it is
+    left out"""
+    hypotheses: int = 220
+    """most that are kept"""
+
+
+@dataclass(frozen=True)
+class _Motions:
+    """A family of motions that may begin: durations (s), rates (1/s), variance (m^2) of their ends per axis, kind."""
+
+    times: np.ndarray
+    rates: np.ndarray
+    variance: np.ndarray
+    toward: bool
+
+    @staticmethod
+    def of(
+        times: Sequence[float], rate: float, deviations: Sequence[Sequence[float]], toward: bool, shares: np.ndarray
+    ) -> _Motions:
+        """Every duration with every deviation (m, per axis); ``shares`` of the rate by duration."""
+        n = len(deviations)
+        variance = np.repeat(np.array(deviations, dtype=float) ** 2, len(times), axis=0)
+        return _Motions(np.tile(times, n), np.tile(rate * shares / shares.sum() / n, n), variance, toward)
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """Of the motions toward a handover: where (m, mean and covariance) and at what stamp (s) the hand comes to rest,
+    when the motion began, where the hand rested before."""
+
+    end: np.ndarray
+    covariance: np.ndarray
+    arrival: float
+    arrival_deviation: float
+    onset: float
+
+
+class ReachBank:
+    """Of one hand. ``step`` with each sight, in the order of stamps; ``handover`` is then the probability that the hand
+    moves toward a handover or waits at one."""
+
+    def __init__(self, stamp: float, position: np.ndarray, settings: ReachSettings) -> None:
+        self.settings = s = settings
+        self.stamp = stamp
+        ratio = s.handover_rate / (s.handover_rate + s.other_rate)
+        at_place = ratio * _density(position - np.array(s.place), np.array(s.place_deviation))
+        elsewhere = (1.0 - ratio) * _density(position - np.array(s.place), np.full(3, 0.5))
+        # Whoever is seen for the first time has not been seen to come: rest at a handover is half as likely as it looks.
+        share = 0.5 * at_place / (at_place + elsewhere)
+        mean = np.zeros((2, 3, STATES))
+        mean[..., POSITION] = mean[..., END] = position
+        cov = np.zeros((2, 3, STATES, STATES))
+        for i in (POSITION, END):
+            for j in (POSITION, END):
+                cov[..., i, j] = s.noise**2
+        cov[..., ERROR, ERROR] = s.noise**2
+        cov[..., ERROR, POSITION] = cov[..., POSITION, ERROR] = -0.5 * s.noise**2
+        cov[..., ERROR, END] = cov[..., END, ERROR] = -0.5 * s.noise**2
+        self._mean, self._cov = mean, cov
+        self._begin = np.full(2, stamp)
+        self._arrival = np.full((2, 3), NEVER)
+        self._toward = np.array([True, False])
+        self._log_weight = np.log(np.array([max(share, 1e-9), 1.0 - share]))
+        self._place = np.array(s.place)
+        scale = np.log(np.array(s.reach_times) / s.reach_time) / s.reach_time_deviation
+        likely, alike = np.exp(-0.5 * scale**2), np.ones(len(s.other_times))
+        evenly = np.ones(len(s.correction_times))
+        small, wide = [[way] * 3 for way in s.other_ways]
+        self._reaches = _Motions.of(s.reach_times, s.handover_rate, [s.place_deviation], True, likely)
+        self._others = _Motions.of(s.other_times, s.other_rate, [small, wide], False, alike)
+        self._corrected = _Motions.of(s.correction_times, s.correction_rate, [[s.correction_way] * 3], True, evenly)
+        self._joined = _Motions.of(s.correction_times, s.correction_rate, [s.place_deviation], True, evenly)
+        self._withdrawn = _Motions.of(s.other_times, s.correction_rate, [wide], False, alike)
+        self._turned = _Motions.of(s.other_times, s.correction_rate, [small, wide], False, alike)
+
+    # -- what is believed ------------------------------------------------------------------------------------------
+
+    @property
+    def handover(self) -> float:
+        """Probability, 0..1."""
+        return float(np.exp(self._log_weight[self._toward]).sum())
+
+    def velocity(self) -> np.ndarray:
+        """m/s, expected now."""
+        velocity: np.ndarray = np.einsum("i,ij->j", np.exp(self._log_weight), self._mean[..., VELOCITY])
+        return velocity
+
+    def prediction(self) -> Prediction | None:
+        """None where no hypothesis is left of a motion toward a handover."""
+        if not self._toward.any():
+            return None
+        weight = np.exp(self._log_weight[self._toward] - self._log_weight[self._toward].max())
+        weight /= weight.sum()
+        ends = self._mean[self._toward][..., END]
+        end = weight @ ends
+        spread = ends - end
+        covariance = np.einsum("i,ij,ik->jk", weight, spread, spread)
+        covariance += np.diag(weight @ self._cov[self._toward][..., END, END])
+        arrivals = np.maximum(self._arrival[self._toward].max(axis=1), self.stamp)
+        arrival = float(weight @ arrivals)
+        deviation = math.sqrt(float(weight @ (arrivals - arrival) ** 2))
+        return Prediction(end, covariance, arrival, deviation, float(weight @ self._begin[self._toward]))
+
+    # -- a sight ---------------------------------------------------------------------------------------------------
+
+    def step(self, stamp: float, position: np.ndarray) -> bool:
+        """False where the sight is none of this hand, or shows it where no hand can be; nothing but time has passed
+        then."""
+        self._spawn(stamp)
+        self._predict(stamp)
+        log_likelihood = self._log_likelihood(position)
+        total = self._log_weight + log_likelihood
+        top = float(total.max())
+        evidence = top + math.log(float(np.exp(total - top).sum()))
+        seen = evidence > math.log(self.settings.clutter_density)
+        if seen:
+            self._update(position)
+            self._log_weight = total
+        self._merge_rest()
+        self._prune()
+        return seen
+
+    def forget(self) -> None:
+        """What was a motion toward a handover is any other motion from now on."""
+        self._toward = np.zeros_like(self._toward)
+        self._merge_rest()
+
+    def _spawn(self, stamp: float) -> None:
+        """Motions that have begun since the last sight: from rest, and changes of motions under way."""
+        resting = self._arrival[:, 0] == NEVER
+        gap = stamp - self.stamp
+        begins = self.stamp + np.arange(0.0, gap, max(SPAWN_STEP, gap / 8.0))
+        born: list[tuple[int, float, _Motions, np.ndarray, float]] = []
+        for source in np.flatnonzero(resting):
+            toward = bool(self._toward[source])
+            here = self._mean[source][:, POSITION]
+            for begin in begins:
+                during = gap / len(begins)
+                if toward:
+                    born.append((source, begin, self._corrected, here, during))
+                    born.append((source, begin, self._withdrawn, here, during))
+                else:
+                    born.append((source, begin, self._reaches, self._place, during))
+                    born.append((source, begin, self._others, here, during))
+        for toward in (True, False):
+            moving = np.flatnonzero(~resting & (self._toward == toward))
+            if not len(moving):
+                continue
+            source = moving[np.argmax(self._log_weight[moving])]
+            end = self._mean[source][:, END] if toward else self._place
+            born.append((source, self.stamp, self._corrected if toward else self._joined, end, gap))
+            here = self._mean[source][:, POSITION]
+            born.append((source, self.stamp, self._withdrawn if toward else self._turned, here, gap))
+        if born:
+            self._add(born)
+
+    def _add(self, born: list[tuple[int, float, _Motions, np.ndarray, float]]) -> None:
+        """New motions (source, begin in s, which, middle of their ends in m, s for which they could have begun)."""
+        counts = [len(motions.times) for _, _, motions, _, _ in born]
+        source = np.repeat([b[0] for b in born], counts)
+        begin = np.repeat([b[1] for b in born], counts)
+        mean, cov = self._mean[source], self._cov[source]
+        mean[..., END] = np.repeat([b[3] for b in born], counts, axis=0)
+        cov[..., END, :] = cov[..., :, END] = 0.0
+        cov[..., END, END] = np.concatenate([b[2].variance for b in born])
+        times = np.concatenate([b[2].times for b in born])
+        share = np.concatenate([b[2].rates * b[4] for b in born])
+        self._log_weight = np.append(self._log_weight, self._log_weight[source] + np.log(share))
+        self._mean = np.concatenate([self._mean, mean])
+        self._cov = np.concatenate([self._cov, cov])
+        self._begin = np.append(self._begin, begin)
+        duration = np.outer(times, [1.0, 1.0, self.settings.vertical_share])
+        self._arrival = np.concatenate([self._arrival, begin[:, None] + duration])
+        self._toward = np.append(self._toward, np.repeat([b[2].toward for b in born], counts))
+
+    def _predict(self, stamp: float) -> None:
+        s = self.settings
+        gap = stamp - self.stamp
+        resting = self._arrival == NEVER
+        # A motion that began after the last sight has moved since its beginning only.
+        since = np.where(resting, gap, stamp - np.maximum(self.stamp, self._begin)[:, None])
+        remaining = np.where(resting, 0.0, self._arrival - (stamp - since))
+        over = since >= remaining - 1e-9
+        a = np.zeros((*since.shape, STATES, STATES))
+        a[..., :ERROR, :ERROR] = transition(remaining, since)
+        keep = math.exp(-gap / s.noise_time)
+        a[..., ERROR, ERROR] = keep
+        self._mean = np.matmul(a, self._mean[..., None])[..., 0]
+        self._cov = np.matmul(np.matmul(a, self._cov), np.swapaxes(a, -1, -2))
+        self._cov[..., ERROR, ERROR] += s.noise**2 * (1.0 - keep**2)
+        wander = np.where(resting, s.rest_wander**2, s.end_wander**2) * since
+        self._cov[..., END, END] += wander
+        for i, j in ((POSITION, POSITION), (POSITION, END), (END, POSITION)):
+            self._cov[..., i, j] += np.where(over, wander, 0.0)
+        bent = np.where(over, 0.0, s.acceleration_wander**2) * since
+        self._cov[..., ACCELERATION, ACCELERATION] += bent
+        for i, j, power in ((VELOCITY, VELOCITY, 2), (POSITION, POSITION, 4)):
+            self._cov[..., i, j] += bent * since**power / (3.0 if power == 2 else 20.0)
+        for i, j, power, part in ((VELOCITY, ACCELERATION, 1, 2.0), (POSITION, ACCELERATION, 2, 6.0), (POSITION, VELOCITY, 3, 8.0)):
+            self._cov[..., i, j] += bent * since**power / part
+            self._cov[..., j, i] = self._cov[..., i, j]
+        self.stamp = stamp
+
+    def _innovation(self, position: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        c = self._cov
+        variance = c[..., POSITION, POSITION] + 2.0 * c[..., POSITION, ERROR] + c[..., ERROR, ERROR] + 1e-8
+        return position - self._mean[..., POSITION] - self._mean[..., ERROR], variance
+
+    def _log_likelihood(self, position: np.ndarray) -> np.ndarray:
+        innovation, variance = self._innovation(position)
+        result: np.ndarray = -0.5 * (innovation**2 / variance + np.log(2 * np.pi * variance)).sum(axis=1)
+        return result
+
+    def _update(self, position: np.ndarray) -> None:
+        innovation, variance = self._innovation(position)
+        seen = self._cov[..., POSITION] + self._cov[..., ERROR]
+        gain = seen / variance[..., None]
+        self._mean = self._mean + gain * innovation[..., None]
+        self._cov = self._cov - gain[..., :, None] * seen[..., None, :]
+
+    def _merge_rest(self) -> None:
+        """All motions of a kind that are over are one rest of that kind, with their mean and covariance."""
+        over = self._arrival.max(axis=1) <= self.stamp + 1e-9
+        rest = []
+        for toward in (True, False):
+            these = np.flatnonzero(over & (self._toward == toward))
+            if not len(these):
+                continue
+            log = self._log_weight[these]
+            total = log.max() + math.log(float(np.exp(log - log.max()).sum()))
+            weight = np.exp(log - total)
+            mean = np.einsum("i,ijk->jk", weight, self._mean[these])
+            spread = self._mean[these] - mean
+            cov = np.einsum("i,ijkl->jkl", weight, self._cov[these])
+            cov += np.einsum("i,ijk,ijl->jkl", weight, spread, spread)
+            rest.append((mean, cov, float(weight @ self._begin[these]), toward, total))
+        kept = ~over
+        if rest:
+            self._mean = np.concatenate([self._mean[kept], np.array([r[0] for r in rest])])
+            self._cov = np.concatenate([self._cov[kept], np.array([r[1] for r in rest])])
+            self._begin = np.append(self._begin[kept], [r[2] for r in rest])
+            self._arrival = np.concatenate([self._arrival[kept], np.full((len(rest), 3), NEVER)])
+            self._toward = np.append(self._toward[kept], [r[3] for r in rest])
+            self._log_weight = np.append(self._log_weight[kept], [r[4] for r in rest])
+
+    def _prune(self) -> None:
+        """The unlikely are dropped; the weights add up to one."""
+        top = float(self._log_weight.max())
+        keep = np.flatnonzero(self._log_weight > top - 16.0)
+        if len(keep) > self.settings.hypotheses:
+            best = np.argpartition(-self._log_weight[keep], self.settings.hypotheses)[: self.settings.hypotheses]
+            keep = keep[best]
+        self._mean, self._cov = self._mean[keep], self._cov[keep]
+        self._begin, self._arrival, self._toward = self._begin[keep], self._arrival[keep], self._toward[keep]
+        log = self._log_weight[keep]
+        self._log_weight = log - (top + math.log(float(np.exp(log - top).sum())))
+
+
+def _density(way: np.ndarray, deviation: np.ndarray) -> float:
+    """1/m^3, of a normal distribution with independent axes."""
+    return float(np.prod(np.exp(-0.5 * (way / deviation) ** 2) / (math.sqrt(2 * math.pi) * deviation)))
