@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -42,9 +42,11 @@ class ReachSettings:
     """of its logarithm"""
     reach_times: tuple[float, ...] = (0.7, 0.85, 1.0, 1.2, 1.4, 1.7, 2.1, 2.6)
     """grid of durations"""
-    other_times: tuple[float, ...] = (0.25, 0.4, 0.6, 0.8, 1.0, 1.25, 1.6)
-    other_ways: tuple[float, float] = (0.06, 0.30)
-    """standard deviations per axis of the ways of all other motions, small and wide, one as likely as the other"""
+    small_times: tuple[float, ...] = (0.25, 0.4, 0.6, 0.9)
+    wide_times: tuple[float, ...] = (0.5, 0.7, 0.9, 1.2, 1.6)
+    small_way: float = 0.06
+    """standard deviation per axis of the ways of small other motions, which are as likely as wide ones"""
+    wide_way: float = 0.30
     correction_rate: float = 0.4
     """of changes of a motion's end on the way, and of shifts of a hand at a handover"""
     correction_times: tuple[float, ...] = (0.45, 0.7, 1.1)
@@ -62,7 +64,7 @@ class ReachSettings:
     """of a motion about minimum jerk, m/s^2 per square root of s"""
     end_wander: float = 0.02
     """of the end of a motion, m per square root of s"""
-    clutter_density: float = 0.01
+    clutter_density: float = 1.0
     """1/m^3, probability density of a sight that shows something else; where no hypothesis explains one better it is
     left out"""
     hypotheses: int = 220
@@ -79,13 +81,20 @@ class _Motions:
     toward: bool
 
     @staticmethod
-    def of(
-        times: Sequence[float], rate: float, deviations: Sequence[Sequence[float]], toward: bool, shares: np.ndarray
-    ) -> _Motions:
-        """Every duration with every deviation (m, per axis); ``shares`` of the rate by duration."""
-        n = len(deviations)
-        variance = np.repeat(np.array(deviations, dtype=float) ** 2, len(times), axis=0)
-        return _Motions(np.tile(times, n), np.tile(rate * shares / shares.sum() / n, n), variance, toward)
+    def of(times: Sequence[float], rate: float, deviation: Sequence[float] | float, toward: bool) -> _Motions:
+        """Every duration as likely; ``deviation`` of the end in m."""
+        n = len(times)
+        variance = np.full((n, 3), np.square(deviation))
+        return _Motions(np.array(times), np.full(n, rate / n), variance, toward)
+
+    def and_(self, other: _Motions) -> _Motions:
+        """Both families."""
+        return _Motions(
+            np.append(self.times, other.times),
+            np.append(self.rates, other.rates),
+            np.concatenate([self.variance, other.variance]),
+            self.toward,
+        )
 
 
 @dataclass(frozen=True)
@@ -128,15 +137,16 @@ class ReachBank:
         self._log_weight = np.log(np.array([max(share, 1e-9), 1.0 - share]))
         self._place = np.array(s.place)
         scale = np.log(np.array(s.reach_times) / s.reach_time) / s.reach_time_deviation
-        likely, alike = np.exp(-0.5 * scale**2), np.ones(len(s.other_times))
-        evenly = np.ones(len(s.correction_times))
-        small, wide = [[way] * 3 for way in s.other_ways]
-        self._reaches = _Motions.of(s.reach_times, s.handover_rate, [s.place_deviation], True, likely)
-        self._others = _Motions.of(s.other_times, s.other_rate, [small, wide], False, alike)
-        self._corrected = _Motions.of(s.correction_times, s.correction_rate, [[s.correction_way] * 3], True, evenly)
-        self._joined = _Motions.of(s.correction_times, s.correction_rate, [s.place_deviation], True, evenly)
-        self._withdrawn = _Motions.of(s.other_times, s.correction_rate, [wide], False, alike)
-        self._turned = _Motions.of(s.other_times, s.correction_rate, [small, wide], False, alike)
+        likely = np.exp(-0.5 * scale**2)
+        reaches = _Motions.of(s.reach_times, s.handover_rate, s.place_deviation, True)
+        self._reaches = replace(reaches, rates=s.handover_rate * likely / likely.sum())
+        self._corrected = _Motions.of(s.correction_times, s.correction_rate, s.correction_way, True)
+        self._joined = _Motions.of(s.correction_times, s.correction_rate, s.place_deviation, True)
+        self._others = _Motions.of(s.small_times, s.other_rate / 2, s.small_way, False).and_(
+            _Motions.of(s.wide_times, s.other_rate / 2, s.wide_way, False)
+        )
+        self._turned = replace(self._others, rates=self._others.rates * s.correction_rate / s.other_rate)
+        self._withdrawn = _Motions.of(s.wide_times, s.correction_rate, s.wide_way, False)
 
     # -- what is believed ------------------------------------------------------------------------------------------
 
@@ -144,6 +154,11 @@ class ReachBank:
     def handover(self) -> float:
         """Probability, 0..1."""
         return float(np.exp(self._log_weight[self._toward]).sum())
+
+    def position(self) -> np.ndarray:
+        """m, expected now, without the tracker's error."""
+        position: np.ndarray = np.einsum("i,ij->j", np.exp(self._log_weight), self._mean[..., POSITION])
+        return position
 
     def velocity(self) -> np.ndarray:
         """m/s, expected now."""

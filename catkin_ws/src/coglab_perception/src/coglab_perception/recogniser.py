@@ -69,13 +69,22 @@ class Estimate:
     probabilities: dict[str, float] = field(default_factory=dict)
 
 
+@dataclass(frozen=True)
+class PatternEnd:
+    """Where the reach ends by the pattern that was recognised: its name, place of the hand (m) and variance per axis."""
+
+    pattern: str
+    place: np.ndarray
+    variance: np.ndarray
+
+
 class FeatureStream:
-    """Positions to features; finds rest and onset by itself."""
+    """Positions to features; finds rest and onset by itself. ``rest`` is where the hand rested last (m), None before."""
 
     def __init__(self, settings: RecogniserSettings) -> None:
         self.settings = settings
         self._history: deque[tuple[float, np.ndarray]] = deque()
-        self._rest: np.ndarray | None = None
+        self.rest: np.ndarray | None = None
         self._recent: deque[tuple[float, np.ndarray]] = deque()
         self.moving = False
         self.started = False
@@ -99,13 +108,13 @@ class FeatureStream:
         t0, p0 = self._history[0]
         velocity = (p - p0) / (stamp - t0) if stamp > t0 else np.zeros(3)
         self._follow_rest(stamp, p)
-        if self._rest is None:
+        if self.rest is None:
             return None
         if not self.moving:
-            if np.linalg.norm(p - self._rest) <= s.onset_distance:
+            if np.linalg.norm(p - self.rest) <= s.onset_distance:
                 return None
             self.moving = self.started = True
-        return np.concatenate([p - self._rest, velocity])
+        return np.concatenate([p - self.rest, velocity])
 
     def _follow_rest(self, stamp: float, p: np.ndarray) -> None:
         """The hand rests where the two halves of the last ``rest_time`` agree: noise averages out, motion does not."""
@@ -120,10 +129,10 @@ class FeatureStream:
         way = np.mean(places[half:], axis=0) - np.mean(places[:half], axis=0)
         if np.linalg.norm(way) > s.rest_speed * s.rest_time / 2:
             return
-        if self.moving or self._rest is None:
-            self._rest = np.mean(places, axis=0)
+        if self.moving or self.rest is None:
+            self.rest = np.mean(places, axis=0)
         # During the first frames of a reach the hand is still slow: follow only what is not yet a displacement.
-        self._rest = self._rest + 0.1 * (p - self._rest)
+        self.rest = self.rest + 0.1 * (p - self.rest)
         self.moving = False
 
 
@@ -159,6 +168,14 @@ class Recogniser:
             f.update(features)
         self.estimate = self._judge()
         return self.estimate
+
+    def pattern_end(self) -> PatternEnd | None:
+        """Where the present reach ends by the pattern that is decided, None without a decision: displacement and spread
+        of the model's last state."""
+        if not (self.estimate.decided and self.stream.moving) or self.stream.rest is None:
+            return None
+        model = next(p.model for p in self.patterns if p.name == self.estimate.pattern)
+        return PatternEnd(self.estimate.pattern, self.stream.rest + model.mean[-1, :3], model.variance[-1, :3])
 
     def _forget(self, stamp: float) -> None:
         """The hand rests: some time after a reach nothing is known any more."""

@@ -1,0 +1,91 @@
+"""Does this object move with the hand? A hidden Markov model over the object's ways between its sights.
+
+Three modes: carried (it goes where the hand goes), lying (it stays), free (it falls, or goes elsewhere). At rest the first
+two look alike, and their probability stays what it was; the first motion tells them apart.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+CARRIED, LYING, FREE = range(3)
+RATES = np.array([[0.0, 0.2, 0.3], [0.5, 0.0, 0.2], [0.3, 2.0, 0.0]])
+"""1/s, from mode (row) to mode: people take things up and put them down every few seconds; what falls is soon at rest"""
+
+
+@dataclass(frozen=True)
+class CarriedSettings:
+    """Lengths in m, times in s."""
+
+    reach: float = 0.25
+    """an object farther from the middle of the palm is in no hand"""
+    turning: float = 0.3
+    """share of the hand's way by which a carried object's way may differ, because the hand turns"""
+    free_speed: float = 1.0
+    """m/s, standard deviation per axis of the speed of what is free"""
+    fastest: float = 2.0
+    """m/s: a way at more than this is no way of this object, but of something that the tracker took for it"""
+    follow_time: float = 0.12
+    """over which the object's place in the hand is averaged"""
+    lost_time: float = 0.25
+    """after which a place that was not believed is believed"""
+    memory: float = 1.0
+    """for which an object that is not seen counts as seen"""
+
+
+class CarriedObject:
+    """One object. ``carried`` is the probability that it is in the hand, ``offset`` (m, world axes) its place from
+    there."""
+
+    def __init__(
+        self, stamp: float, position: np.ndarray, hand: np.ndarray, noise: tuple[float, float], settings: CarriedSettings
+    ) -> None:
+        self.settings = settings
+        self.stamp = stamp
+        self.offset = position - hand
+        self._noise, self._noise_time = noise
+        self._position, self._hand = position, hand
+        near = self._near()
+        self._modes = np.array([0.6, 0.35, 0.05] if near else [0.0, 0.7, 0.3])
+
+    @property
+    def carried(self) -> float:
+        """Probability, 0..1."""
+        return float(self._modes[CARRIED])
+
+    def step(self, stamp: float, position: np.ndarray, hand: np.ndarray, hand_error: float) -> None:
+        """A sight of it, with the hand's position at that stamp and its standard deviation beyond the tracker's error
+        (m)."""
+        s = self.settings
+        gap = stamp - self.stamp
+        if gap <= 0.0:
+            return
+        way, hand_way = position - self._position, hand - self._hand
+        error = 2.0 * self._noise**2 * (1.0 - math.exp(-gap / self._noise_time)) + 1e-7
+        if float(np.linalg.norm(way)) > s.fastest * gap + 4.0 * math.sqrt(error) and gap < s.lost_time:
+            return
+        variances = np.array(
+            [
+                error + 1e-7 + hand_error**2 + (s.turning**2 * float(hand_way @ hand_way)) / 3.0,
+                error + 1e-7,
+                error + (s.free_speed * gap) ** 2,
+            ]
+        )
+        misses = np.array([way - hand_way, way, way])
+        log = -0.5 * ((misses**2).sum(axis=1) / variances + 3.0 * np.log(variances))
+        self.stamp, self._position, self._hand = stamp, position, hand
+        moved = 1.0 - np.exp(-RATES * gap)
+        likely = self._modes @ (moved + np.diag(1.0 - moved.sum(axis=1)))
+        likely = np.maximum(likely, 1e-6) * np.exp(log - log.max())
+        if self._near():
+            self.offset = self.offset + (1.0 - math.exp(-gap / s.follow_time)) * (position - hand - self.offset)
+        else:
+            likely[CARRIED] = 0.0
+            self.offset = position - hand
+        self._modes = likely / likely.sum()
+
+    def _near(self) -> bool:
+        return float(np.linalg.norm(self._position - self._hand)) < self.settings.reach
