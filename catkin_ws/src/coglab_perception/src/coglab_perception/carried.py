@@ -12,8 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 
 CARRIED, LYING, FREE = range(3)
-RATES = np.array([[0.0, 0.2, 0.3], [0.5, 0.0, 0.2], [0.3, 2.0, 0.0]])
-"""1/s, from mode (row) to mode: people take things up and put them down every few seconds; what falls is soon at rest"""
+RATES = np.array([[0.0, 0.05, 0.1], [0.3, 0.0, 0.1], [0.3, 2.0, 0.0]])
+"""1/s, from mode (row) to mode: people take things up more readily than they let go; what falls is soon at rest"""
+JITTER = 0.0025
+"""m per axis, by which a hand at rest seems to go between two sights"""
 
 
 @dataclass(frozen=True)
@@ -64,13 +66,15 @@ class CarriedObject:
         if gap <= 0.0:
             return
         way, hand_way = position - self._position, hand - self._hand
-        error = 2.0 * self._noise**2 * (1.0 - math.exp(-gap / self._noise_time)) + 1e-7
+        # James and Stein: a way that may be nothing but jitter counts as none, or at rest what lies would look likelier.
+        hand_way = hand_way * max(0.0, 1.0 - 3.0 * JITTER**2 / max(1e-12, float(hand_way @ hand_way)))
+        error = 2.0 * self._noise**2 * (1.0 - math.exp(-gap / self._noise_time)) + JITTER**2
         if float(np.linalg.norm(way)) > s.fastest * gap + 4.0 * math.sqrt(error) and gap < s.lost_time:
             return
         variances = np.array(
             [
-                error + 1e-7 + hand_error**2 + (s.turning**2 * float(hand_way @ hand_way)) / 3.0,
-                error + 1e-7,
+                error + hand_error**2 + s.turning**2 * float(hand_way @ hand_way) / 3.0,
+                error,
                 error + (s.free_speed * gap) ** 2,
             ]
         )

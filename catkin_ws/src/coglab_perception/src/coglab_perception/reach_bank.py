@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import reduce
 
 import numpy as np
 
@@ -31,7 +32,7 @@ class ReachSettings:
 
     place: tuple[float, float, float] = (0.86, 0.0, 0.44)
     """where a person's hand is at a handover, world axes"""
-    place_deviation: tuple[float, float, float] = (0.08, 0.10, 0.10)
+    place_deviation: tuple[float, float, float] = (0.06, 0.08, 0.08)
     handover_rate: float = 0.2
     """of motions from rest toward a handover"""
     other_rate: float = 0.2
@@ -47,13 +48,20 @@ class ReachSettings:
     small_way: float = 0.06
     """standard deviation per axis of the ways of small other motions, which are as likely as wide ones"""
     wide_way: float = 0.30
+    return_rate: float = 1.0
+    """of motions back to where the hand usually rests, from a place farther away than twice return_way"""
+    return_way: float = 0.06
+    """standard deviation per axis of their ends"""
+    home_time: float = 4.0
+    """over which the place where the hand usually rests is averaged"""
     correction_rate: float = 0.4
     """of changes of a motion's end on the way, and of shifts of a hand at a handover"""
     correction_times: tuple[float, ...] = (0.45, 0.7, 1.1)
     correction_way: float = 0.10
     """standard deviation per axis"""
-    vertical_share: float = 0.9
-    """of a motion's duration, within which its vertical part is over (Huber et al. 2009)"""
+    vertical_shares: tuple[float, ...] = (0.82, 0.95)
+    """of a reach's duration, within which its vertical part is over (decoupled minimum jerk, Huber et al. 2009); one as
+    likely as the other, other motions have the last one"""
     noise: float = 0.004
     """standard deviation of the tracker's error per axis"""
     noise_time: float = 0.5
@@ -64,16 +72,19 @@ class ReachSettings:
     """of a motion about minimum jerk, m/s^2 per square root of s"""
     end_wander: float = 0.02
     """of the end of a motion, m per square root of s"""
-    clutter_density: float = 1.0
+    clutter_density: float = 10.0
     """1/m^3, probability density of a sight that shows something else; where no hypothesis explains one better it is
     left out"""
+    clutter_again: float = 1e4
+    """and right after such a sight: who has been mistaken for something else is mistaken for it again"""
     hypotheses: int = 220
     """most that are kept"""
 
 
 @dataclass(frozen=True)
 class _Motions:
-    """A family of motions that may begin: durations (s), rates (1/s), variance (m^2) of their ends per axis, kind."""
+    """A family of motions that may begin: durations (s) of the axes, rates (1/s), variance (m^2) of their ends per axis,
+    kind."""
 
     times: np.ndarray
     rates: np.ndarray
@@ -81,16 +92,18 @@ class _Motions:
     toward: bool
 
     @staticmethod
-    def of(times: Sequence[float], rate: float, deviation: Sequence[float] | float, toward: bool) -> _Motions:
-        """Every duration as likely; ``deviation`` of the end in m."""
+    def of(
+        times: Sequence[float], vertical: float, rate: float, deviation: Sequence[float] | float, toward: bool
+    ) -> _Motions:
+        """Every duration as likely, ``vertical`` times as long vertically; ``deviation`` of the end in m."""
         n = len(times)
         variance = np.full((n, 3), np.square(deviation))
-        return _Motions(np.array(times), np.full(n, rate / n), variance, toward)
+        return _Motions(np.outer(times, [1.0, 1.0, vertical]), np.full(n, rate / n), variance, toward)
 
     def and_(self, other: _Motions) -> _Motions:
         """Both families."""
         return _Motions(
-            np.append(self.times, other.times),
+            np.concatenate([self.times, other.times]),
             np.append(self.rates, other.rates),
             np.concatenate([self.variance, other.variance]),
             self.toward,
@@ -138,15 +151,23 @@ class ReachBank:
         self._place = np.array(s.place)
         scale = np.log(np.array(s.reach_times) / s.reach_time) / s.reach_time_deviation
         likely = np.exp(-0.5 * scale**2)
-        reaches = _Motions.of(s.reach_times, s.handover_rate, s.place_deviation, True)
-        self._reaches = replace(reaches, rates=s.handover_rate * likely / likely.sum())
-        self._corrected = _Motions.of(s.correction_times, s.correction_rate, s.correction_way, True)
-        self._joined = _Motions.of(s.correction_times, s.correction_rate, s.place_deviation, True)
-        self._others = _Motions.of(s.small_times, s.other_rate / 2, s.small_way, False).and_(
-            _Motions.of(s.wide_times, s.other_rate / 2, s.wide_way, False)
+        vertical, rate, wide = s.vertical_shares[-1], s.correction_rate, s.wide_way
+        by_share = [_Motions.of(s.reach_times, v, 1.0, s.place_deviation, True) for v in s.vertical_shares]
+        self._reaches = replace(
+            reduce(_Motions.and_, by_share), rates=np.tile(s.handover_rate * likely / likely.sum(), len(by_share)) / len(by_share)
         )
-        self._turned = replace(self._others, rates=self._others.rates * s.correction_rate / s.other_rate)
-        self._withdrawn = _Motions.of(s.wide_times, s.correction_rate, s.wide_way, False)
+        self._corrected = _Motions.of(s.correction_times, vertical, rate, s.correction_way, True)
+        self._joined = _Motions.of(s.correction_times, vertical, rate, s.place_deviation, True)
+        self._others = _Motions.of(s.small_times, vertical, s.other_rate / 2, s.small_way, False).and_(
+            _Motions.of(s.wide_times, vertical, s.other_rate / 2, wide, False)
+        )
+        self._turned = replace(self._others, rates=self._others.rates * rate / s.other_rate)
+        self._withdrawn = _Motions.of(s.wide_times, vertical, rate, wide, False)
+        self._left = _Motions.of(s.wide_times, vertical, rate / 2, wide, False)
+        self._retreated = _Motions.of(s.wide_times, vertical, rate / 2, s.return_way, False)
+        self._returned = _Motions.of(s.wide_times, vertical, s.return_rate, s.return_way, False)
+        self._home = position
+        self._seen = True
 
     # -- what is believed ------------------------------------------------------------------------------------------
 
@@ -186,18 +207,24 @@ class ReachBank:
     def step(self, stamp: float, position: np.ndarray) -> bool:
         """False where the sight is none of this hand, or shows it where no hand can be; nothing but time has passed
         then."""
+        gap = stamp - self.stamp
         self._spawn(stamp)
         self._predict(stamp)
         log_likelihood = self._log_likelihood(position)
         total = self._log_weight + log_likelihood
         top = float(total.max())
         evidence = top + math.log(float(np.exp(total - top).sum()))
-        seen = evidence > math.log(self.settings.clutter_density)
+        s = self.settings
+        seen = evidence > math.log(s.clutter_density if self._seen else s.clutter_again)
+        self._seen = seen
         if seen:
             self._update(position)
             self._log_weight = total
         self._merge_rest()
         self._prune()
+        rests = (self._arrival[:, 0] == NEVER) & ~self._toward
+        share = float(np.exp(self._log_weight[rests]).sum()) * (1.0 - math.exp(-gap / self.settings.home_time))
+        self._home = self._home + share * (self.position() - self._home)
         return seen
 
     def forget(self) -> None:
@@ -218,10 +245,13 @@ class ReachBank:
                 during = gap / len(begins)
                 if toward:
                     born.append((source, begin, self._corrected, here, during))
-                    born.append((source, begin, self._withdrawn, here, during))
+                    born.append((source, begin, self._left, here, during))
+                    born.append((source, begin, self._retreated, self._home, during))
                 else:
                     born.append((source, begin, self._reaches, self._place, during))
                     born.append((source, begin, self._others, here, during))
+                    if float(np.linalg.norm(here - self._home)) > 2.0 * self.settings.return_way:
+                        born.append((source, begin, self._returned, self._home, during))
         for toward in (True, False):
             moving = np.flatnonzero(~resting & (self._toward == toward))
             if not len(moving):
@@ -249,8 +279,7 @@ class ReachBank:
         self._mean = np.concatenate([self._mean, mean])
         self._cov = np.concatenate([self._cov, cov])
         self._begin = np.append(self._begin, begin)
-        duration = np.outer(times, [1.0, 1.0, self.settings.vertical_share])
-        self._arrival = np.concatenate([self._arrival, begin[:, None] + duration])
+        self._arrival = np.concatenate([self._arrival, begin[:, None] + times])
         self._toward = np.append(self._toward, np.repeat([b[2].toward for b in born], counts))
 
     def _predict(self, stamp: float) -> None:
