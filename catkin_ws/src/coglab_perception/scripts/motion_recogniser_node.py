@@ -1,9 +1,13 @@
 #!/usr/bin/python3
-"""The node motion_recogniser: partner's hand from tf2 -> reaching pattern on perception/recognition.
+"""The node motion_recogniser: partner's hand and objects from tf2 -> reaching pattern and belief of a handover.
 
-Publishes coglab_msgs/Recognition for each new transform of the hand: all probabilities, live. Names
-are relative. Parameters: perception/frames (mapping of frames.yaml); private: patterns (file of
-train_patterns.py), memory (s, how long an estimate outlives its reach; default the file's).
+Publishes for each new transform of the hand coglab_msgs/Recognition on perception/recognition (all
+probabilities, live) and coglab_msgs/HandoverBelief on perception/belief; broadcasts, while a place is
+predicted, the frames <hand>_ahead and <object>_ahead: where these will be at the handover, turned as
+they are seen now. Subscribes ih2_hand/hand_status: whether the robot holds something. Names are
+relative. Parameters: perception/frames (mapping of frames.yaml); private: patterns (file of
+train_patterns.py), memory (s, how long an estimate outlives its reach; default the file's), belief
+(mapping, config/belief.yaml).
 """
 
 from __future__ import annotations
@@ -11,20 +15,23 @@ from __future__ import annotations
 import dataclasses
 import sys
 
+import numpy as np
 import rospy
 import tf2_ros
-from coglab_msgs.msg import Recognition
-from coglab_perception.frames import FrameNames
+from coglab_msgs.msg import HandoverBelief, HandStatus, Recognition
+from coglab_perception.belief import Belief, BeliefFilter, BeliefSettings
+from coglab_perception.frames import AHEAD, FrameNames
 from coglab_perception.recogniser import CLOCK_JUMP, Recogniser, load_patterns
 from coglab_perception.tf_listener import TfListener
 from coglab_py import parameters
+from geometry_msgs.msg import Point, TransformStamped, Vector3
 
 
 class RecogniserNode:
-    """Thin node over Recogniser."""
+    """Thin node over Recogniser and BeliefFilter."""
 
     def __init__(self) -> None:
-        frames = FrameNames.from_mapping(
+        self.frames = frames = FrameNames.from_mapping(
             rospy.get_param("perception/frames", None), rospy.resolve_name("perception/frames")
         )
         path = parameters.read("~patterns", str, "")
@@ -36,12 +43,23 @@ class RecogniserNode:
         patterns, settings = load_patterns(path)
         memory = parameters.read("~memory", float, settings.memory, 0.0)
         self.recogniser = Recogniser(patterns, dataclasses.replace(settings, memory=memory))
+        self.filter = BeliefFilter(
+            BeliefSettings.from_mapping(parameters.read("~belief", dict, {}), rospy.resolve_name("~belief"))
+        )
         self.hand, self.base = frames.human_hand, frames.world
+        self.robot_holds = False
         self.buffer = tf2_ros.Buffer(rospy.Duration(2.0))
         self.listener = TfListener(self.buffer, self.base)
+        self.broadcaster = tf2_ros.TransformBroadcaster()
         self.publisher = rospy.Publisher("perception/recognition", Recognition, queue_size=1)
-        self.last = rospy.Time(0)  # stamp of the newest transform taken
+        self.beliefs = rospy.Publisher("perception/belief", HandoverBelief, queue_size=1)
+        self.last: dict[str, rospy.Time] = {}  # stamp of the newest transform taken, by frame
+        rospy.Subscriber("ih2_hand/hand_status", HandStatus, self.on_hand_status, queue_size=1)
         rospy.Timer(rospy.Duration(0.01), self.on_timer)
+
+    def on_hand_status(self, status: HandStatus) -> None:
+        """The robot's hand."""
+        self.robot_holds = bool(status.holding)
 
     def on_timer(self, _event: rospy.timer.TimerEvent) -> None:
         """The timer's thread would not survive an exception."""
@@ -51,25 +69,56 @@ class RecogniserNode:
             rospy.logerr_throttle(5.0, f"motion_recogniser: a transform of '{self.hand}' was not used: {error}")
 
     def take_newest(self) -> None:
-        """Take the newest transform once."""
-        try:
-            transform = self.buffer.lookup_transform(self.base, self.hand, rospy.Time(0))
-        except tf2_ros.TransformException:
+        """Take the newest transforms once: objects first, as the belief is about them when the hand is seen."""
+        for frame in self.listener.moving():
+            object_id = self.frames.object_id(frame)
+            if object_id and frame != self.hand:
+                self.take_object(frame, object_id)
+        transform = self.newest(self.hand)
+        if transform is None:
             return
-        late = (self.last - transform.header.stamp).to_sec()
-        if 0.0 <= late <= CLOCK_JUMP:
-            return
-        self.last = transform.header.stamp
         try:
-            self.publisher.publish(self.message(transform))
+            self.take_hand(transform)
         except rospy.ROSException:
             if not rospy.core.is_shutdown_requested():
                 raise  # else: rospy has closed the topic under a last tick of the timer
 
-    def message(self, transform) -> Recognition:
-        """What the recogniser says after this transform."""
-        p = transform.transform.translation
-        estimate = self.recogniser.update(self.last.to_sec(), (p.x, p.y, p.z))
+    def newest(self, frame: str) -> TransformStamped | None:
+        """The newest transform of a frame, None where it was taken already."""
+        try:
+            transform = self.buffer.lookup_transform(self.base, frame, rospy.Time(0))
+        except tf2_ros.TransformException:
+            return None
+        last = self.last.get(frame, rospy.Time(0))
+        if 0.0 <= (last - transform.header.stamp).to_sec() <= CLOCK_JUMP:
+            return None
+        self.last[frame] = transform.header.stamp
+        return transform
+
+    def take_object(self, frame: str, object_id: str) -> None:
+        """A sight of an object."""
+        transform = self.newest(frame)
+        if transform is not None:
+            self.filter.see_object(self.stamp(frame), object_id, position(transform), rospy.get_time())
+
+    def take_hand(self, transform: TransformStamped) -> None:
+        """A sight of the hand: what is recognised and believed after it."""
+        stamp, place = self.stamp(self.hand), position(transform)
+        self.recogniser.update(stamp, place)
+        self.publisher.publish(self.recognition())
+        end = self.recogniser.pattern_end()
+        belief = self.filter.see_hand(stamp, place, rospy.get_time(), self.robot_holds, end)
+        if belief.stamp == stamp:
+            self.beliefs.publish(self.message(belief))
+            self.broadcast(belief)
+
+    def stamp(self, frame: str) -> float:
+        """s, of the newest transform taken."""
+        return float(self.last[frame].to_sec())
+
+    def recognition(self) -> Recognition:
+        """What the recogniser says."""
+        estimate = self.recogniser.estimate
         message = Recognition(
             pattern=estimate.pattern,
             confidence=estimate.confidence,
@@ -78,13 +127,60 @@ class RecogniserNode:
             names=list(estimate.probabilities),
             probabilities=list(estimate.probabilities.values()),
         )
-        message.header.stamp = self.last
+        message.header.stamp = self.last[self.hand]
         message.header.frame_id = self.base
         return message
 
+    def message(self, belief: Belief) -> HandoverBelief:
+        """The belief as a message."""
+        message = HandoverBelief(
+            offer=belief.offer,
+            request=belief.request,
+            hand=self.hand,
+            object_id=belief.object_id,
+            pattern=belief.pattern,
+            time=belief.time,
+            time_deviation=belief.time_deviation,
+        )
+        message.header.stamp = self.last[self.hand]
+        message.header.frame_id = self.base
+        message.place_covariance = [-1.0] + [0.0] * 8
+        if belief.place is not None and belief.covariance is not None:
+            message.place = Point(*belief.place)
+            message.place_covariance = [float(v) for v in belief.covariance.ravel()]
+        return message
+
+    def broadcast(self, belief: Belief) -> None:
+        """The frames ahead of hand and object; none while no place is predicted, so that what follows one stops."""
+        places = {self.hand: belief.hand_place}
+        if belief.object_id:
+            places[self.frames.object_frame(belief.object_id)] = belief.place
+        transforms = []
+        for frame, place in places.items():
+            if place is None:
+                continue
+            try:
+                turned = self.buffer.lookup_transform(self.base, frame, rospy.Time(0)).transform.rotation
+            except tf2_ros.TransformException:
+                continue
+            ahead = TransformStamped(child_frame_id=frame + AHEAD)
+            ahead.header.stamp = self.last[self.hand]
+            ahead.header.frame_id = self.base
+            ahead.transform.translation = Vector3(*place)
+            ahead.transform.rotation = turned
+            transforms.append(ahead)
+        if transforms:
+            self.broadcaster.sendTransform(transforms)
+
+
+def position(transform: TransformStamped) -> np.ndarray:
+    """m."""
+    p = transform.transform.translation
+    return np.array([p.x, p.y, p.z])
+
 
 def main() -> int:
-    """Entry point; exit status 1 where frames or patterns cannot be used."""
+    """Entry point; exit status 1 where frames, patterns or parameters cannot be used."""
     rospy.init_node("motion_recogniser")
     try:
         RecogniserNode()

@@ -31,7 +31,7 @@ EXTRAPOLATED = 0.10
 class BeliefSettings:
     """Of the belief. Lengths in m, times in s."""
 
-    decision: float = 0.8
+    decision: float = 0.9
     """probability of an offer or a request from which one may act on it"""
     shown: float = 0.3
     """probability below which there is no prediction of a place"""

@@ -67,13 +67,14 @@ class CarriedObject:
             return
         way, hand_way = position - self._position, hand - self._hand
         # James and Stein: a way that may be nothing but jitter counts as none, or at rest what lies would look likelier.
-        hand_way = hand_way * max(0.0, 1.0 - 3.0 * JITTER**2 / max(1e-12, float(hand_way @ hand_way)))
+        moved = max(0.0, 1.0 - 3.0 * JITTER**2 / max(1e-12, float(hand_way @ hand_way)))
+        hand_way = moved * hand_way
         error = 2.0 * self._noise**2 * (1.0 - math.exp(-gap / self._noise_time)) + JITTER**2
         if float(np.linalg.norm(way)) > s.fastest * gap + 4.0 * math.sqrt(error) and gap < s.lost_time:
             return
         variances = np.array(
             [
-                error + hand_error**2 + s.turning**2 * float(hand_way @ hand_way) / 3.0,
+                error + moved * hand_error**2 + s.turning**2 * float(hand_way @ hand_way) / 3.0,
                 error,
                 error + (s.free_speed * gap) ** 2,
             ]
@@ -81,8 +82,8 @@ class CarriedObject:
         misses = np.array([way - hand_way, way, way])
         log = -0.5 * ((misses**2).sum(axis=1) / variances + 3.0 * np.log(variances))
         self.stamp, self._position, self._hand = stamp, position, hand
-        moved = 1.0 - np.exp(-RATES * gap)
-        likely = self._modes @ (moved + np.diag(1.0 - moved.sum(axis=1)))
+        changed = 1.0 - np.exp(-RATES * gap)
+        likely = self._modes @ (changed + np.diag(1.0 - changed.sum(axis=1)))
         likely = np.maximum(likely, 1e-6) * np.exp(log - log.max())
         if self._near():
             self.offset = self.offset + (1.0 - math.exp(-gap / s.follow_time)) * (position - hand - self.offset)

@@ -9,6 +9,10 @@ from typing import Any
 from coglab_py.yaml_file import YamlError, read
 
 
+AHEAD = "_ahead"
+"""ends the name of the frame where something tracked is predicted to be at the handover"""
+
+
 class FramesError(ValueError):
     """The frames' file or parameter cannot be used; the sentence says what is wrong with it."""
 
@@ -32,11 +36,16 @@ class FrameNames:
         """Frame of an object of the database."""
         return self.object.replace("{id}", object_id)
 
+    def object_id(self, frame: str) -> str:
+        """Id of the object whose frame a tracker shows by this name; empty for every other frame."""
+        before, _, after = self.object.partition("{id}")
+        if frame.endswith(AHEAD) or not (frame.startswith(before) and frame.endswith(after)):
+            return ""
+        return frame[len(before) : len(frame) - len(after)]
+
     def is_tracked(self, frame: str) -> bool:
         """Whether a tracker shows this frame: the partner's hand, or an object's."""
-        before, _, after = self.object.partition("{id}")
-        is_object = frame.startswith(before) and frame.endswith(after) and len(frame) > len(before) + len(after)
-        return frame == self.human_hand or is_object
+        return frame == self.human_hand or self.object_id(frame) != ""
 
     @staticmethod
     def from_mapping(data: Any, source: str = "perception/frames") -> FrameNames:

@@ -35,7 +35,7 @@ class ReachSettings:
     place_deviation: tuple[float, float, float] = (0.06, 0.08, 0.08)
     handover_rate: float = 0.2
     """of motions from rest toward a handover"""
-    other_rate: float = 0.2
+    other_rate: float = 0.4
     """and of all other motions"""
     reach_time: float = 1.2
     """median duration of a motion toward a handover"""

@@ -23,6 +23,10 @@ class TfListener(tf2_ros.TransformListener):
         self._moving: set[str] = set()
         super().__init__(buffer)
 
+    def moving(self) -> list[str]:
+        """Names of the frames that have been seen to move so far."""
+        return list(self._moving)
+
     def callback(self, data: TFMessage) -> None:
         limit = min(rospy.get_time() + AHEAD, LARGEST)
         data.transforms = [
