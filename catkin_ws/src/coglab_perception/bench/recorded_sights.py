@@ -19,6 +19,7 @@ from coglab_sim.tracker.tracker import PerceptionSettings, Sight, Tracker
 from scipy.spatial.transform import Rotation
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "test"))
+from other_motions import KINDS as KINDS
 from other_motions import other_motion
 
 DT = 0.01

@@ -35,7 +35,7 @@ class ReachSettings:
     place_deviation: tuple[float, float, float] = (0.06, 0.08, 0.08)
     handover_rate: float = 0.2
     """of motions from rest toward a handover"""
-    other_rate: float = 0.4
+    other_rate: float = 0.7
     """and of all other motions"""
     reach_time: float = 1.2
     """median duration of a motion toward a handover"""
@@ -54,7 +54,7 @@ class ReachSettings:
     """standard deviation per axis of their ends"""
     home_time: float = 4.0
     """over which the place where the hand usually rests is averaged"""
-    correction_rate: float = 0.4
+    correction_rate: float = 0.25
     """of changes of a motion's end on the way, and of shifts of a hand at a handover"""
     correction_times: tuple[float, ...] = (0.45, 0.7, 1.1)
     correction_way: float = 0.10
@@ -77,7 +77,7 @@ class ReachSettings:
     left out"""
     clutter_again: float = 1e4
     """and right after such a sight: who has been mistaken for something else is mistaken for it again"""
-    hypotheses: int = 220
+    hypotheses: int = 150
     """most that are kept"""
 
 
@@ -355,7 +355,7 @@ class ReachBank:
     def _prune(self) -> None:
         """The unlikely are dropped; the weights add up to one."""
         top = float(self._log_weight.max())
-        keep = np.flatnonzero(self._log_weight > top - 16.0)
+        keep = np.flatnonzero(self._log_weight > top - 13.0)
         if len(keep) > self.settings.hypotheses:
             best = np.argpartition(-self._log_weight[keep], self.settings.hypotheses)[: self.settings.hypotheses]
             keep = keep[best]
