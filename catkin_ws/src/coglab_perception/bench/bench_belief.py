@@ -42,9 +42,9 @@ class Run:
         """Index of the first belief at or above a level, delivered after a time."""
         return next((i for i, (t, b) in enumerate(self.beliefs) if t >= after and b.either >= level), None)
 
-    def gone_after(self, stamp: float) -> float:
-        """s from the delivery of the first sight of the hand with this stamp or a later one until there is no belief."""
-        sight = next((t for t, b in self.beliefs if b.stamp >= stamp), np.inf)
+    def gone_after(self, stamp: float, name: str) -> float:
+        """s from the delivery of the first sight of this frame with this stamp or a later one until there is no belief."""
+        sight = next((t for t, s in self.recording.sights if s.name == name and s.captured >= stamp), np.inf)
         return next((t - sight for t, b in self.beliefs if t >= sight and b.either < 0.1), np.inf)
 
 
@@ -181,9 +181,9 @@ def main() -> int:
     long = np.mean([sum(b.either >= level for _, b in r.beliefs) >= 6 for r in others])
     rows.append(row("... for 6 sights (0.2 s) and more", long, "share"))
     rows += calibration_rows(runs + others)
-    back = [r.gone_after(r.recording.back) for r in runs]
+    back = [r.gone_after(r.recording.back, HAND) for r in runs]
     rows.append(at_most(f"hand seen 0.10 m back to no belief, 95th percentile of {len(back)}", quantile(back, 0.95), "s", 0.2))
-    gone = [r.gone_after(r.recording.fall) for r in falls]
+    gone = [r.gone_after(r.recording.fall, OBJECT) for r in falls]
     rows.append(at_most(f"fall of the object seen to no belief, 95th percentile of {FALLS}", quantile(gone, 0.95), "s", 0.2))
     every = runs + others + falls
     per_sight = sum(r.spent for r in every) / sum(len(r.recording.sights) for r in every)
