@@ -1,13 +1,15 @@
 #!/usr/bin/python3
-"""The belief about offers and requests on drawn people who were not used for anything else, seen by the default tracker.
+"""The belief about offers and requests on drawn people who were not used for anything else, seen by the default
+tracker.
 
 Definitions, fixed before anything was measured. People: coglab_sim's, SEED + 0..99, each gives once and takes once; the
 robot's hand stands at home. Onset: the person's own speed (without sway and tremor) first above 0.02 m/s. Decision: the
-probability of offer or request is at or above `decision` after a sight, at the time of that sight's delivery. Place: of the
-object in the person's hand, else of the hand, at the end of the reach, in truth; half of the reach is half of its time.
-Other motions: 200 of test/other_motions.py, half with the object in the moving hand, half with one in the robot's; crossed:
-decision at any time of theirs. Withdrawal: the person takes the hand back 1 s after the reach; fall: the object leaves the
-hand at a random time of the reach or of the second after it; gone: probability below 0.1. Undecided is infinitely late.
+probability of offer or request is at or above `decision` after a sight, at the time of that sight's delivery. Place:
+of the object in the person's hand, else of the hand, at the end of the reach, in truth; half of the reach is half of
+its time. Other motions: 200 of test/other_motions.py, half with the object in the moving hand, half with one in the
+robot's; crossed: decision at any time of theirs. Withdrawal: the person takes the hand back 1 s after the reach;
+fall: the object leaves the hand at a random time of the reach or of the second after it; gone: probability below 0.1.
+Undecided is infinitely late.
 """
 
 from __future__ import annotations
@@ -43,7 +45,8 @@ class Run:
         return next((i for i, (t, b) in enumerate(self.beliefs) if t >= after and b.either >= level), None)
 
     def gone_after(self, stamp: float, name: str) -> float:
-        """s from the delivery of the first sight of this frame with this stamp or a later one until there is no belief."""
+        """s from the delivery of the first sight of this frame with this stamp or a later one until there is no
+        belief."""
         sight = next((t for t, s in self.recording.sights if s.name == name and s.captured >= stamp), np.inf)
         return next((t - sight for t, b in self.beliefs if t >= sight and b.either < 0.1), np.inf)
 
@@ -129,7 +132,9 @@ def place_rows(runs: list[Run], level: float) -> list[dict]:
     errors = [place_errors(run, level) for run in runs]
     for name in errors[0]:
         values = [e[name] for e in errors]
-        rows.append(row(f"error of the predicted place at {name}, median, {len(runs)} reaches", quantile(values, 0.5), "m"))
+        rows.append(
+            row(f"error of the predicted place at {name}, median, {len(runs)} reaches", quantile(values, 0.5), "m")
+        )
         rows.append(row("... 95th percentile", quantile(values, 0.95), "m"))
     steps, lapses = [], []
     for run in runs:
@@ -141,7 +146,13 @@ def place_rows(runs: list[Run], level: float) -> list[dict]:
             for a, b in zip(kept, kept[1:], strict=False)
             if a.place is not None and b.place is not None
         ]
-    rows.append(row(f"step of the place between {len(steps)} sights from the decision on, 99th percentile", quantile(steps, 0.99), "m"))
+    rows.append(
+        row(
+            f"step of the place between {len(steps)} sights from the decision on, 99th percentile",
+            quantile(steps, 0.99),
+            "m",
+        )
+    )
     rows.append(row("belief below 0.5 again before the hand goes back, or no decision", np.mean(lapses), "share"))
     return rows
 
@@ -149,7 +160,10 @@ def place_rows(runs: list[Run], level: float) -> list[dict]:
 def calibration_rows(runs: list[Run]) -> list[dict]:
     """How often what is believed is true, over all sights but those of falls."""
     pairs = [
-        (b.either, r.recording.toward[min(int(np.searchsorted(r.recording.times, b.stamp)), len(r.recording.toward) - 1)])
+        (
+            b.either,
+            r.recording.toward[min(int(np.searchsorted(r.recording.times, b.stamp)), len(r.recording.toward) - 1)],
+        )
         for r in runs
         for _, b in r.beliefs
     ]
@@ -166,9 +180,7 @@ def main() -> int:
     settings, patterns = BeliefSettings(), load_patterns(str(PATTERNS))
     level = settings.decision
     runs = [believe(handover(SEED + i, gives), settings, patterns) for i in range(PEOPLE) for gives in (True, False)]
-    others = [
-        believe(neither(KINDS[i % 3], i, SEED, (i // 3) % 2 == 0), settings, patterns) for i in range(OTHERS)
-    ]
+    others = [believe(neither(KINDS[i % 3], i, SEED, (i // 3) % 2 == 0), settings, patterns) for i in range(OTHERS)]
     when = np.random.default_rng(SEED).uniform(0.3, 2.0, FALLS)
     falls = [believe(handover(SEED + i, True, float(s)), settings, patterns) for i, s in enumerate(when)]
     rows = onset_rows(runs, level) + place_rows(runs, level)
@@ -182,9 +194,13 @@ def main() -> int:
     rows.append(row("... for 6 sights (0.2 s) and more", long, "share"))
     rows += calibration_rows(runs + others)
     back = [r.gone_after(r.recording.back, HAND) for r in runs]
-    rows.append(at_most(f"hand seen 0.10 m back to no belief, 95th percentile of {len(back)}", quantile(back, 0.95), "s", 0.2))
+    rows.append(
+        at_most(f"hand seen 0.10 m back to no belief, 95th percentile of {len(back)}", quantile(back, 0.95), "s", 0.2)
+    )
     gone = [r.gone_after(r.recording.fall, OBJECT) for r in falls]
-    rows.append(at_most(f"fall of the object seen to no belief, 95th percentile of {FALLS}", quantile(gone, 0.95), "s", 0.2))
+    rows.append(
+        at_most(f"fall of the object seen to no belief, 95th percentile of {FALLS}", quantile(gone, 0.95), "s", 0.2)
+    )
     every = runs + others + falls
     per_sight = sum(r.spent for r in every) / sum(len(r.recording.sights) for r in every)
     rows.append(at_most("time per sight of hand or object, mean", per_sight * 1e3, "ms", 5.0))

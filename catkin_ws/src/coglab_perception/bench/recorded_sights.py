@@ -1,6 +1,7 @@
 """Sights of simulated people for bench_belief: what the default tracker delivers of hand and object, with the truth.
 
-People are coglab_sim's, drawn as they are; the robot's hand stands at home. Motions of no handover are of other_motions.
+People are coglab_sim's, drawn as they are; the robot's hand stands at home. Motions of no handover are of
+other_motions.
 """
 
 from __future__ import annotations
@@ -37,8 +38,9 @@ ONSET_SPEED = 0.02
 @dataclass
 class Recording:
     """``sights`` as delivered: time of delivery (s) and sight. Truth: ``times`` (s), ``hand`` and ``thing`` (T, 3) m,
-    ``toward``: the hand is on its way to a handover or waits there. ``onset``, ``begin``, ``end`` of the reach, ``back``:
-    the withdrawal has come 0.10 m far, ``fall``: the object leaves the hand (s; infinite: does not happen)."""
+    ``toward``: the hand is on its way to a handover or waits there. ``onset``, ``begin``, ``end`` of the reach,
+    ``back``: the withdrawal has come 0.10 m far, ``fall``: the object leaves the hand (s; infinite: does not
+    happen)."""
 
     kind: str
     robot_holds: bool
@@ -88,7 +90,6 @@ def handover(seed: int, gives: bool, falls: float | None = None) -> Recording:
     observer = Observer(recording, seed)
     human.command("give mug" if gives else "receive mug")
     hand, t, speed, frozen = Pose(human.rest), 0.0, np.zeros(3), None
-    furthest = 0.0
     while t < 12.0:
         thing = hand * Pose(scene.object_in_hand, scene.object_turn) if gives else Pose(np.array(IN_PALM))
         if t >= recording.fall:
@@ -115,7 +116,9 @@ def handover(seed: int, gives: bool, falls: float | None = None) -> Recording:
         if t > recording.end + LOOK and human.phase == "waiting":
             human.command("rest")
         if human.phase == "retreating":
-            way = float(np.linalg.norm(hand.position - recording.hand[int(np.searchsorted(recording.times, recording.end))]))
+            way = float(
+                np.linalg.norm(hand.position - recording.hand[int(np.searchsorted(recording.times, recording.end))])
+            )
             if way > 0.10 and recording.back == np.inf:
                 recording.back = t
             if t > recording.back + 0.6:

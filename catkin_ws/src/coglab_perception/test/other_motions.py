@@ -20,7 +20,8 @@ SHOULDER = np.array([0.15, 0.0, 0.40])
 
 @dataclass
 class Segment:
-    """From place to place (m) in a time (s), beginning at ``begin``; ``swing`` (m) to and fro at ``rate`` Hz instead."""
+    """From place to place (m) in a time (s), beginning at ``begin``; ``swing`` (m) to and fro at ``rate`` Hz
+    instead."""
 
     begin: float
     duration: float

@@ -17,7 +17,16 @@ def test_the_file():
     frames = FrameNames.load(str(FILE))
     assert frames == FrameNames("world", "human_hand", "board", "object_{id}")
     assert frames.object_frame("mug") == "object_mug"
-    tracked = ("human_hand", "object_mug", "object_", "board", "world", "lwr_flange", "human_hand_ahead", "object_mug_ahead")
+    tracked = (
+        "human_hand",
+        "object_mug",
+        "object_",
+        "board",
+        "world",
+        "lwr_flange",
+        "human_hand_ahead",
+        "object_mug_ahead",
+    )
     assert [name for name in tracked if frames.is_tracked(name)] == ["human_hand", "object_mug"]
     assert [frames.object_id(name) for name in tracked] == ["", "mug", "", "", "", "", "", ""]
 

@@ -63,10 +63,15 @@ class BeliefSettings:
 
 
 def _read(default: Any, data: Any, source: str) -> Any:
-    """A settings object with the numbers of a mapping in the place of its own; each has to be finite and not negative."""
+    """A settings object with the numbers of a mapping in the place of its own; each has to be finite and not
+    negative."""
     if not isinstance(data, Mapping):
         raise ValueError(f"{source}: expected a mapping of numbers, got {str(data)[:60]!r}")
-    known = {f.name: getattr(default, f.name) for f in fields(default) if f.name not in ("reach", "carried") or f.type == "float"}
+    known = {
+        f.name: getattr(default, f.name)
+        for f in fields(default)
+        if f.name not in ("reach", "carried") or f.type == "float"
+    }
     unknown = sorted(set(map(str, data)) - set(known))
     if unknown:
         raise ValueError(f"{source}: unknown {', '.join(unknown)}; known: {', '.join(known)}")
@@ -82,7 +87,9 @@ def _read(default: Any, data: Any, source: str) -> Any:
         fixed = name in ("place", "place_deviation")
         if not good or not numbers or (fixed and len(numbers) != len(known[name])):
             wanted = f"{len(known[name]) if fixed else 'a list of'} numbers" if many else "a number"
-            raise ValueError(f"{source}/{name}: expected {wanted}{'' if signed else ' above 0'}, got {str(value)[:60]!r}")
+            raise ValueError(
+                f"{source}/{name}: expected {wanted}{'' if signed else ' above 0'}, got {str(value)[:60]!r}"
+            )
         kind = type(known[name])
         changes[name] = tuple(float(v) for v in numbers) if many else kind(value)
     return replace(default, **changes)

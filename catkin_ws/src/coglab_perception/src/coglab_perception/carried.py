@@ -1,7 +1,7 @@
 """Does this object move with the hand? A hidden Markov model over the object's ways between its sights.
 
-Three modes: carried (it goes where the hand goes), lying (it stays), free (it falls, or goes elsewhere). At rest the first
-two look alike, and their probability stays what it was; the first motion tells them apart.
+Three modes: carried (it goes where the hand goes), lying (it stays), free (it falls, or goes elsewhere). At rest the
+first two look alike, and their probability stays what it was; the first motion tells them apart.
 """
 
 from __future__ import annotations
@@ -43,7 +43,12 @@ class CarriedObject:
     there."""
 
     def __init__(
-        self, stamp: float, position: np.ndarray, hand: np.ndarray, noise: tuple[float, float], settings: CarriedSettings
+        self,
+        stamp: float,
+        position: np.ndarray,
+        hand: np.ndarray,
+        noise: tuple[float, float],
+        settings: CarriedSettings,
     ) -> None:
         self.settings = settings
         self.stamp = stamp
@@ -66,8 +71,8 @@ class CarriedObject:
         if gap <= 0.0:
             return
         way, hand_way = position - self._position, hand - self._hand
-        # James and Stein: a way that may be nothing but jitter counts as none, or at rest what lies would look likelier.
-        moved = max(0.0, 1.0 - 3.0 * JITTER**2 / max(1e-12, float(hand_way @ hand_way)))
+        # James and Stein: a way that may be nothing but jitter counts as none, or at rest what lies would look
+        likelier.moved = max(0.0, 1.0 - 3.0 * JITTER**2 / max(1e-12, float(hand_way @ hand_way)))
         hand_way = moved * hand_way
         error = 2.0 * self._noise**2 * (1.0 - math.exp(-gap / self._noise_time)) + JITTER**2
         if float(np.linalg.norm(way)) > s.fastest * gap + 4.0 * math.sqrt(error) and gap < s.lost_time:

@@ -8,7 +8,6 @@ from typing import Any
 
 from coglab_py.yaml_file import YamlError, read
 
-
 AHEAD = "_ahead"
 """ends the name of the frame where something tracked is predicted to be at the handover"""
 

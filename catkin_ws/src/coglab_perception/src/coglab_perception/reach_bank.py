@@ -1,8 +1,8 @@
 """Is this hand on its way to a handover, and where will it be at rest? A bank of motion hypotheses over its sights.
 
 Bayesian on-line change-point detection (Adams and MacKay 2007) with minimum-jerk motions: at each sight new motions may
-have begun, of each duration of a grid, toward a handover or toward anywhere else. Each hypothesis is a Kalman filter per
-axis on position, velocity, acceleration, end of the motion and the tracker's wandering error; its weight is the
+have begun, of each duration of a grid, toward a handover or toward anywhere else. Each hypothesis is a Kalman filter
+per axis on position, velocity, acceleration, end of the motion and the tracker's wandering error; its weight is the
 likelihood of all sights so far. A motion that is over is rest, at a handover or elsewhere.
 """
 
@@ -83,8 +83,8 @@ class ReachSettings:
 
 @dataclass(frozen=True)
 class _Motions:
-    """A family of motions that may begin: durations (s) of the axes, rates (1/s), variance (m^2) of their ends per axis,
-    kind."""
+    """A family of motions that may begin: durations (s) of the axes, rates (1/s), variance (m^2) of their ends per
+    axis, kind."""
 
     times: np.ndarray
     rates: np.ndarray
@@ -132,8 +132,8 @@ class ReachBank:
         ratio = s.handover_rate / (s.handover_rate + s.other_rate)
         at_place = ratio * _density(position - np.array(s.place), np.array(s.place_deviation))
         elsewhere = (1.0 - ratio) * _density(position - np.array(s.place), np.full(3, 0.5))
-        # Whoever is seen for the first time has not been seen to come: rest at a handover is half as likely as it looks.
-        share = 0.5 * at_place / (at_place + elsewhere)
+        # Whoever is seen for the first time has not been seen to come: rest at a handover is half as likely as it
+        looks.share = 0.5 * at_place / (at_place + elsewhere)
         mean = np.zeros((2, 3, STATES))
         mean[..., POSITION] = mean[..., END] = position
         cov = np.zeros((2, 3, STATES, STATES))
@@ -154,7 +154,8 @@ class ReachBank:
         vertical, rate, wide = s.vertical_shares[-1], s.correction_rate, s.wide_way
         by_share = [_Motions.of(s.reach_times, v, 1.0, s.place_deviation, True) for v in s.vertical_shares]
         self._reaches = replace(
-            reduce(_Motions.and_, by_share), rates=np.tile(s.handover_rate * likely / likely.sum(), len(by_share)) / len(by_share)
+            reduce(_Motions.and_, by_share),
+            rates=np.tile(s.handover_rate * likely / likely.sum(), len(by_share)) / len(by_share),
         )
         self._corrected = _Motions.of(s.correction_times, vertical, rate, s.correction_way, True)
         self._joined = _Motions.of(s.correction_times, vertical, rate, s.place_deviation, True)
@@ -305,7 +306,11 @@ class ReachBank:
         self._cov[..., ACCELERATION, ACCELERATION] += bent
         for i, j, power in ((VELOCITY, VELOCITY, 2), (POSITION, POSITION, 4)):
             self._cov[..., i, j] += bent * since**power / (3.0 if power == 2 else 20.0)
-        for i, j, power, part in ((VELOCITY, ACCELERATION, 1, 2.0), (POSITION, ACCELERATION, 2, 6.0), (POSITION, VELOCITY, 3, 8.0)):
+        for i, j, power, part in (
+            (VELOCITY, ACCELERATION, 1, 2.0),
+            (POSITION, ACCELERATION, 2, 6.0),
+            (POSITION, VELOCITY, 3, 8.0),
+        ):
             self._cov[..., i, j] += bent * since**power / part
             self._cov[..., j, i] = self._cov[..., i, j]
         self.stamp = stamp

@@ -71,7 +71,8 @@ class Estimate:
 
 @dataclass(frozen=True)
 class PatternEnd:
-    """Where the reach ends by the pattern that was recognised: its name, place of the hand (m) and variance per axis."""
+    """Where the reach ends by the pattern that was recognised: its name, place of the hand (m) and variance per
+    axis."""
 
     pattern: str
     place: np.ndarray
@@ -79,7 +80,8 @@ class PatternEnd:
 
 
 class FeatureStream:
-    """Positions to features; finds rest and onset by itself. ``rest`` is where the hand rested last (m), None before."""
+    """Positions to features; finds rest and onset by itself. ``rest`` is where the hand rested last (m), None
+    before."""
 
     def __init__(self, settings: RecogniserSettings) -> None:
         self.settings = settings
