@@ -72,7 +72,8 @@ class CarriedObject:
             return
         way, hand_way = position - self._position, hand - self._hand
         # James and Stein: a way that may be nothing but jitter counts as none, or at rest what lies would look
-        likelier.moved = max(0.0, 1.0 - 3.0 * JITTER**2 / max(1e-12, float(hand_way @ hand_way)))
+        # likelier.
+        moved = max(0.0, 1.0 - 3.0 * JITTER**2 / max(1e-12, float(hand_way @ hand_way)))
         hand_way = moved * hand_way
         error = 2.0 * self._noise**2 * (1.0 - math.exp(-gap / self._noise_time)) + JITTER**2
         if float(np.linalg.norm(way)) > s.fastest * gap + 4.0 * math.sqrt(error) and gap < s.lost_time:

@@ -133,7 +133,8 @@ class ReachBank:
         at_place = ratio * _density(position - np.array(s.place), np.array(s.place_deviation))
         elsewhere = (1.0 - ratio) * _density(position - np.array(s.place), np.full(3, 0.5))
         # Whoever is seen for the first time has not been seen to come: rest at a handover is half as likely as it
-        looks.share = 0.5 * at_place / (at_place + elsewhere)
+        # looks.
+        share = 0.5 * at_place / (at_place + elsewhere)
         mean = np.zeros((2, 3, STATES))
         mean[..., POSITION] = mean[..., END] = position
         cov = np.zeros((2, 3, STATES, STATES))
