@@ -54,7 +54,7 @@ class ReachSettings:
     """standard deviation per axis of their ends"""
     home_time: float = 4.0
     """over which the place where the hand usually rests is averaged"""
-    correction_rate: float = 0.25
+    correction_rate: float = 0.1
     """of changes of a motion's end on the way, and of shifts of a hand at a handover"""
     correction_times: tuple[float, ...] = (0.45, 0.7, 1.1)
     correction_way: float = 0.10
@@ -68,6 +68,8 @@ class ReachSettings:
     """over which it wanders"""
     rest_wander: float = 0.003
     """of a hand at rest, m per square root of s"""
+    wait_wander: float = 0.006
+    """of a hand that waits at a handover"""
     acceleration_wander: float = 0.8
     """of a motion about minimum jerk, m/s^2 per square root of s"""
     end_wander: float = 0.02
@@ -299,7 +301,8 @@ class ReachBank:
         self._mean = np.matmul(a, self._mean[..., None])[..., 0]
         self._cov = np.matmul(np.matmul(a, self._cov), np.swapaxes(a, -1, -2))
         self._cov[..., ERROR, ERROR] += s.noise**2 * (1.0 - keep**2)
-        wander = np.where(resting, s.rest_wander**2, s.end_wander**2) * since
+        of_rest = np.where(self._toward[:, None], s.wait_wander**2, s.rest_wander**2)
+        wander = np.where(resting, of_rest, s.end_wander**2) * since
         self._cov[..., END, END] += wander
         for i, j in ((POSITION, POSITION), (POSITION, END), (END, POSITION)):
             self._cov[..., i, j] += np.where(over, wander, 0.0)
