@@ -132,6 +132,7 @@ class BeliefFilter:
         self.belief = Belief(-math.inf)
         self._bank: ReachBank | None = None
         self._track: deque[tuple[float, np.ndarray]] = deque(maxlen=40)
+        """stamps with position and velocity (6) of the hand"""
         self._objects: dict[str, CarriedObject] = {}
         self._robot_holds: bool | None = None
         self._misses: list[float] = []
@@ -145,7 +146,7 @@ class BeliefFilter:
         position = np.asarray(position, dtype=float)
         if self._bank is None or not _usable(stamp, position, now):
             return
-        hand = self._hand_at(stamp)
+        hand, velocity = self._hand_at(stamp)
         known = self._objects.get(object_id)
         if known is not None and stamp < known.stamp - CLOCK_JUMP:
             known = None
@@ -155,7 +156,8 @@ class BeliefFilter:
             self._objects[object_id] = CarriedObject(stamp, position, hand, noise, self.settings.carried)
             return
         late = min(max(0.0, stamp - self._track[-1][0]), EXTRAPOLATED)
-        known.step(stamp, position, hand, 0.2 * late * float(np.linalg.norm(self._bank.velocity())) + 2.0 * late**2)
+        speed = float(np.linalg.norm(velocity))
+        known.step(stamp, position, hand, velocity, 0.2 * late * speed + 2.0 * late**2)
 
     def see_hand(
         self, stamp: float, position: np.ndarray, now: float, robot_holds: bool = False, end: PatternEnd | None = None
@@ -184,7 +186,7 @@ class BeliefFilter:
         self._bank = ReachBank(stamp, position, self.settings.reach)
         self._robot_holds = robot_holds
         self._track.clear()
-        self._track.append((stamp, position))
+        self._track.append((stamp, np.concatenate([position, np.zeros(3)])))
         self._objects.clear()
         self._misses.clear()
         self._rest = self._furthest = position
@@ -198,7 +200,7 @@ class BeliefFilter:
                 self._begin(stamp, position, bool(self._robot_holds))
             return
         self._misses.clear()
-        self._track.append((stamp, bank.position()))
+        self._track.append((stamp, np.concatenate([bank.position(), bank.velocity()])))
         prediction = bank.prediction()
         if prediction is None or bank.handover < s.shown:
             self._rest = self._furthest = position
@@ -212,15 +214,15 @@ class BeliefFilter:
             bank.forget()
             self._rest = self._furthest = position
 
-    def _hand_at(self, stamp: float) -> np.ndarray:
-        """m, where the hand was at a stamp, without the tracker's error, or where it would be."""
-        assert self._bank is not None
-        newest, position = self._track[-1]
+    def _hand_at(self, stamp: float) -> tuple[np.ndarray, np.ndarray]:
+        """m and m/s, where the hand was at a stamp, without the tracker's error, or where it would be."""
+        newest, state = self._track[-1]
         if stamp >= newest:
-            return position + min(stamp - newest, EXTRAPOLATED) * self._bank.velocity()
+            return state[:3] + min(stamp - newest, EXTRAPOLATED) * state[3:], state[3:]
         times = np.array([t for t, _ in self._track])
-        places = np.array([p for _, p in self._track])
-        return np.array([np.interp(stamp, times, places[:, axis]) for axis in range(3)])
+        states = np.array([p for _, p in self._track])
+        then = np.array([np.interp(stamp, times, states[:, i]) for i in range(6)])
+        return then[:3], then[3:]
 
     # -- judgement -------------------------------------------------------------------------------------------------
 

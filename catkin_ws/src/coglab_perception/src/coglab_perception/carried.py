@@ -54,7 +54,7 @@ class CarriedObject:
         self.stamp = stamp
         self.offset = position - hand
         self._noise, self._noise_time = noise
-        self._position, self._hand = position, hand
+        self._position, self._hand, self._velocity = position, hand, np.zeros(3)
         near = self._near()
         self._modes = np.array([0.6, 0.35, 0.05] if near else [0.0, 0.7, 0.3])
 
@@ -63,14 +63,16 @@ class CarriedObject:
         """Probability, 0..1."""
         return float(self._modes[CARRIED])
 
-    def step(self, stamp: float, position: np.ndarray, hand: np.ndarray, hand_error: float) -> None:
-        """A sight of it, with the hand's position at that stamp and its standard deviation beyond the tracker's error
-        (m)."""
+    def step(
+        self, stamp: float, position: np.ndarray, hand: np.ndarray, velocity: np.ndarray, hand_error: float
+    ) -> None:
+        """A sight of it, with the hand's position and velocity (m/s) at that stamp and the standard deviation of the
+        hand's way beyond the tracker's error (m)."""
         s = self.settings
         gap = stamp - self.stamp
         if gap <= 0.0:
             return
-        way, hand_way = position - self._position, hand - self._hand
+        way, hand_way = position - self._position, 0.5 * gap * (self._velocity + velocity)
         # James and Stein: a way that may be nothing but jitter counts as none, or at rest what lies would look
         # likelier.
         moved = max(0.0, 1.0 - 3.0 * JITTER**2 / max(1e-12, float(hand_way @ hand_way)))
@@ -87,7 +89,7 @@ class CarriedObject:
         )
         misses = np.array([way - hand_way, way, way])
         log = -0.5 * ((misses**2).sum(axis=1) / variances + 3.0 * np.log(variances))
-        self.stamp, self._position, self._hand = stamp, position, hand
+        self.stamp, self._position, self._hand, self._velocity = stamp, position, hand, velocity
         changed = 1.0 - np.exp(-RATES * gap)
         likely = self._modes @ (changed + np.diag(1.0 - changed.sum(axis=1)))
         likely = np.maximum(likely, 1e-6) * np.exp(log - log.max())
