@@ -23,6 +23,8 @@ AHEAD = 0.05
 """s by which clocks that are synchronised differ; what is stamped later than that has not happened"""
 ROOM = 100.0
 """m: no hand is farther away"""
+GONE = 0.05
+"""probability of a motion toward a handover below which there is none to take back"""
 EXTRAPOLATED = 0.10
 """s for which the hand goes on as it did, for an object that was seen after it"""
 
@@ -202,7 +204,7 @@ class BeliefFilter:
         self._misses.clear()
         self._track.append((stamp, np.concatenate([bank.position(), bank.velocity()])))
         prediction = bank.prediction()
-        if prediction is None or bank.handover < s.shown:
+        if prediction is None or bank.handover < GONE:
             self._rest = self._furthest = position
             return
         way = prediction.end - self._rest

@@ -148,6 +148,7 @@ class ReachBank:
         cov[..., ERROR, END] = cov[..., END, ERROR] = -0.5 * s.noise**2
         self._mean, self._cov = mean, cov
         self._begin = np.full(2, stamp)
+        self._onset = np.full(2, stamp)
         self._arrival = np.full((2, 3), NEVER)
         self._toward = np.array([True, False])
         self._log_weight = np.log(np.array([max(share, 1e-9), 1.0 - share]))
@@ -204,7 +205,7 @@ class ReachBank:
         arrivals = np.maximum(self._arrival[self._toward].max(axis=1), self.stamp)
         arrival = float(weight @ arrivals)
         deviation = math.sqrt(float(weight @ (arrivals - arrival) ** 2))
-        return Prediction(end, covariance, arrival, deviation, float(weight @ self._begin[self._toward]))
+        return Prediction(end, covariance, arrival, deviation, float(weight @ self._onset[self._toward]))
 
     # -- a sight ---------------------------------------------------------------------------------------------------
 
@@ -283,6 +284,9 @@ class ReachBank:
         self._mean = np.concatenate([self._mean, mean])
         self._cov = np.concatenate([self._cov, cov])
         self._begin = np.append(self._begin, begin)
+        # A changed reach has begun when the first one did.
+        changed = self._toward[source] & np.repeat([b[2].toward for b in born], counts)
+        self._onset = np.append(self._onset, np.where(changed, self._onset[source], begin))
         self._arrival = np.concatenate([self._arrival, begin[:, None] + times])
         self._toward = np.append(self._toward, np.repeat([b[2].toward for b in born], counts))
 
@@ -351,12 +355,13 @@ class ReachBank:
             spread = self._mean[these] - mean
             cov = np.einsum("i,ijkl->jkl", weight, self._cov[these])
             cov += np.einsum("i,ijk,ijl->jkl", weight, spread, spread)
-            rest.append((mean, cov, float(weight @ self._begin[these]), toward, total))
+            rest.append((mean, cov, float(weight @ self._onset[these]), toward, total))
         kept = ~over
         if rest:
             self._mean = np.concatenate([self._mean[kept], np.array([r[0] for r in rest])])
             self._cov = np.concatenate([self._cov[kept], np.array([r[1] for r in rest])])
-            self._begin = np.append(self._begin[kept], [r[2] for r in rest])
+            self._begin = np.append(self._begin[kept], np.full(len(rest), self.stamp))
+            self._onset = np.append(self._onset[kept], [r[2] for r in rest])
             self._arrival = np.concatenate([self._arrival[kept], np.full((len(rest), 3), NEVER)])
             self._toward = np.append(self._toward[kept], [r[3] for r in rest])
             self._log_weight = np.append(self._log_weight[kept], [r[4] for r in rest])
@@ -369,7 +374,8 @@ class ReachBank:
             best = np.argpartition(-self._log_weight[keep], self.settings.hypotheses)[: self.settings.hypotheses]
             keep = keep[best]
         self._mean, self._cov = self._mean[keep], self._cov[keep]
-        self._begin, self._arrival, self._toward = self._begin[keep], self._arrival[keep], self._toward[keep]
+        self._begin, self._onset = self._begin[keep], self._onset[keep]
+        self._arrival, self._toward = self._arrival[keep], self._toward[keep]
         log = self._log_weight[keep]
         self._log_weight = log - (top + math.log(float(np.exp(log - top).sum())))
 
