@@ -104,7 +104,7 @@ class RecogniserNode:
     def take_hand(self, transform: TransformStamped) -> None:
         """A sight of the hand: what is recognised and believed after it."""
         stamp, place = self.stamp(self.hand), position(transform)
-        self.recogniser.update(stamp, place)
+        self.recogniser.update(stamp, place.tolist())
         self.publisher.publish(self.recognition())
         end = self.recogniser.pattern_end()
         belief = self.filter.see_hand(stamp, place, rospy.get_time(), self.robot_holds, end)
