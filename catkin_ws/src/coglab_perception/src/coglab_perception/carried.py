@@ -72,11 +72,11 @@ class CarriedObject:
         gap = stamp - self.stamp
         if gap <= 0.0:
             return
-        way, hand_way = position - self._position, 0.5 * gap * (self._velocity + velocity)
-        # James and Stein: a way that may be nothing but jitter counts as none, or at rest what lies would look
-        # likelier.
-        moved = max(0.0, 1.0 - 3.0 * JITTER**2 / max(1e-12, float(hand_way @ hand_way)))
-        hand_way = moved * hand_way
+        way, believed = position - self._position, 0.5 * gap * (self._velocity + velocity)
+        # James and Stein, by the velocity that is believed: a way that may be nothing but jitter counts as none, or at
+        # rest what lies would look likelier.
+        moved = max(0.0, 1.0 - 3.0 * JITTER**2 / max(1e-12, float(believed @ believed)))
+        hand_way = moved * (hand - self._hand)
         error = 2.0 * self._noise**2 * (1.0 - math.exp(-gap / self._noise_time)) + JITTER**2
         if float(np.linalg.norm(way)) > s.fastest * gap + 4.0 * math.sqrt(error) and gap < s.lost_time:
             return

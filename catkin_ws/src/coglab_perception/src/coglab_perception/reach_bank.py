@@ -66,10 +66,8 @@ class ReachSettings:
     """standard deviation of the tracker's error per axis"""
     noise_time: float = 0.5
     """over which it wanders"""
-    rest_wander: float = 0.003
+    rest_wander: float = 0.004
     """of a hand at rest, m per square root of s"""
-    wait_wander: float = 0.006
-    """of a hand that waits at a handover"""
     acceleration_wander: float = 0.8
     """of a motion about minimum jerk, m/s^2 per square root of s"""
     end_wander: float = 0.02
@@ -305,8 +303,8 @@ class ReachBank:
         self._mean = np.matmul(a, self._mean[..., None])[..., 0]
         self._cov = np.matmul(np.matmul(a, self._cov), np.swapaxes(a, -1, -2))
         self._cov[..., ERROR, ERROR] += s.noise**2 * (1.0 - keep**2)
-        of_rest = np.where(self._toward[:, None], s.wait_wander**2, s.rest_wander**2)
-        wander = np.where(resting, of_rest, s.end_wander**2) * since
+        # The same for every rest, at a handover or not: else the one that fits a still hand better would win in time.
+        wander = np.where(resting, s.rest_wander**2, s.end_wander**2) * since
         self._cov[..., END, END] += wander
         for i, j in ((POSITION, POSITION), (POSITION, END), (END, POSITION)):
             self._cov[..., i, j] += np.where(over, wander, 0.0)
