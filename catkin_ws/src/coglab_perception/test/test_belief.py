@@ -114,6 +114,14 @@ def test_a_reach_is_believed_from_its_beginning_and_its_end_settles(holds):
         assert max(steps(scene.beliefs)) < 3.0, "no jump beyond what was said to be uncertain"
 
 
+def test_a_hand_that_waits_is_believed_for_as_long():
+    scene = Scene(13)
+    scene.error = dict.fromkeys(scene.error, np.zeros(3))
+    scene.seen = lambda name, place: place
+    scene.watch(there, carried(there), OVER + 3.0)
+    assert min(b.offer for b in scene.beliefs if b.stamp > OVER) > 0.8
+
+
 def test_without_an_object_in_either_hand_there_is_neither():
     scene = Scene(1).watch(there, lambda t: START + [0.0, -0.15, 0.0], OVER + 0.5)
     assert max(b.either for b in scene.beliefs) < LEVEL

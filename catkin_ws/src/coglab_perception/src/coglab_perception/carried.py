@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 CARRIED, LYING, FREE = range(3)
-RATES = np.array([[0.0, 0.05, 0.1], [0.3, 0.0, 0.1], [0.3, 2.0, 0.0]])
+RATES = np.array([[0.0, 0.02, 0.1], [0.3, 0.0, 0.1], [0.3, 2.0, 0.0]])
 """1/s, from mode (row) to mode: people take things up more readily than they let go; what falls is soon at rest"""
 JITTER = 0.003
 """m per axis, by which a hand at rest seems to go between two sights"""
