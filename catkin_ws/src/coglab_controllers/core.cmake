@@ -25,6 +25,7 @@ add_library(coglab_controllers_core
   src/ik/second_task.cpp
   src/ik/two_task_ik.cpp
   src/kinematics/chain.cpp
+  src/kinematics/dynamics.cpp
   src/kinematics/rotation.cpp
   src/limits/guard.cpp
   src/limits/phase_governor.cpp

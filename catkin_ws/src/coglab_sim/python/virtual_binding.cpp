@@ -84,6 +84,7 @@ py::dict reportOf(Robot& robot) {
   result["commanded_velocity"] = Vector7(sample.commanded_velocity);
   result["commanded_acceleration"] = Vector7(sample.commanded_acceleration);
   result["fri_period"] = sample.cycle_time;
+  result["torque"] = Vector7(sample.torque);
   result["external_torque"] = Vector7(sample.external_torque);
   result["cycles"] = report.cycles;
   return result;

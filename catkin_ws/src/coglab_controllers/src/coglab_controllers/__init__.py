@@ -7,6 +7,7 @@ lwr_a6). Arrays are numpy arrays of float64. Wrong input raises ``ValueError`` (
 
 from coglab_controllers._core import (
     MAX_BASIS,
+    ArmDynamics,
     CartesianMotion,
     CartesianReference,
     Chain,
@@ -37,6 +38,7 @@ from coglab_controllers._core import (
 
 __all__ = [
     "MAX_BASIS",
+    "ArmDynamics",
     "CartesianMotion",
     "CartesianReference",
     "Chain",

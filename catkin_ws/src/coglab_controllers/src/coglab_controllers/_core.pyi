@@ -281,6 +281,35 @@ class Chain:
     def joint_origins(self, q: ArrayLike) -> Array:
         """(7, 3) in m, a point on each joint's axis."""
 
+class DynamicTerms:
+    """Terms of M(q) q'' + C(q, q') q' + g(q) = torque + external torque; links only, without the motors."""
+
+    @property
+    def mass(self) -> Array:
+        """M (7, 7), kg m^2."""
+    @property
+    def momentum(self) -> Array:
+        """M q' (7,), kg m^2/s."""
+    @property
+    def coriolis(self) -> Array:
+        """C q' (7,), Nm."""
+    @property
+    def transposed(self) -> Array:
+        """C^T q' (7,), Nm: what a momentum observer needs."""
+    @property
+    def gravity(self) -> Array:
+        """g (7,), Nm."""
+
+class ArmDynamics:
+    """Rigid-body terms of the arm with its hand (fingers at zero) and a payload, by KDL on the text of a URDF."""
+
+    def __init__(self, urdf: str, base_link: str = "lwr_base_link", tip_link: str = "ih2_palm") -> None:
+        """ValueError if the URDF does not parse or has no chain of 7 joints between the links."""
+    def set_payload(self, mass: float, centre: ArrayLike = ...) -> None:
+        """A point of ``mass`` kg at ``centre`` (3,) m in the frame of the tip; 0 kg: nothing."""
+    def evaluate(self, q: ArrayLike, velocity: ArrayLike) -> DynamicTerms:
+        """Terms at q (7,) rad and velocity (7,) rad/s."""
+
 class IkResult:
     """One cycle of the inverse kinematics."""
 

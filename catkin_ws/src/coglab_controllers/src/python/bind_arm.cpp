@@ -1,5 +1,6 @@
 #include "bindings.hpp"
 #include "coglab_controllers/ik/two_task_ik.hpp"
+#include "coglab_controllers/kinematics/dynamics.hpp"
 
 namespace coglab_controllers::python {
 namespace {
@@ -31,6 +32,26 @@ void bindChain(py::module_& module) {
             return chain.evaluate(requireFinite(q, "q")).origins.transpose();
           },
           py::arg("q"), "A point on each joint's axis, (7, 3) in m.");
+}
+
+void bindDynamics(py::module_& module) {
+  py::class_<ArmDynamics>(module, "ArmDynamics", "Rigid-body terms of the arm, by KDL.")
+      .def(py::init<const std::string&, const std::string&, const std::string&>(), py::arg("urdf"),
+           py::arg("base_link") = "lwr_base_link", py::arg("tip_link") = "ih2_palm")
+      .def("set_payload", &ArmDynamics::setPayload, py::arg("mass"),
+           py::arg("centre") = Vector3(Vector3::Zero()))
+      .def(
+          "evaluate",
+          [](ArmDynamics& dynamics, const JointVector& q, const JointVector& velocity) {
+            return dynamics.evaluate(requireFinite(q, "q"), requireFinite(velocity, "velocity"));
+          },
+          py::arg("q"), py::arg("velocity"));
+  py::class_<DynamicTerms>(module, "DynamicTerms", "Terms at one posture and velocity.")
+      .def_readonly("mass", &DynamicTerms::mass)
+      .def_readonly("momentum", &DynamicTerms::momentum)
+      .def_readonly("coriolis", &DynamicTerms::coriolis)
+      .def_readonly("transposed", &DynamicTerms::transposed)
+      .def_readonly("gravity", &DynamicTerms::gravity);
 }
 
 void bindIk(py::module_& module) {
@@ -103,6 +124,7 @@ void bindIk(py::module_& module) {
 
 void bindArm(py::module_& module) {
   bindChain(module);
+  bindDynamics(module);
   bindIk(module);
   module.def(
       "exp_rotation", [](const Vector3& r) { return toArray(expRotation(r)); },

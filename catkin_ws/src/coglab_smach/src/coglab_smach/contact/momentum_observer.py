@@ -1,0 +1,140 @@
+"""External joint torques of a moving arm without accelerations: a momentum observer (De Luca, Haddadin).
+
+    r = K (p - integral of (tau + C^T q' - g + r)),   p = M(q) q'
+
+so that r follows the external torque as a first-order low-pass with the time constant 1/K. M, C and g are those of the
+robot description with what the hand is told to carry; tau is the measured torque between motors and links, so that
+friction of the drives and inertia of the motors do not enter. Velocities come from positions alone: the mean velocity
+between two samples, in the middle of them.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+Joints = Sequence[float] | np.ndarray
+"""seven numbers, one for each joint in wire order"""
+
+LONGEST_GAP = 0.05
+"""s between two samples that the observer bridges; after a longer one it begins anew"""
+
+
+class Terms(Protocol):
+    """Rigid-body terms at one posture and velocity, as coglab_controllers.DynamicTerms."""
+
+    @property
+    def momentum(self) -> np.ndarray:
+        """M q', kg m^2/s."""
+
+    @property
+    def transposed(self) -> np.ndarray:
+        """C^T q', Nm."""
+
+    @property
+    def gravity(self) -> np.ndarray:
+        """g, Nm."""
+
+
+class Dynamics(Protocol):
+    """The model of the arm, as coglab_controllers.ArmDynamics."""
+
+    def evaluate(self, q: np.ndarray, velocity: np.ndarray) -> Terms:
+        """Terms at q (rad) and velocity (rad/s)."""
+
+    def set_payload(self, mass: float, centre: np.ndarray) -> None:
+        """A point of ``mass`` kg at ``centre`` (m, frame of the palm) from now on."""
+
+
+@dataclass(frozen=True)
+class Residual:
+    """What the observer tells with one sample. Torques in Nm, rad/s, rad/s^2; seven joints each."""
+
+    stamp: float
+    torque: np.ndarray
+    """estimate of the external torque"""
+    position: np.ndarray
+    velocity: np.ndarray
+    acceleration: np.ndarray
+    """low-passed as the estimate is"""
+    fresh: bool = False
+    """the observer has begun anew: the estimates before this one do not count"""
+
+
+class MomentumObserver:
+    """One sample after the other; a sample that is no number is left out, one that comes after a long gap or with a
+    clock that was set begins a new estimate at zero error: what acts then counts as the arm's own."""
+
+    def __init__(self, dynamics: Dynamics, gain: float = 40.0, period: float = 0.0) -> None:
+        """``gain``: K, 1/s. ``period``: s between the robot's measurements, of which the times between samples are
+        whole multiples; 0: the stamps are exact. Stamps of reception jitter, and a velocity feels that."""
+        if not gain > 0.0 or not math.isfinite(gain):
+            raise ValueError(f"gain must be a positive number of 1/s, got {gain}")
+        self.gain, self.period = gain, period
+        self._dynamics = dynamics
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget everything."""
+        self._stamp: float | None = None
+        self._position = self._torque = np.zeros(7)
+        self._step = 0.0
+        self._velocity: np.ndarray | None = None
+        self._momentum = self._forces = np.zeros(7)
+        self._residual: np.ndarray | None = None
+        self._acceleration = np.zeros(7)
+
+    def set_payload(self, mass: float, centre: Joints) -> None:
+        """The hand carries this from now on. The estimate goes on without a step: momentum and gravity of the last
+        samples are taken anew with the new load, and what the load weighs is no external torque any more."""
+        self._dynamics.set_payload(mass, np.asarray(centre, dtype=float))
+        self._velocity = None
+        self._residual = None
+
+    def feed(self, stamp: float, position: Joints, torque: Joints) -> Residual | None:
+        """One sample: s, rad, Nm. None while too few samples have followed each other."""
+        q, tau = np.asarray(position, dtype=float), np.asarray(torque, dtype=float)
+        if not (math.isfinite(stamp) and np.all(np.isfinite(q)) and np.all(np.isfinite(tau))):
+            return None
+        step = self._since_last(stamp)
+        if step is None:
+            self.reset()
+        if step == 0.0:
+            return None
+        last_position, last_torque = self._position, self._torque
+        self._stamp, self._position, self._torque = stamp, q, tau
+        return None if step is None else self._advance(stamp, step, last_position, last_torque)
+
+    def _since_last(self, stamp: float) -> float | None:
+        """s since the last sample; None if this one does not follow it; 0 for one that was there already."""
+        if self._stamp is None:
+            return None
+        step = stamp - self._stamp
+        if step == 0.0 or not -LONGEST_GAP <= step <= LONGEST_GAP:
+            return 0.0 if step == 0.0 else None
+        if self.period > 0.0:
+            step = self.period * max(1, round(step / self.period))
+        return step if step > 0.0 else None
+
+    def _advance(self, stamp: float, step: float, before: np.ndarray, torque_before: np.ndarray) -> Residual | None:
+        velocity = (self._position - before) / step
+        terms = self._dynamics.evaluate(0.5 * (self._position + before), velocity)
+        momentum, forces = np.array(terms.momentum), np.array(terms.gravity) - np.array(terms.transposed)
+        last_velocity, last_momentum, last_forces, last_step = self._velocity, self._momentum, self._forces, self._step
+        self._velocity, self._momentum, self._forces, self._step = velocity, momentum, forces, step
+        if last_velocity is None:
+            return None
+        # From the middle of the last interval to that of this one: each of the two torques is a mean over its interval.
+        span = 0.5 * (step + last_step)
+        torque = (last_step * torque_before + step * self._torque) / (step + last_step)
+        outside = (momentum - last_momentum) / span + 0.5 * (forces + last_forces) - torque
+        fresh = self._residual is None
+        keep = 0.0 if fresh else math.exp(-self.gain * span)
+        last = np.zeros(7) if self._residual is None else self._residual
+        self._residual = keep * last + (1.0 - keep) * outside
+        self._acceleration = keep * self._acceleration + (1.0 - keep) * (velocity - last_velocity) / span
+        return Residual(stamp, self._residual, self._position, velocity, self._acceleration, fresh)
