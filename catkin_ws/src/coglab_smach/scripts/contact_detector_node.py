@@ -1,31 +1,42 @@
 #!/usr/bin/python3
-"""The node /contact_detector: external joint torques -> coglab/contact, armed by ~arm (coglab_msgs/ArmContact).
+"""The node /contact_detector: torques, fingers and touch -> coglab/contact, armed by ~arm (coglab_msgs/ArmContact).
 
-Subscribes lwr/external_torques (effort, Nm) and lwr/joint_states; names are relative. Parameters (private): the fields
-of coglab_smach.contact.detector.DetectorSettings; robot_description is read for the Jacobian.
+Subscribes lwr/external_torques (effort, Nm), lwr/joint_states (with measured torques as effort), lwr/state (FRI
+period), ih2_hand/hand_status and ih2_hand/fingertip_forces (~tactile_topic; nobody has to publish it); names are
+relative. Parameters (private): the fields of coglab_smach.contact.detector.DetectorSettings; robot_description is read
+for Jacobian and dynamics; ~thresholds_file: of the moving arm, learnt in simulation; ~learnt_file: where
+~learn_motion writes what this robot's own motions tell, and from where it is read at the next start.
 Publishes at 20 Hz ~margin (std_msgs/Float64) while watching, ~signal (coglab_msgs/ContactSignal) while torques come.
-Service ~learn (std_srvs/Trigger): the noise at rest anew.
+Services: ~learn (std_srvs/Trigger), the noise at rest anew; ~learn_motion (std_srvs/SetBool), true: gather motions
+without contact, false: learn from them.
 """
 
 import dataclasses
 import sys
 import threading
+from pathlib import Path
 
 import coglab_controllers as cc
 import numpy as np
 import rospy
-from coglab_msgs.msg import Contact, ContactSignal, ReasonCode
+from coglab_msgs.msg import Contact, ContactSignal, FingertipForces, HandStatus, LwrState, ReasonCode
 from coglab_msgs.srv import ArmContact, ArmContactResponse
 from coglab_py import parameters
+from coglab_py.packages import package_path
+from coglab_py.yaml_file import YamlError
 from coglab_smach.contact.detector import ContactDetector, DetectorSettings
+from coglab_smach.contact.fused_detector import IN_MOTION, FusedDetector
+from coglab_smach.contact.learning import MotionRecorder
+from coglab_smach.contact.motion_thresholds import ThresholdError, Thresholds
+from coglab_smach.contact.moving_contact import MovingContact
 from coglab_smach.ros.publish import publish
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64
-from std_srvs.srv import Trigger, TriggerResponse
+from std_srvs.srv import SetBool, SetBoolResponse, Trigger, TriggerResponse
 
 
 class ContactDetectorNode:
-    """Thin node over ContactDetector."""
+    """Thin node over FusedDetector."""
 
     def __init__(self, urdf: str) -> None:
         settings = DetectorSettings()
@@ -38,7 +49,11 @@ class ContactDetectorNode:
             setattr(settings, field.name, value)
         self.arm = cc.Chain(urdf)
         self.joints = tuple(self.arm.joint_names)
-        self.detector = ContactDetector(settings, lambda q: self.arm.jacobian(np.asarray(q, dtype=float))[:3])
+        jacobian = lambda q: self.arm.jacobian(np.asarray(q, dtype=float))[:3]  # noqa: E731
+        self.learnt_file = parameters.read("~learnt_file", str, "")
+        self.moving = MovingContact(self.thresholds(), cc.ArmDynamics(urdf), jacobian)
+        self.detector = FusedDetector(ContactDetector(settings, jacobian), self.moving)
+        self.recorder: MotionRecorder | None = None
         self.lock = threading.Lock()
         self.position: list[float] | None = None
         self.velocity: list[float] | None = None
@@ -48,16 +63,35 @@ class ContactDetectorNode:
         self.margin = rospy.Publisher("~margin", Float64, queue_size=1)
         self.signal = rospy.Publisher("~signal", ContactSignal, queue_size=1)
         self.shown: float | None = None  # stamp of the sample that ~signal was published for
-        rospy.Subscriber("lwr/joint_states", JointState, self.on_joints, queue_size=1, tcp_nodelay=True)
+        rospy.Subscriber("lwr/joint_states", JointState, self.on_joints, queue_size=20, tcp_nodelay=True)
+        rospy.Subscriber("lwr/state", LwrState, self.on_state, queue_size=1)
+        rospy.Subscriber("ih2_hand/hand_status", HandStatus, self.on_hand, queue_size=1)
+        tactile = parameters.read("~tactile_topic", str, "ih2_hand/fingertip_forces")
+        rospy.Subscriber(tactile, FingertipForces, self.on_touch, queue_size=5, tcp_nodelay=True)
         self.torques = rospy.Subscriber(
             "lwr/external_torques", JointState, self.on_torques, queue_size=20, tcp_nodelay=True
         )
         rospy.Service("~arm", ArmContact, self.on_arm)
         rospy.Service("~learn", Trigger, self.on_learn)
+        rospy.Service("~learn_motion", SetBool, self.on_learn_motion)
         rospy.Timer(rospy.Duration(0.05), self.on_timer)
 
+    def thresholds(self) -> Thresholds:
+        """Those that this robot has learnt, else those that come with the package."""
+        shipped = str(package_path("coglab_smach", "config", "contact_thresholds.yaml"))
+        file = Path(parameters.read("~thresholds_file", str, shipped))
+        if self.learnt_file and Path(self.learnt_file).is_file():
+            file = Path(self.learnt_file)
+        return Thresholds.load(file)
+
+    def on_state(self, message: LwrState) -> None:
+        """The FRI period: stamps of reception jitter, the robot's measurements do not."""
+        with self.lock:
+            self.moving.observer.period = message.cycle_time
+
     def on_joints(self, message: JointState) -> None:
-        """Positions and velocities in wire order; velocities are differentiated where the message has none."""
+        """Positions, velocities and torques in wire order; velocities are differentiated where the message has
+        none."""
         index = {name: i for i, name in enumerate(message.name)}
         if any(name not in index for name in self.joints) or len(message.position) != len(message.name):
             return
@@ -71,6 +105,28 @@ class ContactDetectorNode:
         else:
             velocity = None
         self.position, self.velocity, self.joint_stamp = position, velocity, stamp
+        if len(message.effort) != len(message.name):
+            return
+        with self.lock:
+            event = self.detector.feed_measured(stamp, position, [message.effort[i] for i in order])
+            if self.recorder is not None:
+                self.recorder.look()
+        self.publish_event(event, message.header.stamp)
+
+    def on_hand(self, message: HandStatus) -> None:
+        """Fingers; an empty hand carries nothing."""
+        with self.lock:
+            if message.connected and not message.holding and self.moving.load > 0.0:
+                self.detector.set_payload(0.0)
+            event = self.detector.feed_hand(message.header.stamp.to_sec(), message.motors)
+        self.publish_event(event, message.header.stamp)
+
+    def on_touch(self, message: FingertipForces) -> None:
+        """Forces on fingers and palm."""
+        forces = [(force.x, force.y, force.z) for force in [*message.forces, message.palm]]
+        with self.lock:
+            event = self.detector.feed_touch(message.header.stamp.to_sec(), forces, message.deviation)
+        self.publish_event(event, message.header.stamp)
 
     def on_torques(self, message: JointState) -> None:
         """Each torque sample goes through the detector; an event is published at once."""
@@ -79,6 +135,10 @@ class ContactDetectorNode:
         with self.lock:
             stamp = self.last_sample = message.header.stamp.to_sec()
             event = self.detector.feed(stamp, message.effort, self.position, self.velocity)
+        self.publish_event(event, message.header.stamp)
+
+    def publish_event(self, event, stamp) -> None:
+        """Tell it, if there is one; ``stamp``: of the sample that decided."""
         if event is None:
             return
         out = Contact(
@@ -89,7 +149,7 @@ class ContactDetectorNode:
             reason_code=event.code,
             message=event.message,
         )
-        out.header.stamp = message.header.stamp
+        out.header.stamp = stamp
         publish(self.publisher, out)
         rospy.loginfo("contact detector: %s", event.message)
 
@@ -112,15 +172,39 @@ class ContactDetectorNode:
                 )
             except ValueError as error:
                 return ArmContactResponse(False, ReasonCode.INVALID_ARGUMENT, str(error))
+        when = "now" if request.mode == IN_MOTION else "once the arm is still"
         return ArmContactResponse(
-            True, ReasonCode.NONE, f"watching for {request.mode} for {request.timeout:.1f} s once the arm is still"
+            True, ReasonCode.NONE, f"watching for {request.mode} for {request.timeout:.1f} s, {when}"
         )
+
+    def on_learn_motion(self, request):
+        """True: begin to gather motions without contact. False: end it, learn, write the file and use it from now
+        on."""
+        with self.lock:
+            if request.data:
+                self.recorder = MotionRecorder(self.moving)
+                return SetBoolResponse(True, "gathering: let the arm reach, with and without objects in the hand")
+            recorder, self.recorder = self.recorder, None
+            if recorder is None:
+                return SetBoolResponse(False, "nothing was gathered: call with data true first")
+            reaches = len(recorder.reaches)
+            if not self.learnt_file:
+                return SetBoolResponse(False, "parameter ~learnt_file says where to write, and is not set")
+        # Minutes of samples take seconds to learn from: meanwhile the detector goes on.
+        try:
+            thresholds = recorder.learn()
+            thresholds.save(Path(self.learnt_file))
+        except (ThresholdError, OSError) as error:
+            return SetBoolResponse(False, str(error))
+        with self.lock:
+            self.moving.thresholds = thresholds
+        return SetBoolResponse(True, f"learnt from {reaches} motions, written to {self.learnt_file}")
 
     def on_learn(self, _request):
         """Noise at rest."""
         with self.lock:
             try:
-                return TriggerResponse(True, self.detector.learn())
+                return TriggerResponse(True, self.detector.still.learn())
             except ValueError as error:
                 return TriggerResponse(False, str(error))
 
@@ -129,7 +213,7 @@ class ContactDetectorNode:
         with self.lock:
             before, stamp = self.shown, self.last_sample
             self.shown = stamp
-            seen, settings = self.detector.look(), self.detector.settings
+            seen, settings = self.detector.still.look(), self.detector.still.settings
         if seen.state == "watching":
             publish(self.margin, Float64(seen.margin))
         if stamp is None or stamp == before:
@@ -159,7 +243,7 @@ def main() -> int:
         return 1
     try:
         ContactDetectorNode(urdf)
-    except parameters.ParameterError as error:
+    except (parameters.ParameterError, ThresholdError, YamlError, OSError) as error:
         rospy.logfatal("contact_detector: %s", error)
         return 1
     rospy.spin()

@@ -89,11 +89,10 @@ class MomentumObserver:
         self._acceleration = np.zeros(7)
 
     def set_payload(self, mass: float, centre: Joints) -> None:
-        """The hand carries this from now on. The estimate goes on without a step: momentum and gravity of the last
-        samples are taken anew with the new load, and what the load weighs is no external torque any more."""
+        """The hand carries this from now on: what it weighs and its inertia are no external torque any more. The
+        estimate begins anew. ValueError for what is no mass."""
         self._dynamics.set_payload(mass, np.asarray(centre, dtype=float))
-        self._velocity = None
-        self._residual = None
+        self.reset()
 
     def feed(self, stamp: float, position: Joints, torque: Joints) -> Residual | None:
         """One sample: s, rad, Nm. None while too few samples have followed each other."""

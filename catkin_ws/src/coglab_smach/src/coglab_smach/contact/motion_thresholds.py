@@ -1,0 +1,203 @@
+"""How large the residual of a momentum observer gets without any contact, learnt from the robot's own reaches.
+
+What counts is the residual's change against its own mean of a moment ago: sensors' offsets, a wrong payload and other
+slow errors of the model drop out. Its variance, per joint, is a sum of shares that grow with speed, acceleration and
+load; the shares are learnt by non-negative least squares. The change is then explained by a force on the palm
+(generalised least squares), and the length of that force in standard deviations is compared with a limit that reaches
+without contact exceed with a chosen probability (Gumbel's law on the largest value of each reach).
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import yaml
+from coglab_py.yaml_file import read
+from scipy.optimize import nnls
+
+from coglab_smach.contact.momentum_observer import Residual
+
+FEATURES = ("constant", "speed", "speed squared", "acceleration squared", "load times acceleration squared")
+"""what a variance (Nm^2) grows with: 1, v (rad/s, fastest joint), v^2, a^2 (rad/s^2, fastest changing joint), and
+(kg rad/s^2)^2 of the payload told"""
+FLOOR = 1e-4
+"""Nm^2, smallest variance believed: a noise-free simulation must not alarm on rounding"""
+RECENT, OLD = 0.10, 0.25
+"""s: the change is counted from the mean between so long ago and so long ago"""
+LEAST = 5
+"""samples of that mean"""
+CONFIRM = 2
+"""samples in a row over the limit"""
+ALARM_SHARE = 2e-4
+"""probability with which a reach without contact may exceed the limit"""
+EULER = 0.5772156649015329
+
+
+class ThresholdError(ValueError):
+    """Thresholds that cannot be used or learnt; the sentence says why."""
+
+
+@dataclass(frozen=True)
+class Offset:
+    """Residual at rest after a motion less that at rest before it, Nm, with the palm's 3 x 7 Jacobian there."""
+
+    torque: np.ndarray
+    jacobian: np.ndarray
+
+
+@dataclass(frozen=True)
+class Change:
+    """The residual's change at one sample, Nm, with what its variance grows with and the palm's 3 x 7 Jacobian there."""
+
+    stamp: float
+    torque: np.ndarray
+    features: np.ndarray
+    jacobian: np.ndarray
+
+
+class ChangeOfResidual:
+    """The residual against its own mean of a moment ago."""
+
+    def __init__(self, jacobian: Any) -> None:
+        """``jacobian``: position of the joints (rad) to 3 x 7, m/rad, base frame."""
+        self._jacobian = jacobian
+        self._recent: deque[Residual] = deque()
+        self._old: deque[Residual] = deque()
+        self._sum = np.zeros(7)
+        self.past = np.zeros(7)
+        """Nm, the mean of a moment ago"""
+
+    def reset(self) -> None:
+        """Forget the past."""
+        self._recent.clear()
+        self._old.clear()
+        self._sum = np.zeros(7)
+
+    def feed(self, residual: Residual, load: float) -> Change | None:
+        """One residual, ``load`` kg told; None while there is no past to compare with."""
+        if residual.fresh:
+            self.reset()
+        self._recent.append(residual)
+        while self._recent and self._recent[0].stamp <= residual.stamp - RECENT:
+            self._old.append(self._recent.popleft())
+            self._sum = self._sum + self._old[-1].torque
+        while self._old and self._old[0].stamp < residual.stamp - OLD:
+            self._sum = self._sum - self._old.popleft().torque
+        if len(self._old) < LEAST:
+            return None
+        speed = float(np.max(np.abs(residual.velocity)))
+        acceleration = float(np.max(np.abs(residual.acceleration)))
+        features = np.array([1.0, speed, speed**2, acceleration**2, (load * acceleration) ** 2])
+        self.past = self._sum / len(self._old)
+        torque = residual.torque - self.past
+        return Change(residual.stamp, torque, features, self._jacobian(residual.position))
+
+
+@dataclass(frozen=True)
+class Thresholds:
+    """What was learnt: shares of the variance of a change (7 joints x FEATURES), standard deviations of an offset (7,
+    Nm), and of both the limit of the force in deviations."""
+
+    variance: np.ndarray
+    limit: float
+    steady: np.ndarray
+    steady_limit: float
+    reaches: int = 0
+
+    def deviation(self, features: np.ndarray) -> np.ndarray:
+        """Standard deviation of each joint's change without contact, Nm."""
+        return np.sqrt(np.maximum(self.variance @ features, FLOOR))
+
+    def force(self, change: Change) -> tuple[np.ndarray, float]:
+        """The force on the palm (N, base frame) that explains a change best, and its length in deviations."""
+        return explained(change.torque, self.deviation(change.features), change.jacobian)
+
+    def steady_force(self, offset: Offset, features: np.ndarray) -> tuple[np.ndarray, float]:
+        """The same of an offset, seen while the arm moves with these ``features``."""
+        deviation = np.sqrt(self.steady**2 + self.deviation(features) ** 2)
+        return explained(offset.torque, deviation, offset.jacobian)
+
+    def save(self, path: Path) -> None:
+        """Write the file; OSError where that is not possible."""
+        text = {
+            "features": list(FEATURES),
+            "variance": [[float(f"{v:.5g}") for v in row] for row in self.variance],
+            "limit": round(float(self.limit), 3),
+            "steady": [float(f"{v:.5g}") for v in self.steady],
+            "steady_limit": round(float(self.steady_limit), 3),
+            "reaches": int(self.reaches),
+        }
+        path.write_text(yaml.safe_dump(text, default_flow_style=None, sort_keys=False), encoding="utf-8")
+
+    @staticmethod
+    def load(path: Path) -> Thresholds:
+        """Read a file. ThresholdError, or an error of coglab_py.yaml_file, says what is wrong with it."""
+        data = read(path).value
+        if not isinstance(data, dict) or data.get("features") != list(FEATURES):
+            raise ThresholdError(f"{path}: expected the features {', '.join(FEATURES)}; learn the thresholds anew")
+        try:
+            variance = np.array(data["variance"], dtype=float)
+            limit, reaches = float(data["limit"]), int(data.get("reaches", 0))
+            steady, steady_limit = np.array(data["steady"], dtype=float), float(data["steady_limit"])
+        except (KeyError, TypeError, ValueError) as error:
+            raise ThresholdError(f"{path}: a figure is missing or is none: {error}") from error
+        good = all(np.all(np.isfinite(each)) and np.all(each >= 0.0) for each in (variance, steady))
+        if not good or variance.shape != (7, len(FEATURES)) or steady.shape != (7,):
+            raise ThresholdError(f"{path}: expected 7 x {len(FEATURES)} variances and 7 deviations, all 0 or more")
+        if not (0.0 < limit < 1e3 and 0.0 < steady_limit < 1e3):
+            raise ThresholdError(f"{path}: expected positive limits, got {limit} and {steady_limit}")
+        return Thresholds(variance, limit, steady, steady_limit, reaches)
+
+
+def explained(torque: np.ndarray, deviation: np.ndarray, jacobian: np.ndarray) -> tuple[np.ndarray, float]:
+    """The force on the palm (N) behind joint torques (Nm) with these deviations, and its length in deviations."""
+    weighed = jacobian / deviation
+    information = weighed @ weighed.T
+    # A stretched arm feels no force along itself: the small share keeps the solution finite there.
+    steadied = information + 1e-9 * np.trace(information) * np.eye(3)
+    force = np.linalg.solve(steadied, weighed @ (torque / deviation))
+    return force, float(np.sqrt(max(0.0, force @ information @ force)))
+
+
+def learn(
+    reaches: Iterable[Sequence[Change]], offsets: Sequence[Offset] = (), alarm_share: float = ALARM_SHARE
+) -> Thresholds:
+    """From the changes of whole reaches without contact, at least 20 of them, and their offsets where the hand was
+    empty. ThresholdError says what is missing."""
+    runs = [list(reach) for reach in reaches if len(reach) >= CONFIRM]
+    if len(runs) < 20:
+        raise ThresholdError(f"expected at least 20 reaches without contact, got {len(runs)}")
+    features = np.array([change.features for run in runs for change in run])
+    torques = np.array([change.torque for run in runs for change in run])
+    # A squared change scatters with its own size: weighing by that size keeps the quiet samples' share.
+    variance = np.full((7, len(FEATURES)), 0.0)
+    for joint in range(7):
+        squares, weight = torques[:, joint] ** 2, np.ones(len(features))
+        for _ in range(4):
+            variance[joint] = nnls(features * weight[:, None], squares * weight)[0]
+            weight = 1.0 / np.maximum(features @ variance[joint], FLOOR)
+    rests = np.array([offset.torque for offset in offsets]).reshape(-1, 7)
+    # Until offsets were seen an offset has to be as large as the one that D4.10's detector asks for.
+    steady = np.sqrt(np.mean(rests**2, axis=0)) if len(rests) >= 20 else np.full(7, 0.3)
+    draft = Thresholds(variance, 1.0, steady, 1.0, len(runs))
+    changed = [largest_confirmed([draft.force(change)[1] for change in run]) for run in runs]
+    rested = [explained(each.torque, steady, each.jacobian)[1] for each in offsets] if len(rests) >= 20 else [4.0]
+    return Thresholds(variance, limit_of(changed, alarm_share), steady, limit_of(rested, alarm_share), len(runs))
+
+
+def limit_of(largest: Sequence[float], alarm_share: float) -> float:
+    """What the largest value of a reach exceeds with this probability, by Gumbel's law; never less than was seen."""
+    scale = float(np.std(largest)) * np.sqrt(6.0) / np.pi
+    gumbel = float(np.mean(largest)) - EULER * scale - scale * float(np.log(-np.log1p(-alarm_share)))
+    return max(gumbel, 1.05 * float(np.max(largest)))
+
+
+def largest_confirmed(values: Sequence[float]) -> float:
+    """The largest value that CONFIRM samples in a row have reached."""
+    each = np.asarray(values, dtype=float)
+    return float(np.max(np.minimum.reduce([each[k : len(each) - CONFIRM + 1 + k] for k in range(CONFIRM)])))

@@ -1,0 +1,111 @@
+"""Contact from the torques of an arm that moves: momentum observer, its change, thresholds that were learnt."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from coglab_smach.contact.evidence import MOMENTUM, Evidence
+from coglab_smach.contact.momentum_observer import Dynamics, Joints, MomentumObserver, Residual
+from coglab_smach.contact.motion_thresholds import CONFIRM, Change, ChangeOfResidual, Offset, Thresholds
+
+HOLD = 0.03
+"""s for which one sample counts"""
+STILL = 0.02
+"""rad/s; a joint faster than this is motion"""
+SETTLED = 0.25
+"""s of stillness before the residual is taken as that of a free arm"""
+
+
+class MovingContact:
+    """Feed it every sample of lwr/joint_states; it answers with evidence. The hand carries nothing until it is told."""
+
+    def __init__(
+        self,
+        thresholds: Thresholds,
+        dynamics: Dynamics,
+        jacobian: Callable[[Joints], np.ndarray],
+        period: float = 0.0,
+    ) -> None:
+        """``jacobian``: position of the joints (rad) to the palm's 3 x 7, base frame. ``period``: see
+        MomentumObserver."""
+        self.thresholds = thresholds
+        self.observer = MomentumObserver(dynamics, period=period)
+        self.load = 0.0
+        self.change: Change | None = None
+        """the newest one"""
+        self.force = np.zeros(3)
+        """N on the palm, base frame, that explains it"""
+        self._changes = ChangeOfResidual(jacobian)
+        self._sizes: list[float] = []
+        self._still_since: float | None = None
+        self._rest: np.ndarray | None = None
+        self._free: np.ndarray | None = None
+        """mean residual of the rest before the motion, or of this one while the arm has not moved"""
+
+    def set_payload(self, mass: float, centre: Joints = (0.0, 0.0, 0.0)) -> None:
+        """The hand carries ``mass`` kg at ``centre`` (m, ih2_palm) from now on; the past does not count any more, so
+        that the load's own coming is no contact. ValueError for what is no mass."""
+        self.observer.set_payload(mass, centre)
+        self.load = mass
+        self._forget()
+
+    def _forget(self) -> None:
+        self._changes.reset()
+        self._sizes.clear()
+        self.change = self._still_since = self._rest = self._free = None
+
+    def still(self) -> bool:
+        """Whether the arm has stood still long enough."""
+        return self._rest is not None
+
+    def offset(self) -> Offset | None:
+        """Residual of a moment ago less that of the last rest before the motion; None where no rest was seen."""
+        if self.change is None or self._free is None:
+            return None
+        return Offset(self._changes.past - self._free, self.change.jacobian)
+
+    def offset_of_motion(self) -> Offset | None:
+        """Residual of this rest less that of the rest before the motion; None while the arm moves."""
+        if self.change is None or self._free is None or self._rest is None:
+            return None
+        return Offset(self._rest - self._free, self.change.jacobian)
+
+    def steady(self) -> Evidence | None:
+        """What the offset says: a person who was early has left one before anybody watched."""
+        offset = self.offset()
+        if offset is None or self.change is None or self.load > 0.0:
+            return None
+        force, size = self.thresholds.steady_force(offset, self.change.features)
+        stamp, margin = self.change.stamp, size / self.thresholds.steady_limit
+        message = f"{float(np.linalg.norm(force)):.1f} N on the hand since the arm stood still: it was there already"
+        return Evidence(MOMENTUM, stamp, stamp + HOLD, margin, message)
+
+    def _follow_rest(self, residual: Residual) -> None:
+        if float(np.max(np.abs(residual.velocity))) > STILL:
+            if self._rest is not None:
+                self._free = self._rest
+            self._still_since = self._rest = None
+        elif self._still_since is None:
+            self._still_since = residual.stamp
+        elif residual.stamp - self._still_since >= SETTLED:
+            rest = residual.torque if self._rest is None else self._rest
+            self._rest = rest + 0.02 * (residual.torque - rest)
+
+    def feed(self, stamp: float, position: Joints, torque: Joints) -> Evidence | None:
+        """One sample: s, rad, Nm as measured. None while there is too little of a past."""
+        residual = self.observer.feed(stamp, position, torque)
+        if residual is None:
+            return None
+        if residual.fresh:
+            self._forget()
+        self._follow_rest(residual)
+        self.change = self._changes.feed(residual, self.load)
+        if self.change is None:
+            return None
+        self.force, size = self.thresholds.force(self.change)
+        self._sizes = [*self._sizes, size][-CONFIRM:]
+        margin = min(self._sizes) / self.thresholds.limit if len(self._sizes) == CONFIRM else 0.0
+        message = f"{float(np.linalg.norm(self.force)):.1f} N on the hand, {size:.0f} deviations of the moving arm's"
+        return Evidence(MOMENTUM, stamp, stamp + HOLD, margin, message)
