@@ -1,4 +1,4 @@
-"""Reaches of the shipped DMP plug-in in the virtual world, with and without somebody's push, as the robot measures them.
+"""Reaches of the shipped DMP plug-in in the virtual world, with and without a push, as the robot measures them.
 
 A reach: the arm stands at home, a hand moves into the handover region (minimum jerk, seen by the shipped tracker), the
 arm reaches for it with the shipped primitives, orientation and configuration; nothing touches it unless a push is
@@ -8,7 +8,9 @@ time of the hand, duration x 0.8 .. 1.3 of the shipped one, and in half of the r
 whose true mass is 0.7 .. 1.3 times what its file, and so the observer, says.
 
 A push is a force on the palm, applied in the physics: from 0 to ``NEWTON`` N in ``RISE`` s, then constant. It begins
-where the way that remains falls below a share of the whole that is uniform in the last third.
+where the way that remains falls below a share of the whole that is uniform in the last third. Instead of a push the
+person's hand may come: from that moment on it moves from ``AHEAD`` m before the palm toward the robot, and stops when it
+is felt with ``NEWTON`` N; then fingers and palm are touched by contacts of the physics.
 """
 
 from __future__ import annotations
@@ -33,6 +35,8 @@ FRAME = "object_mug"
 GRASP = Pose(np.array([0.0, -0.065, 0.07]), np.array([0.5, 0.5, 0.5, 0.5]))
 """palm in the frame that is reached for: the mug's grasp, drawn back by its approach distance"""
 NEWTON, RISE = 3.0, 0.06
+AHEAD, APPROACH = 0.30, 0.40
+"""m; m/s"""
 FOLLOWED = 0.40
 """s that a reach is followed after a push has begun"""
 AFTERWARDS = 0.3
@@ -98,7 +102,11 @@ class Recording:
     velocity: list[np.ndarray] = field(default_factory=list)
     """as lwr/joint_states has it"""
     touch: list[dict[str, np.ndarray]] = field(default_factory=list)
-    """N on phalanges and palm, without noise; empty unless asked for"""
+    """N on phalanges and palm, without noise; empty unless the person's hand comes"""
+    three_newton: float | None = None
+    """s, from which it is 3 N or more"""
+    aborted: str = ""
+    """why the motion ended early; it counts as a reach all the same"""
     speed: float = 0.0
     """m/s of the palm at ``one_newton``"""
 
@@ -131,13 +139,14 @@ def wrong_urdf(seed: int, payload_error: float = 0.10, inertia_error: float = 0.
 
 
 class MovingReach:
-    """Runs one reach. ``push``: newtons across the line between robot and person, or along it toward the robot."""
+    """Runs one reach. ``push``: across the line between robot and person, along it toward the robot, or by the person's
+    hand, which comes along it."""
 
-    def __init__(self, seed: int, push: str = "", with_touch: bool = False) -> None:
-        if push not in ("", "across", "toward"):
-            raise ValueError(f"push is across, toward or empty, got '{push}'")
+    def __init__(self, seed: int, push: str = "") -> None:
+        if push not in ("", "across", "toward", "hand"):
+            raise ValueError(f"push is across, toward, hand or empty, got '{push}'")
         self.draw = draw = Draw.of(seed)
-        self.push, self.with_touch = push, with_touch
+        self.push = push
         cell: dict[str, Any] = {"object__start": "world", "object__position": [0.45, -0.55, 0.052]}
         payload = (0.0, np.zeros(3))
         if draw.held:
@@ -196,7 +205,7 @@ class MovingReach:
             ("velocity", "measured_velocity"),
         ):
             getattr(record, name).append(np.array(report[key]))
-        if self.with_touch:
+        if self.push == "hand":
             record.touch.append({name: np.array(force) for name, force in self.cell.touch().items()})
 
     def prepare(self) -> None:
@@ -243,7 +252,8 @@ class MovingReach:
         while self.now < end:
             progress = self.virtual.dmp_progress()
             if progress["motion"] == "aborted":
-                raise RuntimeError(f"seed {record.seed}: aborted: {progress['reason']}")
+                record.aborted = str(progress["reason"])
+                break
             if progress["motion"] == "reached":
                 record.reached = self.now
                 break
@@ -252,15 +262,38 @@ class MovingReach:
                 before = palm()
                 self.step()
                 record.speed = float(np.linalg.norm(palm() - before)) / DT
-                self._push(palm())
+                if self.push == "hand":
+                    self._hand_comes(palm())
+                else:
+                    self._push()
                 return
             self.step()
         self.run_for(AFTERWARDS)
 
-    def _push(self, palm: np.ndarray) -> None:
+    def _line(self) -> np.ndarray:
+        """Level direction from the robot to the person."""
+        line = self.draw.place * [1.0, 1.0, 0.0]
+        return line / np.linalg.norm(line)
+
+    def _hand_comes(self, palm: np.ndarray) -> None:
+        line, record = self._line(), self.record
+        turn = about_z(float(np.arctan2(line[1], line[0])))
+        place, end = palm + AHEAD * line, self.now + 2.0
+        while self.now < end:
+            speed = APPROACH if record.three_newton is None else 0.0
+            self.cell.set_human(place, turn, -speed * line)
+            place = place - speed * DT * line
+            began = self.now
+            self.step()
+            newton = float(np.linalg.norm(np.sum(list(record.touch[-1].values()), axis=0)))
+            if record.one_newton is None and newton >= 1.0:
+                record.one_newton, end = began, began + FOLLOWED
+            if record.three_newton is None and newton >= NEWTON:
+                record.three_newton = began
+
+    def _push(self) -> None:
         """The force of a period is what the ramp has at its end."""
-        line = self.draw.place - np.array([0.0, 0.0, self.draw.place[2]])
-        line = line / np.linalg.norm(line)
+        line = self._line()
         aside = np.cross([0.0, 0.0, 1.0], line)
         angle = self.draw.angle
         direction = np.cos(angle) * aside + np.sin(angle) * np.array([0.0, 0.0, 1.0])
