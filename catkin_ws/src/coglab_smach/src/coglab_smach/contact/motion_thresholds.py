@@ -22,18 +22,28 @@ from scipy.optimize import nnls
 
 from coglab_smach.contact.momentum_observer import Residual
 
-FEATURES = ("constant", "speed", "speed squared", "acceleration squared", "load times acceleration squared")
-"""what a variance (Nm^2) grows with: 1, v (rad/s, fastest joint), v^2, a^2 (rad/s^2, fastest changing joint), and
-(kg rad/s^2)^2 of the payload told"""
+FEATURES = (
+    "constant",
+    "speed",
+    "speed squared",
+    "speed squared a moment ago",
+    "acceleration squared",
+    "load times acceleration squared",
+)
+"""what a variance (Nm^2) grows with: 1, v (rad/s, fastest joint, over what the residual remembers), v^2, the same over
+the moment ago that the residual is compared with, a^2 (rad/s^2, fastest changing joint), and (kg rad/s^2)^2 of the
+payload told"""
 FLOOR = 1e-4
 """Nm^2, smallest variance believed: a noise-free simulation must not alarm on rounding"""
 RECENT, OLD = 0.10, 0.25
 """s: the change is counted from the mean between so long ago and so long ago"""
+MEMORY = 0.025
+"""s over which speeds are averaged, about the time constant of the residual"""
 LEAST = 5
 """samples of that mean"""
 CONFIRM = 2
 """samples in a row over the limit"""
-ALARM_SHARE = 2e-4
+ALARM_SHARE = 2e-3
 """probability with which a reach without contact may exceed the limit"""
 EULER = 0.5772156649015329
 
@@ -52,7 +62,7 @@ class Offset:
 
 @dataclass(frozen=True)
 class Change:
-    """The residual's change at one sample, Nm, with what its variance grows with and the palm's 3 x 7 Jacobian there."""
+    """The residual's change at one sample, Nm; what its variance grows with; the palm's 3 x 7 Jacobian there."""
 
     stamp: float
     torque: np.ndarray
@@ -66,36 +76,43 @@ class ChangeOfResidual:
     def __init__(self, jacobian: Any) -> None:
         """``jacobian``: position of the joints (rad) to 3 x 7, m/rad, base frame."""
         self._jacobian = jacobian
-        self._recent: deque[Residual] = deque()
-        self._old: deque[Residual] = deque()
-        self._sum = np.zeros(7)
-        self.past = np.zeros(7)
-        """Nm, the mean of a moment ago"""
+        self._recent: deque[tuple[float, np.ndarray]] = deque()
+        self._old: deque[tuple[float, np.ndarray]] = deque()
+        self.reset()
 
     def reset(self) -> None:
         """Forget the past."""
         self._recent.clear()
         self._old.clear()
-        self._sum = np.zeros(7)
+        self._speed: float | None = None
+        self._stamp = 0.0
+        self._sum = np.zeros(8)
+        self.past = np.zeros(7)
+        """Nm, the mean of a moment ago"""
 
     def feed(self, residual: Residual, load: float) -> Change | None:
         """One residual, ``load`` kg told; None while there is no past to compare with."""
         if residual.fresh:
             self.reset()
-        self._recent.append(residual)
-        while self._recent and self._recent[0].stamp <= residual.stamp - RECENT:
+        speed = float(np.max(np.abs(residual.velocity))) ** 2
+        # Seven torques and the speed's square, so that one sum over the moment ago serves both.
+        self._recent.append((residual.stamp, np.append(residual.torque, speed)))
+        while self._recent and self._recent[0][0] <= residual.stamp - RECENT:
             self._old.append(self._recent.popleft())
-            self._sum = self._sum + self._old[-1].torque
-        while self._old and self._old[0].stamp < residual.stamp - OLD:
-            self._sum = self._sum - self._old.popleft().torque
+            self._sum = self._sum + self._old[-1][1]
+        while self._old and self._old[0][0] < residual.stamp - OLD:
+            self._sum = self._sum - self._old.popleft()[1]
+        blend = 1.0 if self._speed is None else 1.0 - np.exp(-(residual.stamp - self._stamp) / MEMORY)
+        self._speed = speed if self._speed is None else self._speed + blend * (speed - self._speed)
+        self._stamp = residual.stamp
         if len(self._old) < LEAST:
             return None
-        speed = float(np.max(np.abs(residual.velocity)))
+        mean = self._sum / len(self._old)
+        self.past = mean[:7]
         acceleration = float(np.max(np.abs(residual.acceleration)))
-        features = np.array([1.0, speed, speed**2, acceleration**2, (load * acceleration) ** 2])
-        self.past = self._sum / len(self._old)
-        torque = residual.torque - self.past
-        return Change(residual.stamp, torque, features, self._jacobian(residual.position))
+        growing = [1.0, np.sqrt(self._speed), self._speed, max(0.0, mean[7]), acceleration**2]
+        features = np.array([*growing, (load * acceleration) ** 2])
+        return Change(residual.stamp, residual.torque - self.past, features, self._jacobian(residual.position))
 
 
 @dataclass(frozen=True)
