@@ -16,7 +16,7 @@ is felt with ``NEWTON`` N; then fingers and palm are touched by contacts of the 
 from __future__ import annotations
 
 import xml.etree.ElementTree as ElementTree
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from typing import Any
 
@@ -145,7 +145,9 @@ class MovingReach:
     def __init__(self, seed: int, push: str = "") -> None:
         if push not in ("", "across", "toward", "hand"):
             raise ValueError(f"push is across, toward, hand or empty, got '{push}'")
-        self.draw = draw = Draw.of(seed)
+        draw = Draw.of(seed)
+        # Fingers that hold something feel that, and their touch is no contact.
+        self.draw = draw = replace(draw, held="") if push == "hand" else draw
         self.push = push
         cell: dict[str, Any] = {"object__start": "world", "object__position": [0.45, -0.55, 0.052]}
         payload = (0.0, np.zeros(3))

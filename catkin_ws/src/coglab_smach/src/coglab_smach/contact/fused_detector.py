@@ -118,7 +118,10 @@ class FusedDetector:
     def feed_touch(
         self, stamp: float, forces: Sequence[Sequence[float]], deviation: float = 0.0
     ) -> ContactEvent | None:
-        """Forces on the phalanges and the palm (N), as FingertipForces has them."""
+        """Forces on the phalanges and the palm (N), as FingertipForces has them. Fingers that hold something feel that:
+        while a payload was told, touch is no source."""
+        if self.moving is not None and self.moving.load > 0.0:
+            return None
         return self._judge(stamp, self._touch.feed(stamp, forces, deviation))
 
     def feed_hand(self, stamp: float, motors: Sequence[Motor]) -> ContactEvent | None:

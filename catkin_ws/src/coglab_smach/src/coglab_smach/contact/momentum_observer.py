@@ -5,7 +5,7 @@
 so that r follows the external torque as a first-order low-pass with the time constant 1/K. M, C and g are those of the
 robot description with what the hand is told to carry; tau is the measured torque between motors and links, so that
 friction of the drives and inertia of the motors do not enter. Velocities come from positions alone: the mean velocity
-between two samples, in the middle of them.
+between two samples, in the middle of them. The torque of a sample counts as the mean over the period that it ends.
 """
 
 from __future__ import annotations
@@ -81,6 +81,7 @@ class MomentumObserver:
     def reset(self) -> None:
         """Forget everything."""
         self._stamp: float | None = None
+        self._grid = 0.0
         self._position = self._torque = np.zeros(7)
         self._step = 0.0
         self._velocity: np.ndarray | None = None
@@ -102,6 +103,7 @@ class MomentumObserver:
         step = self._since_last(stamp)
         if step is None:
             self.reset()
+            self._grid = stamp
         if step == 0.0:
             return None
         last_position, last_torque = self._position, self._torque
@@ -116,7 +118,11 @@ class MomentumObserver:
         if step == 0.0 or not -LONGEST_GAP <= step <= LONGEST_GAP:
             return 0.0 if step == 0.0 else None
         if self.period > 0.0:
-            step = self.period * max(1, round(step / self.period))
+            # The measurements lie on a grid that the stamps tell with jitter, and that is followed slowly.
+            periods = max(1, round((stamp - self._grid) / self.period))
+            self._grid += periods * self.period
+            self._grid += 0.05 * (stamp - self._grid)
+            return periods * self.period
         return step if step > 0.0 else None
 
     def _advance(self, stamp: float, step: float, before: np.ndarray, torque_before: np.ndarray) -> Residual | None:
