@@ -134,8 +134,13 @@ def quiet_rows(records, thresholds: Thresholds) -> list[dict]:
             print(f"seed {record.seed}: false alarm: {event.source}: {event.message}", file=sys.stderr)
     cost = 1e6 * float(np.median(spent))
     return [
-        row(f"moving reaches without contact, {len(spent)}: false alarms", len(alarms), "reaches", "<= 1 of 500",
-            len(alarms) <= max(1, len(spent) // 500)),
+        row(
+            f"moving reaches without contact, {len(spent)}: false alarms",
+            len(alarms),
+            "reaches",
+            "<= 1 of 500",
+            len(alarms) <= max(1, len(spent) // 500),
+        ),
         row("time per sample, both detectors, processor, median", cost, "us", "<= 1000", cost <= 1000),
     ]
 

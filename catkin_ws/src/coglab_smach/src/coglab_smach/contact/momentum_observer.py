@@ -71,7 +71,8 @@ class MomentumObserver:
 
     def __init__(self, dynamics: Dynamics, gain: float = 40.0, period: float = 0.0) -> None:
         """``gain``: K, 1/s. ``period``: s between the robot's measurements, of which the times between samples are
-        whole multiples; 0: the stamps are exact. Stamps of reception jitter, and a velocity feels that."""
+        whole multiples; 0: the stamps are exact. Stamps of reception jitter, and a velocity feels that;
+        up to a quarter of a period is taken away."""
         if not gain > 0.0 or not math.isfinite(gain):
             raise ValueError(f"gain must be a positive number of 1/s, got {gain}")
         self.gain, self.period = gain, period
