@@ -9,8 +9,8 @@ whose true mass is 0.7 .. 1.3 times what its file, and so the observer, says.
 
 A push is a force on the palm, applied in the physics: from 0 to ``NEWTON`` N in ``RISE`` s, then constant. It begins
 where the way that remains falls below a share of the whole that is uniform in the last third. Instead of a push the
-person's hand may come: from that moment on it moves from ``AHEAD`` m before the palm toward the robot, and stops when it
-is felt with ``NEWTON`` N; then fingers and palm are touched by contacts of the physics.
+person's hand may come: from that moment on it moves from ``AHEAD`` m before the palm toward the robot, and stops when
+it is felt with ``NEWTON`` N; then fingers and palm are touched by contacts of the physics.
 """
 
 from __future__ import annotations
