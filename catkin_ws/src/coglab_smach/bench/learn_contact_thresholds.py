@@ -1,7 +1,8 @@
 #!/usr/bin/python3
 """Learns the shipped thresholds of the moving arm from simulated reaches without contact: [NUMBER] [FILE].
 
-The seeds, from 50000 on, are those of no test and no bench. On a robot the service /contact_detector/learn does the same.
+The seeds, from 50000 on, are those of no test and no bench. On a robot the service /contact_detector/learn does the
+same.
 """
 
 import sys
