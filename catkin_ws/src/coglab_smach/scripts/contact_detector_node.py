@@ -3,7 +3,7 @@
 
 Subscribes lwr/external_torques (effort, Nm), lwr/joint_states (with measured torques as effort), lwr/state (FRI
 period), ih2_hand/hand_status and ih2_hand/fingertip_forces (~tactile_topic; nobody has to publish it); names are
-relative. Parameters (private): the fields of coglab_smach.contact.detector.DetectorSettings; robot_description is read
+relative; and tf2 for the object that is reached for. Parameters: perception/frames; private: the fields of coglab_smach.contact.detector.DetectorSettings; robot_description is read
 for Jacobian and dynamics; ~thresholds_file: of the moving arm, learnt in simulation; ~learnt_file: where
 ~learn_motion writes what this robot's own motions tell, and from where it is read at the next start.
 Publishes at 20 Hz ~margin (std_msgs/Float64) while watching, ~signal (coglab_msgs/ContactSignal) while torques come.
@@ -19,13 +19,17 @@ from pathlib import Path
 import coglab_controllers as cc
 import numpy as np
 import rospy
+import tf2_ros
 from coglab_msgs.msg import Contact, ContactSignal, FingertipForces, HandStatus, LwrState, ReasonCode
 from coglab_msgs.srv import ArmContact, ArmContactResponse
+from coglab_perception.frames import FrameNames, FramesError
+from coglab_perception.tf_listener import TfListener
 from coglab_py import parameters
 from coglab_py.packages import package_path
+from coglab_py.pose import Pose
 from coglab_py.yaml_file import YamlError
 from coglab_smach.contact.detector import ContactDetector, DetectorSettings
-from coglab_smach.contact.fused_detector import IN_MOTION, FusedDetector
+from coglab_smach.contact.fused_detector import IN_MOTION, LIFT, FusedDetector
 from coglab_smach.contact.learning import MotionRecorder
 from coglab_smach.contact.motion_thresholds import ThresholdError, Thresholds
 from coglab_smach.contact.moving_contact import MovingContact
@@ -33,6 +37,9 @@ from coglab_smach.ros.publish import publish
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64
 from std_srvs.srv import SetBool, SetBoolResponse, Trigger, TriggerResponse
+
+OLDEST_SIGHT = 0.15
+"""s, older sights of an object do not tell whether it is in the palm"""
 
 
 class ContactDetectorNode:
@@ -62,6 +69,13 @@ class ContactDetectorNode:
         self.publisher = rospy.Publisher("coglab/contact", Contact, queue_size=10)
         self.margin = rospy.Publisher("~margin", Float64, queue_size=1)
         self.signal = rospy.Publisher("~signal", ContactSignal, queue_size=1)
+        frames = FrameNames.from_mapping(
+            rospy.get_param("perception/frames", None), rospy.resolve_name("perception/frames")
+        )
+        self.base = frames.world
+        self.buffer = tf2_ros.Buffer(rospy.Duration(2.0))
+        self.listener = TfListener(self.buffer, self.base)
+        self.grasp: tuple[str, Pose] | None = None  # the object that is reached for, and the palm in its frame
         self.shown: float | None = None  # stamp of the sample that ~signal was published for
         rospy.Subscriber("lwr/joint_states", JointState, self.on_joints, queue_size=20, tcp_nodelay=True)
         rospy.Subscriber("lwr/state", LwrState, self.on_state, queue_size=1)
@@ -158,6 +172,7 @@ class ContactDetectorNode:
         with self.lock:
             if request.mode == "off":
                 self.detector.disarm()
+                self.grasp = None
                 return ArmContactResponse(success=True, message="off")
             now = self.last_sample
             if now is None or abs(rospy.Time.now().to_sec() - now) > 1.0:
@@ -167,15 +182,45 @@ class ContactDetectorNode:
                     f"no torques on {self.torques.resolved_name} for 1 s; is the robot connected?",
                 )
             try:
+                self.grasp = self.grasp_of(request)
                 self.detector.arm(
                     request.mode, now, request.timeout, request.k, request.joints, request.mass, request.load_share
                 )
             except ValueError as error:
                 return ArmContactResponse(False, ReasonCode.INVALID_ARGUMENT, str(error))
-        when = "now" if request.mode == IN_MOTION else "once the arm is still"
+        when = "now" if request.mode in (IN_MOTION, LIFT) else "once the arm is still"
         return ArmContactResponse(
             True, ReasonCode.NONE, f"watching for {request.mode} for {request.timeout:.1f} s, {when}"
         )
+
+    @staticmethod
+    def grasp_of(request) -> tuple[str, Pose] | None:
+        """The object of a request; ValueError where the pose is none."""
+        if not request.frame:
+            return None
+        p, q = request.grasp.position, request.grasp.orientation
+        return request.frame, Pose.from_dict({"xyz": [p.x, p.y, p.z], "quaternion": [q.x, q.y, q.z, q.w]})
+
+    def look_at_object(self) -> None:
+        """Where the palm is at the object that is reached for, as tracked."""
+        with self.lock:
+            grasp, position, velocity = self.grasp, self.position, self.velocity
+        if grasp is None or position is None or velocity is None:
+            return
+        try:
+            transform = self.buffer.lookup_transform(self.base, grasp[0], rospy.Time(0))
+        except tf2_ros.TransformException:
+            return
+        if abs((rospy.Time.now() - transform.header.stamp).to_sec()) > OLDEST_SIGHT:
+            return
+        p, q = transform.transform.translation, transform.transform.rotation
+        seen = Pose(np.array([p.x, p.y, p.z]), np.array([q.x, q.y, q.z, q.w]))
+        distance, angle = Pose(*self.arm.fk(np.asarray(position))).distance(seen * grasp[1])
+        speed = float(np.linalg.norm(self.arm.jacobian(np.asarray(position))[:3] @ np.asarray(velocity)))
+        now = rospy.Time.now()
+        with self.lock:
+            event = self.detector.feed_sight(now.to_sec(), distance, angle, speed)
+        self.publish_event(event, now)
 
     def on_learn_motion(self, request):
         """True: begin to gather motions without contact. False: end it, learn, write the file and use it from now
@@ -209,7 +254,8 @@ class ContactDetectorNode:
                 return TriggerResponse(False, str(error))
 
     def on_timer(self, _event) -> None:
-        """Live margin and signal."""
+        """The object as seen; live margin and signal."""
+        self.look_at_object()
         with self.lock:
             before, stamp = self.shown, self.last_sample
             self.shown = stamp
@@ -243,7 +289,7 @@ def main() -> int:
         return 1
     try:
         ContactDetectorNode(urdf)
-    except (parameters.ParameterError, ThresholdError, YamlError, OSError) as error:
+    except (parameters.ParameterError, FramesError, ThresholdError, YamlError, OSError) as error:
         rospy.logfatal("contact_detector: %s", error)
         return 1
     rospy.spin()

@@ -6,7 +6,7 @@ Tests, trials and benches make their world here, and nowhere else.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from types import SimpleNamespace
 from typing import Any
 
@@ -87,7 +87,8 @@ class Robot:
         self.cell = self.virtual.cell
         self.limits = cc.load_joint_limits(limits)
         with open(urdf_file(), encoding="utf-8") as stream:
-            self.chain = cc.Chain(stream.read())
+            self.urdf = stream.read()
+        self.chain = cc.Chain(self.urdf)
         self.report = self.virtual.report()
         self.progress: dict[str, Any] = {
             "motion": "idle",
@@ -153,6 +154,7 @@ class Hand(HandMemory):
         self.reason = Reason.NONE
         self.job: Job | None = None
         self.positions: tuple[int, ...] = ()
+        self.readings: Sequence[Any] = ()
         self.dead = False
         self._next_poll = 0.0
         self._calibrated_at = 0.0
@@ -207,7 +209,7 @@ class Hand(HandMemory):
         if t < self._next_poll or self.dead or self.calibrating:
             return
         self._next_poll = t + (1 / 30 if self.job is not None else 0.2)
-        readings = [SimpleNamespace(**r) for r in self.driver.read_motors()]
+        readings = self.readings = [SimpleNamespace(**r) for r in self.driver.read_motors()]
         self.positions = tuple(r.position for r in readings)
         self.look(readings)
         if self.job is None:

@@ -16,11 +16,14 @@ import numpy as np
 MOMENTUM = "momentum"
 TACTILE = "tactile"
 FINGERS = "finger_motor"
+SIGHT = "sight"
 FUSED = "fused"
 DECIDED = 0.99
 """probability from which it is a contact; a source at its threshold reaches it alone"""
 STEEPNESS = 12.0
 """logits per unit of margin: at 0.8 of its threshold a source says 0.9, at 0.6 even chances"""
+SLOW = 0.03
+"""m/s of the palm below which what is seen in it stays there"""
 SPEAKS_TOO = 0.5
 """a source that is this sure is named beside the surest one"""
 
@@ -80,6 +83,32 @@ class Touch:
         self._margins = [*self._margins, largest / needed][-self.confirm :]
         margin = min(self._margins) if len(self._margins) == self.confirm else 0.0
         return Evidence(TACTILE, stamp, stamp + self.hold, margin, f"{largest:.1f} N on the hand's touch sensors")
+
+
+class InPalm:
+    """The tracked object at its grasp in the palm of an arm that has come to rest: it is there, felt or not."""
+
+    def __init__(self, near: float = 0.015, turned: float = math.radians(20.0), confirm: float = 0.12) -> None:
+        """``near`` (m) and ``turned`` (rad): of the palm from where it has to be for the grasp; ``confirm``: s."""
+        self.near, self.turned, self.confirm = near, turned, confirm
+        self._since: float | None = None
+
+    def reset(self) -> None:
+        """Forget the past."""
+        self._since = None
+
+    def feed(self, stamp: float, distance: float, angle: float, speed: float) -> Evidence | None:
+        """One sight: how far (m, rad) the palm is from the grasp, and the palm's speed (m/s)."""
+        if not all(map(math.isfinite, (stamp, distance, angle, speed))):
+            return None
+        if speed > SLOW or distance > self.near or angle > self.turned:
+            self._since = None
+        elif self._since is None or stamp < self._since:
+            self._since = stamp
+        there = self._since is not None and stamp - self._since >= self.confirm
+        margin = 1.0 if there else 0.0
+        message = f"the object is seen at its grasp, {1000 * distance:.0f} mm off the palm"
+        return Evidence(SIGHT, stamp, stamp + self.confirm, margin, message)
 
 
 class Motor(Protocol):

@@ -1,26 +1,58 @@
 """Contact from all that feels it, as one event: the detector behind the ContactPort.
 
 Modes contact, load and release are those of D4.10 (ContactDetector): torques of an arm that stands still. Mode
-IN_MOTION watches from arming on, whether the arm moves or not: the moving arm's torques, the fingers and touch, each
-with a probability, and D4.10's derivative once the arm stands. The first moment at which a contact is likely enough is
-the event; its source is the one that says so alone, or ``fused``.
+IN_MOTION watches from arming on, whether the arm moves or not: the moving arm's torques, the fingers, touch and the
+sight of the object at its grasp, each with a probability, and D4.10's derivative once the arm stands. The first moment
+at which a contact is likely enough is the event; its source is the one that says so alone, or ``fused``. Mode LIFT
+watches the weight come to an arm that lifts what it has grasped, counted from arming on.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
 
 from coglab_msgs.msg import ReasonCode
 
 from coglab_smach.contact.detector import ContactDetector, Joints
-from coglab_smach.contact.evidence import DECIDED, Evidence, Fingers, Motor, Touch, name_of, together
+from coglab_smach.contact.evidence import (
+    DECIDED,
+    MOMENTUM,
+    Evidence,
+    Fingers,
+    InPalm,
+    Motor,
+    Touch,
+    name_of,
+    probability,
+    together,
+)
 from coglab_smach.contact.moving_contact import MovingContact
 from coglab_smach.ports.interfaces import ContactEvent
 
 IN_MOTION = "contact_in_motion"
+LIFT = "lift"
+GRAVITY = 9.81
+SETTLING = 0.10
+"""s after arming over which the residual is averaged that a weight is counted from"""
+CARRIED = 0.06
+"""s for which the weight has to be there"""
 HELD_CENTRE = (0.04, 0.0, 0.0)
 """m in ih2_palm: about where the fingers hold an object"""
+
+
+@dataclass
+class _Lift:
+    """A wait for the weight: N that it takes, and the mean residual of the first moment (Nm)."""
+
+    needed: float
+    sum: np.ndarray = field(default_factory=lambda: np.zeros(7))
+    count: int = 0
+    begun: float | None = None
+    since: float | None = None
 
 
 class FusedDetector:
@@ -35,7 +67,8 @@ class FusedDetector:
     ) -> None:
         """``moving`` None: there is no model of the arm, and IN_MOTION is refused."""
         self.still, self.moving = still, moving
-        self._touch, self._fingers = touch or Touch(), fingers or Fingers()
+        self._touch, self._fingers, self._palm = touch or Touch(), fingers or Fingers(), InPalm()
+        self._lift: _Lift | None = None
         self._until: float | None = None
         self._first = False
         """nothing was looked at yet since arming"""
@@ -53,21 +86,30 @@ class FusedDetector:
         mass: float = 0.0,
         load_share: float = 0.0,
     ) -> None:
-        """As ContactDetector.arm, with the mode IN_MOTION besides. ValueError says what is wrong with the request."""
-        if mode == IN_MOTION and self.moving is None:
-            raise ValueError(f"{IN_MOTION} needs a model of the arm and learnt thresholds, and there are none")
-        self.still.arm("contact" if mode == IN_MOTION else mode, now, timeout, k, joints, mass, load_share)
-        self._mass = mass if mode == "load" else 0.0
-        self._until = now + timeout if mode == IN_MOTION else None
+        """As ContactDetector.arm, with the modes IN_MOTION and LIFT besides. ValueError says what is wrong with the
+        request."""
+        if mode in (IN_MOTION, LIFT) and self.moving is None:
+            raise ValueError(f"{mode} needs a model of the arm and learnt thresholds, and there are none")
+        if mode == LIFT:
+            if not (mass > 0.0 and timeout > 0.0):
+                raise ValueError(f"{LIFT} needs a mass (kg) and a time limit (s), got {mass} and {timeout}")
+            self.still.disarm()
+            self._lift = _Lift((load_share if load_share > 0.0 else self.still.settings.load_share) * mass * GRAVITY)
+        else:
+            self.still.arm("contact" if mode == IN_MOTION else mode, now, timeout, k, joints, mass, load_share)
+            self._lift = None
+        self._mass = mass if mode in ("load", LIFT) else 0.0
+        self._until = now + timeout if mode in (IN_MOTION, LIFT) else None
         self._first = True
         self._evidence.clear()
         self._touch.reset()
         self._fingers.reset()
+        self._palm.reset()
 
     def disarm(self) -> None:
         """Stop watching."""
         self.still.disarm()
-        self._until = None
+        self._until = self._lift = None
 
     def state(self) -> str:
         """off, waiting or watching, see ContactDetector.state; in motion it watches as soon as it has seen enough."""
@@ -106,6 +148,8 @@ class FusedDetector:
             return None
         self._follow_clock(stamp)
         evidence = self.moving.feed(stamp, position, torque)
+        if self._lift is not None:
+            return self._watch_lift(stamp, self._lift)
         if self._until is None or evidence is None:
             return None
         if self._first:
@@ -124,6 +168,10 @@ class FusedDetector:
             return None
         return self._judge(stamp, self._touch.feed(stamp, forces, deviation))
 
+    def feed_sight(self, stamp: float, distance: float, angle: float, speed: float) -> ContactEvent | None:
+        """How far (m, rad) the palm is from its place at the object that was named on arming, and its speed (m/s)."""
+        return self._judge(stamp, self._palm.feed(stamp, distance, angle, speed))
+
     def feed_hand(self, stamp: float, motors: Sequence[Motor]) -> ContactEvent | None:
         """Motors of the hand, as HandStatus has them."""
         return self._judge(stamp, self._fingers.feed(stamp, motors))
@@ -137,8 +185,31 @@ class FusedDetector:
             self._evidence.clear()
         self._last_stamp = stamp
 
+    def _watch_lift(self, stamp: float, lift: _Lift) -> ContactEvent | None:
+        """Has the weight come?"""
+        assert self.moving is not None and self._until is not None
+        residual = self.moving.residual
+        if stamp > self._until:
+            self.disarm()
+            return None
+        if residual is None:
+            return None
+        lift.begun = stamp if lift.begun is None or residual.fresh or stamp < lift.begun else lift.begun
+        if lift.count == 0 or stamp - lift.begun < SETTLING:
+            lift.sum, lift.count = lift.sum + residual.torque, lift.count + 1
+            return None
+        force = self.moving.weight_since(lift.sum / lift.count)
+        lift.since = None if force < lift.needed else stamp if lift.since is None else lift.since
+        if lift.since is None or stamp - lift.since < CARRIED:
+            return None
+        margin, mass = force / lift.needed, self._mass
+        self.disarm()
+        self.set_payload(mass)
+        message = f"{force:.1f} N carried now (needed {lift.needed:.1f} N)"
+        return ContactEvent(True, MOMENTUM, margin, message, probability(margin), ReasonCode.LOAD_CARRIED)
+
     def _judge(self, stamp: float, evidence: Evidence | None) -> ContactEvent | None:
-        if self._until is None or evidence is None:
+        if self._until is None or evidence is None or self._lift is not None:
             return None
         if stamp > self._until:
             self._until = None

@@ -37,6 +37,9 @@ class MovingContact:
         """the newest one"""
         self.force = np.zeros(3)
         """N on the palm, base frame, that explains it"""
+        self.residual: Residual | None = None
+        """the newest one"""
+        self._jacobian = jacobian
         self._changes = ChangeOfResidual(jacobian)
         self._sizes: list[float] = []
         self._still_since: float | None = None
@@ -82,6 +85,13 @@ class MovingContact:
         message = f"{float(np.linalg.norm(force)):.1f} N on the hand since the arm stood still: it was there already"
         return Evidence(MOMENTUM, stamp, stamp + HOLD, margin, message)
 
+    def weight_since(self, before: np.ndarray) -> float:
+        """N that have come to hang on the palm since the residual was ``before`` (Nm): least squares for one unknown,
+        whether the arm moves or not."""
+        assert self.residual is not None
+        lever = self._jacobian(self.residual.position)[2]
+        return -float(lever @ (self.residual.torque - before)) / max(1e-6, float(lever @ lever))
+
     def _follow_rest(self, residual: Residual) -> None:
         if float(np.max(np.abs(residual.velocity))) > STILL:
             if self._rest is not None:
@@ -95,7 +105,7 @@ class MovingContact:
 
     def feed(self, stamp: float, position: Joints, torque: Joints) -> Evidence | None:
         """One sample: s, rad, Nm as measured. None while there is too little of a past."""
-        residual = self.observer.feed(stamp, position, torque)
+        residual = self.residual = self.observer.feed(stamp, position, torque)
         if residual is None:
             return None
         if residual.fresh:

@@ -9,12 +9,13 @@ from coglab_smach.states.arm import HomeRobot, SwitchController
 from coglab_smach.states.base import CoglabMachine
 from coglab_smach.states.hand import HandClose
 from coglab_smach.states.knowledge import QueryDatabase, SetGraspGoal
+from coglab_smach.states.weight import TakeWeight
 
 SHARED = ["object_entry", "grasp", "grasp_name"]
 
 
 def build_exchange_human_to_robot(ctx: Context) -> CoglabMachine:
-    """query -> goal from the nominal grasp -> reach and preshape -> contact -> point-to-point -> close -> home."""
+    """query -> goal from the nominal grasp -> reach and preshape -> contact -> close -> take the weight -> home."""
     machine = CoglabMachine(
         ctx, "exchange_human_to_robot", ACTION_OUTCOMES, input_keys=["object_id"], output_keys=SHARED
     )
@@ -28,7 +29,8 @@ def build_exchange_human_to_robot(ctx: Context) -> CoglabMachine:
             to_recovery(succeeded="switch_to_ptp"),
         )
         machine.add_state("switch_to_ptp", SwitchController(ctx, "ptp"), to_recovery(succeeded="hand_close"))
-        machine.add_state("hand_close", HandClose(ctx, from_person=True), to_recovery(succeeded="coglab_home_robot"))
+        machine.add_state("hand_close", HandClose(ctx, from_person=True), to_recovery(succeeded="take_weight"))
+        machine.add_state("take_weight", TakeWeight(ctx), to_recovery(succeeded="coglab_home_robot"))
         machine.add_state("coglab_home_robot", HomeRobot(ctx), to_recovery(succeeded="succeeded"))
         machine.add_state("recover", build_recovery(ctx), RECOVERY_TRANSITIONS)
     return machine

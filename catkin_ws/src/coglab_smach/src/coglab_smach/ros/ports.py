@@ -12,8 +12,9 @@ from typing import Any
 from coglab_msgs.msg import Contact, ReasonCode
 from coglab_msgs.msg import Recognition as RecognitionMsg
 from coglab_msgs.srv import ArmContact, FreePlaces, GetObject, InitVision, ListObjects, LocateObject
+from coglab_py.pose import IDENTITY
 from coglab_py.yaml_file import YamlError, parse
-from geometry_msgs.msg import Pose
+from geometry_msgs.msg import Point, Pose, Quaternion
 
 from coglab_smach.ports.interfaces import ContactEvent, Located, Recognition
 from coglab_smach.ports.pending import Pending, Permit, PortError, Threaded
@@ -104,6 +105,7 @@ class RosContact:
     def arm(self, mode: str, time_limit: float, settings: dict[str, Any]) -> Pending:
         self._event = None
         self._wanted = mode != "release"
+        grasp = settings.get("grasp", {"xyz": (0.0, 0.0, 0.0), "quaternion": IDENTITY})
         return mapped(
             self._request(
                 2.0,
@@ -113,6 +115,8 @@ class RosContact:
                 joints=list(settings.get("joints", [])),
                 mass=float(settings.get("mass", 0.0)),
                 load_share=float(settings.get("load_share", 0.0)),
+                frame=str(settings.get("frame", "")),
+                grasp=Pose(Point(*grasp["xyz"]), Quaternion(*grasp["quaternion"])),
             ),
             lambda r: None,
         )
@@ -142,7 +146,7 @@ class RosContact:
     def disarm(self) -> None:
         if self._wanted is not None:
             self._wanted = None
-            self._request(0.5, mode="off", timeout=0.0, k=0.0, joints=[], mass=0.0, load_share=0.0)
+            self._request(0.5, mode="off")
 
     def event(self) -> ContactEvent | None:
         return self._event

@@ -10,12 +10,18 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+import coglab_controllers as cc
 import numpy as np
 from coglab_msgs.msg import ReasonCode
+from coglab_py.packages import package_path
+from coglab_py.pose import Pose
 from coglab_objects.database import ObjectDatabase, ObjectError
 from ih2_hand.reasons import Reason, reason_of
 
 from coglab_smach.contact.detector import ContactDetector, DetectorSettings
+from coglab_smach.contact.fused_detector import FusedDetector
+from coglab_smach.contact.motion_thresholds import Thresholds
+from coglab_smach.contact.moving_contact import MovingContact
 from coglab_smach.ports.interfaces import (
     ContactEvent,
     HandState,
@@ -24,6 +30,10 @@ from coglab_smach.ports.interfaces import (
 )
 from coglab_smach.ports.pending import Pending, Polled, PortError, Ready
 from coglab_smach.simulated.virtual_node import VirtualNode
+
+THRESHOLDS = package_path("coglab_smach", "config", "contact_thresholds.yaml")
+OLDEST_SIGHT = 0.15
+"""s, older sights of an object do not tell whether it is in the palm"""
 
 
 class VirtualHand:
@@ -178,14 +188,19 @@ class VirtualDatabase:
 
 
 class VirtualContact:
-    """ContactPort: the detector on the virtual arm's torques."""
+    """ContactPort: the detector on the virtual arm's torques, the hand's motors and the trackers."""
 
     def __init__(self, rig: Any) -> None:
         self.rig = rig
-        self.detector = ContactDetector(DetectorSettings(), lambda q: rig.robot.chain.jacobian(q)[:3])
+        chain = rig.robot.chain
+        jacobian = lambda q: chain.jacobian(np.asarray(q, dtype=float))[:3]  # noqa: E731
+        moving = MovingContact(Thresholds.load(THRESHOLDS), cc.ArmDynamics(rig.robot.urdf), jacobian)
+        self.detector = FusedDetector(ContactDetector(DetectorSettings(), jacobian), moving)
         self.watched_while_moving = 0
-        """periods in which the detector watched though the arm moved"""
+        """periods in which the detector of an arm at rest watched though the arm moved"""
         self._event: ContactEvent | None = None
+        self._grasp: tuple[str, Pose] | None = None
+        self._polled: Any = None
         self.node = VirtualNode()
         rig.after_period.append(self._sense)
 
@@ -200,19 +215,49 @@ class VirtualContact:
     def _sense(self) -> None:
         if self.node.frozen or self.rig.robot.virtual.frozen:
             return
-        report = self.rig.robot.report
-        velocity = np.asarray(report["measured_velocity"])
-        event = self.detector.feed(self.rig.t, report["external_torque"], report["position"], velocity)
-        if event is not None and self._event is None:
-            self._event = event
-        if self.detector.state() == "watching" and np.max(np.abs(velocity)) > 0.05:
+        report, t = self.rig.robot.report, self.rig.t
+        velocity, detector = np.asarray(report["measured_velocity"]), self.detector
+        detector.moving.observer.period = report["fri_period"]
+        events = [
+            detector.feed_measured(t, report["position"], report["torque"]),
+            detector.feed(t, report["external_torque"], report["position"], velocity),
+            self._sense_hand(),
+            self._sense_object(report["position"], velocity),
+        ]
+        self._event = next((event for event in (self._event, *events) if event is not None), None)
+        if detector.still.state() == "watching" and np.max(np.abs(velocity)) > 0.05:
             self.watched_while_moving += 1
+
+    def _sense_hand(self) -> ContactEvent | None:
+        """The motors, as often as they are polled; an empty hand carries nothing."""
+        hand = self.rig.hand
+        if hand.readings is self._polled or hand.dead:
+            return None
+        self._polled = hand.readings
+        if not hand.holding and self.detector.moving.load > 0.0:
+            self.detector.set_payload(0.0)
+        return self.detector.feed_hand(self.rig.t, hand.readings)
+
+    def _sense_object(self, position: Any, velocity: np.ndarray) -> ContactEvent | None:
+        """The object as tracked, against the palm."""
+        if self._grasp is None:
+            return None
+        frame, grasp = self._grasp
+        seen, age = self.rig.newest(frame)
+        if seen is None or age > OLDEST_SIGHT:
+            return None
+        chain = self.rig.robot.chain
+        distance, angle = Pose(*chain.fk(position)).distance(seen * grasp)
+        speed = float(np.linalg.norm(chain.jacobian(np.asarray(position))[:3] @ velocity))
+        return self.detector.feed_sight(self.rig.t, distance, angle, speed)
 
     def arm(self, mode: str, time_limit: float, settings: Mapping[str, Any]) -> Pending:
         self._event = None
         return self.node.ask(lambda: self._arm(mode, time_limit, settings))
 
     def _arm(self, mode: str, time_limit: float, settings: Mapping[str, Any]) -> Pending:
+        frame = str(settings.get("frame", ""))
+        self._grasp = (frame, Pose.from_dict(settings["grasp"])) if frame else None
         try:
             self.detector.arm(
                 mode,

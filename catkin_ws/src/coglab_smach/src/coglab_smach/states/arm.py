@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import partial
 from typing import Any
 
@@ -134,53 +135,85 @@ class ExecuteDmp(CoglabState):
 
 
 class WaitStop(CoglabState):
-    """Wait for the end of the reach and then, if ``trigger`` asks for it, for the contact trigger.
+    """Wait for the end of the reach or, if ``trigger`` asks for it, for the contact trigger.
 
     trigger: '' (the end of the motion is enough), 'contact' (an object is in the hand) or 'release' (the person has
-    taken the load). The detector is armed only after the motion has ended; it checks by itself that the arm
-    stands still. The reach may take ``reach_timeout`` beyond what the arm's limits ask for over its distance.
+    taken the load). Contact is watched for from the last ``contact_within`` m of the reach on and ends the motion;
+    release once the motion has ended. The reach may take ``reach_timeout`` beyond what the arm's limits ask for.
     """
 
     default_time_limit = 20.0
     owns_motion = True
 
     def __init__(self, ctx: Context, trigger: str) -> None:
-        keys: dict[str, list[str]] = {"": [], "contact": ["object_entry"], "release": ["object_entry", "delivery"]}
+        keys: dict[str, list[str]] = {
+            "": [],
+            "contact": ["object_entry", "goal"],
+            "release": ["object_entry", "delivery"],
+        }
         super().__init__(ctx, input_keys=keys[trigger])
         self.trigger = trigger
+        self._left = False
+        """the compliant profile of the approach"""
 
     def run(self, ud: Any) -> str:
-        self._await_reach()
+        self._left = False
+        if self.trigger == "contact":
+            return self._await_contact(ud)
+        self._await_reach(self._reached)
         self.ctx.journal.mark("motion_reached")
         if not self.trigger:
             return "succeeded"
         self._leave_approach_profile()
-        if self.trigger == "release":
-            # The goal is the person's hand, and that now comes to the object: an arm that still followed it
-            # would back away. But first the motion has to come to rest at the goal that it has latched.
-            await_rest(self.ctx, self.check)
-            self.await_pending(self.ctx.arm.switch_controller("ptp"), "end of the reach by switching to 'ptp'", 3.0)
-        settings = self._settings(ud)
+        # The goal is the person's hand, and that now comes to the object: an arm that still followed it
+        # would back away. But first the motion has to come to rest at the goal that it has latched.
+        await_rest(self.ctx, self.check)
+        self.await_pending(self.ctx.arm.switch_controller("ptp"), "end of the reach by switching to 'ptp'", 3.0)
+        self._watch("release", self._settings(ud))
+        # From now on the person holds the object as well: until the hand is open the arm must not go away with it.
+        self.ctx.shared = True
+        return self._found()
+
+    def _await_contact(self, ud: Any) -> str:
+        """The object may come into the hand on the way, at its end, or be brought there once the arm waits."""
+        arm, within = self.ctx.arm, float(self.ctx.config.get("contact_within", 0.12))
+        self._await_reach(lambda: self._reached() or 0.0 < arm.dmp_progress().remaining_distance < within)
+        self._watch("contact_in_motion", {**self._settings(ud), **ud.goal.get("object", {})})
+        return self._found()
+
+    def _watch(self, mode: str, settings: dict[str, Any]) -> None:
+        """Arm the detector and wait for what it finds."""
         limit = float(settings.get("timeout", self.ctx.config.get(f"{self.trigger}_timeout", 6.0)))
         self.allow(limit + 5.0)
-        self.await_pending(self.ctx.contact.arm(self.trigger, limit, settings), "arming of the contact detector", 2.0)
+        self.await_pending(self.ctx.contact.arm(mode, limit, settings), "arming of the contact detector", 2.0)
         try:
-            self.wait_for(lambda: self.ctx.contact.event() is not None, self._expected(), limit)
+            self.wait_for(self._happened, self._expected(), limit)
         except TimeLimit as error:
-            error.code = ReasonCode.NO_CONTACT if self.trigger == "contact" else ReasonCode.NOT_RELEASED
+            error.code = error.code if error.code != ReasonCode.TIME_LIMIT else self._missed()
             raise
         finally:
             self.ctx.contact.disarm()
+
+    def _happened(self) -> bool:
+        if self.ctx.contact.event() is not None:
+            return True
+        if self.trigger == "contact" and self._reached():
+            self.ctx.journal.mark("motion_reached")
+            self._leave_approach_profile()
+        return False
+
+    def _missed(self) -> int:
+        return int(ReasonCode.NO_CONTACT if self.trigger == "contact" else ReasonCode.NOT_RELEASED)
+
+    def _found(self) -> str:
         event = self.ctx.contact.event()
         assert event is not None
-        # From now on the person holds the object as well: until the hand is open the arm must not go away with it.
-        self.ctx.shared = self.trigger == "release"
         self.ctx.journal.mark("contact")
         self.reason = event.message or f"{self.trigger} by {event.source}, margin {event.margin:.1f}"
         return "succeeded"
 
-    def _await_reach(self) -> None:
-        """How far it is, the motion itself knows: it tells in its first feedback."""
+    def _await_reach(self, near: Callable[[], bool]) -> None:
+        """Until ``near()``. How far it is, the motion itself knows: it tells in its first feedback."""
         arm = self.ctx.arm
         try:
             self.wait_for(lambda: self._reached() or arm.dmp_progress().primitive_id != "", "news of the reach", 2.0)
@@ -188,7 +221,7 @@ class WaitStop(CoglabState):
                 arm.motion_limits(), arm.dmp_progress().remaining_distance
             )
             self.allow(limit + 10.0)
-            self.wait_for(self._reached, "the end of the reach", limit, arm.speed_scale)
+            self.wait_for(near, "the end of the reach", limit, arm.speed_scale)
         except TimeLimit as error:
             progress = arm.dmp_progress()
             error.causes = error.causes or (
@@ -200,8 +233,9 @@ class WaitStop(CoglabState):
     def _leave_approach_profile(self) -> None:
         """Back to the rigid profile, and wait until what the compliant one added is gone: contact is found in forces,
         which an arm that yields to them would not show."""
-        if not str(self.ctx.config.get("approach_profile", "")):
+        if self._left or not str(self.ctx.config.get("approach_profile", "")):
             return
+        self._left = True
         self.await_pending(self.ctx.arm.apply_profile("dmp"), "feedback profile 'dmp'", 2.0)
         try:
             self.wait_for(lambda: self.ctx.arm.profile_settled("dmp").ok, "the end of the approach's compliance", 2.0)

@@ -8,7 +8,7 @@ from coglab_msgs.msg import ReasonCode, Say
 
 from coglab_smach.context.context import Context
 from coglab_smach.ports.pending import PortError
-from coglab_smach.states.base import CoglabState, TimeLimit
+from coglab_smach.states.base import CoglabState
 
 
 class CalibrateHand(CoglabState):
@@ -50,15 +50,12 @@ class HandPreshape(CoglabState):
 
 
 class HandClose(CoglabState):
-    """Close the preshaped hand on the object and make sure that something is in it.
+    """Close the preshaped hand on the object and make sure that something is in it; with ``from_person`` say so."""
 
-    With ``from_person`` it also waits until the weight has come: a person who does not let go gets the object back.
-    """
-
-    default_time_limit = 16.0
+    default_time_limit = 12.0
 
     def __init__(self, ctx: Context, from_person: bool) -> None:
-        super().__init__(ctx, input_keys=["object_id", "object_entry"])
+        super().__init__(ctx, input_keys=["object_id"])
         self.from_person = from_person
 
     def run(self, ud: Any) -> str:
@@ -67,7 +64,9 @@ class HandClose(CoglabState):
         self.ctx.holding, self.ctx.shared = ud.object_id, self.from_person
         self.await_pending(self.ctx.hand.close_on_object(), "closing of the hand")
         self.ctx.journal.mark("closed")
-        self.pause(float(self.ctx.config.get("hand.settle_after_close", 0.3)))
+        end = self.ctx.clock.now() + float(self.ctx.config.get("hand.settle_after_close", 0.3))
+        while not self.ctx.hand.state().holding and self.ctx.clock.now() < end:
+            self.pause(0.02)
         state = self.ctx.hand.state()
         if state.connected and not state.holding:
             self.ctx.holding, self.ctx.shared = "", False
@@ -78,32 +77,7 @@ class HandClose(CoglabState):
             )
         if self.from_person:
             self.ctx.say(Say.I_HAVE_IT, "I have it.")
-            self._await_load(ud.object_id, float(ud.object_entry.get("mass", 0.0)))
         return "succeeded"
-
-    def _await_load(self, object_id: str, mass: float) -> None:
-        limit = float(self.ctx.config.get("hand.load_timeout", 5.0))
-        share = float(self.ctx.config.get("hand.load_share", 0.5))
-        self.await_pending(
-            self.ctx.contact.arm("load", limit, {"mass": mass, "load_share": share}),
-            "arming of the contact detector",
-            2.0,
-        )
-        try:
-            self.wait_for(lambda: self.ctx.contact.event() is not None, f"the weight of '{object_id}'", limit)
-        except TimeLimit:
-            self.ctx.holding = ""
-            raise PortError(
-                f"the person did not let go of '{object_id}' within {limit:.0f} s",
-                ("its weight has not come into the robot's hand",),
-                ReasonCode.NOT_RELEASED,
-            ) from None
-        finally:
-            self.ctx.contact.disarm()
-        self.ctx.shared = False
-        self.ctx.journal.mark("loaded")
-        event = self.ctx.contact.event()
-        self.reason = event.message if event is not None else ""
 
 
 class HandOpen(CoglabState):

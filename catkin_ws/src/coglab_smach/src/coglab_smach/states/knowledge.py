@@ -12,7 +12,7 @@ from coglab_py.pose import Pose, mean_pose
 
 from coglab_smach.context.context import Context
 from coglab_smach.context.journal import Wait
-from coglab_smach.kinematics.goals import delivery_goal, grasp_goal, place_goal
+from coglab_smach.kinematics.goals import delivery_goal, grasp_goal, palm_at_grasp, place_goal
 from coglab_smach.ports.pending import PortError
 from coglab_smach.states.base import CoglabState
 
@@ -190,7 +190,7 @@ def paced(ctx: Context, goal: dict[str, Any]) -> dict[str, Any]:
 
 
 class SetGraspGoal(CoglabState):
-    """DMP goal from the nominal grasp: palm relative to the tracked object frame, short of it by the approach distance.
+    """DMP goal from the nominal grasp: palm relative to the tracked object frame, ``handover.standoff`` m short of it.
 
     Ends when the object is on offer, that is inside the handover region: the arm must not chase an object that still
     rests with the person. Nobody offering it within the limit is a failure, and the arm has not moved.
@@ -203,10 +203,13 @@ class SetGraspGoal(CoglabState):
 
     def run(self, ud: Any) -> str:
         self.ctx.say(Say.READY_TO_RECEIVE, f"Please hand me the object '{ud.object_id}'.")
-        goal = paced(self.ctx, grasp_goal(ud.object_entry, ud.grasp, "", "receive"))
+        standoff = float(self.ctx.config.get("handover.standoff", 0.0))
+        goal = paced(self.ctx, grasp_goal(ud.object_entry, ud.grasp, "", "receive", standoff))
         located = await_offer(self, ud.object_id, goal)
         ud.located = located
-        ud.goal = unless_withdrawn(self.ctx, {**goal, "frame": located["frame"]})
+        # The detector looks whether the object is in the palm, wherever the motion's goal comes from.
+        grasped = {"frame": located["frame"], "grasp": palm_at_grasp(ud.grasp, 0.0).to_dict()}
+        ud.goal = unless_withdrawn(self.ctx, {**goal, "frame": located["frame"], "object": grasped})
         return "succeeded"
 
 
