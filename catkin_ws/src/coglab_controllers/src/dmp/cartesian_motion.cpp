@@ -11,6 +11,15 @@ namespace {
 // step.
 constexpr double kRestSpeed = 1e-4, kRestDistance = 1e-4;
 
+// Share of the motion after which the goal is drawn back less and less.
+constexpr double kApproachBegins = 0.5;
+
+// Share of the approach by which the goal is drawn back: from 1 to 0 as minimum-jerk motions go.
+double drawnBack(double progress) noexcept {
+  const double p = std::clamp((progress - kApproachBegins) / (1.0 - kApproachBegins), 0.0, 1.0);
+  return 1.0 - p * p * p * (10.0 + p * (6.0 * p - 15.0));
+}
+
 }  // namespace
 
 CartesianMotion::CartesianMotion(const GoalEstimatorParameters& estimator,
@@ -19,14 +28,15 @@ CartesianMotion::CartesianMotion(const GoalEstimatorParameters& estimator,
 
 void CartesianMotion::start(const CartesianMotionPlan& plan, const Pose& pose,
                             const Vector3& velocity, const Vector3& angular_velocity,
-                            const Pose& goal) noexcept {
+                            const Pose& goal, const Vector3& approach) noexcept {
   goal_estimator_.reset(goal.position);
   orientation_estimator_.reset(goal.orientation);
   jitter_.reset();
   turning_jitter_.reset();
   seen_ = goal;
   end_.reset();
-  dmp_.start(plan.system, pose.position, velocity, goal.position, plan.ratio);
+  drawn_ = 1.0;
+  dmp_.start(plan.system, pose.position, velocity, goal.position - approach, plan.ratio);
   orientation_ = pose.orientation.normalized();
   curve_.start(orientation_, angular_velocity, goal.orientation, dmp_.tau());
   curve_begin_ = 0.0;
@@ -64,7 +74,8 @@ void CartesianMotion::watchNoise(double dt, const Pose& goal) noexcept {
   seen_ = goal;
 }
 
-const CartesianReference& CartesianMotion::step(double dt, const Pose& goal, double rate) noexcept {
+const CartesianReference& CartesianMotion::step(double dt, const Pose& goal, double rate,
+                                                const Vector3& approach) noexcept {
   event_ = MotionEnd::Event::None;
   if (phase_ == Phase::Idle || !(dt > 0.0)) return reference_;
   rate_ = rate;
@@ -79,6 +90,10 @@ const CartesianReference& CartesianMotion::step(double dt, const Pose& goal, dou
     goal_ = goal_estimator_.position();
     goal_velocity = goal_estimator_.velocity();
     if (!goal_estimator_.enabled()) goal_ = goal.position;
+    const double drawn = drawnBack(dmp_.progress());
+    goal_ -= drawn * approach;
+    goal_velocity += (drawn_ - drawn) / dt * approach;
+    drawn_ = drawn;
     goal_estimator_.update(dt, goal.position, jitter_.share());
     orientation_estimator_.update(dt, goal.orientation, turning_jitter_.share());
     curve_.setTarget(orientation_estimator_.orientation());

@@ -12,7 +12,8 @@ namespace coglab_controllers {
 
 namespace {
 
-constexpr double kFastestStart = 2.0;  // m/s
+constexpr double kFastestStart = 2.0;     // m/s
+constexpr double kLongestApproach = 0.3;  // m
 
 std::string text(const Vector3& v) {
   std::ostringstream out;
@@ -148,6 +149,11 @@ Answer DmpController::checkPrimitive(const DmpRequest& request, DmpPlan& plan) c
   if (!request.goal_offset.allFinite()) {
     return Answer::invalid("goal_offset holds a number that is not finite");
   }
+  if (!request.goal_approach.allFinite() || request.goal_approach.norm() > kLongestApproach) {
+    return Answer::invalid("goal_approach " + text(request.goal_approach) +
+                           " is not finite or longer than 0.3 m");
+  }
+  plan.hand.approach = request.goal_approach;
   plan.hand.offset = request.goal_offset;
   plan.hand.in_goal_frame = !request.goal_frame.empty();
   plan.goal_limits = request.goal_limits;

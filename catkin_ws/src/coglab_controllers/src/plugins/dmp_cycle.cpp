@@ -60,6 +60,10 @@ Pose HandGoal::at(const GoalObservation& goal) const noexcept {
   return pose;
 }
 
+Vector3 HandGoal::approachAt(const GoalObservation& goal) const noexcept {
+  return in_goal_frame ? Vector3(goal.orientation * approach) : approach;
+}
+
 void DmpCycle::configure(MotionConfiguration& configuration) {
   const Parameters& parameters = configuration.parameters;
   robot_ = configuration.setup.robot;
@@ -95,6 +99,7 @@ void DmpCycle::substitute(const DmpPlan& plan) {
   const HandGoal before = hand_;
   hand_ = plan.hand;
   hand_.in_goal_frame = before.in_goal_frame;
+  hand_.approach = before.approach;
   if (plan.hand.keep_orientation) hand_.orientation = before.orientation;
   bool projected = false;
   motion_.switchTo(plan.motion, inWorkspace(hand_.at(gate_.goal()), projected));
@@ -124,7 +129,8 @@ void DmpCycle::execute(const MotionStart<DmpPlan>& start) {
   gate_.reset(plan.goal);
   watch_.begin(plan.goal_limits, pose.position, plan.goal.position);
   bool projected = false;
-  motion_.start(plan.motion, pose, velocity, angular, inWorkspace(hand_.at(plan.goal), projected));
+  motion_.start(plan.motion, pose, velocity, angular, inWorkspace(hand_.at(plan.goal), projected),
+                hand_.approachAt(plan.goal));
   reference_.pose = pose;
   jumps_ = plan.given;
 }
@@ -232,7 +238,8 @@ void DmpCycle::computeReference(const MotionCycle& cycle, MotionReference& refer
   if (stage_ == DmpStage::Settle) comeToRest(cycle.last);
   watchGoal(cycle.input);
   if (stage_ == DmpStage::GivenUp) return;
-  reference_ = motion_.step(cycle.input.dt, goal_, cycle.input.time_scale);
+  reference_ = motion_.step(cycle.input.dt, goal_, cycle.input.time_scale,
+                            hand_.approachAt(gate_.goal()));
   followEnd(cycle);
   if (loopClosed()) write(reference, cycle.input.dt);
 }

@@ -115,6 +115,7 @@ class DmpControllerRos : public MotionControllerRos {
     asked.initial_position = toVector(request.initial_position);
     asked.initial_velocity = toVector(request.initial_velocity);
     asked.goal_frame = request.goal_frame;
+    asked.goal_approach = toVector(request.goal_approach);
     asked.goal_limits.region_low = toVector(request.goal_region_low);
     asked.goal_limits.region_high = toVector(request.goal_region_high);
     asked.goal_limits.retreat = request.goal_retreat;

@@ -34,9 +34,10 @@ class CartesianMotion {
 
   /// Begins at phase 1 from the given pose and velocity (execute_dmp).
   /// @param goal hand pose to reach, offset and target orientation already applied, goal as
-  /// received now.
+  /// received now.  @param approach as of step().
   void start(const CartesianMotionPlan& plan, const Pose& pose, const Vector3& velocity,
-             const Vector3& angular_velocity, const Pose& goal) noexcept;
+             const Vector3& angular_velocity, const Pose& goal,
+             const Vector3& approach = Vector3::Zero()) noexcept;
 
   /// Another primitive or ratio (switch_dmp): phase, position and velocity are kept, and the
   /// orientation curve goes on from where it is.
@@ -44,9 +45,12 @@ class CartesianMotion {
 
   /// One cycle.
   /// @param goal as received, sample-and-hold.  @param rate 0..1 slows the clock (speed_scale), see
-  /// Dmp::step.
+  /// Dmp::step.  @param approach m, along which the hand comes to the goal at last: until half of
+  /// the motion is over the goal counts as drawn back by it, then less and less, at the end not at
+  /// all.
   /// @return what the IK shall do in this cycle.
-  const CartesianReference& step(double dt, const Pose& goal, double rate = 1.0) noexcept;
+  const CartesianReference& step(double dt, const Pose& goal, double rate = 1.0,
+                                 const Vector3& approach = Vector3::Zero()) noexcept;
 
   /// Ends the motion where it is; the set-point rests at the present one.
   void stop() noexcept;
@@ -87,6 +91,7 @@ class CartesianMotion {
   double curve_begin_ = 0.0;                         // progress of the DMP at which the curve began
   double remaining_distance_ = 0.0;
   double rate_ = 1.0;     // of the last step
+  double drawn_ = 1.0;    // share of the approach by which the goal was drawn back then
   bool settled_ = false;  // the set-point has come to rest at the latched goal
 };
 

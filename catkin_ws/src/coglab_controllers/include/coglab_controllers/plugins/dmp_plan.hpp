@@ -13,12 +13,16 @@ namespace coglab_controllers {
 struct HandGoal {
   Vector3 offset = Vector3::Zero();
   Quaternion orientation = Quaternion::Identity();
+  /// m, along which the hand comes to the goal at last, in the goal frame; see CartesianMotion.
+  Vector3 approach = Vector3::Zero();
   /// The goal is a frame, with which offset and orientation turn; false: it comes on dmp_goal.
   bool in_goal_frame = true;
   bool keep_orientation = true;  ///< the hand keeps the orientation it has
 
   /// Where the hand shall be, in dmp_frame_name.
   Pose at(const GoalObservation& goal) const noexcept;
+  /// The approach, in dmp_frame_name.
+  Vector3 approachAt(const GoalObservation& goal) const noexcept;
 };
 
 /// One execute_dmp or switch_dmp, checked and complete.

@@ -36,6 +36,13 @@ def palm_at_grasp(grasp: Mapping[str, Any], standoff: float | None = None) -> Po
     return Pose(palm.position - distance * axis / np.linalg.norm(axis), palm.orientation)
 
 
+def approach_of(grasp: Mapping[str, Any], length: float) -> list[float]:
+    """m, object frame: the last ``length`` m of the way to the grasp, along its approach axis."""
+    axis = np.asarray(grasp.get("approach", {}).get("axis", Pose.from_dict(grasp["pose"]).axis(0)), dtype=float)
+    way: list[float] = (length * axis / np.linalg.norm(axis)).tolist()
+    return way
+
+
 def grasp_goal(
     entry: Mapping[str, Any], grasp: Mapping[str, Any], frame: str, role: str, standoff: float | None = None
 ) -> dict[str, Any]:

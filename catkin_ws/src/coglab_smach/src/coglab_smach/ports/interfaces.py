@@ -36,6 +36,7 @@ class DmpRequest:
     dmp_ratio: float = 1.0
     orientation_control: bool = False
     target_orientation: Sequence[float] = (0.0, 0.0, 0.0, 0.0)
+    goal_approach: Sequence[float] = (0.0, 0.0, 0.0)
     goal_region_low: Sequence[float] = (0.0, 0.0, 0.0)
     goal_region_high: Sequence[float] = (0.0, 0.0, 0.0)
     goal_retreat: float = 0.0

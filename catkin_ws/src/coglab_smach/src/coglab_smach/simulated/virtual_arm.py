@@ -148,6 +148,7 @@ class VirtualArm:
         self.request = request
         self.rig.robot.debug = None
         limits = (request.goal_region_low, request.goal_region_high, request.goal_retreat, request.goal_drop)
+        limits = (*limits, request.goal_approach)
         fields = (*self._fields(request), request.goal_frame, *limits)
         return self._ends_motion(self.node.ask(lambda: self._answered(self.robot.execute_dmp(*fields))))
 

@@ -96,6 +96,7 @@ def dmp_request(goal: dict[str, Any], primitive: str | None = None, ratio: float
         dmp_ratio=float(ratio if ratio is not None else goal.get("dmp_ratio", 1.0)),
         orientation_control=orientation is not None,
         target_orientation=list(orientation if orientation is not None else (0.0, 0.0, 0.0, 0.0)),
+        goal_approach=goal.get("approach", (0.0, 0.0, 0.0)),
         **goal.get("limits", {}),
     )
 

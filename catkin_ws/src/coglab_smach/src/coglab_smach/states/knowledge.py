@@ -12,7 +12,7 @@ from coglab_py.pose import Pose, mean_pose
 
 from coglab_smach.context.context import Context
 from coglab_smach.context.journal import Wait
-from coglab_smach.kinematics.goals import delivery_goal, grasp_goal, palm_at_grasp, place_goal
+from coglab_smach.kinematics.goals import approach_of, delivery_goal, grasp_goal, palm_at_grasp, place_goal
 from coglab_smach.ports.pending import PortError
 from coglab_smach.states.base import CoglabState
 
@@ -205,6 +205,7 @@ class SetGraspGoal(CoglabState):
         self.ctx.say(Say.READY_TO_RECEIVE, f"Please hand me the object '{ud.object_id}'.")
         standoff = float(self.ctx.config.get("handover.standoff", 0.0))
         goal = paced(self.ctx, grasp_goal(ud.object_entry, ud.grasp, "", "receive", standoff))
+        goal["approach"] = approach_of(ud.grasp, float(self.ctx.config.get("handover.approach", 0.08)))
         located = await_offer(self, ud.object_id, goal)
         ud.located = located
         # The detector looks whether the object is in the palm, wherever the motion's goal comes from.
