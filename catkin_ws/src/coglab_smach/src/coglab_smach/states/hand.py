@@ -9,6 +9,7 @@ from coglab_msgs.msg import ReasonCode, Say
 from coglab_smach.context.context import Context
 from coglab_smach.ports.pending import PortError
 from coglab_smach.states.base import CoglabState
+from coglab_smach.states.weight import hand_from_palm
 
 
 class CalibrateHand(CoglabState):
@@ -55,14 +56,17 @@ class HandClose(CoglabState):
     default_time_limit = 12.0
 
     def __init__(self, ctx: Context, from_person: bool) -> None:
-        super().__init__(ctx, input_keys=["object_id"])
+        super().__init__(ctx, input_keys=["object_id"], output_keys=["hand_distance"] if from_person else [])
         self.from_person = from_person
 
     def run(self, ud: Any) -> str:
         self.ctx.journal.mark("closing")
         # From here on the hand may hold: a failure in the middle must not make the recovery drop the object.
         self.ctx.holding, self.ctx.shared = ud.object_id, self.from_person
-        self.await_pending(self.ctx.hand.close_on_object(), "closing of the hand")
+        closing = self.ctx.hand.close_on_object()
+        if self.from_person:
+            ud.hand_distance = hand_from_palm(self)
+        self.await_pending(closing, "closing of the hand")
         self.ctx.journal.mark("closed")
         end = self.ctx.clock.now() + float(self.ctx.config.get("hand.settle_after_close", 0.3))
         while not self.ctx.hand.state().holding and self.ctx.clock.now() < end:
