@@ -72,6 +72,7 @@ inline coglab_msgs::CellTruth truthMessage(const CellTruth& truth, const std::st
   message.human_hand = poseMessage(truth.human_hand);
   message.robot_hand = poseMessage(truth.robot_hand);
   message.palm_force = vectorMessage(truth.palm_force);
+  message.human_force = vectorMessage(truth.human_force);
   message.robot_load_share = truth.robot_load_share;
   message.human_load_share = truth.human_load_share;
   message.held_by = truth.held_by;

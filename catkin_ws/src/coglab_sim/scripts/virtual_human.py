@@ -24,7 +24,6 @@ from coglab_objects.database import objects_folder, read_object
 from coglab_py import parameters
 from coglab_py.messages import pose_message, pose_of
 from coglab_py.pose import Pose
-from coglab_sim.person.in_cell import load_on_hand
 from coglab_sim.person.participant import Participant
 from coglab_sim.person.recorded_person import RecordedPerson, open_recorded_hand
 from coglab_sim.person.scene import Scene, WorldView
@@ -98,16 +97,14 @@ class VirtualHumanNode:
     def on_truth(self, message: CellTruth) -> None:
         """What there is to be seen and felt now."""
         robot, held = pose_of(message.robot_hand), pose_of(message.object)
-        force = message.palm_force
-        push = [force.x, force.y, force.z]
-        numbers = [*robot.position, *robot.orientation, *held.position, *held.orientation, *push]
+        force = message.human_force
+        load = np.array([force.x, force.y, force.z])
+        numbers = [*robot.position, *robot.orientation, *held.position, *held.orientation, *load]
         if not np.all(np.abs(numbers) < LARGEST):  # not finite either
             rospy.logwarn_throttle(
                 5.0, f"virtual human: truth/cell ignored: a number is not finite, or beyond {LARGEST:g}"
             )
             return
-        in_hand = message.held_by in ("human", "both")
-        load = load_on_hand(in_hand, push, self.human.scene.object_mass)
         with self.lock:
             self.view = WorldView(robot, self.fingers, held, load)
 

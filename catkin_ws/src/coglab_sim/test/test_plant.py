@@ -94,6 +94,52 @@ def test_friction_cone(share, slides):
     assert way == pytest.approx(expected, rel=0.1 if slides else None, abs=None if slides else 1.5e-3)
 
 
+def velocities(plant):
+    """Of all degrees of freedom, and their mass matrix."""
+    mass = plant.terms()["mass"]
+    return np.frombuffer(plant.bytes())[-len(mass) :], mass
+
+
+def test_energy_at_the_shipped_step_errs_as_the_integrator_does(tmp_path):
+    """Semi-implicit Euler with step h: E(t) - E(0) = -h/2 [p.a] + h int dT/dq.a dt + O(h^2), p = M v, a the acceleration.
+
+    From Taylor's series of one step against the exact motion: they differ by h^2/2 a in the position and by -h^2/2 da/dt
+    in the velocity, hence the energy by h^2/2 (dE/dq.a - p.da/dt); with Lagrange's dp/dt = dT/dq - dU/dq that is the
+    total differential above. dT/dq v follows from the plant's own terms: dM/dt v - C v, with C v = bias - gravity.
+    Whatever the damped fingers take is taken at any step: it is measured with the fine one."""
+    start, seconds = np.full(7, 0.5), 0.2
+    changes = {}
+    for step in (STEP, 2e-5):
+        plant = _plant.Plant(undamped(tmp_path), HOME, BOX, drives=drives(np.full(7, 0.1)), board=False)
+        plant.set_arm(HOME, start)
+        begin = plant.energy()
+        run(plant, seconds, step)
+        changes[step] = plant.energy() - begin
+    plant = _plant.Plant(undamped(tmp_path), HOME, BOX, drives=drives(np.full(7, 0.1)), board=False)
+    still = _plant.Plant(undamped(tmp_path), HOME, BOX, drives=drives(np.full(7, 0.1)), board=False)
+    plant.set_arm(HOME, start)
+    speed, mass = velocities(plant)
+    powers, along = [], 0.0
+    for _ in range(round(seconds / STEP)):
+        state, bias = plant.state(), plant.terms()["bias"][:7]
+        still.set_arm(state["position"])
+        coriolis = bias - still.terms()["bias"][:7]
+        plant.step(np.zeros(7), STEP)
+        now, mass_now = velocities(plant)
+        acceleration = (now - speed) / STEP
+        powers.append(speed @ mass @ acceleration)
+        along += STEP * (((mass_now - mass) / STEP @ speed)[:7] - coriolis) @ acceleration[:7]
+        speed, mass = now, mass_now
+    expected = STEP * (along - 0.5 * (powers[-1] - powers[0]))
+    error = changes[STEP] - changes[2e-5]
+    kinetic = 0.5 * speed @ mass @ speed
+    print(f"energy at 1 ms: error {1e3 * error:.3f} mJ, first order {1e3 * expected:.3f} mJ, of {kinetic:.2f} J")
+    bound = STEP * (abs(along) + 0.5 * abs(powers[0]) + 0.5 * abs(powers[-1]))
+    assert abs(error) <= bound < 0.02 * kinetic
+    # What is left is of second order: a tenth of the bound at a step that is a hundredth of the motion's times.
+    assert abs(error - expected) <= 0.1 * bound
+
+
 def test_energy_of_a_free_arm_stays(tmp_path):
     plant = _plant.Plant(undamped(tmp_path), HOME, BOX, drives=drives(np.full(7, 0.1)), board=False)
     plant.set_arm(HOME, np.full(7, 0.5))
@@ -160,22 +206,47 @@ def test_a_grasp_holds_under_shaking_and_lets_go(name):
 
 
 def test_a_grasp_without_friction_is_lost():
-    thing = {**objects()["bottle"], "friction": 0.02}
-    trial = GraspTrial(thing, "index up")
+    """The fingers close around a bottle that friction holds, and then it has none."""
+    bottle = objects()["bottle"]
+    with pytest.raises(ValueError, match="object 'bottle' cannot be placed in the robot's hand there"):
+        GraspTrial({**bottle, "friction": 0.02}, "index up")
+    trial = GraspTrial(bottle, "index up")
     trial.close()
+    trial.plant.set_object({**bottle, "friction": 0.02})
     slip, _, lost = trial.shake(seconds=0.5)
     assert lost or slip > 0.02
 
 
 def test_relaxed_fingers_give_way():
     """A finger that no tendon pulls is moved by a touch and comes back by its spring."""
-    thing = objects()["ball"]
-    trial = GraspTrial(thing, "palm down")
-    trial.plant.hold(HOME, steps=1500)  # the hand never closed: nothing but its placing holds the ball
-    assert trial.plant.state()["held_by"] == "robot"
-    trial.plant.place("world", trial.plant.state()["object"][0])
+    trial = GraspTrial(objects()["ball"], "palm down", grasped=False)  # the hand never closes
+    trial.plant.place("world", *trial.before_palm())
+    middle, _ = trial.in_palm()
     trial.plant.hold(HOME, steps=400)
     assert trial.plant.state()["held_by"] == "none"
+    assert np.linalg.norm(trial.in_palm()[0] - middle) > 0.1, "nothing but its placing held the ball"
+
+
+def test_in_the_robots_hand_nothing_but_contact_holds():
+    """From the moment on at which it is placed: the same plant whose fingers then open lets it go."""
+    trial = GraspTrial(objects()["mug"], "palm down")
+    assert trial.plant.state()["held_by"] == "robot"
+    held, _ = trial.in_palm()
+    trial.plant.hold(HOME, steps=1000)
+    assert np.linalg.norm(trial.in_palm()[0] - held) < 0.003
+    assert trial.open() <= 0.3
+    trial.plant.hold(HOME, steps=300)
+    assert np.linalg.norm(trial.in_palm()[0] - held) > 0.1
+
+
+@pytest.mark.parametrize("place", [[0.04, 0.30, 0.0], [0.25, 0.0, 0.05], [-0.12, 0.0, 0.05]])
+def test_out_of_the_fingers_reach_nothing_is_placed_in_the_robots_hand(place):
+    """Beside the hand, before it, behind it."""
+    plant = _plant.Plant(URDF, HOME, objects()["mug"], board=False)
+    before = plant.bytes()
+    with pytest.raises(ValueError, match="object 'mug' cannot be placed in the robot's hand there: closed around it,"):
+        plant.place("robot_hand", place, [-0.5, -0.5, -0.5, 0.5])
+    assert plant.bytes() == before, "nothing has changed"
 
 
 def test_motors_stop_at_contact_and_lock():
@@ -186,7 +257,10 @@ def test_motors_stop_at_contact_and_lock():
         assert motor["locked"] and motor["current"] == 0.0 and 0.1 < motor["position"] < 0.9
         # 240 counts are half of the limit; a gear that holds is pulled further by the fingers that close after it.
         assert 0.7 * 0.5 * limit < motor["tension"] < 1.25 * 0.5 * limit
-    alone = GraspTrial(objects()["mug"], "index up")
+    alone = GraspTrial(objects()["mug"], "index up", grasped=False)
+    where, turn = alone.before_palm()
+    alone.plant.place("human_hand", [-0.08, 0.0, -0.05], turn)  # somebody holds it against the finger
+    alone.plant.set_person(where + [0.08, 0.0, 0.05], grip=1.0, grip_force=40.0)
     alone.plant.command_motor(2, 1.0, 1.0, 240.0)
     alone.plant.hold(HOME, steps=1600)
     index = alone.plant.motors()[2]
@@ -225,6 +299,63 @@ def test_a_person_carries_and_gives_way_beyond_their_grip():
         plant.set_person(hand, grip=0.0)
         plant.hold(HOME)
     assert plant.state()["held_by"] in ("none", "floor") and plant.state()["object"][0][2] < 0.0
+
+
+WEIGHT = 0.31 * G
+
+
+def carried(grip_force, pull, seconds=1.5):
+    """A mug in a person's hand that is pulled down with ``pull`` N, weight and all: the state after so long."""
+    plant = _plant.Plant(URDF, HOME, objects()["mug"], board=False)
+    plant.set_brakes(True)
+    plant.place("human_hand", [-0.08, 0.0, -0.05])
+    plant.set_gravity([0.0, 0.0, -pull / 0.31])
+    for _ in range(int(seconds / STEP / 10)):
+        plant.set_person([0.9, 0.3, 0.9], grip=1.0, grip_force=grip_force)
+        run(plant, 0.01)
+    return plant.state()
+
+
+@pytest.mark.parametrize("grip_force", [1.0, 4.0, 10.0, 20.0])
+def test_a_persons_hold_lets_go_of_what_grip_and_friction_do_not_carry(grip_force):
+    """Two sides press: 2 mu F. Below the weight too, and it is gone for good: a closed hand does not find it again."""
+    limit = 2.0 * objects()["mug"]["friction"] * grip_force
+    held = carried(grip_force, 0.9 * limit)
+    assert held["held_by"] == "human" and held["object"][0][2] > 0.8
+    assert held["person_force"] == pytest.approx([0.0, 0.0, -0.9 * limit], abs=0.05)
+    lost = carried(grip_force, 1.2 * limit)
+    assert lost["held_by"] in ("none", "floor") and lost["object"][0][2] < 0.5
+    assert lost["person_force"] == pytest.approx(np.zeros(3), abs=1e-6)
+
+
+def test_the_hand_feels_what_its_own_grip_carries():
+    """The whole weight; nothing of a mug that lies on the floor; together with the robot its own part."""
+    assert carried(20.0, WEIGHT)["person_force"] == pytest.approx([0.0, 0.0, -WEIGHT], abs=0.01)
+    trial = GraspTrial(objects()["mug"], "index up")
+    plant, hand = trial.plant, trial.plant.state()["object"][0] + [0.08, 0.0, 0.05]
+    for _ in range(800):
+        plant.set_person(hand + [0.0, 0.0, 0.004], grip=1.0)
+        plant.hold(HOME)
+    state = plant.state()
+    assert -0.9 * WEIGHT < state["person_force"][2] < -0.2 * WEIGHT
+    weight = 0.31 * 9.81 * rotated(plant.state()["palm"][1], np.array(DIRECTIONS["index up"], dtype=float))
+    assert state["person_force"] + state["object_force"] == pytest.approx(weight, abs=0.05)
+
+
+def test_a_hand_does_not_feel_its_own_motion_as_a_load():
+    """Swung by 2 m/s^2 at 0.5 Hz; what the acceleration alone asks of the grip would be 0.6 N."""
+    plant = _plant.Plant(URDF, HOME, objects()["mug"], board=False)
+    plant.set_brakes(True)
+    plant.place("human_hand", [-0.08, 0.0, -0.05])
+    rate, felt = np.pi, []
+    for step in range(3000):
+        t = STEP * step
+        if step % 10 == 0:
+            at, speed = 2.0 / rate**2 * np.cos(rate * t), -2.0 / rate * np.sin(rate * t)
+            plant.set_person([0.9, 0.3 + at, 0.9], velocity=[0.0, speed, 0.0], grip=1.0)
+        run(plant, STEP)
+        felt.append(plant.state()["person_force"])
+    assert np.abs(np.array(felt[1000:]) - [0.0, 0.0, -WEIGHT]).max() < 0.15
 
 
 def test_a_person_who_takes_carries_what_they_lift():
@@ -276,6 +407,22 @@ def test_divergence_stops_with_seed_and_time():
         run(plant, 1.0, torque=np.full(7, 1e5))
 
 
+@pytest.mark.parametrize("speed, diverged", [(6.0, False), (14.0, True)])
+def test_no_body_is_faster_than_10_m_per_s(speed, diverged):
+    """The arm stretched out, its first joint turning: far below any limit of a joint, but the hand is 1 m away."""
+    stretched = np.array([0.0, 1.57, 0.0, 0.0, 0.0, 0.0, 0.0])
+    plant = _plant.Plant(URDF, HOME, BOX, seed=42, board=False)
+    plant.set_arm(stretched, [speed, 0, 0, 0, 0, 0, 0])
+    palm = plant.terms()["jacobian"][:3, 0] * speed
+    assert (np.linalg.norm(palm) > 10.0) == diverged
+    if not diverged:
+        run(plant, 0.02)
+        return
+    words = r"diverged at 0\.00\d s with seed 42: \w+ is faster than anything here can be \(10 m/s, 100 rad/s\)"
+    with pytest.raises(RuntimeError, match=words):
+        run(plant, 0.02)
+
+
 @pytest.mark.parametrize(
     "change, sentence",
     [
@@ -301,9 +448,37 @@ def test_an_object_inside_something_is_refused():
     plant = _plant.Plant(URDF, HOME, BOX)
     with pytest.raises(ValueError, match=r"object 'box' would stand \d+(\.\d+)? mm inside board there"):
         plant.place("world", BOARD_TOP - [0.0, 0.0, 0.015])
-    with pytest.raises(ValueError, match="inside ih2_base_link in that hand"):
+    with pytest.raises(ValueError, match="inside ih2_base_link there"):
         plant.place("robot_hand", [0.0, 0.0, 0.0])
+    with pytest.raises(ValueError, match=r"object 'box' would stand \d+(\.\d+)? mm inside the person's hand in that"):
+        plant.place("human_hand", [0.15, 0.0, -0.02])
     plant.place("world", BOARD_TOP)
+    before = plant.bytes()
+    with pytest.raises(ValueError, match="inside board there"):
+        plant.place("world", BOARD_TOP - [0.0, 0.0, 0.015])
+    assert plant.bytes() == before, "the object stays where it was"
+
+
+def test_an_object_inside_the_arm_is_refused_wherever_it_is():
+    """The arm straight up, and a small box moved up its axis: where its middle is that of a link, too."""
+    plant = _plant.Plant(URDF, np.zeros(7), {**BOX, "size": [0.04, 0.04, 0.04]}, board=False)
+    top, accepted = plant.state()["palm"][0][2], []
+    for z in np.arange(0.02, top - 0.02, 0.01):
+        try:
+            plant.place("world", [0.0, 0.0, z - 0.02])
+            accepted.append(round(float(z), 3))
+        except ValueError as error:
+            assert re.search(r"object 'box' would stand \d+(\.\d+)? mm inside (lwr|ih2)_\w+ there", str(error))
+    assert accepted == []
+
+
+def test_a_person_who_would_stand_in_the_arm_is_not_there():
+    plant = _plant.Plant(URDF, HOME, BOX)
+    before, palm = plant.bytes(), plant.state()["palm"][0]
+    with pytest.raises(ValueError, match=r"the person's hand would stand \d+(\.\d+)? mm inside \w+ where it comes from"):
+        plant.set_person(palm - [0.15, 0.0, 0.0])
+    assert plant.bytes() == before
+    plant.set_person([1.0, 0.2, 0.4])
 
 
 @pytest.mark.parametrize(

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from coglab_py.pose import Pose
-from coglab_sim.person.in_cell import closure, load_on_hand
+from coglab_sim.person.in_cell import closure
 from coglab_sim.person.participant import Participant
 from coglab_sim.person.scene import WorldView
 from coglab_sim.person.senses import Senses
@@ -68,8 +68,5 @@ def test_a_robot_that_was_never_seen_before_is_not_at_rest():
     assert first[0][1].robot_speed > 0.5 and first[-1][1].robot_speed < 0.03
 
 
-def test_the_hand_feels_weight_and_push_while_it_holds():
-    assert load_on_hand(True, [0.0, -2.0, 0.0], 0.5) == pytest.approx([0.0, 2.0, -0.5 * 9.81])
-    assert load_on_hand(True, [0.0, 0.0, -0.5 * 9.81], 0.5) == pytest.approx([0.0, 0.0, 0.0]), "the robot carries it"
-    assert not load_on_hand(False, [0.0, -2.0, 0.0], 0.5).any()
+def test_closure_is_seen_of_all_but_the_thumb():
     assert closure([254, 254, 0, 0, 0]) == 0.0 and closure([0, 0, 254, 254, 254]) == 1.0

@@ -28,7 +28,7 @@ class Trial:
         truth = cell.truth()
         obj = truth["object"]
         fingers = float(np.mean([motor["position"] for motor in cell.motors()][2:]))
-        move_person(cell, self.human.step(self.robot.now, view_of(truth, fingers, self.human.scene.object_mass)))
+        move_person(cell, self.human.step(self.robot.now, view_of(truth, fingers)))
         cell.set_motors([1.0] * 5, self.wanted, [self.current] * 5)
         self.robot.set_frame("object_mug", obj["position"], obj["rotation"])
         self.robot.tick()

@@ -93,7 +93,7 @@ def misbehaviour_rows():
                 share >= 1.0 and campaign.stuck == 0,
             )
         )
-        for name in ("outside", "moving", "stuck", "trials"):
+        for name in ("outside_commanded", "outside_measured", "moving", "stuck", "trials"):
             setattr(everything, name, getattr(everything, name) + getattr(campaign, name))
     return rows + everything.safety_rows(row, "misbehaving partners")
 

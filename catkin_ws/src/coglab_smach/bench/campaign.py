@@ -62,7 +62,8 @@ def one_trial(job: Job) -> dict[str, Any]:
         "stuck": stuck,
         "outcomes": [(r.kind, r.outcome, r.reason, REASONS.get(r.code, str(r.code))) for r in results],
         "fell": bool(trial.rig.cell.truth()["dropped"]),
-        "outside": trial.rig.robot.limit_violations,
+        "outside_commanded": trial.rig.robot.outside["commanded"],
+        "outside_measured": trial.rig.robot.outside["measured"],
         "moving": trial.ctx.contact.watched_while_moving,
         "virtual": trial.clock.now(),
         "processor": time.process_time() - started,
@@ -118,7 +119,7 @@ class Campaign:
         self.reasons: dict[str, Counter] = {action: Counter() for action in EXCHANGES}
         self.reaches: dict[str, list[dict[str, float]]] = {action: [] for action in EXCHANGES}
         self.touches: list[tuple[float | None, float | None, bool, bool]] = []
-        self.outside = self.moving = self.stuck = self.trials = self.fell = 0
+        self.outside_commanded = self.outside_measured = self.moving = self.stuck = self.trials = self.fell = 0
         self.asked = 0
         self.palms: list[tuple[dict[str, float], bool]] = []
         self.virtual = self.processor = 0.0
@@ -159,7 +160,7 @@ class Campaign:
 
     def _count(self, actions: Sequence[str], trial: dict[str, Any], name: str) -> None:
         self.trials += 1
-        for field in ("outside", "moving", "virtual", "processor", "fell"):
+        for field in ("outside_commanded", "outside_measured", "moving", "virtual", "processor", "fell"):
             setattr(self, field, getattr(self, field) + trial[field])
         self.stuck += bool(trial["stuck"])
         if trial["stuck"]:
@@ -196,11 +197,18 @@ class Campaign:
         found = self.reasons.get(action, Counter()).most_common()
         return ", ".join(f"{name.lower()} {n}" for name, n in found) or "none"
 
+    def limit_rows(self, row: Callable[..., dict], what: str, goal: str = "") -> list[dict]:
+        """Periods outside a joint limit: as the arm was told, and as it moved; with a goal (<= 0) or only printed."""
+        return [
+            row(f"{what}: periods outside a joint limit as {how}", n, "periods", goal, not goal or n == 0)
+            for how, n in (("commanded", self.outside_commanded), ("measured", self.outside_measured))
+        ]
+
     def safety_rows(self, row: Callable[..., dict], what: str) -> list[dict]:
         """Nothing stuck, no limit violated, never armed while moving."""
         return [
             row(f"{what}: stuck", self.stuck, "trials", "<= 0", self.stuck == 0),
-            row(f"{what}: periods outside a joint limit", self.outside, "periods", "<= 0", self.outside == 0),
+            *self.limit_rows(row, what, "<= 0"),
             row(
                 f"{what}: contact detector watching while the arm moves",
                 self.moving,

@@ -105,17 +105,17 @@ def judged_rows(row: Row, campaigns: list[Campaign]) -> list[dict]:
     everything, good = Campaign(), 0.0
     for campaign in campaigns:
         good += sum(campaign.share(action) for action in EXCHANGES) * campaign.trials
-        for count in ("trials", "asked", "fell", "stuck", "outside"):
+        for count in ("trials", "asked", "fell", "stuck", "outside_commanded", "outside_measured"):
             setattr(everything, count, getattr(everything, count) + getattr(campaign, count))
     trials = max(1, everything.trials)
     share, fallen = good / (2 * trials), everything.fell / trials
     what = f"physics right, {PEOPLE} patient people x {len(OBJECTS)} objects x 2 directions, power grasps"
-    row, stuck, outside = everything.marked(row), everything.stuck, everything.outside
+    row, stuck = everything.marked(row), everything.stuck
     return [
         row(f"{what}: succeeded", share, "share", ">= 0.97", share >= 0.97),
         row(f"{what}: object fell", fallen, "share of trials", "<= 0.01", fallen <= 0.01),
         row(f"{what}: stuck", stuck, "trials", "<= 0", stuck == 0),
-        row(f"{what}: measured periods outside a joint limit", outside, "periods", "<= 0", outside == 0),
+        *everything.limit_rows(row, what, "<= 0"),
     ]
 
 
@@ -148,7 +148,7 @@ def whole_rows(row: Row, campaign: Campaign, what: str) -> list[dict]:
         row(f"{what}, give: succeeded of {campaign.begun(give)} begun", campaign.share_of_begun(give), "share"),
         row(f"{what}: object fell", campaign.fell, "trials"),
         row(f"{what}: stuck", campaign.stuck, "trials"),
-        row(f"{what}: measured periods outside a joint limit", campaign.outside, "periods"),
+        *campaign.limit_rows(row, what),
     ]
     for action in EXCHANGES:
         found = campaign.reaches[action]

@@ -86,6 +86,8 @@ class Robot:
         self.virtual = LockstepRobot(urdf_file(), limits, parameters, yaml.safe_dump(manager_parameters()))
         self.cell = self.virtual.cell
         self.limits = cc.load_joint_limits(limits)
+        self._fastest = np.array(self.limits.velocity)
+        self._lowest, self._highest = np.array(self.limits.lower_position), np.array(self.limits.upper_position)
         with open(urdf_file(), encoding="utf-8") as stream:
             self.chain = cc.Chain(stream.read())
         self.report = self.virtual.report()
@@ -98,29 +100,43 @@ class Robot:
         }
         self.ended: dict[int, dict[str, Any]] = {}
         self.loaded: dict[str, str] = {}
-        self.peak_share = 0.0
-        self.limit_violations = 0
+        self.peak_share = self.measured_share = 0.0
+        self.outside = {"commanded": 0, "measured": 0}
         self.debug: dict[str, Any] | None = None
         self._commanded: np.ndarray | None = None
 
+    @property
+    def limit_violations(self) -> int:
+        """Periods in which the arm was outside a limit, by its commands or as it moved."""
+        return self.outside["commanded"] + self.outside["measured"]
+
+    def _look_at_arm(self) -> None:
+        """Judge the true joints: where they are, and how fast they were in any step of the period. Nothing is
+        differentiated or rounded, and no tolerance is given."""
+        share = float((self.cell.fastest / self._fastest).max())
+        self.measured_share = max(self.measured_share, share)
+        self.outside["measured"] += share > 1.0 or self._beyond(self.cell.position)
+
+    def _beyond(self, position: np.ndarray) -> bool:
+        return bool((position < self._lowest).any() or (position > self._highest).any())
+
     def step(self) -> None:
-        """One FRI period; the limits are looked at in what was measured and in what was answered."""
+        """One FRI period; the limits are looked at in how the arm moved and in what it was told."""
         self.virtual.tick()
+        self._look_at_arm()
         self.report = report = self.virtual.report()
         if report["fri_period"] <= 0.0:
             return
         if "ptp" in self.loaded:
             self.ended.update((end["ptp_id"], end) for end in self.virtual.ptp_ends())
-        q, commanded = np.asarray(report["position"]), np.asarray(report["commanded_position"])
-        outside = any(
-            np.any(v < self.limits.lower_position) or np.any(v > self.limits.upper_position) for v in (q, commanded)
-        )
+        commanded = np.asarray(report["commanded_position"])
+        outside = self._beyond(commanded)
         if self._commanded is not None and report["motion_allowed"]:
             speed = np.abs(commanded - self._commanded) / DT
-            self.peak_share = max(self.peak_share, float(np.max(speed / self.limits.velocity)))
-            outside = outside or bool(np.any(speed > self.limits.velocity + FLOAT32))
+            self.peak_share = max(self.peak_share, float(np.max(speed / self._fastest)))
+            outside = outside or bool(np.any(speed > self._fastest + FLOAT32))
         self._commanded = commanded if report["motion_allowed"] else None
-        self.limit_violations += outside
+        self.outside["commanded"] += outside
 
     def look_at_motion(self) -> list[dict[str, Any]]:
         """Progress of the DMP and, while it moves, the newest set-point and goal."""
@@ -306,7 +322,7 @@ class World:
     def _person_and_tracker(self) -> None:
         self.truth = truth = self.cell.truth()
         fingers = closure([motor.position for motor in self.hand.emulator.motors])
-        view = view_of(truth, fingers, self.scene.object_mass)
+        view = view_of(truth, fingers)
         hand = self.human.step(self.t, view)
         move_person(self.cell, hand)
         frames = {self.object_frame: view.object, "human_hand": hand.frame}
