@@ -3,8 +3,10 @@
 Definitions. A trial is a person who gives the object (receive) and asks for it again (give): every person is a trial of
 both directions, a second direction that never began counts as failed. Physics right: profile patient, perfect
 perception, every object grasped with all fingers (power grasp); what an object's file asks for otherwise is printed
-beside. An object has fallen if it lies, or lay, on the floor. The default world is `Conditions()`; a hardship changes
-one thing of it. Beside them: the default world with people whose habits make a handover easier (`CAREFUL`).
+beside. An object has fallen if it lies, or lay, on the floor. A period is outside a limit as commanded if the answered
+positions or their speeds are; as measured if a joint of the plant is beyond its range at the end of the period, or
+faster than its limit in any of its steps of 1 ms, without tolerance. The default world is `Conditions()`; a hardship
+changes one thing of it. Beside them: the default world with people whose habits make a handover easier (`CAREFUL`).
 """
 
 from __future__ import annotations
