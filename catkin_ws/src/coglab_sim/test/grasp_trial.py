@@ -20,6 +20,16 @@ DIRECTIONS = {
 """Gravity in ih2_palm, in units of g."""
 CYLINDRICAL = np.array([245, 5, 30, 50, 50]) / 255
 STEP = 1e-3
+G = 9.81
+BOX = {"id": "box", "mass": 0.5, "shape": "box", "size": [0.08, 0.08, 0.04], "center": [0, 0, 0.02], "friction": 0.5}
+BOARD_TOP = np.array([0.45, -0.55, 0.05])
+
+
+def run(plant, seconds, dt=STEP, torque=None):
+    """So many seconds with constant torques of the motors; the state."""
+    for _ in range(round(seconds / dt)):
+        plant.step(np.zeros(7) if torque is None else torque, dt)
+    return plant.state()
 
 
 def rotated(rotation, vector):

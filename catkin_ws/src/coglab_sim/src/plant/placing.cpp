@@ -23,6 +23,7 @@ constexpr std::array<double, kMotors> kPreshape = {245 / 255.0, 5 / 255.0, 30 / 
                                                    50 / 255.0};
 constexpr double kCloseCurrent = 240.0;  // counts
 constexpr int kOpening = 300, kClosing = 2500, kHanging = 300;  // steps
+constexpr double kCarries = 1.5;  // friction over weight from which on it hangs in the fingers
 constexpr double kStays = 0.02;  // m that it may move in the palm once it hangs in the fingers
 
 }  // namespace
@@ -128,7 +129,7 @@ void Plant::forget() {
   grip_.release();
   placed_ = grip_lost_ = false;
   on_board_ = on_floor_ = dropped_ = false;
-  robot_share_ = person_share_ = squeeze_ = 0.0;
+  robot_share_ = person_share_ = squeeze_ = grasp_force_ = 0.0;
   object_force_.setZero();
   person_force_.setZero();
 }
@@ -162,6 +163,7 @@ void Plant::placeInRobotHand(const Pose& in_palm) {
   motors_ = beside.motors_;
   robot_share_ = beside.robot_share_;
   squeeze_ = beside.squeeze_;
+  grasp_force_ = beside.grasp_force_;
   object_force_ = beside.object_force_;
 }
 
@@ -187,7 +189,11 @@ void Plant::closeAround(const Pose& in_palm) {
     }
     return false;
   };
-  for (int i = 0; i < kClosing && closing(); ++i) step(off);
+  const Object& thing = config_.object;
+  for (int i = 0; i < kClosing && closing(); ++i) {
+    step(off);
+    placed_ = placed_ && thing.friction * grasp_force_ < kCarries * thing.mass * kGravity;
+  }
   placed_ = false;
   for (int i = 0; i < kHanging; ++i) step(off);
   const double moved = ((palm().inverse() * object()).position - in_palm.position).norm();

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <sstream>
 #include <stdexcept>
+#include <utility>
 
 namespace coglab_sim::plant {
 namespace {
@@ -306,8 +307,12 @@ Plant::Terms Plant::terms() const {
 }
 
 double Plant::energy() {
+  // Without the flag MuJoCo leaves the energy at 0; with it every step would compute it.
+  int& flags = model_->get()->opt.enableflags;
+  const int before = std::exchange(flags, flags | mjENBL_ENERGY);
   mj_energyPos(model_->get(), model_->data());
   mj_energyVel(model_->get(), model_->data());
+  flags = before;
   return model_->data()->energy[0] + model_->data()->energy[1];
 }
 

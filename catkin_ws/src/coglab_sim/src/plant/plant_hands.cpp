@@ -215,6 +215,7 @@ void Plant::readContacts(double dt) {
   average(robot_share_, std::clamp(pressing.on_object.z() / weight, 0.0, 1.0));
   average(person_share_, std::clamp(grip_force_.z() / weight, 0.0, 1.0));
   average(squeeze_, opposed);
+  average(grasp_force_, opposed > 0.0 ? pressing.fingers + pressing.opposing : 0.0);
   // People know how their own hand moves: what that alone asks of the grip is not felt as a load.
   Vector3d felt = Vector3d::Zero();
   if (grip_.engaged())

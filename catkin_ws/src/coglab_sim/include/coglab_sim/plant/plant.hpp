@@ -218,7 +218,7 @@ class Plant {
   Vector3d object_force_ = Vector3d::Zero();
   double robot_share_ = 0.0, person_share_ = 0.0;
   Vector3d grip_force_ = Vector3d::Zero(), person_force_ = Vector3d::Zero();
-  double squeeze_ = 0.0;  // N, averaged
+  double squeeze_ = 0.0, grasp_force_ = 0.0;  // N, averaged
   bool on_board_ = false, on_floor_ = false, dropped_ = false;
   int contacts_ = 0;
   double time_ = 0.0;
