@@ -35,14 +35,17 @@ def watched():
 
 def test_a_joint_that_moves_too_fast_is_counted_whatever_was_commanded():
     robot = watched()
-    arm, limit = robot.virtual, np.array(robot.limits.velocity)
+    arm = robot.virtual
+    # rad/s, as published: the KRC's file rsidef7.dat, the same in the robot description.
+    limit = np.radians([110.0, 110.0, 112.5, 112.5, 130.0, 112.5, 112.5])
     for joint in range(7):
         arm.fastest = np.eye(7)[joint] * limit * 0.9999
         robot.step()
-        assert robot.outside == {"commanded": 0, "measured": joint}
+        assert robot.outside == {"commanded": 0, "measured": joint, "over_command": 2 * joint + 1}
         arm.fastest = np.eye(7)[joint] * limit * 1.0001
         robot.step()
-        assert robot.outside == {"commanded": 0, "measured": joint + 1} and robot.limit_violations == joint + 1
+        assert robot.outside == {"commanded": 0, "measured": joint + 1, "over_command": 2 * joint + 2}
+        assert robot.limit_violations == joint + 1
     assert robot.measured_share > 1.0 and robot.peak_share == 0.0
 
 
@@ -50,7 +53,7 @@ def test_a_joint_beyond_its_range_is_counted_whatever_was_commanded():
     robot = watched()
     robot.virtual.position = np.array(robot.limits.upper_position) + np.eye(7)[3] * 1e-6
     robot.step()
-    assert robot.outside == {"commanded": 0, "measured": 1}
+    assert robot.outside == {"commanded": 0, "measured": 1, "over_command": 0}
 
 
 def test_what_is_commanded_too_fast_is_counted_though_the_arm_stands():
@@ -58,7 +61,7 @@ def test_what_is_commanded_too_fast_is_counted_though_the_arm_stands():
     robot.step()
     robot.virtual.commanded = np.array(robot.limits.velocity) * 1.01 * virtual_world.DT
     robot.step()
-    assert robot.outside == {"commanded": 1, "measured": 0}
+    assert robot.outside == {"commanded": 1, "measured": 0, "over_command": 0}
 
 
 def test_the_speed_is_the_plants_own_and_the_largest_of_the_period(session):

@@ -93,7 +93,8 @@ def misbehaviour_rows():
                 share >= 1.0 and campaign.stuck == 0,
             )
         )
-        for name in ("outside_commanded", "outside_measured", "moving", "stuck", "trials"):
+        everything.fastest = max(everything.fastest, campaign.fastest)
+        for name in ("outside_commanded", "outside_measured", "over_command", "moving", "stuck", "trials"):
             setattr(everything, name, getattr(everything, name) + getattr(campaign, name))
     return rows + everything.safety_rows(row, "misbehaving partners")
 

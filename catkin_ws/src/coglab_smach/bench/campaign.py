@@ -64,6 +64,8 @@ def one_trial(job: Job) -> dict[str, Any]:
         "fell": bool(trial.rig.cell.truth()["dropped"]),
         "outside_commanded": trial.rig.robot.outside["commanded"],
         "outside_measured": trial.rig.robot.outside["measured"],
+        "over_command": trial.rig.robot.outside["over_command"],
+        "fastest": trial.rig.robot.measured_share,
         "moving": trial.ctx.contact.watched_while_moving,
         "virtual": trial.clock.now(),
         "processor": time.process_time() - started,
@@ -119,10 +121,10 @@ class Campaign:
         self.reasons: dict[str, Counter] = {action: Counter() for action in EXCHANGES}
         self.reaches: dict[str, list[dict[str, float]]] = {action: [] for action in EXCHANGES}
         self.touches: list[tuple[float | None, float | None, bool, bool]] = []
-        self.outside_commanded = self.outside_measured = self.moving = self.stuck = self.trials = self.fell = 0
+        self.outside_commanded = self.outside_measured = self.over_command = self.moving = self.stuck = self.trials = self.fell = 0
         self.asked = 0
         self.palms: list[tuple[dict[str, float], bool]] = []
-        self.virtual = self.processor = 0.0
+        self.virtual = self.processor = self.fastest = 0.0
 
     def run(self, actions: Sequence[str], seeds: Iterable[int], **kw: Any) -> Campaign:
         """One trial per seed, all alike; returns self."""
@@ -160,7 +162,8 @@ class Campaign:
 
     def _count(self, actions: Sequence[str], trial: dict[str, Any], name: str) -> None:
         self.trials += 1
-        for field in ("outside_commanded", "outside_measured", "moving", "virtual", "processor", "fell"):
+        self.fastest = max(self.fastest, trial["fastest"])
+        for field in ("outside_commanded", "outside_measured", "over_command", "moving", "virtual", "processor", "fell"):
             setattr(self, field, getattr(self, field) + trial[field])
         self.stuck += bool(trial["stuck"])
         if trial["stuck"]:
@@ -198,10 +201,15 @@ class Campaign:
         return ", ".join(f"{name.lower()} {n}" for name, n in found) or "none"
 
     def limit_rows(self, row: Callable[..., dict], what: str, goal: str = "") -> list[dict]:
-        """Periods outside a joint limit: as the arm was told, and as it moved; with a goal (<= 0) or only printed."""
+        """Periods outside a joint limit: as the arm was told, and as it moved; with a goal (<= 0) or only printed. Beside
+        them how fast it was, and how often faster than it may be told."""
         return [
-            row(f"{what}: periods outside a joint limit as {how}", n, "periods", goal, not goal or n == 0)
-            for how, n in (("commanded", self.outside_commanded), ("measured", self.outside_measured))
+            *(
+                row(f"{what}: periods outside a joint limit as {how}", n, "periods", goal, not goal or n == 0)
+                for how, n in (("commanded", self.outside_commanded), ("measured", self.outside_measured))
+            ),
+            row(f"{what}: fastest joint as measured over its limit", self.fastest, "share", "", True),
+            row(f"{what}: measured faster than the largest speed to command", self.over_command, "periods", "", True),
         ]
 
     def safety_rows(self, row: Callable[..., dict], what: str) -> list[dict]:

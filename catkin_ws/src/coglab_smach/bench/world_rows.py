@@ -107,8 +107,9 @@ def judged_rows(row: Row, campaigns: list[Campaign]) -> list[dict]:
     everything, good = Campaign(), 0.0
     for campaign in campaigns:
         good += sum(campaign.share(action) for action in EXCHANGES) * campaign.trials
-        for count in ("trials", "asked", "fell", "stuck", "outside_commanded", "outside_measured"):
+        for count in ("trials", "asked", "fell", "stuck", "outside_commanded", "outside_measured", "over_command"):
             setattr(everything, count, getattr(everything, count) + getattr(campaign, count))
+        everything.fastest = max(everything.fastest, campaign.fastest)
     trials = max(1, everything.trials)
     share, fallen = good / (2 * trials), everything.fell / trials
     what = f"physics right, {PEOPLE} patient people x {len(OBJECTS)} objects x 2 directions, power grasps"

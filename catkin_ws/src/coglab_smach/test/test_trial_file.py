@@ -11,7 +11,8 @@ from trial_file import TrialFile, commit_in
 
 JOBS = [campaign.Job("mug", ("exchange_human_to_robot",), seed, {}) for seed in range(3)]
 TRIAL = {
-    **dict.fromkeys(("seed", "fell", "outside_commanded", "outside_measured", "moving"), 0),
+    **dict.fromkeys(("seed", "fell", "outside_commanded", "outside_measured", "over_command", "moving"), 0),
+    "fastest": 0.5,
     **dict.fromkeys(("virtual", "processor"), 1.0),
     "stuck": "",
     "outcomes": [("exchange_human_to_robot", "succeeded", "", "NONE")],
