@@ -218,10 +218,9 @@ def test_divergence_is_told_with_seed_and_time(session):
 
 
 def test_a_board_through_the_hand_is_refused_before_anything_moves(session):
-    s = session()
-    palm = s.cell.truth()["robot_hand"]["position"]
-    words = r"(board would stand \d+(\.\d+)? mm inside (ih2|lwr)_?\w+|\w+ would stand \d+(\.\d+)? mm inside board) at the start"
-    with pytest.raises(ValueError, match=words):
+    palm = session().cell.truth()["robot_hand"]["position"]
+    depth = r"would stand \d+(\.\d+)? mm inside"
+    with pytest.raises(ValueError, match=rf"(board {depth} (ih2|lwr)_\w+|\w+ {depth} board) at the start"):
         session(contact__board_center=[float(v) for v in palm])
 
 

@@ -89,11 +89,11 @@ def velocities(plant):
 
 
 def test_energy_at_the_shipped_step_errs_as_the_integrator_does(tmp_path):
-    """Semi-implicit Euler with step h: E(t) - E(0) = -h/2 [p.a] + h int dT/dq.a dt + O(h^2), p = M v, a the acceleration.
+    """Semi-implicit Euler with step h: E(t) - E(0) = -h/2 [p.a] + h int dT/dq.a dt + O(h^2), p = M v, a = dv/dt.
 
-    From Taylor's series of one step against the exact motion: they differ by h^2/2 a in the position and by -h^2/2 da/dt
-    in the velocity, hence the energy by h^2/2 (dE/dq.a - p.da/dt); with Lagrange's dp/dt = dT/dq - dU/dq that is the
-    total differential above. dT/dq v follows from the plant's own terms: dM/dt v - C v, with C v = bias - gravity.
+    From Taylor's series of one step against the exact motion: they differ by h^2/2 a in the position and by
+    -h^2/2 da/dt in the velocity, hence the energy by h^2/2 (dE/dq.a - p.da/dt); with Lagrange's dp/dt = dT/dq - dU/dq
+    that sums up to the above. dT/dq follows from the plant's own terms: dM/dt v - C v, with C v = bias - gravity.
     Whatever the damped fingers take is taken at any step: it is measured with the fine one."""
     start, seconds = np.full(7, 0.5), 0.2
     changes = {}

@@ -121,7 +121,9 @@ class Campaign:
         self.reasons: dict[str, Counter] = {action: Counter() for action in EXCHANGES}
         self.reaches: dict[str, list[dict[str, float]]] = {action: [] for action in EXCHANGES}
         self.touches: list[tuple[float | None, float | None, bool, bool]] = []
-        self.outside_commanded = self.outside_measured = self.over_command = self.moving = self.stuck = self.trials = self.fell = 0
+        self.outside_commanded = self.outside_measured = self.over_command = self.moving = self.stuck = self.trials = (
+            self.fell
+        ) = 0
         self.asked = 0
         self.palms: list[tuple[dict[str, float], bool]] = []
         self.virtual = self.processor = self.fastest = 0.0
@@ -163,7 +165,15 @@ class Campaign:
     def _count(self, actions: Sequence[str], trial: dict[str, Any], name: str) -> None:
         self.trials += 1
         self.fastest = max(self.fastest, trial["fastest"])
-        for field in ("outside_commanded", "outside_measured", "over_command", "moving", "virtual", "processor", "fell"):
+        for field in (
+            "outside_commanded",
+            "outside_measured",
+            "over_command",
+            "moving",
+            "virtual",
+            "processor",
+            "fell",
+        ):
             setattr(self, field, getattr(self, field) + trial[field])
         self.stuck += bool(trial["stuck"])
         if trial["stuck"]:
@@ -201,8 +211,8 @@ class Campaign:
         return ", ".join(f"{name.lower()} {n}" for name, n in found) or "none"
 
     def limit_rows(self, row: Callable[..., dict], what: str, goal: str = "") -> list[dict]:
-        """Periods outside a joint limit: as the arm was told, and as it moved; with a goal (<= 0) or only printed. Beside
-        them how fast it was, and how often faster than it may be told."""
+        """Periods outside a joint limit: as the arm was told, and as it moved; with a goal (<= 0) or only printed.
+        Beside them how fast it was, and how often faster than it may be told."""
         return [
             *(
                 row(f"{what}: periods outside a joint limit as {how}", n, "periods", goal, not goal or n == 0)

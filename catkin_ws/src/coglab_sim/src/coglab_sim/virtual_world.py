@@ -114,8 +114,8 @@ class Robot:
 
     def _look_at_arm(self) -> None:
         """Judge the true joints by the arm's own limits: where they are, and how fast they were in any step of the
-        period. Nothing is differentiated or rounded, and no tolerance is given. Commands are bound to a few percent less
-        (``servo_overshoot`` of the table): periods with a joint over that bound are counted apart."""
+        period. Nothing is differentiated or rounded, and no tolerance is given. Commands are bound to a few percent
+        less (``servo_overshoot`` of the table): periods with a joint over that bound are counted apart."""
         fastest = self.cell.fastest
         share = float((fastest / self._fastest).max())
         self.measured_share = max(self.measured_share, share)
