@@ -42,10 +42,11 @@ def demo_parser(top: Path) -> Parser:
     )
     parser.add_argument(
         "--person",
-        choices=("patient", "drawn"),
-        default="patient",
-        help="patient: waits for the robot, seen without noise or delay (default); drawn: as people are, by the seed, "
-        "and seen by the tracker as it is, so that not every handover succeeds",
+        choices=("accustomed", "patient", "drawn"),
+        default="accustomed",
+        help="accustomed: waits for the robot and helps it by habit, seen without noise or delay (default); patient: "
+        "waits for it, without those habits; drawn: as people are, by the seed, and seen by the tracker as it is; with "
+        "patient and drawn people not every handover succeeds",
     )
     return parser
 

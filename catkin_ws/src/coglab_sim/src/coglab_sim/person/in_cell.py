@@ -14,18 +14,11 @@ from coglab_py.pose import Pose
 from coglab_sim.person.scene import HandSample, WorldView
 
 GRAVITY = 9.81
-STROKE = 254.0
-"""position of a motor of the robot's hand that is fully closed"""
 
 
 def pose_of_truth(pose: Mapping[str, Any]) -> Pose:
     """A pose of the cell's truth."""
     return Pose(np.asarray(pose["position"]), np.asarray(pose["rotation"]))
-
-
-def closure(motors: Sequence[float]) -> float:
-    """How far index, middle and the outer fingers are seen to be bent, 0 open .. 1, of the five motors' positions."""
-    return float(np.mean(motors[2:5])) / STROKE
 
 
 def load_on_hand(in_hand: bool, palm_force: Sequence[float], mass: float) -> np.ndarray:
@@ -37,12 +30,12 @@ def load_on_hand(in_hand: bool, palm_force: Sequence[float], mass: float) -> np.
     return -np.asarray(palm_force, dtype=float) - [0.0, 0.0, mass * GRAVITY] if in_hand else np.zeros(3)
 
 
-def view_of(truth: Mapping[str, Any], fingers: float, mass: float) -> WorldView:
-    """What there is to be seen and felt in the cell's truth; ``fingers`` of the robot 0..1, ``mass`` of the object."""
+def view_of(truth: Mapping[str, Any], mass: float) -> WorldView:
+    """What there is to be seen and felt in the cell's truth; ``mass`` of the object."""
     in_hand = truth["held_by"] in ("human", "both")
     return WorldView(
         pose_of_truth(truth["robot_hand"]),
-        fingers,
+        float(truth["hand_closure"]),
         pose_of_truth(truth["object"]),
         load_on_hand(in_hand, truth["palm_force"], mass),
     )
