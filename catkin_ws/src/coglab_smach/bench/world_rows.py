@@ -198,7 +198,9 @@ def palm_rows(row: Row, reaches: list[dict[str, float]], what: str) -> list[dict
 def off_rows(row: Row, found: list[dict[str, float]], every: int, what: str, where: str) -> list[dict]:
     """How many of every reach these are, and how far off their palms were."""
     rows = [row(f"{what}: reaches, {where}", len(found), f"of {every}")]
-    for key, unit in (("truth_mm", "mm"), ("truth_deg", "deg")) if found else ():
+    if not found:
+        return rows
+    for key, unit in (("truth_mm", "mm"), ("truth_deg", "deg")):
         values, name = [each[key] for each in found], f"{what}: palm to the true goal pose, {where}"
         rows.append(row(f"{name}, median", np.median(values), unit))
         rows.append(row(f"{name}, p95", np.percentile(values, 95), unit))
