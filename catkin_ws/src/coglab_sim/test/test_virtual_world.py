@@ -58,7 +58,8 @@ def test_the_board_is_off_as_much_as_everything_that_the_tracker_sees():
 
 def test_the_closure_that_is_seen_is_that_of_the_fingers_joints():
     """Not of the motors: a tendon that is let go gives way before its finger does."""
-    cell = Robot(3, object__start="world", object__position=[1.5, 1.0, 0.0]).cell
+    robot = Robot(3, object__start="world", object__position=[1.5, 1.0, 0.0])
+    cell = robot.cell  # only a view
 
     def after(target, seconds):
         cell.set_motors([1.0] * 5, [0.0, 0.0, target, target, target], [1000.0] * 5)

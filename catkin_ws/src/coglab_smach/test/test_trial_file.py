@@ -145,7 +145,7 @@ def test_every_reach_counts_and_false_alarms_are_split():
         (reach(50.0, False), touch(None, 0.5, moving_when_found=True)),
     ):
         done._count(campaign.EXCHANGES, {**trial("failed_empty"), "reaches": [palm], "touches": [hand]}, "people")
-    rows = {}
+    done.asked, rows = 3, {}
 
     def row(figure, value, unit, goal="", ok=True):
         return rows.setdefault(figure, (float(value), unit))
