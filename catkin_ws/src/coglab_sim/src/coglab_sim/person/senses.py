@@ -5,6 +5,7 @@ Nothing else reaches the simulated person but what is said to them.
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from dataclasses import dataclass, field
 from typing import Generic, TypeVar
@@ -84,7 +85,7 @@ class Senses:
         turn = np.radians(person.seen_turn)
         sigma = np.array([person.seen_noise] * 3 + [turn] * 3)
         self._noises = SlowNoise(rng, sigma), SlowNoise(rng, sigma)
-        self._of_tips = 1.0 / (FINGERTIP_WAY * np.sqrt(FINGERS))
+        self._of_tips = 1.0 / (FINGERTIP_WAY * math.sqrt(FINGERS))
         self._bend_noise = SlowNoise(rng, np.array([person.seen_noise * self._of_tips]))
         self._eyes: Delayed[tuple[WorldView, float, float]] = Delayed(person.seeing_delay)
         self._touch: Delayed[np.ndarray] = Delayed(person.feeling_delay)
