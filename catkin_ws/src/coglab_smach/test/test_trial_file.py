@@ -1,7 +1,9 @@
 """Campaigns kept in a file: nothing is run twice, a cut line is dropped, trials of two commits are never mixed."""
 
 import sys
+from types import SimpleNamespace
 
+import numpy as np
 import pytest
 from coglab_py.packages import package_path
 
@@ -9,6 +11,7 @@ sys.path.insert(0, str(package_path("coglab_smach", "bench")))
 import campaign
 import world_rows
 from trial_file import TrialFile, commit_in
+from virtual_trial import TouchRecord
 
 JOBS = [campaign.Job("mug", ("exchange_human_to_robot",), seed, {}) for seed in range(3)]
 TRIAL = {
@@ -133,6 +136,34 @@ def touch(touched, found, moving=False, moving_when_found=False):
         "moving_when_found": moving_when_found,
         "false_alarm": alarm,
     }
+
+
+def touched(*forces, found_at=None, standing=True):
+    """The record of a wait in which such forces (N) came on fingers and palm, one period after the other."""
+    event, report = [None], {"standing": standing}
+    rig = SimpleNamespace(
+        t=0.0, cell=SimpleNamespace(), robot=SimpleNamespace(report=report), truth={"palm_force": 0.0}
+    )
+    record = TouchRecord(rig, SimpleNamespace(event=lambda: event[0]))
+    for k, force in enumerate(forces):
+        rig.t = float(k)
+        rig.cell.touch = lambda force=force: {name: np.array(each) for name, each in force.items()}
+        event[0] = "contact" if found_at is not None and k >= found_at else None
+        record.look()
+    return record.figures()
+
+
+NOTHING = {"palm": [0.0, 0.0, 0.0]}
+BY_HAND = {"palm": [0.0, 0.0, 0.0], "middle_distal": [0.0, 0.0, -2.6]}
+ITSELF = {"index_distal": [0.0, 5.0, 0.0], "thumb_distal": [0.0, -5.0, 0.0]}
+
+
+def test_whatever_touches_the_hand_is_a_touch_and_the_hand_itself_is_none():
+    """The person's hand on a fingertip too: who finds that has not been alarmed for nothing."""
+    found = touched(NOTHING, BY_HAND, BY_HAND, found_at=2)
+    assert (found["touched"], found["found"], found["false_alarm"]) == (1.0, 2.0, False)
+    alarm = touched(ITSELF, NOTHING, ITSELF, found_at=1, standing=False)
+    assert (alarm["touched"], alarm["false_alarm"], alarm["moving_when_found"]) == (None, True, True)
 
 
 def test_every_reach_counts_and_false_alarms_are_split():

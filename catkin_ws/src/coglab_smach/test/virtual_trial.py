@@ -225,11 +225,11 @@ class ReachRecord:
 
 
 TOUCH = 0.3
-"""N on the robot's hand from which somebody touches it"""
+"""N on the robot's hand, all in all, from which something touches it: the object or the hand that holds it"""
 
 
 class TouchRecord:
-    """When the object first touched the robot's hand in one reach (s), and when contact was found; None: never. And
+    """When something first touched the robot's hand in one reach (s), and when contact was found; None: never. And
     whether the arm moved at either moment."""
 
     def __init__(self, rig, contact):
@@ -239,7 +239,7 @@ class TouchRecord:
 
     def look(self):
         """After each period of the rig."""
-        if self.touched is None and np.linalg.norm(self.rig.truth["palm_force"]) > TOUCH:
+        if self.touched is None and np.linalg.norm(sum(self.rig.cell.touch().values())) > TOUCH:
             self.touched = self.rig.t
             self.moving = not self.rig.robot.report["standing"]
         if self.found is None and self.contact.event() is not None:
