@@ -42,11 +42,11 @@ def demo_parser(top: Path) -> Parser:
     )
     parser.add_argument(
         "--person",
-        choices=("accustomed", "patient", "drawn"),
-        default="accustomed",
-        help="accustomed: waits for the robot and helps it by habit, seen without noise or delay (default); patient: "
-        "waits for it, without those habits; drawn: as people are, by the seed, and seen by the tracker as it is; with "
-        "patient and drawn people not every handover succeeds",
+        choices=("patient", "accustomed", "drawn"),
+        default="patient",
+        help="patient: waits for the robot, seen without noise or delay (default); accustomed: helps it by habit, too; "
+        "drawn: as people are, by the seed, and seen by the tracker as it is; not every handover succeeds, least with "
+        "drawn people",
     )
     return parser
 
