@@ -141,6 +141,7 @@ CellTruth Cell::truth() const {
   truth.object_twist = plant_.objectTwist();
   truth.human_hand = plant_.personHand();
   truth.robot_hand = plant_.palm();
+  truth.hand_closure = plant_.handClosure();
   truth.palm_force = plant_.objectForce();
   truth.robot_load_share = plant_.robotShare();
   truth.human_load_share = plant_.personShare();

@@ -28,7 +28,7 @@ from ih2_hand.progress import Task, Verdict
 from ih2_hand.reasons import Reason
 
 from coglab_sim.conditions import THE_WORLD_AS_IT_IS, Conditions
-from coglab_sim.person.in_cell import closure, move_person, view_of
+from coglab_sim.person.in_cell import move_person, pose_of_truth, view_of
 from coglab_sim.person.recorded_person import RecordedPerson, open_recorded_hand, scene_of
 from coglab_sim.person.scene import Scene
 from coglab_sim.person.virtual_human import VirtualHuman
@@ -293,6 +293,8 @@ class World:
         self.robot = Robot(seed, limits, **where)
         self.cell = self.robot.cell
         self.hand = Hand(self.cell)
+        self.board = conditions.perception.calibration(seed) * BOARD
+        """as the tracker sees it, which is off for the board as for everything"""
         self.trackers = {name: Tracker(name, conditions.perception, seed) for name in (self.object_frame, "human_hand")}
         self.after_period: list[Callable[[], None]] = []
         self.speed_scale = 1.0
@@ -303,9 +305,9 @@ class World:
         self.blind: set[str] = set()
 
     def newest(self, name: str) -> tuple[Pose | None, float]:
-        """Newest sight of a frame and its age; the board is known."""
+        """Newest sight of a frame and its age; the board stands where it was seen once."""
         if name == "board":
-            return BOARD, 0.0
+            return self.board, 0.0
         sight = self.sights.get(name)
         if sight is None:
             return None, OLDEST
@@ -316,7 +318,7 @@ class World:
         if self.ticks % 2 == 0:
             self._person_and_tracker()
         self.hand.step(self.t)
-        self.robot.virtual.set_frame("board", BOARD.position, BOARD.orientation)
+        self.robot.virtual.set_frame("board", self.board.position, self.board.orientation)
         self.robot.step()
         self.ticks += 1
         self.t = self.robot.virtual.now
@@ -326,11 +328,10 @@ class World:
 
     def _person_and_tracker(self) -> None:
         self.truth = truth = self.cell.truth()
-        fingers = closure([motor.position for motor in self.hand.emulator.motors])
-        view = view_of(truth, fingers)
-        hand = self.human.step(self.t, view)
-        move_person(self.cell, hand)
-        frames = {self.object_frame: view.object, "human_hand": hand.frame}
+        view = view_of(truth)
+        move_person(self.cell, self.human.step(self.t, view))
+        # The hand is where the arm has brought it, not where the person wants it.
+        frames = {self.object_frame: view.object, "human_hand": pose_of_truth(truth["human_hand"])}
         for name, frame in frames.items():
             others = [other for each, other in frames.items() if each != name]
             for sight in self.trackers[name].step(self.t, frame, view.robot_hand, others):

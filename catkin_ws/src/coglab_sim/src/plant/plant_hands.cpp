@@ -61,6 +61,19 @@ void Plant::put(int position, int velocity, const Pose& pose, const Twist& twist
   std::copy(spin.data(), spin.data() + 3, d->qvel + velocity + 3);
 }
 
+double Plant::handClosure() const {
+  const auto& phalanges = config_.hand.phalanges;
+  double sum = 0.0;
+  int joints = 0;
+  for (std::size_t i = 0; i < phalanges.size(); ++i) {
+    if (phalanges[i].finger == Finger::Thumb) continue;
+    const double angle = model_->data()->qpos[model_->phalanx_position[i]];
+    sum += (angle - phalanges[i].lower) / (phalanges[i].upper - phalanges[i].lower);
+    ++joints;
+  }
+  return joints > 0 ? sum / joints : 0.0;
+}
+
 void Plant::setPerson(const PersonInput& person) {
   PersonInput wanted = person;
   wanted.twist.linear = clipped(person.twist.linear, kFastestReach);

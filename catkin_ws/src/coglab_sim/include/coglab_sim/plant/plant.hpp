@@ -138,6 +138,9 @@ class Plant {
   Pose object() const { return model_->poseOf(model_->object); }
   Twist objectTwist() const { return twistOf(model_->object); }
   Pose personHand() const { return model_->poseOf(model_->person); }
+  /// How far the fingers but the thumb are bent, 0 open .. 1: the angles of their joints, each as
+  /// share of its range, on average.
+  double handClosure() const;
   const Touch& touch() const { return touch_; }
   const Vector3d& objectForce() const { return object_force_; }  ///< N, of it on the robot's hand
   /// N, of the object on the person's hand, world axes: what their grip carries, less what the
