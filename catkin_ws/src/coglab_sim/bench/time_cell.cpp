@@ -67,13 +67,10 @@ class Bench {
  public:
   explicit Bench(const std::string& urdf) : cell_(configOf(urdf)) {
     cell_.step(nullptr, 0);
-    const MotorCommands open = {{{1.0, 0.96}, {1.0, 0.02}, {1.0, 0.12}, {1.0, 0.2}, {1.0, 0.2}}};
-    cell_.setMotors(open);
-    for (int i = 0; i < 500; ++i) step();
-    MotorCommands closed = open;
+    MotorCommands closed = {{{1.0, 0.96}}};
     for (std::size_t i = 1; i < closed.size(); ++i) closed[i] = {1.0, 1.0, 240.0};
     cell_.setMotors(closed);
-    for (int i = 0; i < 2500; ++i) step();
+    for (int i = 0; i < 3000; ++i) step();
   }
   void step() {
     answer(cell_.measurement(), counter_, command_);

@@ -71,7 +71,9 @@ inline coglab_msgs::CellTruth truthMessage(const CellTruth& truth, const std::st
   message.object_velocity.angular = vectorMessage(truth.object_twist.angular);
   message.human_hand = poseMessage(truth.human_hand);
   message.robot_hand = poseMessage(truth.robot_hand);
+  message.hand_closure = truth.hand_closure;
   message.palm_force = vectorMessage(truth.palm_force);
+  message.human_force = vectorMessage(truth.human_force);
   message.robot_load_share = truth.robot_load_share;
   message.human_load_share = truth.human_load_share;
   message.held_by = truth.held_by;

@@ -215,8 +215,14 @@ class CellNode {
       const bool exchange = !request.object_id.empty() && request.object_id != config_.object.id;
       if (exchange) object = readObject(private_, request.object_id);
       cell_->apply([exchange, object, where, pose](Cell& cell) {
+        const plant::Object before = cell.config().object;
         if (exchange) cell.setObject(object);
-        cell.place(where, pose);
+        try {
+          cell.place(where, pose);
+        } catch (...) {
+          if (exchange) cell.setObject(before);
+          throw;
+        }
       });
       config_.object = object;
       response.success = true;
@@ -238,6 +244,8 @@ class CellNode {
       ros::requestShutdown();
       return;
     }
+    if (!snapshot.refused_hand.empty())
+      ROS_WARN_THROTTLE(5.0, "human_hand ignored: %s", snapshot.refused_hand.c_str());
     if (snapshot.tick == 0) return;
     if (clock_) {
       rosgraph_msgs::Clock clock;

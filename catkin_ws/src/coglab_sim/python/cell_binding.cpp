@@ -31,6 +31,9 @@ PYBIND11_MODULE(_cell, m) {
       .def_property_readonly("velocity",
                              [](const PyCell& c) { return Vector7(c.cell().plant().velocity()); })
       .def_property_readonly(
+          "fastest", [](const PyCell& c) { return c.cell().fastest(); },
+          "rad/s, largest speed of each joint in any step of the last period.")
+      .def_property_readonly(
           "fri_state",
           [](const PyCell& c) { return static_cast<int>(c.cell().controller().friState()); })
       .def_property_readonly(

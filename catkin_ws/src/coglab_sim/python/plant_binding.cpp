@@ -79,6 +79,7 @@ py::dict stateOf(const Plant& plant) {
   result["object_spin"] = plant.objectTwist().angular;
   result["person_hand"] = pair(plant.personHand());
   result["object_force"] = Vector3d(plant.objectForce());
+  result["person_force"] = Vector3d(plant.personForce());
   result["robot_share"] = plant.robotShare();
   result["person_share"] = plant.personShare();
   result["held_by"] = plant.heldBy();

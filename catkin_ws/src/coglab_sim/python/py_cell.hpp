@@ -62,7 +62,9 @@ class PyCell {
     result["object_spin"] = t.object_twist.angular;
     result["human_hand"] = poseDict(t.human_hand);
     result["robot_hand"] = poseDict(t.robot_hand);
+    result["hand_closure"] = t.hand_closure;
     result["palm_force"] = t.palm_force;
+    result["human_force"] = t.human_force;
     result["robot_load_share"] = t.robot_load_share;
     result["human_load_share"] = t.human_load_share;
     result["held_by"] = t.held_by;

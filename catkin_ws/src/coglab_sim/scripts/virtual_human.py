@@ -1,11 +1,11 @@
 #!/usr/bin/python3
 """The node /coglab_sim/virtual_human: a seeded person who gives and takes, or whose hand goes as recorded.
 
-Subscribes truth/cell and the fingers' joint states of the hand (what there is to be seen and felt; the person perceives
-it late and noisily), human_command (std_msgs/String: give <id>, receive <id>, rest) and, in the namespace above this
-one, say (coglab_msgs/Say: what the robot tells the person, who acts on it unless ~react is false). Publishes human_hand
-(coglab_msgs/HumanHand, 100 Hz) and human_state (std_msgs/String). Names are relative to the node's namespace.
-Parameters (private): say, fingers (topics, where they are others), seed, behaviour, profile (drawn, patient),
+Subscribes truth/cell (what there is to be seen and felt; the person perceives it late and noisily), human_command
+(std_msgs/String: give <id>, receive <id>, rest) and, in the namespace above this one, say (coglab_msgs/Say: what the
+robot tells the person, who acts on it unless ~react is false). Publishes human_hand (coglab_msgs/HumanHand, 100 Hz) and
+human_state (std_msgs/String). Names are relative to the node's namespace.
+Parameters (private): say (the topic, where it is another), seed, behaviour, profile (drawn, patient, accustomed),
 participant (mapping, overrides), holds_object, react, rest, handover_object, object_in_hand (three numbers each, m),
 object_mass (kg; by default that of the cell's object in the folder cell/objects), recording (mapping, see
 recorded_person; without a file nothing is played).
@@ -24,19 +24,15 @@ from coglab_objects.database import objects_folder, read_object
 from coglab_py import parameters
 from coglab_py.messages import pose_message, pose_of
 from coglab_py.pose import Pose
-from coglab_sim.person.in_cell import load_on_hand
 from coglab_sim.person.participant import Participant
 from coglab_sim.person.recorded_person import RecordedPerson, open_recorded_hand
 from coglab_sim.person.scene import Scene, WorldView
 from coglab_sim.person.virtual_human import VirtualHuman
 from geometry_msgs.msg import Vector3
-from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 
 LARGEST = 1e4
 """m, N: no number of a cell is larger"""
-BENT = 1.5
-"""rad, of a finger that is closed"""
 CELL_LIMIT = 30.0
 """s for which the cell may take to put a recorded object into the hand"""
 
@@ -54,14 +50,11 @@ class VirtualHumanNode:
         self.human = self.person(object_in_cell())
         self.lock = threading.Lock()
         self.view = WorldView()
-        self.fingers = 0.0
         self.hand = rospy.Publisher("human_hand", HumanHand, queue_size=1, tcp_nodelay=True)
         self.state = rospy.Publisher("human_state", String, queue_size=10, latch=True)
         self.last_phase = ""
         rospy.Subscriber("truth/cell", CellTruth, self.on_truth, queue_size=1, tcp_nodelay=True)
         above = rospy.get_namespace().rstrip("/").rpartition("/")[0]
-        fingers = parameters.read("~fingers", str, f"{above}/ih2_hand/joint_states")
-        rospy.Subscriber(fingers, JointState, self.on_fingers, queue_size=1)
         rospy.Subscriber("human_command", String, self.on_command, queue_size=10)
         if parameters.read("~react", bool, True):
             rospy.Subscriber(parameters.read("~say", str, f"{above}/say"), Say, self.on_say, queue_size=10)
@@ -98,24 +91,16 @@ class VirtualHumanNode:
     def on_truth(self, message: CellTruth) -> None:
         """What there is to be seen and felt now."""
         robot, held = pose_of(message.robot_hand), pose_of(message.object)
-        force = message.palm_force
-        push = [force.x, force.y, force.z]
-        numbers = [*robot.position, *robot.orientation, *held.position, *held.orientation, *push]
+        force = message.human_force
+        load = np.array([force.x, force.y, force.z])
+        numbers = [*robot.position, *robot.orientation, *held.position, *held.orientation, *load, message.hand_closure]
         if not np.all(np.abs(numbers) < LARGEST):  # not finite either
             rospy.logwarn_throttle(
                 5.0, f"virtual human: truth/cell ignored: a number is not finite, or beyond {LARGEST:g}"
             )
             return
-        in_hand = message.held_by in ("human", "both")
-        load = load_on_hand(in_hand, push, self.human.scene.object_mass)
         with self.lock:
-            self.view = WorldView(robot, self.fingers, held, load)
-
-    def on_fingers(self, message: JointState) -> None:
-        """How far the robot's fingers are bent: a person sees the links."""
-        angles = [angle for name, angle in zip(message.name, message.position, strict=False) if "thumb" not in name]
-        if angles and np.all(np.isfinite(angles)):
-            self.fingers = min(1.0, max(0.0, float(np.mean(angles)) / BENT))
+            self.view = WorldView(robot, message.hand_closure, held, load)
 
     def on_command(self, message: String) -> None:
         """What the person is asked to do."""

@@ -8,6 +8,8 @@
 namespace coglab_sim {
 namespace {
 
+constexpr std::uint64_t kFrictionStream = 13;  // of the seed
+
 plant::PlantConfig plantConfig(const CellConfig& config) {
   plant::PlantConfig plant;
   plant.urdf = config.urdf;
@@ -16,6 +18,9 @@ plant::PlantConfig plantConfig(const CellConfig& config) {
   plant.object = config.object;
   plant.surroundings = config.surroundings;
   plant.drives = config.drives;
+  Random random(config.seed, kFrictionStream);
+  for (double& friction : plant.drives.coulomb_friction)
+    friction *= 1.0 + config.drives.friction_spread * (2.0 * random.uniform() - 1.0);
   plant.person = config.person;
   if (!config.hand_model.empty()) plant.hand = plant::readHandTable(config.hand_model);
   return plant;
@@ -108,6 +113,8 @@ const MeasurementBytes& Cell::advance(bool on_time) {
     servos_.observe(plant_.position(), plant_.velocity());
     torque_sensor_.advance(plant_.velocity(), dt);
     torque += plant_.jointTorque() / steps;
+    fastest_ = i > 1 ? Vector7(fastest_.cwiseMax(plant_.velocity().cwiseAbs()))
+                     : Vector7(plant_.velocity().cwiseAbs());
     acceleration += plant_.acceleration() / steps;
   }
 
@@ -134,9 +141,11 @@ CellTruth Cell::truth() const {
   truth.object_twist = plant_.objectTwist();
   truth.human_hand = plant_.personHand();
   truth.robot_hand = plant_.palm();
+  truth.hand_closure = plant_.handClosure();
   truth.palm_force = plant_.objectForce();
   truth.robot_load_share = plant_.robotShare();
   truth.human_load_share = plant_.personShare();
+  truth.human_force = plant_.personForce();
   truth.held_by = plant_.heldBy();
   truth.dropped = plant_.dropped();
   truth.position = plant_.position();

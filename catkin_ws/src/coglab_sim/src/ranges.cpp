@@ -55,6 +55,7 @@ constexpr Row kRanges[] = {
     {"arm/torque_limit", 1, 1000},
     {"arm/rotor_inertia", 0.01, 100},
     {"arm/coulomb_friction", 0, 1000},
+    {"arm/friction_spread", 0, 1},
     {"arm/coulomb_speed", 1e-4, 50},
     {"arm/servo_bandwidth", 1, 500},
     {"arm/nullspace_stiffness", 0, 1e7},

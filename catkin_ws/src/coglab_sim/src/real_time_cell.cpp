@@ -94,7 +94,14 @@ void RealTimeCell::applyInputs() {
   std::vector<Delayed> due;
   {
     const std::lock_guard<std::mutex> lock(mutex_);
-    if (new_human_) cell_.setHuman(human_);
+    if (new_human_) {
+      try {
+        cell_.setHuman(human_);
+        snapshot_.refused_hand.clear();
+      } catch (const std::invalid_argument& error) {  // where it cannot be, it is not there yet
+        snapshot_.refused_hand = error.what();
+      }
+    }
     new_human_ = false;
     cell_.setMotors(motors_);
     cell_.setPush(push_);

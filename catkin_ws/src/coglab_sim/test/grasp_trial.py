@@ -20,6 +20,16 @@ DIRECTIONS = {
 """Gravity in ih2_palm, in units of g."""
 CYLINDRICAL = np.array([245, 5, 30, 50, 50]) / 255
 STEP = 1e-3
+G = 9.81
+BOX = {"id": "box", "mass": 0.5, "shape": "box", "size": [0.08, 0.08, 0.04], "center": [0, 0, 0.02], "friction": 0.5}
+BOARD_TOP = np.array([0.45, -0.55, 0.05])
+
+
+def run(plant, seconds, dt=STEP, torque=None):
+    """So many seconds with constant torques of the motors; the state."""
+    for _ in range(round(seconds / dt)):
+        plant.step(np.zeros(7) if torque is None else torque, dt)
+    return plant.state()
 
 
 def rotated(rotation, vector):
@@ -27,6 +37,13 @@ def rotated(rotation, vector):
     x, y, z, w = rotation
     axis = np.array([x, y, z])
     return vector + 2.0 * np.cross(axis, np.cross(axis, vector) + w * vector)
+
+
+def product(one, two):
+    """Of two quaternions x y z w."""
+    a, b = np.asarray(one), np.asarray(two)
+    vector = a[3] * b[:3] + b[3] * a[:3] + np.cross(a[:3], b[:3])
+    return np.append(vector, a[3] * b[3] - a[:3] @ b[:3])
 
 
 def objects():
@@ -54,8 +71,17 @@ class GraspTrial:
     """The hand around an object whose axis lies across the palm."""
 
     def __init__(
-        self, thing, direction="index up", current=240.0, shift=(0.0, 0.0), seed=1, depth=None, preshape=CYLINDRICAL
+        self,
+        thing,
+        direction="index up",
+        current=240.0,
+        shift=(0.0, 0.0),
+        seed=1,
+        depth=None,
+        preshape=CYLINDRICAL,
+        grasped=True,
     ):
+        """``grasped``: the fingers close around the object; else they are open as preshaped, and it is elsewhere."""
         self.plant = plant = _plant.Plant(URDF, HOME, thing, seed=seed, board=False)
         self.centre = np.array(thing["center"], dtype=float)
         self.current = current
@@ -67,8 +93,14 @@ class GraspTrial:
         # Object z along the index's side (palm y), object y out of the palm.
         turn = np.array([-0.5, -0.5, -0.5, 0.5])
         half = depth if depth is not None else thing["size"][0 if thing["shape"] != "box" else 1] / 2
-        place = np.array([half, shift[0], shift[1]]) - rotated(turn, self.centre)
-        plant.place("robot_hand", place, turn)
+        self.place, self.turn = np.array([half, shift[0], shift[1]]) - rotated(turn, self.centre), turn
+        if grasped:
+            plant.place("robot_hand", self.place, turn)
+
+    def before_palm(self):
+        """Pose of the object in the world where it would be grasped."""
+        position, rotation = self.plant.state()["palm"]
+        return position + rotated(rotation, self.place), product(rotation, self.turn)
 
     def in_palm(self):
         """Middle of the object and its axis in ih2_palm."""
@@ -80,12 +112,10 @@ class GraspTrial:
         return rotated(back, middle - position), rotated(back, rotated(turn, np.array([0.0, 0.0, 1.0])))
 
     def close(self, motors=(1, 2, 3, 4), seconds=1.6):
-        """Close on the object, take away whatever held it there, and wait."""
+        """Close on the object, which the fingers hold already, and wait."""
         for motor in motors:
             self.plant.command_motor(motor, 1.0, 1.0, self.current)
-        self.plant.hold(HOME, steps=int(seconds / STEP))
-        self.plant.place("world", *self.plant.state()["object"])
-        self.plant.hold(HOME, steps=300)
+        self.plant.hold(HOME, steps=int(seconds / STEP) + 300)
 
     def shake(self, acceleration=5.0, frequency=3.0, seconds=1.0):
         """Shake along the three axes of the world one after another; (slip m, turn rad, lost)."""

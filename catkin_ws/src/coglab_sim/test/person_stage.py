@@ -20,7 +20,7 @@ class Stage:
 
     def __init__(self, person=None, robot_comes=True, closes=True, carries=1.0, says=False, human=None, pace=1.0):
         self.scene = Scene()
-        self.human = human or VirtualHuman(person or Participant.draw(1, profile="patient"), self.scene)
+        self.human = human or VirtualHuman(person or Participant.draw(1, profile="accustomed"), self.scene)
         self.t = 0.0
         self.palm = np.array([0.58, -0.15, 0.58])
         self.robot_comes, self.closes, self.carries, self.says = robot_comes, closes, carries, says
@@ -86,7 +86,7 @@ class Stage:
         return next(i for i, sample in enumerate(self.samples) if sample.phase == phase) * DT
 
 
-def give(behaviour="normal", seed=1, profile="patient", seconds=18.0, **kw):
+def give(behaviour="normal", seed=1, profile="accustomed", seconds=18.0, **kw):
     """A person who is asked to give."""
     changes = kw.pop("changes", {})
     fields = {"seed": seed, "behaviour": behaviour, "profile": profile, **changes}

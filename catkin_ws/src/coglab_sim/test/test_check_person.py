@@ -24,7 +24,7 @@ def resolve(*arguments):
     "argument, said",
     [
         ("behaviour:=silly", "there is no 'silly'; there are: normal"),
-        ("profile:=angel", "there is no 'angel'; there are: drawn, patient"),
+        ("profile:=angel", "there is no 'angel'; there are: drawn, patient, accustomed"),
         ("recorded_person:=stay", "there is no 'stay'; there are: wait, no_wait, leave"),
         ("recording:=/nope.bag", "/nope.bag: no such file"),
         ("recording:=/etc/passwd", "a recording is a .csv, .npz or .bag file"),

@@ -190,9 +190,6 @@ def test_a_slippery_object_is_lost(session):
 
 def test_robot_hands_over_to_a_person(session):
     s = session(object__start="robot_hand", object__position=[0.04, 0.0, 0.0], object__rotation=[-0.5, -0.5, -0.5, 0.5])
-    preshape(s)
-    s.run(0.5)
-    s.cell.set_motors([1.0] * 5, CLOSED, [240.0] * 5)
     s.monitor()
     truth = s.cell.truth()
     assert truth["held_by"] == "robot" and truth["robot_load_share"] == pytest.approx(1.0, abs=0.02)
@@ -218,6 +215,13 @@ def test_divergence_is_told_with_seed_and_time(session):
     with pytest.raises(RuntimeError, match=r"diverged at \d+\.\d+ s with seed 9"):
         s.client.request(1, 10)
         s.run(3.0)
+
+
+def test_a_board_through_the_hand_is_refused_before_anything_moves(session):
+    palm = session().cell.truth()["robot_hand"]["position"]
+    depth = r"would stand \d+(\.\d+)? mm inside"
+    with pytest.raises(ValueError, match=rf"(board {depth} (ih2|lwr)_\w+|\w+ {depth} board) at the start"):
+        session(contact__board_center=[float(v) for v in palm])
 
 
 def test_it_stands_on_the_board(session):

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from coglab_py.pose import Pose
-from coglab_sim.person.in_cell import closure, load_on_hand
+from coglab_sim.person.in_cell import view_of
 from coglab_sim.person.participant import Participant
 from coglab_sim.person.scene import WorldView
 from coglab_sim.person.senses import Senses
@@ -32,7 +32,7 @@ def test_everything_seen_comes_late():
             for value in (seen.robot_hand.position[0], seen.hand_closure, seen.object.position[0]):
                 assert person.seeing_delay - 1e-9 <= t - value <= person.seeing_delay + DT + 1e-9
             assert seen.robot_speed == pytest.approx(1.0, abs=0.03)
-            assert seen.closing_speed == pytest.approx(1.0, abs=1e-6)
+            assert seen.closing_speed == pytest.approx(1.0, abs=0.07)
 
 
 def test_what_is_seen_is_noisy_and_the_noise_is_slow():
@@ -68,8 +68,26 @@ def test_a_robot_that_was_never_seen_before_is_not_at_rest():
     assert first[0][1].robot_speed > 0.5 and first[-1][1].robot_speed < 0.03
 
 
-def test_the_hand_feels_weight_and_push_while_it_holds():
-    assert load_on_hand(True, [0.0, -2.0, 0.0], 0.5) == pytest.approx([0.0, 2.0, -0.5 * 9.81])
-    assert load_on_hand(True, [0.0, 0.0, -0.5 * 9.81], 0.5) == pytest.approx([0.0, 0.0, 0.0]), "the robot carries it"
-    assert not load_on_hand(False, [0.0, -2.0, 0.0], 0.5).any()
-    assert closure([254, 254, 0, 0, 0]) == 0.0 and closure([0, 0, 254, 254, 254]) == 1.0
+def test_the_bend_of_the_fingers_is_seen_as_inexactly_as_their_tips():
+    """The mean of four tips over their way of 0.19 m, each as noisy and as slow to change as any place that is seen;
+    its speed is misjudged by the person's share, and by what any speed is."""
+    person = Participant.from_mapping({"seed": 2, "seen_noise": 0.004, "seen_speed": 0.0})
+    seen = [p for _, p in perceive(person, lambda t: WorldView(hand_closure=0.4), 300.0)]
+    bend = np.array([p.hand_closure for p in seen])
+    assert bend.mean() == pytest.approx(0.4, abs=0.002)
+    assert bend.std() == pytest.approx(0.004 / 0.19 / 2, rel=0.2)
+    x = bend - bend.mean()
+    assert float(x[30:] @ x[:-30] / (x @ x)) == pytest.approx(np.exp(-1.0), abs=0.12)
+    assert np.std([p.closing_speed for p in seen]) == pytest.approx(0.005 / 0.19 / 2, rel=0.1)
+    person = Participant.from_mapping({"seed": 2, "seen_speed": 0.1})
+    speeds = []
+    for seed in range(40):
+        seen = perceive(person, lambda t: WorldView(hand_closure=t), 1.0, seed)[50:]
+        speeds.append(np.mean([p.closing_speed for _, p in seen]))
+    assert np.std(speeds) == pytest.approx(0.1, rel=0.35)
+
+
+def test_the_view_takes_the_fingers_from_the_plant():
+    frame = {"position": [0.0, 0.0, 0.0], "rotation": [0.0, 0.0, 0.0, 1.0]}
+    truth = {"robot_hand": frame, "object": frame, "human_force": [0.0, 0.0, 0.0]}
+    assert view_of({**truth, "hand_closure": 0.25}).hand_closure == 0.25

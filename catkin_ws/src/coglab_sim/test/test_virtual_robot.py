@@ -19,7 +19,7 @@ class Trial:
 
     def __init__(self, seed=3, behaviour="normal", **cell):
         self.robot = virtual_world.Robot(seed, **cell).virtual
-        self.human = VirtualHuman(Participant.draw(seed, behaviour, "patient"), Scene())
+        self.human = VirtualHuman(Participant.draw(seed, behaviour, "accustomed"), Scene())
         self.wanted, self.current = [245 / 255, 5 / 255, 30 / 255, 50 / 255, 50 / 255], 640.0
         self.peak = 0.0
 
@@ -27,8 +27,7 @@ class Trial:
         cell = self.robot.cell
         truth = cell.truth()
         obj = truth["object"]
-        fingers = float(np.mean([motor["position"] for motor in cell.motors()][2:]))
-        move_person(cell, self.human.step(self.robot.now, view_of(truth, fingers, self.human.scene.object_mass)))
+        move_person(cell, self.human.step(self.robot.now, view_of(truth)))
         cell.set_motors([1.0] * 5, self.wanted, [self.current] * 5)
         self.robot.set_frame("object_mug", obj["position"], obj["rotation"])
         self.robot.tick()

@@ -12,19 +12,19 @@ from campaign import EXCHANGES, Campaign
 from coglab_sim.conditions import CONSIDERATE, Conditions
 from coglab_sim.tracker.tracker import PerceptionSettings
 from misbehaviours import OUTCOMES
-from world_rows import physics_rows, run_default, world_rows
+from world_rows import NEVER_STOOD, off_rows, physics_rows, run_default, world_rows
 
 LONG = os.environ.get("COGLAB_LONG") == "1"
 TRIALS = 100 if LONG else 12
 MISBEHAVED = 20 if LONG else 1
 BOARD_ACTIONS = ("take", "put")
 NOISY = Conditions(
-    profile="patient",
+    profile="accustomed",
     perception=PerceptionSettings(
         occlusion_distance=0.0, swap_probability=0.0, calibration_offset=0.0, calibration_turn_deg=0.0
     ),
 )
-"""Of the figures of single reaches: a patient person, a tracker with noise, latency and dropouts that is calibrated."""
+"""Of the figures of single reaches: an accustomed person, a calibrated tracker with noise, latency and dropouts."""
 
 
 def row(figure, value, unit, goal="", ok=True, peer=None, peer_value=None):
@@ -43,15 +43,20 @@ def row(figure, value, unit, goal="", ok=True, peer=None, peer_value=None):
 
 def reach_rows(campaign, action, perception):
     """Duration, smoothness, end. Distances to the goal as received; to the truth only with perfect perception."""
-    found = campaign.reaches[action]
+    found = [each for each in campaign.stood(action) if "sparc" in each]
+    every, what = len(campaign.reaches[action]), f"{action}, {perception}"
+    counted = [
+        row(f"{what}: reaches measured, arm standing", len(found), f"of {every}", ">= 1", bool(found)),
+        *off_rows(row, campaign.never_stood(action), every, what, NEVER_STOOD),
+    ]
     if not found:
-        return [row(f"{action}, {perception}: reaches measured", 0, "reaches", ">= 1", False)]
+        return counted
     many = {key: np.array([f[key] for f in found]) for key in found[0]}
 
     def judged(name, value, unit, goal, least=False):
         limit = float(goal.split()[-1]) if goal else 0.0
         return row(
-            f"{action}, {perception}: {name}",
+            f"{what}: {name}",
             value,
             unit,
             goal,
@@ -60,6 +65,7 @@ def reach_rows(campaign, action, perception):
 
     true_goals = ("<= 5", "<= 3") if perception == "perfect perception" else ("", "")
     return [
+        *counted,
         judged("hand to goal as received, p95", np.percentile(many["goal_mm"], 95), "mm", "<= 5"),
         judged("hand to goal as received, p95", np.percentile(many["goal_deg"], 95), "deg", "<= 3"),
         judged("hand to the newest single sight, p95", np.percentile(many["sight_mm"], 95), "mm", ""),
@@ -80,7 +86,7 @@ def misbehaviour_rows():
     for (action, behaviour), allowed in sorted(OUTCOMES.items()):
         actions = EXCHANGES if action == EXCHANGES[1] else (action,)
         kw = {"later_behaviour": behaviour} if len(actions) == 2 else {"behaviour": behaviour}
-        kw |= {"profile": "patient", "perfect": True}
+        kw |= {"profile": "accustomed", "perfect": True}
         campaign = Campaign().run(actions, range(30, 30 + MISBEHAVED), **kw)
         share = campaign.share(action, allowed)
         got = ", ".join(f"{outcome} {n}" for (kind, outcome), n in sorted(campaign.outcomes.items()) if kind == action)
@@ -93,7 +99,8 @@ def misbehaviour_rows():
                 share >= 1.0 and campaign.stuck == 0,
             )
         )
-        for name in ("outside", "moving", "stuck", "trials"):
+        everything.fastest = max(everything.fastest, campaign.fastest)
+        for name in ("outside_commanded", "outside_measured", "over_command", "moving", "stuck", "trials"):
             setattr(everything, name, getattr(everything, name) + getattr(campaign, name))
     return rows + everything.safety_rows(row, "misbehaving partners")
 
@@ -109,7 +116,7 @@ def main() -> int:
     for campaign, actions in ((exchanges, EXCHANGES), (board, BOARD_ACTIONS)):
         for action in actions:
             share = campaign.share(action)
-            what = f"{action}: {TRIALS} patient people, noisy tracker, succeeded"
+            what = f"{action}: {TRIALS} accustomed people, noisy tracker, succeeded"
             rows.append(row(what, share, "share", ">= 0.97", share >= 0.97))
         rows += campaign.safety_rows(row, " and ".join(actions))
     rows.append(row("virtual time over processor time, one core", speed, "x", ">= 8", speed >= 8))

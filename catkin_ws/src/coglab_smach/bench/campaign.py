@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import multiprocessing
 import os
+import signal
 import sys
 import time
 from collections import Counter
@@ -25,6 +26,8 @@ EXCHANGES = ("exchange_human_to_robot", "exchange_robot_to_human")
 REASONS = {value: name for name, value in vars(ReasonCode).items() if name.isupper() and isinstance(value, int)}
 FILE = TrialFile(Path(os.environ["COGLAB_TRIALS"])) if os.environ.get("COGLAB_TRIALS") else None
 """Trials that are in this file are not run again, those that are not are added to it."""
+STUCK, NOT_BEGUN = "STUCK", "NOT_BEGUN"
+"""Reasons of ours, beside those of ReasonCode: the machine came to no end; the action before had failed."""
 RUN_MISSING = True
 """False: only what is in the file counts."""
 
@@ -50,30 +53,56 @@ def one_trial(job: Job) -> dict[str, Any]:
     smach.set_loggers(*[lambda *a: None] * 4)
     started = time.process_time()
     trial = VirtualTrial(seed=seed, **kw)
-    stuck, results = "", []
+    stuck = ""
     try:
-        results = trial.run(*actions)
+        trial.run(*actions)
     except Exception as error:  # the script's own limit, or the physics has ended
         stuck = f"{type(error).__name__}: {error}"
     if not stuck and trial.last_hub not in ("wait_without_object", "wait_with_object"):
         stuck = f"the machine waits in '{trial.last_hub}': {trial.ctx.journal.why()}"
+    results = [r for r in trial.ctx.journal.results if r.kind in actions]
     return {
         "seed": seed,
         "stuck": stuck,
+        "begun": len(trial.begun),
         "outcomes": [(r.kind, r.outcome, r.reason, REASONS.get(r.code, str(r.code))) for r in results],
         "fell": bool(trial.rig.cell.truth()["dropped"]),
-        "outside": trial.rig.robot.limit_violations,
+        "outside_commanded": trial.rig.robot.outside["commanded"],
+        "outside_measured": trial.rig.robot.outside["measured"],
+        "over_command": trial.rig.robot.outside["over_command"],
+        "fastest": trial.rig.robot.measured_share,
         "moving": trial.ctx.contact.watched_while_moving,
         "virtual": trial.clock.now(),
         "processor": time.process_time() - started,
-        "reaches": [(action, figures(reach)) for action, reach in zip(actions, trial.reaches, strict=False)],
-        "touches": [(touch.touched, touch.found, touch.moving, touch.false_alarm) for touch in trial.touches],
+        "reaches": [(reach.action, figures(reach)) for reach in trial.reaches],
+        "touches": [touch.figures() for touch in trial.touches],
     }
+
+
+def ends_of(actions: Sequence[str], trial: dict[str, Any]) -> list[tuple[str, str, str, str]]:
+    """(action, outcome, sentence, reason) of each action, exactly one each: that of the journal; "stuck" for the last
+    that had begun when the trial got stuck, whatever it had come to; "not started" for those that never began."""
+    at = max(0, trial["begun"] - 1) if trial["stuck"] else -1
+    ends = []
+    for k, action in enumerate(actions):
+        if k == at:
+            ends.append((action, "stuck", trial["stuck"], STUCK))
+        elif k < len(trial["outcomes"]):
+            ends.append((action, *trial["outcomes"][k][1:]))
+        else:
+            ends.append((action, "not started", "", NOT_BEGUN))
+    return ends
+
+
+def _begin_worker() -> None:
+    """A worker ends with its campaign, not with the terminal's Ctrl-C."""
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
 def pool_of(processes: int) -> Any:
     """Processes that trials run in."""
-    return multiprocessing.get_context("fork").Pool(processes)
+    return multiprocessing.get_context("fork").Pool(processes, _begin_worker)
 
 
 def results_of(jobs: Sequence[Job]) -> Iterator[dict[str, Any]]:
@@ -93,8 +122,9 @@ def results_of(jobs: Sequence[Job]) -> Iterator[dict[str, Any]]:
 
 
 def in_turn(rows: Sequence[Sequence[Job]]) -> list[Job]:
-    """The first job of each row, then the second of each, and so on."""
-    return [row[k] for k in range(max(map(len, rows), default=0)) for row in rows if k < len(row)]
+    """The jobs so that all rows have the same share of theirs done at any time; of equal ones the first row first."""
+    marks = [(k / len(row), i, job) for i, row in enumerate(rows) for k, job in enumerate(row)]
+    return [job for _, _, job in sorted(marks, key=lambda mark: mark[:2])]
 
 
 def fill(jobs: Sequence[Job], processes: int, seconds: float) -> int:
@@ -111,17 +141,20 @@ def fill(jobs: Sequence[Job], processes: int, seconds: float) -> int:
 
 
 class Campaign:
-    """Trials, on all cores; keeps counts, reasons, reach figures and touches of the first action."""
+    """Trials, on all cores; keeps counts, reasons, figures of every reach, and touches of the first action."""
 
     def __init__(self) -> None:
         self.outcomes: Counter = Counter()
         self.reasons: dict[str, Counter] = {action: Counter() for action in EXCHANGES}
         self.reaches: dict[str, list[dict[str, float]]] = {action: [] for action in EXCHANGES}
-        self.touches: list[tuple[float | None, float | None, bool, bool]] = []
-        self.outside = self.moving = self.stuck = self.trials = self.fell = 0
+        self.touches: list[dict[str, Any]] = []
+        self.outside_commanded = self.outside_measured = self.over_command = self.moving = self.stuck = self.trials = (
+            self.fell
+        ) = 0
         self.asked = 0
-        self.palms: list[tuple[dict[str, float], bool]] = []
-        self.virtual = self.processor = 0.0
+        self.palms: list[tuple[dict[str, float], dict[str, Any]]] = []
+        """of the first action: figures of a reach, and the touch in it"""
+        self.virtual = self.processor = self.fastest = 0.0
 
     def run(self, actions: Sequence[str], seeds: Iterable[int], **kw: Any) -> Campaign:
         """One trial per seed, all alike; returns self."""
@@ -153,35 +186,50 @@ class Campaign:
             return row
 
         def incomplete(figure: str, value: float, unit: str, goal: str = "", ok: bool = False) -> dict:
-            return row(f"{figure} [incomplete: {self.trials} of {self.asked} trials]", value, unit, goal, False)
+            return row(f"{figure} [incomplete: missed; {self.trials} of {self.asked} trials]", value, unit, goal, False)
 
         return incomplete
 
     def _count(self, actions: Sequence[str], trial: dict[str, Any], name: str) -> None:
         self.trials += 1
-        for field in ("outside", "moving", "virtual", "processor", "fell"):
+        self.fastest = max(self.fastest, trial["fastest"])
+        for field in (
+            "outside_commanded",
+            "outside_measured",
+            "over_command",
+            "moving",
+            "virtual",
+            "processor",
+            "fell",
+        ):
             setattr(self, field, getattr(self, field) + trial[field])
         self.stuck += bool(trial["stuck"])
         if trial["stuck"]:
             print(f"{name}, seed {trial['seed']}: stuck: {trial['stuck']}", file=sys.stderr)
-        for action in actions[len(trial["outcomes"]) :]:
-            self.outcomes[(action, "not started")] += 1
-        for kind, outcome, reason, code in trial["outcomes"]:
+        for kind, outcome, reason, code in ends_of(actions, trial):
             self.outcomes[(kind, outcome)] += 1
             if outcome != "succeeded":
                 self.reasons.setdefault(kind, Counter())[code] += 1
-                print(f"{name}, {kind}, seed {trial['seed']}: {outcome}: {reason}", file=sys.stderr)
-        for action, found in trial["reaches"]:
-            if action in self.reaches and found is not None:
+                if code not in (STUCK, NOT_BEGUN):
+                    print(f"{name}, {kind}, seed {trial['seed']}: {outcome}: {reason}", file=sys.stderr)
+        for (action, found), touch in zip(trial["reaches"], trial["touches"], strict=True):
+            if action in self.reaches:
                 self.reaches[action].append(found)
-        self.touches += trial["touches"][:1]
-        for (_, found), touch in zip(trial["reaches"][:1], trial["touches"], strict=False):
-            if found is not None and touch[0] is not None:
-                self.palms.append((found, touch[2]))
+            if action == actions[0]:
+                self.touches.append(touch)
+                self.palms.append((found, touch))
 
     def share(self, action: str, good: Sequence[str] = ("succeeded",)) -> float:
         """Share of the trials whose action ended so."""
         return sum(self.outcomes[(action, outcome)] for outcome in good) / max(1, self.trials)
+
+    def stood(self, action: str) -> list[dict[str, float]]:
+        """Figures of the reaches after which the arm stood still."""
+        return [each for each in self.reaches[action] if each["stood"]]
+
+    def never_stood(self, action: str) -> list[dict[str, float]]:
+        """Figures of the other ones, at their end."""
+        return [each for each in self.reaches[action] if not each["stood"]]
 
     def begun(self, action: str) -> int:
         """Trials that came to this action."""
@@ -196,11 +244,23 @@ class Campaign:
         found = self.reasons.get(action, Counter()).most_common()
         return ", ".join(f"{name.lower()} {n}" for name, n in found) or "none"
 
+    def limit_rows(self, row: Callable[..., dict], what: str, goal: str = "") -> list[dict]:
+        """Periods outside a joint limit: as the arm was told, and as it moved; with a goal (<= 0) or only printed.
+        Beside them how fast it was, and how often faster than it may be told."""
+        return [
+            *(
+                row(f"{what}: periods outside a joint limit as {how}", n, "periods", goal, not goal or n == 0)
+                for how, n in (("commanded", self.outside_commanded), ("measured", self.outside_measured))
+            ),
+            row(f"{what}: fastest joint as measured over its limit", self.fastest, "share", "", True),
+            row(f"{what}: measured faster than the largest speed to command", self.over_command, "periods", "", True),
+        ]
+
     def safety_rows(self, row: Callable[..., dict], what: str) -> list[dict]:
         """Nothing stuck, no limit violated, never armed while moving."""
         return [
             row(f"{what}: stuck", self.stuck, "trials", "<= 0", self.stuck == 0),
-            row(f"{what}: periods outside a joint limit", self.outside, "periods", "<= 0", self.outside == 0),
+            *self.limit_rows(row, what, "<= 0"),
             row(
                 f"{what}: contact detector watching while the arm moves",
                 self.moving,

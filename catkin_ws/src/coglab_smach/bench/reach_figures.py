@@ -29,26 +29,30 @@ def sparc(speed, rate: float, cut: float = 10.0, amplitude: float = 0.05) -> flo
     return -float(np.sum(np.sqrt((np.diff(f) / (f[-1] - f[0])) ** 2 + np.diff(spectrum) ** 2)))
 
 
-def figures(reach) -> dict[str, float] | None:
-    """Of one ReachRecord: ``late`` (s, arrival after a person's), ``reached`` (s, until the machine is told so),
-    ``sparc``, and mm and deg to goal, newest sight and truth. None if the motion did not end."""
-    if reach.reached is None or reach.to_goal is None or len(reach.path) < 20:
-        return None
+def figures(reach) -> dict[str, float]:
+    """Of one ReachRecord that has ended: whether it ``stood`` still, mm and deg from palm to goal, newest sight and
+    truth then (else at its end), and those of its way where it stood and was longer than 20 cycles."""
+    out: dict[str, float] = {"stood": reach.stood}
+    for name in ("goal", "sight", "truth"):
+        if getattr(reach, f"to_{name}") is not None:
+            metres, angle = getattr(reach, f"to_{name}")
+            out[f"{name}_mm"], out[f"{name}_deg"] = 1000.0 * metres, float(np.degrees(angle))
+    return out | (way(reach) if reach.stood and len(reach.path) >= 20 else {})
+
+
+def way(reach) -> dict[str, float]:
+    """``late`` and ``reached_late`` (s after a person's arrival: there, and told so), ``reached`` (s), ``sparc``."""
     times = np.array([t for t, _, _ in reach.path])
     palm = np.array([p for _, p, _ in reach.path])
     goal = np.array([g for _, _, g in reach.path])
     inside = times <= reach.reached
     far = np.flatnonzero(np.linalg.norm(palm[inside] - goal[inside], axis=1) > NEAR)
     arrived = float(times[far[-1]]) if len(far) else reach.begin
-    way = float(np.linalg.norm(palm[-1] - palm[0]))
+    human = human_time(float(np.linalg.norm(palm[-1] - palm[0])))
     speed = np.linalg.norm(np.diff(palm[inside], axis=0), axis=1) / np.diff(times[inside])
-    out = {
-        "late": arrived - times[0] - human_time(way),
-        "reached_late": reach.reached - times[0] - human_time(way),
+    return {
+        "late": arrived - times[0] - human,
+        "reached_late": reach.reached - times[0] - human,
         "reached": reach.reached - reach.begin,
         "sparc": sparc(speed, 1.0 / float(np.median(np.diff(times)))),
     }
-    for name in ("goal", "sight", "truth"):
-        metres, angle = getattr(reach, f"to_{name}")
-        out[f"{name}_mm"], out[f"{name}_deg"] = 1000.0 * metres, float(np.degrees(angle))
-    return out

@@ -32,7 +32,13 @@ def run_session(seed: int) -> dict[str, str]:
     port = free_port()
     environment = run_environment(port, home)
     os.environ.update(environment)
-    arguments = [f"seed:={seed}", "fri_period:=0.010", "console:=false", "profile:=patient", "perfect_perception:=true"]
+    arguments = [
+        f"seed:={seed}",
+        "fri_period:=0.010",
+        "console:=false",
+        "profile:=accustomed",
+        "perfect_perception:=true",
+    ]
     system = System(environment, port, arguments, home / "roslaunch.log")
     outcomes = {}
     try:

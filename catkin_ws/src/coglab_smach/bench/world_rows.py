@@ -1,10 +1,15 @@
 """Figures of a world that nobody tuned: whether the physics are right, the default world, each hardship alone.
 
 Definitions. A trial is a person who gives the object (receive) and asks for it again (give): every person is a trial of
-both directions, a second direction that never began counts as failed. Physics right: profile patient, perfect
-perception, every object grasped with all fingers (power grasp); what an object's file asks for otherwise is printed
-beside. An object has fallen if it lies, or lay, on the floor. The default world is `Conditions()`; a hardship changes
-one thing of it. Beside them: the default world with people whose habits make a handover easier (`CAREFUL`).
+both directions; each direction of each trial has succeeded or failed for exactly one reason, which may be that the
+trial got stuck in it, or that it never began. Physics right: profile patient, perfect perception, every object grasped
+with all fingers (power grasp); what an object's file asks for otherwise is printed beside. An object has fallen if it
+lies, or lay, on the floor. A period is outside a limit as commanded if the answered positions or their speeds are; as
+measured if a joint of the plant is beyond its range at the end of the period, or faster than its limit in any of its
+steps of 1 ms, without tolerance. The default world is `Conditions()`; a hardship changes one thing of it. Palm to the
+true goal pose: once the arm stands still and nobody has touched it; of reaches after which it never did, at their end,
+with their number. Beside them, without a goal: people whose habits make a handover easier, in the default world
+(`CAREFUL`) and in the one of the physics (`CONSIDERATE`).
 """
 
 from __future__ import annotations
@@ -16,14 +21,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 from campaign import EXCHANGES, Campaign, Job
 from coglab_objects.database import objects_folder, read_object
-from coglab_sim.conditions import CAREFUL, CONSIDERATE, HARDSHIPS, Conditions, hardship
+from coglab_sim.conditions import CAREFUL, CONSIDERATE, HARDSHIPS, PATIENT, Conditions, hardship
 
 LONG = os.environ.get("COGLAB_LONG") == "1"
 PEOPLE = 100 if LONG else 2
 DEFAULT_TRIALS = 200 if LONG else 8
 HARDSHIP_TRIALS = 200 if LONG else 2
+ACCUSTOMED = 20 if LONG else 1
 NAMES = dict(zip(EXCHANGES, ("receive", "give"), strict=True))
 OBJECTS = sorted(path.stem for path in objects_folder().glob("*.yaml"))
+NEVER_STOOD = "never stood still, at the reach's end"
 Row = Callable[..., dict]
 
 
@@ -50,9 +57,15 @@ class Plan:
 
 def physics_plan(object_id: str, power: bool = True) -> Plan:
     """Patient people, perfect perception."""
-    conditions = replace(CONSIDERATE, object_id=object_id)
+    conditions = replace(PATIENT, object_id=object_id)
     name = f"physics, {object_id}" + ("" if power else ", own grasp")
     return Plan(name, range(5000, 5000 + PEOPLE), lambda seed: conditions, power)
+
+
+def accustomed_plan(object_id: str) -> Plan:
+    """The same with people who have habits."""
+    conditions = replace(CONSIDERATE, object_id=object_id)
+    return Plan(f"accustomed, {object_id}", range(5000, 5000 + ACCUSTOMED), lambda seed: conditions, True)
 
 
 def default_plan(n: int = DEFAULT_TRIALS) -> Plan:
@@ -60,13 +73,15 @@ def default_plan(n: int = DEFAULT_TRIALS) -> Plan:
     return Plan("default", range(6000, 6000 + n), lambda seed: Conditions())
 
 
-def beside_plans() -> list[Plan]:
-    """Each hardship alone, and the people with habits."""
+def hardship_plans() -> list[Plan]:
+    """Each hardship alone."""
     seeds = range(6000, 6000 + HARDSHIP_TRIALS)
-    return [
-        *(Plan(f"hardship '{name}'", seeds, lambda seed, name=name: hardship(name, seed)) for name in HARDSHIPS),
-        Plan("careful people", seeds, lambda seed: CAREFUL),
-    ]
+    return [Plan(f"hardship '{name}'", seeds, lambda seed, name=name: hardship(name, seed)) for name in HARDSHIPS]
+
+
+def careful_plan() -> Plan:
+    """The default world, but for people with habits."""
+    return Plan("careful people", range(6000, 6000 + HARDSHIP_TRIALS), lambda seed: CAREFUL)
 
 
 def own_grasps() -> list[str]:
@@ -75,9 +90,12 @@ def own_grasps() -> list[str]:
 
 
 def plans() -> list[Plan]:
-    """Everything whose figures the rows below are."""
-    physics = [physics_plan(name) for name in OBJECTS] + [physics_plan(name, power=False) for name in own_grasps()]
-    return [*physics, default_plan(), *beside_plans()]
+    """Everything whose figures the rows below are: first what is judged, then the default world and what makes it
+    harder, then what stands beside."""
+    own = [physics_plan(name, power=False) for name in own_grasps()]
+    accustomed = [accustomed_plan(name) for name in OBJECTS]
+    physics = [physics_plan(name) for name in OBJECTS]
+    return [*physics, default_plan(), *hardship_plans(), careful_plan(), *own, *accustomed]
 
 
 def power_grasped(object_id: str) -> bool:
@@ -93,6 +111,7 @@ def physics_rows(row: Row) -> list[dict]:
         campaigns.append(physics_plan(object_id).run())
         rows += direction_rows(row, campaigns[-1], f"physics right, {object_id}, power grasp")
     rows += judged_rows(row, campaigns)
+    rows += accustomed_rows(row)
     for object_id in own_grasps():
         campaign, what = physics_plan(object_id, power=False).run(), f"{object_id}, the grasp of its file"
         rows += direction_rows(row, campaign, f"physics right, {what}")
@@ -102,20 +121,38 @@ def physics_rows(row: Row) -> list[dict]:
 
 def judged_rows(row: Row, campaigns: list[Campaign]) -> list[dict]:
     """The goals of power grasps, over all objects."""
-    everything, good = Campaign(), 0.0
-    for campaign in campaigns:
-        good += sum(campaign.share(action) for action in EXCHANGES) * campaign.trials
-        for count in ("trials", "asked", "fell", "stuck", "outside"):
-            setattr(everything, count, getattr(everything, count) + getattr(campaign, count))
-    trials = max(1, everything.trials)
-    share, fallen = good / (2 * trials), everything.fell / trials
+    everything, share = together(campaigns)
+    fallen = everything.fell / max(1, everything.trials)
     what = f"physics right, {PEOPLE} patient people x {len(OBJECTS)} objects x 2 directions, power grasps"
-    row, stuck, outside = everything.marked(row), everything.stuck, everything.outside
+    row, stuck = everything.marked(row), everything.stuck
     return [
         row(f"{what}: succeeded", share, "share", ">= 0.97", share >= 0.97),
         row(f"{what}: object fell", fallen, "share of trials", "<= 0.01", fallen <= 0.01),
         row(f"{what}: stuck", stuck, "trials", "<= 0", stuck == 0),
-        row(f"{what}: measured periods outside a joint limit", outside, "periods", "<= 0", outside == 0),
+        *everything.limit_rows(row, what, "<= 0"),
+    ]
+
+
+def together(campaigns: list[Campaign]) -> tuple[Campaign, float]:
+    """Their counts added up, and the share of all directions that succeeded."""
+    everything, good = Campaign(), 0
+    for campaign in campaigns:
+        good += sum(campaign.outcomes[(action, "succeeded")] for action in EXCHANGES)
+        for count in ("trials", "asked", "fell", "stuck", "outside_commanded", "outside_measured", "over_command"):
+            setattr(everything, count, getattr(everything, count) + getattr(campaign, count))
+        everything.fastest = max(everything.fastest, campaign.fastest)
+    return everything, good / max(1, 2 * everything.trials)
+
+
+def accustomed_rows(row: Row) -> list[dict]:
+    """Beside what is judged: the same trials with people who have habits; no goal."""
+    everything, share = together([accustomed_plan(name).run() for name in OBJECTS])
+    what = f"beside it: {ACCUSTOMED} accustomed people (patient, with habits) x {len(OBJECTS)} objects x 2 directions"
+    row = everything.marked(row)
+    return [
+        row(f"{what}: succeeded", share, "share"),
+        row(f"{what}: object fell", everything.fell, "trials"),
+        row(f"{what}: stuck", everything.stuck, "trials"),
     ]
 
 
@@ -123,8 +160,7 @@ def direction_rows(row: Row, campaign: Campaign, what: str) -> list[dict]:
     """Success and failures by reason, per direction; no goal."""
     return [
         campaign.marked(row)(
-            f"{what}, {NAMES[action]}: succeeded of {campaign.trials} (failures: {campaign.failures(action)}; "
-            f"not begun: {campaign.trials - campaign.begun(action)})",
+            f"{what}, {NAMES[action]}: succeeded of {campaign.trials} (failures: {campaign.failures(action)})",
             campaign.share(action),
             "share",
         )
@@ -135,7 +171,7 @@ def direction_rows(row: Row, campaign: Campaign, what: str) -> list[dict]:
 def world_rows(row: Row, default: Campaign) -> list[dict]:
     """The default world and what stands beside it, printed with control as it is."""
     rows = whole_rows(row, default, "default world")
-    for plan in beside_plans():
+    for plan in (*hardship_plans(), careful_plan()):
         rows += whole_rows(row, plan.run(), plan.name)
     return rows
 
@@ -148,17 +184,29 @@ def whole_rows(row: Row, campaign: Campaign, what: str) -> list[dict]:
         row(f"{what}, give: succeeded of {campaign.begun(give)} begun", campaign.share_of_begun(give), "share"),
         row(f"{what}: object fell", campaign.fell, "trials"),
         row(f"{what}: stuck", campaign.stuck, "trials"),
-        row(f"{what}: measured periods outside a joint limit", campaign.outside, "periods"),
+        *campaign.limit_rows(row, what),
     ]
     for action in EXCHANGES:
-        found = campaign.reaches[action]
-        for key, unit in (("truth_mm", "mm"), ("truth_deg", "deg")):
-            if not found:
-                rows.append(row(f"{what}, {NAMES[action]}: palm to the true goal, no reach ended", 0, "reaches"))
-                break
-            values = np.array([each[key] for each in found])
-            for label, value in (("median", np.median(values)), ("p95", np.percentile(values, 95))):
-                rows.append(row(f"{what}, {NAMES[action]}: palm to the true goal pose, {label}", value, unit))
+        rows += palm_rows(row, campaign.reaches[action], f"{what}, {NAMES[action]}")
+    return rows
+
+
+def palm_rows(row: Row, reaches: list[dict[str, float]], what: str) -> list[dict]:
+    """Palm to the true goal pose of every reach: where the arm stood, and of those that never stood, at their end."""
+    stood, never = ([each for each in reaches if bool(each["stood"]) == whether] for whether in (True, False))
+    rows = off_rows(row, stood, len(reaches), what, "arm standing")
+    return rows + off_rows(row, never, len(reaches), what, NEVER_STOOD)
+
+
+def off_rows(row: Row, found: list[dict[str, float]], every: int, what: str, where: str) -> list[dict]:
+    """How many of every reach these are, and how far off their palms were."""
+    rows = [row(f"{what}: reaches, {where}", len(found), f"of {every}")]
+    if not found:
+        return rows
+    for key, unit in (("truth_mm", "mm"), ("truth_deg", "deg")):
+        values, name = [each[key] for each in found], f"{what}: palm to the true goal pose, {where}"
+        rows.append(row(f"{name}, median", np.median(values), unit))
+        rows.append(row(f"{name}, p95", np.percentile(values, 95), unit))
     return rows
 
 
@@ -169,24 +217,22 @@ def run_default(n: int = DEFAULT_TRIALS) -> Campaign:
 
 def contact_rows(row: Row, campaign: Campaign) -> list[dict]:
     """Contact and palm over drawn people who place while the arm stands, and while it moves; nothing is left out."""
-    rows, people = [], campaign.trials
+    rows, waits = [], len(campaign.touches)
     row = campaign.marked(row)
     for moving, what in ((False, "arm still"), (True, "arm moving")):
-        touched = [each for each in campaign.touches if each[0] is not None and each[2] == moving]
-        found = [each[1] - each[0] for each in touched if each[1] is not None and not each[3]]
+        touched = [each for each in campaign.touches if each["touched"] is not None and each["moving"] == moving]
+        real = [each for each in touched if each["found"] is not None and not each["false_alarm"]]
+        found = [each["found"] - each["touched"] for each in real]
         name = f"drawn people, {what} at first touch"
-        rows.append(row(f"{name}: touches", len(touched), "of " + str(people)))
+        rows.append(row(f"{name}: touches", len(touched), f"of {waits} waits"))
         rows.append(row(f"{name}: found", len(found) / max(1, len(touched)), "share"))
         if found:
             rows.append(row(f"{name}: delay from 0.3 N to contact, median", 1000 * np.median(found), "ms"))
             rows.append(row(f"{name}: delay from 0.3 N to contact, p95", 1000 * np.percentile(found, 95), "ms"))
-        for key, unit in (("truth_mm", "mm"), ("truth_deg", "deg")):
-            off = [each[key] for each, while_moving in campaign.palms if while_moving == moving]
-            if off:
-                rows.append(row(f"{name}: palm to the true goal pose, median", np.median(off), unit))
-                rows.append(row(f"{name}: palm to the true goal pose, p95", np.percentile(off, 95), unit))
-    false = sum(each[3] for each in campaign.touches)
-    rows.append(row("drawn people: contact found before anything touched", false, f"of {len(campaign.touches)} waits"))
-    untouched = sum(each[0] is None for each in campaign.touches)
-    rows.append(row("drawn people: nothing touched the hand", untouched, f"of {len(campaign.touches)} waits"))
-    return rows
+        then = [palm for palm, each in campaign.palms if each["touched"] is not None and each["moving"] == moving]
+        rows += palm_rows(row, then, name)
+        false = sum(each["false_alarm"] and each["moving_when_found"] == moving for each in campaign.touches)
+        rows.append(row(f"drawn people, {what}: contact found before anything touched", false, f"of {waits} waits"))
+    untouched = [palm for palm, each in campaign.palms if each["touched"] is None]
+    rows.append(row("drawn people: nothing touched the hand", len(untouched), f"of {waits} waits"))
+    return rows + palm_rows(row, untouched, "drawn people, nothing touched the hand")

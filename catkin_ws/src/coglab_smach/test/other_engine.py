@@ -143,7 +143,7 @@ def main(where):
     smach.set_loggers(*[lambda *a: None] * 4)
     from virtual_trial import VirtualTrial
 
-    trial, seen = VirtualTrial(seed=0, profile="patient", perfect=True), []
+    trial, seen = VirtualTrial(seed=0, profile="accustomed", perfect=True), []
     watch_user_data(trial.master, seen)
     results = trial.run("exchange_human_to_robot", "exchange_robot_to_human")
     truth = trial.rig.cell.truth()

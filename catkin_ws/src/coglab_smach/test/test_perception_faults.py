@@ -86,7 +86,7 @@ class VisionPort:
 
 def two_people(seed, margin, other):
     """A trial whose perception sees the partner and somebody else at ``other(t)``."""
-    trial = VirtualTrial(seed=seed, profile="patient", perfect=True)
+    trial = VirtualTrial(seed=seed, profile="accustomed", perfect=True)
     trial.perception = trial.ctx.perception
     vision = Vision(
         NAMES,
@@ -128,7 +128,7 @@ def test_identity_swaps_neither_mislead_the_arm_nor_go_unsaid(jump):
     settings = PerceptionSettings(swap_probability=0.01, swap_jump=jump)
     good = 0
     for seed in range(3):
-        trial = VirtualTrial(seed=seed, profile="patient", perception=settings)
+        trial = VirtualTrial(seed=seed, profile="accustomed", perception=settings)
         result = trial.run("exchange_human_to_robot")[0]
         assert trial.rig.robot.limit_violations == 0
         assert result.outcome == "succeeded" or (result.outcome == "failed_empty" and result.reason)

@@ -19,7 +19,9 @@ def quiet():
 
 
 def trial_of(**kw):
-    return VirtualTrial(seed=5, recogniser=Recogniser(*load_patterns(PATTERNS)), profile="patient", perfect=True, **kw)
+    return VirtualTrial(
+        seed=5, recogniser=Recogniser(*load_patterns(PATTERNS)), profile="accustomed", perfect=True, **kw
+    )
 
 
 def test_an_object_held_high_gets_the_primitive_for_it():

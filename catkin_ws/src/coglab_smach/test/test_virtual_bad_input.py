@@ -21,7 +21,7 @@ def at_home(trial):
 
 def blinded(after, **overrides):
     """Receive; perception loses the object ``after`` s into the motion."""
-    trial = VirtualTrial(seed=4, profile="patient", perfect=True, **overrides)
+    trial = VirtualTrial(seed=4, profile="accustomed", perfect=True, **overrides)
 
     def beside(t):
         if t._reach is not None and t.rig.t > t._reach.begin + after:
@@ -44,7 +44,7 @@ def test_goal_lost_for_the_rest_of_a_short_way_is_finished_on_the_held_one():
 
 
 def test_primitive_that_does_not_exist():
-    trial = VirtualTrial(seed=4, profile="patient", perfect=True)
+    trial = VirtualTrial(seed=4, profile="accustomed", perfect=True)
     entry = trial.ctx.database.database.get("mug")
     broken = {**entry, "dmp": {**entry["dmp"], "receive": "reach_the_moon"}}
     trial.ctx.database.database.get = lambda object_id: broken
@@ -55,7 +55,7 @@ def test_primitive_that_does_not_exist():
 
 
 def test_hand_dead_when_the_object_comes():
-    trial = VirtualTrial(seed=4, profile="patient", perfect=True)
+    trial = VirtualTrial(seed=4, profile="accustomed", perfect=True)
 
     def beside(t):
         t.rig.hand.dead = t.rig.hand.dead or (t._reach is not None)
@@ -67,7 +67,7 @@ def test_hand_dead_when_the_object_comes():
 
 
 def test_command_mode_lost_in_mid_reach_and_reset():
-    trial = VirtualTrial(seed=4, profile="patient", perfect=True)
+    trial = VirtualTrial(seed=4, profile="accustomed", perfect=True)
     done = []
 
     def beside(t):

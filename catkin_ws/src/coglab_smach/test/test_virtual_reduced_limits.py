@@ -20,7 +20,7 @@ def test_actions_succeed_within_t1(tmp_path, actions, where):
     table = yaml.safe_load(open(LIMITS, encoding="utf-8"))
     reduced = tmp_path / "joint_limits.yaml"
     reduced.write_text(yaml.safe_dump({**table, "default": {**table["default"], **table["t1"]}}))
-    trial = VirtualTrial(seed=3, object_on=where, limits=str(reduced), profile="patient", perfect=True)
+    trial = VirtualTrial(seed=3, object_on=where, limits=str(reduced), profile="accustomed", perfect=True)
     results = trial.run(*actions, limit=200.0)
     wanted = [(action, "succeeded") for action in actions]
     assert [(r.kind, r.outcome) for r in results] == wanted, trial.ctx.journal.why()

@@ -25,8 +25,8 @@ def quiet():
 
 
 def run(*actions, moves=True, **kw):
-    """A trial of the machinery: a patient person and perfect perception, unless other ones are named."""
-    trial = VirtualTrial(**{"profile": "patient", "perfect": True, **kw})
+    """A trial of the machinery: an accustomed person and perfect perception, unless other ones are named."""
+    trial = VirtualTrial(**{"profile": "accustomed", "perfect": True, **kw})
     results = trial.run(*actions)
     assert trial.rig.robot.limit_violations == 0
     assert trial.ctx.contact.watched_while_moving == 0

@@ -10,7 +10,7 @@ from coglab_py.pose import Pose
 from coglab_sim.conditions import Conditions
 from coglab_sim.person.in_cell import pose_of_truth
 from coglab_sim.tracker.tracker import PerceptionSettings
-from coglab_sim.virtual_world import DT, LIMITS, World
+from coglab_sim.virtual_world import BOARD, DT, LIMITS, World
 from coglab_smach.clocks.virtual_clock import VirtualClock, using
 from coglab_smach.context.config import Config
 from coglab_smach.context.context import Context
@@ -30,7 +30,7 @@ class VirtualTrial:
 
     ``conditions`` of the world: by default people and tracker as they are; ``behaviour``, ``profile``, ``perfect`` and
     ``perception`` change them. ``reaches`` gets one ReachRecord per DMP motion, ``touches`` one TouchRecord per wait
-    for contact.
+    for contact, ``begun`` the actions that a hub has taken.
     """
 
     def __init__(
@@ -80,7 +80,7 @@ class VirtualTrial:
             self.master = build_master(self.ctx)
         self.over = False
         self.failure = None
-        self.reaches, self.touches = [], []
+        self.reaches, self.touches, self.begun = [], [], []
         self.said = []
         self.beside = lambda trial: None
         self._reach = self._touch = None
@@ -96,9 +96,16 @@ class VirtualTrial:
             human = self.rig.human
             human.participant = replace(human.participant, behaviour=self.later_behaviour)
         if record.from_state == "execute_dmp" and record.outcome == "succeeded":
-            self._reach = ReachRecord(self.rig, self.ctx)
+            self._end_reach()
+            self._reach = ReachRecord(self.rig, self.ctx, self.begun[-1] if self.begun else "")
             self._touch = TouchRecord(self.rig, self.ctx.contact)
-        if record.from_state == "wait_stop" and self._reach is not None:
+        if record.from_state == "wait_stop":
+            self._end_reach()
+
+    def _end_reach(self):
+        """Keep the records of the reach that is over, if one is."""
+        if self._reach is not None:
+            self._reach.end()
             self.reaches.append(self._reach)
             self.touches.append(self._touch)
             self._reach = self._touch = None
@@ -111,6 +118,7 @@ class VirtualTrial:
             self.clock.start_thread(lambda: self._script(walk), "script")
             self.master.execute()
             self.over = True
+        self._end_reach()  # of a machine that was stopped in it
         if self.failure is not None:
             raise self.failure
         return [r for r in self.ctx.journal.results if r.kind != "coglab_init_system"]
@@ -156,6 +164,7 @@ class VirtualTrial:
                 self.clock.sleep(0.1)
             if not self.ctx.requests.submit(action, self.object_id)[0]:
                 return  # the action before it failed, so that this hub does not take it
+            self.begun.append(action)
             before = len(self.ctx.journal.results)
             while len(self.ctx.journal.results) == before:
                 if self.clock.now() > end:
@@ -170,17 +179,20 @@ class VirtualTrial:
 
 
 class ReachRecord:
-    """What one DMP motion did: (time, measured palm, goal in use) per cycle, and the errors once the arm stands still.
+    """What one DMP motion of ``action`` did: (time, measured palm, goal in use) per cycle, and the errors once the arm
+    stands still; if it never ``stood``, at the reach's end.
 
     ``to_goal``: (m, rad) from the measured palm to the goal as received, that is as the motion has estimated and
-    latched it; ``to_sight``: to the newest single sight; ``to_truth``: to where the grasp pose really is.
+    latched it, None where there was none yet; ``to_sight``: to the newest single sight; ``to_truth``: to where the
+    grasp pose really is.
     """
 
-    def __init__(self, rig, ctx):
-        self.rig, self.request, self.contact = rig, ctx.arm.request, ctx.contact
+    def __init__(self, rig, ctx, action):
+        self.rig, self.request, self.contact, self.action = rig, ctx.arm.request, ctx.contact, action
         self.begin = rig.t
         self.path = []
         self.reached = None
+        self.stood = False
         self.to_goal = self.to_sight = self.to_truth = None
 
     def look(self):
@@ -191,47 +203,58 @@ class ReachRecord:
         if self.reached is None and robot.progress["motion"] == "reached":
             self.reached = rig.t
         # Measured when the detector begins to watch: the arm stands still and nobody has touched it yet.
-        if self.to_goal is None and self.reached is not None and self.contact.detector.state() == "watching":
+        if not self.stood and self.reached is not None and self.contact.detector.state() == "watching":
+            self.stood = True
+            self._measure()
+
+    def end(self):
+        """The reach is over: one that never stood still is measured where it is."""
+        if not self.stood:
             self._measure()
 
     def _measure(self):
         rig, request, debug = self.rig, self.request, self.rig.robot.debug
-        if debug is None:
-            return
         palm = Pose(*rig.robot.chain.fk(rig.robot.report["position"]))
         goal = Pose(np.asarray(request.goal_offset, dtype=float), np.asarray(request.target_orientation))
-        self.to_goal = palm.distance(Pose(np.asarray(debug["goal"]), np.asarray(debug["set_point"][1])))
+        if debug is not None:
+            self.to_goal = palm.distance(Pose(np.asarray(debug["goal"]), np.asarray(debug["set_point"][1])))
         seen, _ = rig.newest(request.goal_frame)
-        truth = rig.truth["human_hand" if request.goal_frame == "human_hand" else "object"]
+        truth = pose_of_truth(rig.truth["human_hand" if request.goal_frame == "human_hand" else "object"])
         self.to_sight = palm.distance(seen * goal)
-        self.to_truth = palm.distance(pose_of_truth(truth) * goal)
+        self.to_truth = palm.distance((BOARD if request.goal_frame == "board" else truth) * goal)
 
 
 TOUCH = 0.3
-"""N on the robot's hand from which somebody touches it"""
+"""N on the robot's hand, all in all, from which something touches it: the object or the hand that holds it"""
 
 
 class TouchRecord:
-    """When the object first touched the robot's hand in one reach (s), whether the arm moved then, and when contact was
-    found; None: never."""
+    """When something first touched the robot's hand in one reach (s), and when contact was found; None: never. And
+    whether the arm moved at either moment."""
 
     def __init__(self, rig, contact):
         self.rig, self.contact = rig, contact
         self.touched = self.found = None
-        self.moving = False
+        self.moving = self.moving_when_found = False
 
     def look(self):
         """After each period of the rig."""
-        if self.touched is None and np.linalg.norm(self.rig.truth["palm_force"]) > TOUCH:
+        if self.touched is None and np.linalg.norm(sum(self.rig.cell.touch().values())) > TOUCH:
             self.touched = self.rig.t
             self.moving = not self.rig.robot.report["standing"]
         if self.found is None and self.contact.event() is not None:
             self.found = self.rig.t
+            self.moving_when_found = not self.rig.robot.report["standing"]
 
     @property
     def false_alarm(self):
         """Found before anything had touched the hand."""
         return self.found is not None and (self.touched is None or self.found < self.touched)
+
+    def figures(self):
+        """As plain data."""
+        names = ("touched", "found", "moving", "moving_when_found", "false_alarm")
+        return {name: getattr(self, name) for name in names}
 
 
 class PowerGrasps(VirtualDatabase):

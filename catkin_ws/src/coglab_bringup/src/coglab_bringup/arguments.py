@@ -42,10 +42,11 @@ def demo_parser(top: Path) -> Parser:
     )
     parser.add_argument(
         "--person",
-        choices=("patient", "drawn"),
+        choices=("patient", "accustomed", "drawn"),
         default="patient",
-        help="patient: waits for the robot, seen without noise or delay (default); drawn: as people are, by the seed, "
-        "and seen by the tracker as it is, so that not every handover succeeds",
+        help="patient: waits for the robot, seen without noise or delay (default); accustomed: helps it by habit, too; "
+        "drawn: as people are, by the seed, and seen by the tracker as it is; not every handover succeeds, least with "
+        "drawn people",
     )
     return parser
 

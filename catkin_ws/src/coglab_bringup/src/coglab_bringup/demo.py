@@ -89,6 +89,10 @@ PEOPLE = {
         "a patient person, who waits for the robot and is seen without noise or delay; people as they are: "
         "./coglab demo --person drawn",
     ),
+    "accustomed": (
+        ("profile:=accustomed", "perfect_perception:=true"),
+        "an accustomed person, who waits for the robot, helps it by habit and is seen without noise or delay",
+    ),
     "drawn": ((), "a person drawn by the seed, as people are, seen by the tracker as it is"),
 }
 """Arguments of the launch file, and what they mean."""

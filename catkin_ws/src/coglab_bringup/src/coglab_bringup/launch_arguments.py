@@ -111,7 +111,7 @@ def _rules(sources: Path, objects: Path) -> dict[str, Callable[[str], object]]:
         "krl_convention": lambda value: _one_of(_conventions(sources), value),
         "limits_profile": lambda value: _one_of(_profiles(sources), value),
         "behaviour": lambda value: _one_of(_behaviours(sources), value),
-        "profile": lambda value: _one_of(["drawn", "patient"], value),
+        "profile": lambda value: _one_of(["drawn", "patient", "accustomed"], value),
         "recorded_person": lambda value: _one_of(["wait", "no_wait", "leave"], value),
         "object": lambda value: _object(objects, value),
         "objects": _folder,

@@ -18,7 +18,9 @@ struct CellTruth {
   double time = 0.0;  ///< s, simulated
   Pose object, human_hand, robot_hand;
   Twist object_twist;
-  Vector3d palm_force = Vector3d::Zero();  ///< N, on the robot hand
+  double hand_closure = 0.0;               ///< of the robot's fingers, see Plant::handClosure()
+  Vector3d palm_force = Vector3d::Zero();   ///< N, on the robot hand
+  Vector3d human_force = Vector3d::Zero();  ///< N, on the person's hand: Plant::personForce()
   double robot_load_share = 0.0, human_load_share = 0.0;
   std::string held_by;
   bool dropped = false;
@@ -52,12 +54,13 @@ class Cell {
   const MeasurementBytes& measurement() const { return bytes_; }
 
   // Inputs, valid until changed
+  /// @throws std::invalid_argument as Plant::setPerson() does.
   void setHuman(const plant::PersonInput& human) { plant_.setPerson(human); }
   /// What the hand's electronics ask of the five motors.
   void setMotors(const MotorCommands& commands);
   /// On the palm about its origin, besides what touches it.
   void setPush(const Wrench& push) { plant_.setPush(push); }
-  /// @throws std::invalid_argument if the object would stand inside something.
+  /// @throws std::invalid_argument as Plant::place() does.
   void place(plant::Place place, const Pose& pose) { plant_.place(place, pose); }
   /// Exchanges the object; it is then to be placed. @throws std::invalid_argument
   void setObject(const plant::Object& object);
@@ -75,6 +78,8 @@ class Cell {
   double period() const { return controller_.parameters().period; }
   CellTruth truth() const;
   MotorStates motors() const;
+  /// rad/s, largest speed of each joint in any step of the last period.
+  const Vector7& fastest() const { return fastest_; }
   const plant::Plant& plant() const { return plant_; }
   plant::Plant& plant() { return plant_; }
   const CellConfig& config() const { return config_; }
@@ -93,6 +98,7 @@ class Cell {
   int lose_next_ = 0;
   bool losing_ = false;
   bool sent_ = false;
+  Vector7 fastest_ = Vector7::Zero();
   MeasurementBytes bytes_{};
 };
 

@@ -32,6 +32,8 @@ struct CellSnapshot {
   std::uint64_t tick = 0;        ///< number of periods so far
   std::uint64_t late_ticks = 0;  ///< periods that the thread itself began too late
   std::uint64_t answers = 0;     ///< datagrams received so far
+  /// Why the person's hand is not there, though it was told where it is; empty: it is.
+  std::string refused_hand;
 };
 
 /// Runs a Cell in real time times a factor.

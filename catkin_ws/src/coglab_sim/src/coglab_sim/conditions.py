@@ -30,10 +30,12 @@ class Conditions:
 
 
 THE_WORLD_AS_IT_IS = Conditions()
-CONSIDERATE = Conditions(profile="patient", perception=PerceptionSettings(perfect=True))
-"""For what is about machinery and not about people: a patient person, perfect perception."""
+PATIENT = Conditions(profile="patient", perception=PerceptionSettings(perfect=True))
+"""Where the physics are judged: a patient person, perfect perception."""
+CONSIDERATE = Conditions(profile="accustomed", perception=PerceptionSettings(perfect=True))
+"""For what is about machinery and not about people: an accustomed person, perfect perception."""
 CAREFUL = Conditions(person=HABITS)
-"""The world as it is, but for people with the habits of the patient: printed beside it."""
+"""The world as it is, but for people with the habits of the accustomed: printed beside it."""
 
 HARDSHIPS: dict[str, Callable[[Conditions, int], Conditions]] = {
     "trust 0.1 s": lambda c, seed: replace(c, person={**c.person, "trust": 0.1}),

@@ -7,6 +7,7 @@ Tests, trials and benches make their world here, and nowhere else.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -27,7 +28,7 @@ from ih2_hand.progress import Task, Verdict
 from ih2_hand.reasons import Reason
 
 from coglab_sim.conditions import THE_WORLD_AS_IT_IS, Conditions
-from coglab_sim.person.in_cell import closure, move_person, view_of
+from coglab_sim.person.in_cell import move_person, pose_of_truth, view_of
 from coglab_sim.person.recorded_person import RecordedPerson, open_recorded_hand, scene_of
 from coglab_sim.person.scene import Scene
 from coglab_sim.person.virtual_human import VirtualHuman
@@ -86,6 +87,9 @@ class Robot:
         self.virtual = LockstepRobot(urdf_file(), limits, parameters, yaml.safe_dump(manager_parameters()))
         self.cell = self.virtual.cell
         self.limits = cc.load_joint_limits(limits)
+        self._fastest_to_command = np.array(self.limits.velocity)
+        self._fastest = np.array(read(Path(limits)).value["default"]["velocity"], dtype=float)
+        self._lowest, self._highest = np.array(self.limits.lower_position), np.array(self.limits.upper_position)
         with open(urdf_file(), encoding="utf-8") as stream:
             self.urdf = stream.read()
         self.chain = cc.Chain(self.urdf)
@@ -99,29 +103,46 @@ class Robot:
         }
         self.ended: dict[int, dict[str, Any]] = {}
         self.loaded: dict[str, str] = {}
-        self.peak_share = 0.0
-        self.limit_violations = 0
+        self.peak_share = self.measured_share = 0.0
+        self.outside = {"commanded": 0, "measured": 0, "over_command": 0}
         self.debug: dict[str, Any] | None = None
         self._commanded: np.ndarray | None = None
 
+    @property
+    def limit_violations(self) -> int:
+        """Periods in which the arm was outside a limit, by its commands or as it moved."""
+        return self.outside["commanded"] + self.outside["measured"]
+
+    def _look_at_arm(self) -> None:
+        """Judge the true joints by the arm's own limits: where they are, and how fast they were in any step of the
+        period. Nothing is differentiated or rounded, and no tolerance is given. Commands are bound to a few percent
+        less (``servo_overshoot`` of the table): periods with a joint over that bound are counted apart."""
+        fastest = self.cell.fastest
+        share = float((fastest / self._fastest).max())
+        self.measured_share = max(self.measured_share, share)
+        self.outside["measured"] += share > 1.0 or self._beyond(self.cell.position)
+        self.outside["over_command"] += bool((fastest > self._fastest_to_command).any())
+
+    def _beyond(self, position: np.ndarray) -> bool:
+        return bool((position < self._lowest).any() or (position > self._highest).any())
+
     def step(self) -> None:
-        """One FRI period; the limits are looked at in what was measured and in what was answered."""
+        """One FRI period; the limits are looked at in how the arm moved and in what it was told."""
         self.virtual.tick()
+        self._look_at_arm()
         self.report = report = self.virtual.report()
         if report["fri_period"] <= 0.0:
             return
         if "ptp" in self.loaded:
             self.ended.update((end["ptp_id"], end) for end in self.virtual.ptp_ends())
-        q, commanded = np.asarray(report["position"]), np.asarray(report["commanded_position"])
-        outside = any(
-            np.any(v < self.limits.lower_position) or np.any(v > self.limits.upper_position) for v in (q, commanded)
-        )
+        commanded = np.asarray(report["commanded_position"])
+        outside = self._beyond(commanded)
         if self._commanded is not None and report["motion_allowed"]:
             speed = np.abs(commanded - self._commanded) / DT
-            self.peak_share = max(self.peak_share, float(np.max(speed / self.limits.velocity)))
-            outside = outside or bool(np.any(speed > self.limits.velocity + FLOAT32))
+            self.peak_share = max(self.peak_share, float(np.max(speed / self._fastest_to_command)))
+            outside = outside or bool(np.any(speed > self._fastest_to_command + FLOAT32))
         self._commanded = commanded if report["motion_allowed"] else None
-        self.limit_violations += outside
+        self.outside["commanded"] += outside
 
     def look_at_motion(self) -> list[dict[str, Any]]:
         """Progress of the DMP and, while it moves, the newest set-point and goal."""
@@ -274,6 +295,8 @@ class World:
         self.robot = Robot(seed, limits, **where)
         self.cell = self.robot.cell
         self.hand = Hand(self.cell)
+        self.board = conditions.perception.calibration(seed) * BOARD
+        """as the tracker sees it, which is off for the board as for everything"""
         self.trackers = {name: Tracker(name, conditions.perception, seed) for name in (self.object_frame, "human_hand")}
         self.after_period: list[Callable[[], None]] = []
         self.speed_scale = 1.0
@@ -284,9 +307,9 @@ class World:
         self.blind: set[str] = set()
 
     def newest(self, name: str) -> tuple[Pose | None, float]:
-        """Newest sight of a frame and its age; the board is known."""
+        """Newest sight of a frame and its age; the board stands where it was seen once."""
         if name == "board":
-            return BOARD, 0.0
+            return self.board, 0.0
         sight = self.sights.get(name)
         if sight is None:
             return None, OLDEST
@@ -297,7 +320,7 @@ class World:
         if self.ticks % 2 == 0:
             self._person_and_tracker()
         self.hand.step(self.t)
-        self.robot.virtual.set_frame("board", BOARD.position, BOARD.orientation)
+        self.robot.virtual.set_frame("board", self.board.position, self.board.orientation)
         self.robot.step()
         self.ticks += 1
         self.t = self.robot.virtual.now
@@ -307,11 +330,10 @@ class World:
 
     def _person_and_tracker(self) -> None:
         self.truth = truth = self.cell.truth()
-        fingers = closure([motor.position for motor in self.hand.emulator.motors])
-        view = view_of(truth, fingers, self.scene.object_mass)
-        hand = self.human.step(self.t, view)
-        move_person(self.cell, hand)
-        frames = {self.object_frame: view.object, "human_hand": hand.frame}
+        view = view_of(truth)
+        move_person(self.cell, self.human.step(self.t, view))
+        # The hand is where the arm has brought it, not where the person wants it.
+        frames = {self.object_frame: view.object, "human_hand": pose_of_truth(truth["human_hand"])}
         for name, frame in frames.items():
             others = [other for each, other in frames.items() if each != name]
             for sight in self.trackers[name].step(self.t, frame, view.robot_hand, others):

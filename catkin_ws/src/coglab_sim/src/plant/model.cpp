@@ -1,5 +1,6 @@
 #include "coglab_sim/plant/model.hpp"
 
+#include <algorithm>
 #include <cstring>
 #include <stdexcept>
 
@@ -77,6 +78,18 @@ int Model::find(mjtObj type, const std::string& name) const {
   const int id = mj_name2id(model_.get(), type, name.c_str());
   if (id < 0) throw std::runtime_error("the model of the cell has no '" + name + "'");
   return id;
+}
+
+double Model::reach() const {
+  double farthest = 0.0;
+  for (int body = 1; body < model_->nbody; ++body) {
+    if (model_->body_rootid[body] != model_->body_rootid[palm]) continue;
+    double way = Eigen::Map<const Vector3d>(model_->body_ipos + 3 * body).norm();
+    for (int link = body; link != 0; link = model_->body_parentid[link])
+      way += Eigen::Map<const Vector3d>(model_->body_pos + 3 * link).norm();
+    farthest = std::max(farthest, way);
+  }
+  return farthest;
 }
 
 Pose Model::poseOf(int body) const {

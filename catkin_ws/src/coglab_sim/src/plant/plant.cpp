@@ -4,6 +4,7 @@
 #include <cmath>
 #include <sstream>
 #include <stdexcept>
+#include <utility>
 
 namespace coglab_sim::plant {
 namespace {
@@ -34,7 +35,14 @@ Plant::Plant(const PlantConfig& config)
   place_ = Place::PersonHand;
   placed_ = true;
   in_hand_.position = Vector3d(-0.08, 0.0, -0.05);
+  reach_ = model_->reach();
+  double finger = 0.0;
+  for (const Phalanx& phalanx : config.hand.phalanges) {
+    finger = (phalanx.first ? 0.0 : finger + phalanx.pivot.norm()) + phalanx.length;
+    finger_reach_ = std::max(finger_reach_, finger);
+  }
   setArm(config.home);
+  refuseOverlap(-1, "at the start");
 }
 
 void Plant::setArm(const Vector7& position, const Vector7& velocity) {
@@ -168,15 +176,16 @@ double Plant::blockDamping(int dof) const {
 /// Torque of the push and of the load that nobody knows of on the joints of the arm, Nm.
 Vector7 Plant::pushedTorque() const {
   const mjModel* m = model_->get();
+  const mjData* d = model_->data();
   Wrench outside = push_;
   outside.force.z() -= kGravity * config_.drives.unknown_load;
-  Eigen::Matrix<double, 3, Eigen::Dynamic, Eigen::RowMajor> linear(3, m->nv), angular(3, m->nv);
-  mj_jacBody(m, model_->data(), linear.data(), angular.data(), model_->palm_frame);
+  const Vector3d point = Eigen::Map<const Vector3d>(d->xpos + 3 * model_->palm_frame);
   Vector7 torque;
   for (std::size_t i = 0; i < 7; ++i) {
-    const int dof = model_->arm_velocity[i];
-    torque[static_cast<Eigen::Index>(i)] =
-        linear.col(dof).dot(outside.force) + angular.col(dof).dot(outside.torque);
+    const int joint = m->dof_jntid[model_->arm_velocity[i]];
+    const Vector3d arm = point - Eigen::Map<const Vector3d>(d->xanchor + 3 * joint);
+    torque[static_cast<Eigen::Index>(i)] = Eigen::Map<const Vector3d>(d->xaxis + 3 * joint)
+                                               .dot(arm.cross(outside.force) + outside.torque);
   }
   return torque;
 }
@@ -218,32 +227,56 @@ void Plant::readArm(const Vector7& before, double dt) {
   }
 }
 
-void Plant::check() const {
+/// The body of the arm or the hand that is faster than anything here can be; 0: none is.
+int Plant::tooFast() {
+  const mjModel* m = model_->get();
+  mjData* d = model_->data();
+  mj_step1(m, d);  // the velocities of bodies are those of the step before
+  const int arm = m->body_rootid[model_->palm];
+  for (int body = 1; body < m->nbody; ++body) {
+    if (m->body_rootid[body] != arm) continue;
+    mjtNum velocity[6];  // rotation before translation, of the centre of mass
+    mj_objectVelocity(m, d, mjOBJ_BODY, body, velocity, 0);
+    if (!(Eigen::Map<const Vector3d>(velocity + 3).norm() < kFastest)) return body;
+  }
+  return 0;
+}
+
+void Plant::check() {
   const mjModel* m = model_->get();
   const mjData* d = model_->data();
   const auto free = [&](int at) {
     return Eigen::Map<const Vector3d>(d->qvel + at).norm() < kFastest &&
            Eigen::Map<const Vector3d>(d->qvel + at + 3).norm() < kFastestSpin;
   };
-  const auto joint = [&](int at) { return std::abs(d->qvel[at]) < kFastestJoint; };
-  const bool arm = std::all_of(model_->arm_velocity.begin(), model_->arm_velocity.end(), joint);
-  const bool fingers =
-      std::all_of(model_->phalanx_velocity.begin(), model_->phalanx_velocity.end(), joint);
-  const bool numbers =
-      std::all_of(d->qpos, d->qpos + m->nq, [](double value) { return std::isfinite(value); });
-  bool warned = false;
+  double arm = 0.0, arm_fastest = 0.0, fingers = 0.0, fingers_fastest = 0.0;
+  for (const int dof : model_->arm_velocity) {
+    arm += std::abs(d->qvel[dof]);
+    arm_fastest = std::max(arm_fastest, std::abs(d->qvel[dof]));
+  }
+  for (const int dof : model_->phalanx_velocity) {
+    fingers += std::abs(d->qvel[dof]);
+    fingers_fastest = std::max(fingers_fastest, std::abs(d->qvel[dof]));
+  }
+  // No sum is finite with a number in it that is not.
+  const double all = Eigen::Map<const Eigen::VectorXd>(d->qpos, m->nq).sum();
+  bool warned = !std::isfinite(all) || !std::isfinite(arm + fingers);
   for (const int kind : {mjWARN_BADQPOS, mjWARN_BADQVEL, mjWARN_BADQACC})
     warned = warned || d->warning[kind].number > 0;
-  const char* what = warned || !numbers               ? "a value is no number"
-                     : !free(model_->object_velocity) ? "the object"
-                     : !free(model_->person_velocity) ? "the person's hand"
-                     : !arm                           ? "a joint of the arm"
-                     : !fingers                       ? "a joint of a finger"
-                                                      : nullptr;
-  if (what == nullptr) return;
+  std::string what = warned                             ? "a value is no number"
+                     : !free(model_->object_velocity)   ? "the object"
+                     : !free(model_->person_velocity)   ? "the person's hand"
+                     : !(arm_fastest < kFastestJoint)   ? "a joint of the arm"
+                     : !(fingers_fastest < kFastestJoint) ? "a joint of a finger"
+                                                        : "";
+  // Nothing is farther from any joint than these reaches, so that nothing is faster than this.
+  if (what.empty() && !(reach_ * arm + finger_reach_ * fingers < kFastest)) {
+    if (const int body = tooFast(); body != 0) what = mj_id2name(m, mjOBJ_BODY, body);
+  }
+  if (what.empty()) return;
   std::ostringstream text;
   text << "the simulation diverged at " << time_ << " s with seed " << config_.seed << ": " << what
-       << (warned || !numbers ? "" : " is faster than anything here can be (10 m/s, 100 rad/s)")
+       << (warned ? "" : " is faster than anything here can be (10 m/s, 100 rad/s)")
        << "; the same seed and inputs repeat it";
   throw std::runtime_error(text.str());
 }
@@ -274,8 +307,12 @@ Plant::Terms Plant::terms() const {
 }
 
 double Plant::energy() {
+  // Without the flag MuJoCo leaves the energy at 0; with it every step would compute it.
+  int& flags = model_->get()->opt.enableflags;
+  const int before = std::exchange(flags, flags | mjENBL_ENERGY);
   mj_energyPos(model_->get(), model_->data());
   mj_energyVel(model_->get(), model_->data());
+  flags = before;
   return model_->data()->energy[0] + model_->data()->energy[1];
 }
 

@@ -1,7 +1,6 @@
 /// Object, fingers and the person's hand of the plant.
 #include <algorithm>
 #include <cmath>
-#include <sstream>
 #include <stdexcept>
 
 #include "coglab_sim/plant/plant.hpp"
@@ -12,11 +11,12 @@ namespace {
 constexpr double kShareTime = 0.02;  // s over which load shares and the squeeze are averaged
 constexpr double kPersonAge = 0.05;  // s for which the hand goes on as it went after its message
 constexpr double kGripBegins = 0.05, kGripEnds = 0.02;
-constexpr double kSafeGrip = 1.5;  // friction over weight at which a hand that was given it holds
+// m by which an object may slide in the person's hand, beyond where the grip reaches, before it is
+// out of the fingers: about the length of a fingertip.
+constexpr double kSlidOut = 0.02;
 // What an arm follows: m that a person's hand lags at most behind where it is wanted, m/s and rad/s
 // of a person's fastest reach and turn. Messages may ask for more; no arm does it.
 constexpr double kLag = 0.15, kFastestReach = 5.0, kFastestTurn = 20.0;
-constexpr double kInside = 0.003;  // m by which a placed object may stand in something
 
 Vector3d clipped(const Vector3d& v, double largest) {
   const double norm = v.norm();
@@ -61,57 +61,45 @@ void Plant::put(int position, int velocity, const Pose& pose, const Twist& twist
   std::copy(spin.data(), spin.data() + 3, d->qvel + velocity + 3);
 }
 
+double Plant::handClosure() const {
+  const auto& phalanges = config_.hand.phalanges;
+  double sum = 0.0;
+  int joints = 0;
+  for (std::size_t i = 0; i < phalanges.size(); ++i) {
+    if (phalanges[i].finger == Finger::Thumb) continue;
+    const double angle = model_->data()->qpos[model_->phalanx_position[i]];
+    sum += (angle - phalanges[i].lower) / (phalanges[i].upper - phalanges[i].lower);
+    ++joints;
+  }
+  return joints > 0 ? sum / joints : 0.0;
+}
+
 void Plant::setPerson(const PersonInput& person) {
-  person_ = person;
-  person_.twist.linear = clipped(person.twist.linear, kFastestReach);
-  person_.twist.angular = clipped(person.twist.angular, kFastestTurn);
+  PersonInput wanted = person;
+  wanted.twist.linear = clipped(person.twist.linear, kFastestReach);
+  wanted.twist.angular = clipped(person.twist.angular, kFastestTurn);
+  if (!person_present_) appear(wanted);
+  person_ = wanted;
   person_age_ = 0.0;
-  if (person_present_) return;
+}
+
+/// The person's hand is there from now on, with what was put into it; or not, if it cannot be.
+void Plant::appear(const PersonInput& person) {
+  const State before = state();
+  put(model_->person_position, model_->person_velocity, person.hand, person.twist);
   person_present_ = true;
-  put(model_->person_position, model_->person_velocity, person_.hand, person_.twist);
   keepPlaced();
-  mj_step1(model_->get(), model_->data());
-}
-
-void Plant::place(Place place, const Pose& pose) {
-  place_ = place;
-  in_hand_ = pose;
-  placed_ = place != Place::World;
-  grip_.release();
-  on_board_ = on_floor_ = dropped_ = false;
-  robot_share_ = person_share_ = person_lift_ = squeeze_ = grasp_force_ = 0.0;
-  object_force_.setZero();
-  if (place == Place::World) put(model_->object_position, model_->object_velocity, pose, {});
-  keepPlaced();
-  mj_step1(model_->get(), model_->data());
-  refuseInside(place == Place::World ? "there" : "in that hand");
-}
-
-void Plant::refuseInside(const char* where) {
-  const mjModel* m = model_->get();
-  const mjData* d = model_->data();
-  for (int i = 0; i < d->ncon; ++i) {
-    const mjContact& contact = d->contact[i];
-    const int one = m->geom_bodyid[contact.geom1], two = m->geom_bodyid[contact.geom2];
-    if ((one != model_->object && two != model_->object) || contact.dist > -kInside) continue;
-    const int other = one == model_->object ? two : one;
-    // A hand that has closed already gives way; what it is put into must not be the palm itself.
-    if (std::find(model_->phalanges.begin(), model_->phalanges.end(), other) !=
-        model_->phalanges.end())
-      continue;
-    const int geom = one == model_->object ? contact.geom2 : contact.geom1;
-    const char* name =
-        other == 0 ? mj_id2name(m, mjOBJ_GEOM, geom) : mj_id2name(m, mjOBJ_BODY, other);
-    std::ostringstream text;
-    text << "object '" << config_.object.id << "' would stand " << -1e3 * contact.dist
-         << " mm inside " << (name != nullptr ? name : "something") << ' ' << where << ", at most "
-         << 1e3 * kInside << " mm are accepted; place it elsewhere";
-    throw std::invalid_argument(text.str());
+  try {
+    acceptOr(before, model_->person, "where it comes from");
+    if (placed_) acceptOr(before, model_->object, "in that hand");
+  } catch (const std::invalid_argument&) {
+    person_present_ = false;
+    throw;
   }
 }
 
-/// What was put into a hand stays there until that hand holds it; without a person their hand and
-/// what is in it stand still.
+/// Before the person has come, their hand and what is in it stand still; what fingers are just
+/// closing around stays in their palm.
 void Plant::keepPlaced() {
   if (!person_present_) put(model_->person_position, model_->person_velocity, person_.hand, {});
   if (!placed_) return;
@@ -125,21 +113,23 @@ void Plant::keepPlaced() {
       {twist.at(object.position - hand.position), twist.angular});
 }
 
-/// Whether the person's grip has the object: from where it was put, from where it finds it, or not
-/// any more.
-void Plant::updateGrip(const FreeBody& held, const Pose& hand, double friction) {
-  const Object& object = config_.object;
-  if (placed_ && place_ == Place::PersonHand) {
-    placed_ = friction < kSafeGrip * object.mass * kGravity;
-    if (!placed_) grip_.engageAt(in_hand_ * Pose{object.center, Quaterniond::Identity()});
-    return;
-  }
-  const bool near =
-      distanceFrom(object, this->object().inverse() * hand.position) < config_.person.reach;
-  if (!placed_ && !grip_.engaged() && person_.grip > kGripBegins && near) {
+/// Whether the person's grip has the object: from where it was put, from where the fingers find it,
+/// or not any more, since they have opened or it has slid out of them.
+void Plant::updateGrip(const FreeBody& held, const Pose& hand) {
+  const double away = distanceFrom(config_.object, object().inverse() * hand.position);
+  const bool open = person_.grip < kGripEnds, closed = person_.grip > kGripBegins;
+  if (placed_) {
+    placed_ = grip_lost_ = false;
+    grip_distance_ = away;
+    if (closed) grip_.engageAt(in_hand_ * Pose{config_.object.center, Quaterniond::Identity()});
+  } else if (grip_.engaged()) {
+    grip_lost_ = away > std::max(config_.person.reach, grip_distance_) + kSlidOut;
+    if (open || grip_lost_) grip_.release();
+  } else if (open) {
+    grip_lost_ = false;
+  } else if (closed && !grip_lost_ && away < config_.person.reach) {
+    grip_distance_ = away;
     grip_.engage(hand, held.center);
-  } else if (person_.grip < kGripEnds) {
-    grip_.release();
   }
 }
 
@@ -150,9 +140,7 @@ void Plant::applyPerson(double dt) {
   std::fill(on_hand, on_hand + 6, 0.0);
   std::fill(on_object, on_object + 6, 0.0);
   const Object& object = config_.object;
-  person_lift_ = 0.0;
-  if (placed_ && place_ == Place::RobotHand)
-    placed_ = object.friction * grasp_force_ < kSafeGrip * object.mass * kGravity;
+  grip_force_.setZero();
   if (!person_present_) {
     put(model_->person_position, model_->person_velocity, person_.hand, {});
     return;
@@ -170,13 +158,13 @@ void Plant::applyPerson(double dt) {
   arm_of_person_.engageAt(Pose{});  // an arm that was pushed aside comes back
 
   const double friction = 2.0 * object.friction * person_.grip * person_.grip_force;
-  updateGrip(held, hand_frame, friction);
+  updateGrip(held, hand_frame);
   if (grip_.engaged()) {
     const HoldFigures figures{config_.person.grip_bandwidth, friction,
                               friction * config_.person.grip_lever};
     const Wrench by_person = grip_.evaluate(hand_frame, twistOf(model_->person), held, figures,
                                             std::clamp(person_.grip, 0.0, 1.0));
-    person_lift_ = by_person.force.z();
+    grip_force_ = by_person.force;
     std::copy(by_person.force.data(), by_person.force.data() + 3, on_object);
     std::copy(by_person.torque.data(), by_person.torque.data() + 3, on_object + 3);
     hold.force -= by_person.force;
@@ -238,16 +226,22 @@ void Plant::readContacts(double dt) {
     value = keep * value + (1.0 - keep) * now;
   };
   average(robot_share_, std::clamp(pressing.on_object.z() / weight, 0.0, 1.0));
-  average(person_share_, std::clamp(person_lift_ / weight, 0.0, 1.0));
+  average(person_share_, std::clamp(grip_force_.z() / weight, 0.0, 1.0));
   average(squeeze_, opposed);
   average(grasp_force_, opposed > 0.0 ? pressing.fingers + pressing.opposing : 0.0);
+  // People know how their own hand moves: what that alone asks of the grip is not felt as a load.
+  Vector3d felt = Vector3d::Zero();
+  if (grip_.engaged())
+    felt = config_.object.mass * Eigen::Map<const Vector3d>(d->qacc + model_->person_velocity) -
+           grip_force_;
+  person_force_ = keep * person_force_ + (1.0 - keep) * felt;
 }
 
 std::string Plant::heldBy() const {
   const bool robot = robotHolds(),
              person = grip_.engaged() || (placed_ && place_ == Place::PersonHand);
   if (robot && person) return "both";
-  if (robot || (placed_ && place_ == Place::RobotHand)) return "robot";
+  if (robot) return "robot";
   if (person) return "human";
   if (on_board_) return "board";
   return on_floor_ ? "floor" : "none";

@@ -36,6 +36,8 @@ class Model {
 
   /// Pose of a body in the world as of the last forward computation.
   Pose poseOf(int body) const;
+  /// m that the middle of no link or phalanx can be away from any joint before it.
+  double reach() const;
 
  private:
   struct Free {

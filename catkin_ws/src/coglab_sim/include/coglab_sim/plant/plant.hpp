@@ -28,6 +28,10 @@ struct Drives {
   Vector7 rotor_inertia = (Vector7() << 3.0, 3.0, 2.0, 2.0, 0.8, 0.4, 0.4).finished();
   /// Nm; ours. The viscous part comes from the robot description.
   Vector7 coulomb_friction = (Vector7() << 0.4, 0.4, 0.25, 0.25, 0.2, 0.1, 0.1).finished();
+  /// Largest share by which each joint's Coulomb friction differs from that, drawn by the seed of
+  /// the cell; ours: friction of robot joints varies by tens of percent with temperature, load and
+  /// wear (Bittencourt and Gunnarsson 2012).
+  double friction_spread = 0.3;
   double coulomb_speed = 0.01;  ///< rad/s over which Coulomb friction reverses
   /// Nm of the brakes: twice the motors' limits (CentroEPiaggio, FloBaRoID, Gaz et al. 2014).
   Vector7 brake_torque = (Vector7() << 352, 352, 200, 200, 200, 76, 76).finished();
@@ -62,11 +66,15 @@ struct PersonInput {
   double grip_force = 20.0;  ///< N, normal force at full grip
 };
 
-/// Where the object can be put.
+/// Where the object can be put. From then on nothing but contacts and the person's grip moves it.
 enum class Place {
-  PersonHand,  ///< pose is that of the object in human_hand; follows the hand until its grip holds
-  RobotHand,   ///< pose is that of the object in ih2_palm; held there until the fingers hold it
-  World        ///< pose is that of the object in the world, let go at once
+  /// Pose is that of the object in human_hand. The person's grip begins there, with the force that
+  /// it has; before their hand has moved for the first time, hand and object stand still.
+  PersonHand,
+  /// Pose is that of the object in ih2_palm. A start state: the open hand closes around it while it
+  /// is kept there and the arm stands, then lets it hang in the fingers.
+  RobotHand,
+  World  ///< pose is that of the object in the world, let go at once
 };
 
 /// Forces of the surroundings on the hand, N, axes of ih2_palm.
@@ -77,7 +85,8 @@ struct Touch {
 
 class Plant {
  public:
-  /// @throws std::invalid_argument or std::runtime_error with a sentence on what does not fit.
+  /// @throws std::invalid_argument or std::runtime_error with a sentence on what does not fit, or
+  /// on which two bodies would stand in each other by more than 3 mm.
   explicit Plant(const PlantConfig& config);
 
   /// Advances by `dt` s, at most kStep, under the motors' torques (Nm at the joints).
@@ -85,13 +94,16 @@ class Plant {
   void step(const Vector7& motor_torque, double dt = kStep);
 
   // Inputs, valid until changed
+  /// @throws std::invalid_argument if the hand is seen for the first time and stands inside
+  /// something by more than 3 mm; it is then not there.
   void setPerson(const PersonInput& person);
   void setPush(const Wrench& push) { push_ = push; }  ///< on ih2_palm about its origin
   void setBrakes(bool on);                            ///< motors without torque, brakes closed
   void setBlock(bool on);                             ///< somebody holds all joints where they are
   HandMotors& motors() { return motors_; }
   const HandMotors& motors() const { return motors_; }
-  /// @throws std::invalid_argument if the object would stand inside something by more than 3 mm.
+  /// @throws std::invalid_argument if the object would stand inside something by more than 3 mm, or
+  /// the robot's fingers would not hold it where it is to be in their hand; nothing has changed then.
   void place(Place place, const Pose& pose);
   /// Exchanges the object; it is then to be placed. The robot stays as it is.
   void setObject(const Object& object);
@@ -126,8 +138,14 @@ class Plant {
   Pose object() const { return model_->poseOf(model_->object); }
   Twist objectTwist() const { return twistOf(model_->object); }
   Pose personHand() const { return model_->poseOf(model_->person); }
+  /// How far the fingers but the thumb are bent, 0 open .. 1: the angles of their joints, each as
+  /// share of its range, on average.
+  double handClosure() const;
   const Touch& touch() const { return touch_; }
   const Vector3d& objectForce() const { return object_force_; }  ///< N, of it on the robot's hand
+  /// N, of the object on the person's hand, world axes: what their grip carries, less what the
+  /// acceleration of their own hand asks for; zero without a grip. A mean over 20 ms.
+  const Vector3d& personForce() const { return person_force_; }
   double robotShare() const { return robot_share_; }             ///< of the weight, 0..1
   double personShare() const { return person_share_; }
   std::string heldBy() const;  ///< robot, human, both, board, floor, none
@@ -150,6 +168,11 @@ class Plant {
     double fingers = 0.0, opposing = 0.0;   ///< N, normal; opposing: thumb and palm
   };
 
+  /// Positions and velocities of everything.
+  struct State {
+    std::vector<mjtNum> position, velocity;
+  };
+
   Twist twistOf(int body) const;
   void feel(int body, int other, const Vector3d& force, double normal, Pressing& pressing);
   FreeBody freeBody(int body, int velocity) const;
@@ -157,14 +180,23 @@ class Plant {
   void keepPlaced();
   void applyArm(const Vector7& motor_torque);
   void applyPerson(double dt);
-  void updateGrip(const FreeBody& held, const Pose& hand, double friction);
+  void updateGrip(const FreeBody& held, const Pose& hand);
   void applyMotors(double dt);
   void readContacts(double dt);
   void readArm(const Vector7& before, double dt);
   Vector7 pushedTorque() const;
   double blockDamping(int dof) const;
-  void refuseInside(const char* where);
-  void check() const;
+  void appear(const PersonInput& person);
+  State state() const;
+  void acceptOr(const State& before, int body, const char* where);
+  void forget();
+  void placeInRobotHand(const Pose& in_palm);
+  void closeAround(const Pose& in_palm);
+  void refuseOverlap(int body, const char* where) const;
+  bool excludeEachOther(int one, int two) const;
+  std::string nameOf(int geom) const;
+  void check();
+  int tooFast();
 
   PlantConfig config_;
   std::unique_ptr<Model> model_;
@@ -173,6 +205,8 @@ class Plant {
   bool person_present_ = false;
   double person_age_ = 0.0;  // s since its last message
   HoldSpring arm_of_person_, grip_;
+  double grip_distance_ = 0.0;  // m, hand to the object's surface when the grip began
+  bool grip_lost_ = false;      // the object slid out; the fingers have to open first
   Wrench push_;
   bool brakes_ = false, locked_ = false, blocked_ = false;
   bool was_stiff_ = false;  // brakes or block in the step before
@@ -181,15 +215,17 @@ class Plant {
   Vector7 joint_torque_ = Vector7::Zero(), external_torque_ = Vector7::Zero(),
           acceleration_ = Vector7::Zero();
   Place place_ = Place::World;
-  bool placed_ = false;  // held where it was put until a hand holds it
+  bool placed_ = false;  // kept where it was put: the person has not come yet, or fingers close
   Pose in_hand_;         // where it was put
   Touch touch_;
   Vector3d object_force_ = Vector3d::Zero();
-  double robot_share_ = 0.0, person_share_ = 0.0, person_lift_ = 0.0;
+  double robot_share_ = 0.0, person_share_ = 0.0;
+  Vector3d grip_force_ = Vector3d::Zero(), person_force_ = Vector3d::Zero();
   double squeeze_ = 0.0, grasp_force_ = 0.0;  // N, averaged
   bool on_board_ = false, on_floor_ = false, dropped_ = false;
   int contacts_ = 0;
   double time_ = 0.0;
+  double reach_ = 0.0, finger_reach_ = 0.0;  // m, of anything from a joint of the arm, of a finger
 };
 
 /// Distance of a point of the object's frame from its surface, m, negative inside.

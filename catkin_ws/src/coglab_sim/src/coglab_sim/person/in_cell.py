@@ -5,7 +5,7 @@ This is all that person and physics know of each other.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -13,38 +13,20 @@ from coglab_py.pose import Pose
 
 from coglab_sim.person.scene import HandSample, WorldView
 
-GRAVITY = 9.81
-STROKE = 254.0
-"""position of a motor of the robot's hand that is fully closed"""
-
 
 def pose_of_truth(pose: Mapping[str, Any]) -> Pose:
     """A pose of the cell's truth."""
     return Pose(np.asarray(pose["position"]), np.asarray(pose["rotation"]))
 
 
-def closure(motors: Sequence[float]) -> float:
-    """How far index, middle and the outer fingers are seen to be bent, 0 open .. 1, of the five motors' positions."""
-    return float(np.mean(motors[2:5])) / STROKE
-
-
-def load_on_hand(in_hand: bool, palm_force: Sequence[float], mass: float) -> np.ndarray:
-    """N, world axes: weight of what the person holds, and what the robot's hand does to it.
-
-    ``palm_force``: of the object on the robot's hand. What the object does to one hand and to the other and its weight
-    add up to nothing where it is not thrown about.
-    """
-    return -np.asarray(palm_force, dtype=float) - [0.0, 0.0, mass * GRAVITY] if in_hand else np.zeros(3)
-
-
-def view_of(truth: Mapping[str, Any], fingers: float, mass: float) -> WorldView:
-    """What there is to be seen and felt in the cell's truth; ``fingers`` of the robot 0..1, ``mass`` of the object."""
-    in_hand = truth["held_by"] in ("human", "both")
+def view_of(truth: Mapping[str, Any]) -> WorldView:
+    """What there is to be seen and felt in the cell's truth. What is felt of the object is the force that the person's
+    own grip carries, whoever else holds it."""
     return WorldView(
         pose_of_truth(truth["robot_hand"]),
-        fingers,
+        float(truth["hand_closure"]),
         pose_of_truth(truth["object"]),
-        load_on_hand(in_hand, truth["palm_force"], mass),
+        np.asarray(truth["human_force"]),
     )
 
 

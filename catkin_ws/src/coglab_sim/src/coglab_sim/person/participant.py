@@ -26,9 +26,9 @@ BEHAVIOURS = (
     "early_contact",
 )
 
-PROFILES = ("drawn", "patient")
-"""drawn: a person as people are; patient: trusts after 1.0 s of rest, holds upright, stays inside the box, and has
-the habits of HABITS."""
+PROFILES = ("drawn", "patient", "accustomed")
+"""drawn: a person as people are; patient: the same person, who trusts after 1.0 s of rest, holds upright and stays
+inside the box; accustomed: a patient one as all were in the first versions of this cell, with the habits of HABITS."""
 
 HABITS: Mapping[str, Any] = {
     "presses_again": 4,
@@ -37,7 +37,7 @@ HABITS: Mapping[str, Any] = {
     "aligns_within": 0.010,
     "relaxes": True,
 }
-"""What a giver may do to make a handover easier for the robot: nobody drawn has it, `patient` has all of it."""
+"""What a giver may do to make a handover easier for the robot: only `accustomed` people do it."""
 
 
 @dataclass(frozen=True)
@@ -129,8 +129,8 @@ class Participant:
         """The person with this seed. ValueError for an unknown profile."""
         if profile not in PROFILES:
             raise ValueError(f"profile '{profile}' is none of {', '.join(PROFILES)}")
-        drawn = _drawn(seed, behaviour)
-        return drawn if profile == "drawn" else _patient(drawn)
+        person = _drawn(seed, behaviour)
+        return person if profile == "drawn" else _patient(person) if profile == "patient" else _accustomed(person)
 
     @staticmethod
     def from_mapping(data: Mapping[str, Any]) -> Participant:
@@ -194,16 +194,18 @@ def _drawn(seed: int, behaviour: str) -> Participant:
 
 
 def _patient(person: Participant) -> Participant:
-    """The same person, as considerate toward the robot as all were in the first versions of this cell."""
+    """The same person: trusts after 1.0 s, holds upright, stays inside the box; all else as it was drawn."""
+    return replace(person, trust=1.0, places_while_moving=False, tilt=0.0, inside_box=True)
+
+
+def _accustomed(person: Participant) -> Participant:
+    """The same person, as considerate toward the robot as all were in the first versions of this cell: patient, with
+    habits, right-handed, always nearly in the same place."""
     x, y, z = person.point_offset
     return replace(
-        person,
+        _patient(person),
         left_handed=False,
-        trust=1.0,
-        places_while_moving=False,
-        tilt=0.0,
         point_offset=(0.4 * x, 0.5 * y, 0.45 * z),
-        inside_box=True,
         patience=12.0,
         **HABITS,
     )

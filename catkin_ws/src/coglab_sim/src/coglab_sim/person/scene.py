@@ -18,7 +18,7 @@ FROM_HAND = 0.04
 HANDOVER = np.array([0.78, 0.03, 0.44])
 """m, nominal place of the object's middle at a handover"""
 BOX = np.array([[0.72, -0.12, 0.34], [0.81, 0.16, 0.51]])
-"""m, within which a person of the profile patient hands over: opposite corners for the object's middle"""
+"""m, within which people of the profiles patient and accustomed hand over: opposite corners for the object's middle"""
 
 
 def shipped(object_id: str) -> dict[str, Any]:
@@ -84,7 +84,7 @@ class WorldView:
 
     robot_hand: Pose = field(default_factory=Pose)
     hand_closure: float = 0.0
-    """of the robot's fingers, 0 open .. 1 closed"""
+    """of the robot's fingers as their joints are bent, 0 open .. 1 closed"""
     object: Pose = field(default_factory=Pose)
     load: np.ndarray = field(default_factory=lambda: np.zeros(3))
     """N, force of the held object on the person's hand, world axes"""

@@ -5,6 +5,7 @@ Nothing else reaches the simulated person but what is said to them.
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from dataclasses import dataclass, field
 from typing import Generic, TypeVar
@@ -22,6 +23,11 @@ SPEED_TIME = 0.05
 """s over which a speed is seen"""
 SLOWEST = 0.005
 """m/s, standard deviation of a seen speed beside its share"""
+FINGERTIP_WAY = 0.19
+"""m that a fingertip goes from open to closed (middle finger of coglab_sim/config/hand_model.yaml): what is seen of the
+fingers is seen of their tips"""
+FINGERS = 4
+"""whose tips are seen, each by itself: the mean of all is more exact than one"""
 
 Value = TypeVar("Value")
 
@@ -79,6 +85,8 @@ class Senses:
         turn = np.radians(person.seen_turn)
         sigma = np.array([person.seen_noise] * 3 + [turn] * 3)
         self._noises = SlowNoise(rng, sigma), SlowNoise(rng, sigma)
+        self._of_tips = 1.0 / (FINGERTIP_WAY * math.sqrt(FINGERS))
+        self._bend_noise = SlowNoise(rng, np.array([person.seen_noise * self._of_tips]))
         self._eyes: Delayed[tuple[WorldView, float, float]] = Delayed(person.seeing_delay)
         self._touch: Delayed[np.ndarray] = Delayed(person.feeling_delay)
         self._before: deque[tuple[float, np.ndarray, float]] = deque()
@@ -95,8 +103,8 @@ class Senses:
         return Percept(
             _moved(seen.robot_hand, hand),
             max(0.0, speed * self._misjudged + SLOWEST * float(self._rng.normal())),
-            seen.hand_closure,
-            closing,
+            seen.hand_closure + float(self._bend_noise.step(dt)[0]),
+            closing * self._misjudged + SLOWEST * self._of_tips * float(self._rng.normal()),
             _moved(seen.object, thing),
             self._feel(self._touch.step(t, np.asarray(view.load, dtype=float))),
         )

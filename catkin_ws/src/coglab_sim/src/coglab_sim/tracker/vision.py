@@ -70,6 +70,7 @@ class PartnerChoice:
 class Vision:
     """What the perception stand-in sees. Thread-safe.
 
+    `board`: as it is. It stands still and is seen once, as far off as everything that the tracker sees.
     `clock` gives the time of the stamps (s); `steady` that of arrivals, which runs on when the
     other stands still.
     """
@@ -84,7 +85,8 @@ class Vision:
         partner_margin: float = 0.0,
         steady: Callable[[], float] = time.monotonic,
     ) -> None:
-        self.names, self.settings, self.board, self.seed = names, settings, board, seed
+        self.names, self.settings, self.seed = names, settings, seed
+        self.board = Board(settings.calibration(seed) * board.frame, board.slots)
         self.clock, self.steady = clock, steady
         self.choice = PartnerChoice(partner_margin)
         self.people = 0

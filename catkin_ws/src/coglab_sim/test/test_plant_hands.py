@@ -1,0 +1,186 @@
+"""What the robot's and the person's hand hold in the plant, and what not: contact and friction, a limited grip."""
+
+import numpy as np
+import pytest
+from coglab_sim import _plant
+from grasp_trial import BOX, DIRECTIONS, HOME, STEP, URDF, G, GraspTrial, objects, rotated, run
+
+
+@pytest.mark.parametrize("name", ["mug", "ball", "tea_box"])
+def test_a_grasp_holds_under_shaking_and_lets_go(name):
+    trial = GraspTrial(objects()[name], "index up")
+    outcome = trial.run()
+    assert not outcome.lost and outcome.slip <= 0.003 and outcome.released <= 0.3
+    assert trial.plant.state()["person_share"] == 0.0
+
+
+def test_a_grasp_without_friction_is_lost():
+    """The fingers close around a bottle that friction holds, and then it has none."""
+    bottle = objects()["bottle"]
+    with pytest.raises(ValueError, match="object 'bottle' cannot be placed in the robot's hand there"):
+        GraspTrial({**bottle, "friction": 0.02}, "index up")
+    trial = GraspTrial(bottle, "index up")
+    trial.close()
+    trial.plant.set_object({**bottle, "friction": 0.02})
+    slip, _, lost = trial.shake(seconds=0.5)
+    assert lost or slip > 0.02
+
+
+def test_relaxed_fingers_give_way():
+    """A finger that no tendon pulls is moved by a touch and comes back by its spring."""
+    trial = GraspTrial(objects()["ball"], "palm down", grasped=False)  # the hand never closes
+    trial.plant.place("world", *trial.before_palm())
+    middle, _ = trial.in_palm()
+    trial.plant.hold(HOME, steps=400)
+    assert trial.plant.state()["held_by"] == "none"
+    assert np.linalg.norm(trial.in_palm()[0] - middle) > 0.1, "nothing but its placing held the ball"
+
+
+def test_in_the_robots_hand_nothing_but_contact_holds():
+    """From the moment on at which it is placed: the same plant whose fingers then open lets it go."""
+    trial = GraspTrial(objects()["mug"], "palm down")
+    assert trial.plant.state()["held_by"] == "robot"
+    held, _ = trial.in_palm()
+    trial.plant.hold(HOME, steps=1000)
+    assert np.linalg.norm(trial.in_palm()[0] - held) < 0.003
+    assert trial.open() <= 0.3
+    trial.plant.hold(HOME, steps=300)
+    assert np.linalg.norm(trial.in_palm()[0] - held) > 0.1
+
+
+@pytest.mark.parametrize("place", [[0.04, 0.30, 0.0], [0.25, 0.0, 0.05], [-0.12, 0.0, 0.05]])
+def test_out_of_the_fingers_reach_nothing_is_placed_in_the_robots_hand(place):
+    """Beside the hand, before it, behind it."""
+    plant = _plant.Plant(URDF, HOME, objects()["mug"], board=False)
+    before = plant.bytes()
+    with pytest.raises(ValueError, match="object 'mug' cannot be placed in the robot's hand there: closed around it,"):
+        plant.place("robot_hand", place, [-0.5, -0.5, -0.5, 0.5])
+    assert plant.bytes() == before, "nothing has changed"
+
+
+def test_motors_stop_at_contact_and_lock():
+    trial = GraspTrial(objects()["mug"], "index up")
+    trial.close()
+    motors = trial.plant.motors()
+    for motor, limit in zip(motors[1:], (90.0, 90.0, 90.0, 180.0), strict=True):
+        assert motor["locked"] and motor["current"] == 0.0 and 0.1 < motor["position"] < 0.9
+        # 240 counts are half of the limit; a gear that holds is pulled further by the fingers that close after it.
+        assert 0.7 * 0.5 * limit < motor["tension"] < 1.25 * 0.5 * limit
+    alone = GraspTrial(objects()["mug"], "index up", grasped=False)
+    where, turn = alone.before_palm()
+    alone.plant.place("human_hand", [-0.08, 0.0, -0.05], turn)  # somebody holds it against the finger
+    alone.plant.set_person(where + [0.08, 0.0, 0.05], grip=1.0, grip_force=40.0)
+    alone.plant.command_motor(2, 1.0, 1.0, 240.0)
+    alone.plant.hold(HOME, steps=1600)
+    index = alone.plant.motors()[2]
+    assert index["locked"] and 0.9 * 0.5 * 90.0 < index["tension"] <= 0.5 * 90.0  # the object gives way a little
+    empty = _plant.Plant(URDF, HOME, BOX)
+    for motor in range(1, 5):
+        empty.command_motor(motor, 1.0)
+    empty.hold(HOME, steps=1600)
+    assert all(motor["position"] > 0.999 and motor["current"] == 0.0 for motor in empty.motors()[1:])
+
+
+def test_touch_is_where_the_object_is():
+    trial = GraspTrial(objects()["mug"], "palm up")
+    trial.close()
+    touch = trial.plant.touch()
+    assert touch["palm"][0] < -5.0  # the object presses into the palm
+    for finger in ("index", "middle", "ring", "little"):
+        assert touch[f"{finger}_distal"][0] > 1.0  # fingers are pushed away from it
+    assert touch["thumb_distal"][2] < -1.0
+    # Everything that touches the object is the robot's: the forces carry its weight.
+    total = sum(np.asarray(force) for force in touch.values())
+    assert np.linalg.norm(total) == pytest.approx(objects()["mug"]["mass"] * G, rel=0.05)
+
+
+def test_a_person_carries_and_gives_way_beyond_their_grip():
+    plant = _plant.Plant(URDF, HOME, objects()["mug"])
+    plant.place("human_hand", [-0.08, 0.0, -0.05])
+    hand = np.array([0.9, 0.3, 0.5])
+    for _ in range(600):
+        plant.set_person(hand, grip=1.0)
+        plant.hold(HOME)
+    state = plant.state()
+    assert state["held_by"] == "human" and state["person_share"] == pytest.approx(1.0, abs=0.02)
+    assert np.linalg.norm(state["object"][0] - hand - [-0.08, 0.0, -0.05]) < 0.01
+    for _ in range(600):
+        plant.set_person(hand, grip=0.0)
+        plant.hold(HOME)
+    assert plant.state()["held_by"] in ("none", "floor") and plant.state()["object"][0][2] < 0.0
+
+
+WEIGHT = 0.31 * G
+
+
+def carried(grip_force, weight, seconds=1.5):
+    """A mug of ``weight`` N in a person's hand: the state after so long, or when it has fallen."""
+    plant = _plant.Plant(URDF, HOME, {**objects()["mug"], "mass": weight / G}, board=False)
+    plant.set_brakes(True)
+    plant.place("human_hand", [-0.08, 0.0, -0.05])
+    for _ in range(int(seconds / STEP / 10)):
+        plant.set_person([0.9, 0.3, 0.9], grip=1.0, grip_force=grip_force)
+        state = run(plant, 0.01)
+        if state["object"][0][2] < 0.0:
+            break
+    return state
+
+
+@pytest.mark.parametrize("grip_force", [1.0, 4.0, 10.0, 20.0])
+def test_a_persons_hold_lets_go_of_what_grip_and_friction_do_not_carry(grip_force):
+    """Two sides press: 2 mu F. Below the weight too, and it is gone for good: a closed hand does not find it again."""
+    limit = 2.0 * objects()["mug"]["friction"] * grip_force
+    held = carried(grip_force, 0.9 * limit)
+    assert held["held_by"] == "human" and held["object"][0][2] > 0.7
+    assert held["person_force"] == pytest.approx([0.0, 0.0, -0.9 * limit], abs=0.05)
+    lost = carried(grip_force, 1.2 * limit)
+    assert lost["held_by"] in ("none", "floor") and lost["object"][0][2] < 0.5
+    assert lost["person_force"] == pytest.approx(np.zeros(3), abs=0.05 * limit)
+
+
+def test_the_hand_feels_what_its_own_grip_carries():
+    """The whole weight; nothing of a mug that lies on the floor; together with the robot its own part."""
+    assert carried(20.0, WEIGHT)["person_force"] == pytest.approx([0.0, 0.0, -WEIGHT], abs=0.01)
+    trial = GraspTrial(objects()["mug"], "index up")
+    plant, hand = trial.plant, trial.plant.state()["object"][0] + [0.08, 0.0, 0.05]
+    for step in range(1600):
+        plant.set_person(hand + [0.0, 0.0, 0.004 if step > 800 else 0.0], grip=1.0)
+        plant.hold(HOME)
+    state = plant.state()
+    assert -0.9 * WEIGHT < state["person_force"][2] < -0.2 * WEIGHT
+    weight = 0.31 * 9.81 * rotated(plant.state()["palm"][1], np.array(DIRECTIONS["index up"], dtype=float))
+    assert state["person_force"] + state["object_force"] == pytest.approx(weight, abs=0.05)
+
+
+def test_a_hand_does_not_feel_its_own_motion_as_a_load():
+    """Swung by 2 m/s^2 at 0.5 Hz; what the acceleration alone asks of the grip would be 0.6 N."""
+    plant = _plant.Plant(URDF, HOME, objects()["mug"], board=False)
+    plant.set_brakes(True)
+    plant.place("human_hand", [-0.08, 0.0, -0.05])
+    rate, felt = np.pi, []
+    for step in range(3000):
+        t = STEP * step
+        if step % 10 == 0:
+            at, speed = 2.0 / rate**2 * np.cos(rate * t), -2.0 / rate * np.sin(rate * t)
+            plant.set_person([0.9, 0.3 + at, 0.9], velocity=[0.0, speed, 0.0], grip=1.0)
+        run(plant, STEP)
+        felt.append(plant.state()["person_force"])
+    assert np.abs(np.array(felt[1000:]) - [0.0, 0.0, -WEIGHT]).max() < 0.15
+
+
+def test_a_person_who_takes_carries_what_they_lift():
+    """A grip on what the robot holds takes no load by itself; the hand has to rise."""
+    trial = GraspTrial(objects()["mug"], "index up")
+    trial.close()
+    plant = trial.plant
+    gravity = 9.81 * rotated(plant.state()["palm"][1], np.array(DIRECTIONS["index up"], dtype=float))
+    assert np.allclose(gravity, [0.0, 0.0, -G], atol=0.5)
+    hand = plant.state()["object"][0] + [0.08, 0.0, 0.05]
+    shares = []
+    for lift in (0.0, 0.006):
+        for _ in range(800):
+            plant.set_person(hand + [0.0, 0.0, lift], grip=1.0)
+            plant.hold(HOME)
+        assert plant.state()["held_by"] == "both"
+        shares.append(plant.state()["person_share"])
+    assert shares[0] < 0.15 and shares[1] > 0.6
