@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 import os
+import shutil
 import signal
 import socket
 import subprocess
@@ -13,6 +15,7 @@ from pathlib import Path
 
 import rospkg
 import rospy
+import tf2_ros
 from coglab_console.browser import Browser, press_and_hold
 from coglab_msgs.msg import LwrState, MasterState
 from coglab_msgs.srv import LwrCommand
@@ -22,6 +25,11 @@ from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
 
 READY = 120.0  # s until the hub
+ANSWERED = """
+const rows = coglab.events().filter((e) => e.seq > arguments[0] && e.source === 'stop').map((e) => e.text);
+const answers = rows.filter((text) => text.startsWith('STOP, ') || text.includes('cannot be asked')).length;
+return rows.filter((text) => text.startsWith('STOP by')).length === 2 && answers === 4;
+"""  # the page sends each press by its connection and by a request, the console each to the arm and to the brain
 
 
 def free_port() -> int:
@@ -34,7 +42,7 @@ def free_port() -> int:
 class Cell:
     """The launched system; `launch_console` and `end_console` for a console beside it."""
 
-    def __init__(self, console: bool) -> None:
+    def __init__(self, console: bool, hosts: str = "") -> None:
         self.home = Path(tempfile.mkdtemp(prefix="coglab-bench-"))
         port = free_port()
         os.environ.update(
@@ -44,7 +52,7 @@ class Cell:
             ROS_LOG_DIR=str(self.home / "log"),
             PYTHONUNBUFFERED="1",
         )
-        words = ["fri_period:=0.010", f"console:={str(console).lower()}", "console_port:=0"]
+        words = ["fri_period:=0.010", f"console:={str(console).lower()}", "console_port:=0", f"console_hosts:={hosts}"]
         launch = Path(rospkg.RosPack().get_path("coglab_bringup"), "launch", "coglab.launch")
         self._log = (self.home / "roslaunch.log").open("w")
         command = ["roslaunch", "-p", str(port), str(launch), *words]
@@ -63,6 +71,8 @@ class Cell:
         while not rosgraph.is_master_online() and time.monotonic() < end:
             time.sleep(0.2)
         rospy.init_node("console_bench", disable_signals=True)
+        self.frames = tf2_ros.Buffer()
+        self._listener = tf2_ros.TransformListener(self.frames)
         rospy.Subscriber("/coglab/state", MasterState, lambda message: setattr(self, "machine", message))
         rospy.Subscriber("/lwr/state", LwrState, self._on_arm, tcp_nodelay=True)
         rospy.Subscriber("/diagnostics", DiagnosticArray, self._on_diagnostics)
@@ -98,7 +108,7 @@ class Cell:
     def reset_arm(self) -> None:
         """Frees the arm's own latch; the machine stays where it is."""
         rospy.ServiceProxy("/lwr/command", LwrCommand)("reset")
-        self.wait(lambda: not self.arm.hold_latched, 3.0, "the end of the hold")
+        self.wait(lambda: not self.arm.hold_latched, 10.0, "the end of the hold")
 
     def launch_console(self) -> None:
         """A console beside the cell."""
@@ -115,10 +125,13 @@ class Cell:
 
     def close(self) -> None:
         """Ends everything."""
-        self.end_console()
-        self._process.send_signal(signal.SIGINT)
-        self._process.wait(60)
-        self._log.close()
+        try:
+            self.end_console()
+        finally:
+            self._process.send_signal(signal.SIGINT)
+            self._process.wait(60)
+            self._log.close()
+            shutil.rmtree(self.home, ignore_errors=True)
 
 
 class Operator:
@@ -126,6 +139,7 @@ class Operator:
 
     def __init__(self, browser: Browser, cell: Cell, pictures: Path) -> None:
         self.browser, self.cell, self.pictures = browser, cell, pictures
+        self.touches = False  # as on a tablet
 
     def button(self, action: str):
         """The element."""
@@ -146,12 +160,37 @@ class Operator:
             number = self.button(action).text.split()[0]
             self.browser.js("document.activeElement.blur()")
             ActionChains(self.browser.driver).send_keys(number).send_keys(Keys.ENTER).perform()
+        elif self.touches:
+            self.browser.touch(f"[data-action={action}]")
         else:
             self.button(action).click()
 
     def stop(self) -> None:
         """Space."""
         ActionChains(self.browser.driver).send_keys(Keys.SPACE).perform()
+
+    def answered(self, since: int) -> None:
+        """Waits until every way of the one STOP after event number `since` has its answer: one that is late would hold
+        the arm again after a reset, and would pass for the next press."""
+        self.browser.until(ANSWERED, 15.0, since)
+
+    def newest_event(self) -> int:
+        """Its number."""
+        return self.browser.js("return coglab.events().at(-1)?.seq ?? 0")
+
+    def take_control(self) -> None:
+        """Another browser may hold the control; it is gone."""
+        operating = "return document.getElementById('role').innerText.startsWith('you operate')"
+        if not self.browser.js(operating):
+            self.browser.js("document.querySelector('#control button').click()")
+        self.browser.until(operating, 15.0)
+
+    def distance_to_tf(self) -> float:
+        """From the hand in the picture to the hand in tf, m; the arm stands."""
+        self.browser.until("return coglab.state().speed < 0.001", 20.0)
+        place = self.cell.frames.lookup_transform("world", "ih2_palm", rospy.Time(0), rospy.Duration(5.0))
+        there = place.transform.translation
+        return math.dist(self.browser.js("return coglab.palm()"), (there.x, there.y, there.z))
 
     def do(self, action: str, keyboard: bool, name: str) -> bool:
         """One action from hub to hub; whether it succeeded."""
@@ -167,7 +206,12 @@ class Operator:
         """Acknowledge, then hold the button of reset, and wait for the hub."""
         self.cell.wait(lambda: self.cell.leaf == "stopped", 15.0, "stopped")
         self.browser.until("return document.getElementById('acknowledge').offsetParent !== null", 5.0)
-        self.browser.driver.find_element(By.ID, "acknowledge").click()
-        self.enabled("reset")
-        press_and_hold(self.browser, self.button("reset"), lambda: self.cell.leaf != "stopped", 8.0)
+        if self.touches:
+            self.browser.touch("#acknowledge")
+            self.enabled("reset")
+            self.browser.touch("[data-action=reset]", lambda: self.cell.leaf != "stopped", 8.0)
+        else:
+            self.browser.driver.find_element(By.ID, "acknowledge").click()
+            self.enabled("reset")
+            press_and_hold(self.browser, self.button("reset"), lambda: self.cell.leaf != "stopped", 8.0)
         self.cell.wait(lambda: self.cell.machine.in_hub and self.cell.leaf.startswith("wait_"), 60.0, "the hub")

@@ -21,13 +21,12 @@ import smach
 import smach_ros
 import tf2_ros
 from coglab_console.browser import Browser, fresh_link, press_and_hold
+from coglab_console.page_check import PAGES, look
 from coglab_msgs.msg import LwrState, MasterState
 from selenium.webdriver.common.action_chains import ActionChains
 from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
 
-PAGES = ("Live", "Experiment", "Contact", "Objects", "Primitives", "Feedback", "Events", "Health", "Help")
-LOOK_AT_PAGE = (Path(__file__).with_name("look_at_page.js")).read_text()
 KNOWN = ("WebGL", "GPU stall", "willReadFrequently")  # of chromium about its own drawing
 
 
@@ -93,10 +92,10 @@ class Console(unittest.TestCase):
             with self.subTest(page=page):
                 self.browser.tab(page)
                 time.sleep(0.4)
-                found = self.browser.js(LOOK_AT_PAGE)
+                problems, texts = look(self.browser)
                 self.browser.picture(self.pictures / f"{page.lower()}.png")
-                self.assertEqual(found["problems"], [], json.dumps(found["problems"], indent=1))
-                self.assertGreater(found["texts"], 10)
+                self.assertEqual(problems, [], json.dumps(problems, indent=1))
+                self.assertGreater(texts, 10)
         self.browser.tab("Live")
         self.assertEqual(self.browser.js("return document.getElementById('band').className"), "simulation")
 
@@ -295,7 +294,7 @@ class Console(unittest.TestCase):
             )
             other.until("return document.getElementById('status').innerText.includes('mug in the hand')", 20.0)
             other.picture(self.pictures / "flat.png")
-            self.assertEqual(other.js(LOOK_AT_PAGE)["problems"], [])
+            self.assertEqual(look(other)[0], [])
             place = self.frames.lookup_transform("world", "ih2_palm", rospy.Time(0)).transform.translation
             self.assertLess(
                 np.linalg.norm(np.array(other.js("return coglab.palm()")) - [place.x, place.y, place.z]), 0.002
