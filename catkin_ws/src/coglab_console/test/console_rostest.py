@@ -26,6 +26,7 @@ from coglab_msgs.msg import LwrState, MasterState
 from selenium.webdriver.common.action_chains import ActionChains
 from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
+from std_msgs.msg import String
 
 KNOWN = ("WebGL", "GPU stall", "willReadFrequently")  # of chromium about its own drawing
 
@@ -271,6 +272,35 @@ class Console(unittest.TestCase):
             server.stop()
         self.assertEqual({node["label"] for node in picture["nodes"]}, {"ALPHA", "BETA"})
         self.assertEqual([edge["outcomes"] for edge in picture["edges"]], ["on"])
+
+    def test_08b_notes_and_the_next_object_go_both_ways(self):
+        heard = {"note": [], "next_object": []}
+        for name, rows in heard.items():
+            rospy.Subscriber(f"/coglab/{name}", String, rows.append)
+        teller = {name: rospy.Publisher(f"/coglab/{name}", String, queue_size=5) for name in heard}
+        end = time.monotonic() + 10.0
+        while not all(one.get_num_connections() > 1 for one in teller.values()):  # this test and the console
+            self.assertLess(time.monotonic(), end, "the console does not listen")
+            time.sleep(0.05)
+        teller["note"].publish("cup slipped <b>twice</b>")
+        teller["next_object"].publish("ball")
+        self.browser.until("return coglab.events().some(e => e.text.endsWith('cup slipped <b>twice</b>'))", 10.0)
+        self.browser.until("return document.getElementById('object').value === 'ball'", 10.0)
+        teller["next_object"].publish("../ball")
+        self.browser.until("return coglab.events().some(e => e.source === 'command' && e.level === 'warning')", 10.0)
+        self.assertEqual(self.browser.js("return document.getElementById('object').value"), "ball")
+        self.browser.js("document.activeElement.blur()")
+        ActionChains(self.browser.driver).send_keys("m").send_keys("by hand").send_keys(Keys.TAB, Keys.ENTER).perform()
+        while not any(row.data == "by hand" for row in heard["note"]):
+            self.assertLess(time.monotonic(), end + 10.0, [row.data for row in heard["note"]])
+            time.sleep(0.05)
+        self.browser.tab("Live")
+        self.browser.js(
+            "const o = document.getElementById('object'); o.value = ''; o.dispatchEvent(new Event('change'))"
+        )
+        while not any(row.data == "" for row in heard["next_object"]):
+            self.assertLess(time.monotonic(), end + 20.0, [row.data for row in heard["next_object"]])
+            time.sleep(0.05)
 
     def test_09_a_second_console_of_this_master_is_refused_and_says_so(self):
         command = ["rosrun", "coglab_console", "console_node.py", "__name:=another_console"]

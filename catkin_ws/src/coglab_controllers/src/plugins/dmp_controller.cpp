@@ -137,7 +137,8 @@ Answer DmpController::predict(const DmpRequest& request, PredictedPath& path) {
   CycleInput input;
   input.robot = setup().host->robotSnapshot();
   if (input.robot.sequence == 0) {
-    return Answer::refusal(ReasonCode::RobotDisconnected, "no joint state has come yet; is the arm there?");
+    return Answer::refusal(ReasonCode::RobotDisconnected,
+                           "no joint state has come yet; is the arm there?");
   }
   SetPoint from;
   from.pose = setup().robot->chain.evaluate(input.robot.commanded_position).tool;

@@ -124,9 +124,8 @@ Answer PtpController::readTarget(const PtpRequest& request, PtpTarget& target) c
 void PtpController::report(std::int64_t stamp_ns) {
   moving_.store(stage() != RunnerStage::Rest, std::memory_order_relaxed);
   if (stage() != RunnerStage::Moving) return;
-  snapshots_.give([&] {
-    return static_cast<const PtpMotion&>(inner()).snapshot(stamp_ns, runningId());
-  });
+  snapshots_.give(
+      [&] { return static_cast<const PtpMotion&>(inner()).snapshot(stamp_ns, runningId()); });
 }
 
 bool PtpController::readPath(PredictedPath& path) {
