@@ -132,8 +132,8 @@ class Console(unittest.TestCase):
     def receive(self):
         """Once: whether the object is in the hand at the end; the machine may have stopped by itself."""
         self.ready("wait_without_object")
-        path = self.browser.until("return coglab.docs().path", 10.0)
-        self.assertEqual(path["kind"], "ahead")
+        path = self.browser.until("const p = coglab.docs().path; return p && p.kind === 'ahead' && p", 20.0)
+        self.assertGreater(len(path["points"]), 10)
         self.browser.js("document.activeElement.blur()")
         self.says("exchange_robot_to_human", "empty")
         self.enabled("exchange_human_to_robot").click()
