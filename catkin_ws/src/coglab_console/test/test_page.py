@@ -197,3 +197,20 @@ def test_the_keyboard_reaches_everything_in_order_on_every_page(desk):
         names, problems = focus_order(desk.browser)
         assert problems == [] and f"tab-{name}" in names, (name, problems)
     desk.browser.tab("Live")
+
+
+def test_a_page_that_is_let_in_no_more_says_what_to_do_and_that_its_stop_went_nowhere(desk):
+    """As after the console was killed and started anew, which knows no session of before."""
+    with Browser() as page:
+        page.driver.execute_cdp_cmd("Page.addScriptToEvaluateOnNewDocument", {"source": IN_HAND})
+        page.open(desk.console.link())
+        mine = page.js("return document.getElementById('role').innerText.match(/browser [0-9]+/)[0]")
+        sessions = desk.console.access._sessions
+        (key,) = [key for key, one in sessions.items() if one.name == mine]
+        del sessions[key]
+        page.js("window.connections.at(-1).close()")
+        page.until("return document.getElementById('lost').textContent.includes('console.url')", 15.0)
+        stops = len(desk.robot.stops)
+        page.js("document.getElementById('stop').click()")
+        page.until("return document.getElementById('told').textContent.includes('red button')", 10.0)
+        assert len(desk.robot.stops) == stops
