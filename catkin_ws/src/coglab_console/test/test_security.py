@@ -2,12 +2,10 @@
 
 import asyncio
 import json
-import socket
 import time
 
 import aiohttp
 import pytest
-from coglab_console.forwarder import Forwarder
 from coglab_console.web.access import CSRF_HEADER, TokenBucket
 from console_double import running
 
@@ -103,64 +101,6 @@ def test_a_foreign_host_is_refused(tmp_path, host):
                     assert response.status == 403
 
     go(test, tmp_path)
-
-
-async def through(console, port, name, family=socket.AF_INET):
-    """Statuses of a browser behind a tunnel that begins at this port: the link, a command, the WebSocket."""
-    origin = f"http://{name}:{port}"
-    link = console.link().replace(console.url, origin)
-    statuses = []
-    connector, jar = aiohttp.TCPConnector(family=family), aiohttp.CookieJar(unsafe=True)
-    async with aiohttp.ClientSession(connector=connector, cookie_jar=jar) as client:
-        async with client.get(link, allow_redirects=False) as response:
-            statuses.append(response.status)
-            words = await response.text()
-        headers = {**console.headers, "Origin": origin}
-        body = {"name": "note", "arguments": {"text": "x"}}
-        async with client.post(f"{origin}/api/command", json=body, headers=headers) as response:
-            statuses.append(response.status)
-        try:
-            async with client.ws_connect(f"ws://{name}:{port}/ws", headers={"Origin": origin}) as ws:
-                await ws.send_str("{}")
-                statuses.append((await ws.receive_json())["t"])
-        except aiohttp.WSServerHandshakeError as error:
-            statuses.append(error.status)
-    return statuses, words
-
-
-def test_a_tunnel_as_the_docs_have_it_is_served(tmp_path):
-    """ssh -L 8790:127.0.0.1:8790: the port is the same at both ends, so that the names are those of loopback."""
-
-    async def test(console):
-        tunnel = Forwarder(console.port, console.port, socket.AF_INET6)  # the other end of loopback
-        try:
-            statuses, _ = await through(console, console.port, "localhost", socket.AF_INET6)
-            assert statuses == [302, 200, "you"]
-        finally:
-            tunnel.close()
-
-    go(test, tmp_path)
-
-
-def test_a_tunnel_from_another_port_is_served_where_it_was_named(tmp_path):
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        port = probe.getsockname()[1]
-
-    async def refused(console):
-        tunnel = Forwarder(console.port, port)
-        statuses, words = await through(console, port, "127.0.0.1")
-        tunnel.close()
-        assert statuses == [403, 403, 403]
-        assert f"127.0.0.1:{port}" in words and f"127.0.0.1:{console.port}" in words
-
-    async def served(console):
-        tunnel = Forwarder(console.port, port)
-        assert (await through(console, port, "127.0.0.1"))[0] == [302, 200, "you"]
-        tunnel.close()
-
-    go(refused, tmp_path)
-    go(served, tmp_path, hosts=[f"127.0.0.1:{port}"])
 
 
 def test_a_token_makes_one_session_once(tmp_path):

@@ -45,4 +45,5 @@ class Forwarder:
 
     def close(self) -> None:
         """No new connections."""
+        self._listener.shutdown(socket.SHUT_RDWR)  # wakes the thread that accepts
         self._listener.close()

@@ -9,6 +9,7 @@ from .browser import Browser
 PAGES = ("Live", "Experiment", "Contact", "Objects", "Primitives", "Feedback", "Events", "Health", "Help")
 _LOOK = Path(__file__).with_name("look_at_page.js").read_text()
 MOST_STEPS = 300
+_BEGIN = "const b = document.body; b.tabIndex = -1; b.focus(); b.removeAttribute('tabindex')"  # Tab goes on from there
 _MARK = """
 const all = [...document.querySelectorAll('*')];
 const kinds = 'button, input, select, textarea, summary, a, [tabindex]';
@@ -41,7 +42,7 @@ def focus_order(browser: Browser) -> tuple[list[str], list[str]]:
     from selenium.webdriver.common.action_chains import ActionChains
     from selenium.webdriver.common.keys import Keys
 
-    browser.js("document.activeElement.blur(); window.getSelection().removeAllRanges(); scrollTo(0, 0)")
+    browser.js(_BEGIN)
     wanted = browser.js(_MARK)
     names: list[str] = []
     problems: list[str] = []
