@@ -32,6 +32,7 @@ def seen(monkeypatch):
     found = ros_view.RosView(
         model, frames, lambda *words: events.append(words), documents.__setitem__, lambda *_: None, lambda _: None
     )
+    found.listen()
     return found, documents, events
 
 

@@ -75,9 +75,9 @@ class RosView:
         self.config: Callable[[], dict] = dict
         self.objects_read: Callable[[], None] = lambda: None
         self._subscribers: dict[str, rospy.Subscriber] = {}
-        self._subscribe()
 
-    def _subscribe(self) -> None:
+    def listen(self) -> None:
+        """Begins; what is latched comes at once, when everybody who is told must be there."""
         for topic, kind, callback, queue in (
             ("coglab/state", MasterState, self._on_machine, 20),
             ("coglab/transitions", Transition, self._on_transition, 200),
