@@ -306,7 +306,8 @@ class RosView:
     def _on_result(self, message: String) -> None:
         try:
             row = json.loads(message.data)
-            words = f"{row['kind']} {row['object_id']}: {row['outcome']} after {float(row['duration_s']):.1f} s"
+            what = f"{row['kind']} {row['object_id']}".strip()
+            words = f"{what}: {row['outcome']} after {float(row['duration_s']):.1f} s"
         except (ValueError, KeyError, TypeError):
             return
         self._say("result", words, "info" if row["outcome"] == "succeeded" else "warning")
