@@ -19,11 +19,13 @@ import tf2_ros
 from coglab_console.browser import Browser, press_and_hold
 from coglab_msgs.msg import LwrState, MasterState
 from coglab_msgs.srv import LwrCommand
+from console_rows import say
 from diagnostic_msgs.msg import DiagnosticArray
 from selenium.webdriver.common.action_chains import ActionChains
 from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
 
+STANDSTILL = ("stopped", "fault")
 READY = 120.0  # s until the hub
 ANSWERED = """
 const rows = coglab.events().filter((e) => e.seq > arguments[0] && e.source === 'stop').map((e) => e.text);
@@ -59,6 +61,7 @@ class Cell:
         self._process = subprocess.Popen(command, stdout=self._log, stderr=subprocess.STDOUT)
         self._console: subprocess.Popen | None = None
         self.machine, self.arm = MasterState(), LwrState()
+        self.passed: list[str] = []  # states that were entered, see came_to()
         self.held_at = 0.0  # s of the bridge's own clock, when the hold latched last
         self.latencies: list[tuple[float, float]] = []  # (time, latency) s
         self.answers: list[tuple[float, float]] = []  # (time, mean answer time) s
@@ -73,10 +76,21 @@ class Cell:
         rospy.init_node("console_bench", disable_signals=True)
         self.frames = tf2_ros.Buffer()
         self._listener = tf2_ros.TransformListener(self.frames)
-        rospy.Subscriber("/coglab/state", MasterState, lambda message: setattr(self, "machine", message))
+        rospy.Subscriber("/coglab/state", MasterState, self._on_machine)
         rospy.Subscriber("/lwr/state", LwrState, self._on_arm, tcp_nodelay=True)
         rospy.Subscriber("/diagnostics", DiagnosticArray, self._on_diagnostics)
         self.wait(lambda: self.machine.in_hub and "wait" in self.machine.state, READY, "the hub")
+
+    def _on_machine(self, message: MasterState) -> None:
+        self.machine = message
+        self.passed.append(message.state)
+
+    def came_to(self, action: str, label: str) -> bool:
+        """Whether this state of the action was entered since `passed` was cleared. TimeoutError where the machine has
+        stopped by itself."""
+        if self.leaf in STANDSTILL:
+            raise TimeoutError(f"{label}: the machine is in {self.leaf}: {self.machine.why}")
+        return any(action in path and path.endswith(f"/{label}") for path in list(self.passed))
 
     def _on_arm(self, message: LwrState) -> None:
         if message.hold_latched and not self.arm.hold_latched:
@@ -200,18 +214,26 @@ class Operator:
         self.browser.picture(self.pictures / f"{name}.png")
         self.cell.wait(lambda: self.cell.machine.in_hub, 90.0, f"the end of {action}")
         wanted = "wait_with_object" if action in ("exchange_human_to_robot", "take") else "wait_without_object"
-        return self.cell.leaf == wanted
+        done = self.cell.leaf == wanted
+        if not done:
+            say(f"{action} ended in {self.cell.leaf}: {self.cell.machine.why or 'no reason told'}")
+        return done
 
     def go_on(self) -> None:
-        """Acknowledge, then hold the button of reset, and wait for the hub."""
-        self.cell.wait(lambda: self.cell.leaf == "stopped", 15.0, "stopped")
-        self.browser.until("return document.getElementById('acknowledge').offsetParent !== null", 5.0)
+        """Acknowledge where that is still to be done, then hold the button that leads on, and wait for the hub."""
+        self.cell.wait(lambda: self.cell.leaf in STANDSTILL, 15.0, "stopped")
+        leaf = self.cell.leaf
+        self.browser.until("return coglab.docs().desk.guard.hold", 5.0)
+        if self.browser.js("return coglab.docs().desk.guard.unacknowledged"):
+            self.browser.until("return document.getElementById('acknowledge').offsetParent !== null", 5.0)
+            if self.touches:
+                self.browser.touch("#acknowledge")
+            else:
+                self.browser.driver.find_element(By.ID, "acknowledge").click()
+        action = "reset" if leaf == "stopped" else "initialise"
+        self.enabled(action)
         if self.touches:
-            self.browser.touch("#acknowledge")
-            self.enabled("reset")
-            self.browser.touch("[data-action=reset]", lambda: self.cell.leaf != "stopped", 8.0)
+            self.browser.touch(f"[data-action={action}]", lambda: self.cell.leaf != leaf, 8.0)
         else:
-            self.browser.driver.find_element(By.ID, "acknowledge").click()
-            self.enabled("reset")
-            press_and_hold(self.browser, self.button("reset"), lambda: self.cell.leaf != "stopped", 8.0)
+            press_and_hold(self.browser, self.button(action), lambda: self.cell.leaf != leaf, 8.0)
         self.cell.wait(lambda: self.cell.machine.in_hub and self.cell.leaf.startswith("wait_"), 60.0, "the hub")
