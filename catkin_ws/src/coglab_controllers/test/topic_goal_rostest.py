@@ -11,7 +11,7 @@ import unittest
 import rospkg
 import rospy
 import rostest
-from coglab_msgs.msg import DmpGoal, FeedbackGain, FeedbackState, FeedbackStatus, IkDebug, ReasonCode
+from coglab_msgs.msg import DmpGoal, FeedbackGain, FeedbackState, FeedbackStatus, IkDebug, PredictedPath, ReasonCode
 from coglab_msgs.srv import (
     AddPtpRequest,
     DescribeController,
@@ -19,13 +19,14 @@ from coglab_msgs.srv import (
     FeedbackBySignal,
     FeedbackSelect,
     LoadFeedback,
+    PredictDmpRequest,
     ReloadGains,
     SetExecutionOrder,
     SetGains,
     SwitchDmpRequest,
 )
 from diagnostic_msgs.msg import DiagnosticArray
-from geometry_msgs.msg import Point, Vector3
+from geometry_msgs.msg import Point, Pose, Vector3
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64
 
@@ -149,6 +150,41 @@ class TopicGoal(unittest.TestCase):
         self.assertLess(math.dist((place.x, place.y, place.z), (near.x, near.y, near.z)), 0.005)
         self.assertAlmostEqual(first.set_point_velocity.linear.y, 0.1, delta=0.03)
         wait_until(lambda: robot.feedback.state == "reached", 10.0, "reached")
+
+    def test_3d_the_path_ahead_before_a_motion_and_while_it_runs(self) -> None:
+        robot, told = self.robot, []
+        for name in ("dmp", "ptp"):
+            rospy.Subscriber(f"controller_manager/{name}/predicted_path", PredictedPath, told.append)
+
+        def place(pose: Pose) -> tuple[float, float, float]:
+            return pose.position.x, pose.position.y, pose.position.z
+
+        robot.see_hand(ASIDE)
+        wait_until(lambda: abs(self.goals[-1].goal.x - ASIDE[0]) < 1e-6, 5.0, "the helper's goal aside")
+        asked = PredictDmpRequest(primitive_id="reach_human", dmp_ratio=2.0, goal_frame="human_hand")
+        ahead = robot.dmp("predict_dmp", asked)
+        self.assertTrue(ahead.success, ahead.message)
+        self.assertEqual((ahead.path.header.frame_id, ahead.path.motion), ("lwr_base_link", "reach_human"))
+        self.assertLess(math.dist(place(ahead.path.poses[-1]), ASIDE), 0.01)
+        refused = robot.dmp("predict_dmp", PredictDmpRequest(primitive_id="reach_human", goal_frame="human_hand"))
+        self.assertEqual((refused.success, refused.reason_code), (False, ReasonCode.OUT_OF_RANGE))  # dmp_ratio 0
+        rospy.sleep(0.5)
+        self.assertEqual(told, [], "before a motion nothing is published")
+        answer = robot.execute(dmp_ratio=2.0)
+        self.assertTrue(answer.success, answer.message)
+        wait_until(lambda: any(not m.poses for m in told), 15.0, "the end of the path")
+        paths = told[:-1]
+        seconds = (paths[-1].header.stamp - paths[0].header.stamp).to_sec()
+        self.assertGreater(len(paths), 5)
+        self.assertLess((len(paths) - 1) / seconds, 5.5, "Hz")
+        self.assertTrue(all(len(m.poses) == len(m.times) >= 2 and m.motion == "reach_human" for m in paths))
+        self.assertLess(math.dist(place(paths[0].poses[-1]), ASIDE), 0.01)
+        self.assertLess(paths[-1].times[-1], paths[0].times[-1])
+        told.clear()
+        robot.go(HOME)
+        wait_until(lambda: any(not m.poses for m in told), 5.0, "the end of the path of the ptp motion")
+        self.assertRegex(told[0].motion, "^ptp [0-9]+$")
+        robot.switch("dmp")
 
     def test_4_refusals(self) -> None:
         robot = self.robot

@@ -128,9 +128,8 @@ void DmpCycle::execute(const MotionStart<DmpPlan>& start) {
   gate_ = GoalGate(plan.hand.in_goal_frame ? frame_gate_ : topic_gate_);
   gate_.reset(plan.goal);
   watch_.begin(plan.goal_limits, pose.position, plan.goal.position);
-  bool projected = false;
-  motion_.start(plan.motion, pose, velocity, angular, inWorkspace(hand_.at(plan.goal), projected),
-                hand_.approachAt(plan.goal));
+  goal_ = inWorkspace(hand_.at(plan.goal), projected_);
+  motion_.start(plan.motion, pose, velocity, angular, goal_, hand_.approachAt(plan.goal));
   reference_.pose = pose;
   jumps_ = plan.given;
 }
