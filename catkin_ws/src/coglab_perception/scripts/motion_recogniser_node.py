@@ -138,6 +138,7 @@ class RecogniserNode:
             request=belief.request,
             hand=self.hand,
             object_id=belief.object_id,
+            object_frame=self.frames.object_frame(belief.object_id) if belief.object_id else "",
             pattern=belief.pattern,
             time=belief.time,
             time_deviation=belief.time_deviation,

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 from coglab_objects.database import ObjectDatabase, objects_folder
+from coglab_perception.belief import BeliefFilter
 from coglab_py.pose import Pose
 from coglab_sim.conditions import Conditions
 from coglab_sim.person.in_cell import pose_of_truth
@@ -67,7 +68,7 @@ class VirtualTrial:
             clock=self.clock,
             arm=VirtualArm(self.rig),
             hand=VirtualHand(self.rig),
-            perception=VirtualPerception(self.rig, recogniser),
+            perception=VirtualPerception(self.rig, recogniser, BeliefFilter()),
             database=PowerGrasps(database) if power else VirtualDatabase(database),
             contact=VirtualContact(self.rig),
             config=config,

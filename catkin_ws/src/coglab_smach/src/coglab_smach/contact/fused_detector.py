@@ -14,7 +14,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-
 from coglab_msgs.msg import ReasonCode
 
 from coglab_smach.contact.detector import ContactDetector, Joints

@@ -108,6 +108,20 @@ class Recognition:
     scores: dict[str, float] = field(default_factory=dict)
 
 
+@dataclass(frozen=True)
+class Ahead:
+    """What the partner is believed to be about: probability that the object is offered or that the robot's is asked for,
+    and where that will be. ``frame``: tf2 frame of the place, with its position in the base frame (m) and its standard
+    deviation (m); empty while no place is predicted."""
+
+    offer: float = 0.0
+    request: float = 0.0
+    object_id: str = ""
+    frame: str = ""
+    place: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    deviation: float = 0.0
+
+
 class ArmPort(Protocol):
     """The low-level cognitive controller and the LWR interface behind it."""
 
@@ -203,6 +217,9 @@ class PerceptionPort(Protocol):
 
     def recognition(self) -> Recognition:
         """The newest recognition of the partner's motion."""
+
+    def ahead(self) -> Ahead:
+        """The newest belief about an offer or a request; nothing is believed where none has come for 0.3 s."""
 
 
 class DatabasePort(Protocol):

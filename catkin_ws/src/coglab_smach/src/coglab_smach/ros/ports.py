@@ -5,20 +5,24 @@ All names are relative: in the node's own namespace, so that two robots fit in o
 
 from __future__ import annotations
 
+import math
 import threading
 import time
 from typing import Any
 
-from coglab_msgs.msg import Contact, ReasonCode
+from coglab_msgs.msg import Contact, HandoverBelief, ReasonCode
 from coglab_msgs.msg import Recognition as RecognitionMsg
 from coglab_msgs.srv import ArmContact, FreePlaces, GetObject, InitVision, ListObjects, LocateObject
 from coglab_py.pose import IDENTITY
 from coglab_py.yaml_file import YamlError, parse
 from geometry_msgs.msg import Point, Pose, Quaternion
 
-from coglab_smach.ports.interfaces import ContactEvent, Located, Recognition
+from coglab_smach.ports.interfaces import Ahead, ContactEvent, Located, Recognition
 from coglab_smach.ports.pending import Pending, Permit, PortError, Threaded
 from coglab_smach.ros.calls import SERVICE_WAIT, Newest, call, call_now, mapped
+
+OLDEST_BELIEF = 0.3
+"""s"""
 
 
 class RosPerception:
@@ -27,6 +31,7 @@ class RosPerception:
     def __init__(self, namespace: str = "perception") -> None:
         self._ns = namespace
         self._recognition = Newest(f"{namespace}/recognition", RecognitionMsg)
+        self._belief = Newest(f"{namespace}/belief", HandoverBelief)
 
     def init_vision(self, time_limit: float) -> Pending:
         # A service that is not there is said before the limit of whoever waits runs out.
@@ -51,6 +56,17 @@ class RosPerception:
             message.decided,
             dict(zip(message.names, message.probabilities, strict=False)),
         )
+
+    def ahead(self) -> Ahead:
+        message = self._belief.message
+        if message is None or self._belief.age() > OLDEST_BELIEF:
+            return Ahead()
+        variances = [message.place_covariance[i] for i in (0, 4, 8)]
+        if variances[0] < 0.0:
+            return Ahead(message.offer, message.request, message.object_id)
+        p, of = message.place, message.object_frame or message.hand
+        deviation = math.sqrt(max(0.0, *variances))
+        return Ahead(message.offer, message.request, message.object_id, of + "_ahead", (p.x, p.y, p.z), deviation)
 
 
 def _located(frame: str, parent: str, pose: Pose, age: float) -> Located:

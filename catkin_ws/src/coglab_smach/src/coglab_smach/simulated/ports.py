@@ -294,6 +294,9 @@ class SimulatedPerception:
             "perception", "free_places", 0.1, lambda: [_located(place, "", parent="board") for place in self.places]
         )
 
+    def ahead(self) -> Ahead:
+        return Ahead()
+
     def recognition(self) -> Recognition:
         cell, partner = self.cell, self.cell.partner
         started = cell.arm.motion_started

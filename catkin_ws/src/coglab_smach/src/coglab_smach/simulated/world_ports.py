@@ -13,9 +13,9 @@ from typing import Any
 import coglab_controllers as cc
 import numpy as np
 from coglab_msgs.msg import ReasonCode
+from coglab_objects.database import ObjectDatabase, ObjectError
 from coglab_py.packages import package_path
 from coglab_py.pose import Pose
-from coglab_objects.database import ObjectDatabase, ObjectError
 from ih2_hand.reasons import Reason, reason_of
 
 from coglab_smach.contact.detector import ContactDetector, DetectorSettings
@@ -23,6 +23,7 @@ from coglab_smach.contact.fused_detector import FusedDetector
 from coglab_smach.contact.motion_thresholds import Thresholds
 from coglab_smach.contact.moving_contact import MovingContact
 from coglab_smach.ports.interfaces import (
+    Ahead,
     ContactEvent,
     HandState,
     Located,
@@ -32,6 +33,7 @@ from coglab_smach.ports.pending import Pending, Polled, PortError, Ready
 from coglab_smach.simulated.virtual_node import VirtualNode
 
 THRESHOLDS = package_path("coglab_smach", "config", "contact_thresholds.yaml")
+HAND = "human_hand"
 OLDEST_SIGHT = 0.15
 """s, older sights of an object do not tell whether it is in the palm"""
 
@@ -109,11 +111,14 @@ class VirtualHand:
 
 
 class VirtualPerception:
-    """PerceptionPort on the virtual world's trackers; the recogniser, if one is given, sees the tracked hand."""
+    """PerceptionPort on the virtual world's trackers; recogniser and belief (BeliefFilter), if given, see what these
+    see."""
 
-    def __init__(self, rig: Any, recogniser: Any = None) -> None:
-        self.rig, self.recogniser, self.node = rig, recogniser, VirtualNode()
+    def __init__(self, rig: Any, recogniser: Any = None, belief: Any = None) -> None:
+        self.rig, self.recogniser, self.belief, self.node = rig, recogniser, belief, VirtualNode()
         self._blind: set[str] = set()
+        self._taken: dict[str, float] = {}
+        rig.after_period.append(self._believe)
 
     def freeze(self) -> None:
         """The perception node stops as it stands, and the frames that it sends."""
@@ -152,6 +157,37 @@ class VirtualPerception:
 
     def free_places(self, object_id: str, time_limit: float) -> Pending:
         return self.node.ask(lambda: Ready([Located("", "board", (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0), 0.0)]))
+
+    def _believe(self) -> None:
+        """Each new sight, objects first; the frames ahead, as the recogniser's node sends them."""
+        if self.belief is None or self.node.frozen:
+            return
+        t = self.rig.t
+        for name, sight in sorted(self.rig.sights.items(), reverse=True):
+            if sight.captured <= self._taken.get(name, -1.0):
+                continue
+            self._taken[name] = sight.captured
+            if name != HAND:
+                self.belief.see_object(sight.captured, name.removeprefix("object_"), sight.frame.position, t)
+                continue
+            end = self.recogniser.pattern_end() if self.recogniser is not None else None
+            seen = self.belief.see_hand(sight.captured, sight.frame.position, t, self.rig.hand.holding, end)
+            places = {HAND: seen.hand_place, f"object_{seen.object_id}": seen.place if seen.object_id else None}
+            for frame, place in places.items():
+                if place is not None and frame in self.rig.sights:
+                    turned = self.rig.sights[frame].frame.orientation
+                    self.rig.robot.virtual.set_frame(frame + "_ahead", place, turned, t - sight.captured)
+
+    def ahead(self) -> Ahead:
+        if self.belief is None or self.node.frozen:
+            return Ahead()
+        seen = self.belief.belief
+        if seen.place is None:
+            return Ahead(seen.offer, seen.request, seen.object_id)
+        frame = f"object_{seen.object_id}" if seen.object_id else HAND
+        x, y, z = map(float, seen.place)
+        deviation = float(np.sqrt(np.max(np.diag(seen.covariance))))
+        return Ahead(seen.offer, seen.request, seen.object_id, frame + "_ahead", (x, y, z), deviation)
 
     def recognition(self) -> Recognition:
         if self.recogniser is None or self.node.frozen:

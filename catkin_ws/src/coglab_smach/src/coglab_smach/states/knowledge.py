@@ -131,6 +131,10 @@ def await_offer(state: CoglabState, target: str, goal: Mapping[str, Any], margin
             )
             if offered and reachable(state.ctx, located, goal):
                 break
+            early = believed(state.ctx, target, located, person, low, high)
+            if early is not None and reachable(state.ctx, early, goal):
+                located = early
+                break
             if now > end and offered:
                 raise PortError(*out_of_reach(target, located, goal), ReasonCode.GOAL_UNREACHABLE)
             if now > end:
@@ -144,6 +148,20 @@ def await_offer(state: CoglabState, target: str, goal: Mapping[str, Any], margin
             state.pause(0.03)
     state.ctx.journal.mark("offered")
     return located
+
+
+def believed(
+    ctx: Context, target: str, located: Mapping[str, Any], person: bool, low: np.ndarray, high: np.ndarray
+) -> dict[str, Any] | None:
+    """Where ``target`` will be at a handover that is believed to have begun: its frame ahead, turned as it is seen now;
+    None where nothing is believed yet, or something outside the handover region."""
+    level = float(ctx.config.get("handover.belief", 0.9))
+    ahead = ctx.perception.ahead()
+    mine = (ahead.request if person else ahead.offer) >= level and (person or ahead.object_id == target)
+    place = np.array(ahead.place)
+    if level <= 0.0 or not (mine and ahead.frame and np.all(place >= low) and np.all(place <= high)):
+        return None
+    return {**located, "frame": ahead.frame, "xyz": list(ahead.place)}
 
 
 def handover_region(ctx: Context, margin: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
@@ -209,7 +227,10 @@ class SetGraspGoal(CoglabState):
         located = await_offer(self, ud.object_id, goal)
         ud.located = located
         # The detector looks whether the object is in the palm, wherever the motion's goal comes from.
-        grasped = {"frame": located["frame"], "grasp": palm_at_grasp(ud.grasp, 0.0).to_dict()}
+        grasped = {
+            "frame": str(located["frame"]).removesuffix("_ahead"),
+            "grasp": palm_at_grasp(ud.grasp, 0.0).to_dict(),
+        }
         ud.goal = unless_withdrawn(self.ctx, {**goal, "frame": located["frame"], "object": grasped})
         return "succeeded"
 
