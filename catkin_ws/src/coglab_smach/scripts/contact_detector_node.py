@@ -3,7 +3,8 @@
 
 Subscribes lwr/external_torques (effort, Nm), lwr/joint_states (with measured torques as effort), lwr/state (FRI
 period), ih2_hand/hand_status and ih2_hand/fingertip_forces (~tactile_topic; nobody has to publish it); names are
-relative; and tf2 for the object that is reached for. Parameters: perception/frames; private: the fields of coglab_smach.contact.detector.DetectorSettings; robot_description is read
+relative; and tf2 for the object that is reached for. Parameters: perception/frames; private: the fields of
+coglab_smach.contact.detector.DetectorSettings; robot_description is read
 for Jacobian and dynamics; ~thresholds_file: of the moving arm, learnt in simulation; ~learnt_file: where
 ~learn_motion writes what this robot's own motions tell, and from where it is read at the next start.
 Publishes at 20 Hz ~margin (std_msgs/Float64) while watching, ~signal (coglab_msgs/ContactSignal) while torques come.

@@ -110,8 +110,8 @@ class Recognition:
 
 @dataclass(frozen=True)
 class Ahead:
-    """What the partner is believed to be about: probability that the object is offered or that the robot's is asked for,
-    and where that will be. ``frame``: tf2 frame of the place, with its position in the base frame (m) and its standard
+    """What the partner is believed to be about: probability that an object is offered or the robot's is asked for, and
+    where that will be. ``frame``: tf2 frame of the place, with its position in the base frame (m) and its standard
     deviation (m); empty while no place is predicted."""
 
     offer: float = 0.0
@@ -237,8 +237,8 @@ class ContactPort(Protocol):
 
     def arm(self, mode: str, time_limit: float, settings: dict[str, Any]) -> Pending:
         """Forget old events and watch for 'contact' (an object touches the hand of an arm that stands),
-        'contact_in_motion' (moving or not), 'load' (its weight is carried now), 'lift' (likewise, counted from now, while
-        the arm lifts) or 'release' (its weight is leaving); value: None once accepted. ``settings``: fields of the
+        'contact_in_motion' (moving or not), 'load' (its weight is carried now), 'lift' (likewise, counted from now,
+        while the arm lifts) or 'release' (its weight is leaving); value: None once accepted. ``settings``: fields of the
         service ArmContact."""
 
     def disarm(self) -> None:

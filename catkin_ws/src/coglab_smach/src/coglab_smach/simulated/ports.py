@@ -18,6 +18,7 @@ from coglab_py.pose import Pose
 from coglab_smach.clocks.clock import Clock
 from coglab_smach.kinematics.motion_time import MotionLimits
 from coglab_smach.ports.interfaces import (
+    Ahead,
     DmpProgress,
     DmpRequest,
     HandState,

@@ -29,11 +29,11 @@ def hand_from_palm(state: CoglabState) -> float | None:
 
 
 class TakeWeight(CoglabState):
-    """Lift what the hand has closed on until the arm carries ``hand.load_share`` of it or the person's hand has left it;
-    it has to leave it in the end. A person who does not let go gets the object back.
+    """Lift what the hand has closed on until the arm carries ``hand.load_share`` of it or the person's hand has left
+    it; it has to leave it in the end. A person who does not let go gets the object back.
 
-    The arm rises by ``hand.lift`` m at most, at ``hand.lift_speed`` m/s. ``hand_distance``: m, of the person's hand from
-    the palm before the fingers closed; None where no tracker sees it, and then the weight alone counts.
+    The arm rises by ``hand.lift`` m at most, at ``hand.lift_speed`` m/s. ``hand_distance``: m, of the person's hand
+    from the palm before the fingers closed; None where no tracker sees it, and then the weight alone counts.
     """
 
     default_time_limit = 16.0
@@ -88,7 +88,7 @@ class TakeWeight(CoglabState):
         self.reason = event.message if event is not None else "the person's hand has left it"
 
     def _lift(self) -> Pending | None:
-        """Begin to rise, each joint as fast as its share of the way asks for; None where the arm's posture is not known."""
+        """Begin to rise, each joint as fast as its share of the way asks for; None where the posture is not known."""
         here = self.ctx.arm.joint_positions()
         if here is None:
             return None
