@@ -237,9 +237,9 @@ class ContactPort(Protocol):
 
     def arm(self, mode: str, time_limit: float, settings: dict[str, Any]) -> Pending:
         """Forget old events and watch for 'contact' (an object touches the hand of an arm that stands),
-        'contact_in_motion' (moving or not), 'load' (its weight is carried now), 'lift' (likewise, counted from now,
-        while the arm lifts) or 'release' (its weight is leaving); value: None once accepted. ``settings``: fields of the
-        service ArmContact."""
+        'contact_in_motion' (moving or not), 'load' (its weight is carried now), 'lift' (likewise, counted from now on,
+        while the arm lifts) or 'release' (its weight is leaving); value: None once accepted. ``settings``: fields of
+        the service ArmContact."""
 
     def disarm(self) -> None:
         """Stop watching."""
