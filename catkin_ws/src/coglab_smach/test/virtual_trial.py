@@ -219,8 +219,9 @@ class ReachRecord:
         goal = Pose(np.asarray(request.goal_offset, dtype=float), np.asarray(request.target_orientation))
         if debug is not None:
             self.to_goal = palm.distance(Pose(np.asarray(debug["goal"]), np.asarray(debug["set_point"][1])))
-        seen, _ = rig.newest(request.goal_frame)
-        truth = pose_of_truth(rig.truth["human_hand" if request.goal_frame == "human_hand" else "object"])
+        frame = request.goal_frame.removesuffix("_ahead")
+        seen, _ = rig.newest(frame)
+        truth = pose_of_truth(rig.truth["human_hand" if frame == "human_hand" else "object"])
         self.to_sight = palm.distance(seen * goal)
         self.to_truth = palm.distance((BOARD if request.goal_frame == "board" else truth) * goal)
 

@@ -14,9 +14,13 @@ TOUCH = 1.0
 """N, a contact"""
 EVENTS = {
     "contact": ReasonCode.CONTACT_FOUND,
+    "contact_in_motion": ReasonCode.CONTACT_FOUND,
+    "lift": ReasonCode.LOAD_CARRIED,
     "load": ReasonCode.LOAD_CARRIED,
     "release": ReasonCode.LOAD_RELEASED,
 }
+
+TOUCHES = ("contact", "contact_in_motion")
 
 
 class SimulatedContact:
@@ -41,11 +45,11 @@ class SimulatedContact:
         def apply() -> None:
             partner = cell.partner
             mass, refused = float(settings.get("mass", 0.0)), ""
-            if mode not in ("contact", "load", "release"):
-                refused = f"mode is contact, load or release, got '{mode}'"
+            if mode not in EVENTS:
+                refused = f"mode is {', '.join(EVENTS)}, got '{mode}'"
             elif not time_limit > 0.0:
                 refused = f"timeout must be a positive time in s, got {time_limit}"
-            elif mode != "contact" and not mass > 0.0:
+            elif mode not in TOUCHES and not mass > 0.0:
                 refused = f"{mode} needs the mass of the object in kg"
             elif mode == "load" and not self._touched:
                 refused = "load is counted from the torque before the contact: arm for contact first"
@@ -53,12 +57,14 @@ class SimulatedContact:
                 raise PortError(f"arm refused: {refused}", code=ReasonCode.INVALID_ARGUMENT)
             if mode != "load":  # load counts from the torque before the contact
                 self._lifted_before = cell.lifted
-            self._needed = TOUCH if mode == "contact" else float(settings.get("load_share", 0.5)) * mass * 9.81
-            after = {"contact": partner.touch_after, "load": partner.let_go_after, "release": partner.take_after}[mode]
+            self._needed = TOUCH if mode in TOUCHES else float(settings.get("load_share", 0.5)) * mass * 9.81
+            touch, carried = partner.touch_after, partner.let_go_after
+            after = {"load": carried, "lift": carried, "release": partner.take_after}.get(mode, touch)
             now = cell.clock.now()
-            self._touched = self._touched or mode == "contact"
+            self._touched = self._touched or mode in TOUCHES
             self._mode, self._until, self._due = mode, now + time_limit, None if after is None else now + after
-            self.armed_while_moving = self.armed_while_moving or not cell.arm.standing()
+            moving = mode not in ("contact_in_motion", "lift") and not cell.arm.standing()
+            self.armed_while_moving = self.armed_while_moving or moving
             fading = now - cell.profile_since < cell.fade_time
             self.armed_with_profile.append(cell.profile + (" fading" if fading else ""))
 
@@ -82,4 +88,5 @@ class SimulatedContact:
 
     def _pushed(self) -> bool:
         lifted = self.cell.lifted - self._lifted_before
-        return {"contact": abs(lifted), "load": -lifted, "release": lifted}.get(self._mode, 0.0) >= self._needed > 0.0
+        felt = {"load": -lifted, "lift": -lifted, "release": lifted}.get(self._mode, abs(lifted) if self._mode else 0.0)
+        return felt >= self._needed > 0.0

@@ -15,6 +15,9 @@ from coglab_smach.ports.pending import PortError
 from coglab_smach.states.base import CoglabState, Interrupted, TimeLimit
 from coglab_smach.states.motion import await_rest
 
+DOUBT_TIME = 0.06
+"""s for which nothing is believed before a reach ends"""
+
 
 class LoadControllers(CoglabState):
     """Ask the controller manager to load the DMP and the point-to-point plug-in (D4.10 Figure 4)."""
@@ -150,7 +153,7 @@ class WaitStop(CoglabState):
         keys: dict[str, list[str]] = {
             "": [],
             "contact": ["object_entry", "goal"],
-            "release": ["object_entry", "delivery"],
+            "release": ["object_entry", "delivery", "goal"],
         }
         super().__init__(ctx, input_keys=keys[trigger])
         self.trigger = trigger
@@ -159,6 +162,8 @@ class WaitStop(CoglabState):
 
     def run(self, ud: Any) -> str:
         self._left = False
+        self._early = bool(ud.goal.get("early", False)) if self.trigger else False
+        self._doubted: float | None = None
         if self.trigger == "contact":
             return self._await_contact(ud)
         self._await_reach(self._reached)
@@ -268,7 +273,21 @@ class WaitStop(CoglabState):
         blocked = self.ctx.arm.motion_allowed()
         if not blocked.ok:
             raise TimeLimit("the arm does not follow any more", (blocked.why,), blocked.code)
+        if self._early:
+            self._check_belief()
         return progress.state == "reached"
+
+    def _check_belief(self) -> None:
+        """A reach that began on a belief ends with it."""
+        ahead, now = self.ctx.perception.ahead(), self.ctx.clock.now()
+        if max(ahead.offer, ahead.request) >= float(self.ctx.config.get("handover.doubt", 0.1)):
+            self._doubted = None
+        elif self._doubted is None:
+            self._doubted = now
+        elif now - self._doubted > DOUBT_TIME:
+            raise TimeLimit(
+                "the reach was given up", ("the person does not offer or ask any more",), ReasonCode.GOAL_WITHDRAWN
+            )
 
 
 class MonitorDmp(CoglabState):
