@@ -8,8 +8,19 @@ import pytest
 from coglab_msgs.msg import ReasonCode
 from coglab_py.packages import package_path
 from coglab_smach.contact.detector import ContactDetector, DetectorSettings
-from coglab_smach.contact.evidence import FUSED, MOMENTUM, TACTILE, Evidence, Fingers, Touch, name_of, together
-from coglab_smach.contact.fused_detector import IN_MOTION, FusedDetector
+from coglab_smach.contact.evidence import (
+    FUSED,
+    MOMENTUM,
+    SIGHT,
+    TACTILE,
+    Evidence,
+    Fingers,
+    InPalm,
+    Touch,
+    name_of,
+    together,
+)
+from coglab_smach.contact.fused_detector import IN_MOTION, LIFT, FusedDetector
 from coglab_smach.contact.learning import MotionRecorder
 from coglab_smach.contact.momentum_observer import MomentumObserver
 from coglab_smach.contact.motion_thresholds import FEATURES, ThresholdError, Thresholds, learn
@@ -296,3 +307,43 @@ def test_without_a_model_in_motion_is_refused():
     with pytest.raises(ValueError, match="model"):
         detector.arm(IN_MOTION, 0.0, 1.0)
     assert detector.feed_measured(0.0, np.zeros(7), np.zeros(7)) is None
+
+
+def test_the_weight_comes_to_an_arm_that_lifts():
+    """Counted from arming on, whatever was carried then; the arm moves meanwhile."""
+    arm, detector = Arm(rate=0.3, sigma=0.05), fused()
+    share = lambda t: 0.2 if t < 1.5 else min(1.0, 0.2 + (t - 1.5) / 0.3)  # noqa: E731
+    weight = lambda t: (0.0, 0.0, -0.31 * 9.81 * share(t))  # noqa: E731
+    assert feed(detector, arm, 0.0, 1.0, weight)[0] is None
+    detector.arm(LIFT, 1.0, 4.0, mass=0.31, load_share=0.5)
+    event, when = feed(detector, arm, 1.0, 3.0, weight)
+    assert event is not None and event.code == ReasonCode.LOAD_CARRIED and event.contact
+    # Half of the weight has come after 0.15 s; the residual's lag and the confirmation add 0.1 s.
+    assert 1.65 < when < 1.80
+    assert detector.moving.load == pytest.approx(0.31) and detector.state() == "off"
+
+
+def test_a_lift_without_a_weight_ends_with_its_time_and_asks_for_a_mass():
+    arm, detector = Arm(rate=0.3, sigma=0.05), fused()
+    feed(detector, arm, 0.0, 1.0)
+    for mass, timeout in ((0.0, 1.0), (0.3, 0.0), (np.nan, 1.0)):
+        with pytest.raises(ValueError, match="mass"):
+            detector.arm(LIFT, 1.0, timeout, mass=mass)
+    detector.arm(LIFT, 1.0, 0.5, mass=0.31)
+    assert feed(detector, arm, 1.0, 2.0)[0] is None
+    assert detector.state() == "off"
+
+
+def test_an_object_that_is_seen_at_its_grasp_is_contact_once_the_arm_is_slow():
+    palm = InPalm()
+    assert palm.feed(0.0, 0.005, 0.1, 0.2).margin == 0.0
+    assert palm.feed(0.1, 0.005, 0.1, 0.01).margin == 0.0
+    assert palm.feed(0.2, 0.005, 0.1, 0.01).margin == 0.0
+    assert palm.feed(0.25, 0.005, 0.1, 0.01).margin == 1.0
+    assert palm.feed(0.3, 0.03, 0.1, 0.01).margin == 0.0
+    assert palm.feed(0.35, np.nan, 0.1, 0.01) is None
+    detector = fused()
+    detector.arm(IN_MOTION, 0.0, 5.0)
+    events = [detector.feed_sight(0.03 * k, 0.008, 0.1, 0.01) for k in range(8)]
+    found = [event for event in events if event is not None]
+    assert len(found) == 1 and found[0].source == SIGHT and found[0].contact
