@@ -58,6 +58,7 @@ def test_human_to_robot_order(trial):
         "approach",
         "switch_to_ptp",
         "hand_close",
+        "take_weight",
         "coglab_home_robot",
     ]
     assert trial.labels("/approach/arm_motion") == ["switch_to_dmp", "execute_dmp", "wait_stop"]
@@ -66,12 +67,13 @@ def test_human_to_robot_order(trial):
         ("get mug", "locate mug"),
         ("locate mug", "switch dmp"),
         ("switch dmp", "execute_dmp"),
-        ("execute_dmp", "arm contact"),
-        ("arm contact", "close"),
+        ("execute_dmp", "arm contact_in_motion"),
+        ("arm contact_in_motion", "close"),
+        ("close", "arm lift"),
     ):
         assert order.index(earlier) < order.index(later)
     # The switch to point-to-point, which ends the DMP, comes between contact and closing.
-    assert "switch ptp" in order[order.index("arm contact") : order.index("close")]
+    assert "switch ptp" in order[order.index("arm contact_in_motion") : order.index("close")]
     assert order.index("close") < len(order) - 1 - order[::-1].index("move_ptp")
     assert trial.ctx.holding == "mug"
     assert trial.result().outcome == "succeeded"

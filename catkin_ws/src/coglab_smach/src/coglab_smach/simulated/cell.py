@@ -19,6 +19,9 @@ from coglab_smach.clocks.clock import Clock
 from coglab_smach.ports.pending import Pending, PortError
 from coglab_smach.simulated.arm_model import ArmModel
 
+HAND_AT_WORK = np.array([0.86, 0.03, 0.43])
+"""m, of the person's hand while something is handed over"""
+
 
 @dataclass
 class Faults:
@@ -116,7 +119,7 @@ class SimulatedCell:
         self.objects: dict[str, Pose] = {
             "mug": Pose(np.array([0.78, 0.03, 0.43])),
             "board": Pose(np.array([0.45, -0.55, 0.05])),
-            "human_hand": Pose(np.array([0.86, 0.03, 0.43])),
+            "human_hand": Pose(HAND_AT_WORK),
         }
         self._lock = threading.RLock()
         self._under_way: list[_Call] = []
@@ -128,6 +131,14 @@ class SimulatedCell:
     def push(self, force: float) -> None:
         """Somebody lifts the hand with so many N from now on, or presses it down if negative."""
         self.lifted = force
+
+    def let_go(self) -> None:
+        """The person's hand leaves what it has given."""
+        self.objects["human_hand"] = Pose(HAND_AT_WORK + [0.3, 0.0, 0.0])
+
+    def reach_out(self) -> None:
+        """The person's hand is where things are handed over."""
+        self.objects["human_hand"] = Pose(HAND_AT_WORK)
 
     def called(self, prefix: str = "") -> list[str]:
         """Names of the calls so far that begin with ``prefix``."""

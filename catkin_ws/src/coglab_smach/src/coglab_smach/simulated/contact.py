@@ -62,6 +62,8 @@ class SimulatedContact:
             after = {"load": carried, "lift": carried, "release": partner.take_after}.get(mode, touch)
             now = cell.clock.now()
             self._touched = self._touched or mode in TOUCHES
+            if mode in TOUCHES:
+                cell.reach_out()
             self._mode, self._until, self._due = mode, now + time_limit, None if after is None else now + after
             moving = mode not in ("contact_in_motion", "lift") and not cell.arm.standing()
             self.armed_while_moving = self.armed_while_moving or moving
@@ -84,6 +86,8 @@ class SimulatedContact:
         if self._event is None and self._mode and happens and "contact" not in self.cell.faults.dead:
             why = f"{self._mode} by the partner's script"
             self._event = ContactEvent(self._mode != "release", "simulated", 2.0, why, code=EVENTS[self._mode])
+            if self._mode == "lift":
+                self.cell.let_go()
         return self._event
 
     def _pushed(self) -> bool:
