@@ -208,7 +208,7 @@ class BrainNodes(unittest.TestCase):
         limited = [m for m in waits if m.waits_for]
         ahead = [(m.deadline - m.header.stamp).to_sec() for m in limited]
         self.assertTrue(all(0.0 < seconds < 120.0 for seconds in ahead), ahead)
-        vision = [s for s, m in zip(ahead, limited, strict=True) if m.state.endswith("/coglab_init_vision")]
+        vision = [s for s, m in zip(ahead, limited, strict=True) if m.waits_for == "start of perception"]
         self.assertTrue(any(3.0 < seconds <= 4.0 for seconds in vision), [(m.state, m.waits_for) for m in limited])
         self.until(lambda: waits[-1].state.endswith("/fault"), "fault again")
         self.assertEqual((waits[-1].waits_for, waits[-1].deadline.to_sec()), ("", 0.0))
