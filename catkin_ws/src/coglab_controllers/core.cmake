@@ -17,6 +17,7 @@ add_library(coglab_controllers_core
   src/dmp/motion_end.cpp
   src/dmp/orientation_curve.cpp
   src/dmp/primitive.cpp
+  src/dmp/roll_out.cpp
   src/dmp/transformation_system.cpp
   src/goal/goal_estimator.cpp
   src/goal/goal_gate.cpp

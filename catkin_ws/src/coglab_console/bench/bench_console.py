@@ -1,6 +1,7 @@
 #!/usr/bin/python3
 """The console against the running cell: STOP from key-down to the bridge's hold, load, size, first paint,
 whole actions by mouse and by keyboard, STOP in every phase, and what the console does to the FRI latency.
+Every part has a cell and a process of its own; one that fails is a missed row that says why.
 Pictures: out/bench_console."""
 
 from __future__ import annotations
@@ -11,43 +12,28 @@ import os
 import random
 import signal
 import statistics
-import subprocess
 import sys
+import tempfile
 import time
+from collections.abc import Callable
 from pathlib import Path
 from xmlrpc.client import ServerProxy
 
 import rosgraph
+from coglab_bringup import process_tree
 from coglab_console.browser import Browser, fresh_link
-from console_cell import Cell, Operator
+from console_cell import Cell, Operator, free_port
 from console_load import flooded, load
+from console_page import page_rows, tab_rows, tablet_rows, tunnel_rows
+from console_rows import row, say
 
 PRESSES = 200
 PHASES = {  # action: labels in which STOP is pressed
     "exchange_human_to_robot": ("set_dmp_goal", "execute_dmp", "wait_stop", "hand_close", "coglab_home_robot"),
     "exchange_robot_to_human": ("set_dmp_goal", "execute_dmp", "wait_stop", "hand_open", "coglab_home_robot"),
 }
+RECOVERY = 150.0  # s to be in a hub again
 BLOCK = 10.0  # s, with or without the console
-
-
-def row(
-    figure: str,
-    value: float | None,
-    unit: str,
-    goal: str,
-    ok: bool,
-    peer: str | None = None,
-    peer_value: float | None = None,
-) -> dict:
-    """A row as coglab_bringup.bench reads it."""
-    return dict(
-        bench="console", figure=figure, value=value, unit=unit, goal=goal, peer=peer, peer_value=peer_value, ok=ok
-    )
-
-
-def say(text: str) -> None:
-    """Progress, for people."""
-    print(f"[console bench] {text}", file=sys.stderr, flush=True)
 
 
 # --- STOP -----------------------------------------------------------------------------------------------------
@@ -62,10 +48,11 @@ def stop_latencies(cell: Cell, operator: Operator) -> list[float]:
     chance = random.Random(1)
     for _ in range(PRESSES):
         time.sleep(chance.uniform(0.05, 0.15))
-        cell.held_at = 0.0
+        since, cell.held_at = operator.newest_event(), 0.0
         operator.stop()
         cell.wait(lambda: cell.held_at > 0.0, 3.0, "the hold")
         found.append(1000 * cell.held_at - browser.js("return window.pressedAt"))
+        operator.answered(since)
         cell.reset_arm()
     return sorted(found)
 
@@ -88,10 +75,9 @@ def phase_rows(cell: Cell, operator: Operator) -> list[dict]:
         for label in labels:
             try:
                 bring_to(cell, operator, action)
+                cell.passed.clear()
                 operator.press(action, keyboard=False)
-                cell.wait(
-                    lambda label=label, action=action: cell.leaf == label and action in cell.machine.state, 45.0, label
-                )
+                cell.wait(lambda label=label, action=action: cell.came_to(action, label), 45.0, label)
                 reached += 1
                 operator.stop()
                 cell.wait(lambda: cell.arm.hold_latched, 1.0, "the hold")
@@ -99,13 +85,24 @@ def phase_rows(cell: Cell, operator: Operator) -> list[dict]:
                 operator.go_on()
             except TimeoutError as error:
                 say(f"{action}, {label}: {error}")
-                if cell.leaf in ("stopped", "fault"):
-                    operator.stop()
-                    operator.go_on()
-                cell.wait(lambda: cell.machine.in_hub, 90.0, "the hub")
+            recover(cell, operator)
     return [
         row(f"STOP in every phase ({reached} of {wanted} reached)", stopped, "stops", f"{wanted}", stopped == wanted)
     ]
+
+
+def recover(cell: Cell, operator: Operator) -> None:
+    """To a hub that takes actions, whatever an attempt has left behind; on a crowded computer the simulated controller
+    may lose command mode on the way, so more than once."""
+    end = time.monotonic() + RECOVERY
+    while not (cell.machine.in_hub and cell.leaf.startswith("wait_")):
+        try:
+            if cell.leaf in ("stopped", "fault"):
+                operator.go_on()
+            cell.wait(lambda: cell.machine.in_hub, 60.0, "the hub")
+        except TimeoutError:
+            if time.monotonic() > end:
+                raise
 
 
 def bring_to(cell: Cell, operator: Operator, action: str) -> None:
@@ -126,23 +123,34 @@ def bring_to(cell: Cell, operator: Operator, action: str) -> None:
 
 
 def action_rows(cell: Cell, operator: Operator) -> list[dict]:
-    rows = []
+    """Each action from hub to hub by mouse, then by keyboard; the hand in the picture against tf after each."""
+    rows, far = [], []
     for keyboard in (False, True):
         way, good = "keyboard" if keyboard else "mouse", 0
         # put leaves the object on the board, take fetches it from there, give hands it back: the cell is as before
         for action in ("exchange_human_to_robot", "put", "take", "exchange_robot_to_human"):
             try:
                 good += operator.do(action, keyboard, f"{way}_{action}")
+                far.append(operator.distance_to_tf())
             except TimeoutError as error:
                 say(f"{action} by {way}: {error}")
+            recover(cell, operator)
         rows.append(row(f"exchange both ways, take and put by {way}", good, "actions", "4 of 4", good == 4))
-    return rows
+    away = max(far, default=None)
+    far_row = row(
+        f"hand in the 3D picture to tf, largest after {len(far)} actions",
+        away and round(1000 * away, 3),
+        "mm",
+        "<= 2",
+        away is not None and away <= 0.002,
+    )
+    return [*rows, far_row]
 
 
 # --- load -----------------------------------------------------------------------------------------------------
 
 
-def load_rows(cell: Cell) -> list[dict]:
+def load_rows(cell: Cell, _pictures: Path) -> list[dict]:
     uri = rosgraph.Master("/console_bench").lookupNode("/coglab_console")
     process = ServerProxy(uri).getPid("/console_bench")[2]
     share, rate = asyncio.run(load(cell.home, process))
@@ -156,27 +164,6 @@ def load_rows(cell: Cell) -> list[dict]:
         row(f"refused of {sent:.0f} requests a second by one browser", round(100 * refused, 1), "%", "told", True),
         row(f"state to another browser {beside}", round(states, 1), "Hz", ">= 28", states >= 28.0),
         row(f"longest STOP to its answer {beside}", round(1000 * stop, 1), "ms", "<= 100", stop <= 0.1),
-    ]
-
-
-def page_rows(cell: Cell) -> list[dict]:
-    """Size as it goes over the wire, and first paint of five loads with an empty cache."""
-    paints, sizes = [], []
-    for _ in range(5):
-        with Browser() as browser:
-            browser.open(fresh_link(cell.home))
-            time.sleep(2.0)
-            paints.append(browser.js("return performance.getEntriesByName('first-contentful-paint')[0].startTime"))
-            sizes.append(
-                browser.js(
-                    "return ['resource', 'navigation'].flatMap((kind) => performance.getEntriesByType(kind))"
-                    ".reduce((sum, one) => sum + one.encodedBodySize, 0)"
-                )
-            )
-    paint, size = statistics.median(paints) / 1000, max(sizes) / 1e6
-    return [
-        row("first paint, median of 5 loads", round(paint, 3), "s", "<= 1", paint <= 1.0),
-        row("page and libraries, compressed", round(size, 3), "MB", "<= 1", size <= 1.0),
     ]
 
 
@@ -240,46 +227,97 @@ def latency_rows(pairs: int) -> list[dict]:
     return rows
 
 
-def main() -> None:
-    signal.signal(signal.SIGTERM, lambda *_: sys.exit("ended by SIGTERM"))  # the cell ends with us
-    pictures = Path(os.environ.get("COGLAB_TOP", ".")) / "out" / "bench_console"
-    rows: list[dict] = []
-    parts = os.environ.get("CONSOLE_BENCH_PARTS", "page load stop actions phases latency").split()
-    if set(parts) - {"latency"}:
+# --- parts ----------------------------------------------------------------------------------------------------
+
+
+def with_cell(work: Callable[[Cell, Path], list[dict]]) -> Callable[[Path], list[dict]]:
+    """A part that needs a running cell with its console."""
+
+    def part(pictures: Path) -> list[dict]:
         cell = Cell(console=True)
         try:
             cell.connect()
-            if "page" in parts:
-                rows += page_rows(cell)
-            if "load" in parts:
-                rows += load_rows(cell)
-            if set(parts) & {"stop", "actions", "phases"}:
-                with Browser() as browser:
-                    browser.open(fresh_link(cell.home), 60.0)
-                    operator = Operator(browser, cell, pictures)
-                    take_control(browser)
-                    for part, work in (("stop", stop_rows), ("actions", action_rows), ("phases", phase_rows)):
-                        if part in parts:
-                            say(part)
-                            rows += work(cell, operator)
+            return work(cell, pictures)
         finally:
             cell.close()
-    if "latency" in parts:
-        if parts == ["latency"]:
-            rows += latency_rows(20 if os.environ.get("COGLAB_LONG") else 8)
-        else:  # a node belongs to one ROS master: the second cell gets a process of its own
-            environment = {**os.environ, "CONSOLE_BENCH_PARTS": "latency"}
-            done = subprocess.run([sys.executable, __file__], env=environment, stdout=subprocess.PIPE, check=True)
-            rows += json.loads(done.stdout)
+
+    return part
+
+
+def with_operator(work: Callable[[Cell, Operator], list[dict]]) -> Callable[[Path], list[dict]]:
+    """A part that needs a browser that operates, too."""
+
+    def part(cell: Cell, pictures: Path) -> list[dict]:
+        with Browser() as browser:
+            browser.open(fresh_link(cell.home), 60.0)
+            operator = Operator(browser, cell, pictures)
+            operator.take_control()
+            return work(cell, operator)
+
+    return with_cell(part)
+
+
+PARTS: dict[str, tuple[float, Callable[[Path], list[dict]]]] = {  # s that it may take, and the work
+    "page": (240.0, with_cell(page_rows)),
+    "load": (240.0, with_cell(load_rows)),
+    "tabs": (400.0, with_cell(tab_rows)),
+    "tablet": (400.0, with_cell(tablet_rows)),
+    "tunnel": (300.0, lambda pictures: tunnel_rows(pictures, free_port())),
+    "stop": (900.0, with_operator(stop_rows)),
+    "actions": (900.0, with_operator(action_rows)),
+    "phases": (1200.0, with_operator(phase_rows)),
+    "latency": (3600.0, lambda _: latency_rows(20 if os.environ.get("COGLAB_LONG") else 8)),
+}
+
+
+def missed(part: str, why: str) -> dict:
+    """The row of a part that gave no figures."""
+    return row(f"{part}: did not run: {why}", None, "", "runs", False)
+
+
+def in_own_process(part: str, limit: float) -> list[dict]:
+    """The rows of a part; nothing that it started outlives it. (A node belongs to one ROS master.)"""
+    with tempfile.TemporaryFile("w+") as output:
+        environment = {**os.environ, "CONSOLE_BENCH_PART": part}
+        status = process_tree.run([sys.executable, __file__], limit, stdout=output, env=environment)
+        if status is None:
+            return [missed(part, f"no end within {limit:.0f} s")]
+        output.seek(0)
+        try:
+            return json.loads(output.read())
+        except ValueError:
+            return [missed(part, f"exit status {status}")]
+
+
+def rows_of(part: str, pictures: Path) -> list[dict]:
+    """The part in this process; what it raises is its row."""
+    try:
+        return PARTS[part][1](pictures)
+    except Exception as error:
+        return [missed(part, f"{type(error).__name__}: {str(error).splitlines()[0][:200]}")]
+
+
+def end(number: int, _frame: object) -> None:
+    """Unwinds, so that what was started ends, also where a shell has SIGINT ignored."""
+    sys.exit(f"ended by {signal.Signals(number).name}")
+
+
+def main() -> None:
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, end)
+    own = os.environ.get("CONSOLE_BENCH_PART")
+    if own:
+        print(json.dumps(rows_of(own, Path(os.environ.get("COGLAB_TOP", ".")) / "out" / "bench_console")))
+        return
+    rows: list[dict] = []
+    for part in os.environ.get("CONSOLE_BENCH_PARTS", " ".join(PARTS)).split():
+        say(part)
+        found = in_own_process(part, PARTS[part][0]) if part in PARTS else [missed(part, f"parts: {', '.join(PARTS)}")]
+        for one in found:
+            verdict = "ok" if one["ok"] else "MISSED"
+            say(f"{verdict}: {one['figure']}: {one['value']} {one['unit']} (goal {one['goal']})")
+        rows += found
     print(json.dumps(rows))
-
-
-def take_control(browser: Browser) -> None:
-    """The browsers that measured before may hold the control; they are gone."""
-    operating = "return document.getElementById('role').innerText.startsWith('you operate')"
-    if not browser.js(operating):
-        browser.js("document.querySelector('#control button').click()")
-    browser.until(operating, 15.0)
 
 
 if __name__ == "__main__":

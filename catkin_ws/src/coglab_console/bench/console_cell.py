@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 import os
+import shutil
 import signal
 import socket
 import subprocess
@@ -13,15 +15,23 @@ from pathlib import Path
 
 import rospkg
 import rospy
+import tf2_ros
 from coglab_console.browser import Browser, press_and_hold
 from coglab_msgs.msg import LwrState, MasterState
 from coglab_msgs.srv import LwrCommand
+from console_rows import say
 from diagnostic_msgs.msg import DiagnosticArray
 from selenium.webdriver.common.action_chains import ActionChains
 from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
 
+STANDSTILL = ("stopped", "fault")
 READY = 120.0  # s until the hub
+ANSWERED = """
+const rows = coglab.events().filter((e) => e.seq > arguments[0] && e.source === 'stop').map((e) => e.text);
+const answers = rows.filter((text) => text.startsWith('STOP, ') || text.includes('cannot be asked')).length;
+return rows.filter((text) => text.startsWith('STOP by')).length === 2 && answers === 4;
+"""  # the page sends each press by its connection and by a request, the console each to the arm and to the brain
 
 
 def free_port() -> int:
@@ -34,7 +44,7 @@ def free_port() -> int:
 class Cell:
     """The launched system; `launch_console` and `end_console` for a console beside it."""
 
-    def __init__(self, console: bool) -> None:
+    def __init__(self, console: bool, hosts: str = "") -> None:
         self.home = Path(tempfile.mkdtemp(prefix="coglab-bench-"))
         port = free_port()
         os.environ.update(
@@ -44,13 +54,14 @@ class Cell:
             ROS_LOG_DIR=str(self.home / "log"),
             PYTHONUNBUFFERED="1",
         )
-        words = ["fri_period:=0.010", f"console:={str(console).lower()}", "console_port:=0"]
+        words = ["fri_period:=0.010", f"console:={str(console).lower()}", "console_port:=0", f"console_hosts:={hosts}"]
         launch = Path(rospkg.RosPack().get_path("coglab_bringup"), "launch", "coglab.launch")
         self._log = (self.home / "roslaunch.log").open("w")
         command = ["roslaunch", "-p", str(port), str(launch), *words]
         self._process = subprocess.Popen(command, stdout=self._log, stderr=subprocess.STDOUT)
         self._console: subprocess.Popen | None = None
         self.machine, self.arm = MasterState(), LwrState()
+        self.passed: list[str] = []  # states that were entered, see came_to()
         self.held_at = 0.0  # s of the bridge's own clock, when the hold latched last
         self.latencies: list[tuple[float, float]] = []  # (time, latency) s
         self.answers: list[tuple[float, float]] = []  # (time, mean answer time) s
@@ -63,10 +74,23 @@ class Cell:
         while not rosgraph.is_master_online() and time.monotonic() < end:
             time.sleep(0.2)
         rospy.init_node("console_bench", disable_signals=True)
-        rospy.Subscriber("/coglab/state", MasterState, lambda message: setattr(self, "machine", message))
+        self.frames = tf2_ros.Buffer()
+        self._listener = tf2_ros.TransformListener(self.frames)
+        rospy.Subscriber("/coglab/state", MasterState, self._on_machine)
         rospy.Subscriber("/lwr/state", LwrState, self._on_arm, tcp_nodelay=True)
         rospy.Subscriber("/diagnostics", DiagnosticArray, self._on_diagnostics)
         self.wait(lambda: self.machine.in_hub and "wait" in self.machine.state, READY, "the hub")
+
+    def _on_machine(self, message: MasterState) -> None:
+        self.machine = message
+        self.passed.append(message.state)
+
+    def came_to(self, action: str, label: str) -> bool:
+        """Whether this state of the action was entered since `passed` was cleared. TimeoutError where the machine has
+        stopped by itself."""
+        if self.leaf in STANDSTILL:
+            raise TimeoutError(f"{label}: the machine is in {self.leaf}: {self.machine.why}")
+        return any(action in path and path.endswith(f"/{label}") for path in list(self.passed))
 
     def _on_arm(self, message: LwrState) -> None:
         if message.hold_latched and not self.arm.hold_latched:
@@ -98,7 +122,7 @@ class Cell:
     def reset_arm(self) -> None:
         """Frees the arm's own latch; the machine stays where it is."""
         rospy.ServiceProxy("/lwr/command", LwrCommand)("reset")
-        self.wait(lambda: not self.arm.hold_latched, 3.0, "the end of the hold")
+        self.wait(lambda: not self.arm.hold_latched, 10.0, "the end of the hold")
 
     def launch_console(self) -> None:
         """A console beside the cell."""
@@ -115,10 +139,13 @@ class Cell:
 
     def close(self) -> None:
         """Ends everything."""
-        self.end_console()
-        self._process.send_signal(signal.SIGINT)
-        self._process.wait(60)
-        self._log.close()
+        try:
+            self.end_console()
+        finally:
+            self._process.send_signal(signal.SIGINT)
+            self._process.wait(60)
+            self._log.close()
+            shutil.rmtree(self.home, ignore_errors=True)
 
 
 class Operator:
@@ -126,6 +153,7 @@ class Operator:
 
     def __init__(self, browser: Browser, cell: Cell, pictures: Path) -> None:
         self.browser, self.cell, self.pictures = browser, cell, pictures
+        self.touches = False  # as on a tablet
 
     def button(self, action: str):
         """The element."""
@@ -146,12 +174,37 @@ class Operator:
             number = self.button(action).text.split()[0]
             self.browser.js("document.activeElement.blur()")
             ActionChains(self.browser.driver).send_keys(number).send_keys(Keys.ENTER).perform()
+        elif self.touches:
+            self.browser.touch(f"[data-action={action}]")
         else:
             self.button(action).click()
 
     def stop(self) -> None:
         """Space."""
         ActionChains(self.browser.driver).send_keys(Keys.SPACE).perform()
+
+    def answered(self, since: int) -> None:
+        """Waits until every way of the one STOP after event number `since` has its answer: one that is late would hold
+        the arm again after a reset, and would pass for the next press."""
+        self.browser.until(ANSWERED, 15.0, since)
+
+    def newest_event(self) -> int:
+        """Its number."""
+        return self.browser.js("return coglab.events().at(-1)?.seq ?? 0")
+
+    def take_control(self) -> None:
+        """Another browser may hold the control; it is gone."""
+        operating = "return document.getElementById('role').innerText.startsWith('you operate')"
+        if not self.browser.js(operating):
+            self.browser.js("document.querySelector('#control button').click()")
+        self.browser.until(operating, 15.0)
+
+    def distance_to_tf(self) -> float:
+        """From the hand in the picture to the hand in tf, m; the arm stands."""
+        self.browser.until("return coglab.state().speed < 0.001", 20.0)
+        place = self.cell.frames.lookup_transform("world", "ih2_palm", rospy.Time(0), rospy.Duration(5.0))
+        there = place.transform.translation
+        return math.dist(self.browser.js("return coglab.palm()"), (there.x, there.y, there.z))
 
     def do(self, action: str, keyboard: bool, name: str) -> bool:
         """One action from hub to hub; whether it succeeded."""
@@ -161,13 +214,26 @@ class Operator:
         self.browser.picture(self.pictures / f"{name}.png")
         self.cell.wait(lambda: self.cell.machine.in_hub, 90.0, f"the end of {action}")
         wanted = "wait_with_object" if action in ("exchange_human_to_robot", "take") else "wait_without_object"
-        return self.cell.leaf == wanted
+        done = self.cell.leaf == wanted
+        if not done:
+            say(f"{action} ended in {self.cell.leaf}: {self.cell.machine.why or 'no reason told'}")
+        return done
 
     def go_on(self) -> None:
-        """Acknowledge, then hold the button of reset, and wait for the hub."""
-        self.cell.wait(lambda: self.cell.leaf == "stopped", 15.0, "stopped")
-        self.browser.until("return document.getElementById('acknowledge').offsetParent !== null", 5.0)
-        self.browser.driver.find_element(By.ID, "acknowledge").click()
-        self.enabled("reset")
-        press_and_hold(self.browser, self.button("reset"), lambda: self.cell.leaf != "stopped", 8.0)
+        """Acknowledge where that is still to be done, then hold the button that leads on, and wait for the hub."""
+        self.cell.wait(lambda: self.cell.leaf in STANDSTILL, 15.0, "stopped")
+        leaf = self.cell.leaf
+        self.browser.until("return coglab.docs().desk.guard.hold", 5.0)
+        if self.browser.js("return coglab.docs().desk.guard.unacknowledged"):
+            self.browser.until("return document.getElementById('acknowledge').offsetParent !== null", 5.0)
+            if self.touches:
+                self.browser.touch("#acknowledge")
+            else:
+                self.browser.driver.find_element(By.ID, "acknowledge").click()
+        action = "reset" if leaf == "stopped" else "initialise"
+        self.enabled(action)
+        if self.touches:
+            self.browser.touch(f"[data-action={action}]", lambda: self.cell.leaf != leaf, 8.0)
+        else:
+            press_and_hold(self.browser, self.button(action), lambda: self.cell.leaf != leaf, 8.0)
         self.cell.wait(lambda: self.cell.machine.in_hub and self.cell.leaf.startswith("wait_"), 60.0, "the hub")

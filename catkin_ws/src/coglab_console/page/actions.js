@@ -26,7 +26,9 @@ export function armStop(button) {
   const press = () => {
     button.classList.add('pressed');
     setTimeout(() => button.classList.remove('pressed'), 300);
-    stop();
+    stop().then((answer) => {
+      if (!answer.success) refuse(`STOP has not been taken: ${answer.message}. If the arm moves, use the red button of the robot controller.`);
+    });
   };
   document.addEventListener('keydown', (event) => {
     if (isStop(event) || (event.target === button && event.key === 'Enter')) {

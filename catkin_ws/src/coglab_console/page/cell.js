@@ -61,17 +61,18 @@ export function ageWords(role) {
   return age < 1 ? `${Math.round(age * 1000)} ms old` : `${age.toFixed(age < 10 ? 1 : 0)} s old`;
 }
 
-/** Path and goal to show: { kind, points, goal }, or null. */
+/** Path and goal to draw: { kind, points, goal }, or null. */
 export function path() {
-  return store.docs.path ?? null;
+  return store.docs.path?.points.length ? store.docs.path : null;
 }
 
 export function viewWords() {
-  const shown = path();
+  const shown = store.docs.path;
   const model = store.docs.model;
   if (model && !model.robot) return 'No robot_description: the robot is not drawn.';
   if (store.state && !store.state.live) return 'No joint states: the arm is shown as it was last.';
   if (!shown) return '';
+  if (shown.kind === 'refused') return `▲ The next motion could not begin now: ${shown.reason}`;
   const kind = shown.kind === 'running' ? 'Path of this motion' : 'Path of the next motion, if it began now';
-  return `${kind}: ${shown.primitive}, ${shown.duration.toFixed(1)} s`;
+  return `${kind}: ${shown.motion}, ${shown.times[shown.times.length - 1].toFixed(1)} s`;
 }

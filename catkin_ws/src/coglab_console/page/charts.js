@@ -24,16 +24,14 @@ function limit(state) {
 let phases = []; // [from (s), label]
 let latest = 0;
 
-/** Speed of the path ahead or under way at the time since its phase began; 0 outside. */
+/** Speed of the newest path of the motion under way now; 0 without one. */
 function planned(state) {
   const shown = store.docs.path;
-  if (!shown || shown.kind !== 'running') return 0;
-  const part = 1 - state.dmp[3] / shown.duration;
-  const points = shown.points;
-  const i = Math.floor(part * (points.length - 1));
-  if (!(i >= 0) || i + 1 >= points.length) return 0;
-  const step = shown.duration / (points.length - 1);
-  return Math.hypot(...points[i].map((value, k) => points[i + 1][k] - value)) / step;
+  if (shown?.kind !== 'running') return 0;
+  const { points, times } = shown;
+  const i = times.findIndex((time) => time > Math.max(0, state.stamp - shown.stamp));
+  if (i < 1) return 0;
+  return Math.hypot(...points[i].map((value, k) => value - points[i - 1][k])) / (times[i] - times[i - 1]);
 }
 
 function remember(strip, state) {

@@ -6,11 +6,13 @@ const HEADERS = { 'Content-Type': 'application/json', 'X-CogLab-Console': '1' };
 const SILENCE = 700; // ms without a word after which the page is greyed
 const BEHIND = 500; // ms of age from which the page says how old it is
 const RETRY = 500; // ms
+const STOP_LIMIT = 2000; // ms until a STOP without an answer is told
 const GIVEN_UP = 2500; // ms without a word after which a connection that says it is open is taken to be dead
 
 let socket = null;
 let openedAt = -Infinity;
 let nextId = 1;
+let refusal = ''; // why the console lets this page in no more
 const waiting = new Map();
 
 /** A new connection in place of the one before, which is not listened to any more. */
@@ -18,7 +20,11 @@ function open() {
   const mine = new WebSocket(`ws://${location.host}/ws`);
   socket = mine;
   openedAt = performance.now();
-  mine.onopen = () => mine === socket && mine.send(JSON.stringify({ seq: store.seq, epoch: store.epoch }));
+  mine.onopen = () => {
+    if (mine !== socket) return;
+    refusal = '';
+    mine.send(JSON.stringify({ seq: store.seq, epoch: store.epoch }));
+  };
   mine.onmessage = (event) => {
     if (mine !== socket) return;
     const message = JSON.parse(event.data);
@@ -26,7 +32,20 @@ function open() {
     else take(message);
     if (message.t === 'state') mine.send(`{"t":"seen","n":${message.n}}`); // the next ones come only then
   };
-  mine.onclose = () => setTimeout(() => mine === socket && open(), RETRY);
+  mine.onclose = () => {
+    askWhy();
+    setTimeout(() => mine === socket && open(), RETRY);
+  };
+}
+
+/** A WebSocket is not told why it was refused; a console that was started anew knows this page no more. */
+async function askWhy() {
+  try {
+    const response = await fetch('/page/link.js', { method: 'GET', cache: 'no-store', signal: AbortSignal.timeout(2000) });
+    refusal = response.status === 401 ? (await response.json()).message : '';
+  } catch {
+    refusal = '';
+  }
 }
 
 /** A cable that was pulled closes nothing: the browser would wait for the network's own limit, many minutes. */
@@ -68,11 +87,17 @@ export function command(name, args = {}) {
   return post('/api/command', { name, arguments: args });
 }
 
-/** STOP: over the connection that stands, and besides by a request of its own. */
+/** STOP: over the connection that stands, and besides by a request of its own; the answer of whichever is first. */
 export function stop() {
-  const sent = send({ t: 'stop' });
-  const posted = post('/api/stop', {});
-  return sent ? Promise.resolve({ success: true, message: 'STOP was sent' }) : posted;
+  const sent = new Promise((resolve, reject) => {
+    if (!send({ t: 'stop' }, resolve)) reject(new Error('no connection'));
+  });
+  const posted = post('/api/stop', {}).then((answer) => (answer.success ? answer : Promise.reject(new Error(answer.message))));
+  const late = new Promise((resolve) => {
+    setTimeout(() => resolve({ success: false, message: `no answer for ${STOP_LIMIT / 1000} s` }), STOP_LIMIT);
+  });
+  const first = Promise.any([sent, posted]).catch((error) => ({ success: false, message: error.errors[1].message }));
+  return Promise.race([first, late]);
 }
 
 /** s from the moment when what is shown left the console until now, without what the fastest message took. */
@@ -87,7 +112,8 @@ function watch() {
   const age = 1000 * behind();
   document.body.classList.toggle('lost', lost);
   band.hidden = !lost && !(age > BEHIND);
-  if (lost) setText(band, Number.isFinite(silent) ? `NOT LIVE for ${Math.round(silent / 1000)} s` : 'NOT LIVE');
+  const since = Number.isFinite(silent) ? ` for ${Math.round(silent / 1000)} s` : '';
+  if (lost) setText(band, `NOT LIVE${since}${refusal && `: ${refusal}`}`);
   else if (age > BEHIND) setText(band, `${(age / 1000).toFixed(1)} s behind`);
   if (lost !== store.lost) {
     store.lost = lost;

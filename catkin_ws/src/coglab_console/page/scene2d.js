@@ -4,8 +4,8 @@ import { compose } from './kinematics.js';
 import { store } from './store.js';
 
 const VIEWS = [
-  { name: 'from the side', across: 0, up: 2, low: [-0.55, -0.35], high: [1.35, 1.2] },
-  { name: 'from above', across: 0, up: 1, low: [-0.55, -0.85], high: [1.35, 0.85] },
+  { name: 'from the side', across: 0, up: 2, low: [-0.55, -0.35], high: [1.6, 1.2] },
+  { name: 'from above', across: 0, up: 1, low: [-0.55, -0.85], high: [1.6, 0.85] },
 ];
 
 /** Ends of a shape's longest line and its half width, in the world. */
@@ -59,7 +59,7 @@ export class Scene2D {
     this.drawPath(context, at);
     context.fillStyle = '#1b1f24';
     context.font = '14px "DejaVu Sans", Verdana, sans-serif';
-    context.fillText(view.name, left + 8, height - 28);
+    context.fillText(view.name, left + 62, 20); // beside the button
   }
 
   drawWorkspace(context, view, at) {

@@ -46,6 +46,7 @@ export class Scene3D {
     this.canvas = this.renderer.domElement;
     this.canvas.setAttribute('role', 'img');
     this.canvas.setAttribute('aria-label', 'Arm, hands, object and path in three dimensions');
+    this.canvas.hidden = true; // black before the first picture
     parent.append(this.canvas);
     this.parent = parent;
     this.scene = new THREE.Scene();
@@ -176,6 +177,7 @@ export class Scene3D {
     }
     this.update();
     this.renderer.render(this.scene, this.camera);
+    this.canvas.hidden = false;
   }
 
   /** Place of the palm as the scene has it, m. */

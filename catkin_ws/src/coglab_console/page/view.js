@@ -44,7 +44,9 @@ export function showView(parent) {
   const flat = h('button', { type: 'button', 'aria-pressed': 'false', onclick: () => toggle() }, '2D');
   bar.append(...buttons, flat);
 
+  let camera = 'front';
   function look(name) {
+    camera = name;
     scene?.look(name);
     for (const button of buttons) setAttribute(button, 'aria-pressed', String(button.textContent === name));
   }
@@ -56,13 +58,13 @@ export function showView(parent) {
     const is2d = viewKind() === '2D';
     setAttribute(flat, 'aria-pressed', String(is2d));
     for (const button of buttons) button.hidden = is2d;
+    if (!is2d) look(camera);
   }
   let begun = false;
   onDocs(['model'], async () => {
     if (begun || !store.docs.model) return;
     begun = true;
     await make(parent, true);
-    look('front');
     show();
   });
   on('state', redraw);

@@ -6,6 +6,7 @@ import asyncio
 import contextlib
 import socket
 import time
+from collections.abc import Iterable
 from pathlib import Path
 
 import aiohttp
@@ -95,13 +96,13 @@ class RobotDouble:
 class Console:
     """One server and what stands behind it."""
 
-    def __init__(self, folder: Path, robot: RobotDouble, **files: object) -> None:
+    def __init__(self, folder: Path, robot: RobotDouble, hosts: Iterable[str] = (), **files: object) -> None:
         self.robot, self.socket = robot, socket.socket()
         self.socket.bind(("127.0.0.1", 0))
         self.port = self.socket.getsockname()[1]
         self.host = f"127.0.0.1:{self.port}"
         self.url, self.origin = f"http://{self.host}", f"http://{self.host}"
-        self.access = Access(allowed_hosts("127.0.0.1", self.port))
+        self.access = Access(allowed_hosts("127.0.0.1", self.port, hosts))
         self.events, self.documents = EventLog(time.time), Documents()
         self.desk = Desk(robot, self.events, self.documents, folder, time.time, self.link)
         page, self.missing = load_all(PAGE, **files)

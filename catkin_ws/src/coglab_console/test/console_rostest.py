@@ -21,13 +21,13 @@ import smach
 import smach_ros
 import tf2_ros
 from coglab_console.browser import Browser, fresh_link, press_and_hold
+from coglab_console.page_check import PAGES, look
 from coglab_msgs.msg import LwrState, MasterState
 from selenium.webdriver.common.action_chains import ActionChains
 from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
+from std_msgs.msg import String
 
-PAGES = ("Live", "Experiment", "Contact", "Objects", "Primitives", "Feedback", "Events", "Health", "Help")
-LOOK_AT_PAGE = (Path(__file__).with_name("look_at_page.js")).read_text()
 KNOWN = ("WebGL", "GPU stall", "willReadFrequently")  # of chromium about its own drawing
 
 
@@ -93,10 +93,10 @@ class Console(unittest.TestCase):
             with self.subTest(page=page):
                 self.browser.tab(page)
                 time.sleep(0.4)
-                found = self.browser.js(LOOK_AT_PAGE)
+                problems, texts = look(self.browser)
                 self.browser.picture(self.pictures / f"{page.lower()}.png")
-                self.assertEqual(found["problems"], [], json.dumps(found["problems"], indent=1))
-                self.assertGreater(found["texts"], 10)
+                self.assertEqual(problems, [], json.dumps(problems, indent=1))
+                self.assertGreater(texts, 10)
         self.browser.tab("Live")
         self.assertEqual(self.browser.js("return document.getElementById('band').className"), "simulation")
 
@@ -132,8 +132,8 @@ class Console(unittest.TestCase):
     def receive(self):
         """Once: whether the object is in the hand at the end; the machine may have stopped by itself."""
         self.ready("wait_without_object")
-        path = self.browser.until("return coglab.docs().path", 10.0)
-        self.assertEqual(path["kind"], "ahead")
+        path = self.browser.until("const p = coglab.docs().path; return p && p.kind === 'ahead' && p", 20.0)
+        self.assertGreater(len(path["points"]), 10)
         self.browser.js("document.activeElement.blur()")
         self.says("exchange_robot_to_human", "empty")
         self.enabled("exchange_human_to_robot").click()
@@ -273,6 +273,35 @@ class Console(unittest.TestCase):
         self.assertEqual({node["label"] for node in picture["nodes"]}, {"ALPHA", "BETA"})
         self.assertEqual([edge["outcomes"] for edge in picture["edges"]], ["on"])
 
+    def test_08b_notes_and_the_next_object_go_both_ways(self):
+        heard = {"note": [], "next_object": []}
+        for name, rows in heard.items():
+            rospy.Subscriber(f"/coglab/{name}", String, rows.append)
+        teller = {name: rospy.Publisher(f"/coglab/{name}", String, queue_size=5) for name in heard}
+        end = time.monotonic() + 10.0
+        while not all(one.get_num_connections() > 1 for one in teller.values()):  # this test and the console
+            self.assertLess(time.monotonic(), end, "the console does not listen")
+            time.sleep(0.05)
+        teller["note"].publish("cup slipped <b>twice</b>")
+        teller["next_object"].publish("ball")
+        self.browser.until("return coglab.events().some(e => e.text.endsWith('cup slipped <b>twice</b>'))", 10.0)
+        # The hand holds the mug, which the page goes on showing.
+        self.browser.until("return coglab.events().some(e => e.text.endsWith('the next object is ball'))", 10.0)
+        teller["next_object"].publish("../ball")
+        self.browser.until("return coglab.events().some(e => e.source === 'command' && e.level === 'warning')", 10.0)
+        self.browser.js("document.activeElement.blur()")
+        ActionChains(self.browser.driver).send_keys("m").send_keys("by hand").send_keys(Keys.TAB, Keys.ENTER).perform()
+        while not any(row.data == "by hand" for row in heard["note"]):
+            self.assertLess(time.monotonic(), end + 10.0, [row.data for row in heard["note"]])
+            time.sleep(0.05)
+        self.browser.tab("Live")
+        self.browser.js(
+            "const o = document.getElementById('object'); o.value = ''; o.dispatchEvent(new Event('change'))"
+        )
+        while not any(row.data == "" for row in heard["next_object"]):
+            self.assertLess(time.monotonic(), end + 20.0, [row.data for row in heard["next_object"]])
+            time.sleep(0.05)
+
     def test_09_a_second_console_of_this_master_is_refused_and_says_so(self):
         command = ["rosrun", "coglab_console", "console_node.py", "__name:=another_console"]
         ended = subprocess.run(command, capture_output=True, text=True, timeout=90)
@@ -295,7 +324,7 @@ class Console(unittest.TestCase):
             )
             other.until("return document.getElementById('status').innerText.includes('mug in the hand')", 20.0)
             other.picture(self.pictures / "flat.png")
-            self.assertEqual(other.js(LOOK_AT_PAGE)["problems"], [])
+            self.assertEqual(look(other)[0], [])
             place = self.frames.lookup_transform("world", "ih2_palm", rospy.Time(0)).transform.translation
             self.assertLess(
                 np.linalg.norm(np.array(other.js("return coglab.palm()")) - [place.x, place.y, place.z]), 0.002

@@ -8,6 +8,7 @@ import time
 import pytest
 from coglab_console.browser import Browser
 from coglab_console.desk.gates import Standing
+from coglab_console.page_check import PAGES, focus_order, look
 from console_double import PAGE_DOCUMENTS, READY, RobotDouble, page_state, running
 
 pytestmark = pytest.mark.skipif(
@@ -112,6 +113,25 @@ def test_a_page_that_is_behind_says_by_how_much(desk):
     page.until("return document.getElementById('lost').hidden", 10.0)
 
 
+@pytest.mark.parametrize(
+    "shown, words",
+    [
+        ({"kind": "refused", "reason": "goal is 0.8 m outside the box", "points": []}, "0.8 m outside"),
+        (
+            {"kind": "running", "motion": "reach_human", "stamp": 0.0, "goal": [0.4, 0, 0.3],
+             "points": [[0.1, 0, 0.3], [0.4, 0, 0.3]], "times": [0.0, 1.24]},
+            "Path of this motion: reach_human, 1.2 s",
+        ),
+    ],
+)  # fmt: skip
+def test_the_path_ahead_in_words(desk, shown, words):
+    page = desk.browser
+    robot = {"root": "world", "joints": [], "shapes": {}}
+    desk.loop.call_soon_threadsafe(desk.console.documents.put, "model", {**PAGE_DOCUMENTS["model"], "robot": robot})
+    desk.loop.call_soon_threadsafe(desk.console.documents.put, "path", shown)
+    page.until("return document.getElementById('view-words').textContent.includes(arguments[0])", 10.0, words)
+
+
 def test_a_click_on_a_disabled_button_says_why(desk):
     page = desk.browser
     button = "[data-action=exchange_robot_to_human]"
@@ -153,3 +173,44 @@ def test_a_button_is_held_by_touch(desk):
     touch("touchEnd")
     assert desk.robot.calls == [("home", {})]
     assert desk.robot.now == Standing(**READY)
+
+
+def test_a_tablet_has_stop_and_every_page_within_reach_of_a_finger(desk):
+    with Browser(size=(1024, 768), touch=True) as tablet:
+        tablet.open(desk.console.link())
+        assert tablet.js("return navigator.maxTouchPoints") > 0
+        for name in PAGES:
+            tablet.touch(f"#tab-{name}")
+            tablet.until("return document.getElementById('tab-' + arguments[0]).ariaSelected === 'true'", 5.0, name)
+            assert look(tablet)[0] == [], name
+        before = len(desk.robot.stops)
+        tablet.touch("#stop")
+        end = time.monotonic() + 10.0
+        while len(desk.robot.stops) == before and time.monotonic() < end:
+            time.sleep(0.02)
+        assert len(desk.robot.stops) > before
+
+
+def test_the_keyboard_reaches_everything_in_order_on_every_page(desk):
+    for name in PAGES:
+        desk.browser.tab(name)
+        names, problems = focus_order(desk.browser)
+        assert problems == [] and f"tab-{name}" in names, (name, problems)
+    desk.browser.tab("Live")
+
+
+def test_a_page_that_is_let_in_no_more_says_what_to_do_and_that_its_stop_went_nowhere(desk):
+    """As after the console was killed and started anew, which knows no session of before."""
+    with Browser() as page:
+        page.driver.execute_cdp_cmd("Page.addScriptToEvaluateOnNewDocument", {"source": IN_HAND})
+        page.open(desk.console.link())
+        mine = page.js("return document.getElementById('role').innerText.match(/browser [0-9]+/)[0]")
+        sessions = desk.console.access._sessions
+        (key,) = [key for key, one in sessions.items() if one.name == mine]
+        del sessions[key]
+        page.js("window.connections.at(-1).close()")
+        page.until("return document.getElementById('lost').textContent.includes('console.url')", 15.0)
+        stops = len(desk.robot.stops)
+        page.js("document.getElementById('stop').click()")
+        page.until("return document.getElementById('told').textContent.includes('red button')", 10.0)
+        assert len(desk.robot.stops) == stops

@@ -7,17 +7,20 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import yaml
 from coglab_console.ros import versions, wire
 from coglab_console.ros.words import phase
 from coglab_console.scene import path_ahead
 from coglab_console.scene.graph_layout import Container, Layout, roots
 from coglab_console.scene.primitives import LibraryError, load_library, shape_map
 from coglab_console.scene.primitives import document as library_document
-from coglab_console.scene.urdf_model import ModelError, RobotModel
+from coglab_console.scene.urdf_model import ModelError, RobotModel, transform
+from rospy import Time
 from scipy.spatial.transform import Rotation
 
 SOURCES = Path(__file__).resolve().parents[2]
 URDF = SOURCES / "lwr_description" / "urdf" / "lwr_ih2.urdf"
+OBJECTS = SOURCES / "coglab_objects" / "objects"
 LIBRARY = SOURCES / "coglab_controllers" / "config" / "primitives.xml"
 MACHINE = {
     "/M": Container(
@@ -164,19 +167,61 @@ MUG = {
 }
 
 
-def test_where_the_next_reach_would_end():
-    frames = {"object_mug": (0.6, 0.1, 0.3, 0, 0, 0, 1), "human_hand": (0.7, 0.0, 0.4, 0, 0, 0, 1)}
-    name, ratio, goal = path_ahead.aim("exchange_human_to_robot", MUG, frames)
-    assert (name, ratio) == ("r", 1.0) and np.allclose(goal, [0.6, 0.1 - 0.04 - 0.025, 0.35])
-    name, _, goal = path_ahead.aim("exchange_robot_to_human", MUG, frames)
-    assert name == "g" and np.allclose(goal, [0.6, -0.04, 0.4])
+def test_what_the_brain_would_ask_for():
+    asked = path_ahead.aim("exchange_human_to_robot", MUG, "person")
+    assert (asked["primitive_id"], asked["dmp_ratio"], asked["goal_frame"]) == ("r", 1.0, "object_mug")
+    assert np.allclose(asked["goal_offset"], [0.0, -0.04 - 0.025, 0.05])
+    assert np.allclose(asked["target_orientation"], [0.5, 0.5, 0.5, 0.5])
+    asked = path_ahead.aim("exchange_robot_to_human", MUG, "person")
+    assert (asked["primitive_id"], asked["goal_frame"]) == ("g", "person")
+    assert np.allclose(asked["goal_offset"], [-0.1, -0.04, 0.0])
+
+
+@pytest.mark.parametrize("name", sorted(path.stem for path in OBJECTS.glob("*.yaml")))
+def test_it_is_what_the_brain_asks_for(name):
+    """For every object of the database, and both roles: the goal that the state machines make."""
+    from coglab_smach.kinematics.goals import delivery_goal, grasp_goal
+
+    entry = yaml.safe_load((OBJECTS / f"{name}.yaml").read_text())
+    grasp = entry["grasps"][entry["default_grasp"]]
+    goals = {"exchange_human_to_robot": grasp_goal(entry, grasp, entry["frame"], "receive")}
+    if entry.get("default_delivery"):
+        delivery = entry["deliveries"][entry["default_delivery"]]
+        goals["exchange_robot_to_human"] = delivery_goal(entry, grasp, delivery, "human_hand")
+    for action, goal in goals.items():
+        asked = path_ahead.aim(action, entry, "human_hand")
+        assert (asked["primitive_id"], asked["goal_frame"]) == (goal["primitive"], goal["frame"])
+        assert asked["dmp_ratio"] == goal["dmp_ratio"]
+        assert np.allclose(asked["goal_offset"], goal["offset"])
+        assert np.allclose(asked["target_orientation"], goal["orientation"])
 
 
 @pytest.mark.parametrize(
-    "entry", [{}, {"grasps": None}, {**MUG, "frame": "gone"}, {**MUG, "grasps": {"side": {"pose": {"xyz": "x"}}}}]
+    "entry",
+    [{}, {"grasps": None}, {**MUG, "frame": None, "dmp": 3}, {**MUG, "grasps": {"side": {"pose": {"xyz": "x"}}}}],
 )
 def test_nobody_knows_where(entry):
-    assert path_ahead.aim("take", entry, {"object_mug": (9.0, 0, 0, 0, 0, 0, 1)}) is None
+    assert path_ahead.aim("take", entry, "human_hand") is None
+
+
+def test_a_predicted_path_for_the_page():
+    from coglab_msgs.msg import PredictedPath
+    from geometry_msgs.msg import Point, Pose
+
+    path = PredictedPath(motion="reach_human", times=[0.0, 0.5])
+    path.header.stamp = Time(5, 250000000)
+    path.poses = [Pose(position=Point(0.1, 0.2, 0.3)), Pose(position=Point(0.4, 0.2, 0.3))]
+    base = transform([1.0, 0.0, 0.0], Rotation.from_euler("z", 90, degrees=True))
+    shown = path_ahead.document("running", path, base)
+    assert shown["points"] == [[0.8, 0.1, 0.3], [0.8, 0.4, 0.3]] and shown["goal"] == shown["points"][-1]
+    assert (shown["kind"], shown["motion"], shown["stamp"], shown["times"]) == (
+        "running",
+        "reach_human",
+        5.25,
+        [0, 0.5],
+    )
+    shown = path_ahead.refused("goal frame 'x' is not known; start perception " + 300 * "!")
+    assert shown == {"kind": "refused", "reason": "goal frame 'x' is not known", "points": []}
 
 
 # --- bytes and words ------------------------------------------------------------------------------------------
@@ -184,7 +229,6 @@ def test_nobody_knows_where(entry):
 
 def test_bytes_against_the_messages_own_decoding():
     from geometry_msgs.msg import Quaternion, TransformStamped, Vector3
-    from rospy import Time
     from tf2_msgs.msg import TFMessage
 
     message = TFMessage()

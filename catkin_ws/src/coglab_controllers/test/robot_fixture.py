@@ -26,6 +26,7 @@ from coglab_msgs.srv import (
     LoadController,
     LoadDmps,
     LwrCommand,
+    PredictDmp,
     SetSpeedScale,
     SwitchController,
     SwitchDmp,
@@ -42,7 +43,12 @@ SERVICES = {
     "get_active_controller": GetActiveController,
     "speed_scale": SetSpeedScale,
 }
-DMP_SERVICES = {"load_dmps": LoadDmps, "execute_dmp": ExecuteDmp, "switch_dmp": SwitchDmp}
+DMP_SERVICES = {
+    "load_dmps": LoadDmps,
+    "execute_dmp": ExecuteDmp,
+    "predict_dmp": PredictDmp,
+    "switch_dmp": SwitchDmp,
+}
 
 
 def wait_until(condition: Callable[[], bool], seconds: float, what: str) -> None:

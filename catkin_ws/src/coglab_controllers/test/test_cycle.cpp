@@ -135,7 +135,7 @@ TEST(Cycle, NeitherAllocatesNorLocksWhileServicesAreCalled) {
   int loaded = 0;
   ASSERT_TRUE(
       VirtualRobot::ok(dmp.loadDmps(std::string(PACKAGE_DIR) + "/config/primitives.xml", loaded)));
-  int requests = 0, accepted = 0;
+  int requests = 0, accepted = 0, paths = 0;
   const auto count = [&](bool success) {
     ++requests;
     if (success) ++accepted;
@@ -156,6 +156,7 @@ TEST(Cycle, NeitherAllocatesNorLocksWhileServicesAreCalled) {
       GoalObservation& seen = frames.frames["human_hand"];
       seen.stamp_ns = seen.frame_ns = manager.now_ns();
       dmp.pollGoal();
+      dmp.askPath();
       std::this_thread::sleep_for(std::chrono::microseconds(500));
     }
     request.primitive_id = "give_human";
@@ -167,6 +168,7 @@ TEST(Cycle, NeitherAllocatesNorLocksWhileServicesAreCalled) {
     count(manager.switchTo("ptp", type).success);
     const double turn = 0.1 * (round % 3);
     for (int i = 0; i < 3; ++i) {
+      ptp.askPath();
       count(ptp.add({{-1.4 + turn, -0.6, 1.5, 1.7, 0.2, 0.2, 0.8}, {}, {}}).id >= 0);
     }
     count(manager.feedback().disable("limits", true).ok());
@@ -176,6 +178,11 @@ TEST(Cycle, NeitherAllocatesNorLocksWhileServicesAreCalled) {
     EndedMotion end;
     while (ptp.readEnd(end)) {
     }
+    PredictedPath path;
+    if (dmp.readPath(path)) ++paths;
+    if (ptp.readPath(path)) ++paths;
+    request.primitive_id = "reach_human";
+    if (dmp.predict(request, path).success) ++paths;  // beside the motion under way
     manager.report();
   }
   stop = true;
@@ -184,6 +191,7 @@ TEST(Cycle, NeitherAllocatesNorLocksWhileServicesAreCalled) {
   EXPECT_GT(moving.load(), kCycles / 100);
   EXPECT_GT(requests, 300);
   EXPECT_GT(accepted, requests / 2);
+  EXPECT_GT(paths, 20);
   EXPECT_EQ(allocations.load(), 0u);
   EXPECT_EQ(locks.load(), 0u);
   const auto calls = static_cast<int>(SystemCalls::count() - calls_before);

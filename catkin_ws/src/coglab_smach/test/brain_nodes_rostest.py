@@ -16,7 +16,7 @@ import numpy as np
 import rospy
 import rostest
 import yaml
-from coglab_msgs.msg import Contact, MasterState, ReasonCode, Transition
+from coglab_msgs.msg import Contact, ContactSignal, MasterState, ReasonCode, Transition
 from coglab_msgs.srv import ArmContact, GetObject, ListObjects, Start
 from coglab_smach.contact.torque_signal import TorqueSignal
 from coglab_smach.kinematics.reachability import default_arm, home_posture, position_jacobian
@@ -73,16 +73,26 @@ class BrainNodes(unittest.TestCase):
 
     def test_2_contact_is_published_once(self):
         torques = Torques()
-        events = []
+        events, seen = [], []
         rospy.Subscriber("/coglab/contact", Contact, events.append)
+        rospy.Subscriber("/contact_detector/signal", ContactSignal, seen.append)
+        learn = service("/contact_detector/learn", Trigger)
+        self.assertIn("no torques come", learn().message)
+        self.assertEqual(seen, [], "a signal without torques")
         torques.start()
         try:
             arm = service("/contact_detector/arm", ArmContact)
             time.sleep(2.0)
+            self.learns(learn, seen)
             self.assertEqual(arm(mode="juggle", timeout=1.0).reason_code, ReasonCode.INVALID_ARGUMENT)
             self.assertFalse(arm(mode="release", timeout=1.0).success)
-            self.assertTrue(arm(mode="contact", timeout=20.0).success)
+            self.assertTrue(arm(mode="contact", timeout=20.0, joints=[1, 2, 4]).success)
             time.sleep(1.5)
+            self.assertEqual((seen[-1].state, seen[-1].mode), ("watching", "contact"))
+            self.assertEqual([j + 1 for j in range(7) if seen[-1].watched[j]], [1, 2, 4])
+            self.assertTrue(0.0 < seen[-1].margin < 1.0)
+            self.assertIn("armed for contact", learn().message)
+            seen.clear()
             self.assertEqual(events, [], "a false alarm at rest")
             torques.force = np.array([0.0, 8.0, 0.0])
             end = time.monotonic() + LIMIT
@@ -93,9 +103,33 @@ class BrainNodes(unittest.TestCase):
             self.assertTrue(events[0].contact and events[0].source == "joint_torque" and events[0].margin > 1.0)
             self.assertEqual(events[0].reason_code, ReasonCode.CONTACT_FOUND)
             self.assertTrue(0.5 < events[0].confidence <= 1.0)
+            self.assertTrue(any(abs(m.change[j]) > m.threshold[j] for m in seen for j in (0, 1, 3)))
             self.assertTrue(arm(mode="off").success)
+            seen.clear()
+            self.until(lambda: seen and seen[-1].state == "off", "off")
         finally:
             torques.over = True
+
+    def until(self, ready, what):
+        """Waits for it."""
+        end = time.monotonic() + LIMIT
+        while not ready():
+            self.assertLess(time.monotonic(), end, what)
+            time.sleep(0.02)
+
+    def learns(self, learn, seen):
+        """The noise at rest anew, as the signal tells it: thresholds are k standard deviations of what was learnt."""
+        self.until(lambda: seen and seen[-1].learnt, "learnt at the start")
+        first, last = seen[0].header.stamp.to_sec(), seen[-1].header.stamp.to_sec()
+        self.assertLess(len(seen) / max(last - first, 1e-3), 25.0, "about 20 Hz")
+        self.assertTrue(all(value > 0.0 for value in seen[-1].threshold) and all(seen[-1].watched))
+        self.assertEqual((seen[-1].state, seen[-1].mode, seen[-1].margin), ("off", "", 0.0))
+        samples = seen[-1].rest_samples
+        seen.clear()
+        answer = learn()
+        self.assertTrue(answer.success, answer.message)
+        self.until(lambda: any(not m.learnt and m.rest_samples < samples for m in seen), "forgotten")
+        self.until(lambda: seen[-1].learnt, "learnt anew")
 
     def test_3_object_database(self):
         self.assertEqual(
@@ -161,6 +195,8 @@ class BrainNodes(unittest.TestCase):
         self.assertEqual((state.why, state.reason_code), (why, ReasonCode.NODE_SILENT))
         self.assertTrue(why.endswith("type: ./coglab start initialise") and answer.message.endswith("start initialise"))
         self.assertEqual(answer.reason_code, ReasonCode.WRONG_STATE)
+        waits = []
+        rospy.Subscriber("/coglab/state", MasterState, waits.append)
         self.assertTrue(start("initialise", "").success)
         end = time.monotonic() + LIMIT
         while not any("is its node running?" in t.reason for t in transitions) and time.monotonic() < end:
@@ -168,6 +204,14 @@ class BrainNodes(unittest.TestCase):
         self.assertTrue(
             any("is its node running?" in t.reason and t.reason_code == ReasonCode.NODE_SILENT for t in transitions)
         )
+        # What it waited for, and until when, was told while it waited.
+        limited = [m for m in waits if m.waits_for]
+        ahead = [(m.deadline - m.header.stamp).to_sec() for m in limited]
+        self.assertTrue(all(0.0 < seconds < 120.0 for seconds in ahead), ahead)
+        vision = [s for s, m in zip(ahead, limited, strict=True) if m.waits_for == "start of perception"]
+        self.assertTrue(any(3.0 < seconds <= 4.0 for seconds in vision), [(m.state, m.waits_for) for m in limited])
+        self.until(lambda: waits[-1].state.endswith("/fault"), "fault again")
+        self.assertEqual((waits[-1].waits_for, waits[-1].deadline.to_sec()), ("", 0.0))
 
     def test_6_a_second_one_in_its_own_namespace_ends_without_a_traceback(self):
         config = rospy.get_param("/coglab/config_file")

@@ -31,7 +31,7 @@ NO_GL = ("--disable-gpu", "--disable-3d-apis")
 class Browser:
     """One browser with a profile of its own; `driver` is selenium's. Closes with the context."""
 
-    def __init__(self, webgl: bool = True, size: tuple[int, int] = SIZE) -> None:
+    def __init__(self, webgl: bool = True, size: tuple[int, int] = SIZE, touch: bool = False) -> None:
         from selenium import webdriver
 
         options = webdriver.ChromeOptions()
@@ -45,8 +45,10 @@ class Browser:
         # the page itself gets this size, whatever the window's frame takes
         self.driver.execute_cdp_cmd(
             "Emulation.setDeviceMetricsOverride",
-            {"width": size[0], "height": size[1], "deviceScaleFactor": 1, "mobile": False},
+            {"width": size[0], "height": size[1], "deviceScaleFactor": 1, "mobile": touch},
         )
+        if touch:
+            self.driver.execute_cdp_cmd("Emulation.setTouchEmulationEnabled", {"enabled": True, "maxTouchPoints": 5})
 
     def __enter__(self) -> Browser:
         return self
@@ -93,6 +95,24 @@ class Browser:
     def tab(self, name: str) -> None:
         """Goes to a page of the console."""
         self.js("document.getElementById('tab-' + arguments[0]).click()", name)
+
+    def touch(self, selector: str, done: Callable[[], bool] = lambda: True, limit: float = 5.0) -> None:
+        """Puts a finger on the middle of an element until `done()`, as on a tablet. TimeoutError after `limit` s."""
+        x, y = self.js(
+            "const e = document.querySelector(arguments[0]); e.scrollIntoView({ block: 'nearest', inline: 'nearest' });"
+            "const b = e.getBoundingClientRect(); return [b.left + b.width / 2, b.top + b.height / 2]",
+            selector,
+        )
+        send = self.driver.execute_cdp_cmd
+        send("Input.dispatchTouchEvent", {"type": "touchStart", "touchPoints": [{"x": x, "y": y}]})
+        end = time.monotonic() + limit
+        try:
+            while not done():
+                if time.monotonic() > end:
+                    raise TimeoutError(f"touching {selector} did nothing within {limit:.0f} s; {self.summary()}")
+                time.sleep(0.05)
+        finally:
+            send("Input.dispatchTouchEvent", {"type": "touchEnd", "touchPoints": []})
 
     def picture(self, path: Path) -> None:
         """Keeps what is seen now."""

@@ -53,7 +53,8 @@ RunnerPolicy dmpPolicy() {
 
 DmpController::DmpController()
     : MotionRunner<DmpPlan>(std::make_unique<DmpCycle>(goals_), dmpPolicy()),
-      cycle_(static_cast<DmpCycle*>(&inner())) {}
+      cycle_(static_cast<DmpCycle*>(&inner())),
+      imagined_(goals_) {}
 
 void DmpController::configure(const MotionSetup& setup) {
   const Parameters parameters(setup.parameters, setup.id);
@@ -65,6 +66,8 @@ void DmpController::configure(const MotionSetup& setup) {
   max_initial_distance_ = parameters.number("max_initial_distance", 0.1, 0.0, 1.0);
   goals_.configure(dmp_frame_, readGoalGate(parameters), *setup.host);
   MotionRunner<DmpPlan>::configure(setup);
+  MotionConfiguration configuration(setup);
+  imagined_.configure(configuration);
   const std::string file = parameters.text("dmp_file", "");
   if (file.empty()) return;
   int loaded = 0;
@@ -85,6 +88,9 @@ Reason DmpController::unwelcome(const DmpPlan& plan) const {
 
 void DmpController::report(std::int64_t stamp_ns) {
   progress_.write(cycle_->progress(stamp_ns, state(), reason()));
+  if (stage() == RunnerStage::Moving) {
+    snapshots_.give([&] { return cycle_->snapshot(stamp_ns); });
+  }
 }
 
 void DmpController::resolve(const CycleInput& input, References& references) {
@@ -115,6 +121,33 @@ Answer DmpController::ask(const DmpRequest& request, bool execute) {
   const Answer answer = offer(begun, plan, false);
   if (answer.success && execute) goals_.follow(request.goal_frame, plan.goal);
   return answer;
+}
+
+bool DmpController::readPath(PredictedPath& path) {
+  DmpSnapshot now;
+  if (!snapshots_.read(now)) return false;
+  path = {now.stamp_ns, now.primitive.str(), rollOut(now.motion, now.goal, now.motion.rate())};
+  return true;
+}
+
+Answer DmpController::predict(const DmpRequest& request, PredictedPath& path) {
+  DmpPlan plan;
+  const Answer checked = check(request, true, plan);
+  if (!checked.success) return checked;
+  CycleInput input;
+  input.robot = setup().host->robotSnapshot();
+  if (input.robot.sequence == 0) {
+    return Answer::refusal(ReasonCode::RobotDisconnected,
+                           "no joint state has come yet; is the arm there?");
+  }
+  SetPoint from;
+  from.pose = setup().robot->chain.evaluate(input.robot.commanded_position).tool;
+  const std::lock_guard<std::mutex> lock(predict_mutex_);
+  imagined_.start({plan, from, input});
+  const DmpSnapshot begun = imagined_.snapshot(setup().host->now_ns());
+  imagined_.stop();
+  path = {begun.stamp_ns, request.primitive_id, rollOut(begun.motion, begun.goal)};
+  return {};
 }
 
 Answer DmpController::check(const DmpRequest& request, bool execute, DmpPlan& plan) {

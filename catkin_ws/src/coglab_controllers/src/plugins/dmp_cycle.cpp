@@ -121,8 +121,8 @@ void DmpCycle::execute(const MotionStart<DmpPlan>& start) {
   request_ = plan.goal.request;
   gate_ = GoalGate(plan.hand.in_goal_frame ? frame_gate_ : topic_gate_);
   gate_.reset(plan.goal);
-  bool projected = false;
-  motion_.start(plan.motion, pose, velocity, angular, inWorkspace(hand_.at(plan.goal), projected));
+  goal_ = inWorkspace(hand_.at(plan.goal), projected_);
+  motion_.start(plan.motion, pose, velocity, angular, goal_);
   reference_.pose = pose;
   jumps_ = plan.given;
 }

@@ -1,5 +1,6 @@
 #include "coglab_controllers/plugins/ptp_controller.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <sstream>
 #include <stdexcept>
@@ -43,6 +44,7 @@ class PtpMotion : public Motion<PtpTarget> {
     trajectory_ = PtpTrajectory(start.from.joints, start.from.joint_velocity, to.position,
                                 to.velocity, to.acceleration, joints_);
     time_ = 0.0;
+    rate_ = 1.0;
   }
   void computeReference(const MotionCycle& cycle, MotionReference& reference) override {
     PtpPoint now, next;
@@ -50,15 +52,20 @@ class PtpMotion : public Motion<PtpTarget> {
     trajectory_.at(cycle.next, next);
     reference.joints(now.position, next.position);
     time_ = cycle.next;
+    rate_ = cycle.input.time_scale;
   }
   MotionState state() const override {
     return time_ >= trajectory_.duration() ? MotionState::Reached : MotionState::Running;
   }
 
+  PtpSnapshot snapshot(std::int64_t stamp_ns, int id) const {
+    return {stamp_ns, id, trajectory_, time_, rate_};
+  }
+
  private:
   int joints_ = kMaxJoints;
   PtpTrajectory trajectory_;
-  double time_ = 0.0;
+  double time_ = 0.0, rate_ = 1.0;
 };
 
 RunnerPolicy ptpPolicy() {
@@ -112,6 +119,30 @@ Answer PtpController::readTarget(const PtpRequest& request, PtpTarget& target) c
   return Answer::refusal(
       ReasonCode::GoalOutsideWorkspace,
       std::string("position puts the hand outside the workspace: ") + describe(border));
+}
+
+void PtpController::report(std::int64_t stamp_ns) {
+  moving_.store(stage() != RunnerStage::Rest, std::memory_order_relaxed);
+  if (stage() != RunnerStage::Moving) return;
+  snapshots_.give(
+      [&] { return static_cast<const PtpMotion&>(inner()).snapshot(stamp_ns, runningId()); });
+}
+
+bool PtpController::readPath(PredictedPath& path) {
+  PtpSnapshot now;
+  if (!snapshots_.read(now)) return false;
+  path = {now.stamp_ns, "ptp " + std::to_string(now.id), {}};
+  const double rate = std::clamp(now.rate, kSlowestClock, 1.0);
+  const double left = std::max(0.0, now.trajectory.duration() - now.time);
+  for (int i = 0; i <= kPathPoints; ++i) {
+    const double ahead = left * i / kPathPoints;
+    PtpPoint point;
+    now.trajectory.at(now.time + ahead, point);
+    path.path.times.push_back(ahead / rate);
+    path.path.poses.push_back(setup().robot->chain.evaluate(point.position).tool);
+    if (left == 0.0) break;  // times grow
+  }
+  return true;
 }
 
 MotionAnswer PtpController::add(const PtpRequest& request) {

@@ -10,12 +10,14 @@
 #include "coglab_controllers/manager/plugin_registry.hpp"
 #include "coglab_controllers/plugins/dmp_controller.hpp"
 #include "coglab_controllers/ros/motion_controller_ros.hpp"
+#include "coglab_controllers/ros/path_topic.hpp"
 #include "coglab_controllers/ros/tf_goal_source.hpp"
 #include "coglab_msgs/DmpFeedback.h"
 #include "coglab_msgs/DmpGoal.h"
 #include "coglab_msgs/ExecuteDmp.h"
 #include "coglab_msgs/IkDebug.h"
 #include "coglab_msgs/LoadDmps.h"
+#include "coglab_msgs/PredictDmp.h"
 #include "coglab_msgs/SwitchDmp.h"
 
 namespace coglab_controllers {
@@ -34,15 +36,7 @@ void write(const Vector3& v, Point& point) {
   point.z = v.z();
 }
 
-void write(const Pose& pose, geometry_msgs::Pose& message) {
-  write(pose.position, message.position);
-  message.orientation.x = pose.orientation.x();
-  message.orientation.y = pose.orientation.y();
-  message.orientation.z = pose.orientation.z();
-  message.orientation.w = pose.orientation.w();
-}
-
-/// What execute_dmp and switch_dmp have in common.
+/// What execute_dmp, predict_dmp and switch_dmp have in common.
 template <typename Request>
 DmpRequest readRequest(const Request& request) {
   DmpRequest result;
@@ -52,6 +46,17 @@ DmpRequest readRequest(const Request& request) {
   result.orientation_control = request.orientation_control;
   const auto& q = request.target_orientation;
   result.target_orientation = Eigen::Vector4d(q.x, q.y, q.z, q.w);
+  return result;
+}
+
+/// All of execute_dmp, or of predict_dmp, which has the same fields.
+template <typename Request>
+DmpRequest readWhole(const Request& request) {
+  DmpRequest result = readRequest(request);
+  result.initial_state = request.initial_state;
+  result.initial_position = toVector(request.initial_position);
+  result.initial_velocity = toVector(request.initial_velocity);
+  result.goal_frame = request.goal_frame;
   return result;
 }
 
@@ -77,6 +82,8 @@ class DmpControllerRos : public MotionControllerRos {
     services_[0] = node_.advertiseService("load_dmps", &DmpControllerRos::onLoad, this);
     services_[1] = node_.advertiseService("execute_dmp", &DmpControllerRos::onExecute, this);
     services_[2] = node_.advertiseService("switch_dmp", &DmpControllerRos::onSwitch, this);
+    services_[3] = node_.advertiseService("predict_dmp", &DmpControllerRos::onPredict, this);
+    path_.attach(node_, controller_->dmpFrame());
     bool debug = false;  // the first reading asks the master; all others must not
     node_.getParamCached("enable_ik_debug", debug);
   }
@@ -86,6 +93,7 @@ class DmpControllerRos : public MotionControllerRos {
   void spinOnce() override {
     publishDebug();
     publishFeedback();
+    path_.spin(*controller_, moving());
     // Once a second: the parameter may be changed while running. The master tells of a change.
     if (++calls_ % 200 == 0) {
       bool debug = controller_->ikDebug();
@@ -96,6 +104,7 @@ class DmpControllerRos : public MotionControllerRos {
  private:
   using LoadDmps = coglab_msgs::LoadDmps;
   using ExecuteDmp = coglab_msgs::ExecuteDmp;
+  using PredictDmp = coglab_msgs::PredictDmp;
   using SwitchDmp = coglab_msgs::SwitchDmp;
 
   bool onLoad(LoadDmps::Request& request, LoadDmps::Response& response) {
@@ -110,12 +119,18 @@ class DmpControllerRos : public MotionControllerRos {
   }
 
   bool onExecute(ExecuteDmp::Request& request, ExecuteDmp::Response& response) {
-    DmpRequest asked = readRequest(request);
-    asked.initial_state = request.initial_state;
-    asked.initial_position = toVector(request.initial_position);
-    asked.initial_velocity = toVector(request.initial_velocity);
-    asked.goal_frame = request.goal_frame;
-    return reply("execute_dmp", controller_->execute(asked), response);
+    return reply("execute_dmp", controller_->execute(readWhole(request)), response);
+  }
+
+  /// Somebody looks ahead again and again: a refusal is no news for the log.
+  bool onPredict(PredictDmp::Request& request, PredictDmp::Response& response) {
+    PredictedPath path;
+    const Answer answer = controller_->predict(readWhole(request), path);
+    if (answer.success) response.path = toMessage(path, controller_->dmpFrame());
+    response.success = answer.success;
+    response.reason_code = answer.number();
+    response.message = answer.message;
+    return true;
   }
 
   bool onSwitch(SwitchDmp::Request& request, SwitchDmp::Response& response) {
@@ -170,16 +185,18 @@ class DmpControllerRos : public MotionControllerRos {
     }
   }
 
+  bool moving() const {
+    return progress_.state == MotionState::Running || progress_.state == MotionState::Holding;
+  }
+
   void publishFeedback() {
     const MotionState before = progress_.state;
     const ReasonCode code = progress_.reason.code();
     if (!controller_->readProgress(progress_)) return;
     broadcastGoal();
     const bool changed = progress_.state != before || progress_.reason.code() != code;
-    const bool moving =
-        progress_.state == MotionState::Running || progress_.state == MotionState::Holding;
     // 50 Hz while it moves, 5 Hz otherwise, and every change at once.
-    if (!changed && calls_ - last_feedback_ < (moving ? 4u : 40u)) return;
+    if (!changed && calls_ - last_feedback_ < (moving() ? 4u : 40u)) return;
     last_feedback_ = calls_;
     coglab_msgs::DmpFeedback message;
     message.header.stamp = toRos(progress_.stamp_ns);
@@ -201,10 +218,8 @@ class DmpControllerRos : public MotionControllerRos {
 
   /// The goal as a tf2 frame, 33 times a second while a motion runs: what rviz and recorders show.
   void broadcastGoal() {
-    const bool moving =
-        progress_.state == MotionState::Running || progress_.state == MotionState::Holding;
     const std::string& frame = controller_->goalTfFrame();
-    if (!moving || frame.empty() || progress_.stamp_ns == 0 || calls_ - last_goal_ < 6) return;
+    if (!moving() || frame.empty() || progress_.stamp_ns == 0 || calls_ - last_goal_ < 6) return;
     last_goal_ = calls_;
     geometry_msgs::TransformStamped message;
     message.header.stamp = toRos(progress_.stamp_ns);
@@ -225,7 +240,8 @@ class DmpControllerRos : public MotionControllerRos {
   std::unique_ptr<TfGoalSource> source_;
   ros::Publisher feedback_, debug_;
   ros::Subscriber goal_;
-  ros::ServiceServer services_[3];
+  ros::ServiceServer services_[4];
+  PathTopic path_;
   DmpProgress progress_;
   std::uint64_t calls_ = 0, last_feedback_ = 0, last_goal_ = 0;
   std::uint64_t goals_refused_ = 0;  // dmp_goal

@@ -4,6 +4,7 @@
 #include "coglab_controllers/manager/plugin_registry.hpp"
 #include "coglab_controllers/plugins/ptp_controller.hpp"
 #include "coglab_controllers/ros/motion_controller_ros.hpp"
+#include "coglab_controllers/ros/path_topic.hpp"
 #include "coglab_msgs/AddPtp.h"
 #include "coglab_msgs/FinishedPtp.h"
 #include "coglab_msgs/UnfinishedPtp.h"
@@ -20,6 +21,7 @@ class PtpControllerRos : public MotionControllerRos {
     node_ = node;
     finished_ = node_.advertise<coglab_msgs::FinishedPtp>("finished_ptp", 50);
     unfinished_ = node_.advertise<coglab_msgs::UnfinishedPtp>("unfinished_ptp", 100);
+    path_.attach(node_, controller_->baseFrame());
     service_ = node_.advertiseService("add_ptp", &PtpControllerRos::onAdd, this);
   }
 
@@ -39,6 +41,7 @@ class PtpControllerRos : public MotionControllerRos {
         ROS_WARN("ptp_id %d was not executed: %s", end.id, end.reason.c_str());
       }
     }
+    path_.spin(*controller_, controller_->moving());
   }
 
  private:
@@ -58,6 +61,7 @@ class PtpControllerRos : public MotionControllerRos {
   ros::NodeHandle node_;
   ros::Publisher finished_, unfinished_;
   ros::ServiceServer service_;
+  PathTopic path_;
 };
 
 }  // namespace coglab_controllers

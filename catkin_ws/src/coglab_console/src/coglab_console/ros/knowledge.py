@@ -11,21 +11,21 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import rospy
 import yaml
-from coglab_msgs.srv import GetObject, ListObjects
+from coglab_msgs.srv import GetObject, ListObjects, PredictDmp, PredictDmpRequest, PredictDmpResponse
 from coglab_py import parameters
+from geometry_msgs.msg import Point, Quaternion
 
 from ..scene import path_ahead
-from ..scene.primitives import LibraryError, Primitive, load_library
+from ..scene.primitives import LibraryError, load_library
 from ..scene.primitives import document as library_document
 from .view import RosView
 from .words import lookup
 
 PERIOD = 5.0  # s between two looks at files and at the object database
-PATH_PERIOD = 0.25  # s
-RUNNING = ("running", "holding")
+PATH_PERIOD = 0.5  # s, between two looks at the path of the next motion
+PREDICT = "controller_manager/dmp/predict_dmp"
 MAX_OBJECTS = 100
 MAX_FILE = 1_000_000  # bytes of a configuration
 
@@ -44,11 +44,10 @@ class Knowledge:
         self._texts: dict[str, str] = {}
         self._entries: dict[str, dict] = {}
         self._config: dict = {}
-        self._library: dict[str, Primitive] = {}
         self._stamps: dict[str, int] = {}
         self._told: dict[str, str] = {}
         self._now = threading.Event()
-        self._motion: tuple[str, np.ndarray] | None = None
+        self._ask: rospy.ServiceProxy | None = None
         view.entry = self._entry
         view.config = lambda: self._config
         view.objects_read = self.read_again
@@ -134,11 +133,11 @@ class Knowledge:
         if not path.is_file() or not self._changed(path):
             return
         try:
-            self._library = load_library(path)
+            library = load_library(path)
         except LibraryError as error:
             self._put("primitives", {"file": str(path), "problem": str(error), "rows": []})
             raise
-        self._put("primitives", {"file": str(path), "problem": "", "rows": library_document(self._library)})
+        self._put("primitives", {"file": str(path), "problem": "", "rows": library_document(library)})
 
     # --- the path ahead ---------------------------------------------------------------------------------------
 
@@ -146,37 +145,16 @@ class Knowledge:
         while not rospy.is_shutdown():
             time.sleep(PATH_PERIOD)
             try:
-                self._put("path", self._path())
+                found = None if self._view.path_runs() else self._path()
+                if not self._view.path_runs():  # it may have begun meanwhile
+                    self._put("path", found)
             except Exception as error:  # nothing that comes from outside ends this thread
                 if self._told.get("path") != str(error):
                     self._told["path"] = str(error)
-                    self._say(f"the path ahead cannot be drawn: {error}", "warning")
+                    self._say(f"the path ahead cannot be drawn: {type(error).__name__}: {error}", "warning")
 
     def _path(self) -> dict | None:
-        view, palm = self._view, self._view.palm()
-        if palm is None:
-            return None
-        running = view.dmp.state in RUNNING and time.monotonic() - view.dmp_at < 1.0
-        if not running:
-            self._motion = None
-            return self._ahead(palm)
-        name = view.dmp.primitive_id
-        if self._motion is None or self._motion[0] != name:
-            self._motion = (name, palm)
-        goal = view.frames.get("dmp_goal")
-        if goal is None or name not in self._library:
-            return None
-        entry = view.entry()
-        own = entry.get("dmp", {}).get("dmp_ratio", 1.0) if isinstance(entry.get("dmp"), dict) else 1.0
-        ratio = float(own) * self._pace()
-        return path_ahead.document("running", self._library[name], self._motion[1], np.array(goal[:3]), ratio)
-
-    def _pace(self) -> float:
-        """By which the machines slow the primitives of an exchange down."""
-        ratio = lookup(self._config, "handover.reach_ratio")
-        return float(ratio) if isinstance(ratio, (int, float)) and ratio > 0 else 1.0
-
-    def _ahead(self, palm: np.ndarray) -> dict | None:
+        """Of the next motion; the view shows that of the one under way."""
         view = self._view
         actions = [
             action
@@ -186,10 +164,30 @@ class Knowledge:
         leaf_parent = view.machine.state.split("/")[-2:-1]
         if not actions and leaf_parent and leaf_parent[0] in path_ahead.ROLES:
             actions = leaf_parent  # the action has begun, the reach has not
-        if not actions:
+        wanted = path_ahead.aim(actions[0], view.entry(), view.hand_frame) if actions else None
+        if wanted is None:
             return None
-        found = path_ahead.aim(actions[0], view.entry(), view.frames)
-        if found is None or found[0] not in self._library:
+        wanted["dmp_ratio"] *= self._pace()
+        answer = self._predict(wanted)
+        if answer is None:
             return None
-        name, ratio, goal = found
-        return path_ahead.document("ahead", self._library[name], palm, goal, ratio * self._pace())
+        return view.shown("ahead", answer.path) if answer.success else path_ahead.refused(answer.message)
+
+    def _predict(self, fields: dict) -> PredictDmpResponse | None:
+        """None where the controller is not there to be asked."""
+        request = PredictDmpRequest(**fields)
+        request.goal_offset = Point(*fields["goal_offset"])
+        request.target_orientation = Quaternion(*fields["target_orientation"])
+        try:
+            if self._ask is None:
+                rospy.wait_for_service(PREDICT, timeout=1.0)
+                self._ask = rospy.ServiceProxy(PREDICT, PredictDmp, persistent=True)
+            return self._ask(request)
+        except (rospy.ServiceException, rospy.ROSException):
+            self._ask = None
+            return None
+
+    def _pace(self) -> float:
+        """By which the machines slow the primitives of an exchange down."""
+        ratio = lookup(self._config, "handover.reach_ratio")
+        return float(ratio) if isinstance(ratio, (int, float)) and ratio > 0 else 1.0

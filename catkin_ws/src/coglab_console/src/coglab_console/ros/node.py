@@ -120,6 +120,7 @@ class ConsoleNode:
             self.write_link,
         )
         self.events.listen(lambda _event: self.soon(self._wake))
+        self.view.listen()
         self._put_static(model, missing, files)
 
     # --- from other threads -----------------------------------------------------------------------------------

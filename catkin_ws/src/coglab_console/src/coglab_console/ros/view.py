@@ -17,6 +17,7 @@ from coglab_msgs.msg import (
     HandStatus,
     LwrState,
     MasterState,
+    PredictedPath,
     Transition,
     UnfinishedPtp,
 )
@@ -24,6 +25,7 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64, String
 
 from ..desk.gates import Standing
+from ..scene import path_ahead
 from ..scene.urdf_model import RobotModel
 from . import wire
 from .tables import Tables
@@ -32,6 +34,7 @@ from .words import phase
 PALM = "ih2_palm"
 FRAME_PARENTS = ("world", "lwr_base_link")
 OLD = 1.0  # s without a message after which a fast topic counts as silent
+MOST_POSES = 200
 ALL_DRIVES = 0x7F  # one bit a joint; further bits of the word say something else
 
 
@@ -54,7 +57,7 @@ class RosView:
     ) -> None:
         self.model = model
         self._say, self._put, self._transition, self._result = say, put, transition, result
-        self._hand_frame, self._board_frame = frames["human_hand"], frames["board"]
+        self.hand_frame, self._board_frame = frames["human_hand"], frames["board"]
         self.frames: dict[str, tuple[float, ...]] = {}
         self._stamps: dict[str, float] = {}
         self.joints: dict[str, float] = {}
@@ -65,15 +68,16 @@ class RosView:
         self.manager, self.dmp = ControllerStatus(), DmpFeedback()
         self._state_since = time.monotonic()
         self.signal, self.contact, self.latency = ContactSignal(), "", math.nan
-        self.dmp_at = self._hand_at = self._signal_at = self._latency_at = 0.0
+        self._dmp_at = self._hand_at = self._signal_at = self._latency_at = self._path_at = 0.0
+        self._path_of = ""  # the controller whose motion is under way
         self.tables = Tables(put)
         self.entry: Callable[[], dict] = dict
         self.config: Callable[[], dict] = dict
         self.objects_read: Callable[[], None] = lambda: None
         self._subscribers: dict[str, rospy.Subscriber] = {}
-        self._subscribe()
 
-    def _subscribe(self) -> None:
+    def listen(self) -> None:
+        """Begins; what is latched comes at once, when everybody who is told must be there."""
         for topic, kind, callback, queue in (
             ("coglab/state", MasterState, self._on_machine, 20),
             ("coglab/transitions", Transition, self._on_transition, 200),
@@ -91,6 +95,9 @@ class RosView:
             ("/tf_static", rospy.AnyMsg, self._on_tf, 50),
         ):
             self._subscribers[topic] = rospy.Subscriber(topic, kind, callback, queue_size=queue, tcp_nodelay=True)
+        for name in ("dmp", "ptp"):
+            topic = f"controller_manager/{name}/predicted_path"
+            self._subscribers[topic] = rospy.Subscriber(topic, PredictedPath, self._on_path, name, queue_size=5)
 
     def _there(self, topic: str) -> bool:
         return self._subscribers[topic].get_num_connections() > 0
@@ -126,17 +133,29 @@ class RosView:
             return None
         return self.model.place(PALM, self.joints)[:3, 3]
 
+    def path_runs(self) -> bool:
+        """Whether the path of a motion under way is shown."""
+        return bool(self._path_of) and time.monotonic() - self._path_at < OLD
+
+    def shown(self, kind: str, path: PredictedPath) -> dict | None:
+        """The document of a path; None where it has no poses, or its frame is none of the robot's."""
+        if self.model is None or not path.poses or len(path.poses) != len(path.times) or len(path.poses) > MOST_POSES:
+            return None
+        frame = path.header.frame_id
+        known = frame == self.model.root or frame in self.model.shapes
+        return path_ahead.document(kind, path, self.model.place(frame, self.joints)) if known else None
+
     def frame(self) -> dict:
         """What goes out 30 times a second."""
         now = time.monotonic()
         self._measure_palm(now)
         object_frame = str(self.entry().get("frame", ""))
-        wanted = {"hand": self._hand_frame, "object": object_frame, "board": self._board_frame, "goal": "dmp_goal"}
+        wanted = {"hand": self.hand_frame, "object": object_frame, "board": self._board_frame, "goal": "dmp_goal"}
         stamp = rospy.get_time()
         shown = {role: _round(self.frames[name], 4) for role, name in wanted.items() if name in self.frames}
         ages = {role: round(stamp - self._stamps[name], 3) for role, name in wanted.items() if name in self._stamps}
         order = self.model.moving() if self.model else []
-        dmp = self.dmp if now - self.dmp_at < OLD else DmpFeedback()
+        dmp = self.dmp if now - self._dmp_at < OLD else DmpFeedback()
         signal = self.signal if now - self._signal_at < OLD else None
         latency = self.latency if now - self._latency_at < OLD else self.tables.latency
         deadline = self.machine.deadline.to_sec()
@@ -287,7 +306,8 @@ class RosView:
     def _on_result(self, message: String) -> None:
         try:
             row = json.loads(message.data)
-            words = f"{row['kind']} {row['object_id']}: {row['outcome']} after {float(row['duration_s']):.1f} s"
+            what = f"{row['kind']} {row['object_id']}".strip()
+            words = f"{what}: {row['outcome']} after {float(row['duration_s']):.1f} s"
         except (ValueError, KeyError, TypeError):
             return
         self._say("result", words, "info" if row["outcome"] == "succeeded" else "warning")
@@ -307,9 +327,17 @@ class RosView:
             self._say("controller", f"fault: {message.reason}", "fault")
 
     def _on_dmp(self, message: DmpFeedback) -> None:
-        before, self.dmp, self.dmp_at = self.dmp, message, time.monotonic()
+        before, self.dmp, self._dmp_at = self.dmp, message, time.monotonic()
         if message.state == "aborted" and before.state != "aborted":
             self._say("controller", f"motion aborted: {message.reason}", "warning")
+
+    def _on_path(self, message: PredictedPath, controller: str) -> None:
+        if message.poses:
+            self._path_of, self._path_at = controller, time.monotonic()
+            self._put("path", self.shown("running", message))
+        elif controller == self._path_of:
+            self._path_of = ""
+            self._put("path", None)
 
     def _on_unfinished(self, message: UnfinishedPtp) -> None:
         self._say("controller", f"motion {message.ptp_id} ended before its target: {message.reason}", "warning")

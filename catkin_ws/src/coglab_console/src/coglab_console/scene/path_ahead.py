@@ -1,5 +1,5 @@
-"""The path that the arm is going to take: before a motion from what the next action would aim at, during it from the
-goal of the motion itself. A picture for people; nothing in control reads it. Lengths m, frames in the world."""
+"""The path that the arm is going to take, as the controllers predict it: of the motion under way, and of what the next
+action would ask for. A picture for people; nothing in control reads it. Lengths m."""
 
 from __future__ import annotations
 
@@ -9,57 +9,66 @@ from typing import Any
 import numpy as np
 from coglab_py.pose import Pose
 
-from .primitives import Primitive
-
 ROLES = {
     "exchange_human_to_robot": "receive",
     "exchange_robot_to_human": "give",
     "take": "take",
 }
-REACH = 1.5  # m; what lies further away is no goal
+LONGEST = 160  # characters of a reason
 
 
-def placed(pose: tuple[float, ...]) -> Pose:
-    """Of (x, y, z, qx, qy, qz, qw)."""
-    return Pose.from_dict({"xyz": pose[:3], "quaternion": pose[3:]})
+def aim(action: str, entry: Mapping[str, Any], hand_frame: str) -> dict[str, Any] | None:
+    """Fields of predict_dmp for the reach of this action, as the brain would ask for it; None if nobody knows.
 
-
-def aim(
-    action: str, entry: Mapping[str, Any], frames: Mapping[str, tuple[float, ...]]
-) -> tuple[str, float, np.ndarray] | None:
-    """Primitive, its ratio and where the palm would be at the end of the reach of this action; None if nobody knows.
-
-    `entry`: of the object database; `frames`: poses in the world of `human_hand` and of the object's frame.
+    `entry`: of the object database; `hand_frame`: tf2 frame of the person's hand.
     """
     try:
         role = ROLES[action]
         grasp = entry["grasps"][entry["default_grasp"]]
+        palm = Pose.from_dict(grasp["pose"])
         if role == "give":
             delivery = entry["deliveries"][entry["default_delivery"]]
-            palm = placed(frames["human_hand"]) * Pose.from_dict(delivery["pose"]) * Pose.from_dict(grasp["pose"])
-            goal = palm.position
+            frame, palm = hand_frame, Pose.from_dict(delivery["pose"]) * palm
         else:
-            tracked = placed(frames[entry["frame"]])
-            approach = grasp.get("approach", {})
-            axis = np.asarray(approach.get("axis", [0.0, 0.0, 0.0]), dtype=float)
-            back = axis / max(float(np.linalg.norm(axis)), 1e-9) * float(approach.get("distance", 0.0))
-            goal = (tracked * Pose.from_dict(grasp["pose"])).position - tracked.rotation.apply(back)
-        if not np.all(np.isfinite(goal)) or np.linalg.norm(goal) > REACH:
-            return None
-        return str(entry["dmp"][role]), float(entry["dmp"].get("dmp_ratio", 1.0)), goal
-    except (KeyError, TypeError, ValueError, IndexError):
+            frame, palm = str(entry["frame"]), drawn_back(palm, grasp.get("approach", {}))
+        return {
+            "primitive_id": str(entry["dmp"][role]),
+            "dmp_ratio": float(entry["dmp"].get("dmp_ratio", 1.0)),
+            "goal_frame": frame,
+            "goal_offset": [float(value) for value in palm.position],
+            "orientation_control": True,
+            "target_orientation": [float(value) for value in palm.orientation],
+        }
+    except (KeyError, TypeError, ValueError, IndexError, AttributeError):
         return None
 
 
-def document(kind: str, primitive: Primitive, start: np.ndarray, goal: np.ndarray, ratio: float) -> dict:
-    """For the page: kind `ahead` or `running`, points, and when they are reached (s from the start)."""
-    times, points = primitive.roll_out(start, goal, ratio)
-    step = max(1, len(points) // 40)
-    kept = [*range(0, len(points) - 1, step), len(points) - 1]
+def drawn_back(palm: Pose, approach: Mapping[str, Any]) -> Pose:
+    """The palm before it closes in on the object, in the same frame."""
+    distance = float(approach.get("distance", 0.0))
+    if distance == 0.0:
+        return palm
+    axis = np.asarray(approach.get("axis", palm.axis(0)), dtype=float)
+    return Pose(palm.position - distance * axis / np.linalg.norm(axis), palm.orientation)
+
+
+def document(kind: str, path: Any, base: np.ndarray) -> dict:
+    """For the page: kind `ahead` or `running`, points in the world, and when the hand is there (s from `stamp`).
+
+    `path`: coglab_msgs/PredictedPath with poses; `base`: 4 x 4, its frame in the world.
+    """
+    places = np.array([(pose.position.x, pose.position.y, pose.position.z) for pose in path.poses])
+    points = np.round(places @ base[:3, :3].T + base[:3, 3], 4).tolist()
     return {
         "kind": kind,
-        "primitive": primitive.name,
-        "goal": [round(float(value), 3) for value in goal],
-        "points": [[round(float(value), 3) for value in points[i]] for i in kept],
-        "duration": round(float(times[-1]), 2),
+        "motion": path.motion[:60],
+        "stamp": round(path.header.stamp.to_sec(), 3),
+        "goal": points[-1],
+        "points": points,
+        "times": [round(float(time), 3) for time in path.times],
     }
+
+
+def refused(reason: str) -> dict:
+    """For the page: the next motion would be refused."""
+    return {"kind": "refused", "reason": reason.split(";")[0][:LONGEST], "points": []}

@@ -62,6 +62,8 @@ class CartesianMotion {
   const Quaternion& goalOrientation() const noexcept {
     return orientation_estimator_.orientation();
   }
+  /// Of the clock, 0..1, in the last step.
+  double rate() const noexcept { return rate_; }
   /// From the set-point to the goal as received, m.
   double remainingDistance() const noexcept { return remaining_distance_; }
   /// Estimated from the phase and tau, s, at rate 1.

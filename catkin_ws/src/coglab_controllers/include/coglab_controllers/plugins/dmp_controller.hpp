@@ -11,6 +11,7 @@
 #include "coglab_controllers/dmp/library.hpp"
 #include "coglab_controllers/goal/goal_feed.hpp"
 #include "coglab_controllers/motion/motion_runner.hpp"
+#include "coglab_controllers/motion/predicted_path.hpp"
 #include "coglab_controllers/plugins/dmp_cycle.hpp"
 #include "coglab_controllers/plugins/dmp_request.hpp"
 
@@ -41,6 +42,9 @@ class DmpController : public MotionRunner<DmpPlan> {
   Answer loadDmps(const std::string& filename, int& loaded);
   Answer execute(const DmpRequest& request) { return ask(request, true); }
   Answer switchDmp(const DmpRequest& request) { return ask(request, false); }
+  /// What execute() would do now from where the arm is commanded to be, at rest: checked as that
+  /// does, but nothing is begun, and the controller need not be the active one.
+  Answer predict(const DmpRequest& request, PredictedPath& path);
   /// dmp_goal, see GoalFeed::offer(). `frame` must be dmp_frame_name.
   Answer setGoal(const std::string& frame, const Vector3& goal, std::int64_t stamp_ns,
                  std::int64_t frame_ns = 0) {
@@ -59,6 +63,10 @@ class DmpController : public MotionRunner<DmpPlan> {
   /// @{
   bool readProgress(DmpProgress& progress) { return progress_.read(progress); }
   bool readIkDebug(IkDebugRecord& record) { return debug_.pop(record); }
+  /// Asks for the path of the motion under way; readPath() has it after the next cycle of one.
+  void askPath() { snapshots_.ask(); }
+  /// Rolls the motion out, in the frame dmp_frame_name. Whether one has come since the last call.
+  bool readPath(PredictedPath& path);
   /// @}
 
   const std::string& dmpFrame() const { return dmp_frame_; }
@@ -90,6 +98,9 @@ class DmpController : public MotionRunner<DmpPlan> {
   Library library_;
   GoalFeed goals_;
   DmpCycle* const cycle_;  // the motion that the base runs
+  std::mutex predict_mutex_;
+  DmpCycle imagined_;  // begins motions that nothing runs
+  CopyOnRequest<DmpSnapshot> snapshots_;
   std::atomic<bool> ik_debug_{false};
   TripleBuffer<DmpProgress> progress_;
   EventRing<IkDebugRecord, 256> debug_;

@@ -33,6 +33,14 @@ struct IkDebugRecord {
   IkResult ik;
 };
 
+/// A motion as it is, for a roll-out of what is left of it.
+struct DmpSnapshot {
+  std::int64_t stamp_ns = 0;
+  Name primitive;
+  CartesianMotion motion;
+  Pose goal;  ///< of the hand in dmp_frame_name, as received, inside the workspace
+};
+
 /// Where a DMP motion is.
 enum class DmpStage : std::uint8_t {
   Rest,    ///< no motion
@@ -65,6 +73,9 @@ class DmpCycle : public Motion<DmpPlan> {
   const CartesianMotion& motion() const noexcept { return motion_; }
   DmpProgress progress(std::int64_t stamp_ns, MotionState state, const Reason& reason) const;
   IkDebugRecord debug(const CycleInput& input, const IkResult& ik) const;
+  DmpSnapshot snapshot(std::int64_t stamp_ns) const {
+    return {stamp_ns, primitive_, motion_, goal_};
+  }
 
  private:
   void execute(const MotionStart<DmpPlan>& start);

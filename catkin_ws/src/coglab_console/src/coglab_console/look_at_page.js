@@ -35,7 +35,7 @@ for (const why of document.querySelectorAll('#actions .why')) {
   if (seen(why) && why.scrollHeight > why.clientHeight + 1) problems.push(`"${why.textContent}" is cut off`);
 }
 const graph = document.querySelector('#graph svg');
-if (graph && seen(graph)) {
+if (graph?.querySelector('text') && seen(graph)) {
   const height = 11 * (graph.getScreenCTM()?.a ?? 1);
   if (height < 13.9) problems.push(`letters of the graph are ${height.toFixed(1)} px high`);
 }
