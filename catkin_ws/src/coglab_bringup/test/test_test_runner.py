@@ -3,7 +3,9 @@
 import sys
 
 import pytest
+from coglab_bringup.arguments import test_options as options_of_test
 from coglab_bringup.test_runner import Program, find_programs, report, run
+from coglab_bringup.usage import Refused
 
 GREEN = (
     '<testsuites><testsuite><testcase classname="a" name="one"/>'
@@ -59,3 +61,24 @@ def test_a_gtest_that_was_not_built_is_a_failure(tmp_path):
 
 def test_nothing_at_all_is_not_a_success(tmp_path):
     assert report([], tmp_path) == 1
+
+
+def test_a_package_that_the_build_left_out_is_not_tested(tmp_path):
+    for name in ("smach", "brain"):
+        package = tmp_path / "catkin_ws" / "src" / name
+        (package / "test").mkdir(parents=True)
+        (package / "package.xml").write_text(f"<package><name>{name}</name></package>")
+        (package / "test" / "test_it.py").write_text("")
+    assert len(find_programs(tmp_path, tmp_path, sys.executable, [])) == 2
+    assert options_of_test(tmp_path, ["smach"]).packages == ["smach"]
+    (tmp_path / "catkin_ws" / "build").mkdir()
+    cache = tmp_path / "catkin_ws" / "build" / "CMakeCache.txt"
+    cache.write_text("A:STRING=b\nCATKIN_BLACKLIST_PACKAGES:STRING=smach;smach_msgs;smach_ros\nC:BOOL=ON\n")
+    (item,) = find_programs(tmp_path, tmp_path, sys.executable, [])
+    assert item.package == "brain"
+    with pytest.raises(Refused) as refusal:
+        options_of_test(tmp_path, ["brain", "smach"])
+    assert "this build leaves out smach for the one installed on this machine" in str(refusal.value)
+    assert "./coglab build" in str(refusal.value)
+    cache.write_text("CATKIN_BLACKLIST_PACKAGES:UNINITIALIZED=\nC:BOOL=ON\n")
+    assert len(find_programs(tmp_path, tmp_path, sys.executable, [])) == 2

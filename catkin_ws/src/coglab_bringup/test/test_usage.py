@@ -85,7 +85,7 @@ def run(top: Path, words: str) -> subprocess.CompletedProcess:
         stdin=subprocess.DEVNULL,
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
-        env={**os.environ, "ROS_PACKAGE_PATH": ""},
+        env={**os.environ, "ROS_PACKAGE_PATH": "", "CMAKE_PREFIX_PATH": "", "PYTHONPATH": ""},
     )
 
 

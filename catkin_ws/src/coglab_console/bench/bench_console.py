@@ -312,7 +312,11 @@ def main() -> None:
     rows: list[dict] = []
     for part in os.environ.get("CONSOLE_BENCH_PARTS", " ".join(PARTS)).split():
         say(part)
-        rows += in_own_process(part, PARTS[part][0]) if part in PARTS else [missed(part, f"parts: {', '.join(PARTS)}")]
+        found = in_own_process(part, PARTS[part][0]) if part in PARTS else [missed(part, f"parts: {', '.join(PARTS)}")]
+        for one in found:
+            verdict = "ok" if one["ok"] else "MISSED"
+            say(f"{verdict}: {one['figure']}: {one['value']} {one['unit']} (goal {one['goal']})")
+        rows += found
     print(json.dumps(rows))
 
 

@@ -101,6 +101,25 @@ TEST(RollOut, OfAMotionThatIsNotBegunIsEmptyAndOneThatNeverArrivesEnds) {
   EXPECT_GT(path.times.back(), 1.0 / kSlowestClock);  // a clock that stands is taken to crawl
 }
 
+TEST(RollOut, OfALongMotionIsAsLongAndAsExact) {
+  Library library;
+  library.load(std::string(PACKAGE_DIR) + "/config/primitives.xml");
+  const Pose start{Vector3(0.4, 0.1, 0.3), Quaternion::Identity()};
+  const Pose goal{kGoal, Quaternion::Identity()};
+  const auto path = [&](double ratio) {
+    CartesianMotion motion;
+    motion.start({TransformationSystem(library.at("reach_human")), ratio, true}, start,
+                 Vector3::Zero(), Vector3::Zero(), goal);
+    return rollOut(motion, goal);
+  };
+  const TimedPath quick = path(1.0), slow = path(100.0);
+  ASSERT_TRUE(wellFormed(slow));
+  for (const double share : {0.2, 0.4, 0.6, 0.8}) {
+    const double t = share * library.at("reach_human").duration;
+    EXPECT_LT((placeAt(quick, t) - placeAt(slow, 100.0 * t)).norm(), 5e-3) << share;
+  }
+}
+
 TEST(PredictedPath, BeforeAReachIsThatOfTheReachAndBeginsNothing) {
   VirtualRobot robot;
   robot.loadBoth("ptp");  // the controller need not be the active one

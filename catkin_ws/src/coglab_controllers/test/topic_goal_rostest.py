@@ -151,41 +151,6 @@ class TopicGoal(unittest.TestCase):
         self.assertAlmostEqual(first.set_point_velocity.linear.y, 0.1, delta=0.03)
         wait_until(lambda: robot.feedback.state == "reached", 10.0, "reached")
 
-    def test_3d_the_path_ahead_before_a_motion_and_while_it_runs(self) -> None:
-        robot, told = self.robot, []
-        for name in ("dmp", "ptp"):
-            rospy.Subscriber(f"controller_manager/{name}/predicted_path", PredictedPath, told.append)
-
-        def place(pose: Pose) -> tuple[float, float, float]:
-            return pose.position.x, pose.position.y, pose.position.z
-
-        robot.see_hand(ASIDE)
-        wait_until(lambda: abs(self.goals[-1].goal.x - ASIDE[0]) < 1e-6, 5.0, "the helper's goal aside")
-        asked = PredictDmpRequest(primitive_id="reach_human", dmp_ratio=2.0, goal_frame="human_hand")
-        ahead = robot.dmp("predict_dmp", asked)
-        self.assertTrue(ahead.success, ahead.message)
-        self.assertEqual((ahead.path.header.frame_id, ahead.path.motion), ("lwr_base_link", "reach_human"))
-        self.assertLess(math.dist(place(ahead.path.poses[-1]), ASIDE), 0.01)
-        refused = robot.dmp("predict_dmp", PredictDmpRequest(primitive_id="reach_human", goal_frame="human_hand"))
-        self.assertEqual((refused.success, refused.reason_code), (False, ReasonCode.OUT_OF_RANGE))  # dmp_ratio 0
-        rospy.sleep(0.5)
-        self.assertEqual(told, [], "before a motion nothing is published")
-        answer = robot.execute(dmp_ratio=2.0)
-        self.assertTrue(answer.success, answer.message)
-        wait_until(lambda: any(not m.poses for m in told), 15.0, "the end of the path")
-        paths = told[:-1]
-        seconds = (paths[-1].header.stamp - paths[0].header.stamp).to_sec()
-        self.assertGreater(len(paths), 5)
-        self.assertLess((len(paths) - 1) / seconds, 5.5, "Hz")
-        self.assertTrue(all(len(m.poses) == len(m.times) >= 2 and m.motion == "reach_human" for m in paths))
-        self.assertLess(math.dist(place(paths[0].poses[-1]), ASIDE), 0.01)
-        self.assertLess(paths[-1].times[-1], paths[0].times[-1])
-        told.clear()
-        robot.go(HOME)
-        wait_until(lambda: any(not m.poses for m in told), 5.0, "the end of the path of the ptp motion")
-        self.assertRegex(told[0].motion, "^ptp [0-9]+$")
-        robot.switch("dmp")
-
     def test_4_refusals(self) -> None:
         robot = self.robot
         for fields, word in (
@@ -346,6 +311,41 @@ class TopicGoal(unittest.TestCase):
         self.assertEqual(robot.status.speed_scale, 0.25)  # refused
         publisher.publish(1.0)
         wait_until(lambda: robot.status.speed_scale == 1.0, 5.0, "1 by the topic")
+
+    def test_7b_the_path_ahead_before_a_motion_and_while_it_runs(self) -> None:
+        robot, told = self.robot, []
+        listening = [
+            rospy.Subscriber(f"controller_manager/{name}/predicted_path", PredictedPath, told.append)
+            for name in ("dmp", "ptp")
+        ]
+        wait_until(lambda: all(one.get_num_connections() for one in listening), 5.0, "connections")
+
+        def place(pose: Pose) -> tuple[float, float, float]:
+            return pose.position.x, pose.position.y, pose.position.z
+
+        robot.go(HOME)
+        wait_until(lambda: any(not m.poses for m in told), 5.0, "the end of the path of the ptp motion")
+        self.assertRegex(told[0].motion, "^ptp [0-9]+$")
+        told.clear()
+        robot.see_hand(GOAL)
+        asked = PredictDmpRequest(primitive_id="reach_human", dmp_ratio=2.0, goal_frame="human_hand")
+        wait_until(lambda: robot.dmp("predict_dmp", asked).success, 5.0, "the path to the hand")
+        ahead = robot.dmp("predict_dmp", asked)
+        self.assertEqual((ahead.path.header.frame_id, ahead.path.motion), ("lwr_base_link", "reach_human"))
+        self.assertLess(math.dist(place(ahead.path.poses[-1]), GOAL), 0.01)
+        asked.dmp_ratio = 0.0
+        self.assertEqual(robot.dmp("predict_dmp", asked).reason_code, ReasonCode.OUT_OF_RANGE)
+        robot.switch("dmp")
+        rospy.sleep(0.3)
+        self.assertEqual(told, [], "before a motion nothing is published")
+        self.assertTrue(robot.execute(dmp_ratio=2.0).success)
+        wait_until(lambda: any(not m.poses for m in told), 15.0, "the end of the path")
+        paths = told[: next(i for i, m in enumerate(told) if not m.poses)]
+        seconds = (paths[-1].header.stamp - paths[0].header.stamp).to_sec()
+        self.assertTrue(len(paths) > 5 and (len(paths) - 1) / seconds < 5.5, f"{len(paths)} in {seconds} s")
+        self.assertTrue(all(len(m.poses) == len(m.times) >= 2 and m.motion == "reach_human" for m in paths))
+        self.assertLess(math.dist(place(paths[0].poses[-1]), GOAL), 0.01)
+        self.assertLess(paths[-1].times[-1], paths[0].times[-1])
 
     def test_8_stamps_of_any_kind_end_nothing_and_are_no_goal_from_the_future(self) -> None:
         robot = self.robot

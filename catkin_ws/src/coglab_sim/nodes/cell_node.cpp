@@ -24,6 +24,7 @@
 #include "cell_messages.hpp"
 #include "cell_parameters.hpp"
 #include "coglab_rt/ros/logger_service.hpp"
+#include "coglab_rt/ros/parameter.hpp"
 #include "coglab_sim/ranges.hpp"
 #include "coglab_sim/real_time_cell.hpp"
 
@@ -48,9 +49,7 @@ std::uint16_t publishedPort(const std::string& parameter) {
 /// parameter, value and range.
 template <typename T>
 T within(const ros::NodeHandle& node, const char* name, T otherwise) {
-  T value = otherwise;
-  if (node.hasParam(name) && !node.getParam(name, value))
-    throw std::invalid_argument("parameter " + node.resolveName(name) + ": expected a number");
+  const T value = coglab_rt::readParameter<T>(node, name, otherwise, "a number");
   requireWithin(rangeOf(name), node.resolveName(name), value);
   return value;
 }

@@ -143,7 +143,7 @@ TEST(ModelErrors, InertiasOfTheRotorsAreWrongByAtMostFivePercent) {
     const Vector7 error = (rotors - kRotors).cwiseQuotient(kRotors);
     EXPECT_LE(error.cwiseAbs().maxCoeff(), 0.05 + 1e-9) << error.transpose();
     largest = std::max(largest, error.cwiseAbs().maxCoeff());
-    different.insert(error[0]);
+    different.insert(error.sum());
   }
   EXPECT_GT(largest, 0.04);
   EXPECT_EQ(different.size(), kSeeds);

@@ -1,7 +1,7 @@
-"""A whole handover, both directions, on an engine that is not ours. A program: ``other_engine.py FOLDER | names``.
+"""A handover, both directions, on an engine that is not ours. A program: ``other_engine.py FOLDER | names [FILE]``.
 
 FOLDER holds a package ``smach``. ``names``: our engine behind modules that have the names and signatures of the ROS
-distributions' smach and nothing else. Prints one JSON object.
+distributions' smach and nothing else. Prints one JSON object. With FILE: runs the tests of that file instead.
 """
 
 import importlib
@@ -10,6 +10,8 @@ import pickle
 import sys
 import threading
 import types
+
+import pytest
 
 MODULES = {
     "smach": "State CBState Container StateMachine Sequence Concurrence Iterator UserData Remapper CBInterface "
@@ -132,8 +134,8 @@ def watch_user_data(container, seen):
             watch_user_data(child, seen)
 
 
-def main(where):
-    """One trial."""
+def main(where, *files):
+    """One trial, or the tests of a file; returns the exit status."""
     if where == "names":
         hide_names()
     else:
@@ -141,6 +143,9 @@ def main(where):
     import smach
 
     smach.set_loggers(*[lambda *a: None] * 4)
+    if files:
+        print(smach.__file__)
+        return pytest.main(["-q", "-p", "no:cacheprovider", *files])
     from virtual_trial import VirtualTrial
 
     trial, seen = VirtualTrial(seed=0, profile="accustomed", perfect=True), []
@@ -160,7 +165,8 @@ def main(where):
             }
         )
     )
+    return 0
 
 
 if __name__ == "__main__":
-    main(sys.argv[1])
+    sys.exit(main(*sys.argv[1:]))

@@ -120,6 +120,34 @@ def test_preempted_after_the_last_look_nothing_follows():
     assert ended["switch_to_dmp"] == "preempted"
 
 
+def test_a_request_that_a_failure_overtook_does_not_end_the_next_handover():
+    """A sibling's failure asks the arm's machine to end in the moment in which that fails itself."""
+    trial = Trial()
+
+    def script(t):
+        t.wait_hub("wait_without_object")
+        arm_motion = t.master
+        for label in (RECEIVE, "approach", "arm_motion"):
+            arm_motion = arm_motion.get_children()[label]
+        state = arm_motion.get_children()["execute_dmp"]
+        work = state.run
+
+        def run(_ud):
+            state.run = work
+            arm_motion.request_preempt()
+            raise PortError("the primitive was refused")
+
+        state.run = run
+        t.start(RECEIVE)
+        t.wait_hub("wait_without_object")
+        assert "the primitive was refused" in t.result().reason
+        t.start(RECEIVE)
+        t.wait_hub("wait_with_object")
+
+    trial.run(script)
+    assert trial.result().outcome == "succeeded"
+
+
 def test_a_limit_follows_the_limits_of_speed_and_the_speed_scale():
     t1 = read_limits({"joint_limits_profile": "t1"})
 

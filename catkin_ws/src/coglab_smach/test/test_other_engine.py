@@ -44,18 +44,23 @@ def test_only_names_that_every_engine_has():
             assert used - {"smach.concurrence.threading"} <= ALLOWED, path
 
 
-def handover_on(engine):
-    """The report of other_engine.py, in a process of its own."""
+def run_on(engine, *files):
+    """What other_engine.py prints, in a process of its own."""
     ended = subprocess.run(
-        [sys.executable, str(PACKAGE / "test" / "other_engine.py"), engine],
+        [sys.executable, str(PACKAGE / "test" / "other_engine.py"), engine, *files],
         cwd=PACKAGE / "test",
         capture_output=True,
         text=True,
         timeout=120,
         check=False,
     )
-    assert ended.returncode == 0, ended.stderr[-3000:]
-    report = json.loads(ended.stdout.splitlines()[-1])
+    assert ended.returncode == 0, (ended.stdout + ended.stderr)[-3000:]
+    return ended.stdout.splitlines()
+
+
+def handover_on(engine):
+    """The report of a handover there."""
+    report = json.loads(run_on(engine)[-1])
     assert [outcome for _, outcome, _ in report["outcomes"]] == ["succeeded", "succeeded"], report
     assert report["held_by"] == "human" and not report["dropped"] and report["limit_violations"] == 0
     assert report["last_hub"] == "wait_without_object" and report["pickled"] > 20
@@ -73,6 +78,12 @@ def distribution():
 @pytest.mark.skipif(distribution() is None, reason="standalone-smach is not installed (test-oracles.txt)")
 def test_a_handover_on_the_engine_of_the_ros_distributions():
     assert Path(handover_on(str(distribution()))["engine"]).resolve().is_relative_to(distribution())
+
+
+@pytest.mark.skipif(distribution() is None, reason="standalone-smach is not installed (test-oracles.txt)")
+def test_who_starts_a_motion_ends_it_on_the_engine_of_the_ros_distributions():
+    lines = run_on(str(distribution()), "test_motion_ownership.py")
+    assert Path(lines[0]).resolve().is_relative_to(distribution()) and " passed" in lines[-1]
 
 
 @pytest.mark.skipif(

@@ -61,6 +61,14 @@ def package_folders(sources: Path) -> dict[str, Path]:
     return found
 
 
+def left_out(top: Path) -> list[str]:
+    """Packages that the last build left out for those installed on this machine: ./coglab build --upstream-smach."""
+    cache = top / "catkin_ws" / "build" / "CMakeCache.txt"
+    text = cache.read_text(encoding="utf-8", errors="replace") if cache.is_file() else ""
+    found = re.search(r"^CATKIN_BLACKLIST_PACKAGES:\w+=(.+)$", text, re.MULTILINE)
+    return found.group(1).split(";") if found else []
+
+
 def find_benches(sources: Path) -> dict[str, list[Path]]:
     """The files of each bench by its name, from the packages below `sources`."""
     benches: dict[str, list[Path]] = {}
@@ -92,6 +100,11 @@ def test_options(top: Path, words: list[str]) -> argparse.Namespace:
     if out.is_dir() and any(out.iterdir()) and not (out / "logs").is_dir():
         raise Refused(f"--out {out} holds other files, and would be emptied; name a new folder")
     _named(options.packages, package_folders(top / "catkin_ws" / "src"), "package")
+    for package in options.packages:
+        if package in left_out(top):
+            raise Refused(
+                f"this build leaves out {package} for the one installed on this machine; to test ours: ./coglab build"
+            )
     return options
 
 

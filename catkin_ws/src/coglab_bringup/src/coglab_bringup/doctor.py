@@ -86,10 +86,12 @@ def findings(top: Path) -> list[tuple[bool, str]]:
                 f"python3 in your PATH is {python}; ./coglab uses /usr/bin/python3 anyway, as does devel/setup.bash",
             )
         )
+    # The environment of this workspace names /opt/ros itself, where it was built with --upstream-smach.
+    own = f"{top}/catkin_ws/"
     foreign = [
         v
         for v in ("ROS_DISTRO", "ROS_ROOT", "CMAKE_PREFIX_PATH", "ROS_PACKAGE_PATH")
-        if "/opt/ros" in os.environ.get(v, "")
+        if "/opt/ros" in os.environ.get(v, "") and own not in os.environ.get(v, "")
     ]
     if foreign:
         result.append(

@@ -5,6 +5,7 @@ Three kinds, found by where they lie in a package:
            not built is a failure
   pytest   test/test_*.py (smach's own packages one level deeper alike)
   rostest  test/*.test, one at a time, each with a ROS master of its own
+Packages that the build left out (./coglab build --upstream-smach) are named and not tested.
 A program without a single case is a failure, too: a test file that tests nothing hides what it was written for.
 gtests and pytests of different packages run two at a time; rostests run alone, because they measure real time.
 """
@@ -22,7 +23,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from coglab_bringup import process_tree
-from coglab_bringup.arguments import package_folders, test_options
+from coglab_bringup.arguments import left_out, package_folders, test_options
 from coglab_bringup.run_directory import free_port, record_times, run_environment
 from coglab_bringup.usage import Refused
 
@@ -47,11 +48,12 @@ class Program:
 
 
 def find_programs(top: Path, results: Path, python: str, wanted: list[str]) -> list[Program]:
-    """All test programs of the wanted packages (all if none is named)."""
+    """All test programs of the wanted packages (if none is named, of all that the build did not leave out)."""
     programs = []
+    untested = left_out(top)
     library = top / "catkin_ws" / "devel" / "lib"
     for package, folder in package_folders(top / "catkin_ws" / "src").items():
-        if wanted and package not in wanted:
+        if package in untested or (wanted and package not in wanted):
             continue
         for source in sorted((folder / "test").glob("test_*.cpp")):
             binary = library / package / f"{package}_{source.stem}"
@@ -168,6 +170,8 @@ def main(arguments: list[str]) -> int:
     (results / "logs").mkdir(parents=True)
     python = os.environ.get("COGLAB_TEST_PYTHON", "/usr/bin/python3")
     programs = find_programs(top, results, python, options.packages)
+    if left_out(top):
+        print(f"not tested, because this build uses those installed on this machine: {', '.join(left_out(top))}")
     start = time.monotonic()
 
     def run_one(program: Program) -> None:

@@ -11,12 +11,15 @@
 
 #include "coglab_rt/clock.hpp"
 #include "coglab_rt/joint_limits_table.hpp"
+#include "coglab_rt/ros/parameter.hpp"
 #include "coglab_rt/ros/ros_time.hpp"
 
 namespace coglab_controllers {
 
 using coglab_rt::Answer;
 using coglab_rt::MotionBlock;
+using coglab_rt::readNumber;
+using coglab_rt::readParameter;
 using coglab_rt::ReasonCode;
 using coglab_rt::RobotSample;
 
@@ -26,26 +29,6 @@ constexpr double kServeLimit = 1.0;  // s within which a tick takes a request
 constexpr double kBrakeLimit = 3.0;  // s within which the arm stands after `stop`
 constexpr int kLateTicks = 20;       // so many periods behind, the arm's clock starts anew
 constexpr std::uint16_t kAllPower = 0x7F;
-
-/// Value of a parameter; one of another type is an error and not silently the default.
-template <typename T>
-T parameter(const ros::NodeHandle& node, const char* name, const T& otherwise,
-            const char* expected) {
-  T value = otherwise;
-  if (node.hasParam(name) && !node.getParam(name, value)) {
-    throw std::invalid_argument("parameter " + node.resolveName(name) + ": expected " + expected);
-  }
-  return value;
-}
-
-double within(const ros::NodeHandle& node, const char* name, double otherwise, double low,
-              double high) {
-  const double value = parameter<double>(node, name, otherwise, "a number");
-  if (value >= low && value <= high) return value;
-  throw std::invalid_argument("parameter " + node.resolveName(name) + " = " +
-                              std::to_string(value) + " is outside its range " +
-                              std::to_string(low) + ".." + std::to_string(high));
-}
 
 /// Waits until the condition holds; false if it did not within the limit.
 template <typename Condition>
@@ -68,7 +51,7 @@ bool sameState(const IdealArmView& one, const IdealArmView& other) {
 
 IdealArmConfig readIdealArmConfig(const ros::NodeHandle& node) {
   IdealArmConfig config;
-  auto table = parameter<std::string>(node, "limits_file", "", "a path");
+  auto table = readParameter<std::string>(node, "limits_file", "", "a path");
   if (table.empty()) {
     const std::string package = ros::package::getPath("lwr_description");
     if (package.empty()) {
@@ -79,13 +62,13 @@ IdealArmConfig readIdealArmConfig(const ros::NodeHandle& node) {
     table = package + "/config/joint_limits.yaml";
   }
   config.limits = coglab_rt::loadJointLimits(
-      table, parameter<std::string>(node, "limits_profile", "default", "a name"));
-  config.period = parameter<double>(node, "ideal_period", config.period, "a number");
+      table, readParameter<std::string>(node, "limits_profile", "default", "a name"));
+  config.period = readParameter<double>(node, "ideal_period", config.period, "a number");
   config.command_timeout =
-      parameter<double>(node, "command_timeout", config.command_timeout, "a number");
+      readParameter<double>(node, "command_timeout", config.command_timeout, "a number");
   if (node.hasParam("start_position")) {
     const auto start =
-        parameter<std::vector<double>>(node, "start_position", {}, "a list of 7 numbers");
+        readParameter<std::vector<double>>(node, "start_position", {}, "a list of 7 numbers");
     if (start.size() != 7) {
       throw std::invalid_argument("parameter " + node.resolveName("start_position") +
                                   ": expected 7 numbers, got " + std::to_string(start.size()));
@@ -99,8 +82,8 @@ IdealArmConfig readIdealArmConfig(const ros::NodeHandle& node) {
 IdealArmRos::IdealArmRos(const ros::NodeHandle& node)
     : node_(node), arm_(readIdealArmConfig(node)) {
   node_.setCallbackQueue(&queue_);
-  priority_ = static_cast<int>(within(node_, "rt_priority", 80, 0, 98));
-  const double rate = within(node_, "joint_states_rate", 200.0, 1.0, 1000.0);
+  priority_ = static_cast<int>(readNumber(node_, "rt_priority", 80, 0, 98));
+  const double rate = readNumber(node_, "joint_states_rate", 200.0, 1.0, 1000.0);
   publish_period_ = std::max(1.0 / rate, arm_.config().period);
   for (const char* name : coglab_rt::kJointNames) joint_message_.name.emplace_back(name);
 }

@@ -88,7 +88,7 @@ class Robot:
         self.cell = self.virtual.cell
         self.limits = cc.load_joint_limits(limits)
         self._fastest_to_command = np.array(self.limits.velocity)
-        self._fastest = np.array(read(Path(limits)).value["default"]["velocity"], dtype=float)
+        self._fastest = np.array(yaml.safe_load(Path(limits).read_text())["default"]["velocity"], dtype=float)
         self._lowest, self._highest = np.array(self.limits.lower_position), np.array(self.limits.upper_position)
         with open(urdf_file(), encoding="utf-8") as stream:
             self.urdf = stream.read()

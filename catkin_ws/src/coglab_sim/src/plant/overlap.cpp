@@ -42,8 +42,7 @@ double depthOf(const mjModel* m, const mjData* d, int inner, int outer) {
   if (m->geom_type[inner] == mjGEOM_PLANE) return 0.0;
   constexpr int kSteps = 4;  // from the middle outward
   const Eigen::Map<const Vector3d> size(m->geom_size + 3 * inner);
-  const bool sphere = m->geom_type[inner] == mjGEOM_SPHERE,
-             box = m->geom_type[inner] == mjGEOM_BOX;
+  const bool sphere = m->geom_type[inner] == mjGEOM_SPHERE, box = m->geom_type[inner] == mjGEOM_BOX;
   const Vector3d half = sphere ? Vector3d::Constant(size.x())
                         : box  ? Vector3d(size)
                                : Vector3d(size.x(), size.x(), size.x() + size.y());
@@ -71,8 +70,7 @@ Overlap deepestOverlap(const mjModel* m, const mjData* d,
   };
   for (int i = 0; i < d->ncon; ++i) {
     const mjContact& contact = d->contact[i];
-    if (counts(contact.geom1, contact.geom2))
-      consider(contact.geom1, contact.geom2, -contact.dist);
+    if (counts(contact.geom1, contact.geom2)) consider(contact.geom1, contact.geom2, -contact.dist);
   }
   for (int one = 0; one < m->ngeom; ++one) {
     for (int two = one + 1; two < m->ngeom; ++two) {

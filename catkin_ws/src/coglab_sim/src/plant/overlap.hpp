@@ -18,8 +18,9 @@ struct Overlap {
 /// be those of the state as it is (mj_step1).
 ///
 /// Contacts alone miss one solid deep inside another: where their middles coincide MuJoCo finds no
-/// direction that parts them, and some pairs do not collide at all. So balls inside the one are held
-/// against the other besides; that depth is a lower bound, so that nothing is refused by mistake.
+/// direction that parts them, and some pairs do not collide at all. So balls inside the one are
+/// held against the other besides; that depth is a lower bound, so that nothing is refused by
+/// mistake.
 Overlap deepestOverlap(const mjModel* m, const mjData* d,
                        const std::function<bool(int one, int two)>& counts);
 

@@ -1,4 +1,5 @@
-/// What may stand where in the plant: an object that is placed, the surroundings, the person's hand.
+/// What may stand where in the plant: an object that is placed, the surroundings, the person's
+/// hand.
 #include <algorithm>
 #include <array>
 #include <sstream>
@@ -21,10 +22,10 @@ constexpr double kInFinger = 0.008;
 // what the tension limit adds. Ours.
 constexpr std::array<double, kMotors> kPreshape = {245 / 255.0, 5 / 255.0, 30 / 255.0, 50 / 255.0,
                                                    50 / 255.0};
-constexpr double kCloseCurrent = 240.0;  // counts
+constexpr double kCloseCurrent = 240.0;                         // counts
 constexpr int kOpening = 300, kClosing = 2500, kHanging = 300;  // steps
 constexpr double kCarries = 1.5;  // friction over weight from which on it hangs in the fingers
-constexpr double kStays = 0.02;  // m that it may move in the palm once it hangs in the fingers
+constexpr double kStays = 0.02;   // m that it may move in the palm once it hangs in the fingers
 
 }  // namespace
 
@@ -47,7 +48,8 @@ bool Plant::excludeEachOther(int one, int two) const {
   if (root(first) && root(second)) return false;
   // The person's fingers close on the object, and do not collide; the forearm behind them is solid.
   if ((first == model_->object && second == model_->person) ||
-      (second == model_->object && first == model_->person)) return true;
+      (second == model_->object && first == model_->person))
+    return true;
   return (m->geom_contype[one] & m->geom_conaffinity[two]) != 0 ||
          (m->geom_contype[two] & m->geom_conaffinity[one]) != 0;
 }

@@ -263,12 +263,12 @@ void Plant::check() {
   bool warned = !std::isfinite(all) || !std::isfinite(arm + fingers);
   for (const int kind : {mjWARN_BADQPOS, mjWARN_BADQVEL, mjWARN_BADQACC})
     warned = warned || d->warning[kind].number > 0;
-  std::string what = warned                             ? "a value is no number"
-                     : !free(model_->object_velocity)   ? "the object"
-                     : !free(model_->person_velocity)   ? "the person's hand"
-                     : !(arm_fastest < kFastestJoint)   ? "a joint of the arm"
+  std::string what = warned                               ? "a value is no number"
+                     : !free(model_->object_velocity)     ? "the object"
+                     : !free(model_->person_velocity)     ? "the person's hand"
+                     : !(arm_fastest < kFastestJoint)     ? "a joint of the arm"
                      : !(fingers_fastest < kFastestJoint) ? "a joint of a finger"
-                                                        : "";
+                                                          : "";
   // Nothing is farther from any joint than these reaches, so that nothing is faster than this.
   if (what.empty() && !(reach_ * arm + finger_reach_ * fingers < kFastest)) {
     if (const int body = tooFast(); body != 0) what = mj_id2name(m, mjOBJ_BODY, body);

@@ -117,7 +117,7 @@ void Plant::keepPlaced() {
 /// or not any more, since they have opened or it has slid out of them.
 void Plant::updateGrip(const FreeBody& held, const Pose& hand) {
   const double away = distanceFrom(config_.object, object().inverse() * hand.position);
-  const bool open = person_.grip < kGripEnds, closed = person_.grip > kGripBegins;
+  const bool open = person_.grip<kGripEnds, closed = person_.grip> kGripBegins;
   if (placed_) {
     placed_ = grip_lost_ = false;
     grip_distance_ = away;

@@ -4,27 +4,20 @@
 #include <ros/package.h>
 
 #include "coglab_rt/joint_limits_table.hpp"
+#include "coglab_rt/ros/parameter.hpp"
 #include "lwr_fri_bridge/ros/bridge_ros.hpp"
 
 namespace lwr_fri_bridge {
 namespace {
 
-/// Value of a parameter; an existing one of another type is an error and not silently the default.
-template <typename T>
-T parameter(const ros::NodeHandle& nh, const char* name, const T& otherwise, const char* expected) {
-  T value = otherwise;
-  if (nh.hasParam(name) && !nh.getParam(name, value)) {
-    throw std::invalid_argument("parameter " + nh.resolveName(name) + ": expected " + expected);
-  }
-  return value;
-}
+using coglab_rt::readParameter;
 
 double numberParameter(const ros::NodeHandle& nh, const char* name, double otherwise) {
-  return parameter<double>(nh, name, otherwise, "a number");
+  return readParameter<double>(nh, name, otherwise, "a number");
 }
 
 int wholeParameter(const ros::NodeHandle& nh, const char* name, int otherwise, int low, int high) {
-  const int value = parameter<int>(nh, name, otherwise, "a whole number");
+  const int value = readParameter<int>(nh, name, otherwise, "a whole number");
   checkParameter(name, value, low, high);
   return value;
 }
@@ -33,7 +26,7 @@ int wholeParameter(const ros::NodeHandle& nh, const char* name, int otherwise, i
 
 BridgeConfig readBridgeConfig(const ros::NodeHandle& nh) {
   BridgeConfig config;
-  auto limits_file = parameter<std::string>(nh, "limits_file", "", "a path");
+  auto limits_file = readParameter<std::string>(nh, "limits_file", "", "a path");
   if (limits_file.empty()) {
     const std::string package = ros::package::getPath("lwr_description");
     if (package.empty()) {
@@ -44,14 +37,14 @@ BridgeConfig readBridgeConfig(const ros::NodeHandle& nh) {
     limits_file = package + "/config/joint_limits.yaml";
   }
   config.limits = coglab_rt::loadJointLimits(
-      limits_file, parameter<std::string>(nh, "limits_profile", "default", "a name"));
-  config.krl_convention =
-      fri::krlConventionFromName(parameter<std::string>(nh, "krl_convention", "coglab", "a name"));
-  config.tool_number = parameter<int>(nh, "tool_number", config.tool_number, "a whole number");
+      limits_file, readParameter<std::string>(nh, "limits_profile", "default", "a name"));
+  config.krl_convention = fri::krlConventionFromName(
+      readParameter<std::string>(nh, "krl_convention", "coglab", "a name"));
+  config.tool_number = readParameter<int>(nh, "tool_number", config.tool_number, "a whole number");
   config.lenient_headers =
-      parameter<bool>(nh, "lenient_headers", config.lenient_headers, "true or false");
-  const Event mode =
-      parseEvent(parameter<std::string>(nh, "control_mode", "position", "an event"), config.mode);
+      readParameter<bool>(nh, "lenient_headers", config.lenient_headers, "true or false");
+  const Event mode = parseEvent(
+      readParameter<std::string>(nh, "control_mode", "position", "an event"), config.mode);
   if (mode.kind != EventKind::Mode) {
     throw std::invalid_argument(
         "parameter " + nh.resolveName("control_mode") +
@@ -62,7 +55,7 @@ BridgeConfig readBridgeConfig(const ros::NodeHandle& nh) {
   config.leash.position = numberParameter(nh, "set_point_leash/position", config.leash.position);
   config.leash.impedance = numberParameter(nh, "set_point_leash/impedance", config.leash.impedance);
   config.leash.load = numberParameter(nh, "set_point_leash/load", config.leash.load);
-  const auto axes = parameter<std::string>(nh, "wrench_axes", "base", "base or tool");
+  const auto axes = readParameter<std::string>(nh, "wrench_axes", "base", "base or tool");
   if (axes != "base" && axes != "tool") {
     throw std::invalid_argument("parameter " + nh.resolveName("wrench_axes") + " = " + axes +
                                 ": expected base or tool");
@@ -84,9 +77,10 @@ BridgeConfig readBridgeConfig(const ros::NodeHandle& nh) {
 
 FriThreadOptions readFriThreadOptions(const ros::NodeHandle& nh) {
   FriThreadOptions options;
-  options.address = parameter<std::string>(nh, "fri_address", options.address, "an IPv4 address");
+  options.address =
+      readParameter<std::string>(nh, "fri_address", options.address, "an IPv4 address");
   options.port = wholeParameter(nh, "fri_port", options.port, 0, 65535);
-  options.controller_address = parameter<std::string>(
+  options.controller_address = readParameter<std::string>(
       nh, "controller_address", options.controller_address, "an IPv4 address or nothing");
   options.priority = wholeParameter(nh, "rt_priority", options.priority, 0, 98);
   options.stack_bytes =

@@ -103,7 +103,8 @@ class Plant {
   HandMotors& motors() { return motors_; }
   const HandMotors& motors() const { return motors_; }
   /// @throws std::invalid_argument if the object would stand inside something by more than 3 mm, or
-  /// the robot's fingers would not hold it where it is to be in their hand; nothing has changed then.
+  /// the robot's fingers would not hold it where it is to be in their hand; nothing has changed
+  /// then.
   void place(Place place, const Pose& pose);
   /// Exchanges the object; it is then to be placed. The robot stays as it is.
   void setObject(const Object& object);
@@ -146,7 +147,7 @@ class Plant {
   /// N, of the object on the person's hand, world axes: what their grip carries, less what the
   /// acceleration of their own hand asks for; zero without a grip. A mean over 20 ms.
   const Vector3d& personForce() const { return person_force_; }
-  double robotShare() const { return robot_share_; }             ///< of the weight, 0..1
+  double robotShare() const { return robot_share_; }  ///< of the weight, 0..1
   double personShare() const { return person_share_; }
   std::string heldBy() const;  ///< robot, human, both, board, floor, none
   bool dropped() const { return dropped_; }

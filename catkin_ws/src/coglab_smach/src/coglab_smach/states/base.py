@@ -90,7 +90,7 @@ class CoglabState(smach.State):
         self.ctx.journal.entered(f"{self.path()}/{self.label}")
         try:
             outcome, failure = self._run(ud)
-            if outcome not in ("failed", "preempted") and self.preempt_requested():
+            if outcome not in ("failed", "preempted") and self.asked_to_end():
                 # Asked for after the last look: the work is done, but nothing may follow it.
                 outcome, failure = "preempted", Failure(f"{self.label} was preempted", (), ReasonCode.PREEMPTED)
             if outcome == "preempted":
@@ -151,9 +151,20 @@ class CoglabState(smach.State):
         """Time left before the limit, s."""
         return self._deadline - self.ctx.clock.now()
 
+    def asked_to_end(self) -> bool:
+        """Whether a preempt was requested of this state or of a container around it.
+
+        Upstream's Concurrence takes a request and passes it to its children a moment later, in another thread. Nothing
+        may begin in between; and nothing in these machines follows upon a preempt, so that the request stands for all.
+        """
+        asked: Any | None = self
+        while asked is not None and not asked.preempt_requested():
+            asked = asked.container
+        return asked is not None
+
     def check(self) -> None:
         """Raise Interrupted if this state was preempted or STOP is latched."""
-        if self.preempt_requested():
+        if self.asked_to_end():
             raise Interrupted(False, f"{self.label} was preempted")
         if self.ctx.stop.pressed() and not self.ignores_stop:
             raise Interrupted(True, f"STOP: {self.ctx.stop.reason}; to go on {command('reset')}")
@@ -262,6 +273,14 @@ class _Placed:
             self.ctx.journal.end_action(outcome)
 
 
+def withdraw_requests(container: Any) -> None:
+    """Clear what preempts were requested of the children of a container, all the way down, and not served."""
+    for child in container.get_children().values():
+        child.recall_preempt()
+        if isinstance(child, smach.Container):
+            withdraw_requests(child)
+
+
 class CoglabMachine(_Placed, smach.StateMachine):
     """A state machine of labelled states that records how it ended."""
 
@@ -326,6 +345,9 @@ class CoglabConcurrence(_Placed, smach.Concurrence):
 
     def execute(self, parent_ud: Any = None) -> str:
         outcome = smach.Concurrence.execute(self, self.begin(parent_ud))
+        # A child that fails while its siblings' end is asked of it leaves the request standing. In upstream's engine it
+        # would end the next run of that child. What was asked of this container from above stays with it.
+        withdraw_requests(self)
         self.record_end(outcome)
         return outcome
 

@@ -1,0 +1,37 @@
+/// @file
+/// Reading a ROS parameter: one of another type is an error and not silently the default. For nodes
+/// alone, which depend on roscpp; nothing else of coglab_rt knows ROS.
+#pragma once
+
+#include <ros/node_handle.h>
+
+#include <stdexcept>
+#include <string>
+
+namespace coglab_rt {
+
+/// The parameter, or `otherwise` where there is none.
+/// @param expected what it has to be, in words.
+/// @throws std::invalid_argument naming the parameter where it has another type.
+template <typename T>
+T readParameter(const ros::NodeHandle& node, const char* name, const T& otherwise,
+                const char* expected) {
+  T value = otherwise;
+  if (node.hasParam(name) && !node.getParam(name, value)) {
+    throw std::invalid_argument("parameter " + node.resolveName(name) + ": expected " + expected);
+  }
+  return value;
+}
+
+/// A number between low and high.
+/// @throws std::invalid_argument naming parameter, value and range.
+inline double readNumber(const ros::NodeHandle& node, const char* name, double otherwise,
+                         double low, double high) {
+  const double value = readParameter<double>(node, name, otherwise, "a number");
+  if (value >= low && value <= high) return value;
+  throw std::invalid_argument("parameter " + node.resolveName(name) + " = " +
+                              std::to_string(value) + " is outside its range " +
+                              std::to_string(low) + ".." + std::to_string(high));
+}
+
+}  // namespace coglab_rt
