@@ -129,8 +129,10 @@ SOURCED = {
 
 
 def passages(text: str) -> list[str]:
-    """Paragraphs, points of lists and rows of tables, without what stands in blocks to type."""
+    """Paragraphs, points of lists and rows of tables, without what stands in blocks to type, and without what is quoted
+    from the page of figures, which a command writes."""
     text = re.sub(r"```.*?```", "", text, flags=re.DOTALL)
+    text = re.sub(f"{figures.BEGIN}.*?{figures.END}", "", text, flags=re.DOTALL)
     return re.split(r"\n\s*\n|\n(?=[*-] |\d+\. |\|)", text)
 
 

@@ -1,6 +1,6 @@
 /// @file
 /// Reading a ROS parameter: one of another type is an error and not silently the default. For nodes
-/// alone, which depend on roscpp; nothing else of coglab_rt knows ROS.
+/// alone, which depend on roscpp; outside of this folder coglab_rt knows no ROS.
 #pragma once
 
 #include <ros/node_handle.h>
