@@ -86,11 +86,12 @@ class MovingContact:
         return Evidence(MOMENTUM, stamp, stamp + HOLD, margin, message)
 
     def weight_since(self, before: np.ndarray) -> float:
-        """N that have come to hang on the palm since the residual was ``before`` (Nm): least squares for one unknown,
-        whether the arm moves or not."""
+        """N that have come to hang on the palm since the residual was ``before`` (Nm), whether the arm moves or not:
+        down's part of the force on the palm that explains the change best, so that a pull aside is no weight."""
         assert self.residual is not None
-        lever = self._jacobian(self.residual.position)[2]
-        return -float(lever @ (self.residual.torque - before)) / max(1e-6, float(lever @ lever))
+        jacobian = self._jacobian(self.residual.position)
+        force = np.linalg.lstsq(jacobian.T, self.residual.torque - before, rcond=0.05)[0]
+        return -float(force[2])
 
     def _follow_rest(self, residual: Residual) -> None:
         if float(np.max(np.abs(residual.velocity))) > STILL:
