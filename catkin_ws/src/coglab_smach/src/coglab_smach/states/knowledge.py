@@ -135,14 +135,15 @@ def await_offer(state: CoglabState, target: str, goals: Goals, margin: float = 0
                 still and bool(np.all(place >= low - wider) and np.all(place <= high + wider))
             )
             early = believed(state.ctx, target, located, person, low, high)
-            goal = first_reachable(state.ctx, located, goals) if offered else None
+            candidates = goals(located)
+            goal = first_reachable(state.ctx, located, candidates) if offered else None
             if goal is None and early is not None:
-                goal = first_reachable(state.ctx, early, goals)
+                goal = first_reachable(state.ctx, early, candidates)
             if goal is not None:
                 state.ctx.journal.mark("offered")
                 return goal
             if now > end and offered:
-                raise PortError(*out_of_reach(target, located, goals(located)[0]), ReasonCode.GOAL_UNREACHABLE)
+                raise PortError(*out_of_reach(target, located, candidates[0]), ReasonCode.GOAL_UNREACHABLE)
             if now > end:
                 where = ", ".join(f"{v:.2f}" for v in place)
                 raise PortError(
@@ -194,11 +195,13 @@ def palm_of(seen: Mapping[str, Any], goal: Mapping[str, Any]) -> Pose:
     return Pose.from_dict(seen) * Pose.from_dict({"xyz": goal["offset"], "quaternion": goal["orientation"]})
 
 
-def first_reachable(ctx: Context, seen: Mapping[str, Any], goals: Goals) -> dict[str, Any] | None:
+def first_reachable(
+    ctx: Context, seen: Mapping[str, Any], goals: list[dict[str, Any]]
+) -> dict[str, Any] | None:
     """The first of the goals for which the arm has a posture, relative to what was seen; with ``handover.check_reach``
     false the first one."""
     unchecked = not bool(ctx.config.get("handover.check_reach", True))
-    for goal in goals(seen):
+    for goal in goals:
         if unchecked or ctx.reachable(palm_of(seen, goal)):
             return {**goal, "frame": seen["frame"]}
     return None
