@@ -14,9 +14,10 @@ from coglab_smach.ports.interfaces import DmpRequest
 from coglab_smach.ports.pending import PortError
 from coglab_smach.states.base import CoglabState, Interrupted, TimeLimit
 from coglab_smach.states.motion import await_rest
+from coglab_smach.states.where import is_offered
 
-DOUBT_TIME = 0.06
-"""s for which nothing is believed before a reach ends"""
+DOUBT_TIME = 0.2
+"""s for which nothing is believed before a reach ends; a belief that a gap in what is seen has broken off is back by then"""
 
 
 class LoadControllers(CoglabState):
@@ -159,10 +160,12 @@ class WaitStop(CoglabState):
         self.trigger = trigger
         self._left = False
         """the compliant profile of the approach"""
+        self._early: dict[str, Any] | None = None
+        """goal of a reach that began on a belief"""
 
     def run(self, ud: Any) -> str:
         self._left = False
-        self._early = bool(ud.goal.get("early", False)) if self.trigger else False
+        self._early = ud.goal if self.trigger and ud.goal.get("early", False) else None
         self._doubted: float | None = None
         if self.trigger == "contact":
             return self._await_contact(ud)
@@ -273,14 +276,15 @@ class WaitStop(CoglabState):
         blocked = self.ctx.arm.motion_allowed()
         if not blocked.ok:
             raise TimeLimit("the arm does not follow any more", (blocked.why,), blocked.code)
-        if self._early:
-            self._check_belief()
+        if self._early is not None:
+            self._check_belief(self._early)
         return progress.state == "reached"
 
-    def _check_belief(self) -> None:
-        """A reach that began on a belief ends with it."""
+    def _check_belief(self, goal: dict[str, Any]) -> None:
+        """A reach that began on a belief ends with it, unless what it is for has come into the handover region."""
         ahead, now = self.ctx.perception.ahead(), self.ctx.clock.now()
-        if max(ahead.offer, ahead.request) >= float(self.ctx.config.get("handover.doubt", 0.1)):
+        believed = max(ahead.offer, ahead.request) >= float(self.ctx.config.get("handover.doubt", 0.1))
+        if believed or is_offered(self, goal):
             self._doubted = None
         elif self._doubted is None:
             self._doubted = now

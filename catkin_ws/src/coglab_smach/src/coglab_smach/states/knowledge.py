@@ -195,9 +195,7 @@ def palm_of(seen: Mapping[str, Any], goal: Mapping[str, Any]) -> Pose:
     return Pose.from_dict(seen) * Pose.from_dict({"xyz": goal["offset"], "quaternion": goal["orientation"]})
 
 
-def first_reachable(
-    ctx: Context, seen: Mapping[str, Any], goals: list[dict[str, Any]]
-) -> dict[str, Any] | None:
+def first_reachable(ctx: Context, seen: Mapping[str, Any], goals: list[dict[str, Any]]) -> dict[str, Any] | None:
     """The first of the goals for which the arm has a posture, relative to what was seen; with ``handover.check_reach``
     false the first one."""
     unchecked = not bool(ctx.config.get("handover.check_reach", True))

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import Any
+
 import numpy as np
 
 from coglab_smach.context.context import Context
@@ -21,12 +24,23 @@ def palm_at(ctx: Context) -> np.ndarray | None:
 
 def person_at(state: CoglabState) -> np.ndarray | None:
     """m."""
-    hand = str(state.ctx.config.get("perception.human_hand", "human_hand"))
+    return seen_at(state, str(state.ctx.config.get("perception.human_hand", "human_hand")))
+
+
+def seen_at(state: CoglabState, target: str) -> np.ndarray | None:
+    """m, of an object or of the person's hand as perception names it."""
     try:
-        seen = state.await_pending(state.ctx.perception.locate_object(hand, 0.3), "sight of the person's hand", 0.5)
+        seen = state.await_pending(state.ctx.perception.locate_object(target, 0.3), f"sight of '{target}'", 0.5)
     except PortError:
         return None
     return np.array(seen.xyz) if seen.age <= OLDEST else None
+
+
+def is_offered(state: CoglabState, goal: Mapping[str, Any]) -> bool:
+    """Whether what the goal is relative to is inside the region that the goal may not leave."""
+    place = seen_at(state, str(goal["frame"]).removesuffix("_ahead").removeprefix("object_"))
+    low, high = (np.array(goal["limits"][f"goal_region_{end}"]) for end in ("low", "high"))
+    return place is not None and bool(np.all(place >= low) and np.all(place <= high))
 
 
 def hand_from_palm(state: CoglabState) -> float | None:
