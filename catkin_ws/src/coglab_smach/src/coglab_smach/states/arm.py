@@ -17,7 +17,7 @@ from coglab_smach.states.motion import await_rest
 from coglab_smach.states.where import is_offered
 
 DOUBT_TIME = 0.2
-"""s for which nothing is believed before a reach ends; a belief that a gap in what is seen has broken off is back by then"""
+"""s for which nothing is believed before a reach ends; a belief that a gap in what is seen broke off is back by then"""
 
 
 class LoadControllers(CoglabState):

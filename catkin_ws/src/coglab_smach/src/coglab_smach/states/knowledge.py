@@ -141,6 +141,7 @@ def await_offer(state: CoglabState, target: str, goals: Goals, margin: float = 0
                 goal = first_reachable(state.ctx, early, candidates)
             if goal is not None:
                 state.ctx.journal.mark("offered")
+                state.pause(float(config.get("handover.start_after", 0.0)))
                 return goal
             if now > end and offered:
                 raise PortError(*out_of_reach(target, located, candidates[0]), ReasonCode.GOAL_UNREACHABLE)
