@@ -13,12 +13,8 @@ from coglab_smach.kinematics.motion_time import ptp_time, reach_time
 from coglab_smach.ports.interfaces import DmpRequest
 from coglab_smach.ports.pending import PortError
 from coglab_smach.states.base import CoglabState, Interrupted, TimeLimit
+from coglab_smach.states.early_reach import EarlyReach
 from coglab_smach.states.motion import await_rest
-from coglab_smach.states.where import is_offered
-
-DOUBT_TIME = 0.2
-"""s for which nothing is believed before a reach ends; a belief that a gap in what is seen broke off is back by then"""
-
 
 class LoadControllers(CoglabState):
     """Ask the controller manager to load the DMP and the point-to-point plug-in (D4.10 Figure 4)."""
@@ -160,13 +156,11 @@ class WaitStop(CoglabState):
         self.trigger = trigger
         self._left = False
         """the compliant profile of the approach"""
-        self._early: dict[str, Any] | None = None
-        """goal of a reach that began on a belief"""
+        self._early: EarlyReach | None = None
 
     def run(self, ud: Any) -> str:
         self._left = False
-        self._early = ud.goal if self.trigger and ud.goal.get("early", False) else None
-        self._doubted: float | None = None
+        self._early = EarlyReach(self, ud.goal) if self.trigger and "early" in ud.goal else None
         if self.trigger == "contact":
             return self._await_contact(ud)
         self._await_reach(self._reached)
@@ -277,21 +271,8 @@ class WaitStop(CoglabState):
         if not blocked.ok:
             raise TimeLimit("the arm does not follow any more", (blocked.why,), blocked.code)
         if self._early is not None:
-            self._check_belief(self._early)
+            self._early.check()
         return progress.state == "reached"
-
-    def _check_belief(self, goal: dict[str, Any]) -> None:
-        """A reach that began on a belief ends with it, unless what it is for has come into the handover region."""
-        ahead, now = self.ctx.perception.ahead(), self.ctx.clock.now()
-        believed = max(ahead.offer, ahead.request) >= float(self.ctx.config.get("handover.doubt", 0.1))
-        if believed or is_offered(self, goal):
-            self._doubted = None
-        elif self._doubted is None:
-            self._doubted = now
-        elif now - self._doubted > DOUBT_TIME:
-            raise TimeLimit(
-                "the reach was given up", ("the person does not offer or ask any more",), ReasonCode.GOAL_WITHDRAWN
-            )
 
 
 class MonitorDmp(CoglabState):

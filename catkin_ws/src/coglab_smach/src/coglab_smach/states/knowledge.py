@@ -180,15 +180,18 @@ def handover_region(ctx: Context, margin: float = 0.0) -> tuple[np.ndarray, np.n
 def unless_withdrawn(ctx: Context, goal: Mapping[str, Any], margin: float = 0.0) -> dict[str, Any]:
     """The goal of a motion that ends by itself when what it follows leaves the region, goes back or falls."""
     low, high = handover_region(ctx, margin)
-    # A predicted place goes to and fro as the prediction is corrected: who offers it is watched by the belief.
-    early = str(goal["frame"]).endswith("_ahead")
     limits = {
         "goal_region_low": low.tolist(),
         "goal_region_high": high.tolist(),
-        "goal_retreat": 0.0 if early else float(ctx.config.get("handover.retreat", 0.10)),
-        "goal_drop": 0.0 if early else float(ctx.config.get("handover.drop", 0.08)),
+        "goal_retreat": float(ctx.config.get("handover.retreat", 0.10)),
+        "goal_drop": float(ctx.config.get("handover.drop", 0.08)),
     }
-    return {**goal, "limits": limits, "early": early}
+    if not str(goal["frame"]).endswith("_ahead"):
+        return {**goal, "limits": limits}
+    # A predicted place goes to and fro as the prediction is corrected: going back and falling are watched in what is
+    # seen, by the state that waits for the reach.
+    early = {"retreat": limits["goal_retreat"], "drop": limits["goal_drop"]}
+    return {**goal, "limits": {**limits, "goal_retreat": 0.0, "goal_drop": 0.0}, "early": early}
 
 
 def palm_of(seen: Mapping[str, Any], goal: Mapping[str, Any]) -> Pose:

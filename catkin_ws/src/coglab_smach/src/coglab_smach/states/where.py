@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
-
 import numpy as np
 
 from coglab_smach.context.context import Context
@@ -36,14 +33,3 @@ def seen_at(state: CoglabState, target: str) -> np.ndarray | None:
     return np.array(seen.xyz) if seen.age <= OLDEST else None
 
 
-def is_offered(state: CoglabState, goal: Mapping[str, Any]) -> bool:
-    """Whether what the goal is relative to is inside the region that the goal may not leave."""
-    place = seen_at(state, str(goal["frame"]).removesuffix("_ahead").removeprefix("object_"))
-    low, high = (np.array(goal["limits"][f"goal_region_{end}"]) for end in ("low", "high"))
-    return place is not None and bool(np.all(place >= low) and np.all(place <= high))
-
-
-def hand_from_palm(state: CoglabState) -> float | None:
-    """m from the person's hand to the palm."""
-    person, palm = person_at(state), palm_at(state.ctx)
-    return None if person is None or palm is None else float(np.linalg.norm(person - palm))
