@@ -8,7 +8,7 @@ from coglab_smach.states.base import CoglabConcurrence, CoglabMachine, require_a
 from coglab_smach.states.hand import HandPreshape
 
 KEYS = ["goal", "grasp", "object_entry", "object_id"]
-RELEASE_KEYS = [*KEYS, "delivery"]
+REST_KEYS = [*KEYS, "delivery"]
 
 
 def build_arm_motion(ctx: Context, trigger: str) -> CoglabMachine:
@@ -17,7 +17,7 @@ def build_arm_motion(ctx: Context, trigger: str) -> CoglabMachine:
         ctx,
         "arm_motion",
         ["succeeded", "failed", "preempted"],
-        input_keys=RELEASE_KEYS if trigger == "release" else KEYS,
+        input_keys=REST_KEYS if trigger == "rest" else KEYS,
     )
     with machine:
         machine.add_state("switch_to_dmp", SwitchController(ctx, "dmp"), {"succeeded": "execute_dmp"})
@@ -38,7 +38,7 @@ def build_approach(ctx: Context, label: str, trigger: str, preshape: bool, monit
         "failed",
         decide,
         conclude,
-        input_keys=RELEASE_KEYS if trigger == "release" else KEYS,
+        input_keys=REST_KEYS if trigger == "rest" else KEYS,
     )
     with group:
         group.add_state("arm_motion", build_arm_motion(ctx, trigger))

@@ -251,12 +251,21 @@ class SimulatedHand:
 
         return self._move("close", 1.0, positions, True)
 
+    def close(self, speed: int) -> Pending:
+        def positions() -> tuple[int, ...]:
+            return (200, 254, 254, 254, 254) if self.cell.faults.empty_grasp else (200, 150, 160, 155, 170)
+
+        return self._at_speed("close", speed, positions)
+
     def open(self, speed: int) -> Pending:
+        return self._at_speed("open", speed, lambda: (0, 0, 0, 0, 0))
+
+    def _at_speed(self, name: str, speed: int, positions: Callable[[], tuple[int, ...]]) -> Pending:
         if not 1 <= speed <= 511:
             return Ready(
-                error=PortError(f"open refused: speed is {speed}, expected 1..511", code=ReasonCode.OUT_OF_RANGE)
+                error=PortError(f"{name} refused: speed is {speed}, expected 1..511", code=ReasonCode.OUT_OF_RANGE)
             )
-        return self._move("open", 0.8, lambda: (0, 0, 0, 0, 0), False)
+        return self._move(name, 0.8 * max(1.0, 400 / speed), positions, False)
 
     def state(self) -> HandState:
         self.cell.advance()

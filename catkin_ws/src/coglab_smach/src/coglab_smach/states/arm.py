@@ -141,20 +141,17 @@ class ExecuteDmp(CoglabState):
 class WaitStop(CoglabState):
     """Wait for the end of the reach or, if ``trigger`` asks for it, for the contact trigger.
 
-    trigger: '' (the end of the motion is enough), 'contact' (an object is in the hand) or 'release' (the person has
-    taken the load). Contact is watched for from the last ``contact_within`` m of the reach on and ends the motion;
-    release once the motion has ended. The reach may take ``reach_timeout`` beyond what the arm's limits ask for.
+    trigger: '' (the end of the motion is enough), 'contact' (an object is in the hand) or 'rest' (the arm stands and
+    follows nothing any more). Contact is watched for from the last ``contact_within`` m of the reach on and ends the
+    motion; so does for 'rest', within the last ``give.touch_within`` m, a load of ``give.touch_share`` of the object's
+    weight, up or down: who takes the object from an arm that moves must not be followed any further. The reach may take ``reach_timeout`` beyond what the arm's limits ask for.
     """
 
     default_time_limit = 20.0
     owns_motion = True
 
     def __init__(self, ctx: Context, trigger: str) -> None:
-        keys: dict[str, list[str]] = {
-            "": [],
-            "contact": ["object_entry", "goal"],
-            "release": ["object_entry", "delivery", "goal"],
-        }
+        keys: dict[str, list[str]] = {"": [], "contact": ["object_entry", "goal"], "rest": ["object_entry", "delivery", "goal"]}
         super().__init__(ctx, input_keys=keys[trigger])
         self.trigger = trigger
         self._left = False
@@ -166,19 +163,48 @@ class WaitStop(CoglabState):
         self._doubted: float | None = None
         if self.trigger == "contact":
             return self._await_contact(ud)
+        if self.trigger == "rest":
+            return self._await_rest(ud)
         self._await_reach(self._reached)
         self.ctx.journal.mark("motion_reached")
-        if not self.trigger:
-            return "succeeded"
+        return "succeeded"
+
+    def _await_rest(self, ud: Any) -> str:
+        """The goal is the person's hand, and that now comes to the object: an arm that still followed it would back
+        away, and one that is held would drag the hand along that it follows. It ends with the detector armed for
+        release."""
+        arm, contact = self.ctx.arm, self.ctx.contact
+        within, touch = (float(self.ctx.config.get(f"give.touch_{name}", 0.0)) for name in ("within", "share"))
+        self._await_reach(lambda: self._reached() or self._comes_to_its_end(within))
         self._leave_approach_profile()
-        # The goal is the person's hand, and that now comes to the object: an arm that still followed it
-        # would back away. But first the motion has to come to rest at the goal that it has latched.
-        await_rest(self.ctx, self.check)
-        self.await_pending(self.ctx.arm.switch_controller("ptp"), "end of the reach by switching to 'ptp'", 3.0)
-        self._watch("release", self._settings(ud))
-        # From now on the person holds the object as well: until the hand is open the arm must not go away with it.
-        self.ctx.shared = True
-        return self._found()
+        release = ud.delivery["release"]
+        settings = {
+            "mass": float(ud.object_entry.get("mass", 0.0)),
+            "load_share": float(release.get("threshold", 0.5)),
+        }
+        limit = float(release.get("timeout", self.ctx.config.get("release_timeout", 8.0)))
+        self.await_pending(
+            contact.arm("release", limit + self.left(), settings), "arming of the contact detector", 2.0
+        )
+
+        def touched() -> bool:
+            self.check()
+            return abs(contact.share_gone() or 0.0) > touch
+
+        self._await_reach(lambda: touched() or self._reached())
+        self.ctx.journal.mark("motion_reached")
+        if arm.dmp_progress().state == "reached":  # it has to come to rest at the goal that it has latched
+            await_rest(self.ctx, touched)
+        else:
+            self.reason = f"touched on the way: {contact.share_gone() or 0.0:.1f} of the weight"
+        self.await_pending(arm.switch_controller("ptp"), "end of the reach by switching to 'ptp'", 3.0)
+        return "succeeded"
+
+    def _comes_to_its_end(self, within: float) -> bool:
+        """Whether the second half of the reach has come to the last ``within`` m: its first news may not know the
+        goal."""
+        progress = self.ctx.arm.dmp_progress()
+        return progress.phase < 0.5 and 0.0 < progress.remaining_distance < within
 
     def _await_contact(self, ud: Any) -> str:
         """The object may come into the hand on the way, at its end, or be brought there once the arm waits."""
@@ -189,13 +215,13 @@ class WaitStop(CoglabState):
 
     def _watch(self, mode: str, settings: dict[str, Any]) -> None:
         """Arm the detector and wait for what it finds."""
-        limit = float(settings.get("timeout", self.ctx.config.get(f"{self.trigger}_timeout", 6.0)))
+        limit = float(settings.get("timeout", self.ctx.config.get("contact_timeout", 6.0)))
         self.allow(limit + 5.0)
         self.await_pending(self.ctx.contact.arm(mode, limit, settings), "arming of the contact detector", 2.0)
         try:
-            self.wait_for(self._happened, self._expected(), limit)
+            self.wait_for(self._happened, "contact of an object with the hand", limit)
         except TimeLimit as error:
-            error.code = error.code if error.code != ReasonCode.TIME_LIMIT else self._missed()
+            error.code = error.code if error.code != ReasonCode.TIME_LIMIT else ReasonCode.NO_CONTACT
             raise
         finally:
             self.ctx.contact.disarm()
@@ -203,19 +229,16 @@ class WaitStop(CoglabState):
     def _happened(self) -> bool:
         if self.ctx.contact.event() is not None:
             return True
-        if self.trigger == "contact" and self._reached():
+        if self._reached():
             self.ctx.journal.mark("motion_reached")
             self._leave_approach_profile()
         return False
-
-    def _missed(self) -> int:
-        return int(ReasonCode.NO_CONTACT if self.trigger == "contact" else ReasonCode.NOT_RELEASED)
 
     def _found(self) -> str:
         event = self.ctx.contact.event()
         assert event is not None
         self.ctx.journal.mark("contact")
-        self.reason = event.message or f"{self.trigger} by {event.source}, margin {event.margin:.1f}"
+        self.reason = event.message or f"contact by {event.source}, margin {event.margin:.1f}"
         return "succeeded"
 
     def _await_reach(self, near: Callable[[], bool]) -> None:
@@ -250,19 +273,9 @@ class WaitStop(CoglabState):
             raise
 
     def _settings(self, ud: Any) -> dict[str, Any]:
-        """What the object's entry says about contact, or its delivery mode about release."""
+        """What the object's entry says about contact."""
         entry = ud.object_entry
-        settings = dict(entry.get("contact", {}))
-        settings["mass"] = float(entry.get("mass", 0.0))
-        if self.trigger == "release":
-            release = ud.delivery["release"]
-            settings.pop("timeout", None)
-            settings.update({key: release[key] for key in ("timeout",) if key in release})
-            settings["load_share"] = float(release.get("threshold", 0.0))
-        return settings
-
-    def _expected(self) -> str:
-        return "contact of an object with the hand" if self.trigger == "contact" else "the person's taking of the load"
+        return {**entry.get("contact", {}), "mass": float(entry.get("mass", 0.0))}
 
     def _reached(self) -> bool:
         progress = self.ctx.arm.dmp_progress()
