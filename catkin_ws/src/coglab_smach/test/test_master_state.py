@@ -78,7 +78,7 @@ def test_what_is_waited_for_is_told_with_its_deadline():
     assert all((s.deadline > 0.0) == bool(s.waits_for) for s in trial.shown)
     receiving = {s.waits_for for s in trial.shown if f"/{RECEIVE}/" in s.state}
     giving = {s.waits_for for s in trial.shown if f"/{GIVE}/" in s.state}
-    assert {"'mug' on offer", "the end of the reach", "contact of an object with the hand"} <= receiving
+    assert {"'mug' on offer", "contact of an object with the hand"} <= receiving  # the reach ends in that
     assert {"the person's hand within reach", "the end of the reach", "the person's taking of the load"} <= giving
     left = [s.deadline - stamp for stamp, s in timed if s.waits_for == "the person's taking of the load"]
     assert left and abs(left[0] - 8.0) < 0.05  # as the mug's delivery says

@@ -50,6 +50,8 @@ class Partner:
     touch_after: float | None = 0.8
     take_after: float | None = 1.0
     let_go_after: float | None = 0.2
+    away: float = 1.0
+    """s for which the person's hand is away then, before it is back at its work"""
     pattern: str = "unknown"
     pattern_at: float = 0.0
     """s into the motion at which the pattern is decided"""
@@ -123,6 +125,8 @@ class SimulatedCell:
         }
         self._lock = threading.RLock()
         self._under_way: list[_Call] = []
+        self._back: float | None = None
+        """when the person's hand comes back"""
 
     def note(self, what: str) -> None:
         """Remember a call with its time."""
@@ -133,12 +137,9 @@ class SimulatedCell:
         self.lifted = force
 
     def let_go(self) -> None:
-        """The person's hand leaves what it has given."""
+        """The person's hand leaves what it has given, and comes back later."""
         self.objects["human_hand"] = Pose(HAND_AT_WORK + [0.3, 0.0, 0.0])
-
-    def reach_out(self) -> None:
-        """The person's hand is where things are handed over."""
-        self.objects["human_hand"] = Pose(HAND_AT_WORK)
+        self._back = self.clock.now() + self.partner.away
 
     def called(self, prefix: str = "") -> list[str]:
         """Names of the calls so far that begin with ``prefix``."""
@@ -168,6 +169,8 @@ class SimulatedCell:
                 call.look(now)
             self._under_way = [call for call in self._under_way if not call.over]
             self.arm.follow()
+            if self._back is not None and now >= self._back:
+                self.objects["human_hand"], self._back = Pose(HAND_AT_WORK), None
 
     @property
     def joints(self) -> tuple[float, ...]:

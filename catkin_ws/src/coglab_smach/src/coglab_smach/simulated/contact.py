@@ -63,8 +63,6 @@ class SimulatedContact:
             after = {"load": carried, "lift": carried, "release": partner.take_after}.get(mode, touch)
             now = cell.clock.now()
             self._touched = self._touched or mode in TOUCHES
-            if mode in TOUCHES:
-                cell.reach_out()
             self._mode, self._until, self._due = mode, now + time_limit, None if after is None else now + after
             moving = mode not in ("contact_in_motion", "lift", "release") and not cell.arm.standing()
             self.armed_while_moving = self.armed_while_moving or moving
