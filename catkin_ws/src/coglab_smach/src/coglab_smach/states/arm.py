@@ -142,16 +142,17 @@ class WaitStop(CoglabState):
     """Wait for the end of the reach or, if ``trigger`` asks for it, for the contact trigger.
 
     trigger: '' (the end of the motion is enough), 'contact' (an object is in the hand) or 'rest' (the arm stands and
-    follows nothing any more). Contact is watched for from the last ``contact_within`` m of the reach on and ends the
-    motion; so does for 'rest', within the last ``give.touch_within`` m, a load of ``give.touch_share`` of the object's
-    weight, up or down: who takes the object from an arm that moves must not be followed any further. The reach may take ``reach_timeout`` beyond what the arm's limits ask for.
+    follows nothing any more, and the detector is armed for release). Contact is watched for from the last
+    ``contact_within`` m of the reach on and ends the motion; so does for 'rest', within the last ``give.touch_within``
+    m, a load of ``give.touch_share`` of the object's weight, up or down: who takes the object from an arm that moves
+    must not be followed any further. The reach may take ``reach_timeout`` beyond what the arm's limits ask for.
     """
 
     default_time_limit = 20.0
     owns_motion = True
 
     def __init__(self, ctx: Context, trigger: str) -> None:
-        keys: dict[str, list[str]] = {"": [], "contact": ["object_entry", "goal"], "rest": ["object_entry", "delivery", "goal"]}
+        keys = {"": [], "contact": ["object_entry", "goal"], "rest": ["object_entry", "delivery", "goal"]}
         super().__init__(ctx, input_keys=keys[trigger])
         self.trigger = trigger
         self._left = False
@@ -171,8 +172,7 @@ class WaitStop(CoglabState):
 
     def _await_rest(self, ud: Any) -> str:
         """The goal is the person's hand, and that now comes to the object: an arm that still followed it would back
-        away, and one that is held would drag the hand along that it follows. It ends with the detector armed for
-        release."""
+        away, and one that is held would drag the hand along that it follows."""
         arm, contact = self.ctx.arm, self.ctx.contact
         within, touch = (float(self.ctx.config.get(f"give.touch_{name}", 0.0)) for name in ("within", "share"))
         self._await_reach(lambda: self._reached() or self._comes_to_its_end(within))
