@@ -19,9 +19,9 @@ sake: the model is that good"""
 class LeavingLoad:
     """The share that is gone, and the moment from which it has been enough for long enough.
 
-    Armed at rest, it is counted from what hangs on the palm then. Armed in a motion, it is counted from what was carried
-    before that, and once the arm stands, from what hangs on the palm then: unless that is more than SAME different,
-    because somebody has been lifting or pulling already.
+    Armed at rest, it is counted from what hangs on the palm then. Armed in a motion, it is counted from what was
+    carried before that, and once the arm stands, from what hangs on the palm then: unless that is more than SAME
+    different, because somebody has been lifting or pulling already.
     """
 
     def __init__(self, mass: float, needed: float, until: float, carried: float | None = None) -> None:

@@ -92,9 +92,7 @@ class MovingContact:
         """N that have come to hang on the palm since the residual was ``before`` (Nm), whether the arm moves or not:
         down's part of the force on the palm that explains the change best, so that a pull aside is no weight."""
         assert self.residual is not None
-        jacobian = self._jacobian(self.residual.position)
-        force = np.linalg.lstsq(jacobian.T, self.residual.torque - before, rcond=0.05)[0]
-        return -float(force[2])
+        return self.weight(self.residual.torque - before, self.residual.position)
 
     def weight(self, residual: Joints, position: Joints) -> float:
         """N that hang on the palm by a residual (Nm) at a position (rad): see weight_since."""

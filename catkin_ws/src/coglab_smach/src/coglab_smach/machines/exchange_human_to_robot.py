@@ -15,7 +15,7 @@ SHARED = ["object_entry", "grasp", "grasp_name"]
 
 
 def build_exchange_human_to_robot(ctx: Context) -> CoglabMachine:
-    """query -> goal from the nominal grasp -> reach and preshape -> contact -> close -> take the weight -> home."""
+    """query -> goal from the best grasp -> reach and preshape -> contact -> close -> take the weight -> home."""
     machine = CoglabMachine(
         ctx, "exchange_human_to_robot", ACTION_OUTCOMES, input_keys=["object_id"], output_keys=SHARED
     )

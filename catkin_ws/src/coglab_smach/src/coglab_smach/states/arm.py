@@ -174,7 +174,8 @@ class WaitStop(CoglabState):
         """The goal is the person's hand, and that now comes to the object: an arm that still followed it would back
         away, and one that is held would drag the hand along that it follows."""
         arm, contact = self.ctx.arm, self.ctx.contact
-        within, touch = (float(self.ctx.config.get(f"give.touch_{name}", 0.0)) for name in ("within", "share"))
+        within = float(self.ctx.config.get("give.touch_within", 0.05))
+        touch = float(self.ctx.config.get("give.touch_share", 0.8))
         self._await_reach(lambda: self._reached() or self._comes_to_its_end(within))
         self._leave_approach_profile()
         release = ud.delivery["release"]

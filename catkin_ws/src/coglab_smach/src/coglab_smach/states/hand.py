@@ -9,7 +9,7 @@ from coglab_msgs.msg import ReasonCode, Say
 from coglab_smach.context.context import Context
 from coglab_smach.ports.pending import PortError
 from coglab_smach.states.base import CoglabState
-from coglab_smach.states.weight import hand_from_palm
+from coglab_smach.states.where import hand_from_palm
 
 
 class CalibrateHand(CoglabState):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
 
@@ -13,8 +13,13 @@ from coglab_py.pose import Pose, mean_pose
 from coglab_smach.context.context import Context
 from coglab_smach.context.journal import Wait
 from coglab_smach.kinematics.goals import approach_of, delivery_goal, grasp_goal, palm_at_grasp, place_goal
+from coglab_smach.kinematics.grasp_choice import ranked
 from coglab_smach.ports.pending import PortError
 from coglab_smach.states.base import CoglabState
+from coglab_smach.states.where import palm_at, person_at
+
+Goals = Callable[[Mapping[str, Any]], list[dict[str, Any]]]
+"""goals for what was seen, best first"""
 
 
 class InitVision(CoglabState):
@@ -105,9 +110,9 @@ def locate(state: CoglabState, target: str) -> dict[str, Any]:
     }
 
 
-def await_offer(state: CoglabState, target: str, goal: Mapping[str, Any], margin: float = 0.0) -> dict[str, Any]:
+def await_offer(state: CoglabState, target: str, goals: Goals, margin: float = 0.0) -> dict[str, Any]:
     """Wait until ``target`` is inside the handover region, so that the arm does not chase a hand at rest, and until the
-    arm has a posture for ``goal``, which is relative to its frame, so that the hand does not run into whoever offers.
+    arm has a posture for one of ``goals``, so that the hand does not run into whoever offers; that goal.
 
     An object that is held still a little outside counts too. ``margin`` (m) widens the region: a hand is behind the
     object it holds or asks for. PortError if nobody comes within ``handover.offer_timeout``; nothing has moved then.
@@ -129,14 +134,16 @@ def await_offer(state: CoglabState, target: str, goal: Mapping[str, Any], margin
             offered = bool(np.all(place >= low) and np.all(place <= high)) or (
                 still and bool(np.all(place >= low - wider) and np.all(place <= high + wider))
             )
-            if offered and reachable(state.ctx, located, goal):
-                break
             early = believed(state.ctx, target, located, person, low, high)
-            if early is not None and reachable(state.ctx, early, goal):
-                located = early
-                break
+            candidates = goals(located)
+            goal = first_reachable(state.ctx, located, candidates) if offered else None
+            if goal is None and early is not None:
+                goal = first_reachable(state.ctx, early, candidates)
+            if goal is not None:
+                state.ctx.journal.mark("offered")
+                return goal
             if now > end and offered:
-                raise PortError(*out_of_reach(target, located, goal), ReasonCode.GOAL_UNREACHABLE)
+                raise PortError(*out_of_reach(target, located, candidates[0]), ReasonCode.GOAL_UNREACHABLE)
             if now > end:
                 where = ", ".join(f"{v:.2f}" for v in place)
                 raise PortError(
@@ -146,8 +153,6 @@ def await_offer(state: CoglabState, target: str, goal: Mapping[str, Any], margin
                     ReasonCode.OBJECT_NOT_SEEN,
                 )
             state.pause(0.03)
-    state.ctx.journal.mark("offered")
-    return located
 
 
 def believed(
@@ -190,9 +195,16 @@ def palm_of(seen: Mapping[str, Any], goal: Mapping[str, Any]) -> Pose:
     return Pose.from_dict(seen) * Pose.from_dict({"xyz": goal["offset"], "quaternion": goal["orientation"]})
 
 
-def reachable(ctx: Context, seen: Mapping[str, Any], goal: Mapping[str, Any]) -> bool:
-    """Whether the arm has a posture for the goal; not asked with ``handover.check_reach`` false."""
-    return not bool(ctx.config.get("handover.check_reach", True)) or ctx.reachable(palm_of(seen, goal))
+def first_reachable(
+    ctx: Context, seen: Mapping[str, Any], goals: list[dict[str, Any]]
+) -> dict[str, Any] | None:
+    """The first of the goals for which the arm has a posture, relative to what was seen; with ``handover.check_reach``
+    false the first one."""
+    unchecked = not bool(ctx.config.get("handover.check_reach", True))
+    for goal in goals:
+        if unchecked or ctx.reachable(palm_of(seen, goal)):
+            return {**goal, "frame": seen["frame"]}
+    return None
 
 
 def out_of_reach(target: str, seen: Mapping[str, Any], goal: Mapping[str, Any]) -> tuple[str, tuple[str, ...]]:
@@ -210,7 +222,8 @@ def paced(ctx: Context, goal: dict[str, Any]) -> dict[str, Any]:
 
 
 class SetGraspGoal(CoglabState):
-    """DMP goal from the nominal grasp: palm relative to the tracked object frame, ``handover.standoff`` m short of it.
+    """DMP goal from the best of the object's grasps: palm relative to the tracked object frame, ``handover.standoff`` m
+    short of it. The hand takes that grasp's preshape meanwhile, so that it is open when the arm arrives.
 
     Ends when the object is on offer, that is inside the handover region: the arm must not chase an object that still
     rests with the person. Nobody offering it within the limit is a failure, and the arm has not moved.
@@ -219,22 +232,36 @@ class SetGraspGoal(CoglabState):
     default_time_limit = 20.0
 
     def __init__(self, ctx: Context) -> None:
-        super().__init__(ctx, input_keys=["object_id", "object_entry", "grasp"], output_keys=["goal", "located"])
+        super().__init__(ctx, input_keys=["object_id", "object_entry"], output_keys=["goal", "grasp", "grasp_name"])
+        self._grasp_name = ""
 
     def run(self, ud: Any) -> str:
         self.ctx.say(Say.READY_TO_RECEIVE, f"Please hand me the object '{ud.object_id}'.")
-        standoff = float(self.ctx.config.get("handover.standoff", 0.0))
-        goal = paced(self.ctx, grasp_goal(ud.object_entry, ud.grasp, "", "receive", standoff))
-        goal["approach"] = approach_of(ud.grasp, float(self.ctx.config.get("handover.approach", 0.08)))
-        located = await_offer(self, ud.object_id, goal)
-        ud.located = located
+        entry, self._grasp_name = ud.object_entry, ""
+        goal = await_offer(self, ud.object_id, lambda seen: self._goals(entry, seen))
+        name = goal.pop("grasp_name")
+        grasp = entry["grasps"][name]
+        ud.grasp_name, ud.grasp, self.reason = name, grasp, f"grasp '{name}'"
         # The detector looks whether the object is in the palm, wherever the motion's goal comes from.
-        grasped = {
-            "frame": str(located["frame"]).removesuffix("_ahead"),
-            "grasp": palm_at_grasp(ud.grasp, 0.0).to_dict(),
-        }
-        ud.goal = unless_withdrawn(self.ctx, {**goal, "frame": located["frame"], "object": grasped})
+        grasped = {"frame": goal["frame"].removesuffix("_ahead"), "grasp": palm_at_grasp(grasp, 0.0).to_dict()}
+        ud.goal = unless_withdrawn(self.ctx, {**goal, "object": grasped})
         return "succeeded"
+
+    def _goals(self, entry: Mapping[str, Any], seen: Mapping[str, Any]) -> list[dict[str, Any]]:
+        """One for each grasp, best first, of the object where it was seen."""
+        config = self.ctx.config
+        names = ranked(entry, Pose.from_dict(seen), person_at(self), palm_at(self.ctx), self._grasp_name)
+        if names[0] != self._grasp_name:
+            self._grasp_name, hand = names[0], entry["grasps"][names[0]]["hand"]
+            self.ctx.hand.preshape(hand["mode"], hand["level"])  # awaited in the approach
+        goals = []
+        for name in names:
+            grasp = entry["grasps"][name]
+            standoff = float(config.get("handover.standoff", 0.0))
+            goal = paced(self.ctx, grasp_goal(entry, grasp, "", "receive", standoff))
+            approach = approach_of(grasp, float(config.get("handover.approach", 0.08)))
+            goals.append({**goal, "approach": approach, "grasp_name": name})
+        return goals
 
 
 class SetTakeGoal(CoglabState):
@@ -276,8 +303,7 @@ class SetDeliveryGoal(CoglabState):
         goal = paced(self.ctx, delivery_goal(entry, ud.grasp, delivery, ""))
         margin = float(self.ctx.config.get("handover.hand_margin", 0.10))
         hand = str(self.ctx.config.get("perception.human_hand", "human_hand"))
-        located = await_offer(self, hand, goal, margin)
-        goal = unless_withdrawn(self.ctx, {**goal, "frame": located["frame"]}, margin)
+        goal = unless_withdrawn(self.ctx, await_offer(self, hand, lambda seen: [goal], margin), margin)
         ud.delivery_pose = {"xyz": goal["offset"], "quaternion": goal["orientation"]}
         ud.goal = goal
         return "succeeded"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -12,28 +11,17 @@ from coglab_smach.context.context import Context
 from coglab_smach.kinematics.reachability import default_arm
 from coglab_smach.ports.pending import Pending, PortError
 from coglab_smach.states.base import CoglabState, TimeLimit
-
-
-def hand_from_palm(state: CoglabState) -> float | None:
-    """m from the person's hand to the robot's palm, None where either is not seen."""
-    ctx = state.ctx
-    here = ctx.arm.joint_positions()
-    hand = str(ctx.config.get("perception.human_hand", "human_hand"))
-    try:
-        seen = state.await_pending(ctx.perception.locate_object(hand, 0.3), "sight of the person's hand", 0.5)
-    except PortError:
-        return None
-    if here is None or seen.age > 0.5:
-        return None
-    return float(np.linalg.norm(np.array(seen.xyz) - default_arm().fk(np.asarray(here))[0]))
+from coglab_smach.states.where import hand_from_palm
 
 
 class TakeWeight(CoglabState):
-    """Lift what the hand has closed on until the arm carries ``hand.load_share`` of it or the person's hand has left
-    it; it has to leave it in the end. A person who does not let go gets the object back.
+    """Lift what the hand has closed on until the person's hand has left it, by ``hand.lift`` m at most and at
+    ``hand.lift_speed`` m/s. A person who does not let go gets the object back.
 
-    The arm rises by ``hand.lift`` m at most, at ``hand.lift_speed`` m/s. ``hand_distance``: m, of the person's hand
-    from the palm before the fingers closed; None where no tracker sees it, and then the weight alone counts.
+    The weight that comes is measured (``hand.load_share`` of the object's). It is counted from the closing of the
+    fingers, when a person often still presses the object up or down, so it does not end the rise: what a person feels
+    in the hand does. ``hand_distance``: m, of the person's hand from the palm before the fingers closed; None where no
+    tracker sees it, and then the weight has to have come by the end of the rise.
     """
 
     default_time_limit = 16.0
@@ -41,17 +29,30 @@ class TakeWeight(CoglabState):
 
     def __init__(self, ctx: Context) -> None:
         super().__init__(ctx, input_keys=["object_id", "object_entry", "hand_distance"])
-        self._has_left: Callable[[], bool] = lambda: False
+        self._lifting: Pending | None = None
 
     def run(self, ud: Any) -> str:
-        limit = float(self.ctx.config.get("hand.load_timeout", 5.0))
+        limit, contact = float(self.ctx.config.get("hand.load_timeout", 5.0)), self.ctx.contact
         end, seen = self.ctx.clock.now() + limit, ud.hand_distance is not None
         farther = (ud.hand_distance or 0.0) + float(self.ctx.config.get("hand.let_go", 0.04))
-        self._has_left = lambda: seen and (hand_from_palm(self) or 0.0) > farther
-        try:
-            self._take(ud, limit)
+        settings = {
+            "mass": float(ud.object_entry.get("mass", 0.0)),
+            "load_share": float(self.ctx.config.get("hand.load_share", 0.5)),
+        }
+        self.await_pending(contact.arm("lift", limit, settings), "arming of the contact detector", 2.0)
+
+        def has_let_go() -> bool:
+            carried = contact.event() is not None
+            if carried:
+                self.ctx.journal.mark("loaded")
             if seen:
-                self.wait_for(self._has_left, "the person's letting go", end - self.ctx.clock.now())
+                return (hand_from_palm(self) or 0.0) > farther
+            return carried and (self._lifting is None or self._lifting.done())
+
+        try:
+            self.pause(float(self.ctx.config.get("hand.lift_after", 0.1)))
+            self._lifting = self._lift()
+            self.wait_for(has_let_go, "the person's letting go", end - self.ctx.clock.now())
         except TimeLimit as error:
             self.ctx.holding = ""
             raise PortError(
@@ -59,33 +60,16 @@ class TakeWeight(CoglabState):
                 (error.sentence,),
                 ReasonCode.NOT_RELEASED,
             ) from None
+        finally:
+            contact.disarm()
+            if self._lifting is not None:
+                self._lifting.cancel()
+                self._lifting = None
+        event = contact.event()
+        self.reason = event.message if event is not None else "the person's hand has left it"
         self.ctx.shared = False
         self.ctx.journal.mark("released")
         return "succeeded"
-
-    def _take(self, ud: Any, limit: float) -> None:
-        """Lift until the weight has come."""
-        contact = self.ctx.contact
-        settings = {
-            "mass": float(ud.object_entry.get("mass", 0.0)),
-            "load_share": float(self.ctx.config.get("hand.load_share", 0.5)),
-        }
-        self.await_pending(contact.arm("lift", limit, settings), "arming of the contact detector", 2.0)
-        lift: Pending | None = None
-        try:
-            self.pause(float(self.ctx.config.get("hand.lift_after", 0.1)))
-            lift = self._lift()
-            self.wait_for(
-                lambda: contact.event() is not None or self._has_left(), f"the weight of '{ud.object_id}'", limit
-            )
-        finally:
-            contact.disarm()
-            if lift is not None:
-                lift.cancel()
-        event = contact.event()
-        if event is not None:
-            self.ctx.journal.mark("loaded")
-        self.reason = event.message if event is not None else "the person's hand has left it"
 
     def _lift(self) -> Pending | None:
         """Begin to rise, each joint as fast as its share of the way asks for; None where the posture is not known."""

@@ -1,0 +1,35 @@
+"""Where the robot's palm and the person's hand are now, in the base frame; None where that is not known."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from coglab_smach.context.context import Context
+from coglab_smach.kinematics.reachability import default_arm
+from coglab_smach.ports.pending import PortError
+from coglab_smach.states.base import CoglabState
+
+OLDEST = 0.5
+"""s, an older sight does not tell where the hand is"""
+
+
+def palm_at(ctx: Context) -> np.ndarray | None:
+    """m."""
+    here = ctx.arm.joint_positions()
+    return None if here is None else np.asarray(default_arm().fk(np.asarray(here))[0])
+
+
+def person_at(state: CoglabState) -> np.ndarray | None:
+    """m."""
+    hand = str(state.ctx.config.get("perception.human_hand", "human_hand"))
+    try:
+        seen = state.await_pending(state.ctx.perception.locate_object(hand, 0.3), "sight of the person's hand", 0.5)
+    except PortError:
+        return None
+    return np.array(seen.xyz) if seen.age <= OLDEST else None
+
+
+def hand_from_palm(state: CoglabState) -> float | None:
+    """m from the person's hand to the palm."""
+    person, palm = person_at(state), palm_at(state.ctx)
+    return None if person is None or palm is None else float(np.linalg.norm(person - palm))
