@@ -26,7 +26,7 @@ def build_exchange_robot_to_human(ctx: Context) -> CoglabMachine:
         machine.add_state("set_dmp_goal", SetDeliveryGoal(ctx), to_recovery(succeeded="approach"))
         machine.add_state(
             "approach",
-            build_approach(ctx, "approach", "rest", preshape=False, monitor=True),
+            build_approach(ctx, "approach", "taker", preshape=False, monitor=True),
             to_recovery(succeeded="switch_to_ptp"),
         )
         machine.add_state("switch_to_ptp", SwitchController(ctx, "ptp"), to_recovery(succeeded="give_load"))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
 
@@ -13,7 +13,6 @@ from coglab_smach.kinematics.motion_time import ptp_time, reach_time
 from coglab_smach.ports.interfaces import DmpRequest
 from coglab_smach.ports.pending import PortError
 from coglab_smach.states.base import CoglabState, Interrupted, TimeLimit
-from coglab_smach.states.motion import await_rest
 
 DOUBT_TIME = 0.06
 """s for which nothing is believed before a reach ends"""
@@ -141,19 +140,16 @@ class ExecuteDmp(CoglabState):
 class WaitStop(CoglabState):
     """Wait for the end of the reach or, if ``trigger`` asks for it, for the contact trigger.
 
-    trigger: '' (the end of the motion is enough), 'contact' (an object is in the hand) or 'rest' (the arm stands and
-    follows nothing any more, and the detector is armed for release). Contact is watched for from the last
-    ``contact_within`` m of the reach on and ends the motion; so does for 'rest', within the last ``give.touch_within``
-    m, a load of ``give.touch_share`` of the object's weight, up or down: who takes the object from an arm that moves
-    must not be followed any further. The reach may take ``reach_timeout`` beyond what the arm's limits ask for.
+    trigger: '' (the end of the motion is enough) or 'contact' (an object is in the hand). Contact is watched for from
+    the last ``contact_within`` m of the reach on and ends the motion. The reach may take ``reach_timeout`` beyond what
+    the arm's limits ask for.
     """
 
     default_time_limit = 20.0
     owns_motion = True
 
-    def __init__(self, ctx: Context, trigger: str) -> None:
-        keys = {"": [], "contact": ["object_entry", "goal"], "rest": ["object_entry", "delivery", "goal"]}
-        super().__init__(ctx, input_keys=keys[trigger])
+    def __init__(self, ctx: Context, trigger: str, keys: Sequence[str] = ()) -> None:
+        super().__init__(ctx, input_keys=["object_entry", "goal"] if trigger == "contact" else keys)
         self.trigger = trigger
         self._left = False
         """the compliant profile of the approach"""
@@ -164,48 +160,12 @@ class WaitStop(CoglabState):
         self._doubted: float | None = None
         if self.trigger == "contact":
             return self._await_contact(ud)
-        if self.trigger == "rest":
-            return self._await_rest(ud)
+        return self._await_end(ud)
+
+    def _await_end(self, ud: Any) -> str:
         self._await_reach(self._reached)
         self.ctx.journal.mark("motion_reached")
         return "succeeded"
-
-    def _await_rest(self, ud: Any) -> str:
-        """The goal is the person's hand, and that now comes to the object: an arm that still followed it would back
-        away, and one that is held would drag the hand along that it follows."""
-        arm, contact = self.ctx.arm, self.ctx.contact
-        within = float(self.ctx.config.get("give.touch_within", 0.05))
-        touch = float(self.ctx.config.get("give.touch_share", 0.8))
-        self._await_reach(lambda: self._reached() or self._comes_to_its_end(within))
-        self._leave_approach_profile()
-        release = ud.delivery["release"]
-        settings = {
-            "mass": float(ud.object_entry.get("mass", 0.0)),
-            "load_share": float(release.get("threshold", 0.5)),
-        }
-        limit = float(release.get("timeout", self.ctx.config.get("release_timeout", 8.0)))
-        self.await_pending(
-            contact.arm("release", limit + self.left(), settings), "arming of the contact detector", 2.0
-        )
-
-        def touched() -> bool:
-            self.check()
-            return abs(contact.share_gone() or 0.0) > touch
-
-        self._await_reach(lambda: touched() or self._reached())
-        self.ctx.journal.mark("motion_reached")
-        if arm.dmp_progress().state == "reached":  # it has to come to rest at the goal that it has latched
-            await_rest(self.ctx, touched)
-        else:
-            self.reason = f"touched on the way: {contact.share_gone() or 0.0:.1f} of the weight"
-        self.await_pending(arm.switch_controller("ptp"), "end of the reach by switching to 'ptp'", 3.0)
-        return "succeeded"
-
-    def _comes_to_its_end(self, within: float) -> bool:
-        """Whether the second half of the reach has come to the last ``within`` m: its first news may not know the
-        goal."""
-        progress = self.ctx.arm.dmp_progress()
-        return progress.phase < 0.5 and 0.0 < progress.remaining_distance < within
 
     def _await_contact(self, ud: Any) -> str:
         """The object may come into the hand on the way, at its end, or be brought there once the arm waits."""
