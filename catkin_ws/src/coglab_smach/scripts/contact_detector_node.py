@@ -30,7 +30,7 @@ from coglab_py.packages import package_path
 from coglab_py.pose import Pose
 from coglab_py.yaml_file import YamlError
 from coglab_smach.contact.detector import ContactDetector, DetectorSettings
-from coglab_smach.contact.fused_detector import IN_MOTION, LIFT, FusedDetector
+from coglab_smach.contact.fused_detector import IN_MOTION, LIFT, RELEASE, FusedDetector
 from coglab_smach.contact.learning import MotionRecorder
 from coglab_smach.contact.motion_thresholds import ThresholdError, Thresholds
 from coglab_smach.contact.moving_contact import MovingContact
@@ -189,7 +189,7 @@ class ContactDetectorNode:
                 )
             except ValueError as error:
                 return ArmContactResponse(False, ReasonCode.INVALID_ARGUMENT, str(error))
-        when = "now" if request.mode in (IN_MOTION, LIFT) else "once the arm is still"
+        when = "now" if request.mode in (IN_MOTION, LIFT, RELEASE) else "once the arm is still"
         return ArmContactResponse(
             True, ReasonCode.NONE, f"watching for {request.mode} for {request.timeout:.1f} s, {when}"
         )
@@ -260,7 +260,7 @@ class ContactDetectorNode:
         with self.lock:
             before, stamp = self.shown, self.last_sample
             self.shown = stamp
-            seen, settings = self.detector.still.look(), self.detector.still.settings
+            seen, settings = self.detector.look(), self.detector.still.settings
         if seen.state == "watching":
             publish(self.margin, Float64(seen.margin))
         if stamp is None or stamp == before:

@@ -17,7 +17,7 @@ OUTCOMES = {
     (GIVE, "change_side"): {"succeeded"},
     (GIVE, "absent"): {"failed_holding"},
     (GIVE, "early_release"): {"failed_holding"},
-    (GIVE, "never_release"): {"failed_holding"},
+    (GIVE, "never_release"): {"succeeded"},
     (GIVE, "pull_back"): {"failed_holding"},
 }
 """(action, behaviour) -> outcomes that are as documented"""

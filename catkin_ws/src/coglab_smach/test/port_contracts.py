@@ -47,6 +47,26 @@ class HandContract(Contract):
         self.settle(self.port.open(511), 8.0)
         self.until(lambda: self.port.state().positions[2] < 60 and not self.port.state().holding, 2.0, "the open hand")
 
+    def test_a_slow_opening_that_is_cancelled_leaves_the_fingers_there_and_they_close_again(self):
+        self.calibrated()
+        finger = lambda: self.port.state().positions[2]  # noqa: E731
+        for speed in (9999, 0, -1):
+            self.refused(self.port.close(speed), ReasonCode.OUT_OF_RANGE)
+        self.settle(self.port.preshape("cylindrical", "medium"), 8.0)
+        self.settle(self.port.close_on_object(), 8.0)
+        self.until(lambda: finger() > 100, 1.0, "the closed fingers")
+        closed, opening = finger(), self.port.open(100)
+        self.until(lambda: finger() < closed - 10, 2.0, "the loosening")
+        opening.cancel()
+        self.refused(opening, ReasonCode.CANCELLED)
+        self.place.sleep(0.4)
+        there = finger()
+        assert closed - 60 < there < closed - 9
+        self.stays(lambda: abs(finger() - there) <= 1, 0.4)
+        self.settle(self.port.close(200), 8.0)
+        self.until(lambda: finger() >= closed - 5, 1.0, "the closed fingers")
+        self.settle(self.port.open(511), 8.0)
+
     def test_cancelled_it_ends_without_success(self):
         self.calibrated()
         self.settle(self.port.preshape("cylindrical", "medium"), 8.0)
@@ -194,9 +214,17 @@ class ContactContract(Contract):
             self.watches("load", mass=0.8, load_share=0.5)
             self.place.push(-8.0)
             self.happens(True, ReasonCode.LOAD_CARRIED)
+            assert self.port.share_gone() is None
             self.watches("release", mass=0.8, load_share=0.5)
+            assert abs(self.port.share_gone()) < 0.1
+            self.place.push(-5.0)
+            self.until(lambda: 0.2 < self.port.share_gone() < 0.5, 2.0, "a part of the load")
+            self.stays(lambda: self.port.event() is None, 0.2)
             self.place.push(0.0)
             self.happens(False, ReasonCode.LOAD_RELEASED)
+            self.until(lambda: self.port.share_gone() > 0.7, 2.0, "the load")
+            self.port.disarm()
+            assert self.port.share_gone() is None
 
     def test_no_event_without_a_touch_and_none_after_the_limit(self):
         self.settle(self.port.arm("contact", 0.4, {"k": 50.0}))

@@ -151,6 +151,7 @@ def test_robot_to_human_order_without_a_new_query(trial):
         "set_dmp_goal",
         "approach",
         "switch_to_ptp",
+        "give_load",
         "hand_open",
         "coglab_home_robot",
     ]

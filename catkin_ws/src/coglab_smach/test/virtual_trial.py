@@ -22,6 +22,7 @@ from coglab_smach.ports.pending import Ready
 from coglab_smach.simulated.virtual_arm import VirtualArm
 from coglab_smach.simulated.world_ports import VirtualContact, VirtualDatabase, VirtualHand, VirtualPerception
 
+GIVE = "exchange_robot_to_human"
 SHARE = Path(__file__).resolve().parent.parent
 LIBRARY = str(SHARE.parent / "coglab_controllers" / "config" / "primitives.xml")
 
@@ -100,7 +101,8 @@ class VirtualTrial:
             self._end_reach()
             self._reach = ReachRecord(self.rig, self.ctx, self.begun[-1] if self.begun else "")
             self._touch = TouchRecord(self.rig, self.ctx.contact)
-        if record.from_state == "wait_stop":
+        giving = self.begun[-1:] == [GIVE] and record.outcome == "succeeded"
+        if record.from_state == "give_load" or (record.from_state == "wait_stop" and not giving):
             self._end_reach()
 
     def _end_reach(self):
@@ -203,8 +205,10 @@ class ReachRecord:
             self.path.append((record["time"], record["measured"][0], record["goal"]))
         if self.reached is None and robot.progress["motion"] == "reached":
             self.reached = rig.t
-        # Measured when the detector begins to watch: the arm stands still and nobody has touched it yet.
-        if not self.stood and self.reached is not None and self.contact.detector.state() == "watching":
+        # Measured when the detector begins to watch an arm that stands still and nobody has touched yet.
+        detector = self.contact.detector
+        watching = detector.state() == "watching" and (detector.moving.still() or self.action != GIVE)
+        if not self.stood and self.reached is not None and watching:
             self.stood = True
             self._measure()
 

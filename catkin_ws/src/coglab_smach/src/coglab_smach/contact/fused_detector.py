@@ -1,6 +1,7 @@
 """Contact from all that feels it, as one event: the detector behind the ContactPort.
 
-Modes contact, load and release are those of D4.10 (ContactDetector): torques of an arm that stands still. Mode
+Modes contact, load and, without a model of the arm, release are those of D4.10 (ContactDetector): torques of an arm
+that stands still. With a model, release watches the weight go from an arm that may move (LeavingLoad). Mode
 IN_MOTION watches from arming on, whether the arm moves or not: the moving arm's torques, the fingers, touch and the
 sight of the object at its grasp, each with a probability, and D4.10's derivative once the arm stands. The first moment
 at which a contact is likely enough is the event; its source is the one that says so alone, or ``fused``. Mode LIFT
@@ -11,12 +12,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from coglab_msgs.msg import ReasonCode
 
-from coglab_smach.contact.detector import ContactDetector, Joints
+from coglab_smach.contact.detector import ContactDetector, Joints, Signal
 from coglab_smach.contact.evidence import (
     DECIDED,
     MOMENTUM,
@@ -29,11 +30,13 @@ from coglab_smach.contact.evidence import (
     probability,
     together,
 )
+from coglab_smach.contact.leaving_load import LeavingLoad
 from coglab_smach.contact.moving_contact import MovingContact
 from coglab_smach.ports.interfaces import ContactEvent
 
 IN_MOTION = "contact_in_motion"
 LIFT = "lift"
+RELEASE = "release"
 GRAVITY = 9.81
 SETTLING = 0.10
 """s after arming over which the residual is averaged that a weight is counted from"""
@@ -68,6 +71,7 @@ class FusedDetector:
         self.still, self.moving = still, moving
         self._touch, self._fingers, self._palm = touch or Touch(), fingers or Fingers(), InPalm()
         self._lift: _Lift | None = None
+        self._leaving: LeavingLoad | None = None
         self._until: float | None = None
         self._first = False
         """nothing was looked at yet since arming"""
@@ -89,7 +93,15 @@ class FusedDetector:
         request."""
         if mode in (IN_MOTION, LIFT) and self.moving is None:
             raise ValueError(f"{mode} needs a model of the arm and learnt thresholds, and there are none")
-        if mode == LIFT:
+        leaving = None
+        if mode == RELEASE and self.moving is not None:
+            if not timeout > 0.0:
+                raise ValueError(f"timeout must be a positive time in s, got {timeout}")
+            share = load_share if load_share > 0.0 else self.still.settings.load_share
+            leaving = LeavingLoad(mass, share, now + timeout, self.moving.weight_before_motion())
+            self.still.disarm()
+            self._lift = None
+        elif mode == LIFT:
             if not (mass > 0.0 and timeout > 0.0):
                 raise ValueError(f"{LIFT} needs a mass (kg) and a time limit (s), got {mass} and {timeout}")
             self.still.disarm()
@@ -97,6 +109,7 @@ class FusedDetector:
         else:
             self.still.arm("contact" if mode == IN_MOTION else mode, now, timeout, k, joints, mass, load_share)
             self._lift = None
+        self._leaving = leaving
         self._mass = mass if mode in ("load", LIFT) else 0.0
         self._until = now + timeout if mode in (IN_MOTION, LIFT) else None
         self._first = True
@@ -108,10 +121,12 @@ class FusedDetector:
     def disarm(self) -> None:
         """Stop watching."""
         self.still.disarm()
-        self._until = self._lift = None
+        self._until = self._lift = self._leaving = None
 
     def state(self) -> str:
         """off, waiting or watching, see ContactDetector.state; in motion it watches as soon as it has seen enough."""
+        if self._leaving is not None:
+            return "waiting" if self._leaving.share is None else "watching"
         if self._until is None:
             return self.still.state()
         return "watching" if self.moving is not None and self.moving.change is not None else "waiting"
@@ -119,6 +134,8 @@ class FusedDetector:
     @property
     def margin(self) -> float:
         """Largest signal over its threshold now."""
+        if self._leaving is not None:
+            return self._leaving.margin
         if self._until is None:
             return self.still.margin
         return max((each.margin for each in self._evidence.values()), default=0.0)
@@ -149,6 +166,8 @@ class FusedDetector:
         evidence = self.moving.feed(stamp, position, torque)
         if self._lift is not None:
             return self._watch_lift(stamp, self._lift)
+        if self._leaving is not None:
+            return self._watch_leaving(stamp, self._leaving)
         if self._until is None or evidence is None:
             return None
         if self._first:
@@ -179,8 +198,11 @@ class FusedDetector:
         """A clock that was set leaves an arming the time that it had."""
         if not math.isfinite(stamp):
             return
-        if self._last_stamp is not None and self._until is not None and abs(stamp - self._last_stamp) > 1.0:
-            self._until += stamp - self._last_stamp
+        if self._last_stamp is not None and abs(stamp - self._last_stamp) > 1.0:
+            if self._until is not None:
+                self._until += stamp - self._last_stamp
+            if self._leaving is not None:
+                self._leaving.until += stamp - self._last_stamp
             self._evidence.clear()
         self._last_stamp = stamp
 
@@ -206,6 +228,33 @@ class FusedDetector:
         self.set_payload(mass)
         message = f"{force:.1f} N carried now (needed {lift.needed:.1f} N)"
         return ContactEvent(True, MOMENTUM, margin, message, probability(margin), ReasonCode.LOAD_CARRIED)
+
+    def _watch_leaving(self, stamp: float, leaving: LeavingLoad) -> ContactEvent | None:
+        """Has the weight gone? The share is told until the watch ends. What the hand carries stays told as well, until
+        it is empty."""
+        assert self.moving is not None
+        residual = self.moving.residual
+        if stamp > leaving.until:
+            self._leaving = None
+        elif residual is not None and leaving.feed(
+            stamp, self.moving.weight(residual.torque, residual.position), self.moving.still(), residual.fresh
+        ):
+            gone, needed = (share * leaving.weight for share in (leaving.share or 0.0, leaving.needed))
+            message = f"{gone:.1f} N of the load are gone (needed {needed:.1f} N)"
+            sure = probability(leaving.margin)
+            return ContactEvent(False, MOMENTUM, leaving.margin, message, sure, ReasonCode.LOAD_RELEASED)
+        return None
+
+    def share_gone(self) -> float | None:
+        """Share of the weight that has left the hand since it was armed for RELEASE; None while it is not watched."""
+        return self._leaving.share if self._leaving is not None else None
+
+    def look(self) -> Signal:
+        """As ContactDetector.look; the margin of RELEASE is told too."""
+        seen, leaving = self.still.look(), self._leaving
+        if leaving is None:
+            return seen
+        return replace(seen, state=self.state(), mode=RELEASE, margin=leaving.margin)
 
     def _judge(self, stamp: float, evidence: Evidence | None) -> ContactEvent | None:
         if self._until is None or evidence is None or self._lift is not None:

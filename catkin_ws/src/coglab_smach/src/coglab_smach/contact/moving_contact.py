@@ -46,6 +46,9 @@ class MovingContact:
         self._rest: np.ndarray | None = None
         self._free: np.ndarray | None = None
         """mean residual of the rest before the motion, or of this one while the arm has not moved"""
+        self._rest_position = np.zeros(7)
+        self._free_weight: float | None = None
+        """N on the palm then"""
 
     def set_payload(self, mass: float, centre: Joints = (0.0, 0.0, 0.0)) -> None:
         """The hand carries ``mass`` kg at ``centre`` (m, ih2_palm) from now on; the past does not count any more, so
@@ -57,7 +60,7 @@ class MovingContact:
     def _forget(self) -> None:
         self._changes.reset()
         self._sizes.clear()
-        self.change = self._still_since = self._rest = self._free = None
+        self.change = self._still_since = self._rest = self._free = self._free_weight = None
 
     def still(self) -> bool:
         """Whether the arm has stood still long enough."""
@@ -89,20 +92,28 @@ class MovingContact:
         """N that have come to hang on the palm since the residual was ``before`` (Nm), whether the arm moves or not:
         down's part of the force on the palm that explains the change best, so that a pull aside is no weight."""
         assert self.residual is not None
-        jacobian = self._jacobian(self.residual.position)
-        force = np.linalg.lstsq(jacobian.T, self.residual.torque - before, rcond=0.05)[0]
-        return -float(force[2])
+        return self.weight(self.residual.torque - before, self.residual.position)
+
+    def weight(self, residual: Joints, position: Joints) -> float:
+        """N that hang on the palm by a residual (Nm) at a position (rad): see weight_since."""
+        return -float(np.linalg.lstsq(self._jacobian(position).T, residual, rcond=0.05)[0][2])
+
+    def weight_before_motion(self) -> float | None:
+        """N on the palm in the last rest before the motion; None where none was seen, or the arm does not move."""
+        return self._free_weight if self._rest is None else None
 
     def _follow_rest(self, residual: Residual) -> None:
         if float(np.max(np.abs(residual.velocity))) > STILL:
             if self._rest is not None:
                 self._free = self._rest
+                self._free_weight = self.weight(self._rest, self._rest_position)
             self._still_since = self._rest = None
         elif self._still_since is None:
             self._still_since = residual.stamp
         elif residual.stamp - self._still_since >= SETTLED:
             rest = residual.torque if self._rest is None else self._rest
             self._rest = rest + 0.02 * (residual.torque - rest)
+            self._rest_position = residual.position
 
     def feed(self, stamp: float, position: Joints, torque: Joints) -> Evidence | None:
         """One sample: s, rad, Nm as measured. None while there is too little of a past."""

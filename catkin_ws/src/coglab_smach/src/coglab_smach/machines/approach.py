@@ -5,10 +5,11 @@ from __future__ import annotations
 from coglab_smach.context.context import Context
 from coglab_smach.states.arm import ExecuteDmp, MonitorDmp, SwitchController, WaitStop
 from coglab_smach.states.base import CoglabConcurrence, CoglabMachine, require_all
+from coglab_smach.states.give import WaitTaker
 from coglab_smach.states.hand import HandPreshape
 
 KEYS = ["goal", "grasp", "object_entry", "object_id"]
-RELEASE_KEYS = [*KEYS, "delivery"]
+TAKER_KEYS = [*KEYS, "delivery"]
 
 
 def build_arm_motion(ctx: Context, trigger: str) -> CoglabMachine:
@@ -17,12 +18,13 @@ def build_arm_motion(ctx: Context, trigger: str) -> CoglabMachine:
         ctx,
         "arm_motion",
         ["succeeded", "failed", "preempted"],
-        input_keys=RELEASE_KEYS if trigger == "release" else KEYS,
+        input_keys=TAKER_KEYS if trigger == "taker" else KEYS,
     )
     with machine:
         machine.add_state("switch_to_dmp", SwitchController(ctx, "dmp"), {"succeeded": "execute_dmp"})
         machine.add_state("execute_dmp", ExecuteDmp(ctx), {"succeeded": "wait_stop"})
-        machine.add_state("wait_stop", WaitStop(ctx, trigger), {"succeeded": "succeeded"})
+        wait_stop = WaitTaker(ctx) if trigger == "taker" else WaitStop(ctx, trigger)
+        machine.add_state("wait_stop", wait_stop, {"succeeded": "succeeded"})
     return machine
 
 
@@ -38,7 +40,7 @@ def build_approach(ctx: Context, label: str, trigger: str, preshape: bool, monit
         "failed",
         decide,
         conclude,
-        input_keys=RELEASE_KEYS if trigger == "release" else KEYS,
+        input_keys=TAKER_KEYS if trigger == "taker" else KEYS,
     )
     with group:
         group.add_state("arm_motion", build_arm_motion(ctx, trigger))

@@ -7,12 +7,13 @@ from coglab_smach.machines.approach import build_approach
 from coglab_smach.machines.recovery import ACTION_OUTCOMES, RECOVERY_TRANSITIONS, build_recovery, to_recovery
 from coglab_smach.states.arm import HomeRobot, SwitchController
 from coglab_smach.states.base import CoglabMachine
+from coglab_smach.states.give import GiveLoad
 from coglab_smach.states.hand import HandOpen
 from coglab_smach.states.knowledge import SetDeliveryGoal
 
 
 def build_exchange_robot_to_human(ctx: Context) -> CoglabMachine:
-    """delivery goal (no new query: the entry travels in user data) -> reach -> release trigger -> open -> home."""
+    """delivery goal (no new query: the entry travels in user data) -> reach -> give the load -> open -> home."""
     machine = CoglabMachine(
         ctx,
         "exchange_robot_to_human",
@@ -25,10 +26,11 @@ def build_exchange_robot_to_human(ctx: Context) -> CoglabMachine:
         machine.add_state("set_dmp_goal", SetDeliveryGoal(ctx), to_recovery(succeeded="approach"))
         machine.add_state(
             "approach",
-            build_approach(ctx, "approach", "release", preshape=False, monitor=True),
+            build_approach(ctx, "approach", "taker", preshape=False, monitor=True),
             to_recovery(succeeded="switch_to_ptp"),
         )
-        machine.add_state("switch_to_ptp", SwitchController(ctx, "ptp"), to_recovery(succeeded="hand_open"))
+        machine.add_state("switch_to_ptp", SwitchController(ctx, "ptp"), to_recovery(succeeded="give_load"))
+        machine.add_state("give_load", GiveLoad(ctx), to_recovery(succeeded="hand_open"))
         machine.add_state("hand_open", HandOpen(ctx, to_person=True), to_recovery(succeeded="coglab_home_robot"))
         machine.add_state("coglab_home_robot", HomeRobot(ctx), to_recovery(succeeded="succeeded"))
         machine.add_state("recover", build_recovery(ctx), RECOVERY_TRANSITIONS)

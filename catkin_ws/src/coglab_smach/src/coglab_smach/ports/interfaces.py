@@ -196,8 +196,12 @@ class HandPort(Protocol):
     def close_on_object(self) -> Pending:
         """Close the preshaped hand; value: None when it has closed or stalled on an object."""
 
+    def close(self, speed: int) -> Pending:
+        """Close the fingers from where they are, at a wire speed 1..511 and with the force that goes with it; value:
+        None when they stand."""
+
     def open(self, speed: int) -> Pending:
-        """Open at a wire speed 1..511; value: None."""
+        """Open at a wire speed 1..511; value: None. Cancelled, the fingers stand where they are."""
 
     def state(self) -> HandState:
         """The newest status; connected=False if the node is silent for more than 1 s."""
@@ -246,3 +250,7 @@ class ContactPort(Protocol):
 
     def event(self) -> ContactEvent | None:
         """The first event since arm(), None until then."""
+
+    def share_gone(self) -> float | None:
+        """Share of the object's weight that has left the hand since it was armed for 'release', also after its event:
+        0 none, 1 all, more where the hand is lifted. None while nobody watches."""

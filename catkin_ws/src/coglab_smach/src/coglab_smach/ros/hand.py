@@ -11,6 +11,7 @@ import rospy
 from actionlib_msgs.msg import GoalStatus
 from coglab_msgs.msg import (
     HandCloseAction,
+    HandCloseGoal,
     HandOpenAction,
     HandOpenGoal,
     HandPreshapeAction,
@@ -113,6 +114,9 @@ class RosHand:
 
     def close_on_object(self) -> Pending:
         return self._call("hand_preshape_close", HandPreshapeCloseGoal())
+
+    def close(self, speed: int) -> Pending:
+        return self._call("hand_close", HandCloseGoal(speed=speed))
 
     def open(self, speed: int) -> Pending:
         return self._call("hand_open", HandOpenGoal(speed=speed))

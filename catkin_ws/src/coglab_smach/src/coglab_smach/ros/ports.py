@@ -10,7 +10,7 @@ import threading
 import time
 from typing import Any
 
-from coglab_msgs.msg import Contact, HandoverBelief, ReasonCode
+from coglab_msgs.msg import Contact, ContactSignal, HandoverBelief, ReasonCode
 from coglab_msgs.msg import Recognition as RecognitionMsg
 from coglab_msgs.srv import ArmContact, FreePlaces, GetObject, InitVision, ListObjects, LocateObject
 from coglab_py.pose import IDENTITY
@@ -21,8 +21,10 @@ from coglab_smach.ports.interfaces import Ahead, ContactEvent, Located, Recognit
 from coglab_smach.ports.pending import Pending, Permit, PortError, Threaded
 from coglab_smach.ros.calls import SERVICE_WAIT, Newest, call, call_now, mapped
 
-OLDEST_BELIEF = 0.3
+OLDEST_BELIEF = OLDEST_SIGNAL = 0.3
 """s"""
+DEFAULT_SHARE = 0.5
+"""of the load, where a request leaves it to the detector"""
 
 
 class RosPerception:
@@ -97,10 +99,19 @@ class RosDatabase:
 
 
 class RosContact:
-    """ContactPort: the topic coglab/contact, and the service that arms whoever publishes there."""
+    """ContactPort: the topic coglab/contact, the service that arms whoever publishes there, and its live signal."""
 
-    def __init__(self, topic: str = "coglab/contact", service: str = "contact_detector/arm") -> None:
+    def __init__(
+        self,
+        topic: str = "coglab/contact",
+        service: str = "contact_detector/arm",
+        signal: str = "contact_detector/signal",
+    ) -> None:
         self._service = service
+        self._signal = Newest(signal, ContactSignal)
+        self._needed: float | None = None
+        """share of the load that is armed for; None where another mode is"""
+        self._armed_at = 0.0
         self._event: ContactEvent | None = None
         self._wanted: bool | None = None
         self._before = threading.Event()
@@ -121,6 +132,9 @@ class RosContact:
     def arm(self, mode: str, time_limit: float, settings: dict[str, Any]) -> Pending:
         self._event = None
         self._wanted = mode != "release"
+        share = float(settings.get("load_share", 0.0))
+        self._needed = None if self._wanted else share if share > 0.0 else DEFAULT_SHARE
+        self._armed_at = time.monotonic()
         grasp = settings.get("grasp", {"xyz": (0.0, 0.0, 0.0), "quaternion": IDENTITY})
         return mapped(
             self._request(
@@ -130,7 +144,7 @@ class RosContact:
                 k=float(settings.get("k", 0.0)),
                 joints=list(settings.get("joints", [])),
                 mass=float(settings.get("mass", 0.0)),
-                load_share=float(settings.get("load_share", 0.0)),
+                load_share=share,
                 frame=str(settings.get("frame", "")),
                 grasp=Pose(Point(*grasp["xyz"]), Quaternion(*grasp["quaternion"])),
             ),
@@ -161,8 +175,15 @@ class RosContact:
 
     def disarm(self) -> None:
         if self._wanted is not None:
-            self._wanted = None
+            self._wanted = self._needed = None
             self._request(0.5, mode="off")
 
     def event(self) -> ContactEvent | None:
         return self._event
+
+    def share_gone(self) -> float | None:
+        signal, newest = self._signal.message, self._signal.stamp
+        if self._needed is None or signal is None or newest < self._armed_at or self._signal.age() > OLDEST_SIGNAL:
+            return None
+        watched = signal.mode == "release" and signal.state == "watching"
+        return float(signal.margin) * self._needed if watched else None

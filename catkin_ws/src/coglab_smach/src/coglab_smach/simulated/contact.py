@@ -33,7 +33,7 @@ class SimulatedContact:
         self._due: float | None = None
         self._event: ContactEvent | None = None
         self._touched = False
-        self._lifted_before = self._needed = 0.0
+        self._lifted_before = self._needed = self._weight = 0.0
         self.armed_while_moving = False
         self.armed_with_profile: list[str] = []
         """profile in force at each arming, with ' fading' while another one's correction was not gone"""
@@ -57,13 +57,14 @@ class SimulatedContact:
                 raise PortError(f"arm refused: {refused}", code=ReasonCode.INVALID_ARGUMENT)
             if mode != "load":  # load counts from the torque before the contact
                 self._lifted_before = cell.lifted
-            self._needed = TOUCH if mode in TOUCHES else float(settings.get("load_share", 0.5)) * mass * 9.81
+            self._weight = mass * 9.81
+            self._needed = TOUCH if mode in TOUCHES else float(settings.get("load_share", 0.5)) * self._weight
             touch, carried = partner.touch_after, partner.let_go_after
             after = {"load": carried, "lift": carried, "release": partner.take_after}.get(mode, touch)
             now = cell.clock.now()
             self._touched = self._touched or mode in TOUCHES
             self._mode, self._until, self._due = mode, now + time_limit, None if after is None else now + after
-            moving = mode not in ("contact_in_motion", "lift") and not cell.arm.standing()
+            moving = mode not in ("contact_in_motion", "lift", "release") and not cell.arm.standing()
             self.armed_while_moving = self.armed_while_moving or moving
             fading = now - cell.profile_since < cell.fade_time
             self.armed_with_profile.append(cell.profile + (" fading" if fading else ""))
@@ -87,6 +88,11 @@ class SimulatedContact:
             if self._mode == "lift":
                 self.cell.let_go()
         return self._event
+
+    def share_gone(self) -> float | None:
+        if self._mode != "release" or "contact" in self.cell.faults.dead:
+            return None
+        return 1.0 if self.event() is not None else max(0.0, self.cell.lifted - self._lifted_before) / self._weight
 
     def _pushed(self) -> bool:
         lifted = self.cell.lifted - self._lifted_before

@@ -187,6 +187,8 @@ class SimulatedHand:
     def __init__(self, cell: SimulatedCell) -> None:
         self.cell = cell
         self._order = 0
+        self._at_work: tuple[float, float, tuple[int, ...]] | None = None
+        """since when the fingers move at a speed, s for the whole way, and from where"""
 
     def calibrate(self, mode: str) -> Pending:
         words = mode.split(" ")
@@ -214,6 +216,7 @@ class SimulatedHand:
         """An action: it moves the fingers unless it was cancelled, or replaced, before its time had come."""
         if self._calibrating():
             return Ready(error=PortError(f"{name} refused: the hand calibrates", code=ReasonCode.HAND_CALIBRATING))
+        self._stand()
         self._order += 1
         order = self._order
         cancelled: list[bool] = []
@@ -225,14 +228,29 @@ class SimulatedHand:
                 code = ReasonCode.CANCELLED if cancelled else ReasonCode.SUPERSEDED
                 raise PortError(f"{name} ended PREEMPTED", code=code)
             self.cell.hand_positions, self.cell.preshaped = positions(), preshaped
+            self._at_work = None
 
         call = self.cell.answer("hand", name, after, apply)
 
         def cancel() -> None:
+            if order == self._order and "hand" not in self.cell.faults.dead:
+                self._stand()
             cancelled.append(True)
             call.cancel()
 
         return Polled(call.done, call.result, cancel)
+
+    def _positions(self) -> tuple[int, ...]:
+        """Where the fingers are: those that open are on the way."""
+        if self._at_work is None or self.cell.hand_positions != self._at_work[2]:
+            return self.cell.hand_positions
+        begun, duration, start = self._at_work
+        left = max(0.0, 1.0 - (self.cell.clock.now() - begun) / duration)
+        return tuple(round(left * position) for position in start)
+
+    def _stand(self) -> None:
+        """What moves stands where it is."""
+        self.cell.hand_positions, self._at_work = self._positions(), None
 
     def preshape(self, mode: str, level: str) -> Pending:
         if mode not in MODES:
@@ -251,21 +269,34 @@ class SimulatedHand:
 
         return self._move("close", 1.0, positions, True)
 
+    def close(self, speed: int) -> Pending:
+        def positions() -> tuple[int, ...]:
+            return (200, 254, 254, 254, 254) if self.cell.faults.empty_grasp else (200, 150, 160, 155, 170)
+
+        return self._at_speed("close", speed, positions)
+
     def open(self, speed: int) -> Pending:
+        return self._at_speed("open", speed, lambda: (0, 0, 0, 0, 0))
+
+    def _at_speed(self, name: str, speed: int, positions: Callable[[], tuple[int, ...]]) -> Pending:
         if not 1 <= speed <= 511:
             return Ready(
-                error=PortError(f"open refused: speed is {speed}, expected 1..511", code=ReasonCode.OUT_OF_RANGE)
+                error=PortError(f"{name} refused: speed is {speed}, expected 1..511", code=ReasonCode.OUT_OF_RANGE)
             )
-        return self._move("open", 0.8, lambda: (0, 0, 0, 0, 0), False)
+        duration = 0.8 * max(1.0, 400 / speed) if name == "open" else 0.8
+        moving = self._move(name, duration, positions, False)
+        if name == "open" and not self._calibrating() and "hand" not in self.cell.faults.dead:
+            self._at_work = (self.cell.clock.now(), duration, self.cell.hand_positions)
+        return moving
 
     def state(self) -> HandState:
         self.cell.advance()
         if "hand" in self.cell.faults.dead:
             return HandState(message="hand_status is silent", event=ReasonCode.NODE_SILENT)
-        closed = self.cell.hand_positions[2] > 100 and not self.cell.faults.empty_grasp
+        closed = self._positions()[2] > 100 and not self.cell.faults.empty_grasp
         calibrating = self._calibrating()
         calibrated = self.cell.calibrated and not calibrating
-        return HandState(True, calibrated, calibrating, closed, "", () if calibrating else self.cell.hand_positions)
+        return HandState(True, calibrated, calibrating, closed, "", () if calibrating else self._positions())
 
 
 class SimulatedPerception:

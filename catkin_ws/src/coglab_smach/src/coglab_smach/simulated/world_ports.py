@@ -99,6 +99,9 @@ class VirtualHand:
     def close_on_object(self) -> Pending:
         return self._goal("hand_preshape_close")
 
+    def close(self, speed: int) -> Pending:
+        return self._goal("hand_close", speed=speed)
+
     def open(self, speed: int) -> Pending:
         return self._goal("hand_open", speed=speed)
 
@@ -317,3 +320,6 @@ class VirtualContact:
 
     def event(self) -> ContactEvent | None:
         return self._event
+
+    def share_gone(self) -> float | None:
+        return None if self.node.frozen else self.detector.share_gone()

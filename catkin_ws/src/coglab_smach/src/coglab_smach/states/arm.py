@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
 
@@ -14,7 +14,7 @@ from coglab_smach.ports.interfaces import DmpRequest
 from coglab_smach.ports.pending import PortError
 from coglab_smach.states.base import CoglabState, Interrupted, TimeLimit
 from coglab_smach.states.early_reach import EarlyReach
-from coglab_smach.states.motion import await_rest
+
 
 class LoadControllers(CoglabState):
     """Ask the controller manager to load the DMP and the point-to-point plug-in (D4.10 Figure 4)."""
@@ -138,21 +138,16 @@ class ExecuteDmp(CoglabState):
 class WaitStop(CoglabState):
     """Wait for the end of the reach or, if ``trigger`` asks for it, for the contact trigger.
 
-    trigger: '' (the end of the motion is enough), 'contact' (an object is in the hand) or 'release' (the person has
-    taken the load). Contact is watched for from the last ``contact_within`` m of the reach on and ends the motion;
-    release once the motion has ended. The reach may take ``reach_timeout`` beyond what the arm's limits ask for.
+    trigger: '' (the end of the motion is enough) or 'contact' (an object is in the hand). Contact is watched for from
+    the last ``contact_within`` m of the reach on and ends the motion. The reach may take ``reach_timeout`` beyond what
+    the arm's limits ask for.
     """
 
     default_time_limit = 20.0
     owns_motion = True
 
-    def __init__(self, ctx: Context, trigger: str) -> None:
-        keys: dict[str, list[str]] = {
-            "": [],
-            "contact": ["object_entry", "goal"],
-            "release": ["object_entry", "delivery", "goal"],
-        }
-        super().__init__(ctx, input_keys=keys[trigger])
+    def __init__(self, ctx: Context, trigger: str, keys: Sequence[str] = ()) -> None:
+        super().__init__(ctx, input_keys=["object_entry", "goal"] if trigger == "contact" else keys)
         self.trigger = trigger
         self._left = False
         """the compliant profile of the approach"""
@@ -163,19 +158,12 @@ class WaitStop(CoglabState):
         self._early = EarlyReach(self, ud.goal) if self.trigger and "early" in ud.goal else None
         if self.trigger == "contact":
             return self._await_contact(ud)
+        return self._await_end(ud)
+
+    def _await_end(self, ud: Any) -> str:
         self._await_reach(self._reached)
         self.ctx.journal.mark("motion_reached")
-        if not self.trigger:
-            return "succeeded"
-        self._leave_approach_profile()
-        # The goal is the person's hand, and that now comes to the object: an arm that still followed it
-        # would back away. But first the motion has to come to rest at the goal that it has latched.
-        await_rest(self.ctx, self.check)
-        self.await_pending(self.ctx.arm.switch_controller("ptp"), "end of the reach by switching to 'ptp'", 3.0)
-        self._watch("release", self._settings(ud))
-        # From now on the person holds the object as well: until the hand is open the arm must not go away with it.
-        self.ctx.shared = True
-        return self._found()
+        return "succeeded"
 
     def _await_contact(self, ud: Any) -> str:
         """The object may come into the hand on the way, at its end, or be brought there once the arm waits."""
@@ -186,13 +174,13 @@ class WaitStop(CoglabState):
 
     def _watch(self, mode: str, settings: dict[str, Any]) -> None:
         """Arm the detector and wait for what it finds."""
-        limit = float(settings.get("timeout", self.ctx.config.get(f"{self.trigger}_timeout", 6.0)))
+        limit = float(settings.get("timeout", self.ctx.config.get("contact_timeout", 6.0)))
         self.allow(limit + 5.0)
         self.await_pending(self.ctx.contact.arm(mode, limit, settings), "arming of the contact detector", 2.0)
         try:
-            self.wait_for(self._happened, self._expected(), limit)
+            self.wait_for(self._happened, "contact of an object with the hand", limit)
         except TimeLimit as error:
-            error.code = error.code if error.code != ReasonCode.TIME_LIMIT else self._missed()
+            error.code = error.code if error.code != ReasonCode.TIME_LIMIT else ReasonCode.NO_CONTACT
             raise
         finally:
             self.ctx.contact.disarm()
@@ -200,19 +188,16 @@ class WaitStop(CoglabState):
     def _happened(self) -> bool:
         if self.ctx.contact.event() is not None:
             return True
-        if self.trigger == "contact" and self._reached():
+        if self._reached():
             self.ctx.journal.mark("motion_reached")
             self._leave_approach_profile()
         return False
-
-    def _missed(self) -> int:
-        return int(ReasonCode.NO_CONTACT if self.trigger == "contact" else ReasonCode.NOT_RELEASED)
 
     def _found(self) -> str:
         event = self.ctx.contact.event()
         assert event is not None
         self.ctx.journal.mark("contact")
-        self.reason = event.message or f"{self.trigger} by {event.source}, margin {event.margin:.1f}"
+        self.reason = event.message or f"contact by {event.source}, margin {event.margin:.1f}"
         return "succeeded"
 
     def _await_reach(self, near: Callable[[], bool]) -> None:
@@ -247,19 +232,9 @@ class WaitStop(CoglabState):
             raise
 
     def _settings(self, ud: Any) -> dict[str, Any]:
-        """What the object's entry says about contact, or its delivery mode about release."""
+        """What the object's entry says about contact."""
         entry = ud.object_entry
-        settings = dict(entry.get("contact", {}))
-        settings["mass"] = float(entry.get("mass", 0.0))
-        if self.trigger == "release":
-            release = ud.delivery["release"]
-            settings.pop("timeout", None)
-            settings.update({key: release[key] for key in ("timeout",) if key in release})
-            settings["load_share"] = float(release.get("threshold", 0.0))
-        return settings
-
-    def _expected(self) -> str:
-        return "contact of an object with the hand" if self.trigger == "contact" else "the person's taking of the load"
+        return {**entry.get("contact", {}), "mass": float(entry.get("mass", 0.0))}
 
     def _reached(self) -> bool:
         progress = self.ctx.arm.dmp_progress()

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+import numpy as np
+
 from coglab_smach.context.context import Context
+from coglab_smach.kinematics.reachability import default_arm
 from coglab_smach.ports.pending import Pending, PortError
 
 POLL_PERIOD = 0.01
@@ -32,17 +35,31 @@ def end_motion(ctx: Context, reason: str) -> str:
     return f"the motion could not be cancelled ({trouble}), so the arm was held{f': {held}' if held else ''}"
 
 
-def await_rest(ctx: Context, look: Callable[[], None] = lambda: None) -> None:
+def await_rest(ctx: Context, look: Callable[[], object] = lambda: None) -> None:
     """Until no joint has moved by more than 1 mrad for 0.2 s, or 1.5 s are over: the arm sways a little after its
-    set-point has come to rest. ``look`` is called all the while."""
+    set-point has come to rest. ``look`` is called all the while; what it returns ends the wait if it is true."""
     end = ctx.clock.now() + 1.5
     still_since, place = ctx.clock.now(), ctx.arm.joint_positions()
     while ctx.clock.now() < end and ctx.clock.now() - still_since < 0.2:
-        look()
+        if look():
+            return
         ctx.clock.sleep(POLL_PERIOD)
         now = ctx.arm.joint_positions()
         if now is None or place is None or max(abs(a - b) for a, b in zip(now, place, strict=True)) > 0.001:
             still_since, place = ctx.clock.now(), now
+
+
+def rise(ctx: Context, height: float, speed: float) -> Pending | None:
+    """Begin to move the palm up by ``height`` m, down if negative, at ``speed`` m/s, each joint as fast as its share of
+    the way asks for; None where the posture is not known."""
+    here = ctx.arm.joint_positions()
+    if here is None:
+        return None
+    jacobian = default_arm().jacobian(np.asarray(here))
+    up = np.array([0.0, 0.0, height, 0.0, 0.0, 0.0])
+    way = jacobian.T @ np.linalg.solve(jacobian @ jacobian.T + 1e-4 * np.eye(6), up)
+    velocity = np.maximum(np.abs(way) * speed / abs(height), 1e-3)
+    return ctx.arm.move_ptp((np.asarray(here) + way).tolist(), velocity.tolist())
 
 
 def _await(ctx: Context, pending: Pending) -> str:

@@ -31,5 +31,3 @@ def seen_at(state: CoglabState, target: str) -> np.ndarray | None:
     except PortError:
         return None
     return np.array(seen.xyz) if seen.age <= OLDEST else None
-
-

@@ -1,0 +1,74 @@
+"""How much of an object's weight has left the hand: the person's share of the load while the robot gives it.
+
+Counted in N on the palm, from the residual of the moving arm's model (momentum_observer), so that an arm that sways or
+sinks meanwhile does not begin anew.
+"""
+
+from __future__ import annotations
+
+GRAVITY = 9.81
+SETTLING = 0.10
+"""s after arming over which the weight is averaged"""
+CONFIRMED = 0.05
+"""s for which the load has to be gone"""
+SAME = 0.5
+"""N by which the weight that was carried before the motion may seem to differ from that after it, for the posture's
+sake: the model is that good"""
+
+
+class LeavingLoad:
+    """The share that is gone, and the moment from which it has been enough for long enough.
+
+    Armed at rest, it is counted from what hangs on the palm then. Armed in a motion, it is counted from what was
+    carried before that, and once the arm stands, from what hangs on the palm then: unless that is more than SAME
+    different, because somebody has been lifting or pulling already.
+    """
+
+    def __init__(self, mass: float, needed: float, until: float, carried: float | None = None) -> None:
+        """``mass``: kg, of the object; ``needed``: share of its weight; ``until``: s, when the watch ends by itself;
+        ``carried``: N on the palm before the motion, None for an arm at rest. ValueError for what is no mass."""
+        if not mass > 0.0:
+            raise ValueError(f"release needs the mass of the object in kg, got {mass}")
+        self.weight, self.needed, self.until = mass * GRAVITY, needed, until
+        self.share: float | None = None
+        """1: all of it; None until enough was seen to count from"""
+        self.told = False
+        self._from = carried
+        """N, that the share is counted from"""
+        self._settled = False
+        """it is final"""
+        self._sum, self._count = 0.0, 0
+        self._begun = 0.0
+        self._since: float | None = None
+
+    @property
+    def margin(self) -> float:
+        """Share that is gone over the one that is needed."""
+        return (self.share or 0.0) / self.needed
+
+    def feed(self, stamp: float, weight: float, still: bool, fresh: bool) -> bool:
+        """One sample: s, and N on the palm; ``still``: the arm stands; ``fresh``: the samples before it do not count.
+        Whether enough is gone now, said once."""
+        if fresh:
+            self._from, self._settled, self._count, self._since = None, False, 0, None
+        if not self._settled and (still or self._from is None):
+            self._settle(stamp, weight)
+        if self._from is None:
+            return False
+        self.share = (self._from - weight) / self.weight
+        self._since = None if self.share < self.needed else stamp if self._since is None else self._since
+        if self.told or self._since is None or stamp - self._since < CONFIRMED:
+            return False
+        self.told = True
+        return True
+
+    def _settle(self, stamp: float, weight: float) -> None:
+        """Average what hangs on the palm, and then decide what is counted from."""
+        if self._count == 0 or stamp < self._begun:
+            self._begun, self._sum, self._count = stamp, 0.0, 0
+        self._sum, self._count = self._sum + weight, self._count + 1
+        if stamp - self._begun < SETTLING:
+            return
+        now, self._settled = self._sum / self._count, True
+        if self._from is None or abs(now - self._from) < SAME:
+            self._from = now

@@ -1,0 +1,211 @@
+"""Giving an object to a person: the grip loosens as they take the load, and closes again if they do not keep it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from coglab_msgs.msg import ReasonCode
+
+from coglab_smach.context.context import Context
+from coglab_smach.ports.interfaces import HandPort
+from coglab_smach.ports.pending import Pending, PortError
+from coglab_smach.states.arm import WaitStop
+from coglab_smach.states.base import CoglabState, Interrupted, TimeLimit
+from coglab_smach.states.motion import await_rest, rise
+from coglab_smach.states.weight import hand_from_palm
+
+FINGERS = slice(1, 5)
+"""motors that bend fingers"""
+
+
+class LooseningGrip:
+    """The fingers around an object: opened by counts of a motor's position (0 open .. 254 closed) and closed again."""
+
+    def __init__(self, hand: HandPort, speed: int, closing_speed: int) -> None:
+        """``speed``, ``closing_speed``: 1..511, wire speeds at which they loosen and close; the second one stands for
+        the force with which they hold then."""
+        self._hand, self._speed, self._closing_speed = hand, speed, closing_speed
+        self._closed = hand.state().positions
+        self._opening: Pending | None = None
+        self._closing: Pending | None = None
+
+    def loosened(self) -> int | None:
+        """Counts by which the finger that has moved most is more open than in the grip; None where the hand does not
+        tell."""
+        now = self._hand.state().positions
+        if not now or not self._closed:
+            return None
+        return max(c - n for c, n in zip(self._closed[FINGERS], now[FINGERS], strict=True))
+
+    def loosen_to(self, counts: float) -> None:
+        """Open on until they are so loose; call it again and again."""
+        if self._closing is not None:
+            if not self._closing.done():
+                return
+            self._closed, self._closing = self._hand.state().positions, None
+        loosened = self.loosened()
+        if self._opening is None:
+            if loosened is not None and loosened + 1 <= counts:
+                self._opening = self._hand.open(self._speed)
+        elif loosened is None or loosened >= counts or self._opening.done():
+            self.stand()
+
+    def stand(self) -> None:
+        """No looser."""
+        if self._opening is not None:
+            self._opening.cancel()
+            self._opening = None
+
+    def tighten(self) -> None:
+        """Close again, unless they do."""
+        self.stand()
+        if self._closing is None:
+            self._closing = self._hand.close(self._closing_speed)
+
+    def tight(self) -> bool:
+        """Whether the closing has ended that was begun last; it may have failed."""
+        return self._closing is None or self._closing.done()
+
+
+class WaitTaker(WaitStop):
+    """The end of a reach toward the person's hand: the arm stands and follows nothing any more, and the contact
+    detector is armed for release.
+
+    The goal is the person's hand, and that now comes to the object: an arm that still followed it would back away, and
+    one that is held would drag the hand along that it follows. So within the last ``give.touch_within`` m the reach
+    ends with a load of ``give.touch_share`` of the object's weight, up or down.
+    """
+
+    def __init__(self, ctx: Context) -> None:
+        super().__init__(ctx, "taker", ["object_entry", "delivery", "goal"])
+
+    def _await_end(self, ud: Any) -> str:
+        arm, contact = self.ctx.arm, self.ctx.contact
+        within = float(self.ctx.config.get("give.touch_within", 0.05))
+        touch = float(self.ctx.config.get("give.touch_share", 0.8))
+        self._await_reach(lambda: self._reached() or self._comes_to_its_end(within))
+        self._leave_approach_profile()
+        release = ud.delivery["release"]
+        settings = {
+            "mass": float(ud.object_entry.get("mass", 0.0)),
+            "load_share": float(release.get("threshold", 0.5)),
+        }
+        limit = float(release.get("timeout", self.ctx.config.get("release_timeout", 8.0)))
+        self.await_pending(contact.arm("release", limit + self.left(), settings), "arming of the contact detector", 2.0)
+
+        def touched() -> bool:
+            self.check()
+            return abs(contact.share_gone() or 0.0) > touch
+
+        self._await_reach(lambda: touched() or self._reached())
+        self.ctx.journal.mark("motion_reached")
+        if arm.dmp_progress().state == "reached":  # it has to come to rest at the goal that it has latched
+            await_rest(self.ctx, touched)
+        else:
+            self.reason = f"touched on the way: {contact.share_gone() or 0.0:.1f} of the weight"
+        self.await_pending(arm.switch_controller("ptp"), "end of the reach by switching to 'ptp'", 3.0)
+        return "succeeded"
+
+    def _comes_to_its_end(self, within: float) -> bool:
+        """Whether the second half of the reach has come to the last ``within`` m: its first news may not know the
+        goal."""
+        progress = self.ctx.arm.dmp_progress()
+        return progress.phase < 0.5 and 0.0 < progress.remaining_distance < within
+
+
+class GiveLoad(CoglabState):
+    """Let the person take the load of the object that the arm holds out, and end when they carry as much of it as the
+    delivery's ``release`` asks for. The contact detector is armed for release (WaitStop).
+
+    The grip loosens in proportion to their share of the weight, by ``give.loosen`` counts at most. When the load comes
+    back to the arm the grip closes again. Where nothing has happened for ``give.lower_after`` s and the person's hand
+    is at the object, the arm sinks by ``give.lower`` m, so that the weight comes to lie in that hand. After the time
+    limit the hand is closed and keeps the object.
+    """
+
+    default_time_limit = 20.0
+    owns_motion = True
+
+    def __init__(self, ctx: Context) -> None:
+        super().__init__(ctx, input_keys=["object_id", "delivery"])
+        self._grip: LooseningGrip
+        self._lowering: Pending | None = None
+        self._lower_at = 0.0
+        self._needed = 0.0
+        self._back_since: float | None = None
+
+    def _number(self, name: str, default: float) -> float:
+        return float(self.ctx.config.get(f"give.{name}", default))
+
+    def run(self, ud: Any) -> str:
+        release, contact = ud.delivery["release"], self.ctx.contact
+        limit = float(release.get("timeout", self.ctx.config.get("release_timeout", 8.0)))
+        self._needed = float(release.get("threshold", 0.5))
+        self.allow(limit + 10.0)
+        self._grip = LooseningGrip(
+            self.ctx.hand, int(self._number("loosen_speed", 40)), int(self._number("close_speed", 120))
+        )
+        self._lowering, self._back_since = None, None
+        self._lower_at = self.ctx.clock.now() + self._number("lower_after", 3.0)
+        try:
+            self.wait_for(self._taken, "the person's taking of the load", limit)
+        except TimeLimit as error:
+            self._keep()
+            error.code = error.code if error.code != ReasonCode.TIME_LIMIT else ReasonCode.NOT_RELEASED
+            raise
+        except (Interrupted, PortError):
+            self._keep()
+            raise
+        finally:
+            contact.disarm()
+            if self._lowering is not None:
+                self._lowering.cancel()
+        # Until the hand is open the arm must not go away with what the person holds as well.
+        self.ctx.shared = True
+        self.ctx.journal.mark("contact")
+        event = contact.event()
+        self.reason = event.message if event is not None else ""
+        return "succeeded"
+
+    def _taken(self) -> bool:
+        """Look at the person's share, and do what it asks for; whether it is enough."""
+        if self.ctx.contact.event() is not None:
+            return True
+        share, now = self.ctx.contact.share_gone(), self.ctx.clock.now()
+        begins = self._number("begins", 0.2)
+        self._follow(0.0 if share is None else share, begins, now)
+        if share is not None and share < begins and self._lowering is None and now >= self._lower_at:
+            self._lower(now)
+        return False
+
+    def _follow(self, share: float, begins: float, now: float) -> None:
+        """As loose as the share asks for; closed again where it does not stay."""
+        if share > begins / 2:
+            self._back_since = None
+            part = (share - begins) / max(1e-6, self._needed - begins)
+            if part > 0.0:
+                # The person's hand is at the object: the arm must not go away with it.
+                self.ctx.shared = True
+                self._grip.loosen_to(min(1.0, part) * self._number("loosen", 4.0))
+            else:
+                self._grip.stand()
+            return
+        self._back_since = now if self._back_since is None else self._back_since
+        self._grip.stand()
+        if now - self._back_since >= self._number("back_time", 0.1):
+            self.ctx.shared = False
+            if (self._grip.loosened() or 0) > 0:
+                self._grip.tighten()
+
+    def _lower(self, now: float) -> None:
+        """Sink, if the person's hand is there; else look again in a moment."""
+        self._lower_at = now + 0.5
+        distance = hand_from_palm(self)
+        if distance is not None and distance < self._number("near", 0.25):
+            self._lowering = rise(self.ctx, -self._number("lower", 0.03), self._number("lower_speed", 0.03))
+
+    def _keep(self) -> None:
+        """The object stays in the hand: closed again, where it was loosened."""
+        self._grip.stand()
+        if (self._grip.loosened() or 0) > 0:
+            self._grip.tighten()

@@ -1,0 +1,131 @@
+"""The robot gives: the grip follows the person's share of the load, and every end without a taker keeps the object."""
+
+import pytest
+from coglab_msgs.msg import ReasonCode
+from coglab_smach.contact.leaving_load import SAME, LeavingLoad
+from conftest import Trial
+
+RECEIVE, GIVE = "exchange_human_to_robot", "exchange_robot_to_human"
+WEIGHT = 0.31 * 9.81
+
+
+def giving(script, **overrides):
+    """A master that holds the mug out to a person who does nothing but what the script does."""
+    trial = Trial(**overrides)
+    trial.cell.partner.take_after = None
+
+    def walk(t):
+        t.wait_hub("wait_without_object")
+        t.start(RECEIVE)
+        t.wait_hub("wait_with_object")
+        t.cell.calls.clear()
+        t.start(GIVE)
+        while "arm release" not in t.cell.called():
+            t.clock.sleep(0.05)
+        t.clock.sleep(1.0)
+        script(t)
+
+    return trial.run(walk)
+
+
+def finger(trial):
+    return trial.ctx.hand.state().positions[2]
+
+
+def test_the_grip_loosens_with_a_part_of_the_load_and_closes_again_when_it_comes_back():
+    def script(t):
+        grip = finger(t)
+        t.clock.sleep(0.5)
+        assert finger(t) == grip and not t.cell.called("open"), "nobody has taken anything yet"
+        loose = []
+        for share in (0.4, 0.55):
+            t.cell.push(share * WEIGHT)
+            t.clock.sleep(0.8)
+            loose.append(grip - finger(t))
+        assert 0 < loose[0] < loose[1] <= 8, loose
+        assert t.ctx.shared, "the arm must not go away with what the person holds too"
+        t.cell.push(0.0)
+        t.clock.sleep(1.5)
+        assert finger(t) == grip and t.cell.called("close") and not t.ctx.shared
+        t.wait_hub("wait_with_object")
+
+    trial = giving(script)
+    result = trial.result()
+    assert result.outcome == "failed_holding" and result.code == ReasonCode.NOT_RELEASED
+    assert trial.ctx.holding == "mug" and "the person's taking of the load within 8.0 s" in trial.ctx.journal.why()
+
+
+def test_who_takes_the_load_gets_the_object():
+    def script(t):
+        t.cell.push(0.9 * WEIGHT)
+        t.wait_hub("wait_without_object")
+
+    trial = giving(script)
+    assert trial.result().outcome == "succeeded" and trial.ctx.holding == ""
+
+
+def test_a_person_who_holds_on_to_a_part_keeps_the_arm_there():
+    """At the end of the time both hold it: the grip is closed, and the arm does not pull it away."""
+
+    def script(t):
+        t.cell.push(0.4 * WEIGHT)
+        t.wait_hub("stopped")
+        t.clock.sleep(1.0)
+
+    trial = giving(script)
+    assert trial.ctx.journal.results[-1].outcome == "stopped" and trial.ctx.holding == "mug"
+    assert trial.cell.called("close") and finger(trial) == 160
+    assert "the person may still hold 'mug'" in trial.ctx.journal.why()
+
+
+def test_the_arm_sinks_once_where_nobody_lifts():
+    def script(t):
+        assert len(t.cell.called("move_ptp")) == 0
+        t.clock.sleep(2.5)
+        assert len(t.cell.called("move_ptp")) == 1
+        t.clock.sleep(1.5)
+        assert len(t.cell.called("move_ptp")) == 1
+        t.wait_hub("wait_with_object")
+
+    assert giving(script, **{"give.near": 2.0}).result().outcome == "failed_holding"
+
+
+def test_stop_in_the_middle_closes_the_grip():
+    def script(t):
+        t.cell.push(0.5 * WEIGHT)
+        t.clock.sleep(0.6)
+        t.ctx.stop.press("by the test")
+        t.wait_hub("stopped")
+        assert t.cell.called("close") and t.ctx.holding == "mug"
+
+    giving(script)
+
+
+def settled(carried=None, weight=WEIGHT, mass=0.31):
+    """Fed at 200 Hz with what hangs on the palm of an arm at rest."""
+    load = LeavingLoad(mass, 0.6, 100.0, carried)
+    assert not any(load.feed(0.005 * k, weight, True, False) for k in range(40))
+    return load
+
+
+def test_the_share_is_counted_from_rest_and_said_once():
+    load = settled()
+    assert load.share == pytest.approx(0.0)
+    assert not load.feed(0.3, 0.5 * WEIGHT, True, False) and load.share == pytest.approx(0.5)
+    said = [load.feed(0.3 + 0.005 * k, 0.3 * WEIGHT, True, False) for k in range(1, 40)]
+    assert sum(said) == 1 and said.index(True) in (10, 11), "after 50 ms"
+    assert load.share == pytest.approx(0.7) and load.margin == pytest.approx(0.7 / 0.6)
+    assert not load.feed(0.6, WEIGHT, True, False) and load.share == pytest.approx(0.0)
+
+
+@pytest.mark.parametrize("error", [0.0, 0.4, -0.4])
+def test_the_models_error_in_another_posture_is_no_load(error):
+    assert settled(carried=WEIGHT + error).share == pytest.approx(0.0)
+
+
+def test_who_lifts_before_the_arm_stands_is_felt():
+    load = LeavingLoad(0.31, 0.6, 100.0, WEIGHT)
+    assert any(load.feed(0.005 * k, 0.2 * WEIGHT, k > 60, False) for k in range(100))
+    assert load.share == pytest.approx(0.8) and 0.8 * WEIGHT > SAME
+    with pytest.raises(ValueError, match="mass"):
+        LeavingLoad(0.0, 0.6, 1.0)
