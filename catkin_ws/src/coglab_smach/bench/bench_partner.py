@@ -42,9 +42,11 @@ from __future__ import annotations
 
 import json
 import sys
+from collections.abc import Mapping
 
 import campaign
 import partner_motion_rows as motion
+from campaign import Job
 from coglab_py.packages import package_path
 from coglab_sim.conditions import HARDSHIPS
 from coglab_smach.context.config import Config
@@ -57,9 +59,11 @@ from partner_rows import (
     groups,
     hardship_rows,
     interrupted_rows,
+    run,
     success_rows,
 )
 from trial_file import commit_of_sources, whole_hash
+from world_rows import OBJECTS
 
 SAME = {
     "postures.home": [-1.4349, -0.6086, 1.4986, 1.7048, 0.1857, 0.2152, 0.782],
@@ -93,29 +97,28 @@ def settings_row(row: Row) -> dict:
                "<= 0", not other)  # fmt: skip
 
 
-def rows_of(row: Row, commit: str) -> list[dict]:
-    """All rows, of the trials with the seeds of a commit."""
-    known = whole_hash(commit)
-    print(f"seeds of {known or 'no commit: git does not tell'}", file=sys.stderr)
-    jobs = groups(commit)
-    people = Group(row, [job for name, part in jobs.items() if name.startswith("people") for job in part])
+def rows_of(row: Row, commit: str, jobs: Mapping[str, list[Job]]) -> list[dict]:
+    """All rows, of these trials by group; their seeds are those of a commit."""
+    trials = run([job for part in jobs.values() for job in part])
+    group = {name: Group(row, part, trials) for name, part in jobs.items()}
+    people = Group(row, [job for name, part in jobs.items() if name.startswith("people") for job in part], trials)
     rows = [settings_row(row), *success_rows(people), *motion.reach_rows(people), *motion.onset_rows(people)]
-    for name in ("others", "others, hub"):
-        rows += motion.other_rows(Group(row, jobs[name]), name != "others")
+    rows += motion.other_rows(group["others"], False) + motion.other_rows(group["others, hub"], True)
     rows += motion.receiving_rows(people) + motion.speed_and_force_rows(people)
-    rows += interrupted_rows(Group(row, jobs["withdrawals"]), "withdrawals", WITHDRAWN)
-    rows += interrupted_rows(Group(row, jobs["falls"]), "falls", FELL)
-    rows += motion.pull_rows(Group(row, jobs["pulls"]))
+    rows += interrupted_rows(group["withdrawals"], "withdrawals", WITHDRAWN)
+    rows += interrupted_rows(group["falls"], "falls", FELL)
+    rows += motion.pull_rows(group["pulls"])
     for name in (*HARDSHIPS, ALL_TOGETHER):
-        rows += hardship_rows(Group(row, jobs[name]), name)
+        rows += hardship_rows(group[name], name)
+    known = whole_hash(commit)
     seeds = f"seeds of commit {known[:12]}" if known else "seeds of no commit: git does not tell"
-    return [*rows, row(f"{seeds}: people", len(jobs["people, mug"]), "people")]
+    return [*rows, row(f"{seeds}: people", people.asked // len(OBJECTS), "people")]
 
 
 def main() -> int:
     """Print the rows."""
     commit = commit_of_sources() if campaign.FILE is None else campaign.FILE.commit
-    print(json.dumps(rows_of(row, commit)))
+    print(json.dumps(rows_of(row, commit, groups(commit))))
     return 0
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import os
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -116,16 +116,19 @@ def directions(job: Job, trial: dict[str, Any]) -> list[Direction]:
     return found
 
 
-class Group:
-    """The trials of some jobs that were run, and rows about them: missed where some are missing."""
+def run(jobs: Sequence[Job]) -> dict[str, dict[str, Any]]:
+    """The trials by their keys, of as many jobs as are run, on all cores; see campaign.RUN_MISSING."""
+    there = [job for job in jobs if campaign.RUN_MISSING or (campaign.FILE and job.key in campaign.FILE.known)]
+    return {job.key: trial for job, trial in zip(there, campaign.results_of(jobs), strict=True)}
 
-    def __init__(self, row: Row, jobs: Sequence[Job]) -> None:
+
+class Group:
+    """The ``trials`` of some jobs, as far as they were run, and rows about them: missed where some are missing."""
+
+    def __init__(self, row: Row, jobs: Sequence[Job], trials: Mapping[str, dict[str, Any]]) -> None:
         self._row, self.asked = row, len(jobs)
-        self.trials = list(campaign.results_of(jobs))
-        # A file gives what it has of the jobs, in their order.
-        known = None if campaign.FILE is None else campaign.FILE.known
-        self.jobs = [job for job in jobs if known is None or job.key in known]
-        assert len(self.jobs) == len(self.trials)
+        self.jobs = [job for job in jobs if job.key in trials]
+        self.trials = [trials[job.key] for job in self.jobs]
 
     @property
     def directions(self) -> list[Direction]:

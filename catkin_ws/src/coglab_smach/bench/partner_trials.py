@@ -56,7 +56,7 @@ class Interrupted(TrueTrace):
     def look(self, trial: Any) -> None:
         super().look(trial)
         if self.event is None and self.begun and self._due():
-            self.event, self._from = self.rig.t, self.series.hand[-1]
+            self.event, self._from = self.now, self.series.hand[-1]
             if self._falls:
                 self.gone = self.event
                 self._drop()
@@ -64,16 +64,16 @@ class Interrupted(TrueTrace):
                 self.rig.human.command("rest")
         elif self.event is not None and self.gone is None:
             if float(np.linalg.norm(self.series.hand[-1] - self._from)) > BACK:
-                self.gone = self.rig.t
+                self.gone = self.now
 
     def _due(self) -> bool:
         waiting = self.rig.human.phase == "waiting"
-        self._waits = (self._waits or self.rig.t) if waiting else None
+        self._waits = (self._waits or self.now) if waiting else None
         away = float(np.linalg.norm(self.series.thing[-1] - self.series.palm[-1]))
         if self.series.moving[-1] and self._whole is None:
             self._whole = away
         near = self._whole is not None and away < self._share * self._whole
-        return near or (self._waits is not None and self.rig.t - self._waits > VAIN)
+        return near or (self._waits is not None and self.now - self._waits > VAIN)
 
     def _drop(self) -> None:
         """The fingers open, whatever the person wants of them."""
@@ -177,7 +177,7 @@ def other(job: Job) -> dict[str, Any]:
     number, hub = job.arguments["number"], job.arguments["hub"]
     rng = np.random.default_rng([job.seed, 71])
     motion = other_motion(KINDS[number % len(KINDS)], rng, LISTENS)
-    robot_holds = bool((number // len(KINDS)) % 2)
+    robot_holds = number % 2 == 1
     conditions = job.arguments["conditions"]
     left = bool(motion.segments[0].start[1] < 0.0)
     arguments: dict[str, Any] = {"conditions": replace(conditions, person={"left_handed": left})}

@@ -39,6 +39,7 @@ class Series:
     """A row of each for every FRI period of the robot."""
 
     time: list[float] = field(default_factory=list)
+    """s, as in the journal"""
     palm: list[np.ndarray] = field(default_factory=list)
     velocity: list[np.ndarray] = field(default_factory=list)
     """m/s, of the palm"""
@@ -82,6 +83,11 @@ class TrueTrace:
         trial.ctx.journal.listen(self._on_transition)
         self.watch_person()
 
+    @property
+    def now(self) -> float:
+        """s of the machines' clock, which is not the robot's."""
+        return float(self.trial.clock.now())
+
     def watch_person(self) -> None:
         """Keep what the person's hand does in each step."""
         step = self.rig.human.step
@@ -103,7 +109,7 @@ class TrueTrace:
             return
         truth = cell.truth()
         forces = np.array(list(cell.touch().values()))
-        series.time.append(rig.t)
+        series.time.append(self.now)
         series.palm.append(np.array(truth["robot_hand"]["position"]))
         series.velocity.append(rig.robot.chain.jacobian(truth["position"])[:3] @ truth["velocity"])
         series.hand.append(np.array(truth["human_hand"]["position"]))
