@@ -46,7 +46,9 @@ def seeds_of(commit: str, name: str, number: int) -> list[int]:
 def groups(commit: str) -> dict[str, list[Job]]:
     """All trials by group, of the sources of this commit."""
 
-    def jobs(name: str, count: int, arguments: Callable[[int, int], dict], runner: Any, both: bool = False) -> list[Job]:
+    def jobs(
+        name: str, count: int, arguments: Callable[[int, int], dict], runner: Any, both: bool = False
+    ) -> list[Job]:
         """``arguments``: of the number of a trial and its seed."""
         seeds = seeds_of(commit, name.partition(",")[0], count)
         actions = EXCHANGES if both else (RECEIVE,)
@@ -64,9 +66,8 @@ def groups(commit: str) -> dict[str, list[Job]]:
     pulling = lambda i, seed: {"conditions": Conditions(PULLING[i % 2], object_id=object_of(i // 2))}  # noqa: E731
     found["pulls"] = jobs("pulls", PULLS, pulling, handover)
     for name, hub in (("others", False), ("others, hub", True)):
-        found[name] = jobs(
-            name, OTHERS, lambda i, seed, hub=hub: {"conditions": Conditions(), "number": i, "hub": hub}, other, both=True
-        )
+        number = lambda i, seed, hub=hub: {"conditions": Conditions(), "number": i, "hub": hub}  # noqa: E731
+        found[name] = jobs(name, OTHERS, number, other, both=True)
     return found
 
 

@@ -140,8 +140,9 @@ class TrueTrace:
         return found
 
     def _after_event(self, part: dict[str, np.ndarray]) -> dict[str, Any]:
-        """``event`` (s); ``chase`` and ``chase_at_once``: m/s, largest speed of the palm toward hand or object from 0.2 s
-        after ``gone`` and after ``event`` on; ``moved_before``: the arm had moved. Nothing where nothing happened."""
+        """``event`` (s); ``chase`` and ``chase_at_once``: m/s, largest speed of the palm toward hand or object from
+        0.2 s after ``gone`` and after ``event`` on; ``moved_before``: the arm had moved. Nothing where nothing
+        happened."""
         if self.event is None:
             return {}
         toward = np.maximum(toward_of(part, "hand"), toward_of(part, "thing"))
@@ -248,5 +249,3 @@ def of_reach(part: dict[str, np.ndarray], action: str) -> dict[str, Any]:
         "peaks": motion_figures.peaks(speed, RATE) if moved else 0,
         "sparc": sparc(speed, RATE) if moved else None,
     }
-
-
