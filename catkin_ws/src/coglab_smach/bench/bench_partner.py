@@ -11,7 +11,7 @@ Success: the machine says so, and at the end of the action the robot (receiving)
 object in truth, and nobody else; claimed: the machine says so and that is not true. A direction that never began,
 because the one before had failed, has failed. People who place while the arm moves: drawn so, or with a trust below
 0.2 s; both of their directions count. Fell: it lies, or lay, on the floor. Documented: with a ReasonCode that is
-neither 0 nor UNEXPECTED, claimed, or "not begun"; stuck is none.
+neither 0 nor UNEXPECTED, or "not begun"; stuck and claimed are not.
 
 Reach: from the beginning of a DMP motion to its end and until the palm stands (below 0.02 m/s; 0.5 s at most).
 Wrong-way motion: farthest that the palm is behind where it had been already, along the line from its first to its last
@@ -120,7 +120,8 @@ def rows_of(row: Row, commit: str, jobs: Mapping[str, list[Job]]) -> list[dict]:
     for name in (*HARDSHIPS, ALL_TOGETHER):
         rows += hardship_rows(group[name], name)
     known = whole_hash(commit)
-    seeds = f"seeds of commit {known[:12]}" if known else "seeds of no commit: git does not tell"
+    changed = " with changes" if commit.endswith("-changed") else ""
+    seeds = f"seeds of commit {known[:12]}{changed}" if known else "seeds of no commit: git does not tell"
     return [*rows, row(f"{seeds}: people", people.asked // len(OBJECTS), "people")]
 
 

@@ -33,7 +33,8 @@ WITHDRAWN = {ReasonCode.GOAL_WITHDRAWN, ReasonCode.GOAL_LEFT_REGION}
 FELL = {ReasonCode.GOAL_FELL}
 NOT_OFFERED = {ReasonCode.OBJECT_NOT_SEEN, ReasonCode.GOAL_UNREACHABLE}
 """outcomes of an offer that was taken back before the arm had moved"""
-UNDOCUMENTED = {"NONE", "UNEXPECTED", STUCK, ""}
+CLAIMED = "claimed"
+UNDOCUMENTED = {"NONE", "UNEXPECTED", STUCK, CLAIMED}
 Row = Callable[..., dict]
 
 
@@ -112,7 +113,7 @@ def directions(job: Job, trial: dict[str, Any]) -> list[Direction]:
         truth = trial["truth"][k] if k < len(trial["truth"]) else {}
         end = code if outcome != "succeeded" else "succeeded"
         if end == "succeeded" and truth.get("held_by") != HOLDER[action]:
-            end, sentence = "claimed", f"held by {truth.get('held_by')}"
+            end, sentence = CLAIMED, f"held by {truth.get('held_by')}"
         found.append(Direction(action, job.arguments["conditions"].object_id, end, sentence, truth, eager))
     return found
 
@@ -188,7 +189,7 @@ def success_rows(group: Group) -> list[dict]:
         what = f"succeeded, {what}, of {len(begun)} begun ({failures(begun)})"
         rows.append(group.row(what, share([each.good for each in begun]), "share"))
     fell, stuck = (sum(bool(trial[name]) for trial in group.trials) for name in ("fell", "stuck"))
-    claimed = sum(each.end == "claimed" for each in found)
+    claimed = sum(each.end == CLAIMED for each in found)
     vague = sum(each.end in UNDOCUMENTED for each in found)
     return [
         *rows,

@@ -16,12 +16,11 @@ from coglab_py.pose import Pose
 from coglab_sim.person.scene import HandSample
 from coglab_sim.virtual_world import DT
 from scipy.spatial.transform import Rotation
-from true_trace import RECEIVE, TrueTrace
+from true_trace import GIVE, RECEIVE, TrueTrace
 
 sys.path.insert(0, str(package_path("coglab_perception", "test")))
 from other_motions import KINDS, Motion, other_motion
 
-GIVE = "exchange_robot_to_human"
 SHARES = (0.3, 0.95)
 """of the distance between palm and object when the reach began: where a withdrawal or a fall may come"""
 BACK = 0.10

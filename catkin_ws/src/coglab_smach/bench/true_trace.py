@@ -11,6 +11,7 @@ from typing import Any
 
 import motion_figures
 import numpy as np
+from campaign import EXCHANGES
 from coglab_py.pose import Pose
 from coglab_sim.virtual_world import DT
 from reach_figures import human_time, sparc
@@ -30,7 +31,7 @@ TAKER = 0.20
 """s after the onset of the person's reach at which a human taker starts"""
 CALMS = 0.5
 """s after its end at most that a reach's own braking belongs to it"""
-RECEIVE = "exchange_human_to_robot"
+RECEIVE, GIVE = EXCHANGES
 UNDER_WAY = ("running", "holding")
 
 
@@ -134,37 +135,33 @@ class TrueTrace:
             ended = results[k].ended if k < len(results) else np.inf
             end = min(last, int(np.searchsorted(self.series.time, ended)) + 1)
             part = self.series.between(begin, max(end, begin + 1))
-            one = {"action": action, **of_action(part, action), **self._after_event(part)}
+            one = {"action": action, **of_action(part, action), **after_event(part, self.event, self.gone)}
             one["reaches"] = reaches_of(part, action, self.codes)
             found.append(one | (of_receiving(part, one) if action == RECEIVE else {}))
         return found
-
-    def _after_event(self, part: dict[str, np.ndarray]) -> dict[str, Any]:
-        """``event`` (s); ``chase`` and ``chase_at_once``: m/s, largest speed of the palm toward hand or object from
-        0.2 s after ``gone`` and after ``event`` on; ``moved_before``: the arm had moved. Nothing where nothing
-        happened."""
-        if self.event is None:
-            return {}
-        toward = np.maximum(toward_of(part, "hand"), toward_of(part, "thing"))
-
-        def after(moment: float | None) -> float:
-            late = part["time"] > (np.inf if moment is None else moment) + FREE - 1e-9
-            return float(np.max(toward[late], initial=0.0))
-
-        arm = motion_figures.onset(np.linalg.norm(part["velocity"], axis=1), RATE)
-        before = arm is not None and part["time"][arm] < self.event
-        return {
-            "event": self.event,
-            "chase": after(self.gone),
-            "chase_at_once": after(self.event),
-            "moved_before": bool(before),
-        }
 
 
 def toward_of(part: dict[str, np.ndarray], what: str) -> np.ndarray:
     """m/s, of the palm toward the person's ``hand`` or the ``thing``."""
     way = part[what] - part["palm"]
     return np.sum(part["velocity"] * way, axis=1) / np.maximum(np.linalg.norm(way, axis=1), 1e-9)
+
+
+def after_event(part: dict[str, np.ndarray], event: float | None, gone: float | None) -> dict[str, Any]:
+    """Of a withdrawal or a fall that began at ``event`` and had happened at ``gone`` (s; None: never): ``event``;
+    ``chase`` and ``chase_at_once``: m/s, largest speed of the palm toward hand or object from 0.2 s after ``gone`` and
+    after ``event`` on; ``moved_before``: the arm had moved. Nothing where nothing began."""
+    if event is None:
+        return {}
+    toward = np.maximum(toward_of(part, "hand"), toward_of(part, "thing"))
+
+    def after(moment: float | None) -> float:
+        late = part["time"] > (np.inf if moment is None else moment) + FREE - 1e-9
+        return float(np.max(toward[late], initial=0.0))
+
+    arm = motion_figures.onset(np.linalg.norm(part["velocity"], axis=1), RATE)
+    before = arm is not None and part["time"][arm] < event
+    return {"event": event, "chase": after(gone), "chase_at_once": after(event), "moved_before": bool(before)}
 
 
 def of_action(part: dict[str, np.ndarray], action: str) -> dict[str, Any]:
@@ -180,7 +177,7 @@ def of_action(part: dict[str, np.ndarray], action: str) -> dict[str, Any]:
         "held_by": str(part["held_by"][-1]),
         "onset": None if onset is None else float(times[onset]),
         "arm_onset": None if arm is None else float(times[arm]),
-        "near_speed": float(max(0.0, *near)) if len(near) > 1 else 0.0,
+        "near_speed": float(np.max(near, initial=0.0)),
         "pull": float(np.max(pulled, initial=0.0)),
     }
 
@@ -226,8 +223,6 @@ def reaches_of(part: dict[str, np.ndarray], action: str, codes: list[tuple[float
         after = np.linalg.norm(part["velocity"][stop : stop + round(CALMS * RATE)], axis=1)
         calm = np.flatnonzero(after <= motion_figures.MOVES)
         end = min(stop + (int(calm[0]) if len(calm) else len(after)) + 1, len(part["time"]))
-        if end - begin < 3:
-            continue
         low, high = part["time"][begin], part["time"][min(begins[k + 1], len(part["time"]) - 1)]
         code = next((code for stamp, code in codes if low <= stamp <= high), 0)
         found.append({"code": code, **of_reach({k: v[begin:end] for k, v in part.items()}, action)})

@@ -140,6 +140,22 @@ def test_speed_near_the_hand():
     assert true_trace.toward_of(part, "hand")[11] == pytest.approx(-0.8)
 
 
+def test_a_chase_begins_once_something_has_happened():
+    part = series(400, hand=np.tile([0.5, 0.0, 0.0], (400, 1)), thing=np.tile([0.0, 0.0, -0.5], (400, 1)))
+    part["velocity"][50:150, 0], part["velocity"][150:250, 0] = 0.6, 0.4
+    part["velocity"][260], part["velocity"][300] = [0.0, 0.0, -0.3], [-0.9, 0.0, 0.0]
+    found = true_trace.after_event(part, 10.5, 10.9)  # indices 100 and 180, and 0.2 s later 140 and 220
+    assert (found["chase_at_once"], found["chase"]) == pytest.approx((0.6, 0.4)) and found["moved_before"]
+    assert true_trace.after_event(part, 10.5, 11.05)["chase"] == pytest.approx(0.3), "the object counts as the hand"
+    assert true_trace.after_event(part, 10.2, None) == {
+        "event": 10.2,
+        "chase": 0.0,
+        "chase_at_once": pytest.approx(0.6),
+        "moved_before": False,
+    }
+    assert true_trace.after_event(part, None, None) == {}
+
+
 def test_reaches_of_an_action():
     n = 700
     part = series(n)
