@@ -1,4 +1,4 @@
-"""A compliant approach: the feedback profile is on during the reach, and gone before the detector of an arm at rest is armed."""
+"""A compliant approach: its feedback profile is on during the reach, and gone before release is watched for at rest."""
 
 import pytest
 from conftest import Trial

@@ -19,8 +19,8 @@ DOUBT_TIME = 0.2
 
 
 class EarlyReach:
-    """Watches a reach toward where something will be: the thing itself may not go back nor fall (cc.GoalWatch, the rules
-    of a reach toward a goal that is seen), and outside the handover region somebody has to go on offering it."""
+    """Watches a reach toward where something will be: the thing itself may not go back nor fall (cc.GoalWatch, the
+    rules of a reach toward a goal that is seen), and outside the handover region somebody has to go on offering it."""
 
     def __init__(self, state: CoglabState, goal: Mapping[str, Any]) -> None:
         self.state, self.limits, self.early = state, goal["limits"], goal["early"]
