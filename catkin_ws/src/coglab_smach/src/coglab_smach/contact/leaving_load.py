@@ -25,7 +25,8 @@ class LeavingLoad:
 
     def __init__(self, mass: float, needed: float, until: float, carried: float | None = None) -> None:
         """``mass``: kg, of the object; ``needed``: share of its weight; ``until``: s, when the watch ends by itself;
-        ``carried``: N on the palm before the last motion, None where that is not known. ValueError for what is no mass."""
+        ``carried``: N on the palm before the last motion, None where that is not known. ValueError for what is no
+        mass."""
         if not mass > 0.0:
             raise ValueError(f"release needs the mass of the object in kg, got {mass}")
         self.weight, self.needed, self.until = mass * GRAVITY, needed, until

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 from coglab_msgs.msg import ReasonCode
 
 from coglab_smach.context.context import Context
-from coglab_smach.ports.interfaces import ContactEvent, HandPort
+from coglab_smach.ports.interfaces import HandPort
 from coglab_smach.ports.pending import Pending, PortError
 from coglab_smach.states.arm import WaitStop
 from coglab_smach.states.base import CoglabState, Interrupted, TimeLimit
@@ -73,7 +74,8 @@ class WaitTaker(WaitStop):
 
     The goal is the person's hand, and that now comes to the object: an arm that still followed it would back away, and
     one that is held would drag the hand along that it follows. So within the last ``give.touch_within`` m, with the
-    hand within ``give.near`` m of the palm, the reach ends with a contact.
+    hand within ``give.near`` m of the palm, the reach ends with a contact, and when the goal goes away from the arm
+    again by ``give.goal_leaves`` m: a person who waits does not do that, and the rest of the way is theirs.
     """
 
     def __init__(self, ctx: Context) -> None:
@@ -82,13 +84,11 @@ class WaitTaker(WaitStop):
     def _await_end(self, ud: Any) -> str:
         contact, settings, release = self.ctx.contact, self._settings(ud), ud.delivery["release"]
         self._await_reach(lambda: self._reached() or self._comes_to_its_end())
-        touched = self._await_touch(settings) if not self._reached() else None
+        self.reason = self._await_taker(settings) if not self._reached() else ""
         self.ctx.journal.mark("motion_reached")
         self._leave_approach_profile()
-        if touched is None:  # it has to come to rest at the goal that it has latched
+        if not self.reason:  # it has to come to rest at the goal that it has latched
             await_rest(self.ctx, self.check)
-        else:
-            self.reason = f"touched on the way: {touched.message}"
         self.await_pending(self.ctx.arm.switch_controller("ptp"), "end of the reach by switching to 'ptp'", 3.0)
         limit = float(release.get("timeout", self.ctx.config.get("release_timeout", 8.0)))
         weight = {"mass": settings["mass"], "load_share": float(release.get("threshold", 0.5))}
@@ -96,15 +96,26 @@ class WaitTaker(WaitStop):
         self.await_pending(contact.arm("release", limit + 5.0, weight), "arming of the contact detector", 2.0)
         return "succeeded"
 
-    def _await_touch(self, settings: dict[str, Any]) -> ContactEvent | None:
-        """Until the reach has ended, or until it was touched."""
-        contact = self.ctx.contact
+    def _await_taker(self, settings: dict[str, Any]) -> str:
+        """Until the reach has ended; or until the person has come, and then what tells that."""
+        contact, leaves = self.ctx.contact, float(self.ctx.config.get("give.goal_leaves", 0.02))
+        nearest = math.inf
+
+        def leaving() -> bool:
+            nonlocal nearest
+            distance = self.ctx.arm.dmp_progress().remaining_distance
+            nearest = min(nearest, distance)
+            return distance > nearest + leaves
+
         self.await_pending(contact.arm("contact_in_motion", 10.0, settings), "arming of the contact detector", 2.0)
         try:
-            self._await_reach(lambda: self._reached() or contact.event() is not None)
+            self._await_reach(lambda: self._reached() or contact.event() is not None or leaving())
         finally:
             contact.disarm()
-        return contact.event()
+        event = contact.event()
+        if event is not None:
+            return f"touched on the way: {event.message}"
+        return f"the hand came to within {nearest:.2f} m of its goal and is followed no more" if leaving() else ""
 
     def _comes_to_its_end(self) -> bool:
         within = float(self.ctx.config.get("give.touch_within", 0.05))
