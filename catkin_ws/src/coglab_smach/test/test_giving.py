@@ -38,7 +38,7 @@ def test_the_grip_loosens_with_a_part_of_the_load_and_closes_again_when_it_comes
         t.clock.sleep(0.5)
         assert finger(t) == grip and not t.cell.called("open"), "nobody has taken anything yet"
         loose = []
-        for share in (0.4, 0.55):
+        for share in (0.35, 0.58):
             t.cell.push(share * WEIGHT)
             t.clock.sleep(0.8)
             loose.append(grip - finger(t))

@@ -236,7 +236,10 @@ class FusedDetector:
         residual = self.moving.residual
         if stamp > leaving.until:
             self._leaving = None
-        elif residual is not None and leaving.feed(
+            return None
+        if residual is None or not (self.moving.slow() or residual.fresh):
+            leaving.pause()
+        elif leaving.feed(
             stamp, self.moving.weight(residual.torque, residual.position), self.moving.still(), residual.fresh
         ):
             gone, needed = (share * leaving.weight for share in (leaving.share or 0.0, leaving.needed))

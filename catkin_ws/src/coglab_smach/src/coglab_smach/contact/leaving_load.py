@@ -19,14 +19,14 @@ sake: the model is that good"""
 class LeavingLoad:
     """The share that is gone, and the moment from which it has been enough for long enough.
 
-    Armed at rest, it is counted from what hangs on the palm then. Armed in a motion, it is counted from what was
-    carried before that, and once the arm stands, from what hangs on the palm then: unless that is more than SAME
-    different, because somebody has been lifting or pulling already.
+    It is counted from what was carried before the last motion, and once the arm stands, from what hangs on the palm
+    then: unless that is more than SAME different, because somebody has been lifting or pulling already.
     """
 
     def __init__(self, mass: float, needed: float, until: float, carried: float | None = None) -> None:
         """``mass``: kg, of the object; ``needed``: share of its weight; ``until``: s, when the watch ends by itself;
-        ``carried``: N on the palm before the motion, None for an arm at rest. ValueError for what is no mass."""
+        ``carried``: N on the palm before the last motion, None where that is not known. ValueError for what is no
+        mass."""
         if not mass > 0.0:
             raise ValueError(f"release needs the mass of the object in kg, got {mass}")
         self.weight, self.needed, self.until = mass * GRAVITY, needed, until
@@ -61,6 +61,10 @@ class LeavingLoad:
             return False
         self.told = True
         return True
+
+    def pause(self) -> None:
+        """The arm moves too fast to tell: the share stays as it was, and what seemed gone has to be so anew."""
+        self._since = None
 
     def _settle(self, stamp: float, weight: float) -> None:
         """Average what hangs on the palm, and then decide what is counted from."""

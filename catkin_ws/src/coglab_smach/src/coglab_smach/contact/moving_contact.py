@@ -14,6 +14,8 @@ HOLD = 0.03
 """s for which one sample counts"""
 STILL = 0.02
 """rad/s; a joint faster than this is motion"""
+SLOW, GENTLE = 0.15, 1.0
+"""rad/s and rad/s^2 of the fastest joint"""
 SETTLED = 0.25
 """s of stillness before the residual is taken as that of a free arm"""
 
@@ -99,8 +101,15 @@ class MovingContact:
         return -float(np.linalg.lstsq(self._jacobian(position).T, residual, rcond=0.05)[0][2])
 
     def weight_before_motion(self) -> float | None:
-        """N on the palm in the last rest before the motion; None where none was seen, or the arm does not move."""
-        return self._free_weight if self._rest is None else None
+        """N on the palm in the last rest before the motion that goes on or was the last; None where none was seen."""
+        return self._free_weight
+
+    def slow(self) -> bool:
+        """Whether the arm moves so little that what is missing in its model's inertia is no force."""
+        residual = self.residual
+        if residual is None or float(np.max(np.abs(residual.velocity))) > SLOW:
+            return False
+        return float(np.max(np.abs(residual.acceleration))) < GENTLE
 
     def _follow_rest(self, residual: Residual) -> None:
         if float(np.max(np.abs(residual.velocity))) > STILL:

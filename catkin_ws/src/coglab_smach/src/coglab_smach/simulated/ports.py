@@ -285,7 +285,8 @@ class SimulatedHand:
             )
         duration = 0.8 * max(1.0, 400 / speed) if name == "open" else 0.8
         moving = self._move(name, duration, positions, False)
-        if name == "open" and not self._calibrating() and "hand" not in self.cell.faults.dead:
+        broken = "hand" in self.cell.faults.dead or name in self.cell.faults.refuse
+        if name == "open" and not self._calibrating() and not broken:
             self._at_work = (self.cell.clock.now(), duration, self.cell.hand_positions)
         return moving
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 from coglab_msgs.msg import ReasonCode
@@ -72,45 +73,56 @@ class WaitTaker(WaitStop):
     detector is armed for release.
 
     The goal is the person's hand, and that now comes to the object: an arm that still followed it would back away, and
-    one that is held would drag the hand along that it follows. So within the last ``give.touch_within`` m the reach
-    ends with a load of ``give.touch_share`` of the object's weight, up or down.
+    one that is held would drag the hand along that it follows. So within the last ``give.touch_within`` m, with the
+    hand within ``give.near`` m of the palm, the reach ends with a contact, and when the goal goes away from the arm
+    again by ``give.goal_leaves`` m: a person who waits does not do that, and the rest of the way is theirs.
     """
 
     def __init__(self, ctx: Context) -> None:
         super().__init__(ctx, "taker", ["object_entry", "delivery", "goal"])
 
     def _await_end(self, ud: Any) -> str:
-        arm, contact = self.ctx.arm, self.ctx.contact
-        within = float(self.ctx.config.get("give.touch_within", 0.05))
-        touch = float(self.ctx.config.get("give.touch_share", 0.8))
-        self._await_reach(lambda: self._reached() or self._comes_to_its_end(within))
-        self._leave_approach_profile()
-        release = ud.delivery["release"]
-        settings = {
-            "mass": float(ud.object_entry.get("mass", 0.0)),
-            "load_share": float(release.get("threshold", 0.5)),
-        }
-        limit = float(release.get("timeout", self.ctx.config.get("release_timeout", 8.0)))
-        self.await_pending(contact.arm("release", limit + self.left(), settings), "arming of the contact detector", 2.0)
-
-        def touched() -> bool:
-            self.check()
-            return abs(contact.share_gone() or 0.0) > touch
-
-        self._await_reach(lambda: touched() or self._reached())
+        contact, settings, release = self.ctx.contact, self._settings(ud), ud.delivery["release"]
+        self._await_reach(lambda: self._reached() or self._comes_to_its_end())
+        self.reason = self._await_taker(settings) if not self._reached() else ""
         self.ctx.journal.mark("motion_reached")
-        if arm.dmp_progress().state == "reached":  # it has to come to rest at the goal that it has latched
-            await_rest(self.ctx, touched)
-        else:
-            self.reason = f"touched on the way: {contact.share_gone() or 0.0:.1f} of the weight"
-        self.await_pending(arm.switch_controller("ptp"), "end of the reach by switching to 'ptp'", 3.0)
+        self._leave_approach_profile()
+        if not self.reason:  # it has to come to rest at the goal that it has latched
+            await_rest(self.ctx, self.check)
+        self.await_pending(self.ctx.arm.switch_controller("ptp"), "end of the reach by switching to 'ptp'", 3.0)
+        limit = float(release.get("timeout", self.ctx.config.get("release_timeout", 8.0)))
+        weight = {"mass": settings["mass"], "load_share": float(release.get("threshold", 0.5))}
+        # give_load begins in a moment, and ends it.
+        self.await_pending(contact.arm("release", limit + 5.0, weight), "arming of the contact detector", 2.0)
         return "succeeded"
 
-    def _comes_to_its_end(self, within: float) -> bool:
-        """Whether the second half of the reach has come to the last ``within`` m: its first news may not know the
-        goal."""
-        progress = self.ctx.arm.dmp_progress()
-        return progress.phase < 0.5 and 0.0 < progress.remaining_distance < within
+    def _await_taker(self, settings: dict[str, Any]) -> str:
+        """Until the reach has ended; or until the person has come, and then what tells that."""
+        contact, leaves = self.ctx.contact, float(self.ctx.config.get("give.goal_leaves", 0.02))
+        nearest = math.inf
+
+        def leaving() -> bool:
+            nonlocal nearest
+            distance = self.ctx.arm.dmp_progress().remaining_distance
+            nearest = min(nearest, distance)
+            return distance > nearest + leaves
+
+        self.await_pending(contact.arm("contact_in_motion", 10.0, settings), "arming of the contact detector", 2.0)
+        try:
+            self._await_reach(lambda: self._reached() or contact.event() is not None or leaving())
+        finally:
+            contact.disarm()
+        event = contact.event()
+        if event is not None:
+            return f"touched on the way: {event.message}"
+        return f"the hand came to within {nearest:.2f} m of its goal and is followed no more" if leaving() else ""
+
+    def _comes_to_its_end(self) -> bool:
+        within = float(self.ctx.config.get("give.touch_within", 0.05))
+        if not 0.0 < self.ctx.arm.dmp_progress().remaining_distance < within:
+            return False
+        distance = hand_from_palm(self)
+        return distance is not None and distance < float(self.ctx.config.get("give.near", 0.25))
 
 
 class GiveLoad(CoglabState):
