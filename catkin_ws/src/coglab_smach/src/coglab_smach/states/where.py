@@ -31,3 +31,9 @@ def seen_at(state: CoglabState, target: str) -> np.ndarray | None:
     except PortError:
         return None
     return np.array(seen.xyz) if seen.age <= OLDEST else None
+
+
+def hand_from_palm(state: CoglabState) -> float | None:
+    """m from the person's hand to the palm."""
+    person, palm = person_at(state), palm_at(state.ctx)
+    return None if person is None or palm is None else float(np.linalg.norm(person - palm))
