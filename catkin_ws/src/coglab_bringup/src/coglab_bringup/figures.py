@@ -152,7 +152,8 @@ def is_quoted(line: str) -> bool:
 
 def missed_besides(text: str) -> str:
     """One sentence that counts the missed rows of the page that README.md does not show; empty if there are none."""
-    not_measured, missed = [], Counter()
+    not_measured: list[str] = []
+    missed: Counter[str] = Counter()
     for line in text.splitlines():
         cells = cells_of(line)
         if cells and cells[3] == "**missed**" and not is_quoted(line):
