@@ -1,8 +1,10 @@
 #!/usr/bin/python3
 """A whole handover through the plain launch file: names, outcome, error, limits at every tick, bytes of the hand."""
 
+import re
 import sys
 import unittest
+import xmlrpc.client
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +19,7 @@ from coglab_bringup.interface import FRAMES, missing_names
 from coglab_bringup.trial_recorder import TrialRecorder
 from tf2_msgs.msg import TFMessage
 
+PAGE = Path(__file__).resolve().parents[4] / "docs" / "architecture.md"
 CMD = 2  # FRI state in which the arm follows our commands
 FLOAT32 = 5e-4  # rad/s, what rounding to float32 on the wire adds to a velocity (at 10 ms)
 
@@ -48,6 +51,17 @@ class Handover(unittest.TestCase):
         nodes = {node for _, names in publishers + subscribers + services for node in names}
         problems = missing_names(dict(master.getTopicTypes()), {name for name, _ in services}, nodes)
         self.assertEqual(problems, [])
+
+    def test_the_named_threads_of_the_robot_are_those_of_the_page(self):
+        """What `ps -T` shows of the running process, against the table of docs/architecture.md."""
+        table = PAGE.read_text(encoding="utf-8").split("Threads of `/robot`")[1].split("\n\nWith `arm:=ideal`")[0]
+        columns = [line.split("|")[2] for line in table.splitlines() if line.startswith("| ")]
+        documented = {name for column in columns for name in re.findall(r"`(\w+)`", column)}
+        node = xmlrpc.client.ServerProxy(rosgraph.Master("/handover_test").lookupNode("/robot"))
+        pid = node.getPid("/handover_test")[2]
+        running = {path.read_text().strip() for path in Path(f"/proc/{pid}/task").glob("*/comm")}
+        self.assertIn("fri", documented)
+        self.assertEqual(running - {"robot_node"}, documented)
 
     def test_frames_of_arm_hand_person_and_goal(self):
         for frame in FRAMES:

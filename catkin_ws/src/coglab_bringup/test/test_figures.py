@@ -33,8 +33,7 @@ def commit(top: Path, message: str) -> None:
         subprocess.run(git, check=True, capture_output=True, timeout=30)
 
 
-def test_the_page_has_definition_goal_value_peer_machine_date_and_commit(checkout, monkeypatch):
-    monkeypatch.setattr(figures, "QUOTED", ("one", "two"))
+def test_the_page_has_definition_goal_value_peer_machine_date_and_commit(checkout):
     figures.record(checkout, "one", [ROW, ROW | {"figure": "other", "ok": False}], False)
     text = figures.write_report(checkout).read_text()
     assert "Ten steps, none left out." in text and "./coglab bench one" in text
@@ -42,9 +41,44 @@ def test_the_page_has_definition_goal_value_peer_machine_date_and_commit(checkou
     assert "| one: other | 1.235 us | <= 2 | **missed** | KDL | 3 |" in text
     assert re.search(r"on \d{4}-\d\d-\d\d, commit [0-9a-f]{7}, on \d+ cores of ", text)
     assert "| two: all of its rows | not measured on this commit | as in the bench | **missed** | - | - |" in text
+
+
+def quoted_by(checkout: Path) -> str:
+    figures.write_report(checkout)
     readme = (checkout / "README.md").read_text()
-    assert readme.startswith("before\n") and readme.endswith("after\n") and "old" not in readme
-    assert r"| one: time of a \| step | 1.235 us" in readme and "| two: all of its rows | not measured" in readme
+    assert readme.startswith(f"before\n{figures.BEGIN}\n") and readme.endswith(f"{figures.END}\nafter\n")
+    assert "old" not in readme
+    return readme
+
+
+def test_the_readme_quotes_what_is_missed_and_the_latency_and_counts_the_rest(checkout, monkeypatch):
+    for name in ("fri", "grasp"):
+        (checkout / "catkin_ws" / "src" / "p" / "bench" / f"bench_{name}.py").write_text('"""Words."""\n')
+    commit(checkout, "benches")
+    monkeypatch.setattr(figures, "QUOTED", ("one", "fri"))
+    missed, empty = ROW | {"figure": r"late | \ ones", "ok": False}, ROW | {"figure": "gone", "value": None}
+    latency = ROW | {"figure": "answer latency, median", "goal": "<= 1.10"}
+    reported = ROW | {"figure": "answer latency, p99", "goal": "reported"}
+    figures.record(checkout, "one", [ROW, missed, empty], False)
+    figures.record(checkout, "fri", [latency, reported, ROW], False)
+    figures.record(checkout, "grasp", [ROW, missed, empty], False)
+    rows = [line for line in quoted_by(checkout).splitlines() if figures.cells_of(line)]
+    expected = [figures.line_of("fri", latency), figures.line_of("one", missed), figures.line_of("one", empty)]
+    assert rows == expected, "in the order of the page"
+    assert "rows of `grasp` 2; not measured on this commit: `mutants`, `two`. Every row: " in quoted_by(checkout)
+
+
+def test_no_missed_row_is_left_out_of_the_readme():
+    text = (TOP / "docs" / "figures.md").read_text(encoding="utf-8")
+    quoted = figures.quotation(text)
+    missed = [figures.cells_of(line) for line in text.splitlines() if "**missed**" in line]
+    assert missed and all(missed), "each is read as a row"
+    shown = [cells for cells in missed if any(figures.cells_of(line) == cells for line in quoted.splitlines())]
+    unmeasured = {cells[0].partition(":")[0] for cells in missed if cells not in shown and figures.ALL_ROWS in cells[0]}
+    counted = figures.missed_besides(text)
+    assert all(f"`{bench}`" in counted for bench in unmeasured)
+    rest = len(missed) - len(shown) - len(unmeasured)
+    assert sum(int(count) for count in re.findall(r"` (\d+)", counted)) == rest
 
 
 def test_a_value_that_is_missing_is_missed(checkout):
@@ -88,8 +122,8 @@ def test_the_page_knows_every_bench_and_the_readme_quotes_it():
     names = [*figures.find_benches(TOP / "catkin_ws" / "src"), "mutants"]
     assert re.findall(r"^## (\w+)$", text, flags=re.M) == sorted(names), "run ./coglab bench --report"
     readme = (TOP / "README.md").read_text(encoding="utf-8")
-    quoted = readme.partition(figures.BEGIN)[2].partition(figures.END)[0].strip().splitlines()
-    assert len(quoted) >= 3 and all(line in text.splitlines() for line in quoted)
+    assert figures.END in readme.partition(figures.BEGIN)[2]
+    assert figures.with_quotation(readme, figures.quotation(text)) == readme, "run ./coglab bench --report"
 
 
 # --- figures in documents -----------------------------------------------------------------------------------------

@@ -33,7 +33,6 @@ LONG: dict[str, str] = {
 MANY_METHODS = {
     "Plant": "one world: each method reads or sets one quantity of the one state that MuJoCo holds",
 }
-BUILT = ("catkin_ws/build", "catkin_ws/devel", "catkin_ws/install", ".coglab")
 
 
 def shown(path: Path) -> str:

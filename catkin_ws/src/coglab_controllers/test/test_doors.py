@@ -32,6 +32,18 @@ def test_plugins_know_no_ros_and_goals_know_no_plugin() -> None:
         assert "plugins" not in found[door], door
 
 
+def test_the_neutral_side_names_no_joint_of_an_arm() -> None:
+    """Names of joints come from the table of joint limits and the robot description."""
+    roots = (PACKAGE / "include", PACKAGE / "src", SOURCES / "coglab_rt" / "include")
+    found = [
+        f"{path.name}: {literal}"
+        for root in roots
+        for path in sorted(root.rglob("*.[hc]pp"))
+        for literal in re.findall(r'"[^"\n]*\blwr_[ae]\d[^"\n]*"', path.read_text(encoding="utf-8"))
+    ]
+    assert not found, found
+
+
 def test_no_two_doors_include_each_other() -> None:
     found = includes()
     pairs = {tuple(sorted((a, b))) for a in found for b in found[a] if a != b and a in found.get(b, set())}

@@ -1,7 +1,10 @@
 // The controller manager in virtual time: loading, switching, faults, limits; D4.10 Table 6.
 #include <atomic>
 #include <chrono>
+#include <stdexcept>
+#include <string>
 #include <thread>
+#include <utility>
 
 #include "coglab_controllers/manager/control_thread.hpp"
 #include "coglab_rt/joint_limits_table.hpp"
@@ -275,6 +278,22 @@ class Probe : public ctrl_more::FeedbackController {
  private:
   bool& ran_;
 };
+
+TEST(Manager, RefusesLimitsOfOtherJointsThanTheRobotDescriptionHas) {
+  coglab_rt::JointLimits limits =
+      coglab_rt::loadJointLimits(std::string(DESCRIPTION_DIR) + "/config/joint_limits.yaml");
+  std::swap(limits.names[1], limits.names[2]);
+  try {
+    readManagerSettings(YAML::Load("{" + kTypes + "}"),
+                        readText(std::string(DESCRIPTION_DIR) + "/urdf/lwr_ih2.urdf"), limits,
+                        false);
+    ADD_FAILURE() << "accepted";
+  } catch (const std::runtime_error& error) {
+    EXPECT_NE(std::string(error.what()).find("joint 2 from lwr_base_link is 'lwr_a2'"),
+              std::string::npos)
+        << error.what();
+  }
+}
 
 TEST(Manager, MotionAndItsFeedbackProfileBeginInTheSameCycle) {
   const coglab_rt::JointLimits limits =

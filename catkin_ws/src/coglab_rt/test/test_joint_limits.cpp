@@ -76,7 +76,10 @@ TEST(JointLimits, ErrorsNameFileLineAndField) {
             std::string::npos);
   EXPECT_NE(errorFor(replaced(original(), "jerk: [500.0", "jerk: [fast")).find("expected a number"),
             std::string::npos);
-  EXPECT_NE(errorFor(replaced(original(), "lwr_a2", "lwr_a9")).find("'lwr_a9': expected 'lwr_a2'"),
+  EXPECT_NE(errorFor(replaced(original(), "lwr_a2", "lwr_a1"))
+                .find("joints[1] = 'lwr_a1': expected a name that no other joint has"),
+            std::string::npos);
+  EXPECT_NE(errorFor(replaced(original(), "[lwr_a1, ", "[")).find("joints: expected the 7 names"),
             std::string::npos);
   EXPECT_NE(
       errorFor(replaced(original(), "  torque:", "  torq:")).find("default.torq: unknown field"),

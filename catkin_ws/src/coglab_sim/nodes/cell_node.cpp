@@ -77,23 +77,21 @@ class CellNode {
     int port = within(private_, "fri_port", 0);
     const double speed = within(private_, "speed", 1.0);
     const double rate = within(private_, "truth_rate", 200.0);
-    port_parameter_ =
-        portParameter(private_.param<std::string>("port_parameter", "lwr/fri_port_bound"));
+    port_parameter_ = portParameter(text("port_parameter", "lwr/fri_port_bound", "a name"));
     follow_port_ = port == 0;
     if (follow_port_) port = waitForPort(port_parameter_, within(private_, "port_wait", 60.0));
-    const auto host = private_.param<std::string>("fri_host", "127.0.0.1");
+    const auto host = text("fri_host", "127.0.0.1", "an IPv4 address");
     const int source_port = within(private_, "fri_source_port", 0);
     cell_ = std::make_unique<RealTimeCell>(config_, host, static_cast<std::uint16_t>(port), speed,
                                            static_cast<std::uint16_t>(source_port));
-    openLog(private_.param<std::string>("log_file", ""));
+    openLog(text("log_file", "", "a path"));
 
     truth_ = node_.advertise<coglab_msgs::CellTruth>("truth/cell", 1);
     motor_states_ = node_.advertise<coglab_msgs::MotorStates>("motor_states", 1);
     messages_ = private_.advertise<std_msgs::String>("messages", 50, true);
-    if (private_.param("tactile", false))
+    if (flag("tactile"))
       touch_ = node_.advertise<coglab_msgs::FingertipForces>("fingertip_forces", 1);
-    if (private_.param("publish_clock", false))
-      clock_ = node_.advertise<rosgraph_msgs::Clock>("/clock", 1);
+    if (flag("publish_clock")) clock_ = node_.advertise<rosgraph_msgs::Clock>("/clock", 1);
     const auto hints = ros::TransportHints().tcpNoDelay();
     human_ = node_.subscribe<coglab_msgs::HumanHand>(
         "human_hand", 1, [this](const coglab_msgs::HumanHand::ConstPtr& m) { onHuman(*m); },
@@ -126,6 +124,14 @@ class CellNode {
   }
 
  private:
+  std::string text(const char* name, const char* otherwise, const char* expected) const {
+    return coglab_rt::readParameter<std::string>(private_, name, otherwise, expected);
+  }
+
+  bool flag(const char* name) const {
+    return coglab_rt::readParameter(private_, name, false, "true or false");
+  }
+
   void openLog(const std::string& path) {
     if (path.empty()) return;
     log_.open(path);

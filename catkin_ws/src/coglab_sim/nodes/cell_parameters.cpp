@@ -1,51 +1,36 @@
 #include "cell_parameters.hpp"
 
 #include <ros/package.h>
-#include <ros/param.h>
 #include <yaml-cpp/yaml.h>
 
 #include <cmath>
 #include <stdexcept>
+#include <type_traits>
+
+#include "coglab_rt/ros/parameter.hpp"
 
 namespace coglab_sim {
 namespace {
 
-ParameterValue valueOf(const std::string& name, XmlRpc::XmlRpcValue& value) {
-  switch (value.getType()) {
-    case XmlRpc::XmlRpcValue::TypeBoolean:
-      return static_cast<bool>(value);
-    case XmlRpc::XmlRpcValue::TypeInt:
-      return static_cast<int>(value);
-    case XmlRpc::XmlRpcValue::TypeDouble:
-      return static_cast<double>(value);
-    case XmlRpc::XmlRpcValue::TypeString:
-      return static_cast<std::string>(value);
-    case XmlRpc::XmlRpcValue::TypeArray: {
-      std::vector<double> list;
-      for (int i = 0; i < value.size(); ++i) {
-        const ParameterValue entry = valueOf(name, value[i]);
-        if (const auto* number = std::get_if<double>(&entry)) {
-          list.push_back(*number);
-        } else if (const auto* whole = std::get_if<int>(&entry)) {
-          list.push_back(*whole);
-        } else {
-          throw std::invalid_argument("parameter " + name + ": expected a list of numbers");
-        }
-      }
-      return list;
-    }
-    default:
-      throw std::invalid_argument("parameter " + name +
-                                  " has a type that no parameter of the cell has");
-  }
+/// What a value is expected to be, in words.
+template <typename T>
+constexpr const char* expected() {
+  if constexpr (std::is_same_v<T, bool>) return "true or false";
+  if constexpr (std::is_same_v<T, std::string>) return "a text";
+  if constexpr (std::is_same_v<T, std::vector<double>>) return "a list of numbers";
+  return "a number";
 }
 
-/// Sets `name` of the table from `key` under the node, if it is there.
-void take(CellConfig& config, const ros::NodeHandle& node, const std::string& key,
-          const std::string& name) {
-  XmlRpc::XmlRpcValue value;
-  if (node.getParam(key, value))
-    setCellParameter(config, name, valueOf(node.resolveName(key), value));
+/// Sets a row of the table from the parameter `key` under the node, if it is there: as the type
+/// that the row has.
+void take(CellConfig& config, const ros::NodeHandle& node, const CellParameter& row,
+          const std::string& key) {
+  if (!node.hasParam(key)) return;
+  const auto read = [&](const auto& otherwise) -> ParameterValue {
+    using T = std::decay_t<decltype(otherwise)>;
+    return coglab_rt::readParameter<T>(node, key.c_str(), otherwise, expected<T>());
+  };
+  row.set(config, std::visit(read, row.get(config)));
 }
 
 double numberOf(const YAML::Node& entry, const char* field) {
@@ -61,20 +46,22 @@ CellConfig readCellConfig(const ros::NodeHandle& node) {
   CellConfig config;
   config.urdf = ros::package::getPath("lwr_description") + "/urdf/lwr_ih2.urdf";
   const ros::NodeHandle above;
-  take(config, above, "fri_period", "krc/period");
-  take(config, above, "seed", "seed");
-  config.object = readObject(node, node.param<std::string>("object/id", config.object.id));
+  config.object =
+      readObject(node, coglab_rt::readParameter(node, "object/id", config.object.id, "a name"));
   config.object_pose.position[2] = -config.object.center[2];  // held at the height of its middle
-  for (const CellParameter& parameter : cellParameters())
-    take(config, node, parameter.name, parameter.name);
+  for (const CellParameter& row : cellParameters()) {
+    if (row.name == "krc/period") take(config, above, row, "fri_period");
+    if (row.name == "seed") take(config, above, row, "seed");
+    take(config, node, row, row.name);
+  }
   return config;
 }
 
 plant::Object readObject(const ros::NodeHandle& node, const std::string& id) {
   if (id.find('/') != std::string::npos)
     throw std::invalid_argument("object id '" + id + "': expected the name of an object file");
-  const auto folder =
-      node.param<std::string>("objects", ros::package::getPath("coglab_objects") + "/objects");
+  const auto folder = coglab_rt::readParameter<std::string>(
+      node, "objects", ros::package::getPath("coglab_objects") + "/objects", "a path");
   const std::string path = folder + "/" + id + ".yaml";
   try {
     const YAML::Node entry = YAML::LoadFile(path);

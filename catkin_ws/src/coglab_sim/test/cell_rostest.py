@@ -220,6 +220,8 @@ class CellNode(unittest.TestCase):
             ("krc/period", 0.5, "krc/period = 0.5 is outside its range 0.001..0.1"),
             ("arm/unknown_load", -1.0, "arm/unknown_load = -1 is outside its range 0..10"),
             ("krc/convention", "nobody", "known: coglab, centro_epiaggio, stanford"),
+            ("tactile", "perhaps", "/tactile: expected true or false"),
+            ("object/size", [0.1, "wide", 0.1], "/object/size: expected a list of numbers"),
         ):
             node = f"bad_{name.replace('/', '_')}"
             rospy.set_param(f"/{node}/fri_port", 49999)

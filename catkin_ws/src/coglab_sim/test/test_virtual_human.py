@@ -9,7 +9,7 @@ from coglab_msgs.msg import Say
 from coglab_py.packages import package_path
 from coglab_py.pose import Pose
 from coglab_sim.conditions import CAREFUL, PATIENT, THE_WORLD_AS_IT_IS
-from coglab_sim.person.participant import BEHAVIOURS, HABITS, PROFILES, Participant, population
+from coglab_sim.person.participant import BEHAVIOURS, HABITS, PROFILES, Participant
 from coglab_sim.person.scene import Scene, WorldView, shipped
 from coglab_sim.person.virtual_human import VirtualHuman
 from person_stage import DT, PALM_TURN, Stage, give
@@ -314,9 +314,9 @@ def test_a_robot_that_gives_up_is_believed(code):
     assert heard == pytest.approx(stage.human.participant.hearing_delay, abs=2 * DT)
 
 
-def test_population_is_reproducible_and_varied():
-    people = population(20, 7)
-    assert people == population(20, 7)
+def test_people_are_reproducible_and_differ():
+    people = [Participant.draw(seed) for seed in range(20)]
+    assert people == [Participant.draw(seed) for seed in range(20)]
     assert len({p.reach_time for p in people}) == 20
 
 

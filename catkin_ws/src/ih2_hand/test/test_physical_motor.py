@@ -7,7 +7,7 @@ from ih2_hand.emulator.hand import EmulatedHand
 from ih2_hand.emulator.physical_motor import MotorState
 from ih2_hand.emulator.virtual_link import VirtualLink
 
-FREE, STALL, STROKE_S, DT = 40.0, 400.0, 1.0, 0.005
+FREE, STROKE_S, DT = 40.0, 1.0, 0.005
 
 
 class Physics:

@@ -4,6 +4,9 @@
 #include <cmath>
 #include <functional>
 #include <sstream>
+#include <stdexcept>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include "bridge_cell.hpp"
@@ -143,6 +146,19 @@ TEST(Bridge, RefusesParametersOutOfRangeByName) {
             << error.what() << " instead of " << expected.str();
       }
     }
+  }
+}
+
+TEST(Bridge, RefusesATableOfOtherJointsThanItsArmHas) {
+  BridgeConfig config = defaultConfig();
+  std::swap(config.limits.names[1], config.limits.names[2]);
+  try {
+    Bridge bridge(config);
+    ADD_FAILURE() << "accepted";
+  } catch (const std::invalid_argument& error) {
+    EXPECT_NE(std::string(error.what()).find("joints[1] = 'lwr_e1': expected 'lwr_a2'"),
+              std::string::npos)
+        << error.what();
   }
 }
 

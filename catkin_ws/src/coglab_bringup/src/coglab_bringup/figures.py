@@ -2,7 +2,8 @@
 
 A run of a bench leaves its rows in .coglab/figures/NAME.json, with machine, date and commit. `./coglab bench --report`
 writes the page from those files. A bench without a file of the sources as they are now was not measured: it is shown as
-missed, whatever an older file says. The lines of README.md between the two marks are taken from that page.
+missed, whatever an older file says. The lines of README.md between the two marks are taken from that page: what
+`is_quoted` says of the benches QUOTED, and below them in one line what is missed besides.
 """
 
 from __future__ import annotations
@@ -11,16 +12,19 @@ import ast
 import json
 import os
 import platform
+import re
 import subprocess
+from collections import Counter
 from datetime import UTC, datetime
 from pathlib import Path
 
 from coglab_bringup.arguments import find_benches
 
 NOT_MEASURED = "not measured on this commit"
+ALL_ROWS = "all of its rows"
 BEGIN, END = "<!-- quoted from docs/figures.md -->", "<!-- end of the quotation -->"
 QUOTED = ("wall", "fri", "trials")
-"""the benches whose rows README.md shows"""
+"""the benches of which README.md shows rows; of the others it says how many are missed"""
 HEAD = """# Figures
 
 Written by `./coglab bench --report`, from what `./coglab bench NAME ...` has measured on these sources; edit nothing
@@ -105,7 +109,7 @@ def lines_of(top: Path, name: str) -> list[str]:
     """The rows of a bench; a single one where it was not measured."""
     run = measured(top, name)
     if run is None:
-        return [f"| {name}: all of its rows | {NOT_MEASURED} | as in the bench | **missed** | - | - |"]
+        return [f"| {name}: {ALL_ROWS} | {NOT_MEASURED} | as in the bench | **missed** | - | - |"]
     return [line_of(name, row) for row in run["rows"]]
 
 
@@ -132,19 +136,55 @@ def page(top: Path) -> str:
     return "\n".join(parts)
 
 
-def quotation(text: str, lines: list[str]) -> str:
-    """A page whose part between the marks holds those lines of the table."""
-    before, begin, rest = text.partition(BEGIN)
+def cells_of(line: str) -> list[str]:
+    """The six cells of a row of this page; none for any other line."""
+    cells = [cell.strip() for cell in re.split(r"(?<!\\)\|", line)[1:-1]]
+    return cells if len(cells) == 6 and cells[3] in ("met", "**missed**") else []
+
+
+def is_quoted(line: str) -> bool:
+    """README.md shows of the benches QUOTED each row that is missed, and the latency over FRI wherever it is judged."""
+    cells = cells_of(line)
+    if not cells or cells[0].partition(": ")[0] not in QUOTED:
+        return False
+    return cells[3] == "**missed**" or (cells[0].startswith("fri: answer latency") and cells[2] != "reported")
+
+
+def missed_besides(text: str) -> str:
+    """One sentence that counts the missed rows of the page that README.md does not show; empty if there are none."""
+    not_measured: list[str] = []
+    missed: Counter[str] = Counter()
+    for line in text.splitlines():
+        cells = cells_of(line)
+        if cells and cells[3] == "**missed**" and not is_quoted(line):
+            bench = cells[0].partition(": ")[0]
+            if cells[0] == f"{bench}: {ALL_ROWS}":
+                not_measured.append(bench)
+            else:
+                missed[bench] += 1
+    counts = [f"`{bench}` {count}" for bench, count in sorted(missed.items())]
+    parts = ["rows of " + ", ".join(counts)] if counts else []
+    parts += [f"{NOT_MEASURED}: " + ", ".join(f"`{bench}`" for bench in not_measured)] if not_measured else []
+    return f"**Missed besides:** {'; '.join(parts)}. Every row: [docs/figures.md](docs/figures.md)." if parts else ""
+
+
+def quotation(text: str) -> str:
+    """What README.md says of a page of figures, between its two marks."""
+    table = "\n".join([TABLE, *(line for line in text.splitlines() if is_quoted(line))])
+    return "\n\n".join(part for part in (table, missed_besides(text)) if part)
+
+
+def with_quotation(readme: str, quoted: str) -> str:
+    """A page whose part between the marks is `quoted`; without the marks as it was."""
+    before, begin, rest = readme.partition(BEGIN)
     _, end, after = rest.partition(END)
-    if not begin or not end:
-        return text
-    return "\n".join([before + begin, TABLE, *lines, end]) + after
+    return f"{before}{begin}\n{quoted}\n{end}{after}" if begin and end else readme
 
 
 def write_report(top: Path) -> Path:
-    """Writes docs/figures.md, and the rows that README.md quotes."""
+    """Writes docs/figures.md, and what README.md quotes of it."""
     target, readme = top / "docs" / "figures.md", top / "README.md"
-    target.write_text(page(top), encoding="utf-8")
-    quoted = [line for name in QUOTED for line in lines_of(top, name)]
-    readme.write_text(quotation(readme.read_text(encoding="utf-8"), quoted), encoding="utf-8")
+    text = page(top)
+    target.write_text(text, encoding="utf-8")
+    readme.write_text(with_quotation(readme.read_text(encoding="utf-8"), quotation(text)), encoding="utf-8")
     return target

@@ -7,10 +7,8 @@
 #include <utility>
 #include <vector>
 
-#include <ros/package.h>
-
 #include "coglab_rt/clock.hpp"
-#include "coglab_rt/joint_limits_table.hpp"
+#include "coglab_rt/ros/joint_limits_parameter.hpp"
 #include "coglab_rt/ros/parameter.hpp"
 #include "coglab_rt/ros/ros_time.hpp"
 
@@ -51,18 +49,7 @@ bool sameState(const IdealArmView& one, const IdealArmView& other) {
 
 IdealArmConfig readIdealArmConfig(const ros::NodeHandle& node) {
   IdealArmConfig config;
-  auto table = readParameter<std::string>(node, "limits_file", "", "a path");
-  if (table.empty()) {
-    const std::string package = ros::package::getPath("lwr_description");
-    if (package.empty()) {
-      throw std::runtime_error(
-          "package lwr_description is not found; build and source the workspace or set " +
-          node.resolveName("limits_file"));
-    }
-    table = package + "/config/joint_limits.yaml";
-  }
-  config.limits = coglab_rt::loadJointLimits(
-      table, readParameter<std::string>(node, "limits_profile", "default", "a name"));
+  config.limits = coglab_rt::readJointLimits(node, "limits_file", "limits_profile");
   config.period = readParameter<double>(node, "ideal_period", config.period, "a number");
   config.command_timeout =
       readParameter<double>(node, "command_timeout", config.command_timeout, "a number");
@@ -85,7 +72,8 @@ IdealArmRos::IdealArmRos(const ros::NodeHandle& node)
   priority_ = static_cast<int>(readNumber(node_, "rt_priority", 80, 0, 98));
   const double rate = readNumber(node_, "joint_states_rate", 200.0, 1.0, 1000.0);
   publish_period_ = std::max(1.0 / rate, arm_.config().period);
-  for (const char* name : coglab_rt::kJointNames) joint_message_.name.emplace_back(name);
+  const auto& names = arm_.config().limits.names;
+  joint_message_.name.assign(names.begin(), names.end());
 }
 
 IdealArmRos::~IdealArmRos() { shutdown(); }

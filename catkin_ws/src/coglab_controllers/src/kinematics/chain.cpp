@@ -27,7 +27,7 @@ Matrix3 zTo(const Vector3& axis) { return shortestTurn(Vector3::UnitZ(), axis).t
 }  // namespace
 
 Chain::Chain(const std::string& urdf, const std::string& base_link, const std::string& tip_link)
-    : base_link_(base_link), tip_link_(tip_link) {
+    : base_link_(base_link) {
   KDL::Tree tree;
   if (!kdl_parser::treeFromString(urdf, tree)) {
     throw std::invalid_argument("expected a URDF with one tree of links, got text of " +

@@ -355,12 +355,6 @@ MotionController* ControllerManager::motion(const std::string& id) {
   return found != nullptr ? found->controller.get() : nullptr;
 }
 
-std::string ControllerManager::typeOf(const std::string& id) const {
-  const std::lock_guard<std::mutex> lock(table_);
-  const LoadedMotion* const found = find(id);
-  return found != nullptr ? found->type : "";
-}
-
 CycleReport ControllerManager::report() const {
   const std::lock_guard<std::mutex> lock(report_mutex_);
   const_cast<ControlCycle&>(cycle_).readReport(report_);

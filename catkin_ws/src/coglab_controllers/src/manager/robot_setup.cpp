@@ -1,8 +1,27 @@
 #include "coglab_controllers/manager/robot_setup.hpp"
 
 #include <stdexcept>
+#include <string>
+#include <vector>
 
 namespace coglab_controllers {
+
+namespace {
+
+/// Limits count for the joints of the chain in their order. @throws std::runtime_error otherwise
+void requireJointsOf(const Chain& chain, const coglab_rt::JointLimits& table) {
+  const std::vector<std::string>& names = chain.jointNames();
+  for (std::size_t joint = 0; joint < names.size(); ++joint) {
+    if (joint < table.names.size() && names[joint] == table.names[joint]) continue;
+    throw std::runtime_error(
+        "joint " + std::to_string(joint + 1) + " from " + chain.baseLink() + " is '" +
+        names[joint] + "' in the robot description, '" +
+        (joint < table.names.size() ? table.names[joint] : "") +
+        "' in the table of joint limits; name the same joints in the same order in both");
+  }
+}
+
+}  // namespace
 
 std::shared_ptr<const RobotSetup> makeRobotSetup(const std::string& urdf,
                                                  const coglab_rt::JointLimits& table,
@@ -47,6 +66,7 @@ std::shared_ptr<const RobotSetup> makeRobotSetup(const std::string& urdf,
 
   const Chain chain(urdf, parameters.text("base_link", "lwr_base_link"),
                     parameters.text("tool_link", "ih2_palm"));
+  requireJointsOf(chain, table);
   const Chain to_wrench(urdf, chain.baseLink(), parameters.text("wrench_link", "ih2_palm"));
   const JointVector zero = JointVector::Zero();
   const Quaternion tool_from_wrench =

@@ -17,7 +17,8 @@ Answer readJoints(const std::vector<double>& values, const char* field,
   std::ostringstream why;
   if (values.size() != static_cast<std::size_t>(kMaxJoints)) {
     why << field << " has " << values.size() << " numbers; expected " << kMaxJoints
-        << ", in wire order lwr_a1 lwr_a2 lwr_e1 lwr_a3 lwr_a4 lwr_a5 lwr_a6";
+        << ", in the order";
+    for (const std::string& name : names) why << " " << name;
     return Answer::invalid(why.str());
   }
   for (int joint = 0; joint < kMaxJoints; ++joint) {

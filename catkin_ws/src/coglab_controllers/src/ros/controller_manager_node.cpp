@@ -16,6 +16,7 @@
 #include "coglab_controllers/ros/ros_parameters.hpp"
 #include "coglab_rt/ros/exit_limit.hpp"
 #include "coglab_rt/ros/logger_service.hpp"
+#include "coglab_rt/ros/parameter.hpp"
 
 namespace {
 volatile std::sig_atomic_t asked_to_end = 0;
@@ -27,7 +28,8 @@ int main(int argc, char** argv) {
   std::signal(SIGINT, onSignal);
   std::signal(SIGTERM, onSignal);
   try {
-    ros::NodeHandle robot(ros::param::param<std::string>("~lwr_namespace", "lwr"));
+    ros::NodeHandle robot(coglab_rt::readParameter<std::string>(ros::NodeHandle("~"),
+                                                                "arm_namespace", "lwr", "a name"));
     coglab_rt::LoggerServices logger_services;
     ros::CallbackQueue queue;  // one thread: the writer of the samples
     robot.setCallbackQueue(&queue);
@@ -41,7 +43,8 @@ int main(int argc, char** argv) {
     coglab_controllers::ManagerRos::Options options;
     options.publish_target = false;
     // Both may run on one computer, and the answers to the robot come first.
-    options.highest_priority = std::max(0, robot.param("rt_priority", 80) - 1);
+    options.highest_priority =
+        std::max(0, coglab_rt::readParameter(robot, "rt_priority", 80, "a whole number") - 1);
     options.thread.after_cycle = [&](const coglab_controllers::VelocityCommand& command) {
       // Without an active controller others may use the topic.
       const auto* manager = ready.load(std::memory_order_acquire);

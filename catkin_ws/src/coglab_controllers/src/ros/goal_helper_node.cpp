@@ -8,10 +8,11 @@
 
 #include "coglab_controllers/goal/goal_relay.hpp"
 #include "coglab_controllers/kinematics/rotation.hpp"
-#include "coglab_controllers/ros/ros_parameters.hpp"
+#include "coglab_controllers/manager/parameters.hpp"
 #include "coglab_controllers/ros/tf_goal_source.hpp"
 #include "coglab_msgs/DmpGoal.h"
 #include "coglab_rt/ros/logger_service.hpp"
+#include "coglab_rt/ros/parameter_tree.hpp"
 
 namespace coglab_controllers {
 
@@ -23,7 +24,7 @@ class GoalHelper {
   /// @param node of the topic's name, which is relative to it  @param own the node's parameters
   GoalHelper(const ros::NodeHandle& node, const ros::NodeHandle& own)
       : node_(node), listener_(buffer_) {
-    const Parameters parameters(readParameters(own), "goal_helper");
+    const Parameters parameters(coglab_rt::readParameterTree(own), "goal_helper");
     frame_ = parameters.text("frame", "human_hand");
     dmp_frame_ = parameters.text("dmp_frame_name", "lwr_base_link");
     offset_ = parameters.numbers("offset", Eigen::VectorXd::Zero(3));

@@ -10,6 +10,7 @@
 #include "coglab_controllers/ros/authored_controller_ros.hpp"
 #include "coglab_controllers/ros/ros_parameters.hpp"
 #include "coglab_msgs/ControllerStatus.h"
+#include "coglab_rt/ros/parameter.hpp"
 
 namespace coglab_controllers {
 
@@ -43,7 +44,8 @@ ManagerRos::ManagerRos(const ros::NodeHandle& node, coglab_rt::ArmMailboxes& mai
   logger_->startDraining();
   ManagerSettings settings = readManagerSettings(node_);
   settings.logger = logger_.get();
-  options_.thread.priority = node_.param("priority", options_.thread.priority);
+  options_.thread.priority =
+      coglab_rt::readParameter(node_, "priority", options_.thread.priority, "a whole number");
   if (options_.thread.priority > options_.highest_priority) {
     ROS_WARN(
         "controller_manager: priority %d is kept to %d, below that of the FRI thread "

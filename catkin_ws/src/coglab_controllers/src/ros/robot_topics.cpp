@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <iterator>
 #include <string>
 #include <utility>
 #include <vector>
@@ -13,18 +12,12 @@
 
 namespace coglab_controllers {
 
-namespace {
-
 using coglab_rt::Vector7;
 
-const std::vector<std::string> kJoints(std::begin(coglab_rt::kJointNames),
-                                       std::end(coglab_rt::kJointNames));
-
-/// Sorts values into wire order. False if a joint is missing or a value is not finite.
-bool inWireOrder(const std::vector<std::string>& names, const std::vector<double>& values,
-                 Vector7& out) {
-  for (std::size_t joint = 0; joint < kJoints.size(); ++joint) {
-    const auto found = std::find(names.begin(), names.end(), kJoints[joint]);
+bool RobotTopics::inOrder(const std::vector<std::string>& names, const std::vector<double>& values,
+                          Vector7& out) const {
+  for (std::size_t joint = 0; joint < names_.size(); ++joint) {
+    const auto found = std::find(names.begin(), names.end(), names_[joint]);
     const std::size_t at = static_cast<std::size_t>(found - names.begin());
     if (found == names.end() || at >= values.size() || !std::isfinite(values[at])) return false;
     out[static_cast<int>(joint)] = values[at];
@@ -32,15 +25,16 @@ bool inWireOrder(const std::vector<std::string>& names, const std::vector<double
   return true;
 }
 
-}  // namespace
-
 RobotTopics::RobotTopics(const ros::NodeHandle& node, const coglab_rt::JointLimits& limits,
                          std::function<void()> sample_written)
-    : node_(node), sample_written_(std::move(sample_written)), set_point_(limits) {
+    : node_(node),
+      sample_written_(std::move(sample_written)),
+      names_(limits.names),
+      set_point_(limits) {
   sample_.stop_rounding = 2.0 * coglab_rt::kWireRounding;
   target_ = node_.advertise<sensor_msgs::JointState>("target_joint_states", 5);
-  target_message_.name = kJoints;
-  target_message_.velocity.resize(kJoints.size());
+  target_message_.name.assign(names_.begin(), names_.end());
+  target_message_.velocity.resize(names_.size());
   const auto hints = ros::TransportHints().tcpNoDelay();
   state_ = node_.subscribe("state", 10, &RobotTopics::onState, this, hints);
   torques_ = node_.subscribe("external_torques", 1, &RobotTopics::onTorques, this, hints);
@@ -53,16 +47,16 @@ void RobotTopics::onJoints(const sensor_msgs::JointState& joints) {
   const std::int64_t ahead = -coglab_rt::ageOf(joints.header.stamp);
   // One stamp from the future would make all that follow look old.
   if (stamp <= last_stamp_ns_ || ahead > coglab_rt::kFutureAllowance_ns ||
-      !inWireOrder(joints.name, joints.position, sample_.position)) {
+      !inOrder(joints.name, joints.position, sample_.position)) {
     ROS_WARN_THROTTLE(
         1.0,
         "joint_states refused: expected a stamp newer than the last one and not ahead of the "
         "clock, and finite positions of %zu arm joints",
-        kJoints.size());
+        names_.size());
     return;
   }
-  if (!inWireOrder(joints.name, joints.velocity, sample_.velocity)) sample_.velocity.setZero();
-  if (!inWireOrder(joints.name, joints.effort, sample_.torque)) sample_.torque.setZero();
+  if (!inOrder(joints.name, joints.velocity, sample_.velocity)) sample_.velocity.setZero();
+  if (!inOrder(joints.name, joints.effort, sample_.torque)) sample_.torque.setZero();
   // True spacing of the measurements, smoothed: topics jitter.
   const double passed = 1e-9 * static_cast<double>(stamp - last_stamp_ns_);
   if (last_stamp_ns_ != 0 && passed < 0.5) {
@@ -93,7 +87,7 @@ void RobotTopics::onState(const coglab_msgs::LwrState& state) {
 }
 
 void RobotTopics::onTorques(const sensor_msgs::JointState& torques) {
-  inWireOrder(torques.name, torques.effort, sample_.external_torque);
+  inOrder(torques.name, torques.effort, sample_.external_torque);
 }
 
 void RobotTopics::onWrench(const geometry_msgs::WrenchStamped& wrench) {

@@ -1,5 +1,4 @@
 #include "coglab_controllers/ros/ros_parameters.hpp"
-#include "coglab_rt/joint_limits_table.hpp"
 
 #include <filesystem>
 #include <fstream>
@@ -7,35 +6,13 @@
 #include <stdexcept>
 
 #include <ros/package.h>
-#include <xmlrpcpp/XmlRpcValue.h>
+
+#include "coglab_rt/ros/joint_limits_parameter.hpp"
+#include "coglab_rt/ros/parameter_tree.hpp"
 
 namespace coglab_controllers {
 
 namespace {
-
-YAML::Node convert(XmlRpc::XmlRpcValue& value) {
-  YAML::Node node;
-  switch (value.getType()) {
-    case XmlRpc::XmlRpcValue::TypeBoolean:
-      return YAML::Node(static_cast<bool>(value));
-    case XmlRpc::XmlRpcValue::TypeInt:
-      return YAML::Node(static_cast<int>(value));
-    case XmlRpc::XmlRpcValue::TypeDouble:
-      return YAML::Node(static_cast<double>(value));
-    case XmlRpc::XmlRpcValue::TypeString:
-      return YAML::Node(static_cast<std::string>(value));
-    case XmlRpc::XmlRpcValue::TypeArray:
-      node = YAML::Node(YAML::NodeType::Sequence);
-      for (int i = 0; i < value.size(); ++i) node.push_back(convert(value[i]));
-      return node;
-    case XmlRpc::XmlRpcValue::TypeStruct:
-      node = YAML::Node(YAML::NodeType::Map);
-      for (auto& entry : value) node[entry.first] = convert(entry.second);
-      return node;
-    default:
-      return node;
-  }
-}
 
 std::string readFile(const std::string& path) {
   std::ifstream file(path);
@@ -71,24 +48,12 @@ std::string robotModel(const ros::NodeHandle& node, const Parameters& parameters
 
 }  // namespace
 
-YAML::Node readParameters(const ros::NodeHandle& node) {
-  XmlRpc::XmlRpcValue value;
-  if (!node.getParam("", value) && !node.getParam(node.getNamespace(), value)) {
-    return YAML::Node(YAML::NodeType::Map);
-  }
-  return value.getType() == XmlRpc::XmlRpcValue::TypeStruct ? convert(value)
-                                                            : YAML::Node(YAML::NodeType::Map);
-}
-
 coglab_rt::JointLimits readJointLimits(const ros::NodeHandle& node) {
-  const Parameters parameters(readParameters(node), "controller_manager");
-  const std::string table = parameters.text(
-      "joint_limits_file", ros::package::getPath("lwr_description") + "/config/joint_limits.yaml");
-  return coglab_rt::loadJointLimits(table, parameters.text("joint_limits_profile", "default"));
+  return coglab_rt::readJointLimits(node, "joint_limits_file", "joint_limits_profile");
 }
 
 ManagerSettings readManagerSettings(const ros::NodeHandle& node) {
-  const YAML::Node tree = readParameters(node);
+  const YAML::Node tree = coglab_rt::readParameterTree(node);
   const Parameters parameters(tree, "controller_manager");
   ManagerSettings settings =
       readManagerSettings(tree, robotModel(node, parameters), readJointLimits(node), false);

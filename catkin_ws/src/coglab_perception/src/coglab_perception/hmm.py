@@ -145,7 +145,6 @@ class HmmFilter:
         self.model = model
         self.log_likelihood = 0.0
         self.frames = 0
-        self.last_increment = 0.0
         self._belief = np.zeros(model.states)
         self._belief[0] = 1.0
 
@@ -165,7 +164,6 @@ class HmmFilter:
         increment = top + float(np.log(total.sum()))
         self._belief = total / total.sum()
         self.log_likelihood += increment
-        self.last_increment = increment
         self.frames += 1
         return increment
 

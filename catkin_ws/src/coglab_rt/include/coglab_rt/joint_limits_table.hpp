@@ -3,6 +3,8 @@
 /// real-time threads.
 #pragma once
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <stdexcept>
 #include <string>
@@ -85,7 +87,7 @@ inline void readLimitProfile(const std::string& path, const YAML::Node& root,
   }
 }
 
-/// The table as YAML, with the names of the joints checked.
+/// The table as YAML.
 inline YAML::Node openLimitsTable(const std::string& path) {
   YAML::Node root;
   try {
@@ -99,19 +101,25 @@ inline YAML::Node openLimitsTable(const std::string& path) {
   }
   if (!root.IsMap())
     failTable(path, root.Mark(), "expected a map with 'joints', 'default' and profiles");
+  return root;
+}
+
+/// The names of the joints; whether they are those of its arm, a back end has to see.
+inline std::array<std::string, 7> jointNames(const std::string& path, const YAML::Node& root) {
   const YAML::Node joints = root["joints"];
-  if (!joints || !joints.IsSequence() || joints.size() != 7) {
-    failTable(path, root.Mark(), "joints: expected the 7 names in wire order");
-  }
+  if (!joints || !joints.IsSequence() || joints.size() != 7)
+    failTable(path, root.Mark(), "joints: expected the 7 names in the order of the arm");
+  std::array<std::string, 7> names;
   for (std::size_t i = 0; i < 7; ++i) {
     const auto name = joints[i].as<std::string>("");
-    if (name != kJointNames[i]) {
-      failTable(
-          path, joints[i].Mark(),
-          "joints[" + std::to_string(i) + "] = '" + name + "': expected '" + kJointNames[i] + "'");
+    if (name.empty() || std::count(names.begin(), names.end(), name) != 0) {
+      failTable(path, joints[i].Mark(),
+                "joints[" + std::to_string(i) + "] = '" + name +
+                    "': expected a name that no other joint has");
     }
+    names[i] = name;
   }
-  return root;
+  return names;
 }
 
 /// Share by which the servos pass the speed that they are told; 0 if the table does not say.
@@ -138,6 +146,7 @@ inline JointLimits loadJointLimits(const std::string& path,
                                    const std::string& profile = "default") {
   const YAML::Node root = detail::openLimitsTable(path);
   JointLimits limits;
+  limits.names = detail::jointNames(path, root);
   detail::readLimitProfile(path, root, "default", limits);
   if (profile != "default") detail::readLimitProfile(path, root, profile, limits);
   const YAML::Node margin = root["position_margin"];
@@ -148,9 +157,9 @@ inline JointLimits loadJointLimits(const std::string& path,
   }
   for (int i = 0; i < 7; ++i) {
     if (limits.lower_position[i] >= limits.upper_position[i]) {
-      detail::failTable(
-          path, root.Mark(),
-          std::string(kJointNames[i]) + ": lower_position must be below upper_position");
+      detail::failTable(path, root.Mark(),
+                        limits.names[static_cast<std::size_t>(i)] +
+                            ": lower_position must be below upper_position");
     }
   }
   limits.velocity /= 1.0 + detail::servoOvershoot(path, root);

@@ -9,14 +9,10 @@
 
 namespace coglab_rt {
 
-/// Joint-space vector in the arm's order, from base to flange: see kJointNames.
+/// Joint-space vector in the arm's order, from base to flange: see JointLimits::names.
 using Vector7 = Eigen::Matrix<double, 7, 1>;
 /// Force (N) and torque (Nm): Fx Fy Fz Tx Ty Tz.
 using Vector6 = Eigen::Matrix<double, 6, 1>;
-
-/// Names of the joints in the order of all joint-space vectors.
-constexpr const char* kJointNames[7] = {"lwr_a1", "lwr_a2", "lwr_e1", "lwr_a3",
-                                        "lwr_a4", "lwr_a5", "lwr_a6"};
 
 /// Why motion is not allowed at the moment; the words are in `describe()`.
 enum class MotionBlock : std::uint8_t {

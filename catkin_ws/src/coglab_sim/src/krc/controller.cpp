@@ -343,11 +343,4 @@ void Controller::restartProgram(double period, double pause) {
   opens_at_ = time_ + pause;
 }
 
-void Controller::setOperatingMode(OperatingMode mode) {
-  if (mode == parameters_.mode) return;
-  // Turning the key switch stops a running program's motion.
-  if (state_ == FriState::Command) leaveCommandMode("operating mode changed");
-  parameters_.mode = mode;
-}
-
 }  // namespace coglab_sim::krc

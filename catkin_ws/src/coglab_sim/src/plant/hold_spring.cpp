@@ -3,11 +3,9 @@
 #include <algorithm>
 
 namespace coglab_sim::plant {
-namespace {}
 
 Wrench HoldSpring::evaluate(const Pose& hand, const Twist& hand_twist, const FreeBody& body,
                             const HoldFigures& figures, double share) {
-  slipping_ = false;
   Wrench wrench;
   if (!engaged_ || share <= 0.0) return wrench;
   const double w = figures.bandwidth;
@@ -18,7 +16,6 @@ Wrench HoldSpring::evaluate(const Pose& hand, const Twist& hand_twist, const Fre
   const Vector3d spring = body.mass * w * w * stretch + weight;
   Vector3d force = share * (spring + 2.0 * w * body.mass * (speed - body.twist.linear));
   if (const double size = force.norm(); size > figures.force) {
-    slipping_ = true;
     force *= figures.force / size;
     // The place follows so far that the spring alone carries what the limit can.
     const double carried = share * spring.norm();
@@ -32,7 +29,6 @@ Wrench HoldSpring::evaluate(const Pose& hand, const Twist& hand_twist, const Fre
   const Vector3d twisting = w * w * body.inertia.cwiseProduct(turn);
   Vector3d torque = share * (twisting + 2.0 * w * body.inertia.cwiseProduct(spin));
   if (const double size = torque.norm(); size > figures.torque) {
-    slipping_ = true;
     torque *= figures.torque / size;
     const double carried = share * twisting.norm();
     if (carried > figures.torque) {

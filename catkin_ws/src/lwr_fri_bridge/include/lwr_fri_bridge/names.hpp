@@ -1,5 +1,5 @@
 /// @file
-/// The names of coglab_rt in which this package is written.
+/// The names of coglab_rt in which this package is written, and those of the joints.
 #pragma once
 
 #include "coglab_rt/arm_port.hpp"
@@ -22,7 +22,6 @@ using coglab_rt::EventRing;
 using coglab_rt::Interpolator;
 using coglab_rt::JointLimits;
 using coglab_rt::kFutureAllowance_ns;
-using coglab_rt::kJointNames;
 using coglab_rt::LossBudget;
 using coglab_rt::MotionBlock;
 using coglab_rt::planVelocity;
@@ -33,5 +32,9 @@ using coglab_rt::TripleBuffer;
 using coglab_rt::Vector6;
 using coglab_rt::Vector7;
 using coglab_rt::VelocityCommand;
+
+/// Names of the joints in the order of FRI.
+constexpr const char* kJointNames[7] = {"lwr_a1", "lwr_a2", "lwr_e1", "lwr_a3",
+                                        "lwr_a4", "lwr_a5", "lwr_a6"};
 
 }  // namespace lwr_fri_bridge

@@ -2,6 +2,7 @@
 
 #include <sstream>
 #include <stdexcept>
+#include <string>
 
 namespace lwr_fri_bridge {
 
@@ -29,6 +30,12 @@ void BridgeConfig::check() const {
   checkParameter("stop_timeout", requests.stop_timeout, 0.1, 30.0);
   checkParameter("silent_stop_timeout", requests.silent_stop_timeout, 0.1, 30.0);
   for (int i = 0; i < 7; ++i) {
+    const std::string& joint = limits.names[static_cast<std::size_t>(i)];
+    if (joint != kJointNames[i]) {
+      throw std::invalid_argument("joint limits: joints[" + std::to_string(i) + "] = '" + joint +
+                                  "': expected '" + kJointNames[i] +
+                                  "', the order of FRI; correct the table that limits_file names");
+    }
     const double room = limits.upper_position[i] - limits.lower_position[i];
     checkParameter("position_margin (twice, within the range of a joint)", 2.0 * position_margin,
                    0.0, room);

@@ -1,9 +1,7 @@
 #include <cmath>
 #include <stdexcept>
 
-#include <ros/package.h>
-
-#include "coglab_rt/joint_limits_table.hpp"
+#include "coglab_rt/ros/joint_limits_parameter.hpp"
 #include "coglab_rt/ros/parameter.hpp"
 #include "lwr_fri_bridge/ros/bridge_ros.hpp"
 
@@ -26,18 +24,7 @@ int wholeParameter(const ros::NodeHandle& nh, const char* name, int otherwise, i
 
 BridgeConfig readBridgeConfig(const ros::NodeHandle& nh) {
   BridgeConfig config;
-  auto limits_file = readParameter<std::string>(nh, "limits_file", "", "a path");
-  if (limits_file.empty()) {
-    const std::string package = ros::package::getPath("lwr_description");
-    if (package.empty()) {
-      throw std::runtime_error(
-          "package lwr_description is not found; build and source the workspace or set " +
-          nh.resolveName("limits_file"));
-    }
-    limits_file = package + "/config/joint_limits.yaml";
-  }
-  config.limits = coglab_rt::loadJointLimits(
-      limits_file, readParameter<std::string>(nh, "limits_profile", "default", "a name"));
+  config.limits = coglab_rt::readJointLimits(nh, "limits_file", "limits_profile");
   config.krl_convention = fri::krlConventionFromName(
       readParameter<std::string>(nh, "krl_convention", "coglab", "a name"));
   config.tool_number = readParameter<int>(nh, "tool_number", config.tool_number, "a whole number");

@@ -11,7 +11,7 @@ import hmac
 import secrets
 import time
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 CSRF_HEADER = "X-CogLab-Console"
 MAX_SESSIONS = 32
@@ -55,8 +55,6 @@ class Session:
     requests: TokenBucket
     stops: TokenBucket
     sockets: int = 0
-    last_socket: float = field(default=-1e9)
-    """when its last WebSocket closed, s of the steady clock"""
 
 
 def allowed_hosts(address: str, port: int, more: Iterable[str] = ()) -> tuple[str, ...]:

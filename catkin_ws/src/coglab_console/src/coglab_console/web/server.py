@@ -203,7 +203,6 @@ class ConsoleServer:
                 sender.cancel()
                 await asyncio.gather(sender, return_exceptions=True)
             session.sockets -= 1
-            session.last_socket = asyncio.get_running_loop().time()
             self.desk.released(session.name)
             if not session.sockets:
                 self.desk.disconnected(session.name)

@@ -17,8 +17,6 @@ class CanonicalSystem {
   double alpha() const noexcept { return alpha_; }
   /// Phase after `dt` seconds at time constant `tau` (s).
   double advance(double s, double dt, double tau) const noexcept;
-  /// Phase at `t` seconds after the start.
-  double phaseAt(double t, double tau) const noexcept { return advance(1.0, t, tau); }
   /// Seconds after the start at which the phase is s (s > 0).
   double timeAt(double s, double tau) const noexcept;
 

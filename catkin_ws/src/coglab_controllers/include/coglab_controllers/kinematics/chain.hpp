@@ -38,7 +38,6 @@ class Chain {
   int joints() const noexcept { return joints_; }
   const std::vector<std::string>& jointNames() const noexcept { return joint_names_; }
   const std::string& baseLink() const noexcept { return base_link_; }
-  const std::string& tipLink() const noexcept { return tip_link_; }
 
   /// Index of the joint whose origin is the elbow: the middle of the arm (3 of 7, 2 of 6).
   int elbowJoint() const noexcept { return joints_ == 7 ? 3 : 2; }
@@ -78,7 +77,7 @@ class Chain {
   double reach_ = 0.0;
   std::array<Link, kMaxJoints> links_;
   Link tool_;
-  std::string base_link_, tip_link_;
+  std::string base_link_;
   std::vector<std::string> joint_names_;
   std::shared_ptr<const KDL::Chain> kdl_;
 };

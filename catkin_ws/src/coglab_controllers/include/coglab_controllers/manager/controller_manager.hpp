@@ -112,8 +112,6 @@ class ControllerManager : public MotionHost {
 
   /// A loaded motion controller; null if the id is unknown. Valid until it is unloaded.
   MotionController* motion(const std::string& id);
-  /// Its type; empty if unknown.
-  std::string typeOf(const std::string& id) const;
 
   ctrl_more::FeedbackControllersManager& feedback() { return feedback_.manager(); }
   /// Forces of the hand's touch sensors, see FeedbackStage::postTouch().

@@ -3,8 +3,11 @@
 /// Tables 1 and 6 have it.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <functional>
+#include <string>
+#include <vector>
 
 #include <coglab_msgs/LwrState.h>
 #include <geometry_msgs/WrenchStamped.h>
@@ -25,7 +28,7 @@ namespace coglab_controllers {
 class RobotTopics {
  public:
   /// @param node namespace of the robot interface (…/lwr)
-  /// @param limits with which the robot interface brakes and accelerates
+  /// @param limits names of the joints, and how the robot interface brakes and accelerates
   /// @param sample_written called after each joint state: wakes the control thread
   RobotTopics(const ros::NodeHandle& node, const coglab_rt::JointLimits& limits,
               std::function<void()> sample_written);
@@ -36,6 +39,9 @@ class RobotTopics {
   void send(const VelocityCommand& command);
 
  private:
+  /// Sorts values into the order of the arm. False if a joint is missing or a value is not finite.
+  bool inOrder(const std::vector<std::string>& names, const std::vector<double>& values,
+               coglab_rt::Vector7& out) const;
   void onJoints(const sensor_msgs::JointState& joints);
   void onState(const coglab_msgs::LwrState& state);
   void onTorques(const sensor_msgs::JointState& torques);
@@ -43,6 +49,7 @@ class RobotTopics {
 
   ros::NodeHandle node_;
   std::function<void()> sample_written_;
+  const std::array<std::string, 7> names_;
   coglab_rt::ArmMailboxes mailboxes_;
   RobotSample sample_;
   coglab_rt::Interpolator set_point_;

@@ -1,5 +1,5 @@
 /// @file
-/// ROS parameters as the YAML trees that the cores read.
+/// The settings of the controller manager from ROS parameters.
 #pragma once
 
 #include <string>
@@ -9,9 +9,6 @@
 #include "coglab_controllers/manager/controller_manager.hpp"
 
 namespace coglab_controllers {
-
-/// Everything below a namespace; an empty map if there is nothing.
-YAML::Node readParameters(const ros::NodeHandle& node);
 
 /// The table of joint limits that the parameters below `node` name (`joint_limits_file`,
 /// `joint_limits_profile`).

@@ -78,7 +78,6 @@ class Controller : private KrlInterface {
   void setSilent(double duration);                   ///< sends nothing for so long, s
   void leaveCommandMode(const std::string& reason);  ///< fall-back as after a fault
   void acknowledge();  ///< operator acknowledges messages; drives may be switched on again
-  void setOperatingMode(OperatingMode mode);
   /// The operator starts the KRL program anew, with another FRI period (s): FRI is closed, nothing
   /// is sent for `pause` s, then the program opens it. @throws std::invalid_argument naming value
   /// and range of the period.

@@ -40,17 +40,16 @@ class HoldSpring {
     in_hand_ = in_hand;
     engaged_ = carries_ahead_ = true;
   }
-  void release() { engaged_ = slipping_ = false; }
+  void release() { engaged_ = false; }
 
   /// Force and torque on the body about its centre, world axes. `share` 0..1 fades the hold.
   Wrench evaluate(const Pose& hand, const Twist& hand_twist, const FreeBody& body,
                   const HoldFigures& figures, double share);
 
   bool engaged() const { return engaged_; }
-  bool slipping() const { return slipping_; }
 
  private:
-  bool engaged_ = false, slipping_ = false, carries_ahead_ = false;
+  bool engaged_ = false, carries_ahead_ = false;
   Pose in_hand_;  // where the body's centre belongs
 };
 

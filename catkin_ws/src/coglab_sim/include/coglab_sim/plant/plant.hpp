@@ -151,9 +151,7 @@ class Plant {
   double personShare() const { return person_share_; }
   std::string heldBy() const;  ///< robot, human, both, board, floor, none
   bool dropped() const { return dropped_; }
-  bool personHolds() const { return grip_.engaged(); }
   bool robotHolds() const { return squeeze_ > kHolds; }
-  bool slipsFromPerson() const { return grip_.slipping(); }
   int contacts() const { return contacts_; }  ///< in the last step
 
   double time() const { return time_; }

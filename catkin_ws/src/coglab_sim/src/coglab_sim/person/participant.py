@@ -209,9 +209,3 @@ def _accustomed(person: Participant) -> Participant:
         patience=12.0,
         **HABITS,
     )
-
-
-def population(n: int, seed: int, behaviour: str = "normal", profile: str = "drawn") -> list[Participant]:
-    """n different people, the same ones for the same seed."""
-    seeds = np.random.default_rng(seed).integers(0, 2**31, size=n)
-    return [Participant.draw(int(s), behaviour, profile) for s in seeds]

@@ -75,6 +75,16 @@ class Polled(Pending):
             self._cancel()
 
 
+def ending_motion(pending: Pending, cancel_motion: Callable[[str], object]) -> Pending:
+    """The handle of a motion: cancelled, the request is withdrawn if it was not sent, and the motion is ended."""
+
+    def cancel() -> None:
+        pending.cancel()
+        cancel_motion("its owner has given up waiting")
+
+    return Polled(pending.done, pending.result, cancel)
+
+
 class Permit:
     """Whether a request may still be sent. Sending and giving up happen in different threads: whichever comes first
     decides, and what was given up first is never sent."""
@@ -87,10 +97,6 @@ class Permit:
         """Nothing more is sent."""
         with self._lock:
             self._withdrawn.set()
-
-    def withdrawn(self) -> bool:
-        """Whether nobody waits any more."""
-        return self._withdrawn.is_set()
 
     def check(self) -> None:
         """PortError if it was withdrawn; called at the last moment before something is sent."""

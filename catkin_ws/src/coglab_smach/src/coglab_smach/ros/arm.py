@@ -37,7 +37,7 @@ from sensor_msgs.msg import JointState
 from coglab_smach.kinematics.manager_limits import read_limits
 from coglab_smach.kinematics.motion_time import MotionLimits
 from coglab_smach.ports.interfaces import DmpProgress, DmpRequest, Verdict
-from coglab_smach.ports.pending import Pending, Permit, Polled, PortError, Threaded
+from coglab_smach.ports.pending import Pending, Permit, Polled, PortError, Threaded, ending_motion
 from coglab_smach.ros.calls import Newest, call, call_now, mapped
 
 JOINTS = ("lwr_a1", "lwr_a2", "lwr_e1", "lwr_a3", "lwr_a4", "lwr_a5", "lwr_a6")
@@ -206,16 +206,7 @@ class RosArm:
         def accepted(response: Any) -> None:
             self._started_at = time.monotonic()
 
-        return self._ends_motion(mapped(pending, accepted))
-
-    def _ends_motion(self, pending: Pending) -> Pending:
-        """The handle of a motion: cancelled, the request is withdrawn if it was not sent, and the motion is ended."""
-
-        def cancel() -> None:
-            pending.cancel()
-            self.cancel_motion("its owner has given up waiting")
-
-        return Polled(pending.done, pending.result, cancel)
+        return ending_motion(mapped(pending, accepted), self.cancel_motion)
 
     def switch_dmp(self, request: DmpRequest) -> Pending:
         return mapped(
@@ -260,7 +251,7 @@ class RosArm:
             if ended[0] is not None:
                 raise ended[0]
 
-        return self._ends_motion(Polled(finished, value, added.cancel))
+        return ending_motion(Polled(finished, value, added.cancel), self.cancel_motion)
 
     def _end_of_ptp(self, added: Pending) -> tuple[PortError | None] | None:
         """How the motion has ended, as a tuple with the error, if any; None while it runs."""

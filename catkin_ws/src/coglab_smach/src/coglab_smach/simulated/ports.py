@@ -26,7 +26,7 @@ from coglab_smach.ports.interfaces import (
     Recognition,
     Verdict,
 )
-from coglab_smach.ports.pending import Pending, Polled, PortError, Ready
+from coglab_smach.ports.pending import Pending, Polled, PortError, Ready, ending_motion
 from coglab_smach.simulated.cell import SimulatedCell
 from coglab_smach.simulated.contact import SimulatedContact
 
@@ -126,7 +126,7 @@ class SimulatedArm:
             self.cell.arm.check_dmp(request, self.cell.primitives)
             self.cell.arm.execute(request)
 
-        return self._ends_motion(self.cell.answer("arm", "execute_dmp", 0.02, apply))
+        return ending_motion(self.cell.answer("arm", "execute_dmp", 0.02, apply), self.cancel_motion)
 
     def switch_dmp(self, request: DmpRequest) -> Pending:
         def apply() -> None:
@@ -154,7 +154,7 @@ class SimulatedArm:
             if ended[0] is not None:
                 raise ended[0]
 
-        return self._ends_motion(Polled(finished, value, added.cancel))
+        return ending_motion(Polled(finished, value, added.cancel), self.cancel_motion)
 
     def _end_of_ptp(self, added: Pending) -> tuple[PortError | None] | None:
         try:
@@ -165,13 +165,6 @@ class SimulatedArm:
         if end is None and not allowed.ok:
             return (PortError("the arm does not follow any more", (allowed.why,), allowed.code),)
         return end
-
-    def _ends_motion(self, pending: Pending) -> Pending:
-        def cancel() -> None:
-            pending.cancel()
-            self.cancel_motion("its owner has given up waiting")
-
-        return Polled(pending.done, pending.result, cancel)
 
     def joint_positions(self) -> tuple[float, ...] | None:
         return self.cell.joints if self._here() else None

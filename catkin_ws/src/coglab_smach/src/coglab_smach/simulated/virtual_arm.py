@@ -10,7 +10,7 @@ from coglab_msgs.msg import ReasonCode
 from coglab_smach.kinematics.manager_limits import read_limits
 from coglab_smach.kinematics.motion_time import MotionLimits
 from coglab_smach.ports.interfaces import DmpProgress, DmpRequest, Verdict
-from coglab_smach.ports.pending import Pending, Polled, PortError, Ready
+from coglab_smach.ports.pending import Pending, Polled, PortError, Ready, ending_motion
 from coglab_smach.simulated.virtual_node import VirtualNode
 
 SILENT = "lwr/joint_states is silent"
@@ -148,9 +148,8 @@ class VirtualArm:
         self.request = request
         self.rig.robot.debug = None
         limits = (request.goal_region_low, request.goal_region_high, request.goal_retreat, request.goal_drop)
-        limits = (*limits, request.goal_approach)
-        fields = (*self._fields(request), request.goal_frame, *limits)
-        return self._ends_motion(self.node.ask(lambda: self._answered(self.robot.execute_dmp(*fields))))
+        fields = (*self._fields(request), request.goal_frame, *limits, request.goal_approach)
+        return ending_motion(self.node.ask(lambda: self._answered(self.robot.execute_dmp(*fields))), self.cancel_motion)
 
     def switch_dmp(self, request: DmpRequest) -> Pending:
         return self.node.ask(lambda: self._answered(self.robot.switch_dmp(*self._fields(request))))
@@ -165,13 +164,6 @@ class VirtualArm:
             list(request.target_orientation),
         )
 
-    def _ends_motion(self, pending: Pending) -> Pending:
-        def cancel() -> None:
-            pending.cancel()
-            self.cancel_motion("its owner has given up waiting")
-
-        return Polled(pending.done, pending.result, cancel)
-
     def dmp_progress(self) -> DmpProgress:
         now = self.robot.dmp_progress()
         return DmpProgress(
@@ -179,7 +171,7 @@ class VirtualArm:
         )
 
     def move_ptp(self, position: Sequence[float], max_velocity: Sequence[float]) -> Pending:
-        return self._ends_motion(self.node.ask(lambda: self._add(list(position), list(max_velocity))))
+        return ending_motion(self.node.ask(lambda: self._add(list(position), list(max_velocity))), self.cancel_motion)
 
     def _add(self, position: list[float], max_velocity: list[float]) -> Pending:
         status, identity, message = self.robot.add_ptp(position, max_velocity)

@@ -40,8 +40,6 @@ class HandCounters:
     """Bytes that arrived during a calibration."""
     too_fast: int = 0
     """Frames that came before the last posture was executed, and were lost."""
-    not_modelled: int = 0
-    """Known frames without effect here."""
 
 
 class EmulatedHand:
@@ -308,8 +306,6 @@ class EmulatedHand:
                 self.motors[number].drive(WIRE.relax_speed, close=False)
         elif kind in modes:
             self._grasp(modes[kind], "current", strength * V17_CURRENT_PER_GF)
-        else:
-            self.counters.not_modelled += 1
 
     def _grasp(self, mode: str, by: str, effort: int) -> None:
         self._posture(self.preshapes[mode])

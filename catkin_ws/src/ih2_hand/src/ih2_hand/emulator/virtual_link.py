@@ -55,10 +55,6 @@ class VirtualLink:
                 answer = self.to_host(answer)
             self._input += answer
 
-    def inject(self, data: bytes) -> None:
-        """Bytes that nobody asked for."""
-        self._input += data
-
     def read(self, count: int, timeout: float) -> bytes:
         self._check()
         if self.faults:

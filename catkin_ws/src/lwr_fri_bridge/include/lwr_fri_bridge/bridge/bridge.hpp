@@ -87,7 +87,6 @@ class Bridge {
   void setVelocitySource(VelocitySource source) {
     source_.store(source, std::memory_order_relaxed);
   }
-  VelocitySource velocitySource() const { return source_.load(std::memory_order_relaxed); }
 
   /// Newest snapshot. Any thread but the FRI thread.
   Snapshot snapshot();

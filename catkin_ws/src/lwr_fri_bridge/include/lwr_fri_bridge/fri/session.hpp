@@ -77,7 +77,6 @@ class Session {
   void forget();
 
   const SessionCounters& counters() const { return counters_; }
-  std::uint16_t lastSent() const { return sent_; }
 
  private:
   Verdict checkForm(const std::uint8_t* bytes, std::size_t size, MeasurementDatagram& candidate);

@@ -1,0 +1,35 @@
+/// @file
+/// The table of joint limits that two ROS parameters name.
+#pragma once
+
+#include <ros/node_handle.h>
+#include <ros/package.h>
+
+#include <stdexcept>
+#include <string>
+
+#include "coglab_rt/joint_limits_table.hpp"
+#include "coglab_rt/ros/parameter.hpp"
+
+namespace coglab_rt {
+
+/// Reads the table.
+/// @param file name of the parameter with its path; unset or empty: that of lwr_description.
+/// @param profile name of the parameter with the profile; unset: "default".
+/// @throws std::invalid_argument naming the parameter, std::runtime_error naming file and line.
+inline JointLimits readJointLimits(const ros::NodeHandle& node, const char* file,
+                                   const char* profile) {
+  auto path = readParameter<std::string>(node, file, "", "a path");
+  if (path.empty()) {
+    const std::string package = ros::package::getPath("lwr_description");
+    if (package.empty()) {
+      throw std::runtime_error(
+          "package lwr_description is not found; build and source the workspace or set " +
+          node.resolveName(file));
+    }
+    path = package + "/config/joint_limits.yaml";
+  }
+  return loadJointLimits(path, readParameter<std::string>(node, profile, "default", "a name"));
+}
+
+}  // namespace coglab_rt

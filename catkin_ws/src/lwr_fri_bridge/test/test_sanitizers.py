@@ -1,0 +1,59 @@
+"""The gtests of the bridge, and of coglab_rt on which it stands, under the sanitizers (a campaign: COGLAB_LONG=1).
+
+Left out are test_real_time.cpp, which counts allocations and system calls and would count those of a sanitizer too, and
+what needs ROS.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import pytest
+
+PACKAGE = Path(__file__).resolve().parent.parent
+GROUND = PACKAGE.parent / "coglab_rt"
+LIMITS = PACKAGE.parent / "lwr_description" / "config" / "joint_limits.yaml"
+WITH_ROS = {"test_reason_codes", "test_ros_time"}
+COUNTING = {"test_real_time"}
+
+
+def compiled(*arguments: object) -> None:
+    """Runs the compiler, which must succeed."""
+    built = subprocess.run(["g++", *map(str, arguments)], capture_output=True, text=True, timeout=900)
+    assert built.returncode == 0, built.stderr[-3000:]
+
+
+@pytest.mark.skipif(not os.environ.get("COGLAB_LONG"), reason="campaign: set COGLAB_LONG=1")
+@pytest.mark.skipif(shutil.which("g++") is None, reason="g++ is not installed")
+@pytest.mark.parametrize("sanitizer", ["thread", "address,undefined"])
+def test_the_gtests_under_a_sanitizer(sanitizer: str, tmp_path: Path) -> None:
+    flags = ["-std=c++17", "-O1", "-g1", f"-fsanitize={sanitizer}", "-fno-omit-frame-pointer"]
+    flags += [f"-I{PACKAGE / 'include'}", f"-I{GROUND / 'include'}", "-isystem/usr/include/eigen3"]
+    sources = [path for path in sorted((PACKAGE / "src").rglob("*.cpp")) if path.parent.name != "ros"]
+    tests = [*sorted((GROUND / "test").glob("test_*.cpp")), *sorted((PACKAGE / "test").glob("test_*.cpp"))]
+    tests = [path for path in tests if path.stem not in WITH_ROS | COUNTING]
+    assert len(sources) > 10 and len(tests) > 15
+    library = tmp_path / "libbridge.a"
+    with ThreadPoolExecutor(2) as pool:
+        list(pool.map(lambda path: compiled(*flags, "-c", path, "-o", tmp_path / f"{path.stem}.o"), sources))
+        subprocess.run(["ar", "cr", library, *(tmp_path / f"{path.stem}.o" for path in sources)], check=True)
+        libraries = [library, "-lyaml-cpp", "-lgtest_main", "-lgtest", "-lpthread", "-ldl"]
+        link = [f'-DLIMITS_FILE="{LIMITS}"', "-o"]
+        list(pool.map(lambda path: compiled(*flags, path, *link, tmp_path / path.stem, *libraries), tests))
+    found = []
+    options = {"TSAN_OPTIONS": "halt_on_error=1 exitcode=66", "UBSAN_OPTIONS": "halt_on_error=1"}
+    for path in tests:
+        result = subprocess.run(
+            ["setarch", os.uname().machine, "-R", tmp_path / path.stem],
+            env=os.environ | options,
+            capture_output=True,
+            text=True,
+            timeout=1800,
+        )
+        if result.returncode != 0:
+            found.append(f"{path.stem}: {(result.stdout + result.stderr)[-4000:]}")
+    assert not found, "\n".join(found)
