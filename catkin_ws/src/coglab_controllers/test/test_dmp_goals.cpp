@@ -36,8 +36,8 @@ TEST(DmpController, FollowsAgainOnlyWhenTheGoalLeavesItsBall) {
   EXPECT_LT((robot.hand().position - moved).norm(), 2e-3);
 }
 
-/// A reach toward a goal that goes `way(t)` from kGoal, 0.5 s after the start; how it ended, and the
-/// largest distance from kGoal that the goal had by then.
+/// A reach toward a goal that goes `way(t)` from kGoal, 0.5 s after the start; how it ended, and
+/// the largest distance from kGoal that the goal had by then.
 std::pair<ReasonCode, double> reachAfter(const GoalLimits& limits,
                                          const std::function<Vector3(double)>& way) {
   VirtualRobot robot;

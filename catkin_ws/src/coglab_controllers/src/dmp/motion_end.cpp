@@ -31,8 +31,7 @@ MotionEnd::Event MotionEnd::update(double dt, double phase, double speed, double
   if (!latched_) {
     const MotionEndParameters& p = parameters_;
     if (phase >= p.phase || speed >= p.speed || turning >= p.turning ||
-        (position - goal).norm() >= p.distance ||
-        (goal - raw_goal).norm() >= p.follow_distance) {
+        (position - goal).norm() >= p.distance || (goal - raw_goal).norm() >= p.follow_distance) {
       return Event::None;
     }
     latched_ = true;

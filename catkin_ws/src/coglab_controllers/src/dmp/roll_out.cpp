@@ -36,7 +36,8 @@ TimedPath rollOut(CartesianMotion motion, const Pose& goal, double rate, const V
   const double dt = step / clock;
   const double longest = kLongest * motion.dmp().tau() + kShortest;
   for (double own = 0.0; own < longest; own += step) {
-    path.poses.push_back(motion.step(dt, goal, clock, approach).pose);  // the set-point before the step
+    path.poses.push_back(
+        motion.step(dt, goal, clock, approach).pose);  // the set-point before the step
     path.times.push_back(own / clock);
     const bool ended = motion.phase() == CartesianMotion::Phase::Ended;
     if (ended && (motion.dmp().state().position - motion.goal()).norm() < kThere) break;

@@ -127,7 +127,8 @@ Answer DmpController::ask(const DmpRequest& request, bool execute) {
 bool DmpController::readPath(PredictedPath& path) {
   DmpSnapshot now;
   if (!snapshots_.read(now)) return false;
-  path = {now.stamp_ns, now.primitive.str(), rollOut(now.motion, now.goal, now.motion.rate(), now.approach)};
+  path = {now.stamp_ns, now.primitive.str(),
+          rollOut(now.motion, now.goal, now.motion.rate(), now.approach)};
   return true;
 }
 
@@ -147,7 +148,8 @@ Answer DmpController::predict(const DmpRequest& request, PredictedPath& path) {
   imagined_.start({plan, from, input});
   const DmpSnapshot begun = imagined_.snapshot(setup().host->now_ns());
   imagined_.stop();
-  path = {begun.stamp_ns, request.primitive_id, rollOut(begun.motion, begun.goal, 1.0, begun.approach)};
+  path = {begun.stamp_ns, request.primitive_id,
+          rollOut(begun.motion, begun.goal, 1.0, begun.approach)};
   return {};
 }
 

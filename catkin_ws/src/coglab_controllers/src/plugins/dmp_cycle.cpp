@@ -32,8 +32,7 @@ GoalEstimatorParameters readEstimator(const Parameters& parameters) {
       parameters.number("goal_time_constant", estimator.time_constant, 0.0, 2.0);
   estimator.noisy_time_constant =
       parameters.number("noisy_goal_time_constant", estimator.noisy_time_constant, 0.005, 2.0);
-  estimator.noisy_speed =
-      parameters.number("noisy_goal_speed", estimator.noisy_speed, 0.0, 1.0);
+  estimator.noisy_speed = parameters.number("noisy_goal_speed", estimator.noisy_speed, 0.0, 1.0);
   estimator.noisy_turning =
       parameters.number("noisy_goal_turning", estimator.noisy_turning, 0.0, 10.0);
   return estimator;
@@ -237,8 +236,8 @@ void DmpCycle::computeReference(const MotionCycle& cycle, MotionReference& refer
   if (stage_ == DmpStage::Settle) comeToRest(cycle.last);
   watchGoal(cycle.input);
   if (stage_ == DmpStage::GivenUp) return;
-  reference_ = motion_.step(cycle.input.dt, goal_, cycle.input.time_scale,
-                            hand_.approachAt(gate_.goal()));
+  reference_ =
+      motion_.step(cycle.input.dt, goal_, cycle.input.time_scale, hand_.approachAt(gate_.goal()));
   followEnd(cycle);
   if (loopClosed()) write(reference, cycle.input.dt);
 }

@@ -142,8 +142,9 @@ void bindEstimators(py::module_& module) {
       .def_property_readonly("position", &GoalEstimator::position)
       .def_property_readonly("velocity", &GoalEstimator::velocity);
 
-  py::class_<GoalWatch>(module, "GoalWatch",
-                        "When a goal that moves is no goal any more: left its region, went back, fell.")
+  py::class_<GoalWatch>(
+      module, "GoalWatch",
+      "When a goal that moves is no goal any more: left its region, went back, fell.")
       .def(py::init([](const Vector3& region_low, const Vector3& region_high, double retreat,
                        double drop, const Vector3& hand, const Vector3& goal) {
              const GoalLimits limits{region_low, region_high, retreat, drop};
@@ -160,7 +161,8 @@ void bindEstimators(py::module_& module) {
             const Reason reason = watch.update(requireStep(dt), requireFinite(goal, "goal"));
             return py::make_tuple(static_cast<int>(reason.number()), reason.str());
           },
-          py::arg("dt"), py::arg("goal"), "Returns (ReasonCode, sentence); (0, '') while it may go on.");
+          py::arg("dt"), py::arg("goal"),
+          "Returns (ReasonCode, sentence); (0, '') while it may go on.");
 
   py::class_<OrientationCurve>(module, "OrientationCurve",
                                "Quaternion Bezier curve between two orientations.")

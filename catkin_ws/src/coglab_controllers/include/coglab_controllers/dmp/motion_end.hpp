@@ -11,7 +11,7 @@ struct MotionEndParameters {
   double phase = 0.012;  ///< the phase must be below this (0.01 is reached with the duration over),
   double speed = 0.02;   ///< m/s, the set-point move slower than this,
   double turning = 0.2;  ///< rad/s, and turn slower than this,
-  double distance = 0.005;  ///< m, and be closer to the goal than this
+  double distance = 0.005;         ///< m, and be closer to the goal than this
   double follow_distance = 0.030;  ///< m: a goal that leaves this ball around the latched one …
   double follow_time = 0.2;        ///< s: … for this long is followed again
 };

@@ -12,7 +12,7 @@ struct GoalLimits {
   Vector3 region_low = Vector3::Zero();   ///< m, corners of a box in dmp_frame_name that a goal
   Vector3 region_high = Vector3::Zero();  ///< which was inside may not leave; equal: anywhere
   double retreat = 0.0;  ///< m, how far it may go back from where it was nearest; 0: any way
-  double drop = 0.0;     ///< m, how far it may sink below where it was on average of kDropTime; 0: any
+  double drop = 0.0;  ///< m, how far it may sink below where it was on average of kDropTime; 0: any
 
   /// What is wrong with them; empty: nothing.
   const char* wrong() const noexcept;

@@ -33,8 +33,8 @@ struct DmpPlan {
   HandGoal hand;
   GoalObservation goal;  ///< the goal as it was when the request came
   GoalLimits goal_limits;
-  Pose base_from_dmp;    ///< dmp_frame_name in robot_base_frame_name
-  bool given = false;    ///< initial_state GIVEN
+  Pose base_from_dmp;  ///< dmp_frame_name in robot_base_frame_name
+  bool given = false;  ///< initial_state GIVEN
   Vector3 initial_position = Vector3::Zero(), initial_velocity = Vector3::Zero();
 };
 

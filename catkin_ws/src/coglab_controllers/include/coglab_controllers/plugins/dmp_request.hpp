@@ -23,7 +23,8 @@ struct DmpRequest {
   Eigen::Vector4d target_orientation =
       Eigen::Vector4d::Zero();  ///< x y z w; all zero: keep the current one
   std::string goal_frame;  ///< tf2 frame that the motion follows; empty: what comes on dmp_goal
-  Vector3 goal_approach = Vector3::Zero();  ///< m, along which the hand comes at last, as the offset
+  Vector3 goal_approach =
+      Vector3::Zero();     ///< m, along which the hand comes at last, as the offset
   GoalLimits goal_limits;  ///< what that frame may do, or the motion ends
 };
 
