@@ -1,7 +1,7 @@
 #!/usr/bin/python3
 """Bench of contact found while the arm moves: pushes in the physics during reaches of the shipped plug-in.
 
-Definitions (issue 15). Reach, push and what is drawn: see moving_reaches.py. The detector is armed
+Definitions. Reach, push and what is drawn: see moving_reaches.py. The detector is armed
 ``contact_in_motion`` when the motion starts and gets what the robot measures (and touch, where the row says so),
 nothing else; its thresholds are those that are shipped, learnt on other seeds. Delay: stamp of the event less the
 time from which the true force is 1 N or more; found: an event within 80 ms of it; an event before it is a false

@@ -72,7 +72,7 @@ def _read(default: Any, data: Any, source: str) -> Any:
     known = {
         f.name: getattr(default, f.name)
         for f in fields(default)
-        if f.name not in ("reach", "carried") or f.type == "float"
+        if f.name not in ("reach", "carried") or isinstance(getattr(default, f.name), float)
     }
     unknown = sorted(set(map(str, data)) - set(known))
     if unknown:

@@ -141,6 +141,6 @@ class MomentumObserver:
         fresh = self._residual is None
         keep = 0.0 if fresh else math.exp(-self.gain * span)
         last = np.zeros(7) if self._residual is None else self._residual
-        self._residual = keep * last + (1.0 - keep) * outside
+        residual = self._residual = keep * last + (1.0 - keep) * outside
         self._acceleration = keep * self._acceleration + (1.0 - keep) * (velocity - last_velocity) / span
-        return Residual(stamp, self._residual, self._position, velocity, self._acceleration, fresh)
+        return Residual(stamp, residual, self._position, velocity, self._acceleration, fresh)

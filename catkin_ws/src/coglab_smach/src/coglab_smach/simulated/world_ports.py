@@ -234,6 +234,7 @@ class VirtualContact:
         chain = rig.robot.chain
         jacobian = lambda q: chain.jacobian(np.asarray(q, dtype=float))[:3]  # noqa: E731
         moving = MovingContact(Thresholds.load(THRESHOLDS), cc.ArmDynamics(rig.robot.urdf), jacobian)
+        self.moving = moving
         self.detector = FusedDetector(ContactDetector(DetectorSettings(), jacobian), moving)
         self.watched_while_moving = 0
         """periods in which the detector of an arm at rest watched though the arm moved"""
@@ -256,7 +257,7 @@ class VirtualContact:
             return
         report, t = self.rig.robot.report, self.rig.t
         velocity, detector = np.asarray(report["measured_velocity"]), self.detector
-        detector.moving.observer.period = report["fri_period"]
+        self.moving.observer.period = report["fri_period"]
         events = [
             detector.feed_measured(t, report["position"], report["torque"]),
             detector.feed(t, report["external_torque"], report["position"], velocity),
@@ -273,7 +274,7 @@ class VirtualContact:
         if hand.readings is self._polled or hand.dead:
             return None
         self._polled = hand.readings
-        if not hand.holding and self.detector.moving.load > 0.0:
+        if not hand.holding and self.moving.load > 0.0:
             self.detector.set_payload(0.0)
         return self.detector.feed_hand(self.rig.t, hand.readings)
 
