@@ -4,7 +4,6 @@ import json
 
 import pytest
 from coglab_smach.context.holding import HoldingMemory
-from coglab_smach.ports.interfaces import Recognition
 from conftest import Trial
 
 
@@ -246,29 +245,28 @@ def test_an_object_that_was_taken_away_ends_in_the_hub_without():
     assert any(r.reason == "'mug' is not in the hand any more" for r in trial.ctx.journal.transitions)
 
 
-def test_an_old_recognition_does_not_trigger_twice():
+def test_an_old_belief_does_not_trigger():
     trial = Trial(
         **{
             "recognition_trigger.enabled": True,
             "monitor.enabled": False,
-            "recognition_trigger.actions": {"offer": ["exchange_human_to_robot", "exchange_robot_to_human"]},
         }
     )
-    seen = [Recognition()]
-    trial.ctx.perception.recognition = lambda: seen[0]
+    partner = trial.cell.partner
 
     def script(t):
         t.wait_hub("wait_without_object")
         t.clock.sleep(0.5)
-        seen[0] = Recognition("offer", 0.95, True)
+        partner.offer = 0.95
         t.wait_hub("wait_with_object")
+        partner.offer, partner.request = 0.0, 0.95
         t.clock.sleep(3.0)
         assert t.ctx.requests.hub() == "wait_with_object", "an old reach counted as a new one"
-        seen[0] = Recognition()
+        partner.request = 0.05
         t.clock.sleep(0.5)
-        seen[0] = Recognition("offer", 0.95, True)
+        partner.request = 0.95
         t.wait_hub("wait_without_object")
 
     trial.run(script)
-    asked = [r.outcome for r in trial.ctx.journal.transitions if "recognition of 'offer'" in r.reason]
+    asked = [r.outcome for r in trial.ctx.journal.transitions if "belief in an " in r.reason]
     assert asked == ["exchange_human_to_robot", "exchange_robot_to_human"]

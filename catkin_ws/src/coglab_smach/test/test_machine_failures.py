@@ -251,19 +251,17 @@ def test_a_programming_error_in_a_state_is_a_failure_not_a_stuck_machine():
     assert_recovered_empty(trial, "TypeError")
 
 
-def test_recognition_leaves_the_hub_where_configured():
-    trial = Trial(
-        **{"recognition_trigger.enabled": True, "recognition_trigger.actions": {"offer": "exchange_human_to_robot"}}
-    )
+def test_a_belief_leaves_the_hub_where_configured():
+    trial = Trial(**{"recognition_trigger.enabled": True})
 
     def script(t):
         t.wait_hub("wait_without_object")
-        t.cell.arm.motion_started = t.clock.now()
-        t.cell.partner.pattern = "offer"
+        t.clock.sleep(0.2)
+        t.cell.partner.offer = 0.95
         t.wait_hub("wait_with_object")
 
     trial.run(script)
-    assert any("recognition of 'offer'" in t.reason for t in trial.ctx.journal.transitions)
+    assert any("belief in an offer of 'mug' (0.95)" in t.reason for t in trial.ctx.journal.transitions)
 
 
 def test_every_transition_of_a_failure_carries_its_sentence():

@@ -57,4 +57,4 @@ def test_a_person_who_reaches_out_starts_the_exchange():
 
     trial.run(script=script)
     asked = [t for t in trial.ctx.journal.transitions if t.from_state == "wait_without_object"]
-    assert asked[0].outcome == GIVE and "recognition of 'centre'" in asked[0].reason
+    assert asked[0].outcome == GIVE and "belief in an offer of 'mug'" in asked[0].reason

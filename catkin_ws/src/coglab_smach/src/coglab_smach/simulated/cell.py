@@ -52,6 +52,9 @@ class Partner:
     let_go_after: float | None = 0.2
     away: float = 1.0
     """s for which the person's hand is away then, before it is back at its work"""
+    offer: float = 0.0
+    request: float = 0.0
+    """what is believed of the person"""
     pattern: str = "unknown"
     pattern_at: float = 0.0
     """s into the motion at which the pattern is decided"""

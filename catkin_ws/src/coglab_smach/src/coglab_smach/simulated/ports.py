@@ -321,7 +321,8 @@ class SimulatedPerception:
         )
 
     def ahead(self) -> Ahead:
-        return Ahead()
+        partner = self.cell.partner
+        return Ahead(partner.offer, partner.request, "mug" if partner.offer > 0.0 else "")
 
     def recognition(self) -> Recognition:
         cell, partner = self.cell, self.cell.partner

@@ -153,19 +153,20 @@ class Hub(CoglabState):
         return ""
 
     def _watch_partner(self) -> None:
-        """A recognised motion of the partner is a trigger like the operator's, if the configuration maps it
-        to an action of this hub. Only a motion that began in this hub counts."""
-        if not bool(self.ctx.config.get("recognition_trigger.enabled", False)):
+        """An offer or a request that is believed in is a trigger like the operator's, if this hub has the action for
+        it: the same belief with which a reach begins. Only one that began in this hub counts."""
+        config = self.ctx.config
+        if not bool(config.get("recognition_trigger.enabled", False)):
             return
-        seen = self.ctx.perception.recognition()
-        if not seen.decided:
-            self._saw_rest = True
+        ahead = self.ctx.perception.ahead()
+        name, probability = max(("offer", ahead.offer), ("request", ahead.request), key=lambda each: each[1])
+        if probability < float(config.get("recognition_trigger.belief", 0.9)):
+            self._saw_rest = self._saw_rest or probability < float(config.get("handover.doubt", 0.1))
             return
-        wanted = dict(self.ctx.config.get("recognition_trigger.actions", {})).get(seen.pattern, [])
-        wanted = [wanted] if isinstance(wanted, str) else list(wanted)
-        action = next((name for name in wanted if name in self.actions), None)
-        if self._saw_rest and action is not None:
-            self.ctx.requests.submit(action, "", f"recognition of '{seen.pattern}' ({seen.confidence:.2f})")
+        action = str(dict(config.get("recognition_trigger.actions", {})).get(name, ""))
+        if self._saw_rest and action in self.actions:
+            what = f" of '{ahead.object_id}'" if ahead.object_id else ""
+            self.ctx.requests.submit(action, ahead.object_id, f"belief in an {name}{what} ({probability:.2f})")
 
 
 class Stopped(CoglabState):
