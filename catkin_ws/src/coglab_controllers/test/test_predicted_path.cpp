@@ -91,8 +91,8 @@ TEST(RollOut, OfAMotionThatIsNotBegunIsEmptyAndOneThatNeverArrivesEnds) {
   Library library;
   library.load(std::string(PACKAGE_DIR) + "/config/primitives.xml");
   MotionEndParameters never;
-  never.distance = never.noisy_distance = 1e-5;
-  never.speed = never.noisy_speed = 1e-6;
+  never.distance = 1e-5;
+  never.speed = 1e-6;
   CartesianMotion motion({}, never);
   motion.start({TransformationSystem(library.at("reach_human")), 1.0, true}, {}, Vector3::Zero(),
                Vector3::Zero(), {kGoal, Quaternion::Identity()});
