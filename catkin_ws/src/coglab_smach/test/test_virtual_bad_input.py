@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 import smach
+from coglab_msgs.msg import ReasonCode, Say
 from virtual_trial import VirtualTrial
 
 RECEIVE, GIVE = "exchange_human_to_robot", "exchange_robot_to_human"
@@ -90,4 +91,64 @@ def test_command_mode_lost_in_mid_reach_and_reset():
     trial.run(script=script)
     assert done and trial.ctx.journal.results[-1].outcome == "stopped"
     assert trial.last_hub == "wait_without_object" and at_home(trial)
+    assert trial.rig.robot.limit_violations == 0
+
+
+def lets_go_of_it(trial):
+    """The fingers open by themselves: a finger that slips off, a hand that somebody has switched off."""
+    for motor in range(1, 5):
+        trial.rig.hand.driver.move_motor(motor, 511, False)
+
+
+def test_an_object_that_leaves_the_hand_on_the_way_home():
+    trial = VirtualTrial(seed=4, profile="accustomed", perfect=True)
+    done = []
+
+    def beside(t):
+        if not done and any(move.from_state == "take_weight" for move in t.ctx.journal.transitions):
+            done.append(lets_go_of_it(t))
+
+    trial.beside = beside
+    results = trial.run(RECEIVE)
+    assert done and trial.rig.cell.truth()["dropped"]
+    assert results[0].outcome == "failed_empty" and results[0].code == ReasonCode.OBJECT_NOT_SEEN
+    assert trial.last_hub == "wait_without_object" and at_home(trial) and trial.ctx.holding == ""
+    assert "'mug' has left the hand on the way" in trial.ctx.journal.why()
+
+
+def test_an_object_that_leaves_the_hand_on_the_way_to_the_person():
+    """The arm does not go on to the person, and nobody is told that they have it."""
+    trial = VirtualTrial(seed=4, profile="accustomed", perfect=True)
+    done = []
+
+    def beside(t):
+        if not done and t.begun[-1:] == [GIVE] and t._reach is not None and t.rig.t > t._reach.begin + 0.3:
+            done.append(lets_go_of_it(t))
+
+    trial.beside = beside
+    results = trial.run(RECEIVE, GIVE)
+    assert done and trial.rig.cell.truth()["dropped"]
+    assert results[1].outcome == "failed_empty" and results[1].code == ReasonCode.OBJECT_NOT_SEEN
+    assert trial.last_hub == "wait_without_object" and at_home(trial) and trial.ctx.holding == ""
+    assert "'mug' has left the hand on the way" in trial.ctx.journal.why()
+    assert Say.YOU_HAVE_IT not in [code for _, code in trial.said]
+
+
+@pytest.mark.parametrize("after", [0.4, 0.8])
+def test_a_partner_who_pushes_the_arm_away_while_it_gives(after):
+    """60 N for a second: the arm holds on to the object and gives it to the person who waits for it."""
+    trial = VirtualTrial(seed=4, profile="accustomed", perfect=True)
+    pushed = []
+
+    def beside(t):
+        if not pushed and t.begun[-1:] == [GIVE] and t._reach is not None and t.rig.t > t._reach.begin + after:
+            pushed.append(t.rig.t)
+        if pushed:
+            t.rig.cell.set_push([-60.0 if t.rig.t < pushed[0] + 1.0 else 0.0, 0.0, 0.0])
+
+    trial.beside = beside
+    results = trial.run(RECEIVE, GIVE)
+    truth = trial.rig.cell.truth()
+    assert pushed and results[1].outcome == "succeeded", trial.ctx.journal.why()
+    assert truth["held_by"] == "human" and not truth["dropped"]
     assert trial.rig.robot.limit_violations == 0

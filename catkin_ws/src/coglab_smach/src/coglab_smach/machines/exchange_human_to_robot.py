@@ -31,6 +31,6 @@ def build_exchange_human_to_robot(ctx: Context) -> CoglabMachine:
         machine.add_state("switch_to_ptp", SwitchController(ctx, "ptp"), to_recovery(succeeded="hand_close"))
         machine.add_state("hand_close", HandClose(ctx, from_person=True), to_recovery(succeeded="take_weight"))
         machine.add_state("take_weight", TakeWeight(ctx), to_recovery(succeeded="coglab_home_robot"))
-        machine.add_state("coglab_home_robot", HomeRobot(ctx), to_recovery(succeeded="succeeded"))
+        machine.add_state("coglab_home_robot", HomeRobot(ctx, carries=True), to_recovery(succeeded="succeeded"))
         machine.add_state("recover", build_recovery(ctx), RECOVERY_TRANSITIONS)
     return machine
