@@ -20,6 +20,7 @@ add_library(coglab_controllers_core
   src/dmp/roll_out.cpp
   src/dmp/transformation_system.cpp
   src/goal/goal_estimator.cpp
+  src/goal/goal_watch.cpp
   src/goal/goal_gate.cpp
   src/goal/goal_jitter.cpp
   src/goal/goal_relay.cpp
@@ -32,7 +33,7 @@ add_library(coglab_controllers_core
   src/limits/phase_governor.cpp
   src/limits/workspace.cpp
   src/ptp/ptp_trajectory.cpp)
-target_include_directories(coglab_controllers_core PUBLIC ${CMAKE_CURRENT_SOURCE_DIR}/include)
+target_include_directories(coglab_controllers_core PUBLIC ${CMAKE_CURRENT_SOURCE_DIR}/include ${coglab_rt_INCLUDE_DIRS})
 target_include_directories(coglab_controllers_core SYSTEM PUBLIC ${orocos_kdl_INCLUDE_DIRS} ${kdl_parser_INCLUDE_DIRS})
 target_link_libraries(coglab_controllers_core
   PUBLIC Eigen3::Eigen ${orocos_kdl_LIBRARIES}
@@ -49,7 +50,6 @@ pybind11_add_module(coglab_controllers_python
   src/python/bind_limits.cpp
   src/python/bind_motion.cpp)
 target_link_libraries(coglab_controllers_python PRIVATE coglab_controllers_core yaml-cpp)
-target_include_directories(coglab_controllers_python PRIVATE ${coglab_rt_INCLUDE_DIRS})
 set_target_properties(coglab_controllers_python PROPERTIES
   OUTPUT_NAME _core
   LIBRARY_OUTPUT_DIRECTORY ${CATKIN_DEVEL_PREFIX}/${CATKIN_PACKAGE_PYTHON_DESTINATION})

@@ -34,12 +34,13 @@ RUN_MISSING = True
 
 @dataclass(frozen=True)
 class Job:
-    """One trial that is to be run; ``name`` and seed are its key in a file."""
+    """One trial that is to be run; ``name`` and seed are its key in a file. ``runner`` runs it: one_trial, if none."""
 
     name: str
     actions: Sequence[str]
     seed: int
     arguments: dict[str, Any]
+    runner: Callable[[Job], dict[str, Any]] | None = None
 
     @property
     def key(self) -> str:
@@ -47,20 +48,28 @@ class Job:
         return f"{self.name} | {' '.join(self.actions)} | {self.seed}"
 
 
-def one_trial(job: Job) -> dict[str, Any]:
+def run_job(job: Job) -> dict[str, Any]:
     """Run one trial in a worker process; plain data only."""
-    actions, seed, kw = job.actions, job.seed, job.arguments
+    return (job.runner or one_trial)(job)
+
+
+def one_trial(job: Job, watch: Callable[[VirtualTrial], Any] | None = None, script: Any = None) -> dict[str, Any]:
+    """The actions of a trial one after the other, or ``script`` instead. ``watch`` sees the trial before it begins; the
+    ``figures()`` of what it returns, if anything, are the result's ``truth``."""
+    actions, seed = job.actions, job.seed
     smach.set_loggers(*[lambda *a: None] * 4)
     started = time.process_time()
-    trial = VirtualTrial(seed=seed, **kw)
+    trial = VirtualTrial(seed=seed, **job.arguments)
+    watcher = watch(trial) if watch is not None else None
     stuck = ""
     try:
-        trial.run(*actions)
+        trial.run(*actions, script=script)
     except Exception as error:  # the script's own limit, or the physics has ended
         stuck = f"{type(error).__name__}: {error}"
     if not stuck and trial.last_hub not in ("wait_without_object", "wait_with_object"):
         stuck = f"the machine waits in '{trial.last_hub}': {trial.ctx.journal.why()}"
     results = [r for r in trial.ctx.journal.results if r.kind in actions]
+    truth = {} if watcher is None else {"truth": watcher.figures()}
     return {
         "seed": seed,
         "stuck": stuck,
@@ -76,6 +85,7 @@ def one_trial(job: Job) -> dict[str, Any]:
         "processor": time.process_time() - started,
         "reaches": [(reach.action, figures(reach)) for reach in trial.reaches],
         "touches": [touch.figures() for touch in trial.touches],
+        **truth,
     }
 
 
@@ -111,7 +121,7 @@ def results_of(jobs: Sequence[Job]) -> Iterator[dict[str, Any]]:
     missing = [job for job in jobs if job.key not in known] if RUN_MISSING else []
     if missing:
         with pool_of(min(len(missing), os.cpu_count() or 1)) as pool:
-            fresh = pool.imap(one_trial, missing)
+            fresh = pool.imap(run_job, missing)
             for job in jobs:
                 if job.key in known:
                     yield known[job.key]
@@ -133,7 +143,7 @@ def fill(jobs: Sequence[Job], processes: int, seconds: float) -> int:
     end = time.monotonic() + seconds
     missing = [job for job in jobs if job.key not in FILE.known]
     with pool_of(processes) as pool:
-        for job, trial in zip(missing, pool.imap(one_trial, missing), strict=True):
+        for job, trial in zip(missing, pool.imap(run_job, missing), strict=True):
             FILE.add(job.key, trial)
             if time.monotonic() > end:
                 break

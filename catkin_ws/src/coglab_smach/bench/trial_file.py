@@ -29,6 +29,15 @@ def commit_of_sources() -> str:
         return "unknown"
 
 
+def whole_hash(commit: str) -> str:
+    """All hex digits of a commit as ``commit_of_sources`` names it; empty without git, or where it does not know it."""
+    command = ["git", "-C", str(SOURCES), "rev-parse", "--verify", "--quiet", commit.removesuffix("-changed")]
+    try:
+        return subprocess.run(command, check=True, capture_output=True, text=True, timeout=30).stdout.strip()
+    except (OSError, subprocess.SubprocessError):
+        return ""
+
+
 def commit_in(path: Path) -> str:
     """The commit whose trials a file holds. ValueError if it is none."""
     try:

@@ -1,9 +1,11 @@
 #!/usr/bin/python3
-"""The campaigns of the world (world_rows.py) into a file, a trial of each row in turn, so that all rows grow alike.
+"""The campaigns of the world (world_rows.py), or those of bench_partner, into a file, a trial of each row in turn, so
+that all rows grow alike.
 
-world_campaign.py FILE [--jobs N] [--seconds S]: goes on where FILE ends, until all is there, S seconds are over or
-it is stopped (Ctrl-C, SIGTERM); about 2.2 s of a core a trial, at a low priority (nice).
-world_campaign.py FILE --table: what FILE holds, as Markdown; what is fewer than asked is marked incomplete and missed.
+world_campaign.py FILE [--of partner] [--jobs N] [--seconds S]: goes on where FILE ends, until all is there, S seconds
+are over or it is stopped (Ctrl-C, SIGTERM); about 2.2 s of a core a trial, at a low priority (nice).
+world_campaign.py FILE [--of partner] --table: what FILE holds, as Markdown; what is fewer than asked is marked
+incomplete and missed.
 """
 
 from __future__ import annotations
@@ -16,8 +18,10 @@ from pathlib import Path
 from typing import Any
 
 os.environ["COGLAB_LONG"] = "1"
+import bench_partner
 import campaign
 import numpy as np
+import partner_rows
 import world_rows
 from campaign import EXCHANGES, Campaign
 from trial_file import TrialFile, commit_in
@@ -85,9 +89,14 @@ def judged(figure: str, value: float, unit: str, goal: str = "", ok: bool = True
     return {}
 
 
+def partner_table(commit: str) -> None:
+    """The rows of bench_partner of what the file holds, as Markdown."""
+    print(f"Sources: {commit}.\n\n| figure | value | goal | |\n| --- | --- | --- | --- |")
+    bench_partner.rows_of(judged, commit, partner_rows.groups(commit))
+
+
 def table(commit: str) -> None:
     """Of what the file holds, as Markdown."""
-    campaign.RUN_MISSING = False
     print(f"Sources: {commit}.\n\n| campaign | {' | '.join(COLUMNS)} |\n| --- |{' --- |' * len(COLUMNS)}")
     everything = []
     for plan in world_rows.plans():
@@ -109,16 +118,20 @@ def main() -> int:
     parser.add_argument("file", type=Path)
     parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1, help="trials at a time (default: one a core)")
     parser.add_argument("--seconds", type=float, default=float("inf"))
+    parser.add_argument("--of", choices=("world", "partner"), default="world", help="whose trials (default: the world)")
     parser.add_argument("--table", action="store_true")
     options = parser.parse_args()
     try:
         campaign.FILE = TrialFile(options.file, commit_in(options.file) if options.table else None)
     except ValueError as error:
         sys.exit(f"error: {error}")
+    of_partner, commit = options.of == "partner", campaign.FILE.commit
     if options.table:
-        table(campaign.FILE.commit)
+        campaign.RUN_MISSING = False
+        partner_table(commit) if of_partner else table(commit)
         return 0
-    jobs = campaign.in_turn([plan.jobs() for plan in world_rows.plans()])
+    rows = list(partner_rows.groups(commit).values()) if of_partner else [plan.jobs() for plan in world_rows.plans()]
+    jobs = campaign.in_turn(rows)
     os.nice(10)  # whatever else runs goes first
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:

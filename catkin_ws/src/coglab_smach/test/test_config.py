@@ -53,6 +53,26 @@ def test_what_is_given_beside_the_file_has_to_fit_too():
         Config.load(str(SHIPPED), {"hand.open_speed": "fast"})
 
 
+def test_a_timing_wins_over_the_file_and_what_is_given_beside_it_wins_over_the_timing():
+    natural, brisk, calm = (Config.load(str(SHIPPED), {"timing": name}) for name in ("natural", "brisk", "calm"))
+    assert calm.get("handover.belief") < brisk.get("handover.belief") < natural.get("handover.belief")
+    assert brisk.get("handover.reach_ratio") < natural.get("handover.reach_ratio") < calm.get("handover.reach_ratio")
+    assert calm.get("handover.doubt") == brisk.get("handover.doubt")
+    assert Config.load(str(SHIPPED)).get("hand.lift_after") == natural.get("hand.lift_after")
+    assert Config.load(str(SHIPPED), {"timing": "calm", "hand.lift_after": 2.0}).get("hand.lift_after") == 2.0
+    calm.set("timing", "brisk")
+    assert calm.get("handover.belief") == brisk.get("handover.belief")
+
+
+def test_an_unknown_timing_is_named_with_those_there_are(tmp_path):
+    with pytest.raises(ConfigError, match="no timing 'hasty'; timings: calm, natural, brisk"):
+        Config.load(str(SHIPPED), {"timing": "hasty"})
+    path = tmp_path / "machines.yaml"
+    path.write_text(SHIPPED.read_text().replace("timing: natural", "timing: hasty"))
+    with pytest.raises(ConfigError, match="no timing 'hasty'"):
+        Config.load(str(path))
+
+
 def test_a_file_that_became_bad_keeps_the_values_read_before(tmp_path):
     import os
 

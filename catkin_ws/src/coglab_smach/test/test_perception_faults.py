@@ -10,7 +10,7 @@ from coglab_py.pose import Pose
 from coglab_sim.tracker.tracker import Board, PerceptionSettings
 from coglab_sim.tracker.vision import NotSeen, Vision
 from coglab_sim.virtual_world import BOARD
-from coglab_smach.ports.interfaces import Located
+from coglab_smach.ports.interfaces import Ahead, Located
 from coglab_smach.ports.pending import Polled, PortError, Ready
 from virtual_trial import VirtualTrial
 
@@ -57,6 +57,9 @@ class VisionPort:
 
     def init_vision(self, time_limit):
         return Ready("rig")
+
+    def ahead(self):
+        return Ahead()
 
     def locate_object(self, object_id, time_limit):
         end = self.trial.clock.now() + time_limit

@@ -232,6 +232,22 @@ class GoalEstimator:
     @property
     def velocity(self) -> Array: ...
 
+class GoalWatch:
+    """When a goal that moves is no goal any more: it left its region, went back, or fell. All in m, one frame."""
+
+    def __init__(
+        self,
+        region_low: ArrayLike,
+        region_high: ArrayLike,
+        retreat: float,
+        drop: float,
+        hand: ArrayLike,
+        goal: ArrayLike,
+    ) -> None:
+        """Equal corners: anywhere; ``retreat`` and ``drop`` 0: any. ``hand`` and ``goal`` as the motion begins."""
+    def update(self, dt: float, goal: ArrayLike) -> tuple[int, str]:
+        """(ReasonCode, sentence) after dt s; (0, '') while the motion may go on."""
+
 class OrientationCurve:
     """Quaternion Bezier curve between two orientations."""
 

@@ -1,5 +1,6 @@
 #include "bindings.hpp"
 #include "coglab_controllers/dmp/cartesian_motion.hpp"
+#include "coglab_controllers/goal/goal_watch.hpp"
 #include "coglab_controllers/ptp/ptp_trajectory.hpp"
 
 namespace coglab_controllers::python {
@@ -140,6 +141,26 @@ void bindEstimators(py::module_& module) {
           py::arg("dt"), py::arg("goal"), "Returns g (m) and g' (m/s).")
       .def_property_readonly("position", &GoalEstimator::position)
       .def_property_readonly("velocity", &GoalEstimator::velocity);
+
+  py::class_<GoalWatch>(module, "GoalWatch",
+                        "When a goal that moves is no goal any more: left its region, went back, fell.")
+      .def(py::init([](const Vector3& region_low, const Vector3& region_high, double retreat,
+                       double drop, const Vector3& hand, const Vector3& goal) {
+             const GoalLimits limits{region_low, region_high, retreat, drop};
+             if (*limits.wrong() != 0) throw std::invalid_argument(limits.wrong());
+             GoalWatch watch;
+             watch.begin(limits, requireFinite(hand, "hand"), requireFinite(goal, "goal"));
+             return watch;
+           }),
+           py::arg("region_low"), py::arg("region_high"), py::arg("retreat"), py::arg("drop"),
+           py::arg("hand"), py::arg("goal"))
+      .def(
+          "update",
+          [](GoalWatch& watch, double dt, const Vector3& goal) {
+            const Reason reason = watch.update(requireStep(dt), requireFinite(goal, "goal"));
+            return py::make_tuple(static_cast<int>(reason.number()), reason.str());
+          },
+          py::arg("dt"), py::arg("goal"), "Returns (ReasonCode, sentence); (0, '') while it may go on.");
 
   py::class_<OrientationCurve>(module, "OrientationCurve",
                                "Quaternion Bezier curve between two orientations.")

@@ -37,6 +37,7 @@ class Config:
         config = Config(_read(path), path, warn)
         _checked(Document("configuration given beside the file", "", _nested(overrides or {}), {}))
         config._overrides = dict(overrides or {})
+        _known_timing(path, str(config._overrides.get("timing", "")), config._values)
         return config
 
     _overrides: dict[str, Any] = {}
@@ -46,6 +47,9 @@ class Config:
         if name in self._overrides:
             return self._overrides[name]
         self._reload_if_changed()
+        timed = self._timing()
+        if name in timed:
+            return timed[name]
         node: Any = self._values
         for part in name.split("."):
             if not isinstance(node, Mapping) or part not in node:
@@ -54,6 +58,12 @@ class Config:
                 return default
             node = node[part]
         return node
+
+    def _timing(self) -> Mapping[str, Any]:
+        """Values by dotted name of the timing that is in force; a name that the file does not have changes nothing."""
+        chosen = self._overrides.get("timing", self._values.get("timing", ""))
+        timed: Mapping[str, Any] = self._values.get("timings", {}).get(chosen, {})
+        return timed
 
     def set(self, name: str, value: Any) -> None:
         """Override one value while running (the console and tests use it)."""
@@ -81,7 +91,9 @@ def _read(path: str) -> dict[str, Any]:
         document = read(path)
     except YamlError as error:
         raise ConfigError(str(error)) from None
-    return _checked(document)
+    values = _checked(document)
+    _known_timing(path, str(values.get("timing", "")), values)
+    return values
 
 
 def _checked(document: Document) -> dict[str, Any]:
@@ -91,6 +103,13 @@ def _checked(document: Document) -> dict[str, Any]:
         raise ConfigError(str(error)) from None
     values: dict[str, Any] = document.value
     return values
+
+
+def _known_timing(path: str, timing: str, values: Mapping[str, Any]) -> None:
+    """ConfigError where a timing is asked for that there is not."""
+    timings = values.get("timings", {})
+    if timing and timing not in timings:
+        raise ConfigError(f"{path}: there is no timing '{timing}'; timings: {', '.join(timings) or 'none'}")
 
 
 def _nested(overrides: Mapping[str, Any]) -> dict[str, Any]:

@@ -213,6 +213,11 @@ class Journal:
             if self._action is not None:
                 self._action.marks.setdefault(name, self._now())
 
+    def marked(self, name: str) -> bool:
+        """Whether this event has happened in the running action."""
+        with self._lock:
+            return self._action is not None and name in self._action.marks
+
     def failure(self, sentence: str, causes: tuple[str, ...] = (), code: int = 0) -> None:
         """A state failed: kept as the reason of the action if it is the first."""
         with self._lock:

@@ -13,10 +13,8 @@ from coglab_smach.kinematics.motion_time import ptp_time, reach_time
 from coglab_smach.ports.interfaces import DmpRequest
 from coglab_smach.ports.pending import Polled, PortError
 from coglab_smach.states.base import CoglabState, Interrupted, TimeLimit
+from coglab_smach.states.early_reach import EarlyReach
 from coglab_smach.states.held import HeldObject
-
-DOUBT_TIME = 0.06
-"""s for which nothing is believed before a reach ends"""
 
 
 class LoadControllers(CoglabState):
@@ -154,11 +152,11 @@ class WaitStop(CoglabState):
         self.trigger = trigger
         self._left = False
         """the compliant profile of the approach"""
+        self._early: EarlyReach | None = None
 
     def run(self, ud: Any) -> str:
         self._left = False
-        self._early = bool(ud.goal.get("early", False)) if self.trigger else False
-        self._doubted: float | None = None
+        self._early = EarlyReach(self, ud.goal) if self.trigger and "early" in ud.goal else None
         if self.trigger == "contact":
             return self._await_contact(ud)
         return self._await_end(ud)
@@ -248,21 +246,9 @@ class WaitStop(CoglabState):
         blocked = self.ctx.arm.motion_allowed()
         if not blocked.ok:
             raise TimeLimit("the arm does not follow any more", (blocked.why,), blocked.code)
-        if self._early:
-            self._check_belief()
+        if self._early is not None:
+            self._early.check()
         return progress.state == "reached"
-
-    def _check_belief(self) -> None:
-        """A reach that began on a belief ends with it."""
-        ahead, now = self.ctx.perception.ahead(), self.ctx.clock.now()
-        if max(ahead.offer, ahead.request) >= float(self.ctx.config.get("handover.doubt", 0.1)):
-            self._doubted = None
-        elif self._doubted is None:
-            self._doubted = now
-        elif now - self._doubted > DOUBT_TIME:
-            raise TimeLimit(
-                "the reach was given up", ("the person does not offer or ask any more",), ReasonCode.GOAL_WITHDRAWN
-            )
 
 
 class MonitorDmp(CoglabState):

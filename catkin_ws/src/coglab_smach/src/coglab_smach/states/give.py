@@ -14,7 +14,7 @@ from coglab_smach.states.arm import WaitStop
 from coglab_smach.states.base import CoglabState, Interrupted, TimeLimit
 from coglab_smach.states.held import HeldObject
 from coglab_smach.states.motion import await_rest, rise
-from coglab_smach.states.weight import hand_from_palm
+from coglab_smach.states.where import hand_from_palm
 
 FINGERS = slice(1, 5)
 """motors that bend fingers"""

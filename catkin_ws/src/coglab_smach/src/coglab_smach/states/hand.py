@@ -51,12 +51,21 @@ class HandPreshape(CoglabState):
 
 
 class HandClose(CoglabState):
-    """Close the preshaped hand on the object and make sure that something is in it; with ``from_person`` say so."""
+    """Close the preshaped hand on the object and make sure that something is in it; with ``from_person`` say so.
+
+    Outcome missed, with ``from_person``: the fingers have closed on nothing for the first time in this action; a person
+    who offers waits, so the arm may try once more.
+    """
 
     default_time_limit = 12.0
 
     def __init__(self, ctx: Context, from_person: bool) -> None:
-        super().__init__(ctx, input_keys=["object_id"], output_keys=["hand_distance"] if from_person else [])
+        super().__init__(
+            ctx,
+            outcomes=["succeeded", "missed"] if from_person else ["succeeded"],
+            input_keys=["object_id"],
+            output_keys=["hand_distance"] if from_person else [],
+        )
         self.from_person = from_person
 
     def run(self, ud: Any) -> str:
@@ -74,6 +83,10 @@ class HandClose(CoglabState):
         state = self.ctx.hand.state()
         if state.connected and not state.holding:
             self.ctx.holding, self.ctx.shared = "", False
+            if self.from_person and not self.ctx.journal.marked("missed"):
+                self.ctx.journal.mark("missed")
+                self.reason = "the hand closed on nothing: once more"
+                return "missed"
             raise PortError(
                 f"the hand closed on nothing: motors at {list(state.positions)} of 254",
                 (state.message,) if state.message else (),

@@ -141,6 +141,7 @@ def await_offer(state: CoglabState, target: str, goals: Goals, margin: float = 0
                 goal = first_reachable(state.ctx, early, candidates)
             if goal is not None:
                 state.ctx.journal.mark("offered")
+                state.pause(float(config.get("handover.start_after", 0.0)))
                 return goal
             if now > end and offered:
                 raise PortError(*out_of_reach(target, located, candidates[0]), ReasonCode.GOAL_UNREACHABLE)
@@ -179,15 +180,18 @@ def handover_region(ctx: Context, margin: float = 0.0) -> tuple[np.ndarray, np.n
 def unless_withdrawn(ctx: Context, goal: Mapping[str, Any], margin: float = 0.0) -> dict[str, Any]:
     """The goal of a motion that ends by itself when what it follows leaves the region, goes back or falls."""
     low, high = handover_region(ctx, margin)
-    # A predicted place goes to and fro as the prediction is corrected: who offers it is watched by the belief.
-    early = str(goal["frame"]).endswith("_ahead")
     limits = {
         "goal_region_low": low.tolist(),
         "goal_region_high": high.tolist(),
-        "goal_retreat": 0.0 if early else float(ctx.config.get("handover.retreat", 0.10)),
-        "goal_drop": 0.0 if early else float(ctx.config.get("handover.drop", 0.08)),
+        "goal_retreat": float(ctx.config.get("handover.retreat", 0.10)),
+        "goal_drop": float(ctx.config.get("handover.drop", 0.08)),
     }
-    return {**goal, "limits": limits, "early": early}
+    if not str(goal["frame"]).endswith("_ahead"):
+        return {**goal, "limits": limits}
+    # A predicted place goes to and fro as the prediction is corrected: going back and falling are watched in what is
+    # seen, by the state that waits for the reach.
+    early = {"retreat": limits["goal_retreat"], "drop": limits["goal_drop"]}
+    return {**goal, "limits": {**limits, "goal_retreat": 0.0, "goal_drop": 0.0}, "early": early}
 
 
 def palm_of(seen: Mapping[str, Any], goal: Mapping[str, Any]) -> Pose:
@@ -195,9 +199,7 @@ def palm_of(seen: Mapping[str, Any], goal: Mapping[str, Any]) -> Pose:
     return Pose.from_dict(seen) * Pose.from_dict({"xyz": goal["offset"], "quaternion": goal["orientation"]})
 
 
-def first_reachable(
-    ctx: Context, seen: Mapping[str, Any], goals: list[dict[str, Any]]
-) -> dict[str, Any] | None:
+def first_reachable(ctx: Context, seen: Mapping[str, Any], goals: list[dict[str, Any]]) -> dict[str, Any] | None:
     """The first of the goals for which the arm has a posture, relative to what was seen; with ``handover.check_reach``
     false the first one."""
     unchecked = not bool(ctx.config.get("handover.check_reach", True))

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
 from coglab_msgs.msg import ReasonCode
 
 from coglab_smach.context.context import Context
-from coglab_smach.kinematics.reachability import default_arm
 from coglab_smach.ports.pending import Pending, PortError
 from coglab_smach.states.base import CoglabState, TimeLimit
+from coglab_smach.states.motion import rise
 from coglab_smach.states.where import hand_from_palm
 
 
@@ -51,7 +50,8 @@ class TakeWeight(CoglabState):
 
         try:
             self.pause(float(self.ctx.config.get("hand.lift_after", 0.1)))
-            self._lifting = self._lift()
+            height, speed = (float(self.ctx.config.get(f"hand.{name}", 0.03)) for name in ("lift", "lift_speed"))
+            self._lifting = rise(self.ctx, height, speed)
             self.wait_for(has_let_go, "the person's letting go", end - self.ctx.clock.now())
         except TimeLimit as error:
             self.ctx.holding = ""
@@ -70,16 +70,3 @@ class TakeWeight(CoglabState):
         self.ctx.shared = False
         self.ctx.journal.mark("released")
         return "succeeded"
-
-    def _lift(self) -> Pending | None:
-        """Begin to rise, each joint as fast as its share of the way asks for; None where the posture is not known."""
-        here = self.ctx.arm.joint_positions()
-        if here is None:
-            return None
-        height = float(self.ctx.config.get("hand.lift", 0.03))
-        speed = float(self.ctx.config.get("hand.lift_speed", 0.03))
-        jacobian = default_arm().jacobian(np.asarray(here))
-        up = np.array([0.0, 0.0, height, 0.0, 0.0, 0.0])
-        way = jacobian.T @ np.linalg.solve(jacobian @ jacobian.T + 1e-4 * np.eye(6), up)
-        velocity = np.maximum(np.abs(way) * speed / height, 1e-3)
-        return self.ctx.arm.move_ptp((np.asarray(here) + way).tolist(), velocity.tolist())

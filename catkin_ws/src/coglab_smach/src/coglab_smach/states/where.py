@@ -21,9 +21,13 @@ def palm_at(ctx: Context) -> np.ndarray | None:
 
 def person_at(state: CoglabState) -> np.ndarray | None:
     """m."""
-    hand = str(state.ctx.config.get("perception.human_hand", "human_hand"))
+    return seen_at(state, str(state.ctx.config.get("perception.human_hand", "human_hand")))
+
+
+def seen_at(state: CoglabState, target: str) -> np.ndarray | None:
+    """m, of an object or of the person's hand as perception names it."""
     try:
-        seen = state.await_pending(state.ctx.perception.locate_object(hand, 0.3), "sight of the person's hand", 0.5)
+        seen = state.await_pending(state.ctx.perception.locate_object(target, 0.3), f"sight of '{target}'", 0.5)
     except PortError:
         return None
     return np.array(seen.xyz) if seen.age <= OLDEST else None
