@@ -183,3 +183,18 @@ def test_who_offers_and_withdraws_five_times_is_not_chased():
             + ", ".join(f"{speed:.2f}" for speed in fastest.values())
             + " m/s"
         )
+
+
+def test_a_tug_while_the_hand_has_closed():
+    """A person who pulls to and fro before letting go: at most 15 N between the two hands."""
+    trial = VirtualTrial(seed=31, profile="accustomed", perfect=True, behaviour="tug")
+    forces = [0.0]
+
+    def beside(t):
+        if t._reach is None and t.begun:
+            forces.append(float(np.linalg.norm(t.rig.cell.truth()["human_force"])))
+
+    trial.beside = beside
+    results = trial.run(RECEIVE)
+    assert results[0].outcome == "succeeded", trial.ctx.journal.why()
+    assert 5.0 < max(forces) <= 15.0

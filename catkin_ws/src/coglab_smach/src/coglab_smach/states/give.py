@@ -64,10 +64,6 @@ class LooseningGrip:
         if self._closing is None:
             self._closing = self._hand.close(self._closing_speed)
 
-    def tight(self) -> bool:
-        """Whether the closing has ended that was begun last; it may have failed."""
-        return self._closing is None or self._closing.done()
-
 
 class WaitTaker(WaitStop):
     """The end of a reach toward the person's hand: the arm stands and follows nothing any more, and the contact
@@ -138,9 +134,9 @@ class GiveLoad(CoglabState):
     delivery's ``release`` asks for. The contact detector is armed for release (WaitStop).
 
     The grip loosens in proportion to their share of the weight, by ``give.loosen`` counts at most. When the load comes
-    back to the arm the grip closes again. Where nothing has happened for ``give.lower_after`` s and the person's hand
-    is at the object, the arm sinks by ``give.lower`` m, so that the weight comes to lie in that hand. After the time
-    limit the hand is closed and keeps the object.
+    back to the arm, or the object sinks in the hand by ``give.slip`` m, the grip closes again. Where nothing has
+    happened for ``give.lower_after`` s and the person's hand is at the object, the arm sinks by ``give.lower`` m, so
+    that the weight comes to lie in that hand. After the time limit the hand is closed and keeps the object.
     """
 
     default_time_limit = 20.0
@@ -201,8 +197,10 @@ class GiveLoad(CoglabState):
         return False
 
     def _follow(self, share: float, begins: float, now: float) -> None:
-        """As loose as the share asks for; closed again where it does not stay."""
-        if share > begins / 2:
+        """As loose as the share asks for; closed again where it does not stay, and where the object slips."""
+        if self._held.sunk > self._number("slip", 0.03) and (self._grip.loosened() or 0) > 0:
+            self._grip.tighten()
+        elif share > begins / 2:
             self._back_since = None
             part = (share - begins) / max(1e-6, self._needed - begins)
             if part > 0.0:
@@ -211,13 +209,13 @@ class GiveLoad(CoglabState):
                 self._grip.loosen_to(min(1.0, part) * self._number("loosen", 4.0))
             else:
                 self._grip.stand()
-            return
-        self._back_since = now if self._back_since is None else self._back_since
-        self._grip.stand()
-        if now - self._back_since >= self._number("back_time", 0.1):
-            self.ctx.shared = False
-            if (self._grip.loosened() or 0) > 0:
-                self._grip.tighten()
+        else:
+            self._back_since = now if self._back_since is None else self._back_since
+            self._grip.stand()
+            if now - self._back_since >= self._number("back_time", 0.1):
+                self.ctx.shared = False
+                if (self._grip.loosened() or 0) > 0:
+                    self._grip.tighten()
 
     def _lower(self, now: float) -> None:
         """Sink, if the person's hand is there; else look again in a moment."""

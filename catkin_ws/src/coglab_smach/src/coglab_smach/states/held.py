@@ -27,7 +27,12 @@ class HeldObject:
     def __init__(self, ctx: Context, object_id: str) -> None:
         self._ctx, self._object_id = ctx, object_id
         self._sight: Pending | None = None
+        self._above = 0.0
+        """m of the object over the palm"""
         self._carried: float | None = None
+        self._height = self._before = 0.0
+        self.sunk = 0.0
+        """m by which the object is lower against the palm than it was at first, in both of its last two sights"""
         self._away_since: float | None = None
 
     def check(self) -> None:
@@ -40,6 +45,8 @@ class HeldObject:
             return
         if self._carried is None:
             self._carried = distance if distance < NEAR else None
+            self._height = self._before = self._above
+        self.sunk, self._before = self._height - max(self._above, self._before), self._above
         if self._carried is None or distance < self._carried + FARTHER:
             self._away_since = None
             return
@@ -71,4 +78,6 @@ class HeldObject:
             return None
         if here is None or seen.age > OLDEST:
             return None
-        return float(np.linalg.norm(np.array(seen.xyz) - default_arm().fk(np.asarray(here))[0]))
+        way = np.array(seen.xyz) - default_arm().fk(np.asarray(here))[0]
+        self._above = float(way[2])
+        return float(np.linalg.norm(way))
