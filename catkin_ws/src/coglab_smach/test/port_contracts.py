@@ -217,9 +217,6 @@ class ContactContract(Contract):
             assert self.port.share_gone() is None
             self.watches("release", mass=0.8, load_share=0.5)
             assert abs(self.port.share_gone()) < 0.1
-            self.place.push(-5.0)
-            self.until(lambda: 0.2 < self.port.share_gone() < 0.5, 2.0, "a part of the load")
-            self.stays(lambda: self.port.event() is None, 0.2)
             self.place.push(0.0)
             self.happens(False, ReasonCode.LOAD_RELEASED)
             self.until(lambda: self.port.share_gone() > 0.7, 2.0, "the load")

@@ -1,8 +1,14 @@
 """The robot gives: the grip follows the person's share of the load, and every end without a taker keeps the object."""
 
+from types import SimpleNamespace
+
 import pytest
 from coglab_msgs.msg import ReasonCode
 from coglab_smach.contact.leaving_load import SAME, LeavingLoad
+from coglab_smach.kinematics.reachability import default_arm
+from coglab_smach.ports.interfaces import HandState, Located
+from coglab_smach.ports.pending import PortError, Ready
+from coglab_smach.states.held import FARTHER, LOST_TIME, HeldObject
 from conftest import Trial
 
 RECEIVE, GIVE = "exchange_human_to_robot", "exchange_robot_to_human"
@@ -129,3 +135,55 @@ def test_who_lifts_before_the_arm_stands_is_felt():
     assert load.share == pytest.approx(0.8) and 0.8 * WEIGHT > SAME
     with pytest.raises(ValueError, match="mass"):
         LeavingLoad(0.0, 0.6, 1.0)
+
+
+class Carried:
+    """A hand at one posture with an object that is seen so far (m, up) from its palm at 30 Hz."""
+
+    def __init__(self):
+        posture = [0.0, 0.5, 0.0, 1.0, 0.0, 0.5, 0.0]
+        self.palm, self.t, self.up, self.holding = default_arm().fk(posture)[0], 0.0, -0.07, True
+        see = lambda *_: Ready(Located("", "world", (*self.palm[:2], self.palm[2] + self.up), (0, 0, 0, 1), 0.05))  # noqa: E731
+        self.ctx = SimpleNamespace(
+            arm=SimpleNamespace(joint_positions=lambda: tuple(posture)),
+            hand=SimpleNamespace(state=lambda: HandState(True, True, False, self.holding)),
+            perception=SimpleNamespace(locate_object=see),
+            clock=SimpleNamespace(now=lambda: self.t),
+            holding="mug",
+            shared=True,
+        )
+        self.held = HeldObject(self.ctx, "mug")
+
+    def look(self, duration=0.1):
+        for _ in range(round(30 * duration)):
+            self.t += 1 / 30
+            self.held.check()
+        return self.held
+
+
+def test_an_object_that_sinks_in_the_hand_is_seen_and_one_wrong_sight_is_nothing():
+    carried = Carried()
+    assert carried.look().sunk == pytest.approx(0.0)
+    carried.up -= 0.04
+    assert carried.look(0.034).sunk == pytest.approx(0.0)
+    assert carried.look(0.034).sunk == pytest.approx(0.04)
+
+
+def test_an_object_that_is_seen_elsewhere_for_long_enough_is_lost():
+    carried = Carried()
+    carried.look()
+    carried.up -= FARTHER + 0.05
+    assert not carried.look(0.6 * LOST_TIME).there()
+    carried.up += FARTHER
+    assert carried.look().there()
+    carried.up -= FARTHER
+    with pytest.raises(PortError, match="has left the hand") as lost:
+        carried.look(2 * LOST_TIME)
+    assert lost.value.code == ReasonCode.OBJECT_NOT_SEEN and carried.ctx.holding == "" and not carried.ctx.shared
+
+
+def test_open_fingers_hold_nothing_wherever_the_object_is_seen():
+    carried = Carried()
+    carried.holding = False
+    with pytest.raises(PortError, match="has left the hand"):
+        carried.look()

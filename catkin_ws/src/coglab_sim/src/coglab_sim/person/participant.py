@@ -24,6 +24,7 @@ BEHAVIOURS = (
     "absent",
     "tug",
     "early_contact",
+    "withdraws",
 )
 
 PROFILES = ("drawn", "patient", "accustomed")

@@ -29,6 +29,8 @@ CORRECTION_TIME = 0.45
 """s, a correction on the way takes at least this long"""
 GONE = 0.35
 """m: a robot's hand that has been near and is then farther away than this has given up"""
+WITHDRAWALS, COMES = 5, 0.25
+"""offers that are taken back by who does that, and m from the object at which the robot's hand makes them do it"""
 LOST, AWAY = 0.2, 0.35
 """share of the weight that is felt no more, and m between hand and object as seen, at which the object is lost"""
 TASKS = {Say.READY_TO_RECEIVE: "give", Say.READY_TO_GIVE: "receive", Say.GIVEN_UP: "rest", Say.PLEASE_STEP_BACK: "rest"}
@@ -219,8 +221,15 @@ class VirtualHuman(Giving, Receiving):
                 self._target = aside
         self._correct(t, seen)
         self._follow(t)
-        if reach.over(t):
+        if self._withdraws(self._gap(seen.robot_hand, seen.object)):
+            self._retreat(t)
+        elif reach.over(t):
             self._go("waiting", t)
+
+    def _withdraws(self, gap: float) -> bool:
+        """Who does that takes the offer back when the robot's hand is seen to come, the first five times."""
+        teases = self.participant.behaviour == "withdraws" and self._task == "give" and self.trial <= WITHDRAWALS
+        return teases and gap < COMES
 
     def _hesitating(self, t: float, dt: float, seen: Percept) -> None:
         self._velocity *= np.exp(-dt / 0.08)
@@ -238,6 +247,9 @@ class VirtualHuman(Giving, Receiving):
         self._met = self._met or near
         if self._task == "give" and self._taken_already(seen, near):
             self._go("holding", t)
+            return
+        if self._withdraws(gap):
+            self._retreat(t)
             return
         early = p.behaviour == "early_contact" and self._task == "give" and gap < NEAR + 0.1 and moves
         if early or (near and p.places_while_moving):

@@ -95,11 +95,10 @@ class FusedDetector:
             raise ValueError(f"{mode} needs a model of the arm and learnt thresholds, and there are none")
         leaving = None
         if mode == RELEASE and self.moving is not None:
-            if not timeout > 0.0:
-                raise ValueError(f"timeout must be a positive time in s, got {timeout}")
+            # Armed too, so that it does not learn what a hand that takes the load does; its own event is not told.
+            self.still.arm(mode, now, timeout, k, joints, mass, load_share)
             share = load_share if load_share > 0.0 else self.still.settings.load_share
             leaving = LeavingLoad(mass, share, now + timeout, self.moving.weight_before_motion())
-            self.still.disarm()
             self._lift = None
         elif mode == LIFT:
             if not (mass > 0.0 and timeout > 0.0):
@@ -148,7 +147,7 @@ class FusedDetector:
     def feed(self, stamp: float, torque: Joints, position: Joints, velocity: Joints) -> ContactEvent | None:
         """External torques as the robot controller estimates them, and the joints: see ContactDetector.feed."""
         event = self.still.feed(stamp, torque, position, velocity)
-        if event is None:
+        if event is None or self._leaving is not None:
             return None
         self._until = None
         # Who has felt the load come knows what the arm carries from now on; with its going the hand is empty.

@@ -36,6 +36,6 @@ def build_exchange_human_to_robot(ctx: Context) -> CoglabMachine:
         )
         machine.add_state("open_again", HandOpen(ctx), to_recovery(succeeded="set_dmp_goal"))
         machine.add_state("take_weight", TakeWeight(ctx), to_recovery(succeeded="coglab_home_robot"))
-        machine.add_state("coglab_home_robot", HomeRobot(ctx), to_recovery(succeeded="succeeded"))
+        machine.add_state("coglab_home_robot", HomeRobot(ctx, carries=True), to_recovery(succeeded="succeeded"))
         machine.add_state("recover", build_recovery(ctx), RECOVERY_TRANSITIONS)
     return machine

@@ -31,7 +31,7 @@ from coglab_msgs.srv import (
     SwitchDmp,
     SwitchDmpRequest,
 )
-from geometry_msgs.msg import Point, Quaternion
+from geometry_msgs.msg import Point, Quaternion, Vector3
 from sensor_msgs.msg import JointState
 
 from coglab_smach.kinematics.manager_limits import read_limits
@@ -294,5 +294,5 @@ def _fields(request: DmpRequest, kind: type[ExecuteDmpRequest | SwitchDmpRequest
     for name, value in vars(request).items():
         if name in message.__slots__:
             own = type(getattr(message, name))
-            setattr(message, name, own(*value) if own in (Point, Quaternion) else value)
+            setattr(message, name, own(*value) if own in (Point, Quaternion, Vector3) else value)
     return {name: getattr(message, name) for name in message.__slots__}

@@ -11,9 +11,10 @@ from coglab_msgs.msg import ReasonCode
 from coglab_smach.context.context import Context
 from coglab_smach.kinematics.motion_time import ptp_time, reach_time
 from coglab_smach.ports.interfaces import DmpRequest
-from coglab_smach.ports.pending import PortError
+from coglab_smach.ports.pending import Polled, PortError
 from coglab_smach.states.base import CoglabState, Interrupted, TimeLimit
 from coglab_smach.states.early_reach import EarlyReach
+from coglab_smach.states.held import HeldObject
 
 
 class LoadControllers(CoglabState):
@@ -326,9 +327,18 @@ class PtpMotion(CoglabState):
                 float(self.ctx.config.get("ptp_timeout", 5.0))
                 + 1.5 * ptp_time(arm.motion_limits(), here, target, speed)
             )
-        self.await_pending(arm.move_ptp(target, speed), f"the motion to posture '{self.posture}'", pace=arm.speed_scale)
+        motion, look = arm.move_ptp(target, speed), self._look_after(ud)
+        self.await_pending(
+            Polled(lambda: look() or motion.done(), motion.result, motion.cancel),
+            f"the motion to posture '{self.posture}'",
+            pace=arm.speed_scale,
+        )
         self._verify(target)
         return "succeeded"
+
+    def _look_after(self, ud: Any) -> Callable[[], object]:
+        """What is to be looked at again and again on the way: it raises what ends the motion, and returns nothing."""
+        return lambda: None
 
     def _verify(self, target: list[float]) -> None:
         """The controller says it has arrived: the measured joints must agree (they are allowed 1 s to settle)."""
@@ -343,7 +353,14 @@ class PtpMotion(CoglabState):
 
 
 class HomeRobot(PtpMotion):
-    """coglab_home_robot: the arm goes to its home posture."""
+    """coglab_home_robot: the arm goes to its home posture; with ``carries``, with the object of the action in the hand,
+    and it ends where that is lost."""
 
-    def __init__(self, ctx: Context) -> None:
+    def __init__(self, ctx: Context, carries: bool = False) -> None:
         super().__init__(ctx, "home")
+        self.carries = carries
+        if carries:
+            self.register_input_keys(["object_id"])
+
+    def _look_after(self, ud: Any) -> Callable[[], object]:
+        return HeldObject(self.ctx, ud.object_id).check if self.carries else super()._look_after(ud)

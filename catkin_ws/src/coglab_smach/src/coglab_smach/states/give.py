@@ -12,6 +12,7 @@ from coglab_smach.ports.interfaces import HandPort
 from coglab_smach.ports.pending import Pending, PortError
 from coglab_smach.states.arm import WaitStop
 from coglab_smach.states.base import CoglabState, Interrupted, TimeLimit
+from coglab_smach.states.held import HeldObject
 from coglab_smach.states.motion import await_rest, rise
 from coglab_smach.states.where import hand_from_palm
 
@@ -63,10 +64,6 @@ class LooseningGrip:
         if self._closing is None:
             self._closing = self._hand.close(self._closing_speed)
 
-    def tight(self) -> bool:
-        """Whether the closing has ended that was begun last; it may have failed."""
-        return self._closing is None or self._closing.done()
-
 
 class WaitTaker(WaitStop):
     """The end of a reach toward the person's hand: the arm stands and follows nothing any more, and the contact
@@ -79,10 +76,12 @@ class WaitTaker(WaitStop):
     """
 
     def __init__(self, ctx: Context) -> None:
-        super().__init__(ctx, "taker", ["object_entry", "delivery", "goal"])
+        super().__init__(ctx, "taker", ["object_id", "object_entry", "delivery", "goal"])
+        self._held: HeldObject
 
     def _await_end(self, ud: Any) -> str:
         contact, settings, release = self.ctx.contact, self._settings(ud), ud.delivery["release"]
+        self._held = HeldObject(self.ctx, ud.object_id)
         self._await_reach(lambda: self._reached() or self._comes_to_its_end())
         self.reason = self._await_taker(settings) if not self._reached() else ""
         self.ctx.journal.mark("motion_reached")
@@ -90,11 +89,16 @@ class WaitTaker(WaitStop):
         if not self.reason:  # it has to come to rest at the goal that it has latched
             await_rest(self.ctx, self.check)
         self.await_pending(self.ctx.arm.switch_controller("ptp"), "end of the reach by switching to 'ptp'", 3.0)
+        self.wait_for(self._held.there, "a sight of the object in the hand", 2.0)
         limit = float(release.get("timeout", self.ctx.config.get("release_timeout", 8.0)))
         weight = {"mass": settings["mass"], "load_share": float(release.get("threshold", 0.5))}
         # give_load begins in a moment, and ends it.
         self.await_pending(contact.arm("release", limit + 5.0, weight), "arming of the contact detector", 2.0)
         return "succeeded"
+
+    def _reached(self) -> bool:
+        self._held.check()
+        return super()._reached()
 
     def _await_taker(self, settings: dict[str, Any]) -> str:
         """Until the reach has ended; or until the person has come, and then what tells that."""
@@ -130,9 +134,9 @@ class GiveLoad(CoglabState):
     delivery's ``release`` asks for. The contact detector is armed for release (WaitStop).
 
     The grip loosens in proportion to their share of the weight, by ``give.loosen`` counts at most. When the load comes
-    back to the arm the grip closes again. Where nothing has happened for ``give.lower_after`` s and the person's hand
-    is at the object, the arm sinks by ``give.lower`` m, so that the weight comes to lie in that hand. After the time
-    limit the hand is closed and keeps the object.
+    back to the arm, or the object sinks in the hand by ``give.slip`` m, the grip closes again. Where nothing has
+    happened for ``give.lower_after`` s and the person's hand is at the object, the arm sinks by ``give.lower`` m, so
+    that the weight comes to lie in that hand. After the time limit the hand is closed and keeps the object.
     """
 
     default_time_limit = 20.0
@@ -141,6 +145,7 @@ class GiveLoad(CoglabState):
     def __init__(self, ctx: Context) -> None:
         super().__init__(ctx, input_keys=["object_id", "delivery"])
         self._grip: LooseningGrip
+        self._held: HeldObject
         self._lowering: Pending | None = None
         self._lower_at = 0.0
         self._needed = 0.0
@@ -158,6 +163,7 @@ class GiveLoad(CoglabState):
             self.ctx.hand, int(self._number("loosen_speed", 40)), int(self._number("close_speed", 120))
         )
         self._lowering, self._back_since = None, None
+        self._held = HeldObject(self.ctx, ud.object_id)
         self._lower_at = self.ctx.clock.now() + self._number("lower_after", 3.0)
         try:
             self.wait_for(self._taken, "the person's taking of the load", limit)
@@ -181,7 +187,7 @@ class GiveLoad(CoglabState):
 
     def _taken(self) -> bool:
         """Look at the person's share, and do what it asks for; whether it is enough."""
-        if self.ctx.contact.event() is not None:
+        if self._held.there() and self.ctx.contact.event() is not None:
             return True
         share, now = self.ctx.contact.share_gone(), self.ctx.clock.now()
         begins = self._number("begins", 0.2)
@@ -191,8 +197,10 @@ class GiveLoad(CoglabState):
         return False
 
     def _follow(self, share: float, begins: float, now: float) -> None:
-        """As loose as the share asks for; closed again where it does not stay."""
-        if share > begins / 2:
+        """As loose as the share asks for; closed again where it does not stay, and where the object slips."""
+        if self._held.sunk > self._number("slip", 0.03) and (self._grip.loosened() or 0) > 0:
+            self._grip.tighten()
+        elif share > begins / 2:
             self._back_since = None
             part = (share - begins) / max(1e-6, self._needed - begins)
             if part > 0.0:
@@ -201,13 +209,13 @@ class GiveLoad(CoglabState):
                 self._grip.loosen_to(min(1.0, part) * self._number("loosen", 4.0))
             else:
                 self._grip.stand()
-            return
-        self._back_since = now if self._back_since is None else self._back_since
-        self._grip.stand()
-        if now - self._back_since >= self._number("back_time", 0.1):
-            self.ctx.shared = False
-            if (self._grip.loosened() or 0) > 0:
-                self._grip.tighten()
+        else:
+            self._back_since = now if self._back_since is None else self._back_since
+            self._grip.stand()
+            if now - self._back_since >= self._number("back_time", 0.1):
+                self.ctx.shared = False
+                if (self._grip.loosened() or 0) > 0:
+                    self._grip.tighten()
 
     def _lower(self, now: float) -> None:
         """Sink, if the person's hand is there; else look again in a moment."""
