@@ -11,6 +11,17 @@
 namespace coglab_rt {
 namespace {
 
+/// Lies in the stack of every thread of this program, as do those of the libraries of a node.
+thread_local volatile char of_the_thread[96 * 1024];
+
+TEST(BoundedThread, WhatThreadLocalVariablesTakeOfTheStackIsNotTouched) {
+  bool ran = false;
+  BoundedThread thread;
+  thread.start("narrow", 128 * 1024, [&ran] { ran = of_the_thread[0] == 0; });
+  thread.join();
+  EXPECT_TRUE(ran);
+}
+
 /// The pages that a body uses first are there before it runs: no page fault comes later.
 TEST(BoundedThread, TheStackBelowTheBodyIsTouchedBeforeItRuns) {
   constexpr std::size_t kStack = 4096 * 1024;  // no stack that the C library keeps from before

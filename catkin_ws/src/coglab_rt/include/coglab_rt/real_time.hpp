@@ -78,12 +78,25 @@ __attribute__((noinline)) inline void touchStack(std::size_t bytes) {
   for (std::size_t i = 0; i < bytes; i += 1024) stack[i] = 0;
 }
 
+/// Bytes of the calling thread's stack below its caller. Thread-local variables of all libraries
+/// lie in the stack too, so that it is less than was asked for; 0 if it is not known.
+inline std::size_t stackLeft() {
+  pthread_attr_t attributes;
+  if (pthread_getattr_np(pthread_self(), &attributes) != 0) return 0;
+  void* lowest = nullptr;
+  std::size_t size = 0;
+  const bool known = pthread_attr_getstack(&attributes, &lowest, &size) == 0;
+  pthread_attr_destroy(&attributes);
+  const auto* here = static_cast<const char*>(__builtin_frame_address(0));
+  return known ? static_cast<std::size_t>(here - static_cast<const char*>(lowest)) : 0;
+}
+
 }  // namespace detail
 
 inline void* BoundedThread::entry(void* self) {
   auto* thread = static_cast<BoundedThread*>(self);
   pthread_setname_np(pthread_self(), thread->name_.c_str());
-  detail::touchStack(thread->stack_bytes_ / 2);
+  detail::touchStack(std::min(thread->stack_bytes_, detail::stackLeft()) / 2);
   thread->body_();
   return nullptr;
 }
