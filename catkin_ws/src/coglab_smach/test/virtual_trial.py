@@ -113,6 +113,13 @@ class VirtualTrial:
             self.touches.append(self._touch)
             self._reach = self._touch = None
 
+    def palm_off_grasp(self):
+        """(m, rad) from the true palm to the true grasp of the reach that was asked for last."""
+        request, robot = self.ctx.arm.request, self.rig.robot
+        palm = Pose(*robot.chain.fk(robot.report["position"]))
+        grasp = Pose(np.asarray(request.goal_offset, dtype=float), np.asarray(request.target_orientation))
+        return palm.distance(pose_of_truth(self.rig.truth["object"]) * grasp)
+
     def run(self, *actions, limit=60.0, script=None):
         """Execute ``actions``, or ``script(trial)``; returns the results of the actions as the journal holds them."""
         with using(self.clock):

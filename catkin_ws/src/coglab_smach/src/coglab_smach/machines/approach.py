@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from coglab_smach.context.context import Context
-from coglab_smach.states.arm import ExecuteDmp, MonitorDmp, SwitchController, WaitStop
+from coglab_smach.states.arm import SwitchController
 from coglab_smach.states.base import CoglabConcurrence, CoglabMachine, require_all
 from coglab_smach.states.give import WaitTaker
 from coglab_smach.states.hand import HandPreshape
+from coglab_smach.states.reach import ExecuteDmp, MonitorDmp, WaitStop
 
 KEYS = ["goal", "grasp", "object_entry", "object_id"]
 TAKER_KEYS = [*KEYS, "delivery"]

@@ -7,7 +7,6 @@ from typing import Any
 
 import coglab_controllers as cc
 import numpy as np
-from coglab_msgs.msg import ReasonCode
 
 from coglab_smach.states.base import CoglabState, TimeLimit
 from coglab_smach.states.where import palm_at, seen_at
@@ -23,30 +22,44 @@ class EarlyReach:
     rules of a reach toward a goal that is seen), and outside the handover region somebody has to go on offering it."""
 
     def __init__(self, state: CoglabState, goal: Mapping[str, Any]) -> None:
-        self.state, self.limits, self.early = state, goal["limits"], goal["early"]
+        self.state, self.goal, self.limits, self.early = state, goal, goal["limits"], goal["early"]
         self.target = str(goal["frame"]).removesuffix("_ahead").removeprefix("object_")
         self._watch: cc.GoalWatch | None = None
         self._sure = state.ctx.clock.now()
         """when it was last believed"""
         self._looked = self._sure - PERIOD
 
-    def check(self) -> None:
-        """TimeLimit, which ends the reach, with the reason."""
+    def doubted(self) -> bool:
+        """Whether nobody has offered or asked for a while. TimeLimit, which ends the reach, where what it is for went
+        back or fell."""
+        now = self.state.ctx.clock.now()
+        if now - self._looked >= PERIOD and self.hopeful():
+            self._sure = now
+        return now - self._sure > DOUBT_TIME
+
+    def hopeful(self) -> bool:
+        """Whether somebody offers or asks now: it is believed, or seen. TimeLimit as doubted()."""
         ctx = self.state.ctx
         now = ctx.clock.now()
-        if now - self._looked < PERIOD:
-            return
-        passed, self._looked = now - self._looked, now
+        passed, self._looked = max(0.0, now - self._looked), now
         place = seen_at(self.state, self.target)
         if place is not None:
             self._follow(place, passed)
         ahead = ctx.perception.ahead()
         believed = max(ahead.offer, ahead.request) >= float(ctx.config.get("handover.doubt", 0.1))
-        if believed or (place is not None and self._offered(place)):
-            self._sure = now
-        elif now - self._sure > DOUBT_TIME:
-            why = "the person does not offer or ask any more"
-            raise TimeLimit("the reach was given up", (why,), ReasonCode.GOAL_WITHDRAWN)
+        return believed or (place is not None and self._offered(place))
+
+    def goal_now(self) -> dict[str, Any]:
+        """What the reach is for: where it will be as long as that is believed, else where it is seen."""
+        if self.state.ctx.perception.ahead().frame == self.goal["frame"]:
+            return dict(self.goal)
+        watched = {"goal_retreat": self.early["retreat"], "goal_drop": self.early["drop"]}
+        seen = str(self.goal["frame"]).removesuffix("_ahead")
+        return {**self.goal, "frame": seen, "limits": {**self.limits, **watched}}
+
+    def forgive(self) -> None:
+        """The doubt is over."""
+        self._sure = self.state.ctx.clock.now()
 
     def _follow(self, place: np.ndarray, passed: float) -> None:
         if self._watch is None:

@@ -10,10 +10,10 @@ from coglab_msgs.msg import ReasonCode
 from coglab_smach.context.context import Context
 from coglab_smach.ports.interfaces import HandPort
 from coglab_smach.ports.pending import Pending, PortError
-from coglab_smach.states.arm import WaitStop
 from coglab_smach.states.base import CoglabState, Interrupted, TimeLimit
 from coglab_smach.states.held import HeldObject
 from coglab_smach.states.motion import await_rest, rise
+from coglab_smach.states.reach import WaitStop
 from coglab_smach.states.where import hand_from_palm
 
 FINGERS = slice(1, 5)

@@ -50,15 +50,20 @@ def await_rest(ctx: Context, look: Callable[[], object] = lambda: None) -> None:
 
 
 def rise(ctx: Context, height: float, speed: float) -> Pending | None:
-    """Begin to move the palm up by ``height`` m, down if negative, at ``speed`` m/s, each joint as fast as its share of
-    the way asks for; None where the posture is not known."""
+    """shift() up by ``height`` m, down if negative."""
+    return shift(ctx, np.array([0.0, 0.0, height]), speed)
+
+
+def shift(ctx: Context, by: np.ndarray, speed: float) -> Pending | None:
+    """Begin to move the palm ``by`` (m, base frame) without turning it, at ``speed`` m/s, each joint as fast as its
+    share of the way asks for; None where the posture is not known. Only with controller 'ptp'."""
     here = ctx.arm.joint_positions()
     if here is None:
         return None
     jacobian = default_arm().jacobian(np.asarray(here))
-    up = np.array([0.0, 0.0, height, 0.0, 0.0, 0.0])
-    way = jacobian.T @ np.linalg.solve(jacobian @ jacobian.T + 1e-4 * np.eye(6), up)
-    velocity = np.maximum(np.abs(way) * speed / abs(height), 1e-3)
+    twist = np.concatenate([by, np.zeros(3)])
+    way = jacobian.T @ np.linalg.solve(jacobian @ jacobian.T + 1e-4 * np.eye(6), twist)
+    velocity = np.maximum(np.abs(way) * speed / float(np.linalg.norm(by)), 1e-3)
     return ctx.arm.move_ptp((np.asarray(here) + way).tolist(), velocity.tolist())
 
 

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import Any
+
 import numpy as np
+from coglab_py.pose import Pose
 
 from coglab_smach.context.context import Context
 from coglab_smach.kinematics.reachability import default_arm
@@ -17,6 +21,28 @@ def palm_at(ctx: Context) -> np.ndarray | None:
     """m."""
     here = ctx.arm.joint_positions()
     return None if here is None else np.asarray(default_arm().fk(np.asarray(here))[0])
+
+
+def palm_axis(ctx: Context) -> np.ndarray | None:
+    """Unit vector, out of the palm."""
+    here = ctx.arm.joint_positions()
+    return None if here is None else Pose(*default_arm().fk(np.asarray(here))).axis(0)
+
+
+def off_grasp(state: CoglabState, goal: Mapping[str, Any]) -> float | None:
+    """m from the palm to where it would hold the object that a reach is for; None where the goal names no object."""
+    thing, here = goal.get("object", {}), state.ctx.arm.joint_positions()
+    if not thing or here is None:
+        return None
+    name = str(thing["frame"]).removeprefix("object_")
+    try:
+        seen = state.await_pending(state.ctx.perception.locate_object(name, 0.3), f"sight of '{name}'", 0.5)
+    except PortError:
+        return None
+    if seen.age > OLDEST:
+        return None
+    grasp = Pose(np.array(seen.xyz), np.array(seen.quaternion)) * Pose.from_dict(thing["grasp"])
+    return Pose(*default_arm().fk(np.asarray(here))).distance(grasp)[0]
 
 
 def person_at(state: CoglabState) -> np.ndarray | None:

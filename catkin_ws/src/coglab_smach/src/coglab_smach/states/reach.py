@@ -1,0 +1,283 @@
+"""States of a reach: starting a DMP, waiting for its end or for contact, another primitive on the way."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import partial
+from typing import Any
+
+from coglab_msgs.msg import ReasonCode
+
+from coglab_smach.context.context import Context
+from coglab_smach.kinematics.motion_time import reach_time
+from coglab_smach.ports.interfaces import DmpRequest
+from coglab_smach.ports.pending import PortError
+from coglab_smach.states.base import CoglabState, Interrupted, TimeLimit
+from coglab_smach.states.early_reach import EarlyReach
+from coglab_smach.states.motion import shift
+from coglab_smach.states.where import off_grasp, palm_axis
+
+BUMPS = 2
+"""touches of something else after which the arm still comes again"""
+DRAWN_BACK = 0.06
+"""m"""
+
+
+def dmp_request(goal: dict[str, Any], primitive: str | None = None, ratio: float | None = None) -> DmpRequest:
+    """The request of a goal as it travels in user data."""
+    orientation = goal.get("orientation")
+    return DmpRequest(
+        primitive_id=primitive or goal["primitive"],
+        goal_frame=goal["frame"],
+        goal_offset=list(goal["offset"]),
+        dmp_ratio=float(ratio if ratio is not None else goal.get("dmp_ratio", 1.0)),
+        orientation_control=orientation is not None,
+        target_orientation=list(orientation if orientation is not None else (0.0, 0.0, 0.0, 0.0)),
+        goal_approach=goal.get("approach", (0.0, 0.0, 0.0)),
+        **goal.get("limits", {}),
+    )
+
+
+class ExecuteDmp(CoglabState):
+    """Temporary state: starts the motion and passes on to wait_stop; the controller manager closes the loop."""
+
+    default_time_limit = 5.0
+    owns_motion = True
+
+    def __init__(self, ctx: Context) -> None:
+        super().__init__(ctx, input_keys=["goal"])
+
+    def run(self, ud: Any) -> str:
+        request = dmp_request(ud.goal)
+        profile = str(self.ctx.config.get("approach_profile", ""))
+        if profile:
+            self.await_pending(self.ctx.arm.apply_profile(profile), f"feedback profile '{profile}'", 2.0)
+        self._start(request)
+        self.ctx.journal.mark("motion_started")
+        self.reason = f"primitive '{request.primitive_id}' toward {request.goal_frame}"
+        return "succeeded"
+
+    def _start(self, request: DmpRequest) -> None:
+        """A tracker that has lost the goal for a moment gets as long as a running motion would give it."""
+        end = self.ctx.clock.now() + float(self.ctx.config.get("goal_lost_time", 1.0))
+        while True:
+            try:
+                self.await_pending(self.ctx.arm.execute_dmp(request), f"start of primitive '{request.primitive_id}'")
+                return
+            except TimeLimit:
+                raise
+            except PortError as error:
+                if error.code != ReasonCode.GOAL_STALE or self.ctx.clock.now() >= end:
+                    raise
+            self.pause(0.05)
+
+
+class WaitStop(CoglabState):
+    """Wait for the end of the reach or, if ``trigger`` asks for it, for the contact trigger.
+
+    trigger: '' (the end of the motion is enough) or 'contact' (an object is in the hand). Contact is watched for from
+    the last ``contact_within`` m of the reach on and ends the motion. The reach may take ``reach_timeout`` beyond what
+    the arm's limits ask for.
+    """
+
+    default_time_limit = 20.0
+    owns_motion = True
+
+    def __init__(self, ctx: Context, trigger: str, keys: Sequence[str] = ()) -> None:
+        super().__init__(ctx, input_keys=["object_entry", "goal"] if trigger == "contact" else keys)
+        self.trigger = trigger
+        self._left = False
+        """the compliant profile of the approach"""
+        self._early: EarlyReach | None = None
+
+    def run(self, ud: Any) -> str:
+        self._left = False
+        self._early = EarlyReach(self, ud.goal) if self.trigger and "early" in ud.goal else None
+        if self.trigger == "contact":
+            return self._await_contact(ud)
+        return self._await_end(ud)
+
+    def _await_end(self, ud: Any) -> str:
+        self._await_reach(self._reached)
+        self.ctx.journal.mark("motion_reached")
+        return "succeeded"
+
+    def _await_contact(self, ud: Any) -> str:
+        """The object may come into the hand on the way, at its end, or be brought there once the arm waits. What
+        touches the hand while the object is elsewhere is not the object: the arm draws back and comes again."""
+        arm, within = self.ctx.arm, float(self.ctx.config.get("contact_within", 0.12))
+        for _ in range(BUMPS + 1):
+            self._await_reach(lambda: self._reached() or 0.0 < arm.dmp_progress().remaining_distance < within)
+            self._watch("contact_in_motion", {**self._settings(ud), **ud.goal.get("object", {})})
+            away = off_grasp(self, ud.goal)
+            if away is None or away < float(self.ctx.config.get("contact_near", 0.09)):
+                return self._found()
+            self.ctx.journal.mark("bumped")
+            self._come_again(ud.goal)
+        raise PortError(
+            f"something touches the hand, and the object is {away:.2f} m from where it would be held",
+            ("something is in the way, or somebody pushes the arm",),
+            ReasonCode.NO_CONTACT,
+        )
+
+    def _come_again(self, goal: dict[str, Any]) -> None:
+        """Draw back against the palm's outward axis, and begin the reach anew."""
+        arm = self.ctx.arm
+        self.allow(15.0)
+        self.await_pending(arm.switch_controller("ptp"), "end of the reach by switching to 'ptp'", 3.0)
+        back = palm_axis(self.ctx)
+        if back is not None:
+            moved = shift(self.ctx, -DRAWN_BACK * back, 0.1)
+            if moved is not None:
+                self.await_pending(moved, "drawing back", 5.0)
+        self.await_pending(arm.switch_controller("dmp"), "switching to controller 'dmp'", 3.0)
+        self.await_pending(arm.execute_dmp(dmp_request(goal)), "the reach once more", 3.0)
+
+    def _pause(self, early: EarlyReach) -> None:
+        """Nobody seems to offer or ask any more: the arm stands. Who goes on within ``handover.pause`` s is met; else
+        the reach is given up."""
+        limit = float(self.ctx.config.get("handover.pause", 3.0))
+        self.allow(limit + 8.0)
+        self.await_pending(self.ctx.arm.cancel_motion("the arm waits: nobody offers or asks"), "rest of the arm", 3.0)
+        self.ctx.journal.mark("paused")
+        try:
+            self.wait_for(early.hopeful, "that the person goes on", limit)
+        except TimeLimit as error:
+            if error.code != ReasonCode.TIME_LIMIT:
+                raise
+            why = "the person does not offer or ask any more"
+            raise TimeLimit("the reach was given up", (why,), ReasonCode.GOAL_WITHDRAWN) from None
+        early.forgive()
+        self.await_pending(self.ctx.arm.execute_dmp(dmp_request(early.goal_now())), "the reach once more", 3.0)
+
+    def _watch(self, mode: str, settings: dict[str, Any]) -> None:
+        """Arm the detector and wait for what it finds."""
+        limit = float(settings.get("timeout", self.ctx.config.get("contact_timeout", 6.0)))
+        self.allow(limit + 5.0)
+        self.await_pending(self.ctx.contact.arm(mode, limit, settings), "arming of the contact detector", 2.0)
+        try:
+            self.wait_for(self._happened, "contact of an object with the hand", limit)
+        except TimeLimit as error:
+            error.code = error.code if error.code != ReasonCode.TIME_LIMIT else ReasonCode.NO_CONTACT
+            raise
+        finally:
+            self.ctx.contact.disarm()
+
+    def _happened(self) -> bool:
+        if self.ctx.contact.event() is not None:
+            return True
+        if self._reached():
+            self.ctx.journal.mark("motion_reached")
+            self._leave_approach_profile()
+        return False
+
+    def _found(self) -> str:
+        event = self.ctx.contact.event()
+        assert event is not None
+        self.ctx.journal.mark("contact")
+        self.reason = event.message or f"contact by {event.source}, margin {event.margin:.1f}"
+        return "succeeded"
+
+    def _await_reach(self, near: Callable[[], bool]) -> None:
+        """Until ``near()``. How far it is, the motion itself knows: it tells in its first feedback."""
+        arm = self.ctx.arm
+        try:
+            self.wait_for(lambda: self._reached() or arm.dmp_progress().primitive_id != "", "news of the reach", 2.0)
+            limit = float(self.ctx.config.get("reach_timeout", 6.0)) + reach_time(
+                arm.motion_limits(), arm.dmp_progress().remaining_distance
+            )
+            self.allow(limit + 10.0)
+            self.wait_for(near, "the end of the reach", limit, arm.speed_scale)
+        except TimeLimit as error:
+            progress = arm.dmp_progress()
+            error.causes = error.causes or (
+                f"the motion is {progress.state} with {progress.remaining_distance:.2f} m "
+                f"to go{': ' if progress.reason else ''}{progress.reason}",
+            )
+            raise
+
+    def _leave_approach_profile(self) -> None:
+        """Back to the rigid profile, and wait until what the compliant one added is gone: contact is found in forces,
+        which an arm that yields to them would not show."""
+        if self._left or not str(self.ctx.config.get("approach_profile", "")):
+            return
+        self._left = True
+        self.await_pending(self.ctx.arm.apply_profile("dmp"), "feedback profile 'dmp'", 2.0)
+        try:
+            self.wait_for(lambda: self.ctx.arm.profile_settled("dmp").ok, "the end of the approach's compliance", 2.0)
+        except TimeLimit as limit:
+            limit.causes = (self.ctx.arm.profile_settled("dmp").why,)
+            raise
+
+    def _settings(self, ud: Any) -> dict[str, Any]:
+        """What the object's entry says about contact."""
+        entry = ud.object_entry
+        return {**entry.get("contact", {}), "mass": float(entry.get("mass", 0.0))}
+
+    def _reached(self) -> bool:
+        progress = self.ctx.arm.dmp_progress()
+        if progress.state == "aborted":
+            raise TimeLimit(
+                "the reach was aborted", (progress.reason or "the controller gave no reason",), progress.code
+            )
+        blocked = self.ctx.arm.motion_allowed()
+        if not blocked.ok:
+            raise TimeLimit("the arm does not follow any more", (blocked.why,), blocked.code)
+        if self._early is not None and progress.state != "reached" and self._early.doubted():
+            self._pause(self._early)
+            return False
+        return progress.state == "reached"
+
+
+class MonitorDmp(CoglabState):
+    """Beside the motion: if another reaching pattern is recognised, substitute its primitive (switch_dmp).
+
+    Only among the primitives of ``monitor.primitives``: a motion that runs with another one (giving, the board) is left
+    alone. A pattern counts from ``monitor.confidence`` on. Runs until preempted; where it fails, the reach goes on."""
+
+    default_time_limit = 600.0
+    essential = False
+
+    def __init__(self, ctx: Context) -> None:
+        super().__init__(ctx, input_keys=["goal"])
+
+    def run(self, ud: Any) -> str:
+        if not bool(self.ctx.config.get("monitor.enabled", True)):
+            self.wait_for(lambda: False, "the end of the motion")
+        running = ud.goal["primitive"]
+        family = dict(self.ctx.config.get("monitor.primitives", {}))
+        if running not in family.values():
+            family = {}
+        switches = 0
+        while True:
+            try:
+                self.wait_for(partial(self._other_pattern, family, running), "another reaching pattern")
+            except Interrupted as end:
+                if end.stop:
+                    raise
+                self.reason = f"motion over, {switches} switches"
+                return "preempted"
+            seen = self.ctx.perception.recognition()
+            target = family[seen.pattern]
+            self.await_pending(
+                self.ctx.arm.switch_dmp(dmp_request(ud.goal, primitive=target)), f"switch to primitive '{target}'", 1.0
+            )
+            self.ctx.journal.mark("switch_dmp")
+            self.ctx.journal.transition(
+                self.path(),
+                self.label,
+                "switched",
+                self.label,
+                f"pattern '{seen.pattern}' recognised with confidence {seen.confidence:.2f}: "
+                f"primitive '{running}' replaced by '{target}'",
+            )
+            running = target
+            switches += 1
+
+    def _other_pattern(self, family: dict[str, str], running: str) -> bool:
+        # Once the hand has arrived there is nothing left to substitute, and the arm has to stand still.
+        if self.ctx.arm.dmp_progress().state not in ("running", "holding"):
+            return False
+        seen = self.ctx.perception.recognition()
+        sure = seen.decided and seen.confidence >= float(self.ctx.config.get("monitor.confidence", 0.9))
+        return sure and seen.pattern in family and family[seen.pattern] != running
