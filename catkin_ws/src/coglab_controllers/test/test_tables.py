@@ -37,7 +37,10 @@ SERVICES = {
     "SwitchController": ([("controller_id", "string")], [("controller_type", "string")]),
     "GetActiveController": ([], [("controller_id", "string"), ("controller_type", "string")]),
 }
-OURS = {("goal_frame", "string"), ("success", "bool"), ("reason_code", "uint16"), ("message", "string"), *IDS}
+LIMITS = [("goal_region_low", "geometry_msgs/Point"), ("goal_region_high", "geometry_msgs/Point")]
+LIMITS += [("goal_retreat", "float64"), ("goal_drop", "float64"), ("goal_approach", "geometry_msgs/Vector3")]
+ANSWER = [("success", "bool"), ("reason_code", "uint16"), ("message", "string")]
+OURS = {("goal_frame", "string"), *LIMITS, *ANSWER, *IDS}
 MESSAGES = {"DmpGoal": [("goal", "geometry_msgs/Point")], "FinishedPtp": [("ptp_id", "int32")]}
 
 

@@ -16,6 +16,7 @@ from coglab_msgs.msg import ReasonCode
 from coglab_py.pose import Pose
 
 from coglab_smach.clocks.clock import Clock
+from coglab_smach.kinematics.reachability import default_arm
 from coglab_smach.ports.pending import Pending, PortError
 from coglab_smach.simulated.arm_model import ArmModel
 
@@ -126,6 +127,8 @@ class SimulatedCell:
             "board": Pose(np.array([0.45, -0.55, 0.05])),
             "human_hand": Pose(HAND_AT_WORK),
         }
+        self.at_palm: tuple[str, Pose] | None = None
+        """what is in the hand, and the palm relative to it"""
         self._lock = threading.RLock()
         self._under_way: list[_Call] = []
         self._back: float | None = None
@@ -138,6 +141,12 @@ class SimulatedCell:
     def push(self, force: float) -> None:
         """Somebody lifts the hand with so many N from now on, or presses it down if negative."""
         self.lifted = force
+
+    def pose(self, object_id: str) -> Pose:
+        """Where something is, in the base frame: what is in the hand goes with it."""
+        if self.at_palm is None or self.at_palm[0] != object_id:
+            return self.objects[object_id]
+        return Pose(*default_arm().fk(np.asarray(self.arm.position()))) * self.at_palm[1].inverse()
 
     def let_go(self) -> None:
         """The person's hand leaves what it has given, and comes back later."""

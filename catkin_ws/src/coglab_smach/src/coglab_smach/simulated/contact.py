@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from coglab_msgs.msg import ReasonCode
+from coglab_py.pose import Pose
 
 from coglab_smach.ports.interfaces import ContactEvent
 from coglab_smach.ports.pending import Pending, PortError
@@ -33,6 +34,8 @@ class SimulatedContact:
         self._due: float | None = None
         self._event: ContactEvent | None = None
         self._touched = False
+        self._touches: tuple[str, Pose] | None = None
+        """what the person brings to the palm, and the palm relative to it"""
         self._lifted_before = self._needed = self._weight = 0.0
         self.armed_while_moving = False
         self.armed_with_profile: list[str] = []
@@ -63,6 +66,8 @@ class SimulatedContact:
             after = {"load": carried, "lift": carried, "release": partner.take_after}.get(mode, touch)
             now = cell.clock.now()
             self._touched = self._touched or mode in TOUCHES
+            grasped = str(settings.get("frame", "")).removeprefix("object_")
+            self._touches = (grasped, Pose.from_dict(settings["grasp"])) if grasped else None
             self._mode, self._until, self._due = mode, now + time_limit, None if after is None else now + after
             moving = mode not in ("contact_in_motion", "lift", "release") and not cell.arm.standing()
             self.armed_while_moving = self.armed_while_moving or moving
@@ -85,6 +90,8 @@ class SimulatedContact:
         if self._event is None and self._mode and happens and "contact" not in self.cell.faults.dead:
             why = f"{self._mode} by the partner's script"
             self._event = ContactEvent(self._mode != "release", "simulated", 2.0, why, code=EVENTS[self._mode])
+            if self._touches is not None and happens and not self._pushed():
+                self.cell.at_palm = self._touches
             if self._mode == "lift":
                 self.cell.let_go()
         return self._event

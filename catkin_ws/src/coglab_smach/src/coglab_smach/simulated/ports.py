@@ -269,7 +269,11 @@ class SimulatedHand:
         return self._at_speed("close", speed, positions)
 
     def open(self, speed: int) -> Pending:
-        return self._at_speed("open", speed, lambda: (0, 0, 0, 0, 0))
+        def positions() -> tuple[int, ...]:
+            self.cell.at_palm = None
+            return (0, 0, 0, 0, 0)
+
+        return self._at_speed("open", speed, positions)
 
     def _at_speed(self, name: str, speed: int, positions: Callable[[], tuple[int, ...]]) -> Pending:
         if not 1 <= speed <= 511:
@@ -311,7 +315,7 @@ class SimulatedPerception:
                 raise PortError(
                     f"'{object_id}' was not seen within {time_limit:.1f} s", code=ReasonCode.OBJECT_NOT_SEEN
                 )
-            return _located(self.cell.objects[object_id], object_id)
+            return _located(self.cell.pose(object_id), object_id)
 
         return self.cell.answer("perception", f"locate {object_id}", time_limit if unseen else 0.05, value)
 

@@ -106,7 +106,7 @@ class PtpMotion(CoglabState):
             )
         motion, look = arm.move_ptp(target, speed), self._look_after(ud)
         self.await_pending(
-            Polled(lambda: look() or motion.done(), motion.result, motion.cancel),
+            Polled(lambda: bool(look()) or motion.done(), motion.result, motion.cancel),
             f"the motion to posture '{self.posture}'",
             pace=arm.speed_scale,
         )
