@@ -43,6 +43,14 @@ OLDEST_SIGHT = 0.15
 """s, older sights of an object do not tell whether it is in the palm"""
 
 
+def pose_of(place, turn) -> Pose | None:
+    """Of a message's point and quaternion; None where they are no pose."""
+    p, q = np.array([place.x, place.y, place.z]), np.array([turn.x, turn.y, turn.z, turn.w])
+    if not (np.all(np.isfinite(p)) and np.all(np.isfinite(q)) and abs(float(np.linalg.norm(q)) - 1.0) < 0.01):
+        return None
+    return Pose(p, q)
+
+
 class ContactDetectorNode:
     """Thin node over FusedDetector."""
 
@@ -200,7 +208,13 @@ class ContactDetectorNode:
         if not request.frame:
             return None
         p, q = request.grasp.position, request.grasp.orientation
-        return request.frame, Pose.from_dict({"xyz": [p.x, p.y, p.z], "quaternion": [q.x, q.y, q.z, q.w]})
+        grasp = pose_of(p, q)
+        if grasp is None:
+            raise ValueError(
+                f"grasp: expected a finite place and a unit quaternion, got ({p.x:g}, {p.y:g}, {p.z:g}) m and "
+                f"({q.x:g}, {q.y:g}, {q.z:g}, {q.w:g})"
+            )
+        return request.frame, grasp
 
     def look_at_object(self) -> None:
         """Where the palm is at the object that is reached for, as tracked."""
@@ -214,8 +228,9 @@ class ContactDetectorNode:
             return
         if abs((rospy.Time.now() - transform.header.stamp).to_sec()) > OLDEST_SIGHT:
             return
-        p, q = transform.transform.translation, transform.transform.rotation
-        seen = Pose(np.array([p.x, p.y, p.z]), np.array([q.x, q.y, q.z, q.w]))
+        seen = pose_of(transform.transform.translation, transform.transform.rotation)
+        if seen is None:
+            return
         distance, angle = Pose(*self.arm.fk(np.asarray(position))).distance(seen * grasp[1])
         speed = float(np.linalg.norm(self.arm.jacobian(np.asarray(position))[:3] @ np.asarray(velocity)))
         now = rospy.Time.now()

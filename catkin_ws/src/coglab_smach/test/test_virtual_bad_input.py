@@ -33,7 +33,7 @@ def blinded(after, **overrides):
 
 
 def test_goal_lost_half_way():
-    trial, results = blinded(0.3, **{"handover.reach_ratio": 2.5})
+    trial, results = blinded(0.3, **{"handover.reach_ratio": 4.0})
     assert results[0].outcome == "failed_empty" and trial.last_hub == "wait_without_object" and at_home(trial)
     why = trial.ctx.journal.why()
     assert why.startswith("wait_stop: the reach was aborted, because the goal is lost for 1") and "m to go" in why

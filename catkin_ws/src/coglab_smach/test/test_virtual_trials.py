@@ -118,10 +118,11 @@ def test_an_object_out_of_reach_all_the_same_ends_with_what_remained():
     trial, results = run(RECEIVE, seed=1, turned=-2.6, **{"handover.check_reach": False})
     assert results[0].outcome == "failed_empty" and trial.last_hub == "wait_without_object"
     assert re.search(
-        r"the end of the reach within \d+\.\d s expected, it did not happen, because the motion is "
-        r"running with \d\.",
+        r"the end of the reach within \d+\.\d s expected, it did not happen, because the motion is running with \d\."
+        r"|something touches the hand, and the object is \d\.\d\d m from where it would be held"
+        r"|joint lwr_\w\d is at its stop and blocks the motion",
         trial.ctx.journal.why(),
-    )
+    ), trial.ctx.journal.why()
 
 
 def test_the_same_seed_gives_the_same_trial():

@@ -38,7 +38,7 @@ class EarlyReach:
         return now - self._sure > DOUBT_TIME
 
     def hopeful(self) -> bool:
-        """Whether somebody offers or asks now: it is believed, or seen. TimeLimit as doubted()."""
+        """Whether somebody offers or asks now, within the region: it is believed, or seen. TimeLimit as doubted()."""
         ctx = self.state.ctx
         now = ctx.clock.now()
         passed, self._looked = max(0.0, now - self._looked), now
@@ -47,7 +47,8 @@ class EarlyReach:
             self._follow(place, passed)
         ahead = ctx.perception.ahead()
         believed = max(ahead.offer, ahead.request) >= float(ctx.config.get("handover.doubt", 0.1))
-        return believed or (place is not None and self._offered(place))
+        there = ahead.frame == "" or self._offered(np.array(ahead.place))
+        return (believed and there) or (place is not None and self._offered(place))
 
     def goal_now(self) -> dict[str, Any]:
         """What the reach is for: where it will be as long as that is believed, else where it is seen."""

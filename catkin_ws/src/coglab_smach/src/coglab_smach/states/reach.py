@@ -129,7 +129,10 @@ class WaitStop(CoglabState):
         if back is not None:
             moved = shift(self.ctx, -DRAWN_BACK * back, 0.1)
             if moved is not None:
-                self.await_pending(moved, "drawing back", 5.0)
+                try:
+                    self.await_pending(moved, "drawing back", 5.0)
+                except PortError as error:
+                    self.reason = error.sentence  # as far as it goes
         self.await_pending(arm.switch_controller("dmp"), "switching to controller 'dmp'", 3.0)
         self.await_pending(arm.execute_dmp(dmp_request(goal)), "the reach once more", 3.0)
 
@@ -216,6 +219,10 @@ class WaitStop(CoglabState):
 
     def _reached(self) -> bool:
         progress = self.ctx.arm.dmp_progress()
+        if progress.state == "aborted" and progress.code == ReasonCode.GOAL_LEFT_REGION and self._early is not None:
+            # Where the person's reach will end was believed outside the region for a moment.
+            self._pause(self._early)
+            return False
         if progress.state == "aborted":
             raise TimeLimit(
                 "the reach was aborted", (progress.reason or "the controller gave no reason",), progress.code
