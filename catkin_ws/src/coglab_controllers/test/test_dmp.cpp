@@ -112,9 +112,8 @@ TEST(Dmp, ForcingFormEqualsTheThreeParts) {
                   dg = random.point(1);
     const Vector3 x = random.point(1), v = random.point(1);
     const double stiffness = system.stiffness(), damping = system.damping();
-    const Vector3 parts =
-        (1 - w) * stiffness * (phi + x0 - x) + w * stiffness * (g - x) +
-        damping * (TransformationSystem::velocityWeight(w) * tau * dg - v);
+    const Vector3 parts = (1 - w) * stiffness * (phi + x0 - x) + w * stiffness * (g - x) +
+                          damping * (TransformationSystem::velocityWeight(w) * tau * dg - v);
     const Vector3 split = system.acceleration(system.forcing(w, phi, x0, g, dg, tau), x, v);
     ASSERT_LT((parts - split).norm(), 1e-11 * (1.0 + stiffness));
   }
