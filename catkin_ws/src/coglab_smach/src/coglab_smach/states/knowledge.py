@@ -189,9 +189,11 @@ def unless_withdrawn(ctx: Context, goal: Mapping[str, Any], margin: float = 0.0)
     if not str(goal["frame"]).endswith("_ahead"):
         return {**goal, "limits": limits}
     # A predicted place goes to and fro as the prediction is corrected: going back and falling are watched in what is
-    # seen, by the state that waits for the reach.
+    # seen, by the state that waits for the reach, and the region is as much wider as for an object that is held still.
     early = {"retreat": limits["goal_retreat"], "drop": limits["goal_drop"]}
-    return {**goal, "limits": {**limits, "goal_retreat": 0.0, "goal_drop": 0.0}, "early": early}
+    low, high = handover_region(ctx, margin + float(ctx.config.get("handover.still_margin", 0.10)))
+    limits = {"goal_region_low": low.tolist(), "goal_region_high": high.tolist(), "goal_retreat": 0.0, "goal_drop": 0.0}
+    return {**goal, "limits": limits, "early": early}
 
 
 def palm_of(seen: Mapping[str, Any], goal: Mapping[str, Any]) -> Pose:
