@@ -22,6 +22,12 @@ Joints = Sequence[float] | np.ndarray
 
 LONGEST_GAP = 0.05
 """s between two samples that the observer bridges; after a longer one it begins anew"""
+BESIDE = 0.4
+"""periods by which a stamp may lie beside the grid of the measurements; farther away nobody can say how many have
+passed, and one too many or too few would look like a push"""
+JUMP, DOUBTS = 12.0, 2
+"""Nm by which the external torque of one sample differs from the estimate where a stamp may be wrong: such samples are
+left out, but no more of them in a row than this, because what stays is a hit"""
 
 
 class Terms(Protocol):
@@ -89,6 +95,7 @@ class MomentumObserver:
         self._momentum = self._forces = np.zeros(7)
         self._residual: np.ndarray | None = None
         self._acceleration = np.zeros(7)
+        self._doubts = 0
 
     def set_payload(self, mass: float, centre: Joints) -> None:
         """The hand carries this from now on: what it weighs and its inertia are no external torque any more. The
@@ -107,12 +114,17 @@ class MomentumObserver:
             self._grid = stamp
         if step == 0.0:
             return None
+        if step is not None and step < 0.0:  # the estimate stays, velocities begin anew
+            self._stamp, self._grid, self._velocity = stamp, stamp, None
+            self._position, self._torque = q, tau
+            return None
         last_position, last_torque = self._position, self._torque
         self._stamp, self._position, self._torque = stamp, q, tau
         return None if step is None else self._advance(stamp, step, last_position, last_torque)
 
     def _since_last(self, stamp: float) -> float | None:
-        """s since the last sample; None if this one does not follow it; 0 for one that was there already."""
+        """s since the last sample; None if this one does not follow it; 0 for one that was there already; negative
+        where nobody can say."""
         if self._stamp is None:
             return None
         step = stamp - self._stamp
@@ -120,7 +132,10 @@ class MomentumObserver:
             return 0.0 if step == 0.0 else None
         if self.period > 0.0:
             # The measurements lie on a grid that the stamps tell with jitter, and that is followed slowly.
-            periods = max(1, round((stamp - self._grid) / self.period))
+            since = (stamp - self._grid) / self.period
+            periods = max(1, round(since))
+            if abs(since - periods) > BESIDE:
+                return -1.0
             self._grid += periods * self.period
             self._grid += 0.05 * (stamp - self._grid)
             return periods * self.period
@@ -138,6 +153,11 @@ class MomentumObserver:
         span = 0.5 * (step + last_step)
         torque = (last_step * torque_before + step * self._torque) / (step + last_step)
         outside = (momentum - last_momentum) / span + 0.5 * (forces + last_forces) - torque
+        jumps = self._residual is not None and float(np.max(np.abs(outside - self._residual))) > JUMP
+        if jumps and self._doubts < DOUBTS:
+            self._doubts, self._velocity = self._doubts + 1, None
+            return None
+        self._doubts = 0
         fresh = self._residual is None
         keep = 0.0 if fresh else math.exp(-self.gain * span)
         last = np.zeros(7) if self._residual is None else self._residual
