@@ -239,11 +239,12 @@ PYBIND11_MODULE(_virtual, m) {
           [](Robot& robot, const std::string& primitive, double ratio, const Vector3d& offset,
              bool orientation_control, const Eigen::Vector4d& orientation,
              const std::string& goal_frame, const Vector3d& region_low, const Vector3d& region_high,
-             double retreat, double drop, const Vector3d& approach) {
+             double retreat, double drop, const Vector3d& approach, double arrival_speed) {
             auto request =
                 requestOf(primitive, ratio, offset, orientation_control, orientation, goal_frame);
             request.goal_limits = {region_low, region_high, retreat, drop};
             request.goal_approach = approach;
+            request.arrival_speed = arrival_speed;
             return robot.tell(robot.dmp().execute(request));
           },
           py::arg("primitive_id"), py::arg("dmp_ratio") = 1.0,
@@ -252,7 +253,7 @@ PYBIND11_MODULE(_virtual, m) {
           py::arg("goal_frame") = "", py::arg("goal_region_low") = Vector3d(Vector3d::Zero()),
           py::arg("goal_region_high") = Vector3d(Vector3d::Zero()), py::arg("goal_retreat") = 0.0,
           py::arg("goal_drop") = 0.0, py::arg("goal_approach") = Vector3d(Vector3d::Zero()),
-          "Starts from the current state; (success, message).")
+          py::arg("arrival_speed") = 0.0, "Starts from the current state; (success, message).")
       .def(
           "switch_dmp",
           [](Robot& robot, const std::string& primitive, double ratio, const Vector3d& offset,

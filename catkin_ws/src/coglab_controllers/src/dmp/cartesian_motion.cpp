@@ -1,6 +1,7 @@
 #include "coglab_controllers/dmp/cartesian_motion.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 #include "coglab_controllers/kinematics/rotation.hpp"
 
@@ -36,6 +37,8 @@ void CartesianMotion::start(const CartesianMotionPlan& plan, const Pose& pose,
   seen_ = goal;
   end_.reset();
   drawn_ = 1.0;
+  arrival_speed_ = plan.arrival_speed;
+  arrival_rate_ = 1.0;
   dmp_.start(plan.system, pose.position, velocity, goal.position - approach, plan.ratio);
   orientation_ = pose.orientation.normalized();
   curve_.start(orientation_, angular_velocity, goal.orientation, dmp_.tau());
@@ -54,7 +57,8 @@ void CartesianMotion::switchTo(const CartesianMotionPlan& plan, const Pose& goal
   dmp_.switchTo(plan.system, goal.position, plan.ratio);
   curve_begin_ = std::min(dmp_.progress(), 0.95);
   // The curve runs on the clock of the DMP, which may be slowed.
-  const Vector3 angular_velocity = reference_.angular_velocity / std::max(rate_, 0.1);
+  const Vector3 angular_velocity =
+      reference_.angular_velocity / std::max(rate_ * arrival_rate_, 0.1);
   orientation_estimator_.reset(goal.orientation);
   curve_.start(orientation_, angular_velocity, goal.orientation, (1.0 - curve_begin_) * dmp_.tau());
   reference_.orientation_control = plan.orientation_control;
@@ -74,6 +78,17 @@ void CartesianMotion::watchNoise(double dt, const Pose& goal) noexcept {
   seen_ = goal;
 }
 
+/// By how much the clock has to be slowed for the set-point to come to the goal no faster than it
+/// may.
+double CartesianMotion::arrivalRate(const Vector3& goal) const noexcept {
+  if (arrival_speed_ <= 0.0) return 1.0;
+  const double way = std::max(0.0, (dmp_.state().position - goal).norm() - kSlowWay);
+  const double most = std::min(
+      kFastestArrival, std::sqrt(arrival_speed_ * arrival_speed_ + 2.0 * kGentleBraking * way));
+  const double speed = dmp_.state().velocity.norm() * rate_;
+  return speed > most ? most / speed : 1.0;
+}
+
 const CartesianReference& CartesianMotion::step(double dt, const Pose& goal, double rate,
                                                 const Vector3& approach) noexcept {
   event_ = MotionEnd::Event::None;
@@ -84,12 +99,14 @@ const CartesianReference& CartesianMotion::step(double dt, const Pose& goal, dou
   Vector3 goal_velocity = Vector3::Zero();
   if (end_.latched()) {
     goal_ = end_.latchedGoal();
+    arrival_rate_ = arrivalRate(goal_);
   } else {
     // g and g' at the beginning of the cycle go into eq. (1); the estimator then follows to its
     // end.
     goal_ = goal_estimator_.position();
     goal_velocity = goal_estimator_.velocity();
     if (!goal_estimator_.enabled()) goal_ = goal.position;
+    arrival_rate_ = arrivalRate(goal_);
     const double drawn = drawnBack(dmp_.progress());
     goal_ -= drawn * approach;
     goal_velocity += (drawn_ - drawn) / dt * approach;
@@ -98,7 +115,7 @@ const CartesianReference& CartesianMotion::step(double dt, const Pose& goal, dou
     orientation_estimator_.update(dt, goal.orientation, turning_jitter_.share());
     curve_.setTarget(orientation_estimator_.orientation());
   }
-  if (!settled_) dmp_.step(dt, goal_, goal_velocity, rate);
+  if (!settled_) dmp_.step(dt, goal_, goal_velocity, rate * arrival_rate_);
   const DmpState& state = dmp_.state();
   const double curve_progress = (dmp_.progress() - curve_begin_) / (1.0 - curve_begin_);
   const Quaternion orientation = settled_ ? orientation_ : curve_.at(curve_progress);
@@ -111,7 +128,7 @@ const CartesianReference& CartesianMotion::step(double dt, const Pose& goal, dou
   remaining_distance_ = (goal.position - state.position).norm();
 
   // Seen on the clock of the motion: a motion that is slowed to a standstill has not ended.
-  const double clock = std::max(rate, 1e-3);
+  const double clock = std::max(rate * arrival_rate_, 1e-3);
   const double turning =
       reference_.orientation_control ? reference_.angular_velocity.norm() / clock : 0.0;
   event_ = end_.update(dt, state.phase, reference_.velocity.norm() / clock, turning, state.position,

@@ -21,6 +21,11 @@ void validate(const GoalEstimatorParameters& parameters) {
     throw std::invalid_argument("noisy goal time constant: expected 0.005 to 2 s, got " +
                                 std::to_string(noisy));
   }
+  const double turning = parameters.noisy_turning_time_constant;
+  if (!(turning >= 0.005 && turning <= 2.0)) {
+    throw std::invalid_argument("noisy goal turning time constant: expected 0.005 to 2 s, got " +
+                                std::to_string(turning));
+  }
   if (!(parameters.noisy_speed >= 0.0 && std::isfinite(parameters.noisy_speed))) {
     throw std::invalid_argument("noisy goal speed: expected 0 m/s or more, got " +
                                 std::to_string(parameters.noisy_speed));
@@ -43,9 +48,9 @@ void validate(const GoalEstimatorParameters& parameters) {
 // not step.
 constexpr double kChange = 0.3;
 
-double nextTimeConstant(const GoalEstimatorParameters& parameters, double present, double noise,
-                        double dt) {
-  const double more = std::max(0.0, parameters.noisy_time_constant - parameters.time_constant);
+double nextTimeConstant(const GoalEstimatorParameters& parameters, double noisy, double present,
+                        double noise, double dt) {
+  const double more = std::max(0.0, noisy - parameters.time_constant);
   const double wanted = parameters.time_constant + std::clamp(noise, 0.0, 1.0) * more;
   return present == wanted ? present : wanted + (present - wanted) * std::exp(-dt / kChange);
 }
@@ -98,7 +103,8 @@ void GoalEstimator::update(double dt, const Vector3& goal, double noise) noexcep
   }
   if (!(dt > 0.0)) return;
   const Vector3 error = clipped(goal - smooth_, parameters_.max_innovation);
-  time_constant_ = nextTimeConstant(parameters_, time_constant_, noise, dt);
+  time_constant_ =
+      nextTimeConstant(parameters_, parameters_.noisy_time_constant, time_constant_, noise, dt);
   smooth_ += tracker_.advance(error, dt, time_constant_);
   velocity_ = beyondNoise(tracker_.rate, std::clamp(noise, 0.0, 1.0) * parameters_.noisy_speed);
   position_ = smooth_ + 3.0 * time_constant_ * velocity_;
@@ -124,7 +130,8 @@ void OrientationEstimator::update(double dt, const Quaternion& target, double no
   }
   if (!(dt > 0.0)) return;
   const Vector3 error = clipped(rotationBetween(smooth_, unit), parameters_.max_angle_innovation);
-  time_constant_ = nextTimeConstant(parameters_, time_constant_, noise, dt);
+  time_constant_ = nextTimeConstant(parameters_, parameters_.noisy_turning_time_constant,
+                                    time_constant_, noise, dt);
   smooth_ = (expRotation(tracker_.advance(error, dt, time_constant_)) * smooth_).normalized();
   velocity_ = beyondNoise(tracker_.rate, std::clamp(noise, 0.0, 1.0) * parameters_.noisy_turning);
   orientation_ = (expRotation(3.0 * time_constant_ * velocity_) * smooth_).normalized();

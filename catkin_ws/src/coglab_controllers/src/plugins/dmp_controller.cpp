@@ -13,6 +13,7 @@ namespace coglab_controllers {
 namespace {
 
 constexpr double kFastestStart = 2.0;     // m/s
+constexpr double kSlowestArrival = 0.02;  // m/s
 constexpr double kLongestApproach = 0.3;  // m
 
 std::string text(const Vector3& v) {
@@ -188,6 +189,12 @@ Answer DmpController::checkPrimitive(const DmpRequest& request, DmpPlan& plan) c
     return Answer::invalid("goal_approach " + text(request.goal_approach) +
                            " is not finite or longer than 0.3 m");
   }
+  if (request.arrival_speed != 0.0 &&
+      !(request.arrival_speed >= kSlowestArrival && request.arrival_speed <= kFastestStart)) {
+    return Answer::invalid("arrival_speed is " + std::to_string(request.arrival_speed) +
+                           " m/s; expected 0 (as the primitive has it) or 0.02 to 2 m/s");
+  }
+  plan.motion.arrival_speed = request.arrival_speed;
   plan.hand.approach = request.goal_approach;
   plan.hand.offset = request.goal_offset;
   plan.hand.in_goal_frame = !request.goal_frame.empty();

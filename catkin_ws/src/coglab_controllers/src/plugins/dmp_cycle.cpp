@@ -32,6 +32,8 @@ GoalEstimatorParameters readEstimator(const Parameters& parameters) {
       parameters.number("goal_time_constant", estimator.time_constant, 0.0, 2.0);
   estimator.noisy_time_constant =
       parameters.number("noisy_goal_time_constant", estimator.noisy_time_constant, 0.005, 2.0);
+  estimator.noisy_turning_time_constant = parameters.number(
+      "noisy_goal_turning_time_constant", estimator.noisy_turning_time_constant, 0.005, 2.0);
   estimator.noisy_speed = parameters.number("noisy_goal_speed", estimator.noisy_speed, 0.0, 1.0);
   estimator.noisy_turning =
       parameters.number("noisy_goal_turning", estimator.noisy_turning, 0.0, 10.0);
@@ -114,7 +116,7 @@ void DmpCycle::execute(const MotionStart<DmpPlan>& start) {
   Vector3 angular = turn * start.from.angular_velocity;
   if (loopClosed()) {
     pose = reference_.pose;
-    velocity = motion_.dmp().state().velocity;
+    velocity = motion_.velocity();
     angular = reference_.angular_velocity / std::max(start.input.time_scale, 0.1);
   }
   if (plan.given) {

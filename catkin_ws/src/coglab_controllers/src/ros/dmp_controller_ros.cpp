@@ -58,6 +58,7 @@ DmpRequest readWhole(const Request& request) {
   result.initial_velocity = toVector(request.initial_velocity);
   result.goal_frame = request.goal_frame;
   result.goal_approach = toVector(request.goal_approach);
+  result.arrival_speed = request.arrival_speed;
   return result;
 }
 

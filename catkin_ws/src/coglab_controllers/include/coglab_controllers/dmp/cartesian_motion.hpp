@@ -16,7 +16,15 @@ struct CartesianMotionPlan {
   TransformationSystem system;
   double ratio = 1.0;  ///< dmp_ratio
   bool orientation_control = true;
+  /// m/s at which the hand comes to the goal at last; 0: as the primitive has it.
+  /// Within kSlowWay of the goal it is not faster, before that only so much that it brakes by
+  /// kGentleBraking until there; the clock of the primitive is slowed for that, its path stays.
+  double arrival_speed = 0.0;
 };
+
+inline constexpr double kSlowWay = 0.02;         ///< m
+inline constexpr double kGentleBraking = 0.6;    ///< m/s^2
+inline constexpr double kFastestArrival = 0.45;  ///< m/s, on all of the way
 
 /// Runs a primitive towards a goal pose that may move. This is all the DMP plug-in does between its
 /// mailboxes and the IK; the Python module runs the same code. No allocation, no throw.
@@ -68,6 +76,8 @@ class CartesianMotion {
   }
   /// Of the clock, 0..1, in the last step.
   double rate() const noexcept { return rate_; }
+  /// Of the set-point, m/s, on the clock of speed_scale: slowed for a slow arrival alone.
+  Vector3 velocity() const noexcept { return arrival_rate_ * dmp_.state().velocity; }
   /// From the set-point to the goal as received, m.
   double remainingDistance() const noexcept { return remaining_distance_; }
   /// Estimated from the phase and tau, s, at rate 1.
@@ -77,6 +87,7 @@ class CartesianMotion {
 
  private:
   void watchNoise(double dt, const Pose& goal) noexcept;
+  double arrivalRate(const Vector3& goal) const noexcept;
 
   GoalEstimator goal_estimator_;
   OrientationEstimator orientation_estimator_;
@@ -92,9 +103,11 @@ class CartesianMotion {
   Quaternion orientation_ = Quaternion::Identity();  // set-point at the end of the last step
   double curve_begin_ = 0.0;                         // progress of the DMP at which the curve began
   double remaining_distance_ = 0.0;
-  double rate_ = 1.0;     // of the last step
-  double drawn_ = 1.0;    // share of the approach by which the goal was drawn back then
-  bool settled_ = false;  // the set-point has come to rest at the latched goal
+  double rate_ = 1.0;           // of the last step
+  double arrival_speed_ = 0.0;  // of the plan
+  double arrival_rate_ = 1.0;   // share of the rate that it left in the last step
+  double drawn_ = 1.0;          // share of the approach by which the goal was drawn back then
+  bool settled_ = false;        // the set-point has come to rest at the latched goal
 };
 
 }  // namespace coglab_controllers

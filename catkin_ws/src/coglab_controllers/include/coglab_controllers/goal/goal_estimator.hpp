@@ -26,6 +26,9 @@ struct GoalEstimatorParameters {
   double time_constant = 0.06;  ///< s; 0 switches the estimator off: g is the input, g' is zero
   /// s; what it grows to when the goal trembles, see GoalJitter; not below time_constant
   double noisy_time_constant = 0.10;
+  /// The same for orientations: a tracker sees how an object is turned less well than where it is,
+  /// and what the wrist does about that costs the acceleration that the way needs.
+  double noisy_turning_time_constant = 0.30;
   /// m/s, rad/s: an estimated speed below this is taken for noise when the goal trembles fully
   double noisy_speed = 0.04;
   double noisy_turning = 0.4;

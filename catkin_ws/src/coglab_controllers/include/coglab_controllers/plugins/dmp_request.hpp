@@ -24,8 +24,9 @@ struct DmpRequest {
       Eigen::Vector4d::Zero();  ///< x y z w; all zero: keep the current one
   std::string goal_frame;  ///< tf2 frame that the motion follows; empty: what comes on dmp_goal
   Vector3 goal_approach =
-      Vector3::Zero();     ///< m, along which the hand comes at last, as the offset
-  GoalLimits goal_limits;  ///< what that frame may do, or the motion ends
+      Vector3::Zero();         ///< m, along which the hand comes at last, as the offset
+  double arrival_speed = 0.0;  ///< m/s, as of CartesianMotionPlan
+  GoalLimits goal_limits;      ///< what that frame may do, or the motion ends
 };
 
 }  // namespace coglab_controllers

@@ -37,6 +37,7 @@ class DmpRequest:
     orientation_control: bool = False
     target_orientation: Sequence[float] = (0.0, 0.0, 0.0, 0.0)
     goal_approach: Sequence[float] = (0.0, 0.0, 0.0)
+    arrival_speed: float = 0.0
     goal_region_low: Sequence[float] = (0.0, 0.0, 0.0)
     goal_region_high: Sequence[float] = (0.0, 0.0, 0.0)
     goal_retreat: float = 0.0

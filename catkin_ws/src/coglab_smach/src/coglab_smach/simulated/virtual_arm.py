@@ -148,7 +148,7 @@ class VirtualArm:
         self.request = request
         self.rig.robot.debug = None
         limits = (request.goal_region_low, request.goal_region_high, request.goal_retreat, request.goal_drop)
-        fields = (*self._fields(request), request.goal_frame, *limits, request.goal_approach)
+        fields = (*self._fields(request), request.goal_frame, *limits, request.goal_approach, request.arrival_speed)
         return ending_motion(self.node.ask(lambda: self._answered(self.robot.execute_dmp(*fields))), self.cancel_motion)
 
     def switch_dmp(self, request: DmpRequest) -> Pending:

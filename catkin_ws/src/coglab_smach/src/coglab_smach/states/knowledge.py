@@ -221,8 +221,10 @@ def out_of_reach(target: str, seen: Mapping[str, Any], goal: Mapping[str, Any]) 
 
 
 def paced(ctx: Context, goal: dict[str, Any]) -> dict[str, Any]:
-    """The goal at the pace of a person: ``handover.reach_ratio`` times the object's own dmp_ratio."""
-    return {**goal, "dmp_ratio": goal["dmp_ratio"] * float(ctx.config.get("handover.reach_ratio", 1.0))}
+    """The goal at the pace of a person: ``handover.reach_ratio`` times the object's own dmp_ratio, and slow at last, so
+    that a touch is light."""
+    ratio = goal["dmp_ratio"] * float(ctx.config.get("handover.reach_ratio", 1.0))
+    return {**goal, "dmp_ratio": ratio, "arrival_speed": float(ctx.config.get("handover.arrival_speed", 0.0))}
 
 
 class SetGraspGoal(CoglabState):

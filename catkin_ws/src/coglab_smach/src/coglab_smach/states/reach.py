@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
 
+import numpy as np
 from coglab_msgs.msg import ReasonCode
 
 from coglab_smach.context.context import Context
@@ -34,6 +35,7 @@ def dmp_request(goal: dict[str, Any], primitive: str | None = None, ratio: float
         orientation_control=orientation is not None,
         target_orientation=list(orientation if orientation is not None else (0.0, 0.0, 0.0, 0.0)),
         goal_approach=goal.get("approach", (0.0, 0.0, 0.0)),
+        arrival_speed=float(goal.get("arrival_speed", 0.0)),
         **goal.get("limits", {}),
     )
 
@@ -89,9 +91,14 @@ class WaitStop(CoglabState):
         self._left = False
         """the compliant profile of the approach"""
         self._early: EarlyReach | None = None
+        self._arrived: float | None = None
+        """s, when the hand was first at its place"""
+        self._deeper = False
+        """it has gone on from there"""
 
     def run(self, ud: Any) -> str:
-        self._left = False
+        self._left = self._deeper = False
+        self._arrived = None
         self._early = EarlyReach(self, ud.goal) if self.trigger and "early" in ud.goal else None
         if self.trigger == "contact":
             return self._await_contact(ud)
@@ -108,7 +115,7 @@ class WaitStop(CoglabState):
         arm, within = self.ctx.arm, float(self.ctx.config.get("contact_within", 0.12))
         for _ in range(BUMPS + 1):
             self._await_reach(lambda: self._reached() or 0.0 < arm.dmp_progress().remaining_distance < within)
-            self._watch("contact_in_motion", {**self._settings(ud), **ud.goal.get("object", {})})
+            self._watch("contact_in_motion", {**self._settings(ud), **ud.goal.get("object", {})}, ud.goal)
             away = off_grasp(self, ud.goal)
             if away is None or away < float(self.ctx.config.get("contact_near", 0.09)):
                 return self._found()
@@ -153,26 +160,47 @@ class WaitStop(CoglabState):
         early.forgive()
         self.await_pending(self.ctx.arm.execute_dmp(dmp_request(early.goal_now())), "the reach once more", 3.0)
 
-    def _watch(self, mode: str, settings: dict[str, Any]) -> None:
-        """Arm the detector and wait for what it finds."""
+    def _watch(self, mode: str, settings: dict[str, Any], goal: dict[str, Any]) -> None:
+        """Arm the detector and wait for what it finds; where the arm has arrived and feels nothing, it goes on."""
         limit = float(settings.get("timeout", self.ctx.config.get("contact_timeout", 6.0)))
         self.allow(limit + 5.0)
         self.await_pending(self.ctx.contact.arm(mode, limit, settings), "arming of the contact detector", 2.0)
         try:
-            self.wait_for(self._happened, "contact of an object with the hand", limit)
+            self.wait_for(partial(self._happened, goal), "contact of an object with the hand", limit)
         except TimeLimit as error:
             error.code = error.code if error.code != ReasonCode.TIME_LIMIT else ReasonCode.NO_CONTACT
             raise
         finally:
             self.ctx.contact.disarm()
 
-    def _happened(self) -> bool:
+    def _happened(self, goal: dict[str, Any]) -> bool:
         if self.ctx.contact.event() is not None:
             return True
         if self._reached():
+            now = self.ctx.clock.now()
+            self._arrived = now if self._arrived is None else self._arrived
             self.ctx.journal.mark("motion_reached")
             self._leave_approach_profile()
+            if not self._deeper and now - self._arrived >= float(self.ctx.config.get("handover.feel", 0.3)):
+                self._go_on(goal)
         return False
+
+    def _go_on(self, goal: dict[str, Any]) -> None:
+        """A tracker's error or a light touch: the hand goes on along the grasp's axis, as slowly as it has come."""
+        self._deeper = True
+        goal = self._early.goal_now() if self._early is not None else goal
+        axis = np.array(goal.get("approach", np.zeros(3)))
+        length = float(np.linalg.norm(axis))
+        if length > 0.0:
+            offset = np.array(goal["offset"]) + float(self.ctx.config.get("handover.deeper", 0.02)) / length * axis
+            request = dmp_request({**goal, "offset": offset.tolist(), "approach": np.zeros(3).tolist()})
+            try:
+                self.await_pending(self.ctx.arm.execute_dmp(request), "the last of the way", 3.0)
+                self.ctx.journal.mark("went_on")
+            except TimeLimit:
+                raise
+            except PortError as error:
+                self.reason = error.sentence  # it waits where it is
 
     def _found(self) -> str:
         event = self.ctx.contact.event()
