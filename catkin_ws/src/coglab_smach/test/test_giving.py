@@ -8,7 +8,7 @@ from coglab_smach.contact.leaving_load import SAME, LeavingLoad
 from coglab_smach.kinematics.reachability import default_arm
 from coglab_smach.ports.interfaces import HandState, Located
 from coglab_smach.ports.pending import PortError, Ready
-from coglab_smach.states.held import FARTHER, LOST_TIME, HeldObject
+from coglab_smach.states.held import FARTHER, LOST_TIME, NEAR, HeldObject
 from conftest import Trial
 
 RECEIVE, GIVE = "exchange_human_to_robot", "exchange_robot_to_human"
@@ -180,6 +180,13 @@ def test_an_object_that_is_seen_elsewhere_for_long_enough_is_lost():
     with pytest.raises(PortError, match="has left the hand") as lost:
         carried.look(2 * LOST_TIME)
     assert lost.value.code == ReasonCode.OBJECT_NOT_SEEN and carried.ctx.holding == "" and not carried.ctx.shared
+
+
+def test_an_object_that_was_lost_before_anybody_asked_is_lost():
+    carried = Carried()
+    carried.up = -NEAR - FARTHER - 0.1
+    with pytest.raises(PortError, match="has left the hand"):
+        carried.look(2 * LOST_TIME)
 
 
 def test_open_fingers_hold_nothing_wherever_the_object_is_seen():

@@ -21,7 +21,8 @@ class HeldObject:
     """Ask it again and again while the arm carries ``object_id``.
 
     Two things tell that it is gone: the hand, whose fingers are open, and the tracker, which sees it away from the palm
-    it was at when the asking began. Fingers that stand where they closed do not feel what slides out of them.
+    it was at when the asking began, or too far from it at once. Fingers that stand where they closed do not feel what
+    slides out of them.
     """
 
     def __init__(self, ctx: Context, object_id: str) -> None:
@@ -47,7 +48,8 @@ class HeldObject:
             self._carried = distance if distance < NEAR else None
             self._height = self._before = self._above
         self.sunk, self._before = self._height - max(self._above, self._before), self._above
-        if self._carried is None or distance < self._carried + FARTHER:
+        # What is far away at the first sight already was lost before anybody asked.
+        if distance < (NEAR if self._carried is None else self._carried) + FARTHER:
             self._away_since = None
             return
         now = self._ctx.clock.now()
