@@ -56,6 +56,14 @@ TEST(DmpRequests, RefusesBadRequestsAndKeepsMoving) {
                     {"goal_offset"}));
       },
       [&] {
+        for (const double speed : {-0.1, 0.01, 3.0, std::nan("")}) {
+          EXPECT_TRUE(refused(dmp.execute(with([&](auto& r) { r.arrival_speed = speed; })),
+                              {"arrival_speed", "0.02 to 2"}));
+        }
+        EXPECT_TRUE(refused(dmp.execute(with([](auto& r) { r.goal_approach.x() = 0.4; })),
+                            {"goal_approach", "0.3 m"}));
+      },
+      [&] {
         EXPECT_TRUE(refused(dmp.execute(with([](auto& r) { r.goal_frame = "cup"; })), {"cup"}));
       },
       [&] {

@@ -78,7 +78,8 @@ def test_a_dmp_request_has_one_shape_from_the_brain_to_the_plugin() -> None:
     limits = ["goal_region_low", "goal_region_high", "goal_retreat", "goal_drop"]
     request = [limits if name == "goal_limits" else [name] for name in struct("plugins/dmp_request.hpp", "DmpRequest")]
     assert sum(request, []) == execute
-    own_of_execute = {"initial_state", "initial_position", "initial_velocity", "goal_frame", "goal_approach", *limits}
+    arrival = ["goal_approach", "arrival_speed"]
+    own_of_execute = {"initial_state", "initial_position", "initial_velocity", "goal_frame", *arrival, *limits}
     assert [f for f in execute if f not in own_of_execute] == switch
     brain = dataclass_fields(
         SOURCES / "coglab_smach" / "src" / "coglab_smach" / "ports" / "interfaces.py", "DmpRequest"

@@ -39,6 +39,7 @@ SERVICES = {
 }
 LIMITS = [("goal_region_low", "geometry_msgs/Point"), ("goal_region_high", "geometry_msgs/Point")]
 LIMITS += [("goal_retreat", "float64"), ("goal_drop", "float64"), ("goal_approach", "geometry_msgs/Vector3")]
+LIMITS += [("arrival_speed", "float64")]
 ANSWER = [("success", "bool"), ("reason_code", "uint16"), ("message", "string")]
 OURS = {("goal_frame", "string"), *LIMITS, *ANSWER, *IDS}
 MESSAGES = {"DmpGoal": [("goal", "geometry_msgs/Point")], "FinishedPtp": [("ptp_id", "int32")]}
