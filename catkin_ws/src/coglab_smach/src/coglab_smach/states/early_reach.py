@@ -7,9 +7,10 @@ from typing import Any
 
 import coglab_controllers as cc
 import numpy as np
+from coglab_msgs.msg import ReasonCode
 
 from coglab_smach.states.base import CoglabState, TimeLimit
-from coglab_smach.states.where import palm_at, seen_at
+from coglab_smach.states.where import palm_at, person_at, seen_at
 
 PERIOD = 0.03
 """s between two looks"""
@@ -17,13 +18,43 @@ DOUBT_TIME = 0.2
 """s for which nothing is believed before a reach ends; a belief that a gap in what is seen broke off is back by then"""
 
 
+SLIPPED = 0.06
+"""m by which an object is farther from the person's hand than at first when it has left it"""
+
+
+def target_of(goal: Mapping[str, Any]) -> str:
+    """The object that a reach is for, or the person's hand, as perception names it; '' for a place."""
+    return str(goal["frame"]).removesuffix("_ahead").removeprefix("object_")
+
+
+class PersonsGrip:
+    """Tells an object that falls from one that is lowered fast: whether the person's hand is still at it."""
+
+    def __init__(self, state: CoglabState, target: str) -> None:
+        self._state, self._target = state, target
+        self._at_first = self._apart()
+
+    def _apart(self) -> float | None:
+        """m from the person's hand to the object, as they are seen."""
+        hand, thing = person_at(self._state), seen_at(self._state, self._target)
+        return None if hand is None or thing is None else float(np.linalg.norm(hand - thing))
+
+    def fell_or_withdrawn(self) -> int:
+        """ReasonCode of what has gone down."""
+        apart = self._apart()
+        if self._at_first is None or apart is None or apart > self._at_first + SLIPPED:
+            return int(ReasonCode.GOAL_FELL)
+        return int(ReasonCode.GOAL_WITHDRAWN)
+
+
 class EarlyReach:
     """Watches a reach toward where something will be: the thing itself may not go back nor fall (cc.GoalWatch, the
     rules of a reach toward a goal that is seen), and outside the handover region somebody has to go on offering it."""
 
-    def __init__(self, state: CoglabState, goal: Mapping[str, Any]) -> None:
+    def __init__(self, state: CoglabState, goal: Mapping[str, Any], grip: PersonsGrip | None) -> None:
+        """``grip``: of the person on the object that the reach is for."""
         self.state, self.goal, self.limits, self.early = state, goal, goal["limits"], goal["early"]
-        self.target = str(goal["frame"]).removesuffix("_ahead").removeprefix("object_")
+        self.target, self._grip = target_of(goal), grip
         self._watch: cc.GoalWatch | None = None
         self._sure = state.ctx.clock.now()
         """when it was last believed"""
@@ -70,6 +101,8 @@ class EarlyReach:
                 self._watch = cc.GoalWatch(nowhere, nowhere, self.early["retreat"], self.early["drop"], palm, place)
             return
         code, sentence = self._watch.update(passed, place)
+        if code == ReasonCode.GOAL_FELL and self._grip is not None:
+            code = self._grip.fell_or_withdrawn()
         if code:
             raise TimeLimit(f"the reach was given up: {sentence}", (), code)
 

@@ -11,10 +11,10 @@ from coglab_msgs.msg import ReasonCode
 
 from coglab_smach.context.context import Context
 from coglab_smach.kinematics.motion_time import reach_time
-from coglab_smach.ports.interfaces import DmpRequest
+from coglab_smach.ports.interfaces import ContactEvent, DmpRequest
 from coglab_smach.ports.pending import PortError
 from coglab_smach.states.base import CoglabState, Interrupted, TimeLimit
-from coglab_smach.states.early_reach import EarlyReach
+from coglab_smach.states.early_reach import EarlyReach, PersonsGrip, target_of
 from coglab_smach.states.motion import shift
 from coglab_smach.states.where import off_grasp, palm_axis
 
@@ -22,6 +22,12 @@ BUMPS = 2
 """touches of something else after which the arm still comes again"""
 DRAWN_BACK = 0.06
 """m"""
+SEATED = 0.03
+"""m off its grasp at most, for an object that the fingers may close on at a touch"""
+FIRM = 2.5
+"""margin of a touch that is more than brushing past"""
+SLIDING = 0.6
+"""s for which the hand goes on at most"""
 
 
 def dmp_request(goal: dict[str, Any], primitive: str | None = None, ratio: float | None = None) -> DmpRequest:
@@ -91,6 +97,7 @@ class WaitStop(CoglabState):
         self._left = False
         """the compliant profile of the approach"""
         self._early: EarlyReach | None = None
+        self._grip: PersonsGrip | None = None
         self._arrived: float | None = None
         """s, when the hand was first at its place"""
         self._deeper = False
@@ -99,7 +106,9 @@ class WaitStop(CoglabState):
     def run(self, ud: Any) -> str:
         self._left = self._deeper = False
         self._arrived = None
-        self._early = EarlyReach(self, ud.goal) if self.trigger and "early" in ud.goal else None
+        target = target_of(ud.goal) if self.trigger == "contact" else ""
+        self._grip = PersonsGrip(self, target) if target else None
+        self._early = EarlyReach(self, ud.goal, self._grip) if self.trigger and "early" in ud.goal else None
         if self.trigger == "contact":
             return self._await_contact(ud)
         return self._await_end(ud)
@@ -118,7 +127,11 @@ class WaitStop(CoglabState):
             self._watch("contact_in_motion", {**self._settings(ud), **ud.goal.get("object", {})}, ud.goal)
             away = off_grasp(self, ud.goal)
             if away is None or away < float(self.ctx.config.get("contact_near", 0.09)):
-                return self._found()
+                event = self.ctx.contact.event()
+                assert event is not None
+                if away is not None and away > SEATED and event.margin < FIRM:
+                    self._slide_in(ud)
+                return self._found(event)
             self.ctx.journal.mark("bumped")
             self._come_again(ud.goal)
         raise PortError(
@@ -202,9 +215,23 @@ class WaitStop(CoglabState):
             except PortError as error:
                 self.reason = error.sentence  # it waits where it is
 
-    def _found(self) -> str:
-        event = self.ctx.contact.event()
-        assert event is not None
+    def _slide_in(self, ud: Any) -> None:
+        """Fingers touch the object on their way past it: closed there, they would hold it by its edge. The reach goes on
+        until the palm is at its grasp, unless something stands in its way."""
+        contact, end = self.ctx.contact, self.ctx.clock.now() + SLIDING
+        settings = {**self._settings(ud), **ud.goal.get("object", {})}
+        try:
+            while self.ctx.clock.now() < end and not self._reached():
+                away, event = off_grasp(self, ud.goal), contact.event()
+                if away is None or away <= SEATED or (event is not None and event.margin >= FIRM):
+                    return
+                if event is not None:
+                    self.await_pending(contact.arm("contact_in_motion", 1.0, settings), "arming of the detector", 1.0)
+                self.pause(0.02)
+        finally:
+            contact.disarm()
+
+    def _found(self, event: ContactEvent) -> str:
         self.ctx.journal.mark("contact")
         self.reason = event.message or f"contact by {event.source}, margin {event.margin:.1f}"
         return "succeeded"
@@ -252,9 +279,11 @@ class WaitStop(CoglabState):
             self._pause(self._early)
             return False
         if progress.state == "aborted":
-            raise TimeLimit(
-                "the reach was aborted", (progress.reason or "the controller gave no reason",), progress.code
-            )
+            why, code = progress.reason or "the controller gave no reason", progress.code
+            if code == ReasonCode.GOAL_FELL and self._grip is not None:
+                code = self._grip.fell_or_withdrawn()
+                why = why if code == ReasonCode.GOAL_FELL else "it was lowered with the hand that holds it"
+            raise TimeLimit("the reach was aborted", (why,), code)
         blocked = self.ctx.arm.motion_allowed()
         if not blocked.ok:
             raise TimeLimit("the arm does not follow any more", (blocked.why,), blocked.code)
