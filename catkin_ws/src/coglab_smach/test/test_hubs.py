@@ -2,7 +2,9 @@
 
 import json
 
+import numpy as np
 import pytest
+from coglab_py.pose import Pose
 from coglab_smach.context.holding import HoldingMemory
 from conftest import Trial
 
@@ -167,6 +169,7 @@ class Restarted(Trial):
         self.ctx.memory = HoldingMemory(str(path))
         self.cell.hand_positions = (200, 150, 160, 155, 170)
         self.cell.arm.enabled = self.cell.calibrated = True
+        self.cell.at_palm = ("mug", Pose(np.array([0.07, 0.0, 0.0])))
 
 
 @pytest.fixture

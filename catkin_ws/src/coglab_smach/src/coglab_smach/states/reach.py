@@ -216,8 +216,8 @@ class WaitStop(CoglabState):
                 self.reason = error.sentence  # it waits where it is
 
     def _slide_in(self, ud: Any) -> None:
-        """Fingers touch the object on their way past it: closed there, they would hold it by its edge. The reach goes on
-        until the palm is at its grasp, unless something stands in its way."""
+        """Fingers touch the object on their way past it: closed there, they would hold it by its edge. The reach goes
+        on until the palm is at its grasp, unless something stands in its way."""
         contact, end = self.ctx.contact, self.ctx.clock.now() + SLIDING
         settings = {**self._settings(ud), **ud.goal.get("object", {})}
         try:
