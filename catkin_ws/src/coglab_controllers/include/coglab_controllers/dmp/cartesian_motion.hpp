@@ -23,8 +23,8 @@ struct CartesianMotionPlan {
 };
 
 inline constexpr double kSlowWay = 0.02;         ///< m
-inline constexpr double kGentleBraking = 0.7;    ///< m/s^2
-inline constexpr double kFastestArrival = 0.48;  ///< m/s, on all of the way
+inline constexpr double kGentleBraking = 0.6;    ///< m/s^2
+inline constexpr double kFastestArrival = 0.45;  ///< m/s, on all of the way
 
 /// Runs a primitive towards a goal pose that may move. This is all the DMP plug-in does between its
 /// mailboxes and the IK; the Python module runs the same code. No allocation, no throw.
