@@ -153,6 +153,29 @@ def test_a_partner_who_pushes_the_arm_away_while_it_gives():
     assert trial.rig.robot.limit_violations == 0
 
 
+@pytest.mark.parametrize("after, outcomes", [(0.3, ["succeeded"]), (0.8, ["succeeded", "failed_empty"])])
+def test_a_partner_who_pushes_the_arm_away_while_it_receives(after, outcomes):
+    """40 N for a second. On the way that is no object in the hand: the arm draws back, comes again and takes it. Beside
+    the object it may be taken for one; then the hand has closed on nothing, or on an edge, and says so."""
+    trial = VirtualTrial(seed=4, profile="accustomed", perfect=True)
+    pushed = []
+
+    def beside(t):
+        if not pushed and t._reach is not None and t.rig.t > t._reach.begin + after:
+            pushed.append(t.rig.t)
+        if pushed:
+            t.rig.cell.set_push([-40.0 if t.rig.t < pushed[0] + 1.0 else 0.0, 0.0, 0.0])
+
+    trial.beside = beside
+    result = trial.run(RECEIVE)[0]
+    documented = {ReasonCode.NONE, ReasonCode.NO_CONTACT, ReasonCode.NOT_RELEASED, ReasonCode.OBJECT_NOT_SEEN}
+    assert pushed and result.outcome in outcomes and result.code in documented, trial.ctx.journal.why()
+    assert (result.outcome == "succeeded") == (trial.rig.cell.truth()["held_by"] == "robot")
+    assert result.outcome == "succeeded" or result.reason
+    assert ("bumped" in result.marks) == (after < 0.5)
+    assert trial.rig.robot.limit_violations == 0
+
+
 def test_who_offers_and_withdraws_five_times_is_not_chased():
     """Each ends because the goal went back or left the region, and the sixth offer is taken. Goal: the palm goes toward
     the hand with at most 0.25 m/s from 0.2 s after it has turned on."""
