@@ -24,6 +24,8 @@ class MotionGuard:
     cause: str = ""
     unacknowledged: bool = False
     needs_hold: bool = field(default=False)
+    stops: int = 0
+    """how many there were: a motion that was asked for before the newest one is not the first after it"""
     _was_stopped: bool = False
 
     def __post_init__(self) -> None:
@@ -32,6 +34,7 @@ class MotionGuard:
     def stop(self, cause: str) -> None:
         """A stop, by whomever."""
         self.cause, self.unacknowledged, self.needs_hold = cause, True, True
+        self.stops += 1
 
     def observe(self, stopped: bool, cause: str) -> bool:
         """How the robot stands, several times a second; True where a stop has just begun."""
@@ -47,9 +50,9 @@ class MotionGuard:
         """The operator has read the cause."""
         self.unacknowledged = False
 
-    def moved(self) -> None:
-        """A motion was begun with a held button."""
-        self.needs_hold = False
+    def moved(self, stops: int) -> None:
+        """A motion was begun with a held button, which was asked for when there had been so many stops."""
+        self.needs_hold = self.needs_hold and stops != self.stops
 
     def guarded(self, name: str, arguments: dict) -> bool:
         """Whether this command needs a held button now. Always: calibrations that open the hand whatever it holds, and

@@ -31,6 +31,6 @@ class HeldButton:
             return True
         return False
 
-    def released(self) -> None:
-        """The button went up."""
-        self._what = None
+    def unfinished(self) -> object:
+        """What is held down and has not begun yet; None where nothing is."""
+        return self._what if self._since != float("inf") else None

@@ -29,6 +29,10 @@ CSP = (
     "connect-src 'self' ws://{host}; "
     "object-src 'none'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
 )
+REFUSALS = {  # in place of the library's two words
+    405: "expected GET for the page, POST for /api/command, /api/stop and /api/session",
+    413: f"expected at most {MAX_MESSAGE} bytes; a command is far shorter",
+}
 HEADERS = {
     "X-Content-Type-Options": "nosniff",
     "X-Frame-Options": "DENY",
@@ -100,7 +104,8 @@ class ConsoleServer:
         except Denied as error:
             response = web.json_response(Answer(False, str(error)), status=error.status)
         except web.HTTPException as error:
-            response = web.json_response(Answer(False, error.reason), status=error.status)
+            words = REFUSALS.get(error.status, error.reason)
+            response = web.json_response(Answer(False, words), status=error.status)
         if not response.prepared:
             response.headers.update(HEADERS)
             host = request.headers.get("Host", "")
@@ -203,7 +208,7 @@ class ConsoleServer:
                 sender.cancel()
                 await asyncio.gather(sender, return_exceptions=True)
             session.sockets -= 1
-            self.desk.released(session.name)
+            self.desk.released(session.name, lost=True)
             if not session.sockets:
                 self.desk.disconnected(session.name)
         return socket
