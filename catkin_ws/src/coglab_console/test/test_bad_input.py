@@ -1,5 +1,5 @@
-"""Two operators at once, a STOP in the middle of a request, a browser that dies with a button held, requests that no page
-would send: each refused or bounded, and said."""
+"""Two operators at once, a STOP in the middle of a request, a browser that dies with a button held, requests that no
+page would send: each refused or bounded, and said."""
 
 import asyncio
 import json

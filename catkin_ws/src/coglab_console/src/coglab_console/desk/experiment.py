@@ -1,8 +1,9 @@
 """A session with one participant: conditions, order of trials, notes, and one file that tools can read.
 
 The file holds one JSON object a line, each with `type` and `stamp` (s since 1970): session, trial_begin, trial_end,
-result (as on coglab/results), note, stop (by the page), stopped (the robot stands, whoever asked for it), resumed (by the
-next console after one was killed), session_end. Participants are pseudonyms; no names belong here. session_file reads it.
+result (as on coglab/results), note, stop (by the page), stopped (the robot stands, whoever asked for it), resumed (by
+the next console after one was killed), session_end. Participants are pseudonyms; no names belong here. What reads it is
+session_file.
 """
 
 from __future__ import annotations
@@ -190,7 +191,7 @@ class Experiment:
         if self.running and "trial" not in fields:
             fields["trial"] = self.position + 1
         try:
-            # A line that a full disk or a killed console has left unfinished is ended first, or it would spoil this one.
+            # A line that a full disk or a killed console has left unfinished is ended first: it would spoil this one.
             with self._path.open("a+b") as stream:
                 if stream.tell():
                     stream.seek(-1, os.SEEK_END)
