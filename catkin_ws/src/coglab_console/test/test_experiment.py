@@ -115,3 +115,10 @@ def test_a_session_does_not_end_in_the_middle_of_a_trial(tmp_path):
 def test_an_experiment_without_a_folder_begins(tmp_path):
     session = Experiment(tmp_path / "gone", time.time, lambda text: None)
     assert session.resume() == ""
+
+
+def test_a_note_without_a_session_says_where_it_is(tmp_path):
+    session = Experiment(tmp_path, time.time, lambda text: None)
+    assert "no session is open" in session.note("a", "x")
+    session.begin("P07", ["a"], 1, "as_listed", 0)
+    assert session.note("a", "y") == "noted"

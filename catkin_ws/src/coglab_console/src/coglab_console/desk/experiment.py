@@ -160,7 +160,7 @@ class Experiment:
         """A note, also between trials."""
         self.notes = [*self.notes[-99:], {"stamp": round(self._now(), 3), "who": who, "text": text}]
         self._write("note", who=who, text=text)
-        return "noted"
+        return "noted" if self._path is not None else "noted in the event log alone: no session is open"
 
     def result(self, row: dict) -> None:
         """An action of the brain's journal has ended. One that is told again, as a latched topic does, is the same."""
