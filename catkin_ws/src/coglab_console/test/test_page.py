@@ -203,6 +203,38 @@ def test_the_keyboard_reaches_everything_in_order_on_every_page(desk):
     desk.browser.tab("Live")
 
 
+def test_diagnostics_are_a_tree_by_node_whose_branches_show_their_worst(desk):
+    def row(name, level):
+        return {"name": name, "level": level, "message": "words", "values": [["key", "value"]]}
+
+    rows = [row("robot: FRI connection", 0), row("robot: arm", 1), row("ih2_hand: hand", 0), row("camera", 2)]
+    page = desk.browser
+    page.tab("Health")
+    health = {"rows": rows, "versions": {}, "browsers": []}
+    desk.loop.call_soon_threadsafe(desk.console.documents.put, "health", health)
+    tree = (
+        "return [...document.querySelectorAll('#diagnostics > details')].map((branch) => ["
+        "branch.querySelector('summary').textContent, [...branch.querySelectorAll(':scope details > summary')].map((leaf) => leaf.textContent)])"
+    )
+    page.until("return document.querySelectorAll('#diagnostics > details').length === 3", 10.0)
+    assert page.js(tree) == [
+        ["▲robot: warning", ["●FRI connection: ok, words", "▲arm: warning, words"]],
+        ["●ih2_hand: ok", ["●hand: ok, words"]],
+        ["■camera: error", ["■camera: error, words"]],
+    ]
+    assert look(page)[0] == [] and focus_order(page)[1] == []
+    # What was opened or closed stays so when the next second's diagnostics come, and so does the focus.
+    page.js("const d = document.querySelectorAll('#diagnostics details'); d[0].open = false; d[3].open = true;")
+    page.js("document.querySelectorAll('#diagnostics summary')[3].focus()")
+    time.sleep(0.2)
+    desk.loop.call_soon_threadsafe(desk.console.documents.put, "health", {**health, "rows": rows[:3]})
+    page.until("return document.querySelectorAll('#diagnostics > details').length === 2", 10.0)
+    kept = "return [...document.querySelectorAll('#diagnostics details')].map((one) => one.open)"
+    assert page.js(kept) == [False, False, False, True, False]
+    assert page.js("return document.activeElement.dataset.name") == "ih2_hand"
+    page.tab("Live")
+
+
 def test_without_graphviz_the_page_has_the_states_and_says_what_is_missing(desk):
     containers = {"/M": Container("/M", ("A", "B", "C"), (("ok", "A", "B"),))}
     picture = {**Layout("no-such-program").of(containers), "roots": ["/M"]}
