@@ -213,8 +213,9 @@ def test_diagnostics_are_a_tree_by_node_whose_branches_show_their_worst(desk):
     health = {"rows": rows, "versions": {}, "browsers": []}
     desk.loop.call_soon_threadsafe(desk.console.documents.put, "health", health)
     tree = (
-        "return [...document.querySelectorAll('#diagnostics > details')].map((branch) => ["
-        "branch.querySelector('summary').textContent, [...branch.querySelectorAll(':scope details > summary')].map((leaf) => leaf.textContent)])"
+        "const words = (one, what) => [...one.querySelectorAll(what)].map((summary) => summary.textContent);"
+        "return [...document.querySelectorAll('#diagnostics > details')].map((branch) =>"
+        " [...words(branch, ':scope > summary'), words(branch, ':scope details > summary')])"
     )
     page.until("return document.querySelectorAll('#diagnostics > details').length === 3", 10.0)
     assert page.js(tree) == [
