@@ -12,6 +12,12 @@ from console_double import RobotDouble, running
 RECEIVE = {"action": "exchange_human_to_robot"}
 
 
+@pytest.fixture(autouse=True)
+def patient(monkeypatch):
+    """A crowded computer makes gaps between the messages of a held button; gaps have tests of their own."""
+    monkeypatch.setattr("coglab_console.desk.hold.LONGEST_GAP", 5.0)
+
+
 def go(test, tmp_path, robot=None, **more):
     async def inside():
         async with running(tmp_path, robot, **more) as console:
