@@ -102,7 +102,8 @@ def session_files(folder: Path) -> list[Path]:
 
 def newest(folder: Path) -> Path | None:
     """The session of this folder that began last; None where there is none."""
-    return (session_files(folder) or [None])[-1]
+    found = session_files(folder)
+    return found[-1] if found else None
 
 
 def read_session(path: Path) -> Session:

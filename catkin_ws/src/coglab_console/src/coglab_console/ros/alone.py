@@ -12,6 +12,7 @@ import os
 import time
 from http.client import HTTPConnection, HTTPException
 from pathlib import Path
+from typing import Any
 from urllib.parse import urlsplit
 from xmlrpc.client import Error, ServerProxy, Transport
 
@@ -29,7 +30,7 @@ class StartError(Exception):
 class _Brief(Transport):
     """Gives up after ANSWER_LIMIT s."""
 
-    def make_connection(self, host: object) -> HTTPConnection:
+    def make_connection(self, host: Any) -> HTTPConnection:
         connection = super().make_connection(host)
         connection.timeout = ANSWER_LIMIT
         return connection
@@ -71,7 +72,7 @@ def _another(master: rosgraph.Master) -> str:
         uri, process = master.getParam(PLACE)
         if not isinstance(uri, str):
             return ""
-        answer = ServerProxy(uri, transport=_Brief()).getPid("/coglab_console")
+        answer: Any = ServerProxy(uri, transport=_Brief()).getPid("/coglab_console")
         return f" at {uri}, process {process}" if answer[2] == process else ""
     except TimeoutError:
         return f" at {uri} but does not answer"
