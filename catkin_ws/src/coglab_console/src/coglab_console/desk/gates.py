@@ -6,12 +6,15 @@ belongs to the console alone is added: who is the operator, what was not acknowl
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, field
 
 from .commands import COMMANDS, STARTS
 
 BUTTONS = (*STARTS, "calibrate", "home")
 STANDSTILL = ("stopped", "fault")
+LONGEST = 28
+"""characters of the arm's reason below a button, where there is room for three lines; the status column has all of it"""
 SECOND_THOUGHT = ("feedback", "feedback_order", "contact_learn")
 """commands that are held down, not clicked: nobody sees at once what they have changed"""
 
@@ -127,7 +130,10 @@ def _home_reason(now: Standing) -> str:
         return "the arm's node is not there"
     if now.master_alive and (not now.in_hub or now.leaf in STANDSTILL):
         return f"not in {now.leaf.replace('_', ' ')}" if now.in_hub else "an action is under way"
-    return "" if now.motion_allowed else f"the arm may not move: {now.arm_reason.split(':')[0] or 'no reason told'}"
+    if now.motion_allowed:
+        return ""
+    short = re.split(r":|;| because ", now.arm_reason)[0] or "no reason told"
+    return f"the arm may not move: {short if len(short) <= LONGEST else short[: LONGEST - 1] + '…'}"
 
 
 def reasons(now: Standing, guard: MotionGuard) -> dict[str, str]:
