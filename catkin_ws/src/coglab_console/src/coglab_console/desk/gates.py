@@ -14,7 +14,7 @@ from .commands import COMMANDS, STARTS
 BUTTONS = (*STARTS, "calibrate", "home")
 STANDSTILL = ("stopped", "fault")
 LONGEST = 28
-"""characters of the arm's reason below a button, where there is room for three lines; the status column has all of it"""
+"""characters of the arm's reason below a button, which has room for three lines; the status column has all of it"""
 SECOND_THOUGHT = ("feedback", "feedback_order", "contact_learn")
 """commands that are held down, not clicked: nobody sees at once what they have changed"""
 
