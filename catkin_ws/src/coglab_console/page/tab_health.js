@@ -13,13 +13,41 @@ function heavy(label, args, told) {
   return actionButton(label, { blockedBy, mustHold: () => true, request: () => ['calibrate', args], tell: (text) => setText(told, text) });
 }
 
+/** Rows by the node that tells them, which stands before the colon: Map of node to [row, its own name]. */
+function byNode(rows) {
+  const nodes = new Map();
+  for (const row of rows) {
+    const [node, ...rest] = row.name.split(': ');
+    nodes.set(node, [...(nodes.get(node) ?? []), [row, rest.join(': ') || node]]);
+  }
+  return nodes;
+}
+
+/** The diagnostics as a tree: a branch per node with the worst of its leaves. What was opened, and the focus, stay. */
+function diagnosticsTree(tree) {
+  const turned = new Set(); // names that are the other way than at first: branches open, leaves closed
+  const item = (name, level, words, isOpen, ...inside) => {
+    const [kind, word] = LEVELS[level] ?? LEVELS[2];
+    const details = h('details', {}, h('summary', { 'data-name': name }, mark(kind), words(word)), ...inside);
+    details.open = isOpen !== turned.has(name);
+    details.addEventListener('toggle', () => (details.open === isOpen ? turned.delete(name) : turned.add(name)));
+    return details;
+  };
+  return (rows) => {
+    const focused = document.activeElement?.dataset?.name;
+    tree.replaceChildren(...[...byNode(rows)].map(([node, leaves]) => item(node, Math.max(...leaves.map(([row]) => row.level)), (word) => `${node}: ${word}`, true,
+      ...leaves.map(([row, name]) => item(`${node}: ${name}`, row.level, (word) => `${name}: ${word}, ${row.message}`, false, table(['Value', ''], row.values, row.name))))));
+    if (focused) [...tree.querySelectorAll('summary')].find((one) => one.dataset.name === focused)?.focus();
+  };
+}
+
 export function healthPage(page) {
   page.className = 'page two';
-  const tree = h('div');
+  const tree = h('div', { id: 'diagnostics' });
+  const drawTree = diagnosticsTree(tree);
   const versions = h('div');
   const parameters = h('div');
   const told = h('p', { 'aria-live': 'polite' });
-  const open = new Set();
   const filter = h('input', { type: 'search', placeholder: 'part of a name', oninput: () => show() });
   let known = [];
   const show = () => parameters.replaceChildren(table(['Parameter', 'Value'], known.filter(([name]) => name.includes(filter.value)).slice(0, 150), 'Parameters'));
@@ -35,15 +63,7 @@ export function healthPage(page) {
       h('h2', {}, 'Parameters'), marked, h('div', { class: 'row' }, read, h('label', {}, 'Filter', filter)), parameters));
   const draw = () => {
     const { rows = [], versions: words = {}, browsers = [] } = store.docs.health ?? {};
-    const focused = document.activeElement?.dataset?.name;
-    tree.replaceChildren(...rows.map((row) => {
-      const [level, word] = LEVELS[row.level] ?? LEVELS[2];
-      const button = h('summary', { 'data-name': row.name }, mark(level), `${row.name}: ${word}, ${row.message}`);
-      const item = h('details', { ontoggle: () => (item.open ? open.add(row.name) : open.delete(row.name)) }, button, table(['Value', ''], row.values, row.name));
-      item.open = open.has(row.name);
-      return item;
-    }));
-    if (focused) [...tree.querySelectorAll('summary')].find((one) => one.dataset.name === focused)?.focus();
+    drawTree(rows);
     const more = [['view', viewKind()], ['browsers', browsers.map((one) => `${one.name}${one.name === store.you ? ' (you)' : ''}`).join(', ')]];
     versions.replaceChildren(table(['', ''], [...Object.entries(words), ...more], 'Versions'));
   };

@@ -7,6 +7,7 @@ import os
 import signal
 import subprocess
 import sys
+import tempfile
 import time
 import unittest
 from pathlib import Path
@@ -307,6 +308,12 @@ class Console(unittest.TestCase):
         ended = subprocess.run(command, capture_output=True, text=True, timeout=90)
         self.assertEqual(ended.returncode, 1)
         self.assertIn("another console of this ROS master runs", ended.stderr)
+        # Of the same name and with a ROS_HOME of its own, as from a second terminal: it would end the first one.
+        with tempfile.TemporaryDirectory() as home:
+            command, environment = command[:-1], {**os.environ, "ROS_HOME": home}
+            ended = subprocess.run(command, capture_output=True, text=True, timeout=90, env=environment)
+        self.assertEqual(ended.returncode, 1)
+        self.assertIn("another console of this ROS master runs at http", ended.stderr)
         self.browser.until("return !document.body.classList.contains('lost')", 20.0)
 
     def test_10_the_page_had_nothing_to_complain_about(self):

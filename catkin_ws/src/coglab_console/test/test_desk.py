@@ -84,14 +84,8 @@ def test_notes_and_the_next_object_are_told_to_ros_and_heard_from_there(desk):
 def test_what_nobody_sees_at_once_is_held_down(desk, name, arguments):
     """One click changes no feedback controller, also between trials."""
     assert "hold the button" in ask(desk, "a", name, **arguments)["message"] and not desk.backend.calls
-
-    async def hold():
-        for _ in range(10):
-            if (answer := await desk.held("a", name, arguments)) is not None:
-                return answer
-            await asyncio.sleep(0.1)
-
-    assert asyncio.run(hold())["success"] and desk.backend.calls == [(name, arguments)]
+    (answer,) = hold_for(desk, 1.0, what=(name, arguments))
+    assert answer["success"] and desk.backend.calls == [(name, arguments)]
 
 
 def test_taking_over_is_announced_and_may_be_refused():
@@ -147,14 +141,14 @@ def test_a_stop_by_somebody_else_counts(desk):
     assert not desk.guard.unacknowledged  # the same stop
 
 
-def hold_for(desk, seconds, gap=0.1, who="a"):
+def hold_for(desk, seconds, gap=0.1, who="a", what=("start", RECEIVE)):
     clock = Clock()
     desk._held[who] = HeldButton(clock)
 
     async def press():
         answers = []
         for _ in range(round(seconds / gap)):
-            answers.append(await desk.held(who, "start", RECEIVE))
+            answers.append(await desk.held(who, *what))
             clock.time += gap
         return [answer for answer in answers if answer is not None]
 
@@ -241,6 +235,17 @@ def test_the_real_robot_and_calibrations_that_open_the_hand_need_a_held_button()
 def test_reasons(change, button, part):
     found = reasons(replace(Standing(**READY), **change), MotionGuard())[button]
     assert (found == "") == (part == "") and part in found
+
+
+def test_a_reason_is_short_enough_to_stand_below_its_button():
+    """Three lines; the whole of it is in the status column."""
+    told = "command mode was lost because the robot controller was not run for 259 ms (load); now: no datagrams"
+    for arm_reason in (told, "x" * 200):
+        standing = replace(Standing(**READY), motion_allowed=False, arm_reason=arm_reason)
+        found = reasons(standing, MotionGuard())["home"]
+        assert found.startswith("the arm may not move: ") and len(found) <= 50
+    standing = replace(Standing(**READY), motion_allowed=False, arm_reason=told)
+    assert reasons(standing, MotionGuard())["home"] == "the arm may not move: command mode was lost"
 
 
 def test_thresholds_do_not_change_under_way(desk):

@@ -9,6 +9,7 @@ import pytest
 from coglab_console.browser import Browser
 from coglab_console.desk.gates import Standing
 from coglab_console.page_check import PAGES, focus_order, look
+from coglab_console.scene.graph_layout import Container, Layout
 from console_double import PAGE_DOCUMENTS, READY, RobotDouble, page_state, running
 
 pytestmark = pytest.mark.skipif(
@@ -34,10 +35,13 @@ window.WebSocket = class extends Real {
 
 
 class Desk:
-    """A console that serves in a thread of its own, 30 states a second, and a browser at its page."""
+    """A console that serves in a thread of its own, 30 states a second, and a browser at its page. `model`: changes of
+    that document; `files`: of where the page's files lie."""
 
-    def __init__(self, folder):
+    def __init__(self, folder, model=None, **files):
         self.robot = RobotDouble()
+        self._documents = {**PAGE_DOCUMENTS, "model": {**PAGE_DOCUMENTS["model"], **(model or {})}}
+        self._files = files
         self.loop = asyncio.new_event_loop()
         self._ready, self._over = threading.Event(), asyncio.Event()
         self._thread = threading.Thread(target=self.loop.run_until_complete, args=(self._serve(folder),))
@@ -48,8 +52,8 @@ class Desk:
         self.browser.open(self.console.link())
 
     async def _serve(self, folder):
-        async with running(folder, self.robot) as self.console:
-            for name, value in PAGE_DOCUMENTS.items():
+        async with running(folder, self.robot, **self._files) as self.console:
+            for name, value in self._documents.items():
                 self.console.documents.put(name, value)
             self._ready.set()
             while not self._over.is_set():
@@ -197,6 +201,66 @@ def test_the_keyboard_reaches_everything_in_order_on_every_page(desk):
         names, problems = focus_order(desk.browser)
         assert problems == [] and f"tab-{name}" in names, (name, problems)
     desk.browser.tab("Live")
+
+
+def test_diagnostics_are_a_tree_by_node_whose_branches_show_their_worst(desk):
+    def row(name, level):
+        return {"name": name, "level": level, "message": "words", "values": [["key", "value"]]}
+
+    rows = [row("robot: FRI connection", 0), row("robot: arm", 1), row("ih2_hand: hand", 0), row("camera", 2)]
+    page = desk.browser
+    page.tab("Health")
+    health = {"rows": rows, "versions": {}, "browsers": []}
+    desk.loop.call_soon_threadsafe(desk.console.documents.put, "health", health)
+    tree = (
+        "const words = (one, what) => [...one.querySelectorAll(what)].map((summary) => summary.textContent);"
+        "return [...document.querySelectorAll('#diagnostics > details')].map((branch) =>"
+        " [...words(branch, ':scope > summary'), words(branch, ':scope details > summary')])"
+    )
+    page.until("return document.querySelectorAll('#diagnostics > details').length === 3", 10.0)
+    assert page.js(tree) == [
+        ["▲robot: warning", ["●FRI connection: ok, words", "▲arm: warning, words"]],
+        ["●ih2_hand: ok", ["●hand: ok, words"]],
+        ["■camera: error", ["■camera: error, words"]],
+    ]
+    assert look(page)[0] == [] and focus_order(page)[1] == []
+    # What was opened or closed stays so when the next second's diagnostics come, and so does the focus.
+    page.js("const d = document.querySelectorAll('#diagnostics details'); d[0].open = false; d[3].open = true;")
+    page.js("document.querySelectorAll('#diagnostics summary')[3].focus()")
+    time.sleep(0.2)
+    desk.loop.call_soon_threadsafe(desk.console.documents.put, "health", {**health, "rows": rows[:3]})
+    page.until("return document.querySelectorAll('#diagnostics > details').length === 2", 10.0)
+    kept = "return [...document.querySelectorAll('#diagnostics details')].map((one) => one.open)"
+    assert page.js(kept) == [False, False, False, True, False]
+    assert page.js("return document.activeElement.dataset.name") == "ih2_hand"
+    page.tab("Live")
+
+
+def test_without_graphviz_the_page_has_the_states_and_says_what_is_missing(desk):
+    containers = {"/M": Container("/M", ("A", "B", "C"), (("ok", "A", "B"),))}
+    picture = {**Layout("no-such-program").of(containers), "roots": ["/M"]}
+    desk.loop.call_soon_threadsafe(desk.console.documents.put, "graph:/coglab", picture)
+    desk.browser.until("return document.querySelectorAll('#graph .node').length >= 3", 10.0)
+    words = desk.browser.js("return document.getElementById('graph').innerText")
+    assert "apt install graphviz" in words
+
+
+@pytest.mark.parametrize("promised", [False, True])
+def test_without_libjs_there_are_two_dimensions_and_a_sentence(tmp_path, promised):
+    """Also where a library was there when the console began, and half of it is not served."""
+    desk = Desk(tmp_path, {"three": promised, "charts": promised}, libraries=tmp_path)
+    try:
+        page = desk.browser
+        assert page.js("return coglab.view()") == "2D"
+        page.until("return /Strip charts/.test(document.getElementById('charts').innerText)", 10.0)
+        assert look(page)[0] == []
+        page.js("document.getElementById('stop').click()")
+        end = time.monotonic() + 10.0
+        while not desk.robot.stops and time.monotonic() < end:
+            time.sleep(0.02)
+        assert desk.robot.stops == ["browser 1"] or len(desk.robot.stops) == 2  # by both ways
+    finally:
+        desk.close()
 
 
 def test_a_page_that_is_let_in_no_more_says_what_to_do_and_that_its_stop_went_nowhere(desk):

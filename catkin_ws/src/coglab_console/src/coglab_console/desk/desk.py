@@ -17,8 +17,8 @@ from .gates import MotionGuard, Standing, reasons
 from .hold import HeldButton
 from .roles import Roles
 
-IN_TRIAL = ("contact_arm", "contact_learn", "feedback", "feedback_order")
-"""Changes of limits, gains or thresholds: not while an action or a trial is under way"""
+IN_TRIAL = ("contact_arm", "contact_learn", "feedback", "feedback_order", "objects_reload")
+"""Changes of limits, gains or thresholds, which object files hold, too: not while an action or a trial is under way"""
 
 
 class Answer(dict):
@@ -65,6 +65,9 @@ class Desk:
         self.roles = Roles(lambda text, level: events.add("control", text, level))
         self.guard = MotionGuard(backend.real)
         self.experiment = Experiment(folder, now, lambda text: events.add("experiment", text, "warning"))
+        goes_on = self.experiment.resume()
+        if goes_on:
+            events.add("experiment", goes_on, "warning")
         self.object_id = ""
         self._held: dict[str, HeldButton] = {}
         self._firing: set[str] = set()
@@ -106,9 +109,14 @@ class Desk:
             self._firing.discard(who)
         return answer
 
-    def released(self, who: str) -> None:
-        """The held button went up, or the connection of its browser went away."""
-        self._held.pop(who, None)
+    def released(self, who: str, lost: bool = False) -> None:
+        """The held button went up; `lost`: the connection of its browser went away, which everybody is told."""
+        button = self._held.pop(who, None)
+        what = button.unfinished() if button is not None and lost else None
+        if what is not None:
+            name, arguments = what
+            words = " ".join([name, *(str(value) for _, value in arguments)])
+            self.events.add("command", f"{who} went away with the button of {words} held: nothing was begun", "warning")
 
     def connected(self, who: str) -> None:
         """A browser's first connection."""
@@ -117,7 +125,7 @@ class Desk:
 
     def disconnected(self, who: str) -> None:
         """A browser's last connection closed."""
-        self.released(who)
+        self.released(who, lost=True)
         self.roles.disconnected(who)
         self.tick()
 
@@ -125,7 +133,7 @@ class Desk:
 
     def result(self, row: dict) -> None:
         """An action of the state machine has ended."""
-        self.experiment.record("result", **{key: row[key] for key in row if key not in ("type", "stamp", "trial")})
+        self.experiment.result(row)
 
     def told(self, name: str, text: str, who: str) -> None:
         """A note, or the object of the next action, told by another node; what does not fit is an event."""
@@ -145,6 +153,7 @@ class Desk:
         """Whether the arm or the machine stands after a stop, and why."""
         if self.guard.observe(stopped, cause):
             self.events.add("stop", f"stopped: {cause or 'no reason was told'}", "fault")
+            self.experiment.record("stopped", cause=cause)
             self.tick()
 
     def tick(self) -> None:
@@ -199,9 +208,10 @@ class Desk:
         if answer is None:
             if name == "start" and arguments["action"] in STARTS[2:]:
                 arguments = {"object_id": self.object_id, **arguments}
+            stops = self.guard.stops
             answer = await self.backend.call(name, arguments)
             if answer["success"] and judge(name, {**arguments}).motion:
-                self.guard.moved()
+                self.guard.moved(stops)
         if name not in ("parameters", "note", "select_object"):
             words = " ".join(str(value) for value in arguments.values())
             told = f"{who}: {name} {words}: {answer['message']}".replace(" :", ":")

@@ -1,17 +1,24 @@
 """A session with one participant: conditions, order of trials, notes, and one file that tools can read.
 
 The file holds one JSON object a line, each with `type` and `stamp` (s since 1970): session, trial_begin, trial_end,
-result (as on coglab/results), note, stop, session_end. Participants are pseudonyms; no names belong here.
+result (as on coglab/results), note, stop (by the page), stopped (the robot stands, whoever asked for it), resumed (by
+the next console after one was killed), session_end. Participants are pseudonyms; no names belong here. What reads it is
+session_file.
 """
 
 from __future__ import annotations
 
-import json
+import os
 import random
 from collections.abc import Callable
 from pathlib import Path
 
+from ..web.fan_out import to_json
+from .session_file import Session, SessionFileError, newest, read_session
+
 MAX_TRIALS = 600
+RESUME = 4 * 3600.0
+"""s without a line after which the session of a console that was killed does not go on"""
 
 
 class ExperimentError(Exception):
@@ -49,6 +56,11 @@ def order_of(conditions: list[str], repetitions: int, order: str, number: int) -
     return trials
 
 
+def _mark(row: dict) -> tuple:
+    """What tells one result from another: when its action began and ended, by the brain's clock."""
+    return row.get("kind"), row.get("started"), row.get("ended")
+
+
 class Experiment:
     """At most one session at a time. A file that cannot be written is told, and the session goes on in memory."""
 
@@ -60,6 +72,36 @@ class Experiment:
         self.position = 0
         self.running = False
         self.notes: list[dict] = []
+        self._last_result: tuple = ()
+
+    def resume(self) -> str:
+        """Goes on with the session that a console has left open when it was killed; says so, or is empty."""
+        try:
+            path = newest(self._folder)
+            found = read_session(path) if path is not None else None
+        except (SessionFileError, OSError) as error:
+            self._warn(f"no session goes on: {error}")
+            return ""
+        if found is None or found.ended is not None or self._now() - found.newest > RESUME:
+            return ""
+        self._restore(found)
+        self._write("resumed")
+        stands = "is under way" if self.running else "is next"
+        trial = min(self.position + 1, len(self.trials))
+        return f"the session of {self.participant} goes on: trial {trial} of {len(self.trials)} {stands}; {self._path}"
+
+    def _restore(self, found: Session) -> None:
+        self._path, self.participant = found.path, found.participant
+        self.trials = [{"condition": condition, "outcome": ""} for condition in found.trials]
+        for attempt in found.attempts:
+            if attempt.ended is not None:
+                self.trials[attempt.trial - 1]["outcome"] = attempt.outcome
+        self.position, self.running = min(found.passed(), len(self.trials)), found.running() is not None
+        places = (*found.attempts, found.outside)
+        notes = sorted((note for place in places for note in place.notes), key=lambda note: note["stamp"])
+        self.notes = [{name: note[name] for name in ("stamp", "who", "text")} for note in notes[-100:]]
+        results = [row for place in places for row in place.results]
+        self._last_result = _mark(max(results, key=lambda row: row["stamp"])) if results else ()
 
     def begin(self, participant: str, conditions: list[str], repetitions: int, order: str, number: int) -> str:
         """Opens a session; the answer in words."""
@@ -83,6 +125,8 @@ class Experiment:
         """Closes the session."""
         if not self.participant:
             raise ExperimentError("no session is open")
+        if self.running:
+            raise ExperimentError(f"trial {self.position + 1} is under way; end it first")
         self._write("session_end", done=sum(trial["outcome"] == "done" for trial in self.trials))
         sentence = f"session of {self.participant} closed; {self._path}"
         self._path, self.participant, self.trials, self.position, self.running = None, "", [], 0, False
@@ -116,10 +160,17 @@ class Experiment:
         """A note, also between trials."""
         self.notes = [*self.notes[-99:], {"stamp": round(self._now(), 3), "who": who, "text": text}]
         self._write("note", who=who, text=text)
-        return "noted"
+        return "noted" if self._path is not None else "noted in the event log alone: no session is open"
+
+    def result(self, row: dict) -> None:
+        """An action of the brain's journal has ended. One that is told again, as a latched topic does, is the same."""
+        if _mark(row) == self._last_result:
+            return
+        self._last_result = _mark(row)
+        self._write("result", **{key: value for key, value in row.items() if key not in ("type", "stamp", "trial")})
 
     def record(self, kind: str, /, **fields: object) -> None:
-        """A result or a stop, into the file of the open session."""
+        """A stop, into the file of the open session."""
         self._write(kind, **fields)
 
     def view(self) -> dict:
@@ -140,8 +191,13 @@ class Experiment:
         if self.running and "trial" not in fields:
             fields["trial"] = self.position + 1
         try:
-            with self._path.open("a", encoding="utf-8") as stream:
-                stream.write(json.dumps(fields) + "\n")
+            # A line that a full disk or a killed console has left unfinished is ended first: it would spoil this one.
+            with self._path.open("a+b") as stream:
+                if stream.tell():
+                    stream.seek(-1, os.SEEK_END)
+                whole = not stream.tell() or stream.read(1) == b"\n"
+                stream.write(b"" if whole else b"\n")
+                stream.write(f"{to_json(fields)}\n".encode())
         except OSError as error:
             self._warn(
                 f"{self._path} cannot be written ({error.strerror}); free the disk, the session goes on unwritten"

@@ -6,12 +6,15 @@ belongs to the console alone is added: who is the operator, what was not acknowl
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, field
 
 from .commands import COMMANDS, STARTS
 
 BUTTONS = (*STARTS, "calibrate", "home")
 STANDSTILL = ("stopped", "fault")
+LONGEST = 28
+"""characters of the arm's reason below a button, which has room for three lines; the status column has all of it"""
 SECOND_THOUGHT = ("feedback", "feedback_order", "contact_learn")
 """commands that are held down, not clicked: nobody sees at once what they have changed"""
 
@@ -24,6 +27,8 @@ class MotionGuard:
     cause: str = ""
     unacknowledged: bool = False
     needs_hold: bool = field(default=False)
+    stops: int = 0
+    """how many there were: a motion that was asked for before the newest one is not the first after it"""
     _was_stopped: bool = False
 
     def __post_init__(self) -> None:
@@ -32,6 +37,7 @@ class MotionGuard:
     def stop(self, cause: str) -> None:
         """A stop, by whomever."""
         self.cause, self.unacknowledged, self.needs_hold = cause, True, True
+        self.stops += 1
 
     def observe(self, stopped: bool, cause: str) -> bool:
         """How the robot stands, several times a second; True where a stop has just begun."""
@@ -47,9 +53,9 @@ class MotionGuard:
         """The operator has read the cause."""
         self.unacknowledged = False
 
-    def moved(self) -> None:
-        """A motion was begun with a held button."""
-        self.needs_hold = False
+    def moved(self, stops: int) -> None:
+        """A motion was begun with a held button, which was asked for when there had been so many stops."""
+        self.needs_hold = self.needs_hold and stops != self.stops
 
     def guarded(self, name: str, arguments: dict) -> bool:
         """Whether this command needs a held button now. Always: calibrations that open the hand whatever it holds, and
@@ -124,7 +130,10 @@ def _home_reason(now: Standing) -> str:
         return "the arm's node is not there"
     if now.master_alive and (not now.in_hub or now.leaf in STANDSTILL):
         return f"not in {now.leaf.replace('_', ' ')}" if now.in_hub else "an action is under way"
-    return "" if now.motion_allowed else f"the arm may not move: {now.arm_reason.split(':')[0] or 'no reason told'}"
+    if now.motion_allowed:
+        return ""
+    short = re.split(r":|;| because ", now.arm_reason)[0] or "no reason told"
+    return f"the arm may not move: {short if len(short) <= LONGEST else short[: LONGEST - 1] + '…'}"
 
 
 def reasons(now: Standing, guard: MotionGuard) -> dict[str, str]:

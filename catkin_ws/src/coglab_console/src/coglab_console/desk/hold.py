@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from typing import Any
 
 HOLD_TIME = 0.8
 LONGEST_GAP = 0.25
@@ -31,6 +32,6 @@ class HeldButton:
             return True
         return False
 
-    def released(self) -> None:
-        """The button went up."""
-        self._what = None
+    def unfinished(self) -> Any:
+        """What is held down and has not begun yet; None where nothing is."""
+        return self._what if self._since != float("inf") else None

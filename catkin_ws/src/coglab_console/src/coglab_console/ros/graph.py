@@ -26,6 +26,7 @@ class Machine:
         self.containers: dict[str, Container] = {}
         self.active: dict[str, list[str]] = {}
         self.last: dict[str, Any] = {}
+        self.tells = False  # whether its transitions are told, with outcome and reason, which introspection has not
         self.heard = time.monotonic()
         self.dirty = True
         self.subscribers: list[rospy.Subscriber] = []
@@ -48,6 +49,7 @@ class SmachGraphs:
         with self._lock:
             for machine in self._machines.values():
                 if path in machine.containers:
+                    machine.tells = True
                     machine.last = {
                         "path": path,
                         "from": from_state,
@@ -111,7 +113,7 @@ class SmachGraphs:
             if before == active or (before is None and len(machine.active) >= MAX_CONTAINERS):
                 return
             machine.active[message.path] = active
-            if before and active and not machine.last.get("reason"):
+            if before and active and not machine.tells:
                 machine.last = {
                     "path": message.path,
                     "from": ", ".join(before),

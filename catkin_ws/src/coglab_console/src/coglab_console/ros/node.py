@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import fcntl
 import os
 import secrets
 import signal
@@ -12,8 +11,8 @@ import sys
 import time
 from pathlib import Path
 from typing import Any
-from urllib.parse import urlsplit
 
+import rosgraph
 import rospkg
 import rospy
 from aiohttp import web
@@ -28,21 +27,18 @@ from ..web.fan_out import Documents
 from ..web.page_files import load_all
 from ..web.server import ConsoleServer
 from . import versions
+from .alone import StartError, announce, look_for_another, only_one
 from .commands import RosBackend
 from .graph import SmachGraphs
 from .knowledge import Knowledge
 from .stop import StopPath
 from .view import RosView
 
-PORT = 8790
+ADDRESS, PORT = "127.0.0.1", 8790
 STATE_RATE = 30.0  # Hz
 TICK = 0.1  # s
 HEALTH = 1.0  # s
 FRAMES = {"human_hand": "human_hand", "board": "board"}
-
-
-class StartError(Exception):
-    """The console cannot begin; the sentence says what to do."""
 
 
 def bind(address: str, port: int, fixed: bool) -> socket.socket:
@@ -61,17 +57,11 @@ def bind(address: str, port: int, fixed: bool) -> socket.socket:
     raise StartError(f"{address}:{port} cannot be used ({problem}); choose another console_port, or leave it out")
 
 
-def only_one(home: Path) -> int:
-    """A lock that one console of this ROS master holds until its process ends."""
-    master = urlsplit(os.environ.get("ROS_MASTER_URI", "")).port or 11311
-    lock = os.open(home / f"console_{master}.lock", os.O_RDWR | os.O_CREAT, 0o600)
-    for _ in range(20):  # one that is being respawned may still end
-        try:
-            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            return lock
-        except OSError:
-            time.sleep(0.1)
-    raise StartError(f"another console of this ROS master runs; its link is in {home / 'console.url'}")
+def exposure(address: str) -> str:
+    """What is to be said of an address that others reach; empty for loopback."""
+    if address in ("127.0.0.1", "localhost"):
+        return ""
+    return f"the console listens on {address}: whoever gets the link can move the robot, and nothing is encrypted"
 
 
 class ConsoleNode:
@@ -79,7 +69,7 @@ class ConsoleNode:
 
     def __init__(self, loop: asyncio.AbstractEventLoop, home: Path) -> None:
         self.loop, self.home = loop, home
-        self.address = parameters.read("~address", str, "127.0.0.1")
+        self.address = parameters.read("~address", str, ADDRESS)
         port = parameters.read("~port", int, PORT, 0, 65535)
         self.socket = bind(self.address, port, port != PORT)
         self.port = self.socket.getsockname()[1]
@@ -211,8 +201,9 @@ class ConsoleNode:
             f"[coglab] console: {self.write_link()}   (one use; the next one is in {self.home / 'console.url'})",
             flush=True,
         )
-        if self.address not in ("127.0.0.1", "localhost"):
-            rospy.logwarn("the console listens on %s: whoever gets the link can move the robot", self.address)
+        if exposure(self.address):
+            rospy.logwarn(exposure(self.address))
+            self.say("console", exposure(self.address), "warning")
         self.say("console", f"console started, {'REAL ROBOT' if self.real else 'simulation'}")
         tasks = [asyncio.create_task(work()) for work in (self._states, self._ticks, self._health)]
         await ended.wait()
@@ -282,10 +273,13 @@ def main() -> int:
     try:
         home.mkdir(parents=True, exist_ok=True)
         lock = only_one(home)
+        master = rosgraph.Master("/coglab_console")
+        look_for_another(master)
         rospy.init_node("coglab_console", disable_signals=True)
+        announce(master, rospy.get_node_uri())
         asyncio.run(_main(home))
         os.close(lock)
-    except (StartError, parameters.ParameterError, ROSInitException, OSError) as error:
+    except (StartError, parameters.ParameterError, ROSInitException, rosgraph.MasterException, OSError) as error:
         print(f"[coglab] console: error: {error}", file=sys.stderr, flush=True)
         return 1
     finally:

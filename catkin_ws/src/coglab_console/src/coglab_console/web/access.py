@@ -3,6 +3,9 @@
 A browser comes once with a token that the terminal printed (/?t=TOKEN) and gets a session, which its cookie carries.
 Every request must name a host of the list (against DNS rebinding); one that changes something, and the WebSocket,
 must also come from an origin of the list and, a POST, carry a header that a foreign page cannot set.
+
+A program without a browser gets a key for a token (POST /api/session) and says it as `Authorization: Bearer KEY`. No
+page can make a browser send that, so neither origin nor header is asked for; an origin that is named must be listed.
 """
 
 from __future__ import annotations
@@ -55,6 +58,8 @@ class Session:
     requests: TokenBucket
     stops: TokenBucket
     sockets: int = 0
+    program: bool = False
+    """whether its key comes as Authorization: Bearer, and never as a cookie"""
 
 
 def allowed_hosts(address: str, port: int, more: Iterable[str] = ()) -> tuple[str, ...]:
@@ -83,15 +88,16 @@ class Access:
         self._tokens = [*self._tokens[-7:], token]
         return token
 
-    def redeem(self, token: str) -> Session | None:
+    def redeem(self, token: str, program: bool = False) -> Session | None:
         """The session for a token, once."""
-        spent = next((known for known in self._tokens if hmac.compare_digest(known.encode(), token.encode())), None)
+        given = token.encode(errors="replace")
+        spent = next((known for known in self._tokens if hmac.compare_digest(known.encode(), given)), None)
         if spent is None:
             return None
         self._tokens.remove(spent)
-        return self._new_session()
+        return self._new_session(program)
 
-    def _new_session(self) -> Session:
+    def _new_session(self, program: bool) -> Session:
         now = self._now()
         for key in [key for key, one in self._sessions.items() if now - one.seen > SESSION_LIFE and not one.sockets]:
             del self._sessions[key]
@@ -102,7 +108,8 @@ class Access:
             del self._sessions[min(idle, key=lambda one: one.seen).key]
         self._count += 1
         limits = TokenBucket(40.0, 120.0, self._now), TokenBucket(50.0, 50.0, self._now)
-        session = Session(secrets.token_urlsafe(24), f"browser {self._count}", now, *limits)
+        name = f"{'program' if program else 'browser'} {self._count}"
+        session = Session(secrets.token_urlsafe(24), name, now, *limits, program=program)
         self._sessions[session.key] = session
         return session
 
@@ -130,10 +137,23 @@ class Access:
         if headers.get(CSRF_HEADER) != "1":
             raise Denied(403, f"the header {CSRF_HEADER}: 1 is missing; only the console's own page sends it")
 
-    def session_of(self, key: str | None) -> Session:
-        """The session of a cookie."""
+    @staticmethod
+    def bearer_of(headers: Mapping[str, str]) -> str | None:
+        """What a program says that it is; None for a browser, which says nothing."""
+        words = headers.get("Authorization")
+        if words is None:
+            return None
+        scheme, _, key = words.partition(" ")
+        if scheme.lower() != "bearer" or not key.strip():
+            raise Denied(401, "expected the header Authorization: Bearer KEY; a key comes from POST /api/session")
+        return key.strip()[:100]
+
+    def session_of(self, key: str | None, program: bool = False) -> Session:
+        """The session of a cookie, or of a program's key."""
         session = self._sessions.get(key or "")
-        if session is None:
+        if session is None or session.program != program:
+            if program:
+                raise Denied(401, "no session for this Bearer key; a key comes from POST /api/session with a new token")
             raise Denied(401, "no session: open the link that the terminal printed; a new one is in console.url")
         session.seen = self._now()
         return session

@@ -2,6 +2,7 @@
 
 GET  /?t=TOKEN   a session for a one-time token      GET /ws      state, events, documents; STOP and held buttons
 GET  / /page /lib  the page                          POST /api/command {"name", "arguments"}      POST /api/stop
+POST /api/session  a program's key for a one-time token, which is said as Authorization: Bearer
 """
 
 from __future__ import annotations
@@ -29,6 +30,10 @@ CSP = (
     "connect-src 'self' ws://{host}; "
     "object-src 'none'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
 )
+REFUSALS = {  # in place of the library's two words
+    405: "expected GET for the page, POST for /api/command, /api/stop and /api/session",
+    413: f"expected at most {MAX_MESSAGE} bytes; a command is far shorter",
+}
 HEADERS = {
     "X-Content-Type-Options": "nosniff",
     "X-Frame-Options": "DENY",
@@ -71,6 +76,7 @@ class ConsoleServer:
         self.app.router.add_get("/ws", self._socket)
         self.app.router.add_post("/api/command", self._command)
         self.app.router.add_post("/api/stop", self._stop)
+        self.app.router.add_post("/api/session", self._key)
         self.app.router.add_get("/{rest:.*}", self._file)
         self._tasks: set[asyncio.Task] = set()
 
@@ -100,7 +106,8 @@ class ConsoleServer:
         except Denied as error:
             response = web.json_response(Answer(False, str(error)), status=error.status)
         except web.HTTPException as error:
-            response = web.json_response(Answer(False, error.reason), status=error.status)
+            words = REFUSALS.get(error.status, error.reason)
+            response = web.json_response(Answer(False, words), status=error.status)
         if not response.prepared:
             response.headers.update(HEADERS)
             host = request.headers.get("Host", "")
@@ -111,7 +118,9 @@ class ConsoleServer:
 
     def _session(self, request: web.Request) -> Session:
         try:
-            session = self.access.session_of(request.cookies.get(self._cookie))
+            key = self.access.bearer_of(request.headers)
+            cookie = request.cookies.get(self._cookie)
+            session = self.access.session_of(cookie) if key is None else self.access.session_of(key, program=True)
         except Denied:
             if not self.access.refused.take():
                 raise Denied(429, "too many requests without a session") from None
@@ -141,22 +150,39 @@ class ConsoleServer:
         body = file.packed if packed else file.plain
         return web.Response(body=body, content_type=file.kind, charset="utf-8", headers=headers)
 
-    def _redeem(self, token: str) -> web.Response:
+    def _spend(self, token: str, program: bool = False) -> Session:
+        """The session for a one-time token."""
         if not self.access.refused.take():
             raise Denied(429, "too many requests without a session")
-        session = self.access.redeem(token[:100])
+        session = self.access.redeem(token[:100], program)
         if session is None:
             raise Denied(401, "this link was used already, or is of another run; a new one is in console.url")
         self._spent()
+        return session
+
+    async def _key(self, request: web.Request) -> web.Response:
+        self._from_here(request)
+        session = self._spend(self.access.bearer_of(request.headers) or "", program=True)
+        return web.json_response(Answer(True, f"the key of {session.name}, for as long as it is used", session.key))
+
+    def _redeem(self, token: str) -> web.Response:
+        session = self._spend(token)
         response = web.Response(status=302, headers={"Location": "/", "Cache-Control": "no-store"})
         response.set_cookie(self._cookie, session.key, httponly=True, samesite="Strict", path="/")
         return response
 
     def _changing(self, request: web.Request) -> Session:
         """The session of a request that changes something."""
-        self.access.check_origin(request.headers)
-        self.access.check_csrf(request.headers)
+        if not self._from_here(request):
+            self.access.check_csrf(request.headers)
         return self._session(request)
+
+    def _from_here(self, request: web.Request) -> bool:
+        """Refuses what comes from a foreign page. True for a program, which names no origin."""
+        program = "Authorization" in request.headers
+        if not program or "Origin" in request.headers:
+            self.access.check_origin(request.headers)
+        return program
 
     async def _command(self, request: web.Request) -> web.Response:
         session = self._changing(request)
@@ -181,7 +207,7 @@ class ConsoleServer:
     # --- one connection ---------------------------------------------------------------------------------------
 
     async def _socket(self, request: web.Request) -> web.StreamResponse:
-        self.access.check_origin(request.headers)
+        self._from_here(request)
         session = self._session(request)
         self._limited(session)
         if session.sockets >= MAX_SOCKETS:
@@ -203,7 +229,7 @@ class ConsoleServer:
                 sender.cancel()
                 await asyncio.gather(sender, return_exceptions=True)
             session.sockets -= 1
-            self.desk.released(session.name)
+            self.desk.released(session.name, lost=True)
             if not session.sockets:
                 self.desk.disconnected(session.name)
         return socket

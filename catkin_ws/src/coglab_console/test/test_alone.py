@@ -1,0 +1,104 @@
+"""One console for each ROS master, also where the second one has another ROS_HOME or comes from another computer."""
+
+import contextlib
+import os
+import socket
+import threading
+from xmlrpc.server import SimpleXMLRPCServer
+
+import pytest
+import rosgraph
+from coglab_console.ros import alone
+from coglab_console.ros.alone import PLACE, StartError, announce, look_for_another
+
+
+@contextlib.contextmanager
+def serving(functions):
+    """An XML-RPC server on a free port, as the ROS master and every node have one."""
+    server = SimpleXMLRPCServer(("127.0.0.1", 0), logRequests=False, allow_none=True)
+    for name, function in functions.items():
+        server.register_function(function, name)
+    thread = threading.Thread(target=server.serve_forever, kwargs={"poll_interval": 0.02})
+    thread.start()
+    try:
+        yield f"http://127.0.0.1:{server.server_address[1]}/"
+    finally:
+        server.shutdown()
+        server.server_close()
+        thread.join(10.0)
+
+
+@pytest.fixture
+def master():
+    """A ROS master as far as parameters go."""
+    values = {}
+
+    def get(_caller, name):
+        return [1, "", values[name]] if name in values else [-1, f"Parameter [{name}] is not set", 0]
+
+    def put(_caller, name, value):
+        values[name] = value
+        return [1, "", 0]
+
+    with serving({"getParam": get, "setParam": put}) as uri:
+        found = rosgraph.Master("/a_test", uri)
+        found.values = values
+        yield found
+
+
+def node(pid):
+    return serving({"getPid": lambda _caller: [1, "", pid]})
+
+
+@pytest.fixture(autouse=True)
+def quickly(monkeypatch):
+    monkeypatch.setattr(alone, "PATIENCE", 0.3)
+    monkeypatch.setattr(alone, "ANSWER_LIMIT", 0.3)
+
+
+def test_the_first_console_begins_and_the_second_is_told_where_the_first_is(master):
+    look_for_another(master)
+    with node(os.getpid()) as uri:
+        announce(master, uri)
+        assert master.values[PLACE] == [uri, os.getpid()]
+        with pytest.raises(StartError, match="another console of this ROS master runs") as refused:
+            look_for_another(master)
+        assert uri in str(refused.value)
+    look_for_another(master)  # it has ended
+
+
+def test_another_node_where_a_console_was_is_no_console(master):
+    with node(4711) as uri:
+        master.values[PLACE] = [uri, 4712]
+        look_for_another(master)
+
+
+def test_a_console_that_is_frozen_is_one(master):
+    with socket.socket() as frozen:
+        frozen.bind(("127.0.0.1", 0))
+        frozen.listen()
+        master.values[PLACE] = [f"http://127.0.0.1:{frozen.getsockname()[1]}/", 4711]
+        with pytest.raises(StartError, match="does not answer"):
+            look_for_another(master)
+
+
+def test_one_that_is_just_ending_is_waited_for(master, monkeypatch):
+    monkeypatch.setattr(alone, "PATIENCE", 10.0)
+    with contextlib.ExitStack() as stack:
+        uri = stack.enter_context(node(4711))
+        master.values[PLACE] = [uri, 4711]
+        threading.Timer(0.5, stack.close).start()
+        look_for_another(master)
+
+
+@pytest.mark.parametrize("value", ["x", 3, [], ["http://127.0.0.1:1/"], [3, 4], {"a": 1}, ["no address", 3], ["", 0]])
+def test_what_somebody_else_has_written_there_refuses_nobody(master, value):
+    master.values[PLACE] = value
+    look_for_another(master)
+
+
+def test_without_a_master_nobody_is_refused_and_nothing_waits():
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        gone = f"http://127.0.0.1:{probe.getsockname()[1]}/"
+    look_for_another(rosgraph.Master("/a_test", gone))

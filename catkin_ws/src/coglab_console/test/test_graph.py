@@ -1,0 +1,79 @@
+"""Machines on this master as the page is told of them: the last transition with its reason, and what is missing."""
+
+import threading
+import time
+from types import SimpleNamespace
+
+import pytest
+from coglab_console.ros import graph
+from coglab_console.ros.graph import Machine, SmachGraphs
+from coglab_console.scene.graph_layout import Container, Layout
+from smach_msgs.msg import SmachContainerStatus, SmachContainerStructure
+
+
+@pytest.fixture
+def told(monkeypatch):
+    """SmachGraphs without a master, and what it puts and says; its threads end with the test."""
+    over = threading.Event()
+    monkeypatch.setattr(graph, "rospy", SimpleNamespace(is_shutdown=over.is_set, get_published_topics=lambda: []))
+    found = SimpleNamespace(documents={}, said=[])
+    found.graphs = SmachGraphs(found.documents.__setitem__, lambda text, level: found.said.append((level, text)))
+    found.machine = found.graphs._machines["/coglab"] = Machine("/coglab")
+    yield found
+    over.set()
+
+
+def structure(told, path="/M", children=("A", "B")):
+    message = SmachContainerStructure(path=path, children=list(children))
+    message.internal_outcomes, message.outcomes_from, message.outcomes_to = ["ok"], ["A"], ["B"]
+    told.graphs._on_structure(message, told.machine)
+
+
+def status(told, active, path="/M"):
+    told.graphs._on_status(SmachContainerStatus(path=path, active_states=[active]), told.machine)
+
+
+def last(told):
+    return told.documents["active"]["/coglab"]["last"]
+
+
+def test_a_transition_keeps_its_outcome_also_without_a_reason(told):
+    structure(told)
+    status(told, "A")
+    told.graphs.transition("/M", "A", "ok", "B", "")
+    status(told, "B")  # introspection tells the same, and knows no outcome
+    assert last(told) == {"path": "/M", "from": "A", "outcome": "ok", "to": "B", "reason": ""}
+    told.graphs.transition("/M", "B", "failed", "A", "no contact")
+    status(told, "A")
+    assert (last(told)["outcome"], last(told)["reason"]) == ("failed", "no contact")
+
+
+def test_of_a_machine_that_tells_no_transitions_the_states_are_known(told):
+    structure(told)
+    status(told, "A")
+    status(told, "B")
+    status(told, "A")
+    assert (last(told)["from"], last(told)["to"], last(told)["outcome"]) == ("B", "A", "")
+
+
+def test_without_graphviz_it_is_said_once_and_the_states_are_shown(told):
+    told.graphs._layout = Layout("no-such-program")
+    structure(told)
+    structure(told, "/N")
+    end = time.monotonic() + 10.0
+    while "graph:/coglab" not in told.documents and time.monotonic() < end:
+        time.sleep(0.05)
+    structure(told, "/O")
+    while len(told.documents["graph:/coglab"]["nodes"]) < 6 and time.monotonic() < end:
+        time.sleep(0.05)
+    assert len(told.documents["graph:/coglab"]["nodes"]) == 6
+    ((level, text),) = told.said
+    assert level == "warning" and "apt install graphviz" in text
+
+
+def test_containers_and_machines_are_bounded(told):
+    for number in range(graph.MAX_CONTAINERS + 30):
+        structure(told, f"/{number}")
+        status(told, "A", f"/{number}")
+    assert len(told.machine.containers) == len(told.machine.active) == graph.MAX_CONTAINERS
+    assert told.machine.containers["/0"] == Container("/0", ("A", "B"), (("ok", "A", "B"),))
