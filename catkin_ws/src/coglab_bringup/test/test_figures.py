@@ -148,7 +148,7 @@ SOURCED = {
     "deviations.md": ("actionlib's client alone", "`servo_overshoot` (0.04)", "kept on a leash"),
     "how_to.md": ("Give `add_ptp` the measured position",),
     "limits_under_loss.md": ("From full speed `R` is worth",),
-    "console.md": ("four states at most are on their way",),
+    "console.md": ("four states at most are on their way", "A program without a browser gets a key"),
     "coglab_console/README.md": ("states at 30 Hz with a number",),
     "people.md": (
         "Huber et al. 2008",
