@@ -26,6 +26,12 @@ def test_summary_of_a_known_trial():
     assert row["peak_velocity_share"] == pytest.approx(0.4)
 
 
+def test_a_goal_that_is_held_on_the_way_is_no_arrival():
+    trial = Trial()
+    trial.feedback = [(4.0, "running", 0.25), (4.1, "holding", 0.18), (4.2, "running", 0.15)]
+    assert summarise(trial, "exchange_human_to_robot", "success", 1.0, 8.0, LIMITS)["final_error_mm"] is None
+
+
 def test_summary_without_measurements_says_none():
     row = summarise(Trial(), "take", "no end", 0.0, 1.0, LIMITS)
     assert row["final_error_mm"] is None and row["contact_delay_ms"] is None and row["peak_velocity_share"] is None

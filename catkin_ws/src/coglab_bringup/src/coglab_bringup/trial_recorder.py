@@ -106,7 +106,8 @@ def summarise(trial: Trial, kind: str, outcome: str, start: float, end: float, v
     until = next(
         (t for t, _, _ in trial.contacts if start <= t <= end), end
     )  # after a contact or a release the arm goes home
-    arrived = [d for t, state, d in trial.feedback if start <= t <= until and state in ("reached", "holding")]
+    # A motion that is "holding" is on its way: it holds a goal that is not seen for the moment.
+    arrived = [d for t, state, d in trial.feedback if start <= t <= until and state == "reached"]
     touch = next((t for t, *_, force in trial.truth if start <= t <= end and force > FORCE_THRESHOLD), None)
     lost_before = [count for t, count in trial.fri_lost if t <= start] or [count for _, count in trial.fri_lost][:1]
     lost_until = [count for t, count in trial.fri_lost if t <= end + 1.0]
