@@ -192,10 +192,13 @@ class Console(unittest.TestCase):
         for _ in range(3):
             self.ready("wait_with_object")
             self.enabled("exchange_robot_to_human").click()
-            self.browser.until(
-                "return coglab.state().dmp[0] === 'running' || coglab.state().phase.endsWith('/stopped')", 45.0
+            # One look for both: a moment later the reach may be over, and that is no stop.
+            seen = self.browser.until(
+                "const s = coglab.state();"
+                "return s.dmp[0] === 'running' ? 'running' : s.phase.endsWith('/stopped') && 'stopped'",
+                45.0,
             )
-            if self.browser.js("return coglab.state().dmp[0] === 'running'"):
+            if seen == "running":
                 return
         self.fail(f"no reach in three attempts: {self.machine.why}")
 
