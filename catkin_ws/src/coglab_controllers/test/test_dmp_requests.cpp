@@ -56,9 +56,9 @@ TEST(DmpRequests, RefusesBadRequestsAndKeepsMoving) {
                     {"goal_offset"}));
       },
       [&] {
-        for (const double speed : {-0.1, 0.01, 3.0, std::nan("")}) {
+        for (const double speed : {-0.1, 0.01, 0.5, 3.0, std::nan("")}) {
           EXPECT_TRUE(refused(dmp.execute(with([&](auto& r) { r.arrival_speed = speed; })),
-                              {"arrival_speed", "0.02 to 2"}));
+                              {"arrival_speed", "0.02 to 0.45"}));
         }
         EXPECT_TRUE(refused(dmp.execute(with([](auto& r) { r.goal_approach.x() = 0.4; })),
                             {"goal_approach", "0.3 m"}));

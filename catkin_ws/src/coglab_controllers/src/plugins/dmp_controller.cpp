@@ -190,9 +190,9 @@ Answer DmpController::checkPrimitive(const DmpRequest& request, DmpPlan& plan) c
                            " is not finite or longer than 0.3 m");
   }
   if (request.arrival_speed != 0.0 &&
-      !(request.arrival_speed >= kSlowestArrival && request.arrival_speed <= kFastestStart)) {
+      !(request.arrival_speed >= kSlowestArrival && request.arrival_speed <= kFastestArrival)) {
     return Answer::invalid("arrival_speed is " + std::to_string(request.arrival_speed) +
-                           " m/s; expected 0 (as the primitive has it) or 0.02 to 2 m/s");
+                           " m/s; expected 0 (as the primitive has it) or 0.02 to 0.45 m/s");
   }
   plan.motion.arrival_speed = request.arrival_speed;
   plan.hand.approach = request.goal_approach;

@@ -31,7 +31,7 @@ struct GoalEstimatorParameters {
   double noisy_turning_time_constant = 0.30;
   /// m/s, rad/s: an estimated speed below this is taken for noise when the goal trembles fully
   double noisy_speed = 0.04;
-  double noisy_turning = 0.4;
+  double noisy_turning = 2.0;
   double max_innovation =
       0.15;  ///< m: a goal further away pulls no harder, which bounds speed and acceleration
   double max_angle_innovation = 0.6;  ///< rad, for orientations
