@@ -9,7 +9,9 @@ from coglab_smach.kinematics.reachability import default_arm
 from coglab_smach.ports.interfaces import HandState, Located
 from coglab_smach.ports.pending import PortError, Ready
 from coglab_smach.states.held import FARTHER, LOST_TIME, NEAR, HeldObject
+from coglab_sim.conditions import Conditions
 from conftest import Trial
+from virtual_trial import VirtualTrial
 
 RECEIVE, GIVE = "exchange_human_to_robot", "exchange_robot_to_human"
 WEIGHT = 0.31 * 9.81
@@ -194,3 +196,13 @@ def test_open_fingers_hold_nothing_wherever_the_object_is_seen():
     carried.holding = False
     with pytest.raises(PortError, match="has left the hand"):
         carried.look()
+
+
+def test_a_place_that_is_corrected_while_the_hand_still_comes_is_followed():
+    """Of this person the predicted place is near at first and 0.07 m farther when the hand is there; an arm that stands
+    where it was near never meets them. A hand that comes does not fall either, whatever its height does."""
+    trial = VirtualTrial(seed=6004, conditions=Conditions(object_id="screwdriver"))
+    results = trial.run(RECEIVE, GIVE)
+    assert [r.outcome for r in results] == ["succeeded", "succeeded"], [r.reason for r in results]
+    goal = trial.ctx.arm.request
+    assert goal.goal_frame.startswith("human_hand") and goal.goal_drop == 0.0

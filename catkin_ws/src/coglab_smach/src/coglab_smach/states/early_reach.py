@@ -16,8 +16,9 @@ PERIOD = 0.03
 """s between two looks"""
 DOUBT_TIME = 0.2
 """s for which nothing is believed before a reach ends; a belief that a gap in what is seen broke off is back by then"""
-
-
+JUMP, SWAPPED = 0.12, 0.2
+"""m between two sights that no person's hand goes, nor anything that falls: the tracker has taken something else for it,
+unless it stays there for so long (s)"""
 SLIPPED = 0.06
 """m by which an object is farther from the person's hand than at first when it has left it"""
 
@@ -59,6 +60,8 @@ class EarlyReach:
         self._sure = state.ctx.clock.now()
         """when it was last believed"""
         self._looked = self._sure - PERIOD
+        self._last: tuple[float, np.ndarray] | None = None
+        """s, m: the newest sight that was no jump"""
 
     def doubted(self) -> bool:
         """Whether nobody has offered or asked for a while. TimeLimit, which ends the reach, where what it is for went
@@ -94,6 +97,8 @@ class EarlyReach:
         self._sure = self.state.ctx.clock.now()
 
     def _follow(self, place: np.ndarray, passed: float) -> None:
+        if self._jumped(place):
+            return
         if self._watch is None:
             palm = palm_at(self.state.ctx)
             if palm is not None:
@@ -105,6 +110,14 @@ class EarlyReach:
             code = self._grip.fell_or_withdrawn()
         if code:
             raise TimeLimit(f"the reach was given up: {sentence}", (), code)
+
+    def _jumped(self, place: np.ndarray) -> bool:
+        now = self.state.ctx.clock.now()
+        jumped = self._last is not None and float(np.linalg.norm(place - self._last[1])) > JUMP
+        if jumped and self._last is not None and now - self._last[0] < SWAPPED:
+            return True
+        self._last = (now, place)
+        return False
 
     def _offered(self, place: np.ndarray) -> bool:
         low, high = (np.array(self.limits[f"goal_region_{end}"]) for end in ("low", "high"))

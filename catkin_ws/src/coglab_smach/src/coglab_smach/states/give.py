@@ -12,12 +12,14 @@ from coglab_smach.ports.interfaces import HandPort
 from coglab_smach.ports.pending import Pending, PortError
 from coglab_smach.states.base import CoglabState, Interrupted, TimeLimit
 from coglab_smach.states.held import HeldObject
-from coglab_smach.states.motion import await_rest, rise
+from coglab_smach.states.motion import await_rest, rise, shift
 from coglab_smach.states.reach import WaitStop
-from coglab_smach.states.where import hand_from_palm
+from coglab_smach.states.where import hand_from_palm, way_to
 
 FINGERS = slice(1, 5)
 """motors that bend fingers"""
+ASTRAY = 0.02
+"""m from where the palm delivers the object, from which it is brought there"""
 
 
 class LooseningGrip:
@@ -72,7 +74,9 @@ class WaitTaker(WaitStop):
     The goal is the person's hand, and that now comes to the object: an arm that still followed it would back away, and
     one that is held would drag the hand along that it follows. So within the last ``give.touch_within`` m, with the
     hand within ``give.near`` m of the palm, the reach ends with a contact, and when the goal goes away from the arm
-    again by ``give.goal_leaves`` m: a person who waits does not do that, and the rest of the way is theirs.
+    again by ``give.goal_leaves`` m because the hand is nearer to the palm than at the delivery: a person who waits does
+    not do that, and the rest of the way is theirs. A hand that is farther away is still on its way, and its predicted
+    place is corrected: that is followed.
     """
 
     def __init__(self, ctx: Context) -> None:
@@ -83,7 +87,7 @@ class WaitTaker(WaitStop):
         contact, settings, release = self.ctx.contact, self._settings(ud), ud.delivery["release"]
         self._held = HeldObject(self.ctx, ud.object_id)
         self._await_reach(lambda: self._reached() or self._comes_to_its_end())
-        self.reason = self._await_taker(settings) if not self._reached() else ""
+        self.reason = self._await_taker(settings, ud.goal) if not self._reached() else ""
         self.ctx.journal.mark("motion_reached")
         self._leave_approach_profile()
         if not self.reason:  # it has to come to rest at the goal that it has latched
@@ -100,16 +104,16 @@ class WaitTaker(WaitStop):
         self._held.check()
         return super()._reached()
 
-    def _await_taker(self, settings: dict[str, Any]) -> str:
+    def _await_taker(self, settings: dict[str, Any], goal: dict[str, Any]) -> str:
         """Until the reach has ended; or until the person has come, and then what tells that."""
         contact, leaves = self.ctx.contact, float(self.ctx.config.get("give.goal_leaves", 0.02))
-        nearest = math.inf
+        nearest, delivered = math.inf, math.hypot(*goal["offset"])
 
         def leaving() -> bool:
             nonlocal nearest
             distance = self.ctx.arm.dmp_progress().remaining_distance
             nearest = min(nearest, distance)
-            return distance > nearest + leaves
+            return distance > nearest + leaves and (hand_from_palm(self) or math.inf) < delivered
 
         self.await_pending(contact.arm("contact_in_motion", 10.0, settings), "arming of the contact detector", 2.0)
         try:
@@ -135,19 +139,24 @@ class GiveLoad(CoglabState):
 
     The grip loosens in proportion to their share of the weight, by ``give.loosen`` counts at most. When the load comes
     back to the arm, or the object sinks in the hand by ``give.slip`` m, the grip closes again. Where nothing has
-    happened for ``give.lower_after`` s and the person's hand is at the object, the arm sinks by ``give.lower`` m, so
-    that the weight comes to lie in that hand. After the time limit the hand is closed and keeps the object.
+    happened for ``give.lower_after`` s and the person's hand is there, the arm brings the object to where that hand
+    takes it, and then sinks by ``give.lower`` m, so that the weight comes to lie in it. After the time limit the hand is
+    closed and keeps the object.
     """
 
     default_time_limit = 20.0
     owns_motion = True
 
     def __init__(self, ctx: Context) -> None:
-        super().__init__(ctx, input_keys=["object_id", "delivery"])
+        super().__init__(ctx, input_keys=["object_id", "delivery", "goal"])
         self._grip: LooseningGrip
         self._held: HeldObject
+        self._goal: dict[str, Any] = {}
         self._lowering: Pending | None = None
+        self._moving: Pending | None = None
         self._lower_at = 0.0
+        self._brought = False
+        """nearer to the person's hand, if it was not near enough"""
         self._needed = 0.0
         self._back_since: float | None = None
 
@@ -162,7 +171,8 @@ class GiveLoad(CoglabState):
         self._grip = LooseningGrip(
             self.ctx.hand, int(self._number("loosen_speed", 40)), int(self._number("close_speed", 120))
         )
-        self._lowering, self._back_since = None, None
+        self._lowering = self._moving = self._back_since = None
+        self._brought, self._goal = False, ud.goal
         self._held = HeldObject(self.ctx, ud.object_id)
         self._lower_at = self.ctx.clock.now() + self._number("lower_after", 3.0)
         try:
@@ -176,8 +186,9 @@ class GiveLoad(CoglabState):
             raise
         finally:
             contact.disarm()
-            if self._lowering is not None:
-                self._lowering.cancel()
+            for motion in (self._moving, self._lowering):
+                if motion is not None:
+                    motion.cancel()
         # Until the hand is open the arm must not go away with what the person holds as well.
         self.ctx.shared = True
         self.ctx.journal.mark("contact")
@@ -218,11 +229,19 @@ class GiveLoad(CoglabState):
                     self._grip.tighten()
 
     def _lower(self, now: float) -> None:
-        """Sink, if the person's hand is there; else look again in a moment."""
+        """Bring the object to the person's hand, if it is elsewhere, or sink; where no hand is, look again in a
+        moment."""
         self._lower_at = now + 0.5
-        distance = hand_from_palm(self)
-        if distance is not None and distance < self._number("near", 0.25):
-            self._lowering = rise(self.ctx, -self._number("lower", 0.03), self._number("lower_speed", 0.03))
+        distance, speed = hand_from_palm(self), self._number("lower_speed", 0.03)
+        if distance is None or distance >= self._number("near", 0.25):
+            return
+        way = None if self._brought else way_to(self, self._goal)
+        self._brought = True
+        if way is not None and ASTRAY < math.hypot(*way) < self._number("near", 0.25):
+            self._moving = shift(self.ctx, way, speed)
+            self._lower_at = now + math.hypot(*way) / speed + self._number("lower_after", 3.0) / 2
+        else:
+            self._lowering = rise(self.ctx, -self._number("lower", 0.03), speed)
 
     def _keep(self) -> None:
         """The object stays in the hand: closed again, where it was loosened."""

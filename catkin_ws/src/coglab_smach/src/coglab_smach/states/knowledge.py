@@ -177,21 +177,26 @@ def handover_region(ctx: Context, margin: float = 0.0) -> tuple[np.ndarray, np.n
     return low, high
 
 
-def unless_withdrawn(ctx: Context, goal: Mapping[str, Any], margin: float = 0.0) -> dict[str, Any]:
-    """The goal of a motion that ends by itself when what it follows leaves the region, goes back or falls."""
-    low, high = handover_region(ctx, margin)
+def unless_withdrawn(
+    ctx: Context, goal: Mapping[str, Any], margin: float = 0.0, may_fall: bool = True
+) -> dict[str, Any]:
+    """The goal of a motion that ends by itself when what it follows leaves the region, goes back or, if it ``may_fall``,
+    falls."""
+    # Who offers at the edge of the region does not leave it with a tremor or a sight that is a little off.
+    edge = float(ctx.config.get("handover.edge", 0.05))
+    low, high = handover_region(ctx, margin + edge)
     limits = {
         "goal_region_low": low.tolist(),
         "goal_region_high": high.tolist(),
         "goal_retreat": float(ctx.config.get("handover.retreat", 0.10)),
-        "goal_drop": float(ctx.config.get("handover.drop", 0.08)),
+        "goal_drop": float(ctx.config.get("handover.drop", 0.08)) if may_fall else 0.0,
     }
     if not str(goal["frame"]).endswith("_ahead"):
         return {**goal, "limits": limits}
     # A predicted place goes to and fro as the prediction is corrected: going back and falling are watched in what is
     # seen, by the state that waits for the reach, and the region is as much wider as for an object that is held still.
     early = {"retreat": limits["goal_retreat"], "drop": limits["goal_drop"]}
-    low, high = handover_region(ctx, margin + float(ctx.config.get("handover.still_margin", 0.10)))
+    low, high = handover_region(ctx, margin + edge + float(ctx.config.get("handover.still_margin", 0.10)))
     limits = {"goal_region_low": low.tolist(), "goal_region_high": high.tolist(), "goal_retreat": 0.0, "goal_drop": 0.0}
     return {**goal, "limits": limits, "early": early}
 
@@ -309,7 +314,9 @@ class SetDeliveryGoal(CoglabState):
         goal = paced(self.ctx, delivery_goal(entry, ud.grasp, delivery, ""))
         margin = float(self.ctx.config.get("handover.hand_margin", 0.10))
         hand = str(self.ctx.config.get("perception.human_hand", "human_hand"))
-        goal = unless_withdrawn(self.ctx, await_offer(self, hand, lambda seen: [goal], margin), margin)
+        # A hand does not fall: one that sinks has come lower, and is followed or has gone back.
+        asked = await_offer(self, hand, lambda seen: [goal], margin)
+        goal = unless_withdrawn(self.ctx, asked, margin, may_fall=False)
         ud.delivery_pose = {"xyz": goal["offset"], "quaternion": goal["orientation"]}
         ud.goal = goal
         return "succeeded"

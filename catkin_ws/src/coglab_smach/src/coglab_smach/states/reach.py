@@ -26,6 +26,8 @@ SEATED = 0.03
 """m off its grasp at most, for an object that the fingers may close on at a touch"""
 FIRM = 2.5
 """margin of a touch that is more than brushing past"""
+BETWEEN = 0.01
+"""m off the last of the way, at most, for an object that is seen between the fingers"""
 SLIDING = 0.6
 """s for which the hand goes on at most"""
 
@@ -46,6 +48,22 @@ def dmp_request(goal: dict[str, Any], primitive: str | None = None, ratio: float
     )
 
 
+def start(state: CoglabState, request: DmpRequest) -> None:
+    """Start a reach. A tracker that has lost the goal for a moment gets as long as a running motion would give it."""
+    ctx = state.ctx
+    end = ctx.clock.now() + float(ctx.config.get("goal_lost_time", 1.0))
+    while True:
+        try:
+            state.await_pending(ctx.arm.execute_dmp(request), f"start of primitive '{request.primitive_id}'", 3.0)
+            return
+        except TimeLimit:
+            raise
+        except PortError as error:
+            if error.code != ReasonCode.GOAL_STALE or ctx.clock.now() >= end:
+                raise
+        state.pause(0.05)
+
+
 class ExecuteDmp(CoglabState):
     """Temporary state: starts the motion and passes on to wait_stop; the controller manager closes the loop."""
 
@@ -60,24 +78,10 @@ class ExecuteDmp(CoglabState):
         profile = str(self.ctx.config.get("approach_profile", ""))
         if profile:
             self.await_pending(self.ctx.arm.apply_profile(profile), f"feedback profile '{profile}'", 2.0)
-        self._start(request)
+        start(self, request)
         self.ctx.journal.mark("motion_started")
         self.reason = f"primitive '{request.primitive_id}' toward {request.goal_frame}"
         return "succeeded"
-
-    def _start(self, request: DmpRequest) -> None:
-        """A tracker that has lost the goal for a moment gets as long as a running motion would give it."""
-        end = self.ctx.clock.now() + float(self.ctx.config.get("goal_lost_time", 1.0))
-        while True:
-            try:
-                self.await_pending(self.ctx.arm.execute_dmp(request), f"start of primitive '{request.primitive_id}'")
-                return
-            except TimeLimit:
-                raise
-            except PortError as error:
-                if error.code != ReasonCode.GOAL_STALE or self.ctx.clock.now() >= end:
-                    raise
-            self.pause(0.05)
 
 
 class WaitStop(CoglabState):
@@ -92,7 +96,7 @@ class WaitStop(CoglabState):
     owns_motion = True
 
     def __init__(self, ctx: Context, trigger: str, keys: Sequence[str] = ()) -> None:
-        super().__init__(ctx, input_keys=["object_entry", "goal"] if trigger == "contact" else keys)
+        super().__init__(ctx, input_keys=["object_entry", "goal", "grasp"] if trigger == "contact" else keys)
         self.trigger = trigger
         self._left = False
         """the compliant profile of the approach"""
@@ -102,9 +106,11 @@ class WaitStop(CoglabState):
         """s, when the hand was first at its place"""
         self._deeper = False
         """it has gone on from there"""
+        self._closing = False
+        """the fingers have begun to close on the way"""
 
     def run(self, ud: Any) -> str:
-        self._left = self._deeper = False
+        self._left = self._deeper = self._closing = False
         self._arrived = None
         target = target_of(ud.goal) if self.trigger == "contact" else ""
         self._grip = PersonsGrip(self, target) if target else None
@@ -124,7 +130,7 @@ class WaitStop(CoglabState):
         arm, within = self.ctx.arm, float(self.ctx.config.get("contact_within", 0.12))
         for _ in range(BUMPS + 1):
             self._await_reach(lambda: self._reached() or 0.0 < arm.dmp_progress().remaining_distance < within)
-            self._watch("contact_in_motion", {**self._settings(ud), **ud.goal.get("object", {})}, ud.goal)
+            self._watch(ud)
             away = off_grasp(self, ud.goal)
             if away is None or away < float(self.ctx.config.get("contact_near", 0.09)):
                 event = self.ctx.contact.event()
@@ -133,18 +139,21 @@ class WaitStop(CoglabState):
                     self._slide_in(ud)
                 return self._found(event)
             self.ctx.journal.mark("bumped")
-            self._come_again(ud.goal)
+            self._come_again(ud)
         raise PortError(
             f"something touches the hand, and the object is {away:.2f} m from where it would be held",
             ("something is in the way, or somebody pushes the arm",),
             ReasonCode.NO_CONTACT,
         )
 
-    def _come_again(self, goal: dict[str, Any]) -> None:
-        """Draw back against the palm's outward axis, and begin the reach anew."""
-        arm = self.ctx.arm
-        self.allow(15.0)
+    def _come_again(self, ud: Any) -> None:
+        """Draw back against the palm's outward axis with the hand open, and begin the reach anew."""
+        arm, hand = self.ctx.arm, ud.grasp["hand"]
+        self.allow(20.0)
         self.await_pending(arm.switch_controller("ptp"), "end of the reach by switching to 'ptp'", 3.0)
+        if self._closing:
+            self._closing = False
+            self.await_pending(self.ctx.hand.preshape(hand["mode"], hand["level"]), "the hand's opening", 5.0)
         back = palm_axis(self.ctx)
         if back is not None:
             moved = shift(self.ctx, -DRAWN_BACK * back, 0.1)
@@ -154,7 +163,9 @@ class WaitStop(CoglabState):
                 except PortError as error:
                     self.reason = error.sentence  # as far as it goes
         self.await_pending(arm.switch_controller("dmp"), "switching to controller 'dmp'", 3.0)
-        self.await_pending(arm.execute_dmp(dmp_request(goal)), "the reach once more", 3.0)
+        # Where the object will be is not told any more once the person's reach is over.
+        goal = self._early.goal_now() if self._early is not None else ud.goal
+        start(self, dmp_request(goal))
 
     def _pause(self, early: EarlyReach) -> None:
         """Nobody seems to offer or ask any more: the arm stands. Who goes on within ``handover.pause`` s is met; else
@@ -171,15 +182,16 @@ class WaitStop(CoglabState):
             why = "the person does not offer or ask any more"
             raise TimeLimit("the reach was given up", (why,), ReasonCode.GOAL_WITHDRAWN) from None
         early.forgive()
-        self.await_pending(self.ctx.arm.execute_dmp(dmp_request(early.goal_now())), "the reach once more", 3.0)
+        start(self, dmp_request(early.goal_now()))
 
-    def _watch(self, mode: str, settings: dict[str, Any], goal: dict[str, Any]) -> None:
+    def _watch(self, ud: Any) -> None:
         """Arm the detector and wait for what it finds; where the arm has arrived and feels nothing, it goes on."""
+        settings = self._contact_settings(ud)
         limit = float(settings.get("timeout", self.ctx.config.get("contact_timeout", 6.0)))
         self.allow(limit + 5.0)
-        self.await_pending(self.ctx.contact.arm(mode, limit, settings), "arming of the contact detector", 2.0)
+        self.await_pending(self.ctx.contact.arm("contact_in_motion", limit, settings), "arming of the detector", 2.0)
         try:
-            self.wait_for(partial(self._happened, goal), "contact of an object with the hand", limit)
+            self.wait_for(partial(self._happened, ud.goal), "contact of an object with the hand", limit)
         except TimeLimit as error:
             error.code = error.code if error.code != ReasonCode.TIME_LIMIT else ReasonCode.NO_CONTACT
             raise
@@ -189,6 +201,7 @@ class WaitStop(CoglabState):
     def _happened(self, goal: dict[str, Any]) -> bool:
         if self.ctx.contact.event() is not None:
             return True
+        self._close_on_the_way(goal)
         if self._reached():
             now = self.ctx.clock.now()
             self._arrived = now if self._arrived is None else self._arrived
@@ -197,6 +210,18 @@ class WaitStop(CoglabState):
             if not self._deeper and now - self._arrived >= float(self.ctx.config.get("handover.feel", 0.3)):
                 self._go_on(goal)
         return False
+
+    def _close_on_the_way(self, goal: dict[str, Any]) -> None:
+        """The fingers need as long as the last of the way: a person lets go of what is light with the first touch, or
+        with what they take for it. So they begin to close where the object is seen between them."""
+        within = float(self.ctx.config.get("handover.close_within", 0.03))
+        if self._closing or not 0.0 < self.ctx.arm.dmp_progress().remaining_distance < within:
+            return
+        away = off_grasp(self, goal)
+        if away is not None and away < within + BETWEEN:
+            self._closing = True
+            self.ctx.hand.close_on_object()
+            self.ctx.journal.mark("closing_on_the_way")
 
     def _go_on(self, goal: dict[str, Any]) -> None:
         """A tracker's error or a light touch: the hand goes on along the grasp's axis, as slowly as it has come."""
@@ -219,7 +244,7 @@ class WaitStop(CoglabState):
         """Fingers touch the object on their way past it: closed there, they would hold it by its edge. The reach goes
         on until the palm is at its grasp, unless something stands in its way."""
         contact, end = self.ctx.contact, self.ctx.clock.now() + SLIDING
-        settings = {**self._settings(ud), **ud.goal.get("object", {})}
+        settings = self._contact_settings(ud)
         try:
             while self.ctx.clock.now() < end and not self._reached():
                 away, event = off_grasp(self, ud.goal), contact.event()
@@ -271,6 +296,10 @@ class WaitStop(CoglabState):
         """What the object's entry says about contact."""
         entry = ud.object_entry
         return {**entry.get("contact", {}), "mass": float(entry.get("mass", 0.0))}
+
+    def _contact_settings(self, ud: Any) -> dict[str, Any]:
+        """The same for an object that comes into the hand, with its grasp, at which it is looked for."""
+        return {**self._settings(ud), **ud.goal.get("object", {})}
 
     def _reached(self) -> bool:
         progress = self.ctx.arm.dmp_progress()

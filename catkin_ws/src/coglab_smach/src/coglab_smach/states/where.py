@@ -63,3 +63,17 @@ def hand_from_palm(state: CoglabState) -> float | None:
     """m from the person's hand to the palm."""
     person, palm = person_at(state), palm_at(state.ctx)
     return None if person is None or palm is None else float(np.linalg.norm(person - palm))
+
+
+def way_to(state: CoglabState, goal: Mapping[str, Any]) -> np.ndarray | None:
+    """m, base frame, from the palm to where a reach for the person's hand wants it, with that hand as it is seen now."""
+    ctx, palm = state.ctx, palm_at(state.ctx)
+    hand = str(ctx.config.get("perception.human_hand", "human_hand"))
+    try:
+        seen = state.await_pending(ctx.perception.locate_object(hand, 0.3), "sight of the person's hand", 0.5)
+    except PortError:
+        return None
+    if palm is None or seen.age > OLDEST:
+        return None
+    wanted: np.ndarray = Pose(np.array(seen.xyz), np.array(seen.quaternion)).apply(np.asarray(goal["offset"])) - palm
+    return wanted
