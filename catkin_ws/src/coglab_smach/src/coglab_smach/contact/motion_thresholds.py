@@ -98,7 +98,9 @@ class ChangeOfResidual:
             self.reset()
         speed = float(np.abs(residual.velocity).max()) ** 2
         # Seven torques and the speed's square, so that one sum over the moment ago serves both.
-        self._recent.append((residual.stamp, np.array([*residual.torque, speed])))
+        both = np.empty(8)
+        both[:7], both[7] = residual.torque, speed
+        self._recent.append((residual.stamp, both))
         while self._recent and self._recent[0][0] <= residual.stamp - RECENT:
             self._old.append(self._recent.popleft())
             self._sum = self._sum + self._old[-1][1]
