@@ -14,6 +14,7 @@ from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
 import numpy as np
+from coglab_py.pose import length
 
 from .carried import CarriedObject, CarriedSettings
 from .reach_bank import Prediction, ReachBank, ReachSettings
@@ -158,7 +159,7 @@ class BeliefFilter:
             self._objects[object_id] = CarriedObject(stamp, position, hand, noise, self.settings.carried)
             return
         late = min(max(0.0, stamp - self._track[-1][0]), EXTRAPOLATED)
-        speed = float(np.linalg.norm(velocity))
+        speed = length(velocity)
         known.step(stamp, position, hand, velocity, 0.2 * late * speed + 2.0 * late**2)
 
     def see_hand(
@@ -208,7 +209,7 @@ class BeliefFilter:
             self._rest = self._furthest = position
             return
         way = prediction.end - self._rest
-        along = way / max(1e-6, float(np.linalg.norm(way)))
+        along = way / max(1e-6, length(way))
         advance = float((position - self._furthest) @ along)
         if advance > 0.0:
             self._furthest = position

@@ -10,6 +10,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from coglab_py.pose import length
 
 CARRIED, LYING, FREE = range(3)
 RATES = np.array([[0.0, 0.02, 0.1], [0.3, 0.0, 0.1], [0.3, 2.0, 0.0]])
@@ -78,7 +79,7 @@ class CarriedObject:
         moved = max(0.0, 1.0 - 3.0 * JITTER**2 / max(1e-12, float(believed @ believed)))
         hand_way = moved * (hand - self._hand)
         error = 2.0 * self._noise**2 * (1.0 - math.exp(-gap / self._noise_time)) + JITTER**2
-        if float(np.linalg.norm(way)) > s.fastest * gap + 4.0 * math.sqrt(error) and gap < s.lost_time:
+        if length(way) > s.fastest * gap + 4.0 * math.sqrt(error) and gap < s.lost_time:
             return
         variances = np.array(
             [
@@ -101,4 +102,4 @@ class CarriedObject:
         self._modes = likely / likely.sum()
 
     def _near(self) -> bool:
-        return float(np.linalg.norm(self._position - self._hand)) < self.settings.reach
+        return length(self._position - self._hand) < self.settings.reach

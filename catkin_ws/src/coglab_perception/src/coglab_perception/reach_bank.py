@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 from functools import reduce
 
 import numpy as np
+from coglab_py.pose import length
 
 from .minimum_jerk import ACCELERATION, END, POSITION, VELOCITY, transition
 
@@ -253,7 +254,7 @@ class ReachBank:
                 else:
                     born.append((source, begin, self._reaches, self._place, during))
                     born.append((source, begin, self._others, here, during))
-                    if float(np.linalg.norm(here - self._home)) > 2.0 * self.settings.return_way:
+                    if length(here - self._home) > 2.0 * self.settings.return_way:
                         born.append((source, begin, self._returned, self._home, during))
         for toward in (True, False):
             moving = np.flatnonzero(~resting & (self._toward == toward))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -14,12 +15,17 @@ IDENTITY = (0.0, 0.0, 0.0, 1.0)
 """quaternion of no rotation"""
 
 
+def length(vector: np.ndarray) -> float:
+    """Of a vector, to the last bit as numpy.linalg.norm has it, without that function's preparations."""
+    return math.sqrt(vector.dot(vector))
+
+
 def rotation(quaternion: ArrayLike) -> Rotation:
     """Rotation of a quaternion (x y z w) of any length; ValueError if it has no direction or is not finite."""
     q = np.asarray(quaternion, dtype=float)
     if q.shape != (4,) or not np.all(np.isfinite(q)):
         raise ValueError(f"a quaternion has four finite numbers x y z w, got {quaternion!r}")
-    if float(np.linalg.norm(q)) < 1e-9:
+    if length(q) < 1e-9:
         raise ValueError("a quaternion of zeros has no direction; write 0 0 0 1 for no rotation")
     return Rotation.from_quat(q)
 
@@ -65,7 +71,7 @@ class Pose:
     def distance(self, other: Pose) -> tuple[float, float]:
         """(m, rad) between this pose and another one in the same parent."""
         angle = (self.rotation.inv() * other.rotation).magnitude()
-        return float(np.linalg.norm(self.position - other.position)), float(angle)
+        return length(self.position - other.position), float(angle)
 
     def to_dict(self) -> dict[str, list[float]]:
         """Plain lists, as user data and files hold it."""

@@ -139,8 +139,8 @@ class Robot:
         outside = self._beyond(commanded)
         if self._commanded is not None and report["motion_allowed"]:
             speed = np.abs(commanded - self._commanded) / DT
-            self.peak_share = max(self.peak_share, float(np.max(speed / self._fastest_to_command)))
-            outside = outside or bool(np.any(speed > self._fastest_to_command + FLOAT32))
+            self.peak_share = max(self.peak_share, float((speed / self._fastest_to_command).max()))
+            outside = outside or bool((speed > self._fastest_to_command + FLOAT32).any())
         self._commanded = commanded if report["motion_allowed"] else None
         self.outside["commanded"] += outside
 
@@ -217,7 +217,7 @@ class Hand(HandMemory):
         self.clock.now = max(self.clock.now, t)
         self.emulator.follow(
             [
-                MotorState(*(motor[name] for name in ("position", "current", "effort", "moving", "locked")))
+                MotorState(motor["position"], motor["current"], motor["effort"], motor["moving"], motor["locked"])
                 for motor in self.cell.motors()
             ]
         )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from coglab_msgs.msg import Say
+from coglab_py.pose import length
 from scipy.spatial.transform import Rotation
 
 from coglab_sim.person.phases import NEAR, STILL, Phases
@@ -35,7 +36,7 @@ class Giving(Phases):
         if not near or self.participant.used_to_touch:
             self._held_load = seen.load
         self._closure = min(self._closure, seen.hand_closure) if near else seen.hand_closure
-        pressed = float(np.linalg.norm(seen.load - self._held_load)) >= self.participant.press
+        pressed = length(seen.load - self._held_load) >= self.participant.press
         return pressed or seen.hand_closure - self._closure > CLOSED
 
     def _placing(self, t: float, dt: float, seen: Percept) -> None:
@@ -44,7 +45,7 @@ class Giving(Phases):
         normal, along = seen.robot_hand.axis(0), seen.robot_hand.axis(2)
         to_object = self._middle() - seen.robot_hand.position
         gap = float(to_object @ normal) - self._thickness(normal)
-        pressing = float(np.linalg.norm(seen.load - self._held_load))
+        pressing = length(seen.load - self._held_load)
         if self._felt_since is None and pressing > 0.0:
             self._felt_since, self._travelled = t, 0.0
         if self._felt_since is not None and p.behaviour == "early_release":
@@ -66,7 +67,7 @@ class Giving(Phases):
         if self._felt_since is None and abs(aside) > p.aligns_within:
             self._velocity = self._velocity - ramp * along * float(np.clip(2.0 * aside, -0.05, 0.05))
         self._hand = self._hand + self._velocity * dt
-        self._travelled += float(np.linalg.norm(self._velocity)) * dt
+        self._travelled += length(self._velocity) * dt
 
     def _thickness(self, direction: np.ndarray) -> float:
         """m, half of the object along a direction."""
@@ -103,7 +104,7 @@ class Giving(Phases):
 
     def _lost_touch(self, t: float, seen: Percept) -> bool:
         """The robot's open hand has backed away from the object: time to press again, if not tried too often."""
-        touch = float(np.linalg.norm(seen.load - self._held_load))
+        touch = length(seen.load - self._held_load)
         if touch >= 0.5 * self.participant.press or seen.robot_speed >= STILL or seen.closing_speed > 0.1:
             self._still_since = None
         elif self._still_since is None:

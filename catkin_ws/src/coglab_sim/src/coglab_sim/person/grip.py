@@ -40,7 +40,7 @@ class GripForce:
     def step(self, dt: float, felt: float, more: float = 0.0) -> float:
         """The force ``dt`` s later, with a load of ``felt`` N and ``more`` N expected soon."""
         change = self._wanted(max(self.expected, felt) + more) - self.force
-        self.force += float(np.clip(change, -RATE * dt, RATE * dt))
+        self.force += min(max(change, -RATE * dt), RATE * dt)
         return self.force
 
     def has_felt(self, weight: float) -> None:

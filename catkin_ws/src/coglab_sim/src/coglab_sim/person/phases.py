@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from coglab_py.pose import Pose
+from coglab_py.pose import Pose, length
 from scipy.spatial.transform import Rotation
 
 from coglab_sim.person.grip import GripForce
@@ -59,11 +59,11 @@ class Phases:
         """m between the robot's palm and the surface of the object at ``place``."""
         half = self.scene.object_size / 2
         beyond = np.abs(place.rotation.inv().apply(palm.position - place.position) - self.scene.object_middle) - half
-        return float(np.linalg.norm(np.maximum(beyond, 0.0)))
+        return length(np.maximum(beyond, 0.0))
 
     def _way_to(self, place: Pose) -> float:
         """m that the object at ``place`` is from where the hand would take it."""
-        return float(np.linalg.norm(place.position - self._turn.apply(self.scene.taken_in_hand) - self._hand))
+        return length(place.position - self._turn.apply(self.scene.taken_in_hand) - self._hand)
 
     def _weight(self) -> float:
         """N, what the person knows the object to weigh."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from coglab_msgs.msg import Say
+from coglab_py.pose import length
 
 from coglab_sim.person.phases import Phases
 from coglab_sim.person.senses import Percept
@@ -24,7 +25,7 @@ class Receiving(Phases):
     def _grasping(self, t: float, dt: float, seen: Percept) -> None:
         """Close the last way to the object as it is seen, and grip it."""
         error = seen.object.position - self._turn.apply(self.scene.taken_in_hand) - self._hand
-        distance = float(np.linalg.norm(error))
+        distance = length(error)
         if self._grip == 0.0 and distance > THERE:
             speed = min(self.participant.place_speed, 4.0 * distance)
             self._velocity = error / distance * speed

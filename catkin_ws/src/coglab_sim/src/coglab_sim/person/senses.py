@@ -7,11 +7,12 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from functools import cached_property
 from typing import Generic, TypeVar
 
 import numpy as np
-from coglab_py.pose import Pose
+from coglab_py.pose import Pose, length
 from scipy.spatial.transform import Rotation
 
 from coglab_sim.person.participant import Participant
@@ -66,15 +67,29 @@ class SlowNoise:
 class Percept:
     """What the person takes for the state of the cell."""
 
-    robot_hand: Pose = field(default_factory=Pose)
-    robot_speed: float = 0.0
+    true_hand: Pose
+    hand_error: np.ndarray
+    """m and rad, by which it is seen elsewhere than it is"""
+    robot_speed: float
     """m/s"""
-    hand_closure: float = 0.0
-    closing_speed: float = 0.0
+    hand_closure: float
+    closing_speed: float
     """1/s, of the robot's fingers"""
-    object: Pose = field(default_factory=Pose)
-    load: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    true_object: Pose
+    object_error: np.ndarray
+    load: np.ndarray
     """N, of the object on the person's hand, world axes"""
+
+    # Most phases look at one of the two frames or at none.
+    @cached_property
+    def robot_hand(self) -> Pose:
+        """As it is seen."""
+        return _moved(self.true_hand, self.hand_error)
+
+    @cached_property
+    def object(self) -> Pose:
+        """As it is seen."""
+        return _moved(self.true_object, self.object_error)
 
 
 class Senses:
@@ -101,11 +116,13 @@ class Senses:
         seen, speed, closing = self._eyes.step(t, (view, *self._speeds(t, view)))
         hand, thing = (noise.step(dt) for noise in self._noises)
         return Percept(
-            _moved(seen.robot_hand, hand),
+            seen.robot_hand,
+            hand,
             max(0.0, speed * self._misjudged + SLOWEST * float(self._rng.normal())),
             seen.hand_closure + float(self._bend_noise.step(dt)[0]),
             closing * self._misjudged + SLOWEST * self._of_tips * float(self._rng.normal()),
-            _moved(seen.object, thing),
+            seen.object,
+            thing,
             self._feel(self._touch.step(t, np.asarray(view.load, dtype=float))),
         )
 
@@ -120,14 +137,14 @@ class Senses:
         if t - then < 0.5 * SPEED_TIME:
             return 1.0, 0.0
         return (
-            float(np.linalg.norm(view.robot_hand.position - place)) / (t - then),
+            length(view.robot_hand.position - place) / (t - then),
             (view.hand_closure - closure) / (t - then),
         )
 
     def _feel(self, load: np.ndarray) -> np.ndarray:
         """The force that is felt stays until the change is noticeable."""
-        noticeable = max(self.person.felt_threshold, self.person.felt_share * float(np.linalg.norm(self._felt)))
-        if float(np.linalg.norm(load - self._felt)) > noticeable:
+        noticeable = max(self.person.felt_threshold, self.person.felt_share * length(self._felt))
+        if length(load - self._felt) > noticeable:
             self._felt = load.copy()
         return self._felt
 

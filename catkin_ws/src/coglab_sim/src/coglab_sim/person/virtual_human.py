@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 from coglab_msgs.msg import Say
-from coglab_py.pose import Pose
+from coglab_py.pose import Pose, length
 from scipy.spatial.transform import Rotation
 
 from coglab_sim.person.giving import Giving
@@ -104,7 +104,7 @@ class VirtualHuman(Giving, Receiving):
         self._spin = np.zeros(3)
         getattr(self, f"_{self.phase}")(t, dt, seen)
         coming = self.participant.press if self.phase in ("placing", "holding") and self._task == "give" else 0.0
-        force = self.grip_force.step(dt, float(np.linalg.norm(seen.load)), coming)
+        force = self.grip_force.step(dt, length(seen.load), coming)
         shown = Pose(self._hand + involuntary(self.participant, self._noise_phase, t), self._turn.as_quat())
         return HandSample(shown, self._velocity.copy(), self._grip, force, self.phase, self._spin.copy())
 
@@ -147,7 +147,7 @@ class VirtualHuman(Giving, Receiving):
 
     def _plan(self, t: float, target: np.ndarray, turn: Rotation, slower: float = 1.0) -> None:
         p = self.participant
-        duration = duration_for(float(np.linalg.norm(target - self._hand)), p.reach_time) * slower
+        duration = duration_for(length(target - self._hand), p.reach_time) * slower
         duration *= float(np.exp(self.rng.normal(0, p.reach_sigma)))
         self._reach = CorrectedReach(
             Reach(self._hand.copy(), target, t, duration, bow=p.bow if self.phase == "reaching" else 0.0)
@@ -170,8 +170,8 @@ class VirtualHuman(Giving, Receiving):
             return
         self._replan_at = t + REPLAN_PERIOD
         offered = seen.object.position - self._target_turn.apply(self.scene.taken_in_hand)
-        nearer = np.linalg.norm(offered - self._hand) < np.linalg.norm(reach.end - self._hand)
-        if nearer and np.linalg.norm(offered - reach.end) > 0.02:
+        nearer = length(offered - self._hand) < length(reach.end - self._hand)
+        if nearer and length(offered - reach.end) > 0.02:
             left = reach.begin + reach.duration - t
             reach.retarget(t, offered, max(CORRECTION_TIME, left))
             self._target = offered
@@ -215,9 +215,7 @@ class VirtualHuman(Giving, Receiving):
             if behaviour == "change_side":
                 self._interrupted = True
                 aside = reach.end + np.array([0.0, self.scene.other_side, 0.0])
-                reach.retarget(
-                    t, aside, duration_for(float(np.linalg.norm(aside - self._hand)), self.participant.reach_time)
-                )
+                reach.retarget(t, aside, duration_for(length(aside - self._hand), self.participant.reach_time))
                 self._target = aside
         self._correct(t, seen)
         self._follow(t)
@@ -277,8 +275,8 @@ class VirtualHuman(Giving, Receiving):
         self._follow(t)
         if self._grip > 0.0:  # who had begun to let go holds on again
             self._grip = min(1.0, self._grip + dt / 0.10)
-        felt = float(np.linalg.norm(seen.load)) > LOST * self._weight()
-        if self._grip == 0.0 or felt or np.linalg.norm(seen.object.position - self._hand) < AWAY:
+        felt = length(seen.load) > LOST * self._weight()
+        if self._grip == 0.0 or felt or length(seen.object.position - self._hand) < AWAY:
             self._lost_since = None
         elif self._lost_since is None:
             self._lost_since = t

@@ -32,15 +32,24 @@ class ClockStalled(RuntimeError):
 
 
 class _Parked:
-    """One waiting thread: its turn (`go`), and whether it was woken by an event (`fired`) or by the time."""
+    """One waiting thread: whether it has its turn (`going`), and was woken by an event (`fired`) or by the time.
 
-    __slots__ = ("fired", "go", "released", "thread")
+    Its gate is a bare lock that is held until the turn comes: an event of `threading` costs several locks each time.
+    """
+
+    __slots__ = ("fired", "gate", "going", "released", "thread")
 
     def __init__(self, thread: threading.Thread) -> None:
         self.thread = thread
-        self.go = threading.Event()
-        self.fired = False
-        self.released = False
+        self.gate = threading.Lock()
+        self.gate.acquire()
+        self.fired = self.going = self.released = False
+
+    def go(self) -> None:
+        """Give it the turn. The clock's lock is held."""
+        if not self.going:
+            self.going = True
+            self.gate.release()
 
 
 class VirtualEvent:
@@ -273,12 +282,12 @@ class VirtualClock(Clock):
             self._progress = time.monotonic()
             if parked.thread in self._members:
                 self._holder = parked.thread
-            parked.go.set()
+            parked.go()
 
     def _await_turn(self, parked: _Parked) -> None:
-        while not parked.go.wait(self._stall_limit):
+        while not parked.gate.acquire(timeout=self._stall_limit):
             with self._lock:
-                if parked.go.is_set() or time.monotonic() - self._progress < self._stall_limit:
+                if parked.going or time.monotonic() - self._progress < self._stall_limit:
                     continue
                 parked.released = True
                 if parked in self._ready:

@@ -222,7 +222,7 @@ class ContactDetector:
         finite, beyond LARGEST, of another length) is ignored."""
         tau = np.asarray(torque, dtype=float)
         for values in (tau, np.asarray(position), np.asarray(velocity)):
-            if values.shape != (7,) or not np.all(np.abs(values) <= LARGEST):
+            if values.shape != (7,) or not np.abs(values).max() <= LARGEST:
                 return None
         if not self._in_time(stamp):
             return None
@@ -258,7 +258,7 @@ class ContactDetector:
         return True
 
     def _follow_motion(self, stamp: float, velocity: Joints) -> None:
-        moving = float(np.max(np.abs(velocity))) > self.settings.still_speed
+        moving = np.abs(velocity).max() > self.settings.still_speed
         if moving:
             if self._still_since is not None and self._rest_torque is not None:
                 self._rest_before_motion = self._rest_torque
@@ -322,7 +322,7 @@ class ContactDetector:
         if armed.mode != "contact":
             return self._watch_weight(stamp, armed, position)
         assert armed.threshold is not None
-        self.margin = float(np.max(np.abs(difference[armed.watched]) / armed.threshold))
+        self.margin = float((np.abs(difference[armed.watched]) / armed.threshold).max())
         armed.over = armed.over + 1 if self.margin > 1.0 else 0
         if armed.over < self.settings.confirm:
             return None

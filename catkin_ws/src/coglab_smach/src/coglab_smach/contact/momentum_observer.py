@@ -106,7 +106,7 @@ class MomentumObserver:
     def feed(self, stamp: float, position: Joints, torque: Joints) -> Residual | None:
         """One sample: s, rad, Nm. None while too few samples have followed each other."""
         q, tau = np.asarray(position, dtype=float), np.asarray(torque, dtype=float)
-        if not (math.isfinite(stamp) and np.all(np.isfinite(q)) and np.all(np.isfinite(tau))):
+        if not (math.isfinite(stamp) and np.isfinite(q).all() and np.isfinite(tau).all()):
             return None
         step = self._since_last(stamp)
         if step is None:
@@ -144,7 +144,7 @@ class MomentumObserver:
     def _advance(self, stamp: float, step: float, before: np.ndarray, torque_before: np.ndarray) -> Residual | None:
         velocity = (self._position - before) / step
         terms = self._dynamics.evaluate(0.5 * (self._position + before), velocity)
-        momentum, forces = np.array(terms.momentum), np.array(terms.gravity) - np.array(terms.transposed)
+        momentum, forces = np.array(terms.momentum), terms.gravity - terms.transposed
         last_velocity, last_momentum, last_forces, last_step = self._velocity, self._momentum, self._forces, self._step
         self._velocity, self._momentum, self._forces, self._step = velocity, momentum, forces, step
         if last_velocity is None:
@@ -153,7 +153,7 @@ class MomentumObserver:
         span = 0.5 * (step + last_step)
         torque = (last_step * torque_before + step * self._torque) / (step + last_step)
         outside = (momentum - last_momentum) / span + 0.5 * (forces + last_forces) - torque
-        jumps = self._residual is not None and float(np.max(np.abs(outside - self._residual))) > JUMP
+        jumps = self._residual is not None and np.abs(outside - self._residual).max() > JUMP
         if jumps and self._doubts < DOUBTS:
             self._doubts, self._velocity = self._doubts + 1, None
             return None

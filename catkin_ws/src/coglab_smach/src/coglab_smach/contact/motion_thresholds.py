@@ -9,6 +9,7 @@ without contact exceed with a chosen probability (Gumbel's law on the largest va
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -46,6 +47,7 @@ CONFIRM = 2
 ALARM_SHARE = 2e-3
 """probability with which a reach without contact may exceed the limit"""
 EULER = 0.5772156649015329
+AXES = np.eye(3)
 
 
 class ThresholdError(ValueError):
@@ -94,23 +96,25 @@ class ChangeOfResidual:
         """One residual, ``load`` kg told; None while there is no past to compare with."""
         if residual.fresh:
             self.reset()
-        speed = float(np.max(np.abs(residual.velocity))) ** 2
+        speed = float(np.abs(residual.velocity).max()) ** 2
         # Seven torques and the speed's square, so that one sum over the moment ago serves both.
-        self._recent.append((residual.stamp, np.append(residual.torque, speed)))
+        both = np.empty(8)
+        both[:7], both[7] = residual.torque, speed
+        self._recent.append((residual.stamp, both))
         while self._recent and self._recent[0][0] <= residual.stamp - RECENT:
             self._old.append(self._recent.popleft())
             self._sum = self._sum + self._old[-1][1]
         while self._old and self._old[0][0] < residual.stamp - OLD:
             self._sum = self._sum - self._old.popleft()[1]
-        blend = 1.0 if self._speed is None else 1.0 - np.exp(-(residual.stamp - self._stamp) / MEMORY)
+        blend = 1.0 if self._speed is None else 1.0 - float(np.exp(-(residual.stamp - self._stamp) / MEMORY))
         self._speed = speed if self._speed is None else self._speed + blend * (speed - self._speed)
         self._stamp = residual.stamp
         if len(self._old) < LEAST:
             return None
         mean = self._sum / len(self._old)
         self.past = mean[:7]
-        acceleration = float(np.max(np.abs(residual.acceleration)))
-        growing = [1.0, np.sqrt(self._speed), self._speed, max(0.0, mean[7]), acceleration**2]
+        acceleration = float(np.abs(residual.acceleration).max())
+        growing = [1.0, math.sqrt(self._speed), self._speed, max(0.0, float(mean[7])), acceleration**2]
         features = np.array([*growing, (load * acceleration) ** 2])
         return Change(residual.stamp, residual.torque - self.past, features, self._jacobian(residual.position))
 
@@ -176,9 +180,9 @@ def explained(torque: np.ndarray, deviation: np.ndarray, jacobian: np.ndarray) -
     weighed = jacobian / deviation
     information = weighed @ weighed.T
     # A stretched arm feels no force along itself: the small share keeps the solution finite there.
-    steadied = information + 1e-9 * np.trace(information) * np.eye(3)
+    steadied = information + 1e-9 * information.trace() * AXES
     force = np.linalg.solve(steadied, weighed @ (torque / deviation))
-    return force, float(np.sqrt(max(0.0, force @ information @ force)))
+    return force, math.sqrt(max(0.0, force @ information @ force))
 
 
 def learn(

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
+from coglab_py.pose import length
 
 from coglab_smach.contact.evidence import MOMENTUM, Evidence
 from coglab_smach.contact.momentum_observer import Dynamics, Joints, MomentumObserver, Residual
@@ -87,7 +88,7 @@ class MovingContact:
             return None
         force, size = self.thresholds.steady_force(offset, self.change.features)
         stamp, margin = self.change.stamp, size / self.thresholds.steady_limit
-        message = f"{float(np.linalg.norm(force)):.1f} N on the hand since the arm stood still: it was there already"
+        message = f"{length(force):.1f} N on the hand since the arm stood still: it was there already"
         return Evidence(MOMENTUM, stamp, stamp + HOLD, margin, message)
 
     def weight_since(self, before: np.ndarray) -> float:
@@ -107,12 +108,12 @@ class MovingContact:
     def slow(self) -> bool:
         """Whether the arm moves so little that what is missing in its model's inertia is no force."""
         residual = self.residual
-        if residual is None or float(np.max(np.abs(residual.velocity))) > SLOW:
+        if residual is None or np.abs(residual.velocity).max() > SLOW:
             return False
-        return float(np.max(np.abs(residual.acceleration))) < GENTLE
+        return bool(np.abs(residual.acceleration).max() < GENTLE)
 
     def _follow_rest(self, residual: Residual) -> None:
-        if float(np.max(np.abs(residual.velocity))) > STILL:
+        if np.abs(residual.velocity).max() > STILL:
             if self._rest is not None:
                 self._free = self._rest
                 self._free_weight = self.weight(self._rest, self._rest_position)
@@ -138,5 +139,5 @@ class MovingContact:
         self.force, size = self.thresholds.force(self.change)
         self._sizes = [*self._sizes, size][-CONFIRM:]
         margin = min(self._sizes) / self.thresholds.limit if len(self._sizes) == CONFIRM else 0.0
-        message = f"{float(np.linalg.norm(self.force)):.1f} N on the hand, {size:.0f} deviations of the moving arm's"
+        message = f"{length(self.force):.1f} N on the hand, {size:.0f} deviations of the moving arm's"
         return Evidence(MOMENTUM, stamp, stamp + HOLD, margin, message)

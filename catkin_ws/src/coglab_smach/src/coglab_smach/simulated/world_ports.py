@@ -15,7 +15,7 @@ import numpy as np
 from coglab_msgs.msg import ReasonCode
 from coglab_objects.database import ObjectDatabase, ObjectError
 from coglab_py.packages import package_path
-from coglab_py.pose import Pose
+from coglab_py.pose import Pose, length
 from ih2_hand.reasons import Reason, reason_of
 
 from coglab_smach.contact.detector import ContactDetector, DetectorSettings
@@ -265,7 +265,7 @@ class VirtualContact:
             self._sense_object(report["position"], velocity),
         ]
         self._event = next((event for event in (self._event, *events) if event is not None), None)
-        if detector.still.state() == "watching" and np.max(np.abs(velocity)) > 0.05:
+        if detector.still.state() == "watching" and np.abs(velocity).max() > 0.05:
             self.watched_while_moving += 1
 
     def _sense_hand(self) -> ContactEvent | None:
@@ -288,7 +288,7 @@ class VirtualContact:
             return None
         chain = self.rig.robot.chain
         distance, angle = Pose(*chain.fk(position)).distance(seen * grasp)
-        speed = float(np.linalg.norm(chain.jacobian(np.asarray(position))[:3] @ velocity))
+        speed = length(chain.jacobian(np.asarray(position))[:3] @ velocity)
         return self.detector.feed_sight(self.rig.t, distance, angle, speed)
 
     def arm(self, mode: str, time_limit: float, settings: Mapping[str, Any]) -> Pending:

@@ -74,6 +74,7 @@ class EmulatedHand:
         kind = PhysicalMotor if physical else Motor
         self.motors = [kind(number, float(positions[number])) for number in range(WIRE.motors)]
         self.physical = physical
+        self._physical_motors = [motor for motor in self.motors if isinstance(motor, PhysicalMotor)]
         self.counters = HandCounters()
         self.calibration_scale = calibration_scale
         self.strict_force = strict_force
@@ -111,7 +112,7 @@ class EmulatedHand:
 
     def follow(self, states: Sequence[MotorState]) -> None:
         """What the physics says of the five motors; ValueError for other numbers than it can say."""
-        physical = self._physical_motors()
+        physical = self._physical_motors
         if len(states) != len(physical) or not physical:
             raise ValueError(f"states of {WIRE.motors} motors turned by the physics are expected; got {len(states)}")
         for state in states:
@@ -124,10 +125,7 @@ class EmulatedHand:
         to go to, counts of current at which to stop."""
         if self.calibrating:  # all open, at full speed
             return [(1.0, 0.0, 0.0)] * WIRE.motors
-        return [motor.order() for motor in self._physical_motors()]
-
-    def _physical_motors(self) -> list[PhysicalMotor]:
-        return [motor for motor in self.motors if isinstance(motor, PhysicalMotor)]
+        return [motor.order() for motor in self._physical_motors]
 
     # -- time ------------------------------------------------------------------------------------
 
