@@ -4,12 +4,12 @@ from types import SimpleNamespace
 
 import pytest
 from coglab_msgs.msg import ReasonCode
+from coglab_sim.conditions import Conditions
 from coglab_smach.contact.leaving_load import SAME, LeavingLoad
 from coglab_smach.kinematics.reachability import default_arm
 from coglab_smach.ports.interfaces import HandState, Located
 from coglab_smach.ports.pending import PortError, Ready
 from coglab_smach.states.held import FARTHER, LOST_TIME, NEAR, HeldObject
-from coglab_sim.conditions import Conditions
 from conftest import Trial
 from virtual_trial import VirtualTrial
 

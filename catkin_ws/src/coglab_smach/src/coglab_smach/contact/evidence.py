@@ -86,7 +86,7 @@ class Touch:
 
 
 class InPalm:
-    """The tracked object at its grasp in the palm of an arm that has come to rest: it is there, felt or not."""
+    """The tracked object at its grasp in the palm of an arm that stands or comes slowly: it is there, felt or not."""
 
     def __init__(self, near: float = 0.020, turned: float = math.radians(20.0), confirm: float = 0.12) -> None:
         """``near`` (m) and ``turned`` (rad): of the palm from where it has to be for the grasp; ``confirm``: s."""

@@ -17,8 +17,8 @@ PERIOD = 0.03
 DOUBT_TIME = 0.2
 """s for which nothing is believed before a reach ends; a belief that a gap in what is seen broke off is back by then"""
 JUMP, SWAPPED = 0.12, 0.2
-"""m between two sights that no person's hand goes, nor anything that falls: the tracker has taken something else for it,
-unless it stays there for so long (s)"""
+"""m between two sights that no person's hand goes, nor anything that falls: the tracker has taken something else for
+it, unless it stays there for so long (s)"""
 SLIPPED = 0.06
 """m by which an object is farther from the person's hand than at first when it has left it"""
 

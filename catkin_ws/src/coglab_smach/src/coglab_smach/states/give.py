@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from functools import partial
 from typing import Any
 
+import numpy as np
 from coglab_msgs.msg import ReasonCode
 
 from coglab_smach.context.context import Context
@@ -14,12 +17,12 @@ from coglab_smach.states.base import CoglabState, Interrupted, TimeLimit
 from coglab_smach.states.held import HeldObject
 from coglab_smach.states.motion import await_rest, rise, shift
 from coglab_smach.states.reach import WaitStop
-from coglab_smach.states.where import hand_from_palm, way_to
+from coglab_smach.states.where import hand_from_palm, way_to_hand
 
 FINGERS = slice(1, 5)
 """motors that bend fingers"""
 ASTRAY = 0.02
-"""m from where the palm delivers the object, from which it is brought there"""
+"""m that the object is from where it is offered, from which on it is brought there"""
 
 
 class LooseningGrip:
@@ -140,18 +143,19 @@ class GiveLoad(CoglabState):
     The grip loosens in proportion to their share of the weight, by ``give.loosen`` counts at most. When the load comes
     back to the arm, or the object sinks in the hand by ``give.slip`` m, the grip closes again. Where nothing has
     happened for ``give.lower_after`` s and the person's hand is there, the arm brings the object to where that hand
-    takes it, and then sinks by ``give.lower`` m, so that the weight comes to lie in it. After the time limit the hand is
-    closed and keeps the object.
+    takes it, and then sinks by ``give.lower`` m, so that the weight comes to lie in it. After the time limit the grip
+    closes and keeps the object.
     """
 
     default_time_limit = 20.0
     owns_motion = True
 
     def __init__(self, ctx: Context) -> None:
-        super().__init__(ctx, input_keys=["object_id", "delivery", "goal"])
+        super().__init__(ctx, input_keys=["object_id", "delivery"])
         self._grip: LooseningGrip
         self._held: HeldObject
-        self._goal: dict[str, Any] = {}
+        self._offer: Callable[[], np.ndarray | None] = lambda: None
+        """the way (m) from the object to where the person's hand takes it"""
         self._lowering: Pending | None = None
         self._moving: Pending | None = None
         self._lower_at = 0.0
@@ -172,7 +176,8 @@ class GiveLoad(CoglabState):
             self.ctx.hand, int(self._number("loosen_speed", 40)), int(self._number("close_speed", 120))
         )
         self._lowering = self._moving = self._back_since = None
-        self._brought, self._goal = False, ud.goal
+        self._brought = False
+        self._offer = partial(way_to_hand, self, ud.object_id, ud.delivery)
         self._held = HeldObject(self.ctx, ud.object_id)
         self._lower_at = self.ctx.clock.now() + self._number("lower_after", 3.0)
         try:
@@ -235,11 +240,11 @@ class GiveLoad(CoglabState):
         distance, speed = hand_from_palm(self), self._number("lower_speed", 0.03)
         if distance is None or distance >= self._number("near", 0.25):
             return
-        way = None if self._brought else way_to(self, self._goal)
+        way = None if self._brought else self._offer()
         self._brought = True
         if way is not None and ASTRAY < math.hypot(*way) < self._number("near", 0.25):
             self._moving = shift(self.ctx, way, speed)
-            self._lower_at = now + math.hypot(*way) / speed + self._number("lower_after", 3.0) / 2
+            self._lower_at = now + math.hypot(*way) / speed + 0.5
         else:
             self._lowering = rise(self.ctx, -self._number("lower", 0.03), speed)
 

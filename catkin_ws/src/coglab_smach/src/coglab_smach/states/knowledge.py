@@ -180,8 +180,8 @@ def handover_region(ctx: Context, margin: float = 0.0) -> tuple[np.ndarray, np.n
 def unless_withdrawn(
     ctx: Context, goal: Mapping[str, Any], margin: float = 0.0, may_fall: bool = True
 ) -> dict[str, Any]:
-    """The goal of a motion that ends by itself when what it follows leaves the region, goes back or, if it ``may_fall``,
-    falls."""
+    """The goal of a motion that ends by itself when what it follows leaves the region, goes back or, where it
+    ``may_fall``, falls."""
     # Who offers at the edge of the region does not leave it with a tremor or a sight that is a little off.
     edge = float(ctx.config.get("handover.edge", 0.05))
     low, high = handover_region(ctx, margin + edge)

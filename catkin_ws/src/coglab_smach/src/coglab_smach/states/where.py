@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -13,6 +14,8 @@ from coglab_smach.kinematics.reachability import default_arm
 from coglab_smach.ports.pending import PortError
 from coglab_smach.states.base import CoglabState
 
+NEARER = 0.02
+"""m by which what a person has missed is brought nearer than it was offered"""
 OLDEST = 0.5
 """s, an older sight does not tell where the hand is"""
 
@@ -65,15 +68,18 @@ def hand_from_palm(state: CoglabState) -> float | None:
     return None if person is None or palm is None else float(np.linalg.norm(person - palm))
 
 
-def way_to(state: CoglabState, goal: Mapping[str, Any]) -> np.ndarray | None:
-    """m, base frame, from the palm to where a reach for the person's hand wants it, with that hand as it is seen now."""
-    ctx, palm = state.ctx, palm_at(state.ctx)
-    hand = str(ctx.config.get("perception.human_hand", "human_hand"))
+def way_to_hand(state: CoglabState, object_id: str, delivery: Mapping[str, Any]) -> np.ndarray | None:
+    """m, base frame: from where the object is seen to NEARER than where the delivery offers it to the person's hand as
+    that is seen now. None where one of them is not."""
+    hand = str(state.ctx.config.get("perception.human_hand", "human_hand"))
+    thing = seen_at(state, object_id)
     try:
-        seen = state.await_pending(ctx.perception.locate_object(hand, 0.3), "sight of the person's hand", 0.5)
+        seen = state.await_pending(state.ctx.perception.locate_object(hand, 0.3), f"sight of '{hand}'", 0.5)
     except PortError:
         return None
-    if palm is None or seen.age > OLDEST:
+    if thing is None or seen.age > OLDEST:
         return None
-    wanted: np.ndarray = Pose(np.array(seen.xyz), np.array(seen.quaternion)).apply(np.asarray(goal["offset"])) - palm
-    return wanted
+    x, y, z = delivery["pose"]["xyz"]
+    nearer = max(0.0, 1.0 - NEARER / max(NEARER, math.hypot(x, y)))
+    offered = Pose(np.array(seen.xyz), np.array(seen.quaternion)).apply(np.array([nearer * x, nearer * y, z]))
+    return np.asarray(offered) - thing

@@ -1,0 +1,87 @@
+"""Fingers begin to close on the last of the way, where the object is seen between them; a hand that has touched
+something else opens before it comes again, toward where the object is seen."""
+
+import pytest
+from coglab_msgs.msg import ReasonCode
+from coglab_smach.ports.pending import PortError
+from coglab_smach.states import reach
+from conftest import Trial
+
+RECEIVE = "exchange_human_to_robot"
+
+
+def receive(monkeypatch, away, touch_after=1.5, **settings):
+    """Receive with the object seen ``away(looks)`` m off its grasp, from somebody felt so late (s). Returns the trial
+    and what was called when."""
+    trial, looks = Trial(**settings), []
+
+    def off_grasp(state, goal):
+        looks.append(trial.clock.now())
+        return away(len(looks))
+
+    monkeypatch.setattr(reach, "off_grasp", off_grasp)
+    trial.cell.partner.touch_after = touch_after
+
+    def script(t):
+        t.wait_hub("wait_without_object")
+        t.start(RECEIVE)
+        t.clock.sleep(1.0)
+        t.wait_hub("wait_with_object")
+
+    trial.run(script)
+    assert trial.result().outcome == "succeeded"
+    return trial, [name for _, name in trial.cell.calls]
+
+
+def test_fingers_begin_to_close_before_anything_is_felt(monkeypatch):
+    trial, calls = receive(monkeypatch, lambda looks: 0.02)
+    marks = trial.result().marks
+    assert marks["closing_on_the_way"] < marks["contact"] <= marks["closing"]
+    assert calls.count("close") == 2, "once on the way, and then until it has closed"
+
+
+@pytest.mark.parametrize("case", ["switched off", "elsewhere", "not seen"])
+def test_they_stay_open_until_the_contact_where_they_might_close_on_nothing(monkeypatch, case):
+    away = {"switched off": lambda n: 0.02, "elsewhere": lambda n: 0.06, "not seen": lambda n: None}[case]
+    settings = {"handover.close_within": 0.0} if case == "switched off" else {}
+    trial, calls = receive(monkeypatch, away, **settings)
+    assert "closing_on_the_way" not in trial.result().marks and calls.count("close") == 1
+
+
+def test_a_hand_that_met_something_else_opens_before_it_comes_again(monkeypatch):
+    """Two looks: the object is between the fingers, and, at the touch, elsewhere."""
+    trial, calls = receive(monkeypatch, lambda looks: 0.2 if looks == 2 else 0.02, touch_after=0.3)
+    assert "bumped" in trial.result().marks
+    first, again = calls.index("close"), [i for i, name in enumerate(calls) if name == "execute_dmp"][1]
+    assert any(name.startswith("preshape") for name in calls[first:again]), calls
+
+
+def test_a_goal_that_is_hidden_for_a_moment_is_waited_for(monkeypatch):
+    """After a touch of something else the tracker has lost the object for 0.5 s."""
+    trial = Trial()
+    trial.cell.partner.touch_after = 0.3
+    looks, refused, execute = [], [], trial.ctx.arm.execute_dmp
+
+    def off_grasp(state, goal):
+        looks.append(1)
+        return 0.02 if refused else 0.2
+
+    def hidden(request):
+        if looks and (not refused or trial.clock.now() < refused[0] + 0.5):
+            refused.append(trial.clock.now())
+            trial.cell.faults.refuse["execute_dmp"] = PortError("the goal is 0.3 s old", code=ReasonCode.GOAL_STALE)
+        else:
+            trial.cell.faults.refuse.pop("execute_dmp", None)
+        return execute(request)
+
+    monkeypatch.setattr(reach, "off_grasp", off_grasp)
+    trial.ctx.arm.execute_dmp = hidden
+
+    def script(t):
+        t.wait_hub("wait_without_object")
+        t.start(RECEIVE)
+        t.clock.sleep(1.0)
+        t.wait_hub("wait_with_object")
+
+    trial.run(script)
+    assert trial.result().outcome == "succeeded" and len(refused) > 5, trial.ctx.journal.why()

@@ -1,0 +1,69 @@
+"""A tracker that takes something else for what a reach is for: that is no withdrawal, and a real one is."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from coglab_msgs.msg import ReasonCode
+from coglab_smach.ports.interfaces import Ahead
+from coglab_smach.states import early_reach
+from coglab_smach.states.base import TimeLimit
+
+LOW, HIGH = [-1.0, -1.0, -1.0], [2.0, 1.0, 2.0]
+FRAME = 1.0 / 30.0
+
+
+class Watched:
+    """A reach for a hand that is seen at places that the test names, 30 times a second; the palm is at the origin."""
+
+    def __init__(self, monkeypatch):
+        self.t, self.place = 0.0, np.array([0.4, 0.0, 0.4])
+        monkeypatch.setattr(early_reach, "seen_at", lambda state, target: self.place)
+        monkeypatch.setattr(early_reach, "palm_at", lambda ctx: np.zeros(3))
+        ctx = SimpleNamespace(
+            clock=SimpleNamespace(now=lambda: self.t),
+            perception=SimpleNamespace(ahead=lambda: Ahead(0.0, 1.0, "", "human_hand_ahead", (0.4, 0.0, 0.4))),
+            config={},
+        )
+        goal = {
+            "frame": "human_hand_ahead",
+            "limits": {"goal_region_low": LOW, "goal_region_high": HIGH},
+            "early": {"retreat": 0.10, "drop": 0.0},
+        }
+        self.reach = early_reach.EarlyReach(SimpleNamespace(ctx=ctx), goal, None)
+
+    def see(self, *place, frames=1):
+        self.place = np.array(place)
+        for _ in range(frames):
+            self.t += FRAME
+            assert not self.reach.doubted()
+
+
+def test_four_frames_of_something_else_are_no_withdrawal(monkeypatch):
+    hand = Watched(monkeypatch)
+    hand.see(0.4, 0.0, 0.4, frames=10)
+    hand.see(0.28, 0.0, 0.28, frames=4)
+    hand.see(0.4, 0.0, 0.4, frames=30)
+
+
+def test_a_hand_that_goes_back_ends_the_reach(monkeypatch):
+    hand = Watched(monkeypatch)
+    hand.see(0.4, 0.0, 0.4, frames=10)
+    with pytest.raises(TimeLimit, match="went back") as end:
+        for k in range(12):
+            hand.see(0.4 + 0.03 * k, 0.0, 0.4)
+    assert end.value.code == ReasonCode.GOAL_WITHDRAWN
+
+
+def test_a_hand_that_was_hidden_while_it_went_back_is_believed_after_a_moment(monkeypatch):
+    hand = Watched(monkeypatch)
+    hand.see(0.4, 0.0, 0.4, frames=10)
+    with pytest.raises(TimeLimit, match="went back"):
+        hand.see(0.7, 0.0, 0.4, frames=12)
+    assert hand.t < 10 * FRAME + early_reach.SWAPPED + 3 * FRAME
+
+
+def test_who_lowers_the_hand_goes_on(monkeypatch):
+    hand = Watched(monkeypatch)
+    for k in range(12):
+        hand.see(0.4, 0.0, 0.4 - 0.025 * k)
