@@ -14,6 +14,7 @@ from coglab_smach.context.holding import HoldingMemory
 from coglab_smach.context.journal import Journal
 from coglab_smach.context.requests import Requests
 from coglab_smach.ports.interfaces import ArmPort, ContactPort, DatabasePort, HandPort, PerceptionPort
+from coglab_smach.ports.pending import Pending
 
 
 class StopSwitch:
@@ -60,6 +61,8 @@ class Context:
     shared: bool = False
     """the person may hold the object that is in the robot's fingers: from the closing on an object that is offered
     until its weight is felt, and from the person's taking of the load until the hand is open"""
+    closing: Pending | None = None
+    """of the fingers, begun on the last of a reach's way"""
     _holding: str = ""
 
     def __post_init__(self) -> None:

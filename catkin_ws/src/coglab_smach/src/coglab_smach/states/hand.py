@@ -72,7 +72,8 @@ class HandClose(CoglabState):
         self.ctx.journal.mark("closing")
         # From here on the hand may hold: a failure in the middle must not make the recovery drop the object.
         self.ctx.holding, self.ctx.shared = ud.object_id, self.from_person
-        closing = self.ctx.hand.close_on_object()
+        closing = self.ctx.closing or self.ctx.hand.close_on_object()
+        self.ctx.closing = None
         if self.from_person:
             ud.hand_distance = hand_from_palm(self)
         self.await_pending(closing, "closing of the hand")

@@ -106,11 +106,10 @@ class WaitStop(CoglabState):
         """s, when the hand was first at its place"""
         self._deeper = False
         """it has gone on from there"""
-        self._closing = False
-        """the fingers have begun to close on the way"""
 
     def run(self, ud: Any) -> str:
-        self._left = self._deeper = self._closing = False
+        self._left = self._deeper = False
+        self.ctx.closing = None
         self._arrived = None
         target = target_of(ud.goal) if self.trigger == "contact" else ""
         self._grip = PersonsGrip(self, target) if target else None
@@ -151,8 +150,8 @@ class WaitStop(CoglabState):
         arm, hand = self.ctx.arm, ud.grasp["hand"]
         self.allow(20.0)
         self.await_pending(arm.switch_controller("ptp"), "end of the reach by switching to 'ptp'", 3.0)
-        if self._closing:
-            self._closing = False
+        if self.ctx.closing is not None:
+            self.ctx.closing = None
             self.await_pending(self.ctx.hand.preshape(hand["mode"], hand["level"]), "the hand's opening", 5.0)
         back = palm_axis(self.ctx)
         if back is not None:
@@ -215,12 +214,11 @@ class WaitStop(CoglabState):
         """The fingers need as long as the last of the way: a person lets go of what is light with the first touch, or
         with what they take for it. So they begin to close where the object is seen between them."""
         within = float(self.ctx.config.get("handover.close_within", 0.03))
-        if self._closing or not 0.0 < self.ctx.arm.dmp_progress().remaining_distance < within:
+        if self.ctx.closing is not None or not 0.0 < self.ctx.arm.dmp_progress().remaining_distance < within:
             return
         away = off_grasp(self, goal)
         if away is not None and away < within + BETWEEN:
-            self._closing = True
-            self.ctx.hand.close_on_object()
+            self.ctx.closing = self.ctx.hand.close_on_object()
             self.ctx.journal.mark("closing_on_the_way")
 
     def _go_on(self, goal: dict[str, Any]) -> None:
