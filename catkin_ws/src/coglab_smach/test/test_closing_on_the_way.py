@@ -85,3 +85,11 @@ def test_a_goal_that_is_hidden_for_a_moment_is_waited_for(monkeypatch):
 
     trial.run(script)
     assert trial.result().outcome == "succeeded" and len(refused) > 5, trial.ctx.journal.why()
+
+
+def test_a_hand_that_still_takes_its_preshape_is_left_alone(monkeypatch):
+    """Asked to close in the middle, it would end its preshape, and with that the reach."""
+    trial, calls = receive(monkeypatch, lambda looks: 0.02, touch_after=2.0)
+    began = [stamp for stamp, name in trial.cell.calls if name.startswith("preshape")][0]
+    closed = [stamp for stamp, name in trial.cell.calls if name == "close"][0]
+    assert closed >= began + 0.8, calls

@@ -61,6 +61,8 @@ class Context:
     shared: bool = False
     """the person may hold the object that is in the robot's fingers: from the closing on an object that is offered
     until its weight is felt, and from the person's taking of the load until the hand is open"""
+    preshaped: bool = False
+    """the fingers have taken the preshape of this reach's grasp"""
     closing: Pending | None = None
     """of the fingers, begun on the last of a reach's way"""
     _holding: str = ""

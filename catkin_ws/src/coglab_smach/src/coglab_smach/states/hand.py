@@ -44,8 +44,9 @@ class HandPreshape(CoglabState):
         super().__init__(ctx, input_keys=["grasp"])
 
     def run(self, ud: Any) -> str:
-        hand = ud.grasp["hand"]
+        hand, self.ctx.preshaped = ud.grasp["hand"], False
         self.await_pending(self.ctx.hand.preshape(hand["mode"], hand["level"]), f"preshape '{hand['mode']}'")
+        self.ctx.preshaped = True
         self.ctx.journal.mark("preshaped")
         return "succeeded"
 

@@ -188,7 +188,8 @@ class WaitStop(CoglabState):
         settings = self._contact_settings(ud)
         limit = float(settings.get("timeout", self.ctx.config.get("contact_timeout", 6.0)))
         self.allow(limit + 5.0)
-        self.await_pending(self.ctx.contact.arm("contact_in_motion", limit, settings), "arming of the detector", 2.0)
+        arming = self.ctx.contact.arm("contact_in_motion", limit, settings)
+        self.await_pending(arming, "arming of the contact detector", 2.0)
         try:
             self.wait_for(partial(self._happened, ud.goal), "contact of an object with the hand", limit)
         except TimeLimit as error:
@@ -214,7 +215,11 @@ class WaitStop(CoglabState):
         """The fingers need as long as the last of the way: a person lets go of what is light with the first touch, or
         with what they take for it. So they begin to close where the object is seen between them."""
         within = float(self.ctx.config.get("handover.close_within", 0.03))
-        if self.ctx.closing is not None or not 0.0 < self.ctx.arm.dmp_progress().remaining_distance < within:
+        if (
+            self.ctx.closing is not None
+            or not self.ctx.preshaped
+            or not 0.0 < self.ctx.arm.dmp_progress().remaining_distance < within
+        ):
             return
         away = off_grasp(self, goal)
         if away is not None and away < within + BETWEEN:
