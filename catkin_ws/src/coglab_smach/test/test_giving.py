@@ -3,7 +3,8 @@
 from types import SimpleNamespace
 
 import pytest
-from coglab_msgs.msg import ReasonCode
+from coglab_msgs.msg import ReasonCode, Say
+from coglab_py.pose import Pose
 from coglab_sim.conditions import Conditions
 from coglab_smach.contact.leaving_load import SAME, LeavingLoad
 from coglab_smach.kinematics.reachability import default_arm
@@ -206,3 +207,35 @@ def test_a_place_that_is_corrected_while_the_hand_still_comes_is_followed():
     assert [r.outcome for r in results] == ["succeeded", "succeeded"], [r.reason for r in results]
     goal = trial.ctx.arm.request
     assert goal.goal_frame.startswith("human_hand") and goal.goal_drop == 0.0
+
+
+def test_what_falls_as_it_is_given_was_not_given():
+    def script(t):
+        t.cell.push(0.9 * WEIGHT)
+        hand = t.cell.objects["human_hand"]
+        while t.ctx.holding:
+            t.clock.sleep(0.02)
+        t.cell.at_palm = None
+        t.cell.objects["mug"] = Pose(hand.position - [0.0, 0.0, 1.0])
+        t.wait_hub("wait_without_object")
+
+    trial = giving(script)
+    assert trial.result().outcome == "failed_empty" and trial.result().code == ReasonCode.GOAL_FELL
+    assert "'mug' fell as it was given" in trial.ctx.journal.why() and trial.ctx.holding == ""
+
+
+def test_the_palm_draws_back_while_the_hand_opens_and_then_the_person_is_told():
+    told = []
+
+    def script(t):
+        t.ctx.say = lambda code, text: told.append((t.clock.now(), code))
+        t.cell.push(0.9 * WEIGHT)
+        t.wait_hub("wait_without_object")
+
+    trial = giving(script)
+    assert trial.result().outcome == "succeeded"
+    opening = trial.result().marks["opening"]
+    after = [(stamp, name) for stamp, name in trial.cell.calls if stamp >= opening]
+    assert [name for _, name in after if name != "disarm"][:2] == ["preshape cylindrical", "move_ptp"], after
+    spoken = [stamp for stamp, code in told if code == Say.YOU_HAVE_IT]
+    assert len(spoken) == 1 and spoken[0] >= opening + 0.8, "once the fingers are out of the way"

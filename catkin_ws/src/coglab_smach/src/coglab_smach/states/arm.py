@@ -5,11 +5,17 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+from coglab_msgs.msg import ReasonCode
+
 from coglab_smach.context.context import Context
 from coglab_smach.kinematics.motion_time import ptp_time
 from coglab_smach.ports.pending import Polled, PortError
 from coglab_smach.states.base import CoglabState, TimeLimit
 from coglab_smach.states.held import HeldObject
+from coglab_smach.states.where import person_at, seen_at
+
+FELL = 0.5
+"""m below the person's hand in which an object is not in it any more"""
 
 
 class LoadControllers(CoglabState):
@@ -131,13 +137,29 @@ class PtpMotion(CoglabState):
 
 class HomeRobot(PtpMotion):
     """coglab_home_robot: the arm goes to its home posture; with ``carries``, with the object of the action in the hand,
-    and it ends where that is lost."""
+    and it ends where that is lost; with ``gave``, an object that has fallen from the person's hand meanwhile was not
+    given."""
 
-    def __init__(self, ctx: Context, carries: bool = False) -> None:
+    def __init__(self, ctx: Context, carries: bool = False, gave: bool = False) -> None:
         super().__init__(ctx, "home")
-        self.carries = carries
-        if carries:
+        self.carries, self.gave = carries, gave
+        if carries or gave:
             self.register_input_keys(["object_id"])
+
+    def run(self, ud: Any) -> str:
+        outcome = super().run(ud)
+        if self.gave:
+            self._see_given(ud.object_id)
+        return outcome
 
     def _look_after(self, ud: Any) -> Callable[[], object]:
         return HeldObject(self.ctx, ud.object_id).check if self.carries else super()._look_after(ud)
+
+    def _see_given(self, object_id: str) -> None:
+        thing, hand = seen_at(self, object_id), person_at(self)
+        if thing is not None and hand is not None and hand[2] - thing[2] > FELL:
+            raise PortError(
+                f"'{object_id}' fell as it was given",
+                (f"it is seen {hand[2] - thing[2]:.2f} m below the person's hand",),
+                ReasonCode.GOAL_FELL,
+            )

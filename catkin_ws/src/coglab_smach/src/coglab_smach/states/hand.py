@@ -8,8 +8,12 @@ from coglab_msgs.msg import ReasonCode, Say
 
 from coglab_smach.context.context import Context
 from coglab_smach.ports.pending import PortError
-from coglab_smach.states.base import CoglabState
-from coglab_smach.states.where import hand_from_palm
+from coglab_smach.states.base import CoglabState, TimeLimit
+from coglab_smach.states.motion import shift
+from coglab_smach.states.where import hand_from_palm, palm_axis
+
+LOOSE = 40
+"""counts of 254 that the fingers have opened when the palm begins to draw back"""
 
 
 class CalibrateHand(CoglabState):
@@ -100,18 +104,53 @@ class HandClose(CoglabState):
 
 
 class HandOpen(CoglabState):
-    """Open the hand; afterwards nothing is held. ``to_person``: who has taken the object is told."""
+    """Open the hand; afterwards nothing is held."""
 
     default_time_limit = 8.0
 
-    def __init__(self, ctx: Context, to_person: bool = False) -> None:
-        super().__init__(ctx)
-        self.to_person = to_person
-
     def run(self, ud: Any) -> str:
         self.ctx.journal.mark("opening")
-        if self.to_person:
-            self.ctx.say(Say.YOU_HAVE_IT, "You have it.")
         self.await_pending(self.ctx.hand.open(int(self.ctx.config.get("hand.open_speed", 400))), "opening of the hand")
         self.ctx.holding, self.ctx.shared = "", False
         return "succeeded"
+
+
+class LetGo(CoglabState):
+    """Open the hand for the person who has taken the object, and tell them.
+
+    It opens as far as its preshape, in which the object came in, and meanwhile the palm draws back from the object,
+    outward by ``give.draw_back`` m: who has an object goes with it at once, and fingers beside it would tear it away.
+    """
+
+    default_time_limit = 8.0
+    owns_motion = True
+
+    def __init__(self, ctx: Context) -> None:
+        super().__init__(ctx, input_keys=["grasp"])
+
+    def run(self, ud: Any) -> str:
+        self.ctx.journal.mark("opening")
+        hand, closed = ud.grasp["hand"], self.ctx.hand.state().positions
+        opening, back = self.ctx.hand.preshape(hand["mode"], hand["level"]), None
+        while not opening.done() and not self._open_by(closed):
+            self.pause(0.01)
+        axis, way = palm_axis(self.ctx), float(self.ctx.config.get("give.draw_back", 0.06))
+        if axis is not None and way > 0.0:
+            back = shift(self.ctx, -way * axis, float(self.ctx.config.get("give.draw_back_speed", 0.25)))
+        self.await_pending(opening, "opening of the hand")
+        self.ctx.holding, self.ctx.shared = "", False
+        # Not earlier: who is told so goes, and fingers that are half open would keep the object.
+        self.ctx.say(Say.YOU_HAVE_IT, "You have it.")
+        if back is not None:
+            try:
+                self.await_pending(back, "drawing back", 2.0)
+            except TimeLimit:
+                raise
+            except PortError as error:
+                self.reason = error.sentence  # as far as it goes
+        return "succeeded"
+
+    def _open_by(self, closed: tuple[int, ...]) -> bool:
+        """Whether a finger has opened by LOOSE counts since."""
+        now = self.ctx.hand.state().positions
+        return len(now) == len(closed) > 0 and max(c - n for c, n in zip(closed[1:], now[1:], strict=True)) >= LOOSE
