@@ -21,7 +21,7 @@ def test_summary_of_a_known_trial():
     row = summarise(trial, "exchange_human_to_robot", "success", 1.0, 8.0, LIMITS)
     assert row["fri_lost"] == 2
     assert row["duration_s"] == 7.0
-    assert row["final_error_mm"] == pytest.approx(3.0)  # the last arrival before contact
+    assert row["believed_error_mm"] == pytest.approx(3.0)  # the last arrival before contact
     assert row["contact_delay_ms"] == pytest.approx(40.0)
     assert row["peak_velocity_share"] == pytest.approx(0.4)
 
@@ -29,13 +29,14 @@ def test_summary_of_a_known_trial():
 def test_a_goal_that_is_held_on_the_way_is_no_arrival():
     trial = Trial()
     trial.feedback = [(4.0, "running", 0.25), (4.1, "holding", 0.18), (4.2, "running", 0.15)]
-    assert summarise(trial, "exchange_human_to_robot", "success", 1.0, 8.0, LIMITS)["final_error_mm"] is None
+    assert summarise(trial, "exchange_human_to_robot", "success", 1.0, 8.0, LIMITS)["believed_error_mm"] is None
 
 
 def test_summary_without_measurements_says_none():
     row = summarise(Trial(), "take", "no end", 0.0, 1.0, LIMITS)
     assert row["final_error_mm"] is None and row["contact_delay_ms"] is None and row["peak_velocity_share"] is None
-    assert row["fri_lost"] is None
+    assert row["fri_lost"] is None and row["believed_error_mm"] is None
+    assert row["final_error_by"].startswith("nobody") and row["reaches"] == []
 
 
 def test_a_handover_that_did_not_end_has_a_code():
