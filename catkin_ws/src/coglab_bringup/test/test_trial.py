@@ -26,6 +26,14 @@ def test_summary_of_a_known_trial():
     assert row["peak_velocity_share"] == pytest.approx(0.4)
 
 
+def test_no_contact_is_waited_for_where_the_robot_gives():
+    """The object touches the hand that holds it all the while; what touches on the way there is no object felt."""
+    trial = Trial()
+    trial.truth = [(t, [0, 0, 0], [0, 0, 0], [0, 0, 0], 3.0) for t in (1.0, 2.0, 3.0)]
+    trial.contacts = [(3.1, True, 2.0)]
+    assert summarise(trial, "exchange_robot_to_human", "success", 0.9, 8.0, LIMITS)["contact_delay_ms"] is None
+
+
 def test_a_goal_that_is_held_on_the_way_is_no_arrival():
     trial = Trial()
     trial.feedback = [(4.0, "running", 0.25), (4.1, "holding", 0.18), (4.2, "running", 0.15)]

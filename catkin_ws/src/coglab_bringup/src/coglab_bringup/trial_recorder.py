@@ -18,7 +18,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import Pose as PoseMessage
 from sensor_msgs.msg import JointState
 
-from coglab_bringup.reach_errors import reach_errors
+from coglab_bringup.reach_errors import GIVES, reach_errors
 
 FORCE_THRESHOLD = 0.3  # N on the palm from which the object counts as touching (truth)
 LOST_KEYS = ("measurements lost", "answers lost")  # diagnostics values of the bridge that count lost FRI packets
@@ -133,6 +133,8 @@ def summarise(
     arrived = [d for t, state, d in trial.feedback if start <= t <= until and state == "reached"]
     touch = next((t for t, *_, force in trial.truth if start <= t <= end and force > FORCE_THRESHOLD), None)
     delay = contact - touch if contact and touch else None
+    if kind == GIVES:  # the object touches the hand from the start
+        delay = None
     lost_before = [count for t, count in trial.fri_lost if t <= start] or [count for _, count in trial.fri_lost][:1]
     lost_until = [count for t, count in trial.fri_lost if t <= end + 1.0]
     speeds = np.array([velocity for t, _, velocity in trial.joints if start <= t <= end])
