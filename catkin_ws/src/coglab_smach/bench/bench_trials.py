@@ -9,18 +9,21 @@ touch, or is unfinished), at its end; the two kinds are shown apart beside it. H
 that the motion has estimated and latched. Later than a person: after coglab_sim's duration of a person's reach over the
 same way; there: from when on the measured palm stays within 5 mm of the goal in use, or when it is met; an unfinished
 reach, or one of less than 20 cycles, is infinitely late and shown as 999. SPARC: 10 Hz, amplitude 0.05, of every reach
-of 20 cycles and more. The definitions of the world's rows stand in world_rows.py.
+of 20 cycles and more. Misbehaving partners: 1 trial each, 20 with --long; each has one right
+outcome, which for some depends on who holds the object in the end, by the cell's truth. The definitions of the world's
+rows stand in world_rows.py.
 """
 
 import json
 import os
 import sys
+from collections import Counter
 
 import numpy as np
 from campaign import EXCHANGES, Campaign
 from coglab_sim.conditions import CONSIDERATE, Conditions
 from coglab_sim.tracker.tracker import PerceptionSettings
-from misbehaviours import OUTCOMES
+from misbehaviours import BY_HOLDER, OUTCOMES
 from world_rows import palm_rows, physics_rows, run_default, world_rows
 
 LONG = os.environ.get("COGLAB_LONG") == "1"
@@ -101,28 +104,40 @@ def reach_rows(campaign, action, perception):
 
 
 def misbehaviour_rows():
-    """Each behaviour ends in an outcome of its table."""
+    """Each behaviour ends in the outcome of its table; where that has two, the true holder decides, with a row each."""
     rows, everything = [], Campaign()
-    for (action, behaviour), allowed in sorted(OUTCOMES.items()):
+    for (action, behaviour), outcome in sorted(OUTCOMES.items(), key=lambda item: item[0]):
         actions = EXCHANGES if action == EXCHANGES[1] else (action,)
         kw = {"later_behaviour": behaviour} if len(actions) == 2 else {"behaviour": behaviour}
         kw |= {"profile": "accustomed", "perfect": True}
         campaign = Campaign().run(actions, range(30, 30 + MISBEHAVED), **kw)
-        share = campaign.share(action, allowed)
-        got = ", ".join(f"{outcome} {n}" for (kind, outcome), n in sorted(campaign.outcomes.items()) if kind == action)
-        rows.append(
-            row(
-                f"{action} with '{behaviour}' x {MISBEHAVED} ends as documented ({got})",
-                share,
-                "share",
-                ">= 1",
-                share >= 1.0 and campaign.stuck == 0,
-            )
-        )
+        rows += documented_rows(campaign, action, behaviour, outcome)
         everything.fastest = max(everything.fastest, campaign.fastest)
         for name in ("outside_commanded", "outside_measured", "over_command", "moving", "stuck", "trials"):
             setattr(everything, name, getattr(everything, name) + getattr(campaign, name))
     return rows + everything.safety_rows(row, "misbehaving partners")
+
+
+def documented_rows(campaign, action, behaviour, outcome):
+    """How many trials of a behaviour have ended as documented; where a kind did not occur nothing is judged."""
+    what = f"{action} with '{behaviour}' x {campaign.trials}"
+    if outcome != BY_HOLDER:
+        cases = [("", outcome, campaign.ends[action])]
+    else:
+        of = {held: [end for end in campaign.ends[action] if (end[1] == "robot") == held] for held in (True, False)}
+        cases = [
+            (", the robot holds the object in the end", outcome[0], of[True]),
+            (", the robot does not hold it in the end", outcome[1], of[False]),
+        ]
+    rows = []
+    for where, wanted, ends in cases:
+        good, got = sum(end[0] == wanted for end in ends), Counter(end[0] for end in ends)
+        told = ", ".join(f"{name} {n}" for name, n in sorted(got.items())) or "did not occur"
+        figure = f"{what}{where}: ends with {wanted} ({told})"
+        goal = ">= 1" if ends else ""
+        share = good / len(ends) if ends else 0.0
+        rows.append(row(figure, share, "share", goal, not ends or (share >= 1.0 and campaign.stuck == 0)))
+    return rows
 
 
 def main() -> int:
