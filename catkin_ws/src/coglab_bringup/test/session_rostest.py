@@ -31,9 +31,12 @@ class Session(unittest.TestCase):
         rospy.Subscriber("/coglab_sim/truth/markers", MarkerArray, cls.markers.append, queue_size=1)
         rospy.Subscriber("/coglab/scene", MarkerArray, cls.scenes.append, queue_size=10)
         recorder = TrialRecorder()
+        cls.rows = {}
         cls.outcomes = dict.fromkeys(ORDER, "not reached: an action before it failed")
         for action in ORDER:
-            cls.outcomes[action] = run_handover(action, "mug", recorder)[0]["outcome"]
+            cls.rows[action] = run_handover(action, "mug", recorder)[0]
+            cls.outcomes[action] = cls.rows[action]["outcome"]
+            print("XXX", cls.rows[action], file=open("/tmp/judge_rows.txt", "a"))
             if cls.outcomes[action] != "success":
                 break
 
@@ -48,6 +51,15 @@ class Session(unittest.TestCase):
 
     def test_4_to_the_person(self):
         self.assertEqual(self.outcomes[ORDER[3]], "success")
+
+    def test_4_to_the_person_ends_where_their_hand_truly_is(self):
+        """The palm's distance and angle to its place before the person's true hand. The arm may stop within
+        give.touch_within (0.05 m) of it, as the person comes."""
+        row = self.rows[ORDER[3]]
+        self.assertEqual(row["final_error_by"], "truth of the simulated cell", row)
+        self.assertEqual([reach["ended"] in ("reached", "met") for reach in row["reaches"]], [True], row)
+        self.assertLessEqual(row["final_error_mm"], 60.0)
+        self.assertLessEqual(row["final_error_deg"], 10.0)
 
     def test_5_rviz_gets_person_object_cell_goal_path_and_state(self):
         self.assertTrue(self.markers)

@@ -21,21 +21,30 @@ def test_summary_of_a_known_trial():
     row = summarise(trial, "exchange_human_to_robot", "success", 1.0, 8.0, LIMITS)
     assert row["fri_lost"] == 2
     assert row["duration_s"] == 7.0
-    assert row["final_error_mm"] == pytest.approx(3.0)  # the last arrival before contact
+    assert row["believed_error_mm"] == pytest.approx(3.0)  # the last arrival before contact
     assert row["contact_delay_ms"] == pytest.approx(40.0)
     assert row["peak_velocity_share"] == pytest.approx(0.4)
+
+
+def test_no_contact_is_waited_for_where_the_robot_gives():
+    """The object touches the hand that holds it all the while; what touches on the way there is no object felt."""
+    trial = Trial()
+    trial.truth = [(t, [0, 0, 0], [0, 0, 0], [0, 0, 0], 3.0) for t in (1.0, 2.0, 3.0)]
+    trial.contacts = [(3.1, True, 2.0)]
+    assert summarise(trial, "exchange_robot_to_human", "success", 0.9, 8.0, LIMITS)["contact_delay_ms"] is None
 
 
 def test_a_goal_that_is_held_on_the_way_is_no_arrival():
     trial = Trial()
     trial.feedback = [(4.0, "running", 0.25), (4.1, "holding", 0.18), (4.2, "running", 0.15)]
-    assert summarise(trial, "exchange_human_to_robot", "success", 1.0, 8.0, LIMITS)["final_error_mm"] is None
+    assert summarise(trial, "exchange_human_to_robot", "success", 1.0, 8.0, LIMITS)["believed_error_mm"] is None
 
 
 def test_summary_without_measurements_says_none():
     row = summarise(Trial(), "take", "no end", 0.0, 1.0, LIMITS)
     assert row["final_error_mm"] is None and row["contact_delay_ms"] is None and row["peak_velocity_share"] is None
-    assert row["fri_lost"] is None
+    assert row["fri_lost"] is None and row["believed_error_mm"] is None
+    assert row["final_error_by"].startswith("nobody") and row["reaches"] == []
 
 
 def test_a_handover_that_did_not_end_has_a_code():

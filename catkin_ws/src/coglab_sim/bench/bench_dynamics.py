@@ -1,6 +1,12 @@
 #!/usr/bin/python3
 """The simulated cell: time of a step, load of the node, dynamics of the plant against KDL's and of the controller's
-model against another MuJoCo's, a blocked arm, lockstep. Prints JSON rows only."""
+model against another MuJoCo's, a blocked arm, lockstep. Prints JSON rows only.
+
+Definitions, nothing is left out. Step: 40 blocks of 2000 steps, the cell and mj_step alone on the same states; median
+of the blocks' ratios, missed if a block has fewer than four contacts. Node: processor time over 10 s. Differences:
+the largest element over all states. Blocked arm: the largest speed of any joint after the release, over two motions
+and three FRI periods. Lockstep: every datagram of two runs with one seed, byte by byte.
+"""
 
 import json
 import os

@@ -1,18 +1,30 @@
 #!/usr/bin/python3
 """Bench of whole trials in virtual time: each action, each misbehaviour, reaches with noisy and with perfect
 perception. A sample by default; with COGLAB_LONG=1 the campaigns (100 trials of each action, 20 of each misbehaviour)
-and five sessions of the whole system in real time."""
+and five sessions of the whole system in real time.
+
+Definitions. Succeeded: the share of all trials asked for; an action that never began, or got stuck, has not. Reach: one
+DMP motion; every one is in the percentiles of its distances, where the arm stood, or, if it never did (it was met by a
+touch, or is unfinished), at its end; the two kinds are shown apart beside it. Hand to goal as received: to the goal
+that the motion has estimated and latched. Later than a person: after coglab_sim's duration of a person's reach over the
+same way; there: from when on the measured palm stays within 5 mm of the goal in use, or when it is met; an unfinished
+reach, or one of less than 20 cycles, is infinitely late and shown as 999. SPARC: 10 Hz, amplitude 0.05, of every reach
+of 20 cycles and more. Misbehaving partners: 1 trial each, 20 with --long; each has one right
+outcome, which for some depends on who holds the object in the end, by the cell's truth. The definitions of the world's
+rows stand in world_rows.py.
+"""
 
 import json
 import os
 import sys
+from collections import Counter
 
 import numpy as np
 from campaign import EXCHANGES, Campaign
 from coglab_sim.conditions import CONSIDERATE, Conditions
 from coglab_sim.tracker.tracker import PerceptionSettings
-from misbehaviours import OUTCOMES
-from world_rows import NEVER_STOOD, off_rows, physics_rows, run_default, world_rows
+from misbehaviours import BY_HOLDER, OUTCOMES
+from world_rows import palm_rows, physics_rows, run_default, world_rows
 
 LONG = os.environ.get("COGLAB_LONG") == "1"
 TRIALS = 100 if LONG else 12
@@ -41,68 +53,91 @@ def row(figure, value, unit, goal="", ok=True, peer=None, peer_value=None):
     }
 
 
+NEVER = 999.0
+"""s, shown for what never happened"""
+
+
 def reach_rows(campaign, action, perception):
-    """Duration, smoothness, end. Distances to the goal as received; to the truth only with perfect perception."""
-    found = [each for each in campaign.stood(action) if "sparc" in each]
-    every, what = len(campaign.reaches[action]), f"{action}, {perception}"
+    """Duration, smoothness, end of every reach. Distances to the goal as received; to the truth with a goal only where
+    perception is perfect."""
+    reaches, what = campaign.reaches[action], f"{action}, {perception}"
+    told = [each for each in reaches if "goal_mm" in each]
+    smooth = [each["sparc"] for each in reaches if "sparc" in each]
+    unfinished = sum(not (each["stood"] or each["met"]) for each in reaches)
+    of = f"of {len(reaches)}"
     counted = [
-        row(f"{what}: reaches measured, arm standing", len(found), f"of {every}", ">= 1", bool(found)),
-        *off_rows(row, campaign.never_stood(action), every, what, NEVER_STOOD),
+        row(f"{what}: reaches with a goal as received at their end", len(told), of, ">= 1", bool(told)),
+        row(f"{what}: reaches unfinished", unfinished, of),
+        row(f"{what}: reaches of 20 cycles and more", len(smooth), of),
+        *palm_rows(row, reaches, what),
     ]
-    if not found:
+    if not told or not smooth:
         return counted
-    many = {key: np.array([f[key] for f in found]) for key in found[0]}
 
     def judged(name, value, unit, goal, least=False):
         limit = float(goal.split()[-1]) if goal else 0.0
-        return row(
-            f"{what}: {name}",
-            value,
-            unit,
-            goal,
-            not goal or (value >= limit if least else value <= limit),
-        )
+        met = not goal or (value >= limit if least else value <= limit)
+        return row(f"{what}: {name}", min(value, NEVER), unit, goal, met)
+
+    def p95(key, found):
+        return np.percentile([each[key] for each in found], 95)
+
+    def late(key, share):
+        """A percentile by rank, which what never happened does not turn into no number."""
+        return np.percentile([each.get(key, np.inf) for each in reaches], share, method="higher")
 
     true_goals = ("<= 5", "<= 3") if perception == "perfect perception" else ("", "")
     return [
         *counted,
-        judged("hand to goal as received, p95", np.percentile(many["goal_mm"], 95), "mm", "<= 5"),
-        judged("hand to goal as received, p95", np.percentile(many["goal_deg"], 95), "deg", "<= 3"),
-        judged("hand to the newest single sight, p95", np.percentile(many["sight_mm"], 95), "mm", ""),
-        judged("hand to the newest single sight, p95", np.percentile(many["sight_deg"], 95), "deg", ""),
-        judged("hand to the true grasp pose, p95", np.percentile(many["truth_mm"], 95), "mm", true_goals[0]),
-        judged("hand to the true grasp pose, p95", np.percentile(many["truth_deg"], 95), "deg", true_goals[1]),
-        judged("arm there later than a person, median", np.median(many["late"]), "s", "<= 0.25"),
-        judged("arm there later than a person, p95", np.percentile(many["late"], 95), "s", ""),
-        judged("'reached' later than a person, median", np.median(many["reached_late"]), "s", ""),
-        judged("SPARC, median", np.median(many["sparc"]), "1", ">= -1.6", least=True),
-        judged("SPARC, p5", np.percentile(many["sparc"], 5), "1", ""),
+        judged("hand to goal as received, p95", p95("goal_mm", told), "mm", "<= 5"),
+        judged("hand to goal as received, p95", p95("goal_deg", told), "deg", "<= 3"),
+        judged("hand to the newest single sight, p95", p95("sight_mm", reaches), "mm", ""),
+        judged("hand to the newest single sight, p95", p95("sight_deg", reaches), "deg", ""),
+        judged("hand to the true grasp pose, p95", p95("truth_mm", reaches), "mm", true_goals[0]),
+        judged("hand to the true grasp pose, p95", p95("truth_deg", reaches), "deg", true_goals[1]),
+        judged("arm there later than a person, median", late("late", 50), "s", "<= 0.25"),
+        judged("arm there later than a person, p95", late("late", 95), "s", ""),
+        judged("'reached' or met later than a person, median", late("reached_late", 50), "s", ""),
+        judged("SPARC, median", np.median(smooth), "1", ">= -1.6", least=True),
+        judged("SPARC, p5", np.percentile(smooth, 5), "1", ""),
     ]
 
 
 def misbehaviour_rows():
-    """Each behaviour ends in an outcome of its table."""
+    """Each behaviour ends in the outcome of its table; where that has two, the true holder decides, with a row each."""
     rows, everything = [], Campaign()
-    for (action, behaviour), allowed in sorted(OUTCOMES.items()):
+    for (action, behaviour), outcome in sorted(OUTCOMES.items(), key=lambda item: item[0]):
         actions = EXCHANGES if action == EXCHANGES[1] else (action,)
         kw = {"later_behaviour": behaviour} if len(actions) == 2 else {"behaviour": behaviour}
         kw |= {"profile": "accustomed", "perfect": True}
         campaign = Campaign().run(actions, range(30, 30 + MISBEHAVED), **kw)
-        share = campaign.share(action, allowed)
-        got = ", ".join(f"{outcome} {n}" for (kind, outcome), n in sorted(campaign.outcomes.items()) if kind == action)
-        rows.append(
-            row(
-                f"{action} with '{behaviour}' x {MISBEHAVED} ends as documented ({got})",
-                share,
-                "share",
-                ">= 1",
-                share >= 1.0 and campaign.stuck == 0,
-            )
-        )
+        rows += documented_rows(campaign, action, behaviour, outcome)
         everything.fastest = max(everything.fastest, campaign.fastest)
         for name in ("outside_commanded", "outside_measured", "over_command", "moving", "stuck", "trials"):
             setattr(everything, name, getattr(everything, name) + getattr(campaign, name))
     return rows + everything.safety_rows(row, "misbehaving partners")
+
+
+def documented_rows(campaign, action, behaviour, outcome):
+    """How many trials of a behaviour have ended as documented; where a kind did not occur nothing is judged."""
+    what = f"{action} with '{behaviour}' x {campaign.trials}"
+    if outcome != BY_HOLDER:
+        cases = [("", outcome, campaign.ends[action])]
+    else:
+        of = {held: [end for end in campaign.ends[action] if (end[1] == "robot") == held] for held in (True, False)}
+        cases = [
+            (", the robot holds the object in the end", outcome[0], of[True]),
+            (", the robot does not hold it in the end", outcome[1], of[False]),
+        ]
+    rows = []
+    for where, wanted, ends in cases:
+        good, got = sum(end[0] == wanted for end in ends), Counter(end[0] for end in ends)
+        told = ", ".join(f"{name} {n}" for name, n in sorted(got.items())) or "did not occur"
+        figure = f"{what}{where}: ends with {wanted} ({told})"
+        goal = ">= 1" if ends else ""
+        share = good / len(ends) if ends else 0.0
+        rows.append(row(figure, share, "share", goal, not ends or (share >= 1.0 and campaign.stuck == 0)))
+    return rows
 
 
 def main() -> int:

@@ -76,6 +76,7 @@ def one_trial(job: Job, watch: Callable[[VirtualTrial], Any] | None = None, scri
         "begun": len(trial.begun),
         "outcomes": [(r.kind, r.outcome, r.reason, REASONS.get(r.code, str(r.code))) for r in results],
         "fell": bool(trial.rig.cell.truth()["dropped"]),
+        "held_by": str(trial.rig.cell.truth()["held_by"]),
         "outside_commanded": trial.rig.robot.outside["commanded"],
         "outside_measured": trial.rig.robot.outside["measured"],
         "over_command": trial.rig.robot.outside["over_command"],
@@ -155,6 +156,8 @@ class Campaign:
 
     def __init__(self) -> None:
         self.outcomes: Counter = Counter()
+        self.ends: dict[str, list[tuple[str, str]]] = {}
+        """of each action: outcome, and who held the object in truth when the trial was over"""
         self.reasons: dict[str, Counter] = {action: Counter() for action in EXCHANGES}
         self.reaches: dict[str, list[dict[str, float]]] = {action: [] for action in EXCHANGES}
         self.touches: list[dict[str, Any]] = []
@@ -218,6 +221,7 @@ class Campaign:
             print(f"{name}, seed {trial['seed']}: stuck: {trial['stuck']}", file=sys.stderr)
         for kind, outcome, reason, code in ends_of(actions, trial):
             self.outcomes[(kind, outcome)] += 1
+            self.ends.setdefault(kind, []).append((outcome, trial.get("held_by", "")))
             if outcome != "succeeded":
                 self.reasons.setdefault(kind, Counter())[code] += 1
                 if code not in (STUCK, NOT_BEGUN):

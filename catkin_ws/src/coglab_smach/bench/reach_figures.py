@@ -6,7 +6,7 @@ import numpy as np
 
 HUMAN_BASE = 1.1
 """s, a person's reach over 0.45 m (coglab_sim.person.participant.Participant.reach_time)"""
-NEAR = 0.010
+NEAR = 0.005
 """m: the hand has arrived when it stays this close to the goal as received"""
 
 
@@ -30,29 +30,33 @@ def sparc(speed, rate: float, cut: float = 10.0, amplitude: float = 0.05) -> flo
 
 
 def figures(reach) -> dict[str, float]:
-    """Of one ReachRecord that has ended: whether it ``stood`` still, mm and deg from palm to goal, newest sight and
-    truth then (else at its end), and those of its way where it stood and was longer than 20 cycles."""
-    out: dict[str, float] = {"stood": reach.stood}
+    """Of one ReachRecord that has ended: whether it ``stood`` still or was ``met``; mm and deg from palm to goal,
+    newest sight and truth where it stood, else at its end; those of its way, unless it was shorter than 20 cycles."""
+    out: dict[str, float] = {"stood": reach.stood, "met": reach.met}
     for name in ("goal", "sight", "truth"):
         if getattr(reach, f"to_{name}") is not None:
             metres, angle = getattr(reach, f"to_{name}")
             out[f"{name}_mm"], out[f"{name}_deg"] = 1000.0 * metres, float(np.degrees(angle))
-    return out | (way(reach) if reach.stood and len(reach.path) >= 20 else {})
+    return out | (way(reach) if len(reach.path) >= 20 else {})
 
 
 def way(reach) -> dict[str, float]:
-    """``late`` and ``reached_late`` (s after a person's arrival: there, and told so), ``reached`` (s), ``sparc``."""
+    """``sparc``; and, unless the reach is unfinished, ``late`` and ``reached_late`` (s after a person's arrival: there,
+    and told so) and ``reached`` (s). One that was met is there, and told so, when it was met."""
     times = np.array([t for t, _, _ in reach.path])
     palm = np.array([p for _, p, _ in reach.path])
     goal = np.array([g for _, _, g in reach.path])
-    inside = times <= reach.reached
+    told = reach.reached if reach.stood else reach.over if reach.met else None
+    inside = times <= (times[-1] if told is None else told)
+    speed = np.linalg.norm(np.diff(palm[inside], axis=0), axis=1) / np.diff(times[inside])
+    out = {"sparc": sparc(speed, 1.0 / float(np.median(np.diff(times))))}
+    if told is None:
+        return out
     far = np.flatnonzero(np.linalg.norm(palm[inside] - goal[inside], axis=1) > NEAR)
     arrived = float(times[far[-1]]) if len(far) else reach.begin
     human = human_time(float(np.linalg.norm(palm[-1] - palm[0])))
-    speed = np.linalg.norm(np.diff(palm[inside], axis=0), axis=1) / np.diff(times[inside])
-    return {
-        "late": arrived - times[0] - human,
-        "reached_late": reach.reached - times[0] - human,
-        "reached": reach.reached - reach.begin,
-        "sparc": sparc(speed, 1.0 / float(np.median(np.diff(times)))),
+    return out | {
+        "late": (arrived if reach.stood else told) - times[0] - human,
+        "reached_late": told - times[0] - human,
+        "reached": told - reach.begin,
     }

@@ -101,6 +101,8 @@ class VirtualTrial:
             self._end_reach()
             self._reach = ReachRecord(self.rig, self.ctx, self.begun[-1] if self.begun else "")
             self._touch = TouchRecord(self.rig, self.ctx.contact)
+        if record.from_state == "wait_stop" and self._reach is not None:
+            self._reach.leave(record.outcome == "succeeded")
         giving = self.begun[-1:] == [GIVE] and record.outcome == "succeeded"
         if record.from_state == "give_load" or (record.from_state == "wait_stop" and not giving):
             self._end_reach()
@@ -190,7 +192,9 @@ class VirtualTrial:
 
 class ReachRecord:
     """What one DMP motion of ``action`` did: (time, measured palm, goal in use) per cycle, and the errors once the arm
-    stands still; if it never ``stood``, at the reach's end.
+    stands still; if it never ``stood``, at the reach's end. ``over``: when the wait for it was left; ``met``: with
+    success, which without standing still is a touch or a person who has come. Neither ``stood`` nor ``met``:
+    unfinished.
 
     ``to_goal``: (m, rad) from the measured palm to the goal as received, that is as the motion has estimated and
     latched it, None where there was none yet; ``to_sight``: to the newest single sight; ``to_truth``: to where the
@@ -202,7 +206,8 @@ class ReachRecord:
         self.begin = rig.t
         self.path = []
         self.reached = None
-        self.stood = False
+        self.over = None
+        self.stood = self.met = False
         self.to_goal = self.to_sight = self.to_truth = None
 
     def look(self):
@@ -219,9 +224,15 @@ class ReachRecord:
             self.stood = True
             self._measure()
 
+    def leave(self, succeeded):
+        """Nobody waits for its end any more; what comes then, such as the giving of the load, is no part of it."""
+        self.over, self.met = self.rig.t, succeeded
+        if self.reached is None:
+            self._measure()
+
     def end(self):
-        """The reach is over: one that never stood still is measured where it is."""
-        if not self.stood:
+        """The reach is over: one that never stood still is measured where it is, unless it was when it was left."""
+        if not self.stood and (self.over is None or self.reached is not None):
             self._measure()
 
     def _measure(self):

@@ -5,7 +5,6 @@
 #include <cstdio>
 #include <cstdlib>
 #include <functional>
-#include <limits>
 #include <memory>
 #include <vector>
 
@@ -78,6 +77,12 @@ double nanoseconds(const std::function<void()>& block, int cycles, int controlle
   return std::chrono::duration<double, std::nano>(end - begin).count() / cycles / controllers;
 }
 
+double median(std::vector<double> values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
 // Stores and managers of the same controllers, run in turn.
 class Bench {
  public:
@@ -92,7 +97,7 @@ class Bench {
     original_ = control_;
   }
 
-  // One block of each; the smallest time counts.
+  // One block of each; the median of the blocks counts.
   void block() {
     measure(unguarded_ns, [this] { unguarded_->update(cycle_, robot_, control_, original_); });
     measure(guarded_ns, [this] { guarded_->update(cycle_, robot_, control_); });
@@ -112,8 +117,7 @@ class Bench {
   std::size_t attributed() const { return bounded_->attribution().size(); }
 
   static constexpr int kControllers = 100, kCycles = 400;
-  double unguarded_ns = std::numeric_limits<double>::max();
-  double guarded_ns = unguarded_ns, timed_ns = unguarded_ns, bounded_ns = unguarded_ns;
+  std::vector<double> unguarded_ns, guarded_ns, timed_ns, bounded_ns;  // one for each block
 
  private:
   std::unique_ptr<FeedbackControllersManager> manager(bool bounded, bool timed) {
@@ -133,14 +137,14 @@ class Bench {
     return manager;
   }
 
-  void measure(double& best, const std::function<void()>& update) {
+  void measure(std::vector<double>& times, const std::function<void()>& update) {
     const auto block = [&] {
       for (int i = 0; i < kCycles; ++i) {
         ++cycle_.number;
         update();
       }
     };
-    best = std::min(best, nanoseconds(block, kCycles, kControllers));
+    times.push_back(nanoseconds(block, kCycles, kControllers));
   }
 
   Logger logger_;
@@ -162,7 +166,8 @@ int main(int argc, char** argv) {
   std::printf(
       "{\"controllers\": %d, \"unguarded_ns\": %.3f, \"guarded_ns\": %.3f, "
       "\"timed_ns\": %.3f, \"bounded_ns\": %.3f, \"faults\": %llu, \"attributed\": %zu}\n",
-      Bench::kControllers, bench.unguarded_ns, bench.guarded_ns, bench.timed_ns, bench.bounded_ns,
+      Bench::kControllers, median(bench.unguarded_ns), median(bench.guarded_ns),
+      median(bench.timed_ns), median(bench.bounded_ns),
       static_cast<unsigned long long>(bench.faults()), bench.attributed());
   return 0;
 }

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from typing import Any
 
 import numpy as np
 import rospy
+import yaml
 from coglab_msgs.msg import ReasonCode
-from coglab_msgs.srv import Start
+from coglab_msgs.srv import GetObject, Start
 from coglab_py.packages import package_path
 from coglab_py.yaml_file import read
 
@@ -48,6 +50,16 @@ def ask_for(action: str, object_id: str, alive: Callable[[], bool], limit: float
     raise NotTaken(f"{action} was not taken within {limit:.0f} s: {refusal}", code)
 
 
+def entry_of(object_id: str) -> Mapping[str, Any] | None:
+    """What the database of the running system knows of an object; None if it does not tell."""
+    try:
+        rospy.wait_for_service("/object_database/get_object", timeout=2.0)
+        answer = rospy.ServiceProxy("/object_database/get_object", GetObject)(object_id)
+    except (rospy.ROSException, rospy.ServiceException):
+        return None
+    return yaml.safe_load(answer.yaml) if answer.success else None
+
+
 def run_handover(
     kind: str, object_id: str, recorder: TrialRecorder, alive: Callable[[], bool] = lambda: True
 ) -> tuple[dict, float, float]:
@@ -59,6 +71,7 @@ def run_handover(
     limits = np.array(read(table).value["default"]["velocity"])
     ask_for(kind, object_id, alive, READY_LIMIT)
     start = rospy.get_time()
+    entry = entry_of(object_id)
 
     def ended() -> list[tuple]:
         rows = list(recorder.trial.transitions)
@@ -73,4 +86,5 @@ def run_handover(
         outcome, code = f"no end within {HANDOVER_LIMIT:.0f} s", ReasonCode.TIME_LIMIT
     else:
         outcome, code = "the system ended", ReasonCode.NODE_SILENT
-    return {**summarise(recorder.trial, kind, outcome, start, end, limits), "reason_code": int(code)}, start, end
+    row = summarise(recorder.trial, kind, outcome, start, end, limits, entry)
+    return {**row, "reason_code": int(code)}, start, end

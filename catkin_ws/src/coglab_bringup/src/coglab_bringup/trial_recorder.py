@@ -6,14 +6,19 @@ Reads the simulated truth: it measures, it does not control.
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 import rospy
 from coglab_msgs.msg import CellTruth, Contact, DmpFeedback, HandStatus, Transition
+from coglab_py.pose import Pose
 from diagnostic_msgs.msg import DiagnosticArray
+from geometry_msgs.msg import Pose as PoseMessage
 from sensor_msgs.msg import JointState
+
+from coglab_bringup.reach_errors import GIVES, reach_errors
 
 FORCE_THRESHOLD = 0.3  # N on the palm from which the object counts as touching (truth)
 LOST_KEYS = ("measurements lost", "answers lost")  # diagnostics values of the bridge that count lost FRI packets
@@ -26,6 +31,7 @@ class Trial:
     joints: list[tuple] = field(default_factory=list)  # (t, position[7], velocity[7])
     external_torques: list[tuple] = field(default_factory=list)  # (t, torque[7]) in Nm
     truth: list[tuple] = field(default_factory=list)  # (t, robot xyz, human xyz, object xyz, palm force)
+    poses: list[tuple] = field(default_factory=list)  # (t, palm, person's hand, object) as Poses in world, the truth
     fingers: list[tuple] = field(default_factory=list)  # (t, position[5])
     feedback: list[tuple] = field(default_factory=list)  # (t, state, remaining distance)
     transitions: list[tuple] = field(default_factory=list)  # (t, path, from, outcome, to, reason, code)
@@ -70,14 +76,16 @@ class TrialRecorder:
     def _on_truth(self, message: CellTruth) -> None:
         points = [message.robot_hand.position, message.human_hand.position, message.object.position, message.palm_force]
         robot, human, thing, force = ([p.x, p.y, p.z] for p in points)
-        self.trial.truth.append((message.header.stamp.to_sec(), robot, human, thing, float(np.linalg.norm(force))))
+        stamp = message.header.stamp.to_sec()
+        self.trial.truth.append((stamp, robot, human, thing, float(np.linalg.norm(force))))
+        self.trial.poses.append((stamp, *map(_pose, (message.robot_hand, message.human_hand, message.object))))
 
     def _on_hand(self, message: HandStatus) -> None:
         if len(message.motors) == 5:
             self.trial.fingers.append((message.header.stamp.to_sec(), [motor.position for motor in message.motors]))
 
     def _on_feedback(self, message: DmpFeedback) -> None:
-        self.trial.feedback.append((rospy.get_time(), message.state, message.remaining_distance))
+        self.trial.feedback.append((message.header.stamp.to_sec(), message.state, message.remaining_distance))
 
     def _on_transition(self, message: Transition) -> None:
         with self.changed:
@@ -94,13 +102,28 @@ class TrialRecorder:
             self.trial.fri_lost.append((message.header.stamp.to_sec(), sum(counts)))
 
 
-def summarise(trial: Trial, kind: str, outcome: str, start: float, end: float, velocity_limits: np.ndarray) -> dict:
-    """The figures of one handover between `start` and `end` (s), for result.json.
+def _pose(message: PoseMessage) -> Pose:
+    place, turn = message.position, message.orientation
+    return Pose(np.array([place.x, place.y, place.z]), np.array([turn.x, turn.y, turn.z, turn.w]))
 
-    final_error_mm: hand to the goal that the motion latched at its end, from goals as received; contact_delay_ms: from
-    the first touch (truth) to the detector's sample; fri_lost: FRI packets lost meanwhile, as the bridge reports
-    once a second; peak_velocity_share: largest joint speed over its limit. None where nothing was measured (no contact
-    is waited for where the robot gives).
+
+def summarise(
+    trial: Trial,
+    kind: str,
+    outcome: str,
+    start: float,
+    end: float,
+    velocity_limits: np.ndarray,
+    entry: Mapping[str, Any] | None = None,
+) -> dict:
+    """The figures of one handover between `start` and `end` (s), for result.json. `entry`: of the object that is handed
+    over, as the database has it; None: not known.
+
+    final_error_mm, final_error_deg, reaches: reach_errors(); believed_error_mm: hand to the goal that the motion
+    latched at its end, as the controller itself tells of reaches that say `reached`; contact_delay_ms: from the first
+    touch (truth) to the detector's sample; fri_lost: FRI packets lost meanwhile, as the bridge reports once a second;
+    peak_velocity_share: largest joint speed over its limit. None where nothing was measured (no contact is waited for
+    where the robot gives).
     """
     contact = next((t for t, found, _ in trial.contacts if found and start <= t <= end), None)
     until = next(
@@ -109,6 +132,9 @@ def summarise(trial: Trial, kind: str, outcome: str, start: float, end: float, v
     # A motion that is "holding" is on its way: it holds a goal that is not seen for the moment.
     arrived = [d for t, state, d in trial.feedback if start <= t <= until and state == "reached"]
     touch = next((t for t, *_, force in trial.truth if start <= t <= end and force > FORCE_THRESHOLD), None)
+    delay = contact - touch if contact and touch else None
+    if kind == GIVES:  # the object touches the hand from the start
+        delay = None
     lost_before = [count for t, count in trial.fri_lost if t <= start] or [count for _, count in trial.fri_lost][:1]
     lost_until = [count for t, count in trial.fri_lost if t <= end + 1.0]
     speeds = np.array([velocity for t, _, velocity in trial.joints if start <= t <= end])
@@ -117,8 +143,9 @@ def summarise(trial: Trial, kind: str, outcome: str, start: float, end: float, v
         "kind": kind,
         "outcome": outcome,
         "duration_s": round(end - start, 3),
-        "final_error_mm": round(1000.0 * arrived[-1], 3) if arrived else None,
-        "contact_delay_ms": round(1000.0 * (contact - touch), 1) if contact and touch else None,
+        **reach_errors(trial, kind, entry, start, end),
+        "believed_error_mm": round(1000.0 * arrived[-1], 3) if arrived else None,
+        "contact_delay_ms": round(1000.0 * delay, 1) if delay is not None else None,
         "fri_lost": lost_until[-1] - lost_before[-1] if lost_until and lost_before else None,
         "peak_velocity_share": round(share, 4) if share is not None else None,
     }

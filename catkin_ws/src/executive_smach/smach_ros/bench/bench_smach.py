@@ -1,6 +1,12 @@
 #!/usr/bin/python3
 """Figures of the state machine engine and of its introspection, as a JSON list on stdout.
 
+Definitions, nothing is left out. Heartbeats and structures: one of each container is due every 2 s from the viewer's
+connection to the end, whether it was sent or not; statuses: each start, transition and end that happened; what arrives
+twice counts once. Idle: processor time over 30 s, one viewer connected. A transition: median of 30 runs of 1000, beside
+a bare loop in the same run; in a node, of 15 runs of 100, judged by the median difference to rospy.loginfo alone.
+Preempts: 10 000 at random moments, also before the run; lost: the run does not end as preempted within 5 s.
+
 Starts a master of its own on a free port of 127.0.0.1 and ends it. Takes about three minutes.
 `--quick` shortens all phases, for a look; its figures are not the ones to show.
 """

@@ -1,0 +1,70 @@
+"""Figures of recorded reaches against motions with known answers: none is left out, whatever it came to."""
+
+import sys
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from coglab_py.packages import package_path
+
+sys.path.insert(0, str(package_path("coglab_smach", "bench")))
+import bench_trials
+from campaign import Campaign
+from coglab_sim.person.reach import min_jerk
+from reach_figures import figures, human_time
+
+RECEIVE = "exchange_human_to_robot"
+WAY, DURATION, RATE = 0.45, 1.5, 200.0
+
+
+def record(share=1.0, **ended):
+    """A minimum-jerk reach over WAY m, of which ``share`` of the time was made; how it ``ended``."""
+    times = np.arange(0.0, share * DURATION + 0.5 / RATE, 1.0 / RATE)
+    palm = [np.array([WAY * min_jerk(min(1.0, t / DURATION))[0], 0.0, 0.0]) for t in times]
+    off = (float(WAY - palm[-1][0]), 0.01)
+    reach = SimpleNamespace(begin=0.0, reached=None, over=None, stood=False, met=False, to_goal=off, to_sight=off)
+    reach.to_truth, reach.path = off, [(t, p, np.array([WAY, 0.0, 0.0])) for t, p in zip(times, palm, strict=True)]
+    vars(reach).update(ended)
+    return reach
+
+
+def test_a_reach_that_stands_has_arrived_when_it_stays_within_five_millimetres():
+    found = figures(record(stood=True, reached=DURATION, over=2.0, met=True))
+    times = np.arange(0.0, DURATION, 1.0 / RATE)
+    away = [WAY * (1.0 - min_jerk(t / DURATION)[0]) for t in times]
+    last = max(t for t, distance in zip(times, away, strict=True) if distance > 0.005)
+    assert found["late"] == pytest.approx(last - human_time(WAY), abs=1.5 / RATE)
+    assert found["reached_late"] == pytest.approx(DURATION - human_time(WAY))
+    assert found["truth_mm"] == pytest.approx(0.0, abs=1e-6)
+
+
+def test_one_that_is_met_is_there_when_it_is_met():
+    found = figures(record(0.6, met=True, over=0.6 * DURATION))
+    way = WAY - found["truth_mm"] / 1000.0
+    assert found["late"] == found["reached_late"] == pytest.approx(0.6 * DURATION - human_time(way))
+    assert found["truth_mm"] > 50.0 and found["sparc"] < 0.0
+
+
+def test_an_unfinished_one_is_never_there_and_stays_in_the_distances():
+    found = figures(record(0.5, over=0.5 * DURATION))
+    assert "late" not in found and found["truth_mm"] > 100.0 and found["sparc"] < 0.0
+
+
+def rows_of(*reaches):
+    campaign = Campaign()
+    campaign.reaches[RECEIVE] = [figures(reach) for reach in reaches]
+    rows = bench_trials.reach_rows(campaign, RECEIVE, "perfect perception")
+    return {row["figure"].partition(": ")[2]: row for row in rows if row["unit"] != "deg"}
+
+
+def test_unfinished_reaches_are_in_every_percentile():
+    good = record(stood=True, reached=DURATION, over=2.0, met=True)
+    rows = rows_of(*[good] * 3)
+    assert rows["hand to the true grasp pose, p95"]["ok"] and rows["reaches unfinished"]["value"] == 0
+    rows = rows_of(good, good, good, record(0.5, over=0.5 * DURATION), record(0.5, over=0.5 * DURATION))
+    assert rows["reaches unfinished"]["value"] == 2
+    assert not rows["hand to the true grasp pose, p95"]["ok"] and not rows["hand to goal as received, p95"]["ok"]
+    assert rows["arm there later than a person, p95"]["value"] == bench_trials.NEVER
+    rows = rows_of(good, record(0.5, over=0.5 * DURATION), record(0.5, over=0.5 * DURATION))
+    median = rows["arm there later than a person, median"]
+    assert median["value"] == bench_trials.NEVER and not median["ok"]
