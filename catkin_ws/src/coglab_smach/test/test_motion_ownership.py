@@ -217,10 +217,12 @@ def test_a_person_who_has_taken_the_load_and_a_hand_that_does_not_open():
         t.wait_hub("wait_without_object")
         t.start(RECEIVE)
         t.wait_hub("wait_with_object")
-        t.cell.faults.refuse["open"] = "motors 2, 3 are stuck"
+        t.cell.faults.refuse |= {"open": "motors 2, 3 are stuck", "preshape cylindrical": "motors 2, 3 are stuck"}
         t.start(GIVE)
-        t.wait_hub("stopped")
+        while not t.ctx.journal.marked("opening"):
+            t.clock.sleep(0.02)
         place = t.cell.joints
+        t.wait_hub("stopped")
         t.clock.sleep(3.0)
         assert t.cell.joints == place and "the person may still hold 'mug'" in t.ctx.journal.why()
         # The operator has looked: the object is the robot's after all.

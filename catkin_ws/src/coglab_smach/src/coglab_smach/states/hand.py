@@ -8,7 +8,7 @@ from coglab_msgs.msg import ReasonCode, Say
 
 from coglab_smach.context.context import Context
 from coglab_smach.ports.pending import PortError
-from coglab_smach.states.base import CoglabState, TimeLimit
+from coglab_smach.states.base import CoglabState
 from coglab_smach.states.motion import shift
 from coglab_smach.states.where import hand_from_palm, palm_axis
 
@@ -134,6 +134,8 @@ class LetGo(CoglabState):
         opening, back = self.ctx.hand.preshape(hand["mode"], hand["level"]), None
         while not opening.done() and not self._open_by(closed):
             self.pause(0.01)
+        if opening.done():
+            opening.result()  # fingers that are stuck would drag what the person holds
         axis, way = palm_axis(self.ctx), float(self.ctx.config.get("give.draw_back", 0.06))
         if axis is not None and way > 0.0:
             back = shift(self.ctx, -way * axis, float(self.ctx.config.get("give.draw_back_speed", 0.25)))
@@ -143,11 +145,9 @@ class LetGo(CoglabState):
         self.ctx.say(Say.YOU_HAVE_IT, "You have it.")
         if back is not None:
             try:
-                self.await_pending(back, "drawing back", 2.0)
-            except TimeLimit:
-                raise
+                self.await_pending(back, "drawing back", 2.0, self.ctx.arm.speed_scale)
             except PortError as error:
-                self.reason = error.sentence  # as far as it goes
+                self.reason = error.sentence  # as far as it goes; the way home goes on from there
         return "succeeded"
 
     def _open_by(self, closed: tuple[int, ...]) -> bool:
