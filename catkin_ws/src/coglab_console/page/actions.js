@@ -134,23 +134,39 @@ export function actionButton(label, { blockedBy, mustHold, request, tell }) {
   return button;
 }
 
+/** Sends a choice. One that is refused is taken back by `show`, and why is said. */
+async function choose(label, name, args, show) {
+  const answer = await command(name, args);
+  if (answer.success) return;
+  refuse(`${label}: ${answer.message}`);
+  show();
+}
+
 function objectChoice() {
-  const select = h('select', { id: 'object', onchange: () => command('select_object', { object_id: select.value }) });
+  const show = () => {
+    select.value = store.docs.desk?.object ?? '';
+  };
+  const select = h('select', { id: 'object', onchange: () => choose('Object', 'select_object', { object_id: select.value }, show) });
   onDocs(['objects', 'desk'], () => {
     const ids = ['', ...(store.docs.objects?.rows ?? []).map((row) => row.id)];
     if (ids.join() !== [...select.options].map((option) => option.value).join()) {
       select.replaceChildren(...ids.map((id) => h('option', { value: id }, id || '(default)')));
     }
-    if (document.activeElement !== select) select.value = store.docs.desk?.object ?? '';
+    if (document.activeElement !== select) show();
   });
   return select;
 }
 
 function speedChoice() {
-  const input = h('input', { id: 'speed', type: 'range', min: 0, max: 100, step: 5, onchange: () => command('speed_scale', { value: Number(input.value) / 100 }) });
-  onDocs(['status'], () => {
-    if (document.activeElement !== input) input.value = Math.round((store.docs.status?.manager.scale ?? 1) * 100);
+  const show = () => {
+    input.value = Math.round((store.docs.status?.manager.scale ?? 1) * 100);
     setAttribute(input, 'aria-valuetext', `${input.value} %`);
+  };
+  const input = h('input', { id: 'speed', type: 'range', min: 0, max: 100, step: 5,
+    oninput: () => setAttribute(input, 'aria-valuetext', `${input.value} %`),
+    onchange: () => choose('Speed', 'speed_scale', { value: Number(input.value) / 100 }, show) });
+  onDocs(['status'], () => {
+    if (document.activeElement !== input) show();
   });
   return input;
 }

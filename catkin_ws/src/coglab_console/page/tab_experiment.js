@@ -61,11 +61,16 @@ export function experimentPage(page) {
   const left = h('div');
   const text = h('textarea', { id: 'note', rows: 3, maxlength: 500 });
   const notes = h('div');
-  const add = sender('Add the note', told, () => {
-    const note = text.value.trim();
-    text.value = '';
-    return ['note', { text: note }];
-  });
+  let sending = false;
+  const add = h('button', { type: 'button', onclick: async () => {
+    if (sending) return;
+    sending = true;
+    const note = text.value;
+    const answer = await command('note', { text: note.trim() });
+    sending = false;
+    setText(told, answer.message);
+    if (answer.success && text.value === note) text.value = ''; // what was typed meanwhile, or was not taken, stays
+  } }, 'Add the note');
   page.append(
     h('div', {}, h('h2', {}, 'Session'), left, told),
     h('div', {}, h('h2', {}, 'Notes'), field('A note with the time of now (M)', text), h('div', { class: 'row' }, add), notes));

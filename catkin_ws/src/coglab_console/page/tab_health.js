@@ -23,21 +23,65 @@ function byNode(rows) {
   return nodes;
 }
 
-/** The diagnostics as a tree: a branch per node with the worst of its leaves. What was opened, and the focus, stay. */
+/** One line of the tree that opens: its element, and a function that shows level and words in it. */
+function line(name, open, ...inside) {
+  const words = h('span');
+  const summary = h('summary', { 'data-name': name }, mark('idle'), words);
+  const details = h('details', {}, summary, ...inside);
+  details.open = open;
+  let shown = 'idle';
+  const show = (level, text) => {
+    const [kind, word] = LEVELS[level] ?? LEVELS[2];
+    if (kind !== shown) summary.firstChild.replaceWith(mark(kind));
+    shown = kind;
+    setText(words, text(word));
+  };
+  return { details, show };
+}
+
+/**
+ * The diagnostics as a tree: a branch per node with the worst of its leaves. Lines are made anew only when there are other
+ * ones, because a line that is being pressed must stay; then, too, what was opened and the focus stay.
+ */
 function diagnosticsTree(tree) {
   const turned = new Set(); // names that are the other way than at first: branches open, leaves closed
-  const item = (name, level, words, isOpen, ...inside) => {
-    const [kind, word] = LEVELS[level] ?? LEVELS[2];
-    const details = h('details', {}, h('summary', { 'data-name': name }, mark(kind), words(word)), ...inside);
-    details.open = isOpen !== turned.has(name);
-    details.addEventListener('toggle', () => (details.open === isOpen ? turned.delete(name) : turned.add(name)));
-    return details;
+  let made = '';
+  let shows = [];
+  const item = (name, isOpen, ...inside) => {
+    const one = line(name, isOpen !== turned.has(name), ...inside);
+    one.details.addEventListener('toggle', () => (one.details.open === isOpen ? turned.delete(name) : turned.add(name)));
+    return one;
+  };
+  const leafOf = (node, name) => {
+    const values = h('div');
+    const leaf = item(`${node}: ${name}`, false, values);
+    const show = (row) => {
+      leaf.show(row.level, (word) => `${name}: ${word}, ${row.message}`);
+      values.replaceChildren(table(['Value', ''], row.values, row.name));
+    };
+    return { details: leaf.details, show };
+  };
+  const make = (nodes) => {
+    const focused = document.activeElement?.dataset?.name;
+    const branches = [...nodes].map(([node, rows]) => {
+      const leaves = rows.map(([, name]) => leafOf(node, name));
+      const branch = item(node, true, ...leaves.map((leaf) => leaf.details));
+      const show = (now) => {
+        branch.show(Math.max(...now.map(([row]) => row.level)), (word) => `${node}: ${word}`);
+        leaves.forEach((leaf, i) => leaf.show(now[i][0]));
+      };
+      return { details: branch.details, show };
+    });
+    tree.replaceChildren(...branches.map((branch) => branch.details));
+    if (focused) [...tree.querySelectorAll('summary')].find((one) => one.dataset.name === focused)?.focus();
+    shows = branches.map((branch) => branch.show);
   };
   return (rows) => {
-    const focused = document.activeElement?.dataset?.name;
-    tree.replaceChildren(...[...byNode(rows)].map(([node, leaves]) => item(node, Math.max(...leaves.map(([row]) => row.level)), (word) => `${node}: ${word}`, true,
-      ...leaves.map(([row, name]) => item(`${node}: ${name}`, row.level, (word) => `${name}: ${word}, ${row.message}`, false, table(['Value', ''], row.values, row.name))))));
-    if (focused) [...tree.querySelectorAll('summary')].find((one) => one.dataset.name === focused)?.focus();
+    const nodes = byNode(rows);
+    const names = JSON.stringify(rows.map((row) => row.name));
+    if (names !== made) make(nodes);
+    made = names;
+    [...nodes.values()].forEach((now, i) => shows[i](now));
   };
 }
 
@@ -46,7 +90,7 @@ export function healthPage(page) {
   const tree = h('div', { id: 'diagnostics' });
   const drawTree = diagnosticsTree(tree);
   const versions = h('div');
-  const parameters = h('div');
+  const parameters = h('div', { id: 'parameters' });
   const told = h('p', { 'aria-live': 'polite' });
   const filter = h('input', { type: 'search', placeholder: 'part of a name', oninput: () => show() });
   let known = [];

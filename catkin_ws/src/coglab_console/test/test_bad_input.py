@@ -213,3 +213,61 @@ def test_a_client_that_sends_half_a_request_holds_nobody_up(tmp_path):
             writer.close()
 
     go(test, tmp_path)
+
+
+SESSION = {"participant": "P07", "conditions": ["a", "b"], "repetitions": 1, "order": "latin_square"}
+
+
+@pytest.mark.parametrize(
+    "name, arguments, where",
+    [
+        ("session_begin", {**SESSION, "participant": "P07\n"}, "participant"),
+        ("session_begin", {**SESSION, "conditions": ["a\n"]}, "conditions"),
+        ("session_begin", {**SESSION, "repetitions": 2.0}, "repetitions"),
+        ("session_begin", {**SESSION, "number": 7.0}, "number"),
+        ("contact_arm", {"mode": "contact", "joints": [1.0]}, "joints"),
+        ("select_object", {"object_id": "mug\n"}, "object_id"),
+        ("feedback", {"verb": "pause", "name": "yield\n"}, "name"),
+        ("note", {"text": "half a character: \ud800"}, "text"),
+    ],
+)
+def test_what_nearly_fits_is_refused_and_begins_nothing(tmp_path, name, arguments, where):
+    """A line's end behind a name, a number that only looks whole, text that has no UTF-8."""
+
+    async def test(console):
+        async with console.browser() as client, console.socket_of(client) as ws:
+            await ws.send_str("{}")
+            await ws.receive()
+            status, answer = await console.post(client, name, arguments)
+            assert status == 409 and where in answer["message"], (status, answer)
+            assert not console.robot.calls and not console.robot.told and not list(tmp_path.iterdir())
+
+    go(test, tmp_path)
+
+
+@pytest.mark.parametrize("body", ['{"name": "note", "arguments": {"text": %s}}', '{"name": %s}', "%s"])
+def test_whatever_the_depth_of_a_request_it_is_refused_in_words(tmp_path, body):
+    async def test(console):
+        async with console.browser() as client:
+            for depth in range(900, 1000):
+                text = body % ("[" * depth + "]" * depth)
+                async with client.post(f"{console.url}/api/command", data=text, headers=console.headers) as answer:
+                    assert answer.status in (400, 409), (depth, answer.status, await answer.text())
+                    assert (await answer.json())["success"] is False
+                await asyncio.sleep(0.03)  # within the rate that one browser may ask at
+
+    go(test, tmp_path)
+
+
+def test_what_the_console_cannot_do_is_answered_in_its_own_form_and_it_goes_on(tmp_path, monkeypatch):
+    async def test(console):
+        async with console.browser() as client, console.socket_of(client) as ws:
+            await ws.send_str("{}")
+            await ws.receive()
+            with monkeypatch.context() as broken:
+                broken.setattr(console.robot, "tell", lambda *_: 1 / 0)
+                status, answer = await console.post(client, "note", {"text": "x"})
+            assert status == 500 and not answer["success"] and "ZeroDivisionError" in answer["message"]
+            assert (await console.post(client, "note", {"text": "x"}))[0] == 200
+
+    go(test, tmp_path)

@@ -236,6 +236,66 @@ def test_diagnostics_are_a_tree_by_node_whose_branches_show_their_worst(desk):
     page.tab("Live")
 
 
+def test_a_note_that_was_not_taken_stays_in_its_field_and_says_why(desk):
+    page = desk.browser
+    page.tab("Experiment")
+    write = (
+        "const n = document.getElementById('note'); n.value = arguments[0];"
+        "n.closest('div').querySelector('button').click()"
+    )
+    here, told = "return document.getElementById('note').value", "return document.getElementById('page').innerText"
+    page.js("window.kept = window.fetch; window.fetch = () => Promise.reject(new Error('no network'))")
+    page.js(write, "the cup slipped")
+    page.until(f"{told}.includes('no network')", 10.0)
+    assert page.js(here) == "the cup slipped"
+    page.js("window.fetch = window.kept")
+    page.js(write, "the cup slipped")
+    page.until("return coglab.events().some((e) => e.text.endsWith('the cup slipped'))", 10.0)
+    page.until("return document.getElementById('note').value === ''", 10.0)
+    page.tab("Live")
+
+
+def test_a_choice_that_was_refused_says_why_and_is_taken_back(desk):
+    """An observer's: the list of objects and the speed show what is, not what was wished."""
+    objects = {"rows": [{"id": "ball", "name": "ball", "mass": 0.1, "text": ""}], "asked": True, "problems": []}
+    desk.loop.call_soon_threadsafe(desk.console.documents.put, "objects", objects)
+    with Browser() as page:
+        page.open(desk.console.link())
+        page.until("return document.getElementById('object').options.length === 2", 10.0)
+        for field, wish, shown in (("object", "ball", ""), ("speed", "40", "100")):
+            page.js("document.getElementById('told').hidden = true")
+            page.js(
+                "const f = document.getElementById(arguments[0]); f.focus(); f.value = arguments[1];"
+                "f.dispatchEvent(new Event('change'))",
+                field,
+                wish,
+            )
+            page.until(
+                "const t = document.getElementById('told'); return !t.hidden && /watches/.test(t.textContent)", 10.0
+            )
+            assert page.js("return document.getElementById(arguments[0]).value", field) == shown
+    assert desk.console.desk.object_id == "" and ("speed_scale", {"value": 0.4}) not in desk.robot.calls
+
+
+def test_a_branch_of_the_diagnostics_stays_the_same_while_only_its_words_change(desk):
+    """It comes every second: a click that begins before and ends after would be lost with the line that was pressed."""
+    page = desk.browser
+    page.tab("Health")
+
+    def put(message, value):
+        rows = [{"name": "robot: FRI connection", "level": 0, "message": message, "values": [["latency (s)", value]]}]
+        health = {"rows": rows, "versions": {}, "browsers": []}
+        desk.loop.call_soon_threadsafe(desk.console.documents.put, "health", health)
+
+    put("CMD, PERFECT", "0.001")
+    page.until("return document.getElementById('diagnostics').textContent.includes('PERFECT')", 10.0)
+    page.js("window.pressed = document.querySelectorAll('#diagnostics summary')[1]")
+    put("CMD, OK", "0.002")
+    page.until("return /CMD, OK.*0.002/s.test(document.getElementById('diagnostics').textContent)", 10.0)
+    assert page.js("return window.pressed.isConnected")
+    page.tab("Live")
+
+
 def test_without_graphviz_the_page_has_the_states_and_says_what_is_missing(desk):
     containers = {"/M": Container("/M", ("A", "B", "C"), (("ok", "A", "B"),))}
     picture = {**Layout("no-such-program").of(containers), "roots": ["/M"]}

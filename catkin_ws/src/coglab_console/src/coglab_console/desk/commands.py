@@ -9,9 +9,12 @@ import jsonschema
 
 STARTS = ("initialise", "reset", "exchange_human_to_robot", "exchange_robot_to_human", "take", "put")
 """Actions of the service coglab/start"""
-_OBJECT = {"type": "string", "pattern": "^([a-z][a-z0-9_]{0,31})?$"}
-_NAME = {"type": "string", "pattern": "^[A-Za-z0-9_./-]{1,64}$"}
-_LABEL = {"type": "string", "pattern": "^[A-Za-z0-9_ .-]{1,40}$"}
+# Python's $ would let a line's end follow.
+_OBJECT = {"type": "string", "pattern": r"^([a-z][a-z0-9_]{0,31})?\Z"}
+_NAME = {"type": "string", "pattern": r"^[A-Za-z0-9_./-]{1,64}\Z"}
+_LABEL = {"type": "string", "pattern": r"^[A-Za-z0-9_ .-]{1,40}\Z"}
+# Halves of a pair of UTF-16, which JSON can name, have no UTF-8.
+_TEXT = {"type": "string", "minLength": 1, "maxLength": 500, "pattern": "^[^\ud800-\udfff]*\\Z"}
 
 
 class BadCommand(Exception):
@@ -41,8 +44,7 @@ class Command:
 
 _ALL = (
     Command("stop", "brake, latch, end the action", {}, operator=False),
-    Command("note", "a note with the time of now", {"text": {"type": "string", "minLength": 1, "maxLength": 500}},
-            ("text",), operator=False),
+    Command("note", "a note with the time of now", {"text": _TEXT}, ("text",), operator=False),
     Command("take_over", "become the operator", {}, operator=False),
     Command("keep", "stay the operator while another browser takes over", {}),
     Command("invite", "a link for one more browser", {}),
@@ -57,7 +59,7 @@ _ALL = (
             ("value",)),
     Command("select_object", "the object of the next action", {"object_id": _OBJECT}, ("object_id",)),
     Command("session_begin", "a session with a participant", {
-        "participant": {"type": "string", "pattern": "^[A-Za-z0-9_-]{1,32}$"},
+        "participant": {"type": "string", "pattern": r"^[A-Za-z0-9_-]{1,32}\Z"},
         "number": {"type": "integer", "minimum": 0, "maximum": 9999},
         "conditions": {"type": "array", "minItems": 1, "maxItems": 12, "uniqueItems": True, "items": _LABEL},
         "repetitions": {"type": "integer", "minimum": 1, "maximum": 50},
@@ -81,14 +83,23 @@ _ALL = (
         "names": {"type": "array", "minItems": 1, "maxItems": 64, "items": _NAME}}, ("names",)),
 )  # fmt: skip
 COMMANDS = {command.name: command for command in _ALL}
-_VALIDATORS = {command.name: jsonschema.Draft7Validator(command.schema()) for command in _ALL}
+# 2.0 is no integer here: Python would count nothing with it.
+_TYPES = jsonschema.Draft7Validator.TYPE_CHECKER.redefine(
+    "integer", lambda _, value: isinstance(value, int) and not isinstance(value, bool)
+)
+_Validator = jsonschema.validators.extend(jsonschema.Draft7Validator, type_checker=_TYPES)
+_VALIDATORS = {command.name: _Validator(command.schema()) for command in _ALL}
 
 
 def judge(name: Any, arguments: Any) -> Command:
     """The command; BadCommand if there is none of that name or its arguments do not fit the schema."""
     if not isinstance(name, str) or name not in COMMANDS:
-        raise BadCommand(f"there is no command '{str(name)[:40]}'; there are: {', '.join(COMMANDS)}")
-    error = jsonschema.exceptions.best_match(_VALIDATORS[name].iter_errors(arguments))
+        told = f"'{name[:40]}'" if isinstance(name, str) else f"without a name of letters ({type(name).__name__})"
+        raise BadCommand(f"there is no command {told}; there are: {', '.join(COMMANDS)}")
+    try:
+        error = jsonschema.exceptions.best_match(_VALIDATORS[name].iter_errors(arguments))
+    except RecursionError:
+        raise BadCommand(f"{name}: lists within lists, too many to be looked at") from None
     if error is not None:
         where = ".".join(str(part) for part in error.absolute_path)
         raise BadCommand(f"{name}{': ' + where if where else ''}: {error.message[:200]}")

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import asyncio
 import json
+import logging
 from collections.abc import Awaitable, Callable
 from typing import Any
 
@@ -42,6 +43,8 @@ HEADERS = {
     "Cross-Origin-Resource-Policy": "same-origin",
     "Permissions-Policy": "camera=(), microphone=(), geolocation=()",
 }
+
+_LOG = logging.getLogger(__name__)
 
 
 def parsed(text: str) -> Any:
@@ -108,6 +111,13 @@ class ConsoleServer:
         except web.HTTPException as error:
             words = REFUSALS.get(error.status, error.reason)
             response = web.json_response(Answer(False, words), status=error.status)
+        except Exception as error:
+            # A connection that is a WebSocket by now takes no answer to its request any more.
+            if isinstance(error, ConnectionError) or request.path == "/ws":
+                raise
+            _LOG.exception("%s %s", request.method, request.path)
+            words = f"the console has failed at this ({type(error).__name__}); its log has more"
+            response = web.json_response(Answer(False, words), status=500)
         if not response.prepared:
             response.headers.update(HEADERS)
             host = request.headers.get("Host", "")
