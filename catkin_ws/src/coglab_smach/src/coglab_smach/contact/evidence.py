@@ -22,7 +22,7 @@ DECIDED = 0.99
 """probability from which it is a contact; a source at its threshold reaches it alone"""
 STEEPNESS = 12.0
 """logits per unit of margin: at 0.8 of its threshold a source says 0.9, at 0.6 even chances"""
-SLOW = 0.08
+SLOW = 0.03
 """m/s of the palm below which what is seen in it stays there"""
 SPEAKS_TOO = 0.5
 """a source that is this sure is named beside the surest one"""
@@ -86,9 +86,9 @@ class Touch:
 
 
 class InPalm:
-    """The tracked object at its grasp in the palm of an arm that stands or comes slowly: it is there, felt or not."""
+    """The tracked object at its grasp in the palm of an arm that has come to rest: it is there, felt or not."""
 
-    def __init__(self, near: float = 0.020, turned: float = math.radians(20.0), confirm: float = 0.12) -> None:
+    def __init__(self, near: float = 0.015, turned: float = math.radians(20.0), confirm: float = 0.12) -> None:
         """``near`` (m) and ``turned`` (rad): of the palm from where it has to be for the grasp; ``confirm``: s."""
         self.near, self.turned, self.confirm = near, turned, confirm
         self._since: float | None = None
