@@ -154,6 +154,7 @@ def test_robot_to_human_order_without_a_new_query(trial):
         "give_load",
         "hand_open",
         "coglab_home_robot",
+        "open_at_home",
     ]
     assert not trial.cell.called("get")
     order = trial.cell.called()

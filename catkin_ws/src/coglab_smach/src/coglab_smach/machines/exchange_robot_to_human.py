@@ -8,12 +8,12 @@ from coglab_smach.machines.recovery import ACTION_OUTCOMES, RECOVERY_TRANSITIONS
 from coglab_smach.states.arm import HomeRobot, SwitchController
 from coglab_smach.states.base import CoglabMachine
 from coglab_smach.states.give import GiveLoad
-from coglab_smach.states.hand import LetGo
+from coglab_smach.states.hand import HandOpen, LetGo
 from coglab_smach.states.knowledge import SetDeliveryGoal
 
 
 def build_exchange_robot_to_human(ctx: Context) -> CoglabMachine:
-    """delivery goal (no new query: the entry travels in user data) -> reach -> give the load -> open -> home."""
+    """delivery goal (no new query: the entry travels in user data) -> reach -> give the load -> let go -> home -> open."""
     machine = CoglabMachine(
         ctx,
         "exchange_robot_to_human",
@@ -32,6 +32,7 @@ def build_exchange_robot_to_human(ctx: Context) -> CoglabMachine:
         machine.add_state("switch_to_ptp", SwitchController(ctx, "ptp"), to_recovery(succeeded="give_load"))
         machine.add_state("give_load", GiveLoad(ctx), to_recovery(succeeded="hand_open"))
         machine.add_state("hand_open", LetGo(ctx), to_recovery(succeeded="coglab_home_robot"))
-        machine.add_state("coglab_home_robot", HomeRobot(ctx, gave=True), to_recovery(succeeded="succeeded"))
+        machine.add_state("coglab_home_robot", HomeRobot(ctx, gave=True), to_recovery(succeeded="open_at_home"))
+        machine.add_state("open_at_home", HandOpen(ctx), to_recovery(succeeded="succeeded"))
         machine.add_state("recover", build_recovery(ctx), RECOVERY_TRANSITIONS)
     return machine
