@@ -18,6 +18,17 @@ function place(list, button) {
   list.style.top = `${up ? box.top - list.offsetHeight : box.bottom}px`;
 }
 
+function onKey(event, isOpen, { open, close, step, take }) {
+  if (STEPS[event.key]) {
+    event.preventDefault();
+    if (isOpen) step(STEPS[event.key]);
+    else open();
+  } else if (isOpen && event.key === 'Enter') {
+    event.preventDefault(); // or the button would be clicked, too
+    take();
+  } else if (event.key === 'Escape') close();
+}
+
 /**
  * A button with a list: { button, offer(pairs of value and words), show(value) }. What is chosen is `button.value`, and
  * told as `change`. Arrows go through the open list, Enter takes, Escape and whatever takes the focus leave it.
@@ -72,16 +83,7 @@ export function choice(attributes) {
     show(button.value);
   };
   button.addEventListener('click', () => (list.isConnected ? close() : open()));
-  button.addEventListener('keydown', (event) => {
-    if (STEPS[event.key]) {
-      event.preventDefault();
-      if (list.isConnected) point(at + STEPS[event.key]);
-      else open();
-    } else if (list.isConnected && event.key === 'Enter') {
-      event.preventDefault(); // or the button would be clicked, too
-      take(at);
-    } else if (event.key === 'Escape') close();
-  });
+  button.addEventListener('keydown', (event) => onKey(event, list.isConnected, { open, close, step: (by) => point(at + by), take: () => take(at) }));
   button.addEventListener('blur', close);
   list.addEventListener('pointerdown', (event) => event.preventDefault()); // the button keeps the focus
   list.addEventListener('mousedown', (event) => event.preventDefault());
