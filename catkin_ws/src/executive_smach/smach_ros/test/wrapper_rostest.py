@@ -106,6 +106,12 @@ class TestWrapper(unittest.TestCase):
 
     def test_wrapper_slots_and_feedback(self):
         machine = smach.StateMachine(["succeeded", "aborted", "preempted"], ["n"], ["m", "result"])
+        got = []
+
+        # Feedback and result travel apart, and a client that has its result hears no feedback any more.
+        def heard(ud):
+            wait_for(lambda: got)
+            return "succeeded"
 
         @smach.cb_interface(outcomes=["ok"], input_keys=["n"], output_keys=["action_feedback", "m"])
         def first(ud):
@@ -115,9 +121,8 @@ class TestWrapper(unittest.TestCase):
 
         with machine:
             smach.StateMachine.add("A", smach.CBState(first), {"ok": "B"})
-            smach.StateMachine.add("B", smach.CBState(lambda ud: "succeeded", outcomes=["succeeded"]))
+            smach.StateMachine.add("B", smach.CBState(heard, outcomes=["succeeded"]))
         client = self.serve(machine, goal_slots_map={"goal": "n"}, result_slots_map={"result": "m"})
-        got = []
         state = self.send(client, 21, feedback_cb=lambda feedback: got.append(feedback.feedback))
         self.assertEqual(state, (GoalStatus.SUCCEEDED, 42))
         self.assertTrue(wait_for(lambda: got == [22]))
