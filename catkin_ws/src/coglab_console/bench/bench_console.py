@@ -1,7 +1,9 @@
 #!/usr/bin/python3
 """The console against the running cell: STOP from key-down to the bridge's hold, load, size, first paint,
 whole actions by mouse and by keyboard, STOP in every phase, and what the console does to the FRI latency.
-Every part has a cell and a process of its own; one that fails is a missed row that says why.
+Every part has a cell and a process of its own; one that fails is a missed row that says why. Where the load of this
+computer takes command mode from the simulated robot controller, what was under way is begun anew, twice at most, and
+the row says how often.
 Pictures: out/bench_console."""
 
 from __future__ import annotations
@@ -32,8 +34,7 @@ PHASES = {  # action: labels in which STOP is pressed
     "exchange_human_to_robot": ("set_dmp_goal", "execute_dmp", "wait_stop", "hand_close", "coglab_home_robot"),
     "exchange_robot_to_human": ("set_dmp_goal", "execute_dmp", "wait_stop", "hand_open", "coglab_home_robot"),
 }
-RECOVERY = 150.0  # s to be in a hub again
-BLOCK = 10.0  # s, with or without the console
+SETTLING, READINGS = 4, 10  # of the bridge's diagnostics, one a second: left out, and taken, of each block
 
 
 # --- STOP -----------------------------------------------------------------------------------------------------
@@ -47,6 +48,7 @@ def stop_latencies(cell: Cell, operator: Operator) -> list[float]:
     )
     chance = random.Random(1)
     for _ in range(PRESSES):
+        # a person's own rhythm, not the cycle's
         time.sleep(chance.uniform(0.05, 0.15))
         since, cell.held_at = operator.newest_event(), 0.0
         operator.stop()
@@ -67,56 +69,37 @@ def stop_rows(cell: Cell, operator: Operator) -> list[dict]:
     ]
 
 
+def stop_in(cell: Cell, operator: Operator, action: str, label: str) -> tuple[bool, bool]:
+    """Whether this phase of the action was reached, and whether STOP held the arm in it."""
+    reached = stopped = False
+    try:
+        operator.bring_to(action)
+        cell.passed.clear()
+        operator.press(action, keyboard=False)
+        cell.wait(lambda: cell.came_to(action, label), 45.0, label)
+        reached = True
+        operator.stop()
+        cell.wait(lambda: cell.arm.hold_latched, 1.0, "the hold")
+        stopped = True
+        operator.go_on()
+    except TimeoutError as error:
+        say(f"{action}, {label}: {error}")
+    return reached, stopped
+
+
 def phase_rows(cell: Cell, operator: Operator) -> list[dict]:
     """STOP in every phase of an exchange each way; both ends of the way back, too."""
+    places = [(action, label) for action, labels in PHASES.items() for label in labels]
     reached, stopped = 0, 0
-    wanted = sum(len(labels) for labels in PHASES.values())
-    for action, labels in PHASES.items():
-        for label in labels:
-            try:
-                bring_to(cell, operator, action)
-                cell.passed.clear()
-                operator.press(action, keyboard=False)
-                cell.wait(lambda label=label, action=action: cell.came_to(action, label), 45.0, label)
-                reached += 1
-                operator.stop()
-                cell.wait(lambda: cell.arm.hold_latched, 1.0, "the hold")
-                stopped += 1
-                operator.go_on()
-            except TimeoutError as error:
-                say(f"{action}, {label}: {error}")
-            recover(cell, operator)
-    return [
-        row(f"STOP in every phase ({reached} of {wanted} reached)", stopped, "stops", f"{wanted}", stopped == wanted)
-    ]
-
-
-def recover(cell: Cell, operator: Operator) -> None:
-    """To a hub that takes actions, whatever an attempt has left behind; on a crowded computer the simulated controller
-    may lose command mode on the way, so more than once."""
-    end = time.monotonic() + RECOVERY
-    while not (cell.machine.in_hub and cell.leaf.startswith("wait_")):
-        try:
-            if cell.leaf in ("stopped", "fault"):
-                operator.go_on()
-            cell.wait(lambda: cell.machine.in_hub, 60.0, "the hub")
-        except TimeoutError:
-            if time.monotonic() > end:
-                raise
-
-
-def bring_to(cell: Cell, operator: Operator, action: str) -> None:
-    """The hub that offers this action."""
-    other = {
-        "exchange_human_to_robot": "exchange_robot_to_human",
-        "exchange_robot_to_human": "exchange_human_to_robot",
-    }[action]
-    for _ in range(3):
-        cell.wait(lambda: cell.machine.in_hub, 60.0, "the hub")
-        if action in cell.machine.actions:
-            return
-        operator.do(other, False, "between")
-    raise TimeoutError(f"{action} was not offered")
+    for action, label in places:
+        found = operator.unless_crowded(
+            lambda place=(action, label): stop_in(cell, operator, *place), lambda both: both[0]
+        )
+        reached += found[0]
+        stopped += found[1]
+        operator.recover()
+    figure = f"STOP in every phase ({reached} of {len(places)} reached){operator.crowded()}"
+    return [row(figure, stopped, "stops", f"{len(places)}", stopped == len(places))]
 
 
 # --- actions --------------------------------------------------------------------------------------------------
@@ -129,13 +112,14 @@ def action_rows(cell: Cell, operator: Operator) -> list[dict]:
         way, good = "keyboard" if keyboard else "mouse", 0
         # put leaves the object on the board, take fetches it from there, give hands it back: the cell is as before
         for action in ("exchange_human_to_robot", "put", "take", "exchange_robot_to_human"):
+            good += operator.carry_out(action, keyboard, f"{way}_{action}")
             try:
-                good += operator.do(action, keyboard, f"{way}_{action}")
                 far.append(operator.distance_to_tf())
             except TimeoutError as error:
-                say(f"{action} by {way}: {error}")
-            recover(cell, operator)
-        rows.append(row(f"exchange both ways, take and put by {way}", good, "actions", "4 of 4", good == 4))
+                say(f"after {action} by {way}: {error}")
+            operator.recover()
+        figure = f"exchange both ways, take and put by {way}{operator.crowded()}"
+        rows.append(row(figure, good, "actions", "4 of 4", good == 4))
     away = max(far, default=None)
     far_row = row(
         f"hand in the 3D picture to tf, largest after {len(far)} actions",
@@ -170,9 +154,15 @@ def load_rows(cell: Cell, _pictures: Path) -> list[dict]:
 # --- what the console does to the robot's loop ----------------------------------------------------------------
 
 
-def mean_of(rows: list[tuple[float, float]], since: float) -> float:
-    """Mean of the values noted after `since`."""
-    return statistics.fmean(value for stamp, value in rows if stamp > since)
+def block(cell: Cell) -> dict[str, float]:
+    """Means of READINGS from now on, after SETTLING that are left out."""
+    first = len(cell.answers) + SETTLING
+    last = first + READINGS
+    cell.wait(lambda: len(cell.answers) >= last, 5.0 * (SETTLING + READINGS), "the bridge's diagnostics")
+    return {
+        "FRI latency": statistics.fmean(cell.latencies[first:last]),
+        "answer time": statistics.fmean(cell.answers[first:last]),
+    }
 
 
 def latency_rows(pairs: int) -> list[dict]:
@@ -190,13 +180,7 @@ def latency_rows(pairs: int) -> list[dict]:
                     cell.launch_console()
                     browser = Browser()
                     browser.open(fresh_link(cell.home, limit=60.0), 60.0)
-                time.sleep(4.0)
-                since = time.monotonic()
-                time.sleep(BLOCK)
-                means[with_console] = {
-                    "FRI latency": mean_of(cell.latencies, since),
-                    "answer time": mean_of(cell.answers, since),
-                }
+                means[with_console] = block(cell)
                 if browser is not None:
                     browser.__exit__()
                     cell.end_console()

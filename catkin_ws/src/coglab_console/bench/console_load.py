@@ -11,6 +11,7 @@ from pathlib import Path
 import aiohttp
 from coglab_console.browser import fresh_link
 
+SHOWN = 10.0  # s until a browser has its first state
 WATCHED = 15.0  # s, with five browsers
 FLOODED = 8.0  # s, with 1000 requests a second
 
@@ -21,8 +22,9 @@ def processor_time(process: int) -> float:
     return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
 
-async def watch_as(home: Path, used: set[str], began: asyncio.Event) -> int:
-    """One browser's connection that reads everything; states received after `began`."""
+async def watch_as(home: Path, used: set[str], shown: asyncio.Event, began: asyncio.Event) -> int:
+    """One browser's connection that reads everything and sets `shown` with its first state; states received after
+    `began`."""
     link = await unused_link(home, used)
     used.add(link)
     origin = link.split("/?")[0]
@@ -32,7 +34,9 @@ async def watch_as(home: Path, used: set[str], began: asyncio.Event) -> int:
             pass
         async with client.ws_connect(origin.replace("http", "ws") + "/ws", headers={"Origin": origin}) as ws:
             await ws.send_str("{}")
-            await began.wait()
+            while not began.is_set():
+                if await take_one(ws):
+                    shown.set()
             end = time.monotonic() + WATCHED
             while time.monotonic() < end:
                 count += await take_one(ws)
@@ -54,9 +58,9 @@ async def load(home: Path, process: int) -> tuple[float, float]:
     began = asyncio.Event()
     watchers = []
     for _ in range(5):
-        watchers.append(asyncio.create_task(watch_as(home, used, began)))
-        await asyncio.sleep(0.5)
-    await asyncio.sleep(1.0)
+        shown = asyncio.Event()
+        watchers.append(asyncio.create_task(watch_as(home, used, shown, began)))
+        await asyncio.wait_for(shown.wait(), SHOWN)
     before, since = processor_time(process), time.monotonic()
     began.set()
     counts = await asyncio.gather(*watchers)

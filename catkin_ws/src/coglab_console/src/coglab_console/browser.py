@@ -85,6 +85,10 @@ class Browser:
                 raise TimeoutError(f"not within {limit:.0f} s: {script} ({problem}); {self.summary()}")
             time.sleep(0.1)
 
+    def painted(self) -> None:
+        """Waits for two pictures more: what was changed before is seen."""
+        self.driver.execute_async_script("requestAnimationFrame(() => requestAnimationFrame(arguments[0]))")
+
     def summary(self) -> str:
         """What the page says, for a message."""
         try:
