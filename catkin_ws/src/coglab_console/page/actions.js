@@ -2,6 +2,7 @@
 import { h, setAttribute, setText } from './dom.js';
 import { on, onDocs, operating, store } from './store.js';
 import { command, send, stop } from './link.js';
+import { choice } from './choice.js';
 
 const HOLD_PERIOD = 100; // ms
 const BUTTONS = [
@@ -143,18 +144,13 @@ async function choose(label, name, args, show) {
 }
 
 function objectChoice() {
-  const show = () => {
-    select.value = store.docs.desk?.object ?? '';
-  };
-  const select = h('select', { id: 'object', onchange: () => choose('Object', 'select_object', { object_id: select.value }, show) });
+  const list = choice({ id: 'object', onchange: () => choose('Object', 'select_object', { object_id: list.button.value }, show) });
+  const show = () => list.show(store.docs.desk?.object ?? '');
   onDocs(['objects', 'desk'], () => {
-    const ids = ['', ...(store.docs.objects?.rows ?? []).map((row) => row.id)];
-    if (ids.join() !== [...select.options].map((option) => option.value).join()) {
-      select.replaceChildren(...ids.map((id) => h('option', { value: id }, id || '(default)')));
-    }
-    if (document.activeElement !== select) show();
+    list.offer(['', ...(store.docs.objects?.rows ?? []).map((row) => row.id)].map((id) => [id, id || '(default)']));
+    show();
   });
-  return select;
+  return list.button;
 }
 
 function speedChoice() {

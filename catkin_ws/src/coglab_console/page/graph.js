@@ -1,6 +1,7 @@
 // The graph of a state machine as Graphviz laid it out; active states thick and filled, the last transition in words.
 import { h, setText, svg } from './dom.js';
 import { onDocs, store, on } from './store.js';
+import { choice } from './choice.js';
 
 const MAIN = '/coglab';
 const READABLE = 14 / 11; // px a unit of the picture, whose letters are 11 high, to be 14
@@ -63,21 +64,21 @@ function frameOf(active, follow, place) {
 }
 
 export function showGraph(parent) {
-  const select = h('select', { 'aria-label': 'State machine to show', onchange: update });
-  const extent = h('select', { 'aria-label': 'How much of it', onchange: update }, h('option', { value: 'follow' }, 'follow'), h('option', { value: 'whole' }, 'whole'));
+  const machine = choice({ 'aria-label': 'State machine to show', onchange: update });
+  const extent = choice({ 'aria-label': 'How much of it', onchange: update });
+  extent.offer([['follow', 'follow'], ['whole', 'whole']]);
+  extent.show('follow');
   const crumbs = h('p', { class: 'crumbs', 'aria-live': 'polite' });
   const last = h('p', { class: 'last' });
   const picture = svg('svg', { role: 'img', 'aria-label': 'Graph of the state machine' });
-  parent.append(h('header', {}, h('label', {}, select), crumbs, extent), picture, last);
+  parent.append(h('header', {}, machine.button, crumbs, extent.button), picture, last);
 
   function names() {
     const known = machines();
-    const wanted = select.value;
-    if (known.join() !== [...select.options].map((option) => option.value).join()) {
-      select.replaceChildren(...known.map((name) => h('option', { value: name }, name.replace(/^\//, ''))));
-      select.value = known.includes(wanted) ? wanted : known.includes(MAIN) ? MAIN : known[0] ?? '';
-    }
-    return select.value;
+    const wanted = machine.button.value;
+    machine.offer(known.map((name) => [name, name.replace(/^\//, '')]));
+    if (!known.includes(wanted)) machine.show(known.includes(MAIN) ? MAIN : known[0] ?? '');
+    return machine.button.value;
   }
 
   function update() {
@@ -101,7 +102,7 @@ export function showGraph(parent) {
     } else setText(last, '');
     const deepest = active.reduce((a, b) => (b.length > a.length ? b : a), '');
     setText(crumbs, graph.problem || deepest.split('/').filter(Boolean).slice(1).join(' › ') || 'not active');
-    picture.setAttribute('viewBox', frameOf(active, extent.value === 'follow', picture).join(' '));
+    picture.setAttribute('viewBox', frameOf(active, extent.button.value === 'follow', picture).join(' '));
   }
 
   on('doc', (name) => {

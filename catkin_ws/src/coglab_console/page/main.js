@@ -50,7 +50,7 @@ function makeTabs(bar) {
 
 function keys(buttons) {
   document.addEventListener('keydown', (event) => {
-    if (event.ctrlKey || event.altKey || event.metaKey || event.target.closest('input, textarea, select')) return;
+    if (event.ctrlKey || event.altKey || event.metaKey || event.target.closest('input, textarea')) return;
     const number = Number(event.key);
     if (number >= 1 && number <= buttons.length) buttons[number - 1].focus();
     else if (event.key === 'o') at('object').focus();

@@ -3,6 +3,7 @@ import { h, setText, table } from './dom.js';
 import { onDocs, operating, store } from './store.js';
 import { command } from './link.js';
 import { actionButton } from './actions.js';
+import { choice } from './choice.js';
 import { clock } from './log.js';
 
 export function field(label, input) {
@@ -28,17 +29,19 @@ function form(told) {
   const number = h('input', { type: 'number', min: 0, max: 9999, value: 0 });
   const conditions = h('input', { type: 'text', value: 'receive, give', maxlength: 400 });
   const repetitions = h('input', { type: 'number', min: 1, max: 50, value: 5 });
-  const order = h('select', {}, ['latin_square', 'random', 'as_listed'].map((word) => h('option', { value: word }, word.replace('_', ' '))));
+  const order = choice({});
+  order.offer(['latin_square', 'random', 'as_listed'].map((word) => [word, word.replace('_', ' ')]));
+  order.show('latin_square');
   const begin = sender('Begin the session', told, () => ['session_begin', {
     participant: participant.value.trim(),
     number: Number(number.value),
     conditions: conditions.value.split(',').map((word) => word.trim()).filter(Boolean),
     repetitions: Number(repetitions.value),
-    order: order.value,
+    order: order.button.value,
   }]);
   return h('form', { onsubmit: (event) => event.preventDefault() },
     field('Participant (a pseudonym, never a name)', participant), field('Number of the participant (row of the Latin square, seed)', number),
-    field('Conditions, separated by commas', conditions), field('Repetitions of each', repetitions), field('Order', order), h('div', { class: 'row' }, begin));
+    field('Conditions, separated by commas', conditions), field('Repetitions of each', repetitions), field('Order', order.button), h('div', { class: 'row' }, begin));
 }
 
 function running(told, session) {

@@ -118,7 +118,7 @@ export function healthPage(page) {
 
 const KEYS = [
   ['Space', 'STOP, everywhere; in a text field Ctrl+Space'], ['1 … 8', 'to an action; Enter triggers it, or is held where a held button is asked for'],
-  ['O', 'to the list of objects'], ['M', 'to a new note'], ['?', 'this page'], ['Tab, Shift+Tab', 'through everything'], ['← →', 'between pages, with the focus on one'],
+  ['O', 'to the list of objects; ↑ ↓ open it and go through it, Enter takes, Escape leaves it'], ['M', 'to a new note'], ['?', 'this page'], ['Tab, Shift+Tab', 'through everything'], ['← →', 'between pages, with the focus on one'],
 ];
 
 export function helpPage(page) {

@@ -1,8 +1,6 @@
 """The page in a real browser, a double in place of the robot: a dead connection, a slow computer, reasons, touch."""
 
-import asyncio
 import shutil
-import threading
 import time
 
 import pytest
@@ -10,67 +8,12 @@ from coglab_console.browser import Browser
 from coglab_console.desk.gates import Standing
 from coglab_console.page_check import PAGES, focus_order, look
 from coglab_console.scene.graph_layout import Container, Layout
-from console_double import PAGE_DOCUMENTS, READY, RobotDouble, page_state, running
+from console_double import PAGE_DOCUMENTS, READY
+from page_double import IN_HAND, Desk
 
 pytestmark = pytest.mark.skipif(
     shutil.which("chromedriver") is None, reason="chromium-driver is missing: ./coglab install browser"
 )
-# Puts the page's connections in a test's hand: deaf ones say nothing and stay open, as behind a cable that was pulled;
-# `slow` is what each message costs, as on a computer that is busy.
-IN_HAND = """
-window.connections = []; window.slow = 0;
-const Real = WebSocket;
-window.WebSocket = class extends Real {
-  constructor(address) { super(address); window.connections.push(this); }
-  set onmessage(f) { super.onmessage = (event) => {
-    if (this.deaf) return;
-    const end = performance.now() + window.slow;
-    while (performance.now() < end);
-    f(event);
-  }; }
-  set onclose(f) { super.onclose = (event) => this.deaf || f(event); }
-  send(data) { if (!this.deaf) super.send(data); }
-};
-"""
-
-
-class Desk:
-    """A console that serves in a thread of its own, 30 states a second, and a browser at its page. `model`: changes of
-    that document; `files`: of where the page's files lie."""
-
-    def __init__(self, folder, model=None, **files):
-        self.robot = RobotDouble()
-        self._documents = {**PAGE_DOCUMENTS, "model": {**PAGE_DOCUMENTS["model"], **(model or {})}}
-        self._files = files
-        self.loop = asyncio.new_event_loop()
-        self._ready, self._over = threading.Event(), asyncio.Event()
-        self._thread = threading.Thread(target=self.loop.run_until_complete, args=(self._serve(folder),))
-        self._thread.start()
-        assert self._ready.wait(20.0)
-        self.browser = Browser()
-        self.browser.driver.execute_cdp_cmd("Page.addScriptToEvaluateOnNewDocument", {"source": IN_HAND})
-        self.browser.open(self.console.link())
-
-    async def _serve(self, folder):
-        async with running(folder, self.robot, **self._files) as self.console:
-            for name, value in self._documents.items():
-                self.console.documents.put(name, value)
-            self._ready.set()
-            while not self._over.is_set():
-                self.console.server.publish_state(page_state(time.monotonic()))
-                await asyncio.sleep(1 / 30)
-
-    def event(self, text):
-        self.loop.call_soon_threadsafe(self.console.events.add, "test", text)
-
-    def age(self):
-        """s since the newest state that the page has left the console."""
-        return time.monotonic() - self.browser.js("return coglab.state().stamp")
-
-    def close(self):
-        self.browser.__exit__()
-        self.loop.call_soon_threadsafe(self._over.set)
-        self._thread.join(20.0)
 
 
 @pytest.fixture(scope="module")
@@ -253,28 +196,6 @@ def test_a_note_that_was_not_taken_stays_in_its_field_and_says_why(desk):
     page.until("return coglab.events().some((e) => e.text.endsWith('the cup slipped'))", 10.0)
     page.until("return document.getElementById('note').value === ''", 10.0)
     page.tab("Live")
-
-
-def test_a_choice_that_was_refused_says_why_and_is_taken_back(desk):
-    """An observer's: the list of objects and the speed show what is, not what was wished."""
-    objects = {"rows": [{"id": "ball", "name": "ball", "mass": 0.1, "text": ""}], "asked": True, "problems": []}
-    desk.loop.call_soon_threadsafe(desk.console.documents.put, "objects", objects)
-    with Browser() as page:
-        page.open(desk.console.link())
-        page.until("return document.getElementById('object').options.length === 2", 10.0)
-        for field, wish, shown in (("object", "ball", ""), ("speed", "40", "100")):
-            page.js("document.getElementById('told').hidden = true")
-            page.js(
-                "const f = document.getElementById(arguments[0]); f.focus(); f.value = arguments[1];"
-                "f.dispatchEvent(new Event('change'))",
-                field,
-                wish,
-            )
-            page.until(
-                "const t = document.getElementById('told'); return !t.hidden && /watches/.test(t.textContent)", 10.0
-            )
-            assert page.js("return document.getElementById(arguments[0]).value", field) == shown
-    assert desk.console.desk.object_id == "" and ("speed_scale", {"value": 0.4}) not in desk.robot.calls
 
 
 def test_a_branch_of_the_diagnostics_stays_the_same_while_only_its_words_change(desk):

@@ -1,0 +1,65 @@
+"""The page in a real browser with a double in place of the robot, for tests of the page."""
+
+import asyncio
+import threading
+import time
+
+from coglab_console.browser import Browser
+from console_double import PAGE_DOCUMENTS, RobotDouble, page_state, running
+
+# Puts the page's connections in a test's hand: deaf ones say nothing and stay open, as behind a cable that was pulled;
+# `slow` is what each message costs, as on a computer that is busy.
+IN_HAND = """
+window.connections = []; window.slow = 0;
+const Real = WebSocket;
+window.WebSocket = class extends Real {
+  constructor(address) { super(address); window.connections.push(this); }
+  set onmessage(f) { super.onmessage = (event) => {
+    if (this.deaf) return;
+    const end = performance.now() + window.slow;
+    while (performance.now() < end);
+    f(event);
+  }; }
+  set onclose(f) { super.onclose = (event) => this.deaf || f(event); }
+  send(data) { if (!this.deaf) super.send(data); }
+};
+"""
+
+
+class Desk:
+    """A console that serves in a thread of its own, 30 states a second, and a browser at its page. `model`: changes of
+    that document; `files`: of where the page's files lie."""
+
+    def __init__(self, folder, model=None, **files):
+        self.robot = RobotDouble()
+        self._documents = {**PAGE_DOCUMENTS, "model": {**PAGE_DOCUMENTS["model"], **(model or {})}}
+        self._files = files
+        self.loop = asyncio.new_event_loop()
+        self._ready, self._over = threading.Event(), asyncio.Event()
+        self._thread = threading.Thread(target=self.loop.run_until_complete, args=(self._serve(folder),))
+        self._thread.start()
+        assert self._ready.wait(20.0)
+        self.browser = Browser()
+        self.browser.driver.execute_cdp_cmd("Page.addScriptToEvaluateOnNewDocument", {"source": IN_HAND})
+        self.browser.open(self.console.link())
+
+    async def _serve(self, folder):
+        async with running(folder, self.robot, **self._files) as self.console:
+            for name, value in self._documents.items():
+                self.console.documents.put(name, value)
+            self._ready.set()
+            while not self._over.is_set():
+                self.console.server.publish_state(page_state(time.monotonic()))
+                await asyncio.sleep(1 / 30)
+
+    def event(self, text):
+        self.loop.call_soon_threadsafe(self.console.events.add, "test", text)
+
+    def age(self):
+        """s since the newest state that the page has left the console."""
+        return time.monotonic() - self.browser.js("return coglab.state().stamp")
+
+    def close(self):
+        self.browser.__exit__()
+        self.loop.call_soon_threadsafe(self._over.set)
+        self._thread.join(20.0)
