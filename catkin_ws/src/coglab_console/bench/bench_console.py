@@ -284,7 +284,7 @@ def rows_of(part: str, pictures: Path) -> list[dict]:
     try:
         return PARTS[part][1](pictures)
     except Exception as error:
-        return [missed(part, f"{type(error).__name__}: {str(error).splitlines()[0][:200]}")]
+        return [missed(part, f"{type(error).__name__}: {' '.join(str(error).split())[:400]}")]
 
 
 def end(number: int, _frame: object) -> None:

@@ -5,6 +5,7 @@ import { choice } from './choice.js';
 
 const MAIN = '/coglab';
 const READABLE = 14 / 11; // px a unit of the picture, whose letters are 11 high, to be 14
+const CRUMBS = 40; // characters for which there is room
 let drawn = null;
 let parts = {};
 
@@ -63,6 +64,14 @@ function frameOf(active, follow, place) {
   return [clamp(leaf[0] + leaf[2] / 2 - width / 2, x, x + w - width) - 4, clamp(leaf[1] + leaf[3] / 2 - height / 2, y, y + high - height) - 4, width + 8, height + 8];
 }
 
+/** Containers down to a state; where that is too long, outer ones give way. */
+function wayTo(path) {
+  const all = path.split('/').filter(Boolean).slice(1);
+  const parts = [...all];
+  while (parts.length > 2 && parts.join(' › ').length > CRUMBS) parts.shift();
+  return (parts.length < all.length ? ['…', ...parts] : parts).join(' › ');
+}
+
 export function showGraph(parent) {
   const machine = choice({ 'aria-label': 'State machine to show', onchange: update });
   const extent = choice({ 'aria-label': 'How much of it', onchange: update });
@@ -101,7 +110,7 @@ export function showGraph(parent) {
       setText(last, `${step.from}${step.outcome ? ` [${step.outcome}]` : ''} → ${step.to}${step.reason ? `: ${step.reason}` : ''}`);
     } else setText(last, '');
     const deepest = active.reduce((a, b) => (b.length > a.length ? b : a), '');
-    setText(crumbs, graph.problem || deepest.split('/').filter(Boolean).slice(1).join(' › ') || 'not active');
+    setText(crumbs, graph.problem || wayTo(deepest) || 'not active');
     picture.setAttribute('viewBox', frameOf(active, extent.button.value === 'follow', picture).join(' '));
   }
 

@@ -49,7 +49,7 @@ function running(told, session) {
   const rows = session.trials.map((trial, i) => [i + 1, trial.condition, i === session.position && session.running ? 'under way' : trial.outcome || '·']);
   const around = rows.slice(Math.max(0, session.position - 4), session.position + 9);
   return [
-    h('p', {}, `Session of ${session.participant}: ${session.position} of ${session.trials.length} trials. File: ${session.file}; as a table: rosrun coglab_console console_session.py`),
+    h('p', {}, `Session of ${session.participant}: ${session.position} of ${session.trials.length} trials. File: ${session.file}; as a table: ./coglab shell rosrun coglab_console console_session.py`),
     h('div', { class: 'row' },
       sender(next ? `Begin trial ${session.position + 1}: ${next.condition}` : 'All trials are done', told, () => ['trial_begin', {}]),
       ...['done', 'repeat', 'skipped'].map((outcome) => sender(`Trial ${outcome}`, told, () => ['trial_end', { outcome }])),

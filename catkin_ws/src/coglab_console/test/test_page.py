@@ -226,6 +226,17 @@ def test_without_graphviz_the_page_has_the_states_and_says_what_is_missing(desk)
     assert "apt install graphviz" in words
 
 
+def test_the_way_to_the_active_state_ends_with_it_in_full(desk):
+    """Where there is no room for all containers the outer ones give way."""
+    leaf = "/M/exchange_human_to_robot/approach/arm_motion/wait_stop"
+    picture = {**Layout("no-such-program").of({"/M": Container("/M", ("A",), ())}), "problem": "", "roots": ["/M"]}
+    desk.loop.call_soon_threadsafe(desk.console.documents.put, "graph:/coglab", picture)
+    desk.loop.call_soon_threadsafe(desk.console.documents.put, "active", {"/coglab": {"active": [leaf], "last": {}}})
+    desk.browser.until("return document.querySelector('.crumbs').textContent.endsWith('wait_stop')", 10.0)
+    cut = "const c = document.querySelector('.crumbs'); return c.scrollHeight - c.clientHeight"
+    assert desk.browser.js(cut) <= 1
+
+
 @pytest.mark.parametrize("promised", [False, True])
 def test_without_libjs_there_are_two_dimensions_and_a_sentence(tmp_path, promised):
     """Also where a library was there when the console began, and half of it is not served."""
