@@ -63,7 +63,7 @@ class TestWrapper(unittest.TestCase):
         wrapper.run_server()
         client = actionlib.SimpleActionClient(name, TestAction)
         self.assertTrue(client.wait_for_server(rospy.Duration(LIMIT)))
-        # The client has seen the server, but the server may not yet know the client, and what is said to nobody is lost.
+        # The client has seen the server, but the server may not know the client yet: what is said to nobody is lost.
         server = wrapper._action_server.action_server
         self.assertTrue(wait_for(lambda: server.feedback_pub.get_num_connections() > 0))
         self.assertTrue(wait_for(lambda: server.result_pub.get_num_connections() > 0))
