@@ -36,11 +36,15 @@ ENTRY_POINTS = {
 }
 
 
+# Whoever runs the tests in the background or under nohup hands on that some signals are ignored.
+HEARS = ["env", "--default-signal=INT,HUP"]
+
+
 def start(script: str, entry: str = "module") -> tuple[Marked, subprocess.Popen]:
     """Starts the script and waits until its tree stands."""
     marked = Marked()
     process = subprocess.Popen(
-        [*ENTRY_POINTS[entry], script],
+        [*HEARS, *ENTRY_POINTS[entry], script],
         env=marked.environment(),
         text=True,
         stdout=subprocess.PIPE,

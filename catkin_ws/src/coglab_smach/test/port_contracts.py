@@ -5,6 +5,8 @@ happens while its node is frozen. A double that is kinder than the real port fai
 A suite gets a Place: the port, the clock that it lives on, and how its node is frozen and thawed.
 """
 
+from contextlib import contextmanager
+
 import numpy as np
 from arm_contract import ArmContract
 from coglab_msgs.msg import ReasonCode
@@ -183,6 +185,14 @@ class ContactContract(Contract):
         self.port.disarm()
         self.place.sleep(0.3)  # what was pushed is at rest again
 
+    @contextmanager
+    def resting(self):
+        """The arm rests until nothing of a push is left: where it rested before a motion, it felt nothing."""
+        with self.place.arm_rests:
+            yield
+            self.place.push(0.0)
+            self.place.sleep(0.5)
+
     def watches(self, mode, time_limit=20.0, **settings):
         """Armed, and the detector has seen enough of the arm at rest."""
         self.settle(self.port.arm(mode, time_limit, settings))
@@ -205,7 +215,7 @@ class ContactContract(Contract):
         assert self.port.event() is None
 
     def test_touch_weight_and_release_are_found_once_each(self):
-        with self.place.arm_rests:
+        with self.resting():
             self.watches("contact", k=20.0)
             self.place.push(-8.0)
             self.happens(True, ReasonCode.CONTACT_FOUND)
@@ -228,7 +238,7 @@ class ContactContract(Contract):
         self.stays(lambda: self.port.event() is None, 1.0)
 
     def test_disarmed_it_says_nothing(self):
-        with self.place.arm_rests:
+        with self.resting():
             self.watches("contact", k=20.0)
             self.port.disarm()
             self.place.push(-8.0)
@@ -236,7 +246,7 @@ class ContactContract(Contract):
             self.place.push(0.0)
 
     def test_armed_again_at_once_it_watches(self):
-        with self.place.arm_rests:
+        with self.resting():
             self.settle(self.port.arm("contact", 20.0, {"k": 20.0}))
             self.port.disarm()
             self.watches("contact", k=20.0)

@@ -177,7 +177,9 @@ except KeyboardInterrupt:
     print("INTERRUPTED", both.is_running(), flush=True)
 """
     env = {**os.environ, "PYTHONPATH": os.pathsep.join([p for p in sys.path if p])}
-    process = subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True, env=env)
+    # Whoever runs the tests in the background hands on that Ctrl-C is ignored.
+    command = ["env", "--default-signal=INT", sys.executable, "-c", code]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=env)
     try:
         while "READY" not in process.stdout.readline():
             pass
