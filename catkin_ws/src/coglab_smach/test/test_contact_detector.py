@@ -91,6 +91,22 @@ def test_a_person_who_was_early_is_found_by_the_offset(posture):
     assert event.code == ReasonCode.CONTACT_CAME_EARLY and event.confidence > 0.5
 
 
+def test_who_pushed_the_arm_at_rest_and_let_go_has_left_no_offset(posture):
+    """The jolts of both are no motion, before which the arm would have rested with that force on it."""
+    run = ContactTrial(posture, 5)
+    run.feed(1.5)
+    jolt = lambda t: np.full(7, 0.05)  # noqa: E731
+    for _ in range(2):
+        run.feed(0.05, push((0, 1, 0), 8.0, rise=1e-6), jolt)
+        run.feed(1.5, push((0, 1, 0), 8.0, rise=1e-6))
+        run.feed(0.05, velocity=jolt)
+        run.feed(0.1)
+    run.detector.arm("contact", run.t, 10.0)
+    assert run.feed(1.0)[0] is None
+    run.feed(0.4, velocity=lambda t: np.full(7, 0.3))
+    assert run.feed(1.0)[0] is None, "nor after a motion from there"
+
+
 def test_an_event_says_what_it_is_and_how_sure_it_is(posture):
     """A push far over the threshold is certain; the weight that has just come to its share is a matter of noise."""
     run = ContactTrial(posture, 8)

@@ -31,6 +31,8 @@ LARGEST = 1e4
 """Nm, rad, rad/s: no number of an arm is larger"""
 LONGEST_STEP = 1.0
 """s between two samples that follow each other"""
+JOLT = 0.02
+"""rad that a joint moves at most when somebody pushes an arm that rests, or lets go of it"""
 
 
 @dataclass
@@ -132,6 +134,9 @@ class ContactDetector:
         """of the last sample that did not follow the one before it"""
         self._still_since: float | None = None
         self._rest_torque: np.ndarray | None = None
+        self._left: np.ndarray | None = None
+        """Nm, what was felt at the rest that a motion has left, and how far (rad) it has come from there"""
+        self._travelled = np.zeros(7)
         self._rest_before_motion: np.ndarray | None = None
         self._unloaded: np.ndarray | None = None
         self.margin = 0.0
@@ -260,9 +265,13 @@ class ContactDetector:
     def _follow_motion(self, stamp: float, velocity: Joints) -> None:
         moving = np.abs(velocity).max() > self.settings.still_speed
         if moving:
-            if self._still_since is not None and self._rest_torque is not None:
-                self._rest_before_motion = self._rest_torque
+            if self._still_since is not None:
+                self._left, self._travelled = self._rest_torque, np.zeros(7)
             self._still_since = None
+            self._travelled = self._travelled + (stamp - (self._last_stamp or stamp)) * np.asarray(velocity)
+            # Who pushes an arm at rest, and lets go of it, jolts it; what it felt between is no rest without a touch.
+            if self._left is not None and np.abs(self._travelled).max() > JOLT:
+                self._rest_before_motion = self._left
         elif self._still_since is None:
             self._still_since = stamp
             self._history.clear()
