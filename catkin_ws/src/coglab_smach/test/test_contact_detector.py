@@ -107,6 +107,20 @@ def test_who_pushed_the_arm_at_rest_and_let_go_has_left_no_offset(posture):
     assert run.feed(1.0)[0] is None, "nor after a motion from there"
 
 
+def test_a_touch_that_jolts_the_arm_is_found_as_a_touch(posture):
+    """Nothing was there on arming, and a motion went before."""
+    run = ContactTrial(posture, 7)
+    run.feed(1.5)
+    run.feed(1.0, velocity=lambda t: np.full(7, 0.3))
+    run.feed(1.0)
+    run.detector.arm("contact", run.t, 10.0)
+    assert run.feed(0.5)[0] is None
+    pressing = push((0, 1, 0), 8.0, rise=1e-6)
+    assert run.feed(0.02, pressing, lambda t: np.full(7, 0.05))[0] is None
+    event, _ = run.feed(1.0, pressing)
+    assert event is not None and event.code == ReasonCode.CONTACT_FOUND, event
+
+
 def test_an_event_says_what_it_is_and_how_sure_it_is(posture):
     """A push far over the threshold is certain; the weight that has just come to its share is a matter of noise."""
     run = ContactTrial(posture, 8)

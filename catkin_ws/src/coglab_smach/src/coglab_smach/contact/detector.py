@@ -19,6 +19,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from coglab_msgs.msg import ReasonCode
 
+from coglab_smach.contact.rest import RestTorque
 from coglab_smach.ports.interfaces import ContactEvent
 
 Joints = Sequence[float] | np.ndarray
@@ -31,8 +32,6 @@ LARGEST = 1e4
 """Nm, rad, rad/s: no number of an arm is larger"""
 LONGEST_STEP = 1.0
 """s between two samples that follow each other"""
-JOLT = 0.02
-"""rad that a joint moves at most when somebody pushes an arm that rests, or lets go of it"""
 
 
 @dataclass
@@ -113,10 +112,17 @@ class _Armed:
     mass: float
     load_share: float
     baseline: np.ndarray | None = None
+    before: np.ndarray | None = None
+    """the baseline until somebody jolted the arm"""
     watched: list[int] = field(default_factory=list)
     threshold: np.ndarray | None = None
     over: int = 0
     gone_since: float | None = None
+
+    def stir(self, travels: bool) -> None:
+        """The arm does not rest any more: a baseline is taken anew."""
+        self.before = None if travels else self.baseline if self.before is None else self.before
+        self.baseline, self.over = None, 0
 
 
 class ContactDetector:
@@ -133,11 +139,7 @@ class ContactDetector:
         self._odd_stamp: float | None = None
         """of the last sample that did not follow the one before it"""
         self._still_since: float | None = None
-        self._rest_torque: np.ndarray | None = None
-        self._left: np.ndarray | None = None
-        """Nm, what was felt at the rest that a motion has left, and how far (rad) it has come from there"""
-        self._travelled = np.zeros(7)
-        self._rest_before_motion: np.ndarray | None = None
+        self._rest = RestTorque()
         self._unloaded: np.ndarray | None = None
         self.margin = 0.0
         self._largest = np.zeros(7)
@@ -239,7 +241,7 @@ class ContactDetector:
             self._armed = None
         if not self.still() or difference is None:
             if self._armed is not None:
-                self._armed.baseline, self._armed.over = None, 0
+                self._armed.stir(self._rest.travels)
             return None
         if self._armed is None:
             self._learn(difference)
@@ -265,18 +267,13 @@ class ContactDetector:
     def _follow_motion(self, stamp: float, velocity: Joints) -> None:
         moving = np.abs(velocity).max() > self.settings.still_speed
         if moving:
-            if self._still_since is not None:
-                self._left, self._travelled = self._rest_torque, np.zeros(7)
+            self._rest.move(stamp - self._last_stamp if self._last_stamp is not None else 0.0, velocity)
             self._still_since = None
-            self._travelled = self._travelled + (stamp - (self._last_stamp or stamp)) * np.asarray(velocity)
-            # Who pushes an arm at rest, and lets go of it, jolts it; what it felt between is no rest without a touch.
-            if self._left is not None and np.abs(self._travelled).max() > JOLT:
-                self._rest_before_motion = self._left
         elif self._still_since is None:
             self._still_since = stamp
             self._history.clear()
             self._filtered = None
-            self._rest_torque = None
+            self._rest.stand()
 
     def _filter(self, stamp: float, tau: np.ndarray) -> np.ndarray | None:
         """Low-pass, remember, and return the difference over the window (None until the window is full)."""
@@ -299,11 +296,7 @@ class ContactDetector:
     def _learn(self, difference: np.ndarray) -> None:
         assert self._filtered is not None
         self._rest_differences.append(difference)
-        self._rest_torque = (
-            self._filtered
-            if self._rest_torque is None
-            else self._rest_torque + 0.02 * (self._filtered - self._rest_torque)
-        )
+        self._rest.learn(self._filtered)
 
     def sigma(self) -> np.ndarray:
         """Robust standard deviation (Nm) of the difference at rest, per joint; the floor where too little was seen."""
@@ -347,23 +340,27 @@ class ContactDetector:
         )
 
     def _check_offset(self, armed: _Armed) -> ContactEvent | None:
-        """Once per arming: a person who was early has left an offset against the last rest before the motion."""
-        if armed.mode != "contact" or self._rest_before_motion is None or armed.baseline is None:
+        """Once at each rest: a person who was early has left an offset against the last rest before the motion, and a
+        touch that jolted the arm has left one against what was felt before."""
+        reference = self._rest.before_motion if armed.before is None else armed.before
+        if armed.mode != "contact" or reference is None or armed.baseline is None:
             return None
-        offset = np.abs(armed.baseline - self._rest_before_motion)[armed.watched]
+        offset = np.abs(armed.baseline - reference)[armed.watched]
         largest = int(np.argmax(offset))
         ratio = float(offset[largest]) / self.settings.offset_threshold
         if ratio <= 1.0:
             return None
-        self._unloaded = self._rest_before_motion
+        self._unloaded = reference
         over = float(offset[largest]) - self.settings.offset_threshold
+        early = armed.before is None
         return self._event(
             True,
             "torque_offset",
             ratio,
             confidence(over / float(self.sigma()[armed.watched][largest])),
-            ReasonCode.CONTACT_CAME_EARLY,
-            f"torque offset {float(offset[largest]):.2f} Nm on arming: the object was there already",
+            ReasonCode.CONTACT_CAME_EARLY if early else ReasonCode.CONTACT_FOUND,
+            f"torque offset {float(offset[largest]):.2f} Nm "
+            + ("on arming: the object was there already" if early else "after a jolt"),
         )
 
     def _watch_weight(self, stamp: float, armed: _Armed, position: Joints) -> ContactEvent | None:
