@@ -47,7 +47,7 @@ void ReferenceLoop::write(const CycleInput& input, const MotionReference& refere
   reference_ = reference;
   if (reference.space == Space::Rest) {
     if (before != Space::Rest) hold_.begin();
-    hold_.computeReference(input, robot_->chain, references);
+    hold_.computeReference(input, *robot_, references);
     return;
   }
   if (reference.jumps || reference.space != before) beginBlend(input);

@@ -17,6 +17,7 @@ import numpy as np
 from coglab_py.pose import length
 
 from .carried import CarriedObject, CarriedSettings
+from .critically_damped import CriticallyDamped
 from .reach_bank import Prediction, ReachBank, ReachSettings
 from .recogniser import CLOCK_JUMP, PatternEnd
 
@@ -52,6 +53,16 @@ class BeliefSettings:
     """of the end of a reach about the one of its pattern, beside the spread of the pattern itself"""
     pattern_time: float = 0.15
     """in which a pattern that is recognised comes to its full weight in the prediction"""
+    place_time: float = 0.2
+    """time constant with which the place of an offer follows its predictions where they are as uncertain as `unsure`"""
+    unsure: float = 0.05
+    """largest standard deviation of the place on an axis from which it is that; below it is as much shorter, but not"""
+    least_share: float = 0.15
+    """less than this share of it"""
+    request_time: float = 0.14
+    """the same time constant for the place where somebody asks for the object"""
+    same_reach: float = 0.3
+    """by which the onset of one reach may be corrected"""
     reach: ReachSettings = field(default_factory=ReachSettings)
     carried: CarriedSettings = field(default_factory=CarriedSettings)
 
@@ -140,6 +151,7 @@ class BeliefFilter:
         self._robot_holds: bool | None = None
         self._misses: list[float] = []
         self._rest = self._furthest = np.zeros(3)
+        self._place, self._onset = CriticallyDamped(), -math.inf
         self._pattern, self._pattern_weight, self._pattern_stamp = "", 0.0, -math.inf
 
     # -- sights ----------------------------------------------------------------------------------------------------
@@ -193,6 +205,7 @@ class BeliefFilter:
         self._objects.clear()
         self._misses.clear()
         self._rest = self._furthest = position
+        self._place.forget()
         self._pattern, self._pattern_weight, self._pattern_stamp = "", 0.0, stamp
 
     def _step(self, bank: ReachBank, stamp: float, position: np.ndarray) -> None:
@@ -245,10 +258,12 @@ class BeliefFilter:
         prediction = self._bank.prediction()
         if prediction is None or offer + request < self.settings.shown:
             self._pattern_weight = 0.0
+            self._place.forget()
             return Belief(stamp, offer, request)
         if self._robot_holds:
             object_id, offset = "", np.zeros(3)
         place, covariance, pattern = self._with_pattern(stamp, prediction, end)
+        place = self._settled(stamp, place, covariance, prediction.onset)
         return Belief(
             stamp,
             offer,
@@ -262,6 +277,18 @@ class BeliefFilter:
             max(0.0, prediction.arrival - stamp),
             prediction.arrival_deviation,
         )
+
+    def _settled(self, stamp: float, place: np.ndarray, covariance: np.ndarray, onset: float) -> np.ndarray:
+        """The predicted place (m) without the to and fro of its corrections: the hand goes to one place, so what the
+        predictions of one reach differ in is their error. An offer has to be met, so its place counts as it is the
+        sooner, the surer it is; who asks comes to what is held out."""
+        s = self.settings
+        if onset > self._onset + s.same_reach:
+            self._place.forget()
+        self._onset = onset
+        spread = math.sqrt(float(np.max(np.diag(covariance)))) / s.unsure
+        time = s.request_time if self._robot_holds else s.place_time * min(1.0, max(s.least_share, spread))
+        return self._place.step(stamp, place, time)
 
     def _with_pattern(
         self, stamp: float, prediction: Prediction, end: PatternEnd | None

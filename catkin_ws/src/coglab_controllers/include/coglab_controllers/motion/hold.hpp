@@ -33,16 +33,23 @@ class StartBlend {
   JointVector joints_ = JointVector::Zero();
 };
 
-/// Zero velocity, so that the arm brakes within its limits; once it stands, the commanded posture
-/// is remembered as the reference. If feedback controllers leave the reference alone, the velocity
-/// is exactly zero; if they move it, the hand follows. No allocation, no throw.
+/// The arm brakes within its limits; once it stands, the commanded posture is remembered as the
+/// reference. If feedback controllers leave the reference alone, the velocity is exactly zero; if
+/// they move it, the hand follows. No allocation, no throw.
+///
+/// All joints brake together, each in proportion to its speed, in the time that the slowest one
+/// needs: where each braked as fast as it can, joints that cancel each other's motion, as in a hand
+/// that only turns, would throw the hand aside.
 class Hold {
  public:
   /// Another hold begins: the arm may still be moving.
-  void begin() noexcept { latched_ = false; }
+  void begin() noexcept {
+    latched_ = false;
+    begins_ = true;
+  }
 
-  /// Writes pose, zero twist, joint position and zero joint velocity.
-  void computeReference(const CycleInput& input, const Chain& chain,
+  /// Writes pose, zero twist, joint position and the joint velocity of braking, at rest zero.
+  void computeReference(const CycleInput& input, const RobotSetup& setup,
                         References& references) noexcept;
 
   /// @param solve makes joint velocities from a chain state, joints and a Cartesian reference:
@@ -50,7 +57,7 @@ class Hold {
   ///        JointVector&, const CartesianReference&) -> JointVector
   template <typename Solve>
   void resolve(const CycleInput& input, References& references, Solve&& solve) noexcept {
-    if (!moved(references)) return;  // joint velocity stays zero
+    if (!moved(references)) return;  // it brakes, or stands
     CartesianReference reference;
     const auto pose = references.states.view<7>(references.pose);
     reference.pose.position = pose.head<3>();
@@ -65,8 +72,14 @@ class Hold {
  private:
   bool moved(const References& references) const noexcept;
 
-  bool latched_ = false;
-  ChainState commanded_;  // kinematics at the commanded joints
+  /// Joint velocities (rad/s) after these: the slowest joint brakes as it can, the others with it.
+  JointVector braked(const JointVector& velocity, const JointVector& acceleration) noexcept;
+
+  bool latched_ = false, begins_ = true;
+  JointVector from_ = JointVector::Zero();  // rad/s, when it began to brake
+  int slowest_ = 0;                         // the joint that needs longest for that
+  double share_ = 1.0;                      // of from_
+  ChainState commanded_;                    // kinematics at the commanded joints
   Eigen::Matrix<double, 7, 1> pose_ = Eigen::Matrix<double, 7, 1>::Zero();
   JointVector joints_ = JointVector::Zero();
 };

@@ -114,9 +114,9 @@ class WaitTaker(WaitStop):
 
         def leaving() -> bool:
             nonlocal nearest
-            distance = self.ctx.arm.dmp_progress().remaining_distance
+            distance, away = self.ctx.arm.dmp_progress().remaining_distance, hand_from_palm(self) or math.inf
             nearest = min(nearest, distance)
-            return distance > nearest + leaves and (hand_from_palm(self) or math.inf) < delivered
+            return away < delivered - leaves or (away < delivered and distance > nearest + leaves)
 
         self.await_pending(contact.arm("contact_in_motion", 10.0, settings), "arming of the contact detector", 2.0)
         try:
