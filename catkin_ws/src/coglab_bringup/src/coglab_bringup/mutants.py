@@ -21,7 +21,7 @@ import shutil
 import subprocess
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Container
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
@@ -63,17 +63,21 @@ def shipped(folder: Path) -> list[Path]:
     )
 
 
-def draw(folder: Path, dice: random.Random) -> tuple[Path, Change]:
-    """One change, of a line drawn over all lines of code of a package; lines that offer no change are drawn again."""
+def draw(
+    folder: Path, dice: random.Random, without: Container[tuple[Path, Change]] = ()
+) -> tuple[Path, Change] | None:
+    """One change, of a line drawn over all lines of code of a package; lines that offer none but those `without` are
+    drawn again. None if there is no such line."""
     lines = []
     for path in shipped(folder):
         lines += [(path, number) for number in code_lines(path.read_text(encoding="utf-8"), path.name)]
     while lines:
         path, number = lines.pop(dice.randrange(len(lines)))
         offered = [c for c in changes(path.read_text(encoding="utf-8"), path.name) if c.line == number]
+        offered = [change for change in offered if (path, change) not in without]
         if offered:
             return path, dice.choice(offered)
-    raise Refused(f"{folder.name} holds no line of C++ or Python that could be changed")
+    return None
 
 
 def standing_on(package: str, folders: dict[str, Path]) -> list[str]:
@@ -131,13 +135,18 @@ class Workspace:
             link.parent.mkdir(exist_ok=True)
             link.symlink_to(oracles)
         self.stale = True
-        """Whether what is built is not what the sources say."""
+        """Whether what is built, of any package, is not what the sources say."""
 
-    def build(self) -> bool:
-        """Whether it builds, with its tests."""
-        self.stale = False
+    def build(self, alone: Path | None = None) -> bool:
+        """Whether it builds, with its tests; `alone`: only what the package in this folder builds."""
+        command = [str(self.root / "coglab"), "build", "tests"]
+        if alone is not None:
+            build = self.root / "catkin_ws" / "build"
+            programs = (build / alone.relative_to(self.root / "catkin_ws" / "src")).rglob("CMakeFiles/*.dir/link.txt")
+            targets = sorted(path.parent.name.removesuffix(".dir") for path in programs)
+            command = ["make", "-C", str(build), f"-j{len(os.sched_getaffinity(0))}", *targets]
+        self.stale = alone is not None
         with (self.logs / "build.log").open("w") as log:
-            command = [str(self.root / "coglab"), "build", "tests"]
             return process_tree.run(command, BUILD_LIMIT, stdout=log, stderr=subprocess.STDOUT) == 0
 
     def enter(self) -> None:
@@ -216,10 +225,11 @@ class Campaign:
         self.workspace, self.package, self.times, self.say = workspace, package, times, say
         self.folders = package_folders(workspace.root / "catkin_ws" / "src")
         self.dice = random.Random(f"{package} {seed}")
+        self.folder, self.own = self.folders[package], own
         self.judges = [package] if own else [package, *standing_on(package, self.folders)]
         self.kept = workspace.root.parent / f"{package}.{seed}{'.own' if own else ''}.json"
         self.drawn: list[Mutant | None] = []  # None: did not compile
-        self.fallen = 0  # of the drawn, those that the dice have given
+        self.fallen: list[tuple[Path, Change]] = []  # of the drawn, those that the dice have given
         try:
             state = json.loads(self.kept.read_text())
             if state["digest"] == workspace.digest:
@@ -238,11 +248,16 @@ class Campaign:
 
     def run(self, count: int) -> None:
         """Draws and judges until there are `count` mutants."""
-        folder = self.folders[self.package]
         while len(self.mutants()) < count:
-            path, change = draw(folder, self.dice)
-            self.fallen += 1
-            if self.fallen <= len(self.drawn):  # judged before: the dice fall as they did
+            drawn = draw(self.folder, self.dice, self.fallen)
+            if drawn is None:
+                if not self.mutants():
+                    raise Refused(f"{self.package} holds no line of C++ or Python that could be changed")
+                self.say(f"{self.package}: there are no more than {len(self.mutants())} changes")
+                return
+            path, change = drawn
+            self.fallen.append(drawn)
+            if len(self.fallen) <= len(self.drawn):  # judged before: the dice fall as they did
                 continue
             mutant = self.judge(path, change)
             self.drawn.append(mutant)
@@ -257,7 +272,7 @@ class Campaign:
         """What the tests say of one change; None if it does not compile. The file is as before afterwards."""
         text, since = path.read_text(encoding="utf-8"), time.monotonic()
         file = str(path.relative_to(self.workspace.root))
-        changed = Edited(self.workspace, path, text, change.apply(text))
+        changed = Edited(self.workspace, path, (text, change.apply(text)), self.folder if self.own else None)
         try:
             if not changed.enter():
                 return None
@@ -292,7 +307,7 @@ class Campaign:
     def _green_unchanged(self, program: test_runner.Program, name: str, changed: Edited) -> bool:
         """Whether a test that the change turns red is green without it; the change is back where it is not."""
         changed.leave()
-        self.workspace.build()
+        self.workspace.build(changed.alone)
         green = not self._red_twice(program, test_runner.TIME_LIMIT)
         self.times.keep(name, program.seconds if green else None)
         if not green:
@@ -304,16 +319,18 @@ class Campaign:
 class Edited:
     """One file of the copy with its change in, or out again."""
 
-    def __init__(self, workspace: Workspace, path: Path, before: str, after: str) -> None:
-        self._workspace, self._path, self._before, self._after = workspace, path, before, after
+    def __init__(self, workspace: Workspace, path: Path, texts: tuple[str, str], alone: Path | None) -> None:
+        self._workspace, self._path, (self._before, self._after) = workspace, path, texts
         self._compiled = path.suffix != ".py"
+        self.alone = alone
+        """The package that is built for it; None: all."""
 
     def enter(self) -> bool:
         """Puts the change in and builds what it touches; whether that compiles."""
         if not self._compiled and self._workspace.stale:
-            self._workspace.build()
+            self._workspace.build(self.alone)
         self._path.write_text(self._after, encoding="utf-8")
-        return not self._compiled or self._workspace.build()
+        return not self._compiled or self._workspace.build(self.alone)
 
     def leave(self) -> None:
         """The file as it was; what is built from it is stale until the next build."""
@@ -370,6 +387,8 @@ def main(arguments: list[str]) -> int:
         times = Times(workspace)
         campaigns = [Campaign(workspace, package, options.seed, times, say, options.own) for package in packages]
         for campaign in campaigns:
+            if workspace.stale:  # of the package before
+                workspace.build()
             campaign.run(options.count)
     except KeyboardInterrupt:
         say("ended; what was judged is kept, and the same command goes on from there")
