@@ -63,9 +63,7 @@ def shipped(folder: Path) -> list[Path]:
     )
 
 
-def draw(
-    folder: Path, dice: random.Random, without: Container[tuple[Path, Change]] = ()
-) -> tuple[Path, Change] | None:
+def draw(folder: Path, dice: random.Random, without: Container[tuple[Path, Change]] = ()) -> tuple[Path, Change] | None:
     """One change, of a line drawn over all lines of code of a package; lines that offer none but those `without` are
     drawn again. None if there is no such line."""
     lines = []
