@@ -6,8 +6,9 @@ import random
 from pathlib import Path
 
 import pytest
-from coglab_bringup import mutants
+from coglab_bringup import mutant_workspace, mutants
 from coglab_bringup.arguments import CORES, mutants_options, package_folders
+from coglab_bringup.mutant_workspace import update_copy
 from coglab_bringup.mutator import changes, code_lines
 from coglab_bringup.usage import Refused
 
@@ -179,14 +180,16 @@ def test_judged_by_its_own_tests_a_package_is_built_alone(tmp_path):
 
 def test_what_is_built_alone_are_the_programs_of_the_folder(tmp_path, monkeypatch):
     (tmp_path / "catkin_ws" / "src" / "group" / "one").mkdir(parents=True)
-    workspace = mutants.Workspace(tmp_path)
+    workspace = mutant_workspace.Workspace(tmp_path)
     build = workspace.root / "catkin_ws" / "build"
     for name in ("group/one/CMakeFiles/one.dir", "group/one/CMakeFiles/one_test_one.dir", "two/CMakeFiles/two.dir"):
         (build / name).mkdir(parents=True)
         (build / name / "link.txt").write_text("")
     (build / "group/one/CMakeFiles/run_tests.dir").mkdir()
     ran = []
-    monkeypatch.setattr(mutants.process_tree, "run", lambda command, limit, **options: ran.append(command) or 0)
+    monkeypatch.setattr(
+        mutant_workspace.process_tree, "run", lambda command, limit, **options: ran.append(command) or 0
+    )
     assert workspace.build() and not workspace.stale
     assert workspace.build(workspace.root / "catkin_ws" / "src" / "group" / "one") and workspace.stale
     assert ran[0][1:] == ["build", "tests"]
@@ -236,18 +239,18 @@ def test_the_copy_follows_the_checkout_and_nothing_flows_back(tmp_path):
     (top / "src" / "a.py").write_text("a = 1\n")
     (top / "src" / "b.py").write_text("b = 1\n")
     (top / "out" / "c.py").write_text("c = 1\n")
-    digest = mutants.update_copy(top, copy)
+    digest = update_copy(top, copy)
     (copy / "src" / "a.py").write_text("a = 2\n")  # a run that was killed in the middle
     (copy / "src" / "stray.py").write_text("")
     (copy / ".coglab").mkdir()
     (copy / ".coglab" / "built.all").write_text("")
     kept = (copy / "src" / "b.py").stat().st_mtime_ns
-    assert mutants.update_copy(top, copy) == digest
+    assert update_copy(top, copy) == digest
     assert (copy / "src" / "a.py").read_text() == (top / "src" / "a.py").read_text() == "a = 1\n"
     assert not (copy / "src" / "stray.py").exists() and not (copy / "out").exists()
     assert (copy / ".coglab" / "built.all").exists() and (copy / "src" / "b.py").stat().st_mtime_ns == kept
     (top / "src" / "b.py").write_text("b = 2\n")
-    assert mutants.update_copy(top, copy) != digest
+    assert update_copy(top, copy) != digest
 
 
 def test_options():
