@@ -3,9 +3,9 @@
 
 Definitions, fixed before anything was measured. 100 people x 2 directions, the objects in turn, and 50 hands that are
 about something else (coglab_perception/test/other_motions.py, kinds in turn, half of them in a hub, half after the
-robot was asked for an action); without --long a few. Seeds come from SHA-256 of the commit's hash, so that no file was
-made with them. All motions of all hands count; nothing is left out, and what never happened is infinitely late and
-shown as 999.
+robot was asked for an action, half with an object in the robot's hand, which that person has given before); without
+--long a few. Seeds come from SHA-256 of the commit's hash, so that no file was made with them. All motions of all hands
+count; nothing is left out, and what never happened is infinitely late and shown as 999.
 
 Reach: the person is reaching, as the person knows; from the onset (own speed above 0.02 m/s for 0.1 s) to the arrival.
 Way back: from the handover to rest. People have no patterns of their own: the true pattern of a reach is the one in
@@ -142,8 +142,15 @@ def rows_of(commit: str, jobs: list[Job]) -> list[dict]:
     rows = pattern_rows(group, motions) + switch_rows(group, motions) + belief_rows(group, motions, rests)
     succeeded = [end[1] == "succeeded" for job, t in zip(group.jobs, group.trials, strict=True)
                  for end in campaign.ends_of(job.actions, t) if job.actions == EXCHANGES]  # fmt: skip
-    found = share(succeeded)
-    return [*rows, group.row(f"the machine says that it has succeeded, of {len(succeeded)} directions", found, "share")]
+    asked = sum("hub" in job.arguments for job in group.jobs)
+    missing = asked - sum(motion["about"] == OTHER for motion in motions)
+    return [
+        *rows,
+        group.row(
+            "motions of something else that were not carried out, the robot had no object", missing, f"of {asked}"
+        ),
+        group.row(f"the machine says that it has succeeded, of {len(succeeded)} directions", share(succeeded), "share"),
+    ]
 
 
 def main() -> int:

@@ -155,5 +155,8 @@ def test_two_trials_make_all_rows(monkeypatch):
     assert len(set(names)) == len(names) and all(name.startswith("whole trials: ") for name in names)
     assert any("of 2 reaches" in name for name in names) and any("of 1 motions of something else" in n for n in names)
     assert any("believed before there was a motion, of 3 rests" in name for name in names)
+    shown = {row["figure"]: row["value"] for row in rows}
+    carried_out = "whole trials: motions of something else that were not carried out, the robot had no object"
+    assert shown[carried_out] == 0.0
     delays = [row["value"] for row in rows if "onset to belief, median" in row["figure"]]
     assert all(0.0 < value < 1.0 or value == partner_rows.NEVER for value in delays)
