@@ -127,17 +127,21 @@ class FakeWorkspace:
 
 
 def test_a_campaign_judges_keeps_and_goes_on(tmp_path):
+    said = []
+
     def campaign(workspace):
-        return mutants.Campaign(workspace, "one", 5, mutants.Times(workspace))
+        return mutants.Campaign(workspace, "one", 5, mutants.Times(workspace), said.append)
 
     workspace = FakeWorkspace(tmp_path)
     before = workspace.file.read_text()
     first = campaign(workspace)
     first.run(3)
     assert workspace.file.read_text() == before and len(first.mutants()) == 3
+    assert not [line for line in said if "before" in line]
     again = FakeWorkspace(tmp_path)
     second = campaign(again)
     second.run(3)
+    assert said[-1] == "one: 3 were judged before"
     assert second.mutants() == first.mutants() and again.builds == 0
     second.run(6)
     assert second.mutants()[:3] == first.mutants() and len(second.mutants()) == 6

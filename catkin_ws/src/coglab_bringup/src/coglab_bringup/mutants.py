@@ -159,6 +159,8 @@ class Campaign:
 
     def run(self, count: int) -> None:
         """Draws and judges until there are `count` mutants."""
+        if self.drawn:
+            self.say(f"{self.package}: {len(self.mutants())} were judged before")
         while len(self.mutants()) < count:
             drawn = draw(self.folder, self.dice, self.fallen)
             if drawn is None:
