@@ -6,8 +6,9 @@ import random
 from pathlib import Path
 
 import pytest
-from coglab_bringup import mutants
+from coglab_bringup import mutant_workspace, mutants
 from coglab_bringup.arguments import CORES, mutants_options, package_folders
+from coglab_bringup.mutant_workspace import update_copy
 from coglab_bringup.mutator import changes, code_lines
 from coglab_bringup.usage import Refused
 
@@ -104,13 +105,14 @@ class FakeWorkspace:
         (folder / "src").mkdir(parents=True, exist_ok=True)
         (folder / "package.xml").write_text("<package><name>one</name></package>")
         self.file = folder / "src" / "one.cpp"
-        self.file.write_text("int f(int a) {\n  if (a < 3) return 1;\n  return a + 4;\n}\n")
-        self.builds = 0
+        self.file.write_text("int f(int a) {\n  if (a < 3) return 1;\n  return a + 4;\n}\nint g() { return 5 * 6; }\n")
+        self.builds, self.alone = 0, []
         self.seen: list[str] = []
 
-    def build(self) -> bool:
+    def build(self, alone=None) -> bool:
         self.builds += 1
-        self.stale = False
+        self.alone.append(alone)
+        self.stale = alone is not None
         return "return a - 4" not in self.file.read_text()  # this one does not compile
 
     def programs(self, packages):
@@ -125,17 +127,21 @@ class FakeWorkspace:
 
 
 def test_a_campaign_judges_keeps_and_goes_on(tmp_path):
+    said = []
+
     def campaign(workspace):
-        return mutants.Campaign(workspace, "one", 5, mutants.Times(workspace))
+        return mutants.Campaign(workspace, "one", 5, mutants.Times(workspace), said.append)
 
     workspace = FakeWorkspace(tmp_path)
     before = workspace.file.read_text()
     first = campaign(workspace)
     first.run(3)
     assert workspace.file.read_text() == before and len(first.mutants()) == 3
+    assert not [line for line in said if "before" in line]
     again = FakeWorkspace(tmp_path)
     second = campaign(again)
     second.run(3)
+    assert said[-1] == "one: 3 were judged before"
     assert second.mutants() == first.mutants() and again.builds == 0
     second.run(6)
     assert second.mutants()[:3] == first.mutants() and len(second.mutants()) == 6
@@ -151,6 +157,47 @@ def test_a_campaign_judges_keeps_and_goes_on(tmp_path):
     changed = FakeWorkspace(tmp_path)
     changed.digest = "other sources"
     assert campaign(changed).drawn == []
+
+
+def test_no_change_is_drawn_twice_and_a_package_has_an_end(tmp_path):
+    workspace, said = FakeWorkspace(tmp_path), []
+    campaign = mutants.Campaign(workspace, "one", 5, mutants.Times(workspace), said.append)
+    campaign.run(50)
+    found = [(m.line, m.before, m.after) for m in campaign.mutants()]
+    offered = changes(workspace.file.read_text(), "one.cpp")
+    assert len(set(found)) == len(found) == len(offered) - 1, "all but the one that does not compile"
+    assert said[-1] == f"one: there are no more than {len(found)} changes"
+    workspace.file.write_text("\n")
+    with pytest.raises(Refused, match="no line of C"):
+        mutants.Campaign(workspace, "one", 6, mutants.Times(workspace)).run(1)
+
+
+def test_judged_by_its_own_tests_a_package_is_built_alone(tmp_path):
+    workspace = FakeWorkspace(tmp_path)
+    campaign = mutants.Campaign(workspace, "one", 5, mutants.Times(workspace), own=True)
+    campaign.run(2)
+    assert set(workspace.alone) == {tmp_path / "copy" / "catkin_ws" / "src" / "one"} and workspace.stale
+    workspace = FakeWorkspace(tmp_path / "whole")
+    mutants.Campaign(workspace, "one", 5, mutants.Times(workspace)).run(2)
+    assert set(workspace.alone) == {None}
+
+
+def test_what_is_built_alone_are_the_programs_of_the_folder(tmp_path, monkeypatch):
+    (tmp_path / "catkin_ws" / "src" / "group" / "one").mkdir(parents=True)
+    workspace = mutant_workspace.Workspace(tmp_path)
+    build = workspace.root / "catkin_ws" / "build"
+    for name in ("group/one/CMakeFiles/one.dir", "group/one/CMakeFiles/one_test_one.dir", "two/CMakeFiles/two.dir"):
+        (build / name).mkdir(parents=True)
+        (build / name / "link.txt").write_text("")
+    (build / "group/one/CMakeFiles/run_tests.dir").mkdir()
+    ran = []
+    monkeypatch.setattr(
+        mutant_workspace.process_tree, "run", lambda command, limit, **options: ran.append(command) or 0
+    )
+    assert workspace.build() and not workspace.stale
+    assert workspace.build(workspace.root / "catkin_ws" / "src" / "group" / "one") and workspace.stale
+    assert ran[0][1:] == ["build", "tests"]
+    assert ran[1][:3] == ["make", "-C", str(build)] and ran[1][4:] == ["one", "one_test_one"]
 
 
 def test_a_test_that_is_red_anyway_is_left_out_and_said(tmp_path):
@@ -196,18 +243,18 @@ def test_the_copy_follows_the_checkout_and_nothing_flows_back(tmp_path):
     (top / "src" / "a.py").write_text("a = 1\n")
     (top / "src" / "b.py").write_text("b = 1\n")
     (top / "out" / "c.py").write_text("c = 1\n")
-    digest = mutants.update_copy(top, copy)
+    digest = update_copy(top, copy)
     (copy / "src" / "a.py").write_text("a = 2\n")  # a run that was killed in the middle
     (copy / "src" / "stray.py").write_text("")
     (copy / ".coglab").mkdir()
     (copy / ".coglab" / "built.all").write_text("")
     kept = (copy / "src" / "b.py").stat().st_mtime_ns
-    assert mutants.update_copy(top, copy) == digest
+    assert update_copy(top, copy) == digest
     assert (copy / "src" / "a.py").read_text() == (top / "src" / "a.py").read_text() == "a = 1\n"
     assert not (copy / "src" / "stray.py").exists() and not (copy / "out").exists()
     assert (copy / ".coglab" / "built.all").exists() and (copy / "src" / "b.py").stat().st_mtime_ns == kept
     (top / "src" / "b.py").write_text("b = 2\n")
-    assert mutants.update_copy(top, copy) != digest
+    assert update_copy(top, copy) != digest
 
 
 def test_options():

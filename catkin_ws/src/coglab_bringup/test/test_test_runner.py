@@ -1,5 +1,6 @@
 """The runner that counts all other tests must not lie: red, dead, hanging and empty programs are told apart."""
 
+import signal
 import sys
 
 import pytest
@@ -46,6 +47,18 @@ def test_counts(tmp_path, script, counts, capsys):
     status = report([item], tmp_path)
     assert status == (0 if counts[1] == 0 and counts[0] > 0 else 1)
     assert capsys.readouterr().out.splitlines()[-1] == "{} passed, {} failed, {} skipped".format(*counts)
+
+
+def test_a_program_hears_ctrl_c_also_where_the_runner_ignores_it(tmp_path):
+    """As it does where a script has started it in the background."""
+    heard = "import signal; assert signal.getsignal(signal.SIGINT) != signal.SIG_IGN"
+    item = program(tmp_path, f"{heard}; open(XML, 'w').write('''{GREEN}''')")
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        run(item, tmp_path / "log", limit=60.0)
+    finally:
+        signal.signal(signal.SIGINT, before)
+    assert (item.passed, item.failed) == (1, 0), item.failures
 
 
 def test_a_gtest_that_was_not_built_is_a_failure(tmp_path):

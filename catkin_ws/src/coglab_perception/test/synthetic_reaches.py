@@ -12,6 +12,10 @@ ENDS = {
     "left": (0.90, -0.28, 0.42),
     "right": (0.92, 0.42, 0.40),
 }
+START_DEVIATION, END_DEVIATION = 0.02, (0.03, 0.035, 0.03)
+"""m, standard deviations per axis of where a reach begins and ends"""
+MIDDLE = 11.345
+"""chi square of three degrees of freedom that 99 % do not exceed"""
 
 
 def share(x):
@@ -31,14 +35,23 @@ def path(stamps, start, end, begin, duration, vertical_share, bow):
 
 def reach(name, rng, noise=0.004, rate=30.0, rest=0.6, hold=0.4):
     """One noisy recording: (stamps, positions, onset time, duration)."""
-    start = START + rng.normal(0, 0.02, 3)
-    end = np.array(ENDS[name]) + rng.normal(0, 1, 3) * [0.03, 0.035, 0.03]
+    start = START + rng.normal(0, START_DEVIATION, 3)
+    end = np.array(ENDS[name]) + rng.normal(0, 1, 3) * END_DEVIATION
     distance = float(np.linalg.norm(end - start))
     duration = 1.1 * max(0.3, (distance / 0.45) ** 0.3) * float(np.exp(rng.normal(0, 0.15)))
     vertical_share, bow = float(rng.uniform(0.8, 0.95)), float(rng.normal(0, 0.015))
     stamps = np.arange(0.0, rest + duration + hold, 1.0 / rate) + rng.normal(0, 0.002)
     positions = path(stamps, start, end, rest, duration, vertical_share, bow)
     return stamps, positions + rng.normal(0, noise, (len(stamps), 3)), rest, duration
+
+
+def pattern_of(way):
+    """Of a motion with this displacement (3), m: the pattern in whose middle 99 % of displacements it lies, the nearest
+    of several; empty if there is none."""
+    deviation = np.hypot(START_DEVIATION, END_DEVIATION)
+    off = {name: float(np.sum(((way - (np.array(end) - START)) / deviation) ** 2)) for name, end in ENDS.items()}
+    name = min(off, key=off.get)
+    return name if off[name] <= MIDDLE else ""
 
 
 def demonstrations(n, seed, **kw):

@@ -170,9 +170,9 @@ class OtherWatch(TrueTrace):
         return {"moved_mm": moved, "kind": self.motion.kind, "robot_holds": self.robot_holds}
 
 
-def other(job: Job) -> dict[str, Any]:
+def other(job: Job, kind: type[OtherWatch] = OtherWatch, recognised: bool = False) -> dict[str, Any]:
     """A hand that is about something else; ``number`` of its arguments says what, ``hub`` that nobody has asked for an
-    action: then it is recognition that may leave the hub."""
+    action: then it is recognition that may leave the hub. ``recognised``: the patterns are looked for in any case."""
     number, hub = job.arguments["number"], job.arguments["hub"]
     rng = np.random.default_rng([job.seed, 71])
     motion = other_motion(KINDS[number % len(KINDS)], rng, LISTENS)
@@ -180,13 +180,19 @@ def other(job: Job) -> dict[str, Any]:
     conditions = job.arguments["conditions"]
     left = bool(motion.segments[0].start[1] < 0.0)
     arguments: dict[str, Any] = {"conditions": replace(conditions, person={"left_handed": left})}
+    if hub or recognised:
+        arguments["recogniser"] = shipped_recogniser()
     if hub:
-        patterns = str(package_path("coglab_perception", "config", "patterns.json"))
-        arguments |= {"recogniser": Recogniser(*load_patterns(patterns)), "recognition_trigger.enabled": True}
+        arguments["recognition_trigger.enabled"] = True
     watches: list[OtherWatch] = []
 
     def watch(trial: Any) -> OtherWatch:
-        watches.append(OtherWatch(trial, motion, rng, robot_holds, hub))
+        watches.append(kind(trial, motion, rng, robot_holds, hub))
         return watches[0]
 
     return one_trial(replace(job, arguments=arguments), watch, lambda trial: watches[0].walk(trial))
+
+
+def shipped_recogniser() -> Recogniser:
+    """A fresh one with the patterns that ship."""
+    return Recogniser(*load_patterns(str(package_path("coglab_perception", "config", "patterns.json"))))

@@ -69,6 +69,13 @@ TEST_F(ControlStatesTest, QuaternionsMustBeUnit) {
   EXPECT_FALSE(control.setTaskSpaceReferencePose("ee", vectorOf({0, 0, 0, 0, 0, 0, 1.1})));
   EXPECT_FALSE(control.find(ControlContainer::TaskSpaceReferencePose, "ee").valid());
   EXPECT_TRUE(control.setTaskSpaceReferencePose("ee", pose));
+  for (const double off : {-1e-6, 1e-6}) {
+    const auto turned = [&](double share) {
+      return vectorOf({0, 0, 0, 0, 0, 0, 1.0 + share * off});
+    };
+    EXPECT_TRUE(control.setTaskSpaceReferencePose("ee", turned(0.9))) << off;
+    EXPECT_FALSE(control.setTaskSpaceReferencePose("ee", turned(1.1))) << off;
+  }
 }
 
 TEST_F(ControlStatesTest, JointReferencesHaveTheNumberOfJoints) {

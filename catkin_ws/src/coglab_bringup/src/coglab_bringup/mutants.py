@@ -12,27 +12,23 @@ the same command goes on where it was ended, as long as the sources are the same
 from __future__ import annotations
 
 import fcntl
-import hashlib
 import json
 import os
 import random
 import re
-import shutil
-import subprocess
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Container
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from coglab_bringup import bench, figures, process_tree, test_runner
+from coglab_bringup import bench, figures, test_runner
 from coglab_bringup.arguments import CORES, mutants_options, package_folders
+from coglab_bringup.mutant_workspace import Workspace
 from coglab_bringup.mutator import ENDINGS, Change, changes, code_lines
 from coglab_bringup.usage import Refused
 
-NOT_COPIED = (".git", ".coglab", "out", "build", "devel", "install", "__pycache__", ".pytest_cache", ".ruff_cache")
 NOT_SHIPPED = {"test", "bench", "example", "examples", "template", "testing"}
-BUILD_LIMIT = 3600.0  # s
 SLOWER = 4.0
 """by which a test may take longer than it did on the unchanged sources before it counts as one that hangs"""
 GOAL_ALL, GOAL_EACH = 85.0, 75.0
@@ -63,17 +59,19 @@ def shipped(folder: Path) -> list[Path]:
     )
 
 
-def draw(folder: Path, dice: random.Random) -> tuple[Path, Change]:
-    """One change, of a line drawn over all lines of code of a package; lines that offer no change are drawn again."""
+def draw(folder: Path, dice: random.Random, without: Container[tuple[Path, Change]] = ()) -> tuple[Path, Change] | None:
+    """One change, of a line drawn over all lines of code of a package; lines that offer none but those `without` are
+    drawn again. None if there is no such line."""
     lines = []
     for path in shipped(folder):
         lines += [(path, number) for number in code_lines(path.read_text(encoding="utf-8"), path.name)]
     while lines:
         path, number = lines.pop(dice.randrange(len(lines)))
         offered = [c for c in changes(path.read_text(encoding="utf-8"), path.name) if c.line == number]
+        offered = [change for change in offered if (path, change) not in without]
         if offered:
             return path, dice.choice(offered)
-    raise Refused(f"{folder.name} holds no line of C++ or Python that could be changed")
+    return None
 
 
 def standing_on(package: str, folders: dict[str, Path]) -> list[str]:
@@ -88,84 +86,6 @@ def standing_on(package: str, folders: dict[str, Path]) -> list[str]:
         front = {name for name in folders if needs[name] & front and name not in (*found, package)}
         found += sorted(front)
     return found
-
-
-def update_copy(top: Path, copy: Path) -> str:
-    """Makes the copy hold the files of the checkout, touching none that is the same; a digest of them all."""
-    digest, there = hashlib.sha256(), set()
-    for folder, names, files in os.walk(top):
-        names[:] = sorted(name for name in names if name not in NOT_COPIED and not (Path(folder) / name).is_symlink())
-        for name in sorted(files):
-            path = Path(folder) / name
-            relative = path.relative_to(top)
-            if path.is_symlink():  # catkin's own, made anew by the build
-                continue
-            content = path.read_bytes()
-            digest.update(str(relative).encode() + b"\0" + hashlib.sha256(content).digest())
-            target = copy / relative
-            there.add(target)
-            if not target.is_file() or target.read_bytes() != content:
-                target.parent.mkdir(parents=True, exist_ok=True)
-                target.write_bytes(content)
-            shutil.copymode(path, target)
-    for folder, names, files in os.walk(copy):
-        names[:] = [name for name in names if name not in NOT_COPIED and not (Path(folder) / name).is_symlink()]
-        for name in files:
-            path = Path(folder) / name
-            if path not in there and not path.is_symlink():
-                path.unlink()
-    return digest.hexdigest()
-
-
-class Workspace:
-    """The copy: builds it and runs its tests."""
-
-    def __init__(self, top: Path) -> None:
-        self.root = top / ".coglab" / "mutants" / "checkout"
-        self.logs = self.root.parent / "logs"
-        self.logs.mkdir(parents=True, exist_ok=True)
-        self.digest = update_copy(top, self.root)
-        oracles = top / ".coglab" / "venv"
-        link = self.root / ".coglab" / "venv"
-        if oracles.is_dir() and not link.exists():
-            link.parent.mkdir(exist_ok=True)
-            link.symlink_to(oracles)
-        self.stale = True
-        """Whether what is built is not what the sources say."""
-
-    def build(self) -> bool:
-        """Whether it builds, with its tests."""
-        self.stale = False
-        with (self.logs / "build.log").open("w") as log:
-            command = [str(self.root / "coglab"), "build", "tests"]
-            return process_tree.run(command, BUILD_LIMIT, stdout=log, stderr=subprocess.STDOUT) == 0
-
-    def enter(self) -> None:
-        """From now on this process and what it starts live in the copy's workspace."""
-        script = f'set -e; . "{self.root}/catkin_ws/devel/setup.bash" >/dev/null; env -0'
-        without = ("PYTHONPATH", "CMAKE_PREFIX_PATH", "ROS_PACKAGE_PATH")
-        clean = {name: value for name, value in os.environ.items() if name not in without}
-        text = subprocess.run(["bash", "-c", script], env=clean, capture_output=True, check=True, timeout=60).stdout
-        entered = dict(entry.split("=", 1) for entry in text.decode().split("\0") if "=" in entry)
-        os.environ.clear()
-        os.environ.update(entered, COGLAB_TOP=str(self.root), PYTHONDONTWRITEBYTECODE="1")
-
-    def programs(self, packages: list[str]) -> list[test_runner.Program]:
-        """The tests of some packages: the first package's first, quick kinds before rostests."""
-        python = os.environ.get("COGLAB_TEST_PYTHON", "/usr/bin/python3")
-        found = test_runner.find_programs(self.root, self.logs, python, packages)
-        return sorted(found, key=lambda p: (p.kind == "rostest", packages.index(p.package), p.kind != "gtest", p.name))
-
-    def red(self, program: test_runner.Program, limit: float) -> bool:
-        """Whether a test is red; one that does not end within `limit` (s) is."""
-        if program.kind == "rostest":
-            shutil.rmtree(program.junit, ignore_errors=True)
-        else:
-            program.junit.unlink(missing_ok=True)
-        program.passed = program.failed = program.skipped = 0
-        program.failures.clear()
-        test_runner.run(program, self.logs / f"{program.package}.{program.name}.log", limit)
-        return program.failed > 0
 
 
 class Times:
@@ -216,10 +136,11 @@ class Campaign:
         self.workspace, self.package, self.times, self.say = workspace, package, times, say
         self.folders = package_folders(workspace.root / "catkin_ws" / "src")
         self.dice = random.Random(f"{package} {seed}")
+        self.folder, self.own = self.folders[package], own
         self.judges = [package] if own else [package, *standing_on(package, self.folders)]
         self.kept = workspace.root.parent / f"{package}.{seed}{'.own' if own else ''}.json"
         self.drawn: list[Mutant | None] = []  # None: did not compile
-        self.fallen = 0  # of the drawn, those that the dice have given
+        self.fallen: list[tuple[Path, Change]] = []  # of the drawn, those that the dice have given
         try:
             state = json.loads(self.kept.read_text())
             if state["digest"] == workspace.digest:
@@ -238,11 +159,18 @@ class Campaign:
 
     def run(self, count: int) -> None:
         """Draws and judges until there are `count` mutants."""
-        folder = self.folders[self.package]
+        if self.drawn:
+            self.say(f"{self.package}: {len(self.mutants())} were judged before")
         while len(self.mutants()) < count:
-            path, change = draw(folder, self.dice)
-            self.fallen += 1
-            if self.fallen <= len(self.drawn):  # judged before: the dice fall as they did
+            drawn = draw(self.folder, self.dice, self.fallen)
+            if drawn is None:
+                if not self.mutants():
+                    raise Refused(f"{self.package} holds no line of C++ or Python that could be changed")
+                self.say(f"{self.package}: there are no more than {len(self.mutants())} changes")
+                return
+            path, change = drawn
+            self.fallen.append(drawn)
+            if len(self.fallen) <= len(self.drawn):  # judged before: the dice fall as they did
                 continue
             mutant = self.judge(path, change)
             self.drawn.append(mutant)
@@ -257,7 +185,7 @@ class Campaign:
         """What the tests say of one change; None if it does not compile. The file is as before afterwards."""
         text, since = path.read_text(encoding="utf-8"), time.monotonic()
         file = str(path.relative_to(self.workspace.root))
-        changed = Edited(self.workspace, path, text, change.apply(text))
+        changed = Edited(self.workspace, path, (text, change.apply(text)), self.folder if self.own else None)
         try:
             if not changed.enter():
                 return None
@@ -292,7 +220,7 @@ class Campaign:
     def _green_unchanged(self, program: test_runner.Program, name: str, changed: Edited) -> bool:
         """Whether a test that the change turns red is green without it; the change is back where it is not."""
         changed.leave()
-        self.workspace.build()
+        self.workspace.build(changed.alone)
         green = not self._red_twice(program, test_runner.TIME_LIMIT)
         self.times.keep(name, program.seconds if green else None)
         if not green:
@@ -304,16 +232,18 @@ class Campaign:
 class Edited:
     """One file of the copy with its change in, or out again."""
 
-    def __init__(self, workspace: Workspace, path: Path, before: str, after: str) -> None:
-        self._workspace, self._path, self._before, self._after = workspace, path, before, after
+    def __init__(self, workspace: Workspace, path: Path, texts: tuple[str, str], alone: Path | None) -> None:
+        self._workspace, self._path, (self._before, self._after) = workspace, path, texts
         self._compiled = path.suffix != ".py"
+        self.alone = alone
+        """The package that is built for it; None: all."""
 
     def enter(self) -> bool:
         """Puts the change in and builds what it touches; whether that compiles."""
         if not self._compiled and self._workspace.stale:
-            self._workspace.build()
+            self._workspace.build(self.alone)
         self._path.write_text(self._after, encoding="utf-8")
-        return not self._compiled or self._workspace.build()
+        return not self._compiled or self._workspace.build(self.alone)
 
     def leave(self) -> None:
         """The file as it was; what is built from it is stale until the next build."""
@@ -370,6 +300,8 @@ def main(arguments: list[str]) -> int:
         times = Times(workspace)
         campaigns = [Campaign(workspace, package, options.seed, times, say, options.own) for package in packages]
         for campaign in campaigns:
+            if workspace.stale:  # of the package before
+                workspace.build()
             campaign.run(options.count)
     except KeyboardInterrupt:
         say("ended; what was judged is kept, and the same command goes on from there")

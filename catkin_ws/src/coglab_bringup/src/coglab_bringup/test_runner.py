@@ -123,9 +123,11 @@ def run(program: Program, log: Path, limit: float) -> None:
         program.failures.append(f"{program.command[0]} does not exist: it was not built; see .coglab/build.log")
         print(f"  {program.package:20s} {program.kind:8s}{program.name:44s} not built  FAILED", flush=True)
         return
+    # What a script starts in the background ignores SIGINT, and so would all below it: tests of Ctrl-C would be red.
+    command = ["env", "--default-signal=INT,QUIT", *program.command]
     with log.open("w") as output:
         status = process_tree.run(
-            program.command, limit, stdout=output, stderr=subprocess.STDOUT, stdin=subprocess.DEVNULL, env=environment
+            command, limit, stdout=output, stderr=subprocess.STDOUT, stdin=subprocess.DEVNULL, env=environment
         )
     program.seconds = time.monotonic() - start
     count(program, status)

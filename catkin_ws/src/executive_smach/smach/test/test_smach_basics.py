@@ -187,6 +187,17 @@ def test_cb_interface_on_a_method_better():
     assert robot.cb(3) == (robot, 3) and robot.cb.get_registered_outcomes() == ("a",)
 
 
+def test_cb_interface_of_a_class_or_of_no_method_is_itself_better():
+    class Adds:
+        def __call__(self, a, b):
+            return a + b
+
+    whole = smach.CBInterface(Adds(), ["a"])
+    robot = type("Robot", (), {"cb": whole, "method": smach.CBInterface(lambda self: 1)})
+    assert robot.cb is whole and robot().cb is whole and robot().cb(1, 2) == 3
+    assert robot.method is vars(robot)["method"], "looked at in the class it is not bound"
+
+
 def test_has_smach_interface():
     assert smach.has_smach_interface(smach.State()) and smach.has_smach_interface(smach.CBInterface(print))
     assert not smach.has_smach_interface(print) and not smach.has_smach_interface(None)

@@ -187,6 +187,22 @@ def test_without_contained_state():
     assert each.get_children() == {} and each.get_internal_edges() == []
 
 
+@pytest.mark.parametrize(
+    "contained, named",
+    [
+        ({"loop_outcomes": ["else"]}, "else"),
+        ({"break_outcomes": ["else"]}, "else"),
+        ({"final_outcome_map": {"else": "failed"}}, "else"),
+        ({"final_outcome_map": {"bad": "nowhere"}}, "nowhere"),
+    ],
+)
+def test_outcomes_that_nobody_has_are_found_better(contained, named):
+    state = Says("ok", registered=["ok", "bad"])
+    iterator(state, loop_outcomes=["ok"], final_outcome_map={"bad": "failed"}).check_consistency()
+    with pytest.raises(smach.InvalidTransitionError, match=rf"\['{named}'\]"):
+        iterator(state, **contained).check_consistency()
+
+
 def test_in_a_machine_and_pickled():
     each = iterator(Says("done"), [1, 2], outcomes=["done"], exhausted="done", loop_outcomes=["done"])
     assert machine(pickle.loads(pickle.dumps(each))).execute() == "done"

@@ -1,0 +1,292 @@
+"""The hand as the brain sees it over ROS: what its node says counts for a second; and what becomes of a calibration,
+also where the node falls silent in the middle. The clock goes on as the test says, and no master is there."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import pytest
+from actionlib_msgs.msg import GoalStatus
+from coglab_msgs.msg import HandStatus, MotorStatus, ReasonCode
+from coglab_smach.ports.interfaces import HandState
+from coglab_smach.ports.pending import PortError
+from coglab_smach.ros import calls, hand
+
+
+class Client:
+    """An action server that takes every goal at once; the test says how it ends."""
+
+    def __init__(self, name, kind):
+        self.name, self.text, self.goals, self.there = name, "", [], True
+        self.cancelled = 0
+
+    def wait_for_server(self, timeout):
+        self.waited = timeout.to_sec()
+        return self.there
+
+    def send_goal(self, goal, done_cb):
+        self.done_cb = done_cb
+        self.goals.append(goal)
+
+    def cancel_goal(self):
+        self.cancelled += 1
+
+    def get_goal_status_text(self):
+        return self.text
+
+
+class Thread:
+    """Runs at once."""
+
+    def __init__(self, target, args, name, daemon):
+        assert daemon, "it must not keep a process that ends"
+        self.start = lambda: target(*args)
+
+
+class Node:
+    """Stands for the hand's node: the port on it, and the clock."""
+
+    def __init__(self, monkeypatch):
+        self.now, self.listens, self.orders = 100.0, 1, []
+        clock = SimpleNamespace(monotonic=lambda: self.now)
+        monkeypatch.setattr(calls, "time", clock)
+        monkeypatch.setattr(hand, "time", clock)
+        monkeypatch.setattr(hand.threading, "Thread", Thread)
+        monkeypatch.setattr(hand.actionlib, "SimpleActionClient", Client)
+        monkeypatch.setattr(calls.rospy, "Subscriber", self.subscribe)
+        monkeypatch.setattr(hand.rospy, "Publisher", self.publisher)
+        self.port = hand.RosHand("right_hand")
+
+    def subscribe(self, topic, kind, take, queue_size):
+        assert (topic, kind) == ("right_hand/hand_status", HandStatus)
+        self.take = take
+
+    def publisher(self, topic, kind, queue_size):
+        assert topic == "right_hand/hand_calibration"
+        return SimpleNamespace(
+            publish=lambda message: self.orders.append(message.data), get_num_connections=lambda: self.listens
+        )
+
+    def say(self, passed=0.0, **fields):
+        """A hand_status of a hand that is well but for ``fields``, ``passed`` s later."""
+        self.now += passed
+        motors = [MotorStatus(motor=n, position=10 * n) for n in range(5)]
+        self.take(HandStatus(**{"connected": True, "motors": motors, **fields}))
+
+    def client(self, name):
+        return self.port._clients[name]
+
+
+@pytest.fixture
+def node(monkeypatch):
+    return Node(monkeypatch)
+
+
+def refused(pending, code):
+    """The error of a call that has ended with this code."""
+    assert pending.done()
+    with pytest.raises(PortError) as raised:
+        pending.result()
+    assert raised.value.code == code
+    return raised.value
+
+
+# --- what is known of it ----------------------------------------------------------------------------------------------
+
+
+def test_a_hand_that_was_never_heard_is_silent(node):
+    state = node.port.state()
+    assert state == HandState(message="right_hand/hand_status is silent", event=ReasonCode.NODE_SILENT)
+    node.now = 0.3  # as young as a computer that has just started
+    assert node.port.state() == state
+
+
+def test_what_the_hand_says_is_passed_on(node):
+    node.say(calibrated=True, holding=True, message="slips", event_code=ReasonCode.HAND_REFUSED)
+    positions = (0, 10, 20, 30, 40)
+    assert node.port.state() == HandState(True, True, False, True, "slips", positions, ReasonCode.HAND_REFUSED)
+    node.say(connected=False, calibrating=True)
+    assert node.port.state() == HandState(False, False, True, False, "", positions, 0)
+
+
+def test_what_it_has_said_counts_for_one_second(node):
+    node.say(calibrated=True, holding=True)
+    node.now += 1.0
+    assert node.port.state().holding
+    node.now += 0.01
+    state = node.port.state()
+    assert not (state.connected or state.calibrated or state.holding) and state.positions == ()
+    assert state.event == ReasonCode.NODE_SILENT and "hand_status is silent" in state.message
+    node.say()
+    assert node.port.state().connected, "it is back"
+
+
+# --- actions ----------------------------------------------------------------------------------------------------------
+
+
+def test_goals_go_to_their_actions(node):
+    pending = [
+        node.port.preshape("cylindrical", "large"),
+        node.port.close_on_object(),
+        node.port.close(200),
+        node.port.open(300),
+    ]
+    goal = node.client("hand_preshape").goals[0]
+    assert (goal.mode, goal.level) == ("cylindrical", "large")
+    assert len(node.client("hand_preshape_close").goals) == 1
+    assert node.client("hand_close").goals[0].speed == 200 and node.client("hand_open").goals[0].speed == 300
+    assert {client.name for client in node.port._clients.values()} == {
+        f"right_hand/hand_{name}" for name in ("open", "close", "preshape", "preshape_close")
+    }
+    assert not any(call.done() for call in pending)
+    pending[3].cancel()
+    assert node.client("hand_open").cancelled == 1 and node.client("hand_close").cancelled == 0
+
+
+def test_an_action_without_a_server_names_the_node(node):
+    node.client("hand_open").there = False
+    error = refused(node.port.open(300), ReasonCode.NODE_SILENT)
+    assert "right_hand/hand_open has no server after 10 s" in error.sentence and "hand node" in error.sentence
+    assert node.client("hand_open").waited == 10.0 and node.client("hand_open").goals == []
+
+
+def test_ends_of_an_action(node):
+    client = node.client("hand_close")
+
+    def ended(status, result, text=""):
+        call = node.port.close(200)
+        client.text = text
+        client.done_cb(status, result)
+        return call
+
+    good = SimpleNamespace(isOk=True, message="", reason_code=0)
+    call = ended(GoalStatus.SUCCEEDED, good)
+    assert call.done() and call.result() is good
+    assert ended(GoalStatus.SUCCEEDED, None).result() is None
+    bad = SimpleNamespace(isOk=False, message="blocked", reason_code=ReasonCode.HAND_LINK_LOST)
+    error = refused(ended(GoalStatus.ABORTED, bad, "text"), ReasonCode.HAND_LINK_LOST)
+    assert error.causes == ("blocked",) and "hand_close ended ABORTED" in error.sentence
+    refused(ended(GoalStatus.SUCCEEDED, bad), ReasonCode.HAND_LINK_LOST)
+    refused(ended(GoalStatus.ABORTED, good), ReasonCode.NONE)
+    error = refused(ended(GoalStatus.LOST, None, "the node is gone"), ReasonCode.NONE)
+    assert error.causes == ("the node is gone",)
+    assert refused(ended(GoalStatus.LOST, None), ReasonCode.NONE).causes == ()
+
+
+# --- calibration ------------------------------------------------------------------------------------------------------
+
+
+def asked(node, mode="fast"):
+    """A calibration that the hand has been told of."""
+    node.say()
+    calibration = node.port.calibrate(mode)
+    assert not calibration.done() and node.orders[-1:] == [mode]
+    return calibration
+
+
+def test_the_order_waits_until_the_hand_listens(node):
+    node.listens = 0
+    calibration = node.port.calibrate("fast")
+    for connected, listens in ((None, 1), (False, 1), (True, 0)):
+        if connected is not None:
+            node.say(connected=connected)
+        node.listens = listens
+        assert not calibration.done() and node.orders == []
+    node.listens = 1
+    assert not calibration.done() and not calibration.done() and node.orders == ["fast"], "once"
+
+
+def test_a_hand_that_holds_is_given_two_seconds_to_be_empty(node):
+    node.say(holding=True)
+    calibration = node.port.calibrate("fast")
+    assert not calibration.done()
+    node.say(1.0, holding=True)
+    node.say(1.0, holding=True)
+    assert not calibration.done() and node.orders == []
+    node.say(0.01, holding=True)
+    assert not calibration.done() and node.orders == ["fast"]
+    node.say(holding=True)
+    calibration = node.port.calibrate("slow")
+    node.say(0.1)
+    assert not calibration.done() and node.orders == ["fast", "slow"]
+
+
+def test_a_calibration_that_succeeds(node):
+    calibration = asked(node)
+    node.say(0.1, calibrating=True)
+    assert not calibration.done()
+    node.say(6.0, calibrating=True)
+    assert not calibration.done()
+    node.say(0.1, calibrated=True)
+    assert calibration.done() and calibration.result() is None
+
+
+def test_one_that_was_over_before_it_was_seen(node):
+    calibration = asked(node)
+    node.say(0.5, calibrated=True)
+    assert not calibration.done(), "that may be from before the order"
+    node.say(0.01, calibrated=True)
+    assert calibration.done() and calibration.result() is None
+
+
+def test_one_that_ends_without_success(node):
+    calibration = asked(node)
+    node.say(0.1, calibrating=True)
+    assert not calibration.done()
+    node.say(0.1, message="a finger is blocked", event_code=ReasonCode.OUT_OF_RANGE)
+    assert "ended without success" in refused(calibration, ReasonCode.OUT_OF_RANGE).sentence
+    assert refused(calibration, ReasonCode.OUT_OF_RANGE).causes == ("a finger is blocked",)
+
+
+def test_one_that_the_hand_refuses(node):
+    calibration = asked(node)
+    node.say(0.19, message="it holds", event_code=ReasonCode.HAND_REFUSED, calibrated=True)
+    assert not calibration.done(), "that may be from before the order"
+    node.say(0.02, message="it holds", event_code=ReasonCode.HAND_REFUSED, calibrated=True)
+    error = refused(calibration, ReasonCode.HAND_REFUSED)
+    assert "after the order 'fast'" in error.sentence and error.causes == ("it holds",)
+    for later in ({"calibrated": True}, {"calibrating": True}):
+        node.say(1.0, **later)
+        refused(calibration, ReasonCode.HAND_REFUSED)
+
+
+def test_another_event_is_no_refusal(node):
+    calibration = asked(node)
+    node.say(0.4, event_code=ReasonCode.HAND_NOT_CALIBRATED)
+    assert not calibration.done()
+
+
+def test_one_that_hand_status_says_nothing_about(node):
+    calibration = asked(node)
+    node.say(3.0)
+    assert not calibration.done()
+    node.say(0.01)
+    assert refused(calibration, ReasonCode.NODE_SILENT).causes == ("hand_status says nothing about it",)
+
+
+def test_a_node_that_dies_before_it_begins_to_calibrate(node):
+    calibration = asked(node)
+    node.now += 3.0
+    assert not calibration.done()
+    node.now += 0.01
+    assert refused(calibration, ReasonCode.NODE_SILENT).causes == ("right_hand/hand_status is silent",)
+
+
+def test_a_node_that_dies_while_it_calibrates(node):
+    calibration = asked(node)
+    node.say(0.1, calibrating=True)
+    assert not calibration.done()
+    node.now += 1.0
+    assert not calibration.done()
+    node.now += 0.01
+    error = refused(calibration, ReasonCode.NODE_SILENT)
+    assert error.causes == ("right_hand/hand_status is silent",)
+
+
+def test_a_dead_node_is_told_nothing(node):
+    node.say()
+    node.now += 1.01
+    calibration = node.port.calibrate("fast")
+    assert not calibration.done() and node.orders == []
+    node.say()
+    assert not calibration.done() and node.orders == ["fast"], "it is back"
