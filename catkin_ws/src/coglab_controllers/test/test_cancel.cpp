@@ -81,6 +81,30 @@ TEST(Cancel, EndsTheMotionAndItsQueueAndSaysWhy) {
   EXPECT_EQ(robot.state(), MotionState::Reached);
 }
 
+// Each as it can would throw the hand aside where the joints cancel each other's motion.
+TEST(Cancel, JointsBrakeTogether) {
+  VirtualRobot robot;
+  robot.loadBoth("ptp");
+  robot.followWithinLimits();
+  robot.ptp().add({kThere, {}, {}});
+  for (int i = 0; i < 100; ++i) robot.tick();
+  const JointVector before = robot.command.velocity;
+  ASSERT_GT(before.norm(), 0.05);
+  const CancelOrder order = robot.manager->askCancel("ptp", "");
+  const int best = brakingCycles(robot);
+  double farthest = 0.0;
+  CancelAnswer answer;
+  int cycles = 0;
+  for (; cycles < 400 && !robot.manager->cancelEnded(order, answer); ++cycles) {
+    robot.tick();
+    JointVector now;
+    for (int i = 0; i < kMaxJoints; ++i) now[i] = robot.interpolator->axis(i).velocity;
+    farthest = std::max(farthest, (now - now.dot(before) / before.squaredNorm() * before).norm());
+  }
+  EXPECT_LT(farthest, 0.1 * before.norm());
+  EXPECT_LE(cycles, best + 4);
+}
+
 TEST(Cancel, EndsADmpMotionAndOneThatFollowsItsGoal) {
   VirtualRobot robot;
   robot.loadBoth("dmp");

@@ -3,11 +3,20 @@
 #include <algorithm>
 #include <cmath>
 
+#include "coglab_rt/interpolator.hpp"
+
 namespace coglab_controllers {
 
 namespace {
 constexpr double kStill = 1e-3;  // rad/s: slower than this the arm counts as standing
-}
+// Share of its speed that the slowest joint has left when each goes on to brake as it can: none is
+// to stand later than that one.
+constexpr double kSlow = 0.3;
+// Share of the slowest joint's time from which a joint brakes as it can, too.
+constexpr double kAsSlow = 0.8;
+// Share of its limit from which an acceleration counts as one.
+constexpr double kSpeedingUp = 0.02;
+}  // namespace
 
 void StartBlend::advance(double dt) noexcept {
   const double left = blend_ > 0.0 ? std::exp(-dt / blend_) : 0.0;
@@ -16,19 +25,30 @@ void StartBlend::advance(double dt) noexcept {
   joints_ *= left;
 }
 
-JointVector Hold::braked(const JointVector& velocity, const JointVector& acceleration) noexcept {
-  const auto times = [&](const JointVector& of) { return of.array().abs() / acceleration.array(); };
+JointVector Hold::braked(const RobotSample& robot, const coglab_rt::JointLimits& limits) noexcept {
+  const auto velocity = robot.commanded_velocity.array();
   if (begins_) {
+    // A joint that still speeds up must not be held up in taking that back.
+    const auto speeding = robot.commanded_acceleration.array() * velocity.sign();
+    if ((speeding > kSpeedingUp * limits.acceleration.array()).any()) return JointVector::Zero();
     begins_ = false;
     from_ = velocity;
-    times(from_).maxCoeff(&slowest_);
+    JointVector times;
+    for (int i = 0; i < kMaxJoints; ++i) {
+      times[i] = coglab_rt::planVelocity(velocity[i], robot.commanded_acceleration[i], 0.0,
+                                         limits.acceleration[i], limits.jerk[i])
+                     .totalTime();
+    }
+    const double longest = times.maxCoeff(&slowest_);
+    slow_ = times.array() > kAsSlow * longest;
     share_ = 1.0;
   }
-  if (std::abs(from_[slowest_]) < kStill) return JointVector::Zero();
-  share_ = std::clamp(velocity[slowest_] / from_[slowest_], 0.0, share_);
-  JointVector wanted = share_ * from_;
-  wanted[slowest_] = 0.0;
-  return wanted;
+  if (std::abs(from_[slowest_]) < kStill || share_ < kSlow) return JointVector::Zero();
+  // Three cycles ahead, as the slowest joint goes on: the others are not to stand later than it.
+  const double now = std::clamp(velocity[slowest_] / from_[slowest_], 0.0, 1.0);
+  const JointVector wanted = std::clamp(now - 3.0 * (share_ - now), 0.0, 1.0) * from_;
+  share_ = now;
+  return slow_.select(JointVector::Zero(), wanted);
 }
 
 void Hold::computeReference(const CycleInput& input, const RobotSetup& setup,
@@ -42,7 +62,7 @@ void Hold::computeReference(const CycleInput& input, const RobotSetup& setup,
     latched_ = robot.commanded_velocity.lpNorm<Eigen::Infinity>() < kStill;
   }
   JointVector velocity = JointVector::Zero();
-  if (!latched_) velocity = braked(robot.commanded_velocity, setup.limits.acceleration);
+  if (!latched_) velocity = braked(robot, setup.limits);
   references.states.view<7>(references.pose) = pose_;
   references.states.view<6>(references.twist).setZero();
   references.states.view<kMaxJoints>(references.joint_position) = joints_;

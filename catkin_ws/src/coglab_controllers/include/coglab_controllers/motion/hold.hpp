@@ -72,14 +72,15 @@ class Hold {
  private:
   bool moved(const References& references) const noexcept;
 
-  /// Joint velocities (rad/s) after these: the slowest joint brakes as it can, the others with it.
-  JointVector braked(const JointVector& velocity, const JointVector& acceleration) noexcept;
+  /// Joint velocities (rad/s) of braking: the slowest joint brakes as it can, the others with it.
+  JointVector braked(const RobotSample& robot, const coglab_rt::JointLimits& limits) noexcept;
 
   bool latched_ = false, begins_ = true;
   JointVector from_ = JointVector::Zero();  // rad/s, when it began to brake
   int slowest_ = 0;                         // the joint that needs longest for that
-  double share_ = 1.0;                      // of from_
-  ChainState commanded_;                    // kinematics at the commanded joints
+  Eigen::Array<bool, kMaxJoints, 1> slow_ = Eigen::Array<bool, kMaxJoints, 1>::Constant(true);
+  double share_ = 1.0;    // of from_, in the last cycle
+  ChainState commanded_;  // kinematics at the commanded joints
   Eigen::Matrix<double, 7, 1> pose_ = Eigen::Matrix<double, 7, 1>::Zero();
   JointVector joints_ = JointVector::Zero();
 };
