@@ -8,7 +8,8 @@
 namespace coglab_controllers {
 
 namespace {
-constexpr double kStill = 1e-3;  // rad/s: slower than this the arm counts as standing
+constexpr double kStill = 1e-3;     // rad/s: slower than this the arm counts as standing
+constexpr double kTogether = 0.02;  // rad/s: slower than this each joint brakes as it can
 // Share of its speed that the slowest joint has left when each goes on to brake as it can: none is
 // to stand later than that one.
 constexpr double kSlow = 0.3;
@@ -43,7 +44,7 @@ JointVector Hold::braked(const RobotSample& robot, const coglab_rt::JointLimits&
     slow_ = times.array() > kAsSlow * longest;
     share_ = 1.0;
   }
-  if (std::abs(from_[slowest_]) < kStill || share_ < kSlow) return JointVector::Zero();
+  if (std::abs(from_[slowest_]) < kTogether || share_ < kSlow) return JointVector::Zero();
   // Three cycles ahead, as the slowest joint goes on: the others are not to stand later than it.
   const double now = std::clamp(velocity[slowest_] / from_[slowest_], 0.0, 1.0);
   const JointVector wanted = std::clamp(now - 3.0 * (share_ - now), 0.0, 1.0) * from_;

@@ -25,12 +25,13 @@ class CriticallyDamped:
         (s) since then; 0: what comes in goes out."""
         gap, self._stamp = stamp - self._stamp, stamp
         if self._value is None or time_constant <= 0.0:
-            self._value, self._rate = np.array(wanted, dtype=float), np.zeros(3)
-            return self._value
-        pole = 1.0 / time_constant
-        left = math.exp(-pole * gap)
-        away = self._value - wanted
-        drift = self._rate + pole * away
-        self._value = wanted + left * (away + gap * drift)
-        self._rate = left * (self._rate - pole * gap * drift)
-        return self._value
+            value, self._rate = np.array(wanted, dtype=float), np.zeros(3)
+        else:
+            pole = 1.0 / time_constant
+            left = math.exp(-pole * gap)
+            away = self._value - wanted
+            drift = self._rate + pole * away
+            value = wanted + left * (away + gap * drift)
+            self._rate = left * (self._rate - pole * gap * drift)
+        self._value = value
+        return value

@@ -163,8 +163,17 @@ class WaitStop(CoglabState):
                     self.reason = error.sentence  # as far as it goes
         self.await_pending(arm.switch_controller("dmp"), "switching to controller 'dmp'", 3.0)
         # Where the object will be is not told any more once the person's reach is over.
-        goal = self._early.goal_now() if self._early is not None else ud.goal
-        start(self, dmp_request(goal))
+        self._begin_again(self._early.goal_now() if self._early is not None else ud.goal)
+
+    def _begin_again(self, goal: dict[str, Any]) -> None:
+        """Start a reach anew. What lies where no hand may go by now has fallen, or was taken there."""
+        try:
+            start(self, dmp_request(goal))
+        except PortError as error:
+            if error.code != ReasonCode.GOAL_OUTSIDE_WORKSPACE or self._grip is None:
+                raise
+            code = self._grip.fell_or_withdrawn()
+            raise TimeLimit("the reach was given up", (error.sentence,), code) from None
 
     def _pause(self, early: EarlyReach) -> None:
         """Nobody seems to offer or ask any more: the arm stands. Who goes on within ``handover.pause`` s is met; else
@@ -181,7 +190,7 @@ class WaitStop(CoglabState):
             why = "the person does not offer or ask any more"
             raise TimeLimit("the reach was given up", (why,), ReasonCode.GOAL_WITHDRAWN) from None
         early.forgive()
-        start(self, dmp_request(early.goal_now()))
+        self._begin_again(early.goal_now())
 
     def _watch(self, ud: Any) -> None:
         """Arm the detector and wait for what it finds; where the arm has arrived and feels nothing, it goes on."""
