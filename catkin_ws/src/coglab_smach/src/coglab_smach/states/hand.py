@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 from coglab_msgs.msg import ReasonCode, Say
+from ih2_hand.grasps import levels_of
 
 from coglab_smach.context.context import Context
 from coglab_smach.ports.pending import PortError
@@ -14,6 +16,12 @@ from coglab_smach.states.where import hand_from_palm, palm_axis
 
 LOOSE = 40
 """counts of 254 that the fingers have opened when the palm begins to draw back"""
+
+
+def gentlest(hand: Mapping[str, Any]) -> dict[str, Any]:
+    """A grasp's hand with the lowest force level that every dialect has for its mode: with more the fingers do not close
+    beside those of a person, whose hand may be between them, or who holds on."""
+    return {**hand, "level": levels_of(hand["mode"], "legacy")[0]}
 
 
 class CalibrateHand(CoglabState):
@@ -100,6 +108,34 @@ class HandClose(CoglabState):
             )
         if self.from_person:
             self.ctx.say(Say.I_HAVE_IT, "I have it.")
+        return "succeeded"
+
+
+class HandTighten(CoglabState):
+    """Hold what the person has let go of as firmly as the object's entry says: the fingers close from where they are,
+    at the wire speed, and with it the force, of ``hand.tighten`` for the grasp's level.
+
+    The arm need not wait until the hand is sure that they stand: they press within ``hand.settle_after_close`` s."""
+
+    default_time_limit = 5.0
+
+    def __init__(self, ctx: Context) -> None:
+        super().__init__(ctx, input_keys=["object_entry", "grasp", "grasp_name"])
+
+    def run(self, ud: Any) -> str:
+        level = ud.object_entry["grasps"][ud.grasp_name]["hand"]["level"]
+        if level == ud.grasp["hand"]["level"]:
+            self.reason = f"it is held with the force of level '{level}'"
+            return "succeeded"
+        speed = int(self.ctx.config.get(f"hand.tighten.{level}", 200))
+        closing, end = self.ctx.hand.close(speed), float(self.ctx.config.get("hand.settle_after_close", 0.3))
+        end += self.ctx.clock.now()
+        while not closing.done() and self.ctx.clock.now() < end:
+            self.pause(0.02)
+        if closing.done():
+            closing.result()
+        self.reason = f"the fingers close to the force of level '{level}'"
+        self.ctx.journal.mark("tightened")
         return "succeeded"
 
 

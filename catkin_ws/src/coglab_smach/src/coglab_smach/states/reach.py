@@ -149,7 +149,9 @@ class WaitStop(CoglabState):
         """Draw back against the palm's outward axis with the hand open, and begin the reach anew."""
         arm, hand = self.ctx.arm, ud.grasp["hand"]
         self.allow(20.0)
-        self.await_pending(arm.switch_controller("ptp"), "end of the reach by switching to 'ptp'", 3.0)
+        # What begins while the arm moves takes its speed along, and brakes less than an arm that is stopped.
+        self.await_pending(arm.cancel_motion("something touches the hand"), "rest of the arm", 3.0)
+        self.await_pending(arm.switch_controller("ptp"), "switching to 'ptp'", 3.0)
         if self.ctx.closing is not None:
             self.ctx.closing = None
             self.await_pending(self.ctx.hand.preshape(hand["mode"], hand["level"]), "the hand's opening", 5.0)
