@@ -14,14 +14,20 @@ from coglab_smach.states.base import CoglabState
 from coglab_smach.states.motion import shift
 from coglab_smach.states.where import hand_from_palm, palm_axis
 
+SLIPPERY = 0.45
+"""friction below which an object is that"""
 LOOSE = 40
 """counts of 254 that the fingers have opened when the palm begins to draw back"""
 
 
-def gentlest(hand: Mapping[str, Any]) -> dict[str, Any]:
-    """A grasp's hand with the lowest force level that every dialect has for its mode: with more the fingers do not close
-    beside those of a person, whose hand may be between them, or who holds on."""
-    return {**hand, "level": levels_of(hand["mode"], "legacy")[0]}
+def gentle(entry: Mapping[str, Any], grasp: Mapping[str, Any]) -> dict[str, Any]:
+    """The hand of a grasp as it closes beside a person, whose fingers may be between its own: with the lowest force
+    level that every dialect has for its mode. What is SLIPPERY slides out of that while the person holds on, and is
+    held with its own level from the beginning."""
+    hand: dict[str, Any] = dict(grasp["hand"])
+    if float(entry.get("friction", 1.0)) >= SLIPPERY:
+        hand["level"] = levels_of(hand["mode"], "legacy")[0]
+    return hand
 
 
 class CalibrateHand(CoglabState):
