@@ -59,6 +59,7 @@ def test_human_to_robot_order(trial):
         "switch_to_ptp",
         "hand_close",
         "take_weight",
+        "hand_tighten",
         "coglab_home_robot",
     ]
     assert trial.labels("/approach/arm_motion") == ["switch_to_dmp", "execute_dmp", "wait_stop"]

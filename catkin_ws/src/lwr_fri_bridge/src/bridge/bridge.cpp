@@ -78,11 +78,7 @@ bool Bridge::compute(const std::uint8_t* datagram, std::size_t size, std::int64_
   const Configurator::Observation seen{true, &measurement_, now_ns};
   serveRequests(seen);
   runSupervision(seen, reception.fresh_session);
-  if (monitor) {
-    active_mode_ = wanted_mode_;
-  } else {
-    active_mode_.approach(wanted_mode_, dt * reception.cycles);
-  }
+  if (monitor) active_mode_ = wanted_mode_;
 
   answer = fri::CommandDatagram{};
   // Before the answer is made, so that it is known when the answer is lost.
@@ -141,8 +137,7 @@ void Bridge::serve(const Request& request, const Configurator::Observation& seen
       return finish(request, OutcomeCode::Done);
     case EventKind::Mode:
       if (supervisor_.held()) return finish(request, OutcomeCode::Held);
-      if (connected_ && !monitor && !softens(request.event.mode))
-        return finish(request, OutcomeCode::InCommandMode);
+      if (connected_ && !monitor) return finish(request, OutcomeCode::InCommandMode);
       if (supervisor_.starting()) return finish(request, OutcomeCode::Busy);
       wanted_mode_ = request.event.mode;
       return finish(request, OutcomeCode::Done);
@@ -171,12 +166,6 @@ void Bridge::serve(const Request& request, const Configurator::Observation& seen
       monitor_asked_ = false;
       return;
   }
-}
-
-/// Whether a mode asks the running strategy for other values alone: those travel with every answer.
-bool Bridge::softens(const ControlMode& mode) const {
-  return mode.strategy == active_mode_.strategy && mode.strategy == wanted_mode_.strategy &&
-         mode.strategy != fri::ControlStrategy::Position;
 }
 
 void Bridge::runSupervision(const Configurator::Observation& seen, bool fresh_session) {

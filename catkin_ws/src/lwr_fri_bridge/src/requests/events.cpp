@@ -13,7 +13,6 @@ namespace {
 constexpr double kSoftest = 0.01, kStiffestJoint = 2000.0, kStiffestTranslation = 5000.0,
                  kStiffestRotation = 300.0;
 constexpr double kLeastDamping = 0.1, kMostDamping = 1.0;
-constexpr double kModeTime = 0.1;  // s, ours: a reach's last 50 mm take half a second
 
 [[noreturn]] void fail(const std::string& what) {
   throw std::invalid_argument(what + "; known events: " + knownEvents());
@@ -126,15 +125,6 @@ const char* wordsFor(fri::KrlResult result) {
 }
 
 }  // namespace
-
-void ControlMode::approach(const ControlMode& wanted, double dt) noexcept {
-  if (wanted.strategy != strategy) return;
-  const double share = -std::expm1(-dt / kModeTime);
-  joint_stiffness += share * (wanted.joint_stiffness - joint_stiffness);
-  joint_damping += share * (wanted.joint_damping - joint_damping);
-  cartesian_stiffness += share * (wanted.cartesian_stiffness - cartesian_stiffness);
-  cartesian_damping += share * (wanted.cartesian_damping - cartesian_damping);
-}
 
 const char* knownEvents() {
   return "start, hold, reset, stop, position, joint_impedance [stiffness k] [damping d], "

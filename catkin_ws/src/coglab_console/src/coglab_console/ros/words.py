@@ -17,6 +17,7 @@ PHASES = {
     "wait_stop": "reaches",
     "hand_preshape": "shapes the hand",
     "hand_close": "closes the hand",
+    "hand_tighten": "holds it firmly",
     "hand_open": "opens the hand",
     "hand_calibration": "calibrates the hand",
     "coglab_home_robot": "goes home",

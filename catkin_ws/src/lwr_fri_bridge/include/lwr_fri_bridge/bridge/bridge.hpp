@@ -106,7 +106,6 @@ class Bridge {
   void serveRequests(const Configurator::Observation& seen);
   void serve(const Request& request, const Configurator::Observation& seen);
   void finish(const Request& request, OutcomeCode code);
-  bool softens(const ControlMode& mode) const;
   void runSupervision(const Configurator::Observation& seen, bool fresh_session);
   void move(const fri::Reception& reception, fri::CommandDatagram& answer);
   void mirror(fri::CommandDatagram& answer);
@@ -132,8 +131,8 @@ class Bridge {
   CartesianSetPoint cartesian_;
   Supervisor supervisor_;
   Configurator configurator_;
-  ControlMode wanted_mode_;  // for the next start, and where the values of this one go
-  ControlMode active_mode_;  // strategy and flags latched on leaving monitor mode
+  ControlMode wanted_mode_;  // for the next start
+  ControlMode active_mode_;  // latched on leaving monitor mode
   RobotSample sample_;
   CommandModeWatch watch_;
   CommandModeLoss loss_;

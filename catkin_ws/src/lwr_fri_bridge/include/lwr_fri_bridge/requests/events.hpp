@@ -32,11 +32,6 @@ struct ControlMode {
       (Vector6() << 2000.0, 2000.0, 2000.0, 200.0, 200.0, 200.0).finished();
   ///< x y z (N/m, 0.01..5000) Rx Ry Rz (Nm/rad, 0.01..300)
   Vector6 cartesian_damping = Vector6::Constant(0.7);  ///< normalised, 0.1..1
-
-  /// Goes `dt` seconds toward the values of a mode of the same strategy, of another one not at all.
-  /// A stiffness that leapt under a load would throw the arm: it comes nearer by the same share in
-  /// each second (time constant 0.1 s, ours). Real-time safe.
-  void approach(const ControlMode& wanted, double dt) noexcept;
 };
 
 enum class EventKind : std::uint8_t { Start, Hold, Reset, Stop, Mode };
