@@ -36,7 +36,6 @@ class Session(unittest.TestCase):
         for action in ORDER:
             cls.rows[action] = run_handover(action, "mug", recorder)[0]
             cls.outcomes[action] = cls.rows[action]["outcome"]
-            print("XXX", cls.rows[action], file=open("/tmp/judge_rows.txt", "a"))
             if cls.outcomes[action] != "success":
                 break
 

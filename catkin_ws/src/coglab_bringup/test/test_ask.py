@@ -119,6 +119,13 @@ def test_hold_status_and_the_way_back(brain):
     assert status == 0 and brain.started == [("reset", "")], output
 
 
+def test_what_the_hub_does_not_take_ends_with_what_to_type(brain):
+    brain.say(HUB, TAKES)
+    status, output = ask("start", "put", "--wait", "0.5")
+    assert status == 1 and "wait_without_object does not take 'put'" in output
+    assert output.endswith("type: ./coglab start exchange_human_to_robot or ./coglab start take\n"), output
+
+
 def test_no_system_and_several(tmp_path, monkeypatch):
     from coglab_bringup.ask import find_master
     from coglab_bringup.usage import Refused

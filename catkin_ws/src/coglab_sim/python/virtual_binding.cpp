@@ -90,6 +90,21 @@ py::dict reportOf(Robot& robot) {
   return result;
 }
 
+py::dict feedbackOf(Robot& robot) {
+  py::list controllers;
+  for (const ctrl_more::ControllerStatus& status : robot.manager().feedback().statusAll()) {
+    py::dict entry;
+    entry["name"] = status.name;
+    entry["enabled"] = status.enabled;
+    entry["activity"] = std::string(ctrl_more::nameOf(status.activity));
+    controllers.append(entry);
+  }
+  py::dict result;
+  result["profile"] = robot.manager().profile();
+  result["controllers"] = controllers;
+  return result;
+}
+
 py::dict debugOf(const coglab_controllers::IkDebugRecord& record) {
   py::dict result;
   result["time"] = 1e-9 * static_cast<double>(record.stamp_ns);
@@ -170,6 +185,15 @@ PYBIND11_MODULE(_virtual, m) {
             return robot.tell(robot.manager().switchTo(id, type));
           },
           py::arg("id"))
+      .def(
+          "apply_profile",
+          [](Robot& robot, const std::string& profile) {
+            return robot.tell(robot.manager().applyProfile(profile));
+          },
+          py::arg("profile"),
+          "Enables exactly the feedback controllers of that profile; (success, message).")
+      .def("feedback_status", &feedbackOf,
+           "{profile, controllers: [{name, enabled, activity}]}, as the topic feedback/status.")
       .def("speed_scale",
            [](Robot& robot, double scale) {
              return robot.tell(robot.manager().setSpeedScale(scale));
@@ -177,7 +201,7 @@ PYBIND11_MODULE(_virtual, m) {
 
       .def_readonly("reason_code", &Robot::reason_code,
                     "ReasonCode of the newest answer of load_controller, switch_controller, "
-                    "speed_scale, add_ptp, load_dmps, execute_dmp or switch_dmp.")
+                    "apply_profile, speed_scale, add_ptp, load_dmps, execute_dmp or switch_dmp.")
       .def(
           "ask_cancel",
           [](Robot& robot, const std::string& id, const std::string& why) {

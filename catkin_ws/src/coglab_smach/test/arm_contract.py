@@ -1,11 +1,33 @@
 """What the port of the arm promises; see port_contracts."""
 
+from dataclasses import replace
+
 import numpy as np
 from coglab_msgs.msg import ReasonCode
 from coglab_smach.ports.interfaces import DmpRequest
-from contract import Contract
+from contract import CONTROLLERS, Contract
 
-CONTROLLERS = {"dmp": "coglab/DmpController", "ptp": "coglab/PtpController"}
+NAN = float("nan")
+REACH = DmpRequest("take_board", "board", [0.0, -0.25, 0.45], dmp_ratio=2.0)
+NO_REACHES = (
+    ({"primitive_id": "to_the_moon"}, ReasonCode.UNKNOWN_NAME, "to_the_moon"),
+    ({"dmp_ratio": 0.0}, ReasonCode.OUT_OF_RANGE, "dmp_ratio"),
+    ({"dmp_ratio": NAN}, ReasonCode.OUT_OF_RANGE, "dmp_ratio"),
+    ({"goal_offset": [0.0, NAN, 0.4]}, ReasonCode.INVALID_ARGUMENT, "goal_offset"),
+    ({"goal_approach": (0.0, 0.0, 0.5)}, ReasonCode.INVALID_ARGUMENT, "goal_approach"),
+    ({"arrival_speed": 9.0}, ReasonCode.INVALID_ARGUMENT, "arrival_speed"),
+    ({"goal_drop": -1.0}, ReasonCode.INVALID_ARGUMENT, "goal_drop"),
+    ({"goal_region_low": (1.0, 0.0, 0.0)}, ReasonCode.INVALID_ARGUMENT, "goal_region_low"),
+    (
+        {"orientation_control": True, "target_orientation": (0.0, 0.0, 0.0, 2.0)},
+        ReasonCode.INVALID_ARGUMENT,
+        "target_orientation",
+    ),
+    ({"goal_frame": "nowhere"}, ReasonCode.UNKNOWN_NAME, "nowhere"),
+    ({"goal_frame": ""}, ReasonCode.GOAL_MISSING, "goal_frame"),
+    ({"goal_offset": [0.0, 0.0, 9.0]}, ReasonCode.GOAL_OUTSIDE_WORKSPACE, "outside the workspace"),
+)
+"""what is wrong with a reach, the code of its refusal, and a word of it"""
 
 
 class ArmContract(Contract):
@@ -20,15 +42,7 @@ class ArmContract(Contract):
             self.refused(self.port.switch_controller("ptp"), ReasonCode.UNKNOWN_NAME)
             self.settle(self.port.cancel_motion("the contract"), 4.0)
             self.loaded = True
-        for name, kind in CONTROLLERS.items():
-            self.settle(self.port.load_controller(name, kind), 20.0)
-        if self.port.motion_allowed().ok:
-            return
-        self.settle(self.port.lwr_command("reset"))
-        if not self.port.motion_allowed().ok:
-            self.settle(self.port.lwr_command("position"))
-            self.settle(self.port.lwr_command("start"), 20.0)
-        self.until(lambda: self.port.motion_allowed().ok, 10.0, "command mode")
+        self.enable(self.port)
 
     def away(self, by=0.4):
         """A posture ``by`` rad from here, in the last joint alone."""
@@ -93,10 +107,10 @@ class ArmContract(Contract):
         self.assert_ended(motion, target, ReasonCode.SWITCHED)
 
     def test_a_reach_goes_on_until_it_is_cancelled(self):
-        assert self.settle(self.port.load_dmps(self.place.library)) >= 5
         self.ready("dmp")
-        request = DmpRequest("take_board", "board", [0.0, -0.25, 0.45], dmp_ratio=2.0)
-        self.settle(self.port.execute_dmp(request))
+        self.refused(self.port.execute_dmp(REACH), ReasonCode.UNKNOWN_NAME)  # no primitive is loaded yet
+        assert self.settle(self.port.load_dmps(self.place.library)) >= 5
+        self.settle(self.port.execute_dmp(REACH))
         self.until(lambda: self.port.dmp_progress().primitive_id == "take_board", 1.0, "news of the motion")
         assert self.port.dmp_progress().state == "running" and self.port.dmp_progress().remaining_distance > 0.05
         self.until(lambda: not self.port.standing().ok, 1.0, "the motion")
@@ -105,21 +119,85 @@ class ArmContract(Contract):
         self.until(lambda: self.port.dmp_progress().state == "aborted", 1.0, "news of the end")
         assert self.port.dmp_progress().code == ReasonCode.CANCELLED
 
+    def test_another_primitive_goes_on_in_the_phase_of_the_motion(self):
+        port = self.port
+        self.settle(port.load_dmps(self.place.library))
+        self.ready("dmp")
+        self.settle(port.execute_dmp(replace(REACH, dmp_ratio=4.0)))
+        self.until(lambda: 0.0 < port.dmp_progress().phase < 0.95, 3.0, "the way")
+        self.refused(port.switch_dmp(DmpRequest("to_the_moon", "", REACH.goal_offset)), ReasonCode.UNKNOWN_NAME)
+        self.refused(port.switch_dmp(replace(REACH, dmp_ratio=0.0)), ReasonCode.OUT_OF_RANGE)
+        before = port.dmp_progress()
+        assert (before.state, before.primitive_id) == ("running", "take_board")
+        self.settle(port.switch_dmp(DmpRequest("put_board", "", REACH.goal_offset, dmp_ratio=4.0)))
+        self.until(lambda: port.dmp_progress().primitive_id == "put_board", 1.0, "news of the other primitive")
+        after = port.dmp_progress()
+        assert after.state == "running" and before.phase - 0.3 < after.phase <= before.phase
+        self.until(lambda: not port.standing().ok, 1.0, "the motion")
+        self.settle(port.cancel_motion("the contract"), 2.5)
+
+    def test_profiles_of_feedback_are_applied_and_come_with_a_controller(self):
+        port = self.port
+        self.ready("dmp")
+        self.until(lambda: port.profile_settled("dmp").ok, 3.0, "the controller's own profile")
+        self.settle(port.apply_profile("dmp_compliant"))
+        self.until(lambda: port.profile_settled("dmp_compliant").ok, 3.0, "the profile")
+        error = self.refused(port.apply_profile("nobody"), ReasonCode.UNKNOWN_NAME)
+        assert "nobody" in error.sentence
+        other = port.profile_settled("dmp")
+        assert not other.ok and "dmp_compliant" in other.why, "a refused one changes nothing"
+        self.settle(port.apply_profile("dmp"))
+        self.until(lambda: port.profile_settled("dmp").ok, 3.0, "the end of the other profile")
+        self.settle(port.apply_profile("dmp_compliant"))
+        self.ready("ptp")
+        self.until(lambda: port.profile_settled("ptp").ok, 3.0, "the profile of the other controller")
+
     def test_refusals_have_codes(self):
         port = self.port
         self.refused(port.switch_controller("nobody"), ReasonCode.UNKNOWN_NAME)
-        self.refused(port.load_controller("x", "coglab/NoController"))
+        for name, kind, code, word in (
+            ("x", "coglab/NoController", ReasonCode.UNKNOWN_NAME, "coglab/NoController"),
+            ("dmp", "coglab/PtpController", ReasonCode.INVALID_ARGUMENT, "in use"),
+            ("9 x/", "coglab/DmpController", ReasonCode.INVALID_ARGUMENT, "beginning with a letter"),
+        ):
+            assert word in self.refused(port.load_controller(name, kind), code).sentence
+        assert "/no/such.xml" in self.refused(port.load_dmps("/no/such.xml"), ReasonCode.BAD_FILE).sentence
         self.ready("dmp")
         self.refused(port.move_ptp(self.away(), []), ReasonCode.NOT_ACTIVE)
-        self.refused(port.execute_dmp(DmpRequest("to_the_moon", "board", [0, 0, 0.4])), ReasonCode.UNKNOWN_NAME)
+        self.settle(port.load_dmps(self.place.library))
         self.refused(port.switch_dmp(DmpRequest("put_board", "board", [0, 0, 0.4])), ReasonCode.NOTHING_RUNS)
         self.ready()
         self.refused(port.execute_dmp(DmpRequest("take_board", "board", [0, 0, 0.4])), ReasonCode.NOT_ACTIVE)
-        self.refused(port.move_ptp(self.away()[:6], []), ReasonCode.INVALID_ARGUMENT)
-        self.refused(port.move_ptp([float("nan"), *self.away()[1:]], []), ReasonCode.INVALID_ARGUMENT)
-        self.refused(port.move_ptp([3.5, *self.away()[1:]], []), ReasonCode.OUT_OF_RANGE)
         self.refused(port.lwr_command("dance"))
         assert port.standing().ok
+
+    def test_reaches_that_make_no_sense_are_refused(self):
+        self.settle(self.port.load_dmps(self.place.library))
+        self.ready("dmp")
+        for fields, code, word in NO_REACHES:
+            error = self.refused(self.port.execute_dmp(replace(REACH, **fields)), code)
+            assert word in error.sentence, (fields, error.sentence)
+        assert self.port.standing().ok
+
+    def test_postures_and_speeds_beyond_the_limits_are_refused(self):
+        self.ready()
+        here = self.away()
+        for position, velocity, code, word in (
+            (here[:6], [], ReasonCode.INVALID_ARGUMENT, "6 numbers"),
+            ([NAN, *here[1:]], [], ReasonCode.INVALID_ARGUMENT, "lwr_a1"),
+            ([3.5, *here[1:]], [], ReasonCode.OUT_OF_RANGE, "lwr_a1"),
+            ([here[0], 2.5, *here[2:]], [], ReasonCode.OUT_OF_RANGE, "lwr_a2"),
+            # Within the table, and nearer to its end than the margin.
+            ([*here[:6], 2.96], [], ReasonCode.OUT_OF_RANGE, "lwr_a6"),
+            ([0.0, 2.0, 0.0, 0.0, 0.0, 0.0, 0.0], [], ReasonCode.GOAL_OUTSIDE_WORKSPACE, "outside the workspace"),
+            (here, [0.1] * 3, ReasonCode.INVALID_ARGUMENT, "3 numbers"),
+            (here, [*[0.1] * 6, NAN], ReasonCode.INVALID_ARGUMENT, "lwr_a6"),
+            (here, [9.0, *[0.1] * 6], ReasonCode.OUT_OF_RANGE, "lwr_a1"),
+            (here, [*[0.1] * 6, 0.0], ReasonCode.OUT_OF_RANGE, "lwr_a6"),
+        ):
+            error = self.refused(self.port.move_ptp(position, velocity), code)
+            assert word in error.sentence, error.sentence
+        assert self.port.standing().ok
 
     def test_a_hold_ends_the_motion_and_latches(self):
         motion, target = self.start_ptp()

@@ -4,12 +4,14 @@ from pathlib import Path
 
 import pytest
 from coglab_objects.database import ObjectDatabase, objects_folder
+from coglab_py.packages import package_path
 from coglab_smach.clocks.virtual_clock import VirtualClock, using
 from coglab_smach.context.config import Config
 from coglab_smach.machines import build_master
 from coglab_smach.simulated.ports import simulated_context
 
 SHARE = Path(__file__).resolve().parent.parent
+LIBRARY = str(package_path("coglab_controllers", "config", "primitives.xml"))
 
 
 class Trial:
@@ -20,7 +22,7 @@ class Trial:
         self.database = ObjectDatabase(objects_folder())
         assert self.database.reload() == []
         config = Config.load(
-            str(SHARE / "config" / "machines.yaml"), {"auto_trigger": True, "dmp_library": "library.xml", **overrides}
+            str(SHARE / "config" / "machines.yaml"), {"auto_trigger": True, "dmp_library": LIBRARY, **overrides}
         )
         self.ctx, self.cell = simulated_context(self.clock, self.database, config)
         with using(self.clock):

@@ -7,6 +7,8 @@ from typing import Any
 
 from coglab_smach.ports.pending import PortError
 
+CONTROLLERS = {"dmp": "coglab/DmpController", "ptp": "coglab/PtpController"}
+
 
 @dataclass
 class Place:
@@ -18,11 +20,16 @@ class Place:
     freeze: Callable[[], None]
     """the node behind the port stops as it stands"""
     thaw: Callable[[], None]
-    library: str = "library.xml"
+    library: str = ""
+    """file of primitives, as the node reads it"""
     push: Callable[[float], None] = lambda force: None
     """somebody lifts the hand with so many N from now on, or presses it down if negative; 0 lets go"""
     arm_rests: AbstractContextManager = field(default_factory=nullcontext)
     """within it nobody else moves the arm"""
+    arm: Any = None
+    """ArmPort of the arm whose contacts the port finds"""
+    believe: Callable[[float], None] = lambda offer: None
+    """from now on it is believed with this probability that the mug is offered"""
 
 
 class Contract:
@@ -54,6 +61,18 @@ class Contract:
             assert not codes or error.code in codes, f"code {error.code}, expected one of {codes}: {error.sentence}"
             return error
         raise AssertionError(f"it succeeded with {value!r}")
+
+    def enable(self, arm):
+        """Its controllers are loaded, and it is in command mode."""
+        for name, kind in CONTROLLERS.items():
+            self.settle(arm.load_controller(name, kind), 20.0)
+        if arm.motion_allowed().ok:
+            return
+        self.settle(arm.lwr_command("reset"))
+        if not arm.motion_allowed().ok:
+            self.settle(arm.lwr_command("position"))
+            self.settle(arm.lwr_command("start"), 20.0)
+        self.until(lambda: arm.motion_allowed().ok, 10.0, "command mode")
 
     def stays(self, condition, duration):
         end = self.place.now() + duration

@@ -1,10 +1,12 @@
 """Nothing moves after a failure: what tests and bench mean by it.
 
 From the moment at which the next state begins after a state that has ended failed or preempted (or at which the machine
-has ended), until somebody asks for a motion or the trial is over, the true speed of every joint stays below STILL.
+has ended), until a motion that somebody asks for is accepted or the trial is over, the true speed of every joint stays
+below STILL.
 """
 
 import numpy as np
+from coglab_smach.ports.pending import PortError
 
 STILL = 0.02
 """rad/s: what the contact detector calls standing still"""
@@ -17,6 +19,8 @@ class MotionWatch:
     def __init__(self, ctx, velocity):
         self._velocity = velocity
         self._failed = self._watching = False
+        self._asked_for = []
+        """requests for motions since the failure whose answer is not known yet"""
         self.failures = 0
         """states that have ended failed or preempted"""
         self.moved = []
@@ -29,8 +33,10 @@ class MotionWatch:
 
     def _asked(self, call):
         def ask(*arguments):
-            self._watching = self._failed = False
-            return call(*arguments)
+            pending = call(*arguments)
+            if self._failed:
+                self._asked_for.append(pending)
+            return pending
 
         return ask
 
@@ -41,6 +47,7 @@ class MotionWatch:
         if record.outcome in ("failed", "preempted") and record.from_state != "monitor_dmp":
             self.failures += 1
             self._failed = True
+            self._asked_for.clear()
 
     def _on_change(self):
         # A state has begun, and nothing beside it is left of what failed.
@@ -48,9 +55,25 @@ class MotionWatch:
             self._watching = True
             self.look()
 
+    def _accepted(self, pending, moves):
+        """Whether a motion was taken over; None: not known yet. A handle of one says so only at its end, but then the
+        arm has moved."""
+        if not pending.done():
+            return True if moves else None
+        try:
+            pending.result()
+        except PortError:
+            return False
+        return True
+
     def look(self):
         """Note it if the arm moves although it must not."""
-        if self._watching:
-            speed = float(np.max(np.abs(self._velocity())))
-            if speed > STILL:
-                self.moved.append((", ".join(self._journal.active()), speed))
+        if not self._failed:
+            return
+        speed = float(np.max(np.abs(self._velocity())))
+        answers = [(pending, self._accepted(pending, speed > STILL)) for pending in self._asked_for]
+        self._asked_for = [pending for pending, accepted in answers if accepted is None]
+        if any(accepted for _, accepted in answers):
+            self._watching = self._failed = False
+        if self._watching and speed > STILL:
+            self.moved.append((", ".join(self._journal.active()), speed))

@@ -10,6 +10,7 @@ from contextlib import contextmanager
 import numpy as np
 from arm_contract import ArmContract
 from coglab_msgs.msg import ReasonCode
+from coglab_smach.ports.interfaces import Ahead, Recognition
 from contract import Contract, Place
 
 __all__ = ["SUITES", "Place"]
@@ -139,6 +140,25 @@ class PerceptionContract(Contract):
     def test_recognition_never_waits(self):
         assert 0.0 <= self.port.recognition().confidence <= 1.0
 
+    def test_an_offer_is_believed_while_perception_says_so(self):
+        nothing = Ahead()
+        self.until(lambda: self.port.ahead() == nothing, 1.0, "the end of what was believed before")
+        self.place.believe(0.75)
+        self.until(lambda: self.port.ahead().offer > 0.5, 2.0, "the belief")
+        seen = self.port.ahead()
+        assert (seen.offer, seen.object_id) == (0.75, "mug") and 0.0 <= seen.request <= 0.25
+        assert seen.deviation >= 0.0 and np.all(np.isfinite(seen.place))
+        self.stays(lambda: self.port.ahead().offer == 0.75, 0.5)
+        self.place.freeze()
+        try:
+            self.until(lambda: self.port.ahead() == nothing, 1.0, "silence")
+            assert self.port.recognition() == Recognition()
+        finally:
+            self.place.thaw()
+        self.until(lambda: self.port.ahead().offer == 0.75, 2.0, "its return")
+        self.place.believe(0.0)
+        self.until(lambda: self.port.ahead().offer == 0.0, 2.0, "the end of the offer")
+
     def test_a_frozen_node_does_not_answer(self):
         self.place.freeze()
         try:
@@ -209,6 +229,7 @@ class ContactContract(Contract):
     def test_requests_that_make_no_sense_are_refused(self):
         self.refused(self.port.arm("juggle", 1.0, {}), ReasonCode.INVALID_ARGUMENT)
         self.refused(self.port.arm("release", 1.0, {}), ReasonCode.INVALID_ARGUMENT)
+        self.refused(self.port.arm("lift", 1.0, {}), ReasonCode.INVALID_ARGUMENT)
         # Nobody has watched for a contact yet.
         self.refused(self.port.arm("load", 1.0, {"mass": 0.3}), ReasonCode.INVALID_ARGUMENT)
         self.refused(self.port.arm("contact", -1.0, {}), ReasonCode.INVALID_ARGUMENT)
@@ -232,6 +253,61 @@ class ContactContract(Contract):
             self.until(lambda: self.port.share_gone() > 0.7, 2.0, "the load")
             self.port.disarm()
             assert self.port.share_gone() is None
+
+    def test_a_weight_that_comes_while_the_arm_lifts_is_found(self):
+        with self.resting():
+            self.watches("lift", mass=0.8, load_share=0.5)
+            self.place.push(-2.0)
+            self.stays(lambda: self.port.event() is None, 0.5)
+            self.place.push(-8.0)
+            self.happens(True, ReasonCode.LOAD_CARRIED)
+
+    @contextmanager
+    def moving(self):
+        """The arm goes for some seconds, slowly, and is stopped in the end."""
+        arm = self.place.arm
+        with self.resting():
+            self.enable(arm)
+            self.settle(arm.switch_controller("ptp"))
+            self.until(lambda: arm.standing().ok, 3.0, "rest")
+            self.place.sleep(1.0)  # what the arm feels while nobody touches it
+            target = list(arm.joint_positions())
+            target[6] += 0.8 if target[6] < 0.5 else -0.8
+
+            def go():
+                arm.move_ptp(target, [0.1] * 7)
+                self.until(lambda: not arm.standing().ok, 2.0, "the motion")
+
+            try:
+                yield go
+            finally:
+                self.settle(arm.cancel_motion("the contract"), 4.0)
+                self.until(lambda: arm.standing().ok, 2.0, "rest")
+
+    def test_contact_says_nothing_while_the_arm_moves(self):
+        with self.moving() as go:
+            self.settle(self.port.arm("contact", 20.0, {"k": 20.0}))
+            go()
+            self.place.sleep(0.3)
+            self.place.push(-8.0)
+            self.stays(lambda: self.port.event() is None and not self.place.arm.standing().ok, 1.0)
+            self.settle(self.place.arm.cancel_motion("the contract"), 4.0)
+            self.happens(True, ReasonCode.CONTACT_CAME_EARLY)
+
+    def test_contact_in_motion_is_found_while_the_arm_moves_and_while_it_rests(self):
+        with self.moving() as go:
+            self.watches("contact_in_motion")
+            self.place.push(-15.0)
+            self.happens(True, ReasonCode.CONTACT_FOUND)
+            self.place.push(0.0)
+            self.place.sleep(1.0)
+            go()
+            self.place.sleep(0.3)
+            self.settle(self.port.arm("contact_in_motion", 20.0, {}))
+            self.stays(lambda: self.port.event() is None, 0.7)
+            self.place.push(-15.0)
+            self.happens(True, ReasonCode.CONTACT_FOUND)
+            assert not self.place.arm.standing().ok
 
     def test_no_event_without_a_touch_and_none_after_the_limit(self):
         self.settle(self.port.arm("contact", 0.4, {"k": 50.0}))

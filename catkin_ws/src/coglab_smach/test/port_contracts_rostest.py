@@ -16,6 +16,7 @@ import rosgraph
 import rospkg
 import rospy
 import rostest
+from coglab_msgs.msg import HandoverBelief
 from coglab_smach.ros.arm import RosArm
 from coglab_smach.ros.hand import RosHand
 from coglab_smach.ros.ports import RosContact, RosDatabase, RosPerception
@@ -42,7 +43,26 @@ def pid_of(node):
     return xmlrpc.client.ServerProxy(api).getPid("/port_contracts")[2]
 
 
-def place_of(name, arm_may_freeze, arm_is_used):
+class Recogniser:
+    """Tells of a belief in an offer, as the node that recognises intentions does, while it believes in one."""
+
+    def __init__(self):
+        self.offer, self.frozen = 0.0, False
+        self.publisher = rospy.Publisher("perception/belief", HandoverBelief, queue_size=1)
+        rospy.Timer(rospy.Duration(0.05), self.tell)
+
+    def believe(self, offer):
+        self.offer = offer
+
+    def tell(self, _event):
+        if self.offer > 0.0 and not self.frozen:
+            message = HandoverBelief(offer=self.offer, hand="human_hand", object_id="mug")
+            message.place_covariance[0] = -1.0
+            message.header.stamp = rospy.Time.now()
+            self.publisher.publish(message)
+
+
+def place_of(name, arm_may_freeze, arm_is_used, recogniser):
     """The real port; the arm's node is frozen only when nobody else needs it, and moves only when nobody else wants it
     to rest."""
     pid = pid_of(NODES[name])
@@ -51,12 +71,18 @@ def place_of(name, arm_may_freeze, arm_is_used):
         if name == "arm":
             assert arm_may_freeze.wait(LIMIT)
         os.kill(pid, signal.SIGSTOP)
+        recogniser.frozen = recogniser.frozen or name == "perception"
+
+    def thaw():
+        os.kill(pid, signal.SIGCONT)
+        recogniser.frozen = recogniser.frozen and name != "perception"
 
     library = rospkg.RosPack().get_path("coglab_controllers") + "/config/primitives.xml"
     publisher = rospy.Publisher("/coglab_sim/cell/push", Wrench, queue_size=1, latch=True)
     push = lambda force: publisher.publish(Wrench(force=Vector3(0.0, 0.0, force)))  # noqa: E731
-    thaw = lambda: os.kill(pid, signal.SIGCONT)  # noqa: E731
-    return Place(PORTS[name](), time.monotonic, time.sleep, freeze, thaw, library, push, arm_is_used)
+    arm = RosArm() if name == "contact" else None
+    clock = time.monotonic, time.sleep
+    return Place(PORTS[name](), *clock, freeze, thaw, library, push, arm_is_used, arm, recogniser.believe)
 
 
 class PortContracts(unittest.TestCase):
@@ -68,6 +94,7 @@ class PortContracts(unittest.TestCase):
         cls.ran = dict.fromkeys(SUITES, 0)
         cls.arm_may_freeze = threading.Event()
         cls.arm_is_used = threading.Lock()
+        cls.recogniser = Recogniser()
         waits = (
             "/lwr/command",
             "/controller_manager/list_controllers",
@@ -84,7 +111,7 @@ class PortContracts(unittest.TestCase):
     @classmethod
     def run_suite(cls, name):
         try:
-            contract = SUITES[name](place_of(name, cls.arm_may_freeze, cls.arm_is_used))
+            contract = SUITES[name](place_of(name, cls.arm_may_freeze, cls.arm_is_used, cls.recogniser))
             moves = cls.arm_is_used if name == "arm" else nullcontext()
             for test in [t for t in vars(SUITES[name]) if t.startswith("test_")]:
                 cls.ran[name] += 1

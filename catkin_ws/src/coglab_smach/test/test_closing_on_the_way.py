@@ -93,3 +93,57 @@ def test_a_hand_that_still_takes_its_preshape_is_left_alone(monkeypatch):
     began = [stamp for stamp, name in trial.cell.calls if name.startswith("preshape")][0]
     closed = [stamp for stamp, name in trial.cell.calls if name == "close"][0]
     assert closed >= began + 0.8, calls
+
+
+@pytest.mark.parametrize("why", ["contact of an object with the hand", "goal lost"])
+def test_with_fingers_that_do_not_open_again_the_arm_stays_with_what_the_person_holds(monkeypatch, why):
+    """They have begun to close, the reach fails, and the hand is stuck: the person may hold what is in it."""
+    trial = Trial()
+    monkeypatch.setattr(reach, "off_grasp", lambda state, goal: 0.02)
+    trial.cell.partner.touch_after = None
+
+    def script(t):
+        t.wait_hub("wait_without_object")
+        t.start(RECEIVE)
+        while not t.ctx.journal.marked("closing_on_the_way"):
+            t.clock.sleep(0.01)
+        moved = t.cell.called("move_ptp")
+        t.cell.faults.refuse["open"] = PortError("motors 2, 3 are stuck", code=ReasonCode.HAND_STALLED)
+        if why == "goal lost":
+            t.cell.arm.end("goal lost", ReasonCode.GOAL_LOST)
+        t.wait_hub("stopped")
+        t.clock.sleep(5.0)
+        assert t.cell.called("move_ptp") == moved, "the arm went away with it"
+        assert "the person may hold what is in it" in t.ctx.journal.why()
+        t.cell.faults.refuse.clear()
+        t.start("reset", "")
+        t.wait_hub("wait_without_object")
+
+    trial.run(script)
+    result = trial.result()
+    assert result.code == ReasonCode.NOT_RELEASED and any(why in cause for cause in result.causes), result
+
+
+def test_fingers_that_have_opened_to_come_again_hold_nothing_of_the_persons(monkeypatch):
+    """After a touch of something else the goal is lost, and only then the hand is stuck, open: the arm goes home."""
+    trial, looks = Trial(), []
+
+    def off_grasp(state, goal):
+        looks.append(trial.clock.now())
+        return 0.02 if len(looks) == 1 else 0.2
+
+    monkeypatch.setattr(reach, "off_grasp", off_grasp)
+    trial.cell.partner.touch_after = 0.3
+
+    def script(t):
+        t.wait_hub("wait_without_object")
+        t.start(RECEIVE)
+        while t.cell.called().count("execute_dmp") < 2:
+            t.clock.sleep(0.01)
+        t.cell.faults.refuse["open"] = PortError("motors 2, 3 are stuck", code=ReasonCode.HAND_STALLED)
+        t.clock.sleep(0.1)
+        t.cell.arm.end("goal lost", ReasonCode.GOAL_LOST)
+        t.wait_hub("wait_without_object")
+
+    trial.run(script)
+    assert "bumped" in trial.result().marks and trial.result().code == ReasonCode.GOAL_LOST

@@ -62,7 +62,7 @@ def test_goal_lost_half_way():
 def test_primitive_that_does_not_exist():
     trial = failed_exchange(lambda t: t.cell.primitives.discard("reach_human"))
     assert_recovered_empty(
-        trial, "primitive 'reach_human' does not exist; loaded: give_human, put_board, reach_human_high, take_board"
+        trial, "primitive 'reach_human' is unknown; loaded are: give_human, put_board, reach_human_high, take_board"
     )
 
 

@@ -2,12 +2,16 @@
 
 import json
 import math
+import re
 
+import pytest
 from coglab_msgs.msg import MasterState as Message
 from coglab_msgs.msg import ReasonCode
 from coglab_smach.context.journal import Journal, Wait
 from coglab_smach.context.master_state import MasterState, StateWatch
+from coglab_smach.context.requests import Answer
 from coglab_smach.context.trigger import ask_for
+from coglab_smach.ports.pending import PortError
 from conftest import Trial
 
 RECEIVE, GIVE = "exchange_human_to_robot", "exchange_robot_to_human"
@@ -159,14 +163,67 @@ def test_an_object_that_does_not_exist_is_refused_by_name():
     trial.run(script)
 
 
-def test_a_silent_database_is_named():
+def no_hub(t):
+    t.ctx.requests.close()
+    return t.ask("take", "mug")
+
+
+def no_name(t):
+    t.ctx.requests.open("wait_with_object", ["put"], names_object=True, default_object="")
+    return t.ask("put")
+
+
+def asked_twice(t):
+    t.ctx.requests.open("wait_without_object", ["take"], default_object="mug")  # nobody takes from it
+    assert t.ask("take", "mug").ok
+    return t.ask("take", "mug")
+
+
+def silent_database(t):
+    t.cell.faults.dead.add("database")
+    return t.ask(RECEIVE, "mug")
+
+
+def broken_database(t):
+    t.cell.faults.refuse["list"] = PortError("service list_objects is not there", code=ReasonCode.NODE_SILENT)
+    return t.ask("take", "mug")
+
+
+def held_by_the_hub(t):
+    """Refused after it was taken: the database lost the object meanwhile."""
+    t.cell.faults.refuse["get mug"] = PortError("'mug' is not in the database", code=ReasonCode.OBJECT_UNKNOWN)
+    t.ctx.holding = "unknown"
+    t.cell.arm.held = True
+    t.wait_hub("stopped")
+    t.cell.hand_positions = (200, 150, 160, 155, 170)
+    assert t.ask("reset").ok
+    t.wait_hub("wait_with_object")
+    assert t.ask("put", "mug").ok
+    t.clock.sleep(1.0)
+    refused = [r for r in t.ctx.journal.transitions if r.outcome == "refused"][-1]
+    return Answer(False, refused.reason, refused.code)
+
+
+@pytest.mark.parametrize(
+    "refuse, code, words",
+    [
+        (no_hub, ReasonCode.WRONG_STATE, "is not in a hub now"),
+        (lambda t: t.ask(GIVE), ReasonCode.WRONG_STATE, "wait_without_object takes"),
+        (no_name, ReasonCode.OBJECT_UNKNOWN, "not known after a restart"),
+        (asked_twice, ReasonCode.BUSY, "'take' was asked for a moment ago"),
+        (silent_database, ReasonCode.NODE_SILENT, "database has not answered within 2 s"),
+        (broken_database, ReasonCode.NODE_SILENT, "list_objects is not there"),
+        (lambda t: t.ask("take", "elephant"), ReasonCode.OBJECT_UNKNOWN, "'elephant' is not in the database"),
+        (held_by_the_hub, ReasonCode.OBJECT_UNKNOWN, "'mug' is not in the database"),
+    ],
+)
+def test_every_refusal_says_why_and_ends_with_what_to_type(refuse, code, words):
     trial = Watched()
 
     def script(t):
         t.wait_hub("wait_without_object")
-        t.cell.faults.dead.add("database")
-        refused = t.ask(RECEIVE, "mug")
-        assert not refused.ok and refused.code == ReasonCode.NODE_SILENT
-        assert "database has not answered" in refused.message
+        refused = refuse(t)
+        assert not refused.ok and refused.code == code and words in refused.message, refused
+        assert re.search(r"type: \./coglab start \w+( \w+)?( or \./coglab start \w+)*$", refused.message), refused
 
     trial.run(script)

@@ -3,7 +3,6 @@
 import ast
 import importlib.metadata
 import json
-import os
 import subprocess
 import sys
 from pathlib import Path
@@ -86,9 +85,5 @@ def test_who_starts_a_motion_ends_it_on_the_engine_of_the_ros_distributions():
     assert Path(lines[0]).resolve().is_relative_to(distribution()) and " passed" in lines[-1]
 
 
-@pytest.mark.skipif(
-    distribution() is not None and os.environ.get("COGLAB_LONG") != "1",
-    reason="run on the engine of the ROS distributions itself; COGLAB_LONG=1 does both",
-)
 def test_a_handover_with_every_other_name_of_our_engine_hidden():
     assert handover_on("names")["engine"] == "names"

@@ -2,15 +2,12 @@
 
 import pytest
 from coglab_objects.database import ObjectDatabase, objects_folder
+from coglab_perception.belief import Belief
 from coglab_sim.virtual_world import DT, World
+from coglab_smach.simulated.arm import SimulatedArm
 from coglab_smach.simulated.cell import SimulatedCell
-from coglab_smach.simulated.ports import (
-    SimulatedArm,
-    SimulatedContact,
-    SimulatedDatabase,
-    SimulatedHand,
-    SimulatedPerception,
-)
+from coglab_smach.simulated.contact import SimulatedContact
+from coglab_smach.simulated.ports import SimulatedDatabase, SimulatedHand, SimulatedPerception
 from coglab_smach.simulated.virtual_arm import VirtualArm
 from coglab_smach.simulated.world_ports import VirtualContact, VirtualDatabase, VirtualHand, VirtualPerception
 from port_contracts import SUITES, Place
@@ -50,7 +47,10 @@ def double_of(name):
         clock.sleep,
         lambda: cell.faults.dead.add(name),
         lambda: cell.faults.dead.discard(name),
-        push=cell.push,
+        LIBRARY,
+        cell.push,
+        arm=SimulatedArm(cell),
+        believe=lambda offer: setattr(cell.partner, "offer", offer),
     )
 
 
@@ -63,9 +63,26 @@ def test_double(name, test):
     getattr(contract, test)()
 
 
+class ToldBelief:
+    """In the place of the BeliefFilter of VirtualPerception: believes what it is told."""
+
+    def __init__(self):
+        self.belief = Belief(0.0)
+
+    def see_object(self, *sight):
+        """Without an influence."""
+
+    def see_hand(self, *sight):
+        """Likewise."""
+        return self.belief
+
+
 def virtual_double_of(name):
     """A port of the trials in virtual time, which has the real controllers, driver and detector behind it."""
-    rig = World(1)
+    rig, told = World(1), ToldBelief()
+
+    def believe(offer):
+        told.belief = Belief(rig.t, offer=offer, object_id="mug" if offer else "")
 
     def sleep(duration):
         for _ in range(max(1, round(duration / DT))):
@@ -77,13 +94,15 @@ def virtual_double_of(name):
     ports = {
         "arm": VirtualArm,
         "hand": VirtualHand,
-        "perception": VirtualPerception,
+        "perception": lambda rig: VirtualPerception(rig, belief=told),
         "contact": VirtualContact,
         "database": lambda rig: VirtualDatabase(database),
     }
     port = ports[name](rig)
     push = lambda force: rig.cell.set_push([0.0, 0.0, force])  # noqa: E731
-    return Place(port, lambda: rig.t, sleep, port.freeze, port.thaw, LIBRARY, push)
+    return Place(
+        port, lambda: rig.t, sleep, port.freeze, port.thaw, LIBRARY, push, arm=VirtualArm(rig), believe=believe
+    )
 
 
 @pytest.mark.parametrize("name", SUITES)

@@ -148,10 +148,8 @@ def start(brain: Brain, options: argparse.Namespace) -> int:
         if wanted and wanted not in brain.state.actions:
             brain.wait_for_state(lambda state: wanted in state.actions or not state.in_hub, min(CHANGE_LIMIT, left))
             if brain.state.in_hub and wanted not in brain.state.actions:
-                raise Refused(
-                    f"{brain.state.state.rpartition('/')[2]} does not take '{wanted}'; it takes: "
-                    f"{', '.join(brain.state.actions)}"
-                )
+                there = " or ".join(f"./coglab start {action}" for action in brain.state.actions)
+                raise Refused(f"{brain.state.state.rpartition('/')[2]} does not take '{wanted}'; type: {there}")
             continue
         action, object_id = choose(options, brain.state)
         answer = brain.call("/coglab/start", Start, action, object_id)

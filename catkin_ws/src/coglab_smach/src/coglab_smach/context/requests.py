@@ -93,7 +93,10 @@ class Requests:
             )
         if self._request is not None:
             return Answer(
-                False, f"'{action}' refused: '{self._request.action}' was asked for a moment ago", ReasonCode.BUSY
+                False,
+                f"'{action}' refused: '{self._request.action}' was asked for a moment ago; "
+                f"when that is over, {command(action)}",
+                ReasonCode.BUSY,
             )
         return None
 

@@ -24,7 +24,8 @@ def ask_for(ctx: Context, action: str, object_id: str = "", source: str = "opera
         try:
             known = _objects(ctx)
         except PortError as error:
-            return Answer(False, f"'{action}' refused: {error.sentence}", error.code)
+            again = f"when the database answers, {command(action)} {wanted}"
+            return Answer(False, f"'{action}' refused: {error.sentence}; {again}", error.code)
         if wanted not in known:
             return Answer(
                 False,
@@ -42,7 +43,7 @@ def _objects(ctx: Context) -> list[str]:
         if ctx.clock.now() >= end:
             pending.cancel()
             raise PortError(
-                f"the object database has not answered within {DATABASE_WAIT:.0f} s; is its node running?",
+                f"the object database has not answered within {DATABASE_WAIT:.0f} s",
                 code=ReasonCode.NODE_SILENT,
             )
         ctx.clock.sleep(0.01)

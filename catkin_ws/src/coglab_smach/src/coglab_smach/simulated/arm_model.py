@@ -18,6 +18,7 @@ from coglab_smach.kinematics.manager_limits import read_limits
 from coglab_smach.kinematics.motion_time import MotionLimits, ptp_time
 from coglab_smach.ports.interfaces import DmpProgress, DmpRequest
 from coglab_smach.ports.pending import PortError
+from coglab_smach.simulated.arm_requests import check_ptp
 
 REACH = np.array([0.9, -0.5, 0.3, -0.4, 0.5, -0.6, 0.4])
 """rad, what a reach of the model adds to the posture it starts from; and back, from where it has ended"""
@@ -159,16 +160,9 @@ class ArmModel:
 
     def add_ptp(self, target: Sequence[float], max_velocity: Sequence[float]) -> int:
         """Begin or queue a motion; its id. PortError as add_ptp refuses."""
-        self._require("ptp")
-        table = np.asarray(target, dtype=float)
-        if table.shape != (7,) or not np.all(np.isfinite(table)):
-            raise PortError(
-                f"add_ptp refused: position has {table.size} numbers, or one that is none; expected 7",
-                code=ReasonCode.INVALID_ARGUMENT,
-            )
-        if np.any(np.abs(table) > 2.95):
-            raise PortError("add_ptp refused: a joint outside its limits", code=ReasonCode.OUT_OF_RANGE)
-        motion = _Ptp(self._next_id, table, max_velocity)
+        self.require("ptp")
+        check_ptp(target, max_velocity, self.limits.velocity)
+        motion = _Ptp(self._next_id, np.asarray(target, dtype=float), max_velocity)
         self._next_id += 1
         if self._running is None:
             self._begin(motion)
@@ -184,15 +178,6 @@ class ArmModel:
     def ended(self, identity: int) -> tuple[PortError | None] | None:
         """How a motion has ended; None while it runs or waits."""
         return (self._ended[identity],) if identity in self._ended else None
-
-    def check_dmp(self, request: DmpRequest, primitives: set[str]) -> None:
-        """PortError as execute_dmp and switch_dmp refuse."""
-        self._require("dmp")
-        if request.primitive_id not in primitives:
-            raise PortError(
-                f"primitive '{request.primitive_id}' does not exist; loaded: {', '.join(sorted(primitives))}",
-                code=ReasonCode.UNKNOWN_NAME,
-            )
 
     def execute(self, request: DmpRequest) -> None:
         """Begin a reach: out from where the arm is, or back if it is out already."""
@@ -210,11 +195,12 @@ class ArmModel:
             raise PortError("switch_dmp refused: no motion runs", code=ReasonCode.NOTHING_RUNS)
         self.request = request
 
-    def _require(self, controller_id: str) -> None:
-        why, code = self.blocked()
-        if code:
-            raise PortError(f"refused: {why}", code=code)
+    def require(self, controller_id: str) -> None:
+        """PortError where this controller may not move the arm now."""
         if self.active != controller_id:
             raise PortError(
                 f"refused: '{self.active}' is the active controller, not '{controller_id}'", code=ReasonCode.NOT_ACTIVE
             )
+        why, code = self.blocked()
+        if code:
+            raise PortError(f"refused: {why}", code=code)

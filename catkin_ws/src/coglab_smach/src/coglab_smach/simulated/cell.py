@@ -117,7 +117,8 @@ class SimulatedCell:
         self.profile_since = 0.0
         self.fade_time = 0.2
         self.loaded: dict[str, str] = {}
-        self.primitives = {"reach_human", "reach_human_high", "give_human", "take_board", "put_board"}
+        self.primitives: set[str] = set()
+        """those that were loaded"""
         self.hand_positions: tuple[int, ...] = (0, 0, 0, 0, 0)
         self.calibrated = self.preshaped = False
         self.calibrating_until = 0.0
@@ -147,6 +148,11 @@ class SimulatedCell:
         if self.at_palm is None or self.at_palm[0] != object_id:
             return self.objects[object_id]
         return Pose(*default_arm().fk(np.asarray(self.arm.position()))) * self.at_palm[1].inverse()
+
+    def frames(self) -> dict[str, Pose]:
+        """All frames that a goal may be given in, in the base frame."""
+        seen = {n if n in ("board", "human_hand") else f"object_{n}": self.pose(n) for n in self.objects}
+        return {"world": Pose(), "lwr_base_link": Pose(), **seen}
 
     def let_go(self) -> None:
         """The person's hand leaves what it has given, and comes back later."""

@@ -22,6 +22,8 @@ EVENTS = {
 }
 
 TOUCHES = ("contact", "contact_in_motion")
+AT_REST = ("contact", "load")
+"""modes in which nothing is found while the arm moves"""
 
 
 class SimulatedContact:
@@ -33,7 +35,8 @@ class SimulatedContact:
         self._until = 0.0
         self._due: float | None = None
         self._event: ContactEvent | None = None
-        self._touched = False
+        self._touched = self._early = False
+        """somebody has watched for a contact; what is felt now came while the arm moved"""
         self._touches: tuple[str, Pose] | None = None
         """what the person brings to the palm, and the palm relative to it"""
         self._lifted_before = self._needed = self._weight = 0.0
@@ -43,7 +46,7 @@ class SimulatedContact:
 
     def arm(self, mode: str, time_limit: float, settings: dict[str, Any]) -> Pending:
         cell = self.cell
-        self._event, self._mode = None, ""
+        self._event, self._mode, self._early = None, "", False
 
         def apply() -> None:
             partner = cell.partner
@@ -87,9 +90,14 @@ class SimulatedContact:
         now = self.cell.clock.now()
         happens = self._due is not None and self._due <= min(now, self._until)
         happens = happens or (now <= self._until and self._pushed())
+        if self._mode in AT_REST and not self.cell.arm.standing():
+            self._early = happens
+            return self._event
         if self._event is None and self._mode and happens and "contact" not in self.cell.faults.dead:
             why = f"{self._mode} by the partner's script"
-            self._event = ContactEvent(self._mode != "release", "simulated", 2.0, why, code=EVENTS[self._mode])
+            early = self._early and self._mode == "contact"
+            code = ReasonCode.CONTACT_CAME_EARLY if early else EVENTS[self._mode]
+            self._event = ContactEvent(self._mode != "release", "simulated", 2.0, why, code=code)
             if self._touches is not None and happens and not self._pushed():
                 self.cell.at_palm = self._touches
             if self._mode == "lift":

@@ -1,13 +1,13 @@
 """Ports without ROS: a kinematic cell in which the machines run in virtual time, for tests and quick trials.
 
-The arm is a model that moves and brakes (simulated_arm_model), the hand takes fixed times, the partner follows a
+The arm (simulated.arm) is a model that moves and brakes, the hand takes fixed times, the partner follows a
 script. Faults are attributes that a test sets at any time. Physics belongs to coglab_sim; here only order, timing and
 outcomes matter.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -16,17 +16,9 @@ from coglab_objects.database import ObjectDatabase, ObjectError
 from coglab_py.pose import Pose
 
 from coglab_smach.clocks.clock import Clock
-from coglab_smach.kinematics.motion_time import MotionLimits
-from coglab_smach.ports.interfaces import (
-    Ahead,
-    DmpProgress,
-    DmpRequest,
-    HandState,
-    Located,
-    Recognition,
-    Verdict,
-)
-from coglab_smach.ports.pending import Pending, Polled, PortError, Ready, ending_motion
+from coglab_smach.ports.interfaces import Ahead, HandState, Located, Recognition
+from coglab_smach.ports.pending import Pending, Polled, PortError, Ready
+from coglab_smach.simulated.arm import SimulatedArm
 from coglab_smach.simulated.cell import SimulatedCell
 from coglab_smach.simulated.contact import SimulatedContact
 
@@ -34,143 +26,6 @@ CALIBRATION = 1.7
 """s"""
 MODES = ("cylindrical", "lateral", "tridigit", "bidigit", "tridigit2", "bidigit2")
 """preshapes of the hand"""
-
-
-class SimulatedArm:
-    """ArmPort of the kinematic cell."""
-
-    def __init__(self, cell: SimulatedCell) -> None:
-        self.cell = cell
-        self._progress = DmpProgress()
-
-    def load_controller(self, controller_id: str, controller_type: str) -> Pending:
-        def apply() -> None:
-            if controller_type not in ("coglab/DmpController", "coglab/PtpController"):
-                raise PortError(
-                    f"load_controller refused: no controller of type '{controller_type}'", code=ReasonCode.UNKNOWN_NAME
-                )
-            self.cell.loaded[controller_id] = controller_type
-
-        return self.cell.answer("arm", "load_controller", 0.1, apply)
-
-    def load_dmps(self, filename: str) -> Pending:
-        return self.cell.answer("arm", "load_dmps", 0.1, lambda: len(self.cell.primitives))
-
-    def lwr_command(self, event: str) -> Pending:
-        def apply() -> str:
-            arm = self.cell.arm
-            if event == "start" and arm.held:
-                raise PortError("'start' refused: hold is latched; send reset first", code=ReasonCode.HELD)
-            if event not in ("start", "hold", "reset", "stop", "position"):
-                raise PortError(f"event '{event}' is not known", code=ReasonCode.UNKNOWN_NAME)
-            arm.enabled = event == "start" or (arm.enabled and event != "stop")
-            arm.held = event == "hold" or (arm.held and event != "reset")
-            return event
-
-        return self.cell.answer("arm", f"lwr {event}", 0.05, apply)
-
-    def _here(self) -> bool:
-        self.cell.advance()
-        return "arm" not in self.cell.faults.dead
-
-    def motion_allowed(self) -> Verdict:
-        if not self._here():
-            return Verdict(False, "/lwr/state is silent", ReasonCode.NODE_SILENT)
-        why, code = self.cell.arm.blocked()
-        return Verdict(code == ReasonCode.NONE, why, code)
-
-    def standing(self) -> Verdict:
-        if not self._here():
-            return Verdict(False, "/lwr/state is silent", ReasonCode.NODE_SILENT)
-        standing = self.cell.arm.standing()
-        return Verdict(standing, "" if standing else "the arm moves")
-
-    def cancel_motion(self, reason: str) -> Pending:
-        arm = self.cell.arm
-        asked = self.cell.answer("arm", "cancel", 0.02, lambda: arm.end(reason, ReasonCode.CANCELLED))
-        # Never withdrawn: whoever gives up waiting leaves it in force.
-        return Polled(lambda: asked.done() and self.standing().ok, lambda: asked.result() and None)
-
-    def motion_limits(self) -> MotionLimits:
-        return self.cell.arm.limits
-
-    def speed_scale(self) -> float:
-        return self.cell.arm.speed_scale
-
-    def switch_controller(self, controller_id: str) -> Pending:
-        def apply() -> str:
-            if controller_id not in self.cell.loaded:
-                raise PortError(f"controller '{controller_id}' is not loaded", code=ReasonCode.UNKNOWN_NAME)
-            self.cell.arm.switch(controller_id)
-            # As the controller manager does: the profile of the motion controller's name comes with it.
-            self.cell.profile, self.cell.profile_since = controller_id, self.cell.clock.now()
-            return self.cell.loaded[controller_id]
-
-        return self.cell.answer("arm", f"switch {controller_id}", 0.02, apply)
-
-    def apply_profile(self, profile: str) -> Pending:
-        def apply() -> None:
-            self.cell.profile, self.cell.profile_since = profile, self.cell.clock.now()
-
-        return self.cell.answer("arm", f"profile {profile}", 0.01, apply)
-
-    def profile_settled(self, profile: str) -> Verdict:
-        cell = self.cell
-        if cell.profile != profile:
-            return Verdict(False, f"profile '{cell.profile}' is in force")
-        faded = cell.clock.now() - cell.profile_since >= cell.fade_time
-        return Verdict(faded, "" if faded else "ee_admittance is stopping")
-
-    def execute_dmp(self, request: DmpRequest) -> Pending:
-        def apply() -> None:
-            self.cell.arm.check_dmp(request, self.cell.primitives)
-            self.cell.arm.execute(request)
-
-        return ending_motion(self.cell.answer("arm", "execute_dmp", 0.02, apply), self.cancel_motion)
-
-    def switch_dmp(self, request: DmpRequest) -> Pending:
-        def apply() -> None:
-            self.cell.arm.check_dmp(request, self.cell.primitives)
-            self.cell.arm.substitute(request)
-
-        return self.cell.answer("arm", f"switch_dmp {request.primitive_id}", 0.02, apply)
-
-    def dmp_progress(self) -> DmpProgress:
-        if self._here():
-            self._progress = self.cell.arm.dmp
-        return self._progress
-
-    def move_ptp(self, position: Sequence[float], max_velocity: Sequence[float]) -> Pending:
-        arm = self.cell.arm
-        added = self.cell.answer("arm", "move_ptp", 0.02, lambda: arm.add_ptp(position, max_velocity))
-        ended: list[PortError | None] = []
-
-        def finished() -> bool:
-            if not ended and added.done():
-                ended.extend(self._end_of_ptp(added) or ())
-            return bool(ended)
-
-        def value() -> None:
-            if ended[0] is not None:
-                raise ended[0]
-
-        return ending_motion(Polled(finished, value, added.cancel), self.cancel_motion)
-
-    def _end_of_ptp(self, added: Pending) -> tuple[PortError | None] | None:
-        try:
-            end = self.cell.arm.ended(added.result())
-        except PortError as error:
-            return (error,)
-        allowed = self.motion_allowed()
-        if end is None and not allowed.ok:
-            return (PortError("the arm does not follow any more", (allowed.why,), allowed.code),)
-        return end
-
-    def joint_positions(self) -> tuple[float, ...] | None:
-        return self.cell.joints if self._here() else None
-
-    def hold(self, reason: str) -> Pending:
-        return self.lwr_command("hold")
 
 
 class SimulatedHand:
@@ -326,12 +181,15 @@ class SimulatedPerception:
 
     def ahead(self) -> Ahead:
         partner = self.cell.partner
+        if "perception" in self.cell.faults.dead:
+            return Ahead()
         return Ahead(partner.offer, partner.request, "mug" if partner.offer > 0.0 else "")
 
     def recognition(self) -> Recognition:
         cell, partner = self.cell, self.cell.partner
         started = cell.arm.motion_started
-        if started is None or cell.clock.now() - started < partner.pattern_at:
+        silent = "perception" in cell.faults.dead
+        if silent or started is None or cell.clock.now() - started < partner.pattern_at:
             return Recognition()
         return Recognition(partner.pattern, 0.95, partner.pattern != "unknown")
 

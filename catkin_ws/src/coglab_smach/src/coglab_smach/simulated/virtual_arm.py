@@ -144,6 +144,17 @@ class VirtualArm:
             )
         )
 
+    def apply_profile(self, profile: str) -> Pending:
+        return self.node.ask(lambda: self._answered(self.robot.apply_profile(profile)))
+
+    def profile_settled(self, profile: str) -> Verdict:
+        now = self.robot.feedback_status()
+        if now["profile"] != profile:
+            return Verdict(False, f"profile '{now['profile']}' is in force")
+        others = [c for c in now["controllers"] if not c["enabled"]]
+        busy = [f"{c['name']} is {c['activity']}" for c in others if c["activity"] != "off"]
+        return Verdict(not busy, ", ".join(busy))
+
     def execute_dmp(self, request: DmpRequest) -> Pending:
         self.request = request
         self.rig.robot.debug = None

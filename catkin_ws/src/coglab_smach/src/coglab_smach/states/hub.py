@@ -146,7 +146,7 @@ class Hub(CoglabState):
             entry = self.await_pending(self.ctx.database.get_object(ud.object_id), f"entry of '{ud.object_id}'", 5.0)
         except PortError as error:
             self.ctx.holding = ud.object_id = UNKNOWN
-            return f"'{request.action}' refused: {error.sentence}"
+            return f"'{request.action}' refused: {error.sentence}; {command(request.action)} OBJECT"
         ud.object_entry = entry
         ud.grasp_name = entry["default_grasp"]
         ud.grasp = entry["grasps"][ud.grasp_name]

@@ -155,6 +155,7 @@ class WaitStop(CoglabState):
         if self.ctx.closing is not None:
             self.ctx.closing = None
             self.await_pending(self.ctx.hand.preshape(hand["mode"], hand["level"]), "the hand's opening", 5.0)
+            self.ctx.shared = False
         back = palm_axis(self.ctx)
         if back is not None:
             moved = shift(self.ctx, -DRAWN_BACK * back, 0.1)
@@ -234,6 +235,8 @@ class WaitStop(CoglabState):
             return
         away = off_grasp(self, goal)
         if away is not None and away < within + BETWEEN:
+            # From here on the person's object may be in the fingers, whatever becomes of the reach.
+            self.ctx.shared = True
             self.ctx.closing = self.ctx.hand.close_on_object()
             self.ctx.journal.mark("closing_on_the_way")
 
