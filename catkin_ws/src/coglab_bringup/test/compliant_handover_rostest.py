@@ -36,7 +36,7 @@ class CompliantHandover(unittest.TestCase):
     def test_the_admittance_ran_during_the_reach_alone(self):
         running = [t for t, profile, activity in self.activity if activity == "running" and profile == "dmp_compliant"]
         self.assertTrue(running, self.activity)
-        contact = next(t for t, found, _ in self.trial.contacts if found and t >= self.start)
+        contact = next(t for t, found, *_ in self.trial.contacts if found and t >= self.start)
         off = [t for t, _, activity in self.activity if t > running[-1] and activity == "off"]
         self.assertTrue(off, self.activity)
         self.assertLess(off[0], contact + 1.5, "the admittance was still at work long after contact was found")

@@ -73,6 +73,7 @@ inline coglab_msgs::CellTruth truthMessage(const CellTruth& truth, const std::st
   message.robot_hand = poseMessage(truth.robot_hand);
   message.hand_closure = truth.hand_closure;
   message.palm_force = vectorMessage(truth.palm_force);
+  message.touch_force = vectorMessage(truth.touch_force);
   message.human_force = vectorMessage(truth.human_force);
   message.robot_load_share = truth.robot_load_share;
   message.human_load_share = truth.human_load_share;

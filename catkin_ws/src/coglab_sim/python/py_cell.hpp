@@ -64,6 +64,7 @@ class PyCell {
     result["robot_hand"] = poseDict(t.robot_hand);
     result["hand_closure"] = t.hand_closure;
     result["palm_force"] = t.palm_force;
+    result["touch_force"] = t.touch_force;
     result["human_force"] = t.human_force;
     result["robot_load_share"] = t.robot_load_share;
     result["human_load_share"] = t.human_load_share;

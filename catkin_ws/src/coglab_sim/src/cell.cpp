@@ -143,6 +143,7 @@ CellTruth Cell::truth() const {
   truth.robot_hand = plant_.palm();
   truth.hand_closure = plant_.handClosure();
   truth.palm_force = plant_.objectForce();
+  truth.touch_force = plant_.touchForce();
   truth.robot_load_share = plant_.robotShare();
   truth.human_load_share = plant_.personShare();
   truth.human_force = plant_.personForce();

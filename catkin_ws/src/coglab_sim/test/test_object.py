@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from fri_client import parse
+from scipy.spatial.transform import Rotation
 
 WEIGHT = 0.31 * 9.81
 EXACT = {
@@ -125,6 +126,25 @@ def test_load_moves_from_person_to_robot(session):
         touch["palm"][0] < -1.0
         and sum(np.linalg.norm(touch[f"{f}_distal"]) > 1.0 for f in ("index", "middle", "ring")) >= 2
     )
+
+
+def test_what_touches_the_hand_is_told_apart_from_the_object(session):
+    """A person's hand on the robot's hand is a touch, and no force of the object."""
+    s, _ = scene(session)
+    s.cell.place("world", [0.3, 0.9, 0.5])  # it falls beside
+    preshape(s)
+    hand = s.cell.truth()["robot_hand"]["position"] + [0.0, 0.15, 0.0]
+    for _ in range(int(0.15 / (0.05 * s.cell.period))):
+        hand = hand - [0.0, 0.05 * s.cell.period, 0.0]
+        s.cell.set_human(hand, velocity=[0.0, -0.05, 0.0], grip=0.0)
+        s.tick()
+        truth = s.cell.truth()
+        if np.linalg.norm(truth["touch_force"]) > 0.5:
+            break
+    assert np.linalg.norm(truth["touch_force"]) > 0.5 and np.linalg.norm(truth["palm_force"]) == 0.0
+    rotation = Rotation.from_quat(truth["robot_hand"]["rotation"])
+    felt = sum(rotation.apply(force) for force in s.cell.touch().values())
+    assert truth["touch_force"] == pytest.approx(felt, abs=1e-3)  # the palm has turned a step since
 
 
 def test_early_release_drops_it(session):

@@ -270,7 +270,7 @@ def test_touch_alone_is_contact_also_of_what_lies_in_the_palm():
 
 
 def test_fingers_that_stop_early_or_are_moved_are_contact():
-    for change, named in (({"position": 60}, "moved"), ({"current": 90}, "current"), ({"force": 60}, "strained")):
+    for change, named in (({"position": 60}, "moved"), ({"force": 60}, "strained")):
         fingers = Fingers()
         assert fingers.feed(0.0, [Motor(), Motor()]).margin == 0.0
         evidence = fingers.feed(0.2, [Motor(), Motor(**change)])
@@ -281,6 +281,19 @@ def test_fingers_that_stop_early_or_are_moved_are_contact():
     assert fingers.feed(0.4, [Motor(position=95, over_current=True)]).margin > 1.0
     fingers.feed(0.6, [Motor(moving=True)])
     assert fingers.feed(0.8, [Motor(position=200, target_reached=True)]).margin == 0.0
+
+
+def test_a_current_counts_once_the_next_status_has_it_too():
+    """The command to close falls between the readings of one status: it shows the current and no motion yet."""
+    fingers = Fingers()
+    fingers.feed(0.0, [Motor(), Motor()])
+    assert fingers.feed(0.03, [Motor(), Motor(current=200)]).margin < 1.0
+    assert fingers.feed(0.06, [Motor(), Motor(current=200, moving=True)]).margin < 1.0
+    fingers = Fingers()
+    fingers.feed(0.0, [Motor(), Motor()])
+    fingers.feed(0.03, [Motor(), Motor(current=200)])
+    evidence = fingers.feed(0.06, [Motor(), Motor(current=200)])  # told to move, and something stands in its way
+    assert evidence.margin >= 1.0 and "motor 1" in evidence.message and "current" in evidence.message
 
 
 def test_two_sources_that_are_nearly_sure_are_a_contact_together():

@@ -178,7 +178,7 @@ def _contact_lines(axes: list[plt.Axes], contacts: list[tuple], start: float) ->
     """Vertical lines where the detector reported, explained beside the phases."""
     kinds = {True: ("contact or load felt", ":"), False: ("load taken over", "--")}
     for axis in axes:
-        for t, found, _ in contacts:
+        for t, found, *_ in contacts:
             axis.axvline(t - start, color=CONTACT, lw=0.9, ls=kinds[bool(found)][1])
     shown = [kinds[found] for found in (True, False) if any(bool(c[1]) is found for c in contacts)]
     handles = [plt.Line2D([], [], color=CONTACT, lw=0.9, ls=style, label=label) for label, style in shown]

@@ -20,7 +20,7 @@ from sensor_msgs.msg import JointState
 
 from coglab_bringup.reach_errors import GIVES, reach_errors
 
-FORCE_THRESHOLD = 0.3  # N on the palm from which the object counts as touching (truth)
+FORCE_THRESHOLD = 0.3  # N on palm and fingers from which something touches the hand (truth)
 LOST_KEYS = ("measurements lost", "answers lost")  # diagnostics values of the bridge that count lost FRI packets
 
 
@@ -30,12 +30,12 @@ class Trial:
 
     joints: list[tuple] = field(default_factory=list)  # (t, position[7], velocity[7])
     external_torques: list[tuple] = field(default_factory=list)  # (t, torque[7]) in Nm
-    truth: list[tuple] = field(default_factory=list)  # (t, robot xyz, human xyz, object xyz, palm force)
+    truth: list[tuple] = field(default_factory=list)  # (t, robot xyz, human xyz, object xyz, force on the robot's hand)
     poses: list[tuple] = field(default_factory=list)  # (t, palm, person's hand, object) as Poses in world, the truth
     fingers: list[tuple] = field(default_factory=list)  # (t, position[5])
     feedback: list[tuple] = field(default_factory=list)  # (t, state, remaining distance)
     transitions: list[tuple] = field(default_factory=list)  # (t, path, from, outcome, to, reason, code)
-    contacts: list[tuple] = field(default_factory=list)  # (t, contact, margin)
+    contacts: list[tuple] = field(default_factory=list)  # (t, contact, margin, what the detector says)
     fri_lost: list[tuple] = field(default_factory=list)  # (t, FRI packets lost so far), from the bridge's diagnostics
 
 
@@ -74,7 +74,7 @@ class TrialRecorder:
         self.trial.external_torques.append((message.header.stamp.to_sec(), message.effort))
 
     def _on_truth(self, message: CellTruth) -> None:
-        points = [message.robot_hand.position, message.human_hand.position, message.object.position, message.palm_force]
+        points = [message.robot_hand.position, message.human_hand.position, message.object.position, message.touch_force]
         robot, human, thing, force = ([p.x, p.y, p.z] for p in points)
         stamp = message.header.stamp.to_sec()
         self.trial.truth.append((stamp, robot, human, thing, float(np.linalg.norm(force))))
@@ -94,7 +94,8 @@ class TrialRecorder:
             self.changed.notify_all()
 
     def _on_contact(self, message: Contact) -> None:
-        self.trial.contacts.append((message.header.stamp.to_sec(), message.contact, message.margin))
+        words = f"{message.source}: {message.message}"
+        self.trial.contacts.append((message.header.stamp.to_sec(), message.contact, message.margin, words))
 
     def _on_diagnostics(self, message: DiagnosticArray) -> None:
         counts = [int(value.value) for status in message.status for value in status.values if value.key in LOST_KEYS]
@@ -125,9 +126,9 @@ def summarise(
     peak_velocity_share: largest joint speed over its limit. None where nothing was measured (no contact is waited for
     where the robot gives).
     """
-    contact = next((t for t, found, _ in trial.contacts if found and start <= t <= end), None)
+    contact = next((t for t, found, *_ in trial.contacts if found and start <= t <= end), None)
     until = next(
-        (t for t, _, _ in trial.contacts if start <= t <= end), end
+        (t for t, *_ in trial.contacts if start <= t <= end), end
     )  # after a contact or a release the arm goes home
     # A motion that is "holding" is on its way: it holds a goal that is not seen for the moment.
     arrived = [d for t, state, d in trial.feedback if start <= t <= until and state == "reached"]

@@ -214,6 +214,8 @@ void Plant::readContacts(double dt) {
     feel(one, two, -force, local[0], pressing);
     feel(two, one, force, local[0], pressing);
   }
+  touch_force_ = touch_.palm;
+  for (const Vector3d& force : touch_.phalanges) touch_force_ += force;
   const Matrix3d to_palm = palm().rotation.toRotationMatrix().transpose();
   for (Vector3d& force : touch_.phalanges) force = to_palm * force;
   touch_.palm = to_palm * touch_.palm;

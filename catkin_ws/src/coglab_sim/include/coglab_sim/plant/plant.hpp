@@ -144,6 +144,8 @@ class Plant {
   double handClosure() const;
   const Touch& touch() const { return touch_; }
   const Vector3d& objectForce() const { return object_force_; }  ///< N, of it on the robot's hand
+  /// N, of all that touches palm and fingers, world axes; where these touch one another, nothing.
+  const Vector3d& touchForce() const { return touch_force_; }
   /// N, of the object on the person's hand, world axes: what their grip carries, less what the
   /// acceleration of their own hand asks for; zero without a grip. A mean over 20 ms.
   const Vector3d& personForce() const { return person_force_; }
@@ -218,6 +220,7 @@ class Plant {
   Pose in_hand_;         // where it was put
   Touch touch_;
   Vector3d object_force_ = Vector3d::Zero();
+  Vector3d touch_force_ = Vector3d::Zero();  // of everything
   double robot_share_ = 0.0, person_share_ = 0.0;
   Vector3d grip_force_ = Vector3d::Zero(), person_force_ = Vector3d::Zero();
   double squeeze_ = 0.0, grasp_force_ = 0.0;  // N, averaged

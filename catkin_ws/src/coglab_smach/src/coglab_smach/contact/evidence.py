@@ -123,8 +123,9 @@ class Motor(Protocol):
 
 
 class Fingers:
-    """Motors of the hand while nobody closes it: a finger that stops before its target, or one that stands and is
-    moved, strained or needs current."""
+    """Motors of the hand: a finger that stops before its target, or one that stands and is moved, strained or needs
+    current. The motors are read one value after the other, so that a command to close may fall between the reading of
+    `moving` and that of the current: a current counts once the next status has it, too, and still no motion."""
 
     def __init__(self, counts: float = 8.0, current: float = 60.0, tension: float = 20.0, hold: float = 0.4) -> None:
         """Thresholds in the counts of MotorStatus: way of a standing motor, current above that on arming, tension above
@@ -137,6 +138,7 @@ class Fingers:
         """Compare with the next status from now on."""
         self._reference: dict[int, np.ndarray] = {}
         self._moved: set[int] = set()
+        self._loaded: set[int] = set()
 
     def feed(self, stamp: float, motors: Sequence[Motor]) -> Evidence | None:
         """One status of all motors; None while there is nothing to compare with."""
@@ -152,8 +154,12 @@ class Fingers:
                 margin, message = 1.2, f"motor {number} of the hand stopped before its target"
             if motor.moving or stopped or number not in self._reference:
                 self._reference[number] = now
+                self._loaded.discard(number)
                 continue
             change = np.abs(now - self._reference[number]) / self.thresholds
+            loaded = change[1] >= 1.0
+            change[1] *= number in self._loaded
+            (self._loaded.add if loaded else self._loaded.discard)(number)
             if float(np.max(change)) > margin:
                 margin = float(np.max(change))
                 what = ("moved", "needs current", "is strained")[int(np.argmax(change))]
