@@ -15,9 +15,13 @@ ROW = dict(zip(bench.COLUMNS, ("one", "time of a | step", 1.23456, "us", "<= 2",
 
 @pytest.fixture
 def checkout(tmp_path):
-    """A checkout with two benches, `one` and `two`, all of it committed."""
-    folder = tmp_path / "catkin_ws" / "src" / "p" / "bench"
+    """A checkout with benches `one` and `two` of package `p`, and packages `used` and `other`; all committed."""
+    source = tmp_path / "catkin_ws" / "src"
+    folder = source / "p" / "bench"
     folder.mkdir(parents=True)
+    for name, uses in (("p", "<exec_depend>used</exec_depend>"), ("used", ""), ("other", "")):
+        (source / name / "test").mkdir(parents=True)
+        (source / name / "package.xml").write_text(f"<package><name>{name}</name>{uses}</package>")
     (tmp_path / "docs").mkdir()
     (tmp_path / "coglab").write_text("")
     (folder / "bench_one.py").write_text('"""Ten steps, none left out."""\n')
@@ -40,7 +44,7 @@ def test_the_page_has_definition_goal_value_peer_machine_date_and_commit(checkou
     assert r"| one: time of a \| step | 1.235 us | <= 2 | met | KDL | 3 |" in text
     assert "| one: other | 1.235 us | <= 2 | **missed** | KDL | 3 |" in text
     assert re.search(r"on \d{4}-\d\d-\d\d, commit [0-9a-f]{7}, on \d+ cores of ", text)
-    assert "| two: all of its rows | not measured on this commit | as in the bench | **missed** | - | - |" in text
+    assert "| two: all of its rows | not measured on these sources | as in the bench | **missed** | - | - |" in text
 
 
 def quoted_by(checkout: Path) -> str:
@@ -65,7 +69,7 @@ def test_the_readme_quotes_what_is_missed_and_the_latency_and_counts_the_rest(ch
     rows = [line for line in quoted_by(checkout).splitlines() if figures.cells_of(line)]
     expected = [figures.line_of("fri", latency), figures.line_of("one", missed), figures.line_of("one", empty)]
     assert rows == expected, "in the order of the page"
-    assert "rows of `grasp` 2; not measured on this commit: `mutants`, `two`. Every row: " in quoted_by(checkout)
+    assert "rows of `grasp` 2; not measured on these sources: `mutants`, `two`. Every row: " in quoted_by(checkout)
 
 
 def test_no_missed_row_is_left_out_of_the_readme():
@@ -83,7 +87,7 @@ def test_no_missed_row_is_left_out_of_the_readme():
 
 def test_a_value_that_is_missing_is_missed(checkout):
     figures.record(checkout, "one", [ROW | {"value": None, "ok": True}], False)
-    assert "| not measured on this commit | <= 2 | **missed** |" in figures.page(checkout)
+    assert "| not measured on these sources | <= 2 | **missed** |" in figures.page(checkout)
 
 
 def test_other_sources_make_a_figure_old_and_other_documents_do_not(checkout):
@@ -100,6 +104,41 @@ def test_other_sources_make_a_figure_old_and_other_documents_do_not(checkout):
     assert figures.measured(checkout, "one") is None
     (checkout / ".coglab" / "figures" / "one.json").write_text("[1")
     assert figures.measured(checkout, "one") is None
+
+
+def test_only_what_a_bench_runs_makes_its_figure_old(checkout):
+    source = checkout / "catkin_ws" / "src"
+    figures.record(checkout, "one", [ROW], False)
+    for place in ("other/code.py", "p/README.md", "p/test/test_code.py", "used/test/a_rostest.py", "used/test/a.test"):
+        (source / place).write_text("a = 1\n")
+        commit(checkout, place)
+        assert figures.measured(checkout, "one") is not None, place
+    for place in ("p/test/rig.py", "used/code.py", "used/contest/test_x.py", "p/bench/bench_two.py"):
+        (source / place).parent.mkdir(exist_ok=True)
+        figures.record(checkout, "one", [ROW], False)
+        (source / place).write_text('"""a"""\n')
+        commit(checkout, place)
+        assert figures.measured(checkout, "one") is None, place
+    figures.record(checkout, "one", [ROW], False)
+    (source / "p" / "bench" / "bench_one.py").write_text('"""Ten steps of `other`."""\n')
+    commit(checkout, "it names a package that its own does not depend on")
+    figures.record(checkout, "one", [ROW], False)
+    (source / "other" / "code.py").write_text("a = 2\n")
+    commit(checkout, "that changes")
+    assert figures.measured(checkout, "one") is None
+
+
+def test_what_was_reported_is_kept_for_who_has_not_measured(checkout):
+    figures.record(checkout, "one", [ROW], False)
+    text = figures.write_report(checkout).read_text()
+    commit(checkout, "report")
+    (checkout / ".coglab" / "figures" / "one.json").unlink()
+    assert figures.page(checkout) == text
+    (checkout / "catkin_ws" / "src" / "used" / "code.py").write_text("a = 1\n")
+    commit(checkout, "code")
+    assert figures.measured(checkout, "one") is None
+    (checkout / figures.KEPT).write_text("[1")
+    assert figures.measured(checkout, "one") is None and figures.kept(checkout) == {}
 
 
 def test_report_runs_only_what_is_named(checkout, monkeypatch):

@@ -1,14 +1,19 @@
 """docs/figures.md: what ./coglab bench has measured of these sources, each figure with its definition, goal and peer.
 
 A run of a bench leaves its rows in .coglab/figures/NAME.json, with machine, date and commit. `./coglab bench --report`
-writes the page from those files. A bench without a file of the sources as they are now was not measured: it is shown as
-missed, whatever an older file says. The lines of README.md between the two marks are taken from that page: what
-`is_quoted` says of the benches QUOTED, and below them in one line what is missed besides.
+writes the page from those files, and keeps them in docs/figures.json for whoever has not measured. A bench without rows
+of its sources as they are now was not measured: it is shown as missed, whatever older rows say. The lines of README.md
+between the two marks are taken from that page: what `is_quoted` says of the benches QUOTED, and below them in one line
+what is missed besides.
+
+The sources of a bench are its package, the packages that its own files name, what all these depend on (package.xml),
+and `coglab`; documents and tests are none. Programs beside the tests, which benches share with them, are.
 """
 
 from __future__ import annotations
 
 import ast
+import hashlib
 import json
 import os
 import platform
@@ -17,18 +22,22 @@ import subprocess
 from collections import Counter
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
 
-from coglab_bringup.arguments import find_benches
+from coglab_bringup.arguments import find_benches, package_folders
 
-NOT_MEASURED = "not measured on this commit"
+NOT_MEASURED = "not measured on these sources"
 ALL_ROWS = "all of its rows"
 BEGIN, END = "<!-- quoted from docs/figures.md -->", "<!-- end of the quotation -->"
+KEPT = "docs/figures.json"
 QUOTED = ("wall", "fri", "trials")
 """the benches of which README.md shows rows; of the others it says how many are missed"""
 HEAD = """# Figures
 
 Written by `./coglab bench --report`, from what `./coglab bench NAME ...` has measured on these sources; edit nothing
-here. A row that misses its goal stays and says so. A bench that was not run on these sources counts as missed.
+here. A row that misses its goal stays and says so. A bench that was not run on its sources as they are (its package and
+those that it uses, tests and documents apart) counts as missed.
 Definitions, goals and peers are fixed before anything is measured: they stand in the bench itself.
 """
 TABLE = "| figure | value | goal | | peer | its value |\n| --- | --- | --- | --- | --- | --- |"
@@ -42,13 +51,37 @@ def _git(top: Path, *words: str) -> str:
         return ""
 
 
-def sources_of(top: Path) -> dict[str, str]:
-    """Commit of a checkout and the name of its sources, which stays the same where only documents change."""
-    changed = _git(top, "status", "--porcelain", "--", "catkin_ws/src", "coglab")
-    tree = " ".join(_git(top, "rev-parse", f"HEAD:{part}") for part in ("catkin_ws/src", "coglab"))
+def _needed(packages: dict[str, Path], files: list[Path]) -> list[Path]:
+    """Folders of the packages that a bench of these files runs; all of them where the files are not known."""
+    words = " ".join(path.read_text(encoding="utf-8") for path in files)
+    found = [
+        name for name, folder in packages.items() if name in words or any(folder in path.parents for path in files)
+    ]
+    for name in found:  # which grows meanwhile
+        manifest = ElementTree.parse(packages[name] / "package.xml").getroot()
+        uses = {element.text for element in manifest if element.tag.endswith("depend")}
+        found += [other for other in packages if other in uses and other not in found]
+    return [packages[name] for name in found or packages]
+
+
+def _is_source(path: str) -> bool:
+    """Whether a figure may depend on this file: documents and tests measure nothing."""
+    folder, _, name = path.rpartition("/")
+    test = f"{folder}/".count("/test/") and (name.startswith("test_") or name.endswith((".test", "_rostest.py")))
+    return not (test or name.endswith(".md"))
+
+
+def sources_of(top: Path, bench: str) -> dict[str, str]:
+    """Commit of a checkout, and one word for the sources of a bench: the same where only others change."""
+    source = top / "catkin_ws" / "src"
+    folders = _needed(package_folders(source), find_benches(source).get(bench, []))
+    places = ["coglab", *sorted(str(folder.relative_to(top)) for folder in folders)]
+    changed = any(_is_source(line[3:]) for line in _git(top, "status", "--porcelain", "--", *places).splitlines())
+    files = [line for line in _git(top, "ls-tree", "-r", "HEAD", "--", *places).splitlines() if _is_source(line)]
+    digest = hashlib.sha256("\n".join(files).encode()).hexdigest() if files else ""
     return {
         "commit": _git(top, "rev-parse", "--short=7", "HEAD") + (" with changes" if changed else ""),
-        "sources": "" if changed else tree.strip(),
+        "sources": "" if changed else digest,
     }
 
 
@@ -71,18 +104,30 @@ def record(top: Path, name: str, rows: list[dict], long: bool) -> None:
         "long": long,
     }
     new = folder / f"{name}.new"
-    new.write_text(json.dumps(run | sources_of(top), indent=1) + "\n")
+    new.write_text(json.dumps(run | sources_of(top, name), indent=1) + "\n")
     new.replace(folder / f"{name}.json")
 
 
-def measured(top: Path, name: str) -> dict | None:
-    """The last run of a bench, if it was one of the sources as they are now."""
+def kept(top: Path) -> dict[str, Any]:
+    """The runs that the last report kept, by bench."""
     try:
-        run = json.loads((top / ".coglab" / "figures" / f"{name}.json").read_text())
-        now = sources_of(top)["sources"]
-        return run if now and run["sources"] == now and isinstance(run["rows"], list) else None
-    except (OSError, ValueError, KeyError, TypeError):
-        return None
+        runs = json.loads((top / KEPT).read_text())
+        return runs if isinstance(runs, dict) else {}
+    except (OSError, ValueError):
+        return {}
+
+
+def measured(top: Path, name: str) -> dict | None:
+    """The last run of a bench, here or as kept by the last report, if it was one of its sources as they are now."""
+    now = sources_of(top, name)["sources"]
+    try:
+        here = json.loads((top / ".coglab" / "figures" / f"{name}.json").read_text())
+    except (OSError, ValueError):
+        here = None
+    for run in (here, kept(top).get(name)):
+        if isinstance(run, dict) and now and run.get("sources") == now and isinstance(run.get("rows"), list):
+            return run
+    return None
 
 
 def definition(paths: list[Path]) -> str:
@@ -186,5 +231,7 @@ def write_report(top: Path) -> Path:
     target, readme = top / "docs" / "figures.md", top / "README.md"
     text = page(top)
     target.write_text(text, encoding="utf-8")
+    runs = {name: run for name in [*find_benches(top / "catkin_ws" / "src"), "mutants"] if (run := measured(top, name))}
+    (top / KEPT).write_text(json.dumps(runs, indent=1, sort_keys=True) + "\n", encoding="utf-8")
     readme.write_text(with_quotation(readme.read_text(encoding="utf-8"), quotation(text)), encoding="utf-8")
     return target

@@ -74,7 +74,12 @@ class TrialRecorder:
         self.trial.external_torques.append((message.header.stamp.to_sec(), message.effort))
 
     def _on_truth(self, message: CellTruth) -> None:
-        points = [message.robot_hand.position, message.human_hand.position, message.object.position, message.touch_force]
+        points = [
+            message.robot_hand.position,
+            message.human_hand.position,
+            message.object.position,
+            message.touch_force,
+        ]
         robot, human, thing, force = ([p.x, p.y, p.z] for p in points)
         stamp = message.header.stamp.to_sec()
         self.trial.truth.append((stamp, robot, human, thing, float(np.linalg.norm(force))))
