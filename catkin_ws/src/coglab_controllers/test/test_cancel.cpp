@@ -274,7 +274,7 @@ TEST(Cancel, OnTheRealClockAnswersWhenTheArmStandsOrAtItsTimeLimit) {
   std::thread robot([&] {
     coglab_rt::Interpolator interpolator(limits);
     RobotSample sample;
-    sample.position << -1.4349, -0.6086, 1.4986, 1.7048, 0.1857, 0.2152, 0.782;
+    sample.position = kHome;
     interpolator.reset(sample.position);
     sample.cycle_time = 0.005;
     sample.block = coglab_rt::MotionBlock::None;

@@ -103,7 +103,7 @@ TEST(Cycle, NeitherAllocatesNorLocksWhileServicesAreCalled) {
 
   std::thread control([&] {
     RobotSample sample;
-    sample.position << -1.4349, -0.6086, 1.4986, 1.7048, 0.1857, 0.2152, 0.782;
+    sample.position = kHome;
     sample.commanded_position = sample.position;
     sample.cycle_time = 0.005;
     sample.block = coglab_rt::MotionBlock::None;
