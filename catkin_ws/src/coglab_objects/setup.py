@@ -3,8 +3,4 @@
 from catkin_pkg.python_setup import generate_distutils_setup
 from setuptools import setup
 
-setup(
-    **generate_distutils_setup(
-        packages=["coglab_objects"], package_dir={"": "src"}, package_data={"coglab_objects": ["object_schema.json"]}
-    )
-)
+setup(**generate_distutils_setup(packages=["coglab_objects"], package_dir={"": "src"}))

@@ -1,15 +1,20 @@
 #!/usr/bin/python3
-"""Wall times a newcomer meets: the first demo and the whole test run as recorded, a later demo as run here.
+"""Wall times a newcomer meets: the first demo and the whole test run as recorded, a later demo and a new motion as run
+here.
 
 One run each. The first is the sum of installation, build and demo of this checkout; where a part was not done here, on
-a machine that had it already, the row has no value and is missed. `docker/prove_bare` does it on a bare machine.
+a machine that had it already, the row has no value and is missed. `docker/prove_bare` does it on a bare machine. The
+new motion is that of coglab_controllers/test/test_new_motion.py: made by `controller new --motion`, built in a
+workspace of its own, and done when its rostest has seen the simulated arm move. A test that fails gives no value.
 """
 
 from __future__ import annotations
 
 import json
 import os
+import re
 import subprocess
+import sys
 import tempfile
 import time
 from pathlib import Path
@@ -40,6 +45,12 @@ def first_demo(times: dict) -> tuple[str, float | None]:
     return f"installation, build and first demo of this checkout ({known})", value
 
 
+def new_motion(output: str) -> float | None:
+    """Seconds that the test of a new motion has printed; None if it did not come so far."""
+    said = re.search(r"to an arm that has moved: ([\d.]+) s", output)
+    return float(said.group(1)) if said and re.search(r"\b1 passed", output) else None
+
+
 def main() -> None:
     top = Path(os.environ["COGLAB_TOP"])
     recorded = top / ".coglab" / "times.json"
@@ -49,9 +60,14 @@ def main() -> None:
         start = time.monotonic()
         subprocess.run([top / "coglab", "demo", "--headless", "--out", out], stdout=subprocess.DEVNULL, check=True)
         later = round(time.monotonic() - start, 1)
+    test = [sys.executable, "-m", "pytest", "-s", "-q", "-p", "no:cacheprovider", "-k", "is_built_tested_and_moves"]
+    made = subprocess.run(
+        [*test, top / "catkin_ws/src/coglab_controllers/test/test_new_motion.py"], stdout=subprocess.PIPE, text=True
+    )
     rows = [
         row(figure, first and round(first, 1), 300),
         row("demo again, run by this bench", later, 60),
+        row("from controller new --motion to a simulated arm that has moved", new_motion(made.stdout), 90),
         row(
             "./coglab test of all packages, as last run in this checkout",
             times.get("last_test", {}).get("total_s"),

@@ -64,11 +64,29 @@ def test_every_node_and_every_thread_of_a_node_is_in_the_tables():
     nodes = {n for p in launched for n in re.findall(r"<node[^>]*?\bname=\"(\w+)\"", p.read_text(encoding="utf-8"))}
     assert not sorted(name for name in nodes - {"rviz", "lwr", "controller_manager"} if f"/{name}`" not in section)
     threads = set()
-    packages = ("coglab_smach", "coglab_console", "ih2_hand", "coglab_objects", "coglab_perception")
+    engine = ("executive_smach/smach", "executive_smach/smach_ros")
+    packages = ("coglab_smach", "coglab_console", "ih2_hand", "coglab_objects", "coglab_perception", *engine)
     for path in shipped_code({".py"}, *packages):
-        threads |= set(re.findall(r"Thread\([^\n]*\bname=f?\"([\w:]+)", path.read_text(encoding="utf-8")))
-    assert {"poll", "coglab_master"} <= threads
+        threads |= set(
+            re.findall(r"Thread\([^()]*?(?:\([^()]*\)[^()]*?)*\bname=f?\"([\w:]+)", path.read_text(encoding="utf-8"))
+        )
+    assert {"poll", "coglab_master", "call:", "concurrent_split:", "smach_introspection:"} <= threads
     assert not sorted(name for name in threads if f"`{name}" not in section)
+
+
+def test_the_numbers_in_the_table_of_threads_are_those_of_the_code():
+    section = PAGE.split("## Processes and threads")[1].split("## ")[0]
+    said = {
+        "FRI | `fri` | SCHED_FIFO {}": ("lwr_fri_bridge/include/**/fri_thread.hpp", r"int priority = (\d+)"),
+        "spinner of the arm, {} |": ("lwr_fri_bridge/src/ros/bridge_ros.cpp", r"kSpinnerThreads = (\d+)"),
+        "spinner of the manager, {} |": ("coglab_controllers/src/ros/manager_ros.cpp", r"AsyncSpinner>\((\d+)"),
+        "cancel, {} |": ("coglab_controllers/src/ros/cancel_ros.cpp", r"spinner_\((\d+)"),
+        "a spinner of {} take": ("coglab_controllers/src/ideal/ideal_arm_ros.cpp", r"AsyncSpinner>\((\d+)"),
+    }
+    for phrase, (where, pattern) in said.items():
+        (path,) = SOURCES.glob(where)
+        (number,) = re.findall(pattern, path.read_text(encoding="utf-8"))
+        assert phrase.format(number) in section, (phrase, number)
 
 
 def test_headers_name_this_page():
@@ -81,9 +99,29 @@ def test_headers_name_this_page():
 def test_the_steps_of_the_cycle_are_those_of_the_code():
     page = re.findall(r"^(\d)\. \*\*(.+?)\*\*", PAGE, flags=re.MULTILINE)
     code = (SOURCES / "coglab_controllers" / "src" / "manager" / "control_cycle.cpp").read_text(encoding="utf-8")
-    steps = re.findall(r"// Step (\d): (.+?)\.$", code, flags=re.MULTILINE)
+    steps = dict(re.findall(r"// Step (\d): (.+?)\.$", code, flags=re.MULTILINE))
+    drawing = (TOP / "docs" / "drawings" / "cycle.dot").read_text(encoding="utf-8")
+    drawn = dict(re.findall(r"label=\"(\d)  (.+?)\"", drawing))
     assert [int(number) for number, _ in page] == list(range(1, len(page) + 1))
-    assert sorted(number for number, _ in steps) == [number for number, _ in page]
+    assert sorted(steps) == sorted(drawn) == [number for number, _ in page]
+    for number, title in page:
+        title = title.replace("`", "").rstrip(".").lower()
+        assert steps[number].lower().startswith(title), (title, steps[number])
+        assert drawn[number].lower().startswith(title), (title, drawn[number])
+
+
+def test_the_notation_names_what_the_code_has():
+    table = PAGE.split("## Notation")[1]
+    rows = re.findall(r"^\| (`.+?) \| (.+?) \| (.+?) \| (.+?) \|$", table, flags=re.MULTILINE)
+    assert len(rows) >= 15
+    headers = "".join(
+        p.read_text(encoding="utf-8") for p in (SOURCES / "coglab_controllers" / "include").rglob("*.hpp")
+    )
+    for symbol, unit, _, code in rows:
+        names = re.findall(r"\w+", " ".join(re.findall(r"`(.+?)`", code)))
+        assert names and not [name for name in names if not re.search(rf"\b{name}\b", headers)], (symbol, names)
+        symbols = len(re.findall(r"`.+?`", symbol))
+        assert len(unit.split(",")) in (1, symbols), f"{symbol}: {symbols} symbols, units {unit}"
 
 
 def test_the_drawing_and_the_headers_number_the_steps_as_the_page_does():

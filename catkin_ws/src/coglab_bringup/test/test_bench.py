@@ -52,3 +52,7 @@ def test_a_wall_time_that_was_not_measured_is_missed_not_zero():
             row = bench_wall.row(figure, value, 600)
             assert row["value"] is None and not row["ok"]
     assert bench_wall.first_demo({})[1] is None
+    said = "from `controller new --motion` to an arm that has moved: 21.4 s, of them to build 15.0 s\n"
+    assert bench_wall.new_motion(said + "1 passed, 1 deselected in 25 s") == 21.4
+    for output in ("", said + "1 failed in 25 s", "1 skipped"):
+        assert bench_wall.new_motion(output) is None

@@ -18,16 +18,8 @@ FILE_LIMIT, FUNCTION_LIMIT, METHOD_LIMIT = 400, 60, 25
 TABLES = re.compile(r"PYBIND11_MODULE|bind[A-Z]\w*|makeTable|\w+::describe")
 # Longer than the limits, and why it stays. Nothing is added here without a reason.
 LONG: dict[str, str] = {
-    "coglab_controllers/bench/core_times.cpp": "one program after another, each a few lines",
-    "coglab_controllers/test/test_cancel.cpp": "one story told in order",
-    "coglab_controllers/test/test_cycle.cpp": "one story told in order",
-    "coglab_controllers/test/test_dmp_requests.cpp": "a table of refusals",
     "coglab_controllers/test/thread_stress.cpp": "threads that share locals",
-    "coglab_sim/test/test_krc_session.py": "one table of conditions of the robot controller",
-    "ctrl_more/test/test_realtime.cpp": "one story told in order",
-    "ctrl_more/test/test_three_robots.cpp": "one story told in order",
     "ctrl_more/test/thread_stress.cpp": "threads that share locals",
-    "ih2_hand/bench/bench_hand.py": "one figure after another",
 }
 # Classes with more public methods of their own than the limit, and why they stay; docs/house.md says it, too.
 MANY_METHODS = {

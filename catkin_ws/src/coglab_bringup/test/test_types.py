@@ -1,62 +1,26 @@
-"""mypy on the Python that ships: strict on modules that import no ROS, plain on the others and on the nodes."""
+"""The Python that ships is typed, as coglab_bringup/type_check.py says; pre-commit runs the same."""
 
-import ast
+from __future__ import annotations
+
 import shutil
-import subprocess
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from coglab_bringup import type_check
 
 TOP = Path(__file__).resolve().parents[4]
-SOURCES = TOP / "catkin_ws" / "src"
-PACKAGES = ("coglab_py", "coglab_objects", "coglab_perception", "coglab_sim", "coglab_smach", "coglab_bringup",
-            "coglab_console", "ih2_hand", "executive_smach/smach", "executive_smach/smach_ros")  # fmt: skip
-# Packages without types of their own, or whose calls are not typed.
-UNTYPED = {
-    "selenium",
-    "rospy",
-    "actionlib",
-    "tf2_ros",
-    "smach_ros",
-    "rosbag",
-    "rosgraph",
-    "rospkg",
-    "genpy",
-    "diagnostic_updater",
-}
-# What --strict sets for a module, but for numpy's generics, which say nothing here, and for Any from untyped packages.
-STRICT = ("disallow_untyped_defs", "disallow_incomplete_defs", "disallow_untyped_calls", "disallow_untyped_decorators",
-          "check_untyped_defs", "strict_equality", "strict_concatenate", "warn_unused_ignores")  # fmt: skip
-
-
-def imported(path: Path) -> Iterator[str]:
-    """Top-level names of what a file imports."""
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-        if isinstance(node, ast.Import):
-            yield from (alias.name.split(".")[0] for alias in node.names)
-        elif isinstance(node, ast.ImportFrom) and node.module and node.level == 0:
-            yield node.module.split(".")[0]
-
-
-def typed_all_through(path: Path) -> bool:
-    return not any(name in UNTYPED or name.endswith("_msgs") or name == "std_srvs" for name in imported(path))
 
 
 @pytest.mark.skipif(shutil.which("mypy") is None, reason="mypy is not installed: ./coglab install test")
-def test_the_python_that_ships_is_typed(tmp_path):
-    files, strict = [], []
-    for package in PACKAGES:
-        source = SOURCES / package / "src"
-        for path in sorted(source.rglob("*.py")):
-            files.append(path)
-            if typed_all_through(path):
-                strict.append(".".join(path.relative_to(source).with_suffix("").parts).removesuffix(".__init__"))
-        files += sorted((SOURCES / package / "scripts").glob("*.py"))
+def test_the_python_that_ships_is_typed(capfd):
+    files, strict = type_check.shipped_files()
     assert len(files) > 100 and len(strict) > 70
-    config = tmp_path / "mypy.ini"
-    section = f"\n[mypy-{','.join(strict)}]\n" + "".join(f"{name} = true\n" for name in STRICT)
-    config.write_text((TOP / "mypy.ini").read_text(encoding="utf-8") + section)
-    command = ["mypy", "--config-file", str(config), "--cache-dir", str(tmp_path / "cache"), *map(str, files)]
-    ended = subprocess.run(command, cwd=TOP, capture_output=True, text=True, timeout=600, check=False)
-    assert ended.returncode == 0, ended.stdout[-6000:] + ended.stderr
+    status = type_check.main()
+    said = capfd.readouterr()
+    assert status == 0, said.out[-6000:] + said.err
+
+
+def test_before_a_commit_the_same_tools_run_as_in_the_tests():
+    hooks = (TOP / ".pre-commit-config.yaml").read_text(encoding="utf-8")
+    for tool in ("clang-format", "ruff check", "ruff format", "coglab_bringup.type_check"):
+        assert tool in hooks, tool

@@ -72,129 +72,130 @@ JointVector kdlCycle(KDL::ChainFkSolverPos_recursive& fk, Solver& solver, const 
   return ratio > 1.0 ? JointVector(result / ratio) : result;
 }
 
-}  // namespace
-
-int main(int argc, char** argv) {
-  if (argc != 3) {
-    std::cerr << "usage: core_times URDF PRIMITIVES\n";
-    return 2;
-  }
-  std::ifstream file(argv[1]);
-  std::stringstream urdf;
-  urdf << file.rdbuf();
-  const Chain chain(urdf.str(), "lwr_base_link", "ih2_palm");
-  Library library;
-  library.load(argv[2]);
-  const CartesianMotionPlan plan{TransformationSystem(library.at("reach_human")), 1.0, true};
-
-  std::mt19937 engine(7);
-  std::uniform_real_distribution<double> uniform(-1.0, 1.0);
+/// Where the candidates are asked: random postures, and for each a reference near by.
+struct Inputs {
   std::vector<JointVector> postures;
-  for (int i = 0; i < kPostures; ++i) {
-    JointVector q;
-    for (int j = 0; j < kMaxJoints; ++j) q[j] = (j % 2 ? 1.8 : 2.6) * uniform(engine);
-    postures.push_back(q);
-  }
   std::vector<CartesianReference> references;
-  for (const JointVector& q : postures) {
-    CartesianReference reference;
-    reference.pose = chain.evaluate(q).tool;
-    reference.pose.position += 0.001 * Vector3(uniform(engine), uniform(engine), uniform(engine));
-    reference.velocity = 0.3 * Vector3(uniform(engine), uniform(engine), uniform(engine));
-    reference.angular_velocity = 0.3 * Vector3(uniform(engine), uniform(engine), uniform(engine));
-    references.push_back(reference);
+
+  explicit Inputs(const Chain& chain) {
+    std::mt19937 engine(7);
+    std::uniform_real_distribution<double> uniform(-1.0, 1.0);
+    const auto random = [&] { return Vector3(uniform(engine), uniform(engine), uniform(engine)); };
+    for (int i = 0; i < kPostures; ++i) {
+      JointVector q;
+      for (int j = 0; j < kMaxJoints; ++j) q[j] = (j % 2 ? 1.8 : 2.6) * uniform(engine);
+      postures.push_back(q);
+    }
+    for (const JointVector& q : postures) {
+      CartesianReference reference;
+      reference.pose = chain.evaluate(q).tool;
+      reference.pose.position += 0.001 * random();
+      reference.velocity = 0.3 * random();
+      reference.angular_velocity = 0.3 * random();
+      references.push_back(reference);
+    }
+  }
+};
+
+/// What is timed, ours and KDL's, on the same inputs.
+class Calls {
+ public:
+  Calls(const Chain& chain, const CartesianMotionPlan& plan)
+      : chain_(chain),
+        plan_(plan),
+        inputs_(chain),
+        fk_(chain.kdl()),
+        jacobian_solver_(chain.kdl()),
+        pinv_(chain.kdl()),
+        wdls_(chain.kdl()),
+        guard_(GuardParameters{}, chain) {
+    wdls_.setLambda(0.05);
+    goal_.position = Vector3(0.6, 0.1, 0.4);
   }
 
-  KDL::ChainFkSolverPos_recursive fk(chain.kdl());
-  KDL::ChainJntToJacSolver jacobian_solver(chain.kdl());
-  KDL::ChainIkSolverVel_pinv pinv(chain.kdl());
-  KDL::ChainIkSolverVel_wdls wdls(chain.kdl());
-  wdls.setLambda(0.05);
-  const TwoTaskIk ik;
-  const JointVector limit = ik.parameters().velocity_limit;
-  Guard guard(GuardParameters{}, chain);
-  CartesianMotion motion, kdl_motion;
-  Dmp dmp;
-  ChainState state;
-  IkResult result;
-  GuardResult limited;
-  KDL::JntArray joints(kMaxJoints);
-  KDL::Jacobian jacobian(kMaxJoints);
-  KDL::Frame frame;
-  Pose goal;
-  goal.position = Vector3(0.6, 0.1, 0.4);
-  const auto restarted = [&](CartesianMotion& m, int i) -> const CartesianReference& {
-    if (i % 240 == 0) m.start(plan, Pose{}, Vector3::Zero(), Vector3::Zero(), goal);
-    return m.step(0.005, goal);
-  };
+  double dmpStep(int i) {
+    if (i % 240 == 0)
+      dmp_.start(plan_.system, Vector3::Zero(), Vector3::Zero(), goal_.position, 1.0);
+    return dmp_.step(0.005, goal_.position).position.x();
+  }
+  double kinematics(int i) {
+    chain_.evaluate(posture(i), state_);
+    return state_.jacobian(0, 0);
+  }
+  double kinematicsOfKdl(int i) {
+    joints_.data = posture(i);
+    fk_.JntToCart(joints_, frame_);
+    jacobian_solver_.JntToJac(joints_, jacobian_);
+    return jacobian_(0, 0) + frame_.p.x();
+  }
+  double inverse(int i) {
+    chain_.evaluate(posture(i), state_);
+    ik_.solve(state_, posture(i), inputs_.references[i % kPostures], result_);
+    return result_.velocity[0];
+  }
+  template <typename Solver>
+  double inverseOfKdl(Solver Calls::*solver, int i) {
+    return kdlCycle(fk_, this->*solver, posture(i), inputs_.references[i % kPostures], limit_)[0];
+  }
+  double cycle(int i) {
+    chain_.evaluate(posture(i), state_);
+    ik_.solve(state_, posture(i), reference(motion_, i), result_);
+    guard_.limit(state_, posture(i), result_.velocity, 0.005, limited_);
+    return limited_.velocity[0];
+  }
+  template <typename Solver>
+  double cycleOfKdl(Solver Calls::*solver, int i) {
+    const JointVector velocity =
+        kdlCycle(fk_, this->*solver, posture(i), reference(kdl_motion_, i), limit_);
+    chain_.evaluate(posture(i), state_);
+    guard_.limit(state_, posture(i), velocity, 0.005, limited_);
+    return limited_.velocity[0];
+  }
 
-  std::vector<Candidate> candidates = {
-      {"dmp_step_20",
-       [&](int i) {
-         if (i % 240 == 0)
-           dmp.start(plan.system, Vector3::Zero(), Vector3::Zero(), goal.position, 1.0);
-         return dmp.step(0.005, goal.position).position.x();
-       },
-       {}},
-      {"fk_jacobian",
-       [&](int i) {
-         chain.evaluate(postures[i % kPostures], state);
-         return state.jacobian(0, 0);
-       },
-       {}},
-      {"kdl_fk_jacobian",
-       [&](int i) {
-         joints.data = postures[i % kPostures];
-         fk.JntToCart(joints, frame);
-         jacobian_solver.JntToJac(joints, jacobian);
-         return jacobian(0, 0) + frame.p.x();
-       },
-       {}},
-      {"two_task_ik",
-       [&](int i) {
-         chain.evaluate(postures[i % kPostures], state);
-         ik.solve(state, postures[i % kPostures], references[i % kPostures], result);
-         return result.velocity[0];
-       },
-       {}},
-      {"kdl_pinv",
-       [&](int i) {
-         return kdlCycle(fk, pinv, postures[i % kPostures], references[i % kPostures], limit)[0];
-       },
-       {}},
-      {"kdl_wdls",
-       [&](int i) {
-         return kdlCycle(fk, wdls, postures[i % kPostures], references[i % kPostures], limit)[0];
-       },
-       {}},
-      {"cycle",
-       [&](int i) {
-         const JointVector& q = postures[i % kPostures];
-         chain.evaluate(q, state);
-         ik.solve(state, q, restarted(motion, i), result);
-         guard.limit(state, q, result.velocity, 0.005, limited);
-         return limited.velocity[0];
-       },
-       {}},
-      {"cycle_kdl_wdls",
-       [&](int i) {
-         const JointVector& q = postures[i % kPostures];
-         const JointVector velocity = kdlCycle(fk, wdls, q, restarted(kdl_motion, i), limit);
-         chain.evaluate(q, state);
-         guard.limit(state, q, velocity, 0.005, limited);
-         return limited.velocity[0];
-       },
-       {}},
-      {"cycle_kdl_pinv",
-       [&](int i) {
-         const JointVector& q = postures[i % kPostures];
-         const JointVector velocity = kdlCycle(fk, pinv, q, restarted(kdl_motion, i), limit);
-         chain.evaluate(q, state);
-         guard.limit(state, q, velocity, 0.005, limited);
-         return limited.velocity[0];
-       },
-       {}},
-  };
+  std::vector<Candidate> candidates() {
+    return {
+        {"dmp_step_20", [this](int i) { return dmpStep(i); }, {}},
+        {"fk_jacobian", [this](int i) { return kinematics(i); }, {}},
+        {"kdl_fk_jacobian", [this](int i) { return kinematicsOfKdl(i); }, {}},
+        {"two_task_ik", [this](int i) { return inverse(i); }, {}},
+        {"kdl_pinv", [this](int i) { return inverseOfKdl(&Calls::pinv_, i); }, {}},
+        {"kdl_wdls", [this](int i) { return inverseOfKdl(&Calls::wdls_, i); }, {}},
+        {"cycle", [this](int i) { return cycle(i); }, {}},
+        {"cycle_kdl_wdls", [this](int i) { return cycleOfKdl(&Calls::wdls_, i); }, {}},
+        {"cycle_kdl_pinv", [this](int i) { return cycleOfKdl(&Calls::pinv_, i); }, {}},
+    };
+  }
+
+ private:
+  const JointVector& posture(int i) const { return inputs_.postures[i % kPostures]; }
+  const CartesianReference& reference(CartesianMotion& motion, int i) {
+    if (i % 240 == 0) motion.start(plan_, Pose{}, Vector3::Zero(), Vector3::Zero(), goal_);
+    return motion.step(0.005, goal_);
+  }
+
+  const Chain& chain_;
+  const CartesianMotionPlan& plan_;
+  const Inputs inputs_;
+  KDL::ChainFkSolverPos_recursive fk_;
+  KDL::ChainJntToJacSolver jacobian_solver_;
+  KDL::ChainIkSolverVel_pinv pinv_;
+  KDL::ChainIkSolverVel_wdls wdls_;
+  const TwoTaskIk ik_;
+  const JointVector limit_ = ik_.parameters().velocity_limit;
+  Guard guard_;
+  CartesianMotion motion_, kdl_motion_;
+  Dmp dmp_;
+  ChainState state_;
+  IkResult result_;
+  GuardResult limited_;
+  KDL::JntArray joints_{kMaxJoints};
+  KDL::Jacobian jacobian_{kMaxJoints};
+  KDL::Frame frame_;
+  Pose goal_;
+};
+
+/// Times all candidates in alternating blocks. The sum keeps the compiler from dropping calls.
+double measure(std::vector<Candidate>& candidates) {
   double sink = 0.0;
   for (int block = 0; block < kBlocks; ++block) {
     for (Candidate& candidate : candidates) {
@@ -203,6 +204,10 @@ int main(int argc, char** argv) {
       candidate.times.push_back((now() - begin) / kCallsPerBlock);
     }
   }
+  return sink;
+}
+
+void print(const std::vector<Candidate>& candidates, bool finite) {
   std::printf("{");
   for (const Candidate& candidate : candidates) {
     std::printf("\"%s\": %.4f, ", candidate.name.c_str(), median(candidate.times));
@@ -217,8 +222,27 @@ int main(int argc, char** argv) {
     for (int i = 0; i < kBlocks; ++i) shares[i] /= times(std::string("cycle_kdl_") + peer)[i];
     std::printf("\"share_of_kdl_%s\": %.4f, ", peer, median(shares));
   }
-  // The sum keeps the compiler from dropping calls.
   std::printf("\"calls\": %d, \"finite\": %s}\n", kCallsPerBlock * kBlocks,
-              std::isfinite(sink) ? "true" : "false");
+              finite ? "true" : "false");
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  if (argc != 3) {
+    std::cerr << "usage: core_times URDF PRIMITIVES\n";
+    return 2;
+  }
+  std::ifstream file(argv[1]);
+  std::stringstream urdf;
+  urdf << file.rdbuf();
+  const Chain chain(urdf.str(), "lwr_base_link", "ih2_palm");
+  Library library;
+  library.load(argv[2]);
+  const CartesianMotionPlan plan{TransformationSystem(library.at("reach_human")), 1.0, true};
+  Calls calls(chain, plan);
+  std::vector<Candidate> candidates = calls.candidates();
+  const double sink = measure(candidates);
+  print(candidates, std::isfinite(sink));
   return 0;
 }

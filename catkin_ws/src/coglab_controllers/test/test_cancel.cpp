@@ -251,6 +251,43 @@ TEST(Cancel, AnytimeItStandsWithinTheBrakingTimeAndNothingMovesAfterwards) {
   EXPECT_GT(ended, 60);
 }
 
+// An arm on the real clock, until it shall stop; while it is blind nobody hears of it.
+void runArm(ControllerManager& manager, ControlThread& thread, coglab_rt::ArmMailboxes& mailboxes,
+            const coglab_rt::JointLimits& limits, const std::atomic<bool>& stop,
+            const std::atomic<bool>& blind) {
+  coglab_rt::Interpolator interpolator(limits);
+  RobotSample sample;
+  sample.position = kHome;
+  interpolator.reset(sample.position);
+  sample.cycle_time = 0.005;
+  sample.block = coglab_rt::MotionBlock::None;
+  VelocityCommand command;
+  while (!stop) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    if (blind) continue;
+    mailboxes.takeVelocity(command);
+    interpolator.step(command.velocity, 0.005);
+    sample.position = sample.commanded_position = interpolator.position();
+    sample.velocity = sample.commanded_velocity = interpolator.velocity();
+    sample.commanded_acceleration = interpolator.acceleration();
+    ++sample.sequence;
+    sample.stamp_ns = manager.now_ns();
+    sample.controller_ns += 5'000'000;
+    mailboxes.publishSample(sample);
+    thread.wake(true);
+  }
+}
+
+// Waits until the arm moves; false if it does not within 5 s.
+bool moves(ControllerManager& manager) {
+  const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(5);
+  while (std::chrono::steady_clock::now() < end) {
+    if (manager.report().robot.commanded_velocity.norm() > 0.05) return true;
+    std::this_thread::sleep_for(std::chrono::milliseconds(2));
+  }
+  return false;
+}
+
 TEST(Cancel, OnTheRealClockAnswersWhenTheArmStandsOrAtItsTimeLimit) {
   coglab_rt::ArmMailboxes mailboxes;
   const coglab_rt::JointLimits limits =
@@ -271,48 +308,18 @@ TEST(Cancel, OnTheRealClockAnswersWhenTheArmStandsOrAtItsTimeLimit) {
   ASSERT_TRUE(VirtualRobot::ok(manager.load("ptp", "coglab/PtpController")));
   ASSERT_TRUE(VirtualRobot::ok(manager.switchTo("ptp", type)));
   std::atomic<bool> stop{false}, blind{false};
-  std::thread robot([&] {
-    coglab_rt::Interpolator interpolator(limits);
-    RobotSample sample;
-    sample.position << -1.4349, -0.6086, 1.4986, 1.7048, 0.1857, 0.2152, 0.782;
-    interpolator.reset(sample.position);
-    sample.cycle_time = 0.005;
-    sample.block = coglab_rt::MotionBlock::None;
-    VelocityCommand command;
-    while (!stop) {
-      std::this_thread::sleep_for(std::chrono::milliseconds(5));
-      if (blind) continue;
-      mailboxes.takeVelocity(command);
-      interpolator.step(command.velocity, 0.005);
-      sample.position = sample.commanded_position = interpolator.position();
-      sample.velocity = sample.commanded_velocity = interpolator.velocity();
-      sample.commanded_acceleration = interpolator.acceleration();
-      ++sample.sequence;
-      sample.stamp_ns = manager.now_ns();
-      sample.controller_ns += 5'000'000;
-      mailboxes.publishSample(sample);
-      thread.wake(true);
-    }
-  });
+  std::thread robot([&] { runArm(manager, thread, mailboxes, limits, stop, blind); });
   auto& ptp = dynamic_cast<PtpController&>(*manager.motion("ptp"));
-  const auto moves = [&] {
-    const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(5);
-    while (std::chrono::steady_clock::now() < end) {
-      if (manager.report().robot.commanded_velocity.norm() > 0.05) return true;
-      std::this_thread::sleep_for(std::chrono::milliseconds(2));
-    }
-    return false;
-  };
   while (manager.report().samples == 0) std::this_thread::sleep_for(std::chrono::milliseconds(2));
   ASSERT_EQ(ptp.add({kThere, {}, {}}).status, MotionAnswer::kStarted);
-  ASSERT_TRUE(moves());
+  ASSERT_TRUE(moves(manager));
   const CancelAnswer good = manager.cancel("ptp", 5.0, "test");
   EXPECT_TRUE(good.success) << good.message;
   EXPECT_TRUE(good.was_running);
   EXPECT_TRUE(manager.report().robot.commanded_velocity.isZero(0.0));
 
   ASSERT_EQ(ptp.add({kThere, {}, {}}).status, MotionAnswer::kStarted);
-  ASSERT_TRUE(moves());
+  ASSERT_TRUE(moves(manager));
   blind = true;  // measurements stop, so nobody knows whether the arm stands
   std::this_thread::sleep_for(std::chrono::milliseconds(20));
   const CancelAnswer bad = manager.cancel("ptp", 0.2, "test");

@@ -40,7 +40,7 @@ class Timer : public ctrl_more::FeedbackController {
 class Robot {
  public:
   explicit Robot(coglab_rt::ArmMailboxes& mailboxes) : mailboxes_(mailboxes) {
-    sample_.position << -1.4349, -0.6086, 1.4986, 1.7048, 0.1857, 0.2152, 0.782;
+    sample_.position = kHome;
     sample_.commanded_position = sample_.position;
     sample_.cycle_time = 0.005;
     sample_.block = coglab_rt::MotionBlock::None;

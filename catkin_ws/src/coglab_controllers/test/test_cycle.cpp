@@ -82,75 +82,63 @@ TEST(Cycle, TheCounterOfSystemCallsCounts) {
   EXPECT_EQ(SystemCalls::last(), SYS_getppid);
 }
 
-TEST(Cycle, NeitherAllocatesNorLocksWhileServicesAreCalled) {
-  constexpr std::uint64_t kCycles = 100000;
-  const auto limits =
-      coglab_rt::loadJointLimits(std::string(DESCRIPTION_DIR) + "/config/joint_limits.yaml");
-  ctrl_more::Logger logger;
-  FrameTable frames;
-  ManagerSettings settings = readManagerSettings(
-      YAML::Load("dmp: {enable_ik_debug: true}"),
-      readText(std::string(DESCRIPTION_DIR) + "/urdf/lwr_ih2.urdf"), limits, false);
-  settings.logger = &logger;
-  settings.cycle.overrun_time = 10.0;  // timed, and never over on a busy machine
-  settings.plan_timeout = 5.0;
-  ControllerManager manager(std::move(settings));
-  std::atomic<bool> stop{false};
+// What the control thread counts.
+struct Counted {
   std::atomic<std::uint64_t> cycles{0}, moving{0};
-  const std::uint64_t calls_before = SystemCalls::count();
-  std::atomic<bool> calls_counted{false};
-  ASSERT_TRUE(manager.load("limits", "JointLimits").success);
+  std::atomic<bool> system_calls{false};
+};
 
-  std::thread control([&] {
-    RobotSample sample;
-    sample.position << -1.4349, -0.6086, 1.4986, 1.7048, 0.1857, 0.2152, 0.782;
+// Runs cycles, as fast as they go, on an arm that follows at once.
+void runCycles(ControllerManager& manager, const std::atomic<bool>& stop, Counted& counted) {
+  RobotSample sample;
+  sample.position = kHome;
+  sample.commanded_position = sample.position;
+  sample.cycle_time = 0.005;
+  sample.block = coglab_rt::MotionBlock::None;
+  VelocityCommand command;
+  counted.system_calls = SystemCalls::enable();
+  while (!stop) {
+    ++sample.sequence;
+    sample.stamp_ns = manager.now_ns();
+    counting = true;
+    SystemCalls::start();
+    manager.cycle().run(sample, 0.005, command);
+    SystemCalls::stop();
+    counting = false;
+    if (command.velocity.norm() > 1e-3) ++counted.moving;
+    sample.position += 0.005 * command.velocity;
+    sample.velocity = command.velocity;
+    sample.commanded_velocity = command.velocity;
     sample.commanded_position = sample.position;
-    sample.cycle_time = 0.005;
-    sample.block = coglab_rt::MotionBlock::None;
-    VelocityCommand command;
-    calls_counted = SystemCalls::enable();
-    while (!stop) {
-      ++sample.sequence;
-      sample.stamp_ns = manager.now_ns();
-      counting = true;
-      SystemCalls::start();
-      manager.cycle().run(sample, 0.005, command);
-      SystemCalls::stop();
-      counting = false;
-      if (command.velocity.norm() > 1e-3) ++moving;
-      sample.position += 0.005 * command.velocity;
-      sample.velocity = command.velocity;
-      sample.commanded_velocity = command.velocity;
-      sample.commanded_position = sample.position;
-      ++cycles;
-      if (cycles % 16 == 0) std::this_thread::yield();
-    }
-  });
+    ++counted.cycles;
+    if (counted.cycles % 16 == 0) std::this_thread::yield();
+  }
+}
 
-  ASSERT_TRUE(VirtualRobot::ok(manager.load("dmp", "coglab/DmpController")));
-  ASSERT_TRUE(VirtualRobot::ok(manager.load("ptp", "coglab/PtpController")));
-  auto& dmp = dynamic_cast<DmpController&>(*manager.motion("dmp"));
-  auto& ptp = dynamic_cast<PtpController&>(*manager.motion("ptp"));
-  dmp.setGoalSource(&frames);
-  int loaded = 0;
-  ASSERT_TRUE(
-      VirtualRobot::ok(dmp.loadDmps(std::string(PACKAGE_DIR) + "/config/primitives.xml", loaded)));
-  int requests = 0, accepted = 0, paths = 0;
-  const auto count = [&](bool success) {
-    ++requests;
+// Everything that services, goals and publishers ask of the manager meanwhile.
+struct Requests {
+  ControllerManager& manager;
+  FrameTable& frames;
+  DmpController& dmp;
+  PtpController& ptp;
+  int made = 0, accepted = 0, paths = 0;
+
+  void count(bool success) {
+    ++made;
     if (success) ++accepted;
-  };
-  std::string type;
-  for (int round = 0; cycles < kCycles || round < 30; ++round) {
+  }
+
+  void round(int number) {
+    std::string type;
     GoalObservation goal;
-    goal.position = Vector3(0.80, 0.02 * (round % 5), 0.45);
+    goal.position = Vector3(0.80, 0.02 * (number % 5), 0.45);
     goal.stamp_ns = goal.frame_ns = manager.now_ns();
     frames.frames["human_hand"] = goal;
     count(manager.switchTo("dmp", type).success);
     DmpRequest request;
     request.primitive_id = "reach_human";
     request.goal_frame = "human_hand";
-    request.orientation_control = round % 2 == 0;
+    request.orientation_control = number % 2 == 0;
     count(dmp.execute(request).success);
     for (int i = 0; i < 5; ++i) {
       GoalObservation& seen = frames.frames["human_hand"];
@@ -163,10 +151,10 @@ TEST(Cycle, NeitherAllocatesNorLocksWhileServicesAreCalled) {
     count(dmp.switchDmp(request).success);
     request.primitive_id = "unknown";
     count(dmp.execute(request).success);
-    count(manager.setSpeedScale(0.5 + 0.5 * (round % 2)).success);
+    count(manager.setSpeedScale(0.5 + 0.5 * (number % 2)).success);
     count(manager.feedback().enable("limits").ok());
     count(manager.switchTo("ptp", type).success);
-    const double turn = 0.1 * (round % 3);
+    const double turn = 0.1 * (number % 3);
     for (int i = 0; i < 3; ++i) {
       ptp.askPath();
       count(ptp.add({{-1.4 + turn, -0.6, 1.5, 1.7, 0.2, 0.2, 0.8}, {}, {}}).id >= 0);
@@ -185,22 +173,54 @@ TEST(Cycle, NeitherAllocatesNorLocksWhileServicesAreCalled) {
     if (dmp.predict(request, path).success) ++paths;  // beside the motion under way
     manager.report();
   }
+};
+
+TEST(Cycle, NeitherAllocatesNorLocksWhileServicesAreCalled) {
+  constexpr std::uint64_t kCycles = 100000;
+  const auto limits =
+      coglab_rt::loadJointLimits(std::string(DESCRIPTION_DIR) + "/config/joint_limits.yaml");
+  ctrl_more::Logger logger;
+  FrameTable frames;
+  ManagerSettings settings = readManagerSettings(
+      YAML::Load("dmp: {enable_ik_debug: true}"),
+      readText(std::string(DESCRIPTION_DIR) + "/urdf/lwr_ih2.urdf"), limits, false);
+  settings.logger = &logger;
+  settings.cycle.overrun_time = 10.0;  // timed, and never over on a busy machine
+  settings.plan_timeout = 5.0;
+  ControllerManager manager(std::move(settings));
+  std::atomic<bool> stop{false};
+  Counted counted;
+  const std::uint64_t calls_before = SystemCalls::count();
+  ASSERT_TRUE(manager.load("limits", "JointLimits").success);
+
+  std::thread control([&] { runCycles(manager, stop, counted); });
+
+  ASSERT_TRUE(VirtualRobot::ok(manager.load("dmp", "coglab/DmpController")));
+  ASSERT_TRUE(VirtualRobot::ok(manager.load("ptp", "coglab/PtpController")));
+  auto& dmp = dynamic_cast<DmpController&>(*manager.motion("dmp"));
+  auto& ptp = dynamic_cast<PtpController&>(*manager.motion("ptp"));
+  dmp.setGoalSource(&frames);
+  int loaded = 0;
+  ASSERT_TRUE(
+      VirtualRobot::ok(dmp.loadDmps(std::string(PACKAGE_DIR) + "/config/primitives.xml", loaded)));
+  Requests requests{manager, frames, dmp, ptp};
+  for (int round = 0; counted.cycles < kCycles || round < 30; ++round) requests.round(round);
   stop = true;
   control.join();
-  EXPECT_GE(cycles.load(), kCycles);
-  EXPECT_GT(moving.load(), kCycles / 100);
-  EXPECT_GT(requests, 300);
-  EXPECT_GT(accepted, requests / 2);
-  EXPECT_GT(paths, 20);
+  EXPECT_GE(counted.cycles.load(), kCycles);
+  EXPECT_GT(counted.moving.load(), kCycles / 100);
+  EXPECT_GT(requests.made, 300);
+  EXPECT_GT(requests.accepted, requests.made / 2);
+  EXPECT_GT(requests.paths, 20);
   EXPECT_EQ(allocations.load(), 0u);
   EXPECT_EQ(locks.load(), 0u);
   const auto calls = static_cast<int>(SystemCalls::count() - calls_before);
-  if (calls_counted) {
+  if (counted.system_calls) {
     EXPECT_EQ(calls, 0) << "the last one has number " << SystemCalls::last();
   }
-  RecordProperty("requests", requests);
+  RecordProperty("requests", requests.made);
   RecordProperty("locks", static_cast<int>(locks.load()));
-  RecordProperty("system_calls", calls_counted ? calls : -1);
+  RecordProperty("system_calls", counted.system_calls ? calls : -1);
   RecordProperty("allocations", static_cast<int>(allocations.load()));
 }
 

@@ -110,7 +110,7 @@ TEST(Faults, OverrunsInARowFaultTheControllerAndSinglesDoNot) {
   while (!stop) manager.cycle().idle(manager.now_ns());
   services.join();
   RobotSample sample;
-  sample.position << -1.4349, -0.6086, 1.4986, 1.7048, 0.1857, 0.2152, 0.782;
+  sample.position = kHome;
   sample.commanded_position = sample.position;
   sample.block = coglab_rt::MotionBlock::None;
   VelocityCommand command;
@@ -189,7 +189,7 @@ TEST(Faults, TheTimeOfASlowFeedbackControllerIsNotChargedToTheMotionController) 
   while (!stop) manager.cycle().idle(manager.now_ns());
   services.join();
   RobotSample sample;
-  sample.position << -1.4349, -0.6086, 1.4986, 1.7048, 0.1857, 0.2152, 0.782;
+  sample.position = kHome;
   sample.commanded_position = sample.position;
   sample.block = coglab_rt::MotionBlock::None;
   VelocityCommand command;

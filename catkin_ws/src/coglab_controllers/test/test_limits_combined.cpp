@@ -177,7 +177,7 @@ TEST(LimitsCombined, ReachesUnderPushesNearTheEndsOfTheRangesComeToNoFault) {
   for (int run = 0; run < 25; ++run) {
     robot.active_dmp = false;
     robot.switchTo("ptp");
-    std::vector<double> home = {-1.4349, -0.6086, 1.4986, 1.7048, 0.1857, 0.2152, 0.782};
+    std::vector<double> home(kHome.data(), kHome.data() + kHome.size());
     home[4] = uniform(random, -2.9, 2.9);  // a wrist near the end of its range
     home[6] =
         uniform(random, 0.0, 1.0) < 0.5 ? uniform(random, 2.6, 2.95) : uniform(random, -2.95, -2.6);

@@ -231,7 +231,7 @@ TEST(Manager, ControlThreadIdlesWithoutARobotAndSurvivesAStall) {
   std::atomic<bool> stop{false};
   std::thread robot([&] {
     RobotSample sample;
-    sample.position << -1.4349, -0.6086, 1.4986, 1.7048, 0.1857, 0.2152, 0.782;
+    sample.position = kHome;
     sample.commanded_position = sample.position;
     sample.cycle_time = 0.005;
     sample.block = coglab_rt::MotionBlock::None;
@@ -319,7 +319,7 @@ TEST(Manager, MotionAndItsFeedbackProfileBeginInTheSameCycle) {
   std::atomic<int> with{0}, without{0}, apart{0};
   std::thread control([&] {
     RobotSample sample;
-    sample.position << -1.4349, -0.6086, 1.4986, 1.7048, 0.1857, 0.2152, 0.782;
+    sample.position = kHome;
     sample.commanded_position = sample.position;
     VelocityCommand command;
     while (!stop) {

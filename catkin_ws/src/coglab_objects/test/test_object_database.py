@@ -26,7 +26,7 @@ def test_five_sample_objects_without_a_problem():
 @pytest.mark.parametrize(
     "change, sentence",
     [
-        (("mass: 0.31", "mass: -1"), "mug.yaml:5: mass: -1 is less than or equal to the minimum of 0"),
+        (("mass: 0.31", "mass: -1"), "mug.yaml:5: mass: -1 is less than the minimum of 0.01"),
         (("mass: 0.31", "mass: heavy"), "mug.yaml:5: mass: 'heavy' is not of type 'number'"),
         (("mass: 0.31\n", ""), "mug.yaml:2: top level: 'mass' is a required property"),
         (("friction: 0.6", "friction: 0.6\nfrction: 0.6"), "'frction' was unexpected"),

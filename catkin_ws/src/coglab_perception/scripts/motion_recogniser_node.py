@@ -32,7 +32,7 @@ class RecogniserNode:
 
     def __init__(self) -> None:
         self.frames = frames = FrameNames.from_mapping(
-            rospy.get_param("perception/frames", None), rospy.resolve_name("perception/frames")
+            parameters.read("perception/frames", dict, {}), rospy.resolve_name("perception/frames")
         )
         path = parameters.read("~patterns", str, "")
         if not path:

@@ -1,6 +1,7 @@
 """Parameters: types and ranges, and the sentence where one does not fit."""
 
 import pytest
+from coglab_py import parameters
 from coglab_py.parameters import ParameterError, checked, checked_numbers
 
 
@@ -32,6 +33,22 @@ def test_another_value_is_refused_with_a_sentence(value, kind, more, sentence):
     with pytest.raises(ParameterError) as error:
         checked("/n/x", value, kind, **more)
     assert sentence in str(error.value)
+
+
+def test_lists_of_points(monkeypatch):
+    given = {"/n/good": [[1, 2, 3.5]], "/n/flat": [1, 2, 3], "/n/short": [[1, 2, 3], [1, 2]], "/n/text": "1 2 3"}
+    monkeypatch.setattr(parameters.rospy, "get_param", lambda name, default: given.get(name, default))
+    monkeypatch.setattr(parameters.rospy, "resolve_name", lambda name: name)
+    assert parameters.points("/n/good", []) == [[1.0, 2.0, 3.5]]
+    assert parameters.points("/n/none", [[0, 0, 1]]) == [[0.0, 0.0, 1.0]]
+    for name, sentence in (
+        ("/n/flat", "parameter /n/flat[0]: expected a list of 3 finite numbers"),
+        ("/n/short", "parameter /n/short[1]: expected a list of 3 finite numbers"),
+        ("/n/text", "parameter /n/text: expected a list of points, got '1 2 3'"),
+    ):
+        with pytest.raises(ParameterError) as error:
+            parameters.points(name, [])
+        assert sentence in str(error.value)
 
 
 def test_lists_of_numbers():

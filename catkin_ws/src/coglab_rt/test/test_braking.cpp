@@ -76,10 +76,10 @@ TEST(Braking, NoPositionLimitIsCrossedFromAnyState) {
       }
       Interpolator interpolator(limits);
       interpolator.resume(p, v, a);
-      Vector7 wish;
-      for (int i = 0; i < 7; ++i) wish[i] = part(random) > 0.0 ? 10.0 : -10.0;
+      Vector7 wanted;
+      for (int i = 0; i < 7; ++i) wanted[i] = part(random) > 0.0 ? 10.0 : -10.0;
       for (int step = 0; step < static_cast<int>(4.5 / dt) && step < 900; ++step) {
-        Vector7 target = wish;
+        Vector7 target = wanted;
         const unsigned cut = guard.bound(interpolator, dt, target);
         at_border += cut != 0 ? 1 : 0;
         interpolator.step(target, dt);

@@ -1,4 +1,4 @@
-/// The mailboxes between FRI thread and control thread, with both threads at full speed.
+/// The mailboxes between the arm's thread and the control thread, with both threads at full speed.
 #include <gtest/gtest.h>
 
 #include <atomic>

@@ -5,9 +5,12 @@
 
 #include <cmath>
 #include <stdexcept>
+#include <string>
 #include <type_traits>
+#include <vector>
 
 #include "coglab_rt/ros/parameter.hpp"
+#include "coglab_sim/ranges.hpp"
 
 namespace coglab_sim {
 namespace {
@@ -33,11 +36,29 @@ void take(CellConfig& config, const ros::NodeHandle& node, const CellParameter& 
   row.set(config, std::visit(read, row.get(config)));
 }
 
-double numberOf(const YAML::Node& entry, const char* field) {
-  const auto value = entry[field].as<double>(std::nan(""));
-  if (!std::isfinite(value))
-    throw std::invalid_argument(std::string(field) + ": expected a number");
+/// A number that may be what the schema says. @throws std::invalid_argument naming the field.
+double numberOf(const YAML::Node& entry, const std::string& field, const YAML::Node& schema) {
+  const auto value = entry.as<double>(std::nan(""));
+  if (!std::isfinite(value)) throw std::invalid_argument(field + ": expected a number");
+  requireWithin({schema["minimum"].as<double>(), schema["maximum"].as<double>()}, field, value);
   return value;
+}
+
+/// Mass, size, shape and friction of an entry, within the ranges that the database checks, too.
+plant::Object objectOf(const YAML::Node& entry) {
+  const YAML::Node schema =
+      YAML::LoadFile(ros::package::getPath("coglab_objects") + "/config/object_schema.json");
+  const YAML::Node fields = schema["properties"], length = schema["definitions"]["length"];
+  std::vector<double> size;
+  for (const YAML::Node& side : entry["size"]) size.push_back(numberOf(side, "size", length));
+  CellConfig config;
+  setCellParameter(config, "object/mass", numberOf(entry["mass"], "mass", fields["mass"]));
+  setCellParameter(config, "object/friction",
+                   numberOf(entry["friction"], "friction", fields["friction"]));
+  setCellParameter(config, "object/shape", entry["shape"]["type"].as<std::string>());
+  setCellParameter(config, "object/size", size);
+  config.object.center = Vector3d(0.0, 0.0, config.object.size[2] / 2);
+  return config.object;
 }
 
 }  // namespace
@@ -64,15 +85,9 @@ plant::Object readObject(const ros::NodeHandle& node, const std::string& id) {
       node, "objects", ros::package::getPath("coglab_objects") + "/objects", "a path");
   const std::string path = folder + "/" + id + ".yaml";
   try {
-    const YAML::Node entry = YAML::LoadFile(path);
-    CellConfig config;
-    setCellParameter(config, "object/mass", numberOf(entry, "mass"));
-    setCellParameter(config, "object/friction", numberOf(entry, "friction"));
-    setCellParameter(config, "object/shape", entry["shape"]["type"].as<std::string>());
-    setCellParameter(config, "object/size", entry["size"].as<std::vector<double>>());
-    config.object.center = Vector3d(0.0, 0.0, config.object.size[2] / 2);
-    config.object.id = id;
-    return config.object;
+    plant::Object object = objectOf(YAML::LoadFile(path));
+    object.id = id;
+    return object;
   } catch (const std::exception& error) {
     throw std::invalid_argument(
         "object '" + id + "': " + path + " cannot be used (" + error.what() +

@@ -49,7 +49,7 @@ class PerceptionNode:
     """Thin node over Vision and Playback."""
 
     def __init__(self) -> None:
-        names = FrameNames.from_mapping(rospy.get_param("~frames", None), rospy.resolve_name("~frames"))
+        names = FrameNames.from_mapping(parameters.read("~frames", dict, {}), rospy.resolve_name("~frames"))
         settings = parameters.read("~settings", dict, {})
         settings["perfect"] = parameters.read("~perfect", bool, settings.get("perfect", False))
         seed = parameters.read("~seed", int, parameters.read("coglab_sim/seed", int, 7))
@@ -66,7 +66,7 @@ class PerceptionNode:
             rospy.get_time,
             parameters.read("~partner_margin", float, 0.0, 0.0),
         )
-        self.others = [Pose(np.array(place, dtype=float)) for place in rospy.get_param("~others", OTHERS)]
+        self.others = [Pose(np.array(place)) for place in parameters.points("~others", OTHERS)]
         self.people = parameters.read("~people", int, 1, 0, 255)
         self.truth: CellTruth | None = None
         self.broadcaster = tf2_ros.TransformBroadcaster()

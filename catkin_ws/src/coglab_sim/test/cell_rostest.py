@@ -6,6 +6,7 @@ import os
 import socket
 import subprocess
 import sys
+import tempfile
 import threading
 import time
 import unittest
@@ -16,6 +17,7 @@ import rospy
 import rostest
 from coglab_msgs.msg import CellTruth, FingertipForces, HumanHand, MotorCommands, MotorStates, ReasonCode
 from coglab_msgs.srv import InjectFault, PlaceObject
+from coglab_objects.database import ObjectError, objects_folder, read_object
 from geometry_msgs.msg import Point, Pose, Quaternion
 from std_msgs.msg import String
 
@@ -145,6 +147,26 @@ class CellNode(unittest.TestCase):
     def move(self, speed, target, current) -> None:
         """Commands to the motors of the hand."""
         self.commands.publish(MotorCommands(speed=speed, target=target, current=[current] * 5))
+
+    def test_3b_what_the_database_refuses_is_no_object_of_the_cell(self) -> None:
+        mug = (objects_folder() / "mug.yaml").read_text(encoding="utf-8")
+        with tempfile.TemporaryDirectory() as folder:
+            rospy.set_param("/coglab_sim/cell/objects", folder)
+            try:
+                for field, changed in (
+                    ("mass", mug.replace("mass: 0.31", "mass: 6.0")),
+                    ("size", mug.replace("size: [0.08, 0.08, 0.10]", "size: [0.08, 0.08, 1.4]")),
+                ):
+                    path = Path(folder) / "mug.yaml"
+                    path.write_text(changed, encoding="utf-8")
+                    with self.assertRaisesRegex(ObjectError, field):
+                        read_object(path)
+                    answer = self.place("mug", "world", Pose(Point(), Quaternion(0, 0, 0, 1)))
+                    self.assertFalse(answer.success)
+                    self.assertIn(f"{field} = ", answer.message)
+                    self.assertIn("./coglab object check mug", answer.message)
+            finally:
+                rospy.delete_param("/coglab_sim/cell/objects")
 
     def test_4_bad_requests_are_refused_with_words(self) -> None:
         answer = self.place("", "moon", Pose(Point(), Quaternion(0, 0, 0, 1)))

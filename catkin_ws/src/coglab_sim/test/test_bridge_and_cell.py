@@ -312,7 +312,7 @@ def test_the_program_of_rcprg_opens_fri_again_on_request():
 
 
 def test_t1_profile_is_slow_enough_for_t1():
-    """At full wish the t1 profile never trips the controller's T1 limit; the default profile does."""
+    """At the highest target velocity the t1 profile never trips the controller's T1 limit; the default profile does."""
     for profile, good in (("t1", True), ("default", False)):
         wire = Wire(profile=profile, krc__mode="T1")
         wire.start()

@@ -1,12 +1,13 @@
 """config/cell.yaml: every name is one of the table's, and every object of the database is one for the cell."""
 
 import importlib
+import json
 import sys
 from pathlib import Path
 
 import pytest
 import yaml
-from coglab_objects.database import cell_parameters, objects_folder, read_object
+from coglab_objects.database import SCHEMA_FILE, cell_parameters, objects_folder, read_object
 from coglab_sim import _cell
 from conftest import URDF
 
@@ -27,6 +28,15 @@ def test_names_are_known():
 def test_the_cell_takes_every_object_of_the_database(object_id):
     entry, _ = read_object(objects_folder() / f"{object_id}.yaml")
     _cell.Cell(URDF, {f"object/{name}": value for name, value in cell_parameters(entry).items()})
+
+
+def test_the_cell_can_compute_with_every_object_that_the_database_takes():
+    schema = json.loads(SCHEMA_FILE.read_text(encoding="utf-8"))
+    ranges = {row["name"]: (row["low"], row["high"]) for row in _cell.parameter_table()}
+    fields = {"size": schema["definitions"]["length"]} | {f: schema["properties"][f] for f in ("mass", "friction")}
+    for field, allowed in fields.items():
+        low, high = ranges[f"object/{field}"]
+        assert low <= allowed["minimum"] < allowed["maximum"] <= high, field
 
 
 def test_the_configuration_repeats_nothing_that_the_database_says():

@@ -79,7 +79,7 @@ class ContactDetectorNode:
         self.margin = rospy.Publisher("~margin", Float64, queue_size=1)
         self.signal = rospy.Publisher("~signal", ContactSignal, queue_size=1)
         frames = FrameNames.from_mapping(
-            rospy.get_param("perception/frames", None), rospy.resolve_name("perception/frames")
+            parameters.read("perception/frames", dict, {}), rospy.resolve_name("perception/frames")
         )
         self.base = frames.world
         self.buffer = tf2_ros.Buffer(rospy.Duration(2.0))

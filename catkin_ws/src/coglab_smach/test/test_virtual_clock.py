@@ -52,10 +52,10 @@ def test_an_hour_of_concurrent_machines_costs_nothing():
 def test_a_request_at_a_moment_of_virtual_time():
     with using(VirtualClock()) as clock:
         machine = both(clock, 10.0, 50.0)
-        asker = clock.start_thread(lambda: (clock.sleep(20.05), machine.request_preempt()), "asker")
+        caller = clock.start_thread(lambda: (clock.sleep(20.05), machine.request_preempt()), "caller")
         assert machine.execute() == "preempted"
         assert clock.now() == pytest.approx(20.1, abs=1e-6)
-        asker.join(5)
+        caller.join(5)
 
 
 def test_runs_are_the_same_each_time():

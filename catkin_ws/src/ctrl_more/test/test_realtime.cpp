@@ -6,6 +6,7 @@
 
 #include <atomic>
 #include <fstream>
+#include <iostream>
 #include <mutex>
 #include <random>
 #include <sstream>
@@ -56,6 +57,54 @@ std::unique_ptr<TestController> typical(std::atomic<bool>* throw_now) {
   return c;
 }
 
+// What another thread asks for while the cycles run.
+Status change(FeedbackControllersManager& manager, int kind, const std::string& name,
+              const std::string& gains, std::mt19937& random) {
+  switch (kind) {
+    case 0:
+      return manager.disable(name);
+    case 1:
+      return manager.enable();
+    case 2:
+      return manager.pause(name);
+    case 3:
+      return manager.resume();
+    case 4: {
+      std::vector<std::string> order = manager.getExecutionOrder();
+      std::swap(order[random() % order.size()], order[random() % order.size()]);
+      return manager.setExecutionOrder(order);
+    }
+    case 5:
+      return manager.loadGains(name, gains);
+    case 6:
+      return manager.pauseAllUsingRobotState("imu");
+    default:
+      return manager.resumeAllUsingRobotState("imu");
+  }
+}
+
+// Cycles as fast as they go; what was forbidden among it all.
+forbidden::Counts cycleWhile(const std::atomic<bool>& run, std::atomic<std::uint64_t>& cycles,
+                             Rig& rig) {
+  const RobotSignal imu = rig.robot.find(RobotSource::Measured, "imu");
+  const ControlStates references = rig.control;
+  const double values[9] = {0.1, 0, 0, 0.1, 0, 0, 0, 0, 9.81};
+  Cycle cycle{0, 0.005, 0};
+  forbidden::start();
+  while (run.load(std::memory_order_relaxed)) {
+    ++cycle.number;
+    cycle.now_ns += 5000000;
+    rig.control.copyValuesFrom(references);
+    rig.robot.write(imu, values, cycle.now_ns);
+    rig.manager->beginCycle(cycle);
+    rig.manager->updateStage(Stage::Task, rig.robot, rig.control);
+    rig.manager->updateStage(Stage::Joint, rig.robot, rig.control);
+    rig.manager->endCycle();
+    cycles.store(cycle.number, std::memory_order_relaxed);
+  }
+  return forbidden::stop();
+}
+
 TEST(Realtime, NothingForbiddenIn100000CyclesWith10000PlanChanges) {
   Rig rig(0.05, true, true);
   std::atomic<bool> throw_now{false};
@@ -68,68 +117,21 @@ TEST(Realtime, NothingForbiddenIn100000CyclesWith10000PlanChanges) {
   const std::string gains = ::testing::TempDir() + "/ctrl_more_realtime.yaml";
   std::ofstream(gains) << "kp: 0.02\n";
   rig.robot.setMeasuredData("imu", Eigen::VectorXd::Constant(9, 0.1), 0);
-  const RobotSignal imu = rig.robot.find(RobotSource::Measured, "imu");
   rig.setReferences();
   rig.manager->freeze();
-  const ControlStates references = rig.control;
 
   std::atomic<bool> run{true};
   std::atomic<std::uint64_t> cycles{0};
   forbidden::Counts counts;
-  std::thread cycle_thread([&] {
-    const double values[9] = {0.1, 0, 0, 0.1, 0, 0, 0, 0, 9.81};
-    Cycle cycle{0, 0.005, 0};
-    forbidden::start();
-    while (run.load(std::memory_order_relaxed)) {
-      ++cycle.number;
-      cycle.now_ns += 5000000;
-      rig.control.copyValuesFrom(references);
-      rig.robot.write(imu, values, cycle.now_ns);
-      rig.manager->beginCycle(cycle);
-      rig.manager->updateStage(Stage::Task, rig.robot, rig.control);
-      rig.manager->updateStage(Stage::Joint, rig.robot, rig.control);
-      rig.manager->endCycle();
-      cycles.store(cycle.number, std::memory_order_relaxed);
-    }
-    counts = forbidden::stop();
-  });
+  std::thread cycle_thread([&] { counts = cycleWhile(run, cycles, rig); });
 
   std::mt19937 random(1);
   std::uint64_t adopted = 0, reorders = 0, reloads = 0, faults = 0;
   int changes = 0;
   while (cycles.load() < 100000 || adopted < 10000) {
     const std::string& name = names[random() % names.size()];
-    Status status;
     const int kind = static_cast<int>(random() % 8);
-    switch (kind) {
-      case 0:
-        status = rig.manager->disable(name);
-        break;
-      case 1:
-        status = rig.manager->enable();
-        break;
-      case 2:
-        status = rig.manager->pause(name);
-        break;
-      case 3:
-        status = rig.manager->resume();
-        break;
-      case 4: {
-        std::vector<std::string> order = rig.manager->getExecutionOrder();
-        std::swap(order[random() % order.size()], order[random() % order.size()]);
-        status = rig.manager->setExecutionOrder(order);
-        break;
-      }
-      case 5:
-        status = rig.manager->loadGains(name, gains);
-        break;
-      case 6:
-        status = rig.manager->pauseAllUsingRobotState("imu");
-        break;
-      case 7:
-        status = rig.manager->resumeAllUsingRobotState("imu");
-        break;
-    }
+    const Status status = change(*rig.manager, kind, name, gains, random);
     ASSERT_TRUE(status) << status.message();
     if (rig.manager->waitAdopted(status.generation(), 1.0)) {
       ++adopted;
@@ -149,13 +151,10 @@ TEST(Realtime, NothingForbiddenIn100000CyclesWith10000PlanChanges) {
   }
   run = false;
   cycle_thread.join();
-  const auto number = [](std::uint64_t n) { return static_cast<unsigned long long>(n); };
-  std::printf(
-      "cycles %llu, plans adopted %llu, reorders %llu, reloads %llu, faults %llu, "
-      "allocations %llu, locks %llu, syscalls %llu, allocations of throws %llu\n",
-      number(cycles.load()), number(adopted), number(reorders), number(reloads), number(faults),
-      number(counts.allocations), number(counts.locks), number(counts.syscalls),
-      number(counts.of_throw));
+  std::cout << "cycles " << cycles << ", plans adopted " << adopted << ", reorders " << reorders
+            << ", reloads " << reloads << ", faults " << faults << ", allocations "
+            << counts.allocations << ", locks " << counts.locks << ", syscalls " << counts.syscalls
+            << ", allocations of throws " << counts.of_throw << "\n";
   EXPECT_EQ(counts.allocations, 0u);
   EXPECT_EQ(counts.locks, 0u);
   EXPECT_EQ(counts.syscalls, 0u);

@@ -57,7 +57,7 @@ Eigen::VectorXd sensorData(const Robot& robot, const Body& body, std::string& ke
   return data;
 }
 
-TEST(ThreeRobots, OneLibraryThreeFilesOneResult) {
+std::vector<Robot> threeRobots() {
   const std::string gains =
       "kp: [0.6, 0.4, 0.2]\nki: [1, 2, 0.5]\nkd: [0.02, 0.03, 0.01]\nmax_angle: 0.5\n";
   const Eigen::Quaterniond tilted = expOf({0.4, -1.1, 2.0});
@@ -68,55 +68,62 @@ TEST(ThreeRobots, OneLibraryThreeFilesOneResult) {
     mount += number;
   }
   mount += "]\n";
-  const std::vector<Robot> robots = {
-      {"LWR with wrist IMU",
-       gains + "imu: wrist_imu\nimu_layout: rpy_gyro_acc\ntarget: pose\npose: wrist\n",
-       Eigen::Quaterniond::Identity(), Eigen::Quaterniond::Identity()},
-      {"biped torso, quaternion in another order",
-       gains + "imu: torso_imu\nimu_layout: quaternion_wxyz_acc_gyro\ntarget: pelvis\n",
-       Eigen::Quaterniond::Identity(), expOf({0, 0, 1.3})},
-      {"IMU mounted turned",
-       gains + mount + "imu_layout: quaternion_acc_gyro\ntarget: pose\npose: chest\n", tilted,
-       expOf({0.2, 0.5, -0.7})}};
+  return {{"LWR with wrist IMU",
+           gains + "imu: wrist_imu\nimu_layout: rpy_gyro_acc\ntarget: pose\npose: wrist\n",
+           Eigen::Quaterniond::Identity(), Eigen::Quaterniond::Identity()},
+          {"biped torso, quaternion in another order",
+           gains + "imu: torso_imu\nimu_layout: quaternion_wxyz_acc_gyro\ntarget: pelvis\n",
+           Eigen::Quaterniond::Identity(), expOf({0, 0, 1.3})},
+          {"IMU mounted turned",
+           gains + mount + "imu_layout: quaternion_acc_gyro\ntarget: pose\npose: chest\n", tilted,
+           expOf({0.2, 0.5, -0.7})}};
+}
+
+// The way of a body that the library corrects on this robot.
+void follow(const Robot& robot, std::vector<Eigen::Quaterniond>& path) {
+  ControllerRig rig;
+  rig.control.declare(ControlContainer::TaskSpaceReferencePose, "wrist", 7);
+  rig.control.declare(ControlContainer::TaskSpaceReferencePose, "chest", 7);
+  const Status status = rig.load("attitude", robot.configuration);
+  ASSERT_TRUE(status) << robot.name << ": " << status.message();
+  const bool pelvis = contains(robot.configuration, "target: pelvis");
+  const std::string pose_key = contains(robot.configuration, "wrist_imu") ? "wrist" : "chest";
+  const Eigen::Quaterniond to_common = robot.world;
+  Body body;
+  for (int k = 0; k < 1000; ++k) {
+    std::string key;
+    const Eigen::VectorXd data = sensorData(robot, body, key);
+    ASSERT_TRUE(rig.robot.setMeasuredData(key, data, rig.cycle.now_ns));
+    // The common reference, in this robot's world.
+    const Eigen::Quaterniond reference =
+        (to_common.conjugate() * expOf({0.1 * std::sin(0.02 * k), 0.05, 0})).normalized();
+    Eigen::VectorXd pose(7);
+    pose << 0.1, 0.2, 0.3, reference.coeffs();
+    if (pelvis) {
+      rig.control.setPelvisOrientation(reference.toRotationMatrix());
+    } else {
+      ASSERT_TRUE(rig.control.setTaskSpaceReferencePose(pose_key, pose));
+    }
+    rig.cycleOnce();
+    Eigen::Quaterniond command(rig.control.getPelvisOrientation());
+    if (!pelvis) {
+      rig.control.getTaskSpaceReferencePose(pose_key, pose);
+      command = Eigen::Quaterniond(pose.tail<4>().data());
+    }
+    body.step(to_common * command, k, 0.005);
+    path.push_back(body.orientation);
+  }
+  EXPECT_EQ(rig.manager->status("c").faults, 0u);
+}
+
+TEST(ThreeRobots, OneLibraryThreeFilesOneResult) {
   const std::string library_before = bytesOfLibrary();
   ASSERT_FALSE(library_before.empty());
 
   std::vector<std::vector<Eigen::Quaterniond>> paths;
-  for (const Robot& robot : robots) {
-    ControllerRig rig;
-    rig.control.declare(ControlContainer::TaskSpaceReferencePose, "wrist", 7);
-    rig.control.declare(ControlContainer::TaskSpaceReferencePose, "chest", 7);
-    const Status status = rig.load("attitude", robot.configuration);
-    ASSERT_TRUE(status) << robot.name << ": " << status.message();
-    const bool pelvis = contains(robot.configuration, "target: pelvis");
-    const std::string pose_key = contains(robot.configuration, "wrist_imu") ? "wrist" : "chest";
-    const Eigen::Quaterniond to_common = robot.world;
-    Body body;
+  for (const Robot& robot : threeRobots()) {
     std::vector<Eigen::Quaterniond> path;
-    for (int k = 0; k < 1000; ++k) {
-      std::string key;
-      const Eigen::VectorXd data = sensorData(robot, body, key);
-      ASSERT_TRUE(rig.robot.setMeasuredData(key, data, rig.cycle.now_ns));
-      // The common reference, in this robot's world.
-      const Eigen::Quaterniond reference =
-          (to_common.conjugate() * expOf({0.1 * std::sin(0.02 * k), 0.05, 0})).normalized();
-      Eigen::VectorXd pose(7);
-      pose << 0.1, 0.2, 0.3, reference.coeffs();
-      if (pelvis) {
-        rig.control.setPelvisOrientation(reference.toRotationMatrix());
-      } else {
-        ASSERT_TRUE(rig.control.setTaskSpaceReferencePose(pose_key, pose));
-      }
-      rig.cycleOnce();
-      Eigen::Quaterniond command(rig.control.getPelvisOrientation());
-      if (!pelvis) {
-        rig.control.getTaskSpaceReferencePose(pose_key, pose);
-        command = Eigen::Quaterniond(pose.tail<4>().data());
-      }
-      body.step(to_common * command, k, 0.005);
-      path.push_back(body.orientation);
-    }
-    EXPECT_EQ(rig.manager->status("c").faults, 0u);
+    ASSERT_NO_FATAL_FAILURE(follow(robot, path));
     paths.push_back(path);
   }
   EXPECT_EQ(bytesOfLibrary(), library_before) << "the same file for all of them";

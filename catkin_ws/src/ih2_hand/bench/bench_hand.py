@@ -136,86 +136,62 @@ def time_of(sweep, *arguments) -> float:
     return (time.perf_counter() - started) / (SWEEPS * 15) * 1e6
 
 
+def block_times(port: str) -> list[list[float]]:
+    """Microseconds per request of each contestant, block by block, without blocks in which the line was disturbed."""
+    # A busy machine may hold the emulator back for longer than a hand ever takes.
+    with HandSerialDriver(port, read_timeout=0.5) as driver:
+        bare = os.open(port, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
+        poll = select.poll()
+        poll.register(bare, select.POLLIN)
+        plain = serial.Serial(port, timeout=0.5)
+        blocking = os.open(port, os.O_RDWR | os.O_NOCTTY)
+        contestants = (
+            (driver_sweep, driver),
+            (bare_sweep, bare, poll),
+            (blocking_sweep, blocking),
+            (pyserial_sweep, plain),
+        )
+        for contestant in contestants * 3:
+            time_of(*contestant)
+        times = []
+        for _ in range(BLOCKS):
+            disturbed = driver.counters.resynchronisations
+            block = [time_of(*contestant) for contestant in contestants]
+            if driver.counters.resynchronisations == disturbed:
+                times.append(block)
+        plain.close()
+        os.close(bare)
+        os.close(blocking)
+        if len(times) < 0.9 * BLOCKS:
+            raise RuntimeError(
+                f"the line was disturbed in {BLOCKS - len(times)} of {BLOCKS} blocks: {driver.counters.reasons}"
+            )
+    return times
+
+
 def request_time() -> list[Row]:
     emulator = subprocess.Popen(
         [sys.executable, str(PACKAGE / "scripts" / "hand_emulator.py"), "--greeting"], stdout=subprocess.PIPE, text=True
     )
     try:
-        port = emulator.stdout.readline().split()[1]
-        # A busy machine may hold the emulator back for longer than a hand ever takes.
-        with HandSerialDriver(port, read_timeout=0.5) as driver:
-            bare = os.open(port, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
-            poll = select.poll()
-            poll.register(bare, select.POLLIN)
-            plain = serial.Serial(port, timeout=0.5)
-            blocking = os.open(port, os.O_RDWR | os.O_NOCTTY)
-            contestants = (
-                (driver_sweep, driver),
-                (bare_sweep, bare, poll),
-                (blocking_sweep, blocking),
-                (pyserial_sweep, plain),
-            )
-            for contestant in contestants * 3:
-                time_of(*contestant)
-            times = []
-            for _ in range(BLOCKS):
-                disturbed = driver.counters.resynchronisations
-                block = [time_of(*contestant) for contestant in contestants]
-                if driver.counters.resynchronisations == disturbed:
-                    times.append(block)
-            plain.close()
-            os.close(bare)
-            os.close(blocking)
-            if len(times) < 0.9 * BLOCKS:
-                raise RuntimeError(
-                    f"the line was disturbed in {BLOCKS - len(times)} of {BLOCKS} blocks: {driver.counters.reasons}"
-                )
+        times = block_times(emulator.stdout.readline().split()[1])
     finally:
         emulator.terminate()
         emulator.wait(10)
-    ours, bare_us, blocking_us, pyserial_us = (statistics.median(column) for column in zip(*times, strict=True))
-    ratio, blocking_ratio, pyserial_ratio = (
-        statistics.median(block[0] / block[peer] for block in times) for peer in (1, 2, 3)
-    )
+    ours, *peers = (statistics.median(column) for column in zip(*times, strict=True))
     wire_us = (3 + 3 + 4) / 3 * 10 / WIRE.baud * 1e6
-    return [
-        row(
-            "driver time per request / bare write and read on the same pty",
-            ratio,
-            "ratio",
-            "<= 1.25",
-            ratio <= 1.25,
-            "bare write/poll/read loop (us)",
-            bare_us,
-        ),
-        row(
-            "driver time per request / write and blocking read, which has no time limit",
-            blocking_ratio,
-            "ratio",
-            "<= 1.25",
-            blocking_ratio <= 1.25,
-            "write/blocking read loop (us)",
-            blocking_us,
-        ),
-        row(
-            "driver time per request / pyserial write and read",
-            pyserial_ratio,
-            "ratio",
-            "<= 1.25",
-            pyserial_ratio <= 1.25,
-            "pyserial write/read loop (us)",
-            pyserial_us,
-        ),
-        row(
-            "driver time per request on the pty",
-            ours,
-            "us",
-            None,
-            True,
-            "the wire's own time per request at 115200 baud, hand's delay not counted (us)",
-            wire_us,
-        ),
-    ]
+    wire = "the wire's own time per request at 115200 baud, hand's delay not counted (us)"
+    rows = []
+    for i, (whose, loop) in enumerate(
+        (
+            ("bare write and read on the same pty", "bare write/poll/read loop (us)"),
+            ("write and blocking read, which has no time limit", "write/blocking read loop (us)"),
+            ("pyserial write and read", "pyserial write/read loop (us)"),
+        )
+    ):
+        ratio = statistics.median(block[0] / block[1 + i] for block in times)
+        rows.append(row(f"driver time per request / {whose}", ratio, "ratio", "<= 1.25", ratio <= 1.25, loop, peers[i]))
+    return [*rows, row("driver time per request on the pty", ours, "us", None, True, wire, wire_us)]
 
 
 # -- node ------------------------------------------------------------------------------------------
@@ -275,6 +251,23 @@ def cpu_share(pid: int) -> float:
     return (cpu_seconds(pid) - before) / (time.monotonic() - begun)
 
 
+def share_while_closing(pid: int) -> float:
+    """The node's processor time while hand_close moves the fingers slowly."""
+    import actionlib
+    import rospy
+    from coglab_msgs.msg import HandCloseAction, HandCloseGoal
+
+    closing = actionlib.SimpleActionClient("/ih2_hand/hand_close", HandCloseAction)
+    if not closing.wait_for_server(rospy.Duration(10.0)):
+        raise RuntimeError("no hand_close action")
+    closing.send_goal(HandCloseGoal(speed=SLOW))
+    time.sleep(1.0)
+    share = cpu_share(pid)
+    if closing.get_state() != actionlib.GoalStatus.ACTIVE:
+        raise RuntimeError("hand_close ended during the measurement")
+    return share
+
+
 def node_figures() -> list[Row]:
     os.environ["ROS_MASTER_URI"] = f"http://127.0.0.1:{free_port()}"
     os.environ.setdefault("ROS_IP", "127.0.0.1")
@@ -284,13 +277,7 @@ def node_figures() -> list[Row]:
         import actionlib
         import rosgraph
         import rospy
-        from coglab_msgs.msg import (
-            HandCloseAction,
-            HandCloseGoal,
-            HandOpenAction,
-            HandOpenGoal,
-            HandStatus,
-        )
+        from coglab_msgs.msg import HandOpenAction, HandOpenGoal, HandStatus
 
         wait_for(rosgraph.is_master_online, 20.0, "the ROS master")
         hand = TimedHand(greeting=True)
@@ -311,14 +298,7 @@ def node_figures() -> list[Row]:
         delays = [one_move(server, hand, client, HandOpenGoal, number) for number in range(MOVES)]
         time.sleep(1.0)
         share = cpu_share(node.pid)
-        closing = actionlib.SimpleActionClient("/ih2_hand/hand_close", HandCloseAction)
-        if not closing.wait_for_server(rospy.Duration(10.0)):
-            raise RuntimeError("no hand_close action")
-        closing.send_goal(HandCloseGoal(speed=SLOW))
-        time.sleep(1.0)
-        moving_share = cpu_share(node.pid)
-        if closing.get_state() != actionlib.GoalStatus.ACTIVE:
-            raise RuntimeError("hand_close ended during the measurement")
+        moving_share = share_while_closing(node.pid)
     median_ms, limit_ms = statistics.median(delays) * 1e3, 1e3 / RATE_HZ + 20.0
     return [
         row(

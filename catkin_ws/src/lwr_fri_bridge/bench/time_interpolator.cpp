@@ -123,18 +123,18 @@ void printBraking(const JointLimits& limits) {
   long states = 0;
   for (const double dt : {0.001, 0.005, 0.020}) {
     for (int trial = 0; trial < kStates / 7 / 3 + 1; ++trial, states += 7) {
-      Vector7 p, v, a, wish;
+      Vector7 p, v, a, wanted;
       for (int i = 0; i < 7; ++i) {
         const AxisState s = randomState(limits, i);
         p[i] = s.position;
         v[i] = s.velocity;
         a[i] = s.acceleration;
-        wish[i] = part() > 0.0 ? 10.0 : -10.0;  // far beyond top speed
+        wanted[i] = part() > 0.0 ? 10.0 : -10.0;  // far beyond top speed
       }
       Interpolator interpolator(limits);
       interpolator.resume(p, v, a);
       for (int step = 0; step < static_cast<int>(4.5 / dt); ++step) {
-        Vector7 target = wish;
+        Vector7 target = wanted;
         guard.bound(interpolator, dt, target);
         interpolator.step(target, dt);
         const Vector7& q = interpolator.position();

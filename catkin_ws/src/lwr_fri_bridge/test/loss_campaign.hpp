@@ -101,14 +101,14 @@ class LossRun {
     const Vector7 towards = direction_.cwiseProduct(bridge_.config().limits.velocity);
     const int cycles = static_cast<int>(2.0 / case_.period);
     const int hold_at = random_() % 3 == 0 ? static_cast<int>(part(0.0, 1.0) * cycles) : -1;
-    Vector7 wish = towards;
+    Vector7 wanted = towards;
     begun_ = true;
     for (int i = 0; i < cycles; ++i) {
       if (i == hold_at) bridge_.submit("hold");
       if (i == hold_at + static_cast<int>(0.6 / case_.period)) bridge_.submit("reset");
       if (i % std::max(1, static_cast<int>(0.25 / case_.period)) == 0)
-        wish = (random_() % 8 == 0 ? -1.0 : 1.0) * towards;
-      cycle(wish);
+        wanted = (random_() % 8 == 0 ? -1.0 : 1.0) * towards;
+      cycle(wanted);
     }
     return extremes_;
   }
@@ -129,13 +129,13 @@ class LossRun {
 
   /// Angle (rad) that the fifth joint turns from a hold at full speed to rest, far from its limits.
   double stop() {
-    Vector7 wish = Vector7::Zero();
-    wish[4] = direction_[4] * bridge_.config().limits.velocity[4];
+    Vector7 wanted = Vector7::Zero();
+    wanted[4] = direction_[4] * bridge_.config().limits.velocity[4];
     // A held set-point starts anew after each loss, so full speed is what comes between losses.
-    for (int i = 0; i < static_cast<int>(0.7 / case_.period); ++i) cycle(wish);
+    for (int i = 0; i < static_cast<int>(0.7 / case_.period); ++i) cycle(wanted);
     bridge_.submit("hold");
     const double from = robot_.setPoint()[4];
-    for (int i = 0; i < static_cast<int>(1.5 / case_.period); ++i) cycle(wish);
+    for (int i = 0; i < static_cast<int>(1.5 / case_.period); ++i) cycle(wanted);
     return std::abs(robot_.setPoint()[4] - from);
   }
 
@@ -148,13 +148,13 @@ class LossRun {
     return std::uniform_real_distribution<double>(low, high)(random_);
   }
 
-  void cycle(const Vector7& wish) {
-    cycle(wish, clean_ > 0 ? LossPattern::Lost::Nothing : loss_.next());
+  void cycle(const Vector7& wanted) {
+    cycle(wanted, clean_ > 0 ? LossPattern::Lost::Nothing : loss_.next());
     if (begun_ && clean_ > 0) --clean_;
   }
 
-  void cycle(const Vector7& wish, LossPattern::Lost lost) {
-    drive(bridge_, robot_, wish);
+  void cycle(const Vector7& wanted, LossPattern::Lost lost) {
+    drive(bridge_, robot_, wanted);
     const bool answered = lost == LossPattern::Lost::Nothing;
     robot_.cycle(bridge_, lost == LossPattern::Lost::Measurement,
                  lost == LossPattern::Lost::Answer);
@@ -205,12 +205,12 @@ inline double motionTime(double period) {
     RobotSample sample;
     bridge.mailboxes().newestSample(sample);
     const double way = target - sample.commanded_position[1];
-    Vector7 wish = Vector7::Zero();
-    wish[1] = std::copysign(
+    Vector7 wanted = Vector7::Zero();
+    wanted[1] = std::copysign(
         std::min(limits.velocity[1],
                  brakingSpeed(std::abs(way), limits.acceleration[1], limits.jerk[1], 2.0 * period)),
         way);
-    drive(bridge, robot, wish);
+    drive(bridge, robot, wanted);
     robot.cycle(bridge);
     if (std::abs(robot.setPoint()[1] - target) < 1e-3 &&
         std::abs(bridge.snapshot().sample.commanded_velocity[1]) < 0.02)

@@ -53,15 +53,14 @@ IdealArmConfig readIdealArmConfig(const ros::NodeHandle& node) {
   config.period = readParameter<double>(node, "ideal_period", config.period, "a number");
   config.command_timeout =
       readParameter<double>(node, "command_timeout", config.command_timeout, "a number");
-  if (node.hasParam("start_position")) {
-    const auto start =
-        readParameter<std::vector<double>>(node, "start_position", {}, "a list of 7 numbers");
-    if (start.size() != 7) {
-      throw std::invalid_argument("parameter " + node.resolveName("start_position") +
-                                  ": expected 7 numbers, got " + std::to_string(start.size()));
-    }
-    std::copy(start.begin(), start.end(), config.start_position.data());
+  const double* given = config.start_position.data();
+  const auto start = readParameter<std::vector<double>>(node, "start_position", {given, given + 7},
+                                                        "a list of 7 numbers");
+  if (start.size() != 7) {
+    throw std::invalid_argument("parameter " + node.resolveName("start_position") +
+                                ": expected 7 numbers, got " + std::to_string(start.size()));
   }
+  std::copy(start.begin(), start.end(), config.start_position.data());
   config.check();
   return config;
 }

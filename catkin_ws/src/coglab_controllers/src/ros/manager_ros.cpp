@@ -48,7 +48,7 @@ ManagerRos::ManagerRos(const ros::NodeHandle& node, coglab_rt::ArmMailboxes& mai
       coglab_rt::readParameter(node_, "priority", options_.thread.priority, "a whole number");
   if (options_.thread.priority > options_.highest_priority) {
     ROS_WARN(
-        "controller_manager: priority %d is kept to %d, below that of the FRI thread "
+        "controller_manager: priority %d is kept to %d, below that of the arm's thread "
         "(lwr/rt_priority)",
         options_.thread.priority, options_.highest_priority);
     options_.thread.priority = options_.highest_priority;

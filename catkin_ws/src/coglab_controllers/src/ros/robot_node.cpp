@@ -19,6 +19,7 @@
 #include "coglab_rt/arm_port.hpp"
 #include "coglab_rt/ros/exit_limit.hpp"
 #include "coglab_rt/ros/logger_service.hpp"
+#include "coglab_rt/ros/parameter.hpp"
 #include "lwr_fri_bridge/ros/bridge_ros.hpp"
 
 namespace {
@@ -28,7 +29,7 @@ void onSignal(int) { asked_to_end = 1; }
 
 /// The back ends by name. @throws std::exception naming a parameter
 std::unique_ptr<coglab_rt::ArmPort> makeArm(const ros::NodeHandle& lwr) {
-  const auto name = lwr.param<std::string>("arm", "fri");
+  const auto name = coglab_rt::readParameter<std::string>(lwr, "arm", "fri", "fri or ideal");
   if (name == "fri") return std::make_unique<lwr_fri_bridge::BridgeRos>(lwr, true);
   if (name == "ideal") return std::make_unique<coglab_controllers::IdealArmRos>(lwr);
   throw std::invalid_argument("parameter " + lwr.resolveName("arm") + " = '" + name +

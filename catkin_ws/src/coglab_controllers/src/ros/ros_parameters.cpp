@@ -8,6 +8,7 @@
 #include <ros/package.h>
 
 #include "coglab_rt/ros/joint_limits_parameter.hpp"
+#include "coglab_rt/ros/parameter.hpp"
 #include "coglab_rt/ros/parameter_tree.hpp"
 
 namespace coglab_controllers {
@@ -41,8 +42,9 @@ std::string resolve(const std::string& name) {
 std::string robotModel(const ros::NodeHandle& node, const Parameters& parameters) {
   const std::string file = parameters.text("urdf_file", "");
   if (!file.empty()) return readFile(file);
-  std::string key, model;
-  if (node.searchParam("robot_description", key) && node.getParam(key, model)) return model;
+  const auto model =
+      coglab_rt::readNearest<std::string>(node, "robot_description", "", "the text of a URDF");
+  if (!model.empty()) return model;
   return readFile(ros::package::getPath("lwr_description") + "/urdf/lwr_ih2.urdf");
 }
 

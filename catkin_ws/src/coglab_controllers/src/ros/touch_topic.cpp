@@ -3,6 +3,7 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "coglab_rt/ros/parameter.hpp"
 #include "coglab_rt/ros/ros_time.hpp"
 
 namespace coglab_controllers {
@@ -43,10 +44,12 @@ TouchForces touchForcesOf(const coglab_msgs::FingertipForces& message, const std
 TouchTopic::TouchTopic(const ros::NodeHandle& node, ControllerManager& manager)
     : manager_(manager),
       node_(ros::names::parentNamespace(node.getNamespace())),
-      tool_(node.param<std::string>("tool_link", "ih2_palm")) {
+      tool_(coglab_rt::readParameter<std::string>(node, "tool_link", "ih2_palm", "a name")) {
   node_.setCallbackQueue(node.getCallbackQueue());
-  forces_ = node_.subscribe(node.param<std::string>("tactile_topic", "ih2_hand/fingertip_forces"),
-                            1, &TouchTopic::onForces, this, ros::TransportHints().tcpNoDelay());
+  const auto topic = coglab_rt::readParameter<std::string>(node, "tactile_topic",
+                                                           "ih2_hand/fingertip_forces", "a name");
+  forces_ =
+      node_.subscribe(topic, 1, &TouchTopic::onForces, this, ros::TransportHints().tcpNoDelay());
   ROS_INFO("touch sensors: %s", forces_.getTopic().c_str());
 }
 

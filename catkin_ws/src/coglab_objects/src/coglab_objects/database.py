@@ -17,7 +17,8 @@ from coglab_py.pose import Pose
 from coglab_py.yaml_file import Document, Field, YamlError, parse, read
 from ih2_hand.grasps import check_grasp
 
-SCHEMA_FILE = Path(__file__).with_name("object_schema.json")
+SCHEMA_FILE = package_path("coglab_objects", "config", "object_schema.json")
+"""what an object may be: the simulated cell reads the ranges of mass, size and friction there, too"""
 
 
 class ObjectError(ValueError):

@@ -22,7 +22,7 @@ class FrameNames:
 
     Example::
 
-        frames = FrameNames.from_mapping(rospy.get_param("perception/frames"))
+        frames = FrameNames.from_mapping(parameters.read("perception/frames", dict, {}))
         frames.object_frame("mug")          # "object_mug"
     """
 
@@ -59,7 +59,8 @@ class FrameNames:
         if missing or unknown:
             raise FramesError(
                 f"{source}: missing: {', '.join(missing) or 'none'}; unknown: "
-                f"{', '.join(unknown) or 'none'}; expected {', '.join(roles)}"
+                f"{', '.join(unknown) or 'none'}; expected {', '.join(roles)}, "
+                "as in coglab_perception/config/frames.yaml"
             )
         if "{id}" not in data["object"]:
             raise FramesError(f"{source}: object is '{data['object']}'; it must contain {{id}}")

@@ -36,6 +36,14 @@ def numbers(name: str, default: Sequence[float] | None = None, length: int = 0) 
     return checked_numbers(rospy.resolve_name(name), rospy.get_param(name, default), length)
 
 
+def points(name: str, default: Sequence[Sequence[float]]) -> list[list[float]]:
+    """A parameter that is a list of points, three finite numbers each. ParameterError."""
+    found, shown = rospy.get_param(name, default), rospy.resolve_name(name)
+    if not isinstance(found, (list, tuple)):
+        raise ParameterError(f"parameter {shown}: expected a list of points, got {str(found)[:60]!r}")
+    return [checked_numbers(f"{shown}[{i}]", point, 3) for i, point in enumerate(found)]
+
+
 def found_above(name: str, kind: type[T]) -> T | None:
     """The parameter of that name in the nearest namespace above the node; None where there is none."""
     found = rospy.search_param(name)

@@ -1,6 +1,6 @@
 /// @file
-/// The port of an arm: what every back end (FRI, ideal, or another) offers to the controller
-/// manager in the same process.
+/// The port of an arm: what every back end (a real arm, an ideal one, or another) offers to the
+/// controller manager in the same process.
 ///
 /// Threads. The *main* thread starts and ends the arm. The *arm's* thread writes one RobotSample
 /// per measurement, wakes the control thread, and takes the newest VelocityCommand. The *control*

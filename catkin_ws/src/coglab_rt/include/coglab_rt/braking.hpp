@@ -36,8 +36,8 @@ double brakingDistance(double speed, double max_acceleration, double max_jerk);
 /// tick ahead with the exact state (BrakingGuard).
 double brakingSpeed(double distance, double max_acceleration, double max_jerk, double delay);
 
-/// The cycles without our answer that the bridge reckons with, at every period: as many as a
-/// controller rides through before it ends command mode (coglab_sim's figures; KUKA publishes
+/// The cycles without an answer that a back end reckons with, at every period: as many as a robot
+/// controller rides through before it ends command mode (coglab_sim's figures; makers publish
 /// none). docs/limits_under_loss.md says why the limits hold.
 struct LossBudget {
   static constexpr int kInARow = 5;
@@ -58,12 +58,13 @@ LossReserve lossReserve(const AxisState& before, const AxisState& after, const A
                         double dt, double max_jerk);
 
 /// Time (s) of constant speed that is at least what lossReserve keeps of one window of the
-/// LossBudget at FRI period `dt` (s): what whoever plans a motion keeps before a limit, so that the
-/// bridge's own guard finds nothing to cut. Real-time safe.
+/// LossBudget at period `dt` (s) of the arm's interface: what whoever plans a motion keeps before a
+/// limit, so that the bridge's own guard finds nothing to cut. Real-time safe.
 double lostTime(double dt);
 
-/// Rounding on the wire (float32 at 3 rad) that one lost cycle can add, rad: 0.24e-6 by the step
-/// that is repeated, both its ends, and 0.24e-6 by the set-point that is reported after it.
+/// Rounding on the wire to the arm (float32 at 3 rad) that one lost cycle can add, rad: 0.24e-6 by
+/// the step that is repeated, both its ends, and 0.24e-6 by the set-point that is reported after
+/// it.
 constexpr double kLossRounding = 0.5e-6;
 
 /// What BrakingGuard keeps before a bound besides the margin, rad: the rounding of one window of

@@ -1,6 +1,6 @@
 /// @file
 /// Interpolator (D4.10 Figure 1): turns target velocities that arrive at any rate into position
-/// commands at the FRI rate, acceleration and jerk limited per joint.
+/// commands at the rate of the arm's interface, acceleration and jerk limited per joint.
 ///
 /// Closed form per axis: velocity target vf, final acceleration 0, time-optimal for |acceleration|
 /// <= A and |jerk| <= J. With d the sign of the change still needed once the acceleration has been

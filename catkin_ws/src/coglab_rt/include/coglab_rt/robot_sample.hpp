@@ -35,7 +35,7 @@ inline const char* describe(MotionBlock block) {
     case MotionBlock::None:
       return "";
     case MotionBlock::Disconnected:
-      return "no datagrams from the robot controller";
+      return "no measurements from the robot controller";
     case MotionBlock::Monitor:
       return "the robot controller is in monitor mode; send start";
     case MotionBlock::NoPower:

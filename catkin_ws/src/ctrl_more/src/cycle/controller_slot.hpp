@@ -34,7 +34,7 @@ struct StageRun {
 /// A controller runs on the references themselves. What it left is judged, then either taken back,
 /// or blended and recorded, before and after, for attribution and for the next fade.
 ///
-/// configure() and the const questions are for services; adopt() and run() are for the cycle and
+/// configure() and the const queries are for services; adopt() and run() are for the cycle and
 /// neither allocate nor lock nor throw.
 class ControllerSlot {
  public:

@@ -58,15 +58,15 @@ def test_preempts_at_random_moments_none_lost_none_left_over():
     runs = 3000 if os.environ.get("COGLAB_LONG") else 300
     threads_before = threading.active_count()
     for run in range(runs):
-        asker = threading.Timer(seed.random() * 0.006, machine.request_preempt)
+        caller = threading.Timer(seed.random() * 0.006, machine.request_preempt)
         if run % 10 == 0:
             machine.request_preempt()  # before the start
         else:
-            asker.start()
+            caller.start()
         assert machine.execute() == "preempted", f"run {run}"
         assert not any(flags(machine)), f"run {run} left a flag up"
         if run % 10:
-            asker.join()
+            caller.join()
         assert not machine.preempt_requested()
     assert threading.active_count() == threads_before
 

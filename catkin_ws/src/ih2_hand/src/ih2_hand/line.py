@@ -218,7 +218,7 @@ class HandLine:
         data = self.request(frame, length)
         if length == 1:
             return data[0]
-        # Ten bits were promised: more cannot be the answer to the question.
+        # Ten bits were promised: more cannot be the answer to this request.
         return data[0] << 8 | data[1] if data[0] < 4 else None
 
     def _confirm(self, frame: bytes, length: int, slack: Slack, first: int | None) -> int:
@@ -229,7 +229,7 @@ class HandLine:
                 resynchronisations = self.counters.resynchronisations
                 number = self._number(frame, length)
                 if self.counters.resynchronisations != resynchronisations:
-                    readings.clear()  # what was read across a slip may belong to another question
+                    readings.clear()  # what was read across a slip may belong to another request
                 if number is None:
                     continue
                 readings.append(number)

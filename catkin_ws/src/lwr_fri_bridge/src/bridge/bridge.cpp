@@ -324,8 +324,8 @@ Vector7 Bridge::targetVelocity() {
     ++counters_.command_timeouts;
   }
   command_expired_ = expired;
-  // While leashed the wish is still looked at, to see when the outward motion is not asked for any
-  // more.
+  // While leashed the target is still looked at, to see when the outward motion is not asked for
+  // any more.
   const bool allowed =
       supervisor_.block() == MotionBlock::None || supervisor_.block() == MotionBlock::Leashed;
   return current && !expired && allowed ? valid_command_.velocity : Vector7::Zero();

@@ -1,16 +1,11 @@
 #include "bridge_diagnostics.hpp"
 
+#include "coglab_rt/ros/parameter.hpp"
 #include "lwr_fri_bridge/bridge/diagnosis.hpp"
 #include "target_topic.hpp"
 
 namespace lwr_fri_bridge {
 namespace {
-
-double checkedTemperature(const ros::NodeHandle& nh) {
-  const double hot = nh.param("hot_drive", 70.0);
-  checkParameter("hot_drive", hot, 0.0, 200.0);
-  return hot;
-}
 
 unsigned char levelOf(Severity severity) { return static_cast<unsigned char>(severity); }
 
@@ -24,7 +19,7 @@ void say(diagnostic_updater::DiagnosticStatusWrapper& status, const Diagnosis& d
 
 BridgeDiagnostics::BridgeDiagnostics(BridgeRos& owner)
     : owner_(owner),
-      hot_(checkedTemperature(owner.nh_)),
+      hot_(coglab_rt::readNumber(owner.nh_, "hot_drive", 70.0, 0.0, 200.0)),
       updater_(ros::NodeHandle(), owner.nh_, owner.nh_.getNamespace()) {
   updater_.setHardwareID("KUKA LWR 4+");
   updater_.add("FRI connection", this, &BridgeDiagnostics::connection);

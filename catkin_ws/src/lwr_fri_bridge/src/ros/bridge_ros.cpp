@@ -12,6 +12,7 @@
 #include <std_msgs/Float64.h>
 
 #include "bridge_diagnostics.hpp"
+#include "coglab_rt/ros/parameter.hpp"
 #include "coglab_rt/ros/ros_time.hpp"
 #include "lwr_fri_bridge/bridge/diagnosis.hpp"
 #include "lwr_fri_bridge/ros/reason_codes.hpp"
@@ -20,19 +21,16 @@
 namespace lwr_fri_bridge {
 namespace {
 
-constexpr int kSpinnerThreads =
-    4;  // a start may occupy one for seconds; hold and stop must get through
+using coglab_rt::readNumber;
+using coglab_rt::readParameter;
+
+// A start may occupy one of them for seconds; hold and stop must get through.
+constexpr int kSpinnerThreads = 4;
 constexpr std::int64_t kLatencyPeriodNs = 50'000'000;  // between two fri_latency
 constexpr double kSilenceWarning = 5.0;                // s between warnings about silence
 
 void copyJoints(const Vector7& joints, std::vector<double>& values) {
   values.assign(joints.data(), joints.data() + joints.size());
-}
-
-double checkedRate(const ros::NodeHandle& nh) {
-  const double rate = nh.param("joint_states_rate", 200.0);
-  checkParameter("joint_states_rate", rate, 1.0, 1000.0);
-  return rate;
 }
 
 }  // namespace
@@ -54,15 +52,17 @@ BridgeRos::BridgeRos(const ros::NodeHandle& nh, bool one_process)
       }()) {
   // A little shorter than the period, so that an FRI period of the same length is not halved by
   // jitter.
-  publish_period_ns_ = static_cast<std::int64_t>(0.9e9 / checkedRate(nh));
+  publish_period_ns_ =
+      static_cast<std::int64_t>(0.9e9 / readNumber(nh, "joint_states_rate", 200.0, 1.0, 1000.0));
   nh_.setCallbackQueue(&queue_);
   sem_init(&new_sample_, 0, 0);
   bridge_.setVelocitySource(VelocitySource::Topic);
   target_ = std::make_unique<TargetTopic>(bridge_, one_process_);
   for (const char* name : kJointNames) joint_message_.name.emplace_back(name);
   torque_message_.name = joint_message_.name;
-  restarts_quietly_ = nh.param("quiet_restart", true);
-  wrench_message_.header.frame_id = nh.param<std::string>("tool_frame", "ih2_palm");
+  restarts_quietly_ = readParameter(nh, "quiet_restart", true, "true or false");
+  wrench_message_.header.frame_id =
+      readParameter<std::string>(nh, "tool_frame", "ih2_palm", "a name");
 }
 
 BridgeRos::~BridgeRos() {
@@ -85,10 +85,11 @@ void BridgeRos::startThreads() {
   stopping_ = false;
   started_ns_ = steadyNow();
   // The port first: what takes long comes after the likeliest thing to fail.
-  const std::string warning = fri_thread_.start(nh_.param("fri_port_bound", 0));
+  const std::string warning =
+      fri_thread_.start(readParameter(nh_, "fri_port_bound", 0, "a whole number"));
   if (!warning.empty()) ROS_WARN("lwr: %s", warning.c_str());
   diagnostics_ = std::make_unique<BridgeDiagnostics>(*this);
-  if (nh_.param("lock_memory", true)) {
+  if (readParameter(nh_, "lock_memory", true, "true or false")) {
     const std::string refused = coglab_rt::lockMemory();
     if (!refused.empty()) ROS_WARN("lwr: %s", refused.c_str());
   }

@@ -11,6 +11,7 @@
 
 #include "coglab_rt/ros/exit_limit.hpp"
 #include "coglab_rt/ros/logger_service.hpp"
+#include "coglab_rt/ros/parameter.hpp"
 #include "lwr_fri_bridge/ros/bridge_ros.hpp"
 
 namespace {
@@ -26,9 +27,10 @@ int main(int argc, char** argv) {
   ros::init(argc, argv, "lwr", ros::init_options::NoSigintHandler);
   std::signal(SIGINT, onSignal);
   std::signal(SIGTERM, onSignal);
-  ros::NodeHandle nh(ros::param::param<std::string>("~lwr_namespace", "lwr"));
-  coglab_rt::LoggerServices logger_services;
   try {
+    const ros::NodeHandle nh(coglab_rt::readParameter<std::string>(
+        ros::NodeHandle("~"), "lwr_namespace", "lwr", "a name"));
+    coglab_rt::LoggerServices logger_services;
     lwr_fri_bridge::BridgeRos bridge(nh, false);
     bridge.start({});
     ros::AsyncSpinner spinner(1);

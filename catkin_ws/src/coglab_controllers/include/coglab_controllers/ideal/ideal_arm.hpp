@@ -42,7 +42,7 @@ struct IdealArmView {
 };
 
 /// Integrates the newest velocity command within the limits of velocity, acceleration and jerk, and
-/// stops before the ends of the joints' ranges with the same reserve as the arm behind FRI, so that
+/// stops before the ends of the joints' ranges with the same reserve as the real arm, so that
 /// a controller meets the same bounds here. What permits a motion is the same as there, too: it
 /// counts between `start` and `stop`, not while `hold` is latched, and only if it was computed in
 /// the present permission.

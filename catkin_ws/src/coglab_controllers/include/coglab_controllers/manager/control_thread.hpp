@@ -17,7 +17,7 @@ namespace coglab_controllers {
 
 /// How the thread runs.
 struct ControlThreadOptions {
-  int priority = 70;          ///< SCHED_FIFO, below the FRI thread; 0: leave the scheduling alone
+  int priority = 70;          ///< SCHED_FIFO, below the arm's thread; 0: leave the scheduling alone
   double idle_period = 0.02;  ///< s: without measurements an idle cycle runs this often
   std::size_t stack_bytes = 1024 * 1024;
   /// Called in this thread after each cycle that made a command, for a robot behind a topic. Not

@@ -44,7 +44,7 @@ class ManagerRos {
     bool publish_target = true;
     ros::Publisher target;  ///< lwr/target_joint_states
     ControlThreadOptions thread;
-    int highest_priority = 99;  ///< the control thread's is kept to it: below the FRI thread's
+    int highest_priority = 99;  ///< the control thread's is kept to it: below the arm's thread
     /// Told after each switch whether a controller is active.
     std::function<void(bool)> controller_active;
   };

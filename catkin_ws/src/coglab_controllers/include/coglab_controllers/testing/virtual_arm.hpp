@@ -26,6 +26,10 @@ inline std::string readText(const std::string& path) {
   return text.str();
 }
 
+/// Where the arm stands at first, rad: the home posture of the machines.
+inline const JointVector kHome =
+    (JointVector() << -1.4349, -0.6086, 1.4986, 1.7048, 0.1857, 0.2152, 0.782).finished();
+
 /// Manager, arm and clock. The arm follows velocities at once and exactly, or, after
 /// followWithinLimits(), as the robot's interface does. Time advances by tick() alone.
 class VirtualArm {
@@ -44,7 +48,7 @@ class VirtualArm {
     settings.plan_timeout = 0.3;
     settings.logger = &logger;
     manager = std::make_unique<ControllerManager>(std::move(settings));
-    sample.position << -1.4349, -0.6086, 1.4986, 1.7048, 0.1857, 0.2152, 0.782;
+    sample.position = kHome;
     sample.commanded_position = sample.position;
     sample.block = MotionBlock::None;
     sample.cycle_time = period;

@@ -23,6 +23,17 @@ T readParameter(const ros::NodeHandle& node, const char* name, const T& otherwis
   return value;
 }
 
+/// The parameter of that name in the nearest namespace above the node, or `otherwise` where there
+/// is none.
+/// @throws std::invalid_argument naming the parameter where it has another type.
+template <typename T>
+T readNearest(const ros::NodeHandle& node, const char* name, const T& otherwise,
+              const char* expected) {
+  std::string found;
+  if (!node.searchParam(name, found)) return otherwise;
+  return readParameter<T>(node, found.c_str(), otherwise, expected);
+}
+
 /// A number between low and high.
 /// @throws std::invalid_argument naming parameter, value and range.
 inline double readNumber(const ros::NodeHandle& node, const char* name, double otherwise,

@@ -1,6 +1,6 @@
 """The perception contract without ROS: what is in view, whose hand is the partner's, and answers.
 
-Every answer comes within the time limit of its question and, where it is a refusal, is a sentence
+Every answer comes within the time limit of its query and, where it is a refusal, is a sentence
 that says what was in view and what to do.
 """
 

@@ -7,7 +7,6 @@ import time
 from collections.abc import Sequence
 from typing import Any
 
-import rospy
 from coglab_msgs.msg import (
     ControllerStatus,
     DmpFeedback,
@@ -31,6 +30,7 @@ from coglab_msgs.srv import (
     SwitchDmp,
     SwitchDmpRequest,
 )
+from coglab_py import parameters
 from geometry_msgs.msg import Point, Quaternion, Vector3
 from sensor_msgs.msg import JointState
 
@@ -74,7 +74,7 @@ class RosArm:
     def load_controller(self, controller_id: str, controller_type: str) -> Pending:
         def run(permit: Permit) -> None:
             # Read here because the parameter server may hang, and a state must not.
-            self._limits = read_limits(rospy.get_param(self._manager, {}))
+            self._limits = read_limits(parameters.read(self._manager, dict, {}))
             loaded = call_now(f"{self._manager}/list_controllers", ListControllers, permit)
             if (controller_id, controller_type) in zip(loaded.controller_ids, loaded.controller_types, strict=False):
                 return

@@ -74,7 +74,7 @@ class Reference {
  public:
   /// An empty handle; using it throws EmptyHandle.
   Reference() = default;
-  /// The same without its size, for questions.
+  /// The same without its size, for queries.
   ControlSignal signal() const { return signal_; }
   /// Number of doubles.
   int size() const { return signal_.size(); }
@@ -96,7 +96,7 @@ class Modify {
  public:
   /// An empty permission; using it is a fault.
   Modify() = default;
-  /// The same signal without permission, for questions.
+  /// The same signal without permission, for queries.
   ControlSignal signal() const { return signal_; }
   /// Number of doubles.
   int size() const { return signal_.size(); }

@@ -168,14 +168,16 @@ class HandNode(HandMemory):
             return self._port_setting
         name = self._port_setting[len("param:") :]
         try:
-            port = rospy.get_param(name, "")
+            port = parameters.read(name, str, "")
+        except parameters.ParameterError as error:
+            raise HandPortError(str(error)) from None
         except Exception as error:  # whatever the master's absence raises: try again later
             raise HandPortError(f"parameter {name} cannot be read ({error}): is the ROS master there?") from error
         if not port:
             raise HandPortError(
                 f"parameter {rospy.resolve_name(name)} is not set: start what publishes the hand's port there"
             )
-        return str(port)
+        return port
 
     def lost(self, error: Exception, driver: HandSerialDriver | None = None) -> None:
         """The connection is lost: close it and say so at once; polling reopens it. Nothing happens
