@@ -4,8 +4,9 @@
 The generator (coglab_bringup/ros_fuzz.py says what it sends) makes each message malformed by design: at least one value
 that its definition excludes; or, in every third one with a time, an odd stamp alone. Messages without any field that
 could be so (`Trigger`, integers alone) are valid by nature and counted apart. Ended: a node whose process is another
-one, or does not answer, afterwards. Silent: a topic on which a node of ours spoke within 1 s before, and within 1.5 s
-afterwards did not. Moved: the farthest that a joint of the arm, in command mode, came from where it was.
+one, or does not answer, afterwards. Silent: a topic on which a node of ours spoke within 2.5 s before, and within 3 s
+afterwards did not. Moved: the farthest that a joint of the arm came from where it was, missed if the arm would not have
+followed a motion at the end, or at any time before; where this computer was late, command mode was begun again.
 """
 
 from __future__ import annotations
@@ -39,6 +40,7 @@ def main() -> int:
             sys.exit(f"{TEST.name} left no report; see its output above")
         found = json.loads(report.read_text())
     sent, what = found["sent"], f"{found['topics']} topics and {found['services']} services of {found['nodes']} nodes"
+    refused = [*found["motion_refused"], *([] if found["motion_allowed"] else ["at the end"])]
     rows = [
         (f"nodes that ended: {', '.join(found['ended']) or 'none'}", len(found["ended"]), "1", 0),
         (f"topics that fell silent: {', '.join(found['silent']) or 'none'}", len(found["silent"]), "1", 0),
@@ -49,8 +51,11 @@ def main() -> int:
             0,
         ),
         ("the arm moved by", 1000.0 * found["moved"], "mrad", 10.0),
+        (f"times at which it would have followed no motion: {'; '.join(refused) or 'none'}", len(refused), "1", 0),
+        (f"callbacks that threw: {'; '.join(found['thrown']) or 'none'}", len(found["thrown"]), "1", 0),
     ]
     told = [
+        ("times that this computer was late and command mode was begun again", found["computer_late"]),
         *((f"messages sent, {kind}, to {what}", count) for kind, count in sent.items()),
         (f"malformed requests answered with success: {json.dumps(found['accepted'])}", sum(found["accepted"].values())),
     ]

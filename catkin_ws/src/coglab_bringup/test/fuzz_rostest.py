@@ -4,6 +4,7 @@
 import json
 import os
 import sys
+import threading
 import time
 import unittest
 from pathlib import Path
@@ -11,7 +12,9 @@ from pathlib import Path
 import rospy
 import rostest
 from coglab_bringup.ros_fuzz import Fuzz, has_time, settle
+from coglab_msgs.msg import LwrState, ReasonCode
 from coglab_msgs.srv import LoadController, LwrCommand, SwitchController
+from rosgraph_msgs.msg import Log
 from sensor_msgs.msg import JointState
 from std_msgs.msg import UInt8
 
@@ -20,6 +23,8 @@ PER_TOPIC, PER_SERVICE = (1500, 700) if LONG else (8, 6)
 LEAST = 100_000 if LONG else 200
 """messages that make the figure"""
 READY_LIMIT = 60.0  # s
+HEARD_BEFORE, HEARD_AFTER = 2.5, 3.0
+"""s in which who speaks is noted; the rarest word that comes by itself is a state machine's structure, every 2 s"""
 
 
 class Still:
@@ -35,6 +40,43 @@ class Still:
             return
         self.first = self.first or message.position
         self.farthest = max(self.farthest, *(abs(a - b) for a, b in zip(message.position, self.first, strict=True)))
+
+
+class MayMove:
+    """Whether the arm would have followed a motion: where it would not, a standing arm shows nothing.
+
+    What this computer has ended by being late is begun again, and counted apart.
+    """
+
+    def __init__(self) -> None:
+        self.allowed = False
+        self.refusals: list[str] = []  # why not, each time that it began
+        self.late = 0
+        rospy.Subscriber("/lwr/state", LwrState, self.on_state, queue_size=50)
+
+    def on_state(self, message: LwrState) -> None:
+        if message._connection_header.get("callerid") != "/robot":
+            return
+        if self.allowed and not message.motion_allowed:
+            if message.reason_code == ReasonCode.COMPUTER_LATE:
+                self.late += 1
+                threading.Thread(target=rospy.ServiceProxy("/lwr/command", LwrCommand), args=("start",)).start()
+            else:
+                self.refusals.append(message.reason)
+        self.allowed = message.motion_allowed
+
+
+class Thrown:
+    """Callbacks and handlers of ours that ended with an exception, as rospy tells it."""
+
+    def __init__(self, nodes: list[str]) -> None:
+        self.nodes = nodes
+        self.words: list[str] = []
+        rospy.Subscriber("/rosout", Log, self.on_log, queue_size=1000)
+
+    def on_log(self, message: Log) -> None:
+        if message.name in self.nodes and message.msg.startswith(("bad callback", "Error processing request")):
+            self.words.append(f"{message.name}: {message.msg[:160]}")
 
 
 class FuzzTest(unittest.TestCase):
@@ -57,13 +99,14 @@ class FuzzTest(unittest.TestCase):
                 assert time.monotonic() < end, answer.message
                 time.sleep(0.2)
         cls.fuzz = Fuzz(seed=1)
-        cls.arm = Still()
-        cls.before = cls.fuzz.talking(1.0)
+        cls.arm, cls.motion, cls.thrown = Still(), MayMove(), Thrown(cls.fuzz.nodes)
+        cls.before = cls.fuzz.talking(HEARD_BEFORE)
+        cls.allowed_before = cls.motion.allowed
         cls.report = cls.fuzz.run(PER_TOPIC, PER_SERVICE, limit=20.0)
         # Every number of people is a valid one, also none; with none in view there is nothing to recognise.
         people = rospy.Publisher("/perception/people", UInt8, queue_size=1, latch=True)
         people.publish(1)
-        cls.after = cls.fuzz.talking(1.5)
+        cls.after = cls.fuzz.talking(HEARD_AFTER)
         report = {
             "nodes": len(cls.fuzz.nodes),
             "topics": len(cls.fuzz.topics),
@@ -77,6 +120,10 @@ class FuzzTest(unittest.TestCase):
             "ended": cls.report.ended,
             "silent": sorted(cls.before - cls.after),
             "moved": cls.arm.farthest,
+            "motion_allowed": cls.motion.allowed,
+            "motion_refused": cls.motion.refusals,
+            "computer_late": cls.motion.late,
+            "thrown": cls.thrown.words,
         }
         print(json.dumps(report), flush=True)
         if "COGLAB_FUZZ_REPORT" in os.environ:
@@ -116,6 +163,14 @@ class FuzzTest(unittest.TestCase):
     def test_5_the_arm_stood(self):
         self.assertIsNotNone(self.arm.first)
         self.assertLess(self.arm.farthest, 0.01)
+
+    def test_5_the_arm_would_have_moved_all_the_while(self):
+        self.assertTrue(self.allowed_before)
+        self.assertEqual(self.motion.refusals, [])
+        self.assertTrue(self.motion.allowed)
+
+    def test_6_nothing_threw(self):
+        self.assertEqual(self.thrown.words, [])
 
 
 if __name__ == "__main__":

@@ -27,7 +27,7 @@ class File:
     text: str
 
 
-def _blocks(page: str) -> list[tuple[str, str, str]]:
+def blocks(page: str) -> list[tuple[str, str, str]]:
     """Section, language and text of each fenced block, also of those inside of a list."""
     section, found, language, lines = "", [], None, []
     for raw in (TOP / page).read_text(encoding="utf-8").splitlines():
@@ -49,7 +49,7 @@ def printed_lines() -> list[Line]:
     """Every line of every block without a language."""
     lines = []
     for page in PAGES:
-        for section, language, text in _blocks(page):
+        for section, language, text in blocks(page):
             for raw in text.splitlines() if not language else []:
                 command = re.sub(r"(^|\s+)# .*$", "", raw).strip()
                 if command:
@@ -61,7 +61,7 @@ def printed_files() -> list[File]:
     """Python and launch files that a page shows in full: those with their name in the first line."""
     files = []
     for page in PAGES:
-        for _, language, text in _blocks(page):
+        for _, language, text in blocks(page):
             name = re.match(r"(?:# |<!-- )(\w+\.(?:py|launch))\b", text)
             if language and name:
                 files.append(File(name.group(1), text + "\n"))
@@ -70,4 +70,4 @@ def printed_files() -> list[File]:
 
 def printed_block(page: str, section: str, language: str) -> str:
     """The first block of that language in a section."""
-    return next(text for where, kind, text in _blocks(page) if where == section and kind == language)
+    return next(text for where, kind, text in blocks(page) if where == section and kind == language)

@@ -27,6 +27,7 @@ from coglab_msgs.srv import (
 )
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import Point, Pose, Vector3
+from rosgraph_msgs.msg import Log
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64
 
@@ -222,8 +223,9 @@ class TopicGoal(unittest.TestCase):
     def test_5b_feedback_controllers_are_loaded_watched_and_unloaded(self) -> None:
         """One is added to a running robot, shows its inside and its corrections, and goes again."""
         name = "controller_manager/feedback/"
-        call, shown = self.robot.call, []
+        call, shown, told = self.robot.call, [], []
         rospy.Subscriber(name + "state", FeedbackState, shown.append)
+        rospy.Subscriber("/rosout", Log, told.append)
         config = "package://ctrl_more/config/ee_admittance.yaml"
         for code, *refused in (
             (ReasonCode.BUSY, "dmp", "EeAdmittance", "", ""),
@@ -260,6 +262,16 @@ class TopicGoal(unittest.TestCase):
             5.0,
             "its correction of the pose",
         )
+        answer = call(name + "set_gains", SetGains, "second", [FeedbackGain("max_offset", [0.0])])
+        self.assertTrue(answer.success, answer.message)
+
+        def own_words() -> list[Log]:
+            return [line for line in told if "second (ee_admittance.cpp:" in line.msg]
+
+        wait_until(lambda: bool(own_words()), 5.0, "what it logs on /rosout")
+        said = own_words()[0]
+        self.assertRegex(said.msg, r"cycle [0-9]+\): a force of [0-9.e-]+ N holds it at max_offset, 0 m")
+        self.assertEqual((said.level, said.name), (Log.WARN, "/robot"))
         self.assertIn("second", [c.name for c in self.feedback[-1].controllers])
         answer = call(name + "unload", FeedbackSelect, ["second"], "")
         self.assertFalse(answer.success)

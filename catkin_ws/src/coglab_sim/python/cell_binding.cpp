@@ -49,6 +49,9 @@ PYBIND11_MODULE(_cell, m) {
             return list;
           },
           "The controller's message window: (time, text), newest last.")
+      .def_property_readonly(
+          "limit_switches", [](const PyCell& c) { return c.cell().controller().limitSwitches(); },
+          "How often a set-point in command mode lay beyond a software limit switch.")
       .def_property_readonly("rejections",
                              [](const PyCell& c) {
                                const auto& r = c.cell().controller().rejections();

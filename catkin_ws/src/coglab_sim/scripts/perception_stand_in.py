@@ -33,6 +33,7 @@ from coglab_py import parameters
 from coglab_py.messages import pose_message, pose_of
 from coglab_py.pose import Pose, about_z
 from coglab_sim.person.recorded_motion import Playback, PlaybackSettings
+from coglab_sim.plausible import IMPLAUSIBLE, plausible
 from coglab_sim.tracker.tracker import Board, PerceptionSettings, Sight
 from coglab_sim.tracker.vision import NotSeen, Vision
 from geometry_msgs.msg import PoseStamped, Quaternion, TransformStamped, Vector3
@@ -95,6 +96,10 @@ class PerceptionNode:
 
     def on_truth(self, message: CellTruth) -> None:
         """The cell as it is now; the capture time is this node's, as a camera's would be."""
+        seen = [message.human_hand, message.robot_hand, *([message.object] if message.object_id else [])]
+        if not plausible(map(pose_of, seen)):
+            rospy.logwarn_throttle(5.0, f"perception: truth/cell ignored: {IMPLAUSIBLE}")
+            return
         self.truth = message
         if not self.playback:
             self.see()

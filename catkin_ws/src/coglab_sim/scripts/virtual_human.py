@@ -28,11 +28,10 @@ from coglab_sim.person.participant import Participant
 from coglab_sim.person.recorded_person import RecordedPerson, open_recorded_hand
 from coglab_sim.person.scene import Scene, WorldView
 from coglab_sim.person.virtual_human import VirtualHuman
+from coglab_sim.plausible import IMPLAUSIBLE, plausible
 from geometry_msgs.msg import Vector3
 from std_msgs.msg import String
 
-LARGEST = 1e4
-"""m, N: no number of a cell is larger"""
 CELL_LIMIT = 30.0
 """s for which the cell may take to put a recorded object into the hand"""
 
@@ -93,11 +92,8 @@ class VirtualHumanNode:
         robot, held = pose_of(message.robot_hand), pose_of(message.object)
         force = message.human_force
         load = np.array([force.x, force.y, force.z])
-        numbers = [*robot.position, *robot.orientation, *held.position, *held.orientation, *load, message.hand_closure]
-        if not np.all(np.abs(numbers) < LARGEST):  # not finite either
-            rospy.logwarn_throttle(
-                5.0, f"virtual human: truth/cell ignored: a number is not finite, or beyond {LARGEST:g}"
-            )
+        if not plausible([robot, *([held] if message.object_id else [])], [*load, message.hand_closure]):
+            rospy.logwarn_throttle(5.0, f"virtual human: truth/cell ignored: {IMPLAUSIBLE}")
             return
         with self.lock:
             self.view = WorldView(robot, message.hand_closure, held, load)

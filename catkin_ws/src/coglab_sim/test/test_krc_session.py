@@ -102,6 +102,31 @@ def test_axis_limits_are_kept(session):
         fields = s.tick(position=target)
     assert fields["state"] == MONITOR
     assert "software limit switch A2" in s.texts()
+    assert s.cell.limit_switches == 1
+
+
+def test_an_axis_that_goes_on_by_itself_runs_into_its_limit_switch_too(session):
+    """The last step before answers are missing led to the switch: extrapolation is no way past it."""
+    s = session(home=[0.0, 2.09, 0.0, 0.3, 0.0, 0.3, 0.0])
+    target = np.array(set_point(s.command()))
+    for _ in range(2):
+        target[1] += 0.0018
+        s.tick(position=target)
+    assert s.cell.limit_switches == 0 and parse(s.measurement)["state"] == COMMAND
+    for _ in range(3):
+        s.tick(answer=False)
+    assert s.cell.limit_switches == 1
+    assert parse(s.measurement)["state"] == MONITOR
+    assert s.texts().count("software limit switch A2") == 1
+
+
+def test_a_standing_axis_at_its_end_meets_no_limit_switch(session):
+    s = session(home=[0.0, 2.0943, 0.0, 0.3, 0.0, 0.3, 0.0])
+    target = np.array(set_point(s.command()))
+    for _ in range(5):
+        s.tick(position=target)
+        s.tick(answer=False)
+    assert s.cell.limit_switches == 0 and parse(s.measurement)["state"] == COMMAND
 
 
 @pytest.mark.parametrize("bad", [float("nan"), float("inf"), -float("inf")])

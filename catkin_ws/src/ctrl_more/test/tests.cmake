@@ -48,7 +48,7 @@ target_link_options(ctrl_more_test_plugin_resident PRIVATE -Wl,-z,nodelete)
 foreach(name robot_states control_states feedback_controller manager by_signal gains cascade
     all_or_nothing isolation letting_go overruns attribution blending plugins documentation config
     config_fuzz logger central_module attitude compliant_stabiliser zmp_dcm ee_admittance
-    joint_limits three_robots)
+    joint_limits three_robots abi controller_logs)
   ctrl_more_add_test(${name} test/test_${name}.cpp)
 endforeach()
 ctrl_more_add_test(realtime test/test_realtime.cpp test/forbidden_calls.cpp)
@@ -58,7 +58,7 @@ foreach(name plugins all_or_nothing config_fuzz central_module)
   endif()
 endforeach()
 foreach(name plugins documentation central_module attitude compliant_stabiliser zmp_dcm ee_admittance
-    joint_limits three_robots realtime)
+    joint_limits three_robots controller_logs realtime)
   if(TARGET ctrl_more_test_${name})
     add_dependencies(ctrl_more_test_${name} ${CTRL_MORE_PLUGINS})
   endif()

@@ -38,21 +38,24 @@ void approaches(double period, unsigned seeds, bool clean_first) {
 }
 
 /// Mean and largest angle of stopping with 10 % loss over that without, on a controller that
-/// extrapolates (one that stands stops shorter).
+/// extrapolates (one that stands stops shorter); the last number counts stops that were not from
+/// full speed, and so show nothing.
 void stops(unsigned seeds) {
   for (const double period : kPeriods) {
     LossRun without({period, 0.0, false, true, 0}, true);
-    const double reference = without.stop();
+    const Stop reference = without.stop();
     for (const bool bursts : {false, true}) {
       double sum = 0.0, worst = 0.0;
+      unsigned slow = reference.from_full_speed ? 0 : 1;
       for (unsigned seed = 0; seed < seeds; ++seed) {
         LossRun run({period, 0.10, bursts, true, seed}, true);
-        const double angle = run.stop();
-        sum += angle;
-        worst = std::max(worst, angle);
+        const Stop stop = run.stop();
+        slow += stop.from_full_speed ? 0 : 1;
+        sum += stop.angle;
+        worst = std::max(worst, stop.angle);
       }
-      std::printf("stop %g %d %.6f %.4f %.4f\n", period, bursts ? 1 : 0, reference,
-                  sum / seeds / reference, worst / reference);
+      std::printf("stop %g %d %.6f %.4f %.4f %u\n", period, bursts ? 1 : 0, reference.angle,
+                  sum / seeds / reference.angle, worst / reference.angle, slow);
       std::fflush(stdout);
     }
   }

@@ -67,6 +67,12 @@ struct SetPointExtremes {
   double acceleration = 0.0;  ///< rad/s^2 beyond the limit, by differences of what was answered
 };
 
+/// A stop of one joint.
+struct Stop {
+  double angle = 0.0;            ///< rad from the hold to rest
+  bool from_full_speed = false;  ///< at the speed limit when it was held; else the angle is no stop
+};
+
 /// One run: the connection is up for a while, then every joint is sent to an end of its range at
 /// full speed, sometimes turned round on the way, in a third of the runs with a hold that is reset
 /// once the arm stands.
@@ -127,16 +133,18 @@ class LossRun {
     return extremes_;
   }
 
-  /// Angle (rad) that the fifth joint turns from a hold at full speed to rest, far from its limits.
-  double stop() {
+  /// A hold of the fifth joint at full speed, far from its limits, on a controller that
+  /// extrapolates. One that stands begins anew after each loss: full speed is not what it has.
+  Stop stop() {
+    const double full = bridge_.config().limits.velocity[4];
     Vector7 wanted = Vector7::Zero();
-    wanted[4] = direction_[4] * bridge_.config().limits.velocity[4];
-    // A held set-point starts anew after each loss, so full speed is what comes between losses.
+    wanted[4] = direction_[4] * full;
     for (int i = 0; i < static_cast<int>(0.7 / case_.period); ++i) cycle(wanted);
     bridge_.submit("hold");
     const double from = robot_.setPoint()[4];
+    const bool at_full = started_ && direction_[4] * last_velocity_[4] > 0.99 * full;
     for (int i = 0; i < static_cast<int>(1.5 / case_.period); ++i) cycle(wanted);
-    return std::abs(robot_.setPoint()[4] - from);
+    return {std::abs(robot_.setPoint()[4] - from), at_full};
   }
 
   bool started() const { return started_; }

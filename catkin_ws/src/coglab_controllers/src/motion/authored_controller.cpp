@@ -3,12 +3,20 @@
 #include <algorithm>
 #include <cmath>
 #include <sstream>
+#include <stdexcept>
 #include <utility>
 
 namespace coglab_controllers {
 
 AuthoredController::AuthoredController(std::unique_ptr<Motion<>> motion)
     : MotionRunner<MotionArguments>(std::move(motion), RunnerPolicy()) {}
+
+MotionController* AuthoredController::make(std::unique_ptr<Motion<>> motion,
+                                           const ctrl_more::Abi& library) {
+  constexpr ctrl_more::Abi program = authoredAbi();
+  if (library == program) return new AuthoredController(std::move(motion));
+  throw std::runtime_error("its motion is " + library.otherThan("coglab_controllers", program));
+}
 
 AuthoredController::~AuthoredController() = default;
 

@@ -97,6 +97,17 @@ void poseToWire(const Pose& pose, float (&wire)[fri::kFrameValues]) {
   }
 }
 
+int jointPastLimitSwitch(const Parameters& parameters, const Vector7& set_point) {
+  for (int i = 0; i < 7; ++i) {
+    if (std::abs(set_point[i]) > parameters.position_limit[i]) return i;
+  }
+  return -1;
+}
+
+std::string limitSwitchMessage(int joint) {
+  return std::string("software limit switch ") + kJointNames[joint];
+}
+
 std::string checkEntry(const CheckContext& context, const fri::CommandDatagram& command) {
   const Parameters& p = context.parameters;
   const bool cartesian = context.strategy == fri::ControlStrategy::CartesianImpedance;
@@ -136,10 +147,9 @@ std::string checkCyclic(const CheckContext& context, const fri::CommandDatagram&
       if (step > context.speed_limit[i] * p.period * (1.0 + p.speed_margin) + 1e-6) {
         return "FRI speed limit J" + std::to_string(i + 1) + " (" + kJointNames[i] + ")";
       }
-      if (std::abs(command.joint_position[i]) > p.position_limit[i]) {
-        return std::string("software limit switch ") + kJointNames[i];
-      }
     }
+    const int joint = jointPastLimitSwitch(p, fri::jointsFromWire(command.joint_position));
+    if (joint >= 0) return limitSwitchMessage(joint);
   }
   if ((command.flags & fri::kCartesianPosition) != 0) {
     Pose frame;

@@ -130,6 +130,11 @@ void Controller::judgeAnswer(const Servos& arm, bool on_time) {
     return;
   }
   missed_in_row_ = 0;
+  const bool commands_joints = !entry_pending_ && (answer_.flags & fri::kJointPosition) != 0;
+  if (commands_joints &&
+      jointPastLimitSwitch(parameters_, fri::jointsFromWire(answer_.joint_position)) >= 0) {
+    ++limit_switches_;
+  }
   const std::string fault =
       entry_pending_ ? checkEntry(checkContext(), answer_) : checkCyclic(checkContext(), answer_);
   if (!fault.empty()) {
@@ -170,8 +175,13 @@ void Controller::follow(const fri::CommandDatagram& command) {
 }
 
 void Controller::extrapolate() {
-  const Vector7& limit = parameters_.position_limit;
-  const Vector7 next = (setPoint() + last_step_).cwiseMax(-limit).cwiseMin(limit);
+  const Vector7 next = setPoint() + last_step_;
+  const int joint = jointPastLimitSwitch(parameters_, next);
+  if (joint >= 0 && !last_step_.isZero()) {
+    ++limit_switches_;
+    leaveCommandMode(limitSwitchMessage(joint));
+    return;
+  }
   offset_ = next - own_;
 }
 

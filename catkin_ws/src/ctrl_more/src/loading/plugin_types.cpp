@@ -15,9 +15,7 @@ void PluginTypes::refuse(const std::string& type, const std::string& clause) {
 
 bool PluginTypes::admit(const std::string& type, bool known, bool has_maker, const Abi& abi) {
   if (!(abi == abi_)) {
-    refuse(type, " compiled for another " + package_ + " (" + abi.text() + "; this program has " +
-                     abi_.text() +
-                     "): build it again with the headers and the compiler of this program");
+    refuse(type, " " + abi.otherThan(package_, abi_));
   } else if (!has_maker) {
     refuse(type, " without a maker");
   } else if (known) {

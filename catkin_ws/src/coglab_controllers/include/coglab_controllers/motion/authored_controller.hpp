@@ -29,10 +29,24 @@ struct MotionProgress {
   int queued = 0;
 };
 
+/// The numbers of the file that is being compiled, for libraries of motions: what they share with
+/// the program beside what motionAbi() names. The first one is raised when meanings change. Static,
+/// so that a library keeps its own.
+static inline constexpr ctrl_more::Abi authoredAbi() {
+  return ctrl_more::abiOf<Motion<>, MotionConfiguration, MotionArgument, MotionArguments,
+                          MotionStart<>, SetPoint, MotionCycle, IkResult, MotionReference>(1);
+}
+
 /// Runs any Motion<>. Parameters: those of MotionRunner, and one for the default of each argument.
 class AuthoredController : public MotionRunner<MotionArguments> {
  public:
-  explicit AuthoredController(std::unique_ptr<Motion<>> motion);
+  /// One for a motion of a library. Made here and not in the library, which may have been compiled
+  /// when a controller had another size.
+  /// @param motion what it runs
+  /// @param library what the caller was compiled with; leave it out
+  /// @throws std::runtime_error if that is not what the program was compiled with
+  static MotionController* make(std::unique_ptr<Motion<>> motion,
+                                const ctrl_more::Abi& library = authoredAbi());
   ~AuthoredController() override;
 
   /// start_motion; any thread.
@@ -43,6 +57,7 @@ class AuthoredController : public MotionRunner<MotionArguments> {
   bool readProgress(MotionProgress& progress) { return progress_.read(progress); }
 
  private:
+  explicit AuthoredController(std::unique_ptr<Motion<>> motion);
   void report(std::int64_t stamp_ns) override;
   Answer readArguments(const MotionRequestByName& request, MotionArguments& values) const;
 
@@ -54,11 +69,11 @@ class AuthoredController : public MotionRunner<MotionArguments> {
 /// Registers a class derived from Motion<> from one of its library's source files, outside of any
 /// namespace: `COGLAB_REGISTER_MOTION("wave/Wave", Wave)`. Where the library is lib<name>.so and
 /// the type <name>/…, load_controller finds it by the type alone.
-#define COGLAB_REGISTER_MOTION(type, Class)                                                    \
-  namespace {                                                                                  \
-  const ::coglab_controllers::MotionRegistration coglab_motion_registration(                   \
-      type, {[]() -> ::coglab_controllers::MotionController* {                                 \
-               return new ::coglab_controllers::AuthoredController(std::make_unique<Class>()); \
-             },                                                                                \
-             nullptr});                                                                        \
+#define COGLAB_REGISTER_MOTION(type, Class)                                                      \
+  namespace {                                                                                    \
+  const ::coglab_controllers::MotionRegistration coglab_motion_registration(                     \
+      type, {[]() -> ::coglab_controllers::MotionController* {                                   \
+               return ::coglab_controllers::AuthoredController::make(std::make_unique<Class>()); \
+             },                                                                                  \
+             nullptr});                                                                          \
   }

@@ -26,6 +26,11 @@ bool poseFromWire(const float (&wire)[lwr_fri_bridge::fri::kFrameValues], double
 /// A pose as 3x4 frame of the wire.
 void poseToWire(const Pose& pose, float (&wire)[lwr_fri_bridge::fri::kFrameValues]);
 
+/// The first joint (0..6) whose software limit switch this set-point (rad) lies beyond; -1: none.
+int jointPastLimitSwitch(const Parameters& parameters, const Vector7& set_point);
+/// The line of the message window about it.
+std::string limitSwitchMessage(int joint);
+
 /// Sentence why the command cannot start command mode; empty if it can.
 std::string checkEntry(const CheckContext& context,
                        const lwr_fri_bridge::fri::CommandDatagram& command);

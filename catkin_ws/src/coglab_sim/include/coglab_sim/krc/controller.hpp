@@ -92,6 +92,9 @@ class Controller : private KrlInterface {
   Vector7 setPoint() const { return own_ + offset_; }
   const AnswerStatistics& statistics() const { return statistics_; }
   const Rejections& rejections() const { return rejections_; }
+  /// How often a set-point in command mode lay beyond a software limit switch: one that was
+  /// commanded, or one that this controller went on to where an answer was missing.
+  std::uint64_t limitSwitches() const { return limit_switches_; }
   const std::deque<Message>& messages() const { return messages_; }  ///< newest last, at most 200
   std::uint64_t messageCount() const { return message_count_; }
   const Parameters& parameters() const override { return parameters_; }
@@ -152,6 +155,7 @@ class Controller : private KrlInterface {
   lwr_fri_bridge::fri::CommandDatagram answer_{};
   lwr_fri_bridge::fri::UserData krl_in_{}, krl_out_{};
   Rejections rejections_;
+  std::uint64_t limit_switches_ = 0;
   int missed_in_row_ = 0;
 
   // Set-points

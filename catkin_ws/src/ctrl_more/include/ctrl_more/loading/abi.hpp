@@ -34,6 +34,14 @@ struct Abi {
     }
     return all;
   }
+
+  /// The clause about a library with these numbers, to which the program is a stranger.
+  /// @param package whose headers it was compiled with
+  /// @param program the numbers of the program that loads it
+  std::string otherThan(const std::string& package, const Abi& program) const {
+    return "compiled for another " + package + " (" + text() + "; this program has " +
+           program.text() + "): build it again with the headers and the compiler of this program";
+  }
 };
 
 /// The numbers of the file that is being compiled. Static, so that a library keeps its own.

@@ -1,0 +1,21 @@
+"""Whether what a topic says of the cell can be true."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+from coglab_py.pose import Pose
+
+LARGEST = 1e4
+"""m, N: no number of a cell is larger"""
+IMPLAUSIBLE = f"a number is not finite or beyond {LARGEST:g}, or an orientation has no direction"
+
+
+def plausible(poses: Iterable[Pose], numbers: Iterable[float] = ()) -> bool:
+    """Finite numbers of a sensible size, and orientations that have a direction."""
+    poses = list(poses)
+    values = [*numbers, *(value for pose in poses for value in (*pose.position, *pose.orientation))]
+    if not np.all(np.abs(values) < LARGEST):  # not finite either
+        return False
+    return all(np.linalg.norm(pose.orientation) > 1e-6 for pose in poses)
