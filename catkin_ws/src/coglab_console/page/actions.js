@@ -205,11 +205,15 @@ export function showActions(parent) {
 /** The cause of a stop with its acknowledgement, above the log. */
 export function showCause(place) {
   const words = h('span');
-  const button = h('button', { type: 'button', id: 'acknowledge', onclick: () => command('acknowledge') }, 'Acknowledge');
+  const button = h('button', { type: 'button', id: 'acknowledge', onclick: async () => {
+    const answer = await command('acknowledge', { stop: Number(button.value) });
+    if (!answer.success) refuse(`Acknowledge: ${answer.message}`);
+  } }, 'Acknowledge');
   place.append(words, button);
   onDocs(['desk'], () => {
     const guard = store.docs.desk?.guard;
     place.parentElement.classList.toggle('told', Boolean(guard?.unacknowledged));
+    button.value = guard?.stop ?? 0; // the stop whose cause stands beside it
     setText(words, guard?.unacknowledged ? guard.cause : guard?.hold ? 'The next motion needs a held button.' : '');
     button.hidden = !guard?.unacknowledged || !operating();
     document.getElementById('stop-words').hidden = Boolean(guard?.unacknowledged);

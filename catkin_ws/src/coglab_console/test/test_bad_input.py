@@ -66,7 +66,7 @@ def test_of_two_operators_at_once_one_is_served_and_the_other_is_told_who_operat
                 assert len(console.robot.calls) == 5
                 # Held down by both at once: the one who watches begins nothing and is told why.
                 console.desk.guard.stop("a test")
-                console.desk.guard.acknowledge()
+                console.desk.guard.acknowledge(console.desk.guard.stops)
                 frame = json.dumps({"t": "hold", "id": 7, "name": "start", "arguments": RECEIVE})
                 for _ in range(11):
                     await first.send_str(frame)
@@ -113,7 +113,7 @@ def test_a_stop_during_a_request_still_asks_for_both_acts(tmp_path):
             robot.let.set()
             assert (await started)[0] == 200
             assert "acknowledge" in (await console.post(client, "home"))[1]["message"]
-            await console.post(client, "acknowledge")
+            await console.post(client, "acknowledge", {"stop": console.desk.guard.stops})
             status, answer = await console.post(client, "home")
             assert status == 409 and "press and hold" in answer["message"]
             assert len(robot.calls) == 1
@@ -127,7 +127,7 @@ def test_a_browser_that_dies_with_a_button_held_is_told_to_the_others(tmp_path):
             ws = await console.socket_of(client)
             await ws.send_str("{}")
             console.desk.guard.stop("a test")
-            console.desk.guard.acknowledge()
+            console.desk.guard.acknowledge(console.desk.guard.stops)
             for _ in range(4):
                 await ws.send_str(json.dumps({"t": "hold", "name": "start", "arguments": RECEIVE}))
                 await asyncio.sleep(0.1)
@@ -147,7 +147,7 @@ def test_a_button_that_was_let_go_or_has_begun_something_is_not_told_when_the_br
                 ws = await console.socket_of(client)
                 await ws.send_str("{}")
                 console.desk.guard.stop("a test")
-                console.desk.guard.acknowledge()
+                console.desk.guard.acknowledge(console.desk.guard.stops)
                 for _ in range(3 if release else 11):
                     await ws.send_str(json.dumps({"t": "hold", "name": "start", "arguments": RECEIVE}))
                     await asyncio.sleep(0.1)

@@ -10,7 +10,7 @@ from coglab_console.desk.commands import COMMANDS, BadCommand, judge
 from coglab_console.desk.desk import Desk
 from coglab_console.desk.events import EventLog
 from coglab_console.desk.experiment import Experiment, ExperimentError, latin_row, order_of
-from coglab_console.desk.gates import MotionGuard, Standing, reasons
+from coglab_console.desk.gates import MotionGuard, Standing, Standstills, reasons
 from coglab_console.desk.hold import HOLD_TIME, HeldButton
 from coglab_console.desk.roles import ABSENCE, NOTICE, Roles
 from coglab_console.web.fan_out import Documents
@@ -126,8 +126,8 @@ def test_two_who_want_to_operate_and_one_who_went_away():
 def test_after_a_stop_acknowledge_then_hold(desk):
     ask(desk, "b", "stop")
     assert "acknowledge" in ask(desk, "a", "start", **RECEIVE)["message"]
-    assert not ask(desk, "b", "acknowledge")["success"]  # an observer
-    assert ask(desk, "a", "acknowledge")["success"]
+    assert not ask(desk, "b", "acknowledge", stop=newest(desk))["success"]  # an observer
+    assert ask(desk, "a", "acknowledge", stop=newest(desk))["success"]
     assert "hold" in ask(desk, "a", "start", **RECEIVE)["message"]
     assert desk.backend.calls == []
 
@@ -136,9 +136,76 @@ def test_a_stop_by_somebody_else_counts(desk):
     desk.observe(False, "")
     desk.observe(True, "hold on /lwr")
     assert desk.guard.unacknowledged and desk.guard.cause == "hold on /lwr"
-    ask(desk, "a", "acknowledge")
+    ask(desk, "a", "acknowledge", stop=newest(desk))
     desk.observe(True, "hold on /lwr")
     assert not desk.guard.unacknowledged  # the same stop
+
+
+def shown(desk):
+    """The document of the desk, as the page has it."""
+    desk.tick()
+    documents = [json.loads(text) for text in desk.documents.newer({})]
+    return next(one["value"] for one in documents if one["name"] == "desk")
+
+
+def newest(desk):
+    """Number of the newest stop."""
+    return shown(desk)["guard"]["stop"]
+
+
+def test_an_acknowledgement_names_its_stop_and_lifts_no_newer_one(desk):
+    stop = ask(desk, "a", "stop")["data"]["stop"]
+    assert stop == newest(desk)
+    desk.observe(True, "the arm is blocked: no datagrams")
+    refused = ask(desk, "a", "acknowledge", stop=stop)
+    assert not refused["success"] and "no datagrams" in refused["message"] and desk.guard.unacknowledged
+    assert not ask(desk, "a", "acknowledge")["success"]
+    assert not ask(desk, "a", "acknowledge", stop=newest(desk) + 1)["success"] and desk.guard.unacknowledged
+    answer = ask(desk, "a", "acknowledge", stop=newest(desk))
+    assert answer["success"] and "no datagrams" in answer["message"] and not desk.guard.unacknowledged
+    events = [event["text"] for event in desk.events.since(0)[0] if event["source"] == "command"]
+    assert any(f"stop {newest(desk)}" in text and "no datagrams" in text for text in events)
+
+
+def test_without_a_stop_nothing_is_acknowledged(desk):
+    answer = ask(desk, "a", "acknowledge", stop=0)
+    assert not answer["success"] and "no stop" in answer["message"]
+
+
+def test_a_fault_after_a_stop_is_a_stop_of_its_own_though_the_robot_never_moved(desk):
+    """STOP, acknowledged, `./coglab start reset`: the arm does not obey, and the machine goes from stopped to fault."""
+    stands = Standstills()
+    stands.arm(True)
+    stands.machine("/coglab_master/stopped")
+    desk.observe(True, "STOP", stands.count)
+    ask(desk, "a", "acknowledge", stop=newest(desk))
+    stands.arm(False)
+    stands.machine("/coglab_master/fault")
+    desk.observe(True, "no command mode", stands.count)
+    assert desk.guard.unacknowledged and desk.guard.needs_hold and desk.guard.cause == "no command mode"
+    told = [event["text"] for event in desk.events.since(0)[0] if event["source"] == "stop"]
+    assert told == ["stopped: STOP", "stopped: no command mode"]
+
+
+def test_a_stop_that_was_over_between_two_looks_counts(desk):
+    desk.observe(False, "")
+    stands = Standstills()
+    stands.arm(True)
+    stands.arm(False)
+    desk.observe(False, "", stands.count)
+    assert desk.guard.unacknowledged
+
+
+def test_a_hold_and_the_machine_that_stops_because_of_it_are_one_stop():
+    stands = Standstills()
+    stands.machine("/m/wait_without_object")
+    stands.arm(True)
+    for state in ("/m/stopped", "/m/stopped"):
+        stands.machine(state)
+    assert stands.count == 1
+    for state in ("/m/recover/end_motion", "/m/fault", "/m/fault", "/m/coglab_init_system/x", "/m/fault"):
+        stands.machine(state)
+    assert stands.count == 3
 
 
 def hold_for(desk, seconds, gap=0.1, who="a", what=("start", RECEIVE)):
@@ -157,7 +224,7 @@ def hold_for(desk, seconds, gap=0.1, who="a", what=("start", RECEIVE)):
 
 def test_a_held_button_begins_the_motion_once(desk):
     ask(desk, "a", "stop")
-    ask(desk, "a", "acknowledge")
+    ask(desk, "a", "acknowledge", stop=newest(desk))
     assert hold_for(desk, 0.6) == []
     desk.released("a")
     answers = hold_for(desk, 1.4)
@@ -365,7 +432,7 @@ def test_a_connection_that_dies_with_the_button_held_starts_nothing(tmp_path):
             ws = await console.socket_of(client)
             await ws.send_str("{}")
             console.desk.guard.stop("test")
-            console.desk.guard.acknowledge()
+            console.desk.guard.acknowledge(console.desk.guard.stops)
             for _ in range(6):
                 await ws.send_str(json.dumps({"t": "hold", "name": "start", "arguments": RECEIVE}))
                 await asyncio.sleep(0.1)

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 from coglab_console.ros import view as ros_view
 from coglab_console.scene.urdf_model import RobotModel
-from coglab_msgs.msg import LwrState, PredictedPath
+from coglab_msgs.msg import LwrState, MasterState, PredictedPath
 from geometry_msgs.msg import Point, Pose
 
 URDF = Path(__file__).resolve().parents[2] / "lwr_description" / "urdf" / "lwr_ih2.urdf"
@@ -44,6 +44,17 @@ def test_all_drives_are_on_where_each_joint_has_its_bit(seen, power, on):
     view, _, _ = seen
     view._on_arm(LwrState(power=power))
     assert view.status()["arm"]["power"] is on
+
+
+def test_each_time_the_robot_comes_to_stand_is_counted(seen):
+    view, _, _ = seen
+    view._on_machine(MasterState(state="/coglab_master/stopped", why="hold is latched"))
+    assert view.stopped() == (True, "hold is latched", 1)
+    view._on_machine(MasterState(state="/coglab_master/fault", why="no command mode"))
+    assert view.stopped() == (True, "no command mode", 2)
+    view._on_arm(LwrState(hold_latched=True))
+    view._on_arm(LwrState(hold_latched=True))
+    assert view.stopped()[2] == 3
 
 
 def path_of(motion, *places):

@@ -80,7 +80,7 @@ class Desk:
         self.guard.stop(f"{who} pressed STOP")
         self.experiment.record("stop", who=who)
         self.tick()
-        return Answer(True, "STOP was sent to the arm and to the brain")
+        return Answer(True, "STOP was sent to the arm and to the brain", {"stop": self.guard.stops})
 
     async def command(self, who: str, name: Any, arguments: Any) -> Answer:
         """One command of the list by the browser `who`."""
@@ -149,9 +149,9 @@ class Desk:
             self._select(who, text)
         self.tick()
 
-    def observe(self, stopped: bool, cause: str) -> None:
-        """Whether the arm or the machine stands after a stop, and why."""
-        if self.guard.observe(stopped, cause):
+    def observe(self, stopped: bool, cause: str, standstills: int = 0) -> None:
+        """Whether the arm or the machine stands after a stop, why, and how often it has come to stand."""
+        if self.guard.observe(stopped, cause, standstills):
             self.events.add("stop", f"stopped: {cause or 'no reason was told'}", "fault")
             self.experiment.record("stopped", cause=cause)
             self.tick()
@@ -168,6 +168,7 @@ class Desk:
                 "roles": self.roles.view(),
                 "reasons": reasons(now, self.guard),
                 "guard": {
+                    "stop": self.guard.stops,
                     "cause": self.guard.cause,
                     "unacknowledged": self.guard.unacknowledged,
                     "hold": self.guard.needs_hold,
@@ -235,8 +236,9 @@ class Desk:
             self.backend.tell("note", given["text"])
             return Answer(True, self._note(who, given["text"]))
         if name == "acknowledge":
-            self.guard.acknowledge()
-            return Answer(True, "acknowledged; the first motion needs a held button")
+            refusal = self.guard.acknowledge(given["stop"])
+            told = f"acknowledged stop {self.guard.stops} ({self.guard.cause}); the first motion needs a held button"
+            return Answer(not refusal, refusal or told)
         if name == "take_over":
             return Answer(True, self.roles.take_over(who))
         if name == "keep":

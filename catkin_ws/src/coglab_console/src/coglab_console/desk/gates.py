@@ -30,28 +30,39 @@ class MotionGuard:
     stops: int = 0
     """how many there were: a motion that was asked for before the newest one is not the first after it"""
     _was_stopped: bool = False
+    _standstills: int = 0
 
     def __post_init__(self) -> None:
         self.needs_hold = self.real
 
     def stop(self, cause: str) -> None:
-        """A stop, by whomever."""
+        """A stop, by whomever. Its number is `stops`."""
         self.cause, self.unacknowledged, self.needs_hold = cause, True, True
         self.stops += 1
 
-    def observe(self, stopped: bool, cause: str) -> bool:
-        """How the robot stands, several times a second; True where a stop has just begun."""
-        begun = stopped and not self._was_stopped
-        self._was_stopped = stopped
+    def observe(self, stopped: bool, cause: str, standstills: int = 0) -> bool:
+        """How the robot stands, several times a second, and how often it has come to stand (Standstills); True where a
+        stop has begun since the last look, also one that followed another without a motion between them."""
+        begun = (stopped and not self._was_stopped) or standstills > self._standstills
+        self._was_stopped, self._standstills = stopped, standstills
         if begun:
             self.stop(cause or self.cause)
         elif stopped and cause:
             self.cause = cause
         return begun
 
-    def acknowledge(self) -> None:
-        """The operator has read the cause."""
+    def acknowledge(self, stop: int) -> str:
+        """The operator has read the cause of the stop of this number. Why that is refused: an answer to an old stop
+        lifts no newer one. Empty where it is taken."""
+        if not self.stops:
+            return "there has been no stop, so that there is nothing to acknowledge"
+        if stop != self.stops:
+            return (
+                f"expected an answer to stop {self.stops}, the newest ({self.cause or 'no reason was told'}), "
+                f"got one to stop {stop}; read its cause, then acknowledge it"
+            )
         self.unacknowledged = False
+        return ""
 
     def moved(self, stops: int) -> None:
         """A motion was begun with a held button, which was asked for when there had been so many stops."""
@@ -65,6 +76,27 @@ class MotionGuard:
         if name in SECOND_THOUGHT:
             return True
         return COMMANDS[name].motion and self.needs_hold
+
+
+class Standstills:
+    """Counts how often the robot has come to stand after a stop or a fault. Told of every message, because what is
+    over between two looks counts, too."""
+
+    def __init__(self) -> None:
+        self.count = 0
+        self._leaf = ""
+        self._held = False
+
+    def machine(self, state: str) -> None:
+        """Path of the machine's active state. Where it stops because the arm is held, that is one stop."""
+        before, self._leaf = self._leaf, state.rsplit("/", 1)[-1]
+        if self._leaf in STANDSTILL and self._leaf != before:
+            self.count += self._leaf != "stopped" or not self._held
+
+    def arm(self, held: bool) -> None:
+        """Whether the arm is held until a reset."""
+        self.count += held and not self._held
+        self._held = held
 
 
 @dataclass

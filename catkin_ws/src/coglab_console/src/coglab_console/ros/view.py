@@ -24,7 +24,7 @@ from coglab_msgs.msg import (
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64, String
 
-from ..desk.gates import Standing
+from ..desk.gates import Standing, Standstills
 from ..scene import path_ahead
 from ..scene.urdf_model import RobotModel
 from . import wire
@@ -67,6 +67,7 @@ class RosView:
         self.machine, self.arm, self.hand = MasterState(), LwrState(), HandStatus()
         self.manager, self.dmp = ControllerStatus(), DmpFeedback()
         self._state_since = time.monotonic()
+        self._standstills = Standstills()
         self.signal, self.contact, self.latency = ContactSignal(), "", math.nan
         self._dmp_at = self._hand_at = self._signal_at = self._latency_at = self._path_at = 0.0
         self._path_of = ""  # the controller whose motion is under way
@@ -121,11 +122,11 @@ class RosView:
             calibrating=hand.calibrating,
         )
 
-    def stopped(self) -> tuple[bool, str]:
-        """Whether the robot stands after a stop or a fault, and why."""
+    def stopped(self) -> tuple[bool, str, int]:
+        """Whether the robot stands after a stop or a fault, why, and how often it has come to stand."""
         now = self.standing()
         held = now.arm_alive and self.arm.hold_latched
-        return now.stopped or held, self.machine.why or self.arm.reason
+        return now.stopped or held, self.machine.why or self.arm.reason, self._standstills.count
 
     def palm(self) -> Any:
         """Place of the palm in the world, m; None where it is not known."""
@@ -279,6 +280,7 @@ class RosView:
 
     def _on_arm(self, message: LwrState) -> None:
         before, self.arm = self.arm, message
+        self._standstills.arm(message.hold_latched)
         if (message.supervisor, message.quality) != (before.supervisor, before.quality):
             bad = message.supervisor in ("stopped", "disconnected")
             words = f"arm {message.supervisor}, quality {message.quality}"
@@ -295,6 +297,7 @@ class RosView:
         if (message.state, message.waits_for) != (self.machine.state, self.machine.waits_for):
             self._state_since = time.monotonic()
         self.machine = message
+        self._standstills.machine(message.state)
 
     def _on_transition(self, message: Transition) -> None:
         level = {"failed": "warning", "stopped": "fault", "fault": "fault"}.get(message.outcome, "info")
