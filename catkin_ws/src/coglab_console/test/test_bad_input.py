@@ -134,7 +134,7 @@ def test_a_browser_that_dies_with_a_button_held_is_told_to_the_others(tmp_path):
             ws._response.connection.transport.abort()
             await until(lambda: any("button" in text for text in events_of(console, "command")))
             (told,) = events_of(console, "command")
-            assert "browser 1" in told and "start" in told and "nothing was begun" in told
+            assert "browser 1" in told and "Receive" in told and "nothing was begun" in told
             assert not console.robot.calls
 
     go(test, tmp_path)
@@ -191,7 +191,8 @@ def test_object_files_are_not_read_again_under_way(tmp_path):
         async with console.browser() as client, console.socket_of(client) as ws:
             await ws.send_str("{}")
             await ws.receive()
-            assert (await console.post(client, "objects_reload"))[0] == 200
+            status, answer = await console.post(client, "objects_reload")
+            assert status == 409 and "press and hold" in answer["message"]
             console.desk.experiment.begin("P1", ["a"], 1, "as_listed", 0)
             console.desk.experiment.trial_begin()
             status, answer = await console.post(client, "objects_reload")
