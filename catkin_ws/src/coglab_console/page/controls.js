@@ -122,7 +122,7 @@ export function commandButton(label, { name, request, told, answered, held = fal
   watch(button, () => {
     const now = blocked(name);
     setAttribute(button, 'aria-disabled', now ? 'true' : null);
-    setText(reason, now || (held ? 'press and hold' : ''));
+    setText(reason, now || (held && !why ? 'press and hold' : ''));
   });
   return why ? button : h('span', { class: 'control' }, button, reason);
 }

@@ -30,7 +30,8 @@ function form(told) {
   const begin = commandButton('Begin the session', { name: 'session_begin', told, request });
   return h('form', { onsubmit: (event) => event.preventDefault() },
     field('Participant (a pseudonym, never a name)', participant), field('Number of the participant (row of the Latin square, seed)', number),
-    field('Conditions, separated by commas; one that names an object, as "receive ball", chooses it for its trials', conditions), field('Repetitions of each', repetitions), field('Order', order.button), h('div', { class: 'row' }, begin));
+    field('Conditions, separated by commas; one with an object (receive ball) chooses it', conditions),
+    h('div', { class: 'pair' }, field('Repetitions of each', repetitions), field('Order', order.button)), h('div', { class: 'row' }, begin));
 }
 
 function running(told, session) {

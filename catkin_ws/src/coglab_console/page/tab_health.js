@@ -1,5 +1,5 @@
 // Health: diagnostics tree, versions, parameters, browsers; and Help.
-import { h, mark, setAttribute, setText, table } from './dom.js';
+import { h, mark, setText, table } from './dom.js';
 import { operating, store } from './store.js';
 import { command } from './link.js';
 import { viewKind } from './view.js';
@@ -136,13 +136,11 @@ export function helpPage(page) {
 
 /** Take over, or keep the control while another browser takes over. */
 export function takeOver(told) {
-  const why = () => (store.lost ? 'not live' : operating() && !store.docs.desk.roles.claimant ? 'you operate, and nobody takes over' : '');
-  const button = h('button', { type: 'button', onclick: async () => setText(told, why() || (await command(operating() ? 'keep' : 'take_over')).message) }, 'Take over');
+  const button = h('button', { type: 'button', onclick: async () => setText(told, (await command(operating() ? 'keep' : 'take_over')).message) }, 'Take over');
   watch(button, () => {
     const claimant = store.docs.desk?.roles.claimant;
-    setText(button, operating() ? (claimant ? `Keep the control (${claimant} takes over)` : 'You operate') : 'Take over');
-    setAttribute(button, 'aria-disabled', why() ? 'true' : null);
-    button.title = why();
+    button.hidden = !store.docs.desk || (operating() && !claimant);
+    setText(button, operating() ? `Keep the control (${claimant} takes over)` : 'Take over');
   });
   return button;
 }

@@ -34,7 +34,7 @@ for (const element of document.querySelectorAll('button, input, select, textarea
 
 for (const element of document.querySelectorAll('[aria-disabled=true]')) {
   const why = document.getElementById(element.getAttribute('aria-describedby'));
-  if (seen(element) && element.id !== 'take-over' && !(why && seen(why) && why.textContent.trim())) problems.push(`${nameOf(element)} does not say why it is disabled`);
+  if (seen(element) && !(why && seen(why) && why.textContent.trim())) problems.push(`${nameOf(element)} does not say why it is disabled`);
 }
 for (const why of document.querySelectorAll('#actions .why')) {
   if (seen(why) && why.scrollHeight > why.clientHeight + 1) problems.push(`"${why.textContent}" is cut off`);

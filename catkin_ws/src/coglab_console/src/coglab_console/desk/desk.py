@@ -210,10 +210,11 @@ class Desk:
                 arguments = {"object_id": self._meant(arguments["action"]), **arguments}
             stops = self.guard.stops
             answer = await self.backend.call(name, arguments)
+            answer["message"] = plain(answer["message"])
             if answer["success"] and judge(name, {**arguments}).motion:
                 self.guard.moved(stops)
         if name not in ("parameters", "note", "select_object"):
-            told = f"{who}: {words_of(name, arguments)}: {plain(answer['message'])}"
+            told = f"{who}: {words_of(name, arguments)}: {answer['message']}"
             self.events.add("command", told, "info" if answer["success"] else "warning")
         self.tick()
         return answer

@@ -110,7 +110,7 @@ def action_of(state: str) -> str:
 
 
 def outcome(name: str) -> str:
-    """Words for how a state ended."""
+    """Words for how a state ended, or for an action of the journal."""
     return OUTCOMES.get(name) or (button(name) if name in BUTTONS else PHASES.get(name, name.replace("_", " ")))
 
 

@@ -25,7 +25,7 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64, String
 
 from ..desk.gates import STANDSTILL, Standing, Standstills
-from ..desk.words import button, phase, plain, transition
+from ..desk.words import outcome, phase, plain, transition
 from ..scene import path_ahead
 from ..scene.urdf_model import RobotModel
 from . import status, wire
@@ -292,12 +292,13 @@ class RosView:
         reason = plain(f": {message.reason}{causes}" if message.reason else "")
         words = transition(message.path, message.from_state, message.outcome, message.to_state)
         self._say("machine", words + reason, level)
-        self._transition(message.path, message.from_state, message.outcome, message.to_state, message.reason + causes)
+        told = plain(message.reason + causes)
+        self._transition(message.path, message.from_state, message.outcome, message.to_state, told)
 
     def _on_result(self, message: String) -> None:
         try:
             row = json.loads(message.data)
-            what = f"{button(row['kind'])} {row['object_id']}".strip()
+            what = f"{outcome(row['kind'])} {row['object_id']}".strip()
             words = f"{what}: {row['outcome']} after {float(row['duration_s']):.1f} s"
         except (ValueError, KeyError, TypeError):
             return
