@@ -69,8 +69,8 @@ export function path() {
 export function viewWords() {
   const shown = store.docs.path;
   const model = store.docs.model;
-  if (model && !model.robot) return 'No robot_description: the robot is not drawn.';
-  if (store.state && !store.state.live) return 'No joint states: the arm is shown as it was last.';
+  if (model && !model.robot) return 'No description of the robot: it is not drawn.';
+  if (store.state && !store.state.live) return 'Nothing new from the arm: it is shown as it was last.';
   if (!shown) return '';
   if (shown.kind === 'refused') return `▲ The next motion could not begin now: ${shown.reason}`;
   const kind = shown.kind === 'running' ? 'Path of this motion' : 'Path of the next motion, if it began now';

@@ -72,7 +72,7 @@ function drawPhases(canvas) {
 }
 
 function rememberPhase(state) {
-  const label = state.phase.split('/').pop().replaceAll('_', ' ');
+  const label = state.words;
   if (latest > state.stamp) phases = [];
   if (phases[phases.length - 1]?.[1] !== label) phases.push([state.stamp - (phases.length ? 0 : Math.min(state.since, WINDOW)), label]);
   while (phases.length > 1 && phases[1][0] < state.stamp - WINDOW) phases.shift();

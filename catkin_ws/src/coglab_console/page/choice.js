@@ -31,9 +31,10 @@ function onKey(event, isOpen, { open, close, step, take }) {
 
 /**
  * A button with a list: { button, offer(pairs of value and words), show(value) }. What is chosen is `button.value`, and
- * told as `change`. Arrows go through the open list, Enter takes, Escape and whatever takes the focus leave it.
+ * told as `change`. Arrows go through the open list, Enter takes, Escape and whatever takes the focus leave it. Where
+ * `blockedBy()` has a reason the list stays closed, and `refused` is told it.
  */
-export function choice(attributes) {
+export function choice({ blockedBy = () => '', refused = () => {}, ...attributes }) {
   const id = `choice-${made++}`;
   const list = h('ul', { id, role: 'listbox', popover: 'manual', class: 'choice' });
   const words = h('span');
@@ -57,6 +58,11 @@ export function choice(attributes) {
     setAttribute(button, 'aria-activedescendant', null);
   };
   const open = () => {
+    const why = blockedBy();
+    if (why) {
+      refused(why);
+      return;
+    }
     document.body.append(list);
     list.showPopover();
     place(list, button);

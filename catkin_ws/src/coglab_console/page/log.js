@@ -9,7 +9,7 @@ export function clock(stamp) {
 }
 
 function line(event) {
-  return h('li', { class: event.level === 'fault' ? 'faultrow' : '', title: event.text }, mark(LEVELS[event.level]), `${clock(event.stamp)} ${event.source}: ${event.text}`);
+  return h('li', { class: event.level === 'fault' ? 'faultrow' : '', title: event.text }, mark(LEVELS[event.level]), `${clock(event.stamp)} ${event.source}: ${event.text}${event.phase ? ` [${event.phase}]` : ''}`);
 }
 
 export function showLog(list) {

@@ -71,7 +71,6 @@ function showBand() {
   const draw = () => {
     const roles = store.docs.desk?.roles;
     setText(words, roles ? (operating() ? `you operate (${store.you})` : `you watch (${store.you}); ${roles.operator || 'nobody'} operates`) : '');
-    control.hidden = !roles || (operating() && !roles.claimant);
     if (operating()) setText(answer, '');
   };
   onDocs(['desk'], draw);

@@ -5,9 +5,23 @@ import { ageWords } from './cell.js';
 
 const ROWS = ['Phase', 'Waits', 'FRI', 'Arm', 'Motion', 'Hand', 'Person', 'Object', 'Contact', 'Why', 'Last'];
 const OLD = 0.5; // s, sights of perception older than this deserve a mark
+const RECENT = 5; // s for which a recognised reach is shown
+const SUPERVISOR = { disconnected: 'no connection', monitor: 'only watched', starting: 'starting', command: 'ready to move', holding: 'holds still', stopping: 'stopping', stopped: 'stopped' };
+const MODES = { POSITION: 'position control', CART_IMP: 'Cartesian impedance', JNT_IMP: 'joint impedance', OTHER: 'another control' };
+const CONTROLLERS = { dmp: 'reach', ptp: 'to a posture' };
+const MOTIONS = { idle: 'at rest', running: 'under way', holding: 'waits where it is', fault: 'fault' };
+const CONTACTS = { contact: 'a touch', load: 'the weight', release: 'the person letting go' };
+
+/** Where a source is not there or has fallen silent: its row; null where it speaks. `who` begins a sentence. */
+function missing(source, alive, who) {
+  if (!alive) return ['fault', `${who} is not there`];
+  const silence = store.state?.silent[source];
+  return silence === undefined ? null : ['fault', `${who} has been silent for ${silence.toFixed(1)} s`];
+}
 
 function fri({ alive, fri: state, quality, cycle, reason }) {
-  if (!alive) return ['fault', 'the arm’s node is not there'];
+  const gone = missing('arm', alive, 'the arm’s program');
+  if (gone) return gone;
   const level = { PERFECT: 'ok', OK: 'ok', BAD: 'warn' }[quality] ?? 'fault';
   const latency = store.state?.fri;
   const more = latency === null || latency === undefined ? '' : `, late by ${latency.toFixed(1)} ms`;
@@ -15,21 +29,24 @@ function fri({ alive, fri: state, quality, cycle, reason }) {
 }
 
 function arm({ alive, supervisor, allowed, held, mode, power }) {
-  if (!alive) return ['fault', 'unknown'];
-  const words = `${supervisor}, ${mode.toLowerCase()}${power ? '' : ', not all drives on'}`;
+  if (missing('arm', alive, '')) return ['fault', 'not known'];
+  const words = `${SUPERVISOR[supervisor] ?? supervisor}, ${MODES[mode] ?? mode}${power ? '' : ', not all drives on'}`;
   return [held || !power || ['stopped', 'disconnected'].includes(supervisor) ? 'fault' : allowed ? 'ok' : 'warn', words];
 }
 
 function motion({ alive, state, active, scale, reason }) {
-  if (!alive) return ['fault', 'no controller manager'];
+  const gone = missing('controllers', alive, 'the motion control');
+  if (gone) return gone;
   const dmp = store.state?.dmp ?? ['idle'];
   const going = dmp[0] === 'running' ? `, ${(dmp[2] * 100).toFixed(0)} cm and ${dmp[3].toFixed(1)} s to go` : '';
-  const words = `${active || 'none'} ${state}, ${Math.round(scale * 100)} %${going}${reason ? `: ${reason}` : ''}`;
+  const words = `${CONTROLLERS[active] ?? (active || 'none')} ${MOTIONS[state] ?? state}, ${Math.round(scale * 100)} %${going}${reason ? `: ${reason}` : ''}`;
   return [state === 'fault' ? 'fault' : state === 'running' ? 'ok' : 'idle', words];
 }
 
 function hand({ alive, connected, calibrated, calibrating, holding, motors, message }) {
-  if (!alive || !connected) return ['fault', alive ? message || 'does not answer' : 'the hand’s node is not there'];
+  const gone = missing('hand', alive, 'the hand’s program');
+  if (gone) return gone;
+  if (!connected) return ['fault', message || 'does not answer'];
   if (calibrating) return ['warn', 'calibrates'];
   if (!calibrated) return ['warn', 'not calibrated'];
   return ['ok', `ready, ${motors}/5 motors, ${holding ? 'holds' : 'empty'}`];
@@ -38,31 +55,39 @@ function hand({ alive, connected, calibrated, calibrating, holding, motors, mess
 function person() {
   const age = store.state?.ages.hand;
   const recognised = store.docs.recognition;
-  const reach = recognised?.decided ? `, reaches ${recognised.pattern}` : '';
+  const since = recognised ? Math.max(0, (store.state?.stamp ?? 0) - recognised.stamp) : Infinity;
+  const reach = recognised?.decided && since < RECENT ? `, reaches ${recognised.pattern} (${since.toFixed(1)} s ago)` : '';
   return [age === undefined ? 'idle' : age < OLD ? 'ok' : 'warn', `hand ${ageWords('hand')}${reach}`];
 }
 
 function object() {
-  const id = store.docs.status.machine.object;
-  const next = store.docs.desk?.object || store.docs.status.machine.fallback;
+  const { object: id, fallback } = store.docs.status.machine;
+  const next = store.docs.desk?.object || fallback;
   const seen = store.state?.ages.object;
-  const words = id ? `${id} in the hand` : next ? `${next} next, ${ageWords('object')}` : 'none';
+  const words = id ? `${id} in the hand${next && next !== id ? `, ${next} next` : ''}` : next ? `${next} next, ${ageWords('object')}` : 'none';
   return [id || (seen !== undefined && seen < OLD) ? 'ok' : 'idle', words];
 }
 
 function contact() {
   const margin = store.state?.margin;
-  const { words, alive, state, mode } = store.docs.status.contact;
-  if (!alive) return ['warn', 'no detector, or no torques'];
-  if (state === 'waiting') return ['idle', `armed for ${mode}, until the arm is still`];
+  const { words, state, mode } = store.docs.status.contact;
+  const silence = store.state?.silent.contact;
+  if (silence !== undefined) return ['warn', `silent for ${silence.toFixed(1)} s: no detector, or no torques`];
+  if (!store.docs.status.contact.alive) return ['warn', 'no detector, or no torques'];
+  if (state === 'waiting') return ['idle', `armed for ${CONTACTS[mode] ?? mode}, until the arm is still`];
   if (margin === null || margin === undefined) return ['idle', `not armed${words ? `; last: ${words}` : ''}`];
   return [margin > 1 ? 'warn' : 'ok', `armed, margin ${margin.toFixed(2)} of 1`];
 }
 
+function phase({ alive, hub, words }, stood) {
+  return missing('brain', alive, 'the brain') ?? [stood ? 'fault' : hub ? 'ok' : 'idle', store.state?.words || words];
+}
+
 /** What the brain waits for and when it gives up, as it tells itself. */
-function waiting({ waits }) {
-  const { since = 0, left = null } = store.state ?? {};
-  if (!waits) return ['idle', `${since.toFixed(1)} s, without a limit`];
+function waiting({ alive }) {
+  const { since = 0, left = null, waits = '' } = store.state ?? {};
+  if (missing('brain', alive, '')) return ['fault', 'not known'];
+  if (!waits) return ['idle', `for nothing with a limit; ${since.toFixed(1)} s in this phase`];
   return [left !== null && left < 1 ? 'warn' : 'idle', `${waits}; ${left === null ? 'without a limit' : `${left.toFixed(1)} s left`}`];
 }
 
@@ -71,7 +96,7 @@ function rows() {
   const last = store.events[store.events.length - 1];
   const stood = machine.state.endsWith('/fault') || machine.state.endsWith('/stopped');
   return {
-    Phase: machine.alive ? [stood ? 'fault' : machine.hub ? 'ok' : 'idle', machine.words] : ['fault', 'the brain (/coglab) is not there'],
+    Phase: phase(machine, stood),
     Waits: waiting(machine),
     FRI: fri(a),
     Arm: arm(a),

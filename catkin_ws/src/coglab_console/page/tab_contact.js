@@ -1,7 +1,8 @@
 // Contact work-bench: what the detector itself sees, per joint against its threshold, live; learning at rest; trying it.
 import { h, setText } from './dom.js';
 import { store } from './store.js';
-import { field, heldSender, sender } from './tab_experiment.js';
+import { field } from './tab_experiment.js';
+import { commandButton } from './controls.js';
 
 const JOINTS = ['A1', 'A2', 'E1', 'A3', 'A4', 'A5', 'A6'];
 
@@ -22,13 +23,12 @@ export function contactPage(page) {
   const timeout = h('input', { type: 'number', min: 1, max: 60, value: 20 });
   page.append(
     h('div', {}, h('h2', {}, title), ...bars.map((bar) => bar.row),
-      h('p', {}, 'What the contact detector sees and compares (contact_detector/signal). Bar: the largest change of the last second. Black line: its threshold, k robust standard deviations at rest; with a mark: the joint counts now.')),
-    h('div', {}, h('h2', {}, 'Noise at rest'), learnt, h('div', { class: 'row' }, heldSender('Learn anew at rest', told, () => ['contact_learn', {}])),
+      h('p', {}, 'What the contact detector sees and compares. Bar: the largest change of the last second. Black line: its threshold, k robust standard deviations at rest; with a mark: the joint counts now.')),
+    h('div', {}, h('h2', {}, 'Noise at rest'), learnt, h('div', { class: 'row' }, commandButton('Learn anew at rest', { name: 'contact_learn', told, held: true, request: () => ['contact_learn', {}] })),
       h('h2', {}, 'Try the detector'), detector,
       h('div', { class: 'row' }, field('Threshold k', k), field('For, s', timeout),
-        sender('Watch for contact', told, () => ['contact_arm', { mode: 'contact', k: Number(k.value), timeout: Number(timeout.value) }]),
-        sender('Off', told, () => ['contact_arm', { mode: 'off' }])),
-      h('p', {}, 'Only between actions and trials: thresholds do not change under way.'), told));
+        commandButton('Watch for contact', { name: 'contact_arm', told, held: true, request: () => ['contact_arm', { mode: 'contact', k: Number(k.value), timeout: Number(timeout.value) }] }),
+        commandButton('Off', { name: 'contact_arm', told, request: () => ['contact_arm', { mode: 'off' }] })), told));
 
   const onState = (state) => {
     bars.forEach((bar, i) => {

@@ -1,8 +1,8 @@
 // Experiment: participant, conditions, order of trials, notes. One file per session, written by the server.
 import { h, setText, table } from './dom.js';
-import { onDocs, operating, store } from './store.js';
+import { onDocs, store } from './store.js';
 import { command } from './link.js';
-import { actionButton } from './actions.js';
+import { commandButton } from './controls.js';
 import { choice } from './choice.js';
 import { clock } from './log.js';
 
@@ -10,19 +10,7 @@ export function field(label, input) {
   return h('label', {}, label, input);
 }
 
-/** A button that sends a command and shows the answer in `told`. */
-export function sender(label, told, request) {
-  return h('button', { type: 'button', onclick: async () => {
-    const [name, args] = request();
-    setText(told, (await command(name, args)).message);
-  } }, label);
-}
-
-/** The same for what needs a second thought: nothing before the button was held for 0.8 s. */
-export function heldSender(label, told, request) {
-  const blockedBy = () => (operating() ? '' : 'only the operator changes this');
-  return actionButton(label, { blockedBy, mustHold: () => true, request, tell: (text) => setText(told, text) });
-}
+const OUTCOMES = [['done', 'The trial is done'], ['repeat', 'Repeat the trial later'], ['skipped', 'Skip the trial']];
 
 function form(told) {
   const participant = h('input', { type: 'text', maxlength: 32, autocomplete: 'off', placeholder: 'P07' });
@@ -32,16 +20,18 @@ function form(told) {
   const order = choice({});
   order.offer(['latin_square', 'random', 'as_listed'].map((word) => [word, word.replace('_', ' ')]));
   order.show('latin_square');
-  const begin = sender('Begin the session', told, () => ['session_begin', {
+  const request = () => ['session_begin', {
     participant: participant.value.trim(),
     number: Number(number.value),
     conditions: conditions.value.split(',').map((word) => word.trim()).filter(Boolean),
     repetitions: Number(repetitions.value),
     order: order.button.value,
-  }]);
+  }];
+  const begin = commandButton('Begin the session', { name: 'session_begin', told, request });
   return h('form', { onsubmit: (event) => event.preventDefault() },
     field('Participant (a pseudonym, never a name)', participant), field('Number of the participant (row of the Latin square, seed)', number),
-    field('Conditions, separated by commas', conditions), field('Repetitions of each', repetitions), field('Order', order.button), h('div', { class: 'row' }, begin));
+    field('Conditions, separated by commas; one with an object (receive ball) chooses it', conditions),
+    h('div', { class: 'pair' }, field('Repetitions of each', repetitions), field('Order', order.button)), h('div', { class: 'row' }, begin));
 }
 
 function running(told, session) {
@@ -51,9 +41,9 @@ function running(told, session) {
   return [
     h('p', {}, `Session of ${session.participant}: ${session.position} of ${session.trials.length} trials. File: ${session.file}; as a table: ./coglab shell rosrun coglab_console console_session.py`),
     h('div', { class: 'row' },
-      sender(next ? `Begin trial ${session.position + 1}: ${next.condition}` : 'All trials are done', told, () => ['trial_begin', {}]),
-      ...['done', 'repeat', 'skipped'].map((outcome) => sender(`Trial ${outcome}`, told, () => ['trial_end', { outcome }])),
-      sender('End the session', told, () => ['session_end', {}])),
+      commandButton(next ? `Begin trial ${session.position + 1}: ${next.condition}` : 'All trials are done', { name: 'trial_begin', told, request: () => ['trial_begin', {}] }),
+      ...OUTCOMES.map(([outcome, label]) => commandButton(label, { name: 'trial_end', told, request: () => ['trial_end', { outcome }] })),
+      commandButton('End the session', { name: 'session_end', told, request: () => ['session_end', {}] })),
     table(['Trial', 'Condition', 'Outcome'], around, 'Trials around the present one'),
   ];
 }
@@ -81,11 +71,10 @@ export function experimentPage(page) {
   const draw = () => {
     const session = store.docs.desk?.experiment;
     if (!session) return;
-    const key = JSON.stringify([session.participant, session.position, session.running, operating()]);
+    const key = JSON.stringify([session.participant, session.position, session.running]);
     if (key !== shown) {
       shown = key;
       left.replaceChildren(...(session.participant ? running(told, session) : [form(told)]));
-      if (!operating()) left.prepend(h('p', {}, 'You watch: only the operator begins and ends sessions and trials.'));
     }
     notes.replaceChildren(table(['Time', 'Who', 'Note'], session.notes.slice().reverse().map((note) => [clock(note.stamp), note.who, note.text]), 'Notes'));
   };

@@ -1,17 +1,11 @@
 // Health: diagnostics tree, versions, parameters, browsers; and Help.
 import { h, mark, setText, table } from './dom.js';
-import { onDocs, operating, store } from './store.js';
+import { operating, store } from './store.js';
 import { command } from './link.js';
 import { viewKind } from './view.js';
-import { actionButton } from './actions.js';
+import { commandButton, watch } from './controls.js';
 
 const LEVELS = [['ok', 'ok'], ['warn', 'warning'], ['fault', 'error'], ['idle', 'silent']];
-
-/** Always a held button: what it does needs a second thought. */
-function heavy(label, args, told) {
-  const blockedBy = () => (operating() ? store.docs.desk?.reasons.calibrate : 'only the operator calibrates');
-  return actionButton(label, { blockedBy, mustHold: () => true, request: () => ['calibrate', args], tell: (text) => setText(told, text) });
-}
 
 /** Rows by the node that tells them, which stands before the colon: Map of node to [row, its own name]. */
 function byNode(rows) {
@@ -103,7 +97,7 @@ export function healthPage(page) {
   } }, 'Read again');
   const marked = h('p');
   page.append(h('div', {}, h('h2', {}, 'Diagnostics'), tree),
-    h('div', {}, h('h2', {}, 'Versions and browsers'), versions, h('h2', {}, 'Hand'), h('p', {}, 'A complete or forced calibration opens the hand, whatever it holds: hold the button.'), h('div', { class: 'row' }, heavy('Complete calibration', { mode: 'complete' }, told), heavy('Forced calibration', { mode: 'complete', force: true }, told)), told,
+    h('div', {}, h('h2', {}, 'Versions and browsers'), versions, h('h2', {}, 'Hand'), h('p', {}, 'A complete or forced calibration opens the hand, whatever it holds: hold the button.'), h('div', { class: 'row' }, commandButton('Complete calibration', { name: 'calibrate_complete', told, held: true, request: () => ['calibrate', { mode: 'complete' }] }), commandButton('Forced calibration', { name: 'calibrate_forced', told, held: true, request: () => ['calibrate', { mode: 'complete', force: true }] })), told,
       h('h2', {}, 'Parameters'), marked, h('div', { class: 'row' }, read, h('label', {}, 'Filter', filter)), parameters));
   const draw = () => {
     const { rows = [], versions: words = {}, browsers = [] } = store.docs.health ?? {};
@@ -125,11 +119,10 @@ export function helpPage(page) {
   page.className = 'page two';
   const told = h('p', { 'aria-live': 'polite' });
   const link = h('input', { type: 'text', readonly: true, 'aria-label': 'Link for one more browser' });
-  const invite = h('button', { type: 'button', onclick: async () => {
-    const answer = await command('invite');
+  const answered = (answer) => {
     link.value = answer.data ?? '';
-    setText(told, answer.message);
-  } }, 'A link for one more browser');
+  };
+  const invite = commandButton('A link for one more browser', { name: 'invite', told, request: () => ['invite', {}], answered });
   page.append(
     h('div', {}, h('h2', {}, 'Keys'), table(['Key', 'Does'], KEYS, 'Keys'),
       h('h2', {}, 'After a stop'), h('p', {}, 'STOP brakes the arm, latches, and ends the action; the hand keeps what it holds. Then two acts: acknowledge the cause, and hold the button of the next motion for 0.8 s. Nothing is ever reset by itself.'),
@@ -144,9 +137,10 @@ export function helpPage(page) {
 /** Take over, or keep the control while another browser takes over. */
 export function takeOver(told) {
   const button = h('button', { type: 'button', onclick: async () => setText(told, (await command(operating() ? 'keep' : 'take_over')).message) }, 'Take over');
-  onDocs(['desk'], () => {
+  watch(button, () => {
     const claimant = store.docs.desk?.roles.claimant;
-    setText(button, operating() ? (claimant ? `Keep the control (${claimant} takes over)` : 'You operate') : 'Take over');
+    button.hidden = !store.docs.desk || (operating() && !claimant);
+    setText(button, operating() ? `Keep the control (${claimant} takes over)` : 'Take over');
   });
   return button;
 }

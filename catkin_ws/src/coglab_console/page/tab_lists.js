@@ -1,7 +1,7 @@
 // Objects, primitives and feedback controllers.
 import { h, mark, setText, table } from './dom.js';
 import { store } from './store.js';
-import { heldSender, sender } from './tab_experiment.js';
+import { commandButton } from './controls.js';
 
 export function objectsPage(page) {
   page.className = 'page two';
@@ -10,7 +10,7 @@ export function objectsPage(page) {
   const list = h('div');
   const entry = h('pre', { tabindex: '0', 'aria-label': 'Entry of the database' });
   page.append(
-    h('div', {}, h('h2', {}, 'Object database'), problems, h('div', { class: 'row' }, sender('Read the files again', told, () => ['objects_reload', {}])), told, list,
+    h('div', {}, h('h2', {}, 'Object database'), problems, h('div', { class: 'row' }, commandButton('Read the files again', { name: 'objects_reload', told, held: true, request: () => ['objects_reload', {}] })), told, list,
       h('p', {}, 'A new object: ./coglab object new NAME, then ./coglab object check NAME. The console writes no object file.')),
     h('div', {}, h('h2', {}, 'Entry'), entry));
   const draw = () => {
@@ -82,11 +82,8 @@ export function feedbackPage(page) {
   // Rows are made anew only when there are other ones: a button that is held down must stay.
   let made = '';
   let shown = [];
-  const heldButton = (label, words, request) => {
-    const button = heldSender(label, told, request);
-    button.setAttribute('aria-label', words);
-    return button;
-  };
+  const why = h('p', { id: 'feedback-why' });
+  const heldButton = (label, words, request) => commandButton(label, { name: 'feedback', told, held: true, words, why, request });
   const verbs = (row) => [row.enabled ? 'disable' : 'enable', row.paused ? 'resume' : 'pause'].map((verb) => heldButton(verb, `${verb} ${row.name}`, () => ['feedback', { verb, name: row.name }]));
   const order = (rows, i, step) => {
     const names = rows.map((row) => row.name);
@@ -97,7 +94,7 @@ export function feedbackPage(page) {
   const make = (rows) => {
     shown = rows.map(() => ({ activity: h('span'), why: h('span'), faults: h('span') }));
     const cells = rows.map((row, i) => [i + 1, row.name, row.stage, shown[i].activity, shown[i].why, shown[i].faults, h('div', { class: 'row' }, ...verbs(row)), h('div', { class: 'row' }, order(rows, i, -1), order(rows, i, 1))]);
-    list.replaceChildren(h('p', { id: 'feedback-profile' }), table(['', 'Name', 'Stage', 'Activity', 'Paused because', 'Faults / overruns', 'Hold to change', 'Hold to order'], cells, 'Feedback controllers'));
+    list.replaceChildren(h('p', { id: 'feedback-profile' }), why, table(['', 'Name', 'Stage', 'Activity', 'Paused because', 'Faults / overruns', 'Hold to change', 'Hold to order'], cells, 'Feedback controllers'));
   };
   const draw = () => {
     const { rows = [], profile = '' } = store.docs.feedback ?? {};

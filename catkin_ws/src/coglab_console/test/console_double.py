@@ -29,6 +29,9 @@ READY = dict(
     motion_allowed=True,
     hand_alive=True,
     hand_connected=True,
+    manager_alive=True,
+    detector_alive=True,
+    database_alive=True,
 )
 
 PAGE_DOCUMENTS = {
@@ -50,6 +53,7 @@ def page_state(stamp: float) -> dict:
         "stamp": stamp,
         "q": [],
         "live": True,
+        "silent": {},
         "frames": {},
         "ages": {},
         "rate": [0.0] * 7,
@@ -61,6 +65,8 @@ def page_state(stamp: float) -> dict:
         "current": [0] * 5,
         "margin": None,
         "phase": READY["state"],
+        "words": "ready, the hand is empty",
+        "waits": "",
         "since": 1.0,
         "left": None,
         "dmp": ["idle", 0.0, 0.0, 0.0],

@@ -158,9 +158,7 @@ class Console(unittest.TestCase):
                 break
         self.page_in("wait_with_object", 5.0)
         self.browser.until("return document.getElementById('status').innerText.includes('mug in the hand')", 20.0)
-        self.browser.until(
-            "return coglab.events().some(e => e.text.includes('exchange_human_to_robot mug: succeeded'))", 20.0
-        )
+        self.browser.until("return coglab.events().some(e => e.text.includes('Receive mug: succeeded'))", 20.0)
         self.browser.until("return coglab.state().speed < 0.001", 20.0)
         self.assertLess(self.distance_to_tf(), 0.002)
         self.browser.picture(self.pictures / "holds.png")

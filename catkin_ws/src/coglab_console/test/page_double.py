@@ -34,6 +34,7 @@ class Desk:
         self.robot = RobotDouble()
         self._documents = {**PAGE_DOCUMENTS, "model": {**PAGE_DOCUMENTS["model"], **(model or {})}}
         self._files = files
+        self.state: dict = {}  # what the next states have other than those of a robot that stands still
         self.loop = asyncio.new_event_loop()
         self._ready, self._over = threading.Event(), asyncio.Event()
         self._thread = threading.Thread(target=self.loop.run_until_complete, args=(self._serve(folder),))
@@ -49,7 +50,7 @@ class Desk:
                 self.console.documents.put(name, value)
             self._ready.set()
             while not self._over.is_set():
-                self.console.server.publish_state(page_state(time.monotonic()))
+                self.console.server.publish_state({**page_state(time.monotonic()), **self.state})
                 await asyncio.sleep(1 / 30)
 
     def event(self, text):

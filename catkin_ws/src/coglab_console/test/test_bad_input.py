@@ -66,7 +66,7 @@ def test_of_two_operators_at_once_one_is_served_and_the_other_is_told_who_operat
                 assert len(console.robot.calls) == 5
                 # Held down by both at once: the one who watches begins nothing and is told why.
                 console.desk.guard.stop("a test")
-                console.desk.guard.acknowledge()
+                console.desk.guard.acknowledge(console.desk.guard.stops)
                 frame = json.dumps({"t": "hold", "id": 7, "name": "start", "arguments": RECEIVE})
                 for _ in range(11):
                     await first.send_str(frame)
@@ -113,7 +113,7 @@ def test_a_stop_during_a_request_still_asks_for_both_acts(tmp_path):
             robot.let.set()
             assert (await started)[0] == 200
             assert "acknowledge" in (await console.post(client, "home"))[1]["message"]
-            await console.post(client, "acknowledge")
+            await console.post(client, "acknowledge", {"stop": console.desk.guard.stops})
             status, answer = await console.post(client, "home")
             assert status == 409 and "press and hold" in answer["message"]
             assert len(robot.calls) == 1
@@ -127,14 +127,14 @@ def test_a_browser_that_dies_with_a_button_held_is_told_to_the_others(tmp_path):
             ws = await console.socket_of(client)
             await ws.send_str("{}")
             console.desk.guard.stop("a test")
-            console.desk.guard.acknowledge()
+            console.desk.guard.acknowledge(console.desk.guard.stops)
             for _ in range(4):
                 await ws.send_str(json.dumps({"t": "hold", "name": "start", "arguments": RECEIVE}))
                 await asyncio.sleep(0.1)
             ws._response.connection.transport.abort()
             await until(lambda: any("button" in text for text in events_of(console, "command")))
             (told,) = events_of(console, "command")
-            assert "browser 1" in told and "start" in told and "nothing was begun" in told
+            assert "browser 1" in told and "Receive" in told and "nothing was begun" in told
             assert not console.robot.calls
 
     go(test, tmp_path)
@@ -147,7 +147,7 @@ def test_a_button_that_was_let_go_or_has_begun_something_is_not_told_when_the_br
                 ws = await console.socket_of(client)
                 await ws.send_str("{}")
                 console.desk.guard.stop("a test")
-                console.desk.guard.acknowledge()
+                console.desk.guard.acknowledge(console.desk.guard.stops)
                 for _ in range(3 if release else 11):
                     await ws.send_str(json.dumps({"t": "hold", "name": "start", "arguments": RECEIVE}))
                     await asyncio.sleep(0.1)
@@ -191,7 +191,8 @@ def test_object_files_are_not_read_again_under_way(tmp_path):
         async with console.browser() as client, console.socket_of(client) as ws:
             await ws.send_str("{}")
             await ws.receive()
-            assert (await console.post(client, "objects_reload"))[0] == 200
+            status, answer = await console.post(client, "objects_reload")
+            assert status == 409 and "press and hold" in answer["message"]
             console.desk.experiment.begin("P1", ["a"], 1, "as_listed", 0)
             console.desk.experiment.trial_begin()
             status, answer = await console.post(client, "objects_reload")

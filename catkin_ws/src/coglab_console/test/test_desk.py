@@ -1,46 +1,16 @@
-"""Who may do what and when: roles, the acts after a stop, held buttons, sessions; with a double of the robot."""
+"""Who may do what and when: roles, reasons, the list of commands, sessions; with a double of the robot."""
 
-import asyncio
 import json
 import time
 from dataclasses import replace
 
 import pytest
 from coglab_console.desk.commands import COMMANDS, BadCommand, judge
-from coglab_console.desk.desk import Desk
-from coglab_console.desk.events import EventLog
 from coglab_console.desk.experiment import Experiment, ExperimentError, latin_row, order_of
 from coglab_console.desk.gates import MotionGuard, Standing, reasons
-from coglab_console.desk.hold import HOLD_TIME, HeldButton
 from coglab_console.desk.roles import ABSENCE, NOTICE, Roles
-from coglab_console.web.fan_out import Documents
-from console_double import READY, RobotDouble, running
-
-RECEIVE = {"action": "exchange_human_to_robot"}
-
-
-class Clock:
-    """A clock that stands until it is moved."""
-
-    def __init__(self) -> None:
-        self.time = 100.0
-
-    def __call__(self) -> float:
-        return self.time
-
-
-@pytest.fixture
-def desk(tmp_path):
-    robot = RobotDouble()
-    made = Desk(robot, EventLog(time.time), Documents(), tmp_path, time.time, lambda: "http://link")
-    made.connected("a")
-    made.connected("b")
-    return made
-
-
-def ask(desk, who, command, /, **arguments):
-    return asyncio.run(desk.command(who, command, arguments))
-
+from console_double import READY
+from desk_double import Clock, ask, hold_for
 
 # --- roles ----------------------------------------------------------------------------------------------------
 
@@ -79,6 +49,8 @@ def test_notes_and_the_next_object_are_told_to_ros_and_heard_from_there(desk):
         ("feedback", {"verb": "disable", "name": "x"}),
         ("feedback_order", {"names": ["b", "a"]}),
         ("contact_learn", {}),
+        ("contact_arm", {"mode": "contact", "k": 3}),
+        ("objects_reload", {}),
     ],
 )
 def test_what_nobody_sees_at_once_is_held_down(desk, name, arguments):
@@ -120,100 +92,6 @@ def test_two_who_want_to_operate_and_one_who_went_away():
     assert "you are the operator" in roles.take_over("c") and roles.operator == "c"
 
 
-# --- after a stop ---------------------------------------------------------------------------------------------
-
-
-def test_after_a_stop_acknowledge_then_hold(desk):
-    ask(desk, "b", "stop")
-    assert "acknowledge" in ask(desk, "a", "start", **RECEIVE)["message"]
-    assert not ask(desk, "b", "acknowledge")["success"]  # an observer
-    assert ask(desk, "a", "acknowledge")["success"]
-    assert "hold" in ask(desk, "a", "start", **RECEIVE)["message"]
-    assert desk.backend.calls == []
-
-
-def test_a_stop_by_somebody_else_counts(desk):
-    desk.observe(False, "")
-    desk.observe(True, "hold on /lwr")
-    assert desk.guard.unacknowledged and desk.guard.cause == "hold on /lwr"
-    ask(desk, "a", "acknowledge")
-    desk.observe(True, "hold on /lwr")
-    assert not desk.guard.unacknowledged  # the same stop
-
-
-def hold_for(desk, seconds, gap=0.1, who="a", what=("start", RECEIVE)):
-    clock = Clock()
-    desk._held[who] = HeldButton(clock)
-
-    async def press():
-        answers = []
-        for _ in range(round(seconds / gap)):
-            answers.append(await desk.held(who, *what))
-            clock.time += gap
-        return [answer for answer in answers if answer is not None]
-
-    return asyncio.run(press())
-
-
-def test_a_held_button_begins_the_motion_once(desk):
-    ask(desk, "a", "stop")
-    ask(desk, "a", "acknowledge")
-    assert hold_for(desk, 0.6) == []
-    desk.released("a")
-    answers = hold_for(desk, 1.4)
-    assert len(answers) == 1 and answers[0]["success"]
-    assert len(desk.backend.calls) == 1
-    assert not desk.guard.needs_hold
-    assert ask(desk, "a", "start", **RECEIVE)["success"]  # the next one needs a press only
-
-
-def test_a_browser_that_dies_with_the_button_held_starts_nothing():
-    clock = Clock()
-    button = HeldButton(clock)
-    for _ in range(7):
-        assert not button.held("x")
-        clock.time += 0.1
-    clock.time += 5.0  # nothing came any more
-    assert not button.held("x")
-
-
-@pytest.mark.parametrize("gap", [0.3, 0.5])
-def test_a_held_button_with_gaps_starts_nothing(gap):
-    clock = Clock()
-    button = HeldButton(clock)
-    for _ in range(20):
-        assert not button.held("x")
-        clock.time += gap
-
-
-def test_another_action_begins_the_holding_anew():
-    clock = Clock()
-    button = HeldButton(clock)
-    for what in "aaaaaabbbbbb":
-        assert not button.held(what)
-        clock.time += HOLD_TIME / 8
-
-
-def test_observers_and_unknown_commands_cannot_hold(desk):
-    async def press():
-        return [
-            await desk.held("b", "start", RECEIVE),
-            await desk.held("a", "nothing", {}),
-            await desk.held("a", "home", {"x": 1}),
-        ]
-
-    assert all(answer is not None and not answer["success"] for answer in asyncio.run(press()))
-
-
-def test_the_real_robot_and_calibrations_that_open_the_hand_need_a_held_button():
-    guard = MotionGuard(real=True)
-    assert guard.guarded("home", {})
-    plain = MotionGuard()
-    assert not plain.guarded("calibrate", {"mode": "fast"})
-    assert plain.guarded("calibrate", {"mode": "fast", "force": True})
-    assert plain.guarded("calibrate", {"mode": "complete"})
-
-
 # --- reasons --------------------------------------------------------------------------------------------------
 
 
@@ -223,10 +101,10 @@ def test_the_real_robot_and_calibrations_that_open_the_hand_need_a_held_button()
         ({}, "exchange_human_to_robot", ""),
         ({"object_id": "mug"}, "exchange_human_to_robot", ""),  # what the machine takes is its own matter
         ({"actions": ()}, "take", "takes nothing"),
-        ({"in_hub": False, "state": "/m/approach", "actions": ()}, "take", "approach is under way"),
+        ({"in_hub": False, "state": "/m/approach", "actions": ()}, "take", "busy: it reaches"),
         ({"master_alive": False}, "take", "not there"),
         ({}, "exchange_robot_to_human", "the hand is empty"),
-        ({"state": "/m/stopped", "actions": ("reset",)}, "take", "only reset leads on"),
+        ({"state": "/m/stopped", "actions": ("reset",)}, "take", "only Go on leads on"),
         ({"hand_connected": False}, "calibrate", "does not answer"),
         ({"motion_allowed": False, "arm_reason": "hold is latched"}, "home", "hold is latched"),
         ({"arm_alive": False}, "home", "not there"),
@@ -354,23 +232,3 @@ def test_a_full_disk_is_told_and_the_session_goes_on(tmp_path):
     session._path = tmp_path / "gone" / "x.jsonl"
     session.note("a", "x")
     assert "cannot be written" in said[0] and session.view()["participant"] == "P07"
-
-
-# --- over the wire --------------------------------------------------------------------------------------------
-
-
-def test_a_connection_that_dies_with_the_button_held_starts_nothing(tmp_path):
-    async def test():
-        async with running(tmp_path) as console, console.browser() as client:
-            ws = await console.socket_of(client)
-            await ws.send_str("{}")
-            console.desk.guard.stop("test")
-            console.desk.guard.acknowledge()
-            for _ in range(6):
-                await ws.send_str(json.dumps({"t": "hold", "name": "start", "arguments": RECEIVE}))
-                await asyncio.sleep(0.1)
-            ws._response.connection.transport.abort()
-            await asyncio.sleep(1.2)
-            assert console.robot.calls == []
-
-    asyncio.run(test())

@@ -93,7 +93,7 @@ def test_a_button_is_held_by_touch(desk):
     """As on a tablet: nothing comes of a short touch, something of a long one, nothing of one that slides away."""
     page = desk.browser
     desk.loop.call_soon_threadsafe(desk.console.desk.guard.stop, "a test")
-    desk.loop.call_soon_threadsafe(desk.console.desk.guard.acknowledge)
+    desk.loop.call_soon_threadsafe(lambda: desk.console.desk.guard.acknowledge(desk.console.desk.guard.stops))
     page.until("return document.getElementById('why-home').textContent.includes('hold')", 10.0)
     box = page.js(
         "const b = document.querySelector('[data-action=home]').getBoundingClientRect();"

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
+from coglab_console.desk.words import phase
 from coglab_console.ros import versions, wire
-from coglab_console.ros.words import phase
 from coglab_console.scene import path_ahead
 from coglab_console.scene.graph_layout import Container, Layout, roots
 from coglab_console.scene.primitives import LibraryError, load_library, shape_map

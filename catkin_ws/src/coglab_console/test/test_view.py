@@ -4,9 +4,13 @@ from pathlib import Path
 
 import pytest
 from coglab_console.ros import view as ros_view
+from coglab_console.ros.sources import Sources
 from coglab_console.scene.urdf_model import RobotModel
-from coglab_msgs.msg import LwrState, PredictedPath
+from coglab_msgs.msg import ContactSignal, ControllerStatus, HandStatus, LwrState, MasterState, PredictedPath
 from geometry_msgs.msg import Point, Pose
+from rospy import Time
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Float64
 
 URDF = Path(__file__).resolve().parents[2] / "lwr_description" / "urdf" / "lwr_ih2.urdf"
 
@@ -44,6 +48,69 @@ def test_all_drives_are_on_where_each_joint_has_its_bit(seen, power, on):
     view, _, _ = seen
     view._on_arm(LwrState(power=power))
     assert view.status()["arm"]["power"] is on
+
+
+def test_each_time_the_robot_comes_to_stand_is_counted(seen):
+    view, _, _ = seen
+    view._on_machine(MasterState(state="/coglab_master/stopped", why="hold is latched"))
+    assert view.stopped() == (True, "hold is latched", 1)
+    view._on_machine(MasterState(state="/coglab_master/fault", why="no command mode"))
+    assert view.stopped() == (True, "no command mode", 2)
+    view._on_arm(LwrState(hold_latched=True))
+    view._on_arm(LwrState(hold_latched=True))
+    assert view.stopped()[2] == 3
+
+
+TOPICS = {
+    "brain": ("_on_machine", MasterState()),
+    "arm": ("_on_arm", LwrState()),
+    "hand": ("_on_hand", HandStatus()),
+    "controllers": ("_on_manager", ControllerStatus()),
+    "contact": ("_on_signal", ContactSignal()),
+}
+
+
+@pytest.mark.parametrize("source", TOPICS)
+def test_what_has_fallen_silent_is_said_within_a_second(seen, monkeypatch, source):
+    """Connected, as a program that is frozen; the others go on."""
+    view, _, _ = seen
+    clock = [1000.0]
+    monkeypatch.setattr(ros_view.time, "monotonic", lambda: clock[0])
+    view.sources = Sources(lambda: clock[0])
+    for _ in range(8):
+        for name, (callback, message) in TOPICS.items():
+            if name != source or clock[0] < 1000.5:
+                getattr(view, callback)(message)
+        assert not view.frame()["silent"] or clock[0] >= 1001.0
+        clock[0] += 0.25
+    assert list(view.frame()["silent"]) == [source] and view.frame()["silent"][source] > 1.0
+
+
+def test_nothing_of_an_arm_that_is_silent_is_shown_as_news(seen, monkeypatch):
+    view, _, _ = seen
+    clock = [1000.0]
+    monkeypatch.setattr(ros_view.time, "monotonic", lambda: clock[0])
+    view.sources = Sources(lambda: clock[0])
+    view._on_arm(LwrState())
+    view._on_latency(Float64(0.001))
+    view.tables.latency = view.tables.answer_time = 0.002
+    view._on_joints(JointState(name=["lwr_a1"], position=[0.1]))
+    assert (view.frame()["fri"], view.frame()["answer"], view.frame()["live"]) == (1.0, 2.0, True)
+    clock[0] += 1.0
+    # As from joint_state_publisher, which says the last positions of a silent arm again.
+    view._on_joints(JointState(name=["lwr_a1"], position=[0.1]))
+    frame = view.frame()
+    assert (frame["fri"], frame["answer"], frame["speed"], frame["live"]) == (None, None, None, False)
+    assert not view.standing().arm_alive
+
+
+def test_phase_and_what_it_waits_for_are_of_one_moment(seen):
+    view, _, _ = seen
+    state = "/coglab_master/exchange_human_to_robot/set_dmp_goal"
+    view._on_machine(MasterState(state=state, waits_for="the offer of mug", deadline=Time(103)))
+    frame = view.frame()
+    assert (frame["words"], frame["waits"], frame["left"]) == ("waits until it is offered", "the offer of mug", 3.0)
+    assert view.phase() == frame["words"]
 
 
 def path_of(motion, *places):

@@ -5,7 +5,7 @@ Names are relative to the node's namespace.
 Services: coglab/start (coglab_msgs/Start), coglab/stop, coglab/why (std_srvs/Trigger).
 Topics: coglab/transitions (coglab_msgs/Transition), coglab/results (std_msgs/String, one JSON object per action,
 latched), coglab/holding (std_msgs/String, what the hand holds, latched), coglab/state (coglab_msgs/MasterState,
-latched), say (coglab_msgs/Say, what the robot says to the person).
+latched, and five times a second), say (coglab_msgs/Say, what the robot says to the person).
 Parameters: perception/frames (names of human_hand and board). Private: config_file, dmp_library (path of the
 primitives), auto_trigger, result_file (JSON lines), state_file (what the hand holds, to survive a restart; default
 coglab_holding.json in ROS_HOME), config_overrides (mapping of dotted names), introspection (default true).
@@ -40,6 +40,9 @@ from coglab_smach.ros.ports import RosContact, RosDatabase, RosPerception
 from coglab_smach.ros.publish import publish
 from std_msgs.msg import String
 from std_srvs.srv import Trigger, TriggerResponse
+
+
+STATE_PERIOD = 0.2  # s between two messages on coglab/state where nothing changes
 
 
 class Memory(HoldingMemory):
@@ -161,8 +164,9 @@ class MasterNode:
         )
         message.header.stamp = rospy.Time.now()
         if state.deadline:  # told in the brain's steady clock
-            left = rospy.Duration.from_sec(state.deadline - self.ctx.clock.now())
-            message.deadline = max(rospy.Time(), message.header.stamp + left)
+            # The state may be told again in the moment between its deadline and its end.
+            left = max(0.001, state.deadline - self.ctx.clock.now())
+            message.deadline = message.header.stamp + rospy.Duration.from_sec(left)
         publish(self.states, message)
 
     def on_transition(self, record: TransitionRecord) -> None:
@@ -197,7 +201,8 @@ class MasterNode:
         # Called before rospy shuts anything: the machine still reaches the arm, to end what it has set in motion.
         rospy.on_shutdown(self.end)
         while not rospy.is_shutdown() and self.thread.is_alive():
-            self.thread.join(0.2)
+            self.thread.join(STATE_PERIOD)
+            self.watch.tell_again()
         self.thread.join(1.0)
         if self.server is not None:
             self.server.stop()

@@ -33,6 +33,13 @@ def test_the_fields_are_those_of_the_message():
     assert set(MasterState.__dataclass_fields__) == set(Message.__slots__) - {"header"}
 
 
+def test_the_newest_is_told_again_for_who_looks_on():
+    trial = Watched()
+    before = list(trial.shown)
+    trial.watch.tell_again()
+    assert trial.shown == [*before, before[-1]]
+
+
 def test_why_is_told_until_the_operator_has_answered():
     trial = Watched()
 

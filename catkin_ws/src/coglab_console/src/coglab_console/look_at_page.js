@@ -1,4 +1,5 @@
-// What is wrong with the page as it stands: scroll bars, STOP hidden, controls without a name or too small, pale text.
+// What is wrong with the page as it stands: scroll bars, STOP hidden, controls without a name, too small or
+// disabled without a reason, pale text.
 const problems = [];
 const root = document.scrollingElement;
 if (root.scrollHeight > root.clientHeight || root.scrollWidth > root.clientWidth) problems.push('the page scrolls');
@@ -31,6 +32,10 @@ for (const element of document.querySelectorAll('button, input, select, textarea
   if (seen(element) && box.height < 43.5) problems.push(`${element.outerHTML.slice(0, 90)} is ${box.height} px high`);
 }
 
+for (const element of document.querySelectorAll('[aria-disabled=true]')) {
+  const why = document.getElementById(element.getAttribute('aria-describedby'));
+  if (seen(element) && !(why && seen(why) && why.textContent.trim())) problems.push(`${nameOf(element)} does not say why it is disabled`);
+}
 for (const why of document.querySelectorAll('#actions .why')) {
   if (seen(why) && why.scrollHeight > why.clientHeight + 1) problems.push(`"${why.textContent}" is cut off`);
 }

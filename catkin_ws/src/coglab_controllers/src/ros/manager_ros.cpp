@@ -18,7 +18,9 @@ namespace {
 constexpr auto kPublishPeriod = std::chrono::milliseconds(5);
 constexpr double kStallTime = 0.25;  // s without a cycle that count as a stall
 constexpr auto kDetachTime = std::chrono::seconds(2);
-constexpr double kWordsPeriod = 0.5;  // s between two status messages that differ in words alone
+// s after which the status is told again though nothing has changed but numbers in a sentence: who
+// looks on knows from it that the node is not silent.
+constexpr double kTellPeriod = 0.25;
 
 /// An exception here would end the process that moves the arm.
 template <typename Function>
@@ -324,11 +326,9 @@ void ManagerRos::publishStatus(const CycleReport& report) {
       message.active_controller == last.active_controller && message.state == last.state &&
       message.standing == last.standing && message.reason_code == last.reason_code &&
       message.plan_generation == last.plan_generation && message.speed_scale == last.speed_scale;
-  // Numbers in a sentence change all the time.
   const std::int64_t now = steadyNow();
-  const bool words = message.reason != last.reason &&
-                     1e-9 * static_cast<double>(now - status_shown_ns_) >= kWordsPeriod;
-  if (shown_once_ && same && !words) return;
+  const bool due = 1e-9 * static_cast<double>(now - status_shown_ns_) >= kTellPeriod;
+  if (shown_once_ && same && !due) return;
   status_shown_ns_ = now;
   if (report.fault && !shown_.fault) ROS_ERROR("%s", report.reason.c_str());
   shown_ = report;

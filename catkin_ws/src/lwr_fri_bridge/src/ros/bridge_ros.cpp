@@ -27,6 +27,7 @@ using coglab_rt::readParameter;
 // A start may occupy one of them for seconds; hold and stop must get through.
 constexpr int kSpinnerThreads = 4;
 constexpr std::int64_t kLatencyPeriodNs = 50'000'000;  // between two fri_latency
+constexpr std::int64_t kStatePeriodNs = 250'000'000;   // between two states without a change
 constexpr double kSilenceWarning = 5.0;                // s between warnings about silence
 
 void copyJoints(const Vector7& joints, std::vector<double>& values) {
@@ -222,7 +223,7 @@ void BridgeRos::publishLoop() {
     }
     while (sem_trywait(&new_sample_) == 0) {  // several posts, one newest sample
     }
-    for (StateView view; bridge_.nextStateChange(view);) publishState(view);
+    publishStates();
     const Snapshot now = bridge_.snapshot();
     if (now.sample.sequence != published_sequence_) {
       published_sequence_ = now.sample.sequence;
@@ -298,6 +299,23 @@ void BridgeRos::publishSample(const Snapshot& snapshot) {
   std_msgs::Float64 latency;
   latency.data = snapshot.latency;
   fri_latency_.publish(latency);
+}
+
+/// Every change, and the newest state again after a while: who looks on knows from it that the
+/// node is not silent.
+void BridgeRos::publishStates() {
+  bool told = false;
+  for (StateView view; bridge_.nextStateChange(view); told = true) {
+    newest_state_ = view;
+    publishState(view);
+  }
+  const std::int64_t now = steadyNow();
+  if (told) {
+    state_told_ns_ = now;
+  } else if (state_told_ns_ != 0 && now - state_told_ns_ >= kStatePeriodNs) {
+    state_told_ns_ = now;
+    publishState(newest_state_);
+  }
 }
 
 void BridgeRos::publishState(const StateView& view) {

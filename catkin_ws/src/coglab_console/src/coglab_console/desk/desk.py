@@ -5,20 +5,25 @@ The robot is reached through a Backend; the node has the real one, tests have a 
 
 from __future__ import annotations
 
+import re
 from collections.abc import Awaitable, Callable
 from pathlib import Path
 from typing import Any, Protocol
 
 from ..web.fan_out import Documents
-from .commands import STARTS, BadCommand, judge
+from .commands import BadCommand, judge
 from .events import EventLog
 from .experiment import Experiment, ExperimentError
-from .gates import MotionGuard, Standing, reasons
+from .gates import MotionGuard, Standing, control, reasons
 from .hold import HeldButton
 from .roles import Roles
+from .words import command as words_of
+from .words import plain
 
-IN_TRIAL = ("contact_arm", "contact_learn", "feedback", "feedback_order", "objects_reload")
-"""Changes of limits, gains or thresholds, which object files hold, too: not while an action or a trial is under way"""
+TAKES = ("exchange_human_to_robot", "take")
+GIVES = ("exchange_robot_to_human", "put")
+UNKNOWN = "unknown"
+"""what the brain says of an object that was in the hand before it began"""
 
 
 class Answer(dict):
@@ -69,6 +74,8 @@ class Desk:
         if goes_on:
             events.add("experiment", goes_on, "warning")
         self.object_id = ""
+        """chosen for the next action that takes one; empty: the brain's default"""
+        self._trial = (0, 0)
         self._held: dict[str, HeldButton] = {}
         self._firing: set[str] = set()
 
@@ -80,7 +87,7 @@ class Desk:
         self.guard.stop(f"{who} pressed STOP")
         self.experiment.record("stop", who=who)
         self.tick()
-        return Answer(True, "STOP was sent to the arm and to the brain")
+        return Answer(True, "STOP was sent to the arm and to the brain", {"stop": self.guard.stops})
 
     async def command(self, who: str, name: Any, arguments: Any) -> Answer:
         """One command of the list by the browser `who`."""
@@ -115,7 +122,7 @@ class Desk:
         what = button.unfinished() if button is not None and lost else None
         if what is not None:
             name, arguments = what
-            words = " ".join([name, *(str(value) for _, value in arguments)])
+            words = words_of(name, dict(arguments))
             self.events.add("command", f"{who} went away with the button of {words} held: nothing was begun", "warning")
 
     def connected(self, who: str) -> None:
@@ -149,9 +156,9 @@ class Desk:
             self._select(who, text)
         self.tick()
 
-    def observe(self, stopped: bool, cause: str) -> None:
-        """Whether the arm or the machine stands after a stop, and why."""
-        if self.guard.observe(stopped, cause):
+    def observe(self, stopped: bool, cause: str, standstills: int = 0) -> None:
+        """Whether the arm or the machine stands after a stop, why, and how often it has come to stand."""
+        if self.guard.observe(stopped, cause, standstills):
             self.events.add("stop", f"stopped: {cause or 'no reason was told'}", "fault")
             self.experiment.record("stopped", cause=cause)
             self.tick()
@@ -160,14 +167,14 @@ class Desk:
         """Several times a second: what every browser is shown of all this."""
         self.roles.tick()
         now = self.backend.standing()
-        if now.object_id:
-            self.object_id = now.object_id
+        self._follow_trial(now)
         self.documents.put(
             "desk",
             {
                 "roles": self.roles.view(),
-                "reasons": reasons(now, self.guard),
+                "reasons": reasons(now, self.guard, self.experiment.refusals()),
                 "guard": {
+                    "stop": self.guard.stops,
                     "cause": self.guard.cause,
                     "unacknowledged": self.guard.unacknowledged,
                     "hold": self.guard.needs_hold,
@@ -187,16 +194,9 @@ class Desk:
             return str(error)
         if command.operator and who != self.roles.operator:
             return f"{who} watches; {self.roles.operator or 'nobody'} is the operator: take over first"
-        now = self.backend.standing()
-        if command.motion:
-            button = arguments["action"] if name == "start" else name
-            reason = reasons(now, self.guard)[button]
-            if reason:
-                return f"{button}: {reason}"
-        under_way = now.master_alive and not now.in_hub
-        if name in IN_TRIAL and (under_way or self.experiment.running):
-            return f"{name}: not while an action or a trial is under way"
-        return ""
+        found = reasons(self.backend.standing(), self.guard, self.experiment.refusals())
+        reason = found.get(control(name, arguments), "")
+        return f"{words_of(name, arguments)}: {reason}" if reason else ""
 
     async def _perform(self, who: str, name: str, arguments: dict) -> Answer:
         try:
@@ -206,18 +206,35 @@ class Desk:
         except OSError as error:
             answer = Answer(False, f"the session's file cannot be written: {error}")
         if answer is None:
-            if name == "start" and arguments["action"] in STARTS[2:]:
-                arguments = {"object_id": self.object_id, **arguments}
+            if name == "start" and arguments["action"] in (*TAKES, *GIVES):
+                arguments = {"object_id": self._meant(arguments["action"]), **arguments}
             stops = self.guard.stops
             answer = await self.backend.call(name, arguments)
+            answer["message"] = plain(answer["message"])
             if answer["success"] and judge(name, {**arguments}).motion:
                 self.guard.moved(stops)
         if name not in ("parameters", "note", "select_object"):
-            words = " ".join(str(value) for value in arguments.values())
-            told = f"{who}: {name} {words}: {answer['message']}".replace(" :", ":")
+            told = f"{who}: {words_of(name, arguments)}: {answer['message']}"
             self.events.add("command", told, "info" if answer["success"] else "warning")
         self.tick()
         return answer
+
+    def _meant(self, action: str) -> str:
+        """The object of a request that names none."""
+        held = self.backend.standing().object_id
+        return held if action in GIVES and held not in ("", UNKNOWN) else self.object_id
+
+    def _follow_trial(self, now: Standing) -> None:
+        """The first object that the condition of a trial names is that of its requests, until another one is chosen."""
+        trial = self.experiment.begun()
+        if trial == self._trial or (trial[0] and not now.objects):
+            return
+        self._trial = trial
+        condition = self.experiment.condition()
+        named = next((word for word in re.split(r"[^a-z0-9_]+", condition) if word in now.objects), "")
+        if trial[0] and named:
+            self.backend.tell("select_object", named)
+            self._select(f"trial {trial[0]} ({condition})", named)
 
     def _note(self, who: str, text: str) -> str:
         self.events.add("note", f"{who}: {text}")
@@ -225,6 +242,8 @@ class Desk:
 
     def _select(self, who: str, object_id: str) -> str:
         self.object_id = object_id
+        if self.experiment.running:
+            self._trial = self.experiment.begun()
         self.events.add("object", f"{who}: the next object is {object_id or 'the default'}")
         return f"object {object_id or 'none'}"
 
@@ -235,8 +254,10 @@ class Desk:
             self.backend.tell("note", given["text"])
             return Answer(True, self._note(who, given["text"]))
         if name == "acknowledge":
-            self.guard.acknowledge()
-            return Answer(True, "acknowledged; the first motion needs a held button")
+            # Which one it was, and why it stood, is in the answer and so in the event.
+            refusal = self.guard.acknowledge(given["stop"])
+            told = f"acknowledged stop {self.guard.stops} ({self.guard.cause}); the first motion needs a held button"
+            return Answer(not refusal, refusal or told)
         if name == "take_over":
             return Answer(True, self.roles.take_over(who))
         if name == "keep":
@@ -260,7 +281,9 @@ class Desk:
         if name == "session_end":
             return Answer(True, session.end())
         if name == "trial_begin":
-            return Answer(True, session.trial_begin())
+            told = session.trial_begin()
+            self._follow_trial(self.backend.standing())
+            return Answer(True, f"{told}; the next object is {self.object_id or 'the default'}")
         if name == "trial_end":
             return Answer(True, session.trial_end(given["outcome"]))
         return None

@@ -12,7 +12,8 @@ LONGEST = 600  # characters of one event
 
 
 class EventLog:
-    """Thread-safe. An event is {seq, stamp (s since 1970), level, source, text}."""
+    """Thread-safe. An event is {seq, stamp (s since 1970), level, source, phase, text}; `phase` tells in words what the
+    robot was doing then, empty where nobody knows."""
 
     def __init__(self, now: Callable[[], float], keep: int = KEPT) -> None:
         self._now = now
@@ -20,6 +21,7 @@ class EventLog:
         self._events: deque[dict] = deque(maxlen=keep)
         self._seq = 0
         self._listeners: list[Callable[[dict], None]] = []
+        self.phase: Callable[[], str] = lambda: ""
 
     def listen(self, on_event: Callable[[dict], None]) -> None:
         """Call this with each event, in the thread that adds it and in the order of the numbers."""
@@ -33,7 +35,14 @@ class EventLog:
             text = text[: LONGEST - 1] + "…"
         with self._lock:
             self._seq += 1
-            event = {"seq": self._seq, "stamp": round(self._now(), 3), "level": level, "source": source, "text": text}
+            event = {
+                "seq": self._seq,
+                "stamp": round(self._now(), 3),
+                "level": level,
+                "source": source,
+                "phase": self.phase(),
+                "text": text,
+            }
             self._events.append(event)
             for listener in self._listeners:
                 listener(event)

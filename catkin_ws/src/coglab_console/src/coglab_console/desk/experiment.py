@@ -71,6 +71,7 @@ class Experiment:
         self.trials: list[dict] = []
         self.position = 0
         self.running = False
+        self._goes = 0
         self.notes: list[dict] = []
         self._last_result: tuple = ()
 
@@ -105,8 +106,7 @@ class Experiment:
 
     def begin(self, participant: str, conditions: list[str], repetitions: int, order: str, number: int) -> str:
         """Opens a session; the answer in words."""
-        if self.participant:
-            raise ExperimentError(f"the session of {self.participant} is open; end it first")
+        self._needs("session_begin")
         trials = order_of(conditions, repetitions, order, number)
         self._folder.mkdir(parents=True, exist_ok=True)
         stamp = int(self._now())
@@ -121,12 +121,34 @@ class Experiment:
         )
         return f"session of {participant}: {len(trials)} trials, written to {path}"
 
+    def refusals(self) -> dict[str, str]:
+        """Why each of the commands of sessions and trials is not possible now; empty where it is."""
+        none = "" if self.participant else "no session is open; begin one first"
+        running = f"trial {self.position + 1} is under way; end it first" if self.running else ""
+        over = "every trial is done; end the session" if self.position >= len(self.trials) else ""
+        return {
+            "session_begin": self.participant and f"the session of {self.participant} is open; end it first",
+            "session_end": none or running,
+            "trial_begin": none or running or over,
+            "trial_end": "" if self.running else "no trial is under way",
+        }
+
+    def _needs(self, command: str) -> None:
+        refusal = self.refusals()[command]
+        if refusal:
+            raise ExperimentError(refusal)
+
+    def begun(self) -> tuple[int, int]:
+        """Number of the trial that is under way and which go at it; zeros where none is."""
+        return (self.position + 1, self._goes) if self.running else (0, 0)
+
+    def condition(self) -> str:
+        """Of the trial that is under way or next; empty after the last one."""
+        return self.trials[self.position]["condition"] if self.position < len(self.trials) else ""
+
     def end(self) -> str:
         """Closes the session."""
-        if not self.participant:
-            raise ExperimentError("no session is open")
-        if self.running:
-            raise ExperimentError(f"trial {self.position + 1} is under way; end it first")
+        self._needs("session_end")
         self._write("session_end", done=sum(trial["outcome"] == "done" for trial in self.trials))
         sentence = f"session of {self.participant} closed; {self._path}"
         self._path, self.participant, self.trials, self.position, self.running = None, "", [], 0, False
@@ -134,21 +156,16 @@ class Experiment:
 
     def trial_begin(self) -> str:
         """The next trial of the order."""
-        if not self.participant:
-            raise ExperimentError("no session is open; begin one first")
-        if self.running:
-            raise ExperimentError(f"trial {self.position + 1} is under way; end it first")
-        if self.position >= len(self.trials):
-            raise ExperimentError("every trial is done; end the session")
+        self._needs("trial_begin")
         self.running = True
+        self._goes += 1
         condition = self.trials[self.position]["condition"]
         self._write("trial_begin", trial=self.position + 1, condition=condition)
         return f"trial {self.position + 1} of {len(self.trials)}: {condition}"
 
     def trial_end(self, outcome: str) -> str:
         """`repeat` leaves the trial to be done again."""
-        if not self.running:
-            raise ExperimentError("no trial is under way")
+        self._needs("trial_end")
         self.running = False
         trial = self.position + 1
         self._write("trial_end", trial=trial, condition=self.trials[self.position]["condition"], outcome=outcome)

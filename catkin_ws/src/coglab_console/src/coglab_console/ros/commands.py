@@ -6,10 +6,12 @@ import asyncio
 import hashlib
 import json
 import threading
+import time
 from collections.abc import Callable
 from typing import Any
 
 import rospy
+from coglab_msgs.msg import ReasonCode
 from coglab_msgs.srv import (
     AddPtp,
     ArmContact,
@@ -24,10 +26,11 @@ from std_srvs.srv import Trigger
 
 from ..desk.desk import Answer
 from ..desk.gates import Standing
+from .knowledge import lookup
 from .view import RosView
-from .words import lookup
 
 LIMIT = 6.0  # s, of one command
+HAND_LIMIT = 3.0  # s until the hand has said whether it calibrates
 MAX_WAITING = 12  # services that have not answered
 HOME_CONTROLLER = "ptp"
 NOTES, NEXT_OBJECT = "coglab/note", "coglab/next_object"
@@ -117,9 +120,23 @@ class RosBackend:
 
     def _calibrate(self, mode: str, force: bool = False) -> Answer:
         if self._calibration.get_num_connections() == 0:
-            return Answer(False, "the hand's node is not there")
+            return Answer(False, "the hand is not there; look at Health")
+        number, before = self._view.hand_number, self._view.hand
         self._calibration.publish(String(mode + (" force" if force else "")))
-        return Answer(True, f"{mode} calibration was asked for; the hand tells how it ends")
+        refused = ""
+        end = time.monotonic() + HAND_LIMIT
+        while time.monotonic() < end:
+            now = self._view.hand
+            if self._view.hand_number > number and now.calibrating:
+                return Answer(True, f"{now.message}; the hand tells how it ends")
+            if self._view.hand_number > number and now.event_code == ReasonCode.HAND_REFUSED:
+                refused = now.message
+                # The same words as before may be those of an earlier request.
+                if refused != before.message:
+                    break
+            time.sleep(0.02)
+        nothing = f"the hand has not answered within {HAND_LIMIT:.0f} s; look at the event log and at Health"
+        return Answer(False, refused or nothing)
 
     def _home(self) -> Answer:
         home = lookup(self._view.config(), "postures.home")

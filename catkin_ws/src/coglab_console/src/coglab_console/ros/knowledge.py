@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -21,13 +21,22 @@ from ..scene import path_ahead
 from ..scene.primitives import LibraryError, load_library
 from ..scene.primitives import document as library_document
 from .view import RosView
-from .words import lookup
 
 PERIOD = 5.0  # s between two looks at files and at the object database
 PATH_PERIOD = 0.5  # s, between two looks at the path of the next motion
 PREDICT = "controller_manager/dmp/predict_dmp"
 MAX_OBJECTS = 100
 MAX_FILE = 1_000_000  # bytes of a configuration
+
+
+def lookup(values: Mapping[str, Any], name: str) -> Any:
+    """`a.b.c` in nested mappings; None if it is not there."""
+    node: Any = values
+    for part in name.split("."):
+        if not isinstance(node, Mapping) or part not in node:
+            return None
+        node = node[part]
+    return node
 
 
 class Knowledge:
@@ -48,7 +57,9 @@ class Knowledge:
         self._told: dict[str, str] = {}
         self._now = threading.Event()
         self._ask: rospy.ServiceProxy | None = None
+        self._asked = False
         view.entry = self._entry
+        view.objects = lambda: tuple(sorted(self._entries)) if self._asked else None
         view.config = lambda: self._config
         view.objects_read = self.read_again
         threading.Thread(target=self._look, name="knowledge", daemon=True).start()
@@ -101,6 +112,7 @@ class Knowledge:
 
     def _show_objects(self, problems: list[str] | None) -> None:
         """`problems` in the database's words; None: it is not there to be asked."""
+        self._asked = problems is not None
         rows = [
             {
                 "id": name,

@@ -77,11 +77,11 @@ class ConsoleNode:
         self.access = Access(allowed_hosts(self.address, self.port, more))
         self.events, self.documents = EventLog(time.time), Documents()
         self.real = parameters.read("~real", bool, False)
-        self.selected = ""
         model = self._model()
         self.graphs = SmachGraphs(self.put, lambda text, level: self.say("graph", text, level))
         frames = {**FRAMES, **parameters.read("perception/frames", dict, {})}
         self.view = RosView(model, frames, self.say, self.put, self.graphs.transition, self._on_result)
+        self.events.phase = self.view.phase
         self.stop_path = StopPath(lambda text, level: self.say("stop", text, level))
         backend = RosBackend(self.view, self.stop_path.press, self.real)
         folder = Path(parameters.read("~sessions", str, "") or home / "console_sessions")

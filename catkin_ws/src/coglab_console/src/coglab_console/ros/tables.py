@@ -34,6 +34,7 @@ class Tables:
             {
                 "pattern": message.pattern,
                 "decided": message.decided,
+                "stamp": round(message.header.stamp.to_sec(), 2),
                 "progress": round(message.progress, 2),
                 "rows": rows,
             },

@@ -24,18 +24,28 @@ from coglab_msgs.msg import (
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64, String
 
-from ..desk.gates import Standing
+from ..desk.gates import STANDSTILL, Standing, Standstills
+from ..desk.words import outcome, phase, plain, transition
 from ..scene import path_ahead
 from ..scene.urdf_model import RobotModel
-from . import wire
+from . import status, wire
+from .sources import SILENT, Sources
 from .tables import Tables
-from .words import phase
 
 PALM = "ih2_palm"
 FRAME_PARENTS = ("world", "lwr_base_link")
-OLD = 1.0  # s without a message after which a fast topic counts as silent
+OLD = 1.0  # s without a message after which a motion's path or progress is over
 MOST_POSES = 200
-ALL_DRIVES = 0x7F  # one bit a joint; further bits of the word say something else
+
+SUPERVISOR = {  # the arm's interface in words; the same as in status.js
+    "disconnected": "no connection to the robot controller",
+    "monitor": "only watched",
+    "starting": "starting",
+    "command": "ready to move",
+    "holding": "holds still",
+    "stopping": "stopping",
+    "stopped": "stopped",
+}
 
 
 def _round(values: Any, digits: int = 4) -> list[float]:
@@ -67,12 +77,18 @@ class RosView:
         self.machine, self.arm, self.hand = MasterState(), LwrState(), HandStatus()
         self.manager, self.dmp = ControllerStatus(), DmpFeedback()
         self._state_since = time.monotonic()
+        self._standstills = Standstills()
+        self.sources = Sources()
+        self.hand_number = 0
+        """of the newest message of the hand"""
         self.signal, self.contact, self.latency = ContactSignal(), "", math.nan
-        self._dmp_at = self._hand_at = self._signal_at = self._latency_at = self._path_at = 0.0
+        self._dmp_at = self._latency_at = self._path_at = 0.0
         self._path_of = ""  # the controller whose motion is under way
         self.tables = Tables(put)
         self.entry: Callable[[], dict] = dict
         self.config: Callable[[], dict] = dict
+        self.objects: Callable[[], tuple[str, ...] | None] = lambda: None
+        """of the database; None where it is not there"""
         self.objects_read: Callable[[], None] = lambda: None
         self._subscribers: dict[str, rospy.Subscriber] = {}
 
@@ -99,8 +115,13 @@ class RosView:
             topic = f"controller_manager/{name}/predicted_path"
             self._subscribers[topic] = rospy.Subscriber(topic, PredictedPath, self._on_path, name, queue_size=5)
 
-    def _there(self, topic: str) -> bool:
+    def there(self, topic: str) -> bool:
+        """Whether somebody publishes it."""
         return self._subscribers[topic].get_num_connections() > 0
+
+    def phase(self) -> str:
+        """The phase in words."""
+        return phase(self.machine.state) if self.machine.state else ""
 
     # --- read -------------------------------------------------------------------------------------------------
 
@@ -108,24 +129,31 @@ class RosView:
         """For the desk."""
         machine, arm, hand = self.machine, self.arm, self.hand
         return Standing(
-            master_alive=self._there("coglab/state"),
+            master_alive=self.there("coglab/state") and self.sources.speaks("brain"),
             state=machine.state,
             in_hub=machine.in_hub,
             actions=tuple(machine.actions),
             object_id=machine.object_id,
-            arm_alive=self._there("lwr/state"),
+            arm_alive=self.there("lwr/state") and self.sources.speaks("arm"),
             motion_allowed=arm.motion_allowed,
-            arm_reason=arm.reason,
-            hand_alive=self._there("ih2_hand/hand_status"),
+            arm_reason=plain(arm.reason),
+            hand_alive=self.there("ih2_hand/hand_status") and self.sources.speaks("hand"),
             hand_connected=hand.connected,
             calibrating=hand.calibrating,
+            calibrated=hand.calibrated,
+            holding=hand.holding,
+            manager_alive=self.there("controller_manager/status") and self.sources.speaks("controllers"),
+            detector_alive=self.sources.speaks("contact"),
+            database_alive=self.objects() is not None,
+            objects=self.objects() or (),
         )
 
-    def stopped(self) -> tuple[bool, str]:
-        """Whether the robot stands after a stop or a fault, and why."""
-        now = self.standing()
-        held = now.arm_alive and self.arm.hold_latched
-        return now.stopped or held, self.machine.why or self.arm.reason
+    def stopped(self) -> tuple[bool, str, int]:
+        """Whether the robot stands after a stop or a fault, why, and how often it has come to stand."""
+        # One that is silent for a moment stands all the same.
+        held = self.there("lwr/state") and self.arm.hold_latched
+        stands = self.there("coglab/state") and self.machine.state.rsplit("/", 1)[-1] in STANDSTILL
+        return stands or held, plain(self.machine.why or self.arm.reason), self._standstills.count
 
     def palm(self) -> Any:
         """Place of the palm in the world, m; None where it is not known."""
@@ -156,83 +184,37 @@ class RosView:
         ages = {role: round(stamp - self._stamps[name], 3) for role, name in wanted.items() if name in self._stamps}
         order = self.model.moving() if self.model else []
         dmp = self.dmp if now - self._dmp_at < OLD else DmpFeedback()
-        signal = self.signal if now - self._signal_at < OLD else None
-        latency = self.latency if now - self._latency_at < OLD else self.tables.latency
+        signal = self.signal if self.sources.speaks("contact") else None
+        arm = self.sources.speaks("arm")
+        latency = self.latency if now - self._latency_at < SILENT else self.tables.latency
+        answer = self.tables.answer_time
         deadline = self.machine.deadline.to_sec()
         return {
             "stamp": round(stamp, 3),
             "q": _round(self.joints.get(name, 0.0) for name in order),
-            "live": now - self._joints_at < OLD,
+            "live": arm and now - self._joints_at < SILENT,
+            "silent": self.sources.silent(),
             "frames": shown,
             "ages": ages,
             "rate": _round(signal.change) if signal else [],
             "threshold": _round(signal.threshold) if signal else [],
             "watched": list(signal.watched) if signal else [],
-            "speed": round(self.palm_speed, 4),
-            "fri": round(1000 * latency, 3) if math.isfinite(latency) else None,
-            "answer": round(1000 * self.tables.answer_time, 3) if math.isfinite(self.tables.answer_time) else None,
-            "current": [motor.current for motor in self.hand.motors] if now - self._hand_at < OLD else [],
+            "speed": round(self.palm_speed, 4) if arm else None,
+            "fri": round(1000 * latency, 3) if arm and math.isfinite(latency) else None,
+            "answer": round(1000 * answer, 3) if arm and math.isfinite(answer) else None,
+            "current": [motor.current for motor in self.hand.motors] if self.sources.speaks("hand") else [],
             "margin": round(signal.margin, 3) if signal and signal.state == "watching" else None,
             "phase": self.machine.state,
+            "words": phase(self.machine.state),
+            "waits": plain(self.machine.waits_for),
             "since": round(now - self._state_since, 2),
             "left": round(max(0.0, deadline - stamp), 2) if deadline else None,
             "dmp": [dmp.state, round(dmp.phase, 4), round(dmp.remaining_distance, 4), round(dmp.remaining_time, 3)],
         }
 
     def status(self) -> dict:
-        """What changes seldom: the document `status`."""
-        now, machine, arm, hand = self.standing(), self.machine, self.arm, self.hand
-        return {
-            "machine": {
-                "alive": now.master_alive,
-                "state": machine.state,
-                "words": phase(machine.state),
-                "waits": machine.waits_for,
-                "hub": machine.in_hub,
-                "actions": list(machine.actions),
-                "object": machine.object_id,
-                "why": machine.why,
-                "fallback": str(self.config().get("default_object", "")),
-            },
-            "arm": {
-                "alive": now.arm_alive,
-                "supervisor": arm.supervisor,
-                "fri": arm.fri_state,
-                "quality": arm.quality,
-                "mode": arm.control_mode,
-                "power": arm.power & ALL_DRIVES == ALL_DRIVES,
-                "allowed": arm.motion_allowed,
-                "held": arm.hold_latched,
-                "reason": arm.reason,
-                "cycle": arm.cycle_time,
-            },
-            "hand": {
-                "alive": now.hand_alive,
-                "connected": hand.connected,
-                "calibrated": hand.calibrated,
-                "calibrating": hand.calibrating,
-                "holding": hand.holding,
-                "message": hand.message,
-                "motors": len(hand.motors),
-            },
-            "manager": {
-                "alive": self._there("controller_manager/status"),
-                "state": self.manager.state,
-                "active": self.manager.active_controller,
-                "reason": self.manager.reason,
-                "scale": round(self.manager.speed_scale, 3),
-            },
-            "contact": {
-                "words": self.contact,
-                "alive": time.monotonic() - self._signal_at < OLD,
-                "state": self.signal.state,
-                "mode": self.signal.mode,
-                "learnt": self.signal.learnt,
-                "samples": self.signal.rest_samples,
-                "k": round(self.signal.k, 3),
-                "window": round(self.signal.window, 4),
-            },
-        }
+        """What changes seldom."""
+        return status.document(self)
 
     # --- arm and hand -----------------------------------------------------------------------------------------
 
@@ -262,7 +244,8 @@ class RosView:
         self.joints, self._joints_stamp, self._joints_at = joints, stamp, time.monotonic()
 
     def _on_signal(self, message: ContactSignal) -> None:
-        self.signal, self._signal_at = message, time.monotonic()
+        self.signal = message
+        self.sources.heard("contact")
 
     def _on_latency(self, message: Float64) -> None:
         self.latency, self._latency_at = message.data, time.monotonic()
@@ -279,34 +262,43 @@ class RosView:
 
     def _on_arm(self, message: LwrState) -> None:
         before, self.arm = self.arm, message
+        self.sources.heard("arm")
+        self._standstills.arm(message.hold_latched)
         if (message.supervisor, message.quality) != (before.supervisor, before.quality):
             bad = message.supervisor in ("stopped", "disconnected")
-            words = f"arm {message.supervisor}, quality {message.quality}"
-            self._say("arm", f"{words}: {message.reason}" if message.reason else words, "fault" if bad else "info")
+            words = f"{SUPERVISOR.get(message.supervisor, message.supervisor)}, quality {message.quality}"
+            told = f"{words}: {plain(message.reason)}" if message.reason else words
+            self._say("arm", told, "fault" if bad else "info")
 
     def _on_hand(self, message: HandStatus) -> None:
-        before, self.hand, self._hand_at = self.hand, message, time.monotonic()
+        before, self.hand = self.hand, message
+        self.hand_number += 1
+        self.sources.heard("hand")
         if message.message and message.message != before.message:
             self._say("hand", message.message, "info" if message.connected else "fault")
 
     # --- brain ------------------------------------------------------------------------------------------------
 
     def _on_machine(self, message: MasterState) -> None:
+        self.sources.heard("brain")
         if (message.state, message.waits_for) != (self.machine.state, self.machine.waits_for):
             self._state_since = time.monotonic()
         self.machine = message
+        self._standstills.machine(message.state)
 
     def _on_transition(self, message: Transition) -> None:
         level = {"failed": "warning", "stopped": "fault", "fault": "fault"}.get(message.outcome, "info")
         causes = "".join(f", because {cause}" for cause in message.causes[:4])
-        reason = f": {message.reason}{causes}" if message.reason else ""
-        self._say("machine", f"{message.from_state} [{message.outcome}] {message.to_state}{reason}", level)
-        self._transition(message.path, message.from_state, message.outcome, message.to_state, message.reason + causes)
+        reason = plain(f": {message.reason}{causes}" if message.reason else "")
+        words = transition(message.path, message.from_state, message.outcome, message.to_state)
+        self._say("machine", words + reason, level)
+        told = plain(message.reason + causes)
+        self._transition(message.path, message.from_state, message.outcome, message.to_state, told)
 
     def _on_result(self, message: String) -> None:
         try:
             row = json.loads(message.data)
-            what = f"{row['kind']} {row['object_id']}".strip()
+            what = f"{outcome(row['kind'])} {row['object_id']}".strip()
             words = f"{what}: {row['outcome']} after {float(row['duration_s']):.1f} s"
         except (ValueError, KeyError, TypeError):
             return
@@ -323,6 +315,7 @@ class RosView:
 
     def _on_manager(self, message: ControllerStatus) -> None:
         before, self.manager = self.manager, message
+        self.sources.heard("controllers")
         if message.state == "fault" and before.state != "fault":
             self._say("controller", f"fault: {message.reason}", "fault")
 

@@ -44,6 +44,12 @@ class StateWatch:
                 self._shown = now
                 self._publish(now)
 
+    def tell_again(self) -> None:
+        """The newest once more: who looks on knows from it that the brain is not silent."""
+        with self._lock:
+            if self._shown is not None:
+                self._publish(self._shown)
+
     def now(self) -> MasterState:
         """As it stands."""
         ctx = self._ctx

@@ -82,6 +82,7 @@ class BridgeRos : public coglab_rt::ArmPort {
   void publishLoop();
   void publishSample(const Snapshot& snapshot);
   void restartQuietly(const Snapshot& now);
+  void publishStates();
   void publishState(const StateView& view);
   void reportOutcomes();
 
@@ -95,6 +96,8 @@ class BridgeRos : public coglab_rt::ArmPort {
   std::unique_ptr<BridgeDiagnostics> diagnostics_;
   ros::Publisher joint_states_, external_torques_, tool_wrench_, state_, fri_latency_;
   std::int64_t latency_told_ns_ = 0;  // stamp of the sample whose latency was published last
+  StateView newest_state_;
+  std::int64_t state_told_ns_ = 0;  // when it was published last
   std::unique_ptr<TargetTopic> target_;
   ros::Subscriber events_;
   ros::ServiceServer command_;

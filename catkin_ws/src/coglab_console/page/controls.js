@@ -1,0 +1,128 @@
+// Controls that say why they are disabled, and buttons that are held: for every tab, and for whoever only watches.
+import { h, setAttribute, setText } from './dom.js';
+import { on, onDocs, operating, store } from './store.js';
+import { command, send } from './link.js';
+
+const HOLD_PERIOD = 100; // ms
+const watched = new Map(); // control: what brings it up to date
+let made = 0;
+
+/** Why this browser cannot use a control now, as the server sees it; empty where it can. */
+export function blocked(name) {
+  const desk = store.docs.desk;
+  if (store.lost) return 'not live';
+  if (!desk) return 'not connected yet';
+  if (!operating()) return `${desk.roles.operator || 'nobody'} operates`;
+  return desk.reasons[name] ?? '';
+}
+
+/** Calls `update` now and whenever a reason may have changed, for as long as the control is on the page. */
+export function watch(control, update) {
+  watched.set(control, { update, seen: false });
+  update();
+}
+
+function updateAll() {
+  for (const [control, one] of watched) {
+    one.seen ||= control.isConnected;
+    if (one.seen && !control.isConnected) watched.delete(control);
+    else one.update();
+  }
+}
+
+on('link', updateAll);
+onDocs(['desk'], updateAll);
+
+/** Says above the actions, for some seconds, why something was not done. */
+export function refuse(text) {
+  const told = document.getElementById('told');
+  told.textContent = text;
+  told.hidden = false;
+  clearTimeout(refuse.timer);
+  refuse.timer = setTimeout(() => {
+    told.hidden = true;
+  }, 6000);
+}
+
+/**
+ * A button that acts when pressed, or after 0.8 s of holding where `mustHold()`; Enter is as good as the mouse.
+ * Letting go, losing the focus or the page ends the holding.
+ */
+export function actionButton(label, { blockedBy, mustHold, request, tell, answered = () => {} }) {
+  const button = h('button', { type: 'button' }, label, h('span', { class: 'fill' }));
+  let timer = null;
+  let held = false; // the click that ends a holding is none
+  const release = () => {
+    if (timer === null) return;
+    clearInterval(timer);
+    timer = null;
+    button.classList.remove('holding');
+    send({ t: 'release' });
+  };
+  const hold = () => {
+    held = true;
+    const [name, args] = request();
+    const once = () => send({ t: 'hold', name, arguments: args }, (answer) => {
+      tell(answer.message);
+      if (!answer.success) refuse(answer.message);
+      release();
+    });
+    tell('hold …');
+    button.classList.add('holding');
+    timer = setInterval(once, HOLD_PERIOD);
+    once();
+  };
+  const begin = (event) => {
+    held = false;
+    if (!blockedBy() && mustHold()) {
+      hold();
+      if (event.type === 'keydown') event.preventDefault();
+    }
+  };
+  button.addEventListener('pointerdown', (event) => {
+    if (event.button !== 0) return;
+    if (button.hasPointerCapture(event.pointerId)) button.releasePointerCapture(event.pointerId); // a finger that slides away leaves, too
+    begin(event);
+  });
+  button.addEventListener('contextmenu', (event) => event.preventDefault()); // that of a long touch
+  for (const name of ['pointerup', 'pointerleave', 'pointercancel', 'blur']) button.addEventListener(name, release);
+  document.addEventListener('visibilitychange', release);
+  button.addEventListener('keydown', (event) => {
+    if (event.key !== 'Enter') return;
+    if (event.repeat) event.preventDefault();
+    else begin(event);
+  });
+  button.addEventListener('keyup', (event) => event.key === 'Enter' && release());
+  button.addEventListener('click', async () => {
+    const reason = blockedBy();
+    if (reason) {
+      tell(reason);
+      refuse(`${label}: ${reason}`);
+    } else if (!held && !mustHold()) {
+      const answer = await command(...request());
+      tell(answer.message);
+      answered(answer);
+      if (!answer.success) refuse(answer.message);
+    }
+  });
+  return button;
+}
+
+/**
+ * A button for a command, with the reason below it where it is disabled: { name (of the control, as the server's reasons
+ * know it), request, told (shows the answer), answered (gets it), held (0.8 s), words (its accessible name), why (a reason that several share) }.
+ */
+export function commandButton(label, { name, request, told, answered, held = false, words = null, why = null }) {
+  const tell = (text) => setText(told, text);
+  const button = actionButton(label, { blockedBy: () => blocked(name), mustHold: () => held, request, tell, answered });
+  const reason = why ?? h('span', { class: 'why' });
+  reason.id ||= `why-control-${made++}`;
+  setAttribute(button, 'aria-describedby', reason.id);
+  if (words) setAttribute(button, 'aria-label', words);
+  watch(button, () => {
+    const now = blocked(name);
+    setAttribute(button, 'aria-disabled', now ? 'true' : null);
+    setText(reason, now || (held && !why ? 'press and hold' : ''));
+  });
+  return why ? button : h('span', { class: 'control' }, button, reason);
+}

@@ -1,0 +1,159 @@
+"""After a stop: which one is acknowledged, the button that is held, and what begins a motion."""
+
+import asyncio
+import json
+
+import pytest
+from coglab_console.desk.gates import MotionGuard, Standstills
+from coglab_console.desk.hold import HOLD_TIME, HeldButton
+from console_double import running
+from desk_double import RECEIVE, Clock, ask, hold_for, newest
+
+
+def test_after_a_stop_acknowledge_then_hold(desk):
+    ask(desk, "b", "stop")
+    assert "acknowledge" in ask(desk, "a", "start", **RECEIVE)["message"]
+    assert not ask(desk, "b", "acknowledge", stop=newest(desk))["success"]  # an observer
+    assert ask(desk, "a", "acknowledge", stop=newest(desk))["success"]
+    assert "hold" in ask(desk, "a", "start", **RECEIVE)["message"]
+    assert desk.backend.calls == []
+
+
+def test_a_stop_by_somebody_else_counts(desk):
+    desk.observe(False, "")
+    desk.observe(True, "hold on /lwr")
+    assert desk.guard.unacknowledged and desk.guard.cause == "hold on /lwr"
+    ask(desk, "a", "acknowledge", stop=newest(desk))
+    desk.observe(True, "hold on /lwr")
+    assert not desk.guard.unacknowledged  # the same stop
+
+
+def test_an_acknowledgement_names_its_stop_and_lifts_no_newer_one(desk):
+    stop = ask(desk, "a", "stop")["data"]["stop"]
+    assert stop == newest(desk)
+    desk.observe(True, "the arm is blocked: no datagrams")
+    refused = ask(desk, "a", "acknowledge", stop=stop)
+    assert not refused["success"] and "no datagrams" in refused["message"] and desk.guard.unacknowledged
+    assert not ask(desk, "a", "acknowledge")["success"]
+    assert not ask(desk, "a", "acknowledge", stop=newest(desk) + 1)["success"] and desk.guard.unacknowledged
+    answer = ask(desk, "a", "acknowledge", stop=newest(desk))
+    assert answer["success"] and "no datagrams" in answer["message"] and not desk.guard.unacknowledged
+    events = [event["text"] for event in desk.events.since(0)[0] if event["source"] == "command"]
+    assert any(f"stop {newest(desk)}" in text and "no datagrams" in text for text in events)
+
+
+def test_without_a_stop_nothing_is_acknowledged(desk):
+    answer = ask(desk, "a", "acknowledge", stop=0)
+    assert not answer["success"] and "no stop" in answer["message"]
+
+
+def test_a_fault_after_a_stop_is_a_stop_of_its_own_though_the_robot_never_moved(desk):
+    """STOP, acknowledged, `./coglab start reset`: the arm does not obey, and the machine goes from stopped to fault."""
+    stands = Standstills()
+    stands.arm(True)
+    stands.machine("/coglab_master/stopped")
+    desk.observe(True, "STOP", stands.count)
+    ask(desk, "a", "acknowledge", stop=newest(desk))
+    stands.arm(False)
+    stands.machine("/coglab_master/fault")
+    desk.observe(True, "no command mode", stands.count)
+    assert desk.guard.unacknowledged and desk.guard.needs_hold and desk.guard.cause == "no command mode"
+    told = [event["text"] for event in desk.events.since(0)[0] if event["source"] == "stop"]
+    assert told == ["stopped: STOP", "stopped: no command mode"]
+
+
+def test_a_stop_that_was_over_between_two_looks_counts(desk):
+    desk.observe(False, "")
+    stands = Standstills()
+    stands.arm(True)
+    stands.arm(False)
+    desk.observe(False, "", stands.count)
+    assert desk.guard.unacknowledged
+
+
+def test_a_hold_and_the_machine_that_stops_because_of_it_are_one_stop():
+    stands = Standstills()
+    stands.machine("/m/wait_without_object")
+    stands.arm(True)
+    for state in ("/m/stopped", "/m/stopped"):
+        stands.machine(state)
+    assert stands.count == 1
+    for state in ("/m/recover/end_motion", "/m/fault", "/m/fault", "/m/coglab_init_system/x", "/m/fault"):
+        stands.machine(state)
+    assert stands.count == 3
+
+
+def test_a_held_button_begins_the_motion_once(desk):
+    ask(desk, "a", "stop")
+    ask(desk, "a", "acknowledge", stop=newest(desk))
+    assert hold_for(desk, 0.6) == []
+    desk.released("a")
+    answers = hold_for(desk, 1.4)
+    assert len(answers) == 1 and answers[0]["success"]
+    assert len(desk.backend.calls) == 1
+    assert not desk.guard.needs_hold
+    assert ask(desk, "a", "start", **RECEIVE)["success"]  # the next one needs a press only
+
+
+def test_a_browser_that_dies_with_the_button_held_starts_nothing():
+    clock = Clock()
+    button = HeldButton(clock)
+    for _ in range(7):
+        assert not button.held("x")
+        clock.time += 0.1
+    clock.time += 5.0  # nothing came any more
+    assert not button.held("x")
+
+
+@pytest.mark.parametrize("gap", [0.3, 0.5])
+def test_a_held_button_with_gaps_starts_nothing(gap):
+    clock = Clock()
+    button = HeldButton(clock)
+    for _ in range(20):
+        assert not button.held("x")
+        clock.time += gap
+
+
+def test_another_action_begins_the_holding_anew():
+    clock = Clock()
+    button = HeldButton(clock)
+    for what in "aaaaaabbbbbb":
+        assert not button.held(what)
+        clock.time += HOLD_TIME / 8
+
+
+def test_observers_and_unknown_commands_cannot_hold(desk):
+    async def press():
+        return [
+            await desk.held("b", "start", RECEIVE),
+            await desk.held("a", "nothing", {}),
+            await desk.held("a", "home", {"x": 1}),
+        ]
+
+    assert all(answer is not None and not answer["success"] for answer in asyncio.run(press()))
+
+
+def test_the_real_robot_and_calibrations_that_open_the_hand_need_a_held_button():
+    guard = MotionGuard(real=True)
+    assert guard.guarded("home", {})
+    plain = MotionGuard()
+    assert not plain.guarded("calibrate", {"mode": "fast"})
+    assert plain.guarded("calibrate", {"mode": "fast", "force": True})
+    assert plain.guarded("calibrate", {"mode": "complete"})
+
+
+def test_a_connection_that_dies_with_the_button_held_starts_nothing(tmp_path):
+    async def test():
+        async with running(tmp_path) as console, console.browser() as client:
+            ws = await console.socket_of(client)
+            await ws.send_str("{}")
+            console.desk.guard.stop("test")
+            console.desk.guard.acknowledge(console.desk.guard.stops)
+            for _ in range(6):
+                await ws.send_str(json.dumps({"t": "hold", "name": "start", "arguments": RECEIVE}))
+                await asyncio.sleep(0.1)
+            ws._response.connection.transport.abort()
+            await asyncio.sleep(1.2)
+            assert console.robot.calls == []
+
+    asyncio.run(test())

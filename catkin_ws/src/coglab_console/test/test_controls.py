@@ -1,0 +1,209 @@
+"""Every control of every page says why it is disabled, also to who only watches; what needs a second thought is held;
+what is silent is said; in a real browser with a double in place of the robot."""
+
+import shutil
+import time
+from dataclasses import replace
+
+import pytest
+from coglab_console.browser import Browser
+from coglab_console.page_check import PAGES, look
+from page_double import Desk
+
+pytestmark = pytest.mark.skipif(
+    shutil.which("chromedriver") is None, reason="chromium-driver is missing: ./coglab install browser"
+)
+FEEDBACK = {
+    "profile": "p",
+    "rows": [
+        {"name": name, "type": "t", "stage": "task", "enabled": True, "paused": False, "safety": False, "activity": "x",
+         "waiting": "", "reasons": [], "fault": "", "faults": 0, "overruns": 0}
+        for name in ("yield", "limit")
+    ],
+}  # fmt: skip
+STATUS = {
+    "machine": {"alive": True, "state": "/m/wait_without_object", "words": "ready", "hub": True, "actions": ["take"],
+                "object": "", "why": "", "fallback": "mug"},
+    "arm": {"alive": True, "supervisor": "command", "fri": "CMD", "quality": "PERFECT", "mode": "POSITION",
+            "power": True, "allowed": True, "held": False, "reason": "", "cycle": 0.005},
+    "hand": {"alive": True, "connected": True, "calibrated": True, "calibrating": False, "holding": False,
+             "message": "", "motors": 5},
+    "manager": {"alive": True, "state": "idle", "active": "dmp", "reason": "", "scale": 1.0},
+    "contact": {"words": "", "alive": True, "state": "off", "mode": "", "learnt": True, "samples": 9, "k": 6.0,
+                "window": 0.04},
+}  # fmt: skip
+# Every button that sends a command of the operator's, and what is said below it.
+DISABLED = """
+return [...document.querySelectorAll('[aria-disabled=true]')].filter((one) => one.getClientRects().length)
+  .map((one) => [one.getAttribute('aria-label') || one.labels?.[0]?.innerText || one.innerText,
+    document.getElementById(one.getAttribute('aria-describedby'))?.innerText ?? '']);
+"""
+OPERATORS = {
+    "Live": {
+        "1 Initialise",
+        "2 Calibrate hand",
+        "3 Home",
+        "4 Receive",
+        "5 Give",
+        "6 Take",
+        "7 Put",
+        "8 Go on",
+        "Object",
+    },
+    "Experiment": {"Begin the session"},
+    "Contact": {"Learn anew at rest", "Watch for contact", "Off"},
+    "Objects": {"Read the files again"},
+    "Feedback": {"disable yield", "pause yield", "yield later", "limit earlier"},
+    "Health": {"Complete calibration", "Forced calibration"},
+    "Help": {"A link for one more browser"},
+}
+
+
+@pytest.fixture(scope="module")
+def desk(tmp_path_factory):
+    found = Desk(tmp_path_factory.mktemp("console"))
+    for name, value in (("feedback", FEEDBACK), ("status", STATUS)):
+        found.loop.call_soon_threadsafe(found.console.documents.put, name, value)
+    yield found
+    found.close()
+
+
+def soon(condition, limit=10.0):
+    end = time.monotonic() + limit
+    while not condition():
+        assert time.monotonic() < end, "not in time"
+        time.sleep(0.02)
+
+
+def words_of(label):
+    return " ".join(label.split())
+
+
+def test_who_watches_is_told_at_every_control_who_operates(desk):
+    with Browser() as other:
+        other.open(desk.console.link())
+        other.until("return document.getElementById('role').innerText.includes('you watch')", 10.0)
+        for page in PAGES:
+            other.tab(page)
+            time.sleep(0.2)
+            found = {words_of(name): why for name, why in other.js(DISABLED)}
+            wanted = OPERATORS["Live"] | OPERATORS.get(page, set())
+            assert wanted <= {name.removesuffix(" (default) ▾") for name in found}, (page, found)
+            assert all("browser 1 operates" in why for why in found.values()), (page, found)
+            assert look(other)[0] == [], page
+
+
+def test_a_stop_shows_who_watches_its_cause_and_why_they_cannot_acknowledge_it(desk):
+    with Browser() as other:
+        other.open(desk.console.link())
+        desk.loop.call_soon_threadsafe(desk.console.desk.guard.stop, "the arm is blocked")
+        other.until("return document.getElementById('acknowledge').getAttribute('aria-disabled') === 'true'", 10.0)
+        assert "browser 1 operates" in other.js("return document.getElementById('why-acknowledge').innerText")
+        assert "the arm is blocked" in other.js("return document.getElementById('stop-cause').innerText")
+        assert look(other)[0] == []
+        other.js("document.getElementById('acknowledge').click()")
+        other.until("return document.getElementById('told').innerText.includes('browser 1 operates')", 5.0)
+    assert desk.console.desk.guard.unacknowledged
+    desk.browser.until("return !document.getElementById('acknowledge').hasAttribute('aria-disabled')", 10.0)
+    desk.browser.js("document.getElementById('acknowledge').click()")
+    soon(lambda: not desk.console.desk.guard.unacknowledged)
+
+
+def test_what_is_not_possible_now_says_why_to_the_operator_in_every_tab(desk):
+    page = desk.browser
+    desk.robot.now = replace(desk.robot.now, manager_alive=False, detector_alive=False, database_alive=False)
+    try:
+        for name, part in (
+            ("Contact", "contact detector"),
+            ("Objects", "object database"),
+            ("Feedback", "controllers"),
+        ):
+            page.tab(name)
+            page.until(f"return {DISABLED.strip()[7:-1]}.some((one) => one[1].includes(arguments[0]))", 10.0, part)
+            assert look(page)[0] == [], name
+        page.tab("Live")
+        page.until("return document.getElementById('why-side').innerText === 'no motion control'", 10.0)
+    finally:
+        desk.robot.now = replace(desk.robot.now, manager_alive=True, detector_alive=True, database_alive=True)
+    page.tab("Experiment")
+    desk.loop.call_soon_threadsafe(desk.console.desk.experiment.begin, "P1", ["receive ball"], 1, "as_listed", 0)
+    page.until("return document.getElementById('page').innerText.includes('no trial is under way')", 10.0)
+    assert look(page)[0] == []
+    desk.loop.call_soon_threadsafe(desk.console.desk.experiment.trial_begin)
+    page.until("return document.getElementById('page').innerText.includes('trial 1 is under way; end it first')", 10.0)
+    page.tab("Contact")
+    page.until(f"return {DISABLED.strip()[7:-1]}.some((one) => one[1].includes('under way'))", 10.0)
+    desk.loop.call_soon_threadsafe(desk.console.desk.experiment.trial_end, "done")
+    desk.loop.call_soon_threadsafe(desk.console.desk.experiment.end)
+    page.tab("Live")
+
+
+@pytest.mark.parametrize(
+    "tab, label, command",
+    [
+        ("Contact", "Watch for contact", "contact_arm"),
+        ("Contact", "Learn anew at rest", "contact_learn"),
+        ("Objects", "Read the files again", "objects_reload"),
+        ("Health", "Forced calibration", "calibrate"),
+        ("Feedback", "disable", "feedback"),
+    ],
+)
+def test_one_click_changes_no_threshold_and_opens_no_hand(desk, tab, label, command):
+    page = desk.browser
+    page.tab(tab)
+    found = f"[...document.querySelectorAll('#page button')].find((one) => one.innerText === '{label}')"
+    page.until(f"const b = {found}; return b && !b.hasAttribute('aria-disabled')", 10.0)
+    before = len(desk.robot.calls)
+    page.js(f"{found}.click()")
+    time.sleep(0.3)
+    assert len(desk.robot.calls) == before
+    page.js(f"{found}.dispatchEvent(new PointerEvent('pointerdown', {{ button: 0, bubbles: true }}))")
+    soon(lambda: len(desk.robot.calls) > before)
+    page.js(f"{found}.dispatchEvent(new PointerEvent('pointerup', {{ bubbles: true }}))")
+    assert desk.robot.calls[-1][0] == command
+    page.tab("Live")
+
+
+def test_the_list_of_objects_stays_closed_for_who_watches(desk):
+    with Browser() as other:
+        other.open(desk.console.link())
+        other.until("return document.getElementById('why-side').innerText === 'browser 1 operates'", 10.0)
+        other.js("document.getElementById('object').click()")
+        assert other.js("return document.querySelector('ul.choice')") is None
+        other.until("return document.getElementById('told').innerText.includes('browser 1 operates')", 5.0)
+
+
+@pytest.mark.parametrize(
+    "source, row, words",
+    [
+        ("brain", "Phase", "the brain has been silent for 1.2 s"),
+        ("arm", "FRI", "silent for 1.2 s"),
+        ("controllers", "Motion", "silent for 1.2 s"),
+        ("hand", "Hand", "silent for 1.2 s"),
+        ("contact", "Contact", "silent for 1.2 s"),
+    ],
+)
+def test_a_row_of_what_is_silent_says_for_how_long(desk, source, row, words):
+    page = desk.browser
+    shown = (
+        "return [...document.querySelectorAll('#status dt')]"
+        ".find((one) => one.innerText === arguments[0]).nextSibling.innerText"
+    )
+    assert "silent" not in page.js(shown, row)
+    desk.state = {"silent": {source: 1.2}}
+    try:
+        page.until(f"{shown}.includes(arguments[1])", 3.0, row, words)
+    finally:
+        desk.state = {}
+    page.until(f"{shown}.includes('silent') === false", 3.0, row)
+
+
+def test_an_event_says_in_which_phase_it_was(desk):
+    desk.console.events.phase = lambda: "reaches and receives"
+    try:
+        desk.event("a touch")
+        desk.browser.until(
+            "return document.getElementById('log').innerText.includes('a touch [reaches and receives]')", 10.0
+        )
+    finally:
+        desk.console.events.phase = lambda: ""
