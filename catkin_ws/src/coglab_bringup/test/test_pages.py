@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
+import os
 import re
+import shutil
+import subprocess
 from pathlib import Path
+
+import pytest
 
 TOP = Path(__file__).resolve().parents[4]
 SOURCES = TOP / "catkin_ws" / "src"
@@ -40,6 +45,32 @@ def test_every_test_that_a_page_names_is_there():
             if not any(name.startswith(prefix) for name in known):
                 wrong.append(f"{path.relative_to(TOP)}: {prefix}_*")
     assert not wrong, "no such test:\n" + "\n".join(wrong)
+
+
+def test_every_service_without_a_code_is_on_the_page_of_the_house():
+    page = (TOP / "docs" / "house.md").read_text(encoding="utf-8").split("## Codes beside sentences")[1].split("## ")[0]
+    nodes = [p for p in SOURCES.rglob("*.py") if {"scripts", "ros"} & set(p.parts) and "test" not in p.parts]
+    served = r"rospy\.Service\(\"[~\w/]*?(\w+)\", (Trigger|SetBool|Empty)\b"
+    found = {pair for path in nodes for pair in re.findall(served, path.read_text(encoding="utf-8"))}
+    assert ("why", "Trigger") in found and len(found) >= 5
+    missing = [name for name, kind in found if not re.search(rf"^\| `/\w+/{name}` \| std_srvs/{kind} ", page, re.M)]
+    assert not missing, missing
+
+
+def test_the_table_of_the_house_is_what_its_command_prints():
+    page = (TOP / "docs" / "house.md").read_text(encoding="utf-8")
+    (command,) = re.findall(r"`(docs/count_lines [\w ]+)` prints", page)
+    tools = f"{TOP}/.coglab/venv/bin:{os.environ.get('PATH', os.defpath)}"
+    missing = [tool for tool in ("cloc", "clang-format", "ruff") if shutil.which(tool, path=tools) is None]
+    if missing:
+        pytest.skip(f"not installed: {', '.join(missing)}")
+    for commit in command.split()[1:]:
+        known = subprocess.run(["git", "-C", str(TOP), "cat-file", "-e", commit], capture_output=True, timeout=30)
+        if known.returncode != 0:
+            pytest.skip(f"commit {commit} is not in this checkout")
+    done = subprocess.run(command.split(), cwd=TOP, capture_output=True, text=True, timeout=300)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout in page, done.stdout
 
 
 def test_the_recipes_lead_to_what_is_there():

@@ -27,10 +27,12 @@ int main(int argc, char** argv) {
   ros::init(argc, argv, "lwr", ros::init_options::NoSigintHandler);
   std::signal(SIGINT, onSignal);
   std::signal(SIGTERM, onSignal);
+  // Lives longest, because ROS logs what goes wrong only as long as there is a handle.
+  const ros::NodeHandle own("~");
+  coglab_rt::LoggerServices logger_services;
   try {
-    const ros::NodeHandle nh(coglab_rt::readParameter<std::string>(
-        ros::NodeHandle("~"), "lwr_namespace", "lwr", "a name"));
-    coglab_rt::LoggerServices logger_services;
+    const ros::NodeHandle nh(
+        coglab_rt::readParameter<std::string>(own, "lwr_namespace", "lwr", "a name"));
     lwr_fri_bridge::BridgeRos bridge(nh, false);
     bridge.start({});
     ros::AsyncSpinner spinner(1);

@@ -5,6 +5,7 @@
 
 #include <ros/node_handle.h>
 
+#include <sstream>
 #include <stdexcept>
 #include <string>
 
@@ -40,9 +41,10 @@ inline double readNumber(const ros::NodeHandle& node, const char* name, double o
                          double low, double high) {
   const double value = readParameter<double>(node, name, otherwise, "a number");
   if (value >= low && value <= high) return value;
-  throw std::invalid_argument("parameter " + node.resolveName(name) + " = " +
-                              std::to_string(value) + " is outside its range " +
-                              std::to_string(low) + ".." + std::to_string(high));
+  std::ostringstream text;
+  text << "parameter " << node.resolveName(name) << " = " << value << " is outside its range "
+       << low << ".." << high;
+  throw std::invalid_argument(text.str());
 }
 
 }  // namespace coglab_rt
