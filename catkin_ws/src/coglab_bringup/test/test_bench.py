@@ -2,10 +2,12 @@
 
 import importlib.util
 import json
+import sys
 from pathlib import Path
 
 import pytest
 from coglab_bringup.bench import COLUMNS, main, run_bench
+from coglab_bringup.test_runner import Program, find_programs, wall_times
 
 WALL = Path(__file__).resolve().parents[1] / "bench" / "bench_wall.py"
 ROW = dict(zip(COLUMNS, ("x", "speed", 1.0, "m/s", "> 0", None, None, True), strict=True))
@@ -37,10 +39,16 @@ def test_an_unknown_name(monkeypatch, tmp_path, capsys):
     assert "no bench named nosuch" in capsys.readouterr().err
 
 
-def test_a_wall_time_that_was_not_measured_is_missed_not_zero():
+@pytest.fixture
+def bench_wall():
+    """The bench as a module."""
     spec = importlib.util.spec_from_file_location("bench_wall", WALL)
-    bench_wall = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(bench_wall)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_a_wall_time_that_was_not_measured_is_missed_not_zero(bench_wall):
     measured = {"setup": {"install_s": 70.0, "build_s": 300.0}, "first_demo": {"run_s": 30.0}}
     figure, value = bench_wall.first_demo(measured)
     assert value == 400.0 and "installation 70 s, build 300 s, first demo 30 s" in figure
@@ -52,7 +60,34 @@ def test_a_wall_time_that_was_not_measured_is_missed_not_zero():
             row = bench_wall.row(figure, value, 600)
             assert row["value"] is None and not row["ok"]
     assert bench_wall.first_demo({})[1] is None
+<<<<<<< HEAD
     said = "from `controller new --motion` to an arm that has moved: 21.4 s, of them to build 15.0 s\n"
     assert bench_wall.new_motion(said + "1 passed, 1 deselected in 25 s") == 21.4
     for output in ("", said + "1 failed in 25 s", "1 skipped"):
         assert bench_wall.new_motion(output) is None
+=======
+
+
+def test_what_combined_conditions_add_is_the_sum_of_all_of_them_or_missed(bench_wall):
+    names = [bench_wall.program_of(package, name) for package, all_of in bench_wall.COMBINED.items() for name in all_of]
+    times = {"last_test": {"programs": {**dict.fromkeys(names, 1.5), "coglab_sim/test_plant.py": 100.0}}}
+    figure, value = bench_wall.combined(times)
+    assert value == 1.5 * len(names) and f"{len(names)} programs" in figure
+    del times["last_test"]["programs"][names[3]]
+    for known in (times, {"last_test": {}}, {}):
+        figure, value = bench_wall.combined(known)
+        assert value is None and not bench_wall.row(figure, value, 45.0)["ok"]
+
+
+def test_every_program_of_combined_conditions_is_one_that_the_test_run_finds(bench_wall, tmp_path):
+    top = Path(__file__).resolve().parents[4]
+    found = wall_times(find_programs(top, tmp_path, sys.executable, []))
+    named = {bench_wall.program_of(package, name) for package, names in bench_wall.COMBINED.items() for name in names}
+    assert named - set(found) == set()
+
+
+def test_a_program_that_runs_beside_another_adds_half_its_time():
+    alone = Program("p", "rostest", "a.test", [], Path("x"), seconds=10.0)
+    beside = Program("p", "gtest", "p_test_b", [], Path("x"), seconds=10.0)
+    assert wall_times([alone, beside]) == {"p/a.test": 10.0, "p/p_test_b": 5.0}
+>>>>>>> mend-12b

@@ -6,39 +6,31 @@ from __future__ import annotations
 import math
 import os
 import sys
-import unittest
 
 import rospkg
 import rospy
 import rostest
-from coglab_msgs.msg import DmpGoal, FeedbackGain, FeedbackState, FeedbackStatus, IkDebug, PredictedPath, ReasonCode
+from coglab_msgs.msg import DmpGoal, FeedbackStatus, IkDebug, PredictedPath, ReasonCode
 from coglab_msgs.srv import (
     AddPtpRequest,
-    DescribeController,
     ExecuteDmpRequest,
-    FeedbackBySignal,
-    FeedbackSelect,
-    LoadFeedback,
     PredictDmpRequest,
-    ReloadGains,
-    SetExecutionOrder,
-    SetGains,
     SwitchDmpRequest,
 )
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import Point, Pose, Vector3
-from rosgraph_msgs.msg import Log
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
+from feedback_on_ros import FeedbackOnRos
 from robot_fixture import HOME, Robot, end_within, frozen_master, robot_processes, wait_until
 
 GOAL = (0.80, 0.0, 0.45)
 ASIDE = (0.65, -0.15, 0.60)
 
 
-class TopicGoal(unittest.TestCase):
+class TopicGoal(FeedbackOnRos):
     """One robot for all tests; they run in the order of their names."""
 
     @classmethod
@@ -188,100 +180,6 @@ class TopicGoal(unittest.TestCase):
             publisher.publish(wrong)
         rospy.sleep(0.5)
         self.assertAlmostEqual(robot.feedback.remaining_distance, before, delta=0.002)
-
-    def test_5_feedback_services(self) -> None:
-        name = "controller_manager/feedback/"
-        wait_until(lambda: bool(self.feedback), 5.0, "feedback/status")
-        names = [c.name for c in self.feedback[-1].controllers]
-        self.assertEqual(sorted(names), ["ee_admittance", "joint_limits"])
-        self.assertEqual(self.feedback[-1].profile, "dmp")
-        call = self.robot.call
-        answer = call(name + "describe", DescribeController, "joint_limits")
-        self.assertTrue(answer.success and "joint_position" in answer.text)
-        self.assertFalse(call(name + "describe", DescribeController, "joint_limit").success)
-        answer = call(name + "set_execution_order", SetExecutionOrder, names[:1])
-        self.assertFalse(answer.success)
-        answer = call(name + "set_execution_order", SetExecutionOrder, names[::-1])
-        self.assertTrue(answer.success, answer.message)
-        answer = call(name + "enable", FeedbackSelect, ["ee_admittance"], "")
-        self.assertTrue(answer.success, answer.message)
-        wait_until(
-            lambda: next(c for c in self.feedback[-1].controllers if c.name == "ee_admittance").enabled, 5.0, "enabled"
-        )
-        answer = call(name + "pause_by_signal", FeedbackBySignal, "wrench", False)
-        self.assertTrue(answer.success, answer.message)
-        self.assertEqual(list(answer.affected), ["ee_admittance"])
-        answer = call(name + "resume_by_signal", FeedbackBySignal, "wrench", False)
-        self.assertEqual(list(answer.affected), ["ee_admittance"])
-        answer = call(name + "reload_gains", ReloadGains, "ee_admittance", "")
-        self.assertTrue(answer.success, answer.message)
-        answer = call(name + "reload_gains", ReloadGains, "ee_admittance", "/no/such.yaml")
-        self.assertFalse(answer.success)
-        self.assertTrue(call(name + "disable", FeedbackSelect, ["ee_admittance"], "").success)
-        self.assertFalse(call(name + "enable", FeedbackSelect, ["nobody"], "").success)
-
-    def test_5b_feedback_controllers_are_loaded_watched_and_unloaded(self) -> None:
-        """One is added to a running robot, shows its inside and its corrections, and goes again."""
-        name = "controller_manager/feedback/"
-        call, shown, told = self.robot.call, [], []
-        rospy.Subscriber(name + "state", FeedbackState, shown.append)
-        rospy.Subscriber("/rosout", Log, told.append)
-        config = "package://ctrl_more/config/ee_admittance.yaml"
-        for code, *refused in (
-            (ReasonCode.BUSY, "dmp", "EeAdmittance", "", ""),
-            (ReasonCode.BUSY, "joint_limits", "JointLimits", "", ""),
-            (ReasonCode.BAD_FILE, "second", "NoSuchType", "", ""),
-            (ReasonCode.BAD_FILE, "second", "EeAdmittance", "", "/no/such.yaml"),
-        ):
-            answer = call(name + "load", LoadFeedback, *refused)
-            self.assertFalse(answer.success, refused)
-            self.assertTrue(answer.message, refused)
-            self.assertEqual(answer.reason_code, code, (refused, answer.message))
-        answer = call(name + "load", LoadFeedback, "second", "EeAdmittance", "", config)
-        self.assertTrue(answer.success, answer.message)
-        gains = [FeedbackGain("force_dead_band", [0.0]), FeedbackGain("stiffness", [20.0])]
-        answer = call(name + "set_gains", SetGains, "second", gains)
-        self.assertTrue(answer.success, answer.message)
-        self.assertFalse(call(name + "set_gains", SetGains, "second", [FeedbackGain("stifness", [1.0])]).success)
-        self.assertFalse(call(name + "set_gains", SetGains, "second", [FeedbackGain("mass", [1.0, 2.0])]).success)
-        self.assertTrue(call(name + "enable", FeedbackSelect, ["second"], "").success)
-
-        def state() -> dict[str, float]:
-            found = [s for s in shown[-1].states if s.controller == "second"] if shown else []
-            return dict(zip(found[0].names, found[0].values, strict=True)) if found else {}
-
-        wait_until(lambda: "offset_x" in state(), 5.0, "state of the controller that was loaded")
-        self.assertEqual(set(shown[-1].states[-1].units), {"m", "rad", "N"})
-        wait_until(
-            lambda: any(
-                c.controller == "second"
-                and c.signal == "taskSpaceReferencePose/ee"
-                and len(c.before) == len(c.after) == 7
-                for c in shown[-1].corrections
-            ),
-            5.0,
-            "its correction of the pose",
-        )
-        answer = call(name + "set_gains", SetGains, "second", [FeedbackGain("max_offset", [0.0])])
-        self.assertTrue(answer.success, answer.message)
-
-        def own_words() -> list[Log]:
-            return [line for line in told if "second (ee_admittance.cpp:" in line.msg]
-
-        wait_until(lambda: bool(own_words()), 5.0, "what it logs on /rosout")
-        said = own_words()[0]
-        self.assertRegex(said.msg, r"cycle [0-9]+\): a force of [0-9.e-]+ N holds it at max_offset, 0 m")
-        self.assertEqual((said.level, said.name), (Log.WARN, "/robot"))
-        self.assertIn("second", [c.name for c in self.feedback[-1].controllers])
-        answer = call(name + "unload", FeedbackSelect, ["second"], "")
-        self.assertFalse(answer.success)
-        self.assertIn("disable", answer.message)
-        self.assertEqual(answer.reason_code, ReasonCode.BUSY)
-        self.assertTrue(call(name + "disable", FeedbackSelect, ["second"], "").success)
-        wait_until(lambda: call(name + "unload", FeedbackSelect, ["second"], "").success, 5.0, "unloaded")
-        wait_until(lambda: "second" not in [c.name for c in self.feedback[-1].controllers], 5.0, "gone")
-        self.assertFalse(call(name + "unload", FeedbackSelect, [], "").success)
-        self.assertFalse(call(name + "unload", FeedbackSelect, ["ee_admittance"], "").success, "part of a profile")
 
     def cycle_statistics(self) -> dict[str, str]:
         """Values of the control cycle on /diagnostics, by name; empty before the first."""

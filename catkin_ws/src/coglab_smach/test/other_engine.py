@@ -38,21 +38,65 @@ ROS_NAMES = (
 """Public names of smach_ros 2.5 that are not those of its modules."""
 
 
-ONLY_OURS = {
-    "StateMachine": ("register_end_cb", "unregister_cb"),
-    "Concurrence": ("is_running", "register_end_cb", "unregister_cb"),
+OF_STATE = (
+    "execute get_registered_input_keys get_registered_outcomes get_registered_output_keys preempt_requested "
+    "recall_preempt register_input_keys register_io_keys register_outcomes register_output_keys request_preempt "
+    "service_preempt"
+)
+OF_CONTAINER = OF_STATE + (
+    " assert_opened call_start_cbs call_termination_cbs call_transition_cbs check_consistency close get_active_states "
+    "get_children get_initial_states get_internal_edges is_opened open opened register_start_cb "
+    "register_termination_cb register_transition_cb set_initial_state"
+)
+ATTRIBUTES = {
+    "State": OF_STATE,
+    "CBState": OF_STATE,
+    "Container": OF_CONTAINER,
+    "StateMachine": OF_CONTAINER + " add add_auto check_state_spec is_running",
+    "Sequence": OF_CONTAINER + " add add_auto check_state_spec is_running",
+    "Concurrence": OF_CONTAINER + " add",
+    "Iterator": OF_CONTAINER + " set_contained_state set_iteritems",
 }
-"""Public methods of our containers that smach 2.5 lacks."""
+"""Public attributes of the states and containers of smach 2.5."""
+OF_INSTANCES = "userdata _preempt_requested"
+"""What instances have besides: the data of a container, and the one private name that states of other people's use."""
+NONE = object()
 
 
 class Hidden:
-    """A method that is not there."""
+    """A name of our engine that smach 2.5 lacks: there for the engine alone."""
 
-    def __init__(self, name):
-        self.name = name
+    def __init__(self, name, own):
+        self.name, self.own = name, own
 
-    def __get__(self, instance, owner):
-        raise AttributeError(f"smach 2.5 has no {owner.__name__}.{self.name}")
+    def __get__(self, instance, owner=None):
+        if sys._getframe(1).f_globals.get("__name__", "").partition(".")[0] != "smach":
+            raise AttributeError(f"smach 2.5 has no {owner.__name__}.{self.name}")
+        if hasattr(self.own, "__set__"):
+            return self.own.__get__(instance, owner)
+        if instance is not None and self.name in vars(instance):
+            return vars(instance)[self.name]
+        if self.own is NONE:
+            raise AttributeError(self.name)
+        return self.own.__get__(instance, owner) if hasattr(self.own, "__get__") else self.own
+
+    def __set__(self, instance, value):
+        if hasattr(self.own, "__set__"):
+            self.own.__set__(instance, value)
+        else:
+            vars(instance)[self.name] = value
+
+
+def only_ours(engine_class, samples):
+    """Attributes of a class of our engine that smach 2.5 lacks: of the class, and what its instances are given."""
+    names = set(dir(engine_class)) | set(vars(samples[engine_class.__name__]))
+    theirs = {*ATTRIBUTES[engine_class.__name__].split(), *OF_INSTANCES.split()}
+    return {name for name in names if not name.startswith("__")} - theirs
+
+
+def own_of(engine_class, name):
+    """What the class holds under this name; NONE if instances alone have it."""
+    return next((vars(one)[name] for one in engine_class.__mro__ if name in vars(one)), NONE)
 
 
 def narrow(smach):
@@ -96,10 +140,22 @@ def narrow(smach):
         def execute(self, parent_ud=None):
             return super().execute(parent_ud)
 
-    for cls in (StateMachine, Concurrence):
-        for name in ONLY_OURS[cls.__name__]:
-            setattr(cls, name, Hidden(name))
-    return {cls.__name__: cls for cls in (State, StateMachine, Concurrence)}
+    instead = {cls.__name__: cls for cls in (State, StateMachine, Concurrence)}
+    for name in ATTRIBUTES:
+        instead.setdefault(name, type(name, (getattr(smach, name),), {}))
+    samples = {
+        "State": smach.State(["ok"]),
+        "CBState": smach.CBState(lambda ud: "ok", outcomes=["ok"]),
+        "Container": smach.Container(["ok"]),
+        "StateMachine": smach.StateMachine(["ok"]),
+        "Sequence": smach.Sequence(["ok"], "ok"),
+        "Concurrence": smach.Concurrence(["ok"], "ok"),
+        "Iterator": smach.Iterator(["ok"], [], [], [1], "it"),
+    }
+    for name, cls in instead.items():
+        for hidden in only_ours(getattr(smach, name), samples):
+            setattr(cls, hidden, Hidden(hidden, own_of(getattr(smach, name), hidden)))
+    return instead
 
 
 def hide_names():

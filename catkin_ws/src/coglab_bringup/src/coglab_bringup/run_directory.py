@@ -99,10 +99,11 @@ def running_systems(top: Path) -> dict[int, str]:
     return found
 
 
-def record_times(top: Path, command: str, seconds: float) -> None:
+def record_times(top: Path, command: str, seconds: float, **parts: object) -> None:
     """Keeps wall times (s) of the first and the last ./coglab demo or test on this machine, for ./coglab bench wall.
 
-    `seconds` is the run itself; what installing and building took before it comes from the environment.
+    `seconds` is the run itself; what installing and building took before it comes from the environment. `parts` of the
+    run are kept beside it.
     """
     folder = top / ".coglab"
     folder.mkdir(exist_ok=True)
@@ -110,11 +111,12 @@ def record_times(top: Path, command: str, seconds: float) -> None:
     times = json.loads(path.read_text()) if path.is_file() else {}
     install = float(os.environ.get("COGLAB_INSTALL_SECONDS", "0"))
     build = float(os.environ.get("COGLAB_BUILD_SECONDS", "0"))
-    row = {
+    row: dict[str, object] = {
         "install_s": install,
         "build_s": build,
         "run_s": round(seconds, 1),
         "total_s": round(install + build + seconds, 1),
+        **parts,
     }
     times.setdefault(f"first_{command}", row)
     times[f"last_{command}"] = row

@@ -27,6 +27,8 @@ from coglab_bringup.arguments import left_out, package_folders, test_options
 from coglab_bringup.run_directory import free_port, record_times, run_environment
 from coglab_bringup.usage import Refused
 
+AT_A_TIME = 2
+"""test programs that run beside each other, but for rostests: those run alone"""
 TIME_LIMIT = 900.0  # s, per test program
 LONG_TIME_LIMIT = 7200.0  # s, with --long
 
@@ -139,6 +141,14 @@ def run(program: Program, log: Path, limit: float) -> None:
     )
 
 
+def wall_times(programs: list[Program]) -> dict[str, float]:
+    """s that each program adds to a run of all: its own, or its part of the time in which others run beside it."""
+    return {
+        f"{one.package}/{one.name}": round(one.seconds / (1 if one.kind == "rostest" else AT_A_TIME), 2)
+        for one in programs
+    }
+
+
 def report(programs: list[Program], results: Path) -> int:
     """Prints failures, the time of each package and the closing line; returns the exit status."""
     for program in programs:
@@ -179,14 +189,14 @@ def main(arguments: list[str]) -> int:
     def run_one(program: Program) -> None:
         run(program, results / "logs" / f"{program.package}.{program.name}.log", limit)
 
-    with ThreadPoolExecutor(max_workers=2) as pool:
+    with ThreadPoolExecutor(max_workers=AT_A_TIME) as pool:
         list(pool.map(run_one, [program for program in programs if program.kind != "rostest"]))
     for program in programs:
         if program.kind == "rostest":
             run_one(program)
     print(f"all tests: {time.monotonic() - start:.0f} s; JUnit files and logs: {os.path.relpath(results)}")
     if not options.packages and not options.long:
-        record_times(top, "test", time.monotonic() - start)
+        record_times(top, "test", time.monotonic() - start, programs=wall_times(programs))
     return report(programs, results)
 
 
