@@ -3,15 +3,11 @@
 here.
 
 One run each. The first is the sum of installation, build and demo of this checkout; where a part was not done here, on
-<<<<<<< HEAD
 a machine that had it already, the row has no value and is missed. `docker/prove_bare` does it on a bare machine. The
 new motion is that of coglab_controllers/test/test_new_motion.py: made by `controller new --motion`, built in a
-workspace of its own, and done when its rostest has seen the simulated arm move. A test that fails gives no value.
-=======
-a machine that had it already, the row has no value and is missed. `docker/prove_bare` does it on a bare machine. What
+workspace of its own, and done when its rostest has seen the simulated arm move. A test that fails gives no value. What
 tests of combined conditions add to the whole test run: the programs named in COMBINED, whole, each with its part of the
 wall time (two run beside each other, rostests alone); without a record of every one of them the row is missed.
->>>>>>> mend-12b
 """
 
 from __future__ import annotations

@@ -60,12 +60,10 @@ def test_a_wall_time_that_was_not_measured_is_missed_not_zero(bench_wall):
             row = bench_wall.row(figure, value, 600)
             assert row["value"] is None and not row["ok"]
     assert bench_wall.first_demo({})[1] is None
-<<<<<<< HEAD
     said = "from `controller new --motion` to an arm that has moved: 21.4 s, of them to build 15.0 s\n"
     assert bench_wall.new_motion(said + "1 passed, 1 deselected in 25 s") == 21.4
     for output in ("", said + "1 failed in 25 s", "1 skipped"):
         assert bench_wall.new_motion(output) is None
-=======
 
 
 def test_what_combined_conditions_add_is_the_sum_of_all_of_them_or_missed(bench_wall):
@@ -90,4 +88,3 @@ def test_a_program_that_runs_beside_another_adds_half_its_time():
     alone = Program("p", "rostest", "a.test", [], Path("x"), seconds=10.0)
     beside = Program("p", "gtest", "p_test_b", [], Path("x"), seconds=10.0)
     assert wall_times([alone, beside]) == {"p/a.test": 10.0, "p/p_test_b": 5.0}
->>>>>>> mend-12b

@@ -111,7 +111,9 @@ def action_of(state: str) -> str:
 
 def outcome(name: str) -> str:
     """Words for how a state ended, or for an action of the journal."""
-    return OUTCOMES.get(name) or (button(name) if name in BUTTONS else PHASES.get(name, name.replace("_", " ")))
+    if name in OUTCOMES:
+        return OUTCOMES[name]
+    return BUTTONS.get(name) or PHASES.get(name) or name.replace("_", " ")
 
 
 def plain(sentence: str) -> str:
