@@ -74,6 +74,20 @@ def test_every_node_and_every_thread_of_a_node_is_in_the_tables():
     assert not sorted(name for name in threads if f"`{name}" not in section)
 
 
+def test_every_timer_and_tf_listener_of_a_node_is_in_the_table():
+    rows = re.findall(r"^\| `/.+$", PAGE.split("## Processes and threads")[1].split("## ")[0], flags=re.MULTILINE)
+    made = {"rospy.Timer(": "timer", "TfListener(": "tf listener"}
+    scripts = [path for path in SOURCES.glob("*/scripts/*.py") if "def main" in path.read_text(encoding="utf-8")]
+    found = 0
+    for path in scripts:
+        text = path.read_text(encoding="utf-8")
+        for row in (row for row in rows if f"`{path.name}`" in row or f"/{path.name}`" in row):
+            for call, word in made.items():
+                found += call in text
+                assert (call in text) <= (word in row), (path.name, word)
+    assert found >= 6
+
+
 def test_the_numbers_in_the_table_of_threads_are_those_of_the_code():
     section = PAGE.split("## Processes and threads")[1].split("## ")[0]
     said = {
