@@ -21,11 +21,13 @@ import tf2_ros
 from coglab_console.browser import Browser, press_and_hold
 from coglab_msgs.msg import LwrState, MasterState
 from coglab_msgs.srv import LwrCommand
+from console_phases import phases_of
 from console_rows import say
 from diagnostic_msgs.msg import DiagnosticArray
 from selenium.webdriver.common.action_chains import ActionChains
 from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
+from smach_msgs.msg import SmachContainerStatus, SmachContainerStructure
 
 MOVES = "return coglab.state().speed > 0.02"
 STANDSTILL = ("stopped", "fault")
@@ -76,6 +78,9 @@ class Cell:
         self._console: subprocess.Popen | None = None
         self.machine, self.arm = MasterState(), LwrState()
         self.passed: list[str] = []  # states that were entered, see came_to()
+        self.structure: dict[str, list[str]] = {}  # children of the machine's containers, by path
+        self.fri: dict[str, str] = {}  # newest diagnostics of the connection to the robot controller
+        self.supervisors: list[str] = []  # what the arm's interface was in, one after the other
         self.held_at = 0.0  # s of the bridge's own clock, when the hold latched last
         self.latencies: list[float] = []  # s, as the bridge's diagnostics tell it
         self.answers: list[float] = []  # s, mean answer time, likewise
@@ -87,6 +92,11 @@ class Cell:
         self.frames = tf2_ros.Buffer()
         self._listener = tf2_ros.TransformListener(self.frames)
         rospy.Subscriber("/coglab/state", MasterState, self._on_machine)
+        for topic, kind, heard in (
+            ("container_structure", SmachContainerStructure, self._on_structure),
+            ("container_status", SmachContainerStatus, self._on_container),
+        ):
+            rospy.Subscriber(f"/coglab/smach/{topic}", kind, heard, queue_size=200)
         rospy.Subscriber("/lwr/state", LwrState, self._on_arm, tcp_nodelay=True)
         rospy.Subscriber("/diagnostics", DiagnosticArray, self._on_diagnostics)
         self.wait(lambda: self.machine.in_hub and "wait" in self.machine.state, READY, "the hub")
@@ -95,22 +105,36 @@ class Cell:
         self.machine = message
         self.passed.append(message.state)
 
-    def came_to(self, action: str, label: str) -> bool:
-        """Whether this state of the action was entered since `passed` was cleared. TimeoutError where the machine has
+    def _on_structure(self, message: SmachContainerStructure) -> None:
+        self.structure[message.path] = list(message.children)
+
+    def _on_container(self, message: SmachContainerStatus) -> None:
+        # Of states side by side, /coglab/state tells the newest alone.
+        self.passed += [f"{message.path}/{label}" for label in message.active_states]
+
+    def phases(self, action: str) -> list[str]:
+        """Paths of the phases of an action, from the structure of the machine."""
+        self.wait(lambda: any(path.endswith(f"/{action}") for path in list(self.structure)), 20.0, "the structure")
+        return phases_of(dict(self.structure), action)
+
+    def came_to(self, state: str) -> bool:
+        """Whether the state of this path was entered since `passed` was cleared. TimeoutError where the machine has
         stopped by itself."""
         if self.leaf in STANDSTILL:
-            raise TimeoutError(f"{label}: the machine is in {self.leaf}: {self.machine.why}")
-        return any(action in path and path.endswith(f"/{label}") for path in list(self.passed))
+            raise TimeoutError(f"{state}: the machine is in {self.leaf}: {self.machine.why}")
+        return state in list(self.passed)
 
     def _on_arm(self, message: LwrState) -> None:
         if message.hold_latched and not self.arm.hold_latched:
             self.held_at = message.header.stamp.to_sec()
+        if message.supervisor != self.arm.supervisor:
+            self.supervisors.append(message.supervisor)
         self.arm = message
 
     def _on_diagnostics(self, message: DiagnosticArray) -> None:
         for status in message.status:
             if status.name.endswith("FRI connection"):
-                values = {pair.key: pair.value for pair in status.values}
+                values = self.fri = {pair.key: pair.value for pair in status.values}
                 self.latencies.append(float(values["latency (s)"]))
                 self.answers.append(float(values["mean answer time (s)"]))
 

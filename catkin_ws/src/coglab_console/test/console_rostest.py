@@ -256,6 +256,27 @@ class Console(unittest.TestCase):
         self.assertEqual(after[: len(before)], before)
         self.assertEqual(after, list(range(after[0], after[-1] + 1)))
 
+    def test_07b_a_program_that_is_frozen_is_said_to_be_silent_within_a_second(self):
+        """Its connections stand, so that nothing but its silence tells."""
+        cell = "[...document.querySelectorAll('#status dt')].find((dt) => dt.innerText === arguments[0]).nextSibling"
+        for node, row in (("/ih2_hand", "Hand"), ("/coglab", "Phase")):
+            self.browser.js(
+                f"const cell = {cell}; delete window.silentAt; window.watch?.disconnect();"
+                "window.watch = new MutationObserver(() => {"
+                " if (cell.innerText.includes('silent')) window.silentAt ??= Date.now(); });"
+                "window.watch.observe(cell, { characterData: true, childList: true, subtree: true });",
+                row,
+            )
+            process = self.process_of(node)
+            began = time.time()
+            os.kill(process, signal.SIGSTOP)
+            try:
+                took = self.browser.until("return window.silentAt", 10.0) / 1000 - began
+            finally:
+                os.kill(process, signal.SIGCONT)
+            self.assertLess(took, 1.0, node)
+            self.browser.until(f"return !{cell}.innerText.includes('silent')", 10.0, row)
+
     @staticmethod
     def process_of(node):
         uri = rosgraph.Master("/console_test").lookupNode(node)
