@@ -59,10 +59,7 @@ export function choice({ blockedBy = () => '', refused = () => {}, ...attributes
   };
   const open = () => {
     const why = blockedBy();
-    if (why) {
-      refused(why);
-      return;
-    }
+    if (why) return refused(why);
     document.body.append(list);
     list.showPopover();
     place(list, button);
