@@ -31,6 +31,7 @@ COMBINED = {
         "faults",
         "goal_path",
         "limits_combined",
+        "test_robot_start.py",
         "test_start_failure.py",
     ),
     "ctrl_more": ("all_or_nothing", "test_address_sanitizer.py"),

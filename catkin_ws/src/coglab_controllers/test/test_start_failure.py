@@ -7,11 +7,14 @@ import shutil
 import socket
 import subprocess
 import sys
-import time
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "lwr_fri_bridge" / "test"))
+sys.path.insert(0, str(Path(__file__).resolve().parent))
+from own_master import own_master
 
 PACKAGE = Path(__file__).resolve().parent.parent
 SOURCES = PACKAGE.parent
@@ -30,8 +33,6 @@ WATCHED = [
         )
     ),
 ]
-
-sys.path.insert(0, str(SOURCES / "lwr_fri_bridge" / "test"))
 
 
 @pytest.fixture(scope="module")
@@ -92,22 +93,9 @@ def robot_node(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture
-def master(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        port = probe.getsockname()[1]
-    monkeypatch.setenv("ROS_MASTER_URI", f"http://127.0.0.1:{port}")
-    core = subprocess.Popen(
-        ["rosmaster", "--core", "-p", str(port)], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
-    )
-    import rosgraph
-
-    end = time.monotonic() + 20.0
-    while not rosgraph.is_master_online() and time.monotonic() < end:
-        time.sleep(0.1)
-    yield
-    core.terminate()
-    core.wait(timeout=20.0)
+def master() -> Iterator[None]:
+    with own_master():
+        yield
 
 
 @pytest.mark.skipif(not os.environ.get("COGLAB_LONG"), reason="campaign: set COGLAB_LONG=1")

@@ -30,6 +30,8 @@ class Place:
     """ArmPort of the arm whose contacts the port finds"""
     believe: Callable[[float], None] = lambda offer: None
     """from now on it is believed with this probability that the mug is offered"""
+    show_hand: Callable[[bool], None] = lambda seen: None
+    """whether the person's hand is seen from now on"""
 
 
 class Contract:

@@ -152,9 +152,24 @@ class PerceptionContract(Contract):
         self.place.freeze()
         try:
             self.until(lambda: self.port.ahead() == nothing, 1.0, "silence")
-            assert self.port.recognition() == Recognition()
+            self.until(lambda: self.port.recognition() == Recognition(), 1.0, "silence")
         finally:
             self.place.thaw()
+        self.until(lambda: self.port.ahead().offer == 0.75, 2.0, "its return")
+        self.place.believe(0.0)
+        self.until(lambda: self.port.ahead().offer == 0.0, 2.0, "the end of the offer")
+
+    def test_nothing_is_believed_nor_recognised_of_a_hand_that_is_not_seen(self):
+        self.place.believe(0.75)
+        self.until(lambda: self.port.ahead().offer == 0.75, 2.0, "the belief")
+        self.until(lambda: self.port.recognition().confidence > 0.5, 2.0, "the recognition")
+        self.place.show_hand(False)
+        try:
+            self.until(lambda: self.port.ahead() == Ahead(), 1.0, "the end of what was believed")
+            self.until(lambda: self.port.recognition() == Recognition(), 1.0, "the end of what was recognised")
+            self.stays(lambda: self.port.ahead() == Ahead() and self.port.recognition() == Recognition(), 0.5)
+        finally:
+            self.place.show_hand(True)
         self.until(lambda: self.port.ahead().offer == 0.75, 2.0, "its return")
         self.place.believe(0.0)
         self.until(lambda: self.port.ahead().offer == 0.0, 2.0, "the end of the offer")

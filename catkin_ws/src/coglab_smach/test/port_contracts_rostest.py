@@ -16,7 +16,7 @@ import rosgraph
 import rospkg
 import rospy
 import rostest
-from coglab_msgs.msg import HandoverBelief
+from coglab_msgs.msg import HandoverBelief, Recognition
 from coglab_smach.ros.arm import RosArm
 from coglab_smach.ros.hand import RosHand
 from coglab_smach.ros.ports import RosContact, RosDatabase, RosPerception
@@ -44,18 +44,24 @@ def pid_of(node):
 
 
 class Recogniser:
-    """Tells of a belief in an offer, as the node that recognises intentions does, while it believes in one."""
+    """Tells of a belief in an offer, as the node that recognises intentions does, while it believes in one: with each
+    sight of the hand."""
 
     def __init__(self):
-        self.offer, self.frozen = 0.0, False
+        self.offer, self.frozen, self.sees = 0.0, False, True
         self.publisher = rospy.Publisher("perception/belief", HandoverBelief, queue_size=1)
+        self.patterns = rospy.Publisher("perception/recognition", Recognition, queue_size=1)
         rospy.Timer(rospy.Duration(0.05), self.tell)
 
     def believe(self, offer):
         self.offer = offer
 
+    def show_hand(self, seen):
+        self.sees = seen
+
     def tell(self, _event):
-        if self.offer > 0.0 and not self.frozen:
+        if self.offer > 0.0 and self.sees and not self.frozen:
+            self.patterns.publish(Recognition(pattern="mug", confidence=0.9, decided=True))
             message = HandoverBelief(offer=self.offer, hand="human_hand", object_id="mug")
             message.place_covariance[0] = -1.0
             message.header.stamp = rospy.Time.now()
@@ -82,7 +88,8 @@ def place_of(name, arm_may_freeze, arm_is_used, recogniser):
     push = lambda force: publisher.publish(Wrench(force=Vector3(0.0, 0.0, force)))  # noqa: E731
     arm = RosArm() if name == "contact" else None
     clock = time.monotonic, time.sleep
-    return Place(PORTS[name](), *clock, freeze, thaw, library, push, arm_is_used, arm, recogniser.believe)
+    person = recogniser.believe, recogniser.show_hand
+    return Place(PORTS[name](), *clock, freeze, thaw, library, push, arm_is_used, arm, *person)
 
 
 class PortContracts(unittest.TestCase):

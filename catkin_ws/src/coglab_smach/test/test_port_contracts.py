@@ -1,8 +1,11 @@
 """The contracts of the ports on their doubles."""
 
+from dataclasses import replace
+
 import pytest
 from coglab_objects.database import ObjectDatabase, objects_folder
 from coglab_perception.belief import Belief
+from coglab_perception.recogniser import Estimate
 from coglab_sim.virtual_world import DT, World
 from coglab_smach.simulated.arm import SimulatedArm
 from coglab_smach.simulated.cell import SimulatedCell
@@ -50,8 +53,16 @@ def double_of(name):
         LIBRARY,
         cell.push,
         arm=SimulatedArm(cell),
-        believe=lambda offer: setattr(cell.partner, "offer", offer),
+        believe=lambda offer: believe_in_cell(cell, offer),
+        show_hand=lambda seen: (cell.faults.not_seen.discard if seen else cell.faults.not_seen.add)("human_hand"),
     )
+
+
+def believe_in_cell(cell, offer):
+    """The partner of the kinematic cell offers, and moves as for that."""
+    cell.partner.offer = offer
+    cell.partner.pattern, cell.partner.pattern_at = ("mug", 0.0) if offer else ("unknown", 0.0)
+    cell.arm.motion_started = cell.clock.now()
 
 
 @pytest.mark.parametrize(
@@ -72,9 +83,20 @@ class ToldBelief:
     def see_object(self, *sight):
         """Without an influence."""
 
-    def see_hand(self, *sight):
+    def see_hand(self, captured, *sight):
         """Likewise."""
+        self.belief = replace(self.belief, stamp=captured)
         return self.belief
+
+
+class ToldRecogniser:
+    """In the place of its recogniser: recognises what it is told."""
+
+    estimate = Estimate("mug", 0.9, True, 0.5, {"mug": 0.9, "unknown": 0.1})
+
+    def pattern_end(self):
+        """Of no influence."""
+        return None
 
 
 def virtual_double_of(name):
@@ -83,6 +105,9 @@ def virtual_double_of(name):
 
     def believe(offer):
         told.belief = Belief(rig.t, offer=offer, object_id="mug" if offer else "")
+
+    def show_hand(seen):
+        (rig.blind.discard if seen else rig.blind.add)("human_hand")
 
     def sleep(duration):
         for _ in range(max(1, round(duration / DT))):
@@ -94,14 +119,23 @@ def virtual_double_of(name):
     ports = {
         "arm": VirtualArm,
         "hand": VirtualHand,
-        "perception": lambda rig: VirtualPerception(rig, belief=told),
+        "perception": lambda rig: VirtualPerception(rig, ToldRecogniser(), told),
         "contact": VirtualContact,
         "database": lambda rig: VirtualDatabase(database),
     }
     port = ports[name](rig)
     push = lambda force: rig.cell.set_push([0.0, 0.0, force])  # noqa: E731
     return Place(
-        port, lambda: rig.t, sleep, port.freeze, port.thaw, LIBRARY, push, arm=VirtualArm(rig), believe=believe
+        port,
+        lambda: rig.t,
+        sleep,
+        port.freeze,
+        port.thaw,
+        LIBRARY,
+        push,
+        arm=VirtualArm(rig),
+        believe=believe,
+        show_hand=show_hand,
     )
 
 

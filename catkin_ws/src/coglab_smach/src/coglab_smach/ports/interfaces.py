@@ -208,6 +208,10 @@ class HandPort(Protocol):
         """The newest status; connected=False if the node is silent for more than 1 s."""
 
 
+OLDEST_BELIEF, OLDEST_RECOGNITION = 0.3, 0.5
+"""s after which nothing is known any more of a hand that is not seen"""
+
+
 class PerceptionPort(Protocol):
     """The perception modules, whoever provides them."""
 
@@ -221,7 +225,7 @@ class PerceptionPort(Protocol):
         """Free places on the board; value: list of Located in frame 'board', best first."""
 
     def recognition(self) -> Recognition:
-        """The newest recognition of the partner's motion."""
+        """The newest recognition of the partner's motion; nothing is recognised where none has come for 0.5 s."""
 
     def ahead(self) -> Ahead:
         """The newest belief about an offer or a request; nothing is believed where none has come for 0.3 s."""

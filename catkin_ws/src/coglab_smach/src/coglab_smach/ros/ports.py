@@ -17,11 +17,11 @@ from coglab_py.pose import IDENTITY
 from coglab_py.yaml_file import YamlError, parse
 from geometry_msgs.msg import Point, Pose, Quaternion
 
-from coglab_smach.ports.interfaces import Ahead, ContactEvent, Located, Recognition
+from coglab_smach.ports.interfaces import OLDEST_BELIEF, OLDEST_RECOGNITION, Ahead, ContactEvent, Located, Recognition
 from coglab_smach.ports.pending import Pending, Permit, PortError, Threaded
 from coglab_smach.ros.calls import SERVICE_WAIT, Newest, call, call_now, mapped
 
-OLDEST_BELIEF = OLDEST_SIGNAL = 0.3
+OLDEST_SIGNAL = 0.3
 """s"""
 DEFAULT_SHARE = 0.5
 """of the load, where a request leaves it to the detector"""
@@ -50,7 +50,7 @@ class RosPerception:
 
     def recognition(self) -> Recognition:
         message = self._recognition.message
-        if message is None or self._recognition.age() > 0.5:
+        if message is None or self._recognition.age() > OLDEST_RECOGNITION:
             return Recognition()
         return Recognition(
             message.pattern,

@@ -179,17 +179,20 @@ class SimulatedPerception:
             "perception", "free_places", 0.1, lambda: [_located(place, "", parent="board") for place in self.places]
         )
 
+    def _knows_nothing(self) -> bool:
+        """The node is silent, or does not see the hand."""
+        return "perception" in self.cell.faults.dead or "human_hand" in self.cell.faults.not_seen
+
     def ahead(self) -> Ahead:
         partner = self.cell.partner
-        if "perception" in self.cell.faults.dead:
+        if self._knows_nothing():
             return Ahead()
         return Ahead(partner.offer, partner.request, "mug" if partner.offer > 0.0 else "")
 
     def recognition(self) -> Recognition:
         cell, partner = self.cell, self.cell.partner
         started = cell.arm.motion_started
-        silent = "perception" in cell.faults.dead
-        if silent or started is None or cell.clock.now() - started < partner.pattern_at:
+        if self._knows_nothing() or started is None or cell.clock.now() - started < partner.pattern_at:
             return Recognition()
         return Recognition(partner.pattern, 0.95, partner.pattern != "unknown")
 

@@ -7,6 +7,7 @@ stands a node that can be frozen: freeze() and thaw() of the port.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -23,6 +24,8 @@ from coglab_smach.contact.fused_detector import FusedDetector
 from coglab_smach.contact.motion_thresholds import Thresholds
 from coglab_smach.contact.moving_contact import MovingContact
 from coglab_smach.ports.interfaces import (
+    OLDEST_BELIEF,
+    OLDEST_RECOGNITION,
     Ahead,
     ContactEvent,
     HandState,
@@ -121,6 +124,7 @@ class VirtualPerception:
         self.rig, self.recogniser, self.belief, self.node = rig, recogniser, belief, VirtualNode()
         self._blind: set[str] = set()
         self._taken: dict[str, float] = {}
+        self._seen = self._believed = -math.inf  # s, when the last sight of the hand came, and the last belief
         rig.after_period.append(self._believe)
 
     def freeze(self) -> None:
@@ -163,18 +167,25 @@ class VirtualPerception:
 
     def _believe(self) -> None:
         """Each new sight, objects first; the frames ahead, as the recogniser's node sends them."""
-        if self.belief is None or self.node.frozen:
+        if self.node.frozen:
             return
         t = self.rig.t
         for name, sight in sorted(self.rig.sights.items(), reverse=True):
             if sight.captured <= self._taken.get(name, -1.0):
                 continue
             self._taken[name] = sight.captured
+            if name == HAND:
+                self._seen = t
+            if self.belief is None:
+                continue
             if name != HAND:
                 self.belief.see_object(sight.captured, name.removeprefix("object_"), sight.frame.position, t)
                 continue
             end = self.recogniser.pattern_end() if self.recogniser is not None else None
             seen = self.belief.see_hand(sight.captured, sight.frame.position, t, self.rig.hand.holding, end)
+            if seen.stamp != sight.captured:
+                continue  # the filter has no use for this sight, and nothing is sent
+            self._believed = t
             places = {HAND: seen.hand_place, f"object_{seen.object_id}": seen.place if seen.object_id else None}
             for frame, place in places.items():
                 if place is not None and frame in self.rig.sights:
@@ -182,7 +193,7 @@ class VirtualPerception:
                     self.rig.robot.virtual.set_frame(frame + "_ahead", place, turned, t - sight.captured)
 
     def ahead(self) -> Ahead:
-        if self.belief is None or self.node.frozen:
+        if self.belief is None or self.node.frozen or self.rig.t - self._believed > OLDEST_BELIEF:
             return Ahead()
         seen = self.belief.belief
         if seen.place is None:
@@ -193,7 +204,7 @@ class VirtualPerception:
         return Ahead(seen.offer, seen.request, seen.object_id, frame + "_ahead", (x, y, z), deviation)
 
     def recognition(self) -> Recognition:
-        if self.recogniser is None or self.node.frozen:
+        if self.recogniser is None or self.node.frozen or self.rig.t - self._seen > OLDEST_RECOGNITION:
             return Recognition()
         seen = self.recogniser.estimate
         return Recognition(seen.pattern, seen.confidence, seen.decided, seen.probabilities)

@@ -1,0 +1,77 @@
+"""A start of /robot that fails is told at once, by what is wrong, and ends the process; its FRI thread, too."""
+
+from __future__ import annotations
+
+import os
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+import rosgraph
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "lwr_fri_bridge" / "test"))
+sys.path.insert(0, str(Path(__file__).resolve().parent))
+from own_master import own_master
+from udp_controller import UdpController
+
+SOURCES = Path(__file__).resolve().parents[2]
+LIMIT = 60.0  # s
+MORE = 1.0  # s that a busy port may take beyond a start that ends for a parameter
+
+
+def robot_binary() -> str:
+    """Path of the node in the sourced workspace."""
+    for prefix in os.environ.get("CMAKE_PREFIX_PATH", "").split(":"):
+        path = Path(prefix) / "lib" / "coglab_controllers" / "robot_node"
+        if path.is_file():
+            return str(path)
+    pytest.skip("robot_node is not built: source the workspace's setup file first")
+
+
+@pytest.fixture(scope="module")
+def master() -> Iterator[rosgraph.Master]:
+    with own_master() as running:
+        running.setParam("/robot_description", (SOURCES / "lwr_description" / "urdf" / "lwr_ih2.urdf").read_text())
+        yield running
+
+
+def failed_start(master: rosgraph.Master, **parameters: object) -> tuple[float, list[str]]:
+    """s that a start took which has to fail, and its lines; parameters with __ for /."""
+    master.setParam("/lwr", {"rt_priority": 0, "lock_memory": False})
+    master.setParam("/controller_manager", {"cycle_time": 0.005})
+    for name, value in parameters.items():
+        master.setParam("/" + name.replace("__", "/"), value)
+    began = time.monotonic()
+    ended = subprocess.run(
+        [robot_binary()], text=True, timeout=LIMIT, check=False, stdout=subprocess.PIPE, stderr=subprocess.STDOUT
+    )
+    assert ended.returncode == 1, (ended.returncode, ended.stdout[-3000:])
+    return time.monotonic() - began, [line for line in ended.stdout.splitlines() if line.strip()]
+
+
+def test_a_busy_port_is_said_first_and_at_once(master):
+    parameter, _ = failed_start(master, lwr__fri_port=70000)
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
+        other.bind(("127.0.0.1", 0))
+        port = other.getsockname()[1]
+        busy, lines = failed_start(master, lwr__fri_port=port)
+    assert f":{port} (Address already in use)" in lines[0], lines
+    assert busy < parameter + MORE, "no time limit of a request is waited for"
+
+
+@pytest.mark.parametrize("name, value", [("lwr__hot_drive", -300.0), ("controller_manager__cycle_time", 7.0)])
+def test_a_parameter_that_is_judged_late_ends_the_start_beside_a_running_fri_thread(master, name, value):
+    """A controller sends at 1 kHz meanwhile. The memory is watched in test_start_failure.py (./coglab test --long)."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        probe.bind(("127.0.0.1", 0))
+        port = probe.getsockname()[1]
+    controller = UdpController(port, period=0.001).start()
+    try:
+        _, lines = failed_start(master, lwr__fri_port=port, **{name: value})
+    finally:
+        controller.close()
+    assert any(name.rpartition("__")[2] in line for line in lines), lines
