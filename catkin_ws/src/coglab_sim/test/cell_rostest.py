@@ -149,22 +149,22 @@ class CellNode(unittest.TestCase):
         self.commands.publish(MotorCommands(speed=speed, target=target, current=[current] * 5))
 
     def test_3b_what_the_database_refuses_is_no_object_of_the_cell(self) -> None:
-        mug = (objects_folder() / "mug.yaml").read_text(encoding="utf-8")
+        ball = (objects_folder() / "ball.yaml").read_text(encoding="utf-8")
         with tempfile.TemporaryDirectory() as folder:
             rospy.set_param("/coglab_sim/cell/objects", folder)
             try:
                 for field, changed in (
-                    ("mass", mug.replace("mass: 0.31", "mass: 6.0")),
-                    ("size", mug.replace("size: [0.08, 0.08, 0.10]", "size: [0.08, 0.08, 1.4]")),
+                    ("mass", ball.replace("mass: 0.13", "mass: 6.0")),
+                    ("size", ball.replace("size: [0.07, 0.07, 0.07]", "size: [0.08, 0.08, 1.4]")),
                 ):
-                    path = Path(folder) / "mug.yaml"
+                    path = Path(folder) / "ball.yaml"
                     path.write_text(changed, encoding="utf-8")
                     with self.assertRaisesRegex(ObjectError, field):
                         read_object(path)
-                    answer = self.place("mug", "world", Pose(Point(), Quaternion(0, 0, 0, 1)))
+                    answer = self.place("ball", "world", Pose(Point(), Quaternion(0, 0, 0, 1)))
                     self.assertFalse(answer.success)
                     self.assertIn(f"{field} = ", answer.message)
-                    self.assertIn("./coglab object check mug", answer.message)
+                    self.assertIn("./coglab object check ball", answer.message)
             finally:
                 rospy.delete_param("/coglab_sim/cell/objects")
 
