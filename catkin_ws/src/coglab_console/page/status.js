@@ -6,7 +6,6 @@ import { ageWords } from './cell.js';
 const ROWS = ['Phase', 'Waits', 'FRI', 'Arm', 'Motion', 'Hand', 'Person', 'Object', 'Contact', 'Why', 'Last'];
 const OLD = 0.5; // s, sights of perception older than this deserve a mark
 const RECENT = 5; // s for which a recognised reach is shown
-const SUPERVISOR = { disconnected: 'no connection', monitor: 'only watched', starting: 'starting', command: 'ready to move', holding: 'holds still', stopping: 'stopping', stopped: 'stopped' };
 const MODES = { POSITION: 'position control', CART_IMP: 'Cartesian impedance', JNT_IMP: 'joint impedance', OTHER: 'another control' };
 const CONTROLLERS = { dmp: 'reach', ptp: 'to a posture' };
 const MOTIONS = { idle: 'at rest', running: 'under way', holding: 'waits where it is', fault: 'fault' };
@@ -28,9 +27,9 @@ function fri({ alive, fri: state, quality, cycle, reason }) {
   return [level, `${state || 'OFF'} ${quality || reason || 'no datagrams'}, ${(cycle * 1000).toFixed(0)} ms${more}`];
 }
 
-function arm({ alive, supervisor, allowed, held, mode, power }) {
+function arm({ alive, supervisor, words: does, allowed, held, mode, power }) {
   if (missing('arm', alive, '')) return ['fault', 'not known'];
-  const words = `${SUPERVISOR[supervisor] ?? supervisor}, ${MODES[mode] ?? mode}${power ? '' : ', not all drives on'}`;
+  const words = `${does}, ${MODES[mode] ?? mode}${power ? '' : ', not all drives on'}`;
   return [held || !power || ['stopped', 'disconnected'].includes(supervisor) ? 'fault' : allowed ? 'ok' : 'warn', words];
 }
 

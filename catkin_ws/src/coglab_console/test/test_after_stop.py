@@ -95,6 +95,15 @@ def test_a_held_button_begins_the_motion_once(desk):
     assert ask(desk, "a", "start", **RECEIVE)["success"]  # the next one needs a press only
 
 
+def test_a_calibration_is_not_the_first_motion_after_a_stop(desk):
+    """It was held down itself; the arm moves by a held button all the same."""
+    ask(desk, "a", "stop")
+    ask(desk, "a", "acknowledge", stop=newest(desk))
+    (answer,) = hold_for(desk, 1.0, what=("calibrate", {"mode": "fast"}))
+    assert answer["success"] and desk.guard.needs_hold
+    assert "hold" in ask(desk, "a", "start", **RECEIVE)["message"]
+
+
 def test_a_browser_that_dies_with_the_button_held_starts_nothing():
     clock = Clock()
     button = HeldButton(clock)

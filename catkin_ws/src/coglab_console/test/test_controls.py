@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import pytest
 from coglab_console.browser import Browser
+from coglab_console.desk.words import BUTTONS
 from coglab_console.page_check import PAGES, look
 from page_double import Desk
 
@@ -24,8 +25,9 @@ FEEDBACK = {
 STATUS = {
     "machine": {"alive": True, "state": "/m/wait_without_object", "words": "ready", "hub": True, "actions": ["take"],
                 "object": "", "why": "", "fallback": "mug"},
-    "arm": {"alive": True, "supervisor": "command", "fri": "CMD", "quality": "PERFECT", "mode": "POSITION",
-            "power": True, "allowed": True, "held": False, "reason": "", "cycle": 0.005},
+    "arm": {"alive": True, "supervisor": "command", "words": "ready to move", "fri": "CMD",
+            "quality": "PERFECT", "mode": "POSITION", "power": True, "allowed": True, "held": False, "reason": "",
+            "cycle": 0.005},
     "hand": {"alive": True, "connected": True, "calibrated": True, "calibrating": False, "holding": False,
              "message": "", "motors": 5},
     "manager": {"alive": True, "state": "idle", "active": "dmp", "reason": "", "scale": 1.0},
@@ -97,9 +99,9 @@ def test_a_stop_shows_who_watches_its_cause_and_why_they_cannot_acknowledge_it(d
     with Browser() as other:
         other.open(desk.console.link())
         desk.loop.call_soon_threadsafe(desk.console.desk.guard.stop, "the arm is blocked")
-        other.until("return document.getElementById('acknowledge').getAttribute('aria-disabled') === 'true'", 10.0)
-        assert "browser 1 operates" in other.js("return document.getElementById('why-acknowledge').innerText")
-        assert "the arm is blocked" in other.js("return document.getElementById('stop-cause').innerText")
+        other.until("return document.getElementById('stop-cause').innerText.includes('the arm is blocked')", 10.0)
+        other.until("return document.getElementById('why-acknowledge').innerText === 'browser 1 operates'", 10.0)
+        assert other.js("return document.getElementById('acknowledge').getAttribute('aria-disabled')") == "true"
         assert look(other)[0] == []
         other.js("document.getElementById('acknowledge').click()")
         other.until("return document.getElementById('told').innerText.includes('browser 1 operates')", 5.0)
@@ -196,6 +198,13 @@ def test_a_row_of_what_is_silent_says_for_how_long(desk, source, row, words):
     finally:
         desk.state = {}
     page.until(f"{shown}.includes('silent') === false", 3.0, row)
+
+
+def test_the_words_on_the_buttons_are_those_of_the_reasons(desk):
+    shown = desk.browser.js(
+        "return [...document.querySelectorAll('[data-action]')].map((one) => [one.dataset.action, one.innerText])"
+    )
+    assert {name: words.split(" ", 1)[1] for name, words in shown} == BUTTONS
 
 
 def test_an_event_says_in_which_phase_it_was(desk):

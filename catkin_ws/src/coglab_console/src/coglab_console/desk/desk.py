@@ -70,6 +70,7 @@ class Desk:
         self.roles = Roles(lambda text, level: events.add("control", text, level))
         self.guard = MotionGuard(backend.real)
         self.experiment = Experiment(folder, now, lambda text: events.add("experiment", text, "warning"))
+        self.experiment.phase = lambda: events.phase()
         goes_on = self.experiment.resume()
         if goes_on:
             events.add("experiment", goes_on, "warning")
@@ -211,7 +212,7 @@ class Desk:
             stops = self.guard.stops
             answer = await self.backend.call(name, arguments)
             answer["message"] = plain(answer["message"])
-            if answer["success"] and judge(name, {**arguments}).motion:
+            if answer["success"] and name in ("start", "home"):  # fingers that calibrate are no motion of the arm
                 self.guard.moved(stops)
         if name not in ("parameters", "note", "select_object"):
             told = f"{who}: {words_of(name, arguments)}: {answer['message']}"
@@ -231,7 +232,7 @@ class Desk:
             return
         self._trial = trial
         condition = self.experiment.condition()
-        named = next((word for word in re.split(r"[^a-z0-9_]+", condition) if word in now.objects), "")
+        named = next((word for word in re.split(r"[^a-z0-9_]+", condition.lower()) if word in now.objects), "")
         if trial[0] and named:
             self.backend.tell("select_object", named)
             self._select(f"trial {trial[0]} ({condition})", named)

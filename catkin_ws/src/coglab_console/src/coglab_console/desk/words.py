@@ -74,6 +74,16 @@ IN_ACTION = {  # where the same state means something else in another action
     ("exchange_robot_to_human", "wait_stop"): "reaches and gives",
     ("exchange_robot_to_human", "hand_open"): "lets the person have it",
 }
+SUPERVISOR = {
+    "disconnected": "no connection to the robot controller",
+    "monitor": "only watched",
+    "starting": "starting",
+    "command": "ready to move",
+    "holding": "holds still",
+    "stopping": "stopping",
+    "stopped": "stopped",
+}
+"""What the arm's interface is in"""
 OUTCOMES = {
     "succeeded": "done",
     "failed": "failed",
@@ -107,6 +117,11 @@ def button(name: str) -> str:
 def action_of(state: str) -> str:
     """Words on the button of the action that the path of a state belongs to; empty where it belongs to none."""
     return next((BUTTONS[label] for label in state.split("/") if label in BUTTONS), "")
+
+
+def supervisor(name: str) -> str:
+    """What the arm's interface is in, in words."""
+    return SUPERVISOR.get(name, name)
 
 
 def outcome(name: str) -> str:
