@@ -58,11 +58,7 @@ export function choice({ blockedBy = () => '', refused = () => {}, ...attributes
     setAttribute(button, 'aria-activedescendant', null);
   };
   const open = () => {
-    const why = blockedBy();
-    if (why) {
-      refused(why);
-      return;
-    }
+    if (blockedBy()) return void refused(blockedBy());
     document.body.append(list);
     list.showPopover();
     place(list, button);

@@ -220,7 +220,7 @@ class Console(unittest.TestCase):
 
     def test_06_stop_waits_neither_for_the_master_nor_for_a_frozen_brain(self):
         master = rosgraph.Master("/console_test")
-        frozen = [self.process_of("/coglab"), master.getPid()]
+        frozen = [self._process_of("/coglab"), master.getPid()]
         for process in frozen:
             os.kill(process, signal.SIGSTOP)
         try:
@@ -237,7 +237,7 @@ class Console(unittest.TestCase):
 
     def test_07_a_lost_connection_greys_the_page_within_a_second_and_loses_no_event(self):
         before = self.browser.js("return coglab.events().map(e => e.seq)")
-        console = self.process_of("/coglab_console")
+        console = self._process_of("/coglab_console")
         self.browser.js(
             "const grey = () => { if (document.body.classList.contains('lost')) window.greyAt ??= Date.now(); };"
             "delete window.greyAt; new MutationObserver(grey).observe(document.body, { attributes: true });"
@@ -267,7 +267,7 @@ class Console(unittest.TestCase):
                 "window.watch.observe(cell, { characterData: true, childList: true, subtree: true });",
                 row,
             )
-            process = self.process_of(node)
+            process = self._process_of(node)
             began = time.time()
             os.kill(process, signal.SIGSTOP)
             try:
@@ -278,7 +278,7 @@ class Console(unittest.TestCase):
             self.browser.until(f"return !{cell}.innerText.includes('silent')", 10.0, row)
 
     @staticmethod
-    def process_of(node):
+    def _process_of(node):
         uri = rosgraph.Master("/console_test").lookupNode(node)
         return ServerProxy(uri).getPid("/console_test")[2]
 

@@ -126,7 +126,8 @@ def supervisor(name: str) -> str:
 
 def outcome(name: str) -> str:
     """Words for how a state ended, or for an action of the journal."""
-    return OUTCOMES.get(name) or (button(name) if name in BUTTONS else PHASES.get(name, name.replace("_", " ")))
+    words = OUTCOMES.get(name) or BUTTONS.get(name) or PHASES.get(name)
+    return words or name.replace("_", " ")
 
 
 def plain(sentence: str) -> str:
