@@ -82,7 +82,7 @@ class Cell:
         self.passed: list[str] = []  # states that were entered, see came_to()
         self.structure: dict[str, list[str]] = {}  # children of the machine's containers, by path
         self.fri: dict[str, str] = {}  # newest diagnostics of the connection to the robot controller
-        self._on_board = Pose()  # where the object lay on the board last
+        self._on_board = Pose()  # where the robot has put the object on the board
         self.supervisors: list[str] = []  # what the arm's interface was in, one after the other
         self.held_at = 0.0  # s of the bridge's own clock, when the hold latched last
         self.latencies: list[float] = []  # s, as the bridge's diagnostics tell it
@@ -167,12 +167,16 @@ class Cell:
     def holder(self) -> str:
         """Who has the object, by the truth of the cell: robot, human, board or floor."""
         truth = rospy.wait_for_message("/coglab_sim/truth/cell", CellTruth, 5.0)
-        if truth.held_by == "board":
-            self._on_board = truth.object
         return {"both": "robot", "none": "floor"}.get(truth.held_by, truth.held_by)
 
+    def remember_board(self) -> None:
+        """The object stands on the board as the robot has put it there."""
+        truth = rospy.wait_for_message("/coglab_sim/truth/cell", CellTruth, 5.0)
+        if truth.held_by == "board":
+            self._on_board = truth.object
+
     def pick_up(self) -> None:
-        """The object to where it lay on the board last, as an experimenter would."""
+        """The object to where the robot has put it on the board, as an experimenter would."""
         answer = rospy.ServiceProxy("/coglab_sim/cell/place_object", PlaceObject)("", "world", self._on_board)
         if not answer.success:
             raise TimeoutError(f"the object stays on the floor: {answer.message}")
@@ -334,7 +338,9 @@ class Operator:
             offered = self.cell.machine.actions
             if not step and action in offered:
                 return
-            self.do(step if step in offered else offered[0], False, "between")
+            done = self.do(step if step in offered else offered[0], False, "between")
+            if not done and holder == "board" and self.cell.leaf.startswith("wait_"):
+                self.cell.pick_up()  # it has fallen over
         raise TimeoutError(f"{action} was not offered, with the object held by {holder}")
 
     def go_on(self) -> None:

@@ -96,7 +96,7 @@ _LONG = sorted((name for name in PHASES if "_" in name), reverse=True)  # short 
 _NAMES = re.compile(rf"(?<![\w/])'?({'|'.join(_LONG)})'?(?![\w/])")
 _PRESSED = re.compile(r"(press|or) (initialise|reset|take|put)\b")
 _TYPED = re.compile(r"type: (\./coglab start \w+(?: or \./coglab start \w+)*)")
-_CALLED = re.compile(r": rosservice call \S+ \w+")
+_CALLED = re.compile(r"(; send \w+)?: rosservice call \S+ \w+|; send (reset|start)\b")
 
 
 def phase(state: str) -> str:

@@ -52,7 +52,7 @@ def document(view: RosView) -> dict:
             "alive": view.there("controller_manager/status"),
             "state": view.manager.state,
             "active": view.manager.active_controller,
-            "reason": view.manager.reason,
+            "reason": plain(view.manager.reason),
             "scale": round(view.manager.speed_scale, 3),
         },
         "contact": {
