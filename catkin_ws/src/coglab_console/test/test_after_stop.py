@@ -2,8 +2,10 @@
 
 import asyncio
 import json
+from dataclasses import replace
 
 import pytest
+from coglab_console.desk.desk import Answer
 from coglab_console.desk.gates import MotionGuard, Standstills
 from coglab_console.desk.hold import HOLD_TIME, HeldButton
 from console_double import running
@@ -93,6 +95,30 @@ def test_a_held_button_begins_the_motion_once(desk):
     assert len(desk.backend.calls) == 1
     assert not desk.guard.needs_hold
     assert ask(desk, "a", "start", **RECEIVE)["success"]  # the next one needs a press only
+
+
+def test_a_button_that_is_still_held_while_its_command_is_carried_out_is_not_refused(desk):
+    """The state has changed by then, because of that very command."""
+    clock = Clock()
+    desk._held["a"] = HeldButton(clock)
+    let = asyncio.Event()
+
+    async def call(name, arguments):
+        desk.backend.now = replace(desk.backend.now, calibrating=True)
+        await let.wait()
+        return Answer(True, "started")
+
+    async def press():
+        held = []
+        for _ in range(12):
+            held.append(asyncio.create_task(desk.held("a", "calibrate", {"mode": "complete"})))
+            await asyncio.sleep(0)
+            clock.time += 0.1
+        let.set()
+        return [answer for answer in await asyncio.gather(*held) if answer is not None]
+
+    desk.backend.call = call
+    assert [dict(answer) for answer in asyncio.run(press())] == [{"success": True, "message": "started"}]
 
 
 def test_a_calibration_is_not_the_first_motion_after_a_stop(desk):

@@ -6,7 +6,8 @@ import time
 from dataclasses import replace
 
 import pytest
-from coglab_console.browser import Browser
+from coglab_console.browser import Browser, press_and_hold
+from coglab_console.desk.desk import Answer
 from coglab_console.desk.words import BUTTONS
 from coglab_console.page_check import PAGES, look
 from page_double import Desk
@@ -169,6 +170,27 @@ def test_one_click_changes_no_threshold_and_opens_no_hand(desk, tab, label, comm
     soon(lambda: len(desk.robot.calls) > before)
     page.js(f"{found}.dispatchEvent(new PointerEvent('pointerup', {{ bubbles: true }}))")
     assert desk.robot.calls[-1][0] == command
+    page.tab("Live")
+
+
+def test_a_held_button_that_has_begun_something_is_not_refused_when_it_is_let_go(desk, monkeypatch):
+    """By then it is disabled, because of what it has begun."""
+    page = desk.browser
+
+    async def call(name, arguments):
+        desk.robot.now = replace(desk.robot.now, calibrating=True)
+        return Answer(True, "calibration complete started")
+
+    monkeypatch.setattr(desk.robot, "call", call)
+    page.tab("Health")
+    page.js("document.getElementById('told').hidden = true")
+    found = "[...document.querySelectorAll('#page button')].find((one) => one.innerText === 'Forced calibration')"
+    button = page.js(f"const one = {found}; one.scrollIntoView(); return one")
+    press_and_hold(page, button, lambda: page.js(f"return {found}.hasAttribute('aria-disabled')"), 15.0)
+    time.sleep(0.3)
+    words = page.js("return document.getElementById('page').innerText")
+    assert page.js("return document.getElementById('told').hidden") and "calibration complete started" in words
+    desk.robot.now = replace(desk.robot.now, calibrating=False)
     page.tab("Live")
 
 

@@ -103,12 +103,14 @@ class Desk:
 
     async def held(self, who: str, name: Any, arguments: Any) -> Answer | None:
         """One message of a held button; None while nothing has come of it."""
+        if who in self._firing:  # what it asked for is being done, and may be the reason why it cannot be asked again
+            return None
         refusal = self._refusal(who, name, arguments)
         if refusal:
             self.released(who)
             return Answer(False, refusal)
         button = self._held.setdefault(who, HeldButton())
-        if not button.held((name, sorted(arguments.items(), key=str))) or who in self._firing:
+        if not button.held((name, sorted(arguments.items(), key=str))):
             return None
         self._firing.add(who)
         try:
