@@ -115,10 +115,16 @@ def test_a_button_that_is_still_held_while_its_command_is_carried_out_is_not_ref
             await asyncio.sleep(0)
             clock.time += 0.1
         let.set()
-        return [answer for answer in await asyncio.gather(*held) if answer is not None]
+        answers = await asyncio.gather(*held)
+        # A message that was on its way when the answer left.
+        answers.append(await desk.held("a", "calibrate", {"mode": "complete"}))
+        return [answer for answer in answers if answer is not None]
 
     desk.backend.call = call
     assert [dict(answer) for answer in asyncio.run(press())] == [{"success": True, "message": "started"}]
+    desk.released("a")
+    answer = asyncio.run(desk.held("a", "calibrate", {"mode": "complete"}))
+    assert "calibrates" in answer["message"]
 
 
 def test_a_calibration_is_not_the_first_motion_after_a_stop(desk):

@@ -78,7 +78,8 @@ class Desk:
         """chosen for the next action that takes one; empty: the brain's default"""
         self._trial = (0, 0)
         self._held: dict[str, HeldButton] = {}
-        self._firing: set[str] = set()
+        self._begun: dict[str, tuple[str, dict]] = {}
+        """by who holds a button down that has begun something: what"""
 
     # --- from the browsers ------------------------------------------------------------------------------------
 
@@ -103,7 +104,8 @@ class Desk:
 
     async def held(self, who: str, name: Any, arguments: Any) -> Answer | None:
         """One message of a held button; None while nothing has come of it."""
-        if who in self._firing:  # what it asked for is being done, and may be the reason why it cannot be asked again
+        # What was begun may be the reason why it cannot be asked again; the button is still down.
+        if who in self._begun and self._begun[who] == (name, arguments):
             return None
         refusal = self._refusal(who, name, arguments)
         if refusal:
@@ -112,15 +114,12 @@ class Desk:
         button = self._held.setdefault(who, HeldButton())
         if not button.held((name, sorted(arguments.items(), key=str))):
             return None
-        self._firing.add(who)
-        try:
-            answer = await self._perform(who, name, arguments)
-        finally:
-            self._firing.discard(who)
-        return answer
+        self._begun[who] = (name, arguments)
+        return await self._perform(who, name, arguments)
 
     def released(self, who: str, lost: bool = False) -> None:
         """The held button went up; `lost`: the connection of its browser went away, which everybody is told."""
+        self._begun.pop(who, None)
         button = self._held.pop(who, None)
         what = button.unfinished() if button is not None and lost else None
         if what is not None:
