@@ -18,7 +18,7 @@ import rosgraph
 import rospkg
 import rospy
 import tf2_ros
-from coglab_console.browser import Browser, press_and_hold
+from coglab_console.browser import Browser, acknowledge, press_and_hold
 from coglab_msgs.msg import CellTruth, LwrState, MasterState
 from coglab_msgs.srv import LwrCommand, PlaceObject
 from console_phases import phases_of
@@ -343,17 +343,18 @@ class Operator:
                 self.cell.pick_up()  # it has fallen over
         raise TimeoutError(f"{action} was not offered, with the object held by {holder}")
 
+    def _acknowledge(self) -> None:
+        if self.touches:
+            self.browser.touch("#acknowledge")
+        else:
+            self.browser.driver.find_element(By.ID, "acknowledge").click()
+
     def go_on(self) -> None:
         """Acknowledge where that is still to be done, then hold the button that leads on, and wait for the hub."""
         self.cell.wait(lambda: self.cell.leaf in STANDSTILL, 15.0, "stopped")
         leaf = self.cell.leaf
         self.browser.until("return coglab.docs().desk.guard.hold", 5.0)
-        if self.browser.js("return coglab.docs().desk.guard.unacknowledged"):
-            self.browser.until("return document.getElementById('acknowledge').offsetParent !== null", 5.0)
-            if self.touches:
-                self.browser.touch("#acknowledge")
-            else:
-                self.browser.driver.find_element(By.ID, "acknowledge").click()
+        acknowledge(self.browser, self._acknowledge)
         action = "reset" if leaf == "stopped" else "initialise"
         self.enabled(action)
         if self.touches:

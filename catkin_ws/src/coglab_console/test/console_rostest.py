@@ -21,7 +21,7 @@ import rostest
 import smach
 import smach_ros
 import tf2_ros
-from coglab_console.browser import Browser, fresh_link, press_and_hold
+from coglab_console.browser import Browser, acknowledge, fresh_link, press_and_hold
 from coglab_console.page_check import PAGES, look
 from coglab_msgs.msg import LwrState, MasterState
 from selenium.webdriver.common.action_chains import ActionChains
@@ -191,8 +191,7 @@ class Console(unittest.TestCase):
         leaf = "/fault" if self.machine.state.endswith("/fault") else "/stopped"
         self.page_in(leaf)
         self.browser.until("return document.getElementById('acknowledge').offsetParent !== null", 20.0)
-        self.browser.driver.find_element(By.ID, "acknowledge").click()
-        self.browser.until("return coglab.docs().desk.guard.unacknowledged === false", 20.0)
+        acknowledge(self.browser, self.browser.driver.find_element(By.ID, "acknowledge").click)
         button = self.enabled("initialise" if leaf == "/fault" else "reset")
         press_and_hold(self.browser, button, lambda: not self.machine.state.endswith(leaf), 30.0)
         self.page_in(hub)
