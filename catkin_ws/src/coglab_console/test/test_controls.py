@@ -23,7 +23,7 @@ FEEDBACK = {
         for name in ("yield", "limit")
     ],
 }  # fmt: skip
-STATUS = {
+STATUS: dict = {
     "machine": {"alive": True, "state": "/m/wait_without_object", "words": "ready", "hub": True, "actions": ["take"],
                 "object": "", "why": "", "fallback": "mug"},
     "arm": {"alive": True, "supervisor": "command", "words": "ready to move", "fri": "CMD",
@@ -208,6 +208,10 @@ def test_the_list_of_objects_stays_closed_for_who_watches(desk):
     "source, row, words",
     [
         ("brain", "Phase", "the brain has been silent for 1.2 s"),
+        ("brain", "Waits", "not known, the brain is silent"),
+        ("brain", "Object", "not known, the brain is silent"),
+        ("brain", "Why", "not known, the brain is silent"),
+        ("arm", "Arm", "not known, the arm is silent"),
         ("arm", "FRI", "silent for 1.2 s"),
         ("controllers", "Motion", "silent for 1.2 s"),
         ("hand", "Hand", "silent for 1.2 s"),
@@ -234,6 +238,16 @@ def test_the_words_on_the_buttons_are_those_of_the_reasons(desk):
         "return [...document.querySelectorAll('[data-action]')].map((one) => [one.dataset.action, one.innerText])"
     )
     assert {name: words.split(" ", 1)[1] for name, words in shown} == BUTTONS
+
+
+def test_what_was_long_ago_says_when(desk):
+    page = desk.browser
+    contact = {**STATUS["contact"], "words": "contact by momentum, margin 2.2", "stamp": time.monotonic() - 12.0}
+    desk.loop.call_soon_threadsafe(desk.console.documents.put, "status", {**STATUS, "contact": contact})
+    page.until("return /margin 2.2, 1[2-9] s ago/.test(document.getElementById('status').innerText)", 5.0)
+    desk.event("a touch")
+    page.until("return /[0-9:]{8} a touch/.test(document.getElementById('status').innerText)", 5.0)
+    desk.loop.call_soon_threadsafe(desk.console.documents.put, "status", STATUS)
 
 
 def test_an_event_says_in_which_phase_it_was(desk):

@@ -57,6 +57,7 @@ def document(view: RosView) -> dict:
         },
         "contact": {
             "words": view.contact,
+            "stamp": round(view.contact_stamp, 1),
             "alive": now.detector_alive,
             "state": view.signal.state,
             "mode": view.signal.mode,

@@ -69,6 +69,7 @@ class RosView:
         self._state_since = time.monotonic()
         self._standstills = Standstills()
         self.sources = Sources()
+        self.contact_stamp = 0.0
         self.hand_number = 0
         """of the newest message of the hand"""
         self.signal, self.contact, self.latency = ContactSignal(), "", math.nan
@@ -296,6 +297,7 @@ class RosView:
         self._result(row)
 
     def _on_contact(self, message: Contact) -> None:
+        self.contact_stamp = rospy.get_time()
         self.contact = (
             f"{'contact' if message.contact else 'released'} by {message.source}, margin {message.margin:.1f}"
         )
