@@ -13,7 +13,7 @@ import rospy
 import rostest
 
 sys.path.insert(0, rospkg.RosPack().get_path("coglab_controllers") + "/test")
-from coglab_msgs.msg import FeedbackStatus, LwrState, ReasonCode
+from coglab_msgs.msg import ControllerStatus, FeedbackStatus, LwrState, ReasonCode
 from coglab_msgs.srv import AddPtpRequest, FeedbackSelect, LwrCommand
 from robot_fixture import HOME, JOINTS, Robot, end_within, robot_processes, wait_until
 from sensor_msgs.msg import JointState
@@ -52,6 +52,14 @@ class IdealArm(unittest.TestCase):
         nodes = set(rosnode.get_node_names())
         self.assertIn("/robot", nodes)
         self.assertFalse(nodes & {"/lwr", "/cell", "/coglab_sim", "/ih2_hand", "/coglab", "/perception"}, nodes)
+
+    def test_1b_state_and_status_are_told_again_without_a_change(self) -> None:
+        """Who looks on knows a silent node from that."""
+        told: list[ControllerStatus] = []
+        rospy.Subscriber("controller_manager/status", ControllerStatus, told.append)
+        count = len(self.states)
+        wait_until(lambda: len(told) >= 4 and len(self.states) >= count + 4, 20.0, "four messages more of each")
+        self.assertEqual(len({(one.state, one.active_controller, one.plan_generation) for one in told[1:]}), 1)
 
     def test_2_goes_from_point_to_point(self) -> None:
         self.robot.start()

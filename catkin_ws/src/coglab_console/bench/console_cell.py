@@ -18,12 +18,13 @@ import rosgraph
 import rospkg
 import rospy
 import tf2_ros
-from coglab_console.browser import Browser, press_and_hold
-from coglab_msgs.msg import LwrState, MasterState
-from coglab_msgs.srv import LwrCommand
+from coglab_console.browser import Browser, acknowledge, press_and_hold
+from coglab_msgs.msg import CellTruth, LwrState, MasterState
+from coglab_msgs.srv import LwrCommand, PlaceObject
 from console_phases import phases_of
 from console_rows import say
 from diagnostic_msgs.msg import DiagnosticArray
+from geometry_msgs.msg import Pose
 from selenium.webdriver.common.action_chains import ActionChains
 from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
@@ -35,12 +36,13 @@ READY = 120.0  # s until the hub
 RECOVERY = 150.0  # s to be in a hub again
 LOAD = "(load)"  # the bridge's word for a simulated robot controller that this computer did not run in time
 ATTEMPTS = 3
-OTHER = {  # the action that makes room for the next one of a kind
-    "exchange_human_to_robot": "exchange_robot_to_human",
-    "exchange_robot_to_human": "exchange_human_to_robot",
-    "take": "put",
-    "put": "take",
+TOWARD = {  # the action that leads toward one, by who holds the object; none where that one can begin
+    "exchange_human_to_robot": {"robot": "exchange_robot_to_human", "board": "take"},
+    "exchange_robot_to_human": {"human": "exchange_human_to_robot", "board": "take"},
+    "take": {"robot": "put", "human": "exchange_human_to_robot"},
+    "put": {"human": "exchange_human_to_robot", "board": "take"},
 }
+STEPS = 8  # until an action can begin
 ANSWERED = """
 const rows = coglab.events().filter((e) => e.seq > arguments[0] && e.source === 'stop').map((e) => e.text);
 const answers = rows.filter((text) => text.startsWith('STOP, ') || text.includes('cannot be asked')).length;
@@ -80,6 +82,7 @@ class Cell:
         self.passed: list[str] = []  # states that were entered, see came_to()
         self.structure: dict[str, list[str]] = {}  # children of the machine's containers, by path
         self.fri: dict[str, str] = {}  # newest diagnostics of the connection to the robot controller
+        self._on_board = Pose()  # where the robot has put the object on the board
         self.supervisors: list[str] = []  # what the arm's interface was in, one after the other
         self.held_at = 0.0  # s of the bridge's own clock, when the hold latched last
         self.latencies: list[float] = []  # s, as the bridge's diagnostics tell it
@@ -160,6 +163,24 @@ class Cell:
         """Frees the arm's own latch; the machine stays where it is."""
         rospy.ServiceProxy("/lwr/command", LwrCommand)("reset")
         self.wait(lambda: not self.arm.hold_latched, 10.0, "the end of the hold")
+
+    def holder(self) -> str:
+        """Who has the object, by the truth of the cell: robot, human, board or floor."""
+        truth = rospy.wait_for_message("/coglab_sim/truth/cell", CellTruth, 5.0)
+        return {"both": "robot", "none": "floor"}.get(truth.held_by, truth.held_by)
+
+    def remember_board(self) -> None:
+        """The object stands on the board as the robot has put it there."""
+        truth = rospy.wait_for_message("/coglab_sim/truth/cell", CellTruth, 5.0)
+        if truth.held_by == "board":
+            self._on_board = truth.object
+
+    def pick_up(self) -> None:
+        """The object to where the robot has put it on the board, as an experimenter would."""
+        answer = rospy.ServiceProxy("/coglab_sim/cell/place_object", PlaceObject)("", "world", self._on_board)
+        if not answer.success:
+            raise TimeoutError(f"the object stays on the floor: {answer.message}")
+        say("the object was picked up and laid on the board")
 
     def launch_console(self) -> None:
         """A console beside the cell."""
@@ -306,25 +327,34 @@ class Operator:
                     raise
 
     def bring_to(self, action: str) -> None:
-        """The hub that offers this action."""
-        for _ in range(ATTEMPTS):
+        """The hub that offers this action, with the object where it has to be; what a STOP let fall is picked up."""
+        for _ in range(STEPS):
             self.recover()
-            if action in self.cell.machine.actions:
+            holder = self.cell.holder()
+            if holder == "floor":
+                self.cell.pick_up()
+                continue
+            step = TOWARD[action].get(holder, "")
+            offered = self.cell.machine.actions
+            if not step and action in offered:
                 return
-            self.do(OTHER[action], False, "between")
-        raise TimeoutError(f"{action} was not offered")
+            done = self.do(step if step in offered else offered[0], False, "between")
+            if not done and holder == "board" and self.cell.leaf.startswith("wait_"):
+                self.cell.pick_up()  # it has fallen over
+        raise TimeoutError(f"{action} was not offered, with the object held by {holder}")
+
+    def _acknowledge(self) -> None:
+        if self.touches:
+            self.browser.touch("#acknowledge")
+        else:
+            self.browser.driver.find_element(By.ID, "acknowledge").click()
 
     def go_on(self) -> None:
         """Acknowledge where that is still to be done, then hold the button that leads on, and wait for the hub."""
         self.cell.wait(lambda: self.cell.leaf in STANDSTILL, 15.0, "stopped")
         leaf = self.cell.leaf
         self.browser.until("return coglab.docs().desk.guard.hold", 5.0)
-        if self.browser.js("return coglab.docs().desk.guard.unacknowledged"):
-            self.browser.until("return document.getElementById('acknowledge').offsetParent !== null", 5.0)
-            if self.touches:
-                self.browser.touch("#acknowledge")
-            else:
-                self.browser.driver.find_element(By.ID, "acknowledge").click()
+        acknowledge(self.browser, self._acknowledge)
         action = "reset" if leaf == "stopped" else "initialise"
         self.enabled(action)
         if self.touches:

@@ -58,8 +58,7 @@ export function choice({ blockedBy = () => '', refused = () => {}, ...attributes
     setAttribute(button, 'aria-activedescendant', null);
   };
   const open = () => {
-    const why = blockedBy();
-    if (why) return refused(why);
+    if (blockedBy()) return void refused(blockedBy());
     document.body.append(list);
     list.showPopover();
     place(list, button);

@@ -92,13 +92,18 @@ export function actionButton(label, { blockedBy, mustHold, request, tell, answer
     if (event.repeat) event.preventDefault();
     else begin(event);
   });
-  button.addEventListener('keyup', (event) => event.key === 'Enter' && release());
+  button.addEventListener('keyup', (event) => {
+    if (event.key !== 'Enter') return;
+    release();
+    held = false;
+  });
   button.addEventListener('click', async () => {
-    const reason = blockedBy();
+    const reason = held ? '' : blockedBy();
     if (reason) {
       tell(reason);
       refuse(`${label}: ${reason}`);
-    } else if (!held && !mustHold()) {
+    } else if (held) held = false;
+    else if (!mustHold()) {
       const answer = await command(...request());
       tell(answer.message);
       answered(answer);

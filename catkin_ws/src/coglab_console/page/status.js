@@ -2,11 +2,12 @@
 import { h, mark, paced, setText } from './dom.js';
 import { on, onDocs, store } from './store.js';
 import { ageWords } from './cell.js';
+import { clock } from './log.js';
 
 const ROWS = ['Phase', 'Waits', 'FRI', 'Arm', 'Motion', 'Hand', 'Person', 'Object', 'Contact', 'Why', 'Last'];
 const OLD = 0.5; // s, sights of perception older than this deserve a mark
+const UNKNOWN = ['fault', 'not known, the brain is silent'];
 const RECENT = 5; // s for which a recognised reach is shown
-const SUPERVISOR = { disconnected: 'no connection', monitor: 'only watched', starting: 'starting', command: 'ready to move', holding: 'holds still', stopping: 'stopping', stopped: 'stopped' };
 const MODES = { POSITION: 'position control', CART_IMP: 'Cartesian impedance', JNT_IMP: 'joint impedance', OTHER: 'another control' };
 const CONTROLLERS = { dmp: 'reach', ptp: 'to a posture' };
 const MOTIONS = { idle: 'at rest', running: 'under way', holding: 'waits where it is', fault: 'fault' };
@@ -28,9 +29,9 @@ function fri({ alive, fri: state, quality, cycle, reason }) {
   return [level, `${state || 'OFF'} ${quality || reason || 'no datagrams'}, ${(cycle * 1000).toFixed(0)} ms${more}`];
 }
 
-function arm({ alive, supervisor, allowed, held, mode, power }) {
-  if (missing('arm', alive, '')) return ['fault', 'not known'];
-  const words = `${SUPERVISOR[supervisor] ?? supervisor}, ${MODES[mode] ?? mode}${power ? '' : ', not all drives on'}`;
+function arm({ alive, supervisor, words: does, allowed, held, mode, power }) {
+  if (missing('arm', alive, '')) return ['fault', 'not known, the arm is silent'];
+  const words = `${does}, ${MODES[mode] ?? mode}${power ? '' : ', not all drives on'}`;
   return [held || !power || ['stopped', 'disconnected'].includes(supervisor) ? 'fault' : allowed ? 'ok' : 'warn', words];
 }
 
@@ -60,8 +61,8 @@ function person() {
   return [age === undefined ? 'idle' : age < OLD ? 'ok' : 'warn', `hand ${ageWords('hand')}${reach}`];
 }
 
-function object() {
-  const { object: id, fallback } = store.docs.status.machine;
+function object({ alive, object: id, fallback }) {
+  if (missing('brain', alive, '')) return UNKNOWN;
   const next = store.docs.desk?.object || fallback;
   const seen = store.state?.ages.object;
   const words = id ? `${id} in the hand${next && next !== id ? `, ${next} next` : ''}` : next ? `${next} next, ${ageWords('object')}` : 'none';
@@ -70,12 +71,12 @@ function object() {
 
 function contact() {
   const margin = store.state?.margin;
-  const { words, state, mode } = store.docs.status.contact;
+  const { words, state, mode, stamp } = store.docs.status.contact;
   const silence = store.state?.silent.contact;
   if (silence !== undefined) return ['warn', `silent for ${silence.toFixed(1)} s: no detector, or no torques`];
   if (!store.docs.status.contact.alive) return ['warn', 'no detector, or no torques'];
   if (state === 'waiting') return ['idle', `armed for ${CONTACTS[mode] ?? mode}, until the arm is still`];
-  if (margin === null || margin === undefined) return ['idle', `not armed${words ? `; last: ${words}` : ''}`];
+  if (margin === null || margin === undefined) return ['idle', `not armed${words ? `; last: ${words}, ${Math.max(0, (store.state?.stamp ?? 0) - stamp).toFixed(0)} s ago` : ''}`];
   return [margin > 1 ? 'warn' : 'ok', `armed, margin ${margin.toFixed(2)} of 1`];
 }
 
@@ -86,9 +87,15 @@ function phase({ alive, hub, words }, stood) {
 /** What the brain waits for and when it gives up, as it tells itself. */
 function waiting({ alive }) {
   const { since = 0, left = null, waits = '' } = store.state ?? {};
-  if (missing('brain', alive, '')) return ['fault', 'not known'];
+  if (missing('brain', alive, '')) return UNKNOWN;
   if (!waits) return ['idle', `for nothing with a limit; ${since.toFixed(1)} s in this phase`];
   return [left !== null && left < 1 ? 'warn' : 'idle', `${waits}; ${left === null ? 'without a limit' : `${left.toFixed(1)} s left`}`];
+}
+
+function why(machine, a, stood) {
+  if (missing('brain', machine.alive, '')) return UNKNOWN;
+  if (machine.why) return [stood ? 'fault' : 'warn', machine.why];
+  return a.reason ? ['warn', a.reason] : ['idle', 'nothing has failed'];
 }
 
 function rows() {
@@ -103,10 +110,10 @@ function rows() {
     Motion: motion(manager),
     Hand: hand(g),
     Person: person(),
-    Object: object(),
+    Object: object(machine),
     Contact: contact(),
-    Why: machine.why ? [stood ? 'fault' : 'warn', machine.why] : a.reason ? ['warn', a.reason] : ['idle', 'nothing has failed'],
-    Last: last ? [{ info: 'idle', warning: 'warn', fault: 'fault' }[last.level], last.text] : ['idle', 'nothing yet'],
+    Why: why(machine, a, stood),
+    Last: last ? [{ info: 'idle', warning: 'warn', fault: 'fault' }[last.level], `${clock(last.stamp)} ${last.text}`] : ['idle', 'nothing yet'],
   };
 }
 

@@ -39,7 +39,7 @@ export function contactPage(page) {
       const full = Math.max(1.5 * threshold, 0.05);
       bar.fill.style.width = `${Math.min(100, (100 * bar.peak) / full)}%`;
       bar.limit.style.left = `${(100 * threshold) / full}%`;
-      setText(bar.value, bar.peak.toFixed(3));
+      setText(bar.value, i in state.rate ? bar.peak.toFixed(3) : '–');
     });
     const { alive, state: stands, mode } = store.docs.status?.contact ?? {};
     setText(detector, !alive ? 'The detector says nothing: it is not there, or no torques come.'

@@ -10,7 +10,7 @@ export function field(label, input) {
   return h('label', {}, label, input);
 }
 
-const OUTCOMES = [['done', 'The trial is done'], ['repeat', 'Repeat the trial later'], ['skipped', 'Skip the trial']];
+const OUTCOMES = [['done', 'The trial is done'], ['repeat', 'Do the trial again'], ['skipped', 'Skip the trial']];
 
 function form(told) {
   const participant = h('input', { type: 'text', maxlength: 32, autocomplete: 'off', placeholder: 'P07' });
@@ -86,6 +86,12 @@ export function experimentPage(page) {
 export function showSession(place) {
   onDocs(['desk'], () => {
     const session = store.docs.desk?.experiment;
-    setText(place, session?.participant ? `session ${session.participant} · trial ${Math.min(session.position + 1, session.trials.length)} of ${session.trials.length}${session.running ? ' (under way)' : ''}` : 'no session');
+    if (!session?.participant) {
+      setText(place, 'no session');
+      return;
+    }
+    const { participant, position, running, trials } = session;
+    const stands = position < trials.length ? `trial ${position + 1} of ${trials.length}: ${trials[position].condition} (${running ? 'under way' : 'next'})` : `${trials.length} trials, all done`;
+    setText(place, `session ${participant} · ${stands}`);
   });
 }

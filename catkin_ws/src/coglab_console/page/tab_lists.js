@@ -61,7 +61,8 @@ export function primitivesPage(page) {
   };
   const recognise = () => {
     const seen = store.docs.recognition;
-    setText(verdict, seen ? `${seen.decided ? 'Decided' : 'Not decided'}: ${seen.pattern}, ${Math.round(seen.progress * 100)} % of the reach seen` : 'No recognition yet: the recogniser tells when the person’s hand moves.');
+    const age = seen && store.state ? `, ${Math.max(0, store.state.stamp - seen.stamp).toFixed(0)} s ago` : '';
+    setText(verdict, seen ? `${seen.decided ? 'Decided' : 'Not decided'}: ${seen.pattern}, ${Math.round(seen.progress * 100)} % of the reach seen${age}` : 'No recognition yet: the recogniser tells when the person’s hand moves.');
     bars.replaceChildren(...(seen?.rows ?? []).map(([name, share]) => {
       const fill = h('i');
       fill.style.width = `${100 * share}%`;
@@ -70,7 +71,12 @@ export function primitivesPage(page) {
   };
   draw();
   recognise();
-  return { docs: { primitives: draw, recognition: recognise } };
+  let told = 0;
+  const onState = (state) => {
+    if (Math.floor(state.stamp) !== told) recognise(); // its age, once a second
+    told = Math.floor(state.stamp);
+  };
+  return { state: onState, docs: { primitives: draw, recognition: recognise } };
 }
 
 export function feedbackPage(page) {
@@ -101,7 +107,9 @@ export function feedbackPage(page) {
     const key = JSON.stringify(rows.map((row) => [row.name, row.stage, row.enabled, row.paused]));
     if (key !== made) make(rows);
     made = key;
-    setText(document.getElementById('feedback-profile') ?? told, rows.length ? `Profile: ${profile || 'none'}` : 'No feedback controllers are loaded.');
+    const silence = store.state?.silent.controllers;
+    const since = silence === undefined ? '' : `; silent for ${silence.toFixed(1)} s: what is shown is as old`;
+    setText(document.getElementById('feedback-profile') ?? told, rows.length ? `Profile: ${profile || 'none'}${since}` : 'No feedback controllers are loaded.');
     rows.forEach((row, i) => {
       setText(shown[i].activity, row.activity + (row.waiting ? ` ${row.waiting}` : ''));
       setText(shown[i].why, [...row.reasons, row.fault && `fault: ${row.fault}`].filter(Boolean).join('; ') || '·');
@@ -116,5 +124,5 @@ export function feedbackPage(page) {
   };
   draw();
   attribute();
-  return { docs: { feedback: draw, attribution: attribute } };
+  return { state: draw, docs: { feedback: draw, attribution: attribute } };
 }

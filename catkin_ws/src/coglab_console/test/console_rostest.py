@@ -21,7 +21,7 @@ import rostest
 import smach
 import smach_ros
 import tf2_ros
-from coglab_console.browser import Browser, fresh_link, press_and_hold
+from coglab_console.browser import Browser, acknowledge, fresh_link, press_and_hold
 from coglab_console.page_check import PAGES, look
 from coglab_msgs.msg import LwrState, MasterState
 from selenium.webdriver.common.action_chains import ActionChains
@@ -122,9 +122,21 @@ class Console(unittest.TestCase):
         self.assertTrue(all(style == "solid" and width == "3px" for _, style, width in seen), seen)
 
     def test_03_the_scene_has_the_hand_where_tf_has_it(self):
-        self.assertLess(self.distance_to_tf(), 0.002)
+        self.assertLess(self._distance_to_tf(), 0.002)
 
-    def distance_to_tf(self):
+    def test_03b_the_hand_is_calibrated_by_a_held_button_and_tells_how_it_ends(self):
+        self.ready("wait_without_object")
+        self.says("calibrate", "is calibrated")
+        self.browser.tab("Health")
+        found = "[...document.querySelectorAll('#page button')].find((one) => one.innerText === 'Forced calibration')"
+        self.browser.until(f"return {found} && !{found}.hasAttribute('aria-disabled')", 20.0)
+        button = self.browser.js(f"const one = {found}; one.scrollIntoView(); return one")
+        told = "return coglab.events().some((one) => one.source === arguments[0] && one.text.includes(arguments[1]))"
+        press_and_hold(self.browser, button, lambda: self.browser.js(told, "command", "complete started"), 20.0)
+        self.browser.until(told, 60.0, "hand", "calibration complete ended")
+        self.browser.tab("Live")
+
+    def _distance_to_tf(self):
         place = self.frames.lookup_transform(
             "world", "ih2_palm", rospy.Time(0), rospy.Duration(5.0)
         ).transform.translation
@@ -160,7 +172,7 @@ class Console(unittest.TestCase):
         self.browser.until("return document.getElementById('status').innerText.includes('mug in the hand')", 20.0)
         self.browser.until("return coglab.events().some(e => e.text.includes('Receive mug: succeeded'))", 20.0)
         self.browser.until("return coglab.state().speed < 0.001", 20.0)
-        self.assertLess(self.distance_to_tf(), 0.002)
+        self.assertLess(self._distance_to_tf(), 0.002)
         self.browser.picture(self.pictures / "holds.png")
 
     def ready(self, hub):
@@ -179,8 +191,7 @@ class Console(unittest.TestCase):
         leaf = "/fault" if self.machine.state.endswith("/fault") else "/stopped"
         self.page_in(leaf)
         self.browser.until("return document.getElementById('acknowledge').offsetParent !== null", 20.0)
-        self.browser.driver.find_element(By.ID, "acknowledge").click()
-        self.browser.until("return coglab.docs().desk.guard.unacknowledged === false", 20.0)
+        acknowledge(self.browser, self.browser.driver.find_element(By.ID, "acknowledge").click)
         button = self.enabled("initialise" if leaf == "/fault" else "reset")
         press_and_hold(self.browser, button, lambda: not self.machine.state.endswith(leaf), 30.0)
         self.page_in(hub)
@@ -220,7 +231,7 @@ class Console(unittest.TestCase):
 
     def test_06_stop_waits_neither_for_the_master_nor_for_a_frozen_brain(self):
         master = rosgraph.Master("/console_test")
-        frozen = [self.process_of("/coglab"), master.getPid()]
+        frozen = [self._process_of("/coglab"), master.getPid()]
         for process in frozen:
             os.kill(process, signal.SIGSTOP)
         try:
@@ -237,7 +248,7 @@ class Console(unittest.TestCase):
 
     def test_07_a_lost_connection_greys_the_page_within_a_second_and_loses_no_event(self):
         before = self.browser.js("return coglab.events().map(e => e.seq)")
-        console = self.process_of("/coglab_console")
+        console = self._process_of("/coglab_console")
         self.browser.js(
             "const grey = () => { if (document.body.classList.contains('lost')) window.greyAt ??= Date.now(); };"
             "delete window.greyAt; new MutationObserver(grey).observe(document.body, { attributes: true });"
@@ -267,7 +278,7 @@ class Console(unittest.TestCase):
                 "window.watch.observe(cell, { characterData: true, childList: true, subtree: true });",
                 row,
             )
-            process = self.process_of(node)
+            process = self._process_of(node)
             began = time.time()
             os.kill(process, signal.SIGSTOP)
             try:
@@ -278,7 +289,7 @@ class Console(unittest.TestCase):
             self.browser.until(f"return !{cell}.innerText.includes('silent')", 10.0, row)
 
     @staticmethod
-    def process_of(node):
+    def _process_of(node):
         uri = rosgraph.Master("/console_test").lookupNode(node)
         return ServerProxy(uri).getPid("/console_test")[2]
 

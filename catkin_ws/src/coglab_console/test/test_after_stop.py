@@ -2,8 +2,10 @@
 
 import asyncio
 import json
+from dataclasses import replace
 
 import pytest
+from coglab_console.desk.desk import Answer
 from coglab_console.desk.gates import MotionGuard, Standstills
 from coglab_console.desk.hold import HOLD_TIME, HeldButton
 from console_double import running
@@ -93,6 +95,45 @@ def test_a_held_button_begins_the_motion_once(desk):
     assert len(desk.backend.calls) == 1
     assert not desk.guard.needs_hold
     assert ask(desk, "a", "start", **RECEIVE)["success"]  # the next one needs a press only
+
+
+def test_a_button_that_is_still_held_while_its_command_is_carried_out_is_not_refused(desk):
+    """The state has changed by then, because of that very command."""
+    clock = Clock()
+    desk._held["a"] = HeldButton(clock)
+    let = asyncio.Event()
+
+    async def call(name, arguments):
+        desk.backend.now = replace(desk.backend.now, calibrating=True)
+        await let.wait()
+        return Answer(True, "started")
+
+    async def press():
+        held = []
+        for _ in range(12):
+            held.append(asyncio.create_task(desk.held("a", "calibrate", {"mode": "complete"})))
+            await asyncio.sleep(0)
+            clock.time += 0.1
+        let.set()
+        answers = await asyncio.gather(*held)
+        # A message that was on its way when the answer left.
+        answers.append(await desk.held("a", "calibrate", {"mode": "complete"}))
+        return [answer for answer in answers if answer is not None]
+
+    desk.backend.call = call
+    assert [dict(answer) for answer in asyncio.run(press())] == [{"success": True, "message": "started"}]
+    desk.released("a")
+    answer = asyncio.run(desk.held("a", "calibrate", {"mode": "complete"}))
+    assert "calibrates" in answer["message"]
+
+
+def test_a_calibration_is_not_the_first_motion_after_a_stop(desk):
+    """It was held down itself; the arm moves by a held button all the same."""
+    ask(desk, "a", "stop")
+    ask(desk, "a", "acknowledge", stop=newest(desk))
+    (answer,) = hold_for(desk, 1.0, what=("calibrate", {"mode": "fast"}))
+    assert answer["success"] and desk.guard.needs_hold
+    assert "hold" in ask(desk, "a", "start", **RECEIVE)["message"]
 
 
 def test_a_browser_that_dies_with_the_button_held_starts_nothing():

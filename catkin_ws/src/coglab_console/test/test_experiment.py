@@ -7,7 +7,7 @@ import pytest
 from coglab_console.desk.desk import Desk
 from coglab_console.desk.events import EventLog
 from coglab_console.desk.experiment import RESUME, Experiment, ExperimentError
-from coglab_console.desk.session_file import newest, read_session
+from coglab_console.desk.session_file import newest, read_session, rows_of
 from coglab_console.web.fan_out import Documents
 from console_double import RobotDouble
 
@@ -84,6 +84,19 @@ def test_a_stop_by_somebody_else_is_in_the_file(tmp_path):
     desk.observe(True, "hold on /lwr")
     (row,) = read_session(newest(tmp_path)).attempts[1].stops
     assert (row["type"], row["cause"], row["trial"]) == ("stopped", "hold on /lwr", 2)
+
+
+def test_notes_and_stops_say_in_which_phase_they_were(tmp_path):
+    desk = begun(tmp_path)
+    desk.events.phase = lambda: "reaches and receives"
+    desk.stop("a")
+    desk.told("note", "let go early", "/x")
+    rows = rows_of([read_session(newest(tmp_path))], "events")
+    assert sorted((row["kind"], row["phase"]) for row in rows) == [
+        ("note", ""),
+        ("note", "reaches and receives"),
+        ("stop", "reaches and receives"),
+    ]
 
 
 def test_half_a_line_spoils_no_other(tmp_path):

@@ -222,6 +222,12 @@ def test_a_predicted_path_for_the_page():
     )
     shown = path_ahead.refused("goal frame 'x' is not known; start perception " + 300 * "!")
     assert shown == {"kind": "refused", "reason": "goal frame 'x' is not known", "points": []}
+    for frame, words in (
+        ("object_tea_box", "tea_box is not seen"),
+        ("human_hand", "the hand of the person is not seen"),
+    ):
+        shown = path_ahead.refused(f"goal frame '{frame}' is not known in 'lwr_base_link': lookupTransform; start it")
+        assert shown["reason"] == words
 
 
 # --- bytes and words ------------------------------------------------------------------------------------------

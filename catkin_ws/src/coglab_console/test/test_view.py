@@ -6,7 +6,15 @@ import pytest
 from coglab_console.ros import view as ros_view
 from coglab_console.ros.sources import Sources
 from coglab_console.scene.urdf_model import RobotModel
-from coglab_msgs.msg import ContactSignal, ControllerStatus, HandStatus, LwrState, MasterState, PredictedPath
+from coglab_msgs.msg import (
+    ContactSignal,
+    ControllerStatus,
+    HandStatus,
+    LwrState,
+    MasterState,
+    PredictedPath,
+    Transition,
+)
 from geometry_msgs.msg import Point, Pose
 from rospy import Time
 from sensor_msgs.msg import JointState
@@ -111,6 +119,14 @@ def test_phase_and_what_it_waits_for_are_of_one_moment(seen):
     frame = view.frame()
     assert (frame["words"], frame["waits"], frame["left"]) == ("waits until it is offered", "the offer of mug", 3.0)
     assert view.phase() == frame["words"]
+
+
+def test_a_transition_belongs_to_the_phase_that_has_ended(seen):
+    view, _, events = seen
+    path = "/coglab_master/exchange_human_to_robot"
+    view._on_machine(MasterState(state=f"{path}/hand_close"))
+    view._on_transition(Transition(path=path, from_state="set_dmp_goal", outcome="succeeded", to_state="approach"))
+    assert events == [("machine", "waits until it is offered: done; now: reaches", "info", "waits until it is offered")]
 
 
 def path_of(motion, *places):

@@ -77,6 +77,8 @@ def test_reasons_are_sentences(change):
             "type: ./coglab start reset",
             "the arm is blocked: hold is latched; when its cause is away, press Go on",
         ),
+        ("hold is latched; send reset: rosservice call /lwr/command reset", "hold is latched"),
+        ("hold is latched; send reset", "hold is latched"),
         (
             "'take' refused: wait_with_object takes exchange_robot_to_human, put; "
             "type: ./coglab start exchange_robot_to_human or ./coglab start put",

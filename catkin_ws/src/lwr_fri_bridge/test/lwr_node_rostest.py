@@ -65,6 +65,17 @@ class LwrNode(unittest.TestCase):
             self.ask("stop")
         wait_for(lambda: self.states[-1].fri_state == "MON", "monitor mode")
 
+    def test_the_state_is_told_again_without_a_change(self) -> None:
+        """Who looks on knows a silent node from that."""
+        count = len(self.states)
+        wait_for(lambda: len(self.states) >= count + 4, "four states more")
+        told = self.states[count + 1 :]
+        self.assertEqual(
+            {(one.fri_state, one.motion_epoch, one.reason) for one in told},
+            {("MON", told[0].motion_epoch, told[0].reason)},
+        )
+        self.assertTrue(all(a.header.stamp < b.header.stamp for a, b in zip(told, told[1:], strict=False)))
+
     def test_joint_states_torques_and_wrench(self) -> None:
         joints = rospy.wait_for_message("/lwr/joint_states", JointState, LIMIT)
         self.assertEqual(joints.name, ["lwr_a1", "lwr_a2", "lwr_e1", "lwr_a3", "lwr_a4", "lwr_a5", "lwr_a6"])

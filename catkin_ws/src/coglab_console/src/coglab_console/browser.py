@@ -151,6 +151,20 @@ def fresh_link(home: Path, used: str = "", limit: float = 30.0) -> str:
     raise TimeoutError(f"no new link in {path} within {limit:.0f} s; does the console run?")
 
 
+def acknowledge(browser: Browser, press: Callable[[], None], limit: float = 20.0) -> None:
+    """Acknowledges the newest stop: again where another one came while `press` was on its way. TimeoutError after
+    `limit` s."""
+    end = time.monotonic() + limit
+    while browser.js("return coglab.docs().desk.guard.unacknowledged"):
+        browser.until("return document.getElementById('acknowledge').offsetParent !== null", limit)
+        press()
+        try:
+            browser.until("return !coglab.docs().desk.guard.unacknowledged", 2.0)
+        except TimeoutError:
+            if time.monotonic() > end:
+                raise
+
+
 def press_and_hold(browser: Browser, element: Any, done: Callable[[], bool], limit: float = 5.0) -> None:
     """Holds a button with the mouse until `done()`. TimeoutError after `limit` s."""
     from selenium.webdriver.common.action_chains import ActionChains

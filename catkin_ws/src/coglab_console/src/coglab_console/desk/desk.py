@@ -70,6 +70,7 @@ class Desk:
         self.roles = Roles(lambda text, level: events.add("control", text, level))
         self.guard = MotionGuard(backend.real)
         self.experiment = Experiment(folder, now, lambda text: events.add("experiment", text, "warning"))
+        self.experiment.phase = lambda: events.phase()
         goes_on = self.experiment.resume()
         if goes_on:
             events.add("experiment", goes_on, "warning")
@@ -77,7 +78,8 @@ class Desk:
         """chosen for the next action that takes one; empty: the brain's default"""
         self._trial = (0, 0)
         self._held: dict[str, HeldButton] = {}
-        self._firing: set[str] = set()
+        self._begun: dict[str, tuple[str, dict]] = {}
+        """by who holds a button down that has begun something: what"""
 
     # --- from the browsers ------------------------------------------------------------------------------------
 
@@ -102,22 +104,22 @@ class Desk:
 
     async def held(self, who: str, name: Any, arguments: Any) -> Answer | None:
         """One message of a held button; None while nothing has come of it."""
+        # What was begun may be the reason why it cannot be asked again; the button is still down.
+        if who in self._begun and self._begun[who] == (name, arguments):
+            return None
         refusal = self._refusal(who, name, arguments)
         if refusal:
             self.released(who)
             return Answer(False, refusal)
         button = self._held.setdefault(who, HeldButton())
-        if not button.held((name, sorted(arguments.items(), key=str))) or who in self._firing:
+        if not button.held((name, sorted(arguments.items(), key=str))):
             return None
-        self._firing.add(who)
-        try:
-            answer = await self._perform(who, name, arguments)
-        finally:
-            self._firing.discard(who)
-        return answer
+        self._begun[who] = (name, arguments)
+        return await self._perform(who, name, arguments)
 
     def released(self, who: str, lost: bool = False) -> None:
         """The held button went up; `lost`: the connection of its browser went away, which everybody is told."""
+        self._begun.pop(who, None)
         button = self._held.pop(who, None)
         what = button.unfinished() if button is not None and lost else None
         if what is not None:
@@ -211,7 +213,7 @@ class Desk:
             stops = self.guard.stops
             answer = await self.backend.call(name, arguments)
             answer["message"] = plain(answer["message"])
-            if answer["success"] and judge(name, {**arguments}).motion:
+            if answer["success"] and name in ("start", "home"):  # fingers that calibrate are no motion of the arm
                 self.guard.moved(stops)
         if name not in ("parameters", "note", "select_object"):
             told = f"{who}: {words_of(name, arguments)}: {answer['message']}"
@@ -231,7 +233,7 @@ class Desk:
             return
         self._trial = trial
         condition = self.experiment.condition()
-        named = next((word for word in re.split(r"[^a-z0-9_]+", condition) if word in now.objects), "")
+        named = next((word for word in re.split(r"[^a-z0-9_]+", condition.lower()) if word in now.objects), "")
         if trial[0] and named:
             self.backend.tell("select_object", named)
             self._select(f"trial {trial[0]} ({condition})", named)

@@ -27,8 +27,9 @@ class EventLog:
         """Call this with each event, in the thread that adds it and in the order of the numbers."""
         self._listeners.append(on_event)
 
-    def add(self, source: str, text: str, level: str = "info") -> dict:
-        """Adds one and returns it; a text that is too long is cut."""
+    def add(self, source: str, text: str, level: str = "info", phase: str | None = None) -> dict:
+        """Adds one and returns it; a text that is too long is cut. `phase` where it belongs to another one than that of
+        now."""
         if level not in LEVELS:
             raise ValueError(f"level is one of {', '.join(LEVELS)}, got '{level}'")
         if len(text) > LONGEST:
@@ -40,7 +41,7 @@ class EventLog:
                 "stamp": round(self._now(), 3),
                 "level": level,
                 "source": source,
-                "phase": self.phase(),
+                "phase": self.phase() if phase is None else phase,
                 "text": text,
             }
             self._events.append(event)

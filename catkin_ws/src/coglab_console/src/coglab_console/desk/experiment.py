@@ -74,6 +74,7 @@ class Experiment:
         self._goes = 0
         self.notes: list[dict] = []
         self._last_result: tuple = ()
+        self.phase: Callable[[], str] = lambda: ""
 
     def resume(self) -> str:
         """Goes on with the session that a console has left open when it was killed; says so, or is empty."""
@@ -176,7 +177,7 @@ class Experiment:
     def note(self, who: str, text: str) -> str:
         """A note, also between trials."""
         self.notes = [*self.notes[-99:], {"stamp": round(self._now(), 3), "who": who, "text": text}]
-        self._write("note", who=who, text=text)
+        self.record("note", who=who, text=text)
         return "noted" if self._path is not None else "noted in the event log alone: no session is open"
 
     def result(self, row: dict) -> None:
@@ -187,8 +188,9 @@ class Experiment:
         self._write("result", **{key: value for key, value in row.items() if key not in ("type", "stamp", "trial")})
 
     def record(self, kind: str, /, **fields: object) -> None:
-        """A stop, into the file of the open session."""
-        self._write(kind, **fields)
+        """A note or a stop, into the file of the open session, with the phase in which it was."""
+        phase = self.phase()
+        self._write(kind, **fields, **({"phase": phase} if phase else {}))
 
     def view(self) -> dict:
         """What the page shows."""

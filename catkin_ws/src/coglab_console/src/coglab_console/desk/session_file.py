@@ -31,7 +31,7 @@ COLUMNS = {
         "session", "participant", "trial", "attempt", "condition", "outcome", "began", "action", "object_id", "result",
         "reason", "reason_code", "causes", "action_s", "marks",
     ),
-    "events": ("session", "participant", "trial", "attempt", "condition", "stamp", "kind", "who", "text"),
+    "events": ("session", "participant", "trial", "attempt", "condition", "stamp", "kind", "who", "phase", "text"),
 }  # fmt: skip
 """Columns by table, in their order"""
 
@@ -321,6 +321,7 @@ def _event_rows(session: Session) -> list[dict[str, Any]]:
             "stamp": _time(row["stamp"]),
             "kind": row["type"],
             "who": row.get("who", ""),
+            "phase": row.get("phase", ""),
             "text": row.get("text", row.get("cause", "")),
         }
         for attempt in (*session.attempts, session.outside)

@@ -74,6 +74,16 @@ IN_ACTION = {  # where the same state means something else in another action
     ("exchange_robot_to_human", "wait_stop"): "reaches and gives",
     ("exchange_robot_to_human", "hand_open"): "lets the person have it",
 }
+SUPERVISOR = {
+    "disconnected": "no connection to the robot controller",
+    "monitor": "only watched",
+    "starting": "starting",
+    "command": "ready to move",
+    "holding": "holds still",
+    "stopping": "stopping",
+    "stopped": "stopped",
+}
+"""What the arm's interface is in"""
 OUTCOMES = {
     "succeeded": "done",
     "failed": "failed",
@@ -86,7 +96,7 @@ _LONG = sorted((name for name in PHASES if "_" in name), reverse=True)  # short 
 _NAMES = re.compile(rf"(?<![\w/])'?({'|'.join(_LONG)})'?(?![\w/])")
 _PRESSED = re.compile(r"(press|or) (initialise|reset|take|put)\b")
 _TYPED = re.compile(r"type: (\./coglab start \w+(?: or \./coglab start \w+)*)")
-_CALLED = re.compile(r": rosservice call \S+ \w+")
+_CALLED = re.compile(r"(; send \w+)?: rosservice call \S+ \w+|; send (reset|start)\b")
 
 
 def phase(state: str) -> str:
@@ -109,11 +119,15 @@ def action_of(state: str) -> str:
     return next((BUTTONS[label] for label in state.split("/") if label in BUTTONS), "")
 
 
+def supervisor(name: str) -> str:
+    """What the arm's interface is in, in words."""
+    return SUPERVISOR.get(name, name)
+
+
 def outcome(name: str) -> str:
     """Words for how a state ended, or for an action of the journal."""
-    if name in OUTCOMES:
-        return OUTCOMES[name]
-    return BUTTONS.get(name) or PHASES.get(name) or name.replace("_", " ")
+    words = OUTCOMES.get(name) or BUTTONS.get(name) or PHASES.get(name)
+    return words or name.replace("_", " ")
 
 
 def plain(sentence: str) -> str:

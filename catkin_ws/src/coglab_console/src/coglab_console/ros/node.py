@@ -38,6 +38,7 @@ ADDRESS, PORT = "127.0.0.1", 8790
 STATE_RATE = 30.0  # Hz
 TICK = 0.1  # s
 HEALTH = 1.0  # s
+SILENT_DIAGNOSTICS = 2.5  # s without a word of diagnostics, which come once a second
 FRAMES = {"human_hand": "human_hand", "board": "board"}
 
 
@@ -55,6 +56,11 @@ def bind(address: str, port: int, fixed: bool) -> socket.socket:
             found.close()
             problem = error.strerror
     raise StartError(f"{address}:{port} cannot be used ({problem}); choose another console_port, or leave it out")
+
+
+def words_of_age(age: float) -> str:
+    """Beside the diagnostics of a node that has fallen silent; empty beside others."""
+    return f" (silent for {age:.0f} s)" if age >= SILENT_DIAGNOSTICS else ""
 
 
 def exposure(address: str) -> str:
@@ -125,9 +131,9 @@ class ConsoleNode:
     def _wake(self) -> None:
         self.server.wake()
 
-    def say(self, source: str, text: str, level: str = "info") -> None:
+    def say(self, source: str, text: str, level: str = "info", phase: str | None = None) -> None:
         """An event, from any thread."""
-        self.events.add(source, text, level)
+        self.events.add(source, text, level, phase)
 
     def put(self, name: str, value: Any) -> None:
         """A document, from any thread; None takes it away."""
@@ -240,8 +246,8 @@ class ConsoleNode:
         rows = [
             {
                 "name": name,
-                "level": row["level"] if now - row["at"] < 5.0 else 3,
-                "message": row["message"],
+                "level": row["level"] if now - row["at"] < SILENT_DIAGNOSTICS else 3,
+                "message": row["message"] + words_of_age(now - row["at"]),
                 "values": row["values"],
             }
             for name, row in sorted(self.view.tables.diagnostics.items())

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ..desk.words import phase, plain
+from ..desk.words import phase, plain, supervisor
 
 if TYPE_CHECKING:
     from .view import RosView
@@ -29,6 +29,7 @@ def document(view: RosView) -> dict:
         "arm": {
             "alive": view.there("lwr/state"),
             "supervisor": arm.supervisor,
+            "words": supervisor(arm.supervisor),
             "fri": arm.fri_state,
             "quality": arm.quality,
             "mode": arm.control_mode,
@@ -51,11 +52,12 @@ def document(view: RosView) -> dict:
             "alive": view.there("controller_manager/status"),
             "state": view.manager.state,
             "active": view.manager.active_controller,
-            "reason": view.manager.reason,
+            "reason": plain(view.manager.reason),
             "scale": round(view.manager.speed_scale, 3),
         },
         "contact": {
             "words": view.contact,
+            "stamp": round(view.contact_stamp, 1),
             "alive": now.detector_alive,
             "state": view.signal.state,
             "mode": view.signal.mode,

@@ -18,6 +18,8 @@ from rospy.core import parse_rosrpc_uri
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
+from ..desk.words import plain
+
 ANSWER_LIMIT = 3.0  # s until a missing answer is told
 MAX_WAITING = 8  # threads whose service has not answered
 
@@ -77,7 +79,7 @@ class StopPath:
         try:
             answer = call()
             took = 1000 * (time.monotonic() - began)
-            self._say(f"STOP, {name}: {answer.message} ({took:.0f} ms)", "info" if answer.success else "fault")
+            self._say(f"STOP, {name}: {plain(answer.message)} ({took:.0f} ms)", "info" if answer.success else "fault")
         except Exception as error:
             self._say(f"STOP: the {name} cannot be asked ({error}); if the arm moves, use the red button", "fault")
         finally:

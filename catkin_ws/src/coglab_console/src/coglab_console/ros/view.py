@@ -25,7 +25,7 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64, String
 
 from ..desk.gates import STANDSTILL, Standing, Standstills
-from ..desk.words import outcome, phase, plain, transition
+from ..desk.words import outcome, phase, plain, supervisor, transition
 from ..scene import path_ahead
 from ..scene.urdf_model import RobotModel
 from . import status, wire
@@ -37,30 +37,20 @@ FRAME_PARENTS = ("world", "lwr_base_link")
 OLD = 1.0  # s without a message after which a motion's path or progress is over
 MOST_POSES = 200
 
-SUPERVISOR = {  # the arm's interface in words; the same as in status.js
-    "disconnected": "no connection to the robot controller",
-    "monitor": "only watched",
-    "starting": "starting",
-    "command": "ready to move",
-    "holding": "holds still",
-    "stopping": "stopping",
-    "stopped": "stopped",
-}
-
 
 def _round(values: Any, digits: int = 4) -> list[float]:
     return [round(value, digits) if math.isfinite(value) else 0.0 for value in values]
 
 
 class RosView:
-    """Callbacks write, anybody reads; each value is replaced as a whole. `say(source, text, level)` makes an event,
-    `put(name, value)` a document, `transition` goes to the graphs and `result` to the desk."""
+    """Callbacks write, anybody reads; each value is replaced as a whole. `say(source, text, level, phase)` makes an
+    event, `put(name, value)` a document, `transition` goes to the graphs and `result` to the desk."""
 
     def __init__(
         self,
         model: RobotModel | None,
         frames: dict[str, str],
-        say: Callable[[str, str, str], None],
+        say: Callable[..., None],
         put: Callable[[str, Any], None],
         transition: Callable[..., None],
         result: Callable[[dict], None],
@@ -79,6 +69,7 @@ class RosView:
         self._state_since = time.monotonic()
         self._standstills = Standstills()
         self.sources = Sources()
+        self.contact_stamp = 0.0
         self.hand_number = 0
         """of the newest message of the hand"""
         self.signal, self.contact, self.latency = ContactSignal(), "", math.nan
@@ -266,7 +257,7 @@ class RosView:
         self._standstills.arm(message.hold_latched)
         if (message.supervisor, message.quality) != (before.supervisor, before.quality):
             bad = message.supervisor in ("stopped", "disconnected")
-            words = f"{SUPERVISOR.get(message.supervisor, message.supervisor)}, quality {message.quality}"
+            words = f"{supervisor(message.supervisor)}, quality {message.quality}"
             told = f"{words}: {plain(message.reason)}" if message.reason else words
             self._say("arm", told, "fault" if bad else "info")
 
@@ -291,7 +282,7 @@ class RosView:
         causes = "".join(f", because {cause}" for cause in message.causes[:4])
         reason = plain(f": {message.reason}{causes}" if message.reason else "")
         words = transition(message.path, message.from_state, message.outcome, message.to_state)
-        self._say("machine", words + reason, level)
+        self._say("machine", words + reason, level, phase(f"{message.path}/{message.from_state}"))
         told = plain(message.reason + causes)
         self._transition(message.path, message.from_state, message.outcome, message.to_state, told)
 
@@ -306,6 +297,7 @@ class RosView:
         self._result(row)
 
     def _on_contact(self, message: Contact) -> None:
+        self.contact_stamp = rospy.get_time()
         self.contact = (
             f"{'contact' if message.contact else 'released'} by {message.source}, margin {message.margin:.1f}"
         )

@@ -3,6 +3,7 @@ action would ask for. A picture for people; nothing in control reads it. Lengths
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from typing import Any
 
@@ -15,6 +16,7 @@ ROLES = {
     "take": "take",
 }
 LONGEST = 160  # characters of a reason
+UNSEEN = re.compile(r"goal frame '(?:object_(\w+)|human_hand)' is not known")
 
 
 def aim(action: str, entry: Mapping[str, Any], hand_frame: str) -> dict[str, Any] | None:
@@ -70,5 +72,7 @@ def document(kind: str, path: Any, base: np.ndarray) -> dict:
 
 
 def refused(reason: str) -> dict:
-    """For the page: the next motion would be refused."""
-    return {"kind": "refused", "reason": reason.split(";")[0][:LONGEST], "points": []}
+    """For the page: the next motion would be refused. Frames that are not known are told as what is not seen."""
+    unknown = UNSEEN.match(reason)
+    words = f"{unknown[1] or 'the hand of the person'} is not seen" if unknown else reason.split(";")[0][:LONGEST]
+    return {"kind": "refused", "reason": words, "points": []}
