@@ -100,6 +100,24 @@ TEST_F(GoalPath, OneFrameCountsOnceHoweverOftenItIsPolled) {
   }
 }
 
+/// Two clocks are never read at once: what a stamp maps to differs from one poll to the next, here
+/// always a little to the later.
+TEST_F(GoalPath, OneFrameCountsOnceHoweverFarApartTheClocksAreRead) {
+  std::int64_t apart = 0;
+  TfGoalSource drifting(buffer_, listener_, [&apart] { return steadyNow() + (apart += 2000); });
+  robot_.dmp().setGoalSource(&drifting);
+  for (int trial = 0; trial < 10; ++trial) {
+    begin();
+    see(kOutlier);
+    for (int cycle = 0; cycle < 40; ++cycle) {
+      tick();
+      ASSERT_LT(astray(), 1e-3) << "cycle " << cycle << " of trial " << trial;
+      ASSERT_EQ(robot_.state(), MotionState::Holding);
+    }
+  }
+  robot_.dmp().setGoalSource(&source_);
+}
+
 TEST_F(GoalPath, AStaticFrameIsFreshAsLongAsItIsShownAndOneMessageCountsOnce) {
   static_ = true;
   begin();

@@ -136,6 +136,32 @@ TEST(LimitsCombined, WhatIsAcceptedNearTheEndsOfTheRangesIsReachedOnAStraightWay
   }
 }
 
+/// The guard plans with the table or with less: a margin below the arm interface's would let pass
+/// what that one stops, a wider range what the arm cannot do.
+TEST(LimitsCombined, ParametersNarrowTheTableAndNeverWidenIt) {
+  const auto refusal = [](const std::string& parameters) {
+    try {
+      VirtualRobot robot("{" + parameters + "}");
+    } catch (const std::exception& error) {
+      return std::string(error.what());
+    }
+    return std::string();
+  };
+  EXPECT_EQ(refusal("position_margin: 0.01"), "");
+  EXPECT_EQ(refusal("position_margin: 0.03"), "");
+  EXPECT_EQ(refusal("upper_joint_pos_limit: [2.9, 2.0, 2.9, 2.0, 2.9, 2.0, 2.9]"), "");
+  for (const std::string wrong : {"0.009", "0.0", "-0.01", "0.6", ".nan"}) {
+    const std::string said = refusal("position_margin: " + wrong);
+    EXPECT_NE(said.find("position_margin"), std::string::npos) << wrong << ": " << said;
+  }
+  for (const std::string wrong : {"upper_joint_pos_limit: [2.9, 2.0, 2.9, 2.1, 2.9, 2.0, 2.9]",
+                                  "lower_joint_pos_limit: [-2.9, -2.0, -2.9, -2.1, -2.9, -2, -2]",
+                                  "joint_vel_limit: [1, 1, 1, 2, 1, 1, 1]"}) {
+    const std::string said = refusal(wrong);
+    EXPECT_NE(said.find("joint 4 is not inside"), std::string::npos) << wrong << ": " << said;
+  }
+}
+
 TEST(LimitsCombined, ReachedIsSaidByTheArmAndNotByItsSetPoint) {
   for (const std::string active : {"ptp", "dmp"}) {
     VirtualRobot robot;

@@ -149,6 +149,25 @@ TEST(Bridge, RefusesParametersOutOfRangeByName) {
   }
 }
 
+/// Who plans motions keeps the margin of the table: a bridge that kept more would stop what was
+/// accepted.
+TEST(Bridge, KeepsNoWiderMarginThanTheTableSays) {
+  BridgeConfig config = defaultConfig();
+  for (const double margin : {config.limits.position_margin, 0.5 * config.limits.position_margin}) {
+    config.position_margin = margin;
+    EXPECT_NO_THROW(Bridge{config}) << margin;
+  }
+  config.position_margin = config.limits.position_margin + 0.001;
+  try {
+    Bridge bridge(config);
+    ADD_FAILURE() << "accepted";
+  } catch (const std::invalid_argument& error) {
+    EXPECT_NE(std::string(error.what()).find("at most that of the joint limits table"),
+              std::string::npos)
+        << error.what();
+  }
+}
+
 TEST(Bridge, RefusesATableOfOtherJointsThanItsArmHas) {
   BridgeConfig config = defaultConfig();
   std::swap(config.limits.names[1], config.limits.names[2]);
