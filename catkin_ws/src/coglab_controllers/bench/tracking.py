@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import coglab_controllers as cc
 import numpy as np
 from core_bench import URDF
+from scipy.spatial.transform import Rotation
 
 try:
     import PyKDL
@@ -46,12 +47,6 @@ class Outcome:
     duration: float
 
 
-def multiply(p: np.ndarray, q: np.ndarray) -> np.ndarray:
-    """Product of two quaternions x y z w."""
-    v = p[3] * q[:3] + q[3] * p[:3] + np.cross(p[:3], q[:3])
-    return np.append(v, p[3] * q[3] - p[:3] @ q[:3])
-
-
 def draw_reaches(chain: cc.Chain, limits: cc.JointLimits) -> list[Reach]:
     """Random reaches of 0.3 to 0.6 m with a turn of up to 60 deg that stay within the arm's length."""
     rng = np.random.default_rng(SEED)
@@ -64,26 +59,16 @@ def draw_reaches(chain: cc.Chain, limits: cc.JointLimits) -> list[Reach]:
         goal = position + way / np.linalg.norm(way) * rng.uniform(0.3, 0.6)
         axis = rng.normal(size=3)
         turn = axis / np.linalg.norm(axis) * rng.uniform(0.0, np.radians(60.0))
-        target = multiply(cc.exp_rotation(turn), orientation)
+        before = Rotation.from_quat(orientation)
+        after = Rotation.from_quat(cc.exp_rotation(turn)) * before
         wrist = chain.joint_origins(posture)[5]
         # Where the wrist would be with the hand at the goal.
-        local = rotate(conjugate(orientation), wrist - position)
-        goal_wrist = goal + rotate(target, local)
+        goal_wrist = goal + after.apply(before.inv().apply(wrist - position))
         distances = [np.linalg.norm(w - shoulder) for w in (wrist, goal_wrist, 0.5 * (wrist + goal_wrist))]
         if min(distances) < 0.3 or max(distances) > 0.75 or min(position[2], goal[2]) < 0.05:
             continue
-        reaches.append(Reach(posture, position, orientation, goal, target))
+        reaches.append(Reach(posture, position, orientation, goal, after.as_quat()))
     return reaches
-
-
-def conjugate(q: np.ndarray) -> np.ndarray:
-    """Inverse of a unit quaternion."""
-    return np.append(-q[:3], q[3])
-
-
-def rotate(q: np.ndarray, v: np.ndarray) -> np.ndarray:
-    """A vector turned by a unit quaternion."""
-    return multiply(multiply(q, np.append(v, 0.0)), conjugate(q))[:3]
 
 
 # Joint velocity for posture, reference and last joint velocity, and the share that the speed limits let pass.
