@@ -78,14 +78,9 @@ function speedChoice() {
     input.value = Math.round((store.docs.status?.manager.scale ?? 1) * 100);
     setAttribute(input, 'aria-valuetext', `${input.value} %`);
   };
-  const change = () => {
-    const why = blocked('speed_scale');
-    if (!why) return choose('Speed', 'speed_scale', { value: Number(input.value) / 100 }, show);
-    refuse(`Speed: ${why}`);
-    return show();
-  };
   const input = h('input', { id: 'speed', type: 'range', min: 0, max: 100, step: 5, 'aria-describedby': 'why-side',
-    oninput: () => (blocked('speed_scale') ? show() : setAttribute(input, 'aria-valuetext', `${input.value} %`)), onchange: change });
+    oninput: () => setAttribute(input, 'aria-valuetext', `${input.value} %`),
+    onchange: () => choose('Speed', 'speed_scale', { value: Number(input.value) / 100 }, show) });
   onDocs(['status'], () => {
     if (document.activeElement !== input) show();
   });

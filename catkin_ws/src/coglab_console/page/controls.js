@@ -44,14 +44,9 @@ export function refuse(text) {
   }, 6000);
 }
 
-/**
- * A button that acts when pressed, or after 0.8 s of holding where `mustHold()`; Enter is as good as the mouse.
- * Letting go, losing the focus or the page ends the holding.
- */
-export function actionButton(label, { blockedBy, mustHold, request, tell, answered = () => {} }) {
-  const button = h('button', { type: 'button' }, label, h('span', { class: 'fill' }));
+/** Tells the server ten times a second that a button is down, from `hold()` until it is answered or `release()`. */
+function holding(button, { request, tell }) {
   let timer = null;
-  let held = false; // the click that ends a holding is none
   const release = () => {
     if (timer === null) return;
     clearInterval(timer);
@@ -60,7 +55,6 @@ export function actionButton(label, { blockedBy, mustHold, request, tell, answer
     send({ t: 'release' });
   };
   const hold = () => {
-    held = true;
     const [name, args] = request();
     const once = () => send({ t: 'hold', name, arguments: args }, (answer) => {
       tell(answer.message);
@@ -72,9 +66,20 @@ export function actionButton(label, { blockedBy, mustHold, request, tell, answer
     timer = setInterval(once, HOLD_PERIOD);
     once();
   };
+  return { hold, release };
+}
+
+/**
+ * A button that acts when pressed, or after 0.8 s of holding where `mustHold()`; Enter is as good as the mouse.
+ * Letting go, losing the focus or the page ends the holding.
+ */
+export function actionButton(label, { blockedBy, mustHold, request, tell, answered = () => {} }) {
+  const button = h('button', { type: 'button' }, label, h('span', { class: 'fill' }));
+  const { hold, release } = holding(button, { request, tell });
+  let held = false; // the click that ends a holding is none
   const begin = (event) => {
-    held = false;
-    if (!blockedBy() && mustHold()) {
+    held = !blockedBy() && mustHold();
+    if (held) {
       hold();
       if (event.type === 'keydown') event.preventDefault();
     }
