@@ -85,4 +85,5 @@ def test_the_neutral_side_speaks_of_no_particular_arm():
     for path in neutral:
         if path.name not in ARM_IS_CHOSEN and "test" not in path.parts:
             found += [f"{path.relative_to(SOURCES)}: {m}" for m in ARM_WORDS.findall(path.read_text(encoding="utf-8"))]
+    found += [str(p) for p in code("coglab_rt/include", suffixes=(".hpp",)) if re.search("(?i)lwr", p.read_text())]
     assert len(neutral) > 150 and not found, found

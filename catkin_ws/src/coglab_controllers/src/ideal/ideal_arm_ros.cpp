@@ -51,7 +51,8 @@ bool sameState(const IdealArmView& one, const IdealArmView& other) {
 
 IdealArmConfig readIdealArmConfig(const ros::NodeHandle& node) {
   IdealArmConfig config;
-  config.limits = coglab_rt::readJointLimits(node, "limits_file", "limits_profile");
+  config.limits =
+      coglab_rt::readJointLimits(node, "limits_file", "limits_profile", "lwr_description");
   config.period = readParameter<double>(node, "ideal_period", config.period, "a number");
   config.command_timeout =
       readParameter<double>(node, "command_timeout", config.command_timeout, "a number");

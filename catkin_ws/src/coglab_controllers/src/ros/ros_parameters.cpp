@@ -15,6 +15,9 @@ namespace coglab_controllers {
 
 namespace {
 
+// Where the model and the limits of the arm come from unless parameters name others.
+constexpr const char* kDescription = "lwr_description";
+
 std::string readFile(const std::string& path) {
   std::ifstream file(path);
   if (!file) throw std::runtime_error("file '" + path + "' cannot be read; check its path");
@@ -45,13 +48,14 @@ std::string robotModel(const ros::NodeHandle& node, const Parameters& parameters
   const auto model =
       coglab_rt::readNearest<std::string>(node, "robot_description", "", "the text of a URDF");
   if (!model.empty()) return model;
-  return readFile(ros::package::getPath("lwr_description") + "/urdf/lwr_ih2.urdf");
+  return readFile(ros::package::getPath(kDescription) + "/urdf/lwr_ih2.urdf");
 }
 
 }  // namespace
 
 coglab_rt::JointLimits readJointLimits(const ros::NodeHandle& node) {
-  return coglab_rt::readJointLimits(node, "joint_limits_file", "joint_limits_profile");
+  return coglab_rt::readJointLimits(node, "joint_limits_file", "joint_limits_profile",
+                                    kDescription);
 }
 
 ManagerSettings readManagerSettings(const ros::NodeHandle& node) {

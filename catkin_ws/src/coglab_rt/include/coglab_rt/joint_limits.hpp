@@ -1,5 +1,5 @@
 /// @file
-/// The robot's joint limits as read from the one table, lwr_description/config/joint_limits.yaml.
+/// The arm's joint limits as read from the one table of them (joint_limits_table.hpp).
 #pragma once
 
 #include <array>

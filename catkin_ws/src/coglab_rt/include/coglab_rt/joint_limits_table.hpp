@@ -1,6 +1,6 @@
 /// @file
-/// Reader of the one table of joint limits, lwr_description/config/joint_limits.yaml. Not for
-/// real-time threads.
+/// Reader of the one table of joint limits, config/joint_limits.yaml of an arm's description. Not
+/// for real-time threads.
 #pragma once
 
 #include <algorithm>
@@ -95,7 +95,7 @@ inline YAML::Node openLimitsTable(const std::string& path) {
   } catch (const YAML::BadFile&) {
     throw std::runtime_error(
         "joint limits " + path +
-        ": cannot be opened; expected lwr_description/config/joint_limits.yaml");
+        ": cannot be opened; expected config/joint_limits.yaml of the arm's description");
   } catch (const YAML::ParserException& error) {
     failTable(path, error.mark, error.msg);
   }

@@ -24,7 +24,8 @@ int wholeParameter(const ros::NodeHandle& nh, const char* name, int otherwise, i
 
 BridgeConfig readBridgeConfig(const ros::NodeHandle& nh) {
   BridgeConfig config;
-  config.limits = coglab_rt::readJointLimits(nh, "limits_file", "limits_profile");
+  config.limits =
+      coglab_rt::readJointLimits(nh, "limits_file", "limits_profile", "lwr_description");
   config.krl_convention = fri::krlConventionFromName(
       readParameter<std::string>(nh, "krl_convention", "coglab", "a name"));
   config.tool_number = readParameter<int>(nh, "tool_number", config.tool_number, "a whole number");

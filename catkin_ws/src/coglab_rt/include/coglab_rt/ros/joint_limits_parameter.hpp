@@ -14,18 +14,19 @@
 namespace coglab_rt {
 
 /// Reads the table.
-/// @param file name of the parameter with its path; unset or empty: that of lwr_description.
+/// @param file name of the parameter with its path; unset or empty: the table of the package
+/// `description`, config/joint_limits.yaml.
 /// @param profile name of the parameter with the profile; unset: "default".
 /// @throws std::invalid_argument naming the parameter, std::runtime_error naming file and line.
 inline JointLimits readJointLimits(const ros::NodeHandle& node, const char* file,
-                                   const char* profile) {
+                                   const char* profile, const std::string& description) {
   auto path = readParameter<std::string>(node, file, "", "a path");
   if (path.empty()) {
-    const std::string package = ros::package::getPath("lwr_description");
+    const std::string package = ros::package::getPath(description);
     if (package.empty()) {
-      throw std::runtime_error(
-          "package lwr_description is not found; build and source the workspace or set " +
-          node.resolveName(file));
+      throw std::runtime_error("package " + description +
+                               " is not found; build and source the workspace or set " +
+                               node.resolveName(file));
     }
     path = package + "/config/joint_limits.yaml";
   }
