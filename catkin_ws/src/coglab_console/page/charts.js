@@ -106,7 +106,7 @@ function optionsOf(strip, last) {
     drawGrid: true,
     gridLineColor: '#dde2e6',
     axisLineColor: '#8b939b',
-    axes: { x: { drawAxis: last, axisLabelFormatter: axis, valueFormatter: axis, axisLabelWidth: 40, pixelsPerLabel: 90 }, y: { axisLabelWidth: 38, pixelsPerLabel: 17 } },
+    axes: { x: { drawAxis: last, axisLabelFormatter: axis, valueFormatter: axis, axisLabelWidth: 40, pixelsPerLabel: 90 }, y: { axisLabelWidth: 38, pixelsPerLabel: 17, axisLabelFormatter: (value) => String(Number(value.toPrecision(2))) } },
     dateWindow: [-WINDOW, 0],
   };
 }
