@@ -23,9 +23,17 @@ from pathlib import Path
 
 COMBINED = {
     # losses with limits, leash and feedback; what ends command mode; stamps, sizes and numbers that nobody expects
-    "lwr_fri_bridge": ("losses", "bridge_faults", "command_mode_loss", "reason_codes", "target_command"),
+    "lwr_fri_bridge": (
+        "losses",
+        "bridge_faults",
+        "command_mode_loss",
+        "reason_codes",
+        "target_command",
+        "test_loss_rows.py",
+    ),
     # cancel, faults and goals on a real clock; loading that fails half way
     "coglab_controllers": (
+        "abi",
         "cancel",
         "control_thread",
         "faults",
@@ -34,13 +42,14 @@ COMBINED = {
         "test_robot_start.py",
         "test_start_failure.py",
     ),
-    "ctrl_more": ("all_or_nothing", "test_address_sanitizer.py"),
+    "ctrl_more": ("abi", "all_or_nothing", "controller_logs", "test_address_sanitizer.py"),
     "ih2_hand": ("test_lost_port.py",),
-    "coglab_sim": ("test_sanitizers.py", "test_limit_switches.py"),
+    "coglab_sim": ("test_sanitizers.py", "test_limit_switches.py", "test_plausible.py"),
     # ports and their doubles, motions that are owned, another engine
     "coglab_smach": (
         "port_contracts.test",
         "test_port_contracts.py",
+        "test_impossible_stamps.py",
         "test_motion_ownership.py",
         "test_master_state.py",
         "test_service_call.py",

@@ -51,14 +51,20 @@ class MayMove:
     def __init__(self) -> None:
         self.allowed = False
         self.refusals: list[str] = []  # why not, each time that it began
-        self.late = 0
+        self.late, self.late_begins = 0, False
         rospy.Subscriber("/lwr/state", LwrState, self.on_state, queue_size=50)
 
     def on_state(self, message: LwrState) -> None:
         if message._connection_header.get("callerid") != "/robot":
             return
+        if self.late_begins and message.motion_allowed:
+            # Begun again by the arm's interface itself, which does so for nothing but a computer that was late.
+            self.late_begins = False
+            self.refusals.pop()
+            self.late += 1
         if self.allowed and not message.motion_allowed:
-            if message.reason_code == ReasonCode.COMPUTER_LATE:
+            self.late_begins = message.reason_code != ReasonCode.COMPUTER_LATE
+            if not self.late_begins:
                 self.late += 1
                 threading.Thread(target=rospy.ServiceProxy("/lwr/command", LwrCommand), args=("start",)).start()
             else:

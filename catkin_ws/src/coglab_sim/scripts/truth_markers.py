@@ -18,6 +18,7 @@ from coglab_objects.database import ObjectError, cell_parameters, objects_folder
 from coglab_py import parameters
 from coglab_py.messages import pose_message, pose_of
 from coglab_py.pose import Pose as Frame
+from coglab_sim.plausible import IMPLAUSIBLE, plausible
 from geometry_msgs.msg import Point, Pose, Quaternion, TransformStamped, Vector3
 from scipy.spatial.transform import Rotation
 from std_msgs.msg import ColorRGBA
@@ -52,6 +53,10 @@ class TruthMarkers:
         """Draw, if it is time."""
         now = time.monotonic()
         if now < self.due:
+            return
+        shown = [truth.human_hand, truth.robot_hand, *([truth.object] if truth.object_id else [])]
+        if not plausible(map(pose_of, shown)):
+            rospy.logwarn_throttle(5.0, f"truth markers: truth/cell ignored: {IMPLAUSIBLE}")
             return
         self.due = now + PERIOD
         array = MarkerArray(markers=[self.hand(truth), *self.person(truth)])
@@ -121,7 +126,7 @@ class TruthMarkers:
             folder = Path(parameters.read("cell/objects", str, str(objects_folder())))
             try:
                 self.shapes[object_id] = cell_parameters(read_object(folder / f"{object_id}.yaml")[0])
-            except ObjectError as error:
+            except (ObjectError, ValueError) as error:  # a name that no file can have
                 rospy.logwarn("truth markers: '%s' is drawn as a box: %s", object_id, error)
                 self.shapes[object_id] = {}
         return self.shapes[object_id]

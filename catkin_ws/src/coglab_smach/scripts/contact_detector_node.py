@@ -34,7 +34,7 @@ from coglab_smach.contact.fused_detector import IN_MOTION, LIFT, RELEASE, FusedD
 from coglab_smach.contact.learning import MotionRecorder
 from coglab_smach.contact.motion_thresholds import ThresholdError, Thresholds
 from coglab_smach.contact.moving_contact import MovingContact
-from coglab_smach.ros.publish import publish
+from coglab_smach.ros.publish import can_be_sent, publish
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64
 from std_srvs.srv import SetBool, SetBoolResponse, Trigger, TriggerResponse
@@ -107,6 +107,13 @@ class ContactDetectorNode:
             file = Path(self.learnt_file)
         return Thresholds.load(file)
 
+    def refuses(self, message: JointState | HandStatus | FingertipForces) -> bool:
+        """Whether the stamp of a message cannot be passed on with what it leads to; said."""
+        if can_be_sent(message.header.stamp):
+            return False
+        rospy.logwarn_throttle(5.0, f"contact detector: {message._type} refused: no message can carry its stamp")
+        return True
+
     def on_state(self, message: LwrState) -> None:
         """The FRI period: stamps of reception jitter, the robot's measurements do not."""
         with self.lock:
@@ -117,6 +124,8 @@ class ContactDetectorNode:
         none."""
         index = {name: i for i, name in enumerate(message.name)}
         if any(name not in index for name in self.joints) or len(message.position) != len(message.name):
+            return
+        if self.refuses(message):
             return
         order = [index[name] for name in self.joints]
         position = [message.position[i] for i in order]
@@ -138,6 +147,8 @@ class ContactDetectorNode:
 
     def on_hand(self, message: HandStatus) -> None:
         """Fingers; an empty hand carries nothing."""
+        if self.refuses(message):
+            return
         with self.lock:
             if message.connected and not message.holding and self.moving.load > 0.0:
                 self.detector.set_payload(0.0)
@@ -146,6 +157,8 @@ class ContactDetectorNode:
 
     def on_touch(self, message: FingertipForces) -> None:
         """Forces on fingers and palm."""
+        if self.refuses(message):
+            return
         forces = [(force.x, force.y, force.z) for force in [*message.forces, message.palm]]
         with self.lock:
             event = self.detector.feed_touch(message.header.stamp.to_sec(), forces, message.deviation)
@@ -153,7 +166,7 @@ class ContactDetectorNode:
 
     def on_torques(self, message: JointState) -> None:
         """Each torque sample goes through the detector; an event is published at once."""
-        if len(message.effort) != 7 or self.position is None or self.velocity is None:
+        if len(message.effort) != 7 or self.position is None or self.velocity is None or self.refuses(message):
             return
         with self.lock:
             stamp = self.last_sample = message.header.stamp.to_sec()

@@ -1,4 +1,4 @@
-"""Publishing from threads that outlive the node's topics for a moment."""
+"""Publishing from threads that outlive the node's topics for a moment, with stamps that came from elsewhere."""
 
 from __future__ import annotations
 
@@ -14,3 +14,9 @@ def publish(publisher: rospy.Publisher, message: Any) -> None:
     except rospy.ROSException:
         if not rospy.is_shutdown():
             raise
+
+
+def can_be_sent(stamp: rospy.Time) -> bool:
+    """Whether a message can carry this stamp, also as a number of seconds: nanoseconds beyond a second have led some
+    past the last one. Publishing it would throw, and end the timer that does so."""
+    return bool(0.0 <= stamp.to_sec() < 2**32)
