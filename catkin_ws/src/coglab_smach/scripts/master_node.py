@@ -41,7 +41,6 @@ from coglab_smach.ros.publish import publish
 from std_msgs.msg import String
 from std_srvs.srv import Trigger, TriggerResponse
 
-
 STATE_PERIOD = 0.2  # s between two messages on coglab/state where nothing changes
 
 
