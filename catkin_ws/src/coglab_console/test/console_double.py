@@ -21,6 +21,7 @@ from coglab_console.web.server import ConsoleServer
 
 PAGE = Path(__file__).resolve().parents[1] / "page"
 READY = dict(
+    master_there=True,
     master_alive=True,
     state="/coglab_master/wait_without_object",
     in_hub=True,

@@ -133,6 +133,15 @@ def test_thresholds_do_not_change_under_way(desk):
         assert "under way" in ask(desk, "a", name, **arguments)["message"]
 
 
+def test_a_brain_that_is_silent_in_an_action_changes_no_threshold(desk):
+    """It may only be frozen, and go on."""
+    desk.backend.now = replace(desk.backend.now, in_hub=False, master_alive=False)
+    for name, arguments in (("contact_arm", {"mode": "off"}), ("calibrate", {"mode": "fast"}), ("home", {})):
+        assert "under way" in ask(desk, "a", name, **arguments)["message"]
+    desk.backend.now = replace(desk.backend.now, master_there=False)
+    assert ask(desk, "a", "home")["success"]
+
+
 # --- commands -------------------------------------------------------------------------------------------------
 
 

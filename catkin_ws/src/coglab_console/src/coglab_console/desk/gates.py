@@ -114,6 +114,8 @@ class Standstills:
 class Standing:
     """What the reasons depend on; the node fills it in. `…_alive`: it is there and was heard a moment ago."""
 
+    master_there: bool = False
+    """also where it has been silent for a moment: what it was doing may go on"""
     master_alive: bool = False
     state: str = ""
     in_hub: bool = False
@@ -141,7 +143,7 @@ class Standing:
     @property
     def under_way(self) -> bool:
         """Whether the machine is in an action."""
-        return self.master_alive and not self.in_hub
+        return self.master_there and not self.in_hub
 
 
 def _leads_on(now: Standing) -> str:
@@ -187,7 +189,7 @@ def _home_reason(now: Standing) -> str:
         return "the arm is not there, or silent"
     if now.under_way:
         return "an action is under way"
-    if now.master_alive and now.leaf in STANDSTILL:
+    if now.master_there and now.leaf in STANDSTILL:
         return _leads_on(now)
     if now.motion_allowed:
         return ""

@@ -120,6 +120,7 @@ class RosView:
         """For the desk."""
         machine, arm, hand = self.machine, self.arm, self.hand
         return Standing(
+            master_there=self.there("coglab/state"),
             master_alive=self.there("coglab/state") and self.sources.speaks("brain"),
             state=machine.state,
             in_hub=machine.in_hub,
