@@ -5,6 +5,7 @@ looked at, the scene's hand against tf. Pictures are kept beside the logs."""
 import json
 import os
 import signal
+import statistics
 import subprocess
 import sys
 import tempfile
@@ -271,22 +272,23 @@ class Console(unittest.TestCase):
         """Its connections stand, so that nothing but its silence tells."""
         cell = "[...document.querySelectorAll('#status dt')].find((dt) => dt.innerText === arguments[0]).nextSibling"
         for node, row in (("/ih2_hand", "Hand"), ("/coglab", "Phase")):
-            self.browser.js(
-                f"const cell = {cell}; delete window.silentAt; window.watch?.disconnect();"
-                "window.watch = new MutationObserver(() => {"
-                " if (cell.innerText.includes('silent')) window.silentAt ??= Date.now(); });"
-                "window.watch.observe(cell, { characterData: true, childList: true, subtree: true });",
-                row,
-            )
-            process = self._process_of(node)
-            began = time.time()
-            os.kill(process, signal.SIGSTOP)
-            try:
-                took = self.browser.until("return window.silentAt", 10.0) / 1000 - began
-            finally:
-                os.kill(process, signal.SIGCONT)
-            self.assertLess(took, 1.0, node)
-            self.browser.until(f"return !{cell}.innerText.includes('silent')", 10.0, row)
+            process, took = self._process_of(node), []
+            for _ in range(3):  # one of them may fall into a moment in which the computer is busy
+                self.browser.js(
+                    f"const cell = {cell}; delete window.silentAt; window.watch?.disconnect();"
+                    "window.watch = new MutationObserver(() => {"
+                    " if (cell.innerText.includes('silent')) window.silentAt ??= Date.now(); });"
+                    "window.watch.observe(cell, { characterData: true, childList: true, subtree: true });",
+                    row,
+                )
+                began = time.time()
+                os.kill(process, signal.SIGSTOP)
+                try:
+                    took.append(self.browser.until("return window.silentAt", 10.0) / 1000 - began)
+                finally:
+                    os.kill(process, signal.SIGCONT)
+                self.browser.until(f"return !{cell}.innerText.includes('silent')", 10.0, row)
+            self.assertLess(statistics.median(took), 1.0, (node, took))
 
     @staticmethod
     def _process_of(node):
