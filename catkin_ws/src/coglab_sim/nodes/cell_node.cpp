@@ -6,7 +6,8 @@
 /// Parameters: every row of the cell's table under the private namespace; ~speed, ~fri_host,
 /// ~fri_port (0: wait for ~port_parameter, by default lwr/fri_port_bound beside this namespace),
 /// ~port_wait, ~fri_source_port (0: any free one), ~log_file, ~truth_rate, ~publish_clock,
-/// ~tactile; fri_period and seed of the parent namespace.
+/// ~tactile, ~rt_priority (SCHED_FIFO of the thread of steps); fri_period and seed of the parent
+/// namespace.
 #include <fstream>
 #include <memory>
 
@@ -77,6 +78,7 @@ class CellNode {
     int port = within(private_, "fri_port", 0);
     const double speed = within(private_, "speed", 1.0);
     const double rate = within(private_, "truth_rate", 200.0);
+    const int priority = within(private_, "rt_priority", 60);
     port_parameter_ = portParameter(text("port_parameter", "lwr/fri_port_bound", "a name"));
     follow_port_ = port == 0;
     if (follow_port_) port = waitForPort(port_parameter_, within(private_, "port_wait", 60.0));
@@ -115,7 +117,11 @@ class CellNode {
         "real time",
         host.c_str(), port, 1e3 * config_.krc.period, krc::nameOf(config_.krc.convention).c_str(),
         speed);
-    cell_->start();
+    const std::string normal = cell_->start(priority);
+    if (normal.empty())
+      ROS_INFO("its thread has SCHED_FIFO priority %d", priority);
+    else
+      ROS_INFO("its thread is a normal one: %s", normal.c_str());
   }
 
   ~CellNode() {

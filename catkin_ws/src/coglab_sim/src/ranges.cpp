@@ -88,6 +88,7 @@ constexpr Row kRanges[] = {
     {"fri_port", 0, 65535},
     {"fri_source_port", 0, 65535},
     {"port_wait", 0, 3600},
+    {"rt_priority", 0, 98},
     {"speed", 0.01, 100},
     {"truth_rate", 1, 1000},
     // of faults

@@ -4,6 +4,9 @@
 #include <stdexcept>
 #include <utility>
 
+#include <pthread.h>
+
+#include "coglab_rt/real_time.hpp"
 #include "coglab_sim/ranges.hpp"
 
 namespace coglab_sim {
@@ -28,16 +31,27 @@ RealTimeCell::RealTimeCell(const CellConfig& config, const std::string& host, st
 
 RealTimeCell::~RealTimeCell() { stop(); }
 
-void RealTimeCell::start() {
-  if (running_.exchange(true)) return;
-  thread_ = std::thread([this] {
+std::string RealTimeCell::start(int priority) {
+  if (running_.exchange(true)) throw std::logic_error("the simulated cell runs already");
+  std::promise<std::string> scheduled;
+  std::future<std::string> scheduling = scheduled.get_future();
+  thread_ = std::thread([this, priority, scheduled = std::move(scheduled)]() mutable {
     try {
+      scheduled.set_value(schedule(priority));
       run();
     } catch (const std::exception& error) {
       const std::lock_guard<std::mutex> lock(mutex_);
       failure_ = error.what();
     }
   });
+  return scheduling.get();
+}
+
+std::string RealTimeCell::schedule(int priority) const {
+  pthread_setname_np(pthread_self(), "cell");
+  if (priority == 0) return "no priority was asked for";
+  if (factor_ > 1.0) return "it runs faster than real time";
+  return coglab_rt::enterRealTime(priority);
 }
 
 void RealTimeCell::stop() {

@@ -239,6 +239,7 @@ class CellNode(unittest.TestCase):
             ("fri_source_port", 70000, "= 70000 is outside its range 0..65535"),
             ("speed", 1000.0, "= 1000 is outside its range 0.01..100"),
             ("truth_rate", 0.1, "= 0.1 is outside its range 1..1000"),
+            ("rt_priority", 99, "= 99 is outside its range 0..98"),
             ("krc/period", 0.5, "krc/period = 0.5 is outside its range 0.001..0.1"),
             ("arm/unknown_load", -1.0, "arm/unknown_load = -1 is outside its range 0..10"),
             ("krc/convention", "nobody", "known: coglab, centro_epiaggio, stanford"),

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include <netinet/in.h>
+#include <pthread.h>
 #include <sys/socket.h>
 #include <unistd.h>
 
@@ -167,6 +168,27 @@ TEST(RealTimeCell, ARequestThatTimedOutIsWithdrawn) {
   cell.apply([&](Cell&) {}, 5.0);  // the thread goes on
   cell.stop();
   EXPECT_EQ(done, 0);
+}
+
+/// A real robot controller has a computer of its own, which no program on the PC delays.
+TEST(RealTimeCell, ItsThreadIsRealTimeWhereThatIsGrantedAndTheFactorAllowsIt) {
+  CellConfig config;
+  config.urdf = URDF;
+  for (const auto& [factor, priority] : {std::pair{1.0, 60}, {1.0, 0}, {2.0, 60}}) {
+    RealTimeCell cell(config, "127.0.0.1", 9, factor);
+    const std::string normal = cell.start(priority);
+    int policy = -1;
+    sched_param parameters{};
+    cell.apply([&](Cell&) { pthread_getschedparam(pthread_self(), &policy, &parameters); }, 5.0);
+    EXPECT_EQ(policy, normal.empty() ? SCHED_FIFO : SCHED_OTHER) << factor << " " << normal;
+    EXPECT_EQ(parameters.sched_priority, normal.empty() ? 60 : 0) << factor;
+    const bool asked = priority > 0 && factor <= 1.0;
+    // Only a computer that refuses it may say no where it was asked for.
+    EXPECT_TRUE(asked ? normal.empty() || normal.find("granted") != std::string::npos
+                      : !normal.empty())
+        << normal;
+    EXPECT_THROW(cell.start(), std::logic_error);
+  }
 }
 
 /// Clients with a hard-wired port of the controller can be used.

@@ -48,7 +48,11 @@ class RealTimeCell {
   RealTimeCell(const RealTimeCell&) = delete;
   RealTimeCell& operator=(const RealTimeCell&) = delete;
 
-  void start();
+  /// Starts the thread, named `cell`: a robot controller is a real-time computer of its own, so that
+  /// it gets SCHED_FIFO with `priority` (0: none) where that is granted. Faster than real time it is
+  /// a normal thread: it would leave nothing to others. Returns an empty string, or why it is one.
+  /// @pre not running
+  std::string start(int priority = 0);
   void stop();
   /// Where the PC listens from now on.
   void setPort(std::uint16_t port) { port_ = port; }
@@ -80,6 +84,7 @@ class RealTimeCell {
     double time;
     std::function<void(Cell&)> action;
   };
+  std::string schedule(int priority) const;
   void run();
   void applyInputs();
   void leaveResults(bool answered);
