@@ -43,6 +43,7 @@ TOWARD = {  # the action that leads toward one, by who holds the object; none wh
     "put": {"human": "exchange_human_to_robot", "board": "take"},
 }
 STEPS = 8  # until an action can begin
+AT_REST, PATIENCE = 0.1, 20.0  # m from where the person's hand rests, and s for which an experimenter waits for that
 ANSWERED = """
 const rows = coglab.events().filter((e) => e.seq > arguments[0] && e.source === 'stop').map((e) => e.text);
 const answers = rows.filter((text) => text.startsWith('STOP, ') || text.includes('cannot be asked')).length;
@@ -168,6 +169,20 @@ class Cell:
         """Who has the object, by the truth of the cell: robot, human, board or floor."""
         truth = rospy.wait_for_message("/coglab_sim/truth/cell", CellTruth, 5.0)
         return {"both": "robot", "none": "floor"}.get(truth.held_by, truth.held_by)
+
+    def await_person(self) -> None:
+        """The person's hand is at rest, as an experimenter sees it before the next action: a STOP leaves people in the
+        middle of what they were doing. Goes on where it does not come to rest."""
+        rest = rospy.get_param("/coglab_sim/virtual_human/rest")
+
+        def rests() -> bool:
+            hand = rospy.wait_for_message("/coglab_sim/truth/cell", CellTruth, 5.0).human_hand.position
+            return math.dist((hand.x, hand.y, hand.z), rest) < AT_REST
+
+        try:
+            self.wait(rests, PATIENCE, "the person's hand at rest")
+        except TimeoutError as error:
+            say(str(error))
 
     def remember_board(self) -> None:
         """The object stands on the board as the robot has put it there."""
@@ -337,6 +352,7 @@ class Operator:
             step = TOWARD[action].get(holder, "")
             offered = self.cell.machine.actions
             if not step and action in offered:
+                self.cell.await_person()
                 return
             done = self.do(step if step in offered else offered[0], False, "between")
             if not done and holder == "board" and self.cell.leaf.startswith("wait_"):
