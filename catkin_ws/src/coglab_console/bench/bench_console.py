@@ -106,8 +106,6 @@ def rehearsed(cell: Cell, operator: Operator) -> tuple[list[tuple[str, str]], li
     for action in ACTIONS:
         cell.passed.clear()
         done += operator.carry_out(action, False, f"rehearsal_{action}")
-        if action == "put":
-            cell.remember_board()
         way, rest = on_the_way(cell.phases(action), list(cell.passed))
         places += [(action, state) for state in way]
         aside += rest

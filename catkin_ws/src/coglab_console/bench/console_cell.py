@@ -43,6 +43,7 @@ TOWARD = {  # the action that leads toward one, by who holds the object; none wh
     "put": {"human": "exchange_human_to_robot", "board": "take"},
 }
 STEPS = 8  # until an action can begin
+MOVED, TURNED = 0.03, 0.3  # m and rad by which what stands on the board was touched since it was put there
 AT_REST, PATIENCE = 0.1, 20.0  # m from where the person's hand rests, and s for which an experimenter waits for that
 ANSWERED = """
 const rows = coglab.events().filter((e) => e.seq > arguments[0] && e.source === 'stop').map((e) => e.text);
@@ -83,7 +84,7 @@ class Cell:
         self.passed: list[str] = []  # states that were entered, see came_to()
         self.structure: dict[str, list[str]] = {}  # children of the machine's containers, by path
         self.fri: dict[str, str] = {}  # newest diagnostics of the connection to the robot controller
-        self._on_board = Pose()  # where the robot has put the object on the board
+        self._on_board: Pose | None = None  # where the robot has put the object on the board
         self.supervisors: list[str] = []  # what the arm's interface was in, one after the other
         self.held_at = 0.0  # s of the bridge's own clock, when the hold latched last
         self.latencies: list[float] = []  # s, as the bridge's diagnostics tell it
@@ -190,8 +191,22 @@ class Cell:
         if truth.held_by == "board":
             self._on_board = truth.object
 
+    def touched(self) -> bool:
+        """Whether the object on the board is not as the robot has put it there: a STOP may have let it fall, or the
+        hand may have pushed it."""
+        if self._on_board is None:
+            return False
+        now, then = rospy.wait_for_message("/coglab_sim/truth/cell", CellTruth, 5.0).object, self._on_board
+        a, b = now.orientation, then.orientation
+        turn = 2.0 * math.acos(min(1.0, abs(a.x * b.x + a.y * b.y + a.z * b.z + a.w * b.w)))
+        place, before = now.position, then.position
+        moved = math.dist((place.x, place.y, place.z), (before.x, before.y, before.z))
+        return moved > MOVED or turn > TURNED
+
     def pick_up(self) -> None:
         """The object to where the robot has put it on the board, as an experimenter would."""
+        if self._on_board is None:
+            raise TimeoutError("the object lies where nobody has put it, and there is no place on the board for it")
         answer = rospy.ServiceProxy("/coglab_sim/cell/place_object", PlaceObject)("", "world", self._on_board)
         if not answer.success:
             raise TimeoutError(f"the object stays on the floor: {answer.message}")
@@ -294,6 +309,8 @@ class Operator:
         self.cell.wait(lambda: self.cell.machine.in_hub, 90.0, f"the end of {action}")
         wanted = "wait_with_object" if action in ("exchange_human_to_robot", "take") else "wait_without_object"
         done = self.cell.leaf == wanted
+        if done and action == "put":
+            self.cell.remember_board()
         if not done:
             say(f"{action} ended in {self.cell.leaf}: {self.cell.machine.why or 'no reason told'}")
         return done
@@ -346,7 +363,7 @@ class Operator:
         for _ in range(STEPS):
             self.recover()
             holder = self.cell.holder()
-            if holder == "floor":
+            if holder == "floor" or (holder == "board" and self.cell.touched()):
                 self.cell.pick_up()
                 continue
             step = TOWARD[action].get(holder, "")
@@ -354,9 +371,7 @@ class Operator:
             if not step and action in offered:
                 self.cell.await_person()
                 return
-            done = self.do(step if step in offered else offered[0], False, "between")
-            if not done and holder == "board" and self.cell.leaf.startswith("wait_"):
-                self.cell.pick_up()  # it has fallen over
+            self.do(step if step in offered else offered[0], False, "between")
         raise TimeoutError(f"{action} was not offered, with the object held by {holder}")
 
     def _acknowledge(self) -> None:
