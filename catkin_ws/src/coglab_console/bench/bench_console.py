@@ -8,9 +8,11 @@ Pictures: out/bench_console.
 
 STOP: 200 presses, from the browser's key-down to the bridge's hold, both by this computer's clock; none left out. In
 every phase: one STOP in each phase of each action, by the structure that the machine publishes, that a rehearsal of the
-action has passed; one whose phase was not reached is missed. Latency: the mean over
-10 s with console and browser over that without, in pairs in random order; judged by the upper end of the bootstrapped
-95 % interval of the median.
+action has passed; one whose phase was not reached is missed. Before each the experimenter waits for the person's hand
+to rest, and puts back an object that a STOP has let fall or that the hand has pushed.
+
+Latency: the mean over 10 s with console and browser over that without, in pairs in random order; judged by the upper
+end of the bootstrapped 95 % interval of the median.
 """
 
 from __future__ import annotations

@@ -100,6 +100,36 @@ def lets_go_of_it(trial):
         trial.rig.hand.driver.move_motor(motor, 511, False)
 
 
+def test_stop_while_the_hand_opens_and_the_person_takes_the_object():
+    """The fingers stay as STOP has left them and say that they hold something. Where the object is seen with the person
+    the hand is empty all the same, and the next exchange is theirs to begin."""
+    trial = VirtualTrial(seed=4, profile="accustomed", perfect=True)
+    pressed = []
+
+    def beside(t):
+        last = t.ctx.journal.transitions[-1] if t.ctx.journal.transitions else None
+        if not pressed and last is not None and last.to_state == "hand_open":
+            pressed.append(t.rig.t)
+            t.ctx.stop.press("the test")
+
+    def script(t):
+        t.wait_hub("wait_without_object")
+        t.ctx.requests.submit(RECEIVE, "mug")
+        t.wait_hub("wait_with_object")
+        t.ctx.requests.submit(GIVE, "mug")
+        t.wait_hub("stopped")
+        while t.rig.cell.truth()["held_by"] != "human" or t.rig.human.phase != "idle":
+            t.clock.sleep(0.05)
+        assert t.ctx.hand.state().holding, "else this test shows nothing"
+        assert t.ctx.requests.submit("reset", "")[0]
+        t.wait_hub("wait_without_object")
+        assert not t.ctx.hand.state().holding and t.ctx.holding == ""
+
+    trial.beside = beside
+    trial.run(script=script)
+    assert pressed and at_home(trial) and not trial.rig.cell.truth()["dropped"]
+
+
 def test_an_object_that_leaves_the_hand_on_the_way_home():
     trial = VirtualTrial(seed=4, profile="accustomed", perfect=True)
     done = []

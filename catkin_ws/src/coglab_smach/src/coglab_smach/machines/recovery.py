@@ -14,6 +14,7 @@ from coglab_smach.ports.interfaces import Verdict
 from coglab_smach.ports.pending import PortError
 from coglab_smach.states.arm import HomeRobot
 from coglab_smach.states.base import CoglabMachine, CoglabState
+from coglab_smach.states.held import LOOK, HeldObject
 from coglab_smach.states.motion import end_motion
 
 
@@ -56,7 +57,8 @@ class EndMotion(CoglabState):
 
 
 class SecureHand(CoglabState):
-    """Decide what the hand does during recovery: keep holding if it closed on an object, else open.
+    """Decide what the hand does during recovery: keep holding if it closed on an object, else open. Fingers that a STOP
+    has left half open say that they hold something: what the tracker sees away from the palm is not in them.
 
     The arm goes nowhere with an object that the person may hold too: outcome stopped, until the operator has looked and
     asks for 'reset' (``operator``: this is the recovery after that).
@@ -75,6 +77,8 @@ class SecureHand(CoglabState):
         return outcome
 
     def _secure(self) -> str:
+        if self.ctx.holding and self.ctx.hand.state().holding:
+            self._look_for_it()
         if self.ctx.holding and (self.operator or not self.ctx.shared):
             self.ctx.shared = False
             self.reason = f"the hand keeps '{self.ctx.holding}'"
@@ -94,6 +98,16 @@ class SecureHand(CoglabState):
             self.reason = f"the hand could not be opened: {error.sentence}"
         self.ctx.shared = False
         return "succeeded"
+
+    def _look_for_it(self) -> None:
+        """Empties the context's hand where the object is seen elsewhere. What nobody sees is where the hand says."""
+        held, end = HeldObject(self.ctx, self.ctx.holding), self.ctx.clock.now() + LOOK
+        try:
+            while not held.seen_with_the_hand() and self.ctx.clock.now() < end:
+                held.check()
+                self.pause(0.02)
+        except PortError as error:
+            self.reason = "; ".join((error.sentence, *error.causes))
 
     def _stay(self, why: str) -> str:
         self.reason = f"the arm stays where it is: {why}; free the object, then {command('reset')}"

@@ -13,6 +13,8 @@ NEAR, FARTHER = 0.20, 0.15
 """m between palm and object in which the object counts as carried, and by which it is farther when it is not"""
 LOST_TIME = 0.3
 """s for which it is seen there"""
+LOOK = 0.8
+"""s for which an arm that stands looks for what its hand may have lost"""
 OLDEST = 0.2
 """s, older sights do not tell"""
 
@@ -61,6 +63,10 @@ class HeldObject:
         """Check it; False while it is not decided, because it was seen away from the palm last."""
         self.check()
         return self._away_since is None
+
+    def seen_with_the_hand(self) -> bool:
+        """Whether one sight at least has shown it near the palm, and none has since shown it elsewhere."""
+        return self._carried is not None and self._away_since is None
 
     def _lost(self, why: str) -> None:
         self._ctx.holding, self._ctx.shared = "", False
