@@ -162,12 +162,13 @@ class FusedDetector:
         if self.moving is None:
             return None
         self._follow_clock(stamp)
-        evidence = self.moving.feed(stamp, position, torque)
+        self.moving.feed(stamp, position, torque)
         if self._lift is not None:
             return self._watch_lift(stamp, self._lift)
         if self._leaving is not None:
             return self._watch_leaving(stamp, self._leaving)
-        if self._until is None or evidence is None:
+        evidence = self.moving.evidence() if self._until is not None else None
+        if evidence is None:
             return None
         if self._first:
             self._first = False

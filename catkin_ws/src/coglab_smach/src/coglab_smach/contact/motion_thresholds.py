@@ -11,8 +11,9 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -64,12 +65,18 @@ class Offset:
 
 @dataclass(frozen=True)
 class Change:
-    """The residual's change at one sample, Nm; what its variance grows with; the palm's 3 x 7 Jacobian there."""
+    """The residual's change at one sample, Nm; what its variance grows with; where the joints were, rad."""
 
     stamp: float
     torque: np.ndarray
     features: np.ndarray
-    jacobian: np.ndarray
+    position: np.ndarray
+    jacobian_at: Callable[[np.ndarray], np.ndarray]
+
+    @cached_property
+    def jacobian(self) -> np.ndarray:
+        """The palm's 3 x 7 Jacobian there; computed where somebody asks, which is seldom."""
+        return self.jacobian_at(self.position)
 
 
 class ChangeOfResidual:
@@ -116,7 +123,7 @@ class ChangeOfResidual:
         acceleration = float(np.abs(residual.acceleration).max())
         growing = [1.0, math.sqrt(self._speed), self._speed, max(0.0, float(mean[7])), acceleration**2]
         features = np.array([*growing, (load * acceleration) ** 2])
-        return Change(residual.stamp, residual.torque - self.past, features, self._jacobian(residual.position))
+        return Change(residual.stamp, residual.torque - self.past, features, residual.position, self._jacobian)
 
 
 @dataclass(frozen=True)

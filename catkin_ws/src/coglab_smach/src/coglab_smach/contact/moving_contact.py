@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable
 
 import numpy as np
@@ -22,7 +23,7 @@ SETTLED = 0.25
 
 
 class MovingContact:
-    """Feed it every sample of lwr/joint_states; it answers with evidence. The hand carries nothing until it is told."""
+    """Feed it every sample of lwr/joint_states, and ask it for evidence. The hand carries nothing until it is told."""
 
     def __init__(
         self,
@@ -38,13 +39,11 @@ class MovingContact:
         self.load = 0.0
         self.change: Change | None = None
         """the newest one"""
-        self.force = np.zeros(3)
-        """N on the palm, base frame, that explains it"""
         self.residual: Residual | None = None
         """the newest one"""
         self._jacobian = jacobian
         self._changes = ChangeOfResidual(jacobian)
-        self._sizes: list[float] = []
+        self._newest: deque[Change] = deque(maxlen=CONFIRM)
         self._still_since: float | None = None
         self._rest: np.ndarray | None = None
         self._free: np.ndarray | None = None
@@ -62,7 +61,7 @@ class MovingContact:
 
     def _forget(self) -> None:
         self._changes.reset()
-        self._sizes.clear()
+        self._newest.clear()
         self.change = self._still_since = self._rest = self._free = self._free_weight = None
 
     def still(self) -> bool:
@@ -125,19 +124,26 @@ class MovingContact:
             self._rest = rest + 0.02 * (residual.torque - rest)
             self._rest_position = residual.position
 
-    def feed(self, stamp: float, position: Joints, torque: Joints) -> Evidence | None:
-        """One sample: s, rad, Nm as measured. None while there is too little of a past."""
+    def feed(self, stamp: float, position: Joints, torque: Joints) -> None:
+        """One sample: s, rad, Nm as measured."""
         residual = self.residual = self.observer.feed(stamp, position, torque)
         if residual is None:
-            return None
+            return
         if residual.fresh:
             self._forget()
         self._follow_rest(residual)
         self.change = self._changes.feed(residual, self.load)
-        if self.change is None:
+        if self.change is not None:
+            self._newest.append(self.change)
+
+    def evidence(self) -> Evidence | None:
+        """What the newest samples say; None while there is too little of a past, or where the last sample was left
+        out. Who does not watch does not ask: the force behind a change costs more than all the rest."""
+        if self.residual is None or self.change is None:
             return None
-        self.force, size = self.thresholds.force(self.change)
-        self._sizes = [*self._sizes, size][-CONFIRM:]
-        margin = min(self._sizes) / self.thresholds.limit if len(self._sizes) == CONFIRM else 0.0
-        message = f"{length(self.force):.1f} N on the hand, {size:.0f} deviations of the moving arm's"
-        return Evidence(MOMENTUM, stamp, stamp + HOLD, margin, message)
+        forces = [self.thresholds.force(change) for change in self._newest]
+        force, size = forces[-1]
+        sure = min(each for _, each in forces) if len(forces) == CONFIRM else 0.0
+        message = f"{length(force):.1f} N on the hand, {size:.0f} deviations of the moving arm's"
+        stamp = self.change.stamp
+        return Evidence(MOMENTUM, stamp, stamp + HOLD, sure / self.thresholds.limit, message)
