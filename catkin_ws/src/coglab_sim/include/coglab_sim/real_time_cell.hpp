@@ -48,9 +48,10 @@ class RealTimeCell {
   RealTimeCell(const RealTimeCell&) = delete;
   RealTimeCell& operator=(const RealTimeCell&) = delete;
 
-  /// Starts the thread, named `cell`: a robot controller is a real-time computer of its own, so that
-  /// it gets SCHED_FIFO with `priority` (0: none) where that is granted. Faster than real time it is
-  /// a normal thread: it would leave nothing to others. Returns an empty string, or why it is one.
+  /// Starts the thread, named `cell`: a robot controller is a real-time computer of its own, so
+  /// that it gets SCHED_FIFO with `priority` (0: none) where that is granted. Faster than real time
+  /// it is a normal thread: it would leave nothing to others. Returns an empty string, or why it is
+  /// one.
   /// @pre not running
   std::string start(int priority = 0);
   void stop();
