@@ -7,7 +7,18 @@ import pytest
 
 PACKAGE = Path(__file__).resolve().parents[1]
 DEFINITIONS = sorted(path for kind in ("msg", "srv", "action") for path in (PACKAGE / kind).glob(f"*.{kind}"))
-SENTENCE = re.compile(r"^string(\[\])?\s+(message|reason|why|text|fault|\w*_reasons)\s*(#|$)")
+STRING = re.compile(r"^string(\[\])?\s+(\w+)\s*(#|$)")
+SENTENCES = set("message reason why text fault pause_reasons waits_for problems status".split())
+NO_SENTENCES = set(
+    """
+    action actions activity active_controller active_type affected causes control_mode controller controller_id
+    controller_ids controller_type controller_types fri_state frame_id from_state hand held_by mode motion name names
+    object_frame object_id object_ids outcome path pattern phalanges primitive_id profile quality signal source stage
+    state supervisor to_state type units waiting_for yaml
+    """.split()
+)
+"""Strings that are a name, one of a few words that the comment lists, or YAML; `causes` stand behind a reason that has
+the code."""
 CODE = re.compile(r"^uint16(\[\])?\s+\w*code\w*\s*#\s*(\S.*)$")
 OWN_CODE = {"Say.msg"}
 """its code has values of its own: what is said is no reason"""
@@ -33,7 +44,10 @@ def answers(path: Path) -> list[list[str]]:
 @pytest.mark.parametrize("path", DEFINITIONS, ids=lambda path: path.name)
 def test_a_sentence_has_a_code_beside_it(path: Path) -> None:
     for part in answers(path):
-        sentences = [match for line in part if (match := SENTENCE.match(line))]
+        strings = [match for line in part if (match := STRING.match(line))]
+        unknown = [match[2] for match in strings if match[2] not in SENTENCES | NO_SENTENCES]
+        assert not unknown, f"{path.name}: are {unknown} sentences, or names? Put them into one of the sets above"
+        sentences = [match for match in strings if match[2] in SENTENCES]
         codes = [
             match for line in part if (match := CODE.match(line)) if "ReasonCode" in match[2] or path.name in OWN_CODE
         ]
