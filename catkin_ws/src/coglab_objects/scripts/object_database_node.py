@@ -1,7 +1,7 @@
 #!/usr/bin/python3
 """The node /object_database: serves the object files of a folder and reads them again when they change.
 
-Services (private): get_object, list_objects, reload (std_srvs/Trigger: problems in words).
+Services (private): get_object, list_objects, reload (Reload: problems in words, one code).
 Parameters: ~folder; ih2_hand/dialect (legacy), that of the hand. Mirrors the good entries read-only to ~objects/<id>.
 """
 
@@ -9,10 +9,9 @@ import sys
 
 import rospy
 from coglab_msgs.msg import ReasonCode
-from coglab_msgs.srv import GetObject, GetObjectResponse, ListObjects, ListObjectsResponse
+from coglab_msgs.srv import GetObject, GetObjectResponse, ListObjects, ListObjectsResponse, Reload, ReloadResponse
 from coglab_objects.database import ObjectDatabase, ObjectError
 from coglab_py import parameters
-from std_srvs.srv import Trigger, TriggerResponse
 
 MIRROR = "~objects"
 
@@ -30,7 +29,7 @@ class ObjectDatabaseNode:
         self.reload(only_changed=False)
         rospy.Service("~get_object", GetObject, self.on_get)
         rospy.Service("~list_objects", ListObjects, self.on_list)
-        rospy.Service("~reload", Trigger, self.on_reload)
+        rospy.Service("~reload", Reload, self.on_reload)
         rospy.Timer(rospy.Duration(1.0), self.on_timer)
 
     def reload(self, only_changed: bool) -> list[str]:
@@ -76,7 +75,8 @@ class ObjectDatabaseNode:
 
     def on_list(self, _request):
         """The ids, and what is wrong with the files that do not fit."""
-        return ListObjectsResponse(self.database.ids(), list(self.database.problems))
+        problems = list(self.database.problems)
+        return ListObjectsResponse(self.database.ids(), problems, [ReasonCode.BAD_FILE] * len(problems))
 
     def on_get(self, request):
         """One entry as YAML text."""
@@ -88,7 +88,8 @@ class ObjectDatabaseNode:
     def on_reload(self, _request):
         """Read everything again now."""
         problems = self.reload(only_changed=False)
-        return TriggerResponse(not problems, "; ".join(problems) or f"{len(self.database.ids())} objects")
+        code = ReasonCode.BAD_FILE if problems else ReasonCode.NONE
+        return ReloadResponse(not problems, code, "; ".join(problems) or f"{len(self.database.ids())} objects")
 
 
 def main() -> int:

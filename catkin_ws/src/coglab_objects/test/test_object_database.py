@@ -68,6 +68,30 @@ def test_bad_files_name_place_and_field(change, sentence):
     assert str(error.value).startswith("mug.yaml:")
 
 
+@pytest.mark.parametrize(
+    "name, change, sentence",
+    [
+        (
+            "mug",
+            ("size: [0.08, 0.08, 0.10]", "size: [0.08, 0.05, 0.10]"),
+            "mug.yaml:6: size: a cylinder of radius 0.04 and height 0.1 is [0.08, 0.08, 0.1], got [0.08, 0.05, 0.1]",
+        ),
+        ("mug", ("radius: 0.04", "radius: 0.02"), "is [0.04, 0.04, 0.1], got [0.08, 0.08, 0.1]"),
+        ("mug", ("height: 0.10}", "height: 0.12}"), "is [0.08, 0.08, 0.12], got [0.08, 0.08, 0.1]"),
+        (
+            "ball",
+            ("radius: 0.035", "radius: 0.05"),
+            "a sphere of radius 0.05 is [0.1, 0.1, 0.1], got [0.07, 0.07, 0.07]",
+        ),
+    ],
+)
+def test_size_and_shape_say_the_same_solid(name, change, sentence):
+    text = (objects_folder() / f"{name}.yaml").read_text()
+    with pytest.raises(ObjectError) as error:
+        parse_object(text.replace(*change), f"{name}.yaml")
+    assert sentence in str(error.value)
+
+
 def test_the_hand_s_dialect_decides_which_grasps_there_are():
     text = MUG.replace("mode: cylindrical, level: medium", "mode: lateral, level: medium")
     assert parse_object(text, "mug.yaml", "v17")["grasps"]["side"]["hand"]["level"] == "medium"

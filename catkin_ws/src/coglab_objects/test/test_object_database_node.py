@@ -8,6 +8,7 @@ from types import SimpleNamespace
 
 import pytest
 import rospy
+from coglab_msgs.msg import ReasonCode
 
 SHARE = Path(__file__).resolve().parent.parent
 HOSTILE = {
@@ -129,3 +130,13 @@ def test_the_list_names_the_files_that_do_not_fit(make, tmp_path):
     listed = started.node.on_list(None)
     assert listed.object_ids == ["ball", "mug"] and len(listed.problems) == 1
     assert "mug.yaml" in listed.problems[0] and "the old entry stays" in listed.problems[0]
+    assert listed.problem_codes == [ReasonCode.BAD_FILE]
+
+
+def test_reading_again_says_by_a_code_whether_all_files_fit(make, tmp_path):
+    started = make()
+    read = started.node.on_reload(None)
+    assert (read.success, read.reason_code, read.message) == (True, ReasonCode.NONE, "2 objects")
+    (tmp_path / "mug.yaml").write_text("id: mug\nmass: heavy\n")
+    read = started.node.on_reload(None)
+    assert (read.success, read.reason_code) == (False, ReasonCode.BAD_FILE) and "mug.yaml" in read.message

@@ -129,6 +129,9 @@ class CellNode {
     writeLog();
   }
 
+  /// Whether the simulation has ended by itself, for a reason that was said.
+  bool failed() const { return failed_; }
+
  private:
   std::string text(const char* name, const char* otherwise, const char* expected) const {
     return coglab_rt::readParameter<std::string>(private_, name, otherwise, expected);
@@ -252,6 +255,7 @@ class CellNode {
     const CellSnapshot snapshot = cell_->snapshot();
     if (const std::string failure = cell_->failure(); !failure.empty()) {
       ROS_FATAL("the simulated cell stopped: %s", failure.c_str());
+      failed_ = true;
       ros::requestShutdown();
       return;
     }
@@ -291,7 +295,7 @@ class CellNode {
   plant::HandTable hand_;  // names of the phalanges
   std::unique_ptr<RealTimeCell> cell_;
   std::string port_parameter_;
-  bool follow_port_ = false;
+  bool follow_port_ = false, failed_ = false;
   std::uint64_t answers_seen_ = 0;
   std::ofstream log_;
   ros::Publisher truth_, motor_states_, messages_, clock_, touch_;
@@ -310,9 +314,9 @@ int main(int argc, char** argv) {
   try {
     const coglab_sim::CellNode node;
     ros::spin();
+    return node.failed() ? 1 : 0;
   } catch (const std::exception& error) {
     ROS_FATAL("%s", error.what());
     return 1;
   }
-  return 0;
 }

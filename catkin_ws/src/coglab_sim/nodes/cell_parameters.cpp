@@ -3,7 +3,9 @@
 #include <ros/package.h>
 #include <yaml-cpp/yaml.h>
 
+#include <algorithm>
 #include <cmath>
+#include <sstream>
 #include <stdexcept>
 #include <string>
 #include <type_traits>
@@ -44,6 +46,31 @@ double numberOf(const YAML::Node& entry, const std::string& field, const YAML::N
   return value;
 }
 
+/// The box around a shape that has lengths of its own. @throws std::invalid_argument with both
+/// where `size` is another one than the shape's, as the database does.
+void requireSolid(const YAML::Node& shape, const YAML::Node& length,
+                  const std::vector<double>& size) {
+  constexpr double kSame = 1e-6;  // m, what rounding leaves
+  const auto type = shape["type"].as<std::string>();
+  if (type != "cylinder" && type != "sphere") return;
+  const double radius = numberOf(shape["radius"], "shape.radius", length);
+  const double height =
+      type == "sphere" ? 2.0 * radius : numberOf(shape["height"], "shape.height", length);
+  const std::vector<double> around{2.0 * radius, 2.0 * radius, height};
+  const auto same = [&](double a, double b) { return std::abs(a - b) <= kSame; };
+  if (size.size() == around.size() && std::equal(size.begin(), size.end(), around.begin(), same))
+    return;
+  std::ostringstream text;
+  text << "size: a " << type << " of radius " << radius;
+  if (type == "cylinder") text << " and height " << height;
+  text << " is [";
+  for (std::size_t i = 0; i < around.size(); ++i) text << (i == 0 ? "" : ", ") << around[i];
+  text << "], got [";
+  for (std::size_t i = 0; i < size.size(); ++i) text << (i == 0 ? "" : ", ") << size[i];
+  text << "]; size is the box around the shape, m";
+  throw std::invalid_argument(text.str());
+}
+
 /// Mass, size, shape and friction of an entry, within the ranges that the database checks, too.
 plant::Object objectOf(const YAML::Node& entry) {
   const YAML::Node schema =
@@ -51,6 +78,7 @@ plant::Object objectOf(const YAML::Node& entry) {
   const YAML::Node fields = schema["properties"], length = schema["definitions"]["length"];
   std::vector<double> size;
   for (const YAML::Node& side : entry["size"]) size.push_back(numberOf(side, "size", length));
+  requireSolid(entry["shape"], length, size);
   CellConfig config;
   setCellParameter(config, "object/mass", numberOf(entry["mass"], "mass", fields["mass"]));
   setCellParameter(config, "object/friction",

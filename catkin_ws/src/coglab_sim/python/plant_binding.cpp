@@ -96,6 +96,7 @@ py::list motorsOf(const Plant& plant) {
     motor["position"] = state.position;
     motor["tension"] = state.tension;
     motor["current"] = state.current;
+    motor["effort"] = state.effort;
     motor["moving"] = state.moving;
     motor["locked"] = state.locked;
     motors.append(motor);

@@ -314,6 +314,7 @@ PYBIND11_MODULE(_virtual, m) {
              result["phase"] = progress.phase;
              result["remaining_distance"] = progress.remaining_distance;
              result["remaining_time"] = progress.remaining_time;
+             result["remaining_time"] = progress.remaining_time;
              return result;
            })
 

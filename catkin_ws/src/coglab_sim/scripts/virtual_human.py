@@ -8,7 +8,8 @@ human_state (std_msgs/String). Names are relative to the node's namespace.
 Parameters (private): say (the topic, where it is another), seed, behaviour, profile (drawn, patient, accustomed),
 participant (mapping, overrides), holds_object, react, rest, handover_object, object_in_hand (three numbers each, m),
 object_mass (kg; by default that of the cell's object in the folder cell/objects), recording (mapping, see
-recorded_person; without a file nothing is played).
+recorded_person; without a file nothing is played). object_in_hand and object_mass are those of the object that the cell
+begins with; of another one that comes later (place_object) the person knows what its file says.
 """
 
 import sys
@@ -20,7 +21,7 @@ import numpy as np
 import rospy
 from coglab_msgs.msg import CellTruth, HumanHand, Say
 from coglab_msgs.srv import PlaceObject
-from coglab_objects.database import objects_folder, read_object
+from coglab_objects.database import ObjectError, objects_folder, read_object
 from coglab_py import parameters
 from coglab_py.messages import pose_message, pose_of
 from coglab_py.pose import Pose
@@ -36,17 +37,27 @@ CELL_LIMIT = 30.0
 """s for which the cell may take to put a recorded object into the hand"""
 
 
-def object_in_cell() -> dict:
-    """The object that the cell begins with, from its file."""
+def object_of(object_id: str) -> dict:
+    """An object of the cell, from its file."""
     folder = Path(parameters.read("cell/objects", str, str(objects_folder())))
-    return read_object(folder / f"{parameters.read('cell/object/id', str, 'mug')}.yaml")[0]
+    return read_object(folder / f"{object_id}.yaml")[0]
+
+
+def scene_with(entry: dict, *fields: str) -> Scene:
+    """The scene with an object, and those of its fields that parameters set."""
+    scene = Scene.of(entry)
+    for name in fields:
+        if rospy.has_param(f"~{name}"):
+            setattr(scene, name, np.array(parameters.numbers(f"~{name}", length=3)))
+    return scene
 
 
 class VirtualHumanNode:
     """Thin node over VirtualHuman."""
 
     def __init__(self) -> None:
-        self.human = self.person(object_in_cell())
+        self.object_id = parameters.read("cell/object/id", str, "mug")
+        self.human = self.person(object_of(self.object_id))
         self.lock = threading.Lock()
         self.view = WorldView()
         self.hand = rospy.Publisher("human_hand", HumanHand, queue_size=1, tcp_nodelay=True)
@@ -65,10 +76,7 @@ class VirtualHumanNode:
         fields.setdefault("seed", parameters.read("~seed", int, parameters.read("seed", int, 7)))
         fields.setdefault("behaviour", parameters.read("~behaviour", str, "normal"))
         fields.setdefault("profile", parameters.read("~profile", str, "drawn"))
-        scene = Scene.of(entry)
-        for name in ("rest", "handover_object", "object_in_hand"):
-            if rospy.has_param(f"~{name}"):
-                setattr(scene, name, np.array(parameters.numbers(f"~{name}", length=3)))
+        scene = scene_with(entry, "rest", "handover_object", "object_in_hand")
         scene.object_mass = parameters.read("~object_mass", float, scene.object_mass, 0.0, 100.0)
         recording = parameters.read("~recording", dict, {})
         if not recording.get("file"):
@@ -95,8 +103,21 @@ class VirtualHumanNode:
         if not plausible([robot, *([held] if message.object_id else [])], [*load, message.hand_closure]):
             rospy.logwarn_throttle(5.0, f"virtual human: truth/cell ignored: {IMPLAUSIBLE}")
             return
+        if message.object_id not in ("", self.object_id):
+            self.meet(message)
         with self.lock:
             self.view = WorldView(robot, message.hand_closure, held, load)
+
+    def meet(self, message: CellTruth) -> None:
+        """Another object has been put into the cell: the person has that one in mind from now on."""
+        self.object_id = message.object_id
+        try:
+            scene = scene_with(object_of(message.object_id), "rest", "handover_object")
+        except ObjectError as error:
+            rospy.logwarn("virtual human: goes on as with the object before: %s", error)
+            return
+        with self.lock:
+            self.human.meets(scene, message.held_by in ("human", "both"))
 
     def on_command(self, message: String) -> None:
         """What the person is asked to do."""

@@ -18,11 +18,14 @@ import rostest
 from coglab_msgs.msg import CellTruth, FingertipForces, HumanHand, MotorCommands, MotorStates, ReasonCode
 from coglab_msgs.srv import InjectFault, PlaceObject
 from coglab_objects.database import ObjectError, objects_folder, read_object
-from geometry_msgs.msg import Point, Pose, Quaternion
+from geometry_msgs.msg import Point, Pose, Quaternion, Vector3, Wrench
 from std_msgs.msg import String
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 from fri_client import COMMAND, MONITOR, Client, parse
+
+ROD = "{type: cylinder, radius: 0.035, height: 0.2}"
+"""no ball: higher than its file says in `size`"""
 
 
 class Bridge(threading.Thread):
@@ -156,6 +159,9 @@ class CellNode(unittest.TestCase):
                 for field, changed in (
                     ("mass", ball.replace("mass: 0.13", "mass: 6.0")),
                     ("size", ball.replace("size: [0.07, 0.07, 0.07]", "size: [0.08, 0.08, 1.4]")),
+                    ("size", ball.replace("radius: 0.035", "radius: 0.05")),
+                    ("size", ball.replace("{type: sphere, radius: 0.035}", ROD)),
+                    ("shape", ball.replace("radius: 0.035", "radius: -0.05")),
                 ):
                     path = Path(folder) / "ball.yaml"
                     path.write_text(changed, encoding="utf-8")
@@ -163,7 +169,7 @@ class CellNode(unittest.TestCase):
                         read_object(path)
                     answer = self.place("ball", "world", Pose(Point(), Quaternion(0, 0, 0, 1)))
                     self.assertFalse(answer.success)
-                    self.assertIn(f"{field} = ", answer.message)
+                    self.assertRegex(answer.message, rf"{field}(\.radius)?( = |: a \w+ of radius)")
                     self.assertIn("./coglab object check ball", answer.message)
             finally:
                 rospy.delete_param("/coglab_sim/cell/objects")
@@ -254,6 +260,21 @@ class CellNode(unittest.TestCase):
             )
             self.assertNotEqual(run.returncode, 0, name)
             self.assertIn(expected, run.stdout)
+
+    def test_91_a_simulation_that_diverges_ends_with_its_reason_and_status_1(self) -> None:
+        """Braked or not, the arm's last joints do not stand against 1000 Nm."""
+        push = rospy.Publisher("/torn/push", Wrench, queue_size=1, latch=True)
+        push.publish(Wrench(torque=Vector3(1000.0, 1000.0, 1000.0), force=Vector3(1000.0, 1000.0, 1000.0)))
+        run = subprocess.run(
+            [cell_binary(), "__name:=torn", "_fri_port:=49999", "_seed:=5"],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            timeout=30,
+            check=False,
+        )
+        self.assertIn("the simulated cell stopped: the simulation diverged at 0.", run.stdout)
+        self.assertEqual(run.returncode, 1, run.stdout)
 
     def test_7_two_robots_in_one_graph(self) -> None:
         """All names are relative: the cell of another namespace finds the bridge of that namespace."""

@@ -19,6 +19,8 @@ from ih2_hand.grasps import check_grasp
 
 SCHEMA_FILE = package_path("coglab_objects", "config", "object_schema.json")
 """what an object may be: the simulated cell reads the ranges of mass, size and friction there, too"""
+SAME_LENGTH = 1e-6
+"""m by which `size` may differ from the box around `shape`: what rounding leaves"""
 
 
 class ObjectError(ValueError):
@@ -55,6 +57,10 @@ def _schema() -> dict[str, Any]:
 
 def _inconsistency(entry: dict[str, Any], dialect: str) -> tuple[Field, str] | None:
     """What the schema cannot see: references between fields, and geometry. None if all is well."""
+    solid = _solid(entry["shape"])
+    if solid is not None and not np.allclose(entry["size"], solid[1], rtol=0.0, atol=SAME_LENGTH):
+        size = [float(v) for v in entry["size"]]
+        return ("size",), f"{solid[0]} is {solid[1]}, got {size}; size is the box around the shape, m"
     for kind, default in (("grasps", "default_grasp"), ("deliveries", "default_delivery")):
         if entry[default] not in entry[kind]:
             return (default,), f"'{entry[default]}' is none of {kind}: {', '.join(entry[kind])}"
@@ -74,6 +80,18 @@ def _inconsistency(entry: dict[str, Any], dialect: str) -> tuple[Field, str] | N
         if axis is not None and not np.linalg.norm(axis) > 1e-6:
             return ("grasps", name, "approach", "axis"), "a direction must not be zero"
     return None
+
+
+def _solid(shape: dict[str, Any]) -> tuple[str, list[float]] | None:
+    """The shape in words and the box around it (m); None where the shape has no lengths of its own."""
+    if shape["type"] == "box":
+        return None
+    radius = float(shape["radius"])
+    across = round(2.0 * radius, 9)
+    if shape["type"] == "sphere":
+        return f"a sphere of radius {radius:g}", [across] * 3
+    height = float(shape["height"])
+    return f"a cylinder of radius {radius:g} and height {height:g}", [across, across, height]
 
 
 def read_object(path: Path, dialect: str = "legacy") -> tuple[dict[str, Any], str]:

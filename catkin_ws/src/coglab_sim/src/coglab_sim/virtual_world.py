@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from operator import gt, truediv
-from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -90,7 +89,7 @@ class Robot:
         self.limits = cc.load_joint_limits(limits)
         # Plain floats: seven numbers are compared sooner by hand than by arrays, and that 200 times a second.
         self._fastest_to_command = [float(speed) for speed in self.limits.velocity]
-        self._fastest = [float(v) for v in yaml.safe_load(Path(limits).read_text())["default"]["velocity"]]
+        self._fastest = [float(v) for v in read(limits).value["default"]["velocity"]]
         lowest, highest = self.limits.lower_position, self.limits.upper_position
         self._range = [(float(low), float(high)) for low, high in zip(lowest, highest, strict=True)]
         with open(urdf_file(), encoding="utf-8") as stream:
@@ -103,6 +102,7 @@ class Robot:
             "primitive": "",
             "phase": 0.0,
             "remaining_distance": 0.0,
+            "remaining_time": 0.0,
         }
         self.ended: dict[int, dict[str, Any]] = {}
         self.loaded: dict[str, str] = {}

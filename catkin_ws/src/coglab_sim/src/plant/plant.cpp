@@ -242,6 +242,17 @@ int Plant::tooFast() {
   return 0;
 }
 
+/// What was left out of the last step for want of room, in words; empty: nothing. A contact that is
+/// not there lets hands and objects pass through each other.
+std::string Plant::leftOut() const {
+  const mjWarningStat* warnings = model_->data()->warning;
+  if (warnings[mjWARN_CONTACTFULL].number > 0)
+    return "more than " + std::to_string(model_->get()->nconmax) + " contacts at a time";
+  if (warnings[mjWARN_CNSTRFULL].number > 0)
+    return "more than " + std::to_string(model_->get()->njmax) + " constraints at a time";
+  return "";
+}
+
 void Plant::check() {
   const mjModel* m = model_->get();
   const mjData* d = model_->data();
@@ -269,14 +280,18 @@ void Plant::check() {
                      : !(arm_fastest < kFastestJoint)     ? "a joint of the arm"
                      : !(fingers_fastest < kFastestJoint) ? "a joint of a finger"
                                                           : "";
+  const std::string left_out = leftOut();
   // Nothing is farther from any joint than these reaches, so that nothing is faster than this.
-  if (what.empty() && !(reach_ * arm + finger_reach_ * fingers < kFastest)) {
+  if (what.empty() && left_out.empty() && !(reach_ * arm + finger_reach_ * fingers < kFastest)) {
     if (const int body = tooFast(); body != 0) what = mj_id2name(m, mjOBJ_BODY, body);
   }
-  if (what.empty()) return;
+  if (what.empty() && left_out.empty()) return;
+  const std::string fast = " is faster than anything here can be (10 m/s, 100 rad/s)";
   std::ostringstream text;
-  text << "the simulation diverged at " << time_ << " s with seed " << config_.seed << ": " << what
-       << (warned ? "" : " is faster than anything here can be (10 m/s, 100 rad/s)")
+  text << "the simulation diverged at " << time_ << " s with seed " << config_.seed << ": "
+       << (what.empty() ? left_out
+           : warned     ? what
+                        : what + fast)
        << "; the same seed and inputs repeat it";
   throw std::runtime_error(text.str());
 }

@@ -197,6 +197,7 @@ class Plant {
   bool excludeEachOther(int one, int two) const;
   std::string nameOf(int geom) const;
   void check();
+  std::string leftOut() const;
   int tooFast();
 
   PlantConfig config_;

@@ -7,15 +7,21 @@ from coglab_msgs.msg import Say
 from coglab_py.pose import length
 from scipy.spatial.transform import Rotation
 
-from coglab_sim.person.phases import NEAR, STILL, Phases
+from coglab_sim.person.phases import NEAR, REGRIPS, STILL, Phases
 from coglab_sim.person.senses import Percept
 
 BEYOND = 0.05
 """m past where the palm was seen after which the person stops: nothing is there"""
+PLACES_WITHIN = 4.0
+"""s after which who has felt nothing stops, too"""
+AFTER_TOUCH, RAMP = 0.02, 0.15
+"""m/s at which the object is pressed on from first touch, and s in which the hand gets as fast as it places"""
 FOLLOW_UP = 0.015
 """m, most that the hand goes on after first touch"""
 CLOSED = 0.08
 """share of their way by which the robot's fingers must have been seen to close"""
+CLOSING = 0.1
+"""1/s of their way, below which they look as if they had closed"""
 TOUCH_PART, TOLD_PART = 0.7, 0.4
 """what a closed hand whose grip is felt, and a spoken 'I have it', count of what it takes to let go"""
 AGAIN = 0.5
@@ -57,12 +63,12 @@ class Giving(Phases):
             else:
                 self._go("holding", t)
             return
-        if self._felt_since is None and (gap < -BEYOND or t - self._since > 4.0):
+        if self._felt_since is None and (gap < -BEYOND or t - self._since > PLACES_WITHIN):
             self._go("holding", t)
             return
-        ramp = min(1.0, (t - self._since) / 0.15)
+        ramp = min(1.0, (t - self._since) / RAMP)
         speed = ramp * min(p.place_speed, 2.0 * max(gap, 0.0) + 0.04)
-        self._velocity = -normal * (0.02 if self._felt_since is not None else speed)
+        self._velocity = -normal * (AFTER_TOUCH if self._felt_since is not None else speed)
         aside = float(to_object @ along)
         if self._felt_since is None and abs(aside) > p.aligns_within:
             self._velocity = self._velocity - ramp * along * float(np.clip(2.0 * aside, -0.05, 0.05))
@@ -78,10 +84,10 @@ class Giving(Phases):
         """Hold on until load and grip say that the robot has it."""
         self._velocity = np.zeros(3)
         p = self.participant
-        self._grip = min(1.0, self._grip + dt / 0.10)
+        self._grip = min(1.0, self._grip + dt / REGRIPS)
         if self._sunk > 0.0:  # up again, after a try to let go
             self._sink(SINK_SPEED, dt)
-        closed = seen.hand_closure - self._closure > CLOSED and seen.closing_speed < 0.1
+        closed = seen.hand_closure - self._closure > CLOSED and seen.closing_speed < CLOSING
         if p.behaviour == "tug" and closed:
             self._tug(t, dt)
             return
@@ -105,7 +111,7 @@ class Giving(Phases):
     def _lost_touch(self, t: float, seen: Percept) -> bool:
         """The robot's open hand has backed away from the object: time to press again, if not tried too often."""
         touch = length(seen.load - self._held_load)
-        if touch >= 0.5 * self.participant.press or seen.robot_speed >= STILL or seen.closing_speed > 0.1:
+        if touch >= 0.5 * self.participant.press or seen.robot_speed >= STILL or seen.closing_speed > CLOSING:
             self._still_since = None
         elif self._still_since is None:
             self._still_since = t

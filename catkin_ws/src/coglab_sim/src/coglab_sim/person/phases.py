@@ -16,6 +16,8 @@ NEAR = 0.10
 the hand that is to take it"""
 STILL = 0.02
 """m/s below which the robot's hand looks still"""
+REGRIPS = 0.10
+"""s in which fingers that had begun to open hold fast again"""
 
 
 class Phases:

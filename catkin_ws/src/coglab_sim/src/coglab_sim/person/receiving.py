@@ -15,8 +15,10 @@ LIFT_SPEED, LIFT = 0.03, 0.03
 """m/s, m: how the hand rises, and how far"""
 MORE_THAN_WEIGHT = 1.2
 """share of the expected weight at which it rises no further"""
-OPENED = 0.08
-"""share of their way by which the robot's fingers must have been seen to open"""
+OPENED, OPEN_FOR = 0.08, 0.2
+"""share of their way by which the robot's fingers must have been seen to open, and s since then"""
+GRASPS_WITHIN = 4.0
+"""s after which who has not come to the object gives up"""
 
 
 class Receiving(Phases):
@@ -30,7 +32,7 @@ class Receiving(Phases):
             speed = min(self.participant.place_speed, 4.0 * distance)
             self._velocity = error / distance * speed
             self._hand = self._hand + self._velocity * min(dt, distance / speed)
-            if t - self._since > 4.0:
+            if t - self._since > GRASPS_WITHIN:
                 self._retreat(t)
             return
         self._velocity = np.zeros(3)
@@ -50,7 +52,7 @@ class Receiving(Phases):
         if opened:
             if self._sure_since is None:
                 self._sure_since = t
-            if t - self._sure_since > 0.2:
+            if t - self._sure_since > OPEN_FOR:
                 self.grip_force.has_felt(max(self._weight(), float(-seen.load[2])))
                 self._retreat(t)
             return

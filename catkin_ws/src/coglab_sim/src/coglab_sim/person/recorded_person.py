@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from coglab_py.pose import Pose
 
+from coglab_sim.person.giving import CLOSING
 from coglab_sim.person.participant import Participant
 from coglab_sim.person.recorded_motion import Playback, PlaybackSettings, RecordingError
 from coglab_sim.person.scene import Scene
@@ -33,6 +34,8 @@ FARTHEST = 0.30
 """m between hand and object at the beginning: farther away it is in nobody's hand"""
 SHORTEST = 0.10
 """m, of a reach"""
+LEAVES_CLOSED = 0.05
+"""share of their way by which the robot's fingers must have been seen to close for who leaves at the recorded time"""
 
 
 class RecordedHand:
@@ -142,7 +145,7 @@ class RecordedPerson(VirtualHuman):
 
     def _leave_it(self, t: float, dt: float, seen: Percept) -> None:
         """On the way back: the fingers open if the robot has the object, now or never."""
-        closed = seen.hand_closure > self._closure + 0.05 and seen.closing_speed < 0.1
+        closed = seen.hand_closure > self._closure + LEAVES_CLOSED and seen.closing_speed < CLOSING
         if self._grip < 1.0 or self._signs(t, seen, closed) >= 1.0:
             self._grip = max(0.0, self._grip - dt / self.participant.release_time)
 

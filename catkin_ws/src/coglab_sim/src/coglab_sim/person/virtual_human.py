@@ -17,7 +17,7 @@ from coglab_sim.person.giving import Giving
 from coglab_sim.person.grip import GripForce
 from coglab_sim.person.involuntary import involuntary
 from coglab_sim.person.participant import Participant
-from coglab_sim.person.phases import NEAR, STILL
+from coglab_sim.person.phases import NEAR, REGRIPS, STILL
 from coglab_sim.person.reach import CorrectedReach, Reach, Turn, duration_for
 from coglab_sim.person.receiving import Receiving
 from coglab_sim.person.scene import HandSample, Scene, WorldView
@@ -31,8 +31,9 @@ GONE = 0.35
 """m: a robot's hand that has been near and is then farther away than this has given up"""
 WITHDRAWALS, COMES = 5, 0.25
 """offers that are taken back by who does that, and m from the object at which the robot's hand makes them do it"""
-LOST, AWAY = 0.2, 0.35
-"""share of the weight that is felt no more, and m between hand and object as seen, at which the object is lost"""
+LOST, AWAY, LOST_FOR = 0.2, 0.35, 0.3
+"""share of the weight below which the object is felt no more, m from the hand at which it is seen elsewhere, and s for
+both of them after which it is lost"""
 TASKS = {Say.READY_TO_RECEIVE: "give", Say.READY_TO_GIVE: "receive", Say.GIVEN_UP: "rest", Say.PLEASE_STEP_BACK: "rest"}
 """What a prompt asks of the person."""
 
@@ -92,6 +93,12 @@ class VirtualHuman(Giving, Receiving):
     def holds(self) -> bool:
         """Whether the person's hand is closed on something."""
         return self._grip > 0.5
+
+    def meets(self, scene: Scene, knows_weight: bool) -> None:
+        """Another object is there: what it weighs, how smooth and large it is, where it is held and taken; the place
+        of rest stays. ``knows_weight``: it lies in the person's hand."""
+        self.scene = scene
+        self.grip_force = GripForce(self.participant, scene, knows_weight)
 
     def step(self, t: float, view: WorldView) -> HandSample:
         """One step at time t (s, increasing)."""
@@ -274,13 +281,13 @@ class VirtualHuman(Giving, Receiving):
         assert self._reach is not None
         self._follow(t)
         if self._grip > 0.0:  # who had begun to let go holds on again
-            self._grip = min(1.0, self._grip + dt / 0.10)
+            self._grip = min(1.0, self._grip + dt / REGRIPS)
         felt = length(seen.load) > LOST * self._weight()
         if self._grip == 0.0 or felt or length(seen.object.position - self._hand) < AWAY:
             self._lost_since = None
         elif self._lost_since is None:
             self._lost_since = t
-        elif t - self._lost_since > 0.3:
+        elif t - self._lost_since > LOST_FOR:
             self._grip = 0.0
         if self._reach.over(t):
             self._task = "rest"

@@ -1,0 +1,70 @@
+"""A cell that cannot begin, or has ended for a reason, ends its launch in words: it is not started again for ever."""
+
+import signal
+import socket
+import subprocess
+from pathlib import Path
+
+import pytest
+import rospkg
+from roslaunch.config import load_config_default
+from roslaunch.core import RLException
+
+PACKAGE = Path(rospkg.RosPack().get_path("coglab_sim"))
+
+
+def launched(*arguments):
+    """What a launch of the cell alone says until it ends by itself; a hang is a failure."""
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        port = str(free.getsockname()[1])
+    command = ["roslaunch", "-p", port, "coglab_sim", "cell.launch", *arguments]
+    with subprocess.Popen(command, stderr=subprocess.STDOUT, stdout=subprocess.PIPE, text=True) as process:
+        try:
+            return process.communicate(timeout=30)[0]
+        except subprocess.TimeoutExpired:
+            process.send_signal(signal.SIGINT)  # it ends what it has started
+            process.communicate()
+            raise
+
+
+def resolve():
+    """The launch file as plain roslaunch reads it."""
+    return load_config_default([(str(PACKAGE / "launch" / "cell.launch"), [])], None, verbose=False)
+
+
+def test_the_cell_is_needed_and_never_started_again():
+    config = resolve()
+    assert config.params["/coglab_sim/cell/physics"].value == "usable"
+    (cell,) = (node for node in config.nodes if node.name == "cell")
+    assert cell.required and not cell.respawn
+
+
+@pytest.mark.parametrize(
+    "yaml, argument, said",
+    [
+        ("", "object:=elephant", "object 'elephant': "),
+        ("hand_model: /nowhere/hand.yaml\n", None, "/nowhere/hand.yaml"),
+    ],
+)
+def test_what_cannot_begin_ends_the_launch_with_a_sentence(tmp_path, yaml, argument, said):
+    config = tmp_path / "cell.yaml"
+    config.write_text((PACKAGE / "config" / "cell.yaml").read_text() + yaml)
+    output = launched(f"config:={config}", *([argument] if argument else []))
+    assert said in output and output.count("REQUIRED process") == 1, output
+    assert "exit code 1" in output
+
+
+def test_a_library_that_is_missing_ends_the_launch_before_anything_starts(tmp_path, monkeypatch, capfd):
+    """As the loader says it, from a stand-in for the module that is linked with the library."""
+    package = tmp_path / "coglab_sim"
+    package.mkdir()
+    (package / "__init__.py").touch()
+    line = "libmujoco.so.2.2.2: cannot open shared object file: No such file or directory"
+    (package / "_plant.py").write_text(f"raise ImportError({line!r})\n")
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    with pytest.raises(RLException):
+        resolve()
+    said = capfd.readouterr().err
+    assert f"the simulated cell cannot be loaded ({line})" in said
+    assert "run ./coglab build" in said and "libmujoco-dev" in said and "./coglab doctor" in said

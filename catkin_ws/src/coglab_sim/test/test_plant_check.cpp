@@ -1,0 +1,79 @@
+/// What ends a simulation of the plant: a number that is none, and what MuJoCo leaves out for want
+/// of room. Each by itself, in words.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <string>
+
+#include "coglab_sim/plant/plant.hpp"
+
+using namespace coglab_sim;
+using namespace coglab_sim::plant;
+
+namespace {
+
+constexpr double kNoNumber = std::numeric_limits<double>::quiet_NaN();
+
+/// The arm on its brakes, a box just above the board.
+class PlantCheck : public ::testing::Test {
+ protected:
+  PlantCheck() : plant_(config()) {
+    plant_.setBrakes(true);
+    Pose pose;
+    pose.position = Vector3d(0.45, -0.55, 0.0505);
+    plant_.place(Place::World, pose);
+  }
+
+  static PlantConfig config() {
+    PlantConfig config;
+    config.urdf = URDF;
+    config.seed = 42;
+    config.home << -1.4349, -0.6086, 1.4986, 1.7048, 0.1857, 0.2152, 0.782;
+    config.object.shape = "box";
+    return config;
+  }
+
+  /// What a run of `steps` ends with; empty if it does not end.
+  std::string endOf(int steps) {
+    try {
+      for (int i = 0; i < steps; ++i) plant_.step(Vector7::Zero());
+    } catch (const std::runtime_error& error) {
+      return error.what();
+    }
+    return "";
+  }
+
+  Plant plant_;
+};
+
+}  // namespace
+
+TEST_F(PlantCheck, NothingEndsAnObjectThatComesToRest) { EXPECT_EQ(endOf(300), ""); }
+
+TEST_F(PlantCheck, APositionThatIsNoNumber) {
+  ASSERT_EQ(endOf(5), "");
+  plant_.model().data()->qpos[plant_.model().object_position] = kNoNumber;
+  EXPECT_EQ(endOf(1),
+            "the simulation diverged at 0.006 s with seed 42: a value is no number; the same seed "
+            "and inputs repeat it");
+}
+
+TEST_F(PlantCheck, AVelocityOfAFingerThatIsNoNumber) {
+  ASSERT_EQ(endOf(5), "");
+  plant_.model().data()->qvel[plant_.model().phalanx_velocity[3]] = kNoNumber;
+  EXPECT_NE(endOf(1).find(": a value is no number;"), std::string::npos);
+}
+
+/// Both lists are as long as ever in memory: the model alone says that they are shorter.
+TEST_F(PlantCheck, ContactsThatAreLeftOut) {
+  ASSERT_EQ(endOf(300), "");
+  plant_.model().get()->nconmax = 1;
+  EXPECT_NE(endOf(2).find(": more than 1 contacts at a time;"), std::string::npos);
+}
+
+TEST_F(PlantCheck, ConstraintsThatAreLeftOut) {
+  ASSERT_EQ(endOf(300), "");
+  plant_.model().get()->njmax = 2;
+  EXPECT_NE(endOf(2).find(": more than 2 constraints at a time;"), std::string::npos);
+}
