@@ -23,8 +23,9 @@ START_LIMIT, REACH_LIMIT, WATCHED = 10.0, 6.0, 1.5  # s of simulated time
 class LockstepReach:
     """One reach. Distance of the hand from its goal at the end as the simulated arm has it (m, deg), largest distance
     from the reference as measured (m), time until it stood (s). Largest of the joints over their limits: speed and
-    acceleration of the set-point that the bridge sends, speed of the arm behind its servos. `why`: it was refused or
-    given up."""
+    acceleration of the set-point that the bridge sends, and of the arm behind its servos (its true joint state at the
+    end of every period, also while it comes to rest); rad by which a joint of the arm was beyond its range, negative
+    inside. `why`: it was refused or given up."""
 
     begun: bool
     why: str
@@ -35,6 +36,8 @@ class LockstepReach:
     over: float = 0.0
     acceleration: float = 0.0
     arm_over: float = 0.0
+    arm_acceleration: float = 0.0
+    arm_beyond: float = -np.inf
 
 
 def wait(robot, condition, limit: float) -> None:
@@ -82,7 +85,7 @@ class Watch:
     def __init__(self, robot, limits, outcome: LockstepReach) -> None:
         self.robot, self.limits, self.outcome = robot, limits, outcome
         self.before = robot.report()["commanded_position"]
-        self.velocity = np.zeros(7)
+        self.velocity, self.arm_velocity = np.zeros(7), np.array(robot.cell.velocity)
         self.hands: list[tuple[float, np.ndarray]] = []
         self.stood: float | None = None
 
@@ -96,13 +99,24 @@ class Watch:
         change = np.abs(velocity - self.velocity) / PERIOD
         outcome.acceleration = max(outcome.acceleration, float(np.max(change / limits.acceleration)))
         self.before, self.velocity = set_point, velocity
-        speed = float(np.max(np.abs(robot.cell.velocity) / limits.velocity))
-        outcome.arm_over = max(outcome.arm_over, speed)
+        speed = self.look_at_arm(np.array(robot.cell.position), np.array(robot.cell.velocity))
         self.stood = (self.stood or robot.now) if speed < 1e-3 else None
         for record in robot.ik_debug():
             off = float(np.linalg.norm(record["set_point"][0] - record["measured"][0]))
             outcome.off_path = max(outcome.off_path, off)
         return report
+
+    def look_at_arm(self, position: np.ndarray, velocity: np.ndarray) -> float:
+        """Takes the true state of the joints after one period into account; their largest speed over its limit."""
+        limits, outcome = self.limits, self.outcome
+        beyond = np.maximum(position - limits.upper_position, limits.lower_position - position)
+        outcome.arm_beyond = max(outcome.arm_beyond, float(np.max(beyond)))
+        change = np.abs(velocity - self.arm_velocity) / PERIOD
+        outcome.arm_acceleration = max(outcome.arm_acceleration, float(np.max(change / limits.acceleration)))
+        self.arm_velocity = velocity
+        speed = float(np.max(np.abs(velocity) / limits.velocity))
+        outcome.arm_over = max(outcome.arm_over, speed)
+        return speed
 
 
 def reach(posture: np.ndarray, goal: np.ndarray, target: np.ndarray, limits: cc.JointLimits) -> LockstepReach:

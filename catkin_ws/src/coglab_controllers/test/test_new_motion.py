@@ -38,8 +38,10 @@ def built_prefix() -> bool:
 
 
 def test_a_new_motion_is_built_tested_and_moves_the_simulated_arm(tmp_path: Path) -> None:
-    if not built_prefix() or not shutil.which("catkin_make") or not shutil.which("rostest"):
-        pytest.skip("coglab_controllers is not built: source the workspace's setup file first")
+    if not built_prefix():
+        pytest.fail("coglab_controllers is not built, or its workspace not sourced: ./coglab build, then ./coglab test")
+    if not shutil.which("catkin_make") or not shutil.which("rostest"):
+        pytest.skip("catkin_make or rostest is not installed: ./coglab install build test")
     sources = tmp_path / "src"
     sources.mkdir()
     begin = time.monotonic()
@@ -60,6 +62,10 @@ def test_a_new_motion_is_built_tested_and_moves_the_simulated_arm(tmp_path: Path
         f"\nfrom `controller new --motion` to an arm that has moved: {end - begin:.1f} s, "
         f"of them to build {ready - begin:.1f} s"
     )
+    ideal = in_workspace(tmp_path, "rostest", "side_sway", "side_sway.test", "arm:=ideal")
+    assert "RESULT: SUCCESS" in ideal, ideal[-6000:]
+    started = in_workspace(tmp_path, "roslaunch", "--nodes", "side_sway", "side_sway.launch", "arm:=ideal")
+    assert started.split() == ["/robot"], "the simulated cell belongs to the arm behind FRI"
     if os.getloadavg()[0] < 1.5 * (os.cpu_count() or 1):
         assert end - begin < LONGEST
     run("catkin_make", "-C", tmp_path, "side_sway_test_motion")

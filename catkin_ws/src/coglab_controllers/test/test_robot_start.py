@@ -29,7 +29,7 @@ def robot_binary() -> str:
         path = Path(prefix) / "lib" / "coglab_controllers" / "robot_node"
         if path.is_file():
             return str(path)
-    pytest.skip("robot_node is not built: source the workspace's setup file first")
+    pytest.fail("robot_node is not built, or its workspace not sourced: ./coglab build, then ./coglab test")
 
 
 @pytest.fixture(scope="module")

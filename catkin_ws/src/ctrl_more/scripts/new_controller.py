@@ -71,10 +71,10 @@ def next_steps(target: Path, motion: bool = False) -> list[str]:
     if target.resolve().parent.name == "src" and (workspace.parent / "coglab").is_file():
         return [f"./coglab build && ./coglab test {target.name}"]
     if motion:
-        workspace = workspace if target.resolve().parent.name == "src" else "WORKSPACE"
+        place = str(workspace) if target.resolve().parent.name == "src" else "WORKSPACE"
         return [
-            f"catkin_make -C {workspace}",
-            f". {workspace}/devel/setup.bash",
+            f"catkin_make -C {place}",
+            f". {place}/devel/setup.bash",
             f"rostest {target.name} {target.name}.test",
         ]
     return [

@@ -19,11 +19,11 @@ def run(*command: str | Path, **options) -> subprocess.CompletedProcess:
 
 
 def need_workspace() -> None:
-    """Skips unless a workspace with ctrl_more is sourced."""
+    """Fails unless a workspace with ctrl_more is sourced."""
     for prefix in os.environ.get("CMAKE_PREFIX_PATH", "").split(":"):
         if prefix and (Path(prefix) / "lib" / "libctrl_more.so").is_file():
             return
-    pytest.skip("ctrl_more is not built: source the workspace's setup file first")
+    pytest.fail("ctrl_more is not built, or its workspace not sourced: ./coglab build, then ./coglab test")
 
 
 def test_new_controller_compiles_is_tested_and_documented(tmp_path: Path) -> None:

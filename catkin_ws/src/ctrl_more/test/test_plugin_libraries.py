@@ -18,7 +18,7 @@ def workspace_lib() -> Path:
     for prefix in os.environ.get("CMAKE_PREFIX_PATH", "").split(":"):
         if prefix and (Path(prefix) / "lib" / "libctrl_more.so").is_file():
             return Path(prefix) / "lib"
-    pytest.skip("ctrl_more is not built: source the workspace's setup file first")
+    pytest.fail("ctrl_more is not built, or its workspace not sourced: ./coglab build, then ./coglab test")
 
 
 @pytest.mark.skipif(shutil.which("nm") is None, reason="nm (binutils) is not installed")
@@ -64,7 +64,7 @@ def test_loading_running_and_unloading_is_clean() -> None:
     lib = workspace_lib()
     program = lib / "ctrl_more" / "ctrl_more_test_plugins"
     if not program.is_file():
-        pytest.skip("ctrl_more_test_plugins is not built: build the target 'tests'")
+        pytest.fail("ctrl_more_test_plugins is not built: ./coglab build tests")
     result = subprocess.run(
         [
             "valgrind",

@@ -141,11 +141,12 @@ TEST_F(FriThreadTest, ASecondSenderIsIgnoredAndNamed) {
 /// Datagrams that waited because the thread was not run make it late, not the controller silent.
 TEST(FriThreadLate, ALateThreadIsKnownAsTheCauseOfALoss) {
   Bridge bridge(test::defaultConfig());
-  std::atomic<bool> sleeps{false};
+  std::atomic<bool> held{false};
   FriThreadOptions options = Fixture::options();
+  // Held until everything has been sent: a sleep may be over before that on a busy computer.
   options.after_answer = [&](bool answered) {
-    if (answered && sleeps.exchange(false))
-      std::this_thread::sleep_for(std::chrono::milliseconds(50));
+    for (int i = 0; i < 2000 && answered && held; ++i)
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
   };
   FriThread fri(bridge, options);
   fri.start();
@@ -166,11 +167,13 @@ TEST(FriThreadLate, ALateThreadIsKnownAsTheCauseOfALoss) {
   }
   ASSERT_TRUE(start.success()) << describe(start);
   ASSERT_TRUE(exchange());
-  sleeps = true;
+  held = true;
   ASSERT_TRUE(exchange());
   for (int i = 0; i < 7; ++i) peer.send(robot.measure());
   robot.state = fri::FriState::Monitor;
-  EXPECT_TRUE(exchange());
+  peer.send(robot.measure());
+  held = false;
+  EXPECT_TRUE(peer.receive(c));
   EXPECT_TRUE(eventually([&] { return bridge.snapshot().fall_backs == 1; }));
   EXPECT_EQ(bridge.snapshot().loss.cause, LossCause::ComputerLate);
 }

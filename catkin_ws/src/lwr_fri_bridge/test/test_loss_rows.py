@@ -29,8 +29,8 @@ def test_a_stop_that_was_not_from_full_speed_makes_its_row_missed(bench, worst, 
     [([0.005, 0.1, 0.0, 0.0, 0.0, 0.0, 0.0], 0.0, False), ([0.005, 0.1, 0, 0, 0, 0, 1], 0.0, True)],
 )
 def test_a_run_that_did_not_start_or_left_command_mode_makes_its_row_missed(bench, line, beyond, failed):
-    row, _ = bench.approach_rows(0.005, [[0.005, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0], line], "from the first cycle on")
-    assert row["value"] == beyond and row["ok"] is not failed
+    row, speed = bench.approach_rows(0.005, [[0.005, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0], line], "from the first cycle on")
+    assert row["value"] == beyond and row["ok"] is not failed and speed["ok"] is not failed
 
 
 def test_a_set_point_beyond_its_bound_makes_its_row_missed(bench):

@@ -59,12 +59,31 @@ void TfListener::receive(const tf2_msgs::TFMessage& message, const std::string& 
       continue;
     }
     try {
-      buffer_.setTransform(transform, publisher, is_static);
+      if (is_static) {
+        putStatic(transform, publisher);
+      } else {
+        buffer_.setTransform(transform, publisher, false);
+      }
     } catch (const std::exception& error) {
       refused_.fetch_add(1, std::memory_order_relaxed);
       ROS_WARN_THROTTLE(5.0, "tf of %s refused: %s", publisher.c_str(), error.what());
     }
   }
+}
+
+void TfListener::putStatic(const geometry_msgs::TransformStamped& transform,
+                           const std::string& publisher) {
+  // A frame that has been seen to move keeps a history by stamps, and a static transform would join
+  // it: one stamp from the future locks out all that come after it. Without a stamp it is too old
+  // for any history, and as valid as ever for a frame that has none.
+  geometry_msgs::TransformStamped unstamped = transform;
+  unstamped.header.stamp = ros::Time();
+  if (buffer_.setTransform(unstamped, publisher, true)) return;
+  refused_.fetch_add(1, std::memory_order_relaxed);
+  ROS_WARN_THROTTLE(5.0,
+                    "static tf of '%.100s' from %s refused: expected a frame that does not move, "
+                    "or names and a rotation that are valid",
+                    transform.child_frame_id.c_str(), publisher.c_str());
 }
 
 bool TfListener::acceptable(const geometry_msgs::TransformStamped& transform,
@@ -75,7 +94,7 @@ bool TfListener::acceptable(const geometry_msgs::TransformStamped& transform,
                       frame.c_str(), publisher.c_str());
     return false;
   }
-  if (is_static) return true;  // valid at any time: nobody reads its stamp
+  if (is_static) return true;  // valid at any time, whatever its stamp says
   const std::int64_t ahead =
       coglab_rt::nanoseconds(transform.header.stamp) - coglab_rt::nanoseconds(ros::Time::now());
   const bool future = ahead > kClockTolerance_ns;

@@ -59,7 +59,9 @@ LossReserve lossReserve(const AxisState& before, const AxisState& after, const A
 
 /// Time (s) of constant speed that is at least what lossReserve keeps of one window of the
 /// LossBudget at period `dt` (s) of the arm's interface: what whoever plans a motion keeps before a
-/// limit, so that the bridge's own guard finds nothing to cut. Real-time safe.
+/// limit, so that the bridge's own guard finds nothing to cut while no cycles or single ones are
+/// lost. Bursts of losses at full speed and long periods use up more before the plan hears of them;
+/// there that guard does cut, see docs/limits_under_loss.md. Real-time safe.
 double lostTime(double dt);
 
 /// Rounding on the wire to the arm (float32 at 3 rad) that one lost cycle can add, rad: 0.24e-6 by

@@ -47,6 +47,7 @@ class TfListener {
   using Event = ros::MessageEvent<const tf2_msgs::TFMessage>;
   bool acceptable(const geometry_msgs::TransformStamped& transform, const std::string& publisher,
                   bool is_static);
+  void putStatic(const geometry_msgs::TransformStamped& transform, const std::string& publisher);
   void clearAfterAStepBack();
 
   tf2::BufferCore& buffer_;

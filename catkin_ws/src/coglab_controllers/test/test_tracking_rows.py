@@ -1,0 +1,66 @@
+"""The rows of ./coglab bench tracking about the arm as measured: judged by range, speed and acceleration."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "bench"))
+import bench_tracking
+import lockstep
+
+LIMITS = SimpleNamespace(
+    lower_position=np.full(7, -1.0),
+    upper_position=np.full(7, 1.0),
+    velocity=np.full(7, 2.0),
+    acceleration=np.full(7, 10.0),
+)
+REST = np.zeros(7)
+
+
+def watch_of(outcome):
+    """A watch on an arm that stands in the middle of its range."""
+    robot = SimpleNamespace(cell=SimpleNamespace(position=REST, velocity=REST))
+    robot.report = lambda: {"commanded_position": REST}
+    return lockstep.Watch(robot, LIMITS, outcome)
+
+
+def test_the_true_state_is_measured_against_range_speed_and_acceleration():
+    outcome = lockstep.LockstepReach(True, "", 0.0, 0.0)
+    watch = watch_of(outcome)
+    third = np.eye(7)[2]
+    watch.look_at_arm(-0.9 * third, 0.01 * third)
+    assert outcome.arm_beyond == pytest.approx(-0.1)
+    assert outcome.arm_acceleration == pytest.approx(0.01 / lockstep.PERIOD / 10.0)
+    assert watch.look_at_arm(-1.02 * third, -0.09 * third) == pytest.approx(0.045)
+    watch.look_at_arm(REST, -0.09 * third)
+    assert outcome.arm_beyond == pytest.approx(0.02) and outcome.arm_over == pytest.approx(0.045)
+    assert outcome.arm_acceleration == pytest.approx(0.1 / lockstep.PERIOD / 10.0), "the largest stays"
+
+
+@pytest.mark.parametrize(
+    "words, field, fine, beyond",
+    [
+        ("joint position of the arm as measured", "arm_beyond", -0.01, 0.001),
+        ("joint speed of the arm as measured", "arm_over", 1.0, 1.01),
+        ("joint acceleration of the arm as measured", "arm_acceleration", 1.0, 1.01),
+    ],
+)
+def test_the_worst_of_all_reaches_that_began_is_judged(monkeypatch, words, field, fine, beyond):
+    def ok(*values):
+        outcomes = [lockstep.LockstepReach(True, why, 0.0, 0.0) for why in ("", "given up")]
+        for outcome, value in zip(outcomes, values, strict=True):
+            outcome.arm_beyond = -0.5
+            setattr(outcome, field, value)
+        left = iter(outcomes)
+        monkeypatch.setattr(lockstep, "_virtual", object())
+        monkeypatch.setattr(lockstep, "reach", lambda *_: next(left))
+        reaches = [SimpleNamespace(posture=REST, goal=REST, target=REST)] * len(outcomes)
+        (row,) = [row for row in bench_tracking.shipped_rows(LIMITS, reaches) if words in row["figure"]]
+        return row["ok"]
+
+    assert ok(fine, fine) and not ok(fine, beyond) and not ok(beyond, fine)
