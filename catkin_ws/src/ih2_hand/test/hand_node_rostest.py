@@ -103,6 +103,8 @@ class HandNode(unittest.TestCase):
         self.assertIn("holding", result.message)
         self.assertTrue(self.hand.feedback)
         self.assertEqual(len(self.hand.feedback[-1].positions), 5)
+        codes = [item.status_code for item in self.hand.feedback]
+        self.assertEqual((set(codes[:-1]), codes[-1]), ({ReasonCode.HAND_MOVING}, ReasonCode.NONE))
         self.assertTrue(self.hand.fresh_status().holding)
         self.assertTrue(any("grasp cylindrical medium by current" in line for line in self.trace))
         self.assertGreater(min(self.hand.fingers.effort[1:]), 100.0)

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import os
 import random
+from collections import deque
 
 import pytest
 from ih2_hand.clock import SteppedClock
@@ -22,11 +23,12 @@ from ih2_hand.emulator.virtual_link import VirtualLink
 from ih2_hand.errors import HandError
 from ih2_hand.line import LineCounters
 
+LONG_STREAM = 50  # bytes, both directions; those without a corruption have 42 at the median, 75 at most
 STREAMS = 1_000_000 if os.environ.get("COGLAB_LONG") else 100_000
 PARTS = 4
 CALLS = 4
-SPAN = 48
-"""Bytes of a stream, both directions, among which corruptions are planned; a stream has more."""
+FIRST_LENGTH = 48
+"""bytes of a stream, both directions, before any has been seen"""
 WIRE_S = 0.0005
 
 
@@ -38,16 +40,18 @@ class Corrupter:
     def __init__(self, rng: random.Random, clock: SteppedClock):
         self.rng, self.clock = rng, clock
         self.plan: dict[int, str] = {}
-        self.passed = 0
-        self.done = 0
+        self.lengths: deque[int] = deque([FIRST_LENGTH], maxlen=500)
+        self.passed = self.done = self.farthest = 0
         self.sample = lambda: None
 
     def arm(self, events: int, burst: bool = False) -> None:
-        """Plan so many corruptions: anywhere, or (burst) of bytes that follow each other."""
+        """Plan so many corruptions: anywhere, or (burst) of bytes that follow each other. How long the stream will be
+        nobody knows, since corruptions lengthen it: the places are drawn over the length of one of those before."""
         self.passed = 0
-        places = self.rng.sample(range(SPAN), events)
+        length = max(self.rng.choice(self.lengths), events)
+        places = self.rng.sample(range(length), events)
         if burst:
-            first = self.rng.randrange(SPAN - events + 1)
+            first = self.rng.randrange(length - events + 1)
             places = range(first, first + events)
         self.plan = {place: self.rng.choice(self.KINDS) for place in places}
 
@@ -58,10 +62,12 @@ class Corrupter:
 
     def tamper(self, data: bytes) -> bytes:
         if not self.plan:
+            self.passed += len(data)
             return data
         out = bytearray()
         for byte in data:
             kind = self.plan.pop(self.passed, None)
+            self.farthest = self.farthest if kind is None else max(self.farthest, self.passed)
             self.passed += 1
             self.done += kind is not None
             if kind == "lost":
@@ -155,6 +161,7 @@ class Campaign:
                     self.refused += 1
             else:
                 self.check_read(self.rng.choice(READS), motor)
+        self.corrupter.lengths.append(self.corrupter.passed)
         self.unspent += len(self.corrupter.plan)
         self.corrupter.plan = {}
         self.check_not_stuck()
@@ -181,8 +188,9 @@ def run(seed: int, streams: int, events: tuple[int, ...], burst: bool = False) -
         f"{campaign.corrupter.done} corruptions ({campaign.unspent} not met), {campaign.asked} asked, "
         f"{campaign.read} values, {campaign.refused} "
         f"refused, {campaign.wrong_but_counted} wrong with a resynchronisation counted, "
-        f"{len(campaign.wrong)} wrong"
+        f"{len(campaign.wrong)} wrong; the farthest at byte {campaign.corrupter.farthest}"
     )
+    assert campaign.corrupter.farthest > LONG_STREAM, "corruptions come anywhere in a stream, also late in a long one"
     return campaign
 
 

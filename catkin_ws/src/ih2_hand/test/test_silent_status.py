@@ -18,7 +18,7 @@ class Handle:
 
     def __init__(self) -> None:
         self.ended: tuple[str, str, int] | None = None
-        self.feedback: list[str] = []
+        self.feedback: list[tuple[str, int]] = []
 
     def set_accepted(self) -> None:
         """It begins."""
@@ -30,7 +30,7 @@ class Handle:
         return SimpleNamespace(status=1)
 
     def publish_feedback(self, feedback: object) -> None:
-        self.feedback.append(feedback.status)
+        self.feedback.append((feedback.status, feedback.status_code))
 
     def set_aborted(self, result: object, text: str) -> None:
         self.ended = ("aborted", text, result.reason_code)
@@ -120,7 +120,7 @@ def test_a_goal_is_aborted_when_hand_status_falls_silent(queue):
     while time.monotonic() - begun < 1.0:  # for a second all is well
         say(queue)
         time.sleep(0.03)
-    assert handle.ended is None and "under way" in handle.feedback
+    assert handle.ended is None and ("under way", Reason.HAND_MOVING) in handle.feedback
     silent = time.monotonic()
     while handle.ended is None and time.monotonic() - silent < 10.0:
         time.sleep(0.01)

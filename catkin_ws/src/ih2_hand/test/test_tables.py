@@ -50,7 +50,7 @@ def test_table_2_what_the_readings_return(bench):
 
 
 TABLE_3 = {
-    # action: goal, result and feedback fields; `message` is ours, appended to the result
+    # action: goal, result and feedback fields; `message` and the codes are ours
     "hand_open": ("HandOpen", {"speed": "int32"}),
     "hand_close": ("HandClose", {"speed": "int32"}),
     "hand_preshape": ("HandPreshape", {"mode": "string", "level": "string"}),
@@ -72,7 +72,7 @@ def test_table_3_actions(name):
 
     assert fields("Goal") == goal
     assert fields("Result") == {"isOk": "bool", "reason_code": "uint16", "message": "string"}
-    assert fields("Feedback") == {"status": "string", "positions": "int32[]"}
+    assert fields("Feedback") == {"status": "string", "status_code": "uint16", "positions": "int32[]"}
 
 
 def test_table_3_has_no_other_action():

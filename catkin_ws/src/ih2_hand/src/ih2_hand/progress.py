@@ -66,6 +66,11 @@ class Verdict:
     stop: bool = False
     reason: Reason = Reason.NONE
 
+    @property
+    def status_code(self) -> Reason:
+        """What `text` means as feedback: the fingers move, or why they shall not any more."""
+        return self.reason if self.done else Reason.HAND_MOVING
+
 
 def _failed(text: str, reason: Reason) -> Verdict:
     return Verdict(text, done=True, stop=True, reason=reason)

@@ -26,10 +26,11 @@ class Reason(IntEnum):
     HAND_REFUSED = 505
     HAND_STARTED = 506
     HAND_ENDED = 507
+    HAND_MOVING = 508
     UNEXPECTED = 699
 
 
-NEUTRAL = (Reason.NONE, Reason.HAND_STARTED, Reason.HAND_ENDED)
+NEUTRAL = (Reason.NONE, Reason.HAND_STARTED, Reason.HAND_ENDED, Reason.HAND_MOVING)
 """What is no failure."""
 
 BROKEN = (Reason.DRIVE_ERROR, Reason.TIME_LIMIT, Reason.HAND_LINK_LOST, Reason.HAND_STALLED, Reason.UNEXPECTED)

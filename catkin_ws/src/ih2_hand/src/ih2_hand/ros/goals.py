@@ -255,7 +255,7 @@ class GoalQueue:
         verdict = running.task.judge(status.motors, time.monotonic() - running.begun)
         _, _, feedback = SPECS[running.name]
         running.handle.publish_feedback(
-            feedback(status=verdict.text, positions=[motor.position for motor in status.motors])
+            feedback(verdict.text, verdict.status_code, [motor.position for motor in status.motors])
         )
         if verdict.done:
             if verdict.stop:
