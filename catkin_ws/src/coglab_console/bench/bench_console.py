@@ -108,9 +108,10 @@ def rehearsed(cell: Cell, operator: Operator) -> tuple[list[tuple[str, str]], li
     for action in ACTIONS:
         cell.passed.clear()
         done += operator.carry_out(action, False, f"rehearsal_{action}")
-        way, rest = on_the_way(cell.phases(action), list(cell.passed))
+        phases, recovery = cell.phases(action)
+        way, rest = on_the_way(phases, list(cell.passed))
         places += [(action, state) for state in way]
-        aside += rest
+        aside += [*rest, *recovery]
         operator.recover()
     return places, aside, done
 
@@ -172,7 +173,7 @@ def load_rows(cell: Cell, _pictures: Path) -> list[dict]:
     process = ServerProxy(uri).getPid("/console_bench")[2]
     share, rate = asyncio.run(load(cell.home, process))
     return [
-        row("node with 5 browsers", round(100 * share, 1), "% of a core", "<= 25", share <= 0.25),
+        row("node with 5 browsers, robot at rest", round(100 * share, 1), "% of a core", "<= 25", share <= 0.25),
         row("state to the slowest of 5 browsers", round(rate, 1), "Hz", ">= 28", rate >= 28.0),
         *flood_rows(cell, process),
     ]

@@ -117,8 +117,8 @@ class Cell:
         # Of states side by side, /coglab/state tells the newest alone.
         self.passed += [f"{message.path}/{label}" for label in message.active_states]
 
-    def phases(self, action: str) -> list[str]:
-        """Paths of the phases of an action, from the structure of the machine."""
+    def phases(self, action: str) -> tuple[list[str], list[str]]:
+        """Paths of the phases of an action and of its recovery, from the structure of the machine."""
         self.wait(lambda: any(path.endswith(f"/{action}") for path in list(self.structure)), 20.0, "the structure")
         return phases_of(dict(self.structure), action)
 

@@ -1,11 +1,11 @@
 // Strip charts on one time axis (the last 20 s), drawn by Debian's dygraphs; phases as bars above them.
-import { drawn, h, setText } from './dom.js';
+import { drawn, h, setText, svg } from './dom.js';
 import { on, onDocs, store } from './store.js';
 
 const WINDOW = 20; // s
 const JOINTS = [0, 1, 3]; // A1, A2, A3 (wire joints 1, 2, 4) carry the lever of a hand-over
 const COLOURS = ['#0072b2', '#d55e00', '#009e73', '#1b1f24', '#cc79a7'];
-const DASHES = [null, [7, 4], null, [2, 3], null];
+const DASHES = [null, [7, 4], [12, 3, 2, 3], [2, 3], [18, 4]]; // one for each colour, which alone tells nobody enough
 const BARS = ['#56b4e9', '#cfd6dc', '#f0e442', '#b9c2ca'];
 
 const STRIPS = [
@@ -21,8 +21,12 @@ function limit(state) {
   return counted.length ? Math.min(...counted) : null;
 }
 
+const LEFT = 42; // px of the canvas of the phases where the charts' time axis begins
+const RIGHT = 4; // px beyond its end
+
 let phases = []; // [from (s), label]
 let latest = 0;
+let bars = []; // of the phases, as they were drawn last, in px of the page
 
 /** Speed of the newest path of the motion under way now; 0 without one. */
 function planned(state) {
@@ -43,6 +47,12 @@ function remember(strip, state) {
   if (old > 60) strip.rows.splice(0, old);
 }
 
+/** The phases as they lie on a canvas of this width: { label, from (s), left, right (px) }. */
+function barsIn(width) {
+  const x = (stamp) => LEFT + ((stamp - latest + WINDOW) / WINDOW) * (width - LEFT - RIGHT);
+  return phases.map(([from, label], i) => ({ label, from, left: Math.max(LEFT, x(from)), right: x(phases[i + 1]?.[0] ?? latest) }));
+}
+
 function drawPhases(canvas) {
   const width = canvas.clientWidth;
   const height = canvas.clientHeight;
@@ -51,22 +61,21 @@ function drawPhases(canvas) {
   const context = canvas.getContext('2d');
   context.clearRect(0, 0, width, height);
   context.font = '14px "DejaVu Sans", Verdana, sans-serif';
-  const left = 42; // where the charts' time axis begins
-  const x = (stamp) => left + ((stamp - latest + WINDOW) / WINDOW) * (width - left - 4);
-  phases.forEach(([from, label], i) => {
-    const a = Math.max(left, x(from));
-    const b = x(phases[i + 1]?.[0] ?? latest);
-    if (b <= left || b <= a) return;
+  const found = barsIn(width);
+  const box = canvas.getBoundingClientRect();
+  bars = found.map((bar) => ({ ...bar, left: box.left + bar.left, right: box.left + bar.right }));
+  found.forEach(({ label, left, right }, i) => {
+    if (right <= left) return;
     context.fillStyle = BARS[i % BARS.length];
-    context.fillRect(a, 1, b - a, height - 2);
+    context.fillRect(left, 1, right - left, height - 2);
     context.strokeStyle = '#1b1f24';
-    context.strokeRect(a, 1, b - a, height - 2);
+    context.strokeRect(left, 1, right - left, height - 2);
     context.save();
     context.beginPath();
-    context.rect(a, 0, b - a, height);
+    context.rect(left, 0, right - left, height);
     context.clip();
     context.fillStyle = '#1b1f24';
-    context.fillText(label, a + 4, height - 7);
+    context.fillText(label, left + 4, height - 7);
     context.restore();
   });
 }
@@ -111,21 +120,27 @@ function optionsOf(strip, last) {
   };
 }
 
+/** A name of the legend with a piece of its line, as the chart draws it. */
+function legend(name, i) {
+  const line = svg('line', { x1: 0, y1: 5, x2: 26, y2: 5, stroke: COLOURS[i], 'stroke-width': 3, ...(DASHES[i] && { 'stroke-dasharray': DASHES[i].join(' ') }) });
+  return h('i', {}, svg('svg', { width: 26, height: 10, 'aria-hidden': 'true' }, line), name);
+}
+
 export function showCharts(parent) {
-  const bars = h('canvas', { role: 'img', 'aria-label': 'Phases' });
-  parent.append(h('div', { class: 'strip phases' }, h('div', { class: 'name' }, 'Phase'), bars));
+  const canvas = h('canvas', { role: 'img', 'aria-label': 'Phases' });
+  parent.append(h('div', { class: 'strip phases' }, h('div', { class: 'name' }, 'Phase'), canvas));
   const note = h('p', { hidden: true }, 'Strip charts need libjs-dygraphs: apt install libjs-dygraphs.');
   for (const [i, strip] of STRIPS.entries()) {
     strip.rows = [];
     strip.place = h('div', { role: 'img', 'aria-label': strip.name });
-    const names = strip.series.map((name, k) => h('i', { class: `c${strip.colours[k]}` }, name));
+    const names = strip.series.map((name, k) => legend(name, strip.colours[k]));
     parent.append(h('div', { class: `strip${i === STRIPS.length - 1 ? ' last' : ''}` }, h('div', { class: 'name' }, strip.name, h('br'), names), strip.place));
   }
   parent.append(note);
 
   const redraw = drawn(() => {
     if (parent.offsetParent === null) return;
-    drawPhases(bars);
+    drawPhases(canvas);
     STRIPS.forEach((strip, i) => {
       if (!strip.rows.length || !window.Dygraph) return;
       const range = { dateWindow: [latest - WINDOW, latest] };
@@ -151,4 +166,24 @@ export function showCharts(parent) {
       setText(note, `Strip charts cannot be drawn: dygraphs ${error.message}`);
     });
   });
+}
+
+/**
+ * A copy of what the strips show, for the tests: { name, series, rows (stamp and a value per series), axis (s), edges (px of
+ * the page where it begins and ends), drawn (dash and colour per series) }; without the last three before they are drawn.
+ */
+export function stripsShown() {
+  return STRIPS.map(({ name, series, rows, chart, place }) => {
+    const shown = { name, series: [...series], rows: structuredClone(rows) };
+    if (!chart) return shown;
+    const { left } = place.getBoundingClientRect();
+    const axis = chart.xAxisRange();
+    const drawn = series.map((one, i) => [chart.getOption('strokePattern', one), chart.getColors()[i]]);
+    return { ...shown, axis, edges: axis.map((stamp) => left + chart.toDomXCoord(stamp)), drawn };
+  });
+}
+
+/** A copy of the bars of the phases as they were drawn last: { label, from (s), left, right (px of the page) }. */
+export function barsShown() {
+  return structuredClone(bars);
 }

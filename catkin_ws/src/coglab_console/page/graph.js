@@ -2,6 +2,7 @@
 import { h, setText, svg } from './dom.js';
 import { onDocs, store, on } from './store.js';
 import { choice } from './choice.js';
+import { more } from './more.js';
 
 const MAIN = '/coglab';
 const READABLE = 14 / 11; // px a unit of the picture, whose letters are 11 high, to be 14
@@ -77,10 +78,10 @@ export function showGraph(parent) {
   const extent = choice({ 'aria-label': 'How much of it', onchange: update });
   extent.offer([['follow', 'follow'], ['whole', 'whole']]);
   extent.show('follow');
-  const crumbs = h('p', { class: 'crumbs', 'aria-live': 'polite' });
-  const last = h('p', { class: 'last' });
+  const crumbs = h('span', { 'aria-live': 'polite' });
+  const last = h('span');
   const picture = svg('svg', { role: 'img', 'aria-label': 'Graph of the state machine' });
-  parent.append(h('header', {}, machine.button, crumbs, extent.button), picture, last);
+  parent.append(h('header', {}, machine.button, more(h('p', { class: 'crumbs' }, crumbs), crumbs), extent.button), picture, more(h('p', { class: 'last' }, last), last));
 
   function names() {
     const known = machines();
@@ -107,7 +108,8 @@ export function showGraph(parent) {
     for (const line of Object.values(parts.edges)) line.classList.remove('last');
     if (step.path) {
       parts.edges[`${step.path}/${step.from} ${step.path}/${step.to}`]?.classList.add('last');
-      setText(last, `${step.from}${step.outcome ? ` [${step.outcome}]` : ''} → ${step.to}${step.reason ? `: ${step.reason}` : ''}`);
+      const names = `${step.from}${step.outcome ? ` [${step.outcome}]` : ''} → ${step.to}`;
+      setText(last, step.reason ? `${step.reason} (${names})` : names);
     } else setText(last, '');
     const deepest = active.reduce((a, b) => (b.length > a.length ? b : a), '');
     setText(crumbs, graph.problem || wayTo(deepest) || 'not active');

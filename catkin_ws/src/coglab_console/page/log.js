@@ -1,6 +1,7 @@
 // The event log: three lines in the footer, and a page of its own.
 import { h, mark, paced } from './dom.js';
 import { on, store } from './store.js';
+import { more } from './more.js';
 
 const LEVELS = { info: 'idle', warning: 'warn', fault: 'fault' };
 
@@ -9,10 +10,11 @@ export function clock(stamp) {
 }
 
 function line(event) {
-  return h('li', { class: event.level === 'fault' ? 'faultrow' : '', title: event.text }, mark(LEVELS[event.level]), `${clock(event.stamp)} ${event.source}: ${event.text}${event.phase ? ` [${event.phase}]` : ''}`);
+  return h('li', { class: event.level === 'fault' ? 'faultrow' : '' }, mark(LEVELS[event.level]), `${clock(event.stamp)} ${event.source}: ${event.text}${event.phase ? ` [${event.phase}]` : ''}`);
 }
 
 export function showLog(list) {
+  more(list.parentElement, list);
   on('events', paced(() => list.replaceChildren(...store.events.slice(-3).reverse().map(line)), 150));
 }
 

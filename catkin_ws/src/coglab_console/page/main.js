@@ -7,7 +7,7 @@ import { eventsPage, showLog } from './log.js';
 import { showStatus } from './status.js';
 import { palmShown, showView, viewKind } from './view.js';
 import { showGraph } from './graph.js';
-import { showCharts } from './charts.js';
+import { barsShown, showCharts, stripsShown } from './charts.js';
 import { experimentPage, showSession } from './tab_experiment.js';
 import { contactPage } from './tab_contact.js';
 import { feedbackPage, objectsPage, primitivesPage } from './tab_lists.js';
@@ -98,4 +98,4 @@ showCharts(at('charts'));
 connect();
 
 /** For the tests: what the page shows, without a way to change anything. */
-window.coglab = Object.freeze({ palm: palmShown, view: viewKind, state: () => store.state, docs: () => store.docs, events: () => store.events });
+window.coglab = Object.freeze({ palm: palmShown, view: viewKind, strips: stripsShown, bars: barsShown, state: () => store.state, docs: () => store.docs, events: () => store.events });

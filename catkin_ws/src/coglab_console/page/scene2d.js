@@ -91,9 +91,10 @@ export class Scene2D {
   drawPath(context, at) {
     const shown = path();
     if (!shown) return;
-    context.strokeStyle = '#0072b2';
-    context.lineWidth = 3;
-    context.setLineDash(shown.kind === 'running' ? [] : [7, 5]);
+    const running = shown.kind === 'running';
+    context.strokeStyle = running ? '#0072b2' : '#56b4e9';
+    context.lineWidth = running ? 5 : 2;
+    context.setLineDash(running ? [] : [7, 5]);
     context.beginPath();
     for (const point of shown.points) context.lineTo(...at(point));
     context.stroke();

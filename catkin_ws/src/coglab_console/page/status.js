@@ -3,8 +3,11 @@ import { h, mark, paced, setText } from './dom.js';
 import { on, onDocs, store } from './store.js';
 import { ageWords } from './cell.js';
 import { clock } from './log.js';
+import { more } from './more.js';
 
 const ROWS = ['Phase', 'Waits', 'FRI', 'Arm', 'Motion', 'Hand', 'Person', 'Object', 'Contact', 'Why', 'Last'];
+const LONG = ['Waits', 'Why', 'Last'];
+const MOST_LINES = 6;
 const OLD = 0.5; // s, sights of perception older than this deserve a mark
 const UNKNOWN = ['fault', 'not known, the brain is silent'];
 const RECENT = 5; // s for which a recognised reach is shown
@@ -117,29 +120,49 @@ function rows() {
   };
 }
 
-export function showStatus(parent) {
+/** The rows, each with the element of its words: { cell, all (mark and words), words, level }. */
+function makeRows(list) {
   const cells = {};
-  const list = h('dl');
   for (const name of ROWS) {
-    const words = h('span');
-    const cell = h('dd', { class: { Phase: 'phase', Waits: 'tall', Why: 'tall', Last: 'tall' }[name] ?? '' }, mark('idle'), words);
-    cells[name] = { cell, words, level: 'idle' };
+    const words = h('span', { 'aria-live': name === 'Phase' ? 'polite' : null });
+    const all = h('span', {}, mark('idle'), words);
+    const cell = more(h('dd', { class: LONG.includes(name) ? `long ${name.toLowerCase()}` : name.toLowerCase() }, all), all);
+    cells[name] = { cell, all, words, level: 'idle' };
     list.append(h('dt', {}, name), cell);
   }
+  return cells;
+}
+
+export function showStatus(parent) {
+  const list = h('dl');
+  const cells = makeRows(list);
   parent.append(list);
   const update = paced(() => {
     if (!store.docs.status || parent.offsetParent === null) return;
+    let changed = false;
     for (const [name, [level, text]] of Object.entries(rows())) {
       const row = cells[name];
+      changed ||= row.words.textContent !== text;
       setText(row.words, text);
       if (row.level === level) continue;
       row.level = level;
-      row.cell.firstChild.replaceWith(mark(level));
+      row.all.firstChild.replaceWith(mark(level));
       row.cell.classList.toggle('warnrow', level === 'warn');
       row.cell.classList.toggle('faultrow', level === 'fault');
     }
+    if (changed) fit(parent, list);
   }, 100);
   on('state', update);
   on('events', update);
   onDocs(['status', 'desk', 'recognition'], update);
+}
+
+/** Long rows have as many lines as there is room for; with two of them all rows fit, whatever they say. */
+function fit(parent, list) {
+  list.classList.remove('tight');
+  for (let lines = MOST_LINES; lines >= 2; lines -= 1) {
+    list.style.setProperty('--long', lines);
+    if (parent.scrollHeight <= parent.clientHeight) return;
+  }
+  list.classList.add('tight');
 }

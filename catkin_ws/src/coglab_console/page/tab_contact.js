@@ -45,6 +45,7 @@ export function contactPage(page) {
     setText(detector, !alive ? 'The detector says nothing: it is not there, or no torques come.'
       : state.margin !== null ? `Watching for ${mode}: margin ${state.margin.toFixed(2)}; it counts from 1.`
         : stands === 'waiting' ? `Armed for ${mode}; waits until the arm stands still and enough was learnt.` : 'The detector is off.');
+    onStatus(); // the deviations are those of the newest thresholds
   };
   const onStatus = () => {
     const contact = store.docs.status?.contact;

@@ -130,7 +130,8 @@ export function helpPage(page) {
     h('div', {}, h('h2', {}, 'One operator'), h('p', {}, 'One browser operates, all others watch; STOP and notes are everybody’s. Taking over is announced to the operator, who has 3 s to keep the control.'),
       h('div', { class: 'row' }, takeOver(told), invite), h('label', {}, 'To be used once', link), told,
       h('h2', {}, 'Who can move the robot'), h('p', {}, 'This page asks for a link with a one-time token, and listens on this computer alone unless it was launched otherwise. ROS 1 itself has no authentication: whoever reaches the ROS master can do everything, without this page. Keep the master on loopback or on a private network. From elsewhere: ssh -L 8790:127.0.0.1:8790 LAB-PC.'),
-      h('h2', {}, 'Words of the picture'), h('p', {}, 'Orange: arm. Green: object. Pink: goal. Thin sky-blue path: where the next motion would go; thick blue: the motion under way. Sky-blue lines: workspace.')));
+      h('h2', {}, 'Words of the picture'), h('p', {}, 'Orange: arm. Green: object. Pink: goal. Thin sky-blue path, dashed in 2D: where the next motion would go; thick blue: the motion under way. Sky-blue lines: workspace.'),
+      h('p', {}, 'Graph of the state machine, whole: all of the machine, with letters as small as that takes; follow: letters that can be read, around the active state.')));
   return {};
 }
 

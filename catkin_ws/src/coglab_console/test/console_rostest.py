@@ -19,8 +19,6 @@ import rosgraph
 import rospkg
 import rospy
 import rostest
-import smach
-import smach_ros
 import tf2_ros
 from coglab_console.browser import Browser, acknowledge, fresh_link, press_and_hold
 from coglab_console.page_check import PAGES, look
@@ -28,6 +26,7 @@ from coglab_msgs.msg import LwrState, MasterState
 from selenium.webdriver.common.action_chains import ActionChains
 from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
+from somebody import Somebody, show_machine
 from std_msgs.msg import String
 
 KNOWN = ("WebGL", "GPU stall", "willReadFrequently")  # of chromium about its own drawing
@@ -49,6 +48,9 @@ class Console(unittest.TestCase):
         cls.link = fresh_link(home, limit=60.0)
         cls.browser = Browser()
         cls.browser.open(cls.link, 60.0)
+        # From the launch, with which the master began.
+        born = Path(f"/proc/{rosgraph.Master('/console_test').getPid()}").stat().st_mtime
+        cls.took = {"start": time.time() - born}
 
     @classmethod
     def tearDownClass(cls):
@@ -159,6 +161,7 @@ class Console(unittest.TestCase):
         if running is True:
             return False
         self.browser.picture(self.pictures / "reaching.png")
+        self.assertEqual(look(self.browser)[0], [])
         self.assertGreater(len(running["points"]), 10)
         end = time.monotonic() + 60.0
         while not self.machine.in_hub and time.monotonic() < end:
@@ -167,6 +170,7 @@ class Console(unittest.TestCase):
 
     def test_04_an_exchange_by_mouse(self):
         for _ in range(3):
+            began = time.monotonic()
             if self.receive():
                 break
         self.page_in("wait_with_object", 5.0)
@@ -174,6 +178,7 @@ class Console(unittest.TestCase):
         self.browser.until("return coglab.events().some(e => e.text.includes('Receive mug: succeeded'))", 20.0)
         self.browser.until("return coglab.state().speed < 0.001", 20.0)
         self.assertLess(self._distance_to_tf(), 0.002)
+        self.took["exchange"] = time.monotonic() - began
         self.browser.picture(self.pictures / "holds.png")
 
     def ready(self, hub):
@@ -198,9 +203,10 @@ class Console(unittest.TestCase):
         self.page_in(hub)
 
     def reach(self):
-        """Until the arm is on its way to the person; once more where the machine has stopped by itself."""
+        """Until the arm is on its way to the person, again where the machine has stopped by itself; when it began."""
         for _ in range(3):
             self.ready("wait_with_object")
+            began = time.monotonic()
             self.enabled("exchange_robot_to_human").click()
             # One look for both: a moment later the reach may be over, and that is no stop.
             seen = self.browser.until(
@@ -209,11 +215,11 @@ class Console(unittest.TestCase):
                 45.0,
             )
             if seen == "running":
-                return
+                return began
         self.fail(f"no reach in three attempts: {self.machine.why}")
 
     def test_05_stop_by_key_then_acknowledge_then_hold(self):
-        self.reach()
+        began = self.reach()
         ActionChains(self.browser.driver).send_keys(Keys.SPACE).perform()
         end = time.monotonic() + 5.0
         while not self.arm.hold_latched:
@@ -222,6 +228,7 @@ class Console(unittest.TestCase):
         self.page_in("/stopped", 20.0)
         self.browser.until("return document.getElementById('acknowledge').offsetParent !== null", 20.0)
         self.browser.picture(self.pictures / "stopped.png")
+        self.assertEqual(look(self.browser)[0], [])
         self.says("reset", "acknowledge")
         self.button("reset").click()  # refused, and a click would not be enough
         self.browser.until("return document.getElementById('told').textContent.includes('acknowledge')", 10.0)
@@ -229,6 +236,10 @@ class Console(unittest.TestCase):
         self.assertTrue(self.arm.hold_latched)
         self.go_on()
         self.assertFalse(self.arm.hold_latched)
+        self.took["STOP and on"] = time.monotonic() - began
+        each = ", ".join(f"{name} {took:.1f}" for name, took in self.took.items())
+        print(f"one exchange by mouse and one STOP: {sum(self.took.values()):.1f} s ({each}), at most 90", flush=True)
+        self.assertLess(sum(self.took.values()), 90.0, each)
 
     def test_06_stop_waits_neither_for_the_master_nor_for_a_frozen_brain(self):
         master = rosgraph.Master("/console_test")
@@ -298,18 +309,20 @@ class Console(unittest.TestCase):
         return ServerProxy(uri).getPid("/console_test")[2]
 
     def test_08_a_machine_of_somebody_else_is_shown(self):
-        machine = smach.StateMachine(outcomes=["done"])
-        with machine:
-            smach.StateMachine.add("ALPHA", smach.CBState(lambda _: "on", outcomes=["on"]), {"on": "BETA"})
-            smach.StateMachine.add("BETA", smach.CBState(lambda _: "done", outcomes=["done"]))
-        server = smach_ros.IntrospectionServer("somebody", machine, "/SOMEBODY")
-        server.start()
-        try:
+        with Somebody() as somebody:
             picture = self.browser.until("return coglab.docs()['graph:/somebody']", 20.0)
-        finally:
-            server.stop()
-        self.assertEqual({node["label"] for node in picture["nodes"]}, {"ALPHA", "BETA"})
-        self.assertEqual([edge["outcomes"] for edge in picture["edges"]], ["on"])
+            self.assertEqual({node["label"] for node in picture["nodes"]}, {"ALPHA", "BETA"})
+            self.assertEqual([edge["outcomes"] for edge in picture["edges"]], ["on"])
+            show_machine(self.browser, "somebody")
+            self.browser.until("return document.querySelectorAll('#graph .node').length === 2", 10.0)
+            somebody.begin()
+            self.browser.until("return document.querySelectorAll('#graph .edge.last').length === 1", 20.0)
+            texts = "return [...document.querySelectorAll('#graph rect.active.node + text')].map((t) => t.textContent)"
+            self.assertEqual(self.browser.js(texts), ["BETA"])
+            self.assertEqual(
+                self.browser.js("return document.querySelector('#graph p.last').innerText"), "ALPHA → BETA"
+            )
+        show_machine(self.browser, "coglab")
 
     def test_08b_notes_and_the_next_object_go_both_ways(self):
         heard = {"note": [], "next_object": []}

@@ -25,6 +25,19 @@ window.WebSocket = class extends Real {
 };
 """
 
+STATUS: dict = {
+    "machine": {"alive": True, "state": "/m/wait_without_object", "words": "ready", "hub": True, "actions": ["take"],
+                "object": "", "why": "", "fallback": "mug"},
+    "arm": {"alive": True, "supervisor": "command", "words": "ready to move", "fri": "CMD",
+            "quality": "PERFECT", "mode": "POSITION", "power": True, "allowed": True, "held": False, "reason": "",
+            "cycle": 0.005},
+    "hand": {"alive": True, "connected": True, "calibrated": True, "calibrating": False, "holding": False,
+             "message": "", "motors": 5},
+    "manager": {"alive": True, "state": "idle", "active": "dmp", "reason": "", "scale": 1.0},
+    "contact": {"words": "", "alive": True, "state": "off", "mode": "", "learnt": True, "samples": 9, "k": 6.0,
+                "window": 0.04},
+}  # fmt: skip
+
 
 class Desk:
     """A console that serves in a thread of its own, 30 states a second, and a browser at its page. `model`: changes of
@@ -55,6 +68,11 @@ class Desk:
 
     def event(self, text):
         self.loop.call_soon_threadsafe(self.console.events.add, "test", text)
+
+    def put(self, **documents):
+        """Documents by name."""
+        for name, value in documents.items():
+            self.loop.call_soon_threadsafe(self.console.documents.put, name, value)
 
     def age(self):
         """s since the newest state that the page has left the console."""

@@ -29,14 +29,19 @@ def structure_of(machine, path, found):
 )
 def test_the_phases_are_those_of_the_machine(action, known):
     structure = structure_of(the_master(), "/coglab_master", {})
-    phases = phases_of(structure, action)
+    phases, aside = phases_of(structure, action)
     labels = [path.rsplit("/", 1)[1] for path in phases]
     assert known <= set(labels) and len(phases) == len(set(phases)) > len(known)
     assert all(f"/{action}/" in path and "/recover/" not in path for path in phases)
+    # Those of the recovery are aside, and none is lost.
+    assert aside and all(f"/{action}/" in path and "/recover" in path for path in aside)
+    leaves = [f"{path}/{label}" for path, labels in structure.items() for label in labels]
+    leaves = [path for path in leaves if path not in structure and f"/{action}/" in path]
+    assert sorted(phases + aside) == sorted(leaves)
     # A state that is added to the machine is a phase without a word to the bench.
     container = phases[0].rsplit("/", 1)[0]
     structure[container].append("new_state")
-    assert f"{container}/new_state" in phases_of(structure, action)
+    assert f"{container}/new_state" in phases_of(structure, action)[0]
 
 
 def test_an_action_that_is_not_there_is_named():

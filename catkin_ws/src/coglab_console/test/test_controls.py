@@ -10,7 +10,7 @@ from coglab_console.browser import Browser, press_and_hold
 from coglab_console.desk.desk import Answer
 from coglab_console.desk.words import BUTTONS
 from coglab_console.page_check import PAGES, look
-from page_double import Desk
+from page_double import STATUS, Desk
 
 pytestmark = pytest.mark.skipif(
     shutil.which("chromedriver") is None, reason="chromium-driver is missing: ./coglab install browser"
@@ -22,18 +22,6 @@ FEEDBACK = {
          "waiting": "", "reasons": [], "fault": "", "faults": 0, "overruns": 0}
         for name in ("yield", "limit")
     ],
-}  # fmt: skip
-STATUS: dict = {
-    "machine": {"alive": True, "state": "/m/wait_without_object", "words": "ready", "hub": True, "actions": ["take"],
-                "object": "", "why": "", "fallback": "mug"},
-    "arm": {"alive": True, "supervisor": "command", "words": "ready to move", "fri": "CMD",
-            "quality": "PERFECT", "mode": "POSITION", "power": True, "allowed": True, "held": False, "reason": "",
-            "cycle": 0.005},
-    "hand": {"alive": True, "connected": True, "calibrated": True, "calibrating": False, "holding": False,
-             "message": "", "motors": 5},
-    "manager": {"alive": True, "state": "idle", "active": "dmp", "reason": "", "scale": 1.0},
-    "contact": {"words": "", "alive": True, "state": "off", "mode": "", "learnt": True, "samples": 9, "k": 6.0,
-                "window": 0.04},
 }  # fmt: skip
 # Every button that sends a command of the operator's, and what is said below it.
 DISABLED = """

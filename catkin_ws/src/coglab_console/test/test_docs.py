@@ -87,3 +87,8 @@ def test_the_limits_are_those_that_are_served():
     assert f"more than {server.MAX_MESSAGE // 1024} KiB" in PAGE and f"nothing for {server.SEND_LIMIT:.0f} s" in PAGE
     assert f"after {server.MAX_BAD_FRAMES} of them" in PAGE and server.MAX_SOCKETS == 4
     assert "note" in COMMANDS
+
+
+def test_the_page_tells_how_long_the_exchange_and_the_stop_in_the_tests_may_take():
+    (limit,) = re.findall(r"self\.took\.values\(\)\), (\d+)\.0", (PACKAGE / "test" / "console_rostest.py").read_text())
+    assert f"{limit} s at most" in PAGE

@@ -126,7 +126,13 @@ def test_a_transition_belongs_to_the_phase_that_has_ended(seen):
     path = "/coglab_master/exchange_human_to_robot"
     view._on_machine(MasterState(state=f"{path}/hand_close"))
     view._on_transition(Transition(path=path, from_state="set_dmp_goal", outcome="succeeded", to_state="approach"))
-    assert events == [("machine", "waits until it is offered: done; now: reaches", "info", "waits until it is offered")]
+    assert events == [("machine", "now: reaches", "info", "waits until it is offered")]
+    reason = "the arm is blocked"
+    told = Transition(path=path, from_state="approach", outcome="failed", to_state="recover", reason=reason)
+    told.causes = ["hold is latched; send reset"]
+    view._on_transition(told)
+    words = "the arm is blocked, because hold is latched (reaches: failed; now: recovers)"
+    assert events[1:] == [("machine", words, "warning", "reaches")]
 
 
 def path_of(motion, *places):

@@ -91,11 +91,17 @@ def test_a_sentence_of_the_brain_says_what_to_press(told, read):
 
 
 def test_a_transition_is_a_sentence():
+    """Its reason stands first. What the phase that is shown beside it says already is left out."""
     path = "/coglab_master/exchange_human_to_robot"
-    assert words.transition(path, "set_dmp_goal", "succeeded", "approach") == (
-        "waits until it is offered: done; now: reaches"
-    )
+    assert words.transition(path, "set_dmp_goal", "succeeded", "approach") == "now: reaches"
     assert words.transition("/coglab_master", "wait_with_object", "put", "put") == (
         "ready, holds an object: Put; now: puts on the board"
     )
     assert words.transition(path, "recover", "empty", "failed_empty") == "recovers: empty"
+    assert words.transition(path, "switch_to_dmp", "succeeded", "switch_to_dmp") == "prepares the reach: done"
+    assert words.transition(path, "monitor_dmp", "switched", "monitor_dmp", "pattern 'high'") == (
+        "pattern 'high' (watches where the person reaches: switched)"
+    )
+    assert words.transition(path, "approach", "failed", "recover", "the arm is blocked") == (
+        "the arm is blocked (reaches: failed; now: recovers)"
+    )

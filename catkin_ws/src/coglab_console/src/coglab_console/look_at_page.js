@@ -17,7 +17,7 @@ const over = document.elementFromPoint(stop.left + stop.width / 2, stop.top + st
 if (!document.getElementById('stop').contains(over)) problems.push(`${over.tagName} lies over STOP`);
 
 const seen = (element) => element.checkVisibility({ checkOpacity: false }) && element.getClientRects().length > 0;
-const nameOf = (element) => element.getAttribute('aria-label') || (element.labels?.length && element.labels[0].textContent.trim()) || (['BUTTON', 'SUMMARY', 'A'].includes(element.tagName) && element.textContent.trim());
+const nameOf = (element) => element.getAttribute('aria-label') || (element.matches('.more') && element.textContent.trim()) || (element.labels?.length && element.labels[0].textContent.trim()) || (['BUTTON', 'SUMMARY', 'A'].includes(element.tagName) && element.textContent.trim());
 const ids = new Set();
 for (const element of document.querySelectorAll('[id]')) {
   if (ids.has(element.id)) problems.push(`two elements are named ${element.id}`);
@@ -38,6 +38,24 @@ for (const element of document.querySelectorAll('[aria-disabled=true]')) {
 }
 for (const why of document.querySelectorAll('#actions .why')) {
   if (seen(why) && why.scrollHeight > why.clientHeight + 1) problems.push(`"${why.textContent}" is cut off`);
+}
+
+// What has no room must be seen in full with the focus on it.
+const status = document.getElementById('status');
+if (seen(status) && status.scrollHeight > status.clientHeight + 1) problems.push('the column of the status is cut off');
+for (const place of document.querySelectorAll('#status dd, #graph p.last, .crumbs, #log-place, #log')) {
+  const words = place.querySelector('.all') ?? place;
+  const cut = () => [words, ...words.querySelectorAll('li')].some((one) => one.scrollHeight > one.clientHeight + 1 || one.scrollWidth > one.clientWidth + 1);
+  if (!seen(place) || place.matches('.all') || !cut()) continue;
+  const before = document.activeElement;
+  place.focus();
+  const [box, around] = [words, place.closest('#status, #graph') ?? document.body].map((one) => one.getBoundingClientRect());
+  const inside = box.top >= around.top && box.bottom <= around.bottom && box.left >= around.left && box.right <= around.right;
+  if (document.activeElement !== place || cut() || !inside) problems.push(`"${words.textContent}" is cut off`);
+  // The focus goes back to where it was, and Tab on from there.
+  if (before === document.body) before.tabIndex = -1;
+  before.focus();
+  if (before === document.body) before.removeAttribute('tabindex');
 }
 const graph = document.querySelector('#graph svg');
 if (graph?.querySelector('text') && seen(graph)) {

@@ -138,12 +138,17 @@ def plain(sentence: str) -> str:
     return _NAMES.sub(lambda found: BUTTONS.get(found[1]) or f"'{PHASES[found[1]]}'", pressed)
 
 
-def transition(path: str, before: str, how: str, after: str) -> str:
-    """One transition of the state machine as a sentence."""
-    ended = phase(f"{path}/{before}")
-    if after in OUTCOMES or (how == after and how not in BUTTONS):
-        return f"{ended}: {outcome(how)}"
-    return f"{ended}: {outcome(how)}; now: {phase(f'{path}/{after}')}"
+def transition(path: str, before: str, how: str, after: str, reason: str = "") -> str:
+    """One transition of the state machine as a sentence: its reason first, where it has one. An event says besides in
+    which phase it was, so that a state that is done is not named again."""
+    ended, now = phase(f"{path}/{before}"), phase(f"{path}/{after}")
+    if after in OUTCOMES or (how == after and how not in BUTTONS) or now == ended:
+        step = f"{ended}: {outcome(how)}"
+    elif how == "succeeded":
+        step = f"now: {now}"
+    else:
+        step = f"{ended}: {outcome(how)}; now: {now}"
+    return f"{reason} ({step})" if reason else step
 
 
 def command(name: str, arguments: Mapping[str, Any]) -> str:

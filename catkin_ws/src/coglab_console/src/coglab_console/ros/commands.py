@@ -16,13 +16,14 @@ from coglab_msgs.srv import (
     AddPtp,
     ArmContact,
     FeedbackSelect,
+    Learn,
+    Reload,
     SetExecutionOrder,
     SetSpeedScale,
     Start,
     SwitchController,
 )
 from std_msgs.msg import String
-from std_srvs.srv import Trigger
 
 from ..desk.desk import Answer
 from ..desk.gates import Standing
@@ -151,13 +152,13 @@ class RosBackend:
         return self._told("controller_manager/speed_scale", SetSpeedScale, float(value))
 
     def _contact_learn(self) -> Answer:
-        return self._told("contact_detector/learn", Trigger)
+        return self._told("contact_detector/learn", Learn)
 
     def _contact_arm(self, mode: str, k: float = 0.0, timeout: float = 10.0, joints: list[int] | None = None) -> Answer:
         return self._told("contact_detector/arm", ArmContact, mode, float(timeout), float(k), joints or [], 0.0, 0.0)
 
     def _objects_reload(self) -> Answer:
-        answer = self._told("object_database/reload", Trigger)
+        answer = self._told("object_database/reload", Reload)
         self._view.objects_read()
         return answer
 

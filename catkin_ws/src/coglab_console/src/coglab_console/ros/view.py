@@ -281,10 +281,9 @@ class RosView:
     def _on_transition(self, message: Transition) -> None:
         level = {"failed": "warning", "stopped": "fault", "fault": "fault"}.get(message.outcome, "info")
         causes = "".join(f", because {cause}" for cause in message.causes[:4])
-        reason = plain(f": {message.reason}{causes}" if message.reason else "")
-        words = transition(message.path, message.from_state, message.outcome, message.to_state)
-        self._say("machine", words + reason, level, phase(f"{message.path}/{message.from_state}"))
         told = plain(message.reason + causes)
+        words = transition(message.path, message.from_state, message.outcome, message.to_state, told)
+        self._say("machine", words, level, phase(f"{message.path}/{message.from_state}"))
         self._transition(message.path, message.from_state, message.outcome, message.to_state, told)
 
     def _on_result(self, message: String) -> None:

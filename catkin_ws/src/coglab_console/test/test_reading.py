@@ -1,0 +1,166 @@
+"""Whoever looks can read all of it: the last event with its reason, what is waited for, why the robot stands still.
+What has no room is shown in full by focus and by the mouse. In a real browser with a double in place of the robot."""
+
+import shutil
+
+import pytest
+from coglab_console.browser import Browser
+from coglab_console.desk import words
+from coglab_console.page_check import focus_order, look
+from coglab_console.scene.graph_layout import Container, Layout
+from page_double import STATUS, Desk
+from selenium.webdriver.common.action_chains import ActionChains
+from selenium.webdriver.common.by import By
+from selenium.webdriver.common.keys import Keys
+
+pytestmark = pytest.mark.skipif(
+    shutil.which("chromedriver") is None, reason="chromium-driver is missing: ./coglab install browser"
+)
+ROOT = "/coglab_master/exchange_human_to_robot/approach"
+SWITCHED = (
+    "pattern 'high' recognised with confidence 1.00: primitive 'reach_human_middle' replaced by 'reach_human_high'"
+)
+FELL = (
+    "the arm does not follow any more: command mode was lost because the robot controller was not run for "
+    "259 ms (load), because the robot controller changed its quality from PERFECT to UNACCEPTABLE; when its cause is "
+    "away, press Go on"
+)
+
+
+def shown_of(last, reason):
+    """Documents of a machine in the middle of a reach, whose last transition was `last`."""
+    containers = {
+        ROOT: Container(ROOT, ("arm_motion", "monitor_dmp"), ()),
+        f"{ROOT}/arm_motion": Container(f"{ROOT}/arm_motion", ("execute_dmp", "wait_stop"), ()),
+    }
+    picture = {**Layout("no-such-program").of(containers), "problem": "", "roots": [ROOT]}
+    step = {"path": ROOT, "from": last[0], "outcome": last[1], "to": last[2], "reason": reason}
+    return {
+        "graph:/coglab": picture,
+        "active": {"/coglab": {"active": [f"{ROOT}/arm_motion/wait_stop"], "last": step}},
+    }
+
+
+def in_the_middle_of_a_reach(desk):
+    desk.state = {
+        "words": "reaches and receives",
+        "waits": "contact of an object with the hand, or the end of the reach",
+        "left": 7.5,
+        "dmp": ["running", 0.4, 0.23, 0.9],
+        "ages": {"hand": 0.047, "object": 0.051},
+    }
+    desk.put(**shown_of(("monitor_dmp", "switched", "monitor_dmp"), SWITCHED))
+    desk.put(status={**STATUS, "manager": {**STATUS["manager"], "state": "running"}})
+    for before, how, after, reason in (
+        ("execute_dmp", "succeeded", "wait_stop", ""),
+        ("monitor_dmp", "switched", "monitor_dmp", SWITCHED),
+    ):
+        desk.event(words.transition(ROOT, before, how, after, reason))
+    return SWITCHED
+
+
+def stopped(desk):
+    desk.state = {"words": "stopped", "phase": "/coglab_master/stopped"}
+    machine = {**STATUS["machine"], "state": "/coglab_master/stopped", "words": "stopped", "why": FELL, "object": "mug"}
+    arm = {**STATUS["arm"], "supervisor": "stopped", "words": "stopped", "quality": "UNACCEPTABLE", "reason": FELL,
+           "held": True, "power": False, "allowed": False}  # fmt: skip
+    manager = {**STATUS["manager"], "state": "fault", "reason": FELL}
+    hand = {**STATUS["hand"], "connected": False, "message": f"no answer of the hand for 0.5 s: {FELL}"}
+    desk.put(status={**STATUS, "machine": machine, "arm": arm, "manager": manager, "hand": hand})
+    desk.put(**shown_of(("arm_motion", "failed", "failed"), FELL))
+    desk.event(words.transition(ROOT, "arm_motion", "failed", "failed", FELL))
+    return FELL
+
+
+@pytest.fixture(scope="module")
+def desk(tmp_path_factory):
+    found = Desk(tmp_path_factory.mktemp("console"))
+    yield found
+    found.close()
+
+
+@pytest.mark.parametrize("moment", [in_the_middle_of_a_reach, stopped])
+def test_nothing_is_cut_off_that_cannot_be_read_in_full(desk, moment):
+    """Least of all the reason of the last event: its first words stand in the column, without a press of any key."""
+    page = desk.browser
+    reason = moment(desk)
+    page.until("return document.getElementById('log').textContent.includes(arguments[0])", 10.0, reason)
+    page.until("return document.getElementById('status').textContent.includes(arguments[0])", 10.0, reason)
+    page.until("return document.querySelector('#graph p.last').textContent.includes(arguments[0])", 10.0, reason)
+    assert look(page)[0] == []
+    ActionChains(page.driver).send_keys(Keys.TAB).perform()
+    assert page.js("return document.activeElement.id") == "tab-Live", "the look has moved the focus"
+    assert focus_order(page)[1] == []
+    # The clock stands before it, and nothing else.
+    last = page.js("return [...document.querySelectorAll('#status dt')].at(-1).nextSibling.innerText")
+    assert last.split(" ", 1)[1].startswith(reason[:40]), last
+    assert page.js("return document.querySelector('#graph p.last').innerText").startswith(reason[:40])
+
+
+def test_a_tablet_shows_the_whole_column(desk):
+    stopped(desk)
+    with Browser(size=(1024, 768), touch=True) as tablet:
+        tablet.open(desk.console.link())
+        tablet.until("return document.getElementById('status').innerText.includes('stopped')", 10.0)
+        assert look(tablet)[0] == []
+
+
+def test_what_is_cut_off_unfolds_under_the_mouse_and_covers_nothing_that_is_pressed(desk):
+    page = desk.browser
+    stopped(desk)
+    height = "return document.getElementById('log').getBoundingClientRect().height"
+    page.until("return document.getElementById('log-place').tabIndex === 0", 10.0)
+    folded = page.js(height)
+    ActionChains(page.driver).move_to_element(page.driver.find_element(By.ID, "log-place")).perform()
+    page.until(f"{height} > arguments[0] + 20", 5.0, folded)
+    # What the unfolded text lies over is pressed as before.
+    over = (
+        "const box = document.getElementById('log').getBoundingClientRect();"
+        "return document.elementFromPoint(box.left + 40, box.top + 4).closest('#log') === null"
+    )
+    assert page.js(over)
+    ActionChains(page.driver).move_to_element(page.driver.find_element(By.ID, "world")).perform()
+    page.until(f"{height} === arguments[0]", 5.0, folded)
+
+
+def test_an_event_that_comes_while_one_reads_takes_the_focus_nowhere(desk):
+    page = desk.browser
+    stopped(desk)
+    page.until("return document.getElementById('log-place').tabIndex === 0", 10.0)
+    page.js("document.getElementById('log-place').focus()")
+    desk.event("one more")
+    page.until("return document.getElementById('log').textContent.includes('one more')", 10.0)
+    assert page.js("return document.activeElement.id") == "log-place"
+    ActionChains(page.driver).send_keys(Keys.TAB).perform()
+    assert page.js("return document.activeElement.id") != "log-place"
+
+
+def test_a_change_of_the_phase_is_read_out(desk):
+    read_out = "return [...document.querySelectorAll('#status [aria-live=polite]')].map((one) => one.closest('dd'))"
+    (cell,) = desk.browser.js(read_out)
+    assert "phase" in cell.get_attribute("class").split()
+
+
+@pytest.mark.parametrize(
+    "kind, wanted, other", [("ahead", ["#56b4e9", 2, True], "#0072b2"), ("running", ["#0072b2", 5, False], "")]
+)
+def test_the_flat_picture_has_the_path_as_the_help_says(desk, kind, wanted, other):
+    """Thin and sky-blue where the next motion would go, thick and blue where it goes; dashes tell them apart, too."""
+    page = desk.browser
+    page.js(
+        "const of = CanvasRenderingContext2D.prototype; window.strokes = []; window.drawStroke ??= of.stroke;"
+        "of.stroke = function (...all) { strokes.push([this.strokeStyle, this.lineWidth,"
+        " this.getLineDash().length > 0]); return window.drawStroke.apply(this, all); };"
+    )
+    shown = {"kind": kind, "motion": "m", "stamp": 0.0, "goal": [0.9, 0, 0.3], "times": [0.0, 2.0],
+             "points": [[0.1, 0, 0.3], [0.9, 0, 0.3]]}  # fmt: skip
+    desk.put(path=None)
+    page.until("window.strokes = []; return coglab.docs().path === null", 10.0)
+    desk.put(path=shown)
+    page.until("return strokes.some((one) => JSON.stringify(one) === JSON.stringify(arguments[0]))", 10.0, wanted)
+    assert other not in page.js("return strokes.map(([colour]) => colour)")
+    page.tab("Help")
+    words = page.js("return document.getElementById('page').innerText")
+    assert "Thin sky-blue path, dashed in 2D: where the next motion would go; thick blue: the motion under way" in words
+    assert "whole: all of the machine, with letters as small as that takes; follow: letters that can be read" in words
+    page.tab("Live")

@@ -1,0 +1,69 @@
+"""Topics that become tables of the page: who changed which reference by how much, why a controller is paused, and what
+the recogniser believes."""
+
+import pytest
+from coglab_console.ros import tables
+from coglab_msgs.msg import (
+    FeedbackControllerState,
+    FeedbackControllerStatus,
+    FeedbackCorrection,
+    FeedbackState,
+    FeedbackStatus,
+    Recognition,
+)
+from rospy import Time
+
+
+@pytest.fixture
+def shown(monkeypatch):
+    """Tables without a master, and the documents that they put."""
+    documents = {}
+    monkeypatch.setattr(tables.rospy, "Subscriber", lambda *_arguments, **_options: None)
+    return tables.Tables(documents.__setitem__), documents
+
+
+def test_who_changed_what_by_how_much_in_execution_order(shown):
+    table, documents = shown
+    message = FeedbackState(cycle=12)
+    message.corrections = [
+        FeedbackCorrection(controller="yield", signal="pose/ee", size=0.01234567, angle=0.1234567),
+        FeedbackCorrection(controller="limit", signal="velocity/arm", size=2.0),
+    ]
+    message.states = [
+        FeedbackControllerState(controller="yield", names=["force", "on"], values=[3.1234567, 1.0], units=["N", "1"])
+    ]
+    table._on_feedback_state(message)
+    assert documents["attribution"] == {
+        "cycle": 12,
+        "rows": [
+            {"controller": "yield", "signal": "pose/ee", "size": 0.012346, "angle": 0.12346},
+            {"controller": "limit", "signal": "velocity/arm", "size": 2.0, "angle": 0.0},
+        ],
+        "inside": [{"controller": "yield", "values": [["force", 3.12346, "N"], ["on", 1.0, "1"]]}],
+    }
+
+
+def test_attribution_is_bounded(shown):
+    """A message of somebody else must not fill the page."""
+    table, documents = shown
+    many = FeedbackControllerState(controller="x", names=["n"] * 500, values=[0.0] * 500, units=["1"] * 500)
+    table._on_feedback_state(FeedbackState(states=[many] * 500, corrections=[FeedbackCorrection()] * 500))
+    found = documents["attribution"]
+    assert (len(found["rows"]), len(found["inside"]), len(found["inside"][0]["values"])) == (64, 32, 20)
+
+
+def test_controllers_with_their_pauses_and_recognition_with_its_confidences(shown):
+    table, documents = shown
+    limit = FeedbackControllerStatus(name="limit", stage="joint", paused=True, pause_reasons=["user"], faults=2)
+    table._on_feedback_status(FeedbackStatus(profile="dmp", controllers=[limit]))
+    assert documents["feedback"]["profile"] == "dmp"
+    (row,) = documents["feedback"]["rows"]
+    assert (row["name"], row["stage"], row["paused"], row["reasons"], row["faults"]) == (
+        "limit", "joint", True, ["user"], 2
+    )  # fmt: skip
+    message = Recognition(pattern="high", decided=True, progress=0.456, names=["low", "high"])
+    message.probabilities, message.header.stamp = [0.096, 0.904], Time(7, 500_000_000)
+    table._on_recognition(message)
+    assert documents["recognition"] == {
+        "pattern": "high", "decided": True, "stamp": 7.5, "progress": 0.46, "rows": [["low", 0.1], ["high", 0.9]]
+    }  # fmt: skip

@@ -1,0 +1,157 @@
+"""What the pages Feedback, Primitives, Objects and Contact show is what was sent, in words and numbers; in a real
+browser with a double in place of the robot."""
+
+import shutil
+import time
+
+import pytest
+from coglab_console.browser import press_and_hold
+from page_double import STATUS, Desk
+
+pytestmark = pytest.mark.skipif(
+    shutil.which("chromedriver") is None, reason="chromium-driver is missing: ./coglab install browser"
+)
+TABLE = (
+    "return [...[...document.querySelectorAll('#page table')][arguments[0]].querySelectorAll('tbody tr')]"
+    ".map((row) => [...row.children].map((cell) => cell.innerText))"
+)
+# Name, share of the row's width that is filled, place of the black line in it, and the number beside it.
+BARS = (
+    "return [...document.querySelectorAll('#page .bar')].map((row) => { const [name, track, value] = row.children;"
+    " const inner = track.clientWidth, of = (one) => one && one.getBoundingClientRect();"
+    " const fill = of(track.querySelector('i')), line = of(track.querySelector('b')), box = of(track);"
+    " return [name.innerText, fill.width / inner, line && (line.left - box.left) / inner, value.innerText]; })"
+)
+
+
+@pytest.fixture(scope="module")
+def desk(tmp_path_factory):
+    found = Desk(tmp_path_factory.mktemp("console"))
+    yield found
+    found.close()
+
+
+def controller(name, **more):
+    row = {"name": name, "type": "t", "stage": "task", "enabled": True, "paused": False, "safety": False, "waiting": "",
+           "activity": "active", "reasons": [], "fault": "", "faults": 0, "overruns": 0}  # fmt: skip
+    return {**row, **more}
+
+
+def test_feedback_controllers_by_order_with_activity_pauses_and_who_changed_what(desk):
+    page = desk.browser
+    page.tab("Feedback")
+    yields = controller("yield", activity="waits", waiting="for the wrench", faults=2, overruns=7)
+    reasons = ["the hand closes", "the arm stands still"]
+    limit = controller("limit", stage="safety", paused=True, activity="paused", reasons=reasons, fault="NaN in x")
+    rows = [
+        {"controller": "yield", "signal": "velocity", "size": 0.0125, "angle": 0.034},
+        {"controller": "limit", "signal": "stiffness", "size": 12.5, "angle": 0.0},
+    ]
+    inside = [{"controller": "yield", "values": [["force", 3.25, "N"], ["offset", 0.004, "m"]]}]
+    desk.put(feedback={"profile": "approach", "rows": [yields, limit]}, attribution={"rows": rows, "inside": inside})
+    page.until("return document.querySelectorAll('#page table').length === 2", 10.0)
+    shown = page.js(TABLE, 0)
+    assert [row[:6] for row in shown] == [
+        ["1", "yield", "task", "waits for the wrench", "·", "2 / 7"],
+        ["2", "limit", "safety", "paused", "the hand closes; the arm stands still; fault: NaN in x", "0 / 0"],
+    ]
+    assert [row[6].split() for row in shown] == [["disable", "pause"], ["disable", "resume"]]
+    assert page.js("return document.getElementById('feedback-profile').innerText") == "Profile: approach"
+    assert page.js(TABLE, 1) == [["yield", "velocity", "0.0125", "0.034"], ["limit", "stiffness", "12.5", "0"]]
+    assert "yield: force 3.25 N, offset 0.004 m" in page.js("return document.getElementById('page').innerText")
+    # Another order is another table, and nobody's correction is said to be nobody's.
+    desk.put(feedback={"profile": "", "rows": [limit, yields]}, attribution={"rows": [], "inside": []})
+    page.until("return document.getElementById('page').innerText.includes('Nobody changed a reference.')", 10.0)
+    assert [row[:2] for row in page.js(TABLE, 0)] == [["1", "limit"], ["2", "yield"]]
+    assert page.js("return document.getElementById('feedback-profile').innerText") == "Profile: none"
+    page.tab("Live")
+
+
+def test_recognition_with_the_confidence_of_each_pattern(desk):
+    page = desk.browser
+    page.tab("Primitives")
+    rows = [["low", 0.07], ["high", 0.9], ["middle", 0.03]]
+    seen = {"pattern": "high", "decided": True, "progress": 0.4, "stamp": time.monotonic() - 7.0, "rows": rows}
+    desk.put(recognition=seen)
+    page.until("return document.querySelectorAll('#page .bar').length === 3", 10.0)
+    bars = page.js(BARS)
+    assert [[name, value] for name, _, _, value in bars] == [["low", "0.07"], ["high", "0.90"], ["middle", "0.03"]]
+    assert [width for _, width, _, _ in bars] == pytest.approx([0.07, 0.9, 0.03], abs=0.01)
+    words = page.js("return document.getElementById('page').innerText")
+    assert "Decided: high, 40 % of the reach seen, 7 s ago" in words
+    desk.put(recognition={**seen, "decided": False})
+    page.until("return document.getElementById('page').innerText.includes('Not decided: high')", 10.0)
+    page.tab("Live")
+
+
+def test_objects_with_what_the_database_has_against_a_file(desk):
+    page = desk.browser
+    page.tab("Objects")
+    sizes = {"mug": {"type": "cylinder", "radius": 0.04, "height": 0.1}, "box": {"type": "box"}}
+    rows = [
+        {
+            "id": name,
+            "name": f"a {name}",
+            "mass": mass,
+            "shape": sizes[name],
+            "size": [0.1] * 3,
+            "text": f"id: {name}\n",
+        }
+        for name, mass in (("box", 0.5), ("mug", 0.25))
+    ]
+    problem = "ball.yaml: mass: -1 is less than the minimum of 0"
+    desk.put(objects={"rows": rows, "asked": True, "problems": [problem]})
+    page.until("return document.getElementById('object-problems').innerText.includes('ball.yaml')", 10.0)
+    assert page.js("return document.getElementById('object-problems').innerText") == f"▲{problem}"
+    assert [row[:4] for row in page.js(TABLE, 0)] == [
+        ["box", "a box", "0.5", "box"],
+        ["mug", "a mug", "0.25", "cylinder"],
+    ]
+    assert page.js("return document.querySelector('#page pre').innerText").strip() == "id: box"
+    page.js("document.querySelector('#page [aria-label=\"Show mug\"]').click()")
+    assert page.js("return document.querySelector('#page pre').innerText").strip() == "id: mug"
+    desk.put(objects={"rows": rows, "asked": True, "problems": []})
+    page.until(
+        "return document.getElementById('object-problems').innerText.includes('2 objects, every file fits')", 10.0
+    )
+    desk.put(objects={"rows": [], "asked": False, "problems": []})
+    page.until("return document.getElementById('object-problems').innerText.includes('has not been asked')", 10.0)
+    page.tab("Live")
+
+
+def test_contact_by_joint_against_its_threshold_and_learning(desk):
+    page = desk.browser
+    page.tab("Contact")
+    rate = [0.3, -0.15, 0.0, 0.9, 0.01, 0.0, 0.02]
+    threshold = [0.6, 0.3, 0.24, 0.6, 0.01, 0.36, 0.18]
+    watched = [True, True, False, True, False, False, False]
+    contact = {**STATUS["contact"], "k": 6.0, "samples": 321, "window": 0.04, "mode": "contact", "state": "watching"}
+    desk.state = {"rate": rate, "threshold": threshold, "watched": watched, "margin": 1.5}
+    desk.put(status={**STATUS, "contact": contact})
+    words = "return document.getElementById('page').innerText"
+    page.until(f"{words}.includes('321 samples')", 10.0)
+    page.until("return [...document.querySelectorAll('#page .bar')][3].innerText.includes('0.900')", 10.0)
+    bars = page.js(BARS)
+    names = ["A1 ●", "A2 ●", "E1 ○", "A3 ●", "A4 ○", "A5 ○", "A6 ○"]
+    assert [name for name, *_ in bars] == names
+    assert [value for *_, value in bars] == [f"{abs(value):.3f}" for value in rate]
+    # The bar's end is half as much again as the threshold, and 0.05 Nm at least.
+    ends = [max(1.5 * value, 0.05) for value in threshold]
+    full = [min(1.0, abs(value) / end) for value, end in zip(rate, ends, strict=True)]
+    assert [width for _, width, _, _ in bars] == pytest.approx(full, abs=0.02)
+    lines = [value / end for value, end in zip(threshold, ends, strict=True)]
+    assert [line for _, _, line, _ in bars] == pytest.approx(lines, abs=0.02)
+    shown = page.js(words)
+    assert "Change of the external torques within 40 ms, Nm" in shown and "Watching for contact: margin 1.50" in shown
+    assert "standard deviations A1 0.100, A2 0.050, E1 0.040" in shown and "k 6" in shown
+    assert "Learnt: 321 samples" in shown
+    desk.state = {**desk.state, "margin": None}
+    desk.put(status={**STATUS, "contact": {**contact, "learnt": False, "state": "waiting", "samples": 12}})
+    page.until(f"{words}.includes('Learning; leave the arm alone: 12 samples')", 10.0)
+    page.until(f"{words}.includes('Armed for contact; waits until the arm stands still')", 10.0)
+    button = page.js(
+        "return [...document.querySelectorAll('#page button')].find((b) => b.innerText === 'Learn anew at rest')"
+    )
+    press_and_hold(page, button, lambda: desk.robot.calls == [("contact_learn", {})])
+    desk.state = {}
+    page.tab("Live")
