@@ -49,16 +49,17 @@ def bench_wall():
 
 
 def test_a_wall_time_that_was_not_measured_is_missed_not_zero(bench_wall):
-    measured = {"setup": {"install_s": 70.0, "build_s": 300.0}, "first_demo": {"run_s": 30.0}}
-    figure, value = bench_wall.first_demo(measured)
-    assert value == 400.0 and "installation 70 s, build 300 s, first demo 30 s" in figure
-    for part, name in (("setup", "install_s"), ("setup", "build_s"), ("first_demo", "run_s")):
+    demo = {"install_s": 70.0, "build_s": 300.0, "run_s": 30.0, "installed": "120 of 140"}
+    figure, value = bench_wall.first_demo({"demo_from_nothing": demo})
+    assert value == 400.0 and "installation 70 s, build 300 s, first demo 30 s; 120 of 140 packages" in figure
+    for name in ("install_s", "build_s", "run_s"):
         for absent in (0.0, None):
-            times = {**measured, part: {**measured[part], name: absent}}
-            figure, value = bench_wall.first_demo(times)
+            figure, value = bench_wall.first_demo({"demo_from_nothing": {**demo, name: absent}})
             assert value is None and "not measured here" in figure
             row = bench_wall.row(figure, value, 600)
             assert row["value"] is None and not row["ok"]
+    apart = {"setup": {"install_s": 70.0, "build_s": 300.0}, "first_demo": {"run_s": 30.0}, "last_demo": demo}
+    assert bench_wall.first_demo(apart)[1] is None, "parts of several commands are no sum"
     assert bench_wall.first_demo({})[1] is None
     said = "from `controller new --motion` to an arm that has moved: 21.4 s, of them to build 15.0 s\n"
     assert bench_wall.new_motion(said + "1 passed, 1 deselected in 25 s") == 21.4
@@ -66,21 +67,26 @@ def test_a_wall_time_that_was_not_measured_is_missed_not_zero(bench_wall):
         assert bench_wall.new_motion(output) is None
 
 
-def test_what_combined_conditions_add_is_the_sum_of_all_of_them_or_missed(bench_wall):
-    names = [bench_wall.program_of(package, name) for package, all_of in bench_wall.COMBINED.items() for name in all_of]
-    times = {"last_test": {"programs": {**dict.fromkeys(names, 1.5), "coglab_sim/test_plant.py": 100.0}}}
-    figure, value = bench_wall.combined(times)
+@pytest.mark.parametrize("group", ["COMBINED", "WORLD"])
+def test_what_named_programs_add_is_the_sum_of_all_of_them_or_missed(bench_wall, group):
+    programs = getattr(bench_wall, group)
+    names = [bench_wall.program_of(package, name) for package, all_of in programs.items() for name in all_of]
+    times = {"last_test": {"programs": {**dict.fromkeys(names, 1.5), "coglab_sim/test_wire.py": 100.0}}}
+    figure, value = bench_wall.added(times, programs, "it")
     assert value == 1.5 * len(names) and f"{len(names)} programs" in figure
     del times["last_test"]["programs"][names[3]]
     for known in (times, {"last_test": {}}, {}):
-        figure, value = bench_wall.combined(known)
+        figure, value = bench_wall.added(known, programs, "it")
         assert value is None and not bench_wall.row(figure, value, 45.0)["ok"]
 
 
-def test_every_program_of_combined_conditions_is_one_that_the_test_run_finds(bench_wall, tmp_path):
+@pytest.mark.parametrize("group", ["COMBINED", "WORLD"])
+def test_every_program_that_is_named_is_one_that_the_test_run_finds(bench_wall, tmp_path, group):
     top = Path(__file__).resolve().parents[4]
     found = wall_times(find_programs(top, tmp_path, sys.executable, []))
-    named = {bench_wall.program_of(package, name) for package, names in bench_wall.COMBINED.items() for name in names}
+    named = {
+        bench_wall.program_of(package, name) for package, names in getattr(bench_wall, group).items() for name in names
+    }
     assert named - set(found) == set()
 
 

@@ -90,6 +90,21 @@ def test_a_value_that_is_missing_is_missed(checkout):
     assert "| not measured on these sources | <= 2 | **missed** |" in figures.page(checkout)
 
 
+@pytest.mark.parametrize("goal", [None, "", "told", "reported"])
+def test_what_has_no_goal_has_not_met_it(checkout, goal, capsys):
+    told = ROW | {"goal": goal}
+    assert figures.cells_of(figures.line_of("one", told))[3] == "-"
+    absent = figures.cells_of(figures.line_of("one", told | {"value": None, "figure": "gone (did not occur)"}))
+    assert absent[1] == absent[3] == "-"
+    assert figures.cells_of(figures.line_of("one", told | {"ok": False}))[3] == "**missed**", "its bench says so"
+    assert figures.cells_of(figures.line_of("one", told | {"value": None, "ok": False}))[3] == "**missed**"
+    latency = figures.line_of("fri", told | {"figure": "answer latency, p99"})
+    assert not figures.is_quoted(latency), "README.md shows what is judged"
+    assert "**Missed" not in figures.missed_besides(latency)
+    bench.print_table([told, ROW])
+    assert [line.split()[-1] for line in capsys.readouterr().out.splitlines()] == ["ok", "-", "ok"]
+
+
 def test_other_sources_make_a_figure_old_and_other_documents_do_not(checkout):
     figures.record(checkout, "one", [ROW], False)
     (checkout / "docs" / "page.md").write_text("words")
@@ -126,6 +141,29 @@ def test_only_what_a_bench_runs_makes_its_figure_old(checkout):
     (source / "other" / "code.py").write_text("a = 2\n")
     commit(checkout, "that changes")
     assert figures.measured(checkout, "one") is None
+
+
+def test_tests_and_equivalent_changes_make_the_figures_of_mutants_old(checkout):
+    for place in ("other/test/test_code.py", "p/test/a.test"):
+        figures.record(checkout, "mutants", [ROW], False)
+        assert figures.measured(checkout, "mutants") is not None
+        (checkout / "catkin_ws" / "src" / place).write_text("a = 1\n")
+        assert figures.measured(checkout, "mutants") is None, "changed and not committed"
+        commit(checkout, place)
+        assert figures.measured(checkout, "mutants") is None, place
+    figures.record(checkout, "mutants", [ROW], False)
+    (checkout / "catkin_ws" / "src" / "p" / "README.md").write_text("words")
+    commit(checkout, "a page")
+    assert figures.measured(checkout, "mutants") is not None
+    (checkout / figures.EQUIVALENT).write_text("[]\n")
+    commit(checkout, "the list")
+    assert figures.measured(checkout, "mutants") is None
+
+
+def test_the_page_says_how_mutants_are_drawn_and_what_is_left_out(checkout):
+    text = figures.page(checkout).partition("## mutants")[2].partition("\n## ")[0]
+    for words in ("12 changes or more", "does not compile", "red on the unchanged sources", "cosmic-ray"):
+        assert words in " ".join(text.split())
 
 
 def test_what_was_reported_is_kept_for_who_has_not_measured(checkout):
@@ -171,9 +209,12 @@ UNIT = r"(?:ms|us|ns|s|min|minutes?|seconds?|h|%|mm|mrad|rad|deg|x|Nm|N|MB|kB|li
 NUMBER = re.compile(r"(?<![\w.])\d[\d.]*\s?" + UNIT + r"(?![\w/])")
 MEASURED = re.compile(
     r"\bmeasured\b|\bmedian\b|\bp95\b|\bpercentile\b|\btakes?\b|\btook\b|\bslowest\b|\bcosts?\b|\bfaster\b|\bslower\b"
-    r"|\bof \d+ (?:trials|runs|seeds|handovers|reaches)\b|\bon average\b|\bin a run\b",
+    r"|\b(?:of|in|over) \d+ (?:\w+ )?(?:trials|runs|seeds|handovers|reaches|stops|streams|people)\b"
+    r"|\bon average\b|\bin a run\b|\bcomes? within\b|\*\*missed\*\*",
     re.I,
 )
+# A row with a cell that is nothing but a figure; one that begins with a name of the code says what a setting is.
+FIGURE_ROW = re.compile(r"^\|(?! `).*\| *[<>=~]* ?\d[\d.]*\s?" + UNIT + r" *\|")
 COMMAND = re.compile(
     r"\./coglab (?:bench|test|demo)|docker/prove_bare|docs/count_lines|code_size|\bbench_\w+|\btest_\w+|_rostest"
     r"|figures\.md"
@@ -209,19 +250,31 @@ def passages(text: str) -> list[str]:
     return re.split(r"\n\s*\n|\n(?=[*-] |\d+\. |\|)", text)
 
 
+def named_by(passage: str, before: str, page: str) -> bool:
+    """Whether the command is named where it has to be: in the passage, or, of a row, in the paragraph before its table,
+    or at least anywhere on its page where the row does not speak of measuring."""
+    if not passage.startswith("|"):
+        return COMMAND.search(passage) is not None
+    where = f"{before} {passage}" if MEASURED.search(passage) else page
+    return COMMAND.search(where) is not None
+
+
 def unprinted(path: Path) -> list[str]:
-    """Passages with a measured figure and without the command that prints it."""
+    """Passages with a measured figure and without the command that prints it; every row of a table with a figure of its
+    own, too, where its page has no command at all."""
     excused = [words for name, all_words in SOURCED.items() if str(path).endswith(name) for words in all_words]
-    found = []
-    for passage in passages(path.read_text(encoding="utf-8")):
+    found, before, page = [], "", path.read_text(encoding="utf-8")
+    for passage in passages(page):
         flat = " ".join(passage.split())
+        row = flat.startswith("|")
         if (
-            MEASURED.search(flat)
+            (MEASURED.search(flat) or FIGURE_ROW.search(flat))
             and NUMBER.search(flat)
-            and not COMMAND.search(flat)
+            and not named_by(flat, before, page)
             and not any(w in flat for w in excused)
         ):
             found.append(f"{path.name}: {flat[:160]}")
+        before = before if row else flat
     return found
 
 
@@ -235,6 +288,27 @@ def test_a_figure_without_a_command_is_found(tmp_path):
     page = tmp_path / "page.md"
     page.write_text("A step takes 3 us.\n\nThe limit is 3 us.\n\nA step takes 3 us (`./coglab bench dmp`).\n")
     assert unprinted(page) == ["page.md: A step takes 3 us."]
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "| a | b |\n| --- | --- |\n| scaling | lets the error grow to 188 mm in 300 random reaches |\n",
+        "Mean and largest of 1000 stops at 10 % loss:\n",
+        "| period | now |\n| --- | --- |\n| slow | 1.307 s |\n",
+        "Stops (`./coglab bench fri`).\n\nOthers:\n\n| a | b |\n| --- | --- |\n| 5 ms | 1.79 **missed** |\n",
+        "That test comes within 2 mrad of the bound.\n",
+    ],
+)
+def test_a_figure_of_a_row_or_of_some_reaches_needs_a_command(tmp_path, text):
+    page = tmp_path / "page.md"
+    page.write_text(text)
+    assert len(unprinted(page)) == 1
+    if "Others:" in text:
+        page.write_text(text.replace("Others:", "Others (`./coglab bench fri`):"))
+    else:
+        page.write_text(f"All by `./coglab bench --long fri`: {text}")
+    assert unprinted(page) == []
 
 
 def test_every_measured_figure_of_a_document_has_a_command_that_prints_it():

@@ -20,6 +20,7 @@ TABLES = re.compile(r"PYBIND11_MODULE|bind[A-Z]\w*|makeTable|\w+::describe")
 LONG: dict[str, str] = {
     "coglab_controllers/test/thread_stress.cpp": "threads that share locals",
     "ctrl_more/test/thread_stress.cpp": "threads that share locals",
+    "coglab_controllers/src/coglab_controllers/_core.pyi": "Python reads the types of one compiled module in one stub",
 }
 # Classes with more public methods of their own than the limit, and why they stay; docs/house.md says it, too.
 MANY_METHODS = {
@@ -98,6 +99,22 @@ def test_nothing_is_excused_that_needs_no_excuse():
         assert lines > FILE_LIMIT or any(n > FUNCTION_LIMIT for _, n, _ in functions(path)), name
 
 
+def test_nothing_is_installed_that_only_tests_and_benches_use():
+    rules = [*SOURCES.rglob("CMakeLists.txt"), *SOURCES.rglob("*.cmake")]
+    found = []
+    for path in rules:
+        text = re.sub(r"#[^\n]*", "", path.read_text(encoding="utf-8"))
+        made = (
+            r"(?:add_executable|add_library|pybind11_add_module)\((\w+)[^)]*?\s(?:bench|test|examples/motions)/[^)]*\)"
+        )
+        targets = set(re.findall(made, text))
+        for block in re.findall(r"install(?:_python)?\(([^)]*)\)", text):
+            found += [
+                f"{shown(path)}: {word}" for word in block.split() if word in targets or word.startswith("bench/")
+            ]
+    assert len(rules) > 15 and not found, found
+
+
 def test_cpp_is_formatted():
     assert shutil.which("clang-format"), "clang-format is missing: ./coglab install test"
     files = [str(p) for p in SOURCES.rglob("*") if p.suffix in (".cpp", ".hpp")]
@@ -125,3 +142,13 @@ def test_cpp_tests_are_named_in_one_style():
         if not name[0].isupper()
     ]
     assert not wrong, f"UpperCamel, as the others: {wrong[:10]}"
+
+
+def test_no_test_is_skipped_because_something_of_ours_is_not_built():
+    """A build that lost a library would be green; what is missing is a failure that says what to build."""
+    wrong = [
+        f"{shown(path)}: {found}"
+        for path in SOURCES.rglob("test_*.py")
+        for found in re.findall(r"pytest\.skip\([^)]*\bis not built\b[^)]*\)", path.read_text(encoding="utf-8"))
+    ]
+    assert not wrong, "\n".join(wrong)

@@ -238,23 +238,41 @@ def test_an_end_in_the_middle_leaves_the_file_as_it_was(tmp_path):
 
 def test_the_copy_follows_the_checkout_and_nothing_flows_back(tmp_path):
     top, copy = tmp_path / "top", tmp_path / "top" / ".coglab" / "copy"
-    (top / "src").mkdir(parents=True)
+    source = top / "catkin_ws" / "src"
+    source.mkdir(parents=True)
     (top / "out").mkdir()
-    (top / "src" / "a.py").write_text("a = 1\n")
-    (top / "src" / "b.py").write_text("b = 1\n")
+    (source / "a.py").write_text("a = 1\n")
+    (source / "b.py").write_text("b = 1\n")
     (top / "out" / "c.py").write_text("c = 1\n")
     digest = update_copy(top, copy)
-    (copy / "src" / "a.py").write_text("a = 2\n")  # a run that was killed in the middle
-    (copy / "src" / "stray.py").write_text("")
+    (copy / "catkin_ws" / "src" / "a.py").write_text("a = 2\n")  # a run that was killed in the middle
+    (copy / "catkin_ws" / "src" / "stray.py").write_text("")
     (copy / ".coglab").mkdir()
     (copy / ".coglab" / "built.all").write_text("")
-    kept = (copy / "src" / "b.py").stat().st_mtime_ns
+    kept = (copy / "catkin_ws" / "src" / "b.py").stat().st_mtime_ns
     assert update_copy(top, copy) == digest
-    assert (copy / "src" / "a.py").read_text() == (top / "src" / "a.py").read_text() == "a = 1\n"
-    assert not (copy / "src" / "stray.py").exists() and not (copy / "out").exists()
-    assert (copy / ".coglab" / "built.all").exists() and (copy / "src" / "b.py").stat().st_mtime_ns == kept
-    (top / "src" / "b.py").write_text("b = 2\n")
+    assert (copy / "catkin_ws" / "src" / "a.py").read_text() == (source / "a.py").read_text() == "a = 1\n"
+    assert not (copy / "catkin_ws" / "src" / "stray.py").exists() and not (copy / "out").exists()
+    assert (copy / ".coglab" / "built.all").exists() and (
+        copy / "catkin_ws" / "src" / "b.py"
+    ).stat().st_mtime_ns == kept
+    (source / "b.py").write_text("b = 2\n")
     assert update_copy(top, copy) != digest
+
+
+def test_a_changed_word_in_a_document_throws_no_campaign_away(tmp_path):
+    top, copy = tmp_path / "top", tmp_path / "copy"
+    for name in ("catkin_ws/src/p/README.md", "catkin_ws/src/p/test/test_a.py", "docs/a.json", "README.md", "coglab"):
+        (top / name).parent.mkdir(parents=True, exist_ok=True)
+        (top / name).write_text("one\n")
+    digest = update_copy(top, copy)
+    for name in ("catkin_ws/src/p/README.md", "docs/a.json", "README.md"):
+        (top / name).write_text("two\n")
+        assert update_copy(top, copy) == digest and (copy / name).read_text() == "two\n"
+    for name in ("coglab", "catkin_ws/src/p/test/test_a.py"):
+        (top / name).write_text("two\n")
+        digest, before = update_copy(top, copy), digest
+        assert digest != before, name
 
 
 def test_options():

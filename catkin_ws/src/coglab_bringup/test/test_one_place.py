@@ -20,6 +20,11 @@ OTHER_READERS = {
     "coglab_console/src/coglab_console/ros/commands.py": "shows all parameters there are",
     "coglab_bringup/src/coglab_bringup/ask.py": "a command beside the system, no node",
 }
+# What reads YAML otherwise than coglab_py.yaml_file, and why.
+OTHER_YAML_READERS = {
+    "coglab_bringup/src/coglab_bringup/handover.py": "an entry that the database has judged and answered with",
+    "coglab_console/src/coglab_console/ros/knowledge.py": "what database and brain have judged before",
+}
 # What names an arm, its robot controller or its wire.
 ARM_WORDS = re.compile(r"\b(?:FRI|KRC|KRL|KUKA|LWR|fri|krc|kuka)\b|\bdatagrams?\b")
 # Where the two back ends are told apart, by name.
@@ -41,6 +46,13 @@ def test_parameters_of_ros_have_one_reader_in_each_language():
         if str(path.relative_to(SOURCES).parent) not in own and pattern.search(without_comments(path))
     }
     assert found == set(OTHER_READERS), found ^ set(OTHER_READERS)
+
+
+def test_yaml_has_one_reader_in_python():
+    paths = [p for p in code("*/src", "*/scripts", "*/*/src", suffixes=(".py",)) if p.name != "yaml_file.py"]
+    otherwise = re.compile(r"\byaml\.(?:safe_|full_|unsafe_)?load\w*\(|\byaml\.\w*Loader\b")
+    found = {str(path.relative_to(SOURCES)) for path in paths if otherwise.search(without_comments(path))}
+    assert len(paths) > 150 and found == set(OTHER_YAML_READERS), found ^ set(OTHER_YAML_READERS)
 
 
 def without_comments(path: Path) -> str:

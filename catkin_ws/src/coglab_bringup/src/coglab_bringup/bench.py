@@ -59,7 +59,8 @@ def as_text(value: object) -> str:
 
 def print_table(rows: list[dict]) -> None:
     """Prints rows in aligned columns."""
-    cells = [[as_text(row[column]) for column in COLUMNS] for row in rows]
+    shown = [{**row, "ok": None if figures.verdict(row) == figures.UNJUDGED else row["ok"]} for row in rows]
+    cells = [[as_text(row[column]) for column in COLUMNS] for row in shown]
     widths = [max(len(column), *(len(line[i]) for line in cells)) for i, column in enumerate(COLUMNS)]
     for line in [list(COLUMNS), *cells]:
         print("  ".join(cell.ljust(width) for cell, width in zip(line, widths, strict=False)).rstrip(), flush=True)

@@ -21,11 +21,11 @@ _PIECES = re.compile(
 
 
 def source_files(top: Path) -> Iterator[Path]:
-    """Python, C++ and JavaScript below `top`; a Python script may have no suffix."""
+    """Python and its stubs, C++ and JavaScript below `top`; a Python script may have no suffix."""
     for path in sorted(top.rglob("*")):
         if not path.is_file() or SKIPPED & set(path.parts):
             continue
-        if path.suffix in (".py", ".cpp", ".hpp", ".js") or _is_script(path):
+        if path.suffix in (".py", ".pyi", ".cpp", ".hpp", ".js") or _is_script(path):
             yield path
 
 
@@ -80,7 +80,7 @@ def public_methods(path: Path) -> Iterator[tuple[int, set[str], str]]:
     text = path.read_text(encoding="utf-8", errors="replace")
     if path.suffix in (".cpp", ".hpp"):
         yield from _classes_by_braces(_blanked(text))
-    elif path.suffix == ".py":
+    elif path.suffix in (".py", ".pyi"):
         for node in ast.walk(ast.parse(text)):
             if isinstance(node, ast.ClassDef):
                 names = {n.name for n in node.body if isinstance(n, (ast.FunctionDef, ast.AsyncFunctionDef))}

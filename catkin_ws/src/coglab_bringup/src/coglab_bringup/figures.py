@@ -7,7 +7,8 @@ between the two marks are taken from that page: what `is_quoted` says of the ben
 what is missed besides.
 
 The sources of a bench are its package, the packages that its own files name, what all these depend on (package.xml),
-and `coglab`; documents and tests are none. Programs beside the tests, which benches share with them, are.
+and `coglab`; documents and tests are none. Programs beside the tests, which benches share with them, are. Those of
+`mutants` are all packages with their tests, which are what it measures, and its list of equivalent changes.
 """
 
 from __future__ import annotations
@@ -29,15 +30,19 @@ from coglab_bringup.arguments import find_benches, package_folders
 
 NOT_MEASURED = "not measured on these sources"
 ALL_ROWS = "all of its rows"
+MET, MISSED, UNJUDGED = "met", "**missed**", "-"
+NO_GOAL = (None, "", "told", "reported")
+"""what stands for the goal of a row that is shown and not judged"""
 BEGIN, END = "<!-- quoted from docs/figures.md -->", "<!-- end of the quotation -->"
 KEPT = "docs/figures.json"
+MUTANTS, EQUIVALENT = "mutants", "docs/equivalent_mutants.json"
 QUOTED = ("wall", "fri", "trials")
 """the benches of which README.md shows rows; of the others it says how many are missed"""
 HEAD = """# Figures
 
 Written by `./coglab bench --report`, from what `./coglab bench NAME ...` has measured on these sources; edit nothing
-here. A row that misses its goal stays and says so. A bench that was not run on its sources as they are (its package and
-those that it uses, tests and documents apart) counts as missed.
+here. A row that misses its goal stays and says so; one without a goal has met none and says "-". A bench that was not
+run on its sources as they are (its package and those that it uses, tests and documents apart) counts as missed.
 Definitions, goals and peers are fixed before anything is measured: they stand in the bench itself.
 """
 TABLE = "| figure | value | goal | | peer | its value |\n| --- | --- | --- | --- | --- | --- |"
@@ -64,11 +69,11 @@ def _needed(packages: dict[str, Path], files: list[Path]) -> list[Path]:
     return [packages[name] for name in found or packages]
 
 
-def _is_source(path: str) -> bool:
-    """Whether a figure may depend on this file: documents and tests measure nothing."""
+def _is_source(path: str, tests: bool = False) -> bool:
+    """Whether a figure may depend on this file: documents measure nothing, nor do tests but where they are measured."""
     folder, _, name = path.rpartition("/")
     test = f"{folder}/".count("/test/") and (name.startswith("test_") or name.endswith((".test", "_rostest.py")))
-    return not (test or name.endswith(".md"))
+    return not (test and not tests or name.endswith(".md"))
 
 
 def sources_of(top: Path, bench: str) -> dict[str, str]:
@@ -76,8 +81,12 @@ def sources_of(top: Path, bench: str) -> dict[str, str]:
     source = top / "catkin_ws" / "src"
     folders = _needed(package_folders(source), find_benches(source).get(bench, []))
     places = ["coglab", *sorted(str(folder.relative_to(top)) for folder in folders)]
-    changed = any(_is_source(line[3:]) for line in _git(top, "status", "--porcelain", "--", *places).splitlines())
-    files = [line for line in _git(top, "ls-tree", "-r", "HEAD", "--", *places).splitlines() if _is_source(line)]
+    tests = bench == MUTANTS
+    places += [EQUIVALENT] if tests else []
+    changed = any(
+        _is_source(line[3:], tests) for line in _git(top, "status", "--porcelain", "--", *places).splitlines()
+    )
+    files = [line for line in _git(top, "ls-tree", "-r", "HEAD", "--", *places).splitlines() if _is_source(line, tests)]
     digest = hashlib.sha256("\n".join(files).encode()).hexdigest() if files else ""
     return {
         "commit": _git(top, "rev-parse", "--short=7", "HEAD") + (" with changes" if changed else ""),
@@ -142,19 +151,29 @@ def _cell(value: object) -> str:
     return "-" if value in (None, "") else str(value).replace("|", "\\|").replace("\n", " ")
 
 
+def verdict(row: dict) -> str:
+    """Whether a row has met its goal; what has none cannot meet it, but what its bench says is wrong is missed."""
+    if not row["ok"]:
+        return MISSED
+    if row["goal"] in NO_GOAL:
+        return UNJUDGED
+    return MET if row["value"] is not None else MISSED
+
+
 def line_of(bench: str, row: dict) -> str:
-    """One row of a table; a value that is missing is a missed one."""
-    value = NOT_MEASURED if row["value"] is None else f"{_cell(row['value'])} {row['unit'] or ''}".strip()
-    verdict = "met" if row["ok"] and row["value"] is not None else "**missed**"
+    """One row of a table; a value that is missing is a missed one, where there is a goal."""
+    judged = verdict(row)
+    absent = "-" if judged == UNJUDGED else NOT_MEASURED
+    value = absent if row["value"] is None else f"{_cell(row['value'])} {row['unit'] or ''}".strip()
     peer, peer_value = _cell(row["peer"]), _cell(row["peer_value"])
-    return f"| {bench}: {_cell(row['figure'])} | {value} | {_cell(row['goal'])} | {verdict} | {peer} | {peer_value} |"
+    return f"| {bench}: {_cell(row['figure'])} | {value} | {_cell(row['goal'])} | {judged} | {peer} | {peer_value} |"
 
 
 def lines_of(top: Path, name: str) -> list[str]:
     """The rows of a bench; a single one where it was not measured."""
     run = measured(top, name)
     if run is None:
-        return [f"| {name}: {ALL_ROWS} | {NOT_MEASURED} | as in the bench | **missed** | - | - |"]
+        return [f"| {name}: {ALL_ROWS} | {NOT_MEASURED} | as in the bench | {MISSED} | - | - |"]
     return [line_of(name, row) for row in run["rows"]]
 
 
@@ -162,15 +181,10 @@ def page(top: Path) -> str:
     """The whole text of docs/figures.md."""
     parts = [HEAD]
     benches = find_benches(top / "catkin_ws" / "src")
-    benches["mutants"] = []
+    benches[MUTANTS] = [Path(__file__).with_name("mutants.py")]
     for name, paths in sorted(benches.items()):
         run = measured(top, name)
-        text = (
-            definition(paths)
-            if paths
-            else "Changed lines that a test notices: `coglab_bringup/mutants.py`, all packages."
-        )
-        parts.append(f"## {name}\n\n{text}\n")
+        parts.append(f"## {name}\n\n{definition(paths)}\n")
         if run is not None:
             kind = "with --long" if run["long"] else "as sampled by default"
             parts.append(
@@ -184,7 +198,7 @@ def page(top: Path) -> str:
 def cells_of(line: str) -> list[str]:
     """The six cells of a row of this page; none for any other line."""
     cells = [cell.strip() for cell in re.split(r"(?<!\\)\|", line)[1:-1]]
-    return cells if len(cells) == 6 and cells[3] in ("met", "**missed**") else []
+    return cells if len(cells) == 6 and cells[3] in (MET, MISSED, UNJUDGED) else []
 
 
 def is_quoted(line: str) -> bool:
@@ -192,7 +206,7 @@ def is_quoted(line: str) -> bool:
     cells = cells_of(line)
     if not cells or cells[0].partition(": ")[0] not in QUOTED:
         return False
-    return cells[3] == "**missed**" or (cells[0].startswith("fri: answer latency") and cells[2] != "reported")
+    return cells[3] == MISSED or (cells[0].startswith("fri: answer latency") and cells[2] not in ("-", *NO_GOAL))
 
 
 def missed_besides(text: str) -> str:
@@ -201,7 +215,7 @@ def missed_besides(text: str) -> str:
     missed: Counter[str] = Counter()
     for line in text.splitlines():
         cells = cells_of(line)
-        if cells and cells[3] == "**missed**" and not is_quoted(line):
+        if cells and cells[3] == MISSED and not is_quoted(line):
             bench = cells[0].partition(": ")[0]
             if cells[0] == f"{bench}: {ALL_ROWS}":
                 not_measured.append(bench)
@@ -231,7 +245,7 @@ def write_report(top: Path) -> Path:
     target, readme = top / "docs" / "figures.md", top / "README.md"
     text = page(top)
     target.write_text(text, encoding="utf-8")
-    runs = {name: run for name in [*find_benches(top / "catkin_ws" / "src"), "mutants"] if (run := measured(top, name))}
+    runs = {name: run for name in [*find_benches(top / "catkin_ws" / "src"), MUTANTS] if (run := measured(top, name))}
     (top / KEPT).write_text(json.dumps(runs, indent=1, sort_keys=True) + "\n", encoding="utf-8")
     readme.write_text(with_quotation(readme.read_text(encoding="utf-8"), quotation(text)), encoding="utf-8")
     return target

@@ -15,7 +15,8 @@ BUILD_LIMIT = 3600.0  # s
 
 
 def update_copy(top: Path, copy: Path) -> str:
-    """Makes the copy hold the files of the checkout, touching none that is the same; a digest of them all."""
+    """Makes the copy hold the files of the checkout, touching none that is the same; a digest of its sources and tests:
+    what lies in catkin_ws/src, and `coglab`, but for pages."""
     digest, there = hashlib.sha256(), set()
     for folder, names, files in os.walk(top):
         names[:] = sorted(name for name in names if name not in NOT_COPIED and not (Path(folder) / name).is_symlink())
@@ -25,7 +26,8 @@ def update_copy(top: Path, copy: Path) -> str:
             if path.is_symlink():  # catkin's own, made anew by the build
                 continue
             content = path.read_bytes()
-            digest.update(str(relative).encode() + b"\0" + hashlib.sha256(content).digest())
+            if path.suffix != ".md" and (relative.parts[:2] == ("catkin_ws", "src") or str(relative) == "coglab"):
+                digest.update(str(relative).encode() + b"\0" + hashlib.sha256(content).digest())
             target = copy / relative
             there.add(target)
             if not target.is_file() or target.read_bytes() != content:

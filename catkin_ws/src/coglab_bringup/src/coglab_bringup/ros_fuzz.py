@@ -16,6 +16,7 @@ import re
 import threading
 import time
 from collections import Counter
+from collections.abc import Collection, Container
 from dataclasses import dataclass, field
 from typing import Any
 from xmlrpc.client import ServerProxy
@@ -49,6 +50,18 @@ ODD = (
     "\x1b[2J",
     "x" * 65536,
 )
+ACCEPTING = frozenset(
+    {
+        "/controller_manager/dmp/cancel",
+        "/controller_manager/ptp/cancel",
+        "/perception/init_vision",
+        "/perception/locate_object",
+        "/perception/free_places",
+    }
+)
+"""services that may answer a request with an excluded value with success. All have a time limit that may be any number:
+cancel is never refused, and what is no time that one can wait means its own time limit; to perception it means none, or
+the longest that it waits."""
 JOINTS = ("lwr_a1", "lwr_a2", "lwr_e1", "lwr_a3", "lwr_a4", "lwr_a5", "lwr_a6")
 KNOWN = (
     "",
@@ -65,6 +78,7 @@ KNOWN = (
     "lwr_a1",
     "lwr_a2",
     "/coglab_master",
+    "reach_goal",
 )
 INTEGER = re.compile(r"(u?)int(8|16|32|64)$")
 BOUND = re.compile(r"(.*)\[(\d*)\]$")
@@ -223,6 +237,7 @@ class Fuzz:
         self.published = sorted(name for name, nodes in publishers if ours & set(nodes))
         self.pids = {node: self.pid(node) for node in self.nodes}
         self.report = Report()
+        self._runs = 0
         self._asked: dict[str, float] = {}
         self._lock = threading.Lock()
 
@@ -250,11 +265,16 @@ class Fuzz:
             listener.unregister()
         return heard
 
-    def run(self, per_topic: int, per_service: int, limit: float) -> Report:
-        """Sends so many messages to each; `limit` s for each answer of a service."""
+    def run(self, per_topic: int, per_service: int, limit: float, spared: Container[str] = ()) -> Report:
+        """Sends so many messages to each; `limit` s for each answer of a service. None to services that are spared.
+
+        What a second run finds is added to the report of the first.
+        """
+        self._runs += 1
+        called = {name: kind for name, kind in self.services.items() if name not in spared}
         threads = [
             threading.Thread(target=self._call, args=(name, kind, per_service, limit), daemon=True)
-            for name, kind in self.services.items()
+            for name, kind in called.items()
         ]
         for thread in threads:
             thread.start()
@@ -262,19 +282,19 @@ class Fuzz:
         end = time.monotonic() + limit + per_service * 0.5
         for thread in threads:
             thread.join(max(0.0, end - time.monotonic()))
-        alive = [name for thread, name in zip(threads, self.services, strict=True) if thread.is_alive()]
+        alive = [name for thread, name in zip(threads, called, strict=True) if thread.is_alive()]
         # Late or lost? Nobody asks anything else now.
         end = time.monotonic() + LAST_WAIT
         while time.monotonic() < end and any(self._waits(name) > limit for name in alive):
             time.sleep(0.5)
-        self.report.lost = [name for name in alive if self._waits(name) > limit]
-        for name in self.report.lost:
-            self.report.unanswered[name] += 1
+        lost = [name for name in alive if self._waits(name) > limit]
+        self.report.lost += lost
+        self.report.unanswered.update(lost)
         self.report.ended = [node for node in self.nodes if self.pid(node) != self.pids[node]]
         return self.report
 
     def _publish(self, count: int) -> None:
-        generator = Generator(self.seed)
+        generator = Generator(self.seed + 1000 * (self._runs - 1))
         publishers = {name: rospy.Publisher(name, kind, queue_size=200) for name, kind in self.topics.items()}
         time.sleep(0.7)  # for the subscribers to connect
         for number in range(count):
@@ -288,7 +308,7 @@ class Fuzz:
             publisher.unregister()
 
     def _call(self, name: str, kind: Any, count: int, limit: float) -> None:
-        generator = Generator(self.seed + hash_of(name))
+        generator = Generator(self.seed + hash_of(name) + 1000 * (self._runs - 1))
         proxy = rospy.ServiceProxy(name, kind)
         for number in range(count):
             request, what = generator.message(kind._request_class, number % 3 == 0)
@@ -326,27 +346,29 @@ def hash_of(name: str) -> int:
     return sum(i * ord(c) for i, c in enumerate(name, 1))
 
 
-def settle(limit: float) -> None:
+ARM = frozenset({"/lwr/command", "/controller_manager/load_controller"})
+WHOLE = ARM | {
+    "/coglab/start",
+    "/object_database/get_object",
+    "/perception/locate_object",
+    "/contact_detector/arm",
+    "/coglab_sim/cell/fault",
+    "/ih2_hand/stop",
+}
+"""services that are there when an arm with its controllers is up, and when the whole system is"""
+
+
+def settle(limit: float, wanted: Collection[str] = WHOLE) -> None:
     """Waits until the nodes of the system have registered what they offer: nothing new for 1 s, the last ones there.
 
     Raises RuntimeError naming what is missing.
     """
-    wanted = {
-        "/lwr/command",
-        "/coglab/start",
-        "/object_database/get_object",
-        "/perception/locate_object",
-        "/contact_detector/arm",
-        "/coglab_sim/cell/fault",
-        "/controller_manager/load_controller",
-        "/ih2_hand/stop",
-    }
     master, end, since, known = rosgraph.Master(rospy.get_name()), time.monotonic() + limit, time.monotonic(), None
     while time.monotonic() < end:
         state = master.getSystemState()
         if state != known:
             known, since = state, time.monotonic()
-        missing = wanted - {name for name, _ in state[2]}
+        missing = set(wanted) - {name for name, _ in state[2]}
         if not missing and time.monotonic() - since > 1.0:
             return
         time.sleep(0.2)

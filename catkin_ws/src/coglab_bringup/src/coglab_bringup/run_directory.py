@@ -100,10 +100,11 @@ def running_systems(top: Path) -> dict[int, str]:
 
 
 def record_times(top: Path, command: str, seconds: float, **parts: object) -> None:
-    """Keeps wall times (s) of the first and the last ./coglab demo or test on this machine, for ./coglab bench wall.
+    """Keeps wall times (s) of the last ./coglab demo or test of this checkout, for ./coglab bench wall.
 
-    `seconds` is the run itself; what installing and building took before it comes from the environment. `parts` of the
-    run are kept beside it.
+    `seconds` is the run itself; what installing and building took before it comes from the environment, where ./coglab
+    did them in the same command. `parts` of the run are kept beside it. A first demo is one alone: that of the command
+    which installed packages, built a checkout where nothing was built, and ran the first demo of it.
     """
     folder = top / ".coglab"
     folder.mkdir(exist_ok=True)
@@ -118,8 +119,8 @@ def record_times(top: Path, command: str, seconds: float, **parts: object) -> No
         "total_s": round(install + build + seconds, 1),
         **parts,
     }
-    times.setdefault(f"first_{command}", row)
+    from_nothing = install > 0.0 and build > 0.0 and os.environ.get("COGLAB_FIRST_BUILD") == "yes"
+    if command == "demo" and from_nothing and "last_demo" not in times:
+        times["demo_from_nothing"] = row | {"installed": os.environ.get("COGLAB_INSTALLED", "")}
     times[f"last_{command}"] = row
-    longest = times.setdefault("setup", {"install_s": 0.0, "build_s": 0.0})  # whichever command had to do it
-    longest.update(install_s=max(install, longest["install_s"]), build_s=max(build, longest["build_s"]))
     path.write_text(json.dumps(times, indent=1) + "\n")

@@ -1,4 +1,4 @@
-"""mypy on the Python that ships: strict on modules that import no ROS, plain on the others and on the nodes.
+"""mypy on the Python that ships: strict on modules and scripts that import no ROS, plain on the others.
 
 `python3 -m coglab_bringup.type_check`, with the folder of this package in PYTHONPATH; pre-commit and the tests run it.
 """
@@ -15,7 +15,8 @@ from pathlib import Path
 TOP = Path(__file__).resolve().parents[5]
 SOURCES = TOP / "catkin_ws" / "src"
 PACKAGES = ("coglab_py", "coglab_objects", "coglab_perception", "coglab_sim", "coglab_smach", "coglab_bringup",
-            "coglab_console", "ih2_hand", "executive_smach/smach", "executive_smach/smach_ros")  # fmt: skip
+            "coglab_console", "coglab_controllers", "ctrl_more", "ih2_hand",
+            "executive_smach/smach", "executive_smach/smach_ros")  # fmt: skip
 # Packages without types of their own, or whose calls are not typed.
 UNTYPED = {
     "selenium",
@@ -49,7 +50,7 @@ def typed_all_through(path: Path) -> bool:
 
 
 def shipped_files() -> tuple[list[Path], list[str]]:
-    """All files to check, and the names of those modules that are checked strictly."""
+    """All files to check, and the names of those modules and scripts that are checked strictly."""
     files: list[Path] = []
     strict: list[str] = []
     for package in PACKAGES:
@@ -58,7 +59,10 @@ def shipped_files() -> tuple[list[Path], list[str]]:
             files.append(path)
             if typed_all_through(path):
                 strict.append(".".join(path.relative_to(source).with_suffix("").parts).removesuffix(".__init__"))
-        files += sorted((SOURCES / package / "scripts").glob("*.py"))
+        for path in sorted((SOURCES / package / "scripts").glob("*.py")):
+            files.append(path)
+            if typed_all_through(path):
+                strict.append(path.stem)
     return files, strict
 
 

@@ -1,0 +1,86 @@
+"""The rows of ./coglab bench mutants: too few, too many equivalent ones and what was left out cannot flatter."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from coglab_bringup.mutant_rows import EQUIVALENT, Equivalent, Mutant, read_equivalent, rows_of
+from coglab_bringup.usage import Refused
+
+TOP = Path(__file__).resolve().parents[4]
+
+
+def mutant(number, verdict="killed", package="one"):
+    file, text = f"catkin_ws/src/{package}/a.py", f"if a < {number}:"
+    changed = text.replace("<", "<=")
+    return Mutant(package, file, number, "comparison", "<", "<=", text, changed, verdict, "one/test_a", 1.0)
+
+
+def package(count, survived=0, name="one"):
+    return [mutant(i, "survived" if i < survived else "killed", name) for i in range(count)]
+
+
+def equivalent(number, reason="a is never that large"):
+    of = mutant(number)
+    return Equivalent(of.file, of.text, of.changed, reason)
+
+
+def test_a_row_needs_twelve_mutants_in_each_package():
+    rows = rows_of({"one": package(11), "two": package(40, name="two")}, 7, [], [])
+    assert [(row["value"], row["ok"]) for row in rows[:3]] == [(100.0, False), (100.0, True), (100.0, False)]
+    assert all("seed 7" in row["figure"] and ">= 12 each" in row["goal"] for row in rows[:3])
+    assert all(row["ok"] for row in rows_of({"one": package(12), "two": package(12, name="two")}, 7, [], []))
+
+
+def test_nothing_judged_is_missed():
+    rows = rows_of({"one": [None, None]}, 7, [], [])
+    assert rows[0]["value"] is None and not rows[0]["ok"]
+
+
+def test_the_goals_are_shares_of_what_was_judged():
+    assert rows_of({"one": package(20, 5)}, 7, [], [])[0]["ok"]
+    assert not rows_of({"one": package(20, 6)}, 7, [], [])[0]["ok"]
+    both = {"one": package(20, 4), "two": package(20, 3, "two")}
+    assert [row["ok"] for row in rows_of(both, 7, [], [])[:3]] == [True, True, False], "82.5 of 85 % over all"
+
+
+def test_one_in_twenty_may_be_named_equivalent_and_is_shown():
+    (first, named, _) = rows_of({"one": package(20, 2)}, 7, [equivalent(1)], [])
+    assert first["value"] == round(100 * 18 / 19, 1) and "of 20, 1 equivalent left out" in first["figure"]
+    assert (named["value"], named["goal"], named["ok"]) == (1, "<= 1", True)
+    assert "a is never that large" in named["figure"] and "a.py:1: comparison: '<' -> '<='" in named["figure"]
+
+
+def test_where_more_are_named_none_is_subtracted():
+    for count, names in ((20, (0, 1)), (19, (1,))):
+        (first, named, _) = rows_of({"one": package(count, 2)}, 7, [equivalent(n) for n in names], [])
+        assert first["value"] == round(100 * (count - 2) / count, 1) and "left out" not in first["figure"]
+        assert not named["ok"] and named["value"] == len(names)
+
+
+def test_what_a_test_notices_is_not_equivalent_and_an_entry_names_one():
+    assert rows_of({"one": package(20)}, 7, [equivalent(1)], [])[1]["value"] == 0
+    twice = [mutant(1, "survived"), mutant(1, "survived"), *package(40)]
+    assert rows_of({"one": twice}, 7, [equivalent(1)], [])[1]["value"] == 1
+    other = Equivalent(mutant(1).file, mutant(1).text, "if a == 1:", "another change of that line")
+    assert rows_of({"one": package(20, 2)}, 7, [other], [])[1]["value"] == 0
+
+
+def test_what_was_left_out_is_counted():
+    row = rows_of({"one": [None, *package(12), None]}, 7, [], ["p/test_b", "p/test_a"])[-1]
+    assert "2 changes that did not compile" in row["figure"] and "2 test programs" in row["figure"]
+    assert "p/test_a, p/test_b" in row["figure"] and (row["value"], row["goal"]) == (4, "reported")
+
+
+def test_the_kept_list_has_a_reason_for_each(tmp_path):
+    read_equivalent(TOP)
+    (tmp_path / "docs").mkdir()
+    entry = {"file": "a", "line": "b", "change": "c", "reason": "d"}
+    for content in ("{", "[1]", json.dumps([entry | {"reason": " "}]), json.dumps([{"file": "a"}])):
+        (tmp_path / EQUIVALENT).write_text(content)
+        with pytest.raises(Refused, match="expected"):
+            read_equivalent(tmp_path)
+    (tmp_path / EQUIVALENT).write_text(json.dumps([entry]))
+    assert read_equivalent(tmp_path) == [Equivalent("a", "b", "c", "d")]
