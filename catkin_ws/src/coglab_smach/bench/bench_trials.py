@@ -5,8 +5,10 @@ and five sessions of the whole system in real time.
 
 Definitions. Succeeded: the share of all trials asked for; an action that never began, or got stuck, has not. Reach: one
 DMP motion; every one is in the percentiles of its distances, where the arm stood, or, if it never did (it was met by a
-touch, or is unfinished), at its end; the two kinds are shown apart beside it. Hand to goal as received: to the goal
-that the motion has estimated and latched. Later than a person: after coglab_sim's duration of a person's reach over the
+touch, or is unfinished), at its end; the two kinds are shown apart beside it. Hand to the latched goal: to the one that
+the motion has estimated and latched; to the pose as received: to the tracker's newest sight at that moment; to the true
+grasp pose: by the cell's truth. Where no reach has such a goal, or none has 20 cycles, the rows have no value and those
+with a goal are missed. Later than a person: after coglab_sim's duration of a person's reach over the
 same way; there: from when on the measured palm stays within 5 mm of the goal in use, or when it is met; an unfinished
 reach, or one of less than 20 cycles, is infinitely late and shown as 999. SPARC: 10 Hz, amplitude 0.05, of every reach
 of 20 cycles and more. Misbehaving partners: 1 trial each, 20 with --long; each has one right
@@ -44,7 +46,7 @@ def row(figure, value, unit, goal="", ok=True, peer=None, peer_value=None):
     return {
         "bench": "trials",
         "figure": figure,
-        "value": round(float(value), 4),
+        "value": value if value is None else round(float(value), 4),
         "unit": unit,
         "goal": goal,
         "peer": peer,
@@ -58,48 +60,49 @@ NEVER = 999.0
 
 
 def reach_rows(campaign, action, perception):
-    """Duration, smoothness, end of every reach. Distances to the goal as received; to the truth with a goal only where
-    perception is perfect."""
+    """Duration, smoothness, end of every reach. Distances to the latched goal and to the pose as received; to the truth
+    with a goal only where perception is perfect."""
     reaches, what = campaign.reaches[action], f"{action}, {perception}"
     told = [each for each in reaches if "goal_mm" in each]
     smooth = [each["sparc"] for each in reaches if "sparc" in each]
     unfinished = sum(not (each["stood"] or each["met"]) for each in reaches)
     of = f"of {len(reaches)}"
     counted = [
-        row(f"{what}: reaches with a goal as received at their end", len(told), of, ">= 1", bool(told)),
+        row(f"{what}: reaches with a latched goal at their end", len(told), of, ">= 1", bool(told)),
         row(f"{what}: reaches unfinished", unfinished, of),
         row(f"{what}: reaches of 20 cycles and more", len(smooth), of),
         *palm_rows(row, reaches, what),
     ]
-    if not told or not smooth:
-        return counted
 
     def judged(name, value, unit, goal, least=False):
+        if value is None:
+            return row(f"{what}: {name}", None, unit, goal, not goal)
         limit = float(goal.split()[-1]) if goal else 0.0
         met = not goal or (value >= limit if least else value <= limit)
         return row(f"{what}: {name}", min(value, NEVER), unit, goal, met)
 
     def p95(key, found):
-        return np.percentile([each[key] for each in found], 95)
+        return np.percentile([each[key] for each in found], 95) if found else None
 
     def late(key, share):
         """A percentile by rank, which what never happened does not turn into no number."""
-        return np.percentile([each.get(key, np.inf) for each in reaches], share, method="higher")
+        values = [each.get(key, np.inf) for each in reaches]
+        return np.percentile(values, share, method="higher") if values else None
 
     true_goals = ("<= 5", "<= 3") if perception == "perfect perception" else ("", "")
     return [
         *counted,
-        judged("hand to goal as received, p95", p95("goal_mm", told), "mm", "<= 5"),
-        judged("hand to goal as received, p95", p95("goal_deg", told), "deg", "<= 3"),
-        judged("hand to the newest single sight, p95", p95("sight_mm", reaches), "mm", ""),
-        judged("hand to the newest single sight, p95", p95("sight_deg", reaches), "deg", ""),
+        judged("hand to the latched goal, p95", p95("goal_mm", told), "mm", "<= 5"),
+        judged("hand to the latched goal, p95", p95("goal_deg", told), "deg", "<= 3"),
+        judged("hand to the pose as received, p95", p95("sight_mm", reaches), "mm", ""),
+        judged("hand to the pose as received, p95", p95("sight_deg", reaches), "deg", ""),
         judged("hand to the true grasp pose, p95", p95("truth_mm", reaches), "mm", true_goals[0]),
         judged("hand to the true grasp pose, p95", p95("truth_deg", reaches), "deg", true_goals[1]),
         judged("arm there later than a person, median", late("late", 50), "s", "<= 0.25"),
         judged("arm there later than a person, p95", late("late", 95), "s", ""),
         judged("'reached' or met later than a person, median", late("reached_late", 50), "s", ""),
-        judged("SPARC, median", np.median(smooth), "1", ">= -1.6", least=True),
-        judged("SPARC, p5", np.percentile(smooth, 5), "1", ""),
+        judged("SPARC, median", np.median(smooth) if smooth else None, "1", ">= -1.6", least=True),
+        judged("SPARC, p5", np.percentile(smooth, 5) if smooth else None, "1", ""),
     ]
 
 
@@ -119,7 +122,8 @@ def misbehaviour_rows():
 
 
 def documented_rows(campaign, action, behaviour, outcome):
-    """How many trials of a behaviour have ended as documented; where a kind did not occur nothing is judged."""
+    """How many trials of a behaviour have ended as documented; a kind that did not occur beside the other has no value,
+    and nothing is judged of it."""
     what = f"{action} with '{behaviour}' x {campaign.trials}"
     if outcome != BY_HOLDER:
         cases = [("", outcome, campaign.ends[action])]
@@ -130,13 +134,15 @@ def documented_rows(campaign, action, behaviour, outcome):
             (", the robot does not hold it in the end", outcome[1], of[False]),
         ]
     rows = []
+    occurred = len(campaign.ends[action])
     for where, wanted, ends in cases:
         good, got = sum(end[0] == wanted for end in ends), Counter(end[0] for end in ends)
-        told = ", ".join(f"{name} {n}" for name, n in sorted(got.items())) or "did not occur"
+        told = ", ".join(f"{name} {n}" for name, n in sorted(got.items())) or f"did not occur in {occurred} trials"
         figure = f"{what}{where}: ends with {wanted} ({told})"
-        goal = ">= 1" if ends else ""
-        share = good / len(ends) if ends else 0.0
-        rows.append(row(figure, share, "share", goal, not ends or (share >= 1.0 and campaign.stuck == 0)))
+        share = good / len(ends) if ends else None
+        fine = share is not None and share >= 1.0 and campaign.stuck == 0
+        unjudged = not ends and occurred > 0
+        rows.append(row(figure, share, "share", "" if unjudged else ">= 1", unjudged or fine))
     return rows
 
 

@@ -7,7 +7,7 @@ import numpy as np
 HUMAN_BASE = 1.1
 """s, a person's reach over 0.45 m (coglab_sim.person.participant.Participant.reach_time)"""
 NEAR = 0.005
-"""m: the hand has arrived when it stays this close to the goal as received"""
+"""m: the hand has arrived when it stays this close to the goal in use"""
 
 
 def human_time(way: float) -> float:

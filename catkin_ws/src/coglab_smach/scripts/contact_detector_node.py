@@ -8,7 +8,7 @@ coglab_smach.contact.detector.DetectorSettings; robot_description is read
 for Jacobian and dynamics; ~thresholds_file: of the moving arm, learnt in simulation; ~learnt_file: where
 ~learn_motion writes what this robot's own motions tell, and from where it is read at the next start.
 Publishes at 20 Hz ~margin (std_msgs/Float64) while watching, ~signal (coglab_msgs/ContactSignal) while torques come.
-Services: ~learn (std_srvs/Trigger), the noise at rest anew; ~learn_motion (std_srvs/SetBool), true: gather motions
+Services: ~learn (Learn), the noise at rest anew; ~learn_motion (LearnMotion), true: gather motions
 without contact, false: learn from them.
 """
 
@@ -22,7 +22,7 @@ import numpy as np
 import rospy
 import tf2_ros
 from coglab_msgs.msg import Contact, ContactSignal, FingertipForces, HandStatus, LwrState, ReasonCode
-from coglab_msgs.srv import ArmContact, ArmContactResponse
+from coglab_msgs.srv import ArmContact, ArmContactResponse, Learn, LearnMotion, LearnMotionResponse, LearnResponse
 from coglab_perception.frames import FrameNames, FramesError
 from coglab_perception.tf_listener import TfListener
 from coglab_py import parameters
@@ -37,7 +37,6 @@ from coglab_smach.contact.moving_contact import MovingContact
 from coglab_smach.ros.publish import can_be_sent, publish
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64
-from std_srvs.srv import SetBool, SetBoolResponse, Trigger, TriggerResponse
 
 OLDEST_SIGHT = 0.15
 """s, older sights of an object do not tell whether it is in the palm"""
@@ -95,8 +94,8 @@ class ContactDetectorNode:
             "lwr/external_torques", JointState, self.on_torques, queue_size=20, tcp_nodelay=True
         )
         rospy.Service("~arm", ArmContact, self.on_arm)
-        rospy.Service("~learn", Trigger, self.on_learn)
-        rospy.Service("~learn_motion", SetBool, self.on_learn_motion)
+        rospy.Service("~learn", Learn, self.on_learn)
+        rospy.Service("~learn_motion", LearnMotion, self.on_learn_motion)
         rospy.Timer(rospy.Duration(0.05), self.on_timer)
 
     def thresholds(self) -> Thresholds:
@@ -189,6 +188,10 @@ class ContactDetectorNode:
         publish(self.publisher, out)
         rospy.loginfo("contact detector: %s", event.message)
 
+    def silent(self) -> bool:
+        """Whether no torques have come for a second."""
+        return self.last_sample is None or abs(rospy.Time.now().to_sec() - self.last_sample) > 1.0
+
     def on_arm(self, request):
         """Arm or disarm."""
         with self.lock:
@@ -197,7 +200,7 @@ class ContactDetectorNode:
                 self.grasp = None
                 return ArmContactResponse(success=True, message="off")
             now = self.last_sample
-            if now is None or abs(rospy.Time.now().to_sec() - now) > 1.0:
+            if now is None or self.silent():
                 return ArmContactResponse(
                     False,
                     ReasonCode.NODE_SILENT,
@@ -255,32 +258,42 @@ class ContactDetectorNode:
         """True: begin to gather motions without contact. False: end it, learn, write the file and use it from now
         on."""
         with self.lock:
-            if request.data:
+            if request.gather:
                 self.recorder = MotionRecorder(self.moving)
-                return SetBoolResponse(True, "gathering: let the arm reach, with and without objects in the hand")
+                return LearnMotionResponse(
+                    True, ReasonCode.NONE, "gathering: let the arm reach, with and without objects in the hand"
+                )
             recorder, self.recorder = self.recorder, None
             if recorder is None:
-                return SetBoolResponse(False, "nothing was gathered: call with data true first")
+                return LearnMotionResponse(
+                    False, ReasonCode.NOTHING_RUNS, "nothing was gathered: call with gather true first"
+                )
             reaches = len(recorder.reaches)
             if not self.learnt_file:
-                return SetBoolResponse(False, "parameter ~learnt_file says where to write, and is not set")
+                return LearnMotionResponse(
+                    False, ReasonCode.BAD_FILE, "parameter ~learnt_file says where to write, and is not set"
+                )
         # Minutes of samples take seconds to learn from: meanwhile the detector goes on.
         try:
             thresholds = recorder.learn()
             thresholds.save(Path(self.learnt_file))
-        except (ThresholdError, OSError) as error:
-            return SetBoolResponse(False, str(error))
+        except ThresholdError as error:
+            return LearnMotionResponse(False, ReasonCode.OUT_OF_RANGE, str(error))
+        except OSError as error:
+            return LearnMotionResponse(False, ReasonCode.BAD_FILE, str(error))
         with self.lock:
             self.moving.thresholds = thresholds
-        return SetBoolResponse(True, f"learnt from {reaches} motions, written to {self.learnt_file}")
+        return LearnMotionResponse(
+            True, ReasonCode.NONE, f"learnt from {reaches} motions, written to {self.learnt_file}"
+        )
 
     def on_learn(self, _request):
         """Noise at rest."""
         with self.lock:
             try:
-                return TriggerResponse(True, self.detector.still.learn())
+                return LearnResponse(True, ReasonCode.NONE, self.detector.still.learn())
             except ValueError as error:
-                return TriggerResponse(False, str(error))
+                return LearnResponse(False, ReasonCode.NODE_SILENT if self.silent() else ReasonCode.BUSY, str(error))
 
     def on_timer(self, _event) -> None:
         """The object as seen; live margin and signal."""

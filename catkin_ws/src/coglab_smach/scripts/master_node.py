@@ -160,6 +160,7 @@ class MasterNode:
             why=state.why,
             reason_code=state.reason_code,
             waits_for=state.waits_for,
+            waits_code=state.waits_code,
         )
         message.header.stamp = rospy.Time.now()
         if state.deadline:  # told in the brain's steady clock

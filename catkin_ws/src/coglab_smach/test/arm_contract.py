@@ -3,7 +3,9 @@
 from dataclasses import replace
 
 import numpy as np
+import yaml
 from coglab_msgs.msg import ReasonCode
+from coglab_py.packages import package_path
 from coglab_smach.ports.interfaces import DmpRequest
 from contract import CONTROLLERS, Contract
 
@@ -211,10 +213,39 @@ class ArmContract(Contract):
         self.until(lambda: self.port.motion_allowed().ok, 2.0, "the end of the hold")
         self.stays(lambda: self.port.standing().ok, 0.2)
 
-    def test_limits_and_speed_are_known(self):
+    def test_limits_are_those_of_the_table(self):
+        table = yaml.safe_load(package_path("lwr_description", "config", "joint_limits.yaml").read_text())["default"]
         limits = self.port.motion_limits()
-        assert len(limits.velocity) == len(limits.ptp_acceleration) == 7 and min(limits.ptp_velocity) > 0.0
+        # Commanded is no more than what a servo that overshoots keeps within the table.
+        for mine, whole in ((limits.velocity, table["velocity"]), (limits.acceleration, table["acceleration"])):
+            assert len(mine) == len(whole) == 7
+            assert np.all(np.array(mine) <= whole) and np.all(np.array(mine) > 0.95 * np.array(whole)), mine
+        manager = package_path("coglab_controllers", "config", "controllers.yaml").read_text()
+        ptp = yaml.safe_load(manager)["ptp"]
+        assert np.allclose(limits.ptp_velocity, ptp["default_speed"] * np.array(limits.velocity))
+        assert np.allclose(limits.ptp_acceleration, ptp["default_acceleration"] * np.array(limits.acceleration))
+
+    def test_the_speed_scale_is_told_as_it_is_set(self):
         assert self.port.speed_scale() == 1.0
+        if self.place.slow is None:
+            return
+        try:
+            for scale in (0.25, 0.5):
+                self.place.slow(scale)
+                self.until(lambda scale=scale: self.port.speed_scale() == scale, 2.0, f"speed scale {scale}")
+            # A motion is slowed down by it, too: at full speed it takes half as long.
+            at_half = self.duration(0.3)
+        finally:
+            self.place.slow(1.0)
+        self.until(lambda: self.port.speed_scale() == 1.0, 2.0, "the full speed scale")
+        assert 1.5 < at_half / self.duration(0.3) < 2.5
+
+    def duration(self, by):
+        """s that a motion in the last joint takes."""
+        self.ready()
+        begun = self.place.now()
+        self.settle(self.port.move_ptp(self.away(by), []), 10.0)
+        return self.place.now() - begun
 
     def test_given_up_while_its_node_is_frozen_it_never_acts(self):
         self.ready()

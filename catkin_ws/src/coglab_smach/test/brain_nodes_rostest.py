@@ -17,7 +17,7 @@ import rospy
 import rostest
 import yaml
 from coglab_msgs.msg import Contact, ContactSignal, MasterState, ReasonCode, Transition
-from coglab_msgs.srv import ArmContact, GetObject, ListObjects, Start
+from coglab_msgs.srv import ArmContact, GetObject, Learn, LearnMotion, ListObjects, Reload, Start
 from coglab_smach.contact.torque_signal import TorqueSignal
 from coglab_smach.kinematics.reachability import default_arm, home_posture, position_jacobian
 from sensor_msgs.msg import JointState
@@ -76,8 +76,10 @@ class BrainNodes(unittest.TestCase):
         events, seen = [], []
         rospy.Subscriber("/coglab/contact", Contact, events.append)
         rospy.Subscriber("/contact_detector/signal", ContactSignal, seen.append)
-        learn = service("/contact_detector/learn", Trigger)
-        self.assertIn("no torques come", learn().message)
+        learn = service("/contact_detector/learn", Learn)
+        refused = learn()
+        self.assertEqual(refused.reason_code, ReasonCode.NODE_SILENT)
+        self.assertIn("no torques come", refused.message)
         self.assertEqual(seen, [], "a signal without torques")
         torques.start()
         try:
@@ -91,7 +93,10 @@ class BrainNodes(unittest.TestCase):
             self.assertEqual((seen[-1].state, seen[-1].mode), ("watching", "contact"))
             self.assertEqual([j + 1 for j in range(7) if seen[-1].watched[j]], [1, 2, 4])
             self.assertTrue(0.0 < seen[-1].margin < 1.0)
-            self.assertIn("armed for contact", learn().message)
+            refused = learn()
+            self.assertEqual((refused.success, refused.reason_code), (False, ReasonCode.BUSY))
+            self.assertIn("armed for contact", refused.message)
+            self.learns_no_motion()
             seen.clear()
             self.assertEqual(events, [], "a false alarm at rest")
             torques.force = np.array([0.0, 8.0, 0.0])
@@ -131,6 +136,17 @@ class BrainNodes(unittest.TestCase):
         self.until(lambda: any(not m.learnt and m.rest_samples < samples for m in seen), "forgotten")
         self.until(lambda: seen[-1].learnt, "learnt anew")
 
+    def learns_no_motion(self):
+        """What is missing for thresholds of the moving arm is told by a code each."""
+        learn_motion = service("/contact_detector/learn_motion", LearnMotion)
+        for gather, success, code in (
+            (False, False, ReasonCode.NOTHING_RUNS),
+            (True, True, ReasonCode.NONE),
+            (False, False, ReasonCode.BAD_FILE),  # nothing says where to write
+        ):
+            answer = learn_motion(gather)
+            self.assertEqual((answer.success, answer.reason_code), (success, code), answer.message)
+
     def test_3_object_database(self):
         self.assertEqual(
             list(service("/object_database/list_objects", ListObjects)().object_ids),
@@ -144,7 +160,8 @@ class BrainNodes(unittest.TestCase):
         missing = service("/object_database/get_object", GetObject)("elephant")
         self.assertFalse(missing.success)
         self.assertIn("ball, bottle, mug", missing.message)
-        self.assertTrue(service("/object_database/reload", Trigger)().success)
+        read = service("/object_database/reload", Reload)()
+        self.assertEqual((read.success, read.reason_code), (True, ReasonCode.NONE))
         self.assertEqual(rospy.get_param("/object_database/objects/mug/mass"), 0.31)
 
     def test_4_introspection_shows_the_whole_hierarchy(self):
@@ -208,6 +225,9 @@ class BrainNodes(unittest.TestCase):
         limited = [m for m in waits if m.waits_for]
         ahead = [(m.deadline - m.header.stamp).to_sec() for m in limited]
         self.assertTrue(all(0.0 < seconds < 120.0 for seconds in ahead), ahead)
+        self.assertTrue(all(bool(m.waits_for) == bool(m.waits_code) for m in waits))
+        sights = {m.waits_code for m in limited if m.waits_for == "start of perception"}
+        self.assertEqual(sights, {ReasonCode.WAITS_FOR_SIGHT})
         vision = [s for s, m in zip(ahead, limited, strict=True) if m.waits_for == "start of perception"]
         self.assertTrue(any(3.0 < seconds <= 4.0 for seconds in vision), [(m.state, m.waits_for) for m in limited])
         self.until(lambda: waits[-1].state.endswith("/fault"), "fault again")

@@ -32,6 +32,8 @@ class Place:
     """from now on it is believed with this probability that the mug is offered"""
     show_hand: Callable[[bool], None] = lambda seen: None
     """whether the person's hand is seen from now on"""
+    slow: Callable[[float], None] | None = None
+    """somebody sets the arm's speed scale, 0..1; None: nobody can here"""
 
 
 class Contract:

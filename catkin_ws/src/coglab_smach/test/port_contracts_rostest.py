@@ -17,6 +17,7 @@ import rospkg
 import rospy
 import rostest
 from coglab_msgs.msg import HandoverBelief, Recognition
+from coglab_msgs.srv import SetSpeedScale
 from coglab_smach.ros.arm import RosArm
 from coglab_smach.ros.hand import RosHand
 from coglab_smach.ros.ports import RosContact, RosDatabase, RosPerception
@@ -89,7 +90,8 @@ def place_of(name, arm_may_freeze, arm_is_used, recogniser):
     arm = RosArm() if name == "contact" else None
     clock = time.monotonic, time.sleep
     person = recogniser.believe, recogniser.show_hand
-    return Place(PORTS[name](), *clock, freeze, thaw, library, push, arm_is_used, arm, *person)
+    scale = rospy.ServiceProxy("/controller_manager/speed_scale", SetSpeedScale)
+    return Place(PORTS[name](), *clock, freeze, thaw, library, push, arm_is_used, arm, *person, scale)
 
 
 class PortContracts(unittest.TestCase):

@@ -2,6 +2,7 @@
 never by opening the hand."""
 
 import pytest
+from coglab_msgs.msg import ReasonCode
 from conftest import Trial
 
 
@@ -84,6 +85,24 @@ def test_hand_closed_on_nothing():
 def test_a_person_who_does_not_let_go_gets_the_object_back():
     trial = failed_exchange(lambda t: setattr(t.cell.partner, "let_go_after", None))
     assert_recovered_empty(trial, "the person did not let go of 'mug' within 5 s")
+
+
+def test_an_object_whose_weight_is_carried_is_not_dropped_when_the_person_is_seen_no_more():
+    trial = Trial()
+
+    def script(t):
+        t.wait_hub("wait_without_object")
+        t.cell.let_go = lambda: t.cell.faults.not_seen.add("human_hand")
+        t.start("exchange_human_to_robot")
+        t.wait_hub("stopped")
+        assert t.cell.called("open") == [] and t.ctx.holding == "mug"
+        assert "the person's hand is not seen any more" in t.ctx.journal.why()
+        # The operator looks: the robot alone holds it.
+        t.start("reset", "")
+        t.wait_hub("wait_with_object")
+
+    trial.run(script)
+    assert trial.result().code == ReasonCode.NOT_RELEASED
 
 
 def test_failed_preshape_ends_the_arm_motion_too():

@@ -86,13 +86,22 @@ def test_what_is_waited_for_is_told_with_its_deadline():
         assert t.shown[-1].waits_for == ""
 
     trial.run(script)
-    assert all((s.deadline > 0.0) == bool(s.waits_for) for s in trial.shown)
+    assert all((s.deadline > 0.0) == bool(s.waits_for) == bool(s.waits_code) for s in trial.shown)
     receiving = {s.waits_for for s in trial.shown if f"/{RECEIVE}/" in s.state}
     giving = {s.waits_for for s in trial.shown if f"/{GIVE}/" in s.state}
     assert {"'mug' on offer", "contact of an object with the hand"} <= receiving  # the reach ends in that
     assert {"the person's hand within reach", "the end of the reach", "the person's taking of the load"} <= giving
+    codes = {s.waits_for: s.waits_code for s in trial.shown}
+    assert codes["'mug' on offer"] == codes["the person's taking of the load"] == ReasonCode.WAITS_FOR_PERSON
+    assert codes["the person's hand within reach"] == ReasonCode.WAITS_FOR_PERSON
+    assert codes["contact of an object with the hand"] == ReasonCode.WAITS_FOR_CONTACT
+    assert codes["the end of the reach"] == codes["the motion to posture 'home'"] == ReasonCode.WAITS_FOR_ARM
+    assert codes["opening of the hand"] == ReasonCode.WAITS_FOR_HAND
+    assert codes["start of perception"] == ReasonCode.WAITS_FOR_SIGHT
     left = [s.deadline - stamp for stamp, s in timed if s.waits_for == "the person's taking of the load"]
     assert left and abs(left[0] - 8.0) < 0.05  # as the mug's delivery says
+    # What looks on beside the motion is waited for by nobody, also between two waits of the motion itself.
+    assert "another reaching pattern" not in receiving
 
 
 def test_a_wait_that_is_put_off_is_told_again():
@@ -108,6 +117,20 @@ def test_a_wait_that_is_put_off_is_told_again():
     assert journal.wait().deadline == 7.0
     journal.waits("/m/a", None)
     assert journal.wait() == Wait() and len(told) == 6
+
+
+def test_what_is_waited_for_aside_is_told_where_nothing_else_is_done():
+    journal = Journal(lambda: 0.0)
+    journal.entered("/m/monitor")
+    journal.waits("/m/monitor", Wait("another pattern", 5.0, aside=True))
+    assert journal.wait().what == "another pattern"
+    journal.entered("/m/reach")
+    assert journal.wait() == Wait()  # between two waits of the reach
+    journal.waits("/m/reach", Wait("the reach", 7.0))
+    assert journal.wait().what == "the reach"
+    journal.waits("/m/reach", None)
+    journal.left("/m/reach")
+    assert journal.wait().what == "another pattern"
 
 
 def test_a_failure_is_told_until_the_next_success():

@@ -4,12 +4,14 @@ begins, and recovery goes nowhere with an object that a person may hold."""
 from types import SimpleNamespace
 
 import coglab_smach.simulated.arm_model as model
+import numpy as np
 import pytest
 from coglab_msgs.msg import ReasonCode
 from coglab_smach.context.journal import Journal
 from coglab_smach.kinematics.manager_limits import read_limits
 from coglab_smach.kinematics.motion_time import ptp_time, reach_time
 from coglab_smach.ports.pending import Polled, PortError, Ready
+from coglab_smach.states.motion import shift, shift_time
 from conftest import Trial
 from motion_watch import MotionWatch
 
@@ -198,6 +200,47 @@ def test_a_limit_follows_the_limits_of_speed_and_the_speed_scale():
             assert t.result().outcome == "succeeded", t.ctx.journal.why()
 
     trial.run(script)
+
+
+def test_a_limit_follows_the_duration_of_the_primitive(monkeypatch):
+    """The longest that an object's file may ask for."""
+    trial = Trial()
+    entry = trial.database.get("mug")
+    slow = {**entry, "dmp": {**entry["dmp"], "dmp_ratio": 10.0}}
+    monkeypatch.setattr(trial.database, "get", lambda object_id: slow)
+
+    def script(t):
+        t.wait_hub("wait_without_object")
+        for action, hub in (("take", "wait_with_object"), ("put", "wait_without_object")):
+            begin = t.clock.now()
+            t.start(action)
+            t.wait_hub(hub, 200.0)
+            assert t.result().outcome == "succeeded", t.ctx.journal.why()
+            assert t.clock.now() - begin > 10.0 * t.cell.arm.reach_time
+
+    trial.run(script)
+
+
+def test_a_shift_is_as_fast_as_the_limits_let_it():
+    """Faster, the manager would refuse it, and an arm in T1 would neither lift nor draw back."""
+    trial = Trial()
+    away, asked = np.array([0.0, 0.0, 0.06]), []
+
+    def script(t):
+        t.wait_hub("wait_without_object")
+        t.ctx.arm.switch_controller("ptp")
+        for table in ({}, {"joint_limits_profile": "t1"}):
+            limits = t.cell.arm.limits = read_limits(table)
+            begin, expected = t.clock.now(), shift_time(t.ctx, away, 0.25)
+            moved = shift(t.ctx, away, 0.25)
+            while not moved.done():
+                t.clock.sleep(0.01)
+            assert moved.result() is None and t.clock.now() - begin <= expected + 0.1
+            asked.append((expected, limits))
+
+    trial.run(script)
+    (quick, _), (slow, t1) = asked
+    assert quick < 1.0 < 2.0 < slow
 
 
 def test_times_are_those_of_the_limits():

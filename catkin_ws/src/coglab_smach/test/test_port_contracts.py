@@ -55,6 +55,7 @@ def double_of(name):
         arm=SimulatedArm(cell),
         believe=lambda offer: believe_in_cell(cell, offer),
         show_hand=lambda seen: (cell.faults.not_seen.discard if seen else cell.faults.not_seen.add)("human_hand"),
+        slow=lambda scale: setattr(cell.arm, "speed_scale", scale),
     )
 
 
@@ -123,6 +124,11 @@ def virtual_double_of(name):
         "contact": VirtualContact,
         "database": lambda rig: VirtualDatabase(database),
     }
+
+    def slow(scale):
+        rig.robot.virtual.speed_scale(scale)
+        rig.speed_scale = scale
+
     port = ports[name](rig)
     push = lambda force: rig.cell.set_push([0.0, 0.0, force])  # noqa: E731
     return Place(
@@ -136,6 +142,7 @@ def virtual_double_of(name):
         arm=VirtualArm(rig),
         believe=believe,
         show_hand=show_hand,
+        slow=slow,
     )
 
 

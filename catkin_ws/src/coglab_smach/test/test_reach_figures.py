@@ -63,8 +63,52 @@ def test_unfinished_reaches_are_in_every_percentile():
     assert rows["hand to the true grasp pose, p95"]["ok"] and rows["reaches unfinished"]["value"] == 0
     rows = rows_of(good, good, good, record(0.5, over=0.5 * DURATION), record(0.5, over=0.5 * DURATION))
     assert rows["reaches unfinished"]["value"] == 2
-    assert not rows["hand to the true grasp pose, p95"]["ok"] and not rows["hand to goal as received, p95"]["ok"]
+    assert not rows["hand to the true grasp pose, p95"]["ok"] and not rows["hand to the latched goal, p95"]["ok"]
     assert rows["arm there later than a person, p95"]["value"] == bench_trials.NEVER
     rows = rows_of(good, record(0.5, over=0.5 * DURATION), record(0.5, over=0.5 * DURATION))
     median = rows["arm there later than a person, median"]
     assert median["value"] == bench_trials.NEVER and not median["ok"]
+
+
+@pytest.mark.parametrize("share", [0.05, 0.5])
+def test_rows_without_a_reach_that_is_long_enough_are_missed_and_not_dropped(share):
+    """As many rows as of a good reach; of the short ones smoothness and arrival are missed."""
+    good = rows_of(record(stood=True, reached=DURATION, over=2.0, met=True))
+    rows = rows_of(record(share, over=share * DURATION))
+    assert {name for name in rows if "standing" not in name and "never stood" not in name} == {
+        name for name in good if "standing" not in name and "never stood" not in name
+    }
+    short = share < 0.1
+    assert (rows["SPARC, median"]["value"] is None) is short
+    assert not (short and rows["SPARC, median"]["ok"])
+    assert not rows["arm there later than a person, median"]["ok"]
+    assert rows["hand to the pose as received, p95"]["goal"] == ""
+
+
+def test_without_any_reach_every_row_with_a_goal_is_missed():
+    rows = rows_of()
+    assert rows["hand to the latched goal, p95"]["value"] is None
+    assert not [name for name, row in rows.items() if row["goal"] and row["ok"]]
+
+
+def documented(outcome, *ends):
+    campaign = Campaign()
+    campaign.ends[RECEIVE], campaign.trials = list(ends), len(ends)
+    return bench_trials.documented_rows(campaign, RECEIVE, "pull_back", outcome)
+
+
+def test_a_case_that_did_not_occur_has_no_value_and_is_not_judged():
+    held, empty = documented(bench_trials.BY_HOLDER, *[("succeeded", "robot")] * 2)
+    assert (held["value"], held["goal"], held["ok"]) == (1.0, ">= 1", True)
+    assert (empty["value"], empty["goal"], empty["ok"]) == (None, "", True)
+    assert "did not occur in 2 trials" in empty["figure"]
+
+
+def test_where_no_trial_ended_the_outcome_is_missed():
+    for outcome in (bench_trials.BY_HOLDER, "succeeded"):
+        assert all(row["goal"] == ">= 1" and not row["ok"] for row in documented(outcome))
+
+
+def test_one_wrong_end_misses_the_outcome():
+    (row,) = documented("succeeded", ("succeeded", "robot"), ("failed_empty", "person"))
+    assert (row["value"], row["ok"]) == (0.5, False)

@@ -5,9 +5,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from coglab_msgs.msg import ReasonCode
-from coglab_smach.ports.interfaces import Ahead
+from coglab_smach.ports.interfaces import Ahead, DmpProgress
 from coglab_smach.states import early_reach
 from coglab_smach.states.base import TimeLimit
+from coglab_smach.states.reach import WaitStop
 
 LOW, HIGH = [-1.0, -1.0, -1.0], [2.0, 1.0, 2.0]
 FRAME = 1.0 / 30.0
@@ -67,3 +68,41 @@ def test_who_lowers_the_hand_goes_on(monkeypatch):
     hand = Watched(monkeypatch)
     for k in range(12):
         hand.see(0.4, 0.0, 0.4 - 0.025 * k)
+
+
+class Reach(WaitStop):
+    """Waits for somebody who never goes on."""
+
+    def __init__(self, progress, doubted):
+        self.ctx = SimpleNamespace(
+            config={},
+            arm=SimpleNamespace(
+                dmp_progress=lambda: progress,
+                motion_allowed=lambda: SimpleNamespace(ok=True),
+                cancel_motion=lambda reason: None,
+            ),
+            journal=SimpleNamespace(mark=lambda name: None),
+        )
+        self._early, self._grip = SimpleNamespace(doubted=lambda: doubted, hopeful=lambda: False), None
+
+    def allow(self, duration):
+        pass
+
+    def await_pending(self, pending, what, limit=None, pace=None, code=0):
+        pass
+
+    def wait_for(self, condition, what, limit=None, pace=None, code=0):
+        raise TimeLimit(what)
+
+
+@pytest.mark.parametrize(
+    "state, code, doubted, expected",
+    [
+        ("running", ReasonCode.NONE, True, ReasonCode.GOAL_WITHDRAWN),
+        ("aborted", ReasonCode.GOAL_LEFT_REGION, False, ReasonCode.GOAL_LEFT_REGION),
+    ],
+)
+def test_a_reach_that_is_given_up_says_for_which_of_the_two_reasons(state, code, doubted, expected):
+    with pytest.raises(TimeLimit) as found:
+        Reach(DmpProgress(state, "", "reach_human", 0.5, 0.2, code), doubted)._reached()
+    assert found.value.code == expected

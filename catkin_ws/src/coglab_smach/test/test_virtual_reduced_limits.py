@@ -2,6 +2,7 @@
 to the board and back by default; COGLAB_LONG=1: all four actions. (test_motion_ownership: all four on the simulated
 arm.)"""
 
+import copy
 import os
 
 import pytest
@@ -19,7 +20,7 @@ def test_actions_succeed_within_t1(tmp_path, actions, where):
     smach.set_loggers(*[lambda *a: None] * 4)
     table = yaml.safe_load(open(LIMITS, encoding="utf-8"))
     reduced = tmp_path / "joint_limits.yaml"
-    reduced.write_text(yaml.safe_dump({**table, "default": {**table["default"], **table["t1"]}}))
+    reduced.write_text(yaml.safe_dump({**table, "default": {**table["default"], **copy.deepcopy(table["t1"])}}))
     trial = VirtualTrial(seed=3, object_on=where, limits=str(reduced), profile="accustomed", perfect=True)
     results = trial.run(*actions, limit=200.0)
     wanted = [(action, "succeeded") for action in actions]

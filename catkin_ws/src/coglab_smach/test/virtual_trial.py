@@ -196,9 +196,9 @@ class ReachRecord:
     success, which without standing still is a touch or a person who has come. Neither ``stood`` nor ``met``:
     unfinished.
 
-    ``to_goal``: (m, rad) from the measured palm to the goal as received, that is as the motion has estimated and
-    latched it, None where there was none yet; ``to_sight``: to the newest single sight; ``to_truth``: to where the
-    grasp pose really is.
+    ``to_goal``: (m, rad) from the measured palm to the latched goal, as the motion has estimated it, None where
+    there was none yet; ``to_sight``: to the pose as received, the newest single sight at that moment; ``to_truth``: to
+    where the grasp pose really is.
     """
 
     def __init__(self, rig, ctx, action):

@@ -47,10 +47,13 @@ class Failure:
 
 @dataclass(frozen=True)
 class Wait:
-    """What an active state waits for, in words, and when (s of the journal's clock) it gives up."""
+    """What an active state waits for, in words and as a code of ``awaited``, and when (s of the journal's clock) it
+    gives up. ``aside``: of a state that looks on beside the others, for whose end nobody waits."""
 
     what: str = ""
     deadline: float = math.inf
+    code: int = 0
+    aside: bool = False
 
 
 @dataclass
@@ -154,9 +157,12 @@ class Journal:
             self.waits(path, None)
 
     def wait(self) -> Wait:
-        """Of the waits of all active states the one that gives up first; empty where none has a limit."""
+        """Of the waits of all active states the one that gives up first; empty where none has a limit. One aside counts
+        only where no other state is active."""
         with self._lock:
-            limited = [wait for wait in self._waits.values() if wait.deadline < math.inf]
+            looking_on = {path for path, wait in self._waits.items() if wait.aside}
+            alone = looking_on.issuperset(self._active)
+            limited = [w for w in self._waits.values() if w.deadline < math.inf and (alone or not w.aside)]
         return min(limited, key=lambda wait: wait.deadline, default=Wait())
 
     def active(self) -> tuple[str, ...]:

@@ -21,6 +21,7 @@ class MasterState:
     why: str = ""
     reason_code: int = 0
     waits_for: str = ""
+    waits_code: int = 0
     deadline: float = 0.0
     """s of the brain's clock; 0 without a limit"""
 
@@ -67,5 +68,6 @@ class StateWatch:
             why,
             failure.code,
             wait.what,
+            wait.code,
             wait.deadline if wait.what else 0.0,
         )

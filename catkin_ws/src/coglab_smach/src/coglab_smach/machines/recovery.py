@@ -7,6 +7,7 @@ from typing import Any
 
 from coglab_msgs.msg import ReasonCode, Say
 
+from coglab_smach.context.awaited import HAND
 from coglab_smach.context.context import Context
 from coglab_smach.context.holding import UNKNOWN
 from coglab_smach.context.requests import command
@@ -87,7 +88,10 @@ class SecureHand(CoglabState):
             return self._stay(f"the person may still hold '{self.ctx.holding}', which is in the robot's fingers")
         try:
             self.await_pending(
-                self.ctx.hand.open(int(self.ctx.config.get("hand.open_speed", 400))), "opening of the empty hand", 8.0
+                self.ctx.hand.open(int(self.ctx.config.get("hand.open_speed", 400))),
+                "opening of the empty hand",
+                8.0,
+                code=HAND,
             )
         except PortError as error:
             if self.ctx.shared:

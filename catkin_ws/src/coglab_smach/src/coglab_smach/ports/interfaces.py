@@ -55,6 +55,8 @@ class DmpProgress:
     phase: float = 0.0
     remaining_distance: float = 0.0
     code: int = 0
+    remaining_time: float = 0.0
+    """s, by the primitive's own clock: what dmp_ratio asks for, whatever the limits make of it"""
 
 
 @dataclass(frozen=True)

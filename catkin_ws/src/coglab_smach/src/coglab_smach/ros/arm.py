@@ -225,6 +225,7 @@ class RosArm:
             message.phase,
             message.remaining_distance,
             message.reason_code,
+            message.remaining_time,
         )
 
     def move_ptp(self, position: Sequence[float], max_velocity: Sequence[float]) -> Pending:

@@ -123,7 +123,12 @@ class ArmModel:
             return
         share = self._share()[0]
         self.dmp = DmpProgress(
-            "reached" if over else "running", "", self.request.primitive_id, 1.0 - share, REACH_WAY * (1.0 - share)
+            "reached" if over else "running",
+            "",
+            self.request.primitive_id,
+            phase=1.0 - share,
+            remaining_distance=REACH_WAY * (1.0 - share),
+            remaining_time=(1.0 - share) * self.reach_time * self.request.dmp_ratio,
         )
         self._reached_out = self._reached_out or over
 
@@ -185,8 +190,9 @@ class ArmModel:
         # 1.875: peak over mean velocity of a minimum-jerk profile.
         slow = 1.875 * float(np.max(np.abs(way) / np.asarray(self.limits.velocity)))
         self.request, self.motion_started = request, self._clock.now()
-        self.dmp = DmpProgress("running", "", request.primitive_id, 1.0, REACH_WAY)
-        self._go(np.array(self.position()) + way, max(self.reach_time * request.dmp_ratio, slow))
+        asked = self.reach_time * request.dmp_ratio
+        self.dmp = DmpProgress("running", "", request.primitive_id, 1.0, REACH_WAY, remaining_time=asked)
+        self._go(np.array(self.position()) + way, max(asked, slow))
         self._reached_out = False
 
     def substitute(self, request: DmpRequest) -> None:

@@ -178,7 +178,13 @@ class VirtualArm:
     def dmp_progress(self) -> DmpProgress:
         now = self.robot.dmp_progress()
         return DmpProgress(
-            now["motion"], now["reason"], now["primitive"], now["phase"], now["remaining_distance"], now["reason_code"]
+            now["motion"],
+            now["reason"],
+            now["primitive"],
+            now["phase"],
+            now["remaining_distance"],
+            now["reason_code"],
+            now["remaining_time"],
         )
 
     def move_ptp(self, position: Sequence[float], max_velocity: Sequence[float]) -> Pending:

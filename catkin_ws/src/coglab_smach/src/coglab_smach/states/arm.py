@@ -7,6 +7,7 @@ from typing import Any
 
 from coglab_msgs.msg import ReasonCode
 
+from coglab_smach.context.awaited import ARM
 from coglab_smach.context.context import Context
 from coglab_smach.kinematics.motion_time import ptp_time
 from coglab_smach.ports.pending import Polled, PortError
@@ -63,7 +64,7 @@ class ConfigureLwr(CoglabState):
                     raise
                 self.pause(1.0)
         try:
-            self.wait_for(lambda: self.ctx.arm.motion_allowed()[0], "command mode of the LWR")
+            self.wait_for(lambda: self.ctx.arm.motion_allowed()[0], "command mode of the LWR", code=ARM)
         except TimeLimit as limit:
             blocked = self.ctx.arm.motion_allowed()
             limit.causes, limit.code = (blocked.why,), blocked.code
@@ -115,6 +116,7 @@ class PtpMotion(CoglabState):
             Polled(lambda: bool(look()) or motion.done(), motion.result, motion.cancel),
             f"the motion to posture '{self.posture}'",
             pace=arm.speed_scale,
+            code=ARM,
         )
         self._verify(target)
         return "succeeded"
@@ -132,7 +134,7 @@ class PtpMotion(CoglabState):
             return measured is None or max(abs(m - t) for m, t in zip(measured, target, strict=False)) <= tolerance
 
         self.allow(1.5)
-        self.wait_for(arrived, f"all measured joints within {tolerance} rad of posture '{self.posture}'", 1.0)
+        self.wait_for(arrived, f"all measured joints within {tolerance} rad of posture '{self.posture}'", 1.0, code=ARM)
 
 
 class HomeRobot(PtpMotion):

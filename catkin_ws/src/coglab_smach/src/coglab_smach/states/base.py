@@ -10,6 +10,7 @@ from typing import Any
 import smach
 from coglab_msgs.msg import ReasonCode
 
+from coglab_smach.context import awaited
 from coglab_smach.context.config import ConfigError
 from coglab_smach.context.context import Context
 from coglab_smach.context.journal import Failure, Wait
@@ -56,7 +57,8 @@ class CoglabState(smach.State):
     """True for states that start a motion of the arm or wait for one: it has ended when they end without success."""
 
     essential = True
-    """False where a failure of this state is no failure of its action: it is recorded as a transition alone."""
+    """False where a failure of this state is no failure of its action: it is recorded as a transition alone, and what
+    it waits for is told only where nothing else is done."""
 
     def __init__(
         self,
@@ -175,9 +177,10 @@ class CoglabState(smach.State):
         what: str,
         limit: float | None = None,
         pace: Callable[[], float] | None = None,
+        code: int = awaited.ANSWER,
     ) -> None:
         """Wait until ``condition()``; TimeLimit naming ``what`` after ``limit`` s or at the end of the
-        state's own limit.
+        state's own limit. ``code`` of ``awaited`` tells programs what it is.
 
         With ``pace`` (0..1, such as the speed scale) the limit counts in the time of a motion: it is used up so much
         slower, down to a tenth, and the state's own limit is put off likewise.
@@ -199,18 +202,23 @@ class CoglabState(smach.State):
                     raise TimeLimit(f"{what} within {max(0.0, allowed):.1f} s expected, it did not happen")
                 if now + left > told + RETOLD:
                     told = now + left
-                    self.ctx.journal.waits(path, Wait(what, told))
+                    self.ctx.journal.waits(path, Wait(what, told, code, aside=not self.essential))
                 self.ctx.clock.sleep(POLL_PERIOD)
         finally:
             if told > -math.inf:
                 self.ctx.journal.waits(path, None)
 
     def await_pending(
-        self, pending: Pending, what: str, limit: float | None = None, pace: Callable[[], float] | None = None
+        self,
+        pending: Pending,
+        what: str,
+        limit: float | None = None,
+        pace: Callable[[], float] | None = None,
+        code: int = awaited.ANSWER,
     ) -> Any:
         """The pending call's value; cancelled if the wait ends otherwise."""
         try:
-            self.wait_for(pending.done, what, limit, pace)
+            self.wait_for(pending.done, what, limit, pace, code)
         except (Interrupted, TimeLimit):
             pending.cancel()
             raise

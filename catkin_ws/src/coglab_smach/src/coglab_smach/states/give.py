@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from coglab_msgs.msg import ReasonCode
 
+from coglab_smach.context.awaited import PERSON, SIGHT
 from coglab_smach.context.context import Context
 from coglab_smach.ports.interfaces import HandPort
 from coglab_smach.ports.pending import Pending, PortError
@@ -96,7 +97,7 @@ class WaitTaker(WaitStop):
         if not self.reason:  # it has to come to rest at the goal that it has latched
             await_rest(self.ctx, self.check)
         self.await_pending(self.ctx.arm.switch_controller("ptp"), "end of the reach by switching to 'ptp'", 3.0)
-        self.wait_for(self._held.there, "a sight of the object in the hand", 2.0)
+        self.wait_for(self._held.there, "a sight of the object in the hand", 2.0, code=SIGHT)
         limit = float(release.get("timeout", self.ctx.config.get("release_timeout", 8.0)))
         weight = {"mass": settings["mass"], "load_share": float(release.get("threshold", 0.5))}
         # give_load begins in a moment, and ends it.
@@ -181,7 +182,7 @@ class GiveLoad(CoglabState):
         self._held = HeldObject(self.ctx, ud.object_id)
         self._lower_at = self.ctx.clock.now() + self._number("lower_after", 3.0)
         try:
-            self.wait_for(self._taken, "the person's taking of the load", limit)
+            self.wait_for(self._taken, "the person's taking of the load", limit, code=PERSON)
         except TimeLimit as error:
             self._keep()
             error.code = error.code if error.code != ReasonCode.TIME_LIMIT else ReasonCode.NOT_RELEASED

@@ -8,16 +8,19 @@ from typing import Any
 from coglab_msgs.msg import ReasonCode, Say
 from ih2_hand.grasps import levels_of
 
+from coglab_smach.context.awaited import ARM, HAND
 from coglab_smach.context.context import Context
 from coglab_smach.ports.pending import PortError
 from coglab_smach.states.base import CoglabState
-from coglab_smach.states.motion import shift
+from coglab_smach.states.motion import shift, shift_time
 from coglab_smach.states.where import hand_from_palm, palm_axis
 
 SLIPPERY = 0.45
 """friction below which an object is that"""
 LOOSE = 40
 """counts of 254 that the fingers have opened when the palm begins to draw back"""
+DRAWING_BACK = 2.0
+"""s that drawing back may take beyond what limits and speed scale ask for"""
 
 
 def gentle(entry: Mapping[str, Any], grasp: Mapping[str, Any]) -> dict[str, Any]:
@@ -49,7 +52,7 @@ class CalibrateHand(CoglabState):
             self.reason = "the hand is calibrated already"
             return "succeeded"
         mode = str(self.ctx.config.get("hand.calibration", "fast"))
-        self.await_pending(self.ctx.hand.calibrate(mode), f"hand calibration '{mode}'")
+        self.await_pending(self.ctx.hand.calibrate(mode), f"hand calibration '{mode}'", code=HAND)
         return "succeeded"
 
 
@@ -63,7 +66,7 @@ class HandPreshape(CoglabState):
 
     def run(self, ud: Any) -> str:
         hand, self.ctx.preshaped = ud.grasp["hand"], False
-        self.await_pending(self.ctx.hand.preshape(hand["mode"], hand["level"]), f"preshape '{hand['mode']}'")
+        self.await_pending(self.ctx.hand.preshape(hand["mode"], hand["level"]), f"preshape '{hand['mode']}'", code=HAND)
         self.ctx.preshaped = True
         self.ctx.journal.mark("preshaped")
         return "succeeded"
@@ -95,7 +98,7 @@ class HandClose(CoglabState):
         self.ctx.closing = None
         if self.from_person:
             ud.hand_distance = hand_from_palm(self)
-        self.await_pending(closing, "closing of the hand")
+        self.await_pending(closing, "closing of the hand", code=HAND)
         self.ctx.journal.mark("closed")
         end = self.ctx.clock.now() + float(self.ctx.config.get("hand.settle_after_close", 0.3))
         while not self.ctx.hand.state().holding and self.ctx.clock.now() < end:
@@ -152,7 +155,9 @@ class HandOpen(CoglabState):
 
     def run(self, ud: Any) -> str:
         self.ctx.journal.mark("opening")
-        self.await_pending(self.ctx.hand.open(int(self.ctx.config.get("hand.open_speed", 400))), "opening of the hand")
+        self.await_pending(
+            self.ctx.hand.open(int(self.ctx.config.get("hand.open_speed", 400))), "opening of the hand", code=HAND
+        )
         self.ctx.holding, self.ctx.shared = "", False
         return "succeeded"
 
@@ -178,16 +183,19 @@ class LetGo(CoglabState):
             self.pause(0.01)
         if opening.done():
             opening.result()  # fingers that are stuck would drag what the person holds
-        axis, way = palm_axis(self.ctx), float(self.ctx.config.get("give.draw_back", 0.06))
+        axis, way, limit = palm_axis(self.ctx), float(self.ctx.config.get("give.draw_back", 0.06)), DRAWING_BACK
         if axis is not None and way > 0.0:
-            back = shift(self.ctx, -way * axis, float(self.ctx.config.get("give.draw_back_speed", 0.25)))
-        self.await_pending(opening, "opening of the hand")
+            speed = float(self.ctx.config.get("give.draw_back_speed", 0.25))
+            limit += shift_time(self.ctx, -way * axis, speed)
+            back = shift(self.ctx, -way * axis, speed)
+        self.await_pending(opening, "opening of the hand", code=HAND)
         self.ctx.holding, self.ctx.shared = "", False
         # Not earlier: who is told so goes, and fingers that are half open would keep the object.
         self.ctx.say(Say.YOU_HAVE_IT, "You have it.")
         if back is not None:
+            self.allow(limit + 1.0)
             try:
-                self.await_pending(back, "drawing back", 2.0, self.ctx.arm.speed_scale)
+                self.await_pending(back, "drawing back", limit, self.ctx.arm.speed_scale, ARM)
             except PortError as error:
                 self.reason = error.sentence  # as far as it goes; the way home goes on from there
         return "succeeded"

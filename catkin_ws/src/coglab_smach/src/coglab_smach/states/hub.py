@@ -8,6 +8,7 @@ from typing import Any
 
 from coglab_msgs.msg import ReasonCode
 
+from coglab_smach.context.awaited import ARM, OPERATOR
 from coglab_smach.context.context import Context
 from coglab_smach.context.holding import UNKNOWN
 from coglab_smach.context.requests import Request, command
@@ -33,7 +34,9 @@ class WaitForTrigger(CoglabState):
         self.ctx.requests.open(self.label, [self.action])
         try:
             self.wait_for(
-                lambda: self.ctx.requests.take() is not None, f"trigger '{self.action}' ({command(self.action)})"
+                lambda: self.ctx.requests.take() is not None,
+                f"trigger '{self.action}' ({command(self.action)})",
+                code=OPERATOR,
             )
         finally:
             self.ctx.requests.close()
@@ -190,7 +193,7 @@ class Stopped(CoglabState):
             self.pause(0.3)
             if not self.ctx.arm.motion_allowed().ok:
                 self.await_pending(self.ctx.arm.lwr_command("start"), "LWR command 'start'", 20.0)
-            self.wait_for(lambda: self.ctx.arm.motion_allowed().ok, "command mode of the LWR", 10.0)
+            self.wait_for(lambda: self.ctx.arm.motion_allowed().ok, "command mode of the LWR", 10.0, code=ARM)
         return "succeeded"
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from coglab_msgs.msg import ReasonCode, Say
 from coglab_py.pose import Pose, mean_pose
 
+from coglab_smach.context.awaited import PERSON, SIGHT
 from coglab_smach.context.context import Context
 from coglab_smach.context.journal import Wait
 from coglab_smach.kinematics.goals import approach_of, delivery_goal, grasp_goal, palm_at_grasp, place_goal
@@ -29,7 +30,9 @@ class InitVision(CoglabState):
     default_time_limit = 30.0
 
     def run(self, ud: Any) -> str:
-        self.reason = str(self.await_pending(self.ctx.perception.init_vision(self.left()), "start of perception"))
+        self.reason = str(
+            self.await_pending(self.ctx.perception.init_vision(self.left()), "start of perception", code=SIGHT)
+        )
         return "succeeded"
 
 
@@ -93,7 +96,7 @@ def locate(state: CoglabState, target: str) -> dict[str, Any]:
     limit = float(state.ctx.config.get("perception.locate_timeout", 5.0))
     with refused_as(ReasonCode.OBJECT_NOT_SEEN):
         found = state.await_pending(
-            state.ctx.perception.locate_object(target, limit), f"sight of '{target}'", limit + 1.0
+            state.ctx.perception.locate_object(target, limit), f"sight of '{target}'", limit + 1.0, code=SIGHT
         )
     oldest = float(state.ctx.config.get("perception.max_age", 0.5))
     if found.age > oldest:
@@ -126,7 +129,7 @@ def await_offer(state: CoglabState, target: str, goals: Goals, margin: float = 0
     seen: list[tuple[float, np.ndarray]] = []
     person = target == config.get("perception.human_hand", "human_hand")
     offer = "the person's hand within reach" if person else f"'{target}' on offer"
-    with state.ctx.journal.waiting(f"{state.path()}/{state.label}/offer", Wait(offer, end)):
+    with state.ctx.journal.waiting(f"{state.path()}/{state.label}/offer", Wait(offer, end, PERSON)):
         while True:
             located = locate(state, target)
             now, place = state.ctx.clock.now(), np.array(located["xyz"])
@@ -335,7 +338,7 @@ class FindPlace(CoglabState):
     def run(self, ud: Any) -> str:
         limit = float(self.ctx.config.get("perception.locate_timeout", 5.0))
         places = self.await_pending(
-            self.ctx.perception.free_places(ud.object_id, limit), "a free place on the board", limit + 1.0
+            self.ctx.perception.free_places(ud.object_id, limit), "a free place on the board", limit + 1.0, code=SIGHT
         )
         if not places:
             raise PortError("perception names no free place on the board; clear one", code=ReasonCode.NO_FREE_PLACE)

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
 from coglab_smach.context.context import Context
+from coglab_smach.kinematics.motion_time import ptp_time
 from coglab_smach.kinematics.reachability import default_arm
 from coglab_smach.ports.pending import Pending, PortError
 
@@ -55,16 +56,28 @@ def rise(ctx: Context, height: float, speed: float) -> Pending | None:
 
 
 def shift(ctx: Context, by: np.ndarray, speed: float) -> Pending | None:
-    """Begin to move the palm ``by`` (m, base frame) without turning it, at ``speed`` m/s, each joint as fast as its
-    share of the way asks for; None where the posture is not known. Only with controller 'ptp'."""
+    """Begin to move the palm ``by`` (m, base frame) without turning it, at ``speed`` m/s or as fast as the limits let
+    it, each joint as fast as its share of the way asks for; None where the posture is not known. Only with controller
+    'ptp'."""
     here = ctx.arm.joint_positions()
-    if here is None:
-        return None
+    return None if here is None else ctx.arm.move_ptp(*_joint_way(ctx, here, by, speed))
+
+
+def shift_time(ctx: Context, by: np.ndarray, speed: float) -> float:
+    """s that shift() takes at full speed scale; 0 where the posture is not known."""
+    here = ctx.arm.joint_positions()
+    return 0.0 if here is None else ptp_time(ctx.arm.motion_limits(), here, *_joint_way(ctx, here, by, speed))
+
+
+def _joint_way(ctx: Context, here: Sequence[float], by: np.ndarray, speed: float) -> tuple[list[float], list[float]]:
+    """Where the joints are after a shift (rad), and how fast each goes there (rad/s)."""
     jacobian = default_arm().jacobian(np.asarray(here))
     twist = np.concatenate([by, np.zeros(3)])
     way = jacobian.T @ np.linalg.solve(jacobian @ jacobian.T + 1e-4 * np.eye(6), twist)
     velocity = np.maximum(np.abs(way) * speed / float(np.linalg.norm(by)), 1e-3)
-    return ctx.arm.move_ptp((np.asarray(here) + way).tolist(), velocity.tolist())
+    # Beyond a limit the motion would be refused: all joints are slowed down alike, so that the way stays straight.
+    share = float(np.min(np.asarray(ctx.arm.motion_limits().velocity) / velocity))
+    return (np.asarray(here) + way).tolist(), (velocity * min(1.0, share)).tolist()
 
 
 def _await(ctx: Context, pending: Pending) -> str:

@@ -9,19 +9,22 @@ from typing import Any
 import numpy as np
 from coglab_msgs.msg import ReasonCode
 
+from coglab_smach.context.awaited import ARM, CONTACT, HAND, PERSON, SIGHT
 from coglab_smach.context.context import Context
 from coglab_smach.kinematics.motion_time import reach_time
 from coglab_smach.ports.interfaces import ContactEvent, DmpRequest
 from coglab_smach.ports.pending import PortError
 from coglab_smach.states.base import CoglabState, Interrupted, TimeLimit
 from coglab_smach.states.early_reach import EarlyReach, PersonsGrip, target_of
-from coglab_smach.states.motion import shift
+from coglab_smach.states.motion import shift, shift_time
 from coglab_smach.states.where import off_grasp, palm_axis
 
 BUMPS = 2
 """touches of something else after which the arm still comes again"""
 DRAWN_BACK = 0.06
 """m"""
+DRAWING_BACK = 5.0
+"""s that drawing back may take beyond what limits and speed scale ask for"""
 SEATED = 0.03
 """m off its grasp at most, for an object that the fingers may close on at a touch"""
 FIRM = 2.5
@@ -29,7 +32,7 @@ FIRM = 2.5
 BETWEEN = 0.01
 """m off the last of the way, at most, for an object that is seen between the fingers"""
 SLIDING = 0.6
-"""s for which the hand goes on at most"""
+"""s for which the hand goes on at most, at full speed scale"""
 
 
 def dmp_request(goal: dict[str, Any], primitive: str | None = None, ratio: float | None = None) -> DmpRequest:
@@ -89,7 +92,7 @@ class WaitStop(CoglabState):
 
     trigger: '' (the end of the motion is enough) or 'contact' (an object is in the hand). Contact is watched for from
     the last ``contact_within`` m of the reach on and ends the motion. The reach may take ``reach_timeout`` beyond what
-    the arm's limits ask for.
+    the primitive's duration and the arm's limits ask for.
     """
 
     default_time_limit = 20.0
@@ -150,18 +153,22 @@ class WaitStop(CoglabState):
         arm, hand = self.ctx.arm, ud.grasp["hand"]
         self.allow(20.0)
         # What begins while the arm moves takes its speed along, and brakes less than an arm that is stopped.
-        self.await_pending(arm.cancel_motion("something touches the hand"), "rest of the arm", 3.0)
+        self.await_pending(arm.cancel_motion("something touches the hand"), "rest of the arm", 3.0, code=ARM)
         self.await_pending(arm.switch_controller("ptp"), "switching to 'ptp'", 3.0)
         if self.ctx.closing is not None:
             self.ctx.closing = None
-            self.await_pending(self.ctx.hand.preshape(hand["mode"], hand["level"]), "the hand's opening", 5.0)
+            self.await_pending(
+                self.ctx.hand.preshape(hand["mode"], hand["level"]), "the hand's opening", 5.0, code=HAND
+            )
             self.ctx.shared = False
         back = palm_axis(self.ctx)
         if back is not None:
-            moved = shift(self.ctx, -DRAWN_BACK * back, 0.1)
+            way = (self.ctx, -DRAWN_BACK * back, 0.1)
+            limit, moved = DRAWING_BACK + shift_time(*way), shift(*way)
+            self.allow(limit + 10.0)
             if moved is not None:
                 try:
-                    self.await_pending(moved, "drawing back", 5.0)
+                    self.await_pending(moved, "drawing back", limit, arm.speed_scale, ARM)
                 except PortError as error:
                     self.reason = error.sentence  # as far as it goes
         self.await_pending(arm.switch_controller("dmp"), "switching to controller 'dmp'", 3.0)
@@ -178,20 +185,20 @@ class WaitStop(CoglabState):
             code = self._grip.fell_or_withdrawn()
             raise TimeLimit("the reach was given up", (error.sentence,), code) from None
 
-    def _pause(self, early: EarlyReach) -> None:
-        """Nobody seems to offer or ask any more: the arm stands. Who goes on within ``handover.pause`` s is met; else
-        the reach is given up."""
+    def _pause(self, early: EarlyReach, code: int, why: str) -> None:
+        """Nobody seems to offer or ask within the region any more: the arm stands. Who goes on within
+        ``handover.pause`` s is met; else the reach is given up, with this code and reason."""
         limit = float(self.ctx.config.get("handover.pause", 3.0))
         self.allow(limit + 8.0)
-        self.await_pending(self.ctx.arm.cancel_motion("the arm waits: nobody offers or asks"), "rest of the arm", 3.0)
+        resting = self.ctx.arm.cancel_motion("the arm waits: nobody offers or asks")
+        self.await_pending(resting, "rest of the arm", 3.0, code=ARM)
         self.ctx.journal.mark("paused")
         try:
-            self.wait_for(early.hopeful, "that the person goes on", limit)
+            self.wait_for(early.hopeful, "that the person goes on", limit, code=PERSON)
         except TimeLimit as error:
             if error.code != ReasonCode.TIME_LIMIT:
                 raise
-            why = "the person does not offer or ask any more"
-            raise TimeLimit("the reach was given up", (why,), ReasonCode.GOAL_WITHDRAWN) from None
+            raise TimeLimit("the reach was given up", (why,), code) from None
         early.forgive()
         self._begin_again(early.goal_now())
 
@@ -203,7 +210,7 @@ class WaitStop(CoglabState):
         arming = self.ctx.contact.arm("contact_in_motion", limit, settings)
         self.await_pending(arming, "arming of the contact detector", 2.0)
         try:
-            self.wait_for(partial(self._happened, ud.goal), "contact of an object with the hand", limit)
+            self.wait_for(partial(self._happened, ud.goal), "contact of an object with the hand", limit, code=CONTACT)
         except TimeLimit as error:
             error.code = error.code if error.code != ReasonCode.TIME_LIMIT else ReasonCode.NO_CONTACT
             raise
@@ -260,8 +267,8 @@ class WaitStop(CoglabState):
     def _slide_in(self, ud: Any) -> None:
         """Fingers touch the object on their way past it: closed there, they would hold it by its edge. The reach goes
         on until the palm is at its grasp, unless something stands in its way."""
-        contact, end = self.ctx.contact, self.ctx.clock.now() + SLIDING
-        settings = self._contact_settings(ud)
+        contact, settings = self.ctx.contact, self._contact_settings(ud)
+        end = self.ctx.clock.now() + SLIDING / max(0.1, self.ctx.arm.speed_scale())
         try:
             while self.ctx.clock.now() < end and not self._reached():
                 away, event = off_grasp(self, ud.goal), contact.event()
@@ -279,15 +286,15 @@ class WaitStop(CoglabState):
         return "succeeded"
 
     def _await_reach(self, near: Callable[[], bool]) -> None:
-        """Until ``near()``. How far it is, the motion itself knows: it tells in its first feedback."""
+        """Until ``near()``. How far and how long it is, the motion itself knows: it tells in its first feedback."""
         arm = self.ctx.arm
         try:
             self.wait_for(lambda: self._reached() or arm.dmp_progress().primitive_id != "", "news of the reach", 2.0)
-            limit = float(self.ctx.config.get("reach_timeout", 6.0)) + reach_time(
-                arm.motion_limits(), arm.dmp_progress().remaining_distance
-            )
+            told = arm.dmp_progress()
+            asked = told.remaining_time + reach_time(arm.motion_limits(), told.remaining_distance)
+            limit = float(self.ctx.config.get("reach_timeout", 6.0)) + asked
             self.allow(limit + 10.0)
-            self.wait_for(near, "the end of the reach", limit, arm.speed_scale)
+            self.wait_for(near, "the end of the reach", limit, arm.speed_scale, ARM)
         except TimeLimit as error:
             progress = arm.dmp_progress()
             error.causes = error.causes or (
@@ -321,8 +328,8 @@ class WaitStop(CoglabState):
     def _reached(self) -> bool:
         progress = self.ctx.arm.dmp_progress()
         if progress.state == "aborted" and progress.code == ReasonCode.GOAL_LEFT_REGION and self._early is not None:
-            # Where the person's reach will end was believed outside the region for a moment.
-            self._pause(self._early)
+            # It may have been believed so for a moment only.
+            self._pause(self._early, progress.code, "the person's reach seems to end outside the handover region")
             return False
         if progress.state == "aborted":
             why, code = progress.reason or "the controller gave no reason", progress.code
@@ -334,7 +341,7 @@ class WaitStop(CoglabState):
         if not blocked.ok:
             raise TimeLimit("the arm does not follow any more", (blocked.why,), blocked.code)
         if self._early is not None and progress.state != "reached" and self._early.doubted():
-            self._pause(self._early)
+            self._pause(self._early, ReasonCode.GOAL_WITHDRAWN, "the person does not offer or ask any more")
             return False
         return progress.state == "reached"
 
@@ -353,7 +360,7 @@ class MonitorDmp(CoglabState):
 
     def run(self, ud: Any) -> str:
         if not bool(self.ctx.config.get("monitor.enabled", True)):
-            self.wait_for(lambda: False, "the end of the motion")
+            self.wait_for(lambda: False, "the end of the motion", code=ARM)
         running = ud.goal["primitive"]
         family = dict(self.ctx.config.get("monitor.primitives", {}))
         if running not in family.values():
@@ -361,7 +368,7 @@ class MonitorDmp(CoglabState):
         switches = 0
         while True:
             try:
-                self.wait_for(partial(self._other_pattern, family, running), "another reaching pattern")
+                self.wait_for(partial(self._other_pattern, family, running), "another reaching pattern", code=SIGHT)
             except Interrupted as end:
                 if end.stop:
                     raise

@@ -6,6 +6,7 @@ from typing import Any
 
 from coglab_msgs.msg import ReasonCode
 
+from coglab_smach.context.awaited import PERSON
 from coglab_smach.context.context import Context
 from coglab_smach.ports.pending import Pending, PortError
 from coglab_smach.states.base import CoglabState, TimeLimit
@@ -20,7 +21,8 @@ class TakeWeight(CoglabState):
     The weight that comes is measured (``hand.load_share`` of the object's). It is counted from the closing of the
     fingers, when a person often still presses the object up or down, so it does not end the rise: what a person feels
     in the hand does. ``hand_distance``: m, of the person's hand from the palm before the fingers closed; None where no
-    tracker sees it, and then the weight has to have come by the end of the rise.
+    tracker sees it, and then the weight has to have come by the end of the rise. Where the weight has come and the
+    tracker has lost the hand since, the person may have gone: nothing is opened, the arm stays and says so.
     """
 
     default_time_limit = 16.0
@@ -52,14 +54,9 @@ class TakeWeight(CoglabState):
             self.pause(float(self.ctx.config.get("hand.lift_after", 0.1)))
             height, speed = (float(self.ctx.config.get(f"hand.{name}", 0.03)) for name in ("lift", "lift_speed"))
             self._lifting = rise(self.ctx, height, speed)
-            self.wait_for(has_let_go, "the person's letting go", end - self.ctx.clock.now())
+            self.wait_for(has_let_go, "the person's letting go", end - self.ctx.clock.now(), code=PERSON)
         except TimeLimit as error:
-            self.ctx.holding = ""
-            raise PortError(
-                f"the person did not let go of '{ud.object_id}' within {limit:.0f} s",
-                (error.sentence,),
-                ReasonCode.NOT_RELEASED,
-            ) from None
+            raise self._not_released(ud.object_id, limit, error) from None
         finally:
             contact.disarm()
             if self._lifting is not None:
@@ -70,3 +67,14 @@ class TakeWeight(CoglabState):
         self.ctx.shared = False
         self.ctx.journal.mark("released")
         return "succeeded"
+
+    def _not_released(self, object_id: str, limit: float, error: TimeLimit) -> PortError:
+        """The failure, and who has the object then: the person, but where only the robot's hand may hold it."""
+        causes: tuple[str, ...] = (error.sentence,)
+        if self.ctx.contact.event() is not None and hand_from_palm(self) is None:
+            causes += ("its weight is carried, and the person's hand is not seen any more",)
+        else:
+            self.ctx.holding = ""
+        return PortError(
+            f"the person did not let go of '{object_id}' within {limit:.0f} s", causes, ReasonCode.NOT_RELEASED
+        )

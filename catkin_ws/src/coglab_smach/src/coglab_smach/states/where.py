@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from coglab_py.pose import Pose
 
+from coglab_smach.context.awaited import SIGHT
 from coglab_smach.context.context import Context
 from coglab_smach.kinematics.reachability import default_arm
 from coglab_smach.ports.pending import PortError
@@ -39,7 +40,7 @@ def off_grasp(state: CoglabState, goal: Mapping[str, Any]) -> float | None:
         return None
     name = str(thing["frame"]).removeprefix("object_")
     try:
-        seen = state.await_pending(state.ctx.perception.locate_object(name, 0.3), f"sight of '{name}'", 0.5)
+        seen = state.await_pending(state.ctx.perception.locate_object(name, 0.3), f"sight of '{name}'", 0.5, code=SIGHT)
     except PortError:
         return None
     if seen.age > OLDEST:
@@ -56,7 +57,9 @@ def person_at(state: CoglabState) -> np.ndarray | None:
 def seen_at(state: CoglabState, target: str) -> np.ndarray | None:
     """m, of an object or of the person's hand as perception names it."""
     try:
-        seen = state.await_pending(state.ctx.perception.locate_object(target, 0.3), f"sight of '{target}'", 0.5)
+        seen = state.await_pending(
+            state.ctx.perception.locate_object(target, 0.3), f"sight of '{target}'", 0.5, code=SIGHT
+        )
     except PortError:
         return None
     return np.array(seen.xyz) if seen.age <= OLDEST else None
@@ -74,7 +77,7 @@ def way_to_hand(state: CoglabState, object_id: str, delivery: Mapping[str, Any])
     hand = str(state.ctx.config.get("perception.human_hand", "human_hand"))
     thing = seen_at(state, object_id)
     try:
-        seen = state.await_pending(state.ctx.perception.locate_object(hand, 0.3), f"sight of '{hand}'", 0.5)
+        seen = state.await_pending(state.ctx.perception.locate_object(hand, 0.3), f"sight of '{hand}'", 0.5, code=SIGHT)
     except PortError:
         return None
     if thing is None or seen.age > OLDEST:
