@@ -141,12 +141,14 @@ TEST_F(FriThreadTest, ASecondSenderIsIgnoredAndNamed) {
 /// Datagrams that waited because the thread was not run make it late, not the controller silent.
 TEST(FriThreadLate, ALateThreadIsKnownAsTheCauseOfALoss) {
   Bridge bridge(test::defaultConfig());
-  std::atomic<bool> held{false};
+  std::atomic<bool> held{false}, waits{false};
   FriThreadOptions options = Fixture::options();
   // Held until everything has been sent: a sleep may be over before that on a busy computer.
   options.after_answer = [&](bool answered) {
-    for (int i = 0; i < 2000 && answered && held; ++i)
+    for (int i = 0; i < 2000 && answered && held; ++i) {
+      waits = true;
       std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    }
   };
   FriThread fri(bridge, options);
   fri.start();
@@ -167,8 +169,9 @@ TEST(FriThreadLate, ALateThreadIsKnownAsTheCauseOfALoss) {
   }
   ASSERT_TRUE(start.success()) << describe(start);
   ASSERT_TRUE(exchange());
-  held = true;
-  ASSERT_TRUE(exchange());
+  held = true;  // from the end of this answer or of the last one
+  peer.send(robot.measure());
+  ASSERT_TRUE(eventually([&] { return waits.load(); }));
   for (int i = 0; i < 7; ++i) peer.send(robot.measure());
   robot.state = fri::FriState::Monitor;
   peer.send(robot.measure());
