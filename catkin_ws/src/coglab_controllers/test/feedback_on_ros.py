@@ -110,6 +110,32 @@ class FeedbackOnRos(unittest.TestCase):
         self.assertFalse(call(name + "unload", FeedbackSelect, [], "").success)
         self.assertFalse(call(name + "unload", FeedbackSelect, ["ee_admittance"], "").success, "part of a profile")
 
+    def test_5c_a_request_outside_what_the_srv_file_says_is_refused_whole(self) -> None:
+        """Each refusal says what came and what was expected, and changes nothing."""
+        name, call = "controller_manager/feedback/", self.robot.call
+        odd = ("\x1b[2J", "a\0b", " ", "\N{RIGHT-TO-LEFT OVERRIDE}x", "x" * 201)
+        requests = [(verb, ["ee_admittance"], text) for verb in ("enable", "disable", "pause", "resume") for text in odd]
+        requests += [("apply_profile", ["dmp"], text) for text in odd]
+        # An empty name among others would otherwise be all of them.
+        requests += [(verb, [""], "") for verb in ("enable", "disable", "pause", "resume")]
+        requests += [("enable", ["ee_admittance", ""], ""), ("unload", ["second"], odd[0])]
+        for verb, names, reason in requests:
+            answer = call(name + verb, FeedbackSelect, names, reason)
+            self.assertFalse(answer.success, (verb, names, reason[:9]))
+            self.assertEqual(answer.reason_code, ReasonCode.INVALID_ARGUMENT, answer.message)
+            self.assertRegex(answer.message, "expected", (verb, names))
+            self.assertTrue(answer.message.isprintable(), repr(answer.message))
+        self.assertTrue(call(name + "pause", FeedbackSelect, ["ee_admittance"], "lunch ☃").success)
+        for names in (["ee_admittance"], []):
+            answer = call(name + "resume", FeedbackSelect, names, "supper")
+            self.assertFalse(answer.success, "no pause has this reason")
+            self.assertEqual(answer.reason_code, ReasonCode.UNKNOWN_NAME, answer.message)
+            self.assertIn("lunch ☃", answer.message)
+        self.assertTrue(call(name + "resume", FeedbackSelect, ["ee_admittance"], "").success, "nothing to withdraw")
+        # All of them: with the reason that was given.
+        self.assertTrue(call(name + "resume", FeedbackSelect, [], "lunch ☃").success)
+        wait_until(lambda: not any(c.paused for c in self.feedback[-1].controllers), 5.0, "nothing paused")
+
     def say_on_rosout(self, controller: str) -> None:
         """A controller that holds at a bound says so, with its name, place in the source, cycle and numbers."""
         told: list[Log] = []

@@ -9,6 +9,7 @@
 #include <ros/console.h>
 #include <ros/serialization.h>
 
+#include "coglab_controllers/manager/feedback_requests.hpp"
 #include "ctrl_more/loading/search_path.hpp"
 
 namespace coglab_controllers {
@@ -53,6 +54,10 @@ bool refuse(Response& response, std::uint16_t code, const std::string& message) 
   response.reason_code = code;
   response.message = message;
   return true;
+}
+
+bool refuse(coglab_msgs::FeedbackSelect::Response& response, const ctrl_more::Status& status) {
+  return refuse(response, codeOf(status.cause()), status.message());
 }
 
 }  // namespace
@@ -122,10 +127,16 @@ bool FeedbackRos::onSelect(Select::Request& request, Select::Response& response)
   using Who = ctrl_more::Change::Who;
   const auto lock = manager_.lockRequests();
   const std::string reason = request.reason.empty() ? "user" : request.reason;
+  ctrl_more::Status judged = judgeReason(request.reason);
+  if (judged) judged = judgeNames(request.names);
+  if (judged && kind == ctrl_more::Change::Kind::Resume) {
+    judged = judgeResume(feedback_.statusAll(), request.names, reason);
+  }
+  if (!judged) return refuse(response, judged);
   ctrl_more::Change change;
   for (const std::string& name : request.names) change.add({kind, name, Who::Named, reason});
   // No name: all controllers.
-  if (request.names.empty()) change.add({kind, "", Who::Named, "user"});
+  if (request.names.empty()) change.add({kind, "", Who::Named, reason});
   return finish(feedback_.apply(change), response);
 }
 
@@ -147,6 +158,8 @@ bool FeedbackRos::onSignal(BySignal::Request& request, BySignal::Response& respo
 }
 
 bool FeedbackRos::onProfile(Select::Request& request, Select::Response& response) {
+  const ctrl_more::Status judged = judgeReason(request.reason);
+  if (!judged) return refuse(response, judged);
   if (request.names.size() != 1) {
     return refuse(response, Code::INVALID_ARGUMENT,
                   "names: expected one profile, got " + std::to_string(request.names.size()));
@@ -209,6 +222,8 @@ bool FeedbackRos::onLoad(coglab_msgs::LoadFeedback::Request& request,
 
 bool FeedbackRos::onUnload(Select::Request& request, Select::Response& response) {
   const auto lock = manager_.lockRequests();
+  const ctrl_more::Status judged = judgeReason(request.reason);
+  if (!judged) return refuse(response, judged);
   if (request.names.size() != 1) {
     return refuse(response, Code::INVALID_ARGUMENT,
                   "names: expected one controller, got " + std::to_string(request.names.size()));
