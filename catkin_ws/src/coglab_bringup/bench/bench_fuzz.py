@@ -4,20 +4,19 @@ three ways to start: one process for bridge and controller manager, two with the
 
 The generator (coglab_bringup/ros_fuzz.py says what it sends) makes each message malformed by design: at least one value
 that its definition excludes; or, in every third one with a time, an odd stamp alone. Messages without any field that
-could be so (`Trigger`, integers alone) are valid by nature, those that are odd where their definition takes it are
-allowed; both are counted apart. Ended: a node whose process is another
-one, or does not answer, afterwards. Silent: a topic on which a node of ours spoke within 2.5 s before, and within 3 s
-afterwards did not. Moved: the farthest that a joint of the arm came from where it was, missed if the arm would not have
-followed a motion at the end, or at any time before; where this computer was late, command mode was begun again. Then
-the arm reaches slowly toward a goal that is seen, beside more of them. Accepted: a malformed request answered with
-success, whichever service. A topic that follows from the tree of frames may fall silent, since a valid transform can
-tear that.
+could be so (`Trigger`, integers alone) are valid by nature, those that are odd only where their definition takes it are
+allowed; both are counted apart. Ended: a node whose process is another one, or does not answer, afterwards. Silent: a
+topic on which a node of ours spoke within 2.5 s before, and within 3 s afterwards did not. Moved: the farthest that a
+joint of the arm came from where it was, missed if the arm would not have followed a motion at the end, or at any time
+before; where this computer was late, command mode was begun again. Then the arm reaches slowly toward a goal that is
+seen, beside more of them. Accepted: a malformed request answered with success, whichever service. A topic that follows
+from the tree of frames may fall silent, since a valid transform can tear that.
 
 Judge's rule made explicit (DOCUMENTED of coglab_bringup/fuzz_rules.py; the same messages are sent as before): these may
 succeed because their srv file says so. `reason` of FeedbackSelect: any printable text of at most 200 bytes, odd as it
 may read. `time_limit` and `reason` of CancelMotion: anything, since to end a motion is never refused. `timeout` of
 InitVision, LocateObject and FreePlaces: any number. `object_id` of FreePlaces: any text. Before, every odd string
-counted, but nothing that the five services answered which take CancelMotion, InitVision, LocateObject or FreePlaces.
+counted, and the services that take CancelMotion, InitVision, LocateObject or FreePlaces did not count at all.
 """
 
 from __future__ import annotations

@@ -101,7 +101,7 @@ Status judgeResume(const std::vector<ControllerStatus>& controllers,
                    const std::vector<std::string>& names, const std::string& reason) {
   if (reason == "user") return {};
   bool found = false;
-  std::string without, others;
+  std::string others;
   for (const ControllerStatus& controller : controllers) {
     const bool named = std::count(names.begin(), names.end(), controller.name) != 0;
     if (!named && !names.empty()) continue;
