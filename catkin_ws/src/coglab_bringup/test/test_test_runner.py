@@ -3,11 +3,12 @@
 import signal
 import sys
 import time
+from pathlib import Path
 
 import pytest
 from coglab_bringup import test_runner
 from coglab_bringup.arguments import test_options as options_of_test
-from coglab_bringup.test_runner import BESIDE, Program, find_programs, in_groups, report, run
+from coglab_bringup.test_runner import BESIDE, FIRST, Program, find_programs, in_groups, report, run
 from coglab_bringup.usage import Refused
 
 GREEN = (
@@ -145,3 +146,12 @@ def test_who_has_others_beside_it_never_meets_who_runs_alone(tmp_path, monkeypat
     for name in ("alone_0.test", "alone_1.test"):
         begin, end = ran[name]
         assert [other for other, (a, b) in ran.items() if a < end and begin < b] == [name], ran
+
+
+def test_what_takes_longest_is_there_and_begins_first(tmp_path):
+    programs = find_programs(Path(__file__).resolve().parents[4], tmp_path, sys.executable, [])
+    names = [[one.name for one in group] for group in in_groups(programs)]
+    assert sorted(name for group in names for name in group if name in FIRST) == sorted(FIRST), "each is one program"
+    for group in names:
+        wanted = [name for name in FIRST if name in group]
+        assert group[: len(wanted)] == wanted

@@ -9,8 +9,8 @@ Packages that the build left out (./coglab build --upstream-smach) are named and
 A program without a single case is a failure, too: a test file that tests nothing hides what it was written for.
 
 First gtests and pytests run, two at a time; then rostests, three at a time, that say in their file that they may
-(BESIDE): those wait more than they compute, and nothing that they measure is short. At last the other rostests, alone,
-because they measure real time.
+(BESIDE): most of those wait more than they compute, and nothing that they measure is short. At last the other
+rostests, alone, because they measure real time.
 """
 
 from __future__ import annotations
@@ -34,13 +34,14 @@ from coglab_bringup.usage import Refused
 AT_A_TIME = 2
 """gtests and pytests that run beside each other"""
 RESTING_AT_A_TIME = 3
-"""rostests that run beside each other, of those that may: each needs less than a third of a processor"""
+"""rostests that run beside each other, of those that may: most need a fifth of a processor, none as much as one"""
 BESIDE = "<!-- Beside others:"
 """how the comment begins by which a .test file says that it may, and why"""
 FIRST = (
     *("test_virtual_trials.py", "test_plain_cmake.py", "test_virtual_bad_input.py", "test_corrupted_streams.py"),
     *("test_bridge_and_cell.py", "test_new_motion.py", "test_page.py"),
-    *("lwr_node.test", "port_contracts.test", "hand_node.test", "hand_faults.test", "topic_goal.test"),
+    *("lwr_node.test", "port_contracts.test", "hand_node.test", "hand_faults.test", "fuzz.test"),
+    "topic_goal.test",
 )
 """what takes longest begins first: as the last one it would run while nothing is left to run beside it"""
 TIME_LIMIT = 900.0  # s, per test program
