@@ -9,8 +9,8 @@ demos, that of this bench too, and later builds are never taken for it. `docker/
 The new motion is that of coglab_controllers/test/test_new_motion.py: made by `controller new --motion`, built in a
 workspace of its own, and done when its rostest has seen the simulated arm move. A test that fails gives no value. What
 tests of combined conditions, and those that came with the simulated world, add to the whole test run: the programs
-named in COMBINED and in WORLD, whole, each with its part of the wall time (two run beside each other, rostests alone);
-without a record of every one of them the row is missed.
+named in COMBINED and in WORLD, whole, each with its part of the wall time (programs that run beside each other share it
+equally, at every moment); without a record of every one of them the row is missed.
 """
 
 from __future__ import annotations

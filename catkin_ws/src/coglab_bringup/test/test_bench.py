@@ -90,7 +90,13 @@ def test_every_program_that_is_named_is_one_that_the_test_run_finds(bench_wall, 
     assert named - set(found) == set()
 
 
-def test_a_program_that_runs_beside_another_adds_half_its_time():
-    alone = Program("p", "rostest", "a.test", [], Path("x"), seconds=10.0)
-    beside = Program("p", "gtest", "p_test_b", [], Path("x"), seconds=10.0)
-    assert wall_times([alone, beside]) == {"p/a.test": 10.0, "p/p_test_b": 5.0}
+def test_programs_that_run_beside_each_other_share_the_time():
+    alone = Program("p", "rostest", "a.test", [], Path("x"), began=100.0, seconds=10.0)
+    beside = [Program("p", "gtest", f"p_test_{name}", [], Path("x"), began=110.0, seconds=10.0) for name in "bc"]
+    assert wall_times([alone, *beside]) == {"p/a.test": 10.0, "p/p_test_b": 5.0, "p/p_test_c": 5.0}
+    # The first 6 s with two others, the next 3 s with one; what waits between runs adds nothing.
+    overlapping = [
+        Program("p", "rostest", name, [], Path("x"), began=200.0 + begin, seconds=seconds)
+        for name, begin, seconds in (("d", 0.0, 6.0), ("e", 0.0, 9.0), ("f", 0.0, 9.0), ("g", 20.0, 1.0))
+    ]
+    assert wall_times(overlapping) == {"p/d": 2.0, "p/e": 3.5, "p/f": 3.5, "p/g": 1.0}

@@ -2,10 +2,13 @@
 
 import signal
 import sys
+import time
+from pathlib import Path
 
 import pytest
+from coglab_bringup import test_runner
 from coglab_bringup.arguments import test_options as options_of_test
-from coglab_bringup.test_runner import Program, find_programs, report, run
+from coglab_bringup.test_runner import BESIDE, FIRST, Program, find_programs, in_groups, report, run
 from coglab_bringup.usage import Refused
 
 GREEN = (
@@ -95,3 +98,60 @@ def test_a_package_that_the_build_left_out_is_not_tested(tmp_path):
     assert "./coglab build" in str(refusal.value)
     cache.write_text("CATKIN_BLACKLIST_PACKAGES:UNINITIALIZED=\nC:BOOL=ON\n")
     assert len(find_programs(tmp_path, tmp_path, sys.executable, [])) == 2
+
+
+def package_with(top, *files: tuple[str, str]) -> None:
+    """A package with these tests: name and text of each."""
+    package = top / "catkin_ws" / "src" / "pkg"
+    (package / "test").mkdir(parents=True)
+    (package / "package.xml").write_text("<package><name>pkg</name></package>")
+    for name, text in files:
+        (package / "test" / name).write_text(text)
+
+
+def test_a_rostest_runs_alone_unless_its_file_says_that_it_may_have_others_beside_it(tmp_path):
+    package_with(
+        tmp_path,
+        ("test_it.py", ""),
+        ("busy.test", "<launch/>"),
+        ("resting.test", f"<launch>\n  {BESIDE} it waits. -->\n</launch>"),
+    )
+    groups = in_groups(find_programs(tmp_path, tmp_path, sys.executable, []))
+    assert [[(one.name, one.beside) for one in group] for group in groups] == [
+        [("test_it.py", 2)],
+        [("resting.test", 3)],
+        [("busy.test", 1)],
+    ]
+
+
+def test_who_has_others_beside_it_never_meets_who_runs_alone(tmp_path, monkeypatch):
+    resting = f"{BESIDE} it waits. -->"
+    package_with(
+        tmp_path, *((f"alone_{i}.test", "") for i in range(2)), *((f"resting_{i}.test", resting) for i in range(4))
+    )
+    ran: dict[str, tuple[float, float]] = {}
+
+    def pretend(program: Program, _log, _limit: float) -> None:
+        begin = time.monotonic()
+        time.sleep(0.1)
+        ran[program.name] = (begin, time.monotonic())
+        program.passed = 1
+
+    monkeypatch.setattr(test_runner, "run", pretend)
+    monkeypatch.setenv("COGLAB_TOP", str(tmp_path))
+    assert test_runner.main(["--out", str(tmp_path / "out")]) == 0
+    assert len(ran) == 6
+    at_begin = {name: [other for other, (a, b) in ran.items() if a <= begin < b] for name, (begin, _) in ran.items()}
+    assert max(len(running) for running in at_begin.values()) == 3, at_begin
+    for name in ("alone_0.test", "alone_1.test"):
+        begin, end = ran[name]
+        assert [other for other, (a, b) in ran.items() if a < end and begin < b] == [name], ran
+
+
+def test_what_takes_longest_is_there_and_begins_first(tmp_path):
+    programs = find_programs(Path(__file__).resolve().parents[4], tmp_path, sys.executable, [])
+    names = [[one.name for one in group] for group in in_groups(programs)]
+    assert sorted(name for group in names for name in group if name in FIRST) == sorted(FIRST), "each is one program"
+    for group in names:
+        wanted = [name for name in FIRST if name in group]
+        assert group[: len(wanted)] == wanted

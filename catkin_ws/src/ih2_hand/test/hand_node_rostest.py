@@ -12,7 +12,7 @@ import rospy
 import rostest
 from actionlib import GoalStatus
 from actionlib_msgs.msg import GoalID, GoalStatusArray
-from coglab_msgs.msg import HandStatus, MotorStatus, ReasonCode
+from coglab_msgs.msg import HandPreshapeCloseActionFeedback, HandStatus, MotorStatus, ReasonCode
 from diagnostic_msgs.msg import DiagnosticArray
 from ih2_hand.ros.client import HandClient
 from std_msgs.msg import String
@@ -98,12 +98,21 @@ class HandNode(unittest.TestCase):
         positions = [motor.position for motor in self.hand.fresh_status().motors]
         for position, target in zip(positions, (245, 5, 30, 50, 50), strict=True):
             self.assertLessEqual(abs(position - target), 4)
+        codes: list[int] = []
+        # As told on the topic: actionlib's client leaves out what comes after the result, which has a topic of its own.
+        told = rospy.Subscriber(
+            "ih2_hand/hand_preshape_close/feedback",
+            HandPreshapeCloseActionFeedback,
+            lambda message: codes.append(message.feedback.status_code),
+        )
+        self.hand.wait(told.get_num_connections, "feedback topic")
         result = self.hand.run("hand_preshape_close")
         self.assertTrue(result.isOk, result.message)
         self.assertIn("holding", result.message)
         self.assertTrue(self.hand.feedback)
         self.assertEqual(len(self.hand.feedback[-1].positions), 5)
-        codes = [item.status_code for item in self.hand.feedback]
+        self.hand.wait(lambda: codes and codes[-1] == ReasonCode.NONE, "the last feedback")
+        told.unregister()
         self.assertEqual((set(codes[:-1]), codes[-1]), ({ReasonCode.HAND_MOVING}, ReasonCode.NONE))
         self.assertTrue(self.hand.fresh_status().holding)
         self.assertTrue(any("grasp cylindrical medium by current" in line for line in self.trace))

@@ -4,14 +4,18 @@ Three kinds, found by where they lie in a package:
   gtest    test/test_THING.cpp, built by the target `tests` as devel/lib/<package>/<package>_test_THING;
            not built is a failure
   pytest   test/test_*.py (smach's own packages one level deeper alike)
-  rostest  test/*.test, one at a time, each with a ROS master of its own
+  rostest  test/*.test, each with a ROS master of its own
 Packages that the build left out (./coglab build --upstream-smach) are named and not tested.
 A program without a single case is a failure, too: a test file that tests nothing hides what it was written for.
-gtests and pytests of different packages run two at a time; rostests run alone, because they measure real time.
+
+First gtests and pytests run, two at a time; then rostests, three at a time, that say in their file that they may
+(BESIDE): most of those wait more than they compute, and nothing that they measure is short. At last the other
+rostests, alone, because they measure real time.
 """
 
 from __future__ import annotations
 
+import itertools
 import os
 import shutil
 import subprocess
@@ -28,7 +32,18 @@ from coglab_bringup.run_directory import free_port, record_times, run_environmen
 from coglab_bringup.usage import Refused
 
 AT_A_TIME = 2
-"""test programs that run beside each other, but for rostests: those run alone"""
+"""gtests and pytests that run beside each other"""
+RESTING_AT_A_TIME = 3
+"""rostests that run beside each other, of those that may: most need a fifth of a processor, none as much as one"""
+BESIDE = "<!-- Beside others:"
+"""how the comment begins by which a .test file says that it may, and why"""
+FIRST = (
+    *("test_virtual_trials.py", "test_plain_cmake.py", "test_virtual_bad_input.py", "test_corrupted_streams.py"),
+    *("test_bridge_and_cell.py", "test_new_motion.py", "test_page.py"),
+    *("lwr_node.test", "port_contracts.test", "hand_node.test", "hand_faults.test", "fuzz.test"),
+    "topic_goal.test",
+)
+"""what takes longest begins first: as the last one it would run while nothing is left to run beside it"""
 TIME_LIMIT = 900.0  # s, per test program
 LONG_TIME_LIMIT = 7200.0  # s, with --long
 
@@ -42,6 +57,8 @@ class Program:
     name: str
     command: list[str]
     junit: Path  # file it writes, or (rostest) folder
+    beside: int = AT_A_TIME  # how many of its kind run at a time
+    began: float = 0.0  # s, monotonic
     seconds: float = 0.0
     passed: int = 0
     failed: int = 0
@@ -67,7 +84,8 @@ def find_programs(top: Path, results: Path, python: str, wanted: list[str]) -> l
             programs.append(Program(package, "pytest", path.name, command, xml))
         for path in sorted((folder / "test").glob("*.test")):
             home = results / f"{package}.{path.stem}"
-            programs.append(Program(package, "rostest", path.name, ["rostest", str(path)], home))
+            beside = RESTING_AT_A_TIME if BESIDE in path.read_text(encoding="utf-8") else 1
+            programs.append(Program(package, "rostest", path.name, ["rostest", str(path)], home, beside))
     return programs
 
 
@@ -119,7 +137,7 @@ def run(program: Program, log: Path, limit: float) -> None:
     environment = dict(os.environ)
     if program.kind == "rostest":
         environment = run_environment(free_port(), program.junit)
-    start = time.monotonic()
+    program.began = time.monotonic()
     if not Path(shutil.which(program.command[0]) or "").is_file():
         program.failed += 1
         program.failures.append(f"{program.command[0]} does not exist: it was not built; see .coglab/build.log")
@@ -131,7 +149,7 @@ def run(program: Program, log: Path, limit: float) -> None:
         status = process_tree.run(
             command, limit, stdout=output, stderr=subprocess.STDOUT, stdin=subprocess.DEVNULL, env=environment
         )
-    program.seconds = time.monotonic() - start
+    program.seconds = time.monotonic() - program.began
     count(program, status)
     verdict = "ok" if not program.failed else f"{program.failed} FAILED"
     print(
@@ -142,11 +160,25 @@ def run(program: Program, log: Path, limit: float) -> None:
 
 
 def wall_times(programs: list[Program]) -> dict[str, float]:
-    """s that each program adds to a run of all: its own, or its part of the time in which others run beside it."""
-    return {
-        f"{one.package}/{one.name}": round(one.seconds / (1 if one.kind == "rostest" else AT_A_TIME), 2)
-        for one in programs
-    }
+    """s that each program adds to a run of all: at every moment, those that run share the time equally."""
+    added = {f"{one.package}/{one.name}": 0.0 for one in programs}
+    edges = sorted({moment for one in programs for moment in (one.began, one.began + one.seconds)})
+    for begin, end in itertools.pairwise(edges):
+        running = [one for one in programs if one.began <= begin and end <= one.began + one.seconds]
+        for one in running:
+            added[f"{one.package}/{one.name}"] += (end - begin) / len(running)
+    return {name: round(seconds, 2) for name, seconds in added.items()}
+
+
+def in_groups(programs: list[Program]) -> list[list[Program]]:
+    """What runs one group after the other: gtests and pytests, rostests that may have others beside them, the rest."""
+    programs = sorted(programs, key=lambda one: FIRST.index(one.name) if one.name in FIRST else len(FIRST))
+    rostests = [one for one in programs if one.kind == "rostest"]
+    return [
+        [one for one in programs if one.kind != "rostest"],
+        [one for one in rostests if one.beside > 1],
+        [one for one in rostests if one.beside == 1],
+    ]
 
 
 def report(programs: list[Program], results: Path) -> int:
@@ -189,11 +221,10 @@ def main(arguments: list[str]) -> int:
     def run_one(program: Program) -> None:
         run(program, results / "logs" / f"{program.package}.{program.name}.log", limit)
 
-    with ThreadPoolExecutor(max_workers=AT_A_TIME) as pool:
-        list(pool.map(run_one, [program for program in programs if program.kind != "rostest"]))
-    for program in programs:
-        if program.kind == "rostest":
-            run_one(program)
+    for group in in_groups(programs):
+        if group:
+            with ThreadPoolExecutor(max_workers=group[0].beside) as pool:
+                list(pool.map(run_one, group))
     print(f"all tests: {time.monotonic() - start:.0f} s; JUnit files and logs: {os.path.relpath(results)}")
     if not options.packages and not options.long:
         record_times(top, "test", time.monotonic() - start, programs=wall_times(programs))
