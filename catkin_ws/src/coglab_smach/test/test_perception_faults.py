@@ -125,6 +125,24 @@ def test_the_partner_among_two_is_served_and_served_only(seed):
     assert trial.rig.robot.limit_violations == 0
 
 
+def test_the_other_hand_of_the_person_who_gives_is_nobody_elses():
+    """It hangs beside the body: the hand that gives is nearer, and is served."""
+    trial = two_people(1, 0.2, lambda t: np.array([1.35, 0.55, 0.1]))
+    results = trial.run("exchange_human_to_robot")
+    assert results[0].outcome == "succeeded", [results[0].reason, *results[0].causes]
+    assert trial.rig.cell.truth()["held_by"] == "robot"
+
+
+def test_two_hands_of_one_person_that_come_together_are_not_told_apart():
+    """The other one comes along 0.15 m beside the hand that gives: nobody can say which gives, and the action ends with
+    the sentence, before the arm has closed on either."""
+    trial = two_people(1, 0.2, lambda t: np.asarray(trial.rig.truth["human_hand"]["position"]) + [0.0, 0.15, 0.0])
+    results = trial.run("exchange_human_to_robot")
+    assert results[0].outcome == "failed_empty"
+    assert SENTENCE in " ".join([results[0].reason, *results[0].causes])
+    assert "closing" not in results[0].marks and trial.last_hub == "wait_without_object"
+
+
 @pytest.mark.parametrize("jump", [0.08, 0.30])
 def test_identity_swaps_neither_mislead_the_arm_nor_go_unsaid(jump):
     """The tracker takes something else for the object or the hand for four frames at a time, about every 3 s."""
