@@ -28,6 +28,43 @@ TEST(DmpController, ReachesTheGoalFrameAndRestsExactlyStill) {
   EXPECT_EQ(robot.command.velocity, JointVector::Zero().eval());
 }
 
+/// A hand that somebody holds for a while, in the middle of its way, does not leap when it is free.
+TEST(DmpController, TheSetPointWaitsForAHandThatLagsBehind) {
+  double fastest[2] = {0.0, 0.0}, lag = 0.0;
+  for (const bool held : {false, true}) {
+    VirtualRobot robot;
+    robot.followWithinLimits();
+    robot.loadBoth();
+    robot.see("human_hand", kGoal);
+    robot.dmp().setIkDebug(true);
+    ASSERT_TRUE(VirtualRobot::ok(robot.dmp().execute(robot.reach())));
+    int i = 0;
+    for (; i < 1600 && robot.state() != MotionState::Reached; ++i) {
+      robot.see("human_hand", kGoal);
+      const bool now = held && i >= 80 && i < 140;
+      const JointVector before = robot.sample.position;
+      robot.tick();
+      if (now) {
+        robot.sample.position = robot.sample.commanded_position = before;
+        robot.sample.velocity.setZero();
+        robot.sample.commanded_velocity.setZero();
+        robot.sample.commanded_acceleration.setZero();
+        robot.interpolator->reset(before);
+      }
+      fastest[held] = std::max(fastest[held], robot.handVelocity().norm());
+      IkDebugRecord record;
+      while (robot.dmp().readIkDebug(record)) {
+        lag = std::max(lag, record.ik.position_error.norm());
+      }
+    }
+    EXPECT_EQ(robot.state(), MotionState::Reached) << robot.reason();
+    EXPECT_LT((robot.hand().position - kGoal).norm(), 2e-3);
+  }
+  EXPECT_GT(lag, 0.02) << "else nobody has held it";
+  EXPECT_LT(lag, 0.08);
+  EXPECT_LT(fastest[1], fastest[0] + 0.15);
+}
+
 TEST(DmpController, OffsetIsAppliedOnceAndTurnsWithTheGoalFrame) {
   VirtualRobot robot;
   robot.loadBoth();

@@ -262,6 +262,32 @@ TEST(TwoTaskIk, AnswersErrorsOnlyWithSpeedsTheJointsCanBrakeFrom) {
   EXPECT_LT(least, 0.5);
 }
 
+TEST(TwoTaskIk, TakesAnErrorOfThePositionAwayNoFasterThanItMay) {
+  Random random(9);
+  IkParameters parameters = unlimited();
+  parameters.correction_speed = 0.3;
+  const TwoTaskIk gentle(parameters), plain(unlimited());
+  int slowed = 0;
+  for (int k = 0; k < 2000; ++k) {
+    const JointVector q = random.posture(0.1);
+    const ChainState state = robot().evaluate(q);
+    CartesianReference reference;
+    reference.orientation_control = false;
+    reference.pose = state.tool;
+    reference.pose.position += random.point(k % 2 == 0 ? 0.1 : 0.01);
+    IkResult slow, fast;
+    gentle.solve(state, q, reference, slow);
+    plain.solve(state, q, reference, fast);
+    if (fast.scale < 1.0 || fast.smallest_singular_value_position < 0.01) continue;
+    const double speed = (state.jacobian.topRows<3>() * slow.velocity).norm();
+    const double eq6 = 20.0 * fast.position_error.norm();
+    ASSERT_NEAR(speed, std::min(0.3, eq6), 1e-6);
+    if (eq6 <= 0.3) ASSERT_LT((slow.velocity - fast.velocity).norm(), 1e-12);
+    slowed += eq6 > 0.3 ? 1 : 0;
+  }
+  EXPECT_GT(slowed, 200);
+}
+
 TEST(TwoTaskIk, RefusesBadParameters) {
   IkParameters parameters;
   parameters.pos_clik_gain = std::nan("");
@@ -271,6 +297,9 @@ TEST(TwoTaskIk, RefusesBadParameters) {
   EXPECT_THROW(TwoTaskIk{parameters}, std::invalid_argument);
   parameters = {};
   parameters.singularity_threshold = -1.0;
+  EXPECT_THROW(TwoTaskIk{parameters}, std::invalid_argument);
+  parameters = {};
+  parameters.correction_speed = 0.0;
   EXPECT_THROW(TwoTaskIk{parameters}, std::invalid_argument);
   EXPECT_THROW(OrientationTask(-1.0), std::invalid_argument);
 }

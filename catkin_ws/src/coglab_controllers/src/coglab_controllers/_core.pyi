@@ -376,9 +376,10 @@ class TwoTaskIk:
         velocity_limit: ArrayLike = ...,
         acceleration_limit: ArrayLike = ...,
         jerk_limit: ArrayLike = ...,
+        correction_speed: float = ...,
     ) -> None:
         """Limits (7,) in rad/s, rad/s^2, rad/s^3. With those of acceleration and jerk, errors are answered only by
-        speeds from which each joint can brake."""
+        speeds from which each joint can brake, and those of the position by correction_speed (m/s) at most."""
 
     def solve(
         self,

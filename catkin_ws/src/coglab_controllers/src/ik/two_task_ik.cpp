@@ -86,6 +86,8 @@ TwoTaskIk::TwoTaskIk(const IkParameters& parameters)
   };
   require("pos_clik_gain", parameters.pos_clik_gain, 0.0, 500.0);
   require("rot_clik_gain", parameters.rot_clik_gain, 0.0, 500.0);
+  require("correction_speed", parameters.correction_speed, 1e-3,
+          std::numeric_limits<double>::infinity());
   require("singularity_threshold", parameters.singularity_threshold, 1e-6, 1.0);
   require("stretch_threshold", parameters.stretch_threshold, 1e-6, 0.2);
   for (int i = 0; i < kMaxJoints; ++i) {
@@ -137,7 +139,9 @@ void TwoTaskIk::solve(const ChainState& state, const JointVector& q,
   };
   const Eigen::Matrix<double, kMaxJoints, 3> pseudo_inverse = svd.pseudoInverse(damped);
   const JointVector way = pseudo_inverse * result.position_error;
-  const double gain = brakeableGain(way, parameters_.pos_clik_gain);
+  const double error = result.position_error.norm();
+  const double most = error > 0.0 ? parameters_.correction_speed / error : parameters_.pos_clik_gain;
+  const double gain = brakeableGain(way, std::min(most, parameters_.pos_clik_gain));
   result.position_velocity = pseudo_inverse * reference.velocity + gain * way;  // (6), (9)
 
   // (10) from the same decomposition: J^+ J is the projection on the right singular vectors.

@@ -8,6 +8,9 @@ namespace coglab_controllers {
 
 using Space = MotionReference::Space;
 
+// m/s: a hand that limits have kept from its set-point comes back beside a person.
+constexpr double kCorrectionSpeed = 0.3;
+
 Reason Arrival::handStuck(double away) noexcept {
   return Reason(ReasonCode::TargetNotReached, "the hand does not come to the goal: ")
          << away << " m are left; is the arm blocked?";
@@ -22,6 +25,7 @@ void ReferenceLoop::configure(const MotionSetup& setup) {
       parameters.number("pos_clik_gain", std::min(ik.pos_clik_gain, most), 0.0, most);
   ik.rot_clik_gain =
       parameters.number("rot_clik_gain", std::min(ik.rot_clik_gain, most), 0.0, most);
+  ik.correction_speed = parameters.number("correction_speed", kCorrectionSpeed, 1e-3, 10.0);
   ik.singularity_threshold =
       parameters.number("singularity_threshold", ik.singularity_threshold, 0.0, 1.0);
   ik.rotation_first_scaling = parameters.flag("rotation_first_scaling", ik.rotation_first_scaling);

@@ -77,7 +77,7 @@ void bindIk(py::module_& module) {
       .def(py::init([](double pos_clik_gain, double rot_clik_gain, double singularity_threshold,
                        double stretch_threshold, bool rotation_first_scaling,
                        const JointVector& velocity_limit, const JointVector& acceleration_limit,
-                       const JointVector& jerk_limit) {
+                       const JointVector& jerk_limit, double correction_speed) {
              IkParameters parameters;
              parameters.pos_clik_gain = pos_clik_gain;
              parameters.rot_clik_gain = rot_clik_gain;
@@ -87,6 +87,7 @@ void bindIk(py::module_& module) {
              parameters.velocity_limit = velocity_limit;
              parameters.acceleration_limit = acceleration_limit;
              parameters.jerk_limit = jerk_limit;
+             parameters.correction_speed = correction_speed;
              return TwoTaskIk(parameters);
            }),
            py::arg("pos_clik_gain") = standard.pos_clik_gain,
@@ -97,8 +98,10 @@ void bindIk(py::module_& module) {
            py::arg("velocity_limit") = standard.velocity_limit,
            py::arg("acceleration_limit") = standard.acceleration_limit,
            py::arg("jerk_limit") = standard.jerk_limit,
+           py::arg("correction_speed") = standard.correction_speed,
            "With the limits of acceleration (7,) and jerk (7,) errors are answered only by speeds "
-           "from which each joint can brake.")
+           "from which each joint can brake, and those of the position by no more than "
+           "correction_speed (m/s).")
       .def(
           "solve",
           [](const TwoTaskIk& ik, const Chain& chain, const JointVector& q,

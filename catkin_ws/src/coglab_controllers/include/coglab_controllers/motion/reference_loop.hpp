@@ -43,8 +43,8 @@ class Arrival {
 /// velocities. Where a motion begins, the difference between set-point and measurement is blended
 /// in. No allocation, no throw but in configure().
 ///
-/// Parameters: `Kp` (1/s, joints), `pos_clik_gain`, `rot_clik_gain` (1/s), `singularity_threshold`,
-/// `rotation_first_scaling` (poses, eq. 6-12), `hold_blend` (s), `tolerance` (rad),
+/// Parameters: `Kp` (1/s, joints), `pos_clik_gain`, `rot_clik_gain` (1/s),
+/// `correction_speed` (m/s), `singularity_threshold`, `rotation_first_scaling` (poses, eq. 6-12), `hold_blend` (s), `tolerance` (rad),
 /// `arrive_distance` (m).
 class ReferenceLoop {
  public:

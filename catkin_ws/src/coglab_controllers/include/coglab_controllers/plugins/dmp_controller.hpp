@@ -30,8 +30,8 @@ namespace coglab_controllers {
 /// `noisy_goal_time_constant` (s), `max_initial_distance` (m), `end_phase`, `end_speed` (m/s),
 /// `end_turning` (rad/s), `end_distance` (m),
 /// `follow_distance` (m), `follow_time` (s), `arrive_distance` (m),
-/// `settle_time` (s), `singularity_threshold`, `rotation_first_scaling`,
-/// `hold_blend` (s), `dmp_file` (a library to load at once); on ROS also `goal_tf_frame` (name
+/// `settle_time` (s), `correction_speed` (m/s), `singularity_threshold`,
+/// `rotation_first_scaling`, `hold_blend` (s), `dmp_file` (a library to load at once); on ROS also `goal_tf_frame` (name
 /// under which the estimated goal is broadcast; empty: it is not).
 class DmpController : public MotionRunner<DmpPlan> {
  public:
