@@ -9,6 +9,8 @@ from coglab_msgs.msg import ReasonCode
 from coglab_objects.database import objects_folder, parse_object
 from coglab_py.packages import package_path
 from coglab_py.pose import Pose
+from coglab_sim.conditions import Conditions
+from coglab_sim.tracker.tracker import PerceptionSettings
 from coglab_sim.virtual_world import BOARD
 from coglab_smach.context.config import Config
 from coglab_smach.kinematics.board_room import BoardRoom
@@ -102,6 +104,13 @@ def test_an_object_that_is_seen_tilted_and_low_is_taken_without_running_into_the
     assert trial.last_hub == "wait_with_object" and trial.rig.cell.truth()["held_by"] == "robot"
 
 
+def test_a_wide_object_is_taken_along_its_approach_axis_and_not_from_above():
+    smach.set_loggers(*[lambda *a: None] * 4)
+    conditions = Conditions(profile="accustomed", perception=PerceptionSettings(perfect=True), object_id="tea_box")
+    trial = VirtualTrial(seed=8001, object_on="world", conditions=conditions)
+    assert [r.outcome for r in trial.run("take")] == ["succeeded"], trial.ctx.journal.why()
+
+
 def test_an_object_that_lies_is_refused_before_the_arm_goes_down_to_it():
     smach.set_loggers(*[lambda *a: None] * 4)
     trial = VirtualTrial(seed=8001, object_on="world", profile="accustomed", perfect=True)
@@ -137,7 +146,7 @@ def test_goals_at_the_board_are_raised(action, z):
     goal = trial.master.get_children()[action].userdata.goal
     assert goal["offset"][2] == pytest.approx(z + 0.004)
     raised = next(t for t in trial.ctx.journal.transitions if t.from_state == "set_dmp_goal" and action in t.path)
-    assert raised.reason == "raised by 4 mm, off the board"
+    assert raised.reason == "raised by 4.0 mm, off the board"
 
 
 @pytest.mark.parametrize("action, outcome", [("take", "failed_empty"), ("put", "failed_holding")])

@@ -297,12 +297,13 @@ def off_the_board(state: CoglabState, goal: dict[str, Any]) -> dict[str, Any]:
         )
     if lift == 0.0:
         return goal
-    state.reason = f"raised by {1000 * lift:.0f} mm, off the board"
+    state.reason = f"raised by {1000 * lift:.1f} mm, off the board"
     return {**goal, "offset": (board.inverse() * palm).to_dict()["xyz"]}
 
 
 class SetTakeGoal(CoglabState):
-    """DMP goal in the board frame, from detection and database, with a little clearance between palm and object."""
+    """DMP goal in the board frame, from detection and database, with a little clearance between palm and object; the
+    last of the way leads along the grasp's approach axis."""
 
     default_time_limit = 8.0
 
@@ -311,7 +312,10 @@ class SetTakeGoal(CoglabState):
 
     def run(self, ud: Any) -> str:
         clearance = float(self.ctx.config.get("take.clearance", 0.012))
-        ud.goal = off_the_board(self, place_goal(ud.object_entry, ud.grasp, ud.located, "take", clearance))
+        goal = off_the_board(self, place_goal(ud.object_entry, ud.grasp, ud.located, "take", clearance))
+        # From above, fingers would come down on what is wider than the hand is open there.
+        way = approach_of(ud.grasp, float(self.ctx.config.get("take.approach", 0.05)))
+        ud.goal = {**goal, "approach": Pose.from_dict(ud.located).rotation.apply(way).tolist()}
         return "succeeded"
 
 
