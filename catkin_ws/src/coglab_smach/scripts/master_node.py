@@ -32,6 +32,7 @@ from coglab_smach.context.journal import NOTHING_FAILED, ActionRecord, Journal, 
 from coglab_smach.context.master_state import MasterState, StateWatch
 from coglab_smach.context.requests import command
 from coglab_smach.context.trigger import ask_for
+from coglab_smach.kinematics.board_room import BoardRoom
 from coglab_smach.kinematics.reachability import solve
 from coglab_smach.machines import build_master
 from coglab_smach.ros.arm import RosArm
@@ -86,8 +87,8 @@ class MasterNode:
             config=config,
             journal=self.journal,
             memory=Memory(self.state_file(), rospy.logwarn),
-            reachable=self.reachable(),
             say=self.say,
+            **self.geometry(config),
         )
         self.master = build_master(self.ctx)
         self.thread = threading.Thread(target=self.master.execute, name="coglab_master", daemon=True)
@@ -102,13 +103,14 @@ class MasterNode:
         rospy.Service("coglab/why", Trigger, self.on_why)
 
     @staticmethod
-    def reachable():
-        """The check of the arm's reach on the robot's own description, where there is one."""
+    def geometry(config):
+        """The checks of the arm's reach and of its room above the board, on the robot's own description; where there
+        is none, nothing is checked."""
         urdf = parameters.found_above("robot_description", str)
         if urdf is None:
-            return lambda pose: True
-        arm = cc.Chain(urdf)
-        return lambda pose: solve(arm, pose) is not None
+            return {}
+        arm, room = cc.Chain(urdf), BoardRoom(urdf, config.get("postures.board"))
+        return {"reachable": lambda pose: solve(arm, pose) is not None, "raised": room.raised}
 
     @staticmethod
     def state_file() -> str:

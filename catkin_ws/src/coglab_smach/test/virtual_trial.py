@@ -16,6 +16,7 @@ from coglab_smach.clocks.virtual_clock import VirtualClock, using
 from coglab_smach.context.config import Config
 from coglab_smach.context.context import Context
 from coglab_smach.context.journal import Journal
+from coglab_smach.kinematics.board_room import BoardRoom
 from coglab_smach.kinematics.reachability import default_arm, solve
 from coglab_smach.machines import build_master
 from coglab_smach.ports.pending import Ready
@@ -75,6 +76,7 @@ class VirtualTrial:
             config=config,
             journal=Journal(self.clock.now),
             reachable=lambda pose: solve(default_arm(), pose) is not None,
+            raised=BoardRoom(self.rig.robot.urdf, config.get("postures.board")).raised,
             say=self._say,
         )
         self.ctx.journal.listen(self._on_transition)

@@ -56,6 +56,9 @@ class Context:
     memory: HoldingMemory = field(default_factory=HoldingMemory)
     reachable: Callable[[Pose], bool] = lambda pose: True
     """whether the arm can bring the palm to a pose in the base frame"""
+    raised: Callable[[Pose, Pose, float, float], tuple[float, Pose | None]] = lambda _board, palm, *_: (0.0, palm)
+    """(board, palm, room, most): m by which the palm has to rise to leave so much room above the board, and that palm;
+    None where that is more than most (BoardRoom.raised)"""
     say: Callable[[int, str], None] = lambda code, text: None
     """tell the person something: code of coglab_msgs/Say and a sentence"""
     shared: bool = False

@@ -280,17 +280,42 @@ class SetGraspGoal(CoglabState):
         return goals
 
 
-class SetTakeGoal(CoglabState):
-    """DMP goal in the board frame, from detection and database, with a little clearance between palm and object."""
+def off_the_board(state: CoglabState, goal: dict[str, Any]) -> dict[str, Any]:
+    """The goal in the board frame, raised so far that hand and forearm stay ``board.room`` m above the board: an object
+    that is seen a little tilted or low would lead them into it. PortError where that is more than ``board.lift`` m."""
+    config = state.ctx.config
+    board = Pose.from_dict(locate(state, str(config.get("perception.board", "board"))))
+    room, most = float(config.get("board.room", 0.01)), float(config.get("board.lift", 0.03))
+    offset = Pose.from_dict({"xyz": goal["offset"], "quaternion": goal["orientation"]})
+    lift, palm = state.ctx.raised(board, board * offset, room, most)
+    if palm is None:
+        raise PortError(
+            f"hand or forearm would run into the board: the goal would have to rise by at least {1000 * lift:.0f} mm "
+            f"to keep {1000 * room:.0f} mm off it, expected at most {1000 * most:.0f} mm",
+            ("the object lies, or is seen tilted or too low; stand it up, or check where the board is seen",),
+            ReasonCode.GOAL_AT_BOARD,
+        )
+    if lift == 0.0:
+        return goal
+    state.reason = f"raised by {1000 * lift:.1f} mm, off the board"
+    return {**goal, "offset": (board.inverse() * palm).to_dict()["xyz"]}
 
-    default_time_limit = 5.0
+
+class SetTakeGoal(CoglabState):
+    """DMP goal in the board frame, from detection and database, with a little clearance between palm and object; the
+    last of the way leads along the grasp's approach axis."""
+
+    default_time_limit = 8.0
 
     def __init__(self, ctx: Context) -> None:
         super().__init__(ctx, input_keys=["object_entry", "grasp", "located"], output_keys=["goal"])
 
     def run(self, ud: Any) -> str:
         clearance = float(self.ctx.config.get("take.clearance", 0.012))
-        ud.goal = place_goal(ud.object_entry, ud.grasp, ud.located, "take", clearance)
+        goal = off_the_board(self, place_goal(ud.object_entry, ud.grasp, ud.located, "take", clearance))
+        # From above, fingers would come down on what is wider than the hand is open there.
+        way = approach_of(ud.grasp, float(self.ctx.config.get("take.approach", 0.05)))
+        ud.goal = {**goal, "approach": Pose.from_dict(ud.located).rotation.apply(way).tolist()}
         return "succeeded"
 
 
@@ -350,11 +375,11 @@ class FindPlace(CoglabState):
 class SetPlaceGoal(CoglabState):
     """DMP goal from a free place: the palm pose that brings the held object there."""
 
-    default_time_limit = 5.0
+    default_time_limit = 8.0
 
     def __init__(self, ctx: Context) -> None:
         super().__init__(ctx, input_keys=["object_entry", "grasp", "place"], output_keys=["goal"])
 
     def run(self, ud: Any) -> str:
-        ud.goal = place_goal(ud.object_entry, ud.grasp, ud.place, "put")
+        ud.goal = off_the_board(self, place_goal(ud.object_entry, ud.grasp, ud.place, "put"))
         return "succeeded"
