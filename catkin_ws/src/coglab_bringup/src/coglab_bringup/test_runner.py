@@ -8,7 +8,7 @@ Three kinds, found by where they lie in a package:
 Packages that the build left out (./coglab build --upstream-smach) are named and not tested.
 A program without a single case is a failure, too: a test file that tests nothing hides what it was written for.
 
-First gtests and pytests run, two at a time; then rostests, three at a time, that say in their file that they may
+First gtests and pytests run, two at a time; then rostests, two at a time, that say in their file that they may
 (BESIDE): most of those wait more than they compute, and nothing that they measure is short. At last the other
 rostests, alone, because they measure real time.
 """
@@ -33,8 +33,8 @@ from coglab_bringup.usage import Refused
 
 AT_A_TIME = 2
 """gtests and pytests that run beside each other"""
-RESTING_AT_A_TIME = 3
-"""rostests that run beside each other, of those that may: most need a fifth of a processor, none as much as one"""
+RESTING_AT_A_TIME = 2
+"""rostests that run beside each other, of those that may: most need a fifth of a processor"""
 BESIDE = "<!-- Beside others:"
 """how the comment begins by which a .test file says that it may, and why"""
 FIRST = (
