@@ -114,7 +114,9 @@ class FeedbackOnRos(unittest.TestCase):
         """Each refusal says what came and what was expected, and changes nothing."""
         name, call = "controller_manager/feedback/", self.robot.call
         odd = ("\x1b[2J", "a\0b", " ", "\N{RIGHT-TO-LEFT OVERRIDE}x", "x" * 201)
-        requests = [(verb, ["ee_admittance"], text) for verb in ("enable", "disable", "pause", "resume") for text in odd]
+        requests = [
+            (verb, ["ee_admittance"], text) for verb in ("enable", "disable", "pause", "resume") for text in odd
+        ]
         requests += [("apply_profile", ["dmp"], text) for text in odd]
         # An empty name among others would otherwise be all of them.
         requests += [(verb, [""], "") for verb in ("enable", "disable", "pause", "resume")]

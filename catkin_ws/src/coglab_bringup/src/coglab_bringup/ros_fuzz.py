@@ -2,10 +2,10 @@
 
 Malformed by design, so that no request is valid by chance: each message holds at least one odd value. That is a float
 that is not finite or near 1e308 (one in each array at least), else an odd string; every third message with a time has
-an odd stamp instead, the rest of it being fine (joint states with all joints of the arm). Only messages without any such
-field are valid by nature (`Empty`, `Trigger`, integers and flags alone), and those whose odd values are all documented
-(fuzz_rules.py) are allowed: both are sent as well and counted apart. What they ask for is no motion of the arm; but
-`stop` would refuse every motion from then on: left out.
+an odd stamp instead, the rest of it being fine (joint states with all joints of the arm). Only messages without any
+such field are valid by nature (`Empty`, `Trigger`, integers and flags alone), and those whose odd values are all
+documented (fuzz_rules.py) are allowed: both are sent as well and counted apart. What they ask for is no motion of the
+arm; but `stop` would refuse every motion from then on: left out.
 """
 
 from __future__ import annotations

@@ -140,7 +140,8 @@ void TwoTaskIk::solve(const ChainState& state, const JointVector& q,
   const Eigen::Matrix<double, kMaxJoints, 3> pseudo_inverse = svd.pseudoInverse(damped);
   const JointVector way = pseudo_inverse * result.position_error;
   const double error = result.position_error.norm();
-  const double most = error > 0.0 ? parameters_.correction_speed / error : parameters_.pos_clik_gain;
+  const double most =
+      error > 0.0 ? parameters_.correction_speed / error : parameters_.pos_clik_gain;
   const double gain = brakeableGain(way, std::min(most, parameters_.pos_clik_gain));
   result.position_velocity = pseudo_inverse * reference.velocity + gain * way;  // (6), (9)
 

@@ -12,8 +12,8 @@ namespace coglab_controllers {
 struct IkParameters {
   double pos_clik_gain = 20.0;  ///< K_pos, 1/s, eq. (6); at most 0.5 / cycle time for a stable loop
   double rot_clik_gain = 20.0;  ///< K_rot, 1/s, eq. (7)
-  /// Largest speed with which an error of the position is taken away, m/s; of larger errors K_pos is
-  /// as much smaller. Without a limit, the default, it is that of eq. (6).
+  /// Largest speed with which an error of the position is taken away, m/s; of larger errors K_pos
+  /// is as much smaller. Without a limit, the default, it is that of eq. (6).
   double correction_speed = std::numeric_limits<double>::infinity();
   double singularity_threshold =
       0.05;  ///< the second task is rejected if its smallest singular value is below this

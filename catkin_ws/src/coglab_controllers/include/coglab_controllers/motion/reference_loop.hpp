@@ -44,8 +44,8 @@ class Arrival {
 /// in. No allocation, no throw but in configure().
 ///
 /// Parameters: `Kp` (1/s, joints), `pos_clik_gain`, `rot_clik_gain` (1/s),
-/// `correction_speed` (m/s), `singularity_threshold`, `rotation_first_scaling` (poses, eq. 6-12), `hold_blend` (s), `tolerance` (rad),
-/// `arrive_distance` (m).
+/// `correction_speed` (m/s), `singularity_threshold`, `rotation_first_scaling` (poses, eq. 6-12),
+/// `hold_blend` (s), `tolerance` (rad), `arrive_distance` (m).
 class ReferenceLoop {
  public:
   /// @throws std::runtime_error naming the parameter

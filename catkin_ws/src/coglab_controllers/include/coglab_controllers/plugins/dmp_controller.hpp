@@ -31,8 +31,8 @@ namespace coglab_controllers {
 /// `end_turning` (rad/s), `end_distance` (m),
 /// `follow_distance` (m), `follow_time` (s), `arrive_distance` (m),
 /// `settle_time` (s), `correction_speed` (m/s), `singularity_threshold`,
-/// `rotation_first_scaling`, `hold_blend` (s), `dmp_file` (a library to load at once); on ROS also `goal_tf_frame` (name
-/// under which the estimated goal is broadcast; empty: it is not).
+/// `rotation_first_scaling`, `hold_blend` (s), `dmp_file` (a library to load at once); on ROS also
+/// `goal_tf_frame` (name under which the estimated goal is broadcast; empty: it is not).
 class DmpController : public MotionRunner<DmpPlan> {
  public:
   DmpController();
