@@ -251,39 +251,3 @@ def test_a_tug_while_the_hand_has_closed():
     results = trial.run(RECEIVE)
     assert results[0].outcome == "succeeded", trial.ctx.journal.why()
     assert 5.0 < max(forces) <= 15.0
-
-
-def test_a_tug_while_the_fingers_close():
-    """14 N for 0.3 s: the fingers loosen, close again when it is over, and the object is received all the same."""
-    trial = VirtualTrial(seed=4, profile="accustomed", perfect=True)
-    tug = []
-
-    def beside(t):
-        if not tug and t.ctx.journal.marked("closing"):
-            tug.append(t.rig.t + 0.1)
-        if tug:
-            t.rig.cell.set_push([0.0, 14.0 if tug[0] < t.rig.t < tug[0] + 0.3 else 0.0, 0.0])
-
-    trial.beside = beside
-    result = trial.run(RECEIVE)[0]
-    assert result.outcome == "succeeded" and "pulled" in result.marks, trial.ctx.journal.why()
-    assert trial.rig.cell.truth()["held_by"] == "robot" and trial.rig.robot.limit_violations == 0
-
-
-def test_a_hand_that_stays_in_the_gripper():
-    """The person holds on until the robot gives up: closed with the lowest force level, pulled at with 15 N at most,
-    and given back."""
-    trial = VirtualTrial(seed=31, profile="accustomed", perfect=True, behaviour="never_release")
-    forces, levels, preshape = [], set(), trial.ctx.hand.preshape
-    trial.ctx.hand.preshape = lambda mode, level: levels.add(level) or preshape(mode, level)
-
-    def beside(t):
-        if t.ctx.journal.marked("closing"):
-            forces.append(float(np.linalg.norm(t.rig.cell.truth()["human_force"])))
-
-    trial.beside = beside
-    result = trial.run(RECEIVE)[0]
-    assert result.outcome == "failed_empty" and result.code == ReasonCode.NOT_RELEASED
-    assert "the person did not let go of 'mug'" in trial.ctx.journal.why()
-    assert levels == {"low"} and 1.0 < max(forces) <= 15.0
-    assert trial.rig.cell.truth()["held_by"] == "human" and at_home(trial)
