@@ -9,47 +9,28 @@ from coglab_msgs.msg import ReasonCode, Say
 from ih2_hand.grasps import levels_of
 
 from coglab_smach.context.awaited import ARM, HAND
-from coglab_smach.context.config import Config
 from coglab_smach.context.context import Context
-from coglab_smach.ports.pending import Pending, PortError
-from coglab_smach.states.base import CoglabState, Interrupted, TimeLimit
+from coglab_smach.ports.pending import PortError
+from coglab_smach.states.base import CoglabState
 from coglab_smach.states.motion import shift, shift_time
 from coglab_smach.states.where import hand_from_palm, palm_axis
-from coglab_smach.states.yielding import GivesWay
 
-GRAVITY, SIDES = 9.81, 2
-"""m/s^2; an object is pressed from two sides, and each bears its share by friction"""
+SLIPPERY = 0.45
+"""friction below which an object is that"""
 LOOSE = 40
 """counts of 254 that the fingers have opened when the palm begins to draw back"""
-PULLED = 0.01
-"""s for which closing fingers are pulled at too strongly before they loosen"""
-LOOSE_PULLED = 8
-"""counts of 254 by which they do at most"""
-MOST_LOOSENED = 3
-"""how often they do, before they open for good"""
-CALM, PULL_ENDS = 0.2, 2.0
-"""s without a pull until they close again, and s for which that is waited for"""
 DRAWING_BACK = 2.0
 """s that drawing back may take beyond what limits and speed scale ask for"""
 
 
-def gentle(entry: Mapping[str, Any], grasp: Mapping[str, Any], config: Config) -> dict[str, Any]:
+def gentle(entry: Mapping[str, Any], grasp: Mapping[str, Any]) -> dict[str, Any]:
     """The hand of a grasp as it closes beside a person, whose fingers may be between its own: with the lowest force
-    level that every dialect has for its mode and that bears the object's weight by friction, ``hand.safety`` times.
-    Where none does it is the grasp's own level."""
+    level that every dialect has for its mode. What is SLIPPERY slides out of that while the person holds on, and is
+    held with its own level from the beginning."""
     hand: dict[str, Any] = dict(grasp["hand"])
-    weight = float(entry.get("mass", 0.0)) * GRAVITY
-    needed = float(config.get("hand.safety", 2.0)) * weight / (SIDES * float(entry.get("friction", 1.0)))
-    for level in levels_of(hand["mode"], "legacy"):
-        if level == hand["level"] or float(config.get(f"hand.force.{level}", 0.0)) >= needed:
-            return {**hand, "level": level}
+    if float(entry.get("friction", 1.0)) >= SLIPPERY:
+        hand["level"] = levels_of(hand["mode"], "legacy")[0]
     return hand
-
-
-def opened_by(ctx: Context, closed: tuple[int, ...], counts: int) -> bool:
-    """Whether a finger has opened by so many counts since the motors stood at ``closed``."""
-    now = ctx.hand.state().positions
-    return len(now) == len(closed) > 0 and max(c - n for c, n in zip(closed[1:], now[1:], strict=True)) >= counts
 
 
 class CalibrateHand(CoglabState):
@@ -95,19 +76,16 @@ class HandClose(CoglabState):
     """Close the preshaped hand on the object and make sure that something is in it; with ``from_person`` say so.
 
     Outcome missed, with ``from_person``: the fingers have closed on nothing for the first time in this action; a person
-    who offers waits, so the arm may try once more. Meanwhile the palm goes along with who pulls (GivesWay), and from
-    ``pull.limit`` N on the fingers loosen until nobody pulls any more, and then close again; who pulls at them again
-    and again gets the object back.
+    who offers waits, so the arm may try once more.
     """
 
     default_time_limit = 12.0
-    owns_motion = True
 
     def __init__(self, ctx: Context, from_person: bool) -> None:
         super().__init__(
             ctx,
             outcomes=["succeeded", "missed"] if from_person else ["succeeded"],
-            input_keys=["object_id", "object_entry"] if from_person else ["object_id"],
+            input_keys=["object_id"],
             output_keys=["hand_distance"] if from_person else [],
         )
         self.from_person = from_person
@@ -120,10 +98,7 @@ class HandClose(CoglabState):
         self.ctx.closing = None
         if self.from_person:
             ud.hand_distance = hand_from_palm(self)
-            if self._pulled_at(closing, float(ud.object_entry.get("mass", 0.0))):
-                self._give_back(ud.object_id)
-        else:
-            self.await_pending(closing, "closing of the hand", code=HAND)
+        self.await_pending(closing, "closing of the hand", code=HAND)
         self.ctx.journal.mark("closed")
         end = self.ctx.clock.now() + float(self.ctx.config.get("hand.settle_after_close", 0.3))
         while not self.ctx.hand.state().holding and self.ctx.clock.now() < end:
@@ -143,63 +118,6 @@ class HandClose(CoglabState):
         if self.from_person:
             self.ctx.say(Say.I_HAVE_IT, "I have it.")
         return "succeeded"
-
-    def _pulled_at(self, closing: Pending, mass: float) -> bool:
-        """Give way until the hand has closed. Closing fingers that are pulled at loosen, and close again when the pull
-        is over; whether they have to loosen for good."""
-        way, loosened = GivesWay(self.ctx, mass), 0
-
-        def over() -> bool:
-            way.follow()
-            return closing.done() or way.too_strong(PULLED)
-
-        try:
-            while True:
-                self.wait_for(over, "closing of the hand", code=HAND)
-                if closing.done() or loosened == MOST_LOOSENED:
-                    break
-                loosened += 1
-                closing.cancel()
-                self._loosen(way)
-                closing = self.ctx.hand.close(int(self.ctx.config.get("pull.close_speed", 100)))
-        except (Interrupted, TimeLimit):
-            closing.cancel()
-            raise
-        finally:
-            way.stop()
-        if not closing.done():
-            closing.cancel()
-            return True
-        closing.result()
-        return False
-
-    def _loosen(self, way: GivesWay) -> None:
-        """Open the fingers until nobody pulls, a little at most, and wait for the end of the pull."""
-        self.ctx.journal.mark("pulled")
-        closed, least = self.ctx.hand.state().positions, float(self.ctx.config.get("pull.ends", 3.0))
-        opening = self.ctx.hand.open(int(self.ctx.config.get("hand.open_speed", 400)))
-        end = self.ctx.clock.now() + PULL_ENDS
-
-        def loose() -> bool:
-            way.follow()
-            return way.strength() < least or opened_by(self.ctx, closed, LOOSE_PULLED) or opening.done()
-
-        self.wait_for(loose, "that the fingers loosen", code=HAND)
-        opening.cancel()
-        calm = self.ctx.clock.now()
-        while self.ctx.clock.now() < min(end, calm + CALM):
-            way.follow()
-            if way.strength() >= least:
-                calm = self.ctx.clock.now()
-            self.pause(0.01)
-
-    def _give_back(self, object_id: str) -> None:
-        """The fingers open around what is pulled at, which is the person's; always a PortError."""
-        opening = self.ctx.hand.open(int(self.ctx.config.get("hand.open_speed", 400)))
-        self.await_pending(opening, "opening of the hand", code=HAND)
-        self.ctx.holding, self.ctx.shared = "", False
-        sentence = f"the person pulled at '{object_id}' again and again while the hand closed, and has it back"
-        raise PortError(sentence, (), ReasonCode.NOT_RELEASED)
 
 
 class HandTighten(CoglabState):
@@ -261,7 +179,7 @@ class LetGo(CoglabState):
         self.ctx.journal.mark("opening")
         hand, closed = ud.grasp["hand"], self.ctx.hand.state().positions
         opening, back = self.ctx.hand.preshape(hand["mode"], hand["level"]), None
-        while not opening.done() and not opened_by(self.ctx, closed, LOOSE):
+        while not opening.done() and not self._open_by(closed):
             self.pause(0.01)
         if opening.done():
             opening.result()  # fingers that are stuck would drag what the person holds
@@ -281,3 +199,8 @@ class LetGo(CoglabState):
             except PortError as error:
                 self.reason = error.sentence  # as far as it goes; the way home goes on from there
         return "succeeded"
+
+    def _open_by(self, closed: tuple[int, ...]) -> bool:
+        """Whether a finger has opened by LOOSE counts since."""
+        now = self.ctx.hand.state().positions
+        return len(now) == len(closed) > 0 and max(c - n for c, n in zip(closed[1:], now[1:], strict=True)) >= LOOSE
