@@ -29,40 +29,36 @@ TEST(DmpController, ReachesTheGoalFrameAndRestsExactlyStill) {
 }
 
 /// A hand that somebody holds for a while, in the middle of its way, does not leap when it is free.
-TEST(DmpController, TheSetPointWaitsForAHandThatLagsBehind) {
-  double fastest[2] = {0.0, 0.0}, lag = 0.0;
-  for (const bool held : {false, true}) {
-    VirtualRobot robot;
+TEST(DmpController, AHandThatWasHeldComesBackGently) {
+  double chase[2];
+  for (const bool shipped : {false, true}) {
+    VirtualRobot robot(shipped ? "" : "dmp: {correction_speed: 10}");
     robot.followWithinLimits();
     robot.loadBoth();
     robot.see("human_hand", kGoal);
     robot.dmp().setIkDebug(true);
     ASSERT_TRUE(VirtualRobot::ok(robot.dmp().execute(robot.reach())));
-    int i = 0;
-    for (; i < 1600 && robot.state() != MotionState::Reached; ++i) {
+    chase[shipped] = 0.0;
+    for (int i = 0; i < 1600 && robot.state() != MotionState::Reached; ++i) {
       robot.see("human_hand", kGoal);
-      const bool now = held && i >= 80 && i < 140;
       const JointVector before = robot.sample.position;
       robot.tick();
-      if (now) {
+      IkDebugRecord record;
+      while (robot.dmp().readIkDebug(record)) {
+      }
+      if (i >= 80 && i < 140) {
         robot.sample.position = robot.sample.commanded_position = before;
         robot.sample.velocity.setZero();
         robot.sample.commanded_velocity.setZero();
         robot.sample.commanded_acceleration.setZero();
         robot.interpolator->reset(before);
-      }
-      fastest[held] = std::max(fastest[held], robot.handVelocity().norm());
-      IkDebugRecord record;
-      while (robot.dmp().readIkDebug(record)) {
-        lag = std::max(lag, record.ik.position_error.norm());
+      } else if (i >= 140) {
+        chase[shipped] = std::max(chase[shipped], (robot.handVelocity() - record.velocity).norm());
       }
     }
     EXPECT_EQ(robot.state(), MotionState::Reached) << robot.reason();
-    EXPECT_LT((robot.hand().position - kGoal).norm(), 2e-3);
   }
-  EXPECT_GT(lag, 0.02) << "else nobody has held it";
-  EXPECT_LT(lag, 0.08);
-  EXPECT_LT(fastest[1], fastest[0] + 0.15);
+  EXPECT_LT(chase[1], 0.9 * chase[0]);  // beside the way that the arm itself lags by
 }
 
 TEST(DmpController, OffsetIsAppliedOnceAndTurnsWithTheGoalFrame) {

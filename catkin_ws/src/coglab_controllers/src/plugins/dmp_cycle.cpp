@@ -17,17 +17,6 @@ constexpr double kRestAngle = 3e-3;
 constexpr double kRestTime = 0.5;
 constexpr double kFadeTime = 0.3;
 
-// The set-point waits for a hand that lags behind it: from kFollows (m) on its clock is slowed, at
-// kWaits (m) it has kSlowest of its speed. It never stands for that, so that a motion of a blocked
-// arm ends, too.
-constexpr double kFollows = 0.015;
-constexpr double kWaits = 0.045;
-constexpr double kSlowest = 0.1;
-
-double clockShare(double lag) noexcept {
-  return std::clamp(1.0 - (lag - kFollows) / (kWaits - kFollows), kSlowest, 1.0);
-}
-
 Pose inverse(const Pose& pose) {
   const Quaternion back = pose.orientation.conjugate();
   return {-(back * pose.position), back};
@@ -249,9 +238,8 @@ void DmpCycle::computeReference(const MotionCycle& cycle, MotionReference& refer
   if (stage_ == DmpStage::Settle) comeToRest(cycle.last);
   watchGoal(cycle.input);
   if (stage_ == DmpStage::GivenUp) return;
-  const double share = clockShare(cycle.last.position_error.norm());
-  reference_ = motion_.step(cycle.input.dt, goal_, cycle.input.time_scale * share,
-                            hand_.approachAt(gate_.goal()));
+  reference_ =
+      motion_.step(cycle.input.dt, goal_, cycle.input.time_scale, hand_.approachAt(gate_.goal()));
   followEnd(cycle);
   if (loopClosed()) write(reference, cycle.input.dt);
 }
