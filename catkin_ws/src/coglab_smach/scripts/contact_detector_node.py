@@ -7,7 +7,9 @@ relative; and tf2 for the object that is reached for. Parameters: perception/fra
 coglab_smach.contact.detector.DetectorSettings; robot_description is read
 for Jacobian and dynamics; ~thresholds_file: of the moving arm, learnt in simulation; ~learnt_file: where
 ~learn_motion writes what this robot's own motions tell, and from where it is read at the next start.
-Publishes at 20 Hz ~margin (std_msgs/Float64) while watching, ~signal (coglab_msgs/ContactSignal) while torques come.
+Publishes at 20 Hz ~margin (std_msgs/Float64) while watching, ~signal (coglab_msgs/ContactSignal) while torques come;
+with the samples of the joints, at 100 Hz at most, ~force (geometry_msgs/Vector3Stamped, base frame): N that pull or
+push at the palm beyond what did before the last reach that was watched.
 Services: ~learn (Learn), the noise at rest anew; ~learn_motion (LearnMotion), true: gather motions
 without contact, false: learn from them.
 """
@@ -35,9 +37,12 @@ from coglab_smach.contact.learning import MotionRecorder
 from coglab_smach.contact.motion_thresholds import ThresholdError, Thresholds
 from coglab_smach.contact.moving_contact import MovingContact
 from coglab_smach.ros.publish import can_be_sent, publish
+from geometry_msgs.msg import Vector3, Vector3Stamped
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64
 
+FORCE_PERIOD = 0.009
+"""s between two messages of ~force, at least"""
 OLDEST_SIGHT = 0.15
 """s, older sights of an object do not tell whether it is in the palm"""
 
@@ -77,6 +82,8 @@ class ContactDetectorNode:
         self.publisher = rospy.Publisher("coglab/contact", Contact, queue_size=10)
         self.margin = rospy.Publisher("~margin", Float64, queue_size=1)
         self.signal = rospy.Publisher("~signal", ContactSignal, queue_size=1)
+        self.force = rospy.Publisher("~force", Vector3Stamped, queue_size=1, tcp_nodelay=True)
+        self.force_stamp = 0.0
         frames = FrameNames.from_mapping(
             parameters.read("perception/frames", dict, {}), rospy.resolve_name("perception/frames")
         )
@@ -142,7 +149,13 @@ class ContactDetectorNode:
             event = self.detector.feed_measured(stamp, position, [message.effort[i] for i in order])
             if self.recorder is not None:
                 self.recorder.look()
+            force = self.detector.force() if abs(stamp - self.force_stamp) >= FORCE_PERIOD else None
         self.publish_event(event, message.header.stamp)
+        if force is not None:
+            self.force_stamp = stamp
+            out = Vector3Stamped(vector=Vector3(*force))
+            out.header.stamp, out.header.frame_id = message.header.stamp, self.base
+            publish(self.force, out)
 
     def on_hand(self, message: HandStatus) -> None:
         """Fingers; an empty hand carries nothing."""

@@ -77,6 +77,8 @@ class FusedDetector:
         """nothing was looked at yet since arming"""
         self._evidence: dict[str, Evidence] = {}
         self._mass = 0.0
+        self._before_reach: np.ndarray | None = None
+        """Nm, residual of the rest before the reach in which contact was watched for last"""
         self._last_stamp: float | None = None
 
     def arm(
@@ -108,6 +110,8 @@ class FusedDetector:
         else:
             self.still.arm("contact" if mode == IN_MOTION else mode, now, timeout, k, joints, mass, load_share)
             self._lift = None
+        if mode == IN_MOTION and self.moving is not None:
+            self._before_reach = self.moving.before_motion()
         self._leaving = leaving
         self._mass = mass if mode in ("load", LIFT) else 0.0
         self._until = now + timeout if mode in (IN_MOTION, LIFT) else None
@@ -251,6 +255,13 @@ class FusedDetector:
     def share_gone(self) -> float | None:
         """Share of the weight that has left the hand since it was armed for RELEASE; None while it is not watched."""
         return self._leaving.share if self._leaving is not None else None
+
+    def force(self) -> np.ndarray | None:
+        """N on the palm, base frame, beyond what acted before the reach in which contact was watched for last, less the
+        payload that was told; see MovingContact.force_since. None where that is not known."""
+        if self.moving is None or self._before_reach is None:
+            return None
+        return self.moving.force_since(self._before_reach)
 
     def look(self) -> Signal:
         """As ContactDetector.look; the margin of RELEASE is told too."""

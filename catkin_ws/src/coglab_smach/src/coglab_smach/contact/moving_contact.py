@@ -20,6 +20,8 @@ SLOW, GENTLE = 0.15, 1.0
 """rad/s and rad/s^2 of the fastest joint"""
 SETTLED = 0.25
 """s of stillness before the residual is taken as that of a free arm"""
+LEAD, GROWTH = 0.03, 0.02
+"""s by which a force is told ahead, about the observer's own delay, and s over which it is seen to grow"""
 
 
 class MovingContact:
@@ -51,6 +53,8 @@ class MovingContact:
         self._rest_position = np.zeros(7)
         self._free_weight: float | None = None
         """N on the palm then"""
+        self._growing: deque[tuple[float, np.ndarray]] = deque()
+        """s and Nm: the residuals of the last GROWTH"""
 
     def set_payload(self, mass: float, centre: Joints = (0.0, 0.0, 0.0)) -> None:
         """The hand carries ``mass`` kg at ``centre`` (m, ih2_palm) from now on; the past does not count any more, so
@@ -62,6 +66,7 @@ class MovingContact:
     def _forget(self) -> None:
         self._changes.reset()
         self._newest.clear()
+        self._growing.clear()
         self.change = self._still_since = self._rest = self._free = self._free_weight = None
 
     def still(self) -> bool:
@@ -100,6 +105,21 @@ class MovingContact:
         """N that hang on the palm by a residual (Nm) at a position (rad): see weight_since."""
         return -float(np.linalg.lstsq(self._jacobian(position).T, residual, rcond=0.05)[0][2])
 
+    def before_motion(self) -> np.ndarray | None:
+        """Mean residual (Nm) of the last rest before the motion that goes on or was the last, or of this rest while the
+        arm has not moved; None where none was seen."""
+        return self._rest if self._free is None else self._free
+
+    def force_since(self, before: np.ndarray) -> np.ndarray | None:
+        """N on the palm, base frame, beyond what acted when the residual was ``before`` (Nm): as far as it will have
+        grown in LEAD s if it goes on like that. None where nothing was measured yet."""
+        if not self._growing or self.residual is None:
+            return None
+        (begin, first), (stamp, torque) = self._growing[0], self._growing[-1]
+        growth = (torque - first) / (stamp - begin) if stamp > begin else np.zeros(7)
+        ahead = torque + LEAD * growth - before
+        return np.asarray(np.linalg.lstsq(self._jacobian(self.residual.position).T, ahead, rcond=0.05)[0])
+
     def weight_before_motion(self) -> float | None:
         """N on the palm in the last rest before the motion that goes on or was the last; None where none was seen."""
         return self._free_weight
@@ -132,6 +152,9 @@ class MovingContact:
         if residual.fresh:
             self._forget()
         self._follow_rest(residual)
+        self._growing.append((residual.stamp, residual.torque))
+        while self._growing[0][0] < residual.stamp - GROWTH - 1e-9:
+            self._growing.popleft()
         self.change = self._changes.feed(residual, self.load)
         if self.change is not None:
             self._newest.append(self.change)

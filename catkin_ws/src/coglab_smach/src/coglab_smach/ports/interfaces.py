@@ -261,3 +261,8 @@ class ContactPort(Protocol):
     def share_gone(self) -> float | None:
         """Share of the object's weight that has left the hand since it was armed for 'release', also after its event:
         0 none, 1 all, more where the hand is lifted. None while nobody watches."""
+
+    def force(self) -> tuple[float, float, float] | None:
+        """N on the palm, base frame, beyond what acted before the last reach in which 'contact_in_motion' was watched
+        for, whether somebody watches now or not. What an object weighs is a part of it until the detector has been told
+        that it is carried. None where it is not known, or older than 0.1 s."""

@@ -15,13 +15,13 @@ from coglab_msgs.msg import Recognition as RecognitionMsg
 from coglab_msgs.srv import ArmContact, FreePlaces, GetObject, InitVision, ListObjects, LocateObject
 from coglab_py.pose import IDENTITY
 from coglab_py.yaml_file import YamlError, parse
-from geometry_msgs.msg import Point, Pose, Quaternion
+from geometry_msgs.msg import Point, Pose, Quaternion, Vector3Stamped
 
 from coglab_smach.ports.interfaces import OLDEST_BELIEF, OLDEST_RECOGNITION, Ahead, ContactEvent, Located, Recognition
 from coglab_smach.ports.pending import Pending, Permit, PortError, Threaded
 from coglab_smach.ros.calls import SERVICE_WAIT, Newest, call, call_now, mapped
 
-OLDEST_SIGNAL = 0.3
+OLDEST_SIGNAL, OLDEST_FORCE = 0.3, 0.1
 """s"""
 DEFAULT_SHARE = 0.5
 """of the load, where a request leaves it to the detector"""
@@ -106,8 +106,10 @@ class RosContact:
         topic: str = "coglab/contact",
         service: str = "contact_detector/arm",
         signal: str = "contact_detector/signal",
+        force: str = "contact_detector/force",
     ) -> None:
         self._service = service
+        self._force = Newest(force, Vector3Stamped)
         self._signal = Newest(signal, ContactSignal)
         self._needed: float | None = None
         """share of the load that is armed for; None where another mode is"""
@@ -187,3 +189,9 @@ class RosContact:
             return None
         watched = signal.mode == "release" and signal.state == "watching"
         return float(signal.margin) * self._needed if watched else None
+
+    def force(self) -> tuple[float, float, float] | None:
+        message = self._force.message
+        if message is None or self._force.age() > OLDEST_FORCE:
+            return None
+        return (message.vector.x, message.vector.y, message.vector.z)

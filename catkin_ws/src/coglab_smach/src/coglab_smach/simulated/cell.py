@@ -123,6 +123,8 @@ class SimulatedCell:
         self.calibrated = self.preshaped = False
         self.calibrating_until = 0.0
         self.lifted = 0.0
+        self.pulled: tuple[float, float, float] | None = (0.0, 0.0, 0.0)
+        """N, base frame: somebody pulls at the hand; None: the detector does not tell"""
         self.objects: dict[str, Pose] = {
             "mug": Pose(np.array([0.78, 0.03, 0.43])),
             "board": Pose(np.array([0.45, -0.55, 0.05])),

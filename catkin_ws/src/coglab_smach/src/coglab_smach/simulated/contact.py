@@ -109,6 +109,13 @@ class SimulatedContact:
             return None
         return 1.0 if self.event() is not None else max(0.0, self.cell.lifted - self._lifted_before) / self._weight
 
+    def force(self) -> tuple[float, float, float] | None:
+        """What the script pulls and lifts with."""
+        if "contact" in self.cell.faults.dead or self.cell.pulled is None:
+            return None
+        x, y, z = self.cell.pulled
+        return (x, y, z + self.cell.lifted)
+
     def _pushed(self) -> bool:
         lifted = self.cell.lifted - self._lifted_before
         felt = {"load": -lifted, "lift": -lifted, "release": lifted}.get(self._mode, abs(lifted) if self._mode else 0.0)

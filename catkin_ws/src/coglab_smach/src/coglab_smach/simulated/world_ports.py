@@ -335,3 +335,7 @@ class VirtualContact:
 
     def share_gone(self) -> float | None:
         return None if self.node.frozen else self.detector.share_gone()
+
+    def force(self) -> tuple[float, float, float] | None:
+        force = None if self.node.frozen else self.detector.force()
+        return None if force is None else (float(force[0]), float(force[1]), float(force[2]))

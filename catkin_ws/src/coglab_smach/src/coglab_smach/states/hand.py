@@ -10,10 +10,11 @@ from ih2_hand.grasps import levels_of
 
 from coglab_smach.context.awaited import ARM, HAND
 from coglab_smach.context.context import Context
-from coglab_smach.ports.pending import PortError
-from coglab_smach.states.base import CoglabState
+from coglab_smach.ports.pending import Pending, PortError
+from coglab_smach.states.base import CoglabState, Interrupted, TimeLimit
 from coglab_smach.states.motion import shift, shift_time
 from coglab_smach.states.where import hand_from_palm, palm_axis
+from coglab_smach.states.yielding import GivesWay
 
 SLIPPERY = 0.45
 """friction below which an object is that"""
@@ -76,10 +77,11 @@ class HandClose(CoglabState):
     """Close the preshaped hand on the object and make sure that something is in it; with ``from_person`` say so.
 
     Outcome missed, with ``from_person``: the fingers have closed on nothing for the first time in this action; a person
-    who offers waits, so the arm may try once more.
+    who offers waits, so the arm may try once more. Meanwhile the palm goes along with who pulls (GivesWay).
     """
 
     default_time_limit = 12.0
+    owns_motion = True
 
     def __init__(self, ctx: Context, from_person: bool) -> None:
         super().__init__(
@@ -98,6 +100,7 @@ class HandClose(CoglabState):
         self.ctx.closing = None
         if self.from_person:
             ud.hand_distance = hand_from_palm(self)
+            self._give_way(closing)
         self.await_pending(closing, "closing of the hand", code=HAND)
         self.ctx.journal.mark("closed")
         end = self.ctx.clock.now() + float(self.ctx.config.get("hand.settle_after_close", 0.3))
@@ -118,6 +121,22 @@ class HandClose(CoglabState):
         if self.from_person:
             self.ctx.say(Say.I_HAVE_IT, "I have it.")
         return "succeeded"
+
+    def _give_way(self, closing: Pending) -> None:
+        """Until the fingers have closed."""
+        way = GivesWay(self.ctx)
+
+        def closed() -> bool:
+            way.follow()
+            return closing.done()
+
+        try:
+            self.wait_for(closed, "closing of the hand", code=HAND)
+        except (Interrupted, TimeLimit):
+            closing.cancel()
+            raise
+        finally:
+            way.stop()
 
 
 class HandTighten(CoglabState):

@@ -8,10 +8,14 @@ from coglab_msgs.msg import ReasonCode
 
 from coglab_smach.context.awaited import PERSON
 from coglab_smach.context.context import Context
-from coglab_smach.ports.pending import Pending, PortError
+from coglab_smach.ports.pending import PortError
 from coglab_smach.states.base import CoglabState, TimeLimit
 from coglab_smach.states.motion import rise
-from coglab_smach.states.where import hand_from_palm
+from coglab_smach.states.where import hand_from_palm, palm_at
+from coglab_smach.states.yielding import LEAST_WAY, GivesWay
+
+MOST_RISES = 4
+"""the first one, and those that go on where somebody's pull has ended one"""
 
 
 class TakeWeight(CoglabState):
@@ -23,6 +27,8 @@ class TakeWeight(CoglabState):
     in the hand does. ``hand_distance``: m, of the person's hand from the palm before the fingers closed; None where no
     tracker sees it, and then the weight has to have come by the end of the rise. Where the weight has come and the
     tracker has lost the hand since, the person may have gone: nothing is opened, the arm stays and says so.
+
+    The palm goes along with who pulls (GivesWay), and the rise goes on afterwards.
     """
 
     default_time_limit = 16.0
@@ -30,43 +36,63 @@ class TakeWeight(CoglabState):
 
     def __init__(self, ctx: Context) -> None:
         super().__init__(ctx, input_keys=["object_id", "object_entry", "hand_distance"])
-        self._lifting: Pending | None = None
+        self._way: GivesWay
+        self._top: float | None = None
+        """m, height to which the palm rises"""
+        self._rises = 0
 
     def run(self, ud: Any) -> str:
         limit, contact = float(self.ctx.config.get("hand.load_timeout", 5.0)), self.ctx.contact
-        end, seen = self.ctx.clock.now() + limit, ud.hand_distance is not None
-        farther = (ud.hand_distance or 0.0) + float(self.ctx.config.get("hand.let_go", 0.04))
+        end, farther = self.ctx.clock.now() + limit, None
+        if ud.hand_distance is not None:
+            farther = ud.hand_distance + float(self.ctx.config.get("hand.let_go", 0.04))
         settings = {
             "mass": float(ud.object_entry.get("mass", 0.0)),
             "load_share": float(self.ctx.config.get("hand.load_share", 0.5)),
         }
+        self._way, self._rises = GivesWay(self.ctx), 0
         self.await_pending(contact.arm("lift", limit, settings), "arming of the contact detector", 2.0)
-
-        def has_let_go() -> bool:
-            carried = contact.event() is not None
-            if carried:
-                self.ctx.journal.mark("loaded")
-            if seen:
-                return (hand_from_palm(self) or 0.0) > farther
-            return carried and (self._lifting is None or self._lifting.done())
-
         try:
             self.pause(float(self.ctx.config.get("hand.lift_after", 0.1)))
-            height, speed = (float(self.ctx.config.get(f"hand.{name}", 0.03)) for name in ("lift", "lift_speed"))
-            self._lifting = rise(self.ctx, height, speed)
-            self.wait_for(has_let_go, "the person's letting go", end - self.ctx.clock.now(), code=PERSON)
+            self._rise()
+            self.wait_for(
+                lambda: self._has_let_go(farther), "the person's letting go", end - self.ctx.clock.now(), code=PERSON
+            )
         except TimeLimit as error:
             raise self._not_released(ud.object_id, limit, error) from None
         finally:
             contact.disarm()
-            if self._lifting is not None:
-                self._lifting.cancel()
-                self._lifting = None
+            self._way.stop()
         event = contact.event()
         self.reason = event.message if event is not None else "the person's hand has left it"
         self.ctx.shared = False
         self.ctx.journal.mark("released")
         return "succeeded"
+
+    def _has_let_go(self, farther: float | None) -> bool:
+        """Whether the person has; meanwhile rise until the weight has come, or give way."""
+        carried = self.ctx.contact.event() is not None
+        if carried:
+            self.ctx.journal.mark("loaded")
+        if farther is not None and (hand_from_palm(self) or 0.0) > farther:
+            return True
+        self._way.follow()
+        if not carried and self._way.idle():
+            self._rise()
+        return farther is None and carried and self._way.idle()
+
+    def _rise(self) -> None:
+        """Up to where the rise that began first was to end; nothing where the palm is there."""
+        palm, speed = palm_at(self.ctx), float(self.ctx.config.get("hand.lift_speed", 0.03))
+        if palm is None or self._rises >= MOST_RISES:
+            return
+        if self._rises == 0:
+            self._top = float(palm[2]) + float(self.ctx.config.get("hand.lift", 0.03))
+        assert self._top is not None
+        left = self._top - float(palm[2])
+        if left > LEAST_WAY:
+            self._rises += 1
+            self._way.begin(rise(self.ctx, left, speed))
 
     def _not_released(self, object_id: str, limit: float, error: TimeLimit) -> PortError:
         """The failure, and who has the object then: the person, but where only the robot's hand may hold it."""

@@ -1,0 +1,118 @@
+"""Who pulls at what the robot's hand closes on, or has closed on, is given way to: the palm goes along."""
+
+import numpy as np
+import pytest
+from coglab_smach.kinematics.reachability import default_arm
+from coglab_smach.states.where import palm_axis
+from coglab_smach.states.yielding import GivesWay
+from conftest import Trial
+
+RECEIVE = "exchange_human_to_robot"
+ASIDE = np.array([0.0, 1.0, 0.0])
+
+
+def palm(trial):
+    return default_arm().fk(np.asarray(trial.ctx.arm.joint_positions()))[0]
+
+
+def pull(trial, force, seconds):
+    """Sideways with so many N, for so long."""
+    trial.cell.pulled = tuple(force * ASIDE)
+    trial.clock.sleep(seconds)
+    trial.cell.pulled = (0.0, 0.0, 0.0)
+
+
+def receiving(script, let_go_after=0.2, **overrides):
+    """Receive; ``script`` when the fingers begin to close. The trial, once a hub is open again."""
+    trial = Trial(**overrides)
+    trial.cell.partner.let_go_after = let_go_after
+
+    def walk(t):
+        t.wait_hub("wait_without_object")
+        t.start(RECEIVE)
+        while not t.ctx.journal.marked("closing"):
+            t.clock.sleep(0.01)
+        t.cell.calls.clear()
+        script(t)
+        while t.ctx.requests.hub() == "":
+            t.clock.sleep(0.05)
+
+    return trial.run(walk)
+
+
+def until_weight(t):
+    while "arm lift" not in t.cell.called():
+        t.clock.sleep(0.01)
+    t.clock.sleep(0.15)
+
+
+def motions(trial):
+    """Beginnings and ends of motions, in order."""
+    return [name for name in trial.cell.called() if name in ("move_ptp", "cancel")]
+
+
+def test_the_palm_goes_along_while_the_fingers_close():
+    gone = []
+
+    def script(t):
+        begin = palm(t)
+        pull(t, 12.0, 0.3)
+        gone.append(float((palm(t) - begin) @ ASIDE))
+
+    trial = receiving(script)
+    assert trial.result().outcome == "succeeded" and "gave_way" in trial.result().marks
+    assert 0.01 < gone[0] < 0.055
+
+
+def test_the_palm_goes_along_while_the_arm_takes_the_weight_and_every_motion_ends_before_the_next():
+    gone, height = [], []
+
+    def script(t):
+        until_weight(t)
+        begin = palm(t)
+        pull(t, 10.0, 1.0)
+        gone.append(float((palm(t) - begin) @ ASIDE))
+        t.clock.sleep(0.3)
+        height.append(float(palm(t)[2] - begin[2]))
+        t.cell.let_go()
+
+    trial = receiving(script, let_go_after=None)
+    assert 0.03 < gone[0] < 0.055, "as far as pull.way lets it"
+    assert height[0] > 0.015, "the rise goes on when the pull is over"
+    assert trial.result().outcome == "succeeded" and "gave_way" in trial.result().marks
+    order = motions(trial)
+    assert order[:3] == ["move_ptp", "cancel", "move_ptp"], order
+
+
+def test_a_short_jolt_is_no_pull():
+    def script(t):
+        until_weight(t)
+        pull(t, 20.0, 0.02)
+        t.wait_hub("wait_with_object")
+
+    assert "gave_way" not in receiving(script).result().marks
+
+
+@pytest.mark.parametrize("weight", [-9.0, 9.0])
+def test_what_hangs_on_the_palm_or_lifts_it_is_no_pull(weight):
+    trial = Trial()
+    trial.cell.pulled = (4.0, 3.0, weight)
+    pull = GivesWay(trial.ctx).pull()
+    assert pull[2] == 0.0 and np.linalg.norm(pull) <= 5.0
+
+
+def test_who_presses_into_the_palm_gives_and_does_not_pull():
+    trial = Trial()
+    outward = palm_axis(trial.ctx)
+    trial.cell.pulled = tuple(-12.0 * outward)
+    assert np.linalg.norm(GivesWay(trial.ctx).pull()) < 1e-6
+    trial.cell.pulled = tuple(12.0 * outward)
+    assert np.linalg.norm(GivesWay(trial.ctx).pull()) == pytest.approx(12.0 * np.linalg.norm(outward[:2]))
+
+
+def test_nothing_is_given_way_to_where_the_detector_does_not_tell():
+    def script(t):
+        t.cell.pulled = None
+        t.wait_hub("wait_with_object")
+
+    assert "gave_way" not in receiving(script).result().marks
