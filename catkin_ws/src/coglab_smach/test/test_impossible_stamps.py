@@ -25,10 +25,10 @@ def node(monkeypatch):
     )  # needs a clock of ROS
     made = module.ContactDetectorNode.__new__(module.ContactDetectorNode)
     made.joints, made.position, made.velocity, made.joint_stamp = JOINTS, [0.0] * 7, [0.0] * 7, 0.0
-    made.lock, made.last_sample, made.recorder = threading.Lock(), None, None
+    made.lock, made.last_sample, made.recorder, made.force_stamp = threading.Lock(), None, None, 0.0
     made.said = []
     made.detector, made.moving, made.publisher = MagicMock(), MagicMock(), MagicMock()
-    for name in ("feed", "feed_measured", "feed_hand", "feed_touch"):
+    for name in ("feed", "feed_measured", "feed_hand", "feed_touch", "force"):
         getattr(made.detector, name).return_value = None
     return made
 
