@@ -165,7 +165,7 @@ def believed(
 ) -> dict[str, Any] | None:
     """Where ``target`` will be at a handover that is believed to have begun: its frame ahead, turned as it is seen now;
     None where nothing is believed yet, or something outside the handover region."""
-    level = float(ctx.config.get("handover.belief", 0.9))
+    level = float(ctx.config.get("handover.belief", 0.85))
     ahead = ctx.perception.ahead()
     mine = (ahead.request if person else ahead.offer) >= level and (person or ahead.object_id == target)
     place = np.array(ahead.place)
