@@ -13,6 +13,7 @@ without contact, false: learn from them.
 """
 
 import dataclasses
+import math
 import sys
 import threading
 from pathlib import Path
@@ -31,6 +32,7 @@ from coglab_py.pose import Pose
 from coglab_py.yaml_file import YamlError
 from coglab_smach.contact.detector import ContactDetector, DetectorSettings
 from coglab_smach.contact.fused_detector import IN_MOTION, LIFT, RELEASE, FusedDetector
+from coglab_smach.contact.grip_and_load import GripAndLoad
 from coglab_smach.contact.learning import MotionRecorder
 from coglab_smach.contact.motion_thresholds import ThresholdError, Thresholds
 from coglab_smach.contact.moving_contact import MovingContact
@@ -67,7 +69,8 @@ class ContactDetectorNode:
         jacobian = lambda q: self.arm.jacobian(np.asarray(q, dtype=float))[:3]  # noqa: E731
         self.learnt_file = parameters.read("~learnt_file", str, "")
         self.moving = MovingContact(self.thresholds(), cc.ArmDynamics(urdf), jacobian)
-        self.detector = FusedDetector(ContactDetector(settings, jacobian), self.moving)
+        held = GripAndLoad(lambda q: Pose(*self.arm.fk(np.asarray(q, dtype=float))).rotation.as_matrix())
+        self.detector = FusedDetector(ContactDetector(settings, jacobian), self.moving, held=held)
         self.recorder: MotionRecorder | None = None
         self.lock = threading.Lock()
         self.position: list[float] | None = None
@@ -302,6 +305,7 @@ class ContactDetectorNode:
             before, stamp = self.shown, self.last_sample
             self.shown = stamp
             seen, settings = self.detector.look(), self.detector.still.settings
+            grip = None if stamp is None else self.detector.grip(stamp)
         if seen.state == "watching":
             publish(self.margin, Float64(seen.margin))
         if stamp is None or stamp == before:
@@ -315,6 +319,7 @@ class ContactDetectorNode:
             window=settings.window,
             k=seen.k,
             margin=seen.margin,
+            grip=math.nan if grip is None else grip,
             rest_samples=seen.rest_samples,
             learnt=seen.rest_samples >= settings.learn_samples,
         )

@@ -261,3 +261,6 @@ class ContactPort(Protocol):
     def share_gone(self) -> float | None:
         """Share of the object's weight that has left the hand since it was armed for 'release', also after its event:
         0 none, 1 all, more where the hand is lifted. None while nobody watches."""
+
+    def grip(self) -> float | None:
+        """N with which the fingers squeeze what they hold; None where nothing in the hand tells that."""

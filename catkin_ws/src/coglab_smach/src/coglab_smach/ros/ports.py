@@ -187,3 +187,9 @@ class RosContact:
             return None
         watched = signal.mode == "release" and signal.state == "watching"
         return float(signal.margin) * self._needed if watched else None
+
+    def grip(self) -> float | None:
+        signal = self._signal.message
+        if signal is None or self._signal.age() > OLDEST_SIGNAL or not math.isfinite(signal.grip):
+            return None
+        return float(signal.grip)

@@ -123,6 +123,9 @@ class SimulatedCell:
         self.calibrated = self.preshaped = False
         self.calibrating_until = 0.0
         self.lifted = 0.0
+        self.touch: float | None = None
+        """N of grip for each count by which the fingers squeeze what they hold; None: the hand does not feel"""
+        self.fingers: Callable[[], tuple[int, ...]] = lambda: self.hand_positions
         self.objects: dict[str, Pose] = {
             "mug": Pose(np.array([0.78, 0.03, 0.43])),
             "board": Pose(np.array([0.45, -0.55, 0.05])),
