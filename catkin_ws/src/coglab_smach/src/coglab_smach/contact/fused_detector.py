@@ -115,7 +115,8 @@ class FusedDetector:
             self._lift = None
         self._leaving = leaving
         if self._held is not None:
-            self._held.count_from_now()
+            # Who is given something may touch it while the arm still comes.
+            {IN_MOTION: self._held.count_from_now, RELEASE: self._held.count_on}.get(mode, self._held.anew)()
         self._mass = mass if mode in ("load", LIFT) else 0.0
         self._until = now + timeout if mode in (IN_MOTION, LIFT) else None
         self._first = True

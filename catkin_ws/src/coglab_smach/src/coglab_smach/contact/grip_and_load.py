@@ -18,7 +18,7 @@ import numpy as np
 
 Joints = Sequence[float] | np.ndarray
 
-SMOOTH = 0.03
+SMOOTH = 0.015
 """s, time constant of the low-pass of each force"""
 USUAL = 0.5
 """s, time constant of the load that is felt while nobody takes it"""
@@ -91,9 +91,13 @@ class GripAndLoad:
         self._usual = usual + (1.0 - math.exp(-step / USUAL)) * (self._load - usual)
 
     def count_from_now(self) -> None:
-        """Somebody may take the load from now on: it is counted from the usual one, until anew() is said."""
+        """Somebody may take the load from now on: it is counted from what has usually hung on the hand."""
+        self._counted_from = self._usual
+
+    def count_on(self) -> None:
+        """As it was counted before, if it was."""
         if self._counted_from is None:
-            self._counted_from = self._usual
+            self.count_from_now()
 
     def anew(self) -> None:
         """The hand holds something else, or nothing."""

@@ -34,12 +34,18 @@ class LooseningGrip:
     is felt has come down, and closed again."""
 
     def __init__(
-        self, hand: HandPort, speed: int, closing_speed: int, force: Callable[[], float | None] = lambda: None
+        self,
+        hand: HandPort,
+        speed: int,
+        closing_speed: int,
+        easing_speed: int = 1,
+        force: Callable[[], float | None] = lambda: None,
     ) -> None:
         """``speed``, ``closing_speed``: 1..511, wire speeds at which they loosen and close; the second one stands for
-        the force with which they hold then. ``force``: N of grip that are felt, None where nothing tells."""
+        the force with which they hold then. ``force``: N of grip that are felt, None where nothing tells; where it
+        tells, they loosen at ``easing_speed``."""
         self._hand, self._speed, self._closing_speed = hand, speed, closing_speed
-        self._force = force
+        self._easing_speed, self._force = easing_speed, force
         self._closed, self._firm = hand.state().positions, force()
         self._opening: Pending | None = None
         self._closing: Pending | None = None
@@ -69,18 +75,20 @@ class LooseningGrip:
         force, loosened = self._force(), self.loosened()
         if force is None or loosened is None:
             return False
-        if not self._has_closed():
-            return True
         if self._firm is None:
             self._firm = force
         wanted = max(least, part * self._firm)
-        if self._opening is not None:
+        if not self._has_closed():
+            if force >= wanted and self._closing is not None:
+                self._closing.cancel()
+                self._closing = None
+        elif self._opening is not None:
             if force <= wanted or loosened >= counts or self._opening.done():
                 self.stand()
         elif force < (1.0 - BAND) * wanted and loosened > 0:
             self.tighten()
         elif force > (1.0 + BAND) * wanted and loosened + 1 <= counts:
-            self._opening = self._hand.open(self._speed)
+            self._opening = self._hand.open(self._easing_speed)
         return True
 
     def _has_closed(self) -> bool:
@@ -177,7 +185,7 @@ class GiveLoad(CoglabState):
 
     The grip loosens in proportion to their share of the weight, as people's does (Chan 2012, Endo 2012): where the hand
     feels its grip, the force of it falls as the load does, down to ``give.grip_safety`` times what friction needs for
-    what the hand still carries, by ``give.loosen_felt`` counts at most; else it is ``give.loosen`` counts. When the load comes
+    what the hand still carries, by ``give.ease`` counts at most; else it is ``give.loosen`` counts. When the load comes
     back to the arm, or the object sinks in the hand by ``give.slip`` m, the grip closes again. Where nothing has
     happened for ``give.lower_after`` s and the person's hand is there, the arm brings the object to where that hand
     takes it, and then sinks by ``give.lower`` m, so that the weight comes to lie in it. After the time limit the grip
@@ -214,7 +222,11 @@ class GiveLoad(CoglabState):
         # Two sides press: the object slips where friction on both does not carry it.
         self._slips_at = GRAVITY * float(entry.get("mass", 0.0)) / (2.0 * float(entry.get("friction", 0.5)))
         self._grip = LooseningGrip(
-            self.ctx.hand, int(self._number("loosen_speed", 40)), int(self._number("close_speed", 120)), contact.grip
+            self.ctx.hand,
+            int(self._number("loosen_speed", 40)),
+            int(self._number("close_speed", 120)),
+            int(self._number("ease_speed", 150)),
+            contact.grip,
         )
         self._lowering = self._moving = self._back_since = None
         self._brought = False
@@ -279,7 +291,7 @@ class GiveLoad(CoglabState):
         """The ratio of grip and load stays; False where the hand does not feel its grip."""
         left = 1.0 - min(1.0, share)
         least = left * self._slips_at * self._number("grip_safety", 2.0)
-        return self._grip.ease_to(left, least, self._number("loosen_felt", 12.0))
+        return self._grip.ease_to(left, least, self._number("ease", 12.0))
 
     def _lower(self, now: float) -> None:
         """Bring the object to the person's hand, if it is elsewhere, or sink; where no hand is, look again in a
