@@ -33,8 +33,8 @@ class VirtualTrial:
 
     ``conditions`` of the world: by default people and tracker as they are; ``behaviour``, ``profile``, ``perfect`` and
     ``perception`` change them. ``reaches`` gets one ReachRecord per DMP motion, ``touches`` one TouchRecord per wait
-    for contact, ``begun`` the actions that a hub has taken. ``touch``: N of noise of the hand's touch sensors, None: it has
-    none.
+    for contact, ``begun`` the actions that a hub has taken. ``touch``: N of noise of the hand's touch sensors; None:
+    it has none.
     """
 
     def __init__(

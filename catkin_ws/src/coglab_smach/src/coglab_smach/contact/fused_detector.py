@@ -70,8 +70,8 @@ class FusedDetector:
         fingers: Fingers | None = None,
         held: GripAndLoad | None = None,
     ) -> None:
-        """``moving`` None: there is no model of the arm, and IN_MOTION is refused. ``held``: what touch tells of grip and
-        load; without it, or where nobody feeds touch, the torques alone tell how much of a load has gone."""
+        """``moving`` None: there is no model of the arm, and IN_MOTION is refused. ``held``: what touch tells of grip
+        and load; without it, or where nobody feeds touch, the torques alone tell how much of a load has gone."""
         self.still, self.moving = still, moving
         self._touch, self._fingers, self._palm = touch or Touch(), fingers or Fingers(), InPalm()
         self._held = held
@@ -250,13 +250,16 @@ class FusedDetector:
             self._leaving = None
             return None
         felt = None if self._held is None else self._held.share_gone(stamp, leaving.weight)
-        tells = residual is not None and (self.moving.slow() or residual.fresh)
-        weight = self.moving.weight(residual.torque, residual.position) if tells else None
-        if leaving.feed(stamp, weight, self.moving.still(), tells and residual.fresh, felt):
+        weight, fresh = None, False
+        if residual is not None and (self.moving.slow() or residual.fresh):
+            weight, fresh = self.moving.weight(residual.torque, residual.position), residual.fresh
+        if leaving.feed(stamp, weight, self.moving.still(), fresh, felt):
             gone, needed = (share * leaving.weight for share in (leaving.share or 0.0, leaving.needed))
             message = f"{gone:.1f} N of the load are gone (needed {needed:.1f} N)"
             sure = probability(leaving.margin)
-            return ContactEvent(False, MOMENTUM if felt is None else FUSED, leaving.margin, message, sure, ReasonCode.LOAD_RELEASED)
+            return ContactEvent(
+                False, MOMENTUM if felt is None else FUSED, leaving.margin, message, sure, ReasonCode.LOAD_RELEASED
+            )
         return None
 
     def share_gone(self) -> float | None:

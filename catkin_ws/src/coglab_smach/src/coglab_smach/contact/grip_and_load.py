@@ -72,9 +72,7 @@ class GripAndLoad:
         self._usual: float | None = None
         self._counted_from: float | None = None
 
-    def feed(
-        self, stamp: float, forces: Sequence[Sequence[float]], deviation: float, position: Joints
-    ) -> None:
+    def feed(self, stamp: float, forces: Sequence[Sequence[float]], deviation: float, position: Joints) -> None:
         """Forces (N, ih2_palm) of the world on each phalanx and the palm, ``deviation`` of one component, joints (rad).
         What is no number is left out."""
         table = np.asarray(forces, dtype=float).reshape(-1, 3)

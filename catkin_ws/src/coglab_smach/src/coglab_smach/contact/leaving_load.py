@@ -49,9 +49,7 @@ class LeavingLoad:
         """Share that is gone over the one that is needed."""
         return (self.share or 0.0) / self.needed
 
-    def feed(
-        self, stamp: float, weight: float | None, still: bool, fresh: bool, felt: Felt | None = None
-    ) -> bool:
+    def feed(self, stamp: float, weight: float | None, still: bool, fresh: bool, felt: Felt | None = None) -> bool:
         """One sample: s, and N on the palm, None while the arm moves too fast to tell; ``still``: the arm stands;
         ``fresh``: the samples before it do not count; ``felt``: the share by touch, None where that does not tell.
         Whether enough is gone now, said once. Where nothing tells, the share stays as it was, and what seemed gone has
@@ -60,8 +58,7 @@ class LeavingLoad:
             self._from, self._settled, self._count, self._since = None, False, 0, None
         if weight is not None and not self._settled and (still or self._from is None):
             self._settle(stamp, weight)
-        known = weight is not None and self._from is not None
-        torques = (self._from - weight) / self.weight if known else None
+        torques = None if weight is None or self._from is None else (self._from - weight) / self.weight
         share = together(torques, SAME / self.weight, felt)
         if share is None:
             self._since = None

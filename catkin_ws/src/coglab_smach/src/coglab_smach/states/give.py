@@ -30,8 +30,8 @@ ASTRAY = 0.02
 
 
 class LooseningGrip:
-    """The fingers around an object: opened by counts of a motor's position (0 open .. 254 closed), or until the grip that
-    is felt has come down, and closed again."""
+    """The fingers around an object: opened by counts of a motor's position (0 open .. 254 closed), or until the grip
+    that is felt has come down, and closed again."""
 
     def __init__(
         self,
@@ -70,8 +70,8 @@ class LooseningGrip:
             self.stand()
 
     def ease_to(self, part: float, least: float, counts: float) -> bool:
-        """Grip with so much of the force of the closed grip, with ``least`` N at least, and looser by ``counts`` at most;
-        call it again and again. False, and nothing done, where no force is felt."""
+        """Grip with so much of the force of the closed grip, with ``least`` N at least, and looser by ``counts`` at
+        most; call it again and again. False, and nothing done, where no force is felt."""
         force, loosened = self._force(), self.loosened()
         if force is None or loosened is None:
             return False
