@@ -7,7 +7,8 @@ relative; and tf2 for the object that is reached for. Parameters: perception/fra
 coglab_smach.contact.detector.DetectorSettings; robot_description is read
 for Jacobian and dynamics; ~thresholds_file: of the moving arm, learnt in simulation; ~learnt_file: where
 ~learn_motion writes what this robot's own motions tell, and from where it is read at the next start.
-Publishes at 20 Hz ~margin (std_msgs/Float64) while watching, ~signal (coglab_msgs/ContactSignal) while torques come.
+Publishes at 20 Hz ~margin (std_msgs/Float64) while watching, ~signal (coglab_msgs/ContactSignal) while torques come;
+both at 100 Hz while a load is given by a hand that has touch.
 Services: ~learn (Learn), the noise at rest anew; ~learn_motion (LearnMotion), true: gather motions
 without contact, false: learn from them.
 """
@@ -42,6 +43,8 @@ from std_msgs.msg import Float64
 
 OLDEST_SIGHT = 0.15
 """s, older sights of an object do not tell whether it is in the palm"""
+SIGNAL = 0.01
+"""s between two messages on ~signal at least"""
 
 
 def pose_of(place, turn) -> Pose | None:
@@ -164,7 +167,10 @@ class ContactDetectorNode:
         forces = [(force.x, force.y, force.z) for force in [*message.forces, message.palm]]
         with self.lock:
             event = self.detector.feed_touch(message.header.stamp.to_sec(), forces, message.deviation)
+            giving = self.detector.share_gone() is not None
         self.publish_event(event, message.header.stamp)
+        if giving:  # fingers follow this signal
+            self.publish_signal()
 
     def on_torques(self, message: JointState) -> None:
         """Each torque sample goes through the detector; an event is published at once."""
@@ -301,8 +307,14 @@ class ContactDetectorNode:
     def on_timer(self, _event) -> None:
         """The object as seen; live margin and signal."""
         self.look_at_object()
+        self.publish_signal()
+
+    def publish_signal(self) -> None:
+        """What the detector sees, once for a sample of torques, and at most every SIGNAL s."""
         with self.lock:
             before, stamp = self.shown, self.last_sample
+            if None not in (before, stamp) and 0.0 < stamp - before < SIGNAL:
+                return
             self.shown = stamp
             seen, settings = self.detector.look(), self.detector.still.settings
             grip = None if stamp is None else self.detector.grip(stamp)

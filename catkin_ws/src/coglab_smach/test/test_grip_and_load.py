@@ -10,7 +10,7 @@ from coglab_smach.contact.evidence import FUSED, MOMENTUM
 from coglab_smach.contact.fused_detector import IN_MOTION, LIFT, RELEASE, FusedDetector
 from coglab_smach.contact.grip_and_load import COVERED, OLDEST, Felt, GripAndLoad, together
 from coglab_smach.ports.interfaces import HandState
-from coglab_smach.states.give import LooseningGrip
+from coglab_smach.states.give import FIRMER, WEAKER, LooseningGrip
 from test_giving import WEIGHT, giving
 
 MASS = WEIGHT / 9.81
@@ -206,19 +206,32 @@ class Hand:
 def test_the_force_follows_the_part_that_is_asked_for_both_ways():
     hand = Hand()
     grip = LooseningGrip(hand, 40, 120, 150, hand.force)
-    for part in (1.0, 0.8, 0.5, 0.3, 0.6, 0.9, 0.4):
-        for _ in range(100):
-            assert grip.ease_to(part, 1.0, 12.0)
+    for k, part in enumerate((1.0, 0.8, 0.5, 0.3, 0.6, 0.9, 0.4)):
+        for i in range(100):
+            assert grip.ease_to(part, 1.0, 12.0, k + 0.01 * i)
             hand.step()
-        assert hand.force() == pytest.approx(50.0 * part, rel=0.2)
+        assert 1.0 - WEAKER - 0.02 < hand.force() / (50.0 * part) < 1.0 + FIRMER + 0.02
+
+
+@pytest.mark.parametrize("late", [0, 2, 4, 6])
+def test_what_is_felt_late_does_not_make_the_fingers_swing(late):
+    """Late by so many periods of 10 ms, as over the hand's line."""
+    hand = Hand()
+    felt = [hand.force()] * (late + 1)
+    grip = LooseningGrip(hand, 40, 120, 150, lambda: felt[-1 - late])
+    for k in range(300):
+        grip.ease_to(0.5, 1.0, 12.0, 0.01 * k)
+        hand.step()
+        felt.append(hand.force())
+    assert len(hand.orders) <= 4 and 1.0 - WEAKER - 0.02 < hand.force() / 25.0 < 1.0 + FIRMER + 0.02
 
 
 def test_it_is_never_weaker_than_friction_asks_for_nor_looser_than_allowed():
     for least, counts, force in ((20.0, 12.0, 20.0), (0.0, 4.0, 30.0)):
         hand = Hand()
         grip = LooseningGrip(hand, 40, 120, 150, hand.force)
-        for _ in range(200):
-            grip.ease_to(0.0, least, counts)
+        for k in range(200):
+            grip.ease_to(0.0, least, counts, 0.01 * k)
             hand.step()
         assert hand.force() == pytest.approx(force, rel=0.2)
 
@@ -226,7 +239,7 @@ def test_it_is_never_weaker_than_friction_asks_for_nor_looser_than_allowed():
 def test_a_hand_that_feels_nothing_is_left_to_the_counts():
     hand = Hand()
     grip = LooseningGrip(hand, 40, 120)
-    assert not grip.ease_to(0.5, 1.0, 12.0) and not hand.orders
+    assert not grip.ease_to(0.5, 1.0, 12.0, 0.0) and not hand.orders
 
 
 def test_the_felt_grip_falls_with_the_load_and_comes_back_with_it():

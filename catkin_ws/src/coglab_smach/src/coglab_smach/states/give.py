@@ -22,8 +22,11 @@ from coglab_smach.states.where import hand_from_palm, way_to_hand
 
 FINGERS = slice(1, 5)
 """motors that bend fingers"""
-BAND = 0.15
-"""share of the wanted grip force by which it may be off without a finger's moving"""
+FIRMER, WEAKER = 0.15, 0.3
+"""share of the wanted grip force by which it may be more or less without a finger's moving"""
+AHEAD, SEEN_AFTER = 0.04, 0.1
+"""s for which the grip goes on as it does after an order to stand, and after which it is seen what that order has left:
+sensors, nodes and the hand's line take some hundredths of a second"""
 GRAVITY = 9.81
 ASTRAY = 0.02
 """m that the object is from where it is offered, from which on it is brought there"""
@@ -47,6 +50,9 @@ class LooseningGrip:
         self._hand, self._speed, self._closing_speed = hand, speed, closing_speed
         self._easing_speed, self._force = easing_speed, force
         self._closed, self._firm = hand.state().positions, force()
+        self._seen: tuple[float, float] | None = None
+        self._rate, self._stood = 0.0, -math.inf
+        """N/s of the grip, and when (s) fingers that followed it stood last"""
         self._opening: Pending | None = None
         self._closing: Pending | None = None
 
@@ -69,7 +75,7 @@ class LooseningGrip:
         elif loosened is None or loosened >= counts or self._opening.done():
             self.stand()
 
-    def ease_to(self, part: float, least: float, counts: float) -> bool:
+    def ease_to(self, part: float, least: float, counts: float, now: float) -> bool:
         """Grip with so much of the force of the closed grip, with ``least`` N at least, and looser by ``counts`` at
         most; call it again and again. False, and nothing done, where no force is felt."""
         force, loosened = self._force(), self.loosened()
@@ -77,17 +83,24 @@ class LooseningGrip:
             return False
         if self._firm is None:
             self._firm = force
+        before, self._seen = self._seen, (now, force)
+        if before is not None and now > before[0]:
+            self._rate += 0.5 * ((force - before[1]) / (now - before[0]) - self._rate)
+        ahead = force + AHEAD * self._rate
         wanted = max(least, part * self._firm)
         if not self._has_closed():
-            if force >= wanted and self._closing is not None:
+            if ahead >= wanted and self._closing is not None:
                 self._closing.cancel()
-                self._closing = None
+                self._closing, self._stood = None, now
         elif self._opening is not None:
-            if force <= wanted or loosened >= counts or self._opening.done():
+            if ahead <= wanted or loosened >= counts or self._opening.done():
                 self.stand()
-        elif force < (1.0 - BAND) * wanted and loosened > 0:
+                self._stood = now
+        elif now < self._stood + SEEN_AFTER:
+            pass
+        elif force < (1.0 - WEAKER) * wanted and loosened > 0:
             self.tighten()
-        elif force > (1.0 + BAND) * wanted and loosened + 1 <= counts:
+        elif force > (1.0 + FIRMER) * wanted and loosened + 1 <= counts:
             self._opening = self._hand.open(self._easing_speed)
         return True
 
@@ -225,7 +238,7 @@ class GiveLoad(CoglabState):
             self.ctx.hand,
             int(self._number("loosen_speed", 40)),
             int(self._number("close_speed", 120)),
-            int(self._number("ease_speed", 150)),
+            int(self._number("ease_speed", 100)),
             contact.grip,
         )
         self._lowering = self._moving = self._back_since = None
@@ -291,7 +304,7 @@ class GiveLoad(CoglabState):
         """The ratio of grip and load stays; False where the hand does not feel its grip."""
         left = 1.0 - min(1.0, share)
         least = left * self._slips_at * self._number("grip_safety", 2.0)
-        return self._grip.ease_to(left, least, self._number("ease", 12.0))
+        return self._grip.ease_to(left, least, self._number("ease", 12.0), self.ctx.clock.now())
 
     def _lower(self, now: float) -> None:
         """Bring the object to the person's hand, if it is elsewhere, or sink; where no hand is, look again in a
