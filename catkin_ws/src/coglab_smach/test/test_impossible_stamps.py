@@ -28,7 +28,7 @@ def node(monkeypatch):
     made.lock, made.last_sample, made.recorder = threading.Lock(), None, None
     made.said = []
     made.detector, made.moving, made.publisher = MagicMock(), MagicMock(), MagicMock()
-    for name in ("feed", "feed_measured", "feed_hand", "feed_touch"):
+    for name in ("feed", "feed_measured", "feed_hand", "feed_touch", "share_gone"):
         getattr(made.detector, name).return_value = None
     return made
 
