@@ -313,7 +313,7 @@ class ContactDetectorNode:
         """What the detector sees, once for a sample of torques, and at most every SIGNAL s."""
         with self.lock:
             before, stamp = self.shown, self.last_sample
-            if None not in (before, stamp) and 0.0 < stamp - before < SIGNAL:
+            if before is not None and stamp is not None and 0.0 < stamp - before < SIGNAL:
                 return
             self.shown = stamp
             seen, settings = self.detector.look(), self.detector.still.settings

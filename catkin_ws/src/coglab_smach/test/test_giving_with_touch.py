@@ -47,13 +47,14 @@ def test_the_grip_falls_as_the_person_takes_the_load(object_id, seed):
 
 def test_a_load_that_comes_back_is_held_again(monkeypatch):
     """The person lifts until they have half of the load, waits, and sinks again."""
-    begun, risen = [], [0.0]
+    begun, risen, enough = [], [0.0], [False]
 
     def half(self, t, dt, seen):
         begun.append(t)
         since = t - begun[0]
-        speed = 0.003 if since < 1.5 and self._load_share(seen) < 0.4 else 0.0
-        if since > 2.5:
+        enough.append(enough[-1] or self._load_share(seen) > 0.3)  # felt late: it gets half
+        speed = 0.0 if enough[-1] else 0.003
+        if since > 2.0:
             speed = -min(0.003, risen[0] / dt)
         self._velocity = np.array([0.0, 0.0, speed])
         self._hand = self._hand + self._velocity * dt

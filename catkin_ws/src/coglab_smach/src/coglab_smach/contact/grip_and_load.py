@@ -82,9 +82,9 @@ class GripAndLoad:
         self._noise = deviation if math.isfinite(deviation) and deviation > 0.0 else 0.0
         if self._forces is None or self._forces.shape != table.shape or not 0.0 <= step <= OLDEST:
             self._forces, self._usual, step = table, None, 0.0
-        self._forces = self._forces + (1.0 - math.exp(-step / SMOOTH)) * (table - self._forces)
+        smooth = self._forces = self._forces + (1.0 - math.exp(-step / SMOOTH)) * (table - self._forces)
         self._stamp = stamp
-        self._load = -float((self._turned(position) @ self._forces.sum(axis=0))[2])
+        self._load = -float((self._turned(position) @ smooth.sum(axis=0))[2])
         usual = self._load if self._usual is None else self._usual
         self._usual = usual + (1.0 - math.exp(-step / USUAL)) * (self._load - usual)
 

@@ -300,7 +300,7 @@ class VirtualContact:
             return None
         forces = np.array(list(self.rig.cell.touch().values()))
         forces += self._touch * self._noise.standard_normal(forces.shape)
-        return self.detector.feed_touch(self.rig.t, forces, self._touch)
+        return self.detector.feed_touch(self.rig.t, forces.tolist(), self._touch)
 
     def _sense_object(self, position: Any, velocity: np.ndarray) -> ContactEvent | None:
         """The object as tracked, against the palm."""
