@@ -8,13 +8,15 @@ coglab_smach.contact.detector.DetectorSettings; robot_description is read
 for Jacobian and dynamics; ~thresholds_file: of the moving arm, learnt in simulation; ~learnt_file: where
 ~learn_motion writes what this robot's own motions tell, and from where it is read at the next start.
 Publishes at 20 Hz ~margin (std_msgs/Float64) while watching, ~signal (coglab_msgs/ContactSignal) while torques come;
-with the samples of the joints, at 100 Hz at most, ~force (geometry_msgs/Vector3Stamped, base frame): N that pull or
-push at the palm beyond what did before the last reach that was watched.
+both at 100 Hz while a load is given by a hand that has touch; with the samples of the joints, at 100 Hz at most,
+~force (geometry_msgs/Vector3Stamped, base frame): N that pull or push at the palm beyond what did before the last reach
+that was watched.
 Services: ~learn (Learn), the noise at rest anew; ~learn_motion (LearnMotion), true: gather motions
 without contact, false: learn from them.
 """
 
 import dataclasses
+import math
 import sys
 import threading
 from pathlib import Path
@@ -33,6 +35,7 @@ from coglab_py.pose import Pose
 from coglab_py.yaml_file import YamlError
 from coglab_smach.contact.detector import ContactDetector, DetectorSettings
 from coglab_smach.contact.fused_detector import IN_MOTION, LIFT, RELEASE, FusedDetector
+from coglab_smach.contact.grip_and_load import GripAndLoad
 from coglab_smach.contact.learning import MotionRecorder
 from coglab_smach.contact.motion_thresholds import ThresholdError, Thresholds
 from coglab_smach.contact.moving_contact import MovingContact
@@ -45,6 +48,8 @@ FORCE_PERIOD = 0.009
 """s between two messages of ~force, at least"""
 OLDEST_SIGHT = 0.15
 """s, older sights of an object do not tell whether it is in the palm"""
+SIGNAL = 0.01
+"""s between two messages on ~signal at least"""
 
 
 def pose_of(place, turn) -> Pose | None:
@@ -72,7 +77,8 @@ class ContactDetectorNode:
         jacobian = lambda q: self.arm.jacobian(np.asarray(q, dtype=float))[:3]  # noqa: E731
         self.learnt_file = parameters.read("~learnt_file", str, "")
         self.moving = MovingContact(self.thresholds(), cc.ArmDynamics(urdf), jacobian)
-        self.detector = FusedDetector(ContactDetector(settings, jacobian), self.moving)
+        held = GripAndLoad(lambda q: Pose(*self.arm.fk(np.asarray(q, dtype=float))).rotation.as_matrix())
+        self.detector = FusedDetector(ContactDetector(settings, jacobian), self.moving, held=held)
         self.recorder: MotionRecorder | None = None
         self.lock = threading.Lock()
         self.position: list[float] | None = None
@@ -174,7 +180,10 @@ class ContactDetectorNode:
         forces = [(force.x, force.y, force.z) for force in [*message.forces, message.palm]]
         with self.lock:
             event = self.detector.feed_touch(message.header.stamp.to_sec(), forces, message.deviation)
+            giving = self.detector.share_gone() is not None
         self.publish_event(event, message.header.stamp)
+        if giving:  # fingers follow this signal
+            self.publish_signal()
 
     def on_torques(self, message: JointState) -> None:
         """Each torque sample goes through the detector; an event is published at once."""
@@ -311,10 +320,17 @@ class ContactDetectorNode:
     def on_timer(self, _event) -> None:
         """The object as seen; live margin and signal."""
         self.look_at_object()
+        self.publish_signal()
+
+    def publish_signal(self) -> None:
+        """What the detector sees, once for a sample of torques, and at most every SIGNAL s."""
         with self.lock:
             before, stamp = self.shown, self.last_sample
+            if before is not None and stamp is not None and 0.0 < stamp - before < SIGNAL:
+                return
             self.shown = stamp
             seen, settings = self.detector.look(), self.detector.still.settings
+            grip = None if stamp is None else self.detector.grip(stamp)
         if seen.state == "watching":
             publish(self.margin, Float64(seen.margin))
         if stamp is None or stamp == before:
@@ -328,6 +344,7 @@ class ContactDetectorNode:
             window=settings.window,
             k=seen.k,
             margin=seen.margin,
+            grip=math.nan if grip is None else grip,
             rest_samples=seen.rest_samples,
             learnt=seen.rest_samples >= settings.learn_samples,
         )

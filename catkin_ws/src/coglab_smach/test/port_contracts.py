@@ -261,6 +261,7 @@ class ContactContract(Contract):
             self.place.push(-8.0)
             self.happens(True, ReasonCode.LOAD_CARRIED)
             assert self.port.share_gone() is None
+            assert self.port.grip() is None, "this hand does not feel"
             self.watches("release", mass=0.8, load_share=0.5)
             assert abs(self.port.share_gone()) < 0.1
             self.place.push(0.0)

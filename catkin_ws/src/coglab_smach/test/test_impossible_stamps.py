@@ -28,7 +28,7 @@ def node(monkeypatch):
     made.lock, made.last_sample, made.recorder, made.force_stamp = threading.Lock(), None, None, 0.0
     made.said = []
     made.detector, made.moving, made.publisher = MagicMock(), MagicMock(), MagicMock()
-    for name in ("feed", "feed_measured", "feed_hand", "feed_touch", "force"):
+    for name in ("feed", "feed_measured", "feed_hand", "feed_touch", "force", "share_gone"):
         getattr(made.detector, name).return_value = None
     return made
 

@@ -33,7 +33,8 @@ class VirtualTrial:
 
     ``conditions`` of the world: by default people and tracker as they are; ``behaviour``, ``profile``, ``perfect`` and
     ``perception`` change them. ``reaches`` gets one ReachRecord per DMP motion, ``touches`` one TouchRecord per wait
-    for contact, ``begun`` the actions that a hub has taken.
+    for contact, ``begun`` the actions that a hub has taken. ``touch``: N of noise of the hand's touch sensors; None:
+    it has none.
     """
 
     def __init__(
@@ -51,6 +52,7 @@ class VirtualTrial:
         conditions=None,
         recording=None,
         power=False,
+        touch=None,
         **overrides,
     ):
         if conditions is None:
@@ -72,7 +74,7 @@ class VirtualTrial:
             hand=VirtualHand(self.rig),
             perception=VirtualPerception(self.rig, recogniser, BeliefFilter()),
             database=PowerGrasps(database) if power else VirtualDatabase(database),
-            contact=VirtualContact(self.rig),
+            contact=VirtualContact(self.rig, touch),
             config=config,
             journal=Journal(self.clock.now),
             reachable=lambda pose: solve(default_arm(), pose) is not None,

@@ -20,6 +20,7 @@ from coglab_msgs.msg import ReasonCode
 from coglab_smach.contact.detector import ContactDetector, Joints, Signal
 from coglab_smach.contact.evidence import (
     DECIDED,
+    FUSED,
     MOMENTUM,
     Evidence,
     Fingers,
@@ -30,6 +31,7 @@ from coglab_smach.contact.evidence import (
     probability,
     together,
 )
+from coglab_smach.contact.grip_and_load import GripAndLoad
 from coglab_smach.contact.leaving_load import LeavingLoad
 from coglab_smach.contact.moving_contact import MovingContact
 from coglab_smach.ports.interfaces import ContactEvent
@@ -66,10 +68,13 @@ class FusedDetector:
         moving: MovingContact | None,
         touch: Touch | None = None,
         fingers: Fingers | None = None,
+        held: GripAndLoad | None = None,
     ) -> None:
-        """``moving`` None: there is no model of the arm, and IN_MOTION is refused."""
+        """``moving`` None: there is no model of the arm, and IN_MOTION is refused. ``held``: what touch tells of grip
+        and load; without it, or where nobody feeds touch, the torques alone tell how much of a load has gone."""
         self.still, self.moving = still, moving
         self._touch, self._fingers, self._palm = touch or Touch(), fingers or Fingers(), InPalm()
+        self._held = held
         self._lift: _Lift | None = None
         self._leaving: LeavingLoad | None = None
         self._until: float | None = None
@@ -113,6 +118,9 @@ class FusedDetector:
         if mode == IN_MOTION and self.moving is not None:
             self._before_reach = self.moving.before_motion()
         self._leaving = leaving
+        if self._held is not None:
+            # Who is given something may touch it while the arm still comes.
+            {IN_MOTION: self._held.count_from_now, RELEASE: self._held.count_on}.get(mode, self._held.anew)()
         self._mass = mass if mode in ("load", LIFT) else 0.0
         self._until = now + timeout if mode in (IN_MOTION, LIFT) else None
         self._first = True
@@ -147,6 +155,8 @@ class FusedDetector:
         """The hand carries this from now on; 0 kg: nothing. ValueError for what is no mass."""
         if self.moving is not None:
             self.moving.set_payload(mass, centre)
+        if self._held is not None:
+            self._held.anew()
 
     def feed(self, stamp: float, torque: Joints, position: Joints, velocity: Joints) -> ContactEvent | None:
         """External torques as the robot controller estimates them, and the joints: see ContactDetector.feed."""
@@ -185,7 +195,9 @@ class FusedDetector:
         self, stamp: float, forces: Sequence[Sequence[float]], deviation: float = 0.0
     ) -> ContactEvent | None:
         """Forces on the phalanges and the palm (N), as FingertipForces has them. Fingers that hold something feel that:
-        while a payload was told, touch is no source."""
+        while a payload was told, touch is no source of contact, but tells grip and load."""
+        if self._held is not None and self.moving is not None and self.moving.residual is not None:
+            self._held.feed(stamp, forces, deviation, self.moving.residual.position)
         if self.moving is not None and self.moving.load > 0.0:
             return None
         return self._judge(stamp, self._touch.feed(stamp, forces, deviation))
@@ -241,15 +253,17 @@ class FusedDetector:
         if stamp > leaving.until:
             self._leaving = None
             return None
-        if residual is None or not (self.moving.slow() or residual.fresh):
-            leaving.pause()
-        elif leaving.feed(
-            stamp, self.moving.weight(residual.torque, residual.position), self.moving.still(), residual.fresh
-        ):
+        felt = None if self._held is None else self._held.share_gone(stamp, leaving.weight)
+        weight, fresh = None, False
+        if residual is not None and (self.moving.slow() or residual.fresh):
+            weight, fresh = self.moving.weight(residual.torque, residual.position), residual.fresh
+        if leaving.feed(stamp, weight, self.moving.still(), fresh, felt):
             gone, needed = (share * leaving.weight for share in (leaving.share or 0.0, leaving.needed))
             message = f"{gone:.1f} N of the load are gone (needed {needed:.1f} N)"
             sure = probability(leaving.margin)
-            return ContactEvent(False, MOMENTUM, leaving.margin, message, sure, ReasonCode.LOAD_RELEASED)
+            return ContactEvent(
+                False, MOMENTUM if felt is None else FUSED, leaving.margin, message, sure, ReasonCode.LOAD_RELEASED
+            )
         return None
 
     def share_gone(self) -> float | None:
@@ -262,6 +276,11 @@ class FusedDetector:
         if self.moving is None or self._before_reach is None:
             return None
         return self.moving.force_since(self._before_reach)
+
+    def grip(self, now: float) -> float | None:
+        """N with which the fingers squeeze what they hold, as touch feels it; None where that does not tell at ``now``
+        (s)."""
+        return None if self._held is None else self._held.grip(now)
 
     def look(self) -> Signal:
         """As ContactDetector.look; the margin of RELEASE is told too."""

@@ -1,10 +1,13 @@
 """How much of an object's weight has left the hand: the person's share of the load while the robot gives it.
 
 Counted in N on the palm, from the residual of the moving arm's model (momentum_observer), so that an arm that sways or
-sinks meanwhile does not begin anew.
+sinks meanwhile does not begin anew. Where touch tells how much has gone, both count, and while the arm is too fast for
+its torques to tell, touch alone does.
 """
 
 from __future__ import annotations
+
+from coglab_smach.contact.grip_and_load import Felt, together
 
 GRAVITY = 9.81
 SETTLING = 0.10
@@ -46,25 +49,26 @@ class LeavingLoad:
         """Share that is gone over the one that is needed."""
         return (self.share or 0.0) / self.needed
 
-    def feed(self, stamp: float, weight: float, still: bool, fresh: bool) -> bool:
-        """One sample: s, and N on the palm; ``still``: the arm stands; ``fresh``: the samples before it do not count.
-        Whether enough is gone now, said once."""
+    def feed(self, stamp: float, weight: float | None, still: bool, fresh: bool, felt: Felt | None = None) -> bool:
+        """One sample: s, and N on the palm, None while the arm moves too fast to tell; ``still``: the arm stands;
+        ``fresh``: the samples before it do not count; ``felt``: the share by touch, None where that does not tell.
+        Whether enough is gone now, said once. Where nothing tells, the share stays as it was, and what seemed gone has
+        to be so anew."""
         if fresh:
             self._from, self._settled, self._count, self._since = None, False, 0, None
-        if not self._settled and (still or self._from is None):
+        if weight is not None and not self._settled and (still or self._from is None):
             self._settle(stamp, weight)
-        if self._from is None:
+        torques = None if weight is None or self._from is None else (self._from - weight) / self.weight
+        share = together(torques, SAME / self.weight, felt)
+        if share is None:
+            self._since = None
             return False
-        self.share = (self._from - weight) / self.weight
-        self._since = None if self.share < self.needed else stamp if self._since is None else self._since
+        self.share = share
+        self._since = None if share < self.needed else stamp if self._since is None else self._since
         if self.told or self._since is None or stamp - self._since < CONFIRMED:
             return False
         self.told = True
         return True
-
-    def pause(self) -> None:
-        """The arm moves too fast to tell: the share stays as it was, and what seemed gone has to be so anew."""
-        self._since = None
 
     def _settle(self, stamp: float, weight: float) -> None:
         """Average what hangs on the palm, and then decide what is counted from."""

@@ -266,3 +266,6 @@ class ContactPort(Protocol):
         """N on the palm, base frame, beyond what acted before the last reach in which 'contact_in_motion' was watched
         for, whether somebody watches now or not. What an object weighs is a part of it until the detector has been told
         that it is carried. None where it is not known, or older than 0.1 s."""
+
+    def grip(self) -> float | None:
+        """N with which the fingers squeeze what they hold; None where nothing in the hand tells that."""

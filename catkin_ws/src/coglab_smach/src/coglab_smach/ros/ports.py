@@ -195,3 +195,9 @@ class RosContact:
         if message is None or self._force.age() > OLDEST_FORCE:
             return None
         return (message.vector.x, message.vector.y, message.vector.z)
+
+    def grip(self) -> float | None:
+        signal = self._signal.message
+        if signal is None or self._signal.age() > OLDEST_SIGNAL or not math.isfinite(signal.grip):
+            return None
+        return float(signal.grip)

@@ -125,6 +125,9 @@ class SimulatedCell:
         self.lifted = 0.0
         self.pulled: tuple[float, float, float] | None = (0.0, 0.0, 0.0)
         """N, base frame: somebody pulls at the hand; None: the detector does not tell"""
+        self.touch: float | None = None
+        """N of grip for each count by which the fingers squeeze what they hold; None: the hand does not feel"""
+        self.fingers: Callable[[], tuple[int, ...]] = lambda: self.hand_positions
         self.objects: dict[str, Pose] = {
             "mug": Pose(np.array([0.78, 0.03, 0.43])),
             "board": Pose(np.array([0.45, -0.55, 0.05])),

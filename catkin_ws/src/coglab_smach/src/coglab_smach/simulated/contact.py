@@ -13,6 +13,8 @@ from coglab_smach.simulated.cell import SimulatedCell
 
 TOUCH = 1.0
 """N, a contact"""
+AROUND = 150
+"""counts at which the middle finger of the closed hand begins to squeeze what it holds"""
 EVENTS = {
     "contact": ReasonCode.CONTACT_FOUND,
     "contact_in_motion": ReasonCode.CONTACT_FOUND,
@@ -115,6 +117,11 @@ class SimulatedContact:
             return None
         x, y, z = self.cell.pulled
         return (x, y, z + self.cell.lifted)
+
+    def grip(self) -> float | None:
+        if self.cell.touch is None or "contact" in self.cell.faults.dead:
+            return None
+        return self.cell.touch * max(0, self.cell.fingers()[2] - AROUND)
 
     def _pushed(self) -> bool:
         lifted = self.cell.lifted - self._lifted_before

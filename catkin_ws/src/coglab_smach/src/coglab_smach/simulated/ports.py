@@ -37,6 +37,7 @@ class SimulatedHand:
         self._order = 0
         self._at_work: tuple[float, float, tuple[int, ...]] | None = None
         """since when the fingers move at a speed, s for the whole way, and from where"""
+        cell.fingers = self._positions
 
     def calibrate(self, mode: str) -> Pending:
         words = mode.split(" ")

@@ -21,6 +21,7 @@ from ih2_hand.reasons import Reason, reason_of
 
 from coglab_smach.contact.detector import ContactDetector, DetectorSettings
 from coglab_smach.contact.fused_detector import FusedDetector
+from coglab_smach.contact.grip_and_load import GripAndLoad
 from coglab_smach.contact.motion_thresholds import Thresholds
 from coglab_smach.contact.moving_contact import MovingContact
 from coglab_smach.ports.interfaces import (
@@ -238,15 +239,18 @@ class VirtualDatabase:
 
 
 class VirtualContact:
-    """ContactPort: the detector on the virtual arm's torques, the hand's motors and the trackers."""
+    """ContactPort: the detector on the virtual arm's torques, the hand's motors, the trackers and touch."""
 
-    def __init__(self, rig: Any) -> None:
-        self.rig = rig
+    def __init__(self, rig: Any, touch: float | None = None) -> None:
+        """``touch``: N, standard deviation of each component of the hand's touch sensors; None: it has none."""
+        self.rig, self._touch = rig, touch
+        self._noise = np.random.default_rng(0)
         chain = rig.robot.chain
         jacobian = lambda q: chain.jacobian(np.asarray(q, dtype=float))[:3]  # noqa: E731
         moving = MovingContact(Thresholds.load(THRESHOLDS), cc.ArmDynamics(rig.robot.urdf), jacobian)
         self.moving = moving
-        self.detector = FusedDetector(ContactDetector(DetectorSettings(), jacobian), moving)
+        held = GripAndLoad(lambda q: Pose(*chain.fk(q)).rotation.as_matrix())
+        self.detector = FusedDetector(ContactDetector(DetectorSettings(), jacobian), moving, held=held)
         self.watched_while_moving = 0
         """periods in which the detector of an arm at rest watched though the arm moved"""
         self._event: ContactEvent | None = None
@@ -273,6 +277,7 @@ class VirtualContact:
             detector.feed_measured(t, report["position"], report["torque"]),
             detector.feed(t, report["external_torque"], report["position"], velocity),
             self._sense_hand(),
+            self._sense_touch(),
             self._sense_object(report["position"], velocity),
         ]
         self._event = next((event for event in (self._event, *events) if event is not None), None)
@@ -288,6 +293,14 @@ class VirtualContact:
         if not hand.holding and self.moving.load > 0.0:
             self.detector.set_payload(0.0)
         return self.detector.feed_hand(self.rig.t, hand.readings)
+
+    def _sense_touch(self) -> ContactEvent | None:
+        """Phalanges and palm, of a hand that has touch sensors."""
+        if self._touch is None:
+            return None
+        forces = np.array(list(self.rig.cell.touch().values()))
+        forces += self._touch * self._noise.standard_normal(forces.shape)
+        return self.detector.feed_touch(self.rig.t, forces.tolist(), self._touch)
 
     def _sense_object(self, position: Any, velocity: np.ndarray) -> ContactEvent | None:
         """The object as tracked, against the palm."""
@@ -339,3 +352,6 @@ class VirtualContact:
     def force(self) -> tuple[float, float, float] | None:
         force = None if self.node.frozen else self.detector.force()
         return None if force is None else (float(force[0]), float(force[1]), float(force[2]))
+
+    def grip(self) -> float | None:
+        return None if self.node.frozen else self.detector.grip(self.rig.t)

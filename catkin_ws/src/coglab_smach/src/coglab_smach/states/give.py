@@ -22,18 +22,37 @@ from coglab_smach.states.where import hand_from_palm, way_to_hand
 
 FINGERS = slice(1, 5)
 """motors that bend fingers"""
+FIRMER, WEAKER = 0.15, 0.3
+"""share of the wanted grip force by which it may be more or less without a finger's moving"""
+AHEAD, SEEN_AFTER = 0.04, 0.1
+"""s for which the grip goes on as it does after an order to stand, and after which it is seen what that order has left:
+sensors, nodes and the hand's line take some hundredths of a second"""
+GRAVITY = 9.81
 ASTRAY = 0.02
 """m that the object is from where it is offered, from which on it is brought there"""
 
 
 class LooseningGrip:
-    """The fingers around an object: opened by counts of a motor's position (0 open .. 254 closed) and closed again."""
+    """The fingers around an object: opened by counts of a motor's position (0 open .. 254 closed), or until the grip
+    that is felt has come down, and closed again."""
 
-    def __init__(self, hand: HandPort, speed: int, closing_speed: int) -> None:
+    def __init__(
+        self,
+        hand: HandPort,
+        speed: int,
+        closing_speed: int,
+        easing_speed: int = 1,
+        force: Callable[[], float | None] = lambda: None,
+    ) -> None:
         """``speed``, ``closing_speed``: 1..511, wire speeds at which they loosen and close; the second one stands for
-        the force with which they hold then."""
+        the force with which they hold then. ``force``: N of grip that are felt, None where nothing tells; where it
+        tells, they loosen at ``easing_speed``."""
         self._hand, self._speed, self._closing_speed = hand, speed, closing_speed
-        self._closed = hand.state().positions
+        self._easing_speed, self._force = easing_speed, force
+        self._closed, self._firm = hand.state().positions, force()
+        self._seen: tuple[float, float] | None = None
+        self._rate, self._stood = 0.0, -math.inf
+        """N/s of the grip, and when (s) fingers that followed it stood last"""
         self._opening: Pending | None = None
         self._closing: Pending | None = None
 
@@ -47,16 +66,52 @@ class LooseningGrip:
 
     def loosen_to(self, counts: float) -> None:
         """Open on until they are so loose; call it again and again."""
-        if self._closing is not None:
-            if not self._closing.done():
-                return
-            self._closed, self._closing = self._hand.state().positions, None
+        if not self._has_closed():
+            return
         loosened = self.loosened()
         if self._opening is None:
             if loosened is not None and loosened + 1 <= counts:
                 self._opening = self._hand.open(self._speed)
         elif loosened is None or loosened >= counts or self._opening.done():
             self.stand()
+
+    def ease_to(self, part: float, least: float, counts: float, now: float) -> bool:
+        """Grip with so much of the force of the closed grip, with ``least`` N at least, and looser by ``counts`` at
+        most; call it again and again. False, and nothing done, where no force is felt."""
+        force, loosened = self._force(), self.loosened()
+        if force is None or loosened is None:
+            return False
+        if self._firm is None:
+            self._firm = force
+        before, self._seen = self._seen, (now, force)
+        if before is not None and now > before[0]:
+            self._rate += 0.5 * ((force - before[1]) / (now - before[0]) - self._rate)
+        ahead = force + AHEAD * self._rate
+        wanted = max(least, part * self._firm)
+        if not self._has_closed():
+            if ahead >= wanted and self._closing is not None:
+                self._closing.cancel()
+                self._closing, self._stood = None, now
+        elif self._opening is not None:
+            if ahead <= wanted or loosened >= counts or self._opening.done():
+                self.stand()
+                self._stood = now
+        elif now < self._stood + SEEN_AFTER:
+            pass
+        elif force < (1.0 - WEAKER) * wanted and loosened > 0:
+            self.tighten()
+        elif force > (1.0 + FIRMER) * wanted and loosened + 1 <= counts:
+            self._opening = self._hand.open(self._easing_speed)
+        return True
+
+    def _has_closed(self) -> bool:
+        """Whether no closing is under way any more. What they hold with then is the closed grip."""
+        if self._closing is None:
+            return True
+        if not self._closing.done():
+            return False
+        self._closed, self._firm, self._closing = self._hand.state().positions, self._force(), None
+        return True
 
     def stand(self) -> None:
         """No looser."""
@@ -141,7 +196,9 @@ class GiveLoad(CoglabState):
     """Let the person take the load of the object that the arm holds out, and end when they carry as much of it as the
     delivery's ``release`` asks for. The contact detector is armed for release (WaitStop).
 
-    The grip loosens in proportion to their share of the weight, by ``give.loosen`` counts at most. When the load comes
+    The grip loosens in proportion to their share of the weight, as people's does (Chan 2012, Endo 2012): where the hand
+    feels its grip, the force of it falls as the load does, down to ``give.grip_safety`` times what friction needs for
+    what the hand still carries, by ``give.ease`` counts at most; else it is ``give.loosen`` counts. When the load comes
     back to the arm, or the object sinks in the hand by ``give.slip`` m, the grip closes again. Where nothing has
     happened for ``give.lower_after`` s and the person's hand is there, the arm brings the object to where that hand
     takes it, and then sinks by ``give.lower`` m, so that the weight comes to lie in it. After the time limit the grip
@@ -152,7 +209,7 @@ class GiveLoad(CoglabState):
     owns_motion = True
 
     def __init__(self, ctx: Context) -> None:
-        super().__init__(ctx, input_keys=["object_id", "delivery"])
+        super().__init__(ctx, input_keys=["object_id", "object_entry", "delivery"])
         self._grip: LooseningGrip
         self._held: HeldObject
         self._offer: Callable[[], np.ndarray | None] = lambda: None
@@ -162,7 +219,8 @@ class GiveLoad(CoglabState):
         self._lower_at = 0.0
         self._brought = False
         """nearer to the person's hand, if it was not near enough"""
-        self._needed = 0.0
+        self._needed = self._slips_at = 0.0
+        """share of the load; N of grip below which the object slips while the hand carries all of it"""
         self._back_since: float | None = None
 
     def _number(self, name: str, default: float) -> float:
@@ -173,8 +231,15 @@ class GiveLoad(CoglabState):
         limit = float(release.get("timeout", self.ctx.config.get("release_timeout", 8.0)))
         self._needed = float(release.get("threshold", 0.5))
         self.allow(limit + 10.0)
+        entry = ud.object_entry
+        # Two sides press: the object slips where friction on both does not carry it.
+        self._slips_at = GRAVITY * float(entry.get("mass", 0.0)) / (2.0 * float(entry.get("friction", 0.5)))
         self._grip = LooseningGrip(
-            self.ctx.hand, int(self._number("loosen_speed", 40)), int(self._number("close_speed", 120))
+            self.ctx.hand,
+            int(self._number("loosen_speed", 40)),
+            int(self._number("close_speed", 120)),
+            int(self._number("ease_speed", 100)),
+            contact.grip,
         )
         self._lowering = self._moving = self._back_since = None
         self._brought = False
@@ -223,8 +288,9 @@ class GiveLoad(CoglabState):
             if part > 0.0:
                 # The person's hand is at the object: the arm must not go away with it.
                 self.ctx.shared = True
-                self._grip.loosen_to(min(1.0, part) * self._number("loosen", 4.0))
-            else:
+                if not self._ease(share):
+                    self._grip.loosen_to(min(1.0, part) * self._number("loosen", 4.0))
+            elif not self._ease(0.0):
                 self._grip.stand()
         else:
             self._back_since = now if self._back_since is None else self._back_since
@@ -233,6 +299,12 @@ class GiveLoad(CoglabState):
                 self.ctx.shared = False
                 if (self._grip.loosened() or 0) > 0:
                     self._grip.tighten()
+
+    def _ease(self, share: float) -> bool:
+        """The ratio of grip and load stays; False where the hand does not feel its grip."""
+        left = 1.0 - min(1.0, share)
+        least = left * self._slips_at * self._number("grip_safety", 2.0)
+        return self._grip.ease_to(left, least, self._number("ease", 12.0), self.ctx.clock.now())
 
     def _lower(self, now: float) -> None:
         """Bring the object to the person's hand, if it is elsewhere, or sink; where no hand is, look again in a
