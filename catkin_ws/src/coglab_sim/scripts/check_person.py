@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""check_person.py BEHAVIOUR PROFILE RECORDING WAY: whether these settings of the virtual person can be used.
+"""check_person.py BEHAVIOUR PROFILE RECORDING WAY OBJECT SOURCE: whether the virtual person can use these settings.
 
 For launch files (<param command=...>), which would otherwise start a person again and again who cannot begin. Prints
 "usable", or ends with 1 and one sentence per setting on the error output.
@@ -11,19 +11,23 @@ import sys
 
 from coglab_sim.person.participant import BEHAVIOURS, PROFILES
 
+SHIPPED = "mug"
+"""object of config/cell.yaml, which a launch without one takes"""
 
-def complaints(behaviour: str, profile: str, recording: str, way: str) -> list[str]:
-    """What cannot be used, and what there is."""
+
+def complaints(behaviour: str, profile: str, recording: str, way: str, object_id: str, source: str) -> list[str]:
+    """What cannot be used, and what there is. ``object_id``: that the person holds, empty for the shipped one;
+    ``source``: where it comes from in a recording, see open_recorded_hand."""
     judged = [("behaviour", behaviour, BEHAVIOURS), ("profile", profile, PROFILES)]
     unreadable = []
     if recording or way != "wait":  # what reads recordings takes long to import
-        from coglab_sim.person.recorded_motion import load_recording
-        from coglab_sim.person.recorded_person import WAYS
+        from coglab_sim.person.recorded_person import WAYS, open_recorded_hand
 
         judged.append(("recorded_person", way, WAYS))
         try:
-            if recording:
-                load_recording(recording)
+            if recording and way in WAYS:
+                settings = {"file": recording, "person": way, "object": source}
+                open_recorded_hand(settings, f"object_{object_id or SHIPPED}")
         except (OSError, ValueError) as error:
             unreadable.append(f"recording:={recording}: {error}")
     return [
@@ -35,7 +39,7 @@ def complaints(behaviour: str, profile: str, recording: str, way: str) -> list[s
 
 def main(words: list[str]) -> int:
     """Exit status: 0 usable, 1 not, 2 usage."""
-    if len(words) != 4:
+    if len(words) != 6:
         print(__doc__, file=sys.stderr)
         return 2
     found = complaints(*words)

@@ -43,10 +43,22 @@ def test_a_recording_that_cannot_be_read(tmp_path, capfd):
     assert "the header must name t,x,y,z" in capfd.readouterr().err
 
 
+def write_reach(path):
+    """A recording of a hand alone, 0.4 m far."""
+    path.write_text("t,x,y,z\n" + "".join(f"{0.1 * i},{min(0.04 * i, 0.4)},0,0.4\n" for i in range(21)))
+
+
+def test_a_recording_without_the_object_is_refused_before_anything_starts(tmp_path, capfd):
+    write_reach(tmp_path / "hand.csv")
+    with pytest.raises(RLException):
+        resolve(f"recording:={tmp_path}/hand.csv")
+    assert "a handover needs the frame 'object_mug', the recording has human_hand" in capfd.readouterr().err
+
+
 @pytest.mark.parametrize("behaviour", [BEHAVIOURS[0], BEHAVIOURS[-1]])
 def test_what_can_be_used_is_taken(behaviour, tmp_path):
-    (tmp_path / "a b.csv").write_text("t,x,y,z\n0,1,2,3\n1,1,2,3\n")
-    config = resolve(f"behaviour:={behaviour}", f"recording:={tmp_path}/a b.csv")
+    write_reach(tmp_path / "a b.csv")
+    config = resolve(f"behaviour:={behaviour}", f"recording:={tmp_path}/a b.csv", "recorded_object:=in_hand")
     assert config.params["/coglab_sim/virtual_human/behaviour"].value == behaviour
     assert config.params["/coglab_sim/virtual_human/settings"].value == "usable"
 

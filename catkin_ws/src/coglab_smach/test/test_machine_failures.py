@@ -105,6 +105,27 @@ def test_an_object_whose_weight_is_carried_is_not_dropped_when_the_person_is_see
     assert trial.result().code == ReasonCode.NOT_RELEASED
 
 
+def test_an_object_that_the_person_was_lost_from_is_kept_though_its_weight_was_not_felt_to_come():
+    trial = Trial()
+
+    def script(t):
+        t.wait_hub("wait_without_object")
+        t.cell.partner.let_go_after = None
+        while "arm lift" not in t.cell.called():
+            if not t.begun_once:
+                t.start("exchange_human_to_robot")
+                t.begun_once = True
+            t.clock.sleep(0.05)
+        t.cell.faults.not_seen.add("human_hand")
+        t.wait_hub("stopped")
+        assert t.cell.called("open") == [] and t.ctx.holding == "mug"
+        assert "its weight has not come, and the person's hand is not seen any more" in t.ctx.journal.why()
+
+    trial.begun_once = False
+    trial.run(script)
+    assert trial.result().code == ReasonCode.NOT_RELEASED
+
+
 def test_failed_preshape_ends_the_arm_motion_too():
     trial = failed_exchange(lambda t: t.cell.faults.refuse.__setitem__("preshape cylindrical", "motor 2 is stuck"))
     assert_recovered_empty(trial, "motor 2 is stuck")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from coglab_msgs.msg import ReasonCode
 import smach
 from coglab_perception.frames import FrameNames
 from coglab_py.pose import Pose
@@ -111,6 +112,7 @@ def test_two_people_as_near_as_each_other_end_the_action_with_the_sentence():
     results = trial.run("exchange_human_to_robot")
     assert results[0].outcome == "failed_empty"
     assert SENTENCE in " ".join([results[0].reason, *results[0].causes])
+    assert results[0].code == ReasonCode.OBJECT_NOT_SEEN
     assert not trial.reaches, "the arm has not moved toward anybody"
     assert trial.last_hub == "wait_without_object"
 
@@ -140,6 +142,7 @@ def test_two_hands_of_one_person_that_come_together_are_not_told_apart():
     results = trial.run("exchange_human_to_robot")
     assert results[0].outcome == "failed_empty"
     assert SENTENCE in " ".join([results[0].reason, *results[0].causes])
+    assert results[0].code == ReasonCode.OBJECT_NOT_SEEN
     assert "closing" not in results[0].marks and trial.last_hub == "wait_without_object"
 
 

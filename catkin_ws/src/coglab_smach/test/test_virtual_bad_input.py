@@ -209,8 +209,9 @@ def test_a_partner_who_pushes_the_arm_away_while_it_receives(after, outcomes):
 
 
 def test_who_offers_and_withdraws_five_times_is_not_chased():
-    """Each ends because the goal went back or left the region, and the sixth offer is taken. Goal: the palm goes toward
-    the hand with at most 0.25 m/s from 0.2 s after it has turned on."""
+    """Each ends because the goal went back or left the region, and the sixth offer is taken. The palm goes toward the
+    hand with at most 0.25 m/s from 0.2 s after it has turned: that is missed, and judged by the bench of the partner,
+    since a reach ends once the hand is 0.10 m back; here it must not get worse."""
     trial = VirtualTrial(seed=4, profile="accustomed", perfect=True, behaviour="withdraws")
     fastest = {}
 
@@ -232,12 +233,7 @@ def test_who_offers_and_withdraws_five_times_is_not_chased():
     assert {end[1] for end in ends[:5]} <= {ReasonCode.GOAL_WITHDRAWN, ReasonCode.GOAL_LEFT_REGION}, ends
     assert all(r.reason for r in results[:5])
     assert trial.rig.robot.limit_violations == 0
-    if max(fastest.values(), default=0.0) > 0.25:
-        pytest.xfail(
-            "known: the reach ends once the hand is 0.10 m back, so the palm still follows it with "
-            + ", ".join(f"{speed:.2f}" for speed in fastest.values())
-            + " m/s"
-        )
+    assert np.median(list(fastest.values())) <= 0.3 and max(fastest.values()) <= 0.6
 
 
 def test_a_tug_while_the_hand_has_closed():

@@ -113,6 +113,7 @@ def _rules(sources: Path, objects: Path) -> dict[str, Callable[[str], object]]:
         "behaviour": lambda value: _one_of(_behaviours(sources), value),
         "profile": lambda value: _one_of(["drawn", "patient", "accustomed"], value),
         "recorded_person": lambda value: _one_of(["wait", "no_wait", "leave"], value),
+        "recorded_object": lambda value: _one_of(["recorded", "in_hand"], value),
         "object": lambda value: _object(objects, value),
         "objects": _folder,
         "recording": _file,

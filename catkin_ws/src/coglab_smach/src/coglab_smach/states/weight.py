@@ -25,7 +25,7 @@ class TakeWeight(CoglabState):
     The weight that comes is measured (``hand.load_share`` of the object's). It is counted from the closing of the
     fingers, when a person often still presses the object up or down, so it does not end the rise: what a person feels
     in the hand does. ``hand_distance``: m, of the person's hand from the palm before the fingers closed; None where no
-    tracker sees it, and then the weight has to have come by the end of the rise. Where the weight has come and the
+    tracker sees it, and then the weight has to have come by the end of the rise. Where the
     tracker has lost the hand since, the person may have gone: nothing is opened, the arm stays and says so.
 
     The palm goes along with who pulls (GivesWay), and the rise goes on afterwards.
@@ -97,8 +97,9 @@ class TakeWeight(CoglabState):
     def _not_released(self, object_id: str, limit: float, error: TimeLimit) -> PortError:
         """The failure, and who has the object then: the person, but where only the robot's hand may hold it."""
         causes: tuple[str, ...] = (error.sentence,)
-        if self.ctx.contact.event() is not None and hand_from_palm(self) is None:
-            causes += ("its weight is carried, and the person's hand is not seen any more",)
+        if hand_from_palm(self) is None:
+            carried = "its weight is carried" if self.ctx.contact.event() is not None else "its weight has not come"
+            causes += (f"{carried}, and the person's hand is not seen any more",)
         else:
             self.ctx.holding = ""
         return PortError(
