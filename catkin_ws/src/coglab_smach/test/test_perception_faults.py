@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from coglab_msgs.msg import ReasonCode
 import smach
+from coglab_msgs.msg import ReasonCode
 from coglab_perception.frames import FrameNames
 from coglab_py.pose import Pose
 from coglab_sim.tracker.tracker import Board, PerceptionSettings
