@@ -168,6 +168,7 @@ class ContactDetectorNode:
         if self.refuses(message):
             return
         with self.lock:
+            self.detector.holds = message.connected and message.holding
             if message.connected and not message.holding and self.moving.load > 0.0:
                 self.detector.set_payload(0.0)
             event = self.detector.feed_hand(message.header.stamp.to_sec(), message.motors)

@@ -269,6 +269,18 @@ def test_touch_alone_is_contact_also_of_what_lies_in_the_palm():
     assert detector.feed_touch(0.04, pressed, 0.05) is None  # one event for one arming
 
 
+def test_what_a_hand_feels_that_says_it_holds_something_is_no_contact():
+    """Taken from the board, an object was never told as a payload."""
+    detector = fused()
+    detector.arm(IN_MOTION, 0.0, 5.0)
+    pressed = [[0, 0, 0], [0.8, 0.0, 0.3], [0, 0, 0]]
+    detector.holds = True
+    assert all(detector.feed_touch(0.01 * i, pressed, 0.05) is None for i in range(4))
+    detector.holds = False
+    assert detector.feed_touch(0.05, pressed, 0.05) is None  # what was felt before does not count
+    assert detector.feed_touch(0.06, pressed, 0.05) is not None
+
+
 def test_fingers_that_stop_early_or_are_moved_are_contact():
     for change, named in (({"position": 60}, "moved"), ({"force": 60}, "strained")):
         fingers = Fingers()

@@ -75,6 +75,8 @@ class FusedDetector:
         self.still, self.moving = still, moving
         self._touch, self._fingers, self._palm = touch or Touch(), fingers or Fingers(), InPalm()
         self._held = held
+        self.holds = False
+        """whether the hand says that it holds something, whatever the arm was told to carry"""
         self._lift: _Lift | None = None
         self._leaving: LeavingLoad | None = None
         self._until: float | None = None
@@ -195,10 +197,10 @@ class FusedDetector:
         self, stamp: float, forces: Sequence[Sequence[float]], deviation: float = 0.0
     ) -> ContactEvent | None:
         """Forces on the phalanges and the palm (N), as FingertipForces has them. Fingers that hold something feel that:
-        while a payload was told, touch is no source of contact, but tells grip and load."""
+        while they do, or a payload was told, touch is no source of contact, but tells grip and load."""
         if self._held is not None and self.moving is not None and self.moving.residual is not None:
             self._held.feed(stamp, forces, deviation, self.moving.residual.position)
-        if self.moving is not None and self.moving.load > 0.0:
+        if self.holds or (self.moving is not None and self.moving.load > 0.0):
             return None
         return self._judge(stamp, self._touch.feed(stamp, forces, deviation))
 
