@@ -3,6 +3,7 @@ something else opens before it comes again, toward where the object is seen."""
 
 import pytest
 from coglab_msgs.msg import ReasonCode
+from coglab_py.pose import Pose
 from coglab_smach.ports.pending import PortError
 from coglab_smach.states import reach
 from conftest import Trial
@@ -125,6 +126,34 @@ def test_with_fingers_that_do_not_open_again_the_arm_stays_with_what_the_person_
     trial.run(script)
     result = trial.result()
     assert result.code == ReasonCode.NOT_RELEASED and any(why in cause for cause in result.causes), result
+
+
+@pytest.mark.parametrize("person", ["away", "not seen", "at it"])
+def test_what_fingers_have_caught_on_the_way_is_not_dropped_where_the_person_has_let_go(monkeypatch, person):
+    """They let go at the first touch, and then the goal is lost: only who is there to hold the object gets it back."""
+    trial = Trial()
+    monkeypatch.setattr(reach, "off_grasp", lambda state, goal: 0.02)
+    trial.cell.partner.touch_after = None
+
+    def script(t):
+        t.wait_hub("wait_without_object")
+        t.start(RECEIVE)
+        while not t.ctx.journal.marked("closing_on_the_way"):
+            t.clock.sleep(0.01)
+        t.cell.at_palm = ("mug", Pose([-0.05, 0.0, 0.0]))
+        if person == "away":
+            t.cell.objects["human_hand"] = Pose([2.0, 0.0, 0.4])
+        if person == "not seen":
+            t.cell.faults.not_seen.add("human_hand")
+        t.cell.arm.end("goal lost", ReasonCode.GOAL_LOST)
+        t.wait_hub({"away": "wait_with_object", "not seen": "stopped", "at it": "wait_without_object"}[person])
+        assert (t.cell.called("open") != []) == (person == "at it")
+        assert person == "at it" or t.ctx.holding == "mug"
+
+    trial.run(script)
+    result = trial.result()
+    assert result.outcome == {"away": "failed_holding", "not seen": "stopped", "at it": "failed_empty"}[person]
+    assert result.code == (ReasonCode.NOT_RELEASED if person == "not seen" else ReasonCode.GOAL_LOST)
 
 
 def test_fingers_that_have_opened_to_come_again_hold_nothing_of_the_persons(monkeypatch):

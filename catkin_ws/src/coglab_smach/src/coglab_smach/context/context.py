@@ -68,6 +68,8 @@ class Context:
     """the fingers have taken the preshape of this reach's grasp"""
     closing: Pending | None = None
     """of the fingers, begun on the last of a reach's way"""
+    closing_on: str = ""
+    """id of the object that they close on there"""
     _holding: str = ""
 
     def __post_init__(self) -> None:

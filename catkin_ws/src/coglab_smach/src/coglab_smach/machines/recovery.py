@@ -17,6 +17,11 @@ from coglab_smach.states.arm import HomeRobot
 from coglab_smach.states.base import CoglabMachine, CoglabState
 from coglab_smach.states.held import LOOK, HeldObject
 from coglab_smach.states.motion import end_motion
+from coglab_smach.states.weight import AWAY
+from coglab_smach.states.where import hand_from_palm
+
+CAUGHT = 1.0
+"""s in which fingers that have begun to close on the way stand"""
 
 
 def arm_is_blocked(state: CoglabState) -> Verdict:
@@ -78,6 +83,7 @@ class SecureHand(CoglabState):
         return outcome
 
     def _secure(self) -> str:
+        self._closed_on_the_way()
         if self.ctx.holding and self.ctx.hand.state().holding:
             self._look_for_it()
         if self.ctx.holding and (self.operator or not self.ctx.shared):
@@ -102,6 +108,19 @@ class SecureHand(CoglabState):
             self.reason = f"the hand could not be opened: {error.sentence}"
         self.ctx.shared = False
         return "succeeded"
+
+    def _closed_on_the_way(self) -> None:
+        """What the fingers have caught on the last of a reach that has failed then. A person whose hand is at it gets
+        it back; one who let go at the first touch has left it to the robot."""
+        closing, self.ctx.closing = self.ctx.closing, None
+        if closing is None or not self.ctx.shared or self.ctx.holding:
+            return
+        end = self.ctx.clock.now() + CAUGHT
+        while not (closing.done() and self.ctx.hand.state().holding) and self.ctx.clock.now() < end:
+            self.pause(0.02)
+        away = hand_from_palm(self)
+        if self.ctx.hand.state().holding and (away is None or away > AWAY):
+            self.ctx.holding, self.ctx.shared = self.ctx.closing_on, away is None
 
     def _look_for_it(self) -> None:
         """Empties the context's hand where the object is seen elsewhere. What nobody sees is where the hand says."""

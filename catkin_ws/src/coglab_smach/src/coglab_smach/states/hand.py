@@ -74,7 +74,7 @@ class HandPreshape(CoglabState):
 
 
 class HandClose(CoglabState):
-    """Close the preshaped hand on the object and make sure that something is in it; with ``from_person`` say so.
+    """Close the preshaped hand on the object and make sure that something is in it.
 
     Outcome missed, with ``from_person``: the fingers have closed on nothing for the first time in this action; a person
     who offers waits, so the arm may try once more. Meanwhile the palm goes along with who pulls (GivesWay).
@@ -118,8 +118,6 @@ class HandClose(CoglabState):
                 (state.message,) if state.message else (),
                 ReasonCode.OBJECT_NOT_SEEN,
             )
-        if self.from_person:
-            self.ctx.say(Say.I_HAVE_IT, "I have it.")
         return "succeeded"
 
     def _give_way(self, closing: Pending) -> None:

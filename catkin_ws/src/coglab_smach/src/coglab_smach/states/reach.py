@@ -243,7 +243,7 @@ class WaitStop(CoglabState):
         away = off_grasp(self, goal)
         if away is not None and away < within + BETWEEN:
             # From here on the person's object may be in the fingers, whatever becomes of the reach.
-            self.ctx.shared = True
+            self.ctx.shared, self.ctx.closing_on = True, target_of(goal)
             self.ctx.closing = self.ctx.hand.close_on_object()
             self.ctx.journal.mark("closing_on_the_way")
 

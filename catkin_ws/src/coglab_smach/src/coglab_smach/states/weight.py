@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from coglab_msgs.msg import ReasonCode
+from coglab_msgs.msg import ReasonCode, Say
 
 from coglab_smach.context.awaited import PERSON
 from coglab_smach.context.context import Context
@@ -16,6 +16,8 @@ from coglab_smach.states.yielding import LEAST_WAY, GivesWay
 
 MOST_RISES = 4
 """the first one, and those that go on where somebody's pull has ended one"""
+AWAY = 0.5
+"""m from the palm: a person's hand that is seen there holds nothing that is in the robot's"""
 
 
 class TakeWeight(CoglabState):
@@ -24,9 +26,10 @@ class TakeWeight(CoglabState):
 
     The weight that comes is measured (``hand.load_share`` of the object's). It is counted from the closing of the
     fingers, when a person often still presses the object up or down, so it does not end the rise: what a person feels
-    in the hand does. ``hand_distance``: m, of the person's hand from the palm before the fingers closed; None where no
-    tracker sees it, and then the weight has to have come by the end of the rise. Where the
-    tracker has lost the hand since, the person may have gone: nothing is opened, the arm stays and says so.
+    in the hand does. With the weight the person is told that the robot has the object. ``hand_distance``: m, of the
+    person's hand from the palm before the fingers closed; None where no tracker saw it, and then the weight has to have
+    come by the end of the rise, or the hand to be seen AWAY. Where the tracker has lost the hand since, the person may
+    have gone: nothing is opened, the arm stays and says so.
 
     The palm goes along with who pulls (GivesWay), and the rise goes on afterwards.
     """
@@ -40,6 +43,7 @@ class TakeWeight(CoglabState):
         self._top: float | None = None
         """m, height to which the palm rises"""
         self._rises = 0
+        self._told = False
 
     def run(self, ud: Any) -> str:
         limit, contact = float(self.ctx.config.get("hand.load_timeout", 5.0)), self.ctx.contact
@@ -50,7 +54,7 @@ class TakeWeight(CoglabState):
             "mass": float(ud.object_entry.get("mass", 0.0)),
             "load_share": float(self.ctx.config.get("hand.load_share", 0.5)),
         }
-        self._way, self._rises = GivesWay(self.ctx), 0
+        self._way, self._rises, self._told = GivesWay(self.ctx), 0, False
         self.await_pending(contact.arm("lift", limit, settings), "arming of the contact detector", 2.0)
         try:
             self.pause(float(self.ctx.config.get("hand.lift_after", 0.1)))
@@ -66,6 +70,7 @@ class TakeWeight(CoglabState):
         event = contact.event()
         self.reason = event.message if event is not None else "the person's hand has left it"
         self.ctx.shared = False
+        self._tell()
         self.ctx.journal.mark("released")
         return "succeeded"
 
@@ -74,12 +79,19 @@ class TakeWeight(CoglabState):
         carried = self.ctx.contact.event() is not None
         if carried:
             self.ctx.journal.mark("loaded")
-        if farther is not None and (hand_from_palm(self) or 0.0) > farther:
+            self._tell()
+        if (hand_from_palm(self) or 0.0) > (AWAY if farther is None else farther):
             return True
         self._way.follow()
         if not carried and self._way.idle():
             self._rise()
         return farther is None and carried and self._way.idle()
+
+    def _tell(self) -> None:
+        """Once: the robot carries the object."""
+        if not self._told:
+            self._told = True
+            self.ctx.say(Say.I_HAVE_IT, "I have it.")
 
     def _rise(self) -> None:
         """Up to where the rise that began first was to end; nothing where the palm is there."""
@@ -98,6 +110,7 @@ class TakeWeight(CoglabState):
         """The failure, and who has the object then: the person, but where only the robot's hand may hold it."""
         causes: tuple[str, ...] = (error.sentence,)
         if hand_from_palm(self) is None:
+            # Nothing is opened: nobody may be there to hold it.
             carried = "its weight is carried" if self.ctx.contact.event() is not None else "its weight has not come"
             causes += (f"{carried}, and the person's hand is not seen any more",)
         else:
