@@ -6,7 +6,12 @@ import numpy as np
 from coglab_msgs.msg import ReasonCode
 from partner_rows import GIVE, RECEIVE, Direction, Group, late, share
 
-GIVEN_UP = (ReasonCode.GOAL_WITHDRAWN, ReasonCode.GOAL_LEFT_REGION, ReasonCode.GOAL_FELL)
+GIVEN_UP = (
+    ReasonCode.GOAL_WITHDRAWN,
+    ReasonCode.GOAL_LEFT_REGION,
+    ReasonCode.GOAL_AHEAD_OUTSIDE,
+    ReasonCode.GOAL_FELL,
+)
 """codes of reaches that end on the way, because there is nothing to reach for any more"""
 
 

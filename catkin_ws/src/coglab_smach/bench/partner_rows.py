@@ -29,7 +29,7 @@ ALL_TOGETHER = "all together"
 PULLING = ("pull_back", "tug")
 NEVER = 999.0
 """shown for what never happened, which counts as infinitely late in every percentile"""
-WITHDRAWN = {ReasonCode.GOAL_WITHDRAWN, ReasonCode.GOAL_LEFT_REGION}
+WITHDRAWN = {ReasonCode.GOAL_WITHDRAWN, ReasonCode.GOAL_LEFT_REGION, ReasonCode.GOAL_AHEAD_OUTSIDE}
 FELL = {ReasonCode.GOAL_FELL}
 NOT_OFFERED = {ReasonCode.OBJECT_NOT_SEEN, ReasonCode.GOAL_UNREACHABLE}
 """outcomes of an offer that was taken back before the arm had moved"""

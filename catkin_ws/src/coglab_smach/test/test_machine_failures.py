@@ -48,6 +48,29 @@ def test_nobody_offers_the_object_and_the_arm_does_not_move():
     assert "execute_dmp" not in trial.cell.called()
 
 
+def test_who_goes_back_while_the_robot_lets_time_pass_is_not_gone_after():
+    """The offer has to last for ``start_after``; who goes back before, and offers again, is met then."""
+    trial = Trial(**{"handover.start_after": 1.0})
+
+    def script(t):
+        t.wait_hub("wait_without_object")
+        offered = t.cell.objects["mug"]
+        t.start("exchange_human_to_robot")
+        while not t.ctx.journal.marked("offered"):
+            t.clock.sleep(0.01)
+        t.clock.sleep(0.5)
+        t.cell.objects["mug"] = Pose([1.2, 0.2, 0.1])
+        t.clock.sleep(3.0)
+        assert "execute_dmp" not in t.cell.called()
+        t.cell.objects["mug"] = offered
+        t.clock.sleep(0.9)
+        assert "execute_dmp" not in t.cell.called()
+        t.wait_hub("wait_with_object")
+
+    trial.run(script)
+    assert trial.result().outcome == "succeeded"
+
+
 def test_no_person_means_no_contact_within_the_limit():
     trial = failed_exchange(lambda t: setattr(t.cell.partner, "touch_after", None))
     assert_recovered_empty(trial, "contact of an object with the hand within 6.0 s expected")

@@ -10,6 +10,7 @@ from coglab_smach.states import early_reach
 from coglab_smach.states.base import TimeLimit
 from coglab_smach.states.reach import WaitStop
 
+WITHDRAWN = (int(ReasonCode.GOAL_WITHDRAWN), "the person does not offer or ask any more")
 LOW, HIGH = [-1.0, -1.0, -1.0], [2.0, 1.0, 2.0]
 FRAME = 1.0 / 30.0
 
@@ -19,17 +20,18 @@ class Watched:
 
     def __init__(self, monkeypatch):
         self.t, self.place = 0.0, np.array([0.4, 0.0, 0.4])
+        self.ahead = Ahead(0.0, 1.0, "", "human_hand_ahead", (0.4, 0.0, 0.4))
         monkeypatch.setattr(early_reach, "seen_at", lambda state, target: self.place)
         monkeypatch.setattr(early_reach, "palm_at", lambda ctx: np.zeros(3))
         ctx = SimpleNamespace(
             clock=SimpleNamespace(now=lambda: self.t),
-            perception=SimpleNamespace(ahead=lambda: Ahead(0.0, 1.0, "", "human_hand_ahead", (0.4, 0.0, 0.4))),
+            perception=SimpleNamespace(ahead=lambda: self.ahead),
             config={},
         )
         goal = {
             "frame": "human_hand_ahead",
             "limits": {"goal_region_low": LOW, "goal_region_high": HIGH},
-            "early": {"retreat": 0.10, "drop": 0.0},
+            "early": {"retreat": 0.10, "drop": 0.0, "low": LOW, "high": HIGH, "unsure": 0.10},
         }
         self.reach = early_reach.EarlyReach(SimpleNamespace(ctx=ctx), goal, None)
 
@@ -70,6 +72,23 @@ def test_who_lowers_the_hand_goes_on(monkeypatch):
         hand.see(0.4, 0.0, 0.4 - 0.025 * k)
 
 
+@pytest.mark.parametrize("deviation, followed", [(0.01, False), (0.06, True)])
+def test_a_reach_that_will_end_outside_the_region_is_followed_only_as_far_as_that_is_unsure(
+    monkeypatch, deviation, followed
+):
+    hand = Watched(monkeypatch)
+    hand.see(0.4, 0.0, 0.4, frames=5)
+    hand.ahead = Ahead(0.0, 1.0, "", "human_hand_ahead", (HIGH[0] + 0.08, 0.0, 0.4), deviation)
+    begin, doubted = hand.t, False
+    while hand.t < begin + 1.0 and not doubted:
+        hand.t += FRAME
+        doubted = hand.reach.doubted()
+    assert doubted == (not followed)
+    if doubted:
+        assert hand.t - begin < early_reach.DOUBT_TIME + 3 * FRAME
+        assert hand.reach.doubt()[0] == ReasonCode.GOAL_AHEAD_OUTSIDE
+
+
 class Reach(WaitStop):
     """Waits for somebody who never goes on."""
 
@@ -83,7 +102,7 @@ class Reach(WaitStop):
             ),
             journal=SimpleNamespace(mark=lambda name: None),
         )
-        self._early, self._grip = SimpleNamespace(doubted=lambda: doubted, hopeful=lambda: False), None
+        self._early, self._grip = SimpleNamespace(doubted=lambda: doubted, hopeful=lambda: False, doubt=lambda: WITHDRAWN), None
 
     def allow(self, duration):
         pass
@@ -99,7 +118,7 @@ class Reach(WaitStop):
     "state, code, doubted, expected",
     [
         ("running", ReasonCode.NONE, True, ReasonCode.GOAL_WITHDRAWN),
-        ("aborted", ReasonCode.GOAL_LEFT_REGION, False, ReasonCode.GOAL_LEFT_REGION),
+        ("aborted", ReasonCode.GOAL_LEFT_REGION, False, ReasonCode.GOAL_AHEAD_OUTSIDE),
     ],
 )
 def test_a_reach_that_is_given_up_says_for_which_of_the_two_reasons(state, code, doubted, expected):

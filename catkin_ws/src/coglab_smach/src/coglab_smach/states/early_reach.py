@@ -19,6 +19,8 @@ DOUBT_TIME = 0.2
 JUMP, SWAPPED = 0.12, 0.2
 """m between two sights that no person's hand goes, nor anything that falls: the tracker has taken something else for
 it, unless it stays there for so long (s)"""
+UNSURE = 2.0
+"""standard deviations by which a predicted place may be outside the region"""
 SLIPPED = 0.06
 """m by which an object is farther from the person's hand than at first when it has left it"""
 
@@ -50,7 +52,8 @@ class PersonsGrip:
 
 class EarlyReach:
     """Watches a reach toward where something will be: the thing itself may not go back nor fall (cc.GoalWatch, the
-    rules of a reach toward a goal that is seen), and outside the handover region somebody has to go on offering it."""
+    rules of a reach toward a goal that is seen), where it will be has to lie in the handover region, and outside of that
+    somebody has to go on offering it."""
 
     def __init__(self, state: CoglabState, goal: Mapping[str, Any], grip: PersonsGrip | None) -> None:
         """``grip``: of the person on the object that the reach is for."""
@@ -62,6 +65,14 @@ class EarlyReach:
         self._looked = self._sure - PERIOD
         self._last: tuple[float, np.ndarray] | None = None
         """s, m: the newest sight that was no jump"""
+        self._outside = False
+        """the person offers or asks, but not in the region"""
+
+    def doubt(self) -> tuple[int, str]:
+        """ReasonCode and sentence of what is doubted."""
+        if self._outside:
+            return int(ReasonCode.GOAL_AHEAD_OUTSIDE), "the person's reach seems to end outside the handover region"
+        return int(ReasonCode.GOAL_WITHDRAWN), "the person does not offer or ask any more"
 
     def doubted(self) -> bool:
         """Whether nobody has offered or asked for a while. TimeLimit, which ends the reach, where what it is for went
@@ -81,8 +92,13 @@ class EarlyReach:
             self._follow(place, passed)
         ahead = ctx.perception.ahead()
         believed = max(ahead.offer, ahead.request) >= float(ctx.config.get("handover.doubt", 0.1))
-        there = ahead.frame == "" or self._offered(np.array(ahead.place))
-        return (believed and there) or (place is not None and self._offered(place))
+        most = self.early["unsure"]
+        if not believed:
+            self._outside = False
+            return place is not None and self._inside(place, most)
+        there = ahead.frame == "" or self._inside(np.array(ahead.place), min(UNSURE * ahead.deviation, most))
+        self._outside = not there
+        return there
 
     def goal_now(self) -> dict[str, Any]:
         """What the reach is for: where it will be as long as that is believed, else where it is seen."""
@@ -119,6 +135,7 @@ class EarlyReach:
         self._last = (now, place)
         return False
 
-    def _offered(self, place: np.ndarray) -> bool:
-        low, high = (np.array(self.limits[f"goal_region_{end}"]) for end in ("low", "high"))
-        return bool(np.all(place >= low) and np.all(place <= high))
+    def _inside(self, place: np.ndarray, unsure: float = 0.0) -> bool:
+        """Whether a place (m) lies in the region, which is ``unsure`` m wider."""
+        low, high = np.array(self.early["low"]), np.array(self.early["high"])
+        return bool(np.all(place >= low - unsure) and np.all(place <= high + unsure))

@@ -116,7 +116,8 @@ def locate(state: CoglabState, target: str) -> dict[str, Any]:
 
 def await_offer(state: CoglabState, target: str, goals: Goals, margin: float = 0.0) -> dict[str, Any]:
     """Wait until ``target`` is inside the handover region, so that the arm does not chase a hand at rest, and until the
-    arm has a posture for one of ``goals``, so that the hand does not run into whoever offers; that goal.
+    arm has a posture for one of ``goals``, so that the hand does not run into whoever offers; that goal. With
+    ``handover.start_after`` all that has to have been so for as long (s).
 
     An object that is held still a little outside counts too. ``margin`` (m) widens the region: a hand is behind the
     object it holds or asks for. PortError if nobody comes within ``handover.offer_timeout``; nothing has moved then.
@@ -127,6 +128,7 @@ def await_offer(state: CoglabState, target: str, goals: Goals, margin: float = 0
     limit = float(config.get("handover.offer_timeout", 8.0))
     end = state.ctx.clock.now() + limit
     seen: list[tuple[float, np.ndarray]] = []
+    since: float | None = None
     person = target == config.get("perception.human_hand", "human_hand")
     offer = "the person's hand within reach" if person else f"'{target}' on offer"
     with state.ctx.journal.waiting(f"{state.path()}/{state.label}/offer", Wait(offer, end, PERSON)):
@@ -143,10 +145,11 @@ def await_offer(state: CoglabState, target: str, goals: Goals, margin: float = 0
             goal = first_reachable(state.ctx, located, candidates) if offered else None
             if goal is None and early is not None:
                 goal = first_reachable(state.ctx, early, candidates)
-            if goal is not None:
+            since = None if goal is None else now if since is None else since
+            if goal is not None and since is not None:
                 state.ctx.journal.mark("offered")
-                state.pause(float(config.get("handover.start_after", 0.0)))
-                return goal
+                if now - since >= float(config.get("handover.start_after", 0.0)):
+                    return goal
             if now > end and offered:
                 raise PortError(*out_of_reach(target, located, candidates[0]), ReasonCode.GOAL_UNREACHABLE)
             if now > end:
@@ -198,9 +201,12 @@ def unless_withdrawn(
     if not str(goal["frame"]).endswith("_ahead"):
         return {**goal, "limits": limits}
     # A predicted place goes to and fro as the prediction is corrected: going back and falling are watched in what is
-    # seen, by the state that waits for the reach, and the region is as much wider as for an object that is held still.
-    early = {"retreat": limits["goal_retreat"], "drop": limits["goal_drop"]}
-    low, high = handover_region(ctx, margin + edge + float(ctx.config.get("handover.still_margin", 0.10)))
+    # seen, by the state that waits for the reach; and so is whether it lies outside the region, which is wider by how
+    # unsure the prediction is, but by no more than for an object that is held still.
+    most = float(ctx.config.get("handover.still_margin", 0.10))
+    early = {"retreat": limits["goal_retreat"], "drop": limits["goal_drop"], "unsure": most}
+    early |= {"low": limits["goal_region_low"], "high": limits["goal_region_high"]}
+    low, high = handover_region(ctx, margin + edge + most)
     limits = {"goal_region_low": low.tolist(), "goal_region_high": high.tolist(), "goal_retreat": 0.0, "goal_drop": 0.0}
     return {**goal, "limits": limits, "early": early}
 

@@ -329,7 +329,11 @@ class WaitStop(CoglabState):
         progress = self.ctx.arm.dmp_progress()
         if progress.state == "aborted" and progress.code == ReasonCode.GOAL_LEFT_REGION and self._early is not None:
             # It may have been believed so for a moment only.
-            self._pause(self._early, progress.code, "the person's reach seems to end outside the handover region")
+            self._pause(
+                self._early,
+                ReasonCode.GOAL_AHEAD_OUTSIDE,
+                "the person's reach seems to end outside the handover region",
+            )
             return False
         if progress.state == "aborted":
             why, code = progress.reason or "the controller gave no reason", progress.code
@@ -341,7 +345,7 @@ class WaitStop(CoglabState):
         if not blocked.ok:
             raise TimeLimit("the arm does not follow any more", (blocked.why,), blocked.code)
         if self._early is not None and progress.state != "reached" and self._early.doubted():
-            self._pause(self._early, ReasonCode.GOAL_WITHDRAWN, "the person does not offer or ask any more")
+            self._pause(self._early, *self._early.doubt())
             return False
         return progress.state == "reached"
 
