@@ -54,8 +54,21 @@ def test_a_hand_that_goes_back_ends_the_reach(monkeypatch):
     hand.see(0.4, 0.0, 0.4, frames=10)
     with pytest.raises(TimeLimit, match="went back") as end:
         for k in range(12):
-            hand.see(0.4 + 0.03 * k, 0.0, 0.4)
+            hand.place, hand.t = np.array([0.4 + 0.03 * k, 0.0, 0.4]), hand.t + FRAME
+            hand.reach.hopeful()
     assert end.value.code == ReasonCode.GOAL_WITHDRAWN
+
+
+def test_the_arm_waits_for_a_hand_that_begins_to_go_back_and_comes_again(monkeypatch):
+    """Before it is known whether it is withdrawn; a tremor of a centimetre is no reason to wait."""
+    hand = Watched(monkeypatch)
+    hand.see(0.4, 0.0, 0.4, frames=10)
+    hand.see(0.41, 0.0, 0.41, frames=10)
+    hand.place = np.array([0.46, 0.0, 0.45])
+    hand.t += FRAME
+    assert hand.reach.doubted() and hand.reach.doubt()[0] == ReasonCode.GOAL_WITHDRAWN and not hand.reach.hopeful()
+    hand.place, hand.t = np.array([0.42, 0.0, 0.42]), hand.t + 2 * FRAME
+    assert hand.reach.hopeful()
 
 
 def test_a_hand_that_was_hidden_while_it_went_back_is_believed_after_a_moment(monkeypatch):

@@ -302,6 +302,19 @@ def test_short_and_wrap_faults(raw):
     assert raw.ask("45 02") == "00"
 
 
+@pytest.mark.parametrize(
+    "fault, largest",
+    [("lose", 10000), ("lose_in", 10000), ("garbage", 10000), ("double", 10000), ("slow", 60000), ("stuck", 4), ("short", 4)],
+)
+def test_the_number_of_a_fault_goes_from_0_to_its_largest(raw, fault, largest):
+    faults = Faults(raw.hand)
+    for number in (0, largest):
+        assert faults.command(f"{fault} {number}")
+    for number in (-1, largest + 1):
+        with pytest.raises(ValueError, match="no such fault"):
+            faults.command(f"{fault} {number}")
+
+
 def test_stuck_motor_trips(raw):
     raw.hand.motors[2].stuck = True
     raw.ask("C9 FF")

@@ -21,6 +21,8 @@ JUMP, SWAPPED = 0.12, 0.2
 it, unless it stays there for so long (s)"""
 UNSURE = 2.0
 """standard deviations by which a predicted place may be outside the region"""
+BACKWARD = 0.6
+"""share of the way that a hand may go back from which on the arm waits to see whether it does"""
 SLIPPED = 0.06
 """m by which an object is farther from the person's hand than at first when it has left it"""
 
@@ -65,6 +67,10 @@ class EarlyReach:
         self._looked = self._sure - PERIOD
         self._last: tuple[float, np.ndarray] | None = None
         """s, m: the newest sight that was no jump"""
+        self._from: np.ndarray | None = None
+        """m, the palm when the reach began"""
+        self._nearest, self._back = np.inf, 0.0
+        """m from there to where the hand was nearest, and by which it has gone back since"""
         self._outside = False
         """the person offers or asks, but not in the region"""
 
@@ -75,12 +81,15 @@ class EarlyReach:
         return int(ReasonCode.GOAL_WITHDRAWN), "the person does not offer or ask any more"
 
     def doubted(self) -> bool:
-        """Whether nobody has offered or asked for a while. TimeLimit, which ends the reach, where what it is for went
-        back or fell."""
+        """Whether nobody has offered or asked for a while, or what the reach is for goes back. TimeLimit, which ends the
+        reach, where it went back too far, or fell."""
         now = self.state.ctx.clock.now()
         if now - self._looked >= PERIOD and self.hopeful():
             self._sure = now
-        return now - self._sure > DOUBT_TIME
+        return now - self._sure > DOUBT_TIME or self._goes_back()
+
+    def _goes_back(self) -> bool:
+        return self._back > BACKWARD * self.early["retreat"] > 0.0
 
     def hopeful(self) -> bool:
         """Whether somebody offers or asks now, within the region: it is believed, or seen. TimeLimit as doubted()."""
@@ -90,6 +99,8 @@ class EarlyReach:
         place = seen_at(self.state, self.target)
         if place is not None:
             self._follow(place, passed)
+        if self._goes_back():
+            return False
         ahead = ctx.perception.ahead()
         believed = max(ahead.offer, ahead.request) >= float(ctx.config.get("handover.doubt", 0.1))
         most = self.early["unsure"]
@@ -115,12 +126,15 @@ class EarlyReach:
     def _follow(self, place: np.ndarray, passed: float) -> None:
         if self._jumped(place):
             return
-        if self._watch is None:
-            palm = palm_at(self.state.ctx)
+        if self._watch is None or self._from is None:
+            palm = self._from = palm_at(self.state.ctx)
             if palm is not None:
                 nowhere = np.zeros(3)
                 self._watch = cc.GoalWatch(nowhere, nowhere, self.early["retreat"], self.early["drop"], palm, place)
             return
+        distance = float(np.linalg.norm(place - self._from))
+        self._nearest = min(self._nearest, distance)
+        self._back = distance - self._nearest
         code, sentence = self._watch.update(passed, place)
         if code == ReasonCode.GOAL_FELL and self._grip is not None:
             code = self._grip.fell_or_withdrawn()
