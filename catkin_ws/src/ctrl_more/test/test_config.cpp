@@ -88,5 +88,19 @@ TEST(ConfigTest, GainsAreCheckedOneByOne) {
   EXPECT_THROW(gains.find("kq"), std::invalid_argument);
 }
 
+TEST(ConfigTest, GainsOfAnotherControllerAreLeftWhereTheyAre) {
+  Description three, two;
+  three.gain("kp", 0).vector(3, 1.0).range(0, 2).in("1").about("x");
+  two.gain("kp", 0).vector(2, 0.5).range(0, 2).in("1").about("x");
+  GainValues gains(three.gains);
+  const GainValues before = gains, others(two.gains);
+  gains.assign(others);
+  EXPECT_TRUE(gains.sameAs(before));
+  gains.blend(others, before, 0.5);
+  EXPECT_TRUE(gains.sameAs(before));
+  gains.blend(before, others, 0.5);
+  EXPECT_TRUE(gains.sameAs(before));
+}
+
 }  // namespace
 }  // namespace ctrl_more
