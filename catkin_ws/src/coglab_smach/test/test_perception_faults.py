@@ -43,7 +43,8 @@ class SharedTracker:
             self.object = frame
         else:
             # Neither name nor order tells who the partner is.
-            hands = {"left": Pose(self.other(t)), "right": frame}
+            other = self.other(t)
+            hands = {"right": frame} if other is None else {"left": Pose(other), "right": frame}
             for sight in self.vision.see(hands, {"object_mug": self.object}, palm):
                 self.waiting[sight.name].append(sight)
         sights, self.waiting[name] = self.waiting[name], []
@@ -89,7 +90,7 @@ class VisionPort:
 
 
 def two_people(seed, margin, other):
-    """A trial whose perception sees the partner and somebody else at ``other(t)``."""
+    """A trial whose perception sees the partner and somebody else at ``other(t)``; None: nobody else."""
     trial = VirtualTrial(seed=seed, profile="accustomed", perfect=True)
     trial.perception = trial.ctx.perception
     vision = Vision(
@@ -143,7 +144,46 @@ def test_two_hands_of_one_person_that_come_together_are_not_told_apart():
     assert results[0].outcome == "failed_empty"
     assert SENTENCE in " ".join([results[0].reason, *results[0].causes])
     assert results[0].code == ReasonCode.OBJECT_NOT_SEEN
-    assert "closing" not in results[0].marks and trial.last_hub == "wait_without_object"
+    # The reach does not begin, so that nothing can close.
+    assert not trial.reaches and trial.last_hub == "wait_without_object"
+
+
+def comes_along(found, begun):
+    """A second hand that is 0.15 m beside the partner's once ``begun()``, and in nobody's sight before."""
+    there = []
+
+    def at(t):
+        if not there and begun():
+            there.append(t)
+        return np.asarray(found[0].rig.truth["human_hand"]["position"]) + [0.0, 0.15, 0.0] if there else None
+
+    return at
+
+
+def test_a_second_hand_that_comes_beside_the_first_during_the_reach():
+    """The object is seen as before and tells where to go: it is taken, with the lowest force level, since anybody's
+    fingers may be there, and nothing falls."""
+    found = []
+    trial = two_people(1, 0.0, comes_along(found, lambda: found[0]._reach is not None))
+    found.append(trial)
+    levels, preshape = set(), trial.ctx.hand.preshape
+    trial.ctx.hand.preshape = lambda mode, level: levels.add(level) or preshape(mode, level)
+    result = trial.run("exchange_human_to_robot")[0]
+    truth = trial.rig.cell.truth()
+    assert result.outcome == "succeeded" and truth["held_by"] == "robot" and trial.last_hub == "wait_with_object"
+    assert levels == {"low"} and not truth["dropped"] and trial.rig.robot.limit_violations == 0
+
+
+def test_two_people_as_near_as_each_other_when_the_robot_gives():
+    """Nobody can tell who is to get the object: the robot keeps it, and says why."""
+    found = []
+    trial = two_people(1, 0.0, comes_along(found, lambda: found[0].begun[-1:] == ["exchange_robot_to_human"]))
+    found.append(trial)
+    results = trial.run("exchange_human_to_robot", "exchange_robot_to_human")
+    assert [r.outcome for r in results] == ["succeeded", "failed_holding"], [r.reason for r in results]
+    assert SENTENCE in " ".join([results[1].reason, *results[1].causes])
+    assert results[1].code == ReasonCode.OBJECT_NOT_SEEN
+    assert trial.rig.cell.truth()["held_by"] == "robot" and trial.last_hub == "wait_with_object"
 
 
 @pytest.mark.parametrize("jump", [0.08, 0.30])

@@ -203,17 +203,17 @@ def test_a_partner_who_pushes_the_arm_away_while_it_receives(after, outcomes):
     documented = {ReasonCode.NONE, ReasonCode.NO_CONTACT, ReasonCode.NOT_RELEASED, ReasonCode.OBJECT_NOT_SEEN}
     assert pushed and result.outcome in outcomes and result.code in documented, trial.ctx.journal.why()
     assert (result.outcome == "succeeded") == (trial.rig.cell.truth()["held_by"] == "robot")
-    assert result.outcome == "succeeded" or result.reason
+    assert result.outcome == "succeeded" or (result.reason and at_home(trial) and not trial.rig.cell.truth()["dropped"])
+    assert trial.last_hub == ("wait_with_object" if result.outcome == "succeeded" else "wait_without_object")
     assert after > 0.5 or "bumped" in result.marks
     assert trial.rig.robot.limit_violations == 0
 
 
 def test_who_offers_and_withdraws_five_times_is_not_chased():
     """Each ends because the goal went back or left the region, and the sixth offer is taken. The palm goes toward the
-    hand with at most 0.25 m/s from 0.2 s after it has turned: that is missed, and judged by the bench of the partner,
-    since a reach ends once the hand is 0.10 m back; here it must not get worse."""
+    hand with at most 0.25 m/s from 0.2 s after the hand is 0.10 m back, and not much faster 0.2 s after it has turned."""
     trial = VirtualTrial(seed=4, profile="accustomed", perfect=True, behaviour="withdraws")
-    fastest = {}
+    fastest, fastest_after, turned, back = {}, {}, {}, {}
 
     def beside(t):
         human, chain, report = t.rig.human, t.rig.robot.chain, t.rig.robot.report
@@ -223,8 +223,13 @@ def test_who_offers_and_withdraws_five_times_is_not_chased():
         hand = np.asarray(t.rig.truth["human_hand"]["position"])
         way = hand - chain.fk(position)[0]
         toward = float(way / np.linalg.norm(way) @ (chain.jacobian(position)[:3] @ velocity))
+        k = human.trial
+        if float(np.linalg.norm(hand - turned.setdefault(k, hand))) > 0.10:
+            back.setdefault(k, t.rig.t)
         if t.rig.t > human._since + 0.2:
-            fastest[human.trial] = max(fastest.get(human.trial, 0.0), toward)
+            fastest[k] = max(fastest.get(k, 0.0), toward)
+        if t.rig.t > back.get(k, np.inf) + 0.2:
+            fastest_after[k] = max(fastest_after.get(k, 0.0), toward)
 
     trial.beside = beside
     results = trial.run(*[RECEIVE] * 6)
@@ -237,6 +242,7 @@ def test_who_offers_and_withdraws_five_times_is_not_chased():
     }, ends
     assert all(r.reason for r in results[:5])
     assert trial.rig.robot.limit_violations == 0
+    assert max(fastest_after.values()) <= 0.25
     assert np.median(list(fastest.values())) <= 0.3 and max(fastest.values()) <= 0.6
 
 
@@ -258,17 +264,21 @@ def test_a_tug_while_the_hand_has_closed():
 def test_a_tug_while_the_fingers_close():
     """14 N for 0.3 s: the palm goes along, and the object is received all the same."""
     trial = VirtualTrial(seed=4, profile="accustomed", perfect=True)
-    tug = []
+    tug, forces, levels, preshape = [], [], set(), trial.ctx.hand.preshape
+    trial.ctx.hand.preshape = lambda mode, level: levels.add(level) or preshape(mode, level)
 
     def beside(t):
         if not tug and t.ctx.journal.marked("closing"):
             tug.append(t.rig.t + 0.1)
         if tug:
             t.rig.cell.set_push([0.0, 14.0 if tug[0] < t.rig.t < tug[0] + 0.3 else 0.0, 0.0])
+            forces.append(float(np.linalg.norm(t.rig.cell.truth()["human_force"])))
 
     trial.beside = beside
     result = trial.run(RECEIVE)[0]
     assert result.outcome == "succeeded" and "gave_way" in result.marks, trial.ctx.journal.why()
+    # The tug itself is 14 N: what the hand adds to it is no more than the arm's own inertia.
+    assert max(forces) <= 15.0 and levels == {"low"} and result.code == ReasonCode.NONE
     assert trial.rig.cell.truth()["held_by"] == "robot" and trial.rig.robot.limit_violations == 0
 
 
