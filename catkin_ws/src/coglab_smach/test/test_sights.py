@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from coglab_msgs.msg import ReasonCode
-from coglab_smach.ports.interfaces import Ahead, DmpProgress
+from coglab_smach.ports.interfaces import Ahead, DmpProgress, Located
 from coglab_smach.states import early_reach
 from coglab_smach.states.base import TimeLimit
 from coglab_smach.states.reach import WaitStop
@@ -100,6 +100,27 @@ def test_a_reach_that_will_end_outside_the_region_is_followed_only_as_far_as_tha
     if doubted:
         assert hand.t - begin < early_reach.DOUBT_TIME + 3 * FRAME
         assert hand.reach.doubt()[0] == ReasonCode.GOAL_AHEAD_OUTSIDE
+
+
+def test_a_hand_that_is_hidden_while_it_goes_down_has_not_lost_what_it_holds(monkeypatch):
+    """Its last sight is older than that of the object, which seems to have left it, until it is seen again."""
+    t, sights = [0.0], {"human_hand": ((0.8, 0.0, 0.45), 0.05), "mug": ((0.75, 0.0, 0.42), 0.05)}
+    monkeypatch.setattr(early_reach, "sight_of", lambda state, name: Located(name, "world", *sight(*sights[name])))
+
+    def sight(place, age):
+        return place, (0.0, 0.0, 0.0, 1.0), age
+
+    def pause(duration):
+        t[0] += duration
+        if t[0] > 0.1:
+            sights["human_hand"] = ((1.0, 0.0, 0.23), 0.05)
+
+    state = SimpleNamespace(ctx=SimpleNamespace(clock=SimpleNamespace(now=lambda: t[0]), config={}), pause=pause)
+    grip = early_reach.PersonsGrip(state, "mug")
+    sights["mug"], sights["human_hand"] = ((0.95, 0.0, 0.20), 0.05), ((0.85, 0.0, 0.40), 0.30)
+    assert grip.fell_or_withdrawn() == ReasonCode.GOAL_WITHDRAWN
+    sights["mug"] = ((1.0, 0.0, 0.10), 0.05)
+    assert grip.fell_or_withdrawn() == ReasonCode.GOAL_FELL
 
 
 class Reach(WaitStop):

@@ -10,7 +10,7 @@ import numpy as np
 from coglab_msgs.msg import ReasonCode
 
 from coglab_smach.states.base import CoglabState, TimeLimit
-from coglab_smach.states.where import palm_at, person_at, seen_at
+from coglab_smach.states.where import hand_name, palm_at, seen_at, sight_of
 
 PERIOD = 0.03
 """s between two looks"""
@@ -24,7 +24,9 @@ UNSURE = 2.0
 BACKWARD = 0.6
 """share of the way that a hand may go back from which on the arm waits to see whether it does"""
 SLIPPED = 0.06
-"""m by which an object is farther from the person's hand than at first when it has left it"""
+"""m by which an object is lower against the person's hand than at first when it has left it"""
+TOGETHER, LOOK = 0.05, 0.4
+"""s between a sight of the hand and one of the object that tell how they are apart, and s in which such a pair comes"""
 
 
 def target_of(goal: Mapping[str, Any]) -> str:
@@ -37,16 +39,24 @@ class PersonsGrip:
 
     def __init__(self, state: CoglabState, target: str) -> None:
         self._state, self._target = state, target
-        self._at_first = self._apart()
+        self._at_first = self._apart(0.0)
 
-    def _apart(self) -> float | None:
-        """m from the person's hand to the object, as they are seen."""
-        hand, thing = person_at(self._state), seen_at(self._state, self._target)
-        return None if hand is None or thing is None else float(np.linalg.norm(hand - thing))
+    def _apart(self, limit: float) -> float | None:
+        """m from the object up to the person's hand, as they are seen together within ``limit`` s. Seen one after the
+        other they would be apart wherever a hand goes fast, and so they are aside."""
+        clock, hand = self._state.ctx.clock, hand_name(self._state.ctx)
+        end = clock.now() + limit
+        while True:
+            at, thing = sight_of(self._state, hand), sight_of(self._state, self._target)
+            if at is not None and thing is not None and abs(at.age - thing.age) <= TOGETHER:
+                return float(at.xyz[2] - thing.xyz[2])
+            if clock.now() >= end:
+                return None
+            self._state.pause(PERIOD)
 
     def fell_or_withdrawn(self) -> int:
         """ReasonCode of what has gone down."""
-        apart = self._apart()
+        apart = self._apart(LOOK)
         if self._at_first is None or apart is None or apart > self._at_first + SLIPPED:
             return int(ReasonCode.GOAL_FELL)
         return int(ReasonCode.GOAL_WITHDRAWN)

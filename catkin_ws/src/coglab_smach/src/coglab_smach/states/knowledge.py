@@ -18,7 +18,7 @@ from coglab_smach.kinematics.grasp_choice import ranked
 from coglab_smach.ports.pending import PortError
 from coglab_smach.states.base import CoglabState
 from coglab_smach.states.hand import gentle
-from coglab_smach.states.where import palm_at, person_at
+from coglab_smach.states.where import hand_name, palm_at, person_at
 
 Goals = Callable[[Mapping[str, Any]], list[dict[str, Any]]]
 """goals for what was seen, best first"""
@@ -129,7 +129,7 @@ def await_offer(state: CoglabState, target: str, goals: Goals, margin: float = 0
     end = state.ctx.clock.now() + limit
     seen: list[tuple[float, np.ndarray]] = []
     since: float | None = None
-    person = target == config.get("perception.human_hand", "human_hand")
+    person = target == hand_name(state.ctx)
     offer = "the person's hand within reach" if person else f"'{target}' on offer"
     with state.ctx.journal.waiting(f"{state.path()}/{state.label}/offer", Wait(offer, end, PERSON)):
         while True:
@@ -349,7 +349,7 @@ class SetDeliveryGoal(CoglabState):
         ud.delivery = delivery
         goal = paced(self.ctx, delivery_goal(entry, ud.grasp, delivery, ""))
         margin = float(self.ctx.config.get("handover.hand_margin", 0.10))
-        hand = str(self.ctx.config.get("perception.human_hand", "human_hand"))
+        hand = hand_name(self.ctx)
         # A hand does not fall: one that sinks has come lower, and is followed or has gone back.
         asked = await_offer(self, hand, lambda seen: [goal], margin)
         goal = unless_withdrawn(self.ctx, asked, margin, may_fall=False)

@@ -12,6 +12,7 @@ from coglab_py.pose import Pose
 from coglab_smach.context.awaited import SIGHT
 from coglab_smach.context.context import Context
 from coglab_smach.kinematics.reachability import default_arm
+from coglab_smach.ports.interfaces import Located
 from coglab_smach.ports.pending import PortError
 from coglab_smach.states.base import CoglabState
 
@@ -51,18 +52,29 @@ def off_grasp(state: CoglabState, goal: Mapping[str, Any]) -> float | None:
 
 def person_at(state: CoglabState) -> np.ndarray | None:
     """m."""
-    return seen_at(state, str(state.ctx.config.get("perception.human_hand", "human_hand")))
+    return seen_at(state, hand_name(state.ctx))
 
 
-def seen_at(state: CoglabState, target: str) -> np.ndarray | None:
-    """m, of an object or of the person's hand as perception names it."""
+def hand_name(ctx: Context) -> str:
+    """Of the person's hand, as perception names it."""
+    return str(ctx.config.get("perception.human_hand", "human_hand"))
+
+
+def sight_of(state: CoglabState, target: str) -> Located | None:
+    """Of an object or of the person's hand as perception names it, OLDEST s old at most."""
     try:
-        seen = state.await_pending(
+        seen: Located = state.await_pending(
             state.ctx.perception.locate_object(target, 0.3), f"sight of '{target}'", 0.5, code=SIGHT
         )
     except PortError:
         return None
-    return np.array(seen.xyz) if seen.age <= OLDEST else None
+    return seen if seen.age <= OLDEST else None
+
+
+def seen_at(state: CoglabState, target: str) -> np.ndarray | None:
+    """m, of an object or of the person's hand as perception names it."""
+    seen = sight_of(state, target)
+    return None if seen is None else np.array(seen.xyz)
 
 
 def hand_from_palm(state: CoglabState) -> float | None:
@@ -74,7 +86,7 @@ def hand_from_palm(state: CoglabState) -> float | None:
 def way_to_hand(state: CoglabState, object_id: str, delivery: Mapping[str, Any]) -> np.ndarray | None:
     """m, base frame: from where the object is seen to NEARER than where the delivery offers it to the person's hand as
     that is seen now. None where one of them is not."""
-    hand = str(state.ctx.config.get("perception.human_hand", "human_hand"))
+    hand = hand_name(state.ctx)
     thing = seen_at(state, object_id)
     try:
         seen = state.await_pending(state.ctx.perception.locate_object(hand, 0.3), f"sight of '{hand}'", 0.5, code=SIGHT)
