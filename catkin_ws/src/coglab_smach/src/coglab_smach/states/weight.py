@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 from coglab_msgs.msg import ReasonCode
@@ -14,18 +15,20 @@ from coglab_smach.states.motion import rise
 from coglab_smach.states.where import hand_from_palm, palm_at
 from coglab_smach.states.yielding import LEAST_WAY, GivesWay
 
-MOST_RISES = 4
-"""the first one, and those that go on where somebody's pull has ended one"""
+MOST_RISES = 8
+"""the first one, and those that go on where the weight or somebody's pull has ended one"""
 
 
 class TakeWeight(CoglabState):
     """Lift what the hand has closed on until the person's hand has left it, by ``hand.lift`` m at most and at
     ``hand.lift_speed`` m/s. A person who does not let go gets the object back.
 
-    The weight that comes is measured (``hand.load_share`` of the object's). It is counted from the closing of the
-    fingers, when a person often still presses the object up or down, so it does not end the rise: what a person feels
-    in the hand does. ``hand_distance``: m, of the person's hand from the palm before the fingers closed; None where no
-    tracker sees it, and then the weight has to have come by the end of the rise. Where the
+    The weight that comes is measured (``hand.load_share`` of the object's), and the rise stands then: the person feels
+    that it is carried, and an arm that went on would draw gentle fingers along an object that is still held. But the
+    weight is counted from the closing of the fingers, when a person often still presses the object up or down: where
+    they hold on for ``hand.lift_pause`` s all the same, the arm rises on by ``hand.lift_step`` m, again and again.
+    ``hand_distance``: m, of the person's hand from the palm before the fingers closed; None where no tracker sees it,
+    and then the weight has to have come by the end of the whole rise. Where the
     tracker has lost the hand since, the person may have gone: nothing is opened, the arm stays and says so.
 
     The palm goes along with who pulls (GivesWay), and the rise goes on afterwards.
@@ -40,6 +43,8 @@ class TakeWeight(CoglabState):
         self._top: float | None = None
         """m, height to which the palm rises"""
         self._rises = 0
+        self._on: float | None = None
+        """s, when it rises on with the weight; None: the weight has not come"""
 
     def run(self, ud: Any) -> str:
         limit, contact = float(self.ctx.config.get("hand.load_timeout", 5.0)), self.ctx.contact
@@ -50,7 +55,7 @@ class TakeWeight(CoglabState):
             "mass": float(ud.object_entry.get("mass", 0.0)),
             "load_share": float(self.ctx.config.get("hand.load_share", 0.5)),
         }
-        self._way, self._rises = GivesWay(self.ctx), 0
+        self._way, self._rises, self._on = GivesWay(self.ctx), 0, None
         self.await_pending(contact.arm("lift", limit, settings), "arming of the contact detector", 2.0)
         try:
             self.pause(float(self.ctx.config.get("hand.lift_after", 0.1)))
@@ -77,19 +82,29 @@ class TakeWeight(CoglabState):
         if farther is not None and (hand_from_palm(self) or 0.0) > farther:
             return True
         self._way.follow()
-        if not carried and self._way.idle():
-            self._rise()
-        return farther is None and carried and self._way.idle()
+        if farther is None or not carried:
+            if not carried and self._way.idle():
+                self._rise()
+            return carried and self._way.idle()
+        now = self.ctx.clock.now()
+        if self._on is None:
+            self._way.halt("the weight has come")
+            self._on = now + float(self.ctx.config.get("hand.lift_pause", 0.5))
+        elif now >= self._on and self._way.idle():
+            step, speed = (float(self.ctx.config.get(f"hand.{name}", 0.01)) for name in ("lift_step", "lift_speed"))
+            self._on = now + step / speed + float(self.ctx.config.get("hand.lift_pause", 0.5))
+            self._rise(step)
+        return False
 
-    def _rise(self) -> None:
-        """Up to where the rise that began first was to end; nothing where the palm is there."""
+    def _rise(self, most: float = math.inf) -> None:
+        """Up to where the rise that began first was to end, by ``most`` m; nothing where the palm is there."""
         palm, speed = palm_at(self.ctx), float(self.ctx.config.get("hand.lift_speed", 0.03))
         if palm is None or self._rises >= MOST_RISES:
             return
         if self._rises == 0:
             self._top = float(palm[2]) + float(self.ctx.config.get("hand.lift", 0.03))
         assert self._top is not None
-        left = self._top - float(palm[2])
+        left = min(most, self._top - float(palm[2]))
         if left > LEAST_WAY:
             self._rises += 1
             self._way.begin(rise(self.ctx, left, speed))
