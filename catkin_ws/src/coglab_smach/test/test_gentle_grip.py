@@ -3,7 +3,7 @@
 import pytest
 from coglab_objects.database import objects_folder, read_object
 from coglab_smach.ports.pending import PortError, Ready
-from coglab_smach.states.hand import SLIPPERY, gentle
+from coglab_smach.states.hand import gentle
 from conftest import Trial
 from ih2_hand.grasps import levels_of
 
@@ -15,12 +15,11 @@ OBJECTS = sorted(path.stem for path in objects_folder().glob("*.yaml"))
 def test_the_lowest_level_that_every_dialect_has(object_id):
     entry = read_object(objects_folder() / f"{object_id}.yaml")[0]
     for grasp in entry["grasps"].values():
-        hand = gentle(entry, grasp)
+        hand = gentle(grasp)
         assert hand["mode"] == grasp["hand"]["mode"]
         lowest = levels_of(hand["mode"], "legacy")[0]
         assert lowest in levels_of(hand["mode"], "v17")
-        slippery = entry["friction"] < SLIPPERY
-        assert hand["level"] == (grasp["hand"]["level"] if slippery else lowest)
+        assert hand["level"] == lowest
 
 
 def receive(trial):

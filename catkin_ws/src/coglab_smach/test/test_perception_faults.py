@@ -171,6 +171,9 @@ def test_a_second_hand_that_comes_beside_the_first_during_the_reach():
     result = trial.run("exchange_human_to_robot")[0]
     truth = trial.rig.cell.truth()
     assert result.outcome == "succeeded" and truth["held_by"] == "robot" and trial.last_hub == "wait_with_object"
+    # Whose fingers were at the object is not known: it is held firmly once the arm is at home.
+    states = [move.from_state for move in trial.ctx.journal.transitions if move.outcome == "succeeded"]
+    assert result.marks["tightened"] > result.ended - 0.5 and "tighten_at_home" in states
     assert levels == {"low"} and not truth["dropped"] and trial.rig.robot.limit_violations == 0
 
 

@@ -7,7 +7,7 @@ from coglab_smach.machines.approach import build_approach
 from coglab_smach.machines.recovery import ACTION_OUTCOMES, RECOVERY_TRANSITIONS, build_recovery, to_recovery
 from coglab_smach.states.arm import HomeRobot, SwitchController
 from coglab_smach.states.base import CoglabMachine
-from coglab_smach.states.hand import HandClose, HandOpen, HandTighten
+from coglab_smach.states.hand import HandClose, HandPreshape, HandTighten
 from coglab_smach.states.knowledge import QueryDatabase, SetGraspGoal
 from coglab_smach.states.weight import TakeWeight
 
@@ -16,9 +16,9 @@ SHARED = ["object_entry", "grasp", "grasp_name"]
 
 def build_exchange_human_to_robot(ctx: Context) -> CoglabMachine:
     """query -> goal from the best grasp -> reach and preshape -> contact -> close gently -> take the weight -> close
-    firmly -> home.
+    firmly, where the person's hand was seen to go -> home, and firmly there where it was not.
 
-    A hand that has closed on nothing opens, and the arm tries once more."""
+    A hand that has closed on nothing, or on an edge, opens to its preshape, and the arm tries once more."""
     machine = CoglabMachine(
         ctx, "exchange_human_to_robot", ACTION_OUTCOMES, input_keys=["object_id"], output_keys=SHARED
     )
@@ -35,9 +35,10 @@ def build_exchange_human_to_robot(ctx: Context) -> CoglabMachine:
         machine.add_state(
             "hand_close", HandClose(ctx, from_person=True), to_recovery(succeeded="take_weight", missed="open_again")
         )
-        machine.add_state("open_again", HandOpen(ctx), to_recovery(succeeded="set_dmp_goal"))
+        machine.add_state("open_again", HandPreshape(ctx), to_recovery(succeeded="set_dmp_goal"))
         machine.add_state("take_weight", TakeWeight(ctx), to_recovery(succeeded="hand_tighten"))
         machine.add_state("hand_tighten", HandTighten(ctx), to_recovery(succeeded="coglab_home_robot"))
-        machine.add_state("coglab_home_robot", HomeRobot(ctx, carries=True), to_recovery(succeeded="succeeded"))
+        machine.add_state("coglab_home_robot", HomeRobot(ctx, carries=True), to_recovery(succeeded="tighten_at_home"))
+        machine.add_state("tighten_at_home", HandTighten(ctx, at_home=True), to_recovery(succeeded="succeeded"))
         machine.add_state("recover", build_recovery(ctx), RECOVERY_TRANSITIONS)
     return machine

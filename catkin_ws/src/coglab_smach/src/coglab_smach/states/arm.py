@@ -12,7 +12,7 @@ from coglab_smach.context.context import Context
 from coglab_smach.kinematics.motion_time import ptp_time
 from coglab_smach.ports.pending import Polled, PortError
 from coglab_smach.states.base import CoglabState, TimeLimit
-from coglab_smach.states.held import HeldObject
+from coglab_smach.states.held import LOOK, HeldObject
 from coglab_smach.states.where import person_at, seen_at
 
 FELL = 0.5
@@ -139,23 +139,37 @@ class PtpMotion(CoglabState):
 
 class HomeRobot(PtpMotion):
     """coglab_home_robot: the arm goes to its home posture; with ``carries``, with the object of the action in the hand,
-    and it ends where that is lost; with ``gave``, an object that has fallen from the person's hand meanwhile was not
+    and it ends where that is lost, and stands at home until it is seen to stay; with ``gave``, an object that has fallen from the person's hand meanwhile was not
     given."""
 
     def __init__(self, ctx: Context, carries: bool = False, gave: bool = False) -> None:
         super().__init__(ctx, "home")
         self.carries, self.gave = carries, gave
+        self._held: HeldObject
         if carries or gave:
             self.register_input_keys(["object_id"])
 
     def run(self, ud: Any) -> str:
         outcome = super().run(ud)
+        if self.carries:
+            self._see_held()
         if self.gave:
             self._see_given(ud.object_id)
         return outcome
 
     def _look_after(self, ud: Any) -> Callable[[], object]:
-        return HeldObject(self.ctx, ud.object_id).check if self.carries else super()._look_after(ud)
+        if not self.carries:
+            return super()._look_after(ud)
+        self._held = HeldObject(self.ctx, ud.object_id)
+        return self._held.check
+
+    def _see_held(self) -> None:
+        """What falls in the last moments of the way is not held: look until it is seen to stay, for LOOK s at most.
+        What nobody sees is where the hand says."""
+        here = self.ctx.clock.now()
+        self.allow(2.0 * LOOK)
+        while not self._held.stays(here) and self.ctx.clock.now() < here + LOOK:
+            self.pause(0.02)
 
     def _see_given(self, object_id: str) -> None:
         thing, hand = seen_at(self, object_id), person_at(self)

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from coglab_msgs.msg import ReasonCode, Say
-from ih2_hand.grasps import levels_of
+from ih2_hand.grasps import CLOSING_MOTORS, levels_of
 
 from coglab_smach.context.awaited import ARM, HAND
 from coglab_smach.context.context import Context
@@ -16,22 +16,26 @@ from coglab_smach.states.motion import shift, shift_time
 from coglab_smach.states.where import hand_from_palm, palm_axis
 from coglab_smach.states.yielding import GivesWay
 
-SLIPPERY = 0.45
-"""friction below which an object is that"""
 LOOSE = 40
 """counts of 254 that the fingers have opened when the palm begins to draw back"""
+AT_END = 250
+"""counts of 254 from which a finger has closed past the object"""
 DRAWING_BACK = 2.0
 """s that drawing back may take beyond what limits and speed scale ask for"""
 
 
-def gentle(entry: Mapping[str, Any], grasp: Mapping[str, Any]) -> dict[str, Any]:
+def gentle(grasp: Mapping[str, Any]) -> dict[str, Any]:
     """The hand of a grasp as it closes beside a person, whose fingers may be between its own: with the lowest force
-    level that every dialect has for its mode. What is SLIPPERY slides out of that while the person holds on, and is
-    held with its own level from the beginning."""
-    hand: dict[str, Any] = dict(grasp["hand"])
-    if float(entry.get("friction", 1.0)) >= SLIPPERY:
-        hand["level"] = levels_of(hand["mode"], "legacy")[0]
-    return hand
+    level that every dialect has for its mode."""
+    return {**grasp["hand"], "level": levels_of(grasp["hand"]["mode"], "legacy")[0]}
+
+
+def stopped_by_object(mode: str, positions: Sequence[int]) -> bool:
+    """Whether the closed fingers of a grasp stand around something: the thumb (motor 1), and one finger that opposes it
+    where the mode closes some, have not come to their closed ends. Fingers that alone stand on it hold it by an edge,
+    against the palm, and it falls. Nothing is said of a hand that does not tell ``positions`` (counts of 254)."""
+    standing = [motor for motor in CLOSING_MOTORS[mode] if len(positions) <= motor or positions[motor] < AT_END]
+    return 1 in standing and len(standing) >= min(2, len(CLOSING_MOTORS[mode]))
 
 
 class CalibrateHand(CoglabState):
@@ -76,8 +80,9 @@ class HandPreshape(CoglabState):
 class HandClose(CoglabState):
     """Close the preshaped hand on the object and make sure that something is in it.
 
-    Outcome missed, with ``from_person``: the fingers have closed on nothing for the first time in this action; a person
-    who offers waits, so the arm may try once more. Meanwhile the palm goes along with who pulls (GivesWay).
+    Outcome missed, with ``from_person``: the fingers have closed on nothing, or do not stand around it
+    (stopped_by_object), for the first time in this action; a person who offers waits, so the arm may try once more.
+    Meanwhile the palm goes along with who pulls (GivesWay).
     """
 
     default_time_limit = 12.0
@@ -87,7 +92,7 @@ class HandClose(CoglabState):
         super().__init__(
             ctx,
             outcomes=["succeeded", "missed"] if from_person else ["succeeded"],
-            input_keys=["object_id"],
+            input_keys=["object_id", "grasp"] if from_person else ["object_id"],
             output_keys=["hand_distance"] if from_person else [],
         )
         self.from_person = from_person
@@ -107,14 +112,17 @@ class HandClose(CoglabState):
         while not self.ctx.hand.state().holding and self.ctx.clock.now() < end:
             self.pause(0.02)
         state = self.ctx.hand.state()
-        if state.connected and not state.holding:
+        around = not self.from_person or stopped_by_object(ud.grasp["hand"]["mode"], state.positions)
+        if state.connected and not (state.holding and around):
             self.ctx.holding, self.ctx.shared = "", False
+            missed = "the hand holds it by an edge" if state.holding else "the hand closed on nothing"
             if self.from_person and not self.ctx.journal.marked("missed"):
                 self.ctx.journal.mark("missed")
-                self.reason = "the hand closed on nothing: once more"
+                self.ctx.preshaped = False
+                self.reason = f"{missed}: once more"
                 return "missed"
             raise PortError(
-                f"the hand closed on nothing: motors at {list(state.positions)} of 254",
+                f"{missed}: motors at {list(state.positions)} of 254",
                 (state.message,) if state.message else (),
                 ReasonCode.OBJECT_NOT_SEEN,
             )
@@ -141,14 +149,20 @@ class HandTighten(CoglabState):
     """Hold what the person has let go of as firmly as the object's entry says: the fingers close from where they are,
     at the wire speed, and with it the force, of ``hand.tighten`` for the grasp's level.
 
-    The arm need not wait until the hand is sure that they stand: they press within ``hand.settle_after_close`` s."""
+    The arm need not wait until the hand is sure that they stand: they press within ``hand.settle_after_close`` s.
+    Whose hand was not seen to have left the object may have fingers there: then it is held firmly ``at_home`` only,
+    where nobody's are."""
 
     default_time_limit = 5.0
 
-    def __init__(self, ctx: Context) -> None:
-        super().__init__(ctx, input_keys=["object_entry", "grasp", "grasp_name"])
+    def __init__(self, ctx: Context, at_home: bool = False) -> None:
+        super().__init__(ctx, input_keys=["object_entry", "grasp", "grasp_name", "hand_seen_away"])
+        self.at_home = at_home
 
     def run(self, ud: Any) -> str:
+        if self.at_home == bool(ud.hand_seen_away):
+            self.reason = "it was held firmly before" if self.at_home else "the person's hand was not seen to go: at home"
+            return "succeeded"
         level = ud.object_entry["grasps"][ud.grasp_name]["hand"]["level"]
         if level == ud.grasp["hand"]["level"]:
             self.reason = f"it is held with the force of level '{level}'"

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from coglab_msgs.msg import ReasonCode
 
 from coglab_smach.context.context import Context
 from coglab_smach.kinematics.reachability import default_arm
 from coglab_smach.ports.pending import Pending, PortError
+from coglab_smach.states.hand import AT_END
 
 NEAR, FARTHER = 0.20, 0.15
 """m between palm and object in which the object counts as carried, and by which it is farther when it is not"""
@@ -17,12 +20,15 @@ LOOK = 0.8
 """s for which an arm that stands looks for what its hand may have lost"""
 OLDEST = 0.2
 """s, older sights do not tell"""
+KEPT, SETTLES = 0.04, 0.15
+"""m by which an object that is held is farther from the palm, or nearer, at most than at first; and s in which one that
+falls has moved by more"""
 
 
 class HeldObject:
     """Ask it again and again while the arm carries ``object_id``.
 
-    Two things tell that it is gone: the hand, whose fingers are open, and the tracker, which sees it away from the palm
+    Two things tell that it is gone: the hand, whose fingers are open or closed to their ends, and the tracker, which sees it away from the palm
     it was at when the asking began, or too far from it at once. Fingers that stand where they closed do not feel what
     slides out of them.
     """
@@ -33,16 +39,20 @@ class HeldObject:
         self._above = 0.0
         """m of the object over the palm"""
         self._carried: float | None = None
-        self._height = self._before = 0.0
+        self._height = self._before = self._taken = 0.0
         self.sunk = 0.0
         """m by which the object is lower against the palm than it was at first, in both of its last two sights"""
         self._away_since: float | None = None
+        self._kept_at = -math.inf
+        """s, when the newest sight was taken that has shown it as far from the palm as the first one"""
 
     def check(self) -> None:
         """PortError, and an empty hand in the context, where the object is gone. It never waits."""
         hand = self._ctx.hand.state()
         if hand.connected and not hand.holding:
             self._lost(hand.message or "the fingers are open")
+        if hand.connected and hand.positions and min(hand.positions[1:]) >= AT_END:
+            self._lost("the fingers have closed past it")
         distance = self._distance()
         if distance is None:
             return
@@ -50,6 +60,8 @@ class HeldObject:
             self._carried = distance if distance < NEAR else None
             self._height = self._before = self._above
         self.sunk, self._before = self._height - max(self._above, self._before), self._above
+        if self._carried is not None and abs(distance - self._carried) < KEPT:
+            self._kept_at = self._taken
         # What is far away at the first sight already was lost before anybody asked.
         if distance < (NEAR if self._carried is None else self._carried) + FARTHER:
             self._away_since = None
@@ -67,6 +79,12 @@ class HeldObject:
     def seen_with_the_hand(self) -> bool:
         """Whether one sight at least has shown it near the palm, and none has since shown it elsewhere."""
         return self._carried is not None and self._away_since is None
+
+    def stays(self, since: float) -> bool:
+        """Check it; whether a sight that was taken SETTLES s after ``since`` (s) or later shows it as far from the palm
+        as at first: it does not fall, or slide out, from then on."""
+        self.check()
+        return self._kept_at >= since + SETTLES
 
     def _lost(self, why: str) -> None:
         self._ctx.holding, self._ctx.shared = "", False
@@ -87,5 +105,5 @@ class HeldObject:
         if here is None or seen.age > OLDEST:
             return None
         way = np.array(seen.xyz) - default_arm().fk(np.asarray(here))[0]
-        self._above = float(way[2])
+        self._above, self._taken = float(way[2]), self._ctx.clock.now() - seen.age
         return float(np.linalg.norm(way))

@@ -262,7 +262,7 @@ class SetGraspGoal(CoglabState):
         goal = await_offer(self, ud.object_id, lambda seen: self._goals(entry, seen))
         name = goal.pop("grasp_name")
         grasp = entry["grasps"][name]
-        ud.grasp_name, ud.grasp = name, {**grasp, "hand": gentle(entry, grasp)}
+        ud.grasp_name, ud.grasp = name, {**grasp, "hand": gentle(grasp)}
         self.reason = f"grasp '{name}'"
         # The detector looks whether the object is in the palm, wherever the motion's goal comes from.
         grasped = {"frame": goal["frame"].removesuffix("_ahead"), "grasp": palm_at_grasp(grasp, 0.0).to_dict()}
@@ -274,7 +274,8 @@ class SetGraspGoal(CoglabState):
         config = self.ctx.config
         names = ranked(entry, Pose.from_dict(seen), person_at(self), palm_at(self.ctx), self._grasp_name)
         if names[0] != self._grasp_name:
-            self._grasp_name, hand = names[0], gentle(entry, entry["grasps"][names[0]])
+            self._grasp_name, hand = names[0], gentle(entry["grasps"][names[0]])
+            self.ctx.preshaped = False
             self.ctx.hand.preshape(hand["mode"], hand["level"])  # awaited in the approach
         goals = []
         for name in names:

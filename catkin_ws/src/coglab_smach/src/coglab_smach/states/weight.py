@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 from coglab_msgs.msg import ReasonCode, Say
@@ -14,8 +15,8 @@ from coglab_smach.states.motion import rise
 from coglab_smach.states.where import hand_from_palm, palm_at
 from coglab_smach.states.yielding import LEAST_WAY, GivesWay
 
-MOST_RISES = 4
-"""the first one, and those that go on where somebody's pull has ended one"""
+MOST_RISES = 8
+"""the first one, and those that go on where the weight or somebody's pull has ended one"""
 AWAY = 0.5
 """m from the palm: a person's hand that is seen there holds nothing that is in the robot's"""
 
@@ -24,12 +25,13 @@ class TakeWeight(CoglabState):
     """Lift what the hand has closed on until the person's hand has left it, by ``hand.lift`` m at most and at
     ``hand.lift_speed`` m/s. A person who does not let go gets the object back.
 
-    The weight that comes is measured (``hand.load_share`` of the object's). It is counted from the closing of the
-    fingers, when a person often still presses the object up or down, so it does not end the rise: what a person feels
-    in the hand does. With the weight the person is told that the robot has the object. ``hand_distance``: m, of the
-    person's hand from the palm before the fingers closed; None where no tracker saw it, and then the weight has to have
-    come by the end of the rise, or the hand to be seen AWAY. Where the tracker has lost the hand since, the person may
-    have gone: nothing is opened, the arm stays and says so.
+    The weight that comes is measured (``hand.load_share`` of the object's), and the rise stands then: the person feels
+    that it is carried, is told so, and an arm that went on would draw gentle fingers along an object that is still held.
+    But the weight is counted from the closing of the fingers, when a person often still presses the object up or down:
+    where they hold on for ``hand.lift_pause`` s all the same, the arm rises on by ``hand.lift_step`` m, again and again.
+    ``hand_distance``: m, of the person's hand from the palm before the fingers closed; None where no tracker saw it,
+    and then the weight has to have come by the end of the whole rise, or the hand to be seen AWAY. Where the
+    tracker has lost the hand since, the person may have gone: nothing is opened, the arm stays and says so.
 
     The palm goes along with who pulls (GivesWay), and the rise goes on afterwards.
     """
@@ -38,12 +40,14 @@ class TakeWeight(CoglabState):
     owns_motion = True
 
     def __init__(self, ctx: Context) -> None:
-        super().__init__(ctx, input_keys=["object_id", "object_entry", "hand_distance"])
+        super().__init__(ctx, input_keys=["object_id", "object_entry", "hand_distance"], output_keys=["hand_seen_away"])
         self._way: GivesWay
         self._top: float | None = None
         """m, height to which the palm rises"""
         self._rises = 0
-        self._told = False
+        self._told = self._seen_away = False
+        self._on: float | None = None
+        """s, when it rises on with the weight; None: the weight has not come"""
 
     def run(self, ud: Any) -> str:
         limit, contact = float(self.ctx.config.get("hand.load_timeout", 5.0)), self.ctx.contact
@@ -54,7 +58,8 @@ class TakeWeight(CoglabState):
             "mass": float(ud.object_entry.get("mass", 0.0)),
             "load_share": float(self.ctx.config.get("hand.load_share", 0.5)),
         }
-        self._way, self._rises, self._told = GivesWay(self.ctx), 0, False
+        self._way, self._rises, self._on, self._told = GivesWay(self.ctx), 0, None, False
+        self._seen_away = False
         self.await_pending(contact.arm("lift", limit, settings), "arming of the contact detector", 2.0)
         try:
             self.pause(float(self.ctx.config.get("hand.lift_after", 0.1)))
@@ -69,7 +74,7 @@ class TakeWeight(CoglabState):
             self._way.stop()
         event = contact.event()
         self.reason = event.message if event is not None else "the person's hand has left it"
-        self.ctx.shared = False
+        self.ctx.shared, ud.hand_seen_away = False, self._seen_away
         self._tell()
         self.ctx.journal.mark("released")
         return "succeeded"
@@ -81,11 +86,22 @@ class TakeWeight(CoglabState):
             self.ctx.journal.mark("loaded")
             self._tell()
         if (hand_from_palm(self) or 0.0) > (AWAY if farther is None else farther):
+            self._seen_away = True
             return True
         self._way.follow()
-        if not carried and self._way.idle():
-            self._rise()
-        return farther is None and carried and self._way.idle()
+        if farther is None or not carried:
+            if not carried and self._way.idle():
+                self._rise()
+            return carried and self._way.idle()
+        now = self.ctx.clock.now()
+        if self._on is None:
+            self._way.halt("the weight has come")
+            self._on = now + float(self.ctx.config.get("hand.lift_pause", 0.5))
+        elif now >= self._on and self._way.idle():
+            step, speed = (float(self.ctx.config.get(f"hand.{name}", 0.01)) for name in ("lift_step", "lift_speed"))
+            self._on = now + step / speed + float(self.ctx.config.get("hand.lift_pause", 0.5))
+            self._rise(step)
+        return False
 
     def _tell(self) -> None:
         """Once: the robot carries the object."""
@@ -93,15 +109,15 @@ class TakeWeight(CoglabState):
             self._told = True
             self.ctx.say(Say.I_HAVE_IT, "I have it.")
 
-    def _rise(self) -> None:
-        """Up to where the rise that began first was to end; nothing where the palm is there."""
+    def _rise(self, most: float = math.inf) -> None:
+        """Up to where the rise that began first was to end, by ``most`` m; nothing where the palm is there."""
         palm, speed = palm_at(self.ctx), float(self.ctx.config.get("hand.lift_speed", 0.03))
         if palm is None or self._rises >= MOST_RISES:
             return
         if self._rises == 0:
             self._top = float(palm[2]) + float(self.ctx.config.get("hand.lift", 0.03))
         assert self._top is not None
-        left = self._top - float(palm[2])
+        left = min(most, self._top - float(palm[2]))
         if left > LEAST_WAY:
             self._rises += 1
             self._way.begin(rise(self.ctx, left, speed))

@@ -49,6 +49,11 @@ class GivesWay:
         """What the state wants the arm to do; only while nothing is under way."""
         self._motion = motion
 
+    def halt(self, why: str) -> None:
+        """End what the state wanted; a palm that gives way goes on."""
+        if self._from is None and self._ending is None and not self.idle():
+            self._end(why)
+
     def idle(self) -> bool:
         """Whether no motion is under way, not even to its end."""
         if self._ending is not None and self._ending.done():

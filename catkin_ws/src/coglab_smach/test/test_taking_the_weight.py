@@ -1,0 +1,179 @@
+"""The arm takes the weight without drawing its gentle fingers along what the person still holds, and says that it has
+an object only where it stands around one, and still has it at home."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from coglab_msgs.msg import ReasonCode
+from coglab_py.pose import Pose
+from coglab_smach.kinematics.reachability import default_arm
+from coglab_smach.states.hand import AT_END, stopped_by_object
+from conftest import Trial
+
+RECEIVE = "exchange_human_to_robot"
+WEIGHT = 0.31 * 9.81
+"""N, of the mug"""
+
+
+def height(trial):
+    return float(default_arm().fk(np.asarray(trial.ctx.arm.joint_positions()))[0][2])
+
+
+def receiving(script, **overrides):
+    """Receive the mug from a person who lets go only when the script says so; ``script`` once the weight is watched
+    for."""
+    trial = Trial(**overrides)
+    trial.cell.partner.let_go_after = None
+    let_go, trial.cell.let_go = trial.cell.let_go, lambda: None
+
+    def walk(t):
+        t.wait_hub("wait_without_object")
+        t.start(RECEIVE)
+        while "arm lift" not in t.cell.called():
+            t.clock.sleep(0.01)
+        script(t)
+        let_go()
+        while t.ctx.requests.hub() == "":
+            t.clock.sleep(0.05)
+
+    return trial.run(walk)
+
+
+def test_the_rise_stands_when_the_weight_has_come_and_goes_on_in_steps_where_the_person_holds_on():
+    rises = []
+
+    def script(t):
+        below, pause = height(t), float(t.ctx.config.get("hand.lift_pause"))
+        t.clock.sleep(0.15)
+        t.cell.push(-0.9 * WEIGHT)
+        for wait in (0.3, pause + 0.3, 6.0 * pause):
+            t.clock.sleep(wait)
+            rises.append(height(t) - below)
+
+    trial = receiving(script, **{"hand.load_timeout": 8.0})
+    step, whole = (float(trial.ctx.config.get(f"hand.{name}")) for name in ("lift_step", "lift"))
+    assert rises[0] < 0.4 * whole, "as far as it had come with the weight"
+    assert rises[1] == pytest.approx(rises[0] + step, abs=0.003)
+    assert rises[2] == pytest.approx(whole, abs=0.006), "never farther than the whole rise"
+    assert trial.result().outcome == "succeeded"
+
+
+def test_without_a_sight_of_the_person_the_rise_is_whole():
+    rises = []
+
+    def script(t):
+        t.clock.sleep(0.15)
+        t.cell.push(-0.9 * WEIGHT)
+        t.wait_hub("wait_with_object")
+        rises.append(t.ctx.journal.results[-1].marks["released"] - t.ctx.journal.results[-1].marks["loaded"])
+
+    trial = Trial()
+    trial.cell.faults.not_seen.add("human_hand")
+
+    def walk(t):
+        t.wait_hub("wait_without_object")
+        t.start(RECEIVE)
+        while "arm lift" not in t.cell.called():
+            t.clock.sleep(0.01)
+        script(t)
+
+    trial.cell.partner.let_go_after = None
+    trial.run(walk)
+    assert rises[0] > 0.2, "the time that the rest of the rise takes"
+
+
+@pytest.mark.parametrize(
+    ("mode", "positions", "around"),
+    [
+        ("cylindrical", (245, 82, 254, 148, 158), True),
+        ("cylindrical", (245, 254, 254, 254, 171), False),
+        ("cylindrical", (245, 120, 254, 254, 254), False),
+        ("tridigit", (245, 120, 160, 254, 0), True),
+        ("tridigit", (245, 120, 254, 254, 0), False),
+        ("lateral", (30, 120, 254, 254, 254), True),
+        ("lateral", (30, 254, 254, 254, 254), False),
+        ("cylindrical", (), True),
+    ],
+)
+def test_fingers_around_an_object(mode, positions, around):
+    assert stopped_by_object(mode, positions) == around
+
+
+def edged(times):
+    """Receive the mug; so many times only the ring finger stands on it."""
+    trial, closings = Trial(), []
+    state = trial.ctx.hand.state
+
+    def seen():
+        real = state()
+        closed = [name for name in trial.cell.called("close")]
+        closings[:] = closed
+        edge = 0 < len(closed) <= times and real.holding
+        return replace(real, positions=(200, 254, 254, 254, 170)) if edge else real
+
+    trial.ctx.hand.state = seen
+
+    def script(t):
+        t.wait_hub("wait_without_object")
+        t.start(RECEIVE)
+        t.clock.sleep(0.5)
+        while t.ctx.requests.hub() == "":
+            t.clock.sleep(0.05)
+
+    return trial.run(script)
+
+
+def test_what_is_held_by_an_edge_is_grasped_once_more():
+    trial = edged(1)
+    assert "missed" in trial.result().marks and trial.result().outcome == "succeeded"
+    order = [name for name in trial.cell.called() if name in ("preshape cylindrical", "close", "arm lift")]
+    again = order[order.index("close") + 1 : order.index("arm lift")]
+    assert again[0] == "preshape cylindrical" and again[-1] == "close", order
+
+
+def test_what_is_held_by_an_edge_again_stays_with_the_person():
+    trial = edged(2)
+    assert trial.result().outcome == "failed_empty" and trial.result().code == ReasonCode.OBJECT_NOT_SEEN
+    assert "by an edge" in trial.ctx.journal.why() and trial.ctx.holding == ""
+
+
+def test_an_object_that_falls_in_the_last_moment_of_the_way_is_no_success():
+    trial = Trial()
+
+    def script(t):
+        t.wait_hub("wait_without_object")
+        t.start(RECEIVE)
+        while not t.ctx.journal.marked("tightened"):
+            t.clock.sleep(0.01)
+        home, here = np.asarray(t.ctx.config.get("postures.home")), lambda: np.asarray(t.ctx.arm.joint_positions())
+        while np.max(np.abs(here() - home)) > 0.05:
+            t.clock.sleep(0.01)
+        t.cell.at_palm = None
+        t.cell.objects["mug"] = Pose(np.array([0.4, -0.4, -0.5]))
+        while t.ctx.requests.hub() == "":
+            t.clock.sleep(0.05)
+
+    trial.run(script)
+    assert trial.result().outcome == "failed_empty" and trial.result().code == ReasonCode.OBJECT_NOT_SEEN
+    assert trial.ctx.holding == ""
+
+
+def test_fingers_that_close_past_it_on_the_way_hold_nothing():
+    trial = Trial()
+    state = trial.ctx.hand.state
+    past = (200, AT_END, 254, 254, 254)
+    trial.ctx.hand.state = lambda: (
+        replace(state(), positions=past) if trial.ctx.journal.marked("tightened") else state()
+    )
+
+    def script(t):
+        t.wait_hub("wait_without_object")
+        t.start(RECEIVE)
+        t.clock.sleep(0.5)
+        while t.ctx.requests.hub() == "":
+            t.clock.sleep(0.05)
+
+    trial.run(script)
+    assert trial.result().outcome == "failed_empty" and trial.result().code == ReasonCode.OBJECT_NOT_SEEN
+    assert "closed past it" in trial.ctx.journal.why()
