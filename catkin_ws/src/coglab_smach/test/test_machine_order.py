@@ -61,6 +61,7 @@ def test_human_to_robot_order(trial):
         "take_weight",
         "hand_tighten",
         "coglab_home_robot",
+        "tighten_at_home",
     ]
     assert trial.labels("/approach/arm_motion") == ["switch_to_dmp", "execute_dmp", "wait_stop"]
     order = trial.cell.called()

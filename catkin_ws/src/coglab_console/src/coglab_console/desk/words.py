@@ -36,6 +36,7 @@ PHASES = {
     "hand_preshape": "shapes the hand",
     "hand_close": "closes the hand",
     "hand_tighten": "holds it firmly",
+    "tighten_at_home": "holds it firmly",
     "hand_open": "opens the hand",
     "open_again": "gives the object back",
     "open_at_home": "opens the hand at home",
