@@ -100,8 +100,9 @@ def test_fingers_around_an_object(mode, positions, around):
     assert stopped_by_object(mode, positions) == around
 
 
-def edged(times):
-    """Receive the mug; so many times only the ring finger stands on it."""
+def edged(times, person_gone=False):
+    """Receive the mug; so many times only the ring finger stands on it. ``person_gone``: the person has left
+    by then."""
     trial, closings = Trial(), []
     state = trial.ctx.hand.state
 
@@ -110,6 +111,8 @@ def edged(times):
         closed = [name for name in trial.cell.called("close")]
         closings[:] = closed
         edge = 0 < len(closed) <= times and real.holding
+        if edge and person_gone:
+            trial.cell.let_go()
         return replace(real, positions=(200, 254, 254, 254, 170)) if edge else real
 
     trial.ctx.hand.state = seen
@@ -130,6 +133,12 @@ def test_what_is_held_by_an_edge_is_grasped_once_more():
     order = [name for name in trial.cell.called() if name in ("preshape cylindrical", "close", "arm lift")]
     again = order[order.index("close") + 1 : order.index("arm lift")]
     assert again[0] == "preshape cylindrical" and again[-1] == "close", order
+
+
+def test_what_is_held_by_an_edge_is_kept_where_the_person_has_gone():
+    trial = edged(1, person_gone=True)
+    assert trial.result().outcome == "succeeded" and "missed" not in trial.result().marks
+    assert "tightened" in trial.result().marks
 
 
 def test_what_is_held_by_an_edge_again_stays_with_the_person():

@@ -139,8 +139,8 @@ class PtpMotion(CoglabState):
 
 class HomeRobot(PtpMotion):
     """coglab_home_robot: the arm goes to its home posture; with ``carries``, with the object of the action in the hand,
-    and it ends where that is lost, and stands at home until it is seen to stay; with ``gave``, an object that has fallen from the person's hand meanwhile was not
-    given."""
+    and it ends where that is lost, and stands at home until it is seen to stay; with ``gave``, an object that has
+    fallen from the person's hand meanwhile was not given."""
 
     def __init__(self, ctx: Context, carries: bool = False, gave: bool = False) -> None:
         super().__init__(ctx, "home")

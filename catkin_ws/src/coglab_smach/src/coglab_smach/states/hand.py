@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -96,6 +97,8 @@ class HandClose(CoglabState):
             output_keys=["hand_distance"] if from_person else [],
         )
         self.from_person = from_person
+        self._before: float | None = None
+        """m from the person's hand to the palm before the fingers had closed; None: not seen"""
 
     def run(self, ud: Any) -> str:
         self.ctx.journal.mark("closing")
@@ -104,7 +107,7 @@ class HandClose(CoglabState):
         closing = self.ctx.closing or self.ctx.hand.close_on_object()
         self.ctx.closing = None
         if self.from_person:
-            ud.hand_distance = hand_from_palm(self)
+            ud.hand_distance = self._before = hand_from_palm(self)
             self._give_way(closing)
         self.await_pending(closing, "closing of the hand", code=HAND)
         self.ctx.journal.mark("closed")
@@ -112,7 +115,7 @@ class HandClose(CoglabState):
         while not self.ctx.hand.state().holding and self.ctx.clock.now() < end:
             self.pause(0.02)
         state = self.ctx.hand.state()
-        around = not self.from_person or stopped_by_object(ud.grasp["hand"]["mode"], state.positions)
+        around = not self.from_person or self._around(ud.grasp["hand"]["mode"], state.positions)
         if state.connected and not (state.holding and around):
             self.ctx.holding, self.ctx.shared = "", False
             missed = "the hand holds it by an edge" if state.holding else "the hand closed on nothing"
@@ -127,6 +130,13 @@ class HandClose(CoglabState):
                 ReasonCode.OBJECT_NOT_SEEN,
             )
         return "succeeded"
+
+    def _around(self, mode: str, positions: Sequence[int]) -> bool:
+        """Whether the fingers stand around the object; or the person has gone, so that opening would let it fall."""
+        if stopped_by_object(mode, positions):
+            return True
+        gone = float(self.ctx.config.get("hand.let_go", 0.04)) + (self._before or math.inf)
+        return (hand_from_palm(self) or 0.0) > gone
 
     def _give_way(self, closing: Pending) -> None:
         """Until the fingers have closed."""

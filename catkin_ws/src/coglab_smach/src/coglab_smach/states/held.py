@@ -28,9 +28,9 @@ falls has moved by more"""
 class HeldObject:
     """Ask it again and again while the arm carries ``object_id``.
 
-    Two things tell that it is gone: the hand, whose fingers are open or closed to their ends, and the tracker, which sees it away from the palm
-    it was at when the asking began, or too far from it at once. Fingers that stand where they closed do not feel what
-    slides out of them.
+    Two things tell that it is gone: the hand, whose fingers are open or closed to their ends, and the tracker, which
+    sees it away from the palm it was at when the asking began, or too far from it at once. Fingers that stand where
+    they closed do not feel what slides out of them.
     """
 
     def __init__(self, ctx: Context, object_id: str) -> None:
