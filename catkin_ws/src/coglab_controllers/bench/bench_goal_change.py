@@ -4,10 +4,13 @@
 One reach of 1 s in cycles of 5 ms, watched for 6 s; rows with noise over 60 seeds, none left out.
 
 Definitions. Change of acceleration: largest from one cycle to the next. Within 10 mm: for good, in durations T. Lag:
-largest distance to the moving goal from T on. Noise: 4 mm per axis at 30 Hz, white or with a correlation time of 0.5 s.
+largest distance to the moving goal from T on, to 2.5 s; where it is seen with noise, of the mean of all seeds in each
+cycle, because the noise itself is no lag; the mean lag of one seed is that over the cycles, along the goal's way.
+Noise: 4 mm per axis at 30 Hz, white or with a correlation time of 0.5 s; a frame stays until the next one.
 Reached: the first cycle from the end of the motion on in which the set-point is slower than 0.02 m/s and within 5 mm of
 the goal as estimated; what never happens within 6 s counts as 6 s. The motion says ended once; where that does not hold
-in that cycle, it was hasty. Speed that the noise adds: of the set-point, beside the same motion without noise.
+in that cycle, it was hasty. Speed that the noise adds: of the set-point, beside the same motion without noise, RMS from
+the beginning to the end; goals are those of all seeds' cycles together and of the worst seed alone.
 """
 
 import json
@@ -31,6 +34,9 @@ GOAL = np.array([0.51, 0.0, 0.0])
 TIMES = np.linspace(0.0, DURATION, 1001)
 DEMONSTRATION = np.outer(minimum_jerk(TIMES / DURATION), GOAL)
 UPRIGHT = np.array([0.0, 0.0, 0.0, 1.0])
+VELOCITY = np.array([0.0, 0.1, 0.0])
+"""m/s, of the goal that moves"""
+NOISES = (("white", 0.0), ("wandering for 0.5 s", 0.5))
 PRIMITIVE = cc.learn("reach", [(TIMES, DEMONSTRATION)], mapping="similarity")
 
 
@@ -128,7 +134,7 @@ def moving_rows() -> list[Row]:
     """A goal that moves at 0.1 m/s from the start."""
 
     def goal_at(t: float) -> np.ndarray:
-        return GOAL + np.array([0.0, 0.1 * t, 0.0])
+        return GOAL + VELOCITY * t
 
     positions, _, _, _ = run(goal_at, 500)
     goals = np.array([goal_at(i * CYCLE) for i in range(500)])
@@ -150,6 +156,33 @@ def moving_rows() -> list[Row]:
         ),
         row("goal_change", "the same, without goal velocity", plain_lag[end:].max(), "mm", ""),
     ]
+
+
+def noisy_lag_rows() -> list[Row]:
+    """The same goal, seen at 30 Hz: exactly, and with noise over SEEDS draws each."""
+    way = np.arange(500)[:, None] * CYCLE * VELOCITY
+    begin = round(DURATION / CYCLE)
+
+    def off(frames: np.ndarray) -> np.ndarray:
+        """(cycles from T on, 3): the goal less the set-point, m."""
+        seen = lambda t: frames[int(t * 30.0 + 1e-9)] + VELOCITY * int(t * 30.0 + 1e-9) / 30.0  # noqa: E731
+        return (GOAL + way - run(seen, len(way))[0])[begin:]
+
+    exact = 1000.0 * np.linalg.norm(off(np.tile(GOAL, (400, 1))), axis=1)
+    what = "goal moving at 0.1 m/s, seen at 30 Hz without noise: lag from T on, largest"
+    rows = [row("goal_change", what, exact.max(), "mm", "")]
+    for name, correlation in NOISES:
+        every = 1000.0 * np.array([off(noisy_frames(seed, correlation)) for seed in range(SEEDS)])
+        behind = every.mean(axis=1) @ VELOCITY / np.linalg.norm(VELOCITY)
+        mean, largest = np.linalg.norm(every.mean(axis=0), axis=1), np.linalg.norm(every, axis=2).max()
+        what = f"goal moving at 0.1 m/s, 4 mm of noise at 30 Hz, {name}, {SEEDS} seeds"
+        rows += [
+            row("goal_change", f"{what}: lag from T on, mean of all seeds, largest", mean.max(), "mm", "<= 2"),
+            row("goal_change", f"{what}: mean lag of one seed, median", float(np.median(behind)), "mm", "<= 2"),
+            row("goal_change", f"{what}: mean lag of one seed, largest", behind.max(), "mm", ""),
+            row("goal_change", f"{what}: distance, noise and all, largest", largest, "mm", ""),
+        ]
+    return rows
 
 
 def noisy_frames(seed: int, correlation: float) -> np.ndarray:
@@ -178,7 +211,7 @@ class Noisy:
     still: float | None  # from the end until the set-point's speed is zero for good
     after: float  # largest speed from 1 s after the end on
     again: int  # times that it followed again
-    added: float  # RMS of the speed that the noise adds until the end
+    added: np.ndarray  # speed that the noise adds in each cycle until the end
 
 
 def noisy(frames: np.ndarray | None, exact: np.ndarray | None) -> Noisy:
@@ -193,16 +226,15 @@ def noisy(frames: np.ndarray | None, exact: np.ndarray | None) -> Noisy:
         speeds.append(float(np.linalg.norm(reference.velocity)))
         there.append(speeds[-1] <= 0.02 and float(np.linalg.norm(motion.position - motion.goal)) <= 0.005)
         events.append(motion.event)
+    extra = np.zeros(WATCHED - 1)
+    if exact is not None:
+        extra = np.linalg.norm(np.diff(np.array(positions) - exact, axis=0), axis=1) / CYCLE
     if "ended" not in events:
-        return Noisy(None, None, True, None, max(speeds), events.count("follows_again"), 0.0)
+        return Noisy(None, None, True, None, max(speeds), events.count("follows_again"), extra)
     end = events.index("ended")
     reached = next((i for i in range(end, WATCHED) if there[i]), None)
     moving = [i for i in range(end, WATCHED) if speeds[i] > 0.0]
     last = moving[-1] + 1 if moving else end
-    added = 0.0
-    if exact is not None and end > 1:
-        extra = np.linalg.norm(np.diff(np.array(positions) - exact, axis=0), axis=1)[:end] / CYCLE
-        added = float(np.sqrt(np.mean(extra**2)))
     return Noisy(
         ended=end * CYCLE,
         reached=None if reached is None else reached * CYCLE,
@@ -210,7 +242,7 @@ def noisy(frames: np.ndarray | None, exact: np.ndarray | None) -> Noisy:
         still=None if last >= WATCHED else (last - end) * CYCLE,
         after=max(speeds[end + round(1.0 / CYCLE) :]),
         again=events.count("follows_again"),
-        added=added,
+        added=extra[: max(1, end)],
     )
 
 
@@ -227,10 +259,11 @@ def noise_rows() -> list[Row]:
     exact = noisy(None, None)
     assert exact.reached is not None
     rows = [row("goal_change", "still goal seen exactly: reached", exact.reached / DURATION, "T", "")]
-    for name, correlation in (("white", 0.0), ("wandering for 0.5 s", 0.5)):
+    for name, correlation in NOISES:
         motions = [noisy(noisy_frames(seed, correlation), still_goal) for seed in range(SEEDS)]
         late = [value - exact.reached for value in missed_is_worst([m.reached for m in motions])]
         rest = missed_is_worst([m.still for m in motions])
+        added = 1000.0 * np.array([np.sqrt(np.mean(m.added**2)) for m in motions])
         what = f"still goal, 4 mm of noise at 30 Hz, {name}, {SEEDS} seeds"
         rows += [
             row("goal_change", f"{what}: reached later than if seen exactly, median", late[SEEDS // 2], "s", "<= 0.25"),
@@ -245,8 +278,14 @@ def noise_rows() -> list[Row]:
             row("goal_change", f"{what}: speed from 1 s after the end on, largest",
                 1000.0 * max(m.after for m in motions), "mm/s", "<= 0"),
             row("goal_change", f"{what}: times it was followed again", sum(m.again for m in motions), "1", "<= 0"),
-            row("goal_change", f"{what}: speed that the noise adds during the motion, RMS, median",
-                1000.0 * float(np.median([m.added for m in motions])), "mm/s", ""),
+            row("goal_change", f"{what}: speed that the noise adds during the motion, RMS, all seeds together",
+                1000.0 * float(np.sqrt(np.mean(np.concatenate([m.added for m in motions]) ** 2))), "mm/s", "<= 15"),
+            row("goal_change", f"{what}: speed that the noise adds during the motion, RMS, median seed",
+                float(np.median(added)), "mm/s", ""),
+            row("goal_change", f"{what}: speed that the noise adds during the motion, RMS, 95th percentile of seeds",
+                float(np.percentile(added, 95, method="higher")), "mm/s", ""),
+            row("goal_change", f"{what}: speed that the noise adds during the motion, RMS, worst seed", added.max(),
+                "mm/s", "<= 15"),
         ]  # fmt: skip
     return rows
 
@@ -272,7 +311,7 @@ def switch_rows() -> list[Row]:
 
 def main() -> None:
     """Prints the rows as JSON."""
-    json.dump(step_rows() + moving_rows() + noise_rows() + switch_rows(), sys.stdout, indent=1)
+    json.dump(step_rows() + moving_rows() + noisy_lag_rows() + noise_rows() + switch_rows(), sys.stdout, indent=1)
     print()
 
 

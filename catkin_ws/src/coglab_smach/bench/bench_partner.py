@@ -3,9 +3,10 @@
 
 One run of the default world (people drawn, tracker as it is), profile and settings as shipped: 100 people x 5 objects
 x 2 directions, and beside it the trials of single questions. Seeds come from SHA-256 of the commit's hash, so nobody
-has tried them. Without --long a few trials of each kind. COGLAB_TRIALS=FILE takes what `world_campaign.py FILE --of
-partner` has run; a row with fewer trials than asked is incomplete, and missed if it has a goal. Nothing is left out of
-a percentile: what never happened is infinitely late and shown as 999. Definitions, fixed before anything was measured:
+has tried them. Without --long a few trials of each kind: a sample, which meets no goal. COGLAB_TRIALS=FILE takes what
+`world_campaign.py FILE --of partner` has run; a row with fewer trials than asked is incomplete, and missed if it has a
+goal. Nothing is left out of a percentile: what never happened is infinitely late and shown as 999. Definitions, fixed
+before anything was measured:
 
 Success: the machine says so, and at the end of the action the robot (receiving) or the person (giving) holds the
 object in truth, and nobody else; claimed: the machine says so and that is not true. A direction that never began,
@@ -21,10 +22,11 @@ order, both ways), prominence over 10 % of the largest. SPARC: 10 Hz, amplitude 
 and SPARC are of all reaches in which the palm moves.
 
 Onset of hand (its own motion, without sway and tremor) or palm: where its speed is above 0.02 m/s for 0.1 s, first in
-the action. An arm that does not start is infinitely late. Other motions: 200
-(coglab_perception/test/other_motions.py), kinds in turn, half with the object in the hand that moves, half with one in
-the robot's, which the drawn person has given it before; palm: farthest from where it was, from the motion's beginning
-to 0.8 s after its end. Those that were not carried out, because that person had failed, are counted.
+the action. An arm that does not start is infinitely late, and so is every direction that never began or in which the
+person did not reach; how many of each is a row. Other motions: 200 (coglab_perception/test/other_motions.py), kinds in
+turn, half with the object in the hand that moves, half with one in the robot's, which the drawn person has given it
+before; palm: farthest from where it was, from the motion's beginning to 0.8 s after its end. Those that were not
+carried out, because that person had failed, are counted.
 
 Human taker: starts 0.2 s after the onset and touches human_time(way from the palm at home to the object's middle)
 later, but not before the object is there: the person's hand stands (below 0.02 m/s for 0.1 s), or the robot touches
@@ -50,21 +52,26 @@ its own: contact_motion.
 from __future__ import annotations
 
 import json
+import re
 import sys
 from collections.abc import Mapping
+from types import SimpleNamespace
 
 import campaign
+import numpy as np
 import partner_motion_rows as motion
 from campaign import Job
 from coglab_py.packages import package_path
 from coglab_sim.conditions import HARDSHIPS
 from coglab_smach.context.config import Config
+from coglab_smach.states.knowledge import unless_withdrawn
 from partner_rows import (
     ALL_TOGETHER,
     FELL,
     WITHDRAWN,
     Group,
     Row,
+    asked_of,
     groups,
     hardship_rows,
     interrupted_rows,
@@ -75,13 +82,16 @@ from trial_file import commit_of_sources, whole_hash
 from world_rows import OBJECTS
 
 SAME = {
+    "timing": "natural",
     "postures.home": [-1.4349, -0.6086, 1.4986, 1.7048, 0.1857, 0.2152, 0.782],
     "handover.region_low": [0.45, -0.50, 0.05],
     "handover.region_high": [0.86, 0.50, 0.85],
     "handover.still_margin": 0.10,
     "handover.hand_margin": 0.10,
 }
-"""home and region when the goals were set"""
+"""home and region when the goals were set, and the profile that they are for"""
+HEADER = ("include", "coglab_controllers", "goal", "goal_watch.hpp")
+"""of the watch that ends a motion whose goal has left its region"""
 
 
 def row(figure: str, value: float, unit: str, goal: str = "", ok: bool = True) -> dict:
@@ -98,20 +108,49 @@ def row(figure: str, value: float, unit: str, goal: str = "", ok: bool = True) -
     }
 
 
-def settings_row(row: Row) -> dict:
-    """Nothing is won by moving home or region."""
+def settings_rows(row: Row) -> list[dict]:
+    """Nothing is won by moving home or region, nor by following what has left the region."""
     config = Config.load(str(package_path("coglab_smach", "config", "machines.yaml")), {})
     other = [name for name, value in SAME.items() if config.get(name) != value]
-    return row(f"settings of home and region that were changed ({', '.join(other) or 'none'})", len(other), "settings",
-               "<= 0", not other)  # fmt: skip
+    changed = row(
+        f"settings of home, region and timing that were changed ({', '.join(other) or 'none'})", len(other),
+        "settings", "<= 0", not other)  # fmt: skip
+    seen, believed = (beyond(config, frame) for frame in ("object_mug", "object_mug_ahead"))
+    border = goal_border()
+    still, hand = (config.get(f"handover.{name}_margin") for name in ("still", "hand"))
+    words = (
+        f"offered in it as at 5828bb3: handover.still_margin {still} m where it is held still, hand_margin {hand} m "
+        f"for a hand that asks; on the way, which 5828bb3 did not watch: {seen:.2f} m where it is seen "
+        f"(handover.edge), {believed:.2f} m where it is believed to end (edge and still_margin), and GoalWatch's "
+        f"border of {border:.2f} m"
+    )
+    most = max(seen, believed) + border
+    return [changed, row(f"a reach follows what is outside the region ({words}), most", most, "m", "<= 0", most <= 0.0)]
+
+
+def beyond(config: Config, frame: str) -> float:
+    """m outside the handover region to which the machines let a reach follow this frame."""
+    goal = unless_withdrawn(SimpleNamespace(config=config), {"frame": frame})
+    region = np.array([config.get("handover.region_low"), config.get("handover.region_high")])
+    followed = np.array([goal["limits"][f"goal_region_{side}"] for side in ("low", "high")])
+    return float(np.max(np.abs(followed - region)))
+
+
+def goal_border() -> float:
+    """m beyond its limits at which the controller ends a motion, as its header has it."""
+    text = package_path("coglab_controllers", *HEADER).read_text(encoding="utf-8")
+    found = re.search(r"kBorder = ([0-9.]+);", text)
+    assert found is not None, "goal_watch.hpp has no kBorder any more"
+    return float(found.group(1))
 
 
 def rows_of(row: Row, commit: str, jobs: Mapping[str, list[Job]]) -> list[dict]:
     """All rows, of these trials by group; their seeds are those of a commit."""
     trials = run([job for part in jobs.values() for job in part])
-    group = {name: Group(row, part, trials) for name, part in jobs.items()}
-    people = Group(row, [job for name, part in jobs.items() if name.startswith("people") for job in part], trials)
-    rows = [settings_row(row), *success_rows(people), *motion.reach_rows(people), *motion.onset_rows(people)]
+    group = {name: Group(row, part, trials, asked_of(name)) for name, part in jobs.items()}
+    everybody = [job for name, part in jobs.items() if name.startswith("people") for job in part]
+    people = Group(row, everybody, trials, len(OBJECTS) * asked_of("people"))
+    rows = [*settings_rows(row), *success_rows(people), *motion.reach_rows(people), *motion.onset_rows(people)]
     rows += motion.other_rows(group["others"], False) + motion.other_rows(group["others, hub"], True)
     rows += motion.receiving_rows(people) + motion.speed_and_force_rows(people)
     rows += interrupted_rows(group["withdrawals"], "withdrawals", WITHDRAWN)
@@ -122,7 +161,7 @@ def rows_of(row: Row, commit: str, jobs: Mapping[str, list[Job]]) -> list[dict]:
     known = whole_hash(commit)
     changed = " with changes" if commit.endswith("-changed") else ""
     seeds = f"seeds of commit {known[:12]}{changed}" if known else "seeds of no commit: git does not tell"
-    return [*rows, row(f"{seeds}: people", people.asked // len(OBJECTS), "people")]
+    return [*rows, row(f"{seeds}: people", people.planned // len(OBJECTS), "people")]
 
 
 def main() -> int:

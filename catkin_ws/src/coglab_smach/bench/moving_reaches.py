@@ -18,6 +18,7 @@ from __future__ import annotations
 import xml.etree.ElementTree as ElementTree
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -26,7 +27,7 @@ from coglab_py.packages import package_path
 from coglab_py.pose import Pose, about_z
 from coglab_sim.person.reach import Reach
 from coglab_sim.tracker.tracker import PerceptionSettings, Tracker
-from coglab_sim.virtual_world import DT, Robot, urdf_file
+from coglab_sim.virtual_world import DT, Hand, Robot, urdf_file
 from coglab_smach.kinematics.reachability import default_arm, solve
 
 LIBRARY = str(package_path("coglab_controllers", "config", "primitives.xml"))
@@ -102,7 +103,11 @@ class Recording:
     velocity: list[np.ndarray] = field(default_factory=list)
     """as lwr/joint_states has it"""
     touch: list[dict[str, np.ndarray]] = field(default_factory=list)
-    """N on phalanges and palm, without noise; empty unless the person's hand comes"""
+    """N on phalanges and palm, without noise; empty where a force is put on the palm itself"""
+    hand: list[Any] = field(default_factory=list)
+    """motors of the hand as its node reads them at rest, 5 times a second; the same object until they are read again"""
+    sight: list[tuple[float, Pose] | None] = field(default_factory=list)
+    """when (s) and where what is reached for was seen last"""
     three_newton: float | None = None
     """s, from which it is 3 N or more"""
     aborted: str = ""
@@ -162,6 +167,9 @@ class MovingReach:
         self.robot = Robot(seed, arm__coulomb_friction=[float(v) for v in friction], **cell)
         self.virtual, self.cell = self.robot.virtual, self.robot.cell
         self.tracker = Tracker(FRAME, PerceptionSettings(), seed)
+        # The hand's driver and emulator, as the node has them: they read the motors, but turn none.
+        self.motors = Hand(SimpleNamespace(motors=self.cell.motors, set_motors=lambda *orders: None))
+        self.seen: tuple[float, Pose] | None = None
         self.record = Recording(seed, payload)
         self.hand: Reach | None = None
 
@@ -195,6 +203,7 @@ class MovingReach:
             for sight in self.tracker.step(self.now, Pose(place, about_z(self.draw.turn))):
                 frame = sight.frame
                 self.virtual.set_frame(FRAME, frame.position, frame.orientation, self.now - sight.captured)
+                self.seen = sight.captured, frame
         self.robot.step()
         report, record = self.robot.report, self.record
         if report["fri_period"] <= 0.0:
@@ -207,7 +216,10 @@ class MovingReach:
             ("velocity", "measured_velocity"),
         ):
             getattr(record, name).append(np.array(report[key]))
-        if self.push == "hand":
+        self.motors.step(self.now)
+        record.hand.append(self.motors.readings)
+        record.sight.append(self.seen)
+        if self.push in ("", "hand"):
             record.touch.append({name: np.array(force) for name, force in self.cell.touch().items()})
 
     def prepare(self) -> None:

@@ -40,23 +40,33 @@ def reach_rows(group: Group) -> list[dict]:
 
 
 def starts_late(each: Direction) -> float | None:
-    """s from the onset of the person's reach to that of the arm; None where it does not start."""
-    arm, person = each.truth["arm_onset"], each.truth["onset"]
-    return None if arm is None else arm - person
+    """s from the onset of the person's reach to that of the arm; None where one of them does not start."""
+    arm, person = each.truth.get("arm_onset"), each.truth.get("onset")
+    return None if arm is None or person is None else arm - person
 
 
 def onset_rows(group: Group) -> list[dict]:
-    """Start with the person."""
-    begun = [each for each in group.directions if each.truth.get("onset") is not None]
-    every = [starts_late(each) for each in begun]
+    """Start with the person: every direction counts, and one without both onsets is infinitely late."""
+    found = group.directions
+    every = [starts_late(each) for each in found]
     what = "onset of the person's reach to the onset of the arm"
     rows = [
         group.row(f"{what}, median of {len(every)}", late(every, 50), "s", "<= 0.35"),
         group.row(f"{what}, 95th percentile", late(every, 95), "s"),
     ]
     for action, name in ((RECEIVE, "receiving"), (GIVE, "giving")):
-        part = [starts_late(each) for each in begun if each.action == action]
+        part = [starts_late(each) for each in found if each.action == action]
         rows.append(group.row(f"{what}, {name}, median of {len(part)}", late(part, 50), "s"))
+    begun = [each.truth for each in found if each.truth]
+    hands = [truth for truth in begun if truth["onset"] is not None]
+    arms = [truth for truth in hands if truth["arm_onset"] is not None]
+    without = (
+        ("the direction never began", len(found) - len(begun)),
+        ("the person did not reach", len(begun) - len(hands)),
+        ("the arm did not start", len(hands) - len(arms)),
+    )
+    for why, number in without:
+        rows.append(group.row(f"{what}: infinitely late, {why}", number, f"of {len(found)}"))
     before = share([value is not None and value < 0.0 for value in every])
     return [*rows, group.row("the arm moves before the person's reach", before, "share")]
 
@@ -78,7 +88,7 @@ def other_rows(group: Group, hub: bool) -> list[dict]:
 
 def receiving_rows(group: Group) -> list[dict]:
     """Against a human taker."""
-    begun = [each.truth for each in group.directions if each.action == RECEIVE and each.truth]
+    begun = [each.truth for each in group.directions if each.action == RECEIVE]
 
     def times(name: str, what: str, goal: str) -> list[dict]:
         values = [each.get(name) for each in begun]

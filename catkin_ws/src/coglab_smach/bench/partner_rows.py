@@ -19,7 +19,9 @@ from trial_file import whole_hash
 from world_rows import OBJECTS
 
 LONG = os.environ.get("COGLAB_LONG") == "1"
-PEOPLE, HARDENED, WITHDRAWALS, FALLS, OTHERS, PULLS = (100, 100, 200, 200, 200, 100) if LONG else (1, 1, 2, 2, 3, 2)
+ASKED = {"people": 100, "hardships": 100, "withdrawals": 200, "falls": 200, "others": 200, "pulls": 100}
+"""trials of each group, the people of each object, that a row needs in order to meet its goal"""
+COUNTS = ASKED if LONG else {"people": 1, "hardships": 1, "withdrawals": 2, "falls": 2, "others": 3, "pulls": 2}
 RECEIVE, GIVE = EXCHANGES
 HOLDER = {RECEIVE: "robot", GIVE: "human"}
 """who truly holds the object at the end of each direction that has succeeded"""
@@ -58,18 +60,24 @@ def groups(commit: str) -> dict[str, list[Job]]:
     found = {}
     for name in OBJECTS:
         key, conditions = f"people, {name}", {"conditions": Conditions(object_id=name)}
-        found[key] = jobs(key, PEOPLE, lambda i, seed, c=conditions: c, handover, both=True)
+        found[key] = jobs(key, COUNTS["people"], lambda i, seed, c=conditions: c, handover, both=True)
     for name in (*HARDSHIPS, ALL_TOGETHER):
         hard = lambda i, seed, name=name: {"conditions": hardened(name, seed, object_of(i))}  # noqa: E731
-        found[name] = jobs(f"hardships, {name}", HARDENED, hard, handover, both=True)
-    for name, count, runner in (("withdrawals", WITHDRAWALS, withdrawal), ("falls", FALLS, fall)):
-        found[name] = jobs(name, count, lambda i, seed: {"conditions": Conditions(object_id=object_of(i))}, runner)
+        found[name] = jobs(f"hardships, {name}", COUNTS["hardships"], hard, handover, both=True)
+    for name, runner in (("withdrawals", withdrawal), ("falls", fall)):
+        given = lambda i, seed: {"conditions": Conditions(object_id=object_of(i))}  # noqa: E731
+        found[name] = jobs(name, COUNTS[name], given, runner)
     pulling = lambda i, seed: {"conditions": Conditions(PULLING[i % 2], object_id=object_of(i // 2))}  # noqa: E731
-    found["pulls"] = jobs("pulls", PULLS, pulling, handover)
+    found["pulls"] = jobs("pulls", COUNTS["pulls"], pulling, handover)
     for name, hub in (("others", False), ("others, hub", True)):
         number = lambda i, seed, hub=hub: {"conditions": Conditions(), "number": i, "hub": hub}  # noqa: E731
-        found[name] = jobs(name, OTHERS, number, other, both=True)
+        found[name] = jobs(name, COUNTS["others"], number, other, both=True)
     return found
+
+
+def asked_of(name: str) -> int:
+    """Trials that the goals ask for of a group of ``groups``; those that have no count of their own are hardships."""
+    return ASKED.get(name.partition(",")[0], ASKED["hardships"])
 
 
 def object_of(number: int) -> str:
@@ -125,10 +133,13 @@ def run(jobs: Sequence[Job]) -> dict[str, dict[str, Any]]:
 
 
 class Group:
-    """The ``trials`` of some jobs, as far as they were run, and rows about them: missed where some are missing."""
+    """The ``trials`` of some jobs, as far as they were run, and rows about them: missed where some are missing, and
+    where they are a sample, because the jobs themselves are fewer than ``asked`` (None: as many as there are jobs)."""
 
-    def __init__(self, row: Row, jobs: Sequence[Job], trials: Mapping[str, dict[str, Any]]) -> None:
-        self._row, self.asked = row, len(jobs)
+    def __init__(
+        self, row: Row, jobs: Sequence[Job], trials: Mapping[str, dict[str, Any]], asked: int | None = None
+    ) -> None:
+        self._row, self.asked, self.planned = row, len(jobs) if asked is None else asked, len(jobs)
         self.jobs = [job for job in jobs if job.key in trials]
         self.trials = [trials[job.key] for job in self.jobs]
 
@@ -139,10 +150,17 @@ class Group:
 
     def row(self, figure: str, value: float, unit: str, goal: str = "") -> dict:
         """A row; ``goal`` is "<= x" or ">= x" or nothing."""
-        if len(self.trials) < self.asked:
-            figure += f" [incomplete: missed; {len(self.trials)} of {self.asked} trials]"
-        ok = meets(value, goal) and (len(self.trials) == self.asked or not goal)
+        enough = len(self.trials) >= self.asked
+        figure += "" if enough else too_few(len(self.trials), self.planned, self.asked)
+        ok = meets(value, goal) and (enough or not goal)
         return self._row(figure, value if np.isfinite(value) else NEVER, unit, goal, ok)
+
+
+def too_few(done: int, planned: int, asked: int) -> str:
+    """What a row says of fewer trials than were asked: of a sample, or of a run that is not over."""
+    if planned < asked:
+        return f" [sample of {done} of {asked} asked: missed]"
+    return f" [incomplete: missed; {done} of {asked} trials]"
 
 
 def meets(value: float, goal: str) -> bool:

@@ -64,6 +64,46 @@ def test_a_timing_wins_over_the_file_and_what_is_given_beside_it_wins_over_the_t
     assert calm.get("handover.belief") == brisk.get("handover.belief")
 
 
+@pytest.mark.parametrize(
+    "name, value",
+    [
+        ("handover.doubt", 0.3),
+        ("handover.pause", 1.5),
+        ("handover.arrival_speed", 0.03),
+        ("handover.feel", 0.8),
+        ("handover.offer_timeout", 12.0),
+        ("give.back_time", 0.4),
+        ("give.lower_after", 1.0),
+        ("recognition_trigger.belief", 0.75),
+    ],
+)
+def test_a_timing_may_have_every_delay_that_studies_vary(tmp_path, name, value):
+    """Only that timing, within the limits that the value has elsewhere."""
+    path = tmp_path / "machines.yaml"
+    text = SHIPPED.read_text().replace("    handover.belief: 0.0\n", f"    handover.belief: 0.0\n    {name}: {value}\n")
+    path.write_text(text)
+    shipped = Config.load(str(SHIPPED)).get(name)
+    assert Config.load(str(path), {"timing": "calm"}).get(name) == value != shipped
+    assert Config.load(str(path)).get(name) == Config.load(str(path), {"timing": "brisk"}).get(name) == shipped
+    assert Config.load(str(path), {"timing": "calm", name: shipped}).get(name) == shipped
+    path.write_text(text.replace(f"    {name}: {value}\n", f"    {name}: -1.0\n"))
+    with pytest.raises(ConfigError, match="-1.0 is less than (or equal to )?the minimum of 0"):
+        Config.load(str(path))
+
+
+def test_a_timing_has_no_settings_that_are_no_delays(tmp_path):
+    path = tmp_path / "machines.yaml"
+    path.write_text(SHIPPED.read_text().replace("    handover.belief: 0.0\n", "    handover.edge: 0.3\n"))
+    with pytest.raises(ConfigError, match="'handover.edge' was unexpected"):
+        Config.load(str(path))
+
+
+def test_natural_is_as_it_was():
+    natural = Config.load(str(SHIPPED), {"timing": "natural"})
+    names = ("handover.belief", "handover.start_after", "handover.reach_ratio", "hand.lift_after", "hand.lift_speed")
+    assert [natural.get(name) for name in names] == [0.85, 0.0, 1.0, 0.05, 0.055]
+
+
 def test_an_unknown_timing_is_named_with_those_there_are(tmp_path):
     with pytest.raises(ConfigError, match="no timing 'hasty'; timings: calm, natural, brisk"):
         Config.load(str(SHIPPED), {"timing": "hasty"})

@@ -11,6 +11,7 @@ sys.path.insert(0, str(package_path("coglab_smach", "bench")))
 import bench_partner
 import campaign
 import motion_figures as motion
+import partner_motion_rows
 import partner_rows
 import trial_file
 import true_trace
@@ -236,21 +237,90 @@ def test_a_row_with_too_few_trials_is_missed():
     assert partner_rows.late([0.1, 0.2, None], 50) == 0.2 and partner_rows.late([], 50) == np.inf
 
 
+def test_a_sample_meets_no_goal():
+    """However good it is; what has no goal is shown and not judged."""
+    job = campaign.Job("falls", (RECEIVE,), 1, {"conditions": Conditions()})
+    group = partner_rows.Group(bench_partner.row, [job], {job.key: TRIAL}, partner_rows.asked_of("falls"))
+    got = group.row("share", 1.0, "share", ">= 0.9")
+    assert not got["ok"] and got["figure"] == "share [sample of 1 of 200 asked: missed]" and got["value"] == 1.0
+    assert group.row("reaches", 3, "reaches")["ok"]
+    counts = {name: partner_rows.asked_of(name) for name in partner_rows.groups("HEAD")}
+    assert counts["people, mug"] == counts["bias 10 mm"] == counts["all together"] == counts["pulls"] == 100
+    assert counts["withdrawals"] == counts["falls"] == counts["others"] == counts["others, hub"] == 200
+
+
+def test_a_direction_without_an_onset_is_infinitely_late():
+    """None is left out: who never began, a person who did not reach and an arm that did not start are each counted."""
+    job = campaign.Job("people, mug", campaign.EXCHANGES, 1, {"conditions": Conditions()})
+    both = [{"held_by": "robot", "reaches": [], "onset": o, "arm_onset": a} for o, a in ((1.0, 1.3), (None, 2.0))]
+    one = [{"held_by": "robot", "reaches": [], "onset": 1.0, "arm_onset": None}]
+    jobs = [job, campaign.Job("people, mug", campaign.EXCHANGES, 2, job.arguments)]
+    found = [TRIAL | {"outcomes": [], "truth": truth} for truth in (both, one)]
+    group = partner_rows.Group(bench_partner.row, jobs, {j.key: t for j, t in zip(jobs, found, strict=True)})
+    shown = {row["figure"]: row for row in partner_motion_rows.onset_rows(group)}
+    what = "onset of the person's reach to the onset of the arm"
+    assert shown[f"{what}, median of 4"]["value"] == partner_rows.NEVER and not shown[f"{what}, median of 4"]["ok"]
+    for why in ("the direction never began", "the person did not reach", "the arm did not start"):
+        assert shown[f"{what}: infinitely late, {why}"]["value"] == 1.0
+    assert partner_motion_rows.starts_late(group.directions[0]) == pytest.approx(0.3)
+
+
 GOALS = """>= 0.95, >= 0.9, <= 0.01, <= 0, >= 0.75, <= 5, <= 1.08, >= -1.5, >= -1.65, <= 0.35, <= 0.05, <= 0.5, <= 1.2,
 <= 2, <= 0.25, >= 1, <= 8, <= 15"""
 
 
-def test_two_trials_make_all_rows(monkeypatch):
+def run_sample(monkeypatch):
+    """One person with the mug and one with the ball, both directions, a withdrawal and a fall: the bench's rows by
+    figure, and what each direction of each trial came to."""
     monkeypatch.setattr(campaign, "FILE", None)
     jobs = {name: [] for name in partner_rows.groups("HEAD")}
-    conditions = {"conditions": Conditions(object_id="mug")}
-    jobs["people, mug"] = [campaign.Job("people, mug", campaign.EXCHANGES, 6001, conditions, partner_rows.handover)]
-    jobs["withdrawals"] = [campaign.Job("withdrawals", (RECEIVE,), 6002, conditions, partner_rows.withdrawal)]
+
+    def job(name, object_id, seed, runner, actions=(RECEIVE,)):
+        return campaign.Job(name, actions, seed, {"conditions": Conditions(object_id=object_id)}, runner)
+
+    for name, seed in (("mug", 21001), ("ball", 21002)):
+        jobs[f"people, {name}"] = [job(f"people, {name}", name, seed, partner_rows.handover, campaign.EXCHANGES)]
+    jobs["withdrawals"] = [job("withdrawals", "mug", 21003, partner_rows.withdrawal)]
+    jobs["falls"] = [job("falls", "ball", 21004, partner_rows.fall)]
+    trials = {}
+
+    def kept(asked):
+        trials.update(ran := partner_rows.run(asked))
+        return ran
+
+    monkeypatch.setattr(bench_partner, "run", kept)
     rows = bench_partner.rows_of(bench_partner.row, "HEAD", jobs)
+    groups = {name: partner_rows.Group(bench_partner.row, part, trials) for name, part in jobs.items()}
+    return rows, groups
+
+
+def test_a_sample_is_true_and_makes_all_rows(monkeypatch):
+    """What a person would see of it, by the cell's truth; the rows of so few trials meet no goal."""
+    rows, groups = run_sample(monkeypatch)
+    for name in ("people, mug", "people, ball"):
+        (trial,), (receive, give) = groups[name].trials, groups[name].directions
+        assert not trial["stuck"] and not trial["fell"], trial
+        assert (receive.end, receive.truth["held_by"]) == ("succeeded", "robot"), (receive.end, receive.sentence)
+        assert (give.end, give.truth["held_by"]) == ("succeeded", "human"), (give.end, give.sentence)
+    for name, codes in (("withdrawals", partner_rows.WITHDRAWN), ("falls", partner_rows.FELL)):
+        (trial,), (each,) = groups[name].trials, groups[name].directions
+        assert not trial["stuck"] and each.truth["moved_before"], "the arm was on its way"
+        assert each.end in {campaign.REASONS[code] for code in codes}, (each.end, each.sentence)
+        assert trial["fell"] == (name == "falls") and each.truth["held_by"] != "robot"
     assert {row["goal"] for row in rows} - {""} == set(" ".join(GOALS.split()).split(", "))
     assert all(np.isfinite(row["value"]) for row in rows)
     names = [row["figure"] for row in rows]
     assert len(set(names)) == len(names)
-    shown = {row["figure"]: row for row in rows}
-    assert shown["withdrawals that came about"]["value"] == 1.0 and shown["reaches"]["value"] >= 1.0
-    assert shown["settings of home and region that were changed (none)"]["ok"]
+    shown = {row["figure"].partition(" [sample of")[0]: row for row in rows}
+    assert shown["withdrawals that came about"]["value"] == 1.0 and shown["reaches"]["value"] >= 4.0
+    changed = "settings of home, region and timing that were changed (none)"
+    assert shown[changed]["ok"]
+    assert not [row["figure"] for row in rows if row["goal"] and row["ok"] and row is not shown[changed]]
+    assert names[2].endswith("[sample of 2 of 500 asked: missed]"), names[2]
+
+
+def test_what_a_reach_follows_beyond_the_region_is_a_row():
+    region = bench_partner.settings_rows(bench_partner.row)[1]
+    assert region["value"] == pytest.approx(0.17) and not region["ok"]
+    for part in ("0.05 m where it is seen", "0.15 m where it is believed to end", "border of 0.02 m"):
+        assert part in region["figure"]
