@@ -44,7 +44,8 @@ HEAD = """# Figures
 
 Written by `./coglab bench --report`, from what `./coglab bench NAME ...` has measured on these sources; edit nothing
 here. A row that misses its goal stays and says so; one without a goal has met none and says "-"; one of fewer trials
-than were asked for has met none either and says "sample". A bench that was not run on its sources as they are (its package and those that it uses, tests and documents apart) counts as missed.
+than were asked for has met none either and says "sample". A bench that was not run on its sources as they are (its
+package and those that it uses, tests and documents apart) counts as missed.
 Definitions, goals and peers are fixed before anything is measured: they stand in the bench itself.
 """
 TABLE = "| figure | value | goal | | peer | its value |\n| --- | --- | --- | --- | --- | --- |"
@@ -183,8 +184,8 @@ def line_of(bench: str, row: dict) -> str:
     judged = verdict(row)
     absent = "-" if judged == UNJUDGED else NOT_MEASURED
     value = absent if row["value"] is None else f"{_cell(row['value'])} {row['unit'] or ''}".strip()
-    peer, peer_value = _cell(row["peer"]), _cell(row["peer_value"])
-    return f"| {bench}: {_cell(row['figure'] + sampled(row))} | {value} | {_cell(row['goal'])} | {judged} | {peer} | {peer_value} |"
+    figure, peer, peer_value = _cell(row["figure"] + sampled(row)), _cell(row["peer"]), _cell(row["peer_value"])
+    return f"| {bench}: {figure} | {value} | {_cell(row['goal'])} | {judged} | {peer} | {peer_value} |"
 
 
 def lines_of(top: Path, name: str) -> list[str]:

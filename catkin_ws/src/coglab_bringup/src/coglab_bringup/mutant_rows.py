@@ -88,7 +88,8 @@ def rows_of(
     """The table of the bench: one row per package, one over all, the equivalent ones, and what was left out.
 
     `drawn`: by package, None for a change that did not compile; `red`: test programs that tell nothing because the
-    unchanged sources turn them red; `own`: nothing that stands on a package has judged. Where more are named equivalent than may be, none is subtracted.
+    unchanged sources turn them red; `own`: nothing that stands on a package has judged. Where more are named equivalent
+    than may be, none is subtracted.
     """
     judged = {package: [m for m in mutants if m is not None] for package, mutants in drawn.items()}
     everything = [m for mutants in judged.values() for m in mutants]

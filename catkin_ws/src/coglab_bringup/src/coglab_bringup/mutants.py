@@ -311,8 +311,7 @@ def main(arguments: list[str]) -> int:
             f"  {sentence(mutant)}" + (f" (equivalent: {equivalent[id(mutant)]})" if id(mutant) in equivalent else "")
         )
     if not recorded(top, options, rows, before):
-        say("these rows are printed alone: docs/figures.md has those of all packages, with the commit's own seed and of "
-            "its unchanged sources")  # fmt: skip
+        say("only printed: docs/figures.md has rows of all packages, the commit's own seed and its unchanged sources")
     if options.json:
         found = [asdict(m) for campaign in campaigns for m in campaign.mutants()]
         options.json.write_text(json.dumps({"seed": options.seed, "rows": rows, "mutants": found}, indent=1) + "\n")
