@@ -31,6 +31,11 @@ def checkout(tmp_path):
     return tmp_path
 
 
+def keep(top: Path, name: str, rows: list[dict], long: bool) -> None:
+    """Rows of a run during which nothing has changed."""
+    assert figures.record(top, name, rows, long, figures.sources_of(top, name))
+
+
 def commit(top: Path, message: str) -> None:
     for words in (["init", "-q"], ["add", "-A"], ["commit", "-q", "-m", message]):
         git = ["git", "-c", "user.name=a", "-c", "user.email=a@b", "-C", str(top), *words]
@@ -38,7 +43,7 @@ def commit(top: Path, message: str) -> None:
 
 
 def test_the_page_has_definition_goal_value_peer_machine_date_and_commit(checkout):
-    figures.record(checkout, "one", [ROW, ROW | {"figure": "other", "ok": False}], False)
+    keep(checkout, "one", [ROW, ROW | {"figure": "other", "ok": False}], False)
     text = figures.write_report(checkout).read_text()
     assert "Ten steps, none left out." in text and "./coglab bench one" in text
     assert r"| one: time of a \| step | 1.235 us | <= 2 | met | KDL | 3 |" in text
@@ -63,9 +68,9 @@ def test_the_readme_quotes_what_is_missed_and_the_latency_and_counts_the_rest(ch
     missed, empty = ROW | {"figure": r"late | \ ones", "ok": False}, ROW | {"figure": "gone", "value": None}
     latency = ROW | {"figure": "answer latency, median", "goal": "<= 1.10"}
     reported = ROW | {"figure": "answer latency, p99", "goal": "reported"}
-    figures.record(checkout, "one", [ROW, missed, empty], False)
-    figures.record(checkout, "fri", [latency, reported, ROW], False)
-    figures.record(checkout, "grasp", [ROW, missed, empty], False)
+    keep(checkout, "one", [ROW, missed, empty], False)
+    keep(checkout, "fri", [latency, reported, ROW], False)
+    keep(checkout, "grasp", [ROW, missed, empty], False)
     rows = [line for line in quoted_by(checkout).splitlines() if figures.cells_of(line)]
     expected = [figures.line_of("fri", latency), figures.line_of("one", missed), figures.line_of("one", empty)]
     assert rows == expected, "in the order of the page"
@@ -86,7 +91,7 @@ def test_no_missed_row_is_left_out_of_the_readme():
 
 
 def test_a_value_that_is_missing_is_missed(checkout):
-    figures.record(checkout, "one", [ROW | {"value": None, "ok": True}], False)
+    keep(checkout, "one", [ROW | {"value": None, "ok": True}], False)
     assert "| not measured on these sources | <= 2 | **missed** |" in figures.page(checkout)
 
 
@@ -106,14 +111,14 @@ def test_what_has_no_goal_has_not_met_it(checkout, goal, capsys):
 
 
 def test_other_sources_make_a_figure_old_and_other_documents_do_not(checkout):
-    figures.record(checkout, "one", [ROW], False)
+    keep(checkout, "one", [ROW], False)
     (checkout / "docs" / "page.md").write_text("words")
     commit(checkout, "a page")
     assert figures.measured(checkout, "one") is not None
     source = checkout / "catkin_ws" / "src" / "p" / "code.py"
     source.write_text("a = 1\n")
     assert figures.measured(checkout, "one") is None, "changed and not committed"
-    figures.record(checkout, "one", [ROW], False)
+    keep(checkout, "one", [ROW], False)
     assert figures.measured(checkout, "one") is None, "measured on sources that nobody can get"
     commit(checkout, "code")
     assert figures.measured(checkout, "one") is None
@@ -123,21 +128,21 @@ def test_other_sources_make_a_figure_old_and_other_documents_do_not(checkout):
 
 def test_only_what_a_bench_runs_makes_its_figure_old(checkout):
     source = checkout / "catkin_ws" / "src"
-    figures.record(checkout, "one", [ROW], False)
+    keep(checkout, "one", [ROW], False)
     for place in ("other/code.py", "p/README.md", "p/test/test_code.py", "used/test/a_rostest.py", "used/test/a.test"):
         (source / place).write_text("a = 1\n")
         commit(checkout, place)
         assert figures.measured(checkout, "one") is not None, place
     for place in ("p/test/rig.py", "used/code.py", "used/contest/test_x.py", "p/bench/bench_two.py"):
         (source / place).parent.mkdir(exist_ok=True)
-        figures.record(checkout, "one", [ROW], False)
+        keep(checkout, "one", [ROW], False)
         (source / place).write_text('"""a"""\n')
         commit(checkout, place)
         assert figures.measured(checkout, "one") is None, place
-    figures.record(checkout, "one", [ROW], False)
+    keep(checkout, "one", [ROW], False)
     (source / "p" / "bench" / "bench_one.py").write_text('"""Ten steps of `other`."""\n')
     commit(checkout, "it names a package that its own does not depend on")
-    figures.record(checkout, "one", [ROW], False)
+    keep(checkout, "one", [ROW], False)
     (source / "other" / "code.py").write_text("a = 2\n")
     commit(checkout, "that changes")
     assert figures.measured(checkout, "one") is None
@@ -145,13 +150,13 @@ def test_only_what_a_bench_runs_makes_its_figure_old(checkout):
 
 def test_tests_and_equivalent_changes_make_the_figures_of_mutants_old(checkout):
     for place in ("other/test/test_code.py", "p/test/a.test"):
-        figures.record(checkout, "mutants", [ROW], False)
+        keep(checkout, "mutants", [ROW], False)
         assert figures.measured(checkout, "mutants") is not None
         (checkout / "catkin_ws" / "src" / place).write_text("a = 1\n")
         assert figures.measured(checkout, "mutants") is None, "changed and not committed"
         commit(checkout, place)
         assert figures.measured(checkout, "mutants") is None, place
-    figures.record(checkout, "mutants", [ROW], False)
+    keep(checkout, "mutants", [ROW], False)
     (checkout / "catkin_ws" / "src" / "p" / "README.md").write_text("words")
     commit(checkout, "a page")
     assert figures.measured(checkout, "mutants") is not None
@@ -167,7 +172,7 @@ def test_the_page_says_how_mutants_are_drawn_and_what_is_left_out(checkout):
 
 
 def test_what_was_reported_is_kept_for_who_has_not_measured(checkout):
-    figures.record(checkout, "one", [ROW], False)
+    keep(checkout, "one", [ROW], False)
     text = figures.write_report(checkout).read_text()
     commit(checkout, "report")
     (checkout / ".coglab" / "figures" / "one.json").unlink()
@@ -177,6 +182,39 @@ def test_what_was_reported_is_kept_for_who_has_not_measured(checkout):
     assert figures.measured(checkout, "one") is None
     (checkout / figures.KEPT).write_text("[1")
     assert figures.measured(checkout, "one") is None and figures.kept(checkout) == {}
+
+
+def test_what_changed_while_it_was_measured_is_not_kept(checkout, monkeypatch, capsys):
+    monkeypatch.setenv("COGLAB_TOP", str(checkout))
+    changes = iter(["used/code.py", "p/README.md"])
+
+    def run_bench(name, *rest):
+        (checkout / "catkin_ws" / "src" / next(changes)).write_text("a = 1\n")
+        commit(checkout, "meanwhile")
+        return [ROW]
+
+    monkeypatch.setattr(bench, "run_bench", run_bench)
+    bench.main(["one"])
+    assert figures.measured(checkout, "one") is None and not (checkout / ".coglab" / "figures" / "one.json").exists()
+    assert "sources changed while it ran" in capsys.readouterr().err
+    before = figures.sources_of(checkout, "one")["commit"]
+    bench.main(["one"])
+    assert figures.measured(checkout, "one")["commit"] == before, "the commit that was measured, not the later one"
+
+
+def test_a_sample_can_miss_a_goal_and_not_meet_it(checkout, capsys):
+    sample = ROW | {"done": 12, "asked": 100}
+    rows = [sample, sample | {"ok": False}, sample | {"goal": "reported"}, ROW | {"done": 100, "asked": 100}]
+    verdicts = [figures.SAMPLE, figures.MISSED, figures.UNJUDGED, figures.MET]
+    assert [figures.verdict(row) for row in rows] == verdicts
+    keep(checkout, "one", rows, False)
+    lines = [line for line in figures.page(checkout).splitlines() if line.startswith("| one: ")]
+    assert [figures.cells_of(line)[3] for line in lines] == verdicts
+    assert ["[sample of 12 of 100 asked]" in line for line in lines] == [True, True, True, False]
+    bench.print_table(rows)
+    printed = capsys.readouterr().out.splitlines()[1:]
+    assert [line.split()[-1] for line in printed] == ["sample", "MISSED", "-", "ok"]
+    assert ["[sample of 12 of 100 asked]" in line for line in printed] == [True, True, True, False]
 
 
 def test_report_runs_only_what_is_named(checkout, monkeypatch):
@@ -192,6 +230,30 @@ def test_report_runs_only_what_is_named(checkout, monkeypatch):
 def test_every_bench_says_what_it_measures():
     for name, paths in figures.find_benches(TOP / "catkin_ws" / "src").items():
         assert len(figures.definition(paths)) > 60, f"{name}: what, over how many, what is left out?"
+
+
+def test_every_goal_is_a_comparison_or_a_number_or_none():
+    def fine(goal: object) -> bool:
+        return goal in figures.NO_GOAL or figures.GOAL.match(str(goal)) is not None
+
+    assert all(map(fine, ("<= 0.25", "0", "> 3", ">= 75, of >= 12 each", "<= peer + 50", "reported")))
+    assert not any(map(fine, ("printed", "as before", "<= what was")))
+    assert figures.verdict(ROW | {"goal": "printed"}) == figures.MISSED
+    names = figures.find_benches(TOP / "catkin_ws" / "src")
+    wrong = [f"{name}: {row['figure']}: {row['goal']}" for name in names if (run := figures.measured(TOP, name))
+             for row in run["rows"] if not fine(row["goal"]) and row["ok"]]  # fmt: skip
+    for path in (TOP / "catkin_ws" / "src").glob("*/bench/*.py"):
+        goals = re.findall(r"\"goal\": \"([^\"]*)\"|\bgoal=\"([^\"]*)\"", path.read_text(encoding="utf-8"))
+        wrong += [f"{path.name}: {a or b}" for a, b in goals if not fine(a or b)]
+    assert not wrong, "\n".join(wrong)
+
+
+def test_every_row_that_was_kept_stands_on_the_page():
+    lines = set((TOP / "docs" / "figures.md").read_text(encoding="utf-8").splitlines())
+    runs = figures.kept(TOP)
+    missing = [figures.line_of(name, row) for name, run in runs.items() for row in run["rows"]
+               if figures.line_of(name, row) not in lines]  # fmt: skip
+    assert runs and not missing, "run ./coglab bench --report\n" + "\n".join(missing)
 
 
 def test_the_page_knows_every_bench_and_the_readme_quotes_it():

@@ -109,6 +109,9 @@ class FakeWorkspace:
         self.builds, self.alone = 0, []
         self.seen: list[str] = []
 
+    def digest_of(self, package) -> str:
+        return f"{package} of {self.digest}"
+
     def build(self, alone=None) -> bool:
         self.builds += 1
         self.alone.append(alone)
@@ -198,6 +201,87 @@ def test_what_is_built_alone_are_the_programs_of_the_folder(tmp_path, monkeypatc
     assert workspace.build(workspace.root / "catkin_ws" / "src" / "group" / "one") and workspace.stale
     assert ran[0][1:] == ["build", "tests"]
     assert ran[1][:3] == ["make", "-C", str(build)] and ran[1][4:] == ["one", "one_test_one"]
+
+
+@pytest.mark.parametrize("kind", ["gtest", "pytest", "rostest"])
+def test_a_test_that_is_red_once_kills_nothing(tmp_path, kind):
+    workspace = FakeWorkspace(tmp_path)
+
+    class Program:
+        package, name, seconds = "one", "test_one", 1.0
+
+    Program.kind = kind
+    workspace.programs = lambda packages: [Program()]
+    reds = iter([True, False] * 4)
+    workspace.red = lambda program, limit: next(reds)
+    campaign = mutants.Campaign(workspace, "one", 5, mutants.Times(workspace))
+    campaign.run(4)
+    assert [m.verdict for m in campaign.mutants()] == ["survived"] * 4
+
+
+def test_form_and_pages_do_not_judge(tmp_path, monkeypatch):
+    sources = TOP / "catkin_ws" / "src"
+    names = {path.name for path in sources.glob("*/test/test_*.py")}
+    assert names >= mutant_workspace.NO_JUDGES >= {"test_house.py", "test_pages.py", "test_figures.py", "test_types.py"}
+    workspace = mutant_workspace.Workspace(tmp_path)
+    workspace.root = TOP
+    found = {program.name for program in workspace.programs(["coglab_bringup", "coglab_sim"])}
+    assert not found & mutant_workspace.NO_JUDGES and {"test_mutants.py", "test_tracker.py"} <= found
+
+
+def test_what_judges_a_package_alone_does_not_change_with_others(tmp_path):
+    def write(place: str, text: str) -> None:
+        path = tmp_path / "catkin_ws" / "src" / place
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text)
+
+    for name, uses in (("one", "two"), ("two", "three"), ("three", "outside"), ("other", "one")):
+        manifest = f"<package><name>{name}</name><exec_depend>{uses}</exec_depend></package>"
+        write(f"{name}/package.xml", manifest)
+        write(f"{name}/code.py", "a = 1\n")
+        write(f"{name}/test/test_code.py", "a = 1\n")
+        write(f"{name}/README.md", "words\n")
+    before = mutant_workspace.digest_of(tmp_path, "one")
+    for place in (
+        "other/code.py",
+        "other/test/test_code.py",
+        "two/test/test_code.py",
+        "three/README.md",
+        "one/README.md",
+    ):
+        write(place, "a = 2\n")
+        assert mutant_workspace.digest_of(tmp_path, "one") == before, place
+    for place in ("one/code.py", "one/test/test_code.py", "two/code.py", "three/code.py"):
+        write(place, "a = 2\n")
+        after = mutant_workspace.digest_of(tmp_path, "one")
+        assert after != before, place
+        before = after
+
+
+def test_judged_alone_what_was_judged_stays_where_others_change(tmp_path):
+    def campaign(workspace):
+        return mutants.Campaign(workspace, "one", 5, mutants.Times(workspace, "one"), own=True)
+
+    workspace = FakeWorkspace(tmp_path)
+    workspace.digest_of = lambda package: "its own"
+    campaign(workspace).run(2)
+    workspace.digest = "others have changed"
+    assert len(campaign(workspace).drawn) == 2 and mutants.Times(workspace, "one").knows("one/test_one")
+    assert not mutants.Times(workspace).knows("one/test_one")
+    workspace.digest_of = lambda package: "changed"
+    assert campaign(workspace).drawn == [] and not mutants.Times(workspace, "one").knows("one/test_one")
+
+
+@pytest.mark.parametrize("own", [[], ["--own"]])
+def test_only_the_seed_of_the_commit_and_its_sources_are_kept_for_the_page(tmp_path, monkeypatch, own):
+    kept: list[dict] = []
+    monkeypatch.setattr(mutants.figures, "record", lambda top, name, rows, long, before: kept.append(before) or True)
+    committed, changed = {"commit": "abc", "sources": "digest"}, {"commit": "abc with changes", "sources": ""}
+    (source := tmp_path / "catkin_ws" / "src" / CORES[0]).mkdir(parents=True)
+    (source / "package.xml").write_text(f"<package><name>{CORES[0]}</name></package>")
+    for words, before in (([CORES[0]], committed), (["--seed", "77"], committed), ([], changed)):
+        assert not mutants.recorded(tmp_path, mutants_options(tmp_path, [*words, *own]), [], before) and not kept
+    assert mutants.recorded(tmp_path, mutants_options(tmp_path, own), [], committed) and kept == [committed]
 
 
 def test_a_test_that_is_red_anyway_is_left_out_and_said(tmp_path):

@@ -34,6 +34,13 @@ def test_a_row_needs_twelve_mutants_in_each_package():
     assert all(row["ok"] for row in rows_of({"one": package(12), "two": package(12, name="two")}, 7, [], []))
 
 
+def test_rows_say_when_the_tests_of_the_package_alone_have_judged():
+    words = ", by the package's own tests alone, "
+    of = {"one": package(12), "two": package(12, name="two")}
+    assert all(words in row["figure"] for row in rows_of(of, 7, [], [], own=True)[:3])
+    assert not any(words in row["figure"] for row in rows_of(of, 7, [], []))
+
+
 def test_nothing_judged_is_missed():
     rows = rows_of({"one": [None, None]}, 7, [], [])
     assert rows[0]["value"] is None and not rows[0]["ok"]

@@ -1,9 +1,11 @@
 #!/usr/bin/python3
 """Recognition of reaches by the shipped patterns, on people that they were not trained on.
 
-Each person has habits of their own (where the hand rests, where each reach ends, tempo, arc), drawn anew for each; the
-tracker's error wanders instead of being white; one motion in five is no reach of these patterns. Every motion counts,
-and reaches and other motions are counted apart as well. The peer is the nearest direction seen so far.
+The people are drawn with the commit's hash as seed, so that nobody has tried them; the shipped patterns come from seed
+2026 (test/make_sample_patterns.py). Each person has habits of their own (where the hand rests, where each reach ends,
+tempo, arc), drawn anew for each; the tracker's error wanders instead of being white; one motion in five is no reach of
+these patterns. Every motion counts, and reaches and other motions are counted apart as well. The peer is the nearest
+direction seen so far.
 """
 
 import json
@@ -14,15 +16,16 @@ from pathlib import Path
 
 import numpy as np
 from coglab_perception.recogniser import UNKNOWN, Recogniser, load_patterns
+from coglab_py.packages import package_path
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "test"))
+sys.path.insert(0, str(package_path("coglab_smach", "bench")))
 from synthetic_reaches import ENDS, START, path, share
+from trial_file import commit_of_sources, whole_hash
 
 PATTERNS = Path(__file__).resolve().parent.parent / "config" / "patterns.json"
 PEOPLE, EACH, OTHERS = 60, 2, 2
 """people; reaches of each pattern and motions of no pattern by each: 20 % of all are of none"""
-SEED = 91
-"""of the people; the shipped patterns come from seed 2026 (test/make_sample_patterns.py)"""
 RATE, NOISE, CORRELATION = 30.0, 0.004, 0.3
 """Hz; m per axis; s over which the tracker's error wanders"""
 REST, HOLD = 0.6, 0.4
@@ -49,6 +52,11 @@ class Motion:
     positions: np.ndarray
     onset: float
     duration: float
+
+
+def seed() -> int:
+    """Of the people: the hash of the commit of the sources; 1 outside of a checkout."""
+    return int(whole_hash(commit_of_sources()) or "1", 16)
 
 
 def person(rng: np.random.Generator) -> Person:
@@ -163,7 +171,7 @@ def row(figure, value, unit, goal="", ok=True, peer=None, peer_value=None):
 def main() -> int:
     """Print the rows."""
     patterns, settings = load_patterns(str(PATTERNS))
-    every = [(motion, judge(motion, patterns, settings)) for motion in motions(np.random.default_rng(SEED))]
+    every = [(motion, judge(motion, patterns, settings)) for motion in motions(np.random.default_rng(seed()))]
     reaches = [judged for motion, judged in every if motion.pattern != UNKNOWN]
     others = [judged for motion, judged in every if motion.pattern == UNKNOWN]
     of = f"of {len(reaches)} reaches by {PEOPLE} new people"

@@ -31,13 +31,14 @@ from collections.abc import Mapping
 from typing import Any
 
 import campaign
-from campaign import EXCHANGES, Job
+from campaign import EXCHANGES, Job, of_asked
 from coglab_sim.conditions import Conditions
 from partner_rows import LONG, RECEIVE, Group, late, object_of, run, seeds_of, share
 from recognition_trials import BACK, OTHER, REACH, SHARES, others, people
 from trial_file import commit_of_sources
 
-PEOPLE, OTHERS = (100, 50) if LONG else (5, 3)
+ASKED = (100, 50)
+PEOPLE, OTHERS = ASKED if LONG else (5, 3)
 
 
 def row(figure: str, value: float, unit: str, goal: str = "", ok: bool = True) -> dict:
@@ -156,7 +157,7 @@ def rows_of(commit: str, jobs: list[Job]) -> list[dict]:
 def main() -> int:
     """Print the rows."""
     commit = commit_of_sources() if campaign.FILE is None else campaign.FILE.commit
-    print(json.dumps(rows_of(commit, jobs_of(commit))))
+    print(json.dumps(of_asked(rows_of(commit, jobs_of(commit)), PEOPLE + OTHERS, sum(ASKED))))
     return 0
 
 

@@ -151,6 +151,11 @@ def fill(jobs: Sequence[Job], processes: int, seconds: float) -> int:
     return sum(job.key in FILE.known for job in jobs)
 
 
+def of_asked(rows: list[dict], done: int, asked: int) -> list[dict]:
+    """Rows of so many trials, or people, where ``asked`` were asked for: with fewer no goal can be met."""
+    return [row | {"done": done, "asked": asked} for row in rows]
+
+
 class Campaign:
     """Trials, on all cores; keeps counts, reasons, figures of every reach, and touches of the first action."""
 

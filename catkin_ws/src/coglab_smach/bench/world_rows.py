@@ -19,15 +19,16 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from campaign import EXCHANGES, Campaign, Job
+from campaign import EXCHANGES, Campaign, Job, of_asked
 from coglab_objects.database import objects_folder, read_object
 from coglab_sim.conditions import CAREFUL, CONSIDERATE, HARDSHIPS, PATIENT, Conditions, hardship
 
+PEOPLE_ASKED, DEFAULT_ASKED, HARDSHIP_ASKED, ACCUSTOMED_ASKED = 100, 200, 200, 20
 LONG = os.environ.get("COGLAB_LONG") == "1"
-PEOPLE = 100 if LONG else 2
-DEFAULT_TRIALS = 200 if LONG else 8
-HARDSHIP_TRIALS = 200 if LONG else 2
-ACCUSTOMED = 20 if LONG else 1
+PEOPLE = PEOPLE_ASKED if LONG else 2
+DEFAULT_TRIALS = DEFAULT_ASKED if LONG else 8
+HARDSHIP_TRIALS = HARDSHIP_ASKED if LONG else 2
+ACCUSTOMED = ACCUSTOMED_ASKED if LONG else 1
 NAMES = dict(zip(EXCHANGES, ("receive", "give"), strict=True))
 OBJECTS = sorted(path.stem for path in objects_folder().glob("*.yaml"))
 NEVER_STOOD = "never stood still, at the reach's end"
@@ -111,11 +112,12 @@ def physics_rows(row: Row) -> list[dict]:
         campaigns.append(physics_plan(object_id).run())
         rows += direction_rows(row, campaigns[-1], f"physics right, {object_id}, power grasp")
     rows += judged_rows(row, campaigns)
-    rows += accustomed_rows(row)
+    rows = of_asked(rows, PEOPLE, PEOPLE_ASKED) + of_asked(accustomed_rows(row), ACCUSTOMED, ACCUSTOMED_ASKED)
     for object_id in own_grasps():
         campaign, what = physics_plan(object_id, power=False).run(), f"{object_id}, the grasp of its file"
-        rows += direction_rows(row, campaign, f"physics right, {what}")
-        rows.append(campaign.marked(row)(f"physics right, {what}: object fell", campaign.fell, "trials"))
+        own = direction_rows(row, campaign, f"physics right, {what}")
+        own.append(campaign.marked(row)(f"physics right, {what}: object fell", campaign.fell, "trials"))
+        rows += of_asked(own, PEOPLE, PEOPLE_ASKED)
     return rows
 
 
@@ -170,9 +172,9 @@ def direction_rows(row: Row, campaign: Campaign, what: str) -> list[dict]:
 
 def world_rows(row: Row, default: Campaign) -> list[dict]:
     """The default world and what stands beside it, printed with control as it is."""
-    rows = whole_rows(row, default, "default world")
+    rows = of_asked(whole_rows(row, default, "default world"), default.asked, DEFAULT_ASKED)
     for plan in (*hardship_plans(), careful_plan()):
-        rows += whole_rows(row, plan.run(), plan.name)
+        rows += of_asked(whole_rows(row, plan.run(), plan.name), HARDSHIP_TRIALS, HARDSHIP_ASKED)
     return rows
 
 

@@ -82,7 +82,64 @@ def test_rows_without_a_reach_that_is_long_enough_are_missed_and_not_dropped(sha
     assert (rows["SPARC, median"]["value"] is None) is short
     assert not (short and rows["SPARC, median"]["ok"])
     assert not rows["arm there later than a person, median"]["ok"]
-    assert rows["hand to the pose as received, p95"]["goal"] == ""
+    received = rows["hand to the pose as received, p95"]
+    assert received["goal"] == "<= 5" and not received["ok"]
+
+
+@pytest.mark.parametrize("perception", ["noisy perception", "perfect perception"])
+@pytest.mark.parametrize("action", bench_trials.EXCHANGES)
+def test_the_pose_as_received_is_judged_whatever_was_latched(action, perception):
+    """Issue 8 asked for 5 mm and 3 deg to the goal as received; the latched one is the controller's own estimate."""
+    campaign = Campaign()
+    ended = dict(stood=True, reached=DURATION, over=2.0, met=True)
+    for off, fine in (((0.004, 0.05), True), ((0.006, 0.06), False)):
+        campaign.reaches[action] = [figures(record(**ended, to_goal=(0.0, 0.0), to_sight=off))] * 20
+        rows = [row for row in bench_trials.reach_rows(campaign, action, perception) if "as received" in row["figure"]]
+        assert [(row["unit"], row["goal"], row["ok"]) for row in rows] == [("mm", "<= 5", fine), ("deg", "<= 3", fine)]
+
+
+def test_a_reach_without_a_sight_is_counted_and_missed():
+    good = record(stood=True, reached=DURATION, over=2.0, met=True)
+    assert rows_of(good, good)["reaches with a sight at their end"]["ok"]
+    row = rows_of(good, record(stood=True, reached=DURATION, over=2.0, met=True, to_sight=None))
+    assert not row["reaches with a sight at their end"]["ok"]
+
+
+def test_who_holds_the_object_in_the_end_has_a_share_each():
+    campaign = Campaign()
+    campaign.ends[RECEIVE], campaign.trials = [("failed_empty", "human")] * 3 + [("failed_empty", "")], 4
+    rows = bench_trials.holder_rows(campaign, RECEIVE, "pull_back")
+    assert [(row["figure"].split(": ")[1].split()[0], row["value"]) for row in rows] == [
+        ("human", 0.75), ("nobody", 0.25), ("robot", 0.0)]  # fmt: skip
+    assert not any(row["goal"] for row in rows)
+
+
+def test_the_people_of_the_trials_are_those_of_the_commit(monkeypatch):
+    seen = {}
+
+    class Nothing(Campaign):
+        def run(self, actions, seeds, **kw):
+            seen.setdefault(commit, []).append(list(seeds))
+            self.ends = {action: [] for action in actions}
+            self.processor = self.virtual = 1.0
+            return self
+
+    monkeypatch.setattr(bench_trials, "Campaign", Nothing)
+    monkeypatch.setattr(bench_trials, "seeds_of", lambda commit, name, n: [f"{commit} {name} {i}" for i in range(n)])
+    for commit in ("one", "two"):
+        bench_trials.people_rows(commit)
+        bench_trials.misbehaviour_rows(commit)
+        assert all(str(seed).startswith(commit) for seeds in seen[commit] for seed in seeds)
+    noisy, board, perfect, *others = seen["one"]
+    assert noisy == board and noisy != perfect and len(others) == len(bench_trials.OUTCOMES)
+    assert len({seed for seeds in (noisy, perfect, *others) for seed in seeds}) == sum(
+        map(len, (noisy, perfect, *others))
+    )
+
+
+def test_rows_of_fewer_trials_than_asked_say_so():
+    (row,) = bench_trials.of_asked([bench_trials.row("share", 1.0, "share", ">= 0.97")], 12, 100)
+    assert (row["done"], row["asked"], row["ok"]) == (12, 100, True)
 
 
 def test_without_any_reach_every_row_with_a_goal_is_missed():

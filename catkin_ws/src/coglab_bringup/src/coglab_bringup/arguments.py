@@ -61,6 +61,25 @@ def package_folders(sources: Path) -> dict[str, Path]:
     return found
 
 
+def needs_of(folders: dict[str, Path]) -> dict[str, set[str]]:
+    """What each package needs by its package.xml, for whatever."""
+    found = {}
+    for name, folder in folders.items():
+        text = (folder / "package.xml").read_text(encoding="utf-8")
+        found[name] = set(re.findall(r"<(?:\w*_)?depend>\s*([\w-]+)\s*<", text))
+    return found
+
+
+def used_by(package: str, folders: dict[str, Path]) -> set[str]:
+    """The packages of the workspace that `package` needs, directly or not."""
+    needs, found = needs_of(folders), set[str]()
+    front = {package}
+    while front:
+        front = {name for each in front for name in needs[each] if name in folders and name not in found}
+        found |= front
+    return found - {package}
+
+
 def left_out(top: Path) -> list[str]:
     """Packages that the last build left out for those installed on this machine: ./coglab build --upstream-smach."""
     cache = top / "catkin_ws" / "build" / "CMakeCache.txt"

@@ -2,9 +2,10 @@
 
 A bench is an executable `bench/bench_<name>.py` in a package; it prints a JSON list of rows
 {bench, figure, value, unit, goal, peer, peer_value, ok} and nothing else on standard output, and ends with status 0,
-also where a figure misses its goal. Another status is a failure of its own, whatever rows were printed. Packages that
-have one of the same name share the bench: each gives its rows. The rows are kept; `--report` writes docs/figures.md
-from what was kept, and runs nothing but the benches named (figures.py).
+also where a figure misses its goal. A row that may be of fewer trials than were asked for has `done` and `asked`, too:
+while they differ it is a sample, which can miss a goal and not meet it. Another status is a failure of its own,
+whatever rows were printed. Packages that have one of the same name share the bench: each gives its rows. The rows are
+kept; `--report` writes docs/figures.md from what was kept, and runs nothing but the benches named (figures.py).
 """
 
 from __future__ import annotations
@@ -20,6 +21,8 @@ from coglab_bringup.arguments import bench_options, find_benches
 from coglab_bringup.usage import Refused
 
 COLUMNS = ("bench", "figure", "value", "unit", "goal", "peer", "peer_value", "ok")
+COUNTS = ("done", "asked")
+"""of a row that may be a sample: trials that it is of, and trials that were asked for"""
 TIME_LIMIT = 1800.0  # s, per bench
 LONG_TIME_LIMIT = 7200.0  # s, with --long
 
@@ -40,7 +43,10 @@ def run_bench(name: str, path: Path, python: str, limit: float = TIME_LIMIT) -> 
         return [failed_row(name, f"no end within {limit:.0f} s")]
     failed = [failed_row(name, f"exit status {status}: {last}")] if status != 0 else []
     try:
-        rows = [{column: row[column] for column in COLUMNS} for row in json.loads(text)] + failed
+        rows = [
+            {column: row[column] for column in COLUMNS} | {count: row[count] for count in COUNTS if count in row}
+            for row in json.loads(text)
+        ] + failed
         return rows or [failed_row(name, "no row on standard output")]
     except (json.JSONDecodeError, KeyError, TypeError) as error:
         return failed or [failed_row(name, f"no list of rows on standard output ({error})")]
@@ -59,7 +65,11 @@ def as_text(value: object) -> str:
 
 def print_table(rows: list[dict]) -> None:
     """Prints rows in aligned columns."""
-    shown = [{**row, "ok": None if figures.verdict(row) == figures.UNJUDGED else row["ok"]} for row in rows]
+    told = {figures.UNJUDGED: None, figures.SAMPLE: figures.SAMPLE}
+    shown = [
+        {**row, "figure": row["figure"] + figures.sampled(row), "ok": told.get(figures.verdict(row), row["ok"])}
+        for row in rows
+    ]
     cells = [[as_text(row[column]) for column in COLUMNS] for row in shown]
     widths = [max(len(column), *(len(line[i]) for line in cells)) for i, column in enumerate(COLUMNS)]
     for line in [list(COLUMNS), *cells]:
@@ -83,8 +93,10 @@ def main(arguments: list[str]) -> int:
     rows: list[dict] = []
     for name in options.names or ([] if options.report else benches):
         print(f"[coglab] bench {name} ...", file=sys.stderr, flush=True)
+        before = figures.sources_of(top, name)
         found = [row for path in benches[name] for row in run_bench(name, path, python, limit)]
-        figures.record(top, name, found, options.long)
+        if not figures.record(top, name, found, options.long, before):
+            print(f"[coglab] bench {name}: its sources changed while it ran; its rows are not kept", file=sys.stderr)
         rows += found
     if rows:
         print_table(rows)

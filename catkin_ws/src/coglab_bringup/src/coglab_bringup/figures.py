@@ -30,9 +30,11 @@ from coglab_bringup.arguments import find_benches, package_folders
 
 NOT_MEASURED = "not measured on these sources"
 ALL_ROWS = "all of its rows"
-MET, MISSED, UNJUDGED = "met", "**missed**", "-"
+MET, MISSED, UNJUDGED, SAMPLE = "met", "**missed**", "-", "sample"
 NO_GOAL = (None, "", "told", "reported")
 """what stands for the goal of a row that is shown and not judged"""
+GOAL = re.compile(r"[<>]=? ?(?:-?[\d.]|peer)|-?[\d.]")
+"""how a goal begins that a value can meet: a comparison with a number or the peer, or a number"""
 BEGIN, END = "<!-- quoted from docs/figures.md -->", "<!-- end of the quotation -->"
 KEPT = "docs/figures.json"
 MUTANTS, EQUIVALENT = "mutants", "docs/equivalent_mutants.json"
@@ -41,8 +43,9 @@ QUOTED = ("wall", "fri", "trials")
 HEAD = """# Figures
 
 Written by `./coglab bench --report`, from what `./coglab bench NAME ...` has measured on these sources; edit nothing
-here. A row that misses its goal stays and says so; one without a goal has met none and says "-". A bench that was not
-run on its sources as they are (its package and those that it uses, tests and documents apart) counts as missed.
+here. A row that misses its goal stays and says so; one without a goal has met none and says "-"; one of fewer trials
+than were asked for has met none either and says "sample". A bench that was not run on its sources as they are (its
+package and those that it uses, tests and documents apart) counts as missed.
 Definitions, goals and peers are fixed before anything is measured: they stand in the bench itself.
 """
 TABLE = "| figure | value | goal | | peer | its value |\n| --- | --- | --- | --- | --- | --- |"
@@ -101,8 +104,14 @@ def machine() -> str:
     return f"{os.cpu_count()} cores of {model}, Linux {platform.release()}"
 
 
-def record(top: Path, name: str, rows: list[dict], long: bool) -> None:
-    """Keeps the rows of one bench as just measured; the load tells how far the machine was alone."""
+def record(top: Path, name: str, rows: list[dict], long: bool, before: dict[str, str]) -> bool:
+    """Keeps the rows of one bench as just measured; the load tells how far the machine was alone.
+
+    `before`: what sources_of() said before the run. False, and nothing is kept, where the sources are others now:
+    nobody could say which of them were measured.
+    """
+    if sources_of(top, name)["sources"] != before["sources"]:
+        return False
     folder = top / ".coglab" / "figures"
     folder.mkdir(parents=True, exist_ok=True)
     run = {
@@ -113,8 +122,9 @@ def record(top: Path, name: str, rows: list[dict], long: bool) -> None:
         "long": long,
     }
     new = folder / f"{name}.new"
-    new.write_text(json.dumps(run | sources_of(top, name), indent=1) + "\n")
+    new.write_text(json.dumps(run | before, indent=1) + "\n")
     new.replace(folder / f"{name}.json")
+    return True
 
 
 def kept(top: Path) -> dict[str, Any]:
@@ -151,13 +161,22 @@ def _cell(value: object) -> str:
     return "-" if value in (None, "") else str(value).replace("|", "\\|").replace("\n", " ")
 
 
+def sampled(row: dict) -> str:
+    """Words for a row with fewer trials than asked for, by its fields `done` and `asked`; empty for any other."""
+    done, asked = row.get("done"), row.get("asked")
+    return f" [sample of {done} of {asked} asked]" if asked is not None and (done or 0) < asked else ""
+
+
 def verdict(row: dict) -> str:
-    """Whether a row has met its goal; what has none cannot meet it, but what its bench says is wrong is missed."""
+    """Whether a row has met its goal; what has none cannot meet it, but what its bench says is wrong is missed, and
+    so is a goal that says no limit. A sample can miss a goal and not meet it."""
     if not row["ok"]:
         return MISSED
     if row["goal"] in NO_GOAL:
         return UNJUDGED
-    return MET if row["value"] is not None else MISSED
+    if row["value"] is None or not GOAL.match(str(row["goal"])):
+        return MISSED
+    return SAMPLE if sampled(row) else MET
 
 
 def line_of(bench: str, row: dict) -> str:
@@ -165,8 +184,8 @@ def line_of(bench: str, row: dict) -> str:
     judged = verdict(row)
     absent = "-" if judged == UNJUDGED else NOT_MEASURED
     value = absent if row["value"] is None else f"{_cell(row['value'])} {row['unit'] or ''}".strip()
-    peer, peer_value = _cell(row["peer"]), _cell(row["peer_value"])
-    return f"| {bench}: {_cell(row['figure'])} | {value} | {_cell(row['goal'])} | {judged} | {peer} | {peer_value} |"
+    figure, peer, peer_value = _cell(row["figure"] + sampled(row)), _cell(row["peer"]), _cell(row["peer_value"])
+    return f"| {bench}: {figure} | {value} | {_cell(row['goal'])} | {judged} | {peer} | {peer_value} |"
 
 
 def lines_of(top: Path, name: str) -> list[str]:
@@ -198,7 +217,7 @@ def page(top: Path) -> str:
 def cells_of(line: str) -> list[str]:
     """The six cells of a row of this page; none for any other line."""
     cells = [cell.strip() for cell in re.split(r"(?<!\\)\|", line)[1:-1]]
-    return cells if len(cells) == 6 and cells[3] in (MET, MISSED, UNJUDGED) else []
+    return cells if len(cells) == 6 and cells[3] in (MET, MISSED, UNJUDGED, SAMPLE) else []
 
 
 def is_quoted(line: str) -> bool:

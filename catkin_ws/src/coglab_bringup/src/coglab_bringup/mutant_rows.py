@@ -82,15 +82,19 @@ def row(figure: str, value: float | None, unit: str, goal: str, ok: bool) -> dic
     return dict(zip(bench.COLUMNS, ("mutants", figure, value, unit, goal, None, None, ok), strict=True))
 
 
-def rows_of(drawn: dict[str, list[Mutant | None]], seed: int, named: list[Equivalent], red: list[str]) -> list[dict]:
+def rows_of(
+    drawn: dict[str, list[Mutant | None]], seed: int, named: list[Equivalent], red: list[str], own: bool = False
+) -> list[dict]:
     """The table of the bench: one row per package, one over all, the equivalent ones, and what was left out.
 
     `drawn`: by package, None for a change that did not compile; `red`: test programs that tell nothing because the
-    unchanged sources turn them red. Where more are named equivalent than may be, none is subtracted.
+    unchanged sources turn them red; `own`: nothing that stands on a package has judged. Where more are named equivalent
+    than may be, none is subtracted.
     """
     judged = {package: [m for m in mutants if m is not None] for package, mutants in drawn.items()}
     everything = [m for mutants in judged.values() for m in mutants]
     equivalent, most = named_equivalent(everything, named), len(everything) // MOST_EQUIVALENT
+    alone = ", by the package's own tests alone" if own else ""
     subtracted = [m for m, _ in equivalent] if len(equivalent) <= most else []
 
     def share(what: str, mutants: list[Mutant], goal: float, enough: bool) -> dict:
@@ -98,7 +102,7 @@ def rows_of(drawn: dict[str, list[Mutant | None]], seed: int, named: list[Equiva
         killed = sum(m.verdict == "killed" for m in counted)
         value = 100.0 * killed / len(counted) if counted else None
         beside = f", {len(mutants) - len(counted)} equivalent left out" if len(mutants) > len(counted) else ""
-        figure = f"changed lines that a test notices, {what}, seed {seed}, of {len(mutants)}{beside}"
+        figure = f"changed lines that a test notices{alone}, {what}, seed {seed}, of {len(mutants)}{beside}"
         ok = enough and value is not None and value >= goal
         return row(figure, value if value is None else round(value, 1), "%", f">= {goal:g}, of >= {FEWEST} each", ok)
 

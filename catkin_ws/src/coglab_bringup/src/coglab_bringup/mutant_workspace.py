@@ -9,9 +9,16 @@ import subprocess
 from pathlib import Path
 
 from coglab_bringup import process_tree, test_runner
+from coglab_bringup.arguments import package_folders, used_by
 
 NOT_COPIED = (".git", ".coglab", "out", "build", "devel", "install", "__pycache__", ".pytest_cache", ".ruff_cache")
 BUILD_LIMIT = 3600.0  # s
+NO_JUDGES = {
+    *("test_house.py", "test_types.py", "test_one_place.py", "test_packages.py"),
+    *("test_pages.py", "test_figures.py", "test_architecture.py", "test_people_page.py", "test_feature_table.py"),
+}
+"""tests of the sources' form and of pages: a change that only the formatter or a page notices is one that no test of
+what the program does has noticed"""
 
 
 def update_copy(top: Path, copy: Path) -> str:
@@ -43,6 +50,21 @@ def update_copy(top: Path, copy: Path) -> str:
     return digest.hexdigest()
 
 
+def digest_of(root: Path, package: str) -> str:
+    """Of what judges a package by its own tests alone: its files, the sources of what it uses, and `coglab`; but for
+    pages and for the tests of what it uses."""
+    packages = package_folders(root / "catkin_ws" / "src")
+    digest = hashlib.sha256((root / "coglab").read_bytes() if (root / "coglab").is_file() else b"")
+    for name in sorted({package, *used_by(package, packages)}):
+        for path in sorted(packages[name].rglob("*")):
+            inside = path.relative_to(packages[name])
+            if path.is_symlink() or not path.is_file() or path.suffix == ".md" or {*NOT_COPIED} & {*inside.parts}:
+                continue
+            if name == package or inside.parts[0] != "test":
+                digest.update(f"{name}/{inside}".encode() + b"\0" + hashlib.sha256(path.read_bytes()).digest())
+    return digest.hexdigest()
+
+
 class Workspace:
     """The copy: builds it and runs its tests."""
 
@@ -71,6 +93,10 @@ class Workspace:
         with (self.logs / "build.log").open("w") as log:
             return process_tree.run(command, BUILD_LIMIT, stdout=log, stderr=subprocess.STDOUT) == 0
 
+    def digest_of(self, package: str) -> str:
+        """See digest_of(); before anything is changed in the copy."""
+        return digest_of(self.root, package)
+
     def enter(self) -> None:
         """From now on this process and what it starts live in the copy's workspace."""
         script = f'set -e; . "{self.root}/catkin_ws/devel/setup.bash" >/dev/null; env -0'
@@ -82,9 +108,10 @@ class Workspace:
         os.environ.update(entered, COGLAB_TOP=str(self.root), PYTHONDONTWRITEBYTECODE="1")
 
     def programs(self, packages: list[str]) -> list[test_runner.Program]:
-        """The tests of some packages: the first package's first, quick kinds before rostests."""
+        """The tests of some packages that judge: the first package's first, quick kinds before rostests."""
         python = os.environ.get("COGLAB_TEST_PYTHON", "/usr/bin/python3")
         found = test_runner.find_programs(self.root, self.logs, python, packages)
+        found = [program for program in found if program.name not in NO_JUDGES]
         return sorted(found, key=lambda p: (p.kind == "rostest", packages.index(p.package), p.kind != "gtest", p.name))
 
     def red(self, program: test_runner.Program, limit: float) -> bool:

@@ -8,21 +8,23 @@ and a test that is red on the unchanged sources, too. Survivors with which the p
 reason, in docs/equivalent_mutants.json, shown, and subtracted as long as they are at most one in twenty of all.
 
 All of it happens in a copy of the checkout below .coglab/mutants: the checkout itself is never changed, however this
-ends. A red rostest is run once more before it is believed, and a test that was never seen green is run on the unchanged
-sources first. What a run has found is kept: the same command goes on where it was ended, as long as the sources are the
-same. Hours; run only when named. With --own the tests of the package alone judge, which is quicker and harder: a
-survivor may be killed by what stands on it; what --own says is not in docs/figures.md. The mutator is our own because
-cosmic-ray and mutmut know Python alone: here one draw goes over all shipped lines of C++ and Python alike, with an
-incremental build behind each.
+ends. A red test is run once more before it is believed, and one that was never seen green is run on the unchanged
+sources first. Tests of format, types, pages and figures do not judge (mutant_workspace.NO_JUDGES). What a run has found
+is kept: the same command goes on where it was ended, as long as the sources are the same. Hours; run only when named.
+With --own the tests of the package alone judge, which is quicker and harder: what survives may be killed by what stands
+on it, so that the share is a lower bound, and its rows say so. docs/figures.md has the rows of all packages with the
+commit's own seed, of sources that were committed and stayed the same, and no others: nobody can choose among seeds. The
+mutator is our own, not a kept tool: cosmic-ray and mutmut know Python alone, and here one draw goes over all shipped
+lines of C++ and Python alike, with an incremental build behind each.
 """
 
 from __future__ import annotations
 
+import argparse
 import fcntl
 import json
 import os
 import random
-import re
 import sys
 import time
 from collections.abc import Callable, Container
@@ -30,7 +32,8 @@ from dataclasses import asdict
 from pathlib import Path
 
 from coglab_bringup import bench, figures, test_runner
-from coglab_bringup.arguments import CORES, mutants_options, package_folders
+from coglab_bringup.arguments import CORES, mutants_options, needs_of, package_folders
+from coglab_bringup.commit import commit_seed
 from coglab_bringup.mutant_rows import Mutant, named_equivalent, read_equivalent, rows_of, sentence
 from coglab_bringup.mutant_workspace import Workspace
 from coglab_bringup.mutator import ENDINGS, Change, changes, code_lines
@@ -68,10 +71,7 @@ def draw(folder: Path, dice: random.Random, without: Container[tuple[Path, Chang
 
 def standing_on(package: str, folders: dict[str, Path]) -> list[str]:
     """The packages that need `package`, directly or not, the nearest first."""
-    needs = {
-        name: set(re.findall(r"<(?:\w*_)?depend>\s*([\w-]+)\s*<", (folder / "package.xml").read_text(encoding="utf-8")))
-        for name, folder in folders.items()
-    }
+    needs = needs_of(folders)
     found: list[str] = []
     front = {package}
     while front:
@@ -83,12 +83,14 @@ def standing_on(package: str, folders: dict[str, Path]) -> list[str]:
 class Times:
     """Of each test program: s that it takes where it is green, or None if the unchanged sources turn it red."""
 
-    def __init__(self, workspace: Workspace) -> None:
-        self._file, self._digest = workspace.root.parent / "times.json", workspace.digest
+    def __init__(self, workspace: Workspace, own: str = "") -> None:
+        """`own`: the package whose tests alone judge; empty: those of all."""
+        self._file = workspace.root.parent / (f"times.{own}.json" if own else "times.json")
+        self._digest = workspace.digest_of(own) if own else workspace.digest
         self._known: dict[str, float | None] = {}
         try:
             state = json.loads(self._file.read_text())
-            self._known = state["times"] if state["digest"] == workspace.digest else {}
+            self._known = state["times"] if state["digest"] == self._digest else {}
         except (OSError, ValueError, KeyError, TypeError):
             pass
 
@@ -135,11 +137,12 @@ class Campaign:
         self.folder, self.own = self.folders[package], own
         self.judges = [package] if own else [package, *standing_on(package, self.folders)]
         self.kept = workspace.root.parent / f"{package}.{seed}{'.own' if own else ''}.json"
+        self.digest = workspace.digest_of(package) if own else workspace.digest
         self.drawn: list[Mutant | None] = []  # None: did not compile
         self.fallen: list[tuple[Path, Change]] = []  # of the drawn, those that the dice have given
         try:
             state = json.loads(self.kept.read_text())
-            if state["digest"] == workspace.digest:
+            if state["digest"] == self.digest:
                 self.drawn = [Mutant(**row) if row else None for row in state["drawn"]]
         except (OSError, ValueError, KeyError, TypeError):
             pass
@@ -151,7 +154,7 @@ class Campaign:
     def keep(self) -> None:
         """Writes what is known, whole or not at all."""
         rows = [asdict(mutant) if mutant else None for mutant in self.drawn]
-        write_whole(self.kept, {"digest": self.workspace.digest, "drawn": rows})
+        write_whole(self.kept, {"digest": self.digest, "drawn": rows})
 
     def run(self, count: int) -> None:
         """Draws and judges until there are `count` mutants."""
@@ -213,8 +216,8 @@ class Campaign:
         return ""
 
     def _red_twice(self, program: test_runner.Program, limit: float) -> bool:
-        """A crowded machine can turn a rostest red, too: that one is run again."""
-        return self.workspace.red(program, limit) and (program.kind != "rostest" or self.workspace.red(program, limit))
+        """A crowded machine can turn any test red, by a time limit if by nothing else."""
+        return self.workspace.red(program, limit) and self.workspace.red(program, limit)
 
     def _green_unchanged(self, program: test_runner.Program, name: str, changed: Edited) -> bool:
         """Whether a test that the change turns red is green without it; the change is back where it is not."""
@@ -251,6 +254,13 @@ class Edited:
             self._workspace.stale = self._workspace.stale or self._compiled
 
 
+def recorded(top: Path, options: argparse.Namespace, rows: list[dict], before: dict[str, str]) -> bool:
+    """Keeps the rows for docs/figures.md where nobody has chosen packages or seed, and the sources, which were
+    committed, are as they were `before`."""
+    chosen = bool(options.packages) or options.seed != commit_seed(top)
+    return not chosen and bool(before["sources"]) and figures.record(top, figures.MUTANTS, rows, False, before)
+
+
 def main(arguments: list[str]) -> int:
     """Exit status 0 if every row is ok, 1 if one is not, 2 if it cannot be run."""
     top = Path(os.environ["COGLAB_TOP"])
@@ -269,13 +279,17 @@ def main(arguments: list[str]) -> int:
         except OSError:
             raise Refused("another `bench mutants` of this checkout runs; wait for it, or end it") from None
         say("copying and building; the first time this takes as long as a whole build")
+        before = figures.sources_of(top, figures.MUTANTS)
         workspace = Workspace(top)
         if not workspace.build():
             raise Refused(f"the unchanged sources do not build; see {workspace.logs / 'build.log'}")
         workspace.enter()
         packages = options.packages or list(CORES)
-        times = Times(workspace)
-        campaigns = [Campaign(workspace, package, options.seed, times, say, options.own) for package in packages]
+        every = Times(workspace)
+        campaigns = [
+            Campaign(workspace, each, options.seed, Times(workspace, each) if options.own else every, say, options.own)
+            for each in packages
+        ]
         for campaign in campaigns:
             if workspace.stale:  # of the package before
                 workspace.build()
@@ -286,7 +300,8 @@ def main(arguments: list[str]) -> int:
     except Refused as error:
         print(f"[coglab] error: {error}", file=sys.stderr)
         return 2
-    rows = rows_of({each.package: each.drawn for each in campaigns}, options.seed, named, times.red())
+    red = sorted({name for each in campaigns for name in each.times.red()})
+    rows = rows_of({each.package: each.drawn for each in campaigns}, options.seed, named, red, options.own)
     bench.print_table(rows)
     survivors = [m for campaign in campaigns for m in campaign.mutants() if m.verdict == "survived"]
     equivalent = {id(mutant): entry.reason for mutant, entry in named_equivalent(survivors, named)}
@@ -295,8 +310,8 @@ def main(arguments: list[str]) -> int:
         print(
             f"  {sentence(mutant)}" + (f" (equivalent: {equivalent[id(mutant)]})" if id(mutant) in equivalent else "")
         )
-    if not options.packages and not options.own:
-        figures.record(top, "mutants", rows, False)
+    if not recorded(top, options, rows, before):
+        say("only printed: docs/figures.md has rows of all packages, the commit's own seed and its unchanged sources")
     if options.json:
         found = [asdict(m) for campaign in campaigns for m in campaign.mutants()]
         options.json.write_text(json.dumps({"seed": options.seed, "rows": rows, "mutants": found}, indent=1) + "\n")
