@@ -6,10 +6,10 @@ The node is /robot as launched by default: FRI thread and controller manager in 
 list; for the second and third row a point-to-point motion runs to and fro. Blocks of 500 packets go to echo, bridge,
 bridge, echo; both are served in every millisecond, the one whose block it is first. The ratio of the medians of
 neighbouring blocks is judged by its median over all pairs and by the upper end of the distribution-free 95 % interval
-of that median. An answer that does not come within 20 ms counts as 20 ms, and makes the row of missing answers
-missed. The ratio of the 99th percentiles is shown beside the same ratio of echo against echo: on a machine that is
-not a real-time one it says more about the machine. Prints JSON. The rows of losses are in
-lwr_fri_bridge/bench/bench_fri.py.
+of that median, whose ranks come from the exact binomial, so that it covers at least that. An answer that does not come
+within 20 ms counts as 20 ms, and makes the row of missing answers missed. The ratio of the 99th percentiles is shown
+beside the same ratio of echo against echo: on a machine that is not a real-time one it says more about the machine.
+Prints JSON. The rows of losses are in lwr_fri_bridge/bench/bench_fri.py.
 """
 
 from __future__ import annotations
@@ -123,14 +123,24 @@ def percentile(values: list[float], part: float) -> float:
     return ordered[min(len(ordered) - 1, int(part * len(ordered)))]
 
 
+def median_ranks(n: int) -> tuple[int, int]:
+    """Ranks (from 1) of the order statistics between which the median lies with at least 95 %, by the exact binomial:
+    the narrowest such pair, as many ranks from both ends. For n < 6 there is none, and the pair is the ends."""
+    below = 0.0  # probability that fewer than `low` of n values are below the median, doubled later
+    low = 1
+    for k in range(n // 2):
+        below += math.comb(n, k) / 2**n
+        if 2.0 * below > 0.05:
+            break
+        low = k + 1
+    return low, n + 1 - low
+
+
 def median_interval(values: list[float]) -> tuple[float, float]:
-    """95 % interval of the median from order statistics (normal approximation of the binomial)."""
+    """95 % interval of the median from order statistics, whatever the distribution."""
     ordered = sorted(values)
-    n = len(ordered)
-    half = 1.96 * math.sqrt(n) / 2.0
-    low = max(0, math.floor(n / 2.0 - half))
-    high = min(n - 1, math.ceil(n / 2.0 + half) - 1)
-    return ordered[low], ordered[high]
+    low, high = median_ranks(len(ordered))
+    return ordered[low - 1], ordered[high - 1]
 
 
 def bound_port() -> int:

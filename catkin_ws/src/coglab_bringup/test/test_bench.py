@@ -100,3 +100,14 @@ def test_programs_that_run_beside_each_other_share_the_time():
         for name, begin, seconds in (("d", 0.0, 6.0), ("e", 0.0, 9.0), ("f", 0.0, 9.0), ("g", 20.0, 1.0))
     ]
     assert wall_times(overlapping) == {"p/d": 2.0, "p/e": 3.5, "p/f": 3.5, "p/g": 1.0}
+
+
+def test_the_final_error_of_the_demo_is_a_row_of_each_direction_and_missed_where_nobody_measured_it(bench_wall):
+    truth, receive, give = "truth of the simulated cell", *bench_wall.KINDS
+    one = {"kind": receive, "final_error_mm": 13.9, "final_error_by": truth}
+    other = {"kind": give, "final_error_mm": None, "final_error_by": "nobody: no reach began"}
+    rows = bench_wall.final_errors({"seed": 7, "handovers": [one, other]})
+    assert [(row["value"], row["unit"], row["ok"]) for row in rows] == [(13.9, "mm", True), (None, "mm", False)]
+    assert all("final_error_mm" in row["figure"] and "seed 7" in row["figure"] for row in rows)
+    assert truth in rows[0]["figure"] and "no reach began" in rows[1]["figure"]
+    assert [row["ok"] for row in bench_wall.final_errors({"seed": 7, "handovers": []})] == [False, False]

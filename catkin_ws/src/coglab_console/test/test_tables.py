@@ -1,6 +1,8 @@
 """Topics that become tables of the page: who changed which reference by how much, why a controller is paused, and what
 the recogniser believes."""
 
+import math
+
 import pytest
 from coglab_console.ros import tables
 from coglab_msgs.msg import (
@@ -11,6 +13,8 @@ from coglab_msgs.msg import (
     FeedbackStatus,
     Recognition,
 )
+from coglab_py.packages import package_path
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rospy import Time
 
 
@@ -67,3 +71,20 @@ def test_controllers_with_their_pauses_and_recognition_with_its_confidences(show
     assert documents["recognition"] == {
         "pattern": "high", "decided": True, "stamp": 7.5, "progress": 0.46, "rows": [["low", 0.1], ["high", 0.9]]
     }  # fmt: skip
+
+
+def test_latency_and_answer_time_are_those_that_the_bridge_names(shown):
+    """The keys of lwr_fri_bridge/src/ros/bridge_diagnostics.cpp; another one is shown as no number."""
+    table, _ = shown
+
+    def tell(**values):
+        status = DiagnosticStatus(name="lwr: FRI connection", level=b"\x00", message="ok")
+        status.values = [KeyValue(key.replace("_", " ") + " (s)", value) for key, value in values.items()]
+        table._on_diagnostics(DiagnosticArray(status=[status]))
+        return table.latency, table.answer_time
+
+    assert tell(latency="0.001", mean_answer_time="0.00002", longest_answer_time="0.5") == (0.001, 0.00002)
+    assert all(math.isnan(value) for value in tell(delay="0.001", answer_time="0.00002", longest_answer_time="0.5"))
+    assert table.diagnostics["lwr: FRI connection"]["message"] == "ok"
+    source = package_path("lwr_fri_bridge", "src", "ros", "bridge_diagnostics.cpp").read_text(encoding="utf-8")
+    assert '"latency (s)"' in source and '"mean answer time (s)"' in source

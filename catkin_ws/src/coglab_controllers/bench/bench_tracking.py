@@ -7,7 +7,9 @@ measured is the true joint state behind its servos at the end of every period of
 after its end, or until it was given up. Its range, speed and acceleration (change of speed over one period) are judged
 against the limits, with no allowance for what the servos add. Then the rule of priority alone, on an ideal robot: ours
 beside plain scaling of the whole vector and KDL's solvers, each in its best setting, all slowed by the same clock and
-with the Jacobian of the same time.
+with the Jacobian of the same time. These rows are over all reaches, and once more over those in which no method's joint
+comes to its stop: where one does, all are equally far off, and nothing is seen of the rule. A peer that is not
+installed makes its rows missed.
 """
 
 import json
@@ -21,6 +23,7 @@ from tracking import DURATION, REACHES, Outcome, PyKDL, Reach, Solver, draw_reac
 
 NEAR, TURNED = 0.001, 3.0
 """m from the path or the goal, and deg at the end: further off is a miss"""
+RULE, DISTANCE = "rotation shrunk first, ideal arm", "distance from the path"
 SETTINGS = {"wdls": (0.005, 0.01, 0.02, 0.05, 0.1), "pinv": (1e-5, 1e-3, 1e-2, 0.05, 0.1)}
 
 
@@ -73,25 +76,57 @@ def misses(outcomes: list[Outcome]) -> int:
     return sum(o.stopped or o.worst > NEAR or o.turned > TURNED for o in outcomes)
 
 
-def priority_rows(ours: list[Outcome], peers: dict[str, list[Outcome]]) -> list[Row]:
+def free_of_limits(ours: list[Outcome], peers: dict[str, list[Outcome] | None]) -> np.ndarray:
+    """Of each reach whether no method's joint has come to its stop in it: there the rules of priority alone differ."""
+    methods = [ours, *(outcomes for outcomes in peers.values() if outcomes is not None)]
+    return np.array([not any(outcomes[i].stopped for outcomes in methods) for i in range(len(ours))])
+
+
+def priority_rows(ours: list[Outcome], peers: dict[str, list[Outcome] | None]) -> list[Row]:
     """Ours beside each peer, on an ideal robot: over all reaches, also those with a joint at its stop, which are
-    counted beside."""
-    rows = []
+    counted beside; and over those in which no method meets a limit of position. None: a peer that is not there."""
+    rows, free = [], free_of_limits(ours, peers)
     for name, theirs in peers.items():
-        what = f"rotation shrunk first, ideal arm, {REACHES} reaches"
+        rows += missing_peer_rows(name) if theirs is None else peer_rows(ours, theirs, name, free)
+    return rows
 
-        def one(words: str, at: float, goal: str, of=theirs, what=what, name=name) -> Row:
-            ours_at, theirs_at = (float(np.percentile(off(o), at)) for o in (ours, of))
-            return row("tracking", f"{what}: {words}", ours_at, "mm", goal, name, theirs_at, below_peer=True)
 
-        stopped, stopped_theirs = (sum(o.stopped for o in outcomes) for outcomes in (ours, theirs))
-        rows += [
-            row("tracking", f"{what}: misses (joint at its stop, 1 mm off the path, 3 deg at the end)", misses(ours),
-                "1", "", name, misses(theirs)),
-            row("tracking", f"{what}: a joint came to its stop", stopped, "1", "", name, stopped_theirs),
-            one("distance from the path, 95th percentile", 95.0, "<= 0.3"),
-            one("distance from the path, largest", 100.0, "<= 1"),
-        ]  # fmt: skip
+def missing_peer_rows(name: str) -> list[Row]:
+    """What would stand beside a peer that is not installed; both rows with a goal of each kind are missed."""
+    rows = []
+    for where in (f"{REACHES} reaches", "reaches without a stop"):
+        for words, goal in ((f"{DISTANCE}, 95th percentile", "<= 0.3"), (f"{DISTANCE}, largest", "<= 1")):
+            row_ = row("tracking", f"{RULE}, {where}: {words}: not measured, no peer", 0.0, "mm", goal, name)
+            rows.append({**row_, "value": None, "ok": False})
+    return rows
+
+
+def peer_rows(ours: list[Outcome], theirs: list[Outcome], name: str, free: np.ndarray) -> list[Row]:
+    """Rows beside one peer; `free`: the reaches in which no method's joint has come to its stop."""
+    pairs = {
+        f"{REACHES} reaches": (ours, theirs),
+        f"the {int(free.sum())} of {REACHES} reaches in which no method comes to a stop": tuple(
+            [o for o, without in zip(of, free, strict=True) if without] for of in (ours, theirs)
+        ),
+    }
+    stopped = [sum(o.stopped for o in outcomes) for outcomes in (ours, theirs)]
+    rows = [
+        row("tracking", f"{RULE}, {REACHES} reaches: a joint came to its stop", stopped[0], "1", "", name, stopped[1])
+    ]
+    for where, of in pairs.items():
+        missed = [misses(outcomes) for outcomes in of]
+        words = "misses (joint at its stop, 1 mm off the path, 3 deg at the end)"
+        rows.append(row("tracking", f"{RULE}, {where}: {words}", missed[0], "1", "", name, missed[1]))
+        for words, at, goal in (("95th percentile", 95.0, "<= 0.3"), ("largest", 100.0, "<= 1")):
+            figure = f"{RULE}, {where}: {DISTANCE}, {words}"
+            if not of[0]:
+                rows.append({**row("tracking", figure, 0.0, "mm", goal, name), "value": None, "ok": False})
+                continue
+            mine, its = (float(np.percentile(off(outcomes), at)) for outcomes in of)
+            rows.append(row("tracking", figure, mine, "mm", goal, name, its, below_peer=True))
+        turned = [float(np.mean([o.turned > TURNED for o in outcomes])) if outcomes else 0.0 for outcomes in of]
+        words = "more than 3 deg from the goal's orientation at the end"
+        rows.append(row("tracking", f"{RULE}, {where}: {words}", turned[0], "share", "", name, turned[1]))
     return rows
 
 
@@ -108,13 +143,18 @@ def main() -> None:
         return [run(chain, limits, reach, primitive, solver) for reach in reaches]
 
     ours = all_of(two_task(chain, limits, True))
-    peers = {"two tasks, whole vector scaled (plain D4.10)": all_of(two_task(chain, limits, False))}
-    for kind, settings in SETTINGS.items() if PyKDL else ():
+    peers: dict[str, list[Outcome] | None] = {
+        "two tasks, whole vector scaled (plain D4.10)": all_of(two_task(chain, limits, False))
+    }
+    for kind, settings in SETTINGS.items():
+        if not PyKDL:
+            peers[f"KDL {kind}: PyKDL is not installed"] = None
+            continue
         tried = {setting: all_of(kdl_solver(chain, limits, kind, setting)) for setting in settings}
         best = min(tried, key=lambda setting: (misses(tried[setting]), float(np.percentile(off(tried[setting]), 95))))
         peers[f"KDL {kind}, best setting {best:g}"] = tried[best]
     rows = shipped_rows(limits, reaches) + priority_rows(ours, peers)
-    over = max(o.over for outcomes in (ours, *peers.values()) for o in outcomes)
+    over = max(o.over for outcomes in (ours, *peers.values()) for o in outcomes or ())
     rows.append(
         row("tracking", "ideal arm, every method: largest joint speed over its limit", over, "1", "<= 1.000000001")
     )

@@ -204,6 +204,17 @@ TEST(IdealArm, LimitsHoldByDifferentiation) {
   }
 }
 
+TEST(IdealArm, ByDefaultACommandEndsAfterFiftyMilliseconds) {
+  EXPECT_DOUBLE_EQ(IdealArmConfig().command_timeout, 0.05);
+  Arm arm;
+  arm.ask("start");
+  arm.drive(400, Vector7::Constant(0.1));  // the last one is 5 ms old
+  for (int i = 0; i < 8; ++i) arm.tick();  // 45 ms
+  EXPECT_TRUE(arm.sample.velocity.isApprox(Vector7::Constant(0.1)));
+  for (int i = 0; i < 3; ++i) arm.tick();  // 60 ms
+  EXPECT_LT(arm.sample.velocity.maxCoeff(), 0.1 - 1e-6);
+}
+
 TEST(IdealArm, ATickAllocatesNothing) {
   Arm arm;
   counting = true;

@@ -12,6 +12,7 @@ import pytest
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "bench"))
 import bench_tracking
 import lockstep
+from tracking import Outcome
 
 LIMITS = SimpleNamespace(
     lower_position=np.full(7, -1.0),
@@ -64,3 +65,33 @@ def test_the_worst_of_all_reaches_that_began_is_judged(monkeypatch, words, field
         return row["ok"]
 
     assert ok(fine, fine) and not ok(fine, beyond) and not ok(beyond, fine)
+
+
+def outcomes(*ends):
+    """Reaches of an ideal arm: (largest distance from the path in mm, deg at the end, whether a joint was stopped)."""
+    return [Outcome(0.001 * worst, 0.0, turned, 1.0, stopped, 1.2) for worst, turned, stopped in ends]
+
+
+def test_beside_a_peer_the_rule_is_judged_where_no_joint_is_stopped():
+    ours = outcomes((0.1, 0.0, False), (0.2, 9.0, False), (200.0, 9.0, True), (0.2, 0.0, False))
+    theirs = outcomes((3.0, 0.0, False), (4.0, 0.0, False), (200.0, 0.0, True), (90.0, 0.0, True))
+    rows = bench_tracking.priority_rows(ours, {"peer": theirs})
+    free = {row["figure"].rpartition(": ")[2]: row for row in rows if "the 2 of 300 reaches" in row["figure"]}
+    largest = free["distance from the path, largest"]
+    assert (largest["value"], largest["peer_value"], largest["goal"], largest["ok"]) == (0.2, 4.0, "<= 1", True)
+    assert free["distance from the path, 95th percentile"]["goal"] == "<= 0.3"
+    turned = free["more than 3 deg from the goal's orientation at the end"]
+    assert (turned["value"], turned["peer_value"]) == (0.5, 0.0)
+    (missed,) = [row for words, row in free.items() if words.startswith("misses")]
+    assert (missed["value"], missed["peer_value"]) == (1, 2)
+    whole = [row for row in rows if ", 300 reaches: distance from the path, largest" in row["figure"]]
+    assert [(row["value"], row["ok"]) for row in whole] == [(200.0, False)]
+
+
+def test_a_peer_that_is_not_there_makes_its_rows_missed():
+    rows = bench_tracking.priority_rows(outcomes((0.1, 0.0, False)), {"KDL wdls: PyKDL is not installed": None})
+    assert len(rows) == 4 and all(row["value"] is None and not row["ok"] and row["goal"] for row in rows)
+    stopped = outcomes((0.1, 0.0, True))
+    rows = bench_tracking.priority_rows(stopped, {"peer": stopped})
+    judged = [row for row in rows if "the 0 of 300" in row["figure"] and row["goal"] != "reported"]
+    assert len(judged) == 2 and not any(row["ok"] for row in judged)

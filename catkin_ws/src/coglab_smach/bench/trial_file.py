@@ -1,13 +1,16 @@
 """Trials kept in a file, one JSON line each: a campaign that was cut off goes on where it was.
 
-The first line holds the commit of the sources whose trials these are; trials of two commits are never mixed.
+The first line holds the commit of the sources whose trials these are, and machine and date of their beginning; trials
+of two commits are never mixed.
 """
 
 from __future__ import annotations
 
 import json
 import os
+import platform
 import subprocess
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
@@ -47,6 +50,19 @@ def commit_in(path: Path) -> str:
         raise ValueError(f"{path} is no file of trials ({error!r}); name another one") from None
 
 
+def origin() -> dict[str, str]:
+    """Machine and date, as they are kept in a file of trials."""
+    machine = f"{os.cpu_count()} cores, {platform.machine()}, Linux {platform.release()}"
+    return {"machine": machine, "date": datetime.now(UTC).strftime("%Y-%m-%d")}
+
+
+def origin_in(path: Path) -> str:
+    """Machine and date of a file of trials, in words; those of files that have none were not noted."""
+    with open(path, encoding="utf-8") as stream:
+        first = json.loads(stream.readline())
+    return f"Machine: {first.get('machine', 'not noted')}; begun: {first.get('date', 'not noted')}."
+
+
 class TrialFile:
     """Results of trials by key. ``known``: what the file holds."""
 
@@ -59,7 +75,7 @@ class TrialFile:
             self._read()
         else:
             path.parent.mkdir(parents=True, exist_ok=True)
-            path.write_text(json.dumps({"sources": self.commit}) + "\n", encoding="utf-8")
+            path.write_text(json.dumps({"sources": self.commit} | origin()) + "\n", encoding="utf-8")
 
     def _read(self) -> None:
         data = self.path.read_bytes()

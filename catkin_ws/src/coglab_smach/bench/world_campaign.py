@@ -24,7 +24,7 @@ import numpy as np
 import partner_rows
 import world_rows
 from campaign import EXCHANGES, Campaign
-from trial_file import TrialFile, commit_in
+from trial_file import TrialFile, commit_in, origin_in
 
 COLUMNS = (
     "trials of asked",
@@ -84,20 +84,25 @@ def line(plan: world_rows.Plan) -> tuple[str, Campaign]:
 
 def judged(figure: str, value: float, unit: str, goal: str = "", ok: bool = True) -> dict[str, Any]:
     """A figure as a line of its own."""
-    verdict = "" if ok and not goal else "ok" if ok else "**missed**"
+    verdict = "" if ok and not goal else "met" if ok else "**missed**"
     print(f"| {figure} | {round(float(value), 4):g} {unit} | {goal} | {verdict} |")
     return {}
 
 
+def origin() -> str:
+    """Machine and date of the file's trials."""
+    return origin_in(campaign.FILE.path) if campaign.FILE is not None else ""
+
+
 def partner_table(commit: str) -> None:
     """The rows of bench_partner of what the file holds, as Markdown."""
-    print(f"Sources: {commit}.\n\n| figure | value | goal | |\n| --- | --- | --- | --- |")
+    print(f"Sources: {commit}. {origin()}\n\n| figure | value | goal | |\n| --- | --- | --- | --- |")
     bench_partner.rows_of(judged, commit, partner_rows.groups(commit))
 
 
 def table(commit: str) -> None:
     """Of what the file holds, as Markdown."""
-    print(f"Sources: {commit}.\n\n| campaign | {' | '.join(COLUMNS)} |\n| --- |{' --- |' * len(COLUMNS)}")
+    print(f"Sources: {commit}. {origin()}\n\n| campaign | {' | '.join(COLUMNS)} |\n| --- |{' --- |' * len(COLUMNS)}")
     everything = []
     for plan in world_rows.plans():
         text, done = line(plan)

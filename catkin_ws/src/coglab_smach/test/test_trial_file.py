@@ -1,5 +1,6 @@
 """Campaigns kept in a file: nothing is run twice, a cut line is dropped, trials of two commits are never mixed."""
 
+import re
 import sys
 from types import SimpleNamespace
 
@@ -10,7 +11,7 @@ from coglab_py.packages import package_path
 sys.path.insert(0, str(package_path("coglab_smach", "bench")))
 import campaign
 import world_rows
-from trial_file import TrialFile, commit_in
+from trial_file import TrialFile, commit_in, origin_in
 from virtual_trial import TouchRecord
 
 JOBS = [campaign.Job("mug", ("exchange_human_to_robot",), seed, {}) for seed in range(3)]
@@ -195,3 +196,12 @@ def test_every_reach_counts_and_false_alarms_are_split():
     assert rows[f"{still}: palm to the true goal pose, arm standing, median"] == (4.0, "mm")
     assert rows[f"{moving}: palm to the true goal pose, {end}, median"] == (30.0, "mm")
     assert rows[f"drawn people, nothing touched the hand: palm to the true goal pose, {end}, median"] == (50.0, "mm")
+
+
+def test_machine_and_date_are_kept_and_not_made_up(tmp_path):
+    path = tmp_path / "trials.jsonl"
+    TrialFile(path, "abc").add("key", {})
+    assert re.fullmatch(r"Machine: \d+ cores, .+, Linux .+; begun: \d{4}-\d\d-\d\d\.", origin_in(path))
+    assert TrialFile(path, "abc").known == {"key": {}} and commit_in(path) == "abc"
+    path.write_text('{"sources": "abc"}\n')
+    assert origin_in(path) == "Machine: not noted; begun: not noted."

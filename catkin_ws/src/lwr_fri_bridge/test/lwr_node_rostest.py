@@ -194,7 +194,7 @@ class LwrNode(unittest.TestCase):
             for status in rospy.wait_for_message("/diagnostics", DiagnosticArray, LIMIT).status:
                 found[status.name.split(": ")[1]] = {v.key: v.value for v in status.values}
         self.assertEqual(found["FRI connection"]["quality"], "PERFECT")
-        for key in ("latency (s)", "jitter (s)", "misses", "longest answer time (s)", "peer"):
+        for key in ("latency (s)", "jitter (s)", "misses", "mean answer time (s)", "longest answer time (s)", "peer"):
             self.assertIn(key, found["FRI connection"])
         # A second sender, which a test before this one was, is told as long as the node lives.
         known = (str(ReasonCode.NONE), str(ReasonCode.SECOND_SENDER))

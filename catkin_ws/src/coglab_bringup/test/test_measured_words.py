@@ -1,0 +1,192 @@
+"""No document has a measured figure of its own: each stands beside the command that prints it."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+from coglab_bringup import figures
+
+TOP = Path(__file__).resolve().parents[4]
+
+UNIT = (
+    r"(?:m/s(?:\^2)?|rad/s(?:\^2)?|N/s|kHz|Hz|ms|us|ns|s|min|minutes?|seconds?|h|%|mm|cm|m|mrad|rad|deg|times|x|Nm|N|MB|kB"
+    r"|lines)"
+)
+NUMBER = re.compile(r"(?<![\w.])(?:\d[\d.]*\s?" + UNIT + r"(?![\w/])|\d+ of (?:the )?\d+\b)")
+MEASURED = re.compile(
+    r"\bmeasured\b|\bmedian\b|\bp95\b|\bpercentile\b|\btakes?\b|\btook\b|\bslowest\b|\bcosts?\b|\bfaster\b|\bslower\b"
+    r"|\b(?:of|in|over) \d+ (?:\w+ )?(?:trials|runs|seeds|handovers|reaches|stops|streams|people)\b"
+    r"|\bon average\b|\bin a run\b|\bcomes? within\b|\*\*missed\*\*"
+    r"|\blargest\b|\bworst\b|\bovershoots?\b|\bsucceed(?:s|ed)?\b|\bmiss(?:es|ed)?\b|\boff its\b"
+    r"|\d+ of (?:the )?\d+\b",
+    re.I,
+)
+# "At most" and "up to" are words of rules, too; what was is a measurement.
+PAST = re.compile(
+    r"\b(?:was|were|came|went|ran|reached|fell|had|needed|stayed|threw|moved|ended|succeeded|missed|measured|found)\b",
+    re.I,
+)
+EXTREME = re.compile(r"\b(?:up to|at most)\b", re.I)
+# A row with a cell that is nothing but a figure; one that begins with a name of the code says what a setting is.
+FIGURE_ROW = re.compile(r"^\|(?! `).*\| *[<>=~]* ?\d[\d.]*\s?" + UNIT + r" *\|")
+COMMAND = re.compile(
+    r"\./coglab (?:bench|test|demo)|docker/prove_bare|docs/count_lines|code_size|\bbench_\w+|(?:\b|_)test_\w+|_rostest"
+    r"|figures\.md"
+)
+# Figures that are no measurements of ours: what a setting, a source or a rule says. The words identify the passage.
+SOURCED = {
+    "ctrl_more/doc/controllers/JointLimits.md": ("setting `joint_position`",),
+    "ih2_hand/README.md": ("about 50 requests for each poll", "`read_timeout_s`"),
+    "lwr_fri_bridge/README.md": ("set_point_leash/position", "`joint_states` (pub)", "as far as this side can see"),
+    "arm_back_end.md": ("It holds until the next one",),
+    "deviations.md": (
+        "actionlib's client alone",
+        "kept on a leash",
+        "eq. (6) | an error of the position",
+        "the guard keeps 0.035 m/s",
+        "its goal is raised",
+    ),
+    "how_to.md": ("Give `add_ptp` the measured position",),
+    "limits_under_loss.md": (
+        "At 20 ms 20 cycles are 0.4 s",
+        "From full speed `R` is worth",
+    ),
+    "console.md": (
+        "The path ahead is what the controllers predict",
+        "four states at most are on their way",
+        "A program without a browser gets a key",
+    ),
+    "coglab_console/README.md": ("states at 30 Hz with a number",),
+    "people.md": (
+        "Huber et al. 2008",
+        "That grip follows load",
+        "recorded handover between people",
+        "| `trust` |",
+        "until 1.2 times",
+        "`recording:=FILE`",
+        "It is seen by four fingertips",
+        "between people the object never stops",
+        "slowest speed of the object between people",
+        "`receiving.LIFT_SPEED`",
+    ),
+    "coglab_smach/README.md": ("pushes the arm away, 40 to 60 N",),
+    "reference.md": (
+        "`/coglab/state` | out, latched",
+        "N on the palm beyond what acted before",
+        "what it started is gone 3 s later",
+        "waits for the hub, 90 s at most",
+    ),
+}
+
+
+def passages(text: str) -> list[str]:
+    """Paragraphs, points of lists and rows of tables, without what stands in blocks to type, and without what is quoted
+    from the page of figures, which a command writes."""
+    text = re.sub(r"```.*?```", "", text, flags=re.DOTALL)
+    text = re.sub(f"{figures.BEGIN}.*?{figures.END}", "", text, flags=re.DOTALL)
+    return re.split(r"\n\s*\n|\n(?=[*-] |\d+\. |\|)", text)
+
+
+def is_measured(passage: str) -> bool:
+    """Whether its words speak of a measurement; names in the code do not."""
+    words = re.sub(r"`[^`]*`", "", passage)
+    sentences = re.split(r"\.\s|[|;:]", words)
+    return MEASURED.search(words) is not None or any(PAST.search(s) and EXTREME.search(s) for s in sentences)
+
+
+def named_by(passage: str, before: str, page: str) -> bool:
+    """Whether the command is named where it has to be: in the passage, or, of a row, in the paragraph before its table,
+    or at least anywhere on its page where the row does not speak of measuring."""
+    if not passage.startswith("|"):
+        return COMMAND.search(passage) is not None
+    where = f"{before} {passage}" if is_measured(passage) else page
+    return COMMAND.search(where) is not None
+
+
+def unprinted(path: Path) -> list[str]:
+    """Passages with a measured figure and without the command that prints it; every row of a table with a figure of its
+    own, too, where its page has no command at all."""
+    excused = [words for name, all_words in SOURCED.items() if str(path).endswith(name) for words in all_words]
+    found, before, page = [], "", path.read_text(encoding="utf-8")
+    for passage in passages(page):
+        flat = " ".join(passage.split())
+        row = flat.startswith("|")
+        if (
+            (is_measured(flat) or FIGURE_ROW.search(flat))
+            and NUMBER.search(flat)
+            and not named_by(flat, before, page)
+            and not any(w in flat for w in excused)
+        ):
+            found.append(f"{path.name}: {flat[:160]}")
+        before = before if row else flat
+    return found
+
+
+def documents() -> list[Path]:
+    """All pages but the changelog, which says what was, and the two that are written by a command."""
+    pages = [*TOP.glob("*.md"), *TOP.glob("docs/*.md"), *(TOP / "catkin_ws" / "src").rglob("*.md")]
+    return [page for page in pages if page.name not in ("CHANGELOG.md", "figures.md", "world_figures.md")]
+
+
+def test_a_figure_without_a_command_is_found(tmp_path):
+    page = tmp_path / "page.md"
+    page.write_text("A step takes 3 us.\n\nThe limit is 3 us.\n\nA step takes 3 us (`./coglab bench dmp`).\n")
+    assert unprinted(page) == ["page.md: A step takes 3 us."]
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "| a | b |\n| --- | --- |\n| scaling | lets the error grow to 188 mm in 300 random reaches |\n",
+        "Mean and largest of 1000 stops at 10 % loss:\n",
+        "| period | now |\n| --- | --- |\n| slow | 1.307 s |\n",
+        "Stops (`./coglab bench fri`).\n\nOthers:\n\n| a | b |\n| --- | --- |\n| 5 ms | 1.79 **missed** |\n",
+        "That test comes within 2 mrad of the bound.\n",
+    ],
+)
+def test_a_figure_of_a_row_or_of_some_reaches_needs_a_command(tmp_path, text):
+    page = tmp_path / "page.md"
+    page.write_text(text)
+    assert len(unprinted(page)) == 1
+    if "Others:" in text:
+        page.write_text(text.replace("Others:", "Others (`./coglab bench fri`):"))
+    else:
+        page.write_text(f"All by `./coglab bench --long fri`: {text}")
+    assert unprinted(page) == []
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "Measured: 0.67 m/s.\n",
+        "83 of 300 reaches miss.\n",
+        "The palm is 13.9 mm off its grasp.\n",
+        "Handovers succeed in 96 %.\n",
+        "It runs 6.1 times faster than real time.\n",
+        "The arm overshoots by 3 %.\n",
+        "Of 100 people 97 succeeded in 2 s.\n",
+        "The largest force was 66 N.\n",
+        "The hand came back at up to 1.1 m/s.\n",
+        "The reach ends 0.4 m/s too fast in the worst trial.\n",
+        "The status comes at 28 Hz, measured.\n",
+    ],
+)
+def test_a_figure_is_found_however_it_is_put(tmp_path, text):
+    page = tmp_path / "page.md"
+    page.write_text(text)
+    assert len(unprinted(page)) == 1
+    page.write_text(f"By `./coglab bench trials`: {text}")
+    assert unprinted(page) == []
+
+
+def test_every_measured_figure_of_a_document_has_a_command_that_prints_it():
+    found = [line for page in documents() for line in unprinted(page)]
+    assert not found, "\n".join(found)
+
+
+def test_nothing_is_excused_that_is_gone():
+    for name, all_words in SOURCED.items():
+        text = " ".join(" ".join(p.read_text(encoding="utf-8").split()) for p in documents() if str(p).endswith(name))
+        assert not [words for words in all_words if words not in text], name
