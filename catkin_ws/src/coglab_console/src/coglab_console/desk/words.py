@@ -39,6 +39,8 @@ PHASES = {
     "tighten_at_home": "holds it firmly",
     "hand_open": "opens the hand",
     "open_again": "gives the object back",
+    "open_beside": "opens its hand once more",
+    "seat": "goes to the object",
     "open_at_home": "opens the hand at home",
     "take_weight": "takes the weight",
     "give_load": "gives the weight to the person",

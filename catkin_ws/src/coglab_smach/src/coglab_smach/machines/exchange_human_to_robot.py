@@ -9,6 +9,7 @@ from coglab_smach.states.arm import HomeRobot, SwitchController
 from coglab_smach.states.base import CoglabMachine
 from coglab_smach.states.hand import HandClose, HandPreshape, HandTighten
 from coglab_smach.states.knowledge import QueryDatabase, SetGraspGoal
+from coglab_smach.states.seat import Seat
 from coglab_smach.states.weight import TakeWeight
 
 SHARED = ["object_entry", "grasp", "grasp_name"]
@@ -18,7 +19,8 @@ def build_exchange_human_to_robot(ctx: Context) -> CoglabMachine:
     """query -> goal from the best grasp -> reach and preshape -> contact -> close gently -> take the weight -> close
     firmly, where the person's hand was seen to go -> home, and firmly there where it was not.
 
-    A hand that has closed on nothing, or on an edge, opens to its preshape, and the arm tries once more."""
+    A hand that has closed on nothing opens to its preshape, and the arm comes once more; one that has closed on an edge
+    opens, goes to the grasp from where it is, and closes again."""
     machine = CoglabMachine(
         ctx, "exchange_human_to_robot", ACTION_OUTCOMES, input_keys=["object_id"], output_keys=SHARED
     )
@@ -33,9 +35,13 @@ def build_exchange_human_to_robot(ctx: Context) -> CoglabMachine:
         )
         machine.add_state("switch_to_ptp", SwitchController(ctx, "ptp"), to_recovery(succeeded="hand_close"))
         machine.add_state(
-            "hand_close", HandClose(ctx, from_person=True), to_recovery(succeeded="take_weight", missed="open_again")
+            "hand_close",
+            HandClose(ctx, from_person=True),
+            to_recovery(succeeded="take_weight", missed="open_again", edge="open_beside"),
         )
         machine.add_state("open_again", HandPreshape(ctx), to_recovery(succeeded="set_dmp_goal"))
+        machine.add_state("open_beside", HandPreshape(ctx), to_recovery(succeeded="seat"))
+        machine.add_state("seat", Seat(ctx), to_recovery(succeeded="hand_close"))
         machine.add_state("take_weight", TakeWeight(ctx), to_recovery(succeeded="hand_tighten"))
         machine.add_state("hand_tighten", HandTighten(ctx), to_recovery(succeeded="coglab_home_robot"))
         machine.add_state("coglab_home_robot", HomeRobot(ctx, carries=True), to_recovery(succeeded="tighten_at_home"))

@@ -81,7 +81,7 @@ class HandPreshape(CoglabState):
 class HandClose(CoglabState):
     """Close the preshaped hand on the object and make sure that something is in it.
 
-    Outcome missed, with ``from_person``: the fingers have closed on nothing, or do not stand around it
+    Outcomes missed and edge, with ``from_person``: the fingers have closed on nothing, or do not stand around it
     (stopped_by_object), for the first time in this action; a person who offers waits, so the arm may try once more.
     Meanwhile the palm goes along with who pulls (GivesWay).
     """
@@ -92,7 +92,7 @@ class HandClose(CoglabState):
     def __init__(self, ctx: Context, from_person: bool) -> None:
         super().__init__(
             ctx,
-            outcomes=["succeeded", "missed"] if from_person else ["succeeded"],
+            outcomes=["succeeded", "missed", "edge"] if from_person else ["succeeded"],
             input_keys=["object_id", "grasp"] if from_person else ["object_id"],
             output_keys=["hand_distance"] if from_person else [],
         )
@@ -123,7 +123,7 @@ class HandClose(CoglabState):
                 self.ctx.journal.mark("missed")
                 self.ctx.preshaped = False
                 self.reason = f"{missed}: once more"
-                return "missed"
+                return "edge" if state.holding else "missed"
             raise PortError(
                 f"{missed}: motors at {list(state.positions)} of 254",
                 (state.message,) if state.message else (),

@@ -20,7 +20,7 @@ LOOK = 0.8
 """s for which an arm that stands looks for what its hand may have lost"""
 OLDEST = 0.2
 """s, older sights do not tell"""
-KEPT, SETTLES = 0.04, 0.15
+KEPT, SETTLES = 0.04, 0.1
 """m by which an object that is held is farther from the palm, or nearer, at most than at first; and s in which one that
 falls has moved by more"""
 

@@ -36,6 +36,12 @@ def palm_axis(ctx: Context) -> np.ndarray | None:
 
 def off_grasp(state: CoglabState, goal: Mapping[str, Any]) -> float | None:
     """m from the palm to where it would hold the object that a reach is for; None where the goal names no object."""
+    way = way_to_grasp(state, goal)
+    return None if way is None else float(np.linalg.norm(way))
+
+
+def way_to_grasp(state: CoglabState, goal: Mapping[str, Any]) -> np.ndarray | None:
+    """off_grasp() as a vector (m, base frame)."""
     thing, here = goal.get("object", {}), state.ctx.arm.joint_positions()
     if not thing or here is None:
         return None
@@ -47,7 +53,7 @@ def off_grasp(state: CoglabState, goal: Mapping[str, Any]) -> float | None:
     if seen.age > OLDEST:
         return None
     grasp = Pose(np.array(seen.xyz), np.array(seen.quaternion)) * Pose.from_dict(thing["grasp"])
-    return Pose(*default_arm().fk(np.asarray(here))).distance(grasp)[0]
+    return np.asarray(grasp.position - default_arm().fk(np.asarray(here))[0])
 
 
 def person_at(state: CoglabState) -> np.ndarray | None:
