@@ -1,12 +1,11 @@
 """Contact of a moving arm: momentum observer, learnt thresholds, evidence and the one event, on analytic motions."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import coglab_controllers as cc
 import numpy as np
 import pytest
 from coglab_msgs.msg import ReasonCode
-from coglab_py.packages import package_path
 from coglab_smach.contact.detector import ContactDetector, DetectorSettings
 from coglab_smach.contact.evidence import (
     FUSED,
@@ -25,71 +24,8 @@ from coglab_smach.contact.learning import MotionRecorder
 from coglab_smach.contact.momentum_observer import MomentumObserver
 from coglab_smach.contact.motion_thresholds import FEATURES, ThresholdError, Thresholds, learn
 from coglab_smach.contact.moving_contact import MovingContact
-from coglab_smach.kinematics.reachability import default_arm, home_posture, position_jacobian
-
-DT = 0.005
-URDF = package_path("lwr_description", "urdf", "lwr_ih2.urdf").read_text(encoding="utf-8")
-SHIPPED = package_path("coglab_smach", "config", "contact_thresholds.yaml")
-SWING = np.array([0.30, 0.25, -0.30, 0.35, 0.20, -0.20, 0.15])
-"""rad, amplitude of the motion about the home posture"""
-
-
-class Arm:
-    """Samples of an arm that swings about home from ``begin`` s on, with what acts on it; exact torques and noise."""
-
-    def __init__(self, rate=2.5, begin=0.6, sigma=0.0, seed=1, mass=0.0):
-        self.rate, self.begin, self.sigma = rate, begin, sigma
-        self.rng = np.random.default_rng([seed, 71])
-        self.true = cc.ArmDynamics(URDF)
-        self.true.set_payload(mass, [0.04, 0.0, 0.0])
-
-    def at(self, t, force=(0.0, 0.0, 0.0), torque=None):
-        """Position, velocity and measured torque at t (s) under a force on the palm (N) or a torque on the joints (Nm);
-        the torque is the mean over the period that ends there."""
-        q, v, _ = self.state(t)
-        middle, speed, a = self.state(t - DT / 2)
-        terms = self.true.evaluate(middle, speed)
-        outside = position_jacobian(default_arm(), q).T @ np.asarray(force) if torque is None else np.asarray(torque)
-        noise = self.rng.normal(0.0, self.sigma, 7) if self.sigma else 0.0
-        return q, v, terms.mass @ a + terms.coriolis + terms.gravity - outside + noise
-
-    def state(self, t):
-        """Position, velocity and acceleration at t."""
-        phase = self.rate * max(0.0, t - self.begin)
-        # From rest without a step of the acceleration: sin^3.
-        q = home_posture() + SWING * np.sin(phase) ** 3
-        v = SWING * 3 * np.sin(phase) ** 2 * np.cos(phase) * self.rate
-        a = SWING * (6 * np.sin(phase) * np.cos(phase) ** 2 - 3 * np.sin(phase) ** 3) * self.rate**2
-        return q, v, a
-
-
-def jacobian(q):
-    """Of the palm."""
-    return position_jacobian(default_arm(), q)
-
-
-def fused():
-    """As the node makes it, with the shipped thresholds."""
-    moving = MovingContact(Thresholds.load(SHIPPED), cc.ArmDynamics(URDF), jacobian)
-    return FusedDetector(ContactDetector(DetectorSettings(), jacobian), moving)
-
-
-def feed(detector, arm, begin, end, force=lambda t: (0.0, 0.0, 0.0), shift=0.0):
-    """Both inputs of the robot from ``begin`` to ``end`` s, stamps shifted; (event, its time) or (None, end)."""
-    for k in range(round(begin / DT), round(end / DT)):
-        t = k * DT
-        outside = np.asarray(force(t))
-        q, v, tau = arm.at(t, outside)
-        event = detector.feed_measured(t + shift, q, tau)
-        event = event or detector.feed(t + shift, jacobian(q).T @ outside, q, v)
-        if event is not None:
-            return event, t
-    return None, end
-
-
-def ramp(direction, begin, newton=3.0):
-    """3 N within 60 ms from ``begin`` s on."""
-    return lambda t: np.asarray(direction) * newton * min(1.0, max(0.0, (t - begin) / 0.06))
+from coglab_smach.kinematics.reachability import home_posture
+from moving_arm import DT, SHIPPED, URDF, Arm, feed, fused, jacobian, ramp
 
 
 def test_terms_of_the_arm_obey_their_definitions():
@@ -179,99 +115,6 @@ def test_a_push_on_the_moving_arm_is_found_within_eighty_milliseconds(direction,
     assert event is not None and event.source == MOMENTUM and event.code == ReasonCode.CONTACT_FOUND
     assert 1.02 < when <= 1.10
     assert event.confidence >= 0.99 and detector.state() == "off"
-
-
-class ArmAsMeasured(Arm):
-    """Torques as the cell's sensors tell them: noise that lasts 10 ms and grows with the fastest joint, and a lag."""
-
-    def __init__(self, lag=0.0, sigma=0.05, **rest):
-        super().__init__(**rest)
-        self.lag, self.noisy, self.noise = lag, sigma, np.zeros(7)
-
-    def at(self, t, force=(0.0, 0.0, 0.0), torque=None):
-        """As Arm.at."""
-        q, v, _ = super().at(t, force, torque)
-        tau = super().at(t - self.lag, force, torque)[2]
-        keep = np.exp(-DT / 0.01)
-        spread = self.noisy * (1.0 + 7.0 * np.abs(v).max()) * np.sqrt(1.0 - keep**2)
-        self.noise = keep * self.noise + self.rng.normal(0.0, 1.0, 7) * spread
-        return q, v, tau + self.noise
-
-
-def delays(pushes, newton, **arm):
-    """s from the begin of pushes aside, at many moments of the swing, to their events; inf: none, or before it."""
-    found = []
-    for seed in range(pushes):
-        moving, detector, begin = ArmAsMeasured(rate=2.0, seed=seed, **arm), fused(), 1.0 + 0.02 * seed
-        direction = (0.0, np.cos(seed), np.sin(seed))
-        feed(detector, moving, 0.0, 0.7)
-        detector.arm(IN_MOTION, 0.7, 5.0)
-        event, when = feed(detector, moving, 0.7, begin + 0.3, ramp(direction, begin, newton))
-        found.append(when - begin if event is not None and when > begin else np.inf)
-    return np.array(found)
-
-
-def test_three_newtons_across_are_found_in_time_at_the_speeds_of_a_reach():
-    """A ramp has 1 N after 20 ms and is found within 80 ms of that; joints at up to 1.4 rad/s."""
-    found = delays(40, 3.0, lag=Thresholds.load(SHIPPED).lag)
-    assert np.mean(found <= 0.1001) >= 0.9, np.sort(found)
-
-
-def test_torques_that_lag_behind_positions_are_no_push_once_that_is_learnt():
-    lag = 0.002
-    moving = MovingContact(Thresholds.load(SHIPPED), cc.ArmDynamics(URDF), jacobian)
-    recorder, arm = MotionRecorder(moving), ArmAsMeasured(lag=lag, rate=4.0)
-    for k in range(1200):
-        q, _, tau = arm.at(k * DT)
-        moving.feed(k * DT, q, tau)
-        recorder.look()
-    recorder.end()
-    run = recorder.reaches[0]
-    learnt = learn([run[k : k + 40] for k in range(0, 1000, 40)], lag=moving.thresholds.lag)
-    assert learnt.lag == pytest.approx(lag, rel=0.1)
-    worst = []
-    for thresholds in (replace(learnt, lag=0.0), learnt):
-        moving.use(thresholds)
-        moving.observer.reset()
-        exact = ArmAsMeasured(lag=lag, sigma=0.0, rate=4.0)
-        residuals = []
-        for k in range(400):
-            q, _, tau = exact.at(k * DT)
-            moving.feed(k * DT, q, tau)
-            residuals.append(np.zeros(7) if moving.residual is None else moving.residual.torque)
-        worst.append(np.abs(residuals).max())
-    assert worst[1] < 0.2 * worst[0], worst
-
-
-@pytest.mark.parametrize("share", [0.7, 1.3])
-def test_an_object_that_is_not_as_heavy_as_its_file_says_is_no_contact(share):
-    for seed in range(6):
-        arm, detector = ArmAsMeasured(rate=3.2, seed=seed, mass=0.53 * share), fused()
-        detector.set_payload(0.53)
-        assert feed(detector, arm, 0.0, 0.7)[0] is None
-        detector.arm(IN_MOTION, 0.7, 60.0)
-        event, when = feed(detector, arm, 0.7, 3.0)
-        assert event is None, (seed, when, event.message)
-
-
-def test_what_an_arm_carries_is_no_early_contact_where_it_comes_to_rest():
-    """The controller's estimate does not know of the load, and feels it elsewhere after the motion."""
-    detector, mass = fused(), 2.0
-    detector.set_payload(mass)
-    arm, weight, stops = Arm(rate=1.0, begin=1.2, mass=mass), np.array([0.0, 0.0, -9.81 * mass]), 1.2 + np.pi / 2.0
-    for k in range(round(3.6 / DT)):
-        t = k * DT
-        if t < stops:
-            q, v, tau = arm.at(t)
-        else:
-            v = np.zeros(7)
-            tau = arm.true.evaluate(q, v).gravity
-        if k == round(1.15 / DT):
-            detector.arm(IN_MOTION, t, 30.0)
-        event = detector.feed_measured(t, q, tau)
-        event = event or detector.feed(t, jacobian(q).T @ weight, q, v)
-        assert event is None, (t, event.message)
-    assert detector.still.state() == "watching"
 
 
 def test_a_push_at_rest_is_found_too_and_nothing_without_one():
