@@ -305,7 +305,7 @@ class ContactDetectorNode:
         except OSError as error:
             return LearnMotionResponse(False, ReasonCode.BAD_FILE, str(error))
         with self.lock:
-            self.moving.thresholds = thresholds
+            self.moving.use(thresholds)
         return LearnMotionResponse(
             True, ReasonCode.NONE, f"learnt from {reaches} motions, written to {self.learnt_file}"
         )

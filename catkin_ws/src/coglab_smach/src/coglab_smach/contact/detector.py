@@ -111,6 +111,7 @@ class _Armed:
     joints: list[int] | None
     mass: float
     load_share: float
+    carries: bool = False
     baseline: np.ndarray | None = None
     before: np.ndarray | None = None
     """the baseline until somebody jolted the arm"""
@@ -153,12 +154,11 @@ class ContactDetector:
         joints: Sequence[int] = (),
         mass: float = 0.0,
         load_share: float = 0.0,
+        carries: bool = False,
     ) -> None:
-        """Watch for 'contact', 'load' or 'release' for ``timeout`` s, as soon as the arm stands still.
-        ``joints`` as 1..7.
-
-        ValueError says what is wrong with the request.
-        """
+        """Watch for 'contact', 'load' or 'release' for ``timeout`` s, as soon as the arm stands still. ``joints`` as
+        1..7. ``carries``: an arm that carries something feels it elsewhere after each motion, and an offset against
+        the rest before says nothing. ValueError says what is wrong with the request."""
         if mode not in ("contact", "load", "release"):
             raise ValueError(f"mode is contact, load, release or off, got '{mode}'")
         if not timeout > 0.0:
@@ -176,6 +176,7 @@ class ContactDetector:
             [j - 1 for j in joints] or None,
             mass,
             load_share if load_share > 0.0 else self.settings.load_share,
+            carries,
         )
 
     def disarm(self) -> None:
@@ -342,7 +343,8 @@ class ContactDetector:
     def _check_offset(self, armed: _Armed) -> ContactEvent | None:
         """Once at each rest: a person who was early has left an offset against the last rest before the motion, and a
         touch that jolted the arm has left one against what was felt before."""
-        reference = self._rest.before_motion if armed.before is None else armed.before
+        before_motion = None if armed.carries else self._rest.before_motion
+        reference = before_motion if armed.before is None else armed.before
         if armed.mode != "contact" or reference is None or armed.baseline is None:
             return None
         offset = np.abs(armed.baseline - reference)[armed.watched]

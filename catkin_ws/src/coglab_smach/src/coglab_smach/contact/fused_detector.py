@@ -115,7 +115,9 @@ class FusedDetector:
             self.still.disarm()
             self._lift = _Lift((load_share if load_share > 0.0 else self.still.settings.load_share) * mass * GRAVITY)
         else:
-            self.still.arm("contact" if mode == IN_MOTION else mode, now, timeout, k, joints, mass, load_share)
+            carries = mode == IN_MOTION and self.moving is not None and self.moving.load > 0.0
+            watched = "contact" if mode == IN_MOTION else mode
+            self.still.arm(watched, now, timeout, k, joints, mass, load_share, carries)
             self._lift = None
         if mode == IN_MOTION and self.moving is not None:
             self._before_reach = self.moving.before_motion()

@@ -36,7 +36,7 @@ class MotionRecorder:
             self._reach = self._reach[-SHORTEST:]
 
     def _moved(self) -> bool:
-        return max(change.features[1] for change in self._reach) > 0.1
+        return max(change.features[0, 1] for change in self._reach) > 0.1
 
     def end(self) -> None:
         """The motion is over, or has lasted long enough."""
@@ -49,4 +49,4 @@ class MotionRecorder:
 
     def learn(self) -> Thresholds:
         """From what was gathered. ThresholdError where that is too little."""
-        return learn(self.reaches, self.offsets)
+        return learn(self.reaches, self.offsets, lag=self.moving.thresholds.lag)

@@ -5,7 +5,8 @@
 so that r follows the external torque as a first-order low-pass with the time constant 1/K. M, C and g are those of the
 robot description with what the hand is told to carry; tau is the measured torque between motors and links, so that
 friction of the drives and inertia of the motors do not enter. Velocities come from positions alone: the mean velocity
-between two samples, in the middle of them. The torque of a sample counts as the mean over the period that it ends.
+between two samples, in the middle of them. The torque of a sample counts as the mean over the period that it ends, or
+over one so much earlier as torques lag behind positions: a heavy arm whose acceleration changes feels a millisecond.
 """
 
 from __future__ import annotations
@@ -67,6 +68,8 @@ class Residual:
     velocity: np.ndarray
     acceleration: np.ndarray
     """low-passed as the estimate is"""
+    rate: np.ndarray
+    """of the measured torque, Nm/s, low-passed in the same way: a second more of lag takes this from the estimate"""
     fresh: bool = False
     """the observer has begun anew: the estimates before this one do not count"""
 
@@ -82,6 +85,8 @@ class MomentumObserver:
         if not gain > 0.0 or not math.isfinite(gain):
             raise ValueError(f"gain must be a positive number of 1/s, got {gain}")
         self.gain, self.period = gain, period
+        self.lag = 0.0
+        """s by which the torques come later than the positions of the same sample"""
         self._dynamics = dynamics
         self.reset()
 
@@ -94,7 +99,7 @@ class MomentumObserver:
         self._velocity: np.ndarray | None = None
         self._momentum = self._forces = np.zeros(7)
         self._residual: np.ndarray | None = None
-        self._acceleration = np.zeros(7)
+        self._acceleration, self._rate = np.zeros(7), np.zeros(7)
         self._doubts = 0
 
     def set_payload(self, mass: float, centre: Joints) -> None:
@@ -152,7 +157,8 @@ class MomentumObserver:
         # From the middle of the last interval to that of this one: each of the two torques is a mean over its interval.
         span = 0.5 * (step + last_step)
         torque = (last_step * torque_before + step * self._torque) / (step + last_step)
-        outside = (momentum - last_momentum) / span + 0.5 * (forces + last_forces) - torque
+        rate = (self._torque - torque_before) / span
+        outside = (momentum - last_momentum) / span + 0.5 * (forces + last_forces) - torque - self.lag * rate
         jumps = self._residual is not None and np.abs(outside - self._residual).max() > JUMP
         if jumps and self._doubts < DOUBTS:
             self._doubts, self._velocity = self._doubts + 1, None
@@ -163,4 +169,5 @@ class MomentumObserver:
         last = np.zeros(7) if self._residual is None else self._residual
         residual = self._residual = keep * last + (1.0 - keep) * outside
         self._acceleration = keep * self._acceleration + (1.0 - keep) * (velocity - last_velocity) / span
-        return Residual(stamp, residual, self._position, velocity, self._acceleration, fresh)
+        self._rate = keep * self._rate + (1.0 - keep) * rate
+        return Residual(stamp, residual, self._position, velocity, self._acceleration, self._rate, fresh)

@@ -1,8 +1,11 @@
 """How large the residual of a momentum observer gets without any contact, learnt from the robot's own reaches.
 
 What counts is the residual's change against its own mean of a moment ago: sensors' offsets, a wrong payload and other
-slow errors of the model drop out. Its variance, per joint, is a sum of shares that grow with speed, acceleration and
-load; the shares are learnt by non-negative least squares. The change is then explained by a force on the palm
+slow errors of the model drop out. That mean is long, since its own noise is part of the change. What changes quickly is
+learnt: torques that lag behind positions look like a push wherever the acceleration changes, and an object that is
+heavier than its file says like one wherever the hand is turned or hastened. The change's variance, per joint, is a sum
+of shares that grow with speed, acceleration and what the load told needs; the shares are learnt by non-negative least
+squares, after the lag. The change is then explained by a force on the palm
 (generalised least squares), and the length of that force in standard deviations is compared with a limit that reaches
 without contact exceed with a chosen probability (Gumbel's law on the largest value of each reach).
 """
@@ -12,7 +15,7 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -30,18 +33,20 @@ FEATURES = (
     "speed squared",
     "speed squared a moment ago",
     "acceleration squared",
-    "load times acceleration squared",
+    "torque of the load squared",
 )
 """what a variance (Nm^2) grows with: 1, v (rad/s, fastest joint, over what the residual remembers), v^2, the same over
-the moment ago that the residual is compared with, a^2 (rad/s^2, fastest changing joint), and (kg rad/s^2)^2 of the
-payload told"""
+the moment ago that the residual is compared with, a^2 (rad/s^2, fastest changing joint), and, joint by joint, the
+square of the change (Nm) in what the payload told needs to be carried and accelerated"""
 FLOOR = 1e-4
 """Nm^2, smallest variance believed: a noise-free simulation must not alarm on rounding"""
-RECENT, OLD = 0.10, 0.25
+RECENT, OLD = 0.10, 0.60
 """s: the change is counted from the mean between so long ago and so long ago"""
+LATELY = 0.25
+"""s: an offset is of the mean between RECENT and so long ago"""
 MEMORY = 0.025
-"""s over which speeds are averaged, about the time constant of the residual"""
-LEAST = 5
+"""s over which speeds and the torque of the load are averaged, about the time constant of the residual"""
+LEAST = 20
 """samples of that mean"""
 CONFIRM = 2
 """samples in a row over the limit"""
@@ -49,6 +54,10 @@ ALARM_SHARE = 2e-3
 """probability with which a reach without contact may exceed the limit"""
 EULER = 0.5772156649015329
 AXES = np.eye(3)
+WEIGHT = np.array([0.0, 0.0, 9.81])
+"""m/s^2 that carrying needs, base frame"""
+LONGEST_LAG = 0.01
+"""s of lag that is believed"""
 
 
 class ThresholdError(ValueError):
@@ -70,6 +79,9 @@ class Change:
     stamp: float
     torque: np.ndarray
     features: np.ndarray
+    """7 x FEATURES"""
+    rate: np.ndarray
+    """the change, Nm/s, that a second less of lag adds to the torque's"""
     position: np.ndarray
     jacobian_at: Callable[[np.ndarray], np.ndarray]
 
@@ -95,51 +107,72 @@ class ChangeOfResidual:
         self._old.clear()
         self._speed: float | None = None
         self._stamp = 0.0
-        self._sum = np.zeros(8)
-        self.past = np.zeros(7)
-        """Nm, the mean of a moment ago"""
+        self._sum = np.zeros(22)
+        self._palm: np.ndarray | None = None
+        self._carried = np.zeros(7)
+
+    @property
+    def past(self) -> np.ndarray:
+        """Nm, the mean of a moment ago; of fewer samples than the change is counted from."""
+        return np.asarray(np.mean([all_of[:7] for at, all_of in self._old if at >= self._stamp - LATELY], axis=0))
+
+    def _needed(self, residual: Residual, load: float, step: float, blend: float) -> np.ndarray:
+        """Nm that the load told needs to be carried and accelerated, low-passed."""
+        if not load > 0.0:
+            return self._carried
+        jacobian = self._jacobian(residual.position)
+        palm = jacobian @ residual.velocity
+        hastened = WEIGHT if self._palm is None or step <= 0.0 else WEIGHT + (palm - self._palm) / step
+        needed = load * (jacobian.T @ hastened)
+        self._carried = needed if self._palm is None else self._carried + blend * (needed - self._carried)
+        self._palm = palm
+        return self._carried
 
     def feed(self, residual: Residual, load: float) -> Change | None:
         """One residual, ``load`` kg told; None while there is no past to compare with."""
         if residual.fresh:
             self.reset()
         speed = float(np.abs(residual.velocity).max()) ** 2
-        # Seven torques and the speed's square, so that one sum over the moment ago serves both.
-        both = np.empty(8)
-        both[:7], both[7] = residual.torque, speed
-        self._recent.append((residual.stamp, both))
+        step = residual.stamp - self._stamp
+        blend = 1.0 if self._speed is None else 1.0 - float(np.exp(-step / MEMORY))
+        # Residual, its rate, what the load needs and the speed's square: one sum over the moment ago serves them all.
+        now = np.empty(22)
+        now[:7], now[7:14], now[21] = residual.torque, residual.rate, speed
+        now[14:21] = self._needed(residual, load, step, blend)
+        self._recent.append((residual.stamp, now))
         while self._recent and self._recent[0][0] <= residual.stamp - RECENT:
             self._old.append(self._recent.popleft())
             self._sum = self._sum + self._old[-1][1]
         while self._old and self._old[0][0] < residual.stamp - OLD:
             self._sum = self._sum - self._old.popleft()[1]
-        blend = 1.0 if self._speed is None else 1.0 - float(np.exp(-(residual.stamp - self._stamp) / MEMORY))
         self._speed = speed if self._speed is None else self._speed + blend * (speed - self._speed)
         self._stamp = residual.stamp
         if len(self._old) < LEAST:
             return None
         mean = self._sum / len(self._old)
-        self.past = mean[:7]
         acceleration = float(np.abs(residual.acceleration).max())
-        growing = [1.0, math.sqrt(self._speed), self._speed, max(0.0, float(mean[7])), acceleration**2]
-        features = np.array([*growing, (load * acceleration) ** 2])
-        return Change(residual.stamp, residual.torque - self.past, features, residual.position, self._jacobian)
+        features = np.empty((7, len(FEATURES)))
+        features[:, :5] = [1.0, math.sqrt(self._speed), self._speed, max(0.0, float(mean[21])), acceleration**2]
+        change = now - mean
+        features[:, 5] = change[14:21] ** 2
+        return Change(residual.stamp, change[:7], features, change[7:14], residual.position, self._jacobian)
 
 
 @dataclass(frozen=True)
 class Thresholds:
     """What was learnt: shares of the variance of a change (7 joints x FEATURES), standard deviations of an offset (7,
-    Nm), and of both the limit of the force in deviations."""
+    Nm), of both the limit of the force in deviations, and the lag of the torques (s, see MomentumObserver)."""
 
     variance: np.ndarray
     limit: float
     steady: np.ndarray
     steady_limit: float
     reaches: int = 0
+    lag: float = 0.0
 
     def deviation(self, features: np.ndarray) -> np.ndarray:
         """Standard deviation of each joint's change without contact, Nm."""
-        return np.sqrt(np.maximum(self.variance @ features, FLOOR))
+        return np.sqrt(np.maximum((self.variance * features).sum(axis=1), FLOOR))
 
     def force(self, change: Change) -> tuple[np.ndarray, float]:
         """The force on the palm (N, base frame) that explains a change best, and its length in deviations."""
@@ -159,6 +192,7 @@ class Thresholds:
             "steady": [float(f"{v:.5g}") for v in self.steady],
             "steady_limit": round(float(self.steady_limit), 3),
             "reaches": int(self.reaches),
+            "lag": float(f"{self.lag:.3g}"),
         }
         path.write_text(yaml.safe_dump(text, default_flow_style=None, sort_keys=False), encoding="utf-8")
 
@@ -172,6 +206,7 @@ class Thresholds:
             variance = np.array(data["variance"], dtype=float)
             limit, reaches = float(data["limit"]), int(data.get("reaches", 0))
             steady, steady_limit = np.array(data["steady"], dtype=float), float(data["steady_limit"])
+            lag = float(data["lag"])
         except (KeyError, TypeError, ValueError) as error:
             raise ThresholdError(f"{path}: a figure is missing or is none: {error}") from error
         good = all(np.all(np.isfinite(each)) and np.all(each >= 0.0) for each in (variance, steady))
@@ -179,7 +214,9 @@ class Thresholds:
             raise ThresholdError(f"{path}: expected 7 x {len(FEATURES)} variances and 7 deviations, all 0 or more")
         if not (0.0 < limit < 1e3 and 0.0 < steady_limit < 1e3):
             raise ThresholdError(f"{path}: expected positive limits, got {limit} and {steady_limit}")
-        return Thresholds(variance, limit, steady, steady_limit, reaches)
+        if not abs(lag) <= LONGEST_LAG:
+            raise ThresholdError(f"{path}: expected a lag within {LONGEST_LAG} s, got {lag}")
+        return Thresholds(variance, limit, steady, steady_limit, reaches, lag)
 
 
 def explained(torque: np.ndarray, deviation: np.ndarray, jacobian: np.ndarray) -> tuple[np.ndarray, float]:
@@ -193,29 +230,44 @@ def explained(torque: np.ndarray, deviation: np.ndarray, jacobian: np.ndarray) -
 
 
 def learn(
-    reaches: Iterable[Sequence[Change]], offsets: Sequence[Offset] = (), alarm_share: float = ALARM_SHARE
+    reaches: Iterable[Sequence[Change]],
+    offsets: Sequence[Offset] = (),
+    alarm_share: float = ALARM_SHARE,
+    lag: float = 0.0,
 ) -> Thresholds:
     """From the changes of whole reaches without contact, at least 20 of them, and their offsets where the hand was
-    empty. ThresholdError says what is missing."""
+    empty; ``lag``: of the torques (s), as it was believed meanwhile. ThresholdError says what is missing."""
     runs = [list(reach) for reach in reaches if len(reach) >= CONFIRM]
     if len(runs) < 20:
         raise ThresholdError(f"expected at least 20 reaches without contact, got {len(runs)}")
     features = np.array([change.features for run in runs for change in run])
     torques = np.array([change.torque for run in runs for change in run])
-    # A squared change scatters with its own size: weighing by that size keeps the quiet samples' share.
-    variance = np.full((7, len(FEATURES)), 0.0)
-    for joint in range(7):
-        squares, weight = torques[:, joint] ** 2, np.ones(len(features))
-        for _ in range(4):
-            variance[joint] = nnls(features * weight[:, None], squares * weight)[0]
-            weight = 1.0 / np.maximum(features @ variance[joint], FLOOR)
+    rates = np.array([change.rate for run in runs for change in run])
+    weights = 1.0 / np.maximum(np.einsum("kji,ji->kj", features, shares_of(torques, features)), FLOOR)
+    moved = float(np.sum(weights * torques * rates) / max(1e-9, float(np.sum(weights * rates**2))))
+    moved = min(max(moved, -LONGEST_LAG - lag), LONGEST_LAG - lag)
+    runs = [[replace(change, torque=change.torque - moved * change.rate) for change in run] for run in runs]
+    variance = shares_of(torques - moved * rates, features)
     rests = np.array([offset.torque for offset in offsets]).reshape(-1, 7)
     # Until offsets were seen an offset has to be as large as the one that D4.10's detector asks for.
     steady = np.sqrt(np.mean(rests**2, axis=0)) if len(rests) >= 20 else np.full(7, 0.3)
     draft = Thresholds(variance, 1.0, steady, 1.0, len(runs))
     changed = [largest_confirmed([draft.force(change)[1] for change in run]) for run in runs]
     rested = [explained(each.torque, steady, each.jacobian)[1] for each in offsets] if len(rests) >= 20 else [4.0]
-    return Thresholds(variance, limit_of(changed, alarm_share), steady, limit_of(rested, alarm_share), len(runs))
+    limits = limit_of(changed, alarm_share), limit_of(rested, alarm_share)
+    return Thresholds(variance, limits[0], steady, limits[1], len(runs), lag + moved)
+
+
+def shares_of(torques: np.ndarray, features: np.ndarray) -> np.ndarray:
+    """The shares (7 x FEATURES) of the variance of n changes (n x 7, Nm) with their features (n x 7 x FEATURES)."""
+    variance = np.zeros(features.shape[1:])
+    for joint in range(7):
+        # A squared change scatters with its own size: weighing by that size keeps the quiet samples' share.
+        squares, seen, weight = torques[:, joint] ** 2, features[:, joint], np.ones(len(features))
+        for _ in range(4):
+            variance[joint] = nnls(seen * weight[:, None], squares * weight)[0]
+            weight = 1.0 / np.maximum(seen @ variance[joint], FLOOR)
+    return variance
 
 
 def limit_of(largest: Sequence[float], alarm_share: float) -> float:

@@ -36,8 +36,8 @@ class MovingContact:
     ) -> None:
         """``jacobian``: position of the joints (rad) to the palm's 3 x 7, base frame. ``period``: see
         MomentumObserver."""
-        self.thresholds = thresholds
         self.observer = MomentumObserver(dynamics, period=period)
+        self.use(thresholds)
         self.load = 0.0
         self.change: Change | None = None
         """the newest one"""
@@ -55,6 +55,11 @@ class MovingContact:
         """N on the palm then"""
         self._growing: deque[tuple[float, np.ndarray]] = deque()
         """s and Nm: the residuals of the last GROWTH"""
+
+    def use(self, thresholds: Thresholds) -> None:
+        """These thresholds, and the lag of the torques that was learnt with them, from now on."""
+        self.thresholds = thresholds
+        self.observer.lag = thresholds.lag
 
     def set_payload(self, mass: float, centre: Joints = (0.0, 0.0, 0.0)) -> None:
         """The hand carries ``mass`` kg at ``centre`` (m, ih2_palm) from now on; the past does not count any more, so
