@@ -95,7 +95,10 @@ class CarriedObject:
         likely = self._modes @ (changed + np.diag(1.0 - changed.sum(axis=1)))
         likely = np.maximum(likely, 1e-6) * np.exp(log - log.max())
         if self._near():
-            self.offset = self.offset + (1.0 - math.exp(-gap / s.follow_time)) * (position - hand - self.offset)
+            # The less is known of where the hand is, the less it tells of the object's place in it.
+            known = self._noise**2 / (self._noise**2 + hand_error**2)
+            follow = known * (1.0 - math.exp(-gap / s.follow_time))
+            self.offset = self.offset + follow * (position - hand - self.offset)
         else:
             likely[CARRIED] = 0.0
             self.offset = position - hand
