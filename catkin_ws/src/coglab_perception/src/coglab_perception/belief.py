@@ -33,8 +33,8 @@ EXTRAPOLATED = 0.10
 """s for which the hand goes on as it did, for an object that was seen after it"""
 WAITING = 40
 """most sights of an object that wait for one of the hand"""
-BENT = 2.0
-"""m/s^2, half of the acceleration by which a hand between two sights, or after the last one, goes another way"""
+BESIDE = 0.02
+"""s by which a sight of an object is beside one of the hand"""
 
 
 @dataclass(frozen=True)
@@ -194,24 +194,31 @@ class BeliefFilter:
         known = self._settled_objects[object_id] = copy(self._settled_objects[object_id])
         while waiting and waiting[0][0] <= newest:
             stamp, position = waiting.popleft()
-            hand, velocity = self._hand_at(stamp)
-            known.step(stamp, position, hand, velocity, self._error_between(stamp))
+            seen = self._hand_seen_at(stamp)
+            if seen is not None:
+                known.step(stamp, position, *seen, 0.0)
         shown = copy(known)
         for stamp, position in waiting:
             late = stamp - newest
             if late > EXTRAPOLATED:
                 break
             hand, velocity = self._hand_at(stamp)
-            shown.step(stamp, position, hand, velocity, 0.2 * late * length(velocity) + BENT * late**2)
+            shown.step(stamp, position, hand, velocity, 0.2 * late * length(velocity) + 2.0 * late**2)
         return shown
 
-    def _error_between(self, stamp: float) -> float:
-        """m, standard deviation of where the hand was at a stamp between two of its sights."""
+    def _hand_seen_at(self, stamp: float) -> tuple[np.ndarray, np.ndarray] | None:
+        """Position and velocity of the hand at a stamp between two of its sights; None where these are far apart and
+        the stamp is not beside one of them: what the hand did there nobody knows."""
         times = [t for t, _ in self._track]
         after = bisect_left(times, stamp)
-        if after == 0 or after == len(times):
-            return 0.0
-        return BENT * (stamp - times[after - 1]) * (times[after] - stamp)
+        near = [i for i in (after - 1, after) if 0 <= i < len(times)]
+        nearest = min(near, key=lambda i: abs(times[i] - stamp))
+        if times[near[-1]] - times[near[0]] <= EXTRAPOLATED:
+            return self._hand_at(stamp)
+        if abs(times[nearest] - stamp) > BESIDE:
+            return None
+        state = self._track[nearest][1]
+        return state[:3] + (stamp - times[nearest]) * state[3:], state[3:]
 
     def see_hand(
         self, stamp: float, position: np.ndarray, now: float, robot_holds: bool = False, end: PatternEnd | None = None
