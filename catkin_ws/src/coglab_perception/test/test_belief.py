@@ -192,6 +192,29 @@ def test_outliers_swaps_and_dropouts_on_the_way_change_little():
     assert max(steps(after)) < 3.0
 
 
+@pytest.mark.parametrize("unseen", [(44, 54), (50, 60), (52, 66)])
+def test_an_object_stays_where_it_is_in_a_hand_that_is_not_seen_for_a_while(unseen):
+    change = lambda t, p: None if unseen[0] <= round(t * 30) < unseen[1] else p  # noqa: E731
+    for seed in (8, 9):
+        scene = Scene(seed).watch(there, carried(there), OVER + 0.6, change)
+        after = [b for b in scene.beliefs if b.stamp > ONSET + 0.35]
+        assert min(b.offer for b in after) > 0.7
+        assert max(np.linalg.norm(b.place - b.hand_place - IN_HAND) for b in after) < 0.03
+
+
+def test_an_object_that_is_taken_for_another_for_some_sights_is_still_offered():
+    class Swapped(Scene):
+        def seen(self, name: str, place: np.ndarray) -> np.ndarray:
+            seen = super().seen(name, place)
+            self.count = getattr(self, "count", 0) + (name == "mug")
+            return seen - IN_HAND if name == "mug" and 56 <= self.count < 60 else seen
+
+    scene = Swapped(10).watch(there, carried(there), OVER + 0.6)
+    after = [b for b in scene.beliefs if b.stamp > ONSET + 0.35]
+    assert min(b.offer for b in after) > 0.7
+    assert max(np.linalg.norm(b.place - b.hand_place - IN_HAND) for b in after) < 0.03
+
+
 @pytest.mark.parametrize("period", [1, 12])
 def test_a_frame_that_jumps_between_two_hands_is_no_offer(period):
     other = np.array([1.05, -0.45, 0.35])

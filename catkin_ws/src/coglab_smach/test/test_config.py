@@ -56,6 +56,7 @@ def test_what_is_given_beside_the_file_has_to_fit_too():
 def test_a_timing_wins_over_the_file_and_what_is_given_beside_it_wins_over_the_timing():
     natural, brisk, calm = (Config.load(str(SHIPPED), {"timing": name}) for name in ("natural", "brisk", "calm"))
     assert calm.get("handover.belief") < brisk.get("handover.belief") < natural.get("handover.belief")
+    assert natural.get("handover.belief_request") > natural.get("handover.belief")
     assert brisk.get("handover.reach_ratio") < natural.get("handover.reach_ratio") < calm.get("handover.reach_ratio")
     assert calm.get("handover.doubt") == brisk.get("handover.doubt")
     assert Config.load(str(SHIPPED)).get("hand.lift_after") == natural.get("hand.lift_after")

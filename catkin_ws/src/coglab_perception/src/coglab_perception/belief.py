@@ -8,8 +8,10 @@ offer needs an object in the person's hand, a request one in the robot's.
 from __future__ import annotations
 
 import math
+from bisect import bisect_left
 from collections import deque
 from collections.abc import Mapping
+from copy import copy
 from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
@@ -29,6 +31,10 @@ GONE = 0.05
 """probability of a motion toward a handover below which there is none to take back"""
 EXTRAPOLATED = 0.10
 """s for which the hand goes on as it did, for an object that was seen after it"""
+WAITING = 40
+"""most sights of an object that wait for one of the hand"""
+BESIDE = 0.02
+"""s by which a sight of an object is beside one of the hand"""
 
 
 @dataclass(frozen=True)
@@ -148,6 +154,11 @@ class BeliefFilter:
         self._track: deque[tuple[float, np.ndarray]] = deque(maxlen=40)
         """stamps with position and velocity (6) of the hand"""
         self._objects: dict[str, CarriedObject] = {}
+        """by id, after all sights"""
+        self._settled_objects: dict[str, CarriedObject] = {}
+        """the same after those alone that are not newer than the newest sight of the hand"""
+        self._waiting: dict[str, deque[tuple[float, np.ndarray]]] = {}
+        """stamps and positions of the newer ones"""
         self._robot_holds: bool | None = None
         self._misses: list[float] = []
         self._rest = self._furthest = np.zeros(3)
@@ -168,11 +179,46 @@ class BeliefFilter:
         if known is None:
             reach = self.settings.reach
             noise = reach.noise, reach.noise_time
-            self._objects[object_id] = CarriedObject(stamp, position, hand, noise, self.settings.carried)
+            known = CarriedObject(stamp, position, hand, noise, self.settings.carried)
+            self._objects[object_id] = self._settled_objects[object_id] = known
+            self._waiting[object_id] = deque(maxlen=WAITING)
             return
-        late = min(max(0.0, stamp - self._track[-1][0]), EXTRAPOLATED)
-        speed = length(velocity)
-        known.step(stamp, position, hand, velocity, 0.2 * late * speed + 2.0 * late**2)
+        self._waiting[object_id].append((stamp, position))
+        self._objects[object_id] = self._beside_hand(object_id)
+
+    def _beside_hand(self, object_id: str) -> CarriedObject:
+        """An object after all its sights. What was seen of it since the newest sight of the hand is judged by where
+        the hand would be, as long as that is known, and again once the hand has been seen after it: a hand that is not
+        seen for a while, or stops meanwhile, does not go on as it did."""
+        newest, waiting = self._track[-1][0], self._waiting[object_id]
+        known = self._settled_objects[object_id] = copy(self._settled_objects[object_id])
+        while waiting and waiting[0][0] <= newest:
+            stamp, position = waiting.popleft()
+            seen = self._hand_seen_at(stamp)
+            if seen is not None:
+                known.step(stamp, position, *seen, 0.0)
+        shown = copy(known)
+        for stamp, position in waiting:
+            late = stamp - newest
+            if late > EXTRAPOLATED:
+                break
+            hand, velocity = self._hand_at(stamp)
+            shown.step(stamp, position, hand, velocity, 0.2 * late * length(velocity) + 2.0 * late**2)
+        return shown
+
+    def _hand_seen_at(self, stamp: float) -> tuple[np.ndarray, np.ndarray] | None:
+        """Position and velocity of the hand at a stamp between two of its sights; None where these are far apart and
+        the stamp is not beside one of them: what the hand did there nobody knows."""
+        times = [t for t, _ in self._track]
+        after = bisect_left(times, stamp)
+        near = [i for i in (after - 1, after) if 0 <= i < len(times)]
+        nearest = min(near, key=lambda i: abs(times[i] - stamp))
+        if times[near[-1]] - times[near[0]] <= EXTRAPOLATED:
+            return self._hand_at(stamp)
+        if abs(times[nearest] - stamp) > BESIDE:
+            return None
+        state = self._track[nearest][1]
+        return state[:3] + (stamp - times[nearest]) * state[3:], state[3:]
 
     def see_hand(
         self, stamp: float, position: np.ndarray, now: float, robot_holds: bool = False, end: PatternEnd | None = None
@@ -202,7 +248,8 @@ class BeliefFilter:
         self._robot_holds = robot_holds
         self._track.clear()
         self._track.append((stamp, np.concatenate([position, np.zeros(3)])))
-        self._objects.clear()
+        for kept in (self._objects, self._settled_objects, self._waiting):
+            kept.clear()
         self._misses.clear()
         self._rest = self._furthest = position
         self._place.forget()
@@ -217,6 +264,8 @@ class BeliefFilter:
             return
         self._misses.clear()
         self._track.append((stamp, np.concatenate([bank.position(), bank.velocity()])))
+        for object_id in self._objects:
+            self._objects[object_id] = self._beside_hand(object_id)
         prediction = bank.prediction()
         if prediction is None or bank.handover < GONE:
             self._rest = self._furthest = position

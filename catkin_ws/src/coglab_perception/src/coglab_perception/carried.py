@@ -79,7 +79,7 @@ class CarriedObject:
         moved = max(0.0, 1.0 - 3.0 * JITTER**2 / max(1e-12, float(believed @ believed)))
         hand_way = moved * (hand - self._hand)
         error = 2.0 * self._noise**2 * (1.0 - math.exp(-gap / self._noise_time)) + JITTER**2
-        if length(way) > s.fastest * gap + 4.0 * math.sqrt(error) and gap < s.lost_time:
+        if gap < s.lost_time and not self._possible(way, hand_way, gap, 4.0 * math.sqrt(error) + 2.0 * hand_error):
             return
         variances = np.array(
             [
@@ -95,11 +95,29 @@ class CarriedObject:
         likely = self._modes @ (changed + np.diag(1.0 - changed.sum(axis=1)))
         likely = np.maximum(likely, 1e-6) * np.exp(log - log.max())
         if self._near():
-            self.offset = self.offset + (1.0 - math.exp(-gap / s.follow_time)) * (position - hand - self.offset)
+            # The less is known of where the hand is, the less it tells of the object's place in it.
+            known = self._noise**2 / (self._noise**2 + hand_error**2)
+            follow = known * (1.0 - math.exp(-gap / s.follow_time))
+            self.offset = self.offset + follow * (position - hand - self.offset)
         else:
             likely[CARRIED] = 0.0
             self.offset = position - hand
         self._modes = likely / likely.sum()
+
+    def _possible(self, way: np.ndarray, hand_way: np.ndarray, gap: float, error: float) -> bool:
+        """Whether an object can have gone a way (m) in a gap (s). What is free goes anywhere; what was not free lies, goes
+        with the hand, or has just left it and falls: any other way is that of something else."""
+        if length(way) > self.settings.fastest * gap + error:
+            return False
+        if self._modes[FREE] > 0.5:
+            return True
+        error += self.settings.turning * length(hand_way)
+        for start in (np.zeros(3), hand_way):
+            off = way - start
+            off[2] -= min(0.0, max(-self.settings.fastest * gap, off[2]))
+            if length(off) <= error:
+                return True
+        return False
 
     def _near(self) -> bool:
         return length(self._position - self._hand) < self.settings.reach

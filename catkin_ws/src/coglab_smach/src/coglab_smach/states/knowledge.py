@@ -169,6 +169,9 @@ def believed(
     """Where ``target`` will be at a handover that is believed to have begun: its frame ahead, turned as it is seen now;
     None where nothing is believed yet, or something outside the handover region."""
     level = float(ctx.config.get("handover.belief", 0.85))
+    if person:
+        # A hand that asks carries nothing: its motion alone has to tell it from one that points.
+        level = float(ctx.config.get("handover.belief_request", level))
     ahead = ctx.perception.ahead()
     mine = (ahead.request if person else ahead.offer) >= level and (person or ahead.object_id == target)
     place = np.array(ahead.place)
