@@ -105,8 +105,10 @@ class CarriedObject:
         self._modes = likely / likely.sum()
 
     def _possible(self, way: np.ndarray, hand_way: np.ndarray, gap: float, error: float) -> bool:
-        """Whether an object can have gone a way (m) in a gap (s). What is free goes anywhere; what was not free lies, goes
-        with the hand, or has just left it and falls: any other way is that of something else."""
+        """Whether an object can have gone a way (m) in a gap (s), but for an error (m). What is free goes anywhere.
+
+        What was not free lies, goes with the hand, or has just left it and falls; any other way is something else's.
+        """
         if length(way) > self.settings.fastest * gap + error:
             return False
         if self._modes[FREE] > 0.5:
