@@ -89,7 +89,7 @@ def test_rows_without_a_reach_that_is_long_enough_are_missed_and_not_dropped(sha
 @pytest.mark.parametrize("perception", ["noisy perception", "perfect perception"])
 @pytest.mark.parametrize("action", bench_trials.EXCHANGES)
 def test_the_pose_as_received_is_judged_whatever_was_latched(action, perception):
-    """Issue 8 asked for 5 mm and 3 deg to the goal as received; the latched one is the controller's own estimate."""
+    """Asked for were 5 mm and 3 deg to the goal as received; the latched one is the controller's own estimate."""
     campaign = Campaign()
     ended = dict(stood=True, reached=DURATION, over=2.0, met=True)
     for off, fine in (((0.004, 0.05), True), ((0.006, 0.06), False)):

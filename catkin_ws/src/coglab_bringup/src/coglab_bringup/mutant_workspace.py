@@ -13,17 +13,9 @@ from coglab_bringup.arguments import package_folders, used_by
 
 NOT_COPIED = (".git", ".coglab", "out", "build", "devel", "install", "__pycache__", ".pytest_cache", ".ruff_cache")
 BUILD_LIMIT = 3600.0  # s
-NO_JUDGES = {
-    *("test_house.py", "test_types.py", "test_one_place.py", "test_packages.py"),
-    *(
-        "test_pages.py",
-        "test_figures.py",
-        "test_measured_words.py",
-        "test_architecture.py",
-        "test_people_page.py",
-        "test_feature_table.py",
-    ),
-}
+FORM = ("test_house.py", "test_types.py", "test_one_place.py", "test_packages.py")
+PAGES = ("test_pages.py", "test_figures.py", "test_measured_words.py", "test_architecture.py", "test_people_page.py")
+NO_JUDGES = {*FORM, *PAGES, "test_feature_table.py"}
 """tests of the sources' form and of pages: a change that only the formatter or a page notices is one that no test of
 what the program does has noticed"""
 
