@@ -17,8 +17,7 @@ from coglab_smach.states.arm import HomeRobot
 from coglab_smach.states.base import CoglabMachine, CoglabState
 from coglab_smach.states.held import LOOK, HeldObject
 from coglab_smach.states.motion import end_motion
-from coglab_smach.states.weight import AWAY
-from coglab_smach.states.where import hand_from_palm
+from coglab_smach.states.where import AWAY, hand_from_palm
 
 CAUGHT = 1.0
 """s in which fingers that have begun to close on the way stand"""

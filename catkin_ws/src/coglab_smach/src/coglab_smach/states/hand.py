@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -14,7 +13,7 @@ from coglab_smach.context.context import Context
 from coglab_smach.ports.pending import Pending, PortError
 from coglab_smach.states.base import CoglabState, Interrupted, TimeLimit
 from coglab_smach.states.motion import shift, shift_time
-from coglab_smach.states.where import hand_from_palm, palm_axis
+from coglab_smach.states.where import AWAY, hand_from_palm, palm_axis
 from coglab_smach.states.yielding import GivesWay
 
 LOOSE = 40
@@ -135,7 +134,7 @@ class HandClose(CoglabState):
         """Whether the fingers stand around the object; or the person has gone, so that opening would let it fall."""
         if stopped_by_object(mode, positions):
             return True
-        gone = float(self.ctx.config.get("hand.let_go", 0.04)) + (self._before or math.inf)
+        gone = AWAY if self._before is None else self._before + float(self.ctx.config.get("hand.let_go", 0.04))
         return (hand_from_palm(self) or 0.0) > gone
 
     def _give_way(self, closing: Pending) -> None:

@@ -12,13 +12,11 @@ from coglab_smach.context.context import Context
 from coglab_smach.ports.pending import PortError
 from coglab_smach.states.base import CoglabState, TimeLimit
 from coglab_smach.states.motion import rise
-from coglab_smach.states.where import hand_from_palm, palm_at
+from coglab_smach.states.where import AWAY, hand_from_palm, palm_at
 from coglab_smach.states.yielding import LEAST_WAY, GivesWay
 
 MOST_RISES = 8
 """the first one, and those that go on where the weight or somebody's pull has ended one"""
-AWAY = 0.5
-"""m from the palm: a person's hand that is seen there holds nothing that is in the robot's"""
 
 
 class TakeWeight(CoglabState):

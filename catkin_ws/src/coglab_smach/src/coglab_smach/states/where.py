@@ -18,6 +18,8 @@ from coglab_smach.states.base import CoglabState
 
 NEARER = 0.02
 """m by which what a person has missed is brought nearer than it was offered"""
+AWAY = 0.5
+"""m from the palm: a person's hand that is seen there holds nothing that is in the robot's"""
 OLDEST = 0.5
 """s, an older sight does not tell where the hand is"""
 
