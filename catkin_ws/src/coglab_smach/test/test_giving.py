@@ -2,6 +2,7 @@
 
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 from coglab_msgs.msg import ReasonCode, Say
 from coglab_py.pose import Pose
@@ -10,6 +11,7 @@ from coglab_smach.contact.leaving_load import SAME, LeavingLoad
 from coglab_smach.kinematics.reachability import default_arm
 from coglab_smach.ports.interfaces import HandState, Located
 from coglab_smach.ports.pending import PortError, Ready
+from coglab_smach.states import give
 from coglab_smach.states.held import FARTHER, LOST_TIME, NEAR, HeldObject
 from conftest import Trial
 from virtual_trial import VirtualTrial
@@ -85,6 +87,25 @@ def test_a_person_who_holds_on_to_a_part_keeps_the_arm_there():
     assert trial.ctx.journal.results[-1].outcome == "stopped" and trial.ctx.holding == "mug"
     assert trial.cell.called("close") and finger(trial) == 160
     assert "the person may still hold 'mug'" in trial.ctx.journal.why()
+
+
+@pytest.mark.parametrize("waits", [True, False])
+def test_the_object_is_brought_to_a_hand_that_waits_elsewhere(monkeypatch, waits):
+    """A reach toward where a hand would be has ended before that hesitated. A hand that still comes is left alone."""
+    looks = []
+
+    def way(state, object_id, delivery):
+        looks.append(1)
+        return np.array([0.1 if waits else 0.05 + 0.03 * (len(looks) % 5), 0.0, 0.0])
+
+    monkeypatch.setattr(give, "way_to_hand", way)
+
+    def script(t):
+        t.clock.sleep(0.8)
+        assert len(t.cell.called("move_ptp")) == (1 if waits else 0)
+        t.wait_hub("wait_with_object")
+
+    assert giving(script, **{"give.near": 2.0}).result().outcome == "failed_holding"
 
 
 def test_the_arm_sinks_once_where_nobody_lifts():

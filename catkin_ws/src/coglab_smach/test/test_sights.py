@@ -136,7 +136,10 @@ class Reach(WaitStop):
             ),
             journal=SimpleNamespace(mark=lambda name: None),
         )
-        self._early, self._grip = SimpleNamespace(doubted=lambda: doubted, hopeful=lambda: False, doubt=lambda: WITHDRAWN), None
+        self._early, self._grip = (
+            SimpleNamespace(doubted=lambda: doubted, hopeful=lambda: False, doubt=lambda: WITHDRAWN),
+            None,
+        )
 
     def allow(self, duration):
         pass

@@ -211,7 +211,7 @@ def test_a_partner_who_pushes_the_arm_away_while_it_receives(after, outcomes):
 
 def test_who_offers_and_withdraws_five_times_is_not_chased():
     """Each ends because the goal went back or left the region, and the sixth offer is taken. The palm goes toward the
-    hand with at most 0.25 m/s from 0.2 s after the hand is 0.10 m back, and not much faster 0.2 s after it has turned."""
+    hand with at most 0.25 m/s from 0.2 s after that is 0.10 m back, and not much faster 0.2 s after it has turned."""
     trial = VirtualTrial(seed=4, profile="accustomed", perfect=True, behaviour="withdraws")
     fastest, fastest_after, turned, back = {}, {}, {}, {}
 

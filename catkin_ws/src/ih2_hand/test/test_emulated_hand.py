@@ -302,12 +302,9 @@ def test_short_and_wrap_faults(raw):
     assert raw.ask("45 02") == "00"
 
 
-@pytest.mark.parametrize(
-    "fault, largest",
-    [("lose", 10000), ("lose_in", 10000), ("garbage", 10000), ("double", 10000), ("slow", 60000), ("stuck", 4), ("short", 4)],
-)
-def test_the_number_of_a_fault_goes_from_0_to_its_largest(raw, fault, largest):
-    faults = Faults(raw.hand)
+@pytest.mark.parametrize("fault", ["lose", "lose_in", "garbage", "double", "slow", "stuck", "short"])
+def test_the_number_of_a_fault_goes_from_0_to_its_largest(raw, fault):
+    faults, largest = Faults(raw.hand), {"slow": 60000, "stuck": 4, "short": 4}.get(fault, 10000)
     for number in (0, largest):
         assert faults.command(f"{fault} {number}")
     for number in (-1, largest + 1):
@@ -390,20 +387,10 @@ def test_no_contact_can_break_the_hand(raw, positions, stiffness):
     assert len(raw.walk(2, 2.0)) > 1
 
 
-@pytest.mark.parametrize(
-    "command",
-    [
-        "",
-        " ",
-        "unplug nan",
-        "unplug -1",
-        "unplug inf",
-        "lose -1",
-        "garbage 99999999999999999999",
-        "stuck x",
-        "x" * 100_000,
-    ],
-)
+NO_FAULTS = ["", " ", "unplug nan", "unplug -1", "unplug inf", "lose -1", "garbage 99999999999999999999", "stuck x"]
+
+
+@pytest.mark.parametrize("command", [*NO_FAULTS, "x" * 100_000])
 def test_no_fault_command_can_break_the_hand(raw, command):
     with pytest.raises(ValueError, match="no such fault"):
         Faults(raw.hand).command(command)

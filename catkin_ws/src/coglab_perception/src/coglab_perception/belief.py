@@ -248,8 +248,9 @@ class BeliefFilter:
         self._robot_holds = robot_holds
         self._track.clear()
         self._track.append((stamp, np.concatenate([position, np.zeros(3)])))
-        for kept in (self._objects, self._settled_objects, self._waiting):
-            kept.clear()
+        self._objects.clear()
+        self._settled_objects.clear()
+        self._waiting.clear()
         self._misses.clear()
         self._rest = self._furthest = position
         self._place.forget()

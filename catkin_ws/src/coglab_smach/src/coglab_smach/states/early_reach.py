@@ -34,6 +34,10 @@ def target_of(goal: Mapping[str, Any]) -> str:
     return str(goal["frame"]).removesuffix("_ahead").removeprefix("object_")
 
 
+OUTSIDE = (int(ReasonCode.GOAL_AHEAD_OUTSIDE), "the person's reach seems to end outside the handover region")
+"""ReasonCode and sentence of a predicted place that is not followed"""
+
+
 class PersonsGrip:
     """Tells an object that falls from one that is lowered fast: whether the person's hand is still at it."""
 
@@ -64,8 +68,8 @@ class PersonsGrip:
 
 class EarlyReach:
     """Watches a reach toward where something will be: the thing itself may not go back nor fall (cc.GoalWatch, the
-    rules of a reach toward a goal that is seen), where it will be has to lie in the handover region, and outside of that
-    somebody has to go on offering it."""
+    rules of a reach toward a goal that is seen), where it will be has to lie in the handover region, and somebody has
+    to go on offering it."""
 
     def __init__(self, state: CoglabState, goal: Mapping[str, Any], grip: PersonsGrip | None) -> None:
         """``grip``: of the person on the object that the reach is for."""
@@ -87,12 +91,12 @@ class EarlyReach:
     def doubt(self) -> tuple[int, str]:
         """ReasonCode and sentence of what is doubted."""
         if self._outside:
-            return int(ReasonCode.GOAL_AHEAD_OUTSIDE), "the person's reach seems to end outside the handover region"
+            return OUTSIDE
         return int(ReasonCode.GOAL_WITHDRAWN), "the person does not offer or ask any more"
 
     def doubted(self) -> bool:
-        """Whether nobody has offered or asked for a while, or what the reach is for goes back. TimeLimit, which ends the
-        reach, where it went back too far, or fell."""
+        """Whether nobody has offered or asked for a while, or what the reach is for goes back. TimeLimit, which ends
+        the reach, where it went back too far, or fell."""
         now = self.state.ctx.clock.now()
         if now - self._looked >= PERIOD and self.hopeful():
             self._sure = now

@@ -30,6 +30,8 @@ sensors, nodes and the hand's line take some hundredths of a second"""
 GRAVITY = 9.81
 ASTRAY = 0.02
 """m that the object is from where it is offered, from which on it is brought there"""
+BRINGS, LOOKS = 3, 0.3
+"""times at most that it is; s between two looks, between which a hand that waits moves by less than ASTRAY"""
 
 
 class LooseningGrip:
@@ -199,10 +201,11 @@ class GiveLoad(CoglabState):
     The grip loosens in proportion to their share of the weight, as people's does (Chan 2012, Endo 2012): where the hand
     feels its grip, the force of it falls as the load does, down to ``give.grip_safety`` times what friction needs for
     what the hand still carries, by ``give.ease`` counts at most; else it is ``give.loosen`` counts. When the load comes
-    back to the arm, or the object sinks in the hand by ``give.slip`` m, the grip closes again. Where nothing has
-    happened for ``give.lower_after`` s and the person's hand is there, the arm brings the object to where that hand
-    takes it, and then sinks by ``give.lower`` m, so that the weight comes to lie in it. After the time limit the grip
-    closes and keeps the object.
+    back to the arm, or the object sinks in the hand by ``give.slip`` m, the grip closes again. Where the person's hand
+    waits there, but not at the object, the arm brings it to where that hand takes it, ``give.bring_after`` s after its
+    own arrival and later; a reach toward where a hand would be may have ended before that hesitated. Where nothing has
+    happened for ``give.lower_after`` s the arm sinks by ``give.lower`` m, so that the weight comes to lie in the hand.
+    After the time limit the grip closes and keeps the object.
     """
 
     default_time_limit = 20.0
@@ -216,9 +219,10 @@ class GiveLoad(CoglabState):
         """the way (m) from the object to where the person's hand takes it"""
         self._lowering: Pending | None = None
         self._moving: Pending | None = None
-        self._lower_at = 0.0
-        self._brought = False
-        """nearer to the person's hand, if it was not near enough"""
+        self._lower_at = self._look_at = 0.0
+        self._brings = 0
+        self._way: np.ndarray | None = None
+        """m, of the last look: from the object to where the person's hand takes it"""
         self._needed = self._slips_at = 0.0
         """share of the load; N of grip below which the object slips while the hand carries all of it"""
         self._back_since: float | None = None
@@ -242,10 +246,11 @@ class GiveLoad(CoglabState):
             contact.grip,
         )
         self._lowering = self._moving = self._back_since = None
-        self._brought = False
+        self._brings, self._way = 0, None
         self._offer = partial(way_to_hand, self, ud.object_id, ud.delivery)
         self._held = HeldObject(self.ctx, ud.object_id)
-        self._lower_at = self.ctx.clock.now() + self._number("lower_after", 3.0)
+        now = self.ctx.clock.now()
+        self._look_at, self._lower_at = now + self._number("bring_after", 1.0), now + self._number("lower_after", 3.0)
         try:
             self.wait_for(self._taken, "the person's taking of the load", limit, code=PERSON)
         except TimeLimit as error:
@@ -274,8 +279,9 @@ class GiveLoad(CoglabState):
         share, now = self.ctx.contact.share_gone(), self.ctx.clock.now()
         begins = self._number("begins", 0.2)
         self._follow(0.0 if share is None else share, begins, now)
-        if share is not None and share < begins and self._lowering is None and now >= self._lower_at:
-            self._lower(now)
+        brings = self._moving is not None and not self._moving.done()
+        if share is not None and share < begins and self._lowering is None and not brings and now >= self._look_at:
+            self._bring_or_lower(now)
         return False
 
     def _follow(self, share: float, begins: float, now: float) -> None:
@@ -306,20 +312,22 @@ class GiveLoad(CoglabState):
         least = left * self._slips_at * self._number("grip_safety", 2.0)
         return self._grip.ease_to(left, least, self._number("ease", 12.0), self.ctx.clock.now())
 
-    def _lower(self, now: float) -> None:
-        """Bring the object to the person's hand, if it is elsewhere, or sink; where no hand is, look again in a
-        moment."""
-        self._lower_at = now + 0.5
-        distance, speed = hand_from_palm(self), self._number("lower_speed", 0.03)
-        if distance is None or distance >= self._number("near", 0.25):
+    def _bring_or_lower(self, now: float) -> None:
+        """Bring the object to a person's hand that waits elsewhere, or sink; where no hand is, look again soon."""
+        self._look_at = now + LOOKS
+        distance, near, before = hand_from_palm(self), self._number("near", 0.25), self._way
+        self._way = None
+        if distance is None or distance >= near:
             return
-        way = None if self._brought else self._offer()
-        self._brought = True
-        if way is not None and ASTRAY < math.hypot(*way) < self._number("near", 0.25):
-            self._moving = shift(self.ctx, way, speed)
-            self._lower_at = now + math.hypot(*way) / speed + 0.5
-        else:
-            self._lowering = rise(self.ctx, -self._number("lower", 0.03), speed)
+        way = self._way = self._offer()
+        length = 0.0 if way is None else math.hypot(*way)
+        if way is not None and ASTRAY < length < near and self._brings < BRINGS:
+            if before is not None and math.hypot(*(way - before)) < ASTRAY:
+                speed = self._number("bring_speed", 0.08)
+                self._moving, self._way, self._brings = shift(self.ctx, way, speed), None, self._brings + 1
+                self._lower_at = now + length / speed + self._number("lower_after", 3.0)
+        elif now >= self._lower_at:
+            self._lowering = rise(self.ctx, -self._number("lower", 0.03), self._number("lower_speed", 0.03))
 
     def _keep(self) -> None:
         """The object stays in the hand: closed again, where it was loosened."""

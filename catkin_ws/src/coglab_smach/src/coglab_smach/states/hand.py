@@ -170,7 +170,9 @@ class HandTighten(CoglabState):
 
     def run(self, ud: Any) -> str:
         if self.at_home == bool(ud.hand_seen_away):
-            self.reason = "it was held firmly before" if self.at_home else "the person's hand was not seen to go: at home"
+            self.reason = (
+                "it was held firmly before" if self.at_home else "the person's hand was not seen to go: at home"
+            )
             return "succeeded"
         level = ud.object_entry["grasps"][ud.grasp_name]["hand"]["level"]
         if level == ud.grasp["hand"]["level"]:

@@ -15,7 +15,7 @@ from coglab_smach.kinematics.motion_time import reach_time
 from coglab_smach.ports.interfaces import ContactEvent, DmpRequest
 from coglab_smach.ports.pending import PortError
 from coglab_smach.states.base import CoglabState, Interrupted, TimeLimit
-from coglab_smach.states.early_reach import EarlyReach, PersonsGrip, target_of
+from coglab_smach.states.early_reach import OUTSIDE, EarlyReach, PersonsGrip, target_of
 from coglab_smach.states.motion import shift, shift_time
 from coglab_smach.states.where import off_grasp, palm_axis
 
@@ -329,11 +329,7 @@ class WaitStop(CoglabState):
         progress = self.ctx.arm.dmp_progress()
         if progress.state == "aborted" and progress.code == ReasonCode.GOAL_LEFT_REGION and self._early is not None:
             # It may have been believed so for a moment only.
-            self._pause(
-                self._early,
-                ReasonCode.GOAL_AHEAD_OUTSIDE,
-                "the person's reach seems to end outside the handover region",
-            )
+            self._pause(self._early, *OUTSIDE)
             return False
         if progress.state == "aborted":
             why, code = progress.reason or "the controller gave no reason", progress.code

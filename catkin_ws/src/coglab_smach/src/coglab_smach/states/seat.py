@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -43,11 +44,13 @@ class Seat(CoglabState):
         self.allow(limit + 3.0)
         motion = shift(self.ctx, way, SPEED)
         if motion is not None:
-            self.wait_for(
-                lambda: motion.done() or self._pushes(), "the way to the grasp", limit, self.ctx.arm.speed_scale, ARM
-            )
+            over = partial(self._over, motion)
+            self.wait_for(over, "the way to the grasp", limit, self.ctx.arm.speed_scale, ARM)
             self._end(motion)
         return "succeeded"
+
+    def _over(self, motion: Pending) -> bool:
+        return motion.done() or self._pushes()
 
     def _pushes(self) -> bool:
         force = self.ctx.contact.force()

@@ -24,9 +24,9 @@ class TakeWeight(CoglabState):
     ``hand.lift_speed`` m/s. A person who does not let go gets the object back.
 
     The weight that comes is measured (``hand.load_share`` of the object's), and the rise stands then: the person feels
-    that it is carried, is told so, and an arm that went on would draw gentle fingers along an object that is still held.
-    But the weight is counted from the closing of the fingers, when a person often still presses the object up or down:
-    where they hold on for ``hand.lift_pause`` s all the same, the arm rises on by ``hand.lift_step`` m, again and again.
+    that it is carried, is told so, and an arm that went on would draw gentle fingers along what is still held. But the
+    weight is counted from the closing of the fingers, when a person often still presses the object up or down: where
+    they hold on for ``hand.lift_pause`` s all the same, the arm rises on by ``hand.lift_step`` m, again and again.
     ``hand_distance``: m, of the person's hand from the palm before the fingers closed; None where no tracker saw it,
     and then the weight has to have come by the end of the whole rise, or the hand to be seen AWAY. Where the
     tracker has lost the hand since, the person may have gone: nothing is opened, the arm stays and says so.
