@@ -1,8 +1,11 @@
 """A touch on the way past an object is not yet the moment to close; and what goes down with the hand does not fall."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from coglab_msgs.msg import ReasonCode
+from coglab_smach.ports.interfaces import Located
 from coglab_smach.states import early_reach, reach
 from conftest import Trial
 
@@ -51,9 +54,17 @@ def test_it_does_not_go_on_for_ever(monkeypatch):
 
 @pytest.mark.parametrize("apart, code", [(0.03, "GOAL_WITHDRAWN"), (0.12, "GOAL_FELL"), (None, "GOAL_FELL")])
 def test_what_is_still_at_the_hand_has_not_fallen(monkeypatch, apart, code):
-    thing, hand = np.array([0.7, 0.0, 0.4]), [np.array([0.73, 0.0, 0.4])]
-    monkeypatch.setattr(early_reach, "person_at", lambda state: hand[0])
-    monkeypatch.setattr(early_reach, "seen_at", lambda state, target: thing)
-    grip = early_reach.PersonsGrip(None, "mug")
-    hand[0] = None if apart is None else thing + [apart, 0.0, 0.0]
+    thing, hand, t = np.array([0.7, 0.0, 0.4]), [np.array([0.73, 0.0, 0.4])], [0.0]
+
+    def sight(state, name):
+        place = thing if name == "mug" else hand[0]
+        return None if place is None else Located(name, "world", tuple(place), (0.0, 0.0, 0.0, 1.0), 0.05)
+
+    def pause(duration):
+        t[0] += duration
+
+    monkeypatch.setattr(early_reach, "sight_of", sight)
+    ctx = SimpleNamespace(clock=SimpleNamespace(now=lambda: t[0]), config={})
+    grip = early_reach.PersonsGrip(SimpleNamespace(ctx=ctx, pause=pause), "mug")
+    hand[0] = None if apart is None else thing + [0.03, 0.0, apart]
     assert grip.fell_or_withdrawn() == getattr(ReasonCode, code)

@@ -30,6 +30,8 @@ sensors, nodes and the hand's line take some hundredths of a second"""
 GRAVITY = 9.81
 ASTRAY = 0.02
 """m that the object is from where it is offered, from which on it is brought there"""
+BEYOND = 0.06
+"""the same before ``give.lower_after``: a person who is nearer comes to it, and would meet an arm that comes, too"""
 BRINGS, LOOKS = 3, 0.3
 """times at most that it is; s between two looks, between which a hand that waits moves by less than ASTRAY"""
 
@@ -321,7 +323,7 @@ class GiveLoad(CoglabState):
             return
         way = self._way = self._offer()
         length = 0.0 if way is None else math.hypot(*way)
-        if way is not None and ASTRAY < length < near and self._brings < BRINGS:
+        if way is not None and (BEYOND if now < self._lower_at else ASTRAY) < length < near and self._brings < BRINGS:
             if before is not None and math.hypot(*(way - before)) < ASTRAY:
                 speed = self._number("bring_speed", 0.08)
                 self._moving, self._way, self._brings = shift(self.ctx, way, speed), None, self._brings + 1
