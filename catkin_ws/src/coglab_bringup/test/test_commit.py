@@ -1,8 +1,7 @@
 """The commit is found without git, however the checkout keeps it."""
 
 import pytest
-from coglab_bringup.arguments import mutants_options
-from coglab_bringup.commit import commit_of, commit_seed
+from coglab_bringup.commit import commit_of, commit_seed, folder_seed
 
 COMMIT = "0abc123" + "4" * 33
 
@@ -30,8 +29,7 @@ def test_found_without_git(kept, tmp_path, monkeypatch):
     (tmp_path / ".git").mkdir()
     kept(tmp_path / ".git")
     assert commit_of(tmp_path) == COMMIT and commit_seed(tmp_path) == 0x0ABC123
-    (tmp_path / "catkin_ws" / "src").mkdir(parents=True)
-    assert mutants_options(tmp_path, []).seed == 0x0ABC123
+    assert folder_seed(tmp_path, tmp_path / "package") == 0x0ABC123
 
 
 @pytest.mark.parametrize("kept", [loose, packed])
