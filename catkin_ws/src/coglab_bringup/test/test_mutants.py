@@ -106,7 +106,7 @@ class FakeWorkspace:
         (folder / "package.xml").write_text("<package><name>one</name></package>")
         self.file = folder / "src" / "one.cpp"
         self.file.write_text("int f(int a) {\n  if (a < 3) return 1;\n  return a + 4;\n}\nint g() { return 5 * 6; }\n")
-        self.builds, self.alone = 0, []
+        self.builds, self.readied, self.alone = 0, 0, []
         self.seen: list[str] = []
 
     def digest_of(self, package) -> str:
@@ -117,6 +117,9 @@ class FakeWorkspace:
         self.alone.append(alone)
         self.stale = alone is not None
         return "return a - 4" not in self.file.read_text()  # this one does not compile
+
+    def ready(self, say) -> None:
+        self.readied += 1
 
     def programs(self, packages):
         class Program:
@@ -145,9 +148,9 @@ def test_a_campaign_judges_keeps_and_goes_on(tmp_path):
     second = campaign(again)
     second.run(3)
     assert said[-1] == "one: 3 were judged before"
-    assert second.mutants() == first.mutants() and again.builds == 0
+    assert second.mutants() == first.mutants() and again.builds == again.readied == 0
     second.run(6)
-    assert second.mutants()[:3] == first.mutants() and len(second.mutants()) == 6
+    assert second.mutants()[:3] == first.mutants() and len(second.mutants()) == 6 and again.readied == 1
     whole = FakeWorkspace(tmp_path / "other")
     third = campaign(whole)
     third.run(6)
@@ -280,8 +283,10 @@ def test_only_the_seed_of_the_commit_and_its_sources_are_kept_for_the_page(tmp_p
     (source := tmp_path / "catkin_ws" / "src" / CORES[0]).mkdir(parents=True)
     (source / "package.xml").write_text(f"<package><name>{CORES[0]}</name></package>")
     for words, before in (([CORES[0]], committed), (["--seed", "77"], committed), ([], changed)):
-        assert not mutants.recorded(tmp_path, mutants_options(tmp_path, [*words, *own]), [], before) and not kept
-    assert mutants.recorded(tmp_path, mutants_options(tmp_path, own), [], committed) and kept == [committed]
+        assert not mutants.recorded(tmp_path, mutants_options(tmp_path, [*words, *own]), {}, [], before) and not kept
+    moved = mutants.recorded(tmp_path, mutants_options(tmp_path, own), {CORES[0]: 5}, [], committed)
+    assert not moved and not kept, "not the seed of a last commit"
+    assert mutants.recorded(tmp_path, mutants_options(tmp_path, own), {}, [], committed) and kept == [committed]
 
 
 def test_a_test_that_is_red_anyway_is_left_out_and_said(tmp_path):
@@ -362,7 +367,7 @@ def test_a_changed_word_in_a_document_throws_no_campaign_away(tmp_path):
 def test_options():
     assert mutants_options(TOP, ["ih2_hand", "--seed", "9"]).seed == 9
     options = mutants_options(TOP, [])
-    assert options.packages == [] and options.count == 12 and options.seed == mutants_options(TOP, []).seed
+    assert options.packages == [] and options.count == 12 and options.seed is None, "each package has its own"
     assert mutants_options(TOP, ["--count", "3"]).count == 3
     for bad in (["nobody"], ["--seed", "-1"], ["--count", "0"], ["--seed"]):
         with pytest.raises(Refused):

@@ -6,10 +6,12 @@ import json
 from pathlib import Path
 
 import pytest
-from coglab_bringup.mutant_rows import EQUIVALENT, Equivalent, Mutant, read_equivalent, rows_of
+from coglab_bringup.mutant import EQUIVALENT, Equivalent, Mutant, read_equivalent
+from coglab_bringup.mutant_rows import rows_of
 from coglab_bringup.usage import Refused
 
 TOP = Path(__file__).resolve().parents[4]
+SEEDS = {"one": 7, "two": 7}
 
 
 def mutant(number, verdict="killed", package="one"):
@@ -28,33 +30,41 @@ def equivalent(number, reason="a is never that large"):
 
 
 def test_a_row_needs_twelve_mutants_in_each_package():
-    rows = rows_of({"one": package(11), "two": package(40, name="two")}, 7, [], [])
+    rows = rows_of({"one": package(11), "two": package(40, name="two")}, SEEDS, [], [])
     assert [(row["value"], row["ok"]) for row in rows[:3]] == [(100.0, False), (100.0, True), (100.0, False)]
     assert all("seed 7" in row["figure"] and ">= 12 each" in row["goal"] for row in rows[:3])
-    assert all(row["ok"] for row in rows_of({"one": package(12), "two": package(12, name="two")}, 7, [], []))
+    assert all(row["ok"] for row in rows_of({"one": package(12), "two": package(12, name="two")}, SEEDS, [], []))
+
+
+def test_each_row_says_its_seed():
+    of = {"one": package(12), "two": package(12, name="two")}
+    rows = rows_of(of, {"one": 7, "two": 8}, [], [])
+    assert "one, seed 7, of" in rows[0]["figure"] and "two, seed 8, of" in rows[1]["figure"]
+    assert "all, seeds of the packages' last commits, of" in rows[2]["figure"]
+    assert "all, seed 7, of" in rows_of(of, SEEDS, [], [])[2]["figure"]
 
 
 def test_rows_say_when_the_tests_of_the_package_alone_have_judged():
     words = ", by the package's own tests alone, "
     of = {"one": package(12), "two": package(12, name="two")}
-    assert all(words in row["figure"] for row in rows_of(of, 7, [], [], own=True)[:3])
-    assert not any(words in row["figure"] for row in rows_of(of, 7, [], []))
+    assert all(words in row["figure"] for row in rows_of(of, SEEDS, [], [], own=True)[:3])
+    assert not any(words in row["figure"] for row in rows_of(of, SEEDS, [], []))
 
 
 def test_nothing_judged_is_missed():
-    rows = rows_of({"one": [None, None]}, 7, [], [])
+    rows = rows_of({"one": [None, None]}, SEEDS, [], [])
     assert rows[0]["value"] is None and not rows[0]["ok"]
 
 
 def test_the_goals_are_shares_of_what_was_judged():
-    assert rows_of({"one": package(20, 5)}, 7, [], [])[0]["ok"]
-    assert not rows_of({"one": package(20, 6)}, 7, [], [])[0]["ok"]
+    assert rows_of({"one": package(20, 5)}, SEEDS, [], [])[0]["ok"]
+    assert not rows_of({"one": package(20, 6)}, SEEDS, [], [])[0]["ok"]
     both = {"one": package(20, 4), "two": package(20, 3, "two")}
-    assert [row["ok"] for row in rows_of(both, 7, [], [])[:3]] == [True, True, False], "82.5 of 85 % over all"
+    assert [row["ok"] for row in rows_of(both, SEEDS, [], [])[:3]] == [True, True, False], "82.5 of 85 % over all"
 
 
 def test_one_in_twenty_may_be_named_equivalent_and_is_shown():
-    (first, named, _) = rows_of({"one": package(20, 2)}, 7, [equivalent(1)], [])
+    (first, named, _) = rows_of({"one": package(20, 2)}, SEEDS, [equivalent(1)], [])
     assert first["value"] == round(100 * 18 / 19, 1) and "of 20, 1 equivalent left out" in first["figure"]
     assert (named["value"], named["goal"], named["ok"]) == (1, "<= 1", True)
     assert "a is never that large" in named["figure"] and "a.py:1: comparison: '<' -> '<='" in named["figure"]
@@ -62,21 +72,21 @@ def test_one_in_twenty_may_be_named_equivalent_and_is_shown():
 
 def test_where_more_are_named_none_is_subtracted():
     for count, names in ((20, (0, 1)), (19, (1,))):
-        (first, named, _) = rows_of({"one": package(count, 2)}, 7, [equivalent(n) for n in names], [])
+        (first, named, _) = rows_of({"one": package(count, 2)}, SEEDS, [equivalent(n) for n in names], [])
         assert first["value"] == round(100 * (count - 2) / count, 1) and "left out" not in first["figure"]
         assert not named["ok"] and named["value"] == len(names)
 
 
 def test_what_a_test_notices_is_not_equivalent_and_an_entry_names_one():
-    assert rows_of({"one": package(20)}, 7, [equivalent(1)], [])[1]["value"] == 0
+    assert rows_of({"one": package(20)}, SEEDS, [equivalent(1)], [])[1]["value"] == 0
     twice = [mutant(1, "survived"), mutant(1, "survived"), *package(40)]
-    assert rows_of({"one": twice}, 7, [equivalent(1)], [])[1]["value"] == 1
+    assert rows_of({"one": twice}, SEEDS, [equivalent(1)], [])[1]["value"] == 1
     other = Equivalent(mutant(1).file, mutant(1).text, "if a == 1:", "another change of that line")
-    assert rows_of({"one": package(20, 2)}, 7, [other], [])[1]["value"] == 0
+    assert rows_of({"one": package(20, 2)}, SEEDS, [other], [])[1]["value"] == 0
 
 
 def test_what_was_left_out_is_counted():
-    row = rows_of({"one": [None, *package(12), None]}, 7, [], ["p/test_b", "p/test_a"])[-1]
+    row = rows_of({"one": [None, *package(12), None]}, SEEDS, [], ["p/test_b", "p/test_a"])[-1]
     assert "2 changes that did not compile" in row["figure"] and "2 test programs" in row["figure"]
     assert "p/test_a, p/test_b" in row["figure"] and (row["value"], row["goal"]) == (4, "reported")
 

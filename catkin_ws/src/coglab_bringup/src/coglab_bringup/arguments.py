@@ -16,7 +16,6 @@ import sys
 from collections.abc import Iterable
 from pathlib import Path
 
-from coglab_bringup.commit import commit_seed
 from coglab_bringup.launch_arguments import judge_launch
 from coglab_bringup.usage import Parser, Refused, master_port, seed, writable_file, writable_folder
 
@@ -146,7 +145,9 @@ def mutants_options(top: Path, words: list[str]) -> argparse.Namespace:
         description="Changes one line at a time, in a copy: do the tests notice? Goes on where it was ended.",
     )
     parser.add_argument("packages", nargs="*", metavar="PACKAGE", help=f"default: {', '.join(CORES)}")
-    parser.add_argument("--seed", type=seed, metavar="N", help="of the lines drawn (default: from the commit)")
+    parser.add_argument(
+        "--seed", type=seed, metavar="N", help="of the lines drawn (default: each package's last commit)"
+    )
     parser.add_argument("--count", type=int, default=12, metavar="N", help="mutants per package (default 12)")
     parser.add_argument("--own", action="store_true", help="judged by the tests of the package alone")
     parser.add_argument("--json", type=writable_file, metavar="FILE", help="write rows and mutants as JSON")
@@ -154,8 +155,6 @@ def mutants_options(top: Path, words: list[str]) -> argparse.Namespace:
     _named(options.packages, package_folders(top / "catkin_ws" / "src"), "package")
     if not 1 <= options.count <= 10000:
         raise Refused(f"--count: expected 1 to 10000, got {options.count}")
-    if options.seed is None:
-        options.seed = commit_seed(top)
     return options
 
 

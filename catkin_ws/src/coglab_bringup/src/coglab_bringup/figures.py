@@ -8,7 +8,8 @@ what is missed besides.
 
 The sources of a bench are its package, the packages that its own files name, what all these depend on (package.xml),
 and `coglab`; documents and tests are none. Programs beside the tests, which benches share with them, are. Those of
-`mutants` are all packages with their tests, which are what it measures, and its list of equivalent changes.
+`mutants` are all packages with their tests, which are what it measures, and its list of equivalent changes; below its
+rows the page lists the survivors of docs/mutants.json, which the report keeps, too.
 """
 
 from __future__ import annotations
@@ -19,14 +20,16 @@ import json
 import os
 import platform
 import re
-import subprocess
 from collections import Counter
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
+from coglab_bringup import mutants_kept
 from coglab_bringup.arguments import find_benches, package_folders
+from coglab_bringup.commit import git
+from coglab_bringup.mutant import EQUIVALENT
 
 NOT_MEASURED = "not measured on these sources"
 ALL_ROWS = "all of its rows"
@@ -37,7 +40,7 @@ GOAL = re.compile(r"[<>]=? ?(?:-?[\d.]|peer)|-?[\d.]")
 """how a goal begins that a value can meet: a comparison with a number or the peer, or a number"""
 BEGIN, END = "<!-- quoted from docs/figures.md -->", "<!-- end of the quotation -->"
 KEPT = "docs/figures.json"
-MUTANTS, EQUIVALENT = "mutants", "docs/equivalent_mutants.json"
+MUTANTS = "mutants"
 QUOTED = ("wall", "fri", "trials")
 """the benches of which README.md shows rows; of the others it says how many are missed"""
 HEAD = """# Figures
@@ -49,14 +52,6 @@ package and those that it uses, tests and documents apart) counts as missed.
 Definitions, goals and peers are fixed before anything is measured: they stand in the bench itself.
 """
 TABLE = "| figure | value | goal | | peer | its value |\n| --- | --- | --- | --- | --- | --- |"
-
-
-def _git(top: Path, *words: str) -> str:
-    try:
-        done = subprocess.run(["git", "-C", str(top), *words], capture_output=True, text=True, timeout=20, check=True)
-        return done.stdout.strip()
-    except (OSError, subprocess.SubprocessError):
-        return ""
 
 
 def _needed(packages: dict[str, Path], files: list[Path]) -> list[Path]:
@@ -86,13 +81,11 @@ def sources_of(top: Path, bench: str) -> dict[str, str]:
     places = ["coglab", *sorted(str(folder.relative_to(top)) for folder in folders)]
     tests = bench == MUTANTS
     places += [EQUIVALENT] if tests else []
-    changed = any(
-        _is_source(line[3:], tests) for line in _git(top, "status", "--porcelain", "--", *places).splitlines()
-    )
-    files = [line for line in _git(top, "ls-tree", "-r", "HEAD", "--", *places).splitlines() if _is_source(line, tests)]
+    changed = any(_is_source(line[3:], tests) for line in git(top, "status", "--porcelain", "--", *places).splitlines())
+    files = [line for line in git(top, "ls-tree", "-r", "HEAD", "--", *places).splitlines() if _is_source(line, tests)]
     digest = hashlib.sha256("\n".join(files).encode()).hexdigest() if files else ""
     return {
-        "commit": _git(top, "rev-parse", "--short=7", "HEAD") + (" with changes" if changed else ""),
+        "commit": git(top, "rev-parse", "--short=7", "HEAD") + (" with changes" if changed else ""),
         "sources": "" if changed else digest,
     }
 
@@ -211,6 +204,8 @@ def page(top: Path) -> str:
                 f"on {run['machine']}, five-minute load {run['load']}.\n"
             )
         parts.append("\n".join([TABLE, *lines_of(top, name)]) + "\n")
+        if name == MUTANTS and (survivors := mutants_kept.survivors(top)):
+            parts.append(survivors + "\n")
     return "\n".join(parts)
 
 
@@ -260,7 +255,8 @@ def with_quotation(readme: str, quoted: str) -> str:
 
 
 def write_report(top: Path) -> Path:
-    """Writes docs/figures.md, and what README.md quotes of it."""
+    """Writes docs/figures.md and what README.md quotes of it, and keeps what both are made of."""
+    mutants_kept.keep(top, machine())
     target, readme = top / "docs" / "figures.md", top / "README.md"
     text = page(top)
     target.write_text(text, encoding="utf-8")

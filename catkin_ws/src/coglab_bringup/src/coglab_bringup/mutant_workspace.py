@@ -6,10 +6,12 @@ import hashlib
 import os
 import shutil
 import subprocess
+from collections.abc import Callable
 from pathlib import Path
 
 from coglab_bringup import process_tree, test_runner
 from coglab_bringup.arguments import package_folders, used_by
+from coglab_bringup.usage import Refused
 
 NOT_COPIED = (".git", ".coglab", "out", "build", "devel", "install", "__pycache__", ".pytest_cache", ".ruff_cache")
 BUILD_LIMIT = 3600.0  # s
@@ -77,6 +79,7 @@ class Workspace:
         if oracles.is_dir() and not link.exists():
             link.parent.mkdir(exist_ok=True)
             link.symlink_to(oracles)
+        self._entered = False
         self.stale = True
         """Whether what is built, of any package, is not what the sources say."""
 
@@ -95,6 +98,17 @@ class Workspace:
     def digest_of(self, package: str) -> str:
         """See digest_of(); before anything is changed in the copy."""
         return digest_of(self.root, package)
+
+    def ready(self, say: Callable[[str], None]) -> None:
+        """Builds what is not built as the sources say, and enters: asked for where a test has to run, and not before,
+        so that who knows all results already waits for no build."""
+        if self.stale:
+            say("building; the first time this takes as long as a whole build")
+            if not self.build():
+                raise Refused(f"the unchanged sources do not build; see {self.logs / 'build.log'}")
+        if not self._entered:
+            self.enter()
+        self._entered = True
 
     def enter(self) -> None:
         """From now on this process and what it starts live in the copy's workspace."""

@@ -1,21 +1,27 @@
 """./coglab bench mutants [PACKAGE ...] [--seed N]: would the tests notice a slip of the hand?
 
-Over how many: 12 changes or more in each of the seven packages with a core, drawn with one seed over all lines of code
+Over how many: 12 changes or more in each of the seven packages with a core, drawn over all lines of code of the package
 that ship (mutator.py: comparison, sign, constant, condition, dropped exit, swapped arguments); fewer make the row
 missed. Each is made alone, what it touches is built, and the tests of the package and of what stands on it run until
 the first red one. What is left out, and counted in a row beside: a line that does not compile, which is drawn again,
 and a test that is red on the unchanged sources, too. Survivors with which the program does the same are named, with a
 reason, in docs/equivalent_mutants.json, shown, and subtracted as long as they are at most one in twenty of all.
 
+The seed of a package comes from the last commit that touched its folder, and changes with each one that does: a row
+says it, and nobody can choose among seeds. A seed given by hand is that of all packages, and is only printed. It was
+one seed of the whole checkout's commit, so that any commit threw away what takes hours; the lines over which one draws
+and the tests that judge are as they were, neither milder. docs/figures.md has the rows of all packages with these
+seeds, of sources that were committed and stayed the same, and no others.
+
 All of it happens in a copy of the checkout below .coglab/mutants: the checkout itself is never changed, however this
 ends. A red test is run once more before it is believed, and one that was never seen green is run on the unchanged
 sources first. Tests of format, types, pages and figures do not judge (mutant_workspace.NO_JUDGES). What a run has found
 is kept: the same command goes on where it was ended, as long as the sources are the same. Hours; run only when named.
 With --own the tests of the package alone judge, which is quicker and harder: what survives may be killed by what stands
-on it, so that the share is a lower bound, and its rows say so. docs/figures.md has the rows of all packages with the
-commit's own seed, of sources that were committed and stayed the same, and no others: nobody can choose among seeds. The
-mutator is our own, not a kept tool: cosmic-ray and mutmut know Python alone, and here one draw goes over all shipped
-lines of C++ and Python alike, with an incremental build behind each.
+on it, so that the share is a lower bound, and its rows say so. What they have judged `./coglab bench --report` keeps in
+docs/mutants.json, from which another machine goes on (mutants_kept.py); it builds only what it has to judge. The
+mutator is our own, not a kept tool: cosmic-ray and mutmut know Python alone, and here one way of drawing goes over all
+shipped lines of C++ and Python alike, with an incremental build behind each.
 """
 
 from __future__ import annotations
@@ -33,9 +39,11 @@ from pathlib import Path
 
 from coglab_bringup import bench, figures, test_runner
 from coglab_bringup.arguments import CORES, mutants_options, needs_of, package_folders
-from coglab_bringup.commit import commit_seed
-from coglab_bringup.mutant_rows import Mutant, named_equivalent, read_equivalent, rows_of, sentence
+from coglab_bringup.commit import folder_seed
+from coglab_bringup.mutant import Equivalent, Mutant, read_equivalent, sentence, told
+from coglab_bringup.mutant_rows import rows_of
 from coglab_bringup.mutant_workspace import Workspace
+from coglab_bringup.mutants_kept import entry_of, further, mutants_of, own_seeds, read_state, rows_of_state, write_whole
 from coglab_bringup.mutator import ENDINGS, Change, changes, code_lines
 from coglab_bringup.usage import Refused
 
@@ -112,13 +120,6 @@ class Times:
         write_whole(self._file, {"digest": self._digest, "times": self._known})
 
 
-def write_whole(path: Path, content: dict) -> None:
-    """A JSON file that is the old or the new one, whenever this process ends."""
-    new = path.with_suffix(".new")
-    new.write_text(json.dumps(content, indent=1) + "\n")
-    new.replace(path)
-
-
 class Campaign:
     """The mutants of one package, drawn with one seed; goes on where it was ended."""
 
@@ -138,14 +139,15 @@ class Campaign:
         self.judges = [package] if own else [package, *standing_on(package, self.folders)]
         self.kept = workspace.root.parent / f"{package}.{seed}{'.own' if own else ''}.json"
         self.digest = workspace.digest_of(package) if own else workspace.digest
-        self.drawn: list[Mutant | None] = []  # None: did not compile
         self.fallen: list[tuple[Path, Change]] = []  # of the drawn, those that the dice have given
-        try:
-            state = json.loads(self.kept.read_text())
-            if state["digest"] == self.digest:
-                self.drawn = [Mutant(**row) if row else None for row in state["drawn"]]
-        except (OSError, ValueError, KeyError, TypeError):
-            pass
+        entry = entry_of(workspace.root, package, seed, self.digest) if own else {}
+        here = rows_of_state(read_state(self.kept), self.digest)
+        self.drawn = mutants_of(further(entry.get("drawn", []), here))  # None: did not compile
+        self._red_elsewhere: list[str] = entry.get("red", [])
+
+    def red(self) -> list[str]:
+        """Tests that tell nothing, here or where others have judged before."""
+        return [*self.times.red(), *self._red_elsewhere]
 
     def mutants(self) -> list[Mutant]:
         """Those judged so far."""
@@ -160,6 +162,7 @@ class Campaign:
         """Draws and judges until there are `count` mutants."""
         if self.drawn:
             self.say(f"{self.package}: {len(self.mutants())} were judged before")
+        ready = False
         while len(self.mutants()) < count:
             drawn = draw(self.folder, self.dice, self.fallen)
             if drawn is None:
@@ -171,6 +174,9 @@ class Campaign:
             self.fallen.append(drawn)
             if len(self.fallen) <= len(self.drawn):  # judged before: the dice fall as they did
                 continue
+            if not ready:
+                self.workspace.ready(self.say)
+                ready = True
             mutant = self.judge(path, change)
             self.drawn.append(mutant)
             self.keep()
@@ -254,20 +260,45 @@ class Edited:
             self._workspace.stale = self._workspace.stale or self._compiled
 
 
-def recorded(top: Path, options: argparse.Namespace, rows: list[dict], before: dict[str, str]) -> bool:
+def recorded(
+    top: Path, options: argparse.Namespace, seeds: dict[str, int], rows: list[dict], before: dict[str, str]
+) -> bool:
     """Keeps the rows for docs/figures.md where nobody has chosen packages or seed, and the sources, which were
-    committed, are as they were `before`."""
-    chosen = bool(options.packages) or options.seed != commit_seed(top)
+    committed, are as they were `before`, each package with its last commit."""
+    chosen = bool(options.packages) or options.seed is not None or own_seeds(top, list(seeds)) != seeds
     return not chosen and bool(before["sources"]) and figures.record(top, figures.MUTANTS, rows, False, before)
+
+
+def judged(top: Path, options: argparse.Namespace, seeds: dict[str, int]) -> list[Campaign]:
+    """The campaigns of the packages, run to their ends."""
+    workspace = Workspace(top)
+    every = Times(workspace)
+    campaigns = [
+        Campaign(workspace, each, seed, Times(workspace, each) if options.own else every, say, options.own)
+        for each, seed in seeds.items()
+    ]
+    for campaign in campaigns:
+        campaign.run(options.count)
+    return campaigns
+
+
+def print_result(rows: list[dict], seeds: dict[str, int], survived: list[Mutant], named: list[Equivalent]) -> None:
+    """The table, and each survivor in a line below it."""
+    bench.print_table(rows)
+    drawn = ", ".join(f"{package} {seed}" for package, seed in seeds.items())
+    print(f"\nseeds: {drawn}; {len(survived)} survived" + (":" if survived else ""))
+    for what, why in told(survived, named):
+        print(f"  {what}{why}")
+
+
+def say(text: str) -> None:
+    """One line of progress."""
+    print(f"[coglab] mutants: {text}", file=sys.stderr, flush=True)
 
 
 def main(arguments: list[str]) -> int:
     """Exit status 0 if every row is ok, 1 if one is not, 2 if it cannot be run."""
     top = Path(os.environ["COGLAB_TOP"])
-
-    def say(text: str) -> None:
-        print(f"[coglab] mutants: {text}", file=sys.stderr, flush=True)
-
     try:
         options = mutants_options(top, arguments)
         named = read_equivalent(top)
@@ -278,43 +309,26 @@ def main(arguments: list[str]) -> int:
             fcntl.flock(holder, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except OSError:
             raise Refused("another `bench mutants` of this checkout runs; wait for it, or end it") from None
-        say("copying and building; the first time this takes as long as a whole build")
+        folders, packages = package_folders(top / "catkin_ws" / "src"), options.packages or list(CORES)
+        given = options.seed is not None
+        seeds = {each: options.seed if given else folder_seed(top, folders[each]) for each in packages}
         before = figures.sources_of(top, figures.MUTANTS)
-        workspace = Workspace(top)
-        if not workspace.build():
-            raise Refused(f"the unchanged sources do not build; see {workspace.logs / 'build.log'}")
-        workspace.enter()
-        packages = options.packages or list(CORES)
-        every = Times(workspace)
-        campaigns = [
-            Campaign(workspace, each, options.seed, Times(workspace, each) if options.own else every, say, options.own)
-            for each in packages
-        ]
-        for campaign in campaigns:
-            if workspace.stale:  # of the package before
-                workspace.build()
-            campaign.run(options.count)
+        campaigns = judged(top, options, seeds)
     except KeyboardInterrupt:
         say("ended; what was judged is kept, and the same command goes on from there")
         return 130
     except Refused as error:
         print(f"[coglab] error: {error}", file=sys.stderr)
         return 2
-    red = sorted({name for each in campaigns for name in each.times.red()})
-    rows = rows_of({each.package: each.drawn for each in campaigns}, options.seed, named, red, options.own)
-    bench.print_table(rows)
-    survivors = [m for campaign in campaigns for m in campaign.mutants() if m.verdict == "survived"]
-    equivalent = {id(mutant): entry.reason for mutant, entry in named_equivalent(survivors, named)}
-    print(f"\nseed {options.seed}; {len(survivors)} survived" + (":" if survivors else ""))
-    for mutant in survivors:
-        print(
-            f"  {sentence(mutant)}" + (f" (equivalent: {equivalent[id(mutant)]})" if id(mutant) in equivalent else "")
-        )
-    if not recorded(top, options, rows, before):
-        say("only printed: docs/figures.md has rows of all packages, the commit's own seed and its unchanged sources")
+    red = sorted({name for each in campaigns for name in each.red()})
+    rows = rows_of({each.package: each.drawn for each in campaigns}, seeds, named, red, options.own)
+    found = [mutant for campaign in campaigns for mutant in campaign.mutants()]
+    print_result(rows, seeds, [mutant for mutant in found if mutant.verdict == "survived"], named)
+    if not recorded(top, options, seeds, rows, before):
+        say("only printed: docs/figures.md has rows of all packages, their own seeds and their unchanged sources")
     if options.json:
-        found = [asdict(m) for campaign in campaigns for m in campaign.mutants()]
-        options.json.write_text(json.dumps({"seed": options.seed, "rows": rows, "mutants": found}, indent=1) + "\n")
+        content = {"seeds": seeds, "rows": rows, "mutants": [asdict(mutant) for mutant in found]}
+        options.json.write_text(json.dumps(content, indent=1) + "\n")
     return 0 if all(row["ok"] for row in rows) else 1
 
 
