@@ -7,13 +7,17 @@ import pytest
 from coglab_msgs.msg import ReasonCode, Say
 from coglab_py.pose import Pose
 from coglab_sim.conditions import Conditions
+from coglab_smach.context.config import Config
 from coglab_smach.contact.leaving_load import SAME, LeavingLoad
 from coglab_smach.kinematics.reachability import default_arm
 from coglab_smach.ports.interfaces import HandState, Located
 from coglab_smach.ports.pending import PortError, Ready
 from coglab_smach.states import give
 from coglab_smach.states.held import FARTHER, LOST_TIME, NEAR, HeldObject
-from conftest import Trial
+from conftest import SHARE, Trial
+from ih2_hand.emulator.hand import GRASP_CURRENT
+from ih2_hand.emulator.motor import STALL_CURRENT
+from ih2_hand.wire_choices import WIRE
 from virtual_trial import VirtualTrial
 
 RECEIVE, GIVE = "exchange_human_to_robot", "exchange_robot_to_human"
@@ -87,6 +91,37 @@ def test_a_person_who_holds_on_to_a_part_keeps_the_arm_there():
     assert trial.ctx.journal.results[-1].outcome == "stopped" and trial.ctx.holding == "mug"
     assert trial.cell.called("close") and finger(trial) == 160
     assert "the person may still hold 'mug'" in trial.ctx.journal.why()
+
+
+def test_a_person_who_is_told_that_it_is_over_lets_go_and_goes():
+    """The grip closes again as gently as beside any person's fingers, and firmly where nobody's are."""
+    asked = []
+
+    def script(t):
+        close, say = t.ctx.hand.close, t.ctx.say
+
+        def told(code, text):
+            say(code, text)
+            if code == Say.GIVEN_UP:
+                t.cell.push(0.0)
+                t.cell.objects["human_hand"] = Pose(np.array([1.4, 0.0, 0.4]))
+
+        t.ctx.say, t.ctx.hand.close = told, lambda speed: asked.append(speed) or close(speed)
+        t.cell.push(0.4 * WEIGHT)
+        t.wait_hub("wait_with_object")
+
+    trial = giving(script)
+    result = trial.result()
+    assert (result.outcome, result.code) == ("failed_holding", ReasonCode.NOT_RELEASED)
+    assert trial.ctx.holding == "mug" and not trial.ctx.shared
+    gently, firmly = (trial.ctx.config.get(name) for name in ("give.close_speed", "hand.tighten.medium"))
+    assert set(asked[:-1]) == {gently} and asked[-1] == firmly
+
+
+def test_it_closes_again_with_no_more_than_the_lowest_force():
+    """Counts of motor current at which fingers stand that close at a wire speed, and those of the lowest level."""
+    speed = Config.load(str(SHARE / "config" / "machines.yaml"), {}).get("give.close_speed")
+    assert 0 < STALL_CURRENT * speed / WIRE.speed_max <= GRASP_CURRENT["low"]
 
 
 @pytest.mark.parametrize("waits", [True, False])

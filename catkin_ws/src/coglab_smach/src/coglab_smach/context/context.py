@@ -64,6 +64,9 @@ class Context:
     shared: bool = False
     """the person may hold the object that is in the robot's fingers: from the closing on an object that is offered
     until its weight is felt, and from the person's taking of the load until the hand is open"""
+    firm: int = 0
+    """wire speed, and with it the force, with which the fingers are to close on what they hold gently as long as a
+    person's fingers may be between them; 0: they hold it as its grasp says"""
     preshaped: bool = False
     """the fingers have taken the preshape of this reach's grasp"""
     closing: Pending | None = None

@@ -15,12 +15,15 @@ from coglab_smach.ports.interfaces import Verdict
 from coglab_smach.ports.pending import PortError
 from coglab_smach.states.arm import HomeRobot
 from coglab_smach.states.base import CoglabMachine, CoglabState
+from coglab_smach.states.hand import HandTighten
 from coglab_smach.states.held import LOOK, HeldObject
 from coglab_smach.states.motion import end_motion
 from coglab_smach.states.where import AWAY, hand_from_palm
 
 CAUGHT = 1.0
 """s in which fingers that have begun to close on the way stand"""
+LETS_GO = 5.0
+"""s in which a person who is told that it is over lets go of what the robot's fingers hold, too, and goes"""
 
 
 def arm_is_blocked(state: CoglabState) -> Verdict:
@@ -65,26 +68,36 @@ class SecureHand(CoglabState):
     """Decide what the hand does during recovery: keep holding if it closed on an object, else open. Fingers that a STOP
     has left half open say that they hold something: what the tracker sees away from the palm is not in them.
 
-    The arm goes nowhere with an object that the person may hold too: outcome stopped, until the operator has looked and
-    asks for 'reset' (``operator``: this is the recovery after that).
+    The arm goes nowhere with an object that the person may hold too. They are told that it is over; where their hand is
+    not seen to go within LETS_GO s the outcome is stopped, until the operator has looked and asks for 'reset'
+    (``operator``: this is the recovery after that).
     """
 
     default_time_limit = 10.0
 
     def __init__(self, ctx: Context, operator: bool = False) -> None:
         super().__init__(ctx, outcomes=["succeeded", "stopped"])
-        self.operator = operator
+        self.operator, self._told = operator, False
 
     def run(self, ud: Any) -> str:
+        self._told = self.operator
         outcome = self._secure()
-        if outcome == "succeeded" and not self.operator:
-            self.ctx.say(Say.GIVEN_UP, "That did not work; I stop here.")
+        if outcome == "succeeded":
+            self._tell()
         return outcome
+
+    def _tell(self) -> None:
+        """Once: it is over."""
+        if not self._told:
+            self._told = True
+            self.ctx.say(Say.GIVEN_UP, "That did not work; I stop here.")
 
     def _secure(self) -> str:
         self._closed_on_the_way()
         if self.ctx.holding and self.ctx.hand.state().holding:
             self._look_for_it()
+        if self.ctx.holding and self.ctx.shared and not self.operator:
+            self._await_letting_go()
         if self.ctx.holding and (self.operator or not self.ctx.shared):
             self.ctx.shared = False
             self.reason = f"the hand keeps '{self.ctx.holding}'"
@@ -120,6 +133,19 @@ class SecureHand(CoglabState):
         away = hand_from_palm(self)
         if self.ctx.hand.state().holding and (away is None or away > AWAY):
             self.ctx.holding, self.ctx.shared = self.ctx.closing_on, away is None
+
+    def _await_letting_go(self) -> None:
+        """Nobody else holds the object, or has taken it along, once the person's hand is seen away from it."""
+        self._tell()
+        self.allow(LETS_GO + 10.0)
+        end = self.ctx.clock.now() + LETS_GO
+        while self.ctx.clock.now() < end:
+            away = hand_from_palm(self)
+            if away is not None and away > AWAY:
+                self.ctx.shared = False
+                self._look_for_it()
+                return
+            self.pause(0.05)
 
     def _look_for_it(self) -> None:
         """Empties the context's hand where the object is seen elsewhere. What nobody sees is where the hand says."""
@@ -187,11 +213,17 @@ def build_recovery(ctx: Context, operator: bool = False) -> CoglabMachine:
         machine.add_state(
             "secure_hand", SecureHand(ctx, operator), {"succeeded": "coglab_home_robot", "stopped": "stopped", **failed}
         )
-        machine.add_state("coglab_home_robot", HomeRobot(ctx), {"succeeded": "what_is_held", **failed})
+        machine.add_state("coglab_home_robot", HomeRobot(ctx), {"succeeded": "tighten_at_home", **failed})
+        # What it closes on is held before it has: a hand that refuses is no reason to end here.
+        machine.add_state(
+            "tighten_at_home",
+            HandTighten(ctx, at_home=True),
+            {"succeeded": "what_is_held", "failed": "what_is_held", "preempted": "preempted"},
+        )
         machine.add_state(
             "what_is_held",
             WhatIsHeld(ctx),
-            {"empty": "empty", "holding": "holding", "failed": "fault", "preempted": "preempted"},
+            {"empty": "empty", "holding": "holding", "failed": "check_stop", "preempted": "preempted"},
         )
         machine.add_state(
             "check_stop",

@@ -15,6 +15,7 @@ from coglab_smach.context.context import Context
 from coglab_smach.ports.interfaces import HandPort
 from coglab_smach.ports.pending import Pending, PortError
 from coglab_smach.states.base import CoglabState, Interrupted, TimeLimit
+from coglab_smach.states.hand import firm_speed
 from coglab_smach.states.held import HeldObject
 from coglab_smach.states.motion import await_rest, rise, shift
 from coglab_smach.states.reach import WaitStop
@@ -207,14 +208,15 @@ class GiveLoad(CoglabState):
     waits there, but not at the object, the arm brings it to where that hand takes it, ``give.bring_after`` s after its
     own arrival and later; a reach toward where a hand would be may have ended before that hesitated. Where nothing has
     happened for ``give.lower_after`` s the arm sinks by ``give.lower`` m, so that the weight comes to lie in the hand.
-    After the time limit the grip closes and keeps the object.
+    After the time limit the grip closes and keeps the object. It closes with the lowest force (``give.close_speed``):
+    the person's fingers are there; firmly at home only.
     """
 
     default_time_limit = 20.0
     owns_motion = True
 
     def __init__(self, ctx: Context) -> None:
-        super().__init__(ctx, input_keys=["object_id", "object_entry", "delivery"])
+        super().__init__(ctx, input_keys=["object_id", "object_entry", "grasp_name", "delivery"])
         self._grip: LooseningGrip
         self._held: HeldObject
         self._offer: Callable[[], np.ndarray | None] = lambda: None
@@ -227,6 +229,8 @@ class GiveLoad(CoglabState):
         """m, of the last look: from the object to where the person's hand takes it"""
         self._needed = self._slips_at = 0.0
         """share of the load; N of grip below which the object slips while the hand carries all of it"""
+        self._firm = 0
+        """wire speed of the grip that is as firm as before"""
         self._back_since: float | None = None
 
     def _number(self, name: str, default: float) -> float:
@@ -243,10 +247,11 @@ class GiveLoad(CoglabState):
         self._grip = LooseningGrip(
             self.ctx.hand,
             int(self._number("loosen_speed", 40)),
-            int(self._number("close_speed", 120)),
+            int(self._number("close_speed", 60)),
             int(self._number("ease_speed", 100)),
             contact.grip,
         )
+        self._firm = firm_speed(self.ctx, entry, ud.grasp_name)
         self._lowering = self._moving = self._back_since = None
         self._brings, self._way = 0, None
         self._offer = partial(way_to_hand, self, ud.object_id, ud.delivery)
@@ -288,8 +293,8 @@ class GiveLoad(CoglabState):
 
     def _follow(self, share: float, begins: float, now: float) -> None:
         """As loose as the share asks for; closed again where it does not stay, and where the object slips."""
-        if self._held.sunk > self._number("slip", 0.03) and (self._grip.loosened() or 0) > 0:
-            self._grip.tighten()
+        if self._held.sunk > self._number("slip", 0.03):
+            self._close_again()
         elif share > begins / 2:
             self._back_since = None
             part = (share - begins) / max(1e-6, self._needed - begins)
@@ -305,8 +310,7 @@ class GiveLoad(CoglabState):
             self._grip.stand()
             if now - self._back_since >= self._number("back_time", 0.1):
                 self.ctx.shared = False
-                if (self._grip.loosened() or 0) > 0:
-                    self._grip.tighten()
+                self._close_again()
 
     def _ease(self, share: float) -> bool:
         """The ratio of grip and load stays; False where the hand does not feel its grip."""
@@ -334,5 +338,10 @@ class GiveLoad(CoglabState):
     def _keep(self) -> None:
         """The object stays in the hand: closed again, where it was loosened."""
         self._grip.stand()
+        self._close_again()
+
+    def _close_again(self) -> None:
+        """Gently, if it is loosened."""
         if (self._grip.loosened() or 0) > 0:
+            self.ctx.firm = self._firm
             self._grip.tighten()

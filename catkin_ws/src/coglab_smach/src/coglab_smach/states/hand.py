@@ -30,6 +30,14 @@ def gentle(grasp: Mapping[str, Any]) -> dict[str, Any]:
     return {**grasp["hand"], "level": levels_of(grasp["hand"]["mode"], "legacy")[0]}
 
 
+def firm_speed(ctx: Context, entry: Mapping[str, Any], grasp_name: str) -> int:
+    """Wire speed, and with it the force, of closing as firmly as the object's entry says; 0 where that is the level of
+    gentle(), too."""
+    own = entry["grasps"][grasp_name]
+    level = own["hand"]["level"]
+    return 0 if level == gentle(own)["level"] else int(ctx.config.get(f"hand.tighten.{level}", 200))
+
+
 def stopped_by_object(mode: str, positions: Sequence[int]) -> bool:
     """Whether the closed fingers of a grasp stand around something: the thumb (motor 1), and one finger that opposes it
     where the mode closes some, have not come to their closed ends. Fingers that alone stand on it hold it by an edge,
@@ -92,7 +100,7 @@ class HandClose(CoglabState):
         super().__init__(
             ctx,
             outcomes=["succeeded", "missed", "edge"] if from_person else ["succeeded"],
-            input_keys=["object_id", "grasp"] if from_person else ["object_id"],
+            input_keys=["object_id", "object_entry", "grasp", "grasp_name"] if from_person else ["object_id"],
             output_keys=["hand_distance"] if from_person else [],
         )
         self.from_person = from_person
@@ -103,6 +111,7 @@ class HandClose(CoglabState):
         self.ctx.journal.mark("closing")
         # From here on the hand may hold: a failure in the middle must not make the recovery drop the object.
         self.ctx.holding, self.ctx.shared = ud.object_id, self.from_person
+        self.ctx.firm = firm_speed(self.ctx, ud.object_entry, ud.grasp_name) if self.from_person else 0
         closing = self.ctx.closing or self.ctx.hand.close_on_object()
         self.ctx.closing = None
         if self.from_person:
@@ -156,7 +165,7 @@ class HandClose(CoglabState):
 
 class HandTighten(CoglabState):
     """Hold what the person has let go of as firmly as the object's entry says: the fingers close from where they are,
-    at the wire speed, and with it the force, of ``hand.tighten`` for the grasp's level.
+    at the wire speed, and with it the force, of ``hand.tighten`` for the grasp's level (Context.firm).
 
     The arm need not wait until the hand is sure that they stand: they press within ``hand.settle_after_close`` s.
     Whose hand was not seen to have left the object may have fingers there: then it is held firmly ``at_home`` only,
@@ -165,27 +174,25 @@ class HandTighten(CoglabState):
     default_time_limit = 5.0
 
     def __init__(self, ctx: Context, at_home: bool = False) -> None:
-        super().__init__(ctx, input_keys=["object_entry", "grasp", "grasp_name", "hand_seen_away"])
+        super().__init__(ctx, input_keys=[] if at_home else ["hand_seen_away"])
         self.at_home = at_home
 
     def run(self, ud: Any) -> str:
-        if self.at_home == bool(ud.hand_seen_away):
-            self.reason = (
-                "it was held firmly before" if self.at_home else "the person's hand was not seen to go: at home"
-            )
+        if not self.at_home and not ud.hand_seen_away:
+            self.reason = "the person's hand was not seen to go: at home"
             return "succeeded"
-        level = ud.object_entry["grasps"][ud.grasp_name]["hand"]["level"]
-        if level == ud.grasp["hand"]["level"]:
-            self.reason = f"it is held with the force of level '{level}'"
+        speed = self.ctx.firm if self.ctx.holding else 0
+        if speed == 0:
+            self.reason = "nothing is held more gently than its grasp asks for"
             return "succeeded"
-        speed = int(self.ctx.config.get(f"hand.tighten.{level}", 200))
         closing, end = self.ctx.hand.close(speed), float(self.ctx.config.get("hand.settle_after_close", 0.3))
         end += self.ctx.clock.now()
         while not closing.done() and self.ctx.clock.now() < end:
             self.pause(0.02)
         if closing.done():
             closing.result()
-        self.reason = f"the fingers close to the force of level '{level}'"
+        self.ctx.firm = 0
+        self.reason = f"the fingers close to the force of wire speed {speed}"
         self.ctx.journal.mark("tightened")
         return "succeeded"
 
