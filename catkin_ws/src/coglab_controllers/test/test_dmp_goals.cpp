@@ -1,6 +1,7 @@
 // Goals of the DMP plug-in in virtual time: they move, jump, vanish, turn and leave the workspace.
 #include "virtual_robot.hpp"
 
+#include <algorithm>
 #include <functional>
 #include <utility>
 
@@ -34,6 +35,34 @@ TEST(DmpController, FollowsAgainOnlyWhenTheGoalLeavesItsBall) {
   EXPECT_TRUE(ran);
   EXPECT_EQ(robot.state(), MotionState::Reached);
   EXPECT_LT((robot.hand().position - moved).norm(), 2e-3);
+}
+
+/// m that the hand is beyond its goal at most, and has to come back: the frame tells late and bit by
+/// bit that the goal is 30 mm farther than it had told.
+double wentBack(const std::string& frame) {
+  VirtualRobot robot("dmp: {predicted_goals: _ahead}");
+  robot.loadBoth();
+  robot.see(frame, kGoal);
+  DmpRequest request = robot.reach();
+  request.goal_frame = frame;
+  EXPECT_TRUE(VirtualRobot::ok(robot.dmp().execute(request)));
+  double farthest = -1.0, back = 0.0;
+  for (int i = 0; i < 1200; ++i) {
+    const double told = std::clamp((i * 0.005 - 0.9) * 0.07, 0.0, 0.03);
+    robot.see(frame, kGoal + Vector3(told, 0, 0));
+    robot.tick();
+    farthest = std::max(farthest, robot.hand().position.x());
+    back = std::max(back, farthest - robot.hand().position.x());
+  }
+  EXPECT_EQ(robot.state(), MotionState::Reached);
+  EXPECT_NEAR(robot.hand().position.x(), kGoal.x() + 0.03, 2e-3);
+  return back;
+}
+
+TEST(DmpController, APredictedGoalIsNotLed) {
+  const double seen = wentBack("human_hand"), predicted = wentBack("human_hand_ahead");
+  EXPECT_GT(seen, predicted + 0.001);
+  EXPECT_LT(predicted, 0.002);
 }
 
 /// A reach toward a goal that goes `way(t)` from kGoal, 0.5 s after the start; how it ended, and

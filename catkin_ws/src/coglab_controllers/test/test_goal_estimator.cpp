@@ -16,7 +16,7 @@ constexpr double kCycle = 0.005;
 TEST(GoalEstimator, MeetsASteadyRampWithoutLag) {
   GoalEstimator estimator;
   Vector3 goal = Vector3::Zero();
-  const Vector3 speed(0.1, -0.2, 0.05);
+  const Vector3 speed(0.07, -0.12, 0.04);
   estimator.reset(goal);
   for (int i = 0; i < 400; ++i) {
     goal += kCycle * speed;
@@ -25,6 +25,55 @@ TEST(GoalEstimator, MeetsASteadyRampWithoutLag) {
   // The input is held over the cycle, so what can be met is its value within that cycle.
   EXPECT_LT((estimator.position() - goal).norm(), kCycle * speed.norm());
   EXPECT_LT((estimator.velocity() - speed).norm(), 1e-6);
+}
+
+/// How far the estimate is beyond a goal that goes along x with `speed` for `time` s and then
+/// rests.
+double ledBeyond(double speed, double time, bool predicted) {
+  GoalEstimator estimator;
+  estimator.reset(Vector3::Zero());
+  double farthest = 0.0;
+  for (int i = 1; i <= 400; ++i) {
+    const double x = speed * std::min(i * kCycle, time);
+    estimator.update(kCycle, Vector3(x, 0, 0), 0.0, predicted);
+    farthest = std::max(farthest, estimator.position().x());
+  }
+  EXPECT_NEAR(estimator.position().x(), speed * time, 1e-4);
+  return farthest - speed * time;
+}
+
+TEST(GoalEstimator, AHandThatComesFastIsNotLed) {
+  const double slow = ledBeyond(0.15, 0.4, false);
+  EXPECT_GT(slow, 0.005);  // the price of no lag behind a goal that goes on
+  // It would be five times as far beyond a hand that is five times as fast, and stops.
+  EXPECT_LT(ledBeyond(0.75, 0.4, false), 2.5 * slow);
+  GoalEstimator estimator;
+  estimator.reset(Vector3::Zero());
+  for (int i = 1; i <= 400; ++i) {
+    estimator.update(kCycle, Vector3(0, 0, -0.003 * i));
+    EXPECT_LE(estimator.velocity().norm(), GoalEstimatorParameters().max_speed + 1e-12);
+  }
+}
+
+TEST(GoalEstimator, AChangeOfAPredictionIsNotLed) {
+  EXPECT_GT(ledBeyond(0.05, 0.4, false), 0.002);
+  EXPECT_LT(ledBeyond(0.05, 0.4, true), 0.0005);
+  // What is predicted may move, too.
+  GoalEstimator estimator;
+  estimator.reset(Vector3::Zero());
+  for (int i = 1; i <= 400; ++i) estimator.update(kCycle, Vector3(0.13 * kCycle * i, 0, 0), 0, true);
+  EXPECT_NEAR(estimator.velocity().x(), 0.13, 0.005);
+}
+
+TEST(GoalEstimator, RefusesSpeedsThatAreNone) {
+  for (const double bad : {-0.1, std::nan(""), 1.0 / 0.0}) {
+    GoalEstimatorParameters parameters;
+    parameters.predicted_speed = bad;
+    EXPECT_THROW(GoalEstimator{parameters}, std::invalid_argument);
+    parameters = {};
+    parameters.max_speed = bad;
+    EXPECT_THROW(GoalEstimator{parameters}, std::invalid_argument);
+  }
 }
 
 TEST(GoalEstimator, HasNoStepWhenTheGoalHasOne) {

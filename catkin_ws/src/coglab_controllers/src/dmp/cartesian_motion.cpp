@@ -38,6 +38,7 @@ void CartesianMotion::start(const CartesianMotionPlan& plan, const Pose& pose,
   end_.reset();
   drawn_ = 1.0;
   arrival_speed_ = plan.arrival_speed;
+  predicted_ = plan.predicted;
   arrival_rate_ = 1.0;
   dmp_.start(plan.system, pose.position, velocity, goal.position - approach, plan.ratio);
   orientation_ = pose.orientation.normalized();
@@ -111,7 +112,7 @@ const CartesianReference& CartesianMotion::step(double dt, const Pose& goal, dou
     goal_ -= drawn * approach;
     goal_velocity += (drawn_ - drawn) / dt * approach;
     drawn_ = drawn;
-    goal_estimator_.update(dt, goal.position, jitter_.share());
+    goal_estimator_.update(dt, goal.position, jitter_.share(), predicted_);
     orientation_estimator_.update(dt, goal.orientation, turning_jitter_.share());
     curve_.setTarget(orientation_estimator_.orientation());
   }

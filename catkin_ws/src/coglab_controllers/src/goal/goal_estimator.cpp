@@ -34,6 +34,14 @@ void validate(const GoalEstimatorParameters& parameters) {
     throw std::invalid_argument("noisy goal turning: expected 0 rad/s or more, got " +
                                 std::to_string(parameters.noisy_turning));
   }
+  if (!(parameters.predicted_speed >= 0.0 && std::isfinite(parameters.predicted_speed))) {
+    throw std::invalid_argument("predicted goal speed: expected 0 m/s or more, got " +
+                                std::to_string(parameters.predicted_speed));
+  }
+  if (!(parameters.max_speed > 0.0 && std::isfinite(parameters.max_speed))) {
+    throw std::invalid_argument("goal max speed: expected a positive speed in m/s, got " +
+                                std::to_string(parameters.max_speed));
+  }
   if (!(parameters.max_innovation > 0.0 && std::isfinite(parameters.max_innovation))) {
     throw std::invalid_argument("goal max innovation: expected a positive distance in m, got " +
                                 std::to_string(parameters.max_innovation));
@@ -96,7 +104,7 @@ void GoalEstimator::reset(const Vector3& goal) noexcept {
   smooth_ = position_ = goal;
 }
 
-void GoalEstimator::update(double dt, const Vector3& goal, double noise) noexcept {
+void GoalEstimator::update(double dt, const Vector3& goal, double noise, bool predicted) noexcept {
   if (!enabled()) {
     smooth_ = position_ = goal;
     return;
@@ -106,7 +114,9 @@ void GoalEstimator::update(double dt, const Vector3& goal, double noise) noexcep
   time_constant_ =
       nextTimeConstant(parameters_, parameters_.noisy_time_constant, time_constant_, noise, dt);
   smooth_ += tracker_.advance(error, dt, time_constant_);
-  velocity_ = beyondNoise(tracker_.rate, std::clamp(noise, 0.0, 1.0) * parameters_.noisy_speed);
+  double noisy = std::clamp(noise, 0.0, 1.0) * parameters_.noisy_speed;
+  if (predicted) noisy = std::max(noisy, parameters_.predicted_speed);
+  velocity_ = clipped(beyondNoise(tracker_.rate, noisy), parameters_.max_speed);
   position_ = smooth_ + 3.0 * time_constant_ * velocity_;
 }
 

@@ -51,6 +51,10 @@ RunnerPolicy dmpPolicy() {
   return policy;
 }
 
+bool endsWith(const std::string& text, const std::string& end) {
+  return text.size() >= end.size() && text.compare(text.size() - end.size(), end.size(), end) == 0;
+}
+
 }  // namespace
 
 DmpController::DmpController()
@@ -64,6 +68,7 @@ void DmpController::configure(const MotionSetup& setup) {
   dmp_frame_ = parameters.text("dmp_frame_name", base_frame_);
   goal_tf_frame_ = parameters.text("goal_tf_frame", "dmp_goal");
   setIkDebug(parameters.flag("enable_ik_debug", false));
+  predicted_ = parameters.text("predicted_goals", "");
   reach_margin_ = parameters.number("goal_reach_margin", 0.5, 0.0, 5.0);
   max_initial_distance_ = parameters.number("max_initial_distance", 0.1, 0.0, 1.0);
   goals_.configure(dmp_frame_, readGoalGate(parameters), *setup.host);
@@ -195,6 +200,7 @@ Answer DmpController::checkPrimitive(const DmpRequest& request, DmpPlan& plan) c
                            " m/s; expected 0 (as the primitive has it) or 0.02 to 0.45 m/s");
   }
   plan.motion.arrival_speed = request.arrival_speed;
+  plan.motion.predicted = !predicted_.empty() && endsWith(request.goal_frame, predicted_);
   plan.hand.approach = request.goal_approach;
   plan.hand.offset = request.goal_offset;
   plan.hand.in_goal_frame = !request.goal_frame.empty();

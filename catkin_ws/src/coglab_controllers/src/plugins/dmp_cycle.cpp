@@ -35,6 +35,9 @@ GoalEstimatorParameters readEstimator(const Parameters& parameters) {
   estimator.noisy_turning_time_constant = parameters.number(
       "noisy_goal_turning_time_constant", estimator.noisy_turning_time_constant, 0.005, 2.0);
   estimator.noisy_speed = parameters.number("noisy_goal_speed", estimator.noisy_speed, 0.0, 1.0);
+  estimator.predicted_speed =
+      parameters.number("predicted_goal_speed", estimator.predicted_speed, 0.0, 1.0);
+  estimator.max_speed = parameters.number("goal_max_speed", estimator.max_speed, 0.01, 10.0);
   estimator.noisy_turning =
       parameters.number("noisy_goal_turning", estimator.noisy_turning, 0.0, 10.0);
   return estimator;

@@ -20,6 +20,9 @@ struct CartesianMotionPlan {
   /// Within kSlowWay of the goal it is not faster, before that only so much that it brakes by
   /// kGentleBraking until there; the clock of the primitive is slowed for that, its path stays.
   double arrival_speed = 0.0;
+  /// The goal tells where something will come to rest. It moves because the prediction changes,
+  /// which is not followed like a goal that moves; see GoalEstimatorParameters::predicted_speed.
+  bool predicted = false;
 };
 
 inline constexpr double kSlowWay = 0.02;         ///< m
@@ -105,6 +108,7 @@ class CartesianMotion {
   double remaining_distance_ = 0.0;
   double rate_ = 1.0;           // of the last step
   double arrival_speed_ = 0.0;  // of the plan
+  bool predicted_ = false;      // of the plan that it began with
   double arrival_rate_ = 1.0;   // share of the rate that it left in the last step
   double drawn_ = 1.0;          // share of the approach by which the goal was drawn back then
   bool settled_ = false;        // the set-point has come to rest at the latched goal

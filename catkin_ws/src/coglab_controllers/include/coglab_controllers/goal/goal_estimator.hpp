@@ -32,6 +32,11 @@ struct GoalEstimatorParameters {
   /// m/s, rad/s: an estimated speed below this is taken for noise when the goal trembles fully
   double noisy_speed = 0.04;
   double noisy_turning = 2.0;
+  /// m/s below which the speed of a predicted goal is taken for a change of the prediction
+  double predicted_speed = 0.08;
+  /// m/s that g' has at most: a goal that is faster is a hand on its way, or a prediction that has
+  /// changed, and will stop. It is neither led nor run after.
+  double max_speed = 0.15;
   double max_innovation =
       0.15;  ///< m: a goal further away pulls no harder, which bounds speed and acceleration
   double max_angle_innovation = 0.6;  ///< rad, for orientations
@@ -42,7 +47,8 @@ struct GoalEstimatorParameters {
 /// A constant-velocity tracker of third order with ramp compensation: g = p + 3 T g', so a steadily
 /// moving goal is met without lag, and g and g' have no step when the input has one. g' is p', but
 /// as good as zero where the goal trembles and p' is no faster than the trembling makes it: a goal
-/// that rests is then not led by its own noise. No allocation, no throw.
+/// that rests is then not led by its own noise. Nor is one led by the changes of a prediction, or
+/// by more than max_speed: a faster goal is met only once it is slower. No allocation, no throw.
 class GoalEstimator {
  public:
   /// @throws std::invalid_argument unless time_constant is 0 or in [0.005, 2] and the others are
@@ -52,7 +58,8 @@ class GoalEstimator {
   /// At rest at `goal` (m).
   void reset(const Vector3& goal) noexcept;
   /// One cycle of `dt` s with the newest goal as received (m, finite).  @param noise of it, 0..1.
-  void update(double dt, const Vector3& goal, double noise = 0.0) noexcept;
+  /// @param predicted it tells where something will come to rest, not where it is
+  void update(double dt, const Vector3& goal, double noise = 0.0, bool predicted = false) noexcept;
 
   const Vector3& position() const noexcept { return position_; }  ///< g, m
   const Vector3& velocity() const noexcept { return velocity_; }  ///< g', m/s

@@ -27,7 +27,8 @@ namespace coglab_controllers {
 /// `dmp_frame_name`, `enable_ik_debug`; and
 /// `goal_timeout` (s, dmp_goal; 0: never old), `goal_max_age` (s), `goal_max_jump` (m),
 /// `goal_lost_time` (s), `goal_finish_distance` (m), `goal_reach_margin` (m), `goal_time_constant`,
-/// `noisy_goal_time_constant` (s), `max_initial_distance` (m), `end_phase`, `end_speed` (m/s),
+/// `noisy_goal_time_constant` (s), `goal_max_speed`, `predicted_goal_speed` (m/s),
+/// `predicted_goals` (how the names of frames end that tell where something will rest), `max_initial_distance` (m), `end_phase`, `end_speed` (m/s),
 /// `end_turning` (rad/s), `end_distance` (m),
 /// `follow_distance` (m), `follow_time` (s), `arrive_distance` (m),
 /// `settle_time` (s), `correction_speed` (m/s), `singularity_threshold`,
@@ -92,6 +93,7 @@ class DmpController : public MotionRunner<DmpPlan> {
 
   // set once, by configure()
   std::string base_frame_, dmp_frame_, goal_tf_frame_;
+  std::string predicted_;  // end of the names of frames that tell where something will rest
   double reach_margin_ = 0.5, max_initial_distance_ = 0.1;
 
   mutable std::mutex library_mutex_;
