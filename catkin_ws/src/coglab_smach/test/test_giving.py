@@ -7,8 +7,8 @@ import pytest
 from coglab_msgs.msg import ReasonCode, Say
 from coglab_py.pose import Pose
 from coglab_sim.conditions import Conditions
-from coglab_smach.context.config import Config
 from coglab_smach.contact.leaving_load import SAME, LeavingLoad
+from coglab_smach.context.config import Config
 from coglab_smach.kinematics.reachability import default_arm
 from coglab_smach.ports.interfaces import HandState, Located
 from coglab_smach.ports.pending import PortError, Ready
@@ -150,6 +150,21 @@ def test_the_arm_sinks_once_where_nobody_lifts():
         assert len(t.cell.called("move_ptp")) == 1
         t.clock.sleep(1.5)
         assert len(t.cell.called("move_ptp")) == 1
+        t.wait_hub("wait_with_object")
+
+    assert giving(script, **{"give.near": 2.0}).result().outcome == "failed_holding"
+
+
+@pytest.mark.parametrize(("pressed", "sinks"), [(0.5, 0), (1.5, 1)])
+def test_the_arm_sinks_at_once_with_a_hand_that_presses_the_object_down(monkeypatch, pressed, sinks):
+    """It is held too high for the hand that has it; what torques are wrong by is no hand."""
+    monkeypatch.setattr(give, "way_to_hand", lambda *_: None)  # it is not brought anywhere
+
+    def script(t):
+        t.cell.push(-pressed * WEIGHT)
+        t.clock.sleep(1.0)
+        assert len(t.cell.called("move_ptp")) == sinks
+        t.cell.push(0.0)
         t.wait_hub("wait_with_object")
 
     assert giving(script, **{"give.near": 2.0}).result().outcome == "failed_holding"

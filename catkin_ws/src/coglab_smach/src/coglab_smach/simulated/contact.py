@@ -109,7 +109,7 @@ class SimulatedContact:
     def share_gone(self) -> float | None:
         if self._mode != "release" or "contact" in self.cell.faults.dead:
             return None
-        return 1.0 if self.event() is not None else max(0.0, self.cell.lifted - self._lifted_before) / self._weight
+        return 1.0 if self.event() is not None else (self.cell.lifted - self._lifted_before) / self._weight
 
     def force(self) -> tuple[float, float, float] | None:
         """What the script pulls and lifts with."""

@@ -33,6 +33,9 @@ ASTRAY = 0.02
 """m that the object is from where it is offered, from which on it is brought there"""
 BEYOND = 0.06
 """the same before ``give.lower_after``: a person who is nearer comes to it, and would meet an arm that comes, too"""
+PRESSES, LASTS, SINKS = 2.0, 0.3, 3
+"""N by which who has the object presses it down, or its weight if that is more, s for which they do before the arm sinks
+with it, and times at most that it does"""
 BRINGS, LOOKS = 3, 0.3
 """times at most that it is; s between two looks, between which a hand that waits moves by less than ASTRAY"""
 
@@ -207,7 +210,8 @@ class GiveLoad(CoglabState):
     back to the arm, or the object sinks in the hand by ``give.slip`` m, the grip closes again. Where the person's hand
     waits there, but not at the object, the arm brings it to where that hand takes it, ``give.bring_after`` s after its
     own arrival and later; a reach toward where a hand would be may have ended before that hesitated. Where nothing has
-    happened for ``give.lower_after`` s the arm sinks by ``give.lower`` m, so that the weight comes to lie in the hand.
+    happened for ``give.lower_after`` s the arm sinks by ``give.lower`` m, so that the weight comes to lie in the hand;
+    at once where the hand that has the object presses it down, since it is held too high for them.
     After the time limit the grip closes and keeps the object. It closes with the lowest force (``give.close_speed``):
     the person's fingers are there; firmly at home only.
     """
@@ -224,11 +228,12 @@ class GiveLoad(CoglabState):
         self._lowering: Pending | None = None
         self._moving: Pending | None = None
         self._lower_at = self._look_at = 0.0
-        self._brings = 0
+        self._brings = self._sinks = 0
+        self._pressed_since: float | None = None
         self._way: np.ndarray | None = None
         """m, of the last look: from the object to where the person's hand takes it"""
-        self._needed = self._slips_at = 0.0
-        """share of the load; N of grip below which the object slips while the hand carries all of it"""
+        self._needed = self._slips_at = self._weight = 0.0
+        """share of the load; N of grip below which the object slips while the hand carries all of it; N"""
         self._firm = 0
         """wire speed of the grip that is as firm as before"""
         self._back_since: float | None = None
@@ -242,8 +247,9 @@ class GiveLoad(CoglabState):
         self._needed = float(release.get("threshold", 0.5))
         self.allow(limit + 10.0)
         entry = ud.object_entry
+        self._weight = GRAVITY * float(entry.get("mass", 0.0))
         # Two sides press: the object slips where friction on both does not carry it.
-        self._slips_at = GRAVITY * float(entry.get("mass", 0.0)) / (2.0 * float(entry.get("friction", 0.5)))
+        self._slips_at = self._weight / (2.0 * float(entry.get("friction", 0.5)))
         self._grip = LooseningGrip(
             self.ctx.hand,
             int(self._number("loosen_speed", 40)),
@@ -252,8 +258,8 @@ class GiveLoad(CoglabState):
             contact.grip,
         )
         self._firm = firm_speed(self.ctx, entry, ud.grasp_name)
-        self._lowering = self._moving = self._back_since = None
-        self._brings, self._way = 0, None
+        self._lowering = self._moving = self._back_since = self._pressed_since = None
+        self._brings, self._sinks, self._way = 0, 0, None
         self._offer = partial(way_to_hand, self, ud.object_id, ud.delivery)
         self._held = HeldObject(self.ctx, ud.object_id)
         now = self.ctx.clock.now()
@@ -286,10 +292,28 @@ class GiveLoad(CoglabState):
         share, now = self.ctx.contact.share_gone(), self.ctx.clock.now()
         begins = self._number("begins", 0.2)
         self._follow(0.0 if share is None else share, begins, now)
-        brings = self._moving is not None and not self._moving.done()
-        if share is not None and share < begins and self._lowering is None and not brings and now >= self._look_at:
-            self._bring_or_lower(now)
+        if share is not None and share < begins and now >= self._look_at:
+            if self._is_pressed(share, now):
+                self._sink_with_them(now)
+            elif self._lowering is None and (self._moving is None or self._moving.done()):
+                self._bring_or_lower(now)
         return False
+
+    def _is_pressed(self, share: float, now: float) -> bool:
+        """Whether a hand that has the object has pressed it down for LASTS s."""
+        if -share * self._weight < max(PRESSES, self._weight):
+            self._pressed_since = None
+        elif self._pressed_since is None:
+            self._pressed_since = now
+        return self._pressed_since is not None and now - self._pressed_since >= LASTS
+
+    def _sink_with_them(self, now: float) -> None:
+        """Rather than bring it anywhere."""
+        if self._moving is not None:
+            self._moving.cancel()
+            self._moving = None
+        if self._sinks < SINKS and (self._lowering is None or self._lowering.done()):
+            self._lower(now)
 
     def _follow(self, share: float, begins: float, now: float) -> None:
         """As loose as the share asks for; closed again where it does not stay, and where the object slips."""
@@ -333,7 +357,12 @@ class GiveLoad(CoglabState):
                 self._moving, self._way, self._brings = shift(self.ctx, way, speed), None, self._brings + 1
                 self._lower_at = now + length / speed + self._number("lower_after", 3.0)
         elif now >= self._lower_at:
-            self._lowering = rise(self.ctx, -self._number("lower", 0.03), self._number("lower_speed", 0.03))
+            self._lower(now)
+
+    def _lower(self, now: float) -> None:
+        """The arm sinks."""
+        self._look_at, self._sinks = now + LOOKS, self._sinks + 1
+        self._lowering = rise(self.ctx, -self._number("lower", 0.03), self._number("lower_speed", 0.03))
 
     def _keep(self) -> None:
         """The object stays in the hand: closed again, where it was loosened."""
