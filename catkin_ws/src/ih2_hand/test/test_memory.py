@@ -133,7 +133,7 @@ def test_a_preshape_that_ends_well_says_nothing_of_the_grip(memory, held):
 
 def test_the_hand_is_shown_empty_once_and_gripping_at_any_time(memory):
     assert memory.look(OPEN) and not memory.holding
-    assert not memory.look(OPEN) and not memory.holding, "it was known"
+    assert memory.look(OPEN) is False and not memory.holding, "it was known"
     assert not memory.look(GRIPPING) and memory.holding
     assert not memory.look([finger(motor) for motor in range(5)]) and memory.holding, "nothing is shown"
 

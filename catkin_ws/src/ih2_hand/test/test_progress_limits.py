@@ -5,10 +5,10 @@ from __future__ import annotations
 from types import SimpleNamespace
 
 import pytest
+from ih2_hand.errors import RefusedError
 from ih2_hand.progress import (
     BLOCKED_S,
     LONGEST_S,
-    POSITION_TOLERANCE,
     STALL_S,
     START_GRACE_S,
     CloseTask,
@@ -50,6 +50,14 @@ def preshape(is_sent: bool = True) -> tuple[PreshapeTask, list]:
 @pytest.mark.parametrize(("speed", "seconds"), [(511, 5.0), (146, 10.0), (20, 54.1), (10, LONGEST_S), (1, LONGEST_S)])
 def test_a_slower_movement_has_longer_but_no_more_than_a_minute(speed, seconds):
     assert OpenTask(speed).limit == CloseTask(speed).limit == pytest.approx(seconds, abs=0.01)
+
+
+@pytest.mark.parametrize(
+    ("speed", "words"), [(0, "speed 0 moves nothing; give 1..511"), (512, "speed must be 0..511"), (-1, "got -1")]
+)
+def test_a_speed_that_is_refused_is_refused_with_what_would_do(speed, words):
+    with pytest.raises(RefusedError, match=words):
+        CloseTask(speed)
 
 
 @pytest.mark.parametrize(("speed", "seconds"), [(511, STALL_S), (21, STALL_S), (16, 0.5), (4, 2.0)])
@@ -97,7 +105,7 @@ def test_a_preshape_is_sent_once_by_the_driver_or_by_the_task(is_sent):
     assert task.limit == 7.0
 
 
-@pytest.mark.parametrize("beside", [-POSITION_TOLERANCE, POSITION_TOLERANCE])
+@pytest.mark.parametrize("beside", [-12, 12])
 def test_a_preshape_may_end_this_far_beside(beside):
     task, _ = preshape()
     farther = beside + (1 if beside > 0 else -1)

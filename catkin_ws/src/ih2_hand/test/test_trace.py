@@ -53,6 +53,11 @@ def test_frames(frame, meaning):
     assert meaning in lines[0]
 
 
+def test_one_stop_is_a_command_and_several_are_filler():
+    assert [line.split()[-1] for line in said(Tracer(), ">", "41")] == ["StopALL"]
+    assert [line.split()[-1] for line in said(Tracer(), ">", "41 41")] == ["resynchronisation"]
+
+
 def test_answers_follow_their_requests():
     tracer = Tracer()
     said(tracer, ">", "4B 00 45 01 49 03")
