@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from types import SimpleNamespace
 
 import pytest
@@ -109,9 +110,12 @@ class Server:
     """An action server without a master."""
 
     started = 0
+    every: dict[str, Server] = {}
 
-    def __init__(self, *arguments: object, **options: object) -> None:
-        assert options["auto_start"] is False, "a goal must not come before there is what takes it"
+    def __init__(self, name: str, action: type, on_goal: Callable, on_cancel: Callable, auto_start: bool) -> None:
+        assert auto_start is False, "a goal must not come before there is what takes it"
+        self.action, self.on_goal, self.on_cancel = action, on_goal, on_cancel
+        Server.every[name] = self
 
     def start(self) -> None:
         Server.started += 1

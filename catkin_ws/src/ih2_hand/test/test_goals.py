@@ -38,9 +38,13 @@ class Desk:
 
     def goal(self, name: str = "hand_close") -> Handle:
         handle = Handle()
-        self.queue._on_goal(name, handle)
+        Server.every[f"~{name}"].on_goal(handle)
         self.work()
         return handle
+
+    def cancel(self, name: str, handle: Handle) -> None:
+        Server.every[f"~{name}"].on_cancel(handle)
+        self.work()
 
     def put(self, kind: str, name: str = "", content: object = None) -> None:
         self.queue._mailbox.put(goals.Item(kind, name, content))
@@ -132,12 +136,12 @@ def test_a_goal_that_was_cancelled_while_it_waited_does_not_begin(desk):
 
 def test_a_cancel_ends_its_own_goal_and_no_other(desk):
     handle = desk.goal()
-    desk.put("cancel", "hand_open", Handle())
+    desk.cancel("hand_open", Handle())
     assert handle.ended is None and desk.stops == 0
-    desk.put("cancel", "hand_close", handle)
+    desk.cancel("hand_close", handle)
     assert handle.ended == ("cancelled", "preempted; fingers stopped", Reason.CANCELLED)
     assert desk.stops == 1 and desk.queue.active is None and desk.master.subscribed == 0
-    desk.put("cancel", "hand_close", handle)
+    desk.cancel("hand_close", handle)
     assert desk.stops == 1, "it has ended"
 
 
@@ -158,7 +162,7 @@ def test_a_goal_ends_though_its_fingers_cannot_be_stopped(desk, driver):
         desk.owner.driver.error = HandConnectionLost("gone")
     else:
         desk.owner.driver = None
-    desk.put("cancel", "hand_close", handle)
+    desk.cancel("hand_close", handle)
     assert handle.ended is not None and desk.queue.active is None
 
 
@@ -179,9 +183,9 @@ def test_a_goal_does_not_go_on_with_another_connection(desk):
 
 def test_a_status_from_before_the_command_is_not_judged(desk):
     desk.goal()
-    desk.status(after=goals.SETTLE_S / 2)
+    desk.status(after=0.019)
     assert desk.task.asked == []
-    desk.status(after=goals.SETTLE_S)
+    desk.status(after=0.0015)
     assert len(desk.task.asked) == 1
     desk.status(motors=[])
     assert len(desk.task.asked) == 1
@@ -328,6 +332,6 @@ def test_the_end_of_the_node_is_told_to_the_goal_before_it_returns(working, monk
     queue.shutdown()
     assert handle.ended == ("aborted", "the node ends", Reason.CANCELLED)
     assert queue._owner.driver.stops == 1
-    assert slept == [goals.SENDING_S], "the result is on its way"
+    assert slept == [0.1], "the result is on its way"
     queue.shutdown()
     assert len(slept) == 1, "nothing is on its way"

@@ -141,6 +141,11 @@ def faults(hand) -> Faults:
     return Faults(hand.hand)
 
 
+def test_a_line_without_a_fault_changes_nothing(faults):
+    assert faults.incoming(b"ab") == faults.outgoing(b"ab") == b"ab"
+    assert faults.take_stray() == b"" and faults.delay_s == 0.0
+
+
 def test_bytes_are_lost_in_both_directions_and_then_no_more(faults):
     assert faults.command("lose 3") == "lose: next 3" and faults.command("lose_in 1") == "lose_in: next 1"
     assert [faults.outgoing(b"ab"), faults.outgoing(b"cd"), faults.outgoing(b"ef")] == [b"", b"d", b"ef"]

@@ -5,7 +5,6 @@ from __future__ import annotations
 import pytest
 from ih2_hand.clock import SteppedClock
 from ih2_hand.emulator.hand import EmulatedHand
-from ih2_hand.emulator.low_level import RAW_PER_COUNT
 
 
 class Electronics:
@@ -78,7 +77,7 @@ def test_raw_positions_count_from_where_zero_was_set(electronics, zero):
         electronics.ask("23")
         assert electronics.ask("22") == "00 00 00"
     electronics.motor.position = zero + 200.0
-    assert int(electronics.ask("22").replace(" ", ""), 16) == 200 * RAW_PER_COUNT
+    assert int(electronics.ask("22").replace(" ", ""), 16) == 200 * 400
     electronics.ask("21 01 90")
     assert electronics.motor.target == zero + 1.0
 

@@ -79,10 +79,10 @@ class Running:
     task: Task
     begun: float
     begun_stamp: rospy.Time
+    last_status: float
     driver: Any = None
     fillers: int = 0
     resends: int = 0
-    last_status: float = 0.0
 
 
 class HandActionServer(actionlib.ActionServer):
@@ -221,7 +221,7 @@ class GoalQueue:
                 rospy.resolve_name("~hand_status"), HandStatus, self._on_status, queue_size=2, tcp_nodelay=True
             )
         now = time.monotonic()
-        self._running = Running(name, handle, task, now, rospy.Time.now(), last_status=now)
+        self._running = Running(name, handle, task, now, rospy.Time.now(), now)
         self._begin(self._running)
 
     def _on_status(self, status: HandStatus) -> None:
