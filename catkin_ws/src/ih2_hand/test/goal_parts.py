@@ -103,6 +103,7 @@ class Owner:
         return self.tasks[-1]
 
     def task_ended(self, task: Task, verdict: Verdict) -> None:
+        assert task in self.tasks
         self.verdicts.append(verdict)
 
 

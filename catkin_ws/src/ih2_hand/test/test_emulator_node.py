@@ -170,7 +170,9 @@ def test_without_a_master_the_hand_lives_on(monkeypatch):
         (True, False, rospy.ROSException("closed"), True),
         (False, True, rospy.ROSException("closed"), True),
         (False, False, rospy.ROSException("closed"), False),
+        (True, True, rospy.ROSSerializationException("closed"), True),
         (True, True, ValueError("a slip"), False),
+        (True, True, Exception("whatever"), False),
     ],
 )
 def test_only_topics_that_close_at_the_end_are_passed_over(monkeypatch, requested, closed, error, is_quiet):

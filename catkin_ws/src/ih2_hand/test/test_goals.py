@@ -204,6 +204,8 @@ def test_a_resynchronised_line_takes_the_command_again_but_not_for_ever(desk):
     how, why, code = handle.ended
     assert how == "aborted" and code == Reason.HAND_LINK_LOST and "resynchronised 3 times" in why
     assert desk.task.begun == 1 + RESENDS, "the fingers are not sent on their way once more"
+    assert len(desk.task.asked) == len(handle.feedback) == 1, "nor is it told any more how they move"
+    assert desk.owner.verdicts[-1].done
     assert desk.stops == 1 and desk.queue.active is None
 
 
@@ -331,7 +333,7 @@ def test_the_end_of_the_node_is_told_to_the_goal_before_it_returns(working, monk
     monkeypatch.setattr(goals, "time", SimpleNamespace(monotonic=time.monotonic, sleep=slept.append))
     queue.shutdown()
     assert handle.ended == ("aborted", "the node ends", Reason.CANCELLED)
-    assert queue._owner.driver.stops == 1
+    assert queue._owner.driver.stops == 1 and not queue._thread.is_alive()
     assert slept == [0.1], "the result is on its way"
     queue.shutdown()
     assert len(slept) == 1, "nothing is on its way"

@@ -45,9 +45,18 @@ def test_a_grasp_by_current_closes_with_its_level(hand, code, level):
     assert hand.modes[1] == "current_position"
 
 
-def test_a_grasp_by_tension_closes_with_its_level(hand):
-    hand.tell("51", then=1.3)
-    assert set(hand.modes[1:]) == {"tension"} and hand.efforts[1:] == [200.0] * 4
+@pytest.mark.parametrize(("code", "level"), [("50", 100), ("51", 200), ("52", 350)])
+def test_a_grasp_by_tension_closes_with_its_level(hand, code, level):
+    hand.tell(code, then=1.3)
+    assert set(hand.modes[1:]) == {"tension"} and hand.efforts[1:] == [float(level)] * 4
+
+
+def test_a_hand_as_delivered_is_not_calibrated_and_loses_no_command():
+    hand = Commanded(greeting=False)
+    assert not EmulatedHand(SteppedClock()).calibrated
+    hand.hand.calibrated = True
+    hand.tell("48 0A 0A 0A 0A 0A 48 44 02 80")
+    assert hand.hand.counters.too_fast == 0 and hand.hand.motors[2].target == 128.0
 
 
 def test_levels_can_be_stored(hand):
@@ -112,6 +121,44 @@ def test_a_relaxed_thumb_stands_where_it_is(hand):
     assert hand.hand.motors[1].direction == -1 and hand.hand.motors[0].position == 100.0
 
 
+def test_a_hand_in_the_cell_opens_at_full_speed_while_it_calibrates():
+    hand = Commanded(physical=True)
+    hand.tell("46")
+    assert hand.hand.orders() == [(1.0, 0.0, 0.0)] * 5
+
+
+def test_a_command_before_the_posture_is_executed_is_lost():
+    hand = Commanded(enforce_spacing=True)
+    hand.tell("48 00 00 00 00 00 48 44 02 80")
+    assert hand.hand.motors[2].target == 0.0 and hand.hand.counters.too_fast == 1
+    hand.clock.sleep(0.003)
+    hand.tell("44 02 80")
+    assert hand.hand.motors[2].target == 128.0 and hand.hand.counters.too_fast == 1
+
+
+def test_nobody_answers_to_the_address_behind_the_last_motor(hand):
+    assert hand.tell("45 05 4B 05 45 04") == "00" and hand.hand.counters.wrong_motor == 2
+    hand.tell("44 05 64")
+    assert hand.hand.counters.wrong_motor == 3 and hand.modes == ["stop"] * 5
+
+
+@pytest.mark.parametrize(("positions", "stiffness"), [(4, 5), (5, 4), (6, 5)])
+def test_a_contact_for_another_number_of_motors_is_refused(hand, positions, stiffness):
+    with pytest.raises(ValueError, match=f"5 positions and stiffnesses; got {positions} and {stiffness}"):
+        hand.hand.set_contacts([100.0] * positions, [1.0] * stiffness)
+
+
+@pytest.mark.parametrize("motor", range(5))
+@pytest.mark.parametrize(("way", "direction"), [(0x80, -1), (0xC0, 1)])
+@pytest.mark.parametrize("speed", [1, 255, 256, 511])
+def test_each_motor_is_driven_both_ways(motor, way, direction, speed):
+    hand = Commanded(positions=[100] * 5)
+    hand.tell(bytes((way + 4 * motor + (speed >> 8), speed & 0xFF)).hex())
+    driven = hand.hand.motors[motor]
+    assert hand.modes == ["speed" if other == motor else "stop" for other in range(5)]
+    assert (driven.direction, driven.speed) == (direction, speed)
+
+
 def test_readings_are_counted_and_clipped(hand):
     hand.hand.motors[2].current = 4000.0
     assert hand.tell("49 02 49 03 4B 01 45 01") == "03 FF 00 00 08 00"
@@ -128,6 +175,8 @@ def test_long_silence_is_made_up_in_steps_short_enough_for_contact(hand):
 def test_contacts_reach_from_the_open_end_to_free_and_from_soft_to_hard(hand, contact, stiffness):
     hand.hand.set_contacts(contact, stiffness)
     assert [motor.contact.position for motor in hand.hand.motors] == contact
+    with pytest.raises(ValueError, match="stiffness 0..1e\\+06"):
+        hand.hand.set_contacts(contact, [1.001e6] * 5)
     for wrong in (contact[0] - 256.0, contact[0] + 255.5):
         with pytest.raises(ValueError, match="for motor 0"):
             hand.hand.set_contacts([wrong] * 5, stiffness)

@@ -210,7 +210,7 @@ class GoalQueue:
         try:
             task = self._owner.make_task(name, handle.get_goal())
         except (ValueError, HandError) as error:
-            self._finish_handle(name, handle, Verdict(str(error), done=True, reason=reason_of(error)))
+            self._finish_handle(name, handle, Verdict(str(error), reason=reason_of(error)))
             return
         if handle.get_goal_status().status == actionlib.GoalStatus.PREEMPTING:
             cancelled = Verdict("cancelled before it began", reason=Reason.CANCELLED)
