@@ -245,11 +245,17 @@ def test_a_cable_can_be_pulled_and_plugged_in_again(served, tmp_path):
 
 
 def test_a_cable_plugs_itself_in_again_after_its_time(served):
-    served.server.fault("unplug 0.1")
     begun = time.monotonic()
+    served.server.fault("unplug 0.1")
     assert served.server.path == ""
     served.serves_until(lambda _: served.server.path)
     assert time.monotonic() - begun >= 0.1
+
+
+def test_a_link_that_somebody_has_removed_keeps_no_cable_plugged(served, tmp_path):
+    (tmp_path / "hand").unlink()
+    served.server.fault("unplug")
+    assert served.server.path == "" and served.ports[-1] == ""
 
 
 def test_answers_that_were_late_do_not_survive_the_cable(served):
