@@ -74,7 +74,7 @@ def test_force_of_the_motor_without_sensor(bench, call, arguments):
     assert bench.sent() == ""
 
 
-@pytest.mark.parametrize("seconds", [-1.0, 0.0, 0.004, 0.6, float("nan"), float("inf")])
+@pytest.mark.parametrize("seconds", [-1.0, 0.0, 0.004, 0.0049, 0.501, 0.6, float("nan"), float("inf")])
 def test_a_read_time_limit_out_of_range_is_refused_before_the_port_is_opened(seconds):
     with pytest.raises(ValueError, match=r"read_timeout must be 0\.005\.\.0\.5 s"):
         HandSerialDriver("/dev/there-is-no-such-port", read_timeout=seconds)
@@ -100,6 +100,32 @@ def test_every_mode_has_a_level_and_a_preshape():
         assert grasps.levels_of(mode, "v17") == grasps.LEVELS
         assert len(preshapes[mode]) == 5
         assert max(preshapes[mode]) <= 254
+
+
+def test_each_mode_closes_the_fingers_that_it_names():
+    assert grasps.CLOSING_MOTORS == {
+        "cylindrical": (1, 2, 3, 4),
+        "lateral": (1,),
+        "tridigit": (1, 2, 3),
+        "bidigit": (1, 2),
+        "tridigit2": (1, 2, 3),
+        "bidigit2": (1, 2),
+    }
+
+
+@pytest.mark.parametrize(("length", "shown"), [(40, "'" + "x" * 40 + "'"), (41, "'" + "x" * 40 + "...'")])
+def test_a_foreign_text_is_shown_up_to_forty_characters(length, shown):
+    assert grasps.quoted("x" * length) == shown
+
+
+def test_a_grasp_file_may_have_remarks_and_its_faults_have_lines(tmp_path):
+    file = tmp_path / "grasps.yaml"
+    modes = [f"{mode}: [1, 2, 3, 4, {number}] # own # value" for number, mode in enumerate(grasps.MODES)]
+    file.write_text("\n".join(["# all", "", *modes]) + "\n")
+    assert grasps.load_preshapes(file)["lateral"] == (1, 2, 3, 4, 1)
+    file.write_text("\n".join(["# all", "", *modes, "power: [1]"]) + "\n")
+    with pytest.raises(ValueError, match="grasps.yaml:9: mode 'power'"):
+        grasps.load_preshapes(file)
 
 
 @pytest.mark.parametrize(

@@ -16,6 +16,10 @@ def test_postures_are_spaced(make_bench):
     assert bench.clock.now >= 20 * 0.003
 
 
+def test_opening_takes_no_longer_than_bringing_the_line_in_step(bench):
+    assert WIRE.resync_wait_s < bench.clock.now < 0.05
+
+
 def test_calibration_polls_until_the_hand_answers(make_bench):
     bench = make_bench(greeting=False, positions=[90] * 5)
     bench.driver.calibration("fast")

@@ -65,9 +65,27 @@ def test_close_on_an_object_at_any_speed(bench, speed):
 
 def test_too_slow_ends_in_time(bench):
     verdict = follow(bench.driver, CloseTask(1), period=0.5)
-    assert not verdict.ok and "not done within 60 s" in verdict.text
+    assert verdict.done and not verdict.ok and "not done within 60 s" in verdict.text
     assert verdict.reason is Reason.TIME_LIMIT
     assert all(motor.mode == "stop" for motor in bench.hand.motors)
+
+
+@pytest.mark.parametrize("begun", [0.0, 1000.0])
+def test_a_movement_is_judged_thirty_times_a_second_from_its_beginning(bench, begun):
+    bench.clock.now += begun
+    start = bench.clock.now
+    elapsed = []
+
+    class Watched(CloseTask):
+        def judge(self, motors, since):
+            elapsed.append((since, bench.clock.now - start))
+            return super().judge(motors, since)
+
+    seen = []
+    verdict = follow(bench.driver, Watched(511), on_poll=lambda verdict, motors: seen.append((verdict, len(motors))))
+    assert verdict.ok and seen[-1] == (verdict, 5) and not seen[0][0].done
+    assert all(since == pytest.approx(now, abs=0.001) for since, now in elapsed)
+    assert elapsed[2][0] == pytest.approx(0.1, abs=0.001)
 
 
 def test_breaking_off_stops_the_fingers(bench):
@@ -76,7 +94,7 @@ def test_breaking_off_stops_the_fingers(bench):
         bench.driver, CloseTask(100), on_poll=lambda verdict, motors: polls.append(motors) or len(polls) > 10
     )
     assert "broken off" in verdict.text and len(polls) == 11
-    assert verdict.reason is Reason.CANCELLED
+    assert verdict.done and verdict.reason is Reason.CANCELLED
     bench.hand.advance()
     assert all(motor.mode == "stop" for motor in bench.hand.motors)
 
@@ -101,7 +119,7 @@ def test_a_line_that_slips_again_and_again_is_reported(bench):
         return False
 
     verdict = follow(bench.driver, CloseTask(100), on_poll=lose)
-    assert not verdict.ok and "resynchronised 3 times" in verdict.text
+    assert verdict.done and not verdict.ok and "resynchronised 3 times" in verdict.text
     assert verdict.reason is Reason.HAND_LINK_LOST
 
 

@@ -156,6 +156,7 @@ def test_grasp_interrupted_by_a_stop():
 
 def test_grasp_ignored():
     task = GraspTask((1,), 10.0)
+    task.begin(SimpleNamespace(grasp_mode_close=lambda: None))
     task.judge(poll("50 50 50 50 50", [0] * 5), 0.1)
     verdict = task.judge(poll("50 50 50 50 50", [0] * 5), 1.2)
     assert verdict.done and not verdict.ok and "did not begin" in verdict.text

@@ -3,91 +3,12 @@
 from __future__ import annotations
 
 import time
-from types import SimpleNamespace
 
 import pytest
 import rospy
-from coglab_msgs.msg import HandStatus, MotorStatus
-from ih2_hand.progress import Verdict
+from goal_parts import Handle, Owner, queue_of_goals, status_now
 from ih2_hand.reasons import Reason
 from ih2_hand.ros import goals
-
-
-class Handle:
-    """A goal's handle; remembers how it ended."""
-
-    def __init__(self) -> None:
-        self.ended: tuple[str, str, int] | None = None
-        self.feedback: list[tuple[str, int]] = []
-
-    def set_accepted(self) -> None:
-        """It begins."""
-
-    def get_goal(self) -> object:
-        return object()
-
-    def get_goal_status(self) -> SimpleNamespace:
-        return SimpleNamespace(status=1)
-
-    def publish_feedback(self, feedback: object) -> None:
-        self.feedback.append((feedback.status, feedback.status_code))
-
-    def set_aborted(self, result: object, text: str) -> None:
-        self.ended = ("aborted", text, result.reason_code)
-
-    def set_succeeded(self, result: object, text: str) -> None:
-        self.ended = ("succeeded", text, result.reason_code)
-
-
-class Task:
-    """A goal that never comes to an end by itself."""
-
-    name, limit = "hand_close", 60.0
-
-    def begin(self, driver: object) -> None:
-        """Nothing is sent."""
-
-    def judge(self, motors: object, elapsed: float) -> Verdict:
-        return Verdict("under way")
-
-
-class Driver:
-    """Counts the stops."""
-
-    def __init__(self) -> None:
-        self.counters, self.stops = SimpleNamespace(fillers=0), 0
-
-    def stop_all(self) -> None:
-        self.stops += 1
-
-
-class Owner:
-    """As much of the hand node as the goals see of it."""
-
-    port = "/dev/of_the_test"
-
-    def __init__(self) -> None:
-        self.driver = Driver()
-        self.verdicts: list[Verdict] = []
-
-    def connected_driver(self) -> Driver:
-        return self.driver
-
-    def make_task(self, name: str, goal: object) -> Task:
-        return Task()
-
-    def task_ended(self, task: Task, verdict: Verdict) -> None:
-        self.verdicts.append(verdict)
-
-
-class Server:
-    """An action server without a master."""
-
-    def __init__(self, *arguments: object, **options: object) -> None:
-        """Nobody asks it."""
-
-    def start(self) -> None:
-        """Nobody asks it."""
 
 
 @pytest.fixture
@@ -95,12 +16,7 @@ def queue(monkeypatch):
     """A queue of goals without a master, on the clock of the computer."""
     rospy.rostime.set_rostime_initialized(True)
     rospy.rostime.switch_to_wallclock()
-    monkeypatch.setattr(goals, "HandActionServer", Server)
-    monkeypatch.setattr(goals.rospy, "Subscriber", lambda *a, **k: SimpleNamespace(unregister=lambda: None))
-    monkeypatch.setattr(goals.rospy, "resolve_name", lambda name: name)
-    monkeypatch.setattr(goals.rospy, "is_shutdown", lambda: False)
-    monkeypatch.setattr(goals.rospy, "logwarn", lambda *a: None)
-    queue = goals.GoalQueue(Owner())
+    queue, _ = queue_of_goals(monkeypatch)
     queue.start()
     yield queue
     queue.shutdown()
@@ -108,9 +24,7 @@ def queue(monkeypatch):
 
 def say(queue: goals.GoalQueue) -> None:
     """One hand_status, read just now."""
-    status = HandStatus(connected=True, motors=[MotorStatus(motor=n) for n in range(5)])
-    status.header.stamp = rospy.Time.now()
-    queue._mailbox.put(goals.Item("status", content=status))
+    queue._mailbox.put(goals.Item("status", content=status_now()))
 
 
 def test_a_goal_is_aborted_when_hand_status_falls_silent(queue):

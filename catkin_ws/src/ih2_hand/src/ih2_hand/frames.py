@@ -142,10 +142,7 @@ def is_known(first: int, dialects: Sequence[str] = ("legacy", "v17")) -> bool:
     if first == GRASP_V17:
         return "v17" in dialects
     return (
-        first < 0x40
-        or first >= 0x80
-        or _LENGTHS[first] > 1
-        or first in (STOP_ALL, FIRST_CALIBRATION, FAST_CALIBRATION, OPEN_ALL, LLMC)
+        first < 0x40 or _LENGTHS[first] > 1 or first in (STOP_ALL, FIRST_CALIBRATION, FAST_CALIBRATION, OPEN_ALL, LLMC)
     )
 
 

@@ -35,13 +35,6 @@ CLOSING_MOTORS = {
 """Motors that close in each mode (EH1 guide 4.3 for the IH2's five motors)."""
 
 
-def check_mode(mode: str) -> str:
-    """`mode` if it exists, else RefusedError, a ValueError, that lists the modes."""
-    if mode not in MODES:
-        raise RefusedError(f"grasp mode must be one of {', '.join(MODES)}; got {quoted(mode)}", Reason.UNKNOWN_NAME)
-    return mode
-
-
 def levels_of(mode: str, dialect: str) -> tuple[str, ...]:
     """Force levels that `dialect` has for a mode (W22: the one-byte set has gaps)."""
     if dialect == "v17":
@@ -51,7 +44,8 @@ def levels_of(mode: str, dialect: str) -> tuple[str, ...]:
 
 def check_grasp(mode: str, level: str, dialect: str) -> None:
     """RefusedError unless the dialect has this mode at this force level; it lists what exists."""
-    check_mode(mode)
+    if mode not in MODES:
+        raise RefusedError(f"grasp mode must be one of {', '.join(MODES)}; got {quoted(mode)}", Reason.UNKNOWN_NAME)
     existing = levels_of(mode, dialect)
     if level not in existing:
         raise RefusedError(

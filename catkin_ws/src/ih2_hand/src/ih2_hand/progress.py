@@ -6,6 +6,7 @@ motors. Motor readings are objects with the fields of coglab_msgs/MotorStatus. N
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any, Protocol
@@ -99,16 +100,16 @@ def _names(motors: Sequence[int]) -> str:
 
 
 @dataclass
-class Task:
+class Task(ABC):
     """One goal: `begin` commands the hand, `judge` reads a poll, `limit` (s) bounds it."""
 
-    name: str = "task"
-    limit: float = 10.0
+    name: str
+    limit: float
     _stall: StallWatch = field(default_factory=StallWatch)
 
+    @abstractmethod
     def begin(self, driver: HandSerialDriver) -> None:
         """Send the command; called again when a resynchronisation has stopped the fingers."""
-        raise NotImplementedError
 
     def judge(self, motors: Sequence[MotorReading], elapsed: float) -> Verdict:
         """Verdict on a poll that began `elapsed` s after the command."""
@@ -118,8 +119,9 @@ class Task:
         self._stall.update(motors, elapsed)
         return self._judge(motors, elapsed)
 
+    @abstractmethod
     def _judge(self, motors: Sequence[MotorReading], elapsed: float) -> Verdict:
-        raise NotImplementedError
+        """Verdict on motors that can be read."""
 
 
 def _speed_limit_s(speed: int) -> float:
@@ -138,8 +140,8 @@ def check_speed(speed: int) -> None:
 class SpeedTask(Task):
     """Common to open and close: MoveMotor at the goal's speed until end sensor or resistance."""
 
-    close = False
-    motors: tuple[int, ...] = ()
+    close: bool
+    motors: tuple[int, ...]
 
     def __init__(self, name: str, speed: int):
         check_speed(speed)
@@ -178,8 +180,9 @@ class SpeedTask(Task):
             return _failed(f"{_names(lost)} stopped on the way without a reason on the status", Reason.HAND_STALLED)
         return self._ended(at_end, met)
 
+    @abstractmethod
     def _ended(self, at_end: list[int], met: list[int]) -> Verdict:
-        raise NotImplementedError
+        """Verdict when no finger moves any more: those at their end sensors, and those that met something."""
 
 
 class OpenTask(SpeedTask):

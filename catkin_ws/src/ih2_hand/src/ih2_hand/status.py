@@ -20,7 +20,6 @@ def _decode(raw: int) -> dict[str, Any]:
         return None if com_error else bool(raw & bit)
 
     return {
-        "motor": 0,
         "raw": raw,
         "mode": MODES[code],
         "mode_code": code,
@@ -42,9 +41,7 @@ def decode_status(motor: int, raw: int) -> dict[str, Any]:
     Keys: motor, raw, mode (text), mode_code, target_reached, fully_open, fully_closed,
     over_current, moving, com_error. With `com_error` the five flags are None (W27).
     """
-    status = _DECODED[raw].copy()
-    status["motor"] = motor
-    return status
+    return {"motor": motor, **_DECODED[raw]}
 
 
 def at_rest(raw: int) -> bool:
@@ -55,7 +52,7 @@ def at_rest(raw: int) -> bool:
 
 def describe_status(raw: int) -> str:
     """One STATUS byte in words, for traces."""
-    status = decode_status(0, raw)
+    status = _DECODED[raw]
     words = [status["mode"]]
     if not status["com_error"]:
         words += [

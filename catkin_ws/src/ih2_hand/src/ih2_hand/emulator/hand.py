@@ -134,8 +134,6 @@ class EmulatedHand:
         now = self.clock.monotonic()
         if self._calibration_end is not None and now >= self._calibration_end:
             self._end_calibration()
-            self._now = now
-            return
         elapsed = now - self._now
         if elapsed <= 0.0:
             return

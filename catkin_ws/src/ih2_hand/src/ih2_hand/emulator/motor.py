@@ -97,7 +97,7 @@ class Motor:
 
     def close_to_current(self, current: int, stop_after: bool) -> None:
         """Close until `current` 0..1023; `stop_after` is current/position mode."""
-        self.goal_effort, self.speed, self.direction = float(current), WIRE.position_speed, 1
+        self.goal_effort, self.speed = float(current), WIRE.position_speed
         self._begin("current_position" if stop_after else "current")
 
     # -- readings --------------------------------------------------------------------------------
@@ -105,8 +105,6 @@ class Motor:
     @property
     def penetration(self) -> float:
         """Counts by which the finger is pressed into the object."""
-        if self.contact.position >= FREE:
-            return 0.0
         return max(0.0, self.position - self.contact.position)
 
     @property
@@ -166,7 +164,7 @@ class Motor:
         if self.stuck:
             return
         position = self.position + step
-        if step > 0.0 and self.contact.position < FREE:
+        if step > 0.0:
             deepest = self.contact.position + limit_effort / max(self.contact.stiffness, 1e-6)
             position = max(self.position, min(position, deepest))
         self.position = max(0.0, min(FULL_SCALE, position))
@@ -182,8 +180,6 @@ class Motor:
     def aim(self) -> float:
         """Where position control goes; not the exact target with the fault "short": real hands
         stop up to 4 counts before it."""
-        if not self.short_by:
-            return self.target
         target = self.target + (self.short_by if self.target < self.position else -self.short_by)
         return max(0.0, min(FULL_SCALE, target))
 
@@ -203,10 +199,8 @@ class Motor:
 
     def _tension_step(self, step: float) -> None:
         goal = self.tension_goal
-        if self.effort > goal + self.contact.stiffness:
-            self._move(-min(step, (self.effort - goal) / max(self.contact.stiffness, 1e-6)), goal)
-        else:
-            self._move(step, goal)
+        too_deep = self.penetration - goal / max(self.contact.stiffness, 1e-6)
+        self._move(step if too_deep <= 0.0 else -min(step, too_deep), goal)
         self.reached = self.penetration > 0.0 and abs(self.effort - goal) < 1.0
 
     def _current_step(self, step: float) -> None:

@@ -27,8 +27,6 @@ class MotorState(NamedTuple):
 
     def check(self) -> None:
         """ValueError unless every figure is one that a motor can have."""
-        if 0.0 <= self.position <= 1.0 and 0.0 <= self.current <= 1e4 and 0.0 <= self.effort <= 1e4:
-            return
         for name, value, most in (
             ("position", self.position, 1.0),
             ("current", self.current, 1e4),

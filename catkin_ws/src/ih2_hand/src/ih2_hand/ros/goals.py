@@ -79,10 +79,10 @@ class Running:
     task: Task
     begun: float
     begun_stamp: rospy.Time
+    last_status: float
     driver: Any = None
     fillers: int = 0
     resends: int = 0
-    last_status: float = 0.0
 
 
 class HandActionServer(actionlib.ActionServer):
@@ -210,7 +210,7 @@ class GoalQueue:
         try:
             task = self._owner.make_task(name, handle.get_goal())
         except (ValueError, HandError) as error:
-            self._finish_handle(name, handle, Verdict(str(error), done=True, reason=reason_of(error)))
+            self._finish_handle(name, handle, Verdict(str(error), reason=reason_of(error)))
             return
         if handle.get_goal_status().status == actionlib.GoalStatus.PREEMPTING:
             cancelled = Verdict("cancelled before it began", reason=Reason.CANCELLED)
@@ -221,7 +221,7 @@ class GoalQueue:
                 rospy.resolve_name("~hand_status"), HandStatus, self._on_status, queue_size=2, tcp_nodelay=True
             )
         now = time.monotonic()
-        self._running = Running(name, handle, task, now, rospy.Time.now(), last_status=now)
+        self._running = Running(name, handle, task, now, rospy.Time.now(), now)
         self._begin(self._running)
 
     def _on_status(self, status: HandStatus) -> None:

@@ -39,6 +39,9 @@ from ih2_hand.ros.shutdown import ending
 from ih2_hand.ros.tracing import TracePublisher
 from ih2_hand.wire_choices import WIRE
 
+ONLY_DEVICE = "(the only serial device)"
+"""What messages call the port while none is named and none was found."""
+
 RECONNECT_S = 0.5
 """Pause between attempts to open the port."""
 
@@ -74,7 +77,7 @@ class HandNode(HandMemory):
         )
         self._preshapes = grasps.load_preshapes(parameters.read("~grasps_file", str, "") or None)
         self.driver: HandSerialDriver | None = None
-        self.port = self._port_setting or "(the only serial device)"
+        self.port = self._port_setting or ONLY_DEVICE
         self._event = (Reason.HAND_LINK_LOST, "not connected yet")
         self._last_status = HandStatus()
         self._contradictions = 0
@@ -149,9 +152,10 @@ class HandNode(HandMemory):
                 self.event(text, Reason.HAND_LINK_LOST)
 
     def _open(self) -> None:
-        self.port = self._resolve_port()
+        named = self._resolve_port()
+        self.port = named or ONLY_DEVICE
         driver = HandSerialDriver(
-            None if self.port == "" else self.port,
+            named or None,
             dialect=self._dialect,
             preshapes=self._preshapes,
             trace=self._trace.hook,

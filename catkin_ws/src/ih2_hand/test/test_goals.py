@@ -1,0 +1,339 @@
+"""The queue of goals: at most one moves the fingers, each ends once, and who asked learns why."""
+
+from __future__ import annotations
+
+import threading
+import time
+from types import SimpleNamespace
+
+import actionlib
+import pytest
+import rospy
+from actionlib_msgs.msg import GoalID
+from coglab_msgs.msg import HandStatus
+from goal_parts import Handle, Owner, Server, Task, queue_of_goals, status_now
+from ih2_hand.errors import HandConnectionLost, RefusedError
+from ih2_hand.progress import RESENDS, Verdict
+from ih2_hand.reasons import Reason
+from ih2_hand.ros import goals
+
+
+class Desk:
+    """A queue whose entries are worked off here, one by one, on a clock of its own."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.now = 100.0
+        clock = SimpleNamespace(monotonic=lambda: self.now, sleep=lambda seconds: None)
+        monkeypatch.setattr(goals, "time", clock)
+        monkeypatch.setattr(goals.rospy.Time, "now", lambda: rospy.Time.from_sec(self.now))
+        # Leaving a topic may take as long as the master likes; here it is done at once.
+        at_once = lambda target, daemon: SimpleNamespace(start=target)  # noqa: E731
+        self.queue, self.master = queue_of_goals(monkeypatch)
+        monkeypatch.setattr(goals, "threading", SimpleNamespace(Thread=at_once))
+        self.owner: Owner = self.queue._owner
+
+    def work(self) -> None:
+        while not self.queue._mailbox.empty():
+            self.queue._handle(self.queue._mailbox.get())
+
+    def goal(self, name: str = "hand_close") -> Handle:
+        handle = Handle()
+        Server.every[f"~{name}"].on_goal(handle)
+        self.work()
+        return handle
+
+    def cancel(self, name: str, handle: Handle) -> None:
+        Server.every[f"~{name}"].on_cancel(handle)
+        self.work()
+
+    def put(self, kind: str, name: str = "", content: object = None) -> None:
+        self.queue._mailbox.put(goals.Item(kind, name, content))
+        self.work()
+
+    def status(self, after: float = 0.1, **fields: object) -> None:
+        self.now += after
+        self.put("status", content=status_now(**fields))
+
+    @property
+    def task(self) -> Task:
+        return self.owner.tasks[-1]
+
+    @property
+    def stops(self) -> int:
+        return self.owner.driver.stops
+
+
+@pytest.fixture
+def desk(monkeypatch) -> Desk:
+    return Desk(monkeypatch)
+
+
+def test_a_goal_is_told_its_way_and_its_end(desk):
+    handle = desk.goal()
+    assert handle.accepted and desk.queue.active == "hand_close" and desk.master.subscribed == 1
+    desk.status(after=0.5)
+    desk.task.verdict = Verdict("closed", done=True, ok=True)
+    desk.status(after=0.5)
+    assert handle.feedback == [("under way", Reason.HAND_MOVING), ("closed", Reason.NONE)]
+    assert list(handle.positions) == [0, 10, 20, 30, 40]
+    assert handle.ended == ("succeeded", "closed", Reason.NONE)
+    assert desk.task.asked == pytest.approx([0.5, 1.0]) and desk.task.begun == 1
+    assert desk.queue.active is None and desk.master.subscribed == 0
+    assert desk.stops == 0 and desk.owner.verdicts == [desk.task.verdict] and desk.master.warnings == []
+
+
+def test_a_verdict_that_asks_for_it_stops_the_fingers(desk):
+    handle = desk.goal()
+    desk.task.verdict = Verdict("blocked", done=True, stop=True, reason=Reason.HAND_STALLED)
+    desk.status()
+    assert handle.ended == ("aborted", "blocked", Reason.HAND_STALLED)
+    assert desk.stops == 1 and desk.master.warnings == ["hand_close: blocked"]
+
+
+def test_a_refused_goal_moves_nothing(desk):
+    desk.owner.refusal = RefusedError("speed must be 0..511", Reason.OUT_OF_RANGE)
+    handle = desk.goal()
+    assert handle.ended == ("aborted", "speed must be 0..511", Reason.OUT_OF_RANGE)
+    assert desk.queue.active is None and desk.stops == 0 and desk.master.subscribed == 0
+
+
+def test_a_refused_goal_ends_what_ran_and_leaves_its_topic(desk):
+    old = desk.goal()
+    desk.owner.refusal = RefusedError("no such mode", Reason.UNKNOWN_NAME)
+    desk.goal("hand_preshape")
+    assert old.ended == ("cancelled", "replaced by a new goal; fingers stopped", Reason.SUPERSEDED)
+    assert desk.queue.active is None and desk.stops == 1 and desk.master.subscribed == 0
+
+
+def test_a_new_goal_replaces_the_old_one(desk):
+    old = desk.goal("hand_close")
+    new = desk.goal("hand_open")
+    assert old.ended == ("cancelled", "replaced by a new goal; fingers stopped", Reason.SUPERSEDED)
+    assert new.ended is None and desk.queue.active == "hand_open"
+    assert desk.stops == 1 and desk.master.subscribed == 1 and len(desk.owner.verdicts) == 1
+    assert desk.owner.verdicts[0].done and not desk.owner.verdicts[0].ok
+
+
+def test_of_a_flood_of_goals_only_the_last_begins(desk):
+    flood = [Handle() for _ in range(5)]
+    for handle in flood:
+        desk.queue._on_goal("hand_close", handle)
+    desk.work()
+    replaced = ("cancelled", "replaced by a new goal before it began", Reason.SUPERSEDED)
+    assert [handle.ended for handle in flood] == [replaced] * 4 + [None]
+    assert all(handle.accepted for handle in flood)
+    assert len(desk.owner.tasks) == 1 and desk.stops == 0 and desk.master.subscribed == 1
+
+
+def test_a_goal_that_was_cancelled_while_it_waited_does_not_begin(desk):
+    handle = Handle()
+    handle.status = actionlib.GoalStatus.PREEMPTING
+    desk.queue._on_goal("hand_close", handle)
+    desk.work()
+    assert handle.ended == ("cancelled", "cancelled before it began", Reason.CANCELLED)
+    assert desk.task.begun == 0 and desk.queue.active is None and desk.master.subscribed == 0
+
+
+def test_a_cancel_ends_its_own_goal_and_no_other(desk):
+    handle = desk.goal()
+    desk.cancel("hand_open", Handle())
+    assert handle.ended is None and desk.stops == 0
+    desk.cancel("hand_close", handle)
+    assert handle.ended == ("cancelled", "preempted; fingers stopped", Reason.CANCELLED)
+    assert desk.stops == 1 and desk.queue.active is None and desk.master.subscribed == 0
+    desk.cancel("hand_close", handle)
+    assert desk.stops == 1, "it has ended"
+
+
+def test_a_stop_aborts_what_runs(desk):
+    desk.queue.stop("stopped by the stop service")
+    desk.work()
+    assert desk.stops == 0, "nothing runs"
+    handle = desk.goal()
+    desk.queue.stop("stopped by the stop service")
+    desk.work()
+    assert handle.ended == ("aborted", "stopped by the stop service", Reason.STOPPING) and desk.stops == 1
+
+
+@pytest.mark.parametrize("driver", ["that fails", "that is gone"])
+def test_a_goal_ends_though_its_fingers_cannot_be_stopped(desk, driver):
+    handle = desk.goal()
+    if driver == "that fails":
+        desk.owner.driver.error = HandConnectionLost("gone")
+    else:
+        desk.owner.driver = None
+    desk.cancel("hand_close", handle)
+    assert handle.ended is not None and desk.queue.active is None
+
+
+def test_a_goal_ends_with_its_connection(desk):
+    handle = desk.goal()
+    desk.status(connected=False, message="connection lost: cable")
+    assert handle.ended == ("aborted", "connection lost: cable", Reason.HAND_LINK_LOST)
+    assert desk.task.asked == []
+
+
+def test_a_goal_does_not_go_on_with_another_connection(desk):
+    handle = desk.goal()
+    desk.owner.driver = type(desk.owner.driver)()
+    desk.status()
+    assert handle.ended[0] == "aborted" and handle.ended[2] == Reason.HAND_LINK_LOST
+    assert Owner.port in handle.ended[1] and desk.task.asked == []
+
+
+def test_a_status_from_before_the_command_is_not_judged(desk):
+    desk.goal()
+    desk.status(after=0.019)
+    assert desk.task.asked == []
+    desk.status(after=0.0015)
+    assert len(desk.task.asked) == 1
+    desk.status(motors=[])
+    assert len(desk.task.asked) == 1
+
+
+def test_a_resynchronised_line_takes_the_command_again_but_not_for_ever(desk):
+    handle = desk.goal()
+    for times in range(1, RESENDS + 1):
+        desk.owner.driver.counters.fillers += 1
+        desk.status()
+        assert desk.task.begun == 1 + times and handle.ended is None and desk.task.asked == []
+    desk.status()
+    assert desk.task.asked == pytest.approx([0.1 * (RESENDS + 1)]), "since the command was sent first"
+    desk.owner.driver.counters.fillers += 1
+    desk.status()
+    how, why, code = handle.ended
+    assert how == "aborted" and code == Reason.HAND_LINK_LOST and "resynchronised 3 times" in why
+    assert desk.task.begun == 1 + RESENDS, "the fingers are not sent on their way once more"
+    assert len(desk.task.asked) == len(handle.feedback) == 1, "nor is it told any more how they move"
+    assert desk.owner.verdicts[-1].done
+    assert desk.stops == 1 and desk.queue.active is None
+
+
+def test_a_goal_has_its_time_limit(desk):
+    handle = desk.goal()
+    desk.task.limit = 3.0
+    for _ in range(3):
+        desk.status(after=1.0)
+    assert handle.ended is None
+    desk.status(after=0.1)
+    assert handle.ended == ("aborted", "not done within 3 s; fingers stopped", Reason.TIME_LIMIT)
+    assert desk.stops == 1
+
+
+def test_a_goal_that_ends_at_its_time_limit_has_succeeded(desk):
+    handle = desk.goal()
+    desk.task.limit, desk.task.verdict = 0.05, Verdict("closed", done=True, ok=True)
+    desk.status()
+    assert handle.ended[0] == "succeeded" and desk.stops == 0
+
+
+def test_silence_counts_from_the_last_status(desk):
+    handle = desk.goal()
+    desk.status(after=goals.SILENCE_S)
+    desk.now += goals.SILENCE_S
+    desk.put("tick")
+    assert handle.ended is None
+    desk.now += 0.01
+    desk.put("tick")
+    assert handle.ended[0] == "aborted" and "no hand_status for 1.5 s" in handle.ended[1]
+
+
+def test_requests_beyond_the_backlog_are_dropped(desk):
+    done: list[int] = []
+    for number in range(goals.BACKLOG + 5):
+        desk.queue.call(lambda number=number: done.append(number))
+    desk.work()
+    assert done == list(range(goals.BACKLOG))
+    assert len(desk.master.warnings) == 5 and "50 requests wait" in desk.master.warnings[0]
+
+
+def test_only_the_nodes_own_status_is_believed(desk):
+    for sender, count in (("/somebody", 0), ("/ih2_hand", 1)):
+        status = HandStatus()
+        status._connection_header = {"callerid": sender}
+        desk.queue._on_status(status)
+        assert desk.queue._mailbox.qsize() == count
+
+
+def test_no_cancel_reaches_into_the_future(monkeypatch):
+    told: list[rospy.Time] = []
+    monkeypatch.setattr(goals.rospy.Time, "now", lambda: rospy.Time(1000))
+    monkeypatch.setattr(
+        actionlib.ActionServer, "internal_cancel_callback", lambda self, goal_id: told.append(goal_id.stamp)
+    )
+    server = goals.HandActionServer.__new__(goals.HandActionServer)
+    for stamp in (5, 1000, 4294967295):
+        server.internal_cancel_callback(GoalID(stamp=rospy.Time(stamp)))
+    assert told == [rospy.Time(5), rospy.Time(1000), rospy.Time(1000)]
+
+
+# -- with its thread -----------------------------------------------------------------------------
+
+
+@pytest.fixture
+def working(monkeypatch):
+    """A queue that works by itself; ended at the end of the test."""
+    rospy.rostime.set_rostime_initialized(True)
+    rospy.rostime.switch_to_wallclock()
+    queue, master = queue_of_goals(monkeypatch)
+    queue.start()
+    assert Server.started == len(goals.SPECS)
+    yield queue, master
+    queue.shutdown()
+
+
+def wait(what) -> None:
+    end = time.monotonic() + 10.0
+    while not what():
+        assert time.monotonic() < end, "it waits for ever"
+        time.sleep(0.005)
+
+
+def fails(error: Exception):
+    raise error
+
+
+@pytest.mark.parametrize(
+    ("error", "why", "code"),
+    [
+        (HandConnectionLost("cable"), "cable", Reason.HAND_LINK_LOST),
+        (KeyError("slip"), "internal error: 'slip'", Reason.UNEXPECTED),
+    ],
+)
+def test_a_goal_ends_whatever_happens_and_the_next_is_taken(working, error, why, code):
+    queue, _ = working
+    handle, after = Handle(), Handle()
+    queue._on_goal("hand_close", handle)
+    wait(lambda: queue.active)
+    queue.call(lambda: fails(error))
+    wait(lambda: handle.ended)
+    assert handle.ended == ("aborted", why, code)
+    queue._on_goal("hand_open", after)
+    wait(lambda: queue.active == "hand_open")
+
+
+def test_nothing_is_said_of_topics_that_close_at_the_end(working, monkeypatch):
+    queue, master = working
+    handle, reached = Handle(), threading.Event()
+    queue._on_goal("hand_close", handle)
+    wait(lambda: queue.active)
+    monkeypatch.setattr(goals, "ending", lambda: True)
+    queue.call(lambda: fails(KeyError("closed topic")))
+    queue.call(reached.set)
+    assert reached.wait(10.0)
+    assert handle.ended is None and master.warnings == []
+
+
+def test_the_end_of_the_node_is_told_to_the_goal_before_it_returns(working, monkeypatch):
+    queue, _ = working
+    slept: list[float] = []
+    handle = Handle()
+    queue._on_goal("hand_close", handle)
+    wait(lambda: queue.active)
+    monkeypatch.setattr(goals, "time", SimpleNamespace(monotonic=time.monotonic, sleep=slept.append))
+    queue.shutdown()
+    assert handle.ended == ("aborted", "the node ends", Reason.CANCELLED)
+    assert queue._owner.driver.stops == 1 and not queue._thread.is_alive()
+    assert slept == [0.1], "the result is on its way"
+    queue.shutdown()
+    assert len(slept) == 1, "nothing is on its way"

@@ -1,0 +1,150 @@
+"""What is remembered of a hand between requests: calibration, preshape and grip."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import pytest
+from ih2_hand.errors import HandCalibratingError, RefusedError
+from ih2_hand.memory import HandMemory
+from ih2_hand.progress import CloseTask, GraspTask, OpenTask, PreshapeTask, Verdict
+from ih2_hand.reasons import Reason
+
+LEGACY = SimpleNamespace(dialect="legacy")
+DONE = Verdict("done", done=True, ok=True)
+BROKEN_OFF = Verdict("broken off", done=True)
+
+
+@pytest.fixture
+def memory() -> HandMemory:
+    return HandMemory(is_current=True, limit=8.0)
+
+
+def ask(memory: HandMemory, name: str, **goal):
+    return memory.task_for(name, SimpleNamespace(**goal), LEGACY)
+
+
+def preshaped(memory: HandMemory) -> None:
+    memory.task_over(ask(memory, "hand_preshape", mode="tridigit", level="low"), DONE)
+
+
+def finger(motor: int, **flags) -> SimpleNamespace:
+    read = {"fully_open": False, "fully_closed": False, "com_error": False, "target_reached": False, "mode": "stop"}
+    return SimpleNamespace(motor=motor, **(read | flags))
+
+
+OPEN = [finger(motor, fully_open=True) for motor in range(5)]
+GRIPPING = [finger(motor, mode="tension", target_reached=True) for motor in range(5)]
+
+
+def test_a_hand_just_connected_may_hold_something_and_is_not_calibrated(memory):
+    assert memory.holding and not memory.calibrated and not memory.calibrating
+    memory.holding, memory.calibrated = False, True
+    memory.forget()
+    assert memory.holding and not memory.calibrated
+
+
+def test_each_action_has_its_task(memory):
+    opened, closed = ask(memory, "hand_open", speed=100), ask(memory, "hand_close", speed=200)
+    assert isinstance(opened, OpenTask) and opened.speed == 100
+    assert isinstance(closed, CloseTask) and closed.speed == 200
+    shaped = ask(memory, "hand_preshape", mode="tridigit", level="low")
+    assert isinstance(shaped, PreshapeTask)
+    assert (shaped.mode, shaped.level, shaped.is_current, shaped.limit) == ("tridigit", "low", True, 8.0)
+    memory.task_over(shaped, DONE)
+    grasp = ask(memory, "hand_preshape_close")
+    assert isinstance(grasp, GraspTask) and (grasp.closing, grasp.limit) == ((1, 2, 3), 8.0)
+
+
+def test_a_grasp_can_be_repeated_without_a_new_preshape(memory):
+    preshaped(memory)
+    for _ in range(2):
+        memory.task_over(ask(memory, "hand_preshape_close"), DONE)
+
+
+def undo_by_opening(memory):
+    ask(memory, "hand_open", speed=100)
+
+
+def undo_by_closing(memory):
+    ask(memory, "hand_close", speed=100)
+
+
+def undo_by_a_preshape_that_fails(memory):
+    memory.task_over(ask(memory, "hand_preshape", mode="lateral", level="high"), BROKEN_OFF)
+
+
+@pytest.mark.parametrize(
+    "undo",
+    [
+        undo_by_opening,
+        undo_by_closing,
+        undo_by_a_preshape_that_fails,
+        HandMemory.forget,
+        HandMemory.calibration_began,
+    ],
+)
+def test_what_moves_the_fingers_otherwise_undoes_the_preshape(memory, undo):
+    preshaped(memory)
+    undo(memory)
+    memory.calibrating = False
+    with pytest.raises(RefusedError, match="hand_preshape first") as refusal:
+        ask(memory, "hand_preshape_close")
+    assert refusal.value.reason is Reason.HAND_REFUSED
+
+
+def test_a_grasp_that_does_not_exist_is_refused_and_leaves_the_preshape(memory):
+    preshaped(memory)
+    with pytest.raises(RefusedError, match="force level high"):
+        ask(memory, "hand_preshape", mode="lateral", level="low")
+    assert isinstance(ask(memory, "hand_preshape_close"), GraspTask)
+
+
+def test_no_goal_is_taken_during_a_calibration(memory):
+    memory.calibrated = True
+    memory.calibration_began()
+    assert memory.calibrating and not memory.calibrated
+    with pytest.raises(HandCalibratingError):
+        ask(memory, "hand_open", speed=100)
+
+
+@pytest.mark.parametrize("name", ["hand_close", "hand_preshape_close", "hand_open", "hand_preshape"])
+def test_what_closes_and_is_broken_off_may_have_caught_something(memory, name):
+    preshaped(memory)
+    memory.holding = False
+    memory.task_over(ask(memory, name, speed=100, mode="tridigit", level="low"), BROKEN_OFF)
+    assert memory.holding is name.endswith("close")
+
+
+@pytest.mark.parametrize("holding", [True, False])
+def test_a_task_tells_the_grip_it_has_learnt(memory, holding):
+    memory.holding = not holding
+    memory.task_over(ask(memory, "hand_close", speed=100), Verdict("", done=True, ok=True, holding=holding))
+    assert memory.holding is holding
+
+
+@pytest.mark.parametrize("held", [True, False])
+def test_a_preshape_that_ends_well_says_nothing_of_the_grip(memory, held):
+    memory.holding = held
+    preshaped(memory)
+    memory.task_over(ask(memory, "hand_preshape_close"), DONE)
+    assert memory.holding is held
+
+
+def test_the_hand_is_shown_empty_once_and_gripping_at_any_time(memory):
+    assert memory.look(OPEN) and not memory.holding
+    assert memory.look(OPEN) is False and not memory.holding, "it was known"
+    assert not memory.look(GRIPPING) and memory.holding
+    assert not memory.look([finger(motor) for motor in range(5)]) and memory.holding, "nothing is shown"
+
+
+def test_why_a_calibration_is_refused(memory):
+    memory.holding = False
+    assert memory.why_not_calibrate(["fast"], None) is None
+    assert "hand_open runs" in memory.why_not_calibrate(["fast", "force"], "hand_open")
+    memory.calibrating = True
+    assert "a calibration runs" in memory.why_not_calibrate(["fast", "force"], None)
+    memory.calibrating, memory.calibrated = False, True
+    assert "calibrated already" in memory.why_not_calibrate(["fast"], None)
+    memory.holding = True
+    assert "may hold an object" in memory.why_not_calibrate(["fast"], None)
