@@ -37,8 +37,8 @@ TEST(DmpController, FollowsAgainOnlyWhenTheGoalLeavesItsBall) {
   EXPECT_LT((robot.hand().position - moved).norm(), 2e-3);
 }
 
-/// m that the hand is beyond its goal at most, and has to come back: the frame tells late and bit by
-/// bit that the goal is 30 mm farther than it had told.
+/// m that the hand is beyond its goal at most, and has to come back: the frame tells late and bit
+/// by bit that the goal is 30 mm farther than it had told.
 double wentBack(const std::string& frame) {
   VirtualRobot robot("dmp: {predicted_goals: _ahead}");
   robot.loadBoth();

@@ -61,7 +61,8 @@ TEST(GoalEstimator, AChangeOfAPredictionIsNotLed) {
   // What is predicted may move, too.
   GoalEstimator estimator;
   estimator.reset(Vector3::Zero());
-  for (int i = 1; i <= 400; ++i) estimator.update(kCycle, Vector3(0.13 * kCycle * i, 0, 0), 0, true);
+  for (int i = 1; i <= 400; ++i)
+    estimator.update(kCycle, Vector3(0.13 * kCycle * i, 0, 0), 0, true);
   EXPECT_NEAR(estimator.velocity().x(), 0.13, 0.005);
 }
 

@@ -28,9 +28,9 @@ namespace coglab_controllers {
 /// `goal_timeout` (s, dmp_goal; 0: never old), `goal_max_age` (s), `goal_max_jump` (m),
 /// `goal_lost_time` (s), `goal_finish_distance` (m), `goal_reach_margin` (m), `goal_time_constant`,
 /// `noisy_goal_time_constant` (s), `goal_max_speed`, `predicted_goal_speed` (m/s),
-/// `predicted_goals` (how the names of frames end that tell where something will rest), `max_initial_distance` (m), `end_phase`, `end_speed` (m/s),
-/// `end_turning` (rad/s), `end_distance` (m),
-/// `follow_distance` (m), `follow_time` (s), `arrive_distance` (m),
+/// `predicted_goals` (how the names of frames end that tell where something will rest),
+/// `max_initial_distance` (m), `end_phase`, `end_speed` (m/s), `end_turning` (rad/s),
+/// `end_distance` (m), `follow_distance` (m), `follow_time` (s), `arrive_distance` (m),
 /// `settle_time` (s), `correction_speed` (m/s), `singularity_threshold`,
 /// `rotation_first_scaling`, `hold_blend` (s), `dmp_file` (a library to load at once); on ROS also
 /// `goal_tf_frame` (name under which the estimated goal is broadcast; empty: it is not).
