@@ -34,8 +34,8 @@ ASTRAY = 0.02
 BEYOND = 0.06
 """the same before ``give.lower_after``: a person who is nearer comes to it, and would meet an arm that comes, too"""
 PRESSES, LASTS, SINKS = 2.0, 0.3, 3
-"""N, or the weight if that is more, by which a hand that has the object presses it down; s after which the arm sinks with
-it, and times at most that it does"""
+"""N, or the weight if that is more, by which a hand that has the object presses it down; s after which the arm sinks
+with it, and times at most that it does"""
 BRINGS, LOOKS = 3, 0.3
 """times at most that it is; s between two looks, between which a hand that waits moves by less than ASTRAY"""
 
