@@ -29,6 +29,12 @@ def test_no_child():
         smach.Concurrence(["done"], "done").execute()
 
 
+def test_add_returns_the_state():
+    state = Says("done")
+    with smach.Concurrence(["done"], "done"):
+        assert smach.Concurrence.add("A", state) is state
+
+
 def test_a_taken_label_is_refused_better():
     with smach.Concurrence(["done"], "done"):
         smach.Concurrence.add("A", Says("done"))
