@@ -241,3 +241,12 @@ def test_a_shutdown_inside_the_state_is_no_transition():
         smach.Iterator.set_contained_state("EACH", state, loop_outcomes=["done"])
     each.register_transition_cb(lambda *_: transitions.append(1))
     assert each.execute() is None and transitions == []
+
+
+def test_a_request_after_the_last_item_is_not_left_with_the_state():
+    state = Says("done")
+    each = smach.Iterator(["done"], [], [], [1])
+    with each:
+        smach.Iterator.set_contained_state("EACH", state)
+    each.register_termination_cb(lambda *_: each.request_preempt())
+    assert each.execute() == "done" and not state.preempt_requested()
