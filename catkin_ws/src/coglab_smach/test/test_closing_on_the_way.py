@@ -4,7 +4,7 @@ something else opens before it comes again, toward where the object is seen."""
 import pytest
 from coglab_msgs.msg import ReasonCode
 from coglab_py.pose import Pose
-from coglab_smach.ports.pending import PortError
+from coglab_smach.ports.pending import Polled, PortError
 from coglab_smach.states import reach
 from conftest import Trial
 
@@ -179,3 +179,25 @@ def test_fingers_that_have_opened_to_come_again_hold_nothing_of_the_persons(monk
 
     trial.run(script)
     assert "bumped" in trial.result().marks and trial.result().code == ReasonCode.GOAL_LOST
+
+
+def test_stop_ends_a_closing_on_the_way(monkeypatch):
+    trial, closing, cancelled = Trial(), [], []
+    monkeypatch.setattr(reach, "off_grasp", lambda state, goal: 0.02)
+    trial.ctx.hand.close_on_object = lambda: (
+        closing.append(Polled(lambda: False, lambda: None, lambda: cancelled.append(trial.clock.now()))) or closing[-1]
+    )
+    trial.cell.partner.touch_after = 1.5
+
+    def script(t):
+        t.wait_hub("wait_without_object")
+        t.start(RECEIVE)
+        end = t.clock.now() + 20.0
+        while not closing and t.clock.now() < end:
+            t.clock.sleep(0.01)
+        assert closing and not cancelled
+        t.ctx.stop.press("by the test")
+        t.wait_hub("stopped")
+        assert cancelled
+
+    trial.run(script)

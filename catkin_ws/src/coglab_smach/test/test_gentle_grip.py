@@ -1,9 +1,13 @@
 """Beside a person's hand the fingers close with the lowest force; firmly once it has let go."""
 
+import numpy as np
 import pytest
 from coglab_objects.database import objects_folder, read_object
+from coglab_py.pose import Pose
 from coglab_smach.ports.pending import PortError, Ready
-from coglab_smach.states.hand import gentle
+from coglab_smach.states import hand as hand_states
+from coglab_smach.states import knowledge, weight
+from coglab_smach.states.hand import closes_gently, gentle
 from conftest import Trial
 from ih2_hand.grasps import levels_of
 
@@ -63,3 +67,51 @@ def test_a_hand_that_refuses_keeps_what_it_holds():
     trial.run(script)
     assert trial.result().outcome == "failed_holding" and "hand_tighten" in trial.result().reason
     assert trial.ctx.holding == "mug"
+
+
+def test_a_grasp_that_older_hands_know_firm_alone_is_not_for_a_persons_hand(monkeypatch):
+    """The screwdriver's handle is held laterally; it has two other grasps."""
+    entry = read_object(objects_folder() / "screwdriver.yaml")[0]
+    assert {name for name, grasp in entry["grasps"].items() if not closes_gently(grasp)} == {"handle"}
+    for name in ("person_at", "palm_at"):
+        monkeypatch.setattr(knowledge, name, lambda _: None)
+    state, seen = knowledge.SetGraspGoal(Trial().ctx), Pose(np.array([0.6, 0.0, 0.4])).to_dict()
+    assert {goal["grasp_name"] for goal in state._goals(entry, seen)} == set(entry["grasps"]) - {"handle"}
+    only = {**entry, "grasps": {"handle": entry["grasps"]["handle"]}}
+    assert [goal["grasp_name"] for goal in state._goals(only, seen)] == ["handle"]
+
+
+@pytest.mark.parametrize(
+    ("way", "firm_at"),
+    [
+        (lambda since: 0.2, "hand_tighten"),
+        (lambda since: 0.06, "tighten_at_home"),  # gone by hand.let_go, but its fingers may be at the object
+        (lambda since: 0.2 if since % 0.3 < 0.13 else 0.0, "tighten_at_home"),  # taken for another one, frame by frame
+    ],
+)
+def test_it_closes_firmly_only_where_the_persons_hand_was_seen_to_stay_away(monkeypatch, way, firm_at):
+    trial, since = Trial(), []
+
+    def distance(state):
+        if trial.ctx.journal.marked("tightened") or state.label == "tighten_at_home":
+            return 1.0
+        if state.label == "hand_tighten":
+            since.append(trial.clock.now())
+            return 0.1 + way(since[-1] - since[0])
+        return 0.1 + (0.06 if state.label == "take_weight" and trial.ctx.contact.event() is not None else 0.0)
+
+    for module in (hand_states, weight):
+        monkeypatch.setattr(module, "hand_from_palm", distance)
+    asked = receive(trial)
+    assert asked[-1] == trial.ctx.config.get("hand.tighten.medium")
+    reasons = {t.from_state: t.reason for t in trial.ctx.journal.transitions if "tighten" in t.from_state}
+    assert "wire speed" in reasons[firm_at], reasons
+    assert trial.ctx.firm == 0
+
+
+def test_at_home_it_stays_held_gently_beside_a_persons_hand(monkeypatch):
+    trial = Trial()
+    monkeypatch.setattr(hand_states, "hand_from_palm", lambda state: 0.1)
+    asked = receive(trial)
+    assert set(asked) == {"low"} and "tightened" not in trial.result().marks
+    assert trial.ctx.holding == "mug" and trial.ctx.firm == trial.ctx.config.get("hand.tighten.medium")

@@ -11,7 +11,7 @@ from coglab_smach.contact.leaving_load import SAME, LeavingLoad
 from coglab_smach.context.config import Config
 from coglab_smach.kinematics.reachability import default_arm
 from coglab_smach.ports.interfaces import HandState, Located
-from coglab_smach.ports.pending import PortError, Ready
+from coglab_smach.ports.pending import Polled, PortError, Ready
 from coglab_smach.states import give
 from coglab_smach.states.held import FARTHER, LOST_TIME, NEAR, HeldObject
 from conftest import SHARE, Trial
@@ -153,6 +153,20 @@ def test_the_arm_sinks_once_where_nobody_lifts():
         t.wait_hub("wait_with_object")
 
     assert giving(script, **{"give.near": 2.0}).result().outcome == "failed_holding"
+
+
+def test_a_hand_that_does_not_open_for_the_person_ends_in_its_time():
+    """A frozen node: the wait for its fingers ends, and the arm stays with what both hold."""
+
+    def script(t):
+        t.ctx.hand.preshape = lambda mode, level: Polled(lambda: False, lambda: None)
+        t.cell.push(0.9 * WEIGHT)
+        t.wait_hub("stopped", limit=40.0)
+        t.clock.sleep(0.5)
+
+    trial = giving(script)
+    assert trial.ctx.journal.results[-1].outcome == "stopped" and trial.ctx.holding == "mug"
+    assert "opening of the hand within 8.0 s expected" in trial.ctx.journal.why()
 
 
 @pytest.mark.parametrize(("pressed", "sinks"), [(0.5, 0), (1.5, 1)])

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import smach
 from coglab_msgs.msg import ReasonCode, Say
+from hand_orders import HandOrders
 from virtual_trial import VirtualTrial
 
 RECEIVE, GIVE = "exchange_human_to_robot", "exchange_robot_to_human"
@@ -264,8 +265,7 @@ def test_a_tug_while_the_hand_has_closed():
 def test_a_tug_while_the_fingers_close():
     """14 N for 0.3 s: the palm goes along, and the object is received all the same."""
     trial = VirtualTrial(seed=4, profile="accustomed", perfect=True)
-    tug, forces, levels, preshape = [], [], set(), trial.ctx.hand.preshape
-    trial.ctx.hand.preshape = lambda mode, level: levels.add(level) or preshape(mode, level)
+    tug, forces, orders = [], [], HandOrders(trial)
 
     def beside(t):
         if not tug and t.ctx.journal.marked("closing"):
@@ -278,7 +278,7 @@ def test_a_tug_while_the_fingers_close():
     result = trial.run(RECEIVE)[0]
     assert result.outcome == "succeeded" and "gave_way" in result.marks, trial.ctx.journal.why()
     # The tug itself is 14 N: what the hand adds to it is no more than the arm's own inertia.
-    assert max(forces) <= 15.0 and levels == {"low"} and result.code == ReasonCode.NONE
+    assert max(forces) <= 15.0 and orders.gentle() and result.code == ReasonCode.NONE
     assert trial.rig.cell.truth()["held_by"] == "robot" and trial.rig.robot.limit_violations == 0
 
 
@@ -286,8 +286,7 @@ def test_a_hand_that_stays_in_the_gripper():
     """The person holds on until the robot gives up: closed with the lowest force level, pulled at with 15 N at most,
     and given back."""
     trial = VirtualTrial(seed=31, profile="accustomed", perfect=True, behaviour="never_release")
-    forces, levels, preshape = [], set(), trial.ctx.hand.preshape
-    trial.ctx.hand.preshape = lambda mode, level: levels.add(level) or preshape(mode, level)
+    forces, orders = [], HandOrders(trial)
 
     def beside(t):
         if t.ctx.journal.marked("closing"):
@@ -297,7 +296,7 @@ def test_a_hand_that_stays_in_the_gripper():
     result = trial.run(RECEIVE)[0]
     assert result.outcome == "failed_empty" and result.code == ReasonCode.NOT_RELEASED
     assert "the person did not let go of 'mug'" in trial.ctx.journal.why()
-    assert levels == {"low"} and 1.0 < max(forces) <= 15.0
+    assert orders.gentle() and 1.0 < max(forces) <= 15.0
     assert trial.rig.cell.truth()["held_by"] == "human" and at_home(trial)
 
 

@@ -213,3 +213,17 @@ def test_readings_have_ten_and_eight_bits():
     assert motor.tension == 1023 and motor.position_byte == 200
     motor.position = 99.6
     assert motor.effort == 0.0 and motor.position_byte == 100
+
+
+def test_a_hard_object_is_held_after_a_fraction_of_a_count():
+    motor = at(95.0, contact=100.0, stiffness=1000.0)
+    motor.close_to_current(200, stop_after=False)
+    run(motor, 0.5)
+    assert motor.position == pytest.approx(100.2) and motor.status_byte == 0x90
+
+
+def test_a_motor_that_is_held_at_its_open_end_draws_nothing():
+    motor = at(0.0, contact=0.0)
+    motor.pull(0)
+    run(motor, 0.1)
+    assert (motor.current, motor.status_byte) == (0.0, 0x68)

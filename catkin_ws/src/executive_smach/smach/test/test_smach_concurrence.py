@@ -29,6 +29,13 @@ def test_no_child():
         smach.Concurrence(["done"], "done").execute()
 
 
+def test_add_returns_the_state_which_is_then_a_child():
+    state = Says("done")
+    with smach.Concurrence(["done"], "done"):
+        assert smach.Concurrence.add("A", state) is state
+        assert smach.Concurrence._currently_opened().get_children() == {"A": state}
+
+
 def test_a_taken_label_is_refused_better():
     with smach.Concurrence(["done"], "done"):
         smach.Concurrence.add("A", Says("done"))

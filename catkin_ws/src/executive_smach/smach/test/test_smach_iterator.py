@@ -219,3 +219,34 @@ def test_set_initial_state_takes_user_data():
     ud.x = 2
     each.set_initial_state([], ud)
     assert each.userdata.x == 2
+
+
+def test_the_contained_state_is_found_by_its_label_and_its_edges_by_its_breaks():
+    state = Says("done", registered=["done", "failed", "again"])
+    each = smach.Iterator(["failed"], [], [], [1])
+    with each:
+        smach.Iterator.set_contained_state("EACH", state, break_outcomes=["failed"])
+    assert each["EACH"] is state
+    assert each.get_internal_edges() == [("done", "EACH", "EACH"), ("again", "EACH", "EACH"), ("failed", "EACH", None)]
+    assert smach.Iterator(["failed"], [], []).get_internal_edges() == []
+
+
+def test_a_shutdown_inside_the_state_is_no_transition():
+    ending, transitions = [], []
+    smach.set_shutdown_check(lambda: bool(ending))
+    state = Says(None, registered=["done"])
+    state.next_outcome = lambda: ending.append(1)
+    each = smach.Iterator(["done"], [], [], [1, 2])
+    with each:
+        smach.Iterator.set_contained_state("EACH", state, loop_outcomes=["done"])
+    each.register_transition_cb(lambda *_: transitions.append(1))
+    assert each.execute() is None and transitions == []
+
+
+def test_a_request_after_the_last_item_is_not_left_with_the_state():
+    state = Says("done")
+    each = smach.Iterator(["done"], [], [], [1])
+    with each:
+        smach.Iterator.set_contained_state("EACH", state)
+    each.register_termination_cb(lambda *_: each.request_preempt())
+    assert each.execute() == "done" and not state.preempt_requested()

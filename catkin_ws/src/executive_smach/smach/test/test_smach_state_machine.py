@@ -165,6 +165,21 @@ def test_an_unregistered_outcome(outcome):
         machine(machine(Says(outcome, registered=["done"]))).execute()
 
 
+@pytest.mark.parametrize("registered", [["done"], ["done", "late"]])
+def test_an_outcome_needs_both_the_state_and_the_machine_to_have_it(registered):
+    sm = machine(Says("late", registered=["done"]), outcomes=["done"] + (["late"] if len(registered) == 1 else []))
+    sm["S0"].register_outcomes(registered)
+    with pytest.raises(smach.InvalidTransitionError, match="returned 'late'"):
+        sm.execute()
+
+
+def test_add_auto_returns_the_state():
+    state = Says("done")
+    with smach.StateMachine(["done"]):
+        assert smach.StateMachine.add_auto("A", state, ["done"]) is state
+        smach.StateMachine.add("B", Says("done"))
+
+
 def test_an_outcome_registered_after_add_falls_through():
     state = Says("late", registered=["done"])
     sm = machine(state, outcomes=["done", "late"])

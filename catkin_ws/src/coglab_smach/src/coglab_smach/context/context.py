@@ -73,6 +73,8 @@ class Context:
     """of the fingers, begun on the last of a reach's way"""
     closing_on: str = ""
     """id of the object that they close on there"""
+    closing_firm: int = 0
+    """``firm`` of that object"""
     _holding: str = ""
 
     def __post_init__(self) -> None:
@@ -87,5 +89,7 @@ class Context:
     def holding(self, object_id: str) -> None:
         if object_id != self._holding:
             self.memory.note(object_id)
+        if not object_id:
+            self.firm = 0
         self._holding = object_id
         self.journal.changed()

@@ -46,6 +46,8 @@ class EndMotion(CoglabState):
 
     def run(self, ud: Any) -> str:
         if self.ctx.stop.pressed():
+            if self.ctx.closing is not None:
+                self.ctx.closing.cancel()
             self.reason = f"STOP: {self.ctx.stop.reason}; the hand keeps what it holds; to go on {command('reset')}"
             return "stopped"
         self.ctx.contact.disarm()
@@ -133,6 +135,7 @@ class SecureHand(CoglabState):
         away = hand_from_palm(self)
         if self.ctx.hand.state().holding and (away is None or away > AWAY):
             self.ctx.holding, self.ctx.shared = self.ctx.closing_on, away is None
+            self.ctx.firm = self.ctx.closing_firm
 
     def _await_letting_go(self) -> None:
         """Nobody else holds the object, or has taken it along, once the person's hand is seen away from it."""

@@ -225,10 +225,13 @@ class CoglabState(smach.State):
         return pending.result()
 
     def pause(self, duration: float) -> None:
-        """Wait for a duration within the state's limit, ended early by preemption or STOP."""
-        end = self.ctx.clock.now() + min(duration, max(0.0, self.left()))
+        """Wait for a duration, ended early by preemption or STOP. TimeLimit at the end of the state's own limit, so
+        that what loops around it ends, too."""
+        end = self.ctx.clock.now() + duration
         while self.ctx.clock.now() < end:
             self.check()
+            if self.left() <= 0.0:
+                raise TimeLimit(f"{self.label} had to end within {self.time_limit():.1f} s, it did not")
             self.ctx.clock.sleep(min(POLL_PERIOD, end - self.ctx.clock.now()))
 
 

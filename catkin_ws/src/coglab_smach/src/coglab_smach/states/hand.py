@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from coglab_msgs.msg import ReasonCode, Say
-from ih2_hand.grasps import CLOSING_MOTORS, levels_of
+from ih2_hand.grasps import CLOSING_MOTORS, LEVELS, levels_of
 
 from coglab_smach.context.awaited import ARM, HAND
 from coglab_smach.context.context import Context
@@ -20,6 +20,11 @@ LOOSE = 40
 """counts of 254 that the fingers have opened when the palm begins to draw back"""
 AT_END = 250
 """counts of 254 from which a finger has closed past the object"""
+FREE, FREE_FOR, GOES = 0.10, 0.2, 1.0
+"""m that the person's hand is farther than it was, and s for which it is, when none of its fingers is at the object; s
+in which it has to go so far"""
+AT_HAND = 0.3
+"""m from the palm in which a person's hand may reach what is in it"""
 DRAWING_BACK = 2.0
 """s that drawing back may take beyond what limits and speed scale ask for"""
 
@@ -28,6 +33,12 @@ def gentle(grasp: Mapping[str, Any]) -> dict[str, Any]:
     """The hand of a grasp as it closes beside a person, whose fingers may be between its own: with the lowest force
     level that every dialect has for its mode."""
     return {**grasp["hand"], "level": levels_of(grasp["hand"]["mode"], "legacy")[0]}
+
+
+def closes_gently(grasp: Mapping[str, Any]) -> bool:
+    """Whether every hand can close by this grasp with the lowest force level that there is: not in a mode that older
+    hands know firm alone."""
+    return bool(gentle(grasp)["level"] == LEVELS[0])
 
 
 def firm_speed(ctx: Context, entry: Mapping[str, Any], grasp_name: str) -> int:
@@ -100,7 +111,7 @@ class HandClose(CoglabState):
         super().__init__(
             ctx,
             outcomes=["succeeded", "missed", "edge"] if from_person else ["succeeded"],
-            input_keys=["object_id", "object_entry", "grasp", "grasp_name"] if from_person else ["object_id"],
+            input_keys=["object_id", "grasp"] if from_person else ["object_id"],
             output_keys=["hand_distance"] if from_person else [],
         )
         self.from_person = from_person
@@ -111,7 +122,7 @@ class HandClose(CoglabState):
         self.ctx.journal.mark("closing")
         # From here on the hand may hold: a failure in the middle must not make the recovery drop the object.
         self.ctx.holding, self.ctx.shared = ud.object_id, self.from_person
-        self.ctx.firm = firm_speed(self.ctx, ud.object_entry, ud.grasp_name) if self.from_person else 0
+        self.ctx.firm = int(ud.grasp["hand"].get("firm", 0)) if self.from_person else 0
         closing = self.ctx.closing or self.ctx.hand.close_on_object()
         self.ctx.closing = None
         if self.from_person:
@@ -144,7 +155,9 @@ class HandClose(CoglabState):
         if stopped_by_object(mode, positions):
             return True
         gone = AWAY if self._before is None else self._before + float(self.ctx.config.get("hand.let_go", 0.04))
-        return (hand_from_palm(self) or 0.0) > gone
+        away = hand_from_palm(self)
+        # A hand that nobody sees may have gone, too.
+        return away is None or away > gone
 
     def _give_way(self, closing: Pending) -> None:
         """Until the fingers have closed."""
@@ -168,22 +181,28 @@ class HandTighten(CoglabState):
     at the wire speed, and with it the force, of ``hand.tighten`` for the grasp's level (Context.firm).
 
     The arm need not wait until the hand is sure that they stand: they press within ``hand.settle_after_close`` s.
-    Whose hand was not seen to have left the object may have fingers there: then it is held firmly ``at_home`` only,
-    where nobody's are."""
+    Nobody's fingers may be there: the person's hand has to be seen FREE m farther than it was for FREE_FOR s, which no
+    hand that was taken for another is. Where it was not seen to go it is held firmly ``at_home``, if no hand is seen
+    near the palm there."""
 
     default_time_limit = 5.0
 
     def __init__(self, ctx: Context, at_home: bool = False) -> None:
-        super().__init__(ctx, input_keys=[] if at_home else ["hand_seen_away"])
+        super().__init__(ctx, input_keys=[] if at_home else ["hand_distance", "hand_seen_away"])
         self.at_home = at_home
 
     def run(self, ud: Any) -> str:
-        if not self.at_home and not ud.hand_seen_away:
-            self.reason = "the person's hand was not seen to go: at home"
-            return "succeeded"
         speed = self.ctx.firm if self.ctx.holding else 0
         if speed == 0:
             self.reason = "nothing is held more gently than its grasp asks for"
+            return "succeeded"
+        if self.at_home:
+            away = hand_from_palm(self)
+            if away is not None and away < AT_HAND:
+                self.reason = f"it stays held gently: the person's hand is {away:.2f} m from the palm"
+                return "succeeded"
+        elif not (ud.hand_seen_away and self._is_free(ud.hand_distance)):
+            self.reason = "the person's hand was not seen to go: at home"
             return "succeeded"
         closing, end = self.ctx.hand.close(speed), float(self.ctx.config.get("hand.settle_after_close", 0.3))
         end += self.ctx.clock.now()
@@ -195,6 +214,20 @@ class HandTighten(CoglabState):
         self.reason = f"the fingers close to the force of wire speed {speed}"
         self.ctx.journal.mark("tightened")
         return "succeeded"
+
+    def _is_free(self, before: float | None) -> bool:
+        """Whether the person's hand, which was ``before`` m from the palm, is seen away from the object."""
+        free, since = AWAY if before is None else before + FREE, None
+        end = self.ctx.clock.now() + GOES
+        while self.ctx.clock.now() < end:
+            if (hand_from_palm(self) or 0.0) <= free:
+                since = None
+            else:
+                since = self.ctx.clock.now() if since is None else since
+                if self.ctx.clock.now() - since >= FREE_FOR:
+                    return True
+            self.pause(0.02)
+        return False
 
 
 class HandOpen(CoglabState):
@@ -228,8 +261,11 @@ class LetGo(CoglabState):
         self.ctx.journal.mark("opening")
         hand, closed = ud.grasp["hand"], self.ctx.hand.state().positions
         opening, back = self.ctx.hand.preshape(hand["mode"], hand["level"]), None
-        while not opening.done() and not self._open_by(closed):
-            self.pause(0.01)
+        try:
+            self.wait_for(lambda: opening.done() or self._open_by(closed), "opening of the hand", code=HAND)
+        except TimeLimit:  # STOP lets the fingers open: the person has what is between them
+            opening.cancel()
+            raise
         if opening.done():
             opening.result()  # fingers that are stuck would drag what the person holds
         axis, way, limit = palm_axis(self.ctx), float(self.ctx.config.get("give.draw_back", 0.06)), DRAWING_BACK

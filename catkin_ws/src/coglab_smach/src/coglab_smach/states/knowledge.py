@@ -17,7 +17,7 @@ from coglab_smach.kinematics.goals import approach_of, delivery_goal, grasp_goal
 from coglab_smach.kinematics.grasp_choice import ranked
 from coglab_smach.ports.pending import PortError
 from coglab_smach.states.base import CoglabState
-from coglab_smach.states.hand import gentle
+from coglab_smach.states.hand import closes_gently, firm_speed, gentle
 from coglab_smach.states.where import hand_name, palm_at, person_at
 
 Goals = Callable[[Mapping[str, Any]], list[dict[str, Any]]]
@@ -265,7 +265,8 @@ class SetGraspGoal(CoglabState):
         goal = await_offer(self, ud.object_id, lambda seen: self._goals(entry, seen))
         name = goal.pop("grasp_name")
         grasp = entry["grasps"][name]
-        ud.grasp_name, ud.grasp = name, {**grasp, "hand": gentle(grasp)}
+        hand = {**gentle(grasp), "firm": firm_speed(self.ctx, entry, name)}
+        ud.grasp_name, ud.grasp = name, {**grasp, "hand": hand}
         self.reason = f"grasp '{name}'"
         # The detector looks whether the object is in the palm, wherever the motion's goal comes from.
         grasped = {"frame": goal["frame"].removesuffix("_ahead"), "grasp": palm_at_grasp(grasp, 0.0).to_dict()}
@@ -276,6 +277,8 @@ class SetGraspGoal(CoglabState):
         """One for each grasp, best first, of the object where it was seen."""
         config = self.ctx.config
         names = ranked(entry, Pose.from_dict(seen), person_at(self), palm_at(self.ctx), self._grasp_name)
+        # A mode that some hands know firm alone is for objects that have no other.
+        names = [name for name in names if closes_gently(entry["grasps"][name])] or names
         if names[0] != self._grasp_name:
             self._grasp_name, hand = names[0], gentle(entry["grasps"][names[0]])
             self.ctx.preshaped = False

@@ -112,12 +112,12 @@ class WaitStop(CoglabState):
 
     def run(self, ud: Any) -> str:
         self._left = self._deeper = False
-        self.ctx.closing = None
-        self._arrived = None
+        self.ctx.closing = self._arrived = None
         target = target_of(ud.goal) if self.trigger == "contact" else ""
         self._grip = PersonsGrip(self, target) if target else None
         self._early = EarlyReach(self, ud.goal, self._grip) if self.trigger and "early" in ud.goal else None
         if self.trigger == "contact":
+            self.ctx.closing_firm = int(ud.grasp["hand"].get("firm", 0))
             return self._await_contact(ud)
         return self._await_end(ud)
 

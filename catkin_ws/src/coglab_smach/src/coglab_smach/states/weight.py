@@ -11,6 +11,7 @@ from coglab_smach.context.awaited import PERSON
 from coglab_smach.context.context import Context
 from coglab_smach.ports.pending import PortError
 from coglab_smach.states.base import CoglabState, TimeLimit
+from coglab_smach.states.hand import AT_HAND
 from coglab_smach.states.motion import rise
 from coglab_smach.states.where import AWAY, hand_from_palm, palm_at
 from coglab_smach.states.yielding import LEAST_WAY, GivesWay
@@ -66,7 +67,7 @@ class TakeWeight(CoglabState):
                 lambda: self._has_let_go(farther), "the person's letting go", end - self.ctx.clock.now(), code=PERSON
             )
         except TimeLimit as error:
-            raise self._not_released(ud.object_id, limit, error) from None
+            raise self._not_released(ud.object_id, limit, error, farther is not None) from None
         finally:
             contact.disarm()
             self._way.stop()
@@ -83,7 +84,8 @@ class TakeWeight(CoglabState):
         if carried:
             self.ctx.journal.mark("loaded")
             self._tell()
-        if (hand_from_palm(self) or 0.0) > (AWAY if farther is None else farther):
+        self._way.follow()
+        if (hand_from_palm(self) or 0.0) > (AWAY if farther is None else farther):  # which waits for a sight
             self._seen_away = True
             return True
         self._way.follow()
@@ -120,13 +122,15 @@ class TakeWeight(CoglabState):
             self._rises += 1
             self._way.begin(rise(self.ctx, left, speed))
 
-    def _not_released(self, object_id: str, limit: float, error: TimeLimit) -> PortError:
+    def _not_released(self, object_id: str, limit: float, error: TimeLimit, seen_before: bool) -> PortError:
         """The failure, and who has the object then: the person, but where only the robot's hand may hold it."""
         causes: tuple[str, ...] = (error.sentence,)
-        if hand_from_palm(self) is None:
+        away = hand_from_palm(self)
+        if away is None or (not seen_before and away > AT_HAND):
             # Nothing is opened: nobody may be there to hold it.
             carried = "its weight is carried" if self.ctx.contact.event() is not None else "its weight has not come"
-            causes += (f"{carried}, and the person's hand is not seen any more",)
+            where = "not seen any more" if away is None else "seen elsewhere"
+            causes += (f"{carried}, and the person's hand is {where}",)
         else:
             self.ctx.holding = ""
         return PortError(

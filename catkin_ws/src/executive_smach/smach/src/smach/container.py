@@ -174,7 +174,7 @@ class Container(Callbacks, State):
         # Whatever happened inside, nobody else may find the construction lock taken.
         if any(container is self for container in Container._construction_stack):
             while not self.is_opened():
-                Container._construction_stack[-1]._pop()
+                self._pop()
             self._pop()
 
     @contextmanager
@@ -186,7 +186,9 @@ class Container(Callbacks, State):
         with self:
             yield self
 
-    def _pop(self) -> None:
+    @staticmethod
+    def _pop() -> None:
+        """Close the innermost open container, whichever it is."""
         Container._construction_stack.pop()
         if not Container._construction_stack:
             Container._construction_thread = None

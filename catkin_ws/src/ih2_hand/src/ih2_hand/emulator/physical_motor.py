@@ -79,13 +79,11 @@ class PhysicalMotor(Motor):
             at_end = self.position >= FULL_SCALE if self.direction > 0 else self.position <= 0.0
             if at_end and WIRE.stop_at_end:
                 self.stop()
-                return
         elif self.mode == "position":
             self._settle_position()
         elif not self.reached:
             self.reached = self.state.locked and self.position < FULL_SCALE
             if self.position >= FULL_SCALE and self.mode != "tension":
                 self.stop()
-                return
         self._watch_current(dt)
         self._end_current_position(dt)
