@@ -57,6 +57,16 @@ def test_every_service_without_a_code_is_on_the_page_of_the_house():
     assert not missing, missing
 
 
+def test_every_mark_of_an_action_is_in_the_reference():
+    """And none that nothing makes."""
+    page = (TOP / "docs" / "reference.md").read_text(encoding="utf-8")
+    table = page.split("Marks in `/coglab/results`")[1].split("\n## ")[0]
+    told = {name for row in re.findall(r"^\| (`.*?) \|", table, re.M) for name in re.findall(r"`(\w+)`", row)}
+    states = (SOURCES / "coglab_smach" / "src").rglob("*.py")
+    made = {name for p in states for name in re.findall(r"journal\.mark\(\"(\w+)\"\)", p.read_text(encoding="utf-8"))}
+    assert len(made) > 15 and told == made
+
+
 def test_the_table_of_the_house_is_what_its_command_prints():
     page = (TOP / "docs" / "house.md").read_text(encoding="utf-8")
     (command,) = re.findall(r"`(docs/count_lines [\w ]+)` prints", page)

@@ -1,12 +1,14 @@
 #!/usr/bin/python3
 """Bench of the partner: whole handovers with drawn people, each figure with its true quantity from the cell.
 
-One run of the default world (people drawn, tracker as it is), profile and settings as shipped: 100 people x 5 objects
-x 2 directions, and beside it the trials of single questions. Seeds come from SHA-256 of the commit's hash, so nobody
-has tried them. Without --long a few trials of each kind: a sample, which meets no goal. COGLAB_TRIALS=FILE takes what
-`world_campaign.py FILE --of partner` has run; a row with fewer trials than asked is incomplete, and missed if it has a
-goal. Nothing is left out of a percentile: what never happened is infinitely late and shown as 999. Definitions, fixed
-before anything was measured:
+One run of the default world (people drawn, tracker as it is), profile and settings as shipped, and with the shipped
+patterns recognised in every trial as in coglab.launch (they enter the prediction of where a hand will be, and the
+monitor may switch the primitive): 100 people x 5 objects x 2 directions, and beside it the trials of single questions.
+The recogniser takes each sight of the hand once, before the belief does, and is a new one in each trial. Seeds come
+from SHA-256 of the commit's hash, so nobody has tried them. Without --long a few trials of each kind: a sample, which
+meets no goal. COGLAB_TRIALS=FILE takes what `world_campaign.py FILE --of partner` has run; a row with fewer trials than
+asked is incomplete, and missed if it has a goal. Nothing is left out of a percentile: what never happened is infinitely
+late and shown as 999. Definitions, fixed before anything was measured:
 
 Success: the machine says so, and at the end of the action the robot (receiving) or the person (giving) holds the
 object in truth, and nobody else; claimed: the machine says so and that is not true. A direction that never began,

@@ -1,5 +1,6 @@
 """The trials of bench_partner: whole handovers, people who withdraw, objects that fall, people who pull, and hands that
-are about something else. Each runs in a worker process and comes back as plain data."""
+are about something else. Each runs in a worker process and comes back as plain data. A recogniser watches in all of
+them, as in coglab.launch: patterns enter the prediction of where a hand will be, and may switch the primitive."""
 
 from __future__ import annotations
 
@@ -37,7 +38,7 @@ GRIP = 20.0
 
 def handover(job: Job) -> dict[str, Any]:
     """Both directions, or one, of one person; see world_rows."""
-    return one_trial(job, TrueTrace)
+    return one_trial(recognised(job), TrueTrace)
 
 
 class Interrupted(TrueTrace):
@@ -82,12 +83,12 @@ class Interrupted(TrueTrace):
 
 def withdrawal(job: Job) -> dict[str, Any]:
     """A giver who takes the hand back."""
-    return one_trial(job, lambda trial: Interrupted(trial, False))
+    return one_trial(recognised(job), lambda trial: Interrupted(trial, False))
 
 
 def fall(job: Job) -> dict[str, Any]:
     """A giver who loses the object."""
-    return one_trial(job, lambda trial: Interrupted(trial, True))
+    return one_trial(recognised(job), lambda trial: Interrupted(trial, True))
 
 
 class OtherHand:
@@ -170,9 +171,9 @@ class OtherWatch(TrueTrace):
         return {"moved_mm": moved, "kind": self.motion.kind, "robot_holds": self.robot_holds}
 
 
-def other(job: Job, kind: type[OtherWatch] = OtherWatch, recognised: bool = False) -> dict[str, Any]:
+def other(job: Job, kind: type[OtherWatch] = OtherWatch) -> dict[str, Any]:
     """A hand that is about something else; ``number`` of its arguments says what, ``hub`` that nobody has asked for an
-    action: then it is recognition that may leave the hub. ``recognised``: the patterns are looked for in any case."""
+    action: then it is recognition that may leave the hub."""
     number, hub = job.arguments["number"], job.arguments["hub"]
     rng = np.random.default_rng([job.seed, 71])
     motion = other_motion(KINDS[number % len(KINDS)], rng, LISTENS)
@@ -180,8 +181,6 @@ def other(job: Job, kind: type[OtherWatch] = OtherWatch, recognised: bool = Fals
     conditions = job.arguments["conditions"]
     left = bool(motion.segments[0].start[1] < 0.0)
     arguments: dict[str, Any] = {"conditions": replace(conditions, person={"left_handed": left})}
-    if hub or recognised:
-        arguments["recogniser"] = shipped_recogniser()
     if hub:
         arguments["recognition_trigger.enabled"] = True
     watches: list[OtherWatch] = []
@@ -190,7 +189,12 @@ def other(job: Job, kind: type[OtherWatch] = OtherWatch, recognised: bool = Fals
         watches.append(kind(trial, motion, rng, robot_holds, hub))
         return watches[0]
 
-    return one_trial(replace(job, arguments=arguments), watch, lambda trial: watches[0].walk(trial))
+    return one_trial(recognised(replace(job, arguments=arguments)), watch, lambda trial: watches[0].walk(trial))
+
+
+def recognised(job: Job) -> Job:
+    """The same trial, watched by a recogniser of its own: one remembers what it has seen."""
+    return replace(job, arguments={**job.arguments, "recogniser": shipped_recogniser()})
 
 
 def shipped_recogniser() -> Recogniser:

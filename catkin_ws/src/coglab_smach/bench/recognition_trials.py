@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any
 
 import motion_figures
@@ -12,7 +12,7 @@ import numpy as np
 from campaign import Job, one_trial
 from coglab_perception.recogniser import UNKNOWN
 from coglab_py.packages import package_path
-from partner_trials import OtherWatch, other, shipped_recogniser
+from partner_trials import OtherWatch, other, recognised
 from true_trace import RATE, TrueTrace
 
 sys.path.insert(0, str(package_path("coglab_perception", "test")))
@@ -198,9 +198,9 @@ def rests_of(seen: dict[str, np.ndarray], level: float) -> list[bool]:
 
 def people(job: Job) -> dict[str, Any]:
     """Both directions of one person, with everything as it ships."""
-    return one_trial(replace(job, arguments={**job.arguments, "recogniser": shipped_recogniser()}), Recognised)
+    return one_trial(recognised(job), Recognised)
 
 
 def others(job: Job) -> dict[str, Any]:
     """A hand that is about something else."""
-    return other(job, RecognisedOther, recognised=True)
+    return other(job, RecognisedOther)

@@ -10,6 +10,7 @@ steps of 1 ms, without tolerance. The default world is `Conditions()`; a hardshi
 true goal pose: once the arm stands still and nobody has touched it; of reaches after which it never did, at their end,
 with their number. Beside them, without a goal: people whose habits make a handover easier, in the default world
 (`CAREFUL`) and in the one of the physics (`CONSIDERATE`).
+No recogniser watches in them, unlike in what ships and in bench_partner: none did when their baseline was printed.
 """
 
 from __future__ import annotations

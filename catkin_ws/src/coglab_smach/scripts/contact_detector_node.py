@@ -36,7 +36,7 @@ from coglab_py.yaml_file import YamlError
 from coglab_smach.contact.detector import ContactDetector, DetectorSettings
 from coglab_smach.contact.fused_detector import IN_MOTION, LIFT, RELEASE, FusedDetector
 from coglab_smach.contact.grip_and_load import GripAndLoad
-from coglab_smach.contact.learning import MotionRecorder
+from coglab_smach.contact.learning import MotionRecorder, unwritable
 from coglab_smach.contact.motion_thresholds import ThresholdError, Thresholds
 from coglab_smach.contact.moving_contact import MovingContact
 from coglab_smach.ros.publish import can_be_sent, publish
@@ -278,10 +278,13 @@ class ContactDetectorNode:
         self.publish_event(event, now)
 
     def on_learn_motion(self, request):
-        """True: begin to gather motions without contact. False: end it, learn, write the file and use it from now
-        on."""
+        """True: begin to gather motions without contact, if there is a file to write. False: end it, learn, write the
+        file and use it from now on."""
         with self.lock:
             if request.gather:
+                why = self.no_file()
+                if why:
+                    return LearnMotionResponse(False, ReasonCode.BAD_FILE, why)
                 self.recorder = MotionRecorder(self.moving)
                 return LearnMotionResponse(
                     True, ReasonCode.NONE, "gathering: let the arm reach, with and without objects in the hand"
@@ -292,10 +295,6 @@ class ContactDetectorNode:
                     False, ReasonCode.NOTHING_RUNS, "nothing was gathered: call with gather true first"
                 )
             reaches = len(recorder.reaches)
-            if not self.learnt_file:
-                return LearnMotionResponse(
-                    False, ReasonCode.BAD_FILE, "parameter ~learnt_file says where to write, and is not set"
-                )
         # Minutes of samples take seconds to learn from: meanwhile the detector goes on.
         try:
             thresholds = recorder.learn()
@@ -303,12 +302,24 @@ class ContactDetectorNode:
         except ThresholdError as error:
             return LearnMotionResponse(False, ReasonCode.OUT_OF_RANGE, str(error))
         except OSError as error:
-            return LearnMotionResponse(False, ReasonCode.BAD_FILE, str(error))
+            with self.lock:
+                self.recorder = (
+                    self.recorder or recorder
+                )  # a disk can be mended, the motions would have to be made anew
+            return LearnMotionResponse(
+                False, ReasonCode.BAD_FILE, f"{error}; what was gathered is kept: call again with gather false"
+            )
         with self.lock:
             self.moving.use(thresholds)
         return LearnMotionResponse(
             True, ReasonCode.NONE, f"learnt from {reaches} motions, written to {self.learnt_file}"
         )
+
+    def no_file(self) -> str:
+        """Why what is learnt could not be written, so that minutes of gathering would be in vain; else empty."""
+        if not self.learnt_file:
+            return "parameter ~learnt_file says where to write, and is not set: start with contact_learnt_file:=FILE"
+        return unwritable(self.learnt_file)
 
     def on_learn(self, _request):
         """Noise at rest."""

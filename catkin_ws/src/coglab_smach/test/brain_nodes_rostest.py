@@ -141,8 +141,8 @@ class BrainNodes(unittest.TestCase):
         learn_motion = service("/contact_detector/learn_motion", LearnMotion)
         for gather, success, code in (
             (False, False, ReasonCode.NOTHING_RUNS),
-            (True, True, ReasonCode.NONE),
-            (False, False, ReasonCode.BAD_FILE),  # nothing says where to write
+            (True, False, ReasonCode.BAD_FILE),  # nothing says where to write
+            (False, False, ReasonCode.NOTHING_RUNS),
         ):
             answer = learn_motion(gather)
             self.assertEqual((answer.success, answer.reason_code), (success, code), answer.message)

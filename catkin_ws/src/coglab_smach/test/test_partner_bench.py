@@ -5,6 +5,7 @@ import sys
 import numpy as np
 import pytest
 from coglab_msgs.msg import ReasonCode
+from coglab_perception.recogniser import load_patterns
 from coglab_py.packages import package_path
 
 sys.path.insert(0, str(package_path("coglab_smach", "bench")))
@@ -13,10 +14,12 @@ import campaign
 import motion_figures as motion
 import partner_motion_rows
 import partner_rows
+import partner_trials
 import trial_file
 import true_trace
 from coglab_sim.conditions import HARDSHIPS, Conditions
 from coglab_sim.person.reach import min_jerk
+from coglab_smach.context.config import Config
 from reach_figures import human_time
 
 RATE = 200.0
@@ -267,6 +270,25 @@ def test_a_direction_without_an_onset_is_infinitely_late():
 
 GOALS = """>= 0.95, >= 0.9, <= 0.01, <= 0, >= 0.75, <= 5, <= 1.08, >= -1.5, >= -1.65, <= 0.35, <= 0.05, <= 0.5, <= 1.2,
 <= 2, <= 0.25, >= 1, <= 8, <= 15"""
+
+
+def test_every_trial_is_watched_by_a_recogniser_of_its_own(monkeypatch):
+    """As coglab.launch does by default, with the patterns and the monitor of the shipped files."""
+    seen = []
+    monkeypatch.setattr(partner_trials, "one_trial", lambda job, *a: seen.append(job.arguments))
+    for jobs in partner_rows.groups("HEAD").values():
+        job = jobs[0]
+        job.runner(job)
+        assert "recogniser" not in job.arguments, "a job is data, and may be run again"
+    assert len(seen) == len(partner_rows.groups("HEAD"))
+    recognisers = [arguments["recogniser"] for arguments in seen]
+    assert len(set(map(id, recognisers))) == len(seen)
+    shipped, _ = load_patterns(str(package_path("coglab_perception", "config", "patterns.json")))
+    names = [pattern.name for pattern in shipped]
+    assert all([pattern.name for pattern in each.patterns] == names for each in recognisers)
+    assert not any(name.startswith("monitor") for arguments in seen for name in arguments)
+    config = Config.load(str(package_path("coglab_smach", "config", "machines.yaml")), {})
+    assert config.get("monitor.enabled") and set(config.get("monitor.primitives")) <= set(names)
 
 
 def run_sample(monkeypatch):

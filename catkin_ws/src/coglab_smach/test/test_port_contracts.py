@@ -95,6 +95,9 @@ class ToldRecogniser:
 
     estimate = Estimate("mug", 0.9, True, 0.5, {"mug": 0.9, "unknown": 0.1})
 
+    def update(self, *sight):
+        """Without an influence."""
+
     def pattern_end(self):
         """Of no influence."""
         return None

@@ -24,6 +24,36 @@ def trial_of(**kw):
     )
 
 
+class Told(Recogniser):
+    """Keeps what it was told, and whose end it was asked for."""
+
+    def __init__(self):
+        super().__init__(*load_patterns(PATTERNS))
+        self.told, self.asked = [], []
+
+    def update(self, stamp, position):
+        self.told.append(stamp)
+        return super().update(stamp, position)
+
+    def pattern_end(self):
+        self.asked.append(self.told[-1])
+        return super().pattern_end()
+
+
+def test_each_sight_is_recognised_once_and_before_it_is_believed():
+    """As in the recogniser's node, which takes every new transform: none is left out, however they come."""
+    trial, sights = VirtualTrial(seed=5, recogniser=Told()), []
+
+    def look(trial):
+        stamp = trial.rig.sights["human_hand"].captured if "human_hand" in trial.rig.sights else None
+        if stamp is not None and sights[-1:] != [stamp]:
+            sights.append(stamp)
+
+    trial.beside = look
+    trial.run(script=lambda trial: trial.clock.sleep(3.0))
+    assert len(sights) > 30 and trial.recogniser.told == trial.recogniser.asked == sights
+
+
 def test_an_object_held_high_gets_the_primitive_for_it():
     trial = trial_of()
     trial.rig.scene.handover_object = np.array([0.78, 0.03, 0.60])

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from coglab_msgs.msg import ReasonCode
 from coglab_smach.ports.interfaces import Ahead, DmpProgress, Located
+from coglab_smach.ports.pending import PortError
 from coglab_smach.states import early_reach
 from coglab_smach.states.base import TimeLimit
 from coglab_smach.states.reach import WaitStop
@@ -19,9 +20,9 @@ class Watched:
     """A reach for a hand that is seen at places that the test names, 30 times a second; the palm is at the origin."""
 
     def __init__(self, monkeypatch):
-        self.t, self.place = 0.0, np.array([0.4, 0.0, 0.4])
+        self.t, self.place, self.refusal = 0.0, np.array([0.4, 0.0, 0.4]), None
         self.ahead = Ahead(0.0, 1.0, "", "human_hand_ahead", (0.4, 0.0, 0.4))
-        monkeypatch.setattr(early_reach, "seen_at", lambda state, target: self.place)
+        monkeypatch.setattr(early_reach, "sight_or_refusal", lambda state, target: self.refusal or self.sight())
         monkeypatch.setattr(early_reach, "palm_at", lambda ctx: np.zeros(3))
         ctx = SimpleNamespace(
             clock=SimpleNamespace(now=lambda: self.t),
@@ -34,6 +35,9 @@ class Watched:
             "early": {"retreat": 0.10, "drop": 0.0, "low": LOW, "high": HIGH, "unsure": 0.10},
         }
         self.reach = early_reach.EarlyReach(SimpleNamespace(ctx=ctx), goal, None)
+
+    def sight(self):
+        return Located("human_hand", "world", tuple(self.place), (0.0, 0.0, 0.0, 1.0), 0.0)
 
     def see(self, *place, frames=1):
         self.place = np.array(place)
@@ -77,6 +81,21 @@ def test_a_hand_that_was_hidden_while_it_went_back_is_believed_after_a_moment(mo
     with pytest.raises(TimeLimit, match="went back"):
         hand.see(0.7, 0.0, 0.4, frames=12)
     assert hand.t < 10 * FRAME + early_reach.SWAPPED + 3 * FRAME
+
+
+@pytest.mark.parametrize("code, told", [(ReasonCode.NOT_PERCEIVED, True), (ReasonCode.OBJECT_NOT_SEEN, False)])
+def test_of_a_hand_that_cannot_be_told_from_another_it_is_said(monkeypatch, code, told):
+    """That is no withdrawal. One that is merely hidden may well be: a hand that goes back hides what it holds."""
+    hand = Watched(monkeypatch)
+    hand.see(0.4, 0.0, 0.4, frames=10)
+    hand.ahead, hand.refusal = Ahead(), PortError("2 people are in view", code=code)
+    begin = hand.t
+    while not hand.reach.doubted():
+        hand.t += FRAME
+        assert hand.t < begin + early_reach.DOUBT_TIME + 3 * FRAME
+    assert hand.reach.doubt() == ((int(code), "2 people are in view") if told else WITHDRAWN)
+    hand.refusal = None
+    assert hand.reach.hopeful() and hand.reach.doubt() == WITHDRAWN
 
 
 def test_who_lowers_the_hand_goes_on(monkeypatch):

@@ -146,10 +146,6 @@ class VirtualTrial:
                 if self._reach is not None:
                     self._reach.look()
                     self._touch.look()
-                if self.recogniser is not None and self.rig.ticks % 6 == 0:
-                    sight = self.rig.sights.get("human_hand")
-                    if sight is not None:
-                        self.recogniser.update(sight.captured, sight.frame.position)
                 self.beside(self)
                 self.clock.sleep(DT)
         except Exception as error:

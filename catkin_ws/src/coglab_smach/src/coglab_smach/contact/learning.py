@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import os
+from pathlib import Path
+
 from coglab_smach.contact.motion_thresholds import Change, Offset, Thresholds, learn
 from coglab_smach.contact.moving_contact import MovingContact
 
@@ -9,6 +12,20 @@ SHORTEST = 40
 """samples of a motion that counts"""
 LONGEST = 4000
 """samples of one that is kept; what follows belongs to the next"""
+
+
+def unwritable(file: str) -> str:
+    """Why what is learnt cannot be written to this file, in a sentence; empty where it can. The file is not touched: an
+    empty one would be read at the next start."""
+    path = Path(file)
+    if path.is_dir():
+        return f"{path} is a folder: name a file in it"
+    if path.exists():
+        return "" if os.access(path, os.W_OK) else f"{path} may not be written"
+    folder = path.absolute().parent
+    if not folder.is_dir():
+        return f"{path} cannot be written, for the folder {folder} is not there: create it"
+    return "" if os.access(folder, os.W_OK) else f"{path} cannot be written, for the folder {folder} may not be written"
 
 
 class MotionRecorder:

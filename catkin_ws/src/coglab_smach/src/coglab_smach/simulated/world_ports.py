@@ -119,7 +119,7 @@ class VirtualHand:
 
 class VirtualPerception:
     """PerceptionPort on the virtual world's trackers; recogniser and belief (BeliefFilter), if given, see what these
-    see."""
+    see: each new sight once, as in the recogniser's node."""
 
     def __init__(self, rig: Any, recogniser: Any = None, belief: Any = None) -> None:
         self.rig, self.recogniser, self.belief, self.node = rig, recogniser, belief, VirtualNode()
@@ -177,6 +177,8 @@ class VirtualPerception:
             self._taken[name] = sight.captured
             if name == HAND:
                 self._seen = t
+                if self.recogniser is not None:
+                    self.recogniser.update(sight.captured, sight.frame.position)
             if self.belief is None:
                 continue
             if name != HAND:

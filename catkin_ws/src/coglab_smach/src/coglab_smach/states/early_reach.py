@@ -9,8 +9,9 @@ import coglab_controllers as cc
 import numpy as np
 from coglab_msgs.msg import ReasonCode
 
+from coglab_smach.ports.pending import PortError
 from coglab_smach.states.base import CoglabState, TimeLimit
-from coglab_smach.states.where import hand_name, palm_at, seen_at, sight_of
+from coglab_smach.states.where import hand_name, palm_at, sight_of, sight_or_refusal
 
 PERIOD = 0.03
 """s between two looks"""
@@ -87,11 +88,15 @@ class EarlyReach:
         """m from there to where the hand was nearest, and by which it has gone back since"""
         self._outside = False
         """the person offers or asks, but not in the region"""
+        self._untold: PortError | None = None
+        """why perception cannot tell whose hand is at what the reach is for"""
 
     def doubt(self) -> tuple[int, str]:
         """ReasonCode and sentence of what is doubted."""
         if self._outside:
             return OUTSIDE
+        if self._untold is not None:
+            return int(ReasonCode.NOT_PERCEIVED), self._untold.sentence
         return int(ReasonCode.GOAL_WITHDRAWN), "the person does not offer or ask any more"
 
     def doubted(self) -> bool:
@@ -110,7 +115,7 @@ class EarlyReach:
         ctx = self.state.ctx
         now = ctx.clock.now()
         passed, self._looked = max(0.0, now - self._looked), now
-        place = seen_at(self.state, self.target)
+        place = self._look()
         if place is not None:
             self._follow(place, passed)
         if self._goes_back():
@@ -136,6 +141,16 @@ class EarlyReach:
     def forgive(self) -> None:
         """The doubt is over."""
         self._sure = self.state.ctx.clock.now()
+
+    def _look(self) -> np.ndarray | None:
+        """m, where the target is seen. Of one that is merely hidden nothing is said: a hand that goes back hides it
+        too."""
+        seen = sight_or_refusal(self.state, self.target)
+        self._untold = None
+        if isinstance(seen, PortError):
+            self._untold = seen if seen.code == ReasonCode.NOT_PERCEIVED else None
+            return None
+        return None if seen is None else np.array(seen.xyz)
 
     def _follow(self, place: np.ndarray, passed: float) -> None:
         if self._jumped(place):

@@ -68,15 +68,22 @@ def hand_name(ctx: Context) -> str:
     return str(ctx.config.get("perception.human_hand", "human_hand"))
 
 
-def sight_of(state: CoglabState, target: str) -> Located | None:
-    """Of an object or of the person's hand as perception names it, OLDEST s old at most."""
+def sight_or_refusal(state: CoglabState, target: str) -> Located | PortError | None:
+    """Of an object or of the person's hand as perception names it, OLDEST s old at most; perception's own words where
+    it has none."""
     try:
         seen: Located = state.await_pending(
             state.ctx.perception.locate_object(target, 0.3), f"sight of '{target}'", 0.5, code=SIGHT
         )
-    except PortError:
-        return None
+    except PortError as error:
+        return error
     return seen if seen.age <= OLDEST else None
+
+
+def sight_of(state: CoglabState, target: str) -> Located | None:
+    """The same, None for a refusal."""
+    seen = sight_or_refusal(state, target)
+    return None if isinstance(seen, PortError) else seen
 
 
 def seen_at(state: CoglabState, target: str) -> np.ndarray | None:
