@@ -303,9 +303,8 @@ class ContactDetectorNode:
             return LearnMotionResponse(False, ReasonCode.OUT_OF_RANGE, str(error))
         except OSError as error:
             with self.lock:
-                self.recorder = (
-                    self.recorder or recorder
-                )  # a disk can be mended, the motions would have to be made anew
+                # A disk can be mended, the motions would have to be made anew.
+                self.recorder = self.recorder or recorder
             return LearnMotionResponse(
                 False, ReasonCode.BAD_FILE, f"{error}; what was gathered is kept: call again with gather false"
             )

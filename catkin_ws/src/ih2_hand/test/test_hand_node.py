@@ -12,20 +12,8 @@ from ih2_hand.errors import HandCalibratingError, HandConnectionLost, HandIncons
 from ih2_hand.progress import OpenTask, Verdict
 from ih2_hand.reasons import Reason
 from ih2_hand.ros import hand_node
-from node_parts import Topic, fails, last, node_without_master, report
+from node_parts import Topic, fails, last, report
 from sensor_msgs.msg import JointState
-
-
-@pytest.fixture
-def node(monkeypatch, bench):
-    return node_without_master(monkeypatch, bench)
-
-
-@pytest.fixture
-def connected(node):
-    node._connect()
-    assert node.driver is not None
-    return node
 
 
 def test_what_can_be_set_and_how_far(node):

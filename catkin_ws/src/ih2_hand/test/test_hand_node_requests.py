@@ -4,27 +4,13 @@ from __future__ import annotations
 
 from types import SimpleNamespace
 
-import pytest
 from coglab_msgs.msg import HandStatus, ReasonCode
 from diagnostic_msgs.msg import DiagnosticStatus
 from ih2_hand.errors import HandConnectionLost
 from ih2_hand.reasons import Reason
 from ih2_hand.ros import diagnostics, tracing
-from node_parts import Topic, ends_calibration, last, node_without_master, report, works_off
+from node_parts import Topic, ends_calibration, last, report, works_off
 from std_msgs.msg import String
-
-
-@pytest.fixture
-def node(monkeypatch, bench):
-    return node_without_master(monkeypatch, bench)
-
-
-@pytest.fixture
-def connected(node):
-    node._connect()
-    assert node.driver is not None
-    return node
-
 
 # -- calibration and stop ------------------------------------------------------------------------
 

@@ -31,7 +31,9 @@ class Far:
 
     def says(self, data: bytes) -> None:
         os.write(self.master, data)
+        end = time.monotonic() + 10.0
         while not self.port.pending():
+            assert time.monotonic() < end, "what was written does not arrive"
             time.sleep(0.001)
 
     def close(self) -> None:

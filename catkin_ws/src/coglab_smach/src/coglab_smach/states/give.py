@@ -292,8 +292,9 @@ class GiveLoad(CoglabState):
         share, now = self.ctx.contact.share_gone(), self.ctx.clock.now()
         begins = self._number("begins", 0.2)
         self._follow(0.0 if share is None else share, begins, now)
+        pressed = share is not None and self._is_pressed(share, now)
         if share is not None and share < begins and now >= self._look_at:
-            if self._is_pressed(share, now):
+            if pressed:
                 self._sink_with_them(now)
             elif self._lowering is None and (self._moving is None or self._moving.done()):
                 self._bring_or_lower(now)

@@ -263,7 +263,8 @@ class LetGo(CoglabState):
         opening, back = self.ctx.hand.preshape(hand["mode"], hand["level"]), None
         try:
             self.wait_for(lambda: opening.done() or self._open_by(closed), "opening of the hand", code=HAND)
-        except TimeLimit:  # STOP lets the fingers open: the person has what is between them
+        except TimeLimit:
+            # STOP lets the fingers open: the person has what is between them.
             opening.cancel()
             raise
         if opening.done():

@@ -84,8 +84,9 @@ class TakeWeight(CoglabState):
         if carried:
             self.ctx.journal.mark("loaded")
             self._tell()
+        # Before and after the look, which waits for a sight.
         self._way.follow()
-        if (hand_from_palm(self) or 0.0) > (AWAY if farther is None else farther):  # which waits for a sight
+        if (hand_from_palm(self) or 0.0) > (AWAY if farther is None else farther):
             self._seen_away = True
             return True
         self._way.follow()
