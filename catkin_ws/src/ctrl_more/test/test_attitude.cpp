@@ -148,5 +148,91 @@ TEST_F(AttitudeTest, WrongConfigurationsAreRefused) {
   EXPECT_TRUE(contains(rig.manager->status("c").fault_text, "not unit"));
 }
 
+TEST_F(AttitudeTest, EveryLayoutOfTheSameMeasurementGivesTheSame) {
+  const Eigen::Quaterniond body = expOf({0.1, -0.2, 0.05});
+  const Eigen::Vector3d rate(0.3, -0.5, 0.7), acc(0.1, 0.2, 9.7);
+  const Eigen::Vector4d q = body.coeffs();
+  setImu(body, rate);
+  Eigen::VectorXd rpy;
+  rig.robot.getMeasuredData("imu", rpy);
+  const std::vector<std::pair<std::string, Eigen::VectorXd>> layouts = {
+      {"rpy_gyro_acc", rpy},
+      {"quaternion_gyro_acc",
+       vectorOf({q[0], q[1], q[2], q[3], rate[0], rate[1], rate[2], acc[0], acc[1], acc[2]})},
+      {"quaternion_acc_gyro",
+       vectorOf({q[0], q[1], q[2], q[3], acc[0], acc[1], acc[2], rate[0], rate[1], rate[2]})},
+      {"quaternion_wxyz_acc_gyro",
+       vectorOf({q[3], q[0], q[1], q[2], acc[0], acc[1], acc[2], rate[0], rate[1], rate[2]})}};
+  for (const auto& layout : layouts) {
+    ControllerRig fresh;
+    ASSERT_TRUE(fresh.load("attitude",
+                           "kp: 0.5\nkd: 0.1\nmax_angle: 1\nimu_layout: " + layout.first + "\n"));
+    fresh.robot.setMeasuredData("imu", layout.second, fresh.cycle.now_ns);
+    fresh.setReferences();
+    fresh.cycleOnce();
+    const Eigen::Vector3d expected = -0.5 * logOf(body) - 0.1 * (body * rate);
+    const Eigen::Vector3d got = logOf(Eigen::Quaterniond(fresh.control.getPelvisOrientation()));
+    EXPECT_LT((got - expected).norm(), 1e-12) << layout.first;
+  }
+}
+
+TEST_F(AttitudeTest, DeadBandIsTakenFromTheError) {
+  ASSERT_TRUE(rig.load("attitude", "kp: 1\nkd: 0\nmax_angle: 1\ndead_band: 0.05\n"));
+  for (const double error : {0.0, 0.02, 0.2, 0.4}) {
+    setImu(expOf({-error, 0, 0}), {0, 0, 0});
+    rig.setReferences();
+    rig.cycleOnce();
+    EXPECT_NEAR(correction().x(), std::max(0.0, error - 0.05), 1e-12);
+  }
+}
+
+TEST_F(AttitudeTest, AnAngleOfZeroOrNoGainKeepsEveryBit) {
+  for (const char* text : {"max_angle: 0\n", "kp: 0\nki: 0\nkd: 0\n"}) {
+    ControllerRig fresh;
+    ASSERT_TRUE(fresh.load("attitude", text));
+    for (const double roll : {0.0, 0.2}) {
+      const double imu[9] = {roll, 0, 0, roll, 0, 0, 0, 0, 9.81};
+      fresh.robot.setMeasuredData("imu", Eigen::Map<const Eigen::VectorXd>(imu, 9),
+                                  fresh.cycle.now_ns);
+      Eigen::Vector4d pelvis = expOf({0.3, 0.1, -0.2}).coeffs();
+      pelvis *= 1.0 + 1e-8;  // unit, but not to the last bit
+      const ControlSignal signal =
+          fresh.control.find(ControlContainer::PelvisOrientation, "pelvis");
+      fresh.control.view(signal) = pelvis;
+      if (roll == 0.0) fresh.setReferences(), pelvis = Eigen::Vector4d(0, 0, 0, 1);
+      fresh.cycleOnce();
+      EXPECT_EQ(Eigen::Vector4d(fresh.control.view(signal)), pelvis) << text << roll;
+      EXPECT_EQ(fresh.manager->status("c").fault, FaultKind::None);
+    }
+  }
+}
+
+TEST_F(AttitudeTest, QuaternionsOfImuAndMountMayBeUnitNearly) {
+  EXPECT_TRUE(rig.load("attitude", "mount: [0, 0, 0, 0.9995]\n", "below"));
+  EXPECT_FALSE(rig.load("attitude", "mount: [0, 0, 0, 0.9985]\n", "too_short"));
+  for (const double norm : {0.985, 0.995, 1.0, 0.0}) {
+    ControllerRig fresh;
+    ASSERT_TRUE(fresh.load("attitude", "imu_layout: quaternion_gyro_acc\n"));
+    fresh.robot.setMeasuredData("imu", vectorOf({0, 0, 0, norm, 0, 0, 0, 0, 0, 0}), 0);
+    fresh.setReferences();
+    fresh.cycleOnce();
+    EXPECT_EQ(fresh.manager->status("c").faults, norm < 0.99 ? 1u : 0u) << norm;
+  }
+}
+
+TEST_F(AttitudeTest, ShowsItsIntegral) {
+  ASSERT_TRUE(rig.load("attitude", "kp: 0\nkd: 0\nki: [1, 2, 3]\nmax_angle: 1\n"));
+  for (int i = 1; i <= 10; ++i) {
+    setImu(expOf({-0.1, 0, 0}), {0, 0, 0});
+    rig.setReferences();
+    rig.cycleOnce();
+    const CycleRecord record = rig.manager->lastCycle();
+    ASSERT_EQ(record.states.size(), 1u);
+    ASSERT_EQ(record.states[0].values.size(), 3u);
+    EXPECT_NEAR(record.states[0].values[0], 0.1 * 0.005 * i, 1e-12);
+    EXPECT_EQ(record.states[0].values[1], 0.0);
+  }
+}
+
 }  // namespace
 }  // namespace ctrl_more

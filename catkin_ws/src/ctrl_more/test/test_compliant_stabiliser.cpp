@@ -147,5 +147,102 @@ TEST_F(CompliantTest, MeasuredForceInstead) {
             std::vector<std::string>{"measuredData/contactForce"});
 }
 
+TEST_F(CompliantTest, ZmpIsTakenFromItsReference) {
+  ASSERT_TRUE(rig.load("compliant_stabiliser", ""));
+  for (int i = 0; i < 20; ++i) {
+    rig.robot.setEstimatedData("zmp", vectorOf({0.3, -0.2, 0}), rig.cycle.now_ns);
+    rig.setReferences();
+    rig.control.setZMP({0.3, -0.2, 0});
+    rig.cycleOnce();
+    EXPECT_EQ(rig.control.getCoM(), Eigen::Vector3d(0, 0, 0)) << "it is where it belongs";
+  }
+}
+
+TEST_F(CompliantTest, PoseAndVelocityFollowTheClosedForm) {
+  ASSERT_TRUE(rig.load("compliant_stabiliser",
+                       "force_source: force\nmass: [2, 20]\ndamping: [40, 300]\n"
+                       "stiffness: [200, 1000]\nmax_offset: 0.3\n"));
+  const double wn = 10, f = -10;
+  for (int i = 1; i <= 100; ++i) {
+    rig.robot.setMeasuredData("contactForce", vectorOf({f, 0, 300}), rig.cycle.now_ns);
+    rig.setReferences();
+    rig.cycleOnce();
+    const double t = 0.005 * i;
+    ASSERT_NEAR(rig.control.getCoM().x(), f / 200 * (1 - (1 + wn * t) * std::exp(-wn * t)), 1e-13);
+    ASSERT_NEAR(rig.control.getCoMVelocity().x(), f / 2 * t * std::exp(-wn * t), 1e-12);
+    ASSERT_EQ(rig.control.getCoM().tail<2>().norm(), 0.0);
+    ASSERT_EQ(rig.control.getCoMVelocity().tail<2>().norm(), 0.0);
+    const std::vector<double> shown = rig.manager->lastCycle().states.at(0).values;
+    ASSERT_EQ(shown, (std::vector<double>{rig.control.getCoM().x(), 0.0, f, 0.0}));
+  }
+}
+
+// Position and velocity after one step from rest at 1 with speed `v`, in long double.
+std::pair<double, double> exactStep(long double m, long double d, long double k, long double dt,
+                                    long double f, long double v) {
+  // Taylor series of the motion in steps so short that it converges at once.
+  const int parts = 64;
+  const long double h = dt / parts;
+  long double x = 1.0L;
+  for (int i = 0; i < parts; ++i) {
+    long double dx = x, dv = v, power = 1.0L, next_x = x, next_v = v;
+    for (int n = 1; n < 40; ++n) {
+      const long double a = ((n == 1 ? f : 0.0L) - d * dv - k * dx) / m;
+      dx = dv;
+      dv = a;
+      power *= h / n;
+      next_x += dx * power;
+      next_v += dv * power;
+    }
+    x = next_x;
+    v = next_v;
+  }
+  return {static_cast<double>(x), static_cast<double>(v)};
+}
+
+TEST(SecondOrderTest, OneStepIsExactForEveryKindOfDamping) {
+  struct Axis {
+    double m, d, k, dt;
+  };
+  const double near = 0.9e-12;  // square of the root times the step, where a series takes over
+  for (const Axis& a :
+       {Axis{1, 0, near / 0.25, 0.5}, Axis{2, 0, 2 * near / 4.0, 2.0},
+        Axis{1, 0.5, 0.0625 - near / 0.25, 0.5}, Axis{1, 0.5, 0.0625 + near / 0.25, 0.5},
+        Axis{1, 2, 1, 0.25}, Axis{1, 2, 1 - 2e-12, 0.25}, Axis{1, 2, 1 + 2e-12, 0.25},
+        Axis{1, 4, 3.5, 0.25}, Axis{3, 60, 0.5, 0.05}, Axis{3, 0.5, 0, 0.05}, Axis{3, 2, 0, 0.05},
+        Axis{3, 0, 0, 0.05}, Axis{4, 3, 200, 0.05}}) {
+    SecondOrder axis;
+    axis.prepare(a.m, a.d, a.k, a.dt);
+    for (const double f : {0.0, 1.5}) {
+      if (f != 0.0 && a.k != 0.0 && a.k < 1e-3) continue;  // the force is not known that well
+      double x = 1.0, v = -0.3;
+      axis.step(f, x, v);
+      const auto exact = exactStep(a.m, a.d, a.k, a.dt, f, -0.3);
+      EXPECT_NEAR(x, exact.first, f == 0.0 ? 4e-15 : 1e-11) << a.m << ' ' << a.d << ' ' << a.k;
+      EXPECT_NEAR(v, exact.second, f == 0.0 ? 4e-15 : 1e-11) << a.m << ' ' << a.d << ' ' << a.k;
+    }
+  }
+}
+
+TEST(SecondOrderTest, AnyOneChangedNumberPreparesAnew) {
+  const double base[4] = {2.0, 10.0, 50.0, 0.005};
+  for (int changed = 0; changed < 4; ++changed) {
+    for (const double factor : {3.0, 0.0}) {
+      if (factor == 0.0 && changed != 1 && changed != 2) continue;
+      double now[4] = {base[0], base[1], base[2], base[3]};
+      now[changed] *= factor;
+      SecondOrder kept, fresh;
+      kept.prepare(base[0], base[1], base[2], base[3]);
+      kept.prepare(now[0], now[1], now[2], now[3]);
+      fresh.prepare(now[0], now[1], now[2], now[3]);
+      double x = 0.1, v = 0.2, y = 0.1, w = 0.2;
+      kept.step(3.0, x, v);
+      fresh.step(3.0, y, w);
+      EXPECT_EQ(x, y) << changed;
+      EXPECT_EQ(v, w) << changed;
+    }
+  }
+}
+
 }  // namespace
 }  // namespace ctrl_more

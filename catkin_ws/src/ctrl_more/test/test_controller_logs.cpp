@@ -79,12 +79,13 @@ TEST_F(ControllerLogs, CompliantStabiliserNamesTheAxis) {
 }
 
 TEST_F(ControllerLogs, ZmpDcmNamesWhatIsWanted) {
-  ASSERT_TRUE(rig.load("zmp_dcm", "mode: dcm\nsupport_box: 0.05\n", "balance"));
+  ASSERT_TRUE(rig.load("zmp_dcm", "mode: dcm\nk: 0\nsupport_box: 0.05\n", "balance"));
   run([this] {
     rig.robot.setEstimatedData("com", vectorOf({1, 0, 0, 0, 0, 0}), rig.cycle.now_ns);
     rig.setReferences();
   });
-  expectSaid("[WARN] balance (zmp_dcm.cpp:", "ZMP is at the edge of the support box");
+  expectSaid("[WARN] balance (zmp_dcm.cpp:",
+             "ZMP is at the edge of the support box: 1 0 m are wanted");
 }
 
 TEST_F(ControllerLogs, ZmpInnerLoopNamesTheAxis) {

@@ -164,5 +164,97 @@ TEST(Handover, CompliantInTheApproachAndGoneBeforeContactIsArmed) {
   for (const ControllerStatus& status : rig.manager->statusAll()) EXPECT_EQ(status.faults, 0u);
 }
 
+TEST_F(AdmittanceTest, AtItsSpeedLimitItMovesAsItSays) {
+  ASSERT_TRUE(rig.load("ee_admittance",
+                       "stiffness: 0\ndamping: 0\nforce_dead_band: 0\nmax_velocity: 0.2\n"
+                       "max_offset: 0.4\n"));
+  push(force(0, 40), 10);
+  for (int i = 0; i < 50; ++i) {
+    const double before = rig.pose()[1];
+    push(force(0, 40), 1);
+    EXPECT_NEAR(rig.twist()[1], 0.2, 1e-12);
+    // 40 N add 0.05 m/s in a cycle, half of which the offset lags behind.
+    EXPECT_NEAR(rig.pose()[1] - before, (0.2 - 0.5 * 0.05) * 0.005, 1e-12);
+  }
+}
+
+TEST_F(AdmittanceTest, AtItsBoundNothingMovesOutward) {
+  ASSERT_TRUE(rig.load("ee_admittance", "max_offset: 0.1\nstiffness: 0\n"));
+  push(force(23), 600);
+  EXPECT_NEAR(rig.pose()[0], 0.1, 1e-12);
+  EXPECT_NEAR(rig.twist().norm(), 0.0, 1e-12);
+  push(force(-23), 1);
+  EXPECT_LT(rig.twist()[0], 0.0) << "back at once";
+}
+
+TEST_F(AdmittanceTest, BoundsOfZeroKeepTheReference) {
+  ASSERT_TRUE(rig.load("ee_admittance",
+                       "axes: all\nmax_offset: 0\nmax_angle: 0\nmax_velocity: 0\n"
+                       "force_dead_band: 0\ntorque_dead_band: 0\n"));
+  for (const double f : {0.0, 50.0, 0.0}) {
+    push(vectorOf({f, 0, 0, 0.1 * f, 0, 0}), 20);
+    EXPECT_NEAR(rig.pose()[0], 0.0, 1e-12) << f;
+    EXPECT_NEAR(rig.pose()[6], 1.0, 1e-12) << f;
+    EXPECT_EQ(rig.manager->status("c").faults, 0u) << f;
+  }
+}
+
+TEST_F(AdmittanceTest, WhatIsLedStaysAlsoWhenItIsQuiteAtRest) {
+  ASSERT_TRUE(rig.load("ee_admittance", "mass: 0.1\ndamping: 10000\nstiffness: 0\n"));
+  push(force(100), 200);
+  push(force(0), 40);
+  EXPECT_EQ(rig.twist()[0], 0.0);
+  EXPECT_NEAR(rig.pose()[0], 97.0 / 10000 * 1.0, 1e-4);
+}
+
+TEST_F(AdmittanceTest, TranslationAloneLeavesTheTurnAlone) {
+  ASSERT_TRUE(rig.load("ee_admittance", ""));
+  push(vectorOf({20, 10, -5, 8, 9, 10}), 50);
+  EXPECT_GT(rig.pose()[0], 0.01);
+  EXPECT_EQ(rig.pose().tail(4), vectorOf({0, 0, 0, 1}));
+  EXPECT_EQ(rig.twist().tail(3), vectorOf({0, 0, 0}));
+}
+
+TEST_F(AdmittanceTest, TurningAndMovingDoNotDisturbEachOther) {
+  auto sink = std::make_shared<ListSink>();
+  rig.logger.addSink(sink);
+  const std::string text = "axes: all\nmax_velocity: 0.05\nmax_offset: 0.3\nmax_angle: 1.5\n";
+  ControllerRig moved, turned;
+  for (ControllerRig* each : {static_cast<ControllerRig*>(&rig), &moved, &turned}) {
+    ASSERT_TRUE(each->load("ee_admittance", text));
+  }
+  for (int i = 0; i < 200; ++i) {
+    const Eigen::VectorXd force = vectorOf({20, 5, 0, 0, 0, 0});
+    const Eigen::VectorXd torque = vectorOf({0, 0, 0, 6, -1, 2});
+    rig.robot.setMeasuredData("wrench", force + torque, rig.cycle.now_ns);
+    moved.robot.setMeasuredData("wrench", force, moved.cycle.now_ns);
+    turned.robot.setMeasuredData("wrench", torque, turned.cycle.now_ns);
+    for (ControllerRig* each : {static_cast<ControllerRig*>(&rig), &moved, &turned}) {
+      each->setReferences();
+      each->cycleOnce();
+    }
+    ASSERT_EQ(rig.pose().head(3), moved.pose().head(3)) << i;
+    ASSERT_EQ(rig.twist().head(3), moved.twist().head(3)) << i;
+    ASSERT_EQ(rig.pose().tail(4), turned.pose().tail(4)) << i;
+    ASSERT_EQ(rig.twist().tail(3), turned.twist().tail(3)) << i;
+  }
+  EXPECT_GT(rig.pose()[3], 0.1) << "turned about x";
+  rig.logger.drain();
+  EXPECT_FALSE(sink->contains("max_offset"));
+  const std::vector<double> shown = rig.manager->lastCycle().states.at(0).values;
+  ASSERT_EQ(shown.size(), 9u);
+  EXPECT_EQ(shown[0], rig.pose()[0]);
+  EXPECT_NEAR(shown[3], logOf(Eigen::Quaterniond(rig.pose().tail<4>().data())).x(), 1e-9);
+  EXPECT_NEAR(shown[6], 20 * (1 - 3 / std::sqrt(425.0)), 1e-12) << "without its dead band";
+}
+
+TEST_F(AdmittanceTest, TheTurnIsBoundedLikeTheOffset) {
+  ASSERT_TRUE(rig.load("ee_admittance", "axes: all\nmax_angle: 0.2\nrotary_stiffness: 0\n"));
+  push(vectorOf({0, 0, 0, 3, 0, 4}), 400);
+  const Eigen::Vector3d turn = logOf(Eigen::Quaterniond(rig.pose().tail<4>().data()));
+  EXPECT_LT((turn - 0.2 * Eigen::Vector3d(0.6, 0, 0.8)).norm(), 1e-12);
+  EXPECT_NEAR(rig.twist().norm(), 0.0, 1e-12);
+}
+
 }  // namespace
 }  // namespace ctrl_more

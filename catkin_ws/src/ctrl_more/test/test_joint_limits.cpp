@@ -76,5 +76,55 @@ TEST_F(JointLimitsTest, WrongConfigurationsAreRefused) {
   EXPECT_FALSE(rig.manager->pause("c")) << "a safety controller";
 }
 
+TEST_F(JointLimitsTest, ShowsHowManyJointsAreSlowedAndTheNearestEnd) {
+  ASSERT_TRUE(rig.load("joint_limits",
+                       "influence: 0.5\nsafety: 0\nxi: 2\n"
+                       "lower: [-1, -1, -1, -1, -1, -1, -1]\nupper: [1, 1, 1, 1, 1, 1, 1]\n"));
+  const auto shown = [&](const Eigen::VectorXd& q, const Eigen::VectorXd& qd) {
+    run(q, qd);
+    return rig.manager->lastCycle().states.at(0).values;
+  };
+  const Eigen::VectorXd middle = Eigen::VectorXd::Zero(7);
+  EXPECT_EQ(shown(middle, Eigen::VectorXd::Constant(7, 3.0)), (std::vector<double>{0, 1}));
+  const Eigen::VectorXd q = vectorOf({0.75, 0, -0.875, 0, 0.5, 0, 0});
+  EXPECT_EQ(shown(q, vectorOf({3, 3, -3, 3, 3, 3, 3})), (std::vector<double>{2, 0.125}));
+  EXPECT_EQ(rig.joints(), vectorOf({1, 3, -0.5, 3, 3, 3, 3}))
+      << "xi times the share of the distance; at the distance of influence itself it is free";
+  EXPECT_EQ(shown(q, vectorOf({1, 0, -0.5, 0, 0, 0, 0})), (std::vector<double>{0, 0.125}))
+      << "a joint at its bound is not slowed";
+  EXPECT_EQ(shown(-q, vectorOf({-3, 3, 3, 3, -3, 3, 3})), (std::vector<double>{2, 0.125}));
+  EXPECT_EQ(rig.joints(), vectorOf({-1, 3, 0.5, 3, -3, 3, 3}));
+}
+
+TEST_F(JointLimitsTest, NothingIsLoggedWhereNothingIsSlowed) {
+  auto sink = std::make_shared<ListSink>();
+  rig.logger.addSink(sink);
+  ASSERT_TRUE(rig.load("joint_limits", kConfiguration));
+  for (int i = 0; i < 5; ++i) run(Eigen::VectorXd::Zero(7), Eigen::VectorXd::Constant(7, 3.0));
+  rig.logger.drain();
+  EXPECT_FALSE(sink->contains("slowed"));
+}
+
+TEST_F(JointLimitsTest, RangesAndDistancesThatAreEqualAreRefused) {
+  EXPECT_FALSE(rig.load("joint_limits", "influence: 0.2\nsafety: 0.2\n"));
+  EXPECT_FALSE(rig.load("joint_limits",
+                        "lower: [-1, 1, -1, -1, -1, -1, -1]\nupper: [1, 1, 1, 1, 1, 1, 1]\n"));
+}
+
+TEST(JointLimitsOfAnyRobot, HaveAsManyJointsAsItsFileSays) {
+  Logger logger;
+  RobotStates robot(&logger);
+  ControlStates control(0, 0.005, &logger);
+  FeedbackControllersManager manager(robot, control, {}, &logger);
+  const std::string file = ::testing::TempDir() + "/ctrl_more_two_joints.yaml";
+  std::ofstream(file) << "lower: [-1, -1]\nupper: [1, 1]\n";
+  ControllerEntry entry;
+  entry.library = std::string(CTRL_MORE_PLUGIN_DIR) + "/libctrl_more_joint_limits.so";
+  entry.config_file = file;
+  ASSERT_TRUE(manager.loadController("limits", entry));
+  EXPECT_EQ(control.joints(), 2);
+  EXPECT_EQ(robot.find(RobotSource::Measured, "joint_position").size(), 2);
+}
+
 }  // namespace
 }  // namespace ctrl_more

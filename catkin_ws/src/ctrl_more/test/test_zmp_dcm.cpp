@@ -115,5 +115,53 @@ TEST(ZmpDcmTest, ZmpIpIsNotAlwaysAtItsLimitAndStaysFinite) {
   }
 }
 
+TEST(ZmpDcmTest, MeasuredStateIsComparedWithAllOfItsReferences) {
+  const double w = std::sqrt(9.80665 / 0.8);
+  ControllerRig rig;
+  ASSERT_TRUE(rig.load("zmp_dcm", "mode: dcm\nk: 4\nsupport_box: 1\n"));
+  rig.robot.setEstimatedData("com", vectorOf({0.1, -0.2, 0.8, 0.05, 0.3, 0}), rig.cycle.now_ns);
+  for (const double apart : {0.0, 0.01}) {
+    rig.setReferences();
+    rig.control.setCoM({0.1 - apart, -0.2, 0.8});
+    rig.control.setCoMVelocity({0.05, 0.3 - 2 * apart, 0});
+    rig.control.setZMP({0.4, 0.5, 0.0});
+    rig.cycleOnce();
+    EXPECT_NEAR(rig.control.getZMP().x(), 0.4 + (1 + 4 / w) * apart, 1e-12);
+    EXPECT_NEAR(rig.control.getZMP().y(), 0.5 + (1 + 4 / w) * 2 * apart / w, 1e-12);
+    EXPECT_EQ(rig.control.getCoM().y(), -0.2) << "untouched in this mode";
+    const std::vector<double> shown = rig.manager->lastCycle().states.at(0).values;
+    ASSERT_EQ(shown.size(), 4u);
+    EXPECT_EQ(shown[0], 0.0);
+    EXPECT_NEAR(shown[2], (1 + 4 / w) * apart, 1e-12);
+  }
+}
+
+TEST(ZmpDcmTest, ZmpIpTakesTheMeasuredZmpFromItsReference) {
+  ControllerRig rig;
+  ASSERT_TRUE(rig.load("zmp_dcm", "mode: zmp_ip\nzmp_filter: 0.1\n"));
+  for (int i = 0; i < 20; ++i) {
+    rig.robot.setEstimatedData("zmp", vectorOf({0.2, -0.1, 0}), rig.cycle.now_ns);
+    rig.setReferences();
+    rig.control.setZMP({0.2, -0.1, 0});
+    rig.cycleOnce();
+    EXPECT_EQ(rig.control.getZMP(), Eigen::Vector3d(0.2, -0.1, 0));
+    EXPECT_EQ(rig.control.getCoM(), Eigen::Vector3d(0, 0, 0));
+  }
+  // One step of the filter, and one of the integrator.
+  rig.robot.setEstimatedData("zmp", vectorOf({0.2, -0.1 + 0.03, 0}), rig.cycle.now_ns);
+  rig.setReferences();
+  rig.control.setZMP({0.2, -0.1, 0});
+  rig.cycleOnce();
+  const double filtered = (1 - std::exp(-kDt / 0.1)) * 0.03;
+  EXPECT_EQ(rig.control.getCoM().x(), 0.0);
+  EXPECT_NEAR(rig.control.getCoM().y(), -kDt * 3.5 * filtered, 1e-15);
+}
+
+TEST(ZmpDcmTest, SupportBoxNeedsOneSide) {
+  ControllerRig rig;
+  EXPECT_FALSE(rig.load("zmp_dcm", "support_box: 0\n"));
+  EXPECT_TRUE(rig.load("zmp_dcm", "support_box: [0, 0, 0, 0.01]\n"));
+}
+
 }  // namespace
 }  // namespace ctrl_more
