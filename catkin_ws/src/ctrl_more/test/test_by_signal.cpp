@@ -143,5 +143,91 @@ TEST_F(BySignal, KeyAndFullNameAreTheSameReason) {
   }
 }
 
+TEST_F(BySignal, SafetyControllersAreLeftAloneHoweverTheyAreMeant) {
+  using Kind = Change::Kind;
+  using Who = Change::Who;
+  const std::vector<std::function<Status()>> ways = {
+      [&] { return rig.manager->pauseAllUsingControlState("Velocity"); },
+      [&] { return rig.manager->disableAllUsingControlState("Velocity"); },
+      [&] { return rig.manager->disableAllUsingRobotState("wrench"); },
+      [&] {
+        return rig.manager->apply(Change().bySignal(Kind::Pause, Who::UsingRobotState, "wrench"));
+      },
+      [&] { return rig.manager->pause(); },
+  };
+  for (std::size_t i = 0; i < ways.size(); ++i) {
+    const Status status = ways[i]();
+    EXPECT_TRUE(status) << i;
+    EXPECT_EQ(status.message(), "left alone, because safety controllers must be forced: limits")
+        << i;
+    EXPECT_TRUE(rig.manager->isEnabled("limits")) << i;
+    EXPECT_FALSE(rig.manager->isPaused("limits")) << i;
+  }
+  EXPECT_FALSE(rig.manager->apply(Change().disable("limits")));
+  EXPECT_FALSE(rig.manager->apply(Change().pause("limits")));
+  EXPECT_TRUE(rig.manager->apply(Change().enable("limits"))) << "that is no stop";
+  EXPECT_TRUE(rig.manager->disableAllUsingControlState("Velocity", true));
+  EXPECT_FALSE(rig.manager->isEnabled("limits"));
+}
+
+TEST_F(BySignal, UnknownSignalsAreRefusedWithWhereToLook) {
+  const Status robot = rig.manager->pauseAllUsingRobotState("ee");
+  EXPECT_EQ(robot.message(), "no loaded controller uses robot signal ee; see getUsedRobotStates()");
+  EXPECT_EQ(rig.manager->resumeAllUsingControlState("wrench").message(),
+            "no loaded controller uses control signal wrench; see getUsedControlStates()");
+}
+
+TEST_F(BySignal, ReasonsHaveAName) {
+  for (const char* reason : {"", "fault"}) {
+    const Status one = rig.manager->apply(Change().pause("force", reason));
+    EXPECT_TRUE(contains(one.message(), "must not be empty or 'fault'")) << one.message();
+    EXPECT_FALSE(rig.manager->apply(Change().pause("", reason))) << "nor that of all";
+    EXPECT_FALSE(rig.manager->isPaused("force"));
+  }
+  EXPECT_TRUE(rig.manager->apply(Change().pause("force", "faulty")));
+}
+
+TEST_F(BySignal, NotesTellWhatStillPausesAndNothingElse) {
+  EXPECT_EQ(rig.manager->pause("force").message(), "");
+  EXPECT_EQ(rig.manager->resume("force").message(), "");
+  ASSERT_TRUE(rig.manager->apply(Change().pause("force", "a").pause("force", "b")));
+  ASSERT_TRUE(rig.manager->pause("force"));
+  EXPECT_EQ(rig.manager->apply(Change().resume("force", "a").resume("force", "b")).message(),
+            "force is still paused: user");
+  EXPECT_EQ(rig.manager->enable("force").message(), "");
+  EXPECT_EQ(rig.manager->resume().message(), "");
+  force->on_update = [](TestController& self, const Cycle&, const RobotStates&,
+                        const ControlStates&, ModifiedControlStates&) { self.fail("lost"); };
+  rig.step();
+  EXPECT_TRUE(contains(rig.manager->resume("force").message(),
+                       "force is still paused: fault: reported by the controller: lost"));
+  EXPECT_EQ(rig.manager->status("force").causes, std::vector<PauseCause>{PauseCause::Fault});
+  EXPECT_EQ(rig.manager->resume("force", "fault").message(), "");
+}
+
+TEST_F(BySignal, AppliedProfilesAreSwitchesOfMotionUnlessSaidOtherwise) {
+  ASSERT_TRUE(rig.manager->setProfile("all", {"force", "vision", "limits"}));
+  rig.step();
+  const int before = force->resets;
+  rig.manager->applyProfile("all", false);
+  rig.step();
+  EXPECT_EQ(force->resets, before);
+  rig.manager->applyProfile("all");
+  rig.step();
+  EXPECT_EQ(force->resets, before + 1);
+}
+
+TEST_F(BySignal, SignalsOfDisabledControllersAreUsedToo) {
+  rig.manager->disable("vision");
+  EXPECT_EQ(rig.manager->getUsedRobotStates(),
+            (Names{"estimatedData/object", "measuredData/wrench"}));
+  EXPECT_EQ(rig.manager->getUsedRobotStates(true), Names{"measuredData/wrench"});
+  rig.manager->disable("", true);
+  EXPECT_EQ(rig.manager->getUsedControlStates().size(), 2u);
+  EXPECT_TRUE(rig.manager->getUsedControlStates(true).empty());
+  EXPECT_TRUE(rig.manager->has("force")) << "the first one, too";
+  EXPECT_FALSE(rig.manager->has("fore"));
+}
+
 }  // namespace
 }  // namespace ctrl_more

@@ -132,5 +132,123 @@ TEST_F(CentralModuleTest, StatesThatDoNotFitAreRefused) {
   EXPECT_FALSE(module.update(RobotStates(&logger), &six));
 }
 
+/// Writes down the cycles it is given.
+struct Watcher : Manager {
+  std::string name_ = "watcher";
+  std::vector<Cycle>* cycles;
+  explicit Watcher(std::vector<Cycle>* list) : cycles(list) {}
+  const std::string& name() const override { return name_; }
+  void beginCycle(const Cycle& cycle) noexcept override { cycles->push_back(cycle); }
+  void updateStage(Stage, const RobotStates&, ControlStates&) noexcept override {}
+};
+
+TEST_F(CentralModuleTest, CountsItsCyclesAndTakesTimeFromTheStates) {
+  static std::vector<Cycle> cycles;
+  const auto maker = [](const std::string&, const ConfigNode&, RobotStates&, ControlStates&,
+                        Logger*) { return std::make_unique<Watcher>(&cycles); };
+  ASSERT_TRUE(CentralModule::registerManager("Watcher", maker));
+  EXPECT_FALSE(CentralModule::registerManager("Watcher", maker)) << "known already";
+  EXPECT_FALSE(CentralModule::registerManager("Feedback", maker)) << "known from the start";
+  EXPECT_FALSE(CentralModule::registerManager("Unmade", nullptr));
+  CentralModule module(
+      ConfigNode::fromText("managers: [w]\nperiod: 0.002\nw: {type: Watcher}\n", "c"), "", &logger);
+  module.robotStates().setMeasuredData("imu", vectorOf({1.0}), 55);
+  module.update();
+  module.update();
+  module.update({99, 0.01, 7});
+  module.update();
+  ASSERT_EQ(cycles.size(), 4u);
+  const std::uint64_t numbers[4] = {1, 2, 7, 8};
+  for (int i = 0; i < 4; ++i) {
+    EXPECT_EQ(cycles[i].number, numbers[i]);
+    EXPECT_EQ(cycles[i].now_ns, i == 2 ? 99 : 55);
+    EXPECT_EQ(cycles[i].dt, i == 2 ? 0.01 : 0.002);
+  }
+}
+
+TEST_F(CentralModuleTest, NumbersOfItsFileHaveTheirBounds) {
+  for (const char* good :
+       {"joints: 0", "joints: 1", "joints: 1000", "period: 0.999", "period: 0.0001"}) {
+    EXPECT_EQ(errorOf("managers: []\n" + std::string(good) + "\n"), "") << good;
+  }
+  for (const char* bad : {"joints: -1", "joints: 1001", "joints: 0.5", "joints: seven"}) {
+    EXPECT_TRUE(contains(errorOf("managers: []\n" + std::string(bad) + "\n"), "joints expects"))
+        << bad;
+  }
+  for (const char* bad : {"period: 1", "period: 1.5", "period: -0.005"}) {
+    EXPECT_TRUE(contains(errorOf("managers: []\n" + std::string(bad) + "\n"), "period expects"))
+        << bad;
+  }
+  CentralModule module(ConfigNode::fromText("managers: []\njoints: 7\nperiod: 0.01\n", "c"), "",
+                       &logger);
+  EXPECT_EQ(module.controlStates().joints(), 7);
+  EXPECT_EQ(module.controlStates().controlPeriod(), 0.01);
+}
+
+TEST_F(CentralModuleTest, BlocksOfManagersAreCheckedInWords) {
+  CentralModule::registerManager(
+      "Empty", [](const std::string&, const ConfigNode&, RobotStates&, ControlStates&, Logger*) {
+        return std::unique_ptr<Manager>();
+      });
+  const auto block = [&](const std::string& inside) {
+    return errorOf("managers: [a]\na: " + inside + "\n");
+  };
+  EXPECT_TRUE(contains(block("3"), "no block 'a:'"));
+  EXPECT_TRUE(contains(block("{type: Empty}"), "the maker of 'Empty' returned nothing"));
+  EXPECT_TRUE(contains(block("{type: Feedback, blend_s: -0.1}"), "blend_s must not be negative"));
+  EXPECT_EQ(block("{type: Feedback, blend_s: 0}"), "");
+  EXPECT_TRUE(contains(block("{type: Feedback, blend: 1}"), "did you mean 'blend_s'"));
+  EXPECT_TRUE(contains(block("{type: Feedback, listFile: [x]}"), "listFile expects a text"));
+  EXPECT_TRUE(contains(errorOf("joints: 7\n"), "needs managers: [names]"));
+}
+
+TEST_F(CentralModuleTest, OptionsOfTheFileAreThoseOfTheManager) {
+  CentralModule module(
+      ConfigNode::fromText(
+          "managers: [f]\nf: {type: Feedback, blend_s: 0.5, timed: true, check_undeclared: true}\n",
+          "c"),
+      "", &logger);
+  EXPECT_EQ(module.feedbackControllers().name(), "f");
+  EXPECT_EQ(module.feedbackControllers().options().blend_s, 0.5);
+  EXPECT_TRUE(module.feedbackControllers().options().timed);
+  EXPECT_TRUE(module.feedbackControllers().options().check_undeclared);
+  CentralModule silent(ConfigNode::fromText("managers: [f]\nf: {type: Feedback}\n", "c"), "",
+                       &logger);
+  EXPECT_EQ(silent.feedbackControllers().options().blend_s, 0.2);
+  EXPECT_FALSE(silent.feedbackControllers().options().timed);
+}
+
+TEST_F(CentralModuleTest, EverySignalOfTheUserGoesInAndComesOut) {
+  CentralModule module(ConfigNode::fromText("managers: []\n", "c"), "", &logger);
+  RobotStates robot(&logger);
+  robot.setMeasuredData("imu", vectorOf({1, 2}), 3);
+  robot.setEstimatedData("zmp", vectorOf({4, 5, 6}), 7);
+  robot.declare(RobotSource::Measured, "later", 2);  // not written yet: nothing to copy
+  ControlStates control(0, 0.005, &logger);
+  const Eigen::VectorXd pose = vectorOf({1, 2, 3, 0, 0, 1, 0});
+  control.setTaskSpaceReferencePose("ee", pose);
+  control.setOtherReference("horizon", vectorOf({7, 8}));
+  control.setJointSpaceReference("Torque", vectorOf({9}));
+  ASSERT_TRUE(module.update(robot, &control));
+  Eigen::VectorXd value;
+  std::int64_t stamp = 0;
+  ASSERT_TRUE(module.robotStates().getMeasuredData("imu", value, stamp));
+  EXPECT_EQ(value, vectorOf({1, 2}));
+  EXPECT_EQ(stamp, 3);
+  ASSERT_TRUE(module.robotStates().getEstimatedData("zmp", value, stamp));
+  EXPECT_EQ(value, vectorOf({4, 5, 6}));
+  EXPECT_EQ(stamp, 7);
+  ASSERT_TRUE(module.controlStates().getTaskSpaceReferencePose("ee", value));
+  EXPECT_EQ(value, pose);
+  ASSERT_TRUE(module.controlStates().getOtherReference("horizon", value));
+  EXPECT_EQ(value, vectorOf({7, 8}));
+  ASSERT_TRUE(control.getJointSpaceReference("Torque", value));
+  EXPECT_EQ(value, vectorOf({9}));
+  // A robot signal that changes its size is refused, and nothing is run.
+  RobotStates other(&logger);
+  other.setMeasuredData("imu", vectorOf({1, 2, 3}), 4);
+  EXPECT_FALSE(module.update(other, &control));
+}
+
 }  // namespace
 }  // namespace ctrl_more

@@ -1,3 +1,5 @@
+#include <fstream>
+
 #include "ctrl_more/log/words.hpp"
 #include "test_support.hpp"
 
@@ -100,6 +102,81 @@ TEST(ConfigTest, GainsOfAnotherControllerAreLeftWhereTheyAre) {
   EXPECT_TRUE(gains.sameAs(before));
   gains.blend(before, others, 0.5);
   EXPECT_TRUE(gains.sameAs(before));
+}
+
+// Lists in lists, or maps in maps.
+std::string nested(int levels, bool maps) {
+  std::string text;
+  for (int i = 0; i < levels; ++i) text += maps ? "{a: " : "[";
+  if (maps) text += "1";
+  for (int i = 0; i < levels; ++i) text += maps ? "}" : "]";
+  return text;
+}
+
+std::string manyItems(int count) {
+  std::string text = "[1";
+  for (int i = 1; i < count; ++i) text += ",1";
+  return text + "]";
+}
+
+TEST(ConfigTest, BoundsOfAFileAreWhereTheyAreSaidToBe) {
+  const auto said = [](const std::string& text) {
+    return messageOf([&] { ConfigNode::fromText(text, "f"); });
+  };
+  EXPECT_EQ(said(nested(33, false)), "") << "the innermost list is at depth 32";
+  EXPECT_EQ(said(nested(34, false)), "f:1: nested deeper than 32 levels");
+  EXPECT_EQ(said(nested(32, true)), "") << "the innermost number is at depth 32";
+  EXPECT_EQ(said(nested(33, true)), "f:1: nested deeper than 32 levels");
+  EXPECT_EQ(said(manyItems(19999)), "") << "and the list itself";
+  EXPECT_EQ(said(manyItems(20000)), "f:1: more than 20000 nodes (aliases counted)");
+  EXPECT_EQ(said("a: 1\n#" + std::string((1 << 20) - 6, 'x')), "");
+  EXPECT_EQ(said("a: 1\n#" + std::string((1 << 20) - 5, 'x')),
+            "f:1: larger than 1 MB; this is no configuration file");
+  const std::string file = ::testing::TempDir() + "/ctrl_more_large.yaml";
+  for (const int more : {0, 1}) {
+    std::ofstream(file) << "a: 1\n#" + std::string((1 << 20) - 6 + more, 'x');
+    EXPECT_EQ(contains(messageOf([&] { ConfigNode::fromFile(file); }), "1 MB"), more == 1);
+  }
+}
+
+TEST(ConfigTest, WhatIsNoYamlOrNoFileIsSaidWithItsPlace) {
+  EXPECT_EQ(messageOf([] { ConfigNode::fromText("a: 1\nb: ]\n", "f"); }).substr(0, 21),
+            "f:2: not valid YAML: ");
+  const std::string folder = ::testing::TempDir();
+  EXPECT_EQ(messageOf([&] { ConfigNode::fromFile(folder); }), folder + ":1: cannot be read");
+  EXPECT_TRUE(contains(messageOf([] { ConfigNode::fromFile("/nowhere.yaml"); }),
+                       "/nowhere.yaml:1: cannot be opened"));
+}
+
+TEST(ConfigTest, LongTextsAreCutInMessages) {
+  for (const int length : {59, 60, 61, 200}) {
+    const std::string text(length, 'x');
+    const std::string shown = length <= 60 ? text : std::string(60, 'x') + "...";
+    EXPECT_EQ(messageOf([&] { ConfigNode::fromText("a: " + text, "f").find("a")->number("n"); }),
+              "f:1: n expects a number, got '" + shown + "'");
+  }
+}
+
+TEST(ConfigTest, NumbersAndTruthsAreReadWholeOrNotAtAll) {
+  const auto number = [](const std::string& text) {
+    return messageOf([&] { ConfigNode::fromText("a: " + text, "f").find("a")->number("n"); });
+  };
+  for (const char* good : {"1", "-1.5", "1e-3", "+2", "0"}) EXPECT_EQ(number(good), "") << good;
+  for (const char* bad : {"1x", "1 2", "''", "x1", "0x1g", "[1]", ".inf", "1,5"}) {
+    EXPECT_NE(number(bad), "") << bad;
+  }
+  EXPECT_TRUE(contains(number("{b: 1}"), "got 'something else'"));
+  const auto truth = [](const std::string& text) {
+    return ConfigNode::fromText("a: " + text, "f").find("a")->boolean("b");
+  };
+  EXPECT_TRUE(truth("true"));
+  EXPECT_FALSE(truth("false"));
+  for (const char* bad : {"True", "yes", "1", "[true]"}) EXPECT_THROW(truth(bad), ConfigError);
+  const ConfigNode map = ConfigNode::fromText("a: {b: 1}\nc: 2\n", "f");
+  EXPECT_EQ(messageOf([&] { map.find("a")->numbers("n"); }), "f:1: n expects numbers");
+  EXPECT_EQ(messageOf([&] { map.find("c")->texts("t"); }), "f:2: t expects a list of names");
+  EXPECT_EQ(map.find("c")->numbers("n"), std::vector<double>{2.0}) << "one number is a list of one";
+  EXPECT_EQ(map.find("c")->line(), 2);
 }
 
 }  // namespace

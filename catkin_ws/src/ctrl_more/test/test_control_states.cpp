@@ -150,5 +150,66 @@ TEST_F(ControlStatesTest, PrintShowsEverySignal) {
   }
 }
 
+TEST_F(ControlStatesTest, ANewStoreSaysNothingAndReadsAsZeros) {
+  auto sink = std::make_shared<ListSink>();
+  logger.addSink(sink);
+  const ControlStates fresh(0, 0.005, &logger);
+  logger.drain();
+  EXPECT_TRUE(sink->lines.empty()) << sink->lines.front();
+  for (const Eigen::Vector3d& value :
+       {fresh.getCoM(), fresh.getCoMVelocity(), fresh.getCoMAcceleration(),
+        fresh.getLinearMomentum(), fresh.getAngularMomentum(), fresh.getZMP()}) {
+    EXPECT_EQ(value, Eigen::Vector3d(0, 0, 0));
+  }
+}
+
+TEST_F(ControlStatesTest, OnlyJointReferencesDecideTheNumberOfJoints) {
+  ControlStates undecided(0, 0.005, &logger);
+  ASSERT_TRUE(undecided.declare(ControlContainer::TaskSpaceReferencePose, "ee", 7));
+  ASSERT_TRUE(undecided.declare(ControlContainer::OtherReference, "x", 4));
+  EXPECT_EQ(undecided.joints(), 0);
+  EXPECT_FALSE(undecided.declare(ControlContainer::JointSpaceReference, "Speed", 6));
+  EXPECT_EQ(undecided.joints(), 0);
+  ASSERT_TRUE(undecided.declare(ControlContainer::JointSpaceReference, "Velocity", 6));
+  EXPECT_EQ(undecided.joints(), 6);
+  EXPECT_FALSE(undecided.declare(ControlContainer::TaskSpaceReferencePose, "hand", 6));
+  EXPECT_FALSE(undecided.declare(ControlContainer::Zmp, "left", 4));
+  Eigen::VectorXd out;
+  ASSERT_TRUE(undecided.getTaskSpaceReferencePose("ee", out));
+  EXPECT_EQ(out, vectorOf({0, 0, 0, 0, 0, 0, 1})) << "the identity until it is set";
+}
+
+TEST_F(ControlStatesTest, PeriodsAreBetweenZeroAndOneSecond) {
+  EXPECT_TRUE(control.setControlPeriod(0.999));
+  for (const double bad : {1.0, 1.5, -0.001}) EXPECT_FALSE(control.setControlPeriod(bad)) << bad;
+  EXPECT_EQ(control.controlPeriod(), 0.999);
+}
+
+TEST_F(ControlStatesTest, RotationsAreTakenWithinAThousandth) {
+  for (const double off : {0.4e-3, 0.6e-3}) {
+    Eigen::Matrix3d nearly = Eigen::Matrix3d::Identity();
+    nearly(0, 0) += off;  // |R R^T - 1| is twice that
+    EXPECT_EQ(control.setPelvisOrientation(nearly).ok(), off < 0.5e-3) << off;
+  }
+  const double nan = std::nan("");
+  EXPECT_FALSE(control.setPelvisOrientation(nan, 0, 0));
+  EXPECT_FALSE(control.setPelvisOrientation(0, nan, 0));
+  EXPECT_FALSE(control.setPelvisOrientation(0, 0, nan));
+  const Status status = control.setPelvisOrientation(Eigen::Matrix3d::Zero());
+  EXPECT_TRUE(contains(status.message(), "and determinant 0.0")) << status.message();
+}
+
+TEST_F(ControlStatesTest, HostsWriteByHandle) {
+  control.setTaskSpaceReferencePose("ee", pose);
+  const Reference<7> ee = control.find<7>(ControlContainer::TaskSpaceReferencePose, "ee");
+  control.view(ee)[1] = 9.0;
+  const ControlStates& constant = control;
+  EXPECT_EQ(constant.view(ee)[1], 9.0);
+  EXPECT_EQ(constant.view(ee)[6], 1.0);
+  EXPECT_EQ(control.find<AnySize>(ControlContainer::TaskSpaceReferencePose, "ee").size(), 7);
+  EXPECT_THROW(control.view(Reference<7>())[0] = 1.0, EmptyHandle);
+  EXPECT_THROW(static_cast<void>(constant.view(Reference<7>())), EmptyHandle);
+}
+
 }  // namespace
 }  // namespace ctrl_more

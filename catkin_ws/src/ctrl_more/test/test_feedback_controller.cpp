@@ -339,5 +339,39 @@ TEST(Handles, HostsLookUpWithASizeToo) {
                std::invalid_argument);
 }
 
+TEST(FeedbackControllerTest, AddedStatesAreModifiedOrReadWhereTheirNameSays) {
+  TestController c;
+  c.addUsedControlState("zmp");
+  c.addUsedControlState("otherReference/horizon");
+  c.addUsedRobotState("estimatedData/zmp");
+  c.addUsedRobotState("imu");
+  const auto control = c.getUsedControlStates();
+  EXPECT_TRUE(control[0].use.modifies);
+  EXPECT_EQ(control[1].name(), "otherReference/horizon");
+  EXPECT_EQ(control[1].key, "horizon");
+  const auto robot = c.getUsedRobotStates();
+  EXPECT_EQ(robot[0].name(), "estimatedData/zmp");
+  EXPECT_EQ(robot[0].key, "zmp");
+  EXPECT_EQ(robot[1].name(), "measuredData/imu");
+  EXPECT_FALSE(c.addUsedControlState("noContainer/key"));
+}
+
+TEST(Handles, PartsAreTheNumbersTheyName) {
+  double n[5] = {1, 2, 3, 4, 5};
+  Numbers<5> five(n, 5);
+  Numbers<> any(n, 5);
+  any.head(2) -= Eigen::Vector2d(1, 1);
+  five.tail<2>() -= Eigen::Vector2d(4, 5);
+  any.segment(2, 0).setZero();
+  five.segment<1>(2).setZero();
+  EXPECT_EQ(std::vector<double>(n, n + 5), (std::vector<double>{0, 1, 0, 0, 0}));
+  const Numbers<> constant(n, 5);
+  n[4] = 7.0;
+  EXPECT_EQ(constant[4], 7.0);
+  EXPECT_EQ(constant(1), 1.0);
+  EXPECT_THROW(static_cast<void>(constant[5]), WrongSize);
+  EXPECT_THROW(static_cast<void>(any.segment<2>(4)), WrongSize);
+}
+
 }  // namespace
 }  // namespace ctrl_more

@@ -97,5 +97,35 @@ TEST_F(WithGain, GainsByNameAndThroughTheInstance) {
   EXPECT_EQ(rig.twist()[0], 4.0);
 }
 
+TEST_F(WithGain, TheControllerIsToldOnceWhenItStarts) { EXPECT_EQ(c->gains_changes, 1); }
+
+TEST_F(WithGain, TheInstanceAsksAndTellsItsManager) {
+  ASSERT_TRUE(c->setGains({{"kp", {4.0}}}));
+  EXPECT_EQ(rig.manager->getGains("c").all().at("kp"), std::vector<double>{4.0});
+  EXPECT_EQ(c->getGains().at("kp"), std::vector<double>{4.0}) << "as requested, not as blended";
+  rig.step();
+  EXPECT_NEAR(rig.twist()[0], 1.0 + 3.0 / 20, 1e-12);
+  ASSERT_TRUE(c->loadGains(temporaryFile("instance.yaml", "kp: 2\n")));
+  EXPECT_EQ(rig.manager->getGains("c").all().at("kp"), std::vector<double>{2.0});
+  rig.step(40);
+  EXPECT_EQ(rig.twist()[0], 2.0);
+}
+
+TEST_F(WithGain, NoFileIsNotTheFileItWasLoadedFrom) {
+  auto made = adder("vel", "ee", 0.0);
+  made->description.gain("kp", 1.0).range(0, 10).in("1").about("x");
+  ControllerEntry entry;
+  entry.config_file = temporaryFile("own.yaml", "kp: 5\n");
+  rig.add(std::move(made), "own", true, entry);
+  EXPECT_EQ(rig.manager->getGains("own").all().at("kp"), std::vector<double>{5.0});
+  ASSERT_TRUE(rig.manager->setGains("own", {{"kp", {7.0}}}));
+  const Status status = rig.manager->loadGains("own", "");
+  EXPECT_TRUE(contains(status.message(), "gains of 'own': no file is given")) << status.message();
+  EXPECT_EQ(rig.manager->getGains("own").all().at("kp"), std::vector<double>{7.0});
+  ASSERT_TRUE(rig.manager->reloadGains("own"));
+  EXPECT_EQ(rig.manager->getGains("own").all().at("kp"), std::vector<double>{5.0});
+  EXPECT_EQ(rig.manager->reloadGains("nobody").cause(), Cause::UnknownName);
+}
+
 }  // namespace
 }  // namespace ctrl_more

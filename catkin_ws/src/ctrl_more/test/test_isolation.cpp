@@ -263,7 +263,11 @@ TEST(IsolationTest, SecondSignalIsUndoneRecordedAndFadesLikeTheFirst) {
     if (wrong) m[velocity][0] = std::nan("");
   };
   rig.add(std::move(c), "c");
-  rig.step(40);
+  for (int i = 1; i <= 40; ++i) {
+    rig.step();
+    ASSERT_NEAR(rig.pose()[0], std::min(1.0, i / 20.0), 1e-12);
+    ASSERT_NEAR(rig.twist()[5], std::min(2.0, i / 10.0), 1e-12);
+  }
   ASSERT_EQ(rig.twist()[5], 2.0);
   const std::vector<Attribution> list = rig.manager->attribution();
   ASSERT_EQ(list.size(), 2u);

@@ -118,5 +118,109 @@ TEST(LettingGoTest, CorrectionOfAPauseFadesWhenItResumesWithoutItsSensor) {
   }
 }
 
+TEST(LettingGoTest, ZeroDropsTheCorrectionInTheSameCycle) {
+  for (const bool fault : {false, true}) {
+    Rig rig(0.1);
+    bool wrong = false;
+    auto c = adder("pose", "ee", 0.0);
+    c->description.control_signals[0].on_pause = StopPolicy::Zero;
+    c->on_update = [&](TestController& self, const Cycle&, const RobotStates&, const ControlStates&,
+                       ModifiedControlStates& m) {
+      m[self.out][0] += 1.0;
+      if (wrong) self.fail("now");
+    };
+    ControllerEntry entry;
+    entry.on_fault = StopPolicy::Zero;
+    rig.add(std::move(c), "c", true, entry);
+    rig.step(40);
+    ASSERT_EQ(rig.pose()[0], 1.0);
+    wrong = fault;
+    if (!fault) rig.manager->pause("c");
+    rig.step();
+    EXPECT_EQ(rig.pose()[0], 0.0) << (fault ? "fault" : "pause");
+  }
+}
+
+TEST(LettingGoTest, PoliciesByKindHoldAlsoAfterAFault) {
+  for (const char* signal : {"pose", "vel"}) {
+    Rig rig(0.1);
+    bool wrong = false;
+    auto c = adder(signal, "ee", 0.0);
+    c->on_update = [&](TestController& self, const Cycle&, const RobotStates&, const ControlStates&,
+                       ModifiedControlStates& m) {
+      m[self.out][0] += 1.0;
+      if (wrong) self.fail("now");
+    };
+    ControllerEntry entry;
+    entry.on_fault = StopPolicy::ByKind;
+    rig.add(std::move(c), "c", true, entry);
+    rig.step(40);
+    wrong = true;
+    rig.step(40);
+    EXPECT_EQ(rig.pose()[0], signal == std::string("pose") ? 1.0 : 0.0) << "held";
+    EXPECT_EQ(rig.twist()[0], 0.0) << "faded";
+  }
+}
+
+// A controller that waits for its sensor, with a correction that fades meanwhile.
+struct Waiting : ::testing::Test {
+  Rig rig{0.1};
+  Waiting() {
+    auto c = adder("pose", "ee", 1.0);
+    c->description.measured("wrench").size(6).maxAge(0.02);
+    rig.add(std::move(c), "c");
+    rig.add(adder("vel", "ee", 0.0), "other");
+    for (int i = 0; i < 30; ++i) {
+      rig.robot.setMeasuredData("wrench", Eigen::VectorXd::Zero(6), rig.cycle.now_ns);
+      rig.step();
+    }
+    EXPECT_EQ(rig.pose()[0], 1.0);
+    EXPECT_EQ(rig.manager->status("c").waiting_for, "");
+    rig.step(4);
+    EXPECT_EQ(rig.manager->status("c").activity, Activity::Waiting);
+    EXPECT_EQ(rig.manager->status("c").waiting_for, "measuredData/wrench");
+  }
+};
+
+TEST_F(Waiting, OtherRequestsDoNotProlongTheFade) {
+  for (int i = 0; i < 19; ++i) {
+    rig.manager->pause("other", false);
+    rig.manager->resume("other");
+    EXPECT_EQ(rig.manager->status("c").activity, Activity::Waiting);
+    rig.step();
+  }
+  EXPECT_NEAR(rig.pose()[0], 0.0, 1e-12);
+  EXPECT_EQ(rig.manager->status("c").activity, Activity::Waiting) << "for as long as it takes";
+}
+
+TEST_F(Waiting, PausedMeanwhileItEndsOff) {
+  rig.manager->pause("c");
+  rig.step();
+  EXPECT_EQ(rig.manager->status("c").activity, Activity::Stopping);
+  EXPECT_EQ(rig.manager->status("c").waiting_for, "") << "it waits for nothing any more";
+  rig.step(30);
+  EXPECT_EQ(rig.manager->status("c").activity, Activity::Off);
+  EXPECT_EQ(rig.pose()[0], 0.0);
+}
+
+TEST_F(Waiting, OnceFreshDataComeNothingIsWaitedFor) {
+  rig.robot.setMeasuredData("wrench", Eigen::VectorXd::Zero(6), rig.cycle.now_ns);
+  rig.step();
+  EXPECT_EQ(rig.manager->status("c").activity, Activity::Running);
+  EXPECT_EQ(rig.manager->status("c").waiting_for, "");
+}
+
+TEST(LettingGoTest, ASwitchOfMotionDoesNotProlongAFade) {
+  Rig rig(0.1);
+  rig.add(adder("vel", "ee", 1.0), "c");
+  rig.step(40);
+  rig.manager->pause("c");
+  for (int i = 1; i <= 20; ++i) {
+    rig.manager->apply(Change().motionSwitched());
+    rig.step();
+    EXPECT_NEAR(rig.twist()[0], 1.0 - i / 20.0, 1e-12);
+  }
+}
+
 }  // namespace
 }  // namespace ctrl_more

@@ -111,5 +111,103 @@ TEST(LoggerTest, Throttle) {
   EXPECT_TRUE(throttle.pass(1000));
 }
 
+std::vector<std::string> linesOf(Logger& logger) {
+  auto sink = std::make_shared<ListSink>();
+  logger.addSink(sink);
+  logger.drain();
+  return sink->lines;
+}
+
+TEST(LoggerTest, TextsAreCutToTheirPlaces) {
+  Logger logger;
+  logger.log(LogLevel::Info, std::string(47, 's'), std::string(207, 't'));
+  logger.log(LogLevel::Info, std::string(48, 's'), std::string(208, 't'));
+  logger.log(LogLevel::Info, "a", "x", std::string(60, 'f').c_str(), 12);
+  logger.log(LogLevel::Info, "a", "x", "/folder/f", 3);
+  const LogSource source(&logger, std::string(50, 'n'));
+  source.write(LogLevel::Info, "g.cpp", 4, "y");
+  const std::string cut = "[INFO] " + std::string(47, 's') + ": " + std::string(207, 't');
+  EXPECT_EQ(linesOf(logger),
+            (std::vector<std::string>{cut, cut, "[INFO] a (" + std::string(47, 'f') + ":12): x",
+                                      "[INFO] a (f:3): x",
+                                      "[INFO] " + std::string(47, 'n') + " (g.cpp:4): y"}));
+}
+
+TEST(LoggerTest, NumbersGoWhereTheTextSaysSo) {
+  Logger logger;
+  const LogSource source(&logger, "a");
+  source.write(LogLevel::Info, "", 0, "{} {} {} {}", 1, 2.5, -3, 1e9);
+  source.write(LogLevel::Info, "", 0, "{} and {}", 1);
+  source.write(LogLevel::Info, "", 0, "{x} y} {} {", 5, 6);
+  source.write(LogLevel::Info, "", 0, "none");
+  logger.log(LogLevel::Info, "a", "plain {}", "f.cpp");
+  EXPECT_EQ(linesOf(logger),
+            (std::vector<std::string>{"[INFO] a: 1 2.5 -3 1e+09", "[INFO] a: 1 and {}",
+                                      "[INFO] a: {x} y} 5 {", "[INFO] a: none",
+                                      "[INFO] a (f.cpp:0): plain {}"}));
+}
+
+TEST(LoggerTest, TheRingHoldsWhatWasAskedForAndPushTellsWhetherItWasFull) {
+  LogRecord record;
+  Logger logger(4);
+  for (int i = 0; i < 4; ++i) EXPECT_TRUE(logger.push(record));
+  EXPECT_FALSE(logger.push(record));
+  EXPECT_EQ(logger.dropped(), 1u);
+  record.level = LogLevel::Debug;
+  EXPECT_TRUE(logger.push(record)) << "below the level is not full";
+  EXPECT_EQ(logger.dropped(), 1u);
+  EXPECT_EQ(logger.drain(), 4u);
+  EXPECT_TRUE(logger.push(record));
+  EXPECT_EQ(logger.drain(), 0u);
+  Logger standard;
+  record.level = LogLevel::Info;
+  for (int i = 0; i < 1024; ++i) ASSERT_TRUE(standard.push(record));
+  EXPECT_FALSE(standard.push(record)) << "1024 if nothing is said";
+  Logger rounded(5);
+  for (int i = 0; i < 8; ++i) ASSERT_TRUE(rounded.push(record));
+  EXPECT_FALSE(rounded.push(record)) << "rounded up to a power of two";
+}
+
+TEST(LoggerTest, SourcesWithoutLoggerOrCounterAreAllowed) {
+  const LogSource nowhere;
+  nowhere.write(LogLevel::Error, "f.cpp", 1, "lost");
+  Logger logger;
+  const LogSource uncounted(&logger, "a");
+  uncounted.write(LogLevel::Error, "f.cpp", 1, "kept");
+  uncounted.write(LogLevel::Debug, "f.cpp", 1, "hidden");
+  EXPECT_EQ(linesOf(logger), std::vector<std::string>{"[ERROR] a (f.cpp:1): kept"});
+}
+
+struct CountingSink : LogSink {
+  std::atomic<int> records{0};
+  void write(const LogRecord&) override { ++records; }
+};
+
+TEST(LoggerTest, ADrainingThreadWritesByItselfAndIsStartedOnce) {
+  auto sink = std::make_shared<CountingSink>();
+  {
+    Logger logger;
+    logger.addSink(sink);
+    logger.startDraining(1);
+    logger.startDraining(1);
+    logger.log(LogLevel::Info, "a", "x");
+    for (int i = 0; i < 20000 && sink->records == 0; ++i) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    }
+    EXPECT_EQ(sink->records, 1);
+  }
+  EXPECT_EQ(sink->records, 1);
+}
+
+TEST(LoggerTest, ThrottleCountsFromTheLastRecordThatPassed) {
+  LogThrottle throttle(1000);
+  EXPECT_TRUE(throttle.pass(5000));
+  EXPECT_FALSE(throttle.pass(5999));
+  EXPECT_TRUE(throttle.pass(6000));
+  EXPECT_FALSE(throttle.pass(6500));
+  EXPECT_FALSE(throttle.pass(6999)) << "what did not pass does not count";
+  EXPECT_TRUE(throttle.pass(7000));
+}
+
 }  // namespace
 }  // namespace ctrl_more

@@ -192,5 +192,76 @@ TEST(ManagerTest, RefusedControllerLeavesNoKeyBehind) {
   EXPECT_FALSE(rig.robot.find(RobotSource::Measured, "leftover").valid());
 }
 
+TEST_F(Three, TheFirstPlanCanBeWithdrawnBeforeAnyCycle) {
+  const Status status = rig.manager->disable("a");
+  ASSERT_TRUE(rig.manager->withdraw(status.generation()));
+  EXPECT_TRUE(rig.manager->isEnabled("a"));
+  EXPECT_EQ(runOnce(), (Names{"a", "b", "c"}));
+}
+
+TEST_F(Three, TheFirstNameIsTakenToo) {
+  EXPECT_TRUE(contains(rig.manager->addController(recorder(&ran), "a").message(), "'a' is loaded"));
+  EXPECT_EQ(runOnce(), (Names{"a", "b", "c"}));
+}
+
+TEST(ManagerTest, NoPlanIsAdoptedBeforeTheFirstCycle) {
+  Rig rig;
+  const Status status = rig.manager->addController(adder("pose", "ee", 1.0), "a");
+  ASSERT_GT(status.generation(), 0u);
+  EXPECT_FALSE(rig.manager->waitAdopted(status.generation(), 0.0));
+  rig.step();
+  EXPECT_TRUE(rig.manager->waitAdopted(status.generation(), 0.0));
+}
+
+TEST(ManagerTest, WithoutAClockCyclesAreCountedAndTimeIsThatOfTheStates) {
+  Rig rig;
+  std::vector<Cycle> cycles;
+  auto c = adder("pose", "ee", 1.0);
+  c->on_update = [&](TestController&, const Cycle& cycle, const RobotStates&, const ControlStates&,
+                     ModifiedControlStates&) { cycles.push_back(cycle); };
+  rig.add(std::move(c), "c");
+  rig.control.setControlPeriod(0.002);
+  rig.robot.setMeasuredData("imu", vectorOf({1.0}), 77);
+  rig.manager->update(rig.robot, nullptr);  // nothing to modify, nothing done
+  EXPECT_TRUE(cycles.empty());
+  for (int i = 0; i < 3; ++i) rig.manager->update(rig.robot, &rig.control);
+  ASSERT_EQ(cycles.size(), 3u);
+  for (unsigned i = 0; i < 3; ++i) {
+    EXPECT_EQ(cycles[i].number, i + 1);
+    EXPECT_EQ(cycles[i].now_ns, 77);
+    EXPECT_EQ(cycles[i].dt, 0.002);
+  }
+  EXPECT_EQ(rig.manager->lastCycle().cycle, 3u);
+}
+
+TEST(ManagerTest, StatesOfAnotherLayoutAreNotTouchedAndSaidSo) {
+  Rig rig;
+  auto sink = std::make_shared<ListSink>();
+  rig.logger.addSink(sink);
+  TestController* c = rig.add(adder("com", "com", 1.0), "c");
+  rig.step();
+  ControlStates other(0, 0.005, &rig.logger);
+  rig.manager->update({0, 0.005, 2}, rig.robot, other);
+  EXPECT_EQ(c->updates, 1);
+  EXPECT_EQ(other.getCoM(), Eigen::Vector3d(0, 0, 0));
+  rig.logger.drain();
+  EXPECT_TRUE(sink->contains("expected: nothing run"));
+}
+
+TEST(ManagerTest, RecordsOfLoadingCarryNoCycle) {
+  Rig rig;
+  auto sink = std::make_shared<ListSink>();
+  rig.logger.addSink(sink);
+  auto c = adder("pose", "ee", 1.0);
+  c->on_initialize = [](TestController& self, ctrl_more::Setup& setup) {
+    self.out = setup.modify("ee");
+    CTRL_MORE_LOG(self.log(), Info, "here I am");
+  };
+  rig.add(std::move(c), "c");
+  rig.logger.drain();
+  ASSERT_TRUE(sink->contains("): here I am"));
+  EXPECT_FALSE(sink->contains("cycle"));
+}
+
 }  // namespace
 }  // namespace ctrl_more

@@ -169,5 +169,39 @@ TEST_F(RobotStatesTest, StampsOfAnotherClockAreNotFresh) {
   }
 }
 
+TEST_F(RobotStatesTest, DeclaredSignalsReadAsZerosAndAreAnnouncedOnce) {
+  ASSERT_TRUE(robot.declare(RobotSource::Measured, "imu", 3));
+  ASSERT_TRUE(robot.declare(RobotSource::Measured, "imu", 3, "rad", "imu_link"));
+  EXPECT_EQ(robot.view(robot.find(RobotSource::Measured, "imu")), vectorOf({0, 0, 0}));
+  EXPECT_EQ(robot.signals(RobotSource::Measured)[0].unit, "rad");
+  logger.drain();
+  ASSERT_EQ(sink->lines.size(), 1u);
+  EXPECT_TRUE(contains(sink->lines[0], "new key measuredData/imu of size 3, added by declare"));
+}
+
+TEST_F(RobotStatesTest, KeysHaveANameAndNumbers) {
+  EXPECT_FALSE(robot.declare(RobotSource::Measured, "", 3));
+  EXPECT_FALSE(robot.declare(RobotSource::Measured, "a", 0));
+  EXPECT_FALSE(robot.declare(RobotSource::Measured, "a", -1));
+  EXPECT_FALSE(robot.setMeasuredData("", vectorOf({1}), 0));
+  EXPECT_TRUE(robot.declare(RobotSource::Measured, "a", 1));
+  EXPECT_EQ(robot.signals(RobotSource::Measured).size(), 1u);
+}
+
+TEST_F(RobotStatesTest, StampsBeginAtZero) {
+  robot.setMeasuredData("imu", vectorOf({1}), 5);
+  const RobotSignal imu = robot.find(RobotSource::Measured, "imu");
+  const double value = 2.0;
+  EXPECT_FALSE(robot.write(imu, &value, -1));
+  EXPECT_EQ(robot.view(imu)[0], 1.0);
+  EXPECT_TRUE(robot.write(imu, &value, 0));
+  EXPECT_EQ(robot.view(imu)[0], 2.0);
+  EXPECT_EQ(robot.stamp(imu), 0);
+  EXPECT_FALSE(robot.setMeasurementTimeStamp("imu", -1));
+  EXPECT_TRUE(robot.setMeasurementTimeStamp("imu", 0));
+  EXPECT_EQ(robot.newestStamp(), 5) << "of all that were ever set";
+  EXPECT_FALSE(robot.write(RobotSignal(), &value, 1));
+}
+
 }  // namespace
 }  // namespace ctrl_more

@@ -46,23 +46,27 @@ target_link_options(ctrl_more_test_plugin_resident PRIVATE -Wl,-z,nodelete)
 
 # One program per file, named after it: the test runner looks for them.
 foreach(name robot_states control_states feedback_controller manager by_signal gains cascade
-    all_or_nothing isolation letting_go overruns attribution blending plugins documentation config
-    config_fuzz logger central_module attitude compliant_stabiliser zmp_dcm ee_admittance
+    all_or_nothing isolation limits letting_go overruns attribution blending corrections exchanges
+    plugins list_file search_path describe_tool documentation description settings defaults config
+    config_fuzz words logger central_module attitude compliant_stabiliser zmp_dcm ee_admittance
     joint_limits three_robots abi controller_logs)
   ctrl_more_add_test(${name} test/test_${name}.cpp)
 endforeach()
 ctrl_more_add_test(realtime test/test_realtime.cpp test/forbidden_calls.cpp)
-foreach(name plugins all_or_nothing config_fuzz central_module)
+foreach(name plugins list_file describe_tool all_or_nothing config_fuzz central_module)
   if(TARGET ctrl_more_test_${name})
     add_dependencies(ctrl_more_test_${name} ${CTRL_MORE_TEST_PLUGINS})
   endif()
 endforeach()
-foreach(name plugins documentation central_module attitude compliant_stabiliser zmp_dcm ee_admittance
-    joint_limits three_robots controller_logs realtime)
+foreach(name plugins search_path describe_tool documentation central_module attitude
+    compliant_stabiliser zmp_dcm ee_admittance joint_limits three_robots controller_logs realtime)
   if(TARGET ctrl_more_test_${name})
     add_dependencies(ctrl_more_test_${name} ${CTRL_MORE_PLUGINS})
   endif()
 endforeach()
+if(TARGET ctrl_more_test_describe_tool)
+  add_dependencies(ctrl_more_test_describe_tool ctrl_more_describe)
+endif()
 if(TARGET ctrl_more_test_realtime)
   target_link_libraries(ctrl_more_test_realtime ${CMAKE_DL_LIBS})
 endif()
