@@ -105,5 +105,18 @@ TEST(AttributionTest, StatesAreZeroUntilTheFirstUpdate) {
   EXPECT_EQ(record.states[0].values, std::vector<double>{0.0});
 }
 
+TEST(AttributionTest, WhoEndedInTheLastCycleIsOff) {
+  Rig rig;  // without blending: at once
+  rig.add(adder("pose", "ee", 1.0), "a");
+  rig.add(adder("pose", "ee", 2.0), "b");
+  rig.step(2);
+  rig.manager->disable("a");
+  rig.step();
+  EXPECT_EQ(rig.manager->status("a").activity, Activity::Off);
+  const std::vector<Attribution> list = rig.manager->attribution();
+  ASSERT_EQ(list.size(), 1u);
+  EXPECT_EQ(list[0].controller, "b");
+}
+
 }  // namespace
 }  // namespace ctrl_more

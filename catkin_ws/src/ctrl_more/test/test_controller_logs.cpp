@@ -98,5 +98,19 @@ TEST_F(ControllerLogs, ZmpInnerLoopNamesTheAxis) {
   expectSaid("[WARN] balance (zmp_dcm.cpp:", "offset of axis 1 is held at max_offset, 0.001");
 }
 
+// A bound of zero that nothing pushes against holds nothing.
+TEST_F(ControllerLogs, NothingIsSaidWhereNoForceIs) {
+  ASSERT_TRUE(rig.load("compliant_stabiliser", "force_source: force\nmax_offset: 0\n", "soft"));
+  ASSERT_TRUE(rig.load("ee_admittance", "max_offset: 0\nmax_angle: 0\naxes: all\n", "hand"));
+  run([this] {
+    rig.robot.setMeasuredData("contactForce", vectorOf({0, 0, 300}), rig.cycle.now_ns);
+    rig.robot.setMeasuredData("wrench", Eigen::VectorXd::Zero(6), rig.cycle.now_ns);
+    rig.setReferences();
+  });
+  EXPECT_FALSE(sink->contains("max_offset"));
+  EXPECT_EQ(rig.control.getCoM(), Eigen::Vector3d(0, 0, 0));
+  EXPECT_EQ(rig.pose().head(3), vectorOf({0, 0.2, 0.3}));
+}
+
 }  // namespace
 }  // namespace ctrl_more

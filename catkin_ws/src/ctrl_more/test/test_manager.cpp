@@ -207,10 +207,13 @@ TEST_F(Three, TheFirstNameIsTakenToo) {
 TEST(ManagerTest, NoPlanIsAdoptedBeforeTheFirstCycle) {
   Rig rig;
   const Status status = rig.manager->addController(adder("pose", "ee", 1.0), "a");
-  ASSERT_GT(status.generation(), 0u);
+  ASSERT_EQ(status.generation(), 1u) << "plans are numbered from one";
   EXPECT_FALSE(rig.manager->waitAdopted(status.generation(), 0.0));
   rig.step();
   EXPECT_TRUE(rig.manager->waitAdopted(status.generation(), 0.0));
+  EXPECT_EQ(rig.manager->enable("a").generation(), 2u);
+  EXPECT_EQ(rig.manager->enable("nobody").generation(), 0u) << "nothing was published";
+  EXPECT_EQ(rig.manager->withdraw(2).generation(), 3u) << "back by a plan of its own";
 }
 
 TEST(ManagerTest, WithoutAClockCyclesAreCountedAndTimeIsThatOfTheStates) {

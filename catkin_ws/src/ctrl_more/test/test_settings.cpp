@@ -65,6 +65,18 @@ TEST(Settings, UnknownNamesAndKindsAreRefused) {
   EXPECT_THROW(values.numbers("mode"), std::invalid_argument);
 }
 
+TEST(Settings, TheFirstOneMayBeOfNumbersToo) {
+  Description d;
+  d.setting("height", std::vector<double>{0.8}).in("m").about("first");
+  d.setting("mode", "a").about("second");
+  SettingValues values(d.settings);
+  EXPECT_EQ(values.numbers("height"), std::vector<double>{0.8});
+  EXPECT_TRUE(values.set("height", std::vector<double>{1.2}));
+  EXPECT_EQ(values.numbers("height"), std::vector<double>{1.2});
+  EXPECT_TRUE(values.set("mode", std::string("b")));
+  EXPECT_EQ(values.text("mode"), "b");
+}
+
 TEST(Settings, DifferencesAreNamed) {
   const SettingValues before(declared().settings);
   SettingValues after = before;
