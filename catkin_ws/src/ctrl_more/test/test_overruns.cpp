@@ -105,10 +105,10 @@ TEST(OverrunTest, BothSignalsOfALateUpdateAreThoseOfTheLastInTime) {
                      const ControlStates&, ModifiedControlStates& m) {
     m[self.out][0] += static_cast<double>(cycle.number);
     m[velocity][5] -= static_cast<double>(cycle.number);
-    if (now) std::this_thread::sleep_for(std::chrono::milliseconds(40));
+    if (now) std::this_thread::sleep_for(std::chrono::milliseconds(250));
   };
   ControllerEntry entry;
-  entry.overrun_us = 30000.0;
+  entry.overrun_us = 200000.0;
   rig.add(std::move(c), "c", true, entry);
   rig.step(3);
   ASSERT_EQ(rig.manager->status("c").overruns, 0u);
