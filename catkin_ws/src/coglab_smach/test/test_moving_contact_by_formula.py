@@ -372,16 +372,16 @@ def test_evidence_takes_two_samples_and_counts_for_30_ms():
 def test_what_was_there_before_is_told_of_an_empty_hand_alone():
     moved = Moved()
     moved.contact.observer.lag = 0.0
-    moved.feed(samples=60)
+    moved.feed((0.0, 1.0, 0.0), samples=60)
     assert moved.contact.steady() is None, "it has not moved"
-    moved.feed((0.0, 2.0, 0.0), 80, by=0.1 * DT)
+    moved.feed((0.0, 3.0, 0.0), 80, by=0.1 * DT)
     steady = moved.contact.steady()
     # Joints go with 0.1 rad/s, of which these thresholds know nothing.
     assert steady.margin == pytest.approx(2.0 / math.hypot(0.3, 0.2) / 4.0, rel=0.02)
     assert steady.until - steady.stamp == pytest.approx(0.03)
     assert moved.contact.offset().torque[1] == pytest.approx(2.0, rel=0.02)
     assert moved.contact.offset_of_motion() is None
-    moved.feed((0.0, 2.0, 0.0), 60)
+    moved.feed((0.0, 3.0, 0.0), 60)
     assert moved.contact.offset_of_motion().torque[1] == pytest.approx(2.0, rel=0.02)
     moved.contact.load = 0.1
     assert moved.contact.steady() is None
