@@ -80,8 +80,7 @@ def late(t):
     let_go, t.cell.let_go = t.cell.let_go, lambda: None
     t.wait_hub("wait_without_object", 200.0)
     t.start(RECEIVE)
-    while "arm lift" not in t.cell.called():
-        t.clock.sleep(0.01)
+    t.until(lambda: "arm lift" in t.cell.called())
     t.cell.pulled = (0.0, 9.0, 0.0)
     t.clock.sleep(0.3)
     t.cell.pulled = (0.0, 0.0, 0.0)
@@ -94,8 +93,7 @@ def late(t):
         t.cell.touch = touch
         t.cell.push(0.0)
         t.start(GIVE)
-        while t.cell.called("arm")[-1] != "arm release":
-            t.clock.sleep(0.05)
+        t.until(lambda: t.cell.called("arm")[-1] == "arm release")
         for push in (1.5, 0.0, -5.0, 0.0):
             t.cell.push(push)
             t.clock.sleep(1.2)

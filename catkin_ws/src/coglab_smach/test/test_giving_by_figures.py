@@ -89,7 +89,7 @@ def test_a_grip_that_falls_is_stopped_four_hundredths_of_a_second_ahead_and_look
     assert hand.orders == [("open", 140)]
     # 100 N/s down, of which the estimate believes a half with each look.
     rate, now, force = 0.0, 0.0, 20.0
-    while len(hand.orders) == 1:
+    while len(hand.orders) == 1 and force > 0.0:
         now, force = now + 0.01, force - 1.0
         rate += 0.5 * (-100.0 - rate)
         felt[0] = force

@@ -283,8 +283,7 @@ def test_what_is_said_to_the_person_before_a_handover():
             ("exchange_human_to_robot", "wait_with_object"),
             ("exchange_robot_to_human", "wait_without_object"),
         ):
-            while not t.ctx.requests.hub():
-                t.clock.sleep(0.05)
+            t.until(t.ctx.requests.hub)
             t.start(action)
             t.wait_hub(hub_after)
 

@@ -266,8 +266,7 @@ def received(monkeypatch, off):
         t.wait_hub("wait_without_object")
         t.start("exchange_human_to_robot")
         t.clock.sleep(1.0)
-        while not t.ctx.requests.hub():
-            t.clock.sleep(0.02)
+        t.until(t.ctx.requests.hub)
 
     trial.run(script)
     return trial
