@@ -219,7 +219,7 @@ def test_a_palm_is_raised_five_times_at_most_and_by_no_more_than_allowed(monkeyp
     assert lift == 0.0 and raised.position == pytest.approx(palm.position)
 
 
-def test_room_is_that_of_the_arm_from_the_elbow_on():
+def test_room_is_that_of_the_arm_from_the_elbow_on(monkeypatch):
     """The shoulder stands beside the board and may be below its plane."""
     urdf = package_path("lwr_description", "urdf", "lwr_ih2.urdf").read_text(encoding="utf-8")
     room, palm = BoardRoom(urdf), Pose(*default_arm().fk(home_posture()))
@@ -227,5 +227,13 @@ def test_room_is_that_of_the_arm_from_the_elbow_on():
     height = room.over(board, palm)
     assert 1.0 < height < 1.0 + palm.position[2]
     assert room.over(Pose(np.array([9.0, 9.0, -0.5])), palm) == pytest.approx(height - 0.5), "a plane without end"
+    # With the hand up and the forearm down it is the forearm that counts.
+    names, up = default_arm().joint_names, np.array([0.0, 0.0, 1.0])
+    bent = np.array([0.0, 1.6, 0.0, 2.0, 0.0, 0.0, 0.0])
+    angles = dict(zip(names, bent, strict=True))
+    lowest = [room._lowest("lwr_base_link", Pose(), angles, set(names[k:]), False, up) for k in (2, 3, 4)]
+    monkeypatch.setattr(board_room, "solve", lambda *_: bent)
+    assert room.over(Pose(), palm) == pytest.approx(lowest[1]) and lowest[0] < lowest[1] < lowest[2]
+    monkeypatch.undo()
     upside = Pose(board.position, np.array([1.0, 0.0, 0.0, 0.0]))
     assert room.over(upside, palm) < -1.0, "its z axis is up"

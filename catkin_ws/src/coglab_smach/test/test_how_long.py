@@ -124,6 +124,8 @@ def test_who_waits_for_what(waited):
     assert found["Stopped", "command mode of the LWR"] == 10.0 and found["EndMotion", "switching to"] is WHOLE
     assert {s for state, what, s, _, _ in waited[0] if (state, what) == ("WaitStop", "sight of")} == {0.5}
     assert {s for state, what, s, _, _ in waited[0] if (state, what) == ("SetTakeGoal", "sight of")} == {6.0}
+    # 6 cm at 0.25 m/s, its start and end, and two seconds more.
+    assert 2.24 < found["LetGo", "drawing back"] < 2.6 and 5.6 < found["WaitStop", "drawing back"] < 6.0
     # Between the closing and the person's letting go, which is measured from the arming.
     assert 4.8 < found["TakeWeight", "the person's letting go"] < 5.0
 

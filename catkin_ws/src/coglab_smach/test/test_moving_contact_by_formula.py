@@ -257,7 +257,8 @@ def test_offsets_count_once_twenty_were_seen():
     assert few.steady == pytest.approx(seven(0.3)) and few.steady_limit == pytest.approx(1.05 * 4.0)
     assert enough.steady == pytest.approx(np.sqrt(np.mean([o.torque**2 for o in offsets], axis=0)))
     assert enough.steady_limit != few.steady_limit and 2.0 < enough.steady_limit < 8.0
-    assert learn(reaches(), alarm_share=1e-4).limit > learn(reaches()).limit
+    usual = learn(reaches()).limit
+    assert learn(reaches(), alarm_share=1e-4).limit > usual == learn(reaches(), alarm_share=2e-3).limit
 
 
 BAD = {
@@ -388,3 +389,4 @@ def test_what_was_there_before_is_told_of_an_empty_hand_alone():
     moved.contact.set_payload(0.4)
     assert moved.arm.payloads == [(0.4, (0.0, 0.0, 0.0))] and moved.contact.load == 0.4
     assert moved.contact.change is None and not moved.contact.still() and moved.contact.before_motion() is None
+    assert moved.contact.evidence() is None and moved.contact.force_since(np.zeros(7)) is None

@@ -368,7 +368,11 @@ def test_a_clock_that_stalls_names_who_runs_and_who_waits():
     assert "at 6.000000 s for 0.1 s of wall time: nobody is running" in str(error.value)
     waiter.join(5)
     with using(VirtualClock()) as other:
+        event = other.event()
+        other.start_thread(lambda: (other.sleep(0.5), event.set(), event.clear()), "pulse")
+        assert event.wait(9.0) is True and not event.is_set(), "who waited was woken"
+        other.sleep(-0.5)
         condition = VirtualCondition(other)
         other.start_thread(lambda: (other.sleep(2.0), condition.notify_all()), "n")
         with condition:
-            assert condition.wait() is True and other.now() == 2.0
+            assert condition.wait() is True and other.now() == 2.5

@@ -133,6 +133,9 @@ def test_a_hand_half_a_metre_from_the_palm_holds_nothing_any_more(away, goes):
             t.clock.sleep(0.05)
 
     trial = giving(script, **{"give.near": 2.0, "give.bring_after": 99.0})
+    secured = next(r.stamp for r in trial.ctx.journal.transitions if r.from_state == "secure_hand")
+    given_up = next(r.stamp for r in trial.ctx.journal.transitions if r.from_state == "give_load")
+    assert (secured - given_up < 2.0) == goes, "who has gone is not waited for"
     assert trial.result().outcome == ("failed_holding" if goes else "stopped")
 
 
@@ -159,7 +162,9 @@ def test_a_fault_lifts_a_hold_that_is_latched_at_the_robot():
         t.wait_hub("fault")
         t.cell.faults.dead.clear()
         t.cell.arm.held = True
+        assert "silent" in t.ctx.journal.why()
         t.start("initialise")
+        assert not t.ctx.journal.newest_failure().sentence, "the operator has answered"
         t.wait_hub("wait_without_object")
         assert not t.cell.arm.held
 
