@@ -178,6 +178,17 @@ def test_commands_to_the_robot(cell):
         assert error.value.code == code
 
 
+def test_the_correction_of_a_profile_fades_within_a_fifth_of_a_second(cell):
+    cell.ready("dmp")
+    cell.sleep(0.3)
+    assert cell.arm.profile_settled("dmp") == Verdict(True)
+    cell.settle(cell.arm.apply_profile("dmp_compliant"))
+    cell.sleep(0.18)
+    assert cell.arm.profile_settled("dmp_compliant") == Verdict(False, "ee_admittance is stopping")
+    cell.sleep(0.03)
+    assert cell.arm.profile_settled("dmp_compliant").ok and "is in force" in cell.arm.profile_settled("dmp").why
+
+
 # --- what is refused --------------------------------------------------------------------------------------------------
 
 

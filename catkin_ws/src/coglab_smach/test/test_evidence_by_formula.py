@@ -322,6 +322,16 @@ def test_a_clock_that_was_set_leaves_an_arming_its_time(jump):
     assert detector.state() != "watching"
 
 
+def test_a_clock_that_was_set_leaves_the_watch_for_a_release_its_time():
+    detector, moving = fused()
+    detector.arm(RELEASE, 0.0, 1.0, mass=0.5)
+    measured(detector, 0.0, 0.5)
+    measured(detector, 50.5, 50.95)
+    assert detector.share_gone() is not None
+    measured(detector, 51.05, 51.1)
+    assert detector.share_gone() is None and moving.payloads == []
+
+
 def test_evidence_counts_until_its_end_and_the_surest_source_is_told():
     detector, moving = fused()
     detector.arm(IN_MOTION, 0.0, 5.0)

@@ -174,6 +174,14 @@ def test_a_load_that_came_back_for_a_tenth_of_a_second_is_held_again(monkeypatch
     assert ("tighten",) not in given.did, "counted anew"
 
 
+@pytest.mark.parametrize(("loosened", "closes"), [(0, False), (1, True), (None, False)])
+def test_a_grip_that_was_never_loosened_is_not_closed_again(monkeypatch, loosened, closes):
+    given = Given(monkeypatch)
+    given.state._grip.loosened = lambda: loosened
+    given.state._keep()
+    assert given.did == [("stand",), *[("tighten",)] * closes] and given.trial.ctx.firm == 140 * closes
+
+
 @pytest.mark.parametrize(("sunk", "closes"), [(0.029, False), (0.031, True)])
 def test_an_object_that_sinks_by_3_cm_is_held_again(monkeypatch, sunk, closes):
     given = Given(monkeypatch, sunk)
