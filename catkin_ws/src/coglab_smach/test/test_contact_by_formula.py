@@ -306,5 +306,8 @@ def test_a_push_of_the_trials_rises_within_60_ms():
     assert push((0.0, 2.0, 0.0), 1.0, rise=0.1)(0.05) == pytest.approx([0.0, 1.0, 0.0])
     trial = ContactTrial((np.zeros(7), JACOBIAN), 1)
     assert trial.feed(0.5) == (None, 0.5) and trial.t == pytest.approx(0.5)
+    steps, trial.signal.sample = [], lambda dt, *_: steps.append(dt) or np.zeros(7)
+    trial.feed(0.1)
+    assert steps == [0.005] * 20, "200 Hz"
     trial = ContactTrial((np.zeros(7), JACOBIAN), 1, cutoff=15.0)
     assert trial.rest_and_arm() is None and trial.t == pytest.approx(1.7) and trial.detector.settings.cutoff == 15.0

@@ -353,6 +353,10 @@ def test_evidence_counts_until_its_end_and_the_surest_source_is_told():
 
 def test_a_force_is_told_against_the_rest_before_the_reach():
     detector, moving = fused()
+    moving.change = None
+    detector.arm(IN_MOTION, 0.0, 1.0)
+    assert detector.state() == "waiting", "too little of a past"
+    detector, moving = fused()
     assert detector.force() is None
     moving.before, moving.hangs = np.full(7, 0.5), 2.0
     detector.arm("contact", 0.0, 1.0)
