@@ -317,6 +317,31 @@ def test_the_person_moves_a_hundred_times_a_second(monkeypatch):
     assert np.diff(steps[6:]) == pytest.approx([0.01] * 13)
 
 
+@pytest.mark.parametrize("name", ["perception_stand_in", "truth_markers", "virtual_human"])
+def test_a_node_that_was_ended_ends_with_0_and_one_that_cannot_begin_with_1(monkeypatch, name):
+    ros = Alone(monkeypatch)
+    ros.parameters = {"~frames": FRAMES, "~board": BOARD}
+    module, spun = script(name), []
+    monkeypatch.setattr(rospy, "init_node", lambda given: spun.append(given))
+    monkeypatch.setattr(rospy, "spin", lambda: spun.append("spin"))
+    monkeypatch.setattr(rospy, "is_shutdown", lambda: True)
+    assert module.main() == 0 and spun[0] == name.replace("_stand_in", "")
+    if name != "truth_markers":
+        ros.parameters = {"~frames": FRAMES, "~behaviour": "silly"}
+        assert module.main() == 1 and "silly" in ros.said[-1] or "board" in ros.said[-1]
+
+
+def test_a_hand_that_was_recorded_alone_has_nothing_put_into_it(monkeypatch, tmp_path):
+    path = tmp_path / "h.csv"
+    path.write_text("t,x,y,z\n" + "".join(f"{0.1 * i},{0.04 * i},0,0.4\n" for i in range(11)))
+    ros = Alone(monkeypatch)
+    ros.parameters = {"~recording": {"file": str(path), "object": "in_hand"}}
+    module = script("virtual_human")
+    monkeypatch.setattr(rospy, "init_node", lambda given: None)
+    monkeypatch.setattr(rospy, "is_shutdown", lambda: True)
+    assert module.main() == 0, ros.said
+
+
 def test_whether_a_person_can_begin_is_said_for_launch_files(capsys):
     check = script("check_person")
     assert check.main(["normal", "drawn", "", "wait", "", "recorded"]) == 0

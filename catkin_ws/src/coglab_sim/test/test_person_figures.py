@@ -232,7 +232,7 @@ def test_the_scene_without_an_object_of_the_database():
 
 
 def test_the_scene_of_an_object_follows_its_size_and_its_delivery():
-    entry = shipped("bottle")
+    entry = shipped("tea_box") | {"size": [0.07, 0.11, 0.16]}
     scene = Scene.of(entry, mass=2.0, friction=0.5)
     x, _, height = entry["size"]
     free = entry["deliveries"][entry["default_delivery"]]["pose"]["xyz"][2]
