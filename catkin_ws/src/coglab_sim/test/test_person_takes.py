@@ -87,11 +87,14 @@ def test_the_taker_leaves_a_moment_after_the_hand_has_opened_or_said_so(closure,
 # -- leaving ------------------------------------------------------------------------------------------------------
 
 
+HAND = np.array([0.3, -0.2, 0.4])
+
+
 def leaving(grip, **seen):
-    """The grips of a hand on a way of no length that takes 3 s."""
-    acting = Acting("retreating", reach_time=10.0)
+    """The grips of a hand that stands at HAND, on a way of no length that takes 3 s."""
+    acting = Acting("retreating", hand=HAND, reach_time=10.0)
     acting.human._grip = grip
-    acting.human._plan(0.0, np.zeros(3), Rotation.identity())
+    acting.human._plan(0.0, HAND, Rotation.identity())
     grips = []
     for _ in range(60):
         acting.step(percept(**seen))
@@ -111,7 +114,7 @@ def test_who_had_begun_to_let_go_holds_on_again():
 )
 def test_an_object_that_is_neither_felt_nor_seen_in_the_hand_is_lost(share, away, lost):
     """Nor within 35 cm of it, for 0.3 s."""
-    grips = leaving(1.0, load=carried(share), thing=(0.0, away, 0.0))
+    grips = leaving(1.0, load=carried(share), thing=HAND + [0.0, away, 0.0])
     assert (grips[-1] == 0.0) is lost
     if lost:
         assert grips.index(0.0) == pytest.approx(31, abs=1)
