@@ -58,6 +58,13 @@ class Trial:
             )
             self.clock.sleep(0.05)
 
+    def until(self, condition, limit=60.0):
+        """Wait until it is so, which has to be within ``limit`` s."""
+        end = self.clock.now() + limit
+        while not condition():
+            assert self.clock.now() < end, f"not within {limit} s; why: {self.ctx.journal.why()}"
+            self.clock.sleep(0.01)
+
     def start(self, action, object_id="mug"):
         """Trigger an action; it must be accepted."""
         ok, message, _ = self.ctx.requests.submit(action, object_id)

@@ -1,0 +1,311 @@
+"""The arm as the brain sees it over ROS: for how long what its nodes say counts, what is asked of them and how long it
+is waited for; and what becomes of a motion. No master is there, and ages are what the test says."""
+
+from __future__ import annotations
+
+import time
+from types import SimpleNamespace
+
+import pytest
+from coglab_msgs.msg import FinishedPtp, ReasonCode, UnfinishedPtp
+from coglab_msgs.srv import ExecuteDmpRequest, SwitchDmpRequest
+from coglab_smach.ports.interfaces import DmpProgress, DmpRequest, Verdict
+from coglab_smach.ports.pending import Permit, PortError, Ready
+from coglab_smach.ros import arm
+
+JOINTS = ["lwr_a1", "lwr_a2", "lwr_e1", "lwr_a3", "lwr_a4", "lwr_a5", "lwr_a6"]
+
+
+class Topic:
+    """In the place of Newest."""
+
+    every: dict[str, Topic] = {}
+
+    def __init__(self, topic, kind, on_message=None):
+        self.message, self.seconds, self.stamp, self.heard = None, 0.0, 0.0, on_message
+        Topic.every[topic] = self
+
+    def age(self):
+        return self.seconds
+
+
+class Robot:
+    """The port, its topics, and the services that it calls: (name, wait, fields)."""
+
+    def __init__(self, monkeypatch):
+        self.now, self.asked, self.answers = 50.0, [], {}
+        monkeypatch.setattr(arm, "Newest", Topic)
+        monkeypatch.setattr(arm, "time", SimpleNamespace(monotonic=lambda: self.now))
+        monkeypatch.setattr(arm, "call", self.call)
+        monkeypatch.setattr(arm, "call_now", self.call_now)
+        monkeypatch.setattr(arm.parameters, "read", lambda name, kind, default: {"joint_vel_limit": [0.7] * 7})
+        self.port = arm.RosArm()
+        self.topics = Topic.every
+        self.say("lwr/state", motion_allowed=True, reason="", supervisor="running", reason_code=0, hold_latched=False)
+        self.say("lwr/joint_states", name=JOINTS[::-1], position=[float(k) for k in range(7)])
+        self.say("controller_manager/status", **self.status())
+
+    @staticmethod
+    def status(**fields):
+        well = {"standing": True, "state": "running", "active_controller": "ptp", "speed_scale": 0.5}
+        return {**well, "reason": "", "reason_code": 0, **fields}
+
+    def say(self, topic, seconds=0.0, **fields):
+        self.topics[topic].message, self.topics[topic].seconds = SimpleNamespace(**fields), seconds
+
+    def call(self, name, kind, wait=20.0, **fields):
+        return Ready(self._answer(name, wait, fields))
+
+    def call_now(self, name, kind, permit, wait=20.0, **fields):
+        assert isinstance(permit, Permit)
+        return self._answer(name, wait, fields)
+
+    def _answer(self, name, wait, fields):
+        self.asked.append((name, wait, fields))
+        answer = self.answers.get(name, SimpleNamespace(message="done", controller_type="T", num_loaded=5, ptp_id=3))
+        if isinstance(answer, PortError):
+            raise answer
+        return answer
+
+
+@pytest.fixture
+def robot(monkeypatch):
+    return Robot(monkeypatch)
+
+
+def ended(pending):
+    """Waits for a call that has a thread of its own."""
+    end = time.monotonic() + 5.0
+    while not pending.done():
+        assert time.monotonic() < end
+        time.sleep(0.002)
+    return pending
+
+
+# --- what is known of it ----------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("ask", ["motion_allowed", "standing"])
+def test_a_robot_that_was_never_heard_or_not_for_a_second_is_silent(robot, ask):
+    verdict = getattr(robot.port, ask)
+    assert verdict() == Verdict(True)
+    robot.topics["lwr/joint_states"].seconds = 1.0
+    assert verdict().ok
+    robot.topics["lwr/joint_states"].seconds = 1.01
+    assert verdict() == Verdict(False, "lwr/joint_states is silent for 1.0 s", ReasonCode.NODE_SILENT)
+    robot.topics["lwr/joint_states"].seconds = 1e9
+    assert "silent for 999.0 s" in verdict().why
+    for topic in ("lwr/state", "controller_manager/status"):
+        robot.topics[topic].message = None
+    assert "has never been published" in verdict().why and verdict().code == ReasonCode.NODE_SILENT
+
+
+@pytest.mark.parametrize(
+    ("said", "verdict"),
+    [
+        ({"reason": "hold", "reason_code": 7}, Verdict(False, "hold", 7)),
+        ({"reason": "", "hold_latched": True}, Verdict(False, "the LWR interface is in state 'held'", ReasonCode.HELD)),
+        ({"reason": "x"}, Verdict(False, "x", ReasonCode.NONE)),
+    ],
+)
+def test_why_motion_is_not_allowed(robot, said, verdict):
+    well = {"motion_allowed": False, "supervisor": "held", "reason_code": 0, "hold_latched": False}
+    robot.say("lwr/state", **{**well, **said})
+    assert robot.port.motion_allowed() == verdict
+
+
+def test_an_arm_that_moves_does_not_stand(robot):
+    robot.say("controller_manager/status", **robot.status(standing=False, state="moving"))
+    assert robot.port.standing() == Verdict(False, "the arm is moving") and robot.port.speed_scale() == 0.5
+    robot.topics["controller_manager/status"].message = None
+    assert robot.port.speed_scale() == 1.0
+
+
+def test_joints_are_told_in_wire_order_for_half_a_second(robot):
+    assert robot.port.joint_positions() == (6.0, 5.0, 4.0, 3.0, 2.0, 1.0, 0.0)
+    robot.topics["lwr/joint_states"].seconds = 0.5
+    assert robot.port.joint_positions() is not None
+    robot.topics["lwr/joint_states"].seconds = 0.51
+    assert robot.port.joint_positions() is None
+    robot.say("lwr/joint_states", name=JOINTS[1:], position=[0.0] * 6)
+    assert robot.port.joint_positions() is None, "one is missing"
+    robot.topics["lwr/joint_states"].message = None
+    assert robot.port.joint_positions() is None
+
+
+def test_news_of_a_motion_that_is_older_than_its_start_is_none(robot):
+    feedback = {"state": "reached", "reason": "r", "primitive_id": "p", "phase": 0.2, "remaining_distance": 0.1}
+    feedback |= {"reason_code": 4, "remaining_time": 0.3}
+    assert robot.port.dmp_progress() == DmpProgress("idle")
+    robot.say("controller_manager/dmp/feedback", **feedback)
+    assert robot.port.dmp_progress() == DmpProgress("reached", "r", "p", 0.2, 0.1, 4, 0.3)
+    robot.topics["controller_manager/dmp/feedback"].stamp = 49.9
+    started = robot.port.execute_dmp(DmpRequest("p", "f", (1.0, 2.0, 3.0)))
+    assert robot.port.dmp_progress() == DmpProgress("running")
+    robot.topics["controller_manager/dmp/feedback"].stamp = 50.1
+    assert robot.port.dmp_progress().state == "reached"
+    robot.now = 51.0
+    assert started.result() is None
+    assert robot.port.dmp_progress() == DmpProgress("running"), "it has begun when it was accepted"
+
+
+def test_a_profile_is_settled_when_the_others_are_off(robot):
+    assert robot.port.profile_settled("dmp").code == ReasonCode.NODE_SILENT
+    part = lambda name, enabled, activity: SimpleNamespace(name=name, enabled=enabled, activity=activity)  # noqa: E731
+    status = "controller_manager/feedback/status"
+    robot.say(status, profile="dmp", controllers=[part("a", True, "active"), part("b", False, "off")])
+    assert robot.port.profile_settled("dmp") == Verdict(True)
+    assert robot.port.profile_settled("ptp") == Verdict(False, "profile 'dmp' is in force")
+    robot.say(status, profile="dmp", controllers=[part("a", False, "stopping"), part("b", False, "off")])
+    assert robot.port.profile_settled("dmp") == Verdict(False, "a is stopping")
+
+
+# --- what is asked of it ----------------------------------------------------------------------------------------------
+
+
+def test_services_and_how_long_they_are_waited_for(robot):
+    port = robot.port
+    assert port.load_dmps("f.xml").result() == 5 and port.lwr_command("start").result() == "done"
+    assert port.switch_controller("dmp").result() == "T" and port.apply_profile("x").result() is None
+    assert port.switch_dmp(DmpRequest("p", "f", (1.0, 2.0, 3.0))).result() is None
+    port.execute_dmp(DmpRequest("p", "f", (1.0, 2.0, 3.0)))
+    port.move_ptp((0.1,) * 7, [0.2] * 7)
+    assert ended(port.hold("why")).result() == "done"
+    manager = "controller_manager/"
+    assert [(name, wait) for name, wait, _ in robot.asked] == [
+        (manager + "dmp/load_dmps", 20.0),
+        ("lwr/command", 20.0),
+        (manager + "switch_controller", 5.0),
+        (manager + "feedback/apply_profile", 5.0),
+        (manager + "dmp/switch_dmp", 1.0),
+        (manager + "dmp/execute_dmp", 5.0),
+        (manager + "ptp/add_ptp", 5.0),
+        ("lwr/command", 1.0),
+    ]
+    assert robot.asked[6][2] == {"position": [0.1] * 7, "max_vel": [0.2] * 7, "max_acc": []}
+    assert robot.asked[7][2] == {"event": "hold"} and robot.asked[3][2] == {"names": ["x"], "reason": ""}
+
+
+def test_a_plugin_that_is_loaded_is_not_loaded_again_and_the_limits_are_read(robot):
+    loaded = SimpleNamespace(controller_ids=["dmp"], controller_types=["T"])
+    robot.answers["controller_manager/list_controllers"] = loaded
+    ended(robot.port.load_controller("dmp", "T")).result()
+    assert [name for name, _, _ in robot.asked] == ["controller_manager/list_controllers"]
+    assert robot.port.motion_limits().velocity == (0.7,) * 7
+    for other in (("dmp", "U"), ("ptp", "T")):
+        ended(robot.port.load_controller(*other)).result()
+        assert robot.asked[-1][0] == "controller_manager/load_controller"
+        assert robot.asked[-1][2] == {"controller_id": other[0], "controller_type": other[1]}
+
+
+def test_a_request_has_the_fields_of_its_service():
+    request = DmpRequest("p", "f", (1.0, 2.0, 3.0), 1.5, True, (0.0, 0.0, 0.0, 1.0), (0.0, 0.05, 0.0), 0.05)
+    fields = arm._fields(request, ExecuteDmpRequest)
+    assert (fields["goal_offset"].x, fields["goal_offset"].z, fields["target_orientation"].w) == (1.0, 3.0, 1.0)
+    assert (fields["goal_approach"].y, fields["arrival_speed"], fields["goal_frame"]) == (0.05, 0.05, "f")
+    switch = arm._fields(request, SwitchDmpRequest)
+    assert (switch["primitive_id"], switch["dmp_ratio"], "goal_frame" in switch) == ("p", 1.5, False)
+    assert set(fields) == set(ExecuteDmpRequest.__slots__) and set(switch) == set(SwitchDmpRequest.__slots__)
+
+
+# --- the end of a motion ----------------------------------------------------------------------------------------------
+
+
+def cancels(robot):
+    return [(name, fields["reason"]) for name, _, fields in robot.asked if name.endswith("/cancel")]
+
+
+def test_both_the_active_and_the_addressed_controller_are_cancelled(robot):
+    ended(robot.port.cancel_motion("x" * 300)).result()
+    assert cancels(robot) == [("controller_manager/ptp/cancel", "x" * 200)]
+    assert robot.asked[-1][1] == 1.0 and robot.asked[-1][2]["time_limit"] == 0.0
+    robot.asked.clear()
+    robot.port.switch_controller("dmp")
+    assert ended(robot.port.cancel_motion("why")).result() is None
+    assert sorted(cancels(robot)) == [
+        ("controller_manager/dmp/cancel", "why"),
+        ("controller_manager/ptp/cancel", "why"),
+    ]
+    robot.asked.clear()
+    robot.port.switch_controller("other")
+    robot.say("controller_manager/status", **robot.status(active_controller="", standing=False))
+    pending = robot.port.cancel_motion("why")
+    assert cancels(robot) == [] and not pending.done()
+    robot.topics["controller_manager/status"].message.standing = True
+    assert pending.done() and pending.result() is None
+
+
+def test_cancelling_is_over_when_the_arm_stands_or_at_once_when_it_fails(robot):
+    robot.say("controller_manager/status", **robot.status(standing=False))
+    pending = robot.port.cancel_motion("why")
+    time.sleep(0.05)
+    assert not pending.done()
+    robot.topics["controller_manager/status"].message.standing = True
+    ended(pending)
+    robot.say("controller_manager/status", **robot.status(standing=False))
+    robot.answers["controller_manager/ptp/cancel"] = PortError("no", code=ReasonCode.HELD)
+    with pytest.raises(PortError, match="no"):
+        ended(robot.port.cancel_motion("why")).result()
+
+
+@pytest.mark.parametrize(
+    ("code", "active", "fails"),
+    [
+        (ReasonCode.NOTHING_RUNS, "ptp", False),
+        (ReasonCode.NOT_ACTIVE, "ptp", False),
+        (ReasonCode.NODE_SILENT, "ptp", True),
+        (ReasonCode.NODE_SILENT, "", False),
+        (ReasonCode.HELD, "", True),
+    ],
+)
+def test_what_has_nothing_to_cancel_is_cancelled(robot, code, active, fails):
+    robot.say("controller_manager/status", **robot.status(active_controller=active))
+    robot.answers["controller_manager/ptp/cancel"] = PortError("no", code=code)
+    if fails:
+        with pytest.raises(PortError):
+            robot.port._cancel("ptp", "why")
+    else:
+        robot.port._cancel("ptp", "why")
+    robot.topics["controller_manager/status"].message = None
+    if code == ReasonCode.NODE_SILENT:
+        with pytest.raises(PortError):
+            robot.port._cancel("ptp", "why")
+
+
+def finished(robot, ptp_id=3):
+    robot.topics["controller_manager/ptp/finished_ptp"].heard(FinishedPtp(ptp_id=ptp_id))
+
+
+def test_a_motion_is_over_when_its_own_end_is_told(robot):
+    motion = robot.port.move_ptp((0.0,) * 7, [])
+    finished(robot, 2)
+    assert not motion.done()
+    finished(robot)
+    assert motion.done() and motion.result() is None
+    again = robot.port.move_ptp((0.0,) * 7, [])
+    assert not again.done(), "ends of motions before it are forgotten"
+    told = UnfinishedPtp(ptp_id=3, reason="cancelled", reason_code=ReasonCode.CANCELLED)
+    robot.topics["controller_manager/ptp/unfinished_ptp"].heard(told)
+    assert again.done() and again.done()
+    with pytest.raises(PortError) as error:
+        again.result()
+    assert (error.value.causes, error.value.code) == (("cancelled",), ReasonCode.CANCELLED)
+
+
+@pytest.mark.parametrize("how", ["fault", "not allowed", "refused"])
+def test_a_motion_may_end_without_a_word_of_its_own(robot, how):
+    motion = robot.port.move_ptp((0.0,) * 7, [])
+    assert not motion.done()
+    if how == "fault":
+        robot.say("controller_manager/status", **robot.status(state="fault", reason="why", reason_code=9))
+    elif how == "not allowed":
+        robot.say("lwr/state", motion_allowed=False, reason="why", supervisor="", reason_code=9, hold_latched=False)
+    else:
+        refused = SimpleNamespace(result=lambda: (_ for _ in ()).throw(PortError("no", ("why",), 9)))
+        assert robot.port._end_of_ptp(refused)[0].code == 9
+        return
+    assert motion.done()
+    with pytest.raises(PortError) as error:
+        motion.result()
+    assert (error.value.causes, error.value.code) == (("why",), 9)
+    assert ("fault" in error.value.sentence) == (how == "fault")

@@ -1,0 +1,239 @@
+"""Geometry and times that the machines reckon with: goals, costs of a grasp, durations, room above a board."""
+
+import math
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+from coglab_controllers import load_joint_limits
+from coglab_py.packages import package_path
+from coglab_py.pose import Pose, about_z
+from coglab_smach.kinematics import board_room, reachability
+from coglab_smach.kinematics.board_room import BoardRoom
+from coglab_smach.kinematics.goals import approach_of, delivery_goal, grasp_goal, palm_at_grasp, place_goal
+from coglab_smach.kinematics.grasp_choice import cost, ranked
+from coglab_smach.kinematics.manager_limits import read_limits
+from coglab_smach.kinematics.motion_time import MotionLimits, hand_path, ptp_time, reach_time
+from coglab_smach.kinematics.reachability import default_arm, home_posture, reachability_report, share_reached, solve
+
+GRASP = {
+    "hand": {"mode": "cylindrical", "level": "low"},
+    "pose": {"xyz": [0.0, -0.04, 0.07], "quaternion": [0.0, 0.0, 0.0, 1.0]},
+    "approach": {"axis": [0.0, 2.0, 0.0], "distance": 0.025},
+}
+ENTRY = {"dmp": {"receive": "a", "give": "b", "take": "c", "put": "d"}, "grasps": {"side": GRASP}}
+
+# --- goals ------------------------------------------------------------------------------------------------------------
+
+
+def test_a_palm_is_drawn_back_against_the_approach_axis():
+    assert palm_at_grasp(GRASP).position == pytest.approx([0.0, -0.065, 0.07]), "as stored"
+    assert palm_at_grasp(GRASP, 0.0).position == pytest.approx([0.0, -0.04, 0.07])
+    assert palm_at_grasp(GRASP, 0.1).position == pytest.approx([0.0, -0.14, 0.07])
+    bare = {"pose": {"xyz": [0.1, 0.0, 0.0], "quaternion": about_z(math.pi / 2).tolist()}}
+    assert palm_at_grasp(bare).position == pytest.approx([0.1, 0.0, 0.0]), "no distance: none"
+    assert palm_at_grasp(bare, 0.05).position == pytest.approx([0.1, -0.05, 0.0]), "no axis: the palm's x"
+    assert approach_of(GRASP, 0.03) == pytest.approx([0.0, 0.03, 0.0])
+    assert approach_of(bare, 0.03) == pytest.approx([0.0, 0.03, 0.0])
+
+
+def test_goals_name_primitive_and_pace():
+    goal = grasp_goal(ENTRY, GRASP, "object_x", "receive", 0.0)
+    assert (goal["frame"], goal["primitive"], goal["dmp_ratio"]) == ("object_x", "a", 1.0)
+    slow = {**ENTRY, "dmp": {**ENTRY["dmp"], "dmp_ratio": 3}}
+    assert grasp_goal(slow, GRASP, "object_x", "take")["dmp_ratio"] == 3.0
+    offered = {"pose": {"xyz": [1.0, 0.0, 0.0], "quaternion": about_z(math.pi / 2).tolist()}}
+    given = delivery_goal(ENTRY, GRASP, offered, "human_hand")
+    assert given["primitive"] == "b" and given["offset"] == pytest.approx([1.04, 0.0, 0.07])
+    placed = {"frame": "board", "xyz": [0.2, 0.0, 0.0], "quaternion": about_z(math.pi / 2).tolist()}
+    assert place_goal(ENTRY, GRASP, placed, "put")["offset"] == pytest.approx([0.24, 0.0, 0.07])
+    cleared = place_goal(ENTRY, GRASP, placed, "take", 0.01)
+    assert cleared["offset"] == pytest.approx([0.25, 0.0, 0.07]) and cleared["frame"] == "board"
+    assert cleared["orientation"] == pytest.approx(about_z(math.pi / 2))
+
+
+def test_a_grasp_costs_for_fingertips_the_persons_hand_and_a_palm_that_turns_away():
+    seen = Pose(np.array([1.0, 0.0, 0.0]))
+    palm = np.array([1.0, -0.04, 0.07])
+    tips = {**GRASP, "hand": {"mode": "tridigit", "level": "low"}}
+    assert cost(GRASP, seen, None, None) == 0.0 and cost(tips, seen, None, None) == 1.0
+    for distance, price in ((0.0, 1.0), (0.03, 0.75), (0.12, 0.0), (0.3, 0.0)):
+        assert cost(GRASP, seen, palm + [0.0, distance, 0.0], None) == pytest.approx(price)
+    # The palm's x axis against the way from where the palm is.
+    for start, price in (([0.5, 0, 0], 0.0), ([0, 0.5, 0], 0.5), ([-0.5, 0, 0], 1.0), ([0.5, 0.5, 0], 0.25)):
+        assert cost(GRASP, seen, None, palm - start) == pytest.approx(price, abs=1e-6)
+    assert cost(GRASP, seen, None, palm) == pytest.approx(0.5), "it is there"
+
+
+@pytest.mark.parametrize(("better", "stays"), [(0.19, True), (0.21, False)])
+def test_a_grasp_that_was_chosen_stays_until_another_is_better_by_a_fifth(better, stays):
+    far = {**GRASP, "pose": {**GRASP["pose"], "xyz": [0.0, -0.04 - 0.12 * better, 0.07]}}
+    entry, person = {"grasps": {"near": GRASP, "far": far}}, np.array([1.0, -0.04, 0.07])
+    seen = Pose(np.array([1.0, 0.0, 0.0]))
+    assert ranked(entry, seen, person, None) == ["far", "near"]
+    assert ranked(entry, seen, person, None, "near")[0] == ("near" if stays else "far")
+    assert ranked(entry, seen, person, None, "gone") == ["far", "near"]
+
+
+# --- times ------------------------------------------------------------------------------------------------------------
+
+
+def limits(velocity=2.0, acceleration=4.0, hand=math.inf):
+    return MotionLimits((velocity,) * 7, (acceleration,) * 7, (0.5,) * 7, (1.0,) * 7, hand)
+
+
+def test_a_point_to_point_motion_takes_its_slowest_joint_or_the_hands_way():
+    way = [0.0, 0.2, 0.0, -1.0, 0.0, 0.0, 0.0]
+    assert ptp_time(limits(), [0.0] * 7, way) == pytest.approx(1.0 / 0.5 + 0.5 / 1.0)
+    assert ptp_time(limits(), way, [0.0] * 7, [0.25] * 7) == pytest.approx(1.0 / 0.25 + 0.25)
+    assert ptp_time(limits(), [0.0] * 7, way, [0.5, 0.05, *[0.5] * 5]) == pytest.approx(0.2 / 0.05 + 0.05)
+    length = hand_path([0.0] * 7, way)
+    assert ptp_time(limits(hand=0.01), [0.0] * 7, way) == pytest.approx(length / 0.01)
+    assert hand_path([0.0] * 7, [0.0] * 7) == 0.0
+    places = [default_arm().fk(s * np.array(way))[0] for s in np.linspace(0.0, 1.0, 400)]
+    assert length == pytest.approx(sum(math.dist(a, b) for a, b in zip(places, places[1:], strict=False)), rel=1e-3)
+    bent = [0.0, 0.0, 0.0, 2.0, 0.0, 0.0, 0.0]
+    assert hand_path([0.0] * 7, bent, 3) < hand_path([0.0] * 7, bent)
+
+
+def test_a_reach_takes_the_way_the_turn_and_the_start():
+    assert reach_time(limits(), 0.4) == pytest.approx(0.4 / 0.8 + math.pi / 2.0 + 0.5)
+    assert reach_time(limits(hand=0.1), 0.4) == pytest.approx(4.0 + math.pi / 2.0 + 0.5)
+    uneven = MotionLimits((2.0, *[1.0] * 6), (4.0, 1.0, *[4.0] * 5), (1.0,) * 7, (1.0,) * 7)
+    assert reach_time(uneven, 0.4) == pytest.approx(1.0 + math.pi + 1.0)
+
+
+def test_limits_are_those_of_the_managers_parameters():
+    table = load_joint_limits(str(package_path("lwr_description", "config", "joint_limits.yaml")), "default")
+    plain = read_limits({})
+    assert plain.velocity == pytest.approx(table.velocity) and plain.acceleration == pytest.approx(table.acceleration)
+    assert plain.ptp_velocity == pytest.approx(0.3 * np.array(table.velocity))
+    assert plain.ptp_acceleration == pytest.approx(0.2 * np.array(table.acceleration))
+    assert plain.hand_speed == 1.0
+    asked = read_limits(
+        {
+            "joint_vel_limit": [0.5] * 7,
+            "ptp": {"default_speed": 0.6, "default_acceleration": 0.1},
+            "hand_speed_limit": 0.4,
+            "elbow_speed_limit": 0.3,
+        }
+    )
+    assert asked.velocity == (0.5,) * 7 and asked.ptp_velocity == pytest.approx([0.3] * 7)
+    assert asked.ptp_acceleration == pytest.approx(0.1 * np.array(table.acceleration)) and asked.hand_speed == 0.3
+    for hand, elbow, speed in ((0.0, 0.7, 0.7), (0.7, 0.0, 0.7), (0.0, 0.0, math.inf)):
+        assert read_limits({"hand_speed_limit": hand, "elbow_speed_limit": elbow}).hand_speed == speed
+
+
+# --- what the arm can reach -------------------------------------------------------------------------------------------
+
+
+def test_a_posture_is_within_3_mm_3_degrees_and_the_joints_ranges():
+    arm, home = default_arm(), home_posture()
+    here = Pose(*arm.fk(home))
+    assert solve(arm, here) == pytest.approx(home), "it begins at home"
+    for moved, turned, needed in ((0.0029, 0.0, False), (0.0031, 0.0, True), (0.0, 2.9, False), (0.0, 3.1, True)):
+        target = Pose(here.position + [0.0, moved, 0.0], here.orientation) * Pose(
+            np.zeros(3), about_z(math.radians(turned))
+        )
+        found = solve(arm, target)
+        assert (np.abs(found - home).max() > 0.0) == needed
+        distance, angle = Pose(*arm.fk(found)).distance(target)
+        assert distance < 0.003 and angle < math.radians(3.0)
+    start = home + [0.4, 0.0, -0.3, 0.2, 0.0, 0.0, 0.0]
+    there = Pose(*arm.fk(start))
+    assert solve(arm, there, start) == pytest.approx(start)
+    assert solve(arm, there, steps=1) is None and solve(arm, there) is not None
+    most = np.asarray(reachability.joint_limits().upper_position)
+    for target in (Pose([0.78, -0.3, 0.2], [0.5, 0.5, 0.5, 0.5]), Pose([0.3, 0.6, 0.6], here.orientation)):
+        found = solve(arm, target)
+        assert found is None or np.all(np.abs(found) <= 0.98 * most + 1e-9)
+    assert solve(arm, Pose([2.0, 0.0, 0.0], here.orientation)) is None
+
+
+def test_the_region_has_27_places_for_each_turn(monkeypatch):
+    asked = []
+    monkeypatch.setattr(reachability, "solve", lambda arm, target: asked.append(target) or (len(asked) % 3 or None))
+    palm = Pose(np.array([0.0, 0.1, 0.0]))
+    assert share_reached(palm, arm="any") == (54, 81)
+    angles = {round(math.degrees(each.rotation.as_rotvec()[2]), 3) for each in asked}
+    objects = np.array([(each * palm.inverse()).position for each in asked])
+    assert angles == {-20.0, 0.0, 20.0}
+    assert [objects[:, i].min() for i in range(3)] == pytest.approx([0.72, -0.12, 0.28])
+    assert [objects[:, i].max() for i in range(3)] == pytest.approx([0.82, 0.12, 0.45])
+    assert objects.mean(axis=0) == pytest.approx([(0.72 + 0.78 + 0.82) / 3, 0.0, (0.28 + 0.38 + 0.45) / 3])
+    asked.clear()
+    assert share_reached(palm, arm="any", yaws_deg=(0.0,)) == (18, 27)
+
+
+@pytest.mark.parametrize(("reached", "good"), [(18, False), (19, True), (27, True)])
+def test_a_grasp_is_good_that_reaches_seven_tenths_of_the_places(monkeypatch, reached, good):
+    turns = []
+    monkeypatch.setattr(reachability, "share_reached", lambda palm, yaws_deg: turns.append(yaws_deg) or (reached, 27))
+    ((line, ok),) = reachability_report(ENTRY)
+    assert ok == good and turns == [(0.0,)]
+    assert line.startswith(f"grasp 'side': {reached} of 27 places") and ("at least 70%" in line) == (not good)
+
+
+# --- the board --------------------------------------------------------------------------------------------------------
+
+
+def solid(text):
+    return board_room._solid(ElementTree.fromstring(f"<collision>{text}</collision>"))
+
+
+def test_the_lowest_point_of_plain_shapes():
+    up, level = np.array([0.0, 0.0, 1.0]), Pose(np.array([0.0, 0.0, 1.0]))
+    tilted = Pose(np.array([0.0, 0.0, 1.0]), np.array([math.sin(math.pi / 8), 0.0, 0.0, math.cos(math.pi / 8)]))
+    box = solid('<origin xyz="0 0 0.5"/><geometry><box size="0.2 0.4 0.6"/></geometry>')
+    assert box.below(level, up) == pytest.approx(1.5 - 0.3)
+    assert box.below(tilted, up) == pytest.approx(1.0 + (0.5 - 0.3 - 0.2) / math.sqrt(2.0))
+    bar = solid('<geometry><cylinder radius="0.1" length="1.0"/></geometry>')
+    assert bar.below(level, up) == pytest.approx(0.5) and bar.kind == "cylinder"
+    assert bar.below(tilted, up) == pytest.approx(1.0 - 0.6 / math.sqrt(2.0))
+    lying = solid('<origin rpy="1.5707963267948966 0 0"/><geometry><cylinder radius="0.1" length="1.0"/></geometry>')
+    assert lying.below(level, up) == pytest.approx(0.9)
+    ball = solid('<origin xyz="0.3 0 0.2"/><geometry><sphere radius="0.1"/></geometry>')
+    assert ball.below(level, up) == pytest.approx(1.1) == ball.below(level, up)
+    assert solid('<geometry><mesh filename="hand.stl"/></geometry>') is None
+
+
+def test_a_palm_is_raised_five_times_at_most_and_by_no_more_than_allowed(monkeypatch):
+    room = BoardRoom.__new__(BoardRoom)
+    board, palm = Pose(np.array([0.0, 0.0, 0.5])), Pose(np.array([0.3, 0.0, 0.5]))
+    asked = []
+
+    def over(share):
+        """Room of which each rise wins so much."""
+        return lambda board, now: asked.append(now.position[2]) or share * (now.position[2] - palm.position[2])
+
+    monkeypatch.setattr(room, "over", over(0.5), raising=False)
+    lift, raised = room.raised(board, palm, 0.01, 0.1)
+    # 10, 15, 17.5, 18.75 mm: half of what is missing each time, and after the fifth look it is not enough.
+    assert raised is None and lift == pytest.approx(0.019375) and len(asked) == 5
+    monkeypatch.setattr(room, "over", over(0.99), raising=False)
+    lift, raised = room.raised(board, palm, 0.01, 0.1)
+    assert lift == pytest.approx(0.01) and raised.position == pytest.approx([0.3, 0.0, 0.51]), "0.1 mm may be missing"
+    assert room.raised(board, palm, 0.01, 0.0101)[1] is not None and room.raised(board, palm, 0.01, 0.0099)[1] is None
+    monkeypatch.setattr(room, "over", lambda board, now: 0.0101, raising=False)
+    lift, raised = room.raised(board, palm, 0.01, 0.1)
+    assert lift == 0.0 and raised.position == pytest.approx(palm.position)
+
+
+def test_room_is_that_of_the_arm_from_the_elbow_on(monkeypatch):
+    """The shoulder stands beside the board and may be below its plane."""
+    urdf = package_path("lwr_description", "urdf", "lwr_ih2.urdf").read_text(encoding="utf-8")
+    room, palm = BoardRoom(urdf), Pose(*default_arm().fk(home_posture()))
+    board = Pose(np.array([0.0, 0.0, -1.0]))
+    height = room.over(board, palm)
+    assert 1.0 < height < 1.0 + palm.position[2]
+    assert room.over(Pose(np.array([9.0, 9.0, -0.5])), palm) == pytest.approx(height - 0.5), "a plane without end"
+    # With the hand up and the forearm down it is the forearm that counts.
+    names, up = default_arm().joint_names, np.array([0.0, 0.0, 1.0])
+    bent = np.array([0.0, 1.6, 0.0, 2.0, 0.0, 0.0, 0.0])
+    angles = dict(zip(names, bent, strict=True))
+    lowest = [room._lowest("lwr_base_link", Pose(), angles, set(names[k:]), False, up) for k in (2, 3, 4)]
+    monkeypatch.setattr(board_room, "solve", lambda *_: bent)
+    assert room.over(Pose(), palm) == pytest.approx(lowest[1]) and lowest[0] < lowest[1] < lowest[2]
+    monkeypatch.undo()
+    upside = Pose(board.position, np.array([1.0, 0.0, 0.0, 0.0]))
+    assert room.over(upside, palm) < -1.0, "its z axis is up"

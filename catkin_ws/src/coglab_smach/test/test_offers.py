@@ -1,0 +1,348 @@
+"""When something counts as offered, what is believed, and the goals that are made of it."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from coglab_msgs.msg import ReasonCode, Say
+from coglab_py.pose import Pose
+from coglab_smach.clocks.virtual_clock import using
+from coglab_smach.ports.interfaces import Ahead, Located
+from coglab_smach.ports.pending import Polled, PortError, Ready
+from coglab_smach.states import hub, knowledge
+from coglab_smach.states.base import CoglabState
+from coglab_smach.states.knowledge import (
+    await_offer,
+    believed,
+    first_reachable,
+    handover_region,
+    locate,
+    off_the_board,
+    paced,
+    palm_of,
+    refused_as,
+    unless_withdrawn,
+)
+from conftest import Trial
+
+GOAL = {"frame": "", "offset": [0.0, 0.0, 0.0], "orientation": [0.0, 0.0, 0.0, 1.0], "primitive": "p", "dmp_ratio": 2.0}
+INSIDE, LOW, HIGH = (0.6, 0.0, 0.4), [0.45, -0.50, 0.05], [0.86, 0.50, 0.85]
+IDENTITY = (0.0, 0.0, 0.0, 1.0)
+
+
+class Offers:
+    """A state that waits for an offer of the mug, which is seen at ``at(s)`` (m) and so old (s)."""
+
+    def __init__(self, at=lambda t: INSIDE, age=0.0, **settings):
+        self.trial, self.age, self.at = Trial(**settings), age, at
+        self.ctx = self.trial.ctx
+        self.ahead = Ahead()
+        self.ctx.perception.ahead = lambda: self.ahead
+        self.ctx.perception.locate_object = self.locate
+        self.state = CoglabState(self.ctx)
+        self.state._deadline = 1e9
+
+    def locate(self, name, limit):
+        self.asked = (name, limit)
+        found = Located(f"object_{name}", "world", tuple(self.at(self.trial.clock.now())), IDENTITY, self.age)
+        return Ready(found)
+
+    def wait(self, target="mug", margin=0.0, goals=lambda seen: [GOAL]):
+        """The goal, and the s until it came."""
+        with using(self.trial.clock):
+            goal = await_offer(self.state, target, goals, margin)
+        return goal, self.trial.clock.now()
+
+
+@pytest.mark.parametrize("axis", range(3))
+@pytest.mark.parametrize("margin", [0.0, 0.1])
+def test_the_region_counts_to_its_walls_and_a_still_object_a_tenth_of_a_metre_beyond(axis, margin):
+    for wall, out in ((LOW, -1.0), (HIGH, 1.0)):
+        for beyond, moving, still in ((-0.001, True, True), (0.001, False, True), (0.099, False, True)):
+            place = np.array(INSIDE)
+            place[axis] = wall[axis] + out * (margin + beyond)
+            goal, when = Offers(lambda t, place=place: place).wait(margin=margin)
+            assert goal["frame"] == "object_mug" and (when == 0.0) == moving
+            assert still and (moving or 0.3 < when < 0.4), "it has been still for 0.3 s"
+        place[axis] = wall[axis] + out * (margin + 0.101)
+        with pytest.raises(PortError) as error:
+            Offers(lambda t, place=place: place).wait(margin=margin)
+        assert error.value.code == ReasonCode.OBJECT_NOT_SEEN
+        where = ", ".join(f"{v:.2f}" for v in place)
+        assert error.value.sentence.startswith(f"'mug' was not offered within 8 s: it stayed at ({where}) m")
+
+
+@pytest.mark.parametrize(("speed", "still"), [(0.05, True), (0.09, False)])
+def test_still_is_what_goes_less_than_25_mm_in_the_last_third_of_a_second(speed, still):
+    offers = Offers(lambda t: (0.9, -0.3 + speed * (t % 4.0), 0.4))
+    if still:
+        assert offers.wait()[1] < 0.4
+    else:
+        with pytest.raises(PortError):
+            offers.wait()
+        assert 8.0 < offers.trial.clock.now() < 8.1
+
+
+def test_an_offer_lasts_for_start_after_from_when_it_is_one():
+    offers = Offers(lambda t: INSIDE if 1.0 < t < 1.3 or t > 2.0 else (1.3, 0.0, 0.4), **{"handover.start_after": 0.5})
+    assert 2.5 <= offers.wait()[1] < 2.57
+    assert Offers().wait()[1] == 0.0
+
+
+def test_an_offer_without_a_posture_is_told_when_the_time_is_over():
+    offers = Offers()
+    offers.ctx.reachable = lambda palm: False
+    with pytest.raises(PortError) as error:
+        offers.wait()
+    assert error.value.code == ReasonCode.GOAL_UNREACHABLE and 8.0 < offers.trial.clock.now() < 8.1
+    assert "the hand at (0.60, 0.00, 0.40) m" in error.value.sentence
+
+
+def ahead(offer=0.0, request=0.0, object_id="mug", place=INSIDE, frame="object_mug_ahead"):
+    return Ahead(offer, request, object_id, frame, place, 0.02)
+
+
+LOCATED = {"frame": "object_mug", "xyz": [1.3, 0.0, 0.4], "quaternion": list(IDENTITY)}
+LOWEST, HIGHEST = np.array(LOW), np.array(HIGH)
+
+
+@pytest.mark.parametrize(
+    ("seen", "person", "is_believed"),
+    [
+        (ahead(offer=0.85), False, True),
+        (ahead(offer=0.84), False, False),
+        (ahead(request=0.99), False, False),
+        (ahead(offer=0.99, object_id="ball"), False, False),
+        (ahead(request=0.9), True, True),
+        (ahead(request=0.89), True, False),
+        (ahead(offer=0.99), True, False),
+        (ahead(request=0.95, object_id=""), True, True),
+        (ahead(offer=0.99, frame=""), False, False),
+        (ahead(offer=0.99, place=tuple(LOW)), False, True),
+        (ahead(offer=0.99, place=tuple(HIGH)), False, True),
+        (ahead(offer=0.99, place=(0.87, 0.0, 0.4)), False, False),
+        (ahead(offer=0.99, place=(0.6, -0.51, 0.4)), False, False),
+    ],
+)
+def test_where_something_will_be_is_believed_from_the_timings_probability_on(seen, person, is_believed):
+    offers = Offers()
+    offers.ahead = seen
+    found = believed(offers.ctx, "mug", LOCATED, person, LOWEST, HIGHEST)
+    assert (found is not None) == is_believed
+    if found is not None:
+        assert found == {**LOCATED, "frame": seen.frame, "xyz": list(seen.place)}
+    offers.ctx.config.set("handover.belief", 0.0)
+    offers.ctx.config.set("handover.belief_request", 0.0)
+    assert believed(offers.ctx, "mug", LOCATED, person, LOWEST, HIGHEST) is None, "the timing starts on no belief"
+
+
+def test_a_reach_begins_on_a_belief_before_the_object_is_there():
+    offers = Offers(lambda t: (1.3, 0.0, 0.4))
+    offers.ahead = ahead(offer=0.95)
+    goal, when = offers.wait()
+    assert goal["frame"] == "object_mug_ahead" and when == 0.0
+
+
+@pytest.mark.parametrize(("age", "good"), [(0.5, True), (0.51, False)])
+def test_a_sight_for_a_goal_is_half_a_second_old_at_most(age, good):
+    offers = Offers(age=age)
+    with using(offers.trial.clock):
+        if good:
+            found = locate(offers.state, "mug")
+            wanted = ("object_mug", "world", list(INSIDE), list(IDENTITY), age)
+            assert tuple(found[name] for name in ("frame", "parent", "xyz", "quaternion", "age")) == wanted
+        else:
+            with pytest.raises(PortError) as error:
+                locate(offers.state, "mug")
+            assert error.value.code == ReasonCode.OBJECT_NOT_SEEN
+            assert error.value.sentence == "'mug' was last seen 0.51 s ago, expected at most 0.5 s"
+    assert offers.asked == ("mug", 5.0)
+
+
+def test_a_silent_perception_is_waited_for_a_second_longer_than_it_was_asked_to_look():
+    offers = Offers()
+    offers.ctx.perception.locate_object = lambda *_: Polled(lambda: False, lambda: None)
+    with using(offers.trial.clock), pytest.raises(PortError):
+        locate(offers.state, "mug")
+    assert offers.trial.clock.now() == pytest.approx(6.0, abs=0.03)
+
+
+def test_a_refusal_without_a_code_gets_one():
+    for own, told in ((0, ReasonCode.OBJECT_UNKNOWN), (ReasonCode.HELD, ReasonCode.HELD)):
+        with pytest.raises(PortError) as error, refused_as(ReasonCode.OBJECT_UNKNOWN):
+            raise PortError("no", code=own)
+        assert error.value.code == told
+
+
+# --- limits of a reach ------------------------------------------------------------------------------------------------
+
+
+def test_a_goal_that_is_seen_may_leave_the_region_by_5_cm_go_back_by_10_and_fall_by_8():
+    ctx = Offers().ctx
+    limits = unless_withdrawn(ctx, {**GOAL, "frame": "object_mug"})["limits"]
+    assert limits["goal_region_low"] == pytest.approx([0.40, -0.55, 0.0])
+    assert limits["goal_region_high"] == pytest.approx([0.91, 0.55, 0.90])
+    assert (limits["goal_retreat"], limits["goal_drop"]) == (0.10, 0.08)
+    hand = unless_withdrawn(ctx, {**GOAL, "frame": "human_hand"}, 0.1, may_fall=False)
+    assert (
+        hand["limits"]["goal_region_low"] == pytest.approx([0.30, -0.65, -0.1]) and hand["limits"]["goal_drop"] == 0.0
+    )
+    assert "early" not in hand and hand["primitive"] == "p"
+
+
+def test_a_goal_that_is_predicted_is_watched_by_the_state_and_may_be_as_unsure_as_a_still_object():
+    early = unless_withdrawn(Offers().ctx, {**GOAL, "frame": "object_mug_ahead"}, 0.1)
+    limits, own = early["limits"], early["early"]
+    assert limits["goal_region_low"] == pytest.approx([0.20, -0.75, -0.2])
+    assert limits["goal_region_high"] == pytest.approx([1.11, 0.75, 1.10])
+    assert (limits["goal_retreat"], limits["goal_drop"]) == (0.0, 0.0)
+    assert own["low"] == pytest.approx([0.30, -0.65, -0.1]) and own["high"] == pytest.approx([1.01, 0.65, 1.0])
+    assert (own["retreat"], own["drop"], own["unsure"]) == (0.10, 0.08, 0.10)
+    low, high = handover_region(Offers().ctx, 0.2)
+    assert low == pytest.approx([0.25, -0.7, -0.15]) and high == pytest.approx([1.06, 0.7, 1.05])
+
+
+def test_a_reach_has_the_pace_of_the_timing_and_arrives_slowly():
+    ctx = Offers(timing="calm").ctx
+    assert paced(ctx, GOAL)["dmp_ratio"] == pytest.approx(2.0 * 1.7) and paced(ctx, GOAL)["arrival_speed"] == 0.05
+    assert paced(Offers(timing="brisk").ctx, GOAL)["dmp_ratio"] == pytest.approx(1.4)
+
+
+def test_the_first_goal_with_a_posture_is_taken_where_it_is_checked():
+    offers, asked = Offers(), []
+    goals = [{**GOAL, "offset": [x, 0.0, 0.0]} for x in (0.1, 0.2, 0.3)]
+    offers.ctx.reachable = lambda palm: asked.append(palm.position[0]) or palm.position[0] > 1.45
+    seen = {**LOCATED, "frame": "f"}
+    assert first_reachable(offers.ctx, seen, goals)["offset"][0] == 0.2 and asked == pytest.approx([1.4, 1.5])
+    assert first_reachable(offers.ctx, seen, goals[:1]) is None
+    assert palm_of(seen, goals[2]).position == pytest.approx([1.6, 0.0, 0.4])
+    offers.ctx.config.set("handover.check_reach", False)
+    assert first_reachable(offers.ctx, seen, goals)["offset"][0] == 0.1
+
+
+@pytest.mark.parametrize(("answer", "raised"), [(0.0, 0.0), (0.02, 0.02), (None, None)])
+def test_a_goal_at_the_board_is_raised_in_the_boards_own_frame(answer, raised):
+    board = (0.5, 0.0, 0.1)
+    offers, asked = Offers(lambda t: board), []
+
+    def ask(at, palm, room, most):
+        asked.append((palm.position, room, most))
+        return (0.05, None) if answer is None else (answer, Pose(palm.position + [0, 0, answer], palm.orientation))
+
+    offers.ctx.raised = ask
+    goal = {**GOAL, "offset": [0.0, 0.0, 0.2]}
+    with using(offers.trial.clock):
+        if answer is None:
+            with pytest.raises(PortError) as error:
+                off_the_board(offers.state, goal)
+            assert "would have to rise by at least 50 mm to keep 10 mm off it, expected at most 30 mm" in str(
+                error.value
+            )
+        else:
+            assert off_the_board(offers.state, goal)["offset"] == pytest.approx([0.0, 0.0, 0.2 + raised])
+            assert offers.state.reason == ("" if raised == 0.0 else "raised by 20.0 mm, off the board")
+    assert asked[0][0] == pytest.approx([0.5, 0.0, 0.3]) and asked[0][1:] == (0.01, 0.03)
+    assert offers.asked[0] == "board"
+
+
+def test_sights_of_an_object_on_the_board_are_averaged():
+    offers = Offers(lambda t: (0.5 + 0.01 * round(t / 0.08), 0.0, 0.1))
+    looks, locate_object = [], offers.ctx.perception.locate_object
+    offers.ctx.perception.locate_object = lambda name, limit: looks.append(name) or locate_object(name, limit)
+    state, ud = knowledge.LocateOnBoard(offers.ctx), SimpleNamespace(object_id="mug")
+    state._deadline = 1e9
+    with using(offers.trial.clock):
+        assert state.run(ud) == "succeeded"
+    assert looks == ["board", *["mug"] * 10] and offers.trial.clock.now() == pytest.approx(9 * 0.08)
+    assert ud.located["xyz"] == pytest.approx([0.045, 0.0, 0.0]) and ud.located["frame"] == "object_board"
+
+
+def test_goals_of_the_board_keep_12_mm_clear_and_come_along_the_approach_axis():
+    trial, found = Trial(), {}
+
+    def script(t):
+        t.wait_hub("wait_without_object")
+        execute = t.ctx.arm.execute_dmp
+        t.ctx.arm.execute_dmp = lambda request: found.setdefault(request.primitive_id, request) and execute(request)
+        for action, hub_after in (("take", "wait_with_object"), ("put", "wait_without_object")):
+            t.start(action)
+            t.wait_hub(hub_after)
+
+    trial.run(script)
+    assert found["take_board"].goal_approach == pytest.approx([0.0, 0.05, 0.0])
+    assert list(found["put_board"].goal_approach) == [0.0] * 3 and found["put_board"].arrival_speed == 0.0
+    assert found["take_board"].orientation_control and found["take_board"].dmp_ratio == 1.0
+
+
+def test_what_is_said_to_the_person_before_a_handover():
+    trial, said = Trial(), []
+    trial.ctx.say = lambda code, text: said.append((code, text))
+
+    def script(t):
+        for action, hub_after in (
+            ("exchange_human_to_robot", "wait_with_object"),
+            ("exchange_robot_to_human", "wait_without_object"),
+        ):
+            t.until(t.ctx.requests.hub)
+            t.start(action)
+            t.wait_hub(hub_after)
+
+    trial.run(script)
+    assert [code for code, _ in said] == [Say.READY_TO_RECEIVE, Say.I_HAVE_IT, Say.READY_TO_GIVE, Say.YOU_HAVE_IT]
+    request = trial.master.get_children()["exchange_human_to_robot"].userdata.goal
+    assert request["approach"] == pytest.approx([0.0, 0.05, 0.0]) and request["arrival_speed"] == 0.05
+    assert request["offset"] == pytest.approx([0.0, -0.04, 0.07]), "no standoff"
+    assert request["object"]["frame"] == "object_mug"
+
+
+# --- hubs -------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("rest", "offer", "starts"), [(0.09, 0.9, True), (0.09, 0.89, False), (0.1, 0.95, False), (0.0, 1.0, True)]
+)
+def test_a_hub_is_left_on_a_belief_of_nine_tenths_that_was_below_a_tenth_before(rest, offer, starts):
+    trial = Trial(**{"recognition_trigger.enabled": True})
+    state = hub.Hub(trial.ctx, ["exchange_human_to_robot", "take"], False)
+    state._open(SimpleNamespace(object_id=""))
+    for probability in (rest, offer):
+        trial.ctx.perception.ahead = lambda p=probability: Ahead(p, 0.0, "ball")
+        state._watch_partner()
+    request = trial.ctx.requests.take()
+    assert (request is not None) == starts
+    if starts:
+        assert (request.action, request.object_id) == ("exchange_human_to_robot", "ball")
+        assert request.source == f"belief in an offer of 'ball' ({offer:.2f})"
+    trial.ctx.perception.ahead = lambda: Ahead(0.0, 0.95, "")
+    state._watch_partner()
+    assert trial.ctx.requests.take() is None, "this hub does not give"
+
+
+@pytest.mark.parametrize(("there", "waited", "end"), [(True, 0.5, None), (True, 0.51, "stopped")])
+def test_an_arm_is_blocked_after_half_a_second(there, waited, end):
+    trial = Trial()
+    state = hub.Hub(trial.ctx, ["take"], False)
+    trial.cell.arm.held = True
+    with using(trial.clock) as clock:
+        assert not state._blocked()
+        clock.sleep(waited)
+        assert state._blocked() == (end is not None)
+        assert end is None or state._code == ReasonCode.HELD
+        trial.cell.arm.held, trial.cell.arm.enabled = False, True
+        assert not state._blocked() and state._blocked_since is None
+
+
+@pytest.mark.parametrize(("waited", "silent"), [(2.0, False), (2.05, True)])
+def test_a_robot_that_says_nothing_for_two_seconds_is_silent(waited, silent):
+    trial = Trial()
+    state = hub.Hub(trial.ctx, ["take"], False)
+    trial.cell.faults.dead.add("arm")
+    with using(trial.clock) as clock:
+        assert not state._blocked()
+        clock.sleep(waited)
+        if not silent:
+            assert not state._blocked()
+            return
+        with pytest.raises(PortError) as error:
+            state._blocked()
+        assert error.value.code == ReasonCode.NODE_SILENT

@@ -1,0 +1,325 @@
+"""Perception, object database and contact detector as the brain sees them over ROS: how long what they say counts, what
+is asked of them, and how long they are waited for."""
+
+from __future__ import annotations
+
+import math
+import time
+from types import SimpleNamespace
+
+import pytest
+import rospy
+from coglab_msgs.msg import Contact, ContactSignal, HandoverBelief, ReasonCode
+from coglab_msgs.msg import Recognition as RecognitionMessage
+from coglab_smach.ports.interfaces import Ahead, ContactEvent, Located, Recognition
+from coglab_smach.ports.pending import Permit, Polled, PortError, Ready, Threaded, ending_motion
+from coglab_smach.ros import calls, ports, publish
+from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion, Vector3, Vector3Stamped
+from test_arm_port import Topic, ended
+
+
+class Nodes:
+    """The ports, and what is asked of their nodes: (name, wait, fields)."""
+
+    def __init__(self, monkeypatch):
+        self.now, self.asked, self.answer = 50.0, [], None
+        monkeypatch.setattr(ports, "Newest", Topic)
+        monkeypatch.setattr(ports, "call", self.call)
+        monkeypatch.setattr(ports, "call_now", self.call_now)
+        monkeypatch.setattr(ports, "time", SimpleNamespace(monotonic=lambda: self.now))
+        self.perception, self.contact, self.database = ports.RosPerception(), ports.RosContact(), ports.RosDatabase()
+
+    def call(self, name, kind, wait=20.0, **fields):
+        self.asked.append((name, wait, fields))
+        return Ready(self.answer)
+
+    def call_now(self, name, kind, permit, wait=20.0, **fields):
+        self.asked.append((name, wait, fields))
+        return self.answer
+
+    def say(self, topic, message, seconds=0.0, stamp=50.0):
+        there = Topic.every[topic]
+        there.message, there.seconds, there.stamp = message, seconds, stamp
+        if there.heard is not None:
+            there.heard(message)
+
+
+@pytest.fixture
+def nodes(monkeypatch):
+    return Nodes(monkeypatch)
+
+
+# --- perception -------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("limit", "wait"), [(30.0, 20.0), (10.0, 9.0), (1.2, 0.5)])
+def test_a_perception_that_is_not_there_is_said_a_second_before_the_limit(nodes, limit, wait):
+    nodes.answer = SimpleNamespace(message="ready")
+    assert nodes.perception.init_vision(limit).result() == "ready"
+    assert nodes.asked == [("perception/init_vision", wait, {"timeout": limit})]
+
+
+def test_sights_and_free_places(nodes):
+    seen = PoseStamped(pose=Pose(Point(1, 2, 3), Quaternion(0, 0, 0, 1)))
+    seen.header.frame_id = "world"
+    nodes.answer = SimpleNamespace(frame_id="object_mug", pose=seen, age=0.2, places=[seen, seen])
+    found = Located("object_mug", "world", (1, 2, 3), (0, 0, 0, 1), 0.2)
+    assert nodes.perception.locate_object("mug", 0.3).result() == found
+    places = nodes.perception.free_places("mug", 5.0).result()
+    assert places == [Located("", "world", (1, 2, 3), (0, 0, 0, 1), 0.0)] * 2
+    assert nodes.asked == [
+        ("perception/locate_object", 2.0, {"object_id": "mug", "timeout": 0.3}),
+        ("perception/free_places", 2.0, {"object_id": "mug", "timeout": 5.0}),
+    ]
+
+
+@pytest.mark.parametrize(("seconds", "known"), [(0.5, True), (0.51, False)])
+def test_what_is_recognised_counts_for_half_a_second(nodes, seconds, known):
+    assert nodes.perception.recognition() == Recognition()
+    message = RecognitionMessage(
+        pattern="high", confidence=0.9, decided=True, names=["a", "b"], probabilities=[0.1, 0.9]
+    )
+    nodes.say("perception/recognition", message, seconds)
+    assert nodes.perception.recognition() == (
+        Recognition("high", 0.9, True, {"a": 0.1, "b": 0.9}) if known else Recognition()
+    )
+
+
+@pytest.mark.parametrize(("seconds", "known"), [(0.3, True), (0.31, False)])
+def test_what_is_believed_counts_for_three_tenths_of_a_second(nodes, seconds, known):
+    assert nodes.perception.ahead() == Ahead()
+    message = HandoverBelief(offer=0.9, request=0.1, object_id="mug", object_frame="object_mug", hand="human_hand")
+    message.place, message.place_covariance = Point(1.0, 2.0, 3.0), [0.01, 9, 9, 9, 0.04, 9, 9, 9, 0.02]
+    nodes.say("perception/belief", message, seconds)
+    place = Ahead(0.9, 0.1, "mug", "object_mug_ahead", (1.0, 2.0, 3.0), 0.2)
+    assert nodes.perception.ahead() == (place if known else Ahead())
+    if known:
+        message.object_frame = ""
+        assert nodes.perception.ahead().frame == "human_hand_ahead"
+        message.place_covariance[0] = -1.0
+        assert nodes.perception.ahead() == Ahead(0.9, 0.1, "mug"), "no place is predicted"
+        message.place_covariance = [0.0] * 9
+        assert nodes.perception.ahead().deviation == 0.0 and nodes.perception.ahead().frame
+
+
+# --- database ---------------------------------------------------------------------------------------------------------
+
+
+def test_entries_are_read_and_waited_for_five_seconds(nodes):
+    nodes.answer = SimpleNamespace(yaml="mass: 0.3", object_ids=("a", "b"))
+    assert nodes.database.get_object("mug").result() == {"mass": 0.3}
+    assert nodes.database.list_objects().result() == ["a", "b"]
+    assert [(name, wait) for name, wait, _ in nodes.asked] == [
+        ("object_database/get_object", 5.0),
+        ("object_database/list_objects", 1.0),
+    ]
+    nodes.answer = SimpleNamespace(yaml="mass: [")
+    with pytest.raises(PortError) as error:
+        nodes.database.get_object("mug").result()
+    assert error.value.code == ReasonCode.BAD_FILE and "entry of 'mug'" in error.value.sentence
+
+
+# --- contact ----------------------------------------------------------------------------------------------------------
+
+
+def test_a_request_to_the_detector_has_what_the_settings_say(nodes):
+    assert ended(nodes.contact.arm("contact", 6.0, {})).result() is None
+    name, wait, fields = nodes.asked[0]
+    assert (name, wait) == ("contact_detector/arm", 2.0) and fields["joints"] == [] and fields["frame"] == ""
+    assert (fields["mode"], fields["timeout"], fields["k"], fields["mass"], fields["load_share"]) == (
+        "contact",
+        6,
+        0,
+        0,
+        0,
+    )
+    assert fields["grasp"].orientation.w == 1.0 and fields["grasp"].position.x == 0.0
+    settings = {"k": 9, "joints": (1, 2), "mass": 0.3, "load_share": 0.4, "frame": "object_mug"}
+    settings["grasp"] = {"xyz": (1.0, 2.0, 3.0), "quaternion": (1.0, 0.0, 0.0, 0.0)}
+    ended(nodes.contact.arm("contact_in_motion", 6.0, settings))
+    fields = nodes.asked[1][2]
+    assert (fields["k"], fields["joints"], fields["mass"], fields["load_share"]) == (9.0, [1, 2], 0.3, 0.4)
+    assert (fields["frame"], fields["grasp"].position.y, fields["grasp"].orientation.x) == ("object_mug", 2.0, 1.0)
+
+
+def sent(nodes, count):
+    end = time.monotonic() + 5.0
+    while len(nodes.asked) < count:
+        assert time.monotonic() < end
+        time.sleep(0.002)
+
+
+def test_it_is_disarmed_once(nodes):
+    nodes.contact.disarm()
+    ended(nodes.contact.arm("contact", 6.0, {}))
+    nodes.contact.disarm()
+    nodes.contact.disarm()
+    sent(nodes, 2)
+    time.sleep(0.02)
+    assert [(wait, fields["mode"]) for _, wait, fields in nodes.asked] == [(2.0, "contact"), (0.5, "off")]
+
+
+@pytest.mark.parametrize(("mode", "contact"), [("contact", True), ("lift", True), ("release", False)])
+def test_the_first_event_of_what_was_armed_for_is_kept(nodes, mode, contact):
+    topic = "coglab/contact"
+    nodes.say(topic, Contact(contact=True))
+    nodes.say(topic, Contact(contact=False))
+    assert nodes.contact.event() is None, "nobody watches"
+    nodes.contact.arm(mode, 6.0, {})
+    nodes.say(topic, Contact(contact=not contact))
+    assert nodes.contact.event() is None
+    nodes.say(topic, Contact(contact=contact, source="s", margin=2.0, message="m", confidence=0.75, reason_code=4))
+    event = ContactEvent(contact, "s", 2.0, "m", 0.75, 4)
+    assert nodes.contact.event() == event
+    nodes.say(topic, Contact(contact=contact, source="later"))
+    assert nodes.contact.event() == event
+    nodes.contact.arm(mode, 6.0, {})
+    assert nodes.contact.event() is None
+
+
+def signal(nodes, seconds=0.0, stamp=50.0, **fields):
+    watching = {"mode": "release", "state": "watching", "margin": 1.5, "grip": 7.0}
+    nodes.say("contact_detector/signal", ContactSignal(**{**watching, **fields}), seconds, stamp)
+
+
+def test_the_share_that_is_gone_is_that_of_this_arming(nodes):
+    assert nodes.contact.share_gone() is None
+    nodes.contact.arm("release", 6.0, {"load_share": 0.6})
+    assert nodes.contact.share_gone() is None
+    signal(nodes)
+    assert nodes.contact.share_gone() == pytest.approx(0.9)
+    signal(nodes, seconds=0.3)
+    assert nodes.contact.share_gone() == pytest.approx(0.9)
+    for fields in ({"seconds": 0.31}, {"stamp": 49.9}, {"mode": "contact"}, {"state": "waiting"}):
+        signal(nodes, **fields)
+        assert nodes.contact.share_gone() is None, fields
+    signal(nodes)
+    nodes.contact.arm("release", 6.0, {})
+    assert nodes.contact.share_gone() == pytest.approx(0.75), "half of the load where nothing is said"
+    nodes.contact.disarm()
+    assert nodes.contact.share_gone() is None
+    nodes.contact.arm("contact", 6.0, {"load_share": 0.6})
+    assert nodes.contact.share_gone() is None
+
+
+def test_forces_count_for_a_tenth_of_a_second_and_the_grip_for_three(nodes):
+    assert nodes.contact.force() is None and nodes.contact.grip() is None
+    for seconds, known in ((0.1, True), (0.11, False)):
+        nodes.say("contact_detector/force", Vector3Stamped(vector=Vector3(1.0, 2.0, 3.0)), seconds)
+        assert nodes.contact.force() == ((1.0, 2.0, 3.0) if known else None)
+    for seconds, known in ((0.3, True), (0.31, False)):
+        signal(nodes, seconds=seconds)
+        assert nodes.contact.grip() == (7.0 if known else None)
+    signal(nodes, grip=math.nan)
+    assert nodes.contact.grip() is None, "this hand does not feel"
+
+
+# --- calls ------------------------------------------------------------------------------------------------------------
+
+
+def test_a_message_is_as_old_as_it_is_since_it_came(monkeypatch):
+    now, heard = [3.0], []
+    monkeypatch.setattr(calls, "time", SimpleNamespace(monotonic=lambda: now[0]))
+    monkeypatch.setattr(calls.rospy, "Subscriber", lambda topic, kind, take, queue_size: take)
+    newest = calls.Newest("t", None, heard.append)
+    assert newest.age() > 1e8 and newest.message is None
+    newest._take("m")
+    now[0] = 5.5
+    assert newest.age() == 2.5 and newest.message == "m" and heard == ["m"]
+
+
+def test_a_node_that_shuts_down_calls_nobody(monkeypatch):
+    def never(name, timeout):
+        raise rospy.ROSException("timeout")
+
+    monkeypatch.setattr(calls.rospy, "wait_for_service", never)
+    monkeypatch.setattr(calls.rospy, "is_shutdown", lambda: True)
+    with pytest.raises(PortError) as error:
+        calls._await_service("/s", 20.0, Permit())
+    assert error.value.code == ReasonCode.PREEMPTED
+
+
+def test_a_service_is_waited_for_in_short_pieces(monkeypatch):
+    now, pieces = [0.0], []
+
+    def never(name, timeout):
+        pieces.append(timeout)
+        now[0] += timeout
+        raise rospy.ROSException("timeout")
+
+    monkeypatch.setattr(calls, "time", SimpleNamespace(monotonic=lambda: now[0]))
+    monkeypatch.setattr(calls.rospy, "wait_for_service", never)
+    monkeypatch.setattr(calls.rospy, "is_shutdown", lambda: False)
+    with pytest.raises(PortError, match="is not there after 1 s"):
+        calls._await_service("/s", 1.2, Permit())
+    assert pieces == pytest.approx([0.5, 0.5, 0.2])
+
+
+def test_stamps_that_a_message_can_carry():
+    good = [rospy.Time(0), rospy.Time(2**32 - 1)]
+    assert all(publish.can_be_sent(stamp) for stamp in good)
+    late = rospy.Time()
+    late.secs = 2**32
+    assert not publish.can_be_sent(late)
+    late.secs = -1
+    assert not publish.can_be_sent(late)
+
+
+@pytest.mark.parametrize("over", [True, False])
+def test_a_topic_that_is_closed_while_the_node_ends_is_no_error(monkeypatch, over):
+    def closed(message):
+        raise rospy.ROSException("publish() to a closed topic")
+
+    monkeypatch.setattr(publish.rospy, "is_shutdown", lambda: over)
+    if over:
+        publish.publish(SimpleNamespace(publish=closed), "m")
+    else:
+        with pytest.raises(rospy.ROSException):
+            publish.publish(SimpleNamespace(publish=closed), "m")
+
+
+# --- what takes time --------------------------------------------------------------------------------------------------
+
+
+def test_answers_that_come_later():
+    error = PortError("no", ("because",), 4)
+    assert (error.sentence, error.causes, error.code) == ("no", ("because",), 4) and PortError("no").code == 0
+    assert Ready(3).done() and Ready(3).result() == 3 and Ready().result() is None
+    with pytest.raises(PortError, match="no"):
+        Ready(error=error).result()
+    cancelled = []
+    motion = ending_motion(Polled(lambda: False, lambda: 1, lambda: cancelled.append("call")), cancelled.append)
+    assert not motion.done() and motion.result() == 1
+    motion.cancel()
+    assert cancelled == ["call", "its owner has given up waiting"]
+    Polled(lambda: True, lambda: 1).cancel()
+
+
+def test_a_call_in_a_thread_of_its_own():
+    good = ended(Threaded(lambda permit: permit.check() or 5, "it"))
+    assert good.result() == 5 and not good.failed()
+    bad = ended(Threaded(lambda permit: 1 / 0, "it"))
+    with pytest.raises(PortError, match="it failed: division by zero") as error:
+        bad.result()
+    assert error.value.code == ReasonCode.UNEXPECTED and bad.failed()
+    refused = ended(Threaded(lambda permit: (_ for _ in ()).throw(PortError("no", code=7)), "it"))
+    with pytest.raises(PortError) as error:
+        refused.result()
+    assert error.value.code == 7
+    permit = Permit()
+    permit.check()
+    permit.withdraw()
+    with pytest.raises(PortError) as error:
+        permit.check()
+    assert error.value.code == ReasonCode.CANCELLED
+
+
+def test_a_call_that_has_not_answered_says_so():
+    go = []
+    slow = Threaded(lambda permit: [time.sleep(0.005) for _ in iter(lambda: bool(go), True)], "it")
+    assert not slow.done() and not slow.failed()
+    with pytest.raises(PortError, match="it has not answered yet") as error:
+        slow.result()
+    assert error.value.code == ReasonCode.TIME_LIMIT
+    go.append(1)
+    ended(slow).result()

@@ -1,0 +1,315 @@
+"""How long a state waits, what it tells meanwhile, and what becomes of how it ends; and the end of a motion."""
+
+import math
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+import smach
+from coglab_msgs.msg import ReasonCode
+from coglab_smach.clocks.virtual_clock import using
+from coglab_smach.context.config import ConfigError
+from coglab_smach.kinematics.motion_time import MotionLimits
+from coglab_smach.kinematics.reachability import default_arm
+from coglab_smach.ports.pending import Pending, PortError, Ready
+from coglab_smach.states.base import CoglabState, require_all
+from coglab_smach.states.motion import await_rest, end_motion, rise, shift, shift_time
+from conftest import Trial
+
+NEVER = lambda: False  # noqa: E731
+
+
+class Probe(CoglabState):
+    """Does what the test says."""
+
+    def __init__(self, ctx, work):
+        super().__init__(ctx, ["succeeded", "other"])
+        self.work = work
+
+    def run(self, ud):
+        return self.work(self) or "succeeded"
+
+
+class Never(Pending):
+    """A call that is never answered."""
+
+    cancelled = 0
+
+    def done(self):
+        return False
+
+    def cancel(self):
+        self.cancelled += 1
+
+
+def walked(work, prepare=lambda trial, state: None, **flags):
+    """(trial, state, its record, s that it took)"""
+    trial = Trial()
+    state = Probe(trial.ctx, work)
+    for name, value in flags.items():
+        setattr(state, name, value)
+    prepare(trial, state)
+    with using(trial.clock):
+        begin = trial.clock.now()
+        outcome = state.execute(smach.UserData())
+    record = trial.ctx.journal.transitions[-1]
+    assert record.outcome == outcome
+    return trial, state, record, trial.clock.now() - begin
+
+
+@pytest.mark.parametrize(
+    ("limit", "own", "took"), [(2.0, 10.0, 2.0), (None, 10.0, 10.0), (20.0, 10.0, 10.0), (0.0, 10.0, 0.0)]
+)
+def test_a_wait_ends_with_its_own_limit_or_the_states(limit, own, took):
+    _, _, record, seconds = walked(lambda s: s.wait_for(NEVER, "rain", limit), default_time_limit=own)
+    assert took <= seconds <= took + 0.021
+    assert (record.outcome, record.code) == ("failed", ReasonCode.TIME_LIMIT)
+    assert record.reason == f"Probe: rain within {took:.1f} s expected, it did not happen"
+
+
+@pytest.mark.parametrize(("pace", "took"), [(1.0, 2.0), (0.5, 4.0), (0.0, 20.0), (0.1, 20.0), (3.0, 2.0)])
+def test_a_wait_for_a_motion_counts_in_its_pace_down_to_a_tenth(pace, took):
+    left = []
+
+    def work(state):
+        try:
+            state.wait_for(NEVER, "rain", 2.0, lambda: pace)
+        finally:
+            left.append(state.left())
+
+    _, _, _, seconds = walked(work)
+    assert seconds == pytest.approx(took, abs=0.15) and left[0] == pytest.approx(8.0, abs=0.1), "put off likewise"
+
+
+def test_what_is_true_at_once_takes_no_time_and_tells_nothing():
+    told = []
+    trial, _, record, seconds = walked(
+        lambda s: s.wait_for(lambda: True, "rain", 0.0), lambda t, s: t.ctx.journal.listen_waits(lambda: told.append(1))
+    )
+    assert seconds == 0.0 and record.outcome == "succeeded" and told == []
+
+
+@pytest.mark.parametrize(("pace", "moves"), [(None, 0.0), (lambda: 0.5, 0.5)])
+def test_the_end_of_a_wait_is_told_again_when_it_has_moved_by_a_fifth_of_a_second(pace, moves):
+    told = []
+
+    def prepare(trial, state):
+        state.trial = trial
+        trial.ctx.journal.listen_waits(lambda: told.append((trial.clock.now(), trial.ctx.journal.wait())))
+
+    walked(lambda s: s.wait_for(NEVER, "rain", 2.0, pace, 77), prepare)
+    *waits, (_, last) = told
+    assert last.what == "" and {(w.what, w.code, w.aside) for _, w in waits} == {("rain", 77, False)}
+    assert waits[0] == (0.0, waits[0][1]) and waits[0][1].deadline == pytest.approx(2.0)
+    steps = np.diff([w.deadline for _, w in waits])
+    assert np.all((steps > 0.2) & (steps < 0.23)) and len(steps) == (9 if moves else 0)
+
+
+def test_what_looks_on_is_told_as_aside_and_its_failure_is_none_of_its_action():
+    told = []
+
+    def prepare(trial, state):
+        trial.ctx.journal.listen_waits(lambda: told.append(next(iter(trial.ctx.journal._waits.values()), None)))
+
+    trial, _, record, _ = walked(lambda s: s.wait_for(NEVER, "rain", 1.0), prepare, essential=False)
+    assert told[0].aside and record.outcome == "failed" and trial.ctx.journal.newest_failure().sentence == ""
+
+
+@pytest.mark.parametrize(("duration", "took", "outcome"), [(3.0, 3.0, "succeeded"), (0.015, 0.015, "succeeded")])
+def test_a_pause_takes_its_time(duration, took, outcome):
+    _, _, record, seconds = walked(lambda s: s.pause(duration))
+    assert seconds == pytest.approx(took) and record.outcome == outcome
+
+
+def test_a_pause_ends_with_the_states_limit():
+    _, _, record, seconds = walked(lambda s: s.pause(30.0))
+    assert seconds == pytest.approx(10.0, abs=0.02) and record.code == ReasonCode.TIME_LIMIT
+    assert record.reason == "Probe: Probe had to end within 10.0 s, it did not"
+
+
+def test_a_call_that_is_given_up_is_cancelled_and_one_that_is_answered_is_not():
+    never, good = Never(), Ready(5)
+    good.cancel = lambda: pytest.fail("it was answered")
+    _, _, record, seconds = walked(lambda s: s.await_pending(never, "the answer", 1.5))
+    assert (
+        never.cancelled == 1 and "the answer within 1.5 s" in record.reason and seconds == pytest.approx(1.5, abs=0.02)
+    )
+    assert walked(lambda s: str(s.await_pending(good, "it")) == "5" and "other")[2].outcome == "other"
+
+
+@pytest.mark.parametrize("configured", [False, True])
+def test_a_state_may_take_what_it_allows_itself_unless_the_configuration_says_otherwise(configured):
+    def prepare(trial, state):
+        trial.ctx.config.set("time_limits", {"Probe": 3.0} if configured else {})
+
+    def work(state):
+        state.pause(1.0)
+        state.allow(20.0)
+        state.wait_for(NEVER, "rain")
+
+    _, _, _, seconds = walked(work, prepare)
+    assert seconds == pytest.approx(3.0 if configured else 21.0, abs=0.03)
+
+
+def raising(error):
+    def work(state):
+        raise error
+
+    return work
+
+
+@pytest.mark.parametrize(
+    ("error", "sentence", "code"),
+    [
+        (PortError("no", ("because",), 7), "Probe: no", 7),
+        (ConfigError("no field"), "Probe: no field", ReasonCode.BAD_FILE),
+        (smach.InvalidUserCodeError("no key"), "Probe: no key", ReasonCode.BAD_FILE),
+        (ValueError("odd"), "Probe: ValueError: odd (work:", ReasonCode.UNEXPECTED),
+    ],
+)
+def test_whatever_a_state_raises_is_a_failure_with_a_sentence_and_a_code(error, sentence, code):
+    trial, _, record, _ = walked(raising(error))
+    assert record.outcome == "failed" and record.reason.startswith(sentence) and record.code == code
+    first = trial.ctx.journal.first_failure()
+    assert (first.sentence, first.causes, first.code) == (record.reason, record.causes, code)
+
+
+def test_a_failure_without_a_word_says_at_least_who_failed():
+    assert walked(lambda s: "failed")[2].reason == "Probe failed"
+    assert walked(lambda s: "other")[2].reason == ""
+    assert set(Probe(Trial().ctx, None).get_registered_outcomes()) == {"succeeded", "other", "failed", "preempted"}
+
+
+@pytest.mark.parametrize(("deaf", "outcome"), [(False, "failed"), (True, "succeeded")])
+def test_stop_ends_a_state_that_is_not_deaf_to_it(deaf, outcome):
+    def prepare(trial, state):
+        state.trial = trial
+
+    def work(state):
+        state.trial.ctx.stop.press("the test")
+        state.pause(1.0)
+
+    _, _, record, seconds = walked(work, prepare, ignores_stop=deaf)
+    assert record.outcome == outcome and seconds == pytest.approx(1.0 if deaf else 0.0)
+    if not deaf:
+        assert record.reason == "STOP: the test; to go on type: ./coglab start reset"
+        assert record.code == ReasonCode.STOP_LATCHED
+
+
+def test_a_request_to_end_is_obeyed_in_the_middle_and_at_the_end():
+    for work in (lambda s: s.request_preempt() or s.pause(1.0), lambda s: s.request_preempt() or "other"):
+        _, state, record, seconds = walked(work)
+        assert (record.outcome, record.code, seconds) == ("preempted", ReasonCode.PREEMPTED, 0.0)
+        assert record.reason == "Probe was preempted" and not state.preempt_requested(), "served"
+    _, state, record, _ = walked(lambda s: s.request_preempt() or "failed")
+    assert record.outcome == "failed" and state.preempt_requested(), "passed on by what is around it"
+
+
+@pytest.mark.parametrize(("outcome", "cancelled"), [("succeeded", 0), ("failed", 1)])
+def test_who_owns_a_motion_ends_it_where_it_fails(outcome, cancelled):
+    trial, _, _, _ = walked(lambda s: outcome, owns_motion=True)
+    assert len(trial.cell.called("cancel")) == cancelled
+    assert not walked(lambda s: "failed")[0].cell.called("cancel")
+
+
+@pytest.mark.parametrize(
+    ("first", "second", "over", "end"),
+    [
+        (None, None, False, None),
+        ("succeeded", None, False, None),
+        ("failed", None, True, None),
+        ("preempted", None, True, None),
+        ("succeeded", "succeeded", True, "succeeded"),
+        ("succeeded", "failed", True, "failed"),
+        ("preempted", "failed", True, "failed"),
+        ("succeeded", "preempted", True, "preempted"),
+    ],
+)
+def test_a_group_is_over_when_all_have_succeeded_or_one_has_not(first, second, over, end):
+    decide, conclude = require_all(["a", "b"])
+    outcomes = {"a": first, "b": second, "looks on": "failed"}
+    assert decide(outcomes) == over
+    assert end is None or conclude(outcomes) == end
+
+
+# --- the end of a motion ----------------------------------------------------------------------------------------------
+
+
+def rested(sway, look=lambda: None):
+    """s that are waited for an arm that sways so (rad at s)."""
+    trial = Trial()
+    trial.ctx.arm.joint_positions = lambda: (0.0, sway(trial.clock.now()), *[0.0] * 5)
+    with using(trial.clock):
+        await_rest(trial.ctx, look)
+    return trial.clock.now()
+
+
+def test_an_arm_rests_that_has_moved_by_no_more_than_a_milliradian_for_a_fifth_of_a_second():
+    assert rested(lambda t: 0.0) == pytest.approx(0.2, abs=0.011)
+    assert rested(lambda t: 0.0009 * (t > 0.1)) == pytest.approx(0.2, abs=0.011)
+    assert rested(lambda t: 0.0011 * (t > 0.095)) == pytest.approx(0.3, abs=0.011)
+    assert rested(lambda t: -0.01 * t) == pytest.approx(1.5, abs=0.021), "a millirad in 0.1 s: no longer than 1.5 s"
+    assert rested(lambda t: 0.0, lambda: True) == 0.0
+    looks = []
+    assert rested(lambda t: 0.1 * t, lambda: looks.append(1) or len(looks) > 10) == pytest.approx(0.1)
+
+
+@pytest.mark.parametrize(
+    ("there", "hold", "took", "words"),
+    [
+        (True, "succeeds", 3.2, "(no answer within 3.0 s), so the arm was held"),
+        (True, "refuses", 3.2, "(no answer within 3.0 s), so the arm was held: held already"),
+        (False, "succeeds", 0.5, "the motion could not be ended: the robot is silent"),
+    ],
+)
+def test_a_motion_that_cannot_be_cancelled_is_held_and_a_silent_robot_is_not_waited_for(there, hold, took, words):
+    trial, held = Trial(), []
+    refusal = Ready(error=PortError("held already"))
+    trial.ctx.arm.cancel_motion = lambda reason: Never()
+    trial.ctx.arm.hold = lambda reason: held.append(reason) or (Ready() if hold == "succeeds" else refusal)
+    if not there:
+        trial.ctx.arm.joint_positions = lambda: None
+    with using(trial.clock):
+        trouble = end_motion(trial.ctx, "the test")
+    assert trouble.endswith(words) and trial.clock.now() == pytest.approx(took, abs=0.04)
+    assert len(held) == there
+
+
+def test_a_motion_that_is_cancelled_is_no_trouble():
+    trial = Trial()
+    with using(trial.clock):
+        assert end_motion(trial.ctx, "the test") == ""
+    assert 0.2 <= trial.clock.now() < 0.3
+
+
+@pytest.mark.parametrize("by", [(0.0, 0.0, 0.05), (0.03, -0.02, 0.01)])
+def test_a_shift_moves_the_palm_straight_and_each_joint_by_its_share(by):
+    trial, asked = Trial(), []
+    here = np.array(trial.ctx.config.get("postures.home"))
+    trial.ctx.arm.joint_positions = lambda: tuple(here)
+    trial.ctx.arm.move_ptp = lambda target, speed: asked.append((np.array(target), np.array(speed))) or Ready()
+    shift(trial.ctx, np.array(by), 0.04)
+    ((target, speed),) = asked
+    (before, turn), (after, turned) = default_arm().fk(here), default_arm().fk(target)
+    assert after - before == pytest.approx(by, abs=5e-3) and abs(turn @ turned) > 0.9999
+    # The way takes its length over its speed; no joint is told less than 1 mrad/s.
+    seconds = float(np.linalg.norm(by)) / 0.04
+    assert speed == pytest.approx(np.maximum(np.abs(target - here) / seconds, 1e-3))
+    assert shift_time(trial.ctx, np.array(by), 0.04) >= seconds
+    slow = MotionLimits((0.01,) * 7, (1.0,) * 7, (1.0,) * 7, (1.0,) * 7)
+    trial.ctx.arm.motion_limits = lambda: slow
+    shift(trial.ctx, np.array(by), 0.04)
+    assert asked[1][1] == pytest.approx(speed * 0.01 / speed.max()), "all alike"
+    rise(trial.ctx, -0.02, 0.04)
+    assert default_arm().fk(asked[2][0])[0] - before == pytest.approx([0.0, 0.0, -0.02], abs=2e-3)
+    trial.ctx.arm.joint_positions = lambda: None
+    assert shift(trial.ctx, np.array(by), 0.04) is None and shift_time(trial.ctx, np.array(by), 0.04) == 0.0
+
+
+def test_an_endless_wait_has_no_deadline_to_tell():
+    trial = Trial()
+    state = Probe(trial.ctx, lambda s: None)
+    state.time_limit = lambda: math.inf
+    with using(trial.clock):
+        assert state.execute(SimpleNamespace()) == "succeeded"
+    assert trial.ctx.journal.wait().deadline == math.inf and trial.ctx.journal.active() == ()

@@ -1,0 +1,258 @@
+"""Taking a weight, and recovering from what failed, at the edges of their figures: metres, newtons and seconds."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from coglab_msgs.msg import ReasonCode, Say
+from coglab_py.pose import Pose
+from coglab_smach.clocks.virtual_clock import using
+from coglab_smach.machines import recovery
+from coglab_smach.machines.recovery import SecureHand, WhatIsHeld
+from coglab_smach.ports.interfaces import ContactEvent, HandState
+from coglab_smach.ports.pending import PortError, Ready
+from coglab_smach.states import arm, weight
+from coglab_smach.states.arm import HomeRobot
+from coglab_smach.states.base import TimeLimit
+from coglab_smach.states.weight import TakeWeight
+from conftest import Trial
+from test_giving import giving
+
+RECEIVE = "exchange_human_to_robot"
+WEIGHT = 0.31 * 9.81
+
+# --- taking the weight ------------------------------------------------------------------------------------------------
+
+
+class Lifted:
+    """A TakeWeight whose parts the test calls; ``rises``: m and m/s."""
+
+    def __init__(self, monkeypatch, carried=False):
+        self.trial, self.rises, self.z, self.away = Trial(), [], 0.5, 0.1
+        self.ctx = self.trial.ctx
+        state = self.state = TakeWeight(self.ctx)
+        self.busy = False
+        state._way = SimpleNamespace(follow=lambda: None, idle=lambda: not self.busy, begin=lambda m: None)
+        state._way.halt = lambda why: self.rises.append(why)
+        state._rises, state._on, state._told, state._seen_away = 0, None, False, False
+        self.event = ContactEvent(True, "x", 1.0) if carried else None
+        self.ctx.contact.event = lambda: self.event
+        monkeypatch.setattr(weight, "palm_at", lambda ctx: np.array([0.0, 0.0, self.z]))
+        monkeypatch.setattr(weight, "hand_from_palm", lambda s: self.away)
+        monkeypatch.setattr(weight, "rise", lambda ctx, by, speed: self.rises.append((by, speed)) or Ready())
+
+
+def test_the_whole_rise_is_3_cm_and_no_shorter_one_than_5_mm_is_begun(monkeypatch):
+    lifted = Lifted(monkeypatch)
+    lifted.state._rise()
+    for z, way in ((0.51, 0.02), (0.524, 0.006)):
+        lifted.z = z
+        lifted.state._rise()
+        assert lifted.rises[-1] == (pytest.approx(way), 0.055)
+    lifted.z = 0.526
+    lifted.state._rise()
+    lifted.z = 0.5
+    lifted.state._rise(0.01)
+    assert lifted.rises[3:] == [(pytest.approx(0.01), 0.055)]
+    for _ in range(9):
+        lifted.state._rise()
+    assert len(lifted.rises) == 8, "times at most"
+
+
+@pytest.mark.parametrize(
+    ("away", "farther", "gone"),
+    [(0.141, 0.14, True), (0.139, 0.14, False), (0.51, None, True), (0.49, None, False), (None, 0.1, False)],
+)
+def test_a_person_has_let_go_who_is_farther_or_half_a_metre_away(monkeypatch, away, farther, gone):
+    lifted = Lifted(monkeypatch)
+    lifted.away = away
+    assert bool(lifted.state._has_let_go(farther)) == gone and lifted.state._seen_away == gone
+
+
+def test_a_rise_goes_on_by_a_centimetre_half_a_second_after_the_weight_has_come(monkeypatch):
+    lifted = Lifted(monkeypatch, carried=True)
+    said = []
+    lifted.ctx.say = lambda code, text: said.append(code)
+    with using(lifted.trial.clock) as clock:
+        for after, rises in ((0.0, 0), (0.49, 0), (0.02, 1), (0.6, 1), (0.1, 2)):
+            clock.sleep(after)
+            assert not lifted.state._has_let_go(0.5)
+            assert lifted.rises == ["the weight has come", *[(pytest.approx(0.01), 0.055)] * rises], after
+    assert said == [Say.I_HAVE_IT]
+
+
+def test_without_a_sight_the_weight_and_the_whole_rise_are_enough(monkeypatch):
+    lifted = Lifted(monkeypatch)
+    lifted.away = None
+    assert not lifted.state._has_let_go(None) and len(lifted.rises) == 1
+    lifted.event, lifted.busy = ContactEvent(True, "x", 1.0), True
+    assert not lifted.state._has_let_go(None)
+    lifted.busy = False
+    assert lifted.state._has_let_go(None)
+
+
+@pytest.mark.parametrize(
+    ("away", "seen_before", "keeps"),
+    [(None, True, True), (0.31, False, True), (0.29, False, False), (0.4, True, False)],
+)
+def test_a_person_within_30_cm_gets_the_object_back(monkeypatch, away, seen_before, keeps):
+    lifted = Lifted(monkeypatch)
+    lifted.away, lifted.ctx.holding = away, "mug"
+    error = lifted.state._not_released("mug", 5.0, TimeLimit("the wait"), seen_before)
+    assert error.sentence == "the person did not let go of 'mug' within 5 s" and error.code == ReasonCode.NOT_RELEASED
+    assert (lifted.ctx.holding == "mug") == keeps and len(error.causes) == 1 + keeps
+
+
+# --- recovery ---------------------------------------------------------------------------------------------------------
+
+
+def test_a_person_who_may_hold_it_too_is_waited_for_five_seconds_from_being_told():
+    told = []
+
+    def script(t):
+        t.ctx.say = lambda code, text: told.append((code, t.clock.now()))
+        t.cell.push(0.4 * WEIGHT)
+        t.wait_hub("stopped")
+        told.append(("stopped", t.clock.now()))
+
+    giving(script)
+    given_up = [when for code, when in told if code == Say.GIVEN_UP]
+    assert len(given_up) == 1 and told[-1][1] - given_up[0] == pytest.approx(5.0, abs=0.15)
+
+
+@pytest.mark.parametrize(("away", "goes"), [(0.45, False), (0.55, True)])
+def test_a_hand_half_a_metre_from_the_palm_holds_nothing_any_more(away, goes):
+    def script(t):
+        t.cell.push(0.4 * WEIGHT)
+        end = t.clock.now() + 60.0
+        while not t.ctx.requests.hub():
+            assert t.clock.now() < end
+            t.cell.objects["human_hand"] = Pose(t.cell.pose("mug").position + [0.0, away, 0.0])
+            if any(r.from_state == "give_load" for r in t.ctx.journal.transitions):
+                t.cell.push(0.0)
+            t.clock.sleep(0.05)
+
+    trial = giving(script, **{"give.near": 2.0, "give.bring_after": 99.0})
+    secured = next(r.stamp for r in trial.ctx.journal.transitions if r.from_state == "secure_hand")
+    given_up = next(r.stamp for r in trial.ctx.journal.transitions if r.from_state == "give_load")
+    assert (secured - given_up < 2.0) == goes, "who has gone is not waited for"
+    assert trial.result().outcome == ("failed_holding" if goes else "stopped")
+
+
+def test_what_lay_half_a_metre_below_the_hand_was_not_given():
+    for below, outcome in ((0.45, "succeeded"), (0.55, "failed_empty")):
+
+        def script(t, below=below):
+            t.cell.push(0.9 * WEIGHT)
+            hand = t.cell.objects["human_hand"]
+            t.until(lambda: not t.ctx.holding)
+            t.cell.at_palm = None
+            t.cell.objects["mug"] = Pose(hand.position - [0.0, 0.0, below])
+            t.wait_hub("wait_without_object")
+
+        assert giving(script).result().outcome == outcome
+
+
+def test_a_fault_lifts_a_hold_that_is_latched_at_the_robot():
+    trial = Trial()
+
+    def script(t):
+        t.wait_hub("wait_without_object")
+        t.cell.faults.dead.add("arm")
+        t.wait_hub("fault")
+        t.cell.faults.dead.clear()
+        t.cell.arm.held = True
+        assert "silent" in t.ctx.journal.why()
+        t.start("initialise")
+        assert not t.ctx.journal.newest_failure().sentence, "the operator has answered"
+        t.wait_hub("wait_without_object")
+        assert not t.cell.arm.held
+
+    trial.run(script)
+
+
+@pytest.mark.parametrize(("stays", "took"), [(0.25, 0.25), (9.0, 0.8)])
+def test_an_arm_at_home_looks_for_eight_tenths_of_a_second_for_what_it_may_have_lost(stays, took):
+    trial = Trial()
+    state = HomeRobot(trial.ctx, carries=True)
+    state._held = SimpleNamespace(stays=lambda since: trial.clock.now() >= since + stays)
+    with using(trial.clock):
+        state._see_held()
+    assert trial.clock.now() == pytest.approx(took, abs=0.021)
+
+
+@pytest.mark.parametrize(("thing", "hand", "fell"), [(0.1, 0.59, False), (0.1, 0.61, True), (None, 0.9, False)])
+def test_what_is_half_a_metre_below_the_hand_fell_as_it_was_given(monkeypatch, thing, hand, fell):
+    place = lambda z: None if z is None else np.array([0.6, 0.0, z])  # noqa: E731
+    monkeypatch.setattr(arm, "seen_at", lambda state, name: place(thing))
+    monkeypatch.setattr(arm, "person_at", lambda state: place(hand))
+    state = HomeRobot(Trial().ctx, gave=True)
+    if not fell:
+        state._see_given("mug")
+        return
+    with pytest.raises(PortError) as error:
+        state._see_given("mug")
+    assert error.value.code == ReasonCode.GOAL_FELL
+    assert error.value.causes == ("it is seen 0.51 m below the person's hand",)
+
+
+@pytest.mark.parametrize(("caught", "opens"), [(0.9, False), (1.1, True)])
+def test_fingers_that_begin_to_close_on_the_way_have_a_second_to_stand(monkeypatch, caught, opens):
+    trial = Trial()
+    state, opened, clock = SecureHand(trial.ctx), [], trial.clock
+    state._deadline = 1e9
+    monkeypatch.setattr(recovery, "hand_from_palm", lambda s: 0.51)
+    trial.ctx.closing, trial.ctx.closing_on, trial.ctx.closing_firm, trial.ctx.shared = Ready(), "mug", 140, True
+    trial.ctx.hand.state = lambda: HandState(True, holding=clock.now() >= caught)
+    trial.ctx.hand.open = lambda speed: opened.append(speed) or Ready()
+    trial.ctx.perception.locate_object = lambda *_: Ready(error=PortError("not seen"))
+    with using(clock):
+        assert state.run(None) == "succeeded"
+    assert (opened, trial.ctx.holding) == (([400], "") if opens else ([], "mug")) and not trial.ctx.shared
+    assert trial.ctx.firm == (0 if opens else 140) and trial.ctx.closing is None
+
+
+@pytest.mark.parametrize(("away", "held"), [(0.49, ""), (0.51, "mug"), (None, "mug")])
+def test_who_is_at_what_fingers_have_caught_gets_it_back(monkeypatch, away, held):
+    trial = Trial()
+    state = SecureHand(trial.ctx)
+    monkeypatch.setattr(recovery, "hand_from_palm", lambda s: away)
+    trial.ctx.closing, trial.ctx.closing_on, trial.ctx.shared = Ready(), "mug", True
+    trial.ctx.hand.state = lambda: HandState(True, holding=True)
+    with using(trial.clock):
+        state._closed_on_the_way()
+    assert trial.ctx.holding == held and trial.ctx.shared == (away is None or held == "")
+
+
+@pytest.mark.parametrize(("empty_after", "hub", "took"), [(1.5, "empty", 1.6), (2.5, "holding", 2.0)])
+def test_a_hand_that_has_just_started_has_two_seconds_to_be_empty(empty_after, hub, took):
+    trial = Trial()
+    state, clock = WhatIsHeld(trial.ctx), trial.clock
+    state._deadline = 1e9
+    trial.ctx.hand.state = lambda: HandState(True, holding=clock.now() < empty_after)
+    with using(clock):
+        assert state.run(None) == hub
+    assert clock.now() == pytest.approx(took, abs=0.11)
+    trial.ctx.hand.state = lambda: HandState(False)
+    with using(clock):
+        assert state.run(None) == hub, "a hand that does not answer changes nothing"
+    assert state.reason.startswith("the hand does not tell")
+
+
+def test_an_abort_of_a_falling_goal_is_a_withdrawal_where_the_hand_is_still_at_it():
+    for above, code in ((0.02, ReasonCode.GOAL_WITHDRAWN), (0.12, ReasonCode.GOAL_FELL)):
+        trial = Trial()
+
+        def script(t, above=above):
+            t.wait_hub("wait_without_object")
+            t.start(RECEIVE)
+            t.until(lambda: t.ctx.journal.marked("motion_started"))
+            t.clock.sleep(0.3)
+            mug = t.cell.objects["mug"].position
+            t.cell.objects["human_hand"] = Pose(mug + [0.08, 0.0, above])
+            t.cell.arm.end("the goal falls", ReasonCode.GOAL_FELL)
+            t.wait_hub("wait_without_object")
+
+        trial.run(script)
+        words = "it was lowered with the hand that holds it" if code != ReasonCode.GOAL_FELL else "the goal falls"
+        assert trial.result().code == code and trial.result().causes == (words,)
