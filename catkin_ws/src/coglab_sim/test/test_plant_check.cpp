@@ -77,3 +77,27 @@ TEST_F(PlantCheck, ConstraintsThatAreLeftOut) {
   plant_.model().get()->njmax = 2;
   EXPECT_NE(endOf(2).find(": more than 2 constraints at a time;"), std::string::npos);
 }
+
+/// Speeds that nothing in this cell has: m/s and rad/s of what is free, rad/s of a joint.
+TEST_F(PlantCheck, SpeedsThatNothingHereHas) {
+  const Model& model = plant_.model();
+  const struct {
+    int at;
+    double good, bad;
+    const char* who;
+  } rows[] = {{model.object_velocity, 9.5, 10.5, "the object"},
+              {model.object_velocity + 5, 950.0, 1100.0, "the object"},
+              {model.phalanx_velocity[4], 80.0, 160.0, "a joint of a finger"}};
+  for (const auto& row : rows) {
+    SCOPED_TRACE(row.who);
+    Pose free;
+    free.position = Vector3d(2.0, 1.0, 3.0);
+    plant_.place(Place::World, free);
+    plant_.model().data()->qvel[row.at] = row.good;
+    EXPECT_EQ(endOf(1), "");
+    plant_.model().data()->qvel[row.at] = row.bad;
+    EXPECT_NE(endOf(1).find(std::string(": ") + row.who + " is faster than anything here can be"),
+              std::string::npos);
+    plant_.model().data()->qvel[row.at] = 0.0;
+  }
+}

@@ -1,0 +1,231 @@
+"""What the controller refuses in a command, field by field: the edge that is still followed, what lies beyond, and the
+line of its message window."""
+
+import struct
+
+import numpy as np
+import pytest
+from fri_client import CARTESIAN_IMPEDANCE, COMMAND, JOINT_IMPEDANCE, MONITOR, parse, set_point
+from scipy.spatial.transform import Rotation
+
+NAN, INF = float("nan"), float("inf")
+OFFSETS = {"position": 144, "frame": 172, "torque": 220, "force": 248, "stiffness": 272, "damping": 300}
+OFFSETS |= {"cartesian stiffness": 328, "cartesian damping": 352}
+"""of arrays of float32 in a command; typed from the protocol's table"""
+
+
+def answered(s, field, values, flags=None):
+    """One period with an answer in which ``values`` (index: number) replace those of a field."""
+    data = bytearray(s.client.answer(s.measurement, **({} if flags is None else {"flags": flags})))
+    for index, value in values.items():
+        struct.pack_into("<f", data, OFFSETS[field] + 4 * index, value)
+    s.measurement = s.cell.step(bytes(data))
+    return parse(s.measurement)
+
+
+def followed(s, field, values):
+    """Whether command mode goes on with such an answer; else the newest line of the message window."""
+    return answered(s, field, values)["state"] == COMMAND or s.texts()[-1]
+
+
+JOINTS = [
+    ("stiffness", {0: 5000.0, 6: 0.0}, True),
+    ("stiffness", {0: 5001.0}, "cmd.jntStiffness out of range"),
+    ("stiffness", {6: 5001.0}, "cmd.jntStiffness out of range"),
+    ("stiffness", {3: -0.1}, "cmd.jntStiffness out of range"),
+    ("stiffness", {3: NAN}, "cmd.jntStiffness out of range"),
+    ("damping", {0: 1.0, 6: 0.0}, True),
+    ("damping", {0: 1.01}, "cmd.jntDamping out of range"),
+    ("damping", {6: -0.01}, "cmd.jntDamping out of range"),
+    ("torque", {0: 0.99, 6: -0.99}, True),
+    ("torque", {0: 1.01}, "cmd.addJntTrq not properly initialized"),
+    ("torque", {6: -1.01}, "cmd.addJntTrq not properly initialized"),
+    ("torque", {2: NAN}, "cmd.addJntTrq not properly initialized"),
+    ("torque", {2: INF}, "cmd.addJntTrq not properly initialized"),
+    ("cartesian stiffness", {0: -5.0}, True),  # not of this strategy
+]
+
+
+@pytest.mark.parametrize("field, values, expected", JOINTS)
+def test_joint_impedance(session, field, values, expected):
+    s = session()
+    s.command(30)
+    assert followed(s, field, values) == expected
+
+
+TIP = [
+    ("cartesian stiffness", {0: 10000.0, 2: 0.0, 3: 1000.0, 5: 0.0}, True),
+    ("cartesian stiffness", {0: 10001.0}, "cmd.cartStiffness out of range"),
+    ("cartesian stiffness", {2: 10001.0}, "cmd.cartStiffness out of range"),
+    ("cartesian stiffness", {3: 1001.0}, "cmd.cartStiffness out of range"),
+    ("cartesian stiffness", {5: 1001.0}, "cmd.cartStiffness out of range"),
+    ("cartesian stiffness", {1: -1.0}, "cmd.cartStiffness out of range"),
+    ("cartesian stiffness", {4: -1.0}, "cmd.cartStiffness out of range"),
+    ("cartesian damping", {0: 1.0, 5: 0.0}, True),
+    ("cartesian damping", {0: 1.01}, "cmd.cartDamping out of range"),
+    ("cartesian damping", {5: -0.01}, "cmd.cartDamping out of range"),
+    ("force", {0: 3.0, 5: -1.0}, True),
+    ("force", {5: NAN}, "cmd.addTcpFT not properly initialized"),
+    ("force", {0: INF}, "cmd.addTcpFT not properly initialized"),
+    ("frame", {3: NAN}, "cmd.cartPos not properly initialized"),
+    ("frame", {10: INF}, "cmd.cartPos not properly initialized"),
+    ("frame", {0: 0.0, 1: 0.0, 2: 0.0}, "cmd.cartPos not properly initialized"),
+    ("stiffness", {0: -5.0}, True),
+    ("damping", {0: 5.0}, True),
+]
+
+
+@pytest.mark.parametrize("field, values, expected", TIP)
+def test_cartesian_impedance(session, field, values, expected):
+    s = session()
+    s.command(20)
+    assert followed(s, field, values) == expected
+
+
+def frame_of(fields):
+    """Rotation and position of the commanded frame."""
+    frame = np.array(fields["commanded_frame"]).reshape(3, 4)
+    return frame[:, :3].copy(), frame[:, 3].copy()
+
+
+def wire(rotation, position):
+    return dict(enumerate(np.column_stack([rotation, position]).ravel()))
+
+
+def test_a_frame_has_to_be_a_rotation(session):
+    for change, ok in ((1.0004, True), (1.0006, False), (-1.0, False)):
+        s = session()
+        rotation, position = frame_of(s.command(20))
+        found = followed(s, "frame", wire(rotation * [1.0, 1.0, change], position))
+        assert found == (True if ok else "cmd.cartPos not properly initialized"), change
+
+
+@pytest.mark.parametrize("axis", range(3))
+def test_a_frame_may_move_and_turn_so_fast_and_no_faster(session, axis):
+    """2 m/s and 4 rad/s, at 5 ms."""
+    along = np.eye(3)[axis]
+    for faster, turning in ((0.0102, 0.0), (0.0, 0.0204)):
+        s = session()
+        rotation, position = frame_of(s.command(20))
+        turned = Rotation.from_rotvec(0.0196 * along).as_matrix() @ rotation
+        assert followed(s, "frame", wire(turned, position + 0.0098 * along)) is True
+        turned = Rotation.from_rotvec(turning * along).as_matrix() @ turned
+        assert followed(s, "frame", wire(turned, position + (0.0098 + faster) * along)) == "FRI speed limit TCP"
+
+
+@pytest.mark.parametrize("mode, limit", [("AUT", 2.0943951), ("T2", 2.0943951), ("T1", 0.24)])
+def test_a_joint_may_step_five_percent_farther_than_its_limit_in_this_mode(session, mode, limit):
+    for share, ok in ((1.045, True), (1.055, False)):
+        s = session(krc__mode=mode)
+        target = np.array(set_point(s.command()))
+        target[0] += share * limit * 0.005
+        assert (s.tick(position=target)["state"] == COMMAND) is ok
+        assert (s.texts()[-1:] == ["FRI speed limit J1 (A1)"]) is not ok
+
+
+def test_in_t1_a_slower_joint_stays_as_slow(session):
+    s = session(krc__mode="T1", krc__speed_limit=[0.1] * 7)
+    target = np.array(set_point(s.command()))
+    target[5] -= 0.15 * 0.005
+    assert s.tick(position=target)["state"] == MONITOR and s.texts()[-1] == "FRI speed limit J6 (A5)"
+
+
+NAMES = ("A1", "A2", "E1", "A3", "A4", "A5", "A6")
+LIMITS = np.array([2.96705973, 2.0943951, 2.96705973, 2.0943951, 2.96705973, 2.0943951, 2.96705973])
+
+
+@pytest.mark.parametrize("joint", range(7))
+def test_every_axis_has_its_limit_switch_for_commands_and_for_going_on(session, joint):
+    side = 1.0 if joint % 2 else -1.0
+    limits = [0.9, 0.9, 0.9, 0.9, 0.9, 0.9, 0.9]
+    home = np.array([0.0, 0.5, 0.0, -0.7, 0.0, 0.5, 0.0])
+    home[joint] = side * 0.894
+    for going_on in (False, True):
+        s = session(home=list(home), krc__position_limit=limits)
+        target = np.array(set_point(s.command()))
+        for _ in range(2):
+            target[joint] += side * 0.0025
+            assert s.tick(position=target)["state"] == COMMAND and s.cell.limit_switches == 0
+        if going_on:
+            s.tick(answer=False)
+            fields = s.tick(answer=False)
+        else:
+            target[joint] += side * 0.0025
+            fields = s.tick(position=target)
+        assert fields["state"] == MONITOR and s.cell.limit_switches == 1
+        assert s.texts() == [f"software limit switch {NAMES[joint]}"]
+
+
+@pytest.mark.parametrize("joint", range(7))
+def test_entry_takes_what_is_within_a_tenth_of_a_milliradian(session, joint):
+    s = session()
+    near = np.array(set_point(s.monitor()))
+    near[joint] += 0.8e-4
+    s.client.request(1, 10)
+    assert s.run(0.5, position=near)["state"] == COMMAND
+    s = session()
+    s.monitor()
+    far = near.copy()
+    far[joint] += 0.5e-4
+    s.client.request(1, 10)
+    assert s.run(0.5, position=far)["state"] == MONITOR
+    assert s.texts() == [f"FRI interpolation error {NAMES[joint]}"] and parse(s.measurement)["ints"][1] == -3
+
+
+@pytest.mark.parametrize("axis", range(3))
+def test_entry_with_a_frame_takes_what_is_within_a_millimetre_and_a_milliradian(session, axis):
+    for step, turn, ok in ((0.0009, 0.0, True), (0.0011, 0.0, False), (0.0, 0.0009, True), (0.0, 0.0011, False)):
+        s = session()
+        rotation, position = frame_of(s.monitor())
+        turned = Rotation.from_rotvec(turn * np.eye(3)[axis]).as_matrix() @ rotation
+        s.client.frame = list(wire(turned, position + step * np.eye(3)[axis]).values())
+        s.client.flags = CARTESIAN_IMPEDANCE
+        s.client.request(1, 20)
+        assert (s.run(0.3)["state"] == COMMAND) is ok, (step, turn)
+        assert s.texts() == ([] if ok else ["cmd.cartPos not properly initialized"])
+
+
+@pytest.mark.parametrize(
+    "strategy, flags, ok",
+    [
+        (10, 0x0001, True),
+        (10, 0x0000, False),
+        (10, 0x0005, False),
+        (10, 0x0003, False),
+        (10, 0x0101, False),
+        (30, JOINT_IMPEDANCE, True),
+        (30, 0x0001, True),
+        (30, 0x0034, False),
+        (30, 0x1035, False),
+        (20, CARTESIAN_IMPEDANCE, True),
+        (20, 0x0100, True),
+        (20, 0x3501, True),
+        (20, 0x3400, False),
+        (20, 0x3510, False),
+        (20, 0x3701, False),
+    ],
+)
+def test_flags_on_entry(session, strategy, flags, ok):
+    s = session()
+    s.monitor()
+    s.client.flags = flags
+    s.client.request(1, strategy)
+    fields = s.run(0.3)
+    assert (fields["state"] == COMMAND) is ok
+    assert s.texts() == ([] if ok else ["cmdFlags do not fit the control strategy"])
+    if ok:
+        assert s.tick(flags=flags ^ 0x8000)["state"] == MONITOR
+        assert s.texts() == ["cmdFlags changed during cmd mode"]
+
+
+def test_an_added_torque_is_judged_against_the_one_in_force(session):
+    s = session()
+    s.command(30)
+    for torque in (0.9, 1.8, 2.7, 1.8):
+        assert answered(s, "torque", {1: torque})["state"] == COMMAND
+    assert answered(s, "torque", {1: 0.7})["state"] == MONITOR
+    fresh = session()
+    fresh.monitor()
+    fresh.client.torque, fresh.client.flags = [0.9] + [0.0] * 6, JOINT_IMPEDANCE
+    fresh.client.request(1, 30)
+    assert fresh.run(0.3)["state"] == COMMAND, "on entry against none"

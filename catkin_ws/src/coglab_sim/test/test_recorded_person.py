@@ -1,0 +1,254 @@
+"""A person whose hand goes as one was recorded: when it arrives and lets go, what is refused, and the three ways after
+the reach."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from coglab_msgs.msg import Say
+from coglab_py.pose import Pose, about_z
+from coglab_sim.person.participant import Participant
+from coglab_sim.person.recorded_motion import Playback, PlaybackSettings, Recording, RecordingError, Track
+from coglab_sim.person.recorded_person import RecordedHand, RecordedPerson, open_recorded_hand, scene_of
+from coglab_sim.person.scene import Scene
+from person_phase import carried, percept
+
+RATE = 0.02
+OBJECT = "object_mug"
+IN_HAND = np.array([-0.085, 0.01, -0.045])
+
+
+def track(stamps, places, turn=(0.0, 0.0, 0.0, 1.0)):
+    return Track(np.asarray(stamps), np.asarray(places), np.tile(turn, (len(stamps), 1)))
+
+
+def reach(stands=1.0, way=0.4, leaves=True, speed=0.4):
+    """The hand's x: out at 0.4 m/s, standing, and back."""
+    out = np.arange(0.0, way, speed * RATE)
+    return np.concatenate([out, np.full(round(stands / RATE), way), out[::-1] if leaves else []])
+
+
+def recorded(x=None, lets_go=None, object_frame=OBJECT, apart=IN_HAND, **settings):
+    """A recorded hand along x with the mug in it, which from ``lets_go`` (s) on stays behind."""
+    x = reach() if x is None else x
+    stamps = RATE * np.arange(len(x))
+    hand = np.column_stack([x, np.zeros(len(x)), np.full(len(x), 0.4)])
+    thing = hand + apart
+    if lets_go is not None:
+        thing[stamps > lets_go] = thing[int(lets_go / RATE)]
+    tracks = {"human_hand": track(stamps, hand)}
+    if object_frame:
+        tracks[object_frame] = track(stamps, thing)
+    return RecordedHand(Playback(Recording(tracks), PlaybackSettings(file="r.csv", **settings)), object_frame)
+
+
+# -- what was recorded --------------------------------------------------------------------------------------------
+
+
+def test_a_hand_has_arrived_when_it_is_far_out_and_slow():
+    hand = recorded()
+    assert hand.arrived == pytest.approx(1.0, abs=0.03) and hand.end == pytest.approx(3.0, abs=0.05)
+    slow = recorded(np.concatenate([reach(0.0, leaves=False), 0.4 + 0.045 * RATE * np.arange(50)]))
+    assert slow.arrived == pytest.approx(1.0, abs=0.03), "slower than 5 cm/s"
+    never = recorded(np.concatenate([reach(0.0, leaves=False), 0.4 - 0.06 * RATE * np.arange(1, 50)]))
+    assert never.arrived == pytest.approx(1.0, abs=0.03), "else where it is farthest out"
+
+
+@pytest.mark.parametrize("share, stops", [(0.55, False), (0.65, True)])
+def test_a_stop_counts_from_60_percent_of_the_way_on(share, stops):
+    x = reach(0.0, leaves=False)
+    at = int(share * len(x))
+    x = np.concatenate([x[:at], np.full(50, x[at]), x[at:], np.full(50, 0.4)])
+    assert recorded(x).arrived == pytest.approx(share if stops else 2.0, abs=0.05)
+
+
+def test_an_object_is_let_go_when_it_leaves_the_hand_or_at_the_end_of_the_rest():
+    hand = recorded(lets_go=2.1)
+    # It has moved 5 cm in the hand an eighth of a second after the hand has left it.
+    assert hand.released == pytest.approx(2.1 + 0.05 / 0.4, abs=0.045)
+    held = recorded()
+    assert held.released == pytest.approx(1.97, abs=0.03)
+    alone = recorded(object_frame=None)
+    assert alone.object_in_hand is None and alone.released == held.released
+    early = recorded(lets_go=0.3)
+    assert early.released == early.arrived, "not before it has arrived"
+
+
+def test_where_the_object_lies_in_the_hand():
+    hand = recorded()
+    assert hand.object_in_hand.position == pytest.approx(IN_HAND)
+    scene = scene_of(Scene(), hand)
+    assert scene.object_in_hand == pytest.approx(IN_HAND) and np.abs(scene.object_turn) == pytest.approx([0, 0, 0, 1])
+    assert scene.object_mass == Scene().object_mass
+    plain = Scene()
+    assert scene_of(plain, recorded(object_frame=None)) is plain
+
+
+def test_what_is_no_handover_is_refused():
+    with pytest.raises(RecordingError, match=r"r.csv: 'human_hand' moves 0.09\d m, a reach is at least 0.1 m long"):
+        recorded(reach(way=0.096, speed=0.1))
+    recorded(reach(way=0.11, speed=0.1))
+    recorded(apart=np.array([0.299, 0.0, 0.0]))
+    with pytest.raises(RecordingError, match="'object_mug' begins 0.31 m from the hand, at most 0.3 m are accepted"):
+        recorded(apart=np.array([0.0, 0.31, 0.0]))
+    tracks = {OBJECT: track([0.0, 1.0], np.zeros((2, 3)))}
+    with pytest.raises(RecordingError, match="needs the frame 'human_hand', the recording has object_mug"):
+        RecordedHand(Playback(Recording(tracks), PlaybackSettings()), None)
+
+
+def write(path, frames):
+    x = reach()
+    with open(path, "w", encoding="utf-8") as stream:
+        stream.write("t,x,y,z,frame\n")
+        for i, each in enumerate(x):
+            stream.writelines(f"{RATE * i},{each},0,0.4,{frame}\n" for frame in frames)
+    return str(path)
+
+
+def test_settings_of_a_recorded_hand(tmp_path):
+    both, alone = write(tmp_path / "b.csv", ("human_hand", OBJECT)), write(tmp_path / "a.csv", ("human_hand",))
+    hand, way = open_recorded_hand({"file": both}, OBJECT)
+    assert way == "wait" and hand.object_in_hand.position == pytest.approx(np.zeros(3))
+    hand, way = open_recorded_hand({"file": alone, "person": "leave", "object": "in_hand", "time_scale": 2.0}, OBJECT)
+    assert way == "leave" and hand.object_in_hand is None and hand.playback.settings.time_scale == 2.0
+    for settings, words in (
+        ({"file": alone}, "needs the frame 'object_mug', the recording has human_hand"),
+        ({"file": both, "person": "stay"}, "person must be wait, no_wait, leave, got 'stay'"),
+        ({"file": both, "object": "gone"}, "object must be recorded or in_hand, got 'gone'"),
+        ({"file": both, "speed": 1}, "unknown fields speed"),
+    ):
+        with pytest.raises(RecordingError, match=words):
+            open_recorded_hand(settings, OBJECT)
+
+
+# -- the person ---------------------------------------------------------------------------------------------------
+
+
+class Shown:
+    """A recorded person in virtual time, told directly what they perceive."""
+
+    def __init__(self, way="wait", hand=None, **changes):
+        self.hand = hand or recorded()
+        self.human = RecordedPerson(replace(Participant(seed=1), **changes), Scene(), self.hand, way)
+        self.t = 0.0
+        self.human.command("give mug")
+        self.human._take_up(0.0)
+
+    def step(self, seen=None, dt=0.01):
+        self.t += dt
+        getattr(self.human, f"_{self.human.phase}")(self.t, dt, seen or percept(load=carried(1.0)))
+        return self.human.phase
+
+    def until(self, phase, seen=None, limit=20.0):
+        while self.t < limit and self.human.phase != phase:
+            self.step(seen)
+        return self.t
+
+
+def test_a_recorded_person_gives_and_does_not_take():
+    shown = Shown()
+    assert shown.human.phase == "reacting" and shown.human.participant.behaviour == "normal"
+    assert shown.human.participant.sway == shown.human.participant.tremor == 0.0
+    idle = RecordedPerson(Participant(behaviour="tug"), Scene(), recorded(), "wait")
+    assert idle.participant.behaviour == "normal" and idle.way == "wait" and idle.holds()
+    idle.command("receive mug")
+    assert idle._pending is None
+    idle.hear(0.0, Say.READY_TO_GIVE)
+    idle._understand(5.0)
+    assert idle._pending is None
+    idle.hear(5.0, Say.READY_TO_RECEIVE)
+    idle._understand(9.0)
+    assert idle._pending == "give"
+    assert RecordedPerson(Participant(), Scene(), recorded()).way == "wait"
+
+
+def test_it_begins_at_once_where_the_recording_begins():
+    shown = Shown()
+    assert shown.human._hand == pytest.approx([0.0, 0.0, 0.4]) and shown.human.rest == pytest.approx([0.0, 0.0, 0.4])
+    assert shown.step() == "reaching"
+    begin = shown.t
+    shown.step()
+    shown.step()
+    assert shown.human._hand == pytest.approx([0.4 * (shown.t - begin), 0.0, 0.4])
+    assert shown.human._velocity == pytest.approx([0.4, 0.0, 0.0]) and not shown.human._spin.any()
+
+
+def test_a_slower_playback_goes_slower():
+    shown = Shown(hand=recorded(time_scale=2.0))
+    shown.step()
+    begin = shown.t
+    for _ in range(50):
+        shown.step()
+    assert shown.human._hand[0] == pytest.approx(0.4 * (shown.t - begin) / 2)
+    assert shown.human._velocity == pytest.approx([0.2, 0.0, 0.0])
+    assert shown.until("waiting") == pytest.approx(2 * shown.hand.arrived, abs=0.05)
+
+
+def test_turns_are_shown_with_their_spin():
+    stamps = RATE * np.arange(100)
+    turns = np.array([about_z(0.5 * t) for t in stamps])
+    hand = Track(stamps, np.column_stack([0.4 * stamps, 0 * stamps, 0 * stamps]), turns)
+    playback = Playback(Recording({"human_hand": hand}), PlaybackSettings(time_scale=2.0))
+    shown = Shown(hand=RecordedHand(playback, None))
+    for _ in range(40):
+        shown.step()
+    assert shown.human._spin == pytest.approx([0.0, 0.0, 0.25], abs=1e-6)
+    seconds = (shown.t - 0.01) / 2
+    assert shown.human._turn.as_rotvec() == pytest.approx([0.0, 0.0, 0.5 * seconds], abs=1e-6)
+
+
+def test_who_waits_does_so_where_the_reach_ends():
+    shown = Shown("wait")
+    assert shown.until("waiting") == pytest.approx(shown.hand.arrived, abs=0.03)
+    assert shown.human._hand[0] == pytest.approx(0.4, abs=0.01)
+
+
+def test_who_does_not_wait_holds_where_it_was_let_go():
+    shown = Shown("no_wait", hand=recorded(lets_go=1.5))
+    assert shown.until("holding") == pytest.approx(shown.hand.released, abs=0.03) and shown.hand.released > 1.9
+
+
+def test_what_was_felt_during_the_reach_is_what_is_held():
+    shown = Shown("no_wait")
+    shown.until("holding", percept(load=carried(1.0, 0.3), closure=0.2))
+    assert shown.human._held_load == pytest.approx(carried(1.0, 0.3)) and shown.human._closure == 0.2
+
+
+@pytest.mark.parametrize(
+    "load, closure, closing, lets_go",
+    [(0.69, 0.0, 0.0, True), (0.75, 0.0, 0.0, False), (1.0, 0.051, 0.0, False), (0.9, 0.049, 0.0, False)],
+)
+def test_who_leaves_lets_go_of_what_the_robot_has_and_takes_the_rest_away(load, closure, closing, lets_go):
+    shown = Shown("leave", release_share=0.3, release_time=0.2)
+    while shown.t < shown.hand.arrived:
+        shown.step()
+    while shown.t < shown.hand.released:
+        shown.step(percept(load=carried(load), closure=closure, closing=closing))
+        assert shown.human._grip == 1.0, "not before it was recorded"
+    ended = shown.until("idle", percept(load=carried(load), closure=closure, closing=closing))
+    assert ended == pytest.approx(shown.hand.end, abs=0.04) and shown.human._task == "rest"
+    assert shown.human._grip == (0.0 if lets_go else 1.0)
+    assert shown.human._hand[0] == pytest.approx(0.0, abs=0.02), "it has gone all the same"
+
+
+@pytest.mark.parametrize("closure, closing, closed", [(0.051, 0.09, True), (0.049, 0.09, False), (0.2, 0.11, False)])
+def test_a_hand_counts_as_closed_from_5_percent_on(closure, closing, closed):
+    """With a word and a grip that is felt it is enough for who leaves."""
+    shown = Shown("leave", release_time=0.2)
+    while shown.t < shown.hand.released:
+        shown.step()
+    shown.human._told = Say.I_HAVE_IT
+    for step in range(30):
+        shown.step(percept(load=carried(1.0, 0.0 if step < 2 else 0.5), closure=closure, closing=closing))
+    assert (shown.human._grip < 1.0) is closed
+
+
+def test_fingers_that_have_begun_to_open_go_on():
+    shown = Shown("leave", release_time=0.2)
+    while shown.t < shown.hand.released + 0.02:
+        shown.step()
+    shown.step(percept(load=carried(0.5)))
+    assert shown.human._grip == pytest.approx(0.95)
+    shown.step(percept(load=carried(1.0)))
+    assert shown.human._grip == pytest.approx(0.90)
+    assert isinstance(shown.hand.at(0.0), Pose)
