@@ -6,6 +6,7 @@
 
 #include <kdl/tree.hpp>
 #include <kdl_parser/kdl_parser.hpp>
+#include <urdf_parser/urdf_parser.h>
 
 namespace coglab_sim {
 namespace {
@@ -61,8 +62,10 @@ KDL::Chain condensed(const KDL::Tree& tree, const KDL::Chain& chain, const Model
 
 KDL::Chain readChain(const std::string& urdf, const ModelErrors& errors, const std::string& base,
                      const std::string& tip) {
+  // Not by treeFromFile(), which takes it for granted that a robot was found.
+  const auto robot = urdf::parseURDFFile(urdf);
   KDL::Tree tree;
-  if (!kdl_parser::treeFromFile(urdf, tree)) {
+  if (!robot || !kdl_parser::treeFromUrdfModel(*robot, tree)) {
     throw std::runtime_error("robot description " + urdf + " cannot be read as a URDF");
   }
   KDL::Chain chain;

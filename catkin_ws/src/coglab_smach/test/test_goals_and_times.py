@@ -237,3 +237,8 @@ def test_room_is_that_of_the_arm_from_the_elbow_on(monkeypatch):
     monkeypatch.undo()
     upside = Pose(board.position, np.array([1.0, 0.0, 0.0, 0.0]))
     assert room.over(upside, palm) < -1.0, "its z axis is up"
+
+
+def test_nobody_changes_the_home_posture_of_all():
+    with pytest.raises(ValueError, match="read-only"):
+        reachability.home_posture()[0] = 1.0

@@ -284,6 +284,7 @@ def test_after_two_touches_of_something_else_it_comes_again_and_after_three_it_g
     trial = received(monkeypatch, lambda looks: 0.2)
     assert (trial.result().outcome, trial.result().code) == ("failed_empty", ReasonCode.NO_CONTACT)
     assert trial.cell.called().count("arm contact_in_motion") == 3
+    assert trial.cell.called().count("execute_dmp") == 3, "it does not come again only to give up"
     assert "the object is 0.20 m from where it would be held" in trial.result().reason
 
 

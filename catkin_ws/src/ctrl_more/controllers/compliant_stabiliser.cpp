@@ -152,7 +152,8 @@ void CompliantStabiliser::update(const Cycle& cycle, const RobotStates& robot,
                       force_estimate_[i], i, limit);
       }
       offset_[i] = std::copysign(limit, offset_[i]);
-      if (offset_[i] * velocity_[i] > 0.0) velocity_[i] = 0.0;
+      // By sign, since the bound may be 0.
+      if (std::signbit(offset_[i]) == std::signbit(velocity_[i])) velocity_[i] = 0.0;
     }
   }
   modified[com_].head<2>() += offset_;

@@ -191,6 +191,7 @@ void EeAdmittance::update(const Cycle& cycle, const RobotStates& robot, const Co
     torque = tool * torque;
   }
   force_ = force;
+  const Eigen::Vector3d before = offset_.head<3>();
   for (int i = 0; i < 3; ++i) {
     axis_[i].prepare(gain(mass_)[i], gain(damping_)[i], gain(stiffness_)[i], cycle.dt);
     axis_[i].step(force[i], offset_[i], velocity_[i]);
@@ -198,9 +199,9 @@ void EeAdmittance::update(const Cycle& cycle, const RobotStates& robot, const Co
   const double speed = velocity_.head<3>().norm();
   const double max_velocity = scalar(max_velocity_);
   if (speed > max_velocity) {
-    // The offset may not run ahead of the velocity that is sent with it.
-    offset_.head<3>() -= cycle.dt * (1.0 - max_velocity / speed) * velocity_.head<3>();
+    // The offset goes as far as the velocity that is sent with it, and as it does with the force.
     velocity_.head<3>() *= max_velocity / speed;
+    offset_.head<3>() = before + cycle.dt * velocity_.head<3>();
   }
   const double max_offset = scalar(max_offset_);
   if (offset_.head<3>().norm() > max_offset && said_.pass(cycle.now_ns)) {

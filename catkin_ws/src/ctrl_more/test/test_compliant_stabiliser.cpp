@@ -147,6 +147,17 @@ TEST_F(CompliantTest, MeasuredForceInstead) {
             std::vector<std::string>{"measuredData/contactForce"});
 }
 
+TEST_F(CompliantTest, WithoutRoomToYieldNoVelocityIsSent) {
+  ASSERT_TRUE(rig.load("compliant_stabiliser", "force_source: force\nmax_offset: 0\n"));
+  for (int i = 0; i < 100; ++i) {
+    rig.robot.setMeasuredData("contactForce", vectorOf({50, -50, 300}), rig.cycle.now_ns);
+    rig.setReferences();
+    rig.cycleOnce();
+    ASSERT_EQ(rig.control.getCoM(), Eigen::Vector3d(0, 0, 0));
+    ASSERT_EQ(rig.control.getCoMVelocity(), Eigen::Vector3d(0, 0, 0));
+  }
+}
+
 TEST_F(CompliantTest, ZmpIsTakenFromItsReference) {
   ASSERT_TRUE(rig.load("compliant_stabiliser", ""));
   for (int i = 0; i < 20; ++i) {

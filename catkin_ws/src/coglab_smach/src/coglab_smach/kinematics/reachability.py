@@ -38,9 +38,11 @@ def joint_limits() -> cc.JointLimits:
 
 @lru_cache(maxsize=1)
 def home_posture() -> np.ndarray:
-    """``postures.home`` of the machines' configuration, rad."""
+    """``postures.home`` of the machines' configuration, rad; read-only, since all share it."""
     machines = read(package_path("coglab_smach", "config", "machines.yaml")).value
-    return np.array(machines["postures"]["home"], dtype=float)
+    home = np.array(machines["postures"]["home"], dtype=float)
+    home.setflags(write=False)
+    return home
 
 
 def position_jacobian(arm: cc.Chain, q: Sequence[float]) -> np.ndarray:

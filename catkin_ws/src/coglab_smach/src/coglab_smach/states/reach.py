@@ -130,7 +130,7 @@ class WaitStop(CoglabState):
         """The object may come into the hand on the way, at its end, or be brought there once the arm waits. What
         touches the hand while the object is elsewhere is not the object: the arm draws back and comes again."""
         arm, within = self.ctx.arm, float(self.ctx.config.get("contact_within", 0.12))
-        for _ in range(BUMPS + 1):
+        for left in reversed(range(BUMPS + 1)):
             self._await_reach(lambda: self._reached() or 0.0 < arm.dmp_progress().remaining_distance < within)
             self._watch(ud)
             away = off_grasp(self, ud.goal)
@@ -141,7 +141,8 @@ class WaitStop(CoglabState):
                     self._slide_in(ud)
                 return self._found(event)
             self.ctx.journal.mark("bumped")
-            self._come_again(ud)
+            if left:
+                self._come_again(ud)
         raise PortError(
             f"something touches the hand, and the object is {away:.2f} m from where it would be held",
             ("something is in the way, or somebody pushes the arm",),
