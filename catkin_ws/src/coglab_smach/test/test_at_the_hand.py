@@ -395,3 +395,13 @@ def test_what_pushes_with_6_5_newton_is_in_the_way(monkeypatch, newton, ends):
     seen.ctx.arm.cancel_motion = lambda why: cancelled.append(why) or Ready()
     assert seen.run(seat.Seat(seen.ctx), goal={})[0] == "succeeded"
     assert cancelled == (["something is in the way"] if ends else [])
+
+
+def test_a_palm_that_does_not_arrive_in_time_stops_where_it_is(monkeypatch):
+    seen, cancelled = Seen(), []
+    monkeypatch.setattr(seat, "way_to_grasp", lambda *_: np.array([0.0, 0.0, -0.03]))
+    monkeypatch.setattr(seat, "shift", lambda ctx, way, speed: Polled(lambda: False, lambda: None))
+    seen.ctx.contact.force = lambda: (0.0, 0.0, 6.0)
+    seen.ctx.arm.cancel_motion = lambda why: cancelled.append(why) or Ready()
+    outcome, state = seen.run(seat.Seat(seen.ctx), goal={})
+    assert outcome == "succeeded" and len(cancelled) == 1 and "the way to the grasp" in cancelled[0]

@@ -10,7 +10,7 @@ import numpy as np
 from coglab_smach.context.awaited import ARM
 from coglab_smach.context.context import Context
 from coglab_smach.ports.pending import Pending
-from coglab_smach.states.base import CoglabState
+from coglab_smach.states.base import CoglabState, TimeLimit
 from coglab_smach.states.motion import shift, shift_time
 from coglab_smach.states.where import way_to_grasp
 
@@ -25,7 +25,7 @@ PUSHES = 6.5
 class Seat(CoglabState):
     """Move the open hand straight to the grasp of the object that a person still holds, as it is seen now and by
     FARTHEST m at most. A reach ends with the first touch, and that may come beside the grasp; another reach would feel
-    the same touch at once. The way ends where the hand pushes; without a sight of the object nothing moves."""
+    the same touch at once. The way ends where the hand pushes or in time; without a sight of the object nothing moves."""
 
     default_time_limit = 6.0
     owns_motion = True
@@ -45,7 +45,11 @@ class Seat(CoglabState):
         motion = shift(self.ctx, way, SPEED)
         if motion is not None:
             over = partial(self._over, motion)
-            self.wait_for(over, "the way to the grasp", limit, self.ctx.arm.speed_scale, ARM)
+            try:
+                self.wait_for(over, "the way to the grasp", limit, self.ctx.arm.speed_scale, ARM)
+            except TimeLimit as error:
+                # Held up by something that yields as the palm comes: the fingers can close here, too.
+                self.reason = error.sentence
             self._end(motion)
         return "succeeded"
 
@@ -60,5 +64,5 @@ class Seat(CoglabState):
         if motion.done():
             motion.result()
         else:
-            self.reason = "something is in the way"
+            self.reason = self.reason or "something is in the way"
             self.await_pending(self.ctx.arm.cancel_motion(self.reason), "end of the way to the grasp", 2.0)
