@@ -225,6 +225,8 @@ TEST(BridgeView, ACommandOfTheFutureOrOfLongPeriodsCountsWithinItsLimit) {
     return !cell.bridge.snapshot().sample.commanded_velocity.isZero();
   };
   EXPECT_TRUE(follows(0.005, 0.049));
+  EXPECT_TRUE(follows(0.005, 0.05));  // the limit is still within
+  EXPECT_TRUE(follows(0.005, -0.05));
   EXPECT_FALSE(follows(0.005, 0.051));
   EXPECT_TRUE(follows(0.005, -0.049));
   EXPECT_FALSE(follows(0.005, -0.051));

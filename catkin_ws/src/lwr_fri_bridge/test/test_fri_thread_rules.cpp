@@ -59,6 +59,7 @@ TEST(FriThreadRules, IdleTicksAreToldAndKeepThePeer) {
 TEST(FriThreadRules, BeforeTheFirstDatagramNobodyIsNamed) {
   Bridge bridge(patient());
   FriThread fri(bridge, anyPort());
+  EXPECT_EQ(fri.port(), 0);
   fri.start();
   const FriThreadStatistics told = fri.statistics();
   EXPECT_EQ(told.answers + told.superseded + told.foreign + told.send_errors, 0U);
@@ -97,6 +98,54 @@ TEST(FriThreadRules, TheNewestOfThoseThatWaitIsAnswered) {
   EXPECT_EQ(fri.statistics().superseded, 3U);
   EXPECT_EQ(bridge.snapshot().session.lost_measurements, 3U);
   EXPECT_EQ(fri.statistics().foreign, 0U);
+}
+
+/// Each of the controller's datagrams that waits behind another is a cycle of lateness; those of
+/// somebody else are none. Four cycles of it are what costs command mode here.
+TEST(FriThreadRules, WhatWaitsForTheThreadIsItsLateness) {
+  Bridge bridge(patient());
+  std::atomic<bool> held{false}, waits{false};
+  std::atomic<int> served{0};
+  FriThreadOptions options = anyPort();
+  options.after_answer = [&](bool answered) {
+    for (int i = 0; i < 1000 && answered && held; ++i) {
+      waits = true;
+      std::this_thread::sleep_for(std::chrono::milliseconds(20));  // off the beat of 5 ms
+    }
+    served += answered ? 1 : 0;
+  };
+  FriThread fri(bridge, options);
+  fri.start();
+  Peer peer(fri.port()), other(fri.port());
+  test::SmallController robot(0.005);
+  fri::CommandDatagram c{};
+  const std::uint32_t ticket = bridge.submit("start");
+  Outcome start;
+  int sent = 0;
+  for (; sent < 200 && start.code == OutcomeCode::Pending; ++sent) {
+    peer.send(robot.measure());
+    ASSERT_TRUE(peer.receive(c));
+    robot.take(&c);
+    start = bridge.outcome(ticket);
+  }
+  ASSERT_TRUE(start.success()) << describe(start);
+  ASSERT_TRUE(eventually([&] { return served == sent; }));  // it waits for the next one
+  held = true;
+  peer.send(robot.measure());
+  ASSERT_TRUE(peer.receive(c));
+  robot.take(&c);
+  ASSERT_TRUE(eventually([&] { return waits.load(); }));
+  for (int i = 0; i < 4; ++i) {
+    peer.send(robot.measure());
+    robot.take(nullptr);
+    if (i < 2) other.send(robot.measure());
+  }
+  robot.state = fri::FriState::Monitor;
+  peer.send(robot.measure());
+  held = false;
+  ASSERT_TRUE(peer.receive(c));
+  EXPECT_TRUE(eventually([&] { return bridge.snapshot().fall_backs == 1; }));
+  EXPECT_EQ(bridge.snapshot().loss.cause, LossCause::ComputerLate);
 }
 
 /// A controller on 127.0.0.1 runs here, so its silence is this computer's doing.

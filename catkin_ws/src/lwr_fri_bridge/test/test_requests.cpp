@@ -166,6 +166,16 @@ TEST(Requests, AnIdleTickAfterTheFirstDatagramGoesOnWithAStart) {
   EXPECT_EQ(cell.bridge.snapshot().supervisor, SupervisorState::Starting);
 }
 
+TEST(Requests, AnIdleTickInCommandModeEndsNothing) {
+  Cell cell;
+  cell.start();
+  cell.bridge.idle(cell.robot.now() + 10'000'000);
+  EXPECT_EQ(cell.bridge.snapshot().supervisor, SupervisorState::Command);
+  EXPECT_EQ(cell.bridge.snapshot().fall_backs, 0U);
+  cell.runDriven(60, Vector7::Constant(0.2));
+  EXPECT_NEAR(cell.bridge.snapshot().sample.commanded_velocity[0], 0.2, 1e-9);
+}
+
 /// Silence counts from the last datagram: 0.25 s, or five cycles where they are longer.
 TEST(Requests, SilenceIsToldAfterItsTimeLimit) {
   for (const double period : {0.005, 0.1}) {
@@ -183,9 +193,11 @@ TEST(Requests, SilenceIsToldAfterItsTimeLimit) {
     EXPECT_EQ(s.supervisor, SupervisorState::Disconnected);
     EXPECT_EQ(s.state, fri::FriState::Off);
     EXPECT_EQ(s.quality, fri::Quality::Unacceptable);
-    cell.robot.setCounter(9);  // whatever it counts now
+    cell.robot.setCounter(9);  // whatever it counts now, and wherever it was moved
+    cell.robot.setMeasured(cell.robot.measured() + Vector7::Constant(0.5));
     EXPECT_TRUE(cell.robot.cycle(cell.bridge));
     EXPECT_TRUE(cell.bridge.connected());
+    EXPECT_TRUE(cell.bridge.snapshot().sample.velocity.isZero());
     EXPECT_EQ(cell.bridge.snapshot().session.restarts, 0U);
   }
 }
