@@ -180,6 +180,24 @@ class LwrNode(unittest.TestCase):
         wait_for(lambda: self.robot.position[0] > before[0], "motion made after the reset")
         self.ask("stop")
 
+    def test_outcomes_of_events_go_to_the_log_once(self) -> None:
+        told: list[str] = []
+        subscriber = rospy.Subscriber("/rosout", Log, lambda m: told.append(m.msg))
+
+        def said(line: str, event: str) -> bool:
+            self.events.publish(event)
+            return wait_for(lambda: any(line in one for one in told), line)
+
+        # Until the log is connected.
+        wait_for(lambda: self.events.publish("reset") or any("lwr: reset: nothing to do" in m for m in told), "the log")
+        said("lwr: hold: done", "hold")
+        said("lwr: start refused: hold is latched", "start")
+        said("lwr: ros_events: unknown event 'jump'", "jump")
+        said("lwr: reset: done", "reset")
+        subscriber.unregister()
+        self.assertEqual(sum("lwr: hold: done" in line for line in told), 1)
+        self.assertFalse([line for line in told if "not finished yet" in line])
+
     def test_modes_change_in_monitor_mode_only(self) -> None:
         self.ask("joint_impedance stiffness 500 damping 0.7")
         self.assertIn("JNT_IMP", self.ask("start"))

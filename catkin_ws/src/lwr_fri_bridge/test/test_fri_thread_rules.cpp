@@ -54,6 +54,10 @@ TEST(FriThreadRules, IdleTicksAreToldAndKeepThePeer) {
   EXPECT_EQ(told.superseded, 0U);
   EXPECT_EQ(told.send_errors, 0U);
   EXPECT_FALSE(told.real_time);
+  EXPECT_GT(told.longest_answer_time, 0.0);
+  EXPECT_EQ(fri.statistics().longest_answer_time, told.longest_answer_time);
+  EXPECT_EQ(fri.statistics(true).longest_answer_time, told.longest_answer_time);
+  EXPECT_EQ(fri.statistics().longest_answer_time, 0.0);
 }
 
 TEST(FriThreadRules, BeforeTheFirstDatagramNobodyIsNamed) {
@@ -61,6 +65,7 @@ TEST(FriThreadRules, BeforeTheFirstDatagramNobodyIsNamed) {
   FriThread fri(bridge, anyPort());
   EXPECT_EQ(fri.port(), 0);
   fri.start();
+  EXPECT_GT(fri.port(), 1023);  // any free one; none is preferred
   const FriThreadStatistics told = fri.statistics();
   EXPECT_EQ(told.answers + told.superseded + told.foreign + told.send_errors, 0U);
   EXPECT_EQ(told.peer, "");
